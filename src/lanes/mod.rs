@@ -1,0 +1,158 @@
+//! Numbers that are computed side by side: one generic body serves one element (`f32`) and `L`
+//! elements at once ([`Lanes`]).
+//!
+//! Element loops are written once over [`Real`]. The compiler turns the fixed-length loops of
+//! [`Lanes`] into vector instructions of whatever width the target has; no operation here fuses a
+//! multiplication with an addition, so every width gives the same bits.
+
+mod functions;
+
+use core::ops::{Add, Mul, Neg, Sub};
+
+/// Elements in one block of the scene's tables; every lane count divides it.
+pub const BLOCK: usize = 16;
+
+/// Real numbers in single precision, one or several side by side.
+pub trait Real:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+{
+    /// Numbers held side by side.
+    const COUNT: usize;
+
+    /// Number `lane` is `at(lane)`.
+    fn from_fn(at: impl Fn(usize) -> f32) -> Self;
+    /// The number in `lane`; lanes that do not exist read as zero.
+    fn lane(&self, lane: usize) -> f32;
+    /// Applies `f` to each number.
+    fn map(self, f: impl Fn(f32) -> f32) -> Self;
+    /// Applies `f` to each pair of numbers.
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self;
+
+    /// The same value in every lane.
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self::from_fn(|_| value)
+    }
+    /// The larger of the two; `other` where the comparison is with NaN, as the vector instructions do.
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+    /// The smaller of the two; `other` where the comparison is with NaN.
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    /// Magnitude.
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.map(f32::abs)
+    }
+    /// Square root of zero or a positive normal number, relative error below 3e-7.
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.map(functions::sqrt)
+    }
+    /// `exp(self)`, relative error below 1.2e-7 for arguments from -87 to 88; outside, the value at the
+    /// nearer end.
+    #[inline(always)]
+    fn exp(self) -> Self {
+        self.map(functions::exp)
+    }
+    /// `self^(-1/3)` for positive normal numbers, relative error below 2e-7.
+    #[inline(always)]
+    fn inverse_cbrt(self) -> Self {
+        self.map(functions::inverse_cbrt)
+    }
+}
+
+impl Real for f32 {
+    const COUNT: usize = 1;
+
+    #[inline(always)]
+    fn from_fn(at: impl Fn(usize) -> f32) -> Self {
+        at(0)
+    }
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> f32 {
+        if lane == 0 { *self } else { 0.0 }
+    }
+    #[inline(always)]
+    fn map(self, f: impl Fn(f32) -> f32) -> Self {
+        f(self)
+    }
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        f(self, other)
+    }
+}
+
+/// `L` numbers side by side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(transparent)]
+pub struct Lanes<const L: usize>(pub [f32; L]);
+
+impl<const L: usize> Real for Lanes<L> {
+    const COUNT: usize = L;
+
+    #[inline(always)]
+    fn from_fn(at: impl Fn(usize) -> f32) -> Self {
+        let mut out = [0.0; L];
+        for (lane, value) in out.iter_mut().enumerate() {
+            *value = at(lane);
+        }
+        Self(out)
+    }
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> f32 {
+        self.0.get(lane).copied().unwrap_or(0.0)
+    }
+    #[inline(always)]
+    fn map(self, f: impl Fn(f32) -> f32) -> Self {
+        let mut out = self.0;
+        for value in &mut out {
+            *value = f(*value);
+        }
+        Self(out)
+    }
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        let mut out = self.0;
+        for (a, b) in out.iter_mut().zip(other.0) {
+            *a = f(*a, b);
+        }
+        Self(out)
+    }
+}
+
+impl<const L: usize> Add for Lanes<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+}
+
+impl<const L: usize> Sub for Lanes<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+}
+
+impl<const L: usize> Mul for Lanes<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+}
+
+impl<const L: usize> Neg for Lanes<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.map(|a| -a)
+    }
+}

@@ -1,0 +1,266 @@
+//! What acts on a scene, set by the host whenever it likes: nodal forces (N), traction on boundary
+//! triangles (Pa, turned into nodal forces on the shape at rest), gravity (m/s^2), prescribed motion (m).
+//! A ramp of `r` seconds multiplies a load by `min(1, t / r)`; `r = 0` is a sudden load. In the step from
+//! `t_n` to `t_(n+1)` forces are taken at `t_n`, prescribed positions at `t_(n+1)`.
+
+use core::fmt;
+
+use glam::Vec3;
+
+use crate::material::Material;
+use crate::scene::{Axes, ElementBlock, NodeInertia, Scene};
+
+/// A force on one node.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NodalForce {
+    /// The node.
+    pub node: u32,
+    /// Full force, N.
+    pub newton: [f32; 3],
+    /// Ramp, s.
+    pub ramp: f32,
+}
+
+/// A displacement that one node follows along held axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motion {
+    /// The node.
+    pub node: u32,
+    /// Axes that follow; each must be held by a [`Support`](crate::scene::Support).
+    pub axes: Axes,
+    /// Full displacement, m.
+    pub metre: [f32; 3],
+    /// Ramp, s.
+    pub ramp: f32,
+}
+
+/// Why loads were refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// A load names a node that is not there.
+    Node {
+        /// "force", "motion" or "triangle".
+        kind: &'static str,
+        /// Position in its list.
+        index: usize,
+        /// The node it names.
+        node: u32,
+        /// Nodes in the scene.
+        nodes: usize,
+    },
+    /// A component is NaN or infinite.
+    NotFinite {
+        /// "force", "motion", "traction" or "gravity".
+        kind: &'static str,
+        /// Position in its list.
+        index: usize,
+        /// The value.
+        value: f32,
+    },
+    /// A ramp is negative or not finite.
+    Ramp {
+        /// "force", "motion" or "traction".
+        kind: &'static str,
+        /// Position in its list.
+        index: usize,
+        /// The ramp, s.
+        value: f32,
+    },
+    /// A motion moves an axis that no support holds.
+    NotHeld {
+        /// Position in the list of motions.
+        index: usize,
+        /// The node.
+        node: u32,
+        /// 0, 1, 2 for x, y, z.
+        axis: usize,
+    },
+}
+
+impl fmt::Display for LoadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Node {
+                kind,
+                index,
+                node,
+                nodes,
+            } => {
+                write!(
+                    f,
+                    "{kind} {index}: node {node} does not exist, the scene has {nodes} nodes"
+                )
+            }
+            Self::NotFinite { kind, index, value } => {
+                write!(f, "{kind} {index}: a component is {value}")
+            }
+            Self::Ramp { kind, index, value } => {
+                write!(
+                    f,
+                    "{kind} {index}: the ramp is {value} s, it must be zero or more"
+                )
+            }
+            Self::NotHeld { index, node, axis } => {
+                let axis = ["x", "y", "z"].get(axis).copied().unwrap_or("?");
+                write!(
+                    f,
+                    "motion {index}: node {node} is not held along {axis}; give it a support that moves"
+                )
+            }
+        }
+    }
+}
+
+impl core::error::Error for LoadError {}
+
+/// Checked loads, borrowed from the caller; what is absent costs nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Loads<'a> {
+    gravity: [f32; 3],
+    forces: &'a [NodalForce],
+    motions: &'a [Motion],
+    /// Nodes of the scene they were checked against.
+    nodes: Option<usize>,
+}
+
+impl<'a> Loads<'a> {
+    /// No load; supports stand still.
+    pub const NONE: Self = Self {
+        gravity: [0.0; 3],
+        forces: &[],
+        motions: &[],
+        nodes: None,
+    };
+
+    /// Checks loads against the scene they will act on. Nodes may be listed more than once: forces add
+    /// up, of several motions of an axis the last one holds.
+    pub fn new<M: Material, N: AsRef<[NodeInertia]>, B: AsRef<[ElementBlock]>>(
+        scene: &Scene<M, N, B>,
+        gravity: [f32; 3],
+        forces: &'a [NodalForce],
+        motions: &'a [Motion],
+    ) -> Result<Self, LoadError> {
+        let nodes = scene.node_count();
+        finite("gravity", 0, &gravity)?;
+        for (index, force) in forces.iter().enumerate() {
+            check("force", index, force.node, nodes, &force.newton, force.ramp)?;
+        }
+        for (index, motion) in motions.iter().enumerate() {
+            check("motion", index, motion.node, nodes, &motion.metre, motion.ramp)?;
+            let held = scene.held(motion.node as usize);
+            if let Some(axis) = (0..3).find(|&axis| motion.axes.has(axis) && !held.has(axis)) {
+                return Err(LoadError::NotHeld {
+                    index,
+                    node: motion.node,
+                    axis,
+                });
+            }
+        }
+        Ok(Self {
+            gravity,
+            forces,
+            motions,
+            nodes: Some(nodes),
+        })
+    }
+
+    pub(crate) const fn nodes(&self) -> Option<usize> {
+        self.nodes
+    }
+
+    /// Gravity, m/s^2.
+    #[must_use]
+    pub const fn gravity(&self) -> [f32; 3] {
+        self.gravity
+    }
+
+    /// Nodal forces.
+    #[must_use]
+    pub const fn forces(&self) -> &'a [NodalForce] {
+        self.forces
+    }
+
+    /// Prescribed motions.
+    #[must_use]
+    pub const fn motions(&self) -> &'a [Motion] {
+        self.motions
+    }
+}
+
+/// The share of a load that acts at `time`, s.
+#[inline]
+#[must_use]
+pub fn ramp_factor(time: f64, ramp: f32) -> f32 {
+    if time < f64::from(ramp) {
+        (time / f64::from(ramp)) as f32
+    } else {
+        1.0
+    }
+}
+
+/// Nodal forces of a uniform traction (Pa) on boundary triangles at rest: a third of traction times area
+/// to each corner. The direction stays as given while the body moves (a dead load).
+pub fn traction<'a>(
+    points: &'a [[f32; 3]],
+    triangles: &'a [[u32; 3]],
+    pascal: [f32; 3],
+    ramp: f32,
+) -> impl Iterator<Item = Result<NodalForce, LoadError>> + 'a {
+    triangles.iter().enumerate().flat_map(move |(index, &triangle)| {
+        let nodes = points.len();
+        let corner = |node: u32| points.get(node as usize).copied().map(Vec3::from_array);
+        let [a, b, c] = triangle.map(corner);
+        let share = match (a, b, c) {
+            (Some(a), Some(b), Some(c)) => Some((b - a).cross(c - a).length() / 6.0),
+            _ => None,
+        };
+        triangle.into_iter().map(move |node| {
+            let Some(share) = share else {
+                let missing = triangle.into_iter().find(|&node| node as usize >= nodes);
+                return Err(LoadError::Node {
+                    kind: "triangle",
+                    index,
+                    node: missing.unwrap_or(node),
+                    nodes,
+                });
+            };
+            let newton = pascal.map(|component| component * share);
+            check("traction", index, node, nodes, &newton, ramp)?;
+            Ok(NodalForce { node, newton, ramp })
+        })
+    })
+}
+
+fn check(
+    kind: &'static str,
+    index: usize,
+    node: u32,
+    nodes: usize,
+    vector: &[f32; 3],
+    ramp: f32,
+) -> Result<(), LoadError> {
+    if node as usize >= nodes {
+        return Err(LoadError::Node {
+            kind,
+            index,
+            node,
+            nodes,
+        });
+    }
+    if !(ramp.is_finite() && ramp >= 0.0) {
+        return Err(LoadError::Ramp {
+            kind,
+            index,
+            value: ramp,
+        });
+    }
+    finite(kind, index, vector)
+}
+
+fn finite(kind: &'static str, index: usize, vector: &[f32; 3]) -> Result<(), LoadError> {
+    match vector.iter().find(|component| !component.is_finite()) {
+        Some(&value) => Err(LoadError::NotFinite { kind, index, value }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,79 @@
+//! Exponential law `W(x) = a / (2 b) (exp(b x) - 1)`, `U(J) = d (J - 1)^2` (Meister et al. 2018, section 2,
+//! after Holzapfel & Ogden 2009). `a` and `d` in Pa, `b` without unit.
+//!
+//! In float32 `exp` overflows at 88. The exponent is capped at [`EXPONENT_CAP`]; beyond it `W` goes on
+//! along its tangent, and the step says [`Limited`](crate::tled::Status::Limited).
+
+use super::{Law, Potential};
+use crate::lanes::Real;
+
+/// Largest exponent `b x` before the law is continued along its tangent.
+pub const EXPONENT_CAP: f32 = 40.0;
+
+/// Constants of the exponential law.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Exponential<R = f32> {
+    /// Shear modulus at rest, Pa.
+    pub a: R,
+    /// Stiffening, without unit.
+    pub b: R,
+    /// Half the bulk modulus, Pa.
+    pub d: R,
+}
+
+impl<R: Real> Exponential<R> {
+    #[inline(always)]
+    fn capped_exp(&self, x: R) -> R {
+        (self.b * x).min(R::splat(EXPONENT_CAP)).exp()
+    }
+}
+
+impl<R: Real> Potential<R> for Exponential<R> {
+    #[inline(always)]
+    fn distortion_slope(&self, x: R) -> R {
+        R::splat(0.5) * self.a * self.capped_exp(x)
+    }
+    #[inline(always)]
+    fn distortion_curvature(&self, x: R) -> R {
+        // The tangent beyond the cap has none, but a bound may not drop at the cap.
+        R::splat(0.5) * self.a * self.b * self.capped_exp(x)
+    }
+    #[inline(always)]
+    fn volume_slope(&self, j: R) -> R {
+        (self.d + self.d) * j
+    }
+    #[inline(always)]
+    fn volume_curvature(&self, _j: R) -> R {
+        self.d + self.d
+    }
+    #[inline(always)]
+    fn saturation(&self, x: R) -> R {
+        self.b * x * R::splat(1.0 / EXPONENT_CAP)
+    }
+}
+
+impl Law for Exponential {
+    type Wide<R: Real> = Exponential<R>;
+
+    #[inline(always)]
+    fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Exponential<R> {
+        Exponential {
+            a: R::from_fn(|lane| at(lane).a),
+            b: R::from_fn(|lane| at(lane).b),
+            d: R::from_fn(|lane| at(lane).d),
+        }
+    }
+
+    fn energy(&self, x: f64, j: f64) -> f64 {
+        let (a, b, d) = (f64::from(self.a), f64::from(self.b), f64::from(self.d));
+        let cap = f64::from(EXPONENT_CAP);
+        let exponent = b * x;
+        let inside = if exponent < cap { exponent } else { cap };
+        let growth = libm::expm1(inside) + (exponent - inside) * libm::exp(inside);
+        a / (2.0 * b) * growth + d * j * j
+    }
+
+    fn unusable_constant(&self) -> Option<(&'static str, f32)> {
+        super::first_not_positive(&[("a", self.a), ("b", self.b), ("d", self.d)])
+    }
+}

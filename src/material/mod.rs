@@ -1,0 +1,233 @@
+//! Hyperelastic laws. A law is two scalar functions: the energy of distortion `W(x)` and of volume
+//! `U(J)`, in Pa (J/m^3), with `x = I1bar - 3`, `I1bar = J^(-2/3) I1` (isochoric, stress-free at rest).
+//! The paper (Meister et al. 2018, section 2) prints `x = I1 - 3`, which leaves a residual stress at rest;
+//! [`Literal`] keeps that form for comparisons.
+//!
+//! The first Piola-Kirchhoff stress is `P = p1 (F - cof F) + s cof F`, with `p1 = 2 W' g`,
+//! `s = p1 + dPsi/dJ` and `g = J^(-2/3)`. `F - cof F` and `s` are both small at small strain and both are
+//! computed from `grad u` without subtracting near-equal numbers, which the textbook form
+//! `p1 F + pJ cof F` does: in float32 it loses five digits at a strain of 1e-3.
+//!
+//! Every function is finite for every `F`: below [`J_FLOOR`] the factor `g` goes on along its tangent,
+//! so an inverted element is pushed back with a force that is still minus the gradient of the energy.
+//!
+//! Adding a law: one short file with the four methods of [`Potential`] and the two of [`Law`]
+//! (`neo_hookean.rs` is the example).
+
+mod exponential;
+mod neo_hookean;
+mod tissue;
+
+pub use exponential::{EXPONENT_CAP, Exponential};
+pub use neo_hookean::NeoHookean;
+pub use tissue::{Material, Regions, Tissue};
+
+use crate::lanes::Real;
+
+/// Volume ratio below which `J^(-2/3)` is continued along its tangent.
+pub const J_FLOOR: f32 = 0.1;
+
+/// A law with its constants for the lanes of one chunk of elements.
+pub trait Potential<R: Real>: Copy {
+    /// `W'(x)`, Pa.
+    fn distortion_slope(&self, x: R) -> R;
+    /// `W''(x)`, Pa.
+    fn distortion_curvature(&self, x: R) -> R;
+    /// `U'(J)` of `j = J - 1`, Pa.
+    fn volume_slope(&self, j: R) -> R;
+    /// `U''(J)` of `j = J - 1`, Pa.
+    fn volume_curvature(&self, j: R) -> R;
+    /// How close `x` comes to the range where the law is continued to keep it finite: above 1 it is beyond.
+    #[inline(always)]
+    fn saturation(&self, _x: R) -> R {
+        R::splat(0.0)
+    }
+}
+
+/// A hyperelastic law: its constants for one element, and how to lay them side by side.
+pub trait Law: Copy {
+    /// The same law with its constants in lanes.
+    type Wide<R: Real>: Potential<R>;
+
+    /// Whether the energy is a function of `I1bar` (true) or, as the paper prints it, of `I1` (false).
+    const ISOCHORIC: bool = true;
+
+    /// Lane `l` takes the constants of `at(l)`.
+    fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Self::Wide<R>;
+
+    /// `W(x) + U(1 + j)` in float64, J/m^3, zero at rest.
+    fn energy(&self, x: f64, j: f64) -> f64;
+
+    /// The first constant that is not usable (not finite, or of the wrong sign), by name and value.
+    fn unusable_constant(&self) -> Option<(&'static str, f32)>;
+}
+
+/// A law as the paper prints it: a function of `I1 - 3` instead of `I1bar - 3`. At rest it has a residual
+/// stress `2 W'(0)`, so a free body shrinks until the volume term balances it (about 3 % in volume for the
+/// paper's neo-Hookean constants). Kept because the paper's figures came from it. Its volume term is
+/// `d (J - 1)^2`: the linear `d (J - 1)` in the paper is a misprint, no state would be in equilibrium.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Literal<L>(pub L);
+
+impl<L: Law> Law for Literal<L> {
+    type Wide<R: Real> = L::Wide<R>;
+
+    const ISOCHORIC: bool = false;
+
+    #[inline(always)]
+    fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Self::Wide<R> {
+        L::widen(|lane| at(lane).0)
+    }
+
+    fn energy(&self, x: f64, j: f64) -> f64 {
+        self.0.energy(x, j)
+    }
+
+    fn unusable_constant(&self) -> Option<(&'static str, f32)> {
+        self.0.unusable_constant()
+    }
+}
+
+/// The invariants a law sees, both zero at rest and both free of cancellation.
+#[derive(Clone, Copy, Debug)]
+pub struct Invariants<R> {
+    /// `I1 - 3`.
+    pub i: R,
+    /// `J - 1`.
+    pub j: R,
+}
+
+/// Scalars of the stress `P = p1 (F - cof F) + s cof F`, Pa.
+#[derive(Clone, Copy, Debug)]
+pub struct Response<R> {
+    /// `dPsi/dI1 * 2`.
+    pub p1: R,
+    /// `p1 + dPsi/dJ`.
+    pub s: R,
+    /// [`Potential::saturation`] at this state.
+    pub saturation: R,
+}
+
+/// `g(J) = J^(-2/3)` with its derivative, continued along the tangent below [`J_FLOOR`].
+#[derive(Clone, Copy)]
+pub(crate) struct VolumeFactor<R> {
+    pub(crate) g: R,
+    pub(crate) slope: R,
+    /// `J^(-5/3)` at the clamped `J`.
+    fifth: R,
+    /// `max(J, J_FLOOR) - 1`.
+    clamped: R,
+    /// `min(J - J_FLOOR, 0)`.
+    below: R,
+    /// `I1bar - 3`.
+    pub(crate) x: R,
+}
+
+impl<R: Real> VolumeFactor<R> {
+    #[inline(always)]
+    pub(crate) fn new(at: Invariants<R>) -> Self {
+        let one = R::splat(1.0);
+        let third = R::splat(1.0 / 3.0);
+        let clamped = at.j.max(R::splat(J_FLOOR - 1.0));
+        let below = (at.j - R::splat(J_FLOOR - 1.0)).min(R::splat(0.0));
+        let y = (one + clamped).inverse_cbrt();
+        // e = y - 1 to full relative accuracy: one Newton step of (1 + j)(1 + e)^3 = 1 in terms of e.
+        let e = y - one;
+        let cube = e * (R::splat(3.0) + e * (R::splat(3.0) + e));
+        let residual = clamped + (one + clamped) * cube;
+        let e = e - residual * third * y;
+        let y = one + e;
+        let square = y * y;
+        let fifth = square * square * y;
+        let slope = fifth * R::splat(-2.0 / 3.0);
+        let i1 = at.i + R::splat(3.0);
+        // I1bar - 3 = g (I1 - 3) + 3 (g - 1), g - 1 = e (2 + e)
+        let x = square * at.i + R::splat(3.0) * e * (R::splat(2.0) + e) + slope * below * i1;
+        Self {
+            g: square + slope * below,
+            slope,
+            fifth,
+            clamped,
+            below,
+            x,
+        }
+    }
+
+    /// Second derivative of `g`: zero where it is continued along its tangent.
+    #[inline(always)]
+    pub(crate) fn curvature(&self) -> R {
+        let inside = self
+            .below
+            .zip(R::splat(0.0), |below, _| if below < 0.0 { 0.0 } else { 1.0 });
+        let y3 = self.fifth.zip(self.clamped, |_, clamped| 1.0 / (1.0 + clamped));
+        inside * R::splat(10.0 / 9.0) * self.fifth * y3
+    }
+}
+
+/// The stress scalars of law `L` at the given invariants.
+#[inline(always)]
+pub(crate) fn response<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>) -> Response<R> {
+    let two = R::splat(2.0);
+    if L::ISOCHORIC {
+        let factor = VolumeFactor::new(at);
+        let slope = two * law.distortion_slope(factor.x);
+        // g + g' I1 / 2 = J^(-5/3) (J - 1 - (I1 - 3 + 2 below) / 3): small at small strain
+        let bracket = factor.fifth * (factor.clamped - (at.i + two * factor.below) * R::splat(1.0 / 3.0));
+        Response {
+            p1: slope * factor.g,
+            s: slope * bracket + law.volume_slope(at.j),
+            saturation: law.saturation(factor.x),
+        }
+    } else {
+        let slope = two * law.distortion_slope(at.i);
+        Response {
+            p1: slope,
+            s: slope + law.volume_slope(at.j),
+            saturation: law.saturation(at.i),
+        }
+    }
+}
+
+/// Energy density in float64, J/m^3, of a deformation with the given `I1 - 3` and `J - 1`.
+pub(crate) fn energy<L: Law>(law: &L, i: f64, j: f64) -> f64 {
+    if !L::ISOCHORIC {
+        return law.energy(i, j);
+    }
+    let floor = f64::from(J_FLOOR);
+    let volume = 1.0 + j;
+    let clamped = if volume > floor { volume } else { floor };
+    // g - 1 without cancellation
+    let below_one = libm::expm1(-2.0 / 3.0 * libm::log1p(clamped - 1.0));
+    let slope = -2.0 / 3.0 * (1.0 + below_one) / clamped;
+    let x = (1.0 + below_one) * i + 3.0 * below_one + slope * (volume - clamped) * (i + 3.0);
+    law.energy(x, j)
+}
+
+/// Largest energy density, J/m^3, that a law can release from rest: zero for a stress-free one. The
+/// literal forms can contract; `W` is convex in `x` and, at given `J`, `x >= 3 (J^(2/3) - 1)`, so the
+/// minimum over uniform contractions is found by bisection of its slope.
+pub(crate) fn releasable_energy<L: Law>(law: &L) -> f64 {
+    if L::ISOCHORIC {
+        return 0.0;
+    }
+    let at = |volume: f64| law.energy(3.0 * (libm::pow(volume, 2.0 / 3.0) - 1.0), volume - 1.0);
+    let (mut low, mut high) = (1e-3, 1.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if at(middle * (1.0 + 1e-7)) > at(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    let least = at(0.5 * (low + high));
+    if least < 0.0 { -least } else { 0.0 }
+}
+
+/// The first of the named constants that is not a finite positive number.
+fn first_not_positive(constants: &[(&'static str, f32)]) -> Option<(&'static str, f32)> {
+    constants
+        .iter()
+        .copied()
+        .find(|(_, value)| !(value.is_finite() && *value > 0.0))
+}

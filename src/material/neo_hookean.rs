@@ -1,0 +1,53 @@
+//! Neo-Hookean law `W(x) = c x`, `U(J) = d (J - 1)^2` (Meister et al. 2018, section 3; with `c = mu / 2`,
+//! `d = kappa / 2` the law of NiftySim and DJ-TLED). Constants in Pa.
+
+use super::{Law, Potential};
+use crate::lanes::Real;
+
+/// Constants of the neo-Hookean law: half the shear modulus and half the bulk modulus, Pa.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NeoHookean<R = f32> {
+    /// Half the shear modulus, Pa.
+    pub c: R,
+    /// Half the bulk modulus, Pa.
+    pub d: R,
+}
+
+impl<R: Real> Potential<R> for NeoHookean<R> {
+    #[inline(always)]
+    fn distortion_slope(&self, _x: R) -> R {
+        self.c
+    }
+    #[inline(always)]
+    fn distortion_curvature(&self, _x: R) -> R {
+        R::splat(0.0)
+    }
+    #[inline(always)]
+    fn volume_slope(&self, j: R) -> R {
+        (self.d + self.d) * j
+    }
+    #[inline(always)]
+    fn volume_curvature(&self, _j: R) -> R {
+        self.d + self.d
+    }
+}
+
+impl Law for NeoHookean {
+    type Wide<R: Real> = NeoHookean<R>;
+
+    #[inline(always)]
+    fn widen<R: Real>(at: impl Fn(usize) -> Self) -> NeoHookean<R> {
+        NeoHookean {
+            c: R::from_fn(|lane| at(lane).c),
+            d: R::from_fn(|lane| at(lane).d),
+        }
+    }
+
+    fn energy(&self, x: f64, j: f64) -> f64 {
+        f64::from(self.c) * x + f64::from(self.d) * j * j
+    }
+
+    fn unusable_constant(&self) -> Option<(&'static str, f32)> {
+        super::first_not_positive(&[("c", self.c), ("d", self.d)])
+    }
+}

@@ -1,0 +1,354 @@
+//! The largest stable step: central differences are stable while `dt < 2 / omega_max`, with `omega_max^2`
+//! the largest eigenvalue of `M^-1 K(u)` and `K` the tangent stiffness at the current displacement. Lumped
+//! damping does not lower the limit, as it is taken at the middle of the step.
+//!
+//! The bound needs no iteration: every term of an element's tangent is a quadratic form that is bounded
+//! by a block-diagonal one, a 3 x 3 matrix `D_a` for each node; then
+//! `omega_max^2 <= max_a lambda_max(sum_e D_a^e)` of the mass-weighted matrices. With the variation `dF = sum_a v_a (x) ga`:
+//!
+//! ```text
+//! P        = p1 F + pJ C,   C = cof F,   E = F - C (zero at rest),   X = dx/dF
+//! dF:A:dF  = p1 |dF|^2 + pJ dF:(dC/dF):dF              geometric: K_ab = p1 (ga.gb) I + pJ [F (ga x gb)]x
+//!          + W'' (X:dF)^2                              stiffening of the law
+//!          + (U'' + W' (4 g' + g'' I1)) (C:dF)^2       volume
+//!          + 4 W' g' (C:dF) (E:dF)                     coupling, split by 2 x y <= r x^2 + y^2 / r
+//! (C:dF)^2 = (sum_a (C ga).va)^2 <= (sum_b |C gb|) sum_a va.(C ga)(C ga).va / |C ga|      Cauchy-Schwarz
+//! ```
+//! The geometric part, small in nearly incompressible tissue, is bounded by its row sums, with
+//! `|K_ab| = sqrt(p1^2 (ga.gb)^2 + pJ^2 |F (ga x gb)|^2)`. Keeping the directions of `C ga` is worth a
+//! factor of up to `sqrt 3` in the step against row sums of norms (Gershgorin).
+//!
+//! No term is left out, so the bound holds for any state, inverted elements included.
+
+use crate::lanes::{BLOCK, Real};
+use crate::material::{Law, Material, Potential, VolumeFactor};
+use crate::scene::{ElementBlock, NodeInertia, Scene};
+use crate::state::{NodeVector, State};
+
+use super::element::{Deformation, Vector};
+
+/// A bound on the stable step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CriticalStep {
+    /// Steps up to this many seconds are stable.
+    pub seconds: f32,
+    /// The node that sets it.
+    pub node: u32,
+}
+
+/// Relative rounding of the sums; the bound is lowered by it.
+const ROUNDING: f32 = 1e-5;
+
+/// A bound on the stable step at the state's displacement (at rest for a fresh one), never above the
+/// exact limit. It costs a few force evaluations and may be called between any two steps. The state's forces and
+/// the padding of its vectors serve as scratch. Nothing if the state is too small for the scene or not finite.
+pub fn critical_step<M, N, B, S>(scene: &Scene<M, N, B>, state: &mut State<S>) -> Option<CriticalStep>
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+    S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+{
+    let count = scene.node_count();
+    let displacement = state.displacement.as_mut().get_mut(..count)?;
+    let increment = state.increment.as_mut().get_mut(..count)?;
+    let force = state.force.as_mut().get_mut(..count)?;
+    let mut sums = Sums {
+        xx_yy_zz_xy: force,
+        yz_in_padding: increment,
+        zx_in_padding: displacement,
+    };
+    sums.clear();
+    for block in scene.blocks() {
+        for first in (0..BLOCK).step_by(super::Wide::COUNT) {
+            let law = M::Law::widen(|lane| scene.material().law(block.element(first + lane)));
+            add_bounds::<super::Wide, M::Law>(&law, block, first, scene.inertia(), &mut sums);
+        }
+    }
+    let mut largest = (0.0, 0);
+    let mut finite = true;
+    for (node, inertia) in scene.inertia().iter().enumerate() {
+        let rate = sums.largest_eigenvalue(node, inertia.inverse);
+        finite &= rate.is_finite();
+        if rate > largest.0 {
+            largest = (rate, node as u32);
+        }
+    }
+    sums.clear();
+    let seconds = 2.0 / libm::sqrtf(largest.0) * (1.0 - ROUNDING);
+    finite.then_some(CriticalStep {
+        seconds,
+        node: largest.1,
+    })
+}
+
+/// Symmetric 3 x 3 matrices of the nodes, 1/s^2.
+struct Sums<'a> {
+    xx_yy_zz_xy: &'a mut [NodeVector],
+    yz_in_padding: &'a mut [NodeVector],
+    zx_in_padding: &'a mut [NodeVector],
+}
+
+impl Sums<'_> {
+    fn clear(&mut self) {
+        self.xx_yy_zz_xy.fill(NodeVector::ZERO);
+        for vectors in [&mut *self.yz_in_padding, &mut *self.zx_in_padding] {
+            for vector in vectors {
+                vector.0[3] = 0.0;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, node: usize, [xx, yy, zz, xy, yz, zx]: [f32; 6]) {
+        if let (Some(a), Some(b), Some(c)) = (
+            self.xx_yy_zz_xy.get_mut(node),
+            self.yz_in_padding.get_mut(node),
+            self.zx_in_padding.get_mut(node),
+        ) {
+            for (sum, value) in a.0.iter_mut().zip([xx, yy, zz, xy]) {
+                *sum += value;
+            }
+            b.0[3] += yz;
+            c.0[3] += zx;
+        }
+    }
+
+    /// A close upper bound of the largest eigenvalue of the node's matrix on its free axes, 1/s^2: Newton's iteration on the characteristic polynomial from above, where it is convex, so that no
+    /// iterate falls below the root.
+    fn largest_eigenvalue(&self, node: usize, inverse: [f32; 3]) -> f32 {
+        let read = |vectors: &[NodeVector]| vectors.get(node).copied().unwrap_or_default().0;
+        let [xx, yy, zz, xy] = read(self.xx_yy_zz_xy);
+        let (yz, zx) = (read(self.yz_in_padding)[3], read(self.zx_in_padding)[3]);
+        let [x, y, z] = inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 });
+        let (xx, yy, zz) = (xx * x, yy * y, zz * z);
+        let (xy, yz, zx) = (xy * x * y, yz * y * z, zx * z * x);
+        let mean = (xx + yy + zz) / 3.0;
+        if mean <= 0.0 || mean.is_nan() {
+            return mean;
+        }
+        // The matrix over its mean, less the identity.
+        let (a, b, c) = (xx / mean - 1.0, yy / mean - 1.0, zz / mean - 1.0);
+        let (d, e, f) = (xy / mean, yz / mean, zx / mean);
+        let q = (a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0;
+        let determinant = a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f);
+        // Roots of t^3 - 3 q t - determinant; 2 sqrt q is above the largest.
+        let mut root = 2.0 * libm::sqrtf(q);
+        for _ in 0..4 {
+            let slope = 3.0 * (root * root - q);
+            if slope > 1e-6 {
+                let next = root - (root * (root * root - 3.0 * q) - determinant) / slope;
+                root = if next < root { next } else { root };
+            }
+        }
+        mean * (1.0 + root)
+    }
+}
+
+/// Adds each element's nodal matrices to the sums, all of `M^-1/2 K M^-1/2`: gradients are divided by the
+/// root of their node's mass, which leaves light nodes among heavy ones a closer bound. Nodes that are held
+/// along all axes count as infinitely heavy.
+#[inline(always)]
+fn add_bounds<R: Real, L: Law>(
+    law: &L::Wide<R>,
+    block: &ElementBlock,
+    first: usize,
+    inertia: &[NodeInertia],
+    sums: &mut Sums<'_>,
+) {
+    let deformation = Deformation::<R>::of_block(block, first, sums.zx_in_padding);
+    let terms = Terms::<R>::new::<L>(law, &deformation);
+    let mut gradients = [[R::splat(0.0); 3]; 4];
+    for corner in 1..4 {
+        gradients[corner] = [0, 1, 2].map(|axis| block.gradient(corner - 1, axis, first));
+    }
+    for axis in 0..3 {
+        gradients[0][axis] = -(gradients[1][axis] + gradients[2][axis] + gradients[3][axis]);
+    }
+    for (corner, gradient) in gradients.iter_mut().enumerate() {
+        let root = R::from_fn(|lane| {
+            let node = inertia
+                .get(block.node(corner, first + lane))
+                .copied()
+                .unwrap_or_default();
+            node.inverse.into_iter().fold(0.0, f32::max)
+        })
+        .sqrt();
+        *gradient = gradient.map(|component| component * root);
+    }
+    let images = gradients.map(|gradient| terms.images(&deformation, gradient));
+    let total = |length: fn(&Images<R>) -> R| {
+        length(&images[0]) + length(&images[1]) + length(&images[2]) + length(&images[3])
+    };
+    let volume = block.volume::<R>(first);
+    let by_c = terms.volume * total(|image| image.c.length) * volume;
+    let by_e = terms.coupling * total(|image| image.e.length) * volume;
+    let by_x = terms.stiffening * total(|image| image.x.length) * volume;
+
+    let mut rows = [R::splat(0.0); 4];
+    for a in 0..4 {
+        rows[a] = rows[a] + terms.geometric(&images[a], &images[a]);
+        for b in 0..a {
+            let norm = terms.geometric(&images[a], &images[b]);
+            rows[a] = rows[a] + norm;
+            rows[b] = rows[b] + norm;
+        }
+    }
+    for corner in 0..4 {
+        let (c, e, x) = (&images[corner].c, &images[corner].e, &images[corner].x);
+        let isotropic = rows[corner] * volume;
+        let entry = |i: usize, j: usize| c.entry(by_c, i, j) + e.entry(by_e, i, j) + x.entry(by_x, i, j);
+        let matrix = [
+            entry(0, 0) + isotropic,
+            entry(1, 1) + isotropic,
+            entry(2, 2) + isotropic,
+            entry(0, 1),
+            entry(1, 2),
+            entry(2, 0),
+        ];
+        for lane in 0..R::COUNT {
+            sums.add(
+                block.node(corner, first + lane),
+                matrix.map(|entry| entry.lane(lane)),
+            );
+        }
+    }
+}
+
+/// Magnitudes of the terms of the tangent, Pa.
+struct Terms<R> {
+    p1: R,
+    p_j: R,
+    stiffening: R,
+    /// Of `(C:dF)^2`, its share of the coupling included.
+    volume: R,
+    /// Of `(E:dF)^2`: the other share of the coupling.
+    coupling: R,
+    /// `X = x_f F + x_c C`.
+    x_f: R,
+    x_c: R,
+}
+
+/// A matrix applied to a shape function gradient: the vector, its length and the inverse of that.
+struct Image<R> {
+    vector: Vector<R>,
+    length: R,
+    inverse: R,
+}
+
+impl<R: Real> Image<R> {
+    #[inline(always)]
+    fn new(vector: Vector<R>) -> Self {
+        let square = vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2];
+        let length = square.sqrt();
+        let inverse = length.map(|length| if length > 0.0 { 1.0 / length } else { 0.0 });
+        Self {
+            vector,
+            length,
+            inverse,
+        }
+    }
+
+    /// `weight v_i v_j / |v|`.
+    #[inline(always)]
+    fn entry(&self, weight: R, i: usize, j: usize) -> R {
+        weight * self.inverse * self.vector[i] * self.vector[j]
+    }
+}
+
+/// A shape function gradient `g` with `C g`, `E g`, `X g` and the matrix of `b -> F (g x b)`.
+struct Images<R> {
+    gradient: Vector<R>,
+    cross: [[R; 3]; 3],
+    c: Image<R>,
+    e: Image<R>,
+    x: Image<R>,
+}
+
+impl<R: Real> Terms<R> {
+    #[inline(always)]
+    fn new<L: Law>(law: &L::Wide<R>, deformation: &Deformation<R>) -> Self {
+        let at = deformation.invariants;
+        let (zero, two) = (R::splat(0.0), R::splat(2.0));
+        if !L::ISOCHORIC {
+            return Self {
+                p1: two * law.distortion_slope(at.i),
+                p_j: law.volume_slope(at.j),
+                stiffening: law.distortion_curvature(at.i).max(zero),
+                volume: law.volume_curvature(at.j).max(zero),
+                coupling: zero,
+                x_f: two,
+                x_c: zero,
+            };
+        }
+        let factor = VolumeFactor::new(at);
+        let slope = law.distortion_slope(factor.x);
+        let i1 = at.i + R::splat(3.0);
+        let volume =
+            law.volume_curvature(at.j) + slope * (R::splat(4.0) * factor.slope + factor.curvature() * i1);
+        // 4 W' g' (C:dF)(E:dF), split at r = |E| / |C|
+        let coupling = (two * slope * factor.slope).abs();
+        let (mut c, mut e) = (zero, zero);
+        for i in 0..3 {
+            for j in 0..3 {
+                c = c + deformation.cofactor(i, j) * deformation.cofactor(i, j);
+                e = e + deformation.distortion(i, j) * deformation.distortion(i, j);
+            }
+        }
+        let ratio = e.zip(c, |e, c| libm::sqrtf((e + 1e-12) / (c + 1e-12)));
+        Self {
+            p1: two * slope * factor.g,
+            p_j: law.volume_slope(at.j) + slope * factor.slope * i1,
+            stiffening: law.distortion_curvature(factor.x).max(zero),
+            volume: (volume + coupling * ratio).max(zero),
+            coupling: coupling.zip(ratio, |coupling, ratio| coupling / ratio),
+            x_f: two * factor.g,
+            x_c: factor.slope * i1,
+        }
+    }
+
+    #[inline(always)]
+    fn images(&self, deformation: &Deformation<R>, gradient: Vector<R>) -> Images<R> {
+        let zero = [R::splat(0.0); 3];
+        let (mut c, mut e, mut x) = (zero, zero, zero);
+        for i in 0..3 {
+            for (j, &component) in gradient.iter().enumerate() {
+                c[i] = c[i] + deformation.cofactor(i, j) * component;
+                e[i] = e[i] + deformation.distortion(i, j) * component;
+            }
+            x[i] = self.x_f * (e[i] + c[i]) + self.x_c * c[i];
+        }
+        let cross = cross_matrix(deformation, gradient);
+        Images {
+            gradient,
+            cross,
+            c: Image::new(c),
+            e: Image::new(e),
+            x: Image::new(x),
+        }
+    }
+
+    /// `|K_ab| / V` of the geometric part, Pa/m^2.
+    #[inline(always)]
+    fn geometric(&self, a: &Images<R>, b: &Images<R>) -> R {
+        let g = b.gradient;
+        let dot = |row: &Vector<R>| row[0] * g[0] + row[1] * g[1] + row[2] * g[2];
+        let along = self.p1 * dot(&a.gradient);
+        let [x, y, z] = [dot(&a.cross[0]), dot(&a.cross[1]), dot(&a.cross[2])];
+        (along * along + self.p_j * self.p_j * (x * x + y * y + z * z)).sqrt()
+    }
+}
+
+/// The matrix of `b -> F (a x b)`.
+#[inline(always)]
+fn cross_matrix<R: Real>(deformation: &Deformation<R>, a: Vector<R>) -> [[R; 3]; 3] {
+    [0, 1, 2].map(|i| {
+        let f = |j: usize| deformation.distortion(i, j) + deformation.cofactor(i, j);
+        let (f0, f1, f2) = (f(0), f(1), f(2));
+        [
+            a[2] * f1 - a[1] * f2,
+            a[0] * f2 - a[2] * f0,
+            a[1] * f0 - a[0] * f1,
+        ]
+    })
+}

@@ -1,0 +1,154 @@
+//! Linear tetrahedra, several side by side: deformation from nodal displacements and nodal forces from the
+//! first Piola-Kirchhoff stress, `f_a = -V P grad N_a` (Miller et al. 2007, with the stress of
+//! [`crate::material`]). Nodes 1, 2, 3 carry stored gradients; node 0 takes minus their sum, so the four
+//! forces of an element add up to zero and a translation gives exactly none.
+
+use crate::lanes::Real;
+use crate::material::{Invariants, Law, Response, response};
+use crate::scene::ElementBlock;
+use crate::state::NodeVector;
+
+/// A vector and a matrix in lanes; rows are spatial, columns material.
+pub(crate) type Vector<R> = [R; 3];
+pub(crate) type Matrix<R> = [[R; 3]; 3];
+
+/// Deformation of a chunk of elements.
+#[derive(Clone, Copy)]
+pub(crate) struct Deformation<R> {
+    /// `H = grad u = F - I`.
+    pub(crate) h: Matrix<R>,
+    /// `cof H`.
+    pub(crate) cof_h: Matrix<R>,
+    /// `tr H`.
+    pub(crate) trace: R,
+    pub(crate) invariants: Invariants<R>,
+}
+
+#[inline(always)]
+fn dot<R: Real>(a: Vector<R>, b: Vector<R>) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+impl<R: Real> Deformation<R> {
+    /// From the displacement gradient: `J - 1 = tr H + tr cof H + det H`, `I1 - 3 = 2 tr H + H:H`.
+    #[inline(always)]
+    pub(crate) fn new(h: Matrix<R>) -> Self {
+        let minor = |i: usize, j: usize| {
+            let (p, q, r, s) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
+            h[p][r] * h[q][s] - h[p][s] * h[q][r]
+        };
+        let cof_h = [
+            [minor(0, 0), minor(0, 1), minor(0, 2)],
+            [minor(1, 0), minor(1, 1), minor(1, 2)],
+            [minor(2, 0), minor(2, 1), minor(2, 2)],
+        ];
+        let trace = h[0][0] + h[1][1] + h[2][2];
+        let second = cof_h[0][0] + cof_h[1][1] + cof_h[2][2];
+        let j = trace + second + dot(h[0], cof_h[0]);
+        let i = trace + trace + (dot(h[0], h[0]) + dot(h[1], h[1]) + dot(h[2], h[2]));
+        Self {
+            h,
+            cof_h,
+            trace,
+            invariants: Invariants { i, j },
+        }
+    }
+
+    /// Deformation of the elements in lanes `first..` of a block. Every node index of a built scene is
+    /// below its node count and `displacement` was checked to be at least as long.
+    #[inline(always)]
+    pub(crate) fn of_block(block: &ElementBlock, first: usize, displacement: &[NodeVector]) -> Self {
+        let at = |corner: usize, axis: usize, lane: usize| {
+            displacement
+                .get(block.node(corner, first + lane))
+                .map_or(0.0, |vector| vector.0[axis])
+        };
+        let mut h = [[R::splat(0.0); 3]; 3];
+        for (i, row) in h.iter_mut().enumerate() {
+            let origin = R::from_fn(|lane| at(0, i, lane));
+            let along = [1, 2, 3].map(|corner| R::from_fn(|lane| at(corner, i, lane)) - origin);
+            for (j, entry) in row.iter_mut().enumerate() {
+                *entry = along[0] * block.gradient(0, j, first)
+                    + along[1] * block.gradient(1, j, first)
+                    + along[2] * block.gradient(2, j, first);
+            }
+        }
+        Self::new(h)
+    }
+
+    /// `F - cof F = H + H^T - tr H I - cof H`.
+    #[inline(always)]
+    pub(crate) fn distortion(&self, i: usize, j: usize) -> R {
+        let sum = self.h[i][j] + self.h[j][i] - self.cof_h[i][j];
+        if i == j { sum - self.trace } else { sum }
+    }
+
+    /// `cof F = (1 + tr H) I - H^T + cof H`.
+    #[inline(always)]
+    pub(crate) fn cofactor(&self, i: usize, j: usize) -> R {
+        let off = self.cof_h[i][j] - self.h[j][i];
+        if i == j {
+            off + (R::splat(1.0) + self.trace)
+        } else {
+            off
+        }
+    }
+
+    /// First Piola-Kirchhoff stress, Pa.
+    #[inline(always)]
+    pub(crate) fn stress(&self, response: &Response<R>) -> Matrix<R> {
+        let entry =
+            |i: usize, j: usize| response.p1 * self.distortion(i, j) + response.s * self.cofactor(i, j);
+        [
+            [entry(0, 0), entry(0, 1), entry(0, 2)],
+            [entry(1, 0), entry(1, 1), entry(1, 2)],
+            [entry(2, 0), entry(2, 1), entry(2, 2)],
+        ]
+    }
+}
+
+/// How far a step went into the range where laws are continued to stay finite.
+#[derive(Clone, Copy)]
+pub(crate) struct Extremes<R> {
+    /// Smallest `J - 1`.
+    pub(crate) least_j: R,
+    /// Largest saturation of the law.
+    pub(crate) saturation: R,
+}
+
+/// Adds the internal forces of the elements in lanes `first..` of a block to `force`, with minus sign.
+#[inline(always)]
+pub(crate) fn add_forces<R: Real, L: Law>(
+    law: &L::Wide<R>,
+    block: &ElementBlock,
+    first: usize,
+    displacement: &[NodeVector],
+    force: &mut [NodeVector],
+    extremes: &mut Extremes<R>,
+) {
+    let deformation = Deformation::<R>::of_block(block, first, displacement);
+    let response = response::<R, L>(law, deformation.invariants);
+    extremes.least_j = deformation.invariants.j.min(extremes.least_j);
+    extremes.saturation = response.saturation.max(extremes.saturation);
+
+    let stress = deformation.stress(&response);
+    let minus_volume = -block.volume::<R>(first);
+    let mut forces = [[R::splat(0.0); 3]; 4];
+    for axis in 0..3 {
+        let row = stress[axis].map(|entry| entry * minus_volume);
+        for corner in 0..3 {
+            let gradient = [0, 1, 2].map(|j| block.gradient::<R>(corner, j, first));
+            forces[corner + 1][axis] = dot(row, gradient);
+        }
+        forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
+    }
+    for lane in 0..R::COUNT {
+        for (corner, components) in forces.iter().enumerate() {
+            if let Some(vector) = force.get_mut(block.node(corner, first + lane)) {
+                for (sum, component) in vector.0.iter_mut().zip(components) {
+                    *sum += component.lane(lane);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! What an element tells about itself, in float64: volume ratio, von Mises stress (Pa), strain energy (J).
+//! For display and for the energy account, not for the step.
+
+use glam::{DMat3, DVec3};
+
+use crate::lanes::BLOCK;
+use crate::material::{Invariants, Law, Material, energy, response};
+use crate::scene::{ElementBlock, NodeInertia, Scene};
+use crate::state::NodeVector;
+
+/// State of one element.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ElementFields {
+    /// The mesh's number of the element.
+    pub element: usize,
+    /// Volume over volume at rest, `J`.
+    pub volume_ratio: f64,
+    /// Von Mises stress of the Cauchy stress `P F^T / J`, Pa; NaN for an element without positive volume.
+    pub von_mises: f64,
+    /// Strain energy, J.
+    pub energy: f64,
+}
+
+/// Fields of every element of the scene, in the scene's order, under the given displacements (m).
+pub fn element_fields<'a, M, N, B>(
+    scene: &'a Scene<M, N, B>,
+    displacement: &'a [NodeVector],
+) -> impl Iterator<Item = ElementFields> + 'a
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+{
+    let places = scene
+        .blocks()
+        .iter()
+        .flat_map(|block| (0..BLOCK).map(move |lane| (block, lane)));
+    places.take(scene.element_count()).map(|(block, lane)| {
+        let element = block.element(lane);
+        fields(&scene.material().law(element), block, lane, element, displacement)
+    })
+}
+
+/// Strain energy of the scene, J.
+pub(crate) fn strain_energy<M, N, B>(scene: &Scene<M, N, B>, displacement: &[NodeVector]) -> f64
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+{
+    element_fields(scene, displacement)
+        .map(|fields| fields.energy)
+        .sum()
+}
+
+fn fields<L: Law>(
+    law: &L,
+    block: &ElementBlock,
+    lane: usize,
+    element: usize,
+    displacement: &[NodeVector],
+) -> ElementFields {
+    let at = |corner: usize| {
+        let [x, y, z] = displacement
+            .get(block.node(corner, lane))
+            .copied()
+            .unwrap_or_default()
+            .to_array();
+        DVec3::new(f64::from(x), f64::from(y), f64::from(z))
+    };
+    let mut h = DMat3::ZERO;
+    for corner in 0..3 {
+        let gradient =
+            DVec3::from_array([0, 1, 2].map(|axis| f64::from(block.gradient::<f32>(corner, axis, lane))));
+        let along = at(corner + 1) - at(0);
+        h += DMat3::from_cols(along * gradient.x, along * gradient.y, along * gradient.z);
+    }
+    let f = DMat3::IDENTITY + h;
+    let trace = h.x_axis.x + h.y_axis.y + h.z_axis.z;
+    let square = h.x_axis.length_squared() + h.y_axis.length_squared() + h.z_axis.length_squared();
+    // Sum of the principal minors of H, so that J - 1 keeps its digits at small strain.
+    let minors = h.x_axis.x * h.y_axis.y - h.x_axis.y * h.y_axis.x + h.y_axis.y * h.z_axis.z
+        - h.y_axis.z * h.z_axis.y
+        + h.x_axis.x * h.z_axis.z
+        - h.x_axis.z * h.z_axis.x;
+    let (i, j) = (2.0 * trace + square, trace + minors + h.determinant());
+    let energy = energy(law, i, j) * f64::from(block.volume::<f32>(lane));
+
+    // The deviator of P F^T needs only p1 F F^T: cof(F) F^T = J I.
+    let wide = L::widen::<f32>(|_| *law);
+    let p1 = f64::from(
+        response::<f32, L>(
+            &wide,
+            Invariants {
+                i: i as f32,
+                j: j as f32,
+            },
+        )
+        .p1,
+    );
+    let b = f * f.transpose();
+    let mean = (b.x_axis.x + b.y_axis.y + b.z_axis.z) / 3.0;
+    let deviator = b - DMat3::from_diagonal(DVec3::splat(mean));
+    let square = deviator.x_axis.length_squared()
+        + deviator.y_axis.length_squared()
+        + deviator.z_axis.length_squared();
+    let volume_ratio = 1.0 + j;
+    let von_mises = if volume_ratio > 0.0 {
+        p1 / volume_ratio * libm::sqrt(1.5 * square)
+    } else {
+        f64::NAN
+    };
+    ElementFields {
+        element,
+        volume_ratio,
+        von_mises,
+        energy,
+    }
+}

@@ -1,0 +1,584 @@
+//! The exact step: total Lagrangian explicit dynamics (Miller et al. 2007). Lumped mass, mass-proportional
+//! damping `mu` (1/s), central differences in increment form:
+//!
+//! ```text
+//! du = ((1 - k) du + dt^2 f / m) / (1 + k),   u += du,   k = mu dt / 2
+//! ```
+//! Algebraically the paper's `u+ = a dt^2 + 2 u - u-`, without its rounding ([`crate::state`]). Forces are
+//! taken at `t_n`, prescribed positions at `t_(n+1)`. SI units.
+//!
+//! A step is computed in full before anything moves: if it cannot be believed, the state stays as it was.
+
+mod critical;
+mod element;
+mod energy;
+#[cfg(feature = "std")]
+mod spectrum;
+
+pub use critical::{CriticalStep, critical_step};
+pub use energy::{ElementFields, element_fields};
+#[cfg(feature = "std")]
+pub use spectrum::exact_critical_step;
+
+use core::fmt;
+
+use crate::lanes::{BLOCK, Lanes, Real};
+use crate::loads::{Loads, ramp_factor};
+use crate::material::{J_FLOOR, Law, Material};
+use crate::scene::{ElementBlock, NodeInertia, Scene};
+use crate::state::{NodeVector, State};
+
+use element::Extremes;
+
+/// Elements computed side by side: enough to fill the registers of the baseline instruction sets.
+pub(crate) type Wide = Lanes<8>;
+
+/// Coefficients of the integration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    dt: f32,
+    damping: f32,
+    keep: f32,
+    push: f32,
+}
+
+/// Why a step was refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum StepError {
+    /// The step is not a finite positive number.
+    Step {
+        /// The step, s.
+        seconds: f32,
+    },
+    /// The damping is negative or not finite.
+    Damping {
+        /// The damping, 1/s.
+        damping: f32,
+    },
+    /// The step is above the bound of stability. [`Step::insist`] takes it all the same.
+    AboveCritical {
+        /// The step, s.
+        seconds: f32,
+        /// The bound.
+        critical: CriticalStep,
+    },
+}
+
+impl fmt::Display for StepError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Step { seconds } => {
+                write!(f, "the step is {seconds} s, it must be a finite positive number")
+            }
+            Self::Damping { damping } => write!(f, "the damping is {damping} 1/s, it must be zero or more"),
+            Self::AboveCritical { seconds, critical } => write!(
+                f,
+                "the step of {seconds:.3e} s is above the stable {:.3e} s, which node {} sets",
+                critical.seconds, critical.node
+            ),
+        }
+    }
+}
+
+impl core::error::Error for StepError {}
+
+impl Step {
+    /// A step of `dt` seconds with mass-proportional damping (1/s), refused above the critical step.
+    pub fn new(dt: f32, damping: f32, critical: CriticalStep) -> Result<Self, StepError> {
+        let step = Self::insist(dt, damping)?;
+        if dt > critical.seconds {
+            return Err(StepError::AboveCritical {
+                seconds: dt,
+                critical,
+            });
+        }
+        Ok(step)
+    }
+
+    /// The same without asking for stability.
+    pub fn insist(dt: f32, damping: f32) -> Result<Self, StepError> {
+        // The square of the step must be a normal number as well.
+        if !(dt.is_finite() && dt > 1e-18) {
+            return Err(StepError::Step { seconds: dt });
+        }
+        if !(damping.is_finite() && damping >= 0.0) {
+            return Err(StepError::Damping { damping });
+        }
+        let k = 0.5 * damping * dt;
+        Ok(Self {
+            dt,
+            damping,
+            keep: (1.0 - k) / (1.0 + k),
+            push: dt * dt / (1.0 + k),
+        })
+    }
+
+    /// The step, s.
+    #[must_use]
+    pub const fn seconds(&self) -> f32 {
+        self.dt
+    }
+}
+
+/// What became of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use = "a step that diverged has not moved the state"]
+#[non_exhaustive]
+pub enum Status {
+    /// The step was taken.
+    Ok,
+    /// The step was taken, with some elements beyond the range of their law: squeezed below
+    /// [`J_FLOOR`] or stretched beyond the exponent cap, where the law goes on along its tangent.
+    Limited {
+        /// Smallest volume ratio of an element.
+        least_volume_ratio: f32,
+        /// Largest exponent over its cap; above 1 the cap was hit.
+        saturation: f32,
+    },
+    /// The step was not taken and the state is as before.
+    Diverged(Divergence),
+    /// The step was not taken: the state has room for fewer nodes than the scene, or the loads were
+    /// checked against a scene with another number of nodes.
+    Mismatch {
+        /// Nodes of the scene.
+        nodes: usize,
+        /// Nodes that the state has room for.
+        room: usize,
+    },
+}
+
+/// Where and when a simulation stopped being believable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Divergence {
+    /// Start of the refused step, s.
+    pub time: f64,
+    /// The first node that is not finite, or else the one with the most kinetic energy.
+    pub node: u32,
+    /// What was wrong.
+    pub cause: Cause,
+}
+
+/// What was wrong with a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cause {
+    /// A displacement would not be a finite number.
+    NotFinite,
+    /// There is more kinetic energy than loads and supports can have given.
+    Energy {
+        /// Kinetic energy, J.
+        kinetic: f64,
+        /// What it may be, J.
+        available: f64,
+    },
+}
+
+impl fmt::Display for Divergence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "diverged at {:.6} s, first at node {}: ", self.time, self.node)?;
+        match self.cause {
+            Cause::NotFinite => write!(f, "its displacement is no longer a finite number"),
+            Cause::Energy { kinetic, available } => write!(
+                f,
+                "kinetic energy {kinetic:.3e} J, but loads and supports account for {available:.3e} J only"
+            ),
+        }
+    }
+}
+
+/// Takes one step. Every call does the same work for the same scene and loads.
+pub fn step<M, N, B, S>(
+    scene: &Scene<M, N, B>,
+    loads: &Loads<'_>,
+    state: &mut State<S>,
+    step: &Step,
+) -> Status
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+    S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+{
+    let nodes = scene.node_count();
+    let room = state.capacity();
+    let State {
+        displacement,
+        increment,
+        force,
+        time,
+        steps,
+        dt,
+        ledger,
+    } = state;
+    let (Some(displacement), Some(increment), Some(force)) = (
+        displacement.as_mut().get_mut(..nodes),
+        increment.as_mut().get_mut(..nodes),
+        force.as_mut().get_mut(..nodes),
+    ) else {
+        return Status::Mismatch { nodes, room };
+    };
+    let inertia = scene.inertia();
+    if loads.nodes().is_some_and(|checked| checked != nodes) {
+        return Status::Mismatch { nodes, room };
+    }
+    if *dt != step.dt {
+        span_increments(increment, *dt, step.dt);
+        *dt = step.dt;
+    }
+    if *steps == 0 {
+        ledger.start = ledger.start.max(scene.releasable_energy());
+    }
+
+    external_forces(force, inertia, loads, *time);
+    let extremes = internal_forces(scene, displacement, force);
+    let entry = Entry::of_nodes(inertia, increment, force, loads, step)
+        .with_forces(loads, inertia, increment, force, *time, step)
+        .with_motions(loads, displacement, increment, force, *time, step);
+    if !entry.finite {
+        let node = first_not_finite(inertia, increment, force, step);
+        return Status::Diverged(Divergence {
+            time: *time,
+            node,
+            cause: Cause::NotFinite,
+        });
+    }
+    let dissipated = 2.0 * f64::from(step.damping) * entry.kinetic * f64::from(step.dt);
+    let Some(entered) = ledger.entered(entry.work, entry.kinetic, dissipated) else {
+        let cause = Cause::Energy {
+            kinetic: entry.kinetic,
+            available: ledger.balance() + entry.work.max(0.0),
+        };
+        let node = most_energetic(inertia, increment, force, step);
+        return Status::Diverged(Divergence {
+            time: *time,
+            node,
+            cause,
+        });
+    };
+
+    *ledger = entered;
+    advance(inertia, displacement, increment, force, step);
+    *time += f64::from(step.dt);
+    *steps += 1;
+    follow_motions(loads, displacement, increment, *time);
+    if 1.0 + extremes.least_j < J_FLOOR || extremes.saturation > 1.0 {
+        let least_volume_ratio = 1.0 + extremes.least_j;
+        return Status::Limited {
+            least_volume_ratio,
+            saturation: extremes.saturation,
+        };
+    }
+    Status::Ok
+}
+
+/// Increments that spanned `from` seconds, for the same velocities, span `to`.
+fn span_increments(increment: &mut [NodeVector], from: f32, to: f32) {
+    if from > 0.0 {
+        let ratio = to / from;
+        for vector in increment {
+            vector.0 = vector.0.map(|component| component * ratio);
+        }
+    }
+}
+
+/// Puts the scene at the displacement (m) and velocity (m/s) that `at` gives for each node, at time zero.
+/// Held axes keep what is given until a motion moves them. Returns whether the state has room for the scene.
+pub fn start<M, N, B, S>(
+    scene: &Scene<M, N, B>,
+    state: &mut State<S>,
+    step: &Step,
+    at: impl Fn(usize) -> ([f32; 3], [f32; 3]),
+) -> bool
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+    S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+{
+    state.reset();
+    if state.capacity() < scene.node_count() {
+        return false;
+    }
+    let mut kinetic = 0.0;
+    let vectors = state
+        .displacement
+        .as_mut()
+        .iter_mut()
+        .zip(state.increment.as_mut());
+    for (node, ((displacement, increment), inertia)) in vectors.zip(scene.inertia()).enumerate() {
+        let ([ux, uy, uz], velocity) = at(node);
+        displacement.0 = [ux, uy, uz, 0.0];
+        for (axis, speed) in velocity.into_iter().enumerate() {
+            if inertia.inverse[axis] > 0.0 {
+                increment.0[axis] = speed * step.dt;
+                kinetic += 0.5 * f64::from(inertia.mass) * f64::from(speed) * f64::from(speed);
+            }
+        }
+    }
+    state.dt = step.dt;
+    let strain = energy::strain_energy(scene, state.displacement.as_ref());
+    state.ledger.start = kinetic + strain + scene.releasable_energy();
+    true
+}
+
+/// Strain energy of the scene in this state, J, zero at rest.
+pub fn strain_energy<M, N, B, S>(scene: &Scene<M, N, B>, state: &State<S>) -> f64
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+    S: AsRef<[NodeVector]>,
+{
+    energy::strain_energy(scene, state.displacement.as_ref())
+}
+
+fn external_forces(force: &mut [NodeVector], inertia: &[NodeInertia], loads: &Loads<'_>, time: f64) {
+    let [gx, gy, gz] = loads.gravity();
+    if loads.gravity() == [0.0; 3] {
+        force.fill(NodeVector::ZERO);
+    } else {
+        for (vector, inertia) in force.iter_mut().zip(inertia) {
+            vector.0 = [gx, gy, gz, 0.0].map(|component| component * inertia.mass);
+        }
+    }
+    for load in loads.forces() {
+        let factor = ramp_factor(time, load.ramp);
+        if let Some(vector) = force.get_mut(load.node as usize) {
+            for (sum, newton) in vector.0.iter_mut().zip(load.newton) {
+                *sum += factor * newton;
+            }
+        }
+    }
+}
+
+fn internal_forces<M, N, B>(
+    scene: &Scene<M, N, B>,
+    displacement: &[NodeVector],
+    force: &mut [NodeVector],
+) -> Extremes<f32>
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+{
+    let mut extremes = Extremes {
+        least_j: Wide::splat(f32::INFINITY),
+        saturation: Wide::splat(f32::NEG_INFINITY),
+    };
+    for block in scene.blocks() {
+        for first in (0..BLOCK).step_by(Wide::COUNT) {
+            let law = M::Law::widen(|lane| scene.material().law(block.element(first + lane)));
+            element::add_forces::<Wide, M::Law>(&law, block, first, displacement, force, &mut extremes);
+        }
+    }
+    Extremes {
+        least_j: extremes.least_j.0.into_iter().fold(f32::INFINITY, f32::min),
+        saturation: extremes
+            .saturation
+            .0
+            .into_iter()
+            .fold(f32::NEG_INFINITY, f32::max),
+    }
+}
+
+/// The next increment of a node; held axes stand still.
+#[inline(always)]
+fn next_increment(
+    inertia: &NodeInertia,
+    increment: &NodeVector,
+    force: &NodeVector,
+    step: &Step,
+) -> [f32; 4] {
+    let [ix, iy, iz] = inertia.inverse;
+    let inverse = [ix, iy, iz, 0.0];
+    let mut next = [0.0; 4];
+    for (axis, value) in next.iter_mut().enumerate() {
+        let free = step.keep * increment.0[axis] + step.push * (inverse[axis] * force.0[axis]);
+        *value = if inverse[axis] > 0.0 { free } else { 0.0 };
+    }
+    next
+}
+
+/// The energies of one step ([`crate::ledger`]), J.
+struct Entry {
+    finite: bool,
+    kinetic: f64,
+    work: f64,
+}
+
+impl Entry {
+    /// Kinetic energy of the free axes and work of gravity.
+    fn of_nodes(
+        inertia: &[NodeInertia],
+        increment: &[NodeVector],
+        force: &[NodeVector],
+        loads: &Loads<'_>,
+        step: &Step,
+    ) -> Self {
+        let mut kinetic = [0.0f32; 4];
+        let mut momentum = [0.0f32; 4];
+        for ((inertia, increment), force) in inertia.iter().zip(increment).zip(force) {
+            let next = next_increment(inertia, increment, force, step);
+            let [ix, iy, iz] = inertia.inverse;
+            let free = [ix, iy, iz, 0.0];
+            for axis in 0..4 {
+                // A held axis has no inertia of its own: what moves it is counted as work.
+                let mean = 0.5 * (next[axis] + increment.0[axis]);
+                let (moving, led) = if free[axis] > 0.0 {
+                    (mean, mean)
+                } else {
+                    (0.0, increment.0[axis])
+                };
+                kinetic[axis] += inertia.mass * moving * moving;
+                momentum[axis] += inertia.mass * led;
+            }
+        }
+        let dt = f64::from(step.dt);
+        let kinetic: f64 = kinetic.into_iter().map(f64::from).sum();
+        let gravity = loads.gravity().into_iter().zip(momentum);
+        Self {
+            finite: kinetic.is_finite(),
+            kinetic: 0.5 * kinetic / (dt * dt),
+            work: gravity
+                .map(|(g, momentum)| f64::from(g) * f64::from(momentum))
+                .sum(),
+        }
+    }
+
+    /// Work of the nodal forces.
+    fn with_forces(
+        mut self,
+        loads: &Loads<'_>,
+        inertia: &[NodeInertia],
+        increment: &[NodeVector],
+        force: &[NodeVector],
+        time: f64,
+        step: &Step,
+    ) -> Self {
+        for load in loads.forces() {
+            let node = load.node as usize;
+            let (Some(inertia), Some(increment), Some(force)) =
+                (inertia.get(node), increment.get(node), force.get(node))
+            else {
+                continue;
+            };
+            let next = next_increment(inertia, increment, force, step);
+            let factor = ramp_factor(time, load.ramp);
+            let mut work = 0.0;
+            for axis in 0..3 {
+                let mean = 0.5 * (next[axis] + increment.0[axis]);
+                work += load.newton[axis]
+                    * if inertia.inverse[axis] > 0.0 {
+                        mean
+                    } else {
+                        increment.0[axis]
+                    };
+            }
+            self.work += f64::from(factor * work);
+        }
+        self
+    }
+
+    /// Work of the supports that move: what they exert is minus the total force on their node.
+    fn with_motions(
+        mut self,
+        loads: &Loads<'_>,
+        displacement: &[NodeVector],
+        increment: &[NodeVector],
+        force: &[NodeVector],
+        time: f64,
+        step: &Step,
+    ) -> Self {
+        for motion in loads.motions() {
+            let node = motion.node as usize;
+            let (Some(displacement), Some(increment), Some(force)) =
+                (displacement.get(node), increment.get(node), force.get(node))
+            else {
+                continue;
+            };
+            let factor = ramp_factor(time + f64::from(step.dt), motion.ramp);
+            for axis in 0..3 {
+                if motion.axes.has(axis) {
+                    let next = factor * motion.metre[axis] - displacement.0[axis];
+                    self.work -= f64::from(force.0[axis] * 0.5 * (next + increment.0[axis]));
+                }
+            }
+        }
+        self
+    }
+}
+
+fn advance(
+    inertia: &[NodeInertia],
+    displacement: &mut [NodeVector],
+    increment: &mut [NodeVector],
+    force: &[NodeVector],
+    step: &Step,
+) {
+    let nodes = displacement
+        .iter_mut()
+        .zip(increment)
+        .zip(inertia.iter().zip(force));
+    for ((displacement, increment), (inertia, force)) in nodes {
+        increment.0 = next_increment(inertia, increment, force, step);
+        for (position, change) in displacement.0.iter_mut().zip(increment.0) {
+            *position += change;
+        }
+    }
+}
+
+/// Puts the nodes of motions where they belong at `time`.
+fn follow_motions(
+    loads: &Loads<'_>,
+    displacement: &mut [NodeVector],
+    increment: &mut [NodeVector],
+    time: f64,
+) {
+    for motion in loads.motions() {
+        let node = motion.node as usize;
+        if let (Some(displacement), Some(increment)) = (displacement.get_mut(node), increment.get_mut(node)) {
+            let factor = ramp_factor(time, motion.ramp);
+            for axis in 0..3 {
+                if motion.axes.has(axis) {
+                    let position = factor * motion.metre[axis];
+                    increment.0[axis] = position - displacement.0[axis];
+                    displacement.0[axis] = position;
+                }
+            }
+        }
+    }
+}
+
+fn first_not_finite(
+    inertia: &[NodeInertia],
+    increment: &[NodeVector],
+    force: &[NodeVector],
+    step: &Step,
+) -> u32 {
+    let nodes = inertia.iter().zip(increment).zip(force);
+    let bad = nodes.map(|((inertia, increment), force)| {
+        next_increment(inertia, increment, force, step)
+            .iter()
+            .any(|value| !value.is_finite())
+    });
+    let first = bad.enumerate().find_map(|(node, bad)| bad.then_some(node as u32));
+    // Increments may still be finite where their energy no longer is.
+    first.unwrap_or_else(|| most_energetic(inertia, increment, force, step))
+}
+
+fn most_energetic(
+    inertia: &[NodeInertia],
+    increment: &[NodeVector],
+    force: &[NodeVector],
+    step: &Step,
+) -> u32 {
+    let mut most = (0.0, 0);
+    for (node, ((inertia, increment), force)) in inertia.iter().zip(increment).zip(force).enumerate() {
+        let next = next_increment(inertia, increment, force, step);
+        let square: f32 = next.iter().zip(increment.0).map(|(a, b)| (a + b) * (a + b)).sum();
+        if inertia.mass * square > most.0 {
+            most = (inertia.mass * square, node as u32);
+        }
+    }
+    most.1
+}

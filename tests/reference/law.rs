@@ -1,0 +1,150 @@
+//! Hyperelastic laws: stored energy per reference volume, first Piola-Kirchhoff stress and tangent.
+//!
+//! `Psi(F) = W(x) + d (J - 1)^2` in Pa, with `J = det F`, `I1 = F : F` and
+//!
+//! - isochoric form: `x = J^(-2/3) I1 - 3`, stress-free at rest;
+//! - literal form, as the paper prints it: `x = I1 - 3`, with the residual stress `2 W'(0)` at rest
+//!   (the misprinted volume term `d (J - 1)` is read as its square);
+//! - neo-Hookean `W = c x`; exponential `W = a / (2 b) (exp(b x) - 1)`.
+//!
+//! Two conventions of the fast kernel are reproduced, both C1 (stress continuous, tangent with a jump):
+//! [`J_MIN`] and [`EXPONENT_CAP`].
+
+use super::tensor::{IDENTITY, Mat3, Mat9, contraction, determinant, from_fn, inverse, transpose};
+
+/// Below this `J` the factor `g(J) = J^(-2/3)` goes on along its tangent, so that crushed and inverted
+/// elements keep a finite energy: `g(J) = g(J_MIN) + g'(J_MIN) (J - J_MIN)`.
+pub const J_MIN: f64 = 0.1;
+
+/// Above this value of the exponent `b x` the exponential `W` goes on along its tangent.
+pub const EXPONENT_CAP: f64 = 40.0;
+
+/// A hyperelastic law; `a`, `c`, `d` in Pa, `b` a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law {
+    /// `c (I1bar - 3) + d (J - 1)^2`.
+    NeoHookean { c: f64, d: f64 },
+    /// `a / (2 b) (exp(b (I1bar - 3)) - 1) + d (J - 1)^2`.
+    Exponential { a: f64, b: f64, d: f64 },
+    /// `c (I1 - 3) + d (J - 1)^2`.
+    NeoHookeanLiteral { c: f64, d: f64 },
+    /// `a / (2 b) (exp(b (I1 - 3)) - 1) + d (J - 1)^2`.
+    ExponentialLiteral { a: f64, b: f64, d: f64 },
+}
+
+impl Law {
+    /// The paper's exponential law, its numbers read as kPa, in isochoric form.
+    pub const PAPER: Law = Law::Exponential {
+        a: 59.0,
+        b: 8.023,
+        d: 60_000.0,
+    };
+
+    /// Volume modulus `d` of `d (J - 1)^2`.
+    pub fn d(&self) -> f64 {
+        match *self {
+            Law::NeoHookean { d, .. } | Law::NeoHookeanLiteral { d, .. } => d,
+            Law::Exponential { d, .. } | Law::ExponentialLiteral { d, .. } => d,
+        }
+    }
+
+    /// Whether `x` is made of `I1bar` (true) or of `I1` (false).
+    pub fn is_isochoric(&self) -> bool {
+        matches!(self, Law::NeoHookean { .. } | Law::Exponential { .. })
+    }
+
+    /// `W`, `W'` and `W''` at `x`.
+    pub fn shape_response(&self, x: f64) -> [f64; 3] {
+        match *self {
+            Law::NeoHookean { c, .. } | Law::NeoHookeanLiteral { c, .. } => [c * x, c, 0.0],
+            Law::Exponential { a, b, .. } | Law::ExponentialLiteral { a, b, .. } => {
+                if b * x <= EXPONENT_CAP {
+                    let e = (b * x).exp();
+                    [a / (2.0 * b) * (e - 1.0), a / 2.0 * e, a * b / 2.0 * e]
+                } else {
+                    let e = EXPONENT_CAP.exp();
+                    let x_cap = EXPONENT_CAP / b;
+                    [
+                        a / (2.0 * b) * (e - 1.0) + a / 2.0 * e * (x - x_cap),
+                        a / 2.0 * e,
+                        0.0,
+                    ]
+                }
+            }
+        }
+    }
+
+    /// `g`, `g'` and `g''` at `J`: the factor of `I1` in `x`.
+    pub fn volume_factor(&self, j: f64) -> [f64; 3] {
+        if !self.is_isochoric() {
+            return [1.0, 0.0, 0.0];
+        }
+        let g = |j: f64| j.powf(-2.0 / 3.0);
+        let dg = |j: f64| -2.0 / 3.0 * j.powf(-5.0 / 3.0);
+        let ddg = |j: f64| 10.0 / 9.0 * j.powf(-8.0 / 3.0);
+        if j >= J_MIN {
+            [g(j), dg(j), ddg(j)]
+        } else {
+            [g(J_MIN) + dg(J_MIN) * (j - J_MIN), dg(J_MIN), 0.0]
+        }
+    }
+
+    /// `x = g(J) I1 - 3`, the argument of `W`.
+    pub fn strain_measure(&self, f: &Mat3) -> f64 {
+        let [g, ..] = self.volume_factor(determinant(f));
+        g * contraction(f, f) - 3.0
+    }
+
+    /// Stored energy `Psi(F)` in J/m^3.
+    pub fn energy(&self, f: &Mat3) -> f64 {
+        let j = determinant(f);
+        let [w, ..] = self.shape_response(self.strain_measure(f));
+        w + self.d() * (j - 1.0).powi(2)
+    }
+
+    /// First Piola-Kirchhoff stress `P = dPsi/dF` in Pa; not finite where `J = 0` exactly.
+    ///
+    /// With `dI1/dF = 2 F` and `dJ/dF = J F^-T`, above [`J_MIN`]
+    /// `P = 2 W' J^(-2/3) (F - I1/3 F^-T) + 2 d (J - 1) J F^-T`.
+    pub fn first_piola(&self, f: &Mat3) -> Mat3 {
+        let j = determinant(f);
+        let i1 = contraction(f, f);
+        let f_inv_t = transpose(&inverse(f));
+        let [_, dw, _] = self.shape_response(self.strain_measure(f));
+        let dx = if !self.is_isochoric() {
+            from_fn(|i, k| 2.0 * f[i][k])
+        } else if j >= J_MIN {
+            let factor = 2.0 * j.powf(-2.0 / 3.0);
+            from_fn(|i, k| factor * (f[i][k] - i1 / 3.0 * f_inv_t[i][k]))
+        } else {
+            let [g, dg, _] = self.volume_factor(j);
+            from_fn(|i, k| 2.0 * g * f[i][k] + dg * i1 * j * f_inv_t[i][k])
+        };
+        from_fn(|i, k| dw * dx[i][k] + 2.0 * self.d() * (j - 1.0) * j * f_inv_t[i][k])
+    }
+
+    /// Tangent `A_iJkL = dP_iJ / dF_kL` in Pa, analytic: the second derivative of `Psi(I1(F), J(F))` by the
+    /// chain rule, with `d(J F^-T)_iJ / dF_kL = J (F^-T_iJ F^-T_kL - F^-T_iL F^-T_kJ)`.
+    pub fn tangent(&self, f: &Mat3) -> Mat9 {
+        let jac = determinant(f);
+        let i1 = contraction(f, f);
+        let f_inv_t = transpose(&inverse(f));
+        let [_, dw, ddw] = self.shape_response(self.strain_measure(f));
+        let [g, dg, ddg] = self.volume_factor(jac);
+        let di1 = from_fn(|i, j| 2.0 * f[i][j]);
+        let dj = from_fn(|i, j| jac * f_inv_t[i][j]);
+        let dx = from_fn(|i, j| g * di1[i][j] + dg * i1 * dj[i][j]);
+        let d = self.d();
+
+        let entry = |i: usize, j: usize, k: usize, l: usize| {
+            let ddi1 = 2.0 * IDENTITY[i][k] * IDENTITY[j][l];
+            let ddj = jac * (f_inv_t[i][j] * f_inv_t[k][l] - f_inv_t[i][l] * f_inv_t[k][j]);
+            let ddx = g * ddi1
+                + dg * (di1[i][j] * dj[k][l] + dj[i][j] * di1[k][l])
+                + i1 * (ddg * dj[i][j] * dj[k][l] + dg * ddj);
+            let volume = 2.0 * d * (dj[i][j] * dj[k][l] + (jac - 1.0) * ddj);
+            ddw * dx[i][j] * dx[k][l] + dw * ddx + volume
+        };
+        std::array::from_fn(|row| std::array::from_fn(|col| entry(row / 3, row % 3, col / 3, col % 3)))
+    }
+}
