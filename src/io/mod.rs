@@ -1,1 +1,87 @@
-//! Meshes in, fields out.
+//! Meshes in, fields out. [`read_mesh`] reads tetrahedral meshes in the formats of VTK, Gmsh and TetGen;
+//! [`write_vtu`] and [`write_pvd`] write results for ParaView. Points keep the unit of their file, which no format
+//! records: the caller scales to metres.
+
+mod cursor;
+mod error;
+mod gmsh;
+mod numbering;
+mod numbers;
+mod tetgen;
+mod vtk;
+mod vtk_cells;
+mod vtu;
+mod vtu_data;
+mod write;
+
+use std::ffi::OsStr;
+use std::path::Path;
+use std::vec::Vec;
+
+use error::Fault;
+pub use error::ReadError;
+pub use write::{Frame, write_atomically, write_pvd, write_vtu};
+
+/// A tetrahedral mesh as its file has it; nothing is scaled, renumbered or turned.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TetMesh {
+    /// Coordinates in file units. They may be NaN or infinite, and not every point belongs to a tetrahedron.
+    pub points: Vec<[f64; 3]>,
+    /// The four points of each tetrahedron, from 0, in the order of the file. All are in range.
+    pub tets: Vec<[u32; 4]>,
+    /// The triangles of the file, usually its surface; empty if it lists none.
+    pub triangles: Vec<[u32; 3]>,
+    /// A region for each tetrahedron, empty if the file has none. Gmsh: the (first) physical tags, or the elementary
+    /// tags where no tetrahedron has a physical one. VTK: the first array of whole numbers among the cell data that
+    /// is named like `region`, `material`, `PhysicalIds`, `CellEntityIds` or `gmsh:physical`. TetGen: the last
+    /// attribute, if it is a whole number everywhere.
+    pub regions: Vec<i32>,
+}
+
+/// Reads a mesh; the extension tells the format.
+///
+/// - `.vtk`: legacy VTK, versions 1 to 5, text or binary
+/// - `.vtu`: VTK XML, text, base64 or raw, plain or zlib
+/// - `.msh`: Gmsh 1, 2.x or 4.1, text or binary
+/// - `.node` or `.ele`: TetGen; the other file is looked for beside the one given
+///
+/// Points, lines and surface cells other than triangles are left out. A volume cell that is not a tetrahedron with
+/// four nodes is an error, as is a file without tetrahedra.
+pub fn read_mesh(path: &Path) -> Result<TetMesh, ReadError> {
+    let extension = path
+        .extension()
+        .and_then(OsStr::to_str)
+        .unwrap_or_default()
+        .to_ascii_lowercase();
+    let mesh = match extension.as_str() {
+        "vtk" => parse(path, vtk::read),
+        "vtu" => parse(path, vtu::read),
+        "msh" => parse(path, gmsh::read),
+        "node" | "ele" => {
+            let file = |kind| {
+                if extension == kind {
+                    path.into()
+                } else {
+                    path.with_extension(kind)
+                }
+            };
+            let (points, numbering) = parse(&file("node"), tetgen::read_nodes)?;
+            parse(&file("ele"), |bytes| {
+                tetgen::read_elements(bytes, points, &numbering)
+            })
+        }
+        _ => Err(Fault::new("", "the extension is none of .vtk, .vtu, .msh, .node and .ele").in_file(path)),
+    }?;
+    if mesh.tets.is_empty() {
+        return Err(Fault::new("", "the file has no tetrahedra").in_file(path));
+    }
+    Ok(mesh)
+}
+
+fn parse<T>(path: &Path, parse: impl FnOnce(&[u8]) -> Result<T, Fault>) -> Result<T, ReadError> {
+    let bytes = std::fs::read(path).map_err(|source| ReadError::Unreadable {
+        path: path.into(),
+        source,
+    })?;
+    parse(&bytes).map_err(|fault| fault.in_file(path))
+}

@@ -1,0 +1,224 @@
+//! Results for ParaView: one `.vtu` file a frame and a `.pvd` file that gives each its time, as specified in "VTK File
+//! Formats" (<https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>). Arrays are appended as raw
+//! bytes, little endian, compressed with zlib: the smallest of the encodings, and ParaView and meshio read it.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+use std::ffi::OsString;
+use std::format;
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+use std::string::String;
+use std::vec::Vec;
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+
+/// The mesh and its fields at one time.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    /// Coordinates, in the unit in which ParaView shall show them.
+    pub points: &'a [[f64; 3]],
+    /// The four points of each tetrahedron, from 0.
+    pub tets: &'a [[u32; 4]],
+    /// Named vectors, one for each point, such as displacements.
+    pub point_vectors: &'a [(&'a str, &'a [[f32; 3]])],
+    /// Named numbers, one for each point.
+    pub point_scalars: &'a [(&'a str, &'a [f32])],
+    /// Named numbers, one for each tetrahedron.
+    pub cell_scalars: &'a [(&'a str, &'a [f32])],
+}
+
+/// Writes one frame as a `.vtu` file, atomically. A field whose length does not fit the mesh is an error of the kind
+/// [`InvalidInput`](io::ErrorKind::InvalidInput), as is a tetrahedron that names a point beyond the last.
+pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
+    let (n_points, n_tets) = (frame.points.len(), frame.tets.len());
+    if let Some(tet) = frame
+        .tets
+        .iter()
+        .position(|tet| tet.iter().any(|&p| p as usize >= n_points))
+    {
+        let corners = frame.tets.get(tet);
+        return Err(invalid(format!(
+            "tetrahedron {tet} names the points {corners:?} of {n_points}"
+        )));
+    }
+    let mut arrays = Arrays {
+        xml: String::new(),
+        data: Vec::new(),
+    };
+    arrays.open("PointData");
+    for (name, values) in frame.point_vectors {
+        check(name, values.len(), n_points, "points")?;
+        arrays.add(
+            name,
+            "Float32",
+            3,
+            values.as_flattened().iter().map(|x| x.to_le_bytes()),
+        )?;
+    }
+    for (name, values) in frame.point_scalars {
+        check(name, values.len(), n_points, "points")?;
+        arrays.add(name, "Float32", 1, values.iter().map(|x| x.to_le_bytes()))?;
+    }
+    arrays.close("PointData");
+    arrays.open("CellData");
+    for (name, values) in frame.cell_scalars {
+        check(name, values.len(), n_tets, "tetrahedra")?;
+        arrays.add(name, "Float32", 1, values.iter().map(|x| x.to_le_bytes()))?;
+    }
+    arrays.close("CellData");
+    arrays.open("Points");
+    arrays.add(
+        "Points",
+        "Float64",
+        3,
+        frame.points.as_flattened().iter().map(|x| x.to_le_bytes()),
+    )?;
+    arrays.close("Points");
+    arrays.open("Cells");
+    let corners = frame
+        .tets
+        .as_flattened()
+        .iter()
+        .map(|&p| i64::from(p).to_le_bytes());
+    arrays.add("connectivity", "Int64", 1, corners)?;
+    arrays.add(
+        "offsets",
+        "Int64",
+        1,
+        (1..=n_tets).map(|tet| (4 * tet as i64).to_le_bytes()),
+    )?;
+    arrays.add("types", "UInt8", 1, frame.tets.iter().map(|_| [10]))?;
+    arrays.close("Cells");
+
+    write_atomically(path, |w| {
+        w.write_all(
+            b"<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" \
+              byte_order=\"LittleEndian\" header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n",
+        )?;
+        writeln!(
+            w,
+            "<UnstructuredGrid><Piece NumberOfPoints=\"{n_points}\" NumberOfCells=\"{n_tets}\">\n{}</Piece>",
+            arrays.xml
+        )?;
+        w.write_all(b"</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_")?;
+        w.write_all(&arrays.data)?;
+        w.write_all(b"\n</AppendedData>\n</VTKFile>\n")
+    })
+}
+
+/// Writes a `.pvd` file, atomically: the frames of a simulation as pairs of a time in s and the name of a `.vtu` file
+/// relative to the folder of the `.pvd` file.
+pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> io::Result<()> {
+    write_atomically(path, |w| {
+        w.write_all(
+            b"<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n",
+        )?;
+        for (time, file) in frames {
+            writeln!(
+                w,
+                "<DataSet timestep=\"{time}\" part=\"0\" file=\"{}\"/>",
+                escaped(file)
+            )?;
+        }
+        w.write_all(b"</Collection>\n</VTKFile>\n")
+    })
+}
+
+/// Writes a file so that nobody ever sees half of it: under a temporary name in the same folder, then renamed. If
+/// `write` or the file system fails, the temporary file is removed and a file of that name stays as it was.
+pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let name = path
+        .file_name()
+        .ok_or_else(|| invalid(format!("{} is not the name of a file", path.display())))?;
+    let mut temporary = OsString::from(".");
+    temporary.push(name);
+    temporary.push(format!(
+        ".{}-{}.tmp",
+        std::process::id(),
+        COUNT.fetch_add(1, Ordering::Relaxed)
+    ));
+    let temporary = path.with_file_name(temporary);
+    let named = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", path.display()));
+    let mut file = BufWriter::new(fs::File::create_new(&temporary).map_err(named)?);
+    let written = write(&mut file).and_then(|()| file.flush());
+    // Closed first: Windows neither renames nor removes an open file.
+    drop(file);
+    written
+        .and_then(|()| fs::rename(&temporary, path))
+        .map_err(|error| {
+            // The first error is the one to report.
+            let _ = fs::remove_file(&temporary);
+            named(error)
+        })
+}
+
+/// The `<DataArray>` elements and the appended data to which they point.
+struct Arrays {
+    xml: String,
+    data: Vec<u8>,
+}
+
+impl Arrays {
+    fn open(&mut self, element: &str) {
+        self.xml += &format!("<{element}>\n");
+    }
+
+    fn close(&mut self, element: &str) {
+        self.xml += &format!("</{element}>\n");
+    }
+
+    fn add<const N: usize>(
+        &mut self,
+        name: &str,
+        kind: &str,
+        components: usize,
+        values: impl Iterator<Item = [u8; N]>,
+    ) -> io::Result<()> {
+        /// Bytes in a block, a multiple of every size of number.
+        const BLOCK: usize = 1 << 20;
+        self.xml += &format!(
+            "<DataArray type=\"{kind}\" Name=\"{}\" NumberOfComponents=\"{components}\" format=\"appended\" \
+             offset=\"{}\"/>\n",
+            escaped(name),
+            self.data.len()
+        );
+        let bytes: Vec<u8> = values.flatten().collect();
+        let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(compressed).collect::<io::Result<_>>()?;
+        for count in [blocks.len(), BLOCK, bytes.len() % BLOCK]
+            .into_iter()
+            .chain(blocks.iter().map(Vec::len))
+        {
+            self.data.extend((count as u64).to_le_bytes());
+        }
+        self.data.extend(blocks.into_iter().flatten());
+        Ok(())
+    }
+}
+
+fn compressed(block: &[u8]) -> io::Result<Vec<u8>> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(block)?;
+    encoder.finish()
+}
+
+fn check(name: &str, found: usize, expected: usize, what: &str) -> io::Result<()> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(invalid(format!(
+        "the field {name:?} has {found} values for {expected} {what}"
+    )))
+}
+
+fn invalid(reason: String) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidInput, reason)
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('"', "&quot;")
+}
