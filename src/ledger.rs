@@ -31,14 +31,8 @@ const ROUNDING: f64 = 1e-4;
 
 impl Ledger {
     /// At rest, nothing done.
-    pub const NEW: Self = Self {
-        start: 0.0,
-        work: 0.0,
-        dissipated: 0.0,
-        kinetic: 0.0,
-        turnover: 0.0,
-        peak: 0.0,
-    };
+    pub const NEW: Self =
+        Self { start: 0.0, work: 0.0, dissipated: 0.0, kinetic: 0.0, turnover: 0.0, peak: 0.0 };
 
     /// What the kinetic energy may be.
     #[must_use]
@@ -56,13 +50,6 @@ impl Ledger {
             return None;
         }
         let dissipated = self.dissipated + dissipated;
-        Some(Self {
-            work: self.work + work,
-            dissipated,
-            kinetic,
-            turnover,
-            peak,
-            ..self
-        })
+        Some(Self { work: self.work + work, dissipated, kinetic, turnover, peak, ..self })
     }
 }

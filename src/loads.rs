@@ -81,25 +81,14 @@ pub enum LoadError {
 impl fmt::Display for LoadError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::Node {
-                kind,
-                index,
-                node,
-                nodes,
-            } => {
-                write!(
-                    f,
-                    "{kind} {index}: node {node} does not exist, the scene has {nodes} nodes"
-                )
+            Self::Node { kind, index, node, nodes } => {
+                write!(f, "{kind} {index}: node {node} does not exist, the scene has {nodes} nodes")
             }
             Self::NotFinite { kind, index, value } => {
                 write!(f, "{kind} {index}: a component is {value}")
             }
             Self::Ramp { kind, index, value } => {
-                write!(
-                    f,
-                    "{kind} {index}: the ramp is {value} s, it must be zero or more"
-                )
+                write!(f, "{kind} {index}: the ramp is {value} s, it must be zero or more")
             }
             Self::NotHeld { index, node, axis } => {
                 let axis = ["x", "y", "z"].get(axis).copied().unwrap_or("?");
@@ -126,12 +115,7 @@ pub struct Loads<'a> {
 
 impl<'a> Loads<'a> {
     /// No load; supports stand still.
-    pub const NONE: Self = Self {
-        gravity: [0.0; 3],
-        forces: &[],
-        motions: &[],
-        nodes: None,
-    };
+    pub const NONE: Self = Self { gravity: [0.0; 3], forces: &[], motions: &[], nodes: None };
 
     /// Checks loads against the scene they will act on. Nodes may be listed more than once: forces add
     /// up, of several motions of an axis the last one holds.
@@ -150,19 +134,10 @@ impl<'a> Loads<'a> {
             check("motion", index, motion.node, nodes, &motion.metre, motion.ramp)?;
             let held = scene.held(motion.node as usize);
             if let Some(axis) = (0..3).find(|&axis| motion.axes.has(axis) && !held.has(axis)) {
-                return Err(LoadError::NotHeld {
-                    index,
-                    node: motion.node,
-                    axis,
-                });
+                return Err(LoadError::NotHeld { index, node: motion.node, axis });
             }
         }
-        Ok(Self {
-            gravity,
-            forces,
-            motions,
-            nodes: Some(nodes),
-        })
+        Ok(Self { gravity, forces, motions, nodes: Some(nodes) })
     }
 
     pub(crate) const fn nodes(&self) -> Option<usize> {
@@ -192,11 +167,7 @@ impl<'a> Loads<'a> {
 #[inline]
 #[must_use]
 pub fn ramp_factor(time: f64, ramp: f32) -> f32 {
-    if time < f64::from(ramp) {
-        (time / f64::from(ramp)) as f32
-    } else {
-        1.0
-    }
+    if time < f64::from(ramp) { (time / f64::from(ramp)) as f32 } else { 1.0 }
 }
 
 /// Nodal forces of a uniform traction (Pa) on boundary triangles at rest: a third of traction times area
@@ -241,19 +212,10 @@ fn check(
     ramp: f32,
 ) -> Result<(), LoadError> {
     if node as usize >= nodes {
-        return Err(LoadError::Node {
-            kind,
-            index,
-            node,
-            nodes,
-        });
+        return Err(LoadError::Node { kind, index, node, nodes });
     }
     if !(ramp.is_finite() && ramp >= 0.0) {
-        return Err(LoadError::Ramp {
-            kind,
-            index,
-            value: ramp,
-        });
+        return Err(LoadError::Ramp { kind, index, value: ramp });
     }
     finite(kind, index, vector)
 }

@@ -77,21 +77,14 @@ impl fmt::Display for MeshError {
         match *self {
             Self::Empty => write!(f, "the mesh has no elements"),
             Self::IndexOutOfRange { element, node, nodes } => {
-                write!(
-                    f,
-                    "element {element}: node {node} does not exist, the mesh has {nodes} nodes"
-                )
+                write!(f, "element {element}: node {node} does not exist, the mesh has {nodes} nodes")
             }
             Self::RepeatedNode { element, node } => write!(f, "element {element}: node {node} appears twice"),
             Self::NotFinite { node, axis, value } => {
                 let axis = ["x", "y", "z"].get(axis).copied().unwrap_or("?");
                 write!(f, "node {node}: coordinate {axis} is {value}")
             }
-            Self::Degenerate {
-                element,
-                volume,
-                longest_edge,
-            } => write!(
+            Self::Degenerate { element, volume, longest_edge } => write!(
                 f,
                 "element {element}: degenerate, volume {volume:.2e} m^3 with a longest edge of {:.3} mm",
                 longest_edge * 1e3
@@ -131,11 +124,7 @@ impl<'a> Mesh<'a> {
         for (element, tet) in tets.iter().enumerate() {
             for (k, &node) in tet.iter().enumerate() {
                 if node as usize >= points.len() {
-                    return Err(MeshError::IndexOutOfRange {
-                        element,
-                        node,
-                        nodes: points.len(),
-                    });
+                    return Err(MeshError::IndexOutOfRange { element, node, nodes: points.len() });
                 }
                 if tet.iter().take(k).any(|&other| other == node) {
                     return Err(MeshError::RepeatedNode { element, node });
@@ -144,11 +133,7 @@ impl<'a> Mesh<'a> {
             let corners = tet.map(|node| corner(points, node));
             let (volume, longest_edge) = (volume(corners), longest_edge(corners));
             if volume.abs() < DEGENERATE * longest_edge * longest_edge * longest_edge || volume == 0.0 {
-                return Err(MeshError::Degenerate {
-                    element,
-                    volume,
-                    longest_edge,
-                });
+                return Err(MeshError::Degenerate { element, volume, longest_edge });
             }
             if volume < 0.0 {
                 match winding {
@@ -183,11 +168,7 @@ impl<'a> Mesh<'a> {
         let points = self.points;
         self.tets.iter().map(move |&[a, b, c, d]| {
             let tet = [a, b, c, d];
-            if volume(tet.map(|node| corner(points, node))) < 0.0 {
-                [a, c, b, d]
-            } else {
-                tet
-            }
+            if volume(tet.map(|node| corner(points, node))) < 0.0 { [a, c, b, d] } else { tet }
         })
     }
 
@@ -217,14 +198,7 @@ pub(crate) fn longest_edge([x0, x1, x2, x3]: [DVec3; 4]) -> f64 {
 pub(crate) fn gradients([x0, x1, x2, x3]: [DVec3; 4]) -> ([DVec3; 3], f64) {
     let (a, b, c) = (x1 - x0, x2 - x0, x3 - x0);
     let determinant = a.dot(b.cross(c));
-    (
-        [
-            b.cross(c) / determinant,
-            c.cross(a) / determinant,
-            a.cross(b) / determinant,
-        ],
-        determinant / 6.0,
-    )
+    ([b.cross(c) / determinant, c.cross(a) / determinant, a.cross(b) / determinant], determinant / 6.0)
 }
 
 /// A box of `cells[0] x cells[1] x cells[2]` cells, each cut in six Kuhn tetrahedra around its diagonal.
@@ -239,10 +213,7 @@ pub struct Bar {
 
 impl Bar {
     /// The paper's bar: 50 x 50 x 100 mm, 1,458 nodes, 6,528 tetrahedra.
-    pub const PAPER: Self = Self {
-        size: [0.05, 0.05, 0.1],
-        cells: [8, 8, 17],
-    };
+    pub const PAPER: Self = Self { size: [0.05, 0.05, 0.1], cells: [8, 8, 17] };
 
     /// Number of nodes.
     #[must_use]
@@ -298,11 +269,7 @@ impl Bar {
                     at[axis] += 1;
                     *corner = self.node(at[0], at[1], at[2]);
                 }
-                if even {
-                    tet
-                } else {
-                    [tet[0], tet[2], tet[1], tet[3]]
-                }
+                if even { tet } else { [tet[0], tet[2], tet[1], tet[3]] }
             })
         })
     }
@@ -328,17 +295,11 @@ mod tests {
             refused(&POINTS, &[[0, 1, 2, 3], [0, 1, 2, 4]]),
             "element 1: node 4 does not exist, the mesh has 4 nodes"
         );
-        assert_eq!(
-            refused(&POINTS, &[[0, 1, 2, 1]]),
-            "element 0: node 1 appears twice"
-        );
+        assert_eq!(refused(&POINTS, &[[0, 1, 2, 1]]), "element 0: node 1 appears twice");
         let mut points = POINTS;
         points[2][1] = f32::NAN;
         assert_eq!(refused(&points, &[[0, 1, 2, 3]]), "node 2: coordinate y is NaN");
-        assert_eq!(
-            refused(&POINTS, &[[0, 2, 1, 3]]),
-            "element 0: volume -1.67e-7 m^3"
-        );
+        assert_eq!(refused(&POINTS, &[[0, 2, 1, 3]]), "element 0: volume -1.67e-7 m^3");
         let mut points = POINTS;
         points[3] = [0.005, 0.005, 1e-9];
         assert_eq!(

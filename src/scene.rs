@@ -59,21 +59,13 @@ impl Support {
     /// The node stands still.
     #[must_use]
     pub const fn fixed(node: u32) -> Self {
-        Self {
-            node,
-            axes: Axes::XYZ,
-            moves: false,
-        }
+        Self { node, axes: Axes::XYZ, moves: false }
     }
 
     /// The node follows prescribed motions.
     #[must_use]
     pub const fn moved(node: u32) -> Self {
-        Self {
-            node,
-            axes: Axes::XYZ,
-            moves: true,
-        }
+        Self { node, axes: Axes::XYZ, moves: true }
     }
 }
 
@@ -142,20 +134,14 @@ impl fmt::Display for BuildError {
         match *self {
             Self::Mesh(error) => error.fmt(f),
             Self::NodeCapacity { needed, capacity } => {
-                write!(
-                    f,
-                    "the mesh has {needed} nodes, the scene has room for {capacity}"
-                )
+                write!(f, "the mesh has {needed} nodes, the scene has room for {capacity}")
             }
             Self::BlockCapacity { needed, capacity } => write!(
                 f,
                 "the mesh needs {needed} blocks of {BLOCK} elements, the scene has room for {capacity}"
             ),
             Self::SupportNode { support, node, nodes } => {
-                write!(
-                    f,
-                    "support {support}: node {node} does not exist, the mesh has {nodes} nodes"
-                )
+                write!(f, "support {support}: node {node} does not exist, the mesh has {nodes} nodes")
             }
             Self::NoTissue { element } => write!(f, "element {element}: the material names no tissue"),
             Self::Constant { element, name, value } => {
@@ -165,10 +151,7 @@ impl fmt::Display for BuildError {
                 )
             }
             Self::Density { element, value } => {
-                write!(
-                    f,
-                    "element {element}: density is {value} kg/m^3, it must be a finite positive number"
-                )
+                write!(f, "element {element}: density is {value} kg/m^3, it must be a finite positive number")
             }
             Self::NothingMoves => write!(f, "all nodes of all elements are fixed, so nothing can move"),
         }
@@ -177,7 +160,10 @@ impl fmt::Display for BuildError {
 
 impl core::error::Error for BuildError {}
 
-/// Tables of [`BLOCK`] elements, structure of arrays. Places without an element have volume zero.
+/// Tables of [`BLOCK`] elements, structure of arrays. The elements of a block come from as many distant
+/// parts of the mesh: neighbours share nodes, and adding their forces one after the other would wait for
+/// each sum to reach memory. Places without an element have volume zero and name node 0, to which they add
+/// zero.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct ElementBlock {
@@ -235,10 +221,7 @@ pub struct NodeInertia {
 
 impl NodeInertia {
     /// A node without mass.
-    pub const EMPTY: Self = Self {
-        inverse: [0.0; 3],
-        mass: 0.0,
-    };
+    pub const EMPTY: Self = Self { inverse: [0.0; 3], mass: 0.0 };
 }
 
 /// Blocks needed for `elements` elements.
@@ -327,6 +310,13 @@ impl<M: Material, N: AsRef<[NodeInertia]>, B: AsRef<[ElementBlock]>> Scene<M, N,
         self.blocks.as_ref().get(..self.block_count).unwrap_or_default()
     }
 
+    /// Block and lane of each element, in the mesh's order.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (&ElementBlock, usize)> {
+        let blocks = self.blocks();
+        (0..self.element_count)
+            .filter_map(|place| Some((blocks.get(place % blocks.len())?, place / blocks.len())))
+    }
+
     /// Mass of a node, kg; zero for a node that does not exist.
     #[must_use]
     pub fn node_mass(&self, node: usize) -> f32 {
@@ -336,10 +326,7 @@ impl<M: Material, N: AsRef<[NodeInertia]>, B: AsRef<[ElementBlock]>> Scene<M, N,
     /// Held axes of a node.
     #[must_use]
     pub fn held(&self, node: usize) -> Axes {
-        let inverse = self
-            .inertia()
-            .get(node)
-            .map_or([1.0; 3], |inertia| inertia.inverse);
+        let inverse = self.inertia().get(node).map_or([1.0; 3], |inertia| inertia.inverse);
         let bits = inverse.iter().enumerate().filter(|(_, value)| **value == 0.0);
         Axes(bits.fold(0, |bits, (axis, _)| bits | 1 << axis))
     }
@@ -379,8 +366,7 @@ where
         // Until the end `inverse` holds a mark for each axis: free, fixed or moved.
         mark_supports(nodes, supports)?;
         let still = |tet: [u32; 4]| {
-            tet.iter()
-                .all(|&node| nodes.get(node as usize).is_some_and(|n| n.inverse == [FIXED; 3]))
+            tet.iter().all(|&node| nodes.get(node as usize).is_some_and(|n| n.inverse == [FIXED; 3]))
         };
         let kept = mesh.tets().filter(|&tet| !still(tet)).count();
         if kept == 0 {
@@ -403,10 +389,7 @@ where
                 return Err(BuildError::Constant { element, name, value });
             }
             if !(tissue.density.is_finite() && tissue.density > 0.0) {
-                return Err(BuildError::Density {
-                    element,
-                    value: tissue.density,
-                });
+                return Err(BuildError::Density { element, value: tissue.density });
             }
             let corners = mesh.corners(tet);
             let share = 0.25 * volume(corners) * f64::from(tissue.density);
@@ -417,23 +400,20 @@ where
                     inertia.mass += share as f32;
                 }
             }
-            let fixed = tet
-                .iter()
-                .all(|&node| nodes.get(node as usize).is_some_and(|n| n.inverse == [FIXED; 3]));
-            if let (false, Some(block)) = (fixed, blocks.get_mut(place / BLOCK)) {
-                write_element(block, place % BLOCK, element, tet, corners);
+            let fixed =
+                tet.iter().all(|&node| nodes.get(node as usize).is_some_and(|n| n.inverse == [FIXED; 3]));
+            let (block, lane) = (place % needed, place / needed);
+            if let (false, Some(block)) = (fixed, blocks.get_mut(block)) {
+                write_element(block, lane, element, tet, corners);
                 place += 1;
             }
         }
-        pad_last_block(blocks, place);
         for (node, inertia) in nodes.iter_mut().enumerate() {
             if inertia.mass == 0.0 {
                 return Err(MeshError::UnusedNode { node }.into());
             }
             let inverse = 1.0 / inertia.mass;
-            inertia.inverse = inertia
-                .inverse
-                .map(|mark| if mark == FREE { inverse } else { 0.0 });
+            inertia.inverse = inertia.inverse.map(|mark| if mark == FREE { inverse } else { 0.0 });
         }
         self.node_count = mesh.points().len();
         self.block_count = needed;
@@ -452,11 +432,7 @@ fn mark_supports(nodes: &mut [NodeInertia], supports: &[Support]) -> Result<(), 
     let count = nodes.len();
     for (index, support) in supports.iter().enumerate() {
         let Some(inertia) = nodes.get_mut(support.node as usize) else {
-            return Err(BuildError::SupportNode {
-                support: index,
-                node: support.node,
-                nodes: count,
-            });
+            return Err(BuildError::SupportNode { support: index, node: support.node, nodes: count });
         };
         for (axis, mark) in inertia.inverse.iter_mut().enumerate() {
             if support.axes.has(axis) {
@@ -480,18 +456,4 @@ fn write_element(block: &mut ElementBlock, lane: usize, element: usize, tet: [u3
     }
     block.volumes[lane] = volume as f32;
     block.elements[lane] = element as u32;
-}
-
-/// Empty places repeat the nodes of the last element, with zero gradients and volume: they read memory
-/// that is there and add zero.
-fn pad_last_block(blocks: &mut [ElementBlock], filled: usize) {
-    let used = filled % BLOCK;
-    if let (true, Some(block)) = (used > 0, blocks.last_mut()) {
-        for nodes in &mut block.nodes {
-            let last = nodes[used - 1];
-            nodes[used..].fill(last);
-        }
-        let last = block.elements[used - 1];
-        block.elements[used..].fill(last);
-    }
 }

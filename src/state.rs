@@ -4,26 +4,8 @@
 //! The increment `u_n - u_(n-1)` is kept instead of `u_(n-1)`: in float32 the rounding of
 //! `2 u_n - u_(n-1)` acts as a false spring to the ground (13.8 % after 20,000 steps of the paper's bar).
 
-use bytemuck::{Pod, Zeroable};
-
+pub use crate::lanes::NodeVector;
 use crate::ledger::Ledger;
-
-/// A vector of one node, padded to four numbers; the fourth stays zero.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C, align(16))]
-pub struct NodeVector(pub(crate) [f32; 4]);
-
-impl NodeVector {
-    /// The zero vector.
-    pub const ZERO: Self = Self([0.0; 4]);
-
-    /// Components along x, y, z.
-    #[must_use]
-    pub const fn to_array(self) -> [f32; 3] {
-        let [x, y, z, _] = self.0;
-        [x, y, z]
-    }
-}
 
 /// The state of a scene over storage `S`, with room for at least its nodes.
 #[derive(Clone, Debug)]
@@ -46,11 +28,7 @@ impl<const N: usize> FixedState<N> {
     /// At rest.
     #[must_use]
     pub const fn new() -> Self {
-        Self::over(
-            [NodeVector::ZERO; N],
-            [NodeVector::ZERO; N],
-            [NodeVector::ZERO; N],
-        )
+        Self::over([NodeVector::ZERO; N], [NodeVector::ZERO; N], [NodeVector::ZERO; N])
     }
 }
 
@@ -63,15 +41,7 @@ impl<const N: usize> Default for FixedState<N> {
 impl<S> State<S> {
     /// A state over the given storage, as it is: zeros mean at rest.
     pub const fn over(displacement: S, increment: S, force: S) -> Self {
-        Self {
-            displacement,
-            increment,
-            force,
-            time: 0.0,
-            steps: 0,
-            dt: 0.0,
-            ledger: Ledger::NEW,
-        }
+        Self { displacement, increment, force, time: 0.0, steps: 0, dt: 0.0, ledger: Ledger::NEW }
     }
 
     /// Simulated time, s.
@@ -111,11 +81,7 @@ impl<S: AsRef<[NodeVector]>> State<S> {
     #[must_use]
     pub fn velocity(&self, node: usize) -> [f32; 3] {
         let increment = self.increment.as_ref().get(node).copied().unwrap_or_default();
-        if self.dt > 0.0 {
-            increment.to_array().map(|component| component / self.dt)
-        } else {
-            [0.0; 3]
-        }
+        if self.dt > 0.0 { increment.to_array().map(|component| component / self.dt) } else { [0.0; 3] }
     }
 
     /// How many nodes the storage holds.

@@ -70,12 +70,8 @@ fn the_files_that_are_broken_below_are_sound() {
         ("a.msh", MSH4, vec![5]),
         ("a.ele", TETGEN, vec![8]),
     ] {
-        let expected = TetMesh {
-            points: points.clone(),
-            tets: vec![[0, 1, 2, 3]],
-            triangles: vec![],
-            regions,
-        };
+        let expected =
+            TetMesh { points: points.clone(), tets: vec![[0, 1, 2, 3]], triangles: vec![], regions };
         assert_eq!(
             read(name, content.as_bytes()).unwrap_or_else(|error| panic!("{error}")),
             expected,
@@ -101,9 +97,7 @@ fn unusual_but_allowed() {
     assert_eq!(read("a.vtk", line.as_bytes()).unwrap(), expected);
     let metadata = VTK5.replace("CONN", "METADATA\nINFORMATION 0\n\nCONN");
     assert_eq!(read("a.vtk", metadata.as_bytes()).unwrap(), expected);
-    let quads = VTK
-        .replace("CELLS 1 5", "CELLS 3 12\n4 0 1 2 3\n1 0")
-        .replace("S 1\n10", "S 3\n9\n1\n10");
+    let quads = VTK.replace("CELLS 1 5", "CELLS 3 12\n4 0 1 2 3\n1 0").replace("S 1\n10", "S 3\n9\n1\n10");
     assert_eq!(read("a.vtk", quads.as_bytes()).unwrap(), expected);
     // A piece without anything, whose arrays have not even a header.
     let array = |name| format!("<DataArray type=\"Int64\" Name=\"{name}\" format=\"binary\"/>");
@@ -116,12 +110,7 @@ fn unusual_but_allowed() {
     assert_eq!(read("a.vtu", pieces.as_bytes()).unwrap(), expected);
     // Extensions in capitals.
     assert_eq!(read("a.VTK", VTK.as_bytes()).unwrap(), expected);
-    assert!(
-        read("a.NODE", b"")
-            .unwrap_err()
-            .to_string()
-            .contains("a.NODE, line 1: the file ends where")
-    );
+    assert!(read("a.NODE", b"").unwrap_err().to_string().contains("a.NODE, line 1: the file ends where"));
 }
 
 #[test]
@@ -288,43 +277,19 @@ fn tetgen() {
 fn binary_arrays_of_xml_files() {
     let points = r#"format="ascii">0 0 0 1 0 0 0 1 0 0 0 1<"#;
     let binary = |text: &str| VTU.replace(points, &format!("format=\"binary\">{text}<"));
-    assert_refused(
-        "a.vtu",
-        binary("AA!A").as_bytes(),
-        "line 3, <DataArray>: \"AA!A\" is not base64",
-    );
-    assert_refused(
-        "a.vtu",
-        binary("").as_bytes(),
-        "4 bytes are expected, but the base64 text ends after 0",
-    );
+    assert_refused("a.vtu", binary("AA!A").as_bytes(), "line 3, <DataArray>: \"AA!A\" is not base64");
+    assert_refused("a.vtu", binary("").as_bytes(), "4 bytes are expected, but the base64 text ends after 0");
     assert_refused(
         "a.vtu",
         binary("YAAAAAAA").as_bytes(),
         "96 bytes are expected, but the base64 text ends after",
     );
-    assert_refused(
-        "a.vtu",
-        binary("/////w==").as_bytes(),
-        "the array has 4294967295 bytes instead of 96",
-    );
-    assert_refused(
-        "a.vtu",
-        VTU.replace(points, "format=\"hex\"><").as_bytes(),
-        "the format \"hex\"",
-    );
+    assert_refused("a.vtu", binary("/////w==").as_bytes(), "the array has 4294967295 bytes instead of 96");
+    assert_refused("a.vtu", VTU.replace(points, "format=\"hex\"><").as_bytes(), "the format \"hex\"");
     let appended = VTU.replace(points, "format=\"appended\" offset=\"7\"><");
-    assert_refused(
-        "a.vtu",
-        appended.as_bytes(),
-        "the offset 7 is beyond the 0 appended bytes",
-    );
+    assert_refused("a.vtu", appended.as_bytes(), "the offset 7 is beyond the 0 appended bytes");
     let huge = binary("YAAAAAAA").replace("NumberOfPoints=\"4\"", "NumberOfPoints=\"1000000000000000\"");
-    assert_refused(
-        "a.vtu",
-        huge.as_bytes(),
-        "the array has 96 bytes instead of 24000000000000000",
-    );
+    assert_refused("a.vtu", huge.as_bytes(), "the array has 96 bytes instead of 24000000000000000");
 
     let zlib = |text: &str| binary(text).replace("<VTKFile", "<VTKFile compressor=\"vtkZLibDataCompressor\"");
     // Counts of blocks, full and last block, compressed bytes.
@@ -333,26 +298,14 @@ fn binary_arrays_of_xml_files() {
         let counts: Vec<u8> = counts.iter().flat_map(|count| count.to_le_bytes()).collect();
         zlib(&(STANDARD.encode(counts) + &STANDARD.encode(data)))
     };
-    assert_refused(
-        "a.vtu",
-        header([1, 96, 0, 5], b"12345").as_bytes(),
-        "block 0 is not zlib data",
-    );
+    assert_refused("a.vtu", header([1, 96, 0, 5], b"12345").as_bytes(), "block 0 is not zlib data");
     assert_refused(
         "a.vtu",
         header([1, 96, 0, 4_000_000_000], b"").as_bytes(),
         "4000000000 bytes are expected",
     );
-    assert_refused(
-        "a.vtu",
-        header([u32::MAX, 96, 0, 0], b"").as_bytes(),
-        "4 bytes are expected",
-    );
-    assert_refused(
-        "a.vtu",
-        header([0, 96, 0, 0], b"").as_bytes(),
-        "the array has 0 bytes instead of 96",
-    );
+    assert_refused("a.vtu", header([u32::MAX, 96, 0, 0], b"").as_bytes(), "4 bytes are expected");
+    assert_refused("a.vtu", header([0, 96, 0, 0], b"").as_bytes(), "the array has 0 bytes instead of 96");
     // A megabyte of zeros in a thousand bytes: unpacked no further than the array is long.
     let bomb = {
         use std::io::Write;
@@ -372,52 +325,25 @@ fn binary_arrays_of_xml_files() {
 fn files_of_other_kinds() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
     for (name, expected) in [
-        (
-            "refused_lz4.vtu",
-            "compressed with \"vtkLZ4DataCompressor\", which cannot be read",
-        ),
+        ("refused_lz4.vtu", "compressed with \"vtkLZ4DataCompressor\", which cannot be read"),
         ("refused_lzma.vtu", "compressed with \"vtkLZMADataCompressor\""),
-        (
-            "refused_4.0.msh",
-            "version \"4\" cannot be read; save the mesh as version 4.1 or 2.2",
-        ),
-        (
-            "refused_order2.msh",
-            "is a tetrahedron with ten nodes (Gmsh type 11)",
-        ),
+        ("refused_4.0.msh", "version \"4\" cannot be read; save the mesh as version 4.1 or 2.2"),
+        ("refused_order2.msh", "is a tetrahedron with ten nodes (Gmsh type 11)"),
         ("refused_order2.vtk", "is a quadratic tetrahedron (VTK type 24)"),
     ] {
         let error = read_mesh(&data.join(name)).expect_err(name).to_string();
         assert!(error.contains(expected), "{error}");
     }
     for extension in ["vtk", "vtu", "msh", "node"] {
-        for content in [
-            b"".as_slice(),
-            b"\n\n",
-            b"\xff\xfe\x00",
-            b"<a/>",
-            b"0",
-            &[0; 1000],
-        ] {
+        for content in [b"".as_slice(), b"\n\n", b"\xff\xfe\x00", b"<a/>", b"0", &[0; 1000]] {
             assert!(read(&format!("a.{extension}"), content).is_err());
         }
     }
-    assert_refused(
-        "a.vtu",
-        b"<VTKFile>\xff</VTKFile>",
-        "byte 9: the text is not UTF-8",
-    );
-    assert_refused(
-        "a.msh",
-        b"$Nod\xe9\n",
-        "line 1: the section \"$Nod\u{fffd}\" has no end",
-    );
+    assert_refused("a.vtu", b"<VTKFile>\xff</VTKFile>", "byte 9: the text is not UTF-8");
+    assert_refused("a.msh", b"$Nod\xe9\n", "line 1: the section \"$Nod\u{fffd}\" has no end");
     assert_refused("a.stl", b"solid", "the extension is none of .vtk");
     assert_refused("a.node", b"1 3 0 0\n1 0 0 0\n", "a.ele: cannot be read: ");
-    assert!(matches!(
-        read_mesh(&data.join("missing.vtk")),
-        Err(ReadError::Unreadable { .. })
-    ));
+    assert!(matches!(read_mesh(&data.join("missing.vtk")), Err(ReadError::Unreadable { .. })));
     assert!(read_mesh(&data).is_err());
 }
 
@@ -437,9 +363,7 @@ fn damaged_files() {
     let mut seed = 1_u64;
     let mut random = move |below: usize| {
         // Knuth's generator; its high bits are the good ones.
-        seed = seed
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 33) as usize % below
     };
     let (mut files, mut read_well, mut refused) = (0, 0, 0);
@@ -478,18 +402,11 @@ fn damaged_files() {
                 }
                 Err(error) => {
                     let text = error.to_string();
-                    assert!(
-                        text.contains("damaged") && text.len() < 500 && !text.contains('\n'),
-                        "{text}"
-                    );
+                    assert!(text.contains("damaged") && text.len() < 500 && !text.contains('\n'), "{text}");
                     refused += 1;
                 }
             }
-            assert!(
-                start.elapsed() < Duration::from_secs(1),
-                "{}, round {round}",
-                path.display()
-            );
+            assert!(start.elapsed() < Duration::from_secs(1), "{}, round {round}", path.display());
         }
     }
     println!("{files} files: {read_well} damaged ones read, {refused} refused");

@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 use supple::io::{TetMesh, read_mesh};
 
 fn data(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/data")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 
 fn read(name: &str) -> TetMesh {
@@ -45,11 +43,7 @@ type Cell<const N: usize> = ([[i64; 3]; N], Option<i32>);
 fn by_coordinates<const N: usize>(mesh: &TetMesh, cells: &[[u32; N]], regions: &[i32]) -> Vec<Cell<N>> {
     let corner = |p: u32| mesh.points[p as usize].map(rounded);
     let region = |cell: usize| regions.get(cell).copied();
-    let mut cells: Vec<_> = cells
-        .iter()
-        .enumerate()
-        .map(|(i, cell)| (cell.map(corner), region(i)))
-        .collect();
+    let mut cells: Vec<_> = cells.iter().enumerate().map(|(i, cell)| (cell.map(corner), region(i))).collect();
     cells.sort_unstable();
     cells
 }
@@ -77,10 +71,7 @@ fn assert_same(name: &str, mesh: &TetMesh, expected: &TetMesh) {
 #[test]
 fn reference_is_what_we_think() {
     let mesh = reference();
-    assert_eq!(
-        (mesh.points.len(), mesh.tets.len(), mesh.triangles.len()),
-        (18, 24, 32)
-    );
+    assert_eq!((mesh.points.len(), mesh.tets.len(), mesh.triangles.len()), (18, 24, 32));
     assert_eq!(mesh.regions.iter().filter(|&&region| region == 3).count(), 12);
 }
 
@@ -120,16 +111,8 @@ fn every_encoding_holds_the_same_mesh() {
 
 #[test]
 fn without_regions_or_triangles_in_the_file_both_are_empty() {
-    let expected = TetMesh {
-        triangles: Vec::new(),
-        regions: Vec::new(),
-        ..reference()
-    };
-    for name in [
-        "meshio_4.1_ascii_bare.msh",
-        "meshio_4.1_binary_bare.msh",
-        "meshio_tetgen_bare.node",
-    ] {
+    let expected = TetMesh { triangles: Vec::new(), regions: Vec::new(), ..reference() };
+    for name in ["meshio_4.1_ascii_bare.msh", "meshio_4.1_binary_bare.msh", "meshio_tetgen_bare.node"] {
         assert_same(name, &read(name), &expected);
     }
 }
@@ -137,12 +120,7 @@ fn without_regions_or_triangles_in_the_file_both_are_empty() {
 #[test]
 fn nothing_is_renumbered() {
     let expected = reference();
-    for name in [
-        "vtk_5.1_ascii_f32.vtk",
-        "vtk_raw.vtu",
-        "meshio_2.2_ascii.msh",
-        "big_4.1_binary.msh",
-    ] {
+    for name in ["vtk_5.1_ascii_f32.vtk", "vtk_raw.vtu", "meshio_2.2_ascii.msh", "big_4.1_binary.msh"] {
         let mesh = read(name);
         assert_eq!(
             (mesh.points, mesh.triangles),
@@ -155,10 +133,7 @@ fn nothing_is_renumbered() {
 
 #[test]
 fn tetgen_is_found_by_either_file() {
-    let expected = TetMesh {
-        triangles: Vec::new(),
-        ..reference()
-    };
+    let expected = TetMesh { triangles: Vec::new(), ..reference() };
     assert_eq!(read("tetgen.1.node"), expected);
     assert_eq!(read("tetgen.1.ele"), expected);
     assert_eq!(read("meshio_tetgen_bare.ele"), read("meshio_tetgen_bare.node"));
@@ -168,10 +143,7 @@ fn tetgen_is_found_by_either_file() {
 fn pieces_are_joined() {
     // Both pieces carry all points, the second has no triangles.
     let (mesh, expected) = (read("vtk_pieces.vtu"), reference());
-    assert_eq!(
-        mesh.points,
-        [expected.points.as_slice(), &expected.points].concat()
-    );
+    assert_eq!(mesh.points, [expected.points.as_slice(), &expected.points].concat());
     let whole = TetMesh {
         points: expected.points.clone(),
         tets: mesh.tets.iter().map(|t| t.map(|p| p % 18)).collect(),
@@ -182,26 +154,12 @@ fn pieces_are_joined() {
 
 #[test]
 fn geometry_with_parameters_on_curves_and_surfaces() {
-    let expected = TetMesh {
-        regions: Vec::new(),
-        ..read("lens.vtk")
-    };
+    let expected = TetMesh { regions: Vec::new(), ..read("lens.vtk") };
     assert!(expected.tets.len() > 4);
-    for name in [
-        "lens_4.1.msh",
-        "lens_parametric.msh",
-        "lens_parametric_binary.msh",
-    ] {
+    for name in ["lens_4.1.msh", "lens_parametric.msh", "lens_parametric_binary.msh"] {
         let mesh = read(name);
         // No physical groups, so the elementary tag of the only volume.
         assert_eq!(mesh.regions, vec![1; mesh.tets.len()]);
-        assert_same(
-            name,
-            &TetMesh {
-                regions: Vec::new(),
-                ..mesh
-            },
-            &expected,
-        );
+        assert_same(name, &TetMesh { regions: Vec::new(), ..mesh }, &expected);
     }
 }

@@ -22,36 +22,18 @@ fn names(folder: &Path) -> Vec<String> {
 
 /// The first `n` numbers of a Float32 array in a file of ours: the header of an array with one block is four counts.
 fn field(bytes: &[u8], name: &str) -> Vec<f32> {
-    let find = |text: &str| {
-        bytes
-            .windows(text.len())
-            .position(|window| window == text.as_bytes())
-    };
+    let find = |text: &str| bytes.windows(text.len()).position(|window| window == text.as_bytes());
     let start = find(&format!("Name=\"{name}\"")).unwrap();
     let element = std::str::from_utf8(&bytes[start..start + 120]).unwrap();
-    let offset: usize = element
-        .split("offset=\"")
-        .nth(1)
-        .unwrap()
-        .split('"')
-        .next()
-        .unwrap()
-        .parse()
-        .unwrap();
+    let offset: usize =
+        element.split("offset=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap();
     let block = &bytes[find("\n_").unwrap() + 2 + offset..];
     let count = |i: usize| u64::from_le_bytes(block[8 * i..8 * i + 8].try_into().unwrap()) as usize;
     assert_eq!(count(0), 1, "one block");
     let mut values = Vec::new();
-    io::copy(
-        &mut flate2::read::ZlibDecoder::new(&block[32..32 + count(3)]),
-        &mut values,
-    )
-    .unwrap();
+    io::copy(&mut flate2::read::ZlibDecoder::new(&block[32..32 + count(3)]), &mut values).unwrap();
     assert_eq!(values.len(), count(2));
-    values
-        .chunks(4)
-        .map(|chunk| f32::from_le_bytes(chunk.try_into().unwrap()))
-        .collect()
+    values.chunks(4).map(|chunk| f32::from_le_bytes(chunk.try_into().unwrap())).collect()
 }
 
 #[test]
@@ -82,21 +64,12 @@ fn a_frame_comes_back_with_its_fields() {
 #[test]
 fn arrays_of_several_blocks() {
     // 1.2 MB of coordinates and 3.2 MB of connectivity, in blocks of 1 MiB.
-    let points: Vec<[f64; 3]> = (0..50_000)
-        .map(|i| [f64::from(i), 0.5, -1.0 / f64::from(i + 1)])
-        .collect();
-    let tets: Vec<[u32; 4]> = (0..100_000)
-        .map(|i| [i % 50_000, (i * 7) % 50_000, 3, i / 2])
-        .collect();
+    let points: Vec<[f64; 3]> = (0..50_000).map(|i| [f64::from(i), 0.5, -1.0 / f64::from(i + 1)]).collect();
+    let tets: Vec<[u32; 4]> = (0..100_000).map(|i| [i % 50_000, (i * 7) % 50_000, 3, i / 2]).collect();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("large.vtu");
-    let frame = Frame {
-        points: &points,
-        tets: &tets,
-        point_vectors: &[],
-        point_scalars: &[],
-        cell_scalars: &[],
-    };
+    let frame =
+        Frame { points: &points, tets: &tets, point_vectors: &[], point_scalars: &[], cell_scalars: &[] };
     write_vtu(&path, &frame).unwrap();
     let back = read_mesh(&path).unwrap();
     assert_eq!((back.points, back.tets), (points, tets));
@@ -116,15 +89,8 @@ fn what_does_not_fit_is_refused_and_nothing_written() {
     };
     let error = write_vtu(&path, &frame).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::InvalidInput);
-    assert_eq!(
-        error.to_string(),
-        "the field \"stress\" has 2 values for 24 tetrahedra"
-    );
-    let frame = Frame {
-        points: &mesh.points[..17],
-        cell_scalars: &[],
-        ..frame
-    };
+    assert_eq!(error.to_string(), "the field \"stress\" has 2 values for 24 tetrahedra");
+    let frame = Frame { points: &mesh.points[..17], cell_scalars: &[], ..frame };
     let error = write_vtu(&path, &frame).unwrap_err();
     assert!(error.to_string().contains("of 17"), "{error}");
     assert!(names(folder.path()).is_empty());
@@ -138,18 +104,9 @@ fn a_series_lists_times_and_files() {
     let text = fs::read_to_string(&path).unwrap();
     let document = roxmltree::Document::parse(&text).unwrap();
     assert_eq!(document.root_element().attribute("type"), Some("Collection"));
-    let sets: Vec<_> = document
-        .descendants()
-        .filter(|node| node.has_tag_name("DataSet"))
-        .collect();
-    let values: Vec<_> = sets
-        .iter()
-        .map(|set| (set.attribute("timestep"), set.attribute("file")))
-        .collect();
-    assert_eq!(
-        values,
-        [(Some("0"), Some("a.vtu")), (Some("0.02"), Some("b & c.vtu"))]
-    );
+    let sets: Vec<_> = document.descendants().filter(|node| node.has_tag_name("DataSet")).collect();
+    let values: Vec<_> = sets.iter().map(|set| (set.attribute("timestep"), set.attribute("file"))).collect();
+    assert_eq!(values, [(Some("0"), Some("a.vtu")), (Some("0.02"), Some("b & c.vtu"))]);
 }
 
 #[test]
@@ -161,12 +118,7 @@ fn a_failed_write_leaves_the_old_file_and_no_other() {
         w.write_all(b"new")?;
         Err(io::Error::other("the disk is on fire"))
     });
-    assert!(
-        error
-            .unwrap_err()
-            .to_string()
-            .ends_with("result.csv: the disk is on fire")
-    );
+    assert!(error.unwrap_err().to_string().ends_with("result.csv: the disk is on fire"));
     assert_eq!(fs::read(&path).unwrap(), b"old");
     write_atomically(&path, |w| write!(w, "new {}", 7)).unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"new 7");
@@ -180,8 +132,5 @@ fn errors_name_the_file() {
     let error = write_atomically(&path, |_| Ok(())).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::NotFound);
     assert!(error.to_string().contains("result.csv"), "{error}");
-    assert_eq!(
-        write_atomically(Path::new("/"), |_| Ok(())).unwrap_err().kind(),
-        ErrorKind::InvalidInput
-    );
+    assert_eq!(write_atomically(Path::new("/"), |_| Ok(())).unwrap_err().kind(), ErrorKind::InvalidInput);
 }

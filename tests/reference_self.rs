@@ -12,20 +12,10 @@ const DENSITY: f64 = 1000.0;
 
 /// Both laws in both forms.
 const LAWS: [Law; 4] = [
-    Law::NeoHookean {
-        c: 500.0,
-        d: 25_000.0,
-    },
-    Law::NeoHookeanLiteral {
-        c: 500.0,
-        d: 25_000.0,
-    },
+    Law::NeoHookean { c: 500.0, d: 25_000.0 },
+    Law::NeoHookeanLiteral { c: 500.0, d: 25_000.0 },
     Law::PAPER,
-    Law::ExponentialLiteral {
-        a: 59.0,
-        b: 8.023,
-        d: 60_000.0,
-    },
+    Law::ExponentialLiteral { a: 59.0, b: 8.023, d: 60_000.0 },
 ];
 
 /// Largest relative error per kind of deformation.
@@ -91,10 +81,7 @@ fn continuations_are_c1() {
         let shear_and_squeeze = |s: f64| from_fn(|i, j| s * closed_form::simple_shear(0.3)[i][j]);
         for (below, above) in [
             (shear_and_squeeze(s * (1.0 - h)), shear_and_squeeze(s * (1.0 + h))),
-            (
-                closed_form::simple_shear(q * (1.0 - h)),
-                closed_form::simple_shear(q * (1.0 + h)),
-            ),
+            (closed_form::simple_shear(q * (1.0 - h)), closed_form::simple_shear(q * (1.0 + h))),
         ] {
             let (p, r) = (law.first_piola(&below), law.first_piola(&above));
             worst = worst.max((law.energy(&below) / law.energy(&above) - 1.0).abs());
@@ -111,18 +98,9 @@ fn stress_matches_the_closed_forms() {
     for law in LAWS {
         for x in [-0.4, -0.1, -1e-3, 0.0, 1e-3, 0.1, 0.3] {
             let cases = [
-                (
-                    closed_form::uniaxial_stretch(1.0 + x),
-                    closed_form::uniaxial_stretch_stress(&law, 1.0 + x),
-                ),
-                (
-                    closed_form::simple_shear(x),
-                    closed_form::simple_shear_stress(&law, x),
-                ),
-                (
-                    closed_form::dilation(1.0 + x),
-                    closed_form::dilation_stress(&law, 1.0 + x),
-                ),
+                (closed_form::uniaxial_stretch(1.0 + x), closed_form::uniaxial_stretch_stress(&law, 1.0 + x)),
+                (closed_form::simple_shear(x), closed_form::simple_shear_stress(&law, x)),
+                (closed_form::dilation(1.0 + x), closed_form::dilation_stress(&law, 1.0 + x)),
             ];
             for (f, exact) in cases {
                 let p = law.first_piola(&f);
@@ -158,12 +136,7 @@ fn force_error(mesh: &Mesh, law: &Law, u: &[Vec3], h: f64) -> f64 {
 #[test]
 fn force_is_the_gradient_of_the_energy() {
     let tet = Mesh {
-        points: vec![
-            [0.0, 0.0, 0.0],
-            [0.011, 0.001, 0.0],
-            [0.002, 0.009, -0.001],
-            [0.001, 0.003, 0.012],
-        ],
+        points: vec![[0.0, 0.0, 0.0], [0.011, 0.001, 0.0], [0.002, 0.009, -0.001], [0.001, 0.003, 0.012]],
         tets: vec![[0, 1, 2, 3]],
     };
     let worst = worst_per_kind("f_int against dE/du, one element", |law, f| {
@@ -174,11 +147,7 @@ fn force_is_the_gradient_of_the_energy() {
     let bar = Mesh::bar([0.02, 0.02, 0.04], [2, 2, 4]);
     let mut random = Random(3);
     for law in LAWS {
-        let u: Vec<Vec3> = bar
-            .points
-            .iter()
-            .map(|_| random.vector().map(|x| 1.5e-3 * x))
-            .collect();
+        let u: Vec<Vec3> = bar.points.iter().map(|_| random.vector().map(|x| 1.5e-3 * x)).collect();
         let error = force_error(&bar, &law, &u, 1e-8);
         println!("f_int against dE/du, bar of 96, noise of 15 % of the edge: {law:?}: {error:.1e}");
         assert!(error < 1e-7, "{error:e}");
@@ -190,31 +159,19 @@ fn tangent_product_is_the_derivative_of_the_force() {
     let mesh = Mesh::bar([0.02, 0.02, 0.04], [2, 2, 4]);
     let mut random = Random(5);
     for law in LAWS {
-        let u: Vec<Vec3> = mesh
-            .points
-            .iter()
-            .map(|_| random.vector().map(|x| 1e-3 * x))
-            .collect();
+        let u: Vec<Vec3> = mesh.points.iter().map(|_| random.vector().map(|x| 1e-3 * x)).collect();
         let v: Vec<Vec3> = mesh.points.iter().map(|_| random.vector()).collect();
         let shifted = |h: f64| -> Vec<Vec3> {
-            u.iter()
-                .zip(&v)
-                .map(|(u, v)| std::array::from_fn(|i| u[i] + h * v[i]))
-                .collect()
+            u.iter().zip(&v).map(|(u, v)| std::array::from_fn(|i| u[i] + h * v[i])).collect()
         };
         let h = 1e-8;
-        let (plus, minus) = (
-            internal_force(&mesh, &law, &shifted(h)),
-            internal_force(&mesh, &law, &shifted(-h)),
-        );
+        let (plus, minus) =
+            (internal_force(&mesh, &law, &shifted(h)), internal_force(&mesh, &law, &shifted(-h)));
         let exact = tangent_product(&mesh, &law, &u, &v);
         let largest = exact.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let error = (exact
-            .iter()
-            .flatten()
-            .zip(plus.iter().flatten().zip(minus.iter().flatten())))
-        .map(|(k, (p, m))| (k - (p - m) / (2.0 * h)).abs() / largest)
-        .fold(0.0, f64::max);
+        let error = (exact.iter().flatten().zip(plus.iter().flatten().zip(minus.iter().flatten())))
+            .map(|(k, (p, m))| (k - (p - m) / (2.0 * h)).abs() / largest)
+            .fold(0.0, f64::max);
         println!("K v against the difference of forces: {law:?}: {error:.1e}");
         assert!(error < 1e-7, "{error:e}");
     }
@@ -261,10 +218,7 @@ fn bar_has_the_counts_volume_and_mass_of_the_paper() {
     assert!((volume / 2.5e-4 - 1.0).abs() < 1e-12 && smallest > 0.0);
     assert!((mass / 0.25 - 1.0).abs() < 1e-12);
     assert_eq!(mesh.points[1457], [0.05, 0.05, 0.1]);
-    assert_eq!(
-        mesh.points[1 + 9 * (2 + 9 * 3)],
-        [0.05 / 8.0, 0.05 * 2.0 / 8.0, 0.1 * 3.0 / 17.0]
-    );
+    assert_eq!(mesh.points[1 + 9 * (2 + 9 * 3)], [0.05 / 8.0, 0.05 * 2.0 / 8.0, 0.1 * 3.0 / 17.0]);
 
     // Every face inside belongs to two elements, every other one to the surface: 2 triangles per cell face.
     let mut faces = std::collections::HashMap::new();
@@ -276,10 +230,7 @@ fn bar_has_the_counts_volume_and_mass_of_the_paper() {
         }
     }
     assert!(faces.values().all(|count| *count <= 2));
-    assert_eq!(
-        faces.values().filter(|count| **count == 1).count(),
-        2 * (2 * 8 * 8 + 4 * 8 * 17)
-    );
+    assert_eq!(faces.values().filter(|count| **count == 1).count(), 2 * (2 * 8 * 8 + 4 * 8 * 17));
 }
 
 /// A small bar held at z = 0 with a twisting force at the other end.
@@ -298,12 +249,7 @@ fn small_bar(law: Law, dt: f64, ramp: f64) -> Simulation {
 }
 
 fn distance(a: &[Vec3], b: &[Vec3]) -> f64 {
-    a.iter()
-        .flatten()
-        .zip(b.iter().flatten())
-        .map(|(x, y)| (x - y).powi(2))
-        .sum::<f64>()
-        .sqrt()
+    a.iter().flatten().zip(b.iter().flatten()).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt()
 }
 
 #[test]
@@ -318,10 +264,7 @@ fn time_integration_is_second_order() {
         };
         let [coarse, middle, fine] = [640, 1280, 2560].map(solve);
         let largest = fine.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
-        (
-            (distance(&coarse, &middle) / distance(&middle, &fine)).log2(),
-            largest,
-        )
+        ((distance(&coarse, &middle) / distance(&middle, &fine)).log2(), largest)
     };
     for law in LAWS.into_iter().filter(Law::is_isochoric) {
         let (ramped, largest) = order(law, end);
@@ -374,31 +317,19 @@ fn energy_balances_under_prescribed_motion() {
     simulation.gravity_ramp = 0.02;
     let metre = [2e-3, -1e-3, 5e-3];
     for node in simulation.mesh.nodes_where(|x| x[2] == 0.04) {
-        simulation.motions.push(Motion {
-            node,
-            axes: [true, false, true],
-            metre,
-            ramp: 0.05,
-        });
+        simulation.motions.push(Motion { node, axes: [true, false, true], metre, ramp: 0.05 });
     }
     let moved = simulation.motions[0].node;
     let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
     for n in 1..=2000 {
         simulation.step();
         let share = (n as f64 * 5e-5 / 0.05).min(1.0);
-        assert!(
-            [0, 2]
-                .into_iter()
-                .all(|i: usize| (simulation.u[moved][i] - share * metre[i]).abs() < 1e-17)
-        );
+        assert!([0, 2].into_iter().all(|i: usize| (simulation.u[moved][i] - share * metre[i]).abs() < 1e-17));
         let e = simulation.energy();
         worst = worst.max((e.kinetic + e.strain + e.dissipated - e.external_work).abs());
         largest = largest.max(e.strain);
     }
-    println!(
-        "energy imbalance under prescribed motion and gravity: {:.1e}",
-        worst / largest
-    );
+    println!("energy imbalance under prescribed motion and gravity: {:.1e}", worst / largest);
     assert!(worst < 1e-2 * largest);
 }
 
@@ -469,18 +400,12 @@ fn critical_step_is_the_limit_of_stability() {
     // Stretched by half with its whole surface held: in equilibrium, and stiffer.
     let cube = Mesh::bar([0.02; 3], [4; 3]);
     let inside = |x: f64| x > 1e-9 && x < 0.02 - 1e-9;
-    let surface_held: Vec<[bool; 3]> = cube
-        .points
-        .iter()
-        .map(|x| [!x.iter().all(|x| inside(*x)); 3])
-        .collect();
+    let surface_held: Vec<[bool; 3]> =
+        cube.points.iter().map(|x| [!x.iter().all(|x| inside(*x)); 3]).collect();
     let stretched = cube.affine(&closed_form::uniaxial_stretch(1.5));
     let rest = vec![[0.0; 3]; bar.points.len()];
 
-    let cases = [
-        ("at rest", &bar, rest, end_held),
-        ("stretched by half", &cube, stretched, surface_held),
-    ];
+    let cases = [("at rest", &bar, rest, end_held), ("stretched by half", &cube, stretched, surface_held)];
     for (name, mesh, u, fixed) in cases {
         let limit = critical_step(mesh, &Law::PAPER, DENSITY, &u, &fixed);
         let below = growth(mesh, &u, &fixed, 0.98 * limit, 5000);
@@ -497,10 +422,8 @@ fn critical_step_of_one_element_matches_its_dilation_mode() {
     // 6 d 3 / (4 r) and m = rho V / 4 give omega^2 = 18 d / (rho r^2); d outweighs the shear modes.
     let r = 0.01;
     let a = r / 3.0_f64.sqrt();
-    let mesh = Mesh {
-        points: vec![[a, a, a], [a, -a, -a], [-a, a, -a], [-a, -a, a]],
-        tets: vec![[0, 2, 1, 3]],
-    };
+    let mesh =
+        Mesh { points: vec![[a, a, a], [a, -a, -a], [-a, a, -a], [-a, -a, a]], tets: vec![[0, 2, 1, 3]] };
     assert!(mesh.volumes()[0] > 0.0);
     let exact = 2.0 / (18.0 * 60_000.0 / (DENSITY * r * r)).sqrt();
     let found = critical_step(&mesh, &Law::PAPER, DENSITY, &[[0.0; 3]; 4], &[[false; 3]; 4]);
@@ -529,10 +452,7 @@ fn critical_step_of_the_paper_bar() {
         .fold(0.0_f64, |m, g| m.max(reference::tensor::dot(g, g).sqrt()));
     let pressure_modulus = Law::PAPER.tangent(&IDENTITY)[0][0];
     let estimate = 1.0 / steepest / (pressure_modulus / DENSITY).sqrt();
-    println!(
-        "height over wave speed: {estimate:.4e} s, {:.3} of the limit",
-        estimate / limit
-    );
+    println!("height over wave speed: {estimate:.4e} s, {:.3} of the limit", estimate / limit);
     assert!(estimate > limit);
 }
 
@@ -555,10 +475,7 @@ fn power_iteration_agrees_with_lanczos() {
         let force = tangent_product(&mesh, &Law::PAPER, &u, &v);
         v = force.iter().zip(&mass).map(|(f, m)| f.map(|f| f / m)).collect();
     }
-    let (power, lanczos) = (
-        2.0 / lambda.sqrt(),
-        critical_step(&mesh, &Law::PAPER, DENSITY, &u, &fixed),
-    );
+    let (power, lanczos) = (2.0 / lambda.sqrt(), critical_step(&mesh, &Law::PAPER, DENSITY, &u, &fixed));
     println!("critical step by power iteration {power:.8e} s, by Lanczos {lanczos:.8e} s");
     assert!((power / lanczos - 1.0).abs() < 1e-6);
 }
@@ -575,10 +492,7 @@ fn time_per_step_on_the_paper_bar() {
         let started = Instant::now();
         let count = 200;
         simulation.run(count);
-        println!(
-            "{:.0} us a step, {law:?}",
-            1e6 * started.elapsed().as_secs_f64() / count as f64
-        );
+        println!("{:.0} us a step, {law:?}", 1e6 * started.elapsed().as_secs_f64() / count as f64);
         assert!(simulation.u.iter().flatten().all(|x| x.is_finite()));
     }
 }

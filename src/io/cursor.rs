@@ -32,22 +32,11 @@ pub(super) struct Cursor<'a> {
 impl<'a> Cursor<'a> {
     /// At the start of `bytes`, whose first line has the number `line`.
     pub(super) fn new(bytes: &'a [u8], line: usize) -> Self {
-        Self {
-            bytes,
-            at: 0,
-            line,
-            mark: 0,
-            seen_binary: false,
-            in_record: false,
-        }
+        Self { bytes, at: 0, line, mark: 0, seen_binary: false, in_record: false }
     }
 
     pub(super) fn place(&self) -> String {
-        if self.seen_binary {
-            format!("byte {}", self.mark)
-        } else {
-            format!("line {}", self.line)
-        }
+        if self.seen_binary { format!("byte {}", self.mark) } else { format!("line {}", self.line) }
     }
 
     /// A complaint about what was read last.
@@ -73,10 +62,7 @@ impl<'a> Cursor<'a> {
         self.skip(rest.iter().position(|b| !blank(b)).unwrap_or(rest.len()));
         self.mark = self.at;
         let rest = self.rest();
-        let length = rest
-            .iter()
-            .position(u8::is_ascii_whitespace)
-            .unwrap_or(rest.len());
+        let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
         self.at += length;
         rest.get(..length).filter(|token| !token.is_empty())
     }
@@ -94,9 +80,7 @@ impl<'a> Cursor<'a> {
 
     pub(super) fn number<T: FromStr>(&mut self, what: impl Display) -> Result<T, Fault> {
         let token = self.word(&what)?;
-        let value = core::str::from_utf8(token)
-            .ok()
-            .and_then(|text| text.parse().ok());
+        let value = core::str::from_utf8(token).ok().and_then(|text| text.parse().ok());
         value.ok_or_else(|| self.fault(format_args!("{} where {what} is expected", quoted(token))))
     }
 
@@ -121,11 +105,7 @@ impl<'a> Cursor<'a> {
             return read(self);
         }
         let rest = self.rest();
-        self.skip(
-            rest.iter()
-                .position(|b| !b.is_ascii_whitespace())
-                .unwrap_or(rest.len()),
-        );
+        self.skip(rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len()));
         self.in_record = true;
         let value = read(self)?;
         if let Some(extra) = self.token() {

@@ -59,18 +59,11 @@ pub(super) struct Fault {
 
 impl Fault {
     pub(super) fn new(place: impl Into<String>, reason: impl fmt::Display) -> Self {
-        Self {
-            place: place.into(),
-            reason: format!("{reason}"),
-        }
+        Self { place: place.into(), reason: format!("{reason}") }
     }
 
     pub(super) fn in_file(self, path: &Path) -> ReadError {
-        ReadError::Malformed {
-            path: path.into(),
-            place: self.place,
-            reason: self.reason,
-        }
+        ReadError::Malformed { path: path.into(), place: self.place, reason: self.reason }
     }
 }
 

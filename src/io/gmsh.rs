@@ -161,9 +161,7 @@ impl Gmsh {
             cursor.record(encoding, |cursor| {
                 let number = cursor.int(encoding, format_args!("the number of node {i} of {n}"))?;
                 numbering.add(number.into(), cursor)?;
-                self.mesh
-                    .points
-                    .push(cursor.point(encoding, format_args!("node {number}"))?);
+                self.mesh.points.push(cursor.point(encoding, format_args!("node {number}"))?);
                 Ok(())
             })?;
         }
@@ -215,9 +213,7 @@ impl Gmsh {
             let kind = cursor.int(encoding, "the type of a block of elements")?;
             let block = cursor.int(encoding, "the number of elements in a block")?;
             let tags = cursor.int(encoding, "the number of tags in a block of elements")?;
-            let block = u64::try_from(block)
-                .ok()
-                .filter(|&block| block > 0 && block <= n - done);
+            let block = u64::try_from(block).ok().filter(|&block| block > 0 && block <= n - done);
             let Some(block) = block else {
                 let reason = format_args!("a block of elements does not fit the announced {n} elements");
                 return Err(cursor.fault(reason));
@@ -246,10 +242,8 @@ impl Gmsh {
                     for _ in 0..if dimension == 0 { 3 } else { 6 } {
                         cursor.real(encoding, format_args!("the bounds of entity {tag}"))?;
                     }
-                    let tags = cursor.size(
-                        encoding,
-                        format_args!("the number of physical tags of entity {tag}"),
-                    )?;
+                    let tags =
+                        cursor.size(encoding, format_args!("the number of physical tags of entity {tag}"))?;
                     let mut physical = 0;
                     for i in 0..tags {
                         let value = cursor.int(encoding, format_args!("a physical tag of entity {tag}"))?;
@@ -287,11 +281,7 @@ impl Gmsh {
                 let dimension = cursor.int(encoding, "the dimension of a block of nodes")?;
                 cursor.int(encoding, "the entity of a block of nodes")?;
                 let parametric = cursor.int(encoding, "the mark of parametric nodes")?;
-                Ok((
-                    dimension,
-                    parametric,
-                    cursor.size(encoding, "the number of nodes in a block")?,
-                ))
+                Ok((dimension, parametric, cursor.size(encoding, "the number of nodes in a block")?))
             })?;
             let mut numbers = Vec::new();
             for _ in 0..block {
@@ -303,9 +293,7 @@ impl Gmsh {
             }
             for number in numbers {
                 cursor.record(encoding, |cursor| {
-                    self.mesh
-                        .points
-                        .push(cursor.point(encoding, format_args!("node {number}"))?);
+                    self.mesh.points.push(cursor.point(encoding, format_args!("node {number}"))?);
                     for _ in 0..if parametric == 0 { 0 } else { dimension } {
                         cursor.real(encoding, format_args!("the parameters of node {number}"))?;
                     }
@@ -316,9 +304,7 @@ impl Gmsh {
         self.numbering = Some(numbering);
         let found = self.mesh.points.len();
         if n != found as u64 {
-            return Err(cursor.fault(format_args!(
-                "{n} nodes are announced, but the blocks list {found}"
-            )));
+            return Err(cursor.fault(format_args!("{n} nodes are announced, but the blocks list {found}")));
         }
         Ok(())
     }
@@ -336,33 +322,19 @@ impl Gmsh {
                 cursor.int(encoding, "the dimension of a block of elements")?;
                 let entity = cursor.int(encoding, "the entity of a block of elements")?;
                 let kind = cursor.int(encoding, "the type of a block of elements")?;
-                Ok((
-                    entity,
-                    kind,
-                    cursor.size(encoding, "the number of elements in a block")?,
-                ))
+                Ok((entity, kind, cursor.size(encoding, "the number of elements in a block")?))
             })?;
             let physical = self.volumes.get(&entity).copied().unwrap_or(0);
             for _ in 0..block {
                 cursor.record(encoding, |cursor| {
                     let number = cursor.size(encoding, "the number of an element")?.cast_signed();
-                    self.read_element(
-                        cursor,
-                        number,
-                        kind,
-                        Tags {
-                            physical,
-                            elementary: entity,
-                        },
-                    )
+                    self.read_element(cursor, number, kind, Tags { physical, elementary: entity })
                 })?;
                 found += 1;
             }
         }
         if n != found {
-            return Err(cursor.fault(format_args!(
-                "{n} elements are announced, but the blocks list {found}"
-            )));
+            return Err(cursor.fault(format_args!("{n} elements are announced, but the blocks list {found}")));
         }
         Ok(())
     }
@@ -461,9 +433,7 @@ fn skip_section(cursor: &mut Cursor<'_>, section: &[u8]) -> Result<(), Fault> {
 
 /// A count on a line of its own; binary data may start on the next.
 fn count(cursor: &mut Cursor<'_>, what: &str) -> Result<u64, Fault> {
-    let n = cursor.record(Encoding::Text, |cursor| {
-        cursor.number(format_args!("the number of {what}"))
-    })?;
+    let n = cursor.record(Encoding::Text, |cursor| cursor.number(format_args!("the number of {what}")))?;
     cursor.rest_of_line();
     Ok(n)
 }
@@ -484,10 +454,7 @@ fn read_sizes<const N: usize>(
 
 /// The first two of an element's tags; further ones are partitions.
 fn read_tags(cursor: &mut Cursor<'_>, encoding: Encoding, n: i32, element: i64) -> Result<Tags, Fault> {
-    let mut tags = Tags {
-        physical: 0,
-        elementary: 0,
-    };
+    let mut tags = Tags { physical: 0, elementary: 0 };
     for i in 0..n {
         let tag = cursor.int(encoding, format_args!("a tag of element {element}"))?;
         match i {

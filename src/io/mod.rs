@@ -48,27 +48,17 @@ pub struct TetMesh {
 /// Points, lines and surface cells other than triangles are left out. A volume cell that is not a tetrahedron with
 /// four nodes is an error, as is a file without tetrahedra.
 pub fn read_mesh(path: &Path) -> Result<TetMesh, ReadError> {
-    let extension = path
-        .extension()
-        .and_then(OsStr::to_str)
-        .unwrap_or_default()
-        .to_ascii_lowercase();
+    let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
     let mesh = match extension.as_str() {
         "vtk" => parse(path, vtk::read),
         "vtu" => parse(path, vtu::read),
         "msh" => parse(path, gmsh::read),
         "node" | "ele" => {
             let file = |kind| {
-                if extension == kind {
-                    path.into()
-                } else {
-                    path.with_extension(kind)
-                }
+                if extension == kind { path.into() } else { path.with_extension(kind) }
             };
             let (points, numbering) = parse(&file("node"), tetgen::read_nodes)?;
-            parse(&file("ele"), |bytes| {
-                tetgen::read_elements(bytes, points, &numbering)
-            })
+            parse(&file("ele"), |bytes| tetgen::read_elements(bytes, points, &numbering))
         }
         _ => Err(Fault::new("", "the extension is none of .vtk, .vtu, .msh, .node and .ele").in_file(path)),
     }?;
@@ -79,9 +69,6 @@ pub fn read_mesh(path: &Path) -> Result<TetMesh, ReadError> {
 }
 
 fn parse<T>(path: &Path, parse: impl FnOnce(&[u8]) -> Result<T, Fault>) -> Result<T, ReadError> {
-    let bytes = std::fs::read(path).map_err(|source| ReadError::Unreadable {
-        path: path.into(),
-        source,
-    })?;
+    let bytes = std::fs::read(path).map_err(|source| ReadError::Unreadable { path: path.into(), source })?;
     parse(&bytes).map_err(|fault| fault.in_file(path))
 }

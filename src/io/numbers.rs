@@ -47,21 +47,16 @@ impl Numbers {
     pub(super) fn into_points(self) -> Vec<[f64; 3]> {
         match self {
             Self::Real(values) => values.as_chunks().0.to_vec(),
-            Self::Whole(values) => values
-                .as_chunks()
-                .0
-                .iter()
-                .map(|p: &[i64; 3]| p.map(|x| x as f64))
-                .collect(),
+            Self::Whole(values) => {
+                values.as_chunks().0.iter().map(|p: &[i64; 3]| p.map(|x| x as f64)).collect()
+            }
         }
     }
 
     pub(super) fn into_whole(self, what: impl Display) -> Result<Vec<i64>, String> {
         match self {
             Self::Whole(values) => Ok(values),
-            Self::Real(_) => Err(format!(
-                "{what} must be whole numbers, but is stored as real numbers"
-            )),
+            Self::Real(_) => Err(format!("{what} must be whole numbers, but is stored as real numbers")),
         }
     }
 }
@@ -93,9 +88,7 @@ pub(super) fn read_numbers(
         Scalar::U32 => whole(bytes, big, |b| u32::from_le_bytes(b).into()),
         Scalar::I64 => whole(bytes, big, i64::from_le_bytes),
         // Nothing that large is a valid index or region, so the nearest invalid value serves.
-        Scalar::U64 => whole(bytes, big, |b| {
-            i64::try_from(u64::from_le_bytes(b)).unwrap_or(i64::MAX)
-        }),
+        Scalar::U64 => whole(bytes, big, |b| i64::try_from(u64::from_le_bytes(b)).unwrap_or(i64::MAX)),
         Scalar::F32 => Numbers::Real(each(bytes, big, |b| f32::from_le_bytes(b).into())),
         Scalar::F64 => Numbers::Real(each(bytes, big, f64::from_le_bytes)),
     })
@@ -107,9 +100,7 @@ fn read_text<T: core::str::FromStr>(
     what: impl Display,
 ) -> Result<Vec<T>, Fault> {
     let n = n.unwrap_or(usize::MAX);
-    (0..n)
-        .map(|i| cursor.number(format_args!("value {} of {n} of {what}", i + 1)))
-        .collect()
+    (0..n).map(|i| cursor.number(format_args!("value {} of {n} of {what}", i + 1))).collect()
 }
 
 fn whole<const N: usize>(bytes: &[u8], big: bool, convert: impl Fn([u8; N]) -> i64) -> Numbers {
@@ -123,10 +114,5 @@ fn each<const N: usize, T>(bytes: &[u8], big: bool, convert: impl Fn([u8; N]) ->
         }
         chunk
     };
-    bytes
-        .as_chunks()
-        .0
-        .iter()
-        .map(|&chunk| convert(order(chunk)))
-        .collect()
+    bytes.as_chunks().0.iter().map(|&chunk| convert(order(chunk))).collect()
 }

@@ -29,9 +29,8 @@ fn expect_end(cursor: &mut Cursor<'_>, n: u64, what: &str) -> Result<(), Fault> 
         None => Ok(()),
         Some(extra) => {
             let extra = quoted(extra);
-            Err(cursor.fault(format_args!(
-                "{extra} where the file should end after the announced {n} {what}"
-            )))
+            Err(cursor
+                .fault(format_args!("{extra} where the file should end after the announced {n} {what}")))
         }
     }
 }
@@ -82,10 +81,7 @@ pub(super) fn read_elements(
             format_args!("the tetrahedra have {corners} nodes; only those with four nodes can be read");
         return Err(cursor.fault(reason));
     }
-    let mut mesh = TetMesh {
-        points,
-        ..TetMesh::default()
-    };
+    let mut mesh = TetMesh { points, ..TetMesh::default() };
     for i in 0..n {
         cursor.record(Encoding::Text, |cursor| {
             let element = cursor.number(format_args!("the number of element {} of {n}", i + 1))?;
@@ -95,8 +91,7 @@ pub(super) fn read_elements(
             for _ in 0..attributes {
                 region = Some(cursor.number::<f64>(format_args!("an attribute of element {element}"))?);
             }
-            mesh.regions
-                .extend(region.filter(|r| f64::from(*r as i32) == *r).map(|r| r as i32));
+            mesh.regions.extend(region.filter(|r| f64::from(*r as i32) == *r).map(|r| r as i32));
             Ok(())
         })?;
     }

@@ -23,20 +23,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, Fault> {
         b"ASCII" => Encoding::Text,
         b"BINARY" => Encoding::Big,
         other => {
-            return Err(cursor.fault(format_args!(
-                "{} where ASCII or BINARY is expected",
-                quoted(other)
-            )));
+            return Err(cursor.fault(format_args!("{} where ASCII or BINARY is expected", quoted(other))));
         }
     };
-    let mut file = Legacy {
-        cursor,
-        encoding,
-        points: None,
-        cells: None,
-        types: None,
-        regions: None,
-    };
+    let mut file = Legacy { cursor, encoding, points: None, cells: None, types: None, regions: None };
     file.read_sections(major)?;
     file.finish()
 }
@@ -48,17 +38,10 @@ fn read_version(cursor: &mut Cursor<'_>) -> Result<u32, Fault> {
     }
     cursor.skip(MAGIC.len());
     let version = cursor.word("the version")?;
-    let major = version
-        .split(|&b| b == b'.')
-        .next()
-        .and_then(|major| core::str::from_utf8(major).ok()?.parse().ok());
+    let major =
+        version.split(|&b| b == b'.').next().and_then(|major| core::str::from_utf8(major).ok()?.parse().ok());
     let known = major.filter(|major| (1..=5).contains(major));
-    let fault = || {
-        cursor.fault(format_args!(
-            "version {} is unknown; 1 to 5 can be read",
-            quoted(version)
-        ))
-    };
+    let fault = || cursor.fault(format_args!("version {} is unknown; 1 to 5 can be read", quoted(version)));
     let major = known.ok_or_else(fault)?;
     cursor.rest_of_line();
     Ok(major)
@@ -129,9 +112,8 @@ impl<'a> Legacy<'a> {
         let mut rest = entries.as_slice();
         while let Some((&count, tail)) = rest.split_first() {
             let cell = ends.len();
-            let Some((nodes, tail)) = usize::try_from(count)
-                .ok()
-                .and_then(|count| tail.split_at_checked(count))
+            let Some((nodes, tail)) =
+                usize::try_from(count).ok().and_then(|count| tail.split_at_checked(count))
             else {
                 let left = tail.len();
                 let reason =
@@ -163,10 +145,7 @@ impl<'a> Legacy<'a> {
             None => Vec::new(),
             Some((0, ends)) => ends.to_vec(),
             Some((first, _)) => {
-                return Err(Fault::new(
-                    place,
-                    format_args!("the first of the OFFSETS is {first}, not 0"),
-                ));
+                return Err(Fault::new(place, format_args!("the first of the OFFSETS is {first}, not 0")));
             }
         };
         self.cells = Some((ends, connectivity, place));
@@ -176,9 +155,7 @@ impl<'a> Legacy<'a> {
     fn read_cell_array(&mut self, name: &str, n: usize) -> Result<Vec<i64>, Fault> {
         let word = self.word(name)?;
         if !word.eq_ignore_ascii_case(name.as_bytes()) {
-            return Err(self
-                .cursor
-                .fault(format_args!("{} where {name} is expected", quoted(word))));
+            return Err(self.cursor.fault(format_args!("{} where {name} is expected", quoted(word))));
         }
         let scalar = self.scalar(name)?;
         self.whole_numbers(Some(n), scalar, name)
@@ -204,10 +181,9 @@ impl<'a> Legacy<'a> {
             b"TENSORS6" => 6,
             b"TEXTURE_COORDINATES" | b"COLOR_SCALARS" => 0,
             _ => {
-                return Err(self.cursor.fault(format_args!(
-                    "{} where a keyword such as CELLS is expected",
-                    quoted(keyword)
-                )));
+                return Err(self
+                    .cursor
+                    .fault(format_args!("{} where a keyword such as CELLS is expected", quoted(keyword))));
             }
         };
         let name = String::from_utf8_lossy(self.cursor.word("the name of the array")?);
@@ -278,11 +254,7 @@ impl<'a> Legacy<'a> {
 
     /// Colours are bytes in binary files, but real numbers from 0 to 1 in text.
     fn skip_colours(&mut self, n: Option<usize>, name: &str) -> Result<(), Fault> {
-        let scalar = if self.encoding == Encoding::Text {
-            Scalar::F32
-        } else {
-            Scalar::U8
-        };
+        let scalar = if self.encoding == Encoding::Text { Scalar::F32 } else { Scalar::U8 };
         self.numbers(n, scalar, name).map(drop)
     }
 
@@ -342,9 +314,7 @@ impl<'a> Legacy<'a> {
     }
 
     fn whole_numbers(&mut self, n: Option<usize>, scalar: Scalar, what: &str) -> Result<Vec<i64>, Fault> {
-        self.numbers(n, scalar, what)?
-            .into_whole(what)
-            .map_err(|reason| self.cursor.fault(reason))
+        self.numbers(n, scalar, what)?.into_whole(what).map_err(|reason| self.cursor.fault(reason))
     }
 
     fn finish(self) -> Result<TetMesh, Fault> {
@@ -352,16 +322,9 @@ impl<'a> Legacy<'a> {
         let points = self.points.ok_or_else(|| missing("POINTS"))?;
         let (ends, connectivity, place) = self.cells.ok_or_else(|| missing("CELLS"))?;
         let types = self.types.ok_or_else(|| missing("CELL_TYPES"))?;
-        let cells = Cells {
-            types,
-            ends,
-            connectivity,
-            regions: self.regions,
-        };
+        let cells = Cells { types, ends, connectivity, regions: self.regions };
         let mut mesh = TetMesh::default();
-        cells
-            .add_to(&mut mesh, 0, points.len())
-            .map_err(|reason| Fault::new(place, reason))?;
+        cells.add_to(&mut mesh, 0, points.len()).map_err(|reason| Fault::new(place, reason))?;
         mesh.points = points;
         Ok(mesh)
     }

@@ -11,9 +11,7 @@ const TRIANGLE: i64 = 5;
 const TETRAHEDRON: i64 = 10;
 
 /// Cells without volume: they cannot be missed in a solid mesh.
-const FLAT: [i64; 23] = [
-    0, 1, 2, 3, 4, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36, 68, 69, 70, 75, 76, 77,
-];
+const FLAT: [i64; 23] = [0, 1, 2, 3, 4, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36, 68, 69, 70, 75, 76, 77];
 
 /// Names under which meshers store the region of a cell, in lower case.
 const REGION_NAMES: [&str; 10] = [
@@ -47,27 +45,18 @@ impl Cells {
     /// Volume cells of any other type are an error, because dropping them would leave holes in the organ.
     pub(super) fn add_to(&self, mesh: &mut TetMesh, first_point: usize, points: usize) -> Result<(), String> {
         if self.types.len() != self.ends.len() {
-            return Err(format!(
-                "{} cell types for {} cells",
-                self.types.len(),
-                self.ends.len()
-            ));
+            return Err(format!("{} cell types for {} cells", self.types.len(), self.ends.len()));
         }
         if let Some(regions) = &self.regions
             && regions.len() != self.types.len()
         {
-            return Err(format!(
-                "{} regions for {} cells",
-                regions.len(),
-                self.types.len()
-            ));
+            return Err(format!("{} regions for {} cells", regions.len(), self.types.len()));
         }
         let mut start = 0;
         for (cell, (&kind, &end)) in self.types.iter().zip(&self.ends).enumerate() {
             let nodes = usize::try_from(start).ok().zip(usize::try_from(end).ok());
-            let nodes = nodes
-                .and_then(|(start, end)| self.connectivity.get(start..end))
-                .ok_or_else(|| {
+            let nodes =
+                nodes.and_then(|(start, end)| self.connectivity.get(start..end)).ok_or_else(|| {
                     format!(
                         "cell {cell} has the entries {start} to {end} of the connectivity, which has {}",
                         self.connectivity.len()
@@ -76,17 +65,14 @@ impl Cells {
             start = end;
             match kind {
                 TETRAHEDRON => {
-                    mesh.tets
-                        .push(corners(cell, "tetrahedron", nodes, first_point, points)?);
+                    mesh.tets.push(corners(cell, "tetrahedron", nodes, first_point, points)?);
                     if let Some(&region) = self.regions.as_ref().and_then(|regions| regions.get(cell)) {
                         let region = i32::try_from(region)
                             .map_err(|_| format!("the region {region} of cell {cell} exceeds 32 bits"))?;
                         mesh.regions.push(region);
                     }
                 }
-                TRIANGLE => mesh
-                    .triangles
-                    .push(corners(cell, "triangle", nodes, first_point, points)?),
+                TRIANGLE => mesh.triangles.push(corners(cell, "triangle", nodes, first_point, points)?),
                 flat if FLAT.contains(&flat) => {}
                 other => {
                     return Err(format!(
@@ -107,20 +93,14 @@ fn corners<const N: usize>(
     first_point: usize,
     points: usize,
 ) -> Result<[u32; N], String> {
-    let nodes: &[i64; N] = nodes
-        .try_into()
-        .map_err(|_| format!("cell {cell} is a {shape} with {} points", nodes.len()))?;
+    let nodes: &[i64; N] =
+        nodes.try_into().map_err(|_| format!("cell {cell} is a {shape} with {} points", nodes.len()))?;
     let mut corners = [0; N];
     for (corner, &node) in corners.iter_mut().zip(nodes) {
         let index = usize::try_from(node).ok().filter(|&node| node < points);
-        *corner = index
-            .and_then(|index| u32::try_from(first_point + index).ok())
-            .ok_or_else(|| {
-                format!(
-                    "cell {cell} names point {node}, but the points are numbered 0 to {}",
-                    points as i64 - 1
-                )
-            })?;
+        *corner = index.and_then(|index| u32::try_from(first_point + index).ok()).ok_or_else(|| {
+            format!("cell {cell} names point {node}, but the points are numbered 0 to {}", points as i64 - 1)
+        })?;
     }
     Ok(corners)
 }

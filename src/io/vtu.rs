@@ -28,10 +28,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, Fault> {
     })?;
     let file = Vtu::open(&document, appended)?;
     let mut mesh = TetMesh::default();
-    for piece in file
-        .child(document.root_element(), "UnstructuredGrid")?
-        .children()
-    {
+    for piece in file.child(document.root_element(), "UnstructuredGrid")?.children() {
         if piece.has_tag_name("Piece") {
             file.read_piece(piece, &mut mesh)?;
         }
@@ -76,15 +73,11 @@ impl<'d> Vtu<'d> {
         }
         let version = root.attribute("version").unwrap_or("0.1");
         if !["0.", "1.", "2."].iter().any(|known| version.starts_with(known)) {
-            return Err(fault(format!(
-                "version {version:?} is unknown; 0.1 to 2.x can be read"
-            )));
+            return Err(fault(format!("version {version:?} is unknown; 0.1 to 2.x can be read")));
         }
         let kind = root.attribute("type").unwrap_or_default();
         if kind != "UnstructuredGrid" {
-            return Err(fault(format!(
-                "the data set is {kind:?}; only \"UnstructuredGrid\" can be read"
-            )));
+            return Err(fault(format!("the data set is {kind:?}; only \"UnstructuredGrid\" can be read")));
         }
         let order = match root.attribute("byte_order") {
             None | Some("LittleEndian") => Encoding::Little,
@@ -95,9 +88,7 @@ impl<'d> Vtu<'d> {
             None | Some("UInt32") => false,
             Some("UInt64") => true,
             Some(other) => {
-                return Err(fault(format!(
-                    "the header type {other:?} is neither UInt32 nor UInt64"
-                )));
+                return Err(fault(format!("the header type {other:?} is neither UInt32 nor UInt64")));
             }
         };
         let compressor = root.attribute("compressor").filter(|name| !name.is_empty());
@@ -107,16 +98,7 @@ impl<'d> Vtu<'d> {
             Some("raw") => true,
             Some(other) => return Err(fault(format!("the encoding {other:?} is neither base64 nor raw"))),
         };
-        Ok(Self {
-            document,
-            layout: Layout {
-                order,
-                wide,
-                compressor,
-            },
-            appended,
-            appended_raw,
-        })
+        Ok(Self { document, layout: Layout { order, wide, compressor }, appended, appended_raw })
     }
 
     fn fault(&self, node: Node<'_, '_>, reason: impl Display) -> Fault {
@@ -130,8 +112,7 @@ impl<'d> Vtu<'d> {
 
     fn count(&self, node: Node<'_, '_>, name: &str) -> Result<usize, Fault> {
         let text = node.attribute(name).unwrap_or_default().trim();
-        text.parse()
-            .map_err(|_| self.fault(node, format_args!("{name} is {text:?}, not a number")))
+        text.parse().map_err(|_| self.fault(node, format_args!("{name} is {text:?}, not a number")))
     }
 
     fn read_piece(&self, piece: Node<'d, '_>, mesh: &mut TetMesh) -> Result<(), Fault> {
@@ -140,10 +121,7 @@ impl<'d> Vtu<'d> {
         let points = self.child(self.child(piece, "Points")?, "DataArray")?;
         let components = points.attribute("NumberOfComponents").unwrap_or("3");
         if components != "3" {
-            return Err(self.fault(
-                points,
-                format_args!("points have {components} components instead of 3"),
-            ));
+            return Err(self.fault(points, format_args!("points have {components} components instead of 3")));
         }
         let points = self.array(points, n_points.checked_mul(3))?.into_points();
 
@@ -157,16 +135,9 @@ impl<'d> Vtu<'d> {
         };
         let connectivity = self.cell_array(node, "connectivity", entries)?;
         let regions = self.read_regions(piece, n_cells)?;
-        let cells = Cells {
-            types,
-            ends,
-            connectivity,
-            regions,
-        };
+        let cells = Cells { types, ends, connectivity, regions };
         let first_point = mesh.points.len();
-        cells
-            .add_to(mesh, first_point, points.len())
-            .map_err(|reason| self.fault(node, reason))?;
+        cells.add_to(mesh, first_point, points.len()).map_err(|reason| self.fault(node, reason))?;
         mesh.points.extend(points);
         Ok(())
     }
@@ -174,19 +145,14 @@ impl<'d> Vtu<'d> {
     fn cell_array(&self, cells: Node<'d, '_>, name: &str, n: usize) -> Result<Vec<i64>, Fault> {
         let node = cells.children().find(|node| node.attribute("Name") == Some(name));
         let node = node.ok_or_else(|| self.fault(cells, format_args!("the array {name:?} is missing")))?;
-        self.array(node, Some(n))?
-            .into_whole(name)
-            .map_err(|reason| self.fault(node, reason))
+        self.array(node, Some(n))?.into_whole(name).map_err(|reason| self.fault(node, reason))
     }
 
     fn read_regions(&self, piece: Node<'d, '_>, n_cells: usize) -> Result<Option<Vec<i64>>, Fault> {
         let Some(data) = piece.children().find(|node| node.has_tag_name("CellData")) else {
             return Ok(None);
         };
-        for node in data
-            .children()
-            .filter(|node| node.attribute("Name").is_some_and(names_regions))
-        {
+        for node in data.children().filter(|node| node.attribute("Name").is_some_and(names_regions)) {
             if node.attribute("NumberOfComponents").unwrap_or("1") == "1"
                 && let Numbers::Whole(regions) = self.array(node, Some(n_cells))?
             {
@@ -236,11 +202,7 @@ impl<'d> Vtu<'d> {
                         format_args!("the offset {offset} is beyond the {length} appended bytes"),
                     )
                 })?;
-                if self.appended_raw {
-                    Source::Raw(data)
-                } else {
-                    Source::Base64(Base64::new(data))
-                }
+                if self.appended_raw { Source::Raw(data) } else { Source::Base64(Base64::new(data)) }
             }
             other => {
                 return Err(self.fault(node, format_args!("the format {other:?} of the array is unknown")));
@@ -248,17 +210,8 @@ impl<'d> Vtu<'d> {
         };
         let size = n.and_then(|n| n.checked_mul(scalar.size()));
         let size = size.ok_or_else(|| self.fault(node, "more values are announced than a file can have"))?;
-        let bytes = self
-            .layout
-            .read(source, size)
-            .map_err(|reason| self.fault(node, reason))?;
-        read_numbers(
-            &mut Cursor::new(&bytes, 1),
-            n,
-            scalar,
-            self.layout.order,
-            "the array",
-        )
+        let bytes = self.layout.read(source, size).map_err(|reason| self.fault(node, reason))?;
+        read_numbers(&mut Cursor::new(&bytes, 1), n, scalar, self.layout.order, "the array")
     }
 }
 

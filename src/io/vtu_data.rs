@@ -44,10 +44,7 @@ pub(super) struct Base64<'a> {
 
 impl<'a> Base64<'a> {
     pub(super) fn new(text: &'a [u8]) -> Self {
-        Self {
-            text,
-            spare: Vec::new(),
-        }
+        Self { text, spare: Vec::new() }
     }
 
     fn take(&mut self, n: usize) -> Result<Vec<u8>, String> {
@@ -56,12 +53,8 @@ impl<'a> Base64<'a> {
             let mut quad = [0; 4];
             for place in &mut quad {
                 let text = self.text.trim_ascii_start();
-                let end = || {
-                    format!(
-                        "{n} bytes are expected, but the base64 text ends after {}",
-                        taken.len()
-                    )
-                };
+                let end =
+                    || format!("{n} bytes are expected, but the base64 text ends after {}", taken.len());
                 let (&first, rest) = text.split_first().ok_or_else(end)?;
                 (*place, self.text) = (first, rest);
             }
@@ -109,9 +102,7 @@ impl Layout<'_> {
         let blocks = self.header(&mut source)?;
         let full = self.header(&mut source)?;
         let last = self.header(&mut source)?;
-        let compressed: Vec<u64> = (0..blocks)
-            .map(|_| self.header(&mut source))
-            .collect::<Result<_, _>>()?;
+        let compressed: Vec<u64> = (0..blocks).map(|_| self.header(&mut source)).collect::<Result<_, _>>()?;
         let mut values = Vec::new();
         for (block, &size) in compressed.iter().enumerate() {
             let bytes = source.take(usize::try_from(size).unwrap_or(usize::MAX))?;
@@ -122,11 +113,7 @@ impl Layout<'_> {
                 .take(limit)
                 .read_to_end(&mut values)
                 .map_err(|error| format!("block {block} is not zlib data: {error}"))?;
-            let announced = if block + 1 == compressed.len() && last != 0 {
-                last
-            } else {
-                full
-            };
+            let announced = if block + 1 == compressed.len() && last != 0 { last } else { full };
             let found = values.len() - start;
             if found as u64 != announced || values.len() > expected {
                 let what = format!("block {block} has {found} bytes or more instead of {announced}");
@@ -134,10 +121,7 @@ impl Layout<'_> {
             }
         }
         if values.len() != expected {
-            return Err(format!(
-                "the array has {} bytes instead of {expected}",
-                values.len()
-            ));
+            return Err(format!("the array has {} bytes instead of {expected}", values.len()));
         }
         Ok(values)
     }
@@ -147,9 +131,6 @@ impl Layout<'_> {
         if self.order == Encoding::Big {
             bytes.reverse();
         }
-        Ok(bytes
-            .iter()
-            .rev()
-            .fold(0, |value, &byte| value << 8 | u64::from(byte)))
+        Ok(bytes.iter().rev().fold(0, |value, &byte| value << 8 | u64::from(byte)))
     }
 }

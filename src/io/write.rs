@@ -33,29 +33,15 @@ pub struct Frame<'a> {
 /// [`InvalidInput`](io::ErrorKind::InvalidInput), as is a tetrahedron that names a point beyond the last.
 pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
     let (n_points, n_tets) = (frame.points.len(), frame.tets.len());
-    if let Some(tet) = frame
-        .tets
-        .iter()
-        .position(|tet| tet.iter().any(|&p| p as usize >= n_points))
-    {
+    if let Some(tet) = frame.tets.iter().position(|tet| tet.iter().any(|&p| p as usize >= n_points)) {
         let corners = frame.tets.get(tet);
-        return Err(invalid(format!(
-            "tetrahedron {tet} names the points {corners:?} of {n_points}"
-        )));
+        return Err(invalid(format!("tetrahedron {tet} names the points {corners:?} of {n_points}")));
     }
-    let mut arrays = Arrays {
-        xml: String::new(),
-        data: Vec::new(),
-    };
+    let mut arrays = Arrays { xml: String::new(), data: Vec::new() };
     arrays.open("PointData");
     for (name, values) in frame.point_vectors {
         check(name, values.len(), n_points, "points")?;
-        arrays.add(
-            name,
-            "Float32",
-            3,
-            values.as_flattened().iter().map(|x| x.to_le_bytes()),
-        )?;
+        arrays.add(name, "Float32", 3, values.as_flattened().iter().map(|x| x.to_le_bytes()))?;
     }
     for (name, values) in frame.point_scalars {
         check(name, values.len(), n_points, "points")?;
@@ -69,26 +55,12 @@ pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
     }
     arrays.close("CellData");
     arrays.open("Points");
-    arrays.add(
-        "Points",
-        "Float64",
-        3,
-        frame.points.as_flattened().iter().map(|x| x.to_le_bytes()),
-    )?;
+    arrays.add("Points", "Float64", 3, frame.points.as_flattened().iter().map(|x| x.to_le_bytes()))?;
     arrays.close("Points");
     arrays.open("Cells");
-    let corners = frame
-        .tets
-        .as_flattened()
-        .iter()
-        .map(|&p| i64::from(p).to_le_bytes());
+    let corners = frame.tets.as_flattened().iter().map(|&p| i64::from(p).to_le_bytes());
     arrays.add("connectivity", "Int64", 1, corners)?;
-    arrays.add(
-        "offsets",
-        "Int64",
-        1,
-        (1..=n_tets).map(|tet| (4 * tet as i64).to_le_bytes()),
-    )?;
+    arrays.add("offsets", "Int64", 1, (1..=n_tets).map(|tet| (4 * tet as i64).to_le_bytes()))?;
     arrays.add("types", "UInt8", 1, frame.tets.iter().map(|_| [10]))?;
     arrays.close("Cells");
 
@@ -116,11 +88,7 @@ pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> io::Result<()> {
             b"<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n",
         )?;
         for (time, file) in frames {
-            writeln!(
-                w,
-                "<DataSet timestep=\"{time}\" part=\"0\" file=\"{}\"/>",
-                escaped(file)
-            )?;
+            writeln!(w, "<DataSet timestep=\"{time}\" part=\"0\" file=\"{}\"/>", escaped(file))?;
         }
         w.write_all(b"</Collection>\n</VTKFile>\n")
     })
@@ -130,29 +98,22 @@ pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> io::Result<()> {
 /// `write` or the file system fails, the temporary file is removed and a file of that name stays as it was.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     static COUNT: AtomicU32 = AtomicU32::new(0);
-    let name = path
-        .file_name()
-        .ok_or_else(|| invalid(format!("{} is not the name of a file", path.display())))?;
+    let name =
+        path.file_name().ok_or_else(|| invalid(format!("{} is not the name of a file", path.display())))?;
     let mut temporary = OsString::from(".");
     temporary.push(name);
-    temporary.push(format!(
-        ".{}-{}.tmp",
-        std::process::id(),
-        COUNT.fetch_add(1, Ordering::Relaxed)
-    ));
+    temporary.push(format!(".{}-{}.tmp", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
     let temporary = path.with_file_name(temporary);
     let named = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", path.display()));
     let mut file = BufWriter::new(fs::File::create_new(&temporary).map_err(named)?);
     let written = write(&mut file).and_then(|()| file.flush());
     // Closed first: Windows neither renames nor removes an open file.
     drop(file);
-    written
-        .and_then(|()| fs::rename(&temporary, path))
-        .map_err(|error| {
-            // The first error is the one to report.
-            let _ = fs::remove_file(&temporary);
-            named(error)
-        })
+    written.and_then(|()| fs::rename(&temporary, path)).map_err(|error| {
+        // The first error is the one to report.
+        let _ = fs::remove_file(&temporary);
+        named(error)
+    })
 }
 
 /// The `<DataArray>` elements and the appended data to which they point.
@@ -187,9 +148,7 @@ impl Arrays {
         );
         let bytes: Vec<u8> = values.flatten().collect();
         let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(compressed).collect::<io::Result<_>>()?;
-        for count in [blocks.len(), BLOCK, bytes.len() % BLOCK]
-            .into_iter()
-            .chain(blocks.iter().map(Vec::len))
+        for count in [blocks.len(), BLOCK, bytes.len() % BLOCK].into_iter().chain(blocks.iter().map(Vec::len))
         {
             self.data.extend((count as u64).to_le_bytes());
         }
@@ -208,9 +167,7 @@ fn check(name: &str, found: usize, expected: usize, what: &str) -> io::Result<()
     if found == expected {
         return Ok(());
     }
-    Err(invalid(format!(
-        "the field {name:?} has {found} values for {expected} {what}"
-    )))
+    Err(invalid(format!("the field {name:?} has {found} values for {expected} {what}")))
 }
 
 fn invalid(reason: String) -> io::Error {
@@ -218,7 +175,5 @@ fn invalid(reason: String) -> io::Error {
 }
 
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('"', "&quot;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }

@@ -6,6 +6,13 @@
 //! multiplication with an addition, so every width gives the same bits.
 
 mod functions;
+mod level;
+mod vectors;
+
+pub use level::Level;
+pub(crate) use level::{Kernel, dispatch};
+pub use vectors::NodeVector;
+pub(crate) use vectors::{Gather, Scatter};
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -16,11 +23,13 @@ pub const BLOCK: usize = 16;
 pub trait Real:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
-    /// Numbers held side by side.
+    /// Numbers held side by side: one, or a multiple of four.
     const COUNT: usize;
 
     /// Number `lane` is `at(lane)`.
     fn from_fn(at: impl Fn(usize) -> f32) -> Self;
+    /// Numbers `4 g` to `4 g + 3` are `quad(g)`; a single number is the first of quad 0.
+    fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self;
     /// The number in `lane`; lanes that do not exist read as zero.
     fn lane(&self, lane: usize) -> f32;
     /// Applies `f` to each number.
@@ -74,6 +83,10 @@ impl Real for f32 {
         at(0)
     }
     #[inline(always)]
+    fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self {
+        quad(0)[0]
+    }
+    #[inline(always)]
     fn lane(&self, lane: usize) -> f32 {
         if lane == 0 { *self } else { 0.0 }
     }
@@ -100,6 +113,14 @@ impl<const L: usize> Real for Lanes<L> {
         let mut out = [0.0; L];
         for (lane, value) in out.iter_mut().enumerate() {
             *value = at(lane);
+        }
+        Self(out)
+    }
+    #[inline(always)]
+    fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self {
+        let mut out = [0.0; L];
+        for (group, values) in out.chunks_exact_mut(4).enumerate() {
+            values.copy_from_slice(&quad(group));
         }
         Self(out)
     }

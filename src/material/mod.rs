@@ -143,22 +143,13 @@ impl<R: Real> VolumeFactor<R> {
         let i1 = at.i + R::splat(3.0);
         // I1bar - 3 = g (I1 - 3) + 3 (g - 1), g - 1 = e (2 + e)
         let x = square * at.i + R::splat(3.0) * e * (R::splat(2.0) + e) + slope * below * i1;
-        Self {
-            g: square + slope * below,
-            slope,
-            fifth,
-            clamped,
-            below,
-            x,
-        }
+        Self { g: square + slope * below, slope, fifth, clamped, below, x }
     }
 
     /// Second derivative of `g`: zero where it is continued along its tangent.
     #[inline(always)]
     pub(crate) fn curvature(&self) -> R {
-        let inside = self
-            .below
-            .zip(R::splat(0.0), |below, _| if below < 0.0 { 0.0 } else { 1.0 });
+        let inside = self.below.zip(R::splat(0.0), |below, _| if below < 0.0 { 0.0 } else { 1.0 });
         let y3 = self.fifth.zip(self.clamped, |_, clamped| 1.0 / (1.0 + clamped));
         inside * R::splat(10.0 / 9.0) * self.fifth * y3
     }
@@ -180,11 +171,7 @@ pub(crate) fn response<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>) -> 
         }
     } else {
         let slope = two * law.distortion_slope(at.i);
-        Response {
-            p1: slope,
-            s: slope + law.volume_slope(at.j),
-            saturation: law.saturation(at.i),
-        }
+        Response { p1: slope, s: slope + law.volume_slope(at.j), saturation: law.saturation(at.i) }
     }
 }
 
@@ -226,8 +213,5 @@ pub(crate) fn releasable_energy<L: Law>(law: &L) -> f64 {
 
 /// The first of the named constants that is not a finite positive number.
 fn first_not_positive(constants: &[(&'static str, f32)]) -> Option<(&'static str, f32)> {
-    constants
-        .iter()
-        .copied()
-        .find(|(_, value)| !(value.is_finite() && *value > 0.0))
+    constants.iter().copied().find(|(_, value)| !(value.is_finite() && *value > 0.0))
 }

@@ -37,10 +37,7 @@ impl Law for NeoHookean {
 
     #[inline(always)]
     fn widen<R: Real>(at: impl Fn(usize) -> Self) -> NeoHookean<R> {
-        NeoHookean {
-            c: R::from_fn(|lane| at(lane).c),
-            d: R::from_fn(|lane| at(lane).d),
-        }
+        NeoHookean { c: R::from_fn(|lane| at(lane).c), d: R::from_fn(|lane| at(lane).d) }
     }
 
     fn energy(&self, x: f64, j: f64) -> f64 {

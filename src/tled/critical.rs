@@ -20,7 +20,7 @@
 //!
 //! No term is left out, so the bound holds for any state, inverted elements included.
 
-use crate::lanes::{BLOCK, Real};
+use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter, dispatch};
 use crate::material::{Law, Material, Potential, VolumeFactor};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
@@ -53,18 +53,9 @@ where
     let displacement = state.displacement.as_mut().get_mut(..count)?;
     let increment = state.increment.as_mut().get_mut(..count)?;
     let force = state.force.as_mut().get_mut(..count)?;
-    let mut sums = Sums {
-        xx_yy_zz_xy: force,
-        yz_in_padding: increment,
-        zx_in_padding: displacement,
-    };
+    let mut sums = Sums { xx_yy_zz_xy: force, yz_in_padding: increment, zx_in_padding: displacement };
     sums.clear();
-    for block in scene.blocks() {
-        for first in (0..BLOCK).step_by(super::Wide::COUNT) {
-            let law = M::Law::widen(|lane| scene.material().law(block.element(first + lane)));
-            add_bounds::<super::Wide, M::Law>(&law, block, first, scene.inertia(), &mut sums);
-        }
-    }
+    dispatch(Bounds { scene, sums: &mut sums });
     let mut largest = (0.0, 0);
     let mut finite = true;
     for (node, inertia) in scene.inertia().iter().enumerate() {
@@ -76,10 +67,7 @@ where
     }
     sums.clear();
     let seconds = 2.0 / libm::sqrtf(largest.0) * (1.0 - ROUNDING);
-    finite.then_some(CriticalStep {
-        seconds,
-        node: largest.1,
-    })
+    finite.then_some(CriticalStep { seconds, node: largest.1 })
 }
 
 /// Symmetric 3 x 3 matrices of the nodes, 1/s^2.
@@ -99,23 +87,9 @@ impl Sums<'_> {
         }
     }
 
-    #[inline(always)]
-    fn add(&mut self, node: usize, [xx, yy, zz, xy, yz, zx]: [f32; 6]) {
-        if let (Some(a), Some(b), Some(c)) = (
-            self.xx_yy_zz_xy.get_mut(node),
-            self.yz_in_padding.get_mut(node),
-            self.zx_in_padding.get_mut(node),
-        ) {
-            for (sum, value) in a.0.iter_mut().zip([xx, yy, zz, xy]) {
-                *sum += value;
-            }
-            b.0[3] += yz;
-            c.0[3] += zx;
-        }
-    }
-
-    /// A close upper bound of the largest eigenvalue of the node's matrix on its free axes, 1/s^2: Newton's iteration on the characteristic polynomial from above, where it is convex, so that no
-    /// iterate falls below the root.
+    /// A close upper bound of the largest eigenvalue of the node's matrix on its free axes, 1/s^2: Newton's
+    /// iteration on the characteristic polynomial from above, where it is convex, so that no iterate falls
+    /// below the root.
     fn largest_eigenvalue(&self, node: usize, inverse: [f32; 3]) -> f32 {
         let read = |vectors: &[NodeVector]| vectors.get(node).copied().unwrap_or_default().0;
         let [xx, yy, zz, xy] = read(self.xx_yy_zz_xy);
@@ -145,6 +119,31 @@ impl Sums<'_> {
     }
 }
 
+struct Bounds<'a, 'b, M, N, B> {
+    scene: &'a Scene<M, N, B>,
+    sums: &'a mut Sums<'b>,
+}
+
+impl<M, N, B> Kernel for Bounds<'_, '_, M, N, B>
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: Real>(self) {
+        for block in self.scene.blocks() {
+            for first in (0..BLOCK).step_by(R::COUNT) {
+                let material = self.scene.material();
+                let law = M::Law::widen(|lane| material.law(block.element(first + lane)));
+                add_bounds::<R, M::Law>(&law, block, first, self.scene.inertia(), self.sums);
+            }
+        }
+    }
+}
+
 /// Adds each element's nodal matrices to the sums, all of `M^-1/2 K M^-1/2`: gradients are divided by the
 /// root of their node's mass, which leaves light nodes among heavy ones a closer bound. Nodes that are held
 /// along all axes count as infinitely heavy.
@@ -156,7 +155,10 @@ fn add_bounds<R: Real, L: Law>(
     inertia: &[NodeInertia],
     sums: &mut Sums<'_>,
 ) {
-    let deformation = Deformation::<R>::of_block(block, first, sums.zx_in_padding);
+    let Some(displacement) = Gather::new(sums.zx_in_padding) else {
+        return;
+    };
+    let deformation = Deformation::<R>::of_block(block, first, displacement);
     let terms = Terms::<R>::new::<L>(law, &deformation);
     let mut gradients = [[R::splat(0.0); 3]; 4];
     for corner in 1..4 {
@@ -167,10 +169,7 @@ fn add_bounds<R: Real, L: Law>(
     }
     for (corner, gradient) in gradients.iter_mut().enumerate() {
         let root = R::from_fn(|lane| {
-            let node = inertia
-                .get(block.node(corner, first + lane))
-                .copied()
-                .unwrap_or_default();
+            let node = inertia.get(block.node(corner, first + lane)).copied().unwrap_or_default();
             node.inverse.into_iter().fold(0.0, f32::max)
         })
         .sqrt();
@@ -206,11 +205,17 @@ fn add_bounds<R: Real, L: Law>(
             entry(1, 2),
             entry(2, 0),
         ];
-        for lane in 0..R::COUNT {
-            sums.add(
-                block.node(corner, first + lane),
-                matrix.map(|entry| entry.lane(lane)),
-            );
+        let [xx, yy, zz, xy, yz, zx] = matrix;
+        let zero = R::splat(0.0);
+        let node = |lane: usize| block.node(corner, first + lane);
+        for (vectors, values) in [
+            (&mut *sums.xx_yy_zz_xy, [xx, yy, zz, xy]),
+            (&mut *sums.yz_in_padding, [zero, zero, zero, yz]),
+            (&mut *sums.zx_in_padding, [zero, zero, zero, zx]),
+        ] {
+            if let Some(mut vectors) = Scatter::new(vectors) {
+                vectors.add_lanes(node, values);
+            }
         }
     }
 }
@@ -241,18 +246,14 @@ impl<R: Real> Image<R> {
     fn new(vector: Vector<R>) -> Self {
         let square = vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2];
         let length = square.sqrt();
-        let inverse = length.map(|length| if length > 0.0 { 1.0 / length } else { 0.0 });
-        Self {
-            vector,
-            length,
-            inverse,
-        }
+        let inverse = length.map(|length| 1.0 / (length + f32::MIN_POSITIVE));
+        Self { vector, length, inverse }
     }
 
     /// `weight v_i v_j / |v|`.
     #[inline(always)]
     fn entry(&self, weight: R, i: usize, j: usize) -> R {
-        weight * self.inverse * self.vector[i] * self.vector[j]
+        (self.inverse * self.vector[i]) * (weight * self.vector[j])
     }
 }
 
@@ -319,13 +320,7 @@ impl<R: Real> Terms<R> {
             x[i] = self.x_f * (e[i] + c[i]) + self.x_c * c[i];
         }
         let cross = cross_matrix(deformation, gradient);
-        Images {
-            gradient,
-            cross,
-            c: Image::new(c),
-            e: Image::new(e),
-            x: Image::new(x),
-        }
+        Images { gradient, cross, c: Image::new(c), e: Image::new(e), x: Image::new(x) }
     }
 
     /// `|K_ab| / V` of the geometric part, Pa/m^2.
@@ -345,10 +340,6 @@ fn cross_matrix<R: Real>(deformation: &Deformation<R>, a: Vector<R>) -> [[R; 3];
     [0, 1, 2].map(|i| {
         let f = |j: usize| deformation.distortion(i, j) + deformation.cofactor(i, j);
         let (f0, f1, f2) = (f(0), f(1), f(2));
-        [
-            a[2] * f1 - a[1] * f2,
-            a[0] * f2 - a[2] * f0,
-            a[1] * f0 - a[0] * f1,
-        ]
+        [a[2] * f1 - a[1] * f2, a[0] * f2 - a[2] * f0, a[1] * f0 - a[0] * f1]
     })
 }

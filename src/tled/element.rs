@@ -3,10 +3,9 @@
 //! [`crate::material`]). Nodes 1, 2, 3 carry stored gradients; node 0 takes minus their sum, so the four
 //! forces of an element add up to zero and a translation gives exactly none.
 
-use crate::lanes::Real;
+use crate::lanes::{Gather, Real, Scatter};
 use crate::material::{Invariants, Law, Response, response};
 use crate::scene::ElementBlock;
-use crate::state::NodeVector;
 
 /// A vector and a matrix in lanes; rows are spatial, columns material.
 pub(crate) type Vector<R> = [R; 3];
@@ -46,31 +45,22 @@ impl<R: Real> Deformation<R> {
         let second = cof_h[0][0] + cof_h[1][1] + cof_h[2][2];
         let j = trace + second + dot(h[0], cof_h[0]);
         let i = trace + trace + (dot(h[0], h[0]) + dot(h[1], h[1]) + dot(h[2], h[2]));
-        Self {
-            h,
-            cof_h,
-            trace,
-            invariants: Invariants { i, j },
-        }
+        Self { h, cof_h, trace, invariants: Invariants { i, j } }
     }
 
-    /// Deformation of the elements in lanes `first..` of a block. Every node index of a built scene is
-    /// below its node count and `displacement` was checked to be at least as long.
+    /// Deformation of the elements in lanes `first..` of a block.
     #[inline(always)]
-    pub(crate) fn of_block(block: &ElementBlock, first: usize, displacement: &[NodeVector]) -> Self {
-        let at = |corner: usize, axis: usize, lane: usize| {
-            displacement
-                .get(block.node(corner, first + lane))
-                .map_or(0.0, |vector| vector.0[axis])
-        };
+    pub(crate) fn of_block(block: &ElementBlock, first: usize, displacement: Gather<'_>) -> Self {
+        let at = |corner: usize| displacement.read_lanes::<R>(|lane| block.node(corner, first + lane));
+        let origin = at(0);
         let mut h = [[R::splat(0.0); 3]; 3];
-        for (i, row) in h.iter_mut().enumerate() {
-            let origin = R::from_fn(|lane| at(0, i, lane));
-            let along = [1, 2, 3].map(|corner| R::from_fn(|lane| at(corner, i, lane)) - origin);
-            for (j, entry) in row.iter_mut().enumerate() {
-                *entry = along[0] * block.gradient(0, j, first)
-                    + along[1] * block.gradient(1, j, first)
-                    + along[2] * block.gradient(2, j, first);
+        for corner in 0..3 {
+            let position = at(corner + 1);
+            for j in 0..3 {
+                let gradient = block.gradient::<R>(corner, j, first);
+                for i in 0..3 {
+                    h[i][j] = h[i][j] + (position[i] - origin[i]) * gradient;
+                }
             }
         }
         Self::new(h)
@@ -87,11 +77,7 @@ impl<R: Real> Deformation<R> {
     #[inline(always)]
     pub(crate) fn cofactor(&self, i: usize, j: usize) -> R {
         let off = self.cof_h[i][j] - self.h[j][i];
-        if i == j {
-            off + (R::splat(1.0) + self.trace)
-        } else {
-            off
-        }
+        if i == j { off + (R::splat(1.0) + self.trace) } else { off }
     }
 
     /// First Piola-Kirchhoff stress, Pa.
@@ -122,8 +108,8 @@ pub(crate) fn add_forces<R: Real, L: Law>(
     law: &L::Wide<R>,
     block: &ElementBlock,
     first: usize,
-    displacement: &[NodeVector],
-    force: &mut [NodeVector],
+    displacement: Gather<'_>,
+    force: &mut Scatter<'_>,
     extremes: &mut Extremes<R>,
 ) {
     let deformation = Deformation::<R>::of_block(block, first, displacement);
@@ -142,13 +128,7 @@ pub(crate) fn add_forces<R: Real, L: Law>(
         }
         forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
     }
-    for lane in 0..R::COUNT {
-        for (corner, components) in forces.iter().enumerate() {
-            if let Some(vector) = force.get_mut(block.node(corner, first + lane)) {
-                for (sum, component) in vector.0.iter_mut().zip(components) {
-                    *sum += component.lane(lane);
-                }
-            }
-        }
+    for (corner, [x, y, z]) in forces.into_iter().enumerate() {
+        force.add_lanes(|lane| block.node(corner, first + lane), [x, y, z, R::splat(0.0)]);
     }
 }

@@ -3,7 +3,6 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::lanes::BLOCK;
 use crate::material::{Invariants, Law, Material, energy, response};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::NodeVector;
@@ -21,7 +20,7 @@ pub struct ElementFields {
     pub energy: f64,
 }
 
-/// Fields of every element of the scene, in the scene's order, under the given displacements (m).
+/// Fields of every element of the scene, in the mesh's order, under the given displacements (m).
 pub fn element_fields<'a, M, N, B>(
     scene: &'a Scene<M, N, B>,
     displacement: &'a [NodeVector],
@@ -31,11 +30,7 @@ where
     N: AsRef<[NodeInertia]>,
     B: AsRef<[ElementBlock]>,
 {
-    let places = scene
-        .blocks()
-        .iter()
-        .flat_map(|block| (0..BLOCK).map(move |lane| (block, lane)));
-    places.take(scene.element_count()).map(|(block, lane)| {
+    scene.places().map(|(block, lane)| {
         let element = block.element(lane);
         fields(&scene.material().law(element), block, lane, element, displacement)
     })
@@ -48,9 +43,7 @@ where
     N: AsRef<[NodeInertia]>,
     B: AsRef<[ElementBlock]>,
 {
-    element_fields(scene, displacement)
-        .map(|fields| fields.energy)
-        .sum()
+    element_fields(scene, displacement).map(|fields| fields.energy).sum()
 }
 
 fn fields<L: Law>(
@@ -61,11 +54,7 @@ fn fields<L: Law>(
     displacement: &[NodeVector],
 ) -> ElementFields {
     let at = |corner: usize| {
-        let [x, y, z] = displacement
-            .get(block.node(corner, lane))
-            .copied()
-            .unwrap_or_default()
-            .to_array();
+        let [x, y, z] = displacement.get(block.node(corner, lane)).copied().unwrap_or_default().to_array();
         DVec3::new(f64::from(x), f64::from(y), f64::from(z))
     };
     let mut h = DMat3::ZERO;
@@ -88,16 +77,7 @@ fn fields<L: Law>(
 
     // The deviator of P F^T needs only p1 F F^T: cof(F) F^T = J I.
     let wide = L::widen::<f32>(|_| *law);
-    let p1 = f64::from(
-        response::<f32, L>(
-            &wide,
-            Invariants {
-                i: i as f32,
-                j: j as f32,
-            },
-        )
-        .p1,
-    );
+    let p1 = f64::from(response::<f32, L>(&wide, Invariants { i: i as f32, j: j as f32 }).p1);
     let b = f * f.transpose();
     let mean = (b.x_axis.x + b.y_axis.y + b.z_axis.z) / 3.0;
     let deviator = b - DMat3::from_diagonal(DVec3::splat(mean));
@@ -105,15 +85,6 @@ fn fields<L: Law>(
         + deviator.y_axis.length_squared()
         + deviator.z_axis.length_squared();
     let volume_ratio = 1.0 + j;
-    let von_mises = if volume_ratio > 0.0 {
-        p1 / volume_ratio * libm::sqrt(1.5 * square)
-    } else {
-        f64::NAN
-    };
-    ElementFields {
-        element,
-        volume_ratio,
-        von_mises,
-        energy,
-    }
+    let von_mises = if volume_ratio > 0.0 { p1 / volume_ratio * libm::sqrt(1.5 * square) } else { f64::NAN };
+    ElementFields { element, volume_ratio, von_mises, energy }
 }

@@ -12,6 +12,7 @@
 mod critical;
 mod element;
 mod energy;
+mod entry;
 #[cfg(feature = "std")]
 mod spectrum;
 
@@ -22,16 +23,14 @@ pub use spectrum::exact_critical_step;
 
 use core::fmt;
 
-use crate::lanes::{BLOCK, Lanes, Real};
+use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter, dispatch};
 use crate::loads::{Loads, ramp_factor};
 use crate::material::{J_FLOOR, Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
 
 use element::Extremes;
-
-/// Elements computed side by side: enough to fill the registers of the baseline instruction sets.
-pub(crate) type Wide = Lanes<8>;
+use entry::{Entry, next_increment};
 
 /// Coefficients of the integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,10 +87,7 @@ impl Step {
     pub fn new(dt: f32, damping: f32, critical: CriticalStep) -> Result<Self, StepError> {
         let step = Self::insist(dt, damping)?;
         if dt > critical.seconds {
-            return Err(StepError::AboveCritical {
-                seconds: dt,
-                critical,
-            });
+            return Err(StepError::AboveCritical { seconds: dt, critical });
         }
         Ok(step)
     }
@@ -106,12 +102,7 @@ impl Step {
             return Err(StepError::Damping { damping });
         }
         let k = 0.5 * damping * dt;
-        Ok(Self {
-            dt,
-            damping,
-            keep: (1.0 - k) / (1.0 + k),
-            push: dt * dt / (1.0 + k),
-        })
+        Ok(Self { dt, damping, keep: (1.0 - k) / (1.0 + k), push: dt * dt / (1.0 + k) })
     }
 
     /// The step, s.
@@ -201,15 +192,7 @@ where
 {
     let nodes = scene.node_count();
     let room = state.capacity();
-    let State {
-        displacement,
-        increment,
-        force,
-        time,
-        steps,
-        dt,
-        ledger,
-    } = state;
+    let State { displacement, increment, force, time, steps, dt, ledger } = state;
     let (Some(displacement), Some(increment), Some(force)) = (
         displacement.as_mut().get_mut(..nodes),
         increment.as_mut().get_mut(..nodes),
@@ -230,30 +213,23 @@ where
     }
 
     external_forces(force, inertia, loads, *time);
-    let extremes = internal_forces(scene, displacement, force);
+    let (Some(from), Some(to)) = (Gather::new(displacement), Scatter::new(force)) else {
+        return Status::Mismatch { nodes, room };
+    };
+    let extremes = dispatch(InternalForces { scene, displacement: from, force: to });
     let entry = Entry::of_nodes(inertia, increment, force, loads, step)
         .with_forces(loads, inertia, increment, force, *time, step)
         .with_motions(loads, displacement, increment, force, *time, step);
     if !entry.finite {
         let node = first_not_finite(inertia, increment, force, step);
-        return Status::Diverged(Divergence {
-            time: *time,
-            node,
-            cause: Cause::NotFinite,
-        });
+        return Status::Diverged(Divergence { time: *time, node, cause: Cause::NotFinite });
     }
     let dissipated = 2.0 * f64::from(step.damping) * entry.kinetic * f64::from(step.dt);
     let Some(entered) = ledger.entered(entry.work, entry.kinetic, dissipated) else {
-        let cause = Cause::Energy {
-            kinetic: entry.kinetic,
-            available: ledger.balance() + entry.work.max(0.0),
-        };
+        let cause =
+            Cause::Energy { kinetic: entry.kinetic, available: ledger.balance() + entry.work.max(0.0) };
         let node = most_energetic(inertia, increment, force, step);
-        return Status::Diverged(Divergence {
-            time: *time,
-            node,
-            cause,
-        });
+        return Status::Diverged(Divergence { time: *time, node, cause });
     };
 
     *ledger = entered;
@@ -263,10 +239,7 @@ where
     follow_motions(loads, displacement, increment, *time);
     if 1.0 + extremes.least_j < J_FLOOR || extremes.saturation > 1.0 {
         let least_volume_ratio = 1.0 + extremes.least_j;
-        return Status::Limited {
-            least_volume_ratio,
-            saturation: extremes.saturation,
-        };
+        return Status::Limited { least_volume_ratio, saturation: extremes.saturation };
     }
     Status::Ok
 }
@@ -300,11 +273,7 @@ where
         return false;
     }
     let mut kinetic = 0.0;
-    let vectors = state
-        .displacement
-        .as_mut()
-        .iter_mut()
-        .zip(state.increment.as_mut());
+    let vectors = state.displacement.as_mut().iter_mut().zip(state.increment.as_mut());
     for (node, ((displacement, increment), inertia)) in vectors.zip(scene.inertia()).enumerate() {
         let ([ux, uy, uz], velocity) = at(node);
         displacement.0 = [ux, uy, uz, 0.0];
@@ -351,160 +320,39 @@ fn external_forces(force: &mut [NodeVector], inertia: &[NodeInertia], loads: &Lo
     }
 }
 
-fn internal_forces<M, N, B>(
-    scene: &Scene<M, N, B>,
-    displacement: &[NodeVector],
-    force: &mut [NodeVector],
-) -> Extremes<f32>
+/// Adds the internal forces of all elements, in their order.
+struct InternalForces<'a, M, N, B> {
+    scene: &'a Scene<M, N, B>,
+    displacement: Gather<'a>,
+    force: Scatter<'a>,
+}
+
+impl<M, N, B> Kernel for InternalForces<'_, M, N, B>
 where
     M: Material,
     N: AsRef<[NodeInertia]>,
     B: AsRef<[ElementBlock]>,
 {
-    let mut extremes = Extremes {
-        least_j: Wide::splat(f32::INFINITY),
-        saturation: Wide::splat(f32::NEG_INFINITY),
-    };
-    for block in scene.blocks() {
-        for first in (0..BLOCK).step_by(Wide::COUNT) {
-            let law = M::Law::widen(|lane| scene.material().law(block.element(first + lane)));
-            element::add_forces::<Wide, M::Law>(&law, block, first, displacement, force, &mut extremes);
-        }
-    }
-    Extremes {
-        least_j: extremes.least_j.0.into_iter().fold(f32::INFINITY, f32::min),
-        saturation: extremes
-            .saturation
-            .0
-            .into_iter()
-            .fold(f32::NEG_INFINITY, f32::max),
-    }
-}
+    type Output = Extremes<f32>;
 
-/// The next increment of a node; held axes stand still.
-#[inline(always)]
-fn next_increment(
-    inertia: &NodeInertia,
-    increment: &NodeVector,
-    force: &NodeVector,
-    step: &Step,
-) -> [f32; 4] {
-    let [ix, iy, iz] = inertia.inverse;
-    let inverse = [ix, iy, iz, 0.0];
-    let mut next = [0.0; 4];
-    for (axis, value) in next.iter_mut().enumerate() {
-        let free = step.keep * increment.0[axis] + step.push * (inverse[axis] * force.0[axis]);
-        *value = if inverse[axis] > 0.0 { free } else { 0.0 };
-    }
-    next
-}
-
-/// The energies of one step ([`crate::ledger`]), J.
-struct Entry {
-    finite: bool,
-    kinetic: f64,
-    work: f64,
-}
-
-impl Entry {
-    /// Kinetic energy of the free axes and work of gravity.
-    fn of_nodes(
-        inertia: &[NodeInertia],
-        increment: &[NodeVector],
-        force: &[NodeVector],
-        loads: &Loads<'_>,
-        step: &Step,
-    ) -> Self {
-        let mut kinetic = [0.0f32; 4];
-        let mut momentum = [0.0f32; 4];
-        for ((inertia, increment), force) in inertia.iter().zip(increment).zip(force) {
-            let next = next_increment(inertia, increment, force, step);
-            let [ix, iy, iz] = inertia.inverse;
-            let free = [ix, iy, iz, 0.0];
-            for axis in 0..4 {
-                // A held axis has no inertia of its own: what moves it is counted as work.
-                let mean = 0.5 * (next[axis] + increment.0[axis]);
-                let (moving, led) = if free[axis] > 0.0 {
-                    (mean, mean)
-                } else {
-                    (0.0, increment.0[axis])
-                };
-                kinetic[axis] += inertia.mass * moving * moving;
-                momentum[axis] += inertia.mass * led;
+    #[inline(always)]
+    fn run<R: Real>(mut self) -> Extremes<f32> {
+        let mut extremes =
+            Extremes { least_j: R::splat(f32::INFINITY), saturation: R::splat(f32::NEG_INFINITY) };
+        for block in self.scene.blocks() {
+            for first in (0..BLOCK).step_by(R::COUNT) {
+                let material = self.scene.material();
+                let law = M::Law::widen(|lane| material.law(block.element(first + lane)));
+                let (displacement, force) = (self.displacement, &mut self.force);
+                element::add_forces::<R, M::Law>(&law, block, first, displacement, force, &mut extremes);
             }
         }
-        let dt = f64::from(step.dt);
-        let kinetic: f64 = kinetic.into_iter().map(f64::from).sum();
-        let gravity = loads.gravity().into_iter().zip(momentum);
-        Self {
-            finite: kinetic.is_finite(),
-            kinetic: 0.5 * kinetic / (dt * dt),
-            work: gravity
-                .map(|(g, momentum)| f64::from(g) * f64::from(momentum))
-                .sum(),
+        let mut reduced = Extremes { least_j: f32::INFINITY, saturation: f32::NEG_INFINITY };
+        for lane in 0..R::COUNT {
+            reduced.least_j = reduced.least_j.min(extremes.least_j.lane(lane));
+            reduced.saturation = reduced.saturation.max(extremes.saturation.lane(lane));
         }
-    }
-
-    /// Work of the nodal forces.
-    fn with_forces(
-        mut self,
-        loads: &Loads<'_>,
-        inertia: &[NodeInertia],
-        increment: &[NodeVector],
-        force: &[NodeVector],
-        time: f64,
-        step: &Step,
-    ) -> Self {
-        for load in loads.forces() {
-            let node = load.node as usize;
-            let (Some(inertia), Some(increment), Some(force)) =
-                (inertia.get(node), increment.get(node), force.get(node))
-            else {
-                continue;
-            };
-            let next = next_increment(inertia, increment, force, step);
-            let factor = ramp_factor(time, load.ramp);
-            let mut work = 0.0;
-            for axis in 0..3 {
-                let mean = 0.5 * (next[axis] + increment.0[axis]);
-                work += load.newton[axis]
-                    * if inertia.inverse[axis] > 0.0 {
-                        mean
-                    } else {
-                        increment.0[axis]
-                    };
-            }
-            self.work += f64::from(factor * work);
-        }
-        self
-    }
-
-    /// Work of the supports that move: what they exert is minus the total force on their node.
-    fn with_motions(
-        mut self,
-        loads: &Loads<'_>,
-        displacement: &[NodeVector],
-        increment: &[NodeVector],
-        force: &[NodeVector],
-        time: f64,
-        step: &Step,
-    ) -> Self {
-        for motion in loads.motions() {
-            let node = motion.node as usize;
-            let (Some(displacement), Some(increment), Some(force)) =
-                (displacement.get(node), increment.get(node), force.get(node))
-            else {
-                continue;
-            };
-            let factor = ramp_factor(time + f64::from(step.dt), motion.ramp);
-            for axis in 0..3 {
-                if motion.axes.has(axis) {
-                    let next = factor * motion.metre[axis] - displacement.0[axis];
-                    self.work -= f64::from(force.0[axis] * 0.5 * (next + increment.0[axis]));
-                }
-            }
-        }
-        self
+        reduced
     }
 }
 
@@ -515,10 +363,7 @@ fn advance(
     force: &[NodeVector],
     step: &Step,
 ) {
-    let nodes = displacement
-        .iter_mut()
-        .zip(increment)
-        .zip(inertia.iter().zip(force));
+    let nodes = displacement.iter_mut().zip(increment).zip(inertia.iter().zip(force));
     for ((displacement, increment), (inertia, force)) in nodes {
         increment.0 = next_increment(inertia, increment, force, step);
         for (position, change) in displacement.0.iter_mut().zip(increment.0) {
@@ -557,9 +402,7 @@ fn first_not_finite(
 ) -> u32 {
     let nodes = inertia.iter().zip(increment).zip(force);
     let bad = nodes.map(|((inertia, increment), force)| {
-        next_increment(inertia, increment, force, step)
-            .iter()
-            .any(|value| !value.is_finite())
+        next_increment(inertia, increment, force, step).iter().any(|value| !value.is_finite())
     });
     let first = bad.enumerate().find_map(|(node, bad)| bad.then_some(node as u32));
     // Increments may still be finite where their energy no longer is.

@@ -8,7 +8,6 @@ use std::vec::Vec;
 
 use glam::{DMat3, DVec3};
 
-use crate::lanes::BLOCK;
 use crate::material::{Invariants, Law, Material, Potential, VolumeFactor};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::NodeVector;
@@ -28,17 +27,9 @@ where
 {
     let displacement = displacement.get(..scene.node_count())?;
     let tangents: Vec<Tangent> = scene
-        .blocks()
-        .iter()
-        .flat_map(|block| (0..BLOCK).map(move |lane| (block, lane)))
-        .take(scene.element_count())
+        .places()
         .map(|(block, lane)| {
-            Tangent::new(
-                &scene.material().law(block.element(lane)),
-                block,
-                lane,
-                displacement,
-            )
+            Tangent::new(&scene.material().law(block.element(lane)), block, lane, displacement)
         })
         .collect();
     let roots: Vec<DVec3> = scene
@@ -57,11 +48,7 @@ where
         out
     };
     let largest = largest_eigenvalue(start_vector(&roots), product)?;
-    Some(if largest > 0.0 {
-        2.0 / largest.sqrt()
-    } else {
-        f64::INFINITY
-    })
+    Some(if largest > 0.0 { 2.0 / largest.sqrt() } else { f64::INFINITY })
 }
 
 /// A fixed vector with a share of every mode.
@@ -123,16 +110,10 @@ fn largest_eigenvalue(start: Vec<DVec3>, product: impl Fn(&[DVec3]) -> Vec<DVec3
 fn largest_of_tridiagonal(diagonal: &[f64], beside: &[f64]) -> f64 {
     let reach = |i: usize| {
         let left = if i > 0 { beside[i - 1].abs() } else { 0.0 };
-        let right = if i + 1 < diagonal.len() {
-            beside[i].abs()
-        } else {
-            0.0
-        };
+        let right = if i + 1 < diagonal.len() { beside[i].abs() } else { 0.0 };
         left + right
     };
-    let mut high = (0..diagonal.len())
-        .map(|i| diagonal[i] + reach(i))
-        .fold(f64::NEG_INFINITY, f64::max);
+    let mut high = (0..diagonal.len()).map(|i| diagonal[i] + reach(i)).fold(f64::NEG_INFINITY, f64::max);
     let mut low = diagonal.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     for _ in 0..80 {
         let middle = 0.5 * (low + high);
@@ -178,12 +159,7 @@ impl Tangent {
         let slopes = [0, 1, 2].map(|corner| {
             DVec3::from_array([0, 1, 2].map(|axis| f64::from(block.gradient::<f32>(corner, axis, lane))))
         });
-        let gradients = [
-            -(slopes[0] + slopes[1] + slopes[2]),
-            slopes[0],
-            slopes[1],
-            slopes[2],
-        ];
+        let gradients = [-(slopes[0] + slopes[1] + slopes[2]), slopes[0], slopes[1], slopes[2]];
         let mut h = DMat3::ZERO;
         for (&node, gradient) in nodes.iter().zip(gradients) {
             let [x, y, z] = displacement[node].to_array().map(f64::from);
@@ -193,10 +169,7 @@ impl Tangent {
         let cofactor = cofactor(f);
         let square = inner3(f, f);
         let volume_ratio = f.determinant();
-        let at = Invariants {
-            i: (square - 3.0) as f32,
-            j: (volume_ratio - 1.0) as f32,
-        };
+        let at = Invariants { i: (square - 3.0) as f32, j: (volume_ratio - 1.0) as f32 };
         let wide = law_at(law);
         let slope = |x: f32| f64::from(wide.distortion_slope(x));
         let curvature = |x: f32| f64::from(wide.distortion_curvature(x));
@@ -221,11 +194,8 @@ impl Tangent {
             return base;
         }
         let factor = VolumeFactor::new(at);
-        let (g, slope_g, curvature_g) = (
-            f64::from(factor.g),
-            f64::from(factor.slope),
-            f64::from(factor.curvature()),
-        );
+        let (g, slope_g, curvature_g) =
+            (f64::from(factor.g), f64::from(factor.slope), f64::from(factor.curvature()));
         Self {
             p1: 2.0 * slope(factor.x) * g,
             p_j: volume_slope + slope(factor.x) * slope_g * square,
@@ -273,9 +243,5 @@ fn inner3(a: DMat3, b: DMat3) -> f64 {
 
 /// The cofactor matrix, quadratic in `f`: a central difference of it is its exact derivative.
 fn cofactor(f: DMat3) -> DMat3 {
-    DMat3::from_cols(
-        f.y_axis.cross(f.z_axis),
-        f.z_axis.cross(f.x_axis),
-        f.x_axis.cross(f.y_axis),
-    )
+    DMat3::from_cols(f.y_axis.cross(f.z_axis), f.z_axis.cross(f.x_axis), f.x_axis.cross(f.y_axis))
 }

@@ -35,10 +35,7 @@ pub fn uniaxial_stretch_stress(law: &Law, s: f64) -> Mat3 {
     let (along, across) = if law.is_isochoric() {
         let g = 1.0 / (s * s).cbrt();
         let w = slope(law, (s * s + 2.0) * g - 3.0);
-        (
-            4.0 / 3.0 * w * g * (s - 1.0 / s),
-            2.0 / 3.0 * w * g * (1.0 - s * s),
-        )
+        (4.0 / 3.0 * w * g * (s - 1.0 / s), 2.0 / 3.0 * w * g * (1.0 - s * s))
     } else {
         let w = slope(law, s * s - 1.0);
         (2.0 * w * s, 2.0 * w)
@@ -71,11 +68,7 @@ pub fn dilation(s: f64) -> Mat3 {
 
 /// `P` of [`dilation`].
 pub fn dilation_stress(law: &Law, s: f64) -> Mat3 {
-    let shape = if law.is_isochoric() {
-        0.0
-    } else {
-        2.0 * slope(law, 3.0 * (s * s - 1.0)) * s
-    };
+    let shape = if law.is_isochoric() { 0.0 } else { 2.0 * slope(law, 3.0 * (s * s - 1.0)) * s };
     let p = shape + 2.0 * law.d() * (s.powi(3) - 1.0) * s * s;
     dilation(p)
 }

@@ -22,10 +22,7 @@ pub fn tangent_product(mesh: &Mesh, law: &Law, u: &[Vec3], v: &[Vec3]) -> Vec<Ve
 }
 
 fn tangents(elements: &[Element], law: &Law, u: &[Vec3]) -> Vec<Mat9> {
-    elements
-        .iter()
-        .map(|e| law.tangent(&e.deformation_gradient(u)))
-        .collect()
+    elements.iter().map(|e| law.tangent(&e.deformation_gradient(u))).collect()
 }
 
 fn product(elements: &[Element], tangents: &[Mat9], v: &[Vec3]) -> Vec<Vec3> {
@@ -33,9 +30,7 @@ fn product(elements: &[Element], tangents: &[Mat9], v: &[Vec3]) -> Vec<Vec3> {
     for (element, tangent) in elements.iter().zip(tangents) {
         let df = element.displacement_gradient(v);
         let dp = from_fn(|i, j| {
-            (0..9)
-                .map(|column| tangent[3 * i + j][column] * df[column / 3][column % 3])
-                .sum()
+            (0..9).map(|column| tangent[3 * i + j][column] * df[column / 3][column % 3]).sum()
         });
         for (node, gradient) in element.nodes.iter().zip(element.gradients) {
             let f = apply(&dp, gradient);
@@ -58,10 +53,7 @@ pub fn critical_step(mesh: &Mesh, law: &Law, density: f64, u: &[Vec3], fixed: &[
         .map(|(m, held)| held.map(|h| if h { 0.0 } else { 1.0 / m.sqrt() }))
         .collect();
     let scaled = |v: &[Vec3]| -> Vec<Vec3> {
-        v.iter()
-            .zip(&scale)
-            .map(|(v, s)| std::array::from_fn(|axis| v[axis] * s[axis]))
-            .collect()
+        v.iter().zip(&scale).map(|(v, s)| std::array::from_fn(|axis| v[axis] * s[axis])).collect()
     };
     let free = scale.iter().flatten().filter(|s| **s > 0.0).count();
     if free == 0 {
@@ -72,34 +64,22 @@ pub fn critical_step(mesh: &Mesh, law: &Law, density: f64, u: &[Vec3], fixed: &[
     for (x, s) in start.iter_mut().flatten().zip(scale.iter().flatten()) {
         *x *= f64::from(*s > 0.0);
     }
-    let lambda = largest_eigenvalue(start, free, |v| {
-        scaled(&product(&elements, &tangents, &scaled(v)))
-    });
-    if lambda > 0.0 {
-        2.0 / lambda.sqrt()
-    } else {
-        f64::INFINITY
-    }
+    let lambda = largest_eigenvalue(start, free, |v| scaled(&product(&elements, &tangents, &scaled(v))));
+    if lambda > 0.0 { 2.0 / lambda.sqrt() } else { f64::INFINITY }
 }
 
 /// A start vector with something of every mode: a linear congruential generator (Knuth's MMIX constants).
 fn seed(nodes: usize) -> Vec<Vec3> {
     let mut state = 1_u64;
     let mut next = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     };
     (0..nodes).map(|_| [next(), next(), next()]).collect()
 }
 
 fn inner(a: &[Vec3], b: &[Vec3]) -> f64 {
-    a.iter()
-        .flatten()
-        .zip(b.iter().flatten())
-        .map(|(x, y)| x * y)
-        .sum()
+    a.iter().flatten().zip(b.iter().flatten()).map(|(x, y)| x * y).sum()
 }
 
 /// Largest eigenvalue of a symmetric operator on a space of `dimension`, by Lanczos.
@@ -127,11 +107,7 @@ fn largest_eigenvalue(start: Vec<Vec3>, dimension: usize, operator: impl Fn(&[Ve
         if (beta * last).abs() <= TOLERANCE * lambda.abs() || basis.len() == dimension {
             return lambda;
         }
-        assert!(
-            basis.len() < MAX_VECTORS,
-            "Lanczos: {lambda:e} not converged, residual {:e}",
-            beta * last
-        );
+        assert!(basis.len() < MAX_VECTORS, "Lanczos: {lambda:e} not converged, residual {:e}", beta * last);
         off_diagonal.push(beta);
         basis.push(normalised(w, beta));
     }
@@ -143,19 +119,11 @@ fn largest_of_tridiagonal(diagonal: &[f64], off_diagonal: &[f64]) -> (f64, f64) 
     let n = diagonal.len();
     // Off-diagonal entry left of row i; off(n) = 0 is right of the last row.
     let off = |i: usize| {
-        if i == 0 || i == n {
-            0.0
-        } else {
-            off_diagonal[i - 1]
-        }
+        if i == 0 || i == n { 0.0 } else { off_diagonal[i - 1] }
     };
     let radius = |i: usize| off(i).abs() + off(i + 1).abs();
-    let mut high = (0..n)
-        .map(|i| diagonal[i] + radius(i))
-        .fold(f64::NEG_INFINITY, f64::max);
-    let mut low = (0..n)
-        .map(|i| diagonal[i] - radius(i))
-        .fold(f64::INFINITY, f64::min);
+    let mut high = (0..n).map(|i| diagonal[i] + radius(i)).fold(f64::NEG_INFINITY, f64::max);
+    let mut low = (0..n).map(|i| diagonal[i] - radius(i)).fold(f64::INFINITY, f64::min);
 
     // All pivots of LDL^T of T - x I are negative exactly where x is above the spectrum.
     let above_spectrum = |x: f64| {

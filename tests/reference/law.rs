@@ -34,11 +34,7 @@ pub enum Law {
 
 impl Law {
     /// The paper's exponential law, its numbers read as kPa, in isochoric form.
-    pub const PAPER: Law = Law::Exponential {
-        a: 59.0,
-        b: 8.023,
-        d: 60_000.0,
-    };
+    pub const PAPER: Law = Law::Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
 
     /// Volume modulus `d` of `d (J - 1)^2`.
     pub fn d(&self) -> f64 {
@@ -64,11 +60,7 @@ impl Law {
                 } else {
                     let e = EXPONENT_CAP.exp();
                     let x_cap = EXPONENT_CAP / b;
-                    [
-                        a / (2.0 * b) * (e - 1.0) + a / 2.0 * e * (x - x_cap),
-                        a / 2.0 * e,
-                        0.0,
-                    ]
+                    [a / (2.0 * b) * (e - 1.0) + a / 2.0 * e * (x - x_cap), a / 2.0 * e, 0.0]
                 }
             }
         }
@@ -82,11 +74,7 @@ impl Law {
         let g = |j: f64| j.powf(-2.0 / 3.0);
         let dg = |j: f64| -2.0 / 3.0 * j.powf(-5.0 / 3.0);
         let ddg = |j: f64| 10.0 / 9.0 * j.powf(-8.0 / 3.0);
-        if j >= J_MIN {
-            [g(j), dg(j), ddg(j)]
-        } else {
-            [g(J_MIN) + dg(J_MIN) * (j - J_MIN), dg(J_MIN), 0.0]
-        }
+        if j >= J_MIN { [g(j), dg(j), ddg(j)] } else { [g(J_MIN) + dg(J_MIN) * (j - J_MIN), dg(J_MIN), 0.0] }
     }
 
     /// `x = g(J) I1 - 3`, the argument of `W`.

@@ -50,9 +50,8 @@ impl Mesh {
             for j in 0..=ny {
                 for i in 0..=nx {
                     let n = [i, j, k];
-                    mesh.points.push(std::array::from_fn(|axis| {
-                        size[axis] * n[axis] as f64 / cells[axis] as f64
-                    }));
+                    mesh.points
+                        .push(std::array::from_fn(|axis| size[axis] * n[axis] as f64 / cells[axis] as f64));
                 }
             }
         }
@@ -87,9 +86,7 @@ impl Mesh {
 
     /// Ids of the nodes whose reference position satisfies the condition.
     pub fn nodes_where(&self, condition: impl Fn(Vec3) -> bool) -> Vec<usize> {
-        (0..self.points.len())
-            .filter(|n| condition(self.points[*n]))
-            .collect()
+        (0..self.points.len()).filter(|n| condition(self.points[*n])).collect()
     }
 
     /// Gradients and volumes of all elements.
@@ -102,20 +99,12 @@ impl Mesh {
 
     fn element(&self, nodes: [usize; 4]) -> Element {
         let x = nodes.map(|n| self.points[n]);
-        let edges = [
-            difference(x[1], x[0]),
-            difference(x[2], x[0]),
-            difference(x[3], x[0]),
-        ];
+        let edges = [difference(x[1], x[0]), difference(x[2], x[0]), difference(x[3], x[0])];
         let d_inv_t = transpose(&inverse(&transpose(&edges)));
         let column = |c: usize| [d_inv_t[0][c], d_inv_t[1][c], d_inv_t[2][c]];
         let (g1, g2, g3) = (column(0), column(1), column(2));
         let g0 = std::array::from_fn(|i| -(g1[i] + g2[i] + g3[i]));
-        Element {
-            nodes,
-            gradients: [g0, g1, g2, g3],
-            volume: determinant(&edges) / 6.0,
-        }
+        Element { nodes, gradients: [g0, g1, g2, g3], volume: determinant(&edges) / 6.0 }
     }
 
     /// Element volumes in m^3.
@@ -136,10 +125,7 @@ impl Mesh {
 
     /// `F` of every element.
     pub fn deformation_gradients(&self, u: &[Vec3]) -> Vec<Mat3> {
-        self.elements()
-            .iter()
-            .map(|e| e.deformation_gradient(u))
-            .collect()
+        self.elements().iter().map(|e| e.deformation_gradient(u)).collect()
     }
 
     /// The displacement field of the homogeneous deformation `x = F X`.

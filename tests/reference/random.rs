@@ -32,10 +32,7 @@ impl Random {
     pub fn deformation(&mut self, stretch: Vec3) -> Mat3 {
         let q = rotation(self.vector(), 3.0 * self.next());
         let noise = self.matrix();
-        product(
-            &q,
-            &from_fn(|i, j| IDENTITY[i][j] * stretch[i] + 0.05 * noise[i][j]),
-        )
+        product(&q, &from_fn(|i, j| IDENTITY[i][j] * stretch[i] + 0.05 * noise[i][j]))
     }
 }
 

@@ -37,19 +37,12 @@ fn element_forces(elements: &[Element], law: &Law, u: &[Vec3]) -> Vec<Vec3> {
 
 /// Strain energy in J, `sum_e V Psi(F)`.
 pub fn strain_energy(mesh: &Mesh, law: &Law, u: &[Vec3]) -> f64 {
-    mesh.elements()
-        .iter()
-        .map(|e| e.volume * law.energy(&e.deformation_gradient(u)))
-        .sum()
+    mesh.elements().iter().map(|e| e.volume * law.energy(&e.deformation_gradient(u))).sum()
 }
 
 /// The factor of a load at time `t` that ramps up in `seconds`: `min(1, t / seconds)`, 1 where `seconds = 0`.
 pub fn ramp(t: f64, seconds: f64) -> f64 {
-    if seconds > 0.0 {
-        (t / seconds).min(1.0)
-    } else {
-        1.0
-    }
+    if seconds > 0.0 { (t / seconds).min(1.0) } else { 1.0 }
 }
 
 /// A force on a node.
@@ -163,11 +156,7 @@ impl Simulation {
     /// Loads at time `t` in N: nodal forces and weight.
     pub fn external_force(&self, t: f64) -> Vec<Vec3> {
         let weight = ramp(t, self.gravity_ramp);
-        let mut force: Vec<Vec3> = self
-            .mass
-            .iter()
-            .map(|m| self.gravity.map(|g| weight * m * g))
-            .collect();
+        let mut force: Vec<Vec3> = self.mass.iter().map(|m| self.gravity.map(|g| weight * m * g)).collect();
         for load in &self.forces {
             for (f, newton) in force[load.node].iter_mut().zip(load.newton) {
                 *f += ramp(t, load.ramp) * newton;
@@ -229,11 +218,7 @@ impl Simulation {
     /// Kinetic energy in J at the last half step.
     pub fn kinetic_energy(&self) -> f64 {
         let dt2 = self.dt * self.dt;
-        self.mass
-            .iter()
-            .zip(&self.du)
-            .map(|(m, du)| 0.5 * m * dot(*du, *du) / dt2)
-            .sum()
+        self.mass.iter().zip(&self.du).map(|(m, du)| 0.5 * m * dot(*du, *du) / dt2).sum()
     }
 
     /// The energy balance at the last half step.

@@ -1,0 +1,52 @@
+//! What this machine can do at most: float32 multiply-adds on one core, measured, in GFLOP/s. A share of
+//! this is the honest way to say how fast a kernel is.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+const CHAINS: usize = 12;
+const ROUNDS: usize = 20_000;
+
+/// Independent chains of vector multiply-adds, as many as the pipelines hold.
+#[inline(always)]
+fn chains<const L: usize>(fused: impl Fn(f32, f32, f32) -> f32) -> f32 {
+    let mut sums = black_box([[1.0f32; L]; CHAINS]);
+    let (factor, add) = (black_box([0.999_9f32; L]), black_box([1e-4f32; L]));
+    for _ in 0..ROUNDS {
+        for sum in &mut sums {
+            for lane in 0..L {
+                sum[lane] = fused(sum[lane], factor[lane], add[lane]);
+            }
+        }
+    }
+    black_box(sums)[0][0]
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn chains_fma() -> f32 {
+    chains::<8>(|a, b, c| a.mul_add(b, c))
+}
+
+fn best<F: Fn() -> f32>(flops: f64, run: F) -> f64 {
+    (0..50)
+        .map(|_| {
+            let start = Instant::now();
+            black_box(run());
+            flops / start.elapsed().as_secs_f64() * 1e-9
+        })
+        .fold(0.0, f64::max)
+}
+
+/// GFLOP/s of one core with its widest instructions, and with the ones the portable build may use.
+pub(crate) fn peak() -> (f64, f64) {
+    let baseline = best((2 * CHAINS * 4 * ROUNDS) as f64, || chains::<4>(|a, b, c| a * b + c));
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+        #[allow(unsafe_code)]
+        // SAFETY: both features were detected.
+        let widest = best((2 * CHAINS * 8 * ROUNDS) as f64, || unsafe { chains_fma() });
+        return (widest, baseline);
+    }
+    (baseline, baseline)
+}

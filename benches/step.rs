@@ -1,0 +1,139 @@
+//! Time of an exact step on the paper's bar, beside the same step in plain scalar code.
+//!
+//! `cargo bench --bench step` prints criterion's figures, then ratios from interleaved pairs of runs (the
+//! machine's speed drifts; the ratio does not) and the share of the machine's measured peak.
+
+mod common {
+    pub(crate) mod peak;
+    pub(crate) mod plain;
+}
+
+use std::time::Instant;
+
+use common::plain::{self, Plain};
+use criterion::{BenchmarkId, Criterion, Throughput};
+use supple::loads::{Loads, NodalForce};
+use supple::material::{Exponential, Law, NeoHookean, Tissue};
+use supple::mesh::{Bar, Mesh, Winding};
+use supple::scene::{ElementBlock, NodeInertia, Scene, Support, blocks_for};
+use supple::state::{NodeVector, State};
+use supple::tled::{self, Step};
+
+const DT: f32 = 3e-5;
+const DAMPING: f32 = 20.0;
+const DENSITY: f32 = 1000.0;
+/// Floating-point operations per tetrahedron, counted in `src/tled/element.rs` and `src/material`:
+/// displacement gradient 54, minors and invariants 57, volume factor and response 55, stress 66, nodal
+/// forces 75; the exponential adds 20.
+const FLOPS: [f64; 2] = [307.0, 327.0];
+
+struct Ours<L> {
+    scene: Scene<Tissue<L>, Vec<NodeInertia>, Vec<ElementBlock>>,
+    state: State<Vec<NodeVector>>,
+    forces: Vec<NodalForce>,
+    step: Step,
+}
+
+impl<L: Law> Ours<L> {
+    fn new(mesh: &Mesh<'_>, law: L, fixed: &[u32], loads: &[(u32, [f32; 3])]) -> Self {
+        let nodes = vec![NodeInertia::EMPTY; mesh.points().len()];
+        let blocks = vec![ElementBlock::EMPTY; blocks_for(mesh.element_count())];
+        let mut scene = Scene::over(Tissue { law, density: DENSITY }, nodes, blocks);
+        let supports: Vec<_> = fixed.iter().map(|&node| Support::fixed(node)).collect();
+        scene.build(mesh, &supports).expect("the bar is sound");
+        let zero = || vec![NodeVector::ZERO; mesh.points().len()];
+        let mut state = State::over(zero(), zero(), zero());
+        let critical = tled::critical_step(&scene, &mut state).expect("the bar has a critical step");
+        let forces = loads.iter().map(|&(node, newton)| NodalForce { node, newton, ramp: 0.0 }).collect();
+        let step = Step::new(DT, DAMPING, critical).expect("dt is below the critical step");
+        Self { scene, state, forces, step }
+    }
+
+    fn run(&mut self, steps: usize) {
+        let loads = Loads::new(&self.scene, [0.0; 3], &self.forces, &[]).expect("nodes of the bar");
+        for _ in 0..steps {
+            assert_eq!(tled::step(&self.scene, &loads, &mut self.state, &self.step), tled::Status::Ok);
+        }
+    }
+}
+
+/// Median of the ratios of paired runs, and the median time of one step of each, s.
+fn pairs(mut plain: impl FnMut(), mut ours: impl FnMut(), steps: usize) -> (f64, f64, f64) {
+    let time = |run: &mut dyn FnMut()| {
+        let start = Instant::now();
+        run();
+        start.elapsed().as_secs_f64() / steps as f64
+    };
+    let runs: Vec<_> = (0..21).map(|_| (time(&mut plain), time(&mut ours))).collect();
+    let median = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    (
+        median(runs.iter().map(|(plain, ours)| plain / ours).collect()),
+        median(runs.iter().map(|run| run.0).collect()),
+        median(runs.iter().map(|run| run.1).collect()),
+    )
+}
+
+fn compare<L: Law>(criterion: &mut Criterion, name: &str, law: L, plain_law: plain::Law, flops: f64) {
+    let bar = Bar::PAPER;
+    let points: Vec<_> = bar.points().collect();
+    let tets: Vec<_> = bar.tets().collect();
+    let mesh = Mesh::new(&points, &tets, Winding::Checked).expect("the bar is sound");
+    let fixed: Vec<u32> = (0..81).collect();
+    let corners = [(0, 0, [1.0, -1.0]), (8, 0, [1.0, 1.0]), (8, 8, [-1.0, 1.0]), (0, 8, [-1.0, -1.0])];
+    let loads = corners.map(|(i, j, [x, y])| (bar.node(i, j, 17), [0.05 * x, 0.05 * y, 0.0]));
+    let mut plain = Plain::new(&mesh, plain_law, DENSITY, &fixed, &loads);
+    let mut ours = Ours::new(&mesh, law, &fixed, &loads);
+    // Both are timed in a deformed state, and must agree on it.
+    (0..2_000).for_each(|_| plain.step(DT, DAMPING, 1.0));
+    ours.run(2_000);
+    let tip = bar.node(8, 8, 17) as usize;
+    let (a, b) = (plain.u[tip], ours.state.displacements()[tip].to_array());
+    let apart = (0..3).map(|i| (a[i] - b[i]).abs()).fold(0.0, f32::max);
+    assert!(apart < 1e-5, "{name}: plain {a:?} and ours {b:?} disagree");
+
+    let mut group = criterion.benchmark_group("step");
+    group.throughput(Throughput::Elements(tets.len() as u64));
+    group.bench_function(BenchmarkId::new(name, "plain"), |b| b.iter(|| plain.step(DT, DAMPING, 1.0)));
+    group.bench_function(BenchmarkId::new(name, "supple"), |b| b.iter(|| ours.run(1)));
+    group.bench_function(BenchmarkId::new(name, "critical step"), |b| {
+        b.iter(|| tled::critical_step(&ours.scene, &mut ours.state));
+    });
+    group.finish();
+
+    let (ratio, plain_s, ours_s) =
+        pairs(|| (0..50).for_each(|_| plain.step(DT, DAMPING, 1.0)), || ours.run(50), 50);
+    let (widest, baseline) = common::peak::peak();
+    let per_tet = |seconds: f64| seconds * 1e9 / tets.len() as f64;
+    let speed = flops / per_tet(ours_s);
+    println!(
+        "{name}: plain {:.1} ns/tet, supple {:.1} ns/tet = {:.0} us a step, {ratio:.2} times faster; \
+         {speed:.1} GFLOP/s = {:.0} % of the {widest:.0} GFLOP/s peak ({:.0} % of {baseline:.0} without AVX)",
+        per_tet(plain_s),
+        per_tet(ours_s),
+        ours_s * 1e6,
+        100.0 * speed / widest,
+        100.0 * speed / baseline,
+    );
+}
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args().sample_size(30);
+    compare(
+        &mut criterion,
+        "exponential",
+        Exponential { a: 59.0, b: 8.023, d: 60_000.0 },
+        plain::Law::Exponential(59.0, 8.023, 60_000.0),
+        FLOPS[1],
+    );
+    compare(
+        &mut criterion,
+        "neo-Hookean",
+        NeoHookean { c: 500.0, d: 15_000.0 },
+        plain::Law::NeoHookean(500.0, 15_000.0),
+        FLOPS[0],
+    );
+    criterion.final_summary();
+}

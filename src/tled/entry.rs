@@ -1,0 +1,126 @@
+//! The increment of a node in one step, and what the step enters in the energy account
+//! ([`crate::ledger`]): kinetic energy of the mean of the increments before and after `t_n`, and the work of
+//! loads and supports along it, in joules.
+
+use crate::loads::{Loads, ramp_factor};
+use crate::scene::NodeInertia;
+use crate::state::NodeVector;
+
+use super::Step;
+
+/// The next increment of a node; held axes stand still.
+#[inline(always)]
+pub(crate) fn next_increment(
+    inertia: &NodeInertia,
+    increment: &NodeVector,
+    force: &NodeVector,
+    step: &Step,
+) -> [f32; 4] {
+    let [ix, iy, iz] = inertia.inverse;
+    let inverse = [ix, iy, iz, 0.0];
+    let mut next = [0.0; 4];
+    for (axis, value) in next.iter_mut().enumerate() {
+        let free = step.keep * increment.0[axis] + step.push * (inverse[axis] * force.0[axis]);
+        *value = if inverse[axis] > 0.0 { free } else { 0.0 };
+    }
+    next
+}
+
+/// The energies of one step ([`crate::ledger`]), J.
+pub(crate) struct Entry {
+    pub(crate) finite: bool,
+    pub(crate) kinetic: f64,
+    pub(crate) work: f64,
+}
+
+impl Entry {
+    /// Kinetic energy of the free axes and work of gravity.
+    pub(crate) fn of_nodes(
+        inertia: &[NodeInertia],
+        increment: &[NodeVector],
+        force: &[NodeVector],
+        loads: &Loads<'_>,
+        step: &Step,
+    ) -> Self {
+        let mut kinetic = [0.0f32; 4];
+        let mut momentum = [0.0f32; 4];
+        for ((inertia, increment), force) in inertia.iter().zip(increment).zip(force) {
+            let next = next_increment(inertia, increment, force, step);
+            let [ix, iy, iz] = inertia.inverse;
+            let free = [ix, iy, iz, 0.0];
+            for axis in 0..4 {
+                // A held axis has no inertia of its own: what moves it is counted as work.
+                let mean = 0.5 * (next[axis] + increment.0[axis]);
+                let (moving, led) = if free[axis] > 0.0 { (mean, mean) } else { (0.0, increment.0[axis]) };
+                kinetic[axis] += inertia.mass * moving * moving;
+                momentum[axis] += inertia.mass * led;
+            }
+        }
+        let dt = f64::from(step.dt);
+        let kinetic: f64 = kinetic.into_iter().map(f64::from).sum();
+        let gravity = loads.gravity().into_iter().zip(momentum);
+        Self {
+            finite: kinetic.is_finite(),
+            kinetic: 0.5 * kinetic / (dt * dt),
+            work: gravity.map(|(g, momentum)| f64::from(g) * f64::from(momentum)).sum(),
+        }
+    }
+
+    /// Work of the nodal forces.
+    pub(crate) fn with_forces(
+        mut self,
+        loads: &Loads<'_>,
+        inertia: &[NodeInertia],
+        increment: &[NodeVector],
+        force: &[NodeVector],
+        time: f64,
+        step: &Step,
+    ) -> Self {
+        for load in loads.forces() {
+            let node = load.node as usize;
+            let (Some(inertia), Some(increment), Some(force)) =
+                (inertia.get(node), increment.get(node), force.get(node))
+            else {
+                continue;
+            };
+            let next = next_increment(inertia, increment, force, step);
+            let factor = ramp_factor(time, load.ramp);
+            let mut work = 0.0;
+            for axis in 0..3 {
+                let mean = 0.5 * (next[axis] + increment.0[axis]);
+                work +=
+                    load.newton[axis] * if inertia.inverse[axis] > 0.0 { mean } else { increment.0[axis] };
+            }
+            self.work += f64::from(factor * work);
+        }
+        self
+    }
+
+    /// Work of the supports that move: what they exert is minus the total force on their node.
+    pub(crate) fn with_motions(
+        mut self,
+        loads: &Loads<'_>,
+        displacement: &[NodeVector],
+        increment: &[NodeVector],
+        force: &[NodeVector],
+        time: f64,
+        step: &Step,
+    ) -> Self {
+        for motion in loads.motions() {
+            let node = motion.node as usize;
+            let (Some(displacement), Some(increment), Some(force)) =
+                (displacement.get(node), increment.get(node), force.get(node))
+            else {
+                continue;
+            };
+            let factor = ramp_factor(time + f64::from(step.dt), motion.ramp);
+            for axis in 0..3 {
+                if motion.axes.has(axis) {
+                    let next = factor * motion.metre[axis] - displacement.0[axis];
+                    self.work -= f64::from(force.0[axis] * 0.5 * (next + increment.0[axis]));
+                }
+            }
+        }
+        self
+    }
+}
