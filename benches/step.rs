@@ -22,11 +22,6 @@ use supple::tled::{self, Step};
 const DT: f32 = 3e-5;
 const DAMPING: f32 = 20.0;
 const DENSITY: f32 = 1000.0;
-/// Floating-point operations per tetrahedron, counted in `src/tled/element.rs` and `src/material`:
-/// displacement gradient 54, minors and invariants 57, volume factor and response 55, stress 66, nodal
-/// forces 75; the exponential adds 20.
-const FLOPS: [f64; 2] = [307.0, 327.0];
-
 struct Ours<L> {
     scene: Scene<Tissue<L>, Vec<NodeInertia>, Vec<ElementBlock>>,
     state: State<Vec<NodeVector>>,
@@ -76,7 +71,7 @@ fn pairs(mut plain: impl FnMut(), mut ours: impl FnMut(), steps: usize) -> (f64,
     )
 }
 
-fn compare<L: Law>(criterion: &mut Criterion, name: &str, law: L, plain_law: plain::Law, flops: f64) {
+fn compare<L: Law>(criterion: &mut Criterion, name: &str, law: L, plain_law: plain::Law) {
     let bar = Bar::PAPER;
     let points: Vec<_> = bar.points().collect();
     let tets: Vec<_> = bar.tets().collect();
@@ -107,7 +102,7 @@ fn compare<L: Law>(criterion: &mut Criterion, name: &str, law: L, plain_law: pla
         pairs(|| (0..50).for_each(|_| plain.step(DT, DAMPING, 1.0)), || ours.run(50), 50);
     let (widest, baseline) = common::peak::peak();
     let per_tet = |seconds: f64| seconds * 1e9 / tets.len() as f64;
-    let speed = flops / per_tet(ours_s);
+    let speed = tled::operations(&ours.scene) as f64 / ours_s * 1e-9;
     println!(
         "{name}: plain {:.1} ns/tet, supple {:.1} ns/tet = {:.0} us a step, {ratio:.2} times faster; \
          {speed:.1} GFLOP/s = {:.0} % of the {widest:.0} GFLOP/s peak ({:.0} % of {baseline:.0} without AVX)",
@@ -126,14 +121,12 @@ fn main() {
         "exponential",
         Exponential { a: 59.0, b: 8.023, d: 60_000.0 },
         plain::Law::Exponential(59.0, 8.023, 60_000.0),
-        FLOPS[1],
     );
     compare(
         &mut criterion,
         "neo-Hookean",
         NeoHookean { c: 500.0, d: 15_000.0 },
         plain::Law::NeoHookean(500.0, 15_000.0),
-        FLOPS[0],
     );
     criterion.final_summary();
 }

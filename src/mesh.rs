@@ -219,21 +219,23 @@ impl Bar {
     #[must_use]
     pub const fn node_count(&self) -> usize {
         let [nx, ny, nz] = self.cells;
-        (nx as usize + 1) * (ny as usize + 1) * (nz as usize + 1)
+        let layer = (nx as usize).saturating_add(1).saturating_mul((ny as usize).saturating_add(1));
+        layer.saturating_mul((nz as usize).saturating_add(1))
     }
 
     /// Number of tetrahedra.
     #[must_use]
     pub const fn element_count(&self) -> usize {
         let [nx, ny, nz] = self.cells;
-        6 * nx as usize * ny as usize * nz as usize
+        (nx as usize).saturating_mul(ny as usize).saturating_mul(nz as usize).saturating_mul(6)
     }
 
-    /// Number of the node at grid planes `i, j, k`.
+    /// Number of the node at grid planes `i, j, k`; a bar of more than 2^32 nodes has no such numbers.
     #[must_use]
     pub const fn node(&self, i: u32, j: u32, k: u32) -> u32 {
         let [nx, ny, _] = self.cells;
-        i + (nx + 1) * (j + (ny + 1) * k)
+        let row = j.wrapping_add(ny.wrapping_add(1).wrapping_mul(k));
+        i.wrapping_add(nx.wrapping_add(1).wrapping_mul(row))
     }
 
     /// Node coordinates, m, in node order.

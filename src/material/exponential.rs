@@ -55,6 +55,8 @@ impl<R: Real> Potential<R> for Exponential<R> {
 impl Law for Exponential {
     type Wide<R: Real> = Exponential<R>;
 
+    const OPERATIONS: u32 = 32;
+
     #[inline(always)]
     fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Exponential<R> {
         Exponential {

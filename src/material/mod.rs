@@ -52,6 +52,9 @@ pub trait Law: Copy {
     /// Whether the energy is a function of `I1bar` (true) or, as the paper prints it, of `I1` (false).
     const ISOCHORIC: bool = true;
 
+    /// Floating-point operations of `W'(x)` and `U'(J)` for one element.
+    const OPERATIONS: u32;
+
     /// Lane `l` takes the constants of `at(l)`.
     fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Self::Wide<R>;
 
@@ -73,6 +76,8 @@ impl<L: Law> Law for Literal<L> {
     type Wide<R: Real> = L::Wide<R>;
 
     const ISOCHORIC: bool = false;
+
+    const OPERATIONS: u32 = L::OPERATIONS;
 
     #[inline(always)]
     fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Self::Wide<R> {
@@ -173,6 +178,12 @@ pub(crate) fn response<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>) -> 
         let slope = two * law.distortion_slope(at.i);
         Response { p1: slope, s: slope + law.volume_slope(at.j), saturation: law.saturation(at.i) }
     }
+}
+
+/// Floating-point operations of [`response`] for one element, those of the law included.
+pub(crate) const fn response_operations<L: Law>() -> u32 {
+    // Isochoric: 52 for `VolumeFactor::new`, 9 to combine.
+    L::OPERATIONS + if L::ISOCHORIC { 61 } else { 2 }
 }
 
 /// Energy density in float64, J/m^3, of a deformation with the given `I1 - 3` and `J - 1`.

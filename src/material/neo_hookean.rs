@@ -35,6 +35,8 @@ impl<R: Real> Potential<R> for NeoHookean<R> {
 impl Law for NeoHookean {
     type Wide<R: Real> = NeoHookean<R>;
 
+    const OPERATIONS: u32 = 2;
+
     #[inline(always)]
     fn widen<R: Real>(at: impl Fn(usize) -> Self) -> NeoHookean<R> {
         NeoHookean { c: R::from_fn(|lane| at(lane).c), d: R::from_fn(|lane| at(lane).d) }

@@ -244,6 +244,16 @@ where
     Status::Ok
 }
 
+/// Floating-point operations of one step without loads, the same for every step.
+#[must_use]
+pub fn operations<M: Material, N, B>(scene: &Scene<M, N, B>) -> u64 {
+    // Per node: twice the next increment of four components (3 each), kinetic energy and momentum (6 each),
+    // the new position (1 each).
+    const NODE: u64 = 4 * (2 * 3 + 6 + 1);
+    let element = u64::from(element::operations::<M::Law>());
+    scene.element_count() as u64 * element + scene.node_count() as u64 * NODE
+}
+
 /// Increments that spanned `from` seconds, for the same velocities, span `to`.
 fn span_increments(increment: &mut [NodeVector], from: f32, to: f32) {
     if from > 0.0 {
