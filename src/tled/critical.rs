@@ -134,11 +134,15 @@ where
 
     #[inline(always)]
     fn run<R: Real>(self) {
+        // The first three numbers of a node's inertia are its inverse masses.
+        let Some(inertia) = Gather::new(bytemuck::must_cast_slice(self.scene.inertia())) else {
+            return;
+        };
         for block in self.scene.blocks() {
             for first in (0..BLOCK).step_by(R::COUNT) {
                 let material = self.scene.material();
                 let law = M::Law::widen(|lane| material.law(block.element(first + lane)));
-                add_bounds::<R, M::Law>(&law, block, first, self.scene.inertia(), self.sums);
+                add_bounds::<R, M::Law>(&law, block, first, inertia, self.sums);
             }
         }
     }
@@ -152,7 +156,7 @@ fn add_bounds<R: Real, L: Law>(
     law: &L::Wide<R>,
     block: &ElementBlock,
     first: usize,
-    inertia: &[NodeInertia],
+    inertia: Gather<'_>,
     sums: &mut Sums<'_>,
 ) {
     let Some(displacement) = Gather::new(sums.zx_in_padding) else {
@@ -168,11 +172,8 @@ fn add_bounds<R: Real, L: Law>(
         gradients[0][axis] = -(gradients[1][axis] + gradients[2][axis] + gradients[3][axis]);
     }
     for (corner, gradient) in gradients.iter_mut().enumerate() {
-        let root = R::from_fn(|lane| {
-            let node = inertia.get(block.node(corner, first + lane)).copied().unwrap_or_default();
-            node.inverse.into_iter().fold(0.0, f32::max)
-        })
-        .sqrt();
+        let [x, y, z] = inertia.read_lanes::<R>(|lane| block.node(corner, first + lane));
+        let root = x.max(y).max(z).sqrt();
         *gradient = gradient.map(|component| component * root);
     }
     let images = gradients.map(|gradient| terms.images(&deformation, gradient));
@@ -296,7 +297,7 @@ impl<R: Real> Terms<R> {
                 e = e + deformation.distortion(i, j) * deformation.distortion(i, j);
             }
         }
-        let ratio = e.zip(c, |e, c| libm::sqrtf((e + 1e-12) / (c + 1e-12)));
+        let ratio = e.zip(c, |e, c| (e + 1e-12) / (c + 1e-12)).sqrt();
         Self {
             p1: two * slope * factor.g,
             p_j: law.volume_slope(at.j) + slope * factor.slope * i1,
