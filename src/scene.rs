@@ -313,8 +313,11 @@ impl<M: Material, N: AsRef<[NodeInertia]>, B: AsRef<[ElementBlock]>> Scene<M, N,
     /// Block and lane of each element, in the mesh's order.
     pub(crate) fn places(&self) -> impl Iterator<Item = (&ElementBlock, usize)> {
         let blocks = self.blocks();
-        (0..self.element_count)
-            .filter_map(|place| Some((blocks.get(place % blocks.len())?, place / blocks.len())))
+        (0..self.element_count).filter_map(|place| {
+            let lane = place.checked_div(blocks.len())?;
+            // The remainder tells the compiler what is so anyway: lanes are below BLOCK.
+            Some((blocks.get(place - lane * blocks.len())?, lane % BLOCK))
+        })
     }
 
     /// Mass of a node, kg; zero for a node that does not exist.
@@ -402,9 +405,8 @@ where
             }
             let fixed =
                 tet.iter().all(|&node| nodes.get(node as usize).is_some_and(|n| n.inverse == [FIXED; 3]));
-            let (block, lane) = (place % needed, place / needed);
-            if let (false, Some(block)) = (fixed, blocks.get_mut(block)) {
-                write_element(block, lane, element, tet, corners);
+            if let (false, Some(block)) = (fixed, blocks.get_mut(place % needed)) {
+                write_element(block, place / needed, element, tet, corners);
                 place += 1;
             }
         }
@@ -445,15 +447,20 @@ fn mark_supports(nodes: &mut [NodeInertia], supports: &[Support]) -> Result<(), 
 }
 
 fn write_element(block: &mut ElementBlock, lane: usize, element: usize, tet: [u32; 4], corners: [DVec3; 4]) {
+    fn set<T>(lanes: &mut [T; BLOCK], lane: usize, value: T) {
+        if let Some(place) = lanes.get_mut(lane) {
+            *place = value;
+        }
+    }
     let (slopes, volume) = gradients(corners);
     for (nodes, node) in block.nodes.iter_mut().zip(tet) {
-        nodes[lane] = node;
+        set(nodes, lane, node);
     }
     for (components, slope) in block.gradients.iter_mut().zip(slopes) {
         for (component, value) in components.iter_mut().zip(slope.to_array()) {
-            component[lane] = value as f32;
+            set(component, lane, value as f32);
         }
     }
-    block.volumes[lane] = volume as f32;
-    block.elements[lane] = element as u32;
+    set(&mut block.volumes, lane, volume as f32);
+    set(&mut block.elements, lane, element as u32);
 }
