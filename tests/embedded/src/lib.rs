@@ -1,0 +1,81 @@
+//! Every public path of the core behind C symbols, on data the compiler knows nothing about. The library
+//! built from this must link without std, and without `core::panicking`: what could panic would show.
+#![no_std]
+
+use supple::loads::{Loads, Motion, NodalForce, traction};
+use supple::material::{Exponential, Literal, NeoHookean, Tissue};
+use supple::mesh::{Bar, Mesh, Winding};
+use supple::scene::{FixedScene, Support};
+use supple::state::FixedState;
+use supple::tled::{self, Status, Step};
+
+type Scene<L> = FixedScene<Tissue<L>, 100, 20>;
+type State = FixedState<100>;
+
+/// Builds a scene in place.
+#[unsafe(no_mangle)]
+pub extern "C" fn build(
+    scene: &mut Scene<Exponential>,
+    points: &[[f32; 3]; 100],
+    tets: &[[u32; 4]; 300],
+    supports: &[Support; 9],
+    point_count: usize,
+    tet_count: usize,
+) -> i32 {
+    let (Some(points), Some(tets)) = (points.get(..point_count), tets.get(..tet_count)) else {
+        return -1;
+    };
+    let Ok(mesh) = Mesh::new(points, tets, Winding::Normalised) else {
+        return -2;
+    };
+    scene.build(&mesh, supports).map_or(-3, |()| 0)
+}
+
+/// The critical step, s.
+#[unsafe(no_mangle)]
+pub extern "C" fn critical(scene: &Scene<Exponential>, state: &mut State) -> f32 {
+    tled::critical_step(scene, state).map_or(0.0, |critical| critical.seconds)
+}
+
+/// Starts and takes a step.
+#[unsafe(no_mangle)]
+pub extern "C" fn step(
+    scene: &Scene<Exponential>,
+    state: &mut State,
+    forces: &[NodalForce; 10],
+    motions: &[Motion; 10],
+    start: &[[f32; 3]; 100],
+    seconds: f32,
+) -> i32 {
+    let Ok(loads) = Loads::new(scene, [0.0, 0.0, seconds], forces, motions) else {
+        return -1;
+    };
+    let Ok(step) = Step::insist(seconds, 1.0) else {
+        return -2;
+    };
+    tled::start(scene, state, &step, |node| (start.get(node).copied().unwrap_or_default(), [0.0; 3]));
+    match tled::step(scene, &loads, state, &step) {
+        Status::Ok => 0,
+        Status::Diverged(divergence) => divergence.node as i32,
+        _ => 1,
+    }
+}
+
+/// Element fields and energy.
+#[unsafe(no_mangle)]
+pub extern "C" fn fields(scene: &Scene<Literal<NeoHookean>>, state: &State) -> f64 {
+    let stresses = tled::element_fields(scene, state.displacements()).map(|fields| fields.von_mises);
+    stresses.sum::<f64>() + tled::strain_energy(scene, state)
+}
+
+/// Traction turned into forces.
+#[unsafe(no_mangle)]
+pub extern "C" fn pull(points: &[[f32; 3]; 100], triangles: &[[u32; 3]; 5]) -> f32 {
+    traction(points, triangles, [1.0; 3], 0.0).filter_map(Result::ok).map(|force| force.newton[0]).sum()
+}
+
+/// The structured bar.
+#[unsafe(no_mangle)]
+pub extern "C" fn bar(bar: &Bar) -> f32 {
+    bar.points().map(|[x, _, _]| x).sum::<f32>() + bar.tets().map(|[a, ..]| a as f32).sum::<f32>()
+}
