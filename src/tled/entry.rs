@@ -20,7 +20,7 @@ pub(crate) fn next_increment(
     let inverse = [ix, iy, iz, 0.0];
     let mut next = [0.0; 4];
     for (axis, value) in next.iter_mut().enumerate() {
-        let free = step.keep * increment.0[axis] + step.push * (inverse[axis] * force.0[axis]);
+        let free = step.keep * (step.carry * increment.0[axis]) + step.push * (inverse[axis] * force.0[axis]);
         *value = if inverse[axis] > 0.0 { free } else { 0.0 };
     }
     next
@@ -31,10 +31,12 @@ pub(crate) struct Entry {
     pub(crate) finite: bool,
     pub(crate) kinetic: f64,
     pub(crate) work: f64,
+    /// How far the work of supports depends on what they did between two steps.
+    pub(crate) jump: f64,
 }
 
 impl Entry {
-    /// Kinetic energy of the free axes and work of gravity.
+    /// Kinetic energy of the free axes, work of gravity, and of supports along what they moved last.
     pub(crate) fn of_nodes(
         inertia: &[NodeInertia],
         increment: &[NodeVector],
@@ -44,25 +46,35 @@ impl Entry {
     ) -> Self {
         let mut kinetic = [0.0f32; 4];
         let mut momentum = [0.0f32; 4];
+        let mut led = [0.0f32; 4];
         for ((inertia, increment), force) in inertia.iter().zip(increment).zip(force) {
             let next = next_increment(inertia, increment, force, step);
             let [ix, iy, iz] = inertia.inverse;
             let free = [ix, iy, iz, 0.0];
             for axis in 0..4 {
                 // A held axis has no inertia of its own: what moves it is counted as work.
-                let mean = 0.5 * (next[axis] + increment.0[axis]);
-                let (moving, led) = if free[axis] > 0.0 { (mean, mean) } else { (0.0, increment.0[axis]) };
+                let last = increment.0[axis];
+                let (moving, way, supported) = if free[axis] > 0.0 {
+                    (0.5 * (next[axis] + step.carry * last), 0.5 * (next[axis] + last), 0.0)
+                } else {
+                    (0.0, last, last)
+                };
                 kinetic[axis] += inertia.mass * moving * moving;
-                momentum[axis] += inertia.mass * led;
+                momentum[axis] += inertia.mass * way;
+                led[axis] += force.0[axis] * supported;
             }
         }
         let dt = f64::from(step.dt);
         let kinetic: f64 = kinetic.into_iter().map(f64::from).sum();
         let gravity = loads.gravity().into_iter().zip(momentum);
+        let gravity: f64 = gravity.map(|(g, momentum)| f64::from(g) * f64::from(momentum)).sum();
+        // What a support exerts is minus the total force on its node.
+        let supports: f64 = led.into_iter().map(f64::from).sum();
         Self {
             finite: kinetic.is_finite(),
             kinetic: 0.5 * kinetic / (dt * dt),
-            work: gravity.map(|(g, momentum)| f64::from(g) * f64::from(momentum)).sum(),
+            work: gravity - 0.5 * supports,
+            jump: 0.0,
         }
     }
 
@@ -87,16 +99,16 @@ impl Entry {
             let factor = ramp_factor(time, load.ramp);
             let mut work = 0.0;
             for axis in 0..3 {
-                let mean = 0.5 * (next[axis] + increment.0[axis]);
-                work +=
-                    load.newton[axis] * if inertia.inverse[axis] > 0.0 { mean } else { increment.0[axis] };
+                let last = increment.0[axis];
+                let way = if inertia.inverse[axis] > 0.0 { 0.5 * (next[axis] + last) } else { last };
+                work += load.newton[axis] * way;
             }
             self.work += f64::from(factor * work);
         }
         self
     }
 
-    /// Work of the supports that move: what they exert is minus the total force on their node.
+    /// Work of the supports along what they move next.
     pub(crate) fn with_motions(
         mut self,
         loads: &Loads<'_>,
@@ -117,7 +129,9 @@ impl Entry {
             for axis in 0..3 {
                 if motion.axes.has(axis) {
                     let next = factor * motion.metre[axis] - displacement.0[axis];
-                    self.work -= f64::from(force.0[axis] * 0.5 * (next + increment.0[axis]));
+                    let (force, last) = (f64::from(0.5 * force.0[axis]), increment.0[axis]);
+                    self.work -= force * f64::from(next);
+                    self.jump += force.abs() * f64::from((next - last).abs());
                 }
             }
         }

@@ -37,6 +37,11 @@ use entry::{Entry, next_increment};
 pub struct Step {
     dt: f32,
     damping: f32,
+    /// Seconds over which a force acts: the mean of the steps before and after it.
+    span: f32,
+    /// What the last increment would be had it spanned `dt`, over what it is.
+    carry: f32,
+    /// Factors of the carried increment and of force over mass.
     keep: f32,
     push: f32,
 }
@@ -101,8 +106,14 @@ impl Step {
         if !(damping.is_finite() && damping >= 0.0) {
             return Err(StepError::Damping { damping });
         }
-        let k = 0.5 * damping * dt;
-        Ok(Self { dt, damping, keep: (1.0 - k) / (1.0 + k), push: dt * dt / (1.0 + k) })
+        Ok(Self::after(dt, dt, damping))
+    }
+
+    /// Central differences with a step that changes: `v+ = v- + (h + dt) / 2 a` after a step of `h`.
+    fn after(h: f32, dt: f32, damping: f32) -> Self {
+        let span = 0.5 * (h + dt);
+        let k = 0.5 * damping * span;
+        Self { dt, damping, span, carry: dt / h, keep: (1.0 - k) / (1.0 + k), push: dt * span / (1.0 + k) }
     }
 
     /// The step, s.
@@ -119,13 +130,16 @@ impl Step {
 pub enum Status {
     /// The step was taken.
     Ok,
-    /// The step was taken, with some elements beyond the range of their law: squeezed below
-    /// [`J_FLOOR`] or stretched beyond the exponent cap, where the law goes on along its tangent.
+    /// The step was taken, but is not exact: some elements are beyond the range of their law (squeezed below
+    /// [`J_FLOOR`] or stretched beyond the exponent cap, where the law goes on along its tangent), or there
+    /// is more kinetic energy than the account explains ([`crate::Ledger`]).
     Limited {
         /// Smallest volume ratio of an element.
         least_volume_ratio: f32,
         /// Largest exponent over its cap; above 1 the cap was hit.
         saturation: f32,
+        /// Kinetic energy beyond the account, as a share of the most that was ever in it; zero if none.
+        energy_excess: f32,
     },
     /// The step was not taken and the state is as before.
     Diverged(Divergence),
@@ -155,11 +169,11 @@ pub struct Divergence {
 pub enum Cause {
     /// A displacement would not be a finite number.
     NotFinite,
-    /// There is more kinetic energy than loads and supports can have given.
+    /// There is several times more kinetic energy than loads and supports can have given.
     Energy {
         /// Kinetic energy, J.
         kinetic: f64,
-        /// What it may be, J.
+        /// The most that was ever in the energy account, J.
         available: f64,
     },
 }
@@ -171,7 +185,7 @@ impl fmt::Display for Divergence {
             Cause::NotFinite => write!(f, "its displacement is no longer a finite number"),
             Cause::Energy { kinetic, available } => write!(
                 f,
-                "kinetic energy {kinetic:.3e} J, but loads and supports account for {available:.3e} J only"
+                "kinetic energy {kinetic:.3e} J, but loads and supports never gave more than {available:.3e} J"
             ),
         }
     }
@@ -204,10 +218,13 @@ where
     if loads.nodes().is_some_and(|checked| checked != nodes) {
         return Status::Mismatch { nodes, room };
     }
-    if *dt != step.dt {
-        span_increments(increment, *dt, step.dt);
-        *dt = step.dt;
-    }
+    let changed;
+    let step = if *dt > 0.0 && *dt != step.dt {
+        changed = Step::after(*dt, step.dt, step.damping);
+        &changed
+    } else {
+        step
+    };
     if *steps == 0 {
         ledger.start = ledger.start.max(scene.releasable_energy());
     }
@@ -224,22 +241,24 @@ where
         let node = first_not_finite(inertia, increment, force, step);
         return Status::Diverged(Divergence { time: *time, node, cause: Cause::NotFinite });
     }
-    let dissipated = 2.0 * f64::from(step.damping) * entry.kinetic * f64::from(step.dt);
-    let Some(entered) = ledger.entered(entry.work, entry.kinetic, dissipated) else {
-        let cause =
-            Cause::Energy { kinetic: entry.kinetic, available: ledger.balance() + entry.work.max(0.0) };
+    let dissipated = 2.0 * f64::from(step.damping) * entry.kinetic * f64::from(step.span);
+    let entered = ledger.entered(entry.work, entry.jump, entry.kinetic, dissipated);
+    if entry.kinetic > entered.most() {
+        let cause = Cause::Energy { kinetic: entry.kinetic, available: entered.peak };
         let node = most_energetic(inertia, increment, force, step);
         return Status::Diverged(Divergence { time: *time, node, cause });
-    };
+    }
 
     *ledger = entered;
     advance(inertia, displacement, increment, force, step);
+    *dt = step.dt;
     *time += f64::from(step.dt);
     *steps += 1;
     follow_motions(loads, displacement, increment, *time);
-    if 1.0 + extremes.least_j < J_FLOOR || extremes.saturation > 1.0 {
-        let least_volume_ratio = 1.0 + extremes.least_j;
-        return Status::Limited { least_volume_ratio, saturation: extremes.saturation };
+    let least_volume_ratio = 1.0 + extremes.least_j;
+    let (saturation, energy_excess) = (extremes.saturation, ledger.excess() as f32);
+    if least_volume_ratio < J_FLOOR || saturation > 1.0 || energy_excess > 0.0 {
+        return Status::Limited { least_volume_ratio, saturation, energy_excess };
     }
     Status::Ok
 }
@@ -252,16 +271,6 @@ pub fn operations<M: Material, N, B>(scene: &Scene<M, N, B>) -> u64 {
     const NODE: u64 = 4 * (2 * 3 + 6 + 1);
     let element = u64::from(element::operations::<M::Law>());
     scene.element_count() as u64 * element + scene.node_count() as u64 * NODE
-}
-
-/// Increments that spanned `from` seconds, for the same velocities, span `to`.
-fn span_increments(increment: &mut [NodeVector], from: f32, to: f32) {
-    if from > 0.0 {
-        let ratio = to / from;
-        for vector in increment {
-            vector.0 = vector.0.map(|component| component * ratio);
-        }
-    }
 }
 
 /// Puts the scene at the displacement (m) and velocity (m/s) that `at` gives for each node, at time zero.
@@ -428,7 +437,8 @@ fn most_energetic(
     let mut most = (0.0, 0);
     for (node, ((inertia, increment), force)) in inertia.iter().zip(increment).zip(force).enumerate() {
         let next = next_increment(inertia, increment, force, step);
-        let square: f32 = next.iter().zip(increment.0).map(|(a, b)| (a + b) * (a + b)).sum();
+        let sums = next.iter().zip(increment.0).map(|(next, last)| next + step.carry * last);
+        let square: f32 = sums.map(|sum| sum * sum).sum();
         if inertia.mass * square > most.0 {
             most = (inertia.mass * square, node as u32);
         }

@@ -1,0 +1,213 @@
+//! What the tests of the physics share: bodies to simulate, the four laws with their float64 twins, and short
+//! ways to build a scene, put it into a state and read its forces.
+//!
+//! Several test crates say `mod support;` and none uses all of it, hence the `allow`.
+#![allow(dead_code, unreachable_pub, unused_imports, unused_macros)]
+
+pub mod bodies;
+
+pub use bodies::Body;
+
+use supple::loads::Loads;
+use supple::material::{Exponential, Law, Literal, Material, NeoHookean, Tissue};
+use supple::scene::{ElementBlock, NodeInertia, Scene, Support};
+use supple::state::{NodeVector, State};
+use supple::tled::{self, CriticalStep, Status, Step};
+
+use crate::reference;
+
+/// kg/m^3.
+pub const DENSITY: f32 = 1000.0;
+/// Neo-Hookean tissue of shear modulus 1 kPa and bulk modulus 50 kPa.
+pub const NEO: NeoHookean = NeoHookean { c: 500.0, d: 25_000.0 };
+/// The paper's exponential law, its constants read as kPa.
+pub const EXP: Exponential = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
+
+/// Runs a block once for each of both laws in both forms.
+#[macro_export]
+macro_rules! each_law {
+    ($law:ident => $block:block) => {{
+        {
+            let $law = $crate::support::NEO;
+            $block
+        }
+        {
+            let $law = supple::material::Literal($crate::support::NEO);
+            $block
+        }
+        {
+            let $law = $crate::support::EXP;
+            $block
+        }
+        {
+            let $law = supple::material::Literal($crate::support::EXP);
+            $block
+        }
+    }};
+}
+
+/// A law of the kernel that the reference knows as well.
+pub trait Judged: Law + Default + Send + Sync + 'static {
+    /// The same law in float64.
+    fn reference(&self) -> reference::Law;
+    /// For printing.
+    fn name(&self) -> &'static str {
+        match self.reference() {
+            reference::Law::NeoHookean { .. } => "neo-Hookean",
+            reference::Law::NeoHookeanLiteral { .. } => "neo-Hookean, literal",
+            reference::Law::Exponential { .. } => "exponential",
+            reference::Law::ExponentialLiteral { .. } => "exponential, literal",
+        }
+    }
+}
+
+impl Judged for NeoHookean {
+    fn reference(&self) -> reference::Law {
+        let (c, d) = (f64::from(self.c), f64::from(self.d));
+        reference::Law::NeoHookean { c, d }
+    }
+}
+
+impl Judged for Literal<NeoHookean> {
+    fn reference(&self) -> reference::Law {
+        let (c, d) = (f64::from(self.0.c), f64::from(self.0.d));
+        reference::Law::NeoHookeanLiteral { c, d }
+    }
+}
+
+impl Judged for Exponential {
+    fn reference(&self) -> reference::Law {
+        let [a, b, d] = [self.a, self.b, self.d].map(f64::from);
+        reference::Law::Exponential { a, b, d }
+    }
+}
+
+impl Judged for Literal<Exponential> {
+    fn reference(&self) -> reference::Law {
+        let [a, b, d] = [self.0.a, self.0.b, self.0.d].map(f64::from);
+        reference::Law::ExponentialLiteral { a, b, d }
+    }
+}
+
+/// A scene in vectors.
+pub type HostScene<M> = Scene<M, Vec<NodeInertia>, Vec<ElementBlock>>;
+/// A state in vectors.
+pub type HostState = State<Vec<NodeVector>>;
+
+/// A state at rest with room for `nodes` nodes.
+pub fn at_rest(nodes: usize) -> HostState {
+    let zeros = vec![NodeVector::ZERO; nodes];
+    State::over(zeros.clone(), zeros.clone(), zeros)
+}
+
+/// A state at rest for this scene.
+pub fn rest_of<M>(scene: &HostScene<M>) -> HostState {
+    at_rest(scene.node_count())
+}
+
+/// One tissue of [`DENSITY`].
+pub fn tissue<L>(law: L) -> Tissue<L> {
+    Tissue { law, density: DENSITY }
+}
+
+/// Supports that fix these nodes.
+pub fn fixed(nodes: &[u32]) -> Vec<Support> {
+    nodes.iter().copied().map(Support::fixed).collect()
+}
+
+/// The bound on the stable step at this state.
+pub fn bound<M: Material>(scene: &HostScene<M>, state: &HostState) -> CriticalStep {
+    tled::critical_step(scene, &mut state.clone()).expect("a finite state")
+}
+
+/// The scene standing still at displacements `u`, m.
+pub fn displaced<M: Material>(scene: &HostScene<M>, u: &[[f32; 3]]) -> HostState {
+    let mut state = rest_of(scene);
+    let step = Step::insist(1e-15, 0.0).unwrap();
+    assert!(tled::start(scene, &mut state, &step, |node| (u[node], [0.0; 3])));
+    state
+}
+
+/// Total force on each node at displacements `u` without loads, N: minus the internal force. Read from a step
+/// too short to move anything.
+pub fn forces<M: Material>(scene: &HostScene<M>, u: &[[f32; 3]]) -> Vec<[f64; 3]> {
+    let mut state = displaced(scene, u);
+    let step = Step::insist(1e-15, 0.0).unwrap();
+    let status = tled::step(scene, &Loads::NONE, &mut state, &step);
+    assert!(matches!(status, Status::Ok | Status::Limited { .. }), "{status:?}");
+    to_f64(state.forces())
+}
+
+/// Takes steps; a step that diverges fails the test.
+pub fn run<M: Material>(
+    scene: &HostScene<M>,
+    loads: &Loads<'_>,
+    state: &mut HostState,
+    step: &Step,
+    count: u64,
+) {
+    for _ in 0..count {
+        if let Status::Diverged(divergence) = tled::step(scene, loads, state, step) {
+            panic!("{divergence}");
+        }
+    }
+}
+
+/// Vectors of nodes in float64.
+pub fn to_f64(vectors: &[NodeVector]) -> Vec<[f64; 3]> {
+    vectors.iter().map(|vector| vector.to_array().map(f64::from)).collect()
+}
+
+/// Vectors rounded to float32.
+pub fn to_f32(vectors: &[[f64; 3]]) -> Vec<[f32; 3]> {
+    vectors.iter().map(|vector| vector.map(|component| component as f32)).collect()
+}
+
+/// Vectors of float32 in float64.
+pub fn widened(vectors: &[[f32; 3]]) -> Vec<[f64; 3]> {
+    vectors.iter().map(|vector| vector.map(f64::from)).collect()
+}
+
+/// The Euclidean norm over all nodes and axes.
+pub fn norm(vectors: &[[f64; 3]]) -> f64 {
+    vectors.iter().flatten().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// The norm of the sum: `forces` of the kernel are external less internal, those of the reference internal.
+pub fn norm_of_sum(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    let sums: Vec<_> = a.iter().zip(b).map(|(a, b)| [0, 1, 2].map(|axis| a[axis] + b[axis])).collect();
+    norm(&sums)
+}
+
+/// The largest distance between two nodes of the same number.
+pub fn largest_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let distance = |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
+    a.iter().zip(b).map(distance).fold(0.0, f64::max)
+}
+
+/// The largest length.
+pub fn largest(vectors: &[[f64; 3]]) -> f64 {
+    largest_distance(vectors, &vec![[0.0; 3]; vectors.len()])
+}
+
+/// Everything that a step may change apart from the forces it saw, bit for bit.
+pub fn bits(state: &HostState) -> Vec<u64> {
+    let nodes = state.displacements().iter().enumerate();
+    let moving = nodes.flat_map(|(node, u)| [u.to_array(), state.velocity(node)].into_iter().flatten());
+    let ledger = state.ledger();
+    let account = [
+        state.time(),
+        ledger.start,
+        ledger.work,
+        ledger.dissipated,
+        ledger.kinetic,
+        ledger.uncertainty,
+        ledger.peak,
+    ];
+    moving
+        .map(|component| u64::from(component.to_bits()))
+        .chain(account.map(f64::to_bits))
+        .chain([state.steps()])
+        .collect()
+}
