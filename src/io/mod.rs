@@ -68,6 +68,11 @@ pub fn read_mesh(path: &Path) -> Result<TetMesh, ReadError> {
     Ok(mesh)
 }
 
+/// Reads a Gmsh `.msh` mesh from memory; `name` stands for the file in errors.
+pub fn parse_msh(name: &Path, bytes: &[u8]) -> Result<TetMesh, ReadError> {
+    gmsh::read(bytes).map_err(|fault| fault.in_file(name))
+}
+
 fn parse<T>(path: &Path, parse: impl FnOnce(&[u8]) -> Result<T, Fault>) -> Result<T, ReadError> {
     let bytes = std::fs::read(path).map_err(|source| ReadError::Unreadable { path: path.into(), source })?;
     parse(&bytes).map_err(|fault| fault.in_file(path))

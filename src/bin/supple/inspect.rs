@@ -1,0 +1,203 @@
+//! `supple inspect`: what a mesh or a scene is like before any time passes. A mesh with faults is looked at
+//! in full: every kind of fault is counted and its first element or node named.
+
+use std::path::Path;
+use std::time::Instant;
+
+use supple::loads::Loads;
+use supple::material::Material;
+use supple::mesh::{DEGENERATE, Winding};
+use supple::tled::{self, Step};
+
+use crate::prepare::{Body, Job, Setup, extent, volume};
+use crate::run;
+use crate::scene_file::{Problem, SceneFile};
+
+pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
+        let setup = Setup::read(&SceneFile::read(path)?)?;
+        mesh(&setup.body)?;
+        for warning in &setup.warnings {
+            println!("warning: {warning}");
+        }
+        return setup.with_material(Cost { setup: &setup });
+    }
+    mesh(&Body::read(path, 1.0, Winding::Checked)?)
+}
+
+fn row(name: &str, value: impl std::fmt::Display) {
+    println!("{name:<21} {value}");
+}
+
+/// Prints what the mesh is like; an unusable one is a problem.
+fn mesh(body: &Body) -> Result<(), Problem> {
+    let mesh = &body.mesh;
+    row("mesh", &body.name);
+    row("nodes", mesh.points.len());
+    row("tetrahedra", mesh.tets.len());
+    row("boundary triangles", body.boundary().len());
+    if !mesh.regions.is_empty() {
+        let mut tags = mesh.regions.clone();
+        tags.sort_unstable();
+        tags.dedup();
+        let counts = tags
+            .iter()
+            .map(|tag| format!("{tag} ({} tetrahedra)", mesh.regions.iter().filter(|t| *t == tag).count()));
+        row("region tags", counts.collect::<Vec<_>>().join(", "));
+    }
+    let (low, high) = extent(&mesh.points);
+    let size = [0, 1, 2].map(|axis| 1e3 * (high[axis] - low[axis]));
+    row("size", format!("{:.3} x {:.3} x {:.3} mm, if one unit is a metre", size[0], size[1], size[2]));
+
+    let mut faults = Faults::default();
+    let (mut total, mut ratios, mut shortest, mut longest) = (0.0, vec![], f64::INFINITY, 0.0f64);
+    let mut used = vec![false; mesh.points.len()];
+    for (element, tet) in mesh.tets.iter().enumerate() {
+        let corners = tet.map(|node| mesh.points[node as usize]);
+        for (k, node) in tet.iter().enumerate() {
+            used[*node as usize] = true;
+            if tet[..k].contains(node) {
+                faults.add("with a repeated node", "element", element, format!("node {node}"));
+            }
+        }
+        let edges = edges(corners);
+        let (least, most) =
+            edges.iter().fold((f64::INFINITY, 0.0f64), |(a, b), edge| (a.min(*edge), b.max(*edge)));
+        (shortest, longest) = (shortest.min(least), longest.max(most));
+        let signed = volume(corners);
+        total += signed.abs();
+        if signed.abs() < DEGENERATE * most.powi(3) || signed == 0.0 || signed.is_nan() {
+            faults.add("degenerate", "element", element, format!("volume {signed:.2e} m^3"));
+        } else if signed < 0.0 && body.winding == Winding::Checked {
+            faults.add("inverted", "element", element, format!("volume {signed:.2e} m^3"));
+        }
+        ratios.push(radius_ratio(corners, signed.abs()));
+    }
+    for (node, point) in mesh.points.iter().enumerate() {
+        if point.iter().any(|component| !component.is_finite()) {
+            faults.add("not finite", "node", node, format!("{point:?}"));
+        }
+        if !used[node] {
+            faults.add("in no element", "node", node, format!("at {point:?}"));
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    row("volume", format!("{:.3} ml", total * 1e6));
+    row("edges", format!("{:.3} to {:.3} mm", 1e3 * shortest, 1e3 * longest));
+    row(
+        "radius ratio",
+        format!(
+            "least {:.3}, median {:.3} (1 is a regular tetrahedron)",
+            ratios[0],
+            ratios[ratios.len() / 2]
+        ),
+    );
+    faults.tell(body)
+}
+
+/// Kinds of fault: what, how many, the first.
+#[derive(Default)]
+struct Faults(Vec<(&'static str, &'static str, usize, String)>);
+
+impl Faults {
+    fn add(&mut self, kind: &'static str, thing: &'static str, index: usize, value: String) {
+        match self.0.iter_mut().find(|fault| fault.0 == kind) {
+            Some(fault) => fault.2 += 1,
+            None => self.0.push((kind, thing, 1, format!("{thing} {index} ({value})"))),
+        }
+    }
+
+    fn tell(self, body: &Body) -> Result<(), Problem> {
+        if self.0.is_empty() {
+            row("verdict", "sound");
+            return Ok(());
+        }
+        let said: Vec<_> = self
+            .0
+            .iter()
+            .map(|(kind, thing, count, first)| {
+                format!("{count} {thing}{} {kind}, first {first}", if *count > 1 { "s" } else { "" })
+            })
+            .collect();
+        Err(Problem(format!("{}: not usable as it is: {}", body.name, said.join("; "))))
+    }
+}
+
+fn edges(corners: [[f64; 3]; 4]) -> [f64; 6] {
+    [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
+        .map(|(a, b)| (0..3).map(|axis| (corners[a][axis] - corners[b][axis]).powi(2)).sum::<f64>().sqrt())
+}
+
+/// Three times inscribed over circumscribed radius.
+fn radius_ratio(corners: [[f64; 3]; 4], volume: f64) -> f64 {
+    let area = |a: usize, b: usize, c: usize| {
+        let side = |p: usize, q: usize| [0, 1, 2].map(|axis| corners[q][axis] - corners[p][axis]);
+        let (u, v) = (side(a, b), side(a, c));
+        let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        0.5 * n.iter().map(|component| component * component).sum::<f64>().sqrt()
+    };
+    let surface = area(1, 2, 3) + area(0, 2, 3) + area(0, 1, 3) + area(0, 1, 2);
+    // Circumscribed radius from products of opposite edges (Crelle).
+    let [e01, e02, e03, e12, e13, e23] = edges(corners);
+    let (p, q, r) = (e01 * e23, e02 * e13, e03 * e12);
+    let product = (p + q + r) * (p + q - r) * (p - q + r) * (-p + q + r);
+    if surface > 0.0 && product > 0.0 { 9.0 * volume / surface * 24.0 * volume / product.sqrt() } else { 0.0 }
+}
+
+/// Critical step, memory and cost of a scene.
+struct Cost<'a> {
+    setup: &'a Setup,
+}
+
+impl Job for Cost<'_> {
+    type Output = Result<(), Problem>;
+
+    fn run<M: Material>(self, material: M) -> Self::Output {
+        let setup = self.setup;
+        let (scene, mut state) = setup.build(material)?;
+        row("material", setup.describe_material());
+        row("mass", format!("{:.3} g", 1e3 * scene.mass()));
+        row("elements left out", setup.body.mesh.tets.len() - scene.element_count());
+        let bound = run::critical(&scene, &mut state)?;
+        row(
+            "critical step",
+            format!("{:.4e} s at rest, which node {} sets (a bound, safe)", bound.seconds, bound.node),
+        );
+        match tled::exact_critical_step(&scene, state.displacements()) {
+            Some(exact) => row(
+                "exact limit",
+                format!("{exact:.4e} s at rest; the bound is {:.2} of it", f64::from(bound.seconds) / exact),
+            ),
+            None => row("exact limit", "not found: the iteration did not settle"),
+        }
+        let step = run::first_step(setup, bound, false);
+        let loads = Loads::new(&scene, setup.gravity, &setup.forces, &setup.motions)
+            .map_err(|error| Problem(error.to_string()))?;
+        let bytes = scene.node_count()
+            * (size_of::<supple::scene::NodeInertia>() + 3 * size_of::<supple::state::NodeVector>())
+            + supple::scene::blocks_for(scene.element_count()) * size_of::<supple::scene::ElementBlock>();
+        row("memory", format!("{:.1} kB", bytes as f64 * 1e-3));
+        let operations = tled::operations(&scene);
+        row("operations per step", format!("{operations} floating-point operations"));
+        let measured =
+            Step::insist(0.5 * bound.seconds, setup.damping).map_err(|error| Problem(error.to_string()))?;
+        const STEPS: u32 = 300;
+        let start = Instant::now();
+        for _ in 0..STEPS {
+            // Only the time counts here; what becomes of the motion is for `simulate`.
+            let _ = tled::step(&scene, &loads, &mut state, &measured);
+        }
+        let seconds = start.elapsed().as_secs_f64() / f64::from(STEPS);
+        row(
+            "time per step",
+            format!(
+                "{:.1} us here and now, {:.1} GFLOP/s",
+                1e6 * seconds,
+                operations as f64 / seconds * 1e-9
+            ),
+        );
+        let wanted = step.as_ref().map_or(f64::from(bound.seconds), |step| f64::from(step.seconds()));
+        row("real-time factor", format!("{:.3} at {wanted:.3e} s a step", wanted / seconds));
+        step.map(|_| ())
+    }
+}

@@ -1,0 +1,75 @@
+//! The command `supple`: simulate a scene, inspect a mesh or a scene, show what the kernel does.
+//!
+//! Exit codes: 0 as asked, 2 the input is not usable, 3 the simulation diverged.
+
+mod demo;
+mod inspect;
+mod picture;
+mod prepare;
+mod report;
+mod run;
+mod scene_file;
+mod simulate;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use simulate::End;
+
+/// Moves soft tissue: total Lagrangian explicit dynamics on tetrahedral meshes.
+#[derive(Parser)]
+#[command(version, about)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Simulate a scene: frames for ParaView, final.csv and summary.json
+    Simulate {
+        /// The scene, a TOML file
+        scene: PathBuf,
+        /// Folder for the results
+        #[arg(long)]
+        out: PathBuf,
+        /// Overwrite the results in a folder that is there
+        #[arg(long)]
+        force: bool,
+        /// Take a step above the critical one all the same
+        #[arg(long)]
+        insist: bool,
+    },
+    /// Look at a mesh or a scene: sizes, quality, critical step, memory, cost
+    Inspect {
+        /// A mesh (.vtk, .vtu, .msh, .node, .ele) or a scene (.toml)
+        file: PathBuf,
+    },
+    /// A liver lobe under its own weight and a push, with a table and a picture
+    Demo {
+        /// Folder for frames and picture; results of an earlier demo are overwritten
+        #[arg(long, default_value = "out/demo")]
+        out: PathBuf,
+    },
+}
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().command {
+        Command::Simulate { scene, out, force, insist } => simulate::simulate(&scene, &out, force, insist),
+        Command::Inspect { file } => inspect::inspect(&file).map(|()| End::Reached),
+        Command::Demo { out } => demo::demo(&out),
+    };
+    match done {
+        Ok(End::Reached) => ExitCode::SUCCESS,
+        Ok(End::Diverged(sentence)) => {
+            eprintln!("error: the simulation {sentence}; the results end before that");
+            ExitCode::from(3)
+        }
+        Err(problem) => {
+            eprintln!("error: {problem}");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! What a simulation leaves behind: frames for ParaView, `final.csv`, `summary.json`, and a table on the
+//! screen. People read millimetres and percent; files hold SI units unless their names say otherwise.
+
+use std::fmt::Write as _;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+use supple::io::{Frame, write_atomically, write_pvd, write_vtu};
+use supple::material::Material;
+use supple::tled;
+
+use crate::prepare::{Body, HostScene, HostState, Setup, volume};
+use crate::run::Outcome;
+use crate::scene_file::Problem;
+
+/// The folder of a simulation's results.
+pub(crate) struct Folder {
+    path: PathBuf,
+    frames: Vec<(f64, String)>,
+}
+
+/// Figures of the state a simulation ended in.
+pub(crate) struct Figures {
+    /// Total volume now over volume at rest, less one.
+    pub(crate) volume_change: f64,
+    pub(crate) least_volume_ratio: f64,
+    pub(crate) max_displacement: f64,
+    pub(crate) max_node: usize,
+    pub(crate) strain_energy: f64,
+}
+
+impl Folder {
+    /// Makes the folder; one that is there is left alone unless `force`.
+    pub(crate) fn create(path: &Path, force: bool) -> Result<Self, Problem> {
+        if path.exists() && !force {
+            return Err(Problem(format!(
+                "{}: is there already; --force overwrites the results in it",
+                path.display()
+            )));
+        }
+        std::fs::create_dir_all(path).map_err(|error| cannot_write(path, &error))?;
+        let folder = Self { path: path.to_path_buf(), frames: vec![] };
+        folder.remove_old_frames().map_err(|error| cannot_write(path, &error))?;
+        Ok(folder)
+    }
+
+    /// Frames of an earlier run would mix with ours; nothing else is touched.
+    fn remove_old_frames(&self) -> io::Result<()> {
+        for entry in std::fs::read_dir(&self.path)? {
+            let path = entry?.path();
+            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+            let number = name.strip_prefix("frame_").and_then(|rest| rest.strip_suffix(".vtu"));
+            if number.is_some_and(|number| number.parse::<u32>().is_ok()) {
+                std::fs::remove_file(path)?;
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// Adds a frame: displacement (m), velocity (m/s), von Mises stress (Pa), volume ratio J.
+    pub(crate) fn add_frame<M: Material>(
+        &mut self,
+        body: &Body,
+        scene: &HostScene<M>,
+        state: &HostState,
+    ) -> Result<(), Problem> {
+        let displacement: Vec<_> = state.displacements().iter().map(|vector| vector.to_array()).collect();
+        let velocity: Vec<_> = (0..displacement.len()).map(|node| state.velocity(node)).collect();
+        // Elements that were left out have four fixed nodes: no stress, no change of volume.
+        let mut von_mises = vec![0.0; body.mesh.tets.len()];
+        let mut volume_ratio = vec![1.0; body.mesh.tets.len()];
+        for fields in tled::element_fields(scene, state.displacements()) {
+            von_mises[fields.element] = fields.von_mises as f32;
+            volume_ratio[fields.element] = fields.volume_ratio as f32;
+        }
+        let name = format!("frame_{:04}.vtu", self.frames.len());
+        let frame = Frame {
+            points: &body.mesh.points,
+            tets: &body.mesh.tets,
+            point_vectors: &[("displacement", &displacement), ("velocity", &velocity)],
+            point_scalars: &[],
+            cell_scalars: &[("von_mises", &von_mises), ("volume_ratio", &volume_ratio)],
+        };
+        let path = self.path(&name);
+        write_vtu(&path, &frame).map_err(|error| cannot_write(&path, &error))?;
+        self.frames.push((state.time(), name));
+        // Always complete, so that a look while the simulation runs finds the frames there are.
+        let path = self.path("frames.pvd");
+        write_pvd(&path, &self.frames).map_err(|error| cannot_write(&path, &error))
+    }
+
+    /// Positions at rest and displacements of all nodes, m.
+    pub(crate) fn write_final(&self, body: &Body, state: &HostState) -> Result<(), Problem> {
+        let mut text = String::from("node,x,y,z,ux,uy,uz\n");
+        for (node, (point, vector)) in body.mesh.points.iter().zip(state.displacements()).enumerate() {
+            let ([x, y, z], [ux, uy, uz]) = (point, vector.to_array());
+            // Writing to a string does not fail.
+            let _ = writeln!(text, "{node},{x},{y},{z},{ux},{uy},{uz}");
+        }
+        self.write_text("final.csv", &text)
+    }
+
+    pub(crate) fn write_summary(&self, summary: &Value) -> Result<(), Problem> {
+        self.write_text("summary.json", &format!("{summary:#}\n"))
+    }
+
+    pub(crate) fn write_text(&self, name: &str, text: &str) -> Result<(), Problem> {
+        let path = self.path(name);
+        write_atomically(&path, |out| out.write_all(text.as_bytes()))
+            .map_err(|error| cannot_write(&path, &error))
+    }
+}
+
+fn cannot_write(path: &Path, error: &io::Error) -> Problem {
+    Problem(format!("{}: cannot be written: {error}", path.display()))
+}
+
+impl Figures {
+    pub(crate) fn new<M: Material>(body: &Body, scene: &HostScene<M>, state: &HostState) -> Self {
+        let displacements = state.displacements();
+        let moved = |node: u32| {
+            let (point, vector) = (body.mesh.points[node as usize], displacements[node as usize].to_array());
+            [0, 1, 2].map(|axis| point[axis] + f64::from(vector[axis]))
+        };
+        let tets = &body.mesh.tets;
+        // Magnitudes at rest: the winding may have been normalised.
+        let rest: f64 =
+            tets.iter().map(|tet| volume(tet.map(|node| body.mesh.points[node as usize])).abs()).sum();
+        let now: f64 = tets
+            .iter()
+            .map(|tet| {
+                let sign = volume(tet.map(|node| body.mesh.points[node as usize])).signum();
+                sign * volume(tet.map(moved))
+            })
+            .sum();
+        let ratios = tled::element_fields(scene, displacements).map(|fields| fields.volume_ratio);
+        let length =
+            |node: usize| displacements[node].to_array().iter().map(|c| f64::from(c * c)).sum::<f64>().sqrt();
+        let furthest = (0..displacements.len()).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
+        Self {
+            volume_change: now / rest - 1.0,
+            least_volume_ratio: ratios.fold(f64::INFINITY, f64::min),
+            max_displacement: length(furthest),
+            max_node: furthest,
+            strain_energy: tled::strain_energy(scene, state),
+        }
+    }
+}
+
+/// Microseconds a step, and simulated seconds per second spent.
+pub(crate) fn speed(state: &HostState, outcome: &Outcome) -> (f64, f64) {
+    let spent = outcome.spent.as_secs_f64().max(1e-9);
+    (spent * 1e6 / state.steps().max(1) as f64, state.time() / spent)
+}
+
+/// What is not as it should be, in sentences.
+pub(crate) fn warnings(setup: &Setup, outcome: &Outcome) -> Vec<String> {
+    let mut warnings = setup.warnings.clone();
+    if let Some(time) = outcome.above_from {
+        warnings.push(format!(
+            "from {time:.3} s on the step was above the stable {:.3e} s, as the tissue had stiffened; shorten it or write step = \"auto\"",
+            outcome.least.0.seconds
+        ));
+    }
+    let limits = outcome.limits;
+    if limits.steps > 0 {
+        let mut causes = vec![];
+        if limits.least_volume_ratio < supple::material::J_FLOOR {
+            causes.push(format!("an element was squeezed to {:.3} of its volume", limits.least_volume_ratio));
+        }
+        if limits.saturation > 1.0 {
+            causes.push(format!("an exponent reached {:.2} times its cap", limits.saturation));
+        }
+        if limits.energy_excess > 0.0 {
+            causes.push(format!(
+                "kinetic energy exceeded the account by {:.0} %",
+                100.0 * limits.energy_excess
+            ));
+        }
+        warnings.push(format!(
+            "{} steps, the first at {:.3} s, were taken but are not exact: {}",
+            limits.steps,
+            limits.first_time,
+            causes.join(", ")
+        ));
+    }
+    warnings
+}
+
+/// A float32 as a person wrote it: 3e-5, not 2.9999999242136255e-5.
+fn decimal(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or(f64::from(value))
+}
+
+/// `summary.json`.
+pub(crate) fn summary<M: Material>(
+    setup: &Setup,
+    scene: &HostScene<M>,
+    state: &HostState,
+    outcome: &Outcome,
+    figures: &Figures,
+) -> Value {
+    let (us_per_step, real_time_factor) = speed(state, outcome);
+    let (status, sentence) = match (&outcome.divergence, outcome.limits.steps) {
+        (Some(divergence), _) => ("diverged", Some(divergence.to_string())),
+        (None, 0) => ("ok", None),
+        (None, _) => ("limited", None),
+    };
+    let ledger = state.ledger();
+    json!({
+        "status": status,
+        "divergence": outcome.divergence.map(|divergence| json!({
+            "time_s": divergence.time, "node": divergence.node, "sentence": sentence,
+        })),
+        "method": "tled",
+        "mesh": setup.body.name,
+        "material": setup.describe_material(),
+        "nodes": scene.node_count(),
+        "elements": setup.body.mesh.tets.len(),
+        "elements_left_out": setup.body.mesh.tets.len() - scene.element_count(),
+        "mass_kg": scene.mass(),
+        "damping_per_s": decimal(setup.damping),
+        "steps": state.steps(),
+        "step_shortest_s": decimal(outcome.steps.0),
+        "step_longest_s": decimal(outcome.steps.1),
+        "critical_step_at_rest_s": decimal(outcome.at_rest.seconds),
+        "critical_step_least_s": decimal(outcome.least.0.seconds),
+        "critical_step_least_at_s": outcome.least.1,
+        "end_s": setup.end,
+        "time_s": state.time(),
+        "us_per_step": us_per_step,
+        "real_time_factor": real_time_factor,
+        "volume_change_percent": 100.0 * figures.volume_change,
+        "least_volume_ratio": figures.least_volume_ratio,
+        "max_displacement_mm": 1e3 * figures.max_displacement,
+        "max_displacement_node": figures.max_node,
+        "energy_j": {
+            "work": ledger.work, "dissipated": ledger.dissipated,
+            "kinetic": ledger.kinetic, "strain": figures.strain_energy,
+        },
+        "steps_limited": outcome.limits.steps,
+        "warnings": warnings(setup, outcome),
+    })
+}
+
+/// The table on the screen.
+pub(crate) fn table<M: Material>(
+    setup: &Setup,
+    scene: &HostScene<M>,
+    state: &HostState,
+    outcome: &Outcome,
+    figures: &Figures,
+) -> String {
+    let (us, factor) = speed(state, outcome);
+    let (shortest, longest) = outcome.steps;
+    let steps = if shortest == longest {
+        format!("{longest:.3e} s")
+    } else {
+        format!("{shortest:.3e} to {longest:.3e} s")
+    };
+    let rows = [
+        (
+            "mesh",
+            format!(
+                "{}: {} nodes, {} tetrahedra, {:.1} g",
+                setup.body.name,
+                scene.node_count(),
+                setup.body.mesh.tets.len(),
+                1e3 * scene.mass()
+            ),
+        ),
+        ("material", setup.describe_material()),
+        (
+            "step",
+            format!(
+                "{steps}; stable at rest {:.3e} s, least on the way {:.3e} s",
+                outcome.at_rest.seconds, outcome.least.0.seconds
+            ),
+        ),
+        ("simulated", format!("{:.3} s in {} steps", state.time(), state.steps())),
+        ("time per step", format!("{us:.1} us")),
+        ("real-time factor", format!("{factor:.3} (1 and more is real time)")),
+        (
+            "volume change",
+            format!(
+                "{:+.3} % (smallest element {:.3} of its volume)",
+                100.0 * figures.volume_change,
+                figures.least_volume_ratio
+            ),
+        ),
+        (
+            "maximum displacement",
+            format!("{:.3} mm at node {}", 1e3 * figures.max_displacement, figures.max_node),
+        ),
+    ];
+    rows.iter().fold(String::new(), |text, (name, value)| text + &format!("{name:<21} {value}\n"))
+}

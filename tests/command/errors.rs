@@ -1,0 +1,162 @@
+//! Everything a person can get wrong has a sentence of its own that names the file, the line and the value,
+//! and exit code 2.
+
+use super::{Desk, bar};
+
+const FIX: &str = "[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n";
+const TIME: &str = "[time]\nstep = \"auto\"\nend = 0.001\n";
+
+#[test]
+fn bad_scenes_are_refused_in_words() {
+    let whole = bar(&format!("{FIX}{TIME}"));
+    let with = |more: &str| bar(&format!("{FIX}{more}{TIME}"));
+    let instead = |old: &str, new: &str| {
+        assert!(whole.contains(old), "{old}");
+        whole.replace(old, new)
+    };
+    let cases: &[(String, &str)] = &[
+        ("damping = ".into(), "scene.toml, line 1:"),
+        (instead("damping", "dampening"), "line 1: unknown field `dampening`"),
+        (instead("density = 1000.0", "density = 1000.0\ndensty = 1.0"), "line 11: unknown field `densty`"),
+        (instead("damping = 20.0", "damping = -1.0"), "line 1: damping is -1 1/s"),
+        (instead("shape = \"bar\"", "shape = \"cone\""), "line 3: shape \"cone\" is not known"),
+        (instead("shape = \"bar\"", "shape = \"bar\"\nfile = \"a.vtk\""), "both a file and a shape"),
+        (instead("shape = \"bar\"", ""), "[mesh] needs a file or a shape"),
+        (instead("cells = [2, 2, 5]", ""), "a bar needs size"),
+        (instead("cells = [2, 2, 5]", "cells = [2, 0, 5]"), "line 5: cells are [2, 0, 5]"),
+        (instead("size = [0.02, 0.02, 0.05]", "size = [0.02, -0.02, 0.05]"), "line 4: size holds -0.02 m"),
+        (instead("shape = \"bar\"\nsize", "shape = \"bar\"\nscale = 0.0\nsize"), "line 4: scale is 0"),
+        (
+            instead("shape = \"bar\"\nsize = [0.02, 0.02, 0.05]\ncells = [2, 2, 5]", "file = \"no.vtk\""),
+            "no.vtk",
+        ),
+        (
+            instead("shape = \"bar\"\nsize = [0.02, 0.02, 0.05]\ncells = [2, 2, 5]", "file = \"mesh.obj\""),
+            "mesh.obj",
+        ),
+        (instead("shape = \"bar\"", "winding = \"left\"\nshape = \"bar\""), "winding \"left\" is not known"),
+        (instead("neo-hookean", "hooke"), "law \"hooke\" is not known"),
+        (instead("c = 500.0\n", ""), "line 6: the law neo-hookean needs c"),
+        (instead("c = 500.0", "c = 500.0\na = 1.0"), "the law neo-hookean has no constant a"),
+        (instead("c = 500.0", "c = -500.0"), "c is -500, it must be a positive number"),
+        (instead("density = 1000.0", "density = nan"), "density is NaN"),
+        (with("[[fix]]\nplane = { axis = \"w\", at = 0.0 }\n"), "unknown variant `w`"),
+        (
+            with("[[fix]]\nplane = { axis = \"x\", at = 0.5 }\n"),
+            "line 13: this selects no node; the mesh reaches from [0.0, 0.0, 0.0] to [20.0, 20.0, 50.0] mm",
+        ),
+        (with("[[fix]]\nnodes = [54]\n"), "line 13: node 54 does not exist, the mesh has nodes 0 to 53"),
+        (with("[[fix]]\nnodes = []\n"), "this selects no node"),
+        (with("[[fix]]\naxes = \"z\"\n"), "give exactly one of nodes, plane and box"),
+        (with("[[fix]]\nnodes = [1]\naxes = \"xq\"\n"), "axes holds 'q'"),
+        (with("[[fix]]\nnodes = [1]\naxes = \"\"\n"), "axes is empty"),
+        (with("[[force]]\nnodes = [50]\nnewton = [0.0, inf, 0.0]\n"), "line 13: newton holds inf"),
+        (with("[[force]]\nnodes = [50]\nnewton = [0.0, 1.0]\n"), "line 15:"),
+        (with("[[force]]\nnodes = [50]\nnewton = [0.0, 1.0, 0.0]\nramp = -1.0\n"), "line 13: ramp is -1 s"),
+        (with("[[move]]\nnodes = [50]\nmetre = [0.0, nan, 0.0]\n"), "metre holds NaN"),
+        (with("[[traction]]\nnodes = [50, 51]\npascal = [0.0, 0.0, 1.0]\n"), "no boundary triangle"),
+        (with("[[region]]\ntags = [3]\nc = 1.0\n"), "this region selects no element"),
+        (
+            with("[[region]]\nplane = { axis = \"z\", at = 0.0 }\nb = 1.0\n"),
+            "the law neo-hookean has no constant b",
+        ),
+        (
+            with(
+                "[[force]]\nnodes = [50]\nnewton = [0.0, 0.0, 0.0]\ngravity = [0.0, 0.0, 1.0]\n[[fix]]\nnodes = [1]\ngravity = [1.0, 0.0, 0.0]\n",
+            ),
+            "gravity is given twice",
+        ),
+        (with("[surrogate]\nweights = \"w\"\n"), "the learned step ([surrogate]) is not in this version"),
+        (instead("step = \"auto\"", "step = \"often\""), "step \"often\" is not known"),
+        (instead("step = \"auto\"", "step = 0.0"), "step is 0 s"),
+        (instead("step = \"auto\"", "step = 1.0"), "is longer than the end"),
+        (instead("end = 0.001", "end = -1.0"), "end is -1 s"),
+        (instead("end = 0.001", "end = 0.001\nframes = 0"), "frames is 0"),
+        (
+            instead("end = 0.001", "end = 0.001\nmethod = \"multilevel\""),
+            "method \"multilevel\" is not in this version",
+        ),
+        (
+            bar(&format!("[[fix]]\nbox = {{ min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }}\n{TIME}")),
+            "nothing can move",
+        ),
+    ];
+    let desk = Desk::new();
+    desk.write("mesh.obj", "v 0 0 0\n");
+    for (scene, fragment) in cases {
+        let said = desk.simulate(scene, &[]);
+        print!("{}", said.err);
+        assert_eq!(said.code, 2, "expected a complaint with \"{fragment}\" of:\n{scene}\n{}", said.err);
+        assert!(said.err.contains(fragment), "\"{fragment}\" is not in: {}", said.err);
+        assert!(said.err.starts_with("error: "), "{}", said.err);
+        assert!(!desk.path("out").exists(), "a refused scene left a folder behind");
+    }
+    println!("{} bad scenes, each with its own sentence", cases.len());
+}
+
+#[test]
+fn bad_meshes_are_refused_in_words() {
+    let gmsh = |nodes: &str, tets: &str| {
+        let count = |text: &str| text.lines().count();
+        format!("$NOD\n{}\n{nodes}$ENDNOD\n$ELM\n{}\n{tets}$ENDELM\n", count(nodes), count(tets))
+    };
+    let corners = "1 0 0 0\n2 0.01 0 0\n3 0 0.01 0\n4 0 0 0.01\n";
+    let cases = [
+        (
+            gmsh(corners, "1 4 1 1 4 1 3 2 4\n"),
+            "element 0: volume -1.67e-7 m^3; 1 of 1 elements have negative volume; winding = \"normalise\"",
+        ),
+        (gmsh(corners, "1 4 1 1 4 1 2 3 3\n"), "element 0: node 2 appears twice"),
+        (gmsh(corners, "1 4 1 1 4 1 2 3 9\n"), "9"),
+        (
+            gmsh(&corners.replace("4 0 0 0.01", "4 0.01 0.01 0"), "1 4 1 1 4 1 2 3 4\n"),
+            "element 0: degenerate",
+        ),
+        (
+            gmsh(&corners.replace("4 0 0 0.01", "4 nan 0 0.01"), "1 4 1 1 4 1 2 3 4\n"),
+            "node 3: coordinate x is NaN",
+        ),
+        (
+            gmsh(&format!("{corners}5 1 1 1\n"), "1 4 1 1 4 1 2 3 4\n"),
+            "node 4 belongs to no element; remove it",
+        ),
+        (gmsh(corners, ""), "no tetrahedra"),
+        ("nonsense\n".into(), "mesh.msh"),
+    ];
+    let scene = "[mesh]\nfile = \"mesh.msh\"\n[material]\nlaw = \"neo-hookean\"\nc = 500.0\nd = 15000.0\ndensity = 1000.0\n\
+                 [time]\nstep = \"auto\"\nend = 0.001\n";
+    let desk = Desk::new();
+    for (mesh, fragment) in &cases {
+        desk.write("mesh.msh", mesh);
+        let said = desk.simulate(scene, &[]);
+        print!("{}", said.err);
+        assert_eq!(said.code, 2, "{mesh}{}", said.err);
+        assert!(said.err.contains(fragment), "\"{fragment}\" is not in: {}", said.err);
+        assert!(!desk.path("out").exists());
+    }
+    // Asked to, the command turns elements round.
+    desk.write("mesh.msh", &cases[0].0);
+    let said = desk.simulate(&scene.replace("[material]", "winding = \"normalise\"\n[material]"), &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert_eq!(desk.summary()["volume_change_percent"].as_f64().map(f64::abs), Some(0.0));
+}
+
+#[test]
+fn a_body_of_the_wrong_unit_is_remarked_upon() {
+    let desk = Desk::new();
+    let scene = bar(&format!("{FIX}{TIME}")).replace("[0.02, 0.02, 0.05]", "[20.0, 20.0, 50.0]");
+    let said = desk.simulate(&scene, &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(said.err.contains("line 2: the body is 57.4456 m across; is scale right?"), "{}", said.err);
+    assert_eq!(desk.summary()["warnings"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn wrong_usage_has_code_2() {
+    let desk = Desk::new();
+    assert_eq!(desk.supple(&["simulate"]).code, 2);
+    assert_eq!(desk.supple(&["fly"]).code, 2);
+    let said = desk.supple(&["simulate", "none.toml", "--out", "out"]);
+    assert_eq!(said.code, 2);
+    assert!(said.err.contains("none.toml: cannot be read"), "{}", said.err);
+}
