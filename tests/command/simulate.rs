@@ -232,3 +232,16 @@ fn regions_have_their_own_constants() {
     );
     assert!(stiff < 0.2 * soft && half > 0.3 * soft && half < 0.8 * soft);
 }
+
+#[test]
+fn the_scene_in_the_readme_runs() {
+    let home = env!("CARGO_MANIFEST_DIR");
+    let readme = std::fs::read_to_string(format!("{home}/README.md")).unwrap();
+    let (_, scene) = readme.split_once("```toml\ndamping").expect("the README holds a scene");
+    let (scene, _) = scene.split_once("```").unwrap();
+    let desk = Desk::new();
+    let said = desk.simulate(&format!("damping{scene}").replace("meshes/", &format!("{home}/meshes/")), &[]);
+    println!("{}", said.out);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert_eq!(desk.summary()["status"], "ok");
+}
