@@ -67,7 +67,7 @@ pub enum LoadError {
         /// The ramp, s.
         value: f32,
     },
-    /// A motion moves an axis that no support holds.
+    /// A motion moves an axis that has no support which moves.
     NotHeld {
         /// Position in the list of motions.
         index: usize,
@@ -92,10 +92,7 @@ impl fmt::Display for LoadError {
             }
             Self::NotHeld { index, node, axis } => {
                 let axis = ["x", "y", "z"].get(axis).copied().unwrap_or("?");
-                write!(
-                    f,
-                    "motion {index}: node {node} is not held along {axis}; give it a support that moves"
-                )
+                write!(f, "motion {index}: node {node} has no support that moves along {axis}")
             }
         }
     }
@@ -132,8 +129,8 @@ impl<'a> Loads<'a> {
         }
         for (index, motion) in motions.iter().enumerate() {
             check("motion", index, motion.node, nodes, &motion.metre, motion.ramp)?;
-            let held = scene.held(motion.node as usize);
-            if let Some(axis) = (0..3).find(|&axis| motion.axes.has(axis) && !held.has(axis)) {
+            let movable = scene.movable(motion.node as usize);
+            if let Some(axis) = (0..3).find(|&axis| motion.axes.has(axis) && !movable.has(axis)) {
                 return Err(LoadError::NotHeld { index, node: motion.node, axis });
             }
         }

@@ -329,9 +329,19 @@ impl<M: Material, N: AsRef<[NodeInertia]>, B: AsRef<[ElementBlock]>> Scene<M, N,
     /// Held axes of a node.
     #[must_use]
     pub fn held(&self, node: usize) -> Axes {
+        self.axes_where(node, |inverse| inverse == 0.0)
+    }
+
+    /// Held axes of a node that motions may move.
+    #[must_use]
+    pub fn movable(&self, node: usize) -> Axes {
+        self.axes_where(node, |inverse| inverse.to_bits() == MOVABLE.to_bits())
+    }
+
+    fn axes_where(&self, node: usize, is: impl Fn(f32) -> bool) -> Axes {
         let inverse = self.inertia().get(node).map_or([1.0; 3], |inertia| inertia.inverse);
-        let bits = inverse.iter().enumerate().filter(|(_, value)| **value == 0.0);
-        Axes(bits.fold(0, |bits, (axis, _)| bits | 1 << axis))
+        let axes = inverse.iter().enumerate().filter(|(_, value)| is(**value));
+        Axes(axes.fold(0, |bits, (axis, _)| bits | 1 << axis))
     }
 }
 
@@ -415,7 +425,11 @@ where
                 return Err(MeshError::UnusedNode { node }.into());
             }
             let inverse = 1.0 / inertia.mass;
-            inertia.inverse = inertia.inverse.map(|mark| if mark == FREE { inverse } else { 0.0 });
+            inertia.inverse = inertia.inverse.map(|mark| match mark {
+                FREE => inverse,
+                MOVED => MOVABLE,
+                _ => 0.0,
+            });
         }
         self.node_count = mesh.points().len();
         self.block_count = needed;
@@ -425,6 +439,9 @@ where
         Ok(())
     }
 }
+
+/// Inverse mass of a held axis that motions may move: zero, with a sign to tell it by.
+const MOVABLE: f32 = -0.0;
 
 const FREE: f32 = 0.0;
 const FIXED: f32 = 1.0;

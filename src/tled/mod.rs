@@ -225,8 +225,9 @@ where
     } else {
         step
     };
+    let mut account = *ledger;
     if *steps == 0 {
-        ledger.start = ledger.start.max(scene.releasable_energy());
+        account.start = account.start.max(scene.releasable_energy());
     }
 
     external_forces(force, inertia, loads, *time);
@@ -242,7 +243,7 @@ where
         return Status::Diverged(Divergence { time: *time, node, cause: Cause::NotFinite });
     }
     let dissipated = 2.0 * f64::from(step.damping) * entry.kinetic * f64::from(step.span);
-    let entered = ledger.entered(entry.work, entry.jump, entry.kinetic, dissipated);
+    let entered = account.entered(entry.work, entry.jump, entry.kinetic, dissipated);
     if entry.kinetic > entered.most() {
         let cause = Cause::Energy { kinetic: entry.kinetic, available: entered.peak };
         let node = most_energetic(inertia, increment, force, step);

@@ -1,0 +1,161 @@
+//! The core never allocates: a counting global allocator sees nothing while a scene is built, loads are checked, the
+//! critical step is found and steps are taken, in memory that is a `static`. Too little room is an error.
+#![allow(unsafe_code)] // A global allocator is an unsafe trait.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Mutex;
+
+use supple::loads::{Loads, Motion, NodalForce, traction};
+use supple::material::{Exponential, NeoHookean, Tissue};
+use supple::mesh::{Bar, Mesh, Winding};
+use supple::scene::{Axes, BuildError, FixedScene, Support, blocks_for};
+use supple::state::FixedState;
+use supple::tled::{self, Status, Step};
+
+/// Counts the allocations of each thread; the test harness allocates on others.
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+// SAFETY: every call goes on to the system's allocator with the arguments as they are.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+        // SAFETY: as promised by the caller.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as promised by the caller.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+        // SAFETY: as promised by the caller.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations() -> u64 {
+    ALLOCATIONS.with(Cell::get)
+}
+
+const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [2, 2, 4] };
+const NODES: usize = BAR.node_count();
+const TETS: usize = BAR.element_count();
+const BLOCKS: usize = blocks_for(TETS);
+const TISSUE: Tissue<Exponential> =
+    Tissue { law: Exponential { a: 59.0, b: 8.023, d: 60_000.0 }, density: 1000.0 };
+
+static SCENE: Mutex<FixedScene<Tissue<Exponential>, NODES, BLOCKS>> = Mutex::new(FixedScene::new(TISSUE));
+static STATE: Mutex<FixedState<NODES>> = Mutex::new(FixedState::new());
+
+/// Points and elements in arrays.
+fn mesh() -> ([[f32; 3]; NODES], [[u32; 4]; TETS]) {
+    let (mut points, mut tets) = ([[0.0; 3]; NODES], [[0; 4]; TETS]);
+    for (place, point) in points.iter_mut().zip(BAR.points()) {
+        *place = point;
+    }
+    for (place, tet) in tets.iter_mut().zip(BAR.tets()) {
+        *place = tet;
+    }
+    (points, tets)
+}
+
+/// The nine nodes at z = 0 fixed, one at the far end led along z.
+fn supports() -> [Support; 10] {
+    let mut supports = [Support::fixed(0); 10];
+    for (node, support) in (0..9).zip(&mut supports) {
+        *support = Support::fixed(node);
+    }
+    supports[9] = Support { node: NODES as u32 - 1, axes: Axes::Z, moves: true };
+    supports
+}
+
+#[test]
+fn the_allocator_counts() {
+    let before = allocations();
+    let mut vector = Vec::with_capacity(3);
+    vector.extend([1, 2, 3]);
+    std::hint::black_box(&vector);
+    vector.extend([4; 100]);
+    assert!(std::hint::black_box(vector).len() == 103 && allocations() >= before + 2);
+}
+
+#[test]
+fn building_and_stepping_in_statics_allocates_nothing() {
+    let (points, tets) = mesh();
+    let (mut scene, mut state) = (SCENE.lock().unwrap(), STATE.lock().unwrap());
+    let before = allocations();
+
+    let mesh = Mesh::new(&points, &tets, Winding::Checked).unwrap();
+    scene.build(&mesh, &supports()).unwrap();
+    let critical = tled::critical_step(&scene, &mut state).unwrap();
+    let step = Step::new(0.3 * critical.seconds, 5.0, critical).unwrap();
+    let mut forces = [NodalForce::default(); 7];
+    forces[0] = NodalForce { node: NODES as u32 - 3, newton: [1e-3, 0.0, 0.0], ramp: 0.01 };
+    let triangles = [[36, 38, 42], [38, 44, 42]];
+    for (force, share) in forces.iter_mut().skip(1).zip(traction(&points, &triangles, [0.0, 5.0, 0.0], 0.0)) {
+        *force = share.unwrap();
+    }
+    let motions = [Motion { node: NODES as u32 - 1, axes: Axes::Z, metre: [0.0, 0.0, 1e-3], ramp: 0.01 }];
+    let loads = Loads::new(&*scene, [0.0, 0.0, -9.81], &forces, &motions).unwrap();
+    assert!(tled::start(&scene, &mut state, &step, |_| ([0.0; 3], [0.0; 3])));
+    let mut taken = 0;
+    for _ in 0..200 {
+        taken += u32::from(tled::step(&scene, &loads, &mut state, &step) == Status::Ok);
+    }
+    let energy = tled::strain_energy(&scene, &state);
+    let volume: f64 = tled::element_fields(&scene, state.displacements()).map(|f| f.volume_ratio).sum();
+    assert!(tled::critical_step(&scene, &mut state).is_some());
+    state.reset();
+
+    // Refusals as well.
+    assert!(Step::new(1.0, 0.0, critical).is_err());
+    let huge = [NodalForce { newton: [f32::MAX; 3], ..forces[0] }];
+    let loads = Loads::new(&*scene, [0.0; 3], &huge, &[]).unwrap();
+    let diverged =
+        (0..100).any(|_| matches!(tled::step(&scene, &loads, &mut state, &step), Status::Diverged(_)));
+    assert!(scene.build(&mesh, &[Support::fixed(10_000)]).is_err());
+
+    assert_eq!(allocations(), before);
+    println!("200 steps, strain energy {energy:.3e} J, no allocation");
+    assert!(taken == 200 && energy > 0.0 && diverged && (volume / TETS as f64 - 1.0).abs() < 0.1);
+}
+
+#[test]
+fn too_few_nodes_or_blocks_is_an_error_and_leaves_the_scene_empty() {
+    let (points, tets) = mesh();
+    let mesh = Mesh::new(&points, &tets, Winding::Checked).unwrap();
+    let tissue = Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 };
+    let mut scene = FixedScene::<_, { NODES - 1 }, BLOCKS>::new(tissue);
+    assert_eq!(scene.build(&mesh, &[]), Err(BuildError::NodeCapacity { needed: NODES, capacity: NODES - 1 }));
+    assert_eq!((scene.node_count(), scene.element_count()), (0, 0));
+
+    let mut scene = FixedScene::<_, NODES, { BLOCKS - 1 }>::new(tissue);
+    assert_eq!(
+        scene.build(&mesh, &[]),
+        Err(BuildError::BlockCapacity { needed: BLOCKS, capacity: BLOCKS - 1 })
+    );
+    assert_eq!((scene.node_count(), scene.element_count()), (0, 0));
+
+    // More room than needed does no harm.
+    let mut scene = FixedScene::<_, { NODES + 5 }, { BLOCKS + 2 }>::new(tissue);
+    assert_eq!(scene.build(&mesh, &[]), Ok(()));
+    assert_eq!((scene.node_count(), scene.element_count()), (NODES, TETS));
+
+    // A state with too little room is refused at every door.
+    let mut state = FixedState::<{ NODES - 1 }>::new();
+    let step = Step::insist(1e-4, 0.0).unwrap();
+    let refused = Status::Mismatch { nodes: NODES, room: NODES - 1 };
+    assert_eq!(tled::step(&scene, &Loads::NONE, &mut state, &step), refused);
+    assert_eq!(tled::critical_step(&scene, &mut state), None);
+    assert_eq!(tled::exact_critical_step(&scene, state.displacements()), None);
+    assert!(!tled::start(&scene, &mut state, &step, |_| ([0.0; 3], [0.0; 3])));
+    assert_eq!(state.steps(), 0);
+}
