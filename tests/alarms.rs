@@ -98,7 +98,8 @@ impl Alarms {
                 Outcome::FalseAlarm(alarm) => return self.0.push(format!("{name}: false alarm at {alarm}")),
                 Outcome::Done { limited, inexact, excess } => {
                     println!(
-                        "{name}: {count} steps of {dt:.1e} s, {limited} limited, largest excess {excess:+.1e}"
+                        "{name}: {count} steps of {dt:.1e} s, {limited} limited, {inexact} inexact, largest excess \
+                         {excess:+.1e}"
                     );
                     return;
                 }
@@ -204,7 +205,7 @@ fn motions_that_jump_and_reverse() {
             let follow = |&node| Motion { node, axes: Axes::XYZ, metre: [0.0, 0.2 * size, size], ramp };
             end.iter().map(follow).collect::<Vec<_>>()
         };
-        let there_and_back = |n: u64| if n / 500 % 2 == 0 { 3.0 } else { -3.0 };
+        let there_and_back = |n: u64| if (n / 500).is_multiple_of(2) { 3.0 } else { -3.0 };
         let mut watch = |how: &str, damping: f32, motions: &dyn Fn(u64, f64) -> Vec<Motion>| {
             let name = format!("{}, {how}", law.name());
             alarms.watch(&name, &scene, &|_| rest_of(&scene), (damping, LONG), &|n, t| (vec![], motions(n, t)));

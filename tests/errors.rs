@@ -33,7 +33,8 @@ fn mesh_errors_say_what_is_wrong_and_where() {
         points[node] = point;
         points
     };
-    let cases: [(&[[f32; 3]], &[[u32; 4]], MeshError, &str); 9] = [
+    type Case<'a> = (&'a [[f32; 3]], &'a [[u32; 4]], MeshError, &'a str);
+    let cases: [Case<'_>; 9] = [
         (&[], &TETS, MeshError::Empty, "the mesh has no elements"),
         (&POINTS, &[], MeshError::Empty, "the mesh has no elements"),
         (

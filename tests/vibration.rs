@@ -6,7 +6,7 @@ mod support;
 
 use std::f64::consts::PI;
 
-use supple::loads::{Loads, NodalForce};
+use supple::loads::Loads;
 use supple::material::{NeoHookean, Tissue};
 use supple::tled::{self, Step};
 use support::bodies::{held, torsion};
@@ -96,6 +96,7 @@ fn waves_run_along_a_thin_bar_at_their_speed() {
 
 /// First torsional frequency of a free square bar, `f = c_t / (2 L)`, `c_t = sqrt(mu k / (rho I_p))` with Saint-
 /// Venant's `k = 0.1406 a^4` and `I_p = a^4 / 6`.
+#[cfg(feature = "slow-tests")]
 fn torsion_frequency_error(across: u32) -> f64 {
     let (side, length) = (0.02_f32, 0.16_f32);
     let body = Body::bar([side, side, length], [across, across, 8 * across]);
@@ -193,6 +194,7 @@ fn order_in_time<L: Judged>(law: L) {
 }
 
 /// Where a bar held at one end comes to rest under a force along x on the other, m.
+#[cfg(feature = "slow-tests")]
 fn deflection(across: u32) -> f64 {
     let body = Body::bar([0.02, 0.02, 0.04], [across, across, 2 * across]);
     let scene = body.scene(tissue(LAW), &held(&body));
@@ -203,7 +205,7 @@ fn deflection(across: u32) -> f64 {
         .into_iter()
         .filter(|triangle| triangle.iter().all(|&node| body.points[node as usize][2] == high))
         .collect();
-    let forces: Vec<NodalForce> =
+    let forces: Vec<_> =
         supple::loads::traction(&body.points, &face, [5.0, 0.0, 0.0], 0.0).map(Result::unwrap).collect();
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
     let step = Step::insist(0.8 * bound(&scene, &rest_of(&scene)).seconds, 30.0).unwrap();
