@@ -9,8 +9,9 @@ use supple::material::{Exponential, Material};
 use supple::mesh::Winding;
 use supple::scene::{Axes, Support};
 
+use crate::body::Body;
 use crate::picture::{self, Panel};
-use crate::prepare::{Body, Job, Setup};
+use crate::prepare::{Job, Setup};
 use crate::report::{self, Figures, Folder};
 use crate::run;
 use crate::scene_file::Problem;

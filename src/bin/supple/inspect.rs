@@ -9,7 +9,8 @@ use supple::material::Material;
 use supple::mesh::{DEGENERATE, Winding};
 use supple::tled::{self, Step};
 
-use crate::prepare::{Body, Job, Setup, extent, volume};
+use crate::body::{Body, extent, volume};
+use crate::prepare::{Job, Setup};
 use crate::run;
 use crate::scene_file::{Problem, SceneFile};
 

@@ -2,6 +2,7 @@
 //!
 //! Exit codes: 0 as asked, 2 the input is not usable, 3 the simulation diverged.
 
+mod body;
 mod demo;
 mod inspect;
 mod picture;

@@ -10,7 +10,8 @@ use supple::io::{Frame, write_atomically, write_pvd, write_vtu};
 use supple::material::Material;
 use supple::tled;
 
-use crate::prepare::{Body, HostScene, HostState, Setup, volume};
+use crate::body::{Body, volume};
+use crate::prepare::{HostScene, HostState, Setup};
 use crate::run::Outcome;
 use crate::scene_file::Problem;
 
