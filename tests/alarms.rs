@@ -18,7 +18,7 @@ use support::{HostScene, HostState, Judged, bound, displaced, rest_of, tissue};
 /// Loads as the host sets them before a step, from the number of the step and the time.
 type Host<'a> = &'a dyn Fn(u64, f64) -> (Vec<NodalForce>, Vec<Motion>);
 /// Steps of a run.
-const LONG: u64 = if cfg!(feature = "slow-tests") { 4_000 } else { 1_000 };
+const LONG: u64 = if cfg!(feature = "slow-tests") { 3_000 } else { 1_000 };
 const NO_LOADS: Host<'static> = &|_, _| (vec![], vec![]);
 
 /// What came of a run.
