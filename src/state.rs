@@ -71,7 +71,8 @@ impl<S: AsRef<[NodeVector]>> State<S> {
     }
 
     /// Total force on each node (external less internal) at the start of the latest step, N. At held nodes
-    /// its opposite is the reaction of the support, apart from the inertia of a moved one.
+    /// its opposite is the reaction of the support, apart from the inertia of a moved one. After a step that
+    /// was refused these are the forces of that step, and after [`crate::tled::critical_step`] zero.
     #[must_use]
     pub fn forces(&self) -> &[NodeVector] {
         self.force.as_ref()

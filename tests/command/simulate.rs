@@ -245,3 +245,16 @@ fn the_scene_in_the_readme_runs() {
     assert_eq!(said.code, 0, "{}", said.err);
     assert_eq!(desk.summary()["status"], "ok");
 }
+
+#[test]
+fn an_automatic_step_survives_a_sudden_load_on_single_nodes() {
+    let desk = Desk::new();
+    let text = bar("").replace("neo-hookean", "exponential").replace("c = 500.0", "a = 59.0\nb = 8.023");
+    let rest = "[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[[force]]\nnodes = [45, 53]\nnewton = [0.05, 0.0, 0.0]\n\
+                [time]\nstep = \"auto\"\nend = 0.05\n";
+    let said = desk.simulate(&format!("{text}{rest}").replace("d = 15000.0", "d = 60000.0"), &[]);
+    println!("{}", said.out);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let summary = desk.summary();
+    assert!(summary["step_shortest_s"].as_f64() < summary["step_longest_s"].as_f64());
+}

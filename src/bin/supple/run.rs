@@ -1,4 +1,8 @@
 //! A simulation from rest to its end: steps, frames at even intervals, what became of it.
+//!
+//! `step = "auto"` takes a share of the critical step, which falls as tissue stiffens: it is asked for anew
+//! every few steps, and steps after which it turns out to be shorter than they were are undone and taken
+//! again in halves. A sudden load on one node needs that: one step may stiffen its elements tenfold.
 
 use std::time::{Duration, Instant};
 
@@ -9,9 +13,27 @@ use supple::tled::{self, CriticalStep, Divergence, Status, Step};
 use crate::prepare::{HostScene, HostState, Setup, StepChoice};
 use crate::scene_file::Problem;
 
-/// With `step = "auto"`: steps between two looks at the critical step, and the share of it taken.
+/// With `step = "auto"`: most steps between two looks at the critical step, and the share of it taken.
 const STEPS_BETWEEN_LOOKS: u32 = 50;
 const SHARE: f32 = 0.9;
+/// By which share the critical step may fall between two looks.
+const FALL: f32 = 0.03;
+/// By which share per step an automatic step grows after it had to shrink. Slowly: steps that change in time
+/// with the motion feed energy into it (Skeel 1993, "Variable step size destabilizes the
+/// Stoermer/leapfrog/Verlet method").
+const GROWTH: f32 = 0.002;
+/// Share of the critical step at rest below which an automatic step is not halved any further.
+const SHORTEST: f32 = 1e-4;
+
+/// Where `step = "auto"` stands.
+struct Pace {
+    /// The step may be this long, s.
+    longest: f32,
+    /// The critical step at the last look, s.
+    critical: f32,
+    /// Steps to the next look.
+    steps: u32,
+}
 
 /// Steps with elements beyond the range of their law, or with energy the account does not explain.
 #[derive(Clone, Copy, Default)]
@@ -86,6 +108,7 @@ pub(crate) fn run<M: Material>(
         divergence: None,
         above_from: None,
     };
+    let mut pace = Pace { longest: SHARE * at_rest.seconds, critical: at_rest.seconds, steps: 1 };
     frame(scene, state)?;
     let total = (setup.end / f64::from(step.seconds())).round().max(1.0) as u64;
     for index in 1..=setup.frames {
@@ -106,17 +129,32 @@ pub(crate) fn run<M: Material>(
                 // A remainder of rounding is no step.
                 while target - state.time() > 1e-9 * setup.end && outcome.divergence.is_none() {
                     tick(state.time());
-                    let bound = critical(scene, state)?;
                     let remaining = target - state.time();
-                    let count = (remaining / f64::from(SHARE * bound.seconds)).ceil().max(1.0);
+                    let count = (remaining / f64::from(pace.longest)).ceil().max(1.0);
                     step = Step::insist((remaining / count) as f32, setup.damping)
                         .map_err(|error| Problem(error.to_string()))?;
-                    outcome.steps.0 = outcome.steps.0.min(step.seconds());
-                    outcome.steps.1 = outcome.steps.1.max(step.seconds());
-                    for _ in 0..(count as u64).min(u64::from(STEPS_BETWEEN_LOOKS)) {
+                    let before = (state.clone(), outcome.limits);
+                    let count = count.min(f64::from(pace.steps)) as u32;
+                    for _ in 0..count {
                         if outcome.divergence.is_none() {
                             take(scene, &loads, state, &step, &mut outcome);
                         }
+                    }
+                    let now = tled::critical_step(scene, state).map_or(0.0, |bound| bound.seconds);
+                    let outrun = outcome.divergence.is_some() || step.seconds() > now;
+                    if outrun && step.seconds() > SHORTEST * at_rest.seconds {
+                        (*state, outcome.limits) = before;
+                        outcome.divergence = None;
+                        (pace.longest, pace.steps) = (0.5 * step.seconds(), 1);
+                    } else {
+                        outcome.steps.0 = outcome.steps.0.min(step.seconds());
+                        outcome.steps.1 = outcome.steps.1.max(step.seconds());
+                        // Look more often while the critical step falls fast.
+                        let fall = (1.0 - now / pace.critical).max(0.0);
+                        let calm = (FALL / fall * pace.steps as f32) as u32;
+                        pace.steps = calm.min(2 * pace.steps).clamp(1, STEPS_BETWEEN_LOOKS);
+                        pace.longest = (pace.longest * (1.0 + GROWTH * count as f32)).min(SHARE * now);
+                        pace.critical = now;
                     }
                 }
             }
