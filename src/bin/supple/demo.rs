@@ -12,7 +12,7 @@ use supple::scene::{Axes, Support};
 use crate::body::Body;
 use crate::picture::{self, Panel};
 use crate::prepare::{Job, Setup};
-use crate::report::{self, Figures, Folder};
+use crate::report::{self, Folder};
 use crate::run;
 use crate::scene_file::Problem;
 use crate::simulate::End;
@@ -74,13 +74,7 @@ impl Job for Demo<'_> {
             |_| {},
             |scene, state| folder.add_frame(&setup.body, scene, state),
         )?;
-        let figures = Figures::new(&setup.body, &scene, &state);
-        folder.write_final(&setup.body, &state)?;
-        folder.write_summary(&report::summary(setup, &scene, &state, &outcome, &figures))?;
-        print!("{}", report::table(setup, &scene, &state, &outcome, &figures));
-        for warning in report::warnings(setup, &outcome) {
-            eprintln!("warning: {warning}");
-        }
+        let figures = report::conclude(&folder, setup, &scene, &state, &outcome)?;
 
         let rest = &setup.body.mesh.points;
         let moved: Vec<_> = rest

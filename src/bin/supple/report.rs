@@ -117,6 +117,24 @@ impl Folder {
     }
 }
 
+/// Leaves `final.csv` and `summary.json` in the folder, the table and the warnings on the screen.
+pub(crate) fn conclude<M: Material>(
+    folder: &Folder,
+    setup: &Setup,
+    scene: &HostScene<M>,
+    state: &HostState,
+    outcome: &Outcome,
+) -> Result<Figures, Problem> {
+    let figures = Figures::new(&setup.body, scene, state);
+    folder.write_final(&setup.body, state)?;
+    folder.write_summary(&summary(setup, scene, state, outcome, &figures))?;
+    print!("{}", table(setup, scene, state, outcome, &figures));
+    for warning in warnings(setup, outcome) {
+        eprintln!("warning: {warning}");
+    }
+    Ok(figures)
+}
+
 fn cannot_write(path: &Path, error: &io::Error) -> Problem {
     Problem(format!("{}: cannot be written: {error}", path.display()))
 }
@@ -160,7 +178,7 @@ pub(crate) fn speed(state: &HostState, outcome: &Outcome) -> (f64, f64) {
 }
 
 /// What is not as it should be, in sentences.
-pub(crate) fn warnings(setup: &Setup, outcome: &Outcome) -> Vec<String> {
+fn warnings(setup: &Setup, outcome: &Outcome) -> Vec<String> {
     let mut warnings = setup.warnings.clone();
     if let Some(time) = outcome.above_from {
         warnings.push(format!(
@@ -199,7 +217,7 @@ fn decimal(value: f32) -> f64 {
 }
 
 /// `summary.json`.
-pub(crate) fn summary<M: Material>(
+fn summary<M: Material>(
     setup: &Setup,
     scene: &HostScene<M>,
     state: &HostState,
@@ -250,7 +268,7 @@ pub(crate) fn summary<M: Material>(
 }
 
 /// The table on the screen.
-pub(crate) fn table<M: Material>(
+fn table<M: Material>(
     setup: &Setup,
     scene: &HostScene<M>,
     state: &HostState,

@@ -6,7 +6,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use supple::material::Material;
 
 use crate::prepare::{Job, Setup};
-use crate::report::{self, Figures, Folder};
+use crate::report::{self, Folder};
 use crate::run;
 use crate::scene_file::{Problem, SceneFile};
 
@@ -51,14 +51,8 @@ impl Job for Simulation<'_> {
             // The last state that may be believed.
             folder.add_frame(&setup.body, &scene, &state)?;
         }
-        let figures = Figures::new(&setup.body, &scene, &state);
-        folder.write_final(&setup.body, &state)?;
-        folder.write_summary(&report::summary(setup, &scene, &state, &outcome, &figures))?;
-        print!("{}", report::table(setup, &scene, &state, &outcome, &figures));
+        report::conclude(&folder, setup, &scene, &state, &outcome)?;
         println!("{:<21} {}", "results", self.out.display());
-        for warning in report::warnings(setup, &outcome) {
-            eprintln!("warning: {warning}");
-        }
         Ok(outcome.divergence.map_or(End::Reached, |divergence| End::Diverged(divergence.to_string())))
     }
 }
