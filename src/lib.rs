@@ -86,6 +86,7 @@
 #[cfg(any(feature = "std", test))]
 extern crate std;
 
+pub mod inertia;
 pub mod lanes;
 mod ledger;
 pub mod loads;
@@ -93,6 +94,7 @@ pub mod material;
 pub mod mesh;
 pub mod scene;
 pub mod state;
+mod symmetric;
 pub mod tled;
 
 #[cfg(feature = "io")]

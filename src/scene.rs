@@ -12,6 +12,7 @@ use glam::DVec3;
 use crate::lanes::{BLOCK, Real};
 use crate::material::{Law, Material, releasable_energy};
 use crate::mesh::{Mesh, MeshError, gradients, volume};
+use crate::symmetric::Symmetric;
 
 /// Coordinate axes, as a set.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
@@ -175,6 +176,8 @@ pub struct ElementBlock {
     volumes: [f32; BLOCK],
     /// The mesh's number of each element.
     elements: [u32; BLOCK],
+    /// Largest eigenvalue of `sum_a ga ga^T` over the four shape function gradients, 1/m^2.
+    spreads: [f32; BLOCK],
 }
 
 impl ElementBlock {
@@ -184,6 +187,7 @@ impl ElementBlock {
         gradients: [[[0.0; BLOCK]; 3]; 3],
         volumes: [0.0; BLOCK],
         elements: [0; BLOCK],
+        spreads: [0.0; BLOCK],
     };
 
     /// Node `corner` (0 to 3) of the element in `lane`.
@@ -202,6 +206,18 @@ impl ElementBlock {
     #[inline(always)]
     pub(crate) fn gradient<R: Real>(&self, corner: usize, axis: usize, first: usize) -> R {
         R::from_fn(|lane| self.gradients[corner][axis][first + lane])
+    }
+
+    /// One gradient component of one element, 1/m.
+    #[inline(always)]
+    pub(crate) fn gradient_of(&self, corner: usize, axis: usize, lane: usize) -> f32 {
+        self.gradients[corner][axis][lane]
+    }
+
+    /// Largest eigenvalue of `sum_a ga ga^T` for lanes from `first` on, 1/m^2.
+    #[inline(always)]
+    pub(crate) fn spread<R: Real>(&self, first: usize) -> R {
+        R::from_fn(|lane| self.spreads[first + lane])
     }
 
     /// Rest volumes for lanes from `first` on, m^3.
@@ -480,4 +496,19 @@ fn write_element(block: &mut ElementBlock, lane: usize, element: usize, tet: [u3
     }
     set(&mut block.volumes, lane, volume as f32);
     set(&mut block.elements, lane, element as u32);
+    set(&mut block.spreads, lane, spread(slopes));
+}
+
+/// Largest eigenvalue of `sum_a ga ga^T` over the four gradients, not rounded down, 1/m^2.
+fn spread(slopes: [DVec3; 3]) -> f32 {
+    let mut sum = Symmetric::default();
+    for g in [slopes[0], slopes[1], slopes[2], -(slopes[0] + slopes[1] + slopes[2])] {
+        sum.xx += (g.x * g.x) as f32;
+        sum.yy += (g.y * g.y) as f32;
+        sum.zz += (g.z * g.z) as f32;
+        sum.xy += (g.x * g.y) as f32;
+        sum.yz += (g.y * g.z) as f32;
+        sum.zx += (g.z * g.x) as f32;
+    }
+    sum.largest_eigenvalue() * (1.0 + 1e-5)
 }

@@ -231,7 +231,7 @@ fn forces_of_one_element_add_up_to_nothing() {
 #[test]
 fn a_scene_is_plain_data_of_the_size_its_types_say() {
     // Four node ids, nine gradients, volume and number: 60 bytes an element, 16 a node.
-    assert_eq!(size_of::<supple::scene::ElementBlock>(), 16 * 60);
+    assert_eq!(size_of::<supple::scene::ElementBlock>(), 16 * 64);
     assert_eq!(size_of::<supple::scene::NodeInertia>(), 16);
     assert_eq!(align_of::<Scene<(), (), supple::scene::ElementBlock>>(), 64);
 }

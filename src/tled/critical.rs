@@ -24,6 +24,7 @@ use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter, dispatch};
 use crate::material::{Law, Material, Potential, VolumeFactor};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
+use crate::symmetric::Symmetric;
 
 use super::element::{Deformation, Vector};
 
@@ -87,35 +88,12 @@ impl Sums<'_> {
         }
     }
 
-    /// A close upper bound of the largest eigenvalue of the node's matrix on its free axes, 1/s^2: Newton's
-    /// iteration on the characteristic polynomial from above, where it is convex, so that no iterate falls
-    /// below the root.
+    /// A close upper bound of the largest eigenvalue of the node's matrix on its free axes, 1/s^2.
     fn largest_eigenvalue(&self, node: usize, inverse: [f32; 3]) -> f32 {
         let read = |vectors: &[NodeVector]| vectors.get(node).copied().unwrap_or_default().0;
         let [xx, yy, zz, xy] = read(self.xx_yy_zz_xy);
         let (yz, zx) = (read(self.yz_in_padding)[3], read(self.zx_in_padding)[3]);
-        let [x, y, z] = inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 });
-        let (xx, yy, zz) = (xx * x, yy * y, zz * z);
-        let (xy, yz, zx) = (xy * x * y, yz * y * z, zx * z * x);
-        let mean = (xx + yy + zz) / 3.0;
-        if mean <= 0.0 || mean.is_nan() {
-            return mean;
-        }
-        // The matrix over its mean, less the identity.
-        let (a, b, c) = (xx / mean - 1.0, yy / mean - 1.0, zz / mean - 1.0);
-        let (d, e, f) = (xy / mean, yz / mean, zx / mean);
-        let q = (a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0;
-        let determinant = a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f);
-        // Roots of t^3 - 3 q t - determinant; 2 sqrt q is above the largest.
-        let mut root = 2.0 * libm::sqrtf(q);
-        for _ in 0..4 {
-            let slope = 3.0 * (root * root - q);
-            if slope > 1e-6 {
-                let next = root - (root * (root * root - 3.0 * q) - determinant) / slope;
-                root = if next < root { next } else { root };
-            }
-        }
-        mean * (1.0 + root)
+        Symmetric { xx, yy, zz, xy, yz, zx }.on_free(inverse).largest_eigenvalue()
     }
 }
 

@@ -108,6 +108,29 @@ pub(crate) struct Extremes<R> {
     pub(crate) saturation: R,
 }
 
+/// What else is made of an element's deformation while it is at hand.
+pub(crate) trait Beside {
+    /// Called with each chunk of elements; what it returns is added to the fourth component of the forces of
+    /// their nodes.
+    fn see<R: Real, L: Law>(
+        &mut self,
+        law: &L::Wide<R>,
+        block: &ElementBlock,
+        first: usize,
+        deformation: &Deformation<R>,
+    ) -> R;
+}
+
+/// Forces and nothing else.
+pub(crate) struct Nothing;
+
+impl Beside for Nothing {
+    #[inline(always)]
+    fn see<R: Real, L: Law>(&mut self, _: &L::Wide<R>, _: &ElementBlock, _: usize, _: &Deformation<R>) -> R {
+        R::splat(0.0)
+    }
+}
+
 /// Adds the internal forces of the elements in lanes `first..` of a block to `force`, with minus sign.
 #[inline(always)]
 pub(crate) fn add_forces<R: Real, L: Law>(
@@ -117,8 +140,10 @@ pub(crate) fn add_forces<R: Real, L: Law>(
     displacement: Gather<'_>,
     force: &mut Scatter<'_>,
     extremes: &mut Extremes<R>,
+    beside: &mut impl Beside,
 ) {
     let deformation = Deformation::<R>::of_block(block, first, displacement);
+    let fourth = beside.see::<R, L>(law, block, first, &deformation);
     let response = response::<R, L>(law, deformation.invariants);
     extremes.least_j = deformation.invariants.j.min(extremes.least_j);
     extremes.saturation = response.saturation.max(extremes.saturation);
@@ -135,6 +160,6 @@ pub(crate) fn add_forces<R: Real, L: Law>(
         forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
     }
     for (corner, [x, y, z]) in forces.into_iter().enumerate() {
-        force.add_lanes(|lane| block.node(corner, first + lane), [x, y, z, R::splat(0.0)]);
+        force.add_lanes(|lane| block.node(corner, first + lane), [x, y, z, fourth]);
     }
 }

@@ -2,11 +2,12 @@
 //! ([`crate::ledger`]): kinetic energy of the mean of the increments before and after `t_n`, and the work of
 //! loads and supports along it, in joules.
 
+use crate::ledger::Ledger;
 use crate::loads::{Loads, ramp_factor};
 use crate::scene::NodeInertia;
 use crate::state::NodeVector;
 
-use super::Step;
+use super::{Cause, Step};
 
 /// The next increment of a node; held axes stand still.
 #[inline(always)]
@@ -26,6 +27,11 @@ pub(crate) fn next_increment(
     next
 }
 
+/// The next increment of a node from its number, inertia, last increment and force.
+pub(crate) trait Next: Fn(usize, &NodeInertia, &NodeVector, &NodeVector) -> [f32; 4] {}
+
+impl<F: Fn(usize, &NodeInertia, &NodeVector, &NodeVector) -> [f32; 4]> Next for F {}
+
 /// The energies of one step ([`crate::ledger`]), J.
 pub(crate) struct Entry {
     pub(crate) finite: bool,
@@ -36,19 +42,21 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    /// Kinetic energy of the free axes, work of gravity, and of supports along what they moved last.
+    /// Kinetic energy of the free axes, work of gravity, and of supports along what they moved last. `next`
+    /// gives the next increment of a node.
     pub(crate) fn of_nodes(
         inertia: &[NodeInertia],
         increment: &[NodeVector],
         force: &[NodeVector],
         loads: &Loads<'_>,
         step: &Step,
+        next: impl Next,
     ) -> Self {
         let mut kinetic = [0.0f32; 4];
         let mut momentum = [0.0f32; 4];
         let mut led = [0.0f32; 4];
-        for ((inertia, increment), force) in inertia.iter().zip(increment).zip(force) {
-            let next = next_increment(inertia, increment, force, step);
+        for (node, ((inertia, increment), force)) in inertia.iter().zip(increment).zip(force).enumerate() {
+            let next = next(node, inertia, increment, force);
             let [ix, iy, iz] = inertia.inverse;
             let free = [ix, iy, iz, 0.0];
             for axis in 0..4 {
@@ -86,7 +94,7 @@ impl Entry {
         increment: &[NodeVector],
         force: &[NodeVector],
         time: f64,
-        step: &Step,
+        next: impl Next,
     ) -> Self {
         for load in loads.forces() {
             let node = load.node as usize;
@@ -95,7 +103,7 @@ impl Entry {
             else {
                 continue;
             };
-            let next = next_increment(inertia, increment, force, step);
+            let next = next(node, inertia, increment, force);
             let factor = ramp_factor(time, load.ramp);
             let mut work = 0.0;
             for axis in 0..3 {
@@ -136,5 +144,18 @@ impl Entry {
             }
         }
         self
+    }
+
+    /// The account after the step, or why the step cannot be believed.
+    pub(crate) fn entered(&self, account: Ledger, step: &Step) -> Result<Ledger, Cause> {
+        if !self.finite {
+            return Err(Cause::NotFinite);
+        }
+        let dissipated = 2.0 * f64::from(step.damping) * self.kinetic * f64::from(step.span);
+        let entered = account.entered(self.work, self.jump, self.kinetic, dissipated);
+        if self.kinetic > entered.most() {
+            return Err(Cause::Energy { kinetic: self.kinetic, available: entered.peak });
+        }
+        Ok(entered)
     }
 }

@@ -29,8 +29,10 @@ use crate::material::{J_FLOOR, Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
 
-use element::Extremes;
-use entry::{Entry, next_increment};
+use element::Nothing;
+pub(crate) use element::{Beside, Deformation, Extremes};
+use entry::next_increment;
+pub(crate) use entry::{Entry, Next};
 
 /// Coefficients of the integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,6 +122,21 @@ impl Step {
     #[must_use]
     pub const fn seconds(&self) -> f32 {
         self.dt
+    }
+
+    /// The damping, 1/s.
+    #[must_use]
+    pub const fn damping(&self) -> f32 {
+        self.damping
+    }
+
+    /// What an increment over `h` seconds would be had it spanned this step, over what it is.
+    pub(crate) fn carried_from(self, h: f32) -> Self {
+        if h > 0.0 { Self { carry: self.dt / h, ..self } } else { self }
+    }
+
+    pub(crate) const fn carry(&self) -> f32 {
+        self.carry
     }
 }
 
@@ -234,21 +251,18 @@ where
     let (Some(from), Some(to)) = (Gather::new(displacement), Scatter::new(force)) else {
         return Status::Mismatch { nodes, room };
     };
-    let extremes = dispatch(InternalForces { scene, displacement: from, force: to });
-    let entry = Entry::of_nodes(inertia, increment, force, loads, step)
-        .with_forces(loads, inertia, increment, force, *time, step)
+    let extremes = dispatch(InternalForces { scene, displacement: from, force: to, beside: Nothing });
+    let next = |_, inertia: &_, increment: &_, force: &_| next_increment(inertia, increment, force, step);
+    let entry = Entry::of_nodes(inertia, increment, force, loads, step, next)
+        .with_forces(loads, inertia, increment, force, *time, next)
         .with_motions(loads, displacement, increment, force, *time, step);
-    if !entry.finite {
-        let node = first_not_finite(inertia, increment, force, step);
-        return Status::Diverged(Divergence { time: *time, node, cause: Cause::NotFinite });
-    }
-    let dissipated = 2.0 * f64::from(step.damping) * entry.kinetic * f64::from(step.span);
-    let entered = account.entered(entry.work, entry.jump, entry.kinetic, dissipated);
-    if entry.kinetic > entered.most() {
-        let cause = Cause::Energy { kinetic: entry.kinetic, available: entered.peak };
-        let node = most_energetic(inertia, increment, force, step);
-        return Status::Diverged(Divergence { time: *time, node, cause });
-    }
+    let entered = match entry.entered(account, step) {
+        Ok(entered) => entered,
+        Err(cause) => {
+            let node = culprit(inertia, increment, force, step, next);
+            return Status::Diverged(Divergence { time: *time, node, cause });
+        }
+    };
 
     *ledger = entered;
     advance(inertia, displacement, increment, force, step);
@@ -321,7 +335,12 @@ where
     energy::strain_energy(scene, state.displacement.as_ref())
 }
 
-fn external_forces(force: &mut [NodeVector], inertia: &[NodeInertia], loads: &Loads<'_>, time: f64) {
+pub(crate) fn external_forces(
+    force: &mut [NodeVector],
+    inertia: &[NodeInertia],
+    loads: &Loads<'_>,
+    time: f64,
+) {
     let [gx, gy, gz] = loads.gravity();
     if loads.gravity() == [0.0; 3] {
         force.fill(NodeVector::ZERO);
@@ -341,17 +360,19 @@ fn external_forces(force: &mut [NodeVector], inertia: &[NodeInertia], loads: &Lo
 }
 
 /// Adds the internal forces of all elements, in their order.
-struct InternalForces<'a, M, N, B> {
-    scene: &'a Scene<M, N, B>,
-    displacement: Gather<'a>,
-    force: Scatter<'a>,
+pub(crate) struct InternalForces<'a, M, N, B, H> {
+    pub(crate) scene: &'a Scene<M, N, B>,
+    pub(crate) displacement: Gather<'a>,
+    pub(crate) force: Scatter<'a>,
+    pub(crate) beside: H,
 }
 
-impl<M, N, B> Kernel for InternalForces<'_, M, N, B>
+impl<M, N, B, H> Kernel for InternalForces<'_, M, N, B, H>
 where
     M: Material,
     N: AsRef<[NodeInertia]>,
     B: AsRef<[ElementBlock]>,
+    H: Beside,
 {
     type Output = Extremes<f32>;
 
@@ -364,7 +385,16 @@ where
                 let material = self.scene.material();
                 let law = M::Law::widen(|lane| material.law(block.element(first + lane)));
                 let (displacement, force) = (self.displacement, &mut self.force);
-                element::add_forces::<R, M::Law>(&law, block, first, displacement, force, &mut extremes);
+                let beside = &mut self.beside;
+                element::add_forces::<R, M::Law>(
+                    &law,
+                    block,
+                    first,
+                    displacement,
+                    force,
+                    &mut extremes,
+                    beside,
+                );
             }
         }
         let mut reduced = Extremes { least_j: f32::INFINITY, saturation: f32::NEG_INFINITY };
@@ -393,7 +423,7 @@ fn advance(
 }
 
 /// Puts the nodes of motions where they belong at `time`.
-fn follow_motions(
+pub(crate) fn follow_motions(
     loads: &Loads<'_>,
     displacement: &mut [NodeVector],
     increment: &mut [NodeVector],
@@ -414,30 +444,21 @@ fn follow_motions(
     }
 }
 
-fn first_not_finite(
+/// The node that a refused step names: the first whose next increment is not finite, or else the one with
+/// the most kinetic energy (increments may still be finite where their energy no longer is).
+pub(crate) fn culprit(
     inertia: &[NodeInertia],
     increment: &[NodeVector],
     force: &[NodeVector],
     step: &Step,
-) -> u32 {
-    let nodes = inertia.iter().zip(increment).zip(force);
-    let bad = nodes.map(|((inertia, increment), force)| {
-        next_increment(inertia, increment, force, step).iter().any(|value| !value.is_finite())
-    });
-    let first = bad.enumerate().find_map(|(node, bad)| bad.then_some(node as u32));
-    // Increments may still be finite where their energy no longer is.
-    first.unwrap_or_else(|| most_energetic(inertia, increment, force, step))
-}
-
-fn most_energetic(
-    inertia: &[NodeInertia],
-    increment: &[NodeVector],
-    force: &[NodeVector],
-    step: &Step,
+    next: impl Next,
 ) -> u32 {
     let mut most = (0.0, 0);
     for (node, ((inertia, increment), force)) in inertia.iter().zip(increment).zip(force).enumerate() {
-        let next = next_increment(inertia, increment, force, step);
+        let next = next(node, inertia, increment, force);
+        if next.iter().any(|value| !value.is_finite()) {
+            return node as u32;
+        }
         let sums = next.iter().zip(increment.0).map(|(next, last)| next + step.carry * last);
         let square: f32 = sums.map(|sum| sum * sum).sum();
         if inertia.mass * square > most.0 {

@@ -1,0 +1,184 @@
+//! A coarse lattice around the body: trilinear functions `W` (one a lattice point) on the nodes, by which
+//! smooth motion is told from the rest. A function is zero at held axes. Where a support or the edge of
+//! the body leaves a function almost nothing to move it is dropped ([`LEAST_MASS`]): its inertia would be
+//! small beside its stiffness, and the system that is factorised ill-conditioned.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::InertiaError;
+use crate::lanes::NodeVector;
+use crate::scene::NodeInertia;
+
+/// Lattice points that a lattice may have.
+pub const MAX_POINTS: usize = 1024;
+/// Functions left after dropping that a lattice may have.
+pub const MAX_FUNCTIONS: usize = 128;
+const DROPPED: u8 = MAX_FUNCTIONS as u8;
+/// Functions with less than this share of the heaviest one's mass are dropped.
+const LEAST_MASS: f32 = 0.02;
+
+/// Where a node is in the lattice.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct LatticeNode {
+    /// The cell's first lattice point.
+    point: u32,
+    /// Position in the cell, 0 to 1.
+    within: [f32; 3],
+}
+
+impl LatticeNode {
+    /// At the first point.
+    pub const EMPTY: Self = Self { point: 0, within: [0.0; 3] };
+}
+
+/// Cells along each axis and the functions that were kept.
+#[derive(Clone, Debug)]
+pub(super) struct Lattice {
+    cells: [u32; 3],
+    /// Corner and size of the box, m.
+    low: [f32; 3],
+    size: [f32; 3],
+    functions: usize,
+    /// Function of each lattice point; [`MAX_FUNCTIONS`] for a dropped one.
+    of_point: [u8; MAX_POINTS],
+}
+
+impl Lattice {
+    pub(super) const NONE: Self =
+        Self { cells: [0; 3], low: [0.0; 3], size: [0.0; 3], functions: 0, of_point: [DROPPED; MAX_POINTS] };
+
+    pub(super) const fn functions(&self) -> usize {
+        self.functions
+    }
+
+    pub(super) const fn cells(&self) -> [u32; 3] {
+        self.cells
+    }
+
+    /// A lattice of the given cells on the box around the points.
+    pub(super) fn new(
+        cells: [u32; 3],
+        points: &[[f32; 3]],
+        inertia: &[NodeInertia],
+    ) -> Result<Self, InertiaError> {
+        let fits = cells.iter().all(|&count| (1..MAX_POINTS as u32).contains(&count))
+            && cells.iter().map(|&count| count as usize + 1).product::<usize>() <= MAX_POINTS;
+        if !fits {
+            return Err(InertiaError::Cells { cells });
+        }
+        let (low, size) = bounding_box(points);
+        let mut lattice = Self { cells, low, size, functions: 0, of_point: [DROPPED; MAX_POINTS] };
+        let mut mass = [0.0f32; MAX_POINTS];
+        for (&point, inertia) in points.iter().zip(inertia) {
+            let free = inertia.inverse.iter().filter(|&&inverse| inverse > 0.0).count() as f32 / 3.0;
+            for (point, weight) in lattice.points(&lattice.place(point)) {
+                if let Some(mass) = mass.get_mut(point) {
+                    *mass += inertia.mass * weight * free;
+                }
+            }
+        }
+        let largest = mass.iter().copied().fold(0.0, f32::max);
+        for (function, mass) in lattice.of_point.iter_mut().zip(mass) {
+            if mass > LEAST_MASS * largest {
+                if lattice.functions == MAX_FUNCTIONS {
+                    return Err(InertiaError::Functions { cells });
+                }
+                *function = lattice.functions as u8;
+                lattice.functions += 1;
+            }
+        }
+        Ok(lattice)
+    }
+
+    /// Where a point is.
+    pub(super) fn place(&self, point: [f32; 3]) -> LatticeNode {
+        let row = [1, self.cells[0] + 1, (self.cells[0] + 1) * (self.cells[1] + 1)];
+        let mut node = LatticeNode::EMPTY;
+        for axis in 0..3 {
+            let (count, size) = (self.cells[axis], self.size[axis]);
+            let place = if size > 0.0 { (point[axis] - self.low[axis]) / size * count as f32 } else { 0.0 };
+            // Rounding may take the last node just beyond the box.
+            let cell = (place as u32).min(count.saturating_sub(1));
+            node.point += cell * row[axis];
+            node.within[axis] = (place - cell as f32).clamp(0.0, 1.0);
+        }
+        node
+    }
+
+    /// Lattice points and weights of a node.
+    #[inline(always)]
+    fn points(&self, node: &LatticeNode) -> [(usize, f32); 8] {
+        let (row, layer) =
+            (self.cells[0] as usize + 1, (self.cells[0] as usize + 1) * (self.cells[1] as usize + 1));
+        let [x, y, z] = node.within;
+        let first = node.point as usize;
+        let (nx, ny, nz) = (1.0 - x, 1.0 - y, 1.0 - z);
+        let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
+        [
+            (first, a * nz),
+            (first + 1, b * nz),
+            (first + row, c * nz),
+            (first + row + 1, d * nz),
+            (first + layer, a * z),
+            (first + layer + 1, b * z),
+            (first + layer + row, c * z),
+            (first + layer + row + 1, d * z),
+        ]
+    }
+
+    /// Functions and weights of a node; dropped ones are number [`MAX_FUNCTIONS`].
+    #[inline(always)]
+    pub(super) fn weights(&self, node: &LatticeNode) -> [(usize, f32); 8] {
+        self.points(node).map(|(point, weight)| {
+            (usize::from(self.of_point.get(point).copied().unwrap_or(DROPPED)), weight)
+        })
+    }
+}
+
+/// Vectors of the functions, with one more place for what dropped ones would get.
+pub(super) type CoarseVectors = [NodeVector; MAX_FUNCTIONS + 1];
+
+/// Adds `W^T v` of one node.
+#[inline(always)]
+pub(super) fn restrict(weights: &[(usize, f32); 8], v: [f32; 4], sums: &mut CoarseVectors) {
+    for &(function, weight) in weights {
+        if let Some(sum) = sums.get_mut(function) {
+            for (sum, v) in sum.0.iter_mut().zip(v) {
+                *sum += weight * v;
+            }
+        }
+    }
+}
+
+/// `W x` of one node.
+#[inline(always)]
+pub(super) fn prolong(weights: &[(usize, f32); 8], x: &CoarseVectors) -> [f32; 4] {
+    let mut out = [0.0; 4];
+    for &(function, weight) in weights {
+        if let Some(x) = x.get(function) {
+            for (out, x) in out.iter_mut().zip(x.0) {
+                *out += weight * x;
+            }
+        }
+    }
+    out
+}
+
+fn bounding_box(points: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
+    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for point in points {
+        for axis in 0..3 {
+            low[axis] = low[axis].min(point[axis]);
+            high[axis] = high[axis].max(point[axis]);
+        }
+    }
+    (low, [0, 1, 2].map(|axis| high[axis] - low[axis]))
+}
+
+/// Near-cubic cells, `parts` along the longest side of the box around the points.
+pub(super) fn near_cubic(points: &[[f32; 3]], parts: u32) -> [u32; 3] {
+    let (_, size) = bounding_box(points);
+    let longest = size.iter().copied().fold(0.0, f32::max);
+    size.map(|size| (libm::roundf(size / longest * parts as f32) as u32).max(1))
+}

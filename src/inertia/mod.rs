@@ -1,0 +1,401 @@
+//! Steps beyond the limit of stability, without a network: inertia is raised where a step `D` would be
+//! unstable, and smooth motion is given its true inertia back through a coarse lattice. One force evaluation a
+//! step, as in the exact one.
+//!
+//! Two methods share the code: *mass scaling* (no lattice; the bound of every element is current in every
+//! step) and *multilevel inertia* (with a lattice; bounds and coarse inertia are renewed in cycles, an
+//! equal part each step). Precedent: selective mass scaling (Olovsson et al. 2005), reciprocal mass matrices
+//! (Tkachuk & Bischoff 2015).
+//!
+//! # The step
+//!
+//! ```text
+//! r   = D^2 f - 2 k m du                            k = mu D / 2
+//! du+ = du + M^-1 r + W (S^-1 - G^-1) W^T r         M = N + reserve m      (node.rs)
+//! S   = (1 + k) Mc + s_c D^2 / 4 Kc,  G = W^T M W                          (assembly.rs)
+//! ```
+//! `N >= s D^2 / 4 sum_e D_a`, the elements' bound ([`bound`](self#the-bound)). The operator is symmetric, and positive: on the motion of
+//! the lattice it is `S^-1` in the energy's inner product, on the rest `M^-1`.
+//!
+//! # Why it is stable
+//!
+//! Central differences with the operator `B` are stable while `lambda_max(B K) < 4 / D^2`. As `G` is positive,
+//! `B <= M^-1 + W S^-1 W^T`, and the largest eigenvalue of a sum of products with `K` is at most the sum of
+//! theirs:
+//!
+//! ```text
+//! lambda_max(B K) <= lambda_max(M^-1 K) + lambda_max(S^-1 W^T K W) <= 4 / D^2 (1 / s + 1 / s_c)
+//! ```
+//! The first because `K <= sum_e D_a <= 4 / (s D^2) N`, the second because `W^T K W <= Kc`: both are made from the same bound of
+//! each element's tangent, for any mesh, support, material and state. With `s` = 1.35 and `s_c` = 6 the
+//! bracket is 0.907: it allows the stiffness of a node to grow by 5 % and that of the lattice's motion by 33 %
+//! while a cycle lasts. **Where they grow more, the step is held back at run time**: each step computes a
+//! scalar bound of every element, which rides along with the forces; a node whose sum has grown beyond its
+//! allowance gets the inverse inertia divided by the growth, and the lattice's part is multiplied by
+//! `1.33 / growth`. `G` may lag behind without harm: it does not appear in the bound.
+//!
+//! A linear bound says nothing about a step that is large against the law's own range. So a node's force may
+//! not move it from rest by more than a fiftieth of the least height of its elements; its
+//! inertia is raised to that ([`Report::held_back`]). What is conserved when inertia changes is stated in `node.rs`.
+//! If a step goes wrong all the same, the energy account says so and the step is not taken.
+//!
+//! # What it costs
+//!
+//! Accuracy: motion that neither has its true inertia nor is carried by the lattice lags behind. [`Report`]
+//! says how much inertia was added, and where. Memory: [`vectors_for`], one [`LatticeNode`] a node and
+//! [`numbers_for`] numbers for the lattice.
+
+mod assembly;
+mod bound;
+mod dense;
+mod lattice;
+mod node;
+mod refresh;
+mod report;
+mod step;
+mod vectors;
+
+pub use lattice::{LatticeNode, MAX_FUNCTIONS, MAX_POINTS};
+pub use report::Report;
+pub use step::step;
+pub use vectors::vectors_for;
+
+use core::fmt;
+
+use crate::lanes::{Gather, NodeVector, Scatter, dispatch};
+use crate::material::Material;
+use crate::scene::{ElementBlock, NodeInertia, Scene};
+use crate::state::State;
+use crate::tled::{InternalForces, Step};
+
+use bound::MatrixBeside;
+use lattice::Lattice;
+use node::{Scaling, renew};
+use refresh::{Matrices, Refresh, Sources};
+use report::Tally;
+use vectors::NodeTables;
+
+/// `s` of mass scaling alone: the bound is current in every step, so this is for rounding.
+const FINE_ALONE: f32 = 1.05;
+/// `s` and `s_c` with a lattice.
+const FINE: f32 = 1.35;
+const COARSE: f32 = 6.0;
+/// How far the stiffness of a node may grow before it is held back.
+const NODE_GROWTH: f32 = 1.05;
+/// How far that of the lattice's motion may grow: `NODE_GROWTH / FINE + COARSE_GROWTH / COARSE = 1`.
+const COARSE_GROWTH: f32 = COARSE * (1.0 - NODE_GROWTH / FINE);
+/// Largest part of an element that a node's force may move it by in one step from rest.
+const LARGEST_KICK: f32 = 0.02;
+/// Steps of a refresh cycle.
+pub const CYCLE: u32 = 32;
+
+/// Numbers that a lattice of this many functions needs.
+#[must_use]
+pub const fn numbers_for(functions: usize) -> usize {
+    refresh::numbers_for(functions)
+}
+
+/// Why an inertia could not be prepared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum InertiaError {
+    /// Less room than the scene or the lattice needs.
+    Capacity {
+        /// "vectors", "lattice nodes", "numbers" or "state".
+        kind: &'static str,
+        /// How many are needed.
+        needed: usize,
+        /// Room.
+        capacity: usize,
+    },
+    /// A lattice has no cell along some axis or more than [`MAX_POINTS`] points.
+    Cells {
+        /// Cells along x, y, z.
+        cells: [u32; 3],
+    },
+    /// A lattice has more than [`MAX_FUNCTIONS`] functions.
+    Functions {
+        /// Cells along x, y, z.
+        cells: [u32; 3],
+    },
+    /// Other points than the scene was built from.
+    Points {
+        /// Points given.
+        points: usize,
+        /// Nodes of the scene.
+        nodes: usize,
+    },
+    /// The state is not finite, or so stiff that no step can be bounded.
+    NotFinite {
+        /// The first such node.
+        node: u32,
+    },
+}
+
+impl fmt::Display for InertiaError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Capacity { kind, needed, capacity } => {
+                write!(f, "the inertia needs {needed} {kind}, there is room for {capacity}")
+            }
+            Self::Cells { cells: [x, y, z] } => write!(
+                f,
+                "a lattice of {x} x {y} x {z} cells: each must be at least 1, with at most {MAX_POINTS} points"
+            ),
+            Self::Functions { cells: [x, y, z] } => {
+                write!(f, "a lattice of {x} x {y} x {z} cells has more than {MAX_FUNCTIONS} functions")
+            }
+            Self::Points { points, nodes } => {
+                write!(f, "{points} points for a scene of {nodes} nodes")
+            }
+            Self::NotFinite { node } => write!(f, "node {node}: its stiffness is not a finite number"),
+        }
+    }
+}
+
+impl core::error::Error for InertiaError {}
+
+/// The inertia of a scene for one step length over storage of the caller: `V` for [`vectors_for`] the
+/// nodes, `W` for a [`LatticeNode`] each, `D` for [`numbers_for`] the functions (both empty without a lattice).
+#[derive(Clone, Debug)]
+pub struct Inertia<V, W, D> {
+    vectors: V,
+    places: W,
+    dense: D,
+    nodes: usize,
+    step: Option<Step>,
+    lattice: Lattice,
+    refresh: Refresh,
+    scaling: Scaling,
+    report: Report,
+}
+
+/// Mass scaling alone.
+pub type MassScaling<V> = Inertia<V, [LatticeNode; 0], [f32; 0]>;
+
+impl<V> MassScaling<V> {
+    /// Over the given vectors; [`Inertia::prepare`] comes next.
+    pub const fn scaling_over(vectors: V) -> Self {
+        Self::over(vectors, [], [])
+    }
+}
+
+impl<V, W, D> Inertia<V, W, D> {
+    /// Over the given storage; [`Inertia::prepare`] comes next.
+    pub const fn over(vectors: V, places: W, dense: D) -> Self {
+        Self {
+            vectors,
+            places,
+            dense,
+            nodes: 0,
+            step: None,
+            lattice: Lattice::NONE,
+            refresh: Refresh::NEW,
+            scaling: Scaling { weight: 0.0, k: 0.0, reserve: 0.0, loss: 0.0 },
+            report: Report::NONE,
+        }
+    }
+
+    /// What the latest step, or the preparation, found.
+    pub const fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// Cells of the lattice along each axis, zeros without one.
+    #[must_use]
+    pub const fn cells(&self) -> [u32; 3] {
+        self.lattice.cells()
+    }
+
+    /// Functions of the lattice: those that support or body leave something to move.
+    #[must_use]
+    pub const fn functions(&self) -> usize {
+        self.lattice.functions()
+    }
+}
+
+/// The largest near-cubic lattice whose cost stays a small part of the step's: with `n = 3` unknowns a function, `n^3` at
+/// most 200 times the elements (the inversions of a cycle then cost about a tenth of a force evaluation a step). Also
+/// gives its number of functions, for [`numbers_for`]. No cells if not even one would do.
+#[must_use]
+pub fn suggested_lattice<M, N, B>(scene: &Scene<M, N, B>, points: &[[f32; 3]]) -> ([u32; 3], usize)
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+{
+    let mut best = ([0; 3], 0);
+    for parts in 1..64 {
+        let cells = lattice::near_cubic(points, parts);
+        let Ok(lattice) = Lattice::new(cells, points, scene.inertia()) else {
+            break;
+        };
+        let unknowns = 3 * lattice.functions() as u64;
+        if unknowns * unknowns * unknowns > 200 * scene.element_count() as u64 {
+            break;
+        }
+        best = (cells, lattice.functions());
+    }
+    best
+}
+
+/// Functions that a lattice of these cells has on the scene.
+pub fn lattice_functions<M, N, B>(
+    scene: &Scene<M, N, B>,
+    points: &[[f32; 3]],
+    cells: [u32; 3],
+) -> Result<usize, InertiaError>
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+{
+    Ok(Lattice::new(cells, points, scene.inertia())?.functions())
+}
+
+impl<V, W, D> Inertia<V, W, D>
+where
+    V: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+    W: AsRef<[LatticeNode]> + AsMut<[LatticeNode]>,
+    D: AsRef<[f32]> + AsMut<[f32]>,
+{
+    /// Computes the inertia for steps of `step` from the state as it is, with a lattice of `cells` along each
+    /// axis (zeros for mass scaling alone) around the scene's `points` at rest. Takes a few force evaluations, and for a
+    /// lattice about as many as a cycle of steps. On an error no step can be taken.
+    pub fn prepare<M, N, B, S>(
+        &mut self,
+        scene: &Scene<M, N, B>,
+        points: &[[f32; 3]],
+        state: &mut State<S>,
+        step: Step,
+        cells: [u32; 3],
+    ) -> Result<(), InertiaError>
+    where
+        M: Material,
+        N: AsRef<[NodeInertia]>,
+        B: AsRef<[ElementBlock]>,
+        S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+    {
+        self.step = None;
+        let nodes = scene.node_count();
+        if points.len() != nodes {
+            return Err(InertiaError::Points { points: points.len(), nodes });
+        }
+        let room = |kind, needed, capacity| {
+            if capacity < needed { Err(InertiaError::Capacity { kind, needed, capacity }) } else { Ok(()) }
+        };
+        room("vectors", vectors_for(nodes), self.vectors.as_ref().len())?;
+        room("state", nodes, state.capacity())?;
+        self.lattice =
+            if cells == [0; 3] { Lattice::NONE } else { Lattice::new(cells, points, scene.inertia())? };
+        let functions = self.lattice.functions();
+        if functions > 0 {
+            room("lattice nodes", nodes, self.places.as_ref().len())?;
+            room("numbers", numbers_for(functions), self.dense.as_ref().len())?;
+        }
+
+        let (dt, damping) = (step.seconds(), step.damping());
+        let k = 0.5 * damping * dt;
+        let alone = functions == 0;
+        let fine = if alone { FINE_ALONE } else { FINE };
+        self.scaling = Scaling {
+            weight: 0.25 * fine * dt * dt,
+            k,
+            reserve: if alone { k } else { k * (1.0 + k) },
+            loss: 2.0 * damping * dt * dt * if alone { 1.0 } else { CYCLE as f32 },
+        };
+        let Some(mut tables) = NodeTables::split(self.vectors.as_mut(), nodes) else {
+            return Ok(());
+        };
+        write_heights(scene, &mut tables);
+        let (Some(displacement), Some(increment)) =
+            (state.displacement.as_ref().get(..nodes), state.increment.as_mut().get_mut(..nodes))
+        else {
+            return Ok(());
+        };
+        self.refresh = Refresh::over(CYCLE, scene.blocks().len(), nodes, functions);
+        if alone {
+            tables.clear_sums();
+            bounds(scene, displacement, &mut tables);
+            let mut tally = Tally::NEW;
+            for (node, inertia) in scene.inertia().iter().enumerate() {
+                let (stiffness, scalar) = tables.summed(node);
+                let renewed = renew(inertia, stiffness, None, [0.0; 3], &self.scaling);
+                tally.add(node, renewed.added);
+                tables.set(node, &renewed.inverse, scalar, 1.0);
+            }
+            self.report = tally.report(0, 1.0);
+        } else {
+            for (place, &point) in self.places.as_mut().iter_mut().zip(points) {
+                *place = self.lattice.place(point);
+            }
+            let Some(mut matrices) = Matrices::split(self.dense.as_mut(), functions) else {
+                return Ok(());
+            };
+            let sources = Sources {
+                scene,
+                displacement,
+                increment,
+                lattice: &self.lattice,
+                places: self.places.as_ref(),
+                scaling: &self.scaling,
+                coarse_weight: 0.25 * COARSE * dt * dt,
+            };
+            self.refresh.complete(sources, &mut tables, &mut matrices);
+            self.report = self.refresh.published.report(0, 1.0);
+        }
+        let bad = (0..nodes).find(|&node| {
+            let (at, scalar) = tables.node(node);
+            !(at.inverse.trace().is_finite() && scalar.is_finite())
+        });
+        if let Some(node) = bad {
+            return Err(InertiaError::NotFinite { node: node as u32 });
+        }
+        self.nodes = nodes;
+        self.step = Some(step);
+        Ok(())
+    }
+}
+
+/// The sums of all elements' bounds; forces go nowhere.
+fn bounds<M, N, B>(scene: &Scene<M, N, B>, displacement: &[NodeVector], tables: &mut NodeTables<'_>)
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+{
+    let mut nowhere = [NodeVector::ZERO];
+    if let (Some(displacement), Some(force), Some(diagonal), Some(beside)) = (
+        Gather::new(displacement),
+        Scatter::new(&mut nowhere),
+        Scatter::new(tables.sum_diagonal),
+        Scatter::new(tables.sum_beside),
+    ) {
+        let beside = MatrixBeside { diagonal, beside };
+        dispatch(InternalForces { scene, displacement, force, beside });
+    }
+}
+
+/// Writes the least height of each node's elements, `1 / |ga|`, into the fourth number of `next`.
+fn write_heights<M, N, B>(scene: &Scene<M, N, B>, tables: &mut NodeTables<'_>)
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+{
+    // First the largest |ga|^2, then the height.
+    tables.next.fill(NodeVector::ZERO);
+    for (block, lane) in scene.places() {
+        let slopes = [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| block.gradient_of(corner, axis, lane)));
+        let origin = [0, 1, 2].map(|axis| slopes[0][axis] + slopes[1][axis] + slopes[2][axis]);
+        for (corner, [x, y, z]) in [origin, slopes[0], slopes[1], slopes[2]].into_iter().enumerate() {
+            if let Some(node) = tables.next.get_mut(block.node(corner, lane)) {
+                let square = x * x + y * y + z * z;
+                node.0[3] = if square > node.0[3] { square } else { node.0[3] };
+            }
+        }
+    }
+    for node in tables.next.iter_mut() {
+        node.0[3] = if node.0[3] > 0.0 { 1.0 / libm::sqrtf(node.0[3]) } else { f32::MAX };
+    }
+}

@@ -1,0 +1,408 @@
+//! The refresh of bounds, inertia and coarse inertia, spread over steps: a cycle of four stages (elements,
+//! nodes, two inversions), each step taking an equal part of the whole cycle's work. It only ever looks at
+//! the state after an accepted step.
+//!
+//! ```text
+//! elements   D_a (bound) and S = s_c D^2 / 4 Kc
+//! nodes      N_a, at once in use; S += (1 + k) Mc, G = W^T (N + reserve m) W, p = W^T (N + reserve m) v
+//! inversions G^-1, then S^-1; X = S^-1 - G^-1 is in use from then on
+//! ```
+//! The coarse part of the velocity is `c = G^-1 p`, its energy `c^T S c`. As for the nodes
+//! ([`super::node`]), a change of `S` may not add energy: `c` is scaled down to what it had.
+
+use super::assembly::{Assembly, Element};
+use super::bound::{Bound, MatrixBeside};
+use super::dense::{apply, eliminate, mirror, stride};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, restrict};
+use super::node::{Scaling, renew};
+use super::report::Tally;
+use super::vectors::NodeTables;
+use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, Scatter, dispatch};
+use crate::material::{Law, Material};
+use crate::scene::{ElementBlock, NodeInertia, Scene};
+use crate::symmetric::Symmetric;
+use crate::tled::Deformation;
+
+/// The four dense matrices of a lattice.
+pub(super) struct Matrices<'a> {
+    /// `X`, what a step applies.
+    pub(super) applied: &'a mut [f32],
+    /// `S` of `X`, not inverted.
+    kept: &'a mut [f32],
+    /// The next `S`.
+    next: &'a mut [f32],
+    /// The next `G`.
+    fine: &'a mut [f32],
+}
+
+/// Numbers that the matrices of a lattice with this many functions need.
+pub(super) const fn numbers_for(functions: usize) -> usize {
+    4 * 3 * functions * stride(functions)
+}
+
+impl<'a> Matrices<'a> {
+    pub(super) fn split(dense: &'a mut [f32], functions: usize) -> Option<Self> {
+        let one = 3 * functions * stride(functions);
+        let (applied, rest) = dense.split_at_mut_checked(one)?;
+        let (kept, rest) = rest.split_at_mut_checked(one)?;
+        let (next, rest) = rest.split_at_mut_checked(one)?;
+        Some(Self { applied, kept, next, fine: rest.get_mut(..one)? })
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Elements,
+    Nodes,
+    Fine,
+    Next,
+}
+
+/// Where the cycle is, and what it hands to the step.
+#[derive(Clone, Debug)]
+pub(super) struct Refresh {
+    stage: Stage,
+    /// Blocks, nodes or pivots done in this stage.
+    done: usize,
+    credit: i64,
+    per_step: i64,
+    /// Nothing has been computed yet.
+    first: bool,
+    /// Largest growth of a node's bound from the cycle that made `X` to the one that made its inertia.
+    pub(super) carried: f32,
+    /// Coarse velocity to be taken away by the next step, m a step.
+    pub(super) correction: CoarseVectors,
+    momentum: CoarseVectors,
+    sound: bool,
+    tally: Tally,
+    /// Of the last whole cycle.
+    pub(super) published: Tally,
+}
+
+/// Relative cost of one block, node and row of a pivot, in floating-point operations.
+const BLOCK_COST: i64 = 12_000;
+const NODE_COST: i64 = 1_200;
+
+const NO_VECTORS: CoarseVectors = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+
+/// What a refresh reads, and the velocities that it may scale.
+pub(super) struct Sources<'a, M, N, B> {
+    pub(super) scene: &'a Scene<M, N, B>,
+    pub(super) displacement: &'a [NodeVector],
+    pub(super) increment: &'a mut [NodeVector],
+    pub(super) lattice: &'a Lattice,
+    pub(super) places: &'a [LatticeNode],
+    pub(super) scaling: &'a Scaling,
+    /// `s_c D^2 / 4`, s^2.
+    pub(super) coarse_weight: f32,
+}
+
+impl Refresh {
+    pub(super) const NEW: Self = Self {
+        stage: Stage::Elements,
+        done: 0,
+        credit: 0,
+        per_step: 0,
+        first: true,
+        carried: 1.0,
+        correction: NO_VECTORS,
+        momentum: NO_VECTORS,
+        sound: true,
+        tally: Tally::NEW,
+        published: Tally::NEW,
+    };
+
+    /// A cycle of `steps` steps over a scene with this many blocks and nodes.
+    pub(super) fn over(steps: u32, blocks: usize, nodes: usize, functions: usize) -> Self {
+        let whole = blocks as i64 * BLOCK_COST
+            + nodes as i64 * NODE_COST
+            + 6 * functions as i64 * pivot_cost(functions);
+        Self { per_step: whole / i64::from(steps) + 1, ..Self::NEW }
+    }
+
+    /// One step's part of the cycle.
+    pub(super) fn advance<M, N, B>(
+        &mut self,
+        mut from: Sources<'_, M, N, B>,
+        tables: &mut NodeTables<'_>,
+        matrices: &mut Matrices<'_>,
+    ) where
+        M: Material,
+        N: AsRef<[NodeInertia]>,
+        B: AsRef<[ElementBlock]>,
+    {
+        self.credit += self.per_step;
+        while self.credit > 0 {
+            self.credit -= self.work(&mut from, tables, matrices);
+        }
+    }
+
+    /// A whole cycle at once.
+    pub(super) fn complete<M, N, B>(
+        &mut self,
+        mut from: Sources<'_, M, N, B>,
+        tables: &mut NodeTables<'_>,
+        matrices: &mut Matrices<'_>,
+    ) where
+        M: Material,
+        N: AsRef<[NodeInertia]>,
+        B: AsRef<[ElementBlock]>,
+    {
+        while self.first {
+            self.work(&mut from, tables, matrices);
+        }
+    }
+
+    /// The next piece of work, with its cost.
+    fn work<M, N, B>(
+        &mut self,
+        from: &mut Sources<'_, M, N, B>,
+        tables: &mut NodeTables<'_>,
+        matrices: &mut Matrices<'_>,
+    ) -> i64
+    where
+        M: Material,
+        N: AsRef<[NodeInertia]>,
+        B: AsRef<[ElementBlock]>,
+    {
+        let functions = from.lattice.functions();
+        let (size, stride) = (3 * functions, stride(functions));
+        let at = self.done;
+        self.done += 1;
+        match self.stage {
+            Stage::Elements => {
+                if at == 0 {
+                    tables.clear_sums();
+                    matrices.next.fill(0.0);
+                }
+                self.elements(from, tables, matrices, at, stride);
+                if self.done >= from.scene.blocks().len() {
+                    self.enter(Stage::Nodes);
+                }
+                BLOCK_COST
+            }
+            Stage::Nodes => {
+                if at == 0 {
+                    matrices.fine.fill(0.0);
+                    self.momentum = NO_VECTORS;
+                }
+                self.node(from, tables, matrices, at, stride);
+                if self.done >= from.scene.node_count() {
+                    self.enter(Stage::Fine);
+                }
+                NODE_COST
+            }
+            Stage::Fine => {
+                if at == 0 {
+                    mirror(matrices.fine, size, stride);
+                }
+                self.sound &= eliminate(matrices.fine, size, stride, at);
+                if self.done >= size {
+                    mirror(matrices.next, size, stride);
+                    self.keep_energy(matrices, size, stride);
+                    self.enter(Stage::Next);
+                }
+                pivot_cost(functions)
+            }
+            Stage::Next => {
+                self.sound &= eliminate(matrices.next, size, stride, at);
+                if self.done >= size {
+                    self.put_in_use(matrices);
+                    self.enter(Stage::Elements);
+                }
+                pivot_cost(functions)
+            }
+        }
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        self.stage = stage;
+        self.done = 0;
+    }
+
+    fn elements<M, N, B>(
+        &self,
+        from: &Sources<'_, M, N, B>,
+        tables: &mut NodeTables<'_>,
+        matrices: &mut Matrices<'_>,
+        at: usize,
+        stride: usize,
+    ) where
+        M: Material,
+        N: AsRef<[NodeInertia]>,
+        B: AsRef<[ElementBlock]>,
+    {
+        let (Some(displacement), Some(diagonal), Some(beside)) = (
+            Gather::new(from.displacement),
+            Scatter::new(tables.sum_diagonal),
+            Scatter::new(tables.sum_beside),
+        ) else {
+            return;
+        };
+        let Some(block) = from.scene.blocks().get(at) else {
+            return;
+        };
+        let assembly = Assembly {
+            lattice: from.lattice,
+            nodes: from.places,
+            inertia: from.scene.inertia(),
+            matrix: matrices.next,
+            stride,
+        };
+        let sums = MatrixBeside { diagonal, beside };
+        let material = from.scene.material();
+        dispatch(OneBlock { material, block, displacement, sums, assembly, weight: from.coarse_weight });
+    }
+
+    fn node<M, N, B>(
+        &mut self,
+        from: &mut Sources<'_, M, N, B>,
+        tables: &mut NodeTables<'_>,
+        matrices: &mut Matrices<'_>,
+        at: usize,
+        stride: usize,
+    ) where
+        M: Material,
+        N: AsRef<[NodeInertia]>,
+        B: AsRef<[ElementBlock]>,
+    {
+        let (Some(inertia), Some(increment), Some(place)) =
+            (from.scene.inertia().get(at), from.increment.get_mut(at), from.places.get(at))
+        else {
+            return;
+        };
+        let (stiffness, scalar) = tables.summed(at);
+        let (old, old_scalar) = tables.node(at);
+        let velocity = increment.to_array();
+        let renewed = renew(inertia, stiffness, (!self.first).then_some(old.inverse), velocity, from.scaling);
+        tables.set(at, &renewed.inverse, scalar, if self.first { 1.0 } else { old.share });
+        self.tally.add(at, renewed.added);
+        if !self.first && old_scalar > 0.0 {
+            let growth = scalar / old_scalar;
+            self.carried = if growth > self.carried { growth } else { self.carried };
+        }
+        let kept = velocity.map(|v| v * renewed.velocity);
+        // A held axis follows its support and has no inertia here.
+        for axis in 0..3 {
+            if inertia.inverse[axis] > 0.0 {
+                increment.0[axis] = kept[axis];
+            }
+        }
+        let [x, y, z] = renewed.inertia.times(kept);
+        restrict(&from.lattice.weights(place), [x, y, z, 0.0], &mut self.momentum);
+        let assembly = |matrix| Assembly {
+            lattice: from.lattice,
+            nodes: from.places,
+            inertia: from.scene.inertia(),
+            matrix,
+            stride,
+        };
+        assembly(&mut *matrices.fine).add_node(place, &renewed.inertia);
+        let mass = inertia.mass * (1.0 + from.scaling.k);
+        let mass = Symmetric { xx: mass, yy: mass, zz: mass, ..Symmetric::default() };
+        assembly(&mut *matrices.next).add_node(place, &mass.on_free(inertia.inverse));
+    }
+
+    /// What has to go from the coarse velocity so that the next `S` adds no energy. `G` is inverted,
+    /// the next `S` not yet.
+    fn keep_energy(&mut self, matrices: &mut Matrices<'_>, size: usize, stride: usize) {
+        let mut momentum = [0.0; 3 * MAX_FUNCTIONS];
+        to_numbers(&self.momentum, &mut momentum);
+        let (mut velocity, mut image) = ([0.0; ROW], [0.0; ROW]);
+        let (Some(momentum), Some(velocity), Some(image)) =
+            (momentum.get(..size), velocity.get_mut(..stride), image.get_mut(..stride))
+        else {
+            return;
+        };
+        apply(matrices.fine, stride, momentum, velocity);
+        let Some(velocity) = velocity.get(..size) else {
+            return;
+        };
+        let mut energy = |matrix: &[f32]| {
+            apply(matrix, stride, velocity, image);
+            velocity.iter().zip(image.iter()).map(|(v, image)| v * image).sum::<f32>()
+        };
+        let (before, after) = (energy(matrices.kept), energy(matrices.next));
+        let kept = if !self.first && after > before * (1.0 + 1e-5) && after > 0.0 {
+            libm::sqrtf(if before > 0.0 { before / after } else { 0.0 })
+        } else {
+            1.0
+        };
+        from_numbers(velocity, 1.0 - kept, &mut self.correction);
+        matrices.kept.copy_from_slice(matrices.next);
+    }
+
+    fn put_in_use(&mut self, matrices: &mut Matrices<'_>) {
+        let inverses = matrices.next.iter().zip(matrices.fine.iter());
+        for (applied, (next, fine)) in matrices.applied.iter_mut().zip(inverses) {
+            *applied = if self.sound { next - fine } else { 0.0 };
+        }
+        self.published = self.tally;
+        self.tally = Tally::NEW;
+        self.sound = true;
+        self.carried = 1.0;
+        self.first = false;
+    }
+}
+
+/// Numbers in the longest row.
+pub(super) const ROW: usize = stride(MAX_FUNCTIONS);
+
+fn pivot_cost(functions: usize) -> i64 {
+    (2 * 3 * functions * stride(functions)) as i64 / 2
+}
+
+pub(super) fn to_numbers(vectors: &CoarseVectors, numbers: &mut [f32]) {
+    for (three, vector) in numbers.chunks_exact_mut(3).zip(vectors) {
+        three.copy_from_slice(&vector.to_array());
+    }
+}
+
+/// `vectors = factor numbers`; vectors beyond the numbers are left as they are.
+pub(super) fn from_numbers(numbers: &[f32], factor: f32, vectors: &mut CoarseVectors) {
+    for (three, vector) in numbers.chunks_exact(3).zip(vectors) {
+        for (component, number) in vector.0.iter_mut().zip(three) {
+            *component = factor * number;
+        }
+    }
+}
+
+struct OneBlock<'a, M> {
+    material: &'a M,
+    block: &'a ElementBlock,
+    displacement: Gather<'a>,
+    sums: MatrixBeside<'a>,
+    assembly: Assembly<'a>,
+    weight: f32,
+}
+
+impl<M: Material> Kernel for OneBlock<'_, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: Real>(mut self) {
+        for first in (0..BLOCK).step_by(R::COUNT) {
+            let block = self.block;
+            let law = M::Law::widen(|lane| self.material.law(block.element(first + lane)));
+            let deformation = Deformation::<R>::of_block(block, first, self.displacement);
+            let bound = Bound::<R>::new::<M::Law>(&law, &deformation);
+            self.sums.add(&bound, block, first, &deformation);
+            let weight = block.volume::<R>(first) * R::splat(self.weight);
+            let (iso, volume) = (weight * bound.iso, weight * bound.volume);
+            let gradients =
+                [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| block.gradient::<R>(corner, axis, first)));
+            let cofactor = [0, 1, 2].map(|j| [0, 1, 2].map(|i| deformation.cofactor(i, j)));
+            for lane in 0..R::COUNT {
+                let slopes = gradients.map(|gradient| gradient.map(|slope| slope.lane(lane)));
+                let origin = [0, 1, 2].map(|axis| -(slopes[0][axis] + slopes[1][axis] + slopes[2][axis]));
+                self.assembly.add_element(&Element {
+                    nodes: [0, 1, 2, 3].map(|corner| block.node(corner, first + lane)),
+                    gradients: [origin, slopes[0], slopes[1], slopes[2]],
+                    iso: iso.lane(lane),
+                    volume: volume.lane(lane),
+                    cofactor: cofactor.map(|[x, y, z]| [x.lane(lane), y.lane(lane), z.lane(lane), 0.0]),
+                });
+            }
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! What the scaling is doing right now.
+
+/// Added inertia, reported with every step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Report {
+    /// Mean over the nodes of the inertia added, in masses of the node.
+    pub added_mean: f32,
+    /// The largest, and the node that has it.
+    pub added_largest: f32,
+    /// See `added_largest`.
+    pub added_node: u32,
+    /// Nodes that the latest step held back: their stiffness has grown since their inertia was computed, or
+    /// their force would have moved them by more than a small part of an element.
+    pub held_back: u32,
+    /// Share of the lattice's motion that was used: below one where the body stiffened since its last refresh.
+    pub coarse_share: f32,
+}
+
+impl Report {
+    pub(super) const NONE: Self =
+        Self { added_mean: 0.0, added_largest: 0.0, added_node: 0, held_back: 0, coarse_share: 1.0 };
+}
+
+/// Sums of added inertia while it is being computed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tally {
+    sum: f32,
+    nodes: u32,
+    largest: f32,
+    node: u32,
+}
+
+impl Tally {
+    pub(super) const NEW: Self = Self { sum: 0.0, nodes: 0, largest: 0.0, node: 0 };
+
+    #[inline(always)]
+    pub(super) fn add(&mut self, node: usize, added: f32) {
+        self.sum += added;
+        self.nodes += 1;
+        if added > self.largest {
+            self.largest = added;
+            self.node = node as u32;
+        }
+    }
+
+    pub(super) fn report(&self, held_back: u32, coarse_share: f32) -> Report {
+        let count = if self.nodes > 0 { self.nodes as f32 } else { 1.0 };
+        Report {
+            added_mean: self.sum / count,
+            added_largest: self.largest,
+            added_node: self.node,
+            held_back,
+            coarse_share,
+        }
+    }
+}

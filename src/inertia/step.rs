@@ -1,0 +1,287 @@
+//! One step with scaled inertia: forces, the fine part of every node with its share of the lattice's force,
+//! the lattice's motion, the account, and only then the state.
+
+use crate::lanes::{Gather, NodeVector, Scatter, dispatch};
+use crate::loads::Loads;
+use crate::material::{J_FLOOR, Material};
+use crate::scene::{ElementBlock, NodeInertia, Scene};
+use crate::state::State;
+use crate::tled::{
+    Divergence, Entry, InternalForces, Status, Step, culprit, external_forces, follow_motions,
+};
+
+use super::assembly::free;
+use super::bound::{MatrixBeside, ScalarBeside};
+use super::dense::{apply, stride};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, prolong, restrict};
+use super::node::{Scaling, renew};
+use super::refresh::{Matrices, ROW, Refresh, Sources, from_numbers, to_numbers};
+use super::report::Tally;
+use super::vectors::NodeTables;
+use super::{COARSE, COARSE_GROWTH, Inertia, LARGEST_KICK, NODE_GROWTH};
+
+/// Takes one step of the length that the inertia was prepared for. Every call does the same work, one
+/// force evaluation and what the lattice needs. `Mismatch` if the inertia was not prepared for this scene.
+pub fn step<M, N, B, S, V, W, D>(
+    scene: &Scene<M, N, B>,
+    loads: &Loads<'_>,
+    state: &mut State<S>,
+    inertia: &mut Inertia<V, W, D>,
+) -> Status
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+    S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+    V: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+    W: AsRef<[LatticeNode]> + AsMut<[LatticeNode]>,
+    D: AsRef<[f32]> + AsMut<[f32]>,
+{
+    let nodes = scene.node_count();
+    let room = state.capacity();
+    let mismatch = Status::Mismatch { nodes, room: if room < inertia.nodes { room } else { inertia.nodes } };
+    let Inertia { vectors, places, dense, step, lattice, refresh, scaling, report, nodes: prepared } =
+        inertia;
+    let State { displacement, increment, force, time, steps, dt, ledger } = state;
+    let (Some(step), Some(displacement), Some(increment), Some(force), Some(mut tables)) = (
+        step.filter(|_| *prepared == nodes),
+        displacement.as_mut().get_mut(..nodes),
+        increment.as_mut().get_mut(..nodes),
+        force.as_mut().get_mut(..nodes),
+        NodeTables::split(vectors.as_mut(), nodes),
+    ) else {
+        return mismatch;
+    };
+    if loads.nodes().is_some_and(|checked| checked != nodes) {
+        return mismatch;
+    }
+    let step = step.carried_from(*dt);
+    let nodal = scene.inertia();
+    let mut account = *ledger;
+    if *steps == 0 {
+        account.start = account.start.max(scene.releasable_energy());
+    }
+
+    external_forces(force, nodal, loads, *time);
+    let functions = lattice.functions();
+    let alone = functions == 0;
+    let (Some(from), Some(to)) = (Gather::new(displacement), Scatter::new(force)) else {
+        return mismatch;
+    };
+    let extremes = if alone {
+        tables.clear_sums();
+        let (Some(diagonal), Some(beside)) =
+            (Scatter::new(tables.sum_diagonal), Scatter::new(tables.sum_beside))
+        else {
+            return mismatch;
+        };
+        let beside = MatrixBeside { diagonal, beside };
+        dispatch(InternalForces { scene, displacement: from, force: to, beside })
+    } else {
+        dispatch(InternalForces { scene, displacement: from, force: to, beside: ScalarBeside })
+    };
+
+    let places = places.as_ref();
+    let mut fine =
+        Fine { step: &step, scaling, lattice, places, held_back: 0, growth: 1.0, tally: Tally::NEW };
+    let mut restricted = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+    fine.prepare(nodal, increment, force, &mut tables, &mut restricted);
+    let (held_back, growth) = (fine.held_back, fine.growth * refresh.carried);
+    let tally = fine.tally;
+    let coarse_share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
+
+    let mut matrices = Matrices::split(dense.as_mut(), functions);
+    let mut solution = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+    if let (Some(matrices), false) = (&matrices, alone) {
+        coarse_motion(matrices.applied, functions, &restricted, coarse_share, refresh, &mut solution);
+    }
+    move_nodes(&step, scaling, nodal, force, lattice, places, &solution, &mut tables);
+
+    let tables_next: &[NodeVector] = tables.next;
+    let next = |node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector| {
+        let [x, y, z, _] = tables_next.get(node).copied().unwrap_or_default().0;
+        [x, y, z, 0.0]
+    };
+    let entry = Entry::of_nodes(nodal, increment, force, loads, &step, next)
+        .with_forces(loads, nodal, increment, force, *time, next)
+        .with_motions(loads, displacement, increment, force, *time, &step);
+    let entered = match entry.entered(account, &step) {
+        Ok(entered) => entered,
+        Err(cause) => {
+            let node = culprit(nodal, increment, force, &step, next);
+            return Status::Diverged(Divergence { time: *time, node, cause });
+        }
+    };
+
+    *ledger = entered;
+    for ((displacement, increment), next) in displacement.iter_mut().zip(&mut *increment).zip(&*tables.next) {
+        let [x, y, z, _] = next.0;
+        increment.0 = [x, y, z, 0.0];
+        for (position, change) in displacement.0.iter_mut().zip(increment.0) {
+            *position += change;
+        }
+    }
+    *dt = step.seconds();
+    *time += f64::from(step.seconds());
+    *steps += 1;
+    follow_motions(loads, displacement, increment, *time);
+    if alone {
+        *report = tally.report(held_back, 1.0);
+    } else if let Some(matrices) = &mut matrices {
+        refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+        let coarse_weight = 0.25 * COARSE * step.seconds() * step.seconds();
+        let sources = Sources { scene, displacement, increment, lattice, places, scaling, coarse_weight };
+        refresh.advance(sources, &mut tables, matrices);
+        *report = refresh.published.report(held_back, coarse_share);
+    }
+    let least_volume_ratio = 1.0 + extremes.least_j;
+    let (saturation, energy_excess) = (extremes.saturation, ledger.excess() as f32);
+    if least_volume_ratio < J_FLOOR || saturation > 1.0 || energy_excess > 0.0 {
+        return Status::Limited { least_volume_ratio, saturation, energy_excess };
+    }
+    Status::Ok
+}
+
+/// The nodes before they move.
+struct Fine<'a> {
+    step: &'a Step,
+    scaling: &'a Scaling,
+    lattice: &'a Lattice,
+    places: &'a [LatticeNode],
+    held_back: u32,
+    growth: f32,
+    tally: Tally,
+}
+
+impl Fine<'_> {
+    /// How much of its inverse inertia each node may use, its velocity (into `next`), and the lattice's share
+    /// of its residual.
+    #[inline(always)]
+    fn prepare(
+        &mut self,
+        nodal: &[NodeInertia],
+        increment: &[NodeVector],
+        force: &mut [NodeVector],
+        tables: &mut NodeTables<'_>,
+        restricted: &mut CoarseVectors,
+    ) {
+        let alone = self.lattice.functions() == 0;
+        let square = self.step.seconds() * self.step.seconds();
+        for (node, ((inertia, increment), force)) in nodal.iter().zip(increment).zip(force).enumerate() {
+            let [fx, fy, fz, scalar] = force.0;
+            force.0[3] = 0.0;
+            let carry = self.step.carry();
+            let velocity = [0, 1, 2].map(|axis| carry * increment.0[axis]);
+            let (mut at, mut made_for) = tables.node(node);
+            let before = at.share;
+            let mut keep = 1.0;
+            if alone {
+                let renewed = renew(inertia, tables.summed(node).0, Some(at.inverse), velocity, self.scaling);
+                (at.inverse, made_for, keep) = (renewed.inverse, scalar, renewed.velocity);
+                tables.set(node, &renewed.inverse, scalar, before);
+                self.tally.add(node, renewed.added);
+            }
+            let growth = if made_for > 0.0 { scalar / made_for } else { 1.0 };
+            let mut share = 1.0;
+            if growth > NODE_GROWTH {
+                share = NODE_GROWTH / growth;
+            }
+            let kick = at.inverse.times([fx * square, fy * square, fz * square]);
+            let length = libm::sqrtf(kick[0] * kick[0] + kick[1] * kick[1] + kick[2] * kick[2]);
+            let Some(next) = tables.next.get_mut(node) else {
+                continue;
+            };
+            let most = LARGEST_KICK * next.0[3];
+            if share * length > most {
+                share = most / length;
+            }
+            if share < before {
+                keep *= libm::sqrtf(share / before);
+            }
+            self.held_back += u32::from(share < 1.0);
+            if growth > self.growth {
+                self.growth = growth;
+            }
+            for axis in 0..3 {
+                next.0[axis] = keep * velocity[axis];
+            }
+            if !alone && let Some(place) = self.places.get(node) {
+                let residual = residual(self.step, self.scaling, inertia, [fx, fy, fz], next);
+                restrict(&self.lattice.weights(place), residual, restricted);
+            }
+            tables.set_share(node, share);
+        }
+    }
+}
+
+/// `D^2 f - 2 k m du` on the free axes, kg m.
+#[inline(always)]
+fn residual(
+    step: &Step,
+    scaling: &Scaling,
+    inertia: &NodeInertia,
+    force: [f32; 3],
+    velocity: &NodeVector,
+) -> [f32; 4] {
+    let square = step.seconds() * step.seconds();
+    let free = free(inertia.inverse);
+    let axis =
+        |axis: usize| free[axis] * (square * force[axis] - 2.0 * scaling.k * inertia.mass * velocity.0[axis]);
+    [axis(0), axis(1), axis(2), 0.0]
+}
+
+/// `share (S^-1 - G^-1) W^T r` less the correction that a change of `S` asked for.
+fn coarse_motion(
+    matrix: &[f32],
+    functions: usize,
+    restricted: &CoarseVectors,
+    share: f32,
+    refresh: &Refresh,
+    solution: &mut CoarseVectors,
+) {
+    let (size, stride) = (3 * functions, stride(functions));
+    let (mut x, mut out) = ([0.0; 3 * MAX_FUNCTIONS], [0.0; ROW]);
+    to_numbers(restricted, &mut x);
+    let (Some(x), Some(out)) = (x.get(..size), out.get_mut(..stride)) else {
+        return;
+    };
+    apply(matrix, stride, x, out);
+    from_numbers(out.get(..size).unwrap_or_default(), share, solution);
+    for (solution, correction) in solution.iter_mut().zip(&refresh.correction) {
+        for (value, correction) in solution.0.iter_mut().zip(correction.0) {
+            *value -= correction;
+        }
+    }
+}
+
+/// The next increments, in `next`.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn move_nodes(
+    step: &Step,
+    scaling: &Scaling,
+    nodal: &[NodeInertia],
+    force: &[NodeVector],
+    lattice: &Lattice,
+    places: &[LatticeNode],
+    solution: &CoarseVectors,
+    tables: &mut NodeTables<'_>,
+) {
+    let alone = lattice.functions() == 0;
+    for (node, (inertia, force)) in nodal.iter().zip(force).enumerate() {
+        let at = tables.node(node).0;
+        let Some(next) = tables.next.get_mut(node) else {
+            continue;
+        };
+        let [x, y, z, _] = residual(step, scaling, inertia, force.to_array(), next);
+        let fine = at.inverse.times([x, y, z]);
+        let mut coarse = [0.0; 4];
+        if !alone && let Some(place) = places.get(node) {
+            coarse = prolong(&lattice.weights(place), solution);
+        }
+        let free = free(inertia.inverse);
+        for axis in 0..3 {
+            next.0[axis] = free[axis] * (next.0[axis] + at.share * fine[axis] + coarse[axis]);
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! What the inertia keeps for each node, in five vectors of four numbers over one storage of the caller.
+
+use super::node::Node;
+use crate::lanes::NodeVector;
+use crate::symmetric::Symmetric;
+
+/// Vectors that the inertia of `nodes` nodes needs.
+#[must_use]
+pub const fn vectors_for(nodes: usize) -> usize {
+    5 * nodes
+}
+
+pub(super) struct NodeTables<'a> {
+    /// `xx, yy, zz` of the inverse inertia in use (1/kg) and the scalar bound it was made for (N/m).
+    inverse_diagonal: &'a mut [NodeVector],
+    /// `xy, yz, zx`, and the share of it in use.
+    inverse_beside: &'a mut [NodeVector],
+    /// Sums of the elements' bounds, N/m, laid out like the inverse.
+    pub(super) sum_diagonal: &'a mut [NodeVector],
+    pub(super) sum_beside: &'a mut [NodeVector],
+    /// The next increment of each node, m; the fourth number is the least height of its elements, m.
+    pub(super) next: &'a mut [NodeVector],
+}
+
+impl<'a> NodeTables<'a> {
+    pub(super) fn split(vectors: &'a mut [NodeVector], nodes: usize) -> Option<Self> {
+        let (inverse_diagonal, rest) = vectors.split_at_mut_checked(nodes)?;
+        let (inverse_beside, rest) = rest.split_at_mut_checked(nodes)?;
+        let (sum_diagonal, rest) = rest.split_at_mut_checked(nodes)?;
+        let (sum_beside, rest) = rest.split_at_mut_checked(nodes)?;
+        Some(Self {
+            inverse_diagonal,
+            inverse_beside,
+            sum_diagonal,
+            sum_beside,
+            next: rest.get_mut(..nodes)?,
+        })
+    }
+
+    pub(super) fn clear_sums(&mut self) {
+        self.sum_diagonal.fill(NodeVector::ZERO);
+        self.sum_beside.fill(NodeVector::ZERO);
+    }
+
+    /// Summed matrix and scalar of a node, N/m.
+    #[inline(always)]
+    pub(super) fn summed(&self, node: usize) -> (Symmetric, f32) {
+        joined(self.sum_diagonal, self.sum_beside, node).0
+    }
+
+    /// The inverse inertia in use and the scalar bound it was made for.
+    #[inline(always)]
+    pub(super) fn node(&self, node: usize) -> (Node, f32) {
+        let ((inverse, scalar), share) = joined(self.inverse_diagonal, self.inverse_beside, node);
+        (Node { inverse, share }, scalar)
+    }
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, node: usize, inverse: &Symmetric, scalar: f32, share: f32) {
+        let places = (self.inverse_diagonal.get_mut(node), self.inverse_beside.get_mut(node));
+        if let (Some(diagonal), Some(beside)) = places {
+            diagonal.0 = [inverse.xx, inverse.yy, inverse.zz, scalar];
+            beside.0 = [inverse.xy, inverse.yz, inverse.zx, share];
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn set_share(&mut self, node: usize, share: f32) {
+        if let Some(beside) = self.inverse_beside.get_mut(node) {
+            beside.0[3] = share;
+        }
+    }
+}
+
+#[inline(always)]
+fn joined(diagonal: &[NodeVector], beside: &[NodeVector], node: usize) -> ((Symmetric, f32), f32) {
+    let [xx, yy, zz, fourth] = diagonal.get(node).copied().unwrap_or_default().0;
+    let [xy, yz, zx, last] = beside.get(node).copied().unwrap_or_default().0;
+    ((Symmetric { xx, yy, zz, xy, yz, zx }, fourth), last)
+}

@@ -1,0 +1,135 @@
+//! Symmetric 3 x 3 matrices of a node: its stiffness (N/m) or inertia (kg) along all directions.
+
+/// `[[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Symmetric {
+    pub(crate) xx: f32,
+    pub(crate) yy: f32,
+    pub(crate) zz: f32,
+    pub(crate) xy: f32,
+    pub(crate) yz: f32,
+    pub(crate) zx: f32,
+}
+
+impl Symmetric {
+    /// The matrix on the free axes (those with a positive inverse mass) and zero on the others.
+    #[inline(always)]
+    pub(crate) fn on_free(self, inverse: [f32; 3]) -> Self {
+        let [x, y, z] = inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 });
+        Self {
+            xx: self.xx * x,
+            yy: self.yy * y,
+            zz: self.zz * z,
+            xy: self.xy * x * y,
+            yz: self.yz * y * z,
+            zx: self.zx * z * x,
+        }
+    }
+
+    /// `diagonal I + factor A`.
+    #[inline(always)]
+    pub(crate) fn scaled_plus(self, factor: f32, diagonal: f32) -> Self {
+        Self {
+            xx: diagonal + factor * self.xx,
+            yy: diagonal + factor * self.yy,
+            zz: diagonal + factor * self.zz,
+            xy: factor * self.xy,
+            yz: factor * self.yz,
+            zx: factor * self.zx,
+        }
+    }
+
+    /// `factor A`.
+    #[inline(always)]
+    pub(crate) fn scaled(self, factor: f32) -> Self {
+        self.scaled_plus(factor, 0.0)
+    }
+
+    #[inline(always)]
+    pub(crate) fn times(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        [
+            self.xx * x + self.xy * y + self.zx * z,
+            self.xy * x + self.yy * y + self.yz * z,
+            self.zx * x + self.yz * y + self.zz * z,
+        ]
+    }
+
+    #[inline(always)]
+    pub(crate) fn trace(&self) -> f32 {
+        self.xx + self.yy + self.zz
+    }
+
+    /// The inverse of a positive definite matrix (by cofactors, the diagonal scaled to one first so that no
+    /// product leaves the range of float32).
+    #[inline(always)]
+    pub(crate) fn inverse(&self) -> Self {
+        let [a, b, c] = [self.xx, self.yy, self.zz].map(|entry| 1.0 / libm::sqrtf(entry));
+        let (d, e, f) = (self.xy * a * b, self.yz * b * c, self.zx * c * a);
+        let (xx, yy, zz) = (1.0 - e * e, 1.0 - f * f, 1.0 - d * d);
+        let (xy, yz, zx) = (e * f - d, f * d - e, d * e - f);
+        let over = 1.0 / (xx + d * xy + f * zx);
+        Self {
+            xx: over * xx * a * a,
+            yy: over * yy * b * b,
+            zz: over * zz * c * c,
+            xy: over * xy * a * b,
+            yz: over * yz * b * c,
+            zx: over * zx * c * a,
+        }
+    }
+
+    /// A close upper bound of the largest eigenvalue of a positive semidefinite matrix: Newton's iteration
+    /// on the characteristic polynomial from above, where it is convex, so that no iterate falls below the
+    /// root. Zero or NaN if the trace is.
+    #[inline(always)]
+    pub(crate) fn largest_eigenvalue(&self) -> f32 {
+        let mean = self.trace() / 3.0;
+        if mean <= 0.0 || mean.is_nan() {
+            return mean;
+        }
+        // The matrix over its mean, less the identity.
+        let (a, b, c) = (self.xx / mean - 1.0, self.yy / mean - 1.0, self.zz / mean - 1.0);
+        let (d, e, f) = (self.xy / mean, self.yz / mean, self.zx / mean);
+        let q = (a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0;
+        let determinant = a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f);
+        // Roots of t^3 - 3 q t - determinant; 2 sqrt q is above the largest.
+        let mut root = 2.0 * libm::sqrtf(q);
+        for _ in 0..4 {
+            let slope = 3.0 * (root * root - q);
+            if slope > 1e-6 {
+                let next = root - (root * (root * root - 3.0 * q) - determinant) / slope;
+                root = if next < root { next } else { root };
+            }
+        }
+        mean * (1.0 + root)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Symmetric;
+
+    #[test]
+    fn inverse_and_eigenvalue_of_a_stiff_direction() {
+        // 2 I + 1e4 n n^T: largest eigenvalue 10002, inverse 0.5 I - ... n n^T
+        let n = [0.48f32, 0.6, 0.64];
+        let rank = Symmetric {
+            xx: n[0] * n[0],
+            yy: n[1] * n[1],
+            zz: n[2] * n[2],
+            xy: n[0] * n[1],
+            yz: n[1] * n[2],
+            zx: n[2] * n[0],
+        };
+        let matrix = rank.scaled_plus(1e4, 2.0);
+        let largest = matrix.largest_eigenvalue();
+        assert!((10_001.9..10_003.0).contains(&largest), "{largest}");
+        let across = [0.6, -0.48, 0.0];
+        let solved = matrix.inverse().times(across);
+        for axis in 0..3 {
+            assert!((solved[axis] - 0.5 * across[axis]).abs() < 2e-3, "{solved:?}");
+        }
+        let along = matrix.inverse().times(n);
+        assert!((along[1] * 10_002.0 / n[1] - 1.0).abs() < 0.2, "{along:?}");
+    }
+}
