@@ -20,9 +20,12 @@ const SWEPT: &str = "reversed";
 /// What to evaluate.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    scenes: Vec<(SceneSpec, Vec<u32>)>,
-    methods: Vec<Method>,
-    sweep: Option<String>,
+    /// Scenes with the multiples at which methods are run on them.
+    pub scenes: Vec<(SceneSpec, Vec<u32>)>,
+    /// Methods.
+    pub methods: Vec<Method>,
+    /// The scene whose errors are drawn over the step.
+    pub sweep: Option<String>,
 }
 
 impl Plan {
