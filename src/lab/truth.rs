@@ -1,7 +1,7 @@
 //! The truth: the exact step at [`DT`], with displacements after every [`INTERVAL_STEPS`] steps and the exact
 //! limit of stability, at rest and the least along the motion. SI units.
 //!
-//! Truths are kept on disk, one file a scene, little endian: [`MAGIC`], key of the scene, counts, limits,
+//! Truths are kept on disk, one file a scene, little endian: `suppleT1`, key of the scene, counts, limits,
 //! displacements, and an FNV-1a checksum of all that. A file that differs from this in anything is computed
 //! anew: another scene, another kernel or a damaged disk.
 
