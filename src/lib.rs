@@ -16,7 +16,8 @@
 //! | [`tled`] | the exact step: element forces, central differences, critical step, divergence |
 //! | [`lanes`] | one generic body for every instruction set |
 //!
-//! With the feature `io` meshes are read and fields written (`io`), with `cli` there is the command `supple`.
+//! With the feature `io` meshes are read and fields written (`io`), with `lab` methods are judged against the
+//! exact step over scenes (`lab`), with `cli` there is the command `supple`.
 //!
 //! # Promises
 //!
@@ -99,6 +100,8 @@ pub mod tled;
 
 #[cfg(feature = "io")]
 pub mod io;
+#[cfg(feature = "lab")]
+pub mod lab;
 
 pub use ledger::Ledger;
 

@@ -1,5 +1,6 @@
 //! The command as a person uses it: scene files in, folders out, exit codes and sentences.
 mod errors;
+mod evaluate;
 mod inspect;
 mod simulate;
 

@@ -1,9 +1,10 @@
-//! The command `supple`: simulate a scene, inspect a mesh or a scene, show what the kernel does.
+//! The command `supple`: simulate a scene, inspect a mesh or a scene, show what the kernel does, judge methods.
 //!
 //! Exit codes: 0 as asked, 2 the input is not usable, 3 the simulation diverged.
 
 mod body;
 mod demo;
+mod evaluate;
 mod inspect;
 mod picture;
 mod prepare;
@@ -54,6 +55,8 @@ enum Command {
         #[arg(long, default_value = "out/demo")]
         out: PathBuf,
     },
+    /// How far from the exact motion methods are, and what they cost: results.csv and a picture
+    Evaluate(evaluate::Asked),
 }
 
 fn main() -> ExitCode {
@@ -61,6 +64,7 @@ fn main() -> ExitCode {
         Command::Simulate { scene, out, force, insist } => simulate::simulate(&scene, &out, force, insist),
         Command::Inspect { file } => inspect::inspect(&file).map(|()| End::Reached),
         Command::Demo { out } => demo::demo(&out),
+        Command::Evaluate(asked) => evaluate::evaluate(&asked),
     };
     match done {
         Ok(End::Reached) => ExitCode::SUCCESS,

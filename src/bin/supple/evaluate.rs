@@ -1,0 +1,39 @@
+//! `supple evaluate`: methods over scenes, judged against the exact step.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use supple::lab::evaluate::{self, Plan};
+use supple::lab::table;
+
+use crate::scene_file::Problem;
+use crate::simulate::End;
+
+#[derive(Args)]
+pub(crate) struct Asked {
+    /// Folder for results.csv, the sweep and the truths; results of an earlier evaluation are overwritten
+    #[arg(long)]
+    out: PathBuf,
+    /// Scene, all unless given; may be repeated
+    #[arg(long = "scene", value_name = "NAME")]
+    scenes: Vec<String>,
+    /// Method, all unless given; may be repeated
+    #[arg(long = "method", value_name = "NAME")]
+    methods: Vec<String>,
+    /// Step as a multiple of 30 us, 1 10 20 50 100 unless given; may be repeated
+    #[arg(long = "multiple", value_name = "N")]
+    multiples: Vec<u32>,
+    /// Scene whose error is drawn over the step; reversed unless given, if that is among the scenes
+    #[arg(long, value_name = "SCENE")]
+    sweep: Option<String>,
+}
+
+pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
+    let Asked { out, scenes, methods, multiples, sweep } = asked;
+    let problem = |error: supple::lab::LabError| Problem(error.to_string());
+    let plan = Plan::new(scenes, methods, multiples, sweep.as_deref()).map_err(problem)?;
+    let rows = evaluate::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(problem)?;
+    print!("{}", table::text(&rows));
+    println!("\nresults  {}", out.join("results.csv").display());
+    Ok(End::Reached)
+}

@@ -1,0 +1,99 @@
+//! Why the laboratory could not do what it was asked, in a sentence for the person who asked.
+
+use core::fmt;
+use std::string::{String, ToString};
+use std::vec::Vec;
+
+use crate::io::ReadError;
+use crate::loads::LoadError;
+use crate::scene::BuildError;
+use crate::tled::{Divergence, StepError};
+
+/// Why the laboratory could not do what it was asked.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum LabError {
+    /// No scene or method has this name.
+    Unknown {
+        /// "scene" or "method".
+        kind: &'static str,
+        /// The name asked for.
+        name: String,
+        /// The names there are, separated by commas.
+        known: String,
+    },
+    /// A mesh inside the program could not be read.
+    Mesh(ReadError),
+    /// A scene could not be built.
+    Build(BuildError),
+    /// The loads of a scene do not fit it.
+    Load(LoadError),
+    /// A step was refused.
+    Step(StepError),
+    /// The exact motion diverged, so there is no truth.
+    Diverged {
+        /// The scene.
+        scene: &'static str,
+        /// Where and when.
+        divergence: Divergence,
+    },
+    /// The exact critical step of a scene was not found.
+    NoCriticalStep {
+        /// The scene.
+        scene: &'static str,
+    },
+    /// State and scene do not belong together.
+    Mismatch {
+        /// Nodes of the scene.
+        nodes: usize,
+        /// Nodes of the state or of the field it is compared with.
+        room: usize,
+    },
+    /// Steps of this multiple do not divide the interval between two snapshots.
+    Multiple {
+        /// The multiple.
+        multiple: u32,
+    },
+    /// A file could not be written; the text names it.
+    Write(std::io::Error),
+}
+
+impl fmt::Display for LabError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown { kind, name, known } => {
+                write!(f, "{kind} \"{name}\" is not known; there are {known}")
+            }
+            Self::Mesh(error) => error.fmt(f),
+            Self::Build(error) => error.fmt(f),
+            Self::Load(error) => error.fmt(f),
+            Self::Step(error) => error.fmt(f),
+            Self::Diverged { scene, divergence } => write!(f, "the truth of {scene} {divergence}"),
+            Self::NoCriticalStep { scene } => write!(f, "{scene}: the exact critical step was not found"),
+            Self::Mismatch { nodes, room } => {
+                write!(f, "the scene has {nodes} nodes, the other side {room}")
+            }
+            Self::Multiple { multiple } => {
+                let steps = super::INTERVAL_STEPS;
+                let known = (1..=steps).filter(|multiple| steps.is_multiple_of(*multiple));
+                let known: Vec<String> = known.map(|multiple| multiple.to_string()).collect();
+                write!(f, "multiple {multiple} misses the snapshots; there are {}", known.join(", "))
+            }
+            Self::Write(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for LabError {}
+
+macro_rules! from {
+    ($($source:ty => $variant:ident),*) => {
+        $(impl From<$source> for LabError {
+            fn from(error: $source) -> Self {
+                Self::$variant(error)
+            }
+        })*
+    };
+}
+
+from!(ReadError => Mesh, BuildError => Build, LoadError => Load, StepError => Step, std::io::Error => Write);

@@ -1,0 +1,138 @@
+//! An evaluation: methods over scenes at multiples of [`super::DT`], the table, and a sweep.
+
+use std::format;
+use std::fs;
+use std::path::Path;
+use std::string::String;
+use std::vec::Vec;
+
+use super::measure::Errors;
+use super::method::Method;
+use super::run::{self, Row};
+use super::scenes::{self, SceneSpec};
+use super::truth::{self, Truth};
+use super::{LabError, MULTIPLES, plot, sweep, table};
+use crate::io::write_atomically;
+
+/// The scene that is swept if nobody says otherwise.
+const SWEPT: &str = "reversed";
+
+/// What to evaluate.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Scenes with the multiples at which methods are run on them.
+    pub scenes: Vec<(SceneSpec, Vec<u32>)>,
+    /// Methods.
+    pub methods: Vec<Method>,
+    /// The scene whose errors are drawn over the step.
+    pub sweep: Option<String>,
+}
+
+impl Plan {
+    /// A plan from names; an empty list stands for all there are. The scene of the sweep is run at
+    /// [`sweep::MULTIPLES`] too. Without a name it is `reversed`, if that is among the scenes.
+    pub fn new(
+        scenes: &[String],
+        methods: &[String],
+        multiples: &[u32],
+        sweep: Option<&str>,
+    ) -> Result<Self, LabError> {
+        let mut names = unique(scenes.iter().map(String::as_str));
+        if names.is_empty() {
+            names = scenes::NAMES.to_vec();
+        }
+        let methods = match methods {
+            [] => Method::ALL.to_vec(),
+            names => names.iter().map(|name| Method::named(name)).collect::<Result<_, _>>()?,
+        };
+        if let Some(&multiple) = multiples.iter().find(|multiple| !run::hits_snapshots(**multiple)) {
+            return Err(LabError::Multiple { multiple });
+        }
+        let multiples = if multiples.is_empty() { &MULTIPLES } else { multiples };
+        let sweep = sweep.or_else(|| names.contains(&SWEPT).then_some(SWEPT));
+        let mut plan = Self { scenes: Vec::new(), methods: unique(methods), sweep: sweep.map(String::from) };
+        for name in unique(names.iter().copied().chain(sweep)) {
+            let asked = if names.contains(&name) { multiples } else { &[] };
+            let swept: &[u32] = if sweep == Some(name) { &sweep::MULTIPLES } else { &[] };
+            let mut all = [asked, swept].concat();
+            all.sort_unstable();
+            all.dedup();
+            plan.scenes.push((scenes::named(name)?, all));
+        }
+        Ok(plan)
+    }
+}
+
+fn unique<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut seen = Vec::new();
+    for item in items {
+        if !seen.contains(&item) {
+            seen.push(item);
+        }
+    }
+    seen
+}
+
+/// Carries the plan out: truths in `out/truth/`, rows in `out/results.csv`, the sweep in
+/// `out/sweep-SCENE.svg`, all of which replace what an earlier evaluation left. `say` hears how it goes on.
+pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Vec<Row>, LabError> {
+    fs::create_dir_all(out)?;
+    let (specs, multiples): (Vec<_>, Vec<_>) = plan.scenes.iter().cloned().unzip();
+    let truths = truth::obtain(&specs, &out.join("truth"), |spec, truth| say(&about(spec, truth)))?;
+    let mut rows = Vec::new();
+    for ((spec, truth), multiples) in specs.iter().zip(&truths).zip(multiples) {
+        for method in &plan.methods {
+            say(&format!("{}: {}", spec.name, method.name()));
+            for multiple in method.multiples(&multiples) {
+                rows.push(run::run(spec, truth, *method, multiple)?);
+            }
+        }
+        if plan.sweep.as_deref() == Some(spec.name) {
+            let curves = sweep::curves(&rows, spec.name);
+            if !curves.is_empty() {
+                let svg = plot::draw(spec.name, &curves, Errors::of_hold(truth)?.mean_over_time());
+                let path = out.join(format!("sweep-{}.svg", spec.name));
+                write_atomically(&path, |file| file.write_all(svg.as_bytes()))?;
+            }
+        }
+    }
+    table::write_csv(&out.join("results.csv"), &rows)?;
+    Ok(rows)
+}
+
+fn about(spec: &SceneSpec, truth: &Truth) -> String {
+    let Truth { limit_at_rest, limit_least, limit_least_time, limited_steps, .. } = truth;
+    let limited = if *limited_steps > 0 { format!("; {limited_steps} steps limited") } else { String::new() };
+    format!(
+        "{}: truth moves by {:.1} mm; stable below {limit_at_rest:.3e} s at rest, {limit_least:.3e} s at \
+         {limit_least_time:.2} s{limited}",
+        spec.name,
+        1e3 * truth.most(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(scenes: &[&str], multiples: &[u32], sweep: Option<&str>) -> Vec<(&'static str, Vec<u32>)> {
+        let scenes: Vec<String> = scenes.iter().copied().map(String::from).collect();
+        let plan = Plan::new(&scenes, &[], multiples, sweep).unwrap();
+        plan.scenes.into_iter().map(|(spec, multiples)| (spec.name, multiples)).collect()
+    }
+
+    #[test]
+    fn nothing_asked_means_everything() {
+        let plan = plan(&[], &[], None);
+        assert_eq!(plan.len(), 10);
+        assert_eq!(plan[0], ("torsion", MULTIPLES.to_vec()));
+        assert_eq!(plan[1], ("reversed", sweep::MULTIPLES.to_vec()));
+    }
+
+    #[test]
+    fn what_is_asked_twice_is_done_once_and_a_sweep_brings_its_scene() {
+        let wanted = [("lobe", [10].to_vec()), ("push", sweep::MULTIPLES.to_vec())];
+        assert_eq!(plan(&["lobe", "lobe"], &[10, 10], Some("push")), wanted);
+        assert_eq!(plan(&["lobe"], &[10], None), wanted[..1]);
+    }
+}

@@ -1,0 +1,37 @@
+//! The laboratory: how far is a method from the truth, and what does it cost? Methods run over scenes at
+//! multiples of the step [`DT`]; the truth is the exact step ([`crate::tled`]) at [`DT`] on the same mesh.
+//! SI units inside, millimetres and microseconds in the tables for people.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`scenes`] | bodies, supports and loads as data |
+//! | [`truth`] | the exact motion of a scene, kept on disk |
+//! | [`method`] | what is compared: one match arm each |
+//! | [`run`] | one method, one scene, one step: a row |
+//! | [`measure`] | errors of a motion against the truth |
+//! | [`evaluate`] | all of them, as asked for: a [`evaluate::Plan`] |
+//! | [`table`] | rows as CSV and as aligned text |
+//! | [`sweep`] | error over step on one scene, with fitted slopes; [`plot`] draws it |
+
+mod error;
+pub mod evaluate;
+pub mod host;
+pub mod measure;
+pub mod method;
+pub mod plot;
+pub mod run;
+pub mod scenes;
+pub mod sweep;
+pub mod table;
+pub mod truth;
+
+pub use error::LabError;
+
+/// The paper's step, s.
+pub const DT: f32 = 3e-5;
+
+/// Steps of [`DT`] between two snapshots of the truth (0.03 s): ten steps of the paper's hundredfold step.
+pub const INTERVAL_STEPS: u32 = 1_000;
+
+/// Multiples of [`DT`] in the table of results. Each divides [`INTERVAL_STEPS`].
+pub const MULTIPLES: [u32; 5] = [1, 10, 20, 50, 100];

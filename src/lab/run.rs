@@ -1,0 +1,201 @@
+//! One method over one scene with one step: a row of the table. Only the steps are timed, on the calling
+//! thread.
+
+use core::fmt;
+use std::time::{Duration, Instant};
+
+use super::host::Job;
+use super::measure::Errors;
+use super::method::Method;
+use super::scenes::SceneSpec;
+use super::truth::Truth;
+use super::{DT, INTERVAL_STEPS, LabError};
+use crate::material::Material;
+use crate::tled::Status;
+
+/// What a method did on a scene with a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// The scene.
+    pub scene: &'static str,
+    /// The method.
+    pub method: Method,
+    /// Its step over [`DT`].
+    pub multiple: u32,
+    /// Mean error over time of a body that never moves, mm.
+    pub hold: f64,
+    /// Step over the exact limit of stability at rest.
+    pub step_over_limit_rest: f64,
+    /// Step over the least exact limit along the motion.
+    pub step_over_limit_trajectory: f64,
+    /// How it ended.
+    pub end: End,
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum End {
+    /// All steps were taken.
+    Reached(Figures),
+    /// A step was refused at this time, s.
+    Diverged(f64),
+}
+
+/// Figures of a run that reached its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figures {
+    /// How far off it was.
+    pub errors: Errors,
+    /// Share of the steps that were [`Status::Limited`].
+    pub clip_share: f64,
+    /// Time of a step, microseconds.
+    pub us_per_step: f64,
+}
+
+impl fmt::Display for End {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Reached(figures) if figures.clip_share > 0.0 => f.write_str("limited"),
+            Self::Reached(_) => f.write_str("ok"),
+            Self::Diverged(time) => write!(f, "diverged at {time:.3} s"),
+        }
+    }
+}
+
+impl Row {
+    /// The step, s.
+    #[must_use]
+    pub fn step(&self) -> f64 {
+        f64::from(self.multiple) * f64::from(DT)
+    }
+
+    /// The figures, if the run reached its end.
+    #[must_use]
+    pub const fn figures(&self) -> Option<&Figures> {
+        match &self.end {
+            End::Reached(figures) => Some(figures),
+            End::Diverged(_) => None,
+        }
+    }
+}
+
+/// Whether every snapshot falls on a step of `multiple` times [`DT`].
+#[must_use]
+pub const fn hits_snapshots(multiple: u32) -> bool {
+    multiple != 0 && INTERVAL_STEPS.is_multiple_of(multiple)
+}
+
+/// Runs `method` over a scene at `multiple` times [`DT`].
+pub fn run(spec: &SceneSpec, truth: &Truth, method: Method, multiple: u32) -> Result<Row, LabError> {
+    if !hits_snapshots(multiple) {
+        return Err(LabError::Multiple { multiple });
+    }
+    let end = spec.with_material(Run { spec, truth, method, multiple })?;
+    let hold = Errors::of_hold(truth)?.mean_over_time();
+    let mut row = Row {
+        scene: spec.name,
+        method,
+        multiple,
+        hold,
+        step_over_limit_rest: 0.0,
+        step_over_limit_trajectory: 0.0,
+        end,
+    };
+    row.step_over_limit_rest = row.step() / truth.limit_at_rest;
+    row.step_over_limit_trajectory = row.step() / truth.limit_least;
+    Ok(row)
+}
+
+struct Run<'a> {
+    spec: &'a SceneSpec,
+    truth: &'a Truth,
+    method: Method,
+    multiple: u32,
+}
+
+impl Job for Run<'_> {
+    type Output = Result<End, LabError>;
+
+    fn run<M: Material + Copy>(self, material: M) -> Self::Output {
+        let Self { spec, truth, method, multiple } = self;
+        let scene = spec.build(material)?;
+        let mut state = spec.state();
+        let mut advance = method.prepare(&scene, multiple as f32 * DT, spec.damping)?;
+
+        let mut errors = Errors::default();
+        let (mut taken, mut limited, mut spent) = (0_u32, 0_u32, Duration::ZERO);
+        for interval in 0..spec.intervals {
+            let loads = spec.loads(&scene, interval)?;
+            let start = Instant::now();
+            for _ in 0..INTERVAL_STEPS / multiple {
+                match advance(&mut state, &loads) {
+                    Status::Ok => {}
+                    Status::Limited { .. } => limited += 1,
+                    Status::Diverged(divergence) => return Ok(End::Diverged(divergence.time)),
+                    Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
+                }
+                taken += 1;
+            }
+            spent += start.elapsed();
+            errors.look(truth, state.displacements())?;
+        }
+        let taken = f64::from(taken);
+        Ok(End::Reached(Figures {
+            errors,
+            clip_share: f64::from(limited) / taken,
+            us_per_step: 1e6 * spent.as_secs_f64() / taken,
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::{scenes, truth};
+
+    /// A tenth of a second of a light scene.
+    fn short(name: &str) -> (SceneSpec, Truth) {
+        let mut scene = scenes::named(name).unwrap();
+        scene.intervals = 3;
+        let truth = truth::compute(&scene).unwrap();
+        (scene, truth)
+    }
+
+    #[test]
+    fn the_exact_step_is_the_truth_and_long_steps_diverge_and_say_so() {
+        let (scene, truth) = short("cylinder");
+        let exact = run(&scene, &truth, Method::Tled, 1).unwrap();
+        let figures = exact.figures().unwrap();
+        assert_eq!(figures.errors.skill(exact.hold), 1.0);
+        assert_eq!(exact.end.to_string(), "ok");
+        let hold = run(&scene, &truth, Method::Hold, 1).unwrap();
+        assert_eq!(hold.figures().unwrap().errors.skill(hold.hold), 0.0);
+        let long = run(&scene, &truth, Method::TledLargeStep, 100).unwrap();
+        assert!(long.step_over_limit_rest > 1.0);
+        assert!(matches!(long.end, End::Diverged(time) if time < 0.1), "{:?}", long.end);
+    }
+
+    #[test]
+    fn multiples_that_miss_the_snapshots_are_refused() {
+        let (scene, truth) = short("cylinder");
+        for multiple in [0, 3] {
+            assert!(matches!(run(&scene, &truth, Method::Hold, multiple), Err(LabError::Multiple { .. })));
+        }
+    }
+
+    #[test]
+    fn a_release_lets_go_after_its_interval() {
+        let mut scene = scenes::named("release").unwrap();
+        scene.released_after = Some(2);
+        let whole = |scene: &SceneSpec| {
+            let Ok(truth) = truth::compute(scene) else { panic!("no truth") };
+            truth
+        };
+        scene.intervals = 4;
+        let let_go = whole(&scene);
+        scene.released_after = None;
+        let kept = whole(&scene);
+        assert_eq!(let_go.snapshots[..2], kept.snapshots[..2]);
+        assert_ne!(let_go.snapshots[2], kept.snapshots[2]);
+    }
+}

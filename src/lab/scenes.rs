@@ -1,0 +1,308 @@
+//! The scenes of the laboratory: bodies, laws, supports and loads as data. SI units.
+//!
+//! The bar is the paper's ([`Bar::PAPER`]), held at z = 0 and loaded at its four corners at z = 100 mm.
+
+use std::path::Path;
+use std::string::ToString;
+use std::vec;
+use std::vec::Vec;
+
+use super::{DT, INTERVAL_STEPS, LabError};
+use crate::io::{TetMesh, parse_msh};
+use crate::loads::{Motion, NodalForce};
+use crate::material::{Exponential, NeoHookean};
+use crate::mesh::Bar;
+use crate::scene::{Axes, Support};
+
+/// The names of all scenes, in the order of the tables.
+pub const NAMES: [&str; 10] = [
+    "torsion",
+    "reversed",
+    "stretch",
+    "compression",
+    "compression-neo-hookean",
+    "cylinder",
+    "lobe",
+    "sudden-torsion",
+    "release",
+    "push",
+];
+
+/// The exponential law of the paper's bar.
+pub const PAPER_LAW: Exponential = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
+/// Four times as stiff at rest as [`PAPER_LAW`] (c would be a / 2), since this law does not stiffen.
+pub const NEO_HOOKEAN: NeoHookean = NeoHookean { c: 118.0, d: 60_000.0 };
+/// Ten times the paper's shear modulus, for meshes that are longer than the bar and loaded all over.
+pub const MESH_LAW: Exponential = Exponential { a: 590.0, b: 8.023, d: 60_000.0 };
+
+/// The paper's, kg/m^3.
+const DENSITY: f32 = 1_000.0;
+/// The paper's, 1/s.
+const DAMPING: f32 = 20.0;
+/// A blow rings on: its swing falls to a third in 0.4 s, 1/s.
+const LIGHT_DAMPING: f32 = 5.0;
+/// The paper's, s.
+const RAMP: f32 = 1.0;
+/// Snapshots, one each 0.03 s: 1.02 s, the first whole number of them that holds the ramp.
+const INTERVALS: usize = 34;
+
+/// Twist of the bar, N at each corner: the exact limit falls to 3.85e-5 s on the way, so the
+/// paper's step is about as long as it can be.
+const TORSION: f32 = 15.5;
+/// The bar moves by 4 to 6 cm, and its limit of stability stays above 1e-4 s, N at each corner.
+const GENTLE: f32 = 0.3;
+/// The corners go in by a quarter of the length, N at each corner.
+const COMPRESSION: f32 = 0.05;
+
+/// The law of a scene with its constants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LawSpec {
+    /// The exponential law.
+    Exponential(Exponential),
+    /// The neo-Hookean law.
+    NeoHookean(NeoHookean),
+}
+
+/// What is simulated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneSpec {
+    /// One of [`NAMES`].
+    pub name: &'static str,
+    /// Node coordinates, m.
+    pub points: Vec<[f32; 3]>,
+    /// The four nodes of each tetrahedron, of positive volume.
+    pub tets: Vec<[u32; 4]>,
+    /// The law.
+    pub law: LawSpec,
+    /// Density, kg/m^3.
+    pub density: f32,
+    /// Damping, proportional to mass, 1/s.
+    pub damping: f32,
+    /// Held nodes.
+    pub supports: Vec<Support>,
+    /// Forces.
+    pub forces: Vec<NodalForce>,
+    /// Prescribed motions.
+    pub motions: Vec<Motion>,
+    /// After so many intervals the forces are gone, at once.
+    pub released_after: Option<usize>,
+    /// Duration in intervals of [`INTERVAL_STEPS`] steps of [`DT`].
+    pub intervals: usize,
+}
+
+impl SceneSpec {
+    /// Duration, s.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.intervals as f64 * f64::from(INTERVAL_STEPS) * f64::from(DT)
+    }
+}
+
+/// All scenes.
+pub fn all() -> Result<Vec<SceneSpec>, LabError> {
+    NAMES.into_iter().map(named).collect()
+}
+
+/// The scene with this name.
+pub fn named(name: &str) -> Result<SceneSpec, LabError> {
+    match name {
+        "torsion" => Ok(bar("torsion", twist(TORSION, RAMP))),
+        "reversed" => Ok(bar("reversed", twist(-GENTLE, RAMP))),
+        "stretch" => Ok(bar("stretch", pull(GENTLE, RAMP))),
+        "compression" => Ok(bar("compression", pull(-COMPRESSION, RAMP))),
+        "compression-neo-hookean" => Ok(SceneSpec {
+            law: LawSpec::NeoHookean(NEO_HOOKEAN),
+            ..bar("compression-neo-hookean", pull(-COMPRESSION, RAMP))
+        }),
+        "cylinder" => leaning("cylinder", CYLINDER),
+        "lobe" => leaning("lobe", LOBE),
+        "sudden-torsion" => {
+            Ok(SceneSpec { damping: LIGHT_DAMPING, ..bar("sudden-torsion", twist(GENTLE, 0.0)) })
+        }
+        // Held for a hundredth of a second after the ramp, so that it is let go at a snapshot.
+        "release" => {
+            Ok(SceneSpec { released_after: Some(INTERVALS / 2), ..bar("release", pull(GENTLE, 0.5)) })
+        }
+        "push" => pushed_lobe(),
+        _ => Err(LabError::Unknown { kind: "scene", name: name.to_string(), known: NAMES.join(", ") }),
+    }
+}
+
+fn bar(name: &'static str, forces: Vec<NodalForce>) -> SceneSpec {
+    let bar = Bar::PAPER;
+    let [nx, ny, _] = bar.cells;
+    SceneSpec {
+        name,
+        points: bar.points().collect(),
+        tets: bar.tets().collect(),
+        law: LawSpec::Exponential(PAPER_LAW),
+        density: DENSITY,
+        damping: DAMPING,
+        supports: (0..bar.node(nx, ny, 0) + 1).map(Support::fixed).collect(),
+        forces,
+        motions: Vec::new(),
+        released_after: None,
+        intervals: INTERVALS,
+    }
+}
+
+/// The four corners of the bar's free end with their offsets from the axis, in units of half the width.
+fn corners() -> [(u32, [f32; 2]); 4] {
+    let [nx, ny, nz] = Bar::PAPER.cells;
+    [(0, 0, [-1.0, -1.0]), (nx, 0, [1.0, -1.0]), (0, ny, [-1.0, 1.0]), (nx, ny, [1.0, 1.0])]
+        .map(|(i, j, offset)| (Bar::PAPER.node(i, j, nz), offset))
+}
+
+/// `newton` at each corner, at a right angle to the axis and to the way to it; positive turns x to y.
+fn twist(newton: f32, ramp: f32) -> Vec<NodalForce> {
+    let along = newton * core::f32::consts::FRAC_1_SQRT_2;
+    let force =
+        |(node, [x, y]): (u32, [f32; 2])| NodalForce { node, newton: [-y * along, x * along, 0.0], ramp };
+    corners().map(force).to_vec()
+}
+
+/// `newton` at each corner along the axis.
+fn pull(newton: f32, ramp: f32) -> Vec<NodalForce> {
+    corners().map(|(node, _)| NodalForce { node, newton: [0.0, 0.0, newton], ramp }).to_vec()
+}
+
+const CYLINDER: &[u8] = include_bytes!("../../meshes/cylinder.msh");
+const LOBE: &[u8] = include_bytes!("../../meshes/lobe.msh");
+/// The held end of a mesh, as a share of its length: more than a layer of elements.
+const HELD: f32 = 0.12;
+
+/// A mesh that leans over under a body force across its length.
+fn leaning(name: &'static str, file: &[u8]) -> Result<SceneSpec, LabError> {
+    /// A sixteenth of the weight, m/s^2: the free end moves by more than a centimetre.
+    const ACCELERATION: f32 = 0.6;
+    let (mut scene, _) = held_at_its_end(name, file)?;
+    let (axis, _, _) = longest(&scene.points);
+    let masses = node_masses(&scene);
+    let forces = (0..).zip(masses).map(|(node, mass)| {
+        let mut newton = [0.0; 3];
+        newton[(axis + 1) % 3] = -ACCELERATION * mass;
+        NodalForce { node, newton, ramp: RAMP }
+    });
+    scene.forces = forces.collect();
+    Ok(scene)
+}
+
+/// The lobe with its tip bent down by an instrument.
+fn pushed_lobe() -> Result<SceneSpec, LabError> {
+    /// Nodes of the surface within this distance of the tip follow the instrument: its width, m.
+    const PATCH: f32 = 0.012;
+    /// Down (z), m: an eleventh of the free length, which bends the tip without moving the limit of stability.
+    const WAY: f32 = 0.012;
+    let (mut scene, triangles) = held_at_its_end("push", LOBE)?;
+    let (axis, _, high) = longest(&scene.points);
+    let tip = scene.points.iter().copied().find(|point| point[axis] == high).unwrap_or_default();
+    let mut surface = vec![false; scene.points.len()];
+    for node in triangles.into_iter().flatten() {
+        if let Some(is) = surface.get_mut(node as usize) {
+            *is = true;
+        }
+    }
+    let nodes = (0..).zip(&scene.points).zip(surface);
+    let patch = nodes.filter(|((_, point), surface)| {
+        let square: f32 = point.iter().zip(tip).map(|(a, b)| (a - b) * (a - b)).sum();
+        *surface && square < PATCH * PATCH
+    });
+    let follow = |((node, _), _)| Motion { node, axes: Axes::XYZ, metre: [0.0, 0.0, -WAY], ramp: RAMP };
+    scene.motions = patch.map(follow).collect();
+    scene.supports.extend(scene.motions.iter().map(|motion| Support::moved(motion.node)));
+    Ok(scene)
+}
+
+/// A mesh held at the low end of its longest axis, and the triangles of its surface.
+fn held_at_its_end(name: &'static str, file: &[u8]) -> Result<(SceneSpec, Vec<[u32; 3]>), LabError> {
+    let TetMesh { points, tets, triangles, .. } = parse_msh(Path::new(name), file)?;
+    let points: Vec<_> = points.into_iter().map(|point| point.map(|component| component as f32)).collect();
+    let (axis, low, high) = longest(&points);
+    let held = (0..).zip(&points).filter(|(_, point)| point[axis] < low + HELD * (high - low));
+    let supports = held.map(|(node, _)| Support::fixed(node)).collect();
+    let law = LawSpec::Exponential(MESH_LAW);
+    Ok((SceneSpec { points, tets, supports, law, ..bar(name, Vec::new()) }, triangles))
+}
+
+/// The axis along which the points reach farthest, with their least and largest coordinates on it.
+fn longest(points: &[[f32; 3]]) -> (usize, f32, f32) {
+    let reach = |axis: usize| {
+        let values = points.iter().map(|point| point[axis]);
+        values.fold((axis, f32::INFINITY, f32::NEG_INFINITY), |(_, low, high), value| {
+            (axis, low.min(value), high.max(value))
+        })
+    };
+    let farther = |a: (usize, f32, f32), b: (usize, f32, f32)| if b.2 - b.1 > a.2 - a.1 { b } else { a };
+    farther(farther(reach(0), reach(1)), reach(2))
+}
+
+/// Lumped masses, kg: a quarter of each element's to each of its nodes.
+fn node_masses(scene: &SceneSpec) -> Vec<f32> {
+    let mut masses = vec![0.0; scene.points.len()];
+    for tet in &scene.tets {
+        let corners = tet.map(|node| {
+            let [x, y, z] = scene.points.get(node as usize).copied().unwrap_or_default();
+            glam::DVec3::new(f64::from(x), f64::from(y), f64::from(z))
+        });
+        let share = 0.25 * crate::mesh::volume(corners) * f64::from(scene.density);
+        for node in tet {
+            if let Some(mass) = masses.get_mut(*node as usize) {
+                *mass += share;
+            }
+        }
+    }
+    masses.into_iter().map(|mass| mass as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_has_its_scene_and_others_are_refused_with_the_names() {
+        for (scene, name) in all().unwrap().iter().zip(NAMES) {
+            assert_eq!(scene.name, name);
+            assert!((scene.duration() - 1.02).abs() < 1e-6);
+            assert!(!scene.supports.is_empty(), "{name}");
+            assert!(scene.forces.is_empty() != scene.motions.is_empty(), "{name}");
+        }
+        let said = named("tension").unwrap_err().to_string();
+        assert!(said.starts_with("scene \"tension\" is not known; there are torsion, reversed,"), "{said}");
+    }
+
+    #[test]
+    fn forces_of_a_twist_turn_but_do_not_push() {
+        let forces = twist(2.0, 1.0);
+        for axis in 0..3 {
+            assert_eq!(forces.iter().map(|force| force.newton[axis]).sum::<f32>(), 0.0);
+        }
+        for force in forces {
+            let [x, y, z] = Bar::PAPER.points().nth(force.node as usize).unwrap();
+            assert_eq!(z, 0.1);
+            let moment = (x - 0.025) * force.newton[1] - (y - 0.025) * force.newton[0];
+            let arm = 0.025 * core::f32::consts::SQRT_2;
+            assert!((moment - 2.0 * arm).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn body_forces_add_up_to_mass_times_acceleration() {
+        // Masses from the volumes in meshes/README.md.
+        for (name, axis, kilogram) in [("cylinder", 0, 0.2875), ("lobe", 1, 0.2886)] {
+            let scene = named(name).unwrap();
+            let total: f32 = scene.forces.iter().map(|force| force.newton[axis]).sum();
+            assert!((total + 0.6 * kilogram).abs() < 1e-4, "{name}: {total} N");
+        }
+    }
+
+    #[test]
+    fn the_push_moves_a_patch_at_the_free_end() {
+        let scene = named("push").unwrap();
+        assert!(scene.motions.len() > 5, "{}", scene.motions.len());
+        for motion in &scene.motions {
+            assert!(scene.points[motion.node as usize][0] > 0.07);
+        }
+        let fixed = scene.supports.len() - scene.motions.len();
+        assert!(fixed > 20, "{fixed}");
+    }
+}

@@ -1,0 +1,326 @@
+//! The truth: the exact step at [`DT`], with displacements after every [`INTERVAL_STEPS`] steps and the exact
+//! limit of stability, at rest and the least along the motion. SI units.
+//!
+//! Truths are kept on disk, one file a scene, little endian: `suppleT1`, key of the scene, counts, limits,
+//! displacements, and an FNV-1a checksum of all that. A file that differs from this in anything is computed
+//! anew: another scene, another kernel or a damaged disk.
+
+use core::fmt;
+use std::format;
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
+use std::thread;
+use std::vec::Vec;
+
+use super::host::{HostScene, HostState, Job};
+use super::scenes::SceneSpec;
+use super::{DT, INTERVAL_STEPS, LabError};
+use crate::io::write_atomically;
+use crate::loads::Loads;
+use crate::material::Material;
+use crate::tled::{self, Status, Step};
+
+/// First bytes of a file, with the version of its format.
+const MAGIC: &[u8; 8] = b"suppleT1";
+/// Magic, key, nodes, snapshots, three limits, limited steps.
+const HEADER: usize = 64;
+const THREADS: usize = 2;
+
+/// The exact limit is measured at rest, at every snapshot, and in between wherever the bound of
+/// [`tled::critical_step`], looked at every `LOOK_STEPS` steps, is lower by `FALL` than at any measurement
+/// before.
+const LOOK_STEPS: u32 = 10;
+const FALL: f32 = 0.02;
+
+/// The exact motion of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Truth {
+    /// Displacement of each node (m) after each interval.
+    pub snapshots: Vec<Vec<[f32; 3]>>,
+    /// The exact limit of stability at rest, s.
+    pub limit_at_rest: f64,
+    /// The least along the motion, s.
+    pub limit_least: f64,
+    /// When that was, s.
+    pub limit_least_time: f64,
+    /// Steps with elements beyond the range of their law.
+    pub limited_steps: u64,
+}
+
+impl Truth {
+    /// The largest displacement of a node at any snapshot, m.
+    #[must_use]
+    pub fn most(&self) -> f64 {
+        let nodes = self.snapshots.iter().flatten();
+        let square = |node: &[f32; 3]| node.iter().map(|u| f64::from(*u).powi(2)).sum::<f64>();
+        nodes.map(square).fold(0.0, f64::max).sqrt()
+    }
+}
+
+/// The truths of `scenes`, in their order, from files in `folder` or computed on two threads and put there.
+/// `tick` hears of each that is ready.
+pub fn obtain(
+    scenes: &[SceneSpec],
+    folder: &Path,
+    mut tick: impl FnMut(&SceneSpec, &Truth),
+) -> Result<Vec<Truth>, LabError> {
+    fs::create_dir_all(folder)?;
+    let next = AtomicUsize::new(0);
+    let (sender, receiver) = mpsc::channel();
+    let mut truths: Vec<(usize, Truth)> = thread::scope(|scope| {
+        for _ in 0..THREADS {
+            let (next, sender) = (&next, sender.clone());
+            scope.spawn(move || {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(scene) = scenes.get(index) else { break };
+                    // Nobody listens any more once a truth has failed.
+                    if sender.send((index, scene, one(scene, folder))).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        let mut truths = Vec::new();
+        for (index, scene, truth) in receiver {
+            let truth = truth?;
+            tick(scene, &truth);
+            truths.push((index, truth));
+        }
+        Ok::<_, LabError>(truths)
+    })?;
+    truths.sort_by_key(|(index, _)| *index);
+    Ok(truths.into_iter().map(|(_, truth)| truth).collect())
+}
+
+fn one(scene: &SceneSpec, folder: &Path) -> Result<Truth, LabError> {
+    let key = key(scene)?;
+    let path = folder.join(format!("{}.bin", scene.name));
+    let shape = (scene.points.len(), scene.intervals);
+    if let Some(truth) = fs::read(&path).ok().and_then(|bytes| decode(&bytes, key, shape)) {
+        return Ok(truth);
+    }
+    let truth = compute(scene)?;
+    write_atomically(&path, |file| file.write_all(&encode(&truth, key)))?;
+    Ok(truth)
+}
+
+/// Computes the truth of a scene.
+pub fn compute(scene: &SceneSpec) -> Result<Truth, LabError> {
+    scene.with_material(Compute { spec: scene, steps: INTERVAL_STEPS })
+}
+
+struct Compute<'a> {
+    spec: &'a SceneSpec,
+    /// Steps in an interval.
+    steps: u32,
+}
+
+impl Job for Compute<'_> {
+    type Output = Result<Truth, LabError>;
+
+    fn run<M: Material + Copy>(self, material: M) -> Self::Output {
+        let Self { spec, steps } = self;
+        let scene = spec.build(material)?;
+        let mut state = spec.state();
+        let limit = |state: &HostState| {
+            tled::exact_critical_step(&scene, state.displacements())
+                .ok_or(LabError::NoCriticalStep { scene: spec.name })
+        };
+        let limit_at_rest = limit(&state)?;
+        let step = Step::insist(DT, spec.damping)?;
+        let mut truth = Truth {
+            snapshots: Vec::new(),
+            limit_at_rest,
+            limit_least: limit_at_rest,
+            limit_least_time: 0.0,
+            limited_steps: 0,
+        };
+        let mut least_bound = f32::INFINITY;
+        for interval in 0..spec.intervals {
+            let loads = spec.loads(&scene, interval)?;
+            for count in 1..=steps {
+                truth.limited_steps += u64::from(take(spec, &scene, &loads, &mut state, &step)?);
+                let mut measure = count == steps;
+                if count % LOOK_STEPS == 0 {
+                    let bound = tled::critical_step(&scene, &mut state).map_or(0.0, |bound| bound.seconds);
+                    measure |= bound < (1.0 - FALL) * least_bound;
+                    if measure {
+                        least_bound = least_bound.min(bound);
+                    }
+                }
+                if measure {
+                    let limit = limit(&state)?;
+                    if limit < truth.limit_least {
+                        (truth.limit_least, truth.limit_least_time) = (limit, state.time());
+                    }
+                }
+            }
+            let shape = state.displacements().iter().map(|vector| vector.to_array());
+            truth.snapshots.push(shape.collect());
+        }
+        Ok(truth)
+    }
+}
+
+/// One exact step; whether it was limited.
+fn take<M: Material>(
+    spec: &SceneSpec,
+    scene: &HostScene<M>,
+    loads: &Loads<'_>,
+    state: &mut HostState,
+    step: &Step,
+) -> Result<bool, LabError> {
+    match tled::step(scene, loads, state, step) {
+        Status::Ok => Ok(false),
+        Status::Limited { .. } => Ok(true),
+        Status::Diverged(divergence) => Err(LabError::Diverged { scene: spec.name, divergence }),
+        Status::Mismatch { nodes, room } => Err(LabError::Mismatch { nodes, room }),
+    }
+}
+
+/// FNV-1a, 64 bits (Fowler, Noll, Vo): against accidents, not against forgery.
+struct Fnv(u64);
+
+impl Fnv {
+    const EMPTY: Self = Self(0xcbf2_9ce4_8422_2325);
+
+    fn add(mut self, bytes: &[u8]) -> Self {
+        for byte in bytes {
+            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+        self
+    }
+}
+
+impl fmt::Write for Fnv {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        *self = Self(self.0).add(text.as_bytes());
+        Ok(())
+    }
+}
+
+/// A hash of all that the truth depends on: the scene in words, for the text of a float32 tells all its digits,
+/// and what the kernel makes of its first steps.
+fn key(scene: &SceneSpec) -> Result<u64, LabError> {
+    /// Enough that all forces and laws have had their say.
+    const STEPS: u32 = 10;
+    let brief = SceneSpec { intervals: 1, ..scene.clone() };
+    let start = brief.with_material(Compute { spec: &brief, steps: STEPS })?;
+    let mut hash = Fnv::EMPTY.add(&encode(&start, 0));
+    // Hashing does not fail.
+    let _ = fmt::write(&mut hash, format_args!("{DT} {INTERVAL_STEPS} {LOOK_STEPS} {FALL} {scene:?}"));
+    Ok(hash.0)
+}
+
+fn encode(truth: &Truth, key: u64) -> Vec<u8> {
+    let mut bytes = MAGIC.to_vec();
+    let counts = [key, truth.snapshots.first().map_or(0, Vec::len) as u64, truth.snapshots.len() as u64];
+    let limits = [truth.limit_at_rest, truth.limit_least, truth.limit_least_time];
+    bytes.extend(counts.iter().flat_map(|number| number.to_le_bytes()));
+    bytes.extend(limits.iter().flat_map(|number| number.to_le_bytes()));
+    bytes.extend(truth.limited_steps.to_le_bytes());
+    for shape in &truth.snapshots {
+        bytes.extend(shape.as_flattened().iter().flat_map(|number| number.to_le_bytes()));
+    }
+    let sum = Fnv::EMPTY.add(&bytes).0;
+    bytes.extend(sum.to_le_bytes());
+    bytes
+}
+
+/// The truth in `bytes`, if they hold one of a scene with this key, number of nodes and of snapshots.
+fn decode(bytes: &[u8], expected: u64, (nodes, snapshots): (usize, usize)) -> Option<Truth> {
+    let size = nodes.checked_mul(snapshots)?.checked_mul(12)?.checked_add(HEADER)?;
+    let (content, sum) =
+        bytes.split_last_chunk::<8>().map(|(content, sum)| (content, u64::from_le_bytes(*sum)))?;
+    if content.len() != size || Fnv::EMPTY.add(content).0 != sum {
+        return None;
+    }
+    let (header, data) = content.split_at_checked(HEADER)?;
+    let words: Vec<[u8; 8]> = header.as_chunks().0.to_vec();
+    let [magic, key, n, count, rest, least, time, limited] = words.try_into().ok()?;
+    let [key, n, count, limited_steps] = [key, n, count, limited].map(u64::from_le_bytes);
+    if magic != *MAGIC || key != expected || n != nodes as u64 || count != snapshots as u64 {
+        return None;
+    }
+    let [limit_at_rest, limit_least, limit_least_time] = [rest, least, time].map(f64::from_le_bytes);
+    let numbers: Vec<f32> = data.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    let snapshots = numbers.as_chunks().0.chunks_exact(nodes).map(<[_]>::to_vec).collect();
+    Some(Truth { snapshots, limit_at_rest, limit_least, limit_least_time, limited_steps })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::scenes;
+    use std::vec;
+
+    fn example() -> Truth {
+        Truth {
+            snapshots: vec![vec![[0.0; 3]; 2], vec![[1.0, 2.0, 3.0], [0.5, -0.25, 1e-9]]],
+            limit_at_rest: 2e-4,
+            limit_least: 1e-4,
+            limit_least_time: 0.5,
+            limited_steps: 7,
+        }
+    }
+
+    #[test]
+    fn a_file_gives_back_what_went_in() {
+        let truth = example();
+        assert_eq!(decode(&encode(&truth, 42), 42, (2, 2)), Some(truth));
+    }
+
+    #[test]
+    fn a_damaged_file_is_refused() {
+        let sound = encode(&example(), 42);
+        for place in 0..sound.len() {
+            let mut bytes = sound.clone();
+            bytes[place] ^= 1;
+            assert_eq!(decode(&bytes, 42, (2, 2)), None, "byte {place}");
+        }
+        for length in 0..sound.len() {
+            assert_eq!(decode(&sound[..length], 42, (2, 2)), None, "cut to {length} bytes");
+        }
+        assert_eq!(decode(&[sound.as_slice(), &[0]].concat(), 42, (2, 2)), None);
+        assert_eq!(decode(&sound, 43, (2, 2)), None);
+        assert_eq!(decode(&sound, 42, (2, 3)), None);
+    }
+
+    #[test]
+    fn a_damaged_file_on_disk_is_computed_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut scene = scenes::named("cylinder").unwrap();
+        scene.intervals = 1;
+        let truth = one(&scene, folder.path()).unwrap();
+        let path = fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
+        let sound = fs::read(&path).unwrap();
+        fs::write(&path, &sound[..sound.len() / 2]).unwrap();
+        assert_eq!(one(&scene, folder.path()).unwrap(), truth);
+        assert_eq!(fs::read(&path).unwrap(), sound);
+    }
+
+    #[test]
+    fn whatever_changes_the_motion_changes_the_key() {
+        let scene = scenes::named("release").unwrap();
+        let mut keys = vec![key(&scene).unwrap()];
+        let mut changed = |change: &dyn Fn(&mut SceneSpec)| {
+            let mut other = scene.clone();
+            change(&mut other);
+            keys.push(key(&other).unwrap());
+        };
+        changed(&|scene| scene.points[3][1] = f32::from_bits(scene.points[3][1].to_bits() + 1));
+        changed(&|scene| scene.tets.swap(0, 1));
+        changed(&|scene| scene.density += 1e-4);
+        changed(&|scene| scene.damping += 1e-6);
+        changed(&|scene| scene.supports.truncate(3));
+        changed(&|scene| scene.released_after = None);
+        changed(&|scene| scene.intervals += 1);
+        keys.sort_unstable();
+        keys.dedup();
+        assert_eq!(keys.len(), 8);
+    }
+}

@@ -1,0 +1,18 @@
+//! `supple evaluate`; what it finds is tested in `tests/evaluate.rs`.
+use crate::Desk;
+
+#[test]
+fn what_does_not_exist_is_named_beside_what_does() {
+    let desk = Desk::new();
+    for (flag, value, sentence) in [
+        ("--scene", "tension", "scene \"tension\" is not known; there are torsion, reversed, "),
+        ("--sweep", "tension", "scene \"tension\" is not known; there are torsion, reversed, "),
+        ("--method", "euler", "method \"euler\" is not known; there are tled, hold, "),
+        ("--multiple", "3", "multiple 3 misses the snapshots; there are 1, 2, 4, 5, 8, 10, "),
+    ] {
+        let said = desk.supple(&["evaluate", "--out", "out", flag, value]);
+        assert_eq!(said.code, 2);
+        assert!(said.err.starts_with(&format!("error: {sentence}")), "{}", said.err);
+        assert!(!desk.path("out").exists());
+    }
+}
