@@ -10,6 +10,7 @@
 //! one gradient for each axis.
 
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
+use crate::lanes::{Lanes, Real};
 use crate::scene::NodeInertia;
 use crate::symmetric::Symmetric;
 
@@ -36,6 +37,12 @@ pub(super) struct Assembly<'a> {
 /// Functions that four nodes can touch.
 const TOUCHED: usize = 32;
 const NOT_TOUCHED: u8 = u8::MAX;
+/// Which functions the element at hand touches, none between elements.
+pub(super) type Slots = [u8; MAX_FUNCTIONS];
+pub(super) const NO_SLOTS: Slots = [NOT_TOUCHED; MAX_FUNCTIONS];
+
+/// Four numbers side by side: the three spatial axes and a spare.
+type Four = Lanes<4>;
 
 #[inline(always)]
 pub(super) fn free(inverse: [f32; 3]) -> [f32; 4] {
@@ -43,92 +50,100 @@ pub(super) fn free(inverse: [f32; 3]) -> [f32; 4] {
     [x, y, z, 0.0]
 }
 
+/// Adds a 3 x 3 block where function `c` meets function `d`. Not four wide: the next block would then read what
+/// was just written at another alignment, which stalls until it is in the cache.
 #[inline(always)]
-fn add_scaled(sum: &mut [f32; 4], vector: [f32; 4], factor: f32) {
-    for (sum, value) in sum.iter_mut().zip(vector) {
-        *sum += factor * value;
-    }
-}
-
-/// Adds a 3 x 3 block, its rows padded to four, where function `c` meets function `d`.
-#[inline(always)]
-fn add_block(matrix: &mut [f32], stride: usize, c: usize, d: usize, rows: [[f32; 4]; 3]) {
-    let Some(rest) = matrix.get_mut(3 * c * stride..) else {
+fn add_block(matrix: &mut [f32], stride: usize, c: usize, d: usize, rows: [Four; 3]) {
+    let Some(rest) = matrix.get_mut(3 * c * stride + 3 * d..) else {
         return;
     };
-    for (row, values) in rest.chunks_exact_mut(stride).zip(rows) {
-        if let Some(place) = row.get_mut(3 * d..3 * d + 4) {
-            for (entry, value) in place.iter_mut().zip(values) {
-                *entry += value;
-            }
+    for (axis, row) in rows.into_iter().enumerate() {
+        if let Some((place, _)) = rest.get_mut(axis * stride..).and_then(<[f32]>::split_first_chunk_mut::<3>)
+        {
+            let [x, y, z, _] = row.0;
+            *place = [place[0] + x, place[1] + y, place[2] + z];
         }
     }
 }
+
+const ZERO: Four = Lanes([0.0; 4]);
 
 impl Assembly<'_> {
     /// Adds the stiffness bound of an element.
     #[inline(always)]
-    pub(super) fn add_element(&mut self, element: &Element) {
-        let mut slot = [NOT_TOUCHED; MAX_FUNCTIONS + 1];
-        let mut functions = [0usize; TOUCHED];
-        // Derivative along each material axis; the four lanes are the spatial axes.
-        let mut slopes = [[[0.0f32; 4]; 3]; TOUCHED];
-        let mut count = 0;
+    pub(super) fn add_element(&mut self, element: &Element, slots: &mut Slots) {
+        // Derivative of each function along each material axis (the lanes are the spatial axes: a function may be cut
+        // off along some of them).
+        let mut touched = [[ZERO; 3]; TOUCHED];
+        let (mut count, mut bits) = (0, 0u128);
         for (&node, gradient) in element.nodes.iter().zip(element.gradients) {
             let (Some(at), Some(inertia)) = (self.nodes.get(node), self.inertia.get(node)) else {
                 continue;
             };
-            let free = free(inertia.inverse);
-            let along = gradient.map(|slope| free.map(|free| free * slope));
+            let free = Lanes(free(inertia.inverse));
+            let along = gradient.map(|slope| free * Four::splat(slope));
             for (function, weight) in self.lattice.weights(at) {
-                if function >= MAX_FUNCTIONS || weight == 0.0 {
-                    continue;
-                }
-                let Some(slot) = slot.get_mut(function) else {
+                let Some(slot) = slots.get_mut(function) else {
                     continue;
                 };
-                if *slot == NOT_TOUCHED && count < TOUCHED {
-                    *slot = count as u8;
-                    functions[count] = function;
-                    count += 1;
-                }
-                if let Some(slopes) = slopes.get_mut(usize::from(*slot)) {
-                    for (slopes, along) in slopes.iter_mut().zip(along) {
-                        add_scaled(slopes, along, weight);
-                    }
-                }
-            }
-        }
-        let mut images = [[0.0f32; 4]; TOUCHED];
-        for (image, slopes) in images.iter_mut().zip(&slopes).take(count) {
-            for (column, slope) in element.cofactor.iter().zip(slopes) {
-                for axis in 0..4 {
-                    image[axis] += column[axis] * slope[axis];
-                }
-            }
-        }
-        let touched = functions.iter().zip(slopes.iter().zip(&images)).take(count);
-        for (&c, (slopes_c, image_c)) in touched.clone() {
-            let (iso, volume) =
-                (slopes_c.map(|s| s.map(|s| element.iso * s)), image_c.map(|a| element.volume * a));
-            for (&d, (slopes_d, image_d)) in touched.clone() {
-                if d > c {
+                if weight == 0.0 {
                     continue;
                 }
-                let mut rows = [[0.0f32; 4]; 3];
-                for (row, &factor) in rows.iter_mut().zip(&volume) {
-                    add_scaled(row, *image_d, factor);
-                }
-                let mut diagonal = [0.0f32; 4];
-                for (iso, slope) in iso.iter().zip(slopes_d) {
-                    for axis in 0..4 {
-                        diagonal[axis] += iso[axis] * slope[axis];
+                let weight = Four::splat(weight);
+                if let Some(touch) = touched.get_mut(usize::from(*slot)) {
+                    for (slope, along) in touch.iter_mut().zip(along) {
+                        *slope = *slope + weight * along;
                     }
+                } else if let Some(touch) = touched.get_mut(count) {
+                    *slot = count as u8;
+                    *touch = along.map(|along| weight * along);
+                    bits |= 1 << function;
+                    count += 1;
                 }
-                for axis in 0..3 {
-                    rows[axis][axis] += diagonal[axis];
+            }
+        }
+        let cofactor = element.cofactor.map(Lanes);
+        // In ascending order of the functions: only blocks on and below the diagonal are kept.
+        let mut functions = [0usize; TOUCHED];
+        let mut images = [[0.0f32; 3]; TOUCHED];
+        let mut slopes = [[ZERO; 3]; TOUCHED];
+        for place in 0..count {
+            let function = bits.trailing_zeros() as usize;
+            bits &= bits.wrapping_sub(1);
+            let Some(slot) = slots.get_mut(function) else {
+                return;
+            };
+            let Some(&[x, y, z]) = touched.get(usize::from(*slot)) else {
+                return;
+            };
+            *slot = NOT_TOUCHED;
+            let Lanes([ix, iy, iz, _]) = cofactor[0] * x + cofactor[1] * y + cofactor[2] * z;
+            functions[place % TOUCHED] = function;
+            images[place % TOUCHED] = [ix, iy, iz];
+            slopes[place % TOUCHED] = [x, y, z];
+        }
+        let iso = Four::splat(element.iso);
+        for c in 0..count {
+            let [x, y, z] = slopes[c % TOUCHED].map(|slope| iso * slope);
+            let mut diagonals = [[0.0f32; 4]; TOUCHED];
+            for (diagonal, slopes) in diagonals.iter_mut().zip(&slopes).take(c + 1) {
+                *diagonal = (x * slopes[0] + y * slopes[1] + z * slopes[2]).0;
+            }
+            for axis in 0..3 {
+                let row = (3 * functions[c % TOUCHED] + axis) * self.stride;
+                let Some(row) = self.matrix.get_mut(row..row + self.stride) else {
+                    return;
+                };
+                let factor = element.volume * images[c % TOUCHED][axis];
+                for ((&d, image), diagonal) in functions.iter().zip(&images).zip(&diagonals).take(c + 1) {
+                    let Some(place) = row.get_mut(3 * d..3 * d + 3) else {
+                        return;
+                    };
+                    place[0] += factor * image[0];
+                    place[1] += factor * image[1];
+                    place[2] += factor * image[2];
+                    place[axis] += diagonal[axis];
                 }
-                add_block(self.matrix, self.stride, c, d, rows);
             }
         }
     }
@@ -137,9 +152,9 @@ impl Assembly<'_> {
     #[inline(always)]
     pub(super) fn add_node(&mut self, node: &LatticeNode, inertia: &Symmetric) {
         let rows = [
-            [inertia.xx, inertia.xy, inertia.zx, 0.0],
-            [inertia.xy, inertia.yy, inertia.yz, 0.0],
-            [inertia.zx, inertia.yz, inertia.zz, 0.0],
+            Lanes([inertia.xx, inertia.xy, inertia.zx, 0.0]),
+            Lanes([inertia.xy, inertia.yy, inertia.yz, 0.0]),
+            Lanes([inertia.zx, inertia.yz, inertia.zz, 0.0]),
         ];
         let weights = self.lattice.weights(node);
         for (c, weight_c) in weights {
@@ -148,8 +163,8 @@ impl Assembly<'_> {
             }
             for (d, weight_d) in weights {
                 if d <= c {
-                    let rows = rows.map(|row| row.map(|entry| weight_c * weight_d * entry));
-                    add_block(self.matrix, self.stride, c, d, rows);
+                    let weight = Four::splat(weight_c * weight_d);
+                    add_block(self.matrix, self.stride, c, d, rows.map(|row| weight * row));
                 }
             }
         }

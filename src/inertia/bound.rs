@@ -22,41 +22,29 @@
 //! ```
 
 use crate::lanes::{Real, Scatter};
-use crate::material::{Law, Potential, VolumeFactor};
+use crate::material::{Law, Local, Potential};
 use crate::scene::ElementBlock;
 use crate::tled::{Beside, Deformation};
 
-/// `iso` and `volume` of a chunk of elements, Pa.
+/// The parts of the bound that depend on the invariants alone, Pa: `iso = geometric + stiffening |E|^2`.
 #[derive(Clone, Copy)]
-pub(super) struct Bound<R> {
-    pub(super) iso: R,
-    pub(super) volume: R,
-    /// `|C|^2`.
-    cofactor_square: R,
+struct Coefficients<R> {
+    geometric: R,
+    stiffening: R,
+    volume: R,
 }
 
 /// `eta` over the volume stiffness.
 const SPLIT: f32 = 0.02;
 
-impl<R: Real> Bound<R> {
+impl<R: Real> Coefficients<R> {
     #[inline(always)]
-    pub(super) fn new<L: Law>(law: &L::Wide<R>, deformation: &Deformation<R>) -> Self {
-        let at = deformation.invariants;
+    fn new<L: Law>(law: &L::Wide<R>, local: &Local<R>) -> Self {
         let (zero, two, four) = (R::splat(0.0), R::splat(2.0), R::splat(4.0));
+        let at = local.at;
         let i1 = at.i + R::splat(3.0);
-        let (slope, stiffening, g, dg, ddg) = if L::ISOCHORIC {
-            let factor = VolumeFactor::new(at);
-            (
-                law.distortion_slope(factor.x),
-                law.distortion_curvature(factor.x),
-                factor.g,
-                factor.slope,
-                factor.curvature(),
-            )
-        } else {
-            (law.distortion_slope(at.i), law.distortion_curvature(at.i), R::splat(1.0), zero, zero)
-        };
-        let stiffening = stiffening.max(zero);
+        let (slope, stiffening, [g, dg, ddg]) =
+            (local.slope, local.stiffening::<L>(law), local.volume_factor());
         let (x_f, x_c) = (two * g, dg * i1);
         let along = x_f + x_c;
         let bulk = law.volume_curvature(at.j);
@@ -67,33 +55,70 @@ impl<R: Real> Bound<R> {
         let ce = two * slope * dg + stiffening * x_f * along;
         let ee = stiffening * x_f * x_f;
         let eta = R::splat(SPLIT) * (bulk + p1 + ce.abs());
-        let (mut distortion, mut cofactor) = (zero, zero);
-        for i in 0..3 {
-            for j in 0..3 {
-                let (e, c) = (deformation.distortion(i, j), deformation.cofactor(i, j));
-                distortion = distortion + e * e;
-                cofactor = cofactor + c * c;
-            }
-        }
         // ce / eta first: its square may be beyond float32 where the law is at its cap.
         let mixed = ce * ce.zip(eta, |ce, eta| ce / eta);
-        let geometric = p1 + p_j.abs() * (i1 + R::splat(3.0)) * R::splat(1.0 / 3.0);
         Self {
-            iso: geometric + (ee + mixed) * distortion,
+            geometric: p1 + p_j.abs() * (i1 + R::splat(3.0)) * R::splat(1.0 / 3.0),
+            stiffening: ee + mixed,
             volume: (cc + eta).max(zero),
-            cofactor_square: cofactor,
         }
-    }
-
-    /// A number (N/m) that no eigenvalue of the element's four matrices exceeds.
-    #[inline(always)]
-    fn scalar(&self, block: &ElementBlock, first: usize) -> R {
-        let spread = block.volume::<R>(first) * block.spread::<R>(first);
-        spread * (self.iso + R::splat(4.0) * self.volume * self.cofactor_square)
     }
 }
 
-/// Puts the scalar bound of each element into the fourth component of its nodes' forces.
+/// A number (N/m) that no eigenvalue of an element's four matrices exceeds, from the invariants `i = I1 - 3` and
+/// `j = J - 1` alone: `|C|^2 <= I1^2 / 3`, and `|E|^2 = I1 + |C|^2 - 6 J` with it.
+#[inline(always)]
+fn scalar_bound<R: Real, L: Law>(
+    law: &L::Wide<R>,
+    block: &ElementBlock,
+    first: usize,
+    local: &Local<R>,
+) -> R {
+    let coefficients = Coefficients::<R>::new::<L>(law, local);
+    let (at, three) = (local.at, R::splat(3.0));
+    let square = at.i * at.i * R::splat(1.0 / 3.0);
+    let cofactor = three + (at.i + at.i) + square;
+    let distortion = three * at.i + square - R::splat(6.0) * at.j;
+    let iso = coefficients.geometric + coefficients.stiffening * distortion.max(R::splat(0.0));
+    let spread = block.volume::<R>(first) * block.spread::<R>(first);
+    spread * (iso + R::splat(4.0) * coefficients.volume * cofactor)
+}
+
+/// `iso` and `volume` of a chunk of elements, Pa.
+#[derive(Clone, Copy)]
+pub(super) struct Bound<R> {
+    pub(super) iso: R,
+    pub(super) volume: R,
+    /// [`scalar_bound`], N/m.
+    scalar: R,
+}
+
+impl<R: Real> Bound<R> {
+    #[inline(always)]
+    pub(super) fn new<L: Law>(
+        law: &L::Wide<R>,
+        block: &ElementBlock,
+        first: usize,
+        deformation: &Deformation<R>,
+        local: &Local<R>,
+    ) -> Self {
+        let coefficients = Coefficients::<R>::new::<L>(law, local);
+        let mut distortion = R::splat(0.0);
+        for i in 0..3 {
+            for j in 0..3 {
+                let e = deformation.distortion(i, j);
+                distortion = distortion + e * e;
+            }
+        }
+        Self {
+            iso: coefficients.geometric + coefficients.stiffening * distortion,
+            volume: coefficients.volume,
+            scalar: scalar_bound::<R, L>(law, block, first, local),
+        }
+    }
+}
+
+/// Puts [`scalar_bound`] into the fourth component of the forces of the elements' nodes.
 pub(super) struct ScalarBeside;
 
 impl Beside for ScalarBeside {
@@ -103,13 +128,14 @@ impl Beside for ScalarBeside {
         law: &L::Wide<R>,
         block: &ElementBlock,
         first: usize,
-        deformation: &Deformation<R>,
+        _: &Deformation<R>,
+        local: &Local<R>,
     ) -> R {
-        Bound::<R>::new::<L>(law, deformation).scalar(block, first)
+        scalar_bound::<R, L>(law, block, first, local)
     }
 }
 
-/// Adds the matrices `D_a` of each element to the sums of its nodes: `xx, yy, zz` with the scalar bound as
+/// Adds the matrices `D_a` of each element to the sums of its nodes: `xx, yy, zz` with [`scalar_bound`] as
 /// fourth number, and `xy, yz, zx`.
 pub(super) struct MatrixBeside<'a> {
     pub(super) diagonal: Scatter<'a>,
@@ -124,8 +150,9 @@ impl Beside for MatrixBeside<'_> {
         block: &ElementBlock,
         first: usize,
         deformation: &Deformation<R>,
+        local: &Local<R>,
     ) -> R {
-        self.add(&Bound::<R>::new::<L>(law, deformation), block, first, deformation)
+        self.add(&Bound::<R>::new::<L>(law, block, first, deformation, local), block, first, deformation)
     }
 }
 
@@ -138,7 +165,6 @@ impl MatrixBeside<'_> {
         first: usize,
         deformation: &Deformation<R>,
     ) -> R {
-        let scalar = bound.scalar(block, first);
         let volume = block.volume::<R>(first);
         let isotropic = volume * bound.iso * block.spread::<R>(first);
         let weight = volume * bound.volume * R::splat(4.0);
@@ -154,10 +180,10 @@ impl MatrixBeside<'_> {
         for (corner, [x, y, z]) in images.into_iter().enumerate() {
             let node = |lane: usize| block.node(corner, first + lane);
             let (wx, wy, wz) = (weight * x, weight * y, weight * z);
-            let diagonal = [isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, scalar];
+            let diagonal = [isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, bound.scalar];
             self.diagonal.add_lanes(node, diagonal);
             self.beside.add_lanes(node, [wx * y, wy * z, wz * x, R::splat(0.0)]);
         }
-        scalar
+        bound.scalar
     }
 }

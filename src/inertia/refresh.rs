@@ -10,15 +10,15 @@
 //! The coarse part of the velocity is `c = G^-1 p`, its energy `c^T S c`. As for the nodes
 //! ([`super::node`]), a change of `S` may not add energy: `c` is scaled down to what it had.
 
-use super::assembly::{Assembly, Element};
+use super::assembly::{Assembly, Element, NO_SLOTS};
 use super::bound::{Bound, MatrixBeside};
 use super::dense::{apply, eliminate, mirror, stride};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, restrict};
-use super::node::{Scaling, renew};
+use super::node::{Scaling, growth, renew};
 use super::report::Tally;
 use super::vectors::NodeTables;
 use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, Scatter, dispatch};
-use crate::material::{Law, Material};
+use crate::material::{Law, Local, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::symmetric::Symmetric;
 use crate::tled::Deformation;
@@ -277,8 +277,8 @@ impl Refresh {
         let renewed = renew(inertia, stiffness, (!self.first).then_some(old.inverse), velocity, from.scaling);
         tables.set(at, &renewed.inverse, scalar, if self.first { 1.0 } else { old.share });
         self.tally.add(at, renewed.added);
-        if !self.first && old_scalar > 0.0 {
-            let growth = scalar / old_scalar;
+        if !self.first {
+            let growth = growth(from.scaling, inertia.mass, old_scalar, scalar);
             self.carried = if growth > self.carried { growth } else { self.carried };
         }
         let kept = velocity.map(|v| v * renewed.velocity);
@@ -381,11 +381,18 @@ impl<M: Material> Kernel for OneBlock<'_, M> {
 
     #[inline(always)]
     fn run<R: Real>(mut self) {
+        let mut slots = NO_SLOTS;
         for first in (0..BLOCK).step_by(R::COUNT) {
             let block = self.block;
             let law = M::Law::widen(|lane| self.material.law(block.element(first + lane)));
             let deformation = Deformation::<R>::of_block(block, first, self.displacement);
-            let bound = Bound::<R>::new::<M::Law>(&law, &deformation);
+            let bound = Bound::<R>::new::<M::Law>(
+                &law,
+                block,
+                first,
+                &deformation,
+                &Local::new::<M::Law>(&law, deformation.invariants),
+            );
             self.sums.add(&bound, block, first, &deformation);
             let weight = block.volume::<R>(first) * R::splat(self.weight);
             let (iso, volume) = (weight * bound.iso, weight * bound.volume);
@@ -395,13 +402,16 @@ impl<M: Material> Kernel for OneBlock<'_, M> {
             for lane in 0..R::COUNT {
                 let slopes = gradients.map(|gradient| gradient.map(|slope| slope.lane(lane)));
                 let origin = [0, 1, 2].map(|axis| -(slopes[0][axis] + slopes[1][axis] + slopes[2][axis]));
-                self.assembly.add_element(&Element {
-                    nodes: [0, 1, 2, 3].map(|corner| block.node(corner, first + lane)),
-                    gradients: [origin, slopes[0], slopes[1], slopes[2]],
-                    iso: iso.lane(lane),
-                    volume: volume.lane(lane),
-                    cofactor: cofactor.map(|[x, y, z]| [x.lane(lane), y.lane(lane), z.lane(lane), 0.0]),
-                });
+                self.assembly.add_element(
+                    &Element {
+                        nodes: [0, 1, 2, 3].map(|corner| block.node(corner, first + lane)),
+                        gradients: [origin, slopes[0], slopes[1], slopes[2]],
+                        iso: iso.lane(lane),
+                        volume: volume.lane(lane),
+                        cofactor: cofactor.map(|[x, y, z]| [x.lane(lane), y.lane(lane), z.lane(lane), 0.0]),
+                    },
+                    &mut slots,
+                );
             }
         }
     }

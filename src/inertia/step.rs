@@ -14,7 +14,7 @@ use super::assembly::free;
 use super::bound::{MatrixBeside, ScalarBeside};
 use super::dense::{apply, stride};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, prolong, restrict};
-use super::node::{Scaling, renew};
+use super::node::{Scaling, growth, renew};
 use super::refresh::{Matrices, ROW, Refresh, Sources, from_numbers, to_numbers};
 use super::report::Tally;
 use super::vectors::NodeTables;
@@ -181,7 +181,7 @@ impl Fine<'_> {
                 tables.set(node, &renewed.inverse, scalar, before);
                 self.tally.add(node, renewed.added);
             }
-            let growth = if made_for > 0.0 { scalar / made_for } else { 1.0 };
+            let growth = growth(self.scaling, inertia.mass, made_for, scalar);
             let mut share = 1.0;
             if growth > NODE_GROWTH {
                 share = NODE_GROWTH / growth;

@@ -34,9 +34,9 @@ impl<R: Real> Potential<R> for Exponential<R> {
         R::splat(0.5) * self.a * self.capped_exp(x)
     }
     #[inline(always)]
-    fn distortion_curvature(&self, x: R) -> R {
+    fn distortion_curvature(&self, _x: R, slope: R) -> R {
         // The tangent beyond the cap has none, but a bound may not drop at the cap.
-        R::splat(0.5) * self.a * self.b * self.capped_exp(x)
+        self.b * slope
     }
     #[inline(always)]
     fn volume_slope(&self, j: R) -> R {

@@ -31,8 +31,8 @@ pub const J_FLOOR: f32 = 0.1;
 pub trait Potential<R: Real>: Copy {
     /// `W'(x)`, Pa.
     fn distortion_slope(&self, x: R) -> R;
-    /// `W''(x)`, Pa.
-    fn distortion_curvature(&self, x: R) -> R;
+    /// `W''(x)`, Pa, given `slope = W'(x)`: the two usually share their costly part.
+    fn distortion_curvature(&self, x: R, slope: R) -> R;
     /// `U'(J)` of `j = J - 1`, Pa.
     fn volume_slope(&self, j: R) -> R;
     /// `U''(J)` of `j = J - 1`, Pa.
@@ -118,8 +118,9 @@ pub struct Response<R> {
 pub(crate) struct VolumeFactor<R> {
     pub(crate) g: R,
     pub(crate) slope: R,
-    /// `J^(-5/3)` at the clamped `J`.
+    /// `J^(-5/3)` and `J^-1` at the clamped `J`.
     fifth: R,
+    inverse: R,
     /// `max(J, J_FLOOR) - 1`.
     clamped: R,
     /// `min(J - J_FLOOR, 0)`.
@@ -148,36 +149,73 @@ impl<R: Real> VolumeFactor<R> {
         let i1 = at.i + R::splat(3.0);
         // I1bar - 3 = g (I1 - 3) + 3 (g - 1), g - 1 = e (2 + e)
         let x = square * at.i + R::splat(3.0) * e * (R::splat(2.0) + e) + slope * below * i1;
-        Self { g: square + slope * below, slope, fifth, clamped, below, x }
+        Self { g: square + slope * below, slope, fifth, inverse: square * y, clamped, below, x }
     }
 
     /// Second derivative of `g`: zero where it is continued along its tangent.
     #[inline(always)]
     pub(crate) fn curvature(&self) -> R {
         let inside = self.below.zip(R::splat(0.0), |below, _| if below < 0.0 { 0.0 } else { 1.0 });
-        let y3 = self.fifth.zip(self.clamped, |_, clamped| 1.0 / (1.0 + clamped));
-        inside * R::splat(10.0 / 9.0) * self.fifth * y3
+        inside * R::splat(10.0 / 9.0) * self.fifth * self.inverse
+    }
+}
+
+/// What stress and tangent share: `W'` and `g` at the given invariants.
+#[derive(Clone, Copy)]
+pub(crate) struct Local<R> {
+    pub(crate) at: Invariants<R>,
+    /// Of an isochoric law.
+    factor: Option<VolumeFactor<R>>,
+    /// `W'(x)`, Pa.
+    pub(crate) slope: R,
+    x: R,
+}
+
+impl<R: Real> Local<R> {
+    #[inline(always)]
+    pub(crate) fn new<L: Law>(law: &L::Wide<R>, at: Invariants<R>) -> Self {
+        let factor = if L::ISOCHORIC { Some(VolumeFactor::new(at)) } else { None };
+        let x = factor.map_or(at.i, |factor| factor.x);
+        Self { at, factor, slope: law.distortion_slope(x), x }
+    }
+
+    /// `W''(x)`, Pa; not negative.
+    #[inline(always)]
+    pub(crate) fn stiffening<L: Law>(&self, law: &L::Wide<R>) -> R {
+        law.distortion_curvature(self.x, self.slope).max(R::splat(0.0))
+    }
+
+    /// `g`, `g'` and `g''`; 1, 0, 0 for a literal law.
+    #[inline(always)]
+    pub(crate) fn volume_factor(&self) -> [R; 3] {
+        match &self.factor {
+            Some(factor) => [factor.g, factor.slope, factor.curvature()],
+            None => [R::splat(1.0), R::splat(0.0), R::splat(0.0)],
+        }
+    }
+
+    /// The stress scalars.
+    #[inline(always)]
+    pub(crate) fn response<L: Law>(&self, law: &L::Wide<R>) -> Response<R> {
+        let two = R::splat(2.0);
+        let slope = two * self.slope;
+        let (p1, s) = match &self.factor {
+            Some(factor) => {
+                // g + g' I1 / 2 = J^(-5/3) (J - 1 - (I1 - 3 + 2 below) / 3): small at small strain
+                let bracket =
+                    factor.fifth * (factor.clamped - (self.at.i + two * factor.below) * R::splat(1.0 / 3.0));
+                (slope * factor.g, slope * bracket)
+            }
+            None => (slope, slope),
+        };
+        Response { p1, s: s + law.volume_slope(self.at.j), saturation: law.saturation(self.x) }
     }
 }
 
 /// The stress scalars of law `L` at the given invariants.
 #[inline(always)]
 pub(crate) fn response<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>) -> Response<R> {
-    let two = R::splat(2.0);
-    if L::ISOCHORIC {
-        let factor = VolumeFactor::new(at);
-        let slope = two * law.distortion_slope(factor.x);
-        // g + g' I1 / 2 = J^(-5/3) (J - 1 - (I1 - 3 + 2 below) / 3): small at small strain
-        let bracket = factor.fifth * (factor.clamped - (at.i + two * factor.below) * R::splat(1.0 / 3.0));
-        Response {
-            p1: slope * factor.g,
-            s: slope * bracket + law.volume_slope(at.j),
-            saturation: law.saturation(factor.x),
-        }
-    } else {
-        let slope = two * law.distortion_slope(at.i);
-        Response { p1: slope, s: slope + law.volume_slope(at.j), saturation: law.saturation(at.i) }
-    }
+    Local::new::<L>(law, at).response::<L>(law)
 }
 
 /// Floating-point operations of [`response`] for one element, those of the law included.

@@ -19,7 +19,7 @@ impl<R: Real> Potential<R> for NeoHookean<R> {
         self.c
     }
     #[inline(always)]
-    fn distortion_curvature(&self, _x: R) -> R {
+    fn distortion_curvature(&self, _x: R, _slope: R) -> R {
         R::splat(0.0)
     }
     #[inline(always)]

@@ -21,7 +21,7 @@
 //! No term is left out, so the bound holds for any state, inverted elements included.
 
 use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter, dispatch};
-use crate::material::{Law, Material, Potential, VolumeFactor};
+use crate::material::{Law, Local, Material, Potential};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
 use crate::symmetric::Symmetric;
@@ -250,24 +250,12 @@ impl<R: Real> Terms<R> {
     fn new<L: Law>(law: &L::Wide<R>, deformation: &Deformation<R>) -> Self {
         let at = deformation.invariants;
         let (zero, two) = (R::splat(0.0), R::splat(2.0));
-        if !L::ISOCHORIC {
-            return Self {
-                p1: two * law.distortion_slope(at.i),
-                p_j: law.volume_slope(at.j),
-                stiffening: law.distortion_curvature(at.i).max(zero),
-                volume: law.volume_curvature(at.j).max(zero),
-                coupling: zero,
-                x_f: two,
-                x_c: zero,
-            };
-        }
-        let factor = VolumeFactor::new(at);
-        let slope = law.distortion_slope(factor.x);
+        let local = Local::new::<L>(law, at);
+        let (slope, [g, dg, ddg]) = (local.slope, local.volume_factor());
         let i1 = at.i + R::splat(3.0);
-        let volume =
-            law.volume_curvature(at.j) + slope * (R::splat(4.0) * factor.slope + factor.curvature() * i1);
+        let volume = law.volume_curvature(at.j) + slope * (R::splat(4.0) * dg + ddg * i1);
         // 4 W' g' (C:dF)(E:dF), split at r = |E| / |C|
-        let coupling = (two * slope * factor.slope).abs();
+        let coupling = (two * slope * dg).abs();
         let (mut c, mut e) = (zero, zero);
         for i in 0..3 {
             for j in 0..3 {
@@ -277,13 +265,13 @@ impl<R: Real> Terms<R> {
         }
         let ratio = e.zip(c, |e, c| (e + 1e-12) / (c + 1e-12)).sqrt();
         Self {
-            p1: two * slope * factor.g,
-            p_j: law.volume_slope(at.j) + slope * factor.slope * i1,
-            stiffening: law.distortion_curvature(factor.x).max(zero),
+            p1: two * slope * g,
+            p_j: law.volume_slope(at.j) + slope * dg * i1,
+            stiffening: local.stiffening::<L>(law),
             volume: (volume + coupling * ratio).max(zero),
             coupling: coupling.zip(ratio, |coupling, ratio| coupling / ratio),
-            x_f: two * factor.g,
-            x_c: factor.slope * i1,
+            x_f: two * g,
+            x_c: dg * i1,
         }
     }
 

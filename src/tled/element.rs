@@ -4,7 +4,7 @@
 //! forces of an element add up to zero and a translation gives exactly none.
 
 use crate::lanes::{Gather, Real, Scatter};
-use crate::material::{Invariants, Law, Response, response, response_operations};
+use crate::material::{Invariants, Law, Local, Response, response_operations};
 use crate::scene::ElementBlock;
 
 /// A vector and a matrix in lanes; rows are spatial, columns material.
@@ -118,6 +118,7 @@ pub(crate) trait Beside {
         block: &ElementBlock,
         first: usize,
         deformation: &Deformation<R>,
+        local: &Local<R>,
     ) -> R;
 }
 
@@ -126,7 +127,14 @@ pub(crate) struct Nothing;
 
 impl Beside for Nothing {
     #[inline(always)]
-    fn see<R: Real, L: Law>(&mut self, _: &L::Wide<R>, _: &ElementBlock, _: usize, _: &Deformation<R>) -> R {
+    fn see<R: Real, L: Law>(
+        &mut self,
+        _: &L::Wide<R>,
+        _: &ElementBlock,
+        _: usize,
+        _: &Deformation<R>,
+        _: &Local<R>,
+    ) -> R {
         R::splat(0.0)
     }
 }
@@ -143,8 +151,9 @@ pub(crate) fn add_forces<R: Real, L: Law>(
     beside: &mut impl Beside,
 ) {
     let deformation = Deformation::<R>::of_block(block, first, displacement);
-    let fourth = beside.see::<R, L>(law, block, first, &deformation);
-    let response = response::<R, L>(law, deformation.invariants);
+    let local = Local::new::<L>(law, deformation.invariants);
+    let fourth = beside.see::<R, L>(law, block, first, &deformation, &local);
+    let response = local.response::<L>(law);
     extremes.least_j = deformation.invariants.j.min(extremes.least_j);
     extremes.saturation = response.saturation.max(extremes.saturation);
 

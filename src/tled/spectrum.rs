@@ -172,7 +172,7 @@ impl Tangent {
         let at = Invariants { i: (square - 3.0) as f32, j: (volume_ratio - 1.0) as f32 };
         let wide = law_at(law);
         let slope = |x: f32| f64::from(wide.distortion_slope(x));
-        let curvature = |x: f32| f64::from(wide.distortion_curvature(x));
+        let curvature = |x: f32| f64::from(wide.distortion_curvature(x, wide.distortion_slope(x)));
         let volume_slope = f64::from(wide.volume_slope(at.j));
         let volume_curvature = f64::from(wide.volume_curvature(at.j));
         let volume = f64::from(block.volume::<f32>(lane));
