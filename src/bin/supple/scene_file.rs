@@ -146,6 +146,7 @@ pub(crate) struct TimeTable {
     pub(crate) end: Spanned<f64>,
     pub(crate) frames: Option<Spanned<u32>>,
     pub(crate) method: Option<Spanned<String>>,
+    pub(crate) lattice: Option<Spanned<[u32; 3]>>,
 }
 
 #[derive(Deserialize)]
@@ -168,8 +169,12 @@ impl SceneFile {
 
     /// A complaint about something in the file.
     pub(crate) fn problem<T>(&self, at: &Spanned<T>, message: impl fmt::Display) -> Problem {
-        let line = line_of(&self.text, at.span().start);
-        Problem(format!("{}, line {line}: {message}", self.path.display()))
+        Problem(format!("{}: {message}", self.place(at)))
+    }
+
+    /// The file and the line of something in it.
+    pub(crate) fn place<T>(&self, at: &Spanned<T>) -> String {
+        format!("{}, line {}", self.path.display(), line_of(&self.text, at.span().start))
     }
 
     /// Mesh files are named relative to the scene file.
