@@ -20,23 +20,23 @@ pub(crate) fn read_loads(file: &SceneFile, body: &Body) -> Result<Lists, Problem
     }
     for at in &scene.motion {
         let axes = read_axes(file, at.get_ref().axes.as_ref())?;
-        let (metre, ramp) = (at.get_ref().metre, read_ramp(file, at, at.get_ref().ramp)?);
-        finite(file, at, "metre", &metre)?;
+        let metre = read_vector(file, "metre", &at.get_ref().metre)?;
+        let ramp = read_ramp(file, at.get_ref().ramp.as_ref())?;
         for node in select(file, at, &at.get_ref().selection(), body)? {
             supports.push(Support { node, axes, moves: true });
             motions.push(Motion { node, axes, metre, ramp });
         }
     }
     for at in &scene.force {
-        let (newton, ramp) = (at.get_ref().newton, read_ramp(file, at, at.get_ref().ramp)?);
-        finite(file, at, "newton", &newton)?;
+        let newton = read_vector(file, "newton", &at.get_ref().newton)?;
+        let ramp = read_ramp(file, at.get_ref().ramp.as_ref())?;
         let nodes = select(file, at, &at.get_ref().selection(), body)?;
         forces.extend(nodes.into_iter().map(|node| NodalForce { node, newton, ramp }));
     }
     let boundary = if scene.traction.is_empty() { vec![] } else { body.boundary() };
     for at in &scene.traction {
-        let (pascal, ramp) = (at.get_ref().pascal, read_ramp(file, at, at.get_ref().ramp)?);
-        finite(file, at, "pascal", &pascal)?;
+        let pascal = read_vector(file, "pascal", &at.get_ref().pascal)?;
+        let ramp = read_ramp(file, at.get_ref().ramp.as_ref())?;
         let mut selected = vec![false; body.local.len()];
         for node in select(file, at, &at.get_ref().selection(), body)? {
             selected[node as usize] = true;
@@ -59,19 +59,22 @@ pub(crate) fn read_loads(file: &SceneFile, body: &Body) -> Result<Lists, Problem
     Ok((supports, forces, motions))
 }
 
-fn read_ramp<T>(file: &SceneFile, at: &Spanned<T>, ramp: Option<f32>) -> Result<f32, Problem> {
-    match ramp {
-        Some(ramp) if !(ramp.is_finite() && ramp >= 0.0) => {
-            Err(file.problem(at, format!("ramp is {ramp} s, it must be zero or more")))
-        }
-        ramp => Ok(ramp.unwrap_or(0.0)),
+fn read_ramp(file: &SceneFile, ramp: Option<&Spanned<f32>>) -> Result<f32, Problem> {
+    let Some(at) = ramp else {
+        return Ok(0.0);
+    };
+    let ramp = *at.get_ref();
+    if !(ramp.is_finite() && ramp >= 0.0) {
+        return Err(file.problem(at, format!("ramp is {ramp} s, it must be zero or more")));
     }
+    Ok(ramp)
 }
 
-fn finite<T>(file: &SceneFile, at: &Spanned<T>, name: &str, vector: &[f32; 3]) -> Result<(), Problem> {
+fn read_vector(file: &SceneFile, name: &str, at: &Spanned<[f32; 3]>) -> Result<[f32; 3], Problem> {
+    let vector = *at.get_ref();
     match vector.iter().find(|component| !component.is_finite()) {
         Some(component) => Err(file.problem(at, format!("{name} holds {component}"))),
-        None => Ok(()),
+        None => Ok(vector),
     }
 }
 

@@ -17,15 +17,18 @@ pub(crate) fn select<T>(
     body: &Body,
 ) -> Result<Vec<u32>, Problem> {
     let points = &body.mesh.points;
-    let chosen = match selection {
+    let chosen: Vec<_> = match selection {
         Selection { nodes: Some(nodes), plane: None, bounds: None } => {
-            if let Some(node) = nodes.iter().find(|node| **node as usize >= points.len()) {
+            if let Some(node) = nodes.get_ref().iter().find(|node| **node as usize >= points.len()) {
                 return Err(file.problem(
-                    at,
+                    nodes,
                     format!("node {node} does not exist, the mesh has nodes 0 to {}", points.len() - 1),
                 ));
             }
-            nodes.to_vec()
+            // A node that is listed twice is one node: it gets the entry's force once.
+            let mut listed = vec![false; points.len()];
+            let first = |node: &u32| !std::mem::replace(&mut listed[*node as usize], true);
+            nodes.get_ref().iter().copied().filter(first).collect()
         }
         Selection { nodes: None, .. } => {
             let inside = inside(file, at, selection, body)?;

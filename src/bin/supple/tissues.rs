@@ -23,16 +23,15 @@ pub(crate) fn read_tissues(file: &SceneFile, body: &Body) -> Result<Tissues, Pro
     let mut base = [0.0; 5];
     for ((name, needed), (slot, given)) in wanted.iter().zip(base.iter_mut().zip([a, b, c, d])) {
         match (needed, given) {
-            (true, Some(value)) => *slot = *value,
+            (true, Some(value)) => *slot = positive(file, name, value)?,
             (true, None) => return Err(file.problem(at, format!("the law {} needs {name}", law.get_ref()))),
-            (false, Some(_)) => {
-                return Err(file.problem(at, format!("the law {} has no constant {name}", law.get_ref())));
+            (false, Some(value)) => {
+                return Err(file.problem(value, format!("the law {} has no constant {name}", law.get_ref())));
             }
             (false, None) => {}
         }
     }
-    base[4] = *density;
-    check_constants(file, at, &wanted, &base)?;
+    base[4] = positive(file, "density", density)?;
     let mut tissues = vec![base];
     let mut of_element = vec![0; body.mesh.tets.len()];
     for at in &file.scene.region {
@@ -41,13 +40,16 @@ pub(crate) fn read_tissues(file: &SceneFile, body: &Body) -> Result<Tissues, Pro
         for ((name, needed), (slot, given)) in wanted.iter().zip(tissue.iter_mut().zip([a, b, c, d])) {
             if let Some(value) = given {
                 if !needed {
-                    return Err(file.problem(at, format!("the law {} has no constant {name}", law.get_ref())));
+                    return Err(
+                        file.problem(value, format!("the law {} has no constant {name}", law.get_ref()))
+                    );
                 }
-                *slot = *value;
+                *slot = positive(file, name, value)?;
             }
         }
-        tissue[4] = density.unwrap_or(base[4]);
-        check_constants(file, at, &wanted, &tissue)?;
+        if let Some(density) = density {
+            tissue[4] = positive(file, "density", density)?;
+        }
         let index = u16::try_from(tissues.len()).map_err(|_| file.problem(at, "more than 65,535 regions"))?;
         let mut any = false;
         let mut assign = |element: usize| {
@@ -81,17 +83,10 @@ pub(crate) fn read_tissues(file: &SceneFile, body: &Body) -> Result<Tissues, Pro
     Ok((law.get_ref().clone(), tissues, of_element))
 }
 
-fn check_constants<T>(
-    file: &SceneFile,
-    at: &Spanned<T>,
-    wanted: &[(&str, bool); 4],
-    values: &[f32; 5],
-) -> Result<(), Problem> {
-    let named = wanted.iter().copied().chain([("density", true)]).zip(values);
-    for ((name, needed), value) in named {
-        if needed && !(value.is_finite() && *value > 0.0) {
-            return Err(file.problem(at, format!("{name} is {value}, it must be a positive number")));
-        }
+fn positive(file: &SceneFile, name: &str, at: &Spanned<f32>) -> Result<f32, Problem> {
+    let value = *at.get_ref();
+    if !(value.is_finite() && value > 0.0) {
+        return Err(file.problem(at, format!("{name} is {value}, it must be a positive number")));
     }
-    Ok(())
+    Ok(value)
 }
