@@ -73,13 +73,12 @@ impl Job for Cost<'_> {
                 operations as f64 / seconds * 1e-9
             ),
         );
-        if let (Ok(step), true) = (&step, setup.time.method == Method::Tled) {
-            row("real-time factor", real_time(step.seconds(), seconds));
+        if setup.time.method == Method::Tled {
+            let wanted = step.as_ref().map_or(bound.seconds, |step| step.seconds());
+            row("real-time factor", real_time(wanted, seconds));
         }
         let times = beyond(setup, &scene, &mut state, &loads, bound)?;
-        let Ok(step) = step else {
-            return step.map(|_| ());
-        };
+        let step = step?;
         if setup.time.method != Method::Tled {
             row("real-time factor", real_time(step.seconds(), times.of(setup.time.method)));
         }
@@ -146,7 +145,7 @@ fn beyond<M: Material>(
         let ratio = seconds / times.plain;
         row(
             &format!("{} step", method.name()),
-            format!("{:.1} us, {ratio:.2} of an exact one of {:.1} us", 1e6 * seconds, 1e6 * times.plain),
+            format!("{:.1} us, {ratio:.2} times an exact one's {:.1} us", 1e6 * seconds, 1e6 * times.plain),
         );
     }
     let (of, grid) = if setup.time.method == Method::MassScaled {

@@ -1,5 +1,6 @@
 //! How long a step may be: each of several lengths is compared with two steps of half of it along the
-//! scene's first part. Where a method converges the difference is about the error of the longer one.
+//! scene's first part. Where a method converges the difference estimates the error of the longer one: it is three
+//! quarters of it for a method of second order, half of it for one of first order.
 //!
 //! A body that hardly moves at any of the lengths passes as well, so the distance moved stands beside it, and
 //! of a length that passes all shorter ones must pass too.
@@ -57,10 +58,13 @@ pub(crate) fn recommend<M: Material>(
         },
     };
     let span = (SHARE * setup.time.end).max(LEAST).min(setup.time.end);
-    println!("\n{} steps against two of half their length, over the first {span:.3} s", method.name());
+    println!(
+        "\n{} steps, their error estimated by two of half their length, over the first {span:.3} s",
+        method.name()
+    );
     println!(
         "{:<21} {:>12} {:>14} {:>14} {:>17}",
-        "step", "seconds", "error, mm", "moved, mm", "real-time factor"
+        "step", "seconds", "estimate, mm", "moved, mm", "real-time factor"
     );
     let mut best = None;
     let mut unbroken = true;
@@ -93,7 +97,7 @@ pub(crate) fn recommend<M: Material>(
         Some((multiple, error)) => row(
             "recommended",
             format!(
-                "method = \"{}\", step = \"{multiple}x\": {error:.4} mm, {accuracy} mm are asked for",
+                "method = \"{}\", step = \"{multiple}x\" (about {error:.3} mm off, {accuracy} mm allowed)",
                 method.name()
             ),
         ),
