@@ -184,8 +184,8 @@ fn undone(state: &HostState, outcome: &Outcome) -> u64 {
 }
 
 /// The step over the bound of the critical step at rest.
-fn multiple(outcome: &Outcome) -> f64 {
-    f64::from(outcome.steps.1) / f64::from(outcome.at_rest.seconds)
+fn multiple(outcome: &Outcome) -> f32 {
+    outcome.steps.1 / outcome.at_rest.seconds
 }
 
 /// Share of the steps in which nodes were held back.
@@ -198,7 +198,7 @@ fn inertia(trace: &Trace, outcome: &Outcome) -> Value {
     let lattice = (trace.grid != Grid::NONE).then_some(trace.grid);
     json!({
         "step_s": decimal(outcome.steps.1),
-        "step_over_critical_at_rest": multiple(outcome),
+        "step_over_critical_at_rest": decimal(multiple(outcome)),
         "lattice_cells": lattice.map(|grid| grid.cells),
         "lattice_functions": lattice.map(|grid| grid.functions),
         "added_mass_mean": decimal(trace.report.added_mean),
