@@ -2,6 +2,7 @@
 mod errors;
 mod evaluate;
 mod inspect;
+mod large_steps;
 mod simulate;
 
 use std::path::{Path, PathBuf};

@@ -234,6 +234,23 @@ fn regions_have_their_own_constants() {
 }
 
 #[test]
+fn a_node_that_is_listed_twice_is_loaded_once() {
+    let desk = Desk::new();
+    let mut reached = vec![];
+    for nodes in ["[49]", "[49, 49]"] {
+        let scene = bar(&format!(
+            "[[fix]]\nplane = {{ axis = \"z\", at = 0.0 }}\n[[force]]\nnodes = {nodes}\n\
+             newton = [0.001, 0.0, 0.0]\n[time]\nstep = 1e-4\nend = 0.01\n"
+        ));
+        let said = desk.simulate(&scene, &["--force"]);
+        assert_eq!(said.code, 0, "{}", said.err);
+        reached.push(desk.last());
+    }
+    assert_eq!(reached[0], reached[1]);
+    assert!(reached[0][49][4] > 0.0);
+}
+
+#[test]
 fn the_scene_in_the_readme_runs() {
     let home = env!("CARGO_MANIFEST_DIR");
     let readme = std::fs::read_to_string(format!("{home}/README.md")).unwrap();

@@ -13,7 +13,7 @@ use crate::body::Body;
 use crate::picture::{self, Panel};
 use crate::prepare::{Job, Setup};
 use crate::report::{self, Folder};
-use crate::run;
+use crate::run::{self, Start};
 use crate::scene_file::Problem;
 use crate::simulate::End;
 
@@ -47,7 +47,6 @@ pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
     }
     setup.gravity = [0.0, 0.0, -9.81];
     setup.damping = DAMPING;
-    setup.frames = 30;
     setup.with_material(Demo { setup: &setup, out })
 }
 
@@ -66,11 +65,12 @@ impl Job for Demo<'_> {
             "A liver lobe, held at its back, sags under its own weight; its dome is pushed in by 10 mm.\n"
         );
         let mut folder = Folder::create(self.out, true)?;
+        let start = Start::new(setup, &scene, &mut state, false)?;
         let outcome = run::run(
             setup,
             &scene,
             &mut state,
-            false,
+            start,
             |_| {},
             |scene, state| folder.add_frame(&setup.body, scene, state),
         )?;

@@ -2,31 +2,40 @@
 //! in full: every kind of fault is counted and its first element or node named.
 
 use std::path::Path;
-use std::time::Instant;
 
-use supple::loads::Loads;
-use supple::material::Material;
 use supple::mesh::{DEGENERATE, Winding};
-use supple::tled::{self, Step};
 
 use crate::body::{Body, extent, volume};
-use crate::prepare::{Job, Setup};
-use crate::run;
+use crate::cost::Cost;
+use crate::prepare::Setup;
 use crate::scene_file::{Problem, SceneFile};
 
-pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
+/// Looks at a file; `accuracy` (mm) asks for a step of a scene that keeps it.
+pub(crate) fn inspect(path: &Path, accuracy: Option<f64>) -> Result<(), Problem> {
+    if let Some(accuracy) = accuracy
+        && !(accuracy.is_finite() && accuracy > 0.0)
+    {
+        return Err(Problem(format!("--accuracy is {accuracy} mm, it must be a positive number")));
+    }
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
         let setup = Setup::read(&SceneFile::read(path)?)?;
         mesh(&setup.body)?;
         for warning in &setup.warnings {
             println!("warning: {warning}");
         }
-        return setup.with_material(Cost { setup: &setup });
+        return setup.with_material(Cost { setup: &setup, accuracy });
+    }
+    if accuracy.is_some() {
+        return Err(Problem(format!(
+            "{}: --accuracy recommends a step for a scene (.toml), this is a mesh",
+            path.display()
+        )));
     }
     mesh(&Body::read(path, 1.0, Winding::Checked)?)
 }
 
-fn row(name: &str, value: impl std::fmt::Display) {
+/// A row of the table.
+pub(crate) fn row(name: &str, value: impl std::fmt::Display) {
     println!("{name:<21} {value}");
 }
 
@@ -143,62 +152,4 @@ fn radius_ratio(corners: [[f64; 3]; 4], volume: f64) -> f64 {
     let (p, q, r) = (e01 * e23, e02 * e13, e03 * e12);
     let product = (p + q + r) * (p + q - r) * (p - q + r) * (-p + q + r);
     if surface > 0.0 && product > 0.0 { 9.0 * volume / surface * 24.0 * volume / product.sqrt() } else { 0.0 }
-}
-
-/// Critical step, memory and cost of a scene.
-struct Cost<'a> {
-    setup: &'a Setup,
-}
-
-impl Job for Cost<'_> {
-    type Output = Result<(), Problem>;
-
-    fn run<M: Material>(self, material: M) -> Self::Output {
-        let setup = self.setup;
-        let (scene, mut state) = setup.build(material)?;
-        row("material", setup.describe_material());
-        row("mass", format!("{:.3} g", 1e3 * scene.mass()));
-        row("elements left out", setup.body.mesh.tets.len() - scene.element_count());
-        let bound = run::critical(&scene, &mut state)?;
-        row(
-            "critical step",
-            format!("{:.4e} s at rest, which node {} sets (a bound, safe)", bound.seconds, bound.node),
-        );
-        match tled::exact_critical_step(&scene, state.displacements()) {
-            Some(exact) => row(
-                "exact limit",
-                format!("{exact:.4e} s at rest; the bound is {:.2} of it", f64::from(bound.seconds) / exact),
-            ),
-            None => row("exact limit", "not found: the iteration did not settle"),
-        }
-        let step = run::first_step(setup, bound, false);
-        let loads = Loads::new(&scene, setup.gravity, &setup.forces, &setup.motions)
-            .map_err(|error| Problem(error.to_string()))?;
-        let bytes = scene.node_count()
-            * (size_of::<supple::scene::NodeInertia>() + 3 * size_of::<supple::state::NodeVector>())
-            + supple::scene::blocks_for(scene.element_count()) * size_of::<supple::scene::ElementBlock>();
-        row("memory", format!("{:.1} kB", bytes as f64 * 1e-3));
-        let operations = tled::operations(&scene);
-        row("operations per step", format!("{operations} floating-point operations"));
-        let measured =
-            Step::insist(0.5 * bound.seconds, setup.damping).map_err(|error| Problem(error.to_string()))?;
-        const STEPS: u32 = 300;
-        let start = Instant::now();
-        for _ in 0..STEPS {
-            // Only the time counts here; what becomes of the motion is for `simulate`.
-            let _ = tled::step(&scene, &loads, &mut state, &measured);
-        }
-        let seconds = start.elapsed().as_secs_f64() / f64::from(STEPS);
-        row(
-            "time per step",
-            format!(
-                "{:.1} us here and now, {:.1} GFLOP/s",
-                1e6 * seconds,
-                operations as f64 / seconds * 1e-9
-            ),
-        );
-        let wanted = step.as_ref().map_or(f64::from(bound.seconds), |step| f64::from(step.seconds()));
-        row("real-time factor", format!("{:.3} at {wanted:.3e} s a step", wanted / seconds));
-        step.map(|_| ())
-    }
 }

@@ -3,15 +3,22 @@
 //! Exit codes: 0 as asked, 2 the input is not usable, 3 the simulation diverged.
 
 mod body;
+mod cost;
 mod demo;
+mod doubling;
 mod evaluate;
 mod inspect;
+mod large_steps;
+mod loads;
 mod picture;
 mod prepare;
 mod report;
 mod run;
 mod scene_file;
+mod select;
 mod simulate;
+mod timing;
+mod tissues;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -48,6 +55,9 @@ enum Command {
     Inspect {
         /// A mesh (.vtk, .vtu, .msh, .node, .ele) or a scene (.toml)
         file: PathBuf,
+        /// Recommend a step for the scene whose error, by step doubling, is below this (mm)
+        #[arg(long, value_name = "MM")]
+        accuracy: Option<f64>,
     },
     /// A liver lobe under its own weight and a push, with a table and a picture
     Demo {
@@ -62,7 +72,7 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Simulate { scene, out, force, insist } => simulate::simulate(&scene, &out, force, insist),
-        Command::Inspect { file } => inspect::inspect(&file).map(|()| End::Reached),
+        Command::Inspect { file, accuracy } => inspect::inspect(&file, accuracy).map(|()| End::Reached),
         Command::Demo { out } => demo::demo(&out),
         Command::Evaluate(asked) => evaluate::evaluate(&asked),
     };

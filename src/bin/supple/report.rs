@@ -11,6 +11,7 @@ use supple::material::Material;
 use supple::tled;
 
 use crate::body::{Body, volume};
+use crate::large_steps::{Grid, Trace, describe_added};
 use crate::prepare::{HostScene, HostState, Setup};
 use crate::run::Outcome;
 use crate::scene_file::Problem;
@@ -171,10 +172,66 @@ impl Figures {
     }
 }
 
-/// Microseconds a step, and simulated seconds per second spent.
+/// Microseconds a step that was computed, and simulated seconds per second spent.
 pub(crate) fn speed(state: &HostState, outcome: &Outcome) -> (f64, f64) {
     let spent = outcome.spent.as_secs_f64().max(1e-9);
-    (spent * 1e6 / state.steps().max(1) as f64, state.time() / spent)
+    (spent * 1e6 / outcome.computed.max(1) as f64, state.time() / spent)
+}
+
+/// Steps that were computed and taken back: automatic ones that turned out too long, or the one that diverged.
+fn undone(state: &HostState, outcome: &Outcome) -> u64 {
+    outcome.computed.saturating_sub(state.steps())
+}
+
+/// The step over the bound of the critical step at rest.
+fn multiple(outcome: &Outcome) -> f32 {
+    outcome.steps.1 / outcome.at_rest.seconds
+}
+
+/// Share of the steps in which nodes were held back.
+fn held_back_share(trace: &Trace, outcome: &Outcome) -> f64 {
+    trace.steps_held_back as f64 / outcome.computed.max(1) as f64
+}
+
+/// The inertia in `summary.json`.
+fn inertia(trace: &Trace, outcome: &Outcome) -> Value {
+    let lattice = (trace.grid != Grid::NONE).then_some(trace.grid);
+    json!({
+        "step_s": decimal(outcome.steps.1),
+        "step_over_critical_at_rest": decimal(multiple(outcome)),
+        "lattice_cells": lattice.map(|grid| grid.cells),
+        "lattice_functions": lattice.map(|grid| grid.functions),
+        "added_mass_mean": decimal(trace.report.added_mean),
+        "added_mass_largest": decimal(trace.report.added_largest),
+        "added_mass_node": trace.report.added_node,
+        "steps_held_back_share": held_back_share(trace, outcome),
+        "most_nodes_held_back": trace.most_held_back,
+        "coarse_share_least": lattice.map(|_| decimal(trace.least_coarse_share)),
+    })
+}
+
+/// The inertia on the screen.
+fn inertia_rows(method: &str, trace: &Trace, outcome: &Outcome) -> Vec<(&'static str, String)> {
+    let lattice = trace.grid != Grid::NONE;
+    let mut rows = vec![
+        ("method", format!("{method}, steps of {:.1} times the critical step at rest", multiple(outcome))),
+        ("added mass", describe_added(&trace.report)),
+        (
+            "held back",
+            match trace.most_held_back {
+                0 => "no node in any step".into(),
+                most => format!(
+                    "nodes in {:.1} % of the steps, at most {most} at once",
+                    100.0 * held_back_share(trace, outcome)
+                ),
+            },
+        ),
+    ];
+    if lattice {
+        rows.insert(1, ("lattice", trace.grid.to_string()));
+        rows.push(("coarse motion", format!("used to {:.1} % or more", 100.0 * trace.least_coarse_share)));
+    }
+    rows
 }
 
 /// What is not as it should be, in sentences.
@@ -236,7 +293,7 @@ fn summary<M: Material>(
         "divergence": outcome.divergence.map(|divergence| json!({
             "time_s": divergence.time, "node": divergence.node, "sentence": sentence,
         })),
-        "method": "tled",
+        "method": setup.time.method.name(),
         "mesh": setup.body.name,
         "material": setup.describe_material(),
         "nodes": scene.node_count(),
@@ -245,12 +302,13 @@ fn summary<M: Material>(
         "mass_kg": scene.mass(),
         "damping_per_s": decimal(setup.damping),
         "steps": state.steps(),
+        "steps_undone": undone(state, outcome),
         "step_shortest_s": decimal(outcome.steps.0),
         "step_longest_s": decimal(outcome.steps.1),
         "critical_step_at_rest_s": decimal(outcome.at_rest.seconds),
         "critical_step_least_s": decimal(outcome.least.0.seconds),
         "critical_step_least_at_s": outcome.least.1,
-        "end_s": setup.end,
+        "end_s": setup.time.end,
         "time_s": state.time(),
         "us_per_step": us_per_step,
         "real_time_factor": real_time_factor,
@@ -263,6 +321,7 @@ fn summary<M: Material>(
             "kinetic": ledger.kinetic, "strain": figures.strain_energy,
         },
         "steps_limited": outcome.limits.steps,
+        "inertia": outcome.trace.as_ref().map(|trace| inertia(trace, outcome)),
         "warnings": warnings(setup, outcome),
     })
 }
@@ -282,7 +341,11 @@ fn table<M: Material>(
     } else {
         format!("{shortest:.3e} to {longest:.3e} s")
     };
-    let rows = [
+    let undone = match (undone(state, outcome), outcome.divergence) {
+        (1.., None) => format!(", {} more undone", undone(state, outcome)),
+        _ => String::new(),
+    };
+    let mut rows = vec![
         (
             "mesh",
             format!(
@@ -301,7 +364,7 @@ fn table<M: Material>(
                 outcome.at_rest.seconds, outcome.least.0.seconds
             ),
         ),
-        ("simulated", format!("{:.3} s in {} steps", state.time(), state.steps())),
+        ("simulated", format!("{:.3} s in {} steps{undone}", state.time(), state.steps())),
         ("time per step", format!("{us:.1} us")),
         ("real-time factor", format!("{factor:.3} (1 and more is real time)")),
         (
@@ -317,5 +380,8 @@ fn table<M: Material>(
             format!("{:.3} mm at node {}", 1e3 * figures.max_displacement, figures.max_node),
         ),
     ];
+    if let Some(trace) = &outcome.trace {
+        rows.splice(2..2, inertia_rows(setup.time.method.name(), trace, outcome));
+    }
     rows.iter().fold(String::new(), |text, (name, value)| text + &format!("{name:<21} {value}\n"))
 }

@@ -6,12 +6,15 @@
 
 use std::time::{Duration, Instant};
 
+use supple::inertia;
 use supple::loads::Loads;
 use supple::material::Material;
 use supple::tled::{self, CriticalStep, Divergence, Status, Step};
 
-use crate::prepare::{HostScene, HostState, Setup, StepChoice};
+use crate::large_steps::{Grid, HostInertia, Trace};
+use crate::prepare::{HostScene, HostState, Setup};
 use crate::scene_file::Problem;
+use crate::timing::{Method, StepChoice};
 
 /// With `step = "auto"`: most steps between two looks at the critical step, and the share of it taken.
 const STEPS_BETWEEN_LOOKS: u32 = 50;
@@ -52,28 +55,45 @@ pub(crate) struct Outcome {
     pub(crate) least: (CriticalStep, f64),
     /// Shortest and longest step taken, s.
     pub(crate) steps: (f32, f32),
+    /// Steps computed, those undone included.
+    pub(crate) computed: u64,
     /// Time spent in steps, looks at the critical step included.
     pub(crate) spent: Duration,
     pub(crate) limits: Limits,
     pub(crate) divergence: Option<Divergence>,
     /// The first frame at which a fixed step was above the bound.
     pub(crate) above_from: Option<f64>,
+    /// What the inertia did, with a method that has one.
+    pub(crate) trace: Option<Trace>,
 }
 
-/// Refuses a step above the critical one unless the user insists.
+/// The step that the scene file asks for. The exact step is refused above the critical one unless the user
+/// insists.
 pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, insist: bool) -> Result<Step, Problem> {
-    let wanted = match setup.step {
+    let time = &setup.time;
+    let exact = time.method == Method::Tled;
+    let seconds = match time.step {
         StepChoice::Seconds(seconds) => seconds,
+        StepChoice::Multiple(multiple) => multiple * at_rest.seconds,
         StepChoice::Auto => SHARE * at_rest.seconds,
     };
-    let step =
-        if insist { Step::insist(wanted, setup.damping) } else { Step::new(wanted, setup.damping, at_rest) };
-    step.map_err(|error| {
-        Problem(format!(
-            "{}: {error}; shorten it, write step = \"auto\", or insist with --insist",
-            setup.body.name
-        ))
-    })
+    let step = if insist || !exact {
+        Step::insist(seconds, setup.damping)
+    } else {
+        Step::new(seconds, setup.damping, at_rest)
+    };
+    let step = step.map_err(|error| {
+        let advice = if exact {
+            "; shorten it, write step = \"auto\", insist with --insist, or go beyond with method = \"multilevel\""
+        } else {
+            ""
+        };
+        Problem(format!("{}: {error}{advice}", time.step_at))
+    })?;
+    if !matches!(time.step, StepChoice::Auto) {
+        time.check_length(seconds)?;
+    }
+    Ok(step)
 }
 
 /// The bound at the state, or a problem: there is none for a state that is not finite.
@@ -85,81 +105,82 @@ pub(crate) fn critical<M: Material>(
         .ok_or_else(|| Problem("the stiffness of some element is not a finite number".into()))
 }
 
+/// A simulation at rest: everything that can be refused has been.
+pub(crate) struct Start {
+    at_rest: CriticalStep,
+    step: Step,
+    inertia: Option<HostInertia>,
+}
+
+impl Start {
+    pub(crate) fn new<M: Material>(
+        setup: &Setup,
+        scene: &HostScene<M>,
+        state: &mut HostState,
+        insist: bool,
+    ) -> Result<Self, Problem> {
+        let at_rest = critical(scene, state)?;
+        let step = first_step(setup, at_rest, insist)?;
+        let inertia = if setup.time.method == Method::Tled {
+            None
+        } else {
+            let inertia = Grid::wanted(setup, scene)?.prepare(setup, scene, state, step);
+            Some(inertia.map_err(|error| Problem(format!("{}: {error}", setup.body.name)))?)
+        };
+        Ok(Self { at_rest, step, inertia })
+    }
+}
+
 /// Runs to the end or to divergence. `frame` is called at rest and after each interval, `tick` with the time
 /// now and then.
 pub(crate) fn run<M: Material>(
     setup: &Setup,
     scene: &HostScene<M>,
     state: &mut HostState,
-    insist: bool,
+    start: Start,
     tick: impl Fn(f64),
     mut frame: impl FnMut(&HostScene<M>, &HostState) -> Result<(), Problem>,
 ) -> Result<Outcome, Problem> {
     let loads = Loads::new(scene, setup.gravity, &setup.forces, &setup.motions)
         .map_err(|error| Problem(error.to_string()))?;
-    let at_rest = critical(scene, state)?;
-    let mut step = first_step(setup, at_rest, insist)?;
+    let Start { at_rest, step, mut inertia } = start;
     let mut outcome = Outcome {
         at_rest,
         least: (at_rest, 0.0),
         steps: (step.seconds(), step.seconds()),
+        computed: 0,
         spent: Duration::ZERO,
         limits: Limits { least_volume_ratio: 1.0, ..Limits::default() },
         divergence: None,
         above_from: None,
+        trace: inertia.as_ref().map(Trace::new),
     };
     let mut pace = Pace { longest: SHARE * at_rest.seconds, critical: at_rest.seconds, steps: 1 };
     frame(scene, state)?;
-    let total = (setup.end / f64::from(step.seconds())).round().max(1.0) as u64;
-    for index in 1..=setup.frames {
-        let share = f64::from(index) / f64::from(setup.frames);
-        let start = Instant::now();
-        match setup.step {
-            StepChoice::Seconds(_) => {
-                let target = (total as f64 * share).round() as u64;
-                while state.steps() < target && outcome.divergence.is_none() {
-                    take(scene, &loads, state, &step, &mut outcome);
-                    if state.steps().is_multiple_of(u64::from(STEPS_BETWEEN_LOOKS)) {
-                        tick(state.time());
-                    }
-                }
+    let automatic = matches!(setup.time.step, StepChoice::Auto);
+    let total = (setup.time.end / f64::from(step.seconds())).round().max(1.0) as u64;
+    // No two frames of one state.
+    let frames = if automatic { setup.time.frames.into() } else { total.min(setup.time.frames.into()) };
+    for index in 1..=frames {
+        let share = index as f64 / frames as f64;
+        let clock = Instant::now();
+        if automatic {
+            let target = setup.time.end * share;
+            // A remainder of rounding is no step.
+            while target - state.time() > 1e-9 * setup.time.end && outcome.divergence.is_none() {
+                tick(state.time());
+                pace.advance(setup, scene, &loads, state, target, &mut outcome)?;
             }
-            StepChoice::Auto => {
-                let target = setup.end * share;
-                // A remainder of rounding is no step.
-                while target - state.time() > 1e-9 * setup.end && outcome.divergence.is_none() {
+        } else {
+            let target = (total as f64 * share).round() as u64;
+            while state.steps() < target && outcome.divergence.is_none() {
+                take(scene, &loads, state, &step, inertia.as_mut(), &mut outcome);
+                if state.steps().is_multiple_of(u64::from(STEPS_BETWEEN_LOOKS)) {
                     tick(state.time());
-                    let remaining = target - state.time();
-                    let count = (remaining / f64::from(pace.longest)).ceil().max(1.0);
-                    step = Step::insist((remaining / count) as f32, setup.damping)
-                        .map_err(|error| Problem(error.to_string()))?;
-                    let before = (state.clone(), outcome.limits);
-                    let count = count.min(f64::from(pace.steps)) as u32;
-                    for _ in 0..count {
-                        if outcome.divergence.is_none() {
-                            take(scene, &loads, state, &step, &mut outcome);
-                        }
-                    }
-                    let now = tled::critical_step(scene, state).map_or(0.0, |bound| bound.seconds);
-                    let outrun = outcome.divergence.is_some() || step.seconds() > now;
-                    if outrun && step.seconds() > SHORTEST * at_rest.seconds {
-                        (*state, outcome.limits) = before;
-                        outcome.divergence = None;
-                        (pace.longest, pace.steps) = (0.5 * step.seconds(), 1);
-                    } else {
-                        outcome.steps.0 = outcome.steps.0.min(step.seconds());
-                        outcome.steps.1 = outcome.steps.1.max(step.seconds());
-                        // Look more often while the critical step falls fast.
-                        let fall = (1.0 - now / pace.critical).max(0.0);
-                        let calm = (FALL / fall * pace.steps as f32) as u32;
-                        pace.steps = calm.min(2 * pace.steps).clamp(1, STEPS_BETWEEN_LOOKS);
-                        pace.longest = (pace.longest * (1.0 + GROWTH * count as f32)).min(SHARE * now);
-                        pace.critical = now;
-                    }
                 }
             }
         }
-        outcome.spent += start.elapsed();
+        outcome.spent += clock.elapsed();
         if outcome.divergence.is_some() {
             break;
         }
@@ -167,7 +188,7 @@ pub(crate) fn run<M: Material>(
         if bound.seconds < outcome.least.0.seconds {
             outcome.least = (bound, state.time());
         }
-        if step.seconds() > bound.seconds && matches!(setup.step, StepChoice::Seconds(_)) {
+        if step.seconds() > bound.seconds && !automatic && inertia.is_none() {
             outcome.above_from.get_or_insert(state.time());
         }
         frame(scene, state)?;
@@ -175,14 +196,68 @@ pub(crate) fn run<M: Material>(
     Ok(outcome)
 }
 
+impl Pace {
+    /// Some steps of an automatic length towards `target`, or none if they were too long.
+    fn advance<M: Material>(
+        &mut self,
+        setup: &Setup,
+        scene: &HostScene<M>,
+        loads: &Loads<'_>,
+        state: &mut HostState,
+        target: f64,
+        outcome: &mut Outcome,
+    ) -> Result<(), Problem> {
+        let remaining = target - state.time();
+        let count = (remaining / f64::from(self.longest)).ceil().max(1.0);
+        let step = Step::insist((remaining / count) as f32, setup.damping)
+            .map_err(|error| Problem(error.to_string()))?;
+        let before = (state.clone(), outcome.limits);
+        let count = count.min(f64::from(self.steps)) as u32;
+        for _ in 0..count {
+            if outcome.divergence.is_none() {
+                take(scene, loads, state, &step, None, outcome);
+            }
+        }
+        let now = tled::critical_step(scene, state).map_or(0.0, |bound| bound.seconds);
+        let outrun = outcome.divergence.is_some() || step.seconds() > now;
+        if outrun && step.seconds() > SHORTEST * outcome.at_rest.seconds {
+            (*state, outcome.limits) = before;
+            outcome.divergence = None;
+            (self.longest, self.steps) = (0.5 * step.seconds(), 1);
+        } else {
+            outcome.steps.0 = outcome.steps.0.min(step.seconds());
+            outcome.steps.1 = outcome.steps.1.max(step.seconds());
+            // Look more often while the critical step falls fast.
+            let fall = (1.0 - now / self.critical).max(0.0);
+            let calm = (FALL / fall * self.steps as f32) as u32;
+            self.steps = calm.min(2 * self.steps).clamp(1, STEPS_BETWEEN_LOOKS);
+            self.longest = (self.longest * (1.0 + GROWTH * count as f32)).min(SHARE * now);
+            self.critical = now;
+        }
+        Ok(())
+    }
+}
+
 fn take<M: Material>(
     scene: &HostScene<M>,
     loads: &Loads<'_>,
     state: &mut HostState,
     step: &Step,
+    inertia: Option<&mut HostInertia>,
     outcome: &mut Outcome,
 ) {
-    match tled::step(scene, loads, state, step) {
+    let status = match inertia {
+        None => tled::step(scene, loads, state, step),
+        Some(inertia) => {
+            let status = inertia::step(scene, loads, state, inertia);
+            if let Some(trace) = &mut outcome.trace {
+                trace.add(inertia.report());
+            }
+            status
+        }
+    };
+    outcome.computed += 1;
+    match status {
         Status::Limited { least_volume_ratio, saturation, energy_excess } => {
             let limits = &mut outcome.limits;
             if limits.steps == 0 {

@@ -60,11 +60,11 @@ pub(crate) struct MeshTable {
 #[serde(deny_unknown_fields)]
 pub(crate) struct MaterialTable {
     pub(crate) law: Spanned<String>,
-    pub(crate) a: Option<f32>,
-    pub(crate) b: Option<f32>,
-    pub(crate) c: Option<f32>,
-    pub(crate) d: Option<f32>,
-    pub(crate) density: f32,
+    pub(crate) a: Option<Spanned<f32>>,
+    pub(crate) b: Option<Spanned<f32>>,
+    pub(crate) c: Option<Spanned<f32>>,
+    pub(crate) d: Option<Spanned<f32>>,
+    pub(crate) density: Spanned<f32>,
 }
 
 /// Elements that differ from `[material]` in some constants.
@@ -75,11 +75,11 @@ pub(crate) struct RegionTable {
     pub(crate) plane: Option<Plane>,
     #[serde(rename = "box")]
     pub(crate) bounds: Option<Bounds>,
-    pub(crate) a: Option<f32>,
-    pub(crate) b: Option<f32>,
-    pub(crate) c: Option<f32>,
-    pub(crate) d: Option<f32>,
-    pub(crate) density: Option<f32>,
+    pub(crate) a: Option<Spanned<f32>>,
+    pub(crate) b: Option<Spanned<f32>>,
+    pub(crate) c: Option<Spanned<f32>>,
+    pub(crate) d: Option<Spanned<f32>>,
+    pub(crate) density: Option<Spanned<f32>>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -106,7 +106,7 @@ pub(crate) struct Bounds {
 
 /// Which nodes an entry is about: exactly one of the three.
 pub(crate) struct Selection<'a> {
-    pub(crate) nodes: Option<&'a [u32]>,
+    pub(crate) nodes: Option<&'a Spanned<Vec<u32>>>,
     pub(crate) plane: Option<Plane>,
     pub(crate) bounds: Option<Bounds>,
 }
@@ -118,7 +118,7 @@ macro_rules! entry {
         #[derive(Deserialize)]
         #[serde(deny_unknown_fields)]
         pub(crate) struct $name {
-            nodes: Option<Vec<u32>>,
+            nodes: Option<Spanned<Vec<u32>>>,
             plane: Option<Plane>,
             #[serde(rename = "box")]
             bounds: Option<Bounds>,
@@ -128,16 +128,16 @@ macro_rules! entry {
 
         impl $name {
             pub(crate) fn selection(&self) -> Selection<'_> {
-                Selection { nodes: self.nodes.as_deref(), plane: self.plane, bounds: self.bounds }
+                Selection { nodes: self.nodes.as_ref(), plane: self.plane, bounds: self.bounds }
             }
         }
     };
 }
 
 entry!(FixTable { axes: Option<Spanned<String>> });
-entry!(ForceTable { newton: [f32; 3], ramp: Option<f32> });
-entry!(MoveTable { metre: [f32; 3], ramp: Option<f32>, axes: Option<Spanned<String>> });
-entry!(TractionTable { pascal: [f32; 3], ramp: Option<f32> });
+entry!(ForceTable { newton: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>> });
+entry!(MoveTable { metre: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>>, axes: Option<Spanned<String>> });
+entry!(TractionTable { pascal: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>> });
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -146,6 +146,7 @@ pub(crate) struct TimeTable {
     pub(crate) end: Spanned<f64>,
     pub(crate) frames: Option<Spanned<u32>>,
     pub(crate) method: Option<Spanned<String>>,
+    pub(crate) lattice: Option<Spanned<[u32; 3]>>,
 }
 
 #[derive(Deserialize)]
@@ -168,8 +169,12 @@ impl SceneFile {
 
     /// A complaint about something in the file.
     pub(crate) fn problem<T>(&self, at: &Spanned<T>, message: impl fmt::Display) -> Problem {
-        let line = line_of(&self.text, at.span().start);
-        Problem(format!("{}, line {line}: {message}", self.path.display()))
+        Problem(format!("{}: {message}", self.place(at)))
+    }
+
+    /// The file and the line of something in it.
+    pub(crate) fn place<T>(&self, at: &Spanned<T>) -> String {
+        format!("{}, line {}", self.path.display(), line_of(&self.text, at.span().start))
     }
 
     /// Mesh files are named relative to the scene file.

@@ -7,7 +7,7 @@ use supple::material::Material;
 
 use crate::prepare::{Job, Setup};
 use crate::report::{self, Folder};
-use crate::run;
+use crate::run::{self, Start};
 use crate::scene_file::{Problem, SceneFile};
 
 /// How a simulation ended, for the exit code.
@@ -36,13 +36,12 @@ impl Job for Simulation<'_> {
         let setup = self.setup;
         let (scene, mut state) = setup.build(material)?;
         // All that can be refused is refused before the folder is touched.
-        let at_rest = run::critical(&scene, &mut state)?;
-        run::first_step(setup, at_rest, self.insist)?;
+        let start = Start::new(setup, &scene, &mut state, self.insist)?;
         let mut folder = Folder::create(self.out, self.force)?;
 
-        let progress = ProgressBar::new((setup.end * 1e3).ceil() as u64).with_style(progress_style());
+        let progress = ProgressBar::new((setup.time.end * 1e3).ceil() as u64).with_style(progress_style());
         let tick = |time: f64| progress.set_position((time * 1e3) as u64);
-        let outcome = run::run(setup, &scene, &mut state, self.insist, tick, |scene, state| {
+        let outcome = run::run(setup, &scene, &mut state, start, tick, |scene, state| {
             folder.add_frame(&setup.body, scene, state)
         })?;
         progress.finish_and_clear();

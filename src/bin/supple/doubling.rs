@@ -1,0 +1,173 @@
+//! How long a step may be: each of several lengths is compared with two steps of half of it along the
+//! scene's first part. Where a method converges the difference estimates the error of the longer one: it is three
+//! quarters of it for a method of second order, half of it for one of first order.
+//!
+//! A body that hardly moves at any of the lengths passes as well, so the distance moved stands beside it, and
+//! of a length that passes all shorter ones must pass too.
+
+use supple::inertia;
+use supple::loads::Loads;
+use supple::material::Material;
+use supple::tled::{CriticalStep, Divergence, Status, Step};
+
+use crate::cost::Times;
+use crate::inspect::row;
+use crate::large_steps::{Grid, HostInertia};
+use crate::prepare::{HostScene, HostState, Setup};
+use crate::scene_file::Problem;
+use crate::timing::Method;
+
+/// Lengths that are tried, times the critical step.
+const MULTIPLES: [f32; 6] = [50.0, 40.0, 30.0, 20.0, 10.0, 5.0];
+/// The first part of a scene: this share of it, and at least so many seconds if it has them.
+const SHARE: f64 = 0.1;
+const LEAST: f64 = 0.2;
+
+/// Distances over the nodes, mm.
+#[derive(Clone, Copy, Default)]
+struct Distance {
+    /// Largest mean difference between the step and its halves.
+    error: f64,
+    /// Largest mean displacement.
+    moved: f64,
+}
+
+/// What came of a length of step.
+enum Found {
+    Distance(Distance),
+    Diverged(Divergence),
+    /// It is longer than the part of the scene.
+    TooLong,
+}
+
+/// Prints the table of errors, and the longest step that keeps `accuracy` (mm).
+pub(crate) fn recommend<M: Material>(
+    setup: &Setup,
+    scene: &HostScene<M>,
+    loads: &Loads<'_>,
+    bound: CriticalStep,
+    accuracy: f64,
+    times: &Times,
+) -> Result<(), Problem> {
+    let (method, grid) = match setup.time.method {
+        Method::MassScaled => (Method::MassScaled, Grid::NONE),
+        Method::Multilevel => (Method::Multilevel, Grid::wanted(setup, scene)?),
+        Method::Tled => match Grid::suggested(setup, scene) {
+            Grid::NONE => (Method::MassScaled, Grid::NONE),
+            grid => (Method::Multilevel, grid),
+        },
+    };
+    let span = (SHARE * setup.time.end).max(LEAST).min(setup.time.end);
+    println!(
+        "\n{} steps, their error estimated by two of half their length, over the first {span:.3} s",
+        method.name()
+    );
+    println!(
+        "{:<21} {:>12} {:>14} {:>14} {:>17}",
+        "step", "seconds", "estimate, mm", "moved, mm", "real-time factor"
+    );
+    let mut best = None;
+    let mut unbroken = true;
+    let mut rows = vec![];
+    for multiple in MULTIPLES.into_iter().rev() {
+        let seconds = multiple * bound.seconds;
+        let found = compare(setup, scene, loads, seconds, span, grid)?;
+        let words = match &found {
+            Found::Distance(Distance { error, moved }) => {
+                unbroken &= *error < accuracy;
+                let factor = f64::from(seconds) / times.of(method);
+                format!("{error:>14.4} {moved:>14.3} {factor:>17.3}")
+            }
+            Found::Diverged(divergence) => {
+                unbroken = false;
+                format!(" diverged at {:.6} s", divergence.time)
+            }
+            Found::TooLong => {
+                unbroken = false;
+                " longer than this part of the scene".into()
+            }
+        };
+        if let (true, Found::Distance(distance)) = (unbroken, &found) {
+            best = Some((multiple, distance.error));
+        }
+        rows.push(format!("{:<21} {seconds:>12.3e} {words}", format!("{multiple}x")));
+    }
+    rows.iter().rev().for_each(|row| println!("{row}"));
+    match best {
+        Some((multiple, error)) => row(
+            "recommended",
+            format!(
+                "method = \"{}\", step = \"{multiple}x\" (about {error:.3} mm off, {accuracy} mm allowed)",
+                method.name()
+            ),
+        ),
+        None => row(
+            "recommended",
+            format!("method = \"tled\": none of these {} steps stays below {accuracy} mm", method.name()),
+        ),
+    }
+    Ok(())
+}
+
+/// One length of step beside its half, from rest over `span` seconds.
+fn compare<M: Material>(
+    setup: &Setup,
+    scene: &HostScene<M>,
+    loads: &Loads<'_>,
+    seconds: f32,
+    span: f64,
+    grid: Grid,
+) -> Result<Found, Problem> {
+    let steps = (span / f64::from(seconds)) as u64;
+    if steps == 0 {
+        return Ok(Found::TooLong);
+    }
+    let mut whole = Walker::new(setup, scene, seconds, grid)?;
+    let mut half = Walker::new(setup, scene, 0.5 * seconds, grid)?;
+    let mut furthest = Distance::default();
+    for _ in 0..steps {
+        for turn in 0..3 {
+            let walker = if turn == 0 { &mut whole } else { &mut half };
+            if let Status::Diverged(divergence) =
+                inertia::step(scene, loads, &mut walker.state, &mut walker.inertia)
+            {
+                return Ok(Found::Diverged(divergence));
+            }
+        }
+        let (mut error, mut moved) = (0.0, 0.0);
+        for (a, b) in whole.state.displacements().iter().zip(half.state.displacements()) {
+            error += length([0, 1, 2].map(|axis| a.to_array()[axis] - b.to_array()[axis]));
+            moved += length(b.to_array());
+        }
+        let scale = 1e3 / scene.node_count() as f64;
+        furthest.error = furthest.error.max(scale * error);
+        furthest.moved = furthest.moved.max(scale * moved);
+    }
+    Ok(Found::Distance(furthest))
+}
+
+fn length(vector: [f32; 3]) -> f64 {
+    vector.iter().map(|component| f64::from(component * component)).sum::<f64>().sqrt()
+}
+
+/// A scene on its way with one length of step.
+struct Walker {
+    state: HostState,
+    inertia: HostInertia,
+}
+
+impl Walker {
+    fn new<M: Material>(
+        setup: &Setup,
+        scene: &HostScene<M>,
+        seconds: f32,
+        grid: Grid,
+    ) -> Result<Self, Problem> {
+        let step = Step::insist(seconds, setup.damping).map_err(|error| Problem(error.to_string()))?;
+        let mut state = setup.state();
+        let inertia = grid
+            .prepare(setup, scene, &mut state, step)
+            .map_err(|error| Problem(format!("{}: {error}", setup.body.name)))?;
+        Ok(Self { state, inertia })
+    }
+}

@@ -1,0 +1,137 @@
+//! Steps beyond the limit of stability: their inertia on a host with a heap, and what it did on the way.
+
+use supple::inertia::{
+    self, Inertia, InertiaError, LatticeNode, Report, lattice_functions, numbers_for, suggested_lattice,
+    vectors_for,
+};
+use supple::material::Material;
+use supple::state::NodeVector;
+use supple::tled::Step;
+
+use crate::prepare::{HostScene, HostState, Setup};
+use crate::scene_file::Problem;
+use crate::timing::Method;
+
+pub(crate) type HostInertia = Inertia<Vec<NodeVector>, Vec<LatticeNode>, Vec<f32>>;
+
+/// Cells along each axis and functions of a lattice, zeros for none.
+#[derive(Clone, Copy, Eq, PartialEq)]
+pub(crate) struct Grid {
+    pub(crate) cells: [u32; 3],
+    pub(crate) functions: usize,
+}
+
+impl Grid {
+    pub(crate) const NONE: Self = Self { cells: [0; 3], functions: 0 };
+
+    /// The lattice that suits the scene.
+    pub(crate) fn suggested<M: Material>(setup: &Setup, scene: &HostScene<M>) -> Self {
+        let (cells, functions) = suggested_lattice(scene, &setup.body.local);
+        Self { cells, functions }
+    }
+
+    /// The lattice that the scene file's method has.
+    pub(crate) fn wanted<M: Material>(setup: &Setup, scene: &HostScene<M>) -> Result<Self, Problem> {
+        if setup.time.method != Method::Multilevel {
+            return Ok(Self::NONE);
+        }
+        if let Some((cells, place)) = &setup.time.lattice {
+            let functions = lattice_functions(scene, &setup.body.local, *cells)
+                .map_err(|error| Problem(format!("{place}: {error}")))?;
+            return Ok(Self { cells: *cells, functions });
+        }
+        let grid = Self::suggested(setup, scene);
+        if grid == Self::NONE {
+            return Err(Problem(format!(
+                "{}: with {} elements the mesh is too small for a lattice to pay; give lattice = [1, 1, 1] under \
+                 [time], or method = \"mass-scaled\"",
+                setup.body.name,
+                scene.element_count()
+            )));
+        }
+        Ok(grid)
+    }
+
+    /// Bytes of the inertia that a scene needs beside its state.
+    pub(crate) fn bytes(self, nodes: usize) -> usize {
+        let places = if self.functions > 0 { nodes } else { 0 };
+        vectors_for(nodes) * size_of::<NodeVector>()
+            + places * size_of::<LatticeNode>()
+            + numbers_for(self.functions) * size_of::<f32>()
+    }
+
+    /// The inertia for steps of one length from the state as it is.
+    pub(crate) fn prepare<M: Material>(
+        self,
+        setup: &Setup,
+        scene: &HostScene<M>,
+        state: &mut HostState,
+        step: Step,
+    ) -> Result<HostInertia, InertiaError> {
+        let nodes = scene.node_count();
+        let (places, numbers) =
+            if self.functions > 0 { (nodes, numbers_for(self.functions)) } else { (0, 0) };
+        let mut inertia = inertia::Inertia::over(
+            vec![NodeVector::ZERO; vectors_for(nodes)],
+            vec![LatticeNode::EMPTY; places],
+            vec![0.0; numbers],
+        );
+        inertia.prepare(scene, &setup.body.local, state, step, self.cells)?;
+        Ok(inertia)
+    }
+}
+
+impl std::fmt::Display for Grid {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let ([x, y, z], functions) = (self.cells, self.functions);
+        write!(f, "{x} x {y} x {z} cells, {functions} functions")
+    }
+}
+
+/// What the inertia did on the way.
+#[derive(Clone, Copy)]
+pub(crate) struct Trace {
+    pub(crate) grid: Grid,
+    /// After the latest step.
+    pub(crate) report: Report,
+    /// Steps in which nodes were held back, and the most nodes at once.
+    pub(crate) steps_held_back: u64,
+    pub(crate) most_held_back: u32,
+    pub(crate) least_coarse_share: f32,
+}
+
+impl Trace {
+    pub(crate) fn new(inertia: &HostInertia) -> Self {
+        Self {
+            grid: Grid { cells: inertia.cells(), functions: inertia.functions() },
+            report: *inertia.report(),
+            steps_held_back: 0,
+            most_held_back: 0,
+            least_coarse_share: 1.0,
+        }
+    }
+
+    /// Takes the report of a step.
+    pub(crate) fn add(&mut self, report: &Report) {
+        self.report = *report;
+        self.steps_held_back += u64::from(report.held_back > 0);
+        self.most_held_back = self.most_held_back.max(report.held_back);
+        self.least_coarse_share = self.least_coarse_share.min(report.coarse_share);
+    }
+}
+
+/// Added mass in words.
+pub(crate) fn describe_added(report: &Report) -> String {
+    format!(
+        "on average {}, at most {} times its own mass (node {})",
+        figure(report.added_mean),
+        figure(report.added_largest),
+        report.added_node
+    )
+}
+
+/// Three figures for what may be a hundredth or thousands.
+fn figure(value: f32) -> String {
+    let decimals = if value < 10.0 { 2 } else { usize::from(value < 100.0) };
+    format!("{value:.decimals$}")
+}
