@@ -47,8 +47,13 @@ fn run<L: Law>(law: L, level: Level, scaled: Option<(f32, [u32; 3])>) -> Bits {
         inertia.prepare(&scene, &points, &mut state, step, cells).unwrap();
         for _ in 0..400 {
             let status = inertia::step(&scene, &loads, &mut state, &mut inertia);
-            assert!(matches!(status, Status::Ok | Status::Limited { .. }), "{status:?}");
+            // Where a step is refused is among what has to be the same.
+            if let Status::Diverged(divergence) = status {
+                println!("after {} steps: {divergence}", state.steps());
+                break;
+            }
         }
+        assert!(state.steps() > 10);
         assert!(inertia.report().added_mean > 0.0);
     } else {
         let step = Step::insist(5e-5, 10.0).unwrap();
