@@ -6,11 +6,12 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Mutex;
 
+use supple::inertia::{self, Inertia, LatticeNode, MassScaling, numbers_for, vectors_for};
 use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{Exponential, NeoHookean, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::scene::{Axes, BuildError, FixedScene, Support, blocks_for};
-use supple::state::FixedState;
+use supple::state::{FixedState, NodeVector};
 use supple::tled::{self, Status, Step};
 
 /// Counts the allocations of each thread; the test harness allocates on others.
@@ -126,6 +127,60 @@ fn building_and_stepping_in_statics_allocates_nothing() {
     assert_eq!(allocations(), before);
     println!("200 steps, strain energy {energy:.3e} J, no allocation");
     assert!(taken == 200 && energy > 0.0 && diverged && (volume / TETS as f64 - 1.0).abs() < 0.1);
+}
+
+const LATTICE: [u32; 3] = [1, 1, 2];
+/// Three layers of four points, of which the held end drops one.
+const FUNCTIONS: usize = 12;
+const VECTORS: usize = vectors_for(NODES);
+
+type FixedMultilevel = Inertia<[NodeVector; VECTORS], [LatticeNode; NODES], [f32; numbers_for(FUNCTIONS)]>;
+
+static SCALED: Mutex<MassScaling<[NodeVector; VECTORS]>> =
+    Mutex::new(MassScaling::scaling_over([NodeVector::ZERO; VECTORS]));
+static MULTILEVEL: Mutex<FixedMultilevel> = Mutex::new(Inertia::over(
+    [NodeVector::ZERO; VECTORS],
+    [LatticeNode::EMPTY; NODES],
+    [0.0; numbers_for(FUNCTIONS)],
+));
+
+#[test]
+fn steps_beyond_the_limit_in_statics_allocate_nothing() {
+    let (points, tets) = mesh();
+    let (mut scaled, mut multilevel) = (SCALED.lock().unwrap(), MULTILEVEL.lock().unwrap());
+    let mut scene = FixedScene::<_, NODES, BLOCKS>::new(TISSUE);
+    let mut state = FixedState::<NODES>::new();
+    let before = allocations();
+
+    scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &supports()).unwrap();
+    let critical = tled::critical_step(&scene, &mut state).unwrap();
+    let step = Step::insist(20.0 * critical.seconds, 5.0).unwrap();
+    let forces = [NodalForce { node: NODES as u32 - 3, newton: [1e-5, 0.0, 0.0], ramp: 0.01 }];
+    let loads = Loads::new(&scene, [0.0, 0.0, -0.01], &forces, &[]).unwrap();
+    let (cells, functions) = inertia::suggested_lattice(&scene, &points);
+    assert!(functions <= FUNCTIONS, "{cells:?}");
+    assert!(inertia::lattice_functions(&scene, &points, LATTICE).is_ok_and(|count| count <= FUNCTIONS));
+    let mut taken = 0;
+    scaled.prepare(&scene, &points, &mut state, step, [0; 3]).unwrap();
+    // More than three cycles of a refresh.
+    for _ in 0..100 {
+        taken += u32::from(inertia::step(&scene, &loads, &mut state, &mut *scaled) == Status::Ok);
+    }
+    let added = scaled.report().added_mean;
+    state.reset();
+    multilevel.prepare(&scene, &points, &mut state, step, LATTICE).unwrap();
+    for _ in 0..100 {
+        taken += u32::from(inertia::step(&scene, &loads, &mut state, &mut *multilevel) == Status::Ok);
+    }
+    // Refusals as well.
+    assert!(multilevel.prepare(&scene, &points[1..], &mut state, step, LATTICE).is_err());
+    let refused = inertia::step(&scene, &loads, &mut state, &mut *multilevel);
+
+    assert_eq!(allocations(), before);
+    println!(
+        "200 steps at 20 times the limit, {taken} of them exact, no allocation; inertia added {added:.1}"
+    );
+    assert!(matches!(refused, Status::Mismatch { .. }) && state.steps() == 100 && taken > 0 && added > 1.0);
 }
 
 #[test]

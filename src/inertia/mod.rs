@@ -47,6 +47,8 @@
 
 mod assembly;
 mod bound;
+#[cfg(test)]
+mod bound_tests;
 mod dense;
 mod lattice;
 mod node;

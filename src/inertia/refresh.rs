@@ -323,12 +323,11 @@ impl Refresh {
             velocity.iter().zip(image.iter()).map(|(v, image)| v * image).sum::<f32>()
         };
         let (before, after) = (energy(matrices.kept), energy(matrices.next));
-        let kept = if !self.first && after > before * (1.0 + 1e-5) && after > 0.0 {
-            libm::sqrtf(if before > 0.0 { before / after } else { 0.0 })
-        } else {
-            1.0
-        };
-        from_numbers(velocity, 1.0 - kept, &mut self.correction);
+        // Without a sound inverse of `G` the velocity means nothing, and `X` will not be used.
+        if self.sound && !self.first && after > before * (1.0 + 1e-5) && after > 0.0 {
+            let kept = libm::sqrtf(if before > 0.0 { before / after } else { 0.0 });
+            from_numbers(velocity, 1.0 - kept, &mut self.correction);
+        }
         matrices.kept.copy_from_slice(matrices.next);
     }
 

@@ -12,6 +12,7 @@
 //! - [`internal_force`], [`strain_energy`], [`Simulation`]: forces and time integration
 //! - [`critical_step`]: exact `2 / omega_max` of `M^-1 K(u)`
 //! - [`closed_form`]: stresses written out by hand for simple deformations
+//! - [`dense`]: Cholesky factor and eigenvalues of small dense matrices
 //! - [`random`]: numbers and deformation gradients for tests
 //!
 //! Several test crates say `mod reference;` and none uses all of it, hence the `allow`.
@@ -19,6 +20,7 @@
 
 pub mod closed_form;
 pub mod critical;
+pub mod dense;
 pub mod law;
 pub mod mesh;
 pub mod random;
