@@ -152,18 +152,26 @@ impl Beside for MatrixBeside<'_> {
         deformation: &Deformation<R>,
         local: &Local<R>,
     ) -> R {
-        self.add(&Bound::<R>::new::<L>(law, block, first, deformation, local), block, first, deformation)
+        let bound = Bound::<R>::new::<L>(law, block, first, deformation, local);
+        self.add(&bound, block, first, &cofactor(deformation))
     }
 }
 
+/// `C` by rows.
+#[inline(always)]
+pub(super) fn cofactor<R: Real>(deformation: &Deformation<R>) -> [[R; 3]; 3] {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| deformation.cofactor(i, j)))
+}
+
 impl MatrixBeside<'_> {
+    /// `cofactor` may be turned into another frame.
     #[inline(always)]
     pub(super) fn add<R: Real>(
         &mut self,
         bound: &Bound<R>,
         block: &ElementBlock,
         first: usize,
-        deformation: &Deformation<R>,
+        cofactor: &[[R; 3]; 3],
     ) -> R {
         let volume = block.volume::<R>(first);
         let isotropic = volume * bound.iso * block.spread::<R>(first);
@@ -172,8 +180,8 @@ impl MatrixBeside<'_> {
         for corner in 0..3 {
             let gradient = [0, 1, 2].map(|axis| block.gradient::<R>(corner, axis, first));
             for i in 0..3 {
-                let c = |j: usize| deformation.cofactor(i, j);
-                images[corner + 1][i] = c(0) * gradient[0] + c(1) * gradient[1] + c(2) * gradient[2];
+                let c = &cofactor[i];
+                images[corner + 1][i] = c[0] * gradient[0] + c[1] * gradient[1] + c[2] * gradient[2];
                 images[0][i] = images[0][i] - images[corner + 1][i];
             }
         }

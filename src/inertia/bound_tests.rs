@@ -9,9 +9,9 @@ use reference::dense::{self, Matrix, beside, cholesky, eigenvalues, symmetric_pa
 use reference::tensor::{apply, contraction, determinant, from_fn, product, rotation};
 use reference::{EXPONENT_CAP, J_MIN, Mat3, Random, Vec3};
 
-use super::bound::{Bound, MatrixBeside};
+use super::bound::{Bound, MatrixBeside, cofactor};
 use crate::lanes::{NodeVector, Scatter};
-use crate::material::{Exponential, Law, Literal, NeoHookean, Tissue};
+use crate::material::{Exponential, Law, Literal, Local, NeoHookean, Tissue};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::tled::Deformation;
@@ -39,13 +39,14 @@ fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
     let block = &scene.blocks()[0];
     let deformation = Deformation::<f32>::new(h);
     let wide = L::widen::<f32>(|_| law);
-    let bound = Bound::<f32>::new::<L>(&wide, &deformation);
+    let local = Local::new::<L>(&wide, deformation.invariants);
+    let bound = Bound::<f32>::new::<L>(&wide, block, 0, &deformation, &local);
     let (mut diagonal, mut beside) = ([NodeVector::ZERO; 4], [NodeVector::ZERO; 4]);
     let mut sums = MatrixBeside {
         diagonal: Scatter::new(&mut diagonal).unwrap(),
         beside: Scatter::new(&mut beside).unwrap(),
     };
-    let scalar = f64::from(sums.add(&bound, block, 0, &deformation));
+    let scalar = f64::from(sums.add(&bound, block, 0, &cofactor(&deformation)));
 
     // By the crate's numbers of the corners, which are those of the block.
     let node = |corner: usize| block.node(corner, 0);

@@ -22,14 +22,22 @@ const LEAST_MASS: f32 = 0.02;
 #[repr(C)]
 pub struct LatticeNode {
     /// The cell's first lattice point.
-    point: u32,
+    point: u16,
+    /// The function whose frame it turns with; [`MAX_FUNCTIONS`] for none.
+    frame: u16,
     /// Position in the cell, 0 to 1.
     within: [f32; 3],
 }
 
 impl LatticeNode {
+    /// See the field.
+    #[inline(always)]
+    pub(super) fn frame(&self) -> usize {
+        usize::from(self.frame)
+    }
+
     /// At the first point.
-    pub const EMPTY: Self = Self { point: 0, within: [0.0; 3] };
+    pub const EMPTY: Self = Self { point: 0, frame: MAX_FUNCTIONS as u16, within: [0.0; 3] };
 }
 
 /// Cells along each axis and the functions that were kept.
@@ -100,8 +108,23 @@ impl Lattice {
             let place = if size > 0.0 { (point[axis] - self.low[axis]) / size * count as f32 } else { 0.0 };
             // Rounding may take the last node just beyond the box.
             let cell = (place as u32).min(count.saturating_sub(1));
-            node.point += cell * row[axis];
+            node.point += (cell * row[axis]) as u16;
             node.within[axis] = (place - cell as f32).clamp(0.0, 1.0);
+        }
+        node
+    }
+
+    /// Where a node of the scene is; it turns with the function that moves it most, unless some of its axes are held:
+    /// those do not turn.
+    pub(super) fn place_node(&self, point: [f32; 3], inertia: &NodeInertia) -> LatticeNode {
+        let mut node = self.place(point);
+        let held = inertia.inverse.iter().filter(|&&inverse| inverse <= 0.0).count();
+        let mut most = 0.0;
+        for (function, weight) in self.weights(&node) {
+            if function < MAX_FUNCTIONS && weight > most && (held == 0 || held == 3) {
+                most = weight;
+                node.frame = function as u16;
+            }
         }
         node
     }
@@ -112,7 +135,7 @@ impl Lattice {
         let (row, layer) =
             (self.cells[0] as usize + 1, (self.cells[0] as usize + 1) * (self.cells[1] as usize + 1));
         let [x, y, z] = node.within;
-        let first = node.point as usize;
+        let first = usize::from(node.point);
         let (nx, ny, nz) = (1.0 - x, 1.0 - y, 1.0 - z);
         let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
         [

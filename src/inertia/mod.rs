@@ -50,6 +50,7 @@ mod bound;
 #[cfg(test)]
 mod bound_tests;
 mod dense;
+mod frames;
 mod lattice;
 mod node;
 mod refresh;
@@ -328,9 +329,12 @@ where
             }
             self.report = tally.report(0, 1.0);
         } else {
-            for (place, &point) in self.places.as_mut().iter_mut().zip(points) {
-                *place = self.lattice.place(point);
+            for ((place, &point), inertia) in self.places.as_mut().iter_mut().zip(points).zip(scene.inertia())
+            {
+                *place = self.lattice.place_node(point, inertia);
             }
+            let places = self.places.as_ref().get(..nodes).unwrap_or_default();
+            self.refresh.frames.choose(&self.lattice, places, points);
             let Some(mut matrices) = Matrices::split(self.dense.as_mut(), functions) else {
                 return Ok(());
             };

@@ -72,13 +72,13 @@ fn with_held(mut matrix: Symmetric, inverse: [f32; 3]) -> Symmetric {
     matrix
 }
 
-/// The inertia from the summed bounds (N/m) of the node's elements. `old` is the inverse in use so far, nothing
-/// at the start.
+/// The inertia from the summed bounds (N/m) of the node's elements. `old` is the inverse in use so far and the
+/// velocity in its frame, nothing at the start.
 #[inline(always)]
 pub(super) fn renew(
     at: &NodeInertia,
     stiffness: Symmetric,
-    old: Option<Symmetric>,
+    old: Option<(Symmetric, [f32; 3])>,
     velocity: [f32; 3],
     scaling: &Scaling,
 ) -> Renewed {
@@ -90,14 +90,14 @@ pub(super) fn renew(
     let added = factor * needed.trace() / (3.0 * mass);
 
     let mut keep = 1.0;
-    if let Some(old) = old {
+    if let Some((old, old_velocity)) = old {
         // The inertia before, from the inverse that was in use.
         let before = with_held(old, at.inverse).inverse().on_free(at.inverse);
         let reserve = scaling.reserve * mass;
         let square: f32 =
             velocity.iter().zip(at.inverse).map(|(v, i)| if i > 0.0 { v * v } else { 0.0 }).sum();
         let energy = form(&scaled, velocity);
-        let had = form(&before, velocity) - reserve * square;
+        let had = form(&before, old_velocity) - reserve * square;
         // What rounding may be, and what damping takes.
         let given = GIVEN_BACK * scaling.loss * mass * square;
         if energy > had * (1.0 + 1e-5) + given && energy > 0.0 {

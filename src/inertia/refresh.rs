@@ -11,10 +11,11 @@
 //! ([`super::node`]), a change of `S` may not add energy: `c` is scaled down to what it had.
 
 use super::assembly::{Assembly, Element, NO_SLOTS};
-use super::bound::{Bound, MatrixBeside};
+use super::bound::{Bound, MatrixBeside, cofactor};
 use super::dense::{apply, eliminate, mirror, stride};
+use super::frames::{Frames, Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, restrict};
-use super::node::{Scaling, growth, renew};
+use super::node::{Scaling, renew};
 use super::report::Tally;
 use super::vectors::NodeTables;
 use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, Scatter, dispatch};
@@ -68,8 +69,7 @@ pub(super) struct Refresh {
     per_step: i64,
     /// Nothing has been computed yet.
     first: bool,
-    /// Largest growth of a node's bound from the cycle that made `X` to the one that made its inertia.
-    pub(super) carried: f32,
+    pub(super) frames: Frames,
     /// Coarse velocity to be taken away by the next step, m a step.
     pub(super) correction: CoarseVectors,
     momentum: CoarseVectors,
@@ -104,7 +104,7 @@ impl Refresh {
         credit: 0,
         per_step: 0,
         first: true,
-        carried: 1.0,
+        frames: Frames::NONE,
         correction: NO_VECTORS,
         momentum: NO_VECTORS,
         sound: true,
@@ -132,6 +132,7 @@ impl Refresh {
         B: AsRef<[ElementBlock]>,
     {
         self.credit += self.per_step;
+        self.frames.look(from.displacement);
         while self.credit > 0 {
             self.credit -= self.work(&mut from, tables, matrices);
         }
@@ -148,6 +149,7 @@ impl Refresh {
         N: AsRef<[NodeInertia]>,
         B: AsRef<[ElementBlock]>,
     {
+        self.frames.look(from.displacement);
         while self.first {
             self.work(&mut from, tables, matrices);
         }
@@ -174,6 +176,7 @@ impl Refresh {
                 if at == 0 {
                     tables.clear_sums();
                     matrices.next.fill(0.0);
+                    self.frames.start_cycle();
                 }
                 self.elements(from, tables, matrices, at, stride);
                 if self.done >= from.scene.blocks().len() {
@@ -207,6 +210,7 @@ impl Refresh {
             Stage::Next => {
                 self.sound &= eliminate(matrices.next, size, stride, at);
                 if self.done >= size {
+                    tables.put_in_use(self.first);
                     self.put_in_use(matrices);
                     self.enter(Stage::Elements);
                 }
@@ -251,7 +255,9 @@ impl Refresh {
         };
         let sums = MatrixBeside { diagonal, beside };
         let material = from.scene.material();
-        dispatch(OneBlock { material, block, displacement, sums, assembly, weight: from.coarse_weight });
+        let frames = &self.frames;
+        let weight = from.coarse_weight;
+        dispatch(OneBlock { material, block, displacement, sums, assembly, frames, weight });
     }
 
     fn node<M, N, B>(
@@ -272,15 +278,13 @@ impl Refresh {
             return;
         };
         let (stiffness, scalar) = tables.summed(at);
-        let (old, old_scalar) = tables.node(at);
         let velocity = increment.to_array();
-        let renewed = renew(inertia, stiffness, (!self.first).then_some(old.inverse), velocity, from.scaling);
-        tables.set(at, &renewed.inverse, scalar, if self.first { 1.0 } else { old.share });
+        let turned = self.frames.since_start(place.frame()).back(velocity);
+        let before = self.frames.since_bounds(place.frame()).back(velocity);
+        let old = (!self.first).then(|| (tables.node(at).0.inverse, before));
+        let renewed = renew(inertia, stiffness, old, turned, from.scaling);
+        tables.set_next(at, &renewed.inverse, scalar);
         self.tally.add(at, renewed.added);
-        if !self.first {
-            let growth = growth(from.scaling, inertia.mass, old_scalar, scalar);
-            self.carried = if growth > self.carried { growth } else { self.carried };
-        }
         let kept = velocity.map(|v| v * renewed.velocity);
         // A held axis follows its support and has no inertia here.
         for axis in 0..3 {
@@ -288,7 +292,7 @@ impl Refresh {
                 increment.0[axis] = kept[axis];
             }
         }
-        let [x, y, z] = renewed.inertia.times(kept);
+        let [x, y, z] = renewed.inertia.times(turned.map(|v| v * renewed.velocity));
         restrict(&from.lattice.weights(place), [x, y, z, 0.0], &mut self.momentum);
         let assembly = |matrix| Assembly {
             lattice: from.lattice,
@@ -318,15 +322,26 @@ impl Refresh {
         let Some(velocity) = velocity.get(..size) else {
             return;
         };
-        let mut energy = |matrix: &[f32]| {
+        let mut energy = |matrix: &[f32], velocity: &[f32]| {
             apply(matrix, stride, velocity, image);
             velocity.iter().zip(image.iter()).map(|(v, image)| v * image).sum::<f32>()
         };
-        let (before, after) = (energy(matrices.kept), energy(matrices.next));
+        // The velocity in the frames of `S` in use, and in the world.
+        let mut world = NO_VECTORS;
+        from_numbers(velocity, 1.0, &mut world);
+        turn(&mut world, &self.frames.of_cycle, Rotation::out);
+        let mut vectors = world;
+        turn(&mut vectors, &self.frames.of_bounds, Rotation::back);
+        let mut old = [0.0; 3 * MAX_FUNCTIONS];
+        to_numbers(&vectors, &mut old);
+        let before = energy(matrices.kept, old.get(..size).unwrap_or_default());
+        let after = energy(matrices.next, velocity);
         // Without a sound inverse of `G` the velocity means nothing, and `X` will not be used.
         if self.sound && !self.first && after > before * (1.0 + 1e-5) && after > 0.0 {
-            let kept = libm::sqrtf(if before > 0.0 { before / after } else { 0.0 });
-            from_numbers(velocity, 1.0 - kept, &mut self.correction);
+            let lost = 1.0 - libm::sqrtf(if before > 0.0 { before / after } else { 0.0 });
+            for (correction, velocity) in self.correction.iter_mut().zip(&world) {
+                correction.0 = velocity.0.map(|component| lost * component);
+            }
         }
         matrices.kept.copy_from_slice(matrices.next);
     }
@@ -336,10 +351,10 @@ impl Refresh {
         for (applied, (next, fine)) in matrices.applied.iter_mut().zip(inverses) {
             *applied = if self.sound { next - fine } else { 0.0 };
         }
+        self.frames.end_cycle();
         self.published = self.tally;
         self.tally = Tally::NEW;
         self.sound = true;
-        self.carried = 1.0;
         self.first = false;
     }
 }
@@ -372,6 +387,7 @@ struct OneBlock<'a, M> {
     displacement: Gather<'a>,
     sums: MatrixBeside<'a>,
     assembly: Assembly<'a>,
+    frames: &'a Frames,
     weight: f32,
 }
 
@@ -392,12 +408,28 @@ impl<M: Material> Kernel for OneBlock<'_, M> {
                 &deformation,
                 &Local::new::<M::Law>(&law, deformation.invariants),
             );
-            self.sums.add(&bound, block, first, &deformation);
+            // C in the frame of the element's first node.
+            let turned = [0; BLOCK].map(|_| Rotation::NONE);
+            let mut turned = turned;
+            for (lane, turned) in turned.iter_mut().enumerate().take(R::COUNT) {
+                let frame = self
+                    .assembly
+                    .nodes
+                    .get(block.node(0, first + lane))
+                    .map_or(MAX_FUNCTIONS, LatticeNode::frame);
+                *turned = self.frames.since_start(frame);
+            }
+            let world = cofactor(&deformation);
+            let cofactor = [0, 1, 2].map(|i| {
+                let along = [0, 1, 2].map(|k| R::from_fn(|lane| turned[lane % BLOCK].0[k][i]));
+                [0, 1, 2].map(|j| along[0] * world[0][j] + along[1] * world[1][j] + along[2] * world[2][j])
+            });
+            self.sums.add(&bound, block, first, &cofactor);
             let weight = block.volume::<R>(first) * R::splat(self.weight);
             let (iso, volume) = (weight * bound.iso, weight * bound.volume);
             let gradients =
                 [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| block.gradient::<R>(corner, axis, first)));
-            let cofactor = [0, 1, 2].map(|j| [0, 1, 2].map(|i| deformation.cofactor(i, j)));
+            let cofactor = [0, 1, 2].map(|j| [0, 1, 2].map(|i| cofactor[i][j]));
             for lane in 0..R::COUNT {
                 let slopes = gradients.map(|gradient| gradient.map(|slope| slope.lane(lane)));
                 let origin = [0, 1, 2].map(|axis| -(slopes[0][axis] + slopes[1][axis] + slopes[2][axis]));

@@ -13,6 +13,7 @@ use crate::tled::{
 use super::assembly::free;
 use super::bound::{MatrixBeside, ScalarBeside};
 use super::dense::{apply, stride};
+use super::frames::{Frames, Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, prolong, restrict};
 use super::node::{Scaling, growth, renew};
 use super::refresh::{Matrices, ROW, Refresh, Sources, from_numbers, to_numbers};
@@ -82,20 +83,22 @@ where
     };
 
     let places = places.as_ref();
+    refresh.frames.look(displacement);
+    let frames = &refresh.frames;
     let mut fine =
-        Fine { step: &step, scaling, lattice, places, held_back: 0, growth: 1.0, tally: Tally::NEW };
+        Fine { step: &step, scaling, lattice, places, frames, held_back: 0, growth: 1.0, tally: Tally::NEW };
     let mut restricted = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
     fine.prepare(nodal, increment, force, &mut tables, &mut restricted);
-    let (held_back, growth) = (fine.held_back, fine.growth * refresh.carried);
+    let (held_back, growth) = (fine.held_back, fine.growth);
     let tally = fine.tally;
     let coarse_share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
 
     let mut matrices = Matrices::split(dense.as_mut(), functions);
     let mut solution = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
     if let (Some(matrices), false) = (&matrices, alone) {
-        coarse_motion(matrices.applied, functions, &restricted, coarse_share, refresh, &mut solution);
+        coarse_motion(matrices.applied, functions, &mut restricted, coarse_share, refresh, &mut solution);
     }
-    move_nodes(&step, scaling, nodal, force, lattice, places, &solution, &mut tables);
+    move_nodes(&step, scaling, nodal, force, lattice, places, frames, &solution, &mut tables);
 
     let tables_next: &[NodeVector] = tables.next;
     let next = |node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector| {
@@ -148,6 +151,7 @@ struct Fine<'a> {
     scaling: &'a Scaling,
     lattice: &'a Lattice,
     places: &'a [LatticeNode],
+    frames: &'a Frames,
     held_back: u32,
     growth: f32,
     tally: Tally,
@@ -176,7 +180,13 @@ impl Fine<'_> {
             let before = at.share;
             let mut keep = 1.0;
             if alone {
-                let renewed = renew(inertia, tables.summed(node).0, Some(at.inverse), velocity, self.scaling);
+                let renewed = renew(
+                    inertia,
+                    tables.summed(node).0,
+                    Some((at.inverse, velocity)),
+                    velocity,
+                    self.scaling,
+                );
                 (at.inverse, made_for, keep) = (renewed.inverse, scalar, renewed.velocity);
                 tables.set(node, &renewed.inverse, scalar, before);
                 self.tally.add(node, renewed.added);
@@ -186,7 +196,9 @@ impl Fine<'_> {
             if growth > NODE_GROWTH {
                 share = NODE_GROWTH / growth;
             }
-            let kick = at.inverse.times([fx * square, fy * square, fz * square]);
+            let frame = self.places.get(node).map_or(MAX_FUNCTIONS, LatticeNode::frame);
+            let force = self.frames.since_bounds(frame).back([fx, fy, fz]);
+            let kick = at.inverse.times(force.map(|force| force * square));
             let length = libm::sqrtf(kick[0] * kick[0] + kick[1] * kick[1] + kick[2] * kick[2]);
             let Some(next) = tables.next.get_mut(node) else {
                 continue;
@@ -234,19 +246,21 @@ fn residual(
 fn coarse_motion(
     matrix: &[f32],
     functions: usize,
-    restricted: &CoarseVectors,
+    restricted: &mut CoarseVectors,
     share: f32,
     refresh: &Refresh,
     solution: &mut CoarseVectors,
 ) {
     let (size, stride) = (3 * functions, stride(functions));
     let (mut x, mut out) = ([0.0; 3 * MAX_FUNCTIONS], [0.0; ROW]);
+    turn(restricted, &refresh.frames.of_bounds, Rotation::back);
     to_numbers(restricted, &mut x);
     let (Some(x), Some(out)) = (x.get(..size), out.get_mut(..stride)) else {
         return;
     };
     apply(matrix, stride, x, out);
     from_numbers(out.get(..size).unwrap_or_default(), share, solution);
+    turn(solution, &refresh.frames.of_bounds, Rotation::out);
     for (solution, correction) in solution.iter_mut().zip(&refresh.correction) {
         for (value, correction) in solution.0.iter_mut().zip(correction.0) {
             *value -= correction;
@@ -264,6 +278,7 @@ fn move_nodes(
     force: &[NodeVector],
     lattice: &Lattice,
     places: &[LatticeNode],
+    frames: &Frames,
     solution: &CoarseVectors,
     tables: &mut NodeTables<'_>,
 ) {
@@ -274,7 +289,8 @@ fn move_nodes(
             continue;
         };
         let [x, y, z, _] = residual(step, scaling, inertia, force.to_array(), next);
-        let fine = at.inverse.times([x, y, z]);
+        let frame = frames.since_bounds(places.get(node).map_or(MAX_FUNCTIONS, LatticeNode::frame));
+        let fine = frame.out(at.inverse.times(frame.back([x, y, z])));
         let mut coarse = [0.0; 4];
         if !alone && let Some(place) = places.get(node) {
             coarse = prolong(&lattice.weights(place), solution);

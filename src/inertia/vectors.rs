@@ -64,6 +64,27 @@ impl<'a> NodeTables<'a> {
         }
     }
 
+    /// Puts a node's next inverse and the scalar it is made for where its sums were.
+    #[inline(always)]
+    pub(super) fn set_next(&mut self, node: usize, inverse: &Symmetric, scalar: f32) {
+        if let (Some(diagonal), Some(beside)) =
+            (self.sum_diagonal.get_mut(node), self.sum_beside.get_mut(node))
+        {
+            diagonal.0 = [inverse.xx, inverse.yy, inverse.zz, scalar];
+            beside.0 = [inverse.xy, inverse.yz, inverse.zx, 0.0];
+        }
+    }
+
+    /// The next inverses are in use from now on; shares stay, and are one at the start.
+    pub(super) fn put_in_use(&mut self, first: bool) {
+        self.inverse_diagonal.copy_from_slice(self.sum_diagonal);
+        for (inverse, next) in self.inverse_beside.iter_mut().zip(&*self.sum_beside) {
+            let share = if first { 1.0 } else { inverse.0[3] };
+            let [xy, yz, zx, _] = next.0;
+            inverse.0 = [xy, yz, zx, share];
+        }
+    }
+
     #[inline(always)]
     pub(super) fn set_share(&mut self, node: usize, share: f32) {
         if let Some(beside) = self.inverse_beside.get_mut(node) {

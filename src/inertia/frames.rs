@@ -1,0 +1,225 @@
+//! How tissue has turned since its bounds were computed. Bounds have directions (volume is stiff along `C ga`), so between two
+//! refreshes they must turn with the tissue: without that a step of twenty times the limit is
+//! unstable once the body has turned by 15 degrees. Each lattice function has a frame: the deformation
+//! gradient of a tetrahedron of four of its nodes, its columns made orthonormal (Gram-Schmidt), now and at the start of the cycle.
+//! Bounds are summed, inverted and applied in the frames of the start of their cycle.
+
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
+use crate::lanes::NodeVector;
+
+/// A 3 x 3 matrix by rows.
+pub(super) type Matrix = [[f32; 3]; 3];
+
+const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// A rotation from where a cycle started to now.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rotation(pub(super) Matrix);
+
+impl Rotation {
+    pub(super) const NONE: Self = Self(IDENTITY);
+
+    /// From the frame to the world.
+    #[inline(always)]
+    pub(super) fn out(&self, v: [f32; 3]) -> [f32; 3] {
+        self.0.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+    }
+
+    /// From the world to the frame.
+    #[inline(always)]
+    pub(super) fn back(&self, v: [f32; 3]) -> [f32; 3] {
+        let [x, y, z] = self.0;
+        [0, 1, 2].map(|axis| x[axis] * v[0] + y[axis] * v[1] + z[axis] * v[2])
+    }
+}
+
+/// Four nodes and the inverse of their edges at rest, 1/m.
+#[derive(Clone, Copy, Debug)]
+struct Probe {
+    nodes: [u32; 4],
+    inverse: Matrix,
+}
+
+/// Frames of the functions; one more that never turns, for nodes that no function moves.
+#[derive(Clone, Debug)]
+pub(super) struct Frames {
+    functions: usize,
+    probes: [Probe; MAX_FUNCTIONS],
+    /// Orthonormal columns at the start of the cycle whose bounds are in use, and of the cycle under way.
+    in_use: [Matrix; MAX_FUNCTIONS],
+    under_way: [Matrix; MAX_FUNCTIONS],
+    latest: [Matrix; MAX_FUNCTIONS],
+    /// Rotations since then.
+    pub(super) of_bounds: [Rotation; MAX_FUNCTIONS + 1],
+    pub(super) of_cycle: [Rotation; MAX_FUNCTIONS + 1],
+}
+
+impl Frames {
+    pub(super) const NONE: Self = Self {
+        functions: 0,
+        probes: [Probe { nodes: [0; 4], inverse: [[0.0; 3]; 3] }; MAX_FUNCTIONS],
+        in_use: [IDENTITY; MAX_FUNCTIONS],
+        under_way: [IDENTITY; MAX_FUNCTIONS],
+        latest: [IDENTITY; MAX_FUNCTIONS],
+        of_bounds: [Rotation::NONE; MAX_FUNCTIONS + 1],
+        of_cycle: [Rotation::NONE; MAX_FUNCTIONS + 1],
+    };
+
+    /// Chooses four nodes for each function, far apart among those that it moves.
+    pub(super) fn choose(&mut self, lattice: &Lattice, places: &[LatticeNode], points: &[[f32; 3]]) {
+        self.functions = lattice.functions();
+        for (function, probe) in self.probes.iter_mut().enumerate().take(self.functions) {
+            *probe = choose(function, lattice, places, points);
+        }
+    }
+
+    /// Looks where the frames are now.
+    pub(super) fn look(&mut self, displacement: &[NodeVector]) {
+        let frames = self.probes.iter().zip(&mut self.latest).take(self.functions);
+        let starts = self.in_use.iter().zip(&self.under_way);
+        let rotations = self.of_bounds.iter_mut().zip(&mut self.of_cycle);
+        for (((probe, latest), (in_use, under_way)), (of_bounds, of_cycle)) in
+            frames.zip(starts).zip(rotations)
+        {
+            // A tetrahedron that has collapsed says nothing; its frame stays.
+            if let Some(basis) = probe.basis(displacement) {
+                *latest = basis;
+            }
+            *of_bounds = Rotation(times_transposed(latest, in_use));
+            *of_cycle = Rotation(times_transposed(latest, under_way));
+        }
+    }
+
+    /// A cycle starts here.
+    pub(super) fn start_cycle(&mut self) {
+        self.under_way = self.latest;
+        self.of_cycle = [Rotation::NONE; MAX_FUNCTIONS + 1];
+    }
+
+    /// The bounds of the cycle are in use from now on.
+    pub(super) fn end_cycle(&mut self) {
+        self.in_use = self.under_way;
+        self.of_bounds = self.of_cycle;
+    }
+
+    #[inline(always)]
+    pub(super) fn since_bounds(&self, frame: usize) -> Rotation {
+        self.of_bounds.get(frame).copied().unwrap_or(Rotation::NONE)
+    }
+
+    #[inline(always)]
+    pub(super) fn since_start(&self, frame: usize) -> Rotation {
+        self.of_cycle.get(frame).copied().unwrap_or(Rotation::NONE)
+    }
+}
+
+/// Turns each function's vector out of its frame, or back into it.
+pub(super) fn turn(
+    vectors: &mut CoarseVectors,
+    rotations: &[Rotation],
+    by: impl Fn(&Rotation, [f32; 3]) -> [f32; 3],
+) {
+    for (vector, rotation) in vectors.iter_mut().zip(rotations) {
+        let [x, y, z] = by(rotation, vector.to_array());
+        vector.0 = [x, y, z, 0.0];
+    }
+}
+
+fn times_transposed(a: &Matrix, b: &Matrix) -> Matrix {
+    a.map(|row| [0, 1, 2].map(|j| row[0] * b[j][0] + row[1] * b[j][1] + row[2] * b[j][2]))
+}
+
+fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn unit(a: [f32; 3]) -> Option<[f32; 3]> {
+    let length = libm::sqrtf(dot(a, a));
+    (length > 1e-6 && length.is_finite()).then(|| a.map(|component| component / length))
+}
+
+impl Probe {
+    /// The orthonormal columns of the deformation gradient, by rows.
+    fn basis(&self, displacement: &[NodeVector]) -> Option<Matrix> {
+        let at = |node: u32| displacement.get(node as usize).map(|vector| vector.to_array());
+        let [a, b, c, d] = self.nodes.map(at);
+        let origin = a?;
+        let edges = [minus(b?, origin), minus(c?, origin), minus(d?, origin)];
+        // Columns of F = I + sum_k edge_k (x) row_k of the inverse.
+        let column = |j: usize| {
+            let mut column = IDENTITY[j];
+            for (edge, row) in edges.iter().zip(self.inverse) {
+                for axis in 0..3 {
+                    column[axis] += edge[axis] * row[j];
+                }
+            }
+            column
+        };
+        let first = unit(column(0))?;
+        let second = column(1);
+        let along = dot(first, second);
+        let second = unit(minus(second, first.map(|component| along * component)))?;
+        let third = cross(first, second);
+        Some([0, 1, 2].map(|axis| [first[axis], second[axis], third[axis]]))
+    }
+}
+
+/// The node nearest to the middle of those that the function moves, the one farthest from it, and those that
+/// span the largest triangle and tetrahedron with them.
+fn choose(function: usize, lattice: &Lattice, places: &[LatticeNode], points: &[[f32; 3]]) -> Probe {
+    let moved = || {
+        let nodes = places.iter().zip(points).enumerate();
+        nodes.filter_map(|(node, (place, &point))| {
+            let (_, weight) =
+                lattice.weights(place).into_iter().find(|&(f, weight)| f == function && weight > 0.0)?;
+            Some((node as u32, point, weight))
+        })
+    };
+    let (mut sum, mut total) = ([0.0f32; 3], 0.0);
+    for (_, point, weight) in moved() {
+        sum = [0, 1, 2].map(|axis| sum[axis] + weight * point[axis]);
+        total += weight;
+    }
+    let middle = sum.map(|sum| sum / total);
+    let most = |score: &dyn Fn([f32; 3]) -> f32| {
+        let mut best = (f32::NEG_INFINITY, 0, middle);
+        for (node, point, _) in moved() {
+            let score = score(point);
+            if score > best.0 {
+                best = (score, node, point);
+            }
+        }
+        (best.1, best.2)
+    };
+    let (a, origin) = most(&|point| -dot(minus(point, middle), minus(point, middle)));
+    let (b, first) = most(&|point| dot(minus(point, origin), minus(point, origin)));
+    let e = minus(first, origin);
+    let (c, second) = most(&|point| {
+        let normal = cross(e, minus(point, origin));
+        dot(normal, normal)
+    });
+    let normal = cross(e, minus(second, origin));
+    let (d, third) = most(&|point| {
+        let height = dot(normal, minus(point, origin));
+        height * height
+    });
+    let (f, g) = (minus(second, origin), minus(third, origin));
+    // Rows of the inverse of the matrix with columns e, f, g.
+    let six = dot(e, cross(f, g));
+    let extent = dot(e, e);
+    let inverse = if six * six > 1e-12 * extent * extent * extent {
+        [cross(f, g), cross(g, e), cross(e, f)].map(|row| row.map(|entry| entry / six))
+    } else {
+        // Its nodes are in one plane: the frame never turns.
+        [[0.0; 3]; 3]
+    };
+    Probe { nodes: [a, b, c, d], inverse }
+}
