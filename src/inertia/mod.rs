@@ -218,7 +218,7 @@ impl<V, W, D> Inertia<V, W, D> {
 }
 
 /// The largest near-cubic lattice whose cost stays a small part of the step's: with `n = 3` unknowns a function, `n^3` at
-/// most 200 times the elements (the inversions of a cycle then cost about a tenth of a force evaluation a step). Also
+/// most 400 times the elements. Also
 /// gives its number of functions, for [`numbers_for`]. No cells if not even one would do.
 #[must_use]
 pub fn suggested_lattice<M, N, B>(scene: &Scene<M, N, B>, points: &[[f32; 3]]) -> ([u32; 3], usize)
@@ -234,7 +234,7 @@ where
             break;
         };
         let unknowns = 3 * lattice.functions() as u64;
-        if unknowns * unknowns * unknowns > 200 * scene.element_count() as u64 {
+        if unknowns * unknowns * unknowns > 400 * scene.element_count() as u64 {
             break;
         }
         best = (cells, lattice.functions());
@@ -305,7 +305,7 @@ where
             weight: 0.25 * fine * dt * dt,
             k,
             reserve: if alone { k } else { k * (1.0 + k) },
-            loss: 2.0 * damping * dt * dt * if alone { 1.0 } else { CYCLE as f32 },
+            loss: 2.0 * damping * dt * if alone { 1.0 } else { CYCLE as f32 },
         };
         let Some(mut tables) = NodeTables::split(self.vectors.as_mut(), nodes) else {
             return Ok(());

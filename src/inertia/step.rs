@@ -21,6 +21,10 @@ use super::report::Tally;
 use super::vectors::NodeTables;
 use super::{COARSE, COARSE_GROWTH, Inertia, LARGEST_KICK, NODE_GROWTH};
 
+/// One in this many nodes held back, or less than half of the lattice's motion used, makes a step
+/// [`Status::Limited`].
+const MANY_HELD_BACK: usize = 20;
+
 /// Takes one step of the length that the inertia was prepared for. Every call does the same work, one
 /// force evaluation and what the lattice needs. `Mismatch` if the inertia was not prepared for this scene.
 pub fn step<M, N, B, S, V, W, D>(
@@ -139,7 +143,8 @@ where
     }
     let least_volume_ratio = 1.0 + extremes.least_j;
     let (saturation, energy_excess) = (extremes.saturation, ledger.excess() as f32);
-    if least_volume_ratio < J_FLOOR || saturation > 1.0 || energy_excess > 0.0 {
+    let held = report.held_back as usize * MANY_HELD_BACK > nodes || coarse_share < 0.5;
+    if held || least_volume_ratio < J_FLOOR || saturation > 1.0 || energy_excess > 0.0 {
         return Status::Limited { least_volume_ratio, saturation, energy_excess };
     }
     Status::Ok

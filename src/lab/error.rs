@@ -4,6 +4,7 @@ use core::fmt;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
+use crate::inertia::InertiaError;
 use crate::io::ReadError;
 use crate::loads::LoadError;
 use crate::scene::BuildError;
@@ -30,6 +31,8 @@ pub enum LabError {
     Load(LoadError),
     /// A step was refused.
     Step(StepError),
+    /// An inertia could not be prepared.
+    Inertia(InertiaError),
     /// The exact motion diverged, so there is no truth.
     Diverged {
         /// The scene.
@@ -68,6 +71,7 @@ impl fmt::Display for LabError {
             Self::Build(error) => error.fmt(f),
             Self::Load(error) => error.fmt(f),
             Self::Step(error) => error.fmt(f),
+            Self::Inertia(error) => error.fmt(f),
             Self::Diverged { scene, divergence } => write!(f, "the truth of {scene} {divergence}"),
             Self::NoCriticalStep { scene } => write!(f, "{scene}: the exact critical step was not found"),
             Self::Mismatch { nodes, room } => {
@@ -96,4 +100,4 @@ macro_rules! from {
     };
 }
 
-from!(ReadError => Mesh, BuildError => Build, LoadError => Load, StepError => Step, std::io::Error => Write);
+from!(ReadError => Mesh, BuildError => Build, LoadError => Load, StepError => Step, InertiaError => Inertia, std::io::Error => Write);

@@ -7,8 +7,10 @@ use std::vec::Vec;
 
 use super::LabError;
 use super::host::{HostScene, HostState};
+use crate::inertia::{self, Inertia, LatticeNode, numbers_for, suggested_lattice, vectors_for};
 use crate::loads::Loads;
 use crate::material::Material;
+use crate::state::{NodeVector, State};
 use crate::tled::{self, Status, Step};
 
 /// A way to move a scene.
@@ -20,6 +22,10 @@ pub enum Method {
     Hold,
     /// The exact step's formula at longer steps, stable or not.
     TledLargeStep,
+    /// Inertia raised where a step would be unstable.
+    MassScaled,
+    /// The same, with a coarse lattice that gives smooth motion its true inertia back.
+    Multilevel,
 }
 
 /// Moves a state on by one step under loads; what it needs beside that, it holds. After
@@ -28,7 +34,8 @@ pub type Advance<'a> = Box<dyn FnMut(&mut HostState, &Loads<'_>) -> Status + 'a>
 
 impl Method {
     /// All methods, in the order of the tables.
-    pub const ALL: [Self; 3] = [Self::Tled, Self::Hold, Self::TledLargeStep];
+    pub const ALL: [Self; 5] =
+        [Self::Tled, Self::Hold, Self::TledLargeStep, Self::MassScaled, Self::Multilevel];
 
     /// Its name in tables.
     #[must_use]
@@ -37,6 +44,8 @@ impl Method {
             Self::Tled => "tled",
             Self::Hold => "hold",
             Self::TledLargeStep => "tled-large-step",
+            Self::MassScaled => "mass-scaled",
+            Self::Multilevel => "multilevel",
         }
     }
 
@@ -55,22 +64,40 @@ impl Method {
     pub fn multiples(self, multiples: &[u32]) -> Vec<u32> {
         match self {
             Self::Tled | Self::Hold => vec![1],
-            Self::TledLargeStep => multiples.iter().copied().filter(|multiple| *multiple > 1).collect(),
+            Self::TledLargeStep | Self::MassScaled | Self::Multilevel => {
+                multiples.iter().copied().filter(|multiple| *multiple > 1).collect()
+            }
         }
     }
 
     /// What moves a state of the scene on by steps of `dt` (s) with `damping` (1/s).
-    pub fn prepare<M: Material>(
+    pub fn prepare<'a, M: Material>(
         self,
-        scene: &HostScene<M>,
+        scene: &'a HostScene<M>,
+        points: &[[f32; 3]],
         dt: f32,
         damping: f32,
-    ) -> Result<Advance<'_>, LabError> {
+    ) -> Result<Advance<'a>, LabError> {
         Ok(match self {
             Self::Hold => Box::new(|_, _| Status::Ok),
             Self::Tled | Self::TledLargeStep => {
                 let step = Step::insist(dt, damping)?;
                 Box::new(move |state, loads| tled::step(scene, loads, state, &step))
+            }
+            Self::MassScaled | Self::Multilevel => {
+                let lattice = self == Self::Multilevel;
+                let (cells, functions) = if lattice { suggested_lattice(scene, points) } else { ([0; 3], 0) };
+                let nodes = scene.node_count();
+                let mut inertia = Box::new(Inertia::over(
+                    vec![NodeVector::ZERO; vectors_for(nodes)],
+                    vec![LatticeNode::EMPTY; nodes],
+                    vec![0.0; numbers_for(functions)],
+                ));
+                // Scenes start at rest.
+                let zero = || vec![NodeVector::ZERO; nodes];
+                let mut rest = State::over(zero(), zero(), zero());
+                inertia.prepare(scene, points, &mut rest, Step::insist(dt, damping)?, cells)?;
+                Box::new(move |state, loads| inertia::step(scene, loads, state, &mut inertia))
             }
         })
     }
@@ -86,6 +113,9 @@ mod tests {
             assert_eq!(Method::named(method.name()).unwrap(), method);
         }
         let said = Method::named("euler").unwrap_err().to_string();
-        assert_eq!(said, "method \"euler\" is not known; there are tled, hold, tled-large-step");
+        assert_eq!(
+            said,
+            "method \"euler\" is not known; there are tled, hold, tled-large-step, mass-scaled, multilevel"
+        );
     }
 }

@@ -120,7 +120,7 @@ impl Job for Run<'_> {
         let Self { spec, truth, method, multiple } = self;
         let scene = spec.build(material)?;
         let mut state = spec.state();
-        let mut advance = method.prepare(&scene, multiple as f32 * DT, spec.damping)?;
+        let mut advance = method.prepare(&scene, &spec.points, multiple as f32 * DT, spec.damping)?;
 
         let mut errors = Errors::default();
         let (mut taken, mut limited, mut spent) = (0_u32, 0_u32, Duration::ZERO);

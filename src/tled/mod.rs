@@ -149,7 +149,8 @@ pub enum Status {
     Ok,
     /// The step was taken, but is not exact: some elements are beyond the range of their law (squeezed below
     /// [`J_FLOOR`] or stretched beyond the exponent cap, where the law goes on along its tangent), or there
-    /// is more kinetic energy than the account explains ([`crate::Ledger`]).
+    /// is more kinetic energy than the account explains ([`crate::Ledger`]). For a step with scaled inertia
+    /// also: much of the motion was held back ([`crate::inertia::Report`]).
     Limited {
         /// Smallest volume ratio of an element.
         least_volume_ratio: f32,
