@@ -14,6 +14,7 @@
 //! | [`loads`] | what acts on it, set when the host likes: forces, traction, gravity, prescribed motion |
 //! | [`state`] | what moves: displacements and their last increment |
 //! | [`tled`] | the exact step: element forces, central differences, critical step, divergence |
+//! | [`inertia`] | steps beyond the limit: mass scaling and multilevel inertia |
 //! | [`lanes`] | one generic body for every instruction set |
 //!
 //! With the feature `io` meshes are read and fields written (`io`), with `lab` methods are judged against the

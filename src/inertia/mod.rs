@@ -14,8 +14,8 @@
 //! du+ = du + M^-1 r + W (S^-1 - G^-1) W^T r         M = N + reserve m      (node.rs)
 //! S   = (1 + k) Mc + s_c D^2 / 4 Kc,  G = W^T M W                          (assembly.rs)
 //! ```
-//! `N >= s D^2 / 4 sum_e D_a`, the elements' bound ([`bound`](self#the-bound)). The operator is symmetric, and positive: on the motion of
-//! the lattice it is `S^-1` in the energy's inner product, on the rest `M^-1`.
+//! `N >= s D^2 / 4 sum_e D_a`, the elements' bound (`bound.rs`). The operator is symmetric, and positive: with
+//! `du = W c + y` and `W^T M y = 0` its inverse is `c^T S c + y^T M y`.
 //!
 //! # Why it is stable
 //!
@@ -29,10 +29,13 @@
 //! The first because `K <= sum_e D_a <= 4 / (s D^2) N`, the second because `W^T K W <= Kc`: both are made from the same bound of
 //! each element's tangent, for any mesh, support, material and state. With `s` = 1.35 and `s_c` = 6 the
 //! bracket is 0.907: it allows the stiffness of a node to grow by 5 % and that of the lattice's motion by 33 %
-//! while a cycle lasts. **Where they grow more, the step is held back at run time**: each step computes a
+//! while a cycle lasts. What a refresh lags behind is met in two ways. Bounds have directions, and tissue
+//! turns: they are kept in frames that turn with it (`frames.rs`; without them a free body that has turned by
+//! 15 degrees is unstable at 20 times its limit). Where tissue stiffens more than allowed, the step is held back: each step computes a
 //! scalar bound of every element, which rides along with the forces; a node whose sum has grown beyond its
 //! allowance gets the inverse inertia divided by the growth, and the lattice's part is multiplied by
-//! `1.33 / growth`. `G` may lag behind without harm: it does not appear in the bound.
+//! `1.33 / growth`. `G` may lag behind without harm: it does not appear in the bound. Between refreshes this is
+//! a safeguard, not a proof: what a bound's direction changes by beyond the rotation of its frame is left to the margin.
 //!
 //! A linear bound says nothing about a step that is large against the law's own range. So a node's force may
 //! not move it from rest by more than a fiftieth of the least height of its elements; its
