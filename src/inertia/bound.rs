@@ -56,7 +56,7 @@ impl<R: Real> Coefficients<R> {
         let ee = stiffening * x_f * x_f;
         let eta = R::splat(SPLIT) * (bulk + p1 + ce.abs());
         // ce / eta first: its square may be beyond float32 where the law is at its cap.
-        let mixed = ce * ce.zip(eta, |ce, eta| ce / eta);
+        let mixed = ce * ce.over(eta);
         Self {
             geometric: p1 + p_j.abs() * (i1 + R::splat(3.0)) * R::splat(1.0 / 3.0),
             stiffening: ee + mixed,

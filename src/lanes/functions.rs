@@ -1,41 +1,69 @@
 //! Exponential, inverse cube root and square root without branches, table look-ups or integer conversions, so that
 //! the compiler can compute several side by side. Errors are measured by the tests at the end.
 
+use super::Real;
+
+/// Numbers whose bits may be computed with.
+pub(super) trait Bits: Real {
+    /// The bits, as a signed integer, rounded to a number.
+    fn as_number(self) -> Self;
+    /// The bits plus `addend` (wrapping), shifted left by 8 or 23.
+    fn plus_shifted(self, addend: u32, left: u32) -> Self;
+    /// `minuend` less half the bits.
+    fn half_from(self, minuend: u32) -> Self;
+}
+
+impl Bits for f32 {
+    #[inline(always)]
+    fn as_number(self) -> Self {
+        (self.to_bits() as i32) as f32
+    }
+    #[inline(always)]
+    fn plus_shifted(self, addend: u32, left: u32) -> Self {
+        Self::from_bits(self.to_bits().wrapping_add(addend) << (left % 32))
+    }
+    #[inline(always)]
+    fn half_from(self, minuend: u32) -> Self {
+        Self::from_bits(minuend.wrapping_sub(self.to_bits() >> 1))
+    }
+}
+
 /// `exp(x)`: `2^n p(r)` with `n = round(x / ln 2)` and the minimax polynomial of Cephes' `expf`
 /// (Moshier) for `|r| <= ln 2 / 2`. Arguments beyond -87 and 88 are clamped.
 #[inline(always)]
-pub(super) fn exp(x: f32) -> f32 {
+pub(super) fn exp<R: Bits>(x: R) -> R {
     const MAGIC: f32 = 12_582_912.0; // 1.5 * 2^23: adding it rounds to an integer held in the low bits
     const LN2_HIGH: f32 = 0.693_359_4; // 355/512, exact
     const LN2_LOW: f32 = -2.121_944_4e-4;
-    let x = if x < 88.0 { x } else { 88.0 };
-    let x = if x > -87.0 { x } else { -87.0 };
-    let shifted = x * core::f32::consts::LOG2_E + MAGIC;
-    let n = shifted - MAGIC;
-    let r = x - n * LN2_HIGH - n * LN2_LOW;
-    let p = 1.987_569_2e-4;
-    let p = p * r + 1.398_199_9e-3;
-    let p = p * r + 8.333_452e-3;
-    let p = p * r + 4.166_579_6e-2;
-    let p = p * r + 1.666_666_5e-1;
-    let p = p * r + 0.5;
-    let p = p * (r * r) + r + 1.0;
+    let c = R::splat;
+    let x = x.min(c(88.0)).max(c(-87.0));
+    let shifted = x * c(core::f32::consts::LOG2_E) + c(MAGIC);
+    let n = shifted - c(MAGIC);
+    let r = x - n * c(LN2_HIGH) - n * c(LN2_LOW);
+    let p = c(1.987_569_2e-4);
+    let p = p * r + c(1.398_199_9e-3);
+    let p = p * r + c(8.333_452e-3);
+    let p = p * r + c(4.166_579_6e-2);
+    let p = p * r + c(1.666_666_5e-1);
+    let p = p * r + c(0.5);
+    let p = p * (r * r) + r + c(1.0);
     // Shifting drops the exponent of MAGIC and leaves n in the exponent field.
-    p * f32::from_bits((shifted.to_bits().wrapping_add(127)) << 23)
+    p * shifted.plus_shifted(127, 23)
 }
 
 /// `x^(-1/3)` for positive normal `x`: a first guess from the bits (-1/3 of the exponent), then two
 /// third-order steps `y (1 + h/3 + 2 h^2/9)`, `h = 1 - x y^3`.
 #[inline(always)]
-pub(super) fn inverse_cbrt(x: f32) -> f32 {
+pub(super) fn inverse_cbrt<R: Bits>(x: R) -> R {
     // The guess 0x54a2fa8c - bits/3, computed in floats: a vector unit has no integer division.
     const SCALE: f32 = -1.0 / (3.0 * 256.0);
     const OFFSET: f32 = 0x54a2_fa8c as f32 / 256.0 + 8_388_608.0;
-    let guess = (x.to_bits() as i32) as f32 * SCALE + OFFSET;
-    let mut y = f32::from_bits(guess.to_bits() << 8);
+    let c = R::splat;
+    let guess = x.as_number() * c(SCALE) + c(OFFSET);
+    let mut y = guess.plus_shifted(0, 8);
     for _ in 0..2 {
-        let h = 1.0 - x * y * y * y;
-        y = y + y * h * (1.0 / 3.0 + h * (2.0 / 9.0));
+        let h = c(1.0) - x * y * y * y;
+        y = y + y * h * (c(1.0 / 3.0) + h * c(2.0 / 9.0));
     }
     y
 }
@@ -43,10 +71,11 @@ pub(super) fn inverse_cbrt(x: f32) -> f32 {
 /// `sqrt(x) = x x^(-1/2)` for zero and positive normal `x`: a first guess from the bits, then three Newton
 /// steps. libm's is exact, but the compiler cannot compute several side by side.
 #[inline(always)]
-pub(super) fn sqrt(x: f32) -> f32 {
-    let mut y = f32::from_bits(0x5f37_59df_u32.wrapping_sub(x.to_bits() >> 1));
+pub(super) fn sqrt<R: Bits>(x: R) -> R {
+    let c = R::splat;
+    let mut y = x.half_from(0x5f37_59df);
     for _ in 0..3 {
-        y = y * (1.5 - 0.5 * x * y * y);
+        y = y * (c(1.5) - c(0.5) * x * y * y);
     }
     x * y
 }
@@ -67,9 +96,9 @@ mod tests {
         }
         println!("exp: largest relative error {worst:.2e}");
         assert!(worst < 1.2e-7);
-        assert_eq!(super::exp(0.0), 1.0);
-        assert_eq!(super::exp(1e9), super::exp(88.0));
-        assert_eq!(super::exp(-1e9), super::exp(-87.0));
+        assert_eq!(super::exp(0.0f32), 1.0);
+        assert_eq!(super::exp(1e9f32), super::exp(88.0));
+        assert_eq!(super::exp(-1e9f32), super::exp(-87.0));
     }
 
     #[test]
@@ -96,6 +125,6 @@ mod tests {
         }
         println!("square root: largest relative error {worst:.2e}");
         assert!(worst < 3e-7);
-        assert_eq!(super::sqrt(0.0), 0.0);
+        assert_eq!(super::sqrt(0.0f32), 0.0);
     }
 }

@@ -4,6 +4,8 @@
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
+#[cfg(target_arch = "x86_64")]
+use super::wide::Avx;
 use super::{Lanes, Real};
 
 /// A set of vector instructions.
@@ -81,7 +83,7 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run::<Lanes<8>>()
+    kernel.run::<Avx>()
 }
 
 /// AVX2 in the processor (leaf 7), AVX and the saving of its registers by the system (leaf 1, XCR0).

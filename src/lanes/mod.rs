@@ -8,6 +8,8 @@
 mod functions;
 mod level;
 mod vectors;
+#[cfg(target_arch = "x86_64")]
+mod wide;
 
 pub use level::Level;
 pub(crate) use level::{Kernel, dispatch};
@@ -56,6 +58,11 @@ pub trait Real:
     #[inline(always)]
     fn abs(self) -> Self {
         self.map(f32::abs)
+    }
+    /// `self / other`.
+    #[inline(always)]
+    fn over(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
     }
     /// Square root of zero or a positive normal number, relative error below 3e-7.
     #[inline(always)]

@@ -1,0 +1,161 @@
+//! Eight numbers in one AVX register. [`Lanes`](super::Lanes) leaves it to the compiler to find the vectors in
+//! unrolled loops, which it gives up on in long kernels; here each operation is one instruction, of the same
+//! results.
+//!
+//! Only [`super::level`] names this type, in what it runs once it has seen that the processor has AVX2.
+
+#![allow(unsafe_code)] // The instructions are unsafe to use without that.
+
+use core::arch::x86_64::{
+    __m256, _mm256_add_epi32, _mm256_add_ps, _mm256_and_ps, _mm256_castps_si256, _mm256_castsi256_ps,
+    _mm256_cvtepi32_ps, _mm256_div_ps, _mm256_max_ps, _mm256_min_ps, _mm256_mul_ps, _mm256_set1_epi32,
+    _mm256_set1_ps, _mm256_slli_epi32, _mm256_srli_epi32, _mm256_sub_epi32, _mm256_sub_ps, _mm256_xor_ps,
+};
+use core::ops::{Add, Mul, Neg, Sub};
+
+use super::Real;
+use super::functions::Bits;
+
+/// See the module.
+#[derive(Clone, Copy)]
+#[repr(transparent)]
+pub(super) struct Avx(__m256);
+
+impl Avx {
+    #[inline(always)]
+    fn numbers(self) -> [f32; 8] {
+        bytemuck::must_cast(self.0)
+    }
+    #[inline(always)]
+    fn of(numbers: [f32; 8]) -> Self {
+        Self(bytemuck::must_cast(numbers))
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $method:ident, $instruction:ident) => {
+        impl $trait for Avx {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                // SAFETY: the processor has AVX2, see the module.
+                Self(unsafe { $instruction(self.0, other.0) })
+            }
+        }
+    };
+}
+
+operator!(Add, add, _mm256_add_ps);
+operator!(Sub, sub, _mm256_sub_ps);
+operator!(Mul, mul, _mm256_mul_ps);
+
+impl Neg for Avx {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_xor_ps(self.0, _mm256_set1_ps(-0.0)) })
+    }
+}
+
+impl Real for Avx {
+    const COUNT: usize = 8;
+
+    #[inline(always)]
+    fn from_fn(at: impl Fn(usize) -> f32) -> Self {
+        let mut out = [0.0; 8];
+        for (lane, value) in out.iter_mut().enumerate() {
+            *value = at(lane);
+        }
+        Self::of(out)
+    }
+    #[inline(always)]
+    fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self {
+        let ([a, b, c, d], [e, f, g, h]) = (quad(0), quad(1));
+        Self::of([a, b, c, d, e, f, g, h])
+    }
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> f32 {
+        self.numbers().get(lane).copied().unwrap_or(0.0)
+    }
+    #[inline(always)]
+    fn map(self, f: impl Fn(f32) -> f32) -> Self {
+        let mut out = self.numbers();
+        for value in &mut out {
+            *value = f(*value);
+        }
+        Self::of(out)
+    }
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        let mut out = self.numbers();
+        for (a, b) in out.iter_mut().zip(other.numbers()) {
+            *a = f(*a, b);
+        }
+        Self::of(out)
+    }
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_set1_ps(value) })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_max_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_min_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_and_ps(self.0, _mm256_castsi256_ps(_mm256_set1_epi32(i32::MAX))) })
+    }
+    #[inline(always)]
+    fn over(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_div_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        super::functions::sqrt(self)
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        super::functions::exp(self)
+    }
+    #[inline(always)]
+    fn inverse_cbrt(self) -> Self {
+        super::functions::inverse_cbrt(self)
+    }
+}
+
+impl Bits for Avx {
+    #[inline(always)]
+    fn as_number(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_cvtepi32_ps(_mm256_castps_si256(self.0)) })
+    }
+    #[inline(always)]
+    fn plus_shifted(self, addend: u32, left: u32) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let sum = _mm256_add_epi32(_mm256_castps_si256(self.0), _mm256_set1_epi32(addend as i32));
+            Self(_mm256_castsi256_ps(match left {
+                8 => _mm256_slli_epi32::<8>(sum),
+                _ => _mm256_slli_epi32::<23>(sum),
+            }))
+        }
+    }
+    #[inline(always)]
+    fn half_from(self, minuend: u32) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let half = _mm256_srli_epi32::<1>(_mm256_castps_si256(self.0));
+            Self(_mm256_castsi256_ps(_mm256_sub_epi32(_mm256_set1_epi32(minuend as i32), half)))
+        }
+    }
+}
