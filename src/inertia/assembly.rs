@@ -32,7 +32,16 @@ pub(super) struct Assembly<'a> {
     pub(super) inertia: &'a [NodeInertia],
     pub(super) matrix: &'a mut [f32],
     pub(super) stride: usize,
+    /// [`CELL`] rows for each cell of the lattice, or for as many as there is room for.
+    pub(super) cells: &'a mut [[f32; CORNERS]],
 }
+
+/// Functions of a cell.
+pub(super) const CORNERS: usize = 8;
+/// Blocks that a cell sums: `xx, yy, zz, xy, yz, zx` of `volume` and the one of `iso`.
+const BLOCKS: usize = 7;
+/// Rows of a cell's sums: for each function one of each block.
+pub(super) const CELL: usize = BLOCKS * CORNERS;
 
 /// Functions that four nodes can touch.
 const TOUCHED: usize = 32;
@@ -68,7 +77,109 @@ fn add_block(matrix: &mut [f32], stride: usize, c: usize, d: usize, rows: [Four;
 
 const ZERO: Four = Lanes([0.0; 4]);
 
+#[inline(always)]
+fn store<R: Real>(values: R) -> [f32; CORNERS] {
+    let mut row = [0.0; CORNERS];
+    for (corner, place) in row.iter_mut().enumerate() {
+        *place = values.lane(corner);
+    }
+    row
+}
+
+#[inline(always)]
+fn add_row<R: Real>(row: &mut [f32; CORNERS], values: R) {
+    *row = store(R::from_fn(|corner| row[corner % CORNERS]) + values);
+}
+
 impl Assembly<'_> {
+    /// Adds the stiffness bound of an element to the sums of the cell that it is in. Says whether it could: its nodes
+    /// must all be in one cell, and each wholly free or wholly held.
+    #[inline(always)]
+    pub(super) fn add_in_cell<R: Real>(&mut self, element: &Element) -> bool {
+        if R::COUNT != CORNERS {
+            return false;
+        }
+        let mut cell = [u8::MAX; 3];
+        for &node in &element.nodes {
+            let Some(at) = self.nodes.get(node) else {
+                return false;
+            };
+            for (least, at) in cell.iter_mut().zip(at.cell()) {
+                *least = if at < *least { at } else { *least };
+            }
+        }
+        let mut slopes = [R::splat(0.0); 3];
+        for (&node, gradient) in element.nodes.iter().zip(&element.gradients) {
+            let (Some(at), Some(inertia)) = (self.nodes.get(node), self.inertia.get(node)) else {
+                return false;
+            };
+            let [x, y, z, _] = free(inertia.inverse);
+            let Some(weights) = at.corner_weights::<R>(cell) else {
+                return false;
+            };
+            if x != y || y != z {
+                return false;
+            }
+            let weights = R::splat(x) * weights;
+            for (slope, &component) in slopes.iter_mut().zip(gradient) {
+                *slope = *slope + weights * R::splat(component);
+            }
+        }
+        let first = CELL * self.lattice.cell_number(cell);
+        let Some(rows) = self.cells.get_mut(first..first + CELL) else {
+            return false;
+        };
+        let mut images = [R::splat(0.0); 3];
+        for (slope, column) in slopes.iter().zip(&element.cofactor) {
+            for (image, &entry) in images.iter_mut().zip(column) {
+                *image = *image + R::splat(entry) * *slope;
+            }
+        }
+        let (volume, iso) = (R::splat(element.volume), R::splat(element.iso));
+        let [x, y, z] = images;
+        let [p, q, r] = slopes;
+        let (ax, ay, az) = (store(volume * x), store(volume * y), store(volume * z));
+        let (bp, bq, br) = (store(iso * p), store(iso * q), store(iso * r));
+        for (corner, rows) in rows.as_chunks_mut::<BLOCKS>().0.iter_mut().enumerate() {
+            let corner = corner % CORNERS;
+            let (along_x, along_y, along_z) =
+                (R::splat(ax[corner]), R::splat(ay[corner]), R::splat(az[corner]));
+            let [xx, yy, zz, xy, yz, zx, all] = rows;
+            add_row(xx, along_x * x);
+            add_row(yy, along_y * y);
+            add_row(zz, along_z * z);
+            add_row(xy, along_x * y);
+            add_row(yz, along_y * z);
+            add_row(zx, along_z * x);
+            add_row(all, R::splat(bp[corner]) * p + R::splat(bq[corner]) * q + R::splat(br[corner]) * r);
+        }
+        true
+    }
+
+    /// Adds the sums of a cell to the matrix.
+    pub(super) fn add_cell(&mut self, number: usize) {
+        let Some((rows, _)) = self.cells.get(CELL * number..).and_then(<[_]>::split_first_chunk::<CELL>)
+        else {
+            return;
+        };
+        let functions = self.lattice.corner_functions(number);
+        let at = |block: usize, c: usize, d: usize| rows[(BLOCKS * c + block) % CELL][d % CORNERS];
+        for (c, &row) in functions.iter().enumerate() {
+            for (d, &column) in functions.iter().enumerate().take(c + 1) {
+                if row >= MAX_FUNCTIONS || column >= MAX_FUNCTIONS {
+                    continue;
+                }
+                let all = at(6, c, d);
+                let rows = [
+                    [at(0, c, d) + all, at(3, c, d), at(5, d, c), 0.0],
+                    [at(3, d, c), at(1, c, d) + all, at(4, c, d), 0.0],
+                    [at(5, c, d), at(4, d, c), at(2, c, d) + all, 0.0],
+                ];
+                add_block(self.matrix, self.stride, row, column, rows.map(Lanes));
+            }
+        }
+    }
+
     /// Adds the stiffness bound of an element.
     #[inline(always)]
     pub(super) fn add_element(&mut self, element: &Element, slots: &mut Slots) {

@@ -6,7 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::InertiaError;
-use crate::lanes::NodeVector;
+use crate::lanes::{NodeVector, Real};
 use crate::scene::NodeInertia;
 
 /// Lattice points that a lattice may have.
@@ -21,10 +21,10 @@ const LEAST_MASS: f32 = 0.02;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct LatticeNode {
-    /// The cell's first lattice point.
-    point: u16,
+    /// The cell; no axis has room for more than 255.
+    cell: [u8; 3],
     /// The function whose frame it turns with; [`MAX_FUNCTIONS`] for none.
-    frame: u16,
+    frame: u8,
     /// Position in the cell, 0 to 1.
     within: [f32; 3],
 }
@@ -36,8 +36,32 @@ impl LatticeNode {
         usize::from(self.frame)
     }
 
-    /// At the first point.
-    pub const EMPTY: Self = Self { point: 0, frame: MAX_FUNCTIONS as u16, within: [0.0; 3] };
+    #[inline(always)]
+    pub(super) fn cell(&self) -> [u8; 3] {
+        self.cell
+    }
+
+    /// Weights of the functions at the corners of a cell, if the node is in it or on its border.
+    #[inline(always)]
+    pub(super) fn corner_weights<R: Real>(&self, cell: [u8; 3]) -> Option<R> {
+        let mut weights = R::splat(1.0);
+        for axis in 0..3 {
+            let beyond = self.cell[axis].wrapping_sub(cell[axis]);
+            let within = self.within[axis];
+            if beyond > 1 || (beyond == 1 && within > 0.0) {
+                return None;
+            }
+            let within = if beyond == 1 { 1.0 } else { within };
+            let far = |corner: usize| corner >> axis & 1 == 1;
+            let near = R::from_fn(|corner| if far(corner) { 0.0 } else { 1.0 });
+            let sign = R::from_fn(|corner| if far(corner) { 1.0 } else { -1.0 });
+            weights = weights * (near + sign * R::splat(within));
+        }
+        Some(weights)
+    }
+
+    /// In the first cell.
+    pub const EMPTY: Self = Self { cell: [0; 3], frame: DROPPED, within: [0.0; 3] };
 }
 
 /// Cells along each axis and the functions that were kept.
@@ -101,14 +125,13 @@ impl Lattice {
 
     /// Where a point is.
     pub(super) fn place(&self, point: [f32; 3]) -> LatticeNode {
-        let row = [1, self.cells[0] + 1, (self.cells[0] + 1) * (self.cells[1] + 1)];
         let mut node = LatticeNode::EMPTY;
         for axis in 0..3 {
             let (count, size) = (self.cells[axis], self.size[axis]);
             let place = if size > 0.0 { (point[axis] - self.low[axis]) / size * count as f32 } else { 0.0 };
             // Rounding may take the last node just beyond the box.
             let cell = (place as u32).min(count.saturating_sub(1));
-            node.point += (cell * row[axis]) as u16;
+            node.cell[axis] = cell as u8;
             node.within[axis] = (place - cell as f32).clamp(0.0, 1.0);
         }
         node
@@ -123,7 +146,7 @@ impl Lattice {
         for (function, weight) in self.weights(&node) {
             if function < MAX_FUNCTIONS && weight > most && (held == 0 || held == 3) {
                 most = weight;
-                node.frame = function as u16;
+                node.frame = function as u8;
             }
         }
         node
@@ -135,7 +158,8 @@ impl Lattice {
         let (row, layer) =
             (self.cells[0] as usize + 1, (self.cells[0] as usize + 1) * (self.cells[1] as usize + 1));
         let [x, y, z] = node.within;
-        let first = usize::from(node.point);
+        let [i, j, k] = node.cell.map(usize::from);
+        let first = i + j * row + k * layer;
         let (nx, ny, nz) = (1.0 - x, 1.0 - y, 1.0 - z);
         let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
         [
@@ -148,6 +172,26 @@ impl Lattice {
             (first + layer + row, c * z),
             (first + layer + row + 1, d * z),
         ]
+    }
+
+    /// Number of a cell among all of them.
+    #[inline(always)]
+    pub(super) fn cell_number(&self, cell: [u8; 3]) -> usize {
+        let [i, j, k] = cell.map(usize::from);
+        i + self.cells[0] as usize * (j + self.cells[1] as usize * k)
+    }
+
+    /// All cells.
+    pub(super) fn cell_count(&self) -> usize {
+        self.cells.iter().map(|&count| count as usize).product()
+    }
+
+    /// Functions at the corners of cell `number`; dropped ones are number [`MAX_FUNCTIONS`].
+    pub(super) fn corner_functions(&self, number: usize) -> [usize; 8] {
+        let (along, across) = (self.cells[0].max(1) as usize, self.cells[1].max(1) as usize);
+        let cell = [number % along, number / along % across, number / along / across].map(|at| at as u8);
+        let node = LatticeNode { cell, ..LatticeNode::EMPTY };
+        self.weights(&node).map(|(function, _)| function)
     }
 
     /// Functions and weights of a node; dropped ones are number [`MAX_FUNCTIONS`].

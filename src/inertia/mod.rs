@@ -319,7 +319,8 @@ where
         else {
             return Ok(());
         };
-        self.refresh = Refresh::over(CYCLE, scene.blocks().len(), nodes, functions);
+        let cell_count = self.lattice.cell_count();
+        self.refresh = Refresh::over(CYCLE, scene.blocks().len(), nodes, functions, cell_count);
         if alone {
             tables.clear_sums();
             bounds(scene, displacement, &mut tables);

@@ -1,9 +1,10 @@
-//! The refresh of bounds, inertia and coarse inertia, spread over steps: a cycle of four stages (elements,
-//! nodes, two inversions), each step taking an equal part of the whole cycle's work. It only ever looks at
+//! The refresh of bounds, inertia and coarse inertia, spread over steps: a cycle of five stages (elements,
+//! cells, nodes, two inversions), each step taking an equal part of the whole cycle's work. It only ever looks at
 //! the state after an accepted step.
 //!
 //! ```text
-//! elements   D_a (bound) and S = s_c D^2 / 4 Kc
+//! elements   D_a (bound) and s_c D^2 / 4 Kc, most of it in sums of the lattice's cells
+//! cells      S = those sums
 //! nodes      N_a, at once in use; S += (1 + k) Mc, G = W^T (N + reserve m) W, p = W^T (N + reserve m) v
 //! inversions G^-1, then S^-1; X = S^-1 - G^-1 is in use from then on
 //! ```
@@ -11,7 +12,7 @@
 //! ([`super::node`]), a change of `S` may not add energy: `c` is scaled down to what it had.
 
 use super::assembly::{Assembly, Element, NO_SLOTS};
-use super::bound::{Bound, MatrixBeside, cofactor};
+use super::bound::{Bound, MatrixBeside};
 use super::dense::{apply, eliminate, mirror, stride};
 use super::frames::{Frames, Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, restrict};
@@ -32,7 +33,7 @@ pub(super) struct Matrices<'a> {
     kept: &'a mut [f32],
     /// The next `S`.
     next: &'a mut [f32],
-    /// The next `G`.
+    /// The next `G`; before, the sums of the cells.
     fine: &'a mut [f32],
 }
 
@@ -54,6 +55,7 @@ impl<'a> Matrices<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Elements,
+    Cells,
     Nodes,
     Fine,
     Next,
@@ -81,6 +83,7 @@ pub(super) struct Refresh {
 
 /// Relative cost of one block, node and row of a pivot, in floating-point operations.
 const BLOCK_COST: i64 = 12_000;
+const CELL_COST: i64 = 2_000;
 const NODE_COST: i64 = 1_200;
 
 const NO_VECTORS: CoarseVectors = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
@@ -95,6 +98,24 @@ pub(super) struct Sources<'a, M, N, B> {
     pub(super) scaling: &'a Scaling,
     /// `s_c D^2 / 4`, s^2.
     pub(super) coarse_weight: f32,
+}
+
+impl<M, N, B> Sources<'_, M, N, B>
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+{
+    fn assembly<'a>(&'a self, matrix: &'a mut [f32], cells: &'a mut [f32], stride: usize) -> Assembly<'a> {
+        Assembly {
+            lattice: self.lattice,
+            nodes: self.places,
+            inertia: self.scene.inertia(),
+            matrix,
+            stride,
+            cells: cells.as_chunks_mut().0,
+        }
+    }
 }
 
 impl Refresh {
@@ -113,8 +134,9 @@ impl Refresh {
     };
 
     /// A cycle of `steps` steps over a scene with this many blocks and nodes.
-    pub(super) fn over(steps: u32, blocks: usize, nodes: usize, functions: usize) -> Self {
+    pub(super) fn over(steps: u32, blocks: usize, nodes: usize, functions: usize, cells: usize) -> Self {
         let whole = blocks as i64 * BLOCK_COST
+            + cells as i64 * CELL_COST
             + nodes as i64 * NODE_COST
             + 6 * functions as i64 * pivot_cost(functions);
         Self { per_step: whole / i64::from(steps) + 1, ..Self::NEW }
@@ -176,13 +198,21 @@ impl Refresh {
                 if at == 0 {
                     tables.clear_sums();
                     matrices.next.fill(0.0);
+                    matrices.fine.fill(0.0);
                     self.frames.start_cycle();
                 }
                 self.elements(from, tables, matrices, at, stride);
                 if self.done >= from.scene.blocks().len() {
-                    self.enter(Stage::Nodes);
+                    self.enter(Stage::Cells);
                 }
                 BLOCK_COST
+            }
+            Stage::Cells => {
+                from.assembly(matrices.next, matrices.fine, stride).add_cell(at);
+                if self.done >= from.lattice.cell_count() {
+                    self.enter(Stage::Nodes);
+                }
+                CELL_COST
             }
             Stage::Nodes => {
                 if at == 0 {
@@ -246,13 +276,7 @@ impl Refresh {
         let Some(block) = from.scene.blocks().get(at) else {
             return;
         };
-        let assembly = Assembly {
-            lattice: from.lattice,
-            nodes: from.places,
-            inertia: from.scene.inertia(),
-            matrix: matrices.next,
-            stride,
-        };
+        let assembly = from.assembly(matrices.next, matrices.fine, stride);
         let sums = MatrixBeside { diagonal, beside };
         let material = from.scene.material();
         let frames = &self.frames;
@@ -294,17 +318,11 @@ impl Refresh {
         }
         let [x, y, z] = renewed.inertia.times(turned.map(|v| v * renewed.velocity));
         restrict(&from.lattice.weights(place), [x, y, z, 0.0], &mut self.momentum);
-        let assembly = |matrix| Assembly {
-            lattice: from.lattice,
-            nodes: from.places,
-            inertia: from.scene.inertia(),
-            matrix,
-            stride,
-        };
-        assembly(&mut *matrices.fine).add_node(place, &renewed.inertia);
+        from.assembly(matrices.fine, &mut [], stride).add_node(place, &renewed.inertia);
         let mass = inertia.mass * (1.0 + from.scaling.k);
         let mass = Symmetric { xx: mass, yy: mass, zz: mass, ..Symmetric::default() };
-        assembly(&mut *matrices.next).add_node(place, &mass.on_free(inertia.inverse));
+        let mass = mass.on_free(inertia.inverse);
+        from.assembly(matrices.next, &mut [], stride).add_node(place, &mass);
     }
 
     /// What has to go from the coarse velocity so that the next `S` adds no energy. `G` is inverted,
@@ -397,52 +415,62 @@ impl<M: Material> Kernel for OneBlock<'_, M> {
     #[inline(always)]
     fn run<R: Real>(mut self) {
         let mut slots = NO_SLOTS;
+        let block = self.block;
+        // The elements one by one, once they have been computed side by side.
+        let (mut iso, mut volume) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
+        let mut columns = [[[0.0f32; BLOCK]; 3]; 3];
+        let mut turned = [Rotation::NONE; BLOCK];
+        for (lane, turned) in turned.iter_mut().enumerate() {
+            // C in the frame of the element's first node.
+            let place = self.assembly.nodes.get(block.node(0, lane));
+            *turned = self.frames.since_start(place.map_or(MAX_FUNCTIONS, LatticeNode::frame));
+        }
         for first in (0..BLOCK).step_by(R::COUNT) {
-            let block = self.block;
             let law = M::Law::widen(|lane| self.material.law(block.element(first + lane)));
             let deformation = Deformation::<R>::of_block(block, first, self.displacement);
-            let bound = Bound::<R>::new::<M::Law>(
-                &law,
-                block,
-                first,
-                &deformation,
-                &Local::new::<M::Law>(&law, deformation.invariants),
-            );
-            // C in the frame of the element's first node.
-            let turned = [0; BLOCK].map(|_| Rotation::NONE);
-            let mut turned = turned;
-            for (lane, turned) in turned.iter_mut().enumerate().take(R::COUNT) {
-                let frame = self
-                    .assembly
-                    .nodes
-                    .get(block.node(0, first + lane))
-                    .map_or(MAX_FUNCTIONS, LatticeNode::frame);
-                *turned = self.frames.since_start(frame);
+            let local = Local::new::<M::Law>(&law, deformation.invariants);
+            let bound = Bound::<R>::new::<M::Law>(&law, block, first, &deformation, &local);
+            let mut cofactor = [[R::splat(0.0); 3]; 3];
+            for i in 0..3 {
+                for k in 0..3 {
+                    let along = R::from_fn(|lane| turned[(first + lane) % BLOCK].0[k][i]);
+                    for j in 0..3 {
+                        cofactor[i][j] = cofactor[i][j] + along * deformation.cofactor(k, j);
+                    }
+                }
             }
-            let world = cofactor(&deformation);
-            let cofactor = [0, 1, 2].map(|i| {
-                let along = [0, 1, 2].map(|k| R::from_fn(|lane| turned[lane % BLOCK].0[k][i]));
-                [0, 1, 2].map(|j| along[0] * world[0][j] + along[1] * world[1][j] + along[2] * world[2][j])
-            });
             self.sums.add(&bound, block, first, &cofactor);
             let weight = block.volume::<R>(first) * R::splat(self.weight);
-            let (iso, volume) = (weight * bound.iso, weight * bound.volume);
-            let gradients =
-                [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| block.gradient::<R>(corner, axis, first)));
-            let cofactor = [0, 1, 2].map(|j| [0, 1, 2].map(|i| cofactor[i][j]));
+            let (wide_iso, wide_volume) = (weight * bound.iso, weight * bound.volume);
             for lane in 0..R::COUNT {
-                let slopes = gradients.map(|gradient| gradient.map(|slope| slope.lane(lane)));
-                let origin = [0, 1, 2].map(|axis| -(slopes[0][axis] + slopes[1][axis] + slopes[2][axis]));
-                self.assembly.add_element(
-                    &Element {
-                        nodes: [0, 1, 2, 3].map(|corner| block.node(corner, first + lane)),
-                        gradients: [origin, slopes[0], slopes[1], slopes[2]],
-                        iso: iso.lane(lane),
-                        volume: volume.lane(lane),
-                        cofactor: cofactor.map(|[x, y, z]| [x.lane(lane), y.lane(lane), z.lane(lane), 0.0]),
-                    },
-                    &mut slots,
-                );
+                let at = (first + lane) % BLOCK;
+                iso[at] = wide_iso.lane(lane);
+                volume[at] = wide_volume.lane(lane);
+                for i in 0..3 {
+                    for j in 0..3 {
+                        columns[j][i][at] = cofactor[i][j].lane(lane);
+                    }
+                }
+            }
+        }
+        for lane in 0..BLOCK {
+            let mut gradients = [[0.0; 3]; 4];
+            for corner in 0..3 {
+                for axis in 0..3 {
+                    gradients[corner + 1][axis] = block.gradient_of(corner, axis, lane);
+                    gradients[0][axis] -= gradients[corner + 1][axis];
+                }
+            }
+            let mut cofactor = [[0.0; 4]; 3];
+            for j in 0..3 {
+                for i in 0..3 {
+                    cofactor[j][i] = columns[j][i][lane];
+                }
+            }
+            let nodes = [0, 1, 2, 3].map(|corner| block.node(corner, lane));
+            let element = Element { nodes, gradients, iso: iso[lane], volume: volume[lane], cofactor };
+            if !self.assembly.add_in_cell::<R>(&element) {
+                self.assembly.add_element(&element, &mut slots);
             }
         }
     }
