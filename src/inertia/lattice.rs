@@ -41,6 +41,15 @@ impl LatticeNode {
         self.cell
     }
 
+    /// Weights of the functions at the corners of its cell.
+    #[inline(always)]
+    pub(super) fn eight_weights(&self) -> [f32; 8] {
+        let [x, y, z] = self.within;
+        let (nx, ny, nz) = (1.0 - x, 1.0 - y, 1.0 - z);
+        let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
+        [a * nz, b * nz, c * nz, d * nz, a * z, b * z, c * z, d * z]
+    }
+
     /// Weights of the functions at the corners of a cell, if the node is in it or on its border.
     #[inline(always)]
     pub(super) fn corner_weights<R: Real>(&self, cell: [u8; 3]) -> Option<R> {
@@ -186,12 +195,18 @@ impl Lattice {
         self.cells.iter().map(|&count| count as usize).product()
     }
 
+    /// Functions at the corners of a node's cell; dropped ones are number [`MAX_FUNCTIONS`].
+    #[inline(always)]
+    pub(super) fn functions_of(&self, node: &LatticeNode) -> [usize; 8] {
+        self.weights(node).map(|(function, _)| function)
+    }
+
     /// Functions at the corners of cell `number`; dropped ones are number [`MAX_FUNCTIONS`].
     pub(super) fn corner_functions(&self, number: usize) -> [usize; 8] {
         let (along, across) = (self.cells[0].max(1) as usize, self.cells[1].max(1) as usize);
         let cell = [number % along, number / along % across, number / along / across].map(|at| at as u8);
         let node = LatticeNode { cell, ..LatticeNode::EMPTY };
-        self.weights(&node).map(|(function, _)| function)
+        self.functions_of(&node)
     }
 
     /// Functions and weights of a node; dropped ones are number [`MAX_FUNCTIONS`].
@@ -216,20 +231,6 @@ pub(super) fn restrict(weights: &[(usize, f32); 8], v: [f32; 4], sums: &mut Coar
             }
         }
     }
-}
-
-/// `W x` of one node.
-#[inline(always)]
-pub(super) fn prolong(weights: &[(usize, f32); 8], x: &CoarseVectors) -> [f32; 4] {
-    let mut out = [0.0; 4];
-    for &(function, weight) in weights {
-        if let Some(x) = x.get(function) {
-            for (out, x) in out.iter_mut().zip(x.0) {
-                *out += weight * x;
-            }
-        }
-    }
-    out
 }
 
 fn bounding_box(points: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {

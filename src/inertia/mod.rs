@@ -56,6 +56,7 @@ mod dense;
 mod frames;
 mod lattice;
 mod node;
+mod passes;
 mod refresh;
 mod report;
 mod step;

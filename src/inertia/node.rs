@@ -109,9 +109,3 @@ pub(super) fn renew(
     let inverse = with_held(inertia, at.inverse).inverse().on_free(at.inverse);
     Renewed { inverse, inertia, velocity: keep, added }
 }
-
-/// How far a node's bound (N/m) has grown from `before` to `now`, as far as that matters beside its mass.
-#[inline(always)]
-pub(super) fn growth(scaling: &Scaling, mass: f32, before: f32, now: f32) -> f32 {
-    (mass + scaling.weight * now) / (mass + scaling.weight * before)
-}

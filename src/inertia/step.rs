@@ -13,13 +13,14 @@ use crate::tled::{
 use super::assembly::free;
 use super::bound::{MatrixBeside, ScalarBeside};
 use super::dense::{apply, stride};
-use super::frames::{Frames, Rotation, turn};
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, prolong, restrict};
-use super::node::{Scaling, growth, renew};
+use super::frames::{Rotation, turn};
+use super::lattice::{CoarseVectors, LatticeNode, MAX_FUNCTIONS};
+use super::node::{Scaling, renew};
+use super::passes::{Move, Nodes, Prepare, turns};
 use super::refresh::{Matrices, ROW, Refresh, Sources, from_numbers, to_numbers};
 use super::report::Tally;
 use super::vectors::NodeTables;
-use super::{COARSE, COARSE_GROWTH, Inertia, LARGEST_KICK, NODE_GROWTH};
+use super::{COARSE, COARSE_GROWTH, Inertia, LARGEST_KICK};
 
 /// One in this many nodes held back, or less than half of the lattice's motion used, makes a step
 /// [`Status::Limited`].
@@ -88,13 +89,19 @@ where
 
     let places = places.as_ref();
     refresh.frames.look(displacement);
-    let frames = &refresh.frames;
-    let mut fine =
-        Fine { step: &step, scaling, lattice, places, frames, held_back: 0, growth: 1.0, tally: Tally::NEW };
     let mut restricted = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    fine.prepare(nodal, increment, force, &mut tables, &mut restricted);
-    let (held_back, growth) = (fine.held_back, fine.growth);
-    let tally = fine.tally;
+    let turned = turns(&refresh.frames.of_bounds);
+    let mut tally = Tally::NEW;
+    let (held_back, growth) = if alone {
+        let fine = Fine { step: &step, scaling, held_back: 0, tally };
+        let (held_back, counted) = fine.prepare(nodal, increment, force, &mut tables);
+        tally = counted;
+        (held_back, 1.0)
+    } else {
+        let nodes = Nodes { step: &step, scaling, lattice, places, turns: &turned, inertia: nodal, force };
+        let tables = &mut tables;
+        dispatch(Prepare { nodes, increment, tables, restricted: &mut restricted })
+    };
     let coarse_share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
 
     let mut matrices = Matrices::split(dense.as_mut(), functions);
@@ -102,7 +109,15 @@ where
     if let (Some(matrices), false) = (&matrices, alone) {
         coarse_motion(matrices.applied, functions, &mut restricted, coarse_share, refresh, &mut solution);
     }
-    move_nodes(&step, scaling, nodal, force, lattice, places, frames, &solution, &mut tables);
+    if alone {
+        move_nodes(&step, scaling, nodal, force, &mut tables);
+    } else {
+        let nodes = Nodes { step: &step, scaling, lattice, places, turns: &turned, inertia: nodal, force };
+        dispatch(Move { nodes, solution: &solution, tables: &mut tables });
+        for force in force.iter_mut() {
+            force.0[3] = 0.0;
+        }
+    }
 
     let tables_next: &[NodeVector] = tables.next;
     let next = |node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector| {
@@ -150,84 +165,54 @@ where
     Status::Ok
 }
 
-/// The nodes before they move.
+/// The nodes of mass scaling before they move.
 struct Fine<'a> {
     step: &'a Step,
     scaling: &'a Scaling,
-    lattice: &'a Lattice,
-    places: &'a [LatticeNode],
-    frames: &'a Frames,
     held_back: u32,
-    growth: f32,
     tally: Tally,
 }
 
 impl Fine<'_> {
-    /// How much of its inverse inertia each node may use, its velocity (into `next`), and the lattice's share
-    /// of its residual.
+    /// The inertia of each node, how much of it it may use, and its velocity (into `next`).
     #[inline(always)]
     fn prepare(
-        &mut self,
+        mut self,
         nodal: &[NodeInertia],
         increment: &[NodeVector],
         force: &mut [NodeVector],
         tables: &mut NodeTables<'_>,
-        restricted: &mut CoarseVectors,
-    ) {
-        let alone = self.lattice.functions() == 0;
+    ) -> (u32, Tally) {
         let square = self.step.seconds() * self.step.seconds();
         for (node, ((inertia, increment), force)) in nodal.iter().zip(increment).zip(force).enumerate() {
             let [fx, fy, fz, scalar] = force.0;
             force.0[3] = 0.0;
             let carry = self.step.carry();
             let velocity = [0, 1, 2].map(|axis| carry * increment.0[axis]);
-            let (mut at, mut made_for) = tables.node(node);
+            let at = tables.node(node).0;
             let before = at.share;
-            let mut keep = 1.0;
-            if alone {
-                let renewed = renew(
-                    inertia,
-                    tables.summed(node).0,
-                    Some((at.inverse, velocity)),
-                    velocity,
-                    self.scaling,
-                );
-                (at.inverse, made_for, keep) = (renewed.inverse, scalar, renewed.velocity);
-                tables.set(node, &renewed.inverse, scalar, before);
-                self.tally.add(node, renewed.added);
-            }
-            let growth = growth(self.scaling, inertia.mass, made_for, scalar);
-            let mut share = 1.0;
-            if growth > NODE_GROWTH {
-                share = NODE_GROWTH / growth;
-            }
-            let frame = self.places.get(node).map_or(MAX_FUNCTIONS, LatticeNode::frame);
-            let force = self.frames.since_bounds(frame).back([fx, fy, fz]);
-            let kick = at.inverse.times(force.map(|force| force * square));
+            let old = Some((at.inverse, velocity));
+            let renewed = renew(inertia, tables.summed(node).0, old, velocity, self.scaling);
+            let mut keep = renewed.velocity;
+            self.tally.add(node, renewed.added);
+            // The bound is that of this state: the node has not stiffened since.
+            let kick = renewed.inverse.times([fx, fy, fz].map(|force| force * square));
             let length = libm::sqrtf(kick[0] * kick[0] + kick[1] * kick[1] + kick[2] * kick[2]);
             let Some(next) = tables.next.get_mut(node) else {
                 continue;
             };
             let most = LARGEST_KICK * next.0[3];
-            if share * length > most {
-                share = most / length;
-            }
+            let share = if length > most { most / length } else { 1.0 };
             if share < before {
                 keep *= libm::sqrtf(share / before);
             }
             self.held_back += u32::from(share < 1.0);
-            if growth > self.growth {
-                self.growth = growth;
-            }
             for axis in 0..3 {
                 next.0[axis] = keep * velocity[axis];
             }
-            if !alone && let Some(place) = self.places.get(node) {
-                let residual = residual(self.step, self.scaling, inertia, [fx, fy, fz], next);
-                restrict(&self.lattice.weights(place), residual, restricted);
-            }
-            tables.set_share(node, share);
+            tables.set(node, &renewed.inverse, scalar, share);
         }
+        (self.held_back, self.tally)
     }
 }
 
@@ -273,36 +258,25 @@ fn coarse_motion(
     }
 }
 
-/// The next increments, in `next`.
+/// The next increments of mass scaling, in `next`.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
 fn move_nodes(
     step: &Step,
     scaling: &Scaling,
     nodal: &[NodeInertia],
     force: &[NodeVector],
-    lattice: &Lattice,
-    places: &[LatticeNode],
-    frames: &Frames,
-    solution: &CoarseVectors,
     tables: &mut NodeTables<'_>,
 ) {
-    let alone = lattice.functions() == 0;
     for (node, (inertia, force)) in nodal.iter().zip(force).enumerate() {
         let at = tables.node(node).0;
         let Some(next) = tables.next.get_mut(node) else {
             continue;
         };
         let [x, y, z, _] = residual(step, scaling, inertia, force.to_array(), next);
-        let frame = frames.since_bounds(places.get(node).map_or(MAX_FUNCTIONS, LatticeNode::frame));
-        let fine = frame.out(at.inverse.times(frame.back([x, y, z])));
-        let mut coarse = [0.0; 4];
-        if !alone && let Some(place) = places.get(node) {
-            coarse = prolong(&lattice.weights(place), solution);
-        }
+        let fine = at.inverse.times([x, y, z]);
         let free = free(inertia.inverse);
         for axis in 0..3 {
-            next.0[axis] = free[axis] * (next.0[axis] + at.share * fine[axis] + coarse[axis]);
+            next.0[axis] = free[axis] * (next.0[axis] + at.share * fine[axis]);
         }
     }
 }

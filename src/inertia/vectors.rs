@@ -12,9 +12,9 @@ pub const fn vectors_for(nodes: usize) -> usize {
 
 pub(super) struct NodeTables<'a> {
     /// `xx, yy, zz` of the inverse inertia in use (1/kg) and the scalar bound it was made for (N/m).
-    inverse_diagonal: &'a mut [NodeVector],
+    pub(super) inverse_diagonal: &'a mut [NodeVector],
     /// `xy, yz, zx`, and the share of it in use.
-    inverse_beside: &'a mut [NodeVector],
+    pub(super) inverse_beside: &'a mut [NodeVector],
     /// Sums of the elements' bounds, N/m, laid out like the inverse.
     pub(super) sum_diagonal: &'a mut [NodeVector],
     pub(super) sum_beside: &'a mut [NodeVector],
@@ -82,13 +82,6 @@ impl<'a> NodeTables<'a> {
             let share = if first { 1.0 } else { inverse.0[3] };
             let [xy, yz, zx, _] = next.0;
             inverse.0 = [xy, yz, zx, share];
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn set_share(&mut self, node: usize, share: f32) {
-        if let Some(beside) = self.inverse_beside.get_mut(node) {
-            beside.0[3] = share;
         }
     }
 }

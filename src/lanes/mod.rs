@@ -14,7 +14,7 @@ mod wide;
 pub use level::Level;
 pub(crate) use level::{Kernel, dispatch};
 pub use vectors::NodeVector;
-pub(crate) use vectors::{Gather, Scatter};
+pub(crate) use vectors::{Gather, Scatter, rows};
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -63,6 +63,16 @@ pub trait Real:
     #[inline(always)]
     fn over(self, other: Self) -> Self {
         self.zip(other, |a, b| a / b)
+    }
+    /// Square root, correctly rounded.
+    #[inline(always)]
+    fn root(self) -> Self {
+        self.map(libm::sqrtf)
+    }
+    /// One where the number is above zero, zero elsewhere.
+    #[inline(always)]
+    fn positive(self) -> Self {
+        self.map(|a| if a > 0.0 { 1.0 } else { 0.0 })
     }
     /// Square root of zero or a positive normal number, relative error below 3e-7.
     #[inline(always)]

@@ -49,6 +49,20 @@ fn transpose(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
     }
 }
 
+/// One vector for each lane.
+#[inline(always)]
+pub(crate) fn rows<R: Real>(values: [R; 4]) -> [[f32; 4]; super::BLOCK] {
+    let mut rows = [[0.0; 4]; super::BLOCK];
+    if R::COUNT == 1 {
+        rows[0] = values.map(|value| value.lane(0));
+        return rows;
+    }
+    for (group, rows) in rows.as_chunks_mut::<4>().0.iter_mut().enumerate().take(R::COUNT / 4) {
+        *rows = transpose(values.map(|value| [0, 1, 2, 3].map(|lane| value.lane(4 * group + lane))));
+    }
+    rows
+}
+
 /// Vectors of nodes to read from; there is at least one.
 #[derive(Clone, Copy)]
 pub(crate) struct Gather<'a> {
@@ -75,16 +89,22 @@ impl<'a> Gather<'a> {
     /// Lane `l` takes the vector of node `index(l)`; a node that does not exist reads as the last one.
     #[inline(always)]
     pub(crate) fn read_lanes<R: Real>(&self, index: impl Fn(usize) -> usize) -> [R; 3] {
+        let [x, y, z, _] = self.read_all(index);
+        [x, y, z]
+    }
+
+    /// The same with the fourth component.
+    #[inline(always)]
+    pub(crate) fn read_all<R: Real>(&self, index: impl Fn(usize) -> usize) -> [R; 4] {
         if R::COUNT == 1 {
-            let [x, y, z, _] = self.read(index(0));
-            return [R::splat(x), R::splat(y), R::splat(z)];
+            return self.read(index(0)).map(R::splat);
         }
         let mut columns = [[[0.0; 4]; 4]; super::BLOCK / 4];
         for group in 0..R::COUNT / 4 {
             columns[group] = transpose([0, 1, 2, 3].map(|lane| self.read(index(4 * group + lane))));
         }
         let axis = |axis: usize| R::from_quads(|group| columns[group][axis]);
-        [axis(0), axis(1), axis(2)]
+        [axis(0), axis(1), axis(2), axis(3)]
     }
 }
 
