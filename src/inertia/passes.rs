@@ -150,9 +150,8 @@ impl Kernel for Prepare<'_, '_> {
             let places = nodes.places.get(first..).unwrap_or_default();
             let into = tables.next.iter_mut().zip(tables.inverse_beside.iter_mut()).skip(first);
             let lanes = next.iter().zip(&residual).take(R::COUNT);
-            for ((place, (next_into, beside)), (next, &[x, y, z, share])) in
-                places.iter().zip(into).zip(lanes)
-            {
+            for ((place, (next_into, beside)), (next, residual)) in places.iter().zip(into).zip(lanes) {
+                let share = residual[3];
                 next_into.0 = *next;
                 beside.0[3] = share;
                 held_back += u32::from(share < 1.0);
@@ -160,10 +159,11 @@ impl Kernel for Prepare<'_, '_> {
                     cell.flush(restricted);
                     cell.enter(nodes.lattice, place);
                 }
+                // Four wide; the sums of the shares are of no use.
                 for (sum, weight) in cell.vectors.iter_mut().zip(place.eight_weights()) {
-                    sum[0] += weight * x;
-                    sum[1] += weight * y;
-                    sum[2] += weight * z;
+                    for (sum, component) in sum.iter_mut().zip(residual) {
+                        *sum += weight * component;
+                    }
                 }
             }
         }

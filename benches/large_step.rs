@@ -1,0 +1,140 @@
+//! Time of a step beyond the limit of stability on the paper's bar, beside the exact one.
+//!
+//! `cargo bench --bench large_step` prints criterion's figures, then ratios from interleaved pairs of runs (the
+//! machine's speed drifts; the ratio does not) and what the steps of a refresh cycle cost against their mean.
+
+use std::time::Instant;
+
+use criterion::{BenchmarkId, Criterion, Throughput};
+use supple::inertia::{self, CYCLE, Inertia, LatticeNode, numbers_for, vectors_for};
+use supple::loads::{Loads, NodalForce};
+use supple::material::{Exponential, Tissue};
+use supple::mesh::{Bar, Mesh, Winding};
+use supple::scene::{ElementBlock, NodeInertia, Scene, Support, blocks_for};
+use supple::state::{NodeVector, State};
+use supple::tled::{self, Status, Step};
+
+/// Steps of the scaled methods over the stable one.
+const MULTIPLE: f32 = 20.0;
+const DAMPING: f32 = 20.0;
+const LATTICE: [u32; 3] = [2, 2, 4];
+const PAIRS: usize = 41;
+
+type BarScene = Scene<Tissue<Exponential>, Vec<NodeInertia>, Vec<ElementBlock>>;
+
+fn state(nodes: usize) -> State<Vec<NodeVector>> {
+    let zero = || vec![NodeVector::ZERO; nodes];
+    State::over(zero(), zero(), zero())
+}
+
+fn moved(status: Status) {
+    assert!(matches!(status, Status::Ok | Status::Limited { .. }), "{status:?}");
+}
+
+/// A step with the given lattice, from a state that it has deformed.
+fn scaled<'a>(
+    scene: &'a BarScene,
+    loads: &'a Loads<'a>,
+    points: &[[f32; 3]],
+    step: Step,
+    cells: [u32; 3],
+) -> impl FnMut() + 'a {
+    let nodes = points.len();
+    let functions = if cells == [0; 3] {
+        0
+    } else {
+        inertia::lattice_functions(scene, points, cells).expect("the lattice fits")
+    };
+    let mut state = state(nodes);
+    let mut inertia = Inertia::over(
+        vec![NodeVector::ZERO; vectors_for(nodes)],
+        vec![LatticeNode::EMPTY; nodes],
+        vec![0.0; numbers_for(functions)],
+    );
+    inertia.prepare(scene, points, &mut state, step, cells).expect("the bar can be prepared");
+    let mut run = move || moved(inertia::step(scene, loads, &mut state, &mut inertia));
+    // Whole cycles.
+    (0..8 * CYCLE).for_each(|_| run());
+    run
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn seconds(mut run: impl FnMut()) -> f64 {
+    let start = Instant::now();
+    run();
+    start.elapsed().as_secs_f64()
+}
+
+/// Median time of each step of a cycle over their mean; the first is the step that the cycle stands at.
+fn phases(run: &mut impl FnMut()) -> Vec<f64> {
+    let mut times = vec![Vec::new(); CYCLE as usize];
+    for _ in 0..PAIRS {
+        for times in &mut times {
+            times.push(seconds(&mut *run));
+        }
+    }
+    let times: Vec<f64> = times.into_iter().map(median).collect();
+    let mean = times.iter().sum::<f64>() / times.len() as f64;
+    times.iter().map(|time| time / mean).collect()
+}
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args().sample_size(30);
+    let bar = Bar::PAPER;
+    let points: Vec<_> = bar.points().collect();
+    let tets: Vec<_> = bar.tets().collect();
+    let mesh = Mesh::new(&points, &tets, Winding::Checked).expect("the bar is sound");
+    let tissue = Tissue { law: Exponential { a: 59.0, b: 8.023, d: 60_000.0 }, density: 1000.0 };
+    let nodes = vec![NodeInertia::EMPTY; points.len()];
+    let mut scene = Scene::over(tissue, nodes, vec![ElementBlock::EMPTY; blocks_for(tets.len())]);
+    let fixed: Vec<_> = (0..81).map(Support::fixed).collect();
+    scene.build(&mesh, &fixed).expect("the bar is sound");
+    let corners = [(0, 0, [1.0, -1.0]), (8, 0, [1.0, 1.0]), (8, 8, [-1.0, 1.0]), (0, 8, [-1.0, -1.0])];
+    let forces = corners.map(|(i, j, [x, y])| NodalForce {
+        node: bar.node(i, j, 17),
+        newton: [0.05 * x, 0.05 * y, 0.0],
+        ramp: 0.0,
+    });
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
+
+    let mut exact_state = state(points.len());
+    let critical = tled::critical_step(&scene, &mut exact_state).expect("the bar has a critical step");
+    let small = Step::new(0.9 * critical.seconds, DAMPING, critical).expect("dt is below the critical step");
+    let large = Step::insist(MULTIPLE * critical.seconds, DAMPING).expect("a positive step");
+    let mut exact = || moved(tled::step(&scene, &loads, &mut exact_state, &small));
+    (0..8_000).for_each(|_| exact());
+    let mut mass_scaled = scaled(&scene, &loads, &points, large, [0; 3]);
+    let mut multilevel = scaled(&scene, &loads, &points, large, LATTICE);
+
+    let mut group = criterion.benchmark_group("large step");
+    group.throughput(Throughput::Elements(tets.len() as u64));
+    group.bench_function(BenchmarkId::from_parameter("exact"), |b| b.iter(&mut exact));
+    group.bench_function(BenchmarkId::from_parameter("mass-scaled"), |b| b.iter(&mut mass_scaled));
+    group.bench_function(BenchmarkId::from_parameter("multilevel"), |b| b.iter(&mut multilevel));
+    group.finish();
+
+    let (mut times, mut by_scaling, mut by_lattice) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..PAIRS {
+        let [one, scaling, lattice] = [
+            seconds(|| (0..CYCLE).for_each(|_| exact())),
+            seconds(|| (0..CYCLE).for_each(|_| mass_scaled())),
+            seconds(|| (0..CYCLE).for_each(|_| multilevel())),
+        ];
+        times.push(one / f64::from(CYCLE));
+        by_scaling.push(scaling / one);
+        by_lattice.push(lattice / one);
+    }
+    let most = phases(&mut multilevel).into_iter().fold(0.0, f64::max);
+    println!(
+        "exact {:.0} us a step; mass-scaled {:.2} times that, multilevel {:.2} times; \
+         the dearest step of a cycle {most:.2} times their mean",
+        median(times) * 1e6,
+        median(by_scaling),
+        median(by_lattice)
+    );
+    criterion.final_summary();
+}
