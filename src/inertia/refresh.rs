@@ -81,10 +81,10 @@ pub(super) struct Refresh {
     pub(super) published: Tally,
 }
 
-/// Relative cost of one block, node and row of a pivot, in floating-point operations.
-const BLOCK_COST: i64 = 12_000;
-const CELL_COST: i64 = 2_000;
-const NODE_COST: i64 = 1_200;
+/// Cost of a block, a cell and a node, in floating-point operations of a pivot that take as long (measured).
+const BLOCK_COST: i64 = 36_000;
+const CELL_COST: i64 = 3_000;
+const NODE_COST: i64 = 4_000;
 
 const NO_VECTORS: CoarseVectors = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
 
