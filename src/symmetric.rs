@@ -59,22 +59,27 @@ impl Symmetric {
         self.xx + self.yy + self.zz
     }
 
-    /// The inverse of a positive definite matrix (by cofactors, the diagonal scaled to one first so that no
-    /// product leaves the range of float32).
+    /// The inverse of a positive definite matrix from its factors `L diag(p) L^T`, the diagonal scaled to one
+    /// first so that no product leaves the range of float32. Cofactors would lose a soft direction beside a stiff
+    /// one: their terms cancel twice, pivots only once.
     #[inline(always)]
     pub(crate) fn inverse(&self) -> Self {
         let [a, b, c] = [self.xx, self.yy, self.zz].map(|entry| 1.0 / libm::sqrtf(entry));
         let (d, e, f) = (self.xy * a * b, self.yz * b * c, self.zx * c * a);
-        let (xx, yy, zz) = (1.0 - e * e, 1.0 - f * f, 1.0 - d * d);
-        let (xy, yz, zx) = (e * f - d, f * d - e, d * e - f);
-        let over = 1.0 / (xx + d * xy + f * zx);
+        // L = [1, 0, 0; d, 1, 0; f, g, 1]
+        let second = 1.0 / (1.0 - d * d);
+        let below = e - d * f;
+        let g = below * second;
+        let third = 1.0 / ((1.0 - f * f) - below * g);
+        // The last row of L^-1 is [h, -g, 1].
+        let h = d * g - f;
         Self {
-            xx: over * xx * a * a,
-            yy: over * yy * b * b,
-            zz: over * zz * c * c,
-            xy: over * xy * a * b,
-            yz: over * yz * b * c,
-            zx: over * zx * c * a,
+            xx: (1.0 + d * d * second + h * h * third) * a * a,
+            yy: (second + g * g * third) * b * b,
+            zz: third * c * c,
+            xy: -(d * second + h * g * third) * a * b,
+            yz: -(g * third) * b * c,
+            zx: h * third * c * a,
         }
     }
 
