@@ -1,43 +1,47 @@
 //! Dense symmetric matrices of the lattice functions (three unknowns a function): inverted in place, applied
 //! by rows. Plain loops without rearranged sums, so every instruction set gives the same bits.
 
-use crate::lanes::{Kernel, Real, dispatch};
+use super::lattice::MAX_FUNCTIONS;
+use crate::lanes::{Kernel, Lanes, Real, dispatch};
+
+/// Rows are a multiple of this.
+const LANES: usize = 8;
+
+/// Numbers in the longest row.
+pub(super) const ROW: usize = stride(MAX_FUNCTIONS);
 
 /// Length of a row of a matrix for `functions` functions: three numbers each, one spare (a block is
 /// written four wide) and a multiple of eight.
 pub(super) const fn stride(functions: usize) -> usize {
-    (3 * functions + 1).div_ceil(8) * 8
+    (3 * functions + 1).div_ceil(LANES) * LANES
 }
 
-/// Copies the lower triangle of `size` rows to the upper one.
-pub(super) fn mirror(matrix: &mut [f32], size: usize, stride: usize) {
-    for row in 1..size {
-        for column in 0..row {
-            let value = matrix.get(row * stride + column).copied().unwrap_or(0.0);
-            if let Some(place) = matrix.get_mut(column * stride + row) {
+/// Makes a row and its column `factor` times what the row holds up to the diagonal.
+pub(super) fn mirror(matrix: &mut [f32], stride: usize, row: usize, factor: f32) {
+    for column in 0..=row {
+        let value = factor * matrix.get(row * stride + column).copied().unwrap_or(0.0);
+        for place in [row * stride + column, column * stride + row] {
+            if let Some(place) = matrix.get_mut(place) {
                 *place = value;
             }
         }
     }
 }
 
-/// One pivot of the Gauss-Jordan inversion in place of a symmetric positive definite matrix; after all of
-/// them it holds the inverse. No row is exchanged: none has to be for a positive definite matrix. Returns
-/// whether the pivot was positive and finite.
-pub(super) fn eliminate(matrix: &mut [f32], size: usize, stride: usize, pivot: usize) -> bool {
-    let Some(diagonal) = matrix.get_mut(pivot * stride + pivot) else {
-        return false;
-    };
-    let inverse = 1.0 / *diagonal;
-    if !(*diagonal > 0.0 && inverse.is_finite()) {
+/// One pivot of the inversion in place of a symmetric positive definite matrix by the sweep operator, on its lower
+/// triangle alone; after all of them that is minus the inverse's. No row is exchanged: none has to be for a positive
+/// definite matrix. Returns whether the pivot was positive and finite.
+pub(super) fn sweep(matrix: &mut [f32], size: usize, stride: usize, pivot: usize) -> bool {
+    let diagonal = matrix.get(pivot * stride + pivot).copied().unwrap_or(0.0);
+    let inverse = 1.0 / diagonal;
+    if !(diagonal > 0.0 && inverse.is_finite()) {
         return false;
     }
-    *diagonal = 1.0;
-    dispatch(Eliminate { matrix, size, stride, pivot, inverse });
+    dispatch(Sweep { matrix, size, stride, pivot, inverse });
     true
 }
 
-struct Eliminate<'a> {
+struct Sweep<'a> {
     matrix: &'a mut [f32],
     size: usize,
     stride: usize,
@@ -45,32 +49,41 @@ struct Eliminate<'a> {
     inverse: f32,
 }
 
-impl Kernel for Eliminate<'_> {
+impl Kernel for Sweep<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<R: Real>(self) {
-        let Some((before, rest)) = self.matrix.split_at_mut_checked(self.pivot * self.stride) else {
-            return;
-        };
-        let Some((row, after)) = rest.split_at_mut_checked(self.stride) else {
-            return;
-        };
-        for value in row.iter_mut() {
-            *value *= self.inverse;
+        let Self { matrix, size, stride, pivot, inverse } = self;
+        // The pivot's row, and its column below.
+        let mut line = [0.0f32; ROW];
+        let rows = || matrix.chunks_exact(stride).take(size).enumerate();
+        for ((index, row), place) in rows().zip(&mut line) {
+            let at = if index < pivot { matrix.get(pivot * stride + index) } else { row.get(pivot) };
+            *place = at.copied().unwrap_or(0.0);
         }
-        let after_rows = self.size.saturating_sub(self.pivot + 1);
-        let others =
-            before.chunks_exact_mut(self.stride).chain(after.chunks_exact_mut(self.stride).take(after_rows));
-        for other in others {
-            let Some(place) = other.get_mut(self.pivot) else {
-                return;
-            };
-            let factor = *place;
-            *place = 0.0;
-            for (value, row) in other.iter_mut().zip(row.iter()) {
-                *value -= factor * row;
+        for (index, row) in matrix.chunks_exact_mut(stride).take(size).enumerate() {
+            if index == pivot {
+                for value in row.iter_mut().take(pivot) {
+                    *value *= inverse;
+                }
+            } else {
+                let factor = line.get(index).copied().unwrap_or(0.0) * inverse;
+                // Whole vectors; what lies above the diagonal is never read.
+                let vectors = row.as_chunks_mut::<LANES>().0.iter_mut().zip(line.as_chunks::<LANES>().0);
+                let factors = Lanes([factor; LANES]);
+                for (value, &line) in vectors.take(index / LANES + 1) {
+                    *value = (Lanes(*value) - factors * Lanes(line)).0;
+                }
+                if index > pivot
+                    && let Some(place) = row.get_mut(pivot)
+                {
+                    *place = factor;
+                }
             }
+        }
+        if let Some(diagonal) = matrix.get_mut(pivot * stride + pivot) {
+            *diagonal = -inverse;
         }
     }
 }
@@ -103,7 +116,7 @@ impl Kernel for Apply<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::{apply, eliminate, mirror, stride};
+    use super::{apply, mirror, stride, sweep};
 
     #[test]
     fn inverts_a_stiff_matrix_in_place() {
@@ -122,11 +135,12 @@ mod tests {
                 matrix[i * stride + j] += 1e4 * sign;
             }
         }
-        mirror(&mut matrix, SIZE, stride);
-        let original = matrix.clone();
+        let mut original = matrix.clone();
+        (0..SIZE).for_each(|row| mirror(&mut original, stride, row, 1.0));
         for pivot in 0..SIZE {
-            assert!(eliminate(&mut matrix, SIZE, stride, pivot));
+            assert!(sweep(&mut matrix, SIZE, stride, pivot));
         }
+        (0..SIZE).for_each(|row| mirror(&mut matrix, stride, row, -1.0));
         let x: Vec<f32> = (0..SIZE).map(|i| (i as f32 * 0.7).sin()).collect();
         let (mut image, mut back) = (vec![0.0; stride], vec![0.0; stride]);
         apply(&matrix, stride, &x, &mut image);
@@ -135,6 +149,6 @@ mod tests {
         println!("A (A^-1 x) is off by {worst:.1e} at a condition of 1e5");
         assert!(worst < 2e-2);
         matrix[0] = -1.0;
-        assert!(!eliminate(&mut matrix, SIZE, stride, 0));
+        assert!(!sweep(&mut matrix, SIZE, stride, 0));
     }
 }

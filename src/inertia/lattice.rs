@@ -195,6 +195,32 @@ impl Lattice {
         self.cells.iter().map(|&count| count as usize).product()
     }
 
+    /// Largest difference between neighbouring points over their distance, for vectors of the functions (m). Where a
+    /// function was dropped nothing moves.
+    pub(super) fn largest_strain(&self, vectors: &CoarseVectors) -> f32 {
+        let [nx, ny, nz] = self.cells.map(|count| count as usize + 1);
+        let at = |point: usize| {
+            let function = self.of_point.get(point).copied().unwrap_or(DROPPED);
+            vectors.get(usize::from(function)).copied().unwrap_or_default().0
+        };
+        let mut largest = 0.0;
+        for point in 0..nx * ny * nz {
+            let here = at(point);
+            let last = [point % nx + 1 == nx, point / nx % ny + 1 == ny, point / nx / ny + 1 == nz];
+            for (axis, stride) in [1, nx, nx * ny].into_iter().enumerate() {
+                if last[axis] || self.size[axis] <= 0.0 {
+                    continue;
+                }
+                let there = at(point + stride);
+                let along = |i: usize| there[i] - here[i];
+                let square = along(0) * along(0) + along(1) * along(1) + along(2) * along(2);
+                let per_metre = self.cells[axis] as f32 / self.size[axis];
+                largest = f32::max(largest, square * per_metre * per_metre);
+            }
+        }
+        libm::sqrtf(largest)
+    }
+
     /// Functions at the corners of a node's cell; dropped ones are number [`MAX_FUNCTIONS`].
     #[inline(always)]
     pub(super) fn functions_of(&self, node: &LatticeNode) -> [usize; 8] {

@@ -1,12 +1,13 @@
 //! The two passes over the nodes of a step with a lattice, several nodes side by side: before the lattice moves and
 //! after. Nodes that follow each other are mostly in the same cell, whose functions are then at hand.
 
+use super::assembly::free;
 use super::frames::Rotation;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::Scaling;
 use super::vectors::NodeTables;
 use super::{LARGEST_KICK, NODE_GROWTH};
-use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, rows};
+use crate::lanes::{Gather, Kernel, Lanes, NodeVector, Real, rows};
 use crate::scene::NodeInertia;
 use crate::tled::Step;
 
@@ -104,10 +105,13 @@ impl<R: Real> Chunk<R> {
     }
 }
 
-/// How much of its inverse inertia each node may use, its velocity (into `next`), and the lattice's share
-/// of its residual. Gives the number of nodes held back and the largest growth.
+/// How much of its inverse inertia each node may use, where that alone takes it (its next increment without the
+/// lattice's part, into `next`), and the lattice's share of its residual. Gives the number of nodes held back and
+/// the largest growth.
 pub(super) struct Prepare<'a, 'b> {
     pub(super) nodes: Nodes<'a>,
+    /// What the velocities are multiplied by.
+    pub(super) brake: f32,
     pub(super) increment: &'a [NodeVector],
     pub(super) tables: &'a mut NodeTables<'b>,
     pub(super) restricted: &'a mut CoarseVectors,
@@ -118,10 +122,10 @@ impl Kernel for Prepare<'_, '_> {
 
     #[inline(always)]
     fn run<R: Real>(self) -> (u32, f32) {
-        let Self { nodes, increment, tables, restricted } = self;
+        let Self { nodes, brake, increment, tables, restricted } = self;
         let (one, weight) = (R::splat(1.0), R::splat(nodes.scaling.weight));
         let square = R::splat(nodes.step.seconds() * nodes.step.seconds());
-        let carry = R::splat(nodes.step.carry());
+        let carry = R::splat(brake * nodes.step.carry());
         let (mut held_back, mut largest) = (0, one);
         let mut cell = Cell::new();
         for first in (0..nodes.inertia.len()).step_by(R::COUNT) {
@@ -145,7 +149,9 @@ impl Kernel for Prepare<'_, '_> {
             let keep = share.over(before).min(one).root() * carry;
             let velocity = [keep * x, keep * y, keep * z];
             let [rx, ry, rz] = nodes.residual(&at, velocity);
-            let next = rows([velocity[0], velocity[1], velocity[2], height]);
+            let fine = at.out(at.moved([rx, ry, rz]));
+            let alone = |axis: usize| velocity[axis] + share * fine[axis];
+            let next = rows([alone(0), alone(1), alone(2), height]);
             let residual = rows([rx, ry, rz, share]);
             let places = nodes.places.get(first..).unwrap_or_default();
             let into = tables.next.iter_mut().zip(tables.inverse_beside.iter_mut()).skip(first);
@@ -176,9 +182,13 @@ impl Kernel for Prepare<'_, '_> {
     }
 }
 
-/// The next increments, in `next`.
+/// Adds what the lattice moves to the next increments, in `next`, and takes the bounds out of the forces' fourth
+/// component.
 pub(super) struct Move<'a, 'b> {
-    pub(super) nodes: Nodes<'a>,
+    pub(super) lattice: &'a Lattice,
+    pub(super) places: &'a [LatticeNode],
+    pub(super) inertia: &'a [NodeInertia],
+    pub(super) force: &'a mut [NodeVector],
     pub(super) solution: &'a CoarseVectors,
     pub(super) tables: &'a mut NodeTables<'b>,
 }
@@ -188,37 +198,23 @@ impl Kernel for Move<'_, '_> {
 
     #[inline(always)]
     fn run<R: Real>(self) {
-        let Self { nodes, solution, tables } = self;
         let mut cell = Cell::new();
-        for first in (0..nodes.inertia.len()).step_by(R::COUNT) {
-            let mut coarse = [NodeVector::ZERO; BLOCK];
-            let places = nodes.places.get(first..).unwrap_or_default();
-            for (coarse, place) in coarse.iter_mut().zip(places).take(R::COUNT) {
-                if !cell.is(place) {
-                    cell.enter(nodes.lattice, place);
-                    cell.read(solution);
-                }
-                for (vector, weight) in cell.vectors.iter().zip(place.eight_weights()) {
-                    for (coarse, component) in coarse.0.iter_mut().zip(vector) {
-                        *coarse += weight * component;
-                    }
-                }
+        let nodes = self.places.iter().zip(self.inertia).zip(self.force).zip(self.tables.next.iter_mut());
+        for (((place, inertia), force), next) in nodes {
+            if !cell.is(place) {
+                cell.enter(self.lattice, place);
+                cell.read(self.solution);
             }
-            let (Some(at), Some(next), Some(coarse)) =
-                (nodes.chunk::<R>(first, tables), Gather::new(tables.next), Gather::new(&coarse))
-            else {
-                break;
-            };
-            let [x, y, z, height] = next.read_all::<R>(|lane| first + lane);
-            let coarse = coarse.read_lanes::<R>(|lane| lane);
-            let velocity = [x, y, z];
-            let fine = at.out(at.moved(nodes.residual(&at, velocity)));
-            let share = at.beside[3];
-            let along = |axis: usize| at.free[axis] * (velocity[axis] + share * fine[axis] + coarse[axis]);
-            let next = rows([along(0), along(1), along(2), height]);
-            for (place, next) in tables.next.iter_mut().skip(first).zip(&next).take(R::COUNT) {
-                place.0 = *next;
+            let [x, y, z, height] = next.0;
+            let mut moved = Lanes([x, y, z, 0.0]);
+            let mut coarse = Lanes([0.0; 4]);
+            for (&vector, weight) in cell.vectors.iter().zip(place.eight_weights()) {
+                coarse = coarse + Lanes(vector) * Lanes([weight; 4]);
             }
+            moved = Lanes(free(inertia.inverse)) * (moved + coarse);
+            let Lanes([x, y, z, _]) = moved;
+            next.0 = [x, y, z, height];
+            force.0[3] = 0.0;
         }
     }
 }

@@ -13,12 +13,13 @@
 
 use super::assembly::{Assembly, Element, NO_SLOTS};
 use super::bound::{Bound, MatrixBeside};
-use super::dense::{apply, eliminate, mirror, stride};
+use super::dense::{ROW, apply, mirror, stride, sweep};
 use super::frames::{Frames, Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, restrict};
 use super::node::{Scaling, renew};
 use super::report::Tally;
 use super::vectors::NodeTables;
+use super::{COARSE, FINE};
 use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, Scatter, dispatch};
 use crate::material::{Law, Local, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
@@ -75,16 +76,29 @@ pub(super) struct Refresh {
     /// Coarse velocity to be taken away by the next step, m a step.
     pub(super) correction: CoarseVectors,
     momentum: CoarseVectors,
+    /// Share of `X` in the last step, and what the velocities have to be multiplied by in the next one.
+    share: f32,
+    pub(super) brake: f32,
     sound: bool,
     tally: Tally,
     /// Of the last whole cycle.
     pub(super) published: Tally,
 }
 
-/// Cost of a block, a cell and a node, in floating-point operations of a pivot that take as long (measured).
+/// Cost of a block, a cell, a node and a number of a row that is mirrored, in floating-point operations of a pivot
+/// that take as long (measured).
 const BLOCK_COST: i64 = 36_000;
 const CELL_COST: i64 = 3_000;
 const NODE_COST: i64 = 4_000;
+const ROW_COST: i64 = 12;
+
+/// Rounding in sums over the lattice.
+const SLACK: f32 = 1e-3;
+
+/// Share of `X` below which a smaller one brakes.
+const BRAKED: f32 = 0.6;
+/// Largest error of an inverse.
+const UNSOUND: f32 = 0.05;
 
 const NO_VECTORS: CoarseVectors = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
 
@@ -128,6 +142,8 @@ impl Refresh {
         frames: Frames::NONE,
         correction: NO_VECTORS,
         momentum: NO_VECTORS,
+        share: 1.0,
+        brake: 1.0,
         sound: true,
         tally: Tally::NEW,
         published: Tally::NEW,
@@ -138,7 +154,7 @@ impl Refresh {
         let whole = blocks as i64 * BLOCK_COST
             + cells as i64 * CELL_COST
             + nodes as i64 * NODE_COST
-            + 6 * functions as i64 * pivot_cost(functions);
+            + 6 * functions as i64 * (pivot_cost(functions) + row_cost(functions));
         Self { per_step: whole / i64::from(steps) + 1, ..Self::NEW }
     }
 
@@ -226,25 +242,31 @@ impl Refresh {
                 NODE_COST
             }
             Stage::Fine => {
-                if at == 0 {
-                    mirror(matrices.fine, size, stride);
+                if at < size {
+                    self.sound &= sweep(matrices.fine, size, stride, at);
+                    return pivot_cost(functions);
                 }
-                self.sound &= eliminate(matrices.fine, size, stride, at);
-                if self.done >= size {
-                    mirror(matrices.next, size, stride);
+                mirror(matrices.fine, stride, at - size, -1.0);
+                mirror(matrices.next, stride, at - size, 1.0);
+                if self.done >= 2 * size {
                     self.keep_energy(matrices, size, stride);
                     self.enter(Stage::Next);
                 }
-                pivot_cost(functions)
+                row_cost(functions)
             }
             Stage::Next => {
-                self.sound &= eliminate(matrices.next, size, stride, at);
-                if self.done >= size {
+                if at < size {
+                    self.sound &= sweep(matrices.next, size, stride, at);
+                    return pivot_cost(functions);
+                }
+                mirror(matrices.next, stride, at - size, -1.0);
+                if self.done >= 2 * size {
+                    self.sound &= self.inverted(matrices, size, stride);
                     tables.put_in_use(self.first);
                     self.put_in_use(matrices);
                     self.enter(Stage::Elements);
                 }
-                pivot_cost(functions)
+                row_cost(functions)
             }
         }
     }
@@ -325,6 +347,14 @@ impl Refresh {
         from.assembly(matrices.next, &mut [], stride).add_node(place, &mass);
     }
 
+    /// The share of `X` that a step used. A smaller one is a larger inertia of the lattice: as for the nodes no
+    /// energy may come of that, and all velocities are scaled, for want of the lattice's own.
+    pub(super) fn share(&mut self, share: f32) {
+        let (now, last) = (share.min(BRAKED), self.share.min(BRAKED));
+        self.brake = if now < last { libm::sqrtf(now / last) } else { 1.0 };
+        self.share = share;
+    }
+
     /// What has to go from the coarse velocity so that the next `S` adds no energy. `G` is inverted,
     /// the next `S` not yet.
     fn keep_energy(&mut self, matrices: &mut Matrices<'_>, size: usize, stride: usize) {
@@ -354,7 +384,10 @@ impl Refresh {
         to_numbers(&vectors, &mut old);
         let before = energy(matrices.kept, old.get(..size).unwrap_or_default());
         let after = energy(matrices.next, velocity);
-        // Without a sound inverse of `G` the velocity means nothing, and `X` will not be used.
+        // `S <= COARSE / FINE G`, so `c^T S c` is at most as many times `c^T p`: where it is not, `G` was too
+        // ill-conditioned to be inverted. Then the velocity means nothing, and `X` will not be used.
+        let most: f32 = velocity.iter().zip(momentum).map(|(v, p)| v * p).sum();
+        self.sound &= after <= most * (COARSE / FINE + SLACK);
         if self.sound && !self.first && after > before * (1.0 + 1e-5) && after > 0.0 {
             let lost = 1.0 - libm::sqrtf(if before > 0.0 { before / after } else { 0.0 });
             for (correction, velocity) in self.correction.iter_mut().zip(&world) {
@@ -362,6 +395,26 @@ impl Refresh {
             }
         }
         matrices.kept.copy_from_slice(matrices.next);
+    }
+
+    /// Whether `S S^-1 p = p`, up to what rounding may do.
+    fn inverted(&self, matrices: &Matrices<'_>, size: usize, stride: usize) -> bool {
+        let mut momentum = [0.0; 3 * MAX_FUNCTIONS];
+        to_numbers(&self.momentum, &mut momentum);
+        let (mut solved, mut back) = ([0.0; ROW], [0.0; ROW]);
+        let (Some(momentum), Some(solved), Some(back)) =
+            (momentum.get(..size), solved.get_mut(..stride), back.get_mut(..stride))
+        else {
+            return false;
+        };
+        apply(matrices.next, stride, momentum, solved);
+        apply(matrices.kept, stride, solved.get(..size).unwrap_or_default(), back);
+        let (mut error, mut all) = (0.0, 0.0);
+        for (back, momentum) in back.iter().zip(momentum) {
+            error += (back - momentum) * (back - momentum);
+            all += momentum * momentum;
+        }
+        error <= UNSOUND * UNSOUND * all
     }
 
     fn put_in_use(&mut self, matrices: &mut Matrices<'_>) {
@@ -377,11 +430,13 @@ impl Refresh {
     }
 }
 
-/// Numbers in the longest row.
-pub(super) const ROW: usize = stride(MAX_FUNCTIONS);
-
+/// A multiplication and an addition for each number of the lower triangle.
 fn pivot_cost(functions: usize) -> i64 {
-    (2 * 3 * functions * stride(functions)) as i64 / 2
+    (3 * functions * stride(functions)) as i64
+}
+
+fn row_cost(functions: usize) -> i64 {
+    ROW_COST * stride(functions) as i64
 }
 
 pub(super) fn to_numbers(vectors: &CoarseVectors, numbers: &mut [f32]) {

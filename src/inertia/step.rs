@@ -12,12 +12,12 @@ use crate::tled::{
 
 use super::assembly::free;
 use super::bound::{MatrixBeside, ScalarBeside};
-use super::dense::{apply, stride};
+use super::dense::{ROW, apply, stride};
 use super::frames::{Rotation, turn};
-use super::lattice::{CoarseVectors, LatticeNode, MAX_FUNCTIONS};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::{Scaling, renew};
 use super::passes::{Move, Nodes, Prepare, turns};
-use super::refresh::{Matrices, ROW, Refresh, Sources, from_numbers, to_numbers};
+use super::refresh::{Matrices, Refresh, Sources, from_numbers, to_numbers};
 use super::report::Tally;
 use super::vectors::NodeTables;
 use super::{COARSE, COARSE_GROWTH, Inertia, LARGEST_KICK};
@@ -98,25 +98,24 @@ where
         tally = counted;
         (held_back, 1.0)
     } else {
+        let brake = refresh.brake;
         let nodes = Nodes { step: &step, scaling, lattice, places, turns: &turned, inertia: nodal, force };
         let tables = &mut tables;
-        dispatch(Prepare { nodes, increment, tables, restricted: &mut restricted })
+        dispatch(Prepare { nodes, brake, increment, tables, restricted: &mut restricted })
     };
-    let coarse_share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
+    let mut coarse_share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
 
     let mut matrices = Matrices::split(dense.as_mut(), functions);
     let mut solution = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
     if let (Some(matrices), false) = (&matrices, alone) {
-        coarse_motion(matrices.applied, functions, &mut restricted, coarse_share, refresh, &mut solution);
+        coarse_share =
+            coarse_motion(matrices.applied, lattice, &mut restricted, coarse_share, refresh, &mut solution);
     }
     if alone {
         move_nodes(&step, scaling, nodal, force, &mut tables);
     } else {
-        let nodes = Nodes { step: &step, scaling, lattice, places, turns: &turned, inertia: nodal, force };
-        dispatch(Move { nodes, solution: &solution, tables: &mut tables });
-        for force in force.iter_mut() {
-            force.0[3] = 0.0;
-        }
+        let (solution, tables) = (&solution, &mut tables);
+        dispatch(Move { lattice, places, inertia: nodal, force, solution, tables });
     }
 
     let tables_next: &[NodeVector] = tables.next;
@@ -151,6 +150,7 @@ where
         *report = tally.report(held_back, 1.0);
     } else if let Some(matrices) = &mut matrices {
         refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+        refresh.share(coarse_share);
         let coarse_weight = 0.25 * COARSE * step.seconds() * step.seconds();
         let sources = Sources { scene, displacement, increment, lattice, places, scaling, coarse_weight };
         refresh.advance(sources, &mut tables, matrices);
@@ -232,30 +232,37 @@ fn residual(
     [axis(0), axis(1), axis(2), 0.0]
 }
 
-/// `share (S^-1 - G^-1) W^T r` less the correction that a change of `S` asked for.
+/// `share (S^-1 - G^-1) W^T r` less the correction that a change of `S` asked for. The share falls where the forces
+/// of one step would strain a cell by more than [`LARGEST_KICK`].
 fn coarse_motion(
     matrix: &[f32],
-    functions: usize,
+    lattice: &Lattice,
     restricted: &mut CoarseVectors,
-    share: f32,
+    mut share: f32,
     refresh: &Refresh,
     solution: &mut CoarseVectors,
-) {
+) -> f32 {
+    let functions = lattice.functions();
     let (size, stride) = (3 * functions, stride(functions));
     let (mut x, mut out) = ([0.0; 3 * MAX_FUNCTIONS], [0.0; ROW]);
     turn(restricted, &refresh.frames.of_bounds, Rotation::back);
     to_numbers(restricted, &mut x);
     let (Some(x), Some(out)) = (x.get(..size), out.get_mut(..stride)) else {
-        return;
+        return share;
     };
     apply(matrix, stride, x, out);
-    from_numbers(out.get(..size).unwrap_or_default(), share, solution);
+    from_numbers(out.get(..size).unwrap_or_default(), 1.0, solution);
     turn(solution, &refresh.frames.of_bounds, Rotation::out);
+    let strain = lattice.largest_strain(solution);
+    if share * strain > LARGEST_KICK {
+        share = LARGEST_KICK / strain;
+    }
     for (solution, correction) in solution.iter_mut().zip(&refresh.correction) {
         for (value, correction) in solution.0.iter_mut().zip(correction.0) {
-            *value -= correction;
+            *value = share * *value - correction;
         }
     }
+    share
 }
 
 /// The next increments of mass scaling, in `next`.
