@@ -96,7 +96,7 @@ const ROW_COST: i64 = 12;
 const SLACK: f32 = 1e-3;
 
 /// Share of `X` below which a smaller one brakes.
-const BRAKED: f32 = 0.6;
+const BRAKED: f32 = 0.5;
 /// Largest error of an inverse.
 const UNSOUND: f32 = 0.05;
 
