@@ -6,7 +6,7 @@
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
-use supple::inertia::{self, CYCLE, Inertia, LatticeNode, numbers_for, vectors_for};
+use supple::inertia::{self, Inertia, LatticeNode, numbers_for, vectors_for};
 use supple::loads::{Loads, NodalForce};
 use supple::material::{Exponential, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
@@ -20,6 +20,8 @@ const MULTIPLE: f32 = 20.0;
 const DAMPING: f32 = 20.0;
 const LATTICE: [u32; 3] = [2, 2, 4];
 const PAIRS: usize = 41;
+/// Steps of a refresh cycle at this step.
+const CYCLE: u32 = 64;
 
 type BarScene = Scene<Tissue<Exponential>, Vec<NodeInertia>, Vec<ElementBlock>>;
 
@@ -53,6 +55,7 @@ fn scaled<'a>(
         vec![0.0; numbers_for(functions)],
     );
     inertia.prepare(scene, points, &mut state, step, cells).expect("the bar can be prepared");
+    assert_eq!(inertia.cycle(), CYCLE);
     let mut run = move || moved(inertia::step(scene, loads, &mut state, &mut inertia));
     // Whole cycles.
     (0..8 * CYCLE).for_each(|_| run());

@@ -258,26 +258,72 @@ impl Assembly<'_> {
             }
         }
     }
+}
 
-    /// Adds a node's inertia (kg, zero rows at held axes).
+/// Sums of the nodes of one cell for each pair of its functions: the inertia's `xx, yy, zz, xy, yz, zx` and the mass
+/// along each axis.
+pub(super) struct NodeSums {
+    cell: Option<LatticeNode>,
+    rows: [[[f32; CORNERS]; 9]; CORNERS],
+}
+
+impl NodeSums {
+    pub(super) const NONE: Self = Self { cell: None, rows: [[[0.0; CORNERS]; 9]; CORNERS] };
+
+    /// Adds a node's inertia and its mass (kg, zero rows at held axes); the matrices get the sums of the cell before
+    /// when it is in another one.
     #[inline(always)]
-    pub(super) fn add_node(&mut self, node: &LatticeNode, inertia: &Symmetric) {
-        let rows = [
-            Lanes([inertia.xx, inertia.xy, inertia.zx, 0.0]),
-            Lanes([inertia.xy, inertia.yy, inertia.yz, 0.0]),
-            Lanes([inertia.zx, inertia.yz, inertia.zz, 0.0]),
-        ];
-        let weights = self.lattice.weights(node);
-        for (c, weight_c) in weights {
-            if c >= MAX_FUNCTIONS || weight_c == 0.0 {
-                continue;
-            }
-            for (d, weight_d) in weights {
-                if d <= c {
-                    let weight = Four::splat(weight_c * weight_d);
-                    add_block(self.matrix, self.stride, c, d, rows.map(|row| weight * row));
-                }
+    pub(super) fn add(
+        &mut self,
+        node: &LatticeNode,
+        inertia: &Symmetric,
+        mass: [f32; 3],
+        into: &mut NodeMatrices<'_>,
+    ) {
+        if self.cell.is_none_or(|last| last.cell() != node.cell()) {
+            self.flush(into);
+            self.cell = Some(*node);
+        }
+        let Symmetric { xx, yy, zz, xy, yz, zx } = *inertia;
+        let entries = [xx, yy, zz, xy, yz, zx, mass[0], mass[1], mass[2]];
+        let weights = node.eight_weights();
+        for (rows, weight) in self.rows.iter_mut().zip(weights) {
+            let products = Lanes([weight; CORNERS]) * Lanes(weights);
+            for (row, entry) in rows.iter_mut().zip(entries) {
+                *row = (Lanes(*row) + Lanes([entry; CORNERS]) * products).0;
             }
         }
     }
+
+    /// Gives the sums to the matrices.
+    pub(super) fn flush(&mut self, into: &mut NodeMatrices<'_>) {
+        let Some(cell) = self.cell.take() else {
+            return;
+        };
+        let functions = into.lattice.functions_of(&cell);
+        for (rows, &c) in self.rows.iter_mut().zip(&functions) {
+            for (corner, &d) in functions.iter().enumerate() {
+                if c >= MAX_FUNCTIONS || d > c {
+                    continue;
+                }
+                let [xx, yy, zz, xy, yz, zx, mx, my, mz] = rows.map(|row| row[corner % CORNERS]);
+                let inertia = [[xx, xy, zx, 0.0], [xy, yy, yz, 0.0], [zx, yz, zz, 0.0]];
+                add_block(into.inertia, into.stride, c, d, inertia.map(Lanes));
+                for (axis, mass) in [mx, my, mz].into_iter().enumerate() {
+                    if let Some(place) = into.mass.get_mut((3 * c + axis) * into.stride + 3 * d + axis) {
+                        *place += mass;
+                    }
+                }
+            }
+            *rows = [[0.0; CORNERS]; 9];
+        }
+    }
+}
+
+/// Dense matrices to add [`NodeSums`] to.
+pub(super) struct NodeMatrices<'a> {
+    pub(super) lattice: &'a Lattice,
+    pub(super) inertia: &'a mut [f32],
+    pub(super) mass: &'a mut [f32],
+    pub(super) stride: usize,
 }

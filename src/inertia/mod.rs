@@ -93,8 +93,10 @@ const NODE_GROWTH: f32 = 1.05;
 const COARSE_GROWTH: f32 = COARSE * (1.0 - NODE_GROWTH / FINE);
 /// Largest part of an element that a node's force may move it by in one step from rest.
 const LARGEST_KICK: f32 = 0.02;
-/// Steps of a refresh cycle.
-pub const CYCLE: u32 = 32;
+/// Time of a refresh cycle, s: short beside the motions of hands and breath, which stiffen and turn tissue.
+const CYCLE: f32 = 0.04;
+/// Fewest and most steps of a cycle.
+const CYCLE_STEPS: (f32, f32) = (16.0, 64.0);
 
 /// Numbers that a lattice of this many functions needs.
 #[must_use]
@@ -214,6 +216,12 @@ impl<V, W, D> Inertia<V, W, D> {
         self.lattice.cells()
     }
 
+    /// Steps in which the inertia of a lattice is computed anew, evenly: those of 0.04 s, at least 16 and at most 64.
+    #[must_use]
+    pub const fn cycle(&self) -> u32 {
+        self.refresh.steps()
+    }
+
     /// Functions of the lattice: those that support or body leave something to move.
     #[must_use]
     pub const fn functions(&self) -> usize {
@@ -304,12 +312,13 @@ where
         let (dt, damping) = (step.seconds(), step.damping());
         let k = 0.5 * damping * dt;
         let alone = functions == 0;
+        let cycle = (CYCLE / dt).clamp(CYCLE_STEPS.0, CYCLE_STEPS.1) as u32;
         let fine = if alone { FINE_ALONE } else { FINE };
         self.scaling = Scaling {
             weight: 0.25 * fine * dt * dt,
             k,
             reserve: if alone { k } else { k * (1.0 + k) },
-            loss: 2.0 * damping * dt * if alone { 1.0 } else { CYCLE as f32 },
+            loss: 2.0 * damping * dt * if alone { 1.0 } else { cycle as f32 },
         };
         let Some(mut tables) = NodeTables::split(self.vectors.as_mut(), nodes) else {
             return Ok(());
@@ -321,7 +330,7 @@ where
             return Ok(());
         };
         let cell_count = self.lattice.cell_count();
-        self.refresh = Refresh::over(CYCLE, scene.blocks().len(), nodes, functions, cell_count);
+        self.refresh = Refresh::over(cycle, scene.blocks().len(), nodes, functions, cell_count);
         if alone {
             tables.clear_sums();
             bounds(scene, displacement, &mut tables);

@@ -5,6 +5,7 @@ use super::assembly::free;
 use super::frames::Rotation;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::Scaling;
+use super::report::HeldBack;
 use super::vectors::NodeTables;
 use super::{LARGEST_KICK, NODE_GROWTH};
 use crate::lanes::{Gather, Kernel, Lanes, NodeVector, Real, rows};
@@ -106,8 +107,8 @@ impl<R: Real> Chunk<R> {
 }
 
 /// How much of its inverse inertia each node may use, where that alone takes it (its next increment without the
-/// lattice's part, into `next`), and the lattice's share of its residual. Gives the number of nodes held back and
-/// the largest growth.
+/// lattice's part, into `next`), and the lattice's share of its residual. Gives who was held back and the largest
+/// growth.
 pub(super) struct Prepare<'a, 'b> {
     pub(super) nodes: Nodes<'a>,
     /// What the velocities are multiplied by.
@@ -118,15 +119,15 @@ pub(super) struct Prepare<'a, 'b> {
 }
 
 impl Kernel for Prepare<'_, '_> {
-    type Output = (u32, f32);
+    type Output = (HeldBack, f32);
 
     #[inline(always)]
-    fn run<R: Real>(self) -> (u32, f32) {
+    fn run<R: Real>(self) -> (HeldBack, f32) {
         let Self { nodes, brake, increment, tables, restricted } = self;
         let (one, weight) = (R::splat(1.0), R::splat(nodes.scaling.weight));
         let square = R::splat(nodes.step.seconds() * nodes.step.seconds());
         let carry = R::splat(brake * nodes.step.carry());
-        let (mut held_back, mut largest) = (0, one);
+        let (mut held_back, mut largest) = (HeldBack::NONE, one);
         let mut cell = Cell::new();
         for first in (0..nodes.inertia.len()).step_by(R::COUNT) {
             let (Some(at), Some(increment), Some(next)) =
@@ -160,16 +161,14 @@ impl Kernel for Prepare<'_, '_> {
                 let share = residual[3];
                 next_into.0 = *next;
                 beside.0[3] = share;
-                held_back += u32::from(share < 1.0);
+                held_back.add(share);
                 if !cell.is(place) {
                     cell.flush(restricted);
                     cell.enter(nodes.lattice, place);
                 }
                 // Four wide; the sums of the shares are of no use.
                 for (sum, weight) in cell.vectors.iter_mut().zip(place.eight_weights()) {
-                    for (sum, component) in sum.iter_mut().zip(residual) {
-                        *sum += weight * component;
-                    }
+                    *sum = (Lanes(*sum) + Lanes([weight; 4]) * Lanes(*residual)).0;
                 }
             }
         }

@@ -11,7 +11,7 @@
 //! The coarse part of the velocity is `c = G^-1 p`, its energy `c^T S c`. As for the nodes
 //! ([`super::node`]), a change of `S` may not add energy: `c` is scaled down to what it had.
 
-use super::assembly::{Assembly, Element, NO_SLOTS};
+use super::assembly::{Assembly, Element, NO_SLOTS, NodeMatrices, NodeSums};
 use super::bound::{Bound, MatrixBeside};
 use super::dense::{ROW, apply, mirror, stride, sweep};
 use super::frames::{Frames, Rotation, turn};
@@ -23,7 +23,6 @@ use super::{COARSE, FINE};
 use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, Scatter, dispatch};
 use crate::material::{Law, Local, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
-use crate::symmetric::Symmetric;
 use crate::tled::Deformation;
 
 /// The four dense matrices of a lattice.
@@ -70,6 +69,7 @@ pub(super) struct Refresh {
     done: usize,
     credit: i64,
     per_step: i64,
+    steps: u32,
     /// Nothing has been computed yet.
     first: bool,
     pub(super) frames: Frames,
@@ -84,6 +84,9 @@ pub(super) struct Refresh {
     /// Of the last whole cycle.
     pub(super) published: Tally,
 }
+
+/// Nodes that are done together.
+const TOGETHER: usize = 8;
 
 /// Cost of a block, a cell, a node and a number of a row that is mirrored, in floating-point operations of a pivot
 /// that take as long (measured).
@@ -138,6 +141,7 @@ impl Refresh {
         done: 0,
         credit: 0,
         per_step: 0,
+        steps: 1,
         first: true,
         frames: Frames::NONE,
         correction: NO_VECTORS,
@@ -153,9 +157,13 @@ impl Refresh {
     pub(super) fn over(steps: u32, blocks: usize, nodes: usize, functions: usize, cells: usize) -> Self {
         let whole = blocks as i64 * BLOCK_COST
             + cells as i64 * CELL_COST
-            + nodes as i64 * NODE_COST
+            + nodes.next_multiple_of(TOGETHER) as i64 * NODE_COST
             + 6 * functions as i64 * (pivot_cost(functions) + row_cost(functions));
-        Self { per_step: whole / i64::from(steps) + 1, ..Self::NEW }
+        Self { per_step: whole / i64::from(steps) + 1, steps, ..Self::NEW }
+    }
+
+    pub(super) const fn steps(&self) -> u32 {
+        self.steps
     }
 
     /// One step's part of the cycle.
@@ -235,11 +243,11 @@ impl Refresh {
                     matrices.fine.fill(0.0);
                     self.momentum = NO_VECTORS;
                 }
-                self.node(from, tables, matrices, at, stride);
-                if self.done >= from.scene.node_count() {
+                self.nodes(from, tables, matrices, at * TOGETHER, stride);
+                if self.done * TOGETHER >= from.scene.node_count() {
                     self.enter(Stage::Fine);
                 }
-                NODE_COST
+                TOGETHER as i64 * NODE_COST
             }
             Stage::Fine => {
                 if at < size {
@@ -306,45 +314,37 @@ impl Refresh {
         dispatch(OneBlock { material, block, displacement, sums, assembly, frames, weight });
     }
 
-    fn node<M, N, B>(
+    /// Some nodes, from `first` on.
+    fn nodes<M, N, B>(
         &mut self,
         from: &mut Sources<'_, M, N, B>,
         tables: &mut NodeTables<'_>,
         matrices: &mut Matrices<'_>,
-        at: usize,
+        first: usize,
         stride: usize,
     ) where
         M: Material,
         N: AsRef<[NodeInertia]>,
         B: AsRef<[ElementBlock]>,
     {
-        let (Some(inertia), Some(increment), Some(place)) =
-            (from.scene.inertia().get(at), from.increment.get_mut(at), from.places.get(at))
-        else {
-            return;
-        };
-        let (stiffness, scalar) = tables.summed(at);
-        let velocity = increment.to_array();
-        let turned = self.frames.since_start(place.frame()).back(velocity);
-        let before = self.frames.since_bounds(place.frame()).back(velocity);
-        let old = (!self.first).then(|| (tables.node(at).0.inverse, before));
-        let renewed = renew(inertia, stiffness, old, turned, from.scaling);
-        tables.set_next(at, &renewed.inverse, scalar);
-        self.tally.add(at, renewed.added);
-        let kept = velocity.map(|v| v * renewed.velocity);
-        // A held axis follows its support and has no inertia here.
-        for axis in 0..3 {
-            if inertia.inverse[axis] > 0.0 {
-                increment.0[axis] = kept[axis];
-            }
-        }
-        let [x, y, z] = renewed.inertia.times(turned.map(|v| v * renewed.velocity));
-        restrict(&from.lattice.weights(place), [x, y, z, 0.0], &mut self.momentum);
-        from.assembly(matrices.fine, &mut [], stride).add_node(place, &renewed.inertia);
-        let mass = inertia.mass * (1.0 + from.scaling.k);
-        let mass = Symmetric { xx: mass, yy: mass, zz: mass, ..Symmetric::default() };
-        let mass = mass.on_free(inertia.inverse);
-        from.assembly(matrices.next, &mut [], stride).add_node(place, &mass);
+        let Self { frames, tally, momentum, first: first_cycle, .. } = self;
+        let Sources { scene, increment, lattice, places, scaling, .. } = from;
+        let into = NodeMatrices { lattice, inertia: matrices.fine, mass: matrices.next, stride };
+        let first_cycle = *first_cycle;
+        let inertia = scene.inertia();
+        dispatch(SomeNodes {
+            inertia,
+            increment,
+            places,
+            scaling,
+            frames,
+            tally,
+            momentum,
+            tables,
+            into,
+            first,
+            first_cycle,
+        });
     }
 
     /// The share of `X` that a step used. A smaller one is a larger inertia of the lattice: as for the nodes no
@@ -451,6 +451,53 @@ pub(super) fn from_numbers(numbers: &[f32], factor: f32, vectors: &mut CoarseVec
         for (component, number) in vector.0.iter_mut().zip(three) {
             *component = factor * number;
         }
+    }
+}
+
+struct SomeNodes<'a, 'b> {
+    inertia: &'a [NodeInertia],
+    increment: &'a mut [NodeVector],
+    places: &'a [LatticeNode],
+    scaling: &'a Scaling,
+    frames: &'a Frames,
+    tally: &'a mut Tally,
+    momentum: &'a mut CoarseVectors,
+    tables: &'a mut NodeTables<'b>,
+    into: NodeMatrices<'a>,
+    first: usize,
+    /// Nothing is in use yet.
+    first_cycle: bool,
+}
+
+impl Kernel for SomeNodes<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: Real>(mut self) {
+        let mut sums = NodeSums::NONE;
+        let nodes = self.inertia.iter().zip(self.increment.iter_mut()).zip(self.places).enumerate();
+        for (node, ((inertia, increment), place)) in nodes.skip(self.first).take(TOGETHER) {
+            let (stiffness, scalar) = self.tables.summed(node);
+            let velocity = increment.to_array();
+            let turned = self.frames.since_start(place.frame()).back(velocity);
+            let before = self.frames.since_bounds(place.frame()).back(velocity);
+            let old = (!self.first_cycle).then(|| (self.tables.node(node).0.inverse, before));
+            let renewed = renew(inertia, stiffness, old, turned, self.scaling);
+            self.tables.set_next(node, &renewed.inverse, scalar);
+            self.tally.add(node, renewed.added);
+            // A held axis follows its support and has no inertia here.
+            let mut mass = [0.0; 3];
+            for axis in 0..3 {
+                if inertia.inverse[axis] > 0.0 {
+                    increment.0[axis] *= renewed.velocity;
+                    mass[axis] = inertia.mass * (1.0 + self.scaling.k);
+                }
+            }
+            let [x, y, z] = renewed.inertia.times(turned.map(|v| v * renewed.velocity));
+            restrict(&self.into.lattice.weights(place), [x, y, z, 0.0], self.momentum);
+            sums.add(place, &renewed.inertia, mass, &mut self.into);
+        }
+        sums.flush(&mut self.into);
     }
 }
 

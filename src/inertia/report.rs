@@ -22,6 +22,24 @@ impl Report {
         Self { added_mean: 0.0, added_largest: 0.0, added_node: 0, held_back: 0, coarse_share: 1.0 };
 }
 
+/// Nodes that a step holds back.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HeldBack {
+    pub(super) nodes: u32,
+    /// Sum of the shares of their inverse inertia that are not used.
+    pub(super) unused: f32,
+}
+
+impl HeldBack {
+    pub(super) const NONE: Self = Self { nodes: 0, unused: 0.0 };
+
+    #[inline(always)]
+    pub(super) fn add(&mut self, share: f32) {
+        self.nodes += u32::from(share < 1.0);
+        self.unused += 1.0 - share;
+    }
+}
+
 /// Sums of added inertia while it is being computed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tally {

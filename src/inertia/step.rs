@@ -18,13 +18,14 @@ use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::{Scaling, renew};
 use super::passes::{Move, Nodes, Prepare, turns};
 use super::refresh::{Matrices, Refresh, Sources, from_numbers, to_numbers};
-use super::report::Tally;
+use super::report::{HeldBack, Tally};
 use super::vectors::NodeTables;
 use super::{COARSE, COARSE_GROWTH, Inertia, LARGEST_KICK};
 
-/// One in this many nodes held back, or less than half of the lattice's motion used, makes a step
+/// More of all nodes' inverse inertia unused than this, or less of the lattice's motion used, makes a step
 /// [`Status::Limited`].
-const MANY_HELD_BACK: usize = 20;
+const MUCH_UNUSED: f32 = 0.05;
+const LITTLE_MOTION: f32 = 0.5;
 
 /// Takes one step of the length that the inertia was prepared for. Every call does the same work, one
 /// force evaluation and what the lattice needs. `Mismatch` if the inertia was not prepared for this scene.
@@ -93,7 +94,7 @@ where
     let turned = turns(&refresh.frames.of_bounds);
     let mut tally = Tally::NEW;
     let (held_back, growth) = if alone {
-        let fine = Fine { step: &step, scaling, held_back: 0, tally };
+        let fine = Fine { step: &step, scaling, held_back: HeldBack::NONE, tally };
         let (held_back, counted) = fine.prepare(nodal, increment, force, &mut tables);
         tally = counted;
         (held_back, 1.0)
@@ -147,18 +148,18 @@ where
     *steps += 1;
     follow_motions(loads, displacement, increment, *time);
     if alone {
-        *report = tally.report(held_back, 1.0);
+        *report = tally.report(held_back.nodes, 1.0);
     } else if let Some(matrices) = &mut matrices {
         refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
         refresh.share(coarse_share);
         let coarse_weight = 0.25 * COARSE * step.seconds() * step.seconds();
         let sources = Sources { scene, displacement, increment, lattice, places, scaling, coarse_weight };
         refresh.advance(sources, &mut tables, matrices);
-        *report = refresh.published.report(held_back, coarse_share);
+        *report = refresh.published.report(held_back.nodes, coarse_share);
     }
     let least_volume_ratio = 1.0 + extremes.least_j;
     let (saturation, energy_excess) = (extremes.saturation, ledger.excess() as f32);
-    let held = report.held_back as usize * MANY_HELD_BACK > nodes || coarse_share < 0.5;
+    let held = held_back.unused > MUCH_UNUSED * nodes as f32 || coarse_share < LITTLE_MOTION;
     if held || least_volume_ratio < J_FLOOR || saturation > 1.0 || energy_excess > 0.0 {
         return Status::Limited { least_volume_ratio, saturation, energy_excess };
     }
@@ -169,7 +170,7 @@ where
 struct Fine<'a> {
     step: &'a Step,
     scaling: &'a Scaling,
-    held_back: u32,
+    held_back: HeldBack,
     tally: Tally,
 }
 
@@ -182,7 +183,7 @@ impl Fine<'_> {
         increment: &[NodeVector],
         force: &mut [NodeVector],
         tables: &mut NodeTables<'_>,
-    ) -> (u32, Tally) {
+    ) -> (HeldBack, Tally) {
         let square = self.step.seconds() * self.step.seconds();
         for (node, ((inertia, increment), force)) in nodal.iter().zip(increment).zip(force).enumerate() {
             let [fx, fy, fz, scalar] = force.0;
@@ -206,7 +207,7 @@ impl Fine<'_> {
             if share < before {
                 keep *= libm::sqrtf(share / before);
             }
-            self.held_back += u32::from(share < 1.0);
+            self.held_back.add(share);
             for axis in 0..3 {
                 next.0[axis] = keep * velocity[axis];
             }
