@@ -8,39 +8,60 @@
 //!         + (U'' + W' (4 g' + g'' I1)) c^2 + 4 W' g' c e + W'' (xf e + (xf + xc) c)^2
 //! xf = 2 g,  xc = g' I1
 //! ```
-//! The map `dF -> dC` has eigenvalues of at most `2 / sqrt 3 |F|` (its trace is zero and the trace of its
-//! square `4 |F|^2`), and `sqrt I1 <= (I1 + 3) / (2 sqrt 3)`: so the geometric part is at most
-//! `p1 + |pJ| (I1 + 3) / 3`. In the rest, `q_cc c^2 + 2 q_ce c e + q_ee e^2`, the mixed term is split by
-//! `2 c e <= eta / q c^2 + q / eta e^2`, and `e^2 <= |E|^2 |dF|^2`. `eta`, a fiftieth of the volume stiffness, adds
-//! as much to `volume` and keeps the share of `iso` small while `E` is.
+//! The map `dF -> dC` takes its extreme eigenvalues among the roots of `m^3 - I1 m - 2 J = 0`. With `q = I1 / 3`
+//! and `m = r sqrt q`, the largest `r` is a concave function of `J / q^(3/2)`, so below its tangents, here those at
+//! `r = 2` (a sphere) and `5/4` (near one, inverted); the smallest is minus that at `-J`. So the geometric
+//! part is at most `p1 + min(16/9 t + 2/9 u, 125/54 t + 32/27 u)` with `t = |pJ| sqrt q`, `u = pJ J / q`: at rest 2.13 p1
+//! (exact: 2).
 //!
-//! With `dF = sum_a v_a (x) ga` and `(sum of four)^2 <= 4 sum of squares`, the element's tangent is at most
-//! block diagonal, one 3 x 3 matrix (N/m) a node:
+//! In the rest, `q_cc c^2 + 2 q_ce c e + q_ee e^2`, the mixed term is split by
+//! `2 |q_ce c e| <= eta c^2 + q_ce^2 / eta e^2`, and `e^2 <= |E|^2 |dF|^2`. Of the two extremes
+//! `eta = 4/5 |q_ce| |E| / |C|` is near the best split. While `E` is small, `eta` is a fiftieth of the volume
+//! stiffness: that adds as much to `volume` and keeps the share of `iso` small.
+//!
+//! With `dF = sum_a v_a (x) ga` and `c = sum_a (C ga).va`, by Cauchy-Schwarz with the weights `|C ga|`, the element's tangent is
+//! at most block diagonal, one 3 x 3 matrix (N/m) a node:
 //!
 //! ```text
-//! D_a = V (iso lambda_G I + 4 volume (C ga)(C ga)^T),   lambda_G = lambda_max(sum_a ga ga^T)
+//! D_a = V (iso lambda_G I + volume (sum_b |C gb|) (C ga)(C ga)^T / |C ga|),   lambda_G = lambda_max(sum_a ga ga^T)
 //! ```
+//! Its largest eigenvalue is at most `V lambda_G (iso + 3/2 volume |C|^2)`, as `x_a sum_b x_b <= 3/2 sum_b x_b^2` for four
+//! numbers. That number grows with `|E|` and `|C|`, the choice of `eta` included (for a factor of `4/5` as
+//! `3/2 (4/5)^2 < 1`, should `q_cc` be negative), so bounds of the two make it a bound.
 
 use crate::lanes::{Real, Scatter};
 use crate::material::{Law, Local, Potential};
 use crate::scene::ElementBlock;
 use crate::tled::{Beside, Deformation};
 
-/// The parts of the bound that depend on the invariants alone, Pa: `iso = geometric + stiffening |E|^2`.
+/// The parts of the bound that depend on the invariants alone, Pa.
 #[derive(Clone, Copy)]
 struct Coefficients<R> {
     geometric: R,
-    stiffening: R,
-    volume: R,
+    /// `q_cc`, `q_ce`, `q_ee`.
+    cc: R,
+    ce: R,
+    ee: R,
+    /// The least `eta`.
+    floor: R,
 }
 
-/// `eta` over the volume stiffness.
-const SPLIT: f32 = 0.02;
+/// The least `eta` over the volume stiffness.
+const FLOOR: f32 = 0.02;
+
+/// `eta |C| / (|q_ce| |E|)`; the scalar bound needs `2/3` or less of its square.
+const SPLIT: f32 = 0.8;
+
+/// `|C|^2` and `I1 / 3` are taken no smaller where they divide.
+const LEAST: f32 = 1e-6;
+
+/// `x_a sum_b x_b` of four numbers over the sum of their squares, at most.
+const WEIGHT: f32 = 1.5;
 
 impl<R: Real> Coefficients<R> {
     #[inline(always)]
     fn new<L: Law>(law: &L::Wide<R>, local: &Local<R>) -> Self {
-        let (zero, two, four) = (R::splat(0.0), R::splat(2.0), R::splat(4.0));
+        let (two, four) = (R::splat(2.0), R::splat(4.0));
         let at = local.at;
         let i1 = at.i + R::splat(3.0);
         let (slope, stiffening, [g, dg, ddg]) =
@@ -54,14 +75,28 @@ impl<R: Real> Coefficients<R> {
         let cc = bulk + slope * (four * dg + ddg * i1) + stiffening * along * along;
         let ce = two * slope * dg + stiffening * x_f * along;
         let ee = stiffening * x_f * x_f;
-        let eta = R::splat(SPLIT) * (bulk + p1 + ce.abs());
-        // ce / eta first: its square may be beyond float32 where the law is at its cap.
-        let mixed = ce * ce.over(eta);
+        // A larger q has larger roots.
+        let q = (i1 * R::splat(1.0 / 3.0)).max(R::splat(LEAST));
+        let (t, u) = (p_j.abs() * q.root(), (p_j + p_j * at.j).over(q));
+        let sphere = R::splat(16.0 / 9.0) * t + R::splat(2.0 / 9.0) * u;
+        let inverted = R::splat(125.0 / 54.0) * t + R::splat(32.0 / 27.0) * u;
         Self {
-            geometric: p1 + p_j.abs() * (i1 + R::splat(3.0)) * R::splat(1.0 / 3.0),
-            stiffening: ee + mixed,
-            volume: (cc + eta).max(zero),
+            geometric: p1 + sphere.min(inverted),
+            cc,
+            ce,
+            ee,
+            floor: R::splat(FLOOR) * (bulk + p1 + ce.abs()),
         }
+    }
+
+    /// `iso` and `volume` at `|E|^2` and `|C|^2`.
+    #[inline(always)]
+    fn split(&self, distortion: R, cofactor: R) -> (R, R) {
+        let ratio = distortion.over(cofactor.max(R::splat(LEAST))).root();
+        let eta = (R::splat(SPLIT) * self.ce.abs() * ratio).max(self.floor);
+        // ce / eta first: its square may be beyond float32 where the law is at its cap.
+        let mixed = self.ce * self.ce.over(eta);
+        (self.geometric + (self.ee + mixed) * distortion, (self.cc + eta).max(R::splat(0.0)))
     }
 }
 
@@ -79,9 +114,9 @@ fn scalar_bound<R: Real, L: Law>(
     let square = at.i * at.i * R::splat(1.0 / 3.0);
     let cofactor = three + (at.i + at.i) + square;
     let distortion = three * at.i + square - R::splat(6.0) * at.j;
-    let iso = coefficients.geometric + coefficients.stiffening * distortion.max(R::splat(0.0));
+    let (iso, volume) = coefficients.split(distortion.max(R::splat(0.0)), cofactor);
     let spread = block.volume::<R>(first) * block.spread::<R>(first);
-    spread * (iso + R::splat(4.0) * coefficients.volume * cofactor)
+    spread * (iso + R::splat(WEIGHT) * volume * cofactor)
 }
 
 /// `iso` and `volume` of a chunk of elements, Pa.
@@ -103,18 +138,16 @@ impl<R: Real> Bound<R> {
         local: &Local<R>,
     ) -> Self {
         let coefficients = Coefficients::<R>::new::<L>(law, local);
-        let mut distortion = R::splat(0.0);
+        let (mut distortion, mut cofactor) = (R::splat(0.0), R::splat(0.0));
         for i in 0..3 {
             for j in 0..3 {
-                let e = deformation.distortion(i, j);
+                let (e, c) = (deformation.distortion(i, j), deformation.cofactor(i, j));
                 distortion = distortion + e * e;
+                cofactor = cofactor + c * c;
             }
         }
-        Self {
-            iso: coefficients.geometric + coefficients.stiffening * distortion,
-            volume: coefficients.volume,
-            scalar: scalar_bound::<R, L>(law, block, first, local),
-        }
+        let (iso, volume) = coefficients.split(distortion, cofactor);
+        Self { iso, volume, scalar: scalar_bound::<R, L>(law, block, first, local) }
     }
 }
 
@@ -175,7 +208,6 @@ impl MatrixBeside<'_> {
     ) -> R {
         let volume = block.volume::<R>(first);
         let isotropic = volume * bound.iso * block.spread::<R>(first);
-        let weight = volume * bound.volume * R::splat(4.0);
         let mut images = [[R::splat(0.0); 3]; 4];
         for corner in 0..3 {
             let gradient = [0, 1, 2].map(|axis| block.gradient::<R>(corner, axis, first));
@@ -185,8 +217,12 @@ impl MatrixBeside<'_> {
                 images[0][i] = images[0][i] - images[corner + 1][i];
             }
         }
-        for (corner, [x, y, z]) in images.into_iter().enumerate() {
+        let lengths = images.map(|[x, y, z]| (x * x + y * y + z * z).root());
+        let weight = volume * bound.volume * (lengths[0] + lengths[1] + lengths[2] + lengths[3]);
+        for (corner, ([x, y, z], length)) in images.into_iter().zip(lengths).enumerate() {
             let node = |lane: usize| block.node(corner, first + lane);
+            // A length below this is none beside the others.
+            let weight = weight.over(length.max(R::splat(1e-12)));
             let (wx, wy, wz) = (weight * x, weight * y, weight * z);
             let diagonal = [isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, bound.scalar];
             self.diagonal.add_lanes(node, diagonal);
