@@ -25,19 +25,28 @@
 //! ```text
 //! D_a = V (iso lambda_G I + volume (sum_b |C gb|) (C ga)(C ga)^T / |C ga|),   lambda_G = lambda_max(sum_a ga ga^T)
 //! ```
-//! Its largest eigenvalue is at most `V lambda_G (iso + 3/2 volume |C|^2)`, as `x_a sum_b x_b <= 3/2 sum_b x_b^2` for four
-//! numbers. That number grows with `|E|` and `|C|`, the choice of `eta` included (for a factor of `4/5` as
-//! `3/2 (4/5)^2 < 1`, should `q_cc` be negative), so bounds of the two make it a bound.
+//! **A number for every step.** Between refreshes a step only asks how far stiffness has grown, of a number that takes
+//! neither root nor division and that no eigenvalue of the four matrices exceeds:
+//!
+//! ```text
+//! V lambda_G (p1 + |pJ| (I1 + 3) / 3 + (q_ee + 5/4 |q_ce|) |E|^2 + (3/2 (q_cc + floor) + 5/4 |q_ce|) |C|^2)
+//! ```
+//! with 0 for a negative `q_cc` and `floor` the least `eta`. For `|J| <= q^(3/2)`, so the geometric part is at most
+//! `2 |pJ| sqrt q <= |pJ| (q + 1)`; `x_a sum_b x_b <= 3/2 sum_b x_b^2` for four numbers, so the largest eigenvalue is at most
+//! `V lambda_G (iso + 3/2 volume |C|^2)`; and the two parts of the mixed term are at most
+//! `(5/4 + 3/2 4/5) |q_ce| |E| |C|` beside `3/2 floor |C|^2`. `|C|^2` and `|E|^2` come from the invariants.
 
 use crate::lanes::{Real, Scatter};
-use crate::material::{Law, Local, Potential};
+use crate::material::{Invariants, Law, Local, Potential};
 use crate::scene::ElementBlock;
 use crate::tled::{Beside, Deformation};
 
 /// The parts of the bound that depend on the invariants alone, Pa.
 #[derive(Clone, Copy)]
 struct Coefficients<R> {
-    geometric: R,
+    /// `p1` and `pJ`.
+    p1: R,
+    p_j: R,
     /// `q_cc`, `q_ce`, `q_ee`.
     cc: R,
     ce: R,
@@ -49,7 +58,7 @@ struct Coefficients<R> {
 /// The least `eta` over the volume stiffness.
 const FLOOR: f32 = 0.02;
 
-/// `eta |C| / (|q_ce| |E|)`; the scalar bound needs `2/3` or less of its square.
+/// `eta |C| / (|q_ce| |E|)`.
 const SPLIT: f32 = 0.8;
 
 /// `|C|^2` and `I1 / 3` are taken no smaller where they divide.
@@ -57,6 +66,9 @@ const LEAST: f32 = 1e-6;
 
 /// `x_a sum_b x_b` of four numbers over the sum of their squares, at most.
 const WEIGHT: f32 = 1.5;
+
+/// Half of `1 / SPLIT + WEIGHT SPLIT`, rounded up.
+const MIXED: f32 = 1.25;
 
 impl<R: Real> Coefficients<R> {
     #[inline(always)]
@@ -75,28 +87,28 @@ impl<R: Real> Coefficients<R> {
         let cc = bulk + slope * (four * dg + ddg * i1) + stiffening * along * along;
         let ce = two * slope * dg + stiffening * x_f * along;
         let ee = stiffening * x_f * x_f;
+        Self { p1, p_j, cc, ce, ee, floor: R::splat(FLOOR) * (bulk + p1 + ce.abs()) }
+    }
+
+    /// The geometric part.
+    #[inline(always)]
+    fn geometric(&self, at: Invariants<R>) -> R {
         // A larger q has larger roots.
-        let q = (i1 * R::splat(1.0 / 3.0)).max(R::splat(LEAST));
-        let (t, u) = (p_j.abs() * q.root(), (p_j + p_j * at.j).over(q));
+        let q = (at.i * R::splat(1.0 / 3.0) + R::splat(1.0)).max(R::splat(LEAST));
+        let (t, u) = (self.p_j.abs() * q.root(), (self.p_j + self.p_j * at.j).over(q));
         let sphere = R::splat(16.0 / 9.0) * t + R::splat(2.0 / 9.0) * u;
         let inverted = R::splat(125.0 / 54.0) * t + R::splat(32.0 / 27.0) * u;
-        Self {
-            geometric: p1 + sphere.min(inverted),
-            cc,
-            ce,
-            ee,
-            floor: R::splat(FLOOR) * (bulk + p1 + ce.abs()),
-        }
+        self.p1 + sphere.min(inverted)
     }
 
     /// `iso` and `volume` at `|E|^2` and `|C|^2`.
     #[inline(always)]
-    fn split(&self, distortion: R, cofactor: R) -> (R, R) {
+    fn split(&self, at: Invariants<R>, distortion: R, cofactor: R) -> (R, R) {
         let ratio = distortion.over(cofactor.max(R::splat(LEAST))).root();
         let eta = (R::splat(SPLIT) * self.ce.abs() * ratio).max(self.floor);
         // ce / eta first: its square may be beyond float32 where the law is at its cap.
         let mixed = self.ce * self.ce.over(eta);
-        (self.geometric + (self.ee + mixed) * distortion, (self.cc + eta).max(R::splat(0.0)))
+        (self.geometric(at) + (self.ee + mixed) * distortion, (self.cc + eta).max(R::splat(0.0)))
     }
 }
 
@@ -110,13 +122,16 @@ fn scalar_bound<R: Real, L: Law>(
     local: &Local<R>,
 ) -> R {
     let coefficients = Coefficients::<R>::new::<L>(law, local);
-    let (at, three) = (local.at, R::splat(3.0));
+    let (at, zero, three) = (local.at, R::splat(0.0), R::splat(3.0));
     let square = at.i * at.i * R::splat(1.0 / 3.0);
     let cofactor = three + (at.i + at.i) + square;
     let distortion = three * at.i + square - R::splat(6.0) * at.j;
-    let (iso, volume) = coefficients.split(distortion.max(R::splat(0.0)), cofactor);
+    let Coefficients { p1, p_j, cc, ce, ee, floor } = coefficients;
+    let mixed = R::splat(MIXED) * ce.abs();
+    let geometric = p1 + p_j.abs() * (at.i * R::splat(1.0 / 3.0) + R::splat(2.0));
+    let iso = geometric + (ee + mixed) * distortion.max(zero);
     let spread = block.volume::<R>(first) * block.spread::<R>(first);
-    spread * (iso + R::splat(WEIGHT) * volume * cofactor)
+    spread * (iso + (R::splat(WEIGHT) * (cc.max(zero) + floor) + mixed) * cofactor)
 }
 
 /// `iso` and `volume` of a chunk of elements, Pa.
@@ -146,7 +161,7 @@ impl<R: Real> Bound<R> {
                 cofactor = cofactor + c * c;
             }
         }
-        let (iso, volume) = coefficients.split(distortion, cofactor);
+        let (iso, volume) = coefficients.split(local.at, distortion, cofactor);
         Self { iso, volume, scalar: scalar_bound::<R, L>(law, block, first, local) }
     }
 }

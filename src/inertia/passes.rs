@@ -1,118 +1,71 @@
-//! The two passes over the nodes of a step with a lattice, several nodes side by side: before the lattice moves and
-//! after. Nodes that follow each other are mostly in the same cell, whose functions are then at hand.
+//! The two passes over the nodes of a step with a lattice, the axes of a node side by side: before the lattice moves
+//! and after. Nodes that follow each other are mostly in the same cell, whose functions are then at hand.
 
-use super::assembly::free;
 use super::frames::Rotation;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::Scaling;
 use super::report::HeldBack;
 use super::vectors::NodeTables;
 use super::{LARGEST_KICK, NODE_GROWTH};
-use crate::lanes::{Gather, Kernel, Lanes, NodeVector, Real, rows};
+use crate::lanes::{Kernel, NodeVector, Real};
 use crate::scene::NodeInertia;
 use crate::tled::Step;
+use glam::{Vec4, Vec4Swizzles};
 
-/// Rotations by rows.
-pub(super) type Turns = [NodeVector; 3 * (MAX_FUNCTIONS + 1)];
+/// A rotation out of the frame of the bounds, as four-wide rows and columns.
+#[derive(Clone, Copy)]
+pub(super) struct Turn {
+    rows: [Vec4; 3],
+    columns: [Vec4; 3],
+}
 
-pub(super) fn turns(rotations: &[Rotation; MAX_FUNCTIONS + 1]) -> Turns {
-    let mut turns = [NodeVector::ZERO; 3 * (MAX_FUNCTIONS + 1)];
-    for (rows, rotation) in turns.as_chunks_mut::<3>().0.iter_mut().zip(rotations) {
-        for (row, [x, y, z]) in rows.iter_mut().zip(rotation.0) {
-            row.0 = [x, y, z, 0.0];
-        }
+pub(super) type Turns = [Turn; MAX_FUNCTIONS + 1];
+
+/// Those of the functions, and none for nodes that no function moves.
+pub(super) fn turns(rotations: &[Rotation], functions: usize) -> Turns {
+    let turn = |Rotation([a, b, c]): &Rotation| Turn {
+        rows: [a, b, c].map(|[x, y, z]| Vec4::new(*x, *y, *z, 0.0)),
+        columns: [0, 1, 2].map(|axis| Vec4::new(a[axis], b[axis], c[axis], 0.0)),
+    };
+    let mut turns = [turn(&Rotation::NONE); MAX_FUNCTIONS + 1];
+    for (place, rotation) in turns.iter_mut().zip(rotations).take(functions) {
+        *place = turn(rotation);
     }
     turns
 }
 
-/// What both passes read.
-#[derive(Clone, Copy)]
-pub(super) struct Nodes<'a> {
-    pub(super) step: &'a Step,
-    pub(super) scaling: &'a Scaling,
-    pub(super) lattice: &'a Lattice,
-    pub(super) places: &'a [LatticeNode],
-    pub(super) turns: &'a Turns,
-    pub(super) inertia: &'a [NodeInertia],
-    pub(super) force: &'a [NodeVector],
+/// `sum_j v_j vectors_j`.
+#[inline(always)]
+fn combined(vectors: &[Vec4; 3], v: Vec4) -> Vec4 {
+    vectors[0] * v.xxxx() + vectors[1] * v.yyyy() + vectors[2] * v.zzzz()
 }
 
-/// Some nodes side by side.
-struct Chunk<R> {
-    mass: R,
-    free: [R; 3],
-    force: [R; 3],
-    scalar: R,
-    /// Rotation by rows.
-    turn: [[R; 3]; 3],
-    /// The inverse inertia: `xx, yy, zz, made for` and `xy, yz, zx, share`.
-    diagonal: [R; 4],
-    beside: [R; 4],
+/// A symmetric matrix as `xx, yy, zz` and `xy, yz, zx` times a vector whose fourth number is zero.
+#[inline(always)]
+fn times(diagonal: Vec4, beside: Vec4, v: Vec4) -> Vec4 {
+    diagonal * v + beside.xxzw() * v.yxxw() + beside.zyyw() * v.zzyw()
 }
 
-impl Nodes<'_> {
-    #[inline(always)]
-    fn chunk<R: Real>(&self, first: usize, tables: &NodeTables<'_>) -> Option<Chunk<R>> {
-        let node = |lane: usize| first + lane;
-        let inertia = Gather::new(bytemuck::must_cast_slice(self.inertia))?;
-        let [x, y, z, mass] = inertia.read_all(node);
-        let [fx, fy, fz, scalar] = Gather::new(self.force)?.read_all(node);
-        let turns = Gather::new(self.turns)?;
-        let row = |row: usize| {
-            turns.read_lanes::<R>(|lane| {
-                3 * self.places.get(first + lane).map_or(MAX_FUNCTIONS, LatticeNode::frame) + row
-            })
-        };
-        Some(Chunk {
-            mass,
-            free: [x.positive(), y.positive(), z.positive()],
-            force: [fx, fy, fz],
-            scalar,
-            turn: [row(0), row(1), row(2)],
-            diagonal: Gather::new(tables.inverse_diagonal)?.read_all(node),
-            beside: Gather::new(tables.inverse_beside)?.read_all(node),
-        })
-    }
-
-    /// `D^2 f - 2 k m du` on the free axes, kg m.
-    #[inline(always)]
-    fn residual<R: Real>(&self, at: &Chunk<R>, velocity: [R; 3]) -> [R; 3] {
-        let square = R::splat(self.step.seconds() * self.step.seconds());
-        let loss = R::splat(2.0 * self.scaling.k) * at.mass;
-        let mut residual = [R::splat(0.0); 3];
-        for axis in 0..3 {
-            residual[axis] = at.free[axis] * (square * at.force[axis] - loss * velocity[axis]);
-        }
-        residual
-    }
-}
-
-impl<R: Real> Chunk<R> {
-    /// The inverse inertia times a vector of the world, in the frames of the bounds.
-    #[inline(always)]
-    fn moved(&self, [x, y, z]: [R; 3]) -> [R; 3] {
-        let [a, b, c] = self.turn;
-        let (p, q, r) =
-            (a[0] * x + b[0] * y + c[0] * z, a[1] * x + b[1] * y + c[1] * z, a[2] * x + b[2] * y + c[2] * z);
-        let ([xx, yy, zz, _], [xy, yz, zx, _]) = (self.diagonal, self.beside);
-        [xx * p + xy * q + zx * r, xy * p + yy * q + yz * r, zx * p + yz * q + zz * r]
-    }
-
-    /// Back into the world.
-    #[inline(always)]
-    fn out(&self, [x, y, z]: [R; 3]) -> [R; 3] {
-        let [a, b, c] = self.turn;
-        [a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z, c[0] * x + c[1] * y + c[2] * z]
-    }
+/// Ones where the axis is free.
+#[inline(always)]
+fn free(inertia: &NodeInertia) -> Vec4 {
+    let [x, y, z] = inertia.inverse;
+    Vec4::select(Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO), Vec4::ONE, Vec4::ZERO)
 }
 
 /// How much of its inverse inertia each node may use, where that alone takes it (its next increment without the
 /// lattice's part, into `next`), and the lattice's share of its residual. Gives who was held back and the largest
 /// growth.
 pub(super) struct Prepare<'a, 'b> {
-    pub(super) nodes: Nodes<'a>,
+    pub(super) step: &'a Step,
+    pub(super) scaling: &'a Scaling,
     /// What the velocities are multiplied by.
     pub(super) brake: f32,
+    pub(super) lattice: &'a Lattice,
+    pub(super) places: &'a [LatticeNode],
+    pub(super) turns: &'a Turns,
+    pub(super) inertia: &'a [NodeInertia],
+    pub(super) force: &'a [NodeVector],
     pub(super) increment: &'a [NodeVector],
     pub(super) tables: &'a mut NodeTables<'b>,
     pub(super) restricted: &'a mut CoarseVectors,
@@ -123,61 +76,61 @@ impl Kernel for Prepare<'_, '_> {
 
     #[inline(always)]
     fn run<R: Real>(self) -> (HeldBack, f32) {
-        let Self { nodes, brake, increment, tables, restricted } = self;
-        let (one, weight) = (R::splat(1.0), R::splat(nodes.scaling.weight));
-        let square = R::splat(nodes.step.seconds() * nodes.step.seconds());
-        let carry = R::splat(brake * nodes.step.carry());
-        let (mut held_back, mut largest) = (HeldBack::NONE, one);
+        let Self { scaling, restricted, .. } = self;
+        let square = self.step.seconds() * self.step.seconds();
+        let carry = self.brake * self.step.carry();
+        let NodeTables { inverse_diagonal, inverse_beside, next, .. } = self.tables;
+        let (mut held_back, mut least) = (HeldBack::NONE, 1.0);
         let mut cell = Cell::new();
-        for first in (0..nodes.inertia.len()).step_by(R::COUNT) {
-            let (Some(at), Some(increment), Some(next)) =
-                (nodes.chunk::<R>(first, tables), Gather::new(increment), Gather::new(tables.next))
-            else {
-                break;
+        let state = self.inertia.iter().zip(self.force).zip(self.increment).zip(self.places);
+        let tables = inverse_diagonal.iter().zip(inverse_beside.iter_mut()).zip(next.iter_mut());
+        for ((((inertia, force), increment), place), ((diagonal, beside), next)) in state.zip(tables) {
+            let [_, _, _, bound] = force.0;
+            let [_, _, _, bound_before] = diagonal.0;
+            let [_, _, _, share_before] = beside.0;
+            let [_, _, _, height] = next.0;
+            let Some(turn) = self.turns.get(place.frame()) else {
+                continue;
             };
-            let [x, y, z] = increment.read_lanes::<R>(|lane| first + lane);
-            let [_, _, _, height] = next.read_all::<R>(|lane| first + lane);
-            // How far its bound has grown, as far as that matters beside its mass.
-            let growth = (at.mass + weight * at.scalar).over(at.mass + weight * at.diagonal[3]);
-            largest = growth.max(largest);
-            let [fx, fy, fz] = at.force;
-            let [p, q, r] = at.moved([square * fx, square * fy, square * fz]);
-            let length = (p * p + q * q + r * r).root();
-            // Comparisons with NaN keep the second.
-            let share = R::splat(NODE_GROWTH).over(growth).min(one);
-            let share = (R::splat(LARGEST_KICK) * height).over(length).min(share);
-            let before = at.beside[3];
-            let keep = share.over(before).min(one).root() * carry;
-            let velocity = [keep * x, keep * y, keep * z];
-            let [rx, ry, rz] = nodes.residual(&at, velocity);
-            let fine = at.out(at.moved([rx, ry, rz]));
-            let alone = |axis: usize| velocity[axis] + share * fine[axis];
-            let next = rows([alone(0), alone(1), alone(2), height]);
-            let residual = rows([rx, ry, rz, share]);
-            let places = nodes.places.get(first..).unwrap_or_default();
-            let into = tables.next.iter_mut().zip(tables.inverse_beside.iter_mut()).skip(first);
-            let lanes = next.iter().zip(&residual).take(R::COUNT);
-            for ((place, (next_into, beside)), (next, residual)) in places.iter().zip(into).zip(lanes) {
-                let share = residual[3];
-                next_into.0 = *next;
-                beside.0[3] = share;
-                held_back.add(share);
-                if !cell.is(place) {
-                    cell.flush(restricted);
-                    cell.enter(nodes.lattice, place);
-                }
-                // Four wide; the sums of the shares are of no use.
-                for (sum, weight) in cell.vectors.iter_mut().zip(place.eight_weights()) {
-                    *sum = (Lanes(*sum) + Lanes([weight; 4]) * Lanes(*residual)).0;
-                }
+            let (old_diagonal, old_beside) = (Vec4::from(diagonal.0), Vec4::from(beside.0));
+            let (force, increment) = (Vec4::from(force.0), Vec4::from(increment.0));
+            let from_force = times(old_diagonal, old_beside, combined(&turn.rows, force));
+            let from_velocity = times(old_diagonal, old_beside, combined(&turn.rows, increment));
+
+            // One over how far its bound has grown, as far as that matters beside its mass.
+            let grown =
+                (inertia.mass + scaling.weight * bound_before) / (inertia.mass + scaling.weight * bound);
+            least = if grown < least { grown } else { least };
+            let mut share = if NODE_GROWTH * grown < 1.0 { NODE_GROWTH * grown } else { 1.0 };
+            let [x, y, z, _] = from_force.to_array();
+            let kick = square * square * (x * x + y * y + z * z);
+            let most = LARGEST_KICK * height;
+            if share * share * kick > most * most {
+                share = most / libm::sqrtf(kick);
+            }
+            let mut keep = carry;
+            if share < share_before {
+                keep *= libm::sqrtf(share / share_before);
+            }
+            held_back.add(share);
+            beside.0[3] = share;
+
+            let loss = 2.0 * scaling.k * inertia.mass * keep;
+            let residual = free(inertia) * (square * force - loss * increment);
+            let fine = combined(&turn.columns, square * from_force - loss * from_velocity);
+            next.0 = (keep * increment + share * fine).with_w(height).to_array();
+
+            if !cell.is(place) {
+                cell.flush(restricted);
+                cell.enter(self.lattice, place);
+            }
+            // Four wide; the fourth sums are of no use.
+            for (sum, weight) in cell.vectors.iter_mut().zip(place.eight_weights()) {
+                *sum += weight * residual;
             }
         }
         cell.flush(restricted);
-        let mut growth = 1.0;
-        for lane in 0..R::COUNT {
-            growth = largest.lane(lane).max(growth);
-        }
-        (held_back, growth)
+        (held_back, 1.0 / least)
     }
 }
 
@@ -204,15 +157,11 @@ impl Kernel for Move<'_, '_> {
                 cell.enter(self.lattice, place);
                 cell.read(self.solution);
             }
-            let [x, y, z, height] = next.0;
-            let mut moved = Lanes([x, y, z, 0.0]);
-            let mut coarse = Lanes([0.0; 4]);
+            let (last, mut moved) = (Vec4::from(next.0), Vec4::from(next.0));
             for (&vector, weight) in cell.vectors.iter().zip(place.eight_weights()) {
-                coarse = coarse + Lanes(vector) * Lanes([weight; 4]);
+                moved += weight * vector;
             }
-            moved = Lanes(free(inertia.inverse)) * (moved + coarse);
-            let Lanes([x, y, z, _]) = moved;
-            next.0 = [x, y, z, height];
+            next.0 = (free(inertia) * moved).with_w(last.w).to_array();
             force.0[3] = 0.0;
         }
     }
@@ -222,13 +171,13 @@ impl Kernel for Move<'_, '_> {
 struct Cell {
     cell: Option<[u8; 3]>,
     functions: [usize; 8],
-    vectors: [[f32; 4]; 8],
+    vectors: [Vec4; 8],
 }
 
 impl Cell {
     #[inline(always)]
     fn new() -> Self {
-        Self { cell: None, functions: [MAX_FUNCTIONS; 8], vectors: [[0.0; 4]; 8] }
+        Self { cell: None, functions: [MAX_FUNCTIONS; 8], vectors: [Vec4::ZERO; 8] }
     }
 
     #[inline(always)]
@@ -247,18 +196,16 @@ impl Cell {
     fn flush(&mut self, sums: &mut CoarseVectors) {
         for (vector, &function) in self.vectors.iter_mut().zip(&self.functions) {
             if let Some(sum) = sums.get_mut(function) {
-                for (sum, component) in sum.0.iter_mut().zip(*vector) {
-                    *sum += component;
-                }
+                sum.0 = (Vec4::from(sum.0) + *vector).to_array();
             }
-            *vector = [0.0; 4];
+            *vector = Vec4::ZERO;
         }
     }
 
     #[inline(always)]
     fn read(&mut self, from: &CoarseVectors) {
         for (vector, &function) in self.vectors.iter_mut().zip(&self.functions) {
-            *vector = from.get(function).copied().unwrap_or_default().0;
+            *vector = Vec4::from(from.get(function).copied().unwrap_or_default().0);
         }
     }
 }

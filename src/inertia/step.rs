@@ -16,7 +16,7 @@ use super::dense::{ROW, apply, stride};
 use super::frames::{Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::{Scaling, renew};
-use super::passes::{Move, Nodes, Prepare, turns};
+use super::passes::{Move, Prepare, turns};
 use super::refresh::{Matrices, Refresh, Sources, from_numbers, to_numbers};
 use super::report::{HeldBack, Tally};
 use super::vectors::NodeTables;
@@ -91,7 +91,6 @@ where
     let places = places.as_ref();
     refresh.frames.look(displacement);
     let mut restricted = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    let turned = turns(&refresh.frames.of_bounds);
     let mut tally = Tally::NEW;
     let (held_back, growth) = if alone {
         let fine = Fine { step: &step, scaling, held_back: HeldBack::NONE, tally };
@@ -99,10 +98,21 @@ where
         tally = counted;
         (held_back, 1.0)
     } else {
-        let brake = refresh.brake;
-        let nodes = Nodes { step: &step, scaling, lattice, places, turns: &turned, inertia: nodal, force };
-        let tables = &mut tables;
-        dispatch(Prepare { nodes, brake, increment, tables, restricted: &mut restricted })
+        let (brake, tables, restricted) = (refresh.brake, &mut tables, &mut restricted);
+        let (step, inertia, turns) = (&step, nodal, &turns(&refresh.frames.of_bounds, functions));
+        dispatch(Prepare {
+            step,
+            scaling,
+            brake,
+            lattice,
+            places,
+            turns,
+            inertia,
+            force,
+            increment,
+            tables,
+            restricted,
+        })
     };
     let mut coarse_share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
 

@@ -14,7 +14,7 @@ mod wide;
 pub use level::Level;
 pub(crate) use level::{Kernel, dispatch};
 pub use vectors::NodeVector;
-pub(crate) use vectors::{Gather, Scatter, rows};
+pub(crate) use vectors::{Gather, Scatter};
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -68,11 +68,6 @@ pub trait Real:
     #[inline(always)]
     fn root(self) -> Self {
         self.map(libm::sqrtf)
-    }
-    /// One where the number is above zero, zero elsewhere.
-    #[inline(always)]
-    fn positive(self) -> Self {
-        self.map(|a| if a > 0.0 { 1.0 } else { 0.0 })
     }
     /// Square root of zero or a positive normal number, relative error below 3e-7.
     #[inline(always)]

@@ -49,20 +49,6 @@ fn transpose(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
     }
 }
 
-/// One vector for each lane.
-#[inline(always)]
-pub(crate) fn rows<R: Real>(values: [R; 4]) -> [[f32; 4]; super::BLOCK] {
-    let mut rows = [[0.0; 4]; super::BLOCK];
-    if R::COUNT == 1 {
-        rows[0] = values.map(|value| value.lane(0));
-        return rows;
-    }
-    for (group, rows) in rows.as_chunks_mut::<4>().0.iter_mut().enumerate().take(R::COUNT / 4) {
-        *rows = transpose(values.map(|value| [0, 1, 2, 3].map(|lane| value.lane(4 * group + lane))));
-    }
-    rows
-}
-
 /// Vectors of nodes to read from; there is at least one.
 #[derive(Clone, Copy)]
 pub(crate) struct Gather<'a> {
