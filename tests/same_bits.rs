@@ -36,6 +36,7 @@ fn run<L: Law>(law: L, level: Level, scaled: Option<(f32, [u32; 3])>) -> Bits {
     let force = NodalForce { node: BAR.node(0, 2, 5), newton: [0.02, -0.03, 0.05], ramp: 0.05 };
     let forces = [force];
     let loads = Loads::new(&scene, [0.0, 0.0, -9.81], &forces, &[]).unwrap();
+    let mut estimate = 0.0;
     if let Some((multiple, cells)) = scaled {
         let functions = inertia::lattice_functions(&scene, &points, cells).unwrap_or(0);
         let mut inertia = Inertia::over(
@@ -55,6 +56,8 @@ fn run<L: Law>(law: L, level: Level, scaled: Option<(f32, [u32; 3])>) -> Bits {
         }
         assert!(state.steps() > 10);
         assert!(inertia.report().added_mean > 0.0);
+        estimate = inertia.report().error;
+        assert!(estimate > 0.0);
     } else {
         let step = Step::insist(5e-5, 10.0).unwrap();
         for _ in 0..2_000 {
@@ -62,7 +65,8 @@ fn run<L: Law>(law: L, level: Level, scaled: Option<(f32, [u32; 3])>) -> Bits {
         }
     }
     let critical = tled::critical_step(&scene, &mut state).unwrap();
-    let bits = state.displacements().iter().map(|u| u.to_array().map(f32::to_bits)).collect();
+    let mut bits: Vec<_> = state.displacements().iter().map(|u| u.to_array().map(f32::to_bits)).collect();
+    bits.push([estimate.to_bits(); 3]);
     (critical, bits)
 }
 

@@ -45,7 +45,7 @@
 //! # What it costs
 //!
 //! Accuracy: motion that neither has its true inertia nor is carried by the lattice lags behind. [`Report`]
-//! says how much inertia was added, and where. Memory: [`vectors_for`], one [`LatticeNode`] a node and
+//! says how much inertia was added, and where, and estimates the error in metres (`estimate.rs`). Memory: [`vectors_for`], one [`LatticeNode`] a node and
 //! [`numbers_for`] numbers for the lattice.
 
 mod assembly;
@@ -53,6 +53,7 @@ mod bound;
 #[cfg(test)]
 mod bound_tests;
 mod dense;
+mod estimate;
 mod frames;
 mod lattice;
 mod node;
@@ -76,6 +77,7 @@ use crate::state::State;
 use crate::tled::{InternalForces, Step};
 
 use bound::MatrixBeside;
+use estimate::Estimate;
 use lattice::Lattice;
 use node::{Scaling, renew};
 use refresh::{Matrices, Refresh, Sources};
@@ -176,6 +178,7 @@ pub struct Inertia<V, W, D> {
     lattice: Lattice,
     refresh: Refresh,
     scaling: Scaling,
+    estimate: Estimate,
     report: Report,
 }
 
@@ -201,6 +204,7 @@ impl<V, W, D> Inertia<V, W, D> {
             lattice: Lattice::NONE,
             refresh: Refresh::NEW,
             scaling: Scaling { weight: 0.0, k: 0.0, reserve: 0.0, loss: 0.0 },
+            estimate: Estimate::NONE,
             report: Report::NONE,
         }
     }
@@ -372,6 +376,7 @@ where
             return Err(InertiaError::NotFinite { node: node as u32 });
         }
         self.nodes = nodes;
+        self.estimate = Estimate::NONE;
         self.step = Some(step);
         Ok(())
     }

@@ -1,6 +1,8 @@
 //! The two passes over the nodes of a step with a lattice, the axes of a node side by side: before the lattice moves
 //! and after. Nodes that follow each other are mostly in the same cell, whose functions are then at hand.
 
+use glam::{Vec4, Vec4Swizzles};
+
 use super::frames::Rotation;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::Scaling;
@@ -10,7 +12,6 @@ use super::{LARGEST_KICK, NODE_GROWTH};
 use crate::lanes::{Kernel, NodeVector, Real};
 use crate::scene::NodeInertia;
 use crate::tled::Step;
-use glam::{Vec4, Vec4Swizzles};
 
 /// A rotation out of the frame of the bounds, as four-wide rows and columns.
 #[derive(Clone, Copy)]
@@ -48,7 +49,7 @@ fn times(diagonal: Vec4, beside: Vec4, v: Vec4) -> Vec4 {
 
 /// Ones where the axis is free.
 #[inline(always)]
-fn free(inertia: &NodeInertia) -> Vec4 {
+pub(super) fn free(inertia: &NodeInertia) -> Vec4 {
     let [x, y, z] = inertia.inverse;
     Vec4::select(Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO), Vec4::ONE, Vec4::ZERO)
 }

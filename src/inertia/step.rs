@@ -13,6 +13,7 @@ use crate::tled::{
 use super::assembly::free;
 use super::bound::{MatrixBeside, ScalarBeside};
 use super::dense::{ROW, apply, stride};
+use super::estimate::{Moving, dot};
 use super::frames::{Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::{Scaling, renew};
@@ -47,8 +48,18 @@ where
     let nodes = scene.node_count();
     let room = state.capacity();
     let mismatch = Status::Mismatch { nodes, room: if room < inertia.nodes { room } else { inertia.nodes } };
-    let Inertia { vectors, places, dense, step, lattice, refresh, scaling, report, nodes: prepared } =
-        inertia;
+    let Inertia {
+        vectors,
+        places,
+        dense,
+        step,
+        lattice,
+        refresh,
+        scaling,
+        estimate,
+        report,
+        nodes: prepared,
+    } = inertia;
     let State { displacement, increment, force, time, steps, dt, ledger } = state;
     let (Some(step), Some(displacement), Some(increment), Some(force), Some(mut tables)) = (
         step.filter(|_| *prepared == nodes),
@@ -70,6 +81,7 @@ where
     }
 
     external_forces(force, nodal, loads, *time);
+    let external = dot(force, displacement);
     let functions = lattice.functions();
     let alone = functions == 0;
     let (Some(from), Some(to)) = (Gather::new(displacement), Scatter::new(force)) else {
@@ -146,6 +158,17 @@ where
     };
 
     *ledger = entered;
+    let next = &*tables.next;
+    estimate.advance(&Moving {
+        step: &step,
+        scaling,
+        inertia: nodal,
+        displacement,
+        increment,
+        force,
+        next,
+        external,
+    });
     for ((displacement, increment), next) in displacement.iter_mut().zip(&mut *increment).zip(&*tables.next) {
         let [x, y, z, _] = next.0;
         increment.0 = [x, y, z, 0.0];
@@ -167,6 +190,7 @@ where
         refresh.advance(sources, &mut tables, matrices);
         *report = refresh.published.report(held_back.nodes, coarse_share);
     }
+    report.error = estimate.error();
     let least_volume_ratio = 1.0 + extremes.least_j;
     let (saturation, energy_excess) = (extremes.saturation, ledger.excess() as f32);
     let held = held_back.unused > MUCH_UNUSED * nodes as f32 || coarse_share < LITTLE_MOTION;

@@ -28,9 +28,9 @@ pub enum Method {
     Multilevel,
 }
 
-/// Moves a state on by one step under loads; what it needs beside that, it holds. After
-/// [`Status::Diverged`] it is not called again.
-pub type Advance<'a> = Box<dyn FnMut(&mut HostState, &Loads<'_>) -> Status + 'a>;
+/// Moves a state on by one step under loads; what it needs beside that, it holds. Gives the status and, where
+/// the method has one, its own estimate of its error, m. After [`Status::Diverged`] it is not called again.
+pub type Advance<'a> = Box<dyn FnMut(&mut HostState, &Loads<'_>) -> (Status, Option<f32>) + 'a>;
 
 impl Method {
     /// All methods, in the order of the tables.
@@ -70,6 +70,12 @@ impl Method {
         }
     }
 
+    /// Whether it scales inertia, so that its error can be estimated.
+    #[must_use]
+    pub const fn scales(self) -> bool {
+        matches!(self, Self::MassScaled | Self::Multilevel)
+    }
+
     /// What moves a state of the scene on by steps of `dt` (s) with `damping` (1/s).
     pub fn prepare<'a, M: Material>(
         self,
@@ -79,10 +85,10 @@ impl Method {
         damping: f32,
     ) -> Result<Advance<'a>, LabError> {
         Ok(match self {
-            Self::Hold => Box::new(|_, _| Status::Ok),
+            Self::Hold => Box::new(|_, _| (Status::Ok, None)),
             Self::Tled | Self::TledLargeStep => {
                 let step = Step::insist(dt, damping)?;
-                Box::new(move |state, loads| tled::step(scene, loads, state, &step))
+                Box::new(move |state, loads| (tled::step(scene, loads, state, &step), None))
             }
             Self::MassScaled | Self::Multilevel => {
                 let lattice = self == Self::Multilevel;
@@ -97,7 +103,10 @@ impl Method {
                 let zero = || vec![NodeVector::ZERO; nodes];
                 let mut rest = State::over(zero(), zero(), zero());
                 inertia.prepare(scene, points, &mut rest, Step::insist(dt, damping)?, cells)?;
-                Box::new(move |state, loads| inertia::step(scene, loads, state, &mut inertia))
+                Box::new(move |state, loads| {
+                    let status = inertia::step(scene, loads, state, &mut inertia);
+                    (status, Some(inertia.report().error))
+                })
             }
         })
     }

@@ -3,6 +3,7 @@
 
 use core::fmt;
 use std::time::{Duration, Instant};
+use std::vec::Vec;
 
 use super::host::Job;
 use super::measure::Errors;
@@ -28,6 +29,8 @@ pub struct Row {
     pub step_over_limit_rest: f64,
     /// Step over the least exact limit along the motion.
     pub step_over_limit_trajectory: f64,
+    /// Error estimated by a run with twice the step, where there is one, mm.
+    pub doubling: Option<f64>,
     /// How it ended.
     pub end: End,
 }
@@ -46,6 +49,8 @@ pub enum End {
 pub struct Figures {
     /// How far off it was.
     pub errors: Errors,
+    /// The method's own estimate of its error, mean over the snapshots, mm.
+    pub running: Option<f64>,
     /// Share of the steps that were [`Status::Limited`].
     pub clip_share: f64,
     /// Time of a step, microseconds.
@@ -85,12 +90,25 @@ pub const fn hits_snapshots(multiple: u32) -> bool {
     multiple != 0 && INTERVAL_STEPS.is_multiple_of(multiple)
 }
 
+/// Displacement of each node (m) at each snapshot that was reached.
+pub type Shapes = Vec<Vec<[f32; 3]>>;
+
 /// Runs `method` over a scene at `multiple` times [`DT`].
 pub fn run(spec: &SceneSpec, truth: &Truth, method: Method, multiple: u32) -> Result<Row, LabError> {
+    Ok(follow(spec, truth, method, multiple)?.0)
+}
+
+/// The same, and where the nodes were.
+pub fn follow(
+    spec: &SceneSpec,
+    truth: &Truth,
+    method: Method,
+    multiple: u32,
+) -> Result<(Row, Shapes), LabError> {
     if !hits_snapshots(multiple) {
         return Err(LabError::Multiple { multiple });
     }
-    let end = spec.with_material(Run { spec, truth, method, multiple })?;
+    let (end, shapes) = spec.with_material(Run { spec, truth, method, multiple })?;
     let hold = Errors::of_hold(truth)?.mean_over_time();
     let mut row = Row {
         scene: spec.name,
@@ -99,11 +117,12 @@ pub fn run(spec: &SceneSpec, truth: &Truth, method: Method, multiple: u32) -> Re
         hold,
         step_over_limit_rest: 0.0,
         step_over_limit_trajectory: 0.0,
+        doubling: None,
         end,
     };
     row.step_over_limit_rest = row.step() / truth.limit_at_rest;
     row.step_over_limit_trajectory = row.step() / truth.limit_least;
-    Ok(row)
+    Ok((row, shapes))
 }
 
 struct Run<'a> {
@@ -114,7 +133,7 @@ struct Run<'a> {
 }
 
 impl Job for Run<'_> {
-    type Output = Result<End, LabError>;
+    type Output = Result<(End, Shapes), LabError>;
 
     fn run<M: Material + Copy>(self, material: M) -> Self::Output {
         let Self { spec, truth, method, multiple } = self;
@@ -122,29 +141,37 @@ impl Job for Run<'_> {
         let mut state = spec.state();
         let mut advance = method.prepare(&scene, &spec.points, multiple as f32 * DT, spec.damping)?;
 
-        let mut errors = Errors::default();
+        let (mut errors, mut shapes) = (Errors::default(), Shapes::new());
+        let (mut estimates, mut estimate) = (Vec::new(), None);
         let (mut taken, mut limited, mut spent) = (0_u32, 0_u32, Duration::ZERO);
         for interval in 0..spec.intervals {
             let loads = spec.loads(&scene, interval)?;
             let start = Instant::now();
             for _ in 0..INTERVAL_STEPS / multiple {
-                match advance(&mut state, &loads) {
+                let (status, found) = advance(&mut state, &loads);
+                estimate = found;
+                match status {
                     Status::Ok => {}
                     Status::Limited { .. } => limited += 1,
-                    Status::Diverged(divergence) => return Ok(End::Diverged(divergence.time)),
+                    Status::Diverged(divergence) => return Ok((End::Diverged(divergence.time), shapes)),
                     Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
                 }
                 taken += 1;
             }
             spent += start.elapsed();
             errors.look(truth, state.displacements())?;
+            shapes.push(state.displacements().iter().map(|vector| vector.to_array()).collect());
+            estimates.extend(estimate.map(|metre| 1e3 * f64::from(metre)));
         }
+        let running = (!estimates.is_empty()).then(|| estimates.iter().sum::<f64>() / estimates.len() as f64);
         let taken = f64::from(taken);
-        Ok(End::Reached(Figures {
+        let figures = Figures {
             errors,
+            running,
             clip_share: f64::from(limited) / taken,
             us_per_step: 1e6 * spent.as_secs_f64() / taken,
-        }))
+        };
+        Ok((End::Reached(figures), shapes))
     }
 }
 

@@ -12,7 +12,7 @@ use super::run::Row;
 use crate::io::write_atomically;
 
 /// Columns of the file.
-pub const COLUMNS: [&str; 15] = [
+pub const COLUMNS: [&str; 17] = [
     "scene",
     "method",
     "multiple",
@@ -28,6 +28,8 @@ pub const COLUMNS: [&str; 15] = [
     "step_over_limit_rest",
     "step_over_limit_trajectory",
     "status",
+    "running_estimate_mm",
+    "doubling_estimate_mm",
 ];
 
 fn cells(row: &Row) -> [String; COLUMNS.len()] {
@@ -52,6 +54,8 @@ fn cells(row: &Row) -> [String; COLUMNS.len()] {
         length(Some(row.step_over_limit_rest)),
         length(Some(row.step_over_limit_trajectory)),
         format!("{}", row.end),
+        length(figures.and_then(|figures| figures.running)),
+        length(row.doubling),
     ]
 }
 
@@ -116,7 +120,7 @@ mod tests {
 
     fn rows() -> [Row; 2] {
         let errors = Errors { means: vec![1.0, 2.0], sd: 0.5, max: 4.0 };
-        let figures = Figures { errors, clip_share: 0.25, us_per_step: 150.0 };
+        let figures = Figures { errors, running: Some(0.75), clip_share: 0.25, us_per_step: 150.0 };
         let row = Row {
             scene: "lobe",
             method: Method::TledLargeStep,
@@ -124,9 +128,10 @@ mod tests {
             hold: 3.0,
             step_over_limit_rest: 1.5,
             step_over_limit_trajectory: 2.0,
+            doubling: Some(1.25),
             end: End::Reached(figures),
         };
-        [row.clone(), Row { end: End::Diverged(0.0126), ..row }]
+        [row.clone(), Row { doubling: None, end: End::Diverged(0.0126), ..row }]
     }
 
     #[test]
@@ -138,9 +143,9 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[0], COLUMNS.join(","));
         let known = "lobe,tled-large-step,10,2.000000,0.500000,4.000000,1.500000,3.000000,0.500000,0.250000,\
-                     150.000,500000.013,1.500000,2.000000,limited";
+                     150.000,500000.013,1.500000,2.000000,limited,0.750000,1.250000";
         assert_eq!(lines[1], known);
-        let unknown = "lobe,tled-large-step,10,,,,,3.000000,,,,,1.500000,2.000000,diverged at 0.013 s";
+        let unknown = "lobe,tled-large-step,10,,,,,3.000000,,,,,1.500000,2.000000,diverged at 0.013 s,,";
         assert_eq!(lines[2], unknown);
     }
 

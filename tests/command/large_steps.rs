@@ -37,8 +37,10 @@ fn long_steps_reach_where_short_ones_do_and_say_what_they_did() {
         assert!(number("added_mass_mean") > 1.0, "{inertia:#}");
         assert!(number("added_mass_largest") > number("added_mass_mean"), "{inertia:#}");
         assert!(inertia["added_mass_node"].as_u64().unwrap() < 275);
+        let (last, most) = (number("error_estimate_mm"), number("error_estimate_largest_mm"));
+        assert!(last > 0.0 && most >= last, "{inertia:#}");
         assert!((0.0..=1.0).contains(&number("steps_held_back_share")), "{inertia:#}");
-        for part in ["times the critical step", "times its own mass", "held back"] {
+        for part in ["times the critical step", "times its own mass", "error estimate", "held back"] {
             assert!(said.out.contains(part), "{part}: {}", said.out);
         }
         for name in ["lattice_cells", "lattice_functions", "coarse_share_least"] {
@@ -155,6 +157,7 @@ fn inspect_tells_what_steps_beyond_the_limit_cost() {
         "multilevel step",
         "added mass at 10x",
         "added mass at 50x",
+        "expected error",
         "over the first 0.200 s",
         "recommended",
     ] {

@@ -78,6 +78,7 @@ impl Job for Cost<'_> {
             row("real-time factor", real_time(wanted, seconds));
         }
         let times = beyond(setup, &scene, &mut state, &loads, bound)?;
+        doubling::foretell(setup, &scene, &loads, bound)?;
         let step = step?;
         if setup.time.method != Method::Tled {
             row("real-time factor", real_time(step.seconds(), times.of(setup.time.method)));

@@ -23,6 +23,13 @@ const MULTIPLES: [f32; 6] = [50.0, 40.0, 30.0, 20.0, 10.0, 5.0];
 const SHARE: f64 = 0.1;
 const LEAST: f64 = 0.2;
 
+/// Multiples whose errors are foretold, and the longest of the two pilots that do it: the next if one of them
+/// diverges or is longer than the scene.
+const FORETOLD: [f64; 4] = [10.0, 20.0, 50.0, 100.0];
+const PILOTS: [f64; 3] = [100.0, 50.0, 25.0];
+/// Orders of convergence that are believed.
+const ORDERS: (f64, f64) = (1.0, 3.0);
+
 /// Distances over the nodes, mm.
 #[derive(Clone, Copy, Default)]
 struct Distance {
@@ -49,14 +56,7 @@ pub(crate) fn recommend<M: Material>(
     accuracy: f64,
     times: &Times,
 ) -> Result<(), Problem> {
-    let (method, grid) = match setup.time.method {
-        Method::MassScaled => (Method::MassScaled, Grid::NONE),
-        Method::Multilevel => (Method::Multilevel, Grid::wanted(setup, scene)?),
-        Method::Tled => match Grid::suggested(setup, scene) {
-            Grid::NONE => (Method::MassScaled, Grid::NONE),
-            grid => (Method::Multilevel, grid),
-        },
-    };
+    let (method, grid) = judged(setup, scene)?;
     let span = (SHARE * setup.time.end).max(LEAST).min(setup.time.end);
     println!(
         "\n{} steps, their error estimated by two of half their length, over the first {span:.3} s",
@@ -106,6 +106,57 @@ pub(crate) fn recommend<M: Material>(
             format!("method = \"tled\": none of these {} steps stays below {accuracy} mm", method.name()),
         ),
     }
+    Ok(())
+}
+
+/// The method that long steps of the scene would have, with its lattice.
+fn judged<M: Material>(setup: &Setup, scene: &HostScene<M>) -> Result<(Method, Grid), Problem> {
+    Ok(match setup.time.method {
+        Method::MassScaled => (Method::MassScaled, Grid::NONE),
+        Method::Multilevel => (Method::Multilevel, Grid::wanted(setup, scene)?),
+        Method::Tled => match Grid::suggested(setup, scene) {
+            Grid::NONE => (Method::MassScaled, Grid::NONE),
+            grid => (Method::Multilevel, grid),
+        },
+    })
+}
+
+/// Prints the errors that long steps will have at the worst moment of the whole scene. Step doubling at two lengths
+/// gives the order of convergence `p`: `|u_2D - u_D| = (2^p - 1) E(D)`, and `E` goes with `D^p`.
+pub(crate) fn foretell<M: Material>(
+    setup: &Setup,
+    scene: &HostScene<M>,
+    loads: &Loads<'_>,
+    bound: CriticalStep,
+) -> Result<(), Problem> {
+    let (method, grid) = judged(setup, scene)?;
+    for longest in PILOTS {
+        let pilot = |multiple: f64| {
+            compare(setup, scene, loads, multiple as f32 * bound.seconds, setup.time.end, grid)
+        };
+        let Found::Distance(long) = pilot(longest)? else { continue };
+        let Found::Distance(short) = pilot(0.5 * longest)? else { continue };
+        let order = (long.error / short.error).log2();
+        // No motion has no order.
+        let order = if order.is_finite() { order.clamp(ORDERS.0, ORDERS.1) } else { ORDERS.0 };
+        let shortest = 0.25 * longest;
+        let error = short.error / (order.exp2() - 1.0);
+        let words = FORETOLD
+            .map(|multiple| format!("{:.3} mm at {multiple}x", error * (multiple / shortest).powf(order)));
+        row("expected error", format!("{}, {}", words.join(", "), method.name()));
+        row(
+            "",
+            format!(
+                "from pilots at {longest} to {shortest}x that moved {:.3} mm; order {order:.1}",
+                short.moved
+            ),
+        );
+        return Ok(());
+    }
+    row(
+        "expected error",
+        format!("not foretold: {} pilots diverge or are longer than the scene", method.name()),
+    );
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use supple::lab::evaluate::{self, Plan};
-use supple::lab::table;
+use supple::lab::{estimates, table};
 
 use crate::scene_file::Problem;
 use crate::simulate::End;
@@ -34,6 +34,10 @@ pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
     let plan = Plan::new(scenes, methods, multiples, sweep.as_deref()).map_err(problem)?;
     let rows = evaluate::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(problem)?;
     print!("{}", table::text(&rows));
+    let judged = estimates::text(&rows);
+    if !judged.is_empty() {
+        print!("\n{judged}");
+    }
     println!("\nresults  {}", out.join("results.csv").display());
     Ok(End::Reached)
 }

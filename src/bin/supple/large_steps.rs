@@ -98,6 +98,8 @@ pub(crate) struct Trace {
     pub(crate) steps_held_back: u64,
     pub(crate) most_held_back: u32,
     pub(crate) least_coarse_share: f32,
+    /// The largest estimate of the error, m.
+    pub(crate) most_error: f32,
 }
 
 impl Trace {
@@ -108,6 +110,7 @@ impl Trace {
             steps_held_back: 0,
             most_held_back: 0,
             least_coarse_share: 1.0,
+            most_error: 0.0,
         }
     }
 
@@ -117,6 +120,7 @@ impl Trace {
         self.steps_held_back += u64::from(report.held_back > 0);
         self.most_held_back = self.most_held_back.max(report.held_back);
         self.least_coarse_share = self.least_coarse_share.min(report.coarse_share);
+        self.most_error = self.most_error.max(report.error);
     }
 }
 

@@ -204,6 +204,8 @@ fn inertia(trace: &Trace, outcome: &Outcome) -> Value {
         "added_mass_mean": decimal(trace.report.added_mean),
         "added_mass_largest": decimal(trace.report.added_largest),
         "added_mass_node": trace.report.added_node,
+        "error_estimate_mm": 1e3 * f64::from(trace.report.error),
+        "error_estimate_largest_mm": 1e3 * f64::from(trace.most_error),
         "steps_held_back_share": held_back_share(trace, outcome),
         "most_nodes_held_back": trace.most_held_back,
         "coarse_share_least": lattice.map(|_| decimal(trace.least_coarse_share)),
@@ -216,6 +218,14 @@ fn inertia_rows(method: &str, trace: &Trace, outcome: &Outcome) -> Vec<(&'static
     let mut rows = vec![
         ("method", format!("{method}, steps of {:.1} times the critical step at rest", multiple(outcome))),
         ("added mass", describe_added(&trace.report)),
+        (
+            "error estimate",
+            format!(
+                "{:.3} mm at the end, {:.3} mm at most, on average over the nodes",
+                1e3 * trace.report.error,
+                1e3 * trace.most_error
+            ),
+        ),
         (
             "held back",
             match trace.most_held_back {
