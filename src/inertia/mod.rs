@@ -31,22 +31,25 @@
 //! bracket is 0.907: it allows the stiffness of a node to grow by 5 % and that of the lattice's motion by 33 %
 //! while a cycle lasts. What a refresh lags behind is met in two ways. Bounds have directions, and tissue
 //! turns: they are kept in frames that turn with it (`frames.rs`; without them a free body that has turned by
-//! 15 degrees is unstable at 20 times its limit). Where tissue stiffens more than allowed, the step is held back: each step computes a
-//! scalar bound of every element, which rides along with the forces; a node whose sum has grown beyond its
-//! allowance gets the inverse inertia divided by the growth, and the lattice's part is multiplied by
+//! 15 degrees is unstable at 20 times its limit). Where tissue stiffens more than allowed, the step is held back:
+//! each step computes a scalar bound of every element, which rides along with the forces; a node whose sum has grown
+//! beyond its allowance gets the inverse inertia divided by the growth, and the lattice's part is multiplied by
 //! `1.33 / growth`. `G` may lag behind without harm: it does not appear in the bound. Between refreshes this is
 //! a safeguard, not a proof: what a bound's direction changes by beyond the rotation of its frame is left to the margin.
+//! A cycle lasts 0.04 s, short beside the motions of hands and breath, but at least 16 and at most 64 steps.
 //!
-//! A linear bound says nothing about a step that is large against the law's own range. So a node's force may
-//! not move it from rest by more than a fiftieth of the least height of its elements; its
-//! inertia is raised to that ([`Report::held_back`]). What is conserved when inertia changes is stated in `node.rs`.
+//! A linear bound says nothing about a step that is large against the law's own range. So the forces of one step may
+//! not move a node from rest by more than a fiftieth of the least height of its elements ([`Report::held_back`]), nor
+//! strain a cell of the lattice by more than that ([`Report::coarse_share`]). And float32 cannot invert what is too
+//! ill-conditioned: an inverse that does not give back what it was solved for is not used, and the nodes move alone
+//! until the next cycle. What is conserved when inertia changes is stated in `node.rs`.
 //! If a step goes wrong all the same, the energy account says so and the step is not taken.
 //!
 //! # What it costs
 //!
 //! Accuracy: motion that neither has its true inertia nor is carried by the lattice lags behind. [`Report`]
-//! says how much inertia was added, and where, and estimates the error in metres (`estimate.rs`). Memory: [`vectors_for`], one [`LatticeNode`] a node and
-//! [`numbers_for`] numbers for the lattice.
+//! says how much inertia was added, and where, and estimates the error in metres (`estimate.rs`). Memory:
+//! [`vectors_for`], one [`LatticeNode`] a node and [`numbers_for`] numbers for the lattice.
 
 mod assembly;
 mod bound;

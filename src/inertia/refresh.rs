@@ -5,8 +5,8 @@
 //! ```text
 //! elements   D_a (bound) and s_c D^2 / 4 Kc, most of it in sums of the lattice's cells
 //! cells      S = those sums
-//! nodes      N_a, at once in use; S += (1 + k) Mc, G = W^T (N + reserve m) W, p = W^T (N + reserve m) v
-//! inversions G^-1, then S^-1; X = S^-1 - G^-1 is in use from then on
+//! nodes      N_a; S += (1 + k) Mc, G = W^T (N + reserve m) W, p = W^T (N + reserve m) v
+//! inversions G^-1, then S^-1; N_a and X = S^-1 - G^-1 are in use from then on
 //! ```
 //! The coarse part of the velocity is `c = G^-1 p`, its energy `c^T S c`. As for the nodes
 //! ([`super::node`]), a change of `S` may not add energy: `c` is scaled down to what it had.
@@ -348,7 +348,8 @@ impl Refresh {
     }
 
     /// The share of `X` that a step used. A smaller one is a larger inertia of the lattice: as for the nodes no
-    /// energy may come of that, and all velocities are scaled, for want of the lattice's own.
+    /// energy may come of that, and all velocities are scaled, for want of the lattice's own. Only a share that is
+    /// small brakes: each fall of a large one would cost more motion than it protects.
     pub(super) fn share(&mut self, share: f32) {
         let (now, last) = (share.min(BRAKED), self.share.min(BRAKED));
         self.brake = if now < last { libm::sqrtf(now / last) } else { 1.0 };
