@@ -7,7 +7,7 @@
 use core::fmt;
 
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use crate::lanes::{BLOCK, Real};
 use crate::material::{Law, Material, releasable_energy};
@@ -238,6 +238,13 @@ pub struct NodeInertia {
 impl NodeInertia {
     /// A node without mass.
     pub const EMPTY: Self = Self { inverse: [0.0; 3], mass: 0.0 };
+
+    /// Ones along free axes; the fourth number is zero.
+    #[inline(always)]
+    pub(crate) fn free(&self) -> Vec4 {
+        let [x, y, z] = self.inverse;
+        Vec4::select(Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO), Vec4::ONE, Vec4::ZERO)
+    }
 }
 
 /// Blocks needed for `elements` elements.

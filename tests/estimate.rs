@@ -71,7 +71,8 @@ fn the_estimate_tells_the_scale_of_the_error_and_grows_with_the_step() {
     let twist = torsion(&body, 5e-4, 0.1);
     let lean = [0.5, 0.0, 0.0];
     // Mass scaling at 16 times this step hardly turns the bar at all: there the estimate is a tenth of the error.
-    let cases: [(&str, [f32; 3], &[NodalForce], bool, &[u32]); 3] = [
+    type Case<'a> = (&'a str, [f32; 3], &'a [NodalForce], bool, &'a [u32]);
+    let cases: [Case; 3] = [
         ("leaning", lean, &[][..], false, &[4, 8, 16][..]),
         ("leaning", lean, &[], true, &[10, 20, 40]),
         ("torsion", [0.0; 3], &twist, false, &[4, 8]),

@@ -11,7 +11,6 @@
 use glam::Vec4;
 
 use super::node::Scaling;
-use super::passes::free;
 use crate::lanes::NodeVector;
 use crate::scene::NodeInertia;
 use crate::tled::Step;
@@ -41,17 +40,37 @@ fn along_axes(sums: Vec4) -> f32 {
     sums.x + sums.y + sums.z
 }
 
-/// A step before its displacement changes.
-pub(super) struct Moving<'a> {
-    pub(super) step: &'a Step,
-    pub(super) scaling: &'a Scaling,
-    pub(super) inertia: &'a [NodeInertia],
-    pub(super) displacement: &'a [NodeVector],
-    pub(super) increment: &'a [NodeVector],
-    pub(super) force: &'a [NodeVector],
-    pub(super) next: &'a [NodeVector],
-    /// Displacement times external force, J.
-    pub(super) external: f32,
+/// Sums over the nodes of a step, before its displacement changes.
+pub(super) struct Defect {
+    k: f32,
+    carry: f32,
+    square: f32,
+    nodes: u32,
+    defect: Vec4,
+    mass: Vec4,
+    length: Vec4,
+    total: Vec4,
+}
+
+impl Defect {
+    pub(super) fn new(step: &Step, scaling: &Scaling) -> Self {
+        let square = step.seconds() * step.seconds();
+        let [defect, mass, length, total] = [Vec4::ZERO; 4];
+        Self { k: scaling.k, carry: step.carry(), square, nodes: 0, defect, mass, length, total }
+    }
+
+    /// Adds a node: displacement, its increments, and total force.
+    #[inline(always)]
+    pub(super) fn add(&mut self, at: &NodeInertia, u: Vec4, increment: Vec4, force: Vec4, next: Vec4) {
+        // D^2 d = D^2 f - k m (du+ + du) - m (du+ - du).
+        let taken = at.mass * ((1.0 + self.k) * next - (1.0 - self.k) * self.carry * increment);
+        let free = at.free() * u;
+        self.nodes += 1;
+        self.defect += free * (self.square * force - taken);
+        self.mass += free * (at.mass * u);
+        self.length += u * u;
+        self.total += u * force;
+    }
 }
 
 impl Estimate {
@@ -62,31 +81,17 @@ impl Estimate {
         ACROSS * if self.now < 0.0 { -self.now } else { self.now }
     }
 
-    /// One step on.
-    #[inline(always)]
-    pub(super) fn advance(&mut self, at: &Moving<'_>) {
-        let (k, carry) = (at.scaling.k, at.step.carry());
-        let square = at.step.seconds() * at.step.seconds();
-        let [mut defect, mut mass, mut length, mut total] = [Vec4::ZERO; 4];
-        let nodes = at.inertia.iter().zip(at.displacement).zip(at.increment).zip(at.force).zip(at.next);
-        for ((((inertia, u), increment), force), next) in nodes {
-            let [u, increment, force, next] = [u, increment, force, next].map(|vector| Vec4::from(vector.0));
-            // D^2 d = D^2 f - k m (du+ + du) - m (du+ - du).
-            let taken = inertia.mass * ((1.0 + k) * next - (1.0 - k) * carry * increment);
-            let free = free(inertia) * u;
-            defect += free * (square * force - taken);
-            mass += free * (inertia.mass * u);
-            length += u * u;
-            total += u * force;
-        }
-        let [defect, mass, length, total] = [defect, mass, length, total].map(along_axes);
+    /// One step on. `external` is displacement times external force, J.
+    pub(super) fn advance(&mut self, sums: &Defect, external: f32) {
+        let (k, square) = (sums.k, sums.square);
+        let [defect, mass, length, total] = [sums.defect, sums.mass, sums.length, sums.total].map(along_axes);
         if mass <= 0.0 {
             return;
         }
         // Implicit: whatever the stiffness, the estimate does not ring.
-        let internal = at.external - total;
+        let internal = external - total;
         let stiffness = if internal > 0.0 { square * internal / mass } else { 0.0 };
-        let push = libm::sqrtf(length / at.inertia.len() as f32) * defect / mass;
+        let push = libm::sqrtf(length / sums.nodes as f32) * defect / mass;
         let next = (push + 2.0 * self.now - (1.0 - k) * self.before) / (1.0 + k + stiffness);
         *self = Self { now: next, before: self.now };
     }

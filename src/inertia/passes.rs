@@ -3,6 +3,7 @@
 
 use glam::{Vec4, Vec4Swizzles};
 
+use super::estimate::Defect;
 use super::frames::Rotation;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::Scaling;
@@ -11,7 +12,7 @@ use super::vectors::NodeTables;
 use super::{LARGEST_KICK, NODE_GROWTH};
 use crate::lanes::{Kernel, NodeVector, Real};
 use crate::scene::NodeInertia;
-use crate::tled::Step;
+use crate::tled::{Step, Sums};
 
 /// A rotation out of the frame of the bounds, as four-wide rows and columns.
 #[derive(Clone, Copy)]
@@ -45,13 +46,6 @@ fn combined(vectors: &[Vec4; 3], v: Vec4) -> Vec4 {
 #[inline(always)]
 fn times(diagonal: Vec4, beside: Vec4, v: Vec4) -> Vec4 {
     diagonal * v + beside.xxzw() * v.yxxw() + beside.zyyw() * v.zzyw()
-}
-
-/// Ones where the axis is free.
-#[inline(always)]
-pub(super) fn free(inertia: &NodeInertia) -> Vec4 {
-    let [x, y, z] = inertia.inverse;
-    Vec4::select(Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO), Vec4::ONE, Vec4::ZERO)
 }
 
 /// How much of its inverse inertia each node may use, where that alone takes it (its next increment without the
@@ -95,16 +89,17 @@ impl Kernel for Prepare<'_, '_> {
             };
             let (old_diagonal, old_beside) = (Vec4::from(diagonal.0), Vec4::from(beside.0));
             let (force, increment) = (Vec4::from(force.0), Vec4::from(increment.0));
-            let from_force = times(old_diagonal, old_beside, combined(&turn.rows, force));
-            let from_velocity = times(old_diagonal, old_beside, combined(&turn.rows, increment));
+            let loss = 2.0 * scaling.k * inertia.mass * carry;
+            let residual = inertia.free() * (square * force - loss * increment);
+            let alone = times(old_diagonal, old_beside, combined(&turn.rows, residual));
 
             // One over how far its bound has grown, as far as that matters beside its mass.
             let grown =
                 (inertia.mass + scaling.weight * bound_before) / (inertia.mass + scaling.weight * bound);
             least = if grown < least { grown } else { least };
             let mut share = if NODE_GROWTH * grown < 1.0 { NODE_GROWTH * grown } else { 1.0 };
-            let [x, y, z, _] = from_force.to_array();
-            let kick = square * square * (x * x + y * y + z * z);
+            let [x, y, z, _] = alone.to_array();
+            let kick = x * x + y * y + z * z;
             let most = LARGEST_KICK * height;
             if share * share * kick > most * most {
                 share = most / libm::sqrtf(kick);
@@ -116,9 +111,7 @@ impl Kernel for Prepare<'_, '_> {
             held_back.add(share);
             beside.0[3] = share;
 
-            let loss = 2.0 * scaling.k * inertia.mass * keep;
-            let residual = free(inertia) * (square * force - loss * increment);
-            let fine = combined(&turn.columns, square * from_force - loss * from_velocity);
+            let fine = combined(&turn.columns, alone);
             next.0 = (keep * increment + share * fine).with_w(height).to_array();
 
             if !cell.is(place) {
@@ -136,35 +129,47 @@ impl Kernel for Prepare<'_, '_> {
 }
 
 /// Adds what the lattice moves to the next increments, in `next`, and takes the bounds out of the forces' fourth
-/// component.
-pub(super) struct Move<'a, 'b> {
+/// component. Gives what the step enters in the energy account and in the estimate of the error.
+pub(super) struct Settle<'a, 'b> {
+    pub(super) step: &'a Step,
+    pub(super) scaling: &'a Scaling,
     pub(super) lattice: &'a Lattice,
     pub(super) places: &'a [LatticeNode],
     pub(super) inertia: &'a [NodeInertia],
+    pub(super) displacement: &'a [NodeVector],
+    pub(super) increment: &'a [NodeVector],
     pub(super) force: &'a mut [NodeVector],
     pub(super) solution: &'a CoarseVectors,
     pub(super) tables: &'a mut NodeTables<'b>,
 }
 
-impl Kernel for Move<'_, '_> {
-    type Output = ();
+impl Kernel for Settle<'_, '_> {
+    type Output = (Sums, Defect);
 
     #[inline(always)]
-    fn run<R: Real>(self) {
+    fn run<R: Real>(self) -> (Sums, Defect) {
+        let (mut sums, mut defect) = (Sums::NONE, Defect::new(self.step, self.scaling));
         let mut cell = Cell::new();
-        let nodes = self.places.iter().zip(self.inertia).zip(self.force).zip(self.tables.next.iter_mut());
-        for (((place, inertia), force), next) in nodes {
+        let state = self.inertia.iter().zip(self.displacement).zip(self.increment).zip(self.force);
+        let nodes = state.zip(self.places).zip(self.tables.next.iter_mut());
+        for (((((inertia, displacement), increment), force), place), next) in nodes {
             if !cell.is(place) {
                 cell.enter(self.lattice, place);
                 cell.read(self.solution);
             }
-            let (last, mut moved) = (Vec4::from(next.0), Vec4::from(next.0));
+            let alone = Vec4::from(next.0);
+            let mut moved = alone;
             for (&vector, weight) in cell.vectors.iter().zip(place.eight_weights()) {
                 moved += weight * vector;
             }
-            next.0 = (free(inertia) * moved).with_w(last.w).to_array();
+            let moved = inertia.free() * moved;
+            next.0 = moved.with_w(alone.w).to_array();
             force.0[3] = 0.0;
+            let (increment, force) = (Vec4::from(increment.0), Vec4::from(force.0));
+            sums.add(inertia, increment, force, moved, self.step.carry());
+            defect.add(inertia, Vec4::from(displacement.0), increment, force, moved);
         }
+        (sums, defect)
     }
 }
 

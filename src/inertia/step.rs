@@ -1,23 +1,25 @@
 //! One step with scaled inertia: forces, the fine part of every node with its share of the lattice's force,
 //! the lattice's motion, the account, and only then the state.
 
-use crate::lanes::{Gather, NodeVector, Scatter, dispatch};
+use glam::Vec4;
+
+use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch};
 use crate::loads::Loads;
 use crate::material::{J_FLOOR, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
 use crate::tled::{
-    Divergence, Entry, InternalForces, Status, Step, culprit, external_forces, follow_motions,
+    Divergence, Entry, InternalForces, Status, Step, Sums, culprit, external_forces, follow_motions,
 };
 
 use super::assembly::free;
 use super::bound::{MatrixBeside, ScalarBeside};
 use super::dense::{ROW, apply, stride};
-use super::estimate::{Moving, dot};
+use super::estimate::{Defect, dot};
 use super::frames::{Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::{Scaling, renew};
-use super::passes::{Move, Prepare, turns};
+use super::passes::{Prepare, Settle, turns};
 use super::refresh::{Matrices, Refresh, Sources, from_numbers, to_numbers};
 use super::report::{HeldBack, Tally};
 use super::vectors::NodeTables;
@@ -134,19 +136,38 @@ where
         coarse_share =
             coarse_motion(matrices.applied, lattice, &mut restricted, coarse_share, refresh, &mut solution);
     }
-    if alone {
-        move_nodes(&step, scaling, nodal, force, &mut tables);
+    let (sums, defect) = if alone {
+        let (displacement, increment) = (&*displacement, &*increment);
+        dispatch(MoveNodes {
+            step: &step,
+            scaling,
+            inertia: nodal,
+            displacement,
+            increment,
+            force,
+            tables: &mut tables,
+        })
     } else {
-        let (solution, tables) = (&solution, &mut tables);
-        dispatch(Move { lattice, places, inertia: nodal, force, solution, tables });
-    }
+        dispatch(Settle {
+            step: &step,
+            scaling,
+            lattice,
+            places,
+            inertia: nodal,
+            displacement,
+            increment,
+            force,
+            solution: &solution,
+            tables: &mut tables,
+        })
+    };
 
     let tables_next: &[NodeVector] = tables.next;
     let next = |node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector| {
         let [x, y, z, _] = tables_next.get(node).copied().unwrap_or_default().0;
         [x, y, z, 0.0]
     };
-    let entry = Entry::of_nodes(nodal, increment, force, loads, &step, next)
+    let entry = Entry::of_sums(&sums, loads, &step)
         .with_forces(loads, nodal, increment, force, *time, next)
         .with_motions(loads, displacement, increment, force, *time, &step);
     let entered = match entry.entered(account, &step) {
@@ -158,17 +179,7 @@ where
     };
 
     *ledger = entered;
-    let next = &*tables.next;
-    estimate.advance(&Moving {
-        step: &step,
-        scaling,
-        inertia: nodal,
-        displacement,
-        increment,
-        force,
-        next,
-        external,
-    });
+    estimate.advance(&defect, external);
     for ((displacement, increment), next) in displacement.iter_mut().zip(&mut *increment).zip(&*tables.next) {
         let [x, y, z, _] = next.0;
         increment.0 = [x, y, z, 0.0];
@@ -300,25 +311,42 @@ fn coarse_motion(
     share
 }
 
-/// The next increments of mass scaling, in `next`.
-#[inline(always)]
-fn move_nodes(
-    step: &Step,
-    scaling: &Scaling,
-    nodal: &[NodeInertia],
-    force: &[NodeVector],
-    tables: &mut NodeTables<'_>,
-) {
-    for (node, (inertia, force)) in nodal.iter().zip(force).enumerate() {
-        let at = tables.node(node).0;
-        let Some(next) = tables.next.get_mut(node) else {
-            continue;
-        };
-        let [x, y, z, _] = residual(step, scaling, inertia, force.to_array(), next);
-        let fine = at.inverse.times([x, y, z]);
-        let free = free(inertia.inverse);
-        for axis in 0..3 {
-            next.0[axis] = free[axis] * (next.0[axis] + at.share * fine[axis]);
+/// The next increments of mass scaling, in `next`, with what [`Settle`] gives.
+struct MoveNodes<'a, 'b> {
+    step: &'a Step,
+    scaling: &'a Scaling,
+    inertia: &'a [NodeInertia],
+    displacement: &'a [NodeVector],
+    increment: &'a [NodeVector],
+    force: &'a [NodeVector],
+    tables: &'a mut NodeTables<'b>,
+}
+
+impl Kernel for MoveNodes<'_, '_> {
+    type Output = (Sums, Defect);
+
+    #[inline(always)]
+    fn run<R: Real>(self) -> (Sums, Defect) {
+        let Self { step, scaling, tables, .. } = self;
+        let (mut sums, mut defect) = (Sums::NONE, Defect::new(step, scaling));
+        let nodes =
+            self.inertia.iter().zip(self.displacement).zip(self.increment).zip(self.force).enumerate();
+        for (node, (((inertia, displacement), increment), force)) in nodes {
+            let at = tables.node(node).0;
+            let Some(next) = tables.next.get_mut(node) else {
+                continue;
+            };
+            let [x, y, z, _] = residual(step, scaling, inertia, force.to_array(), next);
+            let fine = at.inverse.times([x, y, z]);
+            let free = free(inertia.inverse);
+            for axis in 0..3 {
+                next.0[axis] = free[axis] * (next.0[axis] + at.share * fine[axis]);
+            }
+            let moved = Vec4::from(next.0).with_w(0.0);
+            let (increment, force) = (Vec4::from(increment.0), Vec4::from(force.0));
+            sums.add(inertia, increment, force, moved, step.carry());
+            defect.add(inertia, Vec4::from(displacement.0), increment, force, moved);
         }
+        (sums, defect)
     }
 }

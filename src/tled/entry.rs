@@ -2,6 +2,8 @@
 //! ([`crate::ledger`]): kinetic energy of the mean of the increments before and after `t_n`, and the work of
 //! loads and supports along it, in joules.
 
+use glam::Vec4;
+
 use crate::ledger::Ledger;
 use crate::loads::{Loads, ramp_factor};
 use crate::scene::NodeInertia;
@@ -41,6 +43,33 @@ pub(crate) struct Entry {
     pub(crate) jump: f64,
 }
 
+/// Sums over the nodes, a number an axis.
+#[derive(Clone, Copy)]
+pub(crate) struct Sums {
+    /// Mass times the square of the mean increment, kg m^2.
+    kinetic: Vec4,
+    /// Mass times the way, kg m.
+    momentum: Vec4,
+    /// Force times the way of what supports lead, N m.
+    led: Vec4,
+}
+
+impl Sums {
+    pub(crate) const NONE: Self = Self { kinetic: Vec4::ZERO, momentum: Vec4::ZERO, led: Vec4::ZERO };
+
+    /// Adds a node; the fourth numbers must be zero.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, at: &NodeInertia, increment: Vec4, force: Vec4, next: Vec4, carry: f32) {
+        // A held axis has no inertia of its own: what moves it is counted as work.
+        let free = at.free();
+        let moving = free * (0.5 * (next + carry * increment));
+        let led = (Vec4::ONE - free) * increment;
+        self.kinetic += at.mass * (moving * moving);
+        self.momentum += at.mass * (free * (0.5 * (next + increment)) + led);
+        self.led += force * led;
+    }
+}
+
 impl Entry {
     /// Kinetic energy of the free axes, work of gravity, and of supports along what they moved last. `next`
     /// gives the next increment of a node.
@@ -52,36 +81,24 @@ impl Entry {
         step: &Step,
         next: impl Next,
     ) -> Self {
-        let mut kinetic = [0.0f32; 4];
-        let mut momentum = [0.0f32; 4];
-        let mut led = [0.0f32; 4];
+        let mut sums = Sums::NONE;
         for (node, ((inertia, increment), force)) in inertia.iter().zip(increment).zip(force).enumerate() {
-            let next = next(node, inertia, increment, force);
-            let [ix, iy, iz] = inertia.inverse;
-            let free = [ix, iy, iz, 0.0];
-            for axis in 0..4 {
-                // A held axis has no inertia of its own: what moves it is counted as work.
-                let last = increment.0[axis];
-                let (moving, way, supported) = if free[axis] > 0.0 {
-                    (0.5 * (next[axis] + step.carry * last), 0.5 * (next[axis] + last), 0.0)
-                } else {
-                    (0.0, last, last)
-                };
-                kinetic[axis] += inertia.mass * moving * moving;
-                momentum[axis] += inertia.mass * way;
-                led[axis] += force.0[axis] * supported;
-            }
+            let next = Vec4::from(next(node, inertia, increment, force));
+            sums.add(inertia, Vec4::from(increment.0), Vec4::from(force.0), next, step.carry);
         }
-        let dt = f64::from(step.dt);
-        let kinetic: f64 = kinetic.into_iter().map(f64::from).sum();
-        let gravity = loads.gravity().into_iter().zip(momentum);
+        Self::of_sums(&sums, loads, step)
+    }
+
+    pub(crate) fn of_sums(sums: &Sums, loads: &Loads<'_>, step: &Step) -> Self {
+        let total = |sums: Vec4| -> f64 { sums.to_array().into_iter().map(f64::from).sum() };
+        let (dt, kinetic) = (f64::from(step.dt), total(sums.kinetic));
+        let gravity = loads.gravity().into_iter().zip(sums.momentum.to_array());
         let gravity: f64 = gravity.map(|(g, momentum)| f64::from(g) * f64::from(momentum)).sum();
-        // What a support exerts is minus the total force on its node.
-        let supports: f64 = led.into_iter().map(f64::from).sum();
         Self {
             finite: kinetic.is_finite(),
             kinetic: 0.5 * kinetic / (dt * dt),
-            work: gravity - 0.5 * supports,
+            // What a support exerts is minus the total force on its node.
+            work: gravity - 0.5 * total(sums.led),
             jump: 0.0,
         }
     }
