@@ -17,10 +17,10 @@ pub struct Report {
     pub coarse_share: f32,
     /// Estimate of the error that the added inertia has caused so far, m: mean over the nodes of their distance
     /// from where the exact step would have them. It follows the force that the added inertia absorbs along the
-    /// body's displacement, from rest or from when the inertia was prepared. Of 78 runs of the
-    /// laboratory 59 were within a factor of three of the truth, 71 within five, by median 1.0 to 2.1 times it; up to
-    /// nine times too high where a small error sits beside a moved support, up to eleven times too low where mass
-    /// scaling hardly moves the body at all. It tells the scale, it is no bound.
+    /// body's displacement, from rest or from when the inertia was prepared. Of 78 runs of the laboratory 58 were
+    /// within a factor of three of the truth, 70 within five; up to nine times too high where a small error sits
+    /// beside a moved support, up to eleven times too low where mass scaling hardly moves the body at all. It tells
+    /// the scale, it is no bound.
     pub error: f32,
 }
 
