@@ -9,6 +9,8 @@
 //! `W^T K W` for the elements' bounds. At a node that is held along some axes a function has
 //! one gradient for each axis.
 
+use glam::Vec4;
+
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
 use crate::lanes::{Lanes, Real};
 use crate::scene::NodeInertia;
@@ -75,7 +77,12 @@ fn add_block(matrix: &mut [f32], stride: usize, c: usize, d: usize, rows: [Four;
     }
 }
 
-const ZERO: Four = Lanes([0.0; 4]);
+#[inline(always)]
+fn add_four(row: &mut [f32], column: usize, values: Vec4) {
+    if let Some(place) = row.get_mut(column..).and_then(<[f32]>::first_chunk_mut::<4>) {
+        *place = (Vec4::from(*place) + values).to_array();
+    }
+}
 
 #[inline(always)]
 fn store<R: Real>(values: R) -> [f32; CORNERS] {
@@ -185,14 +192,14 @@ impl Assembly<'_> {
     pub(super) fn add_element(&mut self, element: &Element, slots: &mut Slots) {
         // Derivative of each function along each material axis (the lanes are the spatial axes: a function may be cut
         // off along some of them).
-        let mut touched = [[ZERO; 3]; TOUCHED];
+        let mut touched = [[Vec4::ZERO; 3]; TOUCHED];
         let (mut count, mut bits) = (0, 0u128);
         for (&node, gradient) in element.nodes.iter().zip(element.gradients) {
             let (Some(at), Some(inertia)) = (self.nodes.get(node), self.inertia.get(node)) else {
                 continue;
             };
-            let free = Lanes(free(inertia.inverse));
-            let along = gradient.map(|slope| free * Four::splat(slope));
+            let free = inertia.free();
+            let along = gradient.map(|slope| slope * free);
             for (function, weight) in self.lattice.weights(at) {
                 let Some(slot) = slots.get_mut(function) else {
                     continue;
@@ -200,10 +207,9 @@ impl Assembly<'_> {
                 if weight == 0.0 {
                     continue;
                 }
-                let weight = Four::splat(weight);
                 if let Some(touch) = touched.get_mut(usize::from(*slot)) {
                     for (slope, along) in touch.iter_mut().zip(along) {
-                        *slope = *slope + weight * along;
+                        *slope += weight * along;
                     }
                 } else if let Some(touch) = touched.get_mut(count) {
                     *slot = count as u8;
@@ -213,11 +219,11 @@ impl Assembly<'_> {
                 }
             }
         }
-        let cofactor = element.cofactor.map(Lanes);
+        let [cx, cy, cz] = element.cofactor.map(Vec4::from);
         // In ascending order of the functions: only blocks on and below the diagonal are kept.
         let mut functions = [0usize; TOUCHED];
-        let mut images = [[0.0f32; 3]; TOUCHED];
-        let mut slopes = [[ZERO; 3]; TOUCHED];
+        let mut images = [Vec4::ZERO; TOUCHED];
+        let mut slopes = [[Vec4::ZERO; 3]; TOUCHED];
         for place in 0..count {
             let function = bits.trailing_zeros() as usize;
             bits &= bits.wrapping_sub(1);
@@ -228,33 +234,29 @@ impl Assembly<'_> {
                 return;
             };
             *slot = NOT_TOUCHED;
-            let Lanes([ix, iy, iz, _]) = cofactor[0] * x + cofactor[1] * y + cofactor[2] * z;
             functions[place % TOUCHED] = function;
-            images[place % TOUCHED] = [ix, iy, iz];
+            images[place % TOUCHED] = cx * x + cy * y + cz * z;
             slopes[place % TOUCHED] = [x, y, z];
         }
-        let iso = Four::splat(element.iso);
         for c in 0..count {
-            let [x, y, z] = slopes[c % TOUCHED].map(|slope| iso * slope);
-            let mut diagonals = [[0.0f32; 4]; TOUCHED];
-            for (diagonal, slopes) in diagonals.iter_mut().zip(&slopes).take(c + 1) {
-                *diagonal = (x * slopes[0] + y * slopes[1] + z * slopes[2]).0;
-            }
-            for axis in 0..3 {
-                let row = (3 * functions[c % TOUCHED] + axis) * self.stride;
-                let Some(row) = self.matrix.get_mut(row..row + self.stride) else {
-                    return;
-                };
-                let factor = element.volume * images[c % TOUCHED][axis];
-                for ((&d, image), diagonal) in functions.iter().zip(&images).zip(&diagonals).take(c + 1) {
-                    let Some(place) = row.get_mut(3 * d..3 * d + 3) else {
-                        return;
-                    };
-                    place[0] += factor * image[0];
-                    place[1] += factor * image[1];
-                    place[2] += factor * image[2];
-                    place[axis] += diagonal[axis];
-                }
+            let c = c % TOUCHED;
+            let first = 3 * functions[c] * self.stride;
+            let Some(rows) = self.matrix.get_mut(first..first + 3 * self.stride) else {
+                return;
+            };
+            let (row_x, rows) = rows.split_at_mut(self.stride);
+            let (row_y, row_z) = rows.split_at_mut(self.stride);
+            let [x, y, z] = slopes[c].map(|slope| element.iso * slope);
+            let image = element.volume * images[c];
+            // A block is added four wide and spills a zero into the next one, which would have to wait for it to reach
+            // the cache: so every other function first.
+            for d in (0..=c).step_by(2).chain((1..=c).step_by(2)) {
+                let d = d % TOUCHED;
+                let diagonal = x * slopes[d][0] + y * slopes[d][1] + z * slopes[d][2];
+                let column = 3 * functions[d];
+                add_four(row_x, column, image.x * images[d] + diagonal * Vec4::X);
+                add_four(row_y, column, image.y * images[d] + diagonal * Vec4::Y);
+                add_four(row_z, column, image.z * images[d] + diagonal * Vec4::Z);
             }
         }
     }

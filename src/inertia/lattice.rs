@@ -41,6 +41,12 @@ impl LatticeNode {
         self.cell
     }
 
+    /// See the field.
+    #[inline(always)]
+    pub(super) fn within(&self) -> [f32; 3] {
+        self.within
+    }
+
     /// Weights of the functions at the corners of its cell.
     #[inline(always)]
     pub(super) fn eight_weights(&self) -> [f32; 8] {
@@ -224,7 +230,18 @@ impl Lattice {
     /// Functions at the corners of a node's cell; dropped ones are number [`MAX_FUNCTIONS`].
     #[inline(always)]
     pub(super) fn functions_of(&self, node: &LatticeNode) -> [usize; 8] {
-        self.weights(node).map(|(function, _)| function)
+        let [i, j, k] = node.cell.map(usize::from);
+        let row = self.cells[0] as usize + 1;
+        let layer = row * (self.cells[1] as usize + 1);
+        let first = i + j * row + k * layer;
+        // Along x they follow each other.
+        let pair = |at: usize| {
+            let pair = self.of_point.get(at..).and_then(<[u8]>::first_chunk::<2>);
+            pair.map_or([MAX_FUNCTIONS; 2], |pair| pair.map(usize::from))
+        };
+        let ([a, b], [c, d]) = (pair(first), pair(first + row));
+        let ([e, f], [g, h]) = (pair(first + layer), pair(first + layer + row));
+        [a, b, c, d, e, f, g, h]
     }
 
     /// Functions at the corners of cell `number`; dropped ones are number [`MAX_FUNCTIONS`].
