@@ -115,7 +115,7 @@ pub const fn numbers_for(functions: usize) -> usize {
 pub enum InertiaError {
     /// Less room than the scene or the lattice needs.
     Capacity {
-        /// "vectors", "lattice nodes", "numbers" or "state".
+        /// "vectors", "lattice nodes", "numbers" or "nodes in the state".
         kind: &'static str,
         /// How many are needed.
         needed: usize,
@@ -307,7 +307,7 @@ where
             if capacity < needed { Err(InertiaError::Capacity { kind, needed, capacity }) } else { Ok(()) }
         };
         room("vectors", vectors_for(nodes), self.vectors.as_ref().len())?;
-        room("state", nodes, state.capacity())?;
+        room("nodes in the state", nodes, state.capacity())?;
         self.lattice =
             if cells == [0; 3] { Lattice::NONE } else { Lattice::new(cells, points, scene.inertia())? };
         let functions = self.lattice.functions();

@@ -268,6 +268,12 @@ fn warnings(setup: &Setup, outcome: &Outcome) -> Vec<String> {
                 100.0 * limits.energy_excess
             ));
         }
+        if limits.held_back > 0 {
+            causes.push(format!(
+                "in {} much of the motion was held back, which a shorter step does less",
+                limits.held_back
+            ));
+        }
         warnings.push(format!(
             "{} steps, the first at {:.3} s, were taken but are not exact: {}",
             limits.steps,

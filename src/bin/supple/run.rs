@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use supple::inertia;
 use supple::loads::Loads;
-use supple::material::Material;
+use supple::material::{J_FLOOR, Material};
 use supple::tled::{self, CriticalStep, Divergence, Status, Step};
 
 use crate::large_steps::{Grid, HostInertia, Trace};
@@ -38,7 +38,7 @@ struct Pace {
     steps: u32,
 }
 
-/// Steps with elements beyond the range of their law, or with energy the account does not explain.
+/// Steps with elements beyond the range of their law, with energy the account does not explain, or held back.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Limits {
     pub(crate) steps: u64,
@@ -46,6 +46,8 @@ pub(crate) struct Limits {
     pub(crate) least_volume_ratio: f32,
     pub(crate) saturation: f32,
     pub(crate) energy_excess: f32,
+    /// Steps for no other cause than motion that was held back.
+    pub(crate) held_back: u64,
 }
 
 /// What became of a simulation.
@@ -267,6 +269,8 @@ fn take<M: Material>(
             limits.least_volume_ratio = limits.least_volume_ratio.min(least_volume_ratio);
             limits.saturation = limits.saturation.max(saturation);
             limits.energy_excess = limits.energy_excess.max(energy_excess);
+            let within = least_volume_ratio >= J_FLOOR && saturation <= 1.0 && energy_excess <= 0.0;
+            limits.held_back += u64::from(within);
         }
         Status::Diverged(divergence) => outcome.divergence = Some(divergence),
         // The state and the loads are this scene's own, so they match.
