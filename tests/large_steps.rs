@@ -604,7 +604,7 @@ fn what_cannot_be_prepared_is_said_and_no_step_is_taken() {
             && error.to_string().ends_with(" numbers, there is room for 10")
     );
     let error = refused(&mut roomy(), [0; 3], |_, _, state| *state = support::at_rest(95));
-    said(error, "the inertia needs 96 state, there is room for 95");
+    said(error, "the inertia needs 96 nodes in the state, there is room for 95");
 
     for cells in [[1, 0, 1], [2_000, 1, 1], [10, 10, 10], [u32::MAX; 3]] {
         let error = refused(&mut roomy(), cells, nothing);
