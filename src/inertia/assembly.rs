@@ -52,26 +52,15 @@ const NOT_TOUCHED: u8 = u8::MAX;
 pub(super) type Slots = [u8; MAX_FUNCTIONS];
 pub(super) const NO_SLOTS: Slots = [NOT_TOUCHED; MAX_FUNCTIONS];
 
-/// Four numbers side by side: the three spatial axes and a spare.
-type Four = Lanes<4>;
-
-#[inline(always)]
-pub(super) fn free(inverse: [f32; 3]) -> [f32; 4] {
-    let [x, y, z] = inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 });
-    [x, y, z, 0.0]
-}
-
 /// Adds a 3 x 3 block where function `c` meets function `d`. Not four wide: the next block would then read what
 /// was just written at another alignment, which stalls until it is in the cache.
 #[inline(always)]
-fn add_block(matrix: &mut [f32], stride: usize, c: usize, d: usize, rows: [Four; 3]) {
+fn add_block(matrix: &mut [f32], stride: usize, c: usize, d: usize, rows: [[f32; 3]; 3]) {
     let Some(rest) = matrix.get_mut(3 * c * stride + 3 * d..) else {
         return;
     };
-    for (axis, row) in rows.into_iter().enumerate() {
-        if let Some((place, _)) = rest.get_mut(axis * stride..).and_then(<[f32]>::split_first_chunk_mut::<3>)
-        {
-            let [x, y, z, _] = row.0;
+    for (axis, [x, y, z]) in rows.into_iter().enumerate() {
+        if let Some(place) = rest.get_mut(axis * stride..).and_then(<[f32]>::first_chunk_mut::<3>) {
             *place = [place[0] + x, place[1] + y, place[2] + z];
         }
     }
@@ -120,7 +109,7 @@ impl Assembly<'_> {
             let (Some(at), Some(inertia)) = (self.nodes.get(node), self.inertia.get(node)) else {
                 return false;
             };
-            let [x, y, z, _] = free(inertia.inverse);
+            let [x, y, z, _] = inertia.free().to_array();
             let Some(weights) = at.corner_weights::<R>(cell) else {
                 return false;
             };
@@ -178,11 +167,11 @@ impl Assembly<'_> {
                 }
                 let all = at(6, c, d);
                 let rows = [
-                    [at(0, c, d) + all, at(3, c, d), at(5, d, c), 0.0],
-                    [at(3, d, c), at(1, c, d) + all, at(4, c, d), 0.0],
-                    [at(5, c, d), at(4, d, c), at(2, c, d) + all, 0.0],
+                    [at(0, c, d) + all, at(3, c, d), at(5, d, c)],
+                    [at(3, d, c), at(1, c, d) + all, at(4, c, d)],
+                    [at(5, c, d), at(4, d, c), at(2, c, d) + all],
                 ];
-                add_block(self.matrix, self.stride, row, column, rows.map(Lanes));
+                add_block(self.matrix, self.stride, row, column, rows);
             }
         }
     }
@@ -309,8 +298,7 @@ impl NodeSums {
                     continue;
                 }
                 let [xx, yy, zz, xy, yz, zx, mx, my, mz] = rows.map(|row| row[corner % CORNERS]);
-                let inertia = [[xx, xy, zx, 0.0], [xy, yy, yz, 0.0], [zx, yz, zz, 0.0]];
-                add_block(into.inertia, into.stride, c, d, inertia.map(Lanes));
+                add_block(into.inertia, into.stride, c, d, [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]);
                 for (axis, mass) in [mx, my, mz].into_iter().enumerate() {
                     if let Some(place) = into.mass.get_mut((3 * c + axis) * into.stride + 3 * d + axis) {
                         *place += mass;

@@ -115,18 +115,17 @@ impl<R: Real> Coefficients<R> {
 /// A number (N/m) that no eigenvalue of an element's four matrices exceeds, from the invariants `i = I1 - 3` and
 /// `j = J - 1` alone: `|C|^2 <= I1^2 / 3`, and `|E|^2 = I1 + |C|^2 - 6 J` with it.
 #[inline(always)]
-fn scalar_bound<R: Real, L: Law>(
-    law: &L::Wide<R>,
+fn scalar_bound<R: Real>(
+    coefficients: &Coefficients<R>,
+    at: Invariants<R>,
     block: &ElementBlock,
     first: usize,
-    local: &Local<R>,
 ) -> R {
-    let coefficients = Coefficients::<R>::new::<L>(law, local);
-    let (at, zero, three) = (local.at, R::splat(0.0), R::splat(3.0));
+    let (zero, three) = (R::splat(0.0), R::splat(3.0));
     let square = at.i * at.i * R::splat(1.0 / 3.0);
     let cofactor = three + (at.i + at.i) + square;
     let distortion = three * at.i + square - R::splat(6.0) * at.j;
-    let Coefficients { p1, p_j, cc, ce, ee, floor } = coefficients;
+    let &Coefficients { p1, p_j, cc, ce, ee, floor } = coefficients;
     let mixed = R::splat(MIXED) * ce.abs();
     let geometric = p1 + p_j.abs() * (at.i * R::splat(1.0 / 3.0) + R::splat(2.0));
     let iso = geometric + (ee + mixed) * distortion.max(zero);
@@ -162,7 +161,7 @@ impl<R: Real> Bound<R> {
             }
         }
         let (iso, volume) = coefficients.split(local.at, distortion, cofactor);
-        Self { iso, volume, scalar: scalar_bound::<R, L>(law, block, first, local) }
+        Self { iso, volume, scalar: scalar_bound(&coefficients, local.at, block, first) }
     }
 }
 
@@ -179,7 +178,7 @@ impl Beside for ScalarBeside {
         _: &Deformation<R>,
         local: &Local<R>,
     ) -> R {
-        scalar_bound::<R, L>(law, block, first, local)
+        scalar_bound(&Coefficients::<R>::new::<L>(law, local), local.at, block, first)
     }
 }
 

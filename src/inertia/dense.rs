@@ -8,7 +8,10 @@ use crate::lanes::{Kernel, Lanes, Real, dispatch};
 const LANES: usize = 8;
 
 /// Numbers in the longest row.
-pub(super) const ROW: usize = stride(MAX_FUNCTIONS);
+const ROW: usize = stride(MAX_FUNCTIONS);
+
+/// Numbers of the functions, as many as are in use.
+pub(super) type Row = [f32; ROW];
 
 /// Length of a row of a matrix for `functions` functions: three numbers each, one spare (a block is
 /// written four wide) and a multiple of eight.
@@ -56,7 +59,7 @@ impl Kernel for Sweep<'_> {
     fn run<R: Real>(self) {
         let Self { matrix, size, stride, pivot, inverse } = self;
         // The pivot's row, and its column below.
-        let mut line = [0.0f32; ROW];
+        let mut line: Row = [0.0; ROW];
         let rows = || matrix.chunks_exact(stride).take(size).enumerate();
         for ((index, row), place) in rows().zip(&mut line) {
             let at = if index < pivot { matrix.get(pivot * stride + index) } else { row.get(pivot) };
@@ -88,29 +91,29 @@ impl Kernel for Sweep<'_> {
     }
 }
 
-/// `out = A x` for a symmetric matrix of `x.len()` rows; `out` is as long as a row.
-pub(super) fn apply(matrix: &[f32], stride: usize, x: &[f32], out: &mut [f32]) {
-    dispatch(Apply { matrix, stride, x, out });
+/// `A x` for a symmetric matrix, in the first numbers of a row; a row of `A` for each number of `x`.
+pub(super) fn apply(matrix: &[f32], stride: usize, x: &[f32]) -> Row {
+    dispatch(Apply { matrix, stride, x })
 }
 
 struct Apply<'a> {
     matrix: &'a [f32],
     stride: usize,
     x: &'a [f32],
-    out: &'a mut [f32],
 }
 
 impl Kernel for Apply<'_> {
-    type Output = ();
+    type Output = Row;
 
     #[inline(always)]
-    fn run<R: Real>(self) {
-        self.out.fill(0.0);
+    fn run<R: Real>(self) -> Row {
+        let mut out = [0.0; ROW];
         for (row, &x) in self.matrix.chunks_exact(self.stride).zip(self.x) {
-            for (out, entry) in self.out.iter_mut().zip(row) {
+            for (out, entry) in out.iter_mut().zip(row) {
                 *out += entry * x;
             }
         }
+        out
     }
 }
 
@@ -142,9 +145,8 @@ mod tests {
         }
         (0..SIZE).for_each(|row| mirror(&mut matrix, stride, row, -1.0));
         let x: Vec<f32> = (0..SIZE).map(|i| (i as f32 * 0.7).sin()).collect();
-        let (mut image, mut back) = (vec![0.0; stride], vec![0.0; stride]);
-        apply(&matrix, stride, &x, &mut image);
-        apply(&original, stride, &image[..SIZE], &mut back);
+        let image = apply(&matrix, stride, &x);
+        let back = apply(&original, stride, &image[..SIZE]);
         let worst = (0..SIZE).map(|i| (back[i] - x[i]).abs()).fold(0.0, f32::max);
         println!("A (A^-1 x) is off by {worst:.1e} at a condition of 1e5");
         assert!(worst < 2e-2);

@@ -3,6 +3,8 @@
 //! the body leaves a function almost nothing to move it is dropped ([`LEAST_MASS`]): its inertia would be
 //! small beside its stiffness, and the system that is factorised ill-conditioned.
 
+use core::array;
+
 use bytemuck::{Pod, Zeroable};
 
 use super::InertiaError;
@@ -119,7 +121,8 @@ impl Lattice {
         let mut mass = [0.0f32; MAX_POINTS];
         for (&point, inertia) in points.iter().zip(inertia) {
             let free = inertia.inverse.iter().filter(|&&inverse| inverse > 0.0).count() as f32 / 3.0;
-            for (point, weight) in lattice.points(&lattice.place(point)) {
+            let node = lattice.place(point);
+            for (point, weight) in lattice.corner_points(&node).into_iter().zip(node.eight_weights()) {
                 if let Some(mass) = mass.get_mut(point) {
                     *mass += inertia.mass * weight * free;
                 }
@@ -167,26 +170,15 @@ impl Lattice {
         node
     }
 
-    /// Lattice points and weights of a node.
+    /// Lattice points at the corners of a node's cell.
     #[inline(always)]
-    fn points(&self, node: &LatticeNode) -> [(usize, f32); 8] {
-        let (row, layer) =
-            (self.cells[0] as usize + 1, (self.cells[0] as usize + 1) * (self.cells[1] as usize + 1));
-        let [x, y, z] = node.within;
+    fn corner_points(&self, node: &LatticeNode) -> [usize; 8] {
         let [i, j, k] = node.cell.map(usize::from);
+        let row = self.cells[0] as usize + 1;
+        let layer = row * (self.cells[1] as usize + 1);
         let first = i + j * row + k * layer;
-        let (nx, ny, nz) = (1.0 - x, 1.0 - y, 1.0 - z);
-        let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
-        [
-            (first, a * nz),
-            (first + 1, b * nz),
-            (first + row, c * nz),
-            (first + row + 1, d * nz),
-            (first + layer, a * z),
-            (first + layer + 1, b * z),
-            (first + layer + row, c * z),
-            (first + layer + row + 1, d * z),
-        ]
+        let [a, b, c, d] = [first, first + 1, first + row, first + row + 1];
+        [a, b, c, d, a + layer, b + layer, c + layer, d + layer]
     }
 
     /// Number of a cell among all of them.
@@ -230,18 +222,8 @@ impl Lattice {
     /// Functions at the corners of a node's cell; dropped ones are number [`MAX_FUNCTIONS`].
     #[inline(always)]
     pub(super) fn functions_of(&self, node: &LatticeNode) -> [usize; 8] {
-        let [i, j, k] = node.cell.map(usize::from);
-        let row = self.cells[0] as usize + 1;
-        let layer = row * (self.cells[1] as usize + 1);
-        let first = i + j * row + k * layer;
-        // Along x they follow each other.
-        let pair = |at: usize| {
-            let pair = self.of_point.get(at..).and_then(<[u8]>::first_chunk::<2>);
-            pair.map_or([MAX_FUNCTIONS; 2], |pair| pair.map(usize::from))
-        };
-        let ([a, b], [c, d]) = (pair(first), pair(first + row));
-        let ([e, f], [g, h]) = (pair(first + layer), pair(first + layer + row));
-        [a, b, c, d, e, f, g, h]
+        self.corner_points(node)
+            .map(|point| usize::from(self.of_point.get(point).copied().unwrap_or(DROPPED)))
     }
 
     /// Functions at the corners of cell `number`; dropped ones are number [`MAX_FUNCTIONS`].
@@ -255,9 +237,8 @@ impl Lattice {
     /// Functions and weights of a node; dropped ones are number [`MAX_FUNCTIONS`].
     #[inline(always)]
     pub(super) fn weights(&self, node: &LatticeNode) -> [(usize, f32); 8] {
-        self.points(node).map(|(point, weight)| {
-            (usize::from(self.of_point.get(point).copied().unwrap_or(DROPPED)), weight)
-        })
+        let (functions, weights) = (self.functions_of(node), node.eight_weights());
+        array::from_fn(|corner| (functions[corner], weights[corner]))
     }
 }
 

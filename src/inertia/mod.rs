@@ -51,6 +51,7 @@
 //! says how much inertia was added, and where, and estimates the error in metres (`estimate.rs`). Memory:
 //! [`vectors_for`], one [`LatticeNode`] a node and [`numbers_for`] numbers for the lattice.
 
+mod alone;
 mod assembly;
 mod bound;
 #[cfg(test)]
@@ -348,7 +349,7 @@ where
                 tally.add(node, renewed.added);
                 tables.set(node, &renewed.inverse, scalar, 1.0);
             }
-            self.report = tally.report(0, 1.0);
+            self.report = tally.report(0, 1.0, 0.0);
         } else {
             for ((place, &point), inertia) in self.places.as_mut().iter_mut().zip(points).zip(scene.inertia())
             {
@@ -369,7 +370,7 @@ where
                 coarse_weight: 0.25 * COARSE * dt * dt,
             };
             self.refresh.complete(sources, &mut tables, &mut matrices);
-            self.report = self.refresh.published.report(0, 1.0);
+            self.report = self.refresh.published.report(0, 1.0, 0.0);
         }
         let bad = (0..nodes).find(|&node| {
             let (at, scalar) = tables.node(node);

@@ -13,7 +13,7 @@
 
 use super::assembly::{Assembly, Element, NO_SLOTS, NodeMatrices, NodeSums};
 use super::bound::{Bound, MatrixBeside};
-use super::dense::{ROW, apply, mirror, stride, sweep};
+use super::dense::{Row, apply, mirror, stride, sweep};
 use super::frames::{Frames, Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, restrict};
 use super::node::{Scaling, renew};
@@ -359,36 +359,24 @@ impl Refresh {
     /// What has to go from the coarse velocity so that the next `S` adds no energy. `G` is inverted,
     /// the next `S` not yet.
     fn keep_energy(&mut self, matrices: &mut Matrices<'_>, size: usize, stride: usize) {
-        let mut momentum = [0.0; 3 * MAX_FUNCTIONS];
-        to_numbers(&self.momentum, &mut momentum);
-        let (mut velocity, mut image) = ([0.0; ROW], [0.0; ROW]);
-        let (Some(momentum), Some(velocity), Some(image)) =
-            (momentum.get(..size), velocity.get_mut(..stride), image.get_mut(..stride))
-        else {
-            return;
-        };
-        apply(matrices.fine, stride, momentum, velocity);
-        let Some(velocity) = velocity.get(..size) else {
-            return;
-        };
-        let mut energy = |matrix: &[f32], velocity: &[f32]| {
-            apply(matrix, stride, velocity, image);
-            velocity.iter().zip(image.iter()).map(|(v, image)| v * image).sum::<f32>()
-        };
+        let momentum = to_numbers(&self.momentum);
+        let momentum = momentum.get(..size).unwrap_or_default();
+        let velocity = apply(matrices.fine, stride, momentum);
+        let velocity = velocity.get(..size).unwrap_or_default();
+        let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
+        let energy = |matrix: &[f32], velocity: &[f32]| dot(velocity, &apply(matrix, stride, velocity));
         // The velocity in the frames of `S` in use, and in the world.
         let mut world = NO_VECTORS;
-        from_numbers(velocity, 1.0, &mut world);
+        from_numbers(velocity, &mut world);
         turn(&mut world, &self.frames.of_cycle, Rotation::out);
         let mut vectors = world;
         turn(&mut vectors, &self.frames.of_bounds, Rotation::back);
-        let mut old = [0.0; 3 * MAX_FUNCTIONS];
-        to_numbers(&vectors, &mut old);
+        let old = to_numbers(&vectors);
         let before = energy(matrices.kept, old.get(..size).unwrap_or_default());
         let after = energy(matrices.next, velocity);
         // `S <= COARSE / FINE G`, so `c^T S c` is at most as many times `c^T p`: where it is not, `G` was too
         // ill-conditioned to be inverted. Then the velocity means nothing, and `X` will not be used.
-        let most: f32 = velocity.iter().zip(momentum).map(|(v, p)| v * p).sum();
-        self.sound &= after <= most * (COARSE / FINE + SLACK);
+        self.sound &= after <= dot(velocity, momentum) * (COARSE / FINE + SLACK);
         if self.sound && !self.first && after > before * (1.0 + 1e-5) && after > 0.0 {
             let lost = 1.0 - libm::sqrtf(if before > 0.0 { before / after } else { 0.0 });
             for (correction, velocity) in self.correction.iter_mut().zip(&world) {
@@ -400,16 +388,10 @@ impl Refresh {
 
     /// Whether `S S^-1 p = p`, up to what rounding may do.
     fn inverted(&self, matrices: &Matrices<'_>, size: usize, stride: usize) -> bool {
-        let mut momentum = [0.0; 3 * MAX_FUNCTIONS];
-        to_numbers(&self.momentum, &mut momentum);
-        let (mut solved, mut back) = ([0.0; ROW], [0.0; ROW]);
-        let (Some(momentum), Some(solved), Some(back)) =
-            (momentum.get(..size), solved.get_mut(..stride), back.get_mut(..stride))
-        else {
-            return false;
-        };
-        apply(matrices.next, stride, momentum, solved);
-        apply(matrices.kept, stride, solved.get(..size).unwrap_or_default(), back);
+        let momentum = to_numbers(&self.momentum);
+        let momentum = momentum.get(..size).unwrap_or_default();
+        let solved = apply(matrices.next, stride, momentum);
+        let back = apply(matrices.kept, stride, solved.get(..size).unwrap_or_default());
         let (mut error, mut all) = (0.0, 0.0);
         for (back, momentum) in back.iter().zip(momentum) {
             error += (back - momentum) * (back - momentum);
@@ -440,18 +422,19 @@ fn row_cost(functions: usize) -> i64 {
     ROW_COST * stride(functions) as i64
 }
 
-pub(super) fn to_numbers(vectors: &CoarseVectors, numbers: &mut [f32]) {
-    for (three, vector) in numbers.chunks_exact_mut(3).zip(vectors) {
-        three.copy_from_slice(&vector.to_array());
+/// Three numbers a function.
+pub(super) fn to_numbers(vectors: &CoarseVectors) -> Row {
+    let mut numbers = [0.0; _];
+    for (three, vector) in numbers.as_chunks_mut::<3>().0.iter_mut().zip(vectors) {
+        *three = vector.to_array();
     }
+    numbers
 }
 
-/// `vectors = factor numbers`; vectors beyond the numbers are left as they are.
-pub(super) fn from_numbers(numbers: &[f32], factor: f32, vectors: &mut CoarseVectors) {
-    for (three, vector) in numbers.chunks_exact(3).zip(vectors) {
-        for (component, number) in vector.0.iter_mut().zip(three) {
-            *component = factor * number;
-        }
+/// `vectors = numbers`; vectors beyond the numbers are left as they are.
+pub(super) fn from_numbers(numbers: &[f32], vectors: &mut CoarseVectors) {
+    for (&[x, y, z], vector) in numbers.as_chunks::<3>().0.iter().zip(vectors) {
+        vector.0 = [x, y, z, 0.0];
     }
 }
 

@@ -75,7 +75,7 @@ impl Tally {
         }
     }
 
-    pub(super) fn report(&self, held_back: u32, coarse_share: f32) -> Report {
+    pub(super) fn report(&self, held_back: u32, coarse_share: f32, error: f32) -> Report {
         let count = if self.nodes > 0 { self.nodes as f32 } else { 1.0 };
         Report {
             added_mean: self.sum / count,
@@ -83,7 +83,7 @@ impl Tally {
             added_node: self.node,
             held_back,
             coarse_share,
-            error: 0.0,
+            error,
         }
     }
 }

@@ -1,27 +1,22 @@
 //! One step with scaled inertia: forces, the fine part of every node with its share of the lattice's force,
 //! the lattice's motion, the account, and only then the state.
 
-use glam::Vec4;
-
-use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch};
+use crate::lanes::{Gather, NodeVector, Scatter, dispatch};
 use crate::loads::Loads;
 use crate::material::{J_FLOOR, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
-use crate::tled::{
-    Divergence, Entry, InternalForces, Status, Step, Sums, culprit, external_forces, follow_motions,
-};
+use crate::tled::{Divergence, Entry, InternalForces, Status, culprit, external_forces, follow_motions};
 
-use super::assembly::free;
+use super::alone;
 use super::bound::{MatrixBeside, ScalarBeside};
-use super::dense::{ROW, apply, stride};
-use super::estimate::{Defect, dot};
+use super::dense::{apply, stride};
+use super::estimate::dot;
 use super::frames::{Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
-use super::node::{Scaling, renew};
 use super::passes::{Prepare, Settle, turns};
 use super::refresh::{Matrices, Refresh, Sources, from_numbers, to_numbers};
-use super::report::{HeldBack, Tally};
+use super::report::Tally;
 use super::vectors::NodeTables;
 use super::{COARSE, COARSE_GROWTH, Inertia, LARGEST_KICK};
 
@@ -85,11 +80,11 @@ where
     external_forces(force, nodal, loads, *time);
     let external = dot(force, displacement);
     let functions = lattice.functions();
-    let alone = functions == 0;
+    let no_lattice = functions == 0;
     let (Some(from), Some(to)) = (Gather::new(displacement), Scatter::new(force)) else {
         return mismatch;
     };
-    let extremes = if alone {
+    let extremes = if no_lattice {
         tables.clear_sums();
         let (Some(diagonal), Some(beside)) =
             (Scatter::new(tables.sum_diagonal), Scatter::new(tables.sum_beside))
@@ -105,16 +100,13 @@ where
     let places = places.as_ref();
     refresh.frames.look(displacement);
     let mut restricted = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    let mut tally = Tally::NEW;
-    let (held_back, growth) = if alone {
-        let fine = Fine { step: &step, scaling, held_back: HeldBack::NONE, tally };
-        let (held_back, counted) = fine.prepare(nodal, increment, force, &mut tables);
-        tally = counted;
-        (held_back, 1.0)
+    let (held_back, growth, tally) = if no_lattice {
+        let (held_back, tally) = alone::prepare(&step, scaling, nodal, increment, force, &mut tables);
+        (held_back, 1.0, tally)
     } else {
         let (brake, tables, restricted) = (refresh.brake, &mut tables, &mut restricted);
         let (step, inertia, turns) = (&step, nodal, &turns(&refresh.frames.of_bounds, functions));
-        dispatch(Prepare {
+        let (held_back, growth) = dispatch(Prepare {
             step,
             scaling,
             brake,
@@ -126,19 +118,20 @@ where
             increment,
             tables,
             restricted,
-        })
+        });
+        (held_back, growth, Tally::NEW)
     };
     let mut coarse_share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
 
     let mut matrices = Matrices::split(dense.as_mut(), functions);
     let mut solution = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    if let (Some(matrices), false) = (&matrices, alone) {
+    if let (Some(matrices), false) = (&matrices, no_lattice) {
         coarse_share =
             coarse_motion(matrices.applied, lattice, &mut restricted, coarse_share, refresh, &mut solution);
     }
-    let (sums, defect) = if alone {
+    let (sums, defect) = if no_lattice {
         let (displacement, increment) = (&*displacement, &*increment);
-        dispatch(MoveNodes {
+        dispatch(alone::Move {
             step: &step,
             scaling,
             inertia: nodal,
@@ -191,17 +184,16 @@ where
     *time += f64::from(step.seconds());
     *steps += 1;
     follow_motions(loads, displacement, increment, *time);
-    if alone {
-        *report = tally.report(held_back.nodes, 1.0);
+    if no_lattice {
+        *report = tally.report(held_back.nodes, 1.0, estimate.error());
     } else if let Some(matrices) = &mut matrices {
         refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
         refresh.share(coarse_share);
         let coarse_weight = 0.25 * COARSE * step.seconds() * step.seconds();
         let sources = Sources { scene, displacement, increment, lattice, places, scaling, coarse_weight };
         refresh.advance(sources, &mut tables, matrices);
-        *report = refresh.published.report(held_back.nodes, coarse_share);
+        *report = refresh.published.report(held_back.nodes, coarse_share, estimate.error());
     }
-    report.error = estimate.error();
     let least_volume_ratio = 1.0 + extremes.least_j;
     let (saturation, energy_excess) = (extremes.saturation, ledger.excess() as f32);
     let held = held_back.unused > MUCH_UNUSED * nodes as f32 || coarse_share < LITTLE_MOTION;
@@ -209,73 +201,6 @@ where
         return Status::Limited { least_volume_ratio, saturation, energy_excess };
     }
     Status::Ok
-}
-
-/// The nodes of mass scaling before they move.
-struct Fine<'a> {
-    step: &'a Step,
-    scaling: &'a Scaling,
-    held_back: HeldBack,
-    tally: Tally,
-}
-
-impl Fine<'_> {
-    /// The inertia of each node, how much of it it may use, and its velocity (into `next`).
-    #[inline(always)]
-    fn prepare(
-        mut self,
-        nodal: &[NodeInertia],
-        increment: &[NodeVector],
-        force: &mut [NodeVector],
-        tables: &mut NodeTables<'_>,
-    ) -> (HeldBack, Tally) {
-        let square = self.step.seconds() * self.step.seconds();
-        for (node, ((inertia, increment), force)) in nodal.iter().zip(increment).zip(force).enumerate() {
-            let [fx, fy, fz, scalar] = force.0;
-            force.0[3] = 0.0;
-            let carry = self.step.carry();
-            let velocity = [0, 1, 2].map(|axis| carry * increment.0[axis]);
-            let at = tables.node(node).0;
-            let before = at.share;
-            let old = Some((at.inverse, velocity));
-            let renewed = renew(inertia, tables.summed(node).0, old, velocity, self.scaling);
-            let mut keep = renewed.velocity;
-            self.tally.add(node, renewed.added);
-            // The bound is that of this state: the node has not stiffened since.
-            let kick = renewed.inverse.times([fx, fy, fz].map(|force| force * square));
-            let length = libm::sqrtf(kick[0] * kick[0] + kick[1] * kick[1] + kick[2] * kick[2]);
-            let Some(next) = tables.next.get_mut(node) else {
-                continue;
-            };
-            let most = LARGEST_KICK * next.0[3];
-            let share = if length > most { most / length } else { 1.0 };
-            if share < before {
-                keep *= libm::sqrtf(share / before);
-            }
-            self.held_back.add(share);
-            for axis in 0..3 {
-                next.0[axis] = keep * velocity[axis];
-            }
-            tables.set(node, &renewed.inverse, scalar, share);
-        }
-        (self.held_back, self.tally)
-    }
-}
-
-/// `D^2 f - 2 k m du` on the free axes, kg m.
-#[inline(always)]
-fn residual(
-    step: &Step,
-    scaling: &Scaling,
-    inertia: &NodeInertia,
-    force: [f32; 3],
-    velocity: &NodeVector,
-) -> [f32; 4] {
-    let square = step.seconds() * step.seconds();
-    let free = free(inertia.inverse);
-    let axis =
-        |axis: usize| free[axis] * (square * force[axis] - 2.0 * scaling.k * inertia.mass * velocity.0[axis]);
-    [axis(0), axis(1), axis(2), 0.0]
 }
 
 /// `share (S^-1 - G^-1) W^T r` less the correction that a change of `S` asked for. The share falls where the forces
@@ -290,14 +215,9 @@ fn coarse_motion(
 ) -> f32 {
     let functions = lattice.functions();
     let (size, stride) = (3 * functions, stride(functions));
-    let (mut x, mut out) = ([0.0; 3 * MAX_FUNCTIONS], [0.0; ROW]);
     turn(restricted, &refresh.frames.of_bounds, Rotation::back);
-    to_numbers(restricted, &mut x);
-    let (Some(x), Some(out)) = (x.get(..size), out.get_mut(..stride)) else {
-        return share;
-    };
-    apply(matrix, stride, x, out);
-    from_numbers(out.get(..size).unwrap_or_default(), 1.0, solution);
+    let moved = apply(matrix, stride, to_numbers(restricted).get(..size).unwrap_or_default());
+    from_numbers(moved.get(..size).unwrap_or_default(), solution);
     turn(solution, &refresh.frames.of_bounds, Rotation::out);
     let strain = lattice.largest_strain(solution);
     if share * strain > LARGEST_KICK {
@@ -309,44 +229,4 @@ fn coarse_motion(
         }
     }
     share
-}
-
-/// The next increments of mass scaling, in `next`, with what [`Settle`] gives.
-struct MoveNodes<'a, 'b> {
-    step: &'a Step,
-    scaling: &'a Scaling,
-    inertia: &'a [NodeInertia],
-    displacement: &'a [NodeVector],
-    increment: &'a [NodeVector],
-    force: &'a [NodeVector],
-    tables: &'a mut NodeTables<'b>,
-}
-
-impl Kernel for MoveNodes<'_, '_> {
-    type Output = (Sums, Defect);
-
-    #[inline(always)]
-    fn run<R: Real>(self) -> (Sums, Defect) {
-        let Self { step, scaling, tables, .. } = self;
-        let (mut sums, mut defect) = (Sums::NONE, Defect::new(step, scaling));
-        let nodes =
-            self.inertia.iter().zip(self.displacement).zip(self.increment).zip(self.force).enumerate();
-        for (node, (((inertia, displacement), increment), force)) in nodes {
-            let at = tables.node(node).0;
-            let Some(next) = tables.next.get_mut(node) else {
-                continue;
-            };
-            let [x, y, z, _] = residual(step, scaling, inertia, force.to_array(), next);
-            let fine = at.inverse.times([x, y, z]);
-            let free = free(inertia.inverse);
-            for axis in 0..3 {
-                next.0[axis] = free[axis] * (next.0[axis] + at.share * fine[axis]);
-            }
-            let moved = Vec4::from(next.0).with_w(0.0);
-            let (increment, force) = (Vec4::from(increment.0), Vec4::from(force.0));
-            sums.add(inertia, increment, force, moved, step.carry());
-            defect.add(inertia, Vec4::from(displacement.0), increment, force, moved);
-        }
-        (sums, defect)
-    }
 }

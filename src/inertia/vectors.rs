@@ -57,22 +57,13 @@ impl<'a> NodeTables<'a> {
 
     #[inline(always)]
     pub(super) fn set(&mut self, node: usize, inverse: &Symmetric, scalar: f32, share: f32) {
-        let places = (self.inverse_diagonal.get_mut(node), self.inverse_beside.get_mut(node));
-        if let (Some(diagonal), Some(beside)) = places {
-            diagonal.0 = [inverse.xx, inverse.yy, inverse.zz, scalar];
-            beside.0 = [inverse.xy, inverse.yz, inverse.zx, share];
-        }
+        part(self.inverse_diagonal, self.inverse_beside, node, inverse, (scalar, share));
     }
 
     /// Puts a node's next inverse and the scalar it is made for where its sums were.
     #[inline(always)]
     pub(super) fn set_next(&mut self, node: usize, inverse: &Symmetric, scalar: f32) {
-        if let (Some(diagonal), Some(beside)) =
-            (self.sum_diagonal.get_mut(node), self.sum_beside.get_mut(node))
-        {
-            diagonal.0 = [inverse.xx, inverse.yy, inverse.zz, scalar];
-            beside.0 = [inverse.xy, inverse.yz, inverse.zx, 0.0];
-        }
+        part(self.sum_diagonal, self.sum_beside, node, inverse, (scalar, 0.0));
     }
 
     /// The next inverses are in use from now on; shares stay, and are one at the start.
@@ -91,4 +82,19 @@ fn joined(diagonal: &[NodeVector], beside: &[NodeVector], node: usize) -> ((Symm
     let [xx, yy, zz, fourth] = diagonal.get(node).copied().unwrap_or_default().0;
     let [xy, yz, zx, last] = beside.get(node).copied().unwrap_or_default().0;
     ((Symmetric { xx, yy, zz, xy, yz, zx }, fourth), last)
+}
+
+/// What [`joined`] reads, with the two fourth numbers.
+#[inline(always)]
+fn part(
+    diagonal: &mut [NodeVector],
+    beside: &mut [NodeVector],
+    node: usize,
+    matrix: &Symmetric,
+    (fourth, last): (f32, f32),
+) {
+    if let (Some(diagonal), Some(beside)) = (diagonal.get_mut(node), beside.get_mut(node)) {
+        diagonal.0 = [matrix.xx, matrix.yy, matrix.zz, fourth];
+        beside.0 = [matrix.xy, matrix.yz, matrix.zx, last];
+    }
 }

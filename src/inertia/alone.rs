@@ -1,0 +1,111 @@
+//! The two passes over the nodes of mass scaling alone: their inertia from the bounds of this state, and their motion.
+
+use glam::Vec4;
+
+use super::LARGEST_KICK;
+use super::estimate::Defect;
+use super::node::{Scaling, renew};
+use super::report::{HeldBack, Tally};
+use super::vectors::NodeTables;
+use crate::lanes::{Kernel, NodeVector, Real};
+use crate::scene::NodeInertia;
+use crate::tled::{Step, Sums};
+
+/// The inertia of each node, how much of it it may use, and its velocity (into `next`). Gives who was held back and
+/// what was added.
+pub(super) fn prepare(
+    step: &Step,
+    scaling: &Scaling,
+    nodal: &[NodeInertia],
+    increment: &[NodeVector],
+    force: &mut [NodeVector],
+    tables: &mut NodeTables<'_>,
+) -> (HeldBack, Tally) {
+    let (mut held_back, mut tally) = (HeldBack::NONE, Tally::NEW);
+    let square = step.seconds() * step.seconds();
+    for (node, ((inertia, increment), force)) in nodal.iter().zip(increment).zip(force).enumerate() {
+        let [fx, fy, fz, scalar] = force.0;
+        force.0[3] = 0.0;
+        let carry = step.carry();
+        let velocity = [0, 1, 2].map(|axis| carry * increment.0[axis]);
+        let at = tables.node(node).0;
+        let before = at.share;
+        let old = Some((at.inverse, velocity));
+        let renewed = renew(inertia, tables.summed(node).0, old, velocity, scaling);
+        let mut keep = renewed.velocity;
+        tally.add(node, renewed.added);
+        // The bound is that of this state: the node has not stiffened since.
+        let kick = renewed.inverse.times([fx, fy, fz].map(|force| force * square));
+        let length = libm::sqrtf(kick[0] * kick[0] + kick[1] * kick[1] + kick[2] * kick[2]);
+        let Some(next) = tables.next.get_mut(node) else {
+            continue;
+        };
+        let most = LARGEST_KICK * next.0[3];
+        let share = if length > most { most / length } else { 1.0 };
+        if share < before {
+            keep *= libm::sqrtf(share / before);
+        }
+        held_back.add(share);
+        for axis in 0..3 {
+            next.0[axis] = keep * velocity[axis];
+        }
+        tables.set(node, &renewed.inverse, scalar, share);
+    }
+    (held_back, tally)
+}
+
+/// `D^2 f - 2 k m du` on the free axes, kg m.
+#[inline(always)]
+fn residual(
+    step: &Step,
+    scaling: &Scaling,
+    inertia: &NodeInertia,
+    force: [f32; 3],
+    velocity: &NodeVector,
+) -> [f32; 4] {
+    let square = step.seconds() * step.seconds();
+    let free = inertia.free().to_array();
+    let axis =
+        |axis: usize| free[axis] * (square * force[axis] - 2.0 * scaling.k * inertia.mass * velocity.0[axis]);
+    [axis(0), axis(1), axis(2), 0.0]
+}
+
+/// The next increments, in `next`, with what the step enters in the energy account and in the estimate of the error.
+pub(super) struct Move<'a, 'b> {
+    pub(super) step: &'a Step,
+    pub(super) scaling: &'a Scaling,
+    pub(super) inertia: &'a [NodeInertia],
+    pub(super) displacement: &'a [NodeVector],
+    pub(super) increment: &'a [NodeVector],
+    pub(super) force: &'a [NodeVector],
+    pub(super) tables: &'a mut NodeTables<'b>,
+}
+
+impl Kernel for Move<'_, '_> {
+    type Output = (Sums, Defect);
+
+    #[inline(always)]
+    fn run<R: Real>(self) -> (Sums, Defect) {
+        let Self { step, scaling, tables, .. } = self;
+        let (mut sums, mut defect) = (Sums::NONE, Defect::new(step, scaling));
+        let nodes =
+            self.inertia.iter().zip(self.displacement).zip(self.increment).zip(self.force).enumerate();
+        for (node, (((inertia, displacement), increment), force)) in nodes {
+            let at = tables.node(node).0;
+            let Some(next) = tables.next.get_mut(node) else {
+                continue;
+            };
+            let [x, y, z, _] = residual(step, scaling, inertia, force.to_array(), next);
+            let fine = at.inverse.times([x, y, z]);
+            let free = inertia.free().to_array();
+            for axis in 0..3 {
+                next.0[axis] = free[axis] * (next.0[axis] + at.share * fine[axis]);
+            }
+            let moved = Vec4::from(next.0).with_w(0.0);
+            let (increment, force) = (Vec4::from(increment.0), Vec4::from(force.0));
+            sums.add(inertia, increment, force, moved, step.carry());
+            defect.add(inertia, Vec4::from(displacement.0), increment, force, moved);
+        }
+        (sums, defect)
+    }
+}
