@@ -52,7 +52,7 @@ fn scaled<'a>(
     let mut inertia = Inertia::over(
         vec![NodeVector::ZERO; vectors_for(nodes)],
         vec![LatticeNode::EMPTY; nodes],
-        vec![0.0; numbers_for(functions)],
+        vec![0.0; numbers_for(cells, functions)],
     );
     inertia.prepare(scene, points, &mut state, step, cells).expect("the bar can be prepared");
     assert_eq!(inertia.cycle(), CYCLE);

@@ -31,7 +31,7 @@ fn prepared(body: &Body, scene: &Scene, state: &mut HostState, seconds: f32, lat
     let mut inertia = Inertia::over(
         vec![NodeVector::ZERO; vectors_for(nodes)],
         vec![LatticeNode::EMPTY; nodes],
-        vec![0.0; numbers_for(functions)],
+        vec![0.0; numbers_for(cells, functions)],
     );
     let step = Step::insist(seconds, DAMPING).unwrap();
     inertia.prepare(scene, &body.points, state, step, cells).unwrap();

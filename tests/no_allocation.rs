@@ -134,14 +134,15 @@ const LATTICE: [u32; 3] = [1, 1, 2];
 const FUNCTIONS: usize = 12;
 const VECTORS: usize = vectors_for(NODES);
 
-type FixedMultilevel = Inertia<[NodeVector; VECTORS], [LatticeNode; NODES], [f32; numbers_for(FUNCTIONS)]>;
+type FixedMultilevel =
+    Inertia<[NodeVector; VECTORS], [LatticeNode; NODES], [f32; numbers_for(LATTICE, FUNCTIONS)]>;
 
 static SCALED: Mutex<MassScaling<[NodeVector; VECTORS]>> =
     Mutex::new(MassScaling::scaling_over([NodeVector::ZERO; VECTORS]));
 static MULTILEVEL: Mutex<FixedMultilevel> = Mutex::new(Inertia::over(
     [NodeVector::ZERO; VECTORS],
     [LatticeNode::EMPTY; NODES],
-    [0.0; numbers_for(FUNCTIONS)],
+    [0.0; numbers_for(LATTICE, FUNCTIONS)],
 ));
 
 #[test]

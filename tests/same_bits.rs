@@ -42,7 +42,7 @@ fn run<L: Law>(law: L, level: Level, scaled: Option<(f32, [u32; 3])>) -> Bits {
         let mut inertia = Inertia::over(
             vec![NodeVector::ZERO; vectors_for(points.len())],
             vec![LatticeNode::EMPTY; points.len()],
-            vec![0.0; numbers_for(functions)],
+            vec![0.0; numbers_for(cells, functions)],
         );
         let step = Step::insist(multiple * 5e-5, 10.0).unwrap();
         inertia.prepare(&scene, &points, &mut state, step, cells).unwrap();

@@ -3,13 +3,13 @@
 use glam::Vec4;
 
 use super::LARGEST_KICK;
-use super::estimate::Defect;
+use super::estimate::{Defect, Defects};
 use super::node::{Scaling, renew};
 use super::report::{HeldBack, Tally};
 use super::vectors::NodeTables;
 use crate::lanes::{Kernel, NodeVector, Real};
 use crate::scene::NodeInertia;
-use crate::tled::{Step, Sums};
+use crate::tled::{Step, Sums, Totals};
 
 /// The inertia of each node, how much of it it may use, and its velocity (into `next`). Gives who was held back and
 /// what was added.
@@ -45,7 +45,7 @@ pub(super) fn prepare(
         if share < before {
             keep *= libm::sqrtf(share / before);
         }
-        held_back.add(share);
+        held_back.add(if share < 1.0 { 1.0 } else { 0.0 }, 1.0 - share);
         for axis in 0..3 {
             next.0[axis] = keep * velocity[axis];
         }
@@ -82,12 +82,13 @@ pub(super) struct Move<'a, 'b> {
 }
 
 impl Kernel for Move<'_, '_> {
-    type Output = (Sums, Defect);
+    type Output = (Totals, Defects);
 
     #[inline(always)]
-    fn run<R: Real>(self) -> (Sums, Defect) {
+    fn run<R: Real>(self) -> (Totals, Defects) {
         let Self { step, scaling, tables, .. } = self;
-        let (mut sums, mut defect) = (Sums::NONE, Defect::new(step, scaling));
+        let mut sums = Sums::new(step, Vec4::splat);
+        let mut defect = Defect::new(step, scaling, Vec4::splat);
         let nodes =
             self.inertia.iter().zip(self.displacement).zip(self.increment).zip(self.force).enumerate();
         for (node, (((inertia, displacement), increment), force)) in nodes {
@@ -103,9 +104,11 @@ impl Kernel for Move<'_, '_> {
             }
             let moved = Vec4::from(next.0).with_w(0.0);
             let (increment, force) = (Vec4::from(increment.0), Vec4::from(force.0));
-            sums.add(inertia, increment, force, moved, step.carry());
-            defect.add(inertia, Vec4::from(displacement.0), increment, force, moved);
+            let (mass, free, displacement) =
+                (Vec4::splat(inertia.mass), inertia.free(), Vec4::from(displacement.0));
+            sums.add(mass, free, increment, force, moved);
+            defect.add(mass, free, displacement, increment, force, moved);
         }
-        (sums, defect)
+        (Totals::of_axes(&sums), Defects::of_axes(&defect))
     }
 }

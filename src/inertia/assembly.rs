@@ -9,6 +9,7 @@
 //! `W^T K W` for the elements' bounds. At a node that is held along some axes a function has
 //! one gradient for each axis.
 
+use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
@@ -34,16 +35,24 @@ pub(super) struct Assembly<'a> {
     pub(super) inertia: &'a [NodeInertia],
     pub(super) matrix: &'a mut [f32],
     pub(super) stride: usize,
-    /// [`CELL`] rows for each cell of the lattice, or for as many as there is room for.
-    pub(super) cells: &'a mut [[f32; CORNERS]],
+    /// Of each cell.
+    pub(super) sums: &'a mut [CellSums],
 }
 
 /// Functions of a cell.
-pub(super) const CORNERS: usize = 8;
-/// Blocks that a cell sums: `xx, yy, zz, xy, yz, zx` of `volume` and the one of `iso`.
-const BLOCKS: usize = 7;
-/// Rows of a cell's sums: for each function one of each block.
-pub(super) const CELL: usize = BLOCKS * CORNERS;
+const CORNERS: usize = 8;
+/// Sums of one cell for each pair of its functions, eight a row: for each function one row of each block. Of elements
+/// the blocks are `xx, yy, zz, xy, yz, zx` of `volume` and the one of `iso`; of nodes those of the inertia and the mass
+/// along each axis.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(transparent)]
+pub(super) struct CellSums([[[f32; CORNERS]; BLOCKS]; CORNERS]);
+
+const BLOCKS: usize = 9;
+
+impl CellSums {
+    pub(super) const NONE: Self = Self([[[0.0; CORNERS]; BLOCKS]; CORNERS]);
+}
 
 /// Functions that four nodes can touch.
 const TOUCHED: usize = 32;
@@ -87,93 +96,180 @@ fn add_row<R: Real>(row: &mut [f32; CORNERS], values: R) {
     *row = store(R::from_fn(|corner| row[corner % CORNERS]) + values);
 }
 
-impl Assembly<'_> {
-    /// Adds the stiffness bound of an element to the sums of the cell that it is in. Says whether it could: its nodes
-    /// must all be in one cell, and each wholly free or wholly held.
+/// Gradients of the eight functions of a cell (1/m) and their images under `C`, lane by lane.
+#[derive(Clone, Copy)]
+struct Corners<R> {
+    slopes: [R; 3],
+    images: [R; 3],
+}
+
+impl<R: Real> Corners<R> {
     #[inline(always)]
-    pub(super) fn add_in_cell<R: Real>(&mut self, element: &Element) -> bool {
-        if R::COUNT != CORNERS {
-            return false;
-        }
-        let mut cell = [u8::MAX; 3];
-        for &node in &element.nodes {
-            let Some(at) = self.nodes.get(node) else {
-                return false;
-            };
-            for (least, at) in cell.iter_mut().zip(at.cell()) {
-                *least = if at < *least { at } else { *least };
-            }
-        }
-        let mut slopes = [R::splat(0.0); 3];
-        for (&node, gradient) in element.nodes.iter().zip(&element.gradients) {
-            let (Some(at), Some(inertia)) = (self.nodes.get(node), self.inertia.get(node)) else {
-                return false;
-            };
-            let [x, y, z, _] = inertia.free().to_array();
-            let Some(weights) = at.corner_weights::<R>(cell) else {
-                return false;
-            };
-            if x != y || y != z {
-                return false;
-            }
-            let weights = R::splat(x) * weights;
-            for (slope, &component) in slopes.iter_mut().zip(gradient) {
-                *slope = *slope + weights * R::splat(component);
-            }
-        }
-        let first = CELL * self.lattice.cell_number(cell);
-        let Some(rows) = self.cells.get_mut(first..first + CELL) else {
-            return false;
-        };
+    fn new(slopes: [R; 3], element: &Element) -> Self {
         let mut images = [R::splat(0.0); 3];
         for (slope, column) in slopes.iter().zip(&element.cofactor) {
             for (image, &entry) in images.iter_mut().zip(column) {
                 *image = *image + R::splat(entry) * *slope;
             }
         }
-        let (volume, iso) = (R::splat(element.volume), R::splat(element.iso));
-        let [x, y, z] = images;
-        let [p, q, r] = slopes;
-        let (ax, ay, az) = (store(volume * x), store(volume * y), store(volume * z));
-        let (bp, bq, br) = (store(iso * p), store(iso * q), store(iso * r));
-        for (corner, rows) in rows.as_chunks_mut::<BLOCKS>().0.iter_mut().enumerate() {
-            let corner = corner % CORNERS;
-            let (along_x, along_y, along_z) =
-                (R::splat(ax[corner]), R::splat(ay[corner]), R::splat(az[corner]));
-            let [xx, yy, zz, xy, yz, zx, all] = rows;
-            add_row(xx, along_x * x);
-            add_row(yy, along_y * y);
-            add_row(zz, along_z * z);
-            add_row(xy, along_x * y);
-            add_row(yz, along_y * z);
-            add_row(zx, along_z * x);
-            add_row(all, R::splat(bp[corner]) * p + R::splat(bq[corner]) * q + R::splat(br[corner]) * r);
+        Self { slopes, images }
+    }
+
+    #[inline(always)]
+    fn masked(&self, mask: R) -> Self {
+        let [p, q, r] = self.slopes;
+        let [x, y, z] = self.images;
+        Self { slopes: [mask * p, mask * q, mask * r], images: [mask * x, mask * y, mask * z] }
+    }
+}
+
+/// The cell that all nodes of an element are in, or the lower one of two neighbours along an axis.
+struct Home {
+    cell: [u8; 3],
+    across: Option<usize>,
+}
+
+impl Assembly<'_> {
+    /// Where an element is, if it is in one or two cells and its nodes are wholly free or wholly held.
+    #[inline(always)]
+    fn home(&self, nodes: &[usize; 4]) -> Option<Home> {
+        let (mut low, mut high) = ([u8::MAX; 3], [0; 3]);
+        for &node in nodes {
+            let (at, inertia) = (self.nodes.get(node)?, self.inertia.get(node)?);
+            let [x, y, z, _] = inertia.free().to_array();
+            if x != y || y != z {
+                return None;
+            }
+            let (cell, within) = (at.cell(), at.within());
+            for axis in 0..3 {
+                // A node on the border of two cells is in both.
+                let least = cell[axis];
+                let most = if within[axis] > 0.0 || least == 0 { least } else { least - 1 };
+                low[axis] = if least < low[axis] { least } else { low[axis] };
+                high[axis] = if most > high[axis] { most } else { high[axis] };
+            }
+        }
+        let mut across = None;
+        for axis in 0..3 {
+            if high[axis] > low[axis] {
+                if across.is_some() || high[axis] - low[axis] > 1 {
+                    return None;
+                }
+                across = Some(axis);
+            }
+        }
+        Some(Home { cell: low, across })
+    }
+
+    /// Adds the stiffness bound of an element to the sums of the cell that it is in, or of the two. Says whether it could.
+    #[inline(always)]
+    pub(super) fn add_in_cells<R: Real>(&mut self, element: &Element) -> bool {
+        if R::COUNT != CORNERS {
+            return false;
+        }
+        let Some(Home { cell, across }) = self.home(&element.nodes) else {
+            return false;
+        };
+        // Along the axis across, the layers of functions of two cells are numbered 0, 1, 2: `near` has 0 and 1, `far` 1
+        // and 2.
+        let (mut near, mut far) = ([R::splat(0.0); 3], [R::splat(0.0); 3]);
+        for (&node, gradient) in element.nodes.iter().zip(&element.gradients) {
+            let (Some(at), Some(inertia)) = (self.nodes.get(node), self.inertia.get(node)) else {
+                return false;
+            };
+            let free = inertia.free().x;
+            let weights = at.corner_weights::<R>(cell, across);
+            for axis in 0..3 {
+                let slope = R::splat(free * gradient[axis]);
+                near[axis] = near[axis] + weights[0] * slope;
+                if across.is_some() {
+                    far[axis] = far[axis] + weights[1] * slope;
+                }
+            }
+        }
+        let near = Corners::new(near, element);
+        let first = self.lattice.cell_number(cell);
+        let Some(sums) = self.sums.get_mut(first) else {
+            return false;
+        };
+        sums.add_products(element, &near, |_| near);
+        if let Some(axis) = across {
+            let far = Corners::new(far, element);
+            let mut cell = cell;
+            cell[axis] += 1;
+            let second = self.lattice.cell_number(cell);
+            let Some(sums) = self.sums.get_mut(second) else {
+                return false;
+            };
+            // What both have, layer 1 with itself, once.
+            let last = R::from_fn(|corner| if corner >> axis & 1 == 1 { 1.0 } else { 0.0 });
+            let beyond = far.masked(last);
+            sums.add_products(element, &far, |corner| if corner >> axis & 1 == 1 { far } else { beyond });
+            self.add_ends(element, axis, [first, second], [near, far]);
         }
         true
     }
 
-    /// Adds the sums of a cell to the matrix.
+    /// Adds what layers 0 and 2 have with each other, which no cell sums.
+    #[inline(always)]
+    fn add_ends<R: Real>(
+        &mut self,
+        element: &Element,
+        axis: usize,
+        cells: [usize; 2],
+        corners: [Corners<R>; 2],
+    ) {
+        let functions = cells.map(|cell| self.lattice.corner_functions(cell));
+        let by_axis = |[x, y, z]: [R; 3]| [store(x), store(y), store(z)];
+        let slopes = [by_axis(corners[0].slopes), by_axis(corners[1].slopes)];
+        let images = [by_axis(corners[0].images), by_axis(corners[1].images)];
+        let at = |of: &[[[f32; CORNERS]; 3]; 2], end: usize, corner: usize| {
+            let [x, y, z] = of[end].map(|row| row[corner % CORNERS]);
+            Vec4::new(x, y, z, 0.0)
+        };
+        for c in 0..CORNERS {
+            for d in 0..CORNERS {
+                if c >> axis & 1 == 1 || d >> axis & 1 == 0 {
+                    continue;
+                }
+                let (first, last) = (functions[0][c], functions[1][d]);
+                if first >= MAX_FUNCTIONS || last >= MAX_FUNCTIONS {
+                    continue;
+                }
+                let ends = [(0, c), (1, d)];
+                let [low, high] = if first < last { ends } else { [ends[1], ends[0]] };
+                let (row, column) = if first < last { (last, first) } else { (first, last) };
+                let all = element.iso * at(&slopes, low.0, low.1).dot(at(&slopes, high.0, high.1));
+                let (along, down) = (at(&images, low.0, low.1), element.volume * at(&images, high.0, high.1));
+                let Some(rest) = self.matrix.get_mut(3 * row * self.stride..) else {
+                    continue;
+                };
+                for (axis, unit) in [Vec4::X, Vec4::Y, Vec4::Z].into_iter().enumerate() {
+                    if let Some(line) = rest.get_mut(axis * self.stride..) {
+                        add_four(line, 3 * column, down[axis] * along + all * unit);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds the sums of a cell to the matrix, and makes room for the next ones.
     pub(super) fn add_cell(&mut self, number: usize) {
-        let Some((rows, _)) = self.cells.get(CELL * number..).and_then(<[_]>::split_first_chunk::<CELL>)
-        else {
+        let Some(sums) = self.sums.get_mut(number) else {
             return;
         };
         let functions = self.lattice.corner_functions(number);
-        let at = |block: usize, c: usize, d: usize| rows[(BLOCKS * c + block) % CELL][d % CORNERS];
-        for (c, &row) in functions.iter().enumerate() {
-            for (d, &column) in functions.iter().enumerate().take(c + 1) {
-                if row >= MAX_FUNCTIONS || column >= MAX_FUNCTIONS {
-                    continue;
-                }
-                let all = at(6, c, d);
-                let rows = [
-                    [at(0, c, d) + all, at(3, c, d), at(5, d, c)],
-                    [at(3, d, c), at(1, c, d) + all, at(4, c, d)],
-                    [at(5, c, d), at(4, d, c), at(2, c, d) + all],
-                ];
-                add_block(self.matrix, self.stride, row, column, rows);
-            }
+        for (c, d, row, column) in pairs(functions) {
+            let at = |block: usize, c: usize, d: usize| sums.0[c % CORNERS][block][d % CORNERS];
+            let all = at(6, c, d);
+            let rows = [
+                [at(0, c, d) + all, at(3, c, d), at(5, d, c)],
+                [at(3, d, c), at(1, c, d) + all, at(4, c, d)],
+                [at(5, c, d), at(4, d, c), at(2, c, d) + all],
+            ];
+            add_block(self.matrix, self.stride, row, column, rows);
         }
+        *sums = CellSums::NONE;
     }
 
     /// Adds the stiffness bound of an element.
@@ -251,69 +347,79 @@ impl Assembly<'_> {
     }
 }
 
-/// Sums of the nodes of one cell for each pair of its functions: the inertia's `xx, yy, zz, xy, yz, zx` and the mass
-/// along each axis.
-pub(super) struct NodeSums {
-    cell: Option<LatticeNode>,
-    rows: [[[f32; CORNERS]; 9]; CORNERS],
+/// Pairs of a cell's functions on and below the diagonal: two corners, their row and column.
+fn pairs(functions: [usize; CORNERS]) -> impl Iterator<Item = (usize, usize, usize, usize)> {
+    let at = move |corner: usize| functions[corner % CORNERS];
+    (0..CORNERS)
+        .flat_map(move |c| (0..=c).map(move |d| (c, d, at(c), at(d))))
+        .filter(|&(_, _, row, column)| row < MAX_FUNCTIONS && column < MAX_FUNCTIONS)
 }
 
-impl NodeSums {
-    pub(super) const NONE: Self = Self { cell: None, rows: [[[0.0; CORNERS]; 9]; CORNERS] };
-
-    /// Adds a node's inertia and its mass (kg, zero rows at held axes); the matrices get the sums of the cell before
-    /// when it is in another one.
+impl CellSums {
+    /// Adds an element: for each corner the products with all of `columns`.
     #[inline(always)]
-    pub(super) fn add(
+    fn add_products<R: Real>(
         &mut self,
-        node: &LatticeNode,
-        inertia: &Symmetric,
-        mass: [f32; 3],
-        into: &mut NodeMatrices<'_>,
+        element: &Element,
+        corners: &Corners<R>,
+        columns: impl Fn(usize) -> Corners<R>,
     ) {
-        if self.cell.is_none_or(|last| last.cell() != node.cell()) {
-            self.flush(into);
-            self.cell = Some(*node);
+        let (volume, iso) = (R::splat(element.volume), R::splat(element.iso));
+        let Corners { slopes: [p, q, r], images: [x, y, z] } = *corners;
+        let (ax, ay, az) = (store(volume * x), store(volume * y), store(volume * z));
+        let (bp, bq, br) = (store(iso * p), store(iso * q), store(iso * r));
+        for (corner, rows) in self.0.iter_mut().enumerate() {
+            let Corners { slopes: [p, q, r], images: [x, y, z] } = columns(corner);
+            let corner = corner % CORNERS;
+            let (along_x, along_y, along_z) =
+                (R::splat(ax[corner]), R::splat(ay[corner]), R::splat(az[corner]));
+            let [xx, yy, zz, xy, yz, zx, all, ..] = rows;
+            add_row(xx, along_x * x);
+            add_row(yy, along_y * y);
+            add_row(zz, along_z * z);
+            add_row(xy, along_x * y);
+            add_row(yz, along_y * z);
+            add_row(zx, along_z * x);
+            add_row(all, R::splat(bp[corner]) * p + R::splat(bq[corner]) * q + R::splat(br[corner]) * r);
         }
+    }
+
+    /// Adds a node's inertia and its mass (kg, zero rows at held axes).
+    #[inline(always)]
+    pub(super) fn add_node(&mut self, node: &LatticeNode, inertia: &Symmetric, [mx, my, mz]: [f32; 3]) {
         let Symmetric { xx, yy, zz, xy, yz, zx } = *inertia;
-        let entries = [xx, yy, zz, xy, yz, zx, mass[0], mass[1], mass[2]];
+        let entries = [xx, yy, zz, xy, yz, zx, mx, my, mz];
         let weights = node.eight_weights();
-        for (rows, weight) in self.rows.iter_mut().zip(weights) {
+        for (rows, weight) in self.0.iter_mut().zip(weights) {
             let products = Lanes([weight; CORNERS]) * Lanes(weights);
             for (row, entry) in rows.iter_mut().zip(entries) {
                 *row = (Lanes(*row) + Lanes([entry; CORNERS]) * products).0;
             }
         }
     }
-
-    /// Gives the sums to the matrices.
-    pub(super) fn flush(&mut self, into: &mut NodeMatrices<'_>) {
-        let Some(cell) = self.cell.take() else {
-            return;
-        };
-        let functions = into.lattice.functions_of(&cell);
-        for (rows, &c) in self.rows.iter_mut().zip(&functions) {
-            for (corner, &d) in functions.iter().enumerate() {
-                if c >= MAX_FUNCTIONS || d > c {
-                    continue;
-                }
-                let [xx, yy, zz, xy, yz, zx, mx, my, mz] = rows.map(|row| row[corner % CORNERS]);
-                add_block(into.inertia, into.stride, c, d, [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]);
-                for (axis, mass) in [mx, my, mz].into_iter().enumerate() {
-                    if let Some(place) = into.mass.get_mut((3 * c + axis) * into.stride + 3 * d + axis) {
-                        *place += mass;
-                    }
-                }
-            }
-            *rows = [[0.0; CORNERS]; 9];
-        }
-    }
 }
 
-/// Dense matrices to add [`NodeSums`] to.
+/// Dense matrices for the sums of the nodes.
 pub(super) struct NodeMatrices<'a> {
     pub(super) lattice: &'a Lattice,
     pub(super) inertia: &'a mut [f32],
     pub(super) mass: &'a mut [f32],
     pub(super) stride: usize,
+}
+
+impl NodeMatrices<'_> {
+    /// Adds the sums of cell `number`, and makes room for the next ones.
+    pub(super) fn add_cell(&mut self, number: usize, sums: &mut CellSums) {
+        for (c, d, row, column) in pairs(self.lattice.corner_functions(number)) {
+            let [xx, yy, zz, xy, yz, zx, mx, my, mz] = sums.0[c % CORNERS].map(|row| row[d % CORNERS]);
+            let rows = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
+            add_block(self.inertia, self.stride, row, column, rows);
+            for (axis, mass) in [mx, my, mz].into_iter().enumerate() {
+                if let Some(place) = self.mass.get_mut((3 * row + axis) * self.stride + 3 * column + axis) {
+                    *place += mass;
+                }
+            }
+        }
+        *sums = CellSums::NONE;
+    }
 }

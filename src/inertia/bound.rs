@@ -231,7 +231,11 @@ impl MatrixBeside<'_> {
                 images[0][i] = images[0][i] - images[corner + 1][i];
             }
         }
-        let lengths = images.map(|[x, y, z]| (x * x + y * y + z * z).root());
+        // A loop: `map` over four wide vectors is not unrolled.
+        let mut lengths = [R::splat(0.0); 4];
+        for (length, [x, y, z]) in lengths.iter_mut().zip(images) {
+            *length = (x * x + y * y + z * z).root();
+        }
         let weight = volume * bound.volume * (lengths[0] + lengths[1] + lengths[2] + lengths[3]);
         for (corner, ([x, y, z], length)) in images.into_iter().zip(lengths).enumerate() {
             let node = |lane: usize| block.node(corner, first + lane);

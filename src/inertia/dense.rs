@@ -31,63 +31,98 @@ pub(super) fn mirror(matrix: &mut [f32], stride: usize, row: usize, factor: f32)
     }
 }
 
-/// One pivot of the inversion in place of a symmetric positive definite matrix by the sweep operator, on its lower
-/// triangle alone; after all of them that is minus the inverse's. No row is exchanged: none has to be for a positive
-/// definite matrix. Returns whether the pivot was positive and finite.
-pub(super) fn sweep(matrix: &mut [f32], size: usize, stride: usize, pivot: usize) -> bool {
-    let diagonal = matrix.get(pivot * stride + pivot).copied().unwrap_or(0.0);
-    let inverse = 1.0 / diagonal;
-    if !(diagonal > 0.0 && inverse.is_finite()) {
-        return false;
-    }
-    dispatch(Sweep { matrix, size, stride, pivot, inverse });
-    true
+/// Three pivots, those of one function, of the inversion in place of a symmetric positive definite matrix by the sweep
+/// operator, on its lower triangle alone; after all of them that is minus the inverse's. No row is exchanged: none has
+/// to be for a positive definite matrix. Returns whether the pivots were positive and finite; if not, nothing has changed.
+pub(super) fn sweep(matrix: &mut [f32], size: usize, stride: usize, function: usize) -> bool {
+    dispatch(Sweep { matrix, size, stride, first: 3 * function })
 }
 
 struct Sweep<'a> {
     matrix: &'a mut [f32],
     size: usize,
     stride: usize,
-    pivot: usize,
-    inverse: f32,
+    first: usize,
+}
+
+/// `row -= factor line`, whole vectors up to the one that holds `last`.
+#[inline(always)]
+fn subtract(row: &mut [f32], factor: f32, line: &Row, last: usize) {
+    let factor = Lanes([factor; LANES]);
+    let vectors = row.as_chunks_mut::<LANES>().0.iter_mut().zip(line.as_chunks::<LANES>().0);
+    for (value, &line) in vectors.take(last / LANES + 1) {
+        *value = (Lanes(*value) - factor * Lanes(line)).0;
+    }
 }
 
 impl Kernel for Sweep<'_> {
-    type Output = ();
+    type Output = bool;
 
+    /// One sweep takes from each number `a_ij` of other rows and columns `a_ip a_pj / a_pp`, divides those of the pivot's row
+    /// and column by `a_pp`, and puts `-1 / a_pp` in its place. The matrix is gone through once for all three: `lines` are
+    /// the pivots' rows and columns as each sweep finds them.
     #[inline(always)]
-    fn run<R: Real>(self) {
-        let Self { matrix, size, stride, pivot, inverse } = self;
-        // The pivot's row, and its column below.
-        let mut line: Row = [0.0; ROW];
-        let rows = || matrix.chunks_exact(stride).take(size).enumerate();
-        for ((index, row), place) in rows().zip(&mut line) {
-            let at = if index < pivot { matrix.get(pivot * stride + index) } else { row.get(pivot) };
-            *place = at.copied().unwrap_or(0.0);
+    fn run<R: Real>(self) -> bool {
+        let Self { matrix, size, stride, first } = self;
+        let mut lines: [Row; 3] = [[0.0; ROW]; 3];
+        for (index, row) in matrix.chunks_exact(stride).take(size).enumerate() {
+            for (k, line) in lines.iter_mut().enumerate() {
+                let pivot = first + k;
+                let at = if index < pivot { matrix.get(pivot * stride + index) } else { row.get(pivot) };
+                if let (Some(place), Some(&value)) = (line.get_mut(index), at) {
+                    *place = value;
+                }
+            }
         }
-        for (index, row) in matrix.chunks_exact_mut(stride).take(size).enumerate() {
-            if index == pivot {
-                for value in row.iter_mut().take(pivot) {
-                    *value *= inverse;
-                }
-            } else {
-                let factor = line.get(index).copied().unwrap_or(0.0) * inverse;
-                // Whole vectors; what lies above the diagonal is never read.
-                let vectors = row.as_chunks_mut::<LANES>().0.iter_mut().zip(line.as_chunks::<LANES>().0);
-                let factors = Lanes([factor; LANES]);
-                for (value, &line) in vectors.take(index / LANES + 1) {
-                    *value = (Lanes(*value) - factors * Lanes(line)).0;
-                }
-                if index > pivot
-                    && let Some(place) = row.get_mut(pivot)
-                {
+        let mut inverses = [0.0; 3];
+        for (k, inverse) in inverses.iter_mut().enumerate() {
+            let Some((line, later)) = lines.get_mut(k..).and_then(<[Row]>::split_first_mut) else {
+                return false;
+            };
+            let diagonal = line.get(first + k).copied().unwrap_or(0.0);
+            *inverse = 1.0 / diagonal;
+            if !(diagonal > 0.0 && inverse.is_finite()) {
+                return false;
+            }
+            for later in later {
+                let factor = later.get(first + k).copied().unwrap_or(0.0) * *inverse;
+                subtract(later, factor, line, size);
+                if let Some(place) = later.get_mut(first + k) {
                     *place = factor;
                 }
             }
         }
-        if let Some(diagonal) = matrix.get_mut(pivot * stride + pivot) {
-            *diagonal = -inverse;
+        let at = |k: usize, index: usize| lines[k].get(index).copied().unwrap_or(0.0);
+        for (index, row) in matrix.chunks_exact_mut(stride).take(size).enumerate() {
+            let factors = [0, 1, 2].map(|k| at(k, index) * inverses[k]);
+            if index < first || index > first + 2 {
+                let [a, b, c] = factors.map(|factor| Lanes([factor; LANES]));
+                let [one, two, three] = lines.each_ref().map(|line| line.as_chunks::<LANES>().0);
+                let vectors = row.as_chunks_mut::<LANES>().0.iter_mut().zip(one).zip(two).zip(three);
+                // What lies above the diagonal is never read.
+                for (((value, &one), &two), &three) in vectors.take(index / LANES + 1) {
+                    *value = (Lanes(*value) - a * Lanes(one) - b * Lanes(two) - c * Lanes(three)).0;
+                }
+                if index > first {
+                    let [a, b, c] = factors;
+                    let columns = [a - b * at(1, first) - c * at(2, first), b - c * at(2, first + 1), c];
+                    for (place, value) in row.iter_mut().skip(first).zip(columns) {
+                        *place = value;
+                    }
+                }
+            } else {
+                let own = index - first;
+                for (column, place) in row.iter_mut().enumerate().take(index + 1) {
+                    let own_line = if column == index { -1.0 } else { at(own, column) };
+                    let mut value = own_line * inverses[own % 3];
+                    for k in own + 1..3 {
+                        value -= factors[k % 3] * at(k, column);
+                    }
+                    *place = value;
+                }
+            }
         }
+        true
     }
 }
 
@@ -140,8 +175,8 @@ mod tests {
         }
         let mut original = matrix.clone();
         (0..SIZE).for_each(|row| mirror(&mut original, stride, row, 1.0));
-        for pivot in 0..SIZE {
-            assert!(sweep(&mut matrix, SIZE, stride, pivot));
+        for function in 0..FUNCTIONS {
+            assert!(sweep(&mut matrix, SIZE, stride, function));
         }
         (0..SIZE).for_each(|row| mirror(&mut matrix, stride, row, -1.0));
         let x: Vec<f32> = (0..SIZE).map(|i| (i as f32 * 0.7).sin()).collect();
@@ -150,7 +185,9 @@ mod tests {
         let worst = (0..SIZE).map(|i| (back[i] - x[i]).abs()).fold(0.0, f32::max);
         println!("A (A^-1 x) is off by {worst:.1e} at a condition of 1e5");
         assert!(worst < 2e-2);
-        matrix[0] = -1.0;
+        matrix[2 * stride + 2] = -1.0;
+        let before = matrix.clone();
         assert!(!sweep(&mut matrix, SIZE, stride, 0));
+        assert_eq!(matrix, before);
     }
 }

@@ -11,9 +11,8 @@
 use glam::Vec4;
 
 use super::node::Scaling;
-use crate::lanes::NodeVector;
-use crate::scene::NodeInertia;
-use crate::tled::Step;
+use crate::lanes::{NodeVector, Real};
+use crate::tled::{Side, Step};
 
 /// The error across the displacement is about as large again as that along it: over the laboratory's scenes,
 /// methods and steps the median of `x` over the mean error of the nodes is a half.
@@ -41,35 +40,67 @@ fn along_axes(sums: Vec4) -> f32 {
 }
 
 /// Sums over the nodes of a step, before its displacement changes.
-pub(super) struct Defect {
-    k: f32,
-    carry: f32,
-    square: f32,
-    nodes: u32,
-    defect: Vec4,
-    mass: Vec4,
-    length: Vec4,
-    total: Vec4,
+#[derive(Clone, Copy)]
+pub(super) struct Defect<V> {
+    square: V,
+    /// `1 + k`, and `1 - k` times what carries increments over from another step.
+    ahead: V,
+    behind: V,
+    defect: V,
+    mass: V,
+    length: V,
+    total: V,
 }
 
-impl Defect {
-    pub(super) fn new(step: &Step, scaling: &Scaling) -> Self {
-        let square = step.seconds() * step.seconds();
-        let [defect, mass, length, total] = [Vec4::ZERO; 4];
-        Self { k: scaling.k, carry: step.carry(), square, nodes: 0, defect, mass, length, total }
+impl<V: Side> Defect<V> {
+    /// Nothing yet; `splat` repeats a number.
+    #[inline(always)]
+    pub(super) fn new(step: &Step, scaling: &Scaling, splat: impl Fn(f32) -> V) -> Self {
+        let k = scaling.k;
+        let numbers = [step.seconds() * step.seconds(), 1.0 + k, (1.0 - k) * step.carry(), 0.0];
+        let [square, ahead, behind, zero] = numbers.map(splat);
+        Self { square, ahead, behind, defect: zero, mass: zero, length: zero, total: zero }
     }
 
-    /// Adds a node: displacement, its increments, and total force.
+    /// Adds nodes: masses, ones along free axes, displacements, their increments, total forces and next increments.
     #[inline(always)]
-    pub(super) fn add(&mut self, at: &NodeInertia, u: Vec4, increment: Vec4, force: Vec4, next: Vec4) {
+    pub(super) fn add(&mut self, mass: V, free: V, u: V, increment: V, force: V, next: V) {
         // D^2 d = D^2 f - k m (du+ + du) - m (du+ - du).
-        let taken = at.mass * ((1.0 + self.k) * next - (1.0 - self.k) * self.carry * increment);
-        let free = at.free() * u;
-        self.nodes += 1;
-        self.defect += free * (self.square * force - taken);
-        self.mass += free * (at.mass * u);
-        self.length += u * u;
-        self.total += u * force;
+        let taken = mass * (self.ahead * next - self.behind * increment);
+        let along = free * u;
+        self.defect = self.defect + along * (self.square * force - taken);
+        self.mass = self.mass + along * (mass * u);
+        self.length = self.length + u * u;
+        self.total = self.total + u * force;
+    }
+}
+
+/// What [`Defect`] comes to.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Defects {
+    defect: f32,
+    mass: f32,
+    length: f32,
+    total: f32,
+}
+
+impl Defects {
+    /// Of sums of the axes side by side.
+    pub(super) fn of_axes(sums: &Defect<Vec4>) -> Self {
+        let [defect, mass, length, total] = [sums.defect, sums.mass, sums.length, sums.total].map(along_axes);
+        Self { defect, mass, length, total }
+    }
+
+    /// Adds sums of nodes side by side, one for each axis.
+    pub(super) fn add_lanes<R: Real>(&mut self, sums: &[Defect<R>; 3]) {
+        for sums in sums {
+            for lane in 0..R::COUNT {
+                self.defect += sums.defect.lane(lane);
+                self.mass += sums.mass.lane(lane);
+                self.length += sums.length.lane(lane);
+                self.total += sums.total.lane(lane);
+            }
+        }
     }
 }
 
@@ -81,17 +112,15 @@ impl Estimate {
         ACROSS * if self.now < 0.0 { -self.now } else { self.now }
     }
 
-    /// One step on. `external` is displacement times external force, J.
-    pub(super) fn advance(&mut self, sums: &Defect, external: f32) {
-        let (k, square) = (sums.k, sums.square);
-        let [defect, mass, length, total] = [sums.defect, sums.mass, sums.length, sums.total].map(along_axes);
-        if mass <= 0.0 {
+    /// One step of `D^2 = square` on. `external` is displacement times external force, J.
+    pub(super) fn advance(&mut self, of: &Defects, external: f32, nodes: usize, k: f32, square: f32) {
+        if of.mass <= 0.0 {
             return;
         }
         // Implicit: whatever the stiffness, the estimate does not ring.
-        let internal = external - total;
-        let stiffness = if internal > 0.0 { square * internal / mass } else { 0.0 };
-        let push = libm::sqrtf(length / sums.nodes as f32) * defect / mass;
+        let internal = external - of.total;
+        let stiffness = if internal > 0.0 { square * internal / of.mass } else { 0.0 };
+        let push = libm::sqrtf(of.length / nodes as f32) * of.defect / of.mass;
         let next = (push + 2.0 * self.now - (1.0 - k) * self.before) / (1.0 + k + stiffness);
         *self = Self { now: next, before: self.now };
     }

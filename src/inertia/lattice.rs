@@ -58,23 +58,27 @@ impl LatticeNode {
         [a * nz, b * nz, c * nz, d * nz, a * z, b * z, c * z, d * z]
     }
 
-    /// Weights of the functions at the corners of a cell, if the node is in it or on its border.
+    /// Weights of the functions at the corners of a cell, which the node is in or on the border of. With an axis
+    /// `across` it may also be in the next cell along that: first come the weights of the corners of `cell`, then those of
+    /// the next.
     #[inline(always)]
-    pub(super) fn corner_weights<R: Real>(&self, cell: [u8; 3]) -> Option<R> {
-        let mut weights = R::splat(1.0);
+    pub(super) fn corner_weights<R: Real>(&self, cell: [u8; 3], across: Option<usize>) -> [R; 2] {
+        let mut weights = [R::splat(1.0); 2];
         for axis in 0..3 {
-            let beyond = self.cell[axis].wrapping_sub(cell[axis]);
-            let within = self.within[axis];
-            if beyond > 1 || (beyond == 1 && within > 0.0) {
-                return None;
+            // Of the three layers of functions along this axis.
+            let (beyond, within) = (self.cell[axis] > cell[axis], self.within[axis]);
+            let layers = if beyond { [0.0, 1.0 - within, within] } else { [1.0 - within, within, 0.0] };
+            let far = R::from_fn(|corner| if corner >> axis & 1 == 1 { 1.0 } else { 0.0 });
+            let near = R::from_fn(|corner| if corner >> axis & 1 == 1 { 0.0 } else { 1.0 });
+            let [first, second, third] = layers.map(R::splat);
+            let along = near * first + far * second;
+            weights[0] = weights[0] * along;
+            if across.is_some() {
+                let next = near * second + far * third;
+                weights[1] = weights[1] * if across == Some(axis) { next } else { along };
             }
-            let within = if beyond == 1 { 1.0 } else { within };
-            let far = |corner: usize| corner >> axis & 1 == 1;
-            let near = R::from_fn(|corner| if far(corner) { 0.0 } else { 1.0 });
-            let sign = R::from_fn(|corner| if far(corner) { 1.0 } else { -1.0 });
-            weights = weights * (near + sign * R::splat(within));
         }
-        Some(weights)
+        weights
     }
 
     /// In the first cell.

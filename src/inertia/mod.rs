@@ -49,7 +49,7 @@
 //!
 //! Accuracy: motion that neither has its true inertia nor is carried by the lattice lags behind. [`Report`]
 //! says how much inertia was added, and where, and estimates the error in metres (`estimate.rs`). Memory:
-//! [`vectors_for`], one [`LatticeNode`] a node and [`numbers_for`] numbers for the lattice.
+//! [`vectors_for`], one [`LatticeNode`] a node and [`numbers_for`] the lattice.
 
 mod alone;
 mod assembly;
@@ -104,10 +104,11 @@ const CYCLE: f32 = 0.04;
 /// Fewest and most steps of a cycle.
 const CYCLE_STEPS: (f32, f32) = (16.0, 64.0);
 
-/// Numbers that a lattice of this many functions needs.
+/// Numbers that a lattice of these cells along x, y, z with this many functions ([`lattice_functions`]) needs.
 #[must_use]
-pub const fn numbers_for(functions: usize) -> usize {
-    refresh::numbers_for(functions)
+pub const fn numbers_for(cells: [u32; 3], functions: usize) -> usize {
+    let [x, y, z] = cells;
+    refresh::numbers_for(x as usize * y as usize * z as usize, functions)
 }
 
 /// Why an inertia could not be prepared.
@@ -171,7 +172,7 @@ impl fmt::Display for InertiaError {
 impl core::error::Error for InertiaError {}
 
 /// The inertia of a scene for one step length over storage of the caller: `V` for [`vectors_for`] the
-/// nodes, `W` for a [`LatticeNode`] each, `D` for [`numbers_for`] the functions (both empty without a lattice).
+/// nodes, `W` for a [`LatticeNode`] each, `D` for [`numbers_for`] the lattice (both empty without a lattice).
 #[derive(Clone, Debug)]
 pub struct Inertia<V, W, D> {
     vectors: V,
@@ -314,7 +315,7 @@ where
         let functions = self.lattice.functions();
         if functions > 0 {
             room("lattice nodes", nodes, self.places.as_ref().len())?;
-            room("numbers", numbers_for(functions), self.dense.as_ref().len())?;
+            room("numbers", numbers_for(cells, functions), self.dense.as_ref().len())?;
         }
 
         let (dt, damping) = (step.seconds(), step.damping());
@@ -357,7 +358,7 @@ where
             }
             let places = self.places.as_ref().get(..nodes).unwrap_or_default();
             self.refresh.frames.choose(&self.lattice, places, points);
-            let Some(mut matrices) = Matrices::split(self.dense.as_mut(), functions) else {
+            let Some(mut matrices) = Matrices::split(self.dense.as_mut(), &self.lattice) else {
                 return Ok(());
             };
             let sources = Sources {

@@ -1,56 +1,37 @@
-//! The two passes over the nodes of a step with a lattice, the axes of a node side by side: before the lattice moves
-//! and after. Nodes that follow each other are mostly in the same cell, whose functions are then at hand.
+//! The two passes over the nodes of a step with a lattice: before the lattice moves, nodes side by side, and after, the
+//! axes of a node side by side.
 
-use glam::{Vec4, Vec4Swizzles};
+use bytemuck::{Pod, Zeroable, must_cast_slice, must_cast_slice_mut};
+use glam::Vec4;
 
-use super::estimate::Defect;
+use super::estimate::{Defect, Defects};
 use super::frames::Rotation;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::Scaling;
 use super::report::HeldBack;
 use super::vectors::NodeTables;
 use super::{LARGEST_KICK, NODE_GROWTH};
-use crate::lanes::{Kernel, NodeVector, Real};
+use crate::lanes::{BLOCK, Kernel, NodeVector, Real, read_rows, write_rows};
 use crate::scene::NodeInertia;
-use crate::tled::{Step, Sums};
+use crate::tled::{Step, Sums, Totals};
 
-/// A rotation out of the frame of the bounds, as four-wide rows and columns.
-#[derive(Clone, Copy)]
-pub(super) struct Turn {
-    rows: [Vec4; 3],
-    columns: [Vec4; 3],
-}
+/// The functions' rotations out of the frames of the bounds, by padded rows, and one that does not turn for nodes that no
+/// function moves.
+pub(super) type Turns = [[[f32; 4]; 3]; MAX_FUNCTIONS + 1];
 
-pub(super) type Turns = [Turn; MAX_FUNCTIONS + 1];
+const STILL: [[f32; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
-/// Those of the functions, and none for nodes that no function moves.
 pub(super) fn turns(rotations: &[Rotation], functions: usize) -> Turns {
-    let turn = |Rotation([a, b, c]): &Rotation| Turn {
-        rows: [a, b, c].map(|[x, y, z]| Vec4::new(*x, *y, *z, 0.0)),
-        columns: [0, 1, 2].map(|axis| Vec4::new(a[axis], b[axis], c[axis], 0.0)),
-    };
-    let mut turns = [turn(&Rotation::NONE); MAX_FUNCTIONS + 1];
-    for (place, rotation) in turns.iter_mut().zip(rotations).take(functions) {
-        *place = turn(rotation);
+    let mut turns = [STILL; MAX_FUNCTIONS + 1];
+    for (turn, Rotation(rows)) in turns.iter_mut().zip(rotations).take(functions) {
+        *turn = rows.map(|[x, y, z]| [x, y, z, 0.0]);
     }
     turns
 }
 
-/// `sum_j v_j vectors_j`.
-#[inline(always)]
-fn combined(vectors: &[Vec4; 3], v: Vec4) -> Vec4 {
-    vectors[0] * v.xxxx() + vectors[1] * v.yyyy() + vectors[2] * v.zzzz()
-}
-
-/// A symmetric matrix as `xx, yy, zz` and `xy, yz, zx` times a vector whose fourth number is zero.
-#[inline(always)]
-fn times(diagonal: Vec4, beside: Vec4, v: Vec4) -> Vec4 {
-    diagonal * v + beside.xxzw() * v.yxxw() + beside.zyyw() * v.zzyw()
-}
-
 /// How much of its inverse inertia each node may use, where that alone takes it (its next increment without the
-/// lattice's part, into `next`), and the lattice's share of its residual. Gives who was held back and the largest
-/// growth.
+/// lattice's part, into `next`), and the lattice's share of its residual, in sums of the cells. Gives who was held back
+/// and the largest growth.
 pub(super) struct Prepare<'a, 'b> {
     pub(super) step: &'a Step,
     pub(super) scaling: &'a Scaling,
@@ -63,65 +44,106 @@ pub(super) struct Prepare<'a, 'b> {
     pub(super) force: &'a [NodeVector],
     pub(super) increment: &'a [NodeVector],
     pub(super) tables: &'a mut NodeTables<'b>,
-    pub(super) restricted: &'a mut CoarseVectors,
+    pub(super) cells: &'a mut [Cell],
+}
+
+/// What is found on the way, node by node in lanes.
+struct Found<R> {
+    /// One over the largest growth.
+    least: R,
+    /// How many nodes are held back, and what they do not use of their inverse inertia.
+    held: R,
+    unused: R,
+}
+
+impl<R: Real> Found<R> {
+    #[inline(always)]
+    fn nothing() -> Self {
+        Self { least: R::splat(1.0), held: R::splat(0.0), unused: R::splat(0.0) }
+    }
 }
 
 impl Kernel for Prepare<'_, '_> {
     type Output = (HeldBack, f32);
 
     #[inline(always)]
-    fn run<R: Real>(self) -> (HeldBack, f32) {
-        let Self { scaling, restricted, .. } = self;
-        let square = self.step.seconds() * self.step.seconds();
-        let carry = self.brake * self.step.carry();
-        let NodeTables { inverse_diagonal, inverse_beside, next, .. } = self.tables;
-        let (mut held_back, mut least) = (HeldBack::NONE, 1.0);
-        let mut cell = Cell::new();
-        let state = self.inertia.iter().zip(self.force).zip(self.increment).zip(self.places);
-        let tables = inverse_diagonal.iter().zip(inverse_beside.iter_mut()).zip(next.iter_mut());
-        for ((((inertia, force), increment), place), ((diagonal, beside), next)) in state.zip(tables) {
-            let [_, _, _, bound] = force.0;
-            let [_, _, _, bound_before] = diagonal.0;
-            let [_, _, _, share_before] = beside.0;
-            let [_, _, _, height] = next.0;
-            let Some(turn) = self.turns.get(place.frame()) else {
-                continue;
-            };
-            let (old_diagonal, old_beside) = (Vec4::from(diagonal.0), Vec4::from(beside.0));
-            let (force, increment) = (Vec4::from(force.0), Vec4::from(increment.0));
-            let loss = 2.0 * scaling.k * inertia.mass * carry;
-            let residual = inertia.free() * (square * force - loss * increment);
-            let alone = times(old_diagonal, old_beside, combined(&turn.rows, residual));
-
-            // One over how far its bound has grown, as far as that matters beside its mass.
-            let grown =
-                (inertia.mass + scaling.weight * bound_before) / (inertia.mass + scaling.weight * bound);
-            least = if grown < least { grown } else { least };
-            let mut share = if NODE_GROWTH * grown < 1.0 { NODE_GROWTH * grown } else { 1.0 };
-            let [x, y, z, _] = alone.to_array();
-            let kick = x * x + y * y + z * z;
-            let most = LARGEST_KICK * height;
-            if share * share * kick > most * most {
-                share = most / libm::sqrtf(kick);
-            }
-            let mut keep = carry;
-            if share < share_before {
-                keep *= libm::sqrtf(share / share_before);
-            }
-            held_back.add(share);
-            beside.0[3] = share;
-
-            let fine = combined(&turn.columns, alone);
-            next.0 = (keep * increment + share * fine).with_w(height).to_array();
-
-            if !cell.is(place) {
-                cell.flush(restricted);
-                cell.enter(self.lattice, place);
-            }
-            cell.add(place, residual);
+    fn run<R: Real>(mut self) -> (HeldBack, f32) {
+        self.cells.fill(Cell::EMPTY);
+        let nodes = self.inertia.len();
+        let whole = nodes - nodes % R::COUNT;
+        let mut found = Found::<R>::nothing();
+        for first in (0..whole).step_by(R::COUNT) {
+            self.nodes(first, &mut found);
         }
-        cell.flush(restricted);
-        (held_back, 1.0 / least)
+        let mut rest = Found::<f32>::nothing();
+        for node in whole..nodes {
+            self.nodes(node, &mut rest);
+        }
+        let mut held_back = HeldBack::NONE;
+        for lane in 0..R::COUNT {
+            rest.least = found.least.lane(lane).min(rest.least);
+            held_back.add(found.held.lane(lane), found.unused.lane(lane));
+        }
+        held_back.add(rest.held, rest.unused);
+        (held_back, 1.0 / rest.least)
+    }
+}
+
+impl Prepare<'_, '_> {
+    /// The nodes from `first` on, side by side.
+    #[inline(always)]
+    fn nodes<R: Real>(&mut self, first: usize, found: &mut Found<R>) {
+        let step = self.step.seconds();
+        let carry = self.brake * self.step.carry();
+        let NodeTables { inverse_diagonal, inverse_beside, next, .. } = &mut *self.tables;
+        let places = self.places.get(first..first + R::COUNT).unwrap_or_default();
+
+        let [ix, iy, iz, mass] = read_rows::<R>(must_cast_slice(self.inertia), first);
+        let [fx, fy, fz, bound] = read_rows::<R>(must_cast_slice(self.force), first);
+        let [vx, vy, vz, _] = read_rows::<R>(must_cast_slice(self.increment), first);
+        let loss = R::splat(2.0 * self.scaling.k * carry) * mass;
+        let square = R::splat(step * step);
+        let residual = |inverse: R, f: R, v: R| inverse.positive() * (square * f - loss * v);
+        let (rx, ry, rz) = (residual(ix, fx, vx), residual(iy, fy, vy), residual(iz, fz, vz));
+
+        let mut turns = [&STILL; BLOCK];
+        for (turn, place) in turns.iter_mut().zip(places) {
+            *turn = self.turns.get(place.frame()).unwrap_or(&STILL);
+        }
+        let turn = [0, 1, 2].map(|row| R::from_rows(|lane| turns[lane % BLOCK][row]));
+        let back = |axis: usize| turn[0][axis] * rx + turn[1][axis] * ry + turn[2][axis] * rz;
+        let (bx, by, bz) = (back(0), back(1), back(2));
+        let [xx, yy, zz, bound_before] = read_rows::<R>(must_cast_slice(inverse_diagonal), first);
+        let [xy, yz, zx, share_before] = read_rows::<R>(must_cast_slice(inverse_beside), first);
+        let alone = [xx * bx + xy * by + zx * bz, xy * bx + yy * by + yz * bz, zx * bx + yz * by + zz * bz];
+
+        // One over how far its bound has grown, as far as that matters beside its mass.
+        let weight = R::splat(self.scaling.weight);
+        let grown = (mass + weight * bound_before).over(mass + weight * bound);
+        let [_, _, _, height] = read_rows::<R>(must_cast_slice(next), first);
+        let kick = (alone[0] * alone[0] + alone[1] * alone[1] + alone[2] * alone[2]).root();
+        let one = R::splat(1.0);
+        let most = (R::splat(LARGEST_KICK) * height).over(kick);
+        let share = (R::splat(NODE_GROWTH) * grown).min(one).min(most);
+        let keep = R::splat(carry) * share.over(share_before).min(one).root();
+
+        let out = |row: usize| turn[row][0] * alone[0] + turn[row][1] * alone[1] + turn[row][2] * alone[2];
+        let moved =
+            [keep * vx + share * out(0), keep * vy + share * out(1), keep * vz + share * out(2), height];
+        write_rows(must_cast_slice_mut(next), first, moved);
+        write_rows(must_cast_slice_mut(inverse_beside), first, [xy, yz, zx, share]);
+        found.least = grown.min(found.least);
+        let unused = one - share;
+        found.unused = found.unused + unused;
+        found.held = found.held + unused.positive();
+
+        let mut residuals = [[0.0; 4]; BLOCK];
+        write_rows(&mut residuals, 0, [rx, ry, rz, R::splat(0.0)]);
+        for (place, &residual) in places.iter().zip(&residuals) {
+            if let Some(cell) = self.cells.get_mut(self.lattice.cell_number(place.cell())) {
+                cell.add(place, Vec4::from(residual));
+            }
+        }
     }
 }
 
@@ -132,65 +154,87 @@ pub(super) struct Settle<'a, 'b> {
     pub(super) scaling: &'a Scaling,
     pub(super) lattice: &'a Lattice,
     pub(super) places: &'a [LatticeNode],
+    /// What the lattice moves.
+    pub(super) cells: &'a [Cell],
     pub(super) inertia: &'a [NodeInertia],
     pub(super) displacement: &'a [NodeVector],
     pub(super) increment: &'a [NodeVector],
     pub(super) force: &'a mut [NodeVector],
-    pub(super) solution: &'a CoarseVectors,
     pub(super) tables: &'a mut NodeTables<'b>,
 }
 
 impl Kernel for Settle<'_, '_> {
-    type Output = (Sums, Defect);
+    type Output = (Totals, Defects);
 
     #[inline(always)]
-    fn run<R: Real>(self) -> (Sums, Defect) {
-        let (mut sums, mut defect) = (Sums::NONE, Defect::new(self.step, self.scaling));
-        let mut cell = Cell::new();
-        let state = self.inertia.iter().zip(self.displacement).zip(self.increment).zip(self.force);
-        let nodes = state.zip(self.places).zip(self.tables.next.iter_mut());
-        for (((((inertia, displacement), increment), force), place), next) in nodes {
-            if !cell.is(place) {
-                cell.enter(self.lattice, place);
-                cell.read(self.solution);
-            }
-            let alone = Vec4::from(next.0);
-            let moved = inertia.free() * (alone + cell.at(place));
-            next.0 = moved.with_w(alone.w).to_array();
-            force.0[3] = 0.0;
-            let (increment, force) = (Vec4::from(increment.0), Vec4::from(force.0));
-            sums.add(inertia, increment, force, moved, self.step.carry());
-            defect.add(inertia, Vec4::from(displacement.0), increment, force, moved);
+    fn run<R: Real>(mut self) -> (Totals, Defects) {
+        let nodes = self.inertia.len();
+        let whole = nodes - nodes % R::COUNT;
+        let mut sums = self.none::<R>();
+        for first in (0..whole).step_by(R::COUNT) {
+            self.nodes::<R>(first, &mut sums);
         }
-        (sums, defect)
+        let mut rest = self.none::<f32>();
+        for node in whole..nodes {
+            self.nodes::<f32>(node, &mut rest);
+        }
+        let (mut totals, mut defects) = (Totals::default(), Defects::default());
+        totals.add_lanes(&sums.0);
+        totals.add_lanes(&rest.0);
+        defects.add_lanes(&sums.1);
+        defects.add_lanes(&rest.1);
+        (totals, defects)
     }
 }
 
-/// The cell of the node at hand. Its trilinear functions are taken apart into the monomials `1, x, y, xy, z, xz, yz, xyz`
-/// of the position within it, which take fewer operations a node: `vectors` are the monomials' factors, or what is to be
-/// summed with them.
-struct Cell {
-    cell: Option<[u8; 3]>,
-    functions: [usize; 8],
-    vectors: [Vec4; 8],
+/// Sums for each axis.
+type AxisSums<R> = ([Sums<R>; 3], [Defect<R>; 3]);
+
+impl Settle<'_, '_> {
+    #[inline(always)]
+    fn none<R: Real>(&self) -> AxisSums<R> {
+        ([Sums::new(self.step, R::splat); 3], [Defect::new(self.step, self.scaling, R::splat); 3])
+    }
+
+    /// The nodes from `first` on, side by side.
+    #[inline(always)]
+    fn nodes<R: Real>(&mut self, first: usize, (sums, defects): &mut AxisSums<R>) {
+        let mut coarse = [[0.0; 4]; BLOCK];
+        let places = self.places.get(first..first + R::COUNT).unwrap_or_default();
+        for (coarse, place) in coarse.iter_mut().zip(places) {
+            if let Some(cell) = self.cells.get(self.lattice.cell_number(place.cell())) {
+                *coarse = cell.at(place).to_array();
+            }
+        }
+        let coarse = read_rows::<R>(&coarse, 0);
+        let alone = read_rows::<R>(must_cast_slice(self.tables.next), first);
+        let [ix, iy, iz, mass] = read_rows::<R>(must_cast_slice(self.inertia), first);
+        let free = [ix, iy, iz].map(R::positive);
+        let force = read_rows::<R>(must_cast_slice(self.force), first);
+        let increment = read_rows::<R>(must_cast_slice(self.increment), first);
+        let displacement = read_rows::<R>(must_cast_slice(self.displacement), first);
+        let mut moved = alone;
+        for axis in 0..3 {
+            moved[axis] = free[axis] * (alone[axis] + coarse[axis]);
+            let (free, increment, force, next) = (free[axis], increment[axis], force[axis], moved[axis]);
+            sums[axis].add(mass, free, increment, force, next);
+            defects[axis].add(mass, free, displacement[axis], increment, force, next);
+        }
+        write_rows(must_cast_slice_mut(self.tables.next), first, moved);
+        let [x, y, z, _] = force;
+        write_rows(must_cast_slice_mut(self.force), first, [x, y, z, R::splat(0.0)]);
+    }
 }
+
+/// One cell of the lattice. Its trilinear functions are taken apart into the monomials `1, x, y, xy, z, xz, yz, xyz`
+/// of the position within it, which take fewer operations a node: the monomials' factors, or what is to be summed with
+/// them.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(transparent)]
+pub(super) struct Cell([[f32; 4]; 8]);
 
 impl Cell {
-    #[inline(always)]
-    fn new() -> Self {
-        Self { cell: None, functions: [MAX_FUNCTIONS; 8], vectors: [Vec4::ZERO; 8] }
-    }
-
-    #[inline(always)]
-    fn is(&self, place: &LatticeNode) -> bool {
-        self.cell == Some(place.cell())
-    }
-
-    #[inline(always)]
-    fn enter(&mut self, lattice: &Lattice, place: &LatticeNode) {
-        self.cell = Some(place.cell());
-        self.functions = lattice.functions_of(place);
-    }
+    pub(super) const EMPTY: Self = Self([[0.0; 4]; 8]);
 
     /// Adds `W^T v` of a node.
     #[inline(always)]
@@ -198,42 +242,45 @@ impl Cell {
         let [x, y, z] = place.within();
         let (vx, vy) = (x * v, y * v);
         let vxy = y * vx;
-        for (sum, v) in self.vectors.iter_mut().zip([v, vx, vy, vxy, z * v, z * vx, z * vy, z * vxy]) {
-            *sum += v;
+        for (sum, v) in self.0.iter_mut().zip([v, vx, vy, vxy, z * v, z * vx, z * vy, z * vxy]) {
+            *sum = (Vec4::from(*sum) + v).to_array();
         }
-    }
-
-    /// Adds the sums to those of all functions.
-    #[inline(always)]
-    fn flush(&mut self, sums: &mut CoarseVectors) {
-        let [a, b, c, d, e, f, g, h] = self.vectors;
-        let (a, c, e, g) = (a - b, c - d, e - f, g - h);
-        let (a, b, e, f) = (a - c, b - d, e - g, f - h);
-        self.vectors = [a - e, b - f, c - g, d - h, e, f, g, h];
-        for (vector, &function) in self.vectors.iter_mut().zip(&self.functions) {
-            if let Some(sum) = sums.get_mut(function) {
-                sum.0 = (Vec4::from(sum.0) + *vector).to_array();
-            }
-            *vector = Vec4::ZERO;
-        }
-    }
-
-    #[inline(always)]
-    fn read(&mut self, from: &CoarseVectors) {
-        for (vector, &function) in self.vectors.iter_mut().zip(&self.functions) {
-            *vector = Vec4::from(from.get(function).copied().unwrap_or_default().0);
-        }
-        let [a, b, c, d, e, f, g, h] = self.vectors;
-        let (b, d, f, h) = (b - a, d - c, f - e, h - g);
-        let (c, d, g, h) = (c - a, d - b, g - e, h - f);
-        self.vectors = [a, b, c, d, e - a, f - b, g - c, h - d];
     }
 
     /// `W x` of a node.
     #[inline(always)]
     fn at(&self, place: &LatticeNode) -> Vec4 {
         let [x, y, z] = place.within();
-        let [a, b, c, d, e, f, g, h] = self.vectors;
+        let [a, b, c, d, e, f, g, h] = self.0.map(Vec4::from);
         ((a + x * b) + y * (c + x * d)) + z * ((e + x * f) + y * (g + x * h))
+    }
+}
+
+/// Gives the cells' sums to their functions.
+pub(super) fn restrict(cells: &[Cell], lattice: &Lattice) -> CoarseVectors {
+    let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+    for (number, cell) in cells.iter().enumerate() {
+        let [a, b, c, d, e, f, g, h] = cell.0.map(Vec4::from);
+        let (a, c, e, g) = (a - b, c - d, e - f, g - h);
+        let (a, b, e, f) = (a - c, b - d, e - g, f - h);
+        for (vector, function) in
+            [a - e, b - f, c - g, d - h, e, f, g, h].into_iter().zip(lattice.corner_functions(number))
+        {
+            if let Some(sum) = sums.get_mut(function) {
+                sum.0 = (Vec4::from(sum.0) + vector).to_array();
+            }
+        }
+    }
+    sums
+}
+
+/// The factors of each cell, for vectors of the functions.
+pub(super) fn prolong(vectors: &CoarseVectors, lattice: &Lattice, cells: &mut [Cell]) {
+    for (number, cell) in cells.iter_mut().enumerate() {
+        let at = |function: usize| Vec4::from(vectors.get(function).copied().unwrap_or_default().0);
+        let [a, b, c, d, e, f, g, h] = lattice.corner_functions(number).map(at);
+        let (b, d, f, h) = (b - a, d - c, f - e, h - g);
+        let (c, d, g, h) = (c - a, d - b, g - e, h - f);
+        cell.0 = [a, b, c, d, e - a, f - b, g - c, h - d].map(|factor| factor.to_array());
     }
 }

@@ -1,31 +1,35 @@
-//! The refresh of bounds, inertia and coarse inertia, spread over steps: a cycle of five stages (elements,
-//! cells, nodes, two inversions), each step taking an equal part of the whole cycle's work. It only ever looks at
+//! The refresh of bounds, inertia and coarse inertia, spread over steps: a cycle of six stages (elements,
+//! cells, nodes, cells, two inversions), each step taking an equal part of the whole cycle's work. It only ever looks at
 //! the state after an accepted step.
 //!
 //! ```text
 //! elements   D_a (bound) and s_c D^2 / 4 Kc, most of it in sums of the lattice's cells
 //! cells      S = those sums
-//! nodes      N_a; S += (1 + k) Mc, G = W^T (N + reserve m) W, p = W^T (N + reserve m) v
+//! nodes      N_a, Mc and G = W^T (N + reserve m) W in sums of the cells, p = W^T (N + reserve m) v
+//! cells      S += (1 + k) Mc, G
 //! inversions G^-1, then S^-1; N_a and X = S^-1 - G^-1 are in use from then on
 //! ```
 //! The coarse part of the velocity is `c = G^-1 p`, its energy `c^T S c`. As for the nodes
 //! ([`super::node`]), a change of `S` may not add energy: `c` is scaled down to what it had.
 
-use super::assembly::{Assembly, Element, NO_SLOTS, NodeMatrices, NodeSums};
+use bytemuck::must_cast_slice_mut;
+
+use super::assembly::{Assembly, CellSums, Element, NO_SLOTS, NodeMatrices};
 use super::bound::{Bound, MatrixBeside};
 use super::dense::{Row, apply, mirror, stride, sweep};
 use super::frames::{Frames, Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, restrict};
 use super::node::{Scaling, renew};
+use super::passes::Cell;
 use super::report::Tally;
 use super::vectors::NodeTables;
 use super::{COARSE, FINE};
-use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, Scatter, dispatch};
+use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, Scatter, dispatch, write_rows};
 use crate::material::{Law, Local, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::tled::Deformation;
 
-/// The four dense matrices of a lattice.
+/// The four dense matrices of a lattice, and what its cells sum.
 pub(super) struct Matrices<'a> {
     /// `X`, what a step applies.
     pub(super) applied: &'a mut [f32],
@@ -33,30 +37,44 @@ pub(super) struct Matrices<'a> {
     kept: &'a mut [f32],
     /// The next `S`.
     next: &'a mut [f32],
-    /// The next `G`; before, the sums of the cells.
+    /// The next `G`.
     fine: &'a mut [f32],
+    /// For the passes over the nodes.
+    pub(super) cells: &'a mut [Cell],
+    sums: &'a mut [CellSums],
 }
 
-/// Numbers that the matrices of a lattice with this many functions need.
-pub(super) const fn numbers_for(functions: usize) -> usize {
-    4 * 3 * functions * stride(functions)
+/// Numbers of a [`Cell`] and of its sums.
+const CELL_NUMBERS: usize = size_of::<Cell>() / size_of::<f32>();
+const SUM_NUMBERS: usize = size_of::<CellSums>() / size_of::<f32>();
+
+/// Numbers that the matrices of a lattice with this many cells and functions need.
+pub(super) const fn numbers_for(cells: usize, functions: usize) -> usize {
+    4 * 3 * functions * stride(functions) + (CELL_NUMBERS + SUM_NUMBERS) * cells
 }
 
 impl<'a> Matrices<'a> {
-    pub(super) fn split(dense: &'a mut [f32], functions: usize) -> Option<Self> {
+    pub(super) fn split(dense: &'a mut [f32], lattice: &Lattice) -> Option<Self> {
+        let functions = lattice.functions();
         let one = 3 * functions * stride(functions);
         let (applied, rest) = dense.split_at_mut_checked(one)?;
         let (kept, rest) = rest.split_at_mut_checked(one)?;
         let (next, rest) = rest.split_at_mut_checked(one)?;
-        Some(Self { applied, kept, next, fine: rest.get_mut(..one)? })
+        let (fine, rest) = rest.split_at_mut_checked(one)?;
+        let (cells, rest) = rest.split_at_mut_checked(CELL_NUMBERS * lattice.cell_count())?;
+        let sums = rest.get_mut(..SUM_NUMBERS * lattice.cell_count())?;
+        let cells = must_cast_slice_mut(cells.as_chunks_mut::<CELL_NUMBERS>().0);
+        let sums = must_cast_slice_mut(sums.as_chunks_mut::<SUM_NUMBERS>().0);
+        Some(Self { applied, kept, next, fine, cells, sums })
     }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Elements,
-    Cells,
+    ElementCells,
     Nodes,
+    NodeCells,
     Fine,
     Next,
 }
@@ -73,6 +91,8 @@ pub(super) struct Refresh {
     /// Nothing has been computed yet.
     first: bool,
     pub(super) frames: Frames,
+    /// Steps of the state that the frames last looked at.
+    seen: Option<u64>,
     /// Coarse velocity to be taken away by the next step, m a step.
     pub(super) correction: CoarseVectors,
     momentum: CoarseVectors,
@@ -123,14 +143,19 @@ where
     N: AsRef<[NodeInertia]>,
     B: AsRef<[ElementBlock]>,
 {
-    fn assembly<'a>(&'a self, matrix: &'a mut [f32], cells: &'a mut [f32], stride: usize) -> Assembly<'a> {
+    fn assembly<'a>(
+        &'a self,
+        matrix: &'a mut [f32],
+        sums: &'a mut [CellSums],
+        stride: usize,
+    ) -> Assembly<'a> {
         Assembly {
             lattice: self.lattice,
             nodes: self.places,
             inertia: self.scene.inertia(),
             matrix,
             stride,
-            cells: cells.as_chunks_mut().0,
+            sums,
         }
     }
 }
@@ -144,6 +169,7 @@ impl Refresh {
         steps: 1,
         first: true,
         frames: Frames::NONE,
+        seen: None,
         correction: NO_VECTORS,
         momentum: NO_VECTORS,
         share: 1.0,
@@ -156,9 +182,9 @@ impl Refresh {
     /// A cycle of `steps` steps over a scene with this many blocks and nodes.
     pub(super) fn over(steps: u32, blocks: usize, nodes: usize, functions: usize, cells: usize) -> Self {
         let whole = blocks as i64 * BLOCK_COST
-            + cells as i64 * CELL_COST
+            + 2 * cells as i64 * CELL_COST
             + nodes.next_multiple_of(TOGETHER) as i64 * NODE_COST
-            + 6 * functions as i64 * (pivot_cost(functions) + row_cost(functions));
+            + 2 * functions as i64 * (pivots_cost(functions) + 3 * row_cost(functions));
         Self { per_step: whole / i64::from(steps) + 1, steps, ..Self::NEW }
     }
 
@@ -166,9 +192,18 @@ impl Refresh {
         self.steps
     }
 
-    /// One step's part of the cycle.
+    /// Looks where the frames are, if the state has moved since: `steps` is how many it has taken.
+    pub(super) fn look(&mut self, displacement: &[NodeVector], steps: u64) {
+        if self.seen != Some(steps) {
+            self.frames.look(displacement);
+            self.seen = Some(steps);
+        }
+    }
+
+    /// One step's part of the cycle, after step number `steps`.
     pub(super) fn advance<M, N, B>(
         &mut self,
+        steps: u64,
         mut from: Sources<'_, M, N, B>,
         tables: &mut NodeTables<'_>,
         matrices: &mut Matrices<'_>,
@@ -178,7 +213,7 @@ impl Refresh {
         B: AsRef<[ElementBlock]>,
     {
         self.credit += self.per_step;
-        self.frames.look(from.displacement);
+        self.look(from.displacement, steps);
         while self.credit > 0 {
             self.credit -= self.work(&mut from, tables, matrices);
         }
@@ -222,17 +257,17 @@ impl Refresh {
                 if at == 0 {
                     tables.clear_sums();
                     matrices.next.fill(0.0);
-                    matrices.fine.fill(0.0);
+                    matrices.sums.fill(CellSums::NONE);
                     self.frames.start_cycle();
                 }
                 self.elements(from, tables, matrices, at, stride);
                 if self.done >= from.scene.blocks().len() {
-                    self.enter(Stage::Cells);
+                    self.enter(Stage::ElementCells);
                 }
                 BLOCK_COST
             }
-            Stage::Cells => {
-                from.assembly(matrices.next, matrices.fine, stride).add_cell(at);
+            Stage::ElementCells => {
+                from.assembly(matrices.next, matrices.sums, stride).add_cell(at);
                 if self.done >= from.lattice.cell_count() {
                     self.enter(Stage::Nodes);
                 }
@@ -243,32 +278,44 @@ impl Refresh {
                     matrices.fine.fill(0.0);
                     self.momentum = NO_VECTORS;
                 }
-                self.nodes(from, tables, matrices, at * TOGETHER, stride);
+                self.nodes(from, tables, matrices, at * TOGETHER);
                 if self.done * TOGETHER >= from.scene.node_count() {
-                    self.enter(Stage::Fine);
+                    self.enter(Stage::NodeCells);
                 }
                 TOGETHER as i64 * NODE_COST
             }
-            Stage::Fine => {
-                if at < size {
-                    self.sound &= sweep(matrices.fine, size, stride, at);
-                    return pivot_cost(functions);
+            Stage::NodeCells => {
+                let (inertia, mass) = (&mut *matrices.fine, &mut *matrices.next);
+                if let Some(sums) = matrices.sums.get_mut(at) {
+                    NodeMatrices { lattice: from.lattice, inertia, mass, stride }.add_cell(at, sums);
                 }
-                mirror(matrices.fine, stride, at - size, -1.0);
-                mirror(matrices.next, stride, at - size, 1.0);
-                if self.done >= 2 * size {
+                if self.done >= from.lattice.cell_count() {
+                    self.enter(Stage::Fine);
+                }
+                CELL_COST
+            }
+            Stage::Fine => {
+                if at < functions {
+                    self.sound &= sweep(matrices.fine, size, stride, at);
+                    return pivots_cost(functions);
+                }
+                let at = at - functions;
+                mirror(matrices.fine, stride, at, -1.0);
+                mirror(matrices.next, stride, at, 1.0);
+                if at + 1 == size {
                     self.keep_energy(matrices, size, stride);
                     self.enter(Stage::Next);
                 }
                 row_cost(functions)
             }
             Stage::Next => {
-                if at < size {
+                if at < functions {
                     self.sound &= sweep(matrices.next, size, stride, at);
-                    return pivot_cost(functions);
+                    return pivots_cost(functions);
                 }
-                mirror(matrices.next, stride, at - size, -1.0);
-                if self.done >= 2 * size {
+                let at = at - functions;
+                mirror(matrices.next, stride, at, -1.0);
+                if at + 1 == size {
                     self.sound &= self.inverted(matrices, size, stride);
                     tables.put_in_use(self.first);
                     self.put_in_use(matrices);
@@ -306,7 +353,7 @@ impl Refresh {
         let Some(block) = from.scene.blocks().get(at) else {
             return;
         };
-        let assembly = from.assembly(matrices.next, matrices.fine, stride);
+        let assembly = from.assembly(matrices.next, matrices.sums, stride);
         let sums = MatrixBeside { diagonal, beside };
         let material = from.scene.material();
         let frames = &self.frames;
@@ -321,7 +368,6 @@ impl Refresh {
         tables: &mut NodeTables<'_>,
         matrices: &mut Matrices<'_>,
         first: usize,
-        stride: usize,
     ) where
         M: Material,
         N: AsRef<[NodeInertia]>,
@@ -329,7 +375,7 @@ impl Refresh {
     {
         let Self { frames, tally, momentum, first: first_cycle, .. } = self;
         let Sources { scene, increment, lattice, places, scaling, .. } = from;
-        let into = NodeMatrices { lattice, inertia: matrices.fine, mass: matrices.next, stride };
+        let sums = &mut *matrices.sums;
         let first_cycle = *first_cycle;
         let inertia = scene.inertia();
         dispatch(SomeNodes {
@@ -341,7 +387,8 @@ impl Refresh {
             tally,
             momentum,
             tables,
-            into,
+            lattice,
+            sums,
             first,
             first_cycle,
         });
@@ -413,9 +460,9 @@ impl Refresh {
     }
 }
 
-/// A multiplication and an addition for each number of the lower triangle.
-fn pivot_cost(functions: usize) -> i64 {
-    (3 * functions * stride(functions)) as i64
+/// A multiplication and an addition for each number of the lower triangle and each of three pivots.
+fn pivots_cost(functions: usize) -> i64 {
+    3 * (3 * functions * stride(functions)) as i64
 }
 
 fn row_cost(functions: usize) -> i64 {
@@ -447,7 +494,8 @@ struct SomeNodes<'a, 'b> {
     tally: &'a mut Tally,
     momentum: &'a mut CoarseVectors,
     tables: &'a mut NodeTables<'b>,
-    into: NodeMatrices<'a>,
+    lattice: &'a Lattice,
+    sums: &'a mut [CellSums],
     first: usize,
     /// Nothing is in use yet.
     first_cycle: bool,
@@ -457,8 +505,7 @@ impl Kernel for SomeNodes<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<R: Real>(mut self) {
-        let mut sums = NodeSums::NONE;
+    fn run<R: Real>(self) {
         let nodes = self.inertia.iter().zip(self.increment.iter_mut()).zip(self.places).enumerate();
         for (node, ((inertia, increment), place)) in nodes.skip(self.first).take(TOGETHER) {
             let (stiffness, scalar) = self.tables.summed(node);
@@ -478,10 +525,11 @@ impl Kernel for SomeNodes<'_, '_> {
                 }
             }
             let [x, y, z] = renewed.inertia.times(turned.map(|v| v * renewed.velocity));
-            restrict(&self.into.lattice.weights(place), [x, y, z, 0.0], self.momentum);
-            sums.add(place, &renewed.inertia, mass, &mut self.into);
+            restrict(&self.lattice.weights(place), [x, y, z, 0.0], self.momentum);
+            if let Some(sums) = self.sums.get_mut(self.lattice.cell_number(place.cell())) {
+                sums.add_node(place, &renewed.inertia, mass);
+            }
         }
-        sums.flush(&mut self.into);
     }
 }
 
@@ -495,50 +543,21 @@ struct OneBlock<'a, M> {
     weight: f32,
 }
 
+/// What the lattice needs to know of a block's elements: a column of `C` each, and as fourth numbers `V iso`, `V volume`
+/// and nothing.
+type Tangents = [[[f32; 4]; BLOCK]; 3];
+
 impl<M: Material> Kernel for OneBlock<'_, M> {
     type Output = ();
 
     #[inline(always)]
     fn run<R: Real>(mut self) {
-        let mut slots = NO_SLOTS;
         let block = self.block;
-        // The elements one by one, once they have been computed side by side.
-        let (mut iso, mut volume) = ([0.0f32; BLOCK], [0.0f32; BLOCK]);
-        let mut columns = [[[0.0f32; BLOCK]; 3]; 3];
-        let mut turned = [Rotation::NONE; BLOCK];
-        for (lane, turned) in turned.iter_mut().enumerate() {
-            // C in the frame of the element's first node.
-            let place = self.assembly.nodes.get(block.node(0, lane));
-            *turned = self.frames.since_start(place.map_or(MAX_FUNCTIONS, LatticeNode::frame));
-        }
+        let mut tangents = [[[0.0; 4]; BLOCK]; 3];
         for first in (0..BLOCK).step_by(R::COUNT) {
-            let law = M::Law::widen(|lane| self.material.law(block.element(first + lane)));
-            let deformation = Deformation::<R>::of_block(block, first, self.displacement);
-            let local = Local::new::<M::Law>(&law, deformation.invariants);
-            let bound = Bound::<R>::new::<M::Law>(&law, block, first, &deformation, &local);
-            let mut cofactor = [[R::splat(0.0); 3]; 3];
-            for i in 0..3 {
-                for k in 0..3 {
-                    let along = R::from_fn(|lane| turned[(first + lane) % BLOCK].0[k][i]);
-                    for j in 0..3 {
-                        cofactor[i][j] = cofactor[i][j] + along * deformation.cofactor(k, j);
-                    }
-                }
-            }
-            self.sums.add(&bound, block, first, &cofactor);
-            let weight = block.volume::<R>(first) * R::splat(self.weight);
-            let (wide_iso, wide_volume) = (weight * bound.iso, weight * bound.volume);
-            for lane in 0..R::COUNT {
-                let at = (first + lane) % BLOCK;
-                iso[at] = wide_iso.lane(lane);
-                volume[at] = wide_volume.lane(lane);
-                for i in 0..3 {
-                    for j in 0..3 {
-                        columns[j][i][at] = cofactor[i][j].lane(lane);
-                    }
-                }
-            }
+            self.bound::<R>(first, &mut tangents);
         }
+        let mut slots = NO_SLOTS;
         for lane in 0..BLOCK {
             let mut gradients = [[0.0; 3]; 4];
             for corner in 0..3 {
@@ -547,17 +566,47 @@ impl<M: Material> Kernel for OneBlock<'_, M> {
                     gradients[0][axis] -= gradients[corner + 1][axis];
                 }
             }
-            let mut cofactor = [[0.0; 4]; 3];
-            for j in 0..3 {
-                for i in 0..3 {
-                    cofactor[j][i] = columns[j][i][lane];
-                }
-            }
             let nodes = [0, 1, 2, 3].map(|corner| block.node(corner, lane));
-            let element = Element { nodes, gradients, iso: iso[lane], volume: volume[lane], cofactor };
-            if !self.assembly.add_in_cell::<R>(&element) {
+            let columns = tangents.map(|column| column[lane]);
+            let [[_, _, _, iso], [_, _, _, volume], _] = columns;
+            let cofactor = columns.map(|[x, y, z, _]| [x, y, z, 0.0]);
+            let element = Element { nodes, gradients, iso, volume, cofactor };
+            if !self.assembly.add_in_cells::<R>(&element) {
                 self.assembly.add_element(&element, &mut slots);
             }
+        }
+    }
+}
+
+impl<M: Material> OneBlock<'_, M> {
+    /// The bounds of the elements in lanes `first..`, into the sums of their nodes and into `tangents`.
+    #[inline(always)]
+    fn bound<R: Real>(&mut self, first: usize, tangents: &mut Tangents) {
+        let block = self.block;
+        let law = M::Law::widen(|lane| self.material.law(block.element(first + lane)));
+        let deformation = Deformation::<R>::of_block(block, first, self.displacement);
+        let local = Local::new::<M::Law>(&law, deformation.invariants);
+        let bound = Bound::<R>::new::<M::Law>(&law, block, first, &deformation, &local);
+        // C in the frame of the element's first node.
+        let mut turns = [Rotation::NONE; BLOCK];
+        for (lane, turn) in turns.iter_mut().enumerate().take(R::COUNT) {
+            let place = self.assembly.nodes.get(block.node(0, first + lane));
+            *turn = self.frames.since_start(place.map_or(MAX_FUNCTIONS, LatticeNode::frame));
+        }
+        let mut cofactor = [[R::splat(0.0); 3]; 3];
+        for i in 0..3 {
+            for k in 0..3 {
+                let along = R::from_fn(|lane| turns[lane % BLOCK].0[k][i]);
+                for j in 0..3 {
+                    cofactor[i][j] = cofactor[i][j] + along * deformation.cofactor(k, j);
+                }
+            }
+        }
+        self.sums.add(&bound, block, first, &cofactor);
+        let weight = block.volume::<R>(first) * R::splat(self.weight);
+        let beside = [weight * bound.iso, weight * bound.volume, R::splat(0.0)];
+        for (j, (column, beside)) in tangents.iter_mut().zip(beside).enumerate() {
+            write_rows(column, first, [cofactor[0][j], cofactor[1][j], cofactor[2][j], beside]);
         }
     }
 }

@@ -46,10 +46,11 @@ pub(super) struct HeldBack {
 impl HeldBack {
     pub(super) const NONE: Self = Self { nodes: 0, unused: 0.0 };
 
+    /// Adds nodes, and the sum of the shares that they do not use.
     #[inline(always)]
-    pub(super) fn add(&mut self, share: f32) {
-        self.nodes += u32::from(share < 1.0);
-        self.unused += 1.0 - share;
+    pub(super) fn add(&mut self, nodes: f32, unused: f32) {
+        self.nodes += nodes as u32;
+        self.unused += unused;
     }
 }
 

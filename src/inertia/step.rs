@@ -1,6 +1,8 @@
 //! One step with scaled inertia: forces, the fine part of every node with its share of the lattice's force,
 //! the lattice's motion, the account, and only then the state.
 
+use glam::Vec4;
+
 use crate::lanes::{Gather, NodeVector, Scatter, dispatch};
 use crate::loads::Loads;
 use crate::material::{J_FLOOR, Material};
@@ -13,8 +15,8 @@ use super::bound::{MatrixBeside, ScalarBeside};
 use super::dense::{apply, stride};
 use super::estimate::dot;
 use super::frames::{Rotation, turn};
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
-use super::passes::{Prepare, Settle, turns};
+use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
+use super::passes::{Prepare, Settle, prolong, restrict, turns};
 use super::refresh::{Matrices, Refresh, Sources, from_numbers, to_numbers};
 use super::report::Tally;
 use super::vectors::NodeTables;
@@ -98,14 +100,19 @@ where
     };
 
     let places = places.as_ref();
-    refresh.frames.look(displacement);
-    let mut restricted = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    let (held_back, growth, tally) = if no_lattice {
+    let Some(mut matrices) = Matrices::split(dense.as_mut(), lattice) else {
+        return mismatch;
+    };
+    let mut coarse_share = 1.0;
+    let (held_back, tally, (totals, defects)) = if no_lattice {
         let (held_back, tally) = alone::prepare(&step, scaling, nodal, increment, force, &mut tables);
-        (held_back, 1.0, tally)
+        let (step, inertia, tables) = (&step, nodal, &mut tables);
+        let moved = dispatch(alone::Move { step, scaling, inertia, displacement, increment, force, tables });
+        (held_back, tally, moved)
     } else {
-        let (brake, tables, restricted) = (refresh.brake, &mut tables, &mut restricted);
-        let (step, inertia, turns) = (&step, nodal, &turns(&refresh.frames.of_bounds, functions));
+        refresh.look(displacement, *steps);
+        let turns = &turns(&refresh.frames.of_bounds, functions);
+        let (step, inertia, brake, cells) = (&step, nodal, refresh.brake, &mut *matrices.cells);
         let (held_back, growth) = dispatch(Prepare {
             step,
             scaling,
@@ -116,43 +123,27 @@ where
             inertia,
             force,
             increment,
-            tables,
-            restricted,
-        });
-        (held_back, growth, Tally::NEW)
-    };
-    let mut coarse_share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
-
-    let mut matrices = Matrices::split(dense.as_mut(), functions);
-    let mut solution = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    if let (Some(matrices), false) = (&matrices, no_lattice) {
-        coarse_share =
-            coarse_motion(matrices.applied, lattice, &mut restricted, coarse_share, refresh, &mut solution);
-    }
-    let (sums, defect) = if no_lattice {
-        let (displacement, increment) = (&*displacement, &*increment);
-        dispatch(alone::Move {
-            step: &step,
-            scaling,
-            inertia: nodal,
-            displacement,
-            increment,
-            force,
             tables: &mut tables,
-        })
-    } else {
-        dispatch(Settle {
-            step: &step,
+            cells,
+        });
+        if growth > COARSE_GROWTH {
+            coarse_share = COARSE_GROWTH / growth;
+        }
+        coarse_share = coarse_motion(&mut matrices, lattice, coarse_share, refresh);
+        let (tables, cells) = (&mut tables, &*matrices.cells);
+        let moved = dispatch(Settle {
+            step,
             scaling,
             lattice,
             places,
-            inertia: nodal,
+            cells,
+            inertia,
             displacement,
             increment,
             force,
-            solution: &solution,
-            tables: &mut tables,
-        })
+            tables,
+        });
+        (held_back, Tally::NEW, moved)
     };
 
     let tables_next: &[NodeVector] = tables.next;
@@ -160,7 +151,7 @@ where
         let [x, y, z, _] = tables_next.get(node).copied().unwrap_or_default().0;
         [x, y, z, 0.0]
     };
-    let entry = Entry::of_sums(&sums, loads, &step)
+    let entry = Entry::of_totals(&totals, loads, &step)
         .with_forces(loads, nodal, increment, force, *time, next)
         .with_motions(loads, displacement, increment, force, *time, &step);
     let entered = match entry.entered(account, &step) {
@@ -172,13 +163,11 @@ where
     };
 
     *ledger = entered;
-    estimate.advance(&defect, external);
+    estimate.advance(&defects, external, nodes, scaling.k, step.seconds() * step.seconds());
     for ((displacement, increment), next) in displacement.iter_mut().zip(&mut *increment).zip(&*tables.next) {
-        let [x, y, z, _] = next.0;
-        increment.0 = [x, y, z, 0.0];
-        for (position, change) in displacement.0.iter_mut().zip(increment.0) {
-            *position += change;
-        }
+        let next = Vec4::from(next.0).with_w(0.0);
+        increment.0 = next.to_array();
+        displacement.0 = (Vec4::from(displacement.0) + next).to_array();
     }
     *dt = step.seconds();
     *time += f64::from(step.seconds());
@@ -186,12 +175,12 @@ where
     follow_motions(loads, displacement, increment, *time);
     if no_lattice {
         *report = tally.report(held_back.nodes, 1.0, estimate.error());
-    } else if let Some(matrices) = &mut matrices {
+    } else {
         refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
         refresh.share(coarse_share);
         let coarse_weight = 0.25 * COARSE * step.seconds() * step.seconds();
         let sources = Sources { scene, displacement, increment, lattice, places, scaling, coarse_weight };
-        refresh.advance(sources, &mut tables, matrices);
+        refresh.advance(*steps, sources, &mut tables, &mut matrices);
         *report = refresh.published.report(held_back.nodes, coarse_share, estimate.error());
     }
     let least_volume_ratio = 1.0 + extremes.least_j;
@@ -203,23 +192,18 @@ where
     Status::Ok
 }
 
-/// `share (S^-1 - G^-1) W^T r` less the correction that a change of `S` asked for. The share falls where the forces
-/// of one step would strain a cell by more than [`LARGEST_KICK`].
-fn coarse_motion(
-    matrix: &[f32],
-    lattice: &Lattice,
-    restricted: &mut CoarseVectors,
-    mut share: f32,
-    refresh: &Refresh,
-    solution: &mut CoarseVectors,
-) -> f32 {
+/// `share (S^-1 - G^-1) W^T r` less the correction that a change of `S` asked for, from the cells' sums of `r` to what
+/// they move. The share falls where the forces of one step would strain a cell by more than [`LARGEST_KICK`].
+fn coarse_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, mut share: f32, refresh: &Refresh) -> f32 {
     let functions = lattice.functions();
     let (size, stride) = (3 * functions, stride(functions));
-    turn(restricted, &refresh.frames.of_bounds, Rotation::back);
-    let moved = apply(matrix, stride, to_numbers(restricted).get(..size).unwrap_or_default());
-    from_numbers(moved.get(..size).unwrap_or_default(), solution);
-    turn(solution, &refresh.frames.of_bounds, Rotation::out);
-    let strain = lattice.largest_strain(solution);
+    let mut restricted = restrict(matrices.cells, lattice);
+    turn(&mut restricted, &refresh.frames.of_bounds, Rotation::back);
+    let moved = apply(matrices.applied, stride, to_numbers(&restricted).get(..size).unwrap_or_default());
+    let mut solution = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+    from_numbers(moved.get(..size).unwrap_or_default(), &mut solution);
+    turn(&mut solution, &refresh.frames.of_bounds, Rotation::out);
+    let strain = lattice.largest_strain(&solution);
     if share * strain > LARGEST_KICK {
         share = LARGEST_KICK / strain;
     }
@@ -228,5 +212,6 @@ fn coarse_motion(
             *value = share * *value - correction;
         }
     }
+    prolong(&solution, lattice, matrices.cells);
     share
 }

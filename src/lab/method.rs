@@ -97,7 +97,7 @@ impl Method {
                 let mut inertia = Box::new(Inertia::over(
                     vec![NodeVector::ZERO; vectors_for(nodes)],
                     vec![LatticeNode::EMPTY; nodes],
-                    vec![0.0; numbers_for(functions)],
+                    vec![0.0; numbers_for(cells, functions)],
                 ));
                 // Scenes start at rest.
                 let zero = || vec![NodeVector::ZERO; nodes];

@@ -14,7 +14,8 @@ mod wide;
 pub use level::Level;
 pub(crate) use level::{Kernel, dispatch};
 pub use vectors::NodeVector;
-pub(crate) use vectors::{Gather, Scatter};
+use vectors::transpose;
+pub(crate) use vectors::{Gather, Scatter, read_rows, write_rows};
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -30,8 +31,10 @@ pub trait Real:
 
     /// Number `lane` is `at(lane)`.
     fn from_fn(at: impl Fn(usize) -> f32) -> Self;
-    /// Numbers `4 g` to `4 g + 3` are `quad(g)`; a single number is the first of quad 0.
-    fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self;
+    /// Lane `l` of the four takes the four numbers of `row(l)`.
+    fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4];
+    /// Hands the four numbers of each lane to `row`.
+    fn to_rows(columns: [Self; 4], row: impl FnMut(usize, [f32; 4]));
     /// The number in `lane`; lanes that do not exist read as zero.
     fn lane(&self, lane: usize) -> f32;
     /// Applies `f` to each number.
@@ -53,6 +56,11 @@ pub trait Real:
     #[inline(always)]
     fn min(self, other: Self) -> Self {
         self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    /// One where positive, else zero.
+    #[inline(always)]
+    fn positive(self) -> Self {
+        self.map(|a| if a > 0.0 { 1.0 } else { 0.0 })
     }
     /// Magnitude.
     #[inline(always)]
@@ -95,8 +103,12 @@ impl Real for f32 {
         at(0)
     }
     #[inline(always)]
-    fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self {
-        quad(0)[0]
+    fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
+        row(0)
+    }
+    #[inline(always)]
+    fn to_rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
+        row(0, columns);
     }
     #[inline(always)]
     fn lane(&self, lane: usize) -> f32 {
@@ -129,12 +141,26 @@ impl<const L: usize> Real for Lanes<L> {
         Self(out)
     }
     #[inline(always)]
-    fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self {
-        let mut out = [0.0; L];
-        for (group, values) in out.chunks_exact_mut(4).enumerate() {
-            values.copy_from_slice(&quad(group));
+    fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
+        let mut out = [[0.0; L]; 4];
+        for first in (0..L).step_by(4) {
+            let columns = transpose([0, 1, 2, 3].map(|lane| row(first + lane)));
+            for (out, column) in out.iter_mut().zip(columns) {
+                if let Some(out) = out.get_mut(first..first + 4) {
+                    out.copy_from_slice(&column);
+                }
+            }
         }
-        Self(out)
+        out.map(Self)
+    }
+    #[inline(always)]
+    fn to_rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
+        for first in (0..L).step_by(4) {
+            let quads = columns.map(|column| [0, 1, 2, 3].map(|lane| column.lane(first + lane)));
+            for (lane, numbers) in transpose(quads).into_iter().enumerate() {
+                row(first + lane, numbers);
+            }
+        }
     }
     #[inline(always)]
     fn lane(&self, lane: usize) -> f32 {

@@ -24,7 +24,7 @@ impl NodeVector {
 
 /// Four lanes by four components, transposed.
 #[inline(always)]
-fn transpose(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
+pub(super) fn transpose(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
     #[cfg(target_arch = "x86_64")]
     {
         use core::arch::x86_64::{__m128, _mm_movehl_ps, _mm_movelh_ps, _mm_unpackhi_ps, _mm_unpacklo_ps};
@@ -47,6 +47,24 @@ fn transpose(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
     {
         [0, 1, 2, 3].map(|column| rows.map(|row| row[column]))
     }
+}
+
+/// Rows from `first` on, one a lane; zeros if there are fewer.
+#[inline(always)]
+pub(crate) fn read_rows<R: Real>(rows: &[[f32; 4]], first: usize) -> [R; 4] {
+    let rows = rows.get(first..first + R::COUNT).unwrap_or_default();
+    if rows.len() == R::COUNT { R::from_rows(|lane| rows[lane % R::COUNT]) } else { [R::splat(0.0); 4] }
+}
+
+/// Writes rows from `first` on, one a lane; nothing if there are fewer.
+#[inline(always)]
+pub(crate) fn write_rows<R: Real>(rows: &mut [[f32; 4]], first: usize, values: [R; 4]) {
+    let rows = rows.get_mut(first..first + R::COUNT).unwrap_or_default();
+    R::to_rows(values, |lane, value| {
+        if let Some(row) = rows.get_mut(lane) {
+            *row = value;
+        }
+    });
 }
 
 /// Vectors of nodes to read from; there is at least one.
@@ -82,15 +100,7 @@ impl<'a> Gather<'a> {
     /// The same with the fourth component.
     #[inline(always)]
     pub(crate) fn read_all<R: Real>(&self, index: impl Fn(usize) -> usize) -> [R; 4] {
-        if R::COUNT == 1 {
-            return self.read(index(0)).map(R::splat);
-        }
-        let mut columns = [[[0.0; 4]; 4]; super::BLOCK / 4];
-        for group in 0..R::COUNT / 4 {
-            columns[group] = transpose([0, 1, 2, 3].map(|lane| self.read(index(4 * group + lane))));
-        }
-        let axis = |axis: usize| R::from_quads(|group| columns[group][axis]);
-        [axis(0), axis(1), axis(2), axis(3)]
+        R::from_rows(|lane| self.read(index(lane)))
     }
 }
 
@@ -121,15 +131,6 @@ impl<'a> Scatter<'a> {
     /// as the last one.
     #[inline(always)]
     pub(crate) fn add_lanes<R: Real>(&mut self, index: impl Fn(usize) -> usize, values: [R; 4]) {
-        if R::COUNT == 1 {
-            self.add(index(0), values.map(|value| value.lane(0)));
-            return;
-        }
-        for group in 0..R::COUNT / 4 {
-            let columns = values.map(|value| [0, 1, 2, 3].map(|lane| value.lane(4 * group + lane)));
-            for (lane, value) in transpose(columns).into_iter().enumerate() {
-                self.add(index(4 * group + lane), value);
-            }
-        }
+        R::to_rows(values, |lane, value| self.add(index(lane), value));
     }
 }

@@ -7,10 +7,11 @@
 #![allow(unsafe_code)] // The instructions are unsafe to use without that.
 
 use core::arch::x86_64::{
-    __m256, _mm256_add_epi32, _mm256_add_ps, _mm256_and_ps, _mm256_castps_si256, _mm256_castsi256_ps,
-    _mm256_cvtepi32_ps, _mm256_div_ps, _mm256_max_ps, _mm256_min_ps, _mm256_mul_ps, _mm256_set1_epi32,
-    _mm256_set1_ps, _mm256_slli_epi32, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_sub_epi32, _mm256_sub_ps,
-    _mm256_xor_ps,
+    __m256, _CMP_GT_OQ, _mm256_add_epi32, _mm256_add_ps, _mm256_and_ps, _mm256_castps_si256,
+    _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cvtepi32_ps, _mm256_div_ps, _mm256_max_ps, _mm256_min_ps,
+    _mm256_mul_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps,
+    _mm256_slli_epi32, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_sub_epi32, _mm256_sub_ps,
+    _mm256_unpackhi_ps, _mm256_unpacklo_ps, _mm256_xor_ps,
 };
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -71,9 +72,19 @@ impl Real for Avx {
         Self::of(out)
     }
     #[inline(always)]
-    fn from_quads(quad: impl Fn(usize) -> [f32; 4]) -> Self {
-        let ([a, b, c, d], [e, f, g, h]) = (quad(0), quad(1));
-        Self::of([a, b, c, d, e, f, g, h])
+    fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
+        // Rows 0 and 4 side by side and so on; then the halves are transposed at once.
+        transpose([0, 1, 2, 3].map(|lane| Self(bytemuck::must_cast([row(lane), row(lane + 4)]))))
+    }
+    #[inline(always)]
+    fn to_rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
+        let pairs: [[[f32; 4]; 2]; 4] = transpose(columns).map(|pair| bytemuck::must_cast(pair.0));
+        for (lane, [near, _]) in pairs.into_iter().enumerate() {
+            row(lane, near);
+        }
+        for (lane, [_, far]) in pairs.into_iter().enumerate() {
+            row(lane + 4, far);
+        }
     }
     #[inline(always)]
     fn lane(&self, lane: usize) -> f32 {
@@ -111,6 +122,13 @@ impl Real for Avx {
         Self(unsafe { _mm256_min_ps(self.0, other.0) })
     }
     #[inline(always)]
+    fn positive(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe {
+            _mm256_and_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_setzero_ps()), _mm256_set1_ps(1.0))
+        })
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm256_and_ps(self.0, _mm256_castsi256_ps(_mm256_set1_epi32(i32::MAX))) })
@@ -136,6 +154,22 @@ impl Real for Avx {
     #[inline(always)]
     fn inverse_cbrt(self) -> Self {
         super::functions::inverse_cbrt(self)
+    }
+}
+
+/// The two 4 x 4 halves, transposed.
+#[inline(always)]
+fn transpose([a, b, c, d]: [Avx; 4]) -> [Avx; 4] {
+    // SAFETY: as above.
+    unsafe {
+        let (low_ab, high_ab) = (_mm256_unpacklo_ps(a.0, b.0), _mm256_unpackhi_ps(a.0, b.0));
+        let (low_cd, high_cd) = (_mm256_unpacklo_ps(c.0, d.0), _mm256_unpackhi_ps(c.0, d.0));
+        [
+            Avx(_mm256_shuffle_ps::<0x44>(low_ab, low_cd)),
+            Avx(_mm256_shuffle_ps::<0xEE>(low_ab, low_cd)),
+            Avx(_mm256_shuffle_ps::<0x44>(high_ab, high_cd)),
+            Avx(_mm256_shuffle_ps::<0xEE>(high_ab, high_cd)),
+        ]
     }
 }
 

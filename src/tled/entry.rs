@@ -2,8 +2,11 @@
 //! ([`crate::ledger`]): kinetic energy of the mean of the increments before and after `t_n`, and the work of
 //! loads and supports along it, in joules.
 
+use core::ops::{Add, Mul, Sub};
+
 use glam::Vec4;
 
+use crate::lanes::Real;
 use crate::ledger::Ledger;
 use crate::loads::{Loads, ramp_factor};
 use crate::scene::NodeInertia;
@@ -43,30 +46,71 @@ pub(crate) struct Entry {
     pub(crate) jump: f64,
 }
 
-/// Sums over the nodes, a number an axis.
+/// Numbers side by side: the axes of a node, or one axis of several nodes.
+pub(crate) trait Side: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
+
+impl<V: Copy + Add<Output = V> + Sub<Output = V> + Mul<Output = V>> Side for V {}
+
+/// Sums over the nodes.
 #[derive(Clone, Copy)]
-pub(crate) struct Sums {
+pub(crate) struct Sums<V> {
+    one: V,
+    half: V,
+    carry: V,
     /// Mass times the square of the mean increment, kg m^2.
-    kinetic: Vec4,
+    kinetic: V,
     /// Mass times the way, kg m.
-    momentum: Vec4,
+    momentum: V,
     /// Force times the way of what supports lead, N m.
-    led: Vec4,
+    led: V,
 }
 
-impl Sums {
-    pub(crate) const NONE: Self = Self { kinetic: Vec4::ZERO, momentum: Vec4::ZERO, led: Vec4::ZERO };
-
-    /// Adds a node; the fourth numbers must be zero.
+impl<V: Side> Sums<V> {
+    /// Nothing yet; `splat` repeats a number.
     #[inline(always)]
-    pub(crate) fn add(&mut self, at: &NodeInertia, increment: Vec4, force: Vec4, next: Vec4, carry: f32) {
+    pub(crate) fn new(step: &Step, splat: impl Fn(f32) -> V) -> Self {
+        let zero = splat(0.0);
+        let [one, half, carry] = [1.0, 0.5, step.carry].map(splat);
+        Self { one, half, carry, kinetic: zero, momentum: zero, led: zero }
+    }
+
+    /// Adds nodes: masses, ones along free axes, increments, total forces and next increments.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, mass: V, free: V, increment: V, force: V, next: V) {
         // A held axis has no inertia of its own: what moves it is counted as work.
-        let free = at.free();
-        let moving = free * (0.5 * (next + carry * increment));
-        let led = (Vec4::ONE - free) * increment;
-        self.kinetic += at.mass * (moving * moving);
-        self.momentum += at.mass * (free * (0.5 * (next + increment)) + led);
-        self.led += force * led;
+        let moving = free * (self.half * (next + self.carry * increment));
+        let led = (self.one - free) * increment;
+        self.kinetic = self.kinetic + mass * (moving * moving);
+        self.momentum = self.momentum + mass * (free * (self.half * (next + increment)) + led);
+        self.led = self.led + force * led;
+    }
+}
+
+/// What [`Sums`] come to.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Totals {
+    kinetic: f64,
+    momentum: [f64; 3],
+    led: f64,
+}
+
+impl Totals {
+    /// Of sums of the axes side by side; the fourth numbers must be zero.
+    pub(crate) fn of_axes(sums: &Sums<Vec4>) -> Self {
+        let total = |sums: Vec4| -> f64 { sums.to_array().into_iter().map(f64::from).sum() };
+        let [x, y, z, _] = sums.momentum.to_array().map(f64::from);
+        Self { kinetic: total(sums.kinetic), momentum: [x, y, z], led: total(sums.led) }
+    }
+
+    /// Adds sums of nodes side by side, one for each axis.
+    pub(crate) fn add_lanes<R: Real>(&mut self, sums: &[Sums<R>; 3]) {
+        for (sums, momentum) in sums.iter().zip(&mut self.momentum) {
+            for lane in 0..R::COUNT {
+                self.kinetic += f64::from(sums.kinetic.lane(lane));
+                *momentum += f64::from(sums.momentum.lane(lane));
+                self.led += f64::from(sums.led.lane(lane));
+            }
+        }
     }
 }
 
@@ -81,24 +125,25 @@ impl Entry {
         step: &Step,
         next: impl Next,
     ) -> Self {
-        let mut sums = Sums::NONE;
+        let mut sums = Sums::new(step, Vec4::splat);
         for (node, ((inertia, increment), force)) in inertia.iter().zip(increment).zip(force).enumerate() {
             let next = Vec4::from(next(node, inertia, increment, force));
-            sums.add(inertia, Vec4::from(increment.0), Vec4::from(force.0), next, step.carry);
+            let (mass, increment, force) =
+                (Vec4::splat(inertia.mass), Vec4::from(increment.0), Vec4::from(force.0));
+            sums.add(mass, inertia.free(), increment, force, next);
         }
-        Self::of_sums(&sums, loads, step)
+        Self::of_totals(&Totals::of_axes(&sums), loads, step)
     }
 
-    pub(crate) fn of_sums(sums: &Sums, loads: &Loads<'_>, step: &Step) -> Self {
-        let total = |sums: Vec4| -> f64 { sums.to_array().into_iter().map(f64::from).sum() };
-        let (dt, kinetic) = (f64::from(step.dt), total(sums.kinetic));
-        let gravity = loads.gravity().into_iter().zip(sums.momentum.to_array());
-        let gravity: f64 = gravity.map(|(g, momentum)| f64::from(g) * f64::from(momentum)).sum();
+    pub(crate) fn of_totals(totals: &Totals, loads: &Loads<'_>, step: &Step) -> Self {
+        let dt = f64::from(step.dt);
+        let gravity = loads.gravity().into_iter().zip(totals.momentum);
+        let gravity: f64 = gravity.map(|(g, momentum)| f64::from(g) * momentum).sum();
         Self {
-            finite: kinetic.is_finite(),
-            kinetic: 0.5 * kinetic / (dt * dt),
+            finite: totals.kinetic.is_finite(),
+            kinetic: 0.5 * totals.kinetic / (dt * dt),
             // What a support exerts is minus the total force on its node.
-            work: gravity - 0.5 * total(sums.led),
+            work: gravity - 0.5 * totals.led,
             jump: 0.0,
         }
     }

@@ -32,7 +32,7 @@ use crate::state::{NodeVector, State};
 use element::Nothing;
 pub(crate) use element::{Beside, Deformation, Extremes};
 use entry::next_increment;
-pub(crate) use entry::{Entry, Next, Sums};
+pub(crate) use entry::{Entry, Next, Side, Sums, Totals};
 
 /// Coefficients of the integration.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -52,7 +52,7 @@ impl Method {
         };
         let nodes = body.points.len();
         let mut inertia =
-            over(vectors_for(nodes), if functions > 0 { nodes } else { 0 }, numbers_for(functions));
+            over(vectors_for(nodes), if functions > 0 { nodes } else { 0 }, numbers_for(cells, functions));
         inertia.prepare(scene, &body.points, state, step, cells).unwrap();
         assert_eq!(inertia.functions(), functions);
         inertia

@@ -32,14 +32,15 @@ fn refused(
 fn what_cannot_be_prepared_is_said_and_no_step_is_taken() {
     let nodes = small_bar().points.len();
     assert_eq!(nodes, 96);
-    let roomy = || over(vectors_for(nodes), nodes, numbers_for(128));
+    let roomy = || over(vectors_for(nodes), nodes, numbers_for([4; 3], 128));
     let nothing = |_: &HostScene<_>, _: &mut Vec<_>, _: &mut HostState| {};
     let said = |error: InertiaError, text: &str| assert_eq!(error.to_string(), text);
 
     let error = refused(&mut over(vectors_for(nodes) - 1, nodes, 0), [0; 3], nothing);
     assert_eq!(error, InertiaError::Capacity { kind: "vectors", needed: 480, capacity: 479 });
     said(error, "the inertia needs 480 vectors, there is room for 479");
-    let error = refused(&mut over(vectors_for(nodes), nodes - 1, numbers_for(128)), [1, 1, 2], nothing);
+    let error =
+        refused(&mut over(vectors_for(nodes), nodes - 1, numbers_for([4; 3], 128)), [1, 1, 2], nothing);
     said(error, "the inertia needs 96 lattice nodes, there is room for 95");
     let error = refused(&mut over(vectors_for(nodes), nodes, 10), [1, 1, 2], nothing);
     assert!(matches!(error, InertiaError::Capacity { kind: "numbers", capacity: 10, .. }));

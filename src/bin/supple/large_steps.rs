@@ -57,7 +57,7 @@ impl Grid {
         let places = if self.functions > 0 { nodes } else { 0 };
         vectors_for(nodes) * size_of::<NodeVector>()
             + places * size_of::<LatticeNode>()
-            + numbers_for(self.functions) * size_of::<f32>()
+            + numbers_for(self.cells, self.functions) * size_of::<f32>()
     }
 
     /// The inertia for steps of one length from the state as it is.
@@ -70,7 +70,7 @@ impl Grid {
     ) -> Result<HostInertia, InertiaError> {
         let nodes = scene.node_count();
         let (places, numbers) =
-            if self.functions > 0 { (nodes, numbers_for(self.functions)) } else { (0, 0) };
+            if self.functions > 0 { (nodes, numbers_for(self.cells, self.functions)) } else { (0, 0) };
         let mut inertia = inertia::Inertia::over(
             vec![NodeVector::ZERO; vectors_for(nodes)],
             vec![LatticeNode::EMPTY; places],
