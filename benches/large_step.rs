@@ -14,14 +14,16 @@ use supple::scene::{ElementBlock, NodeInertia, Scene, Support, blocks_for};
 use supple::state::{NodeVector, State};
 use supple::tled::{self, Status, Step};
 
-/// The paper's step, s, and how many times longer the steps of the scaled methods are.
+/// The paper's step, s, and how many times longer the steps of the scaled methods are, with the steps of their refresh
+/// cycles.
 const DT: f32 = 3e-5;
 const MULTIPLE: f32 = 20.0;
+const CYCLE: u32 = 64;
+const LONGEST: f32 = 100.0;
+const SHORT_CYCLE: u32 = 16;
 const DAMPING: f32 = 20.0;
 const LATTICE: [u32; 3] = [2, 2, 4];
 const PAIRS: usize = 41;
-/// Steps of a refresh cycle at this step.
-const CYCLE: u32 = 64;
 
 type BarScene = Scene<Tissue<Exponential>, Vec<NodeInertia>, Vec<ElementBlock>>;
 
@@ -39,8 +41,9 @@ fn scaled<'a>(
     scene: &'a BarScene,
     loads: &'a Loads<'a>,
     points: &[[f32; 3]],
-    step: Step,
+    multiple: f32,
     cells: [u32; 3],
+    cycle: u32,
 ) -> impl FnMut() + 'a {
     let nodes = points.len();
     let functions = if cells == [0; 3] {
@@ -54,11 +57,12 @@ fn scaled<'a>(
         vec![LatticeNode::EMPTY; nodes],
         vec![0.0; numbers_for(cells, functions)],
     );
+    let step = Step::insist(multiple * DT, DAMPING).expect("a positive step");
     inertia.prepare(scene, points, &mut state, step, cells).expect("the bar can be prepared");
-    assert_eq!(inertia.cycle(), CYCLE);
+    assert_eq!(inertia.cycle(), cycle);
     let mut run = move || moved(inertia::step(scene, loads, &mut state, &mut inertia));
     // Whole cycles.
-    (0..8 * CYCLE).for_each(|_| run());
+    (0..8 * cycle).for_each(|_| run());
     run
 }
 
@@ -108,11 +112,11 @@ fn main() {
     let mut exact_state = state(points.len());
     let critical = tled::critical_step(&scene, &mut exact_state).expect("the bar has a critical step");
     let small = Step::new(DT, DAMPING, critical).expect("dt is below the critical step");
-    let large = Step::insist(MULTIPLE * DT, DAMPING).expect("a positive step");
     let mut exact = || moved(tled::step(&scene, &loads, &mut exact_state, &small));
     (0..8_000).for_each(|_| exact());
-    let mut mass_scaled = scaled(&scene, &loads, &points, large, [0; 3]);
-    let mut multilevel = scaled(&scene, &loads, &points, large, LATTICE);
+    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, [0; 3], CYCLE);
+    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, LATTICE, CYCLE);
+    let mut longest = scaled(&scene, &loads, &points, LONGEST, LATTICE, SHORT_CYCLE);
 
     let mut group = criterion.benchmark_group("large step");
     group.throughput(Throughput::Elements(tets.len() as u64));
@@ -121,24 +125,28 @@ fn main() {
     group.bench_function(BenchmarkId::from_parameter("multilevel"), |b| b.iter(&mut multilevel));
     group.finish();
 
-    let (mut times, mut by_scaling, mut by_lattice) = (Vec::new(), Vec::new(), Vec::new());
+    let mut times = Vec::new();
+    let mut ratios = [const { Vec::new() }; 3];
     for _ in 0..PAIRS {
-        let [one, scaling, lattice] = [
-            seconds(|| (0..CYCLE).for_each(|_| exact())),
-            seconds(|| (0..CYCLE).for_each(|_| mass_scaled())),
-            seconds(|| (0..CYCLE).for_each(|_| multilevel())),
+        let steps = 4 * SHORT_CYCLE;
+        let one = seconds(|| (0..CYCLE).for_each(|_| exact())) / f64::from(CYCLE);
+        let others = [
+            seconds(|| (0..CYCLE).for_each(|_| mass_scaled())) / f64::from(CYCLE),
+            seconds(|| (0..CYCLE).for_each(|_| multilevel())) / f64::from(CYCLE),
+            seconds(|| (0..steps).for_each(|_| longest())) / f64::from(steps),
         ];
-        times.push(one / f64::from(CYCLE));
-        by_scaling.push(scaling / one);
-        by_lattice.push(lattice / one);
+        times.push(one);
+        for (ratios, other) in ratios.iter_mut().zip(others) {
+            ratios.push(other / one);
+        }
     }
+    let [mass_scaled_ratio, multilevel_ratio, longest_ratio] = ratios.map(median);
     let most = phases(&mut multilevel).into_iter().fold(0.0, f64::max);
     println!(
-        "exact {:.0} us a step; mass-scaled {:.2} times that, multilevel {:.2} times; \
-         the dearest step of a cycle {most:.2} times their mean",
+        "exact {:.0} us a step; at {MULTIPLE} times its length mass-scaled {mass_scaled_ratio:.2} times that, multilevel \
+         {multilevel_ratio:.2} times; the dearest step of a cycle {most:.2} times their mean; at {LONGEST} times its \
+         length, where a cycle has {SHORT_CYCLE} steps, multilevel {longest_ratio:.2} times",
         median(times) * 1e6,
-        median(by_scaling),
-        median(by_lattice)
     );
     criterion.final_summary();
 }

@@ -13,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
-use crate::lanes::{Lanes, Real};
+use crate::lanes::{Lanes, Real, write_rows};
 use crate::scene::NodeInertia;
 use crate::symmetric::Symmetric;
 
@@ -115,6 +115,16 @@ impl<R: Real> Corners<R> {
         Self { slopes, images }
     }
 
+    /// Images and slopes of each corner, padded.
+    #[inline(always)]
+    fn by_corner(&self) -> [[[f32; 4]; CORNERS]; 2] {
+        let mut corners = [[[0.0; 4]; CORNERS]; 2];
+        for ([x, y, z], rows) in [self.images, self.slopes].into_iter().zip(&mut corners) {
+            write_rows(rows, 0, [x, y, z, R::splat(0.0)]);
+        }
+        corners
+    }
+
     #[inline(always)]
     fn masked(&self, mask: R) -> Self {
         let [p, q, r] = self.slopes;
@@ -124,27 +134,31 @@ impl<R: Real> Corners<R> {
 }
 
 /// The cell that all nodes of an element are in, or the lower one of two neighbours along an axis.
-struct Home {
-    cell: [u8; 3],
-    across: Option<usize>,
+pub(super) struct Home {
+    cell: usize,
+    pub(super) across: Option<usize>,
+    /// Along which axes each node is beyond the cell: one, else zero.
+    beyond: [[f32; 3]; 4],
 }
 
 impl Assembly<'_> {
     /// Where an element is, if it is in one or two cells and its nodes are wholly free or wholly held.
     #[inline(always)]
-    fn home(&self, nodes: &[usize; 4]) -> Option<Home> {
+    pub(super) fn home(&self, nodes: &[usize; 4]) -> Option<Home> {
         let (mut low, mut high) = ([u8::MAX; 3], [0; 3]);
-        for &node in nodes {
+        let mut places = [[0; 3]; 4];
+        for (&node, place) in nodes.iter().zip(&mut places) {
             let (at, inertia) = (self.nodes.get(node)?, self.inertia.get(node)?);
             let [x, y, z, _] = inertia.free().to_array();
             if x != y || y != z {
                 return None;
             }
-            let (cell, within) = (at.cell(), at.within());
+            *place = self.lattice.place_of(at.cell());
+            let within = at.within();
             for axis in 0..3 {
                 // A node on the border of two cells is in both.
-                let least = cell[axis];
-                let most = if within[axis] > 0.0 || least == 0 { least } else { least - 1 };
+                let least = place[axis];
+                let most = least.saturating_sub(u8::from(within[axis] <= 0.0));
                 low[axis] = if least < low[axis] { least } else { low[axis] };
                 high[axis] = if most > high[axis] { most } else { high[axis] };
             }
@@ -158,7 +172,8 @@ impl Assembly<'_> {
                 across = Some(axis);
             }
         }
-        Some(Home { cell: low, across })
+        let beyond = places.map(|place| [0, 1, 2].map(|axis| f32::from(place[axis].wrapping_sub(low[axis]))));
+        Some(Home { cell: self.lattice.cell_number(low), across, beyond })
     }
 
     /// Adds the stiffness bound of an element to the sums of the cell that it is in, or of the two. Says whether it could.
@@ -167,18 +182,18 @@ impl Assembly<'_> {
         if R::COUNT != CORNERS {
             return false;
         }
-        let Some(Home { cell, across }) = self.home(&element.nodes) else {
+        let Some(Home { cell, across, beyond }) = self.home(&element.nodes) else {
             return false;
         };
         // Along the axis across, the layers of functions of two cells are numbered 0, 1, 2: `near` has 0 and 1, `far` 1
         // and 2.
         let (mut near, mut far) = ([R::splat(0.0); 3], [R::splat(0.0); 3]);
-        for (&node, gradient) in element.nodes.iter().zip(&element.gradients) {
+        for ((&node, gradient), beyond) in element.nodes.iter().zip(&element.gradients).zip(beyond) {
             let (Some(at), Some(inertia)) = (self.nodes.get(node), self.inertia.get(node)) else {
                 return false;
             };
             let free = inertia.free().x;
-            let weights = at.corner_weights::<R>(cell, across);
+            let weights = at.corner_weights::<R>(beyond, across);
             for axis in 0..3 {
                 let slope = R::splat(free * gradient[axis]);
                 near[axis] = near[axis] + weights[0] * slope;
@@ -188,24 +203,21 @@ impl Assembly<'_> {
             }
         }
         let near = Corners::new(near, element);
-        let first = self.lattice.cell_number(cell);
-        let Some(sums) = self.sums.get_mut(first) else {
+        let Some(sums) = self.sums.get_mut(cell) else {
             return false;
         };
         sums.add_products(element, &near, |_| near);
         if let Some(axis) = across {
             let far = Corners::new(far, element);
-            let mut cell = cell;
-            cell[axis] += 1;
-            let second = self.lattice.cell_number(cell);
-            let Some(sums) = self.sums.get_mut(second) else {
+            let next = cell + self.lattice.next_along(axis);
+            let Some(sums) = self.sums.get_mut(next) else {
                 return false;
             };
             // What both have, layer 1 with itself, once.
             let last = R::from_fn(|corner| if corner >> axis & 1 == 1 { 1.0 } else { 0.0 });
             let beyond = far.masked(last);
             sums.add_products(element, &far, |corner| if corner >> axis & 1 == 1 { far } else { beyond });
-            self.add_ends(element, axis, [first, second], [near, far]);
+            self.add_ends(element, axis, [cell, next], &near, &far);
         }
         true
     }
@@ -217,37 +229,35 @@ impl Assembly<'_> {
         element: &Element,
         axis: usize,
         cells: [usize; 2],
-        corners: [Corners<R>; 2],
+        near: &Corners<R>,
+        far: &Corners<R>,
     ) {
-        let functions = cells.map(|cell| self.lattice.corner_functions(cell));
-        let by_axis = |[x, y, z]: [R; 3]| [store(x), store(y), store(z)];
-        let slopes = [by_axis(corners[0].slopes), by_axis(corners[1].slopes)];
-        let images = [by_axis(corners[0].images), by_axis(corners[1].images)];
-        let at = |of: &[[[f32; CORNERS]; 3]; 2], end: usize, corner: usize| {
-            let [x, y, z] = of[end].map(|row| row[corner % CORNERS]);
-            Vec4::new(x, y, z, 0.0)
-        };
-        for c in 0..CORNERS {
-            for d in 0..CORNERS {
-                if c >> axis & 1 == 1 || d >> axis & 1 == 0 {
-                    continue;
-                }
-                let (first, last) = (functions[0][c], functions[1][d]);
+        let [low, high] = cells.map(|cell| self.lattice.functions_of(cell));
+        let ([images, slopes], [far_images, far_slopes]) = (near.by_corner(), far.by_corner());
+        // Of the four corners across the axis.
+        let corner = |number: usize| (number >> axis) << (axis + 1) | number & ((1 << axis) - 1);
+        for c in [0, 1, 2, 3].map(corner) {
+            let (image, slope) = (Vec4::from(images[c % CORNERS]), Vec4::from(slopes[c % CORNERS]));
+            for d in [0, 1, 2, 3].map(|number| corner(number) | 1 << axis) {
+                let (first, last) = (low[c % CORNERS], high[d % CORNERS]);
                 if first >= MAX_FUNCTIONS || last >= MAX_FUNCTIONS {
                     continue;
                 }
-                let ends = [(0, c), (1, d)];
-                let [low, high] = if first < last { ends } else { [ends[1], ends[0]] };
-                let (row, column) = if first < last { (last, first) } else { (first, last) };
-                let all = element.iso * at(&slopes, low.0, low.1).dot(at(&slopes, high.0, high.1));
-                let (along, down) = (at(&images, low.0, low.1), element.volume * at(&images, high.0, high.1));
-                let Some(rest) = self.matrix.get_mut(3 * row * self.stride..) else {
+                let far_image = Vec4::from(far_images[d % CORNERS]);
+                let all = element.iso * slope.dot(Vec4::from(far_slopes[d % CORNERS]));
+                let (row, down, column, along) = if first < last {
+                    (last, far_image, first, image)
+                } else {
+                    (first, image, last, far_image)
+                };
+                let [x, y, z, _] = (element.volume * down).to_array();
+                let Some(lines) = self.matrix.get_mut(3 * row * self.stride..) else {
                     continue;
                 };
-                for (axis, unit) in [Vec4::X, Vec4::Y, Vec4::Z].into_iter().enumerate() {
-                    if let Some(line) = rest.get_mut(axis * self.stride..) {
-                        add_four(line, 3 * column, down[axis] * along + all * unit);
-                    }
+                let values =
+                    [x * along + all * Vec4::X, y * along + all * Vec4::Y, z * along + all * Vec4::Z];
+                for (line, values) in lines.chunks_exact_mut(self.stride).zip(values) {
+                    add_four(line, 3 * column, values);
                 }
             }
         }
@@ -258,7 +268,7 @@ impl Assembly<'_> {
         let Some(sums) = self.sums.get_mut(number) else {
             return;
         };
-        let functions = self.lattice.corner_functions(number);
+        let functions = self.lattice.functions_of(number);
         for (c, d, row, column) in pairs(functions) {
             let at = |block: usize, c: usize, d: usize| sums.0[c % CORNERS][block][d % CORNERS];
             let all = at(6, c, d);
@@ -410,7 +420,7 @@ pub(super) struct NodeMatrices<'a> {
 impl NodeMatrices<'_> {
     /// Adds the sums of cell `number`, and makes room for the next ones.
     pub(super) fn add_cell(&mut self, number: usize, sums: &mut CellSums) {
-        for (c, d, row, column) in pairs(self.lattice.corner_functions(number)) {
+        for (c, d, row, column) in pairs(self.lattice.functions_of(number)) {
             let [xx, yy, zz, xy, yz, zx, mx, my, mz] = sums.0[c % CORNERS].map(|row| row[d % CORNERS]);
             let rows = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
             add_block(self.inertia, self.stride, row, column, rows);

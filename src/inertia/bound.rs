@@ -121,16 +121,15 @@ fn scalar_bound<R: Real>(
     block: &ElementBlock,
     first: usize,
 ) -> R {
-    let (zero, three) = (R::splat(0.0), R::splat(3.0));
-    let square = at.i * at.i * R::splat(1.0 / 3.0);
-    let cofactor = three + (at.i + at.i) + square;
-    let distortion = three * at.i + square - R::splat(6.0) * at.j;
+    let (zero, third) = (R::splat(0.0), R::splat(1.0 / 3.0));
+    let i1 = at.i + R::splat(3.0);
+    let cofactor = i1 * i1 * third;
+    let distortion = (i1 + cofactor) - R::splat(6.0) * (at.j + R::splat(1.0));
     let &Coefficients { p1, p_j, cc, ce, ee, floor } = coefficients;
-    let mixed = R::splat(MIXED) * ce.abs();
-    let geometric = p1 + p_j.abs() * (at.i * R::splat(1.0 / 3.0) + R::splat(2.0));
-    let iso = geometric + (ee + mixed) * distortion.max(zero);
+    let geometric = p1 + p_j.abs() * (i1 * third + R::splat(1.0));
+    let rest = ee * distortion + R::splat(MIXED) * ce.abs() * (distortion + cofactor);
     let spread = block.volume::<R>(first) * block.spread::<R>(first);
-    spread * (iso + (R::splat(WEIGHT) * (cc.max(zero) + floor) + mixed) * cofactor)
+    spread * (geometric + rest + R::splat(WEIGHT) * (cc.max(zero) + floor) * cofactor)
 }
 
 /// `iso` and `volume` of a chunk of elements, Pa.

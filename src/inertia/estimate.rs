@@ -27,11 +27,15 @@ pub(super) struct Estimate {
 
 /// Sum over the nodes in a fixed order, whatever the instruction set.
 pub(super) fn dot(a: &[NodeVector], b: &[NodeVector]) -> f32 {
-    let mut sums = Vec4::ZERO;
-    for (a, b) in a.iter().zip(b) {
-        sums += Vec4::from(a.0) * Vec4::from(b.0);
+    // Several sums: each addition waits for the one before.
+    let mut sums = [Vec4::ZERO; 4];
+    for (a, b) in a.chunks(4).zip(b.chunks(4)) {
+        for ((a, b), sum) in a.iter().zip(b).zip(&mut sums) {
+            *sum += Vec4::from(a.0) * Vec4::from(b.0);
+        }
     }
-    along_axes(sums)
+    let [a, b, c, d] = sums;
+    along_axes((a + b) + (c + d))
 }
 
 /// The fourth numbers of a node's vectors mean something else.

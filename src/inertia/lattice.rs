@@ -6,6 +6,7 @@
 use core::array;
 
 use bytemuck::{Pod, Zeroable};
+use glam::Vec4;
 
 use super::InertiaError;
 use crate::lanes::{NodeVector, Real};
@@ -23,10 +24,11 @@ const LEAST_MASS: f32 = 0.02;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct LatticeNode {
-    /// The cell; no axis has room for more than 255.
-    cell: [u8; 3],
+    /// Number of the cell.
+    cell: u16,
     /// The function whose frame it turns with; [`MAX_FUNCTIONS`] for none.
     frame: u8,
+    spare: u8,
     /// Position in the cell, 0 to 1.
     within: [f32; 3],
 }
@@ -39,8 +41,8 @@ impl LatticeNode {
     }
 
     #[inline(always)]
-    pub(super) fn cell(&self) -> [u8; 3] {
-        self.cell
+    pub(super) fn cell(&self) -> usize {
+        usize::from(self.cell)
     }
 
     /// See the field.
@@ -60,17 +62,20 @@ impl LatticeNode {
 
     /// Weights of the functions at the corners of a cell, which the node is in or on the border of. With an axis
     /// `across` it may also be in the next cell along that: first come the weights of the corners of `cell`, then those of
-    /// the next.
+    /// the next. `beyond` tells along which axes it is (one, else zero).
     #[inline(always)]
-    pub(super) fn corner_weights<R: Real>(&self, cell: [u8; 3], across: Option<usize>) -> [R; 2] {
+    pub(super) fn corner_weights<R: Real>(&self, beyond: [f32; 3], across: Option<usize>) -> [R; 2] {
         let mut weights = [R::splat(1.0); 2];
+        let [x, y, z] = self.within;
+        let place = Vec4::new(x, y, z, 0.0) + Vec4::new(beyond[0], beyond[1], beyond[2], 0.0);
+        // Of the three layers of functions along each axis.
+        let first = (Vec4::ONE - place).max(Vec4::ZERO).to_array();
+        let third = (place - Vec4::ONE).max(Vec4::ZERO).to_array();
+        let second = (Vec4::ONE - (place - Vec4::ONE).abs()).to_array();
         for axis in 0..3 {
-            // Of the three layers of functions along this axis.
-            let (beyond, within) = (self.cell[axis] > cell[axis], self.within[axis]);
-            let layers = if beyond { [0.0, 1.0 - within, within] } else { [1.0 - within, within, 0.0] };
             let far = R::from_fn(|corner| if corner >> axis & 1 == 1 { 1.0 } else { 0.0 });
             let near = R::from_fn(|corner| if corner >> axis & 1 == 1 { 0.0 } else { 1.0 });
-            let [first, second, third] = layers.map(R::splat);
+            let [first, second, third] = [first[axis], second[axis], third[axis]].map(R::splat);
             let along = near * first + far * second;
             weights[0] = weights[0] * along;
             if across.is_some() {
@@ -82,7 +87,7 @@ impl LatticeNode {
     }
 
     /// In the first cell.
-    pub const EMPTY: Self = Self { cell: [0; 3], frame: DROPPED, within: [0.0; 3] };
+    pub const EMPTY: Self = Self { cell: 0, frame: DROPPED, spare: 0, within: [0.0; 3] };
 }
 
 /// Cells along each axis and the functions that were kept.
@@ -95,11 +100,19 @@ pub(super) struct Lattice {
     functions: usize,
     /// Function of each lattice point; [`MAX_FUNCTIONS`] for a dropped one.
     of_point: [u8; MAX_POINTS],
+    /// Where each cell is along the axes; none has room for more than 255.
+    of_cell: [[u8; 3]; MAX_POINTS],
 }
 
 impl Lattice {
-    pub(super) const NONE: Self =
-        Self { cells: [0; 3], low: [0.0; 3], size: [0.0; 3], functions: 0, of_point: [DROPPED; MAX_POINTS] };
+    pub(super) const NONE: Self = Self {
+        cells: [0; 3],
+        low: [0.0; 3],
+        size: [0.0; 3],
+        functions: 0,
+        of_point: [DROPPED; MAX_POINTS],
+        of_cell: [[0; 3]; MAX_POINTS],
+    };
 
     pub(super) const fn functions(&self) -> usize {
         self.functions
@@ -121,12 +134,16 @@ impl Lattice {
             return Err(InertiaError::Cells { cells });
         }
         let (low, size) = bounding_box(points);
-        let mut lattice = Self { cells, low, size, functions: 0, of_point: [DROPPED; MAX_POINTS] };
+        let mut lattice = Self { cells, low, size, ..Self::NONE };
+        let [along, across, _] = cells.map(|count| count as usize);
+        for (number, place) in lattice.of_cell.iter_mut().enumerate() {
+            *place = [number % along, number / along % across, number / along / across].map(|at| at as u8);
+        }
         let mut mass = [0.0f32; MAX_POINTS];
         for (&point, inertia) in points.iter().zip(inertia) {
             let free = inertia.inverse.iter().filter(|&&inverse| inverse > 0.0).count() as f32 / 3.0;
             let node = lattice.place(point);
-            for (point, weight) in lattice.corner_points(&node).into_iter().zip(node.eight_weights()) {
+            for (point, weight) in lattice.corner_points(node.cell()).into_iter().zip(node.eight_weights()) {
                 if let Some(mass) = mass.get_mut(point) {
                     *mass += inertia.mass * weight * free;
                 }
@@ -148,14 +165,17 @@ impl Lattice {
     /// Where a point is.
     pub(super) fn place(&self, point: [f32; 3]) -> LatticeNode {
         let mut node = LatticeNode::EMPTY;
+        let mut cell_along = [0; 3];
         for axis in 0..3 {
             let (count, size) = (self.cells[axis], self.size[axis]);
             let place = if size > 0.0 { (point[axis] - self.low[axis]) / size * count as f32 } else { 0.0 };
             // Rounding may take the last node just beyond the box.
             let cell = (place as u32).min(count.saturating_sub(1));
-            node.cell[axis] = cell as u8;
+            cell_along[axis] = cell;
             node.within[axis] = (place - cell as f32).clamp(0.0, 1.0);
         }
+        let [i, j, k] = cell_along;
+        node.cell = (i + self.cells[0] * (j + self.cells[1] * k)) as u16;
         node
     }
 
@@ -174,10 +194,10 @@ impl Lattice {
         node
     }
 
-    /// Lattice points at the corners of a node's cell.
+    /// Lattice points at the corners of a cell.
     #[inline(always)]
-    fn corner_points(&self, node: &LatticeNode) -> [usize; 8] {
-        let [i, j, k] = node.cell.map(usize::from);
+    fn corner_points(&self, cell: usize) -> [usize; 8] {
+        let [i, j, k] = self.place_of(cell).map(usize::from);
         let row = self.cells[0] as usize + 1;
         let layer = row * (self.cells[1] as usize + 1);
         let first = i + j * row + k * layer;
@@ -185,11 +205,24 @@ impl Lattice {
         [a, b, c, d, a + layer, b + layer, c + layer, d + layer]
     }
 
-    /// Number of a cell among all of them.
+    /// Where a cell is along the axes.
     #[inline(always)]
-    pub(super) fn cell_number(&self, cell: [u8; 3]) -> usize {
-        let [i, j, k] = cell.map(usize::from);
+    pub(super) fn place_of(&self, cell: usize) -> [u8; 3] {
+        self.of_cell.get(cell).copied().unwrap_or_default()
+    }
+
+    /// Number of the cell at a place.
+    #[inline(always)]
+    pub(super) fn cell_number(&self, place: [u8; 3]) -> usize {
+        let [i, j, k] = place.map(usize::from);
         i + self.cells[0] as usize * (j + self.cells[1] as usize * k)
+    }
+
+    /// Cells from one to the next along an axis.
+    #[inline(always)]
+    pub(super) fn next_along(&self, axis: usize) -> usize {
+        let [along, across, _] = self.cells.map(|count| count as usize);
+        [1, along, along * across][axis % 3]
     }
 
     /// All cells.
@@ -223,25 +256,17 @@ impl Lattice {
         libm::sqrtf(largest)
     }
 
-    /// Functions at the corners of a node's cell; dropped ones are number [`MAX_FUNCTIONS`].
+    /// Functions at the corners of a cell; dropped ones are number [`MAX_FUNCTIONS`].
     #[inline(always)]
-    pub(super) fn functions_of(&self, node: &LatticeNode) -> [usize; 8] {
-        self.corner_points(node)
+    pub(super) fn functions_of(&self, cell: usize) -> [usize; 8] {
+        self.corner_points(cell)
             .map(|point| usize::from(self.of_point.get(point).copied().unwrap_or(DROPPED)))
-    }
-
-    /// Functions at the corners of cell `number`; dropped ones are number [`MAX_FUNCTIONS`].
-    pub(super) fn corner_functions(&self, number: usize) -> [usize; 8] {
-        let (along, across) = (self.cells[0].max(1) as usize, self.cells[1].max(1) as usize);
-        let cell = [number % along, number / along % across, number / along / across].map(|at| at as u8);
-        let node = LatticeNode { cell, ..LatticeNode::EMPTY };
-        self.functions_of(&node)
     }
 
     /// Functions and weights of a node; dropped ones are number [`MAX_FUNCTIONS`].
     #[inline(always)]
     pub(super) fn weights(&self, node: &LatticeNode) -> [(usize, f32); 8] {
-        let (functions, weights) = (self.functions_of(node), node.eight_weights());
+        let (functions, weights) = (self.functions_of(node.cell()), node.eight_weights());
         array::from_fn(|corner| (functions[corner], weights[corner]))
     }
 }

@@ -53,6 +53,9 @@
 
 mod alone;
 mod assembly;
+#[cfg(test)]
+mod assembly_tests;
+mod block;
 mod bound;
 #[cfg(test)]
 mod bound_tests;

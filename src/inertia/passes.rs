@@ -1,7 +1,7 @@
 //! The two passes over the nodes of a step with a lattice: before the lattice moves, nodes side by side, and after, the
 //! axes of a node side by side.
 
-use bytemuck::{Pod, Zeroable, must_cast_slice, must_cast_slice_mut};
+use bytemuck::{Pod, Zeroable, must_cast, must_cast_ref, must_cast_slice, must_cast_slice_mut};
 use glam::Vec4;
 
 use super::estimate::{Defect, Defects};
@@ -37,7 +37,6 @@ pub(super) struct Prepare<'a, 'b> {
     pub(super) scaling: &'a Scaling,
     /// What the velocities are multiplied by.
     pub(super) brake: f32,
-    pub(super) lattice: &'a Lattice,
     pub(super) places: &'a [LatticeNode],
     pub(super) turns: &'a Turns,
     pub(super) inertia: &'a [NodeInertia],
@@ -73,11 +72,11 @@ impl Kernel for Prepare<'_, '_> {
         let whole = nodes - nodes % R::COUNT;
         let mut found = Found::<R>::nothing();
         for first in (0..whole).step_by(R::COUNT) {
-            self.nodes(first, &mut found);
+            self.nodes::<R, R>(first, &mut found);
         }
         let mut rest = Found::<f32>::nothing();
         for node in whole..nodes {
-            self.nodes(node, &mut rest);
+            self.nodes::<f32, R>(node, &mut rest);
         }
         let mut held_back = HeldBack::NONE;
         for lane in 0..R::COUNT {
@@ -90,9 +89,9 @@ impl Kernel for Prepare<'_, '_> {
 }
 
 impl Prepare<'_, '_> {
-    /// The nodes from `first` on, side by side.
+    /// The nodes from `first` on, side by side; `C` holds eight numbers.
     #[inline(always)]
-    fn nodes<R: Real>(&mut self, first: usize, found: &mut Found<R>) {
+    fn nodes<R: Real, C: Real>(&mut self, first: usize, found: &mut Found<R>) {
         let step = self.step.seconds();
         let carry = self.brake * self.step.carry();
         let NodeTables { inverse_diagonal, inverse_beside, next, .. } = &mut *self.tables;
@@ -140,8 +139,8 @@ impl Prepare<'_, '_> {
         let mut residuals = [[0.0; 4]; BLOCK];
         write_rows(&mut residuals, 0, [rx, ry, rz, R::splat(0.0)]);
         for (place, &residual) in places.iter().zip(&residuals) {
-            if let Some(cell) = self.cells.get_mut(self.lattice.cell_number(place.cell())) {
-                cell.add(place, Vec4::from(residual));
+            if let Some(cell) = self.cells.get_mut(place.cell()) {
+                cell.add::<C>(place, residual);
             }
         }
     }
@@ -152,7 +151,6 @@ impl Prepare<'_, '_> {
 pub(super) struct Settle<'a, 'b> {
     pub(super) step: &'a Step,
     pub(super) scaling: &'a Scaling,
-    pub(super) lattice: &'a Lattice,
     pub(super) places: &'a [LatticeNode],
     /// What the lattice moves.
     pub(super) cells: &'a [Cell],
@@ -172,11 +170,11 @@ impl Kernel for Settle<'_, '_> {
         let whole = nodes - nodes % R::COUNT;
         let mut sums = self.none::<R>();
         for first in (0..whole).step_by(R::COUNT) {
-            self.nodes::<R>(first, &mut sums);
+            self.nodes::<R, R>(first, &mut sums);
         }
         let mut rest = self.none::<f32>();
         for node in whole..nodes {
-            self.nodes::<f32>(node, &mut rest);
+            self.nodes::<f32, R>(node, &mut rest);
         }
         let (mut totals, mut defects) = (Totals::default(), Defects::default());
         totals.add_lanes(&sums.0);
@@ -196,14 +194,14 @@ impl Settle<'_, '_> {
         ([Sums::new(self.step, R::splat); 3], [Defect::new(self.step, self.scaling, R::splat); 3])
     }
 
-    /// The nodes from `first` on, side by side.
+    /// The nodes from `first` on, side by side; `C` holds eight numbers.
     #[inline(always)]
-    fn nodes<R: Real>(&mut self, first: usize, (sums, defects): &mut AxisSums<R>) {
+    fn nodes<R: Real, C: Real>(&mut self, first: usize, (sums, defects): &mut AxisSums<R>) {
         let mut coarse = [[0.0; 4]; BLOCK];
         let places = self.places.get(first..first + R::COUNT).unwrap_or_default();
         for (coarse, place) in coarse.iter_mut().zip(places) {
-            if let Some(cell) = self.cells.get(self.lattice.cell_number(place.cell())) {
-                *coarse = cell.at(place).to_array();
+            if let Some(cell) = self.cells.get(place.cell()) {
+                *coarse = cell.at::<C>(place);
             }
         }
         let coarse = read_rows::<R>(&coarse, 0);
@@ -228,31 +226,41 @@ impl Settle<'_, '_> {
 
 /// One cell of the lattice. Its trilinear functions are taken apart into the monomials `1, x, y, xy, z, xz, yz, xyz`
 /// of the position within it, which take fewer operations a node: the monomials' factors, or what is to be summed with
-/// them.
+/// them. Two vectors a row.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(transparent)]
-pub(super) struct Cell([[f32; 4]; 8]);
+pub(super) struct Cell([[f32; 8]; 4]);
 
 impl Cell {
-    pub(super) const EMPTY: Self = Self([[0.0; 4]; 8]);
+    pub(super) const EMPTY: Self = Self([[0.0; 8]; 4]);
 
     /// Adds `W^T v` of a node.
     #[inline(always)]
-    fn add(&mut self, place: &LatticeNode, v: Vec4) {
+    fn add<R: Real>(&mut self, place: &LatticeNode, v: [f32; 4]) {
         let [x, y, z] = place.within();
-        let (vx, vy) = (x * v, y * v);
-        let vxy = y * vx;
-        for (sum, v) in self.0.iter_mut().zip([v, vx, vy, vxy, z * v, z * vx, z * vy, z * vxy]) {
-            *sum = (Vec4::from(*sum) + v).to_array();
+        let v = R::from_fn(|lane| v[lane % 4]) * R::from_fn(|lane| if lane < 4 { 1.0 } else { x });
+        let vy = v * R::splat(y);
+        let z = R::splat(z);
+        for (sums, v) in self.0.iter_mut().zip([v, vy, z * v, z * vy]) {
+            let sum = R::from_fn(|lane| sums[lane % 8]) + v;
+            for (lane, place) in sums.iter_mut().enumerate() {
+                *place = sum.lane(lane);
+            }
         }
     }
 
     /// `W x` of a node.
     #[inline(always)]
-    fn at(&self, place: &LatticeNode) -> Vec4 {
+    fn at<R: Real>(&self, place: &LatticeNode) -> [f32; 4] {
         let [x, y, z] = place.within();
-        let [a, b, c, d, e, f, g, h] = self.0.map(Vec4::from);
-        ((a + x * b) + y * (c + x * d)) + z * ((e + x * f) + y * (g + x * h))
+        let [a, b, c, d] = self.0.map(|row| R::from_fn(|lane| row[lane % 8]));
+        let both = (a + R::splat(y) * b) + R::splat(z) * (c + R::splat(y) * d);
+        [0, 1, 2, 3].map(|axis| both.lane(axis) + x * both.lane(axis + 4))
+    }
+
+    fn vectors(&self) -> [Vec4; 8] {
+        let vectors: &[[f32; 4]; 8] = must_cast_ref(&self.0);
+        vectors.map(Vec4::from)
     }
 }
 
@@ -260,11 +268,11 @@ impl Cell {
 pub(super) fn restrict(cells: &[Cell], lattice: &Lattice) -> CoarseVectors {
     let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
     for (number, cell) in cells.iter().enumerate() {
-        let [a, b, c, d, e, f, g, h] = cell.0.map(Vec4::from);
+        let [a, b, c, d, e, f, g, h] = cell.vectors();
         let (a, c, e, g) = (a - b, c - d, e - f, g - h);
         let (a, b, e, f) = (a - c, b - d, e - g, f - h);
         for (vector, function) in
-            [a - e, b - f, c - g, d - h, e, f, g, h].into_iter().zip(lattice.corner_functions(number))
+            [a - e, b - f, c - g, d - h, e, f, g, h].into_iter().zip(lattice.functions_of(number))
         {
             if let Some(sum) = sums.get_mut(function) {
                 sum.0 = (Vec4::from(sum.0) + vector).to_array();
@@ -278,9 +286,10 @@ pub(super) fn restrict(cells: &[Cell], lattice: &Lattice) -> CoarseVectors {
 pub(super) fn prolong(vectors: &CoarseVectors, lattice: &Lattice, cells: &mut [Cell]) {
     for (number, cell) in cells.iter_mut().enumerate() {
         let at = |function: usize| Vec4::from(vectors.get(function).copied().unwrap_or_default().0);
-        let [a, b, c, d, e, f, g, h] = lattice.corner_functions(number).map(at);
+        let [a, b, c, d, e, f, g, h] = lattice.functions_of(number).map(at);
         let (b, d, f, h) = (b - a, d - c, f - e, h - g);
         let (c, d, g, h) = (c - a, d - b, g - e, h - f);
-        cell.0 = [a, b, c, d, e - a, f - b, g - c, h - d].map(|factor| factor.to_array());
+        let factors = [a, b, c, d, e - a, f - b, g - c, h - d].map(|factor| factor.to_array());
+        cell.0 = must_cast(factors);
     }
 }

@@ -14,8 +14,9 @@
 
 use bytemuck::must_cast_slice_mut;
 
-use super::assembly::{Assembly, CellSums, Element, NO_SLOTS, NodeMatrices};
-use super::bound::{Bound, MatrixBeside};
+use super::assembly::{Assembly, CellSums, NodeMatrices};
+use super::block::OneBlock;
+use super::bound::MatrixBeside;
 use super::dense::{Row, apply, mirror, stride, sweep};
 use super::frames::{Frames, Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, restrict};
@@ -24,10 +25,9 @@ use super::passes::Cell;
 use super::report::Tally;
 use super::vectors::NodeTables;
 use super::{COARSE, FINE};
-use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, Scatter, dispatch, write_rows};
-use crate::material::{Law, Local, Material};
+use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch};
+use crate::material::Material;
 use crate::scene::{ElementBlock, NodeInertia, Scene};
-use crate::tled::Deformation;
 
 /// The four dense matrices of a lattice, and what its cells sum.
 pub(super) struct Matrices<'a> {
@@ -110,9 +110,9 @@ const TOGETHER: usize = 8;
 
 /// Cost of a block, a cell, a node and a number of a row that is mirrored, in floating-point operations of a pivot
 /// that take as long (measured).
-const BLOCK_COST: i64 = 36_000;
-const CELL_COST: i64 = 3_000;
-const NODE_COST: i64 = 4_000;
+const BLOCK_COST: i64 = 47_000;
+const CELL_COST: i64 = 16_000;
+const NODE_COST: i64 = 2_700;
 const ROW_COST: i64 = 12;
 
 /// Rounding in sums over the lattice.
@@ -526,87 +526,9 @@ impl Kernel for SomeNodes<'_, '_> {
             }
             let [x, y, z] = renewed.inertia.times(turned.map(|v| v * renewed.velocity));
             restrict(&self.lattice.weights(place), [x, y, z, 0.0], self.momentum);
-            if let Some(sums) = self.sums.get_mut(self.lattice.cell_number(place.cell())) {
+            if let Some(sums) = self.sums.get_mut(place.cell()) {
                 sums.add_node(place, &renewed.inertia, mass);
             }
-        }
-    }
-}
-
-struct OneBlock<'a, M> {
-    material: &'a M,
-    block: &'a ElementBlock,
-    displacement: Gather<'a>,
-    sums: MatrixBeside<'a>,
-    assembly: Assembly<'a>,
-    frames: &'a Frames,
-    weight: f32,
-}
-
-/// What the lattice needs to know of a block's elements: a column of `C` each, and as fourth numbers `V iso`, `V volume`
-/// and nothing.
-type Tangents = [[[f32; 4]; BLOCK]; 3];
-
-impl<M: Material> Kernel for OneBlock<'_, M> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<R: Real>(mut self) {
-        let block = self.block;
-        let mut tangents = [[[0.0; 4]; BLOCK]; 3];
-        for first in (0..BLOCK).step_by(R::COUNT) {
-            self.bound::<R>(first, &mut tangents);
-        }
-        let mut slots = NO_SLOTS;
-        for lane in 0..BLOCK {
-            let mut gradients = [[0.0; 3]; 4];
-            for corner in 0..3 {
-                for axis in 0..3 {
-                    gradients[corner + 1][axis] = block.gradient_of(corner, axis, lane);
-                    gradients[0][axis] -= gradients[corner + 1][axis];
-                }
-            }
-            let nodes = [0, 1, 2, 3].map(|corner| block.node(corner, lane));
-            let columns = tangents.map(|column| column[lane]);
-            let [[_, _, _, iso], [_, _, _, volume], _] = columns;
-            let cofactor = columns.map(|[x, y, z, _]| [x, y, z, 0.0]);
-            let element = Element { nodes, gradients, iso, volume, cofactor };
-            if !self.assembly.add_in_cells::<R>(&element) {
-                self.assembly.add_element(&element, &mut slots);
-            }
-        }
-    }
-}
-
-impl<M: Material> OneBlock<'_, M> {
-    /// The bounds of the elements in lanes `first..`, into the sums of their nodes and into `tangents`.
-    #[inline(always)]
-    fn bound<R: Real>(&mut self, first: usize, tangents: &mut Tangents) {
-        let block = self.block;
-        let law = M::Law::widen(|lane| self.material.law(block.element(first + lane)));
-        let deformation = Deformation::<R>::of_block(block, first, self.displacement);
-        let local = Local::new::<M::Law>(&law, deformation.invariants);
-        let bound = Bound::<R>::new::<M::Law>(&law, block, first, &deformation, &local);
-        // C in the frame of the element's first node.
-        let mut turns = [Rotation::NONE; BLOCK];
-        for (lane, turn) in turns.iter_mut().enumerate().take(R::COUNT) {
-            let place = self.assembly.nodes.get(block.node(0, first + lane));
-            *turn = self.frames.since_start(place.map_or(MAX_FUNCTIONS, LatticeNode::frame));
-        }
-        let mut cofactor = [[R::splat(0.0); 3]; 3];
-        for i in 0..3 {
-            for k in 0..3 {
-                let along = R::from_fn(|lane| turns[lane % BLOCK].0[k][i]);
-                for j in 0..3 {
-                    cofactor[i][j] = cofactor[i][j] + along * deformation.cofactor(k, j);
-                }
-            }
-        }
-        self.sums.add(&bound, block, first, &cofactor);
-        let weight = block.volume::<R>(first) * R::splat(self.weight);
-        let beside = [weight * bound.iso, weight * bound.volume, R::splat(0.0)];
-        for (j, (column, beside)) in tangents.iter_mut().zip(beside).enumerate() {
-            write_rows(column, first, [cofactor[0][j], cofactor[1][j], cofactor[2][j], beside]);
         }
     }
 }

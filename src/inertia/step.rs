@@ -117,7 +117,6 @@ where
             step,
             scaling,
             brake,
-            lattice,
             places,
             turns,
             inertia,
@@ -134,7 +133,6 @@ where
         let moved = dispatch(Settle {
             step,
             scaling,
-            lattice,
             places,
             cells,
             inertia,
