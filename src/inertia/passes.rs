@@ -1,5 +1,5 @@
-//! The two passes over the nodes of a step with a lattice: before the lattice moves, nodes side by side, and after, the
-//! axes of a node side by side.
+//! The two passes over the nodes of a step with a lattice, before the lattice moves and after, several nodes side by side.
+//! What they have to do with the lattice goes node by node, to and from the cell that the node is in.
 
 use bytemuck::{Pod, Zeroable, must_cast, must_cast_ref, must_cast_slice, must_cast_slice_mut};
 use glam::Vec4;
