@@ -256,7 +256,7 @@ impl Assembly<'_> {
                 };
                 let values =
                     [x * along + all * Vec4::X, y * along + all * Vec4::Y, z * along + all * Vec4::Z];
-                for (line, values) in lines.chunks_exact_mut(self.stride).zip(values) {
+                for (line, values) in lines.chunks_exact_mut(self.stride.max(1)).zip(values) {
                     add_four(line, 3 * column, values);
                 }
             }
@@ -336,11 +336,13 @@ impl Assembly<'_> {
         for c in 0..count {
             let c = c % TOUCHED;
             let first = 3 * functions[c] * self.stride;
-            let Some(rows) = self.matrix.get_mut(first..first + 3 * self.stride) else {
+            let rows = self.matrix.get_mut(first..first + 3 * self.stride);
+            let Some((row_x, rows)) = rows.and_then(|rows| rows.split_at_mut_checked(self.stride)) else {
                 return;
             };
-            let (row_x, rows) = rows.split_at_mut(self.stride);
-            let (row_y, row_z) = rows.split_at_mut(self.stride);
+            let Some((row_y, row_z)) = rows.split_at_mut_checked(self.stride) else {
+                return;
+            };
             let [x, y, z] = slopes[c].map(|slope| element.iso * slope);
             let image = element.volume * images[c];
             // A block is added four wide and spills a zero into the next one, which would have to wait for it to reach

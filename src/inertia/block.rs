@@ -44,7 +44,7 @@ impl<M: Material> Kernel for OneBlock<'_, M> {
                 }
             }
             let nodes = [0, 1, 2, 3].map(|corner| block.node(corner, lane));
-            let columns = tangents.map(|column| column[lane]);
+            let columns = tangents.map(|column| column[lane % BLOCK]);
             let [[_, _, _, iso], [_, _, _, volume], _] = columns;
             let cofactor = columns.map(|[x, y, z, _]| [x, y, z, 0.0]);
             let element = Element { nodes, gradients, iso, volume, cofactor };

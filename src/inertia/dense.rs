@@ -65,7 +65,7 @@ impl Kernel for Sweep<'_> {
     fn run<R: Real>(self) -> bool {
         let Self { matrix, size, stride, first } = self;
         let mut lines: [Row; 3] = [[0.0; ROW]; 3];
-        for (index, row) in matrix.chunks_exact(stride).take(size).enumerate() {
+        for (index, row) in matrix.chunks_exact(stride.max(1)).take(size).enumerate() {
             for (k, line) in lines.iter_mut().enumerate() {
                 let pivot = first + k;
                 let at = if index < pivot { matrix.get(pivot * stride + index) } else { row.get(pivot) };
@@ -93,7 +93,7 @@ impl Kernel for Sweep<'_> {
             }
         }
         let at = |k: usize, index: usize| lines[k].get(index).copied().unwrap_or(0.0);
-        for (index, row) in matrix.chunks_exact_mut(stride).take(size).enumerate() {
+        for (index, row) in matrix.chunks_exact_mut(stride.max(1)).take(size).enumerate() {
             let factors = [0, 1, 2].map(|k| at(k, index) * inverses[k]);
             if index < first || index > first + 2 {
                 let [a, b, c] = factors.map(|factor| Lanes([factor; LANES]));
@@ -143,7 +143,7 @@ impl Kernel for Apply<'_> {
     #[inline(always)]
     fn run<R: Real>(self) -> Row {
         let mut out = [0.0; ROW];
-        for (row, &x) in self.matrix.chunks_exact(self.stride).zip(self.x) {
+        for (row, &x) in self.matrix.chunks_exact(self.stride.max(1)).zip(self.x) {
             for (out, entry) in out.iter_mut().zip(row) {
                 *out += entry * x;
             }

@@ -135,7 +135,7 @@ impl Lattice {
         }
         let (low, size) = bounding_box(points);
         let mut lattice = Self { cells, low, size, ..Self::NONE };
-        let [along, across, _] = cells.map(|count| count as usize);
+        let [along, across, _] = cells.map(|count| (count as usize).max(1));
         for (number, place) in lattice.of_cell.iter_mut().enumerate() {
             *place = [number % along, number / along % across, number / along / across].map(|at| at as u8);
         }
@@ -243,13 +243,14 @@ impl Lattice {
             let here = at(point);
             let last = [point % nx + 1 == nx, point / nx % ny + 1 == ny, point / nx / ny + 1 == nz];
             for (axis, stride) in [1, nx, nx * ny].into_iter().enumerate() {
-                if last[axis] || self.size[axis] <= 0.0 {
+                let (last, size, cells) = (last[axis % 3], self.size[axis % 3], self.cells[axis % 3]);
+                if last || size <= 0.0 {
                     continue;
                 }
                 let there = at(point + stride);
                 let along = |i: usize| there[i] - here[i];
                 let square = along(0) * along(0) + along(1) * along(1) + along(2) * along(2);
-                let per_metre = self.cells[axis] as f32 / self.size[axis];
+                let per_metre = cells as f32 / size;
                 largest = f32::max(largest, square * per_metre * per_metre);
             }
         }

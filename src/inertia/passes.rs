@@ -109,7 +109,7 @@ impl Prepare<'_, '_> {
         for (turn, place) in turns.iter_mut().zip(places) {
             *turn = self.turns.get(place.frame()).unwrap_or(&STILL);
         }
-        let turn = [0, 1, 2].map(|row| R::from_rows(|lane| turns[lane % BLOCK][row]));
+        let turn = [0, 1, 2].map(|row| R::from_rows(|lane| turns[lane % BLOCK][row % 3]));
         let back = |axis: usize| turn[0][axis] * rx + turn[1][axis] * ry + turn[2][axis] * rz;
         let (bx, by, bz) = (back(0), back(1), back(2));
         let [xx, yy, zz, bound_before] = read_rows::<R>(must_cast_slice(inverse_diagonal), first);

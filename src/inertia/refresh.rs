@@ -185,7 +185,7 @@ impl Refresh {
             + 2 * cells as i64 * CELL_COST
             + nodes.next_multiple_of(TOGETHER) as i64 * NODE_COST
             + 2 * functions as i64 * (pivots_cost(functions) + 3 * row_cost(functions));
-        Self { per_step: whole / i64::from(steps) + 1, steps, ..Self::NEW }
+        Self { per_step: whole / i64::from(steps.max(1)) + 1, steps, ..Self::NEW }
     }
 
     pub(super) const fn steps(&self) -> u32 {
@@ -430,7 +430,9 @@ impl Refresh {
                 correction.0 = velocity.0.map(|component| lost * component);
             }
         }
-        matrices.kept.copy_from_slice(matrices.next);
+        for (kept, next) in matrices.kept.iter_mut().zip(&*matrices.next) {
+            *kept = *next;
+        }
     }
 
     /// Whether `S S^-1 p = p`, up to what rounding may do.

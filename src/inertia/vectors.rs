@@ -68,7 +68,9 @@ impl<'a> NodeTables<'a> {
 
     /// The next inverses are in use from now on; shares stay, and are one at the start.
     pub(super) fn put_in_use(&mut self, first: bool) {
-        self.inverse_diagonal.copy_from_slice(self.sum_diagonal);
+        for (inverse, next) in self.inverse_diagonal.iter_mut().zip(&*self.sum_diagonal) {
+            *inverse = *next;
+        }
         for (inverse, next) in self.inverse_beside.iter_mut().zip(&*self.sum_beside) {
             let share = if first { 1.0 } else { inverse.0[3] };
             let [xy, yz, zx, _] = next.0;

@@ -69,6 +69,7 @@ impl<R: Real> Deformation<R> {
     /// `F - cof F = H + H^T - tr H I - cof H`.
     #[inline(always)]
     pub(crate) fn distortion(&self, i: usize, j: usize) -> R {
+        let (i, j) = (i % 3, j % 3);
         let sum = self.h[i][j] + self.h[j][i] - self.cof_h[i][j];
         if i == j { sum - self.trace } else { sum }
     }
@@ -76,6 +77,7 @@ impl<R: Real> Deformation<R> {
     /// `cof F = (1 + tr H) I - H^T + cof H`.
     #[inline(always)]
     pub(crate) fn cofactor(&self, i: usize, j: usize) -> R {
+        let (i, j) = (i % 3, j % 3);
         let off = self.cof_h[i][j] - self.h[j][i];
         if i == j { off + (R::splat(1.0) + self.trace) } else { off }
     }

@@ -2,11 +2,12 @@
 //! built from this must link without std, and without `core::panicking`: what could panic would show.
 #![no_std]
 
+use supple::inertia::{self, Inertia, LatticeNode, MassScaling, numbers_for, vectors_for};
 use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{Exponential, Literal, NeoHookean, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::scene::{FixedScene, Support};
-use supple::state::FixedState;
+use supple::state::{FixedState, NodeVector};
 use supple::tled::{self, Status, Step};
 
 type Scene<L> = FixedScene<Tissue<L>, 100, 20>;
@@ -78,4 +79,56 @@ pub extern "C" fn pull(points: &[[f32; 3]; 100], triangles: &[[u32; 3]; 5]) -> f
 #[unsafe(no_mangle)]
 pub extern "C" fn bar(bar: &Bar) -> f32 {
     bar.points().map(|[x, _, _]| x).sum::<f32>() + bar.tets().map(|[a, ..]| a as f32).sum::<f32>()
+}
+
+type Vectors = [NodeVector; vectors_for(100)];
+
+/// Mass scaling: prepared, and a step.
+#[unsafe(no_mangle)]
+pub extern "C" fn scaled(
+    scene: &Scene<Exponential>,
+    state: &mut State,
+    scaling: &mut MassScaling<Vectors>,
+    points: &[[f32; 3]; 100],
+    loads: &Loads<'_>,
+    seconds: f32,
+) -> f32 {
+    let Ok(step) = Step::insist(seconds, 1.0) else {
+        return -1.0;
+    };
+    if scaling.prepare(scene, points, state, step, [0; 3]).is_err() {
+        return -2.0;
+    }
+    let _ = inertia::step(scene, loads, state, scaling);
+    scaling.report().added_mean
+}
+
+/// Cells and functions of the largest lattice here.
+const LATTICE: [u32; 3] = [2, 2, 2];
+type Multilevel = Inertia<Vectors, [LatticeNode; 100], [f32; numbers_for(LATTICE, 27)]>;
+
+/// Multilevel inertia: the lattice that suits, prepared with another, and a step.
+#[unsafe(no_mangle)]
+pub extern "C" fn multilevel(
+    scene: &Scene<Exponential>,
+    state: &mut State,
+    multilevel: &mut Multilevel,
+    points: &[[f32; 3]; 100],
+    loads: &Loads<'_>,
+    cells: &[u32; 3],
+    seconds: f32,
+) -> f32 {
+    let Ok(step) = Step::insist(seconds, 1.0) else {
+        return -1.0;
+    };
+    let (suggested, functions) = inertia::suggested_lattice(scene, points);
+    if inertia::lattice_functions(scene, points, *cells).is_err() || functions > 27 {
+        return -2.0;
+    }
+    let _ = multilevel.prepare(scene, points, state, step, suggested);
+    if multilevel.prepare(scene, points, state, step, *cells).is_err() {
+        return -3.0;
+    }
+    let _ = inertia::step(scene, loads, state, multilevel);
+    multilevel.report().error + multilevel.functions() as f32
 }
