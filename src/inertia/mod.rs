@@ -111,7 +111,8 @@ const CYCLE_STEPS: (f32, f32) = (16.0, 64.0);
 #[must_use]
 pub const fn numbers_for(cells: [u32; 3], functions: usize) -> usize {
     let [x, y, z] = cells;
-    refresh::numbers_for(x as usize * y as usize * z as usize, functions)
+    let cells = (x as usize).saturating_mul(y as usize).saturating_mul(z as usize);
+    refresh::numbers_for(cells, functions)
 }
 
 /// Why an inertia could not be prepared.

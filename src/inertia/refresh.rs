@@ -50,7 +50,13 @@ const SUM_NUMBERS: usize = size_of::<CellSums>() / size_of::<f32>();
 
 /// Numbers that the matrices of a lattice with this many cells and functions need.
 pub(super) const fn numbers_for(cells: usize, functions: usize) -> usize {
-    4 * 3 * functions * stride(functions) + (CELL_NUMBERS + SUM_NUMBERS) * cells
+    let sums = (CELL_NUMBERS + SUM_NUMBERS).saturating_mul(summing(cells, functions));
+    sums.saturating_add(4 * 3 * functions * stride(functions))
+}
+
+/// Cells that sum something: none where no function is left.
+const fn summing(cells: usize, functions: usize) -> usize {
+    if functions > 0 { cells } else { 0 }
 }
 
 impl<'a> Matrices<'a> {
@@ -61,8 +67,9 @@ impl<'a> Matrices<'a> {
         let (kept, rest) = rest.split_at_mut_checked(one)?;
         let (next, rest) = rest.split_at_mut_checked(one)?;
         let (fine, rest) = rest.split_at_mut_checked(one)?;
-        let (cells, rest) = rest.split_at_mut_checked(CELL_NUMBERS * lattice.cell_count())?;
-        let sums = rest.get_mut(..SUM_NUMBERS * lattice.cell_count())?;
+        let count = summing(lattice.cell_count(), functions);
+        let (cells, rest) = rest.split_at_mut_checked(CELL_NUMBERS * count)?;
+        let sums = rest.get_mut(..SUM_NUMBERS * count)?;
         let cells = must_cast_slice_mut(cells.as_chunks_mut::<CELL_NUMBERS>().0);
         let sums = must_cast_slice_mut(sums.as_chunks_mut::<SUM_NUMBERS>().0);
         Some(Self { applied, kept, next, fine, cells, sums })

@@ -102,3 +102,25 @@ fn an_inertia_serves_only_what_it_was_prepared_for() {
     assert_eq!(state.steps(), 0);
     assert_eq!(inertia::step(&scene, &Loads::NONE, &mut state, &mut inertia), Status::Ok);
 }
+
+/// Where every node is held no function of a lattice is left, and no memory is needed for one.
+#[test]
+fn a_lattice_that_has_nothing_to_move_needs_no_room_and_steps() {
+    let body = small_bar();
+    let nodes = body.points.len();
+    let moved: Vec<_> = (0..nodes as u32).map(Support::moved).collect();
+    let scene = body.scene(tissue(NEO), &moved);
+    let cells = [1, 1, 2];
+    assert_eq!(inertia::lattice_functions(&scene, &body.points, cells), Ok(0));
+    assert_eq!(numbers_for(cells, 0), 0);
+    let mut inertia = over(vectors_for(nodes), 0, 0);
+    let mut state = rest_of(&scene);
+    let step = Step::insist(1e-3, 0.0).unwrap();
+    inertia.prepare(&scene, &body.points, &mut state, step, cells).unwrap();
+    let motions = [Motion { node: 95, axes: Axes::Z, metre: [0.0, 0.0, 1e-3], ramp: 0.01 }];
+    let loads = Loads::new(&scene, [0.0; 3], &[], &motions).unwrap();
+    for _ in 0..10 {
+        assert_eq!(inertia::step(&scene, &loads, &mut state, &mut inertia), Status::Ok);
+    }
+    assert!((state.displacements()[95].to_array()[2] - 1e-3).abs() < 1e-9);
+}
