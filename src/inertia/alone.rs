@@ -62,12 +62,11 @@ fn residual(
     inertia: &NodeInertia,
     force: [f32; 3],
     velocity: &NodeVector,
-) -> [f32; 4] {
+) -> [f32; 3] {
     let square = step.seconds() * step.seconds();
     let free = inertia.free().to_array();
-    let axis =
-        |axis: usize| free[axis] * (square * force[axis] - 2.0 * scaling.k * inertia.mass * velocity.0[axis]);
-    [axis(0), axis(1), axis(2), 0.0]
+    [0, 1, 2]
+        .map(|axis| free[axis] * (square * force[axis] - 2.0 * scaling.k * inertia.mass * velocity.0[axis]))
 }
 
 /// The next increments, in `next`, with what the step enters in the energy account and in the estimate of the error.
@@ -96,8 +95,7 @@ impl Kernel for Move<'_, '_> {
             let Some(next) = tables.next.get_mut(node) else {
                 continue;
             };
-            let [x, y, z, _] = residual(step, scaling, inertia, force.to_array(), next);
-            let fine = at.inverse.times([x, y, z]);
+            let fine = at.inverse.times(residual(step, scaling, inertia, force.to_array(), next));
             let free = inertia.free().to_array();
             for axis in 0..3 {
                 next.0[axis] = free[axis] * (next.0[axis] + at.share * fine[axis]);

@@ -165,17 +165,16 @@ impl Lattice {
     /// Where a point is.
     pub(super) fn place(&self, point: [f32; 3]) -> LatticeNode {
         let mut node = LatticeNode::EMPTY;
-        let mut cell_along = [0; 3];
+        let mut along = [0; 3];
         for axis in 0..3 {
             let (count, size) = (self.cells[axis], self.size[axis]);
             let place = if size > 0.0 { (point[axis] - self.low[axis]) / size * count as f32 } else { 0.0 };
             // Rounding may take the last node just beyond the box.
             let cell = (place as u32).min(count.saturating_sub(1));
-            cell_along[axis] = cell;
+            along[axis] = cell as u8;
             node.within[axis] = (place - cell as f32).clamp(0.0, 1.0);
         }
-        let [i, j, k] = cell_along;
-        node.cell = (i + self.cells[0] * (j + self.cells[1] * k)) as u16;
+        node.cell = self.cell_number(along) as u16;
         node
     }
 

@@ -93,14 +93,8 @@ impl<'a> Gather<'a> {
     /// Lane `l` takes the vector of node `index(l)`; a node that does not exist reads as the last one.
     #[inline(always)]
     pub(crate) fn read_lanes<R: Real>(&self, index: impl Fn(usize) -> usize) -> [R; 3] {
-        let [x, y, z, _] = self.read_all(index);
+        let [x, y, z, _] = R::from_rows(|lane| self.read(index(lane)));
         [x, y, z]
-    }
-
-    /// The same with the fourth component.
-    #[inline(always)]
-    pub(crate) fn read_all<R: Real>(&self, index: impl Fn(usize) -> usize) -> [R; 4] {
-        R::from_rows(|lane| self.read(index(lane)))
     }
 }
 
