@@ -88,6 +88,7 @@
 #[cfg(any(feature = "std", test))]
 extern crate std;
 
+pub mod frame;
 pub mod inertia;
 pub mod lanes;
 mod ledger;
@@ -96,6 +97,7 @@ pub mod material;
 pub mod mesh;
 pub mod scene;
 pub mod state;
+pub mod mlp;
 mod symmetric;
 pub mod tled;
 

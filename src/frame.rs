@@ -1,0 +1,196 @@
+//! The local frame of a vertex: tangent along its velocity, normal carried along without twist (parallel transport,
+//! Hanson & Ma 1995; Meister et al. 2018, section 2), binormal their cross product.
+//!
+//! The rotation that takes tangent `t` to `t'` without twist is Rodrigues' formula about `t x t'`. Of a vector
+//! `n` across `t` it makes, with `s = t + t'`, the mirror image
+//!
+//! ```text
+//! n' = n - 2 (n.s) / (s.s) s
+//! ```
+//! which needs neither angle nor trigonometry. At exact reversal `s` is zero: the frame turns by pi about its normal, which
+//! stays. At zero speed there is no tangent: the frame stays. Frames start as the world's axes.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3A;
+
+/// Squared length of an increment (m^2) or of `s` below which it has no direction.
+const NO_LENGTH: f32 = 1e-30;
+const REVERSED: f32 = 1e-12;
+
+/// An orthonormal frame; the fourth numbers are zero.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub struct Frame {
+    tangent: [f32; 4],
+    normal: [f32; 4],
+}
+
+impl Default for Frame {
+    fn default() -> Self {
+        Self::WORLD
+    }
+}
+
+impl Frame {
+    /// The world's axes: tangent x, normal y, binormal z.
+    pub const WORLD: Self = Self { tangent: [1.0, 0.0, 0.0, 0.0], normal: [0.0, 1.0, 0.0, 0.0] };
+
+    /// Tangent, normal and binormal.
+    #[inline(always)]
+    pub(crate) fn axes(&self) -> [Vec3A; 3] {
+        let ([tx, ty, tz, _], [nx, ny, nz, _]) = (self.tangent, self.normal);
+        let (tangent, normal) = (Vec3A::new(tx, ty, tz), Vec3A::new(nx, ny, nz));
+        [tangent, normal, tangent.cross(normal)]
+    }
+
+    /// Turns the tangent into the direction of an increment of displacement, m.
+    #[inline(always)]
+    pub(crate) fn follow(&mut self, increment: Vec3A) {
+        let square = increment.length_squared();
+        if !(square > NO_LENGTH && square.is_finite()) {
+            return;
+        }
+        let [tangent, normal, _] = self.axes();
+        let next = increment / libm::sqrtf(square);
+        let sum = tangent + next;
+        let across = sum.length_squared();
+        let carried =
+            if across > REVERSED { normal - 2.0 * (normal.dot(sum) / across) * sum } else { normal };
+        // Rounding must not add up.
+        let carried = carried - carried.dot(next) * next;
+        let carried = carried / libm::sqrtf(carried.length_squared());
+        self.tangent = [next.x, next.y, next.z, 0.0];
+        self.normal = [carried.x, carried.y, carried.z, 0.0];
+    }
+
+    /// Components of a vector along tangent, normal and binormal.
+    #[inline(always)]
+    pub(crate) fn local(&self, v: Vec3A) -> [f32; 3] {
+        self.axes().map(|axis| axis.dot(v))
+    }
+
+    /// The vector with these components along tangent, normal and binormal.
+    #[inline(always)]
+    pub(crate) fn world(&self, [t, n, b]: [f32; 3]) -> Vec3A {
+        let [tangent, normal, binormal] = self.axes();
+        t * tangent + n * normal + b * binormal
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec3A};
+    use proptest::prelude::*;
+    use std::println;
+
+    use super::Frame;
+
+    /// Largest difference from an orthonormal, right-handed frame.
+    fn off(frame: &Frame) -> f32 {
+        let [t, n, b] = frame.axes();
+        [
+            t.length() - 1.0,
+            n.length() - 1.0,
+            b.length() - 1.0,
+            t.dot(n),
+            n.dot(b),
+            b.dot(t),
+            t.cross(n).dot(b) - 1.0,
+        ]
+        .into_iter()
+        .fold(0.0, |worst, value| worst.max(value.abs()))
+    }
+
+    fn random(state: &mut u64) -> f32 {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 40) as f32 / 8_388_608.0 - 1.0
+    }
+
+    #[test]
+    fn a_million_random_turns_stay_orthonormal() {
+        let (mut state, mut frame, mut worst) = (7, Frame::WORLD, 0.0f32);
+        for _ in 0..1_000_000 {
+            let [x, y, z] = [0; 3].map(|_| random(&mut state));
+            frame.follow(Vec3A::new(x, y, z));
+            worst = worst.max(off(&frame));
+        }
+        println!("a million turns: off by {worst:.1e}");
+        assert!(worst < 1e-6);
+    }
+
+    #[test]
+    fn zero_speed_keeps_the_frame_and_reversal_turns_about_the_normal() {
+        let mut frame = Frame::WORLD;
+        frame.follow(Vec3A::new(1e-6, 2e-6, -1e-6));
+        let before = frame;
+        for still in [Vec3A::ZERO, Vec3A::splat(1e-20), Vec3A::splat(f32::NAN), Vec3A::splat(f32::INFINITY)] {
+            frame.follow(still);
+            assert_eq!(frame, before);
+        }
+        let [t, n, b] = before.axes();
+        frame.follow(-t);
+        let [reversed, kept, turned] = frame.axes();
+        assert!((reversed + t).length() < 1e-6 && (kept - n).length() < 1e-6 && (turned + b).length() < 1e-6);
+        assert!(off(&frame) < 1e-6);
+    }
+
+    /// Rodrigues' formula in float64: `x + w x x + w x (w x x) / (1 + c)` with `w = t x t'`, `c = t.t'`.
+    fn turned(x: DVec3, t: DVec3, next: DVec3) -> DVec3 {
+        let (w, c) = (t.cross(next), t.dot(next));
+        let across = w.cross(x);
+        x + across + w.cross(across) / (1.0 + c)
+    }
+
+    fn direction() -> impl Strategy<Value = DVec3> {
+        prop::array::uniform3(-1.0f64..1.0)
+            .prop_map(DVec3::from_array)
+            .prop_filter("a direction", |v| v.length() > 1e-2)
+    }
+
+    proptest! {
+        #[test]
+        fn transport_is_rodrigues_rotation(
+            first in direction(),
+            second in direction(),
+            scale in -8f32..-2.0,
+            v in direction(),
+        ) {
+            let scale = libm::powf(10.0, scale);
+            let mut frame = Frame::WORLD;
+            frame.follow(first.as_vec3a() * scale);
+            let [t, n, b] = frame.axes().map(|axis| axis.as_dvec3());
+            let next = (second.as_vec3a() * scale).as_dvec3().normalize();
+            prop_assume!(t.dot(next) > -0.999);
+            frame.follow(second.as_vec3a() * scale);
+            let [tangent, normal, binormal] = frame.axes().map(|axis| axis.as_dvec3());
+            prop_assert!((tangent - next).length() < 1e-6);
+            prop_assert!((normal - turned(n, t, next)).length() < 1e-5);
+            prop_assert!((binormal - turned(b, t, next)).length() < 1e-5);
+            // There and back.
+            let local = frame.local(v.as_vec3a());
+            prop_assert!((frame.world(local) - v.as_vec3a()).length() < 1e-6);
+        }
+
+        /// Carried around a closed loop on the sphere a normal turns by the loop's solid angle: what no twist means.
+        #[test]
+        fn around_a_triangle_it_turns_by_the_solid_angle(a in direction(), b in direction(), c in direction()) {
+            let corners = [a, b, c].map(|corner| corner.normalize());
+            let [a, b, c] = corners;
+            let volume = a.dot(b.cross(c));
+            prop_assume!(a.dot(b).min(b.dot(c)).min(c.dot(a)) > -0.9 && volume.abs() > 1e-3);
+            let solid = 2.0 * volume.atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a));
+            let mut frame = Frame::WORLD;
+            frame.follow(a.as_vec3a());
+            let [t, before, side] = frame.axes();
+            for corner in [b, c, a] {
+                frame.follow(corner.as_vec3a());
+            }
+            let [back, after, _] = frame.axes();
+            prop_assert!((back - t).length() < 1e-6);
+            let angle = f64::from(after.dot(side).atan2(after.dot(before)));
+            let difference = (angle - solid).rem_euclid(std::f64::consts::TAU);
+            let difference = difference.min(std::f64::consts::TAU - difference);
+            prop_assert!(difference < 1e-5, "{angle} {solid}");
+        }
+    }
+}

@@ -1,0 +1,424 @@
+//! Weight files (`weights/FORMAT.md`, version 1): little-endian, checksummed, read where they are. Nothing of a file is
+//! believed before its checksum and every field have been checked.
+
+use core::fmt;
+
+use bytemuck::{Pod, Zeroable, try_cast_slice};
+
+use super::{Activation, Layer, MAX_INPUTS, MAX_LAYERS, MAX_OUTPUTS, MAX_WIDTH};
+
+#[cfg(target_endian = "big")]
+compile_error!("weight files are little-endian and read in place");
+
+pub(super) const MAGIC: [u8; 8] = *b"SUPPLE-W";
+pub(super) const VERSION: u32 = 1;
+/// Arrays begin at multiples of this.
+pub(super) const ALIGNMENT: usize = 64;
+/// Where the checksum's bytes begin.
+pub(super) const CHECKED: usize = 20;
+
+/// What a file begins with.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Header {
+    pub(super) magic: [u8; 8],
+    pub(super) version: u32,
+    pub(super) length: u32,
+    pub(super) checksum: u32,
+    pub(super) inputs: u32,
+    pub(super) outputs: u32,
+    pub(super) layers: u32,
+    pub(super) first_layers: u32,
+    pub(super) law: u32,
+    pub(super) constants: [f32; 4],
+    pub(super) density: f32,
+    pub(super) damping: f32,
+    pub(super) step: f32,
+    pub(super) exact_step: f32,
+    pub(super) recipe: u32,
+    pub(super) recipe_length: u32,
+    pub(super) recipe_hash: [u8; 32],
+    pub(super) reserved: [u8; 128],
+}
+
+pub(super) const HEADER: usize = size_of::<Header>();
+const _: () = assert!(HEADER == 240);
+
+/// One entry of the layer table.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct LayerEntry {
+    pub(super) inputs: u32,
+    pub(super) outputs: u32,
+    pub(super) activation: u32,
+    pub(super) slope: f32,
+    pub(super) precision: u32,
+    pub(super) weights: u32,
+    pub(super) biases: u32,
+    pub(super) reserved: u32,
+}
+
+/// Scale of an input or output, and the range it had in training, in its own unit.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Range {
+    /// What one is to the network.
+    pub scale: f32,
+    /// The least seen in training.
+    pub least: f32,
+    /// The most.
+    pub most: f32,
+}
+
+/// The law of the training's tissue, Pa.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TrainedLaw {
+    /// [`crate::material::NeoHookean`].
+    NeoHookean {
+        /// Pa.
+        c: f32,
+        /// Pa.
+        d: f32,
+        /// In the paper's literal form.
+        literal: bool,
+    },
+    /// [`crate::material::Exponential`].
+    Exponential {
+        /// Pa.
+        a: f32,
+        /// Without unit.
+        b: f32,
+        /// Pa.
+        d: f32,
+        /// In the paper's literal form.
+        literal: bool,
+    },
+}
+
+/// What a network was trained on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Recipe<'w> {
+    /// Law and constants.
+    pub law: TrainedLaw,
+    /// kg/m^3.
+    pub density: f32,
+    /// 1/s.
+    pub damping: f32,
+    /// Step that the network predicts for, s.
+    pub step: f32,
+    /// Step of the exact motion it learned from, s.
+    pub exact_step: f32,
+    /// The configuration, as text.
+    pub text: &'w str,
+    /// SHA-256 of the text.
+    pub hash: [u8; 32],
+}
+
+/// Why bytes are not a usable weight file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum WeightError {
+    /// The memory does not begin at a multiple of four bytes.
+    Misaligned,
+    /// Fewer bytes than a file has at least, or than it says it has.
+    Short {
+        /// Bytes needed.
+        needed: usize,
+        /// Bytes there.
+        bytes: usize,
+    },
+    /// It does not begin like a weight file.
+    NotWeights,
+    /// A version that this library does not know.
+    Version {
+        /// The version.
+        version: u32,
+    },
+    /// The checksum is not that of the bytes.
+    Checksum {
+        /// As the file says.
+        stated: u32,
+        /// As it is.
+        found: u32,
+    },
+    /// A number of the header is not one it can have.
+    Header {
+        /// Which.
+        field: &'static str,
+        /// Its value.
+        value: f32,
+    },
+    /// The scale is not positive, or the range is empty or not finite.
+    Range {
+        /// "input" or "output".
+        kind: &'static str,
+        /// Which, from zero.
+        index: u32,
+        /// What it says.
+        range: Range,
+    },
+    /// A field of the layer table is not one it can have.
+    Layer {
+        /// Which layer, from zero.
+        layer: u32,
+        /// Which field.
+        field: &'static str,
+        /// Its value.
+        value: u32,
+    },
+    /// A slope is not from zero to one.
+    Slope {
+        /// Which layer, from zero.
+        layer: u32,
+        /// Its value.
+        slope: f32,
+    },
+    /// A weight or bias is not finite.
+    NotFinite {
+        /// Which layer, from zero.
+        layer: u32,
+        /// Byte of the file.
+        at: u32,
+    },
+    /// The recipe lies outside the file or is not UTF-8.
+    Recipe {
+        /// First byte.
+        at: u32,
+        /// Bytes.
+        length: u32,
+    },
+}
+
+impl fmt::Display for WeightError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Misaligned => write!(f, "the weights are not at a multiple of 4 bytes in memory"),
+            Self::Short { needed, bytes } => write!(f, "{bytes} bytes, a weight file needs {needed}"),
+            Self::NotWeights => write!(f, "it does not begin with SUPPLE-W: not a weight file"),
+            Self::Version { version } => {
+                write!(f, "version {version} of the weight format; this library reads {VERSION}")
+            }
+            Self::Checksum { stated, found } => {
+                write!(f, "checksum {found:08x} of the weights, the file says {stated:08x}: it is damaged")
+            }
+            Self::Header { field, value } => write!(f, "{field} is {value}"),
+            Self::Range { kind, index, range: Range { scale, least, most } } => {
+                write!(f, "{kind} {index}: scale {scale}, range {least} to {most}")
+            }
+            Self::Layer { layer, field, value } => write!(f, "layer {layer}: {field} is {value}"),
+            Self::Slope { layer, slope } => write!(f, "layer {layer}: slope is {slope}, it must be from 0 to 1"),
+            Self::NotFinite { layer, at } => {
+                write!(f, "layer {layer}: the number at byte {at} is not finite")
+            }
+            Self::Recipe { at, length } => {
+                write!(f, "the recipe, {length} bytes from byte {at} on, is not text in the file")
+            }
+        }
+    }
+}
+
+impl core::error::Error for WeightError {}
+
+/// A network over the bytes of a weight file.
+#[derive(Clone, Copy, Debug)]
+pub struct Network<'w> {
+    pub(super) inputs: &'w [Range],
+    pub(super) outputs: &'w [Range],
+    pub(super) layers: [Layer<'w>; MAX_LAYERS],
+    pub(super) count: usize,
+    /// Layers of the first part.
+    pub(super) first: usize,
+    recipe: Recipe<'w>,
+}
+
+/// `size_of::<T>() * count` bytes from `*at` on, which moves behind them.
+fn take<'w, T: Pod>(bytes: &'w [u8], at: &mut usize, count: usize) -> Result<&'w [T], WeightError> {
+    let end = size_of::<T>().checked_mul(count).and_then(|size| size.checked_add(*at)).unwrap_or(usize::MAX);
+    let slice = bytes.get(*at..end).ok_or(WeightError::Short { needed: end, bytes: bytes.len() })?;
+    *at = end;
+    try_cast_slice(slice).map_err(|_| WeightError::Misaligned)
+}
+
+fn positive(field: &'static str, value: f32) -> Result<f32, WeightError> {
+    if value.is_finite() && value > 0.0 { Ok(value) } else { Err(WeightError::Header { field, value }) }
+}
+
+fn within(field: &'static str, value: u32, most: usize) -> Result<usize, WeightError> {
+    if value >= 1 && value as usize <= most {
+        Ok(value as usize)
+    } else {
+        Err(WeightError::Header { field, value: value as f32 })
+    }
+}
+
+fn checked_ranges<'w>(kind: &'static str, ranges: &'w [Range]) -> Result<&'w [Range], WeightError> {
+    let bad = |range: &Range| {
+        let Range { scale, least, most } = *range;
+        !(scale.is_finite() && scale > 0.0 && least.is_finite() && most.is_finite() && least <= most)
+    };
+    match ranges.iter().position(bad) {
+        None => Ok(ranges),
+        Some(index) => Err(WeightError::Range {
+            kind,
+            index: index as u32,
+            range: ranges.get(index).copied().unwrap_or(Range { scale: 0.0, least: 0.0, most: 0.0 }),
+        }),
+    }
+}
+
+impl<'w> Network<'w> {
+    /// Reads a weight file where it is. The bytes must begin at a multiple of four, better of 64; bytes behind the
+    /// file are ignored.
+    pub fn parse(bytes: &'w [u8]) -> Result<Self, WeightError> {
+        let mut at = 0;
+        let header: &[Header] = take(bytes, &mut at, 1)?;
+        let Some(header) = header.first() else {
+            return Err(WeightError::Short { needed: HEADER, bytes: bytes.len() });
+        };
+        if header.magic != MAGIC {
+            return Err(WeightError::NotWeights);
+        }
+        if header.version != VERSION {
+            return Err(WeightError::Version { version: header.version });
+        }
+        let length = header.length as usize;
+        if length < HEADER {
+            return Err(WeightError::Header { field: "the length", value: length as f32 });
+        }
+        let bytes = bytes.get(..length).ok_or(WeightError::Short { needed: length, bytes: bytes.len() })?;
+        let found = crc32fast::hash(bytes.get(CHECKED..).unwrap_or_default());
+        if found != header.checksum {
+            return Err(WeightError::Checksum { stated: header.checksum, found });
+        }
+        if header.reserved.iter().any(|&byte| byte != 0) {
+            return Err(WeightError::Header { field: "a reserved byte", value: 1.0 });
+        }
+        let inputs = within("the number of inputs", header.inputs, MAX_INPUTS)?;
+        let outputs = within("the number of outputs", header.outputs, MAX_OUTPUTS)?;
+        let count = within("the number of layers", header.layers, MAX_LAYERS)?;
+        let first = within("the number of layers of the first part", header.first_layers, count)?;
+        let recipe = recipe(header, bytes)?;
+        let inputs = checked_ranges("input", take(bytes, &mut at, inputs)?)?;
+        let outputs = checked_ranges("output", take(bytes, &mut at, outputs)?)?;
+        let entries: &[LayerEntry] = take(bytes, &mut at, count)?;
+        let mut layers = [Layer::NONE; MAX_LAYERS];
+        for (number, (layer, entry)) in layers.iter_mut().zip(entries).enumerate() {
+            // The second part sees what the first has predicted.
+            let needed = match number {
+                0 => inputs.len(),
+                _ if number == first => inputs.len() + outputs.len(),
+                _ => entries.get(number - 1).map_or(0, |entry| entry.outputs as usize),
+            };
+            let last = number + 1 == first || number + 1 == count;
+            let wanted = if last { Some(outputs.len()) } else { None };
+            *layer = checked_layer(bytes, number as u32, entry, needed, wanted)?;
+        }
+        Ok(Self { inputs, outputs, layers, count, first, recipe })
+    }
+
+    /// Scale and training range of each input.
+    #[must_use]
+    pub const fn inputs(&self) -> &'w [Range] {
+        self.inputs
+    }
+
+    /// Scale and range, to which they are clipped, of each output.
+    #[must_use]
+    pub const fn outputs(&self) -> &'w [Range] {
+        self.outputs
+    }
+
+    /// The layers of both parts.
+    #[must_use]
+    pub fn layers(&self) -> (&[Layer<'w>], &[Layer<'w>]) {
+        self.layers.get(..self.count).unwrap_or_default().split_at_checked(self.first).unwrap_or_default()
+    }
+
+    /// What it was trained on.
+    #[must_use]
+    pub const fn recipe(&self) -> &Recipe<'w> {
+        &self.recipe
+    }
+
+    /// Multiplications and additions of one prediction.
+    #[must_use]
+    pub fn multiply_adds(&self) -> usize {
+        self.layers.iter().map(|layer| layer.inputs * layer.outputs).sum()
+    }
+}
+
+fn recipe<'w>(header: &Header, bytes: &'w [u8]) -> Result<Recipe<'w>, WeightError> {
+    let constant = |index: usize, field| positive(field, header.constants.get(index).copied().unwrap_or(0.0));
+    let literal = header.law & 1 == 1;
+    let law = match header.law {
+        0 | 1 => TrainedLaw::NeoHookean { c: constant(0, "c")?, d: constant(1, "d")?, literal },
+        2 | 3 => TrainedLaw::Exponential {
+            a: constant(0, "a")?,
+            b: constant(1, "b")?,
+            d: constant(2, "d")?,
+            literal,
+        },
+        law => return Err(WeightError::Header { field: "the law", value: law as f32 }),
+    };
+    let damping = header.damping;
+    if !(damping.is_finite() && damping >= 0.0) {
+        return Err(WeightError::Header { field: "the damping", value: damping });
+    }
+    let (at, length) = (header.recipe, header.recipe_length);
+    let end = (at as usize).checked_add(length as usize);
+    let text = end.and_then(|end| bytes.get(at as usize..end)).and_then(|text| core::str::from_utf8(text).ok());
+    Ok(Recipe {
+        law,
+        density: positive("the density", header.density)?,
+        damping,
+        step: positive("the step", header.step)?,
+        exact_step: positive("the exact step", header.exact_step)?,
+        text: text.ok_or(WeightError::Recipe { at, length })?,
+        hash: header.recipe_hash,
+    })
+}
+
+fn checked_layer<'w>(
+    bytes: &'w [u8],
+    number: u32,
+    entry: &LayerEntry,
+    needed: usize,
+    wanted: Option<usize>,
+) -> Result<Layer<'w>, WeightError> {
+    let wrong = |field, value| Err(WeightError::Layer { layer: number, field, value });
+    let (inputs, outputs) = (entry.inputs as usize, entry.outputs as usize);
+    if inputs != needed {
+        return wrong("the number of inputs", entry.inputs);
+    }
+    if outputs == 0 || outputs > MAX_WIDTH || wanted.is_some_and(|wanted| outputs != wanted) {
+        return wrong("the number of outputs", entry.outputs);
+    }
+    let activation = match entry.activation {
+        0 => Activation::Linear,
+        1 if (0.0..=1.0).contains(&entry.slope) => Activation::LeakyRelu { slope: entry.slope },
+        1 => return Err(WeightError::Slope { layer: number, slope: entry.slope }),
+        code => return wrong("the activation", code),
+    };
+    if entry.precision != 0 {
+        return wrong("the precision", entry.precision);
+    }
+    if entry.reserved != 0 {
+        return wrong("the reserved field", entry.reserved);
+    }
+    let numbers = |field, offset: u32, count: usize| -> Result<&'w [f32], WeightError> {
+        let mut at = offset as usize;
+        if !at.is_multiple_of(ALIGNMENT) || at < HEADER {
+            return Err(WeightError::Layer { layer: number, field, value: offset });
+        }
+        let numbers: &[f32] = take(bytes, &mut at, count)?;
+        match numbers.iter().position(|number| !number.is_finite()) {
+            None => Ok(numbers),
+            Some(index) => {
+                Err(WeightError::NotFinite { layer: number, at: offset + (size_of::<f32>() * index) as u32 })
+            }
+        }
+    };
+    let weights = numbers("the offset of the weights", entry.weights, inputs * outputs)?;
+    let biases = numbers("the offset of the biases", entry.biases, outputs)?;
+    Ok(Layer { inputs, outputs, activation, weights, biases })
+}
