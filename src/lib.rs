@@ -95,9 +95,10 @@ mod ledger;
 pub mod loads;
 pub mod material;
 pub mod mesh;
+pub mod mlp;
 pub mod scene;
 pub mod state;
-pub mod mlp;
+pub mod surrogate;
 mod symmetric;
 pub mod tled;
 

@@ -95,6 +95,18 @@ impl<S: AsRef<[NodeVector]>> State<S> {
 }
 
 impl<S: AsRef<[NodeVector]> + AsMut<[NodeVector]>> State<S> {
+    /// Makes the last increment span `seconds`: `before` are the displacements of that long ago. A step of that length
+    /// goes on from here. Nodes beyond `before` are left as they are.
+    pub fn span(&mut self, before: &[NodeVector], seconds: f32) {
+        let vectors = self.displacement.as_ref().iter().zip(self.increment.as_mut());
+        for ((displacement, increment), before) in vectors.zip(before) {
+            for axis in 0..3 {
+                increment.0[axis] = displacement.0[axis] - before.0[axis];
+            }
+        }
+        self.dt = seconds;
+    }
+
     /// Back to rest at time zero.
     pub fn reset(&mut self) {
         for vectors in [&mut self.displacement, &mut self.increment, &mut self.force] {

@@ -206,7 +206,9 @@ impl fmt::Display for WeightError {
                 write!(f, "{kind} {index}: scale {scale}, range {least} to {most}")
             }
             Self::Layer { layer, field, value } => write!(f, "layer {layer}: {field} is {value}"),
-            Self::Slope { layer, slope } => write!(f, "layer {layer}: slope is {slope}, it must be from 0 to 1"),
+            Self::Slope { layer, slope } => {
+                write!(f, "layer {layer}: slope is {slope}, it must be from 0 to 1")
+            }
             Self::NotFinite { layer, at } => {
                 write!(f, "layer {layer}: the number at byte {at} is not finite")
             }
@@ -366,7 +368,8 @@ fn recipe<'w>(header: &Header, bytes: &'w [u8]) -> Result<Recipe<'w>, WeightErro
     }
     let (at, length) = (header.recipe, header.recipe_length);
     let end = (at as usize).checked_add(length as usize);
-    let text = end.and_then(|end| bytes.get(at as usize..end)).and_then(|text| core::str::from_utf8(text).ok());
+    let text =
+        end.and_then(|end| bytes.get(at as usize..end)).and_then(|text| core::str::from_utf8(text).ok());
     Ok(Recipe {
         law,
         density: positive("the density", header.density)?,

@@ -13,6 +13,7 @@ mod forward;
 mod write;
 
 pub use file::{Network, Range, Recipe, TrainedLaw, WeightError};
+pub(crate) use forward::Scratch;
 #[cfg(feature = "std")]
 pub use write::{Description, LayerDescription, write};
 

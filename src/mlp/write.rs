@@ -107,7 +107,8 @@ pub fn write(description: &Description<'_>) -> Result<Vec<u8>, WeightError> {
         recipe_hash: description.recipe_hash,
         reserved: [0; 128],
     };
-    let mut place = |bytes: &mut Vec<u8>, at: usize, part: &[u8]| bytes[at..at + part.len()].copy_from_slice(part);
+    let place =
+        |bytes: &mut Vec<u8>, at: usize, part: &[u8]| bytes[at..at + part.len()].copy_from_slice(part);
     place(&mut bytes, HEADER, bytemuck::cast_slice(inputs));
     place(&mut bytes, HEADER + size_of::<Range>() * inputs.len(), bytemuck::cast_slice(outputs));
     place(&mut bytes, HEADER + tables, bytemuck::cast_slice(&entries));

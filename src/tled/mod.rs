@@ -29,7 +29,7 @@ use crate::material::{J_FLOOR, Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
 
-use element::Nothing;
+pub(crate) use element::Nothing;
 pub(crate) use element::{Beside, Deformation, Extremes};
 use entry::next_increment;
 pub(crate) use entry::{Entry, Next, Side, Sums, Totals};
