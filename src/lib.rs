@@ -15,10 +15,13 @@
 //! | [`state`] | what moves: displacements and their last increment |
 //! | [`tled`] | the exact step: element forces, central differences, critical step, divergence |
 //! | [`inertia`] | steps beyond the limit: mass scaling and multilevel inertia |
+//! | [`frame`] | the local frame of a vertex and its parallel transport |
+//! | [`mlp`] | dense layers: the forward pass, the weight file |
+//! | [`surrogate`] | the learned step: features, network, clip, increment |
 //! | [`lanes`] | one generic body for every instruction set |
 //!
 //! With the feature `io` meshes are read and fields written (`io`), with `lab` methods are judged against the
-//! exact step over scenes (`lab`), with `cli` there is the command `supple`.
+//! exact step over scenes (`lab`), with `train` networks are trained (`train`), with `cli` there is the command `supple`.
 //!
 //! # Promises
 //!
@@ -106,6 +109,9 @@ pub mod tled;
 pub mod io;
 #[cfg(feature = "lab")]
 pub mod lab;
+
+#[cfg(feature = "train")]
+pub mod train;
 
 pub use ledger::Ledger;
 

@@ -10,8 +10,10 @@ use supple::inertia::{self, Inertia, LatticeNode, MassScaling, numbers_for, vect
 use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{Exponential, NeoHookean, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
+use supple::mlp::Network;
 use supple::scene::{Axes, BuildError, FixedScene, Support, blocks_for};
 use supple::state::{FixedState, NodeVector};
+use supple::surrogate::{self, Surrogate, Vertex};
 use supple::tled::{self, Status, Step};
 
 /// Counts the allocations of each thread; the test harness allocates on others.
@@ -182,6 +184,49 @@ fn steps_beyond_the_limit_in_statics_allocate_nothing() {
         "200 steps at 20 times the limit, {taken} of them exact, no allocation; inertia added {added:.1}"
     );
     assert!(matches!(refused, Status::Mismatch { .. }) && state.steps() == 100 && taken > 0 && added > 1.0);
+}
+
+/// A weight file as it would lie in flash.
+#[repr(C, align(64))]
+struct Flash<B: ?Sized>(B);
+
+static WEIGHTS: &Flash<[u8]> = &Flash(*include_bytes!("data/golden-v1.weights"));
+static VERTICES: Mutex<[Vertex; NODES]> = Mutex::new([Vertex::NEW; NODES]);
+
+#[test]
+fn a_learned_roll_out_in_statics_allocates_nothing() {
+    let (points, tets) = mesh();
+    let mut vertices = VERTICES.lock().unwrap();
+    let mut scene = FixedScene::<_, NODES, BLOCKS>::new(TISSUE);
+    let mut state = FixedState::<NODES>::new();
+    let mut earlier = [NodeVector::ZERO; NODES];
+    let before = allocations();
+
+    scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &supports()).unwrap();
+    let network = Network::parse(&WEIGHTS.0).unwrap();
+    let mut surrogate = Surrogate::over(network, &mut vertices[..]).unwrap();
+    let forces = [NodalForce { node: NODES as u32 - 3, newton: [1e-2, 0.0, 0.0], ramp: 0.0 }];
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+    let exact = Step::insist(0.1 * surrogate.seconds(), 20.0).unwrap();
+    // The exact step leads.
+    for _ in 0..50 {
+        earlier.copy_from_slice(state.displacements());
+        for _ in 0..10 {
+            let _ = tled::step(&scene, &loads, &mut state, &exact);
+        }
+    }
+    state.span(&earlier, surrogate.seconds());
+    surrogate.follow(&state);
+    let led = state.steps();
+    // This network has learned nothing: in the end it is refused, which allocates nothing either.
+    let refused = (0..1_000).map(|_| surrogate::step(&scene, &loads, &mut state, &mut surrogate)).last();
+    let damaged = Network::parse(&WEIGHTS.0[..100]);
+
+    assert_eq!(allocations(), before);
+    let taken = state.steps() - led;
+    println!("{taken} learned steps, no allocation; then {refused:?}");
+    assert!(taken > 0 && damaged.is_err());
+    assert!(matches!(refused, Some(Status::Ok | Status::Limited { .. } | Status::Diverged(_))));
 }
 
 #[test]

@@ -7,7 +7,9 @@ use std::vec::Vec;
 use crate::inertia::InertiaError;
 use crate::io::ReadError;
 use crate::loads::LoadError;
+use crate::mlp::WeightError;
 use crate::scene::BuildError;
+use crate::surrogate::SurrogateError;
 use crate::tled::{Divergence, StepError};
 
 /// Why the laboratory could not do what it was asked.
@@ -57,6 +59,12 @@ pub enum LabError {
         /// The multiple.
         multiple: u32,
     },
+    /// A weight file is not usable.
+    Weights(WeightError),
+    /// A file is not usable; the text names it.
+    File(String),
+    /// A network does not fit the learned step.
+    Surrogate(SurrogateError),
     /// A file could not be written; the text names it.
     Write(std::io::Error),
 }
@@ -83,6 +91,9 @@ impl fmt::Display for LabError {
                 let known: Vec<String> = known.map(|multiple| multiple.to_string()).collect();
                 write!(f, "multiple {multiple} misses the snapshots; there are {}", known.join(", "))
             }
+            Self::Weights(error) => error.fmt(f),
+            Self::File(text) => f.write_str(text),
+            Self::Surrogate(error) => error.fmt(f),
             Self::Write(error) => error.fmt(f),
         }
     }
@@ -100,4 +111,4 @@ macro_rules! from {
     };
 }
 
-from!(ReadError => Mesh, BuildError => Build, LoadError => Load, StepError => Step, InertiaError => Inertia, std::io::Error => Write);
+from!(ReadError => Mesh, BuildError => Build, LoadError => Load, StepError => Step, InertiaError => Inertia, WeightError => Weights, SurrogateError => Surrogate, std::io::Error => Write);

@@ -1,16 +1,20 @@
 //! What is compared: ways to move a scene on by one step. A method is one arm in [`Method::prepare`].
 
 use std::boxed::Box;
-use std::string::ToString;
+use std::format;
+use std::path::Path;
+use std::string::{String, ToString};
 use std::vec;
 use std::vec::Vec;
 
-use super::LabError;
 use super::host::{HostScene, HostState};
+use super::{DT, LabError};
 use crate::inertia::{self, Inertia, LatticeNode, numbers_for, suggested_lattice, vectors_for};
 use crate::loads::Loads;
 use crate::material::Material;
+use crate::mlp::Network;
 use crate::state::{NodeVector, State};
+use crate::surrogate::{self, Surrogate, Vertex};
 use crate::tled::{self, Status, Step};
 
 /// A way to move a scene.
@@ -26,14 +30,57 @@ pub enum Method {
     MassScaled,
     /// The same, with a coarse lattice that gives smooth motion its true inertia back.
     Multilevel,
+    /// The learned step with a network that somebody brings, led by the exact step for [`BURN_IN`].
+    Brought(Brought),
 }
+
+/// A network at its own step.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub struct Brought {
+    /// For the tables.
+    pub name: &'static str,
+    /// A weight file, at a multiple of four bytes.
+    pub bytes: &'static [u8],
+    /// Its step over [`DT`].
+    pub multiple: u32,
+}
+
+impl Brought {
+    /// Reads a weight file, which stays in memory for good.
+    pub fn read(path: &Path) -> Result<Self, LabError> {
+        let problem = |error: &dyn core::fmt::Display| LabError::File(format!("{}: {error}", path.display()));
+        let bytes = std::fs::read(path).map_err(|error| problem(&error))?;
+        let mut words = vec![0_u32; bytes.len().div_ceil(4)];
+        let whole: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+        if let Some(start) = whole.get_mut(..bytes.len()) {
+            start.copy_from_slice(&bytes);
+        }
+        let bytes: &'static [u8] = bytemuck::cast_slice(words.leak());
+        let network = Network::parse(bytes).map_err(|error| problem(&error))?;
+        let multiple = (network.recipe().step / DT).round() as u32;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(Self { name: String::leak(name), bytes, multiple })
+    }
+}
+
+/// Time that the exact step leads before a network takes over, s (Meister et al. 2018, section 3).
+pub const BURN_IN: f64 = 0.3;
 
 /// Moves a state on by one step under loads; what it needs beside that, it holds. Gives the status and, where
 /// the method has one, its own estimate of its error, m. After [`Status::Diverged`] it is not called again.
-pub type Advance<'a> = Box<dyn FnMut(&mut HostState, &Loads<'_>) -> (Status, Option<f32>) + 'a>;
+pub type Advance<'a> = Box<dyn FnMut(&mut HostState, &Loads<'_>) -> (Status, Found) + 'a>;
+
+/// What a step says of itself.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Found {
+    /// Estimate of the error so far, m.
+    pub estimate: Option<f32>,
+    /// Share of the vertices whose prediction was clipped.
+    pub clipped: Option<f32>,
+}
 
 impl Method {
-    /// All methods, in the order of the tables.
+    /// All methods that need nothing brought, in the order of the tables.
     pub const ALL: [Self; 5] =
         [Self::Tled, Self::Hold, Self::TledLargeStep, Self::MassScaled, Self::Multilevel];
 
@@ -46,6 +93,7 @@ impl Method {
             Self::TledLargeStep => "tled-large-step",
             Self::MassScaled => "mass-scaled",
             Self::Multilevel => "multilevel",
+            Self::Brought(network) => network.name,
         }
     }
 
@@ -67,6 +115,7 @@ impl Method {
             Self::TledLargeStep | Self::MassScaled | Self::Multilevel => {
                 multiples.iter().copied().filter(|multiple| *multiple > 1).collect()
             }
+            Self::Brought(network) => vec![network.multiple],
         }
     }
 
@@ -74,6 +123,15 @@ impl Method {
     #[must_use]
     pub const fn scales(self) -> bool {
         matches!(self, Self::MassScaled | Self::Multilevel)
+    }
+
+    /// Time at the start that another method leads, s.
+    #[must_use]
+    pub const fn led_for(self) -> f64 {
+        match self {
+            Self::Brought(_) => BURN_IN,
+            _ => 0.0,
+        }
     }
 
     /// What moves a state of the scene on by steps of `dt` (s) with `damping` (1/s).
@@ -85,10 +143,10 @@ impl Method {
         damping: f32,
     ) -> Result<Advance<'a>, LabError> {
         Ok(match self {
-            Self::Hold => Box::new(|_, _| (Status::Ok, None)),
+            Self::Hold => Box::new(|_, _| (Status::Ok, Found::default())),
             Self::Tled | Self::TledLargeStep => {
                 let step = Step::insist(dt, damping)?;
-                Box::new(move |state, loads| (tled::step(scene, loads, state, &step), None))
+                Box::new(move |state, loads| (tled::step(scene, loads, state, &step), Found::default()))
             }
             Self::MassScaled | Self::Multilevel => {
                 let lattice = self == Self::Multilevel;
@@ -105,11 +163,46 @@ impl Method {
                 inertia.prepare(scene, points, &mut rest, Step::insist(dt, damping)?, cells)?;
                 Box::new(move |state, loads| {
                     let status = inertia::step(scene, loads, state, &mut inertia);
-                    (status, Some(inertia.report().error))
+                    (status, Found { estimate: Some(inertia.report().error), clipped: None })
                 })
             }
+            Self::Brought(network) => learned(scene, network.bytes, network.multiple, damping)?,
         })
     }
+}
+
+/// The learned step after the exact one.
+fn learned<'a, M: Material>(
+    scene: &'a HostScene<M>,
+    bytes: &'static [u8],
+    multiple: u32,
+    damping: f32,
+) -> Result<Advance<'a>, LabError> {
+    let nodes = scene.node_count();
+    let network = Network::parse(bytes)?;
+    let mut surrogate = Surrogate::over(network, vec![Vertex::NEW; nodes])?;
+    let exact = Step::insist(DT, damping)?;
+    let zero = || vec![NodeVector::ZERO; nodes];
+    let mut lead = State::over(zero(), zero(), zero());
+    Ok(Box::new(move |state, loads| {
+        if lead.time() + 0.5 * f64::from(DT) >= BURN_IN {
+            let status = surrogate::step(scene, loads, state, &mut surrogate);
+            return (status, Found { estimate: None, clipped: Some(surrogate.report().clipped) });
+        }
+        let before = lead.displacements().to_vec();
+        let mut worst = Status::Ok;
+        for _ in 0..multiple {
+            match tled::step(scene, loads, &mut lead, &exact) {
+                Status::Ok => {}
+                limited @ Status::Limited { .. } => worst = limited,
+                other => return (other, Found::default()),
+            }
+        }
+        state.clone_from(&lead);
+        state.span(&before, surrogate.seconds());
+        surrogate.follow(state);
+        (worst, Found::default())
+    }))
 }
 
 #[cfg(test)]

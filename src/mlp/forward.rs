@@ -30,16 +30,21 @@ fn dense<R: Real>(layer: &Layer<'_>, from: &[R], to: &mut [R]) {
     let rows = layer.weights.chunks(TOGETHER * layer.inputs.max(1));
     for ((rows, biases), to) in rows.zip(layer.biases.chunks(TOGETHER)).zip(to.chunks_mut(TOGETHER)) {
         // Rows that there are not repeat the first, and are not kept.
-        let mut row = [rows; TOGETHER];
+        let row = |index: usize| {
+            let start = if index < biases.len() { index * layer.inputs } else { 0 };
+            rows.get(start..start + layer.inputs).unwrap_or_default()
+        };
         let mut sums = [R::splat(0.0); TOGETHER];
-        for (index, (sum, bias)) in sums.iter_mut().zip(biases).enumerate() {
+        for (sum, bias) in sums.iter_mut().zip(biases) {
             *sum = R::splat(*bias);
-            row[index] = rows.get(index * layer.inputs..).unwrap_or(rows);
         }
-        let row = row.map(|row| row.get(..layer.inputs).unwrap_or_default());
-        for (index, &value) in from.iter().enumerate().take(layer.inputs) {
-            for (sum, row) in sums.iter_mut().zip(row) {
-                *sum = *sum + R::splat(row.get(index).copied().unwrap_or(0.0)) * value;
+        // Zipped, so that no index has to be checked.
+        let lower = from.iter().zip(row(0)).zip(row(1)).zip(row(2)).zip(row(3));
+        for ((((((((&value, a), b), c), d), e), f), g), h) in
+            lower.zip(row(4)).zip(row(5)).zip(row(6)).zip(row(7))
+        {
+            for (sum, weight) in sums.iter_mut().zip([a, b, c, d, e, f, g, h]) {
+                *sum = *sum + R::splat(*weight) * value;
             }
         }
         for (to, sum) in to.iter_mut().zip(sums).take(biases.len()) {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use supple::lab::evaluate::{self, Plan};
+use supple::lab::method::{Brought, Method};
 use supple::lab::{estimates, table};
 
 use crate::scene_file::Problem;
@@ -23,15 +24,21 @@ pub(crate) struct Asked {
     /// Step as a multiple of 30 us, 1 10 20 50 100 unless given; may be repeated
     #[arg(long = "multiple", value_name = "N")]
     multiples: Vec<u32>,
+    /// Weight file of a network to judge as well, at its own step; may be repeated
+    #[arg(long, value_name = "FILE")]
+    weights: Vec<PathBuf>,
     /// Scene whose error is drawn over the step; reversed unless given, if that is among the scenes
     #[arg(long, value_name = "SCENE")]
     sweep: Option<String>,
 }
 
 pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
-    let Asked { out, scenes, methods, multiples, sweep } = asked;
+    let Asked { out, scenes, methods, multiples, weights, sweep } = asked;
     let problem = |error: supple::lab::LabError| Problem(error.to_string());
-    let plan = Plan::new(scenes, methods, multiples, sweep.as_deref()).map_err(problem)?;
+    let mut plan = Plan::new(scenes, methods, multiples, sweep.as_deref()).map_err(problem)?;
+    for path in weights {
+        plan.methods.push(Method::Brought(Brought::read(path).map_err(problem)?));
+    }
     let rows = evaluate::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(problem)?;
     print!("{}", table::text(&rows));
     let judged = estimates::text(&rows);

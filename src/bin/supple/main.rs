@@ -19,6 +19,8 @@ mod select;
 mod simulate;
 mod timing;
 mod tissues;
+#[cfg(feature = "train")]
+mod train;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -67,6 +69,9 @@ enum Command {
     },
     /// How far from the exact motion methods are, and what they cost: results.csv and a picture
     Evaluate(evaluate::Asked),
+    /// Train a network for the learned step; a training that was stopped goes on where it was
+    #[cfg(feature = "train")]
+    Train(train::Asked),
 }
 
 fn main() -> ExitCode {
@@ -75,6 +80,8 @@ fn main() -> ExitCode {
         Command::Inspect { file, accuracy } => inspect::inspect(&file, accuracy).map(|()| End::Reached),
         Command::Demo { out } => demo::demo(&out),
         Command::Evaluate(asked) => evaluate::evaluate(&asked),
+        #[cfg(feature = "train")]
+        Command::Train(asked) => train::train(&asked),
     };
     match done {
         Ok(End::Reached) => ExitCode::SUCCESS,

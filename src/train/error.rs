@@ -1,0 +1,66 @@
+//! Why a training could not be done, in a sentence for the person who asked.
+
+use core::fmt;
+use std::path::PathBuf;
+use std::string::String;
+
+use crate::lab::LabError;
+use crate::mlp::WeightError;
+
+/// Why a training could not be done.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum TrainError {
+    /// The recipe is not usable; the text names the place and the value.
+    Recipe(String),
+    /// The scene could not be simulated.
+    Lab(LabError),
+    /// The weights cannot be written as a file.
+    Weights(WeightError),
+    /// A checkpoint is there, but of another recipe.
+    OtherRecipe(PathBuf),
+    /// A checkpoint could not be read or written; the text says why.
+    Checkpoint(PathBuf, String),
+    /// It was asked to stop.
+    Stopped {
+        /// Epochs done before.
+        epoch: usize,
+    },
+    /// The loss is no longer a finite number.
+    Diverged {
+        /// Epochs done before.
+        epoch: usize,
+    },
+}
+
+impl fmt::Display for TrainError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Recipe(text) => f.write_str(text),
+            Self::Lab(error) => error.fmt(f),
+            Self::Weights(error) => error.fmt(f),
+            Self::OtherRecipe(path) => {
+                write!(f, "{}: a checkpoint of another recipe; remove it to train anew", path.display())
+            }
+            Self::Checkpoint(path, text) => write!(f, "{}: {text}", path.display()),
+            Self::Stopped { epoch } => write!(f, "stopped after {epoch} epochs"),
+            Self::Diverged { epoch } => {
+                write!(f, "the loss is not finite any more after {epoch} epochs; try a smaller rate")
+            }
+        }
+    }
+}
+
+impl core::error::Error for TrainError {}
+
+impl From<LabError> for TrainError {
+    fn from(error: LabError) -> Self {
+        Self::Lab(error)
+    }
+}
+
+impl From<WeightError> for TrainError {
+    fn from(error: WeightError) -> Self {
+        Self::Weights(error)
+    }
+}

@@ -1,0 +1,351 @@
+//! The network and its training on burn: two mean squared errors, of the first part's prediction and of the sum with
+//! the correction, each against the acceleration; Adam (0.9, 0.999). Inputs and targets are divided by their standard
+//! deviations.
+
+use core::ops::ControlFlow;
+use std::format;
+use std::path::{Path, PathBuf};
+use std::string::{String, ToString};
+use std::time::{Duration, Instant};
+use std::vec::Vec;
+
+use burn::module::Module;
+use burn::nn::{Linear, LinearConfig};
+use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer};
+use burn::tensor::activation::leaky_relu;
+use burn::tensor::{Device, Tensor, TensorData};
+use sha2::{Digest, Sha256};
+
+use super::TrainError;
+use super::recipe::{Decay, Recipe};
+use super::samples::Samples;
+use crate::lab::DT;
+use crate::lab::scenes::{self, LawSpec};
+use crate::mlp::{self, Activation, Description, LayerDescription, Network, Range, TrainedLaw};
+use crate::surrogate::{FEATURES, PREDICTED};
+
+/// Both parts.
+#[derive(Module, Debug)]
+struct Parts {
+    first: Vec<Linear>,
+    second: Vec<Linear>,
+}
+
+impl Parts {
+    fn new(recipe: &Recipe, device: &Device) -> Self {
+        let part = |inputs: usize, hidden: &[usize]| -> Vec<Linear> {
+            let widths: Vec<usize> =
+                [inputs].into_iter().chain(hidden.iter().copied()).chain([PREDICTED]).collect();
+            widths.windows(2).map(|pair| LinearConfig::new(pair[0], pair[1]).init(device)).collect()
+        };
+        Self {
+            first: part(FEATURES, &recipe.network.hidden),
+            second: part(FEATURES + PREDICTED, &recipe.network.correction),
+        }
+    }
+
+    /// The first part's prediction, and the sum with the correction.
+    fn forward(&self, x: Tensor<2>, slope: f64) -> (Tensor<2>, Tensor<2>) {
+        let predicted = run(&self.first, x.clone(), slope);
+        let corrected =
+            predicted.clone() + run(&self.second, Tensor::cat(std::vec![x, predicted.clone()], 1), slope);
+        (predicted, corrected)
+    }
+}
+
+fn run(layers: &[Linear], x: Tensor<2>, slope: f64) -> Tensor<2> {
+    layers.iter().enumerate().fold(x, |x, (number, layer)| {
+        let sums = layer.forward(x);
+        if number + 1 < layers.len() { leaky_relu(sums, slope) } else { sums }
+    })
+}
+
+/// How far a training is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Epochs done, whole ones.
+    pub epoch: usize,
+    /// Of how many.
+    pub epochs: usize,
+    /// Samples of this epoch done, and of how many.
+    pub done: usize,
+    /// See `done`.
+    pub samples: usize,
+    /// Mean loss of this epoch so far, in variances of the target, both losses together.
+    pub loss: f64,
+    /// Samples a second.
+    pub rate: f64,
+    /// What the rest will take at this rate.
+    pub remaining: Duration,
+}
+
+/// What a training came to.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// The weight file.
+    pub bytes: Vec<u8>,
+    /// Root mean square error on the frames that were held out, in standard deviations of each target; nothing if none
+    /// were.
+    pub held_out: Option<[f64; PREDICTED]>,
+    /// Samples that it was trained on.
+    pub samples: usize,
+    /// Mean loss of the last epoch.
+    pub loss: f64,
+}
+
+/// Trains on the motion of the recipe. With a folder for checkpoints the state is kept there after every epoch, and a
+/// training that was stopped goes on from it. `progress` may stop it.
+pub fn train(
+    text: &str,
+    checkpoints: Option<&Path>,
+    mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Fitted, TrainError> {
+    let recipe = Recipe::parse(text)?;
+    let samples = Samples::collect(&recipe)?;
+    fit(&recipe, text, &samples, checkpoints, &mut progress)
+}
+
+/// A share of the frames, evenly spread, is held out.
+fn is_held_out(frame: usize, share: f64) -> bool {
+    ((frame + 1) as f64 * share).floor() > (frame as f64 * share).floor()
+}
+
+/// The same on samples that are there already.
+pub fn fit(
+    recipe: &Recipe,
+    text: &str,
+    samples: &Samples,
+    checkpoints: Option<&Path>,
+    progress: &mut impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Fitted, TrainError> {
+    let hash: [u8; 32] = Sha256::digest(text.as_bytes()).into();
+    let share = recipe.training.held_out;
+    let seen = samples.of_frames(|frame| !is_held_out(frame, share));
+    let unseen = samples.of_frames(|frame| is_held_out(frame, share));
+    let (inputs, targets) = seen.ranges();
+    let device = Device::default().autodiff();
+    device.seed(recipe.seed);
+    let mut parts = Parts::new(recipe, &device);
+    let mut adam = AdamConfig::new().init();
+    let mut first = 0;
+    let folder = checkpoints.map(|path| Folder { path, hash: &hash });
+    if let Some(folder) = &folder
+        && let Some(epoch) = folder.latest()?
+    {
+        (parts, adam) = folder.load(epoch, parts, adam)?;
+        first = epoch;
+    }
+
+    let count = seen.inputs.len();
+    let Recipe { training, network, .. } = recipe;
+    let (x, y) = (scaled(&seen.inputs, &inputs), scaled(&seen.targets, &targets));
+    let start = Instant::now();
+    let mut taken = 0usize;
+    let mut loss = f64::NAN;
+    for epoch in first..training.epochs {
+        let order = shuffled(count, recipe.seed.wrapping_add(epoch as u64));
+        let rate = match training.decay {
+            Decay::None => training.rate,
+            Decay::Cosine => {
+                let way = epoch as f64 / training.epochs as f64;
+                0.5 * training.rate * (1.0 + (core::f64::consts::PI * way).cos())
+            }
+        };
+        let (mut sum, mut done) = (0.0, 0);
+        for batch in order.chunks(training.batch) {
+            let (input, target) = (gathered(&x, batch, &device), gathered(&y, batch, &device));
+            let (predicted, corrected) = parts.forward(input, f64::from(network.slope));
+            let both = (predicted - target.clone()).square().mean() + (corrected - target).square().mean();
+            let gradients = GradientsParams::from_grads(both.backward(), &parts);
+            parts = adam.step(rate, parts, gradients);
+            sum += f64::from(both.into_scalar::<f32>()) * batch.len() as f64;
+            done += batch.len();
+            taken += batch.len();
+            loss = sum / done as f64;
+            let rate = taken as f64 / start.elapsed().as_secs_f64().max(1e-9);
+            let left = (training.epochs - epoch) * count - done;
+            let told = progress(&Progress {
+                epoch,
+                epochs: training.epochs,
+                done,
+                samples: count,
+                loss,
+                rate,
+                remaining: Duration::from_secs_f64(left as f64 / rate),
+            });
+            if told.is_break() {
+                return Err(TrainError::Stopped { epoch });
+            }
+        }
+        if !loss.is_finite() {
+            return Err(TrainError::Diverged { epoch });
+        }
+        if let Some(folder) = &folder {
+            folder.save(epoch + 1, &parts, &adam)?;
+        }
+    }
+
+    let description = described(recipe, text, hash, &parts, inputs, targets)?;
+    let bytes = mlp::write(&description)?;
+    let held_out = (!unseen.inputs.is_empty()).then(|| judged(&bytes, &unseen, &description.outputs));
+    Ok(Fitted { bytes, held_out, samples: count, loss })
+}
+
+/// Rows over the scales.
+fn scaled<const N: usize>(rows: &[[f32; N]], ranges: &[Range]) -> Vec<[f32; N]> {
+    let over = |row: &[f32; N]| core::array::from_fn(|column| row[column] / ranges[column].scale);
+    rows.iter().map(over).collect()
+}
+
+fn gathered<const N: usize>(rows: &[[f32; N]], batch: &[u32], device: &Device) -> Tensor<2> {
+    let numbers: Vec<f32> = batch.iter().flat_map(|&row| rows[row as usize]).collect();
+    Tensor::from_data(TensorData::new(numbers, [batch.len(), N]), device)
+}
+
+/// The numbers below `count` in an order that the seed decides (Fisher-Yates with SplitMix64).
+fn shuffled(count: usize, seed: u64) -> Vec<u32> {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    };
+    let mut order: Vec<u32> = (0..count as u32).collect();
+    for last in (1..count).rev() {
+        order.swap(last, (next() % (last as u64 + 1)) as usize);
+    }
+    order
+}
+
+fn described<'a>(
+    recipe: &Recipe,
+    text: &'a str,
+    recipe_hash: [u8; 32],
+    parts: &Parts,
+    inputs: Vec<Range>,
+    outputs: Vec<Range>,
+) -> Result<Description<'a>, TrainError> {
+    let spec = scenes::named(&recipe.motion.scene)?;
+    let law = match spec.law {
+        LawSpec::Exponential(law) => TrainedLaw::Exponential { a: law.a, b: law.b, d: law.d, literal: false },
+        LawSpec::NeoHookean(law) => TrainedLaw::NeoHookean { c: law.c, d: law.d, literal: false },
+    };
+    let layers = |layers: &[Linear]| -> Vec<LayerDescription> {
+        let last = layers.len() - 1;
+        let each = layers.iter().enumerate();
+        each.map(|(number, layer)| {
+            let slope = recipe.network.slope;
+            let activation = if number < last { Activation::LeakyRelu { slope } } else { Activation::Linear };
+            let [count, _] = layer.weight.val().dims();
+            // burn keeps a column for each output.
+            let weights = numbers(layer.weight.val().transpose());
+            let biases = layer.bias.as_ref().map(|bias| numbers(bias.val())).unwrap_or_default();
+            LayerDescription { inputs: count, activation, weights, biases }
+        })
+        .collect()
+    };
+    Ok(Description {
+        inputs,
+        outputs,
+        first: layers(&parts.first),
+        second: layers(&parts.second),
+        law,
+        density: spec.density,
+        damping: spec.damping,
+        step: recipe.multiple as f32 * DT,
+        exact_step: DT,
+        recipe: text,
+        recipe_hash,
+    })
+}
+
+fn numbers<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    tensor.into_data().try_to_vec().unwrap_or_default()
+}
+
+/// Root mean square errors of the kernel's own forward pass, unclipped motions and all.
+fn judged(bytes: &[u8], samples: &Samples, outputs: &[Range]) -> [f64; PREDICTED] {
+    let mut words = std::vec![0u32; bytes.len().div_ceil(4)];
+    bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
+    let mut squares = [0.0; PREDICTED];
+    if let Ok(network) = Network::parse(bytemuck::cast_slice(&words)) {
+        for (input, target) in samples.inputs.iter().zip(&samples.targets) {
+            let mut found = [0.0; PREDICTED];
+            network.predict(input, &mut found);
+            for (axis, square) in squares.iter_mut().enumerate() {
+                let off = f64::from(found[axis] - target[axis]) / f64::from(outputs[axis].scale);
+                *square += off * off;
+            }
+        }
+    }
+    squares.map(|square| (square / samples.inputs.len() as f64).sqrt())
+}
+
+/// A folder of checkpoints: for the latest epoch the weights and the state of Adam, and a file that names both and the
+/// recipe, written last.
+struct Folder<'a> {
+    path: &'a Path,
+    hash: &'a [u8; 32],
+}
+
+impl Folder<'_> {
+    fn files(&self, epoch: usize) -> [PathBuf; 2] {
+        ["weights", "adam"].map(|kind| self.path.join(format!("{kind}-{epoch:05}.bpk")))
+    }
+
+    fn mark(&self) -> PathBuf {
+        self.path.join("latest")
+    }
+
+    fn recipe(&self) -> String {
+        self.hash.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// Epochs of the checkpoint that is there.
+    fn latest(&self) -> Result<Option<usize>, TrainError> {
+        let Ok(text) = std::fs::read_to_string(self.mark()) else {
+            return Ok(None);
+        };
+        let mut words = text.split_whitespace();
+        let (epoch, recipe) = (words.next(), words.next());
+        if recipe != Some(self.recipe().as_str()) {
+            return Err(TrainError::OtherRecipe(self.path.to_path_buf()));
+        }
+        let epoch = epoch.and_then(|epoch| epoch.parse().ok());
+        epoch
+            .map(Some)
+            .ok_or_else(|| TrainError::Checkpoint(self.mark(), format!("cannot be read: {text:?}")))
+    }
+
+    fn load(
+        &self,
+        epoch: usize,
+        parts: Parts,
+        adam: ModuleOptimizer,
+    ) -> Result<(Parts, ModuleOptimizer), TrainError> {
+        let [weights, state] = self.files(epoch);
+        let problem = |path: &Path, text: String| TrainError::Checkpoint(path.to_path_buf(), text);
+        let parts = parts.try_load_file(&weights).map_err(|error| problem(&weights, error.to_string()))?;
+        let adam = adam.load(&state).map_err(|error| problem(&state, error.to_string()))?;
+        Ok((parts, adam))
+    }
+
+    fn save(&self, epoch: usize, parts: &Parts, adam: &ModuleOptimizer) -> Result<(), TrainError> {
+        let problem = |path: &Path, text: String| TrainError::Checkpoint(path.to_path_buf(), text);
+        std::fs::create_dir_all(self.path).map_err(|error| problem(self.path, error.to_string()))?;
+        let [weights, state] = self.files(epoch);
+        parts.clone().save_file(&weights).map_err(|error| problem(&weights, error.to_string()))?;
+        adam.save(&state).map_err(|error| problem(&state, error.to_string()))?;
+        let next = self.path.join("latest.tmp");
+        let named = std::fs::write(&next, format!("{epoch} {}\n", self.recipe()))
+            .and_then(|()| std::fs::rename(&next, self.mark()));
+        named.map_err(|error| problem(&next, error.to_string()))?;
+        // What is left of the epoch before is of no use.
+        for old in epoch.checked_sub(1).map(|before| self.files(before)).into_iter().flatten() {
+            let _ = std::fs::remove_file(old);
+        }
+        Ok(())
+    }
+}

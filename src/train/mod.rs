@@ -1,0 +1,17 @@
+//! Training of the learned step (feature `train`): a data set from the exact step, two losses, Adam (Meister et al. 2018,
+//! section 2), and a weight file.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`recipe`] | the configuration, a TOML file |
+//! | [`samples`] | what the exact step does, seen by each vertex in its frame |
+//! | [`fit`] | the network on burn, its losses, checkpoints |
+//!
+//! Same recipe, seed, number of threads and processor, same weights.
+
+mod error;
+pub mod fit;
+pub mod recipe;
+pub mod samples;
+
+pub use error::TrainError;

@@ -1,0 +1,165 @@
+//! What a network is trained on and how: a TOML file, kept in the weight file it leads to.
+//!
+//! ```toml
+//! seed = 1
+//! multiple = 10            # step of the network over the exact one's 30 us
+//!
+//! [motion]
+//! scene = "torsion"        # of the laboratory
+//! load = 1.0               # times the scene's forces
+//! from = 0.3               # s
+//! to = 1.0
+//! frames = 1000            # in equal intervals
+//!
+//! [network]
+//! hidden = [256, 256, 128, 64, 32]
+//! correction = [64, 64, 64]
+//! slope = 0.01             # of the leaky ReLU
+//!
+//! [training]
+//! epochs = 200
+//! batch = 4096
+//! rate = 0.001
+//! decay = "none"           # or "cosine", to zero
+//! held_out = 0.1           # share of the frames that are kept for the error at the end
+//! ```
+
+use std::format;
+use std::string::{String, ToString};
+use std::vec::Vec;
+
+use serde::Deserialize;
+
+use super::TrainError;
+use crate::lab::scenes;
+use crate::mlp::{MAX_LAYERS, MAX_WIDTH};
+
+/// See the module.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    /// Of the weights at the start and of the order of the samples.
+    pub seed: u64,
+    /// Step of the network over [`crate::lab::DT`].
+    pub multiple: u32,
+    /// What is learned from.
+    pub motion: Motion,
+    /// What learns.
+    pub network: Shape,
+    /// How.
+    pub training: Training,
+}
+
+/// What is learned from.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Motion {
+    /// One of [`scenes::NAMES`].
+    pub scene: String,
+    /// Times the scene's forces.
+    pub load: f32,
+    /// s.
+    pub from: f64,
+    /// s.
+    pub to: f64,
+    /// In equal intervals.
+    pub frames: usize,
+}
+
+/// What learns.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Shape {
+    /// Widths of the hidden layers of the first part.
+    pub hidden: Vec<usize>,
+    /// And of the correction.
+    pub correction: Vec<usize>,
+    /// Of the leaky ReLU.
+    pub slope: f32,
+}
+
+/// How.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Training {
+    /// Times that every sample is seen.
+    pub epochs: usize,
+    /// Samples of a step of the optimiser.
+    pub batch: usize,
+    /// Of Adam.
+    pub rate: f64,
+    /// Of the rate.
+    pub decay: Decay,
+    /// Share of the frames that are kept for the error at the end.
+    pub held_out: f64,
+}
+
+/// How the rate falls.
+#[derive(Clone, Copy, Debug, Deserialize, Eq, PartialEq)]
+#[serde(rename_all = "lowercase")]
+pub enum Decay {
+    /// Not at all.
+    None,
+    /// As half a cosine, to zero.
+    Cosine,
+}
+
+impl Recipe {
+    /// Reads and checks a recipe.
+    pub fn parse(text: &str) -> Result<Self, TrainError> {
+        let recipe: Self = toml::from_str(text).map_err(|error| TrainError::Recipe(error.to_string()))?;
+        recipe.checked()
+    }
+
+    fn checked(self) -> Result<Self, TrainError> {
+        let refuse = |what: &str, value: String, must: &str| {
+            Err(TrainError::Recipe(format!("{what} = {value}: {must}")))
+        };
+        let Self { multiple, motion, network, training, .. } = &self;
+        if !scenes::NAMES.contains(&motion.scene.as_str()) {
+            return refuse(
+                "scene",
+                format!("{:?}", motion.scene),
+                &format!("there are {}", scenes::NAMES.join(", ")),
+            );
+        }
+        if !(1..=1_000).contains(multiple) {
+            return refuse("multiple", multiple.to_string(), "it must be from 1 to 1000");
+        }
+        if !(motion.from >= 0.0 && motion.to > motion.from && motion.to <= 10.0) {
+            let span = format!("{} to {}", motion.from, motion.to);
+            return refuse("from", span, "they must rise, from zero to ten seconds");
+        }
+        if !(motion.load.is_finite() && motion.load != 0.0) {
+            return refuse("load", motion.load.to_string(), "it must be a number other than zero");
+        }
+        if motion.frames == 0 || motion.frames > 100_000 {
+            return refuse("frames", motion.frames.to_string(), "it must be from 1 to 100000");
+        }
+        let widths = network.hidden.iter().chain(&network.correction);
+        if let Some(width) = widths.clone().find(|width| !(1..=MAX_WIDTH).contains(*width)) {
+            return refuse("a width", width.to_string(), &format!("it must be from 1 to {MAX_WIDTH}"));
+        }
+        if widths.count() + 2 > MAX_LAYERS {
+            let layers = network.hidden.len() + network.correction.len();
+            return refuse("layers", layers.to_string(), &format!("at most {} hidden ones", MAX_LAYERS - 2));
+        }
+        if !(0.0..=1.0).contains(&network.slope) {
+            return refuse("slope", network.slope.to_string(), "it must be from 0 to 1");
+        }
+        if training.epochs == 0 || training.batch == 0 {
+            return refuse(
+                "epochs, batch",
+                format!("{}, {}", training.epochs, training.batch),
+                "one at least",
+            );
+        }
+        if !(training.rate > 0.0 && training.rate < 1.0) {
+            return refuse("rate", training.rate.to_string(), "it must be between 0 and 1");
+        }
+        if !(0.0..0.9).contains(&training.held_out) {
+            return refuse("held_out", training.held_out.to_string(), "it must be from 0 to 0.9");
+        }
+        Ok(self)
+    }
+}

@@ -1,0 +1,215 @@
+//! The data set: what the exact step does over each `D`, seen by each vertex in its frame (Meister et al. 2018, section 2).
+//!
+//! ```text
+//! at t: u(t), |u(t) - u(t-D)| / D, f_e - K u;   target (u(t+D) - 2 u(t) + u(t-D)) / D^2
+//! ```
+//! Vertices that are held or loaded are left out, as in the paper: boundary conditions make them jump. Frames follow
+//! the motion once each `D`, as they do in a roll-out; where the paper's frames lie closer than `D`, several trains of
+//! frames run side by side, each with its own start.
+
+use std::vec;
+use std::vec::Vec;
+
+use glam::{DVec3, Vec3A};
+
+use super::recipe::Recipe;
+use crate::frame::Frame;
+use crate::lab::host::Job;
+use crate::lab::scenes::{self, SceneSpec};
+use crate::lab::{DT, INTERVAL_STEPS, LabError};
+use crate::material::Material;
+use crate::mlp::Range;
+use crate::surrogate::{FEATURES, PREDICTED, features};
+use crate::tled::{self, Status, Step};
+
+/// What vertices saw and did, frame by frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Samples {
+    /// Displacement (m), speed (m/s) and force (N) in the local frame.
+    pub inputs: Vec<[f32; FEATURES]>,
+    /// Acceleration over the step, m/s^2, in the local frame.
+    pub targets: Vec<[f32; PREDICTED]>,
+    /// Vertices of each frame.
+    pub vertices: usize,
+}
+
+/// One train of frames, each `D` after the one before.
+struct Train {
+    /// Step of the exact motion at which it started.
+    start: u64,
+    frames: Vec<Frame>,
+    /// Displacements now, one and two `D` ago.
+    shapes: [Vec<DVec3>; 3],
+    /// Inputs at the latest moment that is to be sampled, in the frames of then.
+    asked: Option<Vec<[f32; FEATURES]>>,
+    moments: u64,
+}
+
+impl Samples {
+    /// Simulates the recipe's motion and samples it.
+    pub fn collect(recipe: &Recipe) -> Result<Self, LabError> {
+        let mut spec = scenes::named(&recipe.motion.scene)?;
+        for force in &mut spec.forces {
+            force.newton = force.newton.map(|newton| recipe.motion.load * newton);
+        }
+        spec.with_material(Collect { spec: &spec, recipe })
+    }
+
+    /// Those of some frames.
+    #[must_use]
+    pub fn of_frames(&self, wanted: impl Fn(usize) -> bool) -> Self {
+        let mut some = Self { vertices: self.vertices, ..Self::default() };
+        let each = self.inputs.chunks(self.vertices).zip(self.targets.chunks(self.vertices)).enumerate();
+        for (_, (inputs, targets)) in each.filter(|(frame, _)| wanted(*frame)) {
+            some.inputs.extend_from_slice(inputs);
+            some.targets.extend_from_slice(targets);
+        }
+        some
+    }
+
+    /// Standard deviation and range of each input, then of each target.
+    #[must_use]
+    pub fn ranges(&self) -> (Vec<Range>, Vec<Range>) {
+        (ranges(&self.inputs), ranges(&self.targets))
+    }
+}
+
+fn ranges<const N: usize>(rows: &[[f32; N]]) -> Vec<Range> {
+    let count = rows.len().max(1) as f64;
+    (0..N)
+        .map(|column| {
+            let values = || rows.iter().map(|row| row[column]);
+            let mean = values().map(f64::from).sum::<f64>() / count;
+            let square = values().map(|value| (f64::from(value) - mean).powi(2)).sum::<f64>() / count;
+            let scale = square.sqrt() as f32;
+            Range {
+                // What never varies says nothing, at any scale.
+                scale: if scale > 0.0 { scale } else { 1.0 },
+                least: values().fold(f32::INFINITY, f32::min),
+                most: values().fold(f32::NEG_INFINITY, f32::max),
+            }
+        })
+        .collect()
+}
+
+struct Collect<'a> {
+    spec: &'a SceneSpec,
+    recipe: &'a Recipe,
+}
+
+impl Job for Collect<'_> {
+    type Output = Result<Samples, LabError>;
+
+    fn run<M: Material + Copy>(self, material: M) -> Self::Output {
+        let Self { spec, recipe } = self;
+        let scene = spec.build(material)?;
+        let step = Step::insist(DT, spec.damping)?;
+        let mut state = spec.state();
+        let nodes = spec.points.len();
+        let mut kept = vec![true; nodes];
+        for node in
+            spec.supports.iter().map(|support| support.node).chain(spec.forces.iter().map(|force| force.node))
+        {
+            if let Some(kept) = kept.get_mut(node as usize) {
+                *kept = false;
+            }
+        }
+        let kept: Vec<usize> = (0..nodes).filter(|&node| kept[node]).collect();
+
+        let dt = f64::from(DT);
+        let every = u64::from(recipe.multiple);
+        let long = every as f64 * dt;
+        let span = recipe.motion.to - recipe.motion.from;
+        let trains = ((recipe.motion.frames as f64 * long / span).ceil() as u64).clamp(1, every);
+        let mut trains: Vec<Train> =
+            (0..trains).map(|number| Train::new(number * every / trains, nodes)).collect();
+        // The moments that are nearest to those of equal intervals.
+        let first = (recipe.motion.from / dt).round() as u64;
+        let spacing = span / recipe.motion.frames as f64 / dt;
+        let mut due = 0;
+        let last = (recipe.motion.to / dt).round() as u64 + every;
+
+        let mut samples = Samples { vertices: kept.len(), ..Samples::default() };
+        let mut place = vec![DVec3::ZERO; nodes];
+        for number in 0..=last {
+            // Before the step: displacements of now. After it: the forces of now.
+            let moments: Vec<usize> =
+                (0..trains.len()).filter(|&at| trains[at].is_due(number, every)).collect();
+            for &at in &moments {
+                trains[at].turn(&place);
+                trains[at].answer(&kept, long, &mut samples);
+            }
+            let interval = number as usize / INTERVAL_STEPS as usize;
+            let loads = spec.loads(&scene, interval)?;
+            match tled::step(&scene, &loads, &mut state, &step) {
+                Status::Ok | Status::Limited { .. } => {}
+                Status::Diverged(divergence) => {
+                    return Err(LabError::Diverged { scene: spec.name, divergence });
+                }
+                Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
+            }
+            for &at in &moments {
+                let frames = recipe.motion.frames;
+                if number >= first && due < frames && (number - first) as f64 >= (due as f64 - 0.5) * spacing
+                {
+                    trains[at].ask(&kept, long as f32, state.forces());
+                    due += 1;
+                }
+            }
+            // Increments are exact; a displacement in float32 is rounded, and a second difference shows that.
+            for (place, increment) in place.iter_mut().zip(state.increment.iter()) {
+                *place += Vec3A::from(increment.to_array()).as_dvec3();
+            }
+        }
+        Ok(samples)
+    }
+}
+
+impl Train {
+    fn new(start: u64, nodes: usize) -> Self {
+        let still = || vec![DVec3::ZERO; nodes];
+        let shapes = [still(), still(), still()];
+        Self { start, frames: vec![Frame::WORLD; nodes], shapes, asked: None, moments: 0 }
+    }
+
+    fn is_due(&self, number: u64, every: u64) -> bool {
+        number >= self.start && (number - self.start).is_multiple_of(every)
+    }
+
+    /// A `D` has passed.
+    fn turn(&mut self, place: &[DVec3]) {
+        self.shapes.rotate_right(1);
+        self.shapes[0].copy_from_slice(place);
+        self.moments += 1;
+    }
+
+    /// Targets for what was asked a `D` ago.
+    fn answer(&mut self, kept: &[usize], long: f64, samples: &mut Samples) {
+        let [now, one, two] = &self.shapes;
+        if let Some(inputs) = self.asked.take() {
+            samples.inputs.extend(inputs);
+            for &node in kept {
+                let acceleration = (now[node] - 2.0 * one[node] + two[node]) / (long * long);
+                samples.targets.push(self.frames[node].local(acceleration.as_vec3a()));
+            }
+        }
+        for ((frame, now), one) in self.frames.iter_mut().zip(now).zip(one) {
+            frame.follow((*now - *one).as_vec3a());
+        }
+    }
+
+    /// Inputs of now.
+    fn ask(&mut self, kept: &[usize], long: f32, forces: &[crate::state::NodeVector]) {
+        // The first moment has no velocity.
+        if self.moments < 2 {
+            return;
+        }
+        let [now, one, _] = &self.shapes;
+        let inputs = kept.iter().map(|&node| {
+            let speed = (now[node] - one[node]).length() as f32 / long;
+            let force = forces.get(node).map_or(Vec3A::ZERO, |force| Vec3A::from(force.to_array()));
+            features(&self.frames[node], now[node].as_vec3a(), speed, force)
+        });
+        self.asked = Some(inputs.collect());
+    }
+}

@@ -1,0 +1,141 @@
+//! Training: the same recipe gives the same weights, a training that was stopped goes on as if it had not been, the
+//! data set is the exact motion, and a recipe that cannot be used says why.
+#![cfg(feature = "train")]
+
+use core::ops::ControlFlow;
+
+use supple::mlp::Network;
+use supple::train::TrainError;
+use supple::train::fit::{Fitted, fit, train};
+use supple::train::recipe::Recipe;
+use supple::train::samples::Samples;
+
+const RECIPE: &str = r#"
+seed = 3
+multiple = 10
+
+[motion]
+scene = "cylinder"
+load = 1.0
+from = 0.03
+to = 0.06
+frames = 20
+
+[network]
+hidden = [12, 8]
+correction = [6]
+slope = 0.01
+
+[training]
+epochs = 4
+batch = 512
+rate = 0.003
+decay = "cosine"
+held_out = 0.2
+"#;
+
+fn samples() -> (Recipe, Samples) {
+    let recipe = Recipe::parse(RECIPE).unwrap();
+    let samples = Samples::collect(&recipe).unwrap();
+    (recipe, samples)
+}
+
+#[test]
+fn a_training_that_was_stopped_goes_on_as_if_it_had_not_been() {
+    let (recipe, samples) = samples();
+    let mut losses = Vec::new();
+    let whole = fit(&recipe, RECIPE, &samples, None, &mut |at| {
+        if at.done == at.samples {
+            losses.push(at.loss);
+        }
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    println!("loss {losses:.3?}, held out {:.3?}", whole.held_out.unwrap());
+    assert!(losses.last().unwrap() < &(0.9 * losses[0]));
+
+    let folder = tempfile::tempdir().unwrap();
+    for epochs in [1, 3] {
+        // Killed in the middle of an epoch.
+        let stopped = fit(&recipe, RECIPE, &samples, Some(folder.path()), &mut |at| {
+            if at.epoch == epochs && at.done > 2_000 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        assert!(matches!(stopped, Err(TrainError::Stopped { epoch }) if epoch == epochs), "{stopped:?}");
+    }
+    let mut first = None;
+    let resumed = fit(&recipe, RECIPE, &samples, Some(folder.path()), &mut |at| {
+        first = first.or(Some(at.epoch));
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    assert_eq!(first, Some(3));
+    assert!(whole.bytes == resumed.bytes, "other weights");
+
+    let other = RECIPE.replace("seed = 3", "seed = 4");
+    let refused = fit(&Recipe::parse(&other).unwrap(), &other, &samples, Some(folder.path()), &mut |_| {
+        ControlFlow::Continue(())
+    });
+    let said = refused.unwrap_err().to_string();
+    println!("{said}");
+    assert!(said.ends_with("a checkpoint of another recipe; remove it to train anew"), "{said}");
+}
+
+#[test]
+fn weights_say_where_they_come_from() {
+    let Fitted { bytes, samples, .. } = train(RECIPE, None, |_| ControlFlow::Continue(())).unwrap();
+    let mut words = vec![0u32; bytes.len().div_ceil(4)];
+    bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(&bytes);
+    let network = Network::parse(bytemuck::cast_slice(&words)).unwrap();
+    assert_eq!(network.recipe().text, RECIPE);
+    assert_eq!((network.recipe().step, network.recipe().damping), (10.0 * 3e-5, 20.0));
+    assert_eq!(network.multiply_adds(), 7 * 12 + 12 * 8 + 8 * 3 + 10 * 6 + 6 * 3);
+    assert!(samples > 1_000);
+    for range in network.inputs().iter().chain(network.outputs()) {
+        assert!(range.least < range.most && range.scale < range.most - range.least, "{range:?}");
+    }
+}
+
+#[test]
+fn frames_are_spread_over_the_motion_at_every_step() {
+    for multiple in [10, 20, 100] {
+        let text = RECIPE.replace("multiple = 10", &format!("multiple = {multiple}"));
+        let recipe = Recipe::parse(&text).unwrap();
+        let samples = Samples::collect(&recipe).unwrap();
+        assert_eq!(samples.inputs.len(), 20 * samples.vertices);
+        assert_eq!(samples.targets.len(), samples.inputs.len());
+        // The speed is that of the motion: it grows with the load, which is on a ramp.
+        let speed = |frame: usize| {
+            let rows = &samples.inputs[frame * samples.vertices..][..samples.vertices];
+            rows.iter().map(|row| f64::from(row[3])).sum::<f64>() / samples.vertices as f64
+        };
+        println!("{multiple}: {:.2e} to {:.2e} m/s", speed(0), speed(19));
+        assert!(speed(19) > speed(0));
+        // Accelerations of the body are of the size of what drives it.
+        let (_, targets) = samples.ranges();
+        assert!(targets.iter().all(|range| range.scale < 5.0), "{targets:?}");
+    }
+}
+
+#[test]
+fn a_recipe_that_cannot_be_used_says_why() {
+    let said = |from: &str, to: &str| {
+        let said = Recipe::parse(&RECIPE.replace(from, to)).unwrap_err().to_string();
+        println!("{said}");
+        said
+    };
+    assert!(said("\"cylinder\"", "\"cilinder\"").starts_with("scene = \"cilinder\": there are torsion,"));
+    assert_eq!(said("multiple = 10", "multiple = 0"), "multiple = 0: it must be from 1 to 1000");
+    assert_eq!(
+        said("to = 0.06", "to = 0.02"),
+        "from = 0.03 to 0.02: they must rise, from zero to ten seconds"
+    );
+    assert_eq!(said("load = 1.0", "load = 0.0"), "load = 0: it must be a number other than zero");
+    assert_eq!(said("[12, 8]", "[12, 300]"), "a width = 300: it must be from 1 to 256");
+    assert_eq!(said("rate = 0.003", "rate = 3.0"), "rate = 3: it must be between 0 and 1");
+    assert_eq!(said("held_out = 0.2", "held_out = 1.0"), "held_out = 1: it must be from 0 to 0.9");
+    assert!(said("batch = 512", "batsch = 512").contains("unknown field `batsch`"));
+}
