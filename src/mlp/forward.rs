@@ -27,7 +27,7 @@ fn dense<R: Real>(layer: &Layer<'_>, from: &[R], to: &mut [R]) {
         Activation::Linear => R::splat(1.0),
         Activation::LeakyRelu { slope } => R::splat(slope),
     };
-    let rows = layer.weights.chunks(TOGETHER * layer.inputs.max(1));
+    let rows = layer.weights.chunks((TOGETHER * layer.inputs).max(1));
     for ((rows, biases), to) in rows.zip(layer.biases.chunks(TOGETHER)).zip(to.chunks_mut(TOGETHER)) {
         // Rows that there are not repeat the first, and are not kept.
         let row = |index: usize| {

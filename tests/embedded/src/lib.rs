@@ -6,8 +6,10 @@ use supple::inertia::{self, Inertia, LatticeNode, MassScaling, numbers_for, vect
 use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{Exponential, Literal, NeoHookean, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
+use supple::mlp::Network;
 use supple::scene::{FixedScene, Support};
 use supple::state::{FixedState, NodeVector};
+use supple::surrogate::{self, Surrogate, Vertex};
 use supple::tled::{self, Status, Step};
 
 type Scene<L> = FixedScene<Tissue<L>, 100, 20>;
@@ -131,4 +133,31 @@ pub extern "C" fn multilevel(
     }
     let _ = inertia::step(scene, loads, state, multilevel);
     multilevel.report().error + multilevel.functions() as f32
+}
+
+/// A weight file, a prediction, a learned step.
+#[unsafe(no_mangle)]
+pub extern "C" fn learned(
+    scene: &Scene<Exponential>,
+    state: &mut State,
+    vertices: &mut [Vertex; 100],
+    weights: &[u8; 100_000],
+    length: usize,
+    loads: &Loads<'_>,
+    outputs: &mut [f32; 8],
+) -> i32 {
+    let Ok(network) = Network::parse(weights.get(..length).unwrap_or_default()) else {
+        return -1;
+    };
+    network.predict(&outputs.map(|output| output + 1.0), outputs);
+    let Ok(mut surrogate) = Surrogate::over(network, &mut vertices[..]) else {
+        return network.multiply_adds() as i32;
+    };
+    let earlier = [NodeVector::ZERO; 100];
+    state.span(&earlier, surrogate.seconds());
+    surrogate.follow(state);
+    match surrogate::step(scene, loads, state, &mut surrogate) {
+        Status::Ok => (100.0 * surrogate.report().outside) as i32,
+        _ => 1,
+    }
 }
