@@ -21,7 +21,8 @@
 //! | [`lanes`] | one generic body for every instruction set |
 //!
 //! With the feature `io` meshes are read and fields written (`io`), with `lab` methods are judged against the
-//! exact step over scenes (`lab`), with `train` networks are trained (`train`), with `cli` there is the command `supple`.
+//! exact step over scenes (`lab`), with `train` networks are trained (`train`), with `safetensors` they go to and from
+//! PyTorch, with `cli` there is the command `supple`.
 //!
 //! # Promises
 //!

@@ -12,7 +12,7 @@ use super::{DT, LabError};
 use crate::inertia::{self, Inertia, LatticeNode, numbers_for, suggested_lattice, vectors_for};
 use crate::loads::Loads;
 use crate::material::Material;
-use crate::mlp::Network;
+use crate::mlp::{Network, WeightBytes};
 use crate::state::{NodeVector, State};
 use crate::surrogate::{self, Surrogate, Vertex};
 use crate::tled::{self, Status, Step};
@@ -50,12 +50,7 @@ impl Brought {
     pub fn read(path: &Path) -> Result<Self, LabError> {
         let problem = |error: &dyn core::fmt::Display| LabError::File(format!("{}: {error}", path.display()));
         let bytes = std::fs::read(path).map_err(|error| problem(&error))?;
-        let mut words = vec![0_u32; bytes.len().div_ceil(4)];
-        let whole: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
-        if let Some(start) = whole.get_mut(..bytes.len()) {
-            start.copy_from_slice(&bytes);
-        }
-        let bytes: &'static [u8] = bytemuck::cast_slice(words.leak());
+        let bytes: &'static [u8] = Box::leak(Box::new(WeightBytes::of(&bytes))).bytes();
         let network = Network::parse(bytes).map_err(|error| problem(&error))?;
         let multiple = (network.recipe().step / DT).round() as u32;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

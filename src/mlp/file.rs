@@ -95,6 +95,29 @@ pub enum TrainedLaw {
     },
 }
 
+impl TrainedLaw {
+    /// As in scene files.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::NeoHookean { literal: false, .. } => "neo-hookean",
+            Self::NeoHookean { literal: true, .. } => "neo-hookean-literal",
+            Self::Exponential { literal: false, .. } => "exponential",
+            Self::Exponential { literal: true, .. } => "exponential-literal",
+        }
+    }
+}
+
+/// Name and constants, for people.
+impl fmt::Display for TrainedLaw {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NeoHookean { c, d, .. } => write!(f, "{}, c {c} Pa, d {d} Pa", self.name()),
+            Self::Exponential { a, b, d, .. } => write!(f, "{}, a {a} Pa, b {b}, d {d} Pa", self.name()),
+        }
+    }
+}
+
 /// What a network was trained on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recipe<'w> {

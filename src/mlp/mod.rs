@@ -7,15 +7,19 @@
 //! `x` are the inputs, each over its scale; outputs are the network's times theirs. A [`Network`] borrows its
 //! weights from the bytes of a weight file (`weights/FORMAT.md`), from flash or a mapped file, without a copy.
 
+#[cfg(feature = "safetensors")]
+mod exchange;
 mod file;
 mod forward;
 #[cfg(feature = "std")]
 mod write;
 
+#[cfg(feature = "safetensors")]
+pub use exchange::{ExchangeError, from_safetensors, to_safetensors};
 pub use file::{Network, Range, Recipe, TrainedLaw, WeightError};
 pub(crate) use forward::Scratch;
 #[cfg(feature = "std")]
-pub use write::{Description, LayerDescription, write};
+pub use write::{Description, LayerDescription, WeightBytes, write};
 
 /// Widest layer.
 pub const MAX_WIDTH: usize = 256;

@@ -1,4 +1,5 @@
-//! Weight files from what training found; [`write`] refuses what [`Network::parse`] would refuse.
+//! Weight files from what training found, and memory for them on a host with a heap; [`write`] refuses what
+//! [`Network::parse`] would refuse.
 
 use std::vec::Vec;
 
@@ -43,6 +44,32 @@ pub struct Description<'a> {
     pub recipe: &'a str,
     /// SHA-256 of the recipe.
     pub recipe_hash: [u8; 32],
+}
+
+/// A copy of a weight file's bytes, at a multiple of four as [`Network::parse`] needs them.
+#[derive(Clone, Debug)]
+pub struct WeightBytes {
+    words: Vec<u32>,
+    length: usize,
+}
+
+impl WeightBytes {
+    /// Copies the bytes.
+    #[must_use]
+    pub fn of(bytes: &[u8]) -> Self {
+        let mut words = std::vec![0; bytes.len().div_ceil(4)];
+        let whole: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+        for (to, from) in whole.iter_mut().zip(bytes) {
+            *to = *from;
+        }
+        Self { words, length: bytes.len() }
+    }
+
+    /// The bytes.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        bytemuck::cast_slice(&self.words).get(..self.length).unwrap_or_default()
+    }
 }
 
 /// Bytes of a file, each array at its place.
@@ -115,10 +142,7 @@ pub fn write(description: &Description<'_>) -> Result<Vec<u8>, WeightError> {
     place(&mut bytes, 0, bytemuck::bytes_of(&header));
     header.checksum = crc32fast::hash(&bytes[CHECKED..]);
     place(&mut bytes, 0, bytemuck::bytes_of(&header));
-    // Parsed where it is aligned.
-    let mut words = std::vec![0u32; bytes.len().div_ceil(4)];
-    bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(&bytes);
-    Network::parse(bytemuck::cast_slice(&words))?;
+    Network::parse(WeightBytes::of(&bytes).bytes())?;
     Ok(bytes)
 }
 
