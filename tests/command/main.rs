@@ -4,6 +4,10 @@ mod evaluate;
 mod inspect;
 mod large_steps;
 mod simulate;
+mod weights;
+
+#[path = "../support/networks.rs"]
+mod networks;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -32,6 +36,12 @@ impl Desk {
     fn write(&self, name: &str, text: &str) -> PathBuf {
         let path = self.path(name);
         std::fs::write(&path, text).unwrap();
+        path
+    }
+
+    fn network(&self, name: &str, description: &supple::mlp::Description<'_>) -> PathBuf {
+        let path = self.path(name);
+        std::fs::write(&path, supple::mlp::write(description).unwrap()).unwrap();
         path
     }
 

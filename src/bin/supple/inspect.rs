@@ -1,4 +1,4 @@
-//! `supple inspect`: what a mesh or a scene is like before any time passes. A mesh with faults is looked at
+//! `supple inspect`: what a mesh or a scene is like before any time passes; networks in network.rs. A mesh with faults is looked at
 //! in full: every kind of fault is counted and its first element or node named.
 
 use std::path::Path;
@@ -7,6 +7,7 @@ use supple::mesh::{DEGENERATE, Winding};
 
 use crate::body::{Body, extent, volume};
 use crate::cost::Cost;
+use crate::network;
 use crate::prepare::Setup;
 use crate::scene_file::{Problem, SceneFile};
 
@@ -25,11 +26,16 @@ pub(crate) fn inspect(path: &Path, accuracy: Option<f64>) -> Result<(), Problem>
         }
         return setup.with_material(Cost { setup: &setup, accuracy });
     }
+    let weights = network::is_weights(path);
     if accuracy.is_some() {
         return Err(Problem(format!(
-            "{}: --accuracy recommends a step for a scene (.toml), this is a mesh",
-            path.display()
+            "{}: --accuracy recommends a step for a scene (.toml), this is a {}",
+            path.display(),
+            if weights { "network" } else { "mesh" }
         )));
+    }
+    if weights {
+        return network::inspect(path);
     }
     mesh(&Body::read(path, 1.0, Winding::Checked)?)
 }

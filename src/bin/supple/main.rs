@@ -1,4 +1,4 @@
-//! The command `supple`: simulate a scene, inspect a mesh or a scene, show what the kernel does, judge methods.
+//! The command `supple`: simulate a scene, inspect a mesh, a scene or a network, show what the kernel does, judge methods.
 //!
 //! Exit codes: 0 as asked, 2 the input is not usable, 3 the simulation diverged.
 
@@ -10,6 +10,7 @@ mod evaluate;
 mod inspect;
 mod large_steps;
 mod loads;
+mod network;
 mod picture;
 mod prepare;
 mod report;
@@ -21,6 +22,7 @@ mod timing;
 mod tissues;
 #[cfg(feature = "train")]
 mod train;
+mod weights;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -53,9 +55,9 @@ enum Command {
         #[arg(long)]
         insist: bool,
     },
-    /// Look at a mesh or a scene: sizes, quality, critical step, memory, cost
+    /// Look at a mesh, a scene or a weight file: sizes, quality, critical step, memory, cost, training
     Inspect {
-        /// A mesh (.vtk, .vtu, .msh, .node, .ele) or a scene (.toml)
+        /// A mesh (.vtk, .vtu, .msh, .node, .ele), a scene (.toml) or a network (.weights)
         file: PathBuf,
         /// Recommend a step for the scene whose error, by step doubling, is below this (mm)
         #[arg(long, value_name = "MM")]
@@ -72,6 +74,9 @@ enum Command {
     /// Train a network for the learned step; a training that was stopped goes on where it was
     #[cfg(feature = "train")]
     Train(train::Asked),
+    /// Convert weight files to and from safetensors
+    #[command(subcommand)]
+    Weights(weights::Conversion),
 }
 
 fn main() -> ExitCode {
@@ -82,6 +87,7 @@ fn main() -> ExitCode {
         Command::Evaluate(asked) => evaluate::evaluate(&asked),
         #[cfg(feature = "train")]
         Command::Train(asked) => train::train(&asked),
+        Command::Weights(conversion) => weights::convert(&conversion),
     };
     match done {
         Ok(End::Reached) => ExitCode::SUCCESS,

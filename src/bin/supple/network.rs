@@ -1,0 +1,126 @@
+//! `supple inspect` of a weight file: what the network is, what it costs, what it was trained on and on which ranges.
+
+use std::path::Path;
+
+use supple::mlp::{Activation, Layer, Network, Range};
+use supple::surrogate::{FEATURES, PREDICTED, Surrogate, Vertex};
+
+use crate::inspect::row;
+use crate::scene_file::Problem;
+use crate::weights;
+
+/// Inputs and outputs of the learned step: what they are, the unit for people, and how many of it the SI unit is.
+type Quantity = (&'static str, &'static str, f32);
+const SEEN: [Quantity; FEATURES] = [
+    ("displacement, tangent", "mm", 1e3),
+    ("displacement, normal", "mm", 1e3),
+    ("displacement, binormal", "mm", 1e3),
+    ("speed", "mm/s", 1e3),
+    ("force, tangent", "mN", 1e3),
+    ("force, normal", "mN", 1e3),
+    ("force, binormal", "mN", 1e3),
+];
+const FORETOLD: [Quantity; PREDICTED] = [
+    ("acceleration, tangent", "m/s^2", 1.0),
+    ("acceleration, normal", "m/s^2", 1.0),
+    ("acceleration, binormal", "m/s^2", 1.0),
+];
+
+/// Whether a file is one of weights, by its name or by how it begins.
+pub(crate) fn is_weights(path: &Path) -> bool {
+    let begins = || {
+        let mut start = [0; 8];
+        let read =
+            std::fs::File::open(path).and_then(|mut file| std::io::Read::read_exact(&mut file, &mut start));
+        read.is_ok() && start == *b"SUPPLE-W"
+    };
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("weights")) || begins()
+}
+
+/// Prints what a weight file holds.
+pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
+    let memory = weights::read(path)?;
+    let network = weights::parse(path, &memory)?;
+    let (inputs, outputs) = (network.inputs(), network.outputs());
+    let recipe = network.recipe();
+    row("weights", path.display());
+    row("size", format!("{} bytes", memory.bytes().len()));
+    row(
+        "network",
+        format!(
+            "{} inputs, {} outputs, {} multiply-adds per vertex",
+            inputs.len(),
+            outputs.len(),
+            network.multiply_adds()
+        ),
+    );
+    row("step", describe_step(&network));
+    row("learned from", describe_tissue(&network));
+    row("damping", format!("{} 1/s", recipe.damping));
+
+    println!(
+        "\n{:<21} {:>7} {:>8}  {:<16} {:>14} {:>9}",
+        "layer", "inputs", "outputs", "activation", "multiply-adds", "bytes"
+    );
+    let (first, second) = network.layers();
+    for (part, layers) in [("first", first), ("second", second)] {
+        for (index, layer) in layers.iter().enumerate() {
+            println!("{}", layer_row(&format!("{part} {index}"), layer));
+        }
+    }
+    let learned_step = inputs.len() == FEATURES && outputs.len() == PREDICTED;
+    let of = |table: &'static [Quantity]| if learned_step { table } else { &[] };
+    ranges("input", "in training", inputs, of(&SEEN));
+    ranges("output", "clipped to", outputs, of(&FORETOLD));
+
+    let hash: String = recipe.hash.iter().map(|byte| format!("{byte:02x}")).collect();
+    println!("\nrecipe, SHA-256 {hash}");
+    for line in recipe.text.lines() {
+        println!("{}", format!("    {line}").trim_end());
+    }
+    match Surrogate::over(network, [Vertex::NEW; 0]) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(Problem(format!("{}: {error}", path.display()))),
+    }
+}
+
+/// The step of a network, for people.
+pub(crate) fn describe_step(network: &Network<'_>) -> String {
+    let recipe = network.recipe();
+    let multiple = recipe.step / recipe.exact_step;
+    format!(
+        "{:.3e} s, {multiple:.1} times the exact step it learned from ({:.3e} s)",
+        recipe.step, recipe.exact_step
+    )
+}
+
+/// The tissue of a network's training, for people.
+pub(crate) fn describe_tissue(network: &Network<'_>) -> String {
+    let recipe = network.recipe();
+    format!("{}, {} kg/m^3", recipe.law, recipe.density)
+}
+
+fn layer_row(name: &str, layer: &Layer<'_>) -> String {
+    let Layer { inputs, outputs, activation, weights, biases } = layer;
+    let activation = match activation {
+        Activation::Linear => "none".into(),
+        Activation::LeakyRelu { slope } => format!("leaky ReLU {slope}"),
+    };
+    let bytes = size_of_val(*weights) + size_of_val(*biases);
+    format!("{name:<21} {inputs:>7} {outputs:>8}  {activation:<16} {:>14} {bytes:>9}", inputs * outputs)
+}
+
+/// Prints a table of ranges; what has no name in `quantities` has a number and no unit.
+fn ranges(kind: &str, what: &str, ranges: &[Range], quantities: &[Quantity]) {
+    println!("\n{kind:<24} {:<6} {:>11}  {what}", "unit", "scale");
+    for (index, Range { scale, least, most }) in ranges.iter().enumerate() {
+        let number = format!("{kind} {index}");
+        let (name, unit, factor) = quantities.get(index).copied().unwrap_or((&number, "", 1.0));
+        println!(
+            "{name:<24} {unit:<6} {:>11.4}  {:.4} to {:.4}",
+            factor * scale,
+            factor * least,
+            factor * most
+        );
+    }
+}
