@@ -107,6 +107,18 @@ impl<S: AsRef<[NodeVector]> + AsMut<[NodeVector]>> State<S> {
         self.dt = seconds;
     }
 
+    /// Makes the last increment span `seconds` at the velocity that it has. A step much shorter than the last goes on
+    /// smoothly from here: it would count half the last step's acceleration into its own otherwise.
+    pub fn respan(&mut self, seconds: f32) {
+        let factor = if self.dt > 0.0 { seconds / self.dt } else { 1.0 };
+        for increment in self.increment.as_mut() {
+            for component in &mut increment.0 {
+                *component *= factor;
+            }
+        }
+        self.dt = seconds;
+    }
+
     /// Back to rest at time zero.
     pub fn reset(&mut self) {
         for vectors in [&mut self.displacement, &mut self.increment, &mut self.force] {

@@ -176,6 +176,28 @@ fn ten_steps_are_those_of_the_paper_in_float64() {
 }
 
 #[test]
+fn an_exact_step_goes_on_from_a_learned_one_at_the_same_velocity() {
+    let body = small_bar();
+    let scene = body.scene(tissue(EXP), &held(&body));
+    let forces = torsion(&body, FORCE, 0.0);
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+    let mut state = led(&body);
+    let nodes = 0..body.points.len();
+    let velocities: Vec<_> = nodes.clone().map(|node| state.velocity(node)).collect();
+    let fastest = velocities.iter().flatten().fold(0.0f32, |most, v| most.max(v.abs()));
+    let largest_change = |state: &HostState| {
+        let both = nodes.clone().map(|node| state.velocity(node)).zip(&velocities);
+        both.flat_map(|(now, then)| [0, 1, 2].map(|axis| (now[axis] - then[axis]).abs()))
+            .fold(0.0f32, f32::max)
+    };
+    state.respan(DT);
+    assert!(largest_change(&state) < 1e-6 * fastest);
+    support::run(&scene, &loads, &mut state, &Step::insist(DT, 20.0).unwrap(), 1);
+    println!("{:.1e} of {fastest:.2e} m/s", largest_change(&state));
+    assert!(largest_change(&state) < 0.2 * fastest);
+}
+
+#[test]
 fn a_network_of_another_shape_is_refused() {
     let memory = Memory::of(&write(&described(&[6, 4, 3], &[], 1)).unwrap());
     let error = Surrogate::over(Network::parse(memory.bytes()).unwrap(), vec![Vertex::NEW; 1]).unwrap_err();

@@ -66,7 +66,6 @@ fn bad_scenes_are_refused_in_words() {
             ),
             "gravity is given twice",
         ),
-        (with("[surrogate]\nweights = \"w\"\n"), "the learned step ([surrogate]) is not in this version"),
         (instead("step = \"auto\"", "step = \"often\""), "step \"often\" is not known"),
         (instead("step = \"auto\"", "step = 0.0"), "step is 0 s"),
         (instead("step = \"auto\"", "step = 1.0"), "is longer than the end"),

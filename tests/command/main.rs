@@ -3,6 +3,7 @@ mod errors;
 mod evaluate;
 mod inspect;
 mod large_steps;
+mod learned;
 mod simulate;
 mod weights;
 

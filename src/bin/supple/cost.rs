@@ -10,6 +10,7 @@ use supple::tled::{self, CriticalStep, Step};
 use crate::doubling;
 use crate::inspect::row;
 use crate::large_steps::{Grid, HostInertia, describe_added};
+use crate::learned;
 use crate::prepare::{HostScene, HostState, Job, Setup};
 use crate::run;
 use crate::scene_file::Problem;
@@ -79,6 +80,9 @@ impl Job for Cost<'_> {
         }
         let times = beyond(setup, &scene, &mut state, &loads, bound)?;
         doubling::foretell(setup, &scene, &loads, bound)?;
+        if let Some(learned) = &setup.learned {
+            learned::cost(learned, setup, &scene, &loads)?;
+        }
         let step = step?;
         if setup.time.method != Method::Tled {
             row("real-time factor", real_time(step.seconds(), times.of(setup.time.method)));

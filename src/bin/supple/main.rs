@@ -9,6 +9,7 @@ mod doubling;
 mod evaluate;
 mod inspect;
 mod large_steps;
+mod learned;
 mod loads;
 mod network;
 mod picture;

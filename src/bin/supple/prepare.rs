@@ -3,10 +3,12 @@
 
 use supple::loads::{Motion, NodalForce};
 use supple::material::{Exponential, Law, Literal, Material, NeoHookean, Regions, Tissue};
+use supple::mlp::{Recipe, TrainedLaw};
 use supple::scene::{BuildError, ElementBlock, NodeInertia, Scene, Support, blocks_for};
 use supple::state::{NodeVector, State};
 
 use crate::body::{Body, read_body};
+use crate::learned::{Learned, same};
 use crate::loads::read_loads;
 use crate::scene_file::{Problem, SceneFile};
 use crate::timing::Timing;
@@ -25,6 +27,8 @@ pub(crate) struct Setup {
     pub(crate) gravity: [f32; 3],
     pub(crate) damping: f32,
     pub(crate) time: Timing,
+    /// The network that takes over from the exact step.
+    pub(crate) learned: Option<Learned>,
     pub(crate) warnings: Vec<String>,
     law: String,
     /// `a, b, c, d, density` of `[material]`, then of each region.
@@ -41,12 +45,6 @@ pub(crate) trait Job {
 impl Setup {
     pub(crate) fn read(file: &SceneFile) -> Result<Self, Problem> {
         let scene = &file.scene;
-        if let Some(surrogate) = &scene.surrogate {
-            return Err(file.problem(
-                surrogate,
-                "the learned step ([surrogate]) is not in this version; remove the table",
-            ));
-        }
         let body = read_body(file, &scene.mesh)?;
         let mut warnings = vec![];
         let diagonal = body.diagonal();
@@ -63,16 +61,24 @@ impl Setup {
             );
         }
         let gravity = file.gravity()?;
-        let damping = scene.damping.as_ref().map_or(0.0, |damping| *damping.get_ref());
         if let Some(at) = &scene.damping
+            && let damping = *at.get_ref()
             && !(damping.is_finite() && damping >= 0.0)
         {
             return Err(file.problem(at, format!("damping is {damping} 1/s, it must be zero or more")));
         }
+        let time = Timing::read(file)?;
+        let learned = match &scene.surrogate {
+            Some(table) => Some(Learned::read(file, table.get_ref(), &time)?),
+            None => None,
+        };
+        let damping = match &learned {
+            Some(learned) => learned.damping(file, scene.damping.as_ref())?,
+            None => scene.damping.as_ref().map_or(0.0, |damping| *damping.get_ref()),
+        };
         let (supports, forces, motions) = read_loads(file, &body)?;
         let (law, tissues, of_element) = read_tissues(file, &body)?;
-        let time = Timing::read(file)?;
-        Ok(Self {
+        let mut setup = Self {
             body,
             supports,
             forces,
@@ -80,11 +86,17 @@ impl Setup {
             gravity,
             damping,
             time,
+            learned,
             warnings,
             law,
             tissues,
             of_element,
-        })
+        };
+        if let Some(learned) = &setup.learned {
+            let warning = learned.warning(&setup)?;
+            setup.warnings.extend(warning);
+        }
+        Ok(setup)
     }
 
     /// The lobe of `supple demo`, which has no scene file.
@@ -98,6 +110,7 @@ impl Setup {
             gravity: [0.0; 3],
             damping: 0.0,
             time: Timing::of_demo(),
+            learned: None,
             warnings: vec![],
             law: "exponential".into(),
             tissues: vec![[a, b, 0.0, d, density]],
@@ -119,6 +132,21 @@ impl Setup {
             more => format!(", {more} further regions"),
         };
         format!("{}, {constants}, {density} kg/m^3{regions}", self.law)
+    }
+
+    /// Whether all of it is the tissue that a network learned from.
+    pub(crate) fn is_of(&self, recipe: &Recipe<'_>) -> bool {
+        let wanted = match recipe.law {
+            TrainedLaw::NeoHookean { c, d, .. } => [0.0, 0.0, c, d, recipe.density],
+            TrainedLaw::Exponential { a, b, d, .. } => [a, b, 0.0, d, recipe.density],
+        };
+        let mut constants = self.tissues.iter().flat_map(|tissue| tissue.iter().zip(&wanted));
+        self.law == recipe.law.name() && constants.all(|(here, there)| same(*here, *there))
+    }
+
+    /// What moves the scene, by name.
+    pub(crate) const fn method(&self) -> &'static str {
+        if self.learned.is_some() { "learned" } else { self.time.method.name() }
     }
 
     /// Runs `job` with the material of this scene.

@@ -12,9 +12,13 @@ use supple::tled;
 
 use crate::body::{Body, volume};
 use crate::large_steps::{Grid, Trace, describe_added};
+use crate::learned::{Learned, LearnedTrace};
 use crate::prepare::{HostScene, HostState, Setup};
 use crate::run::Outcome;
 use crate::scene_file::Problem;
+
+/// Share of the vertices outside a network's training, on average, from which on it is remarked upon.
+const OUTSIDE: f64 = 0.01;
 
 /// The folder of a simulation's results.
 pub(crate) struct Folder {
@@ -244,6 +248,51 @@ fn inertia_rows(method: &str, trace: &Trace, outcome: &Outcome) -> Vec<(&'static
     rows
 }
 
+/// The network in `summary.json`.
+fn learned(setup: &Learned, trace: &LearnedTrace) -> Value {
+    let (clipped, outside) = trace.means();
+    json!({
+        "weights": setup.path.display().to_string(),
+        "step_s": decimal(trace.seconds),
+        "from_s": trace.from,
+        "steps": trace.steps,
+        "us_per_step": trace.us_per_step(),
+        "clipped_share": clipped,
+        "clipped_share_most": decimal(trace.most.clipped),
+        "outside_share": outside,
+        "outside_share_most": decimal(trace.most.outside),
+        "fell_back_at_s": trace.fell_back.as_ref().map(|(time, _)| time),
+        "fell_back_because": trace.fell_back.as_ref().map(|(_, why)| why),
+    })
+}
+
+/// The network on the screen.
+fn learned_rows(setup: &Learned, trace: &LearnedTrace) -> Vec<(&'static str, String)> {
+    let (clipped, outside) = trace.means();
+    let share = |mean: f64, most: f32| {
+        format!("{:.2} % of the vertices on average, {:.1} % at most", 100.0 * mean, 100.0 * most)
+    };
+    let us = trace.us_per_step();
+    let real_time = 1e6 * f64::from(trace.seconds) / us;
+    let mut rows = vec![
+        ("network", format!("{}, steps of {}", setup.path.display(), trace.described)),
+        (
+            "learned steps",
+            format!(
+                "{} from {:.3} s on, {us:.1} us each, {real_time:.3} times real time",
+                trace.steps,
+                trace.from.unwrap_or_default()
+            ),
+        ),
+        ("clipped", share(clipped, trace.most.clipped)),
+        ("outside training", share(outside, trace.most.outside)),
+    ];
+    if let Some((time, why)) = &trace.fell_back {
+        rows.push(("fell back", format!("to the exact step at {time:.3} s; the learned one {why}")));
+    }
+    rows
+}
+
 /// What is not as it should be, in sentences.
 fn warnings(setup: &Setup, outcome: &Outcome) -> Vec<String> {
     let mut warnings = setup.warnings.clone();
@@ -252,6 +301,21 @@ fn warnings(setup: &Setup, outcome: &Outcome) -> Vec<String> {
             "from {time:.3} s on the step was above the stable {:.3e} s, as the tissue had stiffened; shorten it or write step = \"auto\"",
             outcome.least.0.seconds
         ));
+    }
+    if let Some(trace) = &outcome.learned {
+        let (_, outside) = trace.means();
+        if outside > OUTSIDE {
+            warnings.push(format!(
+                "{:.1} % of the vertices had inputs outside the network's training, {:.1} % at most: its error there is \
+                 not known",
+                100.0 * outside,
+                100.0 * trace.most.outside
+            ));
+        }
+        if let Some((time, why)) = &trace.fell_back {
+            warnings
+                .push(format!("from {time:.3} s on the exact step moved the scene: the learned one {why}"));
+        }
     }
     let limits = outcome.limits;
     if limits.steps > 0 {
@@ -298,18 +362,21 @@ fn summary<M: Material>(
     figures: &Figures,
 ) -> Value {
     let (us_per_step, real_time_factor) = speed(state, outcome);
+    let fell_back = outcome.learned.as_ref().is_some_and(|trace| trace.fell_back.is_some());
     let (status, sentence) = match (&outcome.divergence, outcome.limits.steps) {
         (Some(divergence), _) => ("diverged", Some(divergence.to_string())),
+        (None, _) if fell_back => ("fell back", None),
         (None, 0) => ("ok", None),
         (None, _) => ("limited", None),
     };
+    let network = setup.learned.as_ref().zip(outcome.learned.as_ref());
     let ledger = state.ledger();
     json!({
         "status": status,
         "divergence": outcome.divergence.map(|divergence| json!({
             "time_s": divergence.time, "node": divergence.node, "sentence": sentence,
         })),
-        "method": setup.time.method.name(),
+        "method": setup.method(),
         "mesh": setup.body.name,
         "material": setup.describe_material(),
         "nodes": scene.node_count(),
@@ -338,6 +405,7 @@ fn summary<M: Material>(
         },
         "steps_limited": outcome.limits.steps,
         "inertia": outcome.trace.as_ref().map(|trace| inertia(trace, outcome)),
+        "surrogate": network.map(|(setup, trace)| learned(setup, trace)),
         "warnings": warnings(setup, outcome),
     })
 }
@@ -398,6 +466,9 @@ fn table<M: Material>(
     ];
     if let Some(trace) = &outcome.trace {
         rows.splice(2..2, inertia_rows(setup.time.method.name(), trace, outcome));
+    }
+    if let (Some(setup), Some(trace)) = (&setup.learned, &outcome.learned) {
+        rows.splice(2..2, learned_rows(setup, trace));
     }
     rows.iter().fold(String::new(), |text, (name, value)| text + &format!("{name:<21} {value}\n"))
 }

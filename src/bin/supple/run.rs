@@ -3,6 +3,8 @@
 //! `step = "auto"` takes a share of the critical step, which falls as tissue stiffens: it is asked for anew
 //! every few steps, and steps after which it turns out to be shorter than they were are undone and taken
 //! again in halves. A sudden load on one node needs that: one step may stiffen its elements tenfold.
+//!
+//! With `[surrogate]` a network takes over (learned.rs); the same step leads.
 
 use std::time::{Duration, Instant};
 
@@ -12,6 +14,7 @@ use supple::material::{J_FLOOR, Material};
 use supple::tled::{self, CriticalStep, Divergence, Status, Step};
 
 use crate::large_steps::{Grid, HostInertia, Trace};
+use crate::learned::{LearnedRun, LearnedTrace};
 use crate::prepare::{HostScene, HostState, Setup};
 use crate::scene_file::Problem;
 use crate::timing::{Method, StepChoice};
@@ -67,6 +70,8 @@ pub(crate) struct Outcome {
     pub(crate) above_from: Option<f64>,
     /// What the inertia did, with a method that has one.
     pub(crate) trace: Option<Trace>,
+    /// What the network did, with one.
+    pub(crate) learned: Option<LearnedTrace>,
 }
 
 /// The step that the scene file asks for. The exact step is refused above the critical one unless the user
@@ -78,6 +83,11 @@ pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, insist: bool) -> 
         StepChoice::Seconds(seconds) => seconds,
         StepChoice::Multiple(multiple) => multiple * at_rest.seconds,
         StepChoice::Auto => SHARE * at_rest.seconds,
+    };
+    // An interval of a network is a whole number of exact steps.
+    let seconds = match (&setup.learned, time.step) {
+        (None, _) | (_, StepChoice::Auto) => seconds,
+        (Some(learned), _) => learned.exact_seconds(setup, seconds)?,
     };
     let step = if insist || !exact {
         Step::insist(seconds, setup.damping)
@@ -108,15 +118,16 @@ pub(crate) fn critical<M: Material>(
 }
 
 /// A simulation at rest: everything that can be refused has been.
-pub(crate) struct Start {
+pub(crate) struct Start<'a> {
     at_rest: CriticalStep,
     step: Step,
     inertia: Option<HostInertia>,
+    learned: Option<LearnedRun<'a>>,
 }
 
-impl Start {
+impl<'a> Start<'a> {
     pub(crate) fn new<M: Material>(
-        setup: &Setup,
+        setup: &'a Setup,
         scene: &HostScene<M>,
         state: &mut HostState,
         insist: bool,
@@ -129,7 +140,11 @@ impl Start {
             let inertia = Grid::wanted(setup, scene)?.prepare(setup, scene, state, step);
             Some(inertia.map_err(|error| Problem(format!("{}: {error}", setup.body.name)))?)
         };
-        Ok(Self { at_rest, step, inertia })
+        let learned = match &setup.learned {
+            Some(learned) => Some(LearnedRun::new(learned, scene.node_count())?),
+            None => None,
+        };
+        Ok(Self { at_rest, step, inertia, learned })
     }
 }
 
@@ -139,13 +154,13 @@ pub(crate) fn run<M: Material>(
     setup: &Setup,
     scene: &HostScene<M>,
     state: &mut HostState,
-    start: Start,
+    start: Start<'_>,
     tick: impl Fn(f64),
     mut frame: impl FnMut(&HostScene<M>, &HostState) -> Result<(), Problem>,
 ) -> Result<Outcome, Problem> {
     let loads = Loads::new(scene, setup.gravity, &setup.forces, &setup.motions)
         .map_err(|error| Problem(error.to_string()))?;
-    let Start { at_rest, step, mut inertia } = start;
+    let Start { at_rest, step, mut inertia, mut learned } = start;
     let mut outcome = Outcome {
         at_rest,
         least: (at_rest, 0.0),
@@ -156,30 +171,53 @@ pub(crate) fn run<M: Material>(
         divergence: None,
         above_from: None,
         trace: inertia.as_ref().map(Trace::new),
+        learned: None,
     };
     let mut pace = Pace { longest: SHARE * at_rest.seconds, critical: at_rest.seconds, steps: 1 };
     frame(scene, state)?;
     let automatic = matches!(setup.time.step, StepChoice::Auto);
-    let total = (setup.time.end / f64::from(step.seconds())).round().max(1.0) as u64;
+    let interval = learned.as_ref().map_or(step.seconds(), LearnedRun::seconds);
+    let even = !automatic || learned.is_some();
+    let total = (setup.time.end / f64::from(interval)).round().max(1.0) as u64;
+    let mut taken = 0;
     // No two frames of one state.
-    let frames = if automatic { setup.time.frames.into() } else { total.min(setup.time.frames.into()) };
+    let frames = if even { total.min(setup.time.frames.into()) } else { setup.time.frames.into() };
     for index in 1..=frames {
         let share = index as f64 / frames as f64;
         let clock = Instant::now();
-        if automatic {
-            let target = setup.time.end * share;
+        let mut reach = |state: &mut HostState, target: f64, outcome: &mut Outcome| {
             // A remainder of rounding is no step.
             while target - state.time() > 1e-9 * setup.time.end && outcome.divergence.is_none() {
                 tick(state.time());
-                pace.advance(setup, scene, &loads, state, target, &mut outcome)?;
+                pace.advance(setup, scene, &loads, state, target, outcome)?;
             }
-        } else {
-            let target = (total as f64 * share).round() as u64;
-            while state.steps() < target && outcome.divergence.is_none() {
-                take(scene, &loads, state, &step, inertia.as_mut(), &mut outcome);
-                if state.steps().is_multiple_of(u64::from(STEPS_BETWEEN_LOOKS)) {
-                    tick(state.time());
+            Ok::<_, Problem>(())
+        };
+        let target = (total as f64 * share).round() as u64;
+        if !even {
+            reach(state, setup.time.end * share, &mut outcome)?;
+        }
+        while even && taken < target && outcome.divergence.is_none() {
+            taken += 1;
+            match &mut learned {
+                None => take(scene, &loads, state, &step, inertia.as_mut(), &mut outcome),
+                Some(learned) => {
+                    let exact = |state: &mut HostState, outcome: &mut Outcome| {
+                        if automatic {
+                            return reach(state, state.time() + f64::from(interval), outcome);
+                        }
+                        for _ in 0..(interval / step.seconds()).round() as u32 {
+                            if outcome.divergence.is_none() {
+                                take(scene, &loads, state, &step, None, outcome);
+                            }
+                        }
+                        Ok(())
+                    };
+                    learned.advance(scene, &loads, state, &mut outcome, step.seconds(), exact)?;
                 }
+            }
+            if taken % u64::from(STEPS_BETWEEN_LOOKS) == 0 {
+                tick(state.time());
             }
         }
         outcome.spent += clock.elapsed();
@@ -190,11 +228,13 @@ pub(crate) fn run<M: Material>(
         if bound.seconds < outcome.least.0.seconds {
             outcome.least = (bound, state.time());
         }
-        if step.seconds() > bound.seconds && !automatic && inertia.is_none() {
+        let exact = learned.as_ref().map_or(inertia.is_none(), LearnedRun::is_exact);
+        if step.seconds() > bound.seconds && !automatic && exact {
             outcome.above_from.get_or_insert(state.time());
         }
         frame(scene, state)?;
     }
+    outcome.learned = learned.map(|learned| learned.trace);
     Ok(outcome)
 }
 
@@ -258,22 +298,29 @@ fn take<M: Material>(
             status
         }
     };
-    outcome.computed += 1;
-    match status {
-        Status::Limited { least_volume_ratio, saturation, energy_excess } => {
-            let limits = &mut outcome.limits;
-            if limits.steps == 0 {
-                limits.first_time = state.time();
+    outcome.enter(status, state);
+}
+
+impl Outcome {
+    /// Takes down what a step said that led to `state`.
+    pub(crate) fn enter(&mut self, status: Status, state: &HostState) {
+        self.computed += 1;
+        match status {
+            Status::Limited { least_volume_ratio, saturation, energy_excess } => {
+                let limits = &mut self.limits;
+                if limits.steps == 0 {
+                    limits.first_time = state.time();
+                }
+                limits.steps += 1;
+                limits.least_volume_ratio = limits.least_volume_ratio.min(least_volume_ratio);
+                limits.saturation = limits.saturation.max(saturation);
+                limits.energy_excess = limits.energy_excess.max(energy_excess);
+                let within = least_volume_ratio >= J_FLOOR && saturation <= 1.0 && energy_excess <= 0.0;
+                limits.held_back += u64::from(within);
             }
-            limits.steps += 1;
-            limits.least_volume_ratio = limits.least_volume_ratio.min(least_volume_ratio);
-            limits.saturation = limits.saturation.max(saturation);
-            limits.energy_excess = limits.energy_excess.max(energy_excess);
-            let within = least_volume_ratio >= J_FLOOR && saturation <= 1.0 && energy_excess <= 0.0;
-            limits.held_back += u64::from(within);
+            Status::Diverged(divergence) => self.divergence = Some(divergence),
+            // The state and the loads are this scene's own, so they match.
+            _ => {}
         }
-        Status::Diverged(divergence) => outcome.divergence = Some(divergence),
-        // The state and the loads are this scene's own, so they match.
-        _ => {}
     }
 }

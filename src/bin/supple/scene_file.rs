@@ -42,7 +42,7 @@ pub(crate) struct SceneTable {
     pub(crate) traction: Vec<Spanned<TractionTable>>,
     gravity: Option<Spanned<[f32; 3]>>,
     pub(crate) time: Spanned<TimeTable>,
-    pub(crate) surrogate: Option<Spanned<toml::Table>>,
+    pub(crate) surrogate: Option<Spanned<SurrogateTable>>,
 }
 
 #[derive(Deserialize)]
@@ -149,6 +149,15 @@ pub(crate) struct TimeTable {
     pub(crate) lattice: Option<Spanned<[u32; 3]>>,
 }
 
+/// A network that takes over from the exact step.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SurrogateTable {
+    pub(crate) weights: Spanned<PathBuf>,
+    pub(crate) burn_in: Option<Spanned<f64>>,
+    pub(crate) fallback: Option<bool>,
+}
+
 #[derive(Deserialize)]
 #[serde(untagged)]
 pub(crate) enum StepLength {
@@ -177,7 +186,7 @@ impl SceneFile {
         format!("{}, line {}", self.path.display(), line_of(&self.text, at.span().start))
     }
 
-    /// Mesh files are named relative to the scene file.
+    /// Meshes and weight files are named relative to the scene file.
     pub(crate) fn beside(&self, file: &Path) -> PathBuf {
         self.path.parent().map_or_else(|| file.to_path_buf(), |folder| folder.join(file))
     }

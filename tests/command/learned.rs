@@ -1,0 +1,261 @@
+//! `[surrogate]` in a scene file: the exact step leads, a network takes over, and what it did is told.
+
+use supple::mlp::{Activation, Description, LayerDescription, Range, TrainedLaw};
+
+use super::networks::described;
+use super::{Desk, bar, names};
+
+/// A network that brings every vertex to a stop: `a = -40 v`, and the tangent is the direction of the velocity.
+fn brake() -> Description<'static> {
+    let mut weights = vec![0.0; 21];
+    weights[3] = -40.0;
+    let range = |most: f32| Range { scale: 1.0, least: -most, most };
+    Description {
+        inputs: vec![range(10.0); 7],
+        outputs: vec![range(1e3); 3],
+        first: vec![LayerDescription {
+            inputs: 7,
+            activation: Activation::Linear,
+            weights,
+            biases: vec![0.0; 3],
+        }],
+        second: vec![],
+        law: TrainedLaw::NeoHookean { c: 500.0, d: 15_000.0, literal: false },
+        step: 5e-3,
+        exact_step: 5e-4,
+        ..described(&[7, 3], &[], 1)
+    }
+}
+
+/// A network that makes every vertex faster, by `push` m/s^2 along each axis of its frame.
+fn rocket(push: f32) -> Description<'static> {
+    let mut network = brake();
+    network.first[0].weights.fill(0.0);
+    network.first[0].biases.fill(push);
+    network
+}
+
+/// A bar that leans over under gravity from the side, moved by `a.weights`.
+fn leaning(time: &str, surrogate: &str) -> String {
+    let body = bar("").replace("damping = 20.0\n", "");
+    format!(
+        "gravity = [1.0, 0.0, 0.0]\n{body}[[fix]]\nplane = {{ axis = \"z\", at = 0.0 }}\n[time]\n{time}\
+         [surrogate]\nweights = \"a.weights\"\n{surrogate}"
+    )
+}
+
+/// The same without a network.
+fn alone(time: &str) -> String {
+    let scene = leaning(time, "");
+    format!("damping = 20.0\n{}", scene.split("[surrogate]").next().unwrap())
+}
+
+fn far(desk: &Desk) -> f64 {
+    desk.summary()["max_displacement_mm"].as_f64().unwrap()
+}
+
+#[test]
+fn a_network_takes_over_after_the_exact_step_and_says_what_it_did() {
+    let desk = Desk::new();
+    desk.network("a.weights", &brake());
+    // Where the bar has come to a stop.
+    assert_eq!(desk.simulate(&leaning("step = \"auto\"\nend = 0.3\n", "burn_in = 0.1\n"), &[]).code, 0);
+    let stopped = far(&desk);
+    assert_eq!(desk.simulate(&alone("step = \"auto\"\nend = 0.4\n"), &["--force"]).code, 0);
+    assert!(desk.summary()["surrogate"].is_null());
+    assert!((far(&desk) / stopped - 1.0).abs() > 0.05, "{} {stopped}", far(&desk));
+
+    for step in ["\"auto\"", "5e-4"] {
+        let time = format!("step = {step}\nend = 0.4\nframes = 4\n");
+        let said = desk.simulate(&leaning(&time, "burn_in = 0.1\n"), &["--force"]);
+        println!("{}{}", said.out, said.err);
+        assert_eq!(said.code, 0, "{}", said.err);
+        assert_eq!(said.err, "", "the tissue is that of the training");
+        let summary = desk.summary();
+        assert_eq!((&summary["method"], &summary["status"]), (&"learned".into(), &"ok".into()));
+        assert_eq!(summary["damping_per_s"], 20.0);
+        let network = &summary["surrogate"];
+        assert!(network["weights"].as_str().unwrap().ends_with("a.weights"));
+        assert_eq!((&network["steps"], &network["step_s"]), (&60.into(), &5e-3.into()));
+        assert!((network["from_s"].as_f64().unwrap() - 0.1).abs() < 1e-6);
+        for share in ["clipped_share", "clipped_share_most", "outside_share", "outside_share_most"] {
+            assert_eq!(network[share], 0.0, "{share}");
+        }
+        assert!(network["fell_back_at_s"].is_null());
+        if step == "5e-4" {
+            assert_eq!(summary["steps"], 200 + 60);
+        }
+        assert!((summary["time_s"].as_f64().unwrap() - 0.4).abs() < 1e-6);
+        assert!((far(&desk) / stopped - 1.0).abs() < 0.01, "{} {stopped}", far(&desk));
+        for part in ["a.weights, steps of 5.000e-3 s, 10.0 times", "60 from 0.100 s on", "outside training"] {
+            assert!(said.out.contains(part), "{part}: {}", said.out);
+        }
+        let frames = names(&desk.path("out")).into_iter().filter(|name| name.ends_with(".vtu")).count();
+        assert_eq!(frames, 5);
+    }
+}
+
+#[test]
+fn the_last_exact_interval_leads_into_the_first_learned_step() {
+    let desk = Desk::new();
+    // No acceleration: every vertex goes on as it went over the last interval.
+    let mut network = brake();
+    network.first[0].weights.fill(0.0);
+    desk.network("a.weights", &network);
+    let end = |end: f64, surrogate: &str| {
+        let time = format!("step = 5e-4\nend = {end}\n");
+        let scene = if surrogate.is_empty() { alone(&time) } else { leaning(&time, surrogate) };
+        let said = desk.simulate(&scene, &["--force"]);
+        assert_eq!(said.code, 0, "{}", said.err);
+        desk.last()
+    };
+    let (before, led) = (end(0.045, ""), end(0.05, ""));
+    let learned = end(0.06, "burn_in = 0.05\n");
+    for ((before, led), learned) in before.iter().zip(&led).zip(&learned) {
+        for axis in 4..7 {
+            let foretold = led[axis] + 2.0 * (led[axis] - before[axis]);
+            assert!((learned[axis] - foretold).abs() < 1e-8, "{foretold} {}", learned[axis]);
+        }
+    }
+}
+
+#[test]
+fn shares_that_were_clipped_and_outside_are_told() {
+    let desk = Desk::new();
+    let mut network = brake();
+    for range in network.inputs.iter_mut().chain(&mut network.outputs) {
+        (range.least, range.most) = (-1e-9, 1e-9);
+    }
+    desk.network("a.weights", &network);
+    let said = desk.simulate(&leaning("step = \"auto\"\nend = 0.2\n", "burn_in = 0.1\n"), &[]);
+    println!("{}{}", said.out, said.err);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let network = &desk.summary()["surrogate"];
+    for share in ["clipped_share", "clipped_share_most", "outside_share", "outside_share_most"] {
+        assert_eq!(network[share], 1.0, "{share}");
+    }
+    assert!(said.out.contains("100.00 % of the vertices on average, 100.0 % at most"), "{}", said.out);
+    assert!(said.err.contains("had inputs outside the network's training"), "{}", said.err);
+}
+
+#[test]
+fn a_network_that_cannot_be_believed_ends_the_run_or_gives_way_to_the_exact_step() {
+    let desk = Desk::new();
+    desk.network("a.weights", &rocket(900.0));
+    let time = "step = \"auto\"\nend = 0.4\nframes = 4\n";
+    let said = desk.simulate(&leaning(time, "burn_in = 0.1\n"), &[]);
+    print!("{}", said.err);
+    assert_eq!(said.code, 3);
+    assert!(said.err.contains("loads and supports never gave more"), "{}", said.err);
+    assert_eq!(desk.summary()["status"], "diverged");
+
+    assert_eq!(desk.simulate(&alone(time), &["--force"]).code, 0);
+    let exact = far(&desk);
+    for (push, latest, why) in [(900.0, 0.101, "diverged at 0.1"), (3.0, 0.2, "exceeded what loads")] {
+        desk.network("a.weights", &rocket(push));
+        let said = desk.simulate(&leaning(time, "burn_in = 0.1\nfallback = true\n"), &["--force"]);
+        print!("{}{}", said.out, said.err);
+        assert_eq!(said.code, 0, "{}", said.err);
+        let summary = desk.summary();
+        assert_eq!(summary["status"], "fell back");
+        let network = &summary["surrogate"];
+        let at = network["fell_back_at_s"].as_f64().unwrap();
+        assert!((0.099..latest).contains(&at), "{at}");
+        assert!(network["fell_back_because"].as_str().unwrap().starts_with(why), "{network}");
+        // The step that was undone is not among those taken.
+        assert_eq!(summary["steps_undone"], 1);
+        assert!(said.out.contains("fell back             to the exact step at 0.1"), "{}", said.out);
+        assert!(said.err.contains("s on the exact step moved the scene: the learned one "), "{}", said.err);
+        println!("{:.3} mm, the exact step {exact:.3} mm", far(&desk));
+        assert!((far(&desk) / exact - 1.0).abs() < 0.05);
+    }
+}
+
+#[test]
+fn a_tissue_that_the_network_does_not_know_is_remarked_upon() {
+    let desk = Desk::new();
+    desk.network("a.weights", &brake());
+    let scene = leaning("step = \"auto\"\nend = 0.2\n", "burn_in = 0.1\n");
+    for (known, other) in [("c = 500.0", "c = 600.0"), ("density = 1000.0", "density = 1100.0")] {
+        let said = desk.simulate(&scene.replace(known, other), &["--force"]);
+        print!("{}", said.err);
+        assert_eq!(said.code, 0, "{}", said.err);
+        for part in [
+            "line 17: ",
+            "a.weights learned from neo-hookean, c 500 Pa, d 15000 Pa, 1000 kg/m^3; the scene is neo-hookean, c ",
+        ] {
+            assert!(said.err.contains(part), "{part}: {}", said.err);
+        }
+        assert_eq!(desk.summary()["warnings"].as_array().unwrap().len(), 1);
+    }
+}
+
+#[test]
+fn what_does_not_go_together_is_refused_in_words() {
+    let desk = Desk::new();
+    desk.network("a.weights", &brake());
+    desk.network("wide.weights", &described(&[8, 4, 3], &[], 1));
+    desk.write("damaged.weights", &"SUPPLE-W".repeat(40));
+    let auto = "step = \"auto\"\nend = 0.4\n";
+    let cases = [
+        (
+            format!("damping = 10.0\n{}", leaning(auto, "")),
+            "line 1: damping is 10 1/s, but ./a.weights learned a motion damped by 20 1/s; leave damping out",
+        ),
+        (
+            leaning("step = 4e-4\nend = 0.4\n", ""),
+            "line 14: the exact step is 0.0004 s and that of ./a.weights 0.005 s, which is no whole number of them; write \
+             step = 0.00038461538 or step = \"auto\"",
+        ),
+        (leaning("step = 0.1\nend = 0.4\n", ""), "0.1 s and that of ./a.weights 0.005 s, which is no whole"),
+        (
+            leaning("step = \"20x\"\nmethod = \"multilevel\"\nend = 0.4\n", ""),
+            "line 15: method is \"multilevel\", but with [surrogate] the exact step leads",
+        ),
+        (leaning(auto, "burn_in = -0.1\n"), "line 18: burn_in is -0.1 s, it must be zero or more"),
+        (
+            leaning(auto, "burn_in = 0.4\n"),
+            "line 18: the exact step leads for 0.4 s (burn_in), so a learned step of",
+        ),
+        (
+            leaning("step = \"auto\"\nend = 0.2\n", ""),
+            "line 17: the exact step leads for 0.3 s (burn_in), so",
+        ),
+        (leaning(auto, "fallback = 1\n"), "line 18: invalid type"),
+        (leaning(auto, "burn = 1\n"), "line 18: unknown field `burn`"),
+        (leaning(auto, "").replace("weights = \"a.weights\"", ""), "line 16: missing field `weights`"),
+        (leaning(auto, "").replace("a.weights", "no.weights"), "line 17: ./no.weights: cannot be read"),
+        (
+            leaning(auto, "").replace("a.weights", "wide.weights"),
+            "line 17: ./wide.weights: a network of 8 inputs and 3 outputs; the learned step needs 7 and 3",
+        ),
+        (leaning(auto, "").replace("a.weights", "damaged.weights"), "line 17: ./damaged.weights: version "),
+    ];
+    for (scene, fragment) in cases {
+        let said = desk.simulate(&scene, &[]);
+        print!("{}", said.err);
+        assert_eq!(said.code, 2, "expected a complaint with \"{fragment}\" of:\n{scene}\n{}", said.err);
+        let heard = said.err.replace("./", "");
+        assert!(heard.contains(&fragment.replace("./", "")), "\"{fragment}\" is not in: {}", said.err);
+        assert!(!desk.path("out").exists(), "a refused scene left a folder behind");
+    }
+}
+
+#[test]
+fn inspect_tells_what_a_learned_step_costs() {
+    let desk = Desk::new();
+    desk.network("a.weights", &brake());
+    desk.write("scene.toml", &leaning("step = \"auto\"\nend = 0.4\n", ""));
+    let said = desk.supple(&["inspect", "scene.toml"]);
+    println!("{}", said.out);
+    assert_eq!(said.code, 0, "{}", said.err);
+    for part in [
+        "learned step",
+        "a.weights",
+        "5.000e-3 s, 10.0 times",
+        "21 multiply-adds per vertex",
+        "times real time",
+    ] {
+        assert!(said.out.contains(part), "{part}: {}", said.out);
+    }
+}
