@@ -176,6 +176,7 @@ pub(crate) fn run<M: Material>(
     let mut pace = Pace { longest: SHARE * at_rest.seconds, critical: at_rest.seconds, steps: 1 };
     frame(scene, state)?;
     let automatic = matches!(setup.time.step, StepChoice::Auto);
+    // Time goes in even intervals, each one step or one of a network, unless the exact step alone sets its pace.
     let interval = learned.as_ref().map_or(step.seconds(), LearnedRun::seconds);
     let even = !automatic || learned.is_some();
     let total = (setup.time.end / f64::from(interval)).round().max(1.0) as u64;
@@ -185,6 +186,7 @@ pub(crate) fn run<M: Material>(
     for index in 1..=frames {
         let share = index as f64 / frames as f64;
         let clock = Instant::now();
+        // Automatic steps of the exact method up to a time.
         let mut reach = |state: &mut HostState, target: f64, outcome: &mut Outcome| {
             // A remainder of rounding is no step.
             while target - state.time() > 1e-9 * setup.time.end && outcome.divergence.is_none() {
