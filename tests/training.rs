@@ -15,8 +15,8 @@ seed = 3
 multiple = 10
 
 [motion]
-scene = "cylinder"
-load = 1.0
+scene = "torsion"
+load = 0.02
 from = 0.03
 to = 0.06
 frames = 20
@@ -213,4 +213,11 @@ fn turned_normals_change_no_length() {
             assert!((across(a) - across(b)).abs() <= 1e-5 * across(a));
         }
     }
+}
+
+#[test]
+fn a_motion_that_loads_every_vertex_leaves_nothing_to_learn() {
+    let text = RECIPE.replace("torsion", "cylinder");
+    let said = train(&text, None, |_| ControlFlow::Continue(())).unwrap_err().to_string();
+    assert!(said.starts_with("scene = \"cylinder\": every vertex is held or loaded"), "{said}");
 }

@@ -119,6 +119,11 @@ pub fn fit(
     checkpoints: Option<&Path>,
     progress: &mut impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Fitted, TrainError> {
+    if samples.inputs.is_empty() {
+        let scene = &recipe.motion.scene;
+        let text = format!("scene = {scene:?}: every vertex is held or loaded, none is left to learn from");
+        return Err(TrainError::Recipe(text));
+    }
     let hash: [u8; 32] = Sha256::digest(text.as_bytes()).into();
     let share = recipe.training.held_out;
     let seen = samples.of_frames(|frame| !is_held_out(frame, share));
