@@ -15,8 +15,8 @@ seed = 3
 multiple = 10
 
 [motion]
-scene = "cylinder"
-load = 1.0
+scene = "torsion"
+load = 0.02
 from = 0.03
 to = 0.06
 frames = 20
@@ -138,4 +138,86 @@ fn a_recipe_that_cannot_be_used_says_why() {
     assert_eq!(said("rate = 0.003", "rate = 3.0"), "rate = 3: it must be between 0 and 1");
     assert_eq!(said("held_out = 0.2", "held_out = 1.0"), "held_out = 1: it must be from 0 to 0.9");
     assert!(said("batch = 512", "batsch = 512").contains("unknown field `batsch`"));
+}
+
+const NOISE: &str = r#"
+[noise]
+copies = 2
+least = 1e-6
+most = 1e-6
+back = 1.0
+before = 0.5
+ease = 1.0
+
+[network]"#;
+
+fn collected(text: &str) -> Samples {
+    Samples::collect(&Recipe::parse(text).unwrap()).unwrap()
+}
+
+#[test]
+fn rough_motion_leads_back_to_the_exact_one() {
+    let text = RECIPE.replace("[network]", NOISE);
+    let smooth = collected(RECIPE);
+    // So little that it is the exact motion itself.
+    let still = collected(&text.replace("1e-6", "1e-12"));
+    assert_eq!(still.inputs, smooth.inputs);
+    assert_eq!(still.rough.targets.len(), 2 * smooth.targets.len());
+    assert!(still.rough.weights.iter().all(|&weight| weight > 0.999));
+    let (_, scales) = smooth.ranges();
+    let blocks = still.rough.targets.chunks(2 * smooth.vertices).zip(smooth.targets.chunks(smooth.vertices));
+    for (copies, frame) in blocks {
+        for (found, exact) in copies.iter().zip(frame.iter().cycle()) {
+            for axis in 0..3 {
+                assert!((found[axis] - exact[axis]).abs() < 1e-2 * scales[axis].scale, "{found:?} {exact:?}");
+            }
+        }
+    }
+    // A micrometre: the step takes it back, 1.5 times with what it does to the velocity, and the forces are those of
+    // the moved body, many times those of the smooth motion.
+    let rough = collected(&text).rough;
+    let square = |rows: &[[f32; 3]]| {
+        rows.iter().flatten().map(|&value| f64::from(value).powi(2)).sum::<f64>() / (3 * rows.len()) as f64
+    };
+    let (found, long) = (square(&rough.targets) - square(&smooth.targets), 3e-4f64);
+    let expected = (1.5f64.powi(2) + 0.5f64.powi(2)) * (1e-6 / (long * long)).powi(2);
+    println!("{:.2} of what is expected", found / expected);
+    assert!((found / expected - 1.0).abs() < 0.02);
+    let force = |rows: &[[f32; 7]]| rows.iter().map(|row| f64::from(row[4]).abs()).sum::<f64>();
+    assert!(force(&rough.inputs) > 10.0 * force(&smooth.inputs));
+    let taken = (1.5f64.powi(2) + 0.5f64.powi(2)).sqrt() * 1e-6 / (long * long);
+    assert!(
+        rough.weights.iter().all(|&weight| (f64::from(weight) * (1.0 + taken * taken) - 1.0).abs() < 1e-4)
+    );
+    assert!(rough == collected(&text).rough, "the same recipe, other noise");
+
+    for (from, to) in
+        [("copies = 2", "copies = 0"), ("most = 1e-6", "most = 1e-7"), ("ease = 1.0", "ease = 0.0")]
+    {
+        let said = Recipe::parse(&text.replace(from, to)).unwrap_err().to_string();
+        assert!(said.starts_with("noise = "), "{said}");
+    }
+}
+
+#[test]
+fn turned_normals_change_no_length() {
+    let smooth = collected(RECIPE);
+    let turned = collected(&RECIPE.replace("frames = 20", "frames = 20\nturned = true"));
+    assert_ne!(smooth.inputs, turned.inputs);
+    let across = |[a, b]: [f32; 2]| a.hypot(b);
+    for (a, b) in smooth.inputs.iter().zip(&turned.inputs) {
+        assert_eq!((a[0], a[3], a[4]), (b[0], b[3], b[4]));
+        for (a, b) in
+            [(a[1], a[2]), (a[5], a[6])].map(|(x, y)| [x, y]).into_iter().zip([[b[1], b[2]], [b[5], b[6]]])
+        {
+            assert!((across(a) - across(b)).abs() <= 1e-5 * across(a));
+        }
+    }
+}
+
+#[test]
+fn a_motion_that_loads_every_vertex_leaves_nothing_to_learn() {
+    let text = RECIPE.replace("torsion", "cylinder");
+    let said = train(&text, None, |_| ControlFlow::Continue(())).unwrap_err().to_string();
+    assert!(said.starts_with("scene = \"cylinder\": every vertex is held or loaded"), "{said}");
 }

@@ -17,6 +17,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use sha2::{Digest, Sha256};
 
 use super::TrainError;
+use super::noise::Random;
 use super::recipe::{Decay, Recipe};
 use super::samples::Samples;
 use crate::lab::DT;
@@ -118,6 +119,11 @@ pub fn fit(
     checkpoints: Option<&Path>,
     progress: &mut impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Fitted, TrainError> {
+    if samples.inputs.is_empty() {
+        let scene = &recipe.motion.scene;
+        let text = format!("scene = {scene:?}: every vertex is held or loaded, none is left to learn from");
+        return Err(TrainError::Recipe(text));
+    }
     let hash: [u8; 32] = Sha256::digest(text.as_bytes()).into();
     let share = recipe.training.held_out;
     let seen = samples.of_frames(|frame| !is_held_out(frame, share));
@@ -136,9 +142,13 @@ pub fn fit(
         first = epoch;
     }
 
-    let count = seen.inputs.len();
+    let count = seen.inputs.len() + seen.rough.inputs.len();
     let Recipe { training, network, .. } = recipe;
-    let (x, y) = (scaled(&seen.inputs, &inputs), scaled(&seen.targets, &targets));
+    let (mut x, mut y) = (scaled(&seen.inputs, &inputs), scaled(&seen.targets, &targets));
+    x.extend(scaled(&seen.rough.inputs, &inputs));
+    y.extend(scaled(&seen.rough.targets, &targets));
+    let mut weights = std::vec![[1.0]; seen.inputs.len()];
+    weights.extend(seen.rough.weights.iter().map(|&weight| [weight]));
     let start = Instant::now();
     let mut taken = 0usize;
     let mut loss = f64::NAN;
@@ -155,7 +165,9 @@ pub fn fit(
         for batch in order.chunks(training.batch) {
             let (input, target) = (gathered(&x, batch, &device), gathered(&y, batch, &device));
             let (predicted, corrected) = parts.forward(input, f64::from(network.slope));
-            let both = (predicted - target.clone()).square().mean() + (corrected - target).square().mean();
+            let weight = gathered(&weights, batch, &device);
+            let squares = (predicted - target.clone()).square() + (corrected - target).square();
+            let both = (squares * weight).mean();
             let gradients = GradientsParams::from_grads(both.backward(), &parts);
             parts = adam.step(rate, parts, gradients);
             sum += f64::from(both.into_scalar::<f32>()) * batch.len() as f64;
@@ -202,19 +214,12 @@ fn gathered<const N: usize>(rows: &[[f32; N]], batch: &[u32], device: &Device) -
     Tensor::from_data(TensorData::new(numbers, [batch.len(), N]), device)
 }
 
-/// The numbers below `count` in an order that the seed decides (Fisher-Yates with SplitMix64).
+/// The numbers below `count` in an order that the seed decides (Fisher and Yates).
 fn shuffled(count: usize, seed: u64) -> Vec<u32> {
-    let mut state = seed;
-    let mut next = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    };
+    let mut random = Random(seed);
     let mut order: Vec<u32> = (0..count as u32).collect();
     for last in (1..count).rev() {
-        order.swap(last, (next() % (last as u64 + 1)) as usize);
+        order.swap(last, (random.next() % (last as u64 + 1)) as usize);
     }
     order
 }

@@ -5,12 +5,14 @@
 //! |---|---|
 //! | [`recipe`] | the configuration, a TOML file |
 //! | [`samples`] | what the exact step does, seen by each vertex in its frame |
+//! | `noise` | the same of rough motion, with targets that lead back |
 //! | [`fit`] | the network on burn, its losses, checkpoints |
 //!
 //! Same recipe, seed, number of threads and processor, same weights.
 
 mod error;
 pub mod fit;
+mod noise;
 pub mod recipe;
 pub mod samples;
 

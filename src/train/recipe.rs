@@ -10,6 +10,15 @@
 //! from = 0.3               # s
 //! to = 1.0
 //! frames = 1000            # in equal intervals
+//! turned = false           # each sample's normal by a random angle about its tangent
+//!
+//! [noise]                  # may be left out: copies of every frame, moved at random
+//! copies = 1
+//! least = 2e-7             # standard deviation of a vertex's way, m: from here
+//! most = 5e-6              # to here, evenly in its logarithm
+//! back = 1.0               # share of the way that the next step takes back
+//! before = 1.0             # share of it that was not there a step ago
+//! ease = 0.5               # m/s^2: where more is taken back, errors weigh less
 //!
 //! [network]
 //! hidden = [256, 256, 128, 64, 32]
@@ -44,6 +53,9 @@ pub struct Recipe {
     pub multiple: u32,
     /// What is learned from.
     pub motion: Motion,
+    /// Rough motion beside it.
+    #[serde(default)]
+    pub noise: Option<Noise>,
     /// What learns.
     pub network: Shape,
     /// How.
@@ -64,6 +76,40 @@ pub struct Motion {
     pub to: f64,
     /// In equal intervals.
     pub frames: usize,
+    /// Whether each sample's normal is turned about its tangent by a random angle.
+    #[serde(default)]
+    pub turned: bool,
+}
+
+/// Copies of every frame with all free vertices moved at random, see [`super::samples`].
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Noise {
+    /// Of each frame.
+    pub copies: usize,
+    /// Least standard deviation of a vertex's way along each axis, m.
+    pub least: f64,
+    /// And largest; evenly spread in the logarithm.
+    pub most: f64,
+    /// Share of the way that the next step takes back.
+    pub back: f64,
+    /// Share of it that was not there a step ago; what was there instead is another such way.
+    #[serde(default)]
+    pub before: f64,
+    /// Acceleration beyond which errors weigh less, as its square over that of what is taken back, m/s^2.
+    pub ease: f64,
+}
+
+impl Noise {
+    fn usable(&self) -> bool {
+        let Self { copies, least, most, back, before, ease } = *self;
+        (1..=100).contains(&copies)
+            && least > 0.0
+            && (least..1.0).contains(&most)
+            && [back, before].iter().all(|share| (0.0..=2.0).contains(share))
+            && ease > 0.0
+            && ease.is_finite()
+    }
 }
 
 /// What learns.
@@ -115,7 +161,7 @@ impl Recipe {
         let refuse = |what: &str, value: String, must: &str| {
             Err(TrainError::Recipe(format!("{what} = {value}: {must}")))
         };
-        let Self { multiple, motion, network, training, .. } = &self;
+        let Self { multiple, motion, noise, network, training, .. } = &self;
         if !scenes::NAMES.contains(&motion.scene.as_str()) {
             return refuse(
                 "scene",
@@ -135,6 +181,12 @@ impl Recipe {
         }
         if motion.frames == 0 || motion.frames > 100_000 {
             return refuse("frames", motion.frames.to_string(), "it must be from 1 to 100000");
+        }
+        if let Some(noise) = noise
+            && !noise.usable()
+        {
+            let must = "1 to 100 copies, 0 < least <= most < 1 m, back and before from 0 to 2, ease > 0";
+            return refuse("noise", format!("{noise:?}"), must);
         }
         let widths = network.hidden.iter().chain(&network.correction);
         if let Some(width) = widths.clone().find(|width| !(1..=MAX_WIDTH).contains(*width)) {

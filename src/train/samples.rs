@@ -3,6 +3,8 @@
 //! ```text
 //! at t: u(t), |u(t) - u(t-D)| / D, f_e - K u;   target (u(t+D) - 2 u(t) + u(t-D)) / D^2
 //! ```
+//! Beside each frame may stand copies of it in rough motion, see [`super::noise`].
+//!
 //! Vertices that are held or loaded are left out, as in the paper: boundary conditions make them jump. Frames follow
 //! the motion once each `D`, as they do in a roll-out; where the paper's frames lie closer than `D`, several trains of
 //! frames run side by side, each with its own start.
@@ -12,9 +14,10 @@ use std::vec::Vec;
 
 use glam::{DVec3, Vec3A};
 
+use super::noise::{Moment, Moved, Random};
 use super::recipe::Recipe;
 use crate::frame::Frame;
-use crate::lab::host::Job;
+use crate::lab::host::{HostState, Job};
 use crate::lab::scenes::{self, SceneSpec};
 use crate::lab::{DT, INTERVAL_STEPS, LabError};
 use crate::material::Material;
@@ -31,6 +34,19 @@ pub struct Samples {
     pub targets: Vec<[f32; PREDICTED]>,
     /// Vertices of each frame.
     pub vertices: usize,
+    /// Copies of the frames in rough motion, as many of each.
+    pub rough: Rough,
+}
+
+/// What vertices see of rough motion, and what leads back to the exact one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Rough {
+    /// As in [`Samples`].
+    pub inputs: Vec<[f32; FEATURES]>,
+    /// As in [`Samples`].
+    pub targets: Vec<[f32; PREDICTED]>,
+    /// Of each sample in the loss.
+    pub weights: Vec<f32>,
 }
 
 /// One train of frames, each `D` after the one before.
@@ -38,11 +54,19 @@ struct Train {
     /// Step of the exact motion at which it started.
     start: u64,
     frames: Vec<Frame>,
+    /// Way of each vertex in the last `D`, m.
+    increments: Vec<DVec3>,
     /// Displacements now, one and two `D` ago.
     shapes: [Vec<DVec3>; 3],
-    /// Inputs at the latest moment that is to be sampled, in the frames of then.
-    asked: Option<Vec<[f32; FEATURES]>>,
+    /// What was seen at the latest moment that is to be sampled.
+    asked: Option<Asked>,
     moments: u64,
+}
+
+/// What waits for its targets.
+struct Asked {
+    smooth: Vec<[f32; FEATURES]>,
+    rough: Vec<Moved>,
 }
 
 impl Samples {
@@ -64,13 +88,24 @@ impl Samples {
             some.inputs.extend_from_slice(inputs);
             some.targets.extend_from_slice(targets);
         }
+        let frames = self.inputs.len() / self.vertices.max(1);
+        let block = self.rough.inputs.len() / frames.max(1);
+        for frame in (0..frames).filter(|&frame| block > 0 && wanted(frame)) {
+            let rows = frame * block..(frame + 1) * block;
+            some.rough.inputs.extend_from_slice(&self.rough.inputs[rows.clone()]);
+            some.rough.targets.extend_from_slice(&self.rough.targets[rows.clone()]);
+            some.rough.weights.extend_from_slice(&self.rough.weights[rows]);
+        }
         some
     }
 
     /// Standard deviation and range of each input, then of each target.
     #[must_use]
     pub fn ranges(&self) -> (Vec<Range>, Vec<Range>) {
-        (ranges(&self.inputs), ranges(&self.targets))
+        let (mut inputs, mut targets) = (ranges(&self.inputs), ranges(&self.targets));
+        widen(&mut inputs, &self.rough.inputs);
+        widen(&mut targets, &self.rough.targets);
+        (inputs, targets)
     }
 }
 
@@ -90,6 +125,15 @@ fn ranges<const N: usize>(rows: &[[f32; N]]) -> Vec<Range> {
             }
         })
         .collect()
+}
+
+fn widen<const N: usize>(ranges: &mut [Range], rows: &[[f32; N]]) {
+    for row in rows {
+        for (range, &value) in ranges.iter_mut().zip(row) {
+            range.least = range.least.min(value);
+            range.most = range.most.max(value);
+        }
+    }
 }
 
 struct Collect<'a> {
@@ -114,6 +158,13 @@ impl Job for Collect<'_> {
                 *kept = false;
             }
         }
+        let mut free = vec![true; nodes];
+        for support in &spec.supports {
+            if let Some(free) = free.get_mut(support.node as usize) {
+                *free = false;
+            }
+        }
+        let mut random = Random(recipe.seed);
         let kept: Vec<usize> = (0..nodes).filter(|&node| kept[node]).collect();
 
         let dt = f64::from(DT);
@@ -141,6 +192,13 @@ impl Job for Collect<'_> {
             }
             let interval = number as usize / INTERVAL_STEPS as usize;
             let loads = spec.loads(&scene, interval)?;
+            let asks = |due: usize| {
+                number >= first
+                    && due < recipe.motion.frames
+                    && (number - first) as f64 >= (due as f64 - 0.5) * spacing
+            };
+            // The step leaves displacements behind that are later than its forces.
+            let before = (recipe.noise.is_some() && !moments.is_empty() && asks(due)).then(|| state.clone());
             match tled::step(&scene, &loads, &mut state, &step) {
                 Status::Ok | Status::Limited { .. } => {}
                 Status::Diverged(divergence) => {
@@ -149,10 +207,19 @@ impl Job for Collect<'_> {
                 Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
             }
             for &at in &moments {
-                let frames = recipe.motion.frames;
-                if number >= first && due < frames && (number - first) as f64 >= (due as f64 - 0.5) * spacing
-                {
-                    trains[at].ask(&kept, long as f32, state.forces());
+                if asks(due) {
+                    // Forces are found even by a step that is refused.
+                    let forces_of = |moved: &mut HostState| {
+                        let _ = tled::step(&scene, &loads, moved, &step);
+                    };
+                    let copies = before.iter().zip(&recipe.noise).flat_map(|(before, noise)| {
+                        let moment = trains[at].moment(before, &free, long);
+                        (0..noise.copies)
+                            .map(|_| moment.moved(noise, &kept, &mut random, forces_of))
+                            .collect::<Vec<_>>()
+                    });
+                    let copies = copies.collect();
+                    trains[at].ask(&kept, long as f32, state.forces(), copies);
                     due += 1;
                 }
             }
@@ -161,15 +228,40 @@ impl Job for Collect<'_> {
                 *place += Vec3A::from(increment.to_array()).as_dvec3();
             }
         }
+        if recipe.motion.turned {
+            for (inputs, targets) in samples.inputs.iter_mut().zip(&mut samples.targets) {
+                turn(inputs, targets, &mut random);
+            }
+            for (inputs, targets) in samples.rough.inputs.iter_mut().zip(&mut samples.rough.targets) {
+                turn(inputs, targets, &mut random);
+            }
+        }
         Ok(samples)
     }
+}
+
+/// Turns the normal about the tangent by a random angle.
+fn turn(inputs: &mut [f32; FEATURES], targets: &mut [f32; PREDICTED], random: &mut Random) {
+    let (sin, cos) = (core::f64::consts::TAU * random.unit()).sin_cos();
+    let (sin, cos) = (sin as f32, cos as f32);
+    let turned = |normal: f32, binormal: f32| (cos * normal + sin * binormal, cos * binormal - sin * normal);
+    (inputs[1], inputs[2]) = turned(inputs[1], inputs[2]);
+    (inputs[5], inputs[6]) = turned(inputs[5], inputs[6]);
+    (targets[1], targets[2]) = turned(targets[1], targets[2]);
 }
 
 impl Train {
     fn new(start: u64, nodes: usize) -> Self {
         let still = || vec![DVec3::ZERO; nodes];
         let shapes = [still(), still(), still()];
-        Self { start, frames: vec![Frame::WORLD; nodes], shapes, asked: None, moments: 0 }
+        Self {
+            start,
+            frames: vec![Frame::WORLD; nodes],
+            increments: still(),
+            shapes,
+            asked: None,
+            moments: 0,
+        }
     }
 
     fn is_due(&self, number: u64, every: u64) -> bool {
@@ -186,30 +278,45 @@ impl Train {
     /// Targets for what was asked a `D` ago.
     fn answer(&mut self, kept: &[usize], long: f64, samples: &mut Samples) {
         let [now, one, two] = &self.shapes;
-        if let Some(inputs) = self.asked.take() {
-            samples.inputs.extend(inputs);
+        if let Some(asked) = self.asked.take() {
+            samples.inputs.extend(asked.smooth);
+            for copy in asked.rough {
+                for (seen, &node) in copy.seen.iter().zip(kept) {
+                    let acceleration = (now[node] - 2.0 * one[node] + two[node] - seen.back) / (long * long);
+                    samples.rough.inputs.push(seen.inputs);
+                    samples.rough.targets.push(seen.frame.local(acceleration.as_vec3a()));
+                    samples.rough.weights.push(copy.weight);
+                }
+            }
             for &node in kept {
                 let acceleration = (now[node] - 2.0 * one[node] + two[node]) / (long * long);
                 samples.targets.push(self.frames[node].local(acceleration.as_vec3a()));
             }
         }
-        for ((frame, now), one) in self.frames.iter_mut().zip(now).zip(one) {
-            frame.follow((*now - *one).as_vec3a());
+        let moves = self.frames.iter_mut().zip(&mut self.increments);
+        for ((frame, increment), (now, one)) in moves.zip(now.iter().zip(one)) {
+            *increment = *now - *one;
+            frame.follow(increment.as_vec3a());
         }
     }
 
+    fn moment<'a>(&'a self, state: &'a HostState, free: &'a [bool], long: f64) -> Moment<'a> {
+        let Self { frames, increments, .. } = self;
+        Moment { state, frames, increments, free, long }
+    }
+
     /// Inputs of now.
-    fn ask(&mut self, kept: &[usize], long: f32, forces: &[crate::state::NodeVector]) {
+    fn ask(&mut self, kept: &[usize], long: f32, forces: &[crate::state::NodeVector], rough: Vec<Moved>) {
         // The first moment has no velocity.
         if self.moments < 2 {
             return;
         }
-        let [now, one, _] = &self.shapes;
+        let [now, ..] = &self.shapes;
         let inputs = kept.iter().map(|&node| {
-            let speed = (now[node] - one[node]).length() as f32 / long;
+            let speed = self.increments[node].length() as f32 / long;
             let force = forces.get(node).map_or(Vec3A::ZERO, |force| Vec3A::from(force.to_array()));
             features(&self.frames[node], now[node].as_vec3a(), speed, force)
         });
-        self.asked = Some(inputs.collect());
+        self.asked = Some(Asked { smooth: inputs.collect(), rough });
     }
 }

@@ -1,0 +1,122 @@
+//! Rough motion for training (as in learned simulators, Sanchez-Gonzalez et al. 2020). The exact motion is smooth: from it
+//! alone a network learns the gain `1/m` of force, with which steps beyond the explicit limit ring, and nothing of how
+//! rough motion ends. So the free vertices of a frame are moved at random, now by `e` and a step ago by `e'`, the forces of the
+//! moved body are exact, and the target leads back to the exact motion:
+//!
+//! ```text
+//! at t: u + e, |u - u(t-D) + c| / D, f_e - K (u + e);   target (u(t+D) - 2 u + u(t-D) - back e - c) / D^2
+//! c = before (e - e')
+//! ```
+//! The best pointwise answer to a white `e` is a gain of force near `trace K / trace K^2 / D^2`, which is below the limit
+//! of stability, `4 / D^2` over the largest eigenvalue of `K`; small forces, those of smooth motion, keep theirs. With a `c`
+//! the network sees that force opposes velocity, as it does in ringing, and damps it.
+//!
+//! A network cannot tell `e` from one vertex. What remains of the loss is as large as what is taken back: the more, the
+//! less an error weighs ([`super::recipe::Noise::ease`]).
+
+use glam::{DVec3, Vec3A};
+
+use std::vec::Vec;
+
+use super::recipe::Noise;
+use crate::frame::Frame;
+use crate::lab::host::HostState;
+use crate::surrogate::{FEATURES, features};
+
+/// SplitMix64.
+pub(super) struct Random(pub(super) u64);
+
+impl Random {
+    pub(super) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Above 0, up to 1.
+    pub(super) fn unit(&mut self) -> f64 {
+        ((self.next() >> 11) + 1) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Of mean zero and variance one (Box and Muller).
+    fn normal(&mut self) -> f64 {
+        let (radius, angle) = ((-2.0 * self.unit().ln()).sqrt(), core::f64::consts::TAU * self.unit());
+        radius * angle.cos()
+    }
+
+    fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.normal(), self.normal(), self.normal())
+    }
+}
+
+/// A moment of the exact motion.
+pub(super) struct Moment<'a> {
+    /// Before the exact step that finds its forces.
+    pub(super) state: &'a HostState,
+    /// Each vertex's frame, and its way in the last `D`, m.
+    pub(super) frames: &'a [Frame],
+    pub(super) increments: &'a [DVec3],
+    /// Vertices that may move.
+    pub(super) free: &'a [bool],
+    /// `D`, s.
+    pub(super) long: f64,
+}
+
+/// A copy of a moment, moved at random.
+pub(super) struct Moved {
+    pub(super) seen: Vec<Seen>,
+    /// In the loss.
+    pub(super) weight: f32,
+}
+
+/// What a vertex of it sees.
+pub(super) struct Seen {
+    pub(super) inputs: [f32; FEATURES],
+    pub(super) frame: Frame,
+    /// What the next step takes back, m.
+    pub(super) back: DVec3,
+}
+
+impl Moment<'_> {
+    /// A copy for the vertices `kept`; `step` finds the forces of a state.
+    pub(super) fn moved(
+        &self,
+        noise: &Noise,
+        kept: &[usize],
+        random: &mut Random,
+        step: impl Fn(&mut HostState),
+    ) -> Moved {
+        let Self { state, frames, increments, free, long } = *self;
+        let sd = noise.least * (noise.most / noise.least).powf(random.unit());
+        let mut moved = state.clone();
+        let mut changes = Vec::with_capacity(free.len());
+        for (place, &free) in moved.displacement.iter_mut().zip(free) {
+            if !free {
+                changes.push([DVec3::ZERO; 2]);
+                continue;
+            }
+            let way = sd * random.vector();
+            let change = noise.before * (way - sd * random.vector());
+            for (component, way) in place.0.iter_mut().zip(way.to_array()) {
+                *component += way as f32;
+            }
+            changes.push([change, noise.back * way + change]);
+        }
+        let places = moved.displacement.clone();
+        step(&mut moved);
+        let seen = kept.iter().map(|&node| {
+            let [change, back] = changes[node];
+            let increment = increments[node] + change;
+            let mut frame = frames[node];
+            frame.follow(increment.as_vec3a());
+            let speed = (increment.length() / long) as f32;
+            let [place, force] = [places[node], moved.force[node]].map(|v| Vec3A::from(v.to_array()));
+            Seen { inputs: features(&frame, place, speed, force), frame, back }
+        });
+        let taken = (noise.back + noise.before).hypot(noise.before) * sd / (long * long);
+        let ease = noise.ease * noise.ease;
+        Moved { seen: seen.collect(), weight: (ease / (ease + taken * taken)) as f32 }
+    }
+}
