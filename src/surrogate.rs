@@ -21,7 +21,7 @@ use glam::{Vec3A, Vec4};
 use crate::frame::Frame;
 use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch};
 use crate::loads::Loads;
-use crate::material::{J_FLOOR, Material};
+use crate::material::Material;
 use crate::mlp::{MAX_INPUTS, Network, Scratch};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
@@ -222,12 +222,7 @@ where
     *time += f64::from(step.seconds());
     *steps += 1;
     follow_motions(loads, displacement, increment, *time);
-    let least_volume_ratio = 1.0 + extremes.least_j;
-    let (saturation, energy_excess) = (extremes.saturation, ledger.excess() as f32);
-    if least_volume_ratio < J_FLOOR || saturation > 1.0 || energy_excess > 0.0 {
-        return Status::Limited { least_volume_ratio, saturation, energy_excess };
-    }
-    Status::Ok
+    extremes.status(ledger, false)
 }
 
 /// Frames, features, network: the next increment of every vertex.

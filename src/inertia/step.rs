@@ -5,7 +5,7 @@ use glam::Vec4;
 
 use crate::lanes::{Gather, NodeVector, Scatter, dispatch};
 use crate::loads::Loads;
-use crate::material::{J_FLOOR, Material};
+use crate::material::Material;
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
 use crate::tled::{Divergence, Entry, InternalForces, Status, culprit, external_forces, follow_motions};
@@ -181,13 +181,8 @@ where
         refresh.advance(*steps, sources, &mut tables, &mut matrices);
         *report = refresh.published.report(held_back.nodes, coarse_share, estimate.error());
     }
-    let least_volume_ratio = 1.0 + extremes.least_j;
-    let (saturation, energy_excess) = (extremes.saturation, ledger.excess() as f32);
     let held = held_back.unused > MUCH_UNUSED * nodes as f32 || coarse_share < LITTLE_MOTION;
-    if held || least_volume_ratio < J_FLOOR || saturation > 1.0 || energy_excess > 0.0 {
-        return Status::Limited { least_volume_ratio, saturation, energy_excess };
-    }
-    Status::Ok
+    extremes.status(ledger, held)
 }
 
 /// `share (S^-1 - G^-1) W^T r` less the correction that a change of `S` asked for, from the cells' sums of `r` to what

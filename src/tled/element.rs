@@ -3,8 +3,10 @@
 //! [`crate::material`]). Nodes 1, 2, 3 carry stored gradients; node 0 takes minus their sum, so the four
 //! forces of an element add up to zero and a translation gives exactly none.
 
+use super::Status;
 use crate::lanes::{Gather, Real, Scatter};
-use crate::material::{Invariants, Law, Local, Response, response_operations};
+use crate::ledger::Ledger;
+use crate::material::{Invariants, J_FLOOR, Law, Local, Response, response_operations};
 use crate::scene::ElementBlock;
 
 /// A vector and a matrix in lanes; rows are spatial, columns material.
@@ -108,6 +110,18 @@ pub(crate) struct Extremes<R> {
     pub(crate) least_j: R,
     /// Largest saturation of the law.
     pub(crate) saturation: R,
+}
+
+impl Extremes<f32> {
+    /// What a step that was taken says of itself; `held` if it held back much of the motion.
+    pub(crate) fn status(&self, ledger: &Ledger, held: bool) -> Status {
+        let least_volume_ratio = 1.0 + self.least_j;
+        let (saturation, energy_excess) = (self.saturation, ledger.excess() as f32);
+        if held || least_volume_ratio < J_FLOOR || saturation > 1.0 || energy_excess > 0.0 {
+            return Status::Limited { least_volume_ratio, saturation, energy_excess };
+        }
+        Status::Ok
+    }
 }
 
 /// What else is made of an element's deformation while it is at hand.

@@ -25,12 +25,11 @@ use core::fmt;
 
 use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter, dispatch};
 use crate::loads::{Loads, ramp_factor};
-use crate::material::{J_FLOOR, Law, Material};
+use crate::material::{Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
 
-pub(crate) use element::Nothing;
-pub(crate) use element::{Beside, Deformation, Extremes};
+pub(crate) use element::{Beside, Deformation, Extremes, Nothing};
 use entry::next_increment;
 pub(crate) use entry::{Entry, Next, Side, Sums, Totals};
 
@@ -148,7 +147,7 @@ pub enum Status {
     /// The step was taken.
     Ok,
     /// The step was taken, but is not exact: some elements are beyond the range of their law (squeezed below
-    /// [`J_FLOOR`] or stretched beyond the exponent cap, where the law goes on along its tangent), or there
+    /// [`J_FLOOR`](crate::material::J_FLOOR) or stretched beyond the exponent cap, where the law goes on along its tangent), or there
     /// is more kinetic energy than the account explains ([`crate::Ledger`]). For a step with scaled inertia
     /// also: much of the motion was held back ([`crate::inertia::Report`]).
     Limited {
@@ -271,12 +270,7 @@ where
     *time += f64::from(step.dt);
     *steps += 1;
     follow_motions(loads, displacement, increment, *time);
-    let least_volume_ratio = 1.0 + extremes.least_j;
-    let (saturation, energy_excess) = (extremes.saturation, ledger.excess() as f32);
-    if least_volume_ratio < J_FLOOR || saturation > 1.0 || energy_excess > 0.0 {
-        return Status::Limited { least_volume_ratio, saturation, energy_excess };
-    }
-    Status::Ok
+    extremes.status(ledger, false)
 }
 
 /// Floating-point operations of one step without loads, the same for every step.
