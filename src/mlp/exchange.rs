@@ -19,7 +19,7 @@ use serde_json::value::RawValue;
 use super::file::VERSION;
 use super::{
     Activation, Description, Layer, LayerDescription, MAX_WIDTH, Network, Range, TrainedLaw, WeightError,
-    write,
+    hexadecimal, write,
 };
 
 /// The key of the metadata.
@@ -155,7 +155,7 @@ impl About {
             step: recipe.step,
             exact_step: recipe.exact_step,
             recipe: recipe.text.to_string(),
-            recipe_sha256: recipe.hash.iter().map(|byte| format!("{byte:02x}")).collect(),
+            recipe_sha256: hexadecimal(&recipe.hash),
         }
     }
 }

@@ -10,7 +10,8 @@ use super::{Activation, Layer, MAX_INPUTS, MAX_LAYERS, MAX_OUTPUTS, MAX_WIDTH};
 #[cfg(target_endian = "big")]
 compile_error!("weight files are little-endian and read in place");
 
-pub(super) const MAGIC: [u8; 8] = *b"SUPPLE-W";
+/// First bytes of a weight file.
+pub const MAGIC: [u8; 8] = *b"SUPPLE-W";
 pub(super) const VERSION: u32 = 1;
 /// Arrays begin at multiples of this.
 pub(super) const ALIGNMENT: usize = 64;

@@ -16,10 +16,10 @@ mod write;
 
 #[cfg(feature = "safetensors")]
 pub use exchange::{ExchangeError, from_safetensors, to_safetensors};
-pub use file::{Network, Range, Recipe, TrainedLaw, WeightError};
+pub use file::{MAGIC, Network, Range, Recipe, TrainedLaw, WeightError};
 pub(crate) use forward::Scratch;
 #[cfg(feature = "std")]
-pub use write::{Description, LayerDescription, WeightBytes, write};
+pub use write::{Description, LayerDescription, WeightBytes, hexadecimal, write};
 
 /// Widest layer.
 pub const MAX_WIDTH: usize = 256;

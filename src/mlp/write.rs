@@ -1,6 +1,8 @@
 //! Weight files from what training found, and memory for them on a host with a heap; [`write`] refuses what
 //! [`Network::parse`] would refuse.
 
+use std::format;
+use std::string::String;
 use std::vec::Vec;
 
 use super::file::{ALIGNMENT, CHECKED, HEADER, Header, LayerEntry, MAGIC, VERSION};
@@ -144,6 +146,12 @@ pub fn write(description: &Description<'_>) -> Result<Vec<u8>, WeightError> {
     place(&mut bytes, 0, bytemuck::bytes_of(&header));
     Network::parse(WeightBytes::of(&bytes).bytes())?;
     Ok(bytes)
+}
+
+/// The digits of a recipe's hash.
+#[must_use]
+pub fn hexadecimal(hash: &[u8; 32]) -> String {
+    hash.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn vec_of(length: usize) -> Vec<u8> {

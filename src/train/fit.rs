@@ -20,9 +20,10 @@ use super::TrainError;
 use super::noise::Random;
 use super::recipe::{Decay, Recipe};
 use super::samples::Samples;
-use crate::lab::DT;
+use crate::io::write_atomically;
 use crate::lab::scenes::{self, LawSpec};
-use crate::mlp::{self, Activation, Description, LayerDescription, Network, Range, TrainedLaw};
+use crate::lab::{DT, LabError};
+use crate::mlp::{self, Activation, Description, LayerDescription, Network, Range, TrainedLaw, WeightBytes};
 use crate::surrogate::{FEATURES, PREDICTED};
 
 /// Both parts.
@@ -272,10 +273,9 @@ fn numbers<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
 
 /// Root mean square errors of the kernel's own forward pass, unclipped motions and all.
 fn judged(bytes: &[u8], samples: &Samples, outputs: &[Range]) -> [f64; PREDICTED] {
-    let mut words = std::vec![0u32; bytes.len().div_ceil(4)];
-    bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
+    let memory = WeightBytes::of(bytes);
     let mut squares = [0.0; PREDICTED];
-    if let Ok(network) = Network::parse(bytemuck::cast_slice(&words)) {
+    if let Ok(network) = Network::parse(memory.bytes()) {
         for (input, target) in samples.inputs.iter().zip(&samples.targets) {
             let mut found = [0.0; PREDICTED];
             network.predict(input, &mut found);
@@ -304,10 +304,6 @@ impl Folder<'_> {
         self.path.join("latest")
     }
 
-    fn recipe(&self) -> String {
-        self.hash.iter().map(|byte| format!("{byte:02x}")).collect()
-    }
-
     /// Epochs of the checkpoint that is there.
     fn latest(&self) -> Result<Option<usize>, TrainError> {
         let Ok(text) = std::fs::read_to_string(self.mark()) else {
@@ -315,7 +311,7 @@ impl Folder<'_> {
         };
         let mut words = text.split_whitespace();
         let (epoch, recipe) = (words.next(), words.next());
-        if recipe != Some(self.recipe().as_str()) {
+        if recipe != Some(mlp::hexadecimal(self.hash).as_str()) {
             return Err(TrainError::OtherRecipe(self.path.to_path_buf()));
         }
         let epoch = epoch.and_then(|epoch| epoch.parse().ok());
@@ -343,10 +339,8 @@ impl Folder<'_> {
         let [weights, state] = self.files(epoch);
         parts.clone().save_file(&weights).map_err(|error| problem(&weights, error.to_string()))?;
         adam.save(&state).map_err(|error| problem(&state, error.to_string()))?;
-        let next = self.path.join("latest.tmp");
-        let named = std::fs::write(&next, format!("{epoch} {}\n", self.recipe()))
-            .and_then(|()| std::fs::rename(&next, self.mark()));
-        named.map_err(|error| problem(&next, error.to_string()))?;
+        let hash = mlp::hexadecimal(self.hash);
+        write_atomically(&self.mark(), |file| writeln!(file, "{epoch} {hash}")).map_err(LabError::Write)?;
         // What is left of the epoch before is of no use.
         for old in epoch.checked_sub(1).map(|before| self.files(before)).into_iter().flatten() {
             let _ = std::fs::remove_file(old);

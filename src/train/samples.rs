@@ -150,20 +150,16 @@ impl Job for Collect<'_> {
         let step = Step::insist(DT, spec.damping)?;
         let mut state = spec.state();
         let nodes = spec.points.len();
-        let mut kept = vec![true; nodes];
-        for node in
-            spec.supports.iter().map(|support| support.node).chain(spec.forces.iter().map(|force| force.node))
-        {
-            if let Some(kept) = kept.get_mut(node as usize) {
-                *kept = false;
+        let without = |mut marks: Vec<bool>, nodes: &mut dyn Iterator<Item = u32>| {
+            for node in nodes {
+                if let Some(mark) = marks.get_mut(node as usize) {
+                    *mark = false;
+                }
             }
-        }
-        let mut free = vec![true; nodes];
-        for support in &spec.supports {
-            if let Some(free) = free.get_mut(support.node as usize) {
-                *free = false;
-            }
-        }
+            marks
+        };
+        let free = without(vec![true; nodes], &mut spec.supports.iter().map(|support| support.node));
+        let kept = without(free.clone(), &mut spec.forces.iter().map(|force| force.node));
         let mut random = Random(recipe.seed);
         let kept: Vec<usize> = (0..nodes).filter(|&node| kept[node]).collect();
 

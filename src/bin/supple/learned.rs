@@ -62,12 +62,11 @@ impl Learned {
             ));
         }
         let burn_in = learned.burn_in;
+        let at = table.burn_in.as_ref().map_or_else(|| learned.place.clone(), |at| file.place(at));
         if !(burn_in.is_finite() && burn_in >= 0.0) {
-            let at = table.burn_in.as_ref().map_or_else(|| learned.place.clone(), |at| file.place(at));
             return Err(Problem(format!("{at}: burn_in is {burn_in} s, it must be zero or more")));
         }
         if (burn_in + step) * (1.0 - 1e-6) > time.end {
-            let at = table.burn_in.as_ref().map_or_else(|| learned.place.clone(), |at| file.place(at));
             return Err(Problem(format!(
                 "{at}: the exact step leads for {burn_in} s (burn_in), so a learned step of {step:.3e} s does not fit \
                  before the end, {} s",

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use supple::mlp::{Activation, Layer, Network, Range};
+use supple::mlp::{Activation, Layer, MAGIC, Network, Range, hexadecimal};
 use supple::surrogate::{FEATURES, PREDICTED, Surrogate, Vertex};
 
 use crate::inspect::row;
@@ -29,10 +29,10 @@ const FORETOLD: [Quantity; PREDICTED] = [
 /// Whether a file is one of weights, by its name or by how it begins.
 pub(crate) fn is_weights(path: &Path) -> bool {
     let begins = || {
-        let mut start = [0; 8];
+        let mut start = [0; MAGIC.len()];
         let read =
             std::fs::File::open(path).and_then(|mut file| std::io::Read::read_exact(&mut file, &mut start));
-        read.is_ok() && start == *b"SUPPLE-W"
+        read.is_ok() && start == MAGIC
     };
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("weights")) || begins()
 }
@@ -73,8 +73,7 @@ pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
     ranges("input", "in training", inputs, of(&SEEN));
     ranges("output", "clipped to", outputs, of(&FORETOLD));
 
-    let hash: String = recipe.hash.iter().map(|byte| format!("{byte:02x}")).collect();
-    println!("\nrecipe, SHA-256 {hash}");
+    println!("\nrecipe, SHA-256 {}", hexadecimal(&recipe.hash));
     for line in recipe.text.lines() {
         println!("{}", format!("    {line}").trim_end());
     }

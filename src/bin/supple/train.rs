@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use supple::io::write_atomically;
 use supple::train::fit::{Fitted, Progress, train as fit};
 
 use crate::scene_file::Problem;
@@ -51,10 +52,7 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     });
     bar.finish_and_clear();
     let Fitted { bytes, held_out, samples, loss } = fitted.map_err(|error| problem(recipe, &error))?;
-    let next = out.with_extension("tmp");
-    std::fs::write(&next, &bytes)
-        .and_then(|()| std::fs::rename(&next, out))
-        .map_err(|error| problem(out, &error))?;
+    write_atomically(out, |file| file.write_all(&bytes)).map_err(|error| Problem(error.to_string()))?;
     // Only now that the weights are safe.
     let _ = std::fs::remove_dir_all(&folder);
     println!("samples     {samples}");
