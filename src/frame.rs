@@ -158,14 +158,16 @@ mod tests {
             let scale = libm::powf(10.0, scale);
             let mut frame = Frame::WORLD;
             frame.follow(first.as_vec3a() * scale);
-            let [t, n, b] = frame.axes().map(|axis| axis.as_dvec3());
+            let [t, n, b] = frame.axes().map(|axis| axis.as_dvec3().normalize());
             let next = (second.as_vec3a() * scale).as_dvec3().normalize();
             prop_assume!(t.dot(next) > -0.999);
             frame.follow(second.as_vec3a() * scale);
             let [tangent, normal, binormal] = frame.axes().map(|axis| axis.as_dvec3());
             prop_assert!((tangent - next).length() < 1e-6);
-            prop_assert!((normal - turned(n, t, next)).length() < 1e-5);
-            prop_assert!((binormal - turned(b, t, next)).length() < 1e-5);
+            // Close to reversal the plane of the turn is all but lost: an error of the tangents grows by 2 / |s|.
+            let near = 3e-6 / (t + next).length();
+            prop_assert!((normal - turned(n, t, next)).length() < near);
+            prop_assert!((binormal - turned(b, t, next)).length() < near);
             // There and back.
             let local = frame.local(v.as_vec3a());
             prop_assert!((frame.world(local) - v.as_vec3a()).length() < 1e-6);
