@@ -22,7 +22,7 @@ use crate::frame::Frame;
 use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch};
 use crate::loads::Loads;
 use crate::material::Material;
-use crate::mlp::{MAX_INPUTS, Network, Scratch};
+use crate::mlp::{ForceInput, MAX_INPUTS, Network, Scratch};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
 use crate::tled::{
@@ -49,11 +49,26 @@ impl Vertex {
     pub const NEW: Self = Self { frame: Frame::WORLD, next: NodeVector::ZERO };
 }
 
-/// Displacement (m), speed (m/s) and force (N) of a vertex in its frame.
-#[inline(always)]
-pub(crate) fn features(frame: &Frame, displacement: Vec3A, speed: f32, force: Vec3A) -> [f32; FEATURES] {
-    let ([a, b, c], [d, e, f]) = (frame.local(displacement), frame.local(force));
-    [a, b, c, speed, d, e, f]
+/// What the network sees of a vertex: displacement (m), speed (m/s) and force (N, or m/s^2) in its frame.
+pub(crate) struct Seen {
+    /// m.
+    pub(crate) displacement: Vec3A,
+    /// m/s.
+    pub(crate) speed: f32,
+    /// N.
+    pub(crate) force: Vec3A,
+    /// Lumped, kg.
+    pub(crate) mass: f32,
+}
+
+impl Seen {
+    #[inline(always)]
+    pub(crate) fn features(&self, frame: &Frame, input: ForceInput) -> [f32; FEATURES] {
+        // A vertex of no element has no mass, and no force.
+        let unit = if input == ForceInput::PerMass && self.mass > 0.0 { self.mass } else { 1.0 };
+        let ([a, b, c], [d, e, f]) = (frame.local(self.displacement), frame.local(self.force / unit));
+        [a, b, c, self.speed, d, e, f]
+    }
 }
 
 /// Why a network cannot move a scene.
@@ -243,6 +258,7 @@ impl Kernel for Predict<'_, '_> {
     fn run<R: Real>(self) -> (Totals, SurrogateReport) {
         let Self { network, step, inertia, displacement, increment, force, vertices } = self;
         let (seconds, mut scratch) = (step.seconds(), Scratch::<R>::new());
+        let input = network.recipe().force;
         let mut sums = Sums::new(step, Vec4::splat);
         let (mut free, mut clipped, mut outside) = (0u32, 0u32, 0u32);
         let nodes =
@@ -251,15 +267,16 @@ impl Kernel for Predict<'_, '_> {
         for ((((inertia, displacement), increment), force), vertices) in nodes {
             // Features by lane, then inputs by lanes.
             let mut seen = [[0.0; FEATURES]; LANES];
-            let states = displacement.iter().zip(increment).zip(force);
-            for ((seen, vertex), ((displacement, increment), force)) in
+            let states = displacement.iter().zip(increment).zip(force).zip(inertia);
+            for ((seen, vertex), (((displacement, increment), force), inertia)) in
                 seen.iter_mut().zip(&mut *vertices).zip(states)
             {
                 let increment = Vec3A::from(increment.to_array());
                 vertex.frame.follow(increment);
                 let speed = libm::sqrtf(increment.length_squared()) / seconds;
-                let vectors = [displacement, force].map(|vector| Vec3A::from(vector.to_array()));
-                *seen = features(&vertex.frame, vectors[0], speed, vectors[1]);
+                let [displacement, force] = [displacement, force].map(|v| Vec3A::from(v.to_array()));
+                *seen =
+                    Seen { displacement, speed, force, mass: inertia.mass }.features(&vertex.frame, input);
             }
             let mut inputs = [R::splat(0.0); MAX_INPUTS];
             for (feature, input) in inputs.iter_mut().enumerate().take(FEATURES) {

@@ -5,7 +5,7 @@
 use proptest::prelude::*;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde_json::{Value, json};
-use supple::mlp::{ExchangeError, Network, TrainedLaw, from_safetensors, to_safetensors, write};
+use supple::mlp::{ExchangeError, ForceInput, Network, TrainedLaw, from_safetensors, to_safetensors, write};
 
 #[path = "support/networks.rs"]
 mod networks;
@@ -29,6 +29,7 @@ proptest! {
         seed in any::<u32>(),
         literal in any::<bool>(),
         neo in any::<bool>(),
+        per_mass in any::<bool>(),
     ) {
         let first: Vec<_> = [inputs].into_iter().chain(hidden).chain([outputs]).collect();
         let second = [inputs + outputs, 5, outputs];
@@ -36,6 +37,7 @@ proptest! {
         // Numbers with as many digits as there are.
         let mut next = numbers(seed ^ 77);
         let mut odd = || (1.1 + next()) * 10f32.powf(20.0 * next());
+        description.force = if per_mass { ForceInput::PerMass } else { ForceInput::Newton };
         description.law = if neo {
             TrainedLaw::NeoHookean { c: odd(), d: odd(), literal }
         } else {
@@ -218,6 +220,10 @@ fn keys_that_do_not_fit_are_named() {
         (
             |about| about["law"] = json!("hooke"),
             "metadata key law: \"hooke\" is not known; neo-hookean, exponential",
+        ),
+        (
+            |about| about["force"] = json!("pound"),
+            "metadata key force: \"pound\" is not usable: unknown variant",
         ),
         (|about| about["law"] = json!("neo-hookean"), "metadata key constants.c: missing"),
         (|about| about["constants"]["c"] = json!(1.0), "metadata key constants.c: not known"),

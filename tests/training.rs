@@ -120,6 +120,37 @@ fn frames_are_spread_over_the_motion_at_every_step() {
     }
 }
 
+/// Over the mass of its vertex the force says what the exact step does: `a = f / m - mu v`, whatever the vertex weighs.
+#[test]
+fn force_over_mass_is_the_acceleration_and_what_damping_takes() {
+    let text = RECIPE.replace("slope = 0.01", "slope = 0.01\nforce = \"per-mass\"");
+    let (newton, per_mass) = (collected(RECIPE), collected(&text));
+    assert_eq!(newton.targets, per_mass.targets);
+    let (mut off, mut of, mut masses) = (0.0, 0.0, Vec::new());
+    for ((newton, per_mass), target) in newton.inputs.iter().zip(&per_mass.inputs).zip(&per_mass.targets) {
+        assert_eq!(newton[..4], per_mass[..4]);
+        let largest = (4..7).max_by(|&a, &b| newton[a].abs().total_cmp(&newton[b].abs())).unwrap();
+        masses.push(newton[largest] / per_mass[largest]);
+        for axis in 0..3 {
+            let damping = if axis == 0 { 20.0 * per_mass[3] } else { 0.0 };
+            let exact = per_mass[4 + axis] - damping;
+            off += f64::from(target[axis] - exact).powi(2);
+            of += f64::from(target[axis]).powi(2);
+        }
+    }
+    masses.sort_by(f32::total_cmp);
+    let (least, most) = (masses[0], masses[masses.len() - 1]);
+    println!("masses {least:.2e} to {most:.2e} kg; {:.3} of the acceleration unexplained", (off / of).sqrt());
+    assert!(most / least > 3.0);
+    assert!((off / of).sqrt() < 0.1);
+    assert!(
+        Recipe::parse(&text.replace("per-mass", "pound"))
+            .unwrap_err()
+            .to_string()
+            .contains("unknown variant")
+    );
+}
+
 #[test]
 fn a_recipe_that_cannot_be_used_says_why() {
     let said = |from: &str, to: &str| {

@@ -18,8 +18,8 @@ use serde_json::value::RawValue;
 
 use super::file::VERSION;
 use super::{
-    Activation, Description, Layer, LayerDescription, MAX_WIDTH, Network, Range, TrainedLaw, WeightError,
-    hexadecimal, write,
+    Activation, Description, ForceInput, Layer, LayerDescription, MAX_WIDTH, Network, Range, TrainedLaw,
+    WeightError, hexadecimal, write,
 };
 
 /// The key of the metadata.
@@ -116,6 +116,9 @@ struct About {
     damping: f32,
     step: f32,
     exact_step: f32,
+    /// Left out for the paper's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    force: Option<ForceInput>,
     recipe: String,
     recipe_sha256: String,
 }
@@ -154,6 +157,7 @@ impl About {
             damping: recipe.damping,
             step: recipe.step,
             exact_step: recipe.exact_step,
+            force: (recipe.force != ForceInput::default()).then_some(recipe.force),
             recipe: recipe.text.to_string(),
             recipe_sha256: hexadecimal(&recipe.hash),
         }
@@ -209,6 +213,7 @@ pub fn from_safetensors(bytes: &[u8]) -> Result<Vec<u8>, ExchangeError> {
         damping: about.take("damping")?,
         step: about.take("step")?,
         exact_step: about.take("exact_step")?,
+        force: about.take_if_there("force")?.unwrap_or_default(),
         recipe: &recipe,
         recipe_hash: sha256(&hash)?,
     };
@@ -318,8 +323,14 @@ impl Keys {
     }
 
     fn take<T: DeserializeOwned>(&mut self, key: &str) -> Result<T, ExchangeError> {
-        let value = self.keys.remove(key).ok_or_else(|| refused(&self.name(key), "missing"))?;
-        serde_json::from_str(value.get()).map_err(|error| {
+        self.take_if_there(key)?.ok_or_else(|| refused(&self.name(key), "missing"))
+    }
+
+    fn take_if_there<T: DeserializeOwned>(&mut self, key: &str) -> Result<Option<T>, ExchangeError> {
+        let Some(value) = self.keys.remove(key) else {
+            return Ok(None);
+        };
+        serde_json::from_str(value.get()).map(Some).map_err(|error| {
             // The parser's place is that within this key: the text itself says more.
             let (error, shown) = (error.to_string(), value.get().chars().take(40).collect::<String>());
             let reason = error.split(" at line ").next().unwrap_or_default();

@@ -39,7 +39,8 @@ pub(super) struct Header {
     pub(super) recipe: u32,
     pub(super) recipe_length: u32,
     pub(super) recipe_hash: [u8; 32],
-    pub(super) reserved: [u8; 128],
+    pub(super) force: u32,
+    pub(super) reserved: [u8; 124],
 }
 
 pub(super) const HEADER: usize = size_of::<Header>();
@@ -119,6 +120,22 @@ impl fmt::Display for TrainedLaw {
     }
 }
 
+/// How the learned step shows a vertex's force to the network.
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
+#[cfg_attr(
+    any(feature = "safetensors", feature = "train"),
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "kebab-case")
+)]
+pub enum ForceInput {
+    /// In N, as in the paper. A vertex at the surface, where less mass is lumped, moves more under the same force than one
+    /// inside, and the network cannot tell which it has before it.
+    #[default]
+    Newton,
+    /// Over the vertex's lumped mass, m/s^2.
+    PerMass,
+}
+
 /// What a network was trained on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recipe<'w> {
@@ -132,6 +149,8 @@ pub struct Recipe<'w> {
     pub step: f32,
     /// Step of the exact motion it learned from, s.
     pub exact_step: f32,
+    /// Unit of the learned step's force.
+    pub force: ForceInput,
     /// The configuration, as text.
     pub text: &'w str,
     /// SHA-256 of the text.
@@ -390,6 +409,11 @@ fn recipe<'w>(header: &Header, bytes: &'w [u8]) -> Result<Recipe<'w>, WeightErro
     if !(damping.is_finite() && damping >= 0.0) {
         return Err(WeightError::Header { field: "the damping", value: damping });
     }
+    let force = match header.force {
+        0 => ForceInput::Newton,
+        1 => ForceInput::PerMass,
+        code => return Err(WeightError::Header { field: "the unit of force", value: code as f32 }),
+    };
     let (at, length) = (header.recipe, header.recipe_length);
     let end = (at as usize).checked_add(length as usize);
     let text =
@@ -400,6 +424,7 @@ fn recipe<'w>(header: &Header, bytes: &'w [u8]) -> Result<Recipe<'w>, WeightErro
         damping,
         step: positive("the step", header.step)?,
         exact_step: positive("the exact step", header.exact_step)?,
+        force,
         text: text.ok_or(WeightError::Recipe { at, length })?,
         hash: header.recipe_hash,
     })

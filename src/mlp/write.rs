@@ -6,7 +6,7 @@ use std::string::String;
 use std::vec::Vec;
 
 use super::file::{ALIGNMENT, CHECKED, HEADER, Header, LayerEntry, MAGIC, VERSION};
-use super::{Activation, Network, Range, TrainedLaw, WeightError};
+use super::{Activation, ForceInput, Network, Range, TrainedLaw, WeightError};
 
 /// A layer of a network to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +42,8 @@ pub struct Description<'a> {
     pub step: f32,
     /// Step of the exact motion it learned from, s.
     pub exact_step: f32,
+    /// Unit of the learned step's force.
+    pub force: ForceInput,
     /// The configuration, as text.
     pub recipe: &'a str,
     /// SHA-256 of the recipe.
@@ -134,7 +136,8 @@ pub fn write(description: &Description<'_>) -> Result<Vec<u8>, WeightError> {
         recipe,
         recipe_length: description.recipe.len() as u32,
         recipe_hash: description.recipe_hash,
-        reserved: [0; 128],
+        force: u32::from(description.force == ForceInput::PerMass),
+        reserved: [0; 124],
     };
     let place =
         |bytes: &mut Vec<u8>, at: usize, part: &[u8]| bytes[at..at + part.len()].copy_from_slice(part);

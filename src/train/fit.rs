@@ -225,6 +225,14 @@ fn shuffled(count: usize, seed: u64) -> Vec<u32> {
     order
 }
 
+/// The law as a weight file tells it.
+pub(super) fn trained_law(law: &LawSpec) -> TrainedLaw {
+    match *law {
+        LawSpec::Exponential(law) => TrainedLaw::Exponential { a: law.a, b: law.b, d: law.d, literal: false },
+        LawSpec::NeoHookean(law) => TrainedLaw::NeoHookean { c: law.c, d: law.d, literal: false },
+    }
+}
+
 fn described<'a>(
     recipe: &Recipe,
     text: &'a str,
@@ -234,10 +242,7 @@ fn described<'a>(
     outputs: Vec<Range>,
 ) -> Result<Description<'a>, TrainError> {
     let spec = scenes::named(&recipe.motion.scene)?;
-    let law = match spec.law {
-        LawSpec::Exponential(law) => TrainedLaw::Exponential { a: law.a, b: law.b, d: law.d, literal: false },
-        LawSpec::NeoHookean(law) => TrainedLaw::NeoHookean { c: law.c, d: law.d, literal: false },
-    };
+    let law = trained_law(&spec.law);
     let layers = |layers: &[Linear]| -> Vec<LayerDescription> {
         let last = layers.len() - 1;
         let each = layers.iter().enumerate();
@@ -262,6 +267,7 @@ fn described<'a>(
         damping: spec.damping,
         step: recipe.multiple as f32 * DT,
         exact_step: DT,
+        force: recipe.network.force,
         recipe: text,
         recipe_hash,
     })

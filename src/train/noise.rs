@@ -21,7 +21,10 @@ use std::vec::Vec;
 use super::recipe::Noise;
 use crate::frame::Frame;
 use crate::lab::host::HostState;
-use crate::surrogate::{FEATURES, features};
+use crate::mlp::ForceInput;
+use crate::scene::NodeInertia;
+use crate::state::NodeVector;
+use crate::surrogate::{self, FEATURES};
 
 /// SplitMix64.
 pub(super) struct Random(pub(super) u64);
@@ -51,6 +54,28 @@ impl Random {
     }
 }
 
+/// What the network is shown of a force, and the masses for it.
+#[derive(Clone, Copy)]
+pub(super) struct SeenAs<'a> {
+    pub(super) inertia: &'a [NodeInertia],
+    pub(super) force: ForceInput,
+}
+
+impl SeenAs<'_> {
+    pub(super) fn features(
+        self,
+        node: usize,
+        frame: &Frame,
+        displacement: Vec3A,
+        speed: f32,
+        force: NodeVector,
+    ) -> [f32; FEATURES] {
+        let force = Vec3A::from(force.to_array());
+        let seen = surrogate::Seen { displacement, speed, force, mass: self.inertia[node].mass };
+        seen.features(frame, self.force)
+    }
+}
+
 /// A moment of the exact motion.
 pub(super) struct Moment<'a> {
     /// Before the exact step that finds its forces.
@@ -62,6 +87,7 @@ pub(super) struct Moment<'a> {
     pub(super) free: &'a [bool],
     /// `D`, s.
     pub(super) long: f64,
+    pub(super) seen_as: SeenAs<'a>,
 }
 
 /// A copy of a moment, moved at random.
@@ -88,7 +114,7 @@ impl Moment<'_> {
         random: &mut Random,
         step: impl Fn(&mut HostState),
     ) -> Moved {
-        let Self { state, frames, increments, free, long } = *self;
+        let Self { state, frames, increments, free, long, seen_as } = *self;
         let sd = noise.least * (noise.most / noise.least).powf(random.unit());
         let mut moved = state.clone();
         let mut changes = Vec::with_capacity(free.len());
@@ -112,8 +138,8 @@ impl Moment<'_> {
             let mut frame = frames[node];
             frame.follow(increment.as_vec3a());
             let speed = (increment.length() / long) as f32;
-            let [place, force] = [places[node], moved.force[node]].map(|v| Vec3A::from(v.to_array()));
-            Seen { inputs: features(&frame, place, speed, force), frame, back }
+            let place = Vec3A::from(places[node].to_array());
+            Seen { inputs: seen_as.features(node, &frame, place, speed, moved.force[node]), frame, back }
         });
         let taken = (noise.back + noise.before).hypot(noise.before) * sd / (long * long);
         let ease = noise.ease * noise.ease;

@@ -24,6 +24,7 @@
 //! hidden = [256, 256, 128, 64, 32]
 //! correction = [64, 64, 64]
 //! slope = 0.01             # of the leaky ReLU
+//! force = "newton"         # the paper's; or "per-mass", over the vertex's lumped mass
 //!
 //! [training]
 //! epochs = 200
@@ -41,7 +42,7 @@ use serde::Deserialize;
 
 use super::TrainError;
 use crate::lab::scenes;
-use crate::mlp::{MAX_LAYERS, MAX_WIDTH};
+use crate::mlp::{ForceInput, MAX_LAYERS, MAX_WIDTH};
 
 /// See the module.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
@@ -122,6 +123,9 @@ pub struct Shape {
     pub correction: Vec<usize>,
     /// Of the leaky ReLU.
     pub slope: f32,
+    /// What the network sees of the force.
+    #[serde(default)]
+    pub force: ForceInput,
 }
 
 /// How.

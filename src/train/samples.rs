@@ -14,7 +14,7 @@ use std::vec::Vec;
 
 use glam::{DVec3, Vec3A};
 
-use super::noise::{Moment, Moved, Random};
+use super::noise::{Moment, Moved, Random, SeenAs};
 use super::recipe::Recipe;
 use crate::frame::Frame;
 use crate::lab::host::{HostState, Job};
@@ -22,13 +22,14 @@ use crate::lab::scenes::{self, SceneSpec};
 use crate::lab::{DT, INTERVAL_STEPS, LabError};
 use crate::material::Material;
 use crate::mlp::Range;
-use crate::surrogate::{FEATURES, PREDICTED, features};
+use crate::state::NodeVector;
+use crate::surrogate::{FEATURES, PREDICTED};
 use crate::tled::{self, Status, Step};
 
 /// What vertices saw and did, frame by frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
-    /// Displacement (m), speed (m/s) and force (N) in the local frame.
+    /// Displacement (m), speed (m/s) and force (N, or m/s^2) in the local frame.
     pub inputs: Vec<[f32; FEATURES]>,
     /// Acceleration over the step, m/s^2, in the local frame.
     pub targets: Vec<[f32; PREDICTED]>,
@@ -162,6 +163,7 @@ impl Job for Collect<'_> {
         let kept = without(free.clone(), &mut spec.forces.iter().map(|force| force.node));
         let mut random = Random(recipe.seed);
         let kept: Vec<usize> = (0..nodes).filter(|&node| kept[node]).collect();
+        let seen_as = SeenAs { inertia: scene.inertia(), force: recipe.network.force };
 
         let dt = f64::from(DT);
         let every = u64::from(recipe.multiple);
@@ -209,13 +211,13 @@ impl Job for Collect<'_> {
                         let _ = tled::step(&scene, &loads, moved, &step);
                     };
                     let copies = before.iter().zip(&recipe.noise).flat_map(|(before, noise)| {
-                        let moment = trains[at].moment(before, &free, long);
+                        let moment = trains[at].moment(before, &free, long, seen_as);
                         (0..noise.copies)
                             .map(|_| moment.moved(noise, &kept, &mut random, forces_of))
                             .collect::<Vec<_>>()
                     });
                     let copies = copies.collect();
-                    trains[at].ask(&kept, long as f32, state.forces(), copies);
+                    trains[at].ask(&kept, long as f32, state.forces(), seen_as, copies);
                     due += 1;
                 }
             }
@@ -296,13 +298,26 @@ impl Train {
         }
     }
 
-    fn moment<'a>(&'a self, state: &'a HostState, free: &'a [bool], long: f64) -> Moment<'a> {
+    fn moment<'a>(
+        &'a self,
+        state: &'a HostState,
+        free: &'a [bool],
+        long: f64,
+        seen_as: SeenAs<'a>,
+    ) -> Moment<'a> {
         let Self { frames, increments, .. } = self;
-        Moment { state, frames, increments, free, long }
+        Moment { state, frames, increments, free, long, seen_as }
     }
 
     /// Inputs of now.
-    fn ask(&mut self, kept: &[usize], long: f32, forces: &[crate::state::NodeVector], rough: Vec<Moved>) {
+    fn ask(
+        &mut self,
+        kept: &[usize],
+        long: f32,
+        forces: &[NodeVector],
+        seen_as: SeenAs<'_>,
+        rough: Vec<Moved>,
+    ) {
         // The first moment has no velocity.
         if self.moments < 2 {
             return;
@@ -310,8 +325,7 @@ impl Train {
         let [now, ..] = &self.shapes;
         let inputs = kept.iter().map(|&node| {
             let speed = self.increments[node].length() as f32 / long;
-            let force = forces.get(node).map_or(Vec3A::ZERO, |force| Vec3A::from(force.to_array()));
-            features(&self.frames[node], now[node].as_vec3a(), speed, force)
+            seen_as.features(node, &self.frames[node], now[node].as_vec3a(), speed, forces[node])
         });
         self.asked = Some(Asked { smooth: inputs.collect(), rough });
     }

@@ -4,7 +4,7 @@
 
 use std::cell::Cell;
 
-use supple::mlp::{Activation, Description, LayerDescription, Range, TrainedLaw};
+use supple::mlp::{Activation, Description, ForceInput, LayerDescription, Range, TrainedLaw};
 
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(64))]
@@ -91,6 +91,7 @@ pub fn described(first: &[usize], second: &[usize], seed: u32) -> Description<'s
         damping: 20.0,
         step: 3e-4,
         exact_step: 3e-5,
+        force: ForceInput::Newton,
         recipe: "seed = 1\n",
         recipe_hash: [7; 32],
     }
@@ -124,4 +125,23 @@ pub fn predicted(network: &Description<'_>, inputs: &[f32]) -> Vec<f64> {
             value.clamp(f64::from(range.least), f64::from(range.most))
         })
         .collect()
+}
+
+/// A network whose one output is always `value`.
+pub fn constant(inputs: usize, value: f32) -> Memory {
+    let range = Range { scale: 1.0, least: -100.0, most: 100.0 };
+    let output = LayerDescription {
+        inputs,
+        activation: Activation::Linear,
+        weights: vec![0.0; inputs],
+        biases: vec![value],
+    };
+    let network = Description {
+        inputs: vec![range; inputs],
+        outputs: vec![range],
+        first: vec![output],
+        second: Vec::new(),
+        ..described(&[1, 1], &[], 1)
+    };
+    Memory::of(&supple::mlp::write(&network).unwrap())
 }
