@@ -6,10 +6,13 @@
 use std::time::Instant;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
-use supple::inertia::{self, Inertia, LatticeNode, numbers_for, vectors_for};
+use supple::inertia::{
+    self, Damper, Inertia, LatticeNode, damped_numbers_for, damped_step, damped_vectors_for,
+};
 use supple::loads::{Loads, NodalForce};
 use supple::material::{Exponential, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
+use supple::mlp::Network;
 use supple::scene::{ElementBlock, NodeInertia, Scene, Support, blocks_for};
 use supple::state::{NodeVector, State};
 use supple::tled::{self, Status, Step};
@@ -23,6 +26,7 @@ const LONGEST: f32 = 100.0;
 const SHORT_CYCLE: u32 = 16;
 const DAMPING: f32 = 20.0;
 const LATTICE: [u32; 3] = [2, 2, 4];
+const DAMPED_LATTICE: [u32; 3] = [2, 2, 5];
 const PAIRS: usize = 41;
 
 type BarScene = Scene<Tissue<Exponential>, Vec<NodeInertia>, Vec<ElementBlock>>;
@@ -36,13 +40,18 @@ fn moved(status: Status) {
     assert!(matches!(status, Status::Ok | Status::Limited { .. }), "{status:?}");
 }
 
+/// A network as it would lie in flash.
+#[repr(C, align(64))]
+struct Flash<B: ?Sized>(B);
+static DAMPER: &Flash<[u8]> = &Flash(*include_bytes!("../weights/damper.weights"));
+
 /// A step with the given lattice, from a state that it has deformed.
 fn scaled<'a>(
     scene: &'a BarScene,
     loads: &'a Loads<'a>,
     points: &[[f32; 3]],
     multiple: f32,
-    cells: [u32; 3],
+    (cells, damped): ([u32; 3], bool),
     cycle: u32,
 ) -> impl FnMut() + 'a {
     let nodes = points.len();
@@ -53,14 +62,27 @@ fn scaled<'a>(
     };
     let mut state = state(nodes);
     let mut inertia = Inertia::over(
-        vec![NodeVector::ZERO; vectors_for(nodes)],
+        vec![NodeVector::ZERO; damped_vectors_for(nodes)],
         vec![LatticeNode::EMPTY; nodes],
-        vec![0.0; numbers_for(cells, functions)],
+        vec![0.0; damped_numbers_for(cells, functions)],
     );
     let step = Step::insist(multiple * DT, DAMPING).expect("a positive step");
-    inertia.prepare(scene, points, &mut state, step, cells).expect("the bar can be prepared");
+    let damper = damped.then(|| {
+        let network = Network::parse(&DAMPER.0).expect("a weight file of the crate");
+        Damper::over(network).expect("a damper")
+    });
+    match damper {
+        Some(_) => inertia.prepare_damped(scene, points, &mut state, step, cells),
+        None => inertia.prepare(scene, points, &mut state, step, cells),
+    }
+    .expect("the bar can be prepared");
     assert_eq!(inertia.cycle(), cycle);
-    let mut run = move || moved(inertia::step(scene, loads, &mut state, &mut inertia));
+    let mut run = move || {
+        moved(match &damper {
+            Some(damper) => damped_step(scene, loads, &mut state, &mut inertia, damper),
+            None => inertia::step(scene, loads, &mut state, &mut inertia),
+        });
+    };
     // Whole cycles.
     (0..8 * cycle).for_each(|_| run());
     run
@@ -114,19 +136,22 @@ fn main() {
     let small = Step::new(DT, DAMPING, critical).expect("dt is below the critical step");
     let mut exact = || moved(tled::step(&scene, &loads, &mut exact_state, &small));
     (0..8_000).for_each(|_| exact());
-    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, [0; 3], CYCLE);
-    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, LATTICE, CYCLE);
-    let mut longest = scaled(&scene, &loads, &points, LONGEST, LATTICE, SHORT_CYCLE);
+    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, ([0; 3], false), CYCLE);
+    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, (LATTICE, false), CYCLE);
+    let mut damped = scaled(&scene, &loads, &points, MULTIPLE, (DAMPED_LATTICE, true), CYCLE);
+    let mut longest = scaled(&scene, &loads, &points, LONGEST, (LATTICE, false), SHORT_CYCLE);
+    let mut longest_damped = scaled(&scene, &loads, &points, LONGEST, (DAMPED_LATTICE, true), SHORT_CYCLE);
 
     let mut group = criterion.benchmark_group("large step");
     group.throughput(Throughput::Elements(tets.len() as u64));
     group.bench_function(BenchmarkId::from_parameter("exact"), |b| b.iter(&mut exact));
     group.bench_function(BenchmarkId::from_parameter("mass-scaled"), |b| b.iter(&mut mass_scaled));
     group.bench_function(BenchmarkId::from_parameter("multilevel"), |b| b.iter(&mut multilevel));
+    group.bench_function(BenchmarkId::from_parameter("damped"), |b| b.iter(&mut damped));
     group.finish();
 
     let mut times = Vec::new();
-    let mut ratios = [const { Vec::new() }; 3];
+    let mut ratios = [const { Vec::new() }; 5];
     for _ in 0..PAIRS {
         let steps = 4 * SHORT_CYCLE;
         let one = seconds(|| (0..CYCLE).for_each(|_| exact())) / f64::from(CYCLE);
@@ -134,18 +159,23 @@ fn main() {
             seconds(|| (0..CYCLE).for_each(|_| mass_scaled())) / f64::from(CYCLE),
             seconds(|| (0..CYCLE).for_each(|_| multilevel())) / f64::from(CYCLE),
             seconds(|| (0..steps).for_each(|_| longest())) / f64::from(steps),
+            seconds(|| (0..CYCLE).for_each(|_| damped())) / f64::from(CYCLE),
+            seconds(|| (0..steps).for_each(|_| longest_damped())) / f64::from(steps),
         ];
         times.push(one);
         for (ratios, other) in ratios.iter_mut().zip(others) {
             ratios.push(other / one);
         }
     }
-    let [mass_scaled_ratio, multilevel_ratio, longest_ratio] = ratios.map(median);
-    let most = phases(&mut multilevel).into_iter().fold(0.0, f64::max);
+    let [mass_scaled_ratio, multilevel_ratio, longest_ratio, damped_ratio, longest_damped_ratio] =
+        ratios.map(median);
+    let [most, most_damped] =
+        [phases(&mut multilevel), phases(&mut damped)].map(|phases| phases.into_iter().fold(0.0, f64::max));
     println!(
         "exact {:.0} us a step; at {MULTIPLE} times its length mass-scaled {mass_scaled_ratio:.2} times that, multilevel \
          {multilevel_ratio:.2} times; the dearest step of a cycle {most:.2} times their mean; at {LONGEST} times its \
-         length, where a cycle has {SHORT_CYCLE} steps, multilevel {longest_ratio:.2} times",
+         length, where a cycle has {SHORT_CYCLE} steps, multilevel {longest_ratio:.2} times. Damped: {damped_ratio:.2} times, the \
+         dearest step {most_damped:.2} times, at {LONGEST} times its length {longest_damped_ratio:.2} times",
         median(times) * 1e6,
     );
     criterion.final_summary();

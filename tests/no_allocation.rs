@@ -6,7 +6,10 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Mutex;
 
-use supple::inertia::{self, Inertia, LatticeNode, MassScaling, numbers_for, vectors_for};
+use supple::inertia::{
+    self, Damper, Inertia, LatticeNode, MassScaling, damped_numbers_for, damped_vectors_for, numbers_for,
+    vectors_for,
+};
 use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{Exponential, NeoHookean, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
@@ -184,6 +187,46 @@ fn steps_beyond_the_limit_in_statics_allocate_nothing() {
         "200 steps at 20 times the limit, {taken} of them exact, no allocation; inertia added {added:.1}"
     );
     assert!(matches!(refused, Status::Mismatch { .. }) && state.steps() == 100 && taken > 0 && added > 1.0);
+}
+
+const DAMPED_VECTORS: usize = damped_vectors_for(NODES);
+type FixedDamped = Inertia<
+    [NodeVector; DAMPED_VECTORS],
+    [LatticeNode; NODES],
+    [f32; damped_numbers_for(LATTICE, FUNCTIONS)],
+>;
+static DAMPED: Mutex<FixedDamped> = Mutex::new(Inertia::over(
+    [NodeVector::ZERO; DAMPED_VECTORS],
+    [LatticeNode::EMPTY; NODES],
+    [0.0; damped_numbers_for(LATTICE, FUNCTIONS)],
+));
+static DAMPER: &Flash<[u8]> = &Flash(*include_bytes!("../weights/damper.weights"));
+
+#[test]
+fn a_damped_roll_out_in_statics_allocates_nothing() {
+    let (points, tets) = mesh();
+    let mut damped = DAMPED.lock().unwrap();
+    let mut scene = FixedScene::<_, NODES, BLOCKS>::new(TISSUE);
+    let mut state = FixedState::<NODES>::new();
+    let before = allocations();
+
+    scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &supports()).unwrap();
+    let critical = tled::critical_step(&scene, &mut state).unwrap();
+    let step = Step::insist(20.0 * critical.seconds, 5.0).unwrap();
+    let forces = [NodalForce { node: NODES as u32 - 3, newton: [1e-5, 0.0, 0.0], ramp: 0.0 }];
+    let loads = Loads::new(&scene, [0.0, 0.0, -0.01], &forces, &[]).unwrap();
+    let damper = Damper::over(Network::parse(&DAMPER.0).unwrap()).unwrap();
+    damped.prepare_damped(&scene, &points, &mut state, step, LATTICE).unwrap();
+    let mut most = 0.0_f32;
+    for _ in 0..100 {
+        let status = inertia::damped_step(&scene, &loads, &mut state, &mut *damped, &damper);
+        assert!(matches!(status, Status::Ok | Status::Limited { .. }));
+        most = most.max(damped.report().damping);
+    }
+
+    assert_eq!(allocations(), before);
+    println!("100 damped steps, at most {most:.3} of the rough motion taken away, no allocation");
+    assert!(most > 0.0 && most <= 0.5);
 }
 
 /// A weight file as it would lie in flash.

@@ -416,6 +416,8 @@ pub(super) struct NodeMatrices<'a> {
     pub(super) lattice: &'a Lattice,
     pub(super) inertia: &'a mut [f32],
     pub(super) mass: &'a mut [f32],
+    /// The same once more, with nothing else in it; may be empty.
+    pub(super) mass_alone: &'a mut [f32],
     pub(super) stride: usize,
 }
 
@@ -427,8 +429,11 @@ impl NodeMatrices<'_> {
             let rows = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
             add_block(self.inertia, self.stride, row, column, rows);
             for (axis, mass) in [mx, my, mz].into_iter().enumerate() {
-                if let Some(place) = self.mass.get_mut((3 * row + axis) * self.stride + 3 * column + axis) {
-                    *place += mass;
+                let place = (3 * row + axis) * self.stride + 3 * column + axis;
+                for matrix in [&mut *self.mass, &mut *self.mass_alone] {
+                    if let Some(entry) = matrix.get_mut(place) {
+                        *entry += mass;
+                    }
                 }
             }
         }

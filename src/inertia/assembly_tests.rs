@@ -123,7 +123,13 @@ fn sums_of_the_nodes_are_those_of_their_functions() {
             }
         }
     }
-    let mut into = NodeMatrices { lattice: &lattice, inertia: &mut inertia, mass: &mut mass, stride };
+    let mut into = NodeMatrices {
+        lattice: &lattice,
+        inertia: &mut inertia,
+        mass: &mut mass,
+        mass_alone: &mut [],
+        stride,
+    };
     sums.iter_mut().enumerate().for_each(|(cell, sums)| into.add_cell(cell, sums));
     let off = [worst(&inertia, &direct_inertia, stride), worst(&mass, &direct_mass, stride)];
     println!("inertia of the functions off by {:.1e}, mass by {:.1e}", off[0], off[1]);

@@ -297,9 +297,12 @@ fn bounding_box(points: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
     (low, [0, 1, 2].map(|axis| high[axis] - low[axis]))
 }
 
-/// Near-cubic cells, `parts` along the longest side of the box around the points.
-pub(super) fn near_cubic(points: &[[f32; 3]], parts: u32) -> [u32; 3] {
+/// Near-cubic cells, `parts` along the longest side of the box around the points, and the next coarser: along the other
+/// sides as many as fit, or one more where that comes closer to a cube.
+pub(super) fn near_cubic(points: &[[f32; 3]], parts: u32) -> [[u32; 3]; 2] {
     let (_, size) = bounding_box(points);
     let longest = size.iter().copied().fold(0.0, f32::max);
-    size.map(|size| (libm::roundf(size / longest * parts as f32) as u32).max(1))
+    // A whole number of cells may come out a little below it.
+    [0.99, 0.5]
+        .map(|up| size.map(|size| (libm::floorf(size / longest * parts as f32 + 1.0 - up) as u32).max(1)))
 }

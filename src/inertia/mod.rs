@@ -59,10 +59,12 @@ mod block;
 mod bound;
 #[cfg(test)]
 mod bound_tests;
+mod damper;
 mod dense;
 mod estimate;
 mod frames;
 mod lattice;
+mod matrices;
 mod node;
 mod passes;
 mod refresh;
@@ -70,10 +72,11 @@ mod report;
 mod step;
 mod vectors;
 
+pub use damper::{Damper, DamperError, damped_step};
 pub use lattice::{LatticeNode, MAX_FUNCTIONS, MAX_POINTS};
 pub use report::Report;
 pub use step::step;
-pub use vectors::vectors_for;
+pub use vectors::{damped_vectors_for, vectors_for};
 
 use core::fmt;
 
@@ -84,10 +87,12 @@ use crate::state::State;
 use crate::tled::{InternalForces, Step};
 
 use bound::MatrixBeside;
+use damper::Rough;
 use estimate::Estimate;
 use lattice::Lattice;
+use matrices::Matrices;
 use node::{Scaling, renew};
-use refresh::{Matrices, Refresh, Sources};
+use refresh::{Refresh, Sources};
 use report::Tally;
 use vectors::NodeTables;
 
@@ -102,6 +107,8 @@ const NODE_GROWTH: f32 = 1.05;
 const COARSE_GROWTH: f32 = COARSE * (1.0 - NODE_GROWTH / FINE);
 /// Largest part of an element that a node's force may move it by in one step from rest.
 const LARGEST_KICK: f32 = 0.02;
+/// How much faster from step to step what is held back may move again.
+const RECOVERY: f32 = 1.05;
 /// Time of a refresh cycle, s: short beside the motions of hands and breath, which stiffen and turn tissue.
 const CYCLE: f32 = 0.04;
 /// Fewest and most steps of a cycle.
@@ -112,7 +119,15 @@ const CYCLE_STEPS: (f32, f32) = (16.0, 64.0);
 pub const fn numbers_for(cells: [u32; 3], functions: usize) -> usize {
     let [x, y, z] = cells;
     let cells = (x as usize).saturating_mul(y as usize).saturating_mul(z as usize);
-    refresh::numbers_for(cells, functions)
+    matrices::numbers_for(cells, functions, false)
+}
+
+/// The same for [`Inertia::prepare_damped`].
+#[must_use]
+pub const fn damped_numbers_for(cells: [u32; 3], functions: usize) -> usize {
+    let [x, y, z] = cells;
+    let cells = (x as usize).saturating_mul(y as usize).saturating_mul(z as usize);
+    matrices::numbers_for(cells, functions, true)
 }
 
 /// Why an inertia could not be prepared.
@@ -183,6 +198,10 @@ pub struct Inertia<V, W, D> {
     places: W,
     dense: D,
     nodes: usize,
+    /// Prepared for [`damped_step`].
+    damped: bool,
+    /// What the latest damped step found.
+    rough: Rough,
     step: Option<Step>,
     lattice: Lattice,
     refresh: Refresh,
@@ -209,10 +228,12 @@ impl<V, W, D> Inertia<V, W, D> {
             places,
             dense,
             nodes: 0,
+            damped: false,
+            rough: Rough::NONE,
             step: None,
             lattice: Lattice::NONE,
             refresh: Refresh::NEW,
-            scaling: Scaling { weight: 0.0, k: 0.0, reserve: 0.0, loss: 0.0 },
+            scaling: Scaling { weight: 0.0, k: 0.0, reserve: 0.0, loss: 0.0, coarse_weight: 0.0 },
             estimate: Estimate::NONE,
             report: Report::NONE,
         }
@@ -252,17 +273,43 @@ where
     N: AsRef<[NodeInertia]>,
     B: AsRef<[ElementBlock]>,
 {
+    largest_lattice(scene, points, 400)
+}
+
+/// The same for [`Inertia::prepare_damped`]: up to 700 times the elements, since a finer lattice pays once rough motion
+/// is damped.
+#[must_use]
+pub fn suggested_damped_lattice<M, N, B>(scene: &Scene<M, N, B>, points: &[[f32; 3]]) -> ([u32; 3], usize)
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+{
+    largest_lattice(scene, points, 700)
+}
+
+fn largest_lattice<M, N, B>(
+    scene: &Scene<M, N, B>,
+    points: &[[f32; 3]],
+    multiply_adds: u64,
+) -> ([u32; 3], usize)
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+{
     let mut best = ([0; 3], 0);
-    for parts in 1..64 {
-        let cells = lattice::near_cubic(points, parts);
+    for cells in (1..64).flat_map(|parts| lattice::near_cubic(points, parts)) {
         let Ok(lattice) = Lattice::new(cells, points, scene.inertia()) else {
             break;
         };
-        let unknowns = 3 * lattice.functions() as u64;
-        if unknowns * unknowns * unknowns > 400 * scene.element_count() as u64 {
-            break;
+        let functions = lattice.functions();
+        let unknowns = 3 * functions as u64;
+        if functions > best.1
+            && unknowns * unknowns * unknowns <= multiply_adds * scene.element_count() as u64
+        {
+            best = (cells, functions);
         }
-        best = (cells, lattice.functions());
     }
     best
 }
@@ -304,6 +351,43 @@ where
         B: AsRef<[ElementBlock]>,
         S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
     {
+        self.damped = false;
+        self.prepared(scene, points, state, step, cells)
+    }
+
+    /// The same for [`damped_step`]: the lattice's motion follows the law to second order (`damper.rs`).
+    pub fn prepare_damped<M, N, B, S>(
+        &mut self,
+        scene: &Scene<M, N, B>,
+        points: &[[f32; 3]],
+        state: &mut State<S>,
+        step: Step,
+        cells: [u32; 3],
+    ) -> Result<(), InertiaError>
+    where
+        M: Material,
+        N: AsRef<[NodeInertia]>,
+        B: AsRef<[ElementBlock]>,
+        S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+    {
+        self.damped = true;
+        self.prepared(scene, points, state, step, cells)
+    }
+
+    fn prepared<M, N, B, S>(
+        &mut self,
+        scene: &Scene<M, N, B>,
+        points: &[[f32; 3]],
+        state: &mut State<S>,
+        step: Step,
+        cells: [u32; 3],
+    ) -> Result<(), InertiaError>
+    where
+        M: Material,
+        N: AsRef<[NodeInertia]>,
+        B: AsRef<[ElementBlock]>,
+        S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+    {
         self.step = None;
         let nodes = scene.node_count();
         if points.len() != nodes {
@@ -312,14 +396,16 @@ where
         let room = |kind, needed, capacity| {
             if capacity < needed { Err(InertiaError::Capacity { kind, needed, capacity }) } else { Ok(()) }
         };
-        room("vectors", vectors_for(nodes), self.vectors.as_ref().len())?;
+        let vectors = if self.damped { damped_vectors_for } else { vectors_for };
+        room("vectors", vectors(nodes), self.vectors.as_ref().len())?;
         room("nodes in the state", nodes, state.capacity())?;
         self.lattice =
             if cells == [0; 3] { Lattice::NONE } else { Lattice::new(cells, points, scene.inertia())? };
         let functions = self.lattice.functions();
         if functions > 0 {
             room("lattice nodes", nodes, self.places.as_ref().len())?;
-            room("numbers", numbers_for(cells, functions), self.dense.as_ref().len())?;
+            let numbers = if self.damped { damped_numbers_for } else { numbers_for };
+            room("numbers", numbers(cells, functions), self.dense.as_ref().len())?;
         }
 
         let (dt, damping) = (step.seconds(), step.damping());
@@ -332,6 +418,7 @@ where
             k,
             reserve: if alone { k } else { k * (1.0 + k) },
             loss: 2.0 * damping * dt * if alone { 1.0 } else { cycle as f32 },
+            coarse_weight: 0.25 * COARSE * dt * dt,
         };
         let Some(mut tables) = NodeTables::split(self.vectors.as_mut(), nodes) else {
             return Ok(());
@@ -362,7 +449,7 @@ where
             }
             let places = self.places.as_ref().get(..nodes).unwrap_or_default();
             self.refresh.frames.choose(&self.lattice, places, points);
-            let Some(mut matrices) = Matrices::split(self.dense.as_mut(), &self.lattice) else {
+            let Some(mut matrices) = Matrices::split(self.dense.as_mut(), &self.lattice, self.damped) else {
                 return Ok(());
             };
             let sources = Sources {
@@ -372,7 +459,6 @@ where
                 lattice: &self.lattice,
                 places: self.places.as_ref(),
                 scaling: &self.scaling,
-                coarse_weight: 0.25 * COARSE * dt * dt,
             };
             self.refresh.complete(sources, &mut tables, &mut matrices);
             self.report = self.refresh.published.report(0, 1.0, 0.0);
@@ -385,6 +471,10 @@ where
             return Err(InertiaError::NotFinite { node: node as u32 });
         }
         self.nodes = nodes;
+        if let Some(tables) = NodeTables::split(self.vectors.as_mut(), nodes) {
+            tables.rough.fill(NodeVector::ZERO);
+        }
+        self.rough = Rough::default();
         self.estimate = Estimate::NONE;
         self.step = Some(step);
         Ok(())

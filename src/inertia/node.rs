@@ -35,6 +35,8 @@ pub(super) struct Scaling {
     pub(super) reserve: f32,
     /// `2 mu` times the time since the inertia was last computed.
     pub(super) loss: f32,
+    /// `s_c D^2 / 4`, s^2.
+    pub(super) coarse_weight: f32,
 }
 
 /// A node's inertia as it is used.

@@ -4,13 +4,14 @@
 use bytemuck::{Pod, Zeroable, must_cast, must_cast_ref, must_cast_slice, must_cast_slice_mut};
 use glam::Vec4;
 
+use super::damper::Rough;
 use super::estimate::{Defect, Defects};
 use super::frames::Rotation;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::Scaling;
 use super::report::HeldBack;
 use super::vectors::NodeTables;
-use super::{LARGEST_KICK, NODE_GROWTH};
+use super::{LARGEST_KICK, NODE_GROWTH, RECOVERY};
 use crate::lanes::{BLOCK, Kernel, NodeVector, Real, read_rows, write_rows};
 use crate::scene::NodeInertia;
 use crate::tled::{Step, Sums, Totals};
@@ -44,7 +45,13 @@ pub(super) struct Prepare<'a, 'b> {
     pub(super) increment: &'a [NodeVector],
     pub(super) tables: &'a mut NodeTables<'b>,
     pub(super) cells: &'a mut [Cell],
+    /// Gets sums of the momentum, for a damped step.
+    pub(super) momentum: Option<&'a mut [Cell]>,
 }
+
+/// Inverse inertia, 1/kg, and determinant of its correlations below which a node is as heavy as can be.
+const LEAST_INVERSE: f32 = 1e-30;
+const LEAST_DETERMINANT: f32 = 1e-6;
 
 /// What is found on the way, node by node in lanes.
 struct Found<R> {
@@ -66,8 +73,11 @@ impl Kernel for Prepare<'_, '_> {
     type Output = (HeldBack, f32);
 
     #[inline(always)]
-    fn run<R: Real>(mut self) -> (HeldBack, f32) {
+    fn run<R: Real>(mut self) -> Self::Output {
         self.cells.fill(Cell::EMPTY);
+        if let Some(momentum) = &mut self.momentum {
+            momentum.fill(Cell::EMPTY);
+        }
         let nodes = self.inertia.len();
         let whole = nodes - nodes % R::COUNT;
         let mut found = Found::<R>::nothing();
@@ -123,7 +133,8 @@ impl Prepare<'_, '_> {
         let kick = (alone[0] * alone[0] + alone[1] * alone[1] + alone[2] * alone[2]).root();
         let one = R::splat(1.0);
         let most = (R::splat(LARGEST_KICK) * height).over(kick);
-        let share = (R::splat(NODE_GROWTH) * grown).min(one).min(most);
+        // Who is let go and held back in turn would be braked each time: back to one only slowly.
+        let share = (R::splat(NODE_GROWTH) * grown).min(one).min(most).min(R::splat(RECOVERY) * share_before);
         let keep = R::splat(carry) * share.over(share_before).min(one).root();
 
         let out = |row: usize| turn[row][0] * alone[0] + turn[row][1] * alone[1] + turn[row][2] * alone[2];
@@ -136,6 +147,26 @@ impl Prepare<'_, '_> {
         found.unused = found.unused + unused;
         found.held = found.held + unused.positive();
 
+        if let Some(momentum) = &mut self.momentum {
+            // The mean of `M` over the axes, from its inverse, with one where an axis is held. By way of the correlations
+            // `p, q, r`: beside a crushed element the inverse is so small that products of it are zero.
+            let (fx, fy, fz) = (ix.positive(), iy.positive(), iz.positive());
+            let least = R::splat(LEAST_INVERSE);
+            let [a, b, c] = [xx + (one - fx), yy + (one - fy), zz + (one - fz)].map(|x| x.max(least));
+            let [ra, rb, rc] = [a, b, c].map(|x| x.root());
+            let (p, q, r) = (xy.over(ra * rb), yz.over(rb * rc), zx.over(rc * ra));
+            let (pp, qq, rr) = (p * p, q * q, r * r);
+            let determinant = one + R::splat(2.0) * p * q * r - pp - qq - rr;
+            let sum = (fx * (one - qq)).over(a) + (fy * (one - rr)).over(b) + (fz * (one - pp)).over(c);
+            let mean = R::splat(1.0 / 3.0) * sum.over(determinant.max(R::splat(LEAST_DETERMINANT)));
+            let mut sums = [[0.0; 4]; BLOCK];
+            write_rows(&mut sums, 0, [mean * vx, mean * vy, mean * vz, R::splat(0.0)]);
+            for (place, &sum) in places.iter().zip(&sums) {
+                if let Some(cell) = momentum.get_mut(place.cell()) {
+                    cell.add::<C>(place, sum);
+                }
+            }
+        }
         let mut residuals = [[0.0; 4]; BLOCK];
         write_rows(&mut residuals, 0, [rx, ry, rz, R::splat(0.0)]);
         for (place, &residual) in places.iter().zip(&residuals) {
@@ -146,6 +177,12 @@ impl Prepare<'_, '_> {
     }
 }
 
+/// What of the last increment is smooth, and the share of the rest that is taken away.
+pub(super) struct Calm<'a> {
+    pub(super) smooth: &'a [Cell],
+    pub(super) share: f32,
+}
+
 /// Adds what the lattice moves to the next increments, in `next`, and takes the bounds out of the forces' fourth
 /// component. Gives what the step enters in the energy account and in the estimate of the error.
 pub(super) struct Settle<'a, 'b> {
@@ -154,6 +191,8 @@ pub(super) struct Settle<'a, 'b> {
     pub(super) places: &'a [LatticeNode],
     /// What the lattice moves.
     pub(super) cells: &'a [Cell],
+    /// How rough motion is damped.
+    pub(super) damped: Option<Calm<'a>>,
     pub(super) inertia: &'a [NodeInertia],
     pub(super) displacement: &'a [NodeVector],
     pub(super) increment: &'a [NodeVector],
@@ -162,10 +201,10 @@ pub(super) struct Settle<'a, 'b> {
 }
 
 impl Kernel for Settle<'_, '_> {
-    type Output = (Totals, Defects);
+    type Output = (Totals, Defects, Rough);
 
     #[inline(always)]
-    fn run<R: Real>(mut self) -> (Totals, Defects) {
+    fn run<R: Real>(mut self) -> Self::Output {
         let nodes = self.inertia.len();
         let whole = nodes - nodes % R::COUNT;
         let mut sums = self.none::<R>();
@@ -181,22 +220,26 @@ impl Kernel for Settle<'_, '_> {
         totals.add_lanes(&rest.0);
         defects.add_lanes(&sums.1);
         defects.add_lanes(&rest.1);
-        (totals, defects)
+        let mut rough = Rough::default();
+        rough.add_lanes(&sums.2);
+        rough.add_lanes(&rest.2);
+        (totals, defects, rough)
     }
 }
 
 /// Sums for each axis.
-type AxisSums<R> = ([Sums<R>; 3], [Defect<R>; 3]);
+type AxisSums<R> = ([Sums<R>; 3], [Defect<R>; 3], [R; 4]);
 
 impl Settle<'_, '_> {
     #[inline(always)]
     fn none<R: Real>(&self) -> AxisSums<R> {
-        ([Sums::new(self.step, R::splat); 3], [Defect::new(self.step, self.scaling, R::splat); 3])
+        let defects = [Defect::new(self.step, self.scaling, R::splat); 3];
+        ([Sums::new(self.step, R::splat); 3], defects, [R::splat(0.0); 4])
     }
 
     /// The nodes from `first` on, side by side; `C` holds eight numbers.
     #[inline(always)]
-    fn nodes<R: Real, C: Real>(&mut self, first: usize, (sums, defects): &mut AxisSums<R>) {
+    fn nodes<R: Real, C: Real>(&mut self, first: usize, (sums, defects, rough): &mut AxisSums<R>) {
         let mut coarse = [[0.0; 4]; BLOCK];
         let places = self.places.get(first..first + R::COUNT).unwrap_or_default();
         for (coarse, place) in coarse.iter_mut().zip(places) {
@@ -212,8 +255,32 @@ impl Settle<'_, '_> {
         let increment = read_rows::<R>(must_cast_slice(self.increment), first);
         let displacement = read_rows::<R>(must_cast_slice(self.displacement), first);
         let mut moved = alone;
+        let mut taken = [R::splat(0.0); 3];
+        if let Some(calm) = &self.damped {
+            let mut smooth = [[0.0; 4]; BLOCK];
+            for (smooth, place) in smooth.iter_mut().zip(places) {
+                if let Some(cell) = calm.smooth.get(place.cell()) {
+                    *smooth = cell.at::<C>(place);
+                }
+            }
+            let smooth = read_rows::<R>(&smooth, 0);
+            let mut before = read_rows::<R>(must_cast_slice(self.tables.rough), first);
+            let [square, change, both, whole] = rough;
+            for axis in 0..3 {
+                let here = free[axis] * (increment[axis] - smooth[axis]);
+                let difference = here - before[axis];
+                *square = *square + mass * here * here;
+                *change = *change + mass * difference * difference;
+                *both = *both + mass * here * difference;
+                *whole = *whole + mass * free[axis] * increment[axis] * increment[axis];
+                // A crushed body may have no such number.
+                taken[axis] = if calm.share > 0.0 { R::splat(calm.share) * here } else { taken[axis] };
+                before[axis] = here;
+            }
+            write_rows(must_cast_slice_mut(self.tables.rough), first, before);
+        }
         for axis in 0..3 {
-            moved[axis] = free[axis] * (alone[axis] + coarse[axis]);
+            moved[axis] = free[axis] * (alone[axis] + coarse[axis]) - taken[axis];
             let (free, increment, force, next) = (free[axis], increment[axis], force[axis], moved[axis]);
             sums[axis].add(mass, free, increment, force, next);
             defects[axis].add(mass, free, displacement[axis], increment, force, next);

@@ -12,69 +12,20 @@
 //! The coarse part of the velocity is `c = G^-1 p`, its energy `c^T S c`. As for the nodes
 //! ([`super::node`]), a change of `S` may not add energy: `c` is scaled down to what it had.
 
-use bytemuck::must_cast_slice_mut;
-
 use super::assembly::{Assembly, CellSums, NodeMatrices};
 use super::block::OneBlock;
 use super::bound::MatrixBeside;
 use super::dense::{Row, apply, mirror, stride, sweep};
 use super::frames::{Frames, Rotation, turn};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, restrict};
+use super::matrices::{Matrices, copy, invert_means};
 use super::node::{Scaling, renew};
-use super::passes::Cell;
 use super::report::Tally;
 use super::vectors::NodeTables;
 use super::{COARSE, FINE};
 use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch};
 use crate::material::Material;
 use crate::scene::{ElementBlock, NodeInertia, Scene};
-
-/// The four dense matrices of a lattice, and what its cells sum.
-pub(super) struct Matrices<'a> {
-    /// `X`, what a step applies.
-    pub(super) applied: &'a mut [f32],
-    /// `S` of `X`, not inverted.
-    kept: &'a mut [f32],
-    /// The next `S`.
-    next: &'a mut [f32],
-    /// The next `G`.
-    fine: &'a mut [f32],
-    /// For the passes over the nodes.
-    pub(super) cells: &'a mut [Cell],
-    sums: &'a mut [CellSums],
-}
-
-/// Numbers of a [`Cell`] and of its sums.
-const CELL_NUMBERS: usize = size_of::<Cell>() / size_of::<f32>();
-const SUM_NUMBERS: usize = size_of::<CellSums>() / size_of::<f32>();
-
-/// Numbers that the matrices of a lattice with this many cells and functions need.
-pub(super) const fn numbers_for(cells: usize, functions: usize) -> usize {
-    let sums = (CELL_NUMBERS + SUM_NUMBERS).saturating_mul(summing(cells, functions));
-    sums.saturating_add(4 * 3 * functions * stride(functions))
-}
-
-/// Cells that sum something: none where no function is left.
-const fn summing(cells: usize, functions: usize) -> usize {
-    if functions > 0 { cells } else { 0 }
-}
-
-impl<'a> Matrices<'a> {
-    pub(super) fn split(dense: &'a mut [f32], lattice: &Lattice) -> Option<Self> {
-        let functions = lattice.functions();
-        let one = 3 * functions * stride(functions);
-        let (applied, rest) = dense.split_at_mut_checked(one)?;
-        let (kept, rest) = rest.split_at_mut_checked(one)?;
-        let (next, rest) = rest.split_at_mut_checked(one)?;
-        let (fine, rest) = rest.split_at_mut_checked(one)?;
-        let count = summing(lattice.cell_count(), functions);
-        let (cells, rest) = rest.split_at_mut_checked(CELL_NUMBERS * count)?;
-        let sums = rest.get_mut(..SUM_NUMBERS * count)?;
-        let cells = must_cast_slice_mut(cells.as_chunks_mut::<CELL_NUMBERS>().0);
-        let sums = must_cast_slice_mut(sums.as_chunks_mut::<SUM_NUMBERS>().0);
-        Some(Self { applied, kept, next, fine, cells, sums })
-    }
-}
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
@@ -107,6 +58,8 @@ pub(super) struct Refresh {
     share: f32,
     pub(super) brake: f32,
     sound: bool,
+    /// What is in use was sound.
+    pub(super) lattice_in_use: bool,
     tally: Tally,
     /// Of the last whole cycle.
     pub(super) published: Tally,
@@ -140,8 +93,6 @@ pub(super) struct Sources<'a, M, N, B> {
     pub(super) lattice: &'a Lattice,
     pub(super) places: &'a [LatticeNode],
     pub(super) scaling: &'a Scaling,
-    /// `s_c D^2 / 4`, s^2.
-    pub(super) coarse_weight: f32,
 }
 
 impl<M, N, B> Sources<'_, M, N, B>
@@ -182,6 +133,7 @@ impl Refresh {
         share: 1.0,
         brake: 1.0,
         sound: true,
+        lattice_in_use: false,
         tally: Tally::NEW,
         published: Tally::NEW,
     };
@@ -292,9 +244,17 @@ impl Refresh {
                 TOGETHER as i64 * NODE_COST
             }
             Stage::NodeCells => {
+                let mass_alone = match &mut matrices.damped {
+                    Some(damped) => &mut *damped.next_mass,
+                    None => &mut [],
+                };
+                if at == 0 {
+                    mass_alone.fill(0.0);
+                }
                 let (inertia, mass) = (&mut *matrices.fine, &mut *matrices.next);
                 if let Some(sums) = matrices.sums.get_mut(at) {
-                    NodeMatrices { lattice: from.lattice, inertia, mass, stride }.add_cell(at, sums);
+                    NodeMatrices { lattice: from.lattice, inertia, mass, mass_alone, stride }
+                        .add_cell(at, sums);
                 }
                 if self.done >= from.lattice.cell_count() {
                     self.enter(Stage::Fine);
@@ -302,6 +262,9 @@ impl Refresh {
                 CELL_COST
             }
             Stage::Fine => {
+                if let Some(damped) = matrices.damped.as_mut().filter(|_| at == 0) {
+                    self.sound &= invert_means(damped.next_mean, matrices.fine, functions, stride);
+                }
                 if at < functions {
                     self.sound &= sweep(matrices.fine, size, stride, at);
                     return pivots_cost(functions);
@@ -309,6 +272,9 @@ impl Refresh {
                 let at = at - functions;
                 mirror(matrices.fine, stride, at, -1.0);
                 mirror(matrices.next, stride, at, 1.0);
+                if let Some(damped) = &mut matrices.damped {
+                    mirror(damped.next_mass, stride, at, 1.0);
+                }
                 if at + 1 == size {
                     self.keep_energy(matrices, size, stride);
                     self.enter(Stage::Next);
@@ -364,7 +330,7 @@ impl Refresh {
         let sums = MatrixBeside { diagonal, beside };
         let material = from.scene.material();
         let frames = &self.frames;
-        let weight = from.coarse_weight;
+        let weight = from.scaling.coarse_weight;
         dispatch(OneBlock { material, block, displacement, sums, assembly, frames, weight });
     }
 
@@ -437,9 +403,7 @@ impl Refresh {
                 correction.0 = velocity.0.map(|component| lost * component);
             }
         }
-        for (kept, next) in matrices.kept.iter_mut().zip(&*matrices.next) {
-            *kept = *next;
-        }
+        copy(matrices.kept, matrices.next);
     }
 
     /// Whether `S S^-1 p = p`, up to what rounding may do.
@@ -461,6 +425,12 @@ impl Refresh {
         for (applied, (next, fine)) in matrices.applied.iter_mut().zip(inverses) {
             *applied = if self.sound { next - fine } else { 0.0 };
         }
+        if let Some(damped) = &mut matrices.damped {
+            copy(damped.inverse, matrices.next);
+            copy(damped.mass, damped.next_mass);
+            copy(damped.mean, damped.next_mean);
+        }
+        self.lattice_in_use = self.sound;
         self.frames.end_cycle();
         self.published = self.tally;
         self.tally = Tally::NEW;

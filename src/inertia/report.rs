@@ -15,6 +15,8 @@ pub struct Report {
     pub held_back: u32,
     /// Share of the lattice's motion that was used: below one where the body stiffened since its last refresh.
     pub coarse_share: f32,
+    /// Share of the rough motion that the latest damped step took away.
+    pub damping: f32,
     /// Estimate of the error that the added inertia has caused so far, m: mean over the nodes of their distance
     /// from where the exact step would have them. It follows the force that the added inertia absorbs along the
     /// body's displacement, from rest or from when the inertia was prepared. Of 78 runs of the laboratory 58 were
@@ -31,6 +33,7 @@ impl Report {
         added_node: 0,
         held_back: 0,
         coarse_share: 1.0,
+        damping: 0.0,
         error: 0.0,
     };
 }
@@ -84,6 +87,7 @@ impl Tally {
             added_node: self.node,
             held_back,
             coarse_share,
+            damping: 0.0,
             error,
         }
     }

@@ -12,15 +12,17 @@ use crate::tled::{Divergence, Entry, InternalForces, Status, culprit, external_f
 
 use super::alone;
 use super::bound::{MatrixBeside, ScalarBeside};
-use super::dense::{apply, stride};
+use super::damper::{Damper, Rough};
+use super::dense::{Row, apply, stride};
 use super::estimate::dot;
 use super::frames::{Rotation, turn};
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
-use super::passes::{Prepare, Settle, prolong, restrict, turns};
-use super::refresh::{Matrices, Refresh, Sources, from_numbers, to_numbers};
+use super::matrices::{Matrices, thirds};
+use super::passes::{Calm, Prepare, Settle, prolong, restrict, turns};
+use super::refresh::{Refresh, Sources, from_numbers, to_numbers};
 use super::report::Tally;
 use super::vectors::NodeTables;
-use super::{COARSE, COARSE_GROWTH, Inertia, LARGEST_KICK};
+use super::{COARSE_GROWTH, Inertia, LARGEST_KICK};
 
 /// More of all nodes' inverse inertia unused than this, or less of the lattice's motion used, makes a step
 /// [`Status::Limited`].
@@ -34,6 +36,25 @@ pub fn step<M, N, B, S, V, W, D>(
     loads: &Loads<'_>,
     state: &mut State<S>,
     inertia: &mut Inertia<V, W, D>,
+) -> Status
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+    S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+    V: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+    W: AsRef<[LatticeNode]> + AsMut<[LatticeNode]>,
+    D: AsRef<[f32]> + AsMut<[f32]>,
+{
+    advance(scene, loads, state, inertia, None)
+}
+
+pub(super) fn advance<M, N, B, S, V, W, D>(
+    scene: &Scene<M, N, B>,
+    loads: &Loads<'_>,
+    state: &mut State<S>,
+    inertia: &mut Inertia<V, W, D>,
+    damper: Option<&Damper<'_>>,
 ) -> Status
 where
     M: Material,
@@ -58,6 +79,8 @@ where
         estimate,
         report,
         nodes: prepared,
+        damped,
+        rough,
     } = inertia;
     let State { displacement, increment, force, time, steps, dt, ledger } = state;
     let (Some(step), Some(displacement), Some(increment), Some(force), Some(mut tables)) = (
@@ -100,19 +123,24 @@ where
     };
 
     let places = places.as_ref();
-    let Some(mut matrices) = Matrices::split(dense.as_mut(), lattice) else {
+    let Some(mut matrices) = Matrices::split(dense.as_mut(), lattice, *damped && lattice.functions() > 0)
+    else {
         return mismatch;
     };
     let mut coarse_share = 1.0;
-    let (held_back, tally, (totals, defects)) = if no_lattice {
+    // Without a lattice there is nothing to tell rough from smooth by.
+    let damper = damper.filter(|_| refresh.lattice_in_use && !no_lattice);
+    let damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
+    let (held_back, tally, (totals, defects, found)) = if no_lattice {
         let (held_back, tally) = alone::prepare(&step, scaling, nodal, increment, force, &mut tables);
         let (step, inertia, tables) = (&step, nodal, &mut tables);
         let moved = dispatch(alone::Move { step, scaling, inertia, displacement, increment, force, tables });
-        (held_back, tally, moved)
+        (held_back, tally, (moved.0, moved.1, Rough::default()))
     } else {
         refresh.look(displacement, *steps);
         let turns = &turns(&refresh.frames.of_bounds, functions);
         let (step, inertia, brake, cells) = (&step, nodal, refresh.brake, &mut *matrices.cells);
+        let momentum = matrices.damped.as_mut().map(|damped| &mut *damped.momentum);
         let (held_back, growth) = dispatch(Prepare {
             step,
             scaling,
@@ -124,17 +152,21 @@ where
             increment,
             tables: &mut tables,
             cells,
+            momentum,
         });
         if growth > COARSE_GROWTH {
             coarse_share = COARSE_GROWTH / growth;
         }
         coarse_share = coarse_motion(&mut matrices, lattice, coarse_share, refresh);
         let (tables, cells) = (&mut tables, &*matrices.cells);
+        let damped = matrices.damped.as_ref().filter(|_| refresh.lattice_in_use);
+        let damped = damped.map(|damped| Calm { smooth: &*damped.momentum, share: damping });
         let moved = dispatch(Settle {
             step,
             scaling,
             places,
             cells,
+            damped,
             inertia,
             displacement,
             increment,
@@ -161,6 +193,7 @@ where
     };
 
     *ledger = entered;
+    *rough = found;
     estimate.advance(&defects, external, nodes, scaling.k, step.seconds() * step.seconds());
     for ((displacement, increment), next) in displacement.iter_mut().zip(&mut *increment).zip(&*tables.next) {
         let next = Vec4::from(next.0).with_w(0.0);
@@ -176,23 +209,47 @@ where
     } else {
         refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
         refresh.share(coarse_share);
-        let coarse_weight = 0.25 * COARSE * step.seconds() * step.seconds();
-        let sources = Sources { scene, displacement, increment, lattice, places, scaling, coarse_weight };
+        let sources = Sources { scene, displacement, increment, lattice, places, scaling };
         refresh.advance(*steps, sources, &mut tables, &mut matrices);
         *report = refresh.published.report(held_back.nodes, coarse_share, estimate.error());
+        report.damping = damping;
     }
     let held = held_back.unused > MUCH_UNUSED * nodes as f32 || coarse_share < LITTLE_MOTION;
     extremes.status(ledger, held)
 }
 
 /// `share (S^-1 - G^-1) W^T r` less the correction that a change of `S` asked for, from the cells' sums of `r` to what
-/// they move. The share falls where the forces of one step would strain a cell by more than [`LARGEST_KICK`].
+/// they move. The share falls where the forces of one step would strain a cell by more than [`LARGEST_KICK`]. With a
+/// damped inertia `S^-1` goes to second order, and the cells' sums of momentum become what of the increments is smooth.
 fn coarse_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, mut share: f32, refresh: &Refresh) -> f32 {
     let functions = lattice.functions();
     let (size, stride) = (3 * functions, stride(functions));
     let mut restricted = restrict(matrices.cells, lattice);
     turn(&mut restricted, &refresh.frames.of_bounds, Rotation::back);
-    let moved = apply(matrices.applied, stride, to_numbers(&restricted).get(..size).unwrap_or_default());
+    let forces = to_numbers(&restricted);
+    let times = |matrix: &[f32], row: &Row| apply(matrix, stride, row.get(..size).unwrap_or_default());
+    let mut moved = times(matrices.applied, &forces);
+    if let Some(damped) = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use) {
+        // `A S^-1 g = g - M S^-1 g`: where elements are crushed `A` is too large for products with it.
+        let first = times(damped.inverse, &forces);
+        let mut absorbed = forces;
+        for (absorbed, kept) in absorbed.iter_mut().zip(times(damped.mass, &first)) {
+            *absorbed -= kept;
+        }
+        let second = times(damped.inverse, &absorbed);
+        for (moved, more) in moved.iter_mut().zip(times(damped.inverse, &times(damped.mass, &second))) {
+            *moved += more;
+        }
+        let momentum = restrict(damped.momentum, lattice);
+        let mut smooth = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+        let rows = damped.mean.chunks_exact(super::dense::stride(thirds(functions)));
+        for (smooth, row) in smooth.iter_mut().zip(rows).take(functions) {
+            let products = row.iter().zip(&momentum).take(functions);
+            let sum: Vec4 = products.map(|(entry, momentum)| *entry * Vec4::from(momentum.0)).sum();
+            smooth.0 = sum.to_array();
+        }
+        prolong(&smooth, lattice, damped.momentum);
+    }
     let mut solution = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
     from_numbers(moved.get(..size).unwrap_or_default(), &mut solution);
     turn(&mut solution, &refresh.frames.of_bounds, Rotation::out);

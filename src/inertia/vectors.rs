@@ -1,4 +1,5 @@
-//! What the inertia keeps for each node, in five vectors of four numbers over one storage of the caller.
+//! What the inertia keeps for each node, in five vectors of four numbers over one storage of the caller, six for a damped
+//! step.
 
 use super::node::Node;
 use crate::lanes::NodeVector;
@@ -8,6 +9,12 @@ use crate::symmetric::Symmetric;
 #[must_use]
 pub const fn vectors_for(nodes: usize) -> usize {
     5 * nodes
+}
+
+/// The same for [`super::Inertia::prepare_damped`].
+#[must_use]
+pub const fn damped_vectors_for(nodes: usize) -> usize {
+    6 * nodes
 }
 
 pub(super) struct NodeTables<'a> {
@@ -20,6 +27,8 @@ pub(super) struct NodeTables<'a> {
     pub(super) sum_beside: &'a mut [NodeVector],
     /// The next increment of each node, m; the fourth number is the least height of its elements, m.
     pub(super) next: &'a mut [NodeVector],
+    /// Rough part of each node's last increment, m, for a damped step; else nothing.
+    pub(super) rough: &'a mut [NodeVector],
 }
 
 impl<'a> NodeTables<'a> {
@@ -28,12 +37,14 @@ impl<'a> NodeTables<'a> {
         let (inverse_beside, rest) = rest.split_at_mut_checked(nodes)?;
         let (sum_diagonal, rest) = rest.split_at_mut_checked(nodes)?;
         let (sum_beside, rest) = rest.split_at_mut_checked(nodes)?;
+        let (next, rest) = rest.split_at_mut_checked(nodes)?;
         Some(Self {
             inverse_diagonal,
             inverse_beside,
             sum_diagonal,
             sum_beside,
-            next: rest.get_mut(..nodes)?,
+            next,
+            rough: rest.get_mut(..nodes).unwrap_or_default(),
         })
     }
 

@@ -4,7 +4,7 @@ use core::fmt;
 use std::string::{String, ToString};
 use std::vec::Vec;
 
-use crate::inertia::InertiaError;
+use crate::inertia::{DamperError, InertiaError};
 use crate::io::ReadError;
 use crate::loads::LoadError;
 use crate::mlp::WeightError;
@@ -59,12 +59,19 @@ pub enum LabError {
         /// The multiple.
         multiple: u32,
     },
+    /// There is no network for this multiple.
+    NoNetwork {
+        /// The multiple.
+        multiple: u32,
+    },
     /// A weight file is not usable.
     Weights(WeightError),
     /// A file is not usable; the text names it.
     File(String),
     /// A network does not fit the learned step.
     Surrogate(SurrogateError),
+    /// A network does not fit the damped step.
+    Damper(DamperError),
     /// A file could not be written; the text names it.
     Write(std::io::Error),
 }
@@ -91,9 +98,14 @@ impl fmt::Display for LabError {
                 let known: Vec<String> = known.map(|multiple| multiple.to_string()).collect();
                 write!(f, "multiple {multiple} misses the snapshots; there are {}", known.join(", "))
             }
+            Self::NoNetwork { multiple } => {
+                let known = super::networks::MULTIPLES.map(|multiple| multiple.to_string());
+                write!(f, "there is no network for multiple {multiple}; there are {}", known.join(", "))
+            }
             Self::Weights(error) => error.fmt(f),
             Self::File(text) => f.write_str(text),
             Self::Surrogate(error) => error.fmt(f),
+            Self::Damper(error) => error.fmt(f),
             Self::Write(error) => error.fmt(f),
         }
     }
@@ -111,4 +123,4 @@ macro_rules! from {
     };
 }
 
-from!(ReadError => Mesh, BuildError => Build, LoadError => Load, StepError => Step, InertiaError => Inertia, WeightError => Weights, SurrogateError => Surrogate, std::io::Error => Write);
+from!(ReadError => Mesh, BuildError => Build, LoadError => Load, StepError => Step, InertiaError => Inertia, WeightError => Weights, SurrogateError => Surrogate, DamperError => Damper, std::io::Error => Write);

@@ -8,8 +8,12 @@ use std::vec;
 use std::vec::Vec;
 
 use super::host::{HostScene, HostState};
+use super::networks::{self, Size};
 use super::{DT, LabError};
-use crate::inertia::{self, Inertia, LatticeNode, numbers_for, suggested_lattice, vectors_for};
+use crate::inertia::{
+    self, Damper, Inertia, LatticeNode, damped_numbers_for, damped_step, damped_vectors_for,
+    suggested_damped_lattice, suggested_lattice,
+};
 use crate::loads::Loads;
 use crate::material::Material;
 use crate::mlp::{Network, WeightBytes};
@@ -30,8 +34,14 @@ pub enum Method {
     MassScaled,
     /// The same, with a coarse lattice that gives smooth motion its true inertia back.
     Multilevel,
+    /// Multilevel inertia with rough motion damped as the crate's own network says.
+    Best,
+    /// The learned step with a network of the crate, led by the exact step for [`BURN_IN`].
+    Learned(Size),
     /// The learned step with a network that somebody brings, led by the exact step for [`BURN_IN`].
     Brought(Brought),
+    /// Multilevel inertia with rough motion damped as a network says that somebody brings.
+    Damped(Brought),
 }
 
 /// A network at its own step.
@@ -46,15 +56,11 @@ pub struct Brought {
 }
 
 impl Brought {
-    /// Reads a weight file, which stays in memory for good.
-    pub fn read(path: &Path) -> Result<Self, LabError> {
-        let problem = |error: &dyn core::fmt::Display| LabError::File(format!("{}: {error}", path.display()));
-        let bytes = std::fs::read(path).map_err(|error| problem(&error))?;
-        let bytes: &'static [u8] = Box::leak(Box::new(WeightBytes::of(&bytes))).bytes();
-        let network = Network::parse(bytes).map_err(|error| problem(&error))?;
-        let multiple = (network.recipe().step / DT).round() as u32;
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Self { name: String::leak(name), bytes, multiple })
+    /// A weight file's bytes, which stay in memory for good.
+    pub fn kept(name: &'static str, bytes: &[u8]) -> Result<Self, LabError> {
+        let bytes: &'static [u8] = Box::leak(Box::new(WeightBytes::of(bytes))).bytes();
+        let multiple = (Network::parse(bytes)?.recipe().step / DT).round() as u32;
+        Ok(Self { name, bytes, multiple })
     }
 }
 
@@ -76,8 +82,16 @@ pub struct Found {
 
 impl Method {
     /// All methods that need nothing brought, in the order of the tables.
-    pub const ALL: [Self; 5] =
-        [Self::Tled, Self::Hold, Self::TledLargeStep, Self::MassScaled, Self::Multilevel];
+    pub const ALL: [Self; 8] = [
+        Self::Tled,
+        Self::Hold,
+        Self::TledLargeStep,
+        Self::MassScaled,
+        Self::Multilevel,
+        Self::Best,
+        Self::Learned(Size::Compact),
+        Self::Learned(Size::Paper),
+    ];
 
     /// Its name in tables.
     #[must_use]
@@ -88,7 +102,10 @@ impl Method {
             Self::TledLargeStep => "tled-large-step",
             Self::MassScaled => "mass-scaled",
             Self::Multilevel => "multilevel",
-            Self::Brought(network) => network.name,
+            Self::Best => "best",
+            Self::Learned(Size::Compact) => "compact-f32",
+            Self::Learned(Size::Paper) => "paper-f32",
+            Self::Brought(network) | Self::Damped(network) => network.name,
         }
     }
 
@@ -101,14 +118,28 @@ impl Method {
         })
     }
 
+    /// With the network of a weight file: a damper, or the learned step.
+    pub fn with(path: &Path) -> Result<Self, LabError> {
+        let problem = |error: &dyn core::fmt::Display| LabError::File(format!("{}: {error}", path.display()));
+        let bytes = std::fs::read(path).map_err(|error| problem(&error))?;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let network = Brought::kept(String::leak(name), &bytes).map_err(|error| problem(&error))?;
+        let damps = Damper::over(Network::parse(network.bytes)?).is_ok();
+        Ok(if damps { Self::Damped(network) } else { Self::Brought(network) })
+    }
+
     /// At which multiples of [`super::DT`] it is run if asked for `multiples`. At 1 the large step is the
     /// exact one, and what holds still does so at any step.
     #[must_use]
     pub fn multiples(self, multiples: &[u32]) -> Vec<u32> {
         match self {
             Self::Tled | Self::Hold => vec![1],
-            Self::TledLargeStep | Self::MassScaled | Self::Multilevel => {
+            Self::TledLargeStep | Self::MassScaled | Self::Multilevel | Self::Best | Self::Damped(_) => {
                 multiples.iter().copied().filter(|multiple| *multiple > 1).collect()
+            }
+            Self::Learned(_) => {
+                let known = |multiple: &u32| networks::MULTIPLES.contains(multiple);
+                multiples.iter().copied().filter(known).collect()
             }
             Self::Brought(network) => vec![network.multiple],
         }
@@ -117,14 +148,14 @@ impl Method {
     /// Whether it scales inertia, so that its error can be estimated.
     #[must_use]
     pub const fn scales(self) -> bool {
-        matches!(self, Self::MassScaled | Self::Multilevel)
+        matches!(self, Self::MassScaled | Self::Multilevel | Self::Best | Self::Damped(_))
     }
 
     /// Time at the start that another method leads, s.
     #[must_use]
     pub const fn led_for(self) -> f64 {
         match self {
-            Self::Brought(_) => BURN_IN,
+            Self::Brought(_) | Self::Learned(_) => BURN_IN,
             _ => 0.0,
         }
     }
@@ -143,23 +174,49 @@ impl Method {
                 let step = Step::insist(dt, damping)?;
                 Box::new(move |state, loads| (tled::step(scene, loads, state, &step), Found::default()))
             }
-            Self::MassScaled | Self::Multilevel => {
-                let lattice = self == Self::Multilevel;
-                let (cells, functions) = if lattice { suggested_lattice(scene, points) } else { ([0; 3], 0) };
+            Self::MassScaled | Self::Multilevel | Self::Best | Self::Damped(_) => {
+                let weights = match self {
+                    Self::Best => Some(networks::damper()),
+                    Self::Damped(network) => Some(network.bytes),
+                    _ => None,
+                };
+                let damper = match weights {
+                    Some(bytes) => Some(Damper::over(Network::parse(bytes)?)?),
+                    None => None,
+                };
+                let (cells, functions) = match (self, &damper) {
+                    (Self::MassScaled, _) => ([0; 3], 0),
+                    (_, None) => suggested_lattice(scene, points),
+                    (_, Some(_)) => suggested_damped_lattice(scene, points),
+                };
                 let nodes = scene.node_count();
+                // Room for either: a damped inertia needs more.
                 let mut inertia = Box::new(Inertia::over(
-                    vec![NodeVector::ZERO; vectors_for(nodes)],
+                    vec![NodeVector::ZERO; damped_vectors_for(nodes)],
                     vec![LatticeNode::EMPTY; nodes],
-                    vec![0.0; numbers_for(cells, functions)],
+                    vec![0.0; damped_numbers_for(cells, functions)],
                 ));
                 // Scenes start at rest.
                 let zero = || vec![NodeVector::ZERO; nodes];
                 let mut rest = State::over(zero(), zero(), zero());
-                inertia.prepare(scene, points, &mut rest, Step::insist(dt, damping)?, cells)?;
+                let step = Step::insist(dt, damping)?;
+                if damper.is_some() {
+                    inertia.prepare_damped(scene, points, &mut rest, step, cells)?;
+                } else {
+                    inertia.prepare(scene, points, &mut rest, step, cells)?;
+                }
                 Box::new(move |state, loads| {
-                    let status = inertia::step(scene, loads, state, &mut inertia);
+                    let status = match &damper {
+                        Some(damper) => damped_step(scene, loads, state, &mut inertia, damper),
+                        None => inertia::step(scene, loads, state, &mut inertia),
+                    };
                     (status, Found { estimate: Some(inertia.report().error), clipped: None })
                 })
+            }
+            Self::Learned(size) => {
+                let multiple = (dt / DT).round() as u32;
+                let bytes = networks::learned(size, multiple).ok_or(LabError::NoNetwork { multiple })?;
+                learned(scene, bytes, multiple, damping)?
             }
             Self::Brought(network) => learned(scene, network.bytes, network.multiple, damping)?,
         })
@@ -212,7 +269,8 @@ mod tests {
         let said = Method::named("euler").unwrap_err().to_string();
         assert_eq!(
             said,
-            "method \"euler\" is not known; there are tled, hold, tled-large-step, mass-scaled, multilevel"
+            "method \"euler\" is not known; there are tled, hold, tled-large-step, mass-scaled, multilevel, best, compact-f32, \
+             paper-f32"
         );
     }
 }

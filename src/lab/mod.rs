@@ -7,6 +7,7 @@
 //! | [`scenes`] | bodies, supports and loads as data |
 //! | [`truth`] | the exact motion of a scene, kept on disk |
 //! | [`method`] | what is compared: one match arm each |
+//! | [`networks`] | the networks that come with the crate |
 //! | [`run`] | one method, one scene, one step: a row |
 //! | [`measure`] | errors of a motion against the truth |
 //! | [`evaluate`] | all of them, as asked for: a [`evaluate::Plan`] |
@@ -20,6 +21,7 @@ pub mod evaluate;
 pub mod host;
 pub mod measure;
 pub mod method;
+pub mod networks;
 pub mod plot;
 pub mod run;
 pub mod scenes;

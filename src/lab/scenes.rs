@@ -14,7 +14,7 @@ use crate::material::{Exponential, NeoHookean};
 use crate::mesh::Bar;
 use crate::scene::{Axes, Support};
 
-/// The names of all scenes, in the order of the tables.
+/// The names of all scenes of the tables, in their order. One more, `bent`, is for training.
 pub const NAMES: [&str; 10] = [
     "torsion",
     "reversed",
@@ -124,6 +124,7 @@ pub fn named(name: &str) -> Result<SceneSpec, LabError> {
             Ok(SceneSpec { released_after: Some(INTERVALS / 2), ..bar("release", pull(GENTLE, 0.5)) })
         }
         "push" => pushed_lobe(),
+        "bent" => Ok(bent()),
         _ => Err(LabError::Unknown { kind: "scene", name: name.to_string(), known: NAMES.join(", ") }),
     }
 }
@@ -185,6 +186,21 @@ fn leaning(name: &'static str, file: &[u8]) -> Result<SceneSpec, LabError> {
     });
     scene.forces = forces.collect();
     Ok(scene)
+}
+
+/// The bar, ten times as stiff, held in two layers of nodes that no layer of a lattice ends at, leaning over under a body
+/// force. To learn from: it is in no table.
+fn bent() -> SceneSpec {
+    /// m/s^2.
+    const ACCELERATION: f32 = 0.6;
+    let mut scene = SceneSpec { law: LawSpec::Exponential(MESH_LAW), ..bar("bent", Vec::new()) };
+    let [nx, ny, _] = Bar::PAPER.cells;
+    scene.supports = (0..Bar::PAPER.node(nx, ny, 1) + 1).map(Support::fixed).collect();
+    let forces = (0..).zip(node_masses(&scene));
+    scene.forces = forces
+        .map(|(node, mass)| NodalForce { node, newton: [ACCELERATION * mass, 0.0, 0.0], ramp: RAMP })
+        .collect();
+    scene
 }
 
 /// The lobe with its tip bent down by an instrument.

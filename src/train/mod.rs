@@ -7,9 +7,11 @@
 //! | [`samples`] | what the exact step does, seen by each vertex in its frame |
 //! | `noise` | the same of rough motion, with targets that lead back |
 //! | [`fit`] | the network on burn, its losses, checkpoints |
+//! | [`damper`] | the network that damps rough motion, by roll-outs |
 //!
 //! Same recipe, seed, number of threads and processor, same weights.
 
+pub mod damper;
 mod error;
 pub mod fit;
 mod noise;

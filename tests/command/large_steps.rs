@@ -20,7 +20,7 @@ fn long_steps_reach_where_short_ones_do_and_say_what_they_did() {
     assert!(desk.summary()["inertia"].is_null() && !said.out.contains("added mass"), "{}", said.out);
     let exact = far(&desk);
 
-    for (method, lattice) in [("multilevel", true), ("mass-scaled", false)] {
+    for (method, lattice) in [("damped", true), ("multilevel", true), ("mass-scaled", false)] {
         let time = format!("method = \"{method}\"\nstep = \"10x\"\nend = 0.3\nframes = 3\n");
         let said = desk.simulate(&leaning(&time), &["--force"]);
         println!("{}", said.out);
@@ -46,6 +46,13 @@ fn long_steps_reach_where_short_ones_do_and_say_what_they_did() {
         for name in ["lattice_cells", "lattice_functions", "coarse_share_least"] {
             assert_eq!(inertia[name].is_null(), !lattice, "{name}");
         }
+        let damped = inertia["rough_motion_damped_largest"].as_f64();
+        assert_eq!(
+            damped.is_some_and(|share| share > 0.0 && share <= 0.5),
+            method == "damped",
+            "{inertia:#}"
+        );
+        assert_eq!(said.out.contains("taken away in a step"), method == "damped", "{}", said.out);
         assert_eq!(
             said.out.contains("coarse motion") && said.out.contains("lattice "),
             lattice,
@@ -107,7 +114,7 @@ fn what_does_not_go_together_is_refused_in_words() {
         ("end = 0.1\nstep = \"5000x\"\nmethod = \"multilevel\"\n", "line 16: the step of 2.3"),
         (
             "step = 0.001\nend = 1.0\nlattice = [2, 2, 4]\n",
-            "line 17: lattice is [2, 2, 4], but method \"tled\" has none; only \"multilevel\" has",
+            "line 17: lattice is [2, 2, 4], but method \"tled\" has none; \"multilevel\" and \"damped\" have",
         ),
         (
             "step = 0.001\nmethod = \"mass-scaled\"\nend = 1.0\nlattice = [2, 2, 4]\n",

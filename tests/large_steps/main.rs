@@ -2,6 +2,8 @@
 //! operator that they apply is symmetric, positive and bounded, and no mesh, support, load or damping makes them
 //! diverge. Mass scaling and multilevel inertia alike.
 
+#[path = "../support/networks.rs"]
+mod networks;
 #[path = "../reference/mod.rs"]
 mod reference;
 mod refused;
@@ -11,9 +13,13 @@ mod support;
 use proptest::prelude::*;
 use reference::dense::{Matrix, between, cholesky, eigenvalues, symmetric_part, zeros};
 use reference::{Random, tangent_product};
-use supple::inertia::{self, Inertia, InertiaError, LatticeNode, numbers_for, vectors_for};
+use supple::inertia::{
+    self, Damper, Inertia, InertiaError, LatticeNode, damped_numbers_for, damped_step, damped_vectors_for,
+    numbers_for, vectors_for,
+};
 use supple::loads::{Loads, Motion, NodalForce};
 use supple::material::{Material, NeoHookean, Regions, Tissue};
+use supple::mlp::Network;
 use supple::scene::{Axes, Support};
 use supple::state::NodeVector;
 use supple::tled::{self, Status, Step};
@@ -29,9 +35,11 @@ type HostInertia = Inertia<Vec<NodeVector>, Vec<LatticeNode>, Vec<f32>>;
 enum Method {
     Scaled,
     Multilevel,
+    /// Multilevel with rough motion damped, where `advance` moves it; the operator is that of the undamped step.
+    Damped,
 }
 
-const METHODS: [Method; 2] = [Method::Scaled, Method::Multilevel];
+const METHODS: [Method; 3] = [Method::Scaled, Method::Multilevel, Method::Damped];
 
 impl Method {
     /// The inertia of a scene for this step, from the state as it is.
@@ -44,19 +52,39 @@ impl Method {
     ) -> HostInertia {
         let (cells, functions) = match self {
             Self::Scaled => ([0; 3], 0),
-            Self::Multilevel => {
-                let suggested = inertia::suggested_lattice(scene, &body.points);
-                assert!(suggested.1 > 0, "no lattice for this scene");
-                suggested
-            }
+            Self::Multilevel => inertia::suggested_lattice(scene, &body.points),
+            Self::Damped => inertia::suggested_damped_lattice(scene, &body.points),
         };
+        assert!(functions > 0 || self == Self::Scaled, "no lattice for this scene");
         let nodes = body.points.len();
-        let mut inertia =
-            over(vectors_for(nodes), if functions > 0 { nodes } else { 0 }, numbers_for(cells, functions));
-        inertia.prepare(scene, &body.points, state, step, cells).unwrap();
+        let mut inertia = over(
+            damped_vectors_for(nodes),
+            if functions > 0 { nodes } else { 0 },
+            damped_numbers_for(cells, functions),
+        );
+        match self {
+            Self::Damped => inertia.prepare_damped(scene, &body.points, state, step, cells).unwrap(),
+            _ => inertia.prepare(scene, &body.points, state, step, cells).unwrap(),
+        }
         assert_eq!(inertia.functions(), functions);
         inertia
     }
+}
+
+/// A step of a method; a damped one at ten times the shipped gain.
+fn advance<M: Material>(
+    method: Method,
+    scene: &HostScene<M>,
+    loads: &Loads<'_>,
+    state: &mut HostState,
+    inertia: &mut HostInertia,
+) -> Status {
+    if method != Method::Damped {
+        return inertia::step(scene, loads, state, inertia);
+    }
+    let weights = networks::constant(4, 20.0);
+    let damper = Damper::over(Network::parse(weights.bytes()).unwrap()).unwrap();
+    damped_step(scene, loads, state, inertia, &damper)
 }
 
 fn over(vectors: usize, places: usize, numbers: usize) -> HostInertia {
@@ -403,7 +431,7 @@ fn survive<L: Judged>(
     let (mut moved, mut share) = (0.0_f64, 0.0_f64);
     let count = (0.5 / step.seconds()).clamp(100.0, 600.0) as u32;
     for taken in 0..count {
-        let status = inertia::step(&scene, &loads, &mut state, &mut inertia);
+        let status = advance(method, &scene, &loads, &mut state, &mut inertia);
         if !matches!(status, Status::Ok | Status::Limited { .. }) {
             return Err(format!("{} {method:?} at {multiple}, step {taken}: {status:?}", law.name()));
         }
@@ -471,7 +499,7 @@ fn vibration(method: Method, damping: f32) -> Vec<f64> {
     let mut inertia = method.prepared(&body, &scene, &mut state, step);
     (0..2_000)
         .map(|_| {
-            let status = inertia::step(&scene, &Loads::NONE, &mut state, &mut inertia);
+            let status = advance(method, &scene, &Loads::NONE, &mut state, &mut inertia);
             assert!(!matches!(status, Status::Diverged(_)), "{status:?}");
             (state.ledger().kinetic + tled::strain_energy(&scene, &state)) / start
         })
@@ -534,7 +562,8 @@ fn sudden_torsion_does_not_diverge_and_is_followed() {
         let mut error = 0.0;
         let diverged = truth.iter().find_map(|truth| {
             for _ in 0..FINEST / multiple {
-                if let Status::Diverged(divergence) = inertia::step(&scene, &loads, &mut state, &mut inertia)
+                if let Status::Diverged(divergence) =
+                    advance(method, &scene, &loads, &mut state, &mut inertia)
                 {
                     return Some(divergence);
                 }

@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use supple::inertia;
 use supple::loads::Loads;
 use supple::material::Material;
 use supple::tled::{self, CriticalStep, Step};
@@ -103,6 +102,7 @@ pub(crate) struct Times {
     plain: f64,
     mass_scaled: f64,
     multilevel: f64,
+    damped: f64,
 }
 
 impl Times {
@@ -111,6 +111,7 @@ impl Times {
             Method::Tled => self.plain,
             Method::MassScaled => self.mass_scaled,
             Method::Multilevel => self.multilevel,
+            Method::Damped => self.damped,
         }
     }
 }
@@ -125,12 +126,9 @@ fn beyond<M: Material>(
 ) -> Result<Times, Problem> {
     println!("\nsteps beyond the limit");
     let suggested = Grid::suggested(setup, scene);
-    let grid = match setup.time.method {
-        Method::Multilevel => Grid::wanted(setup, scene)?,
-        _ => suggested,
-    };
+    let grid = if setup.time.method.has_lattice() { Grid::wanted(setup, scene)? } else { suggested };
     let words =
-        |grid: Grid| if grid == Grid::NONE { "none, too few elements".into() } else { grid.to_string() };
+        |grid: Grid| if grid.functions == 0 { "none, too few elements".into() } else { grid.to_string() };
     row("lattice suggested", words(suggested));
     if grid != suggested {
         row("lattice of the scene", grid);
@@ -139,13 +137,14 @@ fn beyond<M: Material>(
     row(
         "memory of inertia",
         format!(
-            "{:.1} kB multilevel, {:.1} kB mass-scaled, beside the above",
-            bytes(grid),
+            "{:.1} kB damped, {:.1} kB multilevel, {:.1} kB mass-scaled, beside the above",
+            bytes(Grid { damped: true, ..grid }),
+            bytes(Grid { damped: false, ..grid }),
             bytes(Grid::NONE)
         ),
     );
     let times = time(setup, scene, state, loads, bound, grid)?;
-    for method in [Method::MassScaled, Method::Multilevel] {
+    for method in [Method::MassScaled, Method::Multilevel, Method::Damped] {
         let seconds = times.of(method);
         let ratio = seconds / times.plain;
         row(
@@ -153,10 +152,10 @@ fn beyond<M: Material>(
             format!("{:.1} us, {ratio:.2} times an exact one's {:.1} us", 1e6 * seconds, 1e6 * times.plain),
         );
     }
-    let (of, grid) = if setup.time.method == Method::MassScaled {
-        (Method::MassScaled, Grid::NONE)
-    } else {
-        (Method::Multilevel, grid)
+    let (of, grid) = match setup.time.method {
+        Method::MassScaled => (Method::MassScaled, Grid::NONE),
+        Method::Damped => (Method::Damped, grid),
+        Method::Tled | Method::Multilevel => (Method::Multilevel, grid),
     };
     for multiple in [10.0, 20.0, 50.0] {
         let inertia = at_rest(setup, scene, state, multiple * bound.seconds, grid)?;
@@ -191,27 +190,30 @@ fn time<M: Material>(
     grid: Grid,
 ) -> Result<Times, Problem> {
     let long = TIMED_MULTIPLE * bound.seconds;
-    let mut scaling = at_rest(setup, scene, state, long, Grid::NONE)?;
-    let mut multilevel = at_rest(setup, scene, state, long, grid)?;
+    let mut prepared = |grid| at_rest(setup, scene, state, long, grid);
+    let mut inertias = [
+        prepared(Grid::NONE)?,
+        prepared(Grid { damped: false, ..grid })?,
+        prepared(Grid { damped: true, ..grid })?,
+    ];
     let plain =
         Step::insist(0.5 * bound.seconds, setup.damping).map_err(|error| Problem(error.to_string()))?;
-    let mut states = [state.clone(), state.clone(), state.clone()];
-    let mut spent = [vec![], vec![], vec![]];
+    let mut states = [(); 4].map(|()| state.clone());
+    let mut spent = [(); 4].map(|()| vec![]);
     // Only the time counts here, as above.
     for _ in 0..TIMED {
         for (method, (state, spent)) in states.iter_mut().zip(&mut spent).enumerate() {
             let start = Instant::now();
-            let _ = match method {
-                0 => tled::step(scene, loads, state, &plain),
-                1 => inertia::step(scene, loads, state, &mut scaling),
-                _ => inertia::step(scene, loads, state, &mut multilevel),
+            let _ = match method.checked_sub(1) {
+                None => tled::step(scene, loads, state, &plain),
+                Some(scaled) => inertias[scaled].step(scene, loads, state),
             };
             spent.push(start.elapsed().as_secs_f64());
         }
     }
-    let [plain, mass_scaled, multilevel] = spent.map(|mut seconds| {
+    let [plain, mass_scaled, multilevel, damped] = spent.map(|mut seconds| {
         seconds.sort_by(f64::total_cmp);
         seconds[TIMED / 2]
     });
-    Ok(Times { plain, mass_scaled, multilevel })
+    Ok(Times { plain, mass_scaled, multilevel, damped })
 }

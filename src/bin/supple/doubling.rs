@@ -5,7 +5,6 @@
 //! A body that hardly moves at any of the lengths passes as well, so the distance moved stands beside it, and
 //! of a length that passes all shorter ones must pass too.
 
-use supple::inertia;
 use supple::loads::Loads;
 use supple::material::Material;
 use supple::tled::{CriticalStep, Divergence, Status, Step};
@@ -113,9 +112,9 @@ pub(crate) fn recommend<M: Material>(
 fn judged<M: Material>(setup: &Setup, scene: &HostScene<M>) -> Result<(Method, Grid), Problem> {
     Ok(match setup.time.method {
         Method::MassScaled => (Method::MassScaled, Grid::NONE),
-        Method::Multilevel => (Method::Multilevel, Grid::wanted(setup, scene)?),
+        with_lattice @ (Method::Multilevel | Method::Damped) => (with_lattice, Grid::wanted(setup, scene)?),
         Method::Tled => match Grid::suggested(setup, scene) {
-            Grid::NONE => (Method::MassScaled, Grid::NONE),
+            grid if grid.functions == 0 => (Method::MassScaled, Grid::NONE),
             grid => (Method::Multilevel, grid),
         },
     })
@@ -179,9 +178,7 @@ fn compare<M: Material>(
     for _ in 0..steps {
         for turn in 0..3 {
             let walker = if turn == 0 { &mut whole } else { &mut half };
-            if let Status::Diverged(divergence) =
-                inertia::step(scene, loads, &mut walker.state, &mut walker.inertia)
-            {
+            if let Status::Diverged(divergence) = walker.inertia.step(scene, loads, &mut walker.state) {
                 return Ok(Found::Diverged(divergence));
             }
         }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use supple::lab::evaluate::{self, Plan};
-use supple::lab::method::{Brought, Method};
+use supple::lab::method::Method;
 use supple::lab::{estimates, table};
 
 use crate::scene_file::Problem;
@@ -18,13 +18,13 @@ pub(crate) struct Asked {
     /// Scene, all unless given; may be repeated
     #[arg(long = "scene", value_name = "NAME")]
     scenes: Vec<String>,
-    /// Method, all unless given; may be repeated
+    /// Method, all but paper-f32 unless given (it takes half an hour over all scenes); may be repeated
     #[arg(long = "method", value_name = "NAME")]
     methods: Vec<String>,
     /// Step as a multiple of 30 us, 1 10 20 50 100 unless given; may be repeated
     #[arg(long = "multiple", value_name = "N")]
     multiples: Vec<u32>,
-    /// Weight file of a network to judge as well, at its own step; may be repeated
+    /// Weight file of a network to judge as well, a learned step's at its own step, a damper's at all; may be repeated
     #[arg(long, value_name = "FILE")]
     weights: Vec<PathBuf>,
     /// Scene whose error is drawn over the step; reversed unless given, if that is among the scenes
@@ -37,7 +37,7 @@ pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
     let problem = |error: supple::lab::LabError| Problem(error.to_string());
     let mut plan = Plan::new(scenes, methods, multiples, sweep.as_deref()).map_err(problem)?;
     for path in weights {
-        plan.methods.push(Method::Brought(Brought::read(path).map_err(problem)?));
+        plan.methods.push(Method::with(path).map_err(problem)?);
     }
     let rows = evaluate::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(problem)?;
     print!("{}", table::text(&rows));

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use supple::mlp::{Activation, Layer, MAGIC, Network, Range, hexadecimal};
+use supple::inertia::Damper;
+use supple::mlp::{Activation, ForceInput, Layer, MAGIC, Network, Range, hexadecimal};
 use supple::surrogate::{FEATURES, PREDICTED, Surrogate, Vertex};
 
 use crate::inspect::row;
@@ -20,11 +21,30 @@ const SEEN: [Quantity; FEATURES] = [
     ("force, normal", "mN", 1e3),
     ("force, binormal", "mN", 1e3),
 ];
+/// The same with force over the vertex's mass.
+const SEEN_PER_MASS: [Quantity; FEATURES] = {
+    let [a, b, c, d, ..] = SEEN;
+    let rest = [
+        ("force / mass, tangent", "m/s^2", 1.0),
+        ("force / mass, normal", "m/s^2", 1.0),
+        ("force / mass, binormal", "m/s^2", 1.0),
+    ];
+    [a, b, c, d, rest[0], rest[1], rest[2]]
+};
 const FORETOLD: [Quantity; PREDICTED] = [
     ("acceleration, tangent", "m/s^2", 1.0),
     ("acceleration, normal", "m/s^2", 1.0),
     ("acceleration, binormal", "m/s^2", 1.0),
 ];
+
+/// The same of a damper (`src/inertia/damper.rs`): pure numbers.
+const ROUGH: [Quantity; 4] = [
+    ("change over rough, ln", "", 1.0),
+    ("rough over all, ln", "", 1.0),
+    ("cosine of the change", "", 1.0),
+    ("damping in a step, ln", "", 1.0),
+];
+const GAIN: [Quantity; 1] = [("gain", "", 1.0)];
 
 /// Whether a file is one of weights, by its name or by how it begins.
 pub(crate) fn is_weights(path: &Path) -> bool {
@@ -43,18 +63,20 @@ pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
     let network = weights::parse(path, &memory)?;
     let (inputs, outputs) = (network.inputs(), network.outputs());
     let recipe = network.recipe();
+    let damps = Damper::over(network).is_ok();
     row("weights", path.display());
     row("size", format!("{} bytes", memory.bytes().len()));
     row(
         "network",
         format!(
-            "{} inputs, {} outputs, {} multiply-adds per vertex",
+            "{} inputs, {} outputs, {} multiply-adds per {}",
             inputs.len(),
             outputs.len(),
-            network.multiply_adds()
+            network.multiply_adds(),
+            if damps { "step, a damper of rough motion for any step" } else { "vertex" }
         ),
     );
-    row("step", describe_step(&network));
+    row(if damps { "longest step" } else { "step" }, describe_step(&network));
     row("learned from", describe_tissue(&network));
     row("damping", format!("{} 1/s", recipe.damping));
 
@@ -69,9 +91,14 @@ pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
         }
     }
     let learned_step = inputs.len() == FEATURES && outputs.len() == PREDICTED;
-    let of = |table: &'static [Quantity]| if learned_step { table } else { &[] };
-    ranges("input", "in training", inputs, of(&SEEN));
-    ranges("output", "clipped to", outputs, of(&FORETOLD));
+    let (seen, foretold): (&[Quantity], &[Quantity]) = match (learned_step, damps) {
+        (true, _) if recipe.force == ForceInput::PerMass => (&SEEN_PER_MASS, &FORETOLD),
+        (true, _) => (&SEEN, &FORETOLD),
+        (_, true) => (&ROUGH, &GAIN),
+        _ => (&[], &[]),
+    };
+    ranges("input", if damps { "possible" } else { "in training" }, inputs, seen);
+    ranges("output", "clipped to", outputs, foretold);
 
     println!("\nrecipe, SHA-256 {}", hexadecimal(&recipe.hash));
     for line in recipe.text.lines() {
@@ -79,6 +106,7 @@ pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
     }
     match Surrogate::over(network, [Vertex::NEW; 0]) {
         Ok(_) => Ok(()),
+        Err(_) if damps => Ok(()),
         Err(error) => Err(Problem(format!("{}: {error}", path.display()))),
     }
 }

@@ -213,6 +213,7 @@ fn inertia(trace: &Trace, outcome: &Outcome) -> Value {
         "steps_held_back_share": held_back_share(trace, outcome),
         "most_nodes_held_back": trace.most_held_back,
         "coarse_share_least": lattice.map(|_| decimal(trace.least_coarse_share)),
+        "rough_motion_damped_largest": trace.grid.damped.then_some(decimal(trace.most_damping)),
     })
 }
 
@@ -244,6 +245,12 @@ fn inertia_rows(method: &str, trace: &Trace, outcome: &Outcome) -> Vec<(&'static
     if lattice {
         rows.insert(1, ("lattice", trace.grid.to_string()));
         rows.push(("coarse motion", format!("used to {:.1} % or more", 100.0 * trace.least_coarse_share)));
+    }
+    if trace.grid.damped {
+        rows.push((
+            "rough motion",
+            format!("at most {:.1} % taken away in a step", 100.0 * trace.most_damping),
+        ));
     }
     rows
 }

@@ -8,7 +8,6 @@
 
 use std::time::{Duration, Instant};
 
-use supple::inertia;
 use supple::loads::Loads;
 use supple::material::{J_FLOOR, Material};
 use supple::tled::{self, CriticalStep, Divergence, Status, Step};
@@ -293,7 +292,7 @@ fn take<M: Material>(
     let status = match inertia {
         None => tled::step(scene, loads, state, step),
         Some(inertia) => {
-            let status = inertia::step(scene, loads, state, inertia);
+            let status = inertia.step(scene, loads, state);
             if let Some(trace) = &mut outcome.trace {
                 trace.add(inertia.report());
             }

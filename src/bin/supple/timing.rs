@@ -13,17 +13,24 @@ pub(crate) enum Method {
     MassScaled,
     /// The same, with a lattice that gives smooth motion its inertia back.
     Multilevel,
+    /// The same, with rough motion damped as a network says.
+    Damped,
 }
 
 impl Method {
-    const ALL: [Self; 3] = [Self::Tled, Self::MassScaled, Self::Multilevel];
+    const ALL: [Self; 4] = [Self::Tled, Self::MassScaled, Self::Multilevel, Self::Damped];
 
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Tled => "tled",
             Self::MassScaled => "mass-scaled",
             Self::Multilevel => "multilevel",
+            Self::Damped => "damped",
         }
+    }
+
+    pub(crate) const fn has_lattice(self) -> bool {
+        matches!(self, Self::Multilevel | Self::Damped)
     }
 }
 
@@ -105,7 +112,9 @@ fn read_method(file: &SceneFile, time: &TimeTable) -> Result<Method, Problem> {
     Method::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
         file.problem(
             at,
-            format!("method \"{name}\" is not known; \"tled\", \"mass-scaled\" and \"multilevel\" are"),
+            format!(
+                "method \"{name}\" is not known; \"tled\", \"mass-scaled\", \"multilevel\" and \"damped\" are"
+            ),
         )
     })
 }
@@ -142,11 +151,11 @@ fn read_step(file: &SceneFile, at: &Spanned<StepLength>, method: Method) -> Resu
 
 fn read_lattice(file: &SceneFile, at: &Spanned<[u32; 3]>, method: Method) -> Result<[u32; 3], Problem> {
     let cells = *at.get_ref();
-    if method != Method::Multilevel {
+    if !method.has_lattice() {
         return Err(file.problem(
             at,
             format!(
-                "lattice is {cells:?}, but method \"{}\" has none; only \"multilevel\" has",
+                "lattice is {cells:?}, but method \"{}\" has none; \"multilevel\" and \"damped\" have",
                 method.name()
             ),
         ));

@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use supple::io::write_atomically;
+use supple::train::damper;
 use supple::train::fit::{Fitted, Progress, train as fit};
 
 use crate::scene_file::Problem;
@@ -33,6 +34,9 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     let problem =
         |path: &Path, error: &dyn std::fmt::Display| Problem(format!("{}: {error}", path.display()));
     let text = std::fs::read_to_string(recipe).map_err(|error| problem(recipe, &error))?;
+    if is_damper(&text) {
+        return train_damper(&text, recipe, out);
+    }
     let folder = checkpoints(out);
     eprintln!("simulating the motion to learn from ...");
     let bar = ProgressBar::no_length();
@@ -52,7 +56,7 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     });
     bar.finish_and_clear();
     let Fitted { bytes, held_out, samples, loss } = fitted.map_err(|error| problem(recipe, &error))?;
-    write_atomically(out, |file| file.write_all(&bytes)).map_err(|error| Problem(error.to_string()))?;
+    keep(out, &bytes)?;
     // Only now that the weights are safe.
     let _ = std::fs::remove_dir_all(&folder);
     println!("samples     {samples}");
@@ -63,6 +67,42 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
         );
     }
     println!("weights     {} ({} bytes)", out.display(), bytes.len());
+    Ok(End::Reached)
+}
+
+fn keep(out: &Path, bytes: &[u8]) -> Result<(), Problem> {
+    write_atomically(out, |file| file.write_all(bytes)).map_err(|error| Problem(error.to_string()))
+}
+
+fn is_damper(recipe: &str) -> bool {
+    recipe.parse::<toml::Table>().is_ok_and(|table| table.contains_key("damper"))
+}
+
+/// A few minutes of roll-outs: there are no checkpoints.
+fn train_damper(text: &str, recipe: &Path, out: &Path) -> Result<End, Problem> {
+    eprintln!("simulating the motions to be judged by ...");
+    let found = damper::train(text, |at| {
+        eprintln!(
+            "generation {} of {}, best {:.4}, {} left",
+            at.generation,
+            at.generations,
+            at.best,
+            clock(at.remaining)
+        );
+        ControlFlow::Continue(())
+    });
+    let found = found.map_err(|error| Problem(format!("{}: {error}", recipe.display())))?;
+    keep(out, &found.bytes)?;
+    println!("mean error over nodes and time, mm");
+    println!("scene            load  step  multilevel  undamped      rule   network");
+    for damper::Judged { scene, load, multiple, errors: [multilevel, undamped, rule, network] } in
+        &found.judged
+    {
+        println!(
+            "{scene:14} {load:6} {multiple:4}x {multilevel:11.4} {undamped:9.4} {rule:9.4} {network:9.4}"
+        );
+    }
+    println!("weights     {} ({} bytes)", out.display(), found.bytes.len());
     Ok(End::Reached)
 }
 

@@ -2,7 +2,9 @@
 //! built from this must link without std, and without `core::panicking`: what could panic would show.
 #![no_std]
 
-use supple::inertia::{self, Inertia, LatticeNode, MassScaling, numbers_for, vectors_for};
+use supple::inertia::{
+    self, Damper, Inertia, LatticeNode, MassScaling, damped_numbers_for, damped_vectors_for, numbers_for, vectors_for,
+};
 use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{Exponential, Literal, NeoHookean, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
@@ -133,6 +135,37 @@ pub extern "C" fn multilevel(
     }
     let _ = inertia::step(scene, loads, state, multilevel);
     multilevel.report().error + multilevel.functions() as f32
+}
+
+type Damped = Inertia<
+    [NodeVector; damped_vectors_for(100)],
+    [LatticeNode; 100],
+    [f32; damped_numbers_for(LATTICE, 27)],
+>;
+
+/// Multilevel inertia with rough motion damped.
+#[unsafe(no_mangle)]
+pub extern "C" fn damped(
+    scene: &Scene<Exponential>,
+    state: &mut State,
+    damped: &mut Damped,
+    points: &[[f32; 3]; 100],
+    loads: &Loads<'_>,
+    weights: &[u8; 10_000],
+    cells: &[u32; 3],
+    seconds: f32,
+) -> f32 {
+    let (Ok(step), Ok(network)) = (Step::insist(seconds, 1.0), Network::parse(weights)) else {
+        return -1.0;
+    };
+    let Ok(damper) = Damper::over(network) else {
+        return -2.0;
+    };
+    if damped.prepare_damped(scene, points, state, step, *cells).is_err() {
+        return -3.0;
+    }
+    let _ = inertia::damped_step(scene, loads, state, damped, &damper);
+    damped.report().damping
 }
 
 /// A weight file, a prediction, a learned step.
