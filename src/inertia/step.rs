@@ -242,7 +242,7 @@ fn coarse_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, mut share: f32,
         }
         let momentum = restrict(damped.momentum, lattice);
         let mut smooth = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-        let rows = damped.mean.chunks_exact(super::dense::stride(thirds(functions)));
+        let rows = damped.mean.chunks_exact(super::dense::stride(thirds(functions)).max(1));
         for (smooth, row) in smooth.iter_mut().zip(rows).take(functions) {
             let products = row.iter().zip(&momentum).take(functions);
             let sum: Vec4 = products.map(|(entry, momentum)| *entry * Vec4::from(momentum.0)).sum();
