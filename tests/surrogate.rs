@@ -126,7 +126,7 @@ fn led(body: &Body) -> HostState {
     state
 }
 
-/// With the force in N, and over the mass of a vertex: those of the bar's differ by more than ten times.
+/// With the force in N, and over the mass of a vertex: those of the bar's differ several times.
 #[test]
 fn ten_steps_are_those_of_the_paper_in_float64() {
     let body = small_bar();
