@@ -71,17 +71,13 @@ fn scaled<'a>(
         let network = Network::parse(&DAMPER.0).expect("a weight file of the crate");
         Damper::over(network).expect("a damper")
     });
-    match damper {
-        Some(_) => inertia.prepare_damped(scene, points, &mut state, step, cells),
-        None => inertia.prepare(scene, points, &mut state, step, cells),
+    if damped {
+        inertia = inertia.damped();
     }
-    .expect("the bar can be prepared");
+    inertia.prepare(scene, points, &mut state, step, cells).expect("the bar can be prepared");
     assert_eq!(inertia.cycle(), cycle);
     let mut run = move || {
-        moved(match &damper {
-            Some(damper) => damped_step(scene, loads, &mut state, &mut inertia, damper),
-            None => inertia::step(scene, loads, &mut state, &mut inertia),
-        });
+        moved(damped_step(scene, loads, &mut state, &mut inertia, damper.as_ref()));
     };
     // Whole cycles.
     (0..8 * cycle).for_each(|_| run());

@@ -25,6 +25,7 @@ use support::{Body, EXP, HostScene, HostState, NEO, bound, rest_of, tissue, to_f
 
 type HostInertia = Inertia<Vec<NodeVector>, Vec<LatticeNode>, Vec<f32>>;
 
+/// For damped steps, not yet prepared.
 fn room<M: Material>(scene: &HostScene<M>, body: &Body) -> (HostInertia, [u32; 3]) {
     let (cells, functions) = suggested_damped_lattice(scene, &body.points);
     let nodes = body.points.len();
@@ -39,8 +40,9 @@ fn prepared<M: Material>(
     state: &mut HostState,
     step: Step,
 ) -> HostInertia {
-    let (mut inertia, cells) = room(scene, body);
-    inertia.prepare_damped(scene, &body.points, state, step, cells).unwrap();
+    let (inertia, cells) = room(scene, body);
+    let mut inertia = inertia.damped();
+    inertia.prepare(scene, &body.points, state, step, cells).unwrap();
     inertia
 }
 
@@ -66,10 +68,8 @@ fn without_output_it_is_the_undamped_step() {
         let weights = networks::constant(4, output.unwrap_or(0.0));
         let damper = Damper::over(Network::parse(weights.bytes()).unwrap()).unwrap();
         for _ in 0..100 {
-            let status = match output {
-                Some(_) => damped_step(&scene, &loads, &mut state, &mut inertia, &damper),
-                None => inertia::step(&scene, &loads, &mut state, &mut inertia),
-            };
+            let damper = output.map(|_| &damper);
+            let status = damped_step(&scene, &loads, &mut state, &mut inertia, damper);
             assert!(!matches!(status, Status::Diverged(_) | Status::Mismatch { .. }), "{status:?}");
         }
         state.displacements().to_vec()
@@ -93,7 +93,7 @@ fn smooth_motion_is_left_alone() {
     let weights = networks::constant(4, 20.0);
     let damper = Damper::over(Network::parse(weights.bytes()).unwrap()).unwrap();
     for _ in 0..200 {
-        let status = damped_step(&scene, &Loads::NONE, &mut state, &mut inertia, &damper);
+        let status = damped_step(&scene, &Loads::NONE, &mut state, &mut inertia, Some(&damper));
         assert!(!matches!(status, Status::Diverged(_)), "{status:?}");
     }
     let worst = (0..body.points.len())
@@ -151,7 +151,7 @@ fn on_another_mesh_the_shipped_damper_does_no_harm() {
             assert_eq!(tled::step(&scene, &loads, &mut truth, &exact), Status::Ok);
         }
         let _ = inertia::step(&scene, &loads, &mut plain, &mut of_plain);
-        let _ = damped_step(&scene, &loads, &mut calm, &mut of_calm, &damper);
+        let _ = damped_step(&scene, &loads, &mut calm, &mut of_calm, Some(&damper));
         errors[0] += mean(&truth, &plain);
         errors[1] += mean(&truth, &calm);
         hold += mean(&truth, &rest_of(&scene));

@@ -29,15 +29,8 @@
 
 use core::fmt;
 
-use super::lattice::LatticeNode;
-use super::{Inertia, step};
-use crate::lanes::{NodeVector, Real};
-use crate::loads::Loads;
-use crate::material::Material;
+use crate::lanes::Real;
 use crate::mlp::Network;
-use crate::scene::{ElementBlock, NodeInertia, Scene};
-use crate::state::State;
-use crate::tled::Status;
 
 /// Numbers that go into the network.
 const FEATURES: usize = 4;
@@ -106,7 +99,7 @@ impl<'w> Damper<'w> {
 
 /// Sums over the nodes, kg m^2: of the rough part `y` of the last increment `y^T m y`, with its change `y'` since the step
 /// before `y'^T m y'` and `y^T m y'`, and of the whole increment `du^T m du`.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Rough {
     square: f32,
     change: f32,
@@ -137,25 +130,4 @@ impl Rough {
         let cosine = both / (libm::sqrtf(square) * libm::sqrtf(change));
         Some([ln(change / square), ln(square / whole), cosine.clamp(-1.0, 1.0), ln(k)])
     }
-}
-
-/// [`step()`] with an inertia of [`Inertia::prepare_damped`], and with rough motion damped as `damper` says.
-/// An inertia that was not prepared so takes the step undamped.
-pub fn damped_step<M, N, B, S, V, W, D>(
-    scene: &Scene<M, N, B>,
-    loads: &Loads<'_>,
-    state: &mut State<S>,
-    inertia: &mut Inertia<V, W, D>,
-    damper: &Damper<'_>,
-) -> Status
-where
-    M: Material,
-    N: AsRef<[NodeInertia]>,
-    B: AsRef<[ElementBlock]>,
-    S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
-    V: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
-    W: AsRef<[LatticeNode]> + AsMut<[LatticeNode]>,
-    D: AsRef<[f32]> + AsMut<[f32]>,
-{
-    step::advance(scene, loads, state, inertia, Some(damper))
 }

@@ -303,6 +303,5 @@ pub(super) fn near_cubic(points: &[[f32; 3]], parts: u32) -> [[u32; 3]; 2] {
     let (_, size) = bounding_box(points);
     let longest = size.iter().copied().fold(0.0, f32::max);
     // A whole number of cells may come out a little below it.
-    [0.99, 0.5]
-        .map(|up| size.map(|size| (libm::floorf(size / longest * parts as f32 + 1.0 - up) as u32).max(1)))
+    [0.01, 0.5].map(|up| size.map(|size| (libm::floorf(size / longest * parts as f32 + up) as u32).max(1)))
 }

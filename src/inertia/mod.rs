@@ -72,10 +72,10 @@ mod report;
 mod step;
 mod vectors;
 
-pub use damper::{Damper, DamperError, damped_step};
+pub use damper::{Damper, DamperError};
 pub use lattice::{LatticeNode, MAX_FUNCTIONS, MAX_POINTS};
 pub use report::Report;
-pub use step::step;
+pub use step::{damped_step, step};
 pub use vectors::{damped_vectors_for, vectors_for};
 
 use core::fmt;
@@ -122,7 +122,7 @@ pub const fn numbers_for(cells: [u32; 3], functions: usize) -> usize {
     matrices::numbers_for(cells, functions, false)
 }
 
-/// The same for [`Inertia::prepare_damped`].
+/// The same for [`Inertia::damped`].
 #[must_use]
 pub const fn damped_numbers_for(cells: [u32; 3], functions: usize) -> usize {
     let [x, y, z] = cells;
@@ -198,7 +198,7 @@ pub struct Inertia<V, W, D> {
     places: W,
     dense: D,
     nodes: usize,
-    /// Prepared for [`damped_step`].
+    /// For [`damped_step`].
     damped: bool,
     /// What the latest damped step found.
     rough: Rough,
@@ -239,6 +239,14 @@ impl<V, W, D> Inertia<V, W, D> {
         }
     }
 
+    /// The same for [`damped_step`]: the lattice's motion follows the law to second order (`damper.rs`). Needs
+    /// [`damped_vectors_for`] and [`damped_numbers_for`] as many.
+    #[must_use]
+    pub const fn damped(mut self) -> Self {
+        self.damped = true;
+        self
+    }
+
     /// What the latest step, or the preparation, found.
     pub const fn report(&self) -> &Report {
         &self.report
@@ -276,7 +284,7 @@ where
     largest_lattice(scene, points, 400)
 }
 
-/// The same for [`Inertia::prepare_damped`]: up to 700 times the elements, since a finer lattice pays once rough motion
+/// The same for [`Inertia::damped`]: up to 700 times the elements, since a finer lattice pays once rough motion
 /// is damped.
 #[must_use]
 pub fn suggested_damped_lattice<M, N, B>(scene: &Scene<M, N, B>, points: &[[f32; 3]]) -> ([u32; 3], usize)
@@ -338,43 +346,6 @@ where
     /// axis (zeros for mass scaling alone) around the scene's `points` at rest. Takes a few force evaluations, and for a
     /// lattice about as many as a cycle of steps. On an error no step can be taken.
     pub fn prepare<M, N, B, S>(
-        &mut self,
-        scene: &Scene<M, N, B>,
-        points: &[[f32; 3]],
-        state: &mut State<S>,
-        step: Step,
-        cells: [u32; 3],
-    ) -> Result<(), InertiaError>
-    where
-        M: Material,
-        N: AsRef<[NodeInertia]>,
-        B: AsRef<[ElementBlock]>,
-        S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
-    {
-        self.damped = false;
-        self.prepared(scene, points, state, step, cells)
-    }
-
-    /// The same for [`damped_step`]: the lattice's motion follows the law to second order (`damper.rs`).
-    pub fn prepare_damped<M, N, B, S>(
-        &mut self,
-        scene: &Scene<M, N, B>,
-        points: &[[f32; 3]],
-        state: &mut State<S>,
-        step: Step,
-        cells: [u32; 3],
-    ) -> Result<(), InertiaError>
-    where
-        M: Material,
-        N: AsRef<[NodeInertia]>,
-        B: AsRef<[ElementBlock]>,
-        S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
-    {
-        self.damped = true;
-        self.prepared(scene, points, state, step, cells)
-    }
-
-    fn prepared<M, N, B, S>(
         &mut self,
         scene: &Scene<M, N, B>,
         points: &[[f32; 3]],
@@ -474,7 +445,7 @@ where
         if let Some(tables) = NodeTables::split(self.vectors.as_mut(), nodes) {
             tables.rough.fill(NodeVector::ZERO);
         }
-        self.rough = Rough::default();
+        self.rough = Rough::NONE;
         self.estimate = Estimate::NONE;
         self.step = Some(step);
         Ok(())

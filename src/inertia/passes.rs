@@ -159,21 +159,9 @@ impl Prepare<'_, '_> {
             let determinant = one + R::splat(2.0) * p * q * r - pp - qq - rr;
             let sum = (fx * (one - qq)).over(a) + (fy * (one - rr)).over(b) + (fz * (one - pp)).over(c);
             let mean = R::splat(1.0 / 3.0) * sum.over(determinant.max(R::splat(LEAST_DETERMINANT)));
-            let mut sums = [[0.0; 4]; BLOCK];
-            write_rows(&mut sums, 0, [mean * vx, mean * vy, mean * vz, R::splat(0.0)]);
-            for (place, &sum) in places.iter().zip(&sums) {
-                if let Some(cell) = momentum.get_mut(place.cell()) {
-                    cell.add::<C>(place, sum);
-                }
-            }
+            add_to::<R, C>(momentum, places, [mean * vx, mean * vy, mean * vz]);
         }
-        let mut residuals = [[0.0; 4]; BLOCK];
-        write_rows(&mut residuals, 0, [rx, ry, rz, R::splat(0.0)]);
-        for (place, &residual) in places.iter().zip(&residuals) {
-            if let Some(cell) = self.cells.get_mut(place.cell()) {
-                cell.add::<C>(place, residual);
-            }
-        }
+        add_to::<R, C>(self.cells, places, [rx, ry, rz]);
     }
 }
 
@@ -220,7 +208,7 @@ impl Kernel for Settle<'_, '_> {
         totals.add_lanes(&rest.0);
         defects.add_lanes(&sums.1);
         defects.add_lanes(&rest.1);
-        let mut rough = Rough::default();
+        let mut rough = Rough::NONE;
         rough.add_lanes(&sums.2);
         rough.add_lanes(&rest.2);
         (totals, defects, rough)
@@ -240,14 +228,8 @@ impl Settle<'_, '_> {
     /// The nodes from `first` on, side by side; `C` holds eight numbers.
     #[inline(always)]
     fn nodes<R: Real, C: Real>(&mut self, first: usize, (sums, defects, rough): &mut AxisSums<R>) {
-        let mut coarse = [[0.0; 4]; BLOCK];
         let places = self.places.get(first..first + R::COUNT).unwrap_or_default();
-        for (coarse, place) in coarse.iter_mut().zip(places) {
-            if let Some(cell) = self.cells.get(place.cell()) {
-                *coarse = cell.at::<C>(place);
-            }
-        }
-        let coarse = read_rows::<R>(&coarse, 0);
+        let coarse = at_nodes::<R, C>(self.cells, places);
         let alone = read_rows::<R>(must_cast_slice(self.tables.next), first);
         let [ix, iy, iz, mass] = read_rows::<R>(must_cast_slice(self.inertia), first);
         let free = [ix, iy, iz].map(R::positive);
@@ -257,13 +239,7 @@ impl Settle<'_, '_> {
         let mut moved = alone;
         let mut taken = [R::splat(0.0); 3];
         if let Some(calm) = &self.damped {
-            let mut smooth = [[0.0; 4]; BLOCK];
-            for (smooth, place) in smooth.iter_mut().zip(places) {
-                if let Some(cell) = calm.smooth.get(place.cell()) {
-                    *smooth = cell.at::<C>(place);
-                }
-            }
-            let smooth = read_rows::<R>(&smooth, 0);
+            let smooth = at_nodes::<R, C>(calm.smooth, places);
             let mut before = read_rows::<R>(must_cast_slice(self.tables.rough), first);
             let [square, change, both, whole] = rough;
             for axis in 0..3 {
@@ -329,6 +305,30 @@ impl Cell {
         let vectors: &[[f32; 4]; 8] = must_cast_ref(&self.0);
         vectors.map(Vec4::from)
     }
+}
+
+/// Adds `W^T v` of nodes side by side; `C` holds eight numbers.
+#[inline(always)]
+fn add_to<R: Real, C: Real>(cells: &mut [Cell], places: &[LatticeNode], [x, y, z]: [R; 3]) {
+    let mut vectors = [[0.0; 4]; BLOCK];
+    write_rows(&mut vectors, 0, [x, y, z, R::splat(0.0)]);
+    for (place, &vector) in places.iter().zip(&vectors) {
+        if let Some(cell) = cells.get_mut(place.cell()) {
+            cell.add::<C>(place, vector);
+        }
+    }
+}
+
+/// `W x` of nodes side by side; `C` holds eight numbers.
+#[inline(always)]
+fn at_nodes<R: Real, C: Real>(cells: &[Cell], places: &[LatticeNode]) -> [R; 4] {
+    let mut vectors = [[0.0; 4]; BLOCK];
+    for (vector, place) in vectors.iter_mut().zip(places) {
+        if let Some(cell) = cells.get(place.cell()) {
+            *vector = cell.at::<C>(place);
+        }
+    }
+    read_rows::<R>(&vectors, 0)
 }
 
 /// Gives the cells' sums to their functions.

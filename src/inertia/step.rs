@@ -17,8 +17,8 @@ use super::dense::{Row, apply, stride};
 use super::estimate::dot;
 use super::frames::{Rotation, turn};
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
-use super::matrices::{Matrices, thirds};
-use super::passes::{Calm, Prepare, Settle, prolong, restrict, turns};
+use super::matrices::{DampedMatrices, Matrices, thirds};
+use super::passes::{Calm, Cell, Prepare, Settle, prolong, restrict, turns};
 use super::refresh::{Refresh, Sources, from_numbers, to_numbers};
 use super::report::Tally;
 use super::vectors::NodeTables;
@@ -46,10 +46,11 @@ where
     W: AsRef<[LatticeNode]> + AsMut<[LatticeNode]>,
     D: AsRef<[f32]> + AsMut<[f32]>,
 {
-    advance(scene, loads, state, inertia, None)
+    damped_step(scene, loads, state, inertia, None)
 }
 
-pub(super) fn advance<M, N, B, S, V, W, D>(
+/// [`step()`] with rough motion damped as `damper` says, if there is one and the inertia is [`Inertia::damped`].
+pub fn damped_step<M, N, B, S, V, W, D>(
     scene: &Scene<M, N, B>,
     loads: &Loads<'_>,
     state: &mut State<S>,
@@ -135,7 +136,7 @@ where
         let (held_back, tally) = alone::prepare(&step, scaling, nodal, increment, force, &mut tables);
         let (step, inertia, tables) = (&step, nodal, &mut tables);
         let moved = dispatch(alone::Move { step, scaling, inertia, displacement, increment, force, tables });
-        (held_back, tally, (moved.0, moved.1, Rough::default()))
+        (held_back, tally, (moved.0, moved.1, Rough::NONE))
     } else {
         refresh.look(displacement, *steps);
         let turns = &turns(&refresh.frames.of_bounds, functions);
@@ -159,8 +160,8 @@ where
         }
         coarse_share = coarse_motion(&mut matrices, lattice, coarse_share, refresh);
         let (tables, cells) = (&mut tables, &*matrices.cells);
-        let damped = matrices.damped.as_ref().filter(|_| refresh.lattice_in_use);
-        let damped = damped.map(|damped| Calm { smooth: &*damped.momentum, share: damping });
+        let damped = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use);
+        let damped = damped.map(|damped| Calm { smooth: smooth_motion(damped, lattice), share: damping });
         let moved = dispatch(Settle {
             step,
             scaling,
@@ -218,9 +219,24 @@ where
     extremes.status(ledger, held)
 }
 
+/// The cells' sums of momentum become what of the increments is smooth, `W G^-1 W^T M du`.
+fn smooth_motion<'a>(damped: &'a mut DampedMatrices<'_>, lattice: &Lattice) -> &'a [Cell] {
+    let functions = lattice.functions();
+    let momentum = restrict(damped.momentum, lattice);
+    let mut smooth = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+    let rows = damped.mean.chunks_exact(stride(thirds(functions)).max(1));
+    for (smooth, row) in smooth.iter_mut().zip(rows).take(functions) {
+        let products = row.iter().zip(&momentum).take(functions);
+        let sum: Vec4 = products.map(|(entry, momentum)| *entry * Vec4::from(momentum.0)).sum();
+        smooth.0 = sum.to_array();
+    }
+    prolong(&smooth, lattice, damped.momentum);
+    damped.momentum
+}
+
 /// `share (S^-1 - G^-1) W^T r` less the correction that a change of `S` asked for, from the cells' sums of `r` to what
 /// they move. The share falls where the forces of one step would strain a cell by more than [`LARGEST_KICK`]. With a
-/// damped inertia `S^-1` goes to second order, and the cells' sums of momentum become what of the increments is smooth.
+/// damped inertia `S^-1` goes to second order.
 fn coarse_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, mut share: f32, refresh: &Refresh) -> f32 {
     let functions = lattice.functions();
     let (size, stride) = (3 * functions, stride(functions));
@@ -240,15 +256,6 @@ fn coarse_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, mut share: f32,
         for (moved, more) in moved.iter_mut().zip(times(damped.inverse, &times(damped.mass, &second))) {
             *moved += more;
         }
-        let momentum = restrict(damped.momentum, lattice);
-        let mut smooth = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-        let rows = damped.mean.chunks_exact(super::dense::stride(thirds(functions)).max(1));
-        for (smooth, row) in smooth.iter_mut().zip(rows).take(functions) {
-            let products = row.iter().zip(&momentum).take(functions);
-            let sum: Vec4 = products.map(|(entry, momentum)| *entry * Vec4::from(momentum.0)).sum();
-            smooth.0 = sum.to_array();
-        }
-        prolong(&smooth, lattice, damped.momentum);
     }
     let mut solution = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
     from_numbers(moved.get(..size).unwrap_or_default(), &mut solution);

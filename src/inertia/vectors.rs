@@ -11,7 +11,7 @@ pub const fn vectors_for(nodes: usize) -> usize {
     5 * nodes
 }
 
-/// The same for [`super::Inertia::prepare_damped`].
+/// The same for [`super::Inertia::damped`].
 #[must_use]
 pub const fn damped_vectors_for(nodes: usize) -> usize {
     6 * nodes

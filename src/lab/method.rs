@@ -11,7 +11,7 @@ use super::host::{HostScene, HostState};
 use super::networks::{self, Size};
 use super::{DT, LabError};
 use crate::inertia::{
-    self, Damper, Inertia, LatticeNode, damped_numbers_for, damped_step, damped_vectors_for,
+    Damper, Inertia, LatticeNode, damped_numbers_for, damped_step, damped_vectors_for,
     suggested_damped_lattice, suggested_lattice,
 };
 use crate::loads::Loads;
@@ -191,25 +191,18 @@ impl Method {
                 };
                 let nodes = scene.node_count();
                 // Room for either: a damped inertia needs more.
-                let mut inertia = Box::new(Inertia::over(
+                let inertia = Inertia::over(
                     vec![NodeVector::ZERO; damped_vectors_for(nodes)],
                     vec![LatticeNode::EMPTY; nodes],
                     vec![0.0; damped_numbers_for(cells, functions)],
-                ));
+                );
+                let mut inertia = Box::new(if damper.is_some() { inertia.damped() } else { inertia });
                 // Scenes start at rest.
                 let zero = || vec![NodeVector::ZERO; nodes];
                 let mut rest = State::over(zero(), zero(), zero());
-                let step = Step::insist(dt, damping)?;
-                if damper.is_some() {
-                    inertia.prepare_damped(scene, points, &mut rest, step, cells)?;
-                } else {
-                    inertia.prepare(scene, points, &mut rest, step, cells)?;
-                }
+                inertia.prepare(scene, points, &mut rest, Step::insist(dt, damping)?, cells)?;
                 Box::new(move |state, loads| {
-                    let status = match &damper {
-                        Some(damper) => damped_step(scene, loads, state, &mut inertia, damper),
-                        None => inertia::step(scene, loads, state, &mut inertia),
-                    };
+                    let status = damped_step(scene, loads, state, &mut inertia, damper.as_ref());
                     (status, Found { estimate: Some(inertia.report().error), clipped: None })
                 })
             }

@@ -91,6 +91,15 @@ pub struct SceneSpec {
 }
 
 impl SceneSpec {
+    /// The scene under `times` its forces.
+    #[must_use]
+    pub fn with_load(mut self, times: f32) -> Self {
+        for force in &mut self.forces {
+            force.newton = force.newton.map(|newton| times * newton);
+        }
+        self
+    }
+
     /// Duration, s.
     #[must_use]
     pub fn duration(&self) -> f64 {

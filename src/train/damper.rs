@@ -190,10 +190,7 @@ pub fn train(
     let recipe = Recipe::parse(text)?;
     let mut scenes = Vec::new();
     for motion in &recipe.motion {
-        let mut spec = scenes::named(&motion.scene)?;
-        for force in &mut spec.forces {
-            force.newton = force.newton.map(|newton| motion.load * newton);
-        }
+        let spec = scenes::named(&motion.scene)?.with_load(motion.load);
         let truth = truth::compute(&spec)?;
         scenes.push((spec, truth, motion));
     }
@@ -296,11 +293,7 @@ fn rule(hidden: usize) -> Vec<f64> {
 
 /// How far each of the rule's weights may reasonably move.
 fn scales(hidden: usize) -> Vec<f64> {
-    let scale = |place: usize| match place / hidden {
-        0..INPUTS => 0.1,
-        INPUTS => 0.3,
-        _ => 0.3,
-    };
+    let scale = |place: usize| if place < INPUTS * hidden { 0.1 } else { 0.3 };
     (0..(INPUTS + 2) * hidden + 1).map(scale).collect()
 }
 

@@ -73,10 +73,7 @@ struct Asked {
 impl Samples {
     /// Simulates the recipe's motion and samples it.
     pub fn collect(recipe: &Recipe) -> Result<Self, LabError> {
-        let mut spec = scenes::named(&recipe.motion.scene)?;
-        for force in &mut spec.forces {
-            force.newton = force.newton.map(|newton| recipe.motion.load * newton);
-        }
+        let spec = scenes::named(&recipe.motion.scene)?.with_load(recipe.motion.load);
         spec.with_material(Collect { spec: &spec, recipe })
     }
 

@@ -62,10 +62,10 @@ impl Method {
             if functions > 0 { nodes } else { 0 },
             damped_numbers_for(cells, functions),
         );
-        match self {
-            Self::Damped => inertia.prepare_damped(scene, &body.points, state, step, cells).unwrap(),
-            _ => inertia.prepare(scene, &body.points, state, step, cells).unwrap(),
+        if self == Self::Damped {
+            inertia = inertia.damped();
         }
+        inertia.prepare(scene, &body.points, state, step, cells).unwrap();
         assert_eq!(inertia.functions(), functions);
         inertia
     }
@@ -84,7 +84,7 @@ fn advance<M: Material>(
     }
     let weights = networks::constant(4, 20.0);
     let damper = Damper::over(Network::parse(weights.bytes()).unwrap()).unwrap();
-    damped_step(scene, loads, state, inertia, &damper)
+    damped_step(scene, loads, state, inertia, Some(&damper))
 }
 
 fn over(vectors: usize, places: usize, numbers: usize) -> HostInertia {

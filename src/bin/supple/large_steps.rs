@@ -1,9 +1,8 @@
 //! Steps beyond the limit of stability: their inertia on a host with a heap, and what it did on the way.
 
 use supple::inertia::{
-    self, Damper, Inertia, InertiaError, LatticeNode, Report, damped_numbers_for, damped_step,
-    damped_vectors_for, lattice_functions, numbers_for, suggested_damped_lattice, suggested_lattice,
-    vectors_for,
+    Damper, Inertia, InertiaError, LatticeNode, Report, damped_numbers_for, damped_step, damped_vectors_for,
+    lattice_functions, numbers_for, suggested_damped_lattice, suggested_lattice, vectors_for,
 };
 use supple::lab::networks;
 use supple::loads::Loads;
@@ -29,10 +28,7 @@ impl HostInertia {
         loads: &Loads<'_>,
         state: &mut HostState,
     ) -> Status {
-        match &self.damper {
-            Some(damper) => damped_step(scene, loads, state, &mut self.inertia, damper),
-            None => inertia::step(scene, loads, state, &mut self.inertia),
-        }
+        damped_step(scene, loads, state, &mut self.inertia, self.damper.as_ref())
     }
 
     pub(crate) const fn report(&self) -> &Report {
@@ -113,13 +109,12 @@ impl Grid {
             vec![LatticeNode::EMPTY; places],
             vec![0.0; numbers],
         );
-        let damper = if self.damped {
-            inertia.prepare_damped(scene, &setup.body.local, state, step, self.cells)?;
-            Network::parse(networks::damper()).ok().and_then(|network| Damper::over(network).ok())
-        } else {
-            inertia.prepare(scene, &setup.body.local, state, step, self.cells)?;
-            None
-        };
+        let mut damper = None;
+        if self.damped {
+            inertia = inertia.damped();
+            damper = Network::parse(networks::damper()).ok().and_then(|network| Damper::over(network).ok());
+        }
+        inertia.prepare(scene, &setup.body.local, state, step, self.cells)?;
         Ok(HostInertia { inertia, damper })
     }
 }

@@ -143,7 +143,7 @@ type Damped = Inertia<
     [f32; damped_numbers_for(LATTICE, 27)],
 >;
 
-/// Multilevel inertia with rough motion damped.
+/// Multilevel inertia with rough motion damped; of [`Inertia::damped`].
 #[unsafe(no_mangle)]
 pub extern "C" fn damped(
     scene: &Scene<Exponential>,
@@ -161,10 +161,10 @@ pub extern "C" fn damped(
     let Ok(damper) = Damper::over(network) else {
         return -2.0;
     };
-    if damped.prepare_damped(scene, points, state, step, *cells).is_err() {
+    if damped.prepare(scene, points, state, step, *cells).is_err() {
         return -3.0;
     }
-    let _ = inertia::damped_step(scene, loads, state, damped, &damper);
+    let _ = inertia::damped_step(scene, loads, state, damped, Some(&damper));
     damped.report().damping
 }
 
