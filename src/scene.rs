@@ -208,6 +208,12 @@ impl ElementBlock {
         R::from_fn(|lane| self.gradients[corner][axis][first + lane])
     }
 
+    /// All components of one, 1/m.
+    #[inline(always)]
+    pub(crate) fn gradients<R: Real>(&self, corner: usize, first: usize) -> [R; 3] {
+        [self.gradient(corner, 0, first), self.gradient(corner, 1, first), self.gradient(corner, 2, first)]
+    }
+
     /// One gradient component of one element, 1/m.
     #[inline(always)]
     pub(crate) fn gradient_of(&self, corner: usize, axis: usize, lane: usize) -> f32 {

@@ -206,7 +206,14 @@ impl Beside for MatrixBeside<'_> {
 /// `C` by rows.
 #[inline(always)]
 pub(super) fn cofactor<R: Real>(deformation: &Deformation<R>) -> [[R; 3]; 3] {
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| deformation.cofactor(i, j)))
+    // Loops: closures over vectors may stay calls.
+    let mut cofactor = [[R::splat(0.0); 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            cofactor[i][j] = deformation.cofactor(i, j);
+        }
+    }
+    cofactor
 }
 
 impl MatrixBeside<'_> {
@@ -223,7 +230,7 @@ impl MatrixBeside<'_> {
         let isotropic = volume * bound.iso * block.spread::<R>(first);
         let mut images = [[R::splat(0.0); 3]; 4];
         for corner in 0..3 {
-            let gradient = [0, 1, 2].map(|axis| block.gradient::<R>(corner, axis, first));
+            let gradient = block.gradients::<R>(corner, first);
             for i in 0..3 {
                 let c = &cofactor[i];
                 images[corner + 1][i] = c[0] * gradient[0] + c[1] * gradient[1] + c[2] * gradient[2];

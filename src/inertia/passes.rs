@@ -119,7 +119,11 @@ impl Prepare<'_, '_> {
         for (turn, place) in turns.iter_mut().zip(places) {
             *turn = self.turns.get(place.frame()).unwrap_or(&STILL);
         }
-        let turn = [0, 1, 2].map(|row| R::from_rows(|lane| turns[lane % BLOCK][row % 3]));
+        let turn = [
+            R::from_rows(|lane| turns[lane % BLOCK][0]),
+            R::from_rows(|lane| turns[lane % BLOCK][1]),
+            R::from_rows(|lane| turns[lane % BLOCK][2]),
+        ];
         let back = |axis: usize| turn[0][axis] * rx + turn[1][axis] * ry + turn[2][axis] * rz;
         let (bx, by, bz) = (back(0), back(1), back(2));
         let [xx, yy, zz, bound_before] = read_rows::<R>(must_cast_slice(inverse_diagonal), first);
@@ -152,8 +156,9 @@ impl Prepare<'_, '_> {
             // `p, q, r`: beside a crushed element the inverse is so small that products of it are zero.
             let (fx, fy, fz) = (ix.positive(), iy.positive(), iz.positive());
             let least = R::splat(LEAST_INVERSE);
-            let [a, b, c] = [xx + (one - fx), yy + (one - fy), zz + (one - fz)].map(|x| x.max(least));
-            let [ra, rb, rc] = [a, b, c].map(|x| x.root());
+            let (a, b, c) =
+                ((xx + (one - fx)).max(least), (yy + (one - fy)).max(least), (zz + (one - fz)).max(least));
+            let (ra, rb, rc) = (a.root(), b.root(), c.root());
             let (p, q, r) = (xy.over(ra * rb), yz.over(rb * rc), zx.over(rc * ra));
             let (pp, qq, rr) = (p * p, q * q, r * r);
             let determinant = one + R::splat(2.0) * p * q * r - pp - qq - rr;
@@ -232,7 +237,7 @@ impl Settle<'_, '_> {
         let coarse = at_nodes::<R, C>(self.cells, places);
         let alone = read_rows::<R>(must_cast_slice(self.tables.next), first);
         let [ix, iy, iz, mass] = read_rows::<R>(must_cast_slice(self.inertia), first);
-        let free = [ix, iy, iz].map(R::positive);
+        let free = [ix.positive(), iy.positive(), iz.positive()];
         let force = read_rows::<R>(must_cast_slice(self.force), first);
         let increment = read_rows::<R>(must_cast_slice(self.increment), first);
         let displacement = read_rows::<R>(must_cast_slice(self.displacement), first);
@@ -296,7 +301,8 @@ impl Cell {
     #[inline(always)]
     fn at<R: Real>(&self, place: &LatticeNode) -> [f32; 4] {
         let [x, y, z] = place.within();
-        let [a, b, c, d] = self.0.map(|row| R::from_fn(|lane| row[lane % 8]));
+        let row = |row: usize| R::from_fn(|lane| self.0[row % 4][lane % 8]);
+        let (a, b, c, d) = (row(0), row(1), row(2), row(3));
         let both = (a + R::splat(y) * b) + R::splat(z) * (c + R::splat(y) * d);
         [0, 1, 2, 3].map(|axis| both.lane(axis) + x * both.lane(axis + 4))
     }

@@ -1,6 +1,6 @@
 //! Which instructions a kernel may use, asked of the processor once. The body of a kernel is the same for
-//! every level; a wrapper with the level's instructions switched on is all there is to one. No level fuses
-//! multiplications with additions, so all give the same bits.
+//! every level; a wrapper with the level's instructions switched on is all there is to one. Only networks use fused
+//! multiplications and additions, and not with the feature `deterministic`: all else gives the same bits at every level.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -14,7 +14,7 @@ use super::{Lanes, Real};
 pub enum Level {
     /// What the crate was compiled for.
     Portable,
-    /// x86-64 with AVX2.
+    /// x86-64 with AVX2 and FMA.
     Avx2,
 }
 
@@ -81,17 +81,17 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Avx>()
 }
 
-/// AVX2 in the processor (leaf 7), AVX and the saving of its registers by the system (leaf 1, XCR0).
+/// AVX2 in the processor (leaf 7), FMA, AVX and the saving of its registers by the system (leaf 1, XCR0).
 #[cfg(target_arch = "x86_64")]
 fn has_avx2() -> bool {
     use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 
-    const OSXSAVE_AND_AVX: u32 = 1 << 27 | 1 << 28;
+    const NEEDED: u32 = 1 << 12 | 1 << 27 | 1 << 28;
     const XMM_AND_YMM: u64 = 0b110;
     #[target_feature(enable = "xsave")]
     fn enabled_state() -> u64 {
@@ -101,7 +101,7 @@ fn has_avx2() -> bool {
             _xgetbv(0)
         }
     }
-    if __cpuid(0).eax < 7 || __cpuid(1).ecx & OSXSAVE_AND_AVX != OSXSAVE_AND_AVX {
+    if __cpuid(0).eax < 7 || __cpuid(1).ecx & NEEDED != NEEDED {
         return false;
     }
     // SAFETY: OSXSAVE is set, so xgetbv is there.

@@ -2,17 +2,19 @@
 //! elements at once ([`Lanes`]).
 //!
 //! Element loops are written once over [`Real`]. The compiler turns the fixed-length loops of
-//! [`Lanes`] into vector instructions of whatever width the target has; no operation here fuses a
-//! multiplication with an addition, so every width gives the same bits.
+//! [`Lanes`] into vector instructions of whatever width the target has. Only [`Real::fused`] may fuse a multiplication
+//! with an addition; without it every width gives the same bits.
 
 mod functions;
 mod level;
+mod pair;
 mod vectors;
 #[cfg(target_arch = "x86_64")]
 mod wide;
 
 pub use level::Level;
 pub(crate) use level::{Kernel, dispatch};
+pub(crate) use pair::Pair;
 pub use vectors::NodeVector;
 use vectors::transpose;
 pub(crate) use vectors::{Gather, Scatter, read_rows, write_rows};
@@ -28,6 +30,8 @@ pub trait Real:
 {
     /// Numbers held side by side: one, or a multiple of four.
     const COUNT: usize;
+    /// There are registers for a block of four by two of these sums, and what goes into them.
+    const MANY_REGISTERS: bool = false;
 
     /// Number `lane` is `at(lane)`.
     fn from_fn(at: impl Fn(usize) -> f32) -> Self;
@@ -42,6 +46,16 @@ pub trait Real:
     /// Applies `f` to each pair of numbers.
     fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self;
 
+    /// `self * factor + addend`, rounded once where the level can, unless the feature `deterministic` is on.
+    #[inline(always)]
+    fn fused(self, factor: Self, addend: Self) -> Self {
+        self * factor + addend
+    }
+    /// `yes` where positive, else `no`.
+    #[inline(always)]
+    fn choose(self, yes: Self, no: Self) -> Self {
+        Self::from_fn(|lane| if self.lane(lane) > 0.0 { yes.lane(lane) } else { no.lane(lane) })
+    }
     /// The same value in every lane.
     #[inline(always)]
     fn splat(value: f32) -> Self {

@@ -2,15 +2,17 @@
 //! unrolled loops, which it gives up on in long kernels; here each operation is one instruction, of the same
 //! results.
 //!
-//! Only [`super::level`] names this type, in what it runs once it has seen that the processor has AVX2.
+//! Only [`super::level`] names this type, in what it runs once it has seen that the processor has AVX2 and FMA.
 
 #![allow(unsafe_code)] // The instructions are unsafe to use without that.
 
+#[cfg(not(feature = "deterministic"))]
+use core::arch::x86_64::_mm256_fmadd_ps;
 use core::arch::x86_64::{
-    __m256, _CMP_GT_OQ, _mm256_add_epi32, _mm256_add_ps, _mm256_and_ps, _mm256_castps_si256,
-    _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cvtepi32_ps, _mm256_div_ps, _mm256_max_ps, _mm256_min_ps,
-    _mm256_mul_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_shuffle_ps,
-    _mm256_slli_epi32, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_sub_epi32, _mm256_sub_ps,
+    __m256, _CMP_GT_OQ, _mm256_add_epi32, _mm256_add_ps, _mm256_and_ps, _mm256_blendv_ps,
+    _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cvtepi32_ps, _mm256_div_ps,
+    _mm256_max_ps, _mm256_min_ps, _mm256_mul_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps,
+    _mm256_shuffle_ps, _mm256_slli_epi32, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_sub_epi32, _mm256_sub_ps,
     _mm256_unpackhi_ps, _mm256_unpacklo_ps, _mm256_xor_ps,
 };
 use core::ops::{Add, Mul, Neg, Sub};
@@ -62,6 +64,7 @@ impl Neg for Avx {
 
 impl Real for Avx {
     const COUNT: usize = 8;
+    const MANY_REGISTERS: bool = true;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {
@@ -105,6 +108,19 @@ impl Real for Avx {
             *a = f(*a, b);
         }
         Self::of(out)
+    }
+    #[cfg(not(feature = "deterministic"))]
+    #[inline(always)]
+    fn fused(self, factor: Self, addend: Self) -> Self {
+        // SAFETY: the processor has FMA, see the module.
+        Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, addend.0) })
+    }
+    #[inline(always)]
+    fn choose(self, yes: Self, no: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe {
+            _mm256_blendv_ps(no.0, yes.0, _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_setzero_ps()))
+        })
     }
     #[inline(always)]
     fn splat(value: f32) -> Self {

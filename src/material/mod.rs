@@ -22,7 +22,7 @@ pub use exponential::{EXPONENT_CAP, Exponential};
 pub use neo_hookean::NeoHookean;
 pub use tissue::{Material, Regions, Tissue};
 
-use crate::lanes::Real;
+use crate::lanes::{Pair, Real};
 
 /// Volume ratio below which `J^(-2/3)` is continued along its tangent.
 pub const J_FLOOR: f32 = 0.1;
@@ -209,6 +209,52 @@ impl<R: Real> Local<R> {
             None => (slope, slope),
         };
         Response { p1, s: s + law.volume_slope(self.at.j), saturation: law.saturation(self.x) }
+    }
+}
+
+impl<R: Real> VolumeFactor<Pair<R>> {
+    #[inline(always)]
+    fn split(&self) -> [VolumeFactor<R>; 2] {
+        let Self { g, slope, fifth, inverse, clamped, below, x } = *self;
+        [
+            VolumeFactor {
+                g: g.0,
+                slope: slope.0,
+                fifth: fifth.0,
+                inverse: inverse.0,
+                clamped: clamped.0,
+                below: below.0,
+                x: x.0,
+            },
+            VolumeFactor {
+                g: g.1,
+                slope: slope.1,
+                fifth: fifth.1,
+                inverse: inverse.1,
+                clamped: clamped.1,
+                below: below.1,
+                x: x.1,
+            },
+        ]
+    }
+}
+
+impl<R: Real> Local<Pair<R>> {
+    /// Each half by itself.
+    #[inline(always)]
+    pub(crate) fn split(&self) -> [Local<R>; 2] {
+        let Self { at, factor, slope, x } = *self;
+        let [near, far] = match factor {
+            Some(factor) => {
+                let [near, far] = factor.split();
+                [Some(near), Some(far)]
+            }
+            None => [None, None],
+        };
+        [
+            Local { at: Invariants { i: at.i.0, j: at.j.0 }, factor: near, slope: slope.0, x: x.0 },
+            Local { at: Invariants { i: at.i.1, j: at.j.1 }, factor: far, slope: slope.1, x: x.1 },
+        ]
     }
 }
 

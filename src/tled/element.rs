@@ -4,9 +4,9 @@
 //! forces of an element add up to zero and a translation gives exactly none.
 
 use super::Status;
-use crate::lanes::{Gather, Real, Scatter};
+use crate::lanes::{BLOCK, Gather, Pair, Real, Scatter};
 use crate::ledger::Ledger;
-use crate::material::{Invariants, J_FLOOR, Law, Local, Response, response_operations};
+use crate::material::{Invariants, J_FLOOR, Law, Local, Material, response_operations};
 use crate::scene::ElementBlock;
 
 /// A vector and a matrix in lanes; rows are spatial, columns material.
@@ -34,6 +34,17 @@ impl<R: Real> Deformation<R> {
     /// From the displacement gradient: `J - 1 = tr H + tr cof H + det H`, `I1 - 3 = 2 tr H + H:H`.
     #[inline(always)]
     pub(crate) fn new(h: Matrix<R>) -> Self {
+        let zero = Invariants { i: R::splat(0.0), j: R::splat(0.0) };
+        let Self { cof_h, trace, .. } = Self::with(h, zero);
+        let second = cof_h[0][0] + cof_h[1][1] + cof_h[2][2];
+        let j = trace + second + dot(h[0], cof_h[0]);
+        let i = trace + trace + (dot(h[0], h[0]) + dot(h[1], h[1]) + dot(h[2], h[2]));
+        Self { h, cof_h, trace, invariants: Invariants { i, j } }
+    }
+
+    /// With the invariants that it has.
+    #[inline(always)]
+    fn with(h: Matrix<R>, invariants: Invariants<R>) -> Self {
         let minor = |i: usize, j: usize| {
             let (p, q, r, s) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
             h[p][r] * h[q][s] - h[p][s] * h[q][r]
@@ -44,10 +55,7 @@ impl<R: Real> Deformation<R> {
             [minor(2, 0), minor(2, 1), minor(2, 2)],
         ];
         let trace = h[0][0] + h[1][1] + h[2][2];
-        let second = cof_h[0][0] + cof_h[1][1] + cof_h[2][2];
-        let j = trace + second + dot(h[0], cof_h[0]);
-        let i = trace + trace + (dot(h[0], h[0]) + dot(h[1], h[1]) + dot(h[2], h[2]));
-        Self { h, cof_h, trace, invariants: Invariants { i, j } }
+        Self { h, cof_h, trace, invariants }
     }
 
     /// Deformation of the elements in lanes `first..` of a block.
@@ -86,9 +94,8 @@ impl<R: Real> Deformation<R> {
 
     /// First Piola-Kirchhoff stress, Pa.
     #[inline(always)]
-    pub(crate) fn stress(&self, response: &Response<R>) -> Matrix<R> {
-        let entry =
-            |i: usize, j: usize| response.p1 * self.distortion(i, j) + response.s * self.cofactor(i, j);
+    pub(crate) fn stress(&self, p1: R, s: R) -> Matrix<R> {
+        let entry = |i: usize, j: usize| p1 * self.distortion(i, j) + s * self.cofactor(i, j);
         [
             [entry(0, 0), entry(0, 1), entry(0, 2)],
             [entry(1, 0), entry(1, 1), entry(1, 2)],
@@ -155,36 +162,137 @@ impl Beside for Nothing {
     }
 }
 
-/// Adds the internal forces of the elements in lanes `first..` of a block to `force`, with minus sign.
+/// Elements side by side on their way through the passes of [`add_forces`].
+#[derive(Clone, Copy)]
+struct Part<R> {
+    h: Matrix<R>,
+    invariants: Invariants<R>,
+    p1: R,
+    s: R,
+    /// For the fourth component of the forces.
+    fourth: R,
+}
+
+impl<R: Real> Part<R> {
+    #[inline(always)]
+    fn nothing() -> Self {
+        let zero = R::splat(0.0);
+        Self {
+            h: [[zero; 3]; 3],
+            invariants: Invariants { i: zero, j: zero },
+            p1: zero,
+            s: zero,
+            fourth: zero,
+        }
+    }
+}
+
+/// Vectors of elements that go through the passes together.
+const TOGETHER: usize = 8;
+
+/// Adds the internal forces of all elements to `force`, with minus sign. In three passes over a few vectors of elements: the law is
+/// a long chain of operations that wait for each other, and gets nothing else in between ([`Pair`]).
 #[inline(always)]
-pub(crate) fn add_forces<R: Real, L: Law>(
-    law: &L::Wide<R>,
-    block: &ElementBlock,
-    first: usize,
+pub(crate) fn add_forces<R: Real, M: Material>(
+    material: &M,
+    blocks: &[ElementBlock],
     displacement: Gather<'_>,
     force: &mut Scatter<'_>,
-    extremes: &mut Extremes<R>,
+    beside: &mut impl Beside,
+) -> Extremes<Pair<R>> {
+    let mut extremes =
+        Extremes { least_j: Pair::<R>::splat(f32::INFINITY), saturation: Pair::splat(f32::NEG_INFINITY) };
+    let mut parts = [Part::<R>::nothing(); TOGETHER];
+    for blocks in blocks.chunks((TOGETHER * R::COUNT / BLOCK).max(1)) {
+        let mut rest = parts.iter_mut();
+        for block in blocks {
+            for first in (0..BLOCK).step_by(R::COUNT) {
+                if let Some(part) = rest.next() {
+                    let deformation = Deformation::<R>::of_block(block, first, displacement);
+                    (part.h, part.invariants) = (deformation.h, deformation.invariants);
+                }
+            }
+        }
+        let mut rest = parts.as_chunks_mut::<2>().0.iter_mut();
+        for block in blocks {
+            for first in (0..BLOCK).step_by(Pair::<R>::COUNT) {
+                if let Some(parts) = rest.next() {
+                    respond::<R, M>(material, block, first, parts, &mut extremes, beside);
+                }
+            }
+        }
+        let mut rest = parts.iter();
+        for block in blocks {
+            for first in (0..BLOCK).step_by(R::COUNT) {
+                if let Some(part) = rest.next() {
+                    scatter(part, block, first, force);
+                }
+            }
+        }
+    }
+    extremes
+}
+
+/// The second pass: the law.
+#[inline(always)]
+fn respond<R: Real, M: Material>(
+    material: &M,
+    block: &ElementBlock,
+    first: usize,
+    [near, far]: &mut [Part<R>; 2],
+    extremes: &mut Extremes<Pair<R>>,
     beside: &mut impl Beside,
 ) {
-    let deformation = Deformation::<R>::of_block(block, first, displacement);
-    let local = Local::new::<L>(law, deformation.invariants);
-    let fourth = beside.see::<R, L>(law, block, first, &deformation, &local);
-    let response = local.response::<L>(law);
-    extremes.least_j = deformation.invariants.j.min(extremes.least_j);
+    let law = M::Law::widen::<Pair<R>>(|lane| material.law(block.element(first + lane)));
+    let invariants = Invariants {
+        i: Pair(near.invariants.i, far.invariants.i),
+        j: Pair(near.invariants.j, far.invariants.j),
+    };
+    let local = Local::new::<M::Law>(&law, invariants);
+    let response = local.response::<M::Law>(&law);
+    (near.p1, near.s) = (response.p1.0, response.s.0);
+    (far.p1, far.s) = (response.p1.1, response.s.1);
+    extremes.least_j = invariants.j.min(extremes.least_j);
     extremes.saturation = response.saturation.max(extremes.saturation);
+    let [of_near, of_far] = local.split();
+    look::<R, M>(material, block, first, near, &of_near, beside);
+    look::<R, M>(material, block, first + R::COUNT, far, &of_far, beside);
+}
 
-    let stress = deformation.stress(&response);
+/// What else is made of it.
+#[inline(always)]
+fn look<R: Real, M: Material>(
+    material: &M,
+    block: &ElementBlock,
+    first: usize,
+    part: &mut Part<R>,
+    local: &Local<R>,
+    beside: &mut impl Beside,
+) {
+    let law = M::Law::widen(|lane| material.law(block.element(first + lane)));
+    let deformation = Deformation::with(part.h, part.invariants);
+    part.fourth = beside.see::<R, M::Law>(&law, block, first, &deformation, local);
+}
+
+/// The third pass: nodal forces from the stress.
+#[inline(always)]
+fn scatter<R: Real>(part: &Part<R>, block: &ElementBlock, first: usize, force: &mut Scatter<'_>) {
+    let deformation = Deformation::with(part.h, part.invariants);
+    let stress = deformation.stress(part.p1, part.s);
     let minus_volume = -block.volume::<R>(first);
     let mut forces = [[R::splat(0.0); 3]; 4];
     for axis in 0..3 {
-        let row = stress[axis].map(|entry| entry * minus_volume);
+        let [x, y, z] = stress[axis];
+        let row = [x * minus_volume, y * minus_volume, z * minus_volume];
         for corner in 0..3 {
-            let gradient = [0, 1, 2].map(|j| block.gradient::<R>(corner, j, first));
-            forces[corner + 1][axis] = dot(row, gradient);
+            forces[corner + 1][axis] = dot(row, block.gradients::<R>(corner, first));
         }
         forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
     }
-    for (corner, [x, y, z]) in forces.into_iter().enumerate() {
-        force.add_lanes(|lane| block.node(corner, first + lane), [x, y, z, fourth]);
-    }
+    // One by one: in a loop the compiler would take the forces through memory, number by number.
+    let ([a, b, c, d], fourth) = (forces, part.fourth);
+    force.add_lanes(|lane| block.node(0, first + lane), [a[0], a[1], a[2], fourth]);
+    force.add_lanes(|lane| block.node(1, first + lane), [b[0], b[1], b[2], fourth]);
+    force.add_lanes(|lane| block.node(2, first + lane), [c[0], c[1], c[2], fourth]);
+    force.add_lanes(|lane| block.node(3, first + lane), [d[0], d[1], d[2], fourth]);
 }

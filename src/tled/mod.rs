@@ -23,9 +23,9 @@ pub use spectrum::exact_critical_step;
 
 use core::fmt;
 
-use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter, dispatch};
+use crate::lanes::{Gather, Kernel, Pair, Real, Scatter, dispatch};
 use crate::loads::{Loads, ramp_factor};
-use crate::material::{Law, Material};
+use crate::material::Material;
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
 
@@ -373,27 +373,11 @@ where
 
     #[inline(always)]
     fn run<R: Real>(mut self) -> Extremes<f32> {
-        let mut extremes =
-            Extremes { least_j: R::splat(f32::INFINITY), saturation: R::splat(f32::NEG_INFINITY) };
-        for block in self.scene.blocks() {
-            for first in (0..BLOCK).step_by(R::COUNT) {
-                let material = self.scene.material();
-                let law = M::Law::widen(|lane| material.law(block.element(first + lane)));
-                let (displacement, force) = (self.displacement, &mut self.force);
-                let beside = &mut self.beside;
-                element::add_forces::<R, M::Law>(
-                    &law,
-                    block,
-                    first,
-                    displacement,
-                    force,
-                    &mut extremes,
-                    beside,
-                );
-            }
-        }
+        let Self { scene, displacement, force, beside } = &mut self;
+        let extremes =
+            element::add_forces::<R, M>(scene.material(), scene.blocks(), *displacement, force, beside);
         let mut reduced = Extremes { least_j: f32::INFINITY, saturation: f32::NEG_INFINITY };
-        for lane in 0..R::COUNT {
+        for lane in 0..Pair::<R>::COUNT {
             reduced.least_j = reduced.least_j.min(extremes.least_j.lane(lane));
             reduced.saturation = reduced.saturation.max(extremes.saturation.lane(lane));
         }

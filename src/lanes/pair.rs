@@ -1,0 +1,122 @@
+//! Two vectors as one. A long chain of operations that wait for each other leaves a processor idle, and its window is too
+//! short to find the next vector's chain by itself; two chains, instruction by instruction in turn, fill the gaps.
+
+// No closures over vectors here: the compiler leaves calls of them standing where instructions were to be.
+
+use core::ops::{Add, Mul, Neg, Sub};
+
+use super::Real;
+
+/// The lanes of the first, then those of the second.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pair<R>(pub(crate) R, pub(crate) R);
+
+impl<R: Real> Add for Pair<R> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        let (Self(a, b), Self(c, d)) = (self, other);
+        Self(a + c, b + d)
+    }
+}
+
+impl<R: Real> Sub for Pair<R> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        let (Self(a, b), Self(c, d)) = (self, other);
+        Self(a - c, b - d)
+    }
+}
+
+impl<R: Real> Mul for Pair<R> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        let (Self(a, b), Self(c, d)) = (self, other);
+        Self(a * c, b * d)
+    }
+}
+
+impl<R: Real> Neg for Pair<R> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0, -self.1)
+    }
+}
+
+impl<R: Real> Real for Pair<R> {
+    const COUNT: usize = 2 * R::COUNT;
+
+    #[inline(always)]
+    fn from_fn(at: impl Fn(usize) -> f32) -> Self {
+        Self(R::from_fn(&at), R::from_fn(|lane| at(R::COUNT + lane)))
+    }
+    #[inline(always)]
+    fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
+        let [a, b, c, d] = R::from_rows(&row);
+        let [e, f, g, h] = R::from_rows(|lane| row(R::COUNT + lane));
+        [Self(a, e), Self(b, f), Self(c, g), Self(d, h)]
+    }
+    #[inline(always)]
+    fn to_rows([x, y, z, w]: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
+        R::to_rows([x.0, y.0, z.0, w.0], &mut row);
+        R::to_rows([x.1, y.1, z.1, w.1], |lane, numbers| row(R::COUNT + lane, numbers));
+    }
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> f32 {
+        if lane < R::COUNT { self.0.lane(lane) } else { self.1.lane(lane - R::COUNT) }
+    }
+    #[inline(always)]
+    fn map(self, f: impl Fn(f32) -> f32) -> Self {
+        Self(self.0.map(&f), self.1.map(&f))
+    }
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        Self(self.0.zip(other.0, &f), self.1.zip(other.1, &f))
+    }
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self(R::splat(value), R::splat(value))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        let (Self(a, b), Self(c, d)) = (self, other);
+        Self(a.max(c), b.max(d))
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        let (Self(a, b), Self(c, d)) = (self, other);
+        Self(a.min(c), b.min(d))
+    }
+    #[inline(always)]
+    fn over(self, other: Self) -> Self {
+        let (Self(a, b), Self(c, d)) = (self, other);
+        Self(a.over(c), b.over(d))
+    }
+    #[inline(always)]
+    fn positive(self) -> Self {
+        Self(self.0.positive(), self.1.positive())
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs(), self.1.abs())
+    }
+    #[inline(always)]
+    fn root(self) -> Self {
+        Self(self.0.root(), self.1.root())
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt(), self.1.sqrt())
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        Self(self.0.exp(), self.1.exp())
+    }
+    #[inline(always)]
+    fn inverse_cbrt(self) -> Self {
+        Self(self.0.inverse_cbrt(), self.1.inverse_cbrt())
+    }
+}
