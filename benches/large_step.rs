@@ -3,42 +3,31 @@
 //! `cargo bench --bench large_step` prints criterion's figures, then ratios from interleaved pairs of runs (the
 //! machine's speed drifts; the ratio does not) and what the steps of a refresh cycle cost against their mean.
 
-use std::time::Instant;
+mod common {
+    pub(crate) mod bar;
+    pub(crate) mod pairs;
+}
 
+use common::bar::{self, BarScene, DAMPING, DT, moved, state};
+use common::pairs::{median, seconds};
 use criterion::{BenchmarkId, Criterion, Throughput};
 use supple::inertia::{
     self, Damper, Inertia, LatticeNode, damped_numbers_for, damped_step, damped_vectors_for,
 };
-use supple::loads::{Loads, NodalForce};
-use supple::material::{Exponential, Tissue};
-use supple::mesh::{Bar, Mesh, Winding};
+use supple::loads::Loads;
+use supple::material::Exponential;
 use supple::mlp::Network;
-use supple::scene::{ElementBlock, NodeInertia, Scene, Support, blocks_for};
-use supple::state::{NodeVector, State};
-use supple::tled::{self, Status, Step};
+use supple::state::NodeVector;
+use supple::tled::{self, Step};
 
-/// The paper's step, s, and how many times longer the steps of the scaled methods are, with the steps of their refresh
-/// cycles.
-const DT: f32 = 3e-5;
+/// How many times longer than the exact one the steps of the scaled methods are, with the steps of their refresh cycles.
 const MULTIPLE: f32 = 20.0;
 const CYCLE: u32 = 64;
 const LONGEST: f32 = 100.0;
 const SHORT_CYCLE: u32 = 16;
-const DAMPING: f32 = 20.0;
 const LATTICE: [u32; 3] = [2, 2, 4];
 const DAMPED_LATTICE: [u32; 3] = [2, 2, 5];
 const PAIRS: usize = 41;
-
-type BarScene = Scene<Tissue<Exponential>, Vec<NodeInertia>, Vec<ElementBlock>>;
-
-fn state(nodes: usize) -> State<Vec<NodeVector>> {
-    let zero = || vec![NodeVector::ZERO; nodes];
-    State::over(zero(), zero(), zero())
-}
-
-fn moved(status: Status) {
-    assert!(matches!(status, Status::Ok | Status::Limited { .. }), "{status:?}");
-}
 
 /// A network as it would lie in flash.
 #[repr(C, align(64))]
@@ -47,7 +36,7 @@ static DAMPER: &Flash<[u8]> = &Flash(*include_bytes!("../weights/damper.weights"
 
 /// A step with the given lattice, from a state that it has deformed.
 fn scaled<'a>(
-    scene: &'a BarScene,
+    scene: &'a BarScene<Exponential>,
     loads: &'a Loads<'a>,
     points: &[[f32; 3]],
     multiple: f32,
@@ -84,17 +73,6 @@ fn scaled<'a>(
     run
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
-fn seconds(mut run: impl FnMut()) -> f64 {
-    let start = Instant::now();
-    run();
-    start.elapsed().as_secs_f64()
-}
-
 /// Median time of each step of a cycle over their mean; the first is the step that the cycle stands at.
 fn phases(run: &mut impl FnMut()) -> Vec<f64> {
     let mut times = vec![Vec::new(); CYCLE as usize];
@@ -110,21 +88,8 @@ fn phases(run: &mut impl FnMut()) -> Vec<f64> {
 
 fn main() {
     let mut criterion = Criterion::default().configure_from_args().sample_size(30);
-    let bar = Bar::PAPER;
-    let points: Vec<_> = bar.points().collect();
-    let tets: Vec<_> = bar.tets().collect();
-    let mesh = Mesh::new(&points, &tets, Winding::Checked).expect("the bar is sound");
-    let tissue = Tissue { law: Exponential { a: 59.0, b: 8.023, d: 60_000.0 }, density: 1000.0 };
-    let nodes = vec![NodeInertia::EMPTY; points.len()];
-    let mut scene = Scene::over(tissue, nodes, vec![ElementBlock::EMPTY; blocks_for(tets.len())]);
-    let fixed: Vec<_> = (0..81).map(Support::fixed).collect();
-    scene.build(&mesh, &fixed).expect("the bar is sound");
-    let corners = [(0, 0, [1.0, -1.0]), (8, 0, [1.0, 1.0]), (8, 8, [-1.0, 1.0]), (0, 8, [-1.0, -1.0])];
-    let forces = corners.map(|(i, j, [x, y])| NodalForce {
-        node: bar.node(i, j, 17),
-        newton: [0.05 * x, 0.05 * y, 0.0],
-        ramp: 0.0,
-    });
+    let (points, forces) = (bar::points(), bar::forces());
+    let scene = bar::scene(Exponential { a: 59.0, b: 8.023, d: 60_000.0 });
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
 
     let mut exact_state = state(points.len());
@@ -139,7 +104,7 @@ fn main() {
     let mut longest_damped = scaled(&scene, &loads, &points, LONGEST, (DAMPED_LATTICE, true), SHORT_CYCLE);
 
     let mut group = criterion.benchmark_group("large step");
-    group.throughput(Throughput::Elements(tets.len() as u64));
+    group.throughput(Throughput::Elements(scene.element_count() as u64));
     group.bench_function(BenchmarkId::from_parameter("exact"), |b| b.iter(&mut exact));
     group.bench_function(BenchmarkId::from_parameter("mass-scaled"), |b| b.iter(&mut mass_scaled));
     group.bench_function(BenchmarkId::from_parameter("multilevel"), |b| b.iter(&mut multilevel));

@@ -16,13 +16,13 @@
 use core::fmt;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{Vec3A, Vec4};
+use glam::Vec4;
 
-use crate::frame::Frame;
+use crate::frame::{Axes, Frame};
 use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch};
 use crate::loads::Loads;
 use crate::material::Material;
-use crate::mlp::{ForceInput, MAX_INPUTS, Network, Scratch};
+use crate::mlp::{ForceInput, MAX_INPUTS, Network, Scratch, Tile};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
 use crate::tled::{
@@ -49,24 +49,31 @@ impl Vertex {
     pub const NEW: Self = Self { frame: Frame::WORLD, next: NodeVector::ZERO };
 }
 
-/// What the network sees of a vertex: displacement (m), speed (m/s) and force (N, or m/s^2) in its frame.
-pub(crate) struct Seen {
+/// What the network sees of vertices side by side: displacement (m), speed (m/s) and force (N, or m/s^2) in their frames.
+pub(crate) struct Seen<R> {
     /// m.
-    pub(crate) displacement: Vec3A,
+    pub(crate) displacement: [R; 3],
     /// m/s.
-    pub(crate) speed: f32,
+    pub(crate) speed: R,
     /// N.
-    pub(crate) force: Vec3A,
+    pub(crate) force: [R; 3],
     /// Lumped, kg.
-    pub(crate) mass: f32,
+    pub(crate) mass: R,
 }
 
-impl Seen {
+impl<R: Real> Seen<R> {
     #[inline(always)]
-    pub(crate) fn features(&self, frame: &Frame, input: ForceInput) -> [f32; FEATURES] {
-        // A vertex of no element has no mass, and no force.
-        let unit = if input == ForceInput::PerMass && self.mass > 0.0 { self.mass } else { 1.0 };
-        let ([a, b, c], [d, e, f]) = (frame.local(self.displacement), frame.local(self.force / unit));
+    pub(crate) fn features(&self, axes: &Axes<R>, input: ForceInput) -> [R; FEATURES] {
+        let force = match input {
+            ForceInput::Newton => self.force,
+            // A vertex of no element has no mass, and no force.
+            ForceInput::PerMass => {
+                let mass = self.mass.choose(self.mass, R::splat(1.0));
+                let [x, y, z] = self.force;
+                [x.over(mass), y.over(mass), z.over(mass)]
+            }
+        };
+        let ([a, b, c], [d, e, f]) = (axes.local(self.displacement), axes.local(force));
         [a, b, c, self.speed, d, e, f]
     }
 }
@@ -153,7 +160,7 @@ impl<V: AsRef<[Vertex]> + AsMut<[Vertex]>> Surrogate<'_, V> {
     /// step of this network.
     pub fn follow<S: AsRef<[NodeVector]>>(&mut self, state: &State<S>) {
         for (vertex, increment) in self.vertices.as_mut().iter_mut().zip(state.increment.as_ref()) {
-            vertex.frame.follow(Vec3A::from(increment.to_array()));
+            vertex.frame.follow(increment.to_array());
         }
     }
 }
@@ -255,63 +262,146 @@ impl Kernel for Predict<'_, '_> {
     type Output = (Totals, SurrogateReport);
 
     #[inline(always)]
-    fn run<R: Real>(self) -> (Totals, SurrogateReport) {
-        let Self { network, step, inertia, displacement, increment, force, vertices } = self;
-        let (seconds, mut scratch) = (step.seconds(), Scratch::<R>::new());
-        let input = network.recipe().force;
-        let mut sums = Sums::new(step, Vec4::splat);
-        let (mut free, mut clipped, mut outside) = (0u32, 0u32, 0u32);
-        let nodes =
-            inertia.chunks(R::COUNT).zip(displacement.chunks(R::COUNT)).zip(increment.chunks(R::COUNT));
-        let nodes = nodes.zip(force.chunks(R::COUNT)).zip(vertices.chunks_mut(R::COUNT));
-        for ((((inertia, displacement), increment), force), vertices) in nodes {
-            // Features by lane, then inputs by lanes.
-            let mut seen = [[0.0; FEATURES]; LANES];
-            let states = displacement.iter().zip(increment).zip(force).zip(inertia);
-            for ((seen, vertex), (((displacement, increment), force), inertia)) in
-                seen.iter_mut().zip(&mut *vertices).zip(states)
-            {
-                let increment = Vec3A::from(increment.to_array());
-                vertex.frame.follow(increment);
-                let speed = libm::sqrtf(increment.length_squared()) / seconds;
-                let [displacement, force] = [displacement, force].map(|v| Vec3A::from(v.to_array()));
-                *seen =
-                    Seen { displacement, speed, force, mass: inertia.mass }.features(&vertex.frame, input);
-            }
-            let mut inputs = [R::splat(0.0); MAX_INPUTS];
-            for (feature, input) in inputs.iter_mut().enumerate().take(FEATURES) {
-                *input = R::from_fn(|lane| seen[lane % LANES][feature % FEATURES]);
-            }
-            let (accelerations, unclipped) = network.forward(&inputs, &mut scratch);
-            let [along, across, beside, ..] = accelerations;
-            for (lane, vertex) in vertices.iter_mut().enumerate() {
-                let (Some(inertia), Some(increment), Some(force)) =
-                    (inertia.get(lane), increment.get(lane), force.get(lane))
-                else {
-                    continue;
-                };
-                let local = [along, across, beside].map(|component| component.lane(lane));
-                let acceleration = vertex.frame.world(local);
-                let last = Vec4::from(increment.0);
-                let push = seconds * seconds * acceleration;
-                let next = inertia.free() * (last + Vec4::new(push.x, push.y, push.z, 0.0));
-                vertex.next.0 = next.to_array();
-                sums.add(Vec4::splat(inertia.mass), inertia.free(), last, Vec4::from(force.0), next);
-                if inertia.inverse.iter().any(|&inverse| inverse > 0.0) {
-                    free += 1;
-                    let differs = |a: &R, b: &R| a.lane(lane) != b.lane(lane);
-                    clipped += u32::from(accelerations.iter().zip(&unclipped).any(|(a, b)| differs(a, b)));
-                    let unseen = |(&value, range): (&f32, &crate::mlp::Range)| {
-                        !(range.least <= value && value <= range.most)
-                    };
-                    outside += u32::from(seen[lane % LANES].iter().zip(network.inputs()).any(unseen));
-                }
-            }
-        }
-        let share = |count: u32| count as f32 / free.max(1) as f32;
-        (Totals::of_axes(&sums), SurrogateReport { clipped: share(clipped), outside: share(outside) })
+    fn run<R: Real>(self) -> Self::Output {
+        if R::MANY_REGISTERS { self.tiles::<R, 2>() } else { self.tiles::<R, 1>() }
     }
 }
 
-/// Lanes that there are at most.
-const LANES: usize = crate::lanes::BLOCK;
+/// Nodes side by side, with what their step needs after the network.
+#[derive(Clone, Copy)]
+struct Moving<R> {
+    axes: Axes<R>,
+    /// Ones along free axes.
+    free: [R; 3],
+    mass: R,
+    increment: [R; 3],
+    force: [R; 3],
+    /// One where an input is outside what training has seen.
+    outside: R,
+}
+
+/// What is found on the way, node by node in lanes.
+struct Found<R> {
+    sums: [Sums<R>; 3],
+    free: R,
+    clipped: R,
+    outside: R,
+}
+
+/// One where the two are the same number, else zero.
+#[inline(always)]
+fn same<R: Real>(a: R, b: R) -> R {
+    (R::splat(f32::MIN_POSITIVE) - (a - b).abs()).positive()
+}
+
+/// The vectors of nodes from `first` on, zero where there are none.
+#[inline(always)]
+fn vectors<R: Real>(of: &[NodeVector], first: usize) -> [R; 3] {
+    let [x, y, z, _] = R::from_rows(|lane| of.get(first + lane).copied().unwrap_or_default().0);
+    [x, y, z]
+}
+
+impl Predict<'_, '_> {
+    #[inline(always)]
+    fn tiles<R: Real, const COLUMNS: usize>(mut self) -> (Totals, SurrogateReport) {
+        let mut scratch = Scratch::<R, COLUMNS>::new();
+        let zero = R::splat(0.0);
+        let mut found =
+            Found { sums: [Sums::new(self.step, R::splat); 3], free: zero, clipped: zero, outside: zero };
+        for first in (0..self.inertia.len()).step_by(COLUMNS * R::COUNT) {
+            let mut inputs = [[zero; COLUMNS]; MAX_INPUTS];
+            let sides: [Moving<R>; COLUMNS] = core::array::from_fn(|column| {
+                let (side, features) = self.see(first + column * R::COUNT);
+                for (inputs, feature) in inputs.iter_mut().zip(features) {
+                    inputs[column % COLUMNS] = feature;
+                }
+                side
+            });
+            let [clipped, unclipped] = self.network.forward(&inputs, &mut scratch);
+            for (column, side) in sides.into_iter().enumerate() {
+                let of = |outputs: &[Tile<R, COLUMNS>]| {
+                    [0, 1, 2].map(|axis| outputs.get(axis).map_or(zero, |tile| tile[column % COLUMNS]))
+                };
+                let (clipped, unclipped) = (of(&clipped), of(&unclipped));
+                self.move_on(first + column * R::COUNT, &side, clipped, unclipped, &mut found);
+            }
+        }
+        let mut totals = Totals::default();
+        totals.add_lanes(&found.sums);
+        let sum = |counts: R| (0..R::COUNT).map(|lane| counts.lane(lane)).sum::<f32>();
+        let share = |counts: R| sum(counts) / sum(found.free).max(1.0);
+        (totals, SurrogateReport { clipped: share(found.clipped), outside: share(found.outside) })
+    }
+
+    /// The nodes from `first` on, with what the network sees of them; where there are none, without mass or freedom.
+    #[inline(always)]
+    fn see<R: Real>(&self, first: usize) -> (Moving<R>, [R; FEATURES]) {
+        let [ix, iy, iz, mass] = R::from_rows(|lane| {
+            let NodeInertia { inverse: [x, y, z], mass } =
+                self.inertia.get(first + lane).copied().unwrap_or_default();
+            [x, y, z, mass]
+        });
+        let displacement = vectors::<R>(self.displacement, first);
+        let (increment, force) = (vectors::<R>(self.increment, first), vectors::<R>(self.force, first));
+        let mut axes =
+            Axes::of(|lane| self.vertices.get(first + lane).map_or(Frame::WORLD, |vertex| vertex.frame));
+        axes.follow(increment);
+        let [x, y, z] = increment;
+        let speed = (x * x + y * y + z * z).root().over(R::splat(self.step.seconds()));
+        let seen = Seen { displacement, speed, force, mass };
+        let features = seen.features(&axes, self.network.recipe().force);
+        let mut inside = R::splat(1.0);
+        for (&value, range) in features.iter().zip(self.network.inputs()) {
+            inside = inside * same(value, value.max(R::splat(range.least)).min(R::splat(range.most)));
+        }
+        let outside = R::splat(1.0) - inside;
+        (
+            Moving {
+                axes,
+                free: [ix.positive(), iy.positive(), iz.positive()],
+                mass,
+                increment,
+                force,
+                outside,
+            },
+            features,
+        )
+    }
+
+    /// Their next increments, and how the report counts them.
+    #[inline(always)]
+    fn move_on<R: Real>(
+        &mut self,
+        first: usize,
+        side: &Moving<R>,
+        clipped: [R; 3],
+        unclipped: [R; 3],
+        found: &mut Found<R>,
+    ) {
+        let Moving { axes, free, mass, increment, force, outside } = *side;
+        let square = R::splat(self.step.seconds() * self.step.seconds());
+        let acceleration = axes.world(clipped);
+        let mut next = [R::splat(0.0); 4];
+        for axis in 0..3 {
+            let (free, increment) = (free[axis], increment[axis]);
+            next[axis] = free * (increment + square * acceleration[axis]);
+            found.sums[axis].add(mass, free, increment, force[axis], next[axis]);
+        }
+        axes.hand_to(|lane, frame| {
+            if let Some(vertex) = self.vertices.get_mut(first + lane) {
+                vertex.frame = frame;
+            }
+        });
+        R::to_rows(next, |lane, next| {
+            if let Some(vertex) = self.vertices.get_mut(first + lane) {
+                vertex.next.0 = next;
+            }
+        });
+        let any = free[0].max(free[1]).max(free[2]);
+        let all =
+            same(clipped[0], unclipped[0]) * same(clipped[1], unclipped[1]) * same(clipped[2], unclipped[2]);
+        found.free = found.free + any;
+        found.clipped = found.clipped + any * (R::splat(1.0) - all);
+        found.outside = found.outside + any * outside;
+    }
+}

@@ -1,11 +1,18 @@
-//! The same input gives the same bits, whatever instructions the processor offers: nothing fuses a
-//! multiplication with an addition, and sums are taken in a fixed order.
+//! The same input gives the same bits, whatever instructions the processor offers: only networks fuse multiplications with
+//! additions, and not with the feature `deterministic`; sums are taken in a fixed order.
 
+use std::sync::Mutex;
+
+#[path = "support/networks.rs"]
+mod networks;
+
+use networks::{Memory, described, numbers};
 use supple::inertia::{self, Inertia, LatticeNode, numbers_for, vectors_for};
 use supple::lanes::Level;
 use supple::loads::{Loads, NodalForce};
 use supple::material::{Exponential, Law, Literal, NeoHookean, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
+use supple::mlp::{Network, write};
 use supple::scene::{ElementBlock, NodeInertia, Scene, Support, blocks_for};
 use supple::state::{NodeVector, State};
 use supple::tled::{self, CriticalStep, Status, Step};
@@ -82,9 +89,36 @@ fn compare<L: Law>(name: &str, law: L) {
     }
 }
 
+/// One test at a time: the level is the whole process's.
+static LEVEL: Mutex<()> = Mutex::new(());
+
 #[test]
 fn every_level_gives_the_same_bits() {
+    let _alone = LEVEL.lock().unwrap();
     compare("neo-Hookean", NeoHookean { c: 500.0, d: 15_000.0 });
     compare("exponential", Exponential { a: 59.0, b: 8.023, d: 60_000.0 });
     compare("exponential, literal", Literal(Exponential { a: 59.0, b: 8.023, d: 60_000.0 }));
+}
+
+/// Of different levels within rounding, and with the feature `deterministic` the same bits.
+#[test]
+fn networks_are_within_rounding_or_the_same_bits() {
+    let _alone = LEVEL.lock().unwrap();
+    let description = described(&[7, 40, 24, 3], &[10, 16, 3], 5);
+    let memory = Memory::of(&write(&description).unwrap());
+    let network = Network::parse(memory.bytes()).unwrap();
+    let mut next = numbers(8);
+    let inputs: Vec<f32> = (0..7 * 50).map(|at| 2.0 * description.inputs[at % 7].scale * next()).collect();
+    let predicted = |level: Level| {
+        assert!(Level::force(level));
+        let mut outputs = vec![0.0f32; 3 * 50];
+        network.predict_rows(&inputs, &mut outputs);
+        outputs
+    };
+    let best = Level::current();
+    let (portable, other) = (predicted(Level::Portable), predicted(best));
+    let largest = portable.iter().fold(0.0, |most: f32, a| most.max(a.abs()));
+    let apart = portable.iter().zip(&other).fold(0.0, |most: f32, (a, b)| most.max((a - b).abs()));
+    println!("portable and {best:?}: {apart:.1e} of {largest:.1} apart");
+    assert!(apart <= if cfg!(feature = "deterministic") { 0.0 } else { 1e-6 * largest });
 }

@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use proptest::prelude::*;
+use supple::lanes::Level;
 use supple::mlp::{Description, Network, WeightError, write};
 
 #[path = "support/networks.rs"]
@@ -11,15 +12,49 @@ mod networks;
 
 use networks::{Memory, described, numbers, predicted};
 
-/// Largest difference from the reference over the outputs' scales.
-fn off(description: &Description<'_>, network: &Network<'_>, inputs: &[f32]) -> f64 {
-    let mut outputs = vec![0.0; description.outputs.len()];
-    network.predict(inputs, &mut outputs);
+/// Largest difference of outputs from the reference over their scales.
+fn apart(description: &Description<'_>, inputs: &[f32], outputs: &[f32]) -> f64 {
     let wanted = predicted(description, inputs);
     let differences = outputs.iter().zip(wanted).zip(&description.outputs);
     differences
         .map(|((&found, wanted), range)| (f64::from(found) - wanted).abs() / f64::from(range.scale))
         .fold(0.0, f64::max)
+}
+
+/// The same of one vertex' prediction.
+fn off(description: &Description<'_>, network: &Network<'_>, inputs: &[f32]) -> f64 {
+    let mut outputs = vec![0.0; description.outputs.len()];
+    network.predict(inputs, &mut outputs);
+    apart(description, inputs, &outputs)
+}
+
+/// Many vertices at once, on both levels: each agrees with float64, to the bit the same whatever stands beside it, and what is
+/// not a whole row is left alone.
+#[test]
+fn rows_agree_with_float64_and_do_not_see_their_neighbours() {
+    let best = Level::current();
+    for (level, hidden) in [(Level::Portable, 33), (best, 33), (best, 64), (best, 1)] {
+        assert!(Level::force(level));
+        let description = described(&[7, hidden, hidden, 3], &[10, 32, 3], 11);
+        let memory = Memory::of(&write(&description).unwrap());
+        let network = Network::parse(memory.bytes()).unwrap();
+        let mut next = numbers(6);
+        let inputs: Vec<f32> =
+            (0..45 * 7 + 3).map(|at| 2.0 * description.inputs[at % 7].scale * next()).collect();
+        let mut outputs = vec![-1e9; 46 * 3];
+        network.predict_rows(&inputs, &mut outputs);
+        let worst = (0..45)
+            .map(|row| apart(&description, &inputs[7 * row..7 * row + 7], &outputs[3 * row..3 * row + 3]))
+            .fold(0.0, f64::max);
+        println!("{level:?}, {hidden} wide: off by {worst:.1e} of the outputs' scale");
+        assert!(worst < 1e-5);
+        assert!(outputs[45 * 3..].iter().all(|&output| output == -1e9));
+        for (first, count) in [(0, 1), (44, 1), (3, 20), (1, 44)] {
+            let mut alone = vec![0.0; count * 3];
+            network.predict_rows(&inputs[7 * first..7 * (first + count)], &mut alone);
+            assert_eq!(alone, outputs[3 * first..3 * (first + count)]);
+        }
+    }
 }
 
 #[test]

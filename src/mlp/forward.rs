@@ -1,28 +1,51 @@
-//! The forward pass in float32, several vertices side by side. Sums are taken in the order of the inputs, so the result of
-//! a vertex does not depend on its neighbours nor on the instruction set.
+//! The forward pass in float32, for one vertex as it is written down, and for many side by side. Sums are taken in the order
+//! of the inputs, so the result of a vertex does not depend on its neighbours.
+//!
+//! Many vertices go through in tiles of one or two vectors: a layer's numbers lie vector beside vector, a weight is
+//! repeated over a whole one. Four outputs at a time have their sums in registers, so that a vector that is read and
+//! a weight that is repeated serve several fused multiplications and additions.
 
 use super::{Activation, Layer, MAX_INPUTS, MAX_OUTPUTS, MAX_WIDTH, Network};
-use crate::lanes::Real;
+use crate::lanes::{Kernel, Real, dispatch};
 
-/// What a layer reads and writes, for vertices side by side.
-pub(crate) struct Scratch<R> {
-    here: [R; MAX_WIDTH],
-    there: [R; MAX_WIDTH],
+/// `COLUMNS` vectors of vertices side by side.
+pub(crate) type Tile<R, const COLUMNS: usize> = [R; COLUMNS];
+
+/// What a layer reads and writes, for a tile of vertices.
+pub(crate) struct Scratch<R, const COLUMNS: usize> {
+    here: [Tile<R, COLUMNS>; MAX_WIDTH],
+    there: [Tile<R, COLUMNS>; MAX_WIDTH],
 }
 
-impl<R: Real> Scratch<R> {
+impl<R: Real, const COLUMNS: usize> Scratch<R, COLUMNS> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
-        Self { here: [R::splat(0.0); MAX_WIDTH], there: [R::splat(0.0); MAX_WIDTH] }
+        let zero = [[R::splat(0.0); COLUMNS]; MAX_WIDTH];
+        Self { here: zero, there: zero }
     }
 }
 
-/// Outputs that are computed together: each has a sum of its own, so that none waits for another.
-const TOGETHER: usize = 8;
+/// Outputs that are computed together.
+const TOGETHER: usize = 4;
+
+/// `sums + weight values`.
+#[inline(always)]
+fn plus<R: Real, const COLUMNS: usize>(
+    sums: Tile<R, COLUMNS>,
+    weight: f32,
+    values: &Tile<R, COLUMNS>,
+) -> Tile<R, COLUMNS> {
+    let weight = R::splat(weight);
+    core::array::from_fn(|column| weight.fused(values[column], sums[column]))
+}
 
 /// `to = activation(W from + b)`.
 #[inline(always)]
-fn dense<R: Real>(layer: &Layer<'_>, from: &[R], to: &mut [R]) {
+fn dense<R: Real, const COLUMNS: usize>(
+    layer: &Layer<'_>,
+    from: &[Tile<R, COLUMNS>],
+    to: &mut [Tile<R, COLUMNS>],
+) {
     let slope = match layer.activation {
         Activation::Linear => R::splat(1.0),
         Activation::LeakyRelu { slope } => R::splat(slope),
@@ -34,80 +57,139 @@ fn dense<R: Real>(layer: &Layer<'_>, from: &[R], to: &mut [R]) {
             let start = if index < biases.len() { index * layer.inputs } else { 0 };
             rows.get(start..start + layer.inputs).unwrap_or_default()
         };
-        let mut sums = [R::splat(0.0); TOGETHER];
-        for (sum, bias) in sums.iter_mut().zip(biases) {
-            *sum = R::splat(*bias);
+        let [mut one, mut two, mut three, mut four] =
+            [0, 1, 2, 3].map(|index| [R::splat(biases.get(index).copied().unwrap_or(0.0)); COLUMNS]);
+        // Zipped, so that no index has to be checked; four sums by name, so that the compiler keeps them in registers.
+        for ((((values, &a), &b), &c), &d) in from.iter().zip(row(0)).zip(row(1)).zip(row(2)).zip(row(3)) {
+            one = plus(one, a, values);
+            two = plus(two, b, values);
+            three = plus(three, c, values);
+            four = plus(four, d, values);
         }
-        // Zipped, so that no index has to be checked.
-        let lower = from.iter().zip(row(0)).zip(row(1)).zip(row(2)).zip(row(3));
-        for ((((((((&value, a), b), c), d), e), f), g), h) in
-            lower.zip(row(4)).zip(row(5)).zip(row(6)).zip(row(7))
-        {
-            for (sum, weight) in sums.iter_mut().zip([a, b, c, d, e, f, g, h]) {
-                *sum = *sum + R::splat(*weight) * value;
-            }
-        }
-        for (to, sum) in to.iter_mut().zip(sums).take(biases.len()) {
+        for (to, sums) in to.iter_mut().zip([one, two, three, four]).take(biases.len()) {
             // For slopes from zero to one.
-            *to = sum.max(slope * sum);
+            *to = sums.map(|sum| sum.max(slope * sum));
         }
     }
 }
 
-/// Layers one after the other, from `scratch.here` to `scratch.here`.
+/// Layers one after the other, from `here` to what is returned.
 #[inline(always)]
-fn run<R: Real>(layers: &[Layer<'_>], scratch: &mut Scratch<R>) {
+fn run<'a, R: Real, const COLUMNS: usize>(
+    layers: &[Layer<'_>],
+    scratch: &'a mut Scratch<R, COLUMNS>,
+) -> &'a [Tile<R, COLUMNS>] {
+    let (mut from, mut to) = (&mut scratch.here, &mut scratch.there);
     for layer in layers {
-        dense(layer, &scratch.here, &mut scratch.there);
-        core::mem::swap(&mut scratch.here, &mut scratch.there);
+        dense(layer, from.as_slice(), to.as_mut_slice());
+        core::mem::swap(&mut from, &mut to);
     }
+    from
 }
 
 impl Network<'_> {
-    /// Outputs, in their units, from inputs in theirs; what was not clipped is the second array.
+    /// Outputs of a tile of vertices, in their units, from inputs in theirs; what was not clipped is the second array.
     #[inline(always)]
-    pub(crate) fn forward<R: Real>(
+    pub(crate) fn forward<R: Real, const COLUMNS: usize>(
         &self,
-        inputs: &[R; MAX_INPUTS],
-        scratch: &mut Scratch<R>,
-    ) -> ([R; MAX_OUTPUTS], [R; MAX_OUTPUTS]) {
+        inputs: &[Tile<R, COLUMNS>; MAX_INPUTS],
+        scratch: &mut Scratch<R, COLUMNS>,
+    ) -> [[Tile<R, COLUMNS>; MAX_OUTPUTS]; 2] {
         let (first, second) = self.layers();
         let mut scaled = *inputs;
-        for (value, range) in scaled.iter_mut().zip(self.inputs) {
-            *value = value.over(R::splat(range.scale));
+        for (values, range) in scaled.iter_mut().zip(self.inputs) {
+            *values = values.map(|value| value.over(R::splat(range.scale)));
         }
         let count = self.inputs.len();
         copy(&scaled, &mut scratch.here, count);
-        run(first, scratch);
-        let mut sums = [R::splat(0.0); MAX_OUTPUTS];
-        copy(&scratch.here, &mut sums, self.outputs.len());
+        let mut sums = [[R::splat(0.0); COLUMNS]; MAX_OUTPUTS];
+        copy(run(first, scratch), &mut sums, self.outputs.len());
         if !second.is_empty() {
             copy(&scaled, &mut scratch.here, count);
             copy(&sums, scratch.here.get_mut(count..).unwrap_or_default(), self.outputs.len());
-            run(second, scratch);
-            for (sum, &correction) in sums.iter_mut().zip(&scratch.here) {
-                *sum = *sum + correction;
+            for (sums, corrections) in sums.iter_mut().zip(run(second, scratch)) {
+                for (sum, &correction) in sums.iter_mut().zip(corrections) {
+                    *sum = *sum + correction;
+                }
             }
         }
         let mut clipped = sums;
-        for ((sum, clipped), range) in sums.iter_mut().zip(&mut clipped).zip(self.outputs) {
-            *sum = *sum * R::splat(range.scale);
-            *clipped = sum.max(R::splat(range.least)).min(R::splat(range.most));
+        for ((sums, clipped), range) in sums.iter_mut().zip(&mut clipped).zip(self.outputs) {
+            *sums = sums.map(|sum| sum * R::splat(range.scale));
+            *clipped = sums.map(|sum| sum.max(R::splat(range.least)).min(R::splat(range.most)));
         }
-        (clipped, sums)
+        [clipped, sums]
     }
 
-    /// Outputs, in their units and clipped, of one vertex. Inputs that are not given count as zero.
+    /// Outputs, in their units and clipped, of one vertex. Inputs that are not given count as zero. The same bits on every
+    /// processor.
     pub fn predict(&self, inputs: &[f32], outputs: &mut [f32]) {
-        let mut padded = [0.0; MAX_INPUTS];
-        copy(inputs, &mut padded, MAX_INPUTS);
-        let (clipped, _) = self.forward::<f32>(&padded, &mut Scratch::new());
-        copy(&clipped, outputs, self.outputs.len());
+        let mut padded = [[0.0]; MAX_INPUTS];
+        for (padded, input) in padded.iter_mut().zip(inputs) {
+            *padded = [*input];
+        }
+        let [clipped, _] = self.forward::<f32, 1>(&padded, &mut Scratch::new());
+        for (output, [clipped]) in outputs.iter_mut().zip(clipped).take(self.outputs.len()) {
+            *output = clipped;
+        }
+    }
+
+    /// The same for many vertices: rows of as many inputs as the network has, and of as many outputs. Rows that are not
+    /// whole, or have no counterpart, are left out. Within rounding of [`Network::predict`]; the same bits on every
+    /// processor with the feature `deterministic`.
+    pub fn predict_rows(&self, inputs: &[f32], outputs: &mut [f32]) {
+        dispatch(Rows { network: self, inputs, outputs });
+    }
+}
+
+struct Rows<'a> {
+    network: &'a Network<'a>,
+    inputs: &'a [f32],
+    outputs: &'a mut [f32],
+}
+
+impl Kernel for Rows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: Real>(self) {
+        if R::MANY_REGISTERS { self.tiles::<R, 2>() } else { self.tiles::<R, 1>() }
+    }
+}
+
+impl Rows<'_> {
+    #[inline(always)]
+    fn tiles<R: Real, const COLUMNS: usize>(self) {
+        let Self { network, inputs, outputs } = self;
+        let (wide, high) = (network.inputs.len().max(1), network.outputs.len().max(1));
+        let count = (inputs.len() / wide).min(outputs.len() / high);
+        let (Some(inputs), Some(outputs)) = (inputs.get(..count * wide), outputs.get_mut(..count * high))
+        else {
+            return;
+        };
+        let together = COLUMNS * R::COUNT;
+        let mut scratch = Scratch::<R, COLUMNS>::new();
+        for (inputs, outputs) in inputs.chunks(wide * together).zip(outputs.chunks_mut(high * together)) {
+            let mut values = [[R::splat(0.0); COLUMNS]; MAX_INPUTS];
+            for (input, values) in values.iter_mut().enumerate().take(wide) {
+                for (column, value) in values.iter_mut().enumerate() {
+                    let first = column * R::COUNT;
+                    *value =
+                        R::from_fn(|lane| inputs.get((first + lane) * wide + input).copied().unwrap_or(0.0));
+                }
+            }
+            let [clipped, _] = network.forward(&values, &mut scratch);
+            for (row, outputs) in outputs.chunks_exact_mut(high).enumerate() {
+                for (output, values) in outputs.iter_mut().zip(&clipped) {
+                    *output = values.get(row / R::COUNT).map_or(0.0, |value| value.lane(row % R::COUNT));
+                }
+            }
+        }
     }
 }
 
 #[inline(always)]
-fn copy<R: Copy>(from: &[R], to: &mut [R], count: usize) {
+fn copy<T: Copy>(from: &[T], to: &mut [T], count: usize) {
     for (to, &from) in to.iter_mut().zip(from).take(count) {
         *to = from;
     }

@@ -14,7 +14,7 @@
 //! A network cannot tell `e` from one vertex. What remains of the loss is as large as what is taken back: the more, the
 //! less an error weighs ([`super::recipe::Noise::ease`]).
 
-use glam::{DVec3, Vec3A};
+use glam::DVec3;
 
 use std::vec::Vec;
 
@@ -66,13 +66,12 @@ impl SeenAs<'_> {
         self,
         node: usize,
         frame: &Frame,
-        displacement: Vec3A,
+        displacement: [f32; 3],
         speed: f32,
         force: NodeVector,
     ) -> [f32; FEATURES] {
-        let force = Vec3A::from(force.to_array());
-        let seen = surrogate::Seen { displacement, speed, force, mass: self.inertia[node].mass };
-        seen.features(frame, self.force)
+        let (force, mass) = (force.to_array(), self.inertia[node].mass);
+        surrogate::Seen { displacement, speed, force, mass }.features(&frame.axes(), self.force)
     }
 }
 
@@ -136,9 +135,9 @@ impl Moment<'_> {
             let [change, back] = changes[node];
             let increment = increments[node] + change;
             let mut frame = frames[node];
-            frame.follow(increment.as_vec3a());
+            frame.follow(increment.as_vec3().to_array());
             let speed = (increment.length() / long) as f32;
-            let place = Vec3A::from(places[node].to_array());
+            let place = places[node].to_array();
             Seen { inputs: seen_as.features(node, &frame, place, speed, moved.force[node]), frame, back }
         });
         let taken = (noise.back + noise.before).hypot(noise.before) * sd / (long * long);

@@ -279,19 +279,19 @@ impl Train {
                 for (seen, &node) in copy.seen.iter().zip(kept) {
                     let acceleration = (now[node] - 2.0 * one[node] + two[node] - seen.back) / (long * long);
                     samples.rough.inputs.push(seen.inputs);
-                    samples.rough.targets.push(seen.frame.local(acceleration.as_vec3a()));
+                    samples.rough.targets.push(seen.frame.axes().local(acceleration.as_vec3().to_array()));
                     samples.rough.weights.push(copy.weight);
                 }
             }
             for &node in kept {
                 let acceleration = (now[node] - 2.0 * one[node] + two[node]) / (long * long);
-                samples.targets.push(self.frames[node].local(acceleration.as_vec3a()));
+                samples.targets.push(self.frames[node].axes().local(acceleration.as_vec3().to_array()));
             }
         }
         let moves = self.frames.iter_mut().zip(&mut self.increments);
         for ((frame, increment), (now, one)) in moves.zip(now.iter().zip(one)) {
             *increment = *now - *one;
-            frame.follow(increment.as_vec3a());
+            frame.follow(increment.as_vec3().to_array());
         }
     }
 
@@ -322,7 +322,7 @@ impl Train {
         let [now, ..] = &self.shapes;
         let inputs = kept.iter().map(|&node| {
             let speed = self.increments[node].length() as f32 / long;
-            seen_as.features(node, &self.frames[node], now[node].as_vec3a(), speed, forces[node])
+            seen_as.features(node, &self.frames[node], now[node].as_vec3().to_array(), speed, forces[node])
         });
         self.asked = Some(Asked { smooth: inputs.collect(), rough });
     }

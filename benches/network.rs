@@ -1,0 +1,144 @@
+//! Time of networks: their forward pass at the paper's bar's 1,458 vertices, and learned steps with them beside the exact one.
+//!
+//! `cargo bench --bench network` prints criterion's figures, then times from interleaved runs and shares of the machine's
+//! measured peak.
+
+mod common {
+    pub(crate) mod bar;
+    pub(crate) mod pairs;
+    pub(crate) mod peak;
+}
+
+use common::bar::{self, DAMPING, DT};
+use common::pairs::{median, seconds};
+use common::peak;
+use criterion::{BenchmarkId, Criterion, Throughput};
+use std::hint::black_box;
+use supple::loads::Loads;
+use supple::material::Exponential;
+use supple::mlp::{Description, LayerDescription, Network, WeightBytes, write};
+use supple::surrogate::{self, Surrogate, Vertex};
+use supple::tled::{self, Step};
+
+const ROWS: usize = 1458;
+const ROUNDS: usize = 41;
+
+#[repr(C, align(64))]
+struct Aligned<B: ?Sized>(B);
+static PAPER: &Aligned<[u8]> = &Aligned(*include_bytes!("../weights/paper-10.weights"));
+static COMPACT: &Aligned<[u8]> = &Aligned(*include_bytes!("../weights/compact-10.weights"));
+
+/// A network of one small layer that predicts nothing: what a learned step costs beside its network.
+fn nothing(like: &Network<'_>) -> WeightBytes {
+    let recipe = like.recipe();
+    let (inputs, outputs) = (like.inputs().to_vec(), like.outputs().to_vec());
+    let layer = LayerDescription {
+        inputs: inputs.len(),
+        activation: supple::mlp::Activation::Linear,
+        weights: vec![0.0; inputs.len() * outputs.len()],
+        biases: vec![0.0; outputs.len()],
+    };
+    let bytes = write(&Description {
+        inputs,
+        outputs,
+        first: vec![layer],
+        second: Vec::new(),
+        law: recipe.law,
+        density: recipe.density,
+        damping: recipe.damping,
+        step: recipe.step,
+        exact_step: recipe.exact_step,
+        force: recipe.force,
+        recipe: "",
+        recipe_hash: [0; 32],
+    })
+    .expect("a sound network");
+    WeightBytes::of(&bytes)
+}
+
+fn forward(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("forward, 1458 vertices");
+    group.throughput(Throughput::Elements(ROWS as u64));
+    for (name, bytes) in [("paper", &PAPER.0), ("compact", &COMPACT.0)] {
+        let network = Network::parse(bytes).expect("a weight file of the crate");
+        let (inputs, outputs) = (network.inputs(), network.outputs().len());
+        // Over the ranges of training.
+        let values: Vec<f32> = (0..ROWS * inputs.len())
+            .map(|at| {
+                let range = inputs[at % inputs.len()];
+                range.least + (range.most - range.least) * ((at * 7919 % 1009) as f32 / 1009.0)
+            })
+            .collect();
+        let mut predicted = vec![0.0; ROWS * outputs];
+        group.bench_function(BenchmarkId::new(name, "f32"), |b| {
+            b.iter(|| network.predict_rows(black_box(&values), &mut predicted));
+        });
+        let flops = 2e-9 * network.multiply_adds() as f64 * ROWS as f64;
+        let (mut times, mut shares) = (Vec::new(), Vec::new());
+        for _ in 0..ROUNDS {
+            let before = peak::widest(5);
+            let time = seconds(|| network.predict_rows(black_box(&values), &mut predicted));
+            times.push(time);
+            shares.push(flops / time / (0.5 * (before + peak::widest(5))));
+        }
+        println!(
+            "{name}: {:.0} us, {:.0} % of the machine's peak at the time",
+            median(times) * 1e6,
+            100.0 * median(shares)
+        );
+    }
+    group.finish();
+}
+
+fn steps(criterion: &mut Criterion) {
+    let scene = bar::scene(Exponential { a: 59.0, b: 8.023, d: 60_000.0 });
+    let (forces, nodes) = (bar::forces(), scene.node_count());
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
+    let mut exact_state = bar::state(nodes);
+    let exact_step = Step::insist(DT, DAMPING).expect("a positive step");
+    let mut exact = || bar::moved(tled::step(&scene, &loads, &mut exact_state, &exact_step));
+    (0..10_000).for_each(|_| exact());
+
+    let empty = nothing(&Network::parse(&COMPACT.0).expect("a weight file of the crate"));
+    let mut learned =
+        [("no network", empty.bytes()), ("compact", &COMPACT.0), ("paper", &PAPER.0)].map(|(name, bytes)| {
+            let network = Network::parse(bytes).expect("a weight file of the crate");
+            let mut surrogate =
+                Surrogate::over(network, vec![Vertex::NEW; nodes]).expect("a network of the learned step");
+            let mut state = bar::state(nodes);
+            let (scene, loads) = (&scene, &loads);
+            let run = move || bar::moved(surrogate::step(scene, loads, &mut state, &mut surrogate));
+            (name, run)
+        });
+    let mut group = criterion.benchmark_group("learned step");
+    group.throughput(Throughput::Elements(nodes as u64));
+    group.bench_function("exact", |b| b.iter(&mut exact));
+    for (name, run) in &mut learned {
+        group.bench_function(*name, |b| b.iter(&mut *run));
+    }
+    group.finish();
+
+    let mut times = vec![Vec::new(); 4];
+    for _ in 0..ROUNDS {
+        times[0].push(seconds(|| (0..20).for_each(|_| exact())) / 20.0);
+        for (times, (_, run)) in times[1..].iter_mut().zip(&mut learned) {
+            times.push(seconds(|| (0..5).for_each(|_| run())) / 5.0);
+        }
+    }
+    let [exact, nothing, compact, paper] = [0, 1, 2, 3].map(|at| median(times[at].clone()));
+    println!(
+        "exact step {:.0} us; learned step without network {:.2} times that, compact {:.2} times ({:.0} us), paper's {:.1} times",
+        exact * 1e6,
+        nothing / exact,
+        compact / exact,
+        compact * 1e6,
+        paper / exact,
+    );
+}
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args().sample_size(30);
+    forward(&mut criterion);
+    steps(&mut criterion);
+    criterion.final_summary();
+}
