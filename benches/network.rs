@@ -23,10 +23,8 @@ use supple::tled::{self, Step};
 const ROWS: usize = 1458;
 const ROUNDS: usize = 41;
 
-#[repr(C, align(64))]
-struct Aligned<B: ?Sized>(B);
-static PAPER: &Aligned<[u8]> = &Aligned(*include_bytes!("../weights/paper-10.weights"));
-static COMPACT: &Aligned<[u8]> = &Aligned(*include_bytes!("../weights/compact-10.weights"));
+const PAPER: &[u8] = include_bytes!("../weights/paper-10.weights");
+const COMPACT: &[u8] = include_bytes!("../weights/compact-10.weights");
 
 /// A network of one small layer that predicts nothing: what a learned step costs beside its network.
 fn nothing(like: &Network<'_>) -> WeightBytes {
@@ -59,8 +57,9 @@ fn nothing(like: &Network<'_>) -> WeightBytes {
 fn forward(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("forward, 1458 vertices");
     group.throughput(Throughput::Elements(ROWS as u64));
-    for (name, bytes) in [("paper", &PAPER.0), ("compact", &COMPACT.0)] {
-        let network = Network::parse(bytes).expect("a weight file of the crate");
+    for (name, bytes) in [("paper", PAPER), ("compact", COMPACT)] {
+        let bytes = WeightBytes::of(bytes);
+        let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
         let (inputs, outputs) = (network.inputs(), network.outputs().len());
         // Over the ranges of training.
         let values: Vec<f32> = (0..ROWS * inputs.len())
@@ -99,10 +98,11 @@ fn steps(criterion: &mut Criterion) {
     let mut exact = || bar::moved(tled::step(&scene, &loads, &mut exact_state, &exact_step));
     (0..10_000).for_each(|_| exact());
 
-    let empty = nothing(&Network::parse(&COMPACT.0).expect("a weight file of the crate"));
+    let [paper, compact] = [PAPER, COMPACT].map(WeightBytes::of);
+    let empty = nothing(&Network::parse(compact.bytes()).expect("a weight file of the crate"));
     let mut learned =
-        [("no network", empty.bytes()), ("compact", &COMPACT.0), ("paper", &PAPER.0)].map(|(name, bytes)| {
-            let network = Network::parse(bytes).expect("a weight file of the crate");
+        [("no network", &empty), ("compact", &compact), ("paper", &paper)].map(|(name, bytes)| {
+            let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
             let mut surrogate =
                 Surrogate::over(network, vec![Vertex::NEW; nodes]).expect("a network of the learned step");
             let mut state = bar::state(nodes);

@@ -4,67 +4,50 @@
 //! machine's speed drifts; the ratio does not) and the share of the machine's measured peak.
 
 mod common {
+    pub(crate) mod bar;
+    pub(crate) mod pairs;
     pub(crate) mod peak;
     pub(crate) mod plain;
 }
 
-use std::time::Instant;
-
+use common::bar::{self, BarScene, DAMPING, DENSITY, DT, HELD, HostState};
+use common::pairs::{median, seconds};
 use common::plain::{self, Plain};
 use criterion::{BenchmarkId, Criterion, Throughput};
 use supple::lanes::Level;
 use supple::loads::{Loads, NodalForce};
-use supple::material::{Exponential, Law, NeoHookean, Tissue};
+use supple::material::{Exponential, Law, NeoHookean};
 use supple::mesh::{Bar, Mesh, Winding};
-use supple::scene::{ElementBlock, NodeInertia, Scene, Support, blocks_for};
-use supple::state::{NodeVector, State};
 use supple::tled::{self, Step};
 
-const DT: f32 = 3e-5;
-const DAMPING: f32 = 20.0;
-const DENSITY: f32 = 1000.0;
 struct Ours<L> {
-    scene: Scene<Tissue<L>, Vec<NodeInertia>, Vec<ElementBlock>>,
-    state: State<Vec<NodeVector>>,
-    forces: Vec<NodalForce>,
+    scene: BarScene<L>,
+    state: HostState,
+    forces: [NodalForce; 4],
     step: Step,
 }
 
 impl<L: Law> Ours<L> {
-    fn new(mesh: &Mesh<'_>, law: L, fixed: &[u32], loads: &[(u32, [f32; 3])]) -> Self {
-        let nodes = vec![NodeInertia::EMPTY; mesh.points().len()];
-        let blocks = vec![ElementBlock::EMPTY; blocks_for(mesh.element_count())];
-        let mut scene = Scene::over(Tissue { law, density: DENSITY }, nodes, blocks);
-        let supports: Vec<_> = fixed.iter().map(|&node| Support::fixed(node)).collect();
-        scene.build(mesh, &supports).expect("the bar is sound");
-        let zero = || vec![NodeVector::ZERO; mesh.points().len()];
-        let mut state = State::over(zero(), zero(), zero());
+    fn new(law: L) -> Self {
+        let scene = bar::scene(law);
+        let mut state = bar::state(scene.node_count());
         let critical = tled::critical_step(&scene, &mut state).expect("the bar has a critical step");
-        let forces = loads.iter().map(|&(node, newton)| NodalForce { node, newton, ramp: 0.0 }).collect();
         let step = Step::new(DT, DAMPING, critical).expect("dt is below the critical step");
-        Self { scene, state, forces, step }
+        Self { scene, state, forces: bar::forces(), step }
     }
 
     fn run(&mut self, steps: usize) {
         let loads = Loads::new(&self.scene, [0.0; 3], &self.forces, &[]).expect("nodes of the bar");
         for _ in 0..steps {
-            assert_eq!(tled::step(&self.scene, &loads, &mut self.state, &self.step), tled::Status::Ok);
+            bar::moved(tled::step(&self.scene, &loads, &mut self.state, &self.step));
         }
     }
 }
 
 /// Median of the ratios of paired runs, and the median time of one step of each, s.
 fn pairs(mut plain: impl FnMut(), mut ours: impl FnMut(), steps: usize) -> (f64, f64, f64) {
-    let time = |run: &mut dyn FnMut()| {
-        let start = Instant::now();
-        run();
-        start.elapsed().as_secs_f64() / steps as f64
-    };
+    let time = |run: &mut dyn FnMut()| seconds(run) / steps as f64;
     let runs: Vec<_> = (0..21).map(|_| (time(&mut plain), time(&mut ours))).collect();
-    let median = |mut values: Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        values[values.len() / 2]
-    };
     (
         median(runs.iter().map(|(plain, ours)| plain / ours).collect()),
         median(runs.iter().map(|run| run.0).collect()),
@@ -77,11 +60,10 @@ fn compare<L: Law>(criterion: &mut Criterion, name: &str, law: L, plain_law: pla
     let points: Vec<_> = bar.points().collect();
     let tets: Vec<_> = bar.tets().collect();
     let mesh = Mesh::new(&points, &tets, Winding::Checked).expect("the bar is sound");
-    let fixed: Vec<u32> = (0..81).collect();
-    let corners = [(0, 0, [1.0, -1.0]), (8, 0, [1.0, 1.0]), (8, 8, [-1.0, 1.0]), (0, 8, [-1.0, -1.0])];
-    let loads = corners.map(|(i, j, [x, y])| (bar.node(i, j, 17), [0.05 * x, 0.05 * y, 0.0]));
+    let loads = bar::forces().map(|force| (force.node, force.newton));
+    let fixed: Vec<u32> = HELD.collect();
     let mut plain = Plain::new(&mesh, plain_law, DENSITY, &fixed, &loads);
-    let mut ours = Ours::new(&mesh, law, &fixed, &loads);
+    let mut ours = Ours::new(law);
     // Both are timed in a deformed state, and must agree on it.
     (0..2_000).for_each(|_| plain.step(DT, DAMPING, 1.0));
     ours.run(2_000);

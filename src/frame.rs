@@ -12,7 +12,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::lanes::{BLOCK, Real};
+use crate::lanes::{BLOCK, Real, dot};
 
 /// Squared length of an increment (m^2) or of `s` below which it has no direction.
 const NO_LENGTH: f32 = 1e-30;
@@ -23,11 +23,6 @@ const REVERSED: f32 = 1e-12;
 pub(crate) struct Axes<R> {
     tangent: [R; 3],
     normal: [R; 3],
-}
-
-#[inline(always)]
-fn dot<R: Real>([ax, ay, az]: [R; 3], [bx, by, bz]: [R; 3]) -> R {
-    ax * bx + ay * by + az * bz
 }
 
 #[inline(always)]

@@ -19,7 +19,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
 use crate::frame::{Axes, Frame};
-use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch};
+use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch, dot};
 use crate::loads::Loads;
 use crate::material::Material;
 use crate::mlp::{ForceInput, MAX_INPUTS, Network, Scratch, Tile};
@@ -310,20 +310,20 @@ impl Predict<'_, '_> {
             Found { sums: [Sums::new(self.step, R::splat); 3], free: zero, clipped: zero, outside: zero };
         for first in (0..self.inertia.len()).step_by(COLUMNS * R::COUNT) {
             let mut inputs = [[zero; COLUMNS]; MAX_INPUTS];
-            let sides: [Moving<R>; COLUMNS] = core::array::from_fn(|column| {
-                let (side, features) = self.see(first + column * R::COUNT);
+            let moving: [Moving<R>; COLUMNS] = core::array::from_fn(|column| {
+                let (moving, features) = self.see(first + column * R::COUNT);
                 for (inputs, feature) in inputs.iter_mut().zip(features) {
                     inputs[column % COLUMNS] = feature;
                 }
-                side
+                moving
             });
             let [clipped, unclipped] = self.network.forward(&inputs, &mut scratch);
-            for (column, side) in sides.into_iter().enumerate() {
+            for (column, moving) in moving.into_iter().enumerate() {
                 let of = |outputs: &[Tile<R, COLUMNS>]| {
                     [0, 1, 2].map(|axis| outputs.get(axis).map_or(zero, |tile| tile[column % COLUMNS]))
                 };
                 let (clipped, unclipped) = (of(&clipped), of(&unclipped));
-                self.move_on(first + column * R::COUNT, &side, clipped, unclipped, &mut found);
+                self.move_on(first + column * R::COUNT, &moving, clipped, unclipped, &mut found);
             }
         }
         let mut totals = Totals::default();
@@ -346,8 +346,7 @@ impl Predict<'_, '_> {
         let mut axes =
             Axes::of(|lane| self.vertices.get(first + lane).map_or(Frame::WORLD, |vertex| vertex.frame));
         axes.follow(increment);
-        let [x, y, z] = increment;
-        let speed = (x * x + y * y + z * z).root().over(R::splat(self.step.seconds()));
+        let speed = dot(increment, increment).root().over(R::splat(self.step.seconds()));
         let seen = Seen { displacement, speed, force, mass };
         let features = seen.features(&axes, self.network.recipe().force);
         let mut inside = R::splat(1.0);
@@ -373,12 +372,12 @@ impl Predict<'_, '_> {
     fn move_on<R: Real>(
         &mut self,
         first: usize,
-        side: &Moving<R>,
+        moving: &Moving<R>,
         clipped: [R; 3],
         unclipped: [R; 3],
         found: &mut Found<R>,
     ) {
-        let Moving { axes, free, mass, increment, force, outside } = *side;
+        let Moving { axes, free, mass, increment, force, outside } = *moving;
         let square = R::splat(self.step.seconds() * self.step.seconds());
         let acceleration = axes.world(clipped);
         let mut next = [R::splat(0.0); 4];

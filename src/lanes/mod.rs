@@ -17,7 +17,7 @@ pub(crate) use level::{Kernel, dispatch};
 pub(crate) use pair::Pair;
 pub use vectors::NodeVector;
 use vectors::transpose;
-pub(crate) use vectors::{Gather, Scatter, read_rows, write_rows};
+pub(crate) use vectors::{Gather, Scatter, dot, read_rows, write_rows};
 
 use core::ops::{Add, Mul, Neg, Sub};
 

@@ -11,32 +11,21 @@ use super::Real;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pair<R>(pub(crate) R, pub(crate) R);
 
-impl<R: Real> Add for Pair<R> {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        let (Self(a, b), Self(c, d)) = (self, other);
-        Self(a + c, b + d)
-    }
+macro_rules! operator {
+    ($trait:ident, $method:ident) => {
+        impl<R: Real> $trait for Pair<R> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0.$method(other.0), self.1.$method(other.1))
+            }
+        }
+    };
 }
 
-impl<R: Real> Sub for Pair<R> {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        let (Self(a, b), Self(c, d)) = (self, other);
-        Self(a - c, b - d)
-    }
-}
-
-impl<R: Real> Mul for Pair<R> {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        let (Self(a, b), Self(c, d)) = (self, other);
-        Self(a * c, b * d)
-    }
-}
+operator!(Add, add);
+operator!(Sub, sub);
+operator!(Mul, mul);
 
 impl<R: Real> Neg for Pair<R> {
     type Output = Self;
@@ -44,6 +33,16 @@ impl<R: Real> Neg for Pair<R> {
     fn neg(self) -> Self {
         Self(-self.0, -self.1)
     }
+}
+
+/// Methods that do to each vector what they do to one.
+macro_rules! each {
+    ($($method:ident $($other:ident)?),*) => {
+        $(#[inline(always)]
+        fn $method(self $(, $other: Self)?) -> Self {
+            Self(self.0.$method($($other.0)?), self.1.$method($($other.1)?))
+        })*
+    };
 }
 
 impl<R: Real> Real for Pair<R> {
@@ -80,43 +79,5 @@ impl<R: Real> Real for Pair<R> {
     fn splat(value: f32) -> Self {
         Self(R::splat(value), R::splat(value))
     }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        let (Self(a, b), Self(c, d)) = (self, other);
-        Self(a.max(c), b.max(d))
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        let (Self(a, b), Self(c, d)) = (self, other);
-        Self(a.min(c), b.min(d))
-    }
-    #[inline(always)]
-    fn over(self, other: Self) -> Self {
-        let (Self(a, b), Self(c, d)) = (self, other);
-        Self(a.over(c), b.over(d))
-    }
-    #[inline(always)]
-    fn positive(self) -> Self {
-        Self(self.0.positive(), self.1.positive())
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Self(self.0.abs(), self.1.abs())
-    }
-    #[inline(always)]
-    fn root(self) -> Self {
-        Self(self.0.root(), self.1.root())
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(self.0.sqrt(), self.1.sqrt())
-    }
-    #[inline(always)]
-    fn exp(self) -> Self {
-        Self(self.0.exp(), self.1.exp())
-    }
-    #[inline(always)]
-    fn inverse_cbrt(self) -> Self {
-        Self(self.0.inverse_cbrt(), self.1.inverse_cbrt())
-    }
+    each!(max other, min other, over other, positive, abs, root, sqrt, exp, inverse_cbrt);
 }

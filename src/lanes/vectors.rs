@@ -67,6 +67,12 @@ pub(crate) fn write_rows<R: Real>(rows: &mut [[f32; 4]], first: usize, values: [
     });
 }
 
+/// Scalar products of vectors side by side.
+#[inline(always)]
+pub(crate) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
 /// Vectors of nodes to read from; there is at least one.
 #[derive(Clone, Copy)]
 pub(crate) struct Gather<'a> {

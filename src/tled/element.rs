@@ -4,7 +4,7 @@
 //! forces of an element add up to zero and a translation gives exactly none.
 
 use super::Status;
-use crate::lanes::{BLOCK, Gather, Pair, Real, Scatter};
+use crate::lanes::{BLOCK, Gather, Pair, Real, Scatter, dot};
 use crate::ledger::Ledger;
 use crate::material::{Invariants, J_FLOOR, Law, Local, Material, response_operations};
 use crate::scene::ElementBlock;
@@ -23,11 +23,6 @@ pub(crate) struct Deformation<R> {
     /// `tr H`.
     pub(crate) trace: R,
     pub(crate) invariants: Invariants<R>,
-}
-
-#[inline(always)]
-fn dot<R: Real>(a: Vector<R>, b: Vector<R>) -> R {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 impl<R: Real> Deformation<R> {
