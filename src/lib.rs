@@ -30,9 +30,9 @@
 //! through its public API. Memory is the caller's: capacity is in the type ([`scene::FixedScene`],
 //! [`state::FixedState`]), in slices or in vectors; too little is an error. A step does the same work every
 //! time and says what became of it ([`tled::Status`]); one that cannot be believed is not taken. The same
-//! input gives the same bits, with and without vector instructions. What a scene does not use costs it
-//! nothing: no exponential is linked into a neo-Hookean scene, elements whose four nodes are fixed are left
-//! out.
+//! input gives the same bits from run to run; with the feature `deterministic`, which fuses no multiplications and
+//! additions, on every processor. What a scene does not use costs it nothing: no exponential is linked into a
+//! neo-Hookean scene, elements whose four nodes are fixed are left out.
 //!
 //! # Example
 //!

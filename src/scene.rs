@@ -9,7 +9,7 @@ use core::fmt;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec4};
 
-use crate::lanes::{BLOCK, Real};
+use crate::lanes::{BLOCK, BlockNodes, Real};
 use crate::material::{Law, Material, releasable_energy};
 use crate::mesh::{Mesh, MeshError, gradients, volume};
 use crate::symmetric::Symmetric;
@@ -194,6 +194,12 @@ impl ElementBlock {
     #[inline(always)]
     pub(crate) fn node(&self, corner: usize, lane: usize) -> usize {
         self.nodes[corner][lane] as usize
+    }
+
+    /// The nodes, if all are below `count`.
+    #[inline(always)]
+    pub(crate) fn nodes_below(&self, count: usize) -> Option<BlockNodes<'_>> {
+        BlockNodes::below(&self.nodes, count)
     }
 
     /// The mesh's number of the element in `lane`.

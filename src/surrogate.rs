@@ -21,8 +21,8 @@ use glam::Vec4;
 use crate::frame::{Axes, Frame};
 use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch, dot};
 use crate::loads::Loads;
-use crate::material::Material;
-use crate::mlp::{ForceInput, MAX_INPUTS, Network, Scratch, Tile};
+use crate::material::{Law, Material};
+use crate::mlp::{ForceInput, MAX_INPUTS, Network, Scratch};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
 use crate::tled::{
@@ -204,20 +204,14 @@ where
     }
 
     external_forces(force, inertia, loads, *time);
-    let (Some(from), Some(to)) = (Gather::new(displacement), Scatter::new(force)) else {
-        return mismatch;
-    };
-    let extremes = dispatch(InternalForces { scene, displacement: from, force: to, beside: Nothing });
+    let (from, to) = (Gather::new(displacement), Scatter::new(force));
+    let (laws, blocks) = (scene.material().laws(), scene.blocks());
+    let forces = InternalForces { laws, blocks, displacement: from, force: to, beside: Nothing };
+    let extremes = M::Law::forces(forces);
     let (increments, forces) = (&*increment, &*force);
-    let (totals, found) = dispatch(Predict {
-        network,
-        step,
-        inertia,
-        displacement,
-        increment: increments,
-        force: forces,
-        vertices,
-    });
+    let (totals, found) =
+        Predict { network, step, inertia, displacement, increment: increments, force: forces, vertices }
+            .dispatched();
 
     let vertices = &*vertices;
     let next = |node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector| {
@@ -258,6 +252,14 @@ struct Predict<'a, 'w> {
     vertices: &'a mut [Vertex],
 }
 
+impl Predict<'_, '_> {
+    /// Compiled with this crate, as it is not generic.
+    #[inline(never)]
+    fn dispatched(self) -> (Totals, SurrogateReport) {
+        dispatch(self)
+    }
+}
+
 impl Kernel for Predict<'_, '_> {
     type Output = (Totals, SurrogateReport);
 
@@ -278,6 +280,21 @@ struct Moving<R> {
     force: [R; 3],
     /// One where an input is outside what training has seen.
     outside: R,
+}
+
+impl<R: Real> Moving<R> {
+    #[inline(always)]
+    fn nothing() -> Self {
+        let (zero, none) = (R::splat(0.0), [R::splat(0.0); 3]);
+        Self {
+            axes: Axes::of(|_| Frame::WORLD),
+            free: none,
+            mass: zero,
+            increment: none,
+            force: none,
+            outside: zero,
+        }
+    }
 }
 
 /// What is found on the way, node by node in lanes.
@@ -310,20 +327,22 @@ impl Predict<'_, '_> {
             Found { sums: [Sums::new(self.step, R::splat); 3], free: zero, clipped: zero, outside: zero };
         for first in (0..self.inertia.len()).step_by(COLUMNS * R::COUNT) {
             let mut inputs = [[zero; COLUMNS]; MAX_INPUTS];
-            let moving: [Moving<R>; COLUMNS] = core::array::from_fn(|column| {
-                let (moving, features) = self.see(first + column * R::COUNT);
+            // Loops and functions, no closures over vectors: those may stay calls.
+            let mut moving = [Moving::nothing(); COLUMNS];
+            for (column, moving) in moving.iter_mut().enumerate() {
+                let features;
+                (*moving, features) = self.see(first + column * R::COUNT);
                 for (inputs, feature) in inputs.iter_mut().zip(features) {
-                    inputs[column % COLUMNS] = feature;
+                    inputs[column] = feature;
                 }
-                moving
-            });
+            }
             let [clipped, unclipped] = self.network.forward(&inputs, &mut scratch);
-            for (column, moving) in moving.into_iter().enumerate() {
-                let of = |outputs: &[Tile<R, COLUMNS>]| {
-                    [0, 1, 2].map(|axis| outputs.get(axis).map_or(zero, |tile| tile[column % COLUMNS]))
-                };
-                let (clipped, unclipped) = (of(&clipped), of(&unclipped));
-                self.move_on(first + column * R::COUNT, &moving, clipped, unclipped, &mut found);
+            for (column, moving) in moving.iter().enumerate() {
+                let (mut to, mut unclipped_to) = ([zero; 3], [zero; 3]);
+                for (axis, (clipped, unclipped)) in clipped.iter().zip(&unclipped).enumerate().take(3) {
+                    (to[axis], unclipped_to[axis]) = (clipped[column], unclipped[column]);
+                }
+                self.move_on(first + column * R::COUNT, moving, to, unclipped_to, &mut found);
             }
         }
         let mut totals = Totals::default();

@@ -28,6 +28,25 @@ fn chains_fma() -> f32 {
     chains::<8>(|a, b, c| a.mul_add(b, c))
 }
 
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,fma")]
+fn chains_avx512() -> f32 {
+    use std::arch::x86_64::{_mm512_fmadd_ps, _mm512_reduce_add_ps, _mm512_set1_ps};
+    // By name: the compiler does not find these vectors by itself.
+    let mut sums = [_mm512_set1_ps(black_box(1.0)); CHAINS];
+    let (factor, add) = (_mm512_set1_ps(black_box(0.999_9)), _mm512_set1_ps(black_box(1e-4)));
+    for _ in 0..ROUNDS {
+        for sum in &mut sums {
+            *sum = _mm512_fmadd_ps(*sum, factor, add);
+        }
+    }
+    let mut total = 0.0;
+    for sum in sums {
+        total += _mm512_reduce_add_ps(sum);
+    }
+    total
+}
+
 fn best<F: Fn() -> f32>(rounds: usize, flops: f64, run: F) -> f64 {
     (0..rounds)
         .map(|_| {
@@ -46,6 +65,12 @@ pub(crate) fn baseline(rounds: usize) -> f64 {
 /// GFLOP/s of one core with its widest instructions, the best of so many rounds of 40 us. A machine that others use changes
 /// its speed: shares of the peak are taken of one that was measured just before.
 pub(crate) fn widest(rounds: usize) -> f64 {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx512f") {
+        #[allow(unsafe_code)]
+        // SAFETY: the feature was detected.
+        return best(rounds, (2 * CHAINS * 16 * ROUNDS) as f64, || unsafe { chains_avx512() });
+    }
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
         #[allow(unsafe_code)]

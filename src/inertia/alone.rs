@@ -7,7 +7,7 @@ use super::estimate::{Defect, Defects};
 use super::node::{Scaling, renew};
 use super::report::{HeldBack, Tally};
 use super::vectors::NodeTables;
-use crate::lanes::{Kernel, NodeVector, Real};
+use crate::lanes::{Kernel, NodeVector, Real, dispatch};
 use crate::scene::NodeInertia;
 use crate::tled::{Step, Sums, Totals};
 
@@ -78,6 +78,14 @@ pub(super) struct Move<'a, 'b> {
     pub(super) increment: &'a [NodeVector],
     pub(super) force: &'a [NodeVector],
     pub(super) tables: &'a mut NodeTables<'b>,
+}
+
+impl Move<'_, '_> {
+    /// Compiled with this crate, as it is not generic.
+    #[inline(never)]
+    pub(super) fn moved(self) -> (Totals, Defects) {
+        dispatch(self)
+    }
 }
 
 impl Kernel for Move<'_, '_> {

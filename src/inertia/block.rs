@@ -6,12 +6,12 @@ use super::bound::{Bound, MatrixBeside};
 use super::frames::{Frames, Rotation};
 use super::lattice::{LatticeNode, MAX_FUNCTIONS};
 use crate::lanes::{BLOCK, Gather, Kernel, Real, write_rows};
-use crate::material::{Law, Local, Material};
+use crate::material::{Law, Laws, Local};
 use crate::scene::ElementBlock;
 use crate::tled::Deformation;
 
-pub(super) struct OneBlock<'a, M> {
-    pub(super) material: &'a M,
+pub struct OneBlock<'a, L> {
+    pub(super) laws: Laws<'a, L>,
     pub(super) block: &'a ElementBlock,
     pub(super) displacement: Gather<'a>,
     pub(super) sums: MatrixBeside<'a>,
@@ -24,7 +24,7 @@ pub(super) struct OneBlock<'a, M> {
 /// and nothing.
 type Tangents = [[[f32; 4]; BLOCK]; 3];
 
-impl<M: Material> Kernel for OneBlock<'_, M> {
+impl<L: Law> Kernel for OneBlock<'_, L> {
     type Output = ();
 
     #[inline(always)]
@@ -48,22 +48,22 @@ impl<M: Material> Kernel for OneBlock<'_, M> {
             let [[_, _, _, iso], [_, _, _, volume], _] = columns;
             let cofactor = columns.map(|[x, y, z, _]| [x, y, z, 0.0]);
             let element = Element { nodes, gradients, iso, volume, cofactor };
-            if !self.assembly.add_in_cells::<R>(&element) {
+            if !self.assembly.add_in_cells::<R::Eight>(&element) {
                 self.assembly.add_element(&element, &mut slots);
             }
         }
     }
 }
 
-impl<M: Material> OneBlock<'_, M> {
+impl<L: Law> OneBlock<'_, L> {
     /// The bounds of the elements in lanes `first..`, into the sums of their nodes and into `tangents`.
     #[inline(always)]
     fn bound<R: Real>(&mut self, first: usize, tangents: &mut Tangents) {
         let block = self.block;
-        let law = M::Law::widen(|lane| self.material.law(block.element(first + lane)));
+        let law = self.laws.widen(|lane| block.element(first + lane));
         let deformation = Deformation::<R>::of_block(block, first, self.displacement);
-        let local = Local::new::<M::Law>(&law, deformation.invariants);
-        let bound = Bound::<R>::new::<M::Law>(&law, block, first, &deformation, &local);
+        let local = Local::new::<L>(&law, deformation.invariants);
+        let bound = Bound::<R>::new::<L>(&law, block, first, &deformation, &local);
         // C in the frame of the element's first node.
         let mut turns = [Rotation::NONE; BLOCK];
         for (lane, turn) in turns.iter_mut().enumerate().take(R::COUNT) {

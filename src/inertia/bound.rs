@@ -165,7 +165,7 @@ impl<R: Real> Bound<R> {
 }
 
 /// Puts [`scalar_bound`] into the fourth component of the forces of the elements' nodes.
-pub(super) struct ScalarBeside;
+pub struct ScalarBeside;
 
 impl Beside for ScalarBeside {
     #[inline(always)]
@@ -183,7 +183,7 @@ impl Beside for ScalarBeside {
 
 /// Adds the matrices `D_a` of each element to the sums of its nodes: `xx, yy, zz` with [`scalar_bound`] as
 /// fourth number, and `xy, yz, zx`.
-pub(super) struct MatrixBeside<'a> {
+pub struct MatrixBeside<'a> {
     pub(super) diagonal: Scatter<'a>,
     pub(super) beside: Scatter<'a>,
 }
@@ -242,16 +242,21 @@ impl MatrixBeside<'_> {
         for (length, [x, y, z]) in lengths.iter_mut().zip(images) {
             *length = (x * x + y * y + z * z).root();
         }
+        let Some(nodes) = block.nodes_below(self.diagonal.count()) else {
+            return bound.scalar;
+        };
         let weight = volume * bound.volume * (lengths[0] + lengths[1] + lengths[2] + lengths[3]);
+        let mut diagonal = [[R::splat(0.0); 4]; 4];
+        let mut beside = [[R::splat(0.0); 4]; 4];
         for (corner, ([x, y, z], length)) in images.into_iter().zip(lengths).enumerate() {
-            let node = |lane: usize| block.node(corner, first + lane);
             // A length below this is none beside the others.
             let weight = weight.over(length.max(R::splat(1e-12)));
             let (wx, wy, wz) = (weight * x, weight * y, weight * z);
-            let diagonal = [isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, bound.scalar];
-            self.diagonal.add_lanes(node, diagonal);
-            self.beside.add_lanes(node, [wx * y, wy * z, wz * x, R::splat(0.0)]);
+            diagonal[corner] = [isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, bound.scalar];
+            beside[corner] = [wx * y, wy * z, wz * x, R::splat(0.0)];
         }
+        self.diagonal.add_corners(nodes, first, diagonal);
+        self.beside.add_corners(nodes, first, beside);
         bound.scalar
     }
 }

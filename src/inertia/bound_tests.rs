@@ -45,10 +45,7 @@ fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
     let local = Local::new::<L>(&wide, deformation.invariants);
     let bound = Bound::<f32>::new::<L>(&wide, block, 0, &deformation, &local);
     let (mut diagonal, mut beside) = ([NodeVector::ZERO; 4], [NodeVector::ZERO; 4]);
-    let mut sums = MatrixBeside {
-        diagonal: Scatter::new(&mut diagonal).unwrap(),
-        beside: Scatter::new(&mut beside).unwrap(),
-    };
+    let mut sums = MatrixBeside { diagonal: Scatter::new(&mut diagonal), beside: Scatter::new(&mut beside) };
     let scalar = f64::from(sums.add(&bound, block, 0, &cofactor(&deformation)));
 
     // By the crate's numbers of the corners, which are those of the block.

@@ -80,13 +80,14 @@ pub use vectors::{damped_vectors_for, vectors_for};
 
 use core::fmt;
 
-use crate::lanes::{Gather, NodeVector, Scatter, dispatch};
-use crate::material::Material;
+use crate::lanes::{Gather, NodeVector, Scatter};
+use crate::material::{Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
 use crate::tled::{InternalForces, Step};
 
-use bound::MatrixBeside;
+pub(crate) use block::OneBlock;
+pub(crate) use bound::{MatrixBeside, ScalarBeside};
 use damper::Rough;
 use estimate::Estimate;
 use lattice::Lattice;
@@ -459,16 +460,11 @@ where
     N: AsRef<[NodeInertia]>,
     B: AsRef<[ElementBlock]>,
 {
-    let mut nowhere = [NodeVector::ZERO];
-    if let (Some(displacement), Some(force), Some(diagonal), Some(beside)) = (
-        Gather::new(displacement),
-        Scatter::new(&mut nowhere),
-        Scatter::new(tables.sum_diagonal),
-        Scatter::new(tables.sum_beside),
-    ) {
-        let beside = MatrixBeside { diagonal, beside };
-        dispatch(InternalForces { scene, displacement, force, beside });
-    }
+    let (diagonal, beside) = (Scatter::new(tables.sum_diagonal), Scatter::new(tables.sum_beside));
+    let beside = MatrixBeside { diagonal, beside };
+    let (displacement, nowhere) = (Gather::new(displacement), Scatter::new(&mut []));
+    let (laws, blocks) = (scene.material().laws(), scene.blocks());
+    M::Law::forces_and_matrices(InternalForces { laws, blocks, displacement, force: nowhere, beside });
 }
 
 /// Writes the least height of each node's elements, `1 / |ga|`, into the fourth number of `next`.

@@ -12,7 +12,7 @@ use super::node::Scaling;
 use super::report::HeldBack;
 use super::vectors::NodeTables;
 use super::{LARGEST_KICK, NODE_GROWTH, RECOVERY};
-use crate::lanes::{BLOCK, Kernel, NodeVector, Real, read_rows, write_rows};
+use crate::lanes::{BLOCK, Kernel, NodeVector, Real, dispatch, read_rows, write_rows};
 use crate::scene::NodeInertia;
 use crate::tled::{Step, Sums, Totals};
 
@@ -69,11 +69,26 @@ impl<R: Real> Found<R> {
     }
 }
 
+impl Prepare<'_, '_> {
+    /// Compiled with this crate, as it is not generic.
+    #[inline(never)]
+    pub(super) fn dispatched(self) -> (HeldBack, f32) {
+        dispatch(self)
+    }
+}
+
 impl Kernel for Prepare<'_, '_> {
     type Output = (HeldBack, f32);
 
     #[inline(always)]
-    fn run<R: Real>(mut self) -> Self::Output {
+    fn run<R: Real>(self) -> Self::Output {
+        self.all::<R::Eight>()
+    }
+}
+
+impl Prepare<'_, '_> {
+    #[inline(always)]
+    fn all<R: Real>(mut self) -> (HeldBack, f32) {
         self.cells.fill(Cell::EMPTY);
         if let Some(momentum) = &mut self.momentum {
             momentum.fill(Cell::EMPTY);
@@ -96,9 +111,7 @@ impl Kernel for Prepare<'_, '_> {
         held_back.add(rest.held, rest.unused);
         (held_back, 1.0 / rest.least)
     }
-}
 
-impl Prepare<'_, '_> {
     /// The nodes from `first` on, side by side; `C` holds eight numbers.
     #[inline(always)]
     fn nodes<R: Real, C: Real>(&mut self, first: usize, found: &mut Found<R>) {
@@ -193,11 +206,29 @@ pub(super) struct Settle<'a, 'b> {
     pub(super) tables: &'a mut NodeTables<'b>,
 }
 
+/// Sums for each axis.
+type AxisSums<R> = ([Sums<R>; 3], [Defect<R>; 3], [R; 4]);
+
+impl Settle<'_, '_> {
+    /// Compiled with this crate, as it is not generic.
+    #[inline(never)]
+    pub(super) fn dispatched(self) -> (Totals, Defects, Rough) {
+        dispatch(self)
+    }
+}
+
 impl Kernel for Settle<'_, '_> {
     type Output = (Totals, Defects, Rough);
 
     #[inline(always)]
-    fn run<R: Real>(mut self) -> Self::Output {
+    fn run<R: Real>(self) -> Self::Output {
+        self.all::<R::Eight>()
+    }
+}
+
+impl Settle<'_, '_> {
+    #[inline(always)]
+    fn all<R: Real>(mut self) -> (Totals, Defects, Rough) {
         let nodes = self.inertia.len();
         let whole = nodes - nodes % R::COUNT;
         let mut sums = self.none::<R>();
@@ -218,12 +249,7 @@ impl Kernel for Settle<'_, '_> {
         rough.add_lanes(&rest.2);
         (totals, defects, rough)
     }
-}
 
-/// Sums for each axis.
-type AxisSums<R> = ([Sums<R>; 3], [Defect<R>; 3], [R; 4]);
-
-impl Settle<'_, '_> {
     #[inline(always)]
     fn none<R: Real>(&self) -> AxisSums<R> {
         let defects = [Defect::new(self.step, self.scaling, R::splat); 3];

@@ -24,7 +24,7 @@ use super::report::Tally;
 use super::vectors::NodeTables;
 use super::{COARSE, FINE};
 use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch};
-use crate::material::Material;
+use crate::material::{Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -316,22 +316,17 @@ impl Refresh {
         N: AsRef<[NodeInertia]>,
         B: AsRef<[ElementBlock]>,
     {
-        let (Some(displacement), Some(diagonal), Some(beside)) = (
-            Gather::new(from.displacement),
-            Scatter::new(tables.sum_diagonal),
-            Scatter::new(tables.sum_beside),
-        ) else {
-            return;
-        };
+        let displacement = Gather::new(from.displacement);
+        let (diagonal, beside) = (Scatter::new(tables.sum_diagonal), Scatter::new(tables.sum_beside));
         let Some(block) = from.scene.blocks().get(at) else {
             return;
         };
         let assembly = from.assembly(matrices.next, matrices.sums, stride);
         let sums = MatrixBeside { diagonal, beside };
-        let material = from.scene.material();
+        let laws = from.scene.material().laws();
         let frames = &self.frames;
         let weight = from.scaling.coarse_weight;
-        dispatch(OneBlock { material, block, displacement, sums, assembly, frames, weight });
+        M::Law::bounds_of_block(OneBlock { laws, block, displacement, sums, assembly, frames, weight });
     }
 
     /// Some nodes, from `first` on.
@@ -351,7 +346,7 @@ impl Refresh {
         let sums = &mut *matrices.sums;
         let first_cycle = *first_cycle;
         let inertia = scene.inertia();
-        dispatch(SomeNodes {
+        SomeNodes {
             inertia,
             increment,
             places,
@@ -364,7 +359,8 @@ impl Refresh {
             sums,
             first,
             first_cycle,
-        });
+        }
+        .dispatched();
     }
 
     /// The share of `X` that a step used. A smaller one is a larger inertia of the lattice: as for the nodes no
@@ -478,6 +474,14 @@ struct SomeNodes<'a, 'b> {
     first: usize,
     /// Nothing is in use yet.
     first_cycle: bool,
+}
+
+impl SomeNodes<'_, '_> {
+    /// Compiled with this crate, as it is not generic.
+    #[inline(never)]
+    fn dispatched(self) {
+        dispatch(self);
+    }
 }
 
 impl Kernel for SomeNodes<'_, '_> {

@@ -3,9 +3,9 @@
 
 use glam::Vec4;
 
-use crate::lanes::{Gather, NodeVector, Scatter, dispatch};
+use crate::lanes::{Gather, NodeVector, Scatter};
 use crate::loads::Loads;
-use crate::material::Material;
+use crate::material::{Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
 use crate::tled::{Divergence, Entry, InternalForces, Status, culprit, external_forces, follow_motions};
@@ -93,7 +93,7 @@ where
     ) else {
         return mismatch;
     };
-    if loads.nodes().is_some_and(|checked| checked != nodes) {
+    if nodes == 0 || loads.nodes().is_some_and(|checked| checked != nodes) {
         return mismatch;
     }
     let step = step.carried_from(*dt);
@@ -107,20 +107,16 @@ where
     let external = dot(force, displacement);
     let functions = lattice.functions();
     let no_lattice = functions == 0;
-    let (Some(from), Some(to)) = (Gather::new(displacement), Scatter::new(force)) else {
-        return mismatch;
-    };
+    let (from, to) = (Gather::new(displacement), Scatter::new(force));
+    let (laws, blocks) = (scene.material().laws(), scene.blocks());
     let extremes = if no_lattice {
         tables.clear_sums();
-        let (Some(diagonal), Some(beside)) =
-            (Scatter::new(tables.sum_diagonal), Scatter::new(tables.sum_beside))
-        else {
-            return mismatch;
-        };
+        let (diagonal, beside) = (Scatter::new(tables.sum_diagonal), Scatter::new(tables.sum_beside));
         let beside = MatrixBeside { diagonal, beside };
-        dispatch(InternalForces { scene, displacement: from, force: to, beside })
+        M::Law::forces_and_matrices(InternalForces { laws, blocks, displacement: from, force: to, beside })
     } else {
-        dispatch(InternalForces { scene, displacement: from, force: to, beside: ScalarBeside })
+        let beside = ScalarBeside;
+        M::Law::forces_and_bounds(InternalForces { laws, blocks, displacement: from, force: to, beside })
     };
 
     let places = places.as_ref();
@@ -135,14 +131,14 @@ where
     let (held_back, tally, (totals, defects, found)) = if no_lattice {
         let (held_back, tally) = alone::prepare(&step, scaling, nodal, increment, force, &mut tables);
         let (step, inertia, tables) = (&step, nodal, &mut tables);
-        let moved = dispatch(alone::Move { step, scaling, inertia, displacement, increment, force, tables });
+        let moved = alone::Move { step, scaling, inertia, displacement, increment, force, tables }.moved();
         (held_back, tally, (moved.0, moved.1, Rough::NONE))
     } else {
         refresh.look(displacement, *steps);
         let turns = &turns(&refresh.frames.of_bounds, functions);
         let (step, inertia, brake, cells) = (&step, nodal, refresh.brake, &mut *matrices.cells);
         let momentum = matrices.damped.as_mut().map(|damped| &mut *damped.momentum);
-        let (held_back, growth) = dispatch(Prepare {
+        let (held_back, growth) = Prepare {
             step,
             scaling,
             brake,
@@ -154,7 +150,8 @@ where
             tables: &mut tables,
             cells,
             momentum,
-        });
+        }
+        .dispatched();
         if growth > COARSE_GROWTH {
             coarse_share = COARSE_GROWTH / growth;
         }
@@ -162,18 +159,9 @@ where
         let (tables, cells) = (&mut tables, &*matrices.cells);
         let damped = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use);
         let damped = damped.map(|damped| Calm { smooth: smooth_motion(damped, lattice), share: damping });
-        let moved = dispatch(Settle {
-            step,
-            scaling,
-            places,
-            cells,
-            damped,
-            inertia,
-            displacement,
-            increment,
-            force,
-            tables,
-        });
+        let moved =
+            Settle { step, scaling, places, cells, damped, inertia, displacement, increment, force, tables }
+                .dispatched();
         (held_back, Tally::NEW, moved)
     };
 

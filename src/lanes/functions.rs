@@ -37,16 +37,16 @@ pub(super) fn exp<R: Bits>(x: R) -> R {
     const LN2_LOW: f32 = -2.121_944_4e-4;
     let c = R::splat;
     let x = x.min(c(88.0)).max(c(-87.0));
-    let shifted = x * c(core::f32::consts::LOG2_E) + c(MAGIC);
+    let shifted = x.fused(c(core::f32::consts::LOG2_E), c(MAGIC));
     let n = shifted - c(MAGIC);
     let r = x - n * c(LN2_HIGH) - n * c(LN2_LOW);
     let p = c(1.987_569_2e-4);
-    let p = p * r + c(1.398_199_9e-3);
-    let p = p * r + c(8.333_452e-3);
-    let p = p * r + c(4.166_579_6e-2);
-    let p = p * r + c(1.666_666_5e-1);
-    let p = p * r + c(0.5);
-    let p = p * (r * r) + r + c(1.0);
+    let p = p.fused(r, c(1.398_199_9e-3));
+    let p = p.fused(r, c(8.333_452e-3));
+    let p = p.fused(r, c(4.166_579_6e-2));
+    let p = p.fused(r, c(1.666_666_5e-1));
+    let p = p.fused(r, c(0.5));
+    let p = p.fused(r * r, r) + c(1.0);
     // Shifting drops the exponent of MAGIC and leaves n in the exponent field.
     p * shifted.plus_shifted(127, 23)
 }

@@ -1,12 +1,13 @@
 //! Which instructions a kernel may use, asked of the processor once. The body of a kernel is the same for
-//! every level; a wrapper with the level's instructions switched on is all there is to one. Only networks use fused
-//! multiplications and additions, and not with the feature `deterministic`: all else gives the same bits at every level.
+//! every level; a wrapper with the level's instructions switched on is all there is to one. Levels that have them fuse
+//! multiplications and additions in networks and element loops, which is faster and rounds less often. With the feature
+//! `deterministic` nothing is fused, and every level gives the same bits.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
-#[cfg(target_arch = "x86_64")]
-use super::wide::Avx;
 use super::{Lanes, Real};
+#[cfg(target_arch = "x86_64")]
+use super::{avx2::Avx2, avx512::Avx512};
 
 /// A set of vector instructions.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -16,6 +17,8 @@ pub enum Level {
     Portable,
     /// x86-64 with AVX2 and FMA.
     Avx2,
+    /// x86-64 with AVX-512 (F, BW, DQ, VL) and its dot products of bytes (VNNI).
+    Avx512,
 }
 
 /// Work written once for any number of lanes. `run` must be `#[inline(always)]`, so that it is compiled
@@ -25,26 +28,33 @@ pub(crate) trait Kernel {
     fn run<R: Real>(self) -> Self::Output;
 }
 
-const UNKNOWN: u8 = 0;
+/// Codes of the levels in [`DETECTED`]; zero before it was asked for.
 const PORTABLE: u8 = 1;
 const AVX2: u8 = 2;
+const AVX512: u8 = 3;
 
-static DETECTED: AtomicU8 = AtomicU8::new(UNKNOWN);
+static DETECTED: AtomicU8 = AtomicU8::new(0);
 
 impl Level {
     /// The best level of this processor, or the one set by [`Level::force`].
     #[inline]
     pub fn current() -> Self {
         match DETECTED.load(Ordering::Relaxed) {
+            AVX512 => Self::Avx512,
             AVX2 => Self::Avx2,
             PORTABLE => Self::Portable,
             _ => Self::detect(),
         }
     }
 
+    /// Those this processor has, the best first.
+    pub fn available() -> impl Iterator<Item = Self> {
+        [Self::Avx512, Self::Avx2, Self::Portable].into_iter().filter(|level| level.is_here())
+    }
+
     #[cold]
     fn detect() -> Self {
-        let level = if has_avx2() { Self::Avx2 } else { Self::Portable };
+        let level = Self::available().next().unwrap_or(Self::Portable);
         level.store();
         level
     }
@@ -53,14 +63,29 @@ impl Level {
         let code = match self {
             Self::Portable => PORTABLE,
             Self::Avx2 => AVX2,
+            Self::Avx512 => AVX512,
         };
         DETECTED.store(code, Ordering::Relaxed);
+    }
+
+    fn is_here(self) -> bool {
+        match self {
+            Self::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => has(AVX_STATE, AVX2_FEATURES),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                has(AVX_STATE | AVX512_STATE, [AVX2_FEATURES[0] | AVX512_FEATURES[0], AVX512_FEATURES[1]])
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx2 | Self::Avx512 => false,
+        }
     }
 
     /// Makes every later step of this process use `level`. Returns whether the processor has it; if not,
     /// nothing changes.
     pub fn force(level: Self) -> bool {
-        let possible = level == Self::Portable || has_avx2();
+        let possible = level.is_here();
         if possible {
             level.store();
         }
@@ -72,10 +97,13 @@ impl Level {
 #[inline(always)]
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
-    if Level::current() == Level::Avx2 {
-        #[allow(unsafe_code)]
-        // SAFETY: `Level::Avx2` is stored only after `has_avx2` saw that processor and system support it.
-        return unsafe { with_avx2(kernel) };
+    #[allow(unsafe_code)]
+    match Level::current() {
+        // SAFETY: a level is stored only after `Level::is_here` saw that processor and system support it.
+        Level::Avx512 => return unsafe { with_avx512(kernel) },
+        // SAFETY: as above.
+        Level::Avx2 => return unsafe { with_avx2(kernel) },
+        Level::Portable => {}
     }
     kernel.run::<Lanes<8>>()
 }
@@ -83,16 +111,34 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 fn with_avx2<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run::<Avx>()
+    kernel.run::<Avx2>()
 }
 
-/// AVX2 in the processor (leaf 7), FMA, AVX and the saving of its registers by the system (leaf 1, XCR0).
 #[cfg(target_arch = "x86_64")]
-fn has_avx2() -> bool {
+#[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512vnni")]
+fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Avx512>()
+}
+
+/// Registers that the system saves (XCR0): xmm and ymm; masks and zmm.
+#[cfg(target_arch = "x86_64")]
+const AVX_STATE: u64 = 0b110;
+#[cfg(target_arch = "x86_64")]
+const AVX512_STATE: u64 = 0b1110_0000;
+
+/// What leaf 7 says in ebx and ecx: AVX2; F, DQ, BW and VL, and VNNI.
+#[cfg(target_arch = "x86_64")]
+const AVX2_FEATURES: [u32; 2] = [1 << 5, 0];
+#[cfg(target_arch = "x86_64")]
+const AVX512_FEATURES: [u32; 2] = [1 << 16 | 1 << 17 | 1 << 30 | 1 << 31, 1 << 11];
+
+/// FMA, AVX and the saving of registers in the processor (leaf 1), the given features (leaf 7), and the given registers
+/// saved by the system.
+#[cfg(target_arch = "x86_64")]
+fn has(state: u64, [ebx, ecx]: [u32; 2]) -> bool {
     use core::arch::x86_64::{__cpuid, __cpuid_count, _xgetbv};
 
     const NEEDED: u32 = 1 << 12 | 1 << 27 | 1 << 28;
-    const XMM_AND_YMM: u64 = 0b110;
     #[target_feature(enable = "xsave")]
     fn enabled_state() -> u64 {
         // SAFETY: the caller has checked OSXSAVE.
@@ -106,11 +152,7 @@ fn has_avx2() -> bool {
     }
     // SAFETY: OSXSAVE is set, so xgetbv is there.
     #[allow(unsafe_code)]
-    let state = unsafe { enabled_state() };
-    state & XMM_AND_YMM == XMM_AND_YMM && __cpuid_count(7, 0).ebx >> 5 & 1 == 1
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-fn has_avx2() -> bool {
-    false
+    let saved = unsafe { enabled_state() };
+    let features = __cpuid_count(7, 0);
+    saved & state == state && features.ebx & ebx == ebx && features.ecx & ecx == ecx
 }

@@ -3,21 +3,23 @@
 //!
 //! Element loops are written once over [`Real`]. The compiler turns the fixed-length loops of
 //! [`Lanes`] into vector instructions of whatever width the target has. Only [`Real::fused`] may fuse a multiplication
-//! with an addition; without it every width gives the same bits.
+//! with an addition, and not with the feature `deterministic`: without it every width gives the same bits.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
 mod functions;
 mod level;
 mod pair;
 mod vectors;
-#[cfg(target_arch = "x86_64")]
-mod wide;
 
 pub use level::Level;
 pub(crate) use level::{Kernel, dispatch};
 pub(crate) use pair::Pair;
 pub use vectors::NodeVector;
 use vectors::transpose;
-pub(crate) use vectors::{Gather, Scatter, dot, read_rows, write_rows};
+pub(crate) use vectors::{BlockNodes, Gather, Scatter, dot, read_rows, write_rows};
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -32,6 +34,9 @@ pub trait Real:
     const COUNT: usize;
     /// There are registers for a block of four by two of these sums, and what goes into them.
     const MANY_REGISTERS: bool = false;
+    /// Eight numbers side by side with the same instructions: for tables eight wide, and for sums over nodes, whose
+    /// order and so whose bits the width would change.
+    type Eight: Real;
 
     /// Number `lane` is `at(lane)`.
     fn from_fn(at: impl Fn(usize) -> f32) -> Self;
@@ -39,6 +44,16 @@ pub trait Real:
     fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4];
     /// Hands the four numbers of each lane to `row`.
     fn to_rows(columns: [Self; 4], row: impl FnMut(usize, [f32; 4]));
+    /// Hands the four numbers of each corner and lane of elements side by side to `row`: of eight lanes those of the first
+    /// corner, then of the second and so on, then of the next eight. Sums must not depend on how wide a vector is.
+    #[inline(always)]
+    fn corners_to_rows([a, b, c, d]: [[Self; 4]; 4], mut row: impl FnMut(usize, usize, [f32; 4])) {
+        // One by one: in a loop the compiler would take the numbers through memory, one after the other.
+        Self::to_rows(a, |lane, numbers| row(0, lane, numbers));
+        Self::to_rows(b, |lane, numbers| row(1, lane, numbers));
+        Self::to_rows(c, |lane, numbers| row(2, lane, numbers));
+        Self::to_rows(d, |lane, numbers| row(3, lane, numbers));
+    }
     /// The number in `lane`; lanes that do not exist read as zero.
     fn lane(&self, lane: usize) -> f32;
     /// Applies `f` to each number.
@@ -111,6 +126,7 @@ pub trait Real:
 
 impl Real for f32 {
     const COUNT: usize = 1;
+    type Eight = Lanes<8>;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {
@@ -145,6 +161,7 @@ pub struct Lanes<const L: usize>(pub [f32; L]);
 
 impl<const L: usize> Real for Lanes<L> {
     const COUNT: usize = L;
+    type Eight = Lanes<8>;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {

@@ -47,6 +47,7 @@ macro_rules! each {
 
 impl<R: Real> Real for Pair<R> {
     const COUNT: usize = 2 * R::COUNT;
+    type Eight = R::Eight;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {
@@ -78,6 +79,10 @@ impl<R: Real> Real for Pair<R> {
     #[inline(always)]
     fn splat(value: f32) -> Self {
         Self(R::splat(value), R::splat(value))
+    }
+    #[inline(always)]
+    fn fused(self, factor: Self, addend: Self) -> Self {
+        Self(self.0.fused(factor.0, addend.0), self.1.fused(factor.1, addend.1))
     }
     each!(max other, min other, over other, positive, abs, root, sqrt, exp, inverse_cbrt);
 }

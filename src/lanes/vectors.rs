@@ -3,7 +3,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::Real;
+use super::{BLOCK, Real};
 
 /// A vector of one node, padded to four numbers; between steps the fourth is zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -70,67 +70,101 @@ pub(crate) fn write_rows<R: Real>(rows: &mut [[f32; 4]], first: usize, values: [
 /// Scalar products of vectors side by side.
 #[inline(always)]
 pub(crate) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    a[2].fused(b[2], a[1].fused(b[1], a[0] * b[0]))
 }
 
-/// Vectors of nodes to read from; there is at least one.
+/// Nodes of the elements of a block, known to be below some number: they are checked all at once, so that a kernel does
+/// not have to check them one by one.
 #[derive(Clone, Copy)]
-pub(crate) struct Gather<'a> {
-    vectors: &'a [NodeVector],
-    last: usize,
+pub(crate) struct BlockNodes<'a> {
+    nodes: &'a [[u32; BLOCK]; 4],
+    /// What they are below.
+    count: usize,
 }
+
+impl<'a> BlockNodes<'a> {
+    /// The first node, again and again.
+    pub(crate) const NONE: Self = Self { nodes: &[[0; BLOCK]; 4], count: 1 };
+
+    /// The nodes, if all are below `count`.
+    #[inline(always)]
+    pub(crate) fn below(nodes: &'a [[u32; BLOCK]; 4], count: usize) -> Option<Self> {
+        let last = count.checked_sub(1).and_then(|last| i32::try_from(last).ok())?;
+        // The sign of what is negative, or would be if `last` were subtracted from: no vector unit compares unsigned numbers.
+        let mut signs = 0;
+        for node in nodes.as_flattened() {
+            let node = node.cast_signed();
+            signs |= node | last.wrapping_sub(node);
+        }
+        if signs >= 0 { Some(Self { nodes, count }) } else { None }
+    }
+
+    /// Node `corner` (0 to 3) of the element in `lane`.
+    #[inline(always)]
+    fn at(&self, corner: usize, lane: usize) -> usize {
+        self.nodes[corner % 4][lane % BLOCK] as usize
+    }
+}
+
+/// Vectors of nodes to read from.
+#[derive(Clone, Copy)]
+pub(crate) struct Gather<'a>(&'a [NodeVector]);
 
 impl<'a> Gather<'a> {
-    pub(crate) fn new(vectors: &'a [NodeVector]) -> Option<Self> {
-        Some(Self { vectors, last: vectors.len().checked_sub(1)? })
+    pub(crate) const fn new(vectors: &'a [NodeVector]) -> Self {
+        Self(vectors)
     }
 
+    /// How many there are.
+    pub(crate) const fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Lane `l` takes the vector of node `corner` of the element in lane `first + l` of the block; zeros if the block's
+    /// nodes are not known to be among the vectors.
     #[inline(always)]
-    fn read(&self, node: usize) -> [f32; 4] {
-        let node = if node < self.last { node } else { self.last };
-        #[allow(unsafe_code)]
-        // SAFETY: `node <= last < vectors.len()`. The line above becomes a conditional move; the branch of a
-        // checked access would keep the compiler from unrolling the lanes.
-        unsafe {
-            self.vectors.get_unchecked(node).0
+    pub(crate) fn read_lanes<R: Real>(&self, nodes: BlockNodes<'_>, corner: usize, first: usize) -> [R; 3] {
+        if nodes.count > self.0.len() {
+            return [R::splat(0.0); 3];
         }
-    }
-
-    /// Lane `l` takes the vector of node `index(l)`; a node that does not exist reads as the last one.
-    #[inline(always)]
-    pub(crate) fn read_lanes<R: Real>(&self, index: impl Fn(usize) -> usize) -> [R; 3] {
-        let [x, y, z, _] = R::from_rows(|lane| self.read(index(lane)));
+        let [x, y, z, _] = R::from_rows(|lane| {
+            #[allow(unsafe_code)]
+            // SAFETY: all nodes of the block are below `nodes.count`, which is not above the number of vectors.
+            unsafe {
+                self.0.get_unchecked(nodes.at(corner, first + lane)).0
+            }
+        });
         [x, y, z]
     }
 }
 
-/// Vectors of nodes to add to; there is at least one.
-pub(crate) struct Scatter<'a> {
-    vectors: &'a mut [NodeVector],
-    last: usize,
-}
+/// Vectors of nodes to add to.
+pub(crate) struct Scatter<'a>(&'a mut [NodeVector]);
 
 impl<'a> Scatter<'a> {
-    pub(crate) fn new(vectors: &'a mut [NodeVector]) -> Option<Self> {
-        let last = vectors.len().checked_sub(1)?;
-        Some(Self { vectors, last })
+    pub(crate) const fn new(vectors: &'a mut [NodeVector]) -> Self {
+        Self(vectors)
     }
 
+    /// How many there are.
+    pub(crate) const fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Adds for each corner the components in lane `l` to the vector of that node of the element in lane `first + l` of the
+    /// block, in the order of [`Real::corners_to_rows`]; nothing if the block's nodes are not known to be among the vectors.
     #[inline(always)]
-    fn add(&mut self, node: usize, value: [f32; 4]) {
-        let node = if node < self.last { node } else { self.last };
-        #[allow(unsafe_code)]
-        // SAFETY: `node <= last < vectors.len()`, as in `Gather::read`.
-        let vector = unsafe { self.vectors.get_unchecked_mut(node) };
-        for (sum, value) in vector.0.iter_mut().zip(value) {
-            *sum += value;
+    pub(crate) fn add_corners<R: Real>(&mut self, nodes: BlockNodes<'_>, first: usize, values: [[R; 4]; 4]) {
+        if nodes.count > self.0.len() {
+            return;
         }
-    }
-
-    /// Adds the components in lane `l` to the vector of node `index(l)`; a node that does not exist counts
-    /// as the last one.
-    #[inline(always)]
-    pub(crate) fn add_lanes<R: Real>(&mut self, index: impl Fn(usize) -> usize, values: [R; 4]) {
-        R::to_rows(values, |lane, value| self.add(index(lane), value));
+        R::corners_to_rows(values, |corner, lane, value| {
+            #[allow(unsafe_code)]
+            // SAFETY: as in `Gather::read_lanes`.
+            let vector = unsafe { self.0.get_unchecked_mut(nodes.at(corner, first + lane)) };
+            for (sum, value) in vector.0.iter_mut().zip(value) {
+                *sum += value;
+            }
+        });
     }
 }

@@ -78,4 +78,6 @@ impl Law for Exponential {
     fn unusable_constant(&self) -> Option<(&'static str, f32)> {
         super::first_not_positive(&[("a", self.a), ("b", self.b), ("d", self.d)])
     }
+
+    super::element_loops!();
 }

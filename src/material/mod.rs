@@ -14,13 +14,52 @@
 //! Adding a law: one short file with the four methods of [`Potential`] and the two of [`Law`]
 //! (`neo_hookean.rs` is the example).
 
+/// The element loops of a law. In the trait they are compiled where they are used; in the laws of this crate, where nothing in
+/// them is generic, with the crate: not again, for every level, in each program and test. Each is linked only if it is used.
+macro_rules! element_loops {
+    () => {
+        #[doc(hidden)]
+        #[inline(never)]
+        fn forces(
+            kernel: $crate::tled::InternalForces<'_, Self, $crate::tled::Nothing>,
+        ) -> $crate::tled::Extremes<f32> {
+            $crate::lanes::dispatch(kernel)
+        }
+        #[doc(hidden)]
+        #[inline(never)]
+        fn forces_and_bounds(
+            kernel: $crate::tled::InternalForces<'_, Self, $crate::inertia::ScalarBeside>,
+        ) -> $crate::tled::Extremes<f32> {
+            $crate::lanes::dispatch(kernel)
+        }
+        #[doc(hidden)]
+        #[inline(never)]
+        fn forces_and_matrices(
+            kernel: $crate::tled::InternalForces<'_, Self, $crate::inertia::MatrixBeside<'_>>,
+        ) -> $crate::tled::Extremes<f32> {
+            $crate::lanes::dispatch(kernel)
+        }
+        #[doc(hidden)]
+        #[inline(never)]
+        fn critical_bounds(kernel: $crate::tled::CriticalBounds<'_, '_, Self>) {
+            $crate::lanes::dispatch(kernel);
+        }
+        #[doc(hidden)]
+        #[inline(never)]
+        fn bounds_of_block(kernel: $crate::inertia::OneBlock<'_, Self>) {
+            $crate::lanes::dispatch(kernel);
+        }
+    };
+}
+pub(crate) use element_loops;
+
 mod exponential;
 mod neo_hookean;
 mod tissue;
 
 pub use exponential::{EXPONENT_CAP, Exponential};
 pub use neo_hookean::NeoHookean;
-pub use tissue::{Material, Regions, Tissue};
+pub use tissue::{Laws, Material, Regions, Tissue};
 
 use crate::lanes::{Pair, Real};
 
@@ -45,7 +84,7 @@ pub trait Potential<R: Real>: Copy {
 }
 
 /// A hyperelastic law: its constants for one element, and how to lay them side by side.
-pub trait Law: Copy {
+pub trait Law: Copy + Sized {
     /// The same law with its constants in lanes.
     type Wide<R: Real>: Potential<R>;
 
@@ -63,6 +102,8 @@ pub trait Law: Copy {
 
     /// The first constant that is not usable (not finite, or of the wrong sign), by name and value.
     fn unusable_constant(&self) -> Option<(&'static str, f32)>;
+
+    element_loops!();
 }
 
 /// A law as the paper prints it: a function of `I1 - 3` instead of `I1bar - 3`. At rest it has a residual
@@ -72,26 +113,35 @@ pub trait Law: Copy {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Literal<L>(pub L);
 
-impl<L: Law> Law for Literal<L> {
-    type Wide<R: Real> = L::Wide<R>;
+macro_rules! literal {
+    ($law:ident) => {
+        impl Law for Literal<$law> {
+            type Wide<R: Real> = $law<R>;
 
-    const ISOCHORIC: bool = false;
+            const ISOCHORIC: bool = false;
 
-    const OPERATIONS: u32 = L::OPERATIONS;
+            const OPERATIONS: u32 = $law::OPERATIONS;
 
-    #[inline(always)]
-    fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Self::Wide<R> {
-        L::widen(|lane| at(lane).0)
-    }
+            #[inline(always)]
+            fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Self::Wide<R> {
+                $law::widen(|lane| at(lane).0)
+            }
 
-    fn energy(&self, x: f64, j: f64) -> f64 {
-        self.0.energy(x, j)
-    }
+            fn energy(&self, x: f64, j: f64) -> f64 {
+                self.0.energy(x, j)
+            }
 
-    fn unusable_constant(&self) -> Option<(&'static str, f32)> {
-        self.0.unusable_constant()
-    }
+            fn unusable_constant(&self) -> Option<(&'static str, f32)> {
+                self.0.unusable_constant()
+            }
+
+            element_loops!();
+        }
+    };
 }
+
+literal!(Exponential);
+literal!(NeoHookean);
 
 /// The invariants a law sees, both zero at rest and both free of cancellation.
 #[derive(Clone, Copy, Debug)]
@@ -139,23 +189,23 @@ impl<R: Real> VolumeFactor<R> {
         let y = (one + clamped).inverse_cbrt();
         // e = y - 1 to full relative accuracy: one Newton step of (1 + j)(1 + e)^3 = 1 in terms of e.
         let e = y - one;
-        let cube = e * (R::splat(3.0) + e * (R::splat(3.0) + e));
-        let residual = clamped + (one + clamped) * cube;
-        let e = e - residual * third * y;
+        let cube = e * e.fused(R::splat(3.0) + e, R::splat(3.0));
+        let residual = (one + clamped).fused(cube, clamped);
+        let e = e - residual * (third * y);
         let y = one + e;
         let square = y * y;
         let fifth = square * square * y;
         let slope = fifth * R::splat(-2.0 / 3.0);
         let i1 = at.i + R::splat(3.0);
         // I1bar - 3 = g (I1 - 3) + 3 (g - 1), g - 1 = e (2 + e)
-        let x = square * at.i + R::splat(3.0) * e * (R::splat(2.0) + e) + slope * below * i1;
-        Self { g: square + slope * below, slope, fifth, inverse: square * y, clamped, below, x }
+        let x = square.fused(at.i, (R::splat(3.0) * e).fused(R::splat(2.0) + e, slope * below * i1));
+        Self { g: slope.fused(below, square), slope, fifth, inverse: square * y, clamped, below, x }
     }
 
     /// Second derivative of `g`: zero where it is continued along its tangent.
     #[inline(always)]
     pub(crate) fn curvature(&self) -> R {
-        let inside = self.below.zip(R::splat(0.0), |below, _| if below < 0.0 { 0.0 } else { 1.0 });
+        let inside = R::splat(1.0) - (-self.below).positive();
         inside * R::splat(10.0 / 9.0) * self.fifth * self.inverse
     }
 }

@@ -49,4 +49,6 @@ impl Law for NeoHookean {
     fn unusable_constant(&self) -> Option<(&'static str, f32)> {
         super::first_not_positive(&[("c", self.c), ("d", self.d)])
     }
+
+    super::element_loops!();
 }

@@ -1,6 +1,7 @@
 //! What the elements of a mesh are made of: one tissue for all, or one of several for each element.
 
 use super::Law;
+use crate::lanes::Real;
 
 /// A law with a density.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,8 +20,48 @@ pub trait Material {
     /// The tissue of mesh element `element`, or nothing where the material names none.
     fn tissue(&self, element: usize) -> Option<Tissue<Self::Law>>;
 
-    /// The constants of mesh element `element`, which [`Material::tissue`] knows.
-    fn law(&self, element: usize) -> Self::Law;
+    /// The constants of all elements.
+    fn laws(&self) -> Laws<'_, Self::Law>;
+}
+
+/// The constants of each element, as the element loops want them.
+#[derive(Clone, Copy, Debug)]
+pub enum Laws<'a, L> {
+    /// The same everywhere.
+    One(L),
+    /// By element.
+    Regions {
+        /// The tissues.
+        tissues: &'a [Tissue<L>],
+        /// For each element of the mesh the index of its tissue.
+        of_element: &'a [u16],
+        /// Of elements that the material does not name; a scene with such cannot be built.
+        beyond: L,
+    },
+}
+
+impl<L: Law> Laws<'_, L> {
+    /// The constants of mesh element `element`.
+    #[must_use]
+    #[inline(always)]
+    pub fn of(&self, element: usize) -> L {
+        match *self {
+            Self::One(law) => law,
+            Self::Regions { tissues, of_element, beyond } => {
+                let tissue = of_element.get(element).and_then(|&index| tissues.get(usize::from(index)));
+                tissue.map_or(beyond, |tissue| tissue.law)
+            }
+        }
+    }
+
+    /// Lane `l` takes the constants of element `element(l)`.
+    #[inline(always)]
+    pub(crate) fn widen<R: Real>(&self, element: impl Fn(usize) -> usize) -> L::Wide<R> {
+        match *self {
+            Self::One(law) => L::widen(|_| law),
+            Self::Regions { .. } => L::widen(|lane| self.of(element(lane))),
+        }
+    }
 }
 
 impl<L: Law> Material for Tissue<L> {
@@ -30,9 +71,8 @@ impl<L: Law> Material for Tissue<L> {
         Some(*self)
     }
 
-    #[inline(always)]
-    fn law(&self, _element: usize) -> L {
-        self.law
+    fn laws(&self) -> Laws<'_, L> {
+        Laws::One(self.law)
     }
 }
 
@@ -54,9 +94,7 @@ impl<L: Law + Default> Material for Regions<'_, L> {
         self.tissues.get(index).copied()
     }
 
-    #[inline(always)]
-    fn law(&self, element: usize) -> L {
-        // The scene was built, so every element has its tissue; the default is never reached.
-        self.tissue(element).map_or_else(L::default, |tissue| tissue.law)
+    fn laws(&self) -> Laws<'_, L> {
+        Laws::Regions { tissues: self.tissues, of_element: self.of_element, beyond: L::default() }
     }
 }

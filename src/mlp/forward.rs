@@ -35,8 +35,11 @@ fn plus<R: Real, const COLUMNS: usize>(
     weight: f32,
     values: &Tile<R, COLUMNS>,
 ) -> Tile<R, COLUMNS> {
-    let weight = R::splat(weight);
-    core::array::from_fn(|column| weight.fused(values[column], sums[column]))
+    let (weight, mut sums) = (R::splat(weight), sums);
+    for (sum, &value) in sums.iter_mut().zip(values) {
+        *sum = weight.fused(value, *sum);
+    }
+    sums
 }
 
 /// `to = activation(W from + b)`.
@@ -67,8 +70,10 @@ fn dense<R: Real, const COLUMNS: usize>(
             four = plus(four, d, values);
         }
         for (to, sums) in to.iter_mut().zip([one, two, three, four]).take(biases.len()) {
-            // For slopes from zero to one.
-            *to = sums.map(|sum| sum.max(slope * sum));
+            for (to, sum) in to.iter_mut().zip(sums) {
+                // For slopes from zero to one.
+                *to = sum.max(slope * sum);
+            }
         }
     }
 }
@@ -98,7 +103,9 @@ impl Network<'_> {
         let (first, second) = self.layers();
         let mut scaled = *inputs;
         for (values, range) in scaled.iter_mut().zip(self.inputs) {
-            *values = values.map(|value| value.over(R::splat(range.scale)));
+            for value in values {
+                *value = value.over(R::splat(range.scale));
+            }
         }
         let count = self.inputs.len();
         copy(&scaled, &mut scratch.here, count);
@@ -115,8 +122,10 @@ impl Network<'_> {
         }
         let mut clipped = sums;
         for ((sums, clipped), range) in sums.iter_mut().zip(&mut clipped).zip(self.outputs) {
-            *sums = sums.map(|sum| sum * R::splat(range.scale));
-            *clipped = sums.map(|sum| sum.max(R::splat(range.least)).min(R::splat(range.most)));
+            for (sum, clipped) in sums.iter_mut().zip(clipped) {
+                *sum = *sum * R::splat(range.scale);
+                *clipped = sum.max(R::splat(range.least)).min(R::splat(range.most));
+            }
         }
         [clipped, sums]
     }

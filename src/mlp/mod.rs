@@ -17,7 +17,7 @@ mod write;
 #[cfg(feature = "safetensors")]
 pub use exchange::{ExchangeError, from_safetensors, to_safetensors};
 pub use file::{ForceInput, MAGIC, Network, Range, Recipe, TrainedLaw, WeightError};
-pub(crate) use forward::{Scratch, Tile};
+pub(crate) use forward::Scratch;
 #[cfg(feature = "std")]
 pub use write::{Description, LayerDescription, WeightBytes, hexadecimal, write};
 

@@ -20,8 +20,8 @@
 //!
 //! No term is left out, so the bound holds for any state, inverted elements included.
 
-use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter, dispatch};
-use crate::material::{Law, Local, Material, Potential};
+use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter};
+use crate::material::{Law, Laws, Local, Material, Potential};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
 use crate::symmetric::Symmetric;
@@ -56,7 +56,8 @@ where
     let force = state.force.as_mut().get_mut(..count)?;
     let mut sums = Sums { xx_yy_zz_xy: force, yz_in_padding: increment, zx_in_padding: displacement };
     sums.clear();
-    dispatch(Bounds { scene, sums: &mut sums });
+    let (laws, blocks, inertia) = (scene.material().laws(), scene.blocks(), scene.inertia());
+    M::Law::critical_bounds(CriticalBounds { laws, blocks, inertia, sums: &mut sums });
     let mut largest = (0.0, 0);
     let mut finite = true;
     for (node, inertia) in scene.inertia().iter().enumerate() {
@@ -97,30 +98,25 @@ impl Sums<'_> {
     }
 }
 
-struct Bounds<'a, 'b, M, N, B> {
-    scene: &'a Scene<M, N, B>,
+/// Adds the bounds of all elements to the sums of their nodes.
+pub struct CriticalBounds<'a, 'b, L> {
+    laws: Laws<'a, L>,
+    blocks: &'a [ElementBlock],
+    inertia: &'a [NodeInertia],
     sums: &'a mut Sums<'b>,
 }
 
-impl<M, N, B> Kernel for Bounds<'_, '_, M, N, B>
-where
-    M: Material,
-    N: AsRef<[NodeInertia]>,
-    B: AsRef<[ElementBlock]>,
-{
+impl<L: Law> Kernel for CriticalBounds<'_, '_, L> {
     type Output = ();
 
     #[inline(always)]
     fn run<R: Real>(self) {
         // The first three numbers of a node's inertia are its inverse masses.
-        let Some(inertia) = Gather::new(bytemuck::must_cast_slice(self.scene.inertia())) else {
-            return;
-        };
-        for block in self.scene.blocks() {
+        let inertia = Gather::new(bytemuck::must_cast_slice(self.inertia));
+        for block in self.blocks {
             for first in (0..BLOCK).step_by(R::COUNT) {
-                let material = self.scene.material();
-                let law = M::Law::widen(|lane| material.law(block.element(first + lane)));
-                add_bounds::<R, M::Law>(&law, block, first, inertia, self.sums);
+                let law = self.laws.widen(|lane| block.element(first + lane));
+                add_bounds::<R, L>(&law, block, first, inertia, self.sums);
             }
         }
     }
@@ -137,7 +133,8 @@ fn add_bounds<R: Real, L: Law>(
     inertia: Gather<'_>,
     sums: &mut Sums<'_>,
 ) {
-    let Some(displacement) = Gather::new(sums.zx_in_padding) else {
+    let displacement = Gather::new(sums.zx_in_padding);
+    let Some(nodes) = block.nodes_below(displacement.count()) else {
         return;
     };
     let deformation = Deformation::<R>::of_block(block, first, displacement);
@@ -151,7 +148,7 @@ fn add_bounds<R: Real, L: Law>(
     }
     let volume = block.volume::<R>(first).sqrt();
     for (corner, gradient) in gradients.iter_mut().enumerate() {
-        let [x, y, z] = inertia.read_lanes::<R>(|lane| block.node(corner, first + lane));
+        let [x, y, z] = inertia.read_lanes::<R>(nodes, corner, first);
         let root = x.max(y).max(z).max(R::splat(0.0)).sqrt() * volume;
         *gradient = gradient.map(|component| component * root);
     }
@@ -172,6 +169,8 @@ fn add_bounds<R: Real, L: Law>(
             rows[b] = rows[b] + norm;
         }
     }
+    let zero = R::splat(0.0);
+    let (mut first_four, mut fifth, mut sixth) = ([[zero; 4]; 4], [[zero; 4]; 4], [[zero; 4]; 4]);
     for corner in 0..4 {
         let (c, e, x) = (&images[corner].c, &images[corner].e, &images[corner].x);
         let isotropic = rows[corner];
@@ -185,18 +184,13 @@ fn add_bounds<R: Real, L: Law>(
             entry(2, 0),
         ];
         let [xx, yy, zz, xy, yz, zx] = matrix;
-        let zero = R::splat(0.0);
-        let node = |lane: usize| block.node(corner, first + lane);
-        for (vectors, values) in [
-            (&mut *sums.xx_yy_zz_xy, [xx, yy, zz, xy]),
-            (&mut *sums.yz_in_padding, [zero, zero, zero, yz]),
-            (&mut *sums.zx_in_padding, [zero, zero, zero, zx]),
-        ] {
-            if let Some(mut vectors) = Scatter::new(vectors) {
-                vectors.add_lanes(node, values);
-            }
-        }
+        first_four[corner] = [xx, yy, zz, xy];
+        fifth[corner][3] = yz;
+        sixth[corner][3] = zx;
     }
+    Scatter::new(sums.xx_yy_zz_xy).add_corners(nodes, first, first_four);
+    Scatter::new(sums.yz_in_padding).add_corners(nodes, first, fifth);
+    Scatter::new(sums.zx_in_padding).add_corners(nodes, first, sixth);
 }
 
 /// Magnitudes of the terms of the tangent, Pa.

@@ -4,9 +4,9 @@
 //! forces of an element add up to zero and a translation gives exactly none.
 
 use super::Status;
-use crate::lanes::{BLOCK, Gather, Pair, Real, Scatter, dot};
+use crate::lanes::{BLOCK, BlockNodes, Gather, Pair, Real, Scatter, dot};
 use crate::ledger::Ledger;
-use crate::material::{Invariants, J_FLOOR, Law, Local, Material, response_operations};
+use crate::material::{Invariants, J_FLOOR, Law, Laws, Local, response_operations};
 use crate::scene::ElementBlock;
 
 /// A vector and a matrix in lanes; rows are spatial, columns material.
@@ -42,7 +42,7 @@ impl<R: Real> Deformation<R> {
     fn with(h: Matrix<R>, invariants: Invariants<R>) -> Self {
         let minor = |i: usize, j: usize| {
             let (p, q, r, s) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
-            h[p][r] * h[q][s] - h[p][s] * h[q][r]
+            h[p][r].fused(h[q][s], -(h[p][s] * h[q][r]))
         };
         let cof_h = [
             [minor(0, 0), minor(0, 1), minor(0, 2)],
@@ -53,17 +53,18 @@ impl<R: Real> Deformation<R> {
         Self { h, cof_h, trace, invariants }
     }
 
-    /// Deformation of the elements in lanes `first..` of a block.
+    /// Deformation of the elements in lanes `first..` of a block, none if it names nodes that are not there.
     #[inline(always)]
     pub(crate) fn of_block(block: &ElementBlock, first: usize, displacement: Gather<'_>) -> Self {
-        let at = |corner: usize| displacement.read_lanes::<R>(|lane| block.node(corner, first + lane));
-        let origin = at(0);
+        let nodes = block.nodes_below(displacement.count()).unwrap_or(BlockNodes::NONE);
+        let origin = displacement.read_lanes::<R>(nodes, 0, first);
         let mut h = [[R::splat(0.0); 3]; 3];
         for corner in 0..3 {
-            let position = at(corner + 1);
+            let position = displacement.read_lanes::<R>(nodes, corner + 1, first);
             for j in 0..3 {
                 let gradient = block.gradient::<R>(corner, j, first);
                 for i in 0..3 {
+                    // Not fused: in ill-conditioned states the forces are then a fifth closer to the exact ones.
                     h[i][j] = h[i][j] + (position[i] - origin[i]) * gradient;
                 }
             }
@@ -90,12 +91,14 @@ impl<R: Real> Deformation<R> {
     /// First Piola-Kirchhoff stress, Pa.
     #[inline(always)]
     pub(crate) fn stress(&self, p1: R, s: R) -> Matrix<R> {
-        let entry = |i: usize, j: usize| p1 * self.distortion(i, j) + s * self.cofactor(i, j);
-        [
-            [entry(0, 0), entry(0, 1), entry(0, 2)],
-            [entry(1, 0), entry(1, 1), entry(1, 2)],
-            [entry(2, 0), entry(2, 1), entry(2, 2)],
-        ]
+        // Loops: closures over vectors may stay calls.
+        let mut stress = [[p1; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                stress[i][j] = p1.fused(self.distortion(i, j), s * self.cofactor(i, j));
+            }
+        }
+        stress
     }
 }
 
@@ -107,7 +110,7 @@ pub(crate) const fn operations<L: Law>() -> u32 {
 
 /// How far a step went into the range where laws are continued to stay finite.
 #[derive(Clone, Copy)]
-pub(crate) struct Extremes<R> {
+pub struct Extremes<R> {
     /// Smallest `J - 1`.
     pub(crate) least_j: R,
     /// Largest saturation of the law.
@@ -141,7 +144,7 @@ pub(crate) trait Beside {
 }
 
 /// Forces and nothing else.
-pub(crate) struct Nothing;
+pub struct Nothing;
 
 impl Beside for Nothing {
     #[inline(always)]
@@ -188,8 +191,8 @@ const TOGETHER: usize = 8;
 /// Adds the internal forces of all elements to `force`, with minus sign. In three passes over a few vectors of elements: the law is
 /// a long chain of operations that wait for each other, and gets nothing else in between ([`Pair`]).
 #[inline(always)]
-pub(crate) fn add_forces<R: Real, M: Material>(
-    material: &M,
+pub(crate) fn add_forces<R: Real, L: Law>(
+    laws: &Laws<'_, L>,
     blocks: &[ElementBlock],
     displacement: Gather<'_>,
     force: &mut Scatter<'_>,
@@ -198,80 +201,86 @@ pub(crate) fn add_forces<R: Real, M: Material>(
     let mut extremes =
         Extremes { least_j: Pair::<R>::splat(f32::INFINITY), saturation: Pair::splat(f32::NEG_INFINITY) };
     let mut parts = [Part::<R>::nothing(); TOGETHER];
-    for blocks in blocks.chunks((TOGETHER * R::COUNT / BLOCK).max(1)) {
-        let mut rest = parts.iter_mut();
-        for block in blocks {
-            for first in (0..BLOCK).step_by(R::COUNT) {
-                if let Some(part) = rest.next() {
-                    let deformation = Deformation::<R>::of_block(block, first, displacement);
-                    (part.h, part.invariants) = (deformation.h, deformation.invariants);
-                }
+    let vectors = BLOCK / R::COUNT;
+    for blocks in blocks.chunks((TOGETHER / vectors).max(1)) {
+        let place = |vector: usize| Place {
+            block: blocks.get(vector / vectors).unwrap_or(&ElementBlock::EMPTY),
+            first: vector % vectors * R::COUNT,
+        };
+        let count = blocks.len() * vectors;
+        for (vector, part) in parts.iter_mut().enumerate().take(count) {
+            let Place { block, first } = place(vector);
+            let deformation = Deformation::<R>::of_block(block, first, displacement);
+            (part.h, part.invariants) = (deformation.h, deformation.invariants);
+        }
+        // The last pair may be half empty: what was there before is computed once more, for nobody.
+        for (pair, parts) in parts.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
+            let places = [place(2 * pair), place(2 * pair + 1)];
+            let locals = respond::<R, L>(laws, places, parts, &mut extremes);
+            for ((place, part), local) in places.into_iter().zip(parts).zip(&locals).take(count - 2 * pair) {
+                look::<R, L>(laws, place, part, local, beside);
             }
         }
-        let mut rest = parts.as_chunks_mut::<2>().0.iter_mut();
-        for block in blocks {
-            for first in (0..BLOCK).step_by(Pair::<R>::COUNT) {
-                if let Some(parts) = rest.next() {
-                    respond::<R, M>(material, block, first, parts, &mut extremes, beside);
-                }
-            }
-        }
-        let mut rest = parts.iter();
-        for block in blocks {
-            for first in (0..BLOCK).step_by(R::COUNT) {
-                if let Some(part) = rest.next() {
-                    scatter(part, block, first, force);
-                }
-            }
+        for (vector, part) in parts.iter().enumerate().take(count) {
+            let Place { block, first } = place(vector);
+            scatter(part, block, first, force);
         }
     }
     extremes
 }
 
+/// Elements side by side: lanes of a block, from `first` on.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    block: &'a ElementBlock,
+    first: usize,
+}
+
 /// The second pass: the law.
 #[inline(always)]
-fn respond<R: Real, M: Material>(
-    material: &M,
-    block: &ElementBlock,
-    first: usize,
+fn respond<R: Real, L: Law>(
+    laws: &Laws<'_, L>,
+    places: [Place<'_>; 2],
     [near, far]: &mut [Part<R>; 2],
     extremes: &mut Extremes<Pair<R>>,
-    beside: &mut impl Beside,
-) {
-    let law = M::Law::widen::<Pair<R>>(|lane| material.law(block.element(first + lane)));
+) -> [Local<R>; 2] {
+    let law = laws.widen::<Pair<R>>(|lane| {
+        let Place { block, first } = places[lane / R::COUNT % 2];
+        block.element(first + lane % R::COUNT)
+    });
     let invariants = Invariants {
         i: Pair(near.invariants.i, far.invariants.i),
         j: Pair(near.invariants.j, far.invariants.j),
     };
-    let local = Local::new::<M::Law>(&law, invariants);
-    let response = local.response::<M::Law>(&law);
+    let local = Local::new::<L>(&law, invariants);
+    let response = local.response::<L>(&law);
     (near.p1, near.s) = (response.p1.0, response.s.0);
     (far.p1, far.s) = (response.p1.1, response.s.1);
     extremes.least_j = invariants.j.min(extremes.least_j);
     extremes.saturation = response.saturation.max(extremes.saturation);
-    let [of_near, of_far] = local.split();
-    look::<R, M>(material, block, first, near, &of_near, beside);
-    look::<R, M>(material, block, first + R::COUNT, far, &of_far, beside);
+    local.split()
 }
 
 /// What else is made of it.
 #[inline(always)]
-fn look<R: Real, M: Material>(
-    material: &M,
-    block: &ElementBlock,
-    first: usize,
+fn look<R: Real, L: Law>(
+    laws: &Laws<'_, L>,
+    Place { block, first }: Place<'_>,
     part: &mut Part<R>,
     local: &Local<R>,
     beside: &mut impl Beside,
 ) {
-    let law = M::Law::widen(|lane| material.law(block.element(first + lane)));
+    let law = laws.widen(|lane| block.element(first + lane));
     let deformation = Deformation::with(part.h, part.invariants);
-    part.fourth = beside.see::<R, M::Law>(&law, block, first, &deformation, local);
+    part.fourth = beside.see::<R, L>(&law, block, first, &deformation, local);
 }
 
 /// The third pass: nodal forces from the stress.
 #[inline(always)]
 fn scatter<R: Real>(part: &Part<R>, block: &ElementBlock, first: usize, force: &mut Scatter<'_>) {
+    let Some(nodes) = block.nodes_below(force.count()) else {
+        return;
+    };
     let deformation = Deformation::with(part.h, part.invariants);
     let stress = deformation.stress(part.p1, part.s);
     let minus_volume = -block.volume::<R>(first);
@@ -284,10 +293,12 @@ fn scatter<R: Real>(part: &Part<R>, block: &ElementBlock, first: usize, force: &
         }
         forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
     }
-    // One by one: in a loop the compiler would take the forces through memory, number by number.
     let ([a, b, c, d], fourth) = (forces, part.fourth);
-    force.add_lanes(|lane| block.node(0, first + lane), [a[0], a[1], a[2], fourth]);
-    force.add_lanes(|lane| block.node(1, first + lane), [b[0], b[1], b[2], fourth]);
-    force.add_lanes(|lane| block.node(2, first + lane), [c[0], c[1], c[2], fourth]);
-    force.add_lanes(|lane| block.node(3, first + lane), [d[0], d[1], d[2], fourth]);
+    let rows = [
+        [a[0], a[1], a[2], fourth],
+        [b[0], b[1], b[2], fourth],
+        [c[0], c[1], c[2], fourth],
+        [d[0], d[1], d[2], fourth],
+    ];
+    force.add_corners(nodes, first, rows);
 }

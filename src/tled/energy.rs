@@ -32,7 +32,7 @@ where
 {
     scene.places().map(|(block, lane)| {
         let element = block.element(lane);
-        fields(&scene.material().law(element), block, lane, element, displacement)
+        fields(&scene.material().laws().of(element), block, lane, element, displacement)
     })
 }
 

@@ -4,9 +4,10 @@
 
 use core::ops::{Add, Mul, Sub};
 
+use bytemuck::{Pod, must_cast_slice, must_cast_slice_mut};
 use glam::Vec4;
 
-use crate::lanes::Real;
+use crate::lanes::{Kernel, Real, dispatch};
 use crate::ledger::Ledger;
 use crate::loads::{Loads, ramp_factor};
 use crate::scene::NodeInertia;
@@ -114,27 +115,164 @@ impl Totals {
     }
 }
 
-impl Entry {
-    /// Kinetic energy of the free axes, work of gravity, and of supports along what they moved last. `next`
-    /// gives the next increment of a node.
-    pub(crate) fn of_nodes(
-        inertia: &[NodeInertia],
-        increment: &[NodeVector],
-        force: &[NodeVector],
-        loads: &Loads<'_>,
-        step: &Step,
-        next: impl Next,
-    ) -> Self {
-        let mut sums = Sums::new(step, Vec4::splat);
-        for (node, ((inertia, increment), force)) in inertia.iter().zip(increment).zip(force).enumerate() {
-            let next = Vec4::from(next(node, inertia, increment, force));
-            let (mass, increment, force) =
-                (Vec4::splat(inertia.mass), Vec4::from(increment.0), Vec4::from(force.0));
-            sums.add(mass, inertia.free(), increment, force, next);
-        }
-        Self::of_totals(&Totals::of_axes(&sums), loads, step)
+/// Numbers of four nodes.
+const FOUR: usize = 16;
+
+/// The numbers of four nodes, zeros where there are none.
+#[inline(always)]
+fn four<T: Pod>(of: &[T], first: usize) -> [f32; FOUR] {
+    let numbers: &[f32] = must_cast_slice(of);
+    let numbers = numbers.get(4 * first..).unwrap_or_default();
+    if let Some(four) = numbers.first_chunk() {
+        return *four;
+    }
+    let mut four = [0.0; FOUR];
+    for (to, from) in four.iter_mut().zip(numbers) {
+        *to = *from;
+    }
+    four
+}
+
+/// Puts the numbers of four nodes, or of as many as there are, back.
+#[inline(always)]
+fn put(four: [f32; FOUR], into: &mut [NodeVector]) {
+    let numbers: &mut [f32] = must_cast_slice_mut(into);
+    if let Some(all) = numbers.first_chunk_mut() {
+        *all = four;
+        return;
+    }
+    for (to, from) in numbers.iter_mut().zip(four) {
+        *to = from;
+    }
+}
+
+/// A vector of the numbers of four nodes.
+#[inline(always)]
+fn part<R: Real>(numbers: &[f32; FOUR], from: usize) -> R {
+    R::from_fn(|lane| numbers[(from + lane) % FOUR])
+}
+
+/// The exact step of four nodes, axes side by side.
+struct Exact<R> {
+    keep: R,
+    carry: R,
+    push: R,
+}
+
+impl<R: Real> Exact<R> {
+    #[inline(always)]
+    fn new(step: &Step) -> Self {
+        Self { keep: R::splat(step.keep), carry: R::splat(step.carry), push: R::splat(step.push) }
     }
 
+    /// As [`next_increment`].
+    #[inline(always)]
+    fn next(&self, inverse: R, increment: R, force: R) -> R {
+        let next = self.keep * (self.carry * increment) + self.push * (inverse * force);
+        inverse.choose(next, R::splat(0.0))
+    }
+}
+
+/// Ones for the three axes, zero for what stands behind them.
+#[inline(always)]
+fn axes<R: Real>() -> R {
+    R::from_fn(|lane| if lane % 4 == 3 { 0.0 } else { 1.0 })
+}
+
+/// Sums over the nodes of an exact step.
+pub(super) struct Account<'a> {
+    pub(super) step: &'a Step,
+    pub(super) inertia: &'a [NodeInertia],
+    pub(super) increment: &'a [NodeVector],
+    pub(super) force: &'a [NodeVector],
+}
+
+impl Account<'_> {
+    /// Compiled with this crate, as it is not generic.
+    #[inline(never)]
+    pub(super) fn total(self) -> Totals {
+        dispatch(self)
+    }
+}
+
+impl Kernel for Account<'_> {
+    type Output = Totals;
+
+    #[inline(always)]
+    fn run<R: Real>(self) -> Totals {
+        let Self { step, inertia, increment, force } = self;
+        let exact = Exact::<R>::new(step);
+        // Sixteen sums whatever the width, so that their bits are the same.
+        let mut sums = [Sums::<R>::new(step, R::splat); 4];
+        for first in (0..inertia.len()).step_by(4) {
+            let (inertia, increment, force) =
+                (four(inertia, first), four(increment, first), four(force, first));
+            for (sums, from) in sums.iter_mut().zip((0..FOUR).step_by(R::COUNT)) {
+                let inverse = axes::<R>() * part::<R>(&inertia, from);
+                let mass = R::from_fn(|lane| inertia[((from + lane) | 3) % FOUR]);
+                let (increment, force) = (part::<R>(&increment, from), part::<R>(&force, from));
+                sums.add(mass, inverse.positive(), increment, force, exact.next(inverse, increment, force));
+            }
+        }
+        let mut totals = Totals::default();
+        for (sums, from) in sums.iter().zip((0..FOUR).step_by(R::COUNT)) {
+            for lane in 0..R::COUNT {
+                totals.kinetic += f64::from(sums.kinetic.lane(lane));
+                totals.led += f64::from(sums.led.lane(lane));
+                if let Some(momentum) = totals.momentum.get_mut((from + lane) % 4) {
+                    *momentum += f64::from(sums.momentum.lane(lane));
+                }
+            }
+        }
+        totals
+    }
+}
+
+/// Moves the nodes by an exact step.
+pub(super) struct Advance<'a> {
+    pub(super) step: &'a Step,
+    pub(super) inertia: &'a [NodeInertia],
+    pub(super) displacement: &'a mut [NodeVector],
+    pub(super) increment: &'a mut [NodeVector],
+    pub(super) force: &'a [NodeVector],
+}
+
+impl Advance<'_> {
+    /// Compiled with this crate, as it is not generic.
+    #[inline(never)]
+    pub(super) fn advance(self) {
+        dispatch(self);
+    }
+}
+
+impl Kernel for Advance<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: Real>(self) {
+        let Self { step, inertia, displacement, increment, force } = self;
+        let exact = Exact::<R>::new(step);
+        let moving = displacement.chunks_mut(4).zip(increment.chunks_mut(4));
+        for ((displacement, increment), first) in moving.zip((0..inertia.len()).step_by(4)) {
+            let (inertia, force) = (four(inertia, first), four(force, first));
+            let (mut at, mut moved) = (four(displacement, 0), four(increment, 0));
+            for from in (0..FOUR).step_by(R::COUNT) {
+                let inverse = axes::<R>() * part::<R>(&inertia, from);
+                let next = exact.next(inverse, part(&moved, from), part(&force, from));
+                let here = part::<R>(&at, from) + next;
+                for lane in 0..R::COUNT {
+                    moved[(from + lane) % FOUR] = next.lane(lane);
+                    at[(from + lane) % FOUR] = here.lane(lane);
+                }
+            }
+            put(at, displacement);
+            put(moved, increment);
+        }
+    }
+}
+
+impl Entry {
+    /// Kinetic energy of the free axes, work of gravity, and of supports along what they moved last.
     pub(crate) fn of_totals(totals: &Totals, loads: &Loads<'_>, step: &Step) -> Self {
         let dt = f64::from(step.dt);
         let gravity = loads.gravity().into_iter().zip(totals.momentum);

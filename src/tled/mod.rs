@@ -23,14 +23,15 @@ pub use spectrum::exact_critical_step;
 
 use core::fmt;
 
-use crate::lanes::{Gather, Kernel, Pair, Real, Scatter, dispatch};
+use crate::lanes::{Gather, Kernel, Pair, Real, Scatter};
 use crate::loads::{Loads, ramp_factor};
-use crate::material::Material;
+use crate::material::{Law, Laws, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
 
+pub(crate) use critical::CriticalBounds;
 pub(crate) use element::{Beside, Deformation, Extremes, Nothing};
-use entry::next_increment;
+use entry::{Account, Advance, next_increment};
 pub(crate) use entry::{Entry, Next, Side, Sums, Totals};
 
 /// Coefficients of the integration.
@@ -232,7 +233,7 @@ where
         return Status::Mismatch { nodes, room };
     };
     let inertia = scene.inertia();
-    if loads.nodes().is_some_and(|checked| checked != nodes) {
+    if nodes == 0 || loads.nodes().is_some_and(|checked| checked != nodes) {
         return Status::Mismatch { nodes, room };
     }
     let changed;
@@ -248,12 +249,13 @@ where
     }
 
     external_forces(force, inertia, loads, *time);
-    let (Some(from), Some(to)) = (Gather::new(displacement), Scatter::new(force)) else {
-        return Status::Mismatch { nodes, room };
-    };
-    let extremes = dispatch(InternalForces { scene, displacement: from, force: to, beside: Nothing });
+    let (from, to) = (Gather::new(displacement), Scatter::new(force));
+    let (laws, blocks) = (scene.material().laws(), scene.blocks());
+    let forces = InternalForces { laws, blocks, displacement: from, force: to, beside: Nothing };
+    let extremes = M::Law::forces(forces);
     let next = |_, inertia: &_, increment: &_, force: &_| next_increment(inertia, increment, force, step);
-    let entry = Entry::of_nodes(inertia, increment, force, loads, step, next)
+    let totals = Account { step, inertia, increment, force }.total();
+    let entry = Entry::of_totals(&totals, loads, step)
         .with_forces(loads, inertia, increment, force, *time, next)
         .with_motions(loads, displacement, increment, force, *time, step);
     let entered = match entry.entered(account, step) {
@@ -265,7 +267,7 @@ where
     };
 
     *ledger = entered;
-    advance(inertia, displacement, increment, force, step);
+    Advance { step, inertia, displacement, increment, force }.advance();
     *dt = step.dt;
     *time += f64::from(step.dt);
     *steps += 1;
@@ -355,49 +357,27 @@ pub(crate) fn external_forces(
 }
 
 /// Adds the internal forces of all elements, in their order.
-pub(crate) struct InternalForces<'a, M, N, B, H> {
-    pub(crate) scene: &'a Scene<M, N, B>,
+pub struct InternalForces<'a, L, H> {
+    pub(crate) laws: Laws<'a, L>,
+    pub(crate) blocks: &'a [ElementBlock],
     pub(crate) displacement: Gather<'a>,
     pub(crate) force: Scatter<'a>,
     pub(crate) beside: H,
 }
 
-impl<M, N, B, H> Kernel for InternalForces<'_, M, N, B, H>
-where
-    M: Material,
-    N: AsRef<[NodeInertia]>,
-    B: AsRef<[ElementBlock]>,
-    H: Beside,
-{
+impl<L: Law, H: Beside> Kernel for InternalForces<'_, L, H> {
     type Output = Extremes<f32>;
 
     #[inline(always)]
     fn run<R: Real>(mut self) -> Extremes<f32> {
-        let Self { scene, displacement, force, beside } = &mut self;
-        let extremes =
-            element::add_forces::<R, M>(scene.material(), scene.blocks(), *displacement, force, beside);
+        let Self { laws, blocks, displacement, force, beside } = &mut self;
+        let extremes = element::add_forces::<R, L>(laws, blocks, *displacement, force, beside);
         let mut reduced = Extremes { least_j: f32::INFINITY, saturation: f32::NEG_INFINITY };
         for lane in 0..Pair::<R>::COUNT {
             reduced.least_j = reduced.least_j.min(extremes.least_j.lane(lane));
             reduced.saturation = reduced.saturation.max(extremes.saturation.lane(lane));
         }
         reduced
-    }
-}
-
-fn advance(
-    inertia: &[NodeInertia],
-    displacement: &mut [NodeVector],
-    increment: &mut [NodeVector],
-    force: &[NodeVector],
-    step: &Step,
-) {
-    let nodes = displacement.iter_mut().zip(increment).zip(inertia.iter().zip(force));
-    for ((displacement, increment), (inertia, force)) in nodes {
-        increment.0 = next_increment(inertia, increment, force, step);
-        for (position, change) in displacement.0.iter_mut().zip(increment.0) {
-            *position += change;
-        }
     }
 }
 

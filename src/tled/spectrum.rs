@@ -29,7 +29,7 @@ where
     let tangents: Vec<Tangent> = scene
         .places()
         .map(|(block, lane)| {
-            Tangent::new(&scene.material().law(block.element(lane)), block, lane, displacement)
+            Tangent::new(&scene.material().laws().of(block.element(lane)), block, lane, displacement)
         })
         .collect();
     let roots: Vec<DVec3> = scene

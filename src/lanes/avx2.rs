@@ -23,9 +23,9 @@ use super::functions::Bits;
 /// See the module.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub(super) struct Avx(__m256);
+pub(super) struct Avx2(__m256);
 
-impl Avx {
+impl Avx2 {
     #[inline(always)]
     fn numbers(self) -> [f32; 8] {
         bytemuck::must_cast(self.0)
@@ -38,7 +38,7 @@ impl Avx {
 
 macro_rules! operator {
     ($trait:ident, $method:ident, $instruction:ident) => {
-        impl $trait for Avx {
+        impl $trait for Avx2 {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
@@ -53,7 +53,7 @@ operator!(Add, add, _mm256_add_ps);
 operator!(Sub, sub, _mm256_sub_ps);
 operator!(Mul, mul, _mm256_mul_ps);
 
-impl Neg for Avx {
+impl Neg for Avx2 {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -62,9 +62,10 @@ impl Neg for Avx {
     }
 }
 
-impl Real for Avx {
+impl Real for Avx2 {
     const COUNT: usize = 8;
     const MANY_REGISTERS: bool = true;
+    type Eight = Self;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {
@@ -77,16 +78,19 @@ impl Real for Avx {
     #[inline(always)]
     fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
         // Rows 0 and 4 side by side and so on; then the halves are transposed at once.
-        transpose([0, 1, 2, 3].map(|lane| Self(bytemuck::must_cast([row(lane), row(lane + 4)]))))
+        let pair = |lane: usize| Self(bytemuck::must_cast([row(lane), row(lane + 4)]));
+        transpose([pair(0), pair(1), pair(2), pair(3)])
     }
     #[inline(always)]
     fn to_rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
-        let pairs: [[[f32; 4]; 2]; 4] = transpose(columns).map(|pair| bytemuck::must_cast(pair.0));
-        for (lane, [near, _]) in pairs.into_iter().enumerate() {
-            row(lane, near);
-        }
-        for (lane, [_, far]) in pairs.into_iter().enumerate() {
-            row(lane + 4, far);
+        let [a, b, c, d] = transpose(columns);
+        let pairs: [[[f32; 4]; 2]; 4] = bytemuck::must_cast([a.0, b.0, c.0, d.0]);
+        // Rows are read back from memory: left to itself the compiler takes each together from single numbers.
+        let pairs = core::hint::black_box(&pairs);
+        for half in 0..2 {
+            for (lane, pair) in pairs.iter().enumerate() {
+                row(4 * half + lane, pair[half]);
+            }
         }
     }
     #[inline(always)]
@@ -175,21 +179,21 @@ impl Real for Avx {
 
 /// The two 4 x 4 halves, transposed.
 #[inline(always)]
-fn transpose([a, b, c, d]: [Avx; 4]) -> [Avx; 4] {
+fn transpose([a, b, c, d]: [Avx2; 4]) -> [Avx2; 4] {
     // SAFETY: as above.
     unsafe {
         let (low_ab, high_ab) = (_mm256_unpacklo_ps(a.0, b.0), _mm256_unpackhi_ps(a.0, b.0));
         let (low_cd, high_cd) = (_mm256_unpacklo_ps(c.0, d.0), _mm256_unpackhi_ps(c.0, d.0));
         [
-            Avx(_mm256_shuffle_ps::<0x44>(low_ab, low_cd)),
-            Avx(_mm256_shuffle_ps::<0xEE>(low_ab, low_cd)),
-            Avx(_mm256_shuffle_ps::<0x44>(high_ab, high_cd)),
-            Avx(_mm256_shuffle_ps::<0xEE>(high_ab, high_cd)),
+            Avx2(_mm256_shuffle_ps::<0x44>(low_ab, low_cd)),
+            Avx2(_mm256_shuffle_ps::<0xEE>(low_ab, low_cd)),
+            Avx2(_mm256_shuffle_ps::<0x44>(high_ab, high_cd)),
+            Avx2(_mm256_shuffle_ps::<0xEE>(high_ab, high_cd)),
         ]
     }
 }
 
-impl Bits for Avx {
+impl Bits for Avx2 {
     #[inline(always)]
     fn as_number(self) -> Self {
         // SAFETY: as above.

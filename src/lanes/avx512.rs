@@ -1,0 +1,252 @@
+//! Sixteen numbers in one AVX-512 register, as [`avx2`](super::avx2) holds eight: each operation is one instruction, of the
+//! same results.
+//!
+//! Only [`super::level`] names this type, in what it runs once it has seen that the processor has AVX-512 with its parts
+//! for bytes, double words and shorter vectors.
+
+#![allow(unsafe_code)] // The instructions are unsafe to use without that.
+
+#[cfg(not(feature = "deterministic"))]
+use core::arch::x86_64::_mm512_fmadd_ps;
+use core::arch::x86_64::{
+    __m512, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_epi32, _mm512_add_ps, _mm512_castps_si512,
+    _mm512_castsi512_ps, _mm512_cmp_ps_mask, _mm512_cvtepi32_ps, _mm512_div_ps, _mm512_mask_blend_ps,
+    _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_min_ps, _mm512_mul_ps, _mm512_set1_epi32, _mm512_set1_ps,
+    _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_slli_epi32, _mm512_sqrt_ps, _mm512_srli_epi32,
+    _mm512_sub_epi32, _mm512_sub_ps, _mm512_unpackhi_ps, _mm512_unpacklo_ps, _mm512_xor_ps,
+};
+use core::ops::{Add, Mul, Neg, Sub};
+
+use super::Real;
+use super::avx2::Avx2;
+use super::functions::Bits;
+
+/// See the module.
+#[derive(Clone, Copy)]
+#[repr(transparent)]
+pub(super) struct Avx512(__m512);
+
+impl Avx512 {
+    #[inline(always)]
+    fn numbers(self) -> [f32; 16] {
+        bytemuck::must_cast(self.0)
+    }
+    #[inline(always)]
+    fn of(numbers: [f32; 16]) -> Self {
+        Self(bytemuck::must_cast(numbers))
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $method:ident, $instruction:ident) => {
+        impl $trait for Avx512 {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                // SAFETY: the processor has AVX-512, see the module.
+                Self(unsafe { $instruction(self.0, other.0) })
+            }
+        }
+    };
+}
+
+operator!(Add, add, _mm512_add_ps);
+operator!(Sub, sub, _mm512_sub_ps);
+operator!(Mul, mul, _mm512_mul_ps);
+
+impl Neg for Avx512 {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_xor_ps(self.0, _mm512_set1_ps(-0.0)) })
+    }
+}
+
+impl Real for Avx512 {
+    const COUNT: usize = 16;
+    const MANY_REGISTERS: bool = true;
+    type Eight = Avx2;
+
+    #[inline(always)]
+    fn from_fn(at: impl Fn(usize) -> f32) -> Self {
+        let mut out = [0.0; 16];
+        for (lane, value) in out.iter_mut().enumerate() {
+            *value = at(lane);
+        }
+        Self::of(out)
+    }
+    #[inline(always)]
+    fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
+        // Rows 0, 4, 8 and 12 side by side and so on; then the quarters are transposed at once.
+        let four = |lane: usize| {
+            Self(bytemuck::must_cast([row(lane), row(lane + 4), row(lane + 8), row(lane + 12)]))
+        };
+        transpose([four(0), four(1), four(2), four(3)])
+    }
+    #[inline(always)]
+    fn to_rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
+        let quarters = quarters(columns);
+        // Rows are read back from memory: left to itself the compiler takes each together from single numbers.
+        let quarters = core::hint::black_box(&quarters);
+        eight::<0>(quarters, &mut row);
+        eight::<8>(quarters, &mut row);
+    }
+    #[inline(always)]
+    fn corners_to_rows([a, b, c, d]: [[Self; 4]; 4], mut row: impl FnMut(usize, usize, [f32; 4])) {
+        let corners = [quarters(a), quarters(b), quarters(c), quarters(d)];
+        // As in `to_rows`.
+        let [a, b, c, d] = core::hint::black_box(&corners);
+        eight::<0>(a, |lane, numbers| row(0, lane, numbers));
+        eight::<0>(b, |lane, numbers| row(1, lane, numbers));
+        eight::<0>(c, |lane, numbers| row(2, lane, numbers));
+        eight::<0>(d, |lane, numbers| row(3, lane, numbers));
+        eight::<8>(a, |lane, numbers| row(0, lane, numbers));
+        eight::<8>(b, |lane, numbers| row(1, lane, numbers));
+        eight::<8>(c, |lane, numbers| row(2, lane, numbers));
+        eight::<8>(d, |lane, numbers| row(3, lane, numbers));
+    }
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> f32 {
+        self.numbers().get(lane).copied().unwrap_or(0.0)
+    }
+    #[inline(always)]
+    fn map(self, f: impl Fn(f32) -> f32) -> Self {
+        let mut out = self.numbers();
+        for value in &mut out {
+            *value = f(*value);
+        }
+        Self::of(out)
+    }
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        let mut out = self.numbers();
+        for (a, b) in out.iter_mut().zip(other.numbers()) {
+            *a = f(*a, b);
+        }
+        Self::of(out)
+    }
+    #[cfg(not(feature = "deterministic"))]
+    #[inline(always)]
+    fn fused(self, factor: Self, addend: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_fmadd_ps(self.0, factor.0, addend.0) })
+    }
+    #[inline(always)]
+    fn choose(self, yes: Self, no: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe {
+            _mm512_mask_blend_ps(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, _mm512_setzero_ps()), no.0, yes.0)
+        })
+    }
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_set1_ps(value) })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_max_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_min_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn positive(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe {
+            let positive = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, _mm512_setzero_ps());
+            _mm512_maskz_mov_ps(positive, _mm512_set1_ps(1.0))
+        })
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_abs_ps(self.0) })
+    }
+    #[inline(always)]
+    fn over(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_div_ps(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn root(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_sqrt_ps(self.0) })
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        super::functions::sqrt(self)
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        super::functions::exp(self)
+    }
+    #[inline(always)]
+    fn inverse_cbrt(self) -> Self {
+        super::functions::inverse_cbrt(self)
+    }
+}
+
+/// The rows of four lanes side by side: lane `l` is in quarter `l / 4` of number `l % 4`.
+type Quarters = [[[f32; 4]; 4]; 4];
+
+#[inline(always)]
+fn quarters(columns: [Avx512; 4]) -> Quarters {
+    let [a, b, c, d] = transpose(columns);
+    bytemuck::must_cast([a.0, b.0, c.0, d.0])
+}
+
+/// Hands over eight lanes' rows.
+#[inline(always)]
+fn eight<const FIRST: usize>(quarters: &Quarters, mut row: impl FnMut(usize, [f32; 4])) {
+    for lane in 0..8 {
+        row(FIRST + lane, quarters[lane % 4][FIRST / 4 + lane / 4]);
+    }
+}
+
+/// The four 4 x 4 quarters, transposed.
+#[inline(always)]
+fn transpose([a, b, c, d]: [Avx512; 4]) -> [Avx512; 4] {
+    // SAFETY: as above.
+    unsafe {
+        let (low_ab, high_ab) = (_mm512_unpacklo_ps(a.0, b.0), _mm512_unpackhi_ps(a.0, b.0));
+        let (low_cd, high_cd) = (_mm512_unpacklo_ps(c.0, d.0), _mm512_unpackhi_ps(c.0, d.0));
+        [
+            Avx512(_mm512_shuffle_ps::<0x44>(low_ab, low_cd)),
+            Avx512(_mm512_shuffle_ps::<0xEE>(low_ab, low_cd)),
+            Avx512(_mm512_shuffle_ps::<0x44>(high_ab, high_cd)),
+            Avx512(_mm512_shuffle_ps::<0xEE>(high_ab, high_cd)),
+        ]
+    }
+}
+
+impl Bits for Avx512 {
+    #[inline(always)]
+    fn as_number(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm512_cvtepi32_ps(_mm512_castps_si512(self.0)) })
+    }
+    #[inline(always)]
+    fn plus_shifted(self, addend: u32, left: u32) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let sum = _mm512_add_epi32(_mm512_castps_si512(self.0), _mm512_set1_epi32(addend as i32));
+            Self(_mm512_castsi512_ps(match left {
+                8 => _mm512_slli_epi32::<8>(sum),
+                _ => _mm512_slli_epi32::<23>(sum),
+            }))
+        }
+    }
+    #[inline(always)]
+    fn half_from(self, minuend: u32) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let half = _mm512_srli_epi32::<1>(_mm512_castps_si512(self.0));
+            Self(_mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(minuend as i32), half)))
+        }
+    }
+}
