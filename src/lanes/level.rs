@@ -6,6 +6,10 @@
 use core::sync::atomic::{AtomicU8, Ordering};
 
 use super::{Lanes, Real};
+#[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
+use super::{Pair, neon::Neon};
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+use super::{Pair, simd128::Simd128};
 #[cfg(target_arch = "x86_64")]
 use super::{avx2::Avx2, avx512::Avx512};
 
@@ -19,6 +23,10 @@ pub enum Level {
     Avx2,
     /// x86-64 with AVX-512 (F, BW, DQ, VL) and its dot products of bytes (VNNI).
     Avx512,
+    /// 64-bit Arm; every such processor has it.
+    Neon,
+    /// WebAssembly compiled with its feature `simd128`.
+    Simd128,
 }
 
 /// Work written once for any number of lanes. `run` must be `#[inline(always)]`, so that it is compiled
@@ -32,6 +40,17 @@ pub(crate) trait Kernel {
 const PORTABLE: u8 = 1;
 const AVX2: u8 = 2;
 const AVX512: u8 = 3;
+const NEON: u8 = 4;
+const SIMD128: u8 = 5;
+
+/// What every processor of the target has.
+const BASELINE: Level = if cfg!(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")) {
+    Level::Neon
+} else if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
+    Level::Simd128
+} else {
+    Level::Portable
+};
 
 static DETECTED: AtomicU8 = AtomicU8::new(0);
 
@@ -42,6 +61,8 @@ impl Level {
         match DETECTED.load(Ordering::Relaxed) {
             AVX512 => Self::Avx512,
             AVX2 => Self::Avx2,
+            NEON => Self::Neon,
+            SIMD128 => Self::Simd128,
             PORTABLE => Self::Portable,
             _ => Self::detect(),
         }
@@ -49,7 +70,9 @@ impl Level {
 
     /// Those this processor has, the best first.
     pub fn available() -> impl Iterator<Item = Self> {
-        [Self::Avx512, Self::Avx2, Self::Portable].into_iter().filter(|level| level.is_here())
+        [Self::Avx512, Self::Avx2, Self::Neon, Self::Simd128, Self::Portable]
+            .into_iter()
+            .filter(|level| level.is_here())
     }
 
     #[cold]
@@ -64,6 +87,8 @@ impl Level {
             Self::Portable => PORTABLE,
             Self::Avx2 => AVX2,
             Self::Avx512 => AVX512,
+            Self::Neon => NEON,
+            Self::Simd128 => SIMD128,
         };
         DETECTED.store(code, Ordering::Relaxed);
     }
@@ -71,6 +96,7 @@ impl Level {
     fn is_here(self) -> bool {
         match self {
             Self::Portable => true,
+            Self::Neon | Self::Simd128 => self == BASELINE,
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => has(AVX_STATE, AVX2_FEATURES),
             #[cfg(target_arch = "x86_64")]
@@ -103,7 +129,15 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
         Level::Avx512 => return unsafe { with_avx512(kernel) },
         // SAFETY: as above.
         Level::Avx2 => return unsafe { with_avx2(kernel) },
-        Level::Portable => {}
+        _ => {}
+    }
+    #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
+    if Level::current() == Level::Neon {
+        return kernel.run::<Pair<Neon>>();
+    }
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    if Level::current() == Level::Simd128 {
+        return kernel.run::<Pair<Simd128>>();
     }
     kernel.run::<Lanes<8>>()
 }

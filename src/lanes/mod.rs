@@ -11,7 +11,11 @@ mod avx2;
 mod avx512;
 mod functions;
 mod level;
+#[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
+mod neon;
 mod pair;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod simd128;
 mod vectors;
 
 pub use level::Level;

@@ -47,6 +47,7 @@ macro_rules! each {
 
 impl<R: Real> Real for Pair<R> {
     const COUNT: usize = 2 * R::COUNT;
+    const MANY_REGISTERS: bool = R::MANY_REGISTERS;
     type Eight = R::Eight;
 
     #[inline(always)]
@@ -75,6 +76,14 @@ impl<R: Real> Real for Pair<R> {
     #[inline(always)]
     fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
         Self(self.0.zip(other.0, &f), self.1.zip(other.1, &f))
+    }
+    #[inline(always)]
+    fn fused(self, factor: Self, addend: Self) -> Self {
+        Self(self.0.fused(factor.0, addend.0), self.1.fused(factor.1, addend.1))
+    }
+    #[inline(always)]
+    fn choose(self, yes: Self, no: Self) -> Self {
+        Self(self.0.choose(yes.0, no.0), self.1.choose(yes.1, no.1))
     }
     #[inline(always)]
     fn splat(value: f32) -> Self {

@@ -1,0 +1,200 @@
+//! Four numbers in one NEON register, which every 64-bit Arm processor of these targets has; networks and elements take
+//! them in [pairs](Pair), eight at once as at other levels: so all sums are taken in the same order.
+//!
+//! Larger and smaller are chosen by a comparison: NEON's own maximum is NaN where either number is.
+
+#![allow(unsafe_code)] // The instructions are unsafe to use where a function does not name their feature.
+
+#[cfg(not(feature = "deterministic"))]
+use core::arch::aarch64::vfmaq_f32;
+use core::arch::aarch64::{
+    float32x4_t, vabsq_f32, vaddq_f32, vaddq_u32, vandq_u32, vbslq_f32, vcgtq_f32, vcgtzq_f32, vcltq_f32,
+    vcvtq_f32_s32, vdivq_f32, vdupq_n_f32, vdupq_n_u32, vmulq_f32, vnegq_f32, vreinterpretq_f32_f64,
+    vreinterpretq_f32_u32, vreinterpretq_f64_f32, vreinterpretq_s32_f32, vreinterpretq_u32_f32, vshlq_n_u32,
+    vshrq_n_u32, vsqrtq_f32, vsubq_f32, vsubq_u32, vtrn1q_f32, vtrn2q_f32, vzip1q_f64, vzip2q_f64,
+};
+use core::ops::{Add, Mul, Neg, Sub};
+
+use super::functions::Bits;
+use super::{Pair, Real};
+
+/// See the module.
+#[derive(Clone, Copy)]
+#[repr(transparent)]
+pub(super) struct Neon(float32x4_t);
+
+impl Neon {
+    #[inline(always)]
+    fn numbers(self) -> [f32; 4] {
+        bytemuck::must_cast(self.0)
+    }
+    #[inline(always)]
+    fn of(numbers: [f32; 4]) -> Self {
+        Self(bytemuck::must_cast(numbers))
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $method:ident, $instruction:ident) => {
+        impl $trait for Neon {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                // SAFETY: this module is compiled only for targets with NEON.
+                Self(unsafe { $instruction(self.0, other.0) })
+            }
+        }
+    };
+}
+
+operator!(Add, add, vaddq_f32);
+operator!(Sub, sub, vsubq_f32);
+operator!(Mul, mul, vmulq_f32);
+
+impl Neg for Neon {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { vnegq_f32(self.0) })
+    }
+}
+
+impl Real for Neon {
+    const COUNT: usize = 4;
+    const MANY_REGISTERS: bool = true;
+    type Eight = Pair<Self>;
+
+    #[inline(always)]
+    fn from_fn(at: impl Fn(usize) -> f32) -> Self {
+        Self::of([at(0), at(1), at(2), at(3)])
+    }
+    #[inline(always)]
+    fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
+        transpose([Self::of(row(0)), Self::of(row(1)), Self::of(row(2)), Self::of(row(3))])
+    }
+    #[inline(always)]
+    fn to_rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
+        for (lane, numbers) in transpose(columns).into_iter().enumerate() {
+            row(lane, numbers.numbers());
+        }
+    }
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> f32 {
+        self.numbers().get(lane).copied().unwrap_or(0.0)
+    }
+    #[inline(always)]
+    fn map(self, f: impl Fn(f32) -> f32) -> Self {
+        let [a, b, c, d] = self.numbers();
+        Self::of([f(a), f(b), f(c), f(d)])
+    }
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        let ([a, b, c, d], [e, g, h, i]) = (self.numbers(), other.numbers());
+        Self::of([f(a, e), f(b, g), f(c, h), f(d, i)])
+    }
+    #[cfg(not(feature = "deterministic"))]
+    #[inline(always)]
+    fn fused(self, factor: Self, addend: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { vfmaq_f32(addend.0, self.0, factor.0) })
+    }
+    #[inline(always)]
+    fn choose(self, yes: Self, no: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { vbslq_f32(vcgtzq_f32(self.0), yes.0, no.0) })
+    }
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { vdupq_n_f32(value) })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { vbslq_f32(vcgtq_f32(self.0, other.0), self.0, other.0) })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { vbslq_f32(vcltq_f32(self.0, other.0), self.0, other.0) })
+    }
+    #[inline(always)]
+    fn positive(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe {
+            vreinterpretq_f32_u32(vandq_u32(vcgtzq_f32(self.0), vreinterpretq_u32_f32(vdupq_n_f32(1.0))))
+        })
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { vabsq_f32(self.0) })
+    }
+    #[inline(always)]
+    fn over(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { vdivq_f32(self.0, other.0) })
+    }
+    #[inline(always)]
+    fn root(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { vsqrtq_f32(self.0) })
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        super::functions::sqrt(self)
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        super::functions::exp(self)
+    }
+    #[inline(always)]
+    fn inverse_cbrt(self) -> Self {
+        super::functions::inverse_cbrt(self)
+    }
+}
+
+/// Rows become columns: first pairs of two rows, then pairs of pairs.
+#[inline(always)]
+fn transpose([a, b, c, d]: [Neon; 4]) -> [Neon; 4] {
+    // SAFETY: as above.
+    unsafe {
+        let pairs = |number| vreinterpretq_f64_f32(number);
+        let (even_ab, odd_ab) = (pairs(vtrn1q_f32(a.0, b.0)), pairs(vtrn2q_f32(a.0, b.0)));
+        let (even_cd, odd_cd) = (pairs(vtrn1q_f32(c.0, d.0)), pairs(vtrn2q_f32(c.0, d.0)));
+        [
+            Neon(vreinterpretq_f32_f64(vzip1q_f64(even_ab, even_cd))),
+            Neon(vreinterpretq_f32_f64(vzip1q_f64(odd_ab, odd_cd))),
+            Neon(vreinterpretq_f32_f64(vzip2q_f64(even_ab, even_cd))),
+            Neon(vreinterpretq_f32_f64(vzip2q_f64(odd_ab, odd_cd))),
+        ]
+    }
+}
+
+impl Bits for Neon {
+    #[inline(always)]
+    fn as_number(self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { vcvtq_f32_s32(vreinterpretq_s32_f32(self.0)) })
+    }
+    #[inline(always)]
+    fn plus_shifted(self, addend: u32, left: u32) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let sum = vaddq_u32(vreinterpretq_u32_f32(self.0), vdupq_n_u32(addend));
+            Self(vreinterpretq_f32_u32(match left {
+                8 => vshlq_n_u32::<8>(sum),
+                _ => vshlq_n_u32::<23>(sum),
+            }))
+        }
+    }
+    #[inline(always)]
+    fn half_from(self, minuend: u32) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let half = vshrq_n_u32::<1>(vreinterpretq_u32_f32(self.0));
+            Self(vreinterpretq_f32_u32(vsubq_u32(vdupq_n_u32(minuend), half)))
+        }
+    }
+}
