@@ -75,6 +75,12 @@ fn add_block(matrix: &mut [f32], stride: usize, c: usize, d: usize, rows: [[f32;
     }
 }
 
+/// In one order: glam's differs from processor to processor.
+#[inline(always)]
+fn sum(numbers: Vec4) -> f32 {
+    (numbers.x + numbers.z) + (numbers.y + numbers.w)
+}
+
 #[inline(always)]
 fn add_four(row: &mut [f32], column: usize, values: Vec4) {
     if let Some(place) = row.get_mut(column..).and_then(<[f32]>::first_chunk_mut::<4>) {
@@ -244,7 +250,7 @@ impl Assembly<'_> {
                     continue;
                 }
                 let far_image = Vec4::from(far_images[d % CORNERS]);
-                let all = element.iso * slope.dot(Vec4::from(far_slopes[d % CORNERS]));
+                let all = element.iso * sum(slope * Vec4::from(far_slopes[d % CORNERS]));
                 let (row, down, column, along) = if first < last {
                     (last, far_image, first, image)
                 } else {
