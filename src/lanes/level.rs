@@ -44,13 +44,14 @@ const NEON: u8 = 4;
 const SIMD128: u8 = 5;
 
 /// What every processor of the target has.
-const BASELINE: Level = if cfg!(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")) {
-    Level::Neon
-} else if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
-    Level::Simd128
-} else {
-    Level::Portable
-};
+const BASELINE: Level =
+    if cfg!(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")) {
+        Level::Neon
+    } else if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
+        Level::Simd128
+    } else {
+        Level::Portable
+    };
 
 static DETECTED: AtomicU8 = AtomicU8::new(0);
 

@@ -11,6 +11,8 @@ mod avx2;
 mod avx512;
 mod functions;
 mod level;
+#[cfg(test)]
+mod level_tests;
 #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
 mod neon;
 mod pair;

@@ -1,0 +1,87 @@
+//! The operations of this processor's level give what they give for single numbers, to the bit: also for zeros of both signs,
+//! infinities, numbers below the normal ones, and NaN, which need only be NaN again.
+
+extern crate std;
+use std::println;
+
+use super::{Kernel, Level, Real, dispatch};
+
+const NUMBERS: [f32; 16] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    f32::NAN,
+    0.3,
+    -7.25,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    1e-40,
+    -1e-40,
+    f32::MIN_POSITIVE,
+    f32::MAX,
+    -f32::MAX,
+    1.000_000_1,
+    12_345.678,
+];
+
+struct Operations;
+
+impl Kernel for Operations {
+    type Output = usize;
+
+    fn run<R: Real>(self) -> usize {
+        let mut checked = 0;
+        let mut same = |name: &str, lanes: R, single: &dyn Fn(usize) -> f32| {
+            for lane in 0..R::COUNT {
+                let (lanes, single) = (lanes.lane(lane), single(lane));
+                let both_nan = lanes.is_nan() && single.is_nan();
+                assert!(
+                    both_nan || lanes.to_bits() == single.to_bits(),
+                    "{name}: {lanes:e} in lane {lane}, {single:e} alone"
+                );
+                checked += 1;
+            }
+        };
+        for shift in 0..NUMBERS.len() {
+            for turn in [0, 8] {
+                let x = |lane: usize| NUMBERS[(lane + turn) % NUMBERS.len()];
+                let y = |lane: usize| NUMBERS[(lane + turn + shift) % NUMBERS.len()];
+                // Positive and normal.
+                let z =
+                    |lane: usize| 1e-30 * 1e4f32.powi((lane + shift) as i32 % 15) * (1.0 + 0.1 * lane as f32);
+                let (a, b, c) = (R::from_fn(x), R::from_fn(y), R::from_fn(z));
+                same("+", a + b, &|l| x(l) + y(l));
+                same("-", a - b, &|l| x(l) - y(l));
+                same("*", a * b, &|l| x(l) * y(l));
+                same("negative", -a, &|l| -x(l));
+                same("over", a.over(b), &|l| x(l) / y(l));
+                same("max", a.max(b), &|l| if x(l) > y(l) { x(l) } else { y(l) });
+                same("min", a.min(b), &|l| if x(l) < y(l) { x(l) } else { y(l) });
+                same("choose", a.choose(b, c), &|l| if x(l) > 0.0 { y(l) } else { z(l) });
+                same("positive", a.positive(), &|l| f32::from(u8::from(x(l) > 0.0)));
+                same("abs", a.abs(), &|l| x(l).abs());
+                same("root", a.root(), &|l| libm::sqrtf(x(l)));
+                same("sqrt", Real::sqrt(c), &|l| Real::sqrt(z(l)));
+                same("exp", a.exp(), &|l| Real::exp(x(l)));
+                same("inverse_cbrt", c.inverse_cbrt(), &|l| z(l).inverse_cbrt());
+                let rows = R::from_rows(|lane| [x(lane), y(lane), z(lane), lane as f32]);
+                same("column 0", rows[0], &x);
+                same("column 1", rows[1], &y);
+                same("column 2", rows[2], &z);
+                same("column 3", rows[3], &|l| l as f32);
+                R::to_rows([c, c + c, -c, R::splat(3.0)], |lane, row| {
+                    assert_eq!(row, [z(lane), z(lane) + z(lane), -z(lane), 3.0], "row {lane}");
+                });
+            }
+        }
+        checked
+    }
+}
+
+#[test]
+fn operations_are_those_of_single_numbers() {
+    let checked = dispatch(Operations);
+    println!("{:?}: {checked} results", Level::current());
+    assert!(checked > 1000);
+}
