@@ -1,0 +1,16 @@
+// Runs the library built for WebAssembly and prints its checksums, as src/main.rs does for other processors.
+
+import { readFileSync } from "node:fs";
+
+const { instance } = await WebAssembly.instantiate(readFileSync(process.argv[2]));
+const { has_simd128, web_checksum } = instance.exports;
+if (!has_simd128()) {
+    throw new Error("built without simd128");
+}
+console.error("wasm32: Simd128");
+for (const [what, name] of ["exact", "damped", "network", "learned"].entries()) {
+    for (const level of [0, 1]) {
+        const checksum = web_checksum(what, level) >>> 0;
+        console.log(`${name} unfused ${checksum.toString(16).padStart(8, "0")}`);
+    }
+}

@@ -1,0 +1,17 @@
+//! Prints the checksums of this processor: one line for each level that it has, with how sums of networks were
+//! rounded, on which their bits depend.
+
+use supple::lanes::Level;
+use targets::{NAMES, checksum, fuses};
+
+fn main() {
+    let levels: Vec<_> = Level::available().collect();
+    eprintln!("{}: {levels:?}", std::env::consts::ARCH);
+    for (what, name) in NAMES.into_iter().enumerate() {
+        for &level in &levels {
+            let may_fuse = !cfg!(feature = "deterministic") && level != Level::Portable;
+            let rounding = if fuses(what) && may_fuse { "fused" } else { "unfused" };
+            println!("{name} {rounding} {:08x}", checksum(what, level));
+        }
+    }
+}

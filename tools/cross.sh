@@ -1,0 +1,110 @@
+#!/usr/bin/env bash
+# The same bits on other processors, without having one: builds tests/targets for this processor, for 64-bit Arm and for
+# WebAssembly, runs it here, in an emulator and in node, and compares the checksums. Builds the core for a
+# microcontroller as well.
+#
+#     tools/cross.sh [--tests] [FOLDER]
+#
+# With --tests the library's own tests and some of the core's also run on the emulated Arm processor, which takes
+# several times as long. FOLDER (target/cross) takes a compiler with those targets, from Debian 12's packages: about
+# 260 MB to fetch and 1.5 GB in all. Nothing is installed into the system, except node where there is none.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+tests=false
+if [ "${1:-}" = --tests ]; then
+    tests=true
+    shift
+fi
+mkdir -p "${1:-target/cross}"
+folder=$(realpath "${1:-target/cross}")
+root=$folder/root
+
+step() { printf '\n== %s\n' "$*"; "$@"; }
+
+# The compiler (Debian's, whose targets rustup's lacks when it cannot be asked), Arm's C library and linker, the emulator.
+packages=(
+    rustc-web rust-web-src libstd-rust-web-1.96 libstd-rust-web-dev libllvm22
+    libstd-rust-web-dev:arm64
+    gcc-12-aarch64-linux-gnu gcc-aarch64-linux-gnu cpp-12-aarch64-linux-gnu binutils-aarch64-linux-gnu libgcc-12-dev-arm64-cross
+    libgcc-s1-arm64-cross libc6-arm64-cross libc6-dev-arm64-cross linux-libc-dev-arm64-cross
+    qemu-user-static
+)
+
+install() {
+    # A state of apt's own: the system's knows no packages for Arm, and shall not.
+    local apt=$folder/apt
+    mkdir -p "$apt"/state/lists/partial "$apt"/cache/archives/partial "$folder/debs" "$root"
+    touch "$apt/state/status"
+    local options=(
+        -qq -o APT::Architecture=amd64 -o APT::Architectures::=amd64 -o APT::Architectures::=arm64
+        -o "Dir::State=$apt/state" -o "Dir::State::status=$apt/state/status" -o "Dir::Cache=$apt/cache"
+        -o APT::Sandbox::User=root
+    )
+    apt-get "${options[@]}" update
+    (cd "$folder/debs" && apt-get "${options[@]}" download "${packages[@]}")
+    for package in "$folder"/debs/*.deb; do
+        dpkg -x "$package" "$root"
+    done
+    rm -r "$folder/debs"
+    printf '#!/bin/sh\nLD_LIBRARY_PATH=%s exec %s "$@"\n' "$root/usr/lib/x86_64-linux-gnu:$root/usr/lib" \
+        "$root/usr/bin/rustc" >"$folder/rustc"
+    chmod +x "$folder/rustc"
+    touch "$folder/installed"
+}
+
+[ -e "$folder/installed" ] || step install
+command -v node >/dev/null || step apt-get install -y -qq --no-install-recommends nodejs
+
+# rustup's compiler brings a linker for WebAssembly and microcontrollers.
+lld=$(rustc --print sysroot)/lib/rustlib/x86_64-unknown-linux-gnu/bin/rust-lld
+export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$lld
+export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS="-C target-feature=+simd128"
+arm=$root/usr/bin/aarch64-linux-gnu
+export CC_aarch64_unknown_linux_gnu=$arm-gcc AR_aarch64_unknown_linux_gnu=$arm-ar
+export CFLAGS_aarch64_unknown_linux_gnu=--sysroot=$root
+export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=$arm-gcc
+export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C link-arg=--sysroot=$root"
+emulator=$root/usr/bin/qemu-aarch64-static
+export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="$emulator -L $root/usr/aarch64-linux-gnu"
+
+# cargo with Debian's compiler, which builds the parts of the standard library that it has only as source.
+cross() { RUSTC=$folder/rustc RUSTC_BOOTSTRAP=1 LD_LIBRARY_PATH=$root/usr/lib/x86_64-linux-gnu cargo "$@"; }
+
+here=$folder/build
+targets=(--quiet --release --manifest-path tests/targets/Cargo.toml --target-dir "$here")
+step cargo build "${targets[@]}"
+step cross build "${targets[@]}" --target aarch64-unknown-linux-gnu
+step cross rustc "${targets[@]}" --target wasm32-unknown-unknown -Zbuild-std=core --lib --crate-type cdylib \
+    --features panic-handler
+step cross build --quiet --release --no-default-features --lib --target-dir "$here" --target thumbv7em-none-eabihf \
+    -Zbuild-std=core
+
+step "$here/release/targets" | tee "$folder/checksums"
+# shellcheck disable=SC2086 # A command with its arguments.
+step $CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER "$here/aarch64-unknown-linux-gnu/release/targets" |
+    tee -a "$folder/checksums"
+step node tests/targets/run.mjs "$here/wasm32-unknown-unknown/release/targets.wasm" | tee -a "$folder/checksums"
+
+grep -E ' (un)?fused ' "$folder/checksums" | sort -u >"$folder/unlike"
+if grep ' 00000000$' "$folder/unlike"; then
+    echo "the above could not be computed" >&2
+    exit 1
+fi
+unlike=$(awk '{ print $1, $2 }' "$folder/unlike" | uniq -d)
+if [ -n "$unlike" ]; then
+    echo "not the same bits everywhere: $unlike" >&2
+    exit 1
+fi
+echo "the same bits everywhere"
+
+if $tests; then
+    # As fast to compile as tests can be that are emulated: their dependencies do nothing that takes time.
+    export CARGO_PROFILE_TEST_OPT_LEVEL=1
+    plain=(--config 'profile.test.package."*".opt-level=0')
+    for package in glam libm bytemuck; do
+        plain+=(--config "profile.test.package.$package.opt-level=1")
+    done
+    step cross test "${plain[@]}" --quiet --no-default-features --features std --target-dir "$here" \
+        --target aarch64-unknown-linux-gnu --lib --test same_bits --test elements --test patch
+fi
