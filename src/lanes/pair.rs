@@ -89,9 +89,5 @@ impl<R: Real> Real for Pair<R> {
     fn splat(value: f32) -> Self {
         Self(R::splat(value), R::splat(value))
     }
-    #[inline(always)]
-    fn fused(self, factor: Self, addend: Self) -> Self {
-        Self(self.0.fused(factor.0, addend.0), self.1.fused(factor.1, addend.1))
-    }
     each!(max other, min other, over other, positive, abs, root, sqrt, exp, inverse_cbrt);
 }

@@ -37,11 +37,6 @@ static DAMPER: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/dampe
 /// What is computed.
 pub const NAMES: [&str; 4] = ["exact", "damped", "network", "learned"];
 
-/// Whether networks are in it, whose sums some levels fuse.
-pub fn fuses(what: usize) -> bool {
-    what >= 2
-}
-
 /// Its checksum with the instructions of `level`; zero if it could not be computed.
 pub fn checksum(what: usize, level: Level) -> u32 {
     if !Level::force(level) {
@@ -117,7 +112,7 @@ fn exact(steps: u32) -> Option<(Scene, State)> {
     Some((scene, state))
 }
 
-/// Large steps, with a lattice and a network that damps: one number at a time, so that nothing is fused.
+/// Large steps, with a lattice and a network that damps.
 fn damped() -> Option<u32> {
     let (scene, mut state) = (scene()?, State::new());
     let loads = Loads::new(&scene, GRAVITY, &FORCES, &[]).ok()?;
