@@ -16,7 +16,8 @@ use criterion::{BenchmarkId, Criterion, Throughput};
 use std::hint::black_box;
 use supple::loads::Loads;
 use supple::material::Exponential;
-use supple::mlp::{Description, LayerDescription, Network, WeightBytes, write};
+use supple::mlp::quantise::{Plan, Span, quantise};
+use supple::mlp::{Description, LayerDescription, Network, WeightBytes, write, write_int8};
 use supple::surrogate::{self, Surrogate, Vertex};
 use supple::tled::{self, Step};
 
@@ -54,37 +55,60 @@ fn nothing(like: &Network<'_>) -> WeightBytes {
     WeightBytes::of(&bytes)
 }
 
+/// Inputs of vertices, over the ranges of training.
+fn vertices(network: &Network<'_>) -> Vec<f32> {
+    let inputs = network.inputs();
+    (0..ROWS * inputs.len())
+        .map(|at| {
+            let range = inputs[at % inputs.len()];
+            range.least + (range.most - range.least) * ((at * 7919 % 1009) as f32 / 1009.0)
+        })
+        .collect()
+}
+
+/// The network with all layers in eight bits but the first and the last of each part. Time does not depend on what it was
+/// quantised by.
+fn eight_bits(network: &Network<'_>) -> WeightBytes {
+    let (first, second) = network.layers();
+    let (split, count) = (first.len(), first.len() + second.len());
+    let float = [0, split - 1, split, count - 1];
+    let plan = Plan { float: &float, span: Span::Whole };
+    let quantised = quantise(network, &vertices(network), plan).expect("a float32 network");
+    let bytes = write_int8(&Description::of(network), &quantised.layers).expect("a sound network");
+    WeightBytes::of(&bytes)
+}
+
 fn forward(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("forward, 1458 vertices");
     group.throughput(Throughput::Elements(ROWS as u64));
     for (name, bytes) in [("paper", PAPER), ("compact", COMPACT)] {
         let bytes = WeightBytes::of(bytes);
         let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
-        let (inputs, outputs) = (network.inputs(), network.outputs().len());
-        // Over the ranges of training.
-        let values: Vec<f32> = (0..ROWS * inputs.len())
-            .map(|at| {
-                let range = inputs[at % inputs.len()];
-                range.least + (range.most - range.least) * ((at * 7919 % 1009) as f32 / 1009.0)
-            })
-            .collect();
-        let mut predicted = vec![0.0; ROWS * outputs];
+        let int8 = eight_bits(&network);
+        let int8 = Network::parse(int8.bytes()).expect("a sound network");
+        let values = vertices(&network);
+        let mut predicted = vec![0.0; ROWS * network.outputs().len()];
         group.bench_function(BenchmarkId::new(name, "f32"), |b| {
             b.iter(|| network.predict_rows(black_box(&values), &mut predicted));
         });
+        group.bench_function(BenchmarkId::new(name, "int8"), |b| {
+            b.iter(|| int8.predict_rows(black_box(&values), &mut predicted));
+        });
         let flops = 2e-9 * network.multiply_adds() as f64 * ROWS as f64;
-        let (mut times, mut shares) = (Vec::new(), Vec::new());
+        let (mut times, mut shares) = ([Vec::new(), Vec::new()], Vec::new());
+        let mut ratios = Vec::new();
         for _ in 0..ROUNDS {
             let before = peak::widest(5);
             let time = seconds(|| network.predict_rows(black_box(&values), &mut predicted));
-            times.push(time);
+            let in_int8 = seconds(|| int8.predict_rows(black_box(&values), &mut predicted));
             shares.push(flops / time / (0.5 * (before + peak::widest(5))));
+            ratios.push(time / in_int8);
+            times[0].push(time);
+            times[1].push(in_int8);
         }
-        println!(
-            "{name}: {:.0} us, {:.0} % of the machine's peak at the time",
-            median(times) * 1e6,
-            100.0 * median(shares)
-        );
+        let [time, in_int8] = times.map(|times| median(times) * 1e6);
+        println!("{name}: {time:.0} us, {:.0} % of the machine's peak at the time", 100.0 * median(shares));
+        println!("{name} int8: {in_int8:.0} us, {:.2} times as fast as float32", median(ratios));
     }
     group.finish();
 }
@@ -99,17 +123,19 @@ fn steps(criterion: &mut Criterion) {
     (0..10_000).for_each(|_| exact());
 
     let [paper, compact] = [PAPER, COMPACT].map(WeightBytes::of);
+    let compact_int8 = eight_bits(&Network::parse(compact.bytes()).expect("a weight file of the crate"));
     let empty = nothing(&Network::parse(compact.bytes()).expect("a weight file of the crate"));
     let mut learned =
-        [("no network", &empty), ("compact", &compact), ("paper", &paper)].map(|(name, bytes)| {
-            let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
-            let mut surrogate =
-                Surrogate::over(network, vec![Vertex::NEW; nodes]).expect("a network of the learned step");
-            let mut state = bar::state(nodes);
-            let (scene, loads) = (&scene, &loads);
-            let run = move || bar::moved(surrogate::step(scene, loads, &mut state, &mut surrogate));
-            (name, run)
-        });
+        [("no network", &empty), ("compact", &compact), ("paper", &paper), ("compact int8", &compact_int8)]
+            .map(|(name, bytes)| {
+                let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
+                let mut surrogate = Surrogate::over(network, vec![Vertex::NEW; nodes])
+                    .expect("a network of the learned step");
+                let mut state = bar::state(nodes);
+                let (scene, loads) = (&scene, &loads);
+                let run = move || bar::moved(surrogate::step(scene, loads, &mut state, &mut surrogate));
+                (name, run)
+            });
     let mut group = criterion.benchmark_group("learned step");
     group.throughput(Throughput::Elements(nodes as u64));
     group.bench_function("exact", |b| b.iter(&mut exact));
@@ -118,20 +144,23 @@ fn steps(criterion: &mut Criterion) {
     }
     group.finish();
 
-    let mut times = vec![Vec::new(); 4];
+    let mut times = vec![Vec::new(); 5];
     for _ in 0..ROUNDS {
         times[0].push(seconds(|| (0..20).for_each(|_| exact())) / 20.0);
         for (times, (_, run)) in times[1..].iter_mut().zip(&mut learned) {
             times.push(seconds(|| (0..5).for_each(|_| run())) / 5.0);
         }
     }
-    let [exact, nothing, compact, paper] = [0, 1, 2, 3].map(|at| median(times[at].clone()));
+    let [exact, nothing, compact, paper, compact_int8] = [0, 1, 2, 3, 4].map(|at| median(times[at].clone()));
     println!(
-        "exact step {:.0} us; learned step without network {:.2} times that, compact {:.2} times ({:.0} us), paper's {:.1} times",
+        "exact step {:.0} us; learned step without network {:.2} times that, compact {:.2} times ({:.0} us), in int8 {:.2} times \
+         ({:.0} us), paper's {:.1} times",
         exact * 1e6,
         nothing / exact,
         compact / exact,
         compact * 1e6,
+        compact_int8 / exact,
+        compact_int8 * 1e6,
         paper / exact,
     );
 }

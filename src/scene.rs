@@ -205,13 +205,13 @@ impl ElementBlock {
     /// The mesh's number of the element in `lane`.
     #[inline(always)]
     pub(crate) fn element(&self, lane: usize) -> usize {
-        self.elements[lane] as usize
+        self.elements[lane % BLOCK] as usize
     }
 
     /// Gradient component of shape functions 1 to 3 (`corner` 0 to 2) for lanes from `first` on, 1/m.
     #[inline(always)]
     pub(crate) fn gradient<R: Real>(&self, corner: usize, axis: usize, first: usize) -> R {
-        R::from_fn(|lane| self.gradients[corner][axis][first + lane])
+        lanes(&self.gradients[corner][axis], first)
     }
 
     /// All components of one, 1/m.
@@ -229,14 +229,23 @@ impl ElementBlock {
     /// Largest eigenvalue of `sum_a ga ga^T` for lanes from `first` on, 1/m^2.
     #[inline(always)]
     pub(crate) fn spread<R: Real>(&self, first: usize) -> R {
-        R::from_fn(|lane| self.spreads[first + lane])
+        lanes(&self.spreads, first)
     }
 
     /// Rest volumes for lanes from `first` on, m^3.
     #[inline(always)]
     pub(crate) fn volume<R: Real>(&self, first: usize) -> R {
-        R::from_fn(|lane| self.volumes[first + lane])
+        lanes(&self.volumes, first)
     }
+}
+
+/// The vector of a block's numbers that begins with lane `first`.
+#[inline(always)]
+fn lanes<R: Real>(of: &[f32; BLOCK], first: usize) -> R {
+    // What is so anyway, for the compiler to see that no index is beyond the end.
+    let vectors = (BLOCK / R::COUNT).max(1);
+    let first = first / R::COUNT % vectors * R::COUNT;
+    R::from_fn(|lane| of[(first + lane) % BLOCK])
 }
 
 /// Mass of a node (kg) and its inverse along each axis (1/kg), zero along held ones.

@@ -57,6 +57,17 @@ proptest! {
     }
 }
 
+/// What PyTorch would train is the float32 network.
+#[test]
+fn layers_of_eight_bits_are_not_exported() {
+    let memory = Memory::of(&std::fs::read("tests/data/golden-v2.weights").unwrap());
+    let refused = to_safetensors(&Network::parse(memory.bytes()).unwrap()).unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "layer 1 is of eight bits; export the float32 file that it was made from"
+    );
+}
+
 const GOLDEN: &str = "tests/data/golden-v1.safetensors";
 
 /// Exported when the format came to be; `pytorch.csv` was made from it.
@@ -208,7 +219,7 @@ fn keys_that_do_not_fit_are_named() {
         assert_eq!(file.refused(), format!("metadata key {key}: missing"));
     }
     let cases: &[(Change, &str)] = &[
-        (|about| about["version"] = json!(2), "version 2 of the weight format; this library reads 1"),
+        (|about| about["version"] = json!(2), "metadata key version: it is 2, an export has 1"),
         (|about| about["version"] = json!("1"), "metadata key version: \"1\" is not usable: invalid type"),
         (|about| about["extra"] = json!(1), "metadata key extra: not known"),
         (

@@ -5,12 +5,14 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use supple::lanes::Level;
-use supple::mlp::{Description, Network, WeightError, write};
+use supple::mlp::{
+    Description, Int8Description, Network, Numbers, OutputsDescription, WeightError, write, write_int8,
+};
 
 #[path = "support/networks.rs"]
 mod networks;
 
-use networks::{Memory, described, numbers, predicted};
+use networks::{Memory, described, int8, numbers, predicted};
 
 /// Largest difference of outputs from the reference over their scales.
 fn apart(description: &Description<'_>, inputs: &[f32], outputs: &[f32]) -> f64 {
@@ -112,13 +114,14 @@ fn what_is_written_is_read_back_without_a_copy() {
     for (layer, described) in
         first.iter().chain(second).zip(description.first.iter().chain(&description.second))
     {
-        assert_eq!(layer.weights, described.weights);
-        assert_eq!(layer.biases, described.biases);
+        let Numbers::Float { weights, biases } = layer.numbers else { panic!("not float32") };
+        assert_eq!(weights, described.weights);
+        assert_eq!(biases, described.biases);
         assert_eq!(layer.activation, described.activation);
         // In the host's memory, where vectors like it.
         let start = memory.bytes().as_ptr_range();
-        assert!(start.contains(&layer.weights.as_ptr().cast()));
-        assert_eq!(layer.weights.as_ptr() as usize % 64, 0);
+        assert!(start.contains(&weights.as_ptr().cast()));
+        assert_eq!(weights.as_ptr() as usize % 64, 0);
     }
     let recipe = network.recipe();
     assert_eq!((recipe.text, recipe.hash), (description.recipe, description.recipe_hash));
@@ -146,9 +149,78 @@ fn the_golden_file_is_what_is_written_today() {
 
 const GOLDEN: [u32; 3] = [1_049_510_499, 1_030_333_892, 3_196_632_681];
 
+/// Of eight bits are the two hidden layers of the first part and the first of the second.
+fn mixed(seed: u32) -> (Description<'static>, Vec<Option<Int8Description>>) {
+    let description = described(&[7, 9, 6, 5, 3], &[10, 5, 3], seed);
+    let numbers = int8(&description, |layer| [1, 2, 4].contains(&layer), seed ^ 1);
+    (description, numbers)
+}
+
+/// A file that was written when version 2 came to be.
+#[test]
+fn the_golden_file_of_version_2_is_what_is_written_today() {
+    let (description, int8) = mixed(2026);
+    let bytes = write_int8(&description, &int8).unwrap();
+    let path = Path::new("tests/data/golden-v2.weights");
+    if std::env::var_os("SUPPLE_WRITE_GOLDEN").is_some() {
+        std::fs::write(path, &bytes).unwrap();
+    }
+    let golden = std::fs::read(path).unwrap();
+    assert!(golden == bytes, "the format has changed: it needs a new version");
+    let memory = Memory::of(&golden);
+    let network = Network::parse(memory.bytes()).unwrap();
+    assert!(network.has_int8());
+    let mut outputs = [0.0; 3];
+    network.predict(&[0.1, -0.2, 0.3, 0.4, -0.5, 0.6, 0.7], &mut outputs);
+    println!("{outputs:?} {:?}", outputs.map(f32::to_bits));
+    assert_eq!(outputs.map(f32::to_bits), GOLDEN_2);
+}
+
+const GOLDEN_2: [u32; 3] = [3_200_418_898, 1_081_155_791, 1_080_051_691];
+
+#[test]
+fn layers_of_eight_bits_are_read_back_without_a_copy() {
+    let (description, written) = mixed(1);
+    let memory = Memory::of(&write_int8(&description, &written).unwrap());
+    let network = Network::parse(memory.bytes()).unwrap();
+    let (first, second) = network.layers();
+    let described = description.first.iter().chain(&description.second);
+    for ((layer, described), written) in first.iter().chain(second).zip(described).zip(&written) {
+        assert_eq!(layer.is_int8(), written.is_some());
+        let (Numbers::Int8(numbers), Some(written)) = (layer.numbers, written) else {
+            continue;
+        };
+        let groups = layer.inputs.div_ceil(4);
+        for (at, &weight) in written.weights.iter().enumerate() {
+            let (output, input) = (at / layer.inputs, at % layer.inputs);
+            let tile = numbers.weights[output / 8 * groups + input / 4];
+            assert_eq!(tile[output % 8][input % 4], weight);
+        }
+        assert_eq!(numbers.biases[..layer.outputs], written.biases);
+        assert_eq!(numbers.quantise.map(<[_]>::to_vec), written.quantise);
+        match (numbers.outputs, &written.outputs) {
+            (supple::mlp::Outputs::Requantised(found), OutputsDescription::Requantised(written)) => {
+                assert_eq!(found[..layer.outputs], *written);
+            }
+            (supple::mlp::Outputs::Float(found), OutputsDescription::Float(written)) => {
+                assert_eq!(found[..layer.outputs], *written);
+            }
+            _ => panic!("other outputs"),
+        }
+        assert_eq!(layer.activation, described.activation);
+        assert!(memory.bytes().as_ptr_range().contains(&numbers.weights.as_ptr().cast()));
+        assert_eq!(numbers.weights.as_ptr() as usize % 64, 0);
+    }
+}
+
 #[test]
 fn every_damage_is_refused() {
-    let memory = Memory::of(&write(&described(&[7, 9, 3], &[10, 5, 3], 1)).unwrap());
+    let (description, int8) = mixed(1);
+    damage(&Memory::of(&write(&described(&[7, 9, 3], &[10, 5, 3], 1)).unwrap()));
+    damage(&Memory::of(&write_int8(&description, &int8).unwrap()));
+}
+
+fn damage(memory: &Memory) {
     for at in 0..memory.length {
         for bit in [0x01, 0x80] {
             let mut damaged = memory.clone();
@@ -187,7 +259,7 @@ fn every_wrong_field_has_its_own_error() {
     assert!(error.to_string().ends_with("it is damaged"), "{error}");
 
     refused(4, *b"E-X ", "it does not begin with SUPPLE-W: not a weight file");
-    refused(8, whole(2), "version 2 of the weight format; this library reads 1");
+    refused(8, whole(3), "version 3 of the weight format; this library reads 1 and 2");
     refused(12, whole(100), "the length is 100");
     refused(20, whole(33), "the number of inputs is 33");
     refused(20, whole(0), "the number of inputs is 0");
@@ -222,4 +294,84 @@ fn every_wrong_field_has_its_own_error() {
     refused(384, whole(64), "layer 0: the offset of the biases is 64");
     refused(388, whole(3), "layer 0: the reserved field is 3");
     refused(512 + 8, real(f32::NAN), "layer 0: the number at byte 520 is not finite");
+}
+
+/// The same of layers of eight bits.
+#[test]
+fn every_wrong_field_of_eight_bits_has_its_own_error() {
+    let (description, int8) = mixed(1);
+    let memory = Memory::of(&write_int8(&description, &int8).unwrap());
+    let word = |at: usize| u32::from_le_bytes(memory.bytes()[at..at + 4].try_into().unwrap()) as usize;
+    // Behind 240 bytes and ten ranges: seven entries of 48 bytes, of which layers 1, 2 and 4 are of eight bits.
+    let entry = |layer: usize| 360 + 48 * layer;
+    let error_of = |at: usize, value: [u8; 4]| {
+        let error = Network::parse(memory.with(at, value).bytes()).unwrap_err();
+        println!("{error}");
+        error.to_string()
+    };
+    let refused = |at: usize, value: [u8; 4], text: &str| assert_eq!(error_of(at, value), text);
+    let whole = |value: u32| value.to_le_bytes();
+    let real = |value: f32| value.to_le_bytes();
+    let shorts = |[a, b]: [i16; 2]| {
+        let ([a, b], [c, d]) = (a.to_le_bytes(), b.to_le_bytes());
+        [a, b, c, d]
+    };
+    let (weights, biases) = (word(entry(1) + 20), word(entry(1) + 24));
+    let (inputs, outputs) = (word(entry(1) + 32), word(entry(1) + 36));
+    let scales = word(entry(2) + 36);
+
+    refused(entry(1) + 16, whole(2), "layer 1: the precision is 2");
+    refused(entry(1) + 40, whole(9), "layer 1: the reserved field is 9");
+    refused(entry(1) + 44, whole(9), "layer 1: the reserved field is 9");
+    refused(entry(0) + 32, whole(64), "layer 0: the offset of the inputs' table is 64");
+    refused(entry(0) + 36, whole(64), "layer 0: the offset of the outputs' table is 64");
+    refused(entry(1) + 32, whole(0), "layer 1: the offset of the inputs' table is 0");
+    refused(entry(2) + 32, whole(64), "layer 2: the offset of the inputs' table is 64");
+    refused(entry(1) + 36, whole(7), "layer 1: the offset of the outputs' table is 7");
+    refused(entry(2) + 36, whole(7), "layer 2: the offset of the outputs' scales is 7");
+    refused(entry(1) + 20, whole(68), "layer 1: the offset of the weights is 68");
+    refused(entry(1) + 24, whole(68), "layer 1: the offset of the biases is 68");
+    // In float32 after all: then the layer behind it has no table of inputs.
+    assert!(error_of(entry(1) + 16, whole(0)).starts_with("layer 1: "));
+
+    refused(weights, [0x80, 0, 0, 0], &format!("layer 1: a weight, at byte {weights}, is -128"));
+    // The last group of nine inputs has one, the only block six of eight outputs.
+    let at = weights + 64;
+    refused(
+        at,
+        [0, 5, 0, 0],
+        &format!("layer 1: byte {} belongs to no input or output and is not zero", at + 1),
+    );
+    let at = weights + 24;
+    refused(at, [5, 0, 0, 0], &format!("layer 1: byte {at} belongs to no input or output and is not zero"));
+    let at = biases + 24;
+    refused(at, whole(1), &format!("layer 1: byte {at} belongs to no input or output and is not zero"));
+    let said = error_of(biases, whole(i32::MAX as u32));
+    assert!(
+        said.starts_with("layer 1: sums of output 0 may reach 21") && said.ends_with("than 32 bits hold")
+    );
+
+    refused(inputs, real(0.0), &format!("layer 1: an input's scale, at byte {inputs}, is 0"));
+    refused(inputs, real(f32::NAN), &format!("layer 1: an input's scale, at byte {inputs}, is NaN"));
+    let at = inputs + 4;
+    refused(at, real(0.5), &format!("layer 1: an input's zero, at byte {at}, is 0.5"));
+    refused(at, real(4e4), &format!("layer 1: an input's zero, at byte {at}, is 40000"));
+
+    let (at, by) = (outputs, &memory.bytes()[outputs..]);
+    let [positive, zero] = [i16::from_le_bytes([by[0], by[1]]), i16::from_le_bytes([by[4], by[5]])];
+    let text = format!("layer 1: the factor of positive sums, at byte {at}, is -1");
+    refused(at, shorts([-1, 0]), &text);
+    let text = format!("layer 1: the factor of negative sums, at byte {}, is {}", at + 2, positive + 1);
+    refused(at, shorts([positive, positive + 1]), &text);
+    let text = format!("layer 1: the factor of negative sums, at byte {}, is -1", at + 2);
+    refused(at, shorts([positive, -1]), &text);
+    refused(at + 4, shorts([zero, 31]), &format!("layer 1: the shift, at byte {}, is 31", at + 6));
+    refused(at + 4, shorts([zero, -1]), &format!("layer 1: the shift, at byte {}, is -1", at + 6));
+    let at = outputs + 48;
+    refused(at, whole(1), &format!("layer 1: byte {at} belongs to no input or output and is not zero"));
+
+    refused(scales, real(-1.0), &format!("layer 2: an output's scale, at byte {scales}, is -1"));
+    refused(scales, real(f32::NAN), &format!("layer 2: the number at byte {scales} is not finite"));
+    let at = scales + 20;
+    refused(at, real(1.0), &format!("layer 2: byte {at} belongs to no input or output and is not zero"));
 }

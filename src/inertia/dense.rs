@@ -92,7 +92,7 @@ impl Kernel for Sweep<'_> {
                 }
             }
         }
-        let at = |k: usize, index: usize| lines[k].get(index).copied().unwrap_or(0.0);
+        let at = |k: usize, index: usize| lines[k % 3].get(index).copied().unwrap_or(0.0);
         for (index, row) in matrix.chunks_exact_mut(stride.max(1)).take(size).enumerate() {
             let factors = [0, 1, 2].map(|k| at(k, index) * inverses[k]);
             if index < first || index > first + 2 {

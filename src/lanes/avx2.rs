@@ -19,11 +19,12 @@ use core::ops::{Add, Mul, Neg, Sub};
 
 use super::Real;
 use super::functions::Bits;
+use super::int8_avx2::Bytes32;
 
 /// See the module.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub(super) struct Avx2(__m256);
+pub(super) struct Avx2(pub(super) __m256);
 
 impl Avx2 {
     #[inline(always)]
@@ -66,6 +67,7 @@ impl Real for Avx2 {
     const COUNT: usize = 8;
     const MANY_REGISTERS: bool = true;
     type Eight = Self;
+    type Whole = Bytes32;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {

@@ -20,11 +20,12 @@ use core::ops::{Add, Mul, Neg, Sub};
 use super::Real;
 use super::avx2::Avx2;
 use super::functions::Bits;
+use super::int8_avx512::Bytes64;
 
 /// See the module.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub(super) struct Avx512(__m512);
+pub(super) struct Avx512(pub(super) __m512);
 
 impl Avx512 {
     #[inline(always)]
@@ -67,6 +68,7 @@ impl Real for Avx512 {
     const COUNT: usize = 16;
     const MANY_REGISTERS: bool = true;
     type Eight = Avx2;
+    type Whole = Bytes64;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {

@@ -10,6 +10,11 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod functions;
+pub mod int8;
+#[cfg(target_arch = "x86_64")]
+mod int8_avx2;
+#[cfg(target_arch = "x86_64")]
+mod int8_avx512;
 mod level;
 #[cfg(test)]
 mod level_tests;
@@ -29,6 +34,8 @@ pub(crate) use vectors::{BlockNodes, Gather, Scatter, dot, read_rows, write_rows
 
 use core::ops::{Add, Mul, Neg, Sub};
 
+use int8::{Packed, Whole};
+
 /// Elements in one block of the scene's tables; every lane count divides it.
 pub const BLOCK: usize = 16;
 
@@ -43,6 +50,8 @@ pub trait Real:
     /// Eight numbers side by side with the same instructions: for tables eight wide, and for sums over nodes, whose
     /// order and so whose bits the width would change.
     type Eight: Real;
+    /// As many whole numbers.
+    type Whole: Whole<Self>;
 
     /// Number `lane` is `at(lane)`.
     fn from_fn(at: impl Fn(usize) -> f32) -> Self;
@@ -133,6 +142,7 @@ pub trait Real:
 impl Real for f32 {
     const COUNT: usize = 1;
     type Eight = Lanes<8>;
+    type Whole = Packed<1>;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {
@@ -168,6 +178,7 @@ pub struct Lanes<const L: usize>(pub [f32; L]);
 impl<const L: usize> Real for Lanes<L> {
     const COUNT: usize = L;
     type Eight = Lanes<8>;
+    type Whole = Packed<L>;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {

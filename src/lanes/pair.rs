@@ -6,6 +6,7 @@
 use core::ops::{Add, Mul, Neg, Sub};
 
 use super::Real;
+use super::int8::{Requantise, Whole};
 
 /// The lanes of the first, then those of the second.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +50,7 @@ impl<R: Real> Real for Pair<R> {
     const COUNT: usize = 2 * R::COUNT;
     const MANY_REGISTERS: bool = R::MANY_REGISTERS;
     type Eight = R::Eight;
+    type Whole = Pair<R::Whole>;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {
@@ -90,4 +92,27 @@ impl<R: Real> Real for Pair<R> {
         Self(R::splat(value), R::splat(value))
     }
     each!(max other, min other, over other, positive, abs, root, sqrt, exp, inverse_cbrt);
+}
+
+impl<R: Real, W: Whole<R>> Whole<Pair<R>> for Pair<W> {
+    #[inline(always)]
+    fn splat(number: i32) -> Self {
+        Self(W::splat(number), W::splat(number))
+    }
+    #[inline(always)]
+    fn dot(self, bytes: Self, weights: [i8; 4]) -> Self {
+        Self(self.0.dot(bytes.0, weights), self.1.dot(bytes.1, weights))
+    }
+    #[inline(always)]
+    fn requantise([a, b, c, d]: [Self; 4], by: &[Requantise; 4]) -> Self {
+        Self(W::requantise([a.0, b.0, c.0, d.0], by), W::requantise([a.1, b.1, c.1, d.1], by))
+    }
+    #[inline(always)]
+    fn numbers(self) -> Pair<R> {
+        Pair(self.0.numbers(), self.1.numbers())
+    }
+    #[inline(always)]
+    fn low_bytes([a, b, c, d]: [Pair<R>; 4]) -> Self {
+        Self(W::low_bytes([a.0, b.0, c.0, d.0]), W::low_bytes([a.1, b.1, c.1, d.1]))
+    }
 }

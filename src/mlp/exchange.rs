@@ -18,8 +18,8 @@ use serde_json::value::RawValue;
 
 use super::file::VERSION;
 use super::{
-    Activation, Description, ForceInput, Layer, LayerDescription, MAX_WIDTH, Network, Range, TrainedLaw,
-    WeightError, hexadecimal, write,
+    Activation, Description, ForceInput, Layer, LayerDescription, MAX_WIDTH, Network, Numbers, Range,
+    TrainedLaw, WeightError, hexadecimal, write,
 };
 
 /// The key of the metadata.
@@ -67,6 +67,11 @@ pub enum ExchangeError {
         /// What is wrong.
         problem: String,
     },
+    /// A layer is of eight bits: what PyTorch trains is the float32 network it was made from.
+    Int8 {
+        /// Which layer, from zero.
+        layer: u32,
+    },
     /// What the file says makes no network.
     Weights(WeightError),
 }
@@ -85,6 +90,9 @@ impl fmt::Display for ExchangeError {
                 write!(f, "tensor {tensor}: number {index} is {value}")
             }
             Self::Key { key, problem } => write!(f, "metadata key {key}: {problem}"),
+            Self::Int8 { layer } => {
+                write!(f, "layer {layer} is of eight bits; export the float32 file that it was made from")
+            }
             Self::Weights(error) => write!(f, "{error}"),
         }
     }
@@ -170,11 +178,17 @@ pub fn to_safetensors(network: &Network<'_>) -> Result<Vec<u8>, ExchangeError> {
     let about = serde_json::to_string(&About::of(network)).map_err(|error| file(&error))?;
     let (first, second) = network.layers();
     let mut tensors = Vec::new();
+    if let Some(layer) = first.iter().chain(second).position(Layer::is_int8) {
+        return Err(ExchangeError::Int8 { layer: layer as u32 });
+    }
     for (part, layers) in [("first", first), ("second", second)] {
         for (index, layer) in layers.iter().enumerate() {
+            let Numbers::Float { weights, biases } = layer.numbers else {
+                continue;
+            };
             let arrays = [
-                ("weight", layer.weights, std::vec![layer.outputs, layer.inputs]),
-                ("bias", layer.biases, std::vec![layer.outputs]),
+                ("weight", weights, std::vec![layer.outputs, layer.inputs]),
+                ("bias", biases, std::vec![layer.outputs]),
             ];
             for (kind, numbers, shape) in arrays {
                 let view = TensorView::new(Dtype::F32, shape, bytemuck::cast_slice(numbers));
@@ -194,7 +208,7 @@ pub fn from_safetensors(bytes: &[u8]) -> Result<Vec<u8>, ExchangeError> {
     let mut about = Keys::of(&metadata)?;
     let version: u32 = about.take("version")?;
     if version != VERSION {
-        return Err(WeightError::Version { version }.into());
+        return Err(refused("version", format!("it is {version}, an export has {VERSION}")));
     }
     let (inputs, outputs) = (about.ranges("inputs")?, about.ranges("outputs")?);
     let mut slopes = about.keys("slopes")?;

@@ -1,18 +1,22 @@
-//! Weight files (`weights/FORMAT.md`, version 1): little-endian, checksummed, read where they are. Nothing of a file is
+//! Weight files (`weights/FORMAT.md`, versions 1 and 2): little-endian, checksummed, read where they are. Nothing of a file is
 //! believed before its checksum and every field have been checked.
 
 use core::fmt;
 
 use bytemuck::{Pod, Zeroable, try_cast_slice};
 
-use super::{Activation, Layer, MAX_INPUTS, MAX_LAYERS, MAX_OUTPUTS, MAX_WIDTH};
+use super::layers::{LayerEntry, LongEntry, Place, checked_layer};
+use super::{Layer, MAX_INPUTS, MAX_LAYERS, MAX_OUTPUTS};
 
 #[cfg(target_endian = "big")]
 compile_error!("weight files are little-endian and read in place");
 
 /// First bytes of a weight file.
 pub const MAGIC: [u8; 8] = *b"SUPPLE-W";
+/// All layers in float32.
 pub(super) const VERSION: u32 = 1;
+/// Layers may be of eight bits.
+pub(super) const VERSION_INT8: u32 = 2;
 /// Arrays begin at multiples of this.
 pub(super) const ALIGNMENT: usize = 64;
 /// Where the checksum's bytes begin.
@@ -45,20 +49,6 @@ pub(super) struct Header {
 
 pub(super) const HEADER: usize = size_of::<Header>();
 const _: () = assert!(HEADER == 240);
-
-/// One entry of the layer table.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct LayerEntry {
-    pub(super) inputs: u32,
-    pub(super) outputs: u32,
-    pub(super) activation: u32,
-    pub(super) slope: f32,
-    pub(super) precision: u32,
-    pub(super) weights: u32,
-    pub(super) biases: u32,
-    pub(super) reserved: u32,
-}
 
 /// Scale of an input or output, and the range it had in training, in its own unit.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -223,6 +213,44 @@ pub enum WeightError {
         /// Byte of the file.
         at: u32,
     },
+    /// A whole number of an eight-bit layer is not one it can be.
+    Number {
+        /// Which layer, from zero.
+        layer: u32,
+        /// What it is.
+        field: &'static str,
+        /// Byte of the file.
+        at: u32,
+        /// Its value.
+        value: i32,
+    },
+    /// A scale of an eight-bit layer is not positive, or the activation for zero not a whole number of 16 bits.
+    Scale {
+        /// Which layer, from zero.
+        layer: u32,
+        /// What it is.
+        field: &'static str,
+        /// Byte of the file.
+        at: u32,
+        /// Its value.
+        value: f32,
+    },
+    /// Something other than zero where an eight-bit layer has no input or output.
+    Padding {
+        /// Which layer, from zero.
+        layer: u32,
+        /// Byte of the file.
+        at: u32,
+    },
+    /// A sum of an eight-bit layer might need more than 32 bits.
+    Overflow {
+        /// Which layer, from zero.
+        layer: u32,
+        /// Which output.
+        output: u32,
+        /// The largest sum there may be.
+        sum: i64,
+    },
     /// The recipe lies outside the file or is not UTF-8.
     Recipe {
         /// First byte.
@@ -239,7 +267,10 @@ impl fmt::Display for WeightError {
             Self::Short { needed, bytes } => write!(f, "{bytes} bytes, a weight file needs {needed}"),
             Self::NotWeights => write!(f, "it does not begin with SUPPLE-W: not a weight file"),
             Self::Version { version } => {
-                write!(f, "version {version} of the weight format; this library reads {VERSION}")
+                write!(
+                    f,
+                    "version {version} of the weight format; this library reads {VERSION} and {VERSION_INT8}"
+                )
             }
             Self::Checksum { stated, found } => {
                 write!(f, "checksum {found:08x} of the weights, the file says {stated:08x}: it is damaged")
@@ -254,6 +285,18 @@ impl fmt::Display for WeightError {
             }
             Self::NotFinite { layer, at } => {
                 write!(f, "layer {layer}: the number at byte {at} is not finite")
+            }
+            Self::Number { layer, field, at, value } => {
+                write!(f, "layer {layer}: {field}, at byte {at}, is {value}")
+            }
+            Self::Scale { layer, field, at, value } => {
+                write!(f, "layer {layer}: {field}, at byte {at}, is {value}")
+            }
+            Self::Padding { layer, at } => {
+                write!(f, "layer {layer}: byte {at} belongs to no input or output and is not zero")
+            }
+            Self::Overflow { layer, output, sum } => {
+                write!(f, "layer {layer}: sums of output {output} may reach {sum}, more than 32 bits hold")
             }
             Self::Recipe { at, length } => {
                 write!(f, "the recipe, {length} bytes from byte {at} on, is not text in the file")
@@ -273,11 +316,17 @@ pub struct Network<'w> {
     pub(super) count: usize,
     /// Layers of the first part.
     pub(super) first: usize,
+    /// Whether any layer is of eight bits.
+    int8: bool,
     recipe: Recipe<'w>,
 }
 
 /// `size_of::<T>() * count` bytes from `*at` on, which moves behind them.
-fn take<'w, T: Pod>(bytes: &'w [u8], at: &mut usize, count: usize) -> Result<&'w [T], WeightError> {
+pub(super) fn take<'w, T: Pod>(
+    bytes: &'w [u8],
+    at: &mut usize,
+    count: usize,
+) -> Result<&'w [T], WeightError> {
     let end = size_of::<T>().checked_mul(count).and_then(|size| size.checked_add(*at)).unwrap_or(usize::MAX);
     let slice = bytes.get(*at..end).ok_or(WeightError::Short { needed: end, bytes: bytes.len() })?;
     *at = end;
@@ -323,7 +372,7 @@ impl<'w> Network<'w> {
         if header.magic != MAGIC {
             return Err(WeightError::NotWeights);
         }
-        if header.version != VERSION {
+        if header.version != VERSION && header.version != VERSION_INT8 {
             return Err(WeightError::Version { version: header.version });
         }
         let length = header.length as usize;
@@ -345,20 +394,51 @@ impl<'w> Network<'w> {
         let recipe = recipe(header, bytes)?;
         let inputs = checked_ranges("input", take(bytes, &mut at, inputs)?)?;
         let outputs = checked_ranges("output", take(bytes, &mut at, outputs)?)?;
-        let entries: &[LayerEntry] = take(bytes, &mut at, count)?;
+        let mut entries = [LongEntry::default(); MAX_LAYERS];
+        if header.version == VERSION {
+            let short: &[LayerEntry] = take(bytes, &mut at, count)?;
+            for (long, &entry) in entries.iter_mut().zip(short) {
+                long.entry = entry;
+            }
+        } else {
+            for (long, &entry) in entries.iter_mut().zip(take(bytes, &mut at, count)?) {
+                *long = entry;
+            }
+        }
+        let most = header.version - VERSION;
+        let entries = entries.get(..count).unwrap_or_default();
         let mut layers = [Layer::NONE; MAX_LAYERS];
         for (number, (layer, entry)) in layers.iter_mut().zip(entries).enumerate() {
-            // The second part sees what the first has predicted.
-            let needed = match number {
-                0 => inputs.len(),
-                _ if number == first => inputs.len() + outputs.len(),
-                _ => entries.get(number - 1).map_or(0, |entry| entry.outputs as usize),
-            };
+            let precision = entry.entry.precision;
+            if precision > most {
+                let field = "the precision";
+                return Err(WeightError::Layer { layer: number as u32, field, value: precision });
+            }
+            let other = |number: usize| entries.get(number).map_or(LayerEntry::default(), |long| long.entry);
+            let starts = number == 0 || number == first;
             let last = number + 1 == first || number + 1 == count;
-            let wanted = if last { Some(outputs.len()) } else { None };
-            *layer = checked_layer(bytes, number as u32, entry, needed, wanted)?;
+            let place = Place {
+                number: number as u32,
+                // The second part sees what the first has predicted.
+                needed: match number {
+                    0 => inputs.len(),
+                    _ if number == first => inputs.len() + outputs.len(),
+                    _ => other(number - 1).outputs as usize,
+                },
+                wanted: if last { Some(outputs.len()) } else { None },
+                after_int8: !starts && other(number - 1).precision == 1,
+                before_int8: !last && other(number + 1).precision == 1,
+            };
+            *layer = checked_layer(bytes, entry, place)?;
         }
-        Ok(Self { inputs, outputs, layers, count, first, recipe })
+        let int8 = layers.iter().any(Layer::is_int8);
+        Ok(Self { inputs, outputs, layers, count, first, int8, recipe })
+    }
+
+    /// Whether any layer is of eight bits; then the same input gives the same bits on every processor.
+    #[must_use]
+    pub const fn has_int8(&self) -> bool {
+        self.int8
     }
 
     /// Scale and training range of each input.
@@ -388,7 +468,7 @@ impl<'w> Network<'w> {
     /// Multiplications and additions of one prediction.
     #[must_use]
     pub fn multiply_adds(&self) -> usize {
-        self.layers.iter().map(|layer| layer.inputs * layer.outputs).sum()
+        self.layers.iter().map(Layer::multiply_adds).sum()
     }
 }
 
@@ -428,49 +508,4 @@ fn recipe<'w>(header: &Header, bytes: &'w [u8]) -> Result<Recipe<'w>, WeightErro
         text: text.ok_or(WeightError::Recipe { at, length })?,
         hash: header.recipe_hash,
     })
-}
-
-fn checked_layer<'w>(
-    bytes: &'w [u8],
-    number: u32,
-    entry: &LayerEntry,
-    needed: usize,
-    wanted: Option<usize>,
-) -> Result<Layer<'w>, WeightError> {
-    let wrong = |field, value| Err(WeightError::Layer { layer: number, field, value });
-    let (inputs, outputs) = (entry.inputs as usize, entry.outputs as usize);
-    if inputs != needed {
-        return wrong("the number of inputs", entry.inputs);
-    }
-    if outputs == 0 || outputs > MAX_WIDTH || wanted.is_some_and(|wanted| outputs != wanted) {
-        return wrong("the number of outputs", entry.outputs);
-    }
-    let activation = match entry.activation {
-        0 => Activation::Linear,
-        1 if (0.0..=1.0).contains(&entry.slope) => Activation::LeakyRelu { slope: entry.slope },
-        1 => return Err(WeightError::Slope { layer: number, slope: entry.slope }),
-        code => return wrong("the activation", code),
-    };
-    if entry.precision != 0 {
-        return wrong("the precision", entry.precision);
-    }
-    if entry.reserved != 0 {
-        return wrong("the reserved field", entry.reserved);
-    }
-    let numbers = |field, offset: u32, count: usize| -> Result<&'w [f32], WeightError> {
-        let mut at = offset as usize;
-        if !at.is_multiple_of(ALIGNMENT) || at < HEADER {
-            return Err(WeightError::Layer { layer: number, field, value: offset });
-        }
-        let numbers: &[f32] = take(bytes, &mut at, count)?;
-        match numbers.iter().position(|number| !number.is_finite()) {
-            None => Ok(numbers),
-            Some(index) => {
-                Err(WeightError::NotFinite { layer: number, at: offset + (size_of::<f32>() * index) as u32 })
-            }
-        }
-    };
-    let weights = numbers("the offset of the weights", entry.weights, inputs * outputs)?;
-    let biases = numbers("the offset of the biases", entry.biases, outputs)?;
-    Ok(Layer { inputs, outputs, activation, weights, biases })
 }

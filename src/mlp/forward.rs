@@ -1,27 +1,34 @@
-//! The forward pass in float32, for one vertex as it is written down, and for many side by side. Sums are taken in the order
+//! The forward pass, for one vertex as it is written down, and for many side by side. Sums are taken in the order
 //! of the inputs, so the result of a vertex does not depend on its neighbours.
 //!
 //! Many vertices go through in tiles of one or two vectors: a layer's numbers lie vector beside vector, a weight is
 //! repeated over a whole one. Four outputs at a time have their sums in registers, so that a vector that is read and
 //! a weight that is repeated serve several fused multiplications and additions.
+//!
+//! A network that has layers of eight bits ([`super::int8`]) fuses nothing, so that it gives the same bits on every processor.
 
-use super::{Activation, Layer, MAX_INPUTS, MAX_OUTPUTS, MAX_WIDTH, Network};
+use super::int8::{Outputs, Words, quantise};
+use super::{Layer, MAX_INPUTS, MAX_OUTPUTS, MAX_WIDTH, Network, Numbers};
+use crate::lanes::int8::Whole;
 use crate::lanes::{Kernel, Real, dispatch};
 
 /// `COLUMNS` vectors of vertices side by side.
 pub(crate) type Tile<R, const COLUMNS: usize> = [R; COLUMNS];
 
 /// What a layer reads and writes, for a tile of vertices.
-pub(crate) struct Scratch<R, const COLUMNS: usize> {
+pub(crate) struct Scratch<R: Real, const COLUMNS: usize> {
     here: [Tile<R, COLUMNS>; MAX_WIDTH],
     there: [Tile<R, COLUMNS>; MAX_WIDTH],
+    words_here: Words<R, COLUMNS>,
+    words_there: Words<R, COLUMNS>,
 }
 
 impl<R: Real, const COLUMNS: usize> Scratch<R, COLUMNS> {
     #[inline(always)]
     pub(crate) fn new() -> Self {
         let zero = [[R::splat(0.0); COLUMNS]; MAX_WIDTH];
-        Self { here: zero, there: zero }
+        let words = [[R::Whole::splat(0); COLUMNS]; _];
+        Self { here: zero, there: zero, words_here: words, words_there: words }
     }
 }
 
@@ -30,31 +37,35 @@ const TOGETHER: usize = 4;
 
 /// `sums + weight values`.
 #[inline(always)]
-fn plus<R: Real, const COLUMNS: usize>(
+fn plus<R: Real, const COLUMNS: usize, const FUSED: bool>(
     sums: Tile<R, COLUMNS>,
     weight: f32,
     values: &Tile<R, COLUMNS>,
 ) -> Tile<R, COLUMNS> {
-    let (weight, mut sums) = (R::splat(weight), sums);
-    for (sum, &value) in sums.iter_mut().zip(values) {
-        *sum = weight.fused(value, *sum);
+    let weight = R::splat(weight);
+    // Not a closure: the compiler may leave a call of it standing.
+    let mut out = sums;
+    for column in 0..COLUMNS {
+        out[column] = if FUSED {
+            weight.fused(values[column], sums[column])
+        } else {
+            weight * values[column] + sums[column]
+        };
     }
-    sums
+    out
 }
 
 /// `to = activation(W from + b)`.
 #[inline(always)]
-fn dense<R: Real, const COLUMNS: usize>(
+fn dense<R: Real, const COLUMNS: usize, const FUSED: bool>(
     layer: &Layer<'_>,
+    (weights, biases): (&[f32], &[f32]),
     from: &[Tile<R, COLUMNS>],
     to: &mut [Tile<R, COLUMNS>],
 ) {
-    let slope = match layer.activation {
-        Activation::Linear => R::splat(1.0),
-        Activation::LeakyRelu { slope } => R::splat(slope),
-    };
-    let rows = layer.weights.chunks((TOGETHER * layer.inputs).max(1));
-    for ((rows, biases), to) in rows.zip(layer.biases.chunks(TOGETHER)).zip(to.chunks_mut(TOGETHER)) {
+    let slope = R::splat(layer.activation.slope());
+    let rows = weights.chunks((TOGETHER * layer.inputs).max(1));
+    for ((rows, biases), to) in rows.zip(biases.chunks(TOGETHER)).zip(to.chunks_mut(TOGETHER)) {
         // Rows that there are not repeat the first, and are not kept.
         let row = |index: usize| {
             let start = if index < biases.len() { index * layer.inputs } else { 0 };
@@ -64,30 +75,51 @@ fn dense<R: Real, const COLUMNS: usize>(
             [0, 1, 2, 3].map(|index| [R::splat(biases.get(index).copied().unwrap_or(0.0)); COLUMNS]);
         // Zipped, so that no index has to be checked; four sums by name, so that the compiler keeps them in registers.
         for ((((values, &a), &b), &c), &d) in from.iter().zip(row(0)).zip(row(1)).zip(row(2)).zip(row(3)) {
-            one = plus(one, a, values);
-            two = plus(two, b, values);
-            three = plus(three, c, values);
-            four = plus(four, d, values);
+            one = plus::<R, COLUMNS, FUSED>(one, a, values);
+            two = plus::<R, COLUMNS, FUSED>(two, b, values);
+            three = plus::<R, COLUMNS, FUSED>(three, c, values);
+            four = plus::<R, COLUMNS, FUSED>(four, d, values);
         }
         for (to, sums) in to.iter_mut().zip([one, two, three, four]).take(biases.len()) {
+            // For slopes from zero to one.
             for (to, sum) in to.iter_mut().zip(sums) {
-                // For slopes from zero to one.
                 *to = sum.max(slope * sum);
             }
         }
     }
 }
 
-/// Layers one after the other, from `here` to what is returned.
+/// Layers one after the other, from `here` to what is returned. The last hands on float32.
 #[inline(always)]
-fn run<'a, R: Real, const COLUMNS: usize>(
+fn run<'a, R: Real, const COLUMNS: usize, const FUSED: bool>(
     layers: &[Layer<'_>],
     scratch: &'a mut Scratch<R, COLUMNS>,
 ) -> &'a [Tile<R, COLUMNS>] {
-    let (mut from, mut to) = (&mut scratch.here, &mut scratch.there);
+    let Scratch { here, there, words_here, words_there } = scratch;
+    let (mut from, mut to) = (here, there);
+    let (mut words, mut words_to) = (words_here, words_there);
     for layer in layers {
-        dense(layer, from.as_slice(), to.as_mut_slice());
-        core::mem::swap(&mut from, &mut to);
+        match &layer.numbers {
+            Numbers::Float { weights, biases } => {
+                dense::<R, COLUMNS, FUSED>(layer, (weights, biases), from.as_slice(), to.as_mut_slice());
+                core::mem::swap(&mut from, &mut to);
+            }
+            Numbers::Int8(int8) => {
+                if let Some(by) = int8.quantise {
+                    quantise(by, from.as_slice(), words);
+                }
+                match int8.outputs {
+                    Outputs::Requantised(by) => {
+                        int8.words::<R, COLUMNS>(layer.inputs, by, words, words_to);
+                        core::mem::swap(&mut words, &mut words_to);
+                    }
+                    Outputs::Float(scales) => {
+                        int8.floats(layer.inputs, scales, layer.activation, words, to.as_mut_slice());
+                        core::mem::swap(&mut from, &mut to);
+                    }
+                }
+            }
+        }
     }
     from
 }
@@ -100,6 +132,19 @@ impl Network<'_> {
         inputs: &[Tile<R, COLUMNS>; MAX_INPUTS],
         scratch: &mut Scratch<R, COLUMNS>,
     ) -> [[Tile<R, COLUMNS>; MAX_OUTPUTS]; 2] {
+        if self.has_int8() {
+            self.parts::<R, COLUMNS, false>(inputs, scratch)
+        } else {
+            self.parts::<R, COLUMNS, true>(inputs, scratch)
+        }
+    }
+
+    #[inline(always)]
+    fn parts<R: Real, const COLUMNS: usize, const FUSED: bool>(
+        &self,
+        inputs: &[Tile<R, COLUMNS>; MAX_INPUTS],
+        scratch: &mut Scratch<R, COLUMNS>,
+    ) -> [[Tile<R, COLUMNS>; MAX_OUTPUTS]; 2] {
         let (first, second) = self.layers();
         let mut scaled = *inputs;
         for (values, range) in scaled.iter_mut().zip(self.inputs) {
@@ -107,16 +152,18 @@ impl Network<'_> {
                 *value = value.over(R::splat(range.scale));
             }
         }
-        let count = self.inputs.len();
-        copy(&scaled, &mut scratch.here, count);
+        let (count, high) = (self.inputs.len(), self.outputs.len());
         let mut sums = [[R::splat(0.0); COLUMNS]; MAX_OUTPUTS];
-        copy(run(first, scratch), &mut sums, self.outputs.len());
-        if !second.is_empty() {
+        // One loop body for both parts: it is long, and stands here for every instruction set.
+        for (number, layers) in [first, second].into_iter().enumerate() {
+            if number > 0 && layers.is_empty() {
+                break;
+            }
             copy(&scaled, &mut scratch.here, count);
-            copy(&sums, scratch.here.get_mut(count..).unwrap_or_default(), self.outputs.len());
-            for (sums, corrections) in sums.iter_mut().zip(run(second, scratch)) {
-                for (sum, &correction) in sums.iter_mut().zip(corrections) {
-                    *sum = *sum + correction;
+            copy(&sums, scratch.here.get_mut(count..).unwrap_or_default(), high);
+            for (sums, values) in sums.iter_mut().zip(run::<R, COLUMNS, FUSED>(layers, scratch)).take(high) {
+                for (sum, &value) in sums.iter_mut().zip(values) {
+                    *sum = if number == 0 { value } else { *sum + value };
                 }
             }
         }
@@ -144,8 +191,8 @@ impl Network<'_> {
     }
 
     /// The same for many vertices: rows of as many inputs as the network has, and of as many outputs. Rows that are not
-    /// whole, or have no counterpart, are left out. Within rounding of [`Network::predict`]; the same bits on every
-    /// processor with the feature `deterministic`.
+    /// whole, or have no counterpart, are left out. Of float32 layers within rounding of [`Network::predict`], and the same bits
+    /// on every processor with the feature `deterministic`; with layers of eight bits the same as there.
     pub fn predict_rows(&self, inputs: &[f32], outputs: &mut [f32]) {
         dispatch(Rows { network: self, inputs, outputs });
     }

@@ -11,15 +11,24 @@
 mod exchange;
 mod file;
 mod forward;
+mod int8;
+mod layers;
+#[cfg(feature = "std")]
+pub mod quantise;
 #[cfg(feature = "std")]
 mod write;
 
+pub use crate::lanes::int8::Requantise;
 #[cfg(feature = "safetensors")]
 pub use exchange::{ExchangeError, from_safetensors, to_safetensors};
 pub use file::{ForceInput, MAGIC, Network, Range, Recipe, TrainedLaw, WeightError};
 pub(crate) use forward::Scratch;
+pub use int8::{BLOCK, GROUP, Int8, Outputs, Quantise, WeightTile};
 #[cfg(feature = "std")]
-pub use write::{Description, LayerDescription, WeightBytes, hexadecimal, write};
+pub use write::{
+    Description, Int8Description, LayerDescription, OutputsDescription, WeightBytes, hexadecimal, write,
+    write_int8,
+};
 
 /// Widest layer.
 pub const MAX_WIDTH: usize = 256;
@@ -42,7 +51,32 @@ pub enum Activation {
     },
 }
 
-/// A dense layer: `outputs` rows of `inputs` weights, and a bias for each row.
+impl Activation {
+    /// Of negative numbers.
+    #[inline(always)]
+    pub(crate) const fn slope(self) -> f32 {
+        match self {
+            Self::Linear => 1.0,
+            Self::LeakyRelu { slope } => slope,
+        }
+    }
+}
+
+/// What a layer multiplies with.
+#[derive(Clone, Copy, Debug)]
+pub enum Numbers<'w> {
+    /// `outputs` rows of `inputs` weights, and a bias for each row.
+    Float {
+        /// By rows.
+        weights: &'w [f32],
+        /// One a row.
+        biases: &'w [f32],
+    },
+    /// The same in eight bits.
+    Int8(Int8<'w>),
+}
+
+/// A dense layer.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer<'w> {
     /// Numbers that go in.
@@ -51,14 +85,28 @@ pub struct Layer<'w> {
     pub outputs: usize,
     /// What follows.
     pub activation: Activation,
-    /// By rows.
-    pub weights: &'w [f32],
-    /// One a row.
-    pub biases: &'w [f32],
+    /// Weights and biases.
+    pub numbers: Numbers<'w>,
 }
 
 impl Layer<'_> {
     /// No layer.
-    pub(crate) const NONE: Self =
-        Self { inputs: 0, outputs: 0, activation: Activation::Linear, weights: &[], biases: &[] };
+    pub(crate) const NONE: Self = Self {
+        inputs: 0,
+        outputs: 0,
+        activation: Activation::Linear,
+        numbers: Numbers::Float { weights: &[], biases: &[] },
+    };
+
+    /// Whether its numbers are of eight bits.
+    #[must_use]
+    pub const fn is_int8(&self) -> bool {
+        matches!(self.numbers, Numbers::Int8(_))
+    }
+
+    /// Multiplications and additions.
+    #[must_use]
+    pub const fn multiply_adds(&self) -> usize {
+        self.inputs * self.outputs
+    }
 }

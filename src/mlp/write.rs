@@ -5,8 +5,11 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-use super::file::{ALIGNMENT, CHECKED, HEADER, Header, LayerEntry, MAGIC, VERSION};
-use super::{Activation, ForceInput, Network, Range, TrainedLaw, WeightError};
+use super::file::{ALIGNMENT, CHECKED, HEADER, Header, MAGIC, VERSION, VERSION_INT8};
+use super::int8::{BLOCK, GROUP, Quantise, WeightTile};
+use super::layers::{LayerEntry, LongEntry};
+use super::{Activation, ForceInput, Layer, Network, Numbers, Range, TrainedLaw, WeightError};
+use crate::lanes::int8::Requantise;
 
 /// A layer of a network to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +22,28 @@ pub struct LayerDescription {
     pub weights: Vec<f32>,
     /// One a row.
     pub biases: Vec<f32>,
+}
+
+/// A layer's numbers in eight bits, see [`super::Int8`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Int8Description {
+    /// One an input, if what goes in is float32; nothing behind another such layer.
+    pub quantise: Option<Vec<Quantise>>,
+    /// By rows of as many as there are inputs, -127 to 127.
+    pub weights: Vec<i8>,
+    /// One a row.
+    pub biases: Vec<i32>,
+    /// What becomes of the sums.
+    pub outputs: OutputsDescription,
+}
+
+/// What becomes of the sums of an eight-bit layer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum OutputsDescription {
+    /// Activations for the eight-bit layer that follows, one a row.
+    Requantised(Vec<Requantise>),
+    /// Scales to float32, one a row.
+    Float(Vec<f32>),
 }
 
 /// A network to be written.
@@ -48,6 +73,44 @@ pub struct Description<'a> {
     pub recipe: &'a str,
     /// SHA-256 of the recipe.
     pub recipe_hash: [u8; 32],
+}
+
+impl<'a> Description<'a> {
+    /// What a network consists of; layers of eight bits have neither weights nor biases there.
+    #[must_use]
+    pub fn of(network: &Network<'a>) -> Self {
+        let layers = |layers: &[Layer<'_>]| {
+            let described = |layer: &Layer<'_>| {
+                let (weights, biases) = match layer.numbers {
+                    Numbers::Float { weights, biases } => (weights, biases),
+                    Numbers::Int8(_) => (&[][..], &[][..]),
+                };
+                LayerDescription {
+                    inputs: layer.inputs,
+                    activation: layer.activation,
+                    weights: weights.to_vec(),
+                    biases: biases.to_vec(),
+                }
+            };
+            layers.iter().map(described).collect()
+        };
+        let (first, second) = network.layers();
+        let recipe = network.recipe();
+        Self {
+            inputs: network.inputs().to_vec(),
+            outputs: network.outputs().to_vec(),
+            first: layers(first),
+            second: layers(second),
+            law: recipe.law,
+            density: recipe.density,
+            damping: recipe.damping,
+            step: recipe.step,
+            exact_step: recipe.exact_step,
+            force: recipe.force,
+            recipe: recipe.text,
+            recipe_hash: recipe.hash,
+        }
+    }
 }
 
 /// A copy of a weight file's bytes, at a multiple of four as [`Network::parse`] needs them.
@@ -89,28 +152,80 @@ impl Image {
     }
 }
 
-/// The bytes of a weight file.
+/// Tiles of eight outputs by four inputs from rows of weights, zero where there is neither.
+fn tiles(weights: &[i8], inputs: usize, outputs: usize) -> Vec<WeightTile> {
+    let mut tiles = Vec::new();
+    for block in 0..outputs.div_ceil(BLOCK) {
+        for group in 0..inputs.div_ceil(GROUP) {
+            let weight = |output: usize, input: usize| {
+                let there = output < outputs && input < inputs;
+                there.then(|| weights.get(output * inputs + input)).flatten().copied().unwrap_or(0)
+            };
+            tiles.push(core::array::from_fn(|row| {
+                core::array::from_fn(|index| weight(block * BLOCK + row, group * GROUP + index))
+            }));
+        }
+    }
+    tiles
+}
+
+/// With zeros behind, a multiple of eight.
+fn padded<T: Clone + Default>(numbers: &[T]) -> Vec<T> {
+    let mut padded = numbers.to_vec();
+    padded.resize(numbers.len().next_multiple_of(BLOCK), T::default());
+    padded
+}
+
+/// The bytes of a weight file, all layers in float32: version 1.
 pub fn write(description: &Description<'_>) -> Result<Vec<u8>, WeightError> {
+    write_int8(description, &[])
+}
+
+/// The same with some layers in eight bits: layer `n` of both parts together has the numbers of `int8[n]`, where there are
+/// any, instead of the description's. Version 2 if there is one.
+pub fn write_int8(
+    description: &Description<'_>,
+    int8: &[Option<Int8Description>],
+) -> Result<Vec<u8>, WeightError> {
     let Description { inputs, outputs, first, second, law, .. } = description;
     let layers: Vec<_> = first.iter().chain(second).collect();
+    let version = if int8.iter().any(Option::is_some) { VERSION_INT8 } else { VERSION };
+    let entry_size = if version == VERSION { size_of::<LayerEntry>() } else { size_of::<LongEntry>() };
     let tables = size_of::<Range>() * (inputs.len() + outputs.len());
-    let mut image = Image(vec_of(HEADER + tables + size_of::<LayerEntry>() * layers.len()));
-    let mut entries = Vec::new();
-    for layer in &layers {
+    let mut image = Image(vec_of(HEADER + tables + entry_size * layers.len()));
+    let mut entries: Vec<u8> = Vec::new();
+    for (number, layer) in layers.iter().enumerate() {
         let (activation, slope) = match layer.activation {
             Activation::Linear => (0, 0.0),
             Activation::LeakyRelu { slope } => (1, slope),
         };
-        entries.push(LayerEntry {
-            inputs: layer.inputs as u32,
-            outputs: layer.biases.len() as u32,
-            activation,
-            slope,
-            precision: 0,
-            weights: image.add(bytemuck::cast_slice(&layer.weights)),
-            biases: image.add(bytemuck::cast_slice(&layer.biases)),
-            reserved: 0,
-        });
+        let (inputs, outputs) = (layer.inputs, layer.biases.len());
+        let mut long = LongEntry {
+            entry: LayerEntry {
+                inputs: inputs as u32,
+                outputs: outputs as u32,
+                activation,
+                slope,
+                ..LayerEntry::default()
+            },
+            ..LongEntry::default()
+        };
+        if let Some(int8) = int8.get(number).and_then(Option::as_ref) {
+            long.entry.precision = 1;
+            if let Some(quantise) = &int8.quantise {
+                long.quantise = image.add(bytemuck::cast_slice(quantise));
+            }
+            long.entry.weights = image.add(bytemuck::cast_slice(&tiles(&int8.weights, inputs, outputs)));
+            long.entry.biases = image.add(bytemuck::cast_slice(&padded(&int8.biases)));
+            long.outputs = match &int8.outputs {
+                OutputsDescription::Requantised(by) => image.add(bytemuck::cast_slice(&padded(by))),
+                OutputsDescription::Float(scales) => image.add(bytemuck::cast_slice(&padded(scales))),
+            };
+        } else {
+            long.entry.weights = image.add(bytemuck::cast_slice(&layer.weights));
+            long.entry.biases = image.add(bytemuck::cast_slice(&layer.biases));
+        }
+        entries.extend(bytemuck::bytes_of(&long).iter().take(entry_size));
     }
     let recipe = image.add(description.recipe.as_bytes());
     let Image(mut bytes) = image;
@@ -120,7 +235,7 @@ pub fn write(description: &Description<'_>) -> Result<Vec<u8>, WeightError> {
     };
     let mut header = Header {
         magic: MAGIC,
-        version: VERSION,
+        version,
         length: bytes.len() as u32,
         checksum: 0,
         inputs: inputs.len() as u32,
@@ -143,7 +258,7 @@ pub fn write(description: &Description<'_>) -> Result<Vec<u8>, WeightError> {
         |bytes: &mut Vec<u8>, at: usize, part: &[u8]| bytes[at..at + part.len()].copy_from_slice(part);
     place(&mut bytes, HEADER, bytemuck::cast_slice(inputs));
     place(&mut bytes, HEADER + size_of::<Range>() * inputs.len(), bytemuck::cast_slice(outputs));
-    place(&mut bytes, HEADER + tables, bytemuck::cast_slice(&entries));
+    place(&mut bytes, HEADER + tables, &entries);
     place(&mut bytes, 0, bytemuck::bytes_of(&header));
     header.checksum = crc32fast::hash(&bytes[CHECKED..]);
     place(&mut bytes, 0, bytemuck::bytes_of(&header));

@@ -17,6 +17,8 @@ pub enum TrainError {
     Lab(LabError),
     /// The weights cannot be written as a file.
     Weights(WeightError),
+    /// The network could not be quantised; the text says why.
+    Quantise(String),
     /// A checkpoint is there, but of another recipe.
     OtherRecipe(PathBuf),
     /// A checkpoint could not be read or written; the text says why.
@@ -36,7 +38,7 @@ pub enum TrainError {
 impl fmt::Display for TrainError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Recipe(text) => f.write_str(text),
+            Self::Recipe(text) | Self::Quantise(text) => f.write_str(text),
             Self::Lab(error) => error.fmt(f),
             Self::Weights(error) => error.fmt(f),
             Self::OtherRecipe(path) => {

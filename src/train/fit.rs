@@ -108,7 +108,7 @@ pub fn train(
 }
 
 /// A share of the frames, evenly spread, is held out.
-fn is_held_out(frame: usize, share: f64) -> bool {
+pub(super) fn is_held_out(frame: usize, share: f64) -> bool {
     ((frame + 1) as f64 * share).floor() > (frame as f64 * share).floor()
 }
 
@@ -278,7 +278,7 @@ fn numbers<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
 }
 
 /// Root mean square errors of the kernel's own forward pass, unclipped motions and all.
-fn judged(bytes: &[u8], samples: &Samples, outputs: &[Range]) -> [f64; PREDICTED] {
+pub(super) fn judged(bytes: &[u8], samples: &Samples, outputs: &[Range]) -> [f64; PREDICTED] {
     let memory = WeightBytes::of(bytes);
     let mut squares = [0.0; PREDICTED];
     if let Ok(network) = Network::parse(memory.bytes()) {

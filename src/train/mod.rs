@@ -7,6 +7,7 @@
 //! | [`samples`] | what the exact step does, seen by each vertex in its frame |
 //! | `noise` | the same of rough motion, with targets that lead back |
 //! | [`fit`] | the network on burn, its losses, checkpoints |
+//! | [`int8`] | the same network in eight bits |
 //! | [`damper`] | the network that damps rough motion, by roll-outs |
 //!
 //! Same recipe, seed, number of threads and processor, same weights.
@@ -14,6 +15,7 @@
 pub mod damper;
 mod error;
 pub mod fit;
+pub mod int8;
 mod noise;
 pub mod recipe;
 pub mod samples;

@@ -14,6 +14,8 @@ mod loads;
 mod network;
 mod picture;
 mod prepare;
+#[cfg(feature = "train")]
+mod quantise;
 mod report;
 mod run;
 mod scene_file;

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use supple::inertia::Damper;
-use supple::mlp::{Activation, ForceInput, Layer, MAGIC, Network, Range, hexadecimal};
+use supple::mlp::{
+    Activation, ForceInput, Int8, Layer, MAGIC, Network, Numbers, Outputs, Range, hexadecimal,
+};
 use supple::surrogate::{FEATURES, PREDICTED, Surrogate, Vertex};
 
 use crate::inspect::row;
@@ -81,8 +83,8 @@ pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
     row("damping", format!("{} 1/s", recipe.damping));
 
     println!(
-        "\n{:<21} {:>7} {:>8}  {:<16} {:>14} {:>9}",
-        "layer", "inputs", "outputs", "activation", "multiply-adds", "bytes"
+        "\n{:<21} {:>7} {:>8}  {:<16} {:<9} {:>14} {:>9}",
+        "layer", "inputs", "outputs", "activation", "precision", "multiply-adds", "bytes"
     );
     let (first, second) = network.layers();
     for (part, layers) in [("first", first), ("second", second)] {
@@ -128,13 +130,26 @@ pub(crate) fn describe_tissue(network: &Network<'_>) -> String {
 }
 
 fn layer_row(name: &str, layer: &Layer<'_>) -> String {
-    let Layer { inputs, outputs, activation, weights, biases } = layer;
+    let Layer { inputs, outputs, activation, numbers } = layer;
     let activation = match activation {
         Activation::Linear => "none".into(),
         Activation::LeakyRelu { slope } => format!("leaky ReLU {slope}"),
     };
-    let bytes = size_of_val(*weights) + size_of_val(*biases);
-    format!("{name:<21} {inputs:>7} {outputs:>8}  {activation:<16} {:>14} {bytes:>9}", inputs * outputs)
+    let (precision, bytes) = match numbers {
+        Numbers::Float { weights, biases } => ("float32", size_of_val(*weights) + size_of_val(*biases)),
+        Numbers::Int8(Int8 { quantise, weights, biases, outputs }) => {
+            let tables = match outputs {
+                Outputs::Requantised(by) => size_of_val(*by),
+                Outputs::Float(scales) => size_of_val(*scales),
+            };
+            let quantise = quantise.map_or(0, size_of_val);
+            ("int8", quantise + size_of_val(*weights) + size_of_val(*biases) + tables)
+        }
+    };
+    let multiply_adds = layer.multiply_adds();
+    format!(
+        "{name:<21} {inputs:>7} {outputs:>8}  {activation:<16} {precision:<9} {multiply_adds:>14} {bytes:>9}"
+    )
 }
 
 /// Prints a table of ranges; what has no name in `quantities` has a number and no unit.

@@ -10,6 +10,7 @@ use supple::io::write_atomically;
 use supple::train::damper;
 use supple::train::fit::{Fitted, Progress, train as fit};
 
+use crate::quantise::quantise_beside;
 use crate::scene_file::Problem;
 use crate::simulate::End;
 
@@ -67,10 +68,11 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
         );
     }
     println!("weights     {} ({} bytes)", out.display(), bytes.len());
+    quantise_beside(out, &bytes)?;
     Ok(End::Reached)
 }
 
-fn keep(out: &Path, bytes: &[u8]) -> Result<(), Problem> {
+pub(crate) fn keep(out: &Path, bytes: &[u8]) -> Result<(), Problem> {
     write_atomically(out, |file| file.write_all(bytes)).map_err(|error| Problem(error.to_string()))
 }
 

@@ -20,6 +20,9 @@ pub(crate) enum Conversion {
         #[arg(long)]
         out: PathBuf,
     },
+    /// A weight file with layers of eight bits from a float32 one, by the samples of its recipe
+    #[cfg(feature = "train")]
+    Quantise(crate::quantise::Asked),
     /// A weight file from safetensors with the tensors and metadata of an export
     Import {
         /// The safetensors file
@@ -32,10 +35,14 @@ pub(crate) enum Conversion {
 
 pub(crate) fn convert(conversion: &Conversion) -> Result<End, Problem> {
     let (from, out) = match conversion {
+        #[cfg(feature = "train")]
+        Conversion::Quantise(asked) => return crate::quantise::quantise(asked),
         Conversion::Export { weights, out } => (weights, out),
         Conversion::Import { safetensors, out } => (safetensors, out),
     };
     let written = match conversion {
+        #[cfg(feature = "train")]
+        Conversion::Quantise(_) => return Ok(End::Reached),
         Conversion::Export { .. } => {
             let memory = read(from)?;
             to_safetensors(&parse(from, &memory)?)

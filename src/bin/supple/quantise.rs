@@ -1,0 +1,99 @@
+//! `supple weights quantise`, and what `supple train` does after a training: a network's layers in eight bits, with the errors that
+//! each of them and all together make.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use supple::mlp::quantise::Span;
+use supple::mlp::{Layer, Network, WeightBytes};
+use supple::train::int8::{Made, int8, usual_float_layers};
+use supple::train::recipe::Recipe;
+use supple::train::samples::Samples;
+
+use crate::scene_file::Problem;
+use crate::simulate::End;
+use crate::train::keep;
+use crate::weights;
+
+#[derive(Args)]
+pub(crate) struct Asked {
+    /// The weight file, of a learned step and all in float32
+    weights: PathBuf,
+    /// The weight file to write; one that is there is replaced
+    #[arg(long)]
+    out: PathBuf,
+    /// Layer that stays in float32, counted from 0 through both parts; may be repeated; the first and last of each part unless given
+    #[arg(long = "float", value_name = "LAYER")]
+    float: Vec<usize>,
+}
+
+pub(crate) fn quantise(asked: &Asked) -> Result<End, Problem> {
+    let Asked { weights: path, out, float } = asked;
+    quantise_to(path, &weights::read(path)?, float, out)?;
+    Ok(End::Reached)
+}
+
+/// The same of a network that has just been trained: `NAME-i8.weights` beside `NAME.weights`.
+pub(crate) fn quantise_beside(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
+    let mut name = path.file_stem().unwrap_or_default().to_os_string();
+    name.push("-i8.weights");
+    quantise_to(path, &WeightBytes::of(bytes), &[], &path.with_file_name(name))
+}
+
+fn quantise_to(path: &Path, memory: &WeightBytes, float: &[usize], out: &Path) -> Result<(), Problem> {
+    let network = weights::parse(path, memory)?;
+    let problem = |error: &dyn std::fmt::Display| Problem(format!("{}: {error}", path.display()));
+    let recipe = Recipe::parse(network.recipe().text).map_err(|error| problem(&error))?;
+    let (first, second) = network.layers();
+    let count = first.len() + second.len();
+    if let Some(layer) = float.iter().find(|&&layer| layer >= count) {
+        return Err(Problem(format!("{}: --float {layer}, but there are {count} layers", path.display())));
+    }
+    eprintln!("simulating the motion it learned from ...");
+    let samples = Samples::collect(&recipe).map_err(|error| problem(&error))?;
+    let float = if float.is_empty() { usual_float_layers(&network) } else { float.to_vec() };
+    let made = int8(&network, &recipe, &samples, &float).map_err(|error| problem(&error))?;
+    tell(&made, out)
+}
+
+/// Writes the file and says how good it is.
+fn tell(made: &Made, out: &Path) -> Result<(), Problem> {
+    keep(out, &made.bytes)?;
+    let memory = WeightBytes::of(&made.bytes);
+    let network = Network::parse(memory.bytes()).map_err(|error| Problem(error.to_string()))?;
+    let Made { tried, best, float, bytes } = made;
+    println!(
+        "\nin eight bits           error held out, of the standard deviation along tangent, normal, binormal"
+    );
+    let row =
+        |name: &str, [t, n, b]: [f64; 3], kept: &str| println!("{name:<22}  {t:.4} {n:.4} {b:.4}{kept}");
+    row("float32", *float, "");
+    for (at, tried) in tried.iter().enumerate() {
+        let span = match tried.span {
+            Span::Whole => "whole range",
+            Span::LeastSquares => "least squares",
+        };
+        let name = format!("{span}{}", if tried.rough { ", rough" } else { "" });
+        row(&name, tried.held_out, if at == *best { "  (kept)" } else { "" });
+    }
+    let (first, second) = network.layers();
+    let layers: Vec<(String, &Layer<'_>)> = [("first", first), ("second", second)]
+        .into_iter()
+        .flat_map(|(part, layers)| {
+            layers.iter().enumerate().map(move |(at, layer)| (format!("{part} {at}"), layer))
+        })
+        .collect();
+    println!("\nlayer     precision  multiply-adds   error of what it hands on, of its standard deviation");
+    for ((name, layer), error) in layers.iter().zip(&tried[*best].layers) {
+        let precision = if layer.is_int8() { "int8" } else { "float32" };
+        println!("{name:<9} {precision:<9} {:>14}   {error:.4}", layer.multiply_adds());
+    }
+    let of_int8 = layers.iter().filter(|(_, layer)| layer.is_int8()).map(|(_, layer)| layer.multiply_adds());
+    let share = 100.0 * of_int8.sum::<usize>() as f64 / network.multiply_adds() as f64;
+    println!(
+        "weights   {} ({} bytes), {share:.1} % of the multiply-adds in eight bits",
+        out.display(),
+        bytes.len()
+    );
+    Ok(())
+}
