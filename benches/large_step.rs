@@ -6,18 +6,15 @@
 mod common {
     pub(crate) mod bar;
     pub(crate) mod pairs;
+    pub(crate) mod scaled;
 }
 
-use common::bar::{self, BarScene, DAMPING, DT, moved, state};
+use common::bar::{self, DAMPING, DT, moved, state};
 use common::pairs::{median, seconds};
+use common::scaled::{DAMPED_LATTICE, LATTICE, scaled};
 use criterion::{BenchmarkId, Criterion, Throughput};
-use supple::inertia::{
-    self, Damper, Inertia, LatticeNode, damped_numbers_for, damped_step, damped_vectors_for,
-};
 use supple::loads::Loads;
 use supple::material::Exponential;
-use supple::mlp::Network;
-use supple::state::NodeVector;
 use supple::tled::{self, Step};
 
 /// How many times longer than the exact one the steps of the scaled methods are, with the steps of their refresh cycles.
@@ -25,53 +22,7 @@ const MULTIPLE: f32 = 20.0;
 const CYCLE: u32 = 64;
 const LONGEST: f32 = 100.0;
 const SHORT_CYCLE: u32 = 16;
-const LATTICE: [u32; 3] = [2, 2, 4];
-const DAMPED_LATTICE: [u32; 3] = [2, 2, 5];
 const PAIRS: usize = 41;
-
-/// A network as it would lie in flash.
-#[repr(C, align(64))]
-struct Flash<B: ?Sized>(B);
-static DAMPER: &Flash<[u8]> = &Flash(*include_bytes!("../weights/damper.weights"));
-
-/// A step with the given lattice, from a state that it has deformed.
-fn scaled<'a>(
-    scene: &'a BarScene<Exponential>,
-    loads: &'a Loads<'a>,
-    points: &[[f32; 3]],
-    multiple: f32,
-    (cells, damped): ([u32; 3], bool),
-    cycle: u32,
-) -> impl FnMut() + 'a {
-    let nodes = points.len();
-    let functions = if cells == [0; 3] {
-        0
-    } else {
-        inertia::lattice_functions(scene, points, cells).expect("the lattice fits")
-    };
-    let mut state = state(nodes);
-    let mut inertia = Inertia::over(
-        vec![NodeVector::ZERO; damped_vectors_for(nodes)],
-        vec![LatticeNode::EMPTY; nodes],
-        vec![0.0; damped_numbers_for(cells, functions)],
-    );
-    let step = Step::insist(multiple * DT, DAMPING).expect("a positive step");
-    let damper = damped.then(|| {
-        let network = Network::parse(&DAMPER.0).expect("a weight file of the crate");
-        Damper::over(network).expect("a damper")
-    });
-    if damped {
-        inertia = inertia.damped();
-    }
-    inertia.prepare(scene, points, &mut state, step, cells).expect("the bar can be prepared");
-    assert_eq!(inertia.cycle(), cycle);
-    let mut run = move || {
-        moved(damped_step(scene, loads, &mut state, &mut inertia, damper.as_ref()));
-    };
-    // Whole cycles.
-    (0..8 * cycle).for_each(|_| run());
-    run
-}
 
 /// Median time of each step of a cycle over their mean; the first is the step that the cycle stands at.
 fn phases(run: &mut impl FnMut()) -> Vec<f64> {

@@ -1,0 +1,100 @@
+//! The hot loops, for counting their instructions: `instructions LOOP TIMES` runs one of them so often. The difference
+//! between two numbers of times is the loop's alone. Counts do not depend on how busy the machine is, so that they can guard
+//! against a loop that has become slower (`tools/instructions.sh`).
+
+mod common {
+    pub(crate) mod bar;
+    pub(crate) mod scaled;
+}
+
+use std::hint::black_box;
+use std::process::ExitCode;
+
+use common::bar::{self, DAMPING, DT, moved};
+use common::scaled::{DAMPED_LATTICE, LATTICE, scaled};
+use supple::lanes::Level;
+use supple::loads::Loads;
+use supple::material::{Exponential, Law, NeoHookean};
+use supple::mlp::{Network, WeightBytes};
+use supple::surrogate::{self, Surrogate, Vertex};
+use supple::tled::{self, Step};
+
+const EXPONENTIAL: Exponential = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
+const COMPACT: &[u8] = include_bytes!("../weights/compact-10.weights");
+/// Small, with layers of eight bits.
+const INT8: &[u8] = include_bytes!("../tests/data/golden-v2.weights");
+const ROWS: usize = 1458;
+
+fn exact<L: Law>(law: L, times: u32) {
+    let scene = bar::scene(law);
+    let forces = bar::forces();
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
+    let mut state = bar::state(scene.node_count());
+    let step = Step::insist(DT, DAMPING).expect("a positive step");
+    (0..times).for_each(|_| moved(tled::step(&scene, &loads, &mut state, &step)));
+}
+
+/// A whole cycle of refreshes each time.
+fn large(cells: [u32; 3], damped: bool, times: u32) {
+    const CYCLE: u32 = 64;
+    let (points, forces, scene) = (bar::points(), bar::forces(), bar::scene(EXPONENTIAL));
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
+    let mut run = scaled(&scene, &loads, &points, 20.0, (cells, damped), CYCLE);
+    (0..CYCLE * times).for_each(|_| run());
+}
+
+fn forward(bytes: &[u8], times: u32) {
+    let bytes = WeightBytes::of(bytes);
+    let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
+    let ranges = network.inputs();
+    let inputs: Vec<f32> = (0..ROWS * ranges.len())
+        .map(|at| {
+            let range = ranges[at % ranges.len()];
+            range.least + (range.most - range.least) * ((at * 7919 % 1009) as f32 / 1009.0)
+        })
+        .collect();
+    let mut outputs = vec![0.0; ROWS * network.outputs().len()];
+    (0..times).for_each(|_| network.predict_rows(black_box(&inputs), &mut outputs));
+}
+
+fn learned(times: u32) {
+    let bytes = WeightBytes::of(COMPACT);
+    let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
+    let (scene, forces) = (bar::scene(EXPONENTIAL), bar::forces());
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
+    let (mut state, vertices) = (bar::state(scene.node_count()), vec![Vertex::NEW; scene.node_count()]);
+    let mut surrogate = Surrogate::over(network, vertices).expect("a network of the learned step");
+    (0..times).for_each(|_| moved(surrogate::step(&scene, &loads, &mut state, &mut surrogate)));
+}
+
+fn main() -> ExitCode {
+    // Emulators know these, and every processor that is worth guarding has them.
+    if !Level::force(Level::Avx2) {
+        eprintln!("this processor lacks AVX2, for which the counts are kept");
+        return ExitCode::FAILURE;
+    }
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let [name, times] = arguments.as_slice() else {
+        println!("exponential neo-hookean mass-scaled multilevel damped compact int8 learned");
+        return ExitCode::SUCCESS;
+    };
+    let Ok(times) = times.parse() else {
+        eprintln!("{times} is not a number of times");
+        return ExitCode::FAILURE;
+    };
+    match name.as_str() {
+        "exponential" => exact(EXPONENTIAL, times),
+        "neo-hookean" => exact(NeoHookean { c: 500.0, d: 15_000.0 }, times),
+        "mass-scaled" => large([0; 3], false, times),
+        "multilevel" => large(LATTICE, false, times),
+        "damped" => large(DAMPED_LATTICE, true, times),
+        "compact" => forward(COMPACT, times),
+        "int8" => forward(INT8, times),
+        "learned" => learned(times),
+        _ => {
+            eprintln!("there is no loop {name}");
+            return ExitCode::FAILURE;
+        }
+    }
+    ExitCode::SUCCESS
+}
