@@ -16,7 +16,7 @@ use criterion::{BenchmarkId, Criterion, Throughput};
 use std::hint::black_box;
 use supple::loads::Loads;
 use supple::material::Exponential;
-use supple::mlp::quantise::{Plan, Span, quantise};
+use supple::mlp::quantise::quantise;
 use supple::mlp::{Description, LayerDescription, Network, WeightBytes, write, write_int8};
 use supple::surrogate::{self, Surrogate, Vertex};
 use supple::tled::{self, Step};
@@ -72,8 +72,7 @@ fn eight_bits(network: &Network<'_>) -> WeightBytes {
     let (first, second) = network.layers();
     let (split, count) = (first.len(), first.len() + second.len());
     let float = [0, split - 1, split, count - 1];
-    let plan = Plan { float: &float, span: Span::Whole };
-    let quantised = quantise(network, &vertices(network), plan).expect("a float32 network");
+    let quantised = quantise(network, &vertices(network), &float).expect("a float32 network");
     let bytes = write_int8(&Description::of(network), &quantised.layers).expect("a sound network");
     WeightBytes::of(&bytes)
 }

@@ -1,8 +1,9 @@
 //! Networks in eight bits from networks in float32, by what passes through them on samples of their inputs (post-training
 //! quantisation, Jacob et al. 2018, Nagel et al. 2021).
 //!
-//! Layer by layer the samples go through both networks at once. An activation `x` of channel `c` is `a_c (q - z_c)`, with the range
-//! that the samples have there; a weight is `s_o w` over the activation it meets:
+//! All samples go through the float32 network to find the range of every activation: forces have heavy tails, and what a few thousand
+//! samples leave out would be cut off. Layer by layer some of the samples then go through both networks at once. An activation `x` of
+//! channel `c` is `a_c (q - z_c)` and covers its range; a weight is `s_o w` over the activation it meets:
 //!
 //! ```text
 //! sum_c W_oc x_c + b_o = s_o (sum_c w_oc q_c + B_o),   w_oc = round(W_oc a_c / s_o),   s_o = max_c |W_oc a_c| / 127
@@ -11,6 +12,7 @@
 //! to it is taken back (bias correction).
 
 use core::fmt;
+use std::vec;
 use std::vec::Vec;
 
 use super::int8::Quantise;
@@ -20,26 +22,8 @@ use super::{
 
 /// Least factor of positive sums: below, the slope of negative ones would be rounded too much.
 const FACTOR: f64 = 2048.0;
-/// Shares of the samples' range that are tried for each channel.
-const SHARES: [f64; 12] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.05];
-
-/// What the steps of an activation cover.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub enum Span {
-    /// All that the samples have.
-    Whole,
-    /// The part of it that leaves the least mean square error, of rounding and of what is cut off together.
-    LeastSquares,
-}
-
-/// How to quantise.
-#[derive(Clone, Copy, Debug)]
-pub struct Plan<'a> {
-    /// Layers that stay in float32, of both parts together.
-    pub float: &'a [usize],
-    /// Of every activation.
-    pub span: Span,
-}
+/// Samples that the mean of each sum is taken over, at most; ranges are those of all.
+const MEANS: usize = 8_000;
 
 /// Why a network is not quantised.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,8 +92,12 @@ struct Step {
     zero: f64,
 }
 
-/// Quantises by samples, rows of as many numbers as the network has inputs, in their units.
-pub fn quantise(network: &Network<'_>, samples: &[f32], plan: Plan<'_>) -> Result<Quantised, QuantiseError> {
+/// Least and most number of a channel.
+type Range = [f64; 2];
+
+/// Quantises by samples, rows of as many numbers as the network has inputs, in their units. The layers of `float`, counted through
+/// both parts, stay in float32.
+pub fn quantise(network: &Network<'_>, samples: &[f32], float: &[usize]) -> Result<Quantised, QuantiseError> {
     let (first, second) = network.layers();
     if let Some(layer) = first.iter().chain(second).position(Layer::is_int8) {
         return Err(QuantiseError::Int8 { layer });
@@ -118,19 +106,22 @@ pub fn quantise(network: &Network<'_>, samples: &[f32], plan: Plan<'_>) -> Resul
     if samples.len() < wide {
         return Err(QuantiseError::NoSamples);
     }
+    let ranges = ranges(network, samples)?;
+    let every = (samples.len() / wide).div_ceil(MEANS).max(1);
     let scaled: Vec<f64> = samples
         .chunks_exact(wide)
+        .step_by(every)
         .flat_map(|row| row.iter().zip(network.inputs()).map(|(x, range)| f64::from(x / range.scale)))
         .collect();
     let mut quantised = Quantised { layers: Vec::new(), errors: Vec::new() };
     let start = Flow { width: wide, exact: scaled.clone(), found: scaled.clone(), words: None };
-    let predicted = part(first, start, plan, &mut quantised)?;
+    let predicted = part(first, start, float, &ranges, &mut quantised)?;
     if !second.is_empty() {
         // The correction sees what the quantised first part predicts.
         let rows = scaled.chunks_exact(wide).zip(predicted.found.chunks_exact(predicted.width));
         let both: Vec<f64> = rows.flat_map(|(x, p)| x.iter().chain(p).copied()).collect();
         let start = Flow { width: wide + predicted.width, exact: both.clone(), found: both, words: None };
-        part(second, start, plan, &mut quantised)?;
+        part(second, start, float, &ranges, &mut quantised)?;
     }
     Ok(quantised)
 }
@@ -138,13 +129,14 @@ pub fn quantise(network: &Network<'_>, samples: &[f32], plan: Plan<'_>) -> Resul
 fn part(
     layers: &[Layer<'_>],
     mut flow: Flow,
-    plan: Plan<'_>,
+    float: &[usize],
+    ranges: &[Vec<Range>],
     quantised: &mut Quantised,
 ) -> Result<Flow, QuantiseError> {
     let start = quantised.layers.len();
     for (at, layer) in layers.iter().enumerate() {
         let number = start + at;
-        let is_int8 = |at: usize| at < layers.len() && !plan.float.contains(&(start + at));
+        let is_int8 = |at: usize| at < layers.len() && !float.contains(&(start + at));
         if flow.found.iter().any(|number| !number.is_finite()) {
             return Err(QuantiseError::NotFinite { layer: number });
         }
@@ -155,7 +147,9 @@ fn part(
         let activated = exact.iter().map(|&sum| act(layer.activation, sum)).collect();
         let mut next = Flow { width: layer.outputs, exact: activated, found: Vec::new(), words: None };
         let described = if is_int8(at) {
-            Some(eight(layer, (weights, biases), &flow, &exact, is_int8(at + 1), plan.span, &mut next))
+            let seen = &ranges[number];
+            let to = is_int8(at + 1).then(|| ranges[number + 1].as_slice());
+            Some(eight(layer, (weights, biases), &flow, &exact, (seen, to), &mut next))
         } else {
             let sums = dense(weights, biases, &flow.found, flow.width);
             next.found = sums.into_iter().map(|sum| act(layer.activation, sum)).collect();
@@ -204,39 +198,53 @@ fn error(flow: &Flow) -> f64 {
     if of > 0.0 { (off / of).sqrt() } else { 0.0 }
 }
 
-/// The range of a channel's samples that its steps are to cover.
-fn range(samples: &[f64], wide: usize, channel: usize, span: Span) -> [f64; 2] {
-    let values = || column(samples, wide, channel);
-    let least = values().fold(f64::INFINITY, f64::min);
-    let most = values().fold(f64::NEG_INFINITY, f64::max);
-    // Each end drawn in towards the middle of the samples.
-    let middle = mean(values());
-    let ends = |[low, high]: [f64; 2]| [middle + low * (least - middle), middle + high * (most - middle)];
-    if span == Span::Whole {
-        return [least, most];
-    }
-    let cost = |shares: [f64; 2]| {
-        let [low, high] = ends(shares);
-        let cut = mean(values().map(|value| (value - value.clamp(low, high)).powi(2)));
-        cut + ((high - low) / 255.0).powi(2) / 12.0
-    };
-    let mut best = [1.0, 1.0];
-    for end in [0, 1, 0, 1] {
-        let with = |share: f64| {
-            let mut shares = best;
-            shares[end] = share;
-            shares
-        };
-        let tried = SHARES.map(|share| (cost(with(share)), share));
-        if let Some((_, share)) = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) {
-            best = with(share);
+/// Of what goes into each layer of the float32 network.
+fn ranges(network: &Network<'_>, samples: &[f32]) -> Result<Vec<Vec<Range>>, QuantiseError> {
+    let (first, second) = network.layers();
+    let wide = network.inputs().len();
+    let none = |layer: &Layer<'_>| vec![[f64::INFINITY, f64::NEG_INFINITY]; layer.inputs];
+    let mut ranges: Vec<Vec<Range>> = first.iter().chain(second).map(none).collect();
+    let columns: Vec<Vec<f32>> = first.iter().chain(second).map(by_inputs).collect();
+    let (mut row, mut next) = (Vec::new(), Vec::new());
+    for sample in samples.chunks_exact(wide) {
+        let scaled = || sample.iter().zip(network.inputs()).map(|(x, range)| x / range.scale);
+        row.clear();
+        row.extend(scaled());
+        for (at, layer) in first.iter().chain(second).enumerate() {
+            if at == first.len() {
+                row.splice(0..0, scaled());
+            }
+            if row.iter().any(|x| !x.is_finite()) {
+                return Err(QuantiseError::NotFinite { layer: at });
+            }
+            for (range, &x) in ranges[at].iter_mut().zip(&row) {
+                *range = [range[0].min(x.into()), range[1].max(x.into())];
+            }
+            let Numbers::Float { biases, .. } = layer.numbers else { continue };
+            next.clear();
+            next.extend_from_slice(biases);
+            for (weights, &x) in columns[at].chunks_exact(layer.outputs).zip(&row) {
+                for (sum, weight) in next.iter_mut().zip(weights) {
+                    *sum += weight * x;
+                }
+            }
+            for sum in &mut next {
+                *sum = sum.max(layer.activation.slope() * *sum);
+            }
+            core::mem::swap(&mut row, &mut next);
         }
     }
-    ends(best)
+    Ok(ranges)
+}
+
+/// Weights input by input: sums of many outputs side by side are quicker, and all samples pass here.
+fn by_inputs(layer: &Layer<'_>) -> Vec<f32> {
+    let Numbers::Float { weights, .. } = layer.numbers else { return Vec::new() };
+    (0..layer.inputs).flat_map(|input| weights.iter().skip(input).step_by(layer.inputs)).copied().collect()
 }
 
 /// A channel that never varies has a step all the same.
-fn size([low, high]: [f64; 2]) -> f64 {
+fn size([low, high]: Range) -> f64 {
     ((high - low) / 255.0).max(1e-6 * low.abs().max(high.abs())).max(1e-12)
 }
 
@@ -251,8 +259,7 @@ fn eight(
     (weights, biases): (&[f32], &[f32]),
     flow: &Flow,
     exact: &[f64],
-    before_int8: bool,
-    span: Span,
+    (seen, to): (&[Range], Option<&[Range]>),
     next: &mut Flow,
 ) -> Int8Description {
     let (wide, high) = (layer.inputs, layer.outputs);
@@ -260,7 +267,7 @@ fn eight(
     let (words, steps) = match &flow.words {
         Some((words, steps)) => (words.clone(), steps.clone()),
         None => {
-            let (table, words, steps) = from_floats(&flow.found, wide, span);
+            let (table, words, steps) = from_floats(&flow.found, seen);
             quantise = Some(table);
             (words, steps)
         }
@@ -299,8 +306,8 @@ fn eight(
             *sum = sum.saturating_add(*bias);
         }
     }
-    let (outputs, biases) = if before_int8 {
-        to_words(layer.activation, &sums, &scales, wholes, span, next)
+    let (outputs, biases) = if let Some(ranges) = to {
+        to_words(layer.activation, &sums, &scales, wholes, ranges, next)
     } else {
         let scales: Vec<f32> = scales.iter().map(|&scale| scale as f32).collect();
         next.found = sums
@@ -314,17 +321,17 @@ fn eight(
 }
 
 /// Float32 inputs as activations.
-fn from_floats(found: &[f64], wide: usize, span: Span) -> (Vec<Quantise>, Vec<u8>, Vec<Step>) {
-    let mut table = Vec::with_capacity(wide);
-    for channel in 0..wide {
-        let range = range(found, wide, channel, span);
-        let inverse = (1.0 / size(range)) as f32;
-        table.push(Quantise { inverse, zero: short(-range[0] * f64::from(inverse)).into() });
-    }
-    let words = found.chunks_exact(wide).flat_map(|row| row.iter().zip(&table)).map(|(&x, by)| {
-        let clamped = (x as f32 * by.inverse).clamp(-by.zero, 255.0 - by.zero);
-        (f64::from(clamped) + f64::from(by.zero)).round_ties_even() as u8
-    });
+fn from_floats(found: &[f64], ranges: &[Range]) -> (Vec<Quantise>, Vec<u8>, Vec<Step>) {
+    let entry = |range: &Range| {
+        let inverse = (1.0 / size(*range)) as f32;
+        Quantise { inverse, zero: short(-range[0] * f64::from(inverse)).into() }
+    };
+    let table: Vec<Quantise> = ranges.iter().map(entry).collect();
+    let words =
+        found.chunks_exact(table.len().max(1)).flat_map(|row| row.iter().zip(&table)).map(|(&x, by)| {
+            let clamped = (x as f32 * by.inverse).clamp(-by.zero, 255.0 - by.zero);
+            (f64::from(clamped) + f64::from(by.zero)).round_ties_even() as u8
+        });
     let words = words.collect();
     let step = |by: &Quantise| Step { size: 1.0 / f64::from(by.inverse), zero: by.zero.into() };
     let steps = table.iter().map(step).collect();
@@ -337,20 +344,15 @@ fn to_words(
     sums: &[i32],
     scales: &[f64],
     mut biases: Vec<i32>,
-    span: Span,
+    ranges: &[Range],
     next: &mut Flow,
 ) -> (OutputsDescription, Vec<i32>) {
     let high = scales.len();
     let slope = f64::from(activation.slope());
-    let values: Vec<f64> = sums
-        .chunks_exact(high)
-        .flat_map(|row| row.iter().zip(scales).map(|(&sum, scale)| act(activation, f64::from(sum) * scale)))
-        .collect();
     let (mut table, mut steps) = (Vec::with_capacity(high), Vec::with_capacity(high));
-    for (output, (&scale, bias)) in scales.iter().zip(&mut biases).enumerate() {
-        let range = range(&values, high, output, span);
+    for (output, ((&scale, bias), range)) in scales.iter().zip(&mut biases).zip(ranges).enumerate() {
         // Steps that one unit of the sum is.
-        let ratio = scale / size(range);
+        let ratio = scale / size(*range);
         // What is kept of the sums must not be cut off where the samples are.
         let reach = sums.iter().skip(output).step_by(high).fold(0, |most, sum| sum.abs().max(most));
         let mut shift = 0;

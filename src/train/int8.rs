@@ -1,5 +1,5 @@
-//! Eight bits after the training: a network is quantised by the samples it was trained on, in a few ways, and the way is kept
-//! that is nearest to the exact motion on frames it has not seen.
+//! Eight bits after the training: a network is quantised by the samples it was trained on, those of rough motion aside: their forces are
+//! a hundred times as wide, and steps that cover them are too coarse. It is judged on frames it has not seen.
 
 use std::format;
 use std::vec::Vec;
@@ -8,37 +8,21 @@ use super::TrainError;
 use super::fit::{is_held_out, judged};
 use super::recipe::Recipe;
 use super::samples::Samples;
-use crate::mlp::quantise::{Plan, Span, quantise};
+use crate::mlp::quantise::quantise;
 use crate::mlp::{self, Description, Network};
 use crate::surrogate::PREDICTED;
 
-/// Samples that a network is quantised by, at most.
-const SAMPLES: usize = 8_000;
-
-/// A way that was tried.
-#[derive(Clone, Debug)]
-pub struct Tried {
-    /// What the steps of activations cover.
-    pub span: Span,
-    /// Whether samples of rough motion were among those it was quantised by.
-    pub rough: bool,
-    /// Root mean square error on the frames held out, in standard deviations of each target.
-    pub held_out: [f64; PREDICTED],
-    /// Of each layer, see [`mlp::quantise::Quantised::errors`].
-    pub layers: Vec<f64>,
-}
-
-/// What came of it.
+/// What came of it. Errors are root mean squares on the frames held out, in standard deviations of each target.
 #[derive(Clone, Debug)]
 pub struct Made {
     /// The weight file.
     pub bytes: Vec<u8>,
-    /// All ways, in the order of trial.
-    pub tried: Vec<Tried>,
-    /// Which of them the file is.
-    pub best: usize,
-    /// The float32 network's error on the same frames.
+    /// Its error.
+    pub held_out: [f64; PREDICTED],
+    /// The float32 network's.
     pub float: [f64; PREDICTED],
+    /// Of each layer, see [`mlp::quantise::Quantised::errors`].
+    pub layers: Vec<f64>,
 }
 
 /// Layers that stay in float32 if nobody says otherwise: the first of each part, which sees inputs of a wide range, and the last,
@@ -55,12 +39,6 @@ pub fn usual_float_layers(network: &Network<'_>) -> Vec<usize> {
     float
 }
 
-/// Every so many, so that no more than [`SAMPLES`] are left.
-fn thinned<const N: usize>(rows: &[[f32; N]]) -> Vec<f32> {
-    let every = rows.len().div_ceil(SAMPLES).max(1);
-    rows.iter().step_by(every).flatten().copied().collect()
-}
-
 /// Quantises a network that was trained by this recipe on these samples. Without frames held out, it is judged by those of the training.
 pub fn int8(
     network: &Network<'_>,
@@ -74,28 +52,11 @@ pub fn int8(
     if unseen.inputs.is_empty() {
         unseen = seen.clone();
     }
-    let (smooth, rough) = (thinned(&seen.inputs), thinned(&seen.rough.inputs));
-    let both = [smooth.clone(), rough.clone()].concat();
+    let quantised = quantise(network, seen.inputs.as_flattened(), float)
+        .map_err(|error| TrainError::Quantise(format!("{error}")))?;
     let description = Description::of(network);
+    let bytes = mlp::write_int8(&description, &quantised.layers)?;
     let judge = |bytes: &[u8]| judged(bytes, &unseen, &description.outputs);
-    let mut made =
-        Made { bytes: Vec::new(), tried: Vec::new(), best: 0, float: judge(&mlp::write(&description)?) };
-    let total = |error: [f64; PREDICTED]| error.iter().map(|error| error * error).sum::<f64>();
-    for span in [Span::Whole, Span::LeastSquares] {
-        for (with_rough, rows) in [(false, &smooth), (true, &both)] {
-            if with_rough && rough.is_empty() {
-                continue;
-            }
-            let quantised = quantise(network, rows, Plan { float, span })
-                .map_err(|error| TrainError::Quantise(format!("{error}")))?;
-            let bytes = mlp::write_int8(&description, &quantised.layers)?;
-            let tried = Tried { span, rough: with_rough, held_out: judge(&bytes), layers: quantised.errors };
-            let best = made.tried.get(made.best).map_or(f64::INFINITY, |best| total(best.held_out));
-            if total(tried.held_out) < best {
-                (made.best, made.bytes) = (made.tried.len(), bytes);
-            }
-            made.tried.push(tried);
-        }
-    }
-    Ok(made)
+    let (held_out, float) = (judge(&bytes), judge(&mlp::write(&description)?));
+    Ok(Made { bytes, held_out, float, layers: quantised.errors })
 }

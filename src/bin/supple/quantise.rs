@@ -4,7 +4,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use supple::mlp::quantise::Span;
 use supple::mlp::{Layer, Network, WeightBytes};
 use supple::train::int8::{Made, int8, usual_float_layers};
 use supple::train::recipe::Recipe;
@@ -61,20 +60,12 @@ fn tell(made: &Made, out: &Path) -> Result<(), Problem> {
     keep(out, &made.bytes)?;
     let memory = WeightBytes::of(&made.bytes);
     let network = Network::parse(memory.bytes()).map_err(|error| Problem(error.to_string()))?;
-    let Made { tried, best, float, bytes } = made;
+    let Made { bytes, held_out, float, layers: errors } = made;
     println!(
         "\nin eight bits           error held out, of the standard deviation along tangent, normal, binormal"
     );
-    let row =
-        |name: &str, [t, n, b]: [f64; 3], kept: &str| println!("{name:<22}  {t:.4} {n:.4} {b:.4}{kept}");
-    row("float32", *float, "");
-    for (at, tried) in tried.iter().enumerate() {
-        let span = match tried.span {
-            Span::Whole => "whole range",
-            Span::LeastSquares => "least squares",
-        };
-        let name = format!("{span}{}", if tried.rough { ", rough" } else { "" });
-        row(&name, tried.held_out, if at == *best { "  (kept)" } else { "" });
+    for (name, [t, n, b]) in [("float32", float), ("int8", held_out)] {
+        println!("{name:<22}  {t:.4} {n:.4} {b:.4}");
     }
     let (first, second) = network.layers();
     let layers: Vec<(String, &Layer<'_>)> = [("first", first), ("second", second)]
@@ -84,7 +75,7 @@ fn tell(made: &Made, out: &Path) -> Result<(), Problem> {
         })
         .collect();
     println!("\nlayer     precision  multiply-adds   error of what it hands on, of its standard deviation");
-    for ((name, layer), error) in layers.iter().zip(&tried[*best].layers) {
+    for ((name, layer), error) in layers.iter().zip(errors) {
         let precision = if layer.is_int8() { "int8" } else { "float32" };
         println!("{name:<9} {precision:<9} {:>14}   {error:.4}", layer.multiply_adds());
     }
