@@ -4,6 +4,7 @@
 extern crate std;
 use std::println;
 
+use super::int8::{Requantise, Whole};
 use super::{Kernel, Level, Real, dispatch};
 
 const NUMBERS: [f32; 16] = [
@@ -87,4 +88,68 @@ fn operations_are_those_of_single_numbers() {
     let checked = dispatch(Operations);
     println!("{:?}: {checked} results", Level::current());
     assert!(checked > 1000);
+}
+
+/// Whole numbers, for activations and weights of every size, held against plain loops.
+struct WholeNumbers;
+
+impl Kernel for WholeNumbers {
+    type Output = usize;
+
+    fn run<R: Real>(self) -> usize {
+        let mut seed = 5u32;
+        let mut next = move || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            seed >> 8
+        };
+        let mut checked = 0;
+        for round in 0..2_000 {
+            // Bytes come in as what floats consist of, sums as they are computed.
+            let mut bytes = [[0u32; 16]; 4];
+            bytes
+                .as_flattened_mut()
+                .fill_with(|| if round % 5 == 0 { 255 * (next() % 2) } else { next() % 256 });
+            let words = R::Whole::low_bytes(
+                bytes.map(|bytes| R::from_fn(|lane| f32::from_bits(0x4b40_0000 | bytes[lane]))),
+            );
+            let biases = [(); 4].map(|()| (next() << 8 ^ next()) as i32 >> (next() % 28 + 1));
+            let weights = [[(); 4]; 4].map(|four| {
+                four.map(|()| if round % 7 == 0 { [-128, 127][next() as usize % 2] } else { next() as i8 })
+            });
+            let by = [(); 4].map(|()| {
+                let positive = (next() % 32_768) as i16;
+                let negative = (next() % (positive as u32 + 1)) as i16;
+                Requantise { positive, negative, zero: next() as i16, shift: (next() % 31) as i16 }
+            });
+            let sums = [0, 1, 2, 3].map(|output| R::Whole::splat(biases[output]).dot(words, weights[output]));
+            let results = R::Whole::requantise(sums, &by);
+            // What a byte is shows once it is multiplied by one.
+            let picked = [0, 1, 2, 3].map(|place| {
+                let mut one = [0; 4];
+                one[place] = 1;
+                R::Whole::splat(0).dot(results, one).numbers()
+            });
+            for lane in 0..R::COUNT {
+                for output in 0..4 {
+                    let products = bytes
+                        .iter()
+                        .zip(weights[output])
+                        .map(|(bytes, weight)| bytes[lane] as i32 * i32::from(weight));
+                    let sum = biases[output] + products.sum::<i32>();
+                    assert_eq!(sums[output].numbers().lane(lane), sum as f32, "sum {output} in lane {lane}");
+                    let byte = by[output].apply(sum);
+                    assert_eq!(picked[output].lane(lane), f32::from(byte), "{sum} by {:?}", by[output]);
+                    checked += 1;
+                }
+            }
+        }
+        checked
+    }
+}
+
+#[test]
+fn whole_numbers_are_those_of_plain_loops() {
+    let checked = dispatch(WholeNumbers);
+    println!("{:?}: {checked} results", Level::current());
+    assert!(checked > 10_000);
 }

@@ -15,6 +15,10 @@ pub mod int8;
 mod int8_avx2;
 #[cfg(target_arch = "x86_64")]
 mod int8_avx512;
+#[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
+mod int8_neon;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod int8_simd128;
 mod level;
 #[cfg(test)]
 mod level_tests;

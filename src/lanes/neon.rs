@@ -16,12 +16,13 @@ use core::arch::aarch64::{
 use core::ops::{Add, Mul, Neg, Sub};
 
 use super::functions::Bits;
+use super::int8_neon::Bytes16;
 use super::{Pair, Real};
 
 /// See the module.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub(super) struct Neon(float32x4_t);
+pub(super) struct Neon(pub(super) float32x4_t);
 
 impl Neon {
     #[inline(always)]
@@ -64,6 +65,7 @@ impl Real for Neon {
     const COUNT: usize = 4;
     const MANY_REGISTERS: bool = true;
     type Eight = Pair<Self>;
+    type Whole = Bytes16;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {

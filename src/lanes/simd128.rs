@@ -11,12 +11,13 @@ use core::arch::wasm32::{
 use core::ops::{Add, Mul, Neg, Sub};
 
 use super::functions::Bits;
+use super::int8_simd128::Bytes16;
 use super::{Pair, Real};
 
 /// See the module.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
-pub(super) struct Simd128(v128);
+pub(super) struct Simd128(pub(super) v128);
 
 impl Simd128 {
     #[inline(always)]
@@ -56,6 +57,7 @@ impl Neg for Simd128 {
 impl Real for Simd128 {
     const COUNT: usize = 4;
     type Eight = Pair<Self>;
+    type Whole = Bytes16;
 
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {

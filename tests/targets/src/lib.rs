@@ -21,6 +21,8 @@ const FIXED: usize = 12;
 /// Cells of the lattice, and functions at their corners.
 const CELLS: [u32; 3] = [1, 1, 3];
 const FUNCTIONS: usize = 16;
+/// Vertices that go through a network: enough for activations all over their range.
+const ROWS: usize = 250;
 /// The exact step, s: a tenth of the network's.
 const SECONDS: f32 = 3e-5;
 
@@ -32,10 +34,16 @@ type State = FixedState<NODES>;
 struct Aligned<T: ?Sized>(T);
 
 static NETWORK: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/compact-10.weights"));
+static INT8: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden-v2.weights"));
 static DAMPER: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/damper.weights"));
 
 /// What is computed.
-pub const NAMES: [&str; 4] = ["exact", "damped", "network", "learned"];
+pub const NAMES: [&str; 5] = ["exact", "damped", "network", "learned", "int8"];
+
+/// Whether its sums may be fused: those of networks with layers of eight bits never are.
+pub fn may_fuse(what: usize) -> bool {
+    what != 4
+}
 
 /// Its checksum with the instructions of `level`; zero if it could not be computed.
 pub fn checksum(what: usize, level: Level) -> u32 {
@@ -45,8 +53,9 @@ pub fn checksum(what: usize, level: Level) -> u32 {
     let checksum = match what {
         0 => exact(2_000).map(|(_, state)| of_state(&state)),
         1 => damped(),
-        2 => network(),
-        _ => learned(),
+        2 => network(&NETWORK.0),
+        3 => learned(),
+        _ => network(&INT8.0),
     };
     checksum.unwrap_or(0)
 }
@@ -136,9 +145,9 @@ fn damped() -> Option<u32> {
 }
 
 /// Numbers that are unlike each other, and some that are no ordinary ones, through a network.
-fn network() -> Option<u32> {
-    let network = Network::parse(&NETWORK.0).ok()?;
-    let mut inputs = [0.0; 7 * 50];
+fn network(file: &[u8]) -> Option<u32> {
+    let network = Network::parse(file).ok()?;
+    let mut inputs = [0.0; 7 * ROWS];
     let mut seed = 8u32;
     for (at, input) in inputs.iter_mut().enumerate() {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -148,7 +157,7 @@ fn network() -> Option<u32> {
     for (at, number) in [(0, f32::NAN), (10, f32::INFINITY), (20, -0.0), (30, f32::MIN_POSITIVE / 8.0)] {
         *inputs.get_mut(at)? = number;
     }
-    let mut outputs = [0.0; 3 * 50];
+    let mut outputs = [0.0; 3 * ROWS];
     network.predict_rows(&inputs, &mut outputs);
     Some(of(outputs.into_iter()))
 }

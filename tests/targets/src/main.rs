@@ -2,15 +2,15 @@
 //! bits depend.
 
 use supple::lanes::Level;
-use targets::{NAMES, checksum};
+use targets::{NAMES, checksum, may_fuse};
 
 fn main() {
     let levels: Vec<_> = Level::available().collect();
     eprintln!("{}: {levels:?}", std::env::consts::ARCH);
     for (what, name) in NAMES.into_iter().enumerate() {
         for &level in &levels {
-            let may_fuse = !cfg!(feature = "deterministic") && level != Level::Portable;
-            let rounding = if may_fuse { "fused" } else { "unfused" };
+            let fused = !cfg!(feature = "deterministic") && level != Level::Portable && may_fuse(what);
+            let rounding = if fused { "fused" } else { "unfused" };
             println!("{name} {rounding} {:08x}", checksum(what, level));
         }
     }

@@ -1,0 +1,93 @@
+//! Whole numbers in one NEON register: the same results as [`Packed`](super::int8::Packed), with the instructions that every
+//! 64-bit Arm processor has.
+//!
+//! The product of an activation and a weight fits into 16 bits (255 times -128), so one instruction multiplies eight and one
+//! adds them in pairs to sums of 32.
+
+#![allow(unsafe_code)] // The instructions are unsafe to use where a function does not name their feature.
+
+use core::arch::aarch64::*;
+
+use super::int8::{Requantise, Whole};
+use super::neon::Neon;
+
+/// Four outputs of four vertices, transposed.
+const VERTICES: [u8; 16] = [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15];
+
+#[inline(always)]
+fn low_byte(number: Neon) -> uint32x4_t {
+    // SAFETY: this module is compiled only for targets with NEON.
+    unsafe { vandq_u32(vreinterpretq_u32_f32(number.0), vdupq_n_u32(255)) }
+}
+
+/// The first in the lower four, the second in the upper.
+#[inline(always)]
+fn halves(low: i16, high: i16) -> int16x8_t {
+    // SAFETY: as above.
+    unsafe { vcombine_s16(vdup_n_s16(low), vdup_n_s16(high)) }
+}
+
+/// Four of them.
+#[derive(Clone, Copy)]
+#[repr(transparent)]
+pub(super) struct Bytes16(int32x4_t);
+
+impl Bytes16 {
+    /// Two outputs' sums, brought to activations.
+    #[inline(always)]
+    fn pair(a: Self, b: Self, [by_a, by_b]: [Requantise; 2]) -> uint8x8_t {
+        // SAFETY: as above.
+        unsafe {
+            // To the left by a negative number of bits.
+            let a = vshlq_s32(a.0, vdupq_n_s32(-i32::from(by_a.shift)));
+            let b = vshlq_s32(b.0, vdupq_n_s32(-i32::from(by_b.shift)));
+            let kept = vcombine_s16(vqmovn_s32(a), vqmovn_s32(b));
+            let positive = vqrdmulhq_s16(kept, halves(by_a.positive, by_b.positive));
+            let negative = vqrdmulhq_s16(kept, halves(by_a.negative, by_b.negative));
+            vqmovun_s16(vqaddq_s16(vmaxq_s16(positive, negative), halves(by_a.zero, by_b.zero)))
+        }
+    }
+}
+
+impl Whole<Neon> for Bytes16 {
+    #[inline(always)]
+    fn splat(number: i32) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { vdupq_n_s32(number) })
+    }
+    #[inline(always)]
+    fn dot(self, bytes: Self, [a, b, c, d]: [i8; 4]) -> Self {
+        let weights = |[low, high]: [i8; 2]| -> int16x8_t {
+            bytemuck::must_cast([[i16::from(low), i16::from(high)]; 4])
+        };
+        // SAFETY: as above.
+        unsafe {
+            let bytes = vreinterpretq_u16_s32(bytes.0);
+            let even = vreinterpretq_s16_u16(vandq_u16(bytes, vdupq_n_u16(255)));
+            let odd = vreinterpretq_s16_u16(vshrq_n_u16::<8>(bytes));
+            let sums = vpadalq_s16(self.0, vmulq_s16(even, weights([a, c])));
+            Self(vpadalq_s16(sums, vmulq_s16(odd, weights([b, d]))))
+        }
+    }
+    #[inline(always)]
+    fn requantise([a, b, c, d]: [Self; 4], &[by_a, by_b, by_c, by_d]: &[Requantise; 4]) -> Self {
+        let (ab, cd) = (Self::pair(a, b, [by_a, by_b]), Self::pair(c, d, [by_c, by_d]));
+        // SAFETY: as above.
+        unsafe { Self(vreinterpretq_s32_u8(vqtbl1q_u8(vcombine_u8(ab, cd), bytemuck::must_cast(VERTICES)))) }
+    }
+    #[inline(always)]
+    fn numbers(self) -> Neon {
+        // SAFETY: as above.
+        Neon(unsafe { vcvtq_f32_s32(self.0) })
+    }
+    #[inline(always)]
+    fn low_bytes([a, b, c, d]: [Neon; 4]) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let low = vorrq_u32(low_byte(a), vshlq_n_u32::<8>(low_byte(b)));
+            let high =
+                vorrq_u32(vshlq_n_u32::<16>(low_byte(c)), vshlq_n_u32::<24>(vreinterpretq_u32_f32(d.0)));
+            Self(vreinterpretq_s32_u32(vorrq_u32(low, high)))
+        }
+    }
+}
