@@ -237,10 +237,19 @@ fn a_damped_roll_out_in_statics_allocates_nothing() {
 struct Flash<B: ?Sized>(B);
 
 static WEIGHTS: &Flash<[u8]> = &Flash(*include_bytes!("data/golden-v1.weights"));
+/// With layers of eight bits.
+static INT8: &Flash<[u8]> = &Flash(*include_bytes!("data/golden-v2.weights"));
 static VERTICES: Mutex<[Vertex; NODES]> = Mutex::new([Vertex::NEW; NODES]);
 
 #[test]
 fn a_learned_roll_out_in_statics_allocates_nothing() {
+    for (weights, has_int8) in [(&WEIGHTS.0, false), (&INT8.0, true)] {
+        assert_eq!(Network::parse(weights).unwrap().has_int8(), has_int8);
+        learned_roll_out(weights);
+    }
+}
+
+fn learned_roll_out(weights: &[u8]) {
     let (points, tets) = mesh();
     let mut vertices = VERTICES.lock().unwrap();
     let mut scene = FixedScene::<_, NODES, BLOCKS>::new(TISSUE);
@@ -249,7 +258,7 @@ fn a_learned_roll_out_in_statics_allocates_nothing() {
     let before = allocations();
 
     scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &supports()).unwrap();
-    let network = Network::parse(&WEIGHTS.0).unwrap();
+    let network = Network::parse(weights).unwrap();
     let mut surrogate = Surrogate::over(network, &mut vertices[..]).unwrap();
     let forces = [NodalForce { node: NODES as u32 - 3, newton: [1e-2, 0.0, 0.0], ramp: 0.0 }];
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
@@ -266,13 +275,30 @@ fn a_learned_roll_out_in_statics_allocates_nothing() {
     let led = state.steps();
     // This network has learned nothing: in the end it is refused, which allocates nothing either.
     let refused = (0..1_000).map(|_| surrogate::step(&scene, &loads, &mut state, &mut surrogate)).last();
-    let damaged = Network::parse(&WEIGHTS.0[..100]);
+    let damaged = Network::parse(&weights[..100]);
 
     assert_eq!(allocations(), before);
     let taken = state.steps() - led;
     println!("{taken} learned steps, no allocation; then {refused:?}");
     assert!(taken > 0 && damaged.is_err());
     assert!(matches!(refused, Some(Status::Ok | Status::Limited { .. } | Status::Diverged(_))));
+}
+
+/// Of one vertex and of many, with layers of eight bits.
+#[test]
+fn a_forward_pass_allocates_nothing() {
+    let mut outputs = [0.0; 3 * 37];
+    let before = allocations();
+
+    let network = Network::parse(&INT8.0).unwrap();
+    let inputs: [f32; 7 * 37] = std::array::from_fn(|at| (at % 11) as f32 - 5.0);
+    network.predict_rows(&inputs, &mut outputs);
+    let many = outputs;
+    network.predict(&inputs, &mut outputs);
+
+    assert_eq!(allocations(), before);
+    assert_eq!(many, outputs);
+    assert!(network.has_int8() && outputs.iter().all(|number| number.is_finite()));
 }
 
 #[test]

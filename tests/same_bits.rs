@@ -1,18 +1,19 @@
 //! The same input gives the same bits, whatever instructions the processor offers, with the feature `deterministic`: sums are
 //! taken in a fixed order, and nothing is fused. Without it levels differ by rounding, and two runs at one level by nothing.
+//! Networks with layers of eight bits give the same bits either way.
 
 use std::sync::Mutex;
 
 #[path = "support/networks.rs"]
 mod networks;
 
-use networks::{Memory, described, numbers};
+use networks::{Memory, described, int8, numbers};
 use supple::inertia::{self, Inertia, LatticeNode, numbers_for, vectors_for};
 use supple::lanes::Level;
 use supple::loads::{Loads, NodalForce};
 use supple::material::{Exponential, Law, Literal, NeoHookean, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
-use supple::mlp::{Network, write};
+use supple::mlp::{Network, write, write_int8};
 use supple::scene::{ElementBlock, NodeInertia, Scene, Support, blocks_for};
 use supple::state::{NodeVector, State};
 use supple::tled::{self, CriticalStep, Status, Step};
@@ -139,5 +140,32 @@ fn networks_are_within_rounding_or_the_same_bits() {
         let apart = portable.iter().zip(&other).fold(0.0, |most: f32, (a, b)| most.max((a - b).abs()));
         println!("portable and {level:?}: {apart:.1e} of {largest:.1} apart");
         assert!(apart <= if cfg!(feature = "deterministic") { 0.0 } else { 1e-6 * largest });
+    }
+}
+
+/// With the feature `deterministic` and without: such a network fuses nothing, also in its layers of float32.
+#[test]
+fn networks_with_layers_of_eight_bits_are_the_same_bits() {
+    let _alone = LEVEL.lock().unwrap();
+    let description = described(&[7, 40, 33, 24, 3], &[10, 16, 3], 5);
+    for which in [0b0000_0001, 0b0000_0110, 0b0001_0000, 0b0011_1111] {
+        let numbers_of_layers = int8(&description, |layer| which >> layer & 1 == 1, 6);
+        let memory = Memory::of(&write_int8(&description, &numbers_of_layers).unwrap());
+        let network = Network::parse(memory.bytes()).unwrap();
+        let mut next = numbers(8);
+        let inputs: Vec<f32> =
+            (0..7 * 50).map(|at| 2.0 * description.inputs[at % 7].scale * next()).collect();
+        let mut alone = vec![0.0f32; 3 * 50];
+        for (inputs, outputs) in inputs.chunks(7).zip(alone.chunks_mut(3)) {
+            network.predict(inputs, outputs);
+        }
+        assert!(alone.windows(4).any(|pair| pair[0] != pair[3]), "the same for all inputs");
+        for level in Level::available() {
+            assert!(Level::force(level));
+            let mut together = vec![0.0f32; 3 * 50];
+            network.predict_rows(&inputs, &mut together);
+            let differ = alone.iter().zip(&together).any(|(a, b)| a.to_bits() != b.to_bits());
+            assert!(!differ, "layers {which:b}, {level:?}");
+        }
     }
 }

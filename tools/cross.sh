@@ -106,5 +106,5 @@ if $tests; then
         plain+=(--config "profile.test.package.$package.opt-level=1")
     done
     step cross test "${plain[@]}" --quiet --no-default-features --features std --target-dir "$here" \
-        --target aarch64-unknown-linux-gnu --lib --test same_bits --test elements --test patch
+        --target aarch64-unknown-linux-gnu --lib --test same_bits --test int8 --test elements --test patch
 fi
