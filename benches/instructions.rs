@@ -5,25 +5,25 @@
 mod common {
     pub(crate) mod bar;
     pub(crate) mod scaled;
+    pub(crate) mod vertices;
 }
 
 use std::hint::black_box;
 use std::process::ExitCode;
 
-use common::bar::{self, DAMPING, DT, moved};
+use common::bar::{self, DAMPING, DT, EXPONENTIAL, moved};
 use common::scaled::{DAMPED_LATTICE, LATTICE, scaled};
+use common::vertices::{ROWS, vertices};
 use supple::lanes::Level;
 use supple::loads::Loads;
-use supple::material::{Exponential, Law, NeoHookean};
+use supple::material::{Law, NeoHookean};
 use supple::mlp::{Network, WeightBytes};
 use supple::surrogate::{self, Surrogate, Vertex};
 use supple::tled::{self, Step};
 
-const EXPONENTIAL: Exponential = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
 const COMPACT: &[u8] = include_bytes!("../weights/compact-10.weights");
 /// Small, with layers of eight bits.
 const INT8: &[u8] = include_bytes!("../tests/data/golden-v2.weights");
-const ROWS: usize = 1458;
 
 fn exact<L: Law>(law: L, times: u32) {
     let scene = bar::scene(law);
@@ -46,13 +46,7 @@ fn large(cells: [u32; 3], damped: bool, times: u32) {
 fn forward(bytes: &[u8], times: u32) {
     let bytes = WeightBytes::of(bytes);
     let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
-    let ranges = network.inputs();
-    let inputs: Vec<f32> = (0..ROWS * ranges.len())
-        .map(|at| {
-            let range = ranges[at % ranges.len()];
-            range.least + (range.most - range.least) * ((at * 7919 % 1009) as f32 / 1009.0)
-        })
-        .collect();
+    let inputs = vertices(&network);
     let mut outputs = vec![0.0; ROWS * network.outputs().len()];
     (0..times).for_each(|_| network.predict_rows(black_box(&inputs), &mut outputs));
 }

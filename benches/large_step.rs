@@ -14,7 +14,6 @@ use common::pairs::{median, seconds};
 use common::scaled::{DAMPED_LATTICE, LATTICE, scaled};
 use criterion::{BenchmarkId, Criterion, Throughput};
 use supple::loads::Loads;
-use supple::material::Exponential;
 use supple::tled::{self, Step};
 
 /// How many times longer than the exact one the steps of the scaled methods are, with the steps of their refresh cycles.
@@ -40,7 +39,7 @@ fn phases(run: &mut impl FnMut()) -> Vec<f64> {
 fn main() {
     let mut criterion = Criterion::default().configure_from_args().sample_size(30);
     let (points, forces) = (bar::points(), bar::forces());
-    let scene = bar::scene(Exponential { a: 59.0, b: 8.023, d: 60_000.0 });
+    let scene = bar::scene(bar::EXPONENTIAL);
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
 
     let mut exact_state = state(points.len());

@@ -7,21 +7,21 @@ mod common {
     pub(crate) mod bar;
     pub(crate) mod pairs;
     pub(crate) mod peak;
+    pub(crate) mod vertices;
 }
 
 use common::bar::{self, DAMPING, DT};
 use common::pairs::{median, seconds};
 use common::peak;
+use common::vertices::{ROWS, vertices};
 use criterion::{BenchmarkId, Criterion, Throughput};
 use std::hint::black_box;
 use supple::loads::Loads;
-use supple::material::Exponential;
 use supple::mlp::quantise::quantise;
 use supple::mlp::{Description, LayerDescription, Network, WeightBytes, write, write_int8};
 use supple::surrogate::{self, Surrogate, Vertex};
 use supple::tled::{self, Step};
 
-const ROWS: usize = 1458;
 const ROUNDS: usize = 41;
 
 const PAPER: &[u8] = include_bytes!("../weights/paper-10.weights");
@@ -29,41 +29,15 @@ const COMPACT: &[u8] = include_bytes!("../weights/compact-10.weights");
 
 /// A network of one small layer that predicts nothing: what a learned step costs beside its network.
 fn nothing(like: &Network<'_>) -> WeightBytes {
-    let recipe = like.recipe();
-    let (inputs, outputs) = (like.inputs().to_vec(), like.outputs().to_vec());
     let layer = LayerDescription {
-        inputs: inputs.len(),
+        inputs: like.inputs().len(),
         activation: supple::mlp::Activation::Linear,
-        weights: vec![0.0; inputs.len() * outputs.len()],
-        biases: vec![0.0; outputs.len()],
+        weights: vec![0.0; like.inputs().len() * like.outputs().len()],
+        biases: vec![0.0; like.outputs().len()],
     };
-    let bytes = write(&Description {
-        inputs,
-        outputs,
-        first: vec![layer],
-        second: Vec::new(),
-        law: recipe.law,
-        density: recipe.density,
-        damping: recipe.damping,
-        step: recipe.step,
-        exact_step: recipe.exact_step,
-        force: recipe.force,
-        recipe: "",
-        recipe_hash: [0; 32],
-    })
-    .expect("a sound network");
+    let bytes = write(&Description { first: vec![layer], second: Vec::new(), ..Description::of(like) })
+        .expect("a sound network");
     WeightBytes::of(&bytes)
-}
-
-/// Inputs of vertices, over the ranges of training.
-fn vertices(network: &Network<'_>) -> Vec<f32> {
-    let inputs = network.inputs();
-    (0..ROWS * inputs.len())
-        .map(|at| {
-            let range = inputs[at % inputs.len()];
-            range.least + (range.most - range.least) * ((at * 7919 % 1009) as f32 / 1009.0)
-        })
-        .collect()
 }
 
 /// The network with all layers in eight bits but the first and the last of each part. Time does not depend on what it was
@@ -113,7 +87,7 @@ fn forward(criterion: &mut Criterion) {
 }
 
 fn steps(criterion: &mut Criterion) {
-    let scene = bar::scene(Exponential { a: 59.0, b: 8.023, d: 60_000.0 });
+    let scene = bar::scene(bar::EXPONENTIAL);
     let (forces, nodes) = (bar::forces(), scene.node_count());
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
     let mut exact_state = bar::state(nodes);

@@ -19,7 +19,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
 use crate::frame::{Axes, Frame};
-use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch, dot};
+use crate::lanes::{Kernel, NodeVector, Real, dispatch, dot};
 use crate::loads::Loads;
 use crate::material::{Law, Material};
 use crate::mlp::{ForceInput, MAX_INPUTS, Network, Scratch};
@@ -204,10 +204,7 @@ where
     }
 
     external_forces(force, inertia, loads, *time);
-    let (from, to) = (Gather::new(displacement), Scatter::new(force));
-    let (laws, blocks) = (scene.material().laws(), scene.blocks());
-    let forces = InternalForces { laws, blocks, displacement: from, force: to, beside: Nothing };
-    let extremes = M::Law::forces(forces);
+    let extremes = M::Law::forces(InternalForces::of(scene, displacement, force, Nothing));
     let (increments, forces) = (&*increment, &*force);
     let (totals, found) =
         Predict { network, step, inertia, displacement, increment: increments, force: forces, vertices }

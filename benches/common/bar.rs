@@ -1,7 +1,7 @@
 //! The paper's bar with twisting forces at its free corners, as every bench has it.
 
 use supple::loads::NodalForce;
-use supple::material::{Law, Tissue};
+use supple::material::{Exponential, Law, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::scene::{ElementBlock, NodeInertia, Scene, Support, blocks_for};
 use supple::state::{NodeVector, State};
@@ -11,6 +11,8 @@ use supple::tled::Status;
 pub(crate) const DT: f32 = 3e-5;
 pub(crate) const DAMPING: f32 = 20.0;
 pub(crate) const DENSITY: f32 = 1000.0;
+/// The paper's exponential law.
+pub(crate) const EXPONENTIAL: Exponential = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
 /// Nodes at the end that is held.
 pub(crate) const HELD: std::ops::Range<u32> = 0..81;
 

@@ -80,7 +80,7 @@ pub use vectors::{damped_vectors_for, vectors_for};
 
 use core::fmt;
 
-use crate::lanes::{Gather, NodeVector, Scatter};
+use crate::lanes::{NodeVector, Scatter};
 use crate::material::{Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
@@ -462,9 +462,8 @@ where
 {
     let (diagonal, beside) = (Scatter::new(tables.sum_diagonal), Scatter::new(tables.sum_beside));
     let beside = MatrixBeside { diagonal, beside };
-    let (displacement, nowhere) = (Gather::new(displacement), Scatter::new(&mut []));
-    let (laws, blocks) = (scene.material().laws(), scene.blocks());
-    M::Law::forces_and_matrices(InternalForces { laws, blocks, displacement, force: nowhere, beside });
+    let nowhere = &mut [];
+    M::Law::forces_and_matrices(InternalForces::of(scene, displacement, nowhere, beside));
 }
 
 /// Writes the least height of each node's elements, `1 / |ga|`, into the fourth number of `next`.

@@ -3,7 +3,7 @@
 
 use glam::Vec4;
 
-use crate::lanes::{Gather, NodeVector, Scatter};
+use crate::lanes::{NodeVector, Scatter};
 use crate::loads::Loads;
 use crate::material::{Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
@@ -107,16 +107,13 @@ where
     let external = dot(force, displacement);
     let functions = lattice.functions();
     let no_lattice = functions == 0;
-    let (from, to) = (Gather::new(displacement), Scatter::new(force));
-    let (laws, blocks) = (scene.material().laws(), scene.blocks());
     let extremes = if no_lattice {
         tables.clear_sums();
         let (diagonal, beside) = (Scatter::new(tables.sum_diagonal), Scatter::new(tables.sum_beside));
         let beside = MatrixBeside { diagonal, beside };
-        M::Law::forces_and_matrices(InternalForces { laws, blocks, displacement: from, force: to, beside })
+        M::Law::forces_and_matrices(InternalForces::of(scene, displacement, force, beside))
     } else {
-        let beside = ScalarBeside;
-        M::Law::forces_and_bounds(InternalForces { laws, blocks, displacement: from, force: to, beside })
+        M::Law::forces_and_bounds(InternalForces::of(scene, displacement, force, ScalarBeside))
     };
 
     let places = places.as_ref();

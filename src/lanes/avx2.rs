@@ -20,22 +20,14 @@ use core::ops::{Add, Mul, Neg, Sub};
 use super::Real;
 use super::functions::Bits;
 use super::int8_avx2::Bytes32;
+use super::register::{memory, same_methods};
 
 /// See the module.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 pub(super) struct Avx2(pub(super) __m256);
 
-impl Avx2 {
-    #[inline(always)]
-    fn numbers(self) -> [f32; 8] {
-        bytemuck::must_cast(self.0)
-    }
-    #[inline(always)]
-    fn of(numbers: [f32; 8]) -> Self {
-        Self(bytemuck::must_cast(numbers))
-    }
-}
+memory!(Avx2, 8);
 
 macro_rules! operator {
     ($trait:ident, $method:ident, $instruction:ident) => {
@@ -69,14 +61,8 @@ impl Real for Avx2 {
     type Eight = Self;
     type Whole = Bytes32;
 
-    #[inline(always)]
-    fn from_fn(at: impl Fn(usize) -> f32) -> Self {
-        let mut out = [0.0; 8];
-        for (lane, value) in out.iter_mut().enumerate() {
-            *value = at(lane);
-        }
-        Self::of(out)
-    }
+    same_methods!();
+
     #[inline(always)]
     fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
         // Rows 0 and 4 side by side and so on; then the halves are transposed at once.
@@ -94,26 +80,6 @@ impl Real for Avx2 {
                 row(4 * half + lane, pair[half]);
             }
         }
-    }
-    #[inline(always)]
-    fn lane(&self, lane: usize) -> f32 {
-        self.numbers().get(lane).copied().unwrap_or(0.0)
-    }
-    #[inline(always)]
-    fn map(self, f: impl Fn(f32) -> f32) -> Self {
-        let mut out = self.numbers();
-        for value in &mut out {
-            *value = f(*value);
-        }
-        Self::of(out)
-    }
-    #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
-        let mut out = self.numbers();
-        for (a, b) in out.iter_mut().zip(other.numbers()) {
-            *a = f(*a, b);
-        }
-        Self::of(out)
     }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]
@@ -164,18 +130,6 @@ impl Real for Avx2 {
     fn root(self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm256_sqrt_ps(self.0) })
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        super::functions::sqrt(self)
-    }
-    #[inline(always)]
-    fn exp(self) -> Self {
-        super::functions::exp(self)
-    }
-    #[inline(always)]
-    fn inverse_cbrt(self) -> Self {
-        super::functions::inverse_cbrt(self)
     }
 }
 

@@ -21,22 +21,14 @@ use super::Real;
 use super::avx2::Avx2;
 use super::functions::Bits;
 use super::int8_avx512::Bytes64;
+use super::register::{memory, same_methods};
 
 /// See the module.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 pub(super) struct Avx512(pub(super) __m512);
 
-impl Avx512 {
-    #[inline(always)]
-    fn numbers(self) -> [f32; 16] {
-        bytemuck::must_cast(self.0)
-    }
-    #[inline(always)]
-    fn of(numbers: [f32; 16]) -> Self {
-        Self(bytemuck::must_cast(numbers))
-    }
-}
+memory!(Avx512, 16);
 
 macro_rules! operator {
     ($trait:ident, $method:ident, $instruction:ident) => {
@@ -70,14 +62,8 @@ impl Real for Avx512 {
     type Eight = Avx2;
     type Whole = Bytes64;
 
-    #[inline(always)]
-    fn from_fn(at: impl Fn(usize) -> f32) -> Self {
-        let mut out = [0.0; 16];
-        for (lane, value) in out.iter_mut().enumerate() {
-            *value = at(lane);
-        }
-        Self::of(out)
-    }
+    same_methods!();
+
     #[inline(always)]
     fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
         // Rows 0, 4, 8 and 12 side by side and so on; then the quarters are transposed at once.
@@ -107,26 +93,6 @@ impl Real for Avx512 {
         eight::<8>(b, |lane, numbers| row(1, lane, numbers));
         eight::<8>(c, |lane, numbers| row(2, lane, numbers));
         eight::<8>(d, |lane, numbers| row(3, lane, numbers));
-    }
-    #[inline(always)]
-    fn lane(&self, lane: usize) -> f32 {
-        self.numbers().get(lane).copied().unwrap_or(0.0)
-    }
-    #[inline(always)]
-    fn map(self, f: impl Fn(f32) -> f32) -> Self {
-        let mut out = self.numbers();
-        for value in &mut out {
-            *value = f(*value);
-        }
-        Self::of(out)
-    }
-    #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
-        let mut out = self.numbers();
-        for (a, b) in out.iter_mut().zip(other.numbers()) {
-            *a = f(*a, b);
-        }
-        Self::of(out)
     }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]
@@ -178,18 +144,6 @@ impl Real for Avx512 {
     fn root(self) -> Self {
         // SAFETY: as above.
         Self(unsafe { _mm512_sqrt_ps(self.0) })
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        super::functions::sqrt(self)
-    }
-    #[inline(always)]
-    fn exp(self) -> Self {
-        super::functions::exp(self)
-    }
-    #[inline(always)]
-    fn inverse_cbrt(self) -> Self {
-        super::functions::inverse_cbrt(self)
     }
 }
 

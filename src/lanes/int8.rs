@@ -56,6 +56,10 @@ impl Requantise {
     }
 }
 
+/// Four outputs of four vertices, transposed, by the places of their bytes: for instructions that pick bytes.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+pub(super) const VERTICES: [u8; 16] = [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15];
+
 /// Adding this to a number between -2^22 and 2^22 rounds it to a whole one, half to even, that stands in the low bits.
 pub(crate) const ROUNDING: f32 = 12_582_912.0;
 

@@ -10,7 +10,7 @@
 use core::arch::x86_64::*;
 
 use super::avx2::Avx2;
-use super::int8::{Requantise, Whole};
+use super::int8::{Requantise, VERTICES, Whole};
 
 /// Bytes 0 and 1 of either half, four times: `positive` of two outputs, each for four vertices.
 pub(super) const POSITIVE: [u8; 16] = [0, 1, 0, 1, 0, 1, 0, 1, 8, 9, 8, 9, 8, 9, 8, 9];
@@ -18,8 +18,6 @@ pub(super) const POSITIVE: [u8; 16] = [0, 1, 0, 1, 0, 1, 0, 1, 8, 9, 8, 9, 8, 9,
 pub(super) const NEGATIVE: [u8; 16] = [2, 3, 2, 3, 2, 3, 2, 3, 10, 11, 10, 11, 10, 11, 10, 11];
 /// The same of `zero`.
 pub(super) const ZERO: [u8; 16] = [4, 5, 4, 5, 4, 5, 4, 5, 12, 13, 12, 13, 12, 13, 12, 13];
-/// Four outputs of four vertices, transposed.
-pub(super) const VERTICES: [u8; 16] = [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15];
 
 /// Bytes of each 128 bits, by their places.
 #[inline(always)]

@@ -8,8 +8,8 @@
 use core::arch::x86_64::*;
 
 use super::avx512::Avx512;
-use super::int8::{Requantise, Whole};
-use super::int8_avx2::{NEGATIVE, POSITIVE, VERTICES, ZERO};
+use super::int8::{Requantise, VERTICES, Whole};
+use super::int8_avx2::{NEGATIVE, POSITIVE, ZERO};
 
 /// Bytes of each 128 bits, by their places.
 #[inline(always)]

@@ -8,11 +8,8 @@
 
 use core::arch::aarch64::*;
 
-use super::int8::{Requantise, Whole};
+use super::int8::{Requantise, VERTICES, Whole};
 use super::neon::Neon;
-
-/// Four outputs of four vertices, transposed.
-const VERTICES: [u8; 16] = [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15];
 
 #[inline(always)]
 fn low_byte(number: Neon) -> uint32x4_t {

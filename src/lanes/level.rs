@@ -36,12 +36,8 @@ pub(crate) trait Kernel {
     fn run<R: Real>(self) -> Self::Output;
 }
 
-/// Codes of the levels in [`DETECTED`]; zero before it was asked for.
-const PORTABLE: u8 = 1;
-const AVX2: u8 = 2;
-const AVX512: u8 = 3;
-const NEON: u8 = 4;
-const SIMD128: u8 = 5;
+/// All of them, the best first.
+const LEVELS: [Level; 5] = [Level::Avx512, Level::Avx2, Level::Neon, Level::Simd128, Level::Portable];
 
 /// What every processor of the target has.
 const BASELINE: Level =
@@ -53,27 +49,20 @@ const BASELINE: Level =
         Level::Portable
     };
 
+/// Place in [`LEVELS`], counted from one; zero before it was asked for.
 static DETECTED: AtomicU8 = AtomicU8::new(0);
 
 impl Level {
     /// The best level of this processor, or the one set by [`Level::force`].
     #[inline]
     pub fn current() -> Self {
-        match DETECTED.load(Ordering::Relaxed) {
-            AVX512 => Self::Avx512,
-            AVX2 => Self::Avx2,
-            NEON => Self::Neon,
-            SIMD128 => Self::Simd128,
-            PORTABLE => Self::Portable,
-            _ => Self::detect(),
-        }
+        let place = usize::from(DETECTED.load(Ordering::Relaxed));
+        place.checked_sub(1).and_then(|place| LEVELS.get(place)).copied().unwrap_or_else(Self::detect)
     }
 
     /// Those this processor has, the best first.
     pub fn available() -> impl Iterator<Item = Self> {
-        [Self::Avx512, Self::Avx2, Self::Neon, Self::Simd128, Self::Portable]
-            .into_iter()
-            .filter(|level| level.is_here())
+        LEVELS.into_iter().filter(|level| level.is_here())
     }
 
     #[cold]
@@ -84,14 +73,8 @@ impl Level {
     }
 
     fn store(self) {
-        let code = match self {
-            Self::Portable => PORTABLE,
-            Self::Avx2 => AVX2,
-            Self::Avx512 => AVX512,
-            Self::Neon => NEON,
-            Self::Simd128 => SIMD128,
-        };
-        DETECTED.store(code, Ordering::Relaxed);
+        let place = LEVELS.iter().position(|level| *level == self).map_or(0, |place| place + 1);
+        DETECTED.store(place as u8, Ordering::Relaxed);
     }
 
     fn is_here(self) -> bool {
@@ -101,9 +84,7 @@ impl Level {
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => has(AVX_STATE, AVX2_FEATURES),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => {
-                has(AVX_STATE | AVX512_STATE, [AVX2_FEATURES[0] | AVX512_FEATURES[0], AVX512_FEATURES[1]])
-            }
+            Self::Avx512 => has(AVX512_STATE, AVX512_FEATURES),
             #[cfg(not(target_arch = "x86_64"))]
             Self::Avx2 | Self::Avx512 => false,
         }
@@ -155,17 +136,17 @@ fn with_avx512<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Avx512>()
 }
 
-/// Registers that the system saves (XCR0): xmm and ymm; masks and zmm.
+/// Registers that the system saves (XCR0): xmm and ymm; masks and zmm as well.
 #[cfg(target_arch = "x86_64")]
 const AVX_STATE: u64 = 0b110;
 #[cfg(target_arch = "x86_64")]
-const AVX512_STATE: u64 = 0b1110_0000;
+const AVX512_STATE: u64 = AVX_STATE | 0b1110_0000;
 
-/// What leaf 7 says in ebx and ecx: AVX2; F, DQ, BW and VL, and VNNI.
+/// What leaf 7 says in ebx and ecx: AVX2; F, DQ, BW, VL and VNNI as well.
 #[cfg(target_arch = "x86_64")]
 const AVX2_FEATURES: [u32; 2] = [1 << 5, 0];
 #[cfg(target_arch = "x86_64")]
-const AVX512_FEATURES: [u32; 2] = [1 << 16 | 1 << 17 | 1 << 30 | 1 << 31, 1 << 11];
+const AVX512_FEATURES: [u32; 2] = [AVX2_FEATURES[0] | 1 << 16 | 1 << 17 | 1 << 30 | 1 << 31, 1 << 11];
 
 /// FMA, AVX and the saving of registers in the processor (leaf 1), the given features (leaf 7), and the given registers
 /// saved by the system.

@@ -25,6 +25,7 @@ mod level_tests;
 #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
 mod neon;
 mod pair;
+mod register;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 mod simd128;
 mod vectors;
@@ -76,9 +77,15 @@ pub trait Real:
     /// The number in `lane`; lanes that do not exist read as zero.
     fn lane(&self, lane: usize) -> f32;
     /// Applies `f` to each number.
-    fn map(self, f: impl Fn(f32) -> f32) -> Self;
+    #[inline(always)]
+    fn map(self, f: impl Fn(f32) -> f32) -> Self {
+        Self::from_fn(|lane| f(self.lane(lane)))
+    }
     /// Applies `f` to each pair of numbers.
-    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self;
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        Self::from_fn(|lane| f(self.lane(lane), other.lane(lane)))
+    }
 
     /// `self * factor + addend`, rounded once where the level can, unless the feature `deterministic` is on.
     #[inline(always)]

@@ -17,6 +17,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 
 use super::functions::Bits;
 use super::int8_neon::Bytes16;
+use super::register::{memory, same_methods};
 use super::{Pair, Real};
 
 /// See the module.
@@ -24,16 +25,7 @@ use super::{Pair, Real};
 #[repr(transparent)]
 pub(super) struct Neon(pub(super) float32x4_t);
 
-impl Neon {
-    #[inline(always)]
-    fn numbers(self) -> [f32; 4] {
-        bytemuck::must_cast(self.0)
-    }
-    #[inline(always)]
-    fn of(numbers: [f32; 4]) -> Self {
-        Self(bytemuck::must_cast(numbers))
-    }
-}
+memory!(Neon, 4);
 
 macro_rules! operator {
     ($trait:ident, $method:ident, $instruction:ident) => {
@@ -67,10 +59,8 @@ impl Real for Neon {
     type Eight = Pair<Self>;
     type Whole = Bytes16;
 
-    #[inline(always)]
-    fn from_fn(at: impl Fn(usize) -> f32) -> Self {
-        Self::of([at(0), at(1), at(2), at(3)])
-    }
+    same_methods!();
+
     #[inline(always)]
     fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
         transpose([Self::of(row(0)), Self::of(row(1)), Self::of(row(2)), Self::of(row(3))])
@@ -80,20 +70,6 @@ impl Real for Neon {
         for (lane, numbers) in transpose(columns).into_iter().enumerate() {
             row(lane, numbers.numbers());
         }
-    }
-    #[inline(always)]
-    fn lane(&self, lane: usize) -> f32 {
-        self.numbers().get(lane).copied().unwrap_or(0.0)
-    }
-    #[inline(always)]
-    fn map(self, f: impl Fn(f32) -> f32) -> Self {
-        let [a, b, c, d] = self.numbers();
-        Self::of([f(a), f(b), f(c), f(d)])
-    }
-    #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
-        let ([a, b, c, d], [e, g, h, i]) = (self.numbers(), other.numbers());
-        Self::of([f(a, e), f(b, g), f(c, h), f(d, i)])
     }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]
@@ -142,18 +118,6 @@ impl Real for Neon {
     fn root(self) -> Self {
         // SAFETY: as above.
         Self(unsafe { vsqrtq_f32(self.0) })
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        super::functions::sqrt(self)
-    }
-    #[inline(always)]
-    fn exp(self) -> Self {
-        super::functions::exp(self)
-    }
-    #[inline(always)]
-    fn inverse_cbrt(self) -> Self {
-        super::functions::inverse_cbrt(self)
     }
 }
 

@@ -72,14 +72,6 @@ impl<R: Real> Real for Pair<R> {
         if lane < R::COUNT { self.0.lane(lane) } else { self.1.lane(lane - R::COUNT) }
     }
     #[inline(always)]
-    fn map(self, f: impl Fn(f32) -> f32) -> Self {
-        Self(self.0.map(&f), self.1.map(&f))
-    }
-    #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
-        Self(self.0.zip(other.0, &f), self.1.zip(other.1, &f))
-    }
-    #[inline(always)]
     fn fused(self, factor: Self, addend: Self) -> Self {
         Self(self.0.fused(factor.0, addend.0), self.1.fused(factor.1, addend.1))
     }

@@ -12,6 +12,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 
 use super::functions::Bits;
 use super::int8_simd128::Bytes16;
+use super::register::{memory, same_methods};
 use super::{Pair, Real};
 
 /// See the module.
@@ -19,16 +20,7 @@ use super::{Pair, Real};
 #[repr(transparent)]
 pub(super) struct Simd128(pub(super) v128);
 
-impl Simd128 {
-    #[inline(always)]
-    fn numbers(self) -> [f32; 4] {
-        bytemuck::must_cast(self.0)
-    }
-    #[inline(always)]
-    fn of(numbers: [f32; 4]) -> Self {
-        Self(bytemuck::must_cast(numbers))
-    }
-}
+memory!(Simd128, 4);
 
 macro_rules! operator {
     ($trait:ident, $method:ident, $instruction:ident) => {
@@ -59,10 +51,8 @@ impl Real for Simd128 {
     type Eight = Pair<Self>;
     type Whole = Bytes16;
 
-    #[inline(always)]
-    fn from_fn(at: impl Fn(usize) -> f32) -> Self {
-        Self::of([at(0), at(1), at(2), at(3)])
-    }
+    same_methods!();
+
     #[inline(always)]
     fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
         transpose([Self::of(row(0)), Self::of(row(1)), Self::of(row(2)), Self::of(row(3))])
@@ -72,20 +62,6 @@ impl Real for Simd128 {
         for (lane, numbers) in transpose(columns).into_iter().enumerate() {
             row(lane, numbers.numbers());
         }
-    }
-    #[inline(always)]
-    fn lane(&self, lane: usize) -> f32 {
-        self.numbers().get(lane).copied().unwrap_or(0.0)
-    }
-    #[inline(always)]
-    fn map(self, f: impl Fn(f32) -> f32) -> Self {
-        let [a, b, c, d] = self.numbers();
-        Self::of([f(a), f(b), f(c), f(d)])
-    }
-    #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
-        let ([a, b, c, d], [e, g, h, i]) = (self.numbers(), other.numbers());
-        Self::of([f(a, e), f(b, g), f(c, h), f(d, i)])
     }
     #[inline(always)]
     fn choose(self, yes: Self, no: Self) -> Self {
@@ -119,18 +95,6 @@ impl Real for Simd128 {
     #[inline(always)]
     fn root(self) -> Self {
         Self(f32x4_sqrt(self.0))
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        super::functions::sqrt(self)
-    }
-    #[inline(always)]
-    fn exp(self) -> Self {
-        super::functions::exp(self)
-    }
-    #[inline(always)]
-    fn inverse_cbrt(self) -> Self {
-        super::functions::inverse_cbrt(self)
     }
 }
 

@@ -23,12 +23,10 @@ pub(crate) fn next_increment(
     force: &NodeVector,
     step: &Step,
 ) -> [f32; 4] {
-    let [ix, iy, iz] = inertia.inverse;
-    let inverse = [ix, iy, iz, 0.0];
+    let exact = Exact::<f32>::new(step);
     let mut next = [0.0; 4];
-    for (axis, value) in next.iter_mut().enumerate() {
-        let free = step.keep * (step.carry * increment.0[axis]) + step.push * (inverse[axis] * force.0[axis]);
-        *value = if inverse[axis] > 0.0 { free } else { 0.0 };
+    for (axis, inverse) in inertia.inverse.into_iter().enumerate() {
+        next[axis] = exact.next(inverse, increment.0[axis], force.0[axis]);
     }
     next
 }
@@ -152,7 +150,7 @@ fn part<R: Real>(numbers: &[f32; FOUR], from: usize) -> R {
     R::from_fn(|lane| numbers[(from + lane) % FOUR])
 }
 
-/// The exact step of four nodes, axes side by side.
+/// The exact step along axes side by side.
 struct Exact<R> {
     keep: R,
     carry: R,
@@ -165,7 +163,7 @@ impl<R: Real> Exact<R> {
         Self { keep: R::splat(step.keep), carry: R::splat(step.carry), push: R::splat(step.push) }
     }
 
-    /// As [`next_increment`].
+    /// The next increment of axes with these inverse masses; held axes stand still.
     #[inline(always)]
     fn next(&self, inverse: R, increment: R, force: R) -> R {
         let next = self.keep * (self.carry * increment) + self.push * (inverse * force);

@@ -249,10 +249,7 @@ where
     }
 
     external_forces(force, inertia, loads, *time);
-    let (from, to) = (Gather::new(displacement), Scatter::new(force));
-    let (laws, blocks) = (scene.material().laws(), scene.blocks());
-    let forces = InternalForces { laws, blocks, displacement: from, force: to, beside: Nothing };
-    let extremes = M::Law::forces(forces);
+    let extremes = M::Law::forces(InternalForces::of(scene, displacement, force, Nothing));
     let next = |_, inertia: &_, increment: &_, force: &_| next_increment(inertia, increment, force, step);
     let totals = Account { step, inertia, increment, force }.total();
     let entry = Entry::of_totals(&totals, loads, step)
@@ -358,11 +355,29 @@ pub(crate) fn external_forces(
 
 /// Adds the internal forces of all elements, in their order.
 pub struct InternalForces<'a, L, H> {
-    pub(crate) laws: Laws<'a, L>,
-    pub(crate) blocks: &'a [ElementBlock],
-    pub(crate) displacement: Gather<'a>,
-    pub(crate) force: Scatter<'a>,
-    pub(crate) beside: H,
+    laws: Laws<'a, L>,
+    blocks: &'a [ElementBlock],
+    displacement: Gather<'a>,
+    force: Scatter<'a>,
+    beside: H,
+}
+
+impl<'a, L: Law, H> InternalForces<'a, L, H> {
+    /// Of a scene's elements.
+    pub(crate) fn of<M, N, B>(
+        scene: &'a Scene<M, N, B>,
+        displacement: &'a [NodeVector],
+        force: &'a mut [NodeVector],
+        beside: H,
+    ) -> Self
+    where
+        M: Material<Law = L>,
+        N: AsRef<[NodeInertia]>,
+        B: AsRef<[ElementBlock]>,
+    {
+        let (laws, blocks) = (scene.material().laws(), scene.blocks());
+        Self { laws, blocks, displacement: Gather::new(displacement), force: Scatter::new(force), beside }
+    }
 }
 
 impl<L: Law, H: Beside> Kernel for InternalForces<'_, L, H> {

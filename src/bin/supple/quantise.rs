@@ -28,31 +28,39 @@ pub(crate) struct Asked {
 
 pub(crate) fn quantise(asked: &Asked) -> Result<End, Problem> {
     let Asked { weights: path, out, float } = asked;
-    quantise_to(path, &weights::read(path)?, float, out)?;
-    Ok(End::Reached)
-}
-
-/// The same of a network that has just been trained: `NAME-i8.weights` beside `NAME.weights`.
-pub(crate) fn quantise_beside(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
-    let mut name = path.file_stem().unwrap_or_default().to_os_string();
-    name.push("-i8.weights");
-    quantise_to(path, &WeightBytes::of(bytes), &[], &path.with_file_name(name))
-}
-
-fn quantise_to(path: &Path, memory: &WeightBytes, float: &[usize], out: &Path) -> Result<(), Problem> {
-    let network = weights::parse(path, memory)?;
-    let problem = |error: &dyn std::fmt::Display| Problem(format!("{}: {error}", path.display()));
-    let recipe = Recipe::parse(network.recipe().text).map_err(|error| problem(&error))?;
+    let memory = weights::read(path)?;
+    let network = weights::parse(path, &memory)?;
+    let recipe = Recipe::parse(network.recipe().text).map_err(|error| problem(path, &error))?;
     let (first, second) = network.layers();
     let count = first.len() + second.len();
     if let Some(layer) = float.iter().find(|&&layer| layer >= count) {
         return Err(Problem(format!("{}: --float {layer}, but there are {count} layers", path.display())));
     }
     eprintln!("simulating the motion it learned from ...");
-    let samples = Samples::collect(&recipe).map_err(|error| problem(&error))?;
-    let float = if float.is_empty() { usual_float_layers(&network) } else { float.to_vec() };
-    let made = int8(&network, &recipe, &samples, &float).map_err(|error| problem(&error))?;
-    tell(&made, out)
+    let samples = Samples::collect(&recipe).map_err(|error| problem(path, &error))?;
+    let float = if float.is_empty() { usual_float_layers(&network) } else { float.clone() };
+    let made = int8(&network, &recipe, &samples, &float).map_err(|error| problem(path, &error))?;
+    tell(&made, out)?;
+    Ok(End::Reached)
+}
+
+/// The same of a network that has just been trained on these samples: `NAME-i8.weights` beside `NAME.weights`.
+pub(crate) fn quantise_beside(
+    path: &Path,
+    bytes: &[u8],
+    recipe: &Recipe,
+    samples: &Samples,
+) -> Result<(), Problem> {
+    let mut name = path.file_stem().unwrap_or_default().to_os_string();
+    name.push("-i8.weights");
+    let memory = WeightBytes::of(bytes);
+    let network = weights::parse(path, &memory)?;
+    let made = int8(&network, recipe, samples, &usual_float_layers(&network));
+    tell(&made.map_err(|error| problem(path, &error))?, &path.with_file_name(name))
+}
+
+fn problem(path: &Path, error: &dyn std::fmt::Display) -> Problem {
+    Problem(format!("{}: {error}", path.display()))
 }
 
 /// Writes the file and says how good it is.

@@ -8,7 +8,9 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use supple::io::write_atomically;
 use supple::train::damper;
-use supple::train::fit::{Fitted, Progress, train as fit};
+use supple::train::fit::{Fitted, Progress, fit};
+use supple::train::recipe::Recipe;
+use supple::train::samples::Samples;
 
 use crate::quantise::quantise_beside;
 use crate::scene_file::Problem;
@@ -38,13 +40,15 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     if is_damper(&text) {
         return train_damper(&text, recipe, out);
     }
+    let parsed = Recipe::parse(&text).map_err(|error| problem(recipe, &error))?;
     let folder = checkpoints(out);
     eprintln!("simulating the motion to learn from ...");
+    let collected = Samples::collect(&parsed).map_err(|error| problem(recipe, &error))?;
     let bar = ProgressBar::no_length();
     let style = ProgressStyle::with_template("{bar:30} {msg}").map_err(|error| problem(recipe, &error))?;
     bar.set_style(style);
     let mut told = None;
-    let fitted = fit(&text, Some(&folder), |at| {
+    let fitted = fit(&parsed, &text, &collected, Some(&folder), &mut |at: &Progress| {
         bar.set_length((at.epochs * at.samples) as u64);
         bar.set_position((at.epoch * at.samples + at.done) as u64);
         bar.set_message(said(at));
@@ -68,7 +72,7 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
         );
     }
     println!("weights     {} ({} bytes)", out.display(), bytes.len());
-    quantise_beside(out, &bytes)?;
+    quantise_beside(out, &bytes, &parsed, &collected)?;
     Ok(End::Reached)
 }
 

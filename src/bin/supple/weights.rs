@@ -34,20 +34,14 @@ pub(crate) enum Conversion {
 }
 
 pub(crate) fn convert(conversion: &Conversion) -> Result<End, Problem> {
-    let (from, out) = match conversion {
+    let (from, out, written) = match conversion {
         #[cfg(feature = "train")]
         Conversion::Quantise(asked) => return crate::quantise::quantise(asked),
-        Conversion::Export { weights, out } => (weights, out),
-        Conversion::Import { safetensors, out } => (safetensors, out),
-    };
-    let written = match conversion {
-        #[cfg(feature = "train")]
-        Conversion::Quantise(_) => return Ok(End::Reached),
-        Conversion::Export { .. } => {
-            let memory = read(from)?;
-            to_safetensors(&parse(from, &memory)?)
+        Conversion::Export { weights, out } => {
+            let memory = read(weights)?;
+            (weights, out, to_safetensors(&parse(weights, &memory)?))
         }
-        Conversion::Import { .. } => from_safetensors(&bytes(from)?),
+        Conversion::Import { safetensors, out } => (safetensors, out, from_safetensors(&bytes(safetensors)?)),
     };
     let written = written.map_err(|error| Problem(format!("{}: {error}", from.display())))?;
     write_atomically(out, |file| file.write_all(&written))
