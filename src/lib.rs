@@ -92,6 +92,7 @@
 #[cfg(any(feature = "std", test))]
 extern crate std;
 
+mod chunks;
 pub mod frame;
 pub mod inertia;
 pub mod lanes;
@@ -100,10 +101,12 @@ pub mod loads;
 pub mod material;
 pub mod mesh;
 pub mod mlp;
+pub mod numbering;
 pub mod scene;
 pub mod state;
 pub mod surrogate;
 mod symmetric;
+pub mod threads;
 pub mod tled;
 
 #[cfg(feature = "io")]

@@ -65,6 +65,13 @@ pub enum MeshError {
         /// Its volume, m^3.
         volume: f64,
     },
+    /// A table of numbers does not have one place for each node.
+    Table {
+        /// Its places.
+        places: usize,
+        /// Nodes in the mesh.
+        nodes: usize,
+    },
     /// A node belongs to no element, so it has no mass.
     UnusedNode {
         /// The node.
@@ -90,12 +97,32 @@ impl fmt::Display for MeshError {
                 longest_edge * 1e3
             ),
             Self::Inverted { element, volume } => write!(f, "element {element}: volume {volume:.2e} m^3"),
+            Self::Table { places, nodes } => {
+                write!(f, "a table of node numbers has {places} places, the mesh has {nodes} nodes")
+            }
             Self::UnusedNode { node } => write!(f, "node {node} belongs to no element"),
         }
     }
 }
 
 impl core::error::Error for MeshError {}
+
+/// Coordinates are numbers, and elements name nodes that are there.
+pub(crate) fn in_range(points: &[[f32; 3]], tets: &[[u32; 4]]) -> Result<(), MeshError> {
+    for (node, point) in points.iter().enumerate() {
+        for (axis, &value) in point.iter().enumerate() {
+            if !value.is_finite() {
+                return Err(MeshError::NotFinite { node, axis, value });
+            }
+        }
+    }
+    for (element, tet) in tets.iter().enumerate() {
+        if let Some(&node) = tet.iter().find(|&&node| node as usize >= points.len()) {
+            return Err(MeshError::IndexOutOfRange { element, node, nodes: points.len() });
+        }
+    }
+    Ok(())
+}
 
 /// A tetrahedral mesh whose elements are sound: indices in range, four different nodes, finite
 /// coordinates, positive volume. That every node is used is checked when a scene is built, which has the
@@ -113,19 +140,10 @@ impl<'a> Mesh<'a> {
         if points.is_empty() || tets.is_empty() {
             return Err(MeshError::Empty);
         }
-        for (node, point) in points.iter().enumerate() {
-            for (axis, &value) in point.iter().enumerate() {
-                if !value.is_finite() {
-                    return Err(MeshError::NotFinite { node, axis, value });
-                }
-            }
-        }
+        in_range(points, tets)?;
         let mut turned = 0;
         for (element, tet) in tets.iter().enumerate() {
             for (k, &node) in tet.iter().enumerate() {
-                if node as usize >= points.len() {
-                    return Err(MeshError::IndexOutOfRange { element, node, nodes: points.len() });
-                }
                 if tet.iter().take(k).any(|&other| other == node) {
                     return Err(MeshError::RepeatedNode { element, node });
                 }
@@ -164,7 +182,7 @@ impl<'a> Mesh<'a> {
     }
 
     /// Node numbers of each element, turned to positive volume.
-    pub fn tets(&self) -> impl Iterator<Item = [u32; 4]> + 'a {
+    pub fn tets(&self) -> impl Iterator<Item = [u32; 4]> + Clone + 'a {
         let points = self.points;
         self.tets.iter().map(move |&[a, b, c, d]| {
             let tet = [a, b, c, d];

@@ -9,8 +9,9 @@ use core::fmt;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec4};
 
+use crate::chunks::{Chunks, Seats, most_blocks};
 use crate::lanes::{BLOCK, BlockNodes, Real};
-use crate::material::{Law, Material, releasable_energy};
+use crate::material::{Law, Laws, Material, releasable_energy};
 use crate::mesh::{Mesh, MeshError, gradients, volume};
 use crate::symmetric::Symmetric;
 
@@ -161,10 +162,9 @@ impl fmt::Display for BuildError {
 
 impl core::error::Error for BuildError {}
 
-/// Tables of [`BLOCK`] elements, structure of arrays. The elements of a block come from as many distant
-/// parts of the mesh: neighbours share nodes, and adding their forces one after the other would wait for
-/// each sum to reach memory. Places without an element have volume zero and name node 0, to which they add
-/// zero.
+/// Tables of [`BLOCK`] elements, structure of arrays. The elements of a block come from as many parts of the mesh: neighbours
+/// share nodes, and adding their forces one after the other would wait for each sum to reach memory. Places without an
+/// element have volume zero and name the nodes of another, to which they add zero.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct ElementBlock {
@@ -193,13 +193,29 @@ impl ElementBlock {
     /// Node `corner` (0 to 3) of the element in `lane`.
     #[inline(always)]
     pub(crate) fn node(&self, corner: usize, lane: usize) -> usize {
-        self.nodes[corner][lane] as usize
+        self.nodes[corner % 4][lane % BLOCK] as usize
+    }
+
+    /// The nodes, by corner and lane.
+    #[inline(always)]
+    pub(crate) const fn nodes(&self) -> &[[u32; BLOCK]; 4] {
+        &self.nodes
     }
 
     /// The nodes, if all are below `count`.
     #[inline(always)]
     pub(crate) fn nodes_below(&self, count: usize) -> Option<BlockNodes<'_>> {
-        BlockNodes::below(&self.nodes, count)
+        BlockNodes::among(&self.nodes, 0, count)
+    }
+
+    /// Places without an element name the nodes of the first one.
+    fn name_nodes_of_empty_places(&mut self) {
+        for nodes in &mut self.nodes {
+            let first = nodes[0];
+            for (node, volume) in nodes.iter_mut().zip(self.volumes) {
+                *node = if volume > 0.0 { *node } else { first };
+            }
+        }
     }
 
     /// The mesh's number of the element in `lane`.
@@ -223,7 +239,7 @@ impl ElementBlock {
     /// One gradient component of one element, 1/m.
     #[inline(always)]
     pub(crate) fn gradient_of(&self, corner: usize, axis: usize, lane: usize) -> f32 {
-        self.gradients[corner][axis][lane]
+        self.gradients[corner % 3][axis % 3][lane % BLOCK]
     }
 
     /// Largest eigenvalue of `sum_a ga ga^T` for lanes from `first` on, 1/m^2.
@@ -268,10 +284,18 @@ impl NodeInertia {
     }
 }
 
-/// Blocks needed for `elements` elements.
+/// The elements of a scene with their laws.
+#[derive(Clone, Copy)]
+pub(crate) struct Elements<'a, L> {
+    pub(crate) laws: Laws<'a, L>,
+    pub(crate) blocks: &'a [ElementBlock],
+    pub(crate) chunks: &'a Chunks,
+}
+
+/// Blocks that are enough for any `elements` elements.
 #[must_use]
 pub const fn blocks_for(elements: usize) -> usize {
-    elements.div_ceil(BLOCK)
+    most_blocks(elements)
 }
 
 /// A scene over storage `N` for the nodes and `B` for the blocks of elements.
@@ -281,8 +305,8 @@ pub struct Scene<M, N, B> {
     nodes: N,
     blocks: B,
     node_count: usize,
-    block_count: usize,
     element_count: usize,
+    chunks: Chunks,
     mass: f64,
     releasable_energy: f64,
 }
@@ -305,8 +329,8 @@ impl<M, N, B> Scene<M, N, B> {
             nodes,
             blocks,
             node_count: 0,
-            block_count: 0,
             element_count: 0,
+            chunks: Chunks::NONE,
             mass: 0.0,
             releasable_energy: 0.0,
         }
@@ -351,17 +375,18 @@ impl<M: Material, N: AsRef<[NodeInertia]>, B: AsRef<[ElementBlock]>> Scene<M, N,
     /// Blocks of elements in use.
     #[inline(always)]
     pub(crate) fn blocks(&self) -> &[ElementBlock] {
-        self.blocks.as_ref().get(..self.block_count).unwrap_or_default()
+        self.blocks.as_ref().get(..self.chunks.blocks()).unwrap_or_default()
     }
 
-    /// Block and lane of each element, in the mesh's order.
+    /// What internal forces are computed from.
+    pub(crate) fn elements(&self) -> Elements<'_, M::Law> {
+        Elements { laws: self.material.laws(), blocks: self.blocks(), chunks: &self.chunks }
+    }
+
+    /// Block and lane of each element, in the order of the tables.
     pub(crate) fn places(&self) -> impl Iterator<Item = (&ElementBlock, usize)> {
-        let blocks = self.blocks();
-        (0..self.element_count).filter_map(|place| {
-            let lane = place.checked_div(blocks.len())?;
-            // The remainder tells the compiler what is so anyway: lanes are below BLOCK.
-            Some((blocks.get(place - lane * blocks.len())?, lane % BLOCK))
-        })
+        let places = self.blocks().iter().flat_map(|block| (0..BLOCK).map(move |lane| (block, lane)));
+        places.filter(|(block, lane)| block.volumes[lane % BLOCK] > 0.0)
     }
 
     /// Mass of a node, kg; zero for a node that does not exist.
@@ -407,8 +432,8 @@ where
 
     fn clear(&mut self) {
         self.node_count = 0;
-        self.block_count = 0;
         self.element_count = 0;
+        self.chunks = Chunks::NONE;
         self.mass = 0.0;
         self.releasable_energy = 0.0;
     }
@@ -425,18 +450,18 @@ where
         let still = |tet: [u32; 4]| {
             tet.iter().all(|&node| nodes.get(node as usize).is_some_and(|n| n.inverse == [FIXED; 3]))
         };
-        let kept = mesh.tets().filter(|&tet| !still(tet)).count();
-        if kept == 0 {
+        let chunks = Chunks::of(nodes.len(), mesh.tets().filter(|&tet| !still(tet)));
+        let (needed, capacity) = (chunks.blocks(), self.blocks.as_ref().len());
+        if needed == 0 {
             return Err(BuildError::NothingMoves);
         }
-        let needed = blocks_for(kept);
-        let capacity = self.blocks.as_ref().len();
         let Some(blocks) = self.blocks.as_mut().get_mut(..needed) else {
             return Err(BuildError::BlockCapacity { needed, capacity });
         };
         blocks.fill(ElementBlock::EMPTY);
 
-        let mut place = 0;
+        let mut seats = Seats::new(&chunks);
+        let mut elements = 0;
         let (mut mass, mut releasable) = (0.0, 0.0);
         for (element, tet) in mesh.tets().enumerate() {
             let Some(tissue) = self.material.tissue(element) else {
@@ -459,11 +484,17 @@ where
             }
             let fixed =
                 tet.iter().all(|&node| nodes.get(node as usize).is_some_and(|n| n.inverse == [FIXED; 3]));
-            if let (false, Some(block)) = (fixed, blocks.get_mut(place % needed)) {
-                write_element(block, place / needed, element, tet, corners);
-                place += 1;
+            if fixed {
+                continue;
+            }
+            if let Some((block, lane)) = seats.next(tet)
+                && let Some(block) = blocks.get_mut(block)
+            {
+                write_element(block, lane, element, tet, corners);
+                elements += 1;
             }
         }
+        blocks.iter_mut().for_each(ElementBlock::name_nodes_of_empty_places);
         for (node, inertia) in nodes.iter_mut().enumerate() {
             if inertia.mass == 0.0 {
                 return Err(MeshError::UnusedNode { node }.into());
@@ -476,8 +507,8 @@ where
             });
         }
         self.node_count = mesh.points().len();
-        self.block_count = needed;
-        self.element_count = place;
+        self.element_count = elements;
+        self.chunks = chunks;
         self.mass = mass;
         self.releasable_energy = releasable;
         Ok(())

@@ -14,6 +14,7 @@
 //! ([`crate::Ledger`]): with several times more kinetic energy than loads and supports have ever given the step is refused.
 
 use core::fmt;
+use core::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
@@ -21,13 +22,13 @@ use glam::Vec4;
 use crate::frame::{Axes, Frame};
 use crate::lanes::{Kernel, NodeVector, Real, dispatch, dot};
 use crate::loads::Loads;
-use crate::material::{Law, Material};
+use crate::material::Material;
 use crate::mlp::{ForceInput, MAX_INPUTS, Network, Scratch};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
+use crate::threads::{Alone, Threads};
 use crate::tled::{
-    Divergence, Entry, InternalForces, Nothing, Status, Step, Sums, Totals, culprit, external_forces,
-    follow_motions,
+    Divergence, Entry, Forcing, Status, Step, Sums, Totals, culprit, follow_motions, move_in_parts,
 };
 
 /// Numbers that go into the network for each vertex, and that come out.
@@ -180,6 +181,24 @@ where
     S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
     V: AsRef<[Vertex]> + AsMut<[Vertex]>,
 {
+    step_in_parts(scene, loads, state, surrogate, &Alone)
+}
+
+/// The same step, to the bit, on several threads of the host.
+pub fn step_in_parts<M, N, B, S, V>(
+    scene: &Scene<M, N, B>,
+    loads: &Loads<'_>,
+    state: &mut State<S>,
+    surrogate: &mut Surrogate<'_, V>,
+    threads: &impl Threads,
+) -> Status
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+    S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+    V: AsRef<[Vertex]> + AsMut<[Vertex]>,
+{
     let nodes = scene.node_count();
     let room = state.capacity().min(surrogate.vertices.as_ref().len());
     let mismatch = Status::Mismatch { nodes, room };
@@ -203,12 +222,17 @@ where
         account.start = account.start.max(scene.releasable_energy());
     }
 
-    external_forces(force, inertia, loads, *time);
-    let extremes = M::Law::forces(InternalForces::of(scene, displacement, force, Nothing));
-    let (increments, forces) = (&*increment, &*force);
-    let (totals, found) =
-        Predict { network, step, inertia, displacement, increment: increments, force: forces, vertices }
-            .dispatched();
+    let elements = scene.elements();
+    let forcing = Forcing { elements, inertia, displacement, loads, time: *time };
+    let (network, step) = (&*network, &*step);
+    let predict = |nodes: Range<usize>, force: &[NodeVector], vertices: &mut [Vertex]| {
+        let inertia = inertia.get(nodes.clone()).unwrap_or_default();
+        let displacement = displacement.get(nodes.clone()).unwrap_or_default();
+        let increment = increment.get(nodes).unwrap_or_default();
+        Predict { network, step, inertia, displacement, increment, force, vertices }.dispatched()
+    };
+    let (found, extremes) = forcing.in_parts(force, vertices, threads, predict);
+    let totals = Totals::of_all(found.iter().map(|(totals, _)| totals));
 
     let vertices = &*vertices;
     let next = |node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector| {
@@ -226,11 +250,14 @@ where
     };
 
     *ledger = entered;
-    *report = found;
-    for ((displacement, increment), vertex) in displacement.iter_mut().zip(&mut *increment).zip(vertices) {
-        *increment = vertex.next;
-        displacement.0 = (Vec4::from(displacement.0) + Vec4::from(vertex.next.0)).to_array();
-    }
+    *report = Counts::of_all(found.iter().map(|(_, counts)| counts)).report();
+    move_in_parts(elements.chunks, displacement, increment, threads, |nodes, displacement, increment| {
+        let vertices = vertices.get(nodes).unwrap_or_default();
+        for ((displacement, increment), vertex) in displacement.iter_mut().zip(increment).zip(vertices) {
+            *increment = vertex.next;
+            displacement.0 = (Vec4::from(displacement.0) + Vec4::from(vertex.next.0)).to_array();
+        }
+    });
     *dt = step.seconds();
     *time += f64::from(step.seconds());
     *steps += 1;
@@ -238,7 +265,30 @@ where
     extremes.status(ledger, false)
 }
 
-/// Frames, features, network: the next increment of every vertex.
+/// How many vertices are free, and of how many of these the acceleration was clipped or an input is outside.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    free: f32,
+    clipped: f32,
+    outside: f32,
+}
+
+impl Counts {
+    fn of_all<'a>(parts: impl Iterator<Item = &'a Self>) -> Self {
+        parts.fold(Self::default(), |sum, part| Self {
+            free: sum.free + part.free,
+            clipped: sum.clipped + part.clipped,
+            outside: sum.outside + part.outside,
+        })
+    }
+
+    fn report(&self) -> SurrogateReport {
+        let free = self.free.max(1.0);
+        SurrogateReport { clipped: self.clipped / free, outside: self.outside / free }
+    }
+}
+
+/// Frames, features, network: the next increment of vertices.
 struct Predict<'a, 'w> {
     network: &'a Network<'w>,
     step: &'a Step,
@@ -252,13 +302,13 @@ struct Predict<'a, 'w> {
 impl Predict<'_, '_> {
     /// Compiled with this crate, as it is not generic.
     #[inline(never)]
-    fn dispatched(self) -> (Totals, SurrogateReport) {
+    fn dispatched(self) -> (Totals, Counts) {
         dispatch(self)
     }
 }
 
 impl Kernel for Predict<'_, '_> {
-    type Output = (Totals, SurrogateReport);
+    type Output = (Totals, Counts);
 
     #[inline(always)]
     fn run<R: Real>(self) -> Self::Output {
@@ -317,7 +367,7 @@ fn vectors<R: Real>(of: &[NodeVector], first: usize) -> [R; 3] {
 
 impl Predict<'_, '_> {
     #[inline(always)]
-    fn tiles<R: Real, const COLUMNS: usize>(mut self) -> (Totals, SurrogateReport) {
+    fn tiles<R: Real, const COLUMNS: usize>(mut self) -> (Totals, Counts) {
         let mut scratch = Scratch::<R, COLUMNS>::new();
         let zero = R::splat(0.0);
         let mut found =
@@ -345,8 +395,9 @@ impl Predict<'_, '_> {
         let mut totals = Totals::default();
         totals.add_lanes(&found.sums);
         let sum = |counts: R| (0..R::COUNT).map(|lane| counts.lane(lane)).sum::<f32>();
-        let share = |counts: R| sum(counts) / sum(found.free).max(1.0);
-        (totals, SurrogateReport { clipped: share(found.clipped), outside: share(found.outside) })
+        let counts =
+            Counts { free: sum(found.free), clipped: sum(found.clipped), outside: sum(found.outside) };
+        (totals, counts)
     }
 
     /// The nodes from `first` on, with what the network sees of them; where there are none, without mass or freedom.

@@ -242,7 +242,7 @@ impl MatrixBeside<'_> {
         for (length, [x, y, z]) in lengths.iter_mut().zip(images) {
             *length = (x * x + y * y + z * z).root();
         }
-        let Some(nodes) = block.nodes_below(self.diagonal.count()) else {
+        let Some(nodes) = self.diagonal.all_of(block.nodes()) else {
             return bound.scalar;
         };
         let weight = volume * bound.volume * (lengths[0] + lengths[1] + lengths[2] + lengths[3]);

@@ -103,7 +103,7 @@ where
         account.start = account.start.max(scene.releasable_energy());
     }
 
-    external_forces(force, nodal, loads, *time);
+    external_forces(force, 0, nodal, loads, *time);
     let external = dot(force, displacement);
     let functions = lattice.functions();
     let no_lattice = functions == 0;

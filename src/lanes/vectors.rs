@@ -73,30 +73,33 @@ pub(crate) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
     a[2].fused(b[2], a[1].fused(b[1], a[0] * b[0]))
 }
 
-/// Nodes of the elements of a block, known to be below some number: they are checked all at once, so that a kernel does
-/// not have to check them one by one.
+/// Nodes of the elements of a block, known to be in some range: they are checked all at once, so that a kernel does not
+/// have to check them one by one.
 #[derive(Clone, Copy)]
 pub(crate) struct BlockNodes<'a> {
     nodes: &'a [[u32; BLOCK]; 4],
-    /// What they are below.
+    /// Where they are.
+    first: usize,
     count: usize,
 }
 
 impl<'a> BlockNodes<'a> {
     /// The first node, again and again.
-    pub(crate) const NONE: Self = Self { nodes: &[[0; BLOCK]; 4], count: 1 };
+    pub(crate) const NONE: Self = Self { nodes: &[[0; BLOCK]; 4], first: 0, count: 1 };
 
-    /// The nodes, if all are below `count`.
+    /// The nodes, if all are among `count` from `first` on.
     #[inline(always)]
-    pub(crate) fn below(nodes: &'a [[u32; BLOCK]; 4], count: usize) -> Option<Self> {
-        let last = count.checked_sub(1).and_then(|last| i32::try_from(last).ok())?;
-        // The sign of what is negative, or would be if `last` were subtracted from: no vector unit compares unsigned numbers.
+    pub(crate) fn among(nodes: &'a [[u32; BLOCK]; 4], first: usize, count: usize) -> Option<Self> {
+        let (start, last) = (i32::try_from(first).ok()?, i32::try_from(count.checked_sub(1)?).ok()?);
+        start.checked_add(last)?;
+        // The sign of what is negative, or would be were it subtracted: no vector unit compares unsigned numbers. A number
+        // that has wrapped round is beyond `last`, as `start + last` is a number.
         let mut signs = 0;
         for node in nodes.as_flattened() {
-            let node = node.cast_signed();
-            signs |= node | last.wrapping_sub(node);
+            let at = node.cast_signed().wrapping_sub(start);
+            signs |= at | last.wrapping_sub(at);
         }
-        if signs >= 0 { Some(Self { nodes, count }) } else { None }
+        if signs >= 0 { Some(Self { nodes, first, count }) } else { None }
     }
 
     /// Node `corner` (0 to 3) of the element in `lane`.
@@ -124,12 +127,12 @@ impl<'a> Gather<'a> {
     /// nodes are not known to be among the vectors.
     #[inline(always)]
     pub(crate) fn read_lanes<R: Real>(&self, nodes: BlockNodes<'_>, corner: usize, first: usize) -> [R; 3] {
-        if nodes.count > self.0.len() {
+        if nodes.first + nodes.count > self.0.len() {
             return [R::splat(0.0); 3];
         }
         let [x, y, z, _] = R::from_rows(|lane| {
             #[allow(unsafe_code)]
-            // SAFETY: all nodes of the block are below `nodes.count`, which is not above the number of vectors.
+            // SAFETY: all nodes of the block are below `nodes.first + nodes.count`, which is not above the number of vectors.
             unsafe {
                 self.0.get_unchecked(nodes.at(corner, first + lane)).0
             }
@@ -138,33 +141,68 @@ impl<'a> Gather<'a> {
     }
 }
 
-/// Vectors of nodes to add to.
-pub(crate) struct Scatter<'a>(&'a mut [NodeVector]);
+/// Vectors of consecutive nodes to add to.
+pub(crate) struct Scatter<'a> {
+    vectors: &'a mut [NodeVector],
+    /// Whose the first one is.
+    first: usize,
+}
 
 impl<'a> Scatter<'a> {
+    /// Vectors of all nodes.
     pub(crate) const fn new(vectors: &'a mut [NodeVector]) -> Self {
-        Self(vectors)
+        Self::from(0, vectors)
     }
 
-    /// How many there are.
-    pub(crate) const fn count(&self) -> usize {
-        self.0.len()
+    /// Vectors of the nodes from `first` on.
+    pub(crate) const fn from(first: usize, vectors: &'a mut [NodeVector]) -> Self {
+        Self { vectors, first }
+    }
+
+    /// A block's nodes, if all are among those of the vectors.
+    #[inline(always)]
+    pub(crate) fn all_of<'b>(&self, nodes: &'b [[u32; BLOCK]; 4]) -> Option<BlockNodes<'b>> {
+        BlockNodes::among(nodes, self.first, self.vectors.len())
     }
 
     /// Adds for each corner the components in lane `l` to the vector of that node of the element in lane `first + l` of the
-    /// block, in the order of [`Real::corners_to_rows`]; nothing if the block's nodes are not known to be among the vectors.
+    /// block, in the order of [`Real::corners_to_rows`]; nothing if the block's nodes are not known to be among the vectors'.
     #[inline(always)]
     pub(crate) fn add_corners<R: Real>(&mut self, nodes: BlockNodes<'_>, first: usize, values: [[R; 4]; 4]) {
-        if nodes.count > self.0.len() {
+        if nodes.first != self.first || nodes.count > self.vectors.len() {
             return;
         }
+        // Where node 0 would be: one subtraction for all.
+        let vectors = self.vectors.as_mut_ptr().wrapping_sub(self.first);
         R::corners_to_rows(values, |corner, lane, value| {
             #[allow(unsafe_code)]
-            // SAFETY: as in `Gather::read_lanes`.
-            let vector = unsafe { self.0.get_unchecked_mut(nodes.at(corner, first + lane)) };
+            // SAFETY: all nodes of the block are among `nodes.count` from `self.first` on, of which there are vectors.
+            let vector = unsafe { &mut *vectors.wrapping_add(nodes.at(corner, first + lane)) };
             for (sum, value) in vector.0.iter_mut().zip(value) {
                 *sum += value;
             }
         });
+    }
+
+    /// The same for a block of which only some nodes are among those of the vectors: adds to these, slowly.
+    #[inline(always)]
+    pub(crate) fn add_some_corners<R: Real>(
+        &mut self,
+        nodes: &[[u32; BLOCK]; 4],
+        first: usize,
+        values: [[R; 4]; 4],
+    ) {
+        for eight in (0..R::COUNT).step_by(8) {
+            for (nodes, values) in nodes.iter().zip(&values) {
+                for lane in eight..R::COUNT.min(eight + 8) {
+                    let node = nodes[(first + lane) % BLOCK] as usize;
+                    if let Some(vector) = self.vectors.get_mut(node.wrapping_sub(self.first)) {
+                        for (sum, value) in vector.0.iter_mut().zip(values) {
+                            *sum += value.lane(lane);
+                        }
+                    }
+                }
+            }
+        }
     }
 }

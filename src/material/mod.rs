@@ -84,7 +84,7 @@ pub trait Potential<R: Real>: Copy {
 }
 
 /// A hyperelastic law: its constants for one element, and how to lay them side by side.
-pub trait Law: Copy + Sized {
+pub trait Law: Copy + Send + Sync {
     /// The same law with its constants in lanes.
     type Wide<R: Real>: Potential<R>;
 

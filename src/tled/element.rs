@@ -117,6 +117,22 @@ pub struct Extremes<R> {
     pub(crate) saturation: R,
 }
 
+impl<R: Real> Extremes<R> {
+    /// Of no elements.
+    pub(crate) fn none() -> Self {
+        Self { least_j: R::splat(f32::INFINITY), saturation: R::splat(f32::NEG_INFINITY) }
+    }
+
+    /// Of this and the lanes of another.
+    pub(crate) fn with_lanes<O: Real>(mut self, other: &Extremes<O>) -> Self {
+        for lane in 0..O::COUNT {
+            self.least_j = self.least_j.min(R::splat(other.least_j.lane(lane)));
+            self.saturation = self.saturation.max(R::splat(other.saturation.lane(lane)));
+        }
+        self
+    }
+}
+
 impl Extremes<f32> {
     /// What a step that was taken says of itself; `held` if it held back much of the motion.
     pub(crate) fn status(&self, ledger: &Ledger, held: bool) -> Status {
@@ -197,9 +213,8 @@ pub(crate) fn add_forces<R: Real, L: Law>(
     displacement: Gather<'_>,
     force: &mut Scatter<'_>,
     beside: &mut impl Beside,
-) -> Extremes<Pair<R>> {
-    let mut extremes =
-        Extremes { least_j: Pair::<R>::splat(f32::INFINITY), saturation: Pair::splat(f32::NEG_INFINITY) };
+    extremes: &mut Extremes<Pair<R>>,
+) {
     let mut parts = [Part::<R>::nothing(); TOGETHER];
     let vectors = BLOCK / R::COUNT;
     for blocks in blocks.chunks((TOGETHER / vectors).max(1)) {
@@ -216,7 +231,7 @@ pub(crate) fn add_forces<R: Real, L: Law>(
         // The last pair may be half empty: what was there before is computed once more, for nobody.
         for (pair, parts) in parts.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
             let places = [place(2 * pair), place(2 * pair + 1)];
-            let locals = respond::<R, L>(laws, places, parts, &mut extremes);
+            let locals = respond::<R, L>(laws, places, parts, extremes);
             for ((place, part), local) in places.into_iter().zip(parts).zip(&locals).take(count - 2 * pair) {
                 look::<R, L>(laws, place, part, local, beside);
             }
@@ -226,7 +241,6 @@ pub(crate) fn add_forces<R: Real, L: Law>(
             scatter(part, block, first, force);
         }
     }
-    extremes
 }
 
 /// Elements side by side: lanes of a block, from `first` on.
@@ -278,9 +292,6 @@ fn look<R: Real, L: Law>(
 /// The third pass: nodal forces from the stress.
 #[inline(always)]
 fn scatter<R: Real>(part: &Part<R>, block: &ElementBlock, first: usize, force: &mut Scatter<'_>) {
-    let Some(nodes) = block.nodes_below(force.count()) else {
-        return;
-    };
     let deformation = Deformation::with(part.h, part.invariants);
     let stress = deformation.stress(part.p1, part.s);
     let minus_volume = -block.volume::<R>(first);
@@ -300,5 +311,9 @@ fn scatter<R: Real>(part: &Part<R>, block: &ElementBlock, first: usize, force: &
         [c[0], c[1], c[2], fourth],
         [d[0], d[1], d[2], fourth],
     ];
-    force.add_corners(nodes, first, rows);
+    match force.all_of(block.nodes()) {
+        Some(nodes) => force.add_corners(nodes, first, rows),
+        // Elements between the nodes of two threads.
+        None => force.add_some_corners(block.nodes(), first, rows),
+    }
 }

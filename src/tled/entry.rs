@@ -101,6 +101,19 @@ impl Totals {
         Self { kinetic: total(sums.kinetic), momentum: [x, y, z], led: total(sums.led) }
     }
 
+    /// Of all nodes from those of some.
+    pub(crate) fn of_all<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut all = Self::default();
+        for part in parts {
+            all.kinetic += part.kinetic;
+            all.led += part.led;
+            for (sum, momentum) in all.momentum.iter_mut().zip(part.momentum) {
+                *sum += momentum;
+            }
+        }
+        all
+    }
+
     /// Adds sums of nodes side by side, one for each axis.
     pub(crate) fn add_lanes<R: Real>(&mut self, sums: &[Sums<R>; 3]) {
         for (sums, momentum) in sums.iter().zip(&mut self.momentum) {

@@ -13,6 +13,7 @@ mod critical;
 mod element;
 mod energy;
 mod entry;
+mod parts;
 #[cfg(feature = "std")]
 mod spectrum;
 
@@ -22,17 +23,20 @@ pub use energy::{ElementFields, element_fields};
 pub use spectrum::exact_critical_step;
 
 use core::fmt;
+use core::ops::Range;
 
-use crate::lanes::{Gather, Kernel, Pair, Real, Scatter};
 use crate::loads::{Loads, ramp_factor};
-use crate::material::{Law, Laws, Material};
+use crate::material::Material;
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
+use crate::threads::{Alone, Threads};
 
 pub(crate) use critical::CriticalBounds;
 pub(crate) use element::{Beside, Deformation, Extremes, Nothing};
 use entry::{Account, Advance, next_increment};
 pub(crate) use entry::{Entry, Next, Side, Sums, Totals};
+pub use parts::InternalForces;
+pub(crate) use parts::{Forcing, external_forces, move_in_parts};
 
 /// Coefficients of the integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -222,6 +226,23 @@ where
     B: AsRef<[ElementBlock]>,
     S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
 {
+    step_in_parts(scene, loads, state, step, &Alone)
+}
+
+/// The same step, to the bit, on several threads of the host.
+pub fn step_in_parts<M, N, B, S>(
+    scene: &Scene<M, N, B>,
+    loads: &Loads<'_>,
+    state: &mut State<S>,
+    step: &Step,
+    threads: &impl Threads,
+) -> Status
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+    S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+{
     let nodes = scene.node_count();
     let room = state.capacity();
     let State { displacement, increment, force, time, steps, dt, ledger } = state;
@@ -248,10 +269,16 @@ where
         account.start = account.start.max(scene.releasable_energy());
     }
 
-    external_forces(force, inertia, loads, *time);
-    let extremes = M::Law::forces(InternalForces::of(scene, displacement, force, Nothing));
+    let elements = scene.elements();
+    let forcing = Forcing { elements, inertia, displacement, loads, time: *time };
+    let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
+        let inertia = inertia.get(nodes.clone()).unwrap_or_default();
+        let increment = increment.get(nodes).unwrap_or_default();
+        Account { step, inertia, increment, force }.total()
+    };
+    let (totals, extremes) = forcing.in_parts(force, &mut [], threads, totals_of);
+    let totals = Totals::of_all(&totals);
     let next = |_, inertia: &_, increment: &_, force: &_| next_increment(inertia, increment, force, step);
-    let totals = Account { step, inertia, increment, force }.total();
     let entry = Entry::of_totals(&totals, loads, step)
         .with_forces(loads, inertia, increment, force, *time, next)
         .with_motions(loads, displacement, increment, force, *time, step);
@@ -264,7 +291,12 @@ where
     };
 
     *ledger = entered;
-    Advance { step, inertia, displacement, increment, force }.advance();
+    let force = &*force;
+    move_in_parts(elements.chunks, displacement, increment, threads, |nodes, displacement, increment| {
+        let inertia = inertia.get(nodes.clone()).unwrap_or_default();
+        let force = force.get(nodes).unwrap_or_default();
+        Advance { step, inertia, displacement, increment, force }.advance();
+    });
     *dt = step.dt;
     *time += f64::from(step.dt);
     *steps += 1;
@@ -327,73 +359,6 @@ where
     S: AsRef<[NodeVector]>,
 {
     energy::strain_energy(scene, state.displacement.as_ref())
-}
-
-pub(crate) fn external_forces(
-    force: &mut [NodeVector],
-    inertia: &[NodeInertia],
-    loads: &Loads<'_>,
-    time: f64,
-) {
-    let [gx, gy, gz] = loads.gravity();
-    if loads.gravity() == [0.0; 3] {
-        force.fill(NodeVector::ZERO);
-    } else {
-        for (vector, inertia) in force.iter_mut().zip(inertia) {
-            vector.0 = [gx, gy, gz, 0.0].map(|component| component * inertia.mass);
-        }
-    }
-    for load in loads.forces() {
-        let factor = ramp_factor(time, load.ramp);
-        if let Some(vector) = force.get_mut(load.node as usize) {
-            for (sum, newton) in vector.0.iter_mut().zip(load.newton) {
-                *sum += factor * newton;
-            }
-        }
-    }
-}
-
-/// Adds the internal forces of all elements, in their order.
-pub struct InternalForces<'a, L, H> {
-    laws: Laws<'a, L>,
-    blocks: &'a [ElementBlock],
-    displacement: Gather<'a>,
-    force: Scatter<'a>,
-    beside: H,
-}
-
-impl<'a, L: Law, H> InternalForces<'a, L, H> {
-    /// Of a scene's elements.
-    pub(crate) fn of<M, N, B>(
-        scene: &'a Scene<M, N, B>,
-        displacement: &'a [NodeVector],
-        force: &'a mut [NodeVector],
-        beside: H,
-    ) -> Self
-    where
-        M: Material<Law = L>,
-        N: AsRef<[NodeInertia]>,
-        B: AsRef<[ElementBlock]>,
-    {
-        let (laws, blocks) = (scene.material().laws(), scene.blocks());
-        Self { laws, blocks, displacement: Gather::new(displacement), force: Scatter::new(force), beside }
-    }
-}
-
-impl<L: Law, H: Beside> Kernel for InternalForces<'_, L, H> {
-    type Output = Extremes<f32>;
-
-    #[inline(always)]
-    fn run<R: Real>(mut self) -> Extremes<f32> {
-        let Self { laws, blocks, displacement, force, beside } = &mut self;
-        let extremes = element::add_forces::<R, L>(laws, blocks, *displacement, force, beside);
-        let mut reduced = Extremes { least_j: f32::INFINITY, saturation: f32::NEG_INFINITY };
-        for lane in 0..Pair::<R>::COUNT {
-            reduced.least_j = reduced.least_j.min(extremes.least_j.lane(lane));
-            reduced.saturation = reduced.saturation.max(extremes.saturation.lane(lane));
-        }
-        reduced
-    }
 }
 
 /// Puts the nodes of motions where they belong at `time`.

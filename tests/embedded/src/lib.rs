@@ -9,6 +9,7 @@ use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{Exponential, Literal, NeoHookean, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::mlp::Network;
+use supple::numbering;
 use supple::scene::{FixedScene, Support};
 use supple::state::{FixedState, NodeVector};
 use supple::surrogate::{self, Surrogate, Vertex};
@@ -34,6 +35,17 @@ pub extern "C" fn build(
         return -2;
     };
     scene.build(&mesh, supports).map_or(-3, |()| 0)
+}
+
+/// Numbers the nodes anew.
+#[unsafe(no_mangle)]
+pub extern "C" fn renumber(
+    points: &mut [[f32; 3]; 100],
+    tets: &mut [[u32; 4]; 300],
+    old: &mut [u32; 100],
+    new: &mut [u32; 100],
+) -> i32 {
+    numbering::renumber(points, tets, old, new).map_or(-1, |()| 0)
 }
 
 /// The critical step, s.
