@@ -5,20 +5,21 @@
 
 mod common {
     pub(crate) mod bar;
+    pub(crate) mod eight_bits;
     pub(crate) mod pairs;
     pub(crate) mod peak;
     pub(crate) mod vertices;
 }
 
 use common::bar::{self, DAMPING, DT};
+use common::eight_bits::eight_bits;
 use common::pairs::{median, seconds};
 use common::peak;
 use common::vertices::{ROWS, vertices};
 use criterion::{BenchmarkId, Criterion, Throughput};
 use std::hint::black_box;
 use supple::loads::Loads;
-use supple::mlp::quantise::quantise;
-use supple::mlp::{Description, LayerDescription, Network, WeightBytes, write, write_int8};
+use supple::mlp::{Description, LayerDescription, Network, WeightBytes, write};
 use supple::surrogate::{self, Surrogate, Vertex};
 use supple::tled::{self, Step};
 
@@ -37,17 +38,6 @@ fn nothing(like: &Network<'_>) -> WeightBytes {
     };
     let bytes = write(&Description { first: vec![layer], second: Vec::new(), ..Description::of(like) })
         .expect("a sound network");
-    WeightBytes::of(&bytes)
-}
-
-/// The network with all layers in eight bits but the first and the last of each part. Time does not depend on what it was
-/// quantised by.
-fn eight_bits(network: &Network<'_>) -> WeightBytes {
-    let (first, second) = network.layers();
-    let (split, count) = (first.len(), first.len() + second.len());
-    let float = [0, split - 1, split, count - 1];
-    let quantised = quantise(network, &vertices(network), &float).expect("a float32 network");
-    let bytes = write_int8(&Description::of(network), &quantised.layers).expect("a sound network");
     WeightBytes::of(&bytes)
 }
 

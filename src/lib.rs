@@ -19,6 +19,8 @@
 //! | [`mlp`] | dense layers: the forward pass, the weight file |
 //! | [`surrogate`] | the learned step: features, network, clip, increment |
 //! | [`lanes`] | one generic body for every instruction set |
+//! | [`threads`] | who computes a step: the host's threads, rayon's (feature `parallel`), or the caller alone |
+//! | [`numbering`] | numbers for nodes by where they are |
 //!
 //! With the feature `io` meshes are read and fields written (`io`), with `lab` methods are judged against the
 //! exact step over scenes (`lab`), with `train` networks are trained (`train`), with `safetensors` they go to and from
@@ -30,7 +32,7 @@
 //! through its public API. Memory is the caller's: capacity is in the type ([`scene::FixedScene`],
 //! [`state::FixedState`]), in slices or in vectors; too little is an error. A step does the same work every
 //! time and says what became of it ([`tled::Status`]); one that cannot be believed is not taken. The same
-//! input gives the same bits from run to run; with the feature `deterministic`, which fuses no multiplications and
+//! input gives the same bits from run to run and for any number of threads; with the feature `deterministic`, which fuses no multiplications and
 //! additions, on every processor. What a scene does not use costs it nothing: no exponential is linked into a
 //! neo-Hookean scene, elements whose four nodes are fixed are left out.
 //!

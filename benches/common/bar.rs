@@ -24,13 +24,21 @@ pub(crate) fn points() -> Vec<[f32; 3]> {
 }
 
 pub(crate) fn scene<L: Law>(law: L) -> BarScene<L> {
-    let (points, tets): (_, Vec<_>) = (points(), Bar::PAPER.tets().collect());
-    let mesh = Mesh::new(&points, &tets, Winding::Checked).expect("the bar is sound");
+    let fixed: Vec<_> = HELD.map(Support::fixed).collect();
+    scene_of(law, &points(), &Bar::PAPER.tets().collect::<Vec<_>>(), &fixed)
+}
+
+pub(crate) fn scene_of<L: Law>(
+    law: L,
+    points: &[[f32; 3]],
+    tets: &[[u32; 4]],
+    fixed: &[Support],
+) -> BarScene<L> {
+    let mesh = Mesh::new(points, tets, Winding::Checked).expect("the bar is sound");
     let nodes = vec![NodeInertia::EMPTY; points.len()];
     let blocks = vec![ElementBlock::EMPTY; blocks_for(tets.len())];
     let mut scene = Scene::over(Tissue { law, density: DENSITY }, nodes, blocks);
-    let fixed: Vec<_> = HELD.map(Support::fixed).collect();
-    scene.build(&mesh, &fixed).expect("the bar is sound");
+    scene.build(&mesh, fixed).expect("the bar is sound");
     scene
 }
 

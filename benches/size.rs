@@ -1,0 +1,138 @@
+//! Time of an exact step from 6.5 thousand tetrahedra to a million, on one thread and on two, and with nodes numbered in order,
+//! as if by chance, and anew ([`supple::numbering`]).
+//!
+//! `cargo bench --bench size --features parallel` prints medians, and the least time in brackets, of runs in turn. It has no
+//! criterion group: a body of that size takes seconds to prepare.
+
+mod common {
+    #[allow(dead_code)] // This bench has loads and supports of its own.
+    pub(crate) mod bar;
+    pub(crate) mod pairs;
+}
+
+use common::bar::{self, BarScene, DAMPING, HostState};
+use common::pairs::{median, seconds};
+use supple::loads::Loads;
+use supple::material::Exponential;
+use supple::mesh::Bar;
+use supple::numbering::renumber;
+use supple::scene::Support;
+use supple::threads::Rayon;
+use supple::tled::{self, Step};
+
+const SIZES: [[u32; 3]; 5] = [[8, 8, 17], [16, 16, 32], [20, 20, 42], [32, 32, 64], [44, 44, 88]];
+const ROUNDS: usize = 21;
+
+/// A bar with its nodes and elements in some order.
+struct Body {
+    points: Vec<[f32; 3]>,
+    tets: Vec<[u32; 4]>,
+}
+
+impl Body {
+    fn in_order(cells: [u32; 3]) -> Self {
+        let bar = Bar { size: [0.1, 0.1, 0.2], cells };
+        Self { points: bar.points().collect(), tets: bar.tets().collect() }
+    }
+
+    fn shuffled(&self) -> Self {
+        let mut state = 0x9e37_79b9_u64;
+        let mut below = |count: usize| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state % count as u64) as usize
+        };
+        let mut numbers: Vec<u32> = (0..self.points.len() as u32).collect();
+        (1..numbers.len()).rev().for_each(|last| numbers.swap(last, below(last + 1)));
+        let mut points = self.points.clone();
+        for (point, &number) in self.points.iter().zip(&numbers) {
+            points[number as usize] = *point;
+        }
+        let mut tets: Vec<_> = self.tets.iter().map(|tet| tet.map(|node| numbers[node as usize])).collect();
+        (1..tets.len()).rev().for_each(|last| tets.swap(last, below(last + 1)));
+        Self { points, tets }
+    }
+
+    fn renumbered(mut self) -> Self {
+        let (mut old, mut new) = (vec![0; self.points.len()], vec![0; self.points.len()]);
+        renumber(&mut self.points, &mut self.tets, &mut old, &mut new).expect("a sound mesh");
+        self
+    }
+}
+
+/// A bent body that swings.
+struct Run {
+    scene: BarScene<Exponential>,
+    state: HostState,
+    step: Step,
+    steps: usize,
+}
+
+impl Run {
+    fn new(Body { points, tets }: &Body) -> Self {
+        let held = points.iter().enumerate().filter(|(_, point)| point[2] == 0.0);
+        let held: Vec<_> = held.map(|(node, _)| Support::fixed(node as u32)).collect();
+        let scene = bar::scene_of(bar::EXPONENTIAL, points, tets, &held);
+        let mut state = bar::state(points.len());
+        let critical = tled::critical_step(&scene, &mut state).expect("the bar has a critical step");
+        let step = Step::new(critical.seconds, DAMPING, critical).expect("that step");
+        // Bent from the start: in a body at rest the front of the first wave is so weak that numbers are denormal, and
+        // these are ten times as slow.
+        let bent = |node: usize| {
+            let [x, y, z] = points[node];
+            ([0.01 * z * y, 0.001 * (30.0 * x).sin() * z, -0.01 * z * x], [0.0; 3])
+        };
+        assert!(tled::start(&scene, &mut state, &step, bent));
+        let steps = (100_000 / tets.len()).max(1);
+        Self { scene, state, step, steps }
+    }
+
+    /// Seconds for a step.
+    fn time(&mut self, parts: usize) -> f64 {
+        let loads = Loads::NONE;
+        let time = seconds(|| {
+            for _ in 0..self.steps {
+                let threads = Rayon { parts };
+                let (scene, state) = (&self.scene, &mut self.state);
+                bar::moved(tled::step_in_parts(scene, &loads, state, &self.step, &threads));
+            }
+        });
+        time / self.steps as f64
+    }
+}
+
+/// Median, and least in brackets.
+fn both(times: &[f64], unit: f64) -> String {
+    let least = times.iter().copied().fold(f64::INFINITY, f64::min);
+    format!("{:.1} ({:.1})", median(times.to_vec()) * unit, least * unit)
+}
+
+fn main() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads");
+    println!("tetrahedra | ns/tet in order | shuffled | renumbered | two threads, ns/tet | times faster");
+    for cells in SIZES {
+        let body = Body::in_order(cells);
+        let shuffled = body.shuffled();
+        let unit = 1e9 / body.tets.len() as f64;
+        let mut in_order = Run::new(&body);
+        let mut shuffled_run = Run::new(&shuffled);
+        let mut renumbered = Run::new(&shuffled.renumbered());
+        let mut times = [const { Vec::new() }; 4];
+        let mut ratios = Vec::new();
+        pool.install(|| {
+            for _ in 0..ROUNDS {
+                let [one, two] = [1, 2].map(|parts| in_order.time(parts));
+                ratios.push(one / two);
+                let found = [one, shuffled_run.time(1), renumbered.time(1), two];
+                times.iter_mut().zip(found).for_each(|(times, time)| times.push(time));
+            }
+        });
+        let [in_order, shuffled, renumbered, two] = times.map(|times| both(&times, unit));
+        println!(
+            "{} | {in_order} | {shuffled} | {renumbered} | {two} | {:.2}",
+            body.tets.len(),
+            median(ratios)
+        );
+    }
+}
