@@ -1,5 +1,5 @@
 //! Numbers for nodes by where they are. A step reads and adds to the nodes of each element: neighbours with near numbers share
-//! cache lines, and only with such numbers can threads share a scene ([`crate::chunks`]). Meshes from a generator are often
+//! cache lines, and only with such numbers can threads share a scene (`src/chunks.rs`). Meshes from a generator are often
 //! numbered as if by chance.
 
 use crate::mesh::{MeshError, in_range};

@@ -1,4 +1,4 @@
-//! Who computes a step. Threads belong to the host: a step is cut into parts that share nothing ([`crate::chunks`]), and a host
+//! Who computes a step. Threads belong to the host: a step is cut into parts that share nothing (`src/chunks.rs`), and a host
 //! with threads says where they run. The bits do not depend on it.
 
 /// Most parts of a step.
