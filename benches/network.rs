@@ -47,7 +47,7 @@ fn eight_bits(network: &Network<'_>) -> WeightBytes {
     let (split, count) = (first.len(), first.len() + second.len());
     let float = [0, split - 1, split, count - 1];
     let quantised = quantise(network, &vertices(network), &float).expect("a float32 network");
-    let bytes = write_int8(&Description::of(network), &quantised.layers).expect("a sound network");
+    let bytes = write_int8(&quantised.description, &quantised.layers).expect("a sound network");
     WeightBytes::of(&bytes)
 }
 
