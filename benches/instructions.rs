@@ -23,7 +23,7 @@ use supple::tled::{self, Step};
 
 const COMPACT: &[u8] = include_bytes!("../weights/compact-10.weights");
 /// Small, with layers of eight bits.
-const INT8: &[u8] = include_bytes!("../tests/data/golden-v2.weights");
+const INT8: &[u8] = include_bytes!("../tests/data/golden-v3.weights");
 
 fn exact<L: Law>(law: L, times: u32) {
     let scene = bar::scene(law);

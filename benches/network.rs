@@ -5,14 +5,12 @@
 
 mod common {
     pub(crate) mod bar;
-    pub(crate) mod eight_bits;
     pub(crate) mod pairs;
     pub(crate) mod peak;
     pub(crate) mod vertices;
 }
 
 use common::bar::{self, DAMPING, DT};
-use common::eight_bits::eight_bits;
 use common::pairs::{median, seconds};
 use common::peak;
 use common::vertices::{ROWS, vertices};
@@ -26,7 +24,9 @@ use supple::tled::{self, Step};
 const ROUNDS: usize = 41;
 
 const PAPER: &[u8] = include_bytes!("../weights/paper-10.weights");
+const PAPER_INT8: &[u8] = include_bytes!("../weights/paper-10-i8.weights");
 const COMPACT: &[u8] = include_bytes!("../weights/compact-10.weights");
+const COMPACT_INT8: &[u8] = include_bytes!("../weights/compact-10-i8.weights");
 
 /// A network of one small layer that predicts nothing: what a learned step costs beside its network.
 fn nothing(like: &Network<'_>) -> WeightBytes {
@@ -44,11 +44,10 @@ fn nothing(like: &Network<'_>) -> WeightBytes {
 fn forward(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("forward, 1458 vertices");
     group.throughput(Throughput::Elements(ROWS as u64));
-    for (name, bytes) in [("paper", PAPER), ("compact", COMPACT)] {
-        let bytes = WeightBytes::of(bytes);
+    for (name, bytes, int8) in [("paper", PAPER, PAPER_INT8), ("compact", COMPACT, COMPACT_INT8)] {
+        let (bytes, int8) = (WeightBytes::of(bytes), WeightBytes::of(int8));
         let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
-        let int8 = eight_bits(&network);
-        let int8 = Network::parse(int8.bytes()).expect("a sound network");
+        let int8 = Network::parse(int8.bytes()).expect("a weight file of the crate");
         let values = vertices(&network);
         let mut predicted = vec![0.0; ROWS * network.outputs().len()];
         group.bench_function(BenchmarkId::new(name, "f32"), |b| {
@@ -85,8 +84,7 @@ fn steps(criterion: &mut Criterion) {
     let mut exact = || bar::moved(tled::step(&scene, &loads, &mut exact_state, &exact_step));
     (0..10_000).for_each(|_| exact());
 
-    let [paper, compact] = [PAPER, COMPACT].map(WeightBytes::of);
-    let compact_int8 = eight_bits(&Network::parse(compact.bytes()).expect("a weight file of the crate"));
+    let [paper, compact, compact_int8] = [PAPER, COMPACT, COMPACT_INT8].map(WeightBytes::of);
     let empty = nothing(&Network::parse(compact.bytes()).expect("a weight file of the crate"));
     let mut learned =
         [("no network", &empty), ("compact", &compact), ("paper", &paper), ("compact int8", &compact_int8)]

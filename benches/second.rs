@@ -5,14 +5,11 @@
 
 mod common {
     pub(crate) mod bar;
-    pub(crate) mod eight_bits;
     pub(crate) mod pairs;
     pub(crate) mod scaled;
-    pub(crate) mod vertices;
 }
 
 use common::bar::{self, DAMPING, DT};
-use common::eight_bits::eight_bits;
 use common::pairs::{median, seconds};
 use common::scaled::{DAMPED_LATTICE, LATTICE, scaled};
 use supple::loads::Loads;
@@ -40,9 +37,13 @@ fn main() {
         }
         bar::moved(tled::step(&scene, &loads, &mut state, &step));
     }
-    let compact = WeightBytes::of(include_bytes!("../weights/compact-20.weights"));
-    let paper = WeightBytes::of(include_bytes!("../weights/paper-20.weights"));
-    let compact_int8 = eight_bits(&Network::parse(compact.bytes()).expect("a weight file of the crate"));
+    let [compact, compact_int8, paper, paper_int8]: [&'static WeightBytes; 4] = [
+        include_bytes!("../weights/compact-20.weights").as_slice(),
+        include_bytes!("../weights/compact-20-i8.weights"),
+        include_bytes!("../weights/paper-20.weights"),
+        include_bytes!("../weights/paper-20-i8.weights"),
+    ]
+    .map(|bytes| &*Box::leak(Box::new(WeightBytes::of(bytes))));
     let learned = |bytes: &'static WeightBytes| {
         let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
         let mut surrogate =
@@ -68,6 +69,7 @@ fn main() {
         ("compact network", Box::new(learned(compact))),
         ("compact network, int8", Box::new(learned(compact_int8))),
         ("paper's network", Box::new(learned(paper))),
+        ("paper's network, int8", Box::new(learned(paper_int8))),
     ];
     let mut exact_state = state.clone();
     let mut exact =

@@ -60,7 +60,7 @@ proptest! {
 /// What PyTorch would train is the float32 network.
 #[test]
 fn layers_of_eight_bits_are_not_exported() {
-    let memory = Memory::of(&std::fs::read("tests/data/golden-v2.weights").unwrap());
+    let memory = Memory::of(&std::fs::read("tests/data/golden-v3.weights").unwrap());
     let refused = to_safetensors(&Network::parse(memory.bytes()).unwrap()).unwrap_err();
     assert_eq!(
         refused.to_string(),

@@ -1,64 +1,10 @@
-//! Whole numbers side by side, for networks of eight-bit weights and activations. Everything here is exact, so every
+//! Whole numbers side by side, for layers of eight-bit weights and activations. Everything here is exact, so every
 //! instruction set gives the same bits; [`Packed`] says in plain loops what the others must give.
 //!
 //! Activations are `u8`, four channels of a vertex in one word of 32 bits, channel 0 lowest; a lane is a vertex. Weights
-//! are `i8`. A sum of products is an `i32` and never saturates: the weight file is checked for that. It becomes an
-//! activation again by [`Requantise`], in whole numbers throughout:
-//!
-//! ```text
-//! t = clamp(sum >> shift, -2^15, 2^15 - 1)                      rounds down; the bias holds the half that rounds to nearest
-//! q = clamp(zero + max(positive * t, negative * t), 0, 255)     a * b here is (a b + 2^14) >> 15
-//! ```
-//! `0 <= negative <= positive`, so the maximum is a leaky ReLU. The product of sixteen bits is one instruction in SSSE3
-//! (`pmulhrsw`), NEON (`sqrdmulh`) and wasm (`q15mulr_sat`), and handles twice as many numbers as one of 32 would.
-
-use bytemuck::{Pod, Zeroable};
+//! are `i8`. A sum of products is an `i32`; layers are not wide enough for one to overflow.
 
 use super::Real;
-
-/// From a sum to an activation, see the module: one for each output of a layer.
-#[derive(Clone, Copy, Debug, Default, Eq, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Requantise {
-    /// Factor of positive sums, zero to 2^15 - 1.
-    pub positive: i16,
-    /// Factor of negative ones, from zero to `positive`.
-    pub negative: i16,
-    /// The activation that stands for zero; it may lie outside 0 to 255.
-    pub zero: i16,
-    /// Bits that are dropped first, 0 to 30.
-    pub shift: i16,
-}
-
-impl Requantise {
-    /// The activation of a sum.
-    #[must_use]
-    #[inline(always)]
-    pub const fn apply(self, sum: i32) -> u8 {
-        let shifted = sum >> (self.shift & 31);
-        let kept = if shifted > 32_767 {
-            32_767
-        } else if shifted < -32_768 {
-            -32_768
-        } else {
-            shifted
-        };
-        let positive = (kept * self.positive as i32 + 0x4000) >> 15;
-        let negative = (kept * self.negative as i32 + 0x4000) >> 15;
-        let q = (if positive > negative { positive } else { negative }) + self.zero as i32;
-        if q < 0 {
-            0
-        } else if q > 255 {
-            255
-        } else {
-            q as u8
-        }
-    }
-}
-
-/// Four outputs of four vertices, transposed, by the places of their bytes: for instructions that pick bytes.
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-pub(super) const VERTICES: [u8; 16] = [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15];
 
 /// Adding this to a number between -2^22 and 2^22 rounds it to a whole one, half to even, that stands in the low bits.
 pub(crate) const ROUNDING: f32 = 12_582_912.0;
@@ -73,8 +19,6 @@ pub trait Whole<R: Real>: Copy {
     /// `self` plus the four products of each lane's bytes, which are from 0 to 255, with the weights.
     #[must_use]
     fn dot(self, bytes: Self, weights: [i8; 4]) -> Self;
-    /// Four outputs' sums as bytes.
-    fn requantise(sums: [Self; 4], by: &[Requantise; 4]) -> Self;
     /// The numbers, each rounded to the nearest float32 and half to even.
     fn numbers(self) -> R;
     /// The lowest bytes of what floats consist of.
@@ -103,16 +47,6 @@ impl<R: Real, const L: usize> Whole<R> for Packed<L> {
             *sum = sum.wrapping_add(products);
         }
         Self(sums)
-    }
-    #[inline(always)]
-    fn requantise(sums: [Self; 4], by: &[Requantise; 4]) -> Self {
-        let mut bytes = [0; L];
-        for (place, (sums, by)) in sums.iter().zip(by).enumerate() {
-            for (bytes, &sum) in bytes.iter_mut().zip(&sums.0) {
-                *bytes |= i32::from(by.apply(sum)) << (8 * place);
-            }
-        }
-        Self(bytes)
     }
     #[inline(always)]
     fn numbers(self) -> R {

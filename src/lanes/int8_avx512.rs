@@ -8,19 +8,11 @@
 use core::arch::x86_64::*;
 
 use super::avx512::Avx512;
-use super::int8::{Requantise, VERTICES, Whole};
-use super::int8_avx2::{NEGATIVE, POSITIVE, ZERO};
-
-/// Bytes of each 128 bits, by their places.
-#[inline(always)]
-fn picked(from: __m512i, places: [u8; 16]) -> __m512i {
-    // SAFETY: the processor has AVX-512, see the module.
-    unsafe { _mm512_shuffle_epi8(from, _mm512_broadcast_i32x4(bytemuck::must_cast(places))) }
-}
+use super::int8::Whole;
 
 #[inline(always)]
 fn low_byte(number: Avx512) -> __m512i {
-    // SAFETY: as above.
+    // SAFETY: the processor has AVX-512, see the module.
     unsafe { _mm512_and_si512(_mm512_castps_si512(number.0), _mm512_set1_epi32(255)) }
 }
 
@@ -28,24 +20,6 @@ fn low_byte(number: Avx512) -> __m512i {
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 pub(super) struct Bytes64(__m512i);
-
-impl Bytes64 {
-    /// Two outputs' sums, brought to activations that are not clamped yet.
-    #[inline(always)]
-    fn pair(a: Self, b: Self, [by_a, by_b]: [Requantise; 2]) -> __m512i {
-        // SAFETY: as above.
-        unsafe {
-            let both: __m128i = bytemuck::must_cast([by_a, by_b]);
-            let by = _mm512_broadcast_i32x4(both);
-            let a = _mm512_srav_epi32(a.0, _mm512_set1_epi32(i32::from(by_a.shift)));
-            let b = _mm512_srav_epi32(b.0, _mm512_set1_epi32(i32::from(by_b.shift)));
-            let kept = _mm512_packs_epi32(a, b);
-            let positive = _mm512_mulhrs_epi16(kept, picked(by, POSITIVE));
-            let negative = _mm512_mulhrs_epi16(kept, picked(by, NEGATIVE));
-            _mm512_adds_epi16(_mm512_max_epi16(positive, negative), picked(by, ZERO))
-        }
-    }
-}
 
 impl Whole<Avx512> for Bytes64 {
     const EIGHT: bool = true;
@@ -60,12 +34,6 @@ impl Whole<Avx512> for Bytes64 {
         let weights = i32::from_le_bytes(bytemuck::must_cast(weights));
         // SAFETY: as above.
         Self(unsafe { _mm512_dpbusd_epi32(self.0, bytes.0, _mm512_set1_epi32(weights)) })
-    }
-    #[inline(always)]
-    fn requantise([a, b, c, d]: [Self; 4], &[by_a, by_b, by_c, by_d]: &[Requantise; 4]) -> Self {
-        let (ab, cd) = (Self::pair(a, b, [by_a, by_b]), Self::pair(c, d, [by_c, by_d]));
-        // SAFETY: as above.
-        unsafe { Self(picked(_mm512_packus_epi16(ab, cd), VERTICES)) }
     }
     #[inline(always)]
     fn numbers(self) -> Avx512 {

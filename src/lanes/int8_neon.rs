@@ -8,7 +8,7 @@
 
 use core::arch::aarch64::*;
 
-use super::int8::{Requantise, VERTICES, Whole};
+use super::int8::Whole;
 use super::neon::Neon;
 
 #[inline(always)]
@@ -17,34 +17,10 @@ fn low_byte(number: Neon) -> uint32x4_t {
     unsafe { vandq_u32(vreinterpretq_u32_f32(number.0), vdupq_n_u32(255)) }
 }
 
-/// The first in the lower four, the second in the upper.
-#[inline(always)]
-fn halves(low: i16, high: i16) -> int16x8_t {
-    // SAFETY: as above.
-    unsafe { vcombine_s16(vdup_n_s16(low), vdup_n_s16(high)) }
-}
-
 /// Four of them.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 pub(super) struct Bytes16(int32x4_t);
-
-impl Bytes16 {
-    /// Two outputs' sums, brought to activations.
-    #[inline(always)]
-    fn pair(a: Self, b: Self, [by_a, by_b]: [Requantise; 2]) -> uint8x8_t {
-        // SAFETY: as above.
-        unsafe {
-            // To the left by a negative number of bits.
-            let a = vshlq_s32(a.0, vdupq_n_s32(-i32::from(by_a.shift)));
-            let b = vshlq_s32(b.0, vdupq_n_s32(-i32::from(by_b.shift)));
-            let kept = vcombine_s16(vqmovn_s32(a), vqmovn_s32(b));
-            let positive = vqrdmulhq_s16(kept, halves(by_a.positive, by_b.positive));
-            let negative = vqrdmulhq_s16(kept, halves(by_a.negative, by_b.negative));
-            vqmovun_s16(vqaddq_s16(vmaxq_s16(positive, negative), halves(by_a.zero, by_b.zero)))
-        }
-    }
-}
 
 impl Whole<Neon> for Bytes16 {
     #[inline(always)]
@@ -65,12 +41,6 @@ impl Whole<Neon> for Bytes16 {
             let sums = vpadalq_s16(self.0, vmulq_s16(even, weights([a, c])));
             Self(vpadalq_s16(sums, vmulq_s16(odd, weights([b, d]))))
         }
-    }
-    #[inline(always)]
-    fn requantise([a, b, c, d]: [Self; 4], &[by_a, by_b, by_c, by_d]: &[Requantise; 4]) -> Self {
-        let (ab, cd) = (Self::pair(a, b, [by_a, by_b]), Self::pair(c, d, [by_c, by_d]));
-        // SAFETY: as above.
-        unsafe { Self(vreinterpretq_s32_u8(vqtbl1q_u8(vcombine_u8(ab, cd), bytemuck::must_cast(VERTICES)))) }
     }
     #[inline(always)]
     fn numbers(self) -> Neon {

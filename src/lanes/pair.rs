@@ -6,7 +6,7 @@
 use core::ops::{Add, Mul, Neg, Sub};
 
 use super::Real;
-use super::int8::{Requantise, Whole};
+use super::int8::Whole;
 
 /// The lanes of the first, then those of the second.
 #[derive(Clone, Copy, Debug)]
@@ -94,10 +94,6 @@ impl<R: Real, W: Whole<R>> Whole<Pair<R>> for Pair<W> {
     #[inline(always)]
     fn dot(self, bytes: Self, weights: [i8; 4]) -> Self {
         Self(self.0.dot(bytes.0, weights), self.1.dot(bytes.1, weights))
-    }
-    #[inline(always)]
-    fn requantise([a, b, c, d]: [Self; 4], by: &[Requantise; 4]) -> Self {
-        Self(W::requantise([a.0, b.0, c.0, d.0], by), W::requantise([a.1, b.1, c.1, d.1], by))
     }
     #[inline(always)]
     fn numbers(self) -> Pair<R> {

@@ -1,4 +1,4 @@
-//! Weight files (`weights/FORMAT.md`, versions 1 and 2): little-endian, checksummed, read where they are. Nothing of a file is
+//! Weight files (`weights/FORMAT.md`, versions 1 and 3): little-endian, checksummed, read where they are. Nothing of a file is
 //! believed before its checksum and every field have been checked.
 
 use core::fmt;
@@ -15,8 +15,8 @@ compile_error!("weight files are little-endian and read in place");
 pub const MAGIC: [u8; 8] = *b"SUPPLE-W";
 /// All layers in float32.
 pub(super) const VERSION: u32 = 1;
-/// Layers may be of eight bits.
-pub(super) const VERSION_INT8: u32 = 2;
+/// Layers may be of eight bits. Version 2 had another kind of them, and was never released.
+pub(super) const VERSION_INT8: u32 = 3;
 /// Arrays begin at multiples of this.
 pub(super) const ALIGNMENT: usize = 64;
 /// Where the checksum's bytes begin.
@@ -224,12 +224,10 @@ pub enum WeightError {
         /// Its value.
         value: i32,
     },
-    /// A scale of an eight-bit layer is not positive, or the activation for zero not a whole number of 16 bits.
+    /// A scale of an eight-bit layer is not positive.
     Scale {
         /// Which layer, from zero.
         layer: u32,
-        /// What it is.
-        field: &'static str,
         /// Byte of the file.
         at: u32,
         /// Its value.
@@ -241,15 +239,6 @@ pub enum WeightError {
         layer: u32,
         /// Byte of the file.
         at: u32,
-    },
-    /// A sum of an eight-bit layer might need more than 32 bits.
-    Overflow {
-        /// Which layer, from zero.
-        layer: u32,
-        /// Which output.
-        output: u32,
-        /// The largest sum there may be.
-        sum: i64,
     },
     /// The recipe lies outside the file or is not UTF-8.
     Recipe {
@@ -289,14 +278,11 @@ impl fmt::Display for WeightError {
             Self::Number { layer, field, at, value } => {
                 write!(f, "layer {layer}: {field}, at byte {at}, is {value}")
             }
-            Self::Scale { layer, field, at, value } => {
-                write!(f, "layer {layer}: {field}, at byte {at}, is {value}")
+            Self::Scale { layer, at, value } => {
+                write!(f, "layer {layer}: an output's scale, at byte {at}, is {value}")
             }
             Self::Padding { layer, at } => {
                 write!(f, "layer {layer}: byte {at} belongs to no input or output and is not zero")
-            }
-            Self::Overflow { layer, output, sum } => {
-                write!(f, "layer {layer}: sums of output {output} may reach {sum}, more than 32 bits hold")
             }
             Self::Recipe { at, length } => {
                 write!(f, "the recipe, {length} bytes from byte {at} on, is not text in the file")
@@ -405,7 +391,7 @@ impl<'w> Network<'w> {
                 *long = entry;
             }
         }
-        let most = header.version - VERSION;
+        let most = u32::from(header.version == VERSION_INT8);
         let entries = entries.get(..count).unwrap_or_default();
         let mut layers = [Layer::NONE; MAX_LAYERS];
         for (number, (layer, entry)) in layers.iter_mut().zip(entries).enumerate() {
@@ -415,7 +401,6 @@ impl<'w> Network<'w> {
                 return Err(WeightError::Layer { layer: number as u32, field, value: precision });
             }
             let other = |number: usize| entries.get(number).map_or(LayerEntry::default(), |long| long.entry);
-            let starts = number == 0 || number == first;
             let last = number + 1 == first || number + 1 == count;
             let place = Place {
                 number: number as u32,
@@ -426,8 +411,6 @@ impl<'w> Network<'w> {
                     _ => other(number - 1).outputs as usize,
                 },
                 wanted: if last { Some(outputs.len()) } else { None },
-                after_int8: !starts && other(number - 1).precision == 1,
-                before_int8: !last && other(number + 1).precision == 1,
             };
             *layer = checked_layer(bytes, entry, place)?;
         }

@@ -7,7 +7,7 @@
 //!
 //! A network that has layers of eight bits ([`super::int8`]) fuses nothing, so that it gives the same bits on every processor.
 
-use super::int8::{Outputs, Words, quantise};
+use super::int8::Words;
 use super::{Layer, MAX_INPUTS, MAX_OUTPUTS, MAX_WIDTH, Network, Numbers};
 use crate::lanes::int8::Whole;
 use crate::lanes::{Kernel, Real, dispatch};
@@ -19,8 +19,7 @@ pub(crate) type Tile<R, const COLUMNS: usize> = [R; COLUMNS];
 pub(crate) struct Scratch<R: Real, const COLUMNS: usize> {
     here: [Tile<R, COLUMNS>; MAX_WIDTH],
     there: [Tile<R, COLUMNS>; MAX_WIDTH],
-    words_here: Words<R, COLUMNS>,
-    words_there: Words<R, COLUMNS>,
+    words: Words<R, COLUMNS>,
 }
 
 impl<R: Real, const COLUMNS: usize> Scratch<R, COLUMNS> {
@@ -28,7 +27,7 @@ impl<R: Real, const COLUMNS: usize> Scratch<R, COLUMNS> {
     pub(crate) fn new() -> Self {
         let zero = [[R::splat(0.0); COLUMNS]; MAX_WIDTH];
         let words = [[R::Whole::splat(0); COLUMNS]; _];
-        Self { here: zero, there: zero, words_here: words, words_there: words }
+        Self { here: zero, there: zero, words }
     }
 }
 
@@ -89,37 +88,25 @@ fn dense<R: Real, const COLUMNS: usize, const FUSED: bool>(
     }
 }
 
-/// Layers one after the other, from `here` to what is returned. The last hands on float32.
+/// Layers one after the other, from `here` to what is returned.
 #[inline(always)]
 fn run<'a, R: Real, const COLUMNS: usize, const FUSED: bool>(
     layers: &[Layer<'_>],
     scratch: &'a mut Scratch<R, COLUMNS>,
 ) -> &'a [Tile<R, COLUMNS>] {
-    let Scratch { here, there, words_here, words_there } = scratch;
+    let Scratch { here, there, words } = scratch;
     let (mut from, mut to) = (here, there);
-    let (mut words, mut words_to) = (words_here, words_there);
     for layer in layers {
         match &layer.numbers {
             Numbers::Float { weights, biases } => {
                 dense::<R, COLUMNS, FUSED>(layer, (weights, biases), from.as_slice(), to.as_mut_slice());
-                core::mem::swap(&mut from, &mut to);
             }
             Numbers::Int8(int8) => {
-                if let Some(by) = int8.quantise {
-                    quantise(by, from.as_slice(), words);
-                }
-                match int8.outputs {
-                    Outputs::Requantised(by) => {
-                        int8.words::<R, COLUMNS>(layer.inputs, by, words, words_to);
-                        core::mem::swap(&mut words, &mut words_to);
-                    }
-                    Outputs::Float(scales) => {
-                        int8.floats(layer.inputs, scales, layer.activation, words, to.as_mut_slice());
-                        core::mem::swap(&mut from, &mut to);
-                    }
-                }
+                let inputs = from.get(..layer.inputs).unwrap_or_default();
+                int8.run(layer.activation, inputs, words, to.as_mut_slice());
             }
         }
+        core::mem::swap(&mut from, &mut to);
     }
     from
 }

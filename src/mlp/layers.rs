@@ -1,14 +1,12 @@
-//! The layer table of a weight file (`weights/FORMAT.md`): every field is checked before a layer is handed on, and of eight-bit
-//! layers that no sum can leave 32 bits, whatever goes in.
+//! The layer table of a weight file (`weights/FORMAT.md`): every field is checked before a layer is handed on.
 
 use bytemuck::{Pod, Zeroable};
 
 use super::file::{ALIGNMENT, HEADER, WeightError, take};
-use super::int8::{BLOCK, GROUP, Int8, Outputs, Quantise, WeightTile};
+use super::int8::{BLOCK, GROUP, Int8, WeightTile};
 use super::{Activation, Layer, MAX_WIDTH, Numbers};
-use crate::lanes::int8::Requantise;
 
-/// An entry of version 1, and what begins one of version 2.
+/// An entry of version 1, and what begins one of version 3.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct LayerEntry {
@@ -22,16 +20,18 @@ pub(super) struct LayerEntry {
     pub(super) reserved: u32,
 }
 
-/// An entry of version 2.
+/// An entry of version 3.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct LongEntry {
     pub(super) entry: LayerEntry,
-    /// Where the table of [`Quantise`] begins, or zero.
-    pub(super) quantise: u32,
-    /// Where the table of [`Requantise`] or the scales begin, or zero.
-    pub(super) outputs: u32,
-    pub(super) reserved: [u32; 2],
+    /// Where the starts of the sums begin, or zero for a layer of float32.
+    pub(super) starts: u32,
+    /// The same of the scales.
+    pub(super) scales: u32,
+    /// The activation that stands for zero, or zero.
+    pub(super) zero: u32,
+    pub(super) reserved: u32,
 }
 
 /// What a layer is, among its neighbours.
@@ -43,10 +43,6 @@ pub(super) struct Place {
     pub(super) needed: usize,
     /// Outputs that it must have, if it is the last of a part.
     pub(super) wanted: Option<usize>,
-    /// Whether the layer before it in its part hands on activations.
-    pub(super) after_int8: bool,
-    /// Whether the layer behind it in its part takes activations.
-    pub(super) before_int8: bool,
 }
 
 /// A file, and the layer that is looked at.
@@ -77,154 +73,51 @@ impl<'w> Arrays<'w> {
         }
     }
 
-    /// That a whole number is among those it may be.
-    fn within(
-        self,
-        field: &'static str,
-        at: u32,
-        value: impl Into<i32>,
-        least: i32,
-        most: i32,
-    ) -> Result<(), WeightError> {
-        let value = value.into();
-        if (least..=most).contains(&value) {
-            Ok(())
-        } else {
-            Err(WeightError::Number { layer: self.layer, field, at, value })
-        }
-    }
-
-    fn scale(self, field: &'static str, at: u32, value: f32) -> Result<(), WeightError> {
-        if value.is_finite() && value > 0.0 {
-            Ok(())
-        } else {
-            Err(WeightError::Scale { layer: self.layer, field, at, value })
-        }
-    }
-
-    fn int8(
-        self,
-        entry: &LongEntry,
-        activation: Activation,
-        place_of: Place,
-    ) -> Result<Int8<'w>, WeightError> {
-        let (inputs, outputs) = (entry.entry.inputs as usize, entry.entry.outputs as usize);
-        let padded = outputs.next_multiple_of(BLOCK);
-        let quantise = if place_of.after_int8 {
-            if entry.quantise != 0 {
-                return self.wrong("the offset of the inputs' table", entry.quantise);
-            }
-            None
-        } else {
-            Some(self.quantise(entry.quantise, inputs)?)
+    fn int8(self, long: &LongEntry) -> Result<Int8<'w>, WeightError> {
+        let LayerEntry { inputs, outputs, weights: start, biases, .. } = long.entry;
+        let (inputs, outputs) = (inputs as usize, outputs as usize);
+        let (groups, padded) = (inputs.div_ceil(GROUP), outputs.next_multiple_of(BLOCK));
+        let Some(zero) = u8::try_from(long.zero).ok().filter(|zero| (1..u8::MAX).contains(zero)) else {
+            return self.wrong("the activation for zero", long.zero);
         };
-        let groups = inputs.div_ceil(GROUP);
         let weights: &[WeightTile] =
-            self.array("the offset of the weights", entry.entry.weights, groups * (padded / BLOCK))?;
-        let biases: &[i32] = self.array("the offset of the biases", entry.entry.biases, padded)?;
-        self.sums(entry, groups, weights, biases)?;
-        let results = if place_of.before_int8 {
-            Outputs::Requantised(self.requantise(entry.outputs, outputs, padded, activation)?)
-        } else {
-            let scales: &[f32] = self.finite("the offset of the outputs' scales", entry.outputs, padded)?;
-            for (index, &scale) in scales.iter().enumerate() {
-                let at = place::<f32>(entry.outputs, index);
-                if index < outputs {
-                    self.scale("an output's scale", at, scale)?;
-                } else if scale.to_bits() != 0 {
-                    return Err(WeightError::Padding { layer: self.layer, at });
+            self.array("the offset of the weights", start, groups * (padded / BLOCK))?;
+        let starts: &[i32] = self.array("the offset of the sums' starts", long.starts, padded)?;
+        let scales = self.finite("the offset of the scales", long.scales, padded)?;
+        let floats = self.finite("the offset of the biases", biases, padded)?;
+        for (output, ((&first, &scale), &bias)) in starts.iter().zip(scales).zip(floats).enumerate() {
+            let mut sum = 0;
+            for group in 0..groups {
+                let tile = output / BLOCK * groups + group;
+                let four = weights.get(tile).and_then(|tile| tile.get(output % BLOCK)).copied();
+                for (index, weight) in four.unwrap_or_default().into_iter().enumerate() {
+                    let row = size_of::<WeightTile>() * tile + GROUP * (output % BLOCK);
+                    let at = start + (row + index) as u32;
+                    self.number("a weight", at, weight.into(), weight != i8::MIN)?;
+                    self.padding(at, weight == 0 || group * GROUP + index < inputs && output < outputs)?;
+                    sum += i32::from(weight);
                 }
             }
-            Outputs::Float(scales)
-        };
-        Ok(Int8 { quantise, weights, biases, outputs: results })
-    }
-
-    fn quantise(self, offset: u32, inputs: usize) -> Result<&'w [Quantise], WeightError> {
-        let table: &[Quantise] = self.array("the offset of the inputs' table", offset, inputs)?;
-        for (index, by) in table.iter().enumerate() {
-            let at = place::<Quantise>(offset, index);
-            self.scale("an input's scale", at, by.inverse)?;
-            // Converting back tells whether it is a whole number; what is none saturates or becomes zero.
-            let whole = by.zero as i16;
-            if f32::from(whole).to_bits() != by.zero.to_bits() {
-                return Err(WeightError::Scale {
-                    layer: self.layer,
-                    field: "an input's zero",
-                    at: at + 4,
-                    value: by.zero,
-                });
+            let at = place::<i32>(long.starts, output);
+            self.number("the start of a sum", at, first, first == -i32::from(zero) * sum)?;
+            let at = place::<f32>(long.scales, output);
+            if output >= outputs {
+                self.padding(at, scale.to_bits() == 0)?;
+                self.padding(place::<f32>(biases, output), bias.to_bits() == 0)?;
+            } else if scale <= 0.0 {
+                return Err(WeightError::Scale { layer: self.layer, at, value: scale });
             }
         }
-        Ok(table)
+        Ok(Int8 { zero, weights, starts, scales, biases: floats })
     }
 
-    fn requantise(
-        self,
-        offset: u32,
-        outputs: usize,
-        padded: usize,
-        activation: Activation,
-    ) -> Result<&'w [Requantise], WeightError> {
-        let table: &[Requantise] = self.array("the offset of the outputs' table", offset, padded)?;
-        for (index, by) in table.iter().enumerate() {
-            let at = place::<Requantise>(offset, index);
-            if index >= outputs && *by != Requantise::default() {
-                return Err(WeightError::Padding { layer: self.layer, at });
-            }
-            self.within("the factor of positive sums", at, by.positive, 0, i32::from(i16::MAX))?;
-            let least = if activation == Activation::Linear { by.positive } else { 0 };
-            let most = i32::from(by.positive);
-            self.within("the factor of negative sums", at + 2, by.negative, least.into(), most)?;
-            self.within("the shift", at + 6, by.shift, 0, 30)?;
-        }
-        Ok(table)
+    /// That a whole number is one it can be.
+    fn number(self, field: &'static str, at: u32, value: i32, sound: bool) -> Result<(), WeightError> {
+        if sound { Ok(()) } else { Err(WeightError::Number { layer: self.layer, field, at, value }) }
     }
 
-    /// That no sum leaves 32 bits, and that there is nothing where there are no inputs and outputs.
-    fn sums(
-        self,
-        entry: &LongEntry,
-        groups: usize,
-        weights: &[WeightTile],
-        biases: &[i32],
-    ) -> Result<(), WeightError> {
-        let LayerEntry { inputs, outputs, weights: start, biases: biases_start, .. } = entry.entry;
-        let rows = weights.chunks_exact(groups.max(1)).zip(biases.chunks_exact(BLOCK));
-        for (block, (tiles, biases)) in rows.enumerate() {
-            for (row, &bias) in biases.iter().enumerate() {
-                let output = block * BLOCK + row;
-                let mut largest = i64::from(bias).abs();
-                for (group, tile) in tiles.iter().enumerate() {
-                    let Some(four) = tile.get(row) else {
-                        continue;
-                    };
-                    for (index, &weight) in four.iter().enumerate() {
-                        let tile = block * groups + group;
-                        let at = start + (size_of::<WeightTile>() * tile + GROUP * row + index) as u32;
-                        self.within("a weight", at, weight, -127, 127)?;
-                        if weight != 0
-                            && (group * GROUP + index >= inputs as usize || output >= outputs as usize)
-                        {
-                            return Err(WeightError::Padding { layer: self.layer, at });
-                        }
-                        largest += 255 * i64::from(weight).abs();
-                    }
-                }
-                if output >= outputs as usize && bias != 0 {
-                    let at = place::<i32>(biases_start, output);
-                    return Err(WeightError::Padding { layer: self.layer, at });
-                }
-                if largest > i64::from(i32::MAX) {
-                    return Err(WeightError::Overflow {
-                        layer: self.layer,
-                        output: output as u32,
-                        sum: largest,
-                    });
-                }
-            }
-        }
-        Ok(())
+    fn padding(self, at: u32, sound: bool) -> Result<(), WeightError> {
+        if sound { Ok(()) } else { Err(WeightError::Padding { layer: self.layer, at }) }
     }
 }
 
@@ -254,22 +147,25 @@ pub(super) fn checked_layer<'w>(
         1 => return Err(WeightError::Slope { layer: place_of.number, slope: entry.slope }),
         code => return arrays.wrong("the activation", code),
     };
-    if let Some(&reserved) = [entry.reserved].iter().chain(&long.reserved).find(|&&word| word != 0) {
+    if let Some(reserved) = [entry.reserved, long.reserved].into_iter().find(|&word| word != 0) {
         return arrays.wrong("the reserved field", reserved);
     }
     let numbers = match entry.precision {
         0 => {
-            if long.quantise != 0 {
-                return arrays.wrong("the offset of the inputs' table", long.quantise);
-            }
-            if long.outputs != 0 {
-                return arrays.wrong("the offset of the outputs' table", long.outputs);
+            for (field, value) in [
+                ("the offset of the sums' starts", long.starts),
+                ("the offset of the scales", long.scales),
+                ("the activation for zero", long.zero),
+            ] {
+                if value != 0 {
+                    return arrays.wrong(field, value);
+                }
             }
             let weights = arrays.finite("the offset of the weights", entry.weights, inputs * outputs)?;
             let biases = arrays.finite("the offset of the biases", entry.biases, outputs)?;
             Numbers::Float { weights, biases }
         }
-        _ => Numbers::Int8(arrays.int8(long, activation, place_of)?),
+        _ => Numbers::Int8(arrays.int8(long)?),
     };
     Ok(Layer { inputs, outputs, activation, numbers })
 }

@@ -18,16 +18,14 @@ pub mod quantise;
 #[cfg(feature = "std")]
 mod write;
 
-pub use crate::lanes::int8::Requantise;
 #[cfg(feature = "safetensors")]
 pub use exchange::{ExchangeError, from_safetensors, to_safetensors};
 pub use file::{ForceInput, MAGIC, Network, Range, Recipe, TrainedLaw, WeightError};
 pub(crate) use forward::Scratch;
-pub use int8::{BLOCK, GROUP, Int8, Outputs, Quantise, WeightTile};
+pub use int8::{BLOCK, GROUP, Int8, WeightTile};
 #[cfg(feature = "std")]
 pub use write::{
-    Description, Int8Description, LayerDescription, OutputsDescription, WeightBytes, hexadecimal, write,
-    write_int8,
+    Description, Int8Description, LayerDescription, WeightBytes, hexadecimal, write, write_int8,
 };
 
 /// Widest layer.

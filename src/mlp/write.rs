@@ -6,10 +6,9 @@ use std::string::String;
 use std::vec::Vec;
 
 use super::file::{ALIGNMENT, CHECKED, HEADER, Header, MAGIC, VERSION, VERSION_INT8};
-use super::int8::{BLOCK, GROUP, Quantise, WeightTile};
+use super::int8::{BLOCK, GROUP, WeightTile};
 use super::layers::{LayerEntry, LongEntry};
 use super::{Activation, ForceInput, Layer, Network, Numbers, Range, TrainedLaw, WeightError};
-use crate::lanes::int8::Requantise;
 
 /// A layer of a network to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,26 +23,15 @@ pub struct LayerDescription {
     pub biases: Vec<f32>,
 }
 
-/// A layer's numbers in eight bits, see [`super::Int8`].
+/// A layer's numbers in eight bits, see [`super::Int8`]; its biases are the float32 ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Int8Description {
-    /// One an input, if what goes in is float32; nothing behind another such layer.
-    pub quantise: Option<Vec<Quantise>>,
+    /// The activation that stands for zero, 1 to 254.
+    pub zero: u8,
     /// By rows of as many as there are inputs, -127 to 127.
     pub weights: Vec<i8>,
     /// One a row.
-    pub biases: Vec<i32>,
-    /// What becomes of the sums.
-    pub outputs: OutputsDescription,
-}
-
-/// What becomes of the sums of an eight-bit layer.
-#[derive(Clone, Debug, PartialEq)]
-pub enum OutputsDescription {
-    /// Activations for the eight-bit layer that follows, one a row.
-    Requantised(Vec<Requantise>),
-    /// Scales to float32, one a row.
-    Float(Vec<f32>),
+    pub scales: Vec<f32>,
 }
 
 /// A network to be written.
@@ -76,14 +64,14 @@ pub struct Description<'a> {
 }
 
 impl<'a> Description<'a> {
-    /// What a network consists of; layers of eight bits have neither weights nor biases there.
+    /// What a network consists of; layers of eight bits have no weights there.
     #[must_use]
     pub fn of(network: &Network<'a>) -> Self {
         let layers = |layers: &[Layer<'_>]| {
             let described = |layer: &Layer<'_>| {
                 let (weights, biases) = match layer.numbers {
                     Numbers::Float { weights, biases } => (weights, biases),
-                    Numbers::Int8(_) => (&[][..], &[][..]),
+                    Numbers::Int8(int8) => (&[][..], int8.biases.get(..layer.outputs).unwrap_or_default()),
                 };
                 LayerDescription {
                     inputs: layer.inputs,
@@ -182,7 +170,7 @@ pub fn write(description: &Description<'_>) -> Result<Vec<u8>, WeightError> {
 }
 
 /// The same with some layers in eight bits: layer `n` of both parts together has the numbers of `int8[n]`, where there are
-/// any, instead of the description's. Version 2 if there is one.
+/// any, instead of the description's weights. Version 3 if there is one.
 pub fn write_int8(
     description: &Description<'_>,
     int8: &[Option<Int8Description>],
@@ -211,16 +199,15 @@ pub fn write_int8(
             ..LongEntry::default()
         };
         if let Some(int8) = int8.get(number).and_then(Option::as_ref) {
+            let sums =
+                int8.weights.chunks(inputs.max(1)).map(|row| row.iter().map(|&w| i32::from(w)).sum::<i32>());
+            let starts: Vec<i32> = sums.map(|sum| -i32::from(int8.zero) * sum).collect();
             long.entry.precision = 1;
-            if let Some(quantise) = &int8.quantise {
-                long.quantise = image.add(bytemuck::cast_slice(quantise));
-            }
+            long.zero = int8.zero.into();
             long.entry.weights = image.add(bytemuck::cast_slice(&tiles(&int8.weights, inputs, outputs)));
-            long.entry.biases = image.add(bytemuck::cast_slice(&padded(&int8.biases)));
-            long.outputs = match &int8.outputs {
-                OutputsDescription::Requantised(by) => image.add(bytemuck::cast_slice(&padded(by))),
-                OutputsDescription::Float(scales) => image.add(bytemuck::cast_slice(&padded(scales))),
-            };
+            long.starts = image.add(bytemuck::cast_slice(&padded(&starts)));
+            long.scales = image.add(bytemuck::cast_slice(&padded(&int8.scales)));
+            long.entry.biases = image.add(bytemuck::cast_slice(&padded(&layer.biases)));
         } else {
             long.entry.weights = image.add(bytemuck::cast_slice(&layer.weights));
             long.entry.biases = image.add(bytemuck::cast_slice(&layer.biases));

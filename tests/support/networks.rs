@@ -5,8 +5,7 @@
 use std::cell::Cell;
 
 use supple::mlp::{
-    Activation, Description, ForceInput, Int8Description, LayerDescription, OutputsDescription, Quantise,
-    Range, Requantise, TrainedLaw,
+    Activation, Description, ForceInput, Int8Description, LayerDescription, Range, TrainedLaw,
 };
 
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -149,45 +148,22 @@ pub fn constant(inputs: usize, value: f32) -> Memory {
     Memory::of(&supple::mlp::write(&network).unwrap())
 }
 
-/// Random numbers of eight bits for the layers that `wanted` names, with activations all over their range.
+/// Random numbers of eight bits for the layers that `wanted` names, with any zero.
 pub fn int8(
     description: &Description<'_>,
     wanted: impl Fn(usize) -> bool,
     seed: u32,
 ) -> Vec<Option<Int8Description>> {
     let mut next = numbers(seed);
-    let layers: Vec<_> = description.first.iter().chain(&description.second).collect();
-    let split = description.first.len();
-    let starts = |at: usize| at == 0 || at == split;
-    let last = |at: usize| at + 1 == split || at + 1 == layers.len();
-    let mut all = Vec::new();
-    for (at, layer) in layers.iter().enumerate() {
-        let outputs = layer.biases.len();
-        let after = !starts(at) && wanted(at - 1);
-        let before = !last(at) && wanted(at + 1);
-        let quantise = (!after).then(|| {
-            (0..layer.inputs)
-                .map(|_| Quantise { inverse: 40.0 + 30.0 * next(), zero: (120.0 + 100.0 * next()).round() })
-                .collect()
-        });
-        let weights = (0..layer.inputs * outputs).map(|_| (127.0 * next()).round() as i8).collect();
-        let spread = 255.0 * 127.0 * (layer.inputs as f32).sqrt();
-        let biases = (0..outputs).map(|_| (spread * next()) as i32).collect();
-        let linear = layer.activation == Activation::Linear;
-        let results = if before {
-            let table = (0..outputs).map(|_| {
-                let shift = (spread / 32_768.0).log2().ceil().max(0.0) as i16;
-                let positive = 1_000 + (900.0 * next()) as i16;
-                let negative =
-                    if linear { positive } else { (f32::from(positive) * (0.5 + 0.5 * next())) as i16 };
-                Requantise { positive, negative, zero: (130.0 + 200.0 * next()) as i16, shift }
-            });
-            OutputsDescription::Requantised(table.collect())
-        } else {
-            OutputsDescription::Float((0..outputs).map(|_| (1.5 + next()) / spread).collect())
+    let layers = description.first.iter().chain(&description.second).enumerate();
+    let described = |(at, layer): (usize, &LayerDescription)| {
+        let spread = 127.0 * (layer.inputs as f32).sqrt();
+        let described = Int8Description {
+            zero: (128.0 + 126.0 * next()) as u8,
+            weights: (0..layer.weights.len()).map(|_| (127.0 * next()).round() as i8).collect(),
+            scales: (0..layer.biases.len()).map(|_| (1.5 + next()) / spread).collect(),
         };
-        let described = Int8Description { quantise, weights, biases, outputs: results };
-        all.push(wanted(at).then_some(described));
-    }
-    all
+        wanted(at).then_some(described)
+    };
+    layers.map(described).collect()
 }

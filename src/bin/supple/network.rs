@@ -3,9 +3,7 @@
 use std::path::Path;
 
 use supple::inertia::Damper;
-use supple::mlp::{
-    Activation, ForceInput, Int8, Layer, MAGIC, Network, Numbers, Outputs, Range, hexadecimal,
-};
+use supple::mlp::{Activation, ForceInput, Int8, Layer, MAGIC, Network, Numbers, Range, hexadecimal};
 use supple::surrogate::{FEATURES, PREDICTED, Surrogate, Vertex};
 
 use crate::inspect::row;
@@ -137,14 +135,10 @@ fn layer_row(name: &str, layer: &Layer<'_>) -> String {
     };
     let (precision, bytes) = match numbers {
         Numbers::Float { weights, biases } => ("float32", size_of_val(*weights) + size_of_val(*biases)),
-        Numbers::Int8(Int8 { quantise, weights, biases, outputs }) => {
-            let tables = match outputs {
-                Outputs::Requantised(by) => size_of_val(*by),
-                Outputs::Float(scales) => size_of_val(*scales),
-            };
-            let quantise = quantise.map_or(0, size_of_val);
-            ("int8", quantise + size_of_val(*weights) + size_of_val(*biases) + tables)
-        }
+        Numbers::Int8(Int8 { weights, starts, scales, biases, .. }) => (
+            "int8",
+            size_of_val(*weights) + size_of_val(*starts) + size_of_val(*scales) + size_of_val(*biases),
+        ),
     };
     let multiply_adds = layer.multiply_adds();
     format!(

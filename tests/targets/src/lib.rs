@@ -34,7 +34,7 @@ type State = FixedState<NODES>;
 struct Aligned<T: ?Sized>(T);
 
 static NETWORK: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/compact-10.weights"));
-static INT8: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden-v2.weights"));
+static INT8: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden-v3.weights"));
 static DAMPER: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/damper.weights"));
 
 /// What is computed.
