@@ -26,7 +26,7 @@ use super::node::{Scaling, renew};
 use super::report::Tally;
 use super::vectors::{NodeTables, read_matrices, write_matrices};
 use super::{COARSE, FINE};
-use crate::lanes::{BLOCK, Chosen, Following, Gather, Kernel, NodeVector, Real, Rows, Scatter, dispatch};
+use crate::lanes::{BLOCK, Chosen, Gather, Kernel, NodeVector, Real, Rows, Scatter, dispatch};
 use crate::material::{Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::symmetric::Symmetric;
@@ -75,9 +75,9 @@ const TOGETHER: usize = 8;
 /// Cost of a block, one without a lattice, a cell, a node and a number of a row that is mirrored, in floating-point operations of a pivot
 /// that take as long (measured).
 const BLOCK_COST: i64 = 47_000;
-const BLOCK_ALONE_COST: i64 = 6_000;
+const BLOCK_ALONE_COST: i64 = 18_000;
 const CELL_COST: i64 = 16_000;
-const NODE_COST: i64 = 2_700;
+const NODE_COST: i64 = 1_500;
 const ROW_COST: i64 = 12;
 
 /// Cost of a block.
@@ -504,28 +504,23 @@ impl Kernel for SomeNodes<'_, '_> {
     #[inline(always)]
     fn run<R: Real>(mut self) {
         let (first, count) = (self.first, self.inertia.len());
-        let place = |at: usize| self.places.get(at).map_or(at, LatticeNode::node);
+        // Lanes beyond the last node repeat it.
         let mut rows = [0; BLOCK];
         for (lane, row) in rows.iter_mut().enumerate().take(TOGETHER) {
-            *row = place(first + lane) as u32;
+            let at = (first + lane).min(count.saturating_sub(1));
+            *row = self.places.get(at).map_or(at, LatticeNode::node) as u32;
         }
-        if let Some(rows) = Chosen::below(rows, count)
-            && first + TOGETHER <= count
-            && R::Eight::COUNT == TOGETHER
-        {
-            self.nodes::<R::Eight, R>(rows);
-        } else {
-            for node in (first..count.min(first + TOGETHER)).map(place) {
-                self.nodes::<f32, R>(Following(node));
-            }
+        if let Some(rows) = Chosen::below(rows, count) {
+            self.nodes::<R::Eight, R>(rows, count - first.min(count));
         }
     }
 }
 
 impl SomeNodes<'_, '_> {
-    /// Nodes side by side; `W` is as wide as can be.
+    /// Nodes side by side, as many as are left; `W` is as wide as can be.
     #[inline(always)]
-    fn nodes<R: Real, W: Real>(&mut self, rows: impl Rows) {
+    fn nodes<R: Real, W: Real>(&mut self, rows: Chosen, left: usize) {
+        const { assert!(R::COUNT == TOGETHER) };
         let Self { inertia, increment, places, scaling, frames, tally, tables, sums, .. } = self;
         let [x, y, z, mass] = rows.read::<R>(must_cast_slice(inertia));
         let free = [x, y, z];
@@ -550,7 +545,7 @@ impl SomeNodes<'_, '_> {
             kept[axis] = free[axis].choose(velocity[axis] * renewed.velocity, velocity[axis]);
         }
         rows.write(must_cast_slice_mut(increment), [kept[0], kept[1], kept[2], spare]);
-        for lane in 0..R::COUNT {
+        for lane in 0..left.min(R::COUNT) {
             tally.add(rows.number::<R>(lane), renewed.added.lane(lane));
         }
 
@@ -560,7 +555,7 @@ impl SomeNodes<'_, '_> {
         let [vx, vy, vz] = turned;
         let pushed =
             renewed.inertia.times([vx * renewed.velocity, vy * renewed.velocity, vz * renewed.velocity]);
-        for lane in 0..R::COUNT {
+        for lane in 0..left.min(R::COUNT) {
             let node = rows.number::<R>(lane);
             let (Some(place), Some(inertia)) = (place_of(places, node), inertia.get(node)) else {
                 continue;
