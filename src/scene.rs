@@ -560,7 +560,7 @@ fn write_element(block: &mut ElementBlock, lane: usize, element: usize, tet: [u3
 
 /// Largest eigenvalue of `sum_a ga ga^T` over the four gradients, not rounded down, 1/m^2.
 fn spread(slopes: [DVec3; 3]) -> f32 {
-    let mut sum = Symmetric::default();
+    let mut sum = Symmetric::<f32>::default();
     for g in [slopes[0], slopes[1], slopes[2], -(slopes[0] + slopes[1] + slopes[2])] {
         sum.xx += (g.x * g.x) as f32;
         sum.yy += (g.y * g.y) as f32;

@@ -1,21 +1,23 @@
 //! Symmetric 3 x 3 matrices of a node: its stiffness (N/m) or inertia (kg) along all directions.
 
-/// `[[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]`.
+use crate::lanes::Real;
+
+/// `[[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]`, of one node or of several side by side.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Symmetric {
-    pub(crate) xx: f32,
-    pub(crate) yy: f32,
-    pub(crate) zz: f32,
-    pub(crate) xy: f32,
-    pub(crate) yz: f32,
-    pub(crate) zx: f32,
+pub(crate) struct Symmetric<R = f32> {
+    pub(crate) xx: R,
+    pub(crate) yy: R,
+    pub(crate) zz: R,
+    pub(crate) xy: R,
+    pub(crate) yz: R,
+    pub(crate) zx: R,
 }
 
-impl Symmetric {
+impl<R: Real> Symmetric<R> {
     /// The matrix on the free axes (those with a positive inverse mass) and zero on the others.
     #[inline(always)]
-    pub(crate) fn on_free(self, inverse: [f32; 3]) -> Self {
-        let [x, y, z] = inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 });
+    pub(crate) fn on_free(self, [x, y, z]: [R; 3]) -> Self {
+        let (x, y, z) = (x.positive(), y.positive(), z.positive());
         Self {
             xx: self.xx * x,
             yy: self.yy * y,
@@ -28,7 +30,7 @@ impl Symmetric {
 
     /// `diagonal I + factor A`.
     #[inline(always)]
-    pub(crate) fn scaled_plus(self, factor: f32, diagonal: f32) -> Self {
+    pub(crate) fn scaled_plus(self, factor: R, diagonal: R) -> Self {
         Self {
             xx: diagonal + factor * self.xx,
             yy: diagonal + factor * self.yy,
@@ -41,12 +43,12 @@ impl Symmetric {
 
     /// `factor A`.
     #[inline(always)]
-    pub(crate) fn scaled(self, factor: f32) -> Self {
-        self.scaled_plus(factor, 0.0)
+    pub(crate) fn scaled(self, factor: R) -> Self {
+        self.scaled_plus(factor, R::splat(0.0))
     }
 
     #[inline(always)]
-    pub(crate) fn times(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    pub(crate) fn times(&self, [x, y, z]: [R; 3]) -> [R; 3] {
         [
             self.xx * x + self.xy * y + self.zx * z,
             self.xy * x + self.yy * y + self.yz * z,
@@ -55,7 +57,7 @@ impl Symmetric {
     }
 
     #[inline(always)]
-    pub(crate) fn trace(&self) -> f32 {
+    pub(crate) fn trace(&self) -> R {
         self.xx + self.yy + self.zz
     }
 
@@ -64,21 +66,22 @@ impl Symmetric {
     /// one: their terms cancel twice, pivots only once.
     #[inline(always)]
     pub(crate) fn inverse(&self) -> Self {
-        let [a, b, c] = [self.xx, self.yy, self.zz].map(|entry| 1.0 / libm::sqrtf(entry));
+        let one = R::splat(1.0);
+        let (a, b, c) = (one.over(self.xx.root()), one.over(self.yy.root()), one.over(self.zz.root()));
         let (d, e, f) = (self.xy * a * b, self.yz * b * c, self.zx * c * a);
         // L = [1, 0, 0; d, 1, 0; f, g, 1]
-        let second = 1.0 / (1.0 - d * d);
+        let second = one.over(one - d * d);
         let below = e - d * f;
         let g = below * second;
-        let third = 1.0 / ((1.0 - f * f) - below * g);
+        let third = one.over((one - f * f) - below * g);
         // The last row of L^-1 is [h, -g, 1].
         let h = d * g - f;
         Self {
-            xx: (1.0 + d * d * second + h * h * third) * a * a,
+            xx: (one + d * d * second + h * h * third) * a * a,
             yy: (second + g * g * third) * b * b,
             zz: third * c * c,
-            xy: -(d * second + h * g * third) * a * b,
-            yz: -(g * third) * b * c,
+            xy: -((d * second + h * g * third) * a * b),
+            yz: -(g * third * b * c),
             zx: h * third * c * a,
         }
     }
@@ -87,26 +90,23 @@ impl Symmetric {
     /// on the characteristic polynomial from above, where it is convex, so that no iterate falls below the
     /// root. Zero or NaN if the trace is.
     #[inline(always)]
-    pub(crate) fn largest_eigenvalue(&self) -> f32 {
-        let mean = self.trace() / 3.0;
-        if mean <= 0.0 || mean.is_nan() {
-            return mean;
-        }
+    pub(crate) fn largest_eigenvalue(&self) -> R {
+        let (one, two, three) = (R::splat(1.0), R::splat(2.0), R::splat(3.0));
+        let mean = self.trace().over(three);
         // The matrix over its mean, less the identity.
-        let (a, b, c) = (self.xx / mean - 1.0, self.yy / mean - 1.0, self.zz / mean - 1.0);
-        let (d, e, f) = (self.xy / mean, self.yz / mean, self.zx / mean);
-        let q = (a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0;
+        let per = |entry: R| entry.over(mean);
+        let (a, b, c) = (per(self.xx) - one, per(self.yy) - one, per(self.zz) - one);
+        let (d, e, f) = (per(self.xy), per(self.yz), per(self.zx));
+        let q = (a * a + b * b + c * c + two * (d * d + e * e + f * f)).over(R::splat(6.0));
         let determinant = a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f);
         // Roots of t^3 - 3 q t - determinant; 2 sqrt q is above the largest.
-        let mut root = 2.0 * libm::sqrtf(q);
+        let mut root = two * q.root();
         for _ in 0..4 {
-            let slope = 3.0 * (root * root - q);
-            if slope > 1e-6 {
-                let next = root - (root * (root * root - 3.0 * q) - determinant) / slope;
-                root = if next < root { next } else { root };
-            }
+            let slope = three * (root * root - q);
+            let next = root - (root * (root * root - three * q) - determinant).over(slope);
+            root = (slope - R::splat(1e-6)).choose(next.min(root), root);
         }
-        mean * (1.0 + root)
+        mean.choose(mean * (one + root), mean)
     }
 }
 

@@ -12,8 +12,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
-use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
-use crate::lanes::{Lanes, Real, write_rows};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, place_of};
+use crate::lanes::{Real, write_rows};
 use crate::scene::NodeInertia;
 use crate::symmetric::Symmetric;
 
@@ -42,8 +42,9 @@ pub(super) struct Assembly<'a> {
 /// Functions of a cell.
 const CORNERS: usize = 8;
 /// Sums of one cell for each pair of its functions, eight a row: for each function one row of each block. Of elements
-/// the blocks are `xx, yy, zz, xy, yz, zx` of `volume` and the one of `iso`; of nodes those of the inertia and the mass
-/// along each axis.
+/// the blocks are `xx, yy, zz, xy, yz, zx` of `volume` and the one of `iso`. Of nodes the sums take less: two functions of a
+/// cell multiply to one of 27 products. They are kept 32 a row for the inertia and the mass along each axis, and behind them
+/// a row of the eight functions for each axis of the momentum.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(transparent)]
 pub(super) struct CellSums([[[f32; CORNERS]; BLOCKS]; CORNERS]);
@@ -97,9 +98,14 @@ fn store<R: Real>(values: R) -> [f32; CORNERS] {
     row
 }
 
+/// `row += factors values`, a product after the other.
 #[inline(always)]
-fn add_row<R: Real>(row: &mut [f32; CORNERS], values: R) {
-    *row = store(R::from_fn(|corner| row[corner % CORNERS]) + values);
+fn add_row<R: Real, const N: usize>(row: &mut [f32; CORNERS], products: [(R, R); N]) {
+    let mut sum = R::from_fn(|corner| row[corner % CORNERS]);
+    for (factor, value) in products {
+        sum = factor.fused(value, sum);
+    }
+    *row = store(sum);
 }
 
 /// Gradients of the eight functions of a cell (1/m) and their images under `C`, lane by lane.
@@ -154,7 +160,7 @@ impl Assembly<'_> {
         let (mut low, mut high) = ([u8::MAX; 3], [0; 3]);
         let mut places = [[0; 3]; 4];
         for (&node, place) in nodes.iter().zip(&mut places) {
-            let (at, inertia) = (self.nodes.get(node)?, self.inertia.get(node)?);
+            let (at, inertia) = (place_of(self.nodes, node)?, self.inertia.get(node)?);
             let [x, y, z, _] = inertia.free().to_array();
             if x != y || y != z {
                 return None;
@@ -195,7 +201,7 @@ impl Assembly<'_> {
         // and 2.
         let (mut near, mut far) = ([R::splat(0.0); 3], [R::splat(0.0); 3]);
         for ((&node, gradient), beyond) in element.nodes.iter().zip(&element.gradients).zip(beyond) {
-            let (Some(at), Some(inertia)) = (self.nodes.get(node), self.inertia.get(node)) else {
+            let (Some(at), Some(inertia)) = (place_of(self.nodes, node), self.inertia.get(node)) else {
                 return false;
             };
             let free = inertia.free().x;
@@ -296,7 +302,7 @@ impl Assembly<'_> {
         let mut touched = [[Vec4::ZERO; 3]; TOUCHED];
         let (mut count, mut bits) = (0, 0u128);
         for (&node, gradient) in element.nodes.iter().zip(element.gradients) {
-            let (Some(at), Some(inertia)) = (self.nodes.get(node), self.inertia.get(node)) else {
+            let (Some(at), Some(inertia)) = (place_of(self.nodes, node), self.inertia.get(node)) else {
                 continue;
             };
             let free = inertia.free();
@@ -392,27 +398,88 @@ impl CellSums {
             let (along_x, along_y, along_z) =
                 (R::splat(ax[corner]), R::splat(ay[corner]), R::splat(az[corner]));
             let [xx, yy, zz, xy, yz, zx, all, ..] = rows;
-            add_row(xx, along_x * x);
-            add_row(yy, along_y * y);
-            add_row(zz, along_z * z);
-            add_row(xy, along_x * y);
-            add_row(yz, along_y * z);
-            add_row(zx, along_z * x);
-            add_row(all, R::splat(bp[corner]) * p + R::splat(bq[corner]) * q + R::splat(br[corner]) * r);
+            add_row(xx, [(along_x, x)]);
+            add_row(yy, [(along_y, y)]);
+            add_row(zz, [(along_z, z)]);
+            add_row(xy, [(along_x, y)]);
+            add_row(yz, [(along_y, z)]);
+            add_row(zx, [(along_z, x)]);
+            let (p_along, q_along, r_along) =
+                (R::splat(bp[corner]), R::splat(bq[corner]), R::splat(br[corner]));
+            add_row(all, [(p_along, p), (q_along, q), (r_along, r)]);
         }
     }
 
-    /// Adds a node's inertia and its mass (kg, zero rows at held axes).
+    /// Adds a node's inertia, its mass (kg, zero rows at held axes) and its momentum.
     #[inline(always)]
-    pub(super) fn add_node(&mut self, node: &LatticeNode, inertia: &Symmetric, [mx, my, mz]: [f32; 3]) {
+    pub(super) fn add_node<R: Real>(
+        &mut self,
+        node: &LatticeNode,
+        inertia: &Symmetric,
+        [mx, my, mz]: [f32; 3],
+        momentum: [f32; 3],
+    ) {
         let Symmetric { xx, yy, zz, xy, yz, zx } = *inertia;
         let entries = [xx, yy, zz, xy, yz, zx, mx, my, mz];
+        // Of two functions along an axis: both near, one of each, both far.
+        let [x, y, z] = node.within().map(|far| [(1.0 - far) * (1.0 - far), (1.0 - far) * far, far * far]);
+        let mut products = [0.0; PRODUCTS];
+        let of_yz = z.into_iter().flat_map(|z| y.map(|y| y * z));
+        for (three, of_yz) in products.as_chunks_mut::<3>().0.iter_mut().zip(of_yz) {
+            *three = x.map(|x| x * of_yz);
+        }
+        let numbers = self.0.as_flattened_mut().as_flattened_mut();
+        let mut rows = numbers.chunks_exact_mut(PRODUCTS);
+        for (row, entry) in rows.by_ref().zip(entries) {
+            add_times::<R>(row, entry, &products);
+        }
         let weights = node.eight_weights();
-        for (rows, weight) in self.0.iter_mut().zip(weights) {
-            let products = Lanes([weight; CORNERS]) * Lanes(weights);
-            for (row, entry) in rows.iter_mut().zip(entries) {
-                *row = (Lanes(*row) + Lanes([entry; CORNERS]) * products).0;
+        for (row, of) in numbers.chunks_exact_mut(CORNERS).skip(MOMENTA).zip(momentum) {
+            add_times::<R::Eight>(row, of, &weights);
+        }
+    }
+
+    /// What has been summed of nodes where functions `c` and `d` of the cell meet.
+    #[inline(always)]
+    fn of_nodes(&self, c: usize, d: usize) -> [f32; ENTRIES] {
+        let product = (c & 1) + (d & 1) + 3 * ((c >> 1 & 1) + (d >> 1 & 1)) + 9 * ((c >> 2) + (d >> 2));
+        let numbers = self.0.as_flattened().as_flattened();
+        let mut entries = [0.0; ENTRIES];
+        for (entry, row) in entries.iter_mut().zip(numbers.chunks_exact(PRODUCTS)) {
+            *entry = row.get(product).copied().unwrap_or(0.0);
+        }
+        entries
+    }
+
+    /// Adds the sums of momenta to those of the functions.
+    fn add_momenta(&self, functions: [usize; CORNERS], momenta: &mut CoarseVectors) {
+        let rows = self.0.as_flattened().iter().skip(MOMENTA);
+        for (axis, row) in rows.take(3).enumerate() {
+            for (function, sum) in functions.into_iter().zip(row) {
+                if let Some(momentum) = momenta.get_mut(function) {
+                    momentum.0[axis] += sum;
+                }
             }
+        }
+    }
+}
+
+/// Products of two functions of a cell: three along each axis, and as many more as make whole vectors.
+const PRODUCTS: usize = 32;
+/// Numbers of a node: its inertia, and its mass along each axis.
+const ENTRIES: usize = 9;
+/// Rows of eight before those of the momentum.
+const MOMENTA: usize = ENTRIES * PRODUCTS / CORNERS;
+
+/// `row += factor of`.
+#[inline(always)]
+fn add_times<R: Real>(row: &mut [f32], factor: f32, of: &[f32]) {
+    let factor = R::splat(factor);
+    for (row, of) in row.chunks_exact_mut(R::COUNT).zip(of.chunks_exact(R::COUNT)) {
+        let products = R::from_fn(|lane| of.get(lane).copied().unwrap_or(0.0));
+        let sum = factor.fused(products, R::from_fn(|lane| row.get(lane).copied().unwrap_or(0.0)));
+        for (lane, place) in row.iter_mut().enumerate() {
+            *place = sum.lane(lane);
         }
     }
 }
@@ -424,14 +491,16 @@ pub(super) struct NodeMatrices<'a> {
     pub(super) mass: &'a mut [f32],
     /// The same once more, with nothing else in it; may be empty.
     pub(super) mass_alone: &'a mut [f32],
+    pub(super) momenta: &'a mut CoarseVectors,
     pub(super) stride: usize,
 }
 
 impl NodeMatrices<'_> {
     /// Adds the sums of cell `number`, and makes room for the next ones.
     pub(super) fn add_cell(&mut self, number: usize, sums: &mut CellSums) {
+        sums.add_momenta(self.lattice.functions_of(number), self.momenta);
         for (c, d, row, column) in pairs(self.lattice.functions_of(number)) {
-            let [xx, yy, zz, xy, yz, zx, mx, my, mz] = sums.0[c % CORNERS].map(|row| row[d % CORNERS]);
+            let [xx, yy, zz, xy, yz, zx, mx, my, mz] = sums.of_nodes(c, d);
             let rows = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
             add_block(self.inertia, self.stride, row, column, rows);
             for (axis, mass) in [mx, my, mz].into_iter().enumerate() {

@@ -2,8 +2,8 @@
 
 use super::assembly::{Assembly, CellSums, Element, NO_SLOTS, NodeMatrices};
 use super::dense::stride;
-use super::lattice::{Lattice, LatticeNode};
-use crate::lanes::Lanes;
+use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS, order};
+use crate::lanes::{Lanes, NodeVector};
 use crate::mesh::Bar;
 use crate::scene::NodeInertia;
 use crate::symmetric::Symmetric;
@@ -28,7 +28,8 @@ fn scene() -> (Lattice, Vec<LatticeNode>, Vec<NodeInertia>) {
     inertia[..30].fill(NodeInertia { inverse: [0.0; 3], mass: 1e-3 });
     inertia[100].inverse[1] = 0.0;
     let lattice = Lattice::new([2, 2, 3], &points, &inertia).unwrap();
-    let places = points.iter().zip(&inertia).map(|(&point, at)| lattice.place_node(point, at)).collect();
+    let mut places: Vec<_> = points.iter().map(|&point| lattice.place(point)).collect();
+    order(&mut places);
     (lattice, places, inertia)
 }
 
@@ -107,7 +108,12 @@ fn sums_of_the_nodes_are_those_of_their_functions() {
     for place in &places {
         let [xx, yy, zz, xy, yz, zx] = [3.0, 3.0, 3.0, 0.0, 0.0, 0.0].map(|mean: f32| mean + random());
         let masses = [1.0, 1.0, 0.0];
-        sums[place.cell()].add_node(place, &Symmetric { xx, yy, zz, xy, yz, zx }, masses);
+        sums[place.cell()].add_node::<Lanes<8>>(
+            place,
+            &Symmetric { xx, yy, zz, xy, yz, zx },
+            masses,
+            [1.0, 2.0, 3.0],
+        );
         let rows = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
         let weights = lattice.weights(place).map(|(function, weight)| (function, f64::from(weight)));
         let kept = || weights.iter().filter(|(function, _)| *function < lattice.functions());
@@ -123,14 +129,23 @@ fn sums_of_the_nodes_are_those_of_their_functions() {
             }
         }
     }
+    let mut momenta = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
     let mut into = NodeMatrices {
         lattice: &lattice,
         inertia: &mut inertia,
         mass: &mut mass,
         mass_alone: &mut [],
+        momenta: &mut momenta,
         stride,
     };
     sums.iter_mut().enumerate().for_each(|(cell, sums)| into.add_cell(cell, sums));
+    for (function, momentum) in momenta.iter().enumerate().take(lattice.functions()) {
+        let weights = places.iter().flat_map(|place| lattice.weights(place));
+        let sum: f64 = weights.filter(|(of, _)| *of == function).map(|(_, weight)| f64::from(weight)).sum();
+        for (axis, found) in momentum.to_array().into_iter().enumerate() {
+            assert!((f64::from(found) / (sum * (axis + 1) as f64) - 1.0).abs() < 2e-6);
+        }
+    }
     let off = [worst(&inertia, &direct_inertia, stride), worst(&mass, &direct_mass, stride)];
     println!("inertia of the functions off by {:.1e}, mass by {:.1e}", off[0], off[1]);
     assert!(off.iter().all(|off| *off < 2e-6));

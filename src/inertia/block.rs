@@ -2,10 +2,11 @@
 //! (N/m) and of the lattice's cells (N m, times `s_c D^2 / 4`).
 
 use super::assembly::{Assembly, Element, NO_SLOTS};
-use super::bound::{Bound, MatrixBeside};
+use super::bound::{Bound, MatrixSums};
 use super::frames::{Frames, Rotation};
-use super::lattice::{LatticeNode, MAX_FUNCTIONS};
-use crate::lanes::{BLOCK, Gather, Kernel, Real, write_rows};
+use super::lattice::MAX_FUNCTIONS;
+use super::vectors::frame_of;
+use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, write_rows};
 use crate::material::{Law, Laws, Local};
 use crate::scene::ElementBlock;
 use crate::tled::Deformation;
@@ -14,8 +15,11 @@ pub struct OneBlock<'a, L> {
     pub(super) laws: Laws<'a, L>,
     pub(super) block: &'a ElementBlock,
     pub(super) displacement: Gather<'a>,
-    pub(super) sums: MatrixBeside<'a>,
-    pub(super) assembly: Assembly<'a>,
+    pub(super) sums: MatrixSums<'a>,
+    /// Tells the frames of the nodes.
+    pub(super) next: &'a [NodeVector],
+    /// None without a lattice.
+    pub(super) assembly: Option<Assembly<'a>>,
     pub(super) frames: &'a Frames,
     pub(super) weight: f32,
 }
@@ -34,6 +38,9 @@ impl<L: Law> Kernel for OneBlock<'_, L> {
         for first in (0..BLOCK).step_by(R::COUNT) {
             self.bound::<R>(first, &mut tangents);
         }
+        let Some(assembly) = &mut self.assembly else {
+            return;
+        };
         let mut slots = NO_SLOTS;
         for lane in 0..BLOCK {
             let mut gradients = [[0.0; 3]; 4];
@@ -48,8 +55,8 @@ impl<L: Law> Kernel for OneBlock<'_, L> {
             let [[_, _, _, iso], [_, _, _, volume], _] = columns;
             let cofactor = columns.map(|[x, y, z, _]| [x, y, z, 0.0]);
             let element = Element { nodes, gradients, iso, volume, cofactor };
-            if !self.assembly.add_in_cells::<R::Eight>(&element) {
-                self.assembly.add_element(&element, &mut slots);
+            if !assembly.add_in_cells::<R::Eight>(&element) {
+                assembly.add_element(&element, &mut slots);
             }
         }
     }
@@ -67,8 +74,8 @@ impl<L: Law> OneBlock<'_, L> {
         // C in the frame of the element's first node.
         let mut turns = [Rotation::NONE; BLOCK];
         for (lane, turn) in turns.iter_mut().enumerate().take(R::COUNT) {
-            let place = self.assembly.nodes.get(block.node(0, first + lane));
-            *turn = self.frames.since_start(place.map_or(MAX_FUNCTIONS, LatticeNode::frame));
+            let node = self.next.get(block.node(0, first + lane));
+            *turn = self.frames.since_start(node.map_or(MAX_FUNCTIONS, frame_of));
         }
         let mut cofactor = [[R::splat(0.0); 3]; 3];
         for i in 0..3 {
@@ -80,6 +87,9 @@ impl<L: Law> OneBlock<'_, L> {
             }
         }
         self.sums.add(&bound, block, first, &cofactor);
+        if self.assembly.is_none() {
+            return;
+        }
         let weight = block.volume::<R>(first) * R::splat(self.weight);
         let beside = [weight * bound.iso, weight * bound.volume, R::splat(0.0)];
         for (j, (column, beside)) in tangents.iter_mut().zip(beside).enumerate() {

@@ -73,20 +73,21 @@ const MIXED: f32 = 1.25;
 impl<R: Real> Coefficients<R> {
     #[inline(always)]
     fn new<L: Law>(law: &L::Wide<R>, local: &Local<R>) -> Self {
-        let (two, four) = (R::splat(2.0), R::splat(4.0));
+        let four = R::splat(4.0);
         let at = local.at;
         let i1 = at.i + R::splat(3.0);
         let (slope, stiffening, [g, dg, ddg]) =
             (local.slope, local.stiffening::<L>(law), local.volume_factor());
-        let (x_f, x_c) = (two * g, dg * i1);
+        let (x_f, x_c) = (g + g, dg * i1);
         let along = x_f + x_c;
         let bulk = law.volume_curvature(at.j);
-        let p1 = two * slope * g;
-        let p_j = law.volume_slope(at.j) + slope * x_c;
+        let p1 = slope * x_f;
+        let p_j = slope.fused(x_c, law.volume_slope(at.j));
 
-        let cc = bulk + slope * (four * dg + ddg * i1) + stiffening * along * along;
-        let ce = two * slope * dg + stiffening * x_f * along;
-        let ee = stiffening * x_f * x_f;
+        let (stiff_c, stiff_f) = (stiffening * along, stiffening * x_f);
+        let cc = stiff_c.fused(along, slope.fused(ddg.fused(i1, four * dg), bulk));
+        let ce = stiff_f.fused(along, slope * (dg + dg));
+        let ee = stiff_f * x_f;
         Self { p1, p_j, cc, ce, ee, floor: R::splat(FLOOR) * (bulk + p1 + ce.abs()) }
     }
 
@@ -126,10 +127,11 @@ fn scalar_bound<R: Real>(
     let cofactor = i1 * i1 * third;
     let distortion = (i1 + cofactor) - R::splat(6.0) * (at.j + R::splat(1.0));
     let &Coefficients { p1, p_j, cc, ce, ee, floor } = coefficients;
-    let geometric = p1 + p_j.abs() * (i1 * third + R::splat(1.0));
-    let rest = ee * distortion + R::splat(MIXED) * ce.abs() * (distortion + cofactor);
+    let geometric = p_j.abs().fused(i1.fused(third, R::splat(1.0)), p1);
+    let rest = ee.fused(distortion, geometric);
+    let rest = (R::splat(MIXED) * ce.abs()).fused(distortion + cofactor, rest);
     let spread = block.volume::<R>(first) * block.spread::<R>(first);
-    spread * (geometric + rest + R::splat(WEIGHT) * (cc.max(zero) + floor) * cofactor)
+    spread * (R::splat(WEIGHT) * (cc.max(zero) + floor)).fused(cofactor, rest)
 }
 
 /// `iso` and `volume` of a chunk of elements, Pa.
@@ -138,7 +140,7 @@ pub(super) struct Bound<R> {
     pub(super) iso: R,
     pub(super) volume: R,
     /// [`scalar_bound`], N/m.
-    scalar: R,
+    pub(super) scalar: R,
 }
 
 impl<R: Real> Bound<R> {
@@ -181,42 +183,14 @@ impl Beside for ScalarBeside {
     }
 }
 
-/// Adds the matrices `D_a` of each element to the sums of its nodes: `xx, yy, zz` with [`scalar_bound`] as
+/// Where the matrices `D_a` of each element go, the sums of its nodes: `xx, yy, zz` with [`scalar_bound`] as
 /// fourth number, and `xy, yz, zx`.
-pub struct MatrixBeside<'a> {
+pub(super) struct MatrixSums<'a> {
     pub(super) diagonal: Scatter<'a>,
     pub(super) beside: Scatter<'a>,
 }
 
-impl Beside for MatrixBeside<'_> {
-    #[inline(always)]
-    fn see<R: Real, L: Law>(
-        &mut self,
-        law: &L::Wide<R>,
-        block: &ElementBlock,
-        first: usize,
-        deformation: &Deformation<R>,
-        local: &Local<R>,
-    ) -> R {
-        let bound = Bound::<R>::new::<L>(law, block, first, deformation, local);
-        self.add(&bound, block, first, &cofactor(deformation))
-    }
-}
-
-/// `C` by rows.
-#[inline(always)]
-pub(super) fn cofactor<R: Real>(deformation: &Deformation<R>) -> [[R; 3]; 3] {
-    // Loops: closures over vectors may stay calls.
-    let mut cofactor = [[R::splat(0.0); 3]; 3];
-    for i in 0..3 {
-        for j in 0..3 {
-            cofactor[i][j] = deformation.cofactor(i, j);
-        }
-    }
-    cofactor
-}
-
-impl MatrixBeside<'_> {
+impl MatrixSums<'_> {
     /// `cofactor` may be turned into another frame.
     #[inline(always)]
     pub(super) fn add<R: Real>(
@@ -225,7 +199,7 @@ impl MatrixBeside<'_> {
         block: &ElementBlock,
         first: usize,
         cofactor: &[[R; 3]; 3],
-    ) -> R {
+    ) {
         let volume = block.volume::<R>(first);
         let isotropic = volume * bound.iso * block.spread::<R>(first);
         let mut images = [[R::splat(0.0); 3]; 4];
@@ -243,7 +217,7 @@ impl MatrixBeside<'_> {
             *length = (x * x + y * y + z * z).root();
         }
         let Some(nodes) = self.diagonal.all_of(block.nodes()) else {
-            return bound.scalar;
+            return;
         };
         let weight = volume * bound.volume * (lengths[0] + lengths[1] + lengths[2] + lengths[3]);
         let mut diagonal = [[R::splat(0.0); 4]; 4];
@@ -257,6 +231,5 @@ impl MatrixBeside<'_> {
         }
         self.diagonal.add_corners(nodes, first, diagonal);
         self.beside.add_corners(nodes, first, beside);
-        bound.scalar
     }
 }

@@ -9,7 +9,7 @@ use reference::dense::{self, Matrix, beside, cholesky, eigenvalues, symmetric_pa
 use reference::tensor::{apply, contraction, determinant, from_fn, product, rotation};
 use reference::{EXPONENT_CAP, J_MIN, Mat3, Random, Vec3};
 
-use super::bound::{Bound, MatrixBeside, cofactor};
+use super::bound::{Bound, MatrixSums};
 use crate::lanes::{NodeVector, Scatter};
 use crate::material::{Exponential, Law, Literal, Local, NeoHookean, Tissue};
 use crate::mesh::{Mesh, Winding};
@@ -45,8 +45,10 @@ fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
     let local = Local::new::<L>(&wide, deformation.invariants);
     let bound = Bound::<f32>::new::<L>(&wide, block, 0, &deformation, &local);
     let (mut diagonal, mut beside) = ([NodeVector::ZERO; 4], [NodeVector::ZERO; 4]);
-    let mut sums = MatrixBeside { diagonal: Scatter::new(&mut diagonal), beside: Scatter::new(&mut beside) };
-    let scalar = f64::from(sums.add(&bound, block, 0, &cofactor(&deformation)));
+    let mut sums = MatrixSums { diagonal: Scatter::new(&mut diagonal), beside: Scatter::new(&mut beside) };
+    let rows = [0, 1, 2].map(|i| [0, 1, 2].map(|j| deformation.cofactor(i, j)));
+    sums.add(&bound, block, 0, &rows);
+    let scalar = f64::from(bound.scalar);
 
     // By the crate's numbers of the corners, which are those of the block.
     let node = |corner: usize| block.node(corner, 0);

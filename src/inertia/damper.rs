@@ -29,7 +29,6 @@
 
 use core::fmt;
 
-use crate::lanes::Real;
 use crate::mlp::Network;
 
 /// Numbers that go into the network.
@@ -110,14 +109,12 @@ pub(super) struct Rough {
 impl Rough {
     pub(super) const NONE: Self = Self { square: 0.0, change: 0.0, both: 0.0, whole: 0.0 };
 
-    /// Adds sums of nodes side by side, in the order of the fields.
-    pub(super) fn add_lanes<R: Real>(&mut self, [square, change, both, whole]: &[R; 4]) {
-        for lane in 0..R::COUNT {
-            self.square += square.lane(lane);
-            self.change += change.lane(lane);
-            self.both += both.lane(lane);
-            self.whole += whole.lane(lane);
-        }
+    /// Adds sums in the order of the fields.
+    pub(super) fn add(&mut self, [square, change, both, whole]: [f32; 4]) {
+        self.square += square;
+        self.change += change;
+        self.both += both;
+        self.whole += whole;
     }
 
     /// Nothing where there is no rough motion.

@@ -8,10 +8,10 @@
 //! The velocity would be a worse shape: its short waves are far stiffer than the error's.
 //! Work over all nodes, supports as well, so that a support that moves the body bears its stiffness.
 
-use glam::Vec4;
+use bytemuck::must_cast_slice;
 
 use super::node::Scaling;
-use crate::lanes::{NodeVector, Real};
+use crate::lanes::{Kernel, NodeVector, Real, dispatch};
 use crate::tled::{Side, Step};
 
 /// The error across the displacement is about as large again as that along it: over the laboratory's scenes,
@@ -27,21 +27,43 @@ pub(super) struct Estimate {
 
 /// Sum over the nodes in a fixed order, whatever the instruction set.
 pub(super) fn dot(a: &[NodeVector], b: &[NodeVector]) -> f32 {
-    // Several sums: each addition waits for the one before.
-    let mut sums = [Vec4::ZERO; 4];
-    for (a, b) in a.chunks(4).zip(b.chunks(4)) {
-        for ((a, b), sum) in a.iter().zip(b).zip(&mut sums) {
-            *sum += Vec4::from(a.0) * Vec4::from(b.0);
-        }
-    }
-    let [a, b, c, d] = sums;
-    along_axes((a + b) + (c + d))
+    dispatch(Dot { a: must_cast_slice(a), b: must_cast_slice(b) })
 }
 
-/// The fourth numbers of a node's vectors mean something else.
-fn along_axes(sums: Vec4) -> f32 {
-    sums.x + sums.y + sums.z
+struct Dot<'a> {
+    a: &'a [f32],
+    b: &'a [f32],
 }
+
+impl Kernel for Dot<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn run<R: Real>(self) -> f32 {
+        // Several sums: each addition waits for the one before.
+        let mut sums = [R::splat(0.0); 8];
+        let (vectors, rest) = self.a.as_chunks::<WIDTH>();
+        let (others, other_rest) = self.b.as_chunks::<WIDTH>();
+        for (a, b) in vectors.iter().zip(others) {
+            for (sum, from) in sums.iter_mut().zip((0..WIDTH).step_by(R::COUNT)) {
+                let of = |numbers: &[f32; WIDTH]| R::from_fn(|lane| numbers[(from + lane) % WIDTH]);
+                *sum = *sum + of(a) * of(b);
+            }
+        }
+        // The fourth numbers of a node's vectors mean something else.
+        let mut total = 0.0;
+        for lane in (0..WIDTH).filter(|lane| lane % 4 < 3) {
+            total += sums[lane / R::COUNT % 8].lane(lane % R::COUNT);
+        }
+        for (at, (a, b)) in rest.iter().zip(other_rest).enumerate() {
+            total += if at % 4 < 3 { a * b } else { 0.0 };
+        }
+        total
+    }
+}
+
+/// Numbers whose products are summed side by side.
+const WIDTH: usize = 64;
 
 /// Sums over the nodes of a step, before its displacement changes.
 #[derive(Clone, Copy)]
@@ -64,6 +86,23 @@ impl<V: Side> Defect<V> {
         let numbers = [step.seconds() * step.seconds(), 1.0 + k, (1.0 - k) * step.carry(), 0.0];
         let [square, ahead, behind, zero] = numbers.map(splat);
         Self { square, ahead, behind, defect: zero, mass: zero, length: zero, total: zero }
+    }
+
+    /// The sums of one lane.
+    #[inline(always)]
+    pub(super) fn at(&self, lane: usize) -> Defect<f32>
+    where
+        V: Real,
+    {
+        Defect {
+            square: self.square.lane(lane),
+            ahead: self.ahead.lane(lane),
+            behind: self.behind.lane(lane),
+            defect: self.defect.lane(lane),
+            mass: self.mass.lane(lane),
+            length: self.length.lane(lane),
+            total: self.total.lane(lane),
+        }
     }
 
     /// Adds nodes: masses, ones along free axes, displacements, their increments, total forces and next increments.
@@ -89,21 +128,13 @@ pub(super) struct Defects {
 }
 
 impl Defects {
-    /// Of sums of the axes side by side.
-    pub(super) fn of_axes(sums: &Defect<Vec4>) -> Self {
-        let [defect, mass, length, total] = [sums.defect, sums.mass, sums.length, sums.total].map(along_axes);
-        Self { defect, mass, length, total }
-    }
-
-    /// Adds sums of nodes side by side, one for each axis.
-    pub(super) fn add_lanes<R: Real>(&mut self, sums: &[Defect<R>; 3]) {
+    /// Adds the sums of each axis.
+    pub(super) fn add_axes(&mut self, sums: &[Defect<f32>; 3]) {
         for sums in sums {
-            for lane in 0..R::COUNT {
-                self.defect += sums.defect.lane(lane);
-                self.mass += sums.mass.lane(lane);
-                self.length += sums.length.lane(lane);
-                self.total += sums.total.lane(lane);
-            }
+            self.defect += sums.defect;
+            self.mass += sums.mass;
+            self.length += sums.length;
+            self.total += sums.total;
         }
     }
 }

@@ -4,7 +4,7 @@
 //! gradient of a tetrahedron of four of its nodes, its columns made orthonormal (Gram-Schmidt), now and at the start of the cycle.
 //! Bounds are summed, inverted and applied in the frames of the start of their cycle.
 
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
+use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
 use crate::lanes::NodeVector;
 
 /// A 3 x 3 matrix by rows.
@@ -66,11 +66,15 @@ impl Frames {
     };
 
     /// Chooses four nodes for each function, far apart among those that it moves.
-    pub(super) fn choose(&mut self, lattice: &Lattice, places: &[LatticeNode], points: &[[f32; 3]]) {
+    pub(super) fn choose(&mut self, lattice: &Lattice, points: &[[f32; 3]]) {
         self.functions = lattice.functions();
         for (function, probe) in self.probes.iter_mut().enumerate().take(self.functions) {
-            *probe = choose(function, lattice, places, points);
+            *probe = choose(function, lattice, points);
         }
+    }
+
+    pub(super) const fn functions(&self) -> usize {
+        self.functions
     }
 
     /// Looks where the frames are now.
@@ -125,61 +129,78 @@ pub(super) fn turn(
     }
 }
 
+#[inline(always)]
 fn times_transposed(a: &Matrix, b: &Matrix) -> Matrix {
-    a.map(|row| [0, 1, 2].map(|j| row[0] * b[j][0] + row[1] * b[j][1] + row[2] * b[j][2]))
+    // Loops: closures over rows may stay calls.
+    let mut product = [[0.0; 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            product[i][j] = a[i][0] * b[j][0] + a[i][1] * b[j][1] + a[i][2] * b[j][2];
+        }
+    }
+    product
 }
 
+#[inline(always)]
 fn minus(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
+#[inline(always)]
 fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+#[inline(always)]
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+#[inline(always)]
 fn unit(a: [f32; 3]) -> Option<[f32; 3]> {
     let length = libm::sqrtf(dot(a, a));
-    (length > 1e-6 && length.is_finite()).then(|| a.map(|component| component / length))
+    let inverse = 1.0 / length;
+    if length > 1e-6 && length.is_finite() {
+        Some([a[0] * inverse, a[1] * inverse, a[2] * inverse])
+    } else {
+        None
+    }
 }
 
 impl Probe {
     /// The orthonormal columns of the deformation gradient, by rows.
+    #[inline(always)]
     fn basis(&self, displacement: &[NodeVector]) -> Option<Matrix> {
         let at = |node: u32| displacement.get(node as usize).map(|vector| vector.to_array());
-        let [a, b, c, d] = self.nodes.map(at);
-        let origin = a?;
-        let edges = [minus(b?, origin), minus(c?, origin), minus(d?, origin)];
+        let [a, b, c, d] = self.nodes;
+        let origin = at(a)?;
+        let edges = [minus(at(b)?, origin), minus(at(c)?, origin), minus(at(d)?, origin)];
         // Columns of F = I + sum_k edge_k (x) row_k of the inverse.
-        let column = |j: usize| {
-            let mut column = IDENTITY[j];
-            for (edge, row) in edges.iter().zip(self.inverse) {
-                for axis in 0..3 {
-                    column[axis] += edge[axis] * row[j];
-                }
+        let (mut first, mut second) = (IDENTITY[0], IDENTITY[1]);
+        for axis in 0..3 {
+            for (edge, row) in edges.iter().zip(&self.inverse) {
+                first[axis] += edge[axis] * row[0];
+                second[axis] += edge[axis] * row[1];
             }
-            column
-        };
-        let first = unit(column(0))?;
-        let second = column(1);
+        }
+        let first = unit(first)?;
         let along = dot(first, second);
-        let second = unit(minus(second, first.map(|component| along * component)))?;
+        let across = [first[0] * along, first[1] * along, first[2] * along];
+        let second = unit(minus(second, across))?;
         let third = cross(first, second);
-        Some([0, 1, 2].map(|axis| [first[axis], second[axis], third[axis]]))
+        let row = |axis: usize| [first[axis], second[axis], third[axis]];
+        Some([row(0), row(1), row(2)])
     }
 }
 
 /// The node nearest to the middle of those that the function moves, the one farthest from it, and those that
 /// span the largest triangle and tetrahedron with them.
-fn choose(function: usize, lattice: &Lattice, places: &[LatticeNode], points: &[[f32; 3]]) -> Probe {
+fn choose(function: usize, lattice: &Lattice, points: &[[f32; 3]]) -> Probe {
     let moved = || {
-        let nodes = places.iter().zip(points).enumerate();
-        nodes.filter_map(|(node, (place, &point))| {
+        points.iter().enumerate().filter_map(|(node, &point)| {
+            let place = lattice.place(point);
             let (_, weight) =
-                lattice.weights(place).into_iter().find(|&(f, weight)| f == function && weight > 0.0)?;
+                lattice.weights(&place).into_iter().find(|&(f, weight)| f == function && weight > 0.0)?;
             Some((node as u32, point, weight))
         })
     };

@@ -20,35 +20,42 @@ const DROPPED: u8 = MAX_FUNCTIONS as u8;
 /// Functions with less than this share of the heaviest one's mass are dropped.
 const LEAST_MASS: f32 = 0.02;
 
-/// Where a node is in the lattice.
+/// Where a node is in the lattice. Nodes are in the order of their cells.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct LatticeNode {
-    /// Number of the cell.
-    cell: u16,
-    /// The function whose frame it turns with; [`MAX_FUNCTIONS`] for none.
-    frame: u8,
-    spare: u8,
     /// Position in the cell, 0 to 1.
     within: [f32; 3],
+    /// Number of the node.
+    node: u32,
+    /// Number of the cell.
+    cell: u32,
+    /// Not of this node: where the one with the number of this place is.
+    rank: u32,
 }
 
 impl LatticeNode {
-    /// See the field.
     #[inline(always)]
-    pub(super) fn frame(&self) -> usize {
-        usize::from(self.frame)
+    pub(super) fn cell(&self) -> usize {
+        self.cell as usize
     }
 
     #[inline(always)]
-    pub(super) fn cell(&self) -> usize {
-        usize::from(self.cell)
+    pub(super) fn node(&self) -> usize {
+        self.node as usize
     }
 
     /// See the field.
     #[inline(always)]
     pub(super) fn within(&self) -> [f32; 3] {
         self.within
+    }
+
+    /// Position, and the number of the node by its bits.
+    #[inline(always)]
+    pub(super) fn row(&self) -> [f32; 4] {
+        let [x, y, z] = self.within;
+        [x, y, z, f32::from_bits(self.node)]
     }
 
     /// Weights of the functions at the corners of its cell.
@@ -87,7 +94,54 @@ impl LatticeNode {
     }
 
     /// In the first cell.
-    pub const EMPTY: Self = Self { cell: 0, frame: DROPPED, spare: 0, within: [0.0; 3] };
+    pub const EMPTY: Self = Self { within: [0.0; 3], node: 0, cell: 0, rank: 0 };
+}
+
+/// Where a node is.
+#[inline(always)]
+pub(super) fn place_of(places: &[LatticeNode], node: usize) -> Option<&LatticeNode> {
+    places.get(places.get(node)?.rank as usize)
+}
+
+/// Puts the places of nodes in the order of their cells.
+pub(super) fn order(places: &mut [LatticeNode]) {
+    // Where the next node of each cell goes.
+    let mut next = [0u32; MAX_POINTS + 1];
+    for place in &*places {
+        if let Some(count) = next.get_mut(place.cell() + 1) {
+            *count += 1;
+        }
+    }
+    let mut sum = 0;
+    for next in &mut next {
+        sum += *next;
+        *next = sum;
+    }
+    for (node, place) in places.iter_mut().enumerate() {
+        place.node = node as u32;
+        if let Some(next) = next.get_mut(place.cell()) {
+            place.rank = *next;
+            *next += 1;
+        }
+    }
+    for at in 0..places.len() {
+        // Each exchange brings one node to where it belongs.
+        for _ in 0..places.len() {
+            let Some(here) = places.get(at).copied() else {
+                return;
+            };
+            let goes = places.get(here.node()).map_or(at, |place| place.rank as usize);
+            let Some(there) = places.get(goes).copied().filter(|_| goes != at) else {
+                break;
+            };
+            if let Some(place) = places.get_mut(goes) {
+                *place = LatticeNode { rank: there.rank, ..here };
+            }
+            if let Some(place) = places.get_mut(at) {
+                *place = LatticeNode { rank: here.rank, ..there };
+            }
+        }
+    }
 }
 
 /// Cells along each axis and the functions that were kept.
@@ -174,23 +228,21 @@ impl Lattice {
             along[axis] = cell as u8;
             node.within[axis] = (place - cell as f32).clamp(0.0, 1.0);
         }
-        node.cell = self.cell_number(along) as u16;
+        node.cell = self.cell_number(along) as u32;
         node
     }
 
-    /// Where a node of the scene is; it turns with the function that moves it most, unless some of its axes are held:
-    /// those do not turn.
-    pub(super) fn place_node(&self, point: [f32; 3], inertia: &NodeInertia) -> LatticeNode {
-        let mut node = self.place(point);
+    /// The function whose frame a node turns with, [`MAX_FUNCTIONS`] for none: the one that moves it most, unless some of
+    /// its axes are held, which do not turn.
+    pub(super) fn frame(&self, place: &LatticeNode, inertia: &NodeInertia) -> usize {
         let held = inertia.inverse.iter().filter(|&&inverse| inverse <= 0.0).count();
-        let mut most = 0.0;
-        for (function, weight) in self.weights(&node) {
+        let (mut frame, mut most) = (MAX_FUNCTIONS, 0.0);
+        for (function, weight) in self.weights(place) {
             if function < MAX_FUNCTIONS && weight > most && (held == 0 || held == 3) {
-                most = weight;
-                node.frame = function as u8;
+                (frame, most) = (function, weight);
             }
         }
-        node
+        frame
     }
 
     /// Lattice points at the corners of a cell.
@@ -273,18 +325,6 @@ impl Lattice {
 
 /// Vectors of the functions, with one more place for what dropped ones would get.
 pub(super) type CoarseVectors = [NodeVector; MAX_FUNCTIONS + 1];
-
-/// Adds `W^T v` of one node.
-#[inline(always)]
-pub(super) fn restrict(weights: &[(usize, f32); 8], v: [f32; 4], sums: &mut CoarseVectors) {
-    for &(function, weight) in weights {
-        if let Some(sum) = sums.get_mut(function) {
-            for (sum, v) in sum.0.iter_mut().zip(v) {
-                *sum += weight * v;
-            }
-        }
-    }
-}
 
 fn bounding_box(points: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
     let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);

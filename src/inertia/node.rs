@@ -18,7 +18,7 @@
 //! shrinks the velocity is kept. In slow motion the scaling would brake more than it protects; half of what damping takes
 //! meanwhile is therefore given back ([`GIVEN_BACK`]), which keeps the sum of both a loss.
 
-use crate::scene::NodeInertia;
+use crate::lanes::Real;
 use crate::symmetric::Symmetric;
 
 /// Share of the energy that damping takes which a growing inertia may give back.
@@ -39,75 +39,70 @@ pub(super) struct Scaling {
     pub(super) coarse_weight: f32,
 }
 
-/// A node's inertia as it is used.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Node {
+/// What became of nodes side by side.
+pub(super) struct Renewed<R> {
     /// `(N + reserve m)^-1` on the free axes, 1/kg.
-    pub(super) inverse: Symmetric,
-    /// Share of it in use: below one where a node is held back.
-    pub(super) share: f32,
-}
-
-/// What became of a node.
-pub(super) struct Renewed {
-    pub(super) inverse: Symmetric,
+    pub(super) inverse: Symmetric<R>,
     /// `N + reserve m` with zero rows at held axes, kg.
-    pub(super) inertia: Symmetric,
+    pub(super) inertia: Symmetric<R>,
     /// What the velocity has to be multiplied by.
-    pub(super) velocity: f32,
+    pub(super) velocity: R,
     /// Mean added inertia over the three axes, in masses of the node.
-    pub(super) added: f32,
+    pub(super) added: R,
 }
 
-fn form(matrix: &Symmetric, v: [f32; 3]) -> f32 {
+#[inline(always)]
+fn form<R: Real>(matrix: &Symmetric<R>, v: [R; 3]) -> R {
     let [x, y, z] = matrix.times(v);
     x * v[0] + y * v[1] + z * v[2]
 }
 
 /// A diagonal of ones where the axis is held, so that the rest can be inverted.
-fn with_held(mut matrix: Symmetric, inverse: [f32; 3]) -> Symmetric {
-    for (entry, inverse) in [&mut matrix.xx, &mut matrix.yy, &mut matrix.zz].into_iter().zip(inverse) {
-        if inverse <= 0.0 {
-            *entry = 1.0;
-        }
-    }
+#[inline(always)]
+fn with_held<R: Real>(mut matrix: Symmetric<R>, [x, y, z]: [R; 3]) -> Symmetric<R> {
+    let one = R::splat(1.0);
+    matrix.xx = x.choose(matrix.xx, one);
+    matrix.yy = y.choose(matrix.yy, one);
+    matrix.zz = z.choose(matrix.zz, one);
     matrix
 }
 
-/// The inertia from the summed bounds (N/m) of the node's elements. `old` is the inverse in use so far and the
-/// velocity in its frame, nothing at the start.
+/// The inertia from the summed bounds (N/m) of the nodes' elements; `free` is positive along free axes. `old` is the inverse
+/// in use so far and the velocity in its frame, nothing at the start.
 #[inline(always)]
-pub(super) fn renew(
-    at: &NodeInertia,
-    stiffness: Symmetric,
-    old: Option<(Symmetric, [f32; 3])>,
-    velocity: [f32; 3],
+pub(super) fn renew<R: Real>(
+    free: [R; 3],
+    mass: R,
+    stiffness: Symmetric<R>,
+    old: Option<(Symmetric<R>, [R; 3])>,
+    velocity: [R; 3],
     scaling: &Scaling,
-) -> Renewed {
-    let mass = at.mass;
-    let needed = stiffness.scaled(scaling.weight).on_free(at.inverse);
+) -> Renewed<R> {
+    let (zero, one) = (R::splat(0.0), R::splat(1.0));
+    let needed = stiffness.scaled(R::splat(scaling.weight)).on_free(free);
     let largest = needed.largest_eigenvalue();
-    let factor = if largest > mass { 1.0 - mass / largest } else { 0.0 };
-    let scaled = needed.scaled_plus(factor, mass).on_free(at.inverse);
-    let added = factor * needed.trace() / (3.0 * mass);
+    let factor = (largest - mass).choose(one - mass.over(largest), zero);
+    let scaled = needed.scaled_plus(factor, mass).on_free(free);
+    let added = (factor * needed.trace()).over(R::splat(3.0) * mass);
+    let reserve = R::splat(scaling.reserve) * mass;
 
-    let mut keep = 1.0;
+    let mut keep = one;
     if let Some((old, old_velocity)) = old {
         // The inertia before, from the inverse that was in use.
-        let before = with_held(old, at.inverse).inverse().on_free(at.inverse);
-        let reserve = scaling.reserve * mass;
-        let square: f32 =
-            velocity.iter().zip(at.inverse).map(|(v, i)| if i > 0.0 { v * v } else { 0.0 }).sum();
+        let before = with_held(old, free).inverse().on_free(free);
+        let mut square = zero;
+        for axis in 0..3 {
+            square = square + free[axis].choose(velocity[axis] * velocity[axis], zero);
+        }
         let energy = form(&scaled, velocity);
         let had = form(&before, old_velocity) - reserve * square;
         // What rounding may be, and what damping takes.
-        let given = GIVEN_BACK * scaling.loss * mass * square;
-        if energy > had * (1.0 + 1e-5) + given && energy > 0.0 {
-            let allowed = (had + given) / energy;
-            keep = if allowed > 0.0 { libm::sqrtf(allowed) } else { 0.0 };
-        }
+        let given = R::splat(GIVEN_BACK * scaling.loss) * mass * square;
+        let more = energy - (had * R::splat(1.0 + 1e-5) + given);
+        let allowed = (had + given).over(energy).max(zero).root();
+        keep = more.choose(energy.choose(allowed, one), one);
     }
-    let inertia = scaled.scaled_plus(1.0, scaling.reserve * mass).on_free(at.inverse);
-    let inverse = with_held(inertia, at.inverse).inverse().on_free(at.inverse);
+    let inertia = scaled.scaled_plus(one, reserve).on_free(free);
+    let inverse = with_held(inertia, free).inverse().on_free(free);
     Renewed { inverse, inertia, velocity: keep, added }
 }

@@ -1,5 +1,5 @@
-//! The two passes over the nodes of a step with a lattice, before the lattice moves and after, several nodes side by side.
-//! What they have to do with the lattice goes node by node, to and from the cell that the node is in.
+//! The passes over the nodes of a step, several nodes side by side: with a lattice one before it moves and one after, in
+//! the order of its cells, so that what a cell sums or moves stays in registers; without one both at once.
 
 use bytemuck::{Pod, Zeroable, must_cast, must_cast_ref, must_cast_slice, must_cast_slice_mut};
 use glam::Vec4;
@@ -10,14 +10,13 @@ use super::frames::Rotation;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::node::Scaling;
 use super::report::HeldBack;
-use super::vectors::NodeTables;
+use super::vectors::{NodeTables, frame_of};
 use super::{LARGEST_KICK, NODE_GROWTH, RECOVERY};
-use crate::lanes::{BLOCK, Kernel, NodeVector, Real, dispatch, read_rows, write_rows};
+use crate::lanes::{BLOCK, Chosen, Following, Kernel, NodeVector, Real, Rows, dispatch, write_rows};
 use crate::scene::NodeInertia;
 use crate::tled::{Step, Sums, Totals};
 
-/// The functions' rotations out of the frames of the bounds, by padded rows, and one that does not turn for nodes that no
-/// function moves.
+/// The functions' rotations out of the frames of the bounds, by padded rows; those beyond do not turn.
 pub(super) type Turns = [[[f32; 4]; 3]; MAX_FUNCTIONS + 1];
 
 const STILL: [[f32; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
@@ -30,19 +29,101 @@ pub(super) fn turns(rotations: &[Rotation], functions: usize) -> Turns {
     turns
 }
 
+/// Parts of [`BLOCK`] nodes: sums are kept for as many lanes whatever the width, so that their bits are the same.
+const PARTS: usize = 2;
+
+/// The sums of a row of a block, of which there is one a lane: their part, and the lane.
+#[inline(always)]
+fn of_row<R: Real, T>(parts: &[T; PARTS], row: usize, lane_of: impl Fn(usize) -> usize) -> (&T, usize) {
+    (&parts[row / R::COUNT % PARTS], lane_of(row % R::COUNT))
+}
+
+/// What both passes read.
+#[derive(Clone, Copy)]
+pub(super) struct Given<'a> {
+    pub(super) step: &'a Step,
+    pub(super) scaling: &'a Scaling,
+    pub(super) inertia: &'a [NodeInertia],
+    pub(super) displacement: &'a [NodeVector],
+    pub(super) increment: &'a [NodeVector],
+    /// None without a lattice.
+    pub(super) places: &'a [LatticeNode],
+}
+
+/// Nodes side by side.
+#[derive(Clone, Copy)]
+struct Nodes<R> {
+    /// Ones along free axes.
+    free: [R; 3],
+    mass: R,
+    force: [R; 3],
+    /// The bound that the forces brought along, N/m.
+    bound: R,
+    increment: [R; 3],
+}
+
+impl Given<'_> {
+    #[inline(always)]
+    fn read<R: Real>(&self, rows: impl Rows, force: &[NodeVector]) -> Nodes<R> {
+        let [ix, iy, iz, mass] = rows.read::<R>(must_cast_slice(self.inertia));
+        let [fx, fy, fz, bound] = rows.read::<R>(must_cast_slice(force));
+        let [vx, vy, vz, _] = rows.read::<R>(must_cast_slice(self.increment));
+        let free = [ix.positive(), iy.positive(), iz.positive()];
+        Nodes { free, mass, force: [fx, fy, fz], bound, increment: [vx, vy, vz] }
+    }
+
+    /// The nodes that come `first` and on in the order of the cells, and where they are.
+    #[inline(always)]
+    fn in_order<R: Real>(&self, first: usize) -> Option<(Chosen, Within<'_, R>)> {
+        let places = self.places.get(first..first + R::COUNT)?;
+        let [x, y, z, numbers] = R::from_rows(|lane| places.get(lane).map_or([0.0; 4], LatticeNode::row));
+        let mut rows = [0; BLOCK];
+        for (lane, row) in rows.iter_mut().enumerate().take(R::COUNT) {
+            *row = numbers.lane(lane).to_bits();
+        }
+        let ends = [places.first()?.cell(), places.last()?.cell()];
+        Some((Chosen::below(rows, self.places.len())?, Within { position: [x, y, z], ends, places }))
+    }
+}
+
+/// Positions of nodes side by side in their cells, and the cells of the first and the last.
+struct Within<'a, R> {
+    position: [R; 3],
+    ends: [usize; 2],
+    places: &'a [LatticeNode],
+}
+
+impl<R: Real> Within<'_, R> {
+    fn cell(&self, lane: usize) -> usize {
+        self.places.get(lane).map_or(0, LatticeNode::cell)
+    }
+
+    /// Ones for the nodes in this cell.
+    #[inline(always)]
+    fn mask(&self, cell: usize) -> R {
+        R::from_fn(|lane| if self.cell(lane) == cell { 1.0 } else { 0.0 })
+    }
+
+    /// The next cell that nodes are in.
+    #[inline(always)]
+    fn after(&self, cell: usize) -> usize {
+        let mut next = self.ends[1];
+        for other in self.places.iter().map(LatticeNode::cell) {
+            next = if other > cell && other < next { other } else { next };
+        }
+        next
+    }
+}
+
 /// How much of its inverse inertia each node may use, where that alone takes it (its next increment without the
 /// lattice's part, into `next`), and the lattice's share of its residual, in sums of the cells. Gives who was held back
 /// and the largest growth.
 pub(super) struct Prepare<'a, 'b> {
-    pub(super) step: &'a Step,
-    pub(super) scaling: &'a Scaling,
+    pub(super) given: Given<'a>,
     /// What the velocities are multiplied by.
     pub(super) brake: f32,
-    pub(super) places: &'a [LatticeNode],
     pub(super) turns: &'a Turns,
-    pub(super) inertia: &'a [NodeInertia],
     pub(super) force: &'a [NodeVector],
-    pub(super) increment: &'a [NodeVector],
     pub(super) tables: &'a mut NodeTables<'b>,
     pub(super) cells: &'a mut [Cell],
     /// Gets sums of the momentum, for a damped step.
@@ -54,6 +135,7 @@ const LEAST_INVERSE: f32 = 1e-30;
 const LEAST_DETERMINANT: f32 = 1e-6;
 
 /// What is found on the way, node by node in lanes.
+#[derive(Clone, Copy)]
 struct Found<R> {
     /// One over the largest growth.
     least: R,
@@ -67,6 +149,31 @@ impl<R: Real> Found<R> {
     fn nothing() -> Self {
         Self { least: R::splat(1.0), held: R::splat(0.0), unused: R::splat(0.0) }
     }
+
+    /// Who was held back and the largest growth, with the nodes that were left over.
+    #[inline(always)]
+    fn total(
+        parts: &[Self; PARTS],
+        lane_of: impl Fn(usize) -> usize,
+        mut rest: Found<f32>,
+    ) -> (HeldBack, f32) {
+        let mut held_back = HeldBack::NONE;
+        for row in 0..BLOCK {
+            let (found, lane) = of_row::<R, _>(parts, row, &lane_of);
+            rest.least = found.least.lane(lane).min(rest.least);
+            held_back.add(found.held.lane(lane), found.unused.lane(lane));
+        }
+        held_back.add(rest.held, rest.unused);
+        (held_back, 1.0 / rest.least)
+    }
+}
+
+/// What a node is moved by alone, what the lattice gets of it, and its inverse inertia.
+struct Prepared<R> {
+    /// The next increment without the lattice's part, and the least height of the node's elements.
+    next: [R; 4],
+    residual: [R; 3],
+    inverse: [R; 6],
 }
 
 impl Prepare<'_, '_> {
@@ -81,106 +188,127 @@ impl Kernel for Prepare<'_, '_> {
     type Output = (HeldBack, f32);
 
     #[inline(always)]
-    fn run<R: Real>(self) -> Self::Output {
-        self.all::<R::Eight>()
+    fn run<R: Real>(mut self) -> Self::Output {
+        let given = self.given;
+        let nodes = given.inertia.len().min(given.places.len());
+        let whole = nodes - nodes % BLOCK;
+        let mut found = [Found::<R>::nothing(); PARTS];
+        self.cells.fill(Cell::EMPTY);
+        let mut forces = CellSum::new();
+        let mut moving = CellSum::new();
+        if let Some(momentum) = &mut self.momentum {
+            momentum.fill(Cell::EMPTY);
+        }
+        for first in (0..whole).step_by(BLOCK) {
+            for part in 0..BLOCK / R::COUNT {
+                let Some((rows, within)) = given.in_order::<R>(first + part * R::COUNT) else {
+                    continue;
+                };
+                let nodes = self.given.read::<R>(rows, self.force);
+                let prepared = self.nodes(rows, &nodes, &mut found[part % PARTS]);
+                rows.write(must_cast_slice_mut(self.tables.next), prepared.next);
+                if let Some(momentum) = &mut self.momentum {
+                    moving.add(momentum, &within, part, momentum_of(&nodes, prepared.inverse));
+                }
+                forces.add(self.cells, &within, part, prepared.residual);
+            }
+        }
+        forces.flush(self.cells);
+        if let Some(momentum) = &mut self.momentum {
+            moving.flush(momentum);
+        }
+        let mut rest = Found::nothing();
+        for at in whole..nodes {
+            let Some(place) = self.given.places.get(at) else {
+                continue;
+            };
+            let rows = Following(place.node());
+            let nodes = self.given.read::<f32>(rows, self.force);
+            let prepared = self.nodes(rows, &nodes, &mut rest);
+            rows.write(must_cast_slice_mut(self.tables.next), prepared.next);
+            if let Some(cell) = self.momentum.as_mut().and_then(|cells| cells.get_mut(place.cell())) {
+                cell.add(place, momentum_of(&nodes, prepared.inverse));
+            }
+            if let Some(cell) = self.cells.get_mut(place.cell()) {
+                cell.add(place, prepared.residual);
+            }
+        }
+        Found::total(&found, |row| row, rest)
     }
 }
 
 impl Prepare<'_, '_> {
     #[inline(always)]
-    fn all<R: Real>(mut self) -> (HeldBack, f32) {
-        self.cells.fill(Cell::EMPTY);
-        if let Some(momentum) = &mut self.momentum {
-            momentum.fill(Cell::EMPTY);
-        }
-        let nodes = self.inertia.len();
-        let whole = nodes - nodes % R::COUNT;
-        let mut found = Found::<R>::nothing();
-        for first in (0..whole).step_by(R::COUNT) {
-            self.nodes::<R, R>(first, &mut found);
-        }
-        let mut rest = Found::<f32>::nothing();
-        for node in whole..nodes {
-            self.nodes::<f32, R>(node, &mut rest);
-        }
-        let mut held_back = HeldBack::NONE;
-        for lane in 0..R::COUNT {
-            rest.least = found.least.lane(lane).min(rest.least);
-            held_back.add(found.held.lane(lane), found.unused.lane(lane));
-        }
-        held_back.add(rest.held, rest.unused);
-        (held_back, 1.0 / rest.least)
-    }
-
-    /// The nodes from `first` on, side by side; `C` holds eight numbers.
-    #[inline(always)]
-    fn nodes<R: Real, C: Real>(&mut self, first: usize, found: &mut Found<R>) {
-        let step = self.step.seconds();
-        let carry = self.brake * self.step.carry();
+    fn nodes<R: Real>(&mut self, rows: impl Rows, nodes: &Nodes<R>, found: &mut Found<R>) -> Prepared<R> {
+        let Given { step, scaling, .. } = self.given;
+        let carry = self.brake * step.carry();
         let NodeTables { inverse_diagonal, inverse_beside, next, .. } = &mut *self.tables;
-        let places = self.places.get(first..first + R::COUNT).unwrap_or_default();
+        let &Nodes { free, mass, force, bound, increment: [vx, vy, vz] } = nodes;
 
-        let [ix, iy, iz, mass] = read_rows::<R>(must_cast_slice(self.inertia), first);
-        let [fx, fy, fz, bound] = read_rows::<R>(must_cast_slice(self.force), first);
-        let [vx, vy, vz, _] = read_rows::<R>(must_cast_slice(self.increment), first);
-        let loss = R::splat(2.0 * self.scaling.k * carry) * mass;
-        let square = R::splat(step * step);
-        let residual = |inverse: R, f: R, v: R| inverse.positive() * (square * f - loss * v);
-        let (rx, ry, rz) = (residual(ix, fx, vx), residual(iy, fy, vy), residual(iz, fz, vz));
+        let loss = R::splat(2.0 * scaling.k * carry) * mass;
+        let square = R::splat(step.seconds() * step.seconds());
+        let rx = free[0] * (square * force[0] - loss * vx);
+        let ry = free[1] * (square * force[1] - loss * vy);
+        let rz = free[2] * (square * force[2] - loss * vz);
 
-        let mut turns = [&STILL; BLOCK];
-        for (turn, place) in turns.iter_mut().zip(places) {
-            *turn = self.turns.get(place.frame()).unwrap_or(&STILL);
-        }
+        let [_, _, _, height] = rows.read::<R>(must_cast_slice(next));
+        // The number of the frame is in the last bits, see `NodeTables`.
+        let turn = |lane: usize| {
+            let frame = frame_of(&NodeVector([0.0, 0.0, 0.0, height.lane(lane)]));
+            &self.turns[frame.min(MAX_FUNCTIONS)]
+        };
         let turn = [
-            R::from_rows(|lane| turns[lane % BLOCK][0]),
-            R::from_rows(|lane| turns[lane % BLOCK][1]),
-            R::from_rows(|lane| turns[lane % BLOCK][2]),
+            R::from_rows(|lane| turn(lane)[0]),
+            R::from_rows(|lane| turn(lane)[1]),
+            R::from_rows(|lane| turn(lane)[2]),
         ];
-        let back = |axis: usize| turn[0][axis] * rx + turn[1][axis] * ry + turn[2][axis] * rz;
-        let (bx, by, bz) = (back(0), back(1), back(2));
-        let [xx, yy, zz, bound_before] = read_rows::<R>(must_cast_slice(inverse_diagonal), first);
-        let [xy, yz, zx, share_before] = read_rows::<R>(must_cast_slice(inverse_beside), first);
+        let bx = turn[0][0] * rx + turn[1][0] * ry + turn[2][0] * rz;
+        let by = turn[0][1] * rx + turn[1][1] * ry + turn[2][1] * rz;
+        let bz = turn[0][2] * rx + turn[1][2] * ry + turn[2][2] * rz;
+        let [xx, yy, zz, bound_before] = rows.read::<R>(must_cast_slice(inverse_diagonal));
+        let [xy, yz, zx, share_before] = rows.read::<R>(must_cast_slice(inverse_beside));
         let alone = [xx * bx + xy * by + zx * bz, xy * bx + yy * by + yz * bz, zx * bx + yz * by + zz * bz];
 
         // One over how far its bound has grown, as far as that matters beside its mass.
-        let weight = R::splat(self.scaling.weight);
+        let weight = R::splat(scaling.weight);
         let grown = (mass + weight * bound_before).over(mass + weight * bound);
-        let [_, _, _, height] = read_rows::<R>(must_cast_slice(next), first);
         let kick = (alone[0] * alone[0] + alone[1] * alone[1] + alone[2] * alone[2]).root();
         let one = R::splat(1.0);
         let most = (R::splat(LARGEST_KICK) * height).over(kick);
         // Who is let go and held back in turn would be braked each time: back to one only slowly.
         let share = (R::splat(NODE_GROWTH) * grown).min(one).min(most).min(R::splat(RECOVERY) * share_before);
         let keep = R::splat(carry) * share.over(share_before).min(one).root();
-
-        let out = |row: usize| turn[row][0] * alone[0] + turn[row][1] * alone[1] + turn[row][2] * alone[2];
-        let moved =
-            [keep * vx + share * out(0), keep * vy + share * out(1), keep * vz + share * out(2), height];
-        write_rows(must_cast_slice_mut(next), first, moved);
-        write_rows(must_cast_slice_mut(inverse_beside), first, [xy, yz, zx, share]);
+        rows.write(must_cast_slice_mut(inverse_beside), [xy, yz, zx, share]);
         found.least = grown.min(found.least);
         let unused = one - share;
         found.unused = found.unused + unused;
         found.held = found.held + unused.positive();
 
-        if let Some(momentum) = &mut self.momentum {
-            // The mean of `M` over the axes, from its inverse, with one where an axis is held. By way of the correlations
-            // `p, q, r`: beside a crushed element the inverse is so small that products of it are zero.
-            let (fx, fy, fz) = (ix.positive(), iy.positive(), iz.positive());
-            let least = R::splat(LEAST_INVERSE);
-            let (a, b, c) =
-                ((xx + (one - fx)).max(least), (yy + (one - fy)).max(least), (zz + (one - fz)).max(least));
-            let (ra, rb, rc) = (a.root(), b.root(), c.root());
-            let (p, q, r) = (xy.over(ra * rb), yz.over(rb * rc), zx.over(rc * ra));
-            let (pp, qq, rr) = (p * p, q * q, r * r);
-            let determinant = one + R::splat(2.0) * p * q * r - pp - qq - rr;
-            let sum = (fx * (one - qq)).over(a) + (fy * (one - rr)).over(b) + (fz * (one - pp)).over(c);
-            let mean = R::splat(1.0 / 3.0) * sum.over(determinant.max(R::splat(LEAST_DETERMINANT)));
-            add_to::<R, C>(momentum, places, [mean * vx, mean * vy, mean * vz]);
+        let mut moved = [keep * vx, keep * vy, keep * vz, height];
+        for row in 0..3 {
+            let out = turn[row][0] * alone[0] + turn[row][1] * alone[1] + turn[row][2] * alone[2];
+            moved[row] = moved[row] + share * out;
         }
-        add_to::<R, C>(self.cells, places, [rx, ry, rz]);
+        Prepared { next: moved, residual: [rx, ry, rz], inverse: [xx, yy, zz, xy, yz, zx] }
     }
+}
+
+/// The momentum of nodes, with the mean of `M` over the axes, from its inverse, with one where an axis is held. By way of the
+/// correlations `p, q, r`: beside a crushed element the inverse is so small that products of it are zero.
+#[inline(always)]
+fn momentum_of<R: Real>(nodes: &Nodes<R>, [xx, yy, zz, xy, yz, zx]: [R; 6]) -> [R; 3] {
+    let (one, least) = (R::splat(1.0), R::splat(LEAST_INVERSE));
+    let [fx, fy, fz] = nodes.free;
+    let (a, b, c) =
+        ((xx + (one - fx)).max(least), (yy + (one - fy)).max(least), (zz + (one - fz)).max(least));
+    let (ra, rb, rc) = (a.root(), b.root(), c.root());
+    let (p, q, r) = (xy.over(ra * rb), yz.over(rb * rc), zx.over(rc * ra));
+    let (pp, qq, rr) = (p * p, q * q, r * r);
+    let determinant = one + R::splat(2.0) * p * q * r - pp - qq - rr;
+    let sum = (fx * (one - qq)).over(a) + (fy * (one - rr)).over(b) + (fz * (one - pp)).over(c);
+    let mean = R::splat(1.0 / 3.0) * sum.over(determinant.max(R::splat(LEAST_DETERMINANT)));
+    let [vx, vy, vz] = nodes.increment;
+    [mean * vx, mean * vy, mean * vz]
 }
 
 /// What of the last increment is smooth, and the share of the rest that is taken away.
@@ -192,22 +320,61 @@ pub(super) struct Calm<'a> {
 /// Adds what the lattice moves to the next increments, in `next`, and takes the bounds out of the forces' fourth
 /// component. Gives what the step enters in the energy account and in the estimate of the error.
 pub(super) struct Settle<'a, 'b> {
-    pub(super) step: &'a Step,
-    pub(super) scaling: &'a Scaling,
-    pub(super) places: &'a [LatticeNode],
+    pub(super) given: Given<'a>,
     /// What the lattice moves.
     pub(super) cells: &'a [Cell],
     /// How rough motion is damped.
     pub(super) damped: Option<Calm<'a>>,
-    pub(super) inertia: &'a [NodeInertia],
-    pub(super) displacement: &'a [NodeVector],
-    pub(super) increment: &'a [NodeVector],
     pub(super) force: &'a mut [NodeVector],
     pub(super) tables: &'a mut NodeTables<'b>,
 }
 
 /// Sums for each axis.
-type AxisSums<R> = ([Sums<R>; 3], [Defect<R>; 3], [R; 4]);
+#[derive(Clone, Copy)]
+struct AxisSums<R> {
+    sums: [Sums<R>; 3],
+    defects: [Defect<R>; 3],
+    rough: [R; 4],
+}
+
+impl<R: Real> AxisSums<R> {
+    #[inline(always)]
+    fn none(given: &Given<'_>) -> Self {
+        let defects = [Defect::new(given.step, given.scaling, R::splat); 3];
+        Self { sums: [Sums::new(given.step, R::splat); 3], defects, rough: [R::splat(0.0); 4] }
+    }
+
+    /// Adds nodes and where they go next.
+    #[inline(always)]
+    fn add(&mut self, nodes: &Nodes<R>, displacement: [R; 4], next: [R; 4]) {
+        for axis in 0..3 {
+            let (free, increment, force, next) =
+                (nodes.free[axis], nodes.increment[axis], nodes.force[axis], next[axis]);
+            self.sums[axis].add(nodes.mass, free, increment, force, next);
+            self.defects[axis].add(nodes.mass, free, displacement[axis], increment, force, next);
+        }
+    }
+
+    #[inline(always)]
+    fn total(
+        parts: &[Self; PARTS],
+        lane_of: impl Fn(usize) -> usize,
+        rest: &AxisSums<f32>,
+    ) -> (Totals, Defects, Rough) {
+        let (mut totals, mut defects, mut rough) = (Totals::default(), Defects::default(), Rough::NONE);
+        for row in 0..BLOCK {
+            let (part, lane) = of_row::<R, _>(parts, row, &lane_of);
+            let ([a, b, c], [d, e, f], [g, h, i, j]) = (&part.sums, &part.defects, &part.rough);
+            totals.add_axes(&[a.at(lane), b.at(lane), c.at(lane)]);
+            defects.add_axes(&[d.at(lane), e.at(lane), f.at(lane)]);
+            rough.add([g.lane(lane), h.lane(lane), i.lane(lane), j.lane(lane)]);
+        }
+        totals.add_axes(&rest.sums);
+        defects.add_axes(&rest.defects);
+        rough.add(rest.rough);
+        (totals, defects, rough)
+    }
+}
 
 impl Settle<'_, '_> {
     /// Compiled with this crate, as it is not generic.
@@ -221,58 +388,50 @@ impl Kernel for Settle<'_, '_> {
     type Output = (Totals, Defects, Rough);
 
     #[inline(always)]
-    fn run<R: Real>(self) -> Self::Output {
-        self.all::<R::Eight>()
+    fn run<R: Real>(mut self) -> Self::Output {
+        let given = self.given;
+        let nodes = given.inertia.len().min(given.places.len());
+        let whole = nodes - nodes % BLOCK;
+        let mut sums = [AxisSums::<R>::none(&self.given); PARTS];
+        for first in (0..whole).step_by(BLOCK) {
+            for part in 0..BLOCK / R::COUNT {
+                let Some((rows, within)) = given.in_order::<R>(first + part * R::COUNT) else {
+                    continue;
+                };
+                let coarse = moved_by(self.cells, &within);
+                let mut smooth = [R::splat(0.0); 3];
+                if let Some(calm) = &self.damped {
+                    smooth = moved_by(calm.smooth, &within);
+                }
+                self.nodes(rows, coarse, smooth, &mut sums[part % PARTS]);
+            }
+        }
+        let mut rest = AxisSums::none(&self.given);
+        for at in whole..nodes {
+            let Some(place) = self.given.places.get(at) else {
+                continue;
+            };
+            let rows = Following(place.node());
+            let at =
+                |cells: &[Cell]| cells.get(place.cell()).map_or([0.0; 3], |cell| cell.at(place.within()));
+            let smooth = self.damped.as_ref().map_or([0.0; 3], |calm| at(calm.smooth));
+            self.nodes(rows, at(self.cells), smooth, &mut rest);
+        }
+        AxisSums::total(&sums, |row| row, &rest)
     }
 }
 
 impl Settle<'_, '_> {
     #[inline(always)]
-    fn all<R: Real>(mut self) -> (Totals, Defects, Rough) {
-        let nodes = self.inertia.len();
-        let whole = nodes - nodes % R::COUNT;
-        let mut sums = self.none::<R>();
-        for first in (0..whole).step_by(R::COUNT) {
-            self.nodes::<R, R>(first, &mut sums);
-        }
-        let mut rest = self.none::<f32>();
-        for node in whole..nodes {
-            self.nodes::<f32, R>(node, &mut rest);
-        }
-        let (mut totals, mut defects) = (Totals::default(), Defects::default());
-        totals.add_lanes(&sums.0);
-        totals.add_lanes(&rest.0);
-        defects.add_lanes(&sums.1);
-        defects.add_lanes(&rest.1);
-        let mut rough = Rough::NONE;
-        rough.add_lanes(&sums.2);
-        rough.add_lanes(&rest.2);
-        (totals, defects, rough)
-    }
-
-    #[inline(always)]
-    fn none<R: Real>(&self) -> AxisSums<R> {
-        let defects = [Defect::new(self.step, self.scaling, R::splat); 3];
-        ([Sums::new(self.step, R::splat); 3], defects, [R::splat(0.0); 4])
-    }
-
-    /// The nodes from `first` on, side by side; `C` holds eight numbers.
-    #[inline(always)]
-    fn nodes<R: Real, C: Real>(&mut self, first: usize, (sums, defects, rough): &mut AxisSums<R>) {
-        let places = self.places.get(first..first + R::COUNT).unwrap_or_default();
-        let coarse = at_nodes::<R, C>(self.cells, places);
-        let alone = read_rows::<R>(must_cast_slice(self.tables.next), first);
-        let [ix, iy, iz, mass] = read_rows::<R>(must_cast_slice(self.inertia), first);
-        let free = [ix.positive(), iy.positive(), iz.positive()];
-        let force = read_rows::<R>(must_cast_slice(self.force), first);
-        let increment = read_rows::<R>(must_cast_slice(self.increment), first);
-        let displacement = read_rows::<R>(must_cast_slice(self.displacement), first);
-        let mut moved = alone;
+    fn nodes<R: Real>(&mut self, rows: impl Rows, coarse: [R; 3], smooth: [R; 3], sums: &mut AxisSums<R>) {
+        let nodes = self.given.read::<R>(rows, self.force);
+        let Nodes { free, mass, force: [fx, fy, fz], increment, .. } = nodes;
+        let displacement = rows.read::<R>(must_cast_slice(self.given.displacement));
+        let mut moved = rows.read::<R>(must_cast_slice(self.tables.next));
         let mut taken = [R::splat(0.0); 3];
         if let Some(calm) = &self.damped {
-            let smooth = at_nodes::<R, C>(calm.smooth, places);
-            let mut before = read_rows::<R>(must_cast_slice(self.tables.rough), first);
-            let [square, change, both, whole] = rough;
+            let mut before = rows.read::<R>(must_cast_slice(self.tables.rough));
+            let [square, change, both, whole] = &mut sums.rough;
             for axis in 0..3 {
                 let here = free[axis] * (increment[axis] - smooth[axis]);
                 let difference = here - before[axis];
@@ -284,17 +443,125 @@ impl Settle<'_, '_> {
                 taken[axis] = if calm.share > 0.0 { R::splat(calm.share) * here } else { taken[axis] };
                 before[axis] = here;
             }
-            write_rows(must_cast_slice_mut(self.tables.rough), first, before);
+            rows.write(must_cast_slice_mut(self.tables.rough), before);
         }
         for axis in 0..3 {
-            moved[axis] = free[axis] * (alone[axis] + coarse[axis]) - taken[axis];
-            let (free, increment, force, next) = (free[axis], increment[axis], force[axis], moved[axis]);
-            sums[axis].add(mass, free, increment, force, next);
-            defects[axis].add(mass, free, displacement[axis], increment, force, next);
+            moved[axis] = free[axis] * (moved[axis] + coarse[axis]) - taken[axis];
         }
-        write_rows(must_cast_slice_mut(self.tables.next), first, moved);
-        let [x, y, z, _] = force;
-        write_rows(must_cast_slice_mut(self.force), first, [x, y, z, R::splat(0.0)]);
+        sums.add(&nodes, displacement, moved);
+        rows.write(must_cast_slice_mut(self.tables.next), moved);
+        rows.write(must_cast_slice_mut(self.force), [fx, fy, fz, R::splat(0.0)]);
+    }
+}
+
+/// Both passes at once where there is no lattice between them.
+pub(super) struct Alone<'a, 'b> {
+    pub(super) given: Given<'a>,
+    pub(super) brake: f32,
+    pub(super) turns: &'a Turns,
+    pub(super) force: &'a mut [NodeVector],
+    pub(super) tables: &'a mut NodeTables<'b>,
+}
+
+impl Alone<'_, '_> {
+    /// Compiled with this crate, as it is not generic.
+    #[inline(never)]
+    pub(super) fn dispatched(self) -> (HeldBack, Totals, Defects) {
+        dispatch(self)
+    }
+}
+
+impl Kernel for Alone<'_, '_> {
+    type Output = (HeldBack, Totals, Defects);
+
+    #[inline(always)]
+    fn run<R: Real>(mut self) -> Self::Output {
+        let nodes = self.given.inertia.len();
+        let whole = nodes - nodes % BLOCK;
+        let mut found = [Found::<R>::nothing(); PARTS];
+        let mut sums = [AxisSums::<R>::none(&self.given); PARTS];
+        for first in (0..whole).step_by(BLOCK) {
+            for part in 0..BLOCK / R::COUNT {
+                let rows = Following(first + part * R::COUNT);
+                self.nodes(rows, &mut found[part % PARTS], &mut sums[part % PARTS]);
+            }
+        }
+        let (mut rest_found, mut rest) = (Found::nothing(), AxisSums::none(&self.given));
+        for node in whole..nodes {
+            self.nodes::<f32>(Following(node), &mut rest_found, &mut rest);
+        }
+        let (totals, defects, _) = AxisSums::total(&sums, R::lane_of, &rest);
+        (Found::total(&found, R::lane_of, rest_found).0, totals, defects)
+    }
+}
+
+impl Alone<'_, '_> {
+    #[inline(always)]
+    fn nodes<R: Real>(&mut self, rows: Following, found: &mut Found<R>, sums: &mut AxisSums<R>) {
+        let &mut Self { given, brake, turns, .. } = self;
+        let nodes = given.read::<R>(rows, self.force);
+        let [fx, fy, fz] = nodes.force;
+        let tables = &mut *self.tables;
+        let (cells, momentum): (&mut [Cell], _) = (&mut [], None);
+        let mut next = Prepare { given, brake, turns, force: &[], tables, cells, momentum }
+            .nodes(rows, &nodes, found)
+            .next;
+        for axis in 0..3 {
+            next[axis] = nodes.free[axis] * next[axis];
+        }
+        sums.add(&nodes, rows.read::<R>(must_cast_slice(given.displacement)), next);
+        rows.write(must_cast_slice_mut(self.tables.next), next);
+        rows.write(must_cast_slice_mut(self.force), [fx, fy, fz, R::splat(0.0)]);
+    }
+}
+
+/// Moves the nodes by their next increments.
+pub(super) struct Follow<'a> {
+    pub(super) next: &'a [NodeVector],
+    pub(super) displacement: &'a mut [NodeVector],
+    pub(super) increment: &'a mut [NodeVector],
+}
+
+impl Follow<'_> {
+    /// Compiled with this crate, as it is not generic.
+    #[inline(never)]
+    pub(super) fn dispatched(self) {
+        dispatch(self);
+    }
+}
+
+impl Kernel for Follow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: Real>(self) {
+        // What stands behind the axes is no increment.
+        let axes = R::from_fn(|lane| if lane % 4 == 3 { 0.0 } else { 1.0 });
+        let (next, rest) = must_cast_slice::<_, f32>(self.next).as_chunks::<BLOCK>();
+        let (displacement, rest_of_displacement) =
+            must_cast_slice_mut::<_, f32>(self.displacement).as_chunks_mut::<BLOCK>();
+        let (increment, rest_of_increment) =
+            must_cast_slice_mut::<_, f32>(self.increment).as_chunks_mut::<BLOCK>();
+        for ((next, displacement), increment) in next.iter().zip(displacement).zip(increment) {
+            // Put together here: two vectors are not stored at once into what may be the same.
+            let (mut moved, mut there) = ([0.0; BLOCK], [0.0; BLOCK]);
+            for from in (0..BLOCK).step_by(R::COUNT) {
+                let of = |numbers: &[f32; BLOCK]| R::from_fn(|lane| numbers[(from + lane) % BLOCK]);
+                let next = axes.choose(of(next), R::splat(0.0));
+                let sum = of(displacement) + next;
+                for lane in 0..R::COUNT {
+                    moved[(from + lane) % BLOCK] = next.lane(lane);
+                    there[(from + lane) % BLOCK] = sum.lane(lane);
+                }
+            }
+            (*increment, *displacement) = (moved, there);
+        }
+        for (at, (next, (displacement, increment))) in
+            rest.iter().zip(rest_of_displacement.iter_mut().zip(rest_of_increment)).enumerate()
+        {
+            *increment = if at % 4 == 3 { 0.0 } else { *next };
+            *displacement += *increment;
+        }
     }
 }
 
@@ -310,27 +577,29 @@ impl Cell {
 
     /// Adds `W^T v` of a node.
     #[inline(always)]
-    fn add<R: Real>(&mut self, place: &LatticeNode, v: [f32; 4]) {
+    fn add(&mut self, place: &LatticeNode, v: [f32; 3]) {
         let [x, y, z] = place.within();
-        let v = R::from_fn(|lane| v[lane % 4]) * R::from_fn(|lane| if lane < 4 { 1.0 } else { x });
-        let vy = v * R::splat(y);
-        let z = R::splat(z);
-        for (sums, v) in self.0.iter_mut().zip([v, vy, z * v, z * vy]) {
-            let sum = R::from_fn(|lane| sums[lane % 8]) + v;
-            for (lane, place) in sums.iter_mut().enumerate() {
-                *place = sum.lane(lane);
+        let products = monomials([x, y, z]);
+        for (sums, of) in self.0.as_flattened_mut().chunks_exact_mut(4).zip(products) {
+            for (sum, v) in sums.iter_mut().zip(v) {
+                *sum += of * v;
             }
         }
     }
 
-    /// `W x` of a node.
+    /// `W x` of nodes side by side.
     #[inline(always)]
-    fn at<R: Real>(&self, place: &LatticeNode) -> [f32; 4] {
-        let [x, y, z] = place.within();
-        let row = |row: usize| R::from_fn(|lane| self.0[row % 4][lane % 8]);
-        let (a, b, c, d) = (row(0), row(1), row(2), row(3));
-        let both = (a + R::splat(y) * b) + R::splat(z) * (c + R::splat(y) * d);
-        [0, 1, 2, 3].map(|axis| both.lane(axis) + x * both.lane(axis + 4))
+    fn at<R: Real>(&self, [x, y, z]: [R; 3]) -> [R; 3] {
+        let mut at = [R::splat(0.0); 3];
+        for (axis, at) in at.iter_mut().enumerate() {
+            let factor = |row: usize, half: usize| R::splat(self.0[row % 4][4 * half + axis]);
+            let half = |half: usize| {
+                let near = y.fused(factor(1, half), factor(0, half));
+                z.fused(y.fused(factor(3, half), factor(2, half)), near)
+            };
+            *at = x.fused(half(1), half(0));
+        }
+        at
     }
 
     fn vectors(&self) -> [Vec4; 8] {
@@ -339,28 +608,103 @@ impl Cell {
     }
 }
 
-/// Adds `W^T v` of nodes side by side; `C` holds eight numbers.
 #[inline(always)]
-fn add_to<R: Real, C: Real>(cells: &mut [Cell], places: &[LatticeNode], [x, y, z]: [R; 3]) {
-    let mut vectors = [[0.0; 4]; BLOCK];
-    write_rows(&mut vectors, 0, [x, y, z, R::splat(0.0)]);
-    for (place, &vector) in places.iter().zip(&vectors) {
-        if let Some(cell) = cells.get_mut(place.cell()) {
-            cell.add::<C>(place, vector);
+fn monomials<R: Real>([x, y, z]: [R; 3]) -> [R; 8] {
+    let (xy, xz) = (x * y, x * z);
+    [R::splat(1.0), x, y, xy, z, xz, y * z, xy * z]
+}
+
+/// Sums of one cell while its nodes are gone through, in lanes.
+struct CellSum<R> {
+    cell: usize,
+    parts: [[[R; 3]; 8]; PARTS],
+}
+
+impl<R: Real> CellSum<R> {
+    #[inline(always)]
+    fn new() -> Self {
+        Self { cell: 0, parts: [[[R::splat(0.0); 3]; 8]; PARTS] }
+    }
+
+    /// Adds `W^T v` of nodes side by side.
+    #[inline(always)]
+    fn add(&mut self, cells: &mut [Cell], within: &Within<'_, R>, part: usize, v: [R; 3]) {
+        let of = monomials(within.position);
+        let [mut cell, last] = within.ends;
+        if cell == last {
+            self.enter(cells, cell);
+            self.add_products(part, &of, v);
+            return;
         }
+        loop {
+            self.enter(cells, cell);
+            let mask = within.mask(cell);
+            self.add_products(part, &of, [mask * v[0], mask * v[1], mask * v[2]]);
+            if cell >= last {
+                return;
+            }
+            cell = within.after(cell);
+        }
+    }
+
+    #[inline(always)]
+    fn add_products(&mut self, part: usize, of: &[R; 8], v: [R; 3]) {
+        for (sums, of) in self.parts[part % PARTS].iter_mut().zip(of) {
+            for (sum, v) in sums.iter_mut().zip(v) {
+                *sum = of.fused(v, *sum);
+            }
+        }
+    }
+
+    /// The sums are those of this cell from now on.
+    #[inline(always)]
+    fn enter(&mut self, cells: &mut [Cell], cell: usize) {
+        if cell != self.cell {
+            self.flush(cells);
+            self.cell = cell;
+        }
+    }
+
+    /// Hands the sums to their cell, lane by lane.
+    #[inline(always)]
+    fn flush(&mut self, cells: &mut [Cell]) {
+        let Some(cell) = cells.get_mut(self.cell) else {
+            return;
+        };
+        for monomial in 0..8 {
+            let mut sum = Vec4::ZERO;
+            for part in self.parts.iter().take(BLOCK / R::COUNT) {
+                let [x, y, z] = part[monomial];
+                let mut rows = [[0.0; 4]; BLOCK];
+                write_rows(&mut rows, 0, [x, y, z, R::splat(0.0)]);
+                for row in rows.into_iter().take(R::COUNT) {
+                    sum += Vec4::from(row);
+                }
+            }
+            if let Some(place) =
+                cell.0[monomial / 2].get_mut(4 * (monomial % 2)..).and_then(<[f32]>::first_chunk_mut)
+            {
+                *place = (Vec4::from(*place) + sum).to_array();
+            }
+        }
+        self.parts = [[[R::splat(0.0); 3]; 8]; PARTS];
     }
 }
 
-/// `W x` of nodes side by side; `C` holds eight numbers.
+/// `W x` of nodes side by side.
 #[inline(always)]
-fn at_nodes<R: Real, C: Real>(cells: &[Cell], places: &[LatticeNode]) -> [R; 4] {
-    let mut vectors = [[0.0; 4]; BLOCK];
-    for (vector, place) in vectors.iter_mut().zip(places) {
-        if let Some(cell) = cells.get(place.cell()) {
-            *vector = cell.at::<C>(place);
+fn moved_by<R: Real>(cells: &[Cell], within: &Within<'_, R>) -> [R; 3] {
+    let [mut cell, last] = within.ends;
+    let at = |cell: usize| cells.get(cell).unwrap_or(&Cell::EMPTY).at(within.position);
+    let mut moved = at(cell);
+    while cell < last {
+        cell = within.after(cell);
+        let (mask, here) = (within.mask(cell), at(cell));
+        for axis in 0..3 {
+            moved[axis] = mask.choose(here[axis], moved[axis]);
         }
     }
-    read_rows::<R>(&vectors, 0)
+    moved
 }
 
 /// Gives the cells' sums to their functions.

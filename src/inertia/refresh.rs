@@ -9,23 +9,27 @@
 //! cells      S += (1 + k) Mc, G
 //! inversions G^-1, then S^-1; N_a and X = S^-1 - G^-1 are in use from then on
 //! ```
+//! Mass scaling has the elements' `D_a` and the nodes' `N_a` alone.
 //! The coarse part of the velocity is `c = G^-1 p`, its energy `c^T S c`. As for the nodes
 //! ([`super::node`]), a change of `S` may not add energy: `c` is scaled down to what it had.
 
+use bytemuck::{must_cast_slice, must_cast_slice_mut};
+
 use super::assembly::{Assembly, CellSums, NodeMatrices};
 use super::block::OneBlock;
-use super::bound::MatrixBeside;
+use super::bound::MatrixSums;
 use super::dense::{Row, apply, mirror, stride, sweep};
 use super::frames::{Frames, Rotation, turn};
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, restrict};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, place_of};
 use super::matrices::{Matrices, copy, invert_means};
 use super::node::{Scaling, renew};
 use super::report::Tally;
-use super::vectors::NodeTables;
+use super::vectors::{NodeTables, read_matrices, write_matrices};
 use super::{COARSE, FINE};
-use crate::lanes::{Gather, Kernel, NodeVector, Real, Scatter, dispatch};
+use crate::lanes::{BLOCK, Chosen, Gather, Kernel, NodeVector, Real, Rows, Scatter, dispatch};
 use crate::material::{Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
+use crate::symmetric::Symmetric;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
@@ -68,12 +72,18 @@ pub(super) struct Refresh {
 /// Nodes that are done together.
 const TOGETHER: usize = 8;
 
-/// Cost of a block, a cell, a node and a number of a row that is mirrored, in floating-point operations of a pivot
+/// Cost of a block, one without a lattice, a cell, a node and a number of a row that is mirrored, in floating-point operations of a pivot
 /// that take as long (measured).
 const BLOCK_COST: i64 = 47_000;
+const BLOCK_ALONE_COST: i64 = 18_000;
 const CELL_COST: i64 = 16_000;
-const NODE_COST: i64 = 2_700;
+const NODE_COST: i64 = 1_500;
 const ROW_COST: i64 = 12;
+
+/// Cost of a block.
+const fn block_cost(functions: usize) -> i64 {
+    if functions > 0 { BLOCK_COST } else { BLOCK_ALONE_COST }
+}
 
 /// Rounding in sums over the lattice.
 const SLACK: f32 = 1e-3;
@@ -140,7 +150,7 @@ impl Refresh {
 
     /// A cycle of `steps` steps over a scene with this many blocks and nodes.
     pub(super) fn over(steps: u32, blocks: usize, nodes: usize, functions: usize, cells: usize) -> Self {
-        let whole = blocks as i64 * BLOCK_COST
+        let whole = blocks as i64 * block_cost(functions)
             + 2 * cells as i64 * CELL_COST
             + nodes.next_multiple_of(TOGETHER) as i64 * NODE_COST
             + 2 * functions as i64 * (pivots_cost(functions) + 3 * row_cost(functions));
@@ -221,9 +231,9 @@ impl Refresh {
                 }
                 self.elements(from, tables, matrices, at, stride);
                 if self.done >= from.scene.blocks().len() {
-                    self.enter(Stage::ElementCells);
+                    self.enter(if functions > 0 { Stage::ElementCells } else { Stage::Nodes });
                 }
-                BLOCK_COST
+                block_cost(functions)
             }
             Stage::ElementCells => {
                 from.assembly(matrices.next, matrices.sums, stride).add_cell(at);
@@ -239,7 +249,11 @@ impl Refresh {
                 }
                 self.nodes(from, tables, matrices, at * TOGETHER);
                 if self.done * TOGETHER >= from.scene.node_count() {
-                    self.enter(Stage::NodeCells);
+                    if functions > 0 {
+                        self.enter(Stage::NodeCells);
+                    } else {
+                        self.end(tables, matrices);
+                    }
                 }
                 TOGETHER as i64 * NODE_COST
             }
@@ -253,8 +267,15 @@ impl Refresh {
                 }
                 let (inertia, mass) = (&mut *matrices.fine, &mut *matrices.next);
                 if let Some(sums) = matrices.sums.get_mut(at) {
-                    NodeMatrices { lattice: from.lattice, inertia, mass, mass_alone, stride }
-                        .add_cell(at, sums);
+                    NodeMatrices {
+                        lattice: from.lattice,
+                        inertia,
+                        mass,
+                        mass_alone,
+                        momenta: &mut self.momentum,
+                        stride,
+                    }
+                    .add_cell(at, sums);
                 }
                 if self.done >= from.lattice.cell_count() {
                     self.enter(Stage::Fine);
@@ -290,9 +311,7 @@ impl Refresh {
                 mirror(matrices.next, stride, at, -1.0);
                 if at + 1 == size {
                     self.sound &= self.inverted(matrices, size, stride);
-                    tables.put_in_use(self.first);
-                    self.put_in_use(matrices);
-                    self.enter(Stage::Elements);
+                    self.end(tables, matrices);
                 }
                 row_cost(functions)
             }
@@ -302,6 +321,13 @@ impl Refresh {
     fn enter(&mut self, stage: Stage) {
         self.stage = stage;
         self.done = 0;
+    }
+
+    /// What the cycle has computed is in use from now on.
+    fn end(&mut self, tables: &mut NodeTables<'_>, matrices: &mut Matrices<'_>) {
+        tables.put_in_use(self.first);
+        self.put_in_use(matrices);
+        self.enter(Stage::Elements);
     }
 
     fn elements<M, N, B>(
@@ -321,12 +347,13 @@ impl Refresh {
         let Some(block) = from.scene.blocks().get(at) else {
             return;
         };
-        let assembly = from.assembly(matrices.next, matrices.sums, stride);
-        let sums = MatrixBeside { diagonal, beside };
+        let lattice = from.lattice.functions() > 0;
+        let assembly = lattice.then(|| from.assembly(matrices.next, matrices.sums, stride));
+        let (sums, next) = (MatrixSums { diagonal, beside }, &*tables.next);
         let laws = from.scene.material().laws();
         let frames = &self.frames;
         let weight = from.scaling.coarse_weight;
-        M::Law::bounds_of_block(OneBlock { laws, block, displacement, sums, assembly, frames, weight });
+        M::Law::bounds_of_block(OneBlock { laws, block, displacement, sums, next, assembly, frames, weight });
     }
 
     /// Some nodes, from `first` on.
@@ -341,26 +368,14 @@ impl Refresh {
         N: AsRef<[NodeInertia]>,
         B: AsRef<[ElementBlock]>,
     {
-        let Self { frames, tally, momentum, first: first_cycle, .. } = self;
+        let Self { frames, tally, first: first_cycle, .. } = self;
         let Sources { scene, increment, lattice, places, scaling, .. } = from;
         let sums = &mut *matrices.sums;
         let first_cycle = *first_cycle;
         let inertia = scene.inertia();
-        SomeNodes {
-            inertia,
-            increment,
-            places,
-            scaling,
-            frames,
-            tally,
-            momentum,
-            tables,
-            lattice,
-            sums,
-            first,
-            first_cycle,
-        }
-        .dispatched();
+        let places = if lattice.functions() > 0 { *places } else { &[] };
+        SomeNodes { inertia, increment, places, scaling, frames, tally, tables, sums, first, first_cycle }
+            .dispatched();
     }
 
     /// The share of `X` that a step used. A smaller one is a larger inertia of the lattice: as for the nodes no
@@ -463,13 +478,12 @@ pub(super) fn from_numbers(numbers: &[f32], vectors: &mut CoarseVectors) {
 struct SomeNodes<'a, 'b> {
     inertia: &'a [NodeInertia],
     increment: &'a mut [NodeVector],
+    /// None without a lattice.
     places: &'a [LatticeNode],
     scaling: &'a Scaling,
     frames: &'a Frames,
     tally: &'a mut Tally,
-    momentum: &'a mut CoarseVectors,
     tables: &'a mut NodeTables<'b>,
-    lattice: &'a Lattice,
     sums: &'a mut [CellSums],
     first: usize,
     /// Nothing is in use yet.
@@ -488,30 +502,86 @@ impl Kernel for SomeNodes<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<R: Real>(self) {
-        let nodes = self.inertia.iter().zip(self.increment.iter_mut()).zip(self.places).enumerate();
-        for (node, ((inertia, increment), place)) in nodes.skip(self.first).take(TOGETHER) {
-            let (stiffness, scalar) = self.tables.summed(node);
-            let velocity = increment.to_array();
-            let turned = self.frames.since_start(place.frame()).back(velocity);
-            let before = self.frames.since_bounds(place.frame()).back(velocity);
-            let old = (!self.first_cycle).then(|| (self.tables.node(node).0.inverse, before));
-            let renewed = renew(inertia, stiffness, old, turned, self.scaling);
-            self.tables.set_next(node, &renewed.inverse, scalar);
-            self.tally.add(node, renewed.added);
+    fn run<R: Real>(mut self) {
+        let (first, count) = (self.first, self.inertia.len());
+        // Lanes beyond the last node repeat it.
+        let mut rows = [0; BLOCK];
+        for (lane, row) in rows.iter_mut().enumerate().take(TOGETHER) {
+            let at = (first + lane).min(count.saturating_sub(1));
+            *row = self.places.get(at).map_or(at, LatticeNode::node) as u32;
+        }
+        if let Some(rows) = Chosen::below(rows, count) {
+            self.nodes::<R::Eight, R>(rows, count - first.min(count));
+        }
+    }
+}
+
+impl SomeNodes<'_, '_> {
+    /// Nodes side by side, as many as are left; `W` is as wide as can be.
+    #[inline(always)]
+    fn nodes<R: Real, W: Real>(&mut self, rows: Chosen, left: usize) {
+        const { assert!(R::COUNT == TOGETHER) };
+        let Self { inertia, increment, places, scaling, frames, tally, tables, sums, .. } = self;
+        let [x, y, z, mass] = rows.read::<R>(must_cast_slice(inertia));
+        let free = [x, y, z];
+        let [vx, vy, vz, spare] = rows.read::<R>(must_cast_slice(increment));
+        let velocity = [vx, vy, vz];
+        let (mut since_start, mut since_bounds) = ([Rotation::NONE; TOGETHER], [Rotation::NONE; TOGETHER]);
+        for (lane, (start, bounds)) in since_start.iter_mut().zip(&mut since_bounds).enumerate() {
+            let frame = tables.frame(rows.number::<R>(lane));
+            (*start, *bounds) = (frames.since_start(frame), frames.since_bounds(frame));
+        }
+        let turned = back(&since_start, velocity);
+        let (stiffness, [scalar, _]) = read_matrices(rows, tables.sum_diagonal, tables.sum_beside);
+        let old = (!self.first_cycle).then(|| {
+            let inverse = read_matrices(rows, tables.inverse_diagonal, tables.inverse_beside).0;
+            (inverse, back(&since_bounds, velocity))
+        });
+        let renewed = renew(free, mass, stiffness, old, turned, scaling);
+        let beside = [scalar, R::splat(0.0)];
+        write_matrices(rows, tables.sum_diagonal, tables.sum_beside, &renewed.inverse, beside);
+        let mut kept = velocity;
+        for axis in 0..3 {
+            kept[axis] = free[axis].choose(velocity[axis] * renewed.velocity, velocity[axis]);
+        }
+        rows.write(must_cast_slice_mut(increment), [kept[0], kept[1], kept[2], spare]);
+        for lane in 0..left.min(R::COUNT) {
+            tally.add(rows.number::<R>(lane), renewed.added.lane(lane));
+        }
+
+        if places.is_empty() {
+            return;
+        }
+        let [vx, vy, vz] = turned;
+        let pushed =
+            renewed.inertia.times([vx * renewed.velocity, vy * renewed.velocity, vz * renewed.velocity]);
+        for lane in 0..left.min(R::COUNT) {
+            let node = rows.number::<R>(lane);
+            let (Some(place), Some(inertia)) = (place_of(places, node), inertia.get(node)) else {
+                continue;
+            };
             // A held axis follows its support and has no inertia here.
-            let mut mass = [0.0; 3];
-            for axis in 0..3 {
-                if inertia.inverse[axis] > 0.0 {
-                    increment.0[axis] *= renewed.velocity;
-                    mass[axis] = inertia.mass * (1.0 + self.scaling.k);
-                }
-            }
-            let [x, y, z] = renewed.inertia.times(turned.map(|v| v * renewed.velocity));
-            restrict(&self.lattice.weights(place), [x, y, z, 0.0], self.momentum);
-            if let Some(sums) = self.sums.get_mut(place.cell()) {
-                sums.add_node(place, &renewed.inertia, mass);
+            let mass = inertia.free() * inertia.mass * (1.0 + scaling.k);
+            let Symmetric { xx, yy, zz, xy, yz, zx } = renewed.inertia;
+            let of = |entry: R| entry.lane(lane);
+            let matrix = Symmetric { xx: of(xx), yy: of(yy), zz: of(zz), xy: of(xy), yz: of(yz), zx: of(zx) };
+            let [x, y, z] = pushed;
+            if let Some(sums) = sums.get_mut(place.cell()) {
+                sums.add_node::<W>(place, &matrix, mass.truncate().to_array(), [of(x), of(y), of(z)]);
             }
         }
     }
+}
+
+/// Vectors of nodes side by side turned back into their frames.
+#[inline(always)]
+fn back<R: Real>(turns: &[Rotation; TOGETHER], vectors: [R; 3]) -> [R; 3] {
+    let mut back = [R::splat(0.0); 3];
+    for (row, along) in vectors.into_iter().enumerate() {
+        for column in 0..3 {
+            let entry = R::from_fn(|lane| turns[lane % TOGETHER].0[row][column]);
+            back[column] = back[column] + entry * along;
+        }
+    }
+    back
 }

@@ -3,24 +3,22 @@
 
 use glam::Vec4;
 
-use crate::lanes::{NodeVector, Scatter};
+use crate::lanes::NodeVector;
 use crate::loads::Loads;
 use crate::material::{Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
 use crate::tled::{Divergence, Entry, InternalForces, Status, culprit, external_forces, follow_motions};
 
-use super::alone;
-use super::bound::{MatrixBeside, ScalarBeside};
+use super::bound::ScalarBeside;
 use super::damper::{Damper, Rough};
 use super::dense::{Row, apply, stride};
 use super::estimate::dot;
 use super::frames::{Rotation, turn};
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::matrices::{DampedMatrices, Matrices, thirds};
-use super::passes::{Calm, Cell, Prepare, Settle, prolong, restrict, turns};
+use super::passes::{Alone, Calm, Cell, Follow, Given, Prepare, Settle, prolong, restrict, turns};
 use super::refresh::{Refresh, Sources, from_numbers, to_numbers};
-use super::report::Tally;
 use super::vectors::NodeTables;
 use super::{COARSE_GROWTH, Inertia, LARGEST_KICK};
 
@@ -107,16 +105,9 @@ where
     let external = dot(force, displacement);
     let functions = lattice.functions();
     let no_lattice = functions == 0;
-    let extremes = if no_lattice {
-        tables.clear_sums();
-        let (diagonal, beside) = (Scatter::new(tables.sum_diagonal), Scatter::new(tables.sum_beside));
-        let beside = MatrixBeside { diagonal, beside };
-        M::Law::forces_and_matrices(InternalForces::of(scene, displacement, force, beside))
-    } else {
-        M::Law::forces_and_bounds(InternalForces::of(scene, displacement, force, ScalarBeside))
-    };
+    let extremes = M::Law::forces_and_bounds(InternalForces::of(scene, displacement, force, ScalarBeside));
 
-    let places = places.as_ref();
+    let places = if no_lattice { &[] } else { places.as_ref().get(..nodes).unwrap_or_default() };
     let Some(mut matrices) = Matrices::split(dense.as_mut(), lattice, *damped && lattice.functions() > 0)
     else {
         return mismatch;
@@ -125,42 +116,28 @@ where
     // Without a lattice there is nothing to tell rough from smooth by.
     let damper = damper.filter(|_| refresh.lattice_in_use && !no_lattice);
     let damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
-    let (held_back, tally, (totals, defects, found)) = if no_lattice {
-        let (held_back, tally) = alone::prepare(&step, scaling, nodal, increment, force, &mut tables);
-        let (step, inertia, tables) = (&step, nodal, &mut tables);
-        let moved = alone::Move { step, scaling, inertia, displacement, increment, force, tables }.moved();
-        (held_back, tally, (moved.0, moved.1, Rough::NONE))
+    refresh.look(displacement, *steps);
+    let turns = &turns(&refresh.frames.of_bounds, refresh.frames.functions());
+    let given = Given { step: &step, scaling, inertia: nodal, displacement, increment, places };
+    let (brake, tables) = (refresh.brake, &mut tables);
+    let (held_back, totals, defects, found);
+    if no_lattice {
+        (held_back, totals, defects) = Alone { given, brake, turns, force, tables }.dispatched();
+        found = Rough::NONE;
     } else {
-        refresh.look(displacement, *steps);
-        let turns = &turns(&refresh.frames.of_bounds, functions);
-        let (step, inertia, brake, cells) = (&step, nodal, refresh.brake, &mut *matrices.cells);
+        let cells = &mut *matrices.cells;
         let momentum = matrices.damped.as_mut().map(|damped| &mut *damped.momentum);
-        let (held_back, growth) = Prepare {
-            step,
-            scaling,
-            brake,
-            places,
-            turns,
-            inertia,
-            force,
-            increment,
-            tables: &mut tables,
-            cells,
-            momentum,
-        }
-        .dispatched();
+        let growth;
+        (held_back, growth) = Prepare { given, brake, turns, force, tables, cells, momentum }.dispatched();
         if growth > COARSE_GROWTH {
             coarse_share = COARSE_GROWTH / growth;
         }
         coarse_share = coarse_motion(&mut matrices, lattice, coarse_share, refresh);
-        let (tables, cells) = (&mut tables, &*matrices.cells);
+        let cells = &*matrices.cells;
         let damped = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use);
         let damped = damped.map(|damped| Calm { smooth: smooth_motion(damped, lattice), share: damping });
-        let moved =
-            Settle { step, scaling, places, cells, damped, inertia, displacement, increment, force, tables }
-                .dispatched();
-        (held_back, Tally::NEW, moved)
-    };
+        (totals, defects, found) = Settle { given, cells, damped, force, tables }.dispatched();
+    }
 
     let tables_next: &[NodeVector] = tables.next;
     let next = |node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector| {
@@ -181,25 +158,17 @@ where
     *ledger = entered;
     *rough = found;
     estimate.advance(&defects, external, nodes, scaling.k, step.seconds() * step.seconds());
-    for ((displacement, increment), next) in displacement.iter_mut().zip(&mut *increment).zip(&*tables.next) {
-        let next = Vec4::from(next.0).with_w(0.0);
-        increment.0 = next.to_array();
-        displacement.0 = (Vec4::from(displacement.0) + next).to_array();
-    }
+    Follow { next: tables.next, displacement, increment }.dispatched();
     *dt = step.seconds();
     *time += f64::from(step.seconds());
     *steps += 1;
     follow_motions(loads, displacement, increment, *time);
-    if no_lattice {
-        *report = tally.report(held_back.nodes, 1.0, estimate.error());
-    } else {
-        refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-        refresh.share(coarse_share);
-        let sources = Sources { scene, displacement, increment, lattice, places, scaling };
-        refresh.advance(*steps, sources, &mut tables, &mut matrices);
-        *report = refresh.published.report(held_back.nodes, coarse_share, estimate.error());
-        report.damping = damping;
-    }
+    refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+    refresh.share(coarse_share);
+    let sources = Sources { scene, displacement, increment, lattice, places, scaling };
+    refresh.advance(*steps, sources, tables, &mut matrices);
+    *report = refresh.published.report(held_back.nodes, coarse_share, estimate.error());
+    report.damping = damping;
     let held = held_back.unused > MUCH_UNUSED * nodes as f32 || coarse_share < LITTLE_MOTION;
     extremes.status(ledger, held)
 }

@@ -1,8 +1,9 @@
 //! What the inertia keeps for each node, in five vectors of four numbers over one storage of the caller, six for a damped
 //! step.
 
-use super::node::Node;
-use crate::lanes::NodeVector;
+use bytemuck::{must_cast_slice, must_cast_slice_mut};
+
+use crate::lanes::{NodeVector, Real, Rows};
 use crate::symmetric::Symmetric;
 
 /// Vectors that the inertia of `nodes` nodes needs.
@@ -17,6 +18,15 @@ pub const fn damped_vectors_for(nodes: usize) -> usize {
     6 * nodes
 }
 
+/// The bits of a height that tell the frame.
+const FRAME: u32 = 0xFF;
+
+/// The frame that a node with this vector in `next` turns with.
+#[inline(always)]
+pub(super) fn frame_of(vector: &NodeVector) -> usize {
+    (vector.0[3].to_bits() & FRAME) as usize
+}
+
 pub(super) struct NodeTables<'a> {
     /// `xx, yy, zz` of the inverse inertia in use (1/kg) and the scalar bound it was made for (N/m).
     pub(super) inverse_diagonal: &'a mut [NodeVector],
@@ -25,7 +35,8 @@ pub(super) struct NodeTables<'a> {
     /// Sums of the elements' bounds, N/m, laid out like the inverse.
     pub(super) sum_diagonal: &'a mut [NodeVector],
     pub(super) sum_beside: &'a mut [NodeVector],
-    /// The next increment of each node, m; the fourth number is the least height of its elements, m.
+    /// The next increment of each node, m; the fourth number is the least height of its elements, m, with
+    /// the number of the frame that it turns with for its last eight bits: it only tells how far is far.
     pub(super) next: &'a mut [NodeVector],
     /// Rough part of each node's last increment, m, for a damped step; else nothing.
     pub(super) rough: &'a mut [NodeVector],
@@ -53,28 +64,17 @@ impl<'a> NodeTables<'a> {
         self.sum_beside.fill(NodeVector::ZERO);
     }
 
-    /// Summed matrix and scalar of a node, N/m.
-    #[inline(always)]
-    pub(super) fn summed(&self, node: usize) -> (Symmetric, f32) {
-        joined(self.sum_diagonal, self.sum_beside, node).0
+    /// Node `node` turns with this frame, below 256; its height is there already.
+    pub(super) fn set_frame(&mut self, node: usize, frame: usize) {
+        if let Some(vector) = self.next.get_mut(node) {
+            vector.0[3] = f32::from_bits(vector.0[3].to_bits() & !FRAME | frame as u32 & FRAME);
+        }
     }
 
-    /// The inverse inertia in use and the scalar bound it was made for.
+    /// The frame that a node turns with.
     #[inline(always)]
-    pub(super) fn node(&self, node: usize) -> (Node, f32) {
-        let ((inverse, scalar), share) = joined(self.inverse_diagonal, self.inverse_beside, node);
-        (Node { inverse, share }, scalar)
-    }
-
-    #[inline(always)]
-    pub(super) fn set(&mut self, node: usize, inverse: &Symmetric, scalar: f32, share: f32) {
-        part(self.inverse_diagonal, self.inverse_beside, node, inverse, (scalar, share));
-    }
-
-    /// Puts a node's next inverse and the scalar it is made for where its sums were.
-    #[inline(always)]
-    pub(super) fn set_next(&mut self, node: usize, inverse: &Symmetric, scalar: f32) {
-        part(self.sum_diagonal, self.sum_beside, node, inverse, (scalar, 0.0));
+    pub(super) fn frame(&self, node: usize) -> usize {
+        self.next.get(node).map_or(0, frame_of)
     }
 
     /// The next inverses are in use from now on; shares stay, and are one at the start.
@@ -90,24 +90,27 @@ impl<'a> NodeTables<'a> {
     }
 }
 
+/// The matrices of nodes side by side, and the fourth numbers beside them.
 #[inline(always)]
-fn joined(diagonal: &[NodeVector], beside: &[NodeVector], node: usize) -> ((Symmetric, f32), f32) {
-    let [xx, yy, zz, fourth] = diagonal.get(node).copied().unwrap_or_default().0;
-    let [xy, yz, zx, last] = beside.get(node).copied().unwrap_or_default().0;
-    ((Symmetric { xx, yy, zz, xy, yz, zx }, fourth), last)
+pub(super) fn read_matrices<R: Real>(
+    rows: impl Rows,
+    diagonal: &[NodeVector],
+    beside: &[NodeVector],
+) -> (Symmetric<R>, [R; 2]) {
+    let [xx, yy, zz, fourth] = rows.read::<R>(must_cast_slice(diagonal));
+    let [xy, yz, zx, last] = rows.read::<R>(must_cast_slice(beside));
+    (Symmetric { xx, yy, zz, xy, yz, zx }, [fourth, last])
 }
 
-/// What [`joined`] reads, with the two fourth numbers.
+/// Writes what [`read_matrices`] reads.
 #[inline(always)]
-fn part(
+pub(super) fn write_matrices<R: Real>(
+    rows: impl Rows,
     diagonal: &mut [NodeVector],
     beside: &mut [NodeVector],
-    node: usize,
-    matrix: &Symmetric,
-    (fourth, last): (f32, f32),
+    &Symmetric { xx, yy, zz, xy, yz, zx }: &Symmetric<R>,
+    [fourth, last]: [R; 2],
 ) {
-    if let (Some(diagonal), Some(beside)) = (diagonal.get_mut(node), beside.get_mut(node)) {
-        diagonal.0 = [matrix.xx, matrix.yy, matrix.zz, fourth];
-        beside.0 = [matrix.xy, matrix.yz, matrix.zx, last];
-    }
+    rows.write(must_cast_slice_mut(diagonal), [xx, yy, zz, fourth]);
+    rows.write(must_cast_slice_mut(beside), [xy, yz, zx, last]);
 }

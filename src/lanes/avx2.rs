@@ -81,6 +81,24 @@ impl Real for Avx2 {
             }
         }
     }
+    #[inline(always)]
+    fn from_block(rows: &[[f32; 4]]) -> [Self; 4] {
+        // Two rows side by side as they come, of which the halves are transposed at once.
+        let &[a, b, c, d, e, f, g, h] = rows.first_chunk().unwrap_or(&[[0.0; 4]; 8]);
+        let pair = |a: [f32; 4], b: [f32; 4]| Self(bytemuck::must_cast([a, b]));
+        transpose([pair(a, b), pair(c, d), pair(e, f), pair(g, h)])
+    }
+    #[inline(always)]
+    fn to_block(columns: [Self; 4], rows: &mut [[f32; 4]]) {
+        let [a, b, c, d] = transpose(columns);
+        if let Some(rows) = rows.first_chunk_mut::<8>() {
+            *rows = bytemuck::must_cast([a.0, b.0, c.0, d.0]);
+        }
+    }
+    #[inline(always)]
+    fn lane_of(row: usize) -> usize {
+        4 * (row % 2) + row / 2
+    }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]
     fn fused(self, factor: Self, addend: Self) -> Self {

@@ -94,6 +94,23 @@ impl Real for Avx512 {
         eight::<8>(c, |lane, numbers| row(2, lane, numbers));
         eight::<8>(d, |lane, numbers| row(3, lane, numbers));
     }
+    #[inline(always)]
+    fn from_block(rows: &[[f32; 4]]) -> [Self; 4] {
+        // Four rows side by side as they come, of which the quarters are transposed at once.
+        let rows: [__m512; 4] = bytemuck::must_cast(*rows.first_chunk::<16>().unwrap_or(&[[0.0; 4]; 16]));
+        transpose(rows.map(Self))
+    }
+    #[inline(always)]
+    fn to_block(columns: [Self; 4], rows: &mut [[f32; 4]]) {
+        let [a, b, c, d] = transpose(columns);
+        if let Some(rows) = rows.first_chunk_mut::<16>() {
+            *rows = bytemuck::must_cast([a.0, b.0, c.0, d.0]);
+        }
+    }
+    #[inline(always)]
+    fn lane_of(row: usize) -> usize {
+        4 * (row % 4) + row / 4
+    }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]
     fn fused(self, factor: Self, addend: Self) -> Self {

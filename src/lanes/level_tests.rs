@@ -77,6 +77,17 @@ impl Kernel for Operations {
                 R::to_rows([c, c + c, -c, R::splat(3.0)], |lane, row| {
                     assert_eq!(row, [z(lane), z(lane) + z(lane), -z(lane), 3.0], "row {lane}");
                 });
+                let mut block = [[0.0; 4]; 16];
+                for (row, numbers) in block.iter_mut().enumerate() {
+                    *numbers = [0.0, 1.0, 2.0, 3.0].map(|column| 4.0 * row as f32 + column);
+                }
+                let columns = R::from_block(&block[..R::COUNT]);
+                let mut back = [[0.0; 4]; 16];
+                R::to_block(columns, &mut back[..R::COUNT]);
+                for row in 0..R::COUNT {
+                    assert_eq!(columns.map(|column| column.lane(R::lane_of(row))), block[row], "row {row}");
+                    assert_eq!(back[row], block[row], "row {row} back");
+                }
             }
         }
         checked

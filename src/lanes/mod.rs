@@ -35,7 +35,7 @@ pub(crate) use level::{Kernel, dispatch};
 pub(crate) use pair::Pair;
 pub use vectors::NodeVector;
 use vectors::transpose;
-pub(crate) use vectors::{BlockNodes, Gather, Scatter, dot, read_rows, write_rows};
+pub(crate) use vectors::{BlockNodes, Chosen, Following, Gather, Rows, Scatter, dot, write_rows};
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -73,6 +73,26 @@ pub trait Real:
         Self::to_rows(b, |lane, numbers| row(1, lane, numbers));
         Self::to_rows(c, |lane, numbers| row(2, lane, numbers));
         Self::to_rows(d, |lane, numbers| row(3, lane, numbers));
+    }
+    /// As many rows as there are lanes, in the order of lanes that takes the fewest instructions: lane [`Real::lane_of`] of the
+    /// four takes the numbers of a row. Zeros if there are fewer.
+    #[inline(always)]
+    fn from_block(rows: &[[f32; 4]]) -> [Self; 4] {
+        Self::from_rows(|lane| rows.get(lane).copied().unwrap_or_default())
+    }
+    /// Writes what [`Real::from_block`] reads; nothing if there are fewer rows.
+    #[inline(always)]
+    fn to_block(columns: [Self; 4], rows: &mut [[f32; 4]]) {
+        Self::to_rows(columns, |lane, numbers| {
+            if let Some(row) = rows.get_mut(lane) {
+                *row = numbers;
+            }
+        });
+    }
+    /// The lane of a row of a block.
+    #[inline(always)]
+    fn lane_of(row: usize) -> usize {
+        row
     }
     /// The number in `lane`; lanes that do not exist read as zero.
     fn lane(&self, lane: usize) -> f32;

@@ -49,13 +49,6 @@ pub(super) fn transpose(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
     }
 }
 
-/// Rows from `first` on, one a lane; zeros if there are fewer.
-#[inline(always)]
-pub(crate) fn read_rows<R: Real>(rows: &[[f32; 4]], first: usize) -> [R; 4] {
-    let rows = rows.get(first..first + R::COUNT).unwrap_or_default();
-    if rows.len() == R::COUNT { R::from_rows(|lane| rows[lane % R::COUNT]) } else { [R::splat(0.0); 4] }
-}
-
 /// Writes rows from `first` on, one a lane; nothing if there are fewer.
 #[inline(always)]
 pub(crate) fn write_rows<R: Real>(rows: &mut [[f32; 4]], first: usize, values: [R; 4]) {
@@ -65,6 +58,103 @@ pub(crate) fn write_rows<R: Real>(rows: &mut [[f32; 4]], first: usize, values: [
             *row = value;
         }
     });
+}
+
+/// Where the rows of nodes side by side are.
+pub(crate) trait Rows: Copy {
+    /// The row of a lane.
+    fn number<R: Real>(&self, lane: usize) -> usize;
+    /// Rows, one a lane; zeros if there are fewer.
+    fn read<R: Real>(&self, rows: &[[f32; 4]]) -> [R; 4];
+    /// Writes rows, one a lane; nothing if there are fewer.
+    fn write<R: Real>(&self, rows: &mut [[f32; 4]], values: [R; 4]);
+}
+
+/// Rows one after the other, from this one on; the order of lanes is that of [`Real::lane_of`].
+#[derive(Clone, Copy)]
+pub(crate) struct Following(pub(crate) usize);
+
+impl Rows for Following {
+    #[inline(always)]
+    fn number<R: Real>(&self, lane: usize) -> usize {
+        self.0 + (0..R::COUNT).find(|&row| R::lane_of(row) == lane).unwrap_or(0)
+    }
+    #[inline(always)]
+    fn read<R: Real>(&self, rows: &[[f32; 4]]) -> [R; 4] {
+        R::from_block(rows.get(self.0..self.0 + R::COUNT).unwrap_or_default())
+    }
+    #[inline(always)]
+    fn write<R: Real>(&self, rows: &mut [[f32; 4]], values: [R; 4]) {
+        R::to_block(values, rows.get_mut(self.0..self.0 + R::COUNT).unwrap_or_default());
+    }
+}
+
+/// Rows in any order, known to be below some number: checked all at once, as [`BlockNodes`] are.
+#[derive(Clone, Copy)]
+pub(crate) struct Chosen {
+    rows: [u32; BLOCK],
+    /// What they are below.
+    count: usize,
+}
+
+impl Chosen {
+    /// The rows, if all are below `count`.
+    #[inline(always)]
+    pub(crate) fn below(rows: [u32; BLOCK], count: usize) -> Option<Self> {
+        if are_among(&rows, 0, count) { Some(Self { rows, count }) } else { None }
+    }
+}
+
+impl Rows for Chosen {
+    #[inline(always)]
+    fn number<R: Real>(&self, lane: usize) -> usize {
+        self.rows[lane % BLOCK] as usize
+    }
+    #[inline(always)]
+    fn read<R: Real>(&self, rows: &[[f32; 4]]) -> [R; 4] {
+        if self.count > rows.len() {
+            return [R::splat(0.0); 4];
+        }
+        R::from_rows(|lane| {
+            #[allow(unsafe_code)]
+            // SAFETY: all rows are below `self.count`, which is not above how many there are.
+            unsafe {
+                *rows.get_unchecked(self.number::<R>(lane))
+            }
+        })
+    }
+    #[inline(always)]
+    fn write<R: Real>(&self, rows: &mut [[f32; 4]], values: [R; 4]) {
+        if self.count > rows.len() {
+            return;
+        }
+        R::to_rows(values, |lane, value| {
+            #[allow(unsafe_code)]
+            // SAFETY: as above.
+            let row = unsafe { rows.get_unchecked_mut(self.number::<R>(lane)) };
+            *row = value;
+        });
+    }
+}
+
+/// Whether all of some numbers are among `count` from `first` on.
+#[inline(always)]
+fn are_among(numbers: &[u32], first: usize, count: usize) -> bool {
+    let last = count.checked_sub(1).and_then(|last| i32::try_from(last).ok());
+    let (Ok(start), Some(last)) = (i32::try_from(first), last) else {
+        return false;
+    };
+    if start.checked_add(last).is_none() {
+        return false;
+    }
+    // The sign of what is negative, or would be were it subtracted: no vector unit compares unsigned numbers. A number
+    // that has wrapped round is beyond `last`, as `start + last` is a number.
+    let mut signs = 0;
+    for number in numbers {
+        let at = number.cast_signed().wrapping_sub(start);
+        signs |= at | last.wrapping_sub(at);
+    }
+    signs >= 0
 }
 
 /// Scalar products of vectors side by side.
@@ -90,16 +180,7 @@ impl<'a> BlockNodes<'a> {
     /// The nodes, if all are among `count` from `first` on.
     #[inline(always)]
     pub(crate) fn among(nodes: &'a [[u32; BLOCK]; 4], first: usize, count: usize) -> Option<Self> {
-        let (start, last) = (i32::try_from(first).ok()?, i32::try_from(count.checked_sub(1)?).ok()?);
-        start.checked_add(last)?;
-        // The sign of what is negative, or would be were it subtracted: no vector unit compares unsigned numbers. A number
-        // that has wrapped round is beyond `last`, as `start + last` is a number.
-        let mut signs = 0;
-        for node in nodes.as_flattened() {
-            let at = node.cast_signed().wrapping_sub(start);
-            signs |= at | last.wrapping_sub(at);
-        }
-        if signs >= 0 { Some(Self { nodes, first, count }) } else { None }
+        if are_among(nodes.as_flattened(), first, count) { Some(Self { nodes, first, count }) } else { None }
     }
 
     /// Node `corner` (0 to 3) of the element in `lane`.

@@ -34,13 +34,6 @@ macro_rules! element_loops {
         }
         #[doc(hidden)]
         #[inline(never)]
-        fn forces_and_matrices(
-            kernel: $crate::tled::InternalForces<'_, Self, $crate::inertia::MatrixBeside<'_>>,
-        ) -> $crate::tled::Extremes<f32> {
-            $crate::lanes::dispatch(kernel)
-        }
-        #[doc(hidden)]
-        #[inline(never)]
         fn critical_bounds(kernel: $crate::tled::CriticalBounds<'_, '_, Self>) {
             $crate::lanes::dispatch(kernel);
         }

@@ -5,7 +5,6 @@
 use core::ops::{Add, Mul, Sub};
 
 use bytemuck::{Pod, must_cast_slice, must_cast_slice_mut};
-use glam::Vec4;
 
 use crate::lanes::{Kernel, Real, dispatch};
 use crate::ledger::Ledger;
@@ -73,6 +72,22 @@ impl<V: Side> Sums<V> {
         Self { one, half, carry, kinetic: zero, momentum: zero, led: zero }
     }
 
+    /// The sums of one lane.
+    #[inline(always)]
+    pub(crate) fn at(&self, lane: usize) -> Sums<f32>
+    where
+        V: Real,
+    {
+        Sums {
+            one: self.one.lane(lane),
+            half: self.half.lane(lane),
+            carry: self.carry.lane(lane),
+            kinetic: self.kinetic.lane(lane),
+            momentum: self.momentum.lane(lane),
+            led: self.led.lane(lane),
+        }
+    }
+
     /// Adds nodes: masses, ones along free axes, increments, total forces and next increments.
     #[inline(always)]
     pub(crate) fn add(&mut self, mass: V, free: V, increment: V, force: V, next: V) {
@@ -94,13 +109,6 @@ pub(crate) struct Totals {
 }
 
 impl Totals {
-    /// Of sums of the axes side by side; the fourth numbers must be zero.
-    pub(crate) fn of_axes(sums: &Sums<Vec4>) -> Self {
-        let total = |sums: Vec4| -> f64 { sums.to_array().into_iter().map(f64::from).sum() };
-        let [x, y, z, _] = sums.momentum.to_array().map(f64::from);
-        Self { kinetic: total(sums.kinetic), momentum: [x, y, z], led: total(sums.led) }
-    }
-
     /// Of all nodes from those of some.
     pub(crate) fn of_all<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut all = Self::default();
@@ -122,6 +130,15 @@ impl Totals {
                 *momentum += f64::from(sums.momentum.lane(lane));
                 self.led += f64::from(sums.led.lane(lane));
             }
+        }
+    }
+
+    /// Adds the sums of each axis.
+    pub(crate) fn add_axes(&mut self, sums: &[Sums<f32>; 3]) {
+        for (sums, momentum) in sums.iter().zip(&mut self.momentum) {
+            self.kinetic += f64::from(sums.kinetic);
+            *momentum += f64::from(sums.momentum);
+            self.led += f64::from(sums.led);
         }
     }
 }
