@@ -9,6 +9,7 @@
 use core::ops::Range;
 
 use crate::lanes::BLOCK;
+use crate::pairs::{Numbered, Unit, units};
 use crate::threads::MOST_PARTS;
 
 /// Most chunks of a scene: 1, 2, 3, 4, 6, 8, 12 or 24 threads have equal shares.
@@ -32,10 +33,12 @@ const fn chunks_for(elements: usize) -> usize {
     }
 }
 
-/// Blocks needed for that many elements, however they fall into groups: all but one may end with a block that is not full.
+/// Blocks needed for that many elements, however they fall into groups and pairs: each group may end with two blocks of
+/// pairs and one of single elements that are not full.
 pub(crate) const fn most_blocks(elements: usize) -> usize {
     let groups = 2 * chunks_for(elements) - 1;
-    elements.div_ceil(BLOCK) + groups - 1
+    let most = elements.div_ceil(BLOCK) + 3 * groups - 1;
+    if most < elements { most } else { elements }
 }
 
 /// Where the chunks of a scene begin and end.
@@ -55,28 +58,10 @@ impl Chunks {
     pub(crate) const NONE: Self =
         Self { count: 0, size: TOGETHER, nodes: 0, ends: [[0; 2]; MAX_CHUNKS], reach: [0; MAX_CHUNKS] };
 
-    /// Those of a scene.
-    pub(crate) fn of(nodes: usize, elements: impl Iterator<Item = [u32; 4]> + Clone) -> Self {
-        let count = chunks_for(elements.clone().count());
-        let size = nodes.div_ceil(count).next_multiple_of(TOGETHER);
-        let mut chunks = Self { count, size, nodes, ..Self::NONE };
-        let mut counts = [[0; 2]; MAX_CHUNKS];
-        for element in elements {
-            let (first, last) = chunks.span(element);
-            let out = usize::from(last > first);
-            if let (Some(counts), Some(reach)) = (counts.get_mut(first), chunks.reach.get_mut(first)) {
-                counts[out % 2] += 1;
-                *reach = (*reach).max(last as u8);
-            }
-        }
-        let mut end = 0;
-        for (ends, counts) in chunks.ends.iter_mut().zip(counts) {
-            *ends = counts.map(|elements: usize| {
-                end += elements.div_ceil(BLOCK) as u32;
-                end
-            });
-        }
-        chunks
+    /// Pairs and single elements; those of a pair are in the same group.
+    pub(crate) fn units(&self, elements: impl Iterator<Item = Numbered>) -> impl Iterator<Item = Unit> {
+        let chunks = *self;
+        units(elements, move |nodes| chunks.span(nodes))
     }
 
     /// First and last chunk of an element's nodes.
@@ -138,28 +123,77 @@ impl Chunks {
 }
 
 /// Gives each element its place.
-pub(crate) struct Seats<'a> {
-    chunks: &'a Chunks,
-    taken: [[u32; 2]; MAX_CHUNKS],
+pub(crate) struct Seats {
+    chunks: Chunks,
+    /// Pairs and single elements of each group, in that order.
+    units: [[[u32; 2]; 2]; MAX_CHUNKS],
+    taken: [[[u32; 2]; 2]; MAX_CHUNKS],
 }
 
-impl<'a> Seats<'a> {
-    pub(crate) const fn new(chunks: &'a Chunks) -> Self {
-        Self { chunks, taken: [[0; 2]; MAX_CHUNKS] }
+/// Blocks and lane of a unit; those of a pair stand one behind the other.
+pub(crate) struct Seat {
+    pub(crate) block: usize,
+    pub(crate) lane: usize,
+}
+
+impl Seats {
+    /// For the units that the elements of a scene make.
+    pub(crate) fn of(nodes: usize, elements: impl Iterator<Item = Numbered> + Clone) -> Self {
+        let count = chunks_for(elements.clone().count());
+        let size = nodes.div_ceil(count).next_multiple_of(TOGETHER);
+        let chunks = Chunks { count, size, nodes, ..Chunks::NONE };
+        let none = [[[0; 2]; 2]; MAX_CHUNKS];
+        let mut seats = Self { chunks, units: none, taken: none };
+        for unit in chunks.units(elements) {
+            let (nodes, single) = of_unit(&unit);
+            let (first, last) = chunks.span(nodes);
+            let out = usize::from(last > first);
+            if let (Some(units), Some(reach)) =
+                (seats.units.get_mut(first), seats.chunks.reach.get_mut(first))
+            {
+                units[out % 2][single % 2] += 1;
+                *reach = (*reach).max(last as u8);
+            }
+        }
+        let mut end = 0;
+        for (ends, units) in seats.chunks.ends.iter_mut().zip(seats.units) {
+            *ends = units.map(|[pairs, single]| {
+                end += 2 * pairs.div_ceil(BLOCK as u32) + single.div_ceil(BLOCK as u32);
+                end
+            });
+        }
+        seats
     }
 
-    /// Block and lane of the next element. A lane has consecutive elements of its group: neighbours share nodes, and in one
+    /// The chunks.
+    pub(crate) const fn chunks(&self) -> &Chunks {
+        &self.chunks
+    }
+
+    /// The place of the next unit. A lane has consecutive ones of its group: neighbours share nodes, and in one
     /// block the sums at these would wait for each other on their way through memory.
-    pub(crate) fn next(&mut self, element: [u32; 4]) -> Option<(usize, usize)> {
-        let (first, last) = self.chunks.span(element);
+    pub(crate) fn next(&mut self, unit: &Unit) -> Option<Seat> {
+        let (nodes, single) = of_unit(unit);
+        let (first, last) = self.chunks.span(nodes);
         let group = usize::from(last > first);
-        let blocks = self.chunks.group(first, group);
-        let taken = &mut self.taken.get_mut(first)?[group % 2];
+        let start = self.chunks.group(first, group).start;
+        let [pairs, singles] =
+            self.units.get(first)?[group % 2].map(|units| (units as usize).div_ceil(BLOCK));
+        let taken = &mut self.taken.get_mut(first)?[group % 2][single % 2];
         let place = *taken as usize;
         *taken += 1;
-        let lane = place.checked_div(blocks.len())?;
-        // The compiler cannot know that blocks are not none here.
-        Some((blocks.start + (place - lane * blocks.len()), lane))
+        let blocks = if single == 0 { pairs } else { singles };
+        let lane = place.checked_div(blocks)?;
+        let row = place - lane * blocks;
+        Some(Seat { block: start + if single == 0 { 2 * row } else { 2 * pairs + row }, lane })
+    }
+}
+
+/// Nodes that tell the group of a unit, and 0 for a pair, 1 for a single element.
+fn of_unit(unit: &Unit) -> ([u32; 4], usize) {
+    match unit {
+        Unit::One(one) => (one.nodes, 1),
+        Unit::Two([one, _]) => (one.nodes, 0),
     }
 }
 
@@ -170,10 +204,23 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Seats of all elements, by element.
-    fn seats(chunks: &Chunks, elements: &[[u32; 4]]) -> Vec<(usize, usize)> {
-        let mut seats = Seats::new(chunks);
-        elements.iter().map(|&element| seats.next(element).unwrap()).collect()
+    /// Blocks and lanes of all elements, by element.
+    fn seats(nodes: usize, elements: &[[u32; 4]]) -> (Chunks, Vec<(usize, usize)>) {
+        let numbered = elements.iter().enumerate();
+        let numbered = numbered.map(|(element, &nodes)| Numbered { element, nodes });
+        let mut seats = Seats::of(nodes, numbered.clone());
+        let chunks = *seats.chunks();
+        let mut places = std::vec![(usize::MAX, 0); elements.len()];
+        for unit in chunks.units(numbered) {
+            let Seat { block, lane } = seats.next(&unit).unwrap();
+            match unit {
+                Unit::One(one) => places[one.element] = (block, lane),
+                Unit::Two(both) => {
+                    both.iter().enumerate().for_each(|(at, one)| places[one.element] = (block + at, lane));
+                }
+            }
+        }
+        (chunks, places)
     }
 
     proptest! {
@@ -189,8 +236,7 @@ mod tests {
                     [0, 1, 2, 3].map(|corner| (first + number(4 * e + corner) % apart) % nodes as u32)
                 })
                 .collect();
-            let chunks = Chunks::of(nodes, elements.iter().copied());
-            let seats = seats(&chunks, &elements);
+            let (chunks, seats) = seats(nodes, &elements);
             prop_assert!(chunks.blocks() <= most_blocks(count));
             let mut taken: Vec<_> = seats.clone();
             taken.sort_unstable();
