@@ -9,6 +9,7 @@
 use core::ops::Range;
 
 use crate::lanes::BLOCK;
+use crate::pairs::{Numbered, Unit, units};
 use crate::threads::MOST_PARTS;
 
 /// Most chunks of a scene: 1, 2, 3, 4, 6, 8, 12 or 24 threads have equal shares.
@@ -32,7 +33,7 @@ const fn chunks_for(elements: usize) -> usize {
     }
 }
 
-/// Blocks needed for that many elements, however they fall into groups: all but one may end with a block that is not full.
+/// Blocks needed for that many elements, however they fall into groups: each may end with a block that is not full.
 pub(crate) const fn most_blocks(elements: usize) -> usize {
     let groups = 2 * chunks_for(elements) - 1;
     elements.div_ceil(BLOCK) + groups - 1
@@ -55,28 +56,10 @@ impl Chunks {
     pub(crate) const NONE: Self =
         Self { count: 0, size: TOGETHER, nodes: 0, ends: [[0; 2]; MAX_CHUNKS], reach: [0; MAX_CHUNKS] };
 
-    /// Those of a scene.
-    pub(crate) fn of(nodes: usize, elements: impl Iterator<Item = [u32; 4]> + Clone) -> Self {
-        let count = chunks_for(elements.clone().count());
-        let size = nodes.div_ceil(count).next_multiple_of(TOGETHER);
-        let mut chunks = Self { count, size, nodes, ..Self::NONE };
-        let mut counts = [[0; 2]; MAX_CHUNKS];
-        for element in elements {
-            let (first, last) = chunks.span(element);
-            let out = usize::from(last > first);
-            if let (Some(counts), Some(reach)) = (counts.get_mut(first), chunks.reach.get_mut(first)) {
-                counts[out % 2] += 1;
-                *reach = (*reach).max(last as u8);
-            }
-        }
-        let mut end = 0;
-        for (ends, counts) in chunks.ends.iter_mut().zip(counts) {
-            *ends = counts.map(|elements: usize| {
-                end += elements.div_ceil(BLOCK) as u32;
-                end
-            });
-        }
-        chunks
+    /// Pairs and single elements; those of a pair are in the same group.
+    pub(crate) fn units(&self, elements: impl Iterator<Item = Numbered>) -> impl Iterator<Item = Unit> {
+        let chunks = *self;
+        units(elements, move |nodes| chunks.span(nodes))
     }
 
     /// First and last chunk of an element's nodes.
@@ -138,28 +121,91 @@ impl Chunks {
 }
 
 /// Gives each element its place.
-pub(crate) struct Seats<'a> {
-    chunks: &'a Chunks,
-    taken: [[u32; 2]; MAX_CHUNKS],
+pub(crate) struct Seats {
+    chunks: Chunks,
+    groups: [[Group; 2]; MAX_CHUNKS],
 }
 
-impl<'a> Seats<'a> {
-    pub(crate) const fn new(chunks: &'a Chunks) -> Self {
-        Self { chunks, taken: [[0; 2]; MAX_CHUNKS] }
+/// Elements of one group: first pairs that fill blocks, then single elements, among them what is left of the pairs.
+#[derive(Clone, Copy, Default)]
+struct Group {
+    pairs: usize,
+    singles: usize,
+    taken_pairs: usize,
+    taken_singles: usize,
+}
+
+impl Group {
+    /// Rows of blocks with pairs and of blocks with single elements.
+    const fn rows(&self) -> (usize, usize) {
+        let pairs = self.pairs / BLOCK;
+        (pairs, (self.singles + 2 * (self.pairs - pairs * BLOCK)).div_ceil(BLOCK))
+    }
+}
+
+impl Seats {
+    /// For the units that the elements of a scene make.
+    pub(crate) fn of(nodes: usize, elements: impl Iterator<Item = Numbered> + Clone) -> Self {
+        let count = chunks_for(elements.clone().count());
+        let size = nodes.div_ceil(count).next_multiple_of(TOGETHER);
+        let chunks = Chunks { count, size, nodes, ..Chunks::NONE };
+        let mut seats = Self { chunks, groups: [[Group::default(); 2]; MAX_CHUNKS] };
+        for unit in chunks.units(elements) {
+            let (first, last) = chunks.span(unit.nodes());
+            let out = usize::from(last > first);
+            if let (Some(groups), Some(reach)) =
+                (seats.groups.get_mut(first), seats.chunks.reach.get_mut(first))
+            {
+                match unit {
+                    Unit::One(_) => groups[out % 2].singles += 1,
+                    Unit::Two(_) => groups[out % 2].pairs += 1,
+                }
+                *reach = (*reach).max(last as u8);
+            }
+        }
+        let mut end = 0;
+        for (ends, groups) in seats.chunks.ends.iter_mut().zip(&seats.groups) {
+            for (place, group) in ends.iter_mut().zip(groups) {
+                let (pairs, singles) = group.rows();
+                end += (2 * pairs + singles) as u32;
+                *place = end;
+            }
+        }
+        seats
     }
 
-    /// Block and lane of the next element. A lane has consecutive elements of its group: neighbours share nodes, and in one
-    /// block the sums at these would wait for each other on their way through memory.
-    pub(crate) fn next(&mut self, element: [u32; 4]) -> Option<(usize, usize)> {
-        let (first, last) = self.chunks.span(element);
-        let group = usize::from(last > first);
-        let blocks = self.chunks.group(first, group);
-        let taken = &mut self.taken.get_mut(first)?[group % 2];
-        let place = *taken as usize;
-        *taken += 1;
-        let lane = place.checked_div(blocks.len())?;
-        // The compiler cannot know that blocks are not none here.
-        Some((blocks.start + (place - lane * blocks.len()), lane))
+    /// The chunks.
+    pub(crate) const fn chunks(&self) -> &Chunks {
+        &self.chunks
+    }
+
+    /// Hands the elements of the next unit to their places, block and lane. A lane has consecutive ones of its group: neighbours share nodes,
+    /// and in one block the sums at these would wait for each other on their way through memory.
+    pub(crate) fn place(&mut self, unit: Unit, mut at: impl FnMut(Numbered, (usize, usize))) {
+        let (first, last) = self.chunks.span(unit.nodes());
+        let out = usize::from(last > first);
+        let start = self.chunks.group(first, out).start;
+        let Some(groups) = self.groups.get_mut(first) else { return };
+        let group = &mut groups[out % 2];
+        let (pairs, singles) = group.rows();
+        if let Unit::Two([one, other]) = unit {
+            let place = group.taken_pairs;
+            if place < pairs * BLOCK {
+                group.taken_pairs += 1;
+                let lane = place.checked_div(pairs).unwrap_or(0);
+                let block = start + 2 * (place - lane * pairs);
+                at(one, (block, lane));
+                at(other, (block + 1, lane));
+                return;
+            }
+        }
+        for element in unit.elements() {
+            let place = group.taken_singles;
+            group.taken_singles += 1;
+            let lane = place.checked_div(singles).unwrap_or(0);
+            let block = start + 2 * pairs + (place - lane * singles);
+            at(element, (block, lane));
+        }
     }
 }
 
@@ -170,10 +216,17 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Seats of all elements, by element.
-    fn seats(chunks: &Chunks, elements: &[[u32; 4]]) -> Vec<(usize, usize)> {
-        let mut seats = Seats::new(chunks);
-        elements.iter().map(|&element| seats.next(element).unwrap()).collect()
+    /// Blocks and lanes of all elements, by element.
+    fn seats(nodes: usize, elements: &[[u32; 4]]) -> (Chunks, Vec<(usize, usize)>) {
+        let numbered = elements.iter().enumerate();
+        let numbered = numbered.map(|(element, &nodes)| Numbered { element, nodes });
+        let mut seats = Seats::of(nodes, numbered.clone());
+        let chunks = *seats.chunks();
+        let mut places = std::vec![(usize::MAX, 0); elements.len()];
+        for unit in chunks.units(numbered) {
+            seats.place(unit, |one, place| places[one.element] = place);
+        }
+        (chunks, places)
     }
 
     proptest! {
@@ -189,8 +242,7 @@ mod tests {
                     [0, 1, 2, 3].map(|corner| (first + number(4 * e + corner) % apart) % nodes as u32)
                 })
                 .collect();
-            let chunks = Chunks::of(nodes, elements.iter().copied());
-            let seats = seats(&chunks, &elements);
+            let (chunks, seats) = seats(nodes, &elements);
             prop_assert!(chunks.blocks() <= most_blocks(count));
             let mut taken: Vec<_> = seats.clone();
             taken.sort_unstable();

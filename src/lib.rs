@@ -104,6 +104,7 @@ pub mod material;
 pub mod mesh;
 pub mod mlp;
 pub mod numbering;
+mod pairs;
 pub mod scene;
 pub mod state;
 pub mod surrogate;

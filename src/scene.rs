@@ -13,6 +13,7 @@ use crate::chunks::{Chunks, Seats, most_blocks};
 use crate::lanes::{BLOCK, BlockNodes, Real};
 use crate::material::{Law, Laws, Material, releasable_energy};
 use crate::mesh::{Mesh, MeshError, gradients, volume};
+use crate::pairs::Numbered;
 use crate::symmetric::Symmetric;
 
 /// Coordinate axes, as a set.
@@ -164,7 +165,7 @@ impl core::error::Error for BuildError {}
 
 /// Tables of [`BLOCK`] elements, structure of arrays. The elements of a block come from as many parts of the mesh: neighbours
 /// share nodes, and adding their forces one after the other would wait for each sum to reach memory. Places without an
-/// element have volume zero and name the nodes of another, to which they add zero.
+/// element have volume zero and name nodes of another, to which they add zero.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct ElementBlock {
@@ -202,20 +203,22 @@ impl ElementBlock {
         &self.nodes
     }
 
+    /// Whether each element shares a face with the one in the same lane of the other block, as [`crate::pairs`] orders their nodes.
+    #[inline(always)]
+    pub(crate) fn shares_faces_with(&self, other: &Self) -> bool {
+        let mut unlike = 0;
+        for lane in 0..BLOCK {
+            unlike |= self.nodes[1][lane] ^ other.nodes[1][lane];
+            unlike |= self.nodes[2][lane] ^ other.nodes[3][lane];
+            unlike |= self.nodes[3][lane] ^ other.nodes[2][lane];
+        }
+        unlike == 0
+    }
+
     /// The nodes, if all are below `count`.
     #[inline(always)]
     pub(crate) fn nodes_below(&self, count: usize) -> Option<BlockNodes<'_>> {
         BlockNodes::among(&self.nodes, 0, count)
-    }
-
-    /// Places without an element name the nodes of the first one.
-    fn name_nodes_of_empty_places(&mut self) {
-        for nodes in &mut self.nodes {
-            let first = nodes[0];
-            for (node, volume) in nodes.iter_mut().zip(self.volumes) {
-                *node = if volume > 0.0 { *node } else { first };
-            }
-        }
     }
 
     /// The mesh's number of the element in `lane`.
@@ -450,7 +453,10 @@ where
         let still = |tet: [u32; 4]| {
             tet.iter().all(|&node| nodes.get(node as usize).is_some_and(|n| n.inverse == [FIXED; 3]))
         };
-        let chunks = Chunks::of(nodes.len(), mesh.tets().filter(|&tet| !still(tet)));
+        let elements = mesh.tets().enumerate().filter(|&(_, nodes)| !still(nodes));
+        let elements = elements.map(|(element, nodes)| Numbered { element, nodes });
+        let mut seats = Seats::of(nodes.len(), elements.clone());
+        let chunks = *seats.chunks();
         let (needed, capacity) = (chunks.blocks(), self.blocks.as_ref().len());
         if needed == 0 {
             return Err(BuildError::NothingMoves);
@@ -459,9 +465,16 @@ where
             return Err(BuildError::BlockCapacity { needed, capacity });
         };
         blocks.fill(ElementBlock::EMPTY);
+        let mut element_count = 0;
+        for unit in chunks.units(elements) {
+            seats.place(unit, |element, (block, lane)| {
+                if let Some(block) = blocks.get_mut(block) {
+                    write_element(block, lane, element, mesh.corners(element.nodes));
+                    element_count += 1;
+                }
+            });
+        }
 
-        let mut seats = Seats::new(&chunks);
-        let mut elements = 0;
         let (mut mass, mut releasable) = (0.0, 0.0);
         for (element, tet) in mesh.tets().enumerate() {
             let Some(tissue) = self.material.tissue(element) else {
@@ -482,19 +495,7 @@ where
                     inertia.mass += share as f32;
                 }
             }
-            let fixed =
-                tet.iter().all(|&node| nodes.get(node as usize).is_some_and(|n| n.inverse == [FIXED; 3]));
-            if fixed {
-                continue;
-            }
-            if let Some((block, lane)) = seats.next(tet)
-                && let Some(block) = blocks.get_mut(block)
-            {
-                write_element(block, lane, element, tet, corners);
-                elements += 1;
-            }
         }
-        blocks.iter_mut().for_each(ElementBlock::name_nodes_of_empty_places);
         for (node, inertia) in nodes.iter_mut().enumerate() {
             if inertia.mass == 0.0 {
                 return Err(MeshError::UnusedNode { node }.into());
@@ -507,7 +508,7 @@ where
             });
         }
         self.node_count = mesh.points().len();
-        self.element_count = elements;
+        self.element_count = element_count;
         self.chunks = chunks;
         self.mass = mass;
         self.releasable_energy = releasable;
@@ -538,14 +539,18 @@ fn mark_supports(nodes: &mut [NodeInertia], supports: &[Support]) -> Result<(), 
     Ok(())
 }
 
-fn write_element(block: &mut ElementBlock, lane: usize, element: usize, tet: [u32; 4], corners: [DVec3; 4]) {
+fn write_element(block: &mut ElementBlock, lane: usize, element: Numbered, corners: [DVec3; 4]) {
     fn set<T>(lanes: &mut [T; BLOCK], lane: usize, value: T) {
         if let Some(place) = lanes.get_mut(lane) {
             *place = value;
         }
     }
     let (slopes, volume) = gradients(corners);
-    for (nodes, node) in block.nodes.iter_mut().zip(tet) {
+    for (nodes, node) in block.nodes.iter_mut().zip(element.nodes) {
+        // The first one stands in for those that do not come: one node four times, which is no pair's.
+        if lane == 0 {
+            nodes.fill(element.nodes[0]);
+        }
         set(nodes, lane, node);
     }
     for (components, slope) in block.gradients.iter_mut().zip(slopes) {
@@ -554,7 +559,7 @@ fn write_element(block: &mut ElementBlock, lane: usize, element: usize, tet: [u3
         }
     }
     set(&mut block.volumes, lane, volume as f32);
-    set(&mut block.elements, lane, element as u32);
+    set(&mut block.elements, lane, element.element as u32);
     set(&mut block.spreads, lane, spread(slopes));
 }
 

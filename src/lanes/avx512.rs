@@ -111,6 +111,21 @@ impl Real for Avx512 {
     fn lane_of(row: usize) -> usize {
         4 * (row % 4) + row / 4
     }
+    #[inline(always)]
+    fn five_to_rows([a, b, c, d, e]: [[Self; 4]; 5], mut row: impl FnMut(usize, usize, [f32; 4])) {
+        let corners = [quarters(a), quarters(b), quarters(c), quarters(d), quarters(e)];
+        let [a, b, c, d, e] = core::hint::black_box(&corners);
+        eight::<0>(a, |lane, numbers| row(0, lane, numbers));
+        eight::<0>(b, |lane, numbers| row(1, lane, numbers));
+        eight::<0>(c, |lane, numbers| row(2, lane, numbers));
+        eight::<0>(d, |lane, numbers| row(3, lane, numbers));
+        eight::<0>(e, |lane, numbers| row(4, lane, numbers));
+        eight::<8>(a, |lane, numbers| row(0, lane, numbers));
+        eight::<8>(b, |lane, numbers| row(1, lane, numbers));
+        eight::<8>(c, |lane, numbers| row(2, lane, numbers));
+        eight::<8>(d, |lane, numbers| row(3, lane, numbers));
+        eight::<8>(e, |lane, numbers| row(4, lane, numbers));
+    }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]
     fn fused(self, factor: Self, addend: Self) -> Self {

@@ -94,6 +94,15 @@ pub trait Real:
     fn lane_of(row: usize) -> usize {
         row
     }
+    /// The same for five nodes that two elements have in common.
+    #[inline(always)]
+    fn five_to_rows([a, b, c, d, e]: [[Self; 4]; 5], mut row: impl FnMut(usize, usize, [f32; 4])) {
+        Self::to_rows(a, |lane, numbers| row(0, lane, numbers));
+        Self::to_rows(b, |lane, numbers| row(1, lane, numbers));
+        Self::to_rows(c, |lane, numbers| row(2, lane, numbers));
+        Self::to_rows(d, |lane, numbers| row(3, lane, numbers));
+        Self::to_rows(e, |lane, numbers| row(4, lane, numbers));
+    }
     /// The number in `lane`; lanes that do not exist read as zero.
     fn lane(&self, lane: usize) -> f32;
     /// Applies `f` to each number.

@@ -265,13 +265,37 @@ impl<'a> Scatter<'a> {
         });
     }
 
-    /// The same for a block of which only some nodes are among those of the vectors: adds to these, slowly.
+    /// The same for the five nodes of pairs of elements: the fifth is the first of `apart`.
     #[inline(always)]
-    pub(crate) fn add_some_corners<R: Real>(
+    pub(crate) fn add_five<R: Real>(
         &mut self,
-        nodes: &[[u32; BLOCK]; 4],
+        [nodes, apart]: [BlockNodes<'_>; 2],
         first: usize,
-        values: [[R; 4]; 4],
+        values: [[R; 4]; 5],
+    ) {
+        let missing = |nodes: BlockNodes<'_>| nodes.first != self.first || nodes.count > self.vectors.len();
+        if missing(nodes) || missing(apart) {
+            return;
+        }
+        let vectors = self.vectors.as_mut_ptr().wrapping_sub(self.first);
+        R::five_to_rows(values, |corner, lane, value| {
+            let node = if corner < 4 { nodes.at(corner, first + lane) } else { apart.at(0, first + lane) };
+            #[allow(unsafe_code)]
+            // SAFETY: as in `add_corners`.
+            let vector = unsafe { &mut *vectors.wrapping_add(node) };
+            for (sum, value) in vector.0.iter_mut().zip(value) {
+                *sum += value;
+            }
+        });
+    }
+
+    /// Adds to those of a block's nodes that are among those of the vectors, slowly, in the same order.
+    #[inline(always)]
+    pub(crate) fn add_some<R: Real, const N: usize>(
+        &mut self,
+        nodes: [&[u32; BLOCK]; N],
+        first: usize,
+        values: [[R; 4]; N],
     ) {
         for eight in (0..R::COUNT).step_by(8) {
             for (nodes, values) in nodes.iter().zip(&values) {

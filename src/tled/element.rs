@@ -57,10 +57,26 @@ impl<R: Real> Deformation<R> {
     #[inline(always)]
     pub(crate) fn of_block(block: &ElementBlock, first: usize, displacement: Gather<'_>) -> Self {
         let nodes = block.nodes_below(displacement.count()).unwrap_or(BlockNodes::NONE);
-        let origin = displacement.read_lanes::<R>(nodes, 0, first);
+        let at = |corner: usize| displacement.read_lanes::<R>(nodes, corner, first);
+        Self::of_moved(block, first, [at(0), at(1), at(2), at(3)])
+    }
+
+    /// Deformation of the elements in lanes `first..` of two blocks of pairs, which have three nodes in common.
+    #[inline(always)]
+    fn of_pair([one, other]: [&ElementBlock; 2], first: usize, displacement: Gather<'_>) -> [Self; 2] {
+        let nodes = one.nodes_below(displacement.count()).unwrap_or(BlockNodes::NONE);
+        let apart = other.nodes_below(displacement.count()).unwrap_or(BlockNodes::NONE);
+        let at = |corner: usize| displacement.read_lanes::<R>(nodes, corner, first);
+        let [p, a, b, c] = [at(0), at(1), at(2), at(3)];
+        let q = displacement.read_lanes::<R>(apart, 0, first);
+        [Self::of_moved(one, first, [p, a, b, c]), Self::of_moved(other, first, [q, a, c, b])]
+    }
+
+    /// From the displacements of the corners.
+    #[inline(always)]
+    fn of_moved(block: &ElementBlock, first: usize, [origin, a, b, c]: [Vector<R>; 4]) -> Self {
         let mut h = [[R::splat(0.0); 3]; 3];
-        for corner in 0..3 {
-            let position = displacement.read_lanes::<R>(nodes, corner + 1, first);
+        for (corner, position) in [a, b, c].into_iter().enumerate() {
             for j in 0..3 {
                 let gradient = block.gradient::<R>(corner, j, first);
                 for i in 0..3 {
@@ -217,16 +233,47 @@ pub(crate) fn add_forces<R: Real, L: Law>(
 ) {
     let mut parts = [Part::<R>::nothing(); TOGETHER];
     let vectors = BLOCK / R::COUNT;
-    for blocks in blocks.chunks((TOGETHER / vectors).max(1)) {
-        let place = |vector: usize| Place {
-            block: blocks.get(vector / vectors).unwrap_or(&ElementBlock::EMPTY),
-            first: vector % vectors * R::COUNT,
+    let mut rest = blocks;
+    while let [first, ..] = rest {
+        let pairs = matches!(rest, [one, other, ..] if one.shares_faces_with(other));
+        let most = (TOGETHER / vectors).max(2);
+        let batch = if pairs {
+            rest.get(..most)
+                .unwrap_or(rest)
+                .chunks_exact(2)
+                .take_while(|pair| pair[0].shares_faces_with(&pair[1]))
+                .count()
+                * 2
+        } else {
+            let next = |at: usize| matches!(rest.get(at..at + 2), Some([one, other]) if one.shares_faces_with(other));
+            (1..most.min(rest.len())).find(|&at| next(at)).unwrap_or(most.min(rest.len()))
+        };
+        let (blocks, others) = rest.split_at_checked(batch).unwrap_or((rest, &[]));
+        rest = others;
+        // Vectors of a pair of blocks in turn.
+        let place = |vector: usize| {
+            let (block, part) = if pairs {
+                (vector / 2 / vectors * 2 + vector % 2, vector / 2 % vectors)
+            } else {
+                (vector / vectors, vector % vectors)
+            };
+            Place { block: blocks.get(block).unwrap_or(first), first: part * R::COUNT }
         };
         let count = blocks.len() * vectors;
-        for (vector, part) in parts.iter_mut().enumerate().take(count) {
-            let Place { block, first } = place(vector);
-            let deformation = Deformation::<R>::of_block(block, first, displacement);
-            (part.h, part.invariants) = (deformation.h, deformation.invariants);
+        if pairs {
+            for (pair, parts) in parts.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count / 2) {
+                let (near, far) = (place(2 * pair), place(2 * pair + 1));
+                let both = Deformation::<R>::of_pair([near.block, far.block], near.first, displacement);
+                for (part, deformation) in parts.iter_mut().zip(both) {
+                    (part.h, part.invariants) = (deformation.h, deformation.invariants);
+                }
+            }
+        } else {
+            for (vector, part) in parts.iter_mut().enumerate().take(count) {
+                let Place { block, first } = place(vector);
+                let deformation = Deformation::<R>::of_block(block, first, displacement);
+                (part.h, part.invariants) = (deformation.h, deformation.invariants);
+            }
         }
         // The last pair may be half empty: what was there before is computed once more, for nobody.
         for (pair, parts) in parts.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
@@ -236,9 +283,14 @@ pub(crate) fn add_forces<R: Real, L: Law>(
                 look::<R, L>(laws, place, part, local, beside);
             }
         }
-        for (vector, part) in parts.iter().enumerate().take(count) {
-            let Place { block, first } = place(vector);
-            scatter(part, block, first, force);
+        if pairs {
+            for (pair, parts) in parts.as_chunks::<2>().0.iter().enumerate().take(count / 2) {
+                scatter_pair(parts, [place(2 * pair), place(2 * pair + 1)], force);
+            }
+        } else {
+            for (vector, part) in parts.iter().enumerate().take(count) {
+                scatter(part, place(vector), force);
+            }
         }
     }
 }
@@ -289,9 +341,9 @@ fn look<R: Real, L: Law>(
     part.fourth = beside.see::<R, L>(&law, block, first, &deformation, local);
 }
 
-/// The third pass: nodal forces from the stress.
+/// Nodal forces from the stress, with what else goes to the elements' nodes.
 #[inline(always)]
-fn scatter<R: Real>(part: &Part<R>, block: &ElementBlock, first: usize, force: &mut Scatter<'_>) {
+fn nodal_forces<R: Real>(part: &Part<R>, Place { block, first }: Place<'_>) -> [[R; 4]; 4] {
     let deformation = Deformation::with(part.h, part.invariants);
     let stress = deformation.stress(part.p1, part.s);
     let minus_volume = -block.volume::<R>(first);
@@ -305,15 +357,44 @@ fn scatter<R: Real>(part: &Part<R>, block: &ElementBlock, first: usize, force: &
         forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
     }
     let ([a, b, c, d], fourth) = (forces, part.fourth);
-    let rows = [
+    [
         [a[0], a[1], a[2], fourth],
         [b[0], b[1], b[2], fourth],
         [c[0], c[1], c[2], fourth],
         [d[0], d[1], d[2], fourth],
-    ];
+    ]
+}
+
+/// The third pass: forces to the nodes.
+#[inline(always)]
+fn scatter<R: Real>(part: &Part<R>, place: Place<'_>, force: &mut Scatter<'_>) {
+    let Place { block, first } = place;
+    let rows = nodal_forces(part, place);
     match force.all_of(block.nodes()) {
         Some(nodes) => force.add_corners(nodes, first, rows),
         // Elements between the nodes of two threads.
-        None => force.add_some_corners(block.nodes(), first, rows),
+        None => force.add_some(block.nodes().each_ref(), first, rows),
+    }
+}
+
+/// The same for pairs of elements.
+#[inline(always)]
+fn scatter_pair<R: Real>([one, other]: &[Part<R>; 2], places: [Place<'_>; 2], force: &mut Scatter<'_>) {
+    let [near, far] = places;
+    let [p, mut a, mut b, mut c] = nodal_forces(one, near);
+    let [q, a2, c2, b2] = nodal_forces(other, far);
+    for axis in 0..4 {
+        a[axis] = a[axis] + a2[axis];
+        b[axis] = b[axis] + b2[axis];
+        c[axis] = c[axis] + c2[axis];
+    }
+    let rows = [p, a, b, c, q];
+    let (nodes, apart) = (near.block.nodes(), far.block.nodes());
+    match (force.all_of(nodes), force.all_of(apart)) {
+        (Some(nodes), Some(apart)) => force.add_five([nodes, apart], near.first, rows),
+        _ => {
+            let [p, a, b, c] = nodes;
+            force.add_some([p, a, b, c, &apart[0]], near.first, rows);
+        }
     }
 }
