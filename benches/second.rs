@@ -21,6 +21,9 @@ const MULTIPLE: f32 = 20.0;
 const CYCLE: u32 = 64;
 const ROUNDS: usize = 5;
 
+/// Takes the steps of a second.
+type Second<'a> = Box<dyn FnMut() + 'a>;
+
 fn main() {
     let (points, forces) = (bar::points(), bar::forces());
     let scene = bar::scene(bar::EXPONENTIAL);
@@ -60,9 +63,7 @@ fn main() {
     let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, ([0; 3], false), CYCLE);
     let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, (LATTICE, false), CYCLE);
     let mut damped = scaled(&scene, &loads, &points, MULTIPLE, (DAMPED_LATTICE, true), CYCLE);
-    let [compact, compact_int8, paper] =
-        [compact, compact_int8, paper].map(|bytes| Box::leak(Box::new(bytes)));
-    let mut others: [(&str, Box<dyn FnMut()>); 6] = [
+    let mut others: [(&str, Second<'_>); 7] = [
         ("mass-scaled", Box::new(|| (0..long).for_each(|_| mass_scaled()))),
         ("multilevel", Box::new(|| (0..long).for_each(|_| multilevel()))),
         ("damped (`best`)", Box::new(|| (0..long).for_each(|_| damped()))),

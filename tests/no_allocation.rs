@@ -238,7 +238,7 @@ struct Flash<B: ?Sized>(B);
 
 static WEIGHTS: &Flash<[u8]> = &Flash(*include_bytes!("data/golden-v1.weights"));
 /// With layers of eight bits.
-static INT8: &Flash<[u8]> = &Flash(*include_bytes!("data/golden-v2.weights"));
+static INT8: &Flash<[u8]> = &Flash(*include_bytes!("data/golden-v3.weights"));
 static VERTICES: Mutex<[Vertex; NODES]> = Mutex::new([Vertex::NEW; NODES]);
 
 #[test]

@@ -5,9 +5,9 @@
 use bytemuck::must_cast_slice_mut;
 
 use super::assembly::CellSums;
+use super::cells::Cell;
 use super::dense::{self, mirror, stride, sweep};
 use super::lattice::Lattice;
-use super::passes::Cell;
 
 /// The dense matrices of a lattice, and what its cells sum.
 pub(super) struct Matrices<'a> {

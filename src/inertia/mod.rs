@@ -58,6 +58,7 @@ mod block;
 mod bound;
 #[cfg(test)]
 mod bound_tests;
+mod cells;
 mod damper;
 mod dense;
 mod estimate;

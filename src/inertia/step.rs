@@ -11,13 +11,14 @@ use crate::state::State;
 use crate::tled::{Divergence, Entry, InternalForces, Status, culprit, external_forces, follow_motions};
 
 use super::bound::ScalarBeside;
+use super::cells::{Cell, prolong, restrict};
 use super::damper::{Damper, Rough};
 use super::dense::{Row, apply, stride};
 use super::estimate::dot;
 use super::frames::{Rotation, turn};
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::matrices::{DampedMatrices, Matrices, thirds};
-use super::passes::{Alone, Calm, Cell, Follow, Given, Prepare, Settle, prolong, restrict, turns};
+use super::passes::{Alone, Calm, Follow, Given, Prepare, Settle, turns};
 use super::refresh::{Refresh, Sources, from_numbers, to_numbers};
 use super::vectors::NodeTables;
 use super::{COARSE_GROWTH, Inertia, LARGEST_KICK};
