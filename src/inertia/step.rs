@@ -136,7 +136,10 @@ where
         coarse_share = coarse_motion(&mut matrices, lattice, coarse_share, refresh);
         let cells = &*matrices.cells;
         let damped = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use);
-        let damped = damped.map(|damped| Calm { smooth: smooth_motion(damped, lattice), share: damping });
+        let largest =
+            increment.iter().fold(0.0, |most: f32, du| most.max(Vec4::from(du.0).abs().max_element()));
+        let smooth = damped.and_then(|damped| smooth_motion(damped, lattice, largest));
+        let damped = smooth.map(|smooth| Calm { smooth, share: damping });
         (totals, defects, found) = Settle { given, cells, damped, force, tables }.dispatched();
     }
 
@@ -174,8 +177,17 @@ where
     extremes.status(ledger, held)
 }
 
-/// The cells' sums of momentum become what of the increments is smooth, `W G^-1 W^T M du`.
-fn smooth_motion<'a>(damped: &'a mut DampedMatrices<'_>, lattice: &Lattice) -> &'a [Cell] {
+/// How many times larger than the largest increment what is smooth of them may be: functions that are cut off by the body's
+/// surface reach beyond it.
+const SMOOTH: f32 = 10.0;
+
+/// The cells' sums of momentum become what of the increments is smooth, `W G^-1 W^T M du`. Nothing where that cannot be: `G`
+/// is a cycle old, and where an element has been crushed since, `M` is another.
+fn smooth_motion<'a>(
+    damped: &'a mut DampedMatrices<'_>,
+    lattice: &Lattice,
+    largest_increment: f32,
+) -> Option<&'a [Cell]> {
     let functions = lattice.functions();
     let momentum = restrict(damped.momentum, lattice);
     let mut smooth = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
@@ -185,8 +197,13 @@ fn smooth_motion<'a>(damped: &'a mut DampedMatrices<'_>, lattice: &Lattice) -> &
         let sum: Vec4 = products.map(|(entry, momentum)| *entry * Vec4::from(momentum.0)).sum();
         smooth.0 = sum.to_array();
     }
+    let possible =
+        |vector: &NodeVector| Vec4::from(vector.0).abs().cmple(Vec4::splat(SMOOTH * largest_increment)).all();
+    if !smooth.iter().all(possible) {
+        return None;
+    }
     prolong(&smooth, lattice, damped.momentum);
-    damped.momentum
+    Some(damped.momentum)
 }
 
 /// `share (S^-1 - G^-1) W^T r` less the correction that a change of `S` asked for, from the cells' sums of `r` to what

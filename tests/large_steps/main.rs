@@ -589,3 +589,16 @@ fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
 }
 
 // Refusals.
+
+/// Found by the test above: an element was crushed while the lattice's inertia was a cycle old, and damping took thousands of
+/// metres of smooth motion away that there was not.
+#[test]
+fn smooth_motion_is_none_where_the_lattice_cannot_tell() {
+    let mut random = Random(2_280_812_162_470_855_614);
+    let body = wild(&mut random);
+    let drawn = drawn(&mut random, &body);
+    for multiple in [66.0, 67.0, 68.0, 68.009_92, 69.0] {
+        let (moved, _) = survive(&body, &drawn, EXP, Method::Damped, multiple).unwrap();
+        assert!(moved < 0.1, "moved by {moved} m at {multiple} times the limit");
+    }
+}
