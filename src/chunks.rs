@@ -39,6 +39,10 @@ pub(crate) const fn most_blocks(elements: usize) -> usize {
     elements.div_ceil(BLOCK) + groups - 1
 }
 
+/// What blocks hold of a chunk's elements, in their order: those within it, and those that reach out of it into later chunks;
+/// of each first pairs that fill blocks, then the others one by one.
+const KINDS: usize = 4;
+
 /// Where the chunks of a scene begin and end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chunks {
@@ -46,15 +50,15 @@ pub(crate) struct Chunks {
     /// Nodes of each chunk, the last ones may have fewer.
     size: usize,
     nodes: usize,
-    /// Blocks before the end of the elements within each chunk, and of those that reach out of it.
-    ends: [[u32; 2]; MAX_CHUNKS],
+    /// Blocks before the end of each kind of elements of each chunk.
+    ends: [u32; KINDS * MAX_CHUNKS],
     /// The last chunk that they reach.
     reach: [u8; MAX_CHUNKS],
 }
 
 impl Chunks {
     pub(crate) const NONE: Self =
-        Self { count: 0, size: TOGETHER, nodes: 0, ends: [[0; 2]; MAX_CHUNKS], reach: [0; MAX_CHUNKS] };
+        Self { count: 0, size: TOGETHER, nodes: 0, ends: [0; KINDS * MAX_CHUNKS], reach: [0; MAX_CHUNKS] };
 
     /// Pairs and single elements; those of a pair are in the same group.
     pub(crate) fn units(&self, elements: impl Iterator<Item = Numbered>) -> impl Iterator<Item = Unit> {
@@ -90,39 +94,31 @@ impl Chunks {
         start(chunks.start)..start(chunks.end)
     }
 
-    /// The blocks with all elements that touch chunks, in their order, and some that do not.
-    pub(crate) fn touching(&self, chunks: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    /// The blocks with all elements that touch chunks, in their order, and some that do not; and whether they hold pairs.
+    pub(crate) fn touching(&self, chunks: Range<usize>) -> impl Iterator<Item = (Range<usize>, bool)> {
         let before = (0..chunks.start).filter(move |&chunk| {
             self.reach.get(chunk).is_some_and(|&reach| usize::from(reach) >= chunks.start)
         });
-        let own = self.group(chunks.start, 0).start..self.end(chunks.end.saturating_sub(1), 1);
-        before.map(|chunk| self.group(chunk, 1)).chain(core::iter::once(own))
+        let reaching = before.flat_map(|chunk| KINDS * chunk + KINDS / 2..KINDS * (chunk + 1));
+        let own = KINDS * chunks.start..KINDS * chunks.end;
+        reaching.chain(own).map(|kind| (self.start(kind)..self.start(kind + 1), kind % 2 == 0))
     }
 
     /// Blocks of all elements.
-    pub(crate) const fn blocks(&self) -> usize {
-        self.ends[MAX_CHUNKS - 1][1] as usize
+    pub(crate) fn blocks(&self) -> usize {
+        self.start(self.ends.len())
     }
 
-    /// Blocks before the end of a chunk's elements: of those within it (0), or of those that reach out of it too (1).
-    fn end(&self, chunk: usize, group: usize) -> usize {
-        self.ends.get(chunk).map_or(0, |ends| ends[group % 2] as usize)
-    }
-
-    /// Blocks of one group.
-    fn group(&self, chunk: usize, group: usize) -> Range<usize> {
-        let start = match (chunk, group) {
-            (_, 1) => self.end(chunk, 0),
-            (0, _) => 0,
-            _ => self.end(chunk - 1, 1),
-        };
-        start..self.end(chunk, group)
+    /// Blocks before those of a chunk's kind of elements, by the number of all kinds of the chunks before it and its own.
+    fn start(&self, kind: usize) -> usize {
+        kind.checked_sub(1).and_then(|before| self.ends.get(before)).map_or(0, |&end| end as usize)
     }
 }
 
 /// Gives each element its place.
 pub(crate) struct Seats {
     chunks: Chunks,
+    /// Within each chunk, and reaching out of it.
     groups: [[Group; 2]; MAX_CHUNKS],
 }
 
@@ -143,6 +139,15 @@ impl Group {
     }
 }
 
+/// Row and lane of the next place, of so many rows. A lane has consecutive elements: neighbours share nodes, and in one block
+/// the sums at these would wait for each other on their way through memory.
+fn next_place(taken: &mut usize, rows: usize) -> (usize, usize) {
+    let lane = taken.checked_div(rows).unwrap_or(0);
+    let row = *taken - lane * rows;
+    *taken += 1;
+    (row, lane)
+}
+
 impl Seats {
     /// For the units that the elements of a scene make.
     pub(crate) fn of(nodes: usize, elements: impl Iterator<Item = Numbered> + Clone) -> Self {
@@ -152,24 +157,24 @@ impl Seats {
         let mut seats = Self { chunks, groups: [[Group::default(); 2]; MAX_CHUNKS] };
         for unit in chunks.units(elements) {
             let (first, last) = chunks.span(unit.nodes());
-            let out = usize::from(last > first);
-            if let (Some(groups), Some(reach)) =
-                (seats.groups.get_mut(first), seats.chunks.reach.get_mut(first))
-            {
+            if let Some((_, group)) = seats.group(unit) {
                 match unit {
-                    Unit::One(_) => groups[out % 2].singles += 1,
-                    Unit::Two(_) => groups[out % 2].pairs += 1,
+                    Unit::One(_) => group.singles += 1,
+                    Unit::Two(_) => group.pairs += 1,
                 }
+            }
+            if let Some(reach) = seats.chunks.reach.get_mut(first) {
                 *reach = (*reach).max(last as u8);
             }
         }
         let mut end = 0;
-        for (ends, groups) in seats.chunks.ends.iter_mut().zip(&seats.groups) {
-            for (place, group) in ends.iter_mut().zip(groups) {
-                let (pairs, singles) = group.rows();
-                end += (2 * pairs + singles) as u32;
-                *place = end;
-            }
+        for (ends, group) in
+            seats.chunks.ends.as_chunks_mut::<2>().0.iter_mut().zip(seats.groups.as_flattened())
+        {
+            let (pairs, singles) = group.rows();
+            let after_pairs = end + 2 * pairs as u32;
+            end = after_pairs + singles as u32;
+            *ends = [after_pairs, end];
         }
         seats
     }
@@ -179,32 +184,31 @@ impl Seats {
         &self.chunks
     }
 
-    /// Hands the elements of the next unit to their places, block and lane. A lane has consecutive ones of its group: neighbours share nodes,
-    /// and in one block the sums at these would wait for each other on their way through memory.
-    pub(crate) fn place(&mut self, unit: Unit, mut at: impl FnMut(Numbered, (usize, usize))) {
+    /// The group of a unit, with its number.
+    fn group(&mut self, unit: Unit) -> Option<(usize, &mut Group)> {
         let (first, last) = self.chunks.span(unit.nodes());
-        let out = usize::from(last > first);
-        let start = self.chunks.group(first, out).start;
-        let Some(groups) = self.groups.get_mut(first) else { return };
-        let group = &mut groups[out % 2];
+        let number = 2 * first + usize::from(last > first);
+        self.groups.as_flattened_mut().get_mut(number).map(|group| (number, group))
+    }
+
+    /// Hands the elements of the next unit to their places, block and lane.
+    pub(crate) fn place(&mut self, unit: Unit, mut at: impl FnMut(Numbered, (usize, usize))) {
+        let chunks = self.chunks;
+        let Some((number, group)) = self.group(unit) else { return };
         let (pairs, singles) = group.rows();
-        if let Unit::Two([one, other]) = unit {
-            let place = group.taken_pairs;
-            if place < pairs * BLOCK {
-                group.taken_pairs += 1;
-                let lane = place.checked_div(pairs).unwrap_or(0);
-                let block = start + 2 * (place - lane * pairs);
+        match unit {
+            Unit::Two([one, other]) if group.taken_pairs < pairs * BLOCK => {
+                let (row, lane) = next_place(&mut group.taken_pairs, pairs);
+                let block = chunks.start(2 * number) + 2 * row;
                 at(one, (block, lane));
                 at(other, (block + 1, lane));
-                return;
             }
-        }
-        for element in unit.elements() {
-            let place = group.taken_singles;
-            group.taken_singles += 1;
-            let lane = place.checked_div(singles).unwrap_or(0);
-            let block = start + 2 * pairs + (place - lane * singles);
-            at(element, (block, lane));
+            _ => {
+                for element in unit.elements() {
+                    let (row, lane) = next_place(&mut group.taken_singles, singles);
+                    at(element, (chunks.start(2 * number + 1) + row, lane));
+                }
+            }
         }
     }
 }
@@ -258,7 +262,7 @@ mod tests {
                 next = own.end;
                 let mut visits = std::vec![0; chunks.blocks()];
                 let mut last = 0;
-                for blocks in chunks.touching(mine) {
+                for (blocks, _) in chunks.touching(mine) {
                     prop_assert!(blocks.start >= last, "not in the order of the groups");
                     last = blocks.end;
                     visits[blocks].iter_mut().for_each(|visits| *visits += 1);

@@ -1,7 +1,7 @@
 //! Elements two by two: two that share a face have five nodes instead of eight, and most of a step goes into bringing nodes'
 //! displacements to elements and forces back. Found greedily among elements whose numbers are near.
 
-/// How many elements in front a mate is looked for: a power of two, at most 64.
+/// How many elements ahead a mate is looked for.
 const WINDOW: usize = 32;
 
 /// An element with its number in the mesh; its nodes in an order of the same winding.

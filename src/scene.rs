@@ -199,26 +199,14 @@ impl ElementBlock {
 
     /// The nodes, by corner and lane.
     #[inline(always)]
-    pub(crate) const fn nodes(&self) -> &[[u32; BLOCK]; 4] {
-        &self.nodes
-    }
-
-    /// Whether each element shares a face with the one in the same lane of the other block, as [`crate::pairs`] orders their nodes.
-    #[inline(always)]
-    pub(crate) fn shares_faces_with(&self, other: &Self) -> bool {
-        let mut unlike = 0;
-        for lane in 0..BLOCK {
-            unlike |= self.nodes[1][lane] ^ other.nodes[1][lane];
-            unlike |= self.nodes[2][lane] ^ other.nodes[3][lane];
-            unlike |= self.nodes[3][lane] ^ other.nodes[2][lane];
-        }
-        unlike == 0
+    pub(crate) fn nodes(&self) -> [&[u32; BLOCK]; 4] {
+        self.nodes.each_ref()
     }
 
     /// The nodes, if all are below `count`.
     #[inline(always)]
-    pub(crate) fn nodes_below(&self, count: usize) -> Option<BlockNodes<'_>> {
-        BlockNodes::among(&self.nodes, 0, count)
+    pub(crate) fn nodes_below<R: Real>(&self, count: usize) -> Option<BlockNodes<'_, 4>> {
+        BlockNodes::among::<R>(self.nodes(), 0, count)
     }
 
     /// The mesh's number of the element in `lane`.
@@ -547,9 +535,9 @@ fn write_element(block: &mut ElementBlock, lane: usize, element: Numbered, corne
     }
     let (slopes, volume) = gradients(corners);
     for (nodes, node) in block.nodes.iter_mut().zip(element.nodes) {
-        // The first one stands in for those that do not come: one node four times, which is no pair's.
+        // The first one stands in for those that do not come.
         if lane == 0 {
-            nodes.fill(element.nodes[0]);
+            nodes.fill(node);
         }
         set(nodes, lane, node);
     }

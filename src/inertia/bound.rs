@@ -216,7 +216,7 @@ impl MatrixSums<'_> {
         for (length, [x, y, z]) in lengths.iter_mut().zip(images) {
             *length = (x * x + y * y + z * z).root();
         }
-        let Some(nodes) = self.diagonal.all_of(block.nodes()) else {
+        let Some(nodes) = self.diagonal.all_of::<R, 4>(block.nodes()) else {
             return;
         };
         let weight = volume * bound.volume * (lengths[0] + lengths[1] + lengths[2] + lengths[3]);
@@ -229,7 +229,7 @@ impl MatrixSums<'_> {
             diagonal[corner] = [isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, bound.scalar];
             beside[corner] = [wx * y, wy * z, wz * x, R::splat(0.0)];
         }
-        self.diagonal.add_corners(nodes, first, diagonal);
-        self.beside.add_corners(nodes, first, beside);
+        self.diagonal.add_corners(&nodes, first, diagonal);
+        self.beside.add_corners(&nodes, first, beside);
     }
 }

@@ -12,7 +12,7 @@ use super::node::Scaling;
 use super::report::HeldBack;
 use super::vectors::{NodeTables, frame_of};
 use super::{LARGEST_KICK, NODE_GROWTH, RECOVERY};
-use crate::lanes::{BLOCK, Chosen, Following, Kernel, NodeVector, Real, Rows, dispatch};
+use crate::lanes::{BLOCK, Chosen, Following, Kernel, NodeVector, Real, Rows, axes, dispatch};
 use crate::scene::NodeInertia;
 use crate::tled::{Step, Sums, Totals};
 
@@ -79,7 +79,7 @@ impl Given<'_> {
             *row = numbers.lane(lane).to_bits();
         }
         let ends = [places.first()?.cell(), places.last()?.cell()];
-        Some((Chosen::below(rows, self.places.len())?, Within { position: [x, y, z], ends, places }))
+        Some((Chosen::below::<R>(rows, self.places.len())?, Within { position: [x, y, z], ends, places }))
     }
 }
 
@@ -504,7 +504,7 @@ impl Kernel for Follow<'_> {
     #[inline(always)]
     fn run<R: Real>(self) {
         // What stands behind the axes is no increment.
-        let axes = R::from_fn(|lane| if lane % 4 == 3 { 0.0 } else { 1.0 });
+        let axes = axes::<R>();
         let (next, rest) = must_cast_slice::<_, f32>(self.next).as_chunks::<BLOCK>();
         let (displacement, rest_of_displacement) =
             must_cast_slice_mut::<_, f32>(self.displacement).as_chunks_mut::<BLOCK>();

@@ -510,7 +510,7 @@ impl Kernel for SomeNodes<'_, '_> {
             let at = (first + lane).min(count.saturating_sub(1));
             *row = self.places.get(at).map_or(at, LatticeNode::node) as u32;
         }
-        if let Some(rows) = Chosen::below(rows, count) {
+        if let Some(rows) = Chosen::below::<R>(rows, count) {
             self.nodes::<R::Eight, R>(rows, count - first.min(count));
         }
     }

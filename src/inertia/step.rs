@@ -136,9 +136,7 @@ where
         coarse_share = coarse_motion(&mut matrices, lattice, coarse_share, refresh);
         let cells = &*matrices.cells;
         let damped = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use);
-        let largest =
-            increment.iter().fold(0.0, |most: f32, du| most.max(Vec4::from(du.0).abs().max_element()));
-        let smooth = damped.and_then(|damped| smooth_motion(damped, lattice, largest));
+        let smooth = damped.and_then(|damped| smooth_motion(damped, lattice, increment));
         let damped = smooth.map(|smooth| Calm { smooth, share: damping });
         (totals, defects, found) = Settle { given, cells, damped, force, tables }.dispatched();
     }
@@ -186,7 +184,7 @@ const SMOOTH: f32 = 10.0;
 fn smooth_motion<'a>(
     damped: &'a mut DampedMatrices<'_>,
     lattice: &Lattice,
-    largest_increment: f32,
+    increment: &[NodeVector],
 ) -> Option<&'a [Cell]> {
     let functions = lattice.functions();
     let momentum = restrict(damped.momentum, lattice);
@@ -197,9 +195,9 @@ fn smooth_motion<'a>(
         let sum: Vec4 = products.map(|(entry, momentum)| *entry * Vec4::from(momentum.0)).sum();
         smooth.0 = sum.to_array();
     }
-    let possible =
-        |vector: &NodeVector| Vec4::from(vector.0).abs().cmple(Vec4::splat(SMOOTH * largest_increment)).all();
-    if !smooth.iter().all(possible) {
+    let largest = increment.iter().fold(Vec4::ZERO, |most, du| most.max(Vec4::from(du.0).abs()));
+    let most = Vec4::splat(SMOOTH * largest.max_element());
+    if !smooth.iter().all(|vector| Vec4::from(vector.0).abs().cmple(most).all()) {
         return None;
     }
     prolong(&smooth, lattice, damped.momentum);

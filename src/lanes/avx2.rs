@@ -9,18 +9,19 @@
 #[cfg(not(feature = "deterministic"))]
 use core::arch::x86_64::_mm256_fmadd_ps;
 use core::arch::x86_64::{
-    __m256, _CMP_GT_OQ, _mm256_add_epi32, _mm256_add_ps, _mm256_and_ps, _mm256_blendv_ps,
-    _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cvtepi32_ps, _mm256_div_ps,
-    _mm256_max_ps, _mm256_min_ps, _mm256_mul_ps, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps,
+    __m256, __m256i, _CMP_GT_OQ, _mm256_add_epi32, _mm256_add_ps, _mm256_and_ps, _mm256_blendv_ps,
+    _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_cvtepi32_ps,
+    _mm256_div_ps, _mm256_max_epu32, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_epi8, _mm256_mul_ps,
+    _mm256_or_si256, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_setzero_si256,
     _mm256_shuffle_ps, _mm256_slli_epi32, _mm256_sqrt_ps, _mm256_srli_epi32, _mm256_sub_epi32, _mm256_sub_ps,
     _mm256_unpackhi_ps, _mm256_unpacklo_ps, _mm256_xor_ps,
 };
 use core::ops::{Add, Mul, Neg, Sub};
 
-use super::Real;
 use super::functions::Bits;
 use super::int8_avx2::Bytes32;
 use super::register::{memory, same_methods};
+use super::{BLOCK, Real};
 
 /// See the module.
 #[derive(Clone, Copy)]
@@ -79,6 +80,23 @@ impl Real for Avx2 {
             for (lane, pair) in pairs.iter().enumerate() {
                 row(4 * half + lane, pair[half]);
             }
+        }
+    }
+    #[inline(always)]
+    fn are_among<const N: usize>(rows: [&[u32; BLOCK]; N], first: u32, count: u32) -> bool {
+        // SAFETY: the processor has AVX2, see the module.
+        unsafe {
+            let (first, count) = (_mm256_set1_epi32(first as i32), _mm256_set1_epi32(count as i32));
+            let mut beyond = _mm256_setzero_si256();
+            for row in rows {
+                let halves: [__m256i; 2] = bytemuck::must_cast(*row);
+                for half in halves {
+                    let at = _mm256_sub_epi32(half, first);
+                    // The larger of the two is itself: there is no comparison of unsigned numbers.
+                    beyond = _mm256_or_si256(beyond, _mm256_cmpeq_epi32(_mm256_max_epu32(at, count), at));
+                }
+            }
+            _mm256_movemask_epi8(beyond) == 0
         }
     }
     #[inline(always)]

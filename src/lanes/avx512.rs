@@ -10,18 +10,19 @@
 use core::arch::x86_64::_mm512_fmadd_ps;
 use core::arch::x86_64::{
     __m512, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_epi32, _mm512_add_ps, _mm512_castps_si512,
-    _mm512_castsi512_ps, _mm512_cmp_ps_mask, _mm512_cvtepi32_ps, _mm512_div_ps, _mm512_mask_blend_ps,
-    _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_min_ps, _mm512_mul_ps, _mm512_set1_epi32, _mm512_set1_ps,
-    _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_slli_epi32, _mm512_sqrt_ps, _mm512_srli_epi32,
-    _mm512_sub_epi32, _mm512_sub_ps, _mm512_unpackhi_ps, _mm512_unpacklo_ps, _mm512_xor_ps,
+    _mm512_castsi512_ps, _mm512_cmp_ps_mask, _mm512_cmpge_epu32_mask, _mm512_cvtepi32_ps, _mm512_div_ps,
+    _mm512_mask_blend_ps, _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_min_ps, _mm512_mul_ps,
+    _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_slli_epi32,
+    _mm512_sqrt_ps, _mm512_srli_epi32, _mm512_sub_epi32, _mm512_sub_ps, _mm512_unpackhi_ps,
+    _mm512_unpacklo_ps, _mm512_xor_ps,
 };
 use core::ops::{Add, Mul, Neg, Sub};
 
-use super::Real;
 use super::avx2::Avx2;
 use super::functions::Bits;
 use super::int8_avx512::Bytes64;
 use super::register::{memory, same_methods};
+use super::{BLOCK, Real};
 
 /// See the module.
 #[derive(Clone, Copy)]
@@ -81,18 +82,32 @@ impl Real for Avx512 {
         eight::<8>(quarters, &mut row);
     }
     #[inline(always)]
-    fn corners_to_rows([a, b, c, d]: [[Self; 4]; 4], mut row: impl FnMut(usize, usize, [f32; 4])) {
-        let corners = [quarters(a), quarters(b), quarters(c), quarters(d)];
+    fn corners_to_rows<const N: usize>(corners: [[Self; 4]; N], mut row: impl FnMut(usize, usize, [f32; 4])) {
+        // A loop: `map` leaves the vectors in memory.
+        let mut rows = [[[[0.0; 4]; 4]; 4]; N];
+        for corner in 0..N {
+            rows[corner] = quarters(corners[corner]);
+        }
         // As in `to_rows`.
-        let [a, b, c, d] = core::hint::black_box(&corners);
-        eight::<0>(a, |lane, numbers| row(0, lane, numbers));
-        eight::<0>(b, |lane, numbers| row(1, lane, numbers));
-        eight::<0>(c, |lane, numbers| row(2, lane, numbers));
-        eight::<0>(d, |lane, numbers| row(3, lane, numbers));
-        eight::<8>(a, |lane, numbers| row(0, lane, numbers));
-        eight::<8>(b, |lane, numbers| row(1, lane, numbers));
-        eight::<8>(c, |lane, numbers| row(2, lane, numbers));
-        eight::<8>(d, |lane, numbers| row(3, lane, numbers));
+        let corners = core::hint::black_box(&rows);
+        for corner in 0..N {
+            eight::<0>(&corners[corner], |lane, numbers| row(corner, lane, numbers));
+        }
+        for corner in 0..N {
+            eight::<8>(&corners[corner], |lane, numbers| row(corner, lane, numbers));
+        }
+    }
+    #[inline(always)]
+    fn are_among<const N: usize>(rows: [&[u32; BLOCK]; N], first: u32, count: u32) -> bool {
+        let mut beyond = 0;
+        for row in rows {
+            // SAFETY: as above; any bits are numbers.
+            beyond |= unsafe {
+                let at = _mm512_sub_epi32(bytemuck::must_cast(*row), _mm512_set1_epi32(first as i32));
+                _mm512_cmpge_epu32_mask(at, _mm512_set1_epi32(count as i32))
+            };
+        }
+        beyond == 0
     }
     #[inline(always)]
     fn from_block(rows: &[[f32; 4]]) -> [Self; 4] {
@@ -110,21 +125,6 @@ impl Real for Avx512 {
     #[inline(always)]
     fn lane_of(row: usize) -> usize {
         4 * (row % 4) + row / 4
-    }
-    #[inline(always)]
-    fn five_to_rows([a, b, c, d, e]: [[Self; 4]; 5], mut row: impl FnMut(usize, usize, [f32; 4])) {
-        let corners = [quarters(a), quarters(b), quarters(c), quarters(d), quarters(e)];
-        let [a, b, c, d, e] = core::hint::black_box(&corners);
-        eight::<0>(a, |lane, numbers| row(0, lane, numbers));
-        eight::<0>(b, |lane, numbers| row(1, lane, numbers));
-        eight::<0>(c, |lane, numbers| row(2, lane, numbers));
-        eight::<0>(d, |lane, numbers| row(3, lane, numbers));
-        eight::<0>(e, |lane, numbers| row(4, lane, numbers));
-        eight::<8>(a, |lane, numbers| row(0, lane, numbers));
-        eight::<8>(b, |lane, numbers| row(1, lane, numbers));
-        eight::<8>(c, |lane, numbers| row(2, lane, numbers));
-        eight::<8>(d, |lane, numbers| row(3, lane, numbers));
-        eight::<8>(e, |lane, numbers| row(4, lane, numbers));
     }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]

@@ -35,7 +35,7 @@ pub(crate) use level::{Kernel, dispatch};
 pub(crate) use pair::Pair;
 pub use vectors::NodeVector;
 use vectors::transpose;
-pub(crate) use vectors::{BlockNodes, Chosen, Following, Gather, Rows, Scatter, dot, write_rows};
+pub(crate) use vectors::{BlockNodes, Chosen, Following, Gather, Rows, Scatter, axes, dot, write_rows};
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -67,12 +67,10 @@ pub trait Real:
     /// Hands the four numbers of each corner and lane of elements side by side to `row`: of eight lanes those of the first
     /// corner, then of the second and so on, then of the next eight. Sums must not depend on how wide a vector is.
     #[inline(always)]
-    fn corners_to_rows([a, b, c, d]: [[Self; 4]; 4], mut row: impl FnMut(usize, usize, [f32; 4])) {
-        // One by one: in a loop the compiler would take the numbers through memory, one after the other.
-        Self::to_rows(a, |lane, numbers| row(0, lane, numbers));
-        Self::to_rows(b, |lane, numbers| row(1, lane, numbers));
-        Self::to_rows(c, |lane, numbers| row(2, lane, numbers));
-        Self::to_rows(d, |lane, numbers| row(3, lane, numbers));
+    fn corners_to_rows<const N: usize>(corners: [[Self; 4]; N], mut row: impl FnMut(usize, usize, [f32; 4])) {
+        for (corner, columns) in corners.into_iter().enumerate() {
+            Self::to_rows(columns, |lane, numbers| row(corner, lane, numbers));
+        }
     }
     /// As many rows as there are lanes, in the order of lanes that takes the fewest instructions: lane [`Real::lane_of`] of the
     /// four takes the numbers of a row. Zeros if there are fewer.
@@ -94,14 +92,16 @@ pub trait Real:
     fn lane_of(row: usize) -> usize {
         row
     }
-    /// The same for five nodes that two elements have in common.
+    /// Whether all of some numbers are among `count` from `first` on.
     #[inline(always)]
-    fn five_to_rows([a, b, c, d, e]: [[Self; 4]; 5], mut row: impl FnMut(usize, usize, [f32; 4])) {
-        Self::to_rows(a, |lane, numbers| row(0, lane, numbers));
-        Self::to_rows(b, |lane, numbers| row(1, lane, numbers));
-        Self::to_rows(c, |lane, numbers| row(2, lane, numbers));
-        Self::to_rows(d, |lane, numbers| row(3, lane, numbers));
-        Self::to_rows(e, |lane, numbers| row(4, lane, numbers));
+    fn are_among<const N: usize>(rows: [&[u32; BLOCK]; N], first: u32, count: u32) -> bool {
+        let mut among = true;
+        for row in rows {
+            for number in row {
+                among &= number.wrapping_sub(first) < count;
+            }
+        }
+        among
     }
     /// The number in `lane`; lanes that do not exist read as zero.
     fn lane(&self, lane: usize) -> f32;

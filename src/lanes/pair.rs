@@ -5,8 +5,8 @@
 
 use core::ops::{Add, Mul, Neg, Sub};
 
-use super::Real;
 use super::int8::Whole;
+use super::{BLOCK, Real};
 
 /// The lanes of the first, then those of the second.
 #[derive(Clone, Copy, Debug)]
@@ -66,6 +66,10 @@ impl<R: Real> Real for Pair<R> {
     fn to_rows([x, y, z, w]: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
         R::to_rows([x.0, y.0, z.0, w.0], &mut row);
         R::to_rows([x.1, y.1, z.1, w.1], |lane, numbers| row(R::COUNT + lane, numbers));
+    }
+    #[inline(always)]
+    fn are_among<const N: usize>(rows: [&[u32; BLOCK]; N], first: u32, count: u32) -> bool {
+        R::are_among(rows, first, count)
     }
     #[inline(always)]
     fn lane(&self, lane: usize) -> f32 {

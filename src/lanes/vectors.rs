@@ -22,6 +22,12 @@ impl NodeVector {
     }
 }
 
+/// Of vectors side by side as they are in memory: ones for the three axes, zero for what stands behind them.
+#[inline(always)]
+pub(crate) fn axes<R: Real>() -> R {
+    R::from_fn(|lane| if lane % 4 == 3 { 0.0 } else { 1.0 })
+}
+
 /// Four lanes by four components, transposed.
 #[inline(always)]
 pub(super) fn transpose(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
@@ -100,8 +106,8 @@ pub(crate) struct Chosen {
 impl Chosen {
     /// The rows, if all are below `count`.
     #[inline(always)]
-    pub(crate) fn below(rows: [u32; BLOCK], count: usize) -> Option<Self> {
-        if are_among(&rows, 0, count) { Some(Self { rows, count }) } else { None }
+    pub(crate) fn below<R: Real>(rows: [u32; BLOCK], count: usize) -> Option<Self> {
+        if are_among::<R, 1>([&rows], 0, count) { Some(Self { rows, count }) } else { None }
     }
 }
 
@@ -139,22 +145,11 @@ impl Rows for Chosen {
 
 /// Whether all of some numbers are among `count` from `first` on.
 #[inline(always)]
-fn are_among(numbers: &[u32], first: usize, count: usize) -> bool {
-    let last = count.checked_sub(1).and_then(|last| i32::try_from(last).ok());
-    let (Ok(start), Some(last)) = (i32::try_from(first), last) else {
-        return false;
-    };
-    if start.checked_add(last).is_none() {
-        return false;
+fn are_among<R: Real, const N: usize>(rows: [&[u32; BLOCK]; N], first: usize, count: usize) -> bool {
+    match (u32::try_from(first), u32::try_from(count)) {
+        (Ok(first), Ok(count)) => R::are_among(rows, first, count),
+        _ => false,
     }
-    // The sign of what is negative, or would be were it subtracted: no vector unit compares unsigned numbers. A number
-    // that has wrapped round is beyond `last`, as `start + last` is a number.
-    let mut signs = 0;
-    for number in numbers {
-        let at = number.cast_signed().wrapping_sub(start);
-        signs |= at | last.wrapping_sub(at);
-    }
-    signs >= 0
 }
 
 /// Scalar products of vectors side by side.
@@ -163,30 +158,30 @@ pub(crate) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
     a[2].fused(b[2], a[1].fused(b[1], a[0] * b[0]))
 }
 
-/// Nodes of the elements of a block, known to be in some range: they are checked all at once, so that a kernel does not
-/// have to check them one by one.
+/// Nodes of the elements of a block, `N` rows of them, known to be in some range: they are checked all at once, so that a kernel
+/// does not have to check them one by one.
 #[derive(Clone, Copy)]
-pub(crate) struct BlockNodes<'a> {
-    nodes: &'a [[u32; BLOCK]; 4],
+pub(crate) struct BlockNodes<'a, const N: usize> {
+    rows: [&'a [u32; BLOCK]; N],
     /// Where they are.
     first: usize,
     count: usize,
 }
 
-impl<'a> BlockNodes<'a> {
+impl<'a, const N: usize> BlockNodes<'a, N> {
     /// The first node, again and again.
-    pub(crate) const NONE: Self = Self { nodes: &[[0; BLOCK]; 4], first: 0, count: 1 };
+    pub(crate) const NONE: Self = Self { rows: [&[0; BLOCK]; N], first: 0, count: 1 };
 
     /// The nodes, if all are among `count` from `first` on.
     #[inline(always)]
-    pub(crate) fn among(nodes: &'a [[u32; BLOCK]; 4], first: usize, count: usize) -> Option<Self> {
-        if are_among(nodes.as_flattened(), first, count) { Some(Self { nodes, first, count }) } else { None }
+    pub(crate) fn among<R: Real>(rows: [&'a [u32; BLOCK]; N], first: usize, count: usize) -> Option<Self> {
+        if are_among::<R, N>(rows, first, count) { Some(Self { rows, first, count }) } else { None }
     }
 
-    /// Node `corner` (0 to 3) of the element in `lane`.
+    /// The node in row `corner` and `lane`.
     #[inline(always)]
     fn at(&self, corner: usize, lane: usize) -> usize {
-        self.nodes[corner % 4][lane % BLOCK] as usize
+        self.rows[corner % N][lane % BLOCK] as usize
     }
 }
 
@@ -204,16 +199,21 @@ impl<'a> Gather<'a> {
         self.0.len()
     }
 
-    /// Lane `l` takes the vector of node `corner` of the element in lane `first + l` of the block; zeros if the block's
-    /// nodes are not known to be among the vectors.
+    /// Lane `l` takes the vector of the node in row `corner` and lane `first + l`; zeros if the nodes are not known to be among
+    /// the vectors.
     #[inline(always)]
-    pub(crate) fn read_lanes<R: Real>(&self, nodes: BlockNodes<'_>, corner: usize, first: usize) -> [R; 3] {
+    pub(crate) fn read_lanes<R: Real, const N: usize>(
+        &self,
+        nodes: &BlockNodes<'_, N>,
+        corner: usize,
+        first: usize,
+    ) -> [R; 3] {
         if nodes.first + nodes.count > self.0.len() {
             return [R::splat(0.0); 3];
         }
         let [x, y, z, _] = R::from_rows(|lane| {
             #[allow(unsafe_code)]
-            // SAFETY: all nodes of the block are below `nodes.first + nodes.count`, which is not above the number of vectors.
+            // SAFETY: all nodes are below `nodes.first + nodes.count`, which is not above the number of vectors.
             unsafe {
                 self.0.get_unchecked(nodes.at(corner, first + lane)).0
             }
@@ -242,14 +242,22 @@ impl<'a> Scatter<'a> {
 
     /// A block's nodes, if all are among those of the vectors.
     #[inline(always)]
-    pub(crate) fn all_of<'b>(&self, nodes: &'b [[u32; BLOCK]; 4]) -> Option<BlockNodes<'b>> {
-        BlockNodes::among(nodes, self.first, self.vectors.len())
+    pub(crate) fn all_of<'b, R: Real, const N: usize>(
+        &self,
+        rows: [&'b [u32; BLOCK]; N],
+    ) -> Option<BlockNodes<'b, N>> {
+        BlockNodes::among::<R>(rows, self.first, self.vectors.len())
     }
 
-    /// Adds for each corner the components in lane `l` to the vector of that node of the element in lane `first + l` of the
-    /// block, in the order of [`Real::corners_to_rows`]; nothing if the block's nodes are not known to be among the vectors'.
+    /// Adds for each row of nodes the components in lane `l` to the vector of the node in lane `first + l`, in the order of
+    /// [`Real::corners_to_rows`]; nothing if the nodes are not known to be among the vectors'.
     #[inline(always)]
-    pub(crate) fn add_corners<R: Real>(&mut self, nodes: BlockNodes<'_>, first: usize, values: [[R; 4]; 4]) {
+    pub(crate) fn add_corners<R: Real, const N: usize>(
+        &mut self,
+        nodes: &BlockNodes<'_, N>,
+        first: usize,
+        values: [[R; 4]; N],
+    ) {
         if nodes.first != self.first || nodes.count > self.vectors.len() {
             return;
         }
@@ -257,32 +265,8 @@ impl<'a> Scatter<'a> {
         let vectors = self.vectors.as_mut_ptr().wrapping_sub(self.first);
         R::corners_to_rows(values, |corner, lane, value| {
             #[allow(unsafe_code)]
-            // SAFETY: all nodes of the block are among `nodes.count` from `self.first` on, of which there are vectors.
+            // SAFETY: all nodes are among `nodes.count` from `self.first` on, of which there are vectors.
             let vector = unsafe { &mut *vectors.wrapping_add(nodes.at(corner, first + lane)) };
-            for (sum, value) in vector.0.iter_mut().zip(value) {
-                *sum += value;
-            }
-        });
-    }
-
-    /// The same for the five nodes of pairs of elements: the fifth is the first of `apart`.
-    #[inline(always)]
-    pub(crate) fn add_five<R: Real>(
-        &mut self,
-        [nodes, apart]: [BlockNodes<'_>; 2],
-        first: usize,
-        values: [[R; 4]; 5],
-    ) {
-        let missing = |nodes: BlockNodes<'_>| nodes.first != self.first || nodes.count > self.vectors.len();
-        if missing(nodes) || missing(apart) {
-            return;
-        }
-        let vectors = self.vectors.as_mut_ptr().wrapping_sub(self.first);
-        R::five_to_rows(values, |corner, lane, value| {
-            let node = if corner < 4 { nodes.at(corner, first + lane) } else { apart.at(0, first + lane) };
-            #[allow(unsafe_code)]
-            // SAFETY: as in `add_corners`.
-            let vector = unsafe { &mut *vectors.wrapping_add(node) };
             for (sum, value) in vector.0.iter_mut().zip(value) {
                 *sum += value;
             }

@@ -134,7 +134,7 @@ fn add_bounds<R: Real, L: Law>(
     sums: &mut Sums<'_>,
 ) {
     let displacement = Gather::new(sums.zx_in_padding);
-    let Some(nodes) = block.nodes_below(displacement.count()) else {
+    let Some(nodes) = block.nodes_below::<R>(displacement.count()) else {
         return;
     };
     let deformation = Deformation::<R>::of_block(block, first, displacement);
@@ -148,7 +148,7 @@ fn add_bounds<R: Real, L: Law>(
     }
     let volume = block.volume::<R>(first).sqrt();
     for (corner, gradient) in gradients.iter_mut().enumerate() {
-        let [x, y, z] = inertia.read_lanes::<R>(nodes, corner, first);
+        let [x, y, z] = inertia.read_lanes::<R, 4>(&nodes, corner, first);
         let root = x.max(y).max(z).max(R::splat(0.0)).sqrt() * volume;
         *gradient = gradient.map(|component| component * root);
     }
@@ -188,9 +188,9 @@ fn add_bounds<R: Real, L: Law>(
         fifth[corner][3] = yz;
         sixth[corner][3] = zx;
     }
-    Scatter::new(sums.xx_yy_zz_xy).add_corners(nodes, first, first_four);
-    Scatter::new(sums.yz_in_padding).add_corners(nodes, first, fifth);
-    Scatter::new(sums.zx_in_padding).add_corners(nodes, first, sixth);
+    Scatter::new(sums.xx_yy_zz_xy).add_corners(&nodes, first, first_four);
+    Scatter::new(sums.yz_in_padding).add_corners(&nodes, first, fifth);
+    Scatter::new(sums.zx_in_padding).add_corners(&nodes, first, sixth);
 }
 
 /// Magnitudes of the terms of the tangent, Pa.

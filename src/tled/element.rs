@@ -56,19 +56,18 @@ impl<R: Real> Deformation<R> {
     /// Deformation of the elements in lanes `first..` of a block, none if it names nodes that are not there.
     #[inline(always)]
     pub(crate) fn of_block(block: &ElementBlock, first: usize, displacement: Gather<'_>) -> Self {
-        let nodes = block.nodes_below(displacement.count()).unwrap_or(BlockNodes::NONE);
-        let at = |corner: usize| displacement.read_lanes::<R>(nodes, corner, first);
+        let nodes = block.nodes_below::<R>(displacement.count()).unwrap_or(BlockNodes::NONE);
+        let at = |corner: usize| displacement.read_lanes::<R, 4>(&nodes, corner, first);
         Self::of_moved(block, first, [at(0), at(1), at(2), at(3)])
     }
 
     /// Deformation of the elements in lanes `first..` of two blocks of pairs, which have three nodes in common.
     #[inline(always)]
     fn of_pair([one, other]: [&ElementBlock; 2], first: usize, displacement: Gather<'_>) -> [Self; 2] {
-        let nodes = one.nodes_below(displacement.count()).unwrap_or(BlockNodes::NONE);
-        let apart = other.nodes_below(displacement.count()).unwrap_or(BlockNodes::NONE);
-        let at = |corner: usize| displacement.read_lanes::<R>(nodes, corner, first);
-        let [p, a, b, c] = [at(0), at(1), at(2), at(3)];
-        let q = displacement.read_lanes::<R>(apart, 0, first);
+        let nodes = BlockNodes::among::<R>(nodes_of_pair([one, other]), 0, displacement.count());
+        let nodes = nodes.unwrap_or(BlockNodes::NONE);
+        let at = |corner: usize| displacement.read_lanes::<R, 5>(&nodes, corner, first);
+        let [p, a, b, c, q] = [at(0), at(1), at(2), at(3), at(4)];
         [Self::of_moved(one, first, [p, a, b, c]), Self::of_moved(other, first, [q, a, c, b])]
     }
 
@@ -220,12 +219,13 @@ impl<R: Real> Part<R> {
 /// Vectors of elements that go through the passes together.
 const TOGETHER: usize = 8;
 
-/// Adds the internal forces of all elements to `force`, with minus sign. In three passes over a few vectors of elements: the law is
-/// a long chain of operations that wait for each other, and gets nothing else in between ([`Pair`]).
+/// Adds the internal forces of elements to `force`, with minus sign; `paired` if the blocks hold pairs ([`crate::pairs`]), one
+/// element in each of two. In three passes over a few vectors of elements: the law is a long chain of operations that wait
+/// for each other, and gets nothing else in between ([`Pair`]).
 #[inline(always)]
 pub(crate) fn add_forces<R: Real, L: Law>(
     laws: &Laws<'_, L>,
-    blocks: &[ElementBlock],
+    (blocks, paired): (&[ElementBlock], bool),
     displacement: Gather<'_>,
     force: &mut Scatter<'_>,
     beside: &mut impl Beside,
@@ -233,26 +233,11 @@ pub(crate) fn add_forces<R: Real, L: Law>(
 ) {
     let mut parts = [Part::<R>::nothing(); TOGETHER];
     let vectors = BLOCK / R::COUNT;
-    let mut rest = blocks;
-    while let [first, ..] = rest {
-        let pairs = matches!(rest, [one, other, ..] if one.shares_faces_with(other));
-        let most = (TOGETHER / vectors).max(2);
-        let batch = if pairs {
-            rest.get(..most)
-                .unwrap_or(rest)
-                .chunks_exact(2)
-                .take_while(|pair| pair[0].shares_faces_with(&pair[1]))
-                .count()
-                * 2
-        } else {
-            let next = |at: usize| matches!(rest.get(at..at + 2), Some([one, other]) if one.shares_faces_with(other));
-            (1..most.min(rest.len())).find(|&at| next(at)).unwrap_or(most.min(rest.len()))
-        };
-        let (blocks, others) = rest.split_at_checked(batch).unwrap_or((rest, &[]));
-        rest = others;
+    for blocks in blocks.chunks((TOGETHER / vectors).max(2)) {
+        let Some(first) = blocks.first() else { continue };
         // Vectors of a pair of blocks in turn.
         let place = |vector: usize| {
-            let (block, part) = if pairs {
+            let (block, part) = if paired {
                 (vector / 2 / vectors * 2 + vector % 2, vector / 2 % vectors)
             } else {
                 (vector / vectors, vector % vectors)
@@ -260,7 +245,7 @@ pub(crate) fn add_forces<R: Real, L: Law>(
             Place { block: blocks.get(block).unwrap_or(first), first: part * R::COUNT }
         };
         let count = blocks.len() * vectors;
-        if pairs {
+        if paired {
             for (pair, parts) in parts.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count / 2) {
                 let (near, far) = (place(2 * pair), place(2 * pair + 1));
                 let both = Deformation::<R>::of_pair([near.block, far.block], near.first, displacement);
@@ -283,13 +268,14 @@ pub(crate) fn add_forces<R: Real, L: Law>(
                 look::<R, L>(laws, place, part, local, beside);
             }
         }
-        if pairs {
+        if paired {
             for (pair, parts) in parts.as_chunks::<2>().0.iter().enumerate().take(count / 2) {
                 scatter_pair(parts, [place(2 * pair), place(2 * pair + 1)], force);
             }
         } else {
             for (vector, part) in parts.iter().enumerate().take(count) {
-                scatter(part, place(vector), force);
+                let place = place(vector);
+                add_rows(place.block.nodes(), place.first, nodal_forces(part, place), force);
             }
         }
     }
@@ -365,22 +351,9 @@ fn nodal_forces<R: Real>(part: &Part<R>, Place { block, first }: Place<'_>) -> [
     ]
 }
 
-/// The third pass: forces to the nodes.
+/// The third pass: forces to the nodes of pairs of elements.
 #[inline(always)]
-fn scatter<R: Real>(part: &Part<R>, place: Place<'_>, force: &mut Scatter<'_>) {
-    let Place { block, first } = place;
-    let rows = nodal_forces(part, place);
-    match force.all_of(block.nodes()) {
-        Some(nodes) => force.add_corners(nodes, first, rows),
-        // Elements between the nodes of two threads.
-        None => force.add_some(block.nodes().each_ref(), first, rows),
-    }
-}
-
-/// The same for pairs of elements.
-#[inline(always)]
-fn scatter_pair<R: Real>([one, other]: &[Part<R>; 2], places: [Place<'_>; 2], force: &mut Scatter<'_>) {
-    let [near, far] = places;
+fn scatter_pair<R: Real>([one, other]: &[Part<R>; 2], [near, far]: [Place<'_>; 2], force: &mut Scatter<'_>) {
     let [p, mut a, mut b, mut c] = nodal_forces(one, near);
     let [q, a2, c2, b2] = nodal_forces(other, far);
     for axis in 0..4 {
@@ -388,13 +361,27 @@ fn scatter_pair<R: Real>([one, other]: &[Part<R>; 2], places: [Place<'_>; 2], fo
         b[axis] = b[axis] + b2[axis];
         c[axis] = c[axis] + c2[axis];
     }
-    let rows = [p, a, b, c, q];
-    let (nodes, apart) = (near.block.nodes(), far.block.nodes());
-    match (force.all_of(nodes), force.all_of(apart)) {
-        (Some(nodes), Some(apart)) => force.add_five([nodes, apart], near.first, rows),
-        _ => {
-            let [p, a, b, c] = nodes;
-            force.add_some([p, a, b, c, &apart[0]], near.first, rows);
-        }
+    add_rows(nodes_of_pair([near.block, far.block]), near.first, [p, a, b, c, q], force);
+}
+
+/// The nodes of blocks of pairs: `p`, `a`, `b`, `c`, `q` of `(p, a, b, c)` and `(q, a, c, b)`.
+#[inline(always)]
+fn nodes_of_pair([one, other]: [&ElementBlock; 2]) -> [&[u32; BLOCK]; 5] {
+    let ([p, a, b, c], [q, ..]) = (one.nodes(), other.nodes());
+    [p, a, b, c, q]
+}
+
+/// Adds to the nodes that are there.
+#[inline(always)]
+fn add_rows<R: Real, const N: usize>(
+    nodes: [&[u32; BLOCK]; N],
+    first: usize,
+    rows: [[R; 4]; N],
+    force: &mut Scatter<'_>,
+) {
+    match force.all_of::<R, N>(nodes) {
+        Some(nodes) => force.add_corners(&nodes, first, rows),
+        // Elements between the nodes of two threads.
+        None => force.add_some(nodes, first, rows),
     }
 }

@@ -6,7 +6,7 @@ use core::ops::{Add, Mul, Sub};
 
 use bytemuck::{Pod, must_cast_slice, must_cast_slice_mut};
 
-use crate::lanes::{Kernel, Real, dispatch};
+use crate::lanes::{Kernel, Real, axes, dispatch};
 use crate::ledger::Ledger;
 use crate::loads::{Loads, ramp_factor};
 use crate::scene::NodeInertia;
@@ -199,12 +199,6 @@ impl<R: Real> Exact<R> {
         let next = self.keep * (self.carry * increment) + self.push * (inverse * force);
         inverse.choose(next, R::splat(0.0))
     }
-}
-
-/// Ones for the three axes, zero for what stands behind them.
-#[inline(always)]
-fn axes<R: Real>() -> R {
-    R::from_fn(|lane| if lane % 4 == 3 { 0.0 } else { 1.0 })
 }
 
 /// Sums over the nodes of an exact step.

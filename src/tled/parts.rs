@@ -62,8 +62,8 @@ impl<L: Law, H: Beside> Kernel for InternalForces<'_, L, H> {
         let Self { elements: Elements { laws, blocks, chunks: all }, chunks, displacement, .. } = self;
         let (mut force, mut beside) = (self.force, self.beside);
         let mut extremes = Extremes::<Pair<R>>::none();
-        for touching in all.touching(chunks) {
-            let blocks = blocks.get(touching).unwrap_or_default();
+        for (touching, paired) in all.touching(chunks) {
+            let blocks = (blocks.get(touching).unwrap_or_default(), paired);
             add_forces::<R, L>(&laws, blocks, displacement, &mut force, &mut beside, &mut extremes);
         }
         Extremes::none().with_lanes(&extremes)
@@ -124,7 +124,9 @@ impl<L: Law> Forcing<'_, L> {
     ) {
         let Part { chunks, force, own, found, extremes } = part;
         let all = self.elements.chunks;
-        self.external(all.nodes(chunks), force);
+        let nodes = all.nodes(chunks);
+        let inertia = self.inertia.get(nodes.clone()).unwrap_or_default();
+        external_forces(force, nodes.start, inertia, self.loads, self.time);
         let (elements, displacement) = (self.elements, self.displacement);
         let mine = chunks.clone();
         *extremes = L::forces(InternalForces::of_chunks(elements, mine, displacement, force, Nothing));
@@ -134,17 +136,6 @@ impl<L: Law> Forcing<'_, L> {
             let count = nodes.len();
             *found = then(nodes, take(&mut force, count), take(&mut own, count));
         }
-    }
-
-    /// Gravity and nodal forces.
-    fn external(&self, nodes: Range<usize>, force: &mut [NodeVector]) {
-        external_forces(
-            force,
-            nodes.start,
-            self.inertia.get(nodes).unwrap_or_default(),
-            self.loads,
-            self.time,
-        );
     }
 }
 
