@@ -8,8 +8,8 @@
 
 use core::ops::Range;
 
+use crate::chains::{Chain, LONGEST, Numbered, chains};
 use crate::lanes::BLOCK;
-use crate::pairs::{Numbered, Unit, units};
 use crate::threads::MOST_PARTS;
 
 /// Most chunks of a scene: 1, 2, 3, 4, 6, 8, 12 or 24 threads have equal shares.
@@ -40,8 +40,8 @@ pub(crate) const fn most_blocks(elements: usize) -> usize {
 }
 
 /// What blocks hold of a chunk's elements, in their order: those within it, and those that reach out of it into later chunks;
-/// of each first pairs that fill blocks, then the others one by one.
-const KINDS: usize = 4;
+/// of each first the longest chains that fill blocks, one block for each element of a chain, then shorter ones.
+const KINDS: usize = 2 * LONGEST;
 
 /// Where the chunks of a scene begin and end.
 #[derive(Clone, Copy, Debug)]
@@ -60,10 +60,10 @@ impl Chunks {
     pub(crate) const NONE: Self =
         Self { count: 0, size: TOGETHER, nodes: 0, ends: [0; KINDS * MAX_CHUNKS], reach: [0; MAX_CHUNKS] };
 
-    /// Pairs and single elements; those of a pair are in the same group.
-    pub(crate) fn units(&self, elements: impl Iterator<Item = Numbered>) -> impl Iterator<Item = Unit> {
+    /// All elements in chains; those of a chain are in the same group.
+    pub(crate) fn chains(&self, elements: impl Iterator<Item = Numbered>) -> impl Iterator<Item = Chain> {
         let chunks = *self;
-        units(elements, move |nodes| chunks.span(nodes))
+        chains(elements, move |nodes| chunks.span(nodes))
     }
 
     /// First and last chunk of an element's nodes.
@@ -94,14 +94,14 @@ impl Chunks {
         start(chunks.start)..start(chunks.end)
     }
 
-    /// The blocks with all elements that touch chunks, in their order, and some that do not; and whether they hold pairs.
-    pub(crate) fn touching(&self, chunks: Range<usize>) -> impl Iterator<Item = (Range<usize>, bool)> {
+    /// The blocks with all elements that touch chunks, in their order, and some that do not; and how long the chains in them are.
+    pub(crate) fn touching(&self, chunks: Range<usize>) -> impl Iterator<Item = (Range<usize>, usize)> {
         let before = (0..chunks.start).filter(move |&chunk| {
             self.reach.get(chunk).is_some_and(|&reach| usize::from(reach) >= chunks.start)
         });
-        let reaching = before.flat_map(|chunk| KINDS * chunk + KINDS / 2..KINDS * (chunk + 1));
+        let reaching = before.flat_map(|chunk| KINDS * chunk + LONGEST..KINDS * (chunk + 1));
         let own = KINDS * chunks.start..KINDS * chunks.end;
-        reaching.chain(own).map(|kind| (self.start(kind)..self.start(kind + 1), kind % 2 == 0))
+        reaching.chain(own).map(|kind| (self.start(kind)..self.start(kind + 1), LONGEST - kind % LONGEST))
     }
 
     /// Blocks of all elements.
@@ -122,20 +122,21 @@ pub(crate) struct Seats {
     groups: [[Group; 2]; MAX_CHUNKS],
 }
 
-/// Elements of one group: first pairs that fill blocks, then single elements, among them what is left of the pairs.
+/// Chains of one group, by their length, the longest first, and how many have been given places.
 #[derive(Clone, Copy, Default)]
 struct Group {
-    pairs: usize,
-    singles: usize,
-    taken_pairs: usize,
-    taken_singles: usize,
+    chains: [usize; LONGEST],
+    taken: [usize; LONGEST],
 }
 
 impl Group {
-    /// Rows of blocks with pairs and of blocks with single elements.
-    const fn rows(&self) -> (usize, usize) {
-        let pairs = self.pairs / BLOCK;
-        (pairs, (self.singles + 2 * (self.pairs - pairs * BLOCK)).div_ceil(BLOCK))
+    /// Rows of blocks for each length: of chains that fill them, and in the end of single elements, among them what is left
+    /// of chains.
+    fn rows(&self) -> [usize; LONGEST] {
+        let [threes, twos, ones] = self.chains;
+        let (three_rows, threes) = (threes / BLOCK, threes % BLOCK);
+        let (two_rows, twos) = ((twos + threes) / BLOCK, (twos + threes) % BLOCK);
+        [three_rows, two_rows, (ones + threes + 2 * twos).div_ceil(BLOCK)]
     }
 }
 
@@ -149,32 +150,29 @@ fn next_place(taken: &mut usize, rows: usize) -> (usize, usize) {
 }
 
 impl Seats {
-    /// For the units that the elements of a scene make.
+    /// For the chains that the elements of a scene make.
     pub(crate) fn of(nodes: usize, elements: impl Iterator<Item = Numbered> + Clone) -> Self {
         let count = chunks_for(elements.clone().count());
         let size = nodes.div_ceil(count).next_multiple_of(TOGETHER);
         let chunks = Chunks { count, size, nodes, ..Chunks::NONE };
         let mut seats = Self { chunks, groups: [[Group::default(); 2]; MAX_CHUNKS] };
-        for unit in chunks.units(elements) {
-            let (first, last) = chunks.span(unit.nodes());
-            if let Some((_, group)) = seats.group(unit) {
-                match unit {
-                    Unit::One(_) => group.singles += 1,
-                    Unit::Two(_) => group.pairs += 1,
-                }
+        for chain in chunks.chains(elements) {
+            let length = chain.elements().len();
+            let Some((_, (first, last), group)) = seats.group(&chain) else { continue };
+            if let Some(count) = group.chains.get_mut(LONGEST - length) {
+                *count += 1;
             }
             if let Some(reach) = seats.chunks.reach.get_mut(first) {
                 *reach = (*reach).max(last as u8);
             }
         }
         let mut end = 0;
-        for (ends, group) in
-            seats.chunks.ends.as_chunks_mut::<2>().0.iter_mut().zip(seats.groups.as_flattened())
-        {
-            let (pairs, singles) = group.rows();
-            let after_pairs = end + 2 * pairs as u32;
-            end = after_pairs + singles as u32;
-            *ends = [after_pairs, end];
+        let ends = seats.chunks.ends.as_chunks_mut::<LONGEST>().0;
+        for (ends, group) in ends.iter_mut().zip(seats.groups.as_flattened()) {
+            for ((place, rows), length) in ends.iter_mut().zip(group.rows()).zip((1..=LONGEST).rev()) {
+                end += (rows * length) as u32;
+                *place = end;
+            }
         }
         seats
     }
@@ -184,30 +182,30 @@ impl Seats {
         &self.chunks
     }
 
-    /// The group of a unit, with its number.
-    fn group(&mut self, unit: Unit) -> Option<(usize, &mut Group)> {
-        let (first, last) = self.chunks.span(unit.nodes());
+    /// The group of a chain, with its number and with the first and the last chunk of its nodes.
+    fn group(&mut self, chain: &Chain) -> Option<(usize, (usize, usize), &mut Group)> {
+        let (first, last) = self.chunks.span(chain.elements().first()?.nodes);
         let number = 2 * first + usize::from(last > first);
-        self.groups.as_flattened_mut().get_mut(number).map(|group| (number, group))
+        self.groups.as_flattened_mut().get_mut(number).map(|group| (number, (first, last), group))
     }
 
-    /// Hands the elements of the next unit to their places, block and lane.
-    pub(crate) fn place(&mut self, unit: Unit, mut at: impl FnMut(Numbered, (usize, usize))) {
+    /// Hands the elements of the next chain to their places, block and lane.
+    pub(crate) fn place(&mut self, chain: &Chain, mut at: impl FnMut(Numbered, (usize, usize))) {
         let chunks = self.chunks;
-        let Some((number, group)) = self.group(unit) else { return };
-        let (pairs, singles) = group.rows();
-        match unit {
-            Unit::Two([one, other]) if group.taken_pairs < pairs * BLOCK => {
-                let (row, lane) = next_place(&mut group.taken_pairs, pairs);
-                let block = chunks.start(2 * number) + 2 * row;
-                at(one, (block, lane));
-                at(other, (block + 1, lane));
-            }
-            _ => {
-                for element in unit.elements() {
-                    let (row, lane) = next_place(&mut group.taken_singles, singles);
-                    at(element, (chunks.start(2 * number + 1) + row, lane));
-                }
+        let Some((number, _, group)) = self.group(chain) else { return };
+        let rows = group.rows();
+        let mut rest = chain.elements();
+        while !rest.is_empty() {
+            // As long a part of the chain as there is still a place for.
+            let kind = (LONGEST - rest.len()..LONGEST - 1)
+                .find(|&kind| group.taken[kind % LONGEST] < rows[kind % LONGEST] * BLOCK)
+                .unwrap_or(LONGEST - 1);
+            let Some((placed, others)) = rest.split_at_checked(LONGEST - kind) else { return };
+            rest = others;
+            let (row, lane) = next_place(&mut group.taken[kind % LONGEST], rows[kind % LONGEST]);
+            let block = chunks.start(LONGEST * number + kind) + row * placed.len();
+            for (beside, &element) in placed.iter().enumerate() {
+                at(element, (block + beside, lane));
             }
         }
     }
@@ -227,8 +225,8 @@ mod tests {
         let mut seats = Seats::of(nodes, numbered.clone());
         let chunks = *seats.chunks();
         let mut places = std::vec![(usize::MAX, 0); elements.len()];
-        for unit in chunks.units(numbered) {
-            seats.place(unit, |one, place| places[one.element] = place);
+        for chain in chunks.chains(numbered) {
+            seats.place(&chain, |one, place| places[one.element] = place);
         }
         (chunks, places)
     }

@@ -94,6 +94,7 @@
 #[cfg(any(feature = "std", test))]
 extern crate std;
 
+mod chains;
 mod chunks;
 pub mod frame;
 pub mod inertia;
@@ -104,7 +105,6 @@ pub mod material;
 pub mod mesh;
 pub mod mlp;
 pub mod numbering;
-mod pairs;
 pub mod scene;
 pub mod state;
 pub mod surrogate;

@@ -9,11 +9,11 @@ use core::fmt;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec4};
 
+use crate::chains::Numbered;
 use crate::chunks::{Chunks, Seats, most_blocks};
 use crate::lanes::{BLOCK, BlockNodes, Real};
 use crate::material::{Law, Laws, Material, releasable_energy};
 use crate::mesh::{Mesh, MeshError, gradients, volume};
-use crate::pairs::Numbered;
 use crate::symmetric::Symmetric;
 
 /// Coordinate axes, as a set.
@@ -454,8 +454,8 @@ where
         };
         blocks.fill(ElementBlock::EMPTY);
         let mut element_count = 0;
-        for unit in chunks.units(elements) {
-            seats.place(unit, |element, (block, lane)| {
+        for chain in chunks.chains(elements) {
+            seats.place(&chain, |element, (block, lane)| {
                 if let Some(block) = blocks.get_mut(block) {
                     write_element(block, lane, element, mesh.corners(element.nodes));
                     element_count += 1;

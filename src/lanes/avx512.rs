@@ -22,7 +22,7 @@ use super::avx2::Avx2;
 use super::functions::Bits;
 use super::int8_avx512::Bytes64;
 use super::register::{memory, same_methods};
-use super::{BLOCK, Real};
+use super::{BLOCK, Real, unrolled};
 
 /// See the module.
 #[derive(Clone, Copy)]
@@ -83,19 +83,18 @@ impl Real for Avx512 {
     }
     #[inline(always)]
     fn corners_to_rows<const N: usize>(corners: [[Self; 4]; N], mut row: impl FnMut(usize, usize, [f32; 4])) {
-        // A loop: `map` leaves the vectors in memory.
         let mut rows = [[[[0.0; 4]; 4]; 4]; N];
-        for corner in 0..N {
+        unrolled!(corner < N => {
             rows[corner] = quarters(corners[corner]);
-        }
+        });
         // As in `to_rows`.
         let corners = core::hint::black_box(&rows);
-        for corner in 0..N {
+        unrolled!(corner < N => {
             eight::<0>(&corners[corner], |lane, numbers| row(corner, lane, numbers));
-        }
-        for corner in 0..N {
+        });
+        unrolled!(corner < N => {
             eight::<8>(&corners[corner], |lane, numbers| row(corner, lane, numbers));
-        }
+        });
     }
     #[inline(always)]
     fn are_among<const N: usize>(rows: [&[u32; BLOCK]; N], first: u32, count: u32) -> bool {

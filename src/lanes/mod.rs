@@ -41,6 +41,22 @@ use core::ops::{Add, Mul, Neg, Sub};
 
 use int8::{Packed, Whole};
 
+/// The same statements for each number below one that the compiler knows, at most six: it leaves long ones in a loop, and
+/// the vectors that they handle in memory.
+macro_rules! unrolled {
+    ($number:ident < $count:ident => $statements:block) => {
+        unrolled!($number < $count => $statements; 0 1 2 3 4 5)
+    };
+    ($number:ident < $count:ident => $statements:block; $($each:literal)*) => {
+        const { assert!($count <= 6) };
+        $(if $each < $count {
+            let $number: usize = $each;
+            $statements
+        })*
+    };
+}
+pub(crate) use unrolled;
+
 /// Elements in one block of the scene's tables; every lane count divides it.
 pub const BLOCK: usize = 16;
 
@@ -68,9 +84,9 @@ pub trait Real:
     /// corner, then of the second and so on, then of the next eight. Sums must not depend on how wide a vector is.
     #[inline(always)]
     fn corners_to_rows<const N: usize>(corners: [[Self; 4]; N], mut row: impl FnMut(usize, usize, [f32; 4])) {
-        for (corner, columns) in corners.into_iter().enumerate() {
-            Self::to_rows(columns, |lane, numbers| row(corner, lane, numbers));
-        }
+        unrolled!(corner < N => {
+            Self::to_rows(corners[corner], |lane, numbers| row(corner, lane, numbers));
+        });
     }
     /// As many rows as there are lanes, in the order of lanes that takes the fewest instructions: lane [`Real::lane_of`] of the
     /// four takes the numbers of a row. Zeros if there are fewer.

@@ -3,8 +3,11 @@
 //! [`crate::material`]). Nodes 1, 2, 3 carry stored gradients; node 0 takes minus their sum, so the four
 //! forces of an element add up to zero and a translation gives exactly none.
 
+use core::ops::Range;
+
 use super::Status;
-use crate::lanes::{BLOCK, BlockNodes, Gather, Pair, Real, Scatter, dot};
+use crate::chains::{CORNERS, LONGEST};
+use crate::lanes::{BLOCK, BlockNodes, Gather, Pair, Real, Scatter, dot, unrolled};
 use crate::ledger::Ledger;
 use crate::material::{Invariants, J_FLOOR, Law, Laws, Local, response_operations};
 use crate::scene::ElementBlock;
@@ -59,16 +62,6 @@ impl<R: Real> Deformation<R> {
         let nodes = block.nodes_below::<R>(displacement.count()).unwrap_or(BlockNodes::NONE);
         let at = |corner: usize| displacement.read_lanes::<R, 4>(&nodes, corner, first);
         Self::of_moved(block, first, [at(0), at(1), at(2), at(3)])
-    }
-
-    /// Deformation of the elements in lanes `first..` of two blocks of pairs, which have three nodes in common.
-    #[inline(always)]
-    fn of_pair([one, other]: [&ElementBlock; 2], first: usize, displacement: Gather<'_>) -> [Self; 2] {
-        let nodes = BlockNodes::among::<R>(nodes_of_pair([one, other]), 0, displacement.count());
-        let nodes = nodes.unwrap_or(BlockNodes::NONE);
-        let at = |corner: usize| displacement.read_lanes::<R, 5>(&nodes, corner, first);
-        let [p, a, b, c, q] = [at(0), at(1), at(2), at(3), at(4)];
-        [Self::of_moved(one, first, [p, a, b, c]), Self::of_moved(other, first, [q, a, c, b])]
     }
 
     /// From the displacements of the corners.
@@ -191,9 +184,11 @@ impl Beside for Nothing {
     }
 }
 
-/// Elements side by side on their way through the passes of [`add_forces`].
+/// Elements side by side on their way through the passes of [`add_forces`]: lanes of a block, from `first` on.
 #[derive(Clone, Copy)]
-struct Part<R> {
+struct Part<'a, R> {
+    block: &'a ElementBlock,
+    first: usize,
     h: Matrix<R>,
     invariants: Invariants<R>,
     p1: R,
@@ -202,104 +197,110 @@ struct Part<R> {
     fourth: R,
 }
 
-impl<R: Real> Part<R> {
+impl<'a, R: Real> Part<'a, R> {
     #[inline(always)]
-    fn nothing() -> Self {
+    fn nothing(block: &'a ElementBlock) -> Self {
         let zero = R::splat(0.0);
-        Self {
-            h: [[zero; 3]; 3],
-            invariants: Invariants { i: zero, j: zero },
-            p1: zero,
-            s: zero,
-            fourth: zero,
-        }
+        let invariants = Invariants { i: zero, j: zero };
+        Self { block, first: 0, h: [[zero; 3]; 3], invariants, p1: zero, s: zero, fourth: zero }
     }
 }
 
 /// Vectors of elements that go through the passes together.
 const TOGETHER: usize = 8;
 
-/// Adds the internal forces of elements to `force`, with minus sign; `paired` if the blocks hold pairs ([`crate::pairs`]), one
-/// element in each of two. In three passes over a few vectors of elements: the law is a long chain of operations that wait
-/// for each other, and gets nothing else in between ([`Pair`]).
+/// Adds the internal forces of elements to `force`, with minus sign; the blocks hold chains of that `length`
+/// ([`crate::chains`]), one element of each in every block. In three passes over a few vectors of elements: the law is a
+/// sequence of operations that wait for each other, and gets nothing else in between ([`Pair`]).
 #[inline(always)]
 pub(crate) fn add_forces<R: Real, L: Law>(
     laws: &Laws<'_, L>,
-    (blocks, paired): (&[ElementBlock], bool),
+    (blocks, length): (&[ElementBlock], usize),
     displacement: Gather<'_>,
     force: &mut Scatter<'_>,
     beside: &mut impl Beside,
     extremes: &mut Extremes<Pair<R>>,
 ) {
-    let mut parts = [Part::<R>::nothing(); TOGETHER];
-    let vectors = BLOCK / R::COUNT;
-    for blocks in blocks.chunks((TOGETHER / vectors).max(2)) {
-        let Some(first) = blocks.first() else { continue };
-        // Vectors of a pair of blocks in turn.
-        let place = |vector: usize| {
-            let (block, part) = if paired {
-                (vector / 2 / vectors * 2 + vector % 2, vector / 2 % vectors)
-            } else {
-                (vector / vectors, vector % vectors)
-            };
-            Place { block: blocks.get(block).unwrap_or(first), first: part * R::COUNT }
-        };
-        let count = blocks.len() * vectors;
-        if paired {
-            for (pair, parts) in parts.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count / 2) {
-                let (near, far) = (place(2 * pair), place(2 * pair + 1));
-                let both = Deformation::<R>::of_pair([near.block, far.block], near.first, displacement);
-                for (part, deformation) in parts.iter_mut().zip(both) {
-                    (part.h, part.invariants) = (deformation.h, deformation.invariants);
-                }
-            }
-        } else {
-            for (vector, part) in parts.iter_mut().enumerate().take(count) {
-                let Place { block, first } = place(vector);
-                let deformation = Deformation::<R>::of_block(block, first, displacement);
-                (part.h, part.invariants) = (deformation.h, deformation.invariants);
-            }
+    let Some(first) = blocks.first() else { return };
+    let mut parts = [Part::<R>::nothing(first); TOGETHER];
+    let chains = blocks.len().checked_div(length).unwrap_or(0) * (BLOCK / R::COUNT);
+    let most = TOGETHER.checked_div(length).unwrap_or(TOGETHER).max(1);
+    for start in (0..chains).step_by(most) {
+        let chains = start..chains.min(start + most);
+        let count = length * chains.len();
+        match length {
+            3 => deform::<R, 3, 6>(blocks, chains, displacement, &mut parts),
+            2 => deform::<R, 2, 5>(blocks, chains, displacement, &mut parts),
+            _ => deform::<R, 1, 4>(blocks, chains, displacement, &mut parts),
         }
         // The last pair may be half empty: what was there before is computed once more, for nobody.
         for (pair, parts) in parts.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
-            let places = [place(2 * pair), place(2 * pair + 1)];
-            let locals = respond::<R, L>(laws, places, parts, extremes);
-            for ((place, part), local) in places.into_iter().zip(parts).zip(&locals).take(count - 2 * pair) {
-                look::<R, L>(laws, place, part, local, beside);
+            let locals = respond::<R, L>(laws, parts, extremes);
+            for (part, local) in parts.iter_mut().zip(&locals).take(count - 2 * pair) {
+                look::<R, L>(laws, part, local, beside);
             }
         }
-        if paired {
-            for (pair, parts) in parts.as_chunks::<2>().0.iter().enumerate().take(count / 2) {
-                scatter_pair(parts, [place(2 * pair), place(2 * pair + 1)], force);
-            }
-        } else {
-            for (vector, part) in parts.iter().enumerate().take(count) {
-                let place = place(vector);
-                add_rows(place.block.nodes(), place.first, nodal_forces(part, place), force);
-            }
+        let parts = parts.get(..count).unwrap_or_default();
+        match length {
+            3 => scatter::<R, 3, 6>(parts, force),
+            2 => scatter::<R, 2, 5>(parts, force),
+            _ => scatter::<R, 1, 4>(parts, force),
         }
     }
 }
 
-/// Elements side by side: lanes of a block, from `first` on.
-#[derive(Clone, Copy)]
-struct Place<'a> {
-    block: &'a ElementBlock,
-    first: usize,
+/// The nodes of chains of `K` elements: those of the first, and one of each that follows.
+#[inline(always)]
+fn nodes_of<const K: usize, const N: usize>(blocks: [&ElementBlock; K]) -> [&[u32; BLOCK]; N] {
+    let mut nodes = [blocks[0].nodes()[0]; N];
+    for node in 1..N {
+        nodes[node] = if node < 4 { blocks[0].nodes()[node] } else { blocks[(node - 3) % K].nodes()[0] };
+    }
+    nodes
+}
+
+/// The first pass: deformation of the elements of some chains of `K` elements with `N` nodes, none of those of blocks that
+/// name nodes that are not there.
+#[inline(always)]
+fn deform<'a, R: Real, const K: usize, const N: usize>(
+    blocks: &'a [ElementBlock],
+    chains: Range<usize>,
+    displacement: Gather<'_>,
+    parts: &mut [Part<'a, R>],
+) {
+    let (blocks, vectors) = (blocks.as_chunks::<K>().0, BLOCK / R::COUNT);
+    for (chain, parts) in chains.zip(parts.as_chunks_mut::<K>().0) {
+        let Some(blocks) = blocks.get(chain / vectors) else { return };
+        let first = chain % vectors * R::COUNT;
+        let nodes = BlockNodes::among::<R>(nodes_of(blocks.each_ref()), 0, displacement.count());
+        let nodes = nodes.unwrap_or(BlockNodes::<N>::NONE);
+        let mut moved = [[R::splat(0.0); 3]; N];
+        unrolled!(node < N => {
+            moved[node] = displacement.read_lanes::<R, N>(&nodes, node, first);
+        });
+        unrolled!(element < K => {
+            let [a, b, c, d] = CORNERS[element % LONGEST];
+            let corners = [moved[a % N], moved[b % N], moved[c % N], moved[d % N]];
+            let deformation = Deformation::of_moved(&blocks[element], first, corners);
+            let part = &mut parts[element];
+            (part.block, part.first) = (&blocks[element], first);
+            (part.h, part.invariants) = (deformation.h, deformation.invariants);
+        });
+    }
 }
 
 /// The second pass: the law.
 #[inline(always)]
 fn respond<R: Real, L: Law>(
     laws: &Laws<'_, L>,
-    places: [Place<'_>; 2],
-    [near, far]: &mut [Part<R>; 2],
+    parts: &mut [Part<'_, R>; 2],
     extremes: &mut Extremes<Pair<R>>,
 ) -> [Local<R>; 2] {
     let law = laws.widen::<Pair<R>>(|lane| {
-        let Place { block, first } = places[lane / R::COUNT % 2];
-        block.element(first + lane % R::COUNT)
+        let part = &parts[lane / R::COUNT % 2];
+        part.block.element(part.first + lane % R::COUNT)
     });
+    let [near, far] = parts;
     let invariants = Invariants {
         i: Pair(near.invariants.i, far.invariants.i),
         j: Pair(near.invariants.j, far.invariants.j),
@@ -317,19 +318,19 @@ fn respond<R: Real, L: Law>(
 #[inline(always)]
 fn look<R: Real, L: Law>(
     laws: &Laws<'_, L>,
-    Place { block, first }: Place<'_>,
-    part: &mut Part<R>,
+    part: &mut Part<'_, R>,
     local: &Local<R>,
     beside: &mut impl Beside,
 ) {
-    let law = laws.widen(|lane| block.element(first + lane));
+    let law = laws.widen(|lane| part.block.element(part.first + lane));
     let deformation = Deformation::with(part.h, part.invariants);
-    part.fourth = beside.see::<R, L>(&law, block, first, &deformation, local);
+    part.fourth = beside.see::<R, L>(&law, part.block, part.first, &deformation, local);
 }
 
 /// Nodal forces from the stress, with what else goes to the elements' nodes.
 #[inline(always)]
-fn nodal_forces<R: Real>(part: &Part<R>, Place { block, first }: Place<'_>) -> [[R; 4]; 4] {
+fn nodal_forces<R: Real>(part: &Part<'_, R>) -> [[R; 4]; 4] {
+    let Part { block, first, .. } = *part;
     let deformation = Deformation::with(part.h, part.invariants);
     let stress = deformation.stress(part.p1, part.s);
     let minus_volume = -block.volume::<R>(first);
@@ -351,37 +352,28 @@ fn nodal_forces<R: Real>(part: &Part<R>, Place { block, first }: Place<'_>) -> [
     ]
 }
 
-/// The third pass: forces to the nodes of pairs of elements.
+/// The third pass: forces to the nodes of chains of `K` elements with `N` nodes.
 #[inline(always)]
-fn scatter_pair<R: Real>([one, other]: &[Part<R>; 2], [near, far]: [Place<'_>; 2], force: &mut Scatter<'_>) {
-    let [p, mut a, mut b, mut c] = nodal_forces(one, near);
-    let [q, a2, c2, b2] = nodal_forces(other, far);
-    for axis in 0..4 {
-        a[axis] = a[axis] + a2[axis];
-        b[axis] = b[axis] + b2[axis];
-        c[axis] = c[axis] + c2[axis];
-    }
-    add_rows(nodes_of_pair([near.block, far.block]), near.first, [p, a, b, c, q], force);
-}
-
-/// The nodes of blocks of pairs: `p`, `a`, `b`, `c`, `q` of `(p, a, b, c)` and `(q, a, c, b)`.
-#[inline(always)]
-fn nodes_of_pair([one, other]: [&ElementBlock; 2]) -> [&[u32; BLOCK]; 5] {
-    let ([p, a, b, c], [q, ..]) = (one.nodes(), other.nodes());
-    [p, a, b, c, q]
-}
-
-/// Adds to the nodes that are there.
-#[inline(always)]
-fn add_rows<R: Real, const N: usize>(
-    nodes: [&[u32; BLOCK]; N],
-    first: usize,
-    rows: [[R; 4]; N],
-    force: &mut Scatter<'_>,
-) {
-    match force.all_of::<R, N>(nodes) {
-        Some(nodes) => force.add_corners(&nodes, first, rows),
-        // Elements between the nodes of two threads.
-        None => force.add_some(nodes, first, rows),
+fn scatter<R: Real, const K: usize, const N: usize>(parts: &[Part<'_, R>], force: &mut Scatter<'_>) {
+    for parts in parts.as_chunks::<K>().0 {
+        let mut rows = [[R::splat(0.0); 4]; N];
+        let mut blocks = [parts[0].block; K];
+        unrolled!(element < K => {
+            blocks[element] = parts[element].block;
+            let forces = nodal_forces(&parts[element]);
+            for corner in 0..4 {
+                let row = &mut rows[CORNERS[element % LONGEST][corner] % N];
+                for axis in 0..4 {
+                    let first = element == 0 || corner == 0;
+                    row[axis] = if first { forces[corner][axis] } else { row[axis] + forces[corner][axis] };
+                }
+            }
+        });
+        let (nodes, first) = (nodes_of(blocks), parts[0].first);
+        match force.all_of::<R, N>(nodes) {
+            Some(nodes) => force.add_corners(&nodes, first, rows),
+            // Elements between the nodes of two threads.
+            None => force.add_some(nodes, first, rows),
+        }
     }
 }

@@ -62,8 +62,8 @@ impl<L: Law, H: Beside> Kernel for InternalForces<'_, L, H> {
         let Self { elements: Elements { laws, blocks, chunks: all }, chunks, displacement, .. } = self;
         let (mut force, mut beside) = (self.force, self.beside);
         let mut extremes = Extremes::<Pair<R>>::none();
-        for (touching, paired) in all.touching(chunks) {
-            let blocks = (blocks.get(touching).unwrap_or_default(), paired);
+        for (touching, length) in all.touching(chunks) {
+            let blocks = (blocks.get(touching).unwrap_or_default(), length);
             add_forces::<R, L>(&laws, blocks, displacement, &mut force, &mut beside, &mut extremes);
         }
         Extremes::none().with_lanes(&extremes)
