@@ -94,7 +94,8 @@ def microseconds(run, rows, calls=30):
 def ours(program):
     """Medians that the bench prints, us."""
     text = subprocess.run([program, "--bench", "none"], check=True, capture_output=True, text=True).stdout
-    return {name: float(time) for name, time in re.findall(r"^(paper|compact): ([0-9.]+) us", text, re.MULTILINE)}
+    found = re.findall(r"^(paper|compact)( int8)?: ([0-9.]+) us", text, re.MULTILINE)
+    return {(name, bool(quantised)): float(time) for name, quantised, time in found}
 
 
 def main():
@@ -124,12 +125,14 @@ def main():
             for name, sessions in runs.items():
                 times = [microseconds(run, rows) for run in sessions]
                 print(f"{name}: ONNX Runtime float32 {times[0]:.0f} us, int8 {times[1]:.0f} us", end="")
-                if name in mine:
-                    print(f"; supple float32 {mine[name]:.0f} us", end="")
-                    ratios.setdefault(name, []).append(times[0] / mine[name])
+                if mine:
+                    own = [mine[name, quantised] for quantised in (False, True)]
+                    print(f"; supple float32 {own[0]:.0f} us, int8 {own[1]:.0f} us", end="")
+                    ratios.setdefault(name, []).append((times[0] / own[0], times[1] / own[1]))
                 print()
-        for name, values in ratios.items():
-            print(f"{name}: supple is {statistics.median(values):.2f} times as fast in float32")
+        for name, pairs in ratios.items():
+            plain, quantised = map(statistics.median, zip(*pairs))
+            print(f"{name}: supple is {plain:.2f} times as fast in float32, {quantised:.2f} times in int8")
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ use core::fmt;
 use core::ops::Range;
 
 use crate::loads::{Loads, ramp_factor};
-use crate::material::Material;
+use crate::material::{Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
 use crate::threads::{Alone, Threads};
@@ -304,14 +304,19 @@ where
     extremes.status(ledger, false)
 }
 
+/// Floating-point operations of the internal forces.
+#[must_use]
+pub fn element_operations<M: Material, N, B>(scene: &Scene<M, N, B>) -> u64 {
+    scene.element_count() as u64 * u64::from(element::operations::<M::Law>())
+}
+
 /// Floating-point operations of one step without loads, the same for every step.
 #[must_use]
 pub fn operations<M: Material, N, B>(scene: &Scene<M, N, B>) -> u64 {
     // Per node: twice the next increment of four components (3 each), kinetic energy and momentum (6 each),
     // the new position (1 each).
     const NODE: u64 = 4 * (2 * 3 + 6 + 1);
-    let element = u64::from(element::operations::<M::Law>());
-    scene.element_count() as u64 * element + scene.node_count() as u64 * NODE
+    element_operations(scene) + scene.node_count() as u64 * NODE
 }
 
 /// Puts the scene at the displacement (m) and velocity (m/s) that `at` gives for each node, at time zero.
@@ -359,6 +364,27 @@ where
     S: AsRef<[NodeVector]>,
 {
     energy::strain_energy(scene, state.displacement.as_ref())
+}
+
+/// Forces with which the elements act on the nodes at the state's displacements, N ([`State::forces`], until the next step).
+/// Returns whether the state has room for the scene.
+pub fn internal_forces<M, N, B, S>(scene: &Scene<M, N, B>, state: &mut State<S>) -> bool
+where
+    M: Material,
+    N: AsRef<[NodeInertia]>,
+    B: AsRef<[ElementBlock]>,
+    S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+{
+    let State { displacement, force, .. } = state;
+    let nodes = scene.node_count();
+    let (Some(displacement), Some(force)) =
+        (displacement.as_ref().get(..nodes), force.as_mut().get_mut(..nodes))
+    else {
+        return false;
+    };
+    force.fill(NodeVector::ZERO);
+    M::Law::forces(InternalForces::of(scene, displacement, force, Nothing));
+    true
 }
 
 /// Puts the nodes of motions where they belong at `time`.

@@ -132,10 +132,13 @@ pub fn displaced<M: Material>(scene: &HostScene<M>, u: &[[f32; 3]]) -> HostState
 /// too short to move anything.
 pub fn forces<M: Material>(scene: &HostScene<M>, u: &[[f32; 3]]) -> Vec<[f64; 3]> {
     let mut state = displaced(scene, u);
+    assert!(tled::internal_forces(scene, &mut state));
+    let forces = to_f64(state.forces());
     let step = Step::insist(1e-15, 0.0).unwrap();
     let status = tled::step(scene, &Loads::NONE, &mut state, &step);
     assert!(matches!(status, Status::Ok | Status::Limited { .. }), "{status:?}");
-    to_f64(state.forces())
+    assert_eq!(to_f64(state.forces()), forces, "not those of the step");
+    forces
 }
 
 /// Takes steps; a step that diverges fails the test.
