@@ -12,7 +12,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, place_of};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, corner_weights, place_of};
 use crate::lanes::{Real, write_rows};
 use crate::scene::NodeInertia;
 use crate::symmetric::Symmetric;
@@ -149,43 +149,41 @@ impl<R: Real> Corners<R> {
 pub(super) struct Home {
     cell: usize,
     pub(super) across: Option<usize>,
-    /// Along which axes each node is beyond the cell: one, else zero.
-    beyond: [[f32; 3]; 4],
+    /// Position of each node from the cell's lowest corner, in cells; and as fourth number one if the node is free, else zero.
+    nodes: [Vec4; 4],
 }
 
 impl Assembly<'_> {
     /// Where an element is, if it is in one or two cells and its nodes are wholly free or wholly held.
     #[inline(always)]
     pub(super) fn home(&self, nodes: &[usize; 4]) -> Option<Home> {
-        let (mut low, mut high) = ([u8::MAX; 3], [0; 3]);
-        let mut places = [[0; 3]; 4];
+        let (mut low, mut high) = (Vec4::splat(f32::MAX), Vec4::ZERO);
+        let mut places = [[Vec4::ZERO; 2]; 4];
         for (&node, place) in nodes.iter().zip(&mut places) {
             let (at, inertia) = (place_of(self.nodes, node)?, self.inertia.get(node)?);
-            let [x, y, z, _] = inertia.free().to_array();
-            if x != y || y != z {
-                return None;
-            }
-            *place = self.lattice.place_of(at.cell());
-            let within = at.within();
-            for axis in 0..3 {
-                // A node on the border of two cells is in both.
-                let least = place[axis];
-                let most = least.saturating_sub(u8::from(within[axis] <= 0.0));
-                low[axis] = if least < low[axis] { least } else { low[axis] };
-                high[axis] = if most > high[axis] { most } else { high[axis] };
-            }
+            let [x, y, z] = at.within();
+            let free = match inertia.free().cmpgt(Vec4::ZERO).bitmask() {
+                0 => 0.0,
+                0b111 => 1.0,
+                _ => return None,
+            };
+            let [i, j, k] = self.lattice.place_of(at.cell()).map(f32::from);
+            *place = [Vec4::new(i, j, k, 0.0), Vec4::new(x, y, z, free)];
+            // A node on the border of two cells is in both.
+            let [least, within] = *place;
+            let border = Vec4::select(within.cmple(Vec4::ZERO), Vec4::ONE, Vec4::ZERO);
+            low = low.min(least);
+            high = high.max(least - border);
         }
-        let mut across = None;
-        for axis in 0..3 {
-            if high[axis] > low[axis] {
-                if across.is_some() || high[axis] - low[axis] > 1 {
-                    return None;
-                }
-                across = Some(axis);
-            }
+        let span = high - low;
+        let more = span.cmpgt(Vec4::ZERO).bitmask() & 0b111;
+        if more.count_ones() > 1 || span.cmpgt(Vec4::ONE).any() {
+            return None;
         }
-        let beyond = places.map(|place| [0, 1, 2].map(|axis| f32::from(place[axis].wrapping_sub(low[axis]))));
-        Some(Home { cell: self.lattice.cell_number(low), across, beyond })
+        let across = if more == 0 { None } else { Some(more.trailing_zeros() as usize) };
+        let [i, j, k, _] = low.to_array().map(|along| along as u8);
+        let nodes = places.map(|[cell, within]| (cell - low) + within);
+        Some(Home { cell: self.lattice.cell_number([i, j, k]), across, nodes })
     }
 
     /// Adds the stiffness bound of an element to the sums of the cell that it is in, or of the two. Says whether it could.
@@ -194,20 +192,16 @@ impl Assembly<'_> {
         if R::COUNT != CORNERS {
             return false;
         }
-        let Some(Home { cell, across, beyond }) = self.home(&element.nodes) else {
+        let Some(Home { cell, across, nodes }) = self.home(&element.nodes) else {
             return false;
         };
         // Along the axis across, the layers of functions of two cells are numbered 0, 1, 2: `near` has 0 and 1, `far` 1
         // and 2.
         let (mut near, mut far) = ([R::splat(0.0); 3], [R::splat(0.0); 3]);
-        for ((&node, gradient), beyond) in element.nodes.iter().zip(&element.gradients).zip(beyond) {
-            let (Some(at), Some(inertia)) = (place_of(self.nodes, node), self.inertia.get(node)) else {
-                return false;
-            };
-            let free = inertia.free().x;
-            let weights = at.corner_weights::<R>(beyond, across);
+        for (place, gradient) in nodes.iter().zip(&element.gradients) {
+            let weights = corner_weights::<R>(*place, across);
             for axis in 0..3 {
-                let slope = R::splat(free * gradient[axis]);
+                let slope = R::splat(place.w * gradient[axis]);
                 near[axis] = near[axis] + weights[0] * slope;
                 if across.is_some() {
                     far[axis] = far[axis] + weights[1] * slope;

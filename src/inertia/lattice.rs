@@ -67,34 +67,31 @@ impl LatticeNode {
         [a * nz, b * nz, c * nz, d * nz, a * z, b * z, c * z, d * z]
     }
 
-    /// Weights of the functions at the corners of a cell, which the node is in or on the border of. With an axis
-    /// `across` it may also be in the next cell along that: first come the weights of the corners of `cell`, then those of
-    /// the next. `beyond` tells along which axes it is (one, else zero).
-    #[inline(always)]
-    pub(super) fn corner_weights<R: Real>(&self, beyond: [f32; 3], across: Option<usize>) -> [R; 2] {
-        let mut weights = [R::splat(1.0); 2];
-        let [x, y, z] = self.within;
-        let place = Vec4::new(x, y, z, 0.0) + Vec4::new(beyond[0], beyond[1], beyond[2], 0.0);
-        // Of the three layers of functions along each axis.
-        let first = (Vec4::ONE - place).max(Vec4::ZERO).to_array();
-        let third = (place - Vec4::ONE).max(Vec4::ZERO).to_array();
-        let second = (Vec4::ONE - (place - Vec4::ONE).abs()).to_array();
-        for axis in 0..3 {
-            let far = R::from_fn(|corner| if corner >> axis & 1 == 1 { 1.0 } else { 0.0 });
-            let near = R::from_fn(|corner| if corner >> axis & 1 == 1 { 0.0 } else { 1.0 });
-            let [first, second, third] = [first[axis], second[axis], third[axis]].map(R::splat);
-            let along = near * first + far * second;
-            weights[0] = weights[0] * along;
-            if across.is_some() {
-                let next = near * second + far * third;
-                weights[1] = weights[1] * if across == Some(axis) { next } else { along };
-            }
-        }
-        weights
-    }
-
     /// In the first cell.
     pub const EMPTY: Self = Self { within: [0.0; 3], node: 0, cell: 0, rank: 0 };
+}
+
+/// Weights of the functions at the corners of a cell for a node at `place`, in cells from its lowest corner. With an axis
+/// `across` it may also be in the next cell along that: first come the weights of the corners of the cell, then those of the
+/// next.
+#[inline(always)]
+pub(super) fn corner_weights<R: Real>(place: Vec4, across: Option<usize>) -> [R; 2] {
+    let mut weights = [R::splat(1.0); 2];
+    // Of the three layers of functions along each axis.
+    let first = (Vec4::ONE - place).max(Vec4::ZERO).to_array();
+    let third = (place - Vec4::ONE).max(Vec4::ZERO).to_array();
+    let second = (Vec4::ONE - (place - Vec4::ONE).abs()).to_array();
+    for axis in 0..3 {
+        let far = R::from_fn(|corner| if corner >> axis & 1 == 1 { 1.0 } else { 0.0 });
+        let [first, second, third] = [first[axis], second[axis], third[axis]].map(R::splat);
+        let along = far.choose(second, first);
+        weights[0] = weights[0] * along;
+        if across.is_some() {
+            let next = far.choose(third, second);
+            weights[1] = weights[1] * if across == Some(axis) { next } else { along };
+        }
+    }
+    weights
 }
 
 /// Where a node is.
