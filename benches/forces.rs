@@ -4,6 +4,7 @@
 //! tetrahedra medians of runs in turn, the share of the machine's peak as measured in between, and the share of the step.
 
 mod common {
+    #[allow(dead_code)] // This bench has bars, loads and supports of its own.
     pub(crate) mod bar;
     pub(crate) mod pairs;
     pub(crate) mod peak;

@@ -62,8 +62,8 @@ pub(super) fn inverse_cbrt<R: Bits>(x: R) -> R {
     let guess = x.as_number() * c(SCALE) + c(OFFSET);
     let mut y = guess.plus_shifted(0, 8);
     for _ in 0..2 {
-        let h = c(1.0) - x * y * y * y;
-        y = y + y * h * (c(1.0 / 3.0) + h * c(2.0 / 9.0));
+        let h = (x * y * y).fused(-y, c(1.0));
+        y = (y * h).fused(h.fused(c(2.0 / 9.0), c(1.0 / 3.0)), y);
     }
     y
 }
