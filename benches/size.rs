@@ -7,18 +7,19 @@
 mod common {
     #[allow(dead_code)] // This bench has loads and supports of its own.
     pub(crate) mod bar;
+    pub(crate) mod bent;
     pub(crate) mod pairs;
 }
 
-use common::bar::{self, BarScene, DAMPING, HostState};
+use common::bar;
+use common::bent::Bent;
 use common::pairs::{median, seconds};
 use supple::loads::Loads;
 use supple::material::Exponential;
 use supple::mesh::Bar;
 use supple::numbering::renumber;
-use supple::scene::Support;
 use supple::threads::Rayon;
-use supple::tled::{self, Step};
+use supple::tled;
 
 const SIZES: [[u32; 3]; 5] = [[8, 8, 17], [16, 16, 32], [20, 20, 42], [32, 32, 64], [44, 44, 88]];
 const ROUNDS: usize = 21;
@@ -61,31 +62,16 @@ impl Body {
     }
 }
 
-/// A bent body that swings.
+/// A bent body, and how many steps are timed at once.
 struct Run {
-    scene: BarScene<Exponential>,
-    state: HostState,
-    step: Step,
+    body: Bent<Exponential>,
     steps: usize,
 }
 
 impl Run {
     fn new(Body { points, tets }: &Body) -> Self {
-        let held = points.iter().enumerate().filter(|(_, point)| point[2] == 0.0);
-        let held: Vec<_> = held.map(|(node, _)| Support::fixed(node as u32)).collect();
-        let scene = bar::scene_of(bar::EXPONENTIAL, points, tets, &held);
-        let mut state = bar::state(points.len());
-        let critical = tled::critical_step(&scene, &mut state).expect("the bar has a critical step");
-        let step = Step::new(critical.seconds, DAMPING, critical).expect("that step");
-        // Bent from the start: in a body at rest the front of the first wave is so weak that numbers are denormal, and
-        // these are ten times as slow.
-        let bent = |node: usize| {
-            let [x, y, z] = points[node];
-            ([0.01 * z * y, 0.001 * (30.0 * x).sin() * z, -0.01 * z * x], [0.0; 3])
-        };
-        assert!(tled::start(&scene, &mut state, &step, bent));
         let steps = (100_000 / tets.len()).max(1);
-        Self { scene, state, step, steps }
+        Self { body: Bent::new(bar::EXPONENTIAL, points, tets), steps }
     }
 
     /// Seconds for a step.
@@ -94,8 +80,8 @@ impl Run {
         let time = seconds(|| {
             for _ in 0..self.steps {
                 let threads = Rayon { parts };
-                let (scene, state) = (&self.scene, &mut self.state);
-                bar::moved(tled::step_in_parts(scene, &loads, state, &self.step, &threads));
+                let Bent { scene, state, step } = &mut self.body;
+                bar::moved(tled::step_in_parts(scene, &loads, state, step, &threads));
             }
         });
         time / self.steps as f64

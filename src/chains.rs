@@ -13,7 +13,7 @@ pub(crate) const CORNERS: [[usize; 4]; LONGEST] = [[0, 1, 2, 3], [4, 1, 3, 2], [
 const WINDOW: usize = 32;
 
 /// An element with its number in the mesh; its nodes in an order of the same winding.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Numbered {
     pub(crate) element: usize,
     pub(crate) nodes: [u32; 4],
