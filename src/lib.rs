@@ -94,6 +94,8 @@
 #[cfg(any(feature = "std", test))]
 extern crate std;
 
+#[cfg(feature = "capi-neo-hookean")]
+mod capi;
 mod chains;
 mod chunks;
 pub mod frame;

@@ -137,6 +137,17 @@ impl<'a> Loads<'a> {
         Ok(Self { gravity, forces, motions, nodes: Some(nodes) })
     }
 
+    /// Loads that were checked one by one against a scene of so many nodes.
+    #[cfg(feature = "capi-neo-hookean")]
+    pub(crate) const fn checked(
+        gravity: [f32; 3],
+        forces: &'a [NodalForce],
+        motions: &'a [Motion],
+        nodes: usize,
+    ) -> Self {
+        Self { gravity, forces, motions, nodes: Some(nodes) }
+    }
+
     pub(crate) const fn nodes(&self) -> Option<usize> {
         self.nodes
     }
@@ -200,7 +211,7 @@ pub fn traction<'a>(
     })
 }
 
-fn check(
+pub(crate) fn check(
     kind: &'static str,
     index: usize,
     node: u32,

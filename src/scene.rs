@@ -295,11 +295,22 @@ pub struct Scene<M, N, B> {
     material: M,
     nodes: N,
     blocks: B,
+    built: Built,
+}
+
+/// What was found when a scene was built, apart from its tables.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Built {
     node_count: usize,
     element_count: usize,
     chunks: Chunks,
     mass: f64,
     releasable_energy: f64,
+}
+
+impl Built {
+    pub(crate) const NOTHING: Self =
+        Self { node_count: 0, element_count: 0, chunks: Chunks::NONE, mass: 0.0, releasable_energy: 0.0 };
 }
 
 /// A scene with room for `N` nodes and `B` blocks of elements ([`blocks_for`]), which may be a `static`.
@@ -315,16 +326,19 @@ impl<M, const N: usize, const B: usize> FixedScene<M, N, B> {
 impl<M, N, B> Scene<M, N, B> {
     /// An empty scene over the given storage.
     pub const fn over(material: M, nodes: N, blocks: B) -> Self {
-        Self {
-            material,
-            nodes,
-            blocks,
-            node_count: 0,
-            element_count: 0,
-            chunks: Chunks::NONE,
-            mass: 0.0,
-            releasable_energy: 0.0,
-        }
+        Self { material, nodes, blocks, built: Built::NOTHING }
+    }
+
+    /// A scene that was built before, over the storage that it was built in.
+    #[cfg(feature = "capi-neo-hookean")]
+    pub(crate) const fn again(material: M, nodes: N, blocks: B, built: Built) -> Self {
+        Self { material, nodes, blocks, built }
+    }
+
+    /// What was found when it was built.
+    #[cfg(feature = "capi-neo-hookean")]
+    pub(crate) const fn built(&self) -> &Built {
+        &self.built
     }
 
     /// The material.
@@ -335,24 +349,24 @@ impl<M, N, B> Scene<M, N, B> {
     /// Number of nodes.
     #[must_use]
     pub const fn node_count(&self) -> usize {
-        self.node_count
+        self.built.node_count
     }
 
     /// Number of elements that take part; those with four fixed nodes were left out.
     #[must_use]
     pub const fn element_count(&self) -> usize {
-        self.element_count
+        self.built.element_count
     }
 
     /// Total mass, kg.
     #[must_use]
     pub const fn mass(&self) -> f64 {
-        self.mass
+        self.built.mass
     }
 
     /// Energy that the material can release from rest, J; zero for the isochoric laws.
     pub(crate) const fn releasable_energy(&self) -> f64 {
-        self.releasable_energy
+        self.built.releasable_energy
     }
 }
 
@@ -360,18 +374,18 @@ impl<M: Material, N: AsRef<[NodeInertia]>, B: AsRef<[ElementBlock]>> Scene<M, N,
     /// Inertia of each node.
     #[inline(always)]
     pub(crate) fn inertia(&self) -> &[NodeInertia] {
-        self.nodes.as_ref().get(..self.node_count).unwrap_or_default()
+        self.nodes.as_ref().get(..self.built.node_count).unwrap_or_default()
     }
 
     /// Blocks of elements in use.
     #[inline(always)]
     pub(crate) fn blocks(&self) -> &[ElementBlock] {
-        self.blocks.as_ref().get(..self.chunks.blocks()).unwrap_or_default()
+        self.blocks.as_ref().get(..self.built.chunks.blocks()).unwrap_or_default()
     }
 
     /// What internal forces are computed from.
     pub(crate) fn elements(&self) -> Elements<'_, M::Law> {
-        Elements { laws: self.material.laws(), blocks: self.blocks(), chunks: &self.chunks }
+        Elements { laws: self.material.laws(), blocks: self.blocks(), chunks: &self.built.chunks }
     }
 
     /// Block and lane of each element, in the order of the tables.
@@ -413,23 +427,25 @@ where
     /// Builds the scene in place from a mesh and its supports; a node may be listed more than once.
     /// Allocates nothing. On an error the scene is empty.
     pub fn build(&mut self, mesh: &Mesh<'_>, supports: &[Support]) -> Result<(), BuildError> {
-        self.clear();
-        let built = self.fill(mesh, supports);
-        if built.is_err() {
-            self.clear();
-        }
-        built
+        self.build_from(mesh, supports.iter().copied())
     }
 
-    fn clear(&mut self) {
-        self.node_count = 0;
-        self.element_count = 0;
-        self.chunks = Chunks::NONE;
-        self.mass = 0.0;
-        self.releasable_energy = 0.0;
+    /// The same with supports from wherever they come.
+    pub(crate) fn build_from(
+        &mut self,
+        mesh: &Mesh<'_>,
+        supports: impl Iterator<Item = Support>,
+    ) -> Result<(), BuildError> {
+        self.built = Built::NOTHING;
+        self.built = self.fill(mesh, supports)?;
+        Ok(())
     }
 
-    fn fill(&mut self, mesh: &Mesh<'_>, supports: &[Support]) -> Result<(), BuildError> {
+    fn fill(
+        &mut self,
+        mesh: &Mesh<'_>,
+        supports: impl Iterator<Item = Support>,
+    ) -> Result<Built, BuildError> {
         let needed = mesh.points().len();
         let capacity = self.nodes.as_ref().len();
         let Some(nodes) = self.nodes.as_mut().get_mut(..needed) else {
@@ -495,12 +511,7 @@ where
                 _ => 0.0,
             });
         }
-        self.node_count = mesh.points().len();
-        self.element_count = element_count;
-        self.chunks = chunks;
-        self.mass = mass;
-        self.releasable_energy = releasable;
-        Ok(())
+        Ok(Built { node_count: nodes.len(), element_count, chunks, mass, releasable_energy: releasable })
     }
 }
 
@@ -511,9 +522,12 @@ const FREE: f32 = 0.0;
 const FIXED: f32 = 1.0;
 const MOVED: f32 = 2.0;
 
-fn mark_supports(nodes: &mut [NodeInertia], supports: &[Support]) -> Result<(), BuildError> {
+fn mark_supports(
+    nodes: &mut [NodeInertia],
+    supports: impl Iterator<Item = Support>,
+) -> Result<(), BuildError> {
     let count = nodes.len();
-    for (index, support) in supports.iter().enumerate() {
+    for (index, support) in supports.enumerate() {
         let Some(inertia) = nodes.get_mut(support.node as usize) else {
             return Err(BuildError::SupportNode { support: index, node: support.node, nodes: count });
         };

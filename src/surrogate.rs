@@ -23,6 +23,8 @@ use crate::frame::{Axes, Frame};
 use crate::lanes::{Kernel, NodeVector, Real, dispatch, dot};
 use crate::loads::Loads;
 use crate::material::Material;
+#[cfg(feature = "capi-neo-hookean")]
+use crate::mlp::Recipe;
 use crate::mlp::{ForceInput, MAX_INPUTS, Network, Scratch};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::State;
@@ -148,6 +150,50 @@ impl<'w, V> Surrogate<'w, V> {
     /// What the latest step found.
     pub const fn report(&self) -> &SurrogateReport {
         &self.report
+    }
+}
+
+#[cfg(feature = "capi-neo-hookean")]
+impl<'w> Surrogate<'w, ()> {
+    /// The same with storage for vertices.
+    pub(crate) fn with<'v>(&self, vertices: &'v mut [Vertex]) -> Surrogate<'w, &'v mut [Vertex]> {
+        let Self { network, step, report, .. } = *self;
+        Surrogate { network, vertices, step, report }
+    }
+
+    /// What it was trained on.
+    pub(crate) const fn recipe(&self) -> &Recipe<'w> {
+        self.network.recipe()
+    }
+
+    /// Multiplications and additions of one prediction.
+    pub(crate) fn multiply_adds(&self) -> usize {
+        self.network.multiply_adds()
+    }
+
+    pub(crate) const fn set_report(&mut self, report: SurrogateReport) {
+        self.report = report;
+    }
+}
+
+/// A lead by the exact step, one step of the network at a time, without memory of its own: until the network takes over
+/// nobody needs a vertex's next increment.
+#[cfg(feature = "capi-neo-hookean")]
+impl Vertex {
+    /// Keeps where the node is.
+    pub(crate) const fn remember(&mut self, displacement: NodeVector) {
+        self.next = displacement;
+    }
+
+    /// Turns the frame with the motion since, which is kept instead.
+    pub(crate) fn follow_since(&mut self, displacement: NodeVector) {
+        self.next = NodeVector((Vec4::from(displacement.0) - Vec4::from(self.next.0)).to_array());
+        self.frame.follow(self.next.to_array());
+    }
+
+    /// What is kept.
+    pub(crate) const fn kept(&self) -> NodeVector {
+        self.next
     }
 }
 

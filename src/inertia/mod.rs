@@ -197,6 +197,12 @@ pub struct Inertia<V, W, D> {
     vectors: V,
     places: W,
     dense: D,
+    core: Core,
+}
+
+/// What an inertia is apart from its storage.
+#[derive(Clone, Debug)]
+pub(crate) struct Core {
     nodes: usize,
     /// For [`damped_step`].
     damped: bool,
@@ -223,52 +229,46 @@ impl<V> MassScaling<V> {
 impl<V, W, D> Inertia<V, W, D> {
     /// Over the given storage; [`Inertia::prepare`] comes next.
     pub const fn over(vectors: V, places: W, dense: D) -> Self {
-        Self {
-            vectors,
-            places,
-            dense,
-            nodes: 0,
-            damped: false,
-            rough: Rough::NONE,
-            step: None,
-            lattice: Lattice::NONE,
-            refresh: Refresh::NEW,
-            scaling: Scaling { weight: 0.0, k: 0.0, reserve: 0.0, loss: 0.0, coarse_weight: 0.0 },
-            estimate: Estimate::NONE,
-            report: Report::NONE,
-        }
+        Self { vectors, places, dense, core: Core::NEW }
     }
 
     /// The same for [`damped_step`]: the lattice's motion follows the law to second order (`damper.rs`). Needs
     /// [`damped_vectors_for`] and [`damped_numbers_for`] as many.
     #[must_use]
     pub const fn damped(mut self) -> Self {
-        self.damped = true;
+        self.core.damped = true;
         self
     }
 
     /// What the latest step, or the preparation, found.
     pub const fn report(&self) -> &Report {
-        &self.report
+        self.core.report()
     }
 
     /// Cells of the lattice along each axis, zeros without one.
     #[must_use]
     pub const fn cells(&self) -> [u32; 3] {
-        self.lattice.cells()
+        self.core.lattice.cells()
     }
 
     /// Steps in which the inertia of a lattice is computed anew, evenly: those of 0.04 s, at least 16 and at most 64.
     #[must_use]
     pub const fn cycle(&self) -> u32 {
-        self.refresh.steps()
+        self.core.refresh.steps()
     }
 
     /// Functions of the lattice: those that support or body leave something to move.
     #[must_use]
     pub const fn functions(&self) -> usize {
-        self.lattice.functions()
+        self.core.lattice.functions()
     }
+}
+
+/// The storage of an inertia.
+pub(crate) struct Storage<'a> {
+    pub(crate) vectors: &'a mut [NodeVector],
+    pub(crate) places: &'a mut [LatticeNode],
+    pub(crate) dense: &'a mut [f32],
 }
 
 /// The largest near-cubic lattice whose cost stays a small part of the step's: with `n = 3` unknowns a function, `n^3` at
@@ -359,6 +359,50 @@ where
         B: AsRef<[ElementBlock]>,
         S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
     {
+        let Self { vectors, places, dense, core } = self;
+        let storage = Storage { vectors: vectors.as_mut(), places: places.as_mut(), dense: dense.as_mut() };
+        core.prepare(scene, points, state, step, cells, storage)
+    }
+}
+
+impl Core {
+    pub(crate) const NEW: Self = Self {
+        nodes: 0,
+        damped: false,
+        rough: Rough::NONE,
+        step: None,
+        lattice: Lattice::NONE,
+        refresh: Refresh::NEW,
+        scaling: Scaling { weight: 0.0, k: 0.0, reserve: 0.0, loss: 0.0, coarse_weight: 0.0 },
+        estimate: Estimate::NONE,
+        report: Report::NONE,
+    };
+
+    /// Of [`Inertia::damped`].
+    #[cfg(feature = "capi-neo-hookean")]
+    pub(crate) const DAMPED: Self = Self { damped: true, ..Self::NEW };
+
+    pub(crate) const fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// [`Inertia::prepare`].
+    pub(crate) fn prepare<M, N, B, S>(
+        &mut self,
+        scene: &Scene<M, N, B>,
+        points: &[[f32; 3]],
+        state: &mut State<S>,
+        step: Step,
+        cells: [u32; 3],
+        storage: Storage<'_>,
+    ) -> Result<(), InertiaError>
+    where
+        M: Material,
+        N: AsRef<[NodeInertia]>,
+        B: AsRef<[ElementBlock]>,
+        S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+    {
+        let Storage { vectors: all, places, dense } = storage;
         self.step = None;
         let nodes = scene.node_count();
         if points.len() != nodes {
@@ -368,15 +412,15 @@ where
             if capacity < needed { Err(InertiaError::Capacity { kind, needed, capacity }) } else { Ok(()) }
         };
         let vectors = if self.damped { damped_vectors_for } else { vectors_for };
-        room("vectors", vectors(nodes), self.vectors.as_ref().len())?;
+        room("vectors", vectors(nodes), all.len())?;
         room("nodes in the state", nodes, state.capacity())?;
         self.lattice =
             if cells == [0; 3] { Lattice::NONE } else { Lattice::new(cells, points, scene.inertia())? };
         let functions = self.lattice.functions();
         if functions > 0 {
-            room("lattice nodes", nodes, self.places.as_ref().len())?;
+            room("lattice nodes", nodes, places.len())?;
             let numbers = if self.damped { damped_numbers_for } else { numbers_for };
-            room("numbers", numbers(cells, functions), self.dense.as_ref().len())?;
+            room("numbers", numbers(cells, functions), dense.len())?;
         }
 
         let (dt, damping) = (step.seconds(), step.damping());
@@ -391,7 +435,7 @@ where
             loss: 2.0 * damping * dt * cycle as f32,
             coarse_weight: 0.25 * COARSE * dt * dt,
         };
-        let Some(mut tables) = NodeTables::split(self.vectors.as_mut(), nodes) else {
+        let Some(mut tables) = NodeTables::split(all, nodes) else {
             return Ok(());
         };
         write_heights(scene, &mut tables);
@@ -407,15 +451,14 @@ where
         for (node, (&point, inertia)) in points.iter().zip(scene.inertia()).enumerate() {
             let place = turning.place(point);
             tables.set_frame(node, turning.frame(&place, inertia));
-            if let Some(to) = self.places.as_mut().get_mut(node).filter(|_| !alone) {
+            if let Some(to) = places.get_mut(node).filter(|_| !alone) {
                 *to = place;
             }
         }
-        if let Some(places) = self.places.as_mut().get_mut(..nodes).filter(|_| !alone) {
+        if let Some(places) = places.get_mut(..nodes).filter(|_| !alone) {
             lattice::order(places);
         }
-        let Some(mut matrices) = Matrices::split(self.dense.as_mut(), &self.lattice, self.damped && !alone)
-        else {
+        let Some(mut matrices) = Matrices::split(dense, &self.lattice, self.damped && !alone) else {
             return Ok(());
         };
         let sources = Sources {
@@ -423,7 +466,7 @@ where
             displacement,
             increment,
             lattice: &self.lattice,
-            places: self.places.as_ref(),
+            places,
             scaling: &self.scaling,
         };
         self.refresh.complete(sources, &mut tables, &mut matrices);
@@ -437,9 +480,7 @@ where
             return Err(InertiaError::NotFinite { node: node as u32 });
         }
         self.nodes = nodes;
-        if let Some(tables) = NodeTables::split(self.vectors.as_mut(), nodes) {
-            tables.rough.fill(NodeVector::ZERO);
-        }
+        tables.rough.fill(NodeVector::ZERO);
         self.rough = Rough::NONE;
         self.estimate = Estimate::NONE;
         self.step = Some(step);

@@ -21,7 +21,7 @@ use super::matrices::{DampedMatrices, Matrices, thirds};
 use super::passes::{Alone, Calm, Follow, Given, Prepare, Settle, turns};
 use super::refresh::{Refresh, Sources, from_numbers, to_numbers};
 use super::vectors::NodeTables;
-use super::{COARSE_GROWTH, Inertia, LARGEST_KICK};
+use super::{COARSE_GROWTH, Core, Inertia, LARGEST_KICK, Storage};
 
 /// More of all nodes' inverse inertia unused than this, or less of the lattice's motion used, makes a step
 /// [`Status::Limited`].
@@ -65,114 +65,125 @@ where
     W: AsRef<[LatticeNode]> + AsMut<[LatticeNode]>,
     D: AsRef<[f32]> + AsMut<[f32]>,
 {
-    let nodes = scene.node_count();
-    let room = state.capacity();
-    let mismatch = Status::Mismatch { nodes, room: if room < inertia.nodes { room } else { inertia.nodes } };
-    let Inertia {
-        vectors,
-        places,
-        dense,
-        step,
-        lattice,
-        refresh,
-        scaling,
-        estimate,
-        report,
-        nodes: prepared,
-        damped,
-        rough,
-    } = inertia;
-    let State { displacement, increment, force, time, steps, dt, ledger } = state;
-    let (Some(step), Some(displacement), Some(increment), Some(force), Some(mut tables)) = (
-        step.filter(|_| *prepared == nodes),
-        displacement.as_mut().get_mut(..nodes),
-        increment.as_mut().get_mut(..nodes),
-        force.as_mut().get_mut(..nodes),
-        NodeTables::split(vectors.as_mut(), nodes),
-    ) else {
-        return mismatch;
-    };
-    if nodes == 0 || loads.nodes().is_some_and(|checked| checked != nodes) {
-        return mismatch;
-    }
-    let step = step.carried_from(*dt);
-    let nodal = scene.inertia();
-    let mut account = *ledger;
-    if *steps == 0 {
-        account.start = account.start.max(scene.releasable_energy());
-    }
+    let Inertia { vectors, places, dense, core } = inertia;
+    let storage = Storage { vectors: vectors.as_mut(), places: places.as_mut(), dense: dense.as_mut() };
+    core.step(scene, loads, state, storage, damper)
+}
 
-    external_forces(force, 0, nodal, loads, *time);
-    let external = dot(force, displacement);
-    let functions = lattice.functions();
-    let no_lattice = functions == 0;
-    let extremes = M::Law::forces_and_bounds(InternalForces::of(scene, displacement, force, ScalarBeside));
-
-    let places = if no_lattice { &[] } else { places.as_ref().get(..nodes).unwrap_or_default() };
-    let Some(mut matrices) = Matrices::split(dense.as_mut(), lattice, *damped && lattice.functions() > 0)
-    else {
-        return mismatch;
-    };
-    let mut coarse_share = 1.0;
-    // Without a lattice there is nothing to tell rough from smooth by.
-    let damper = damper.filter(|_| refresh.lattice_in_use && !no_lattice);
-    let damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
-    refresh.look(displacement, *steps);
-    let turns = &turns(&refresh.frames.of_bounds, refresh.frames.functions());
-    let given = Given { step: &step, scaling, inertia: nodal, displacement, increment, places };
-    let (brake, tables) = (refresh.brake, &mut tables);
-    let (held_back, totals, defects, found);
-    if no_lattice {
-        (held_back, totals, defects) = Alone { given, brake, turns, force, tables }.dispatched();
-        found = Rough::NONE;
-    } else {
-        let cells = &mut *matrices.cells;
-        let momentum = matrices.damped.as_mut().map(|damped| &mut *damped.momentum);
-        let growth;
-        (held_back, growth) = Prepare { given, brake, turns, force, tables, cells, momentum }.dispatched();
-        if growth > COARSE_GROWTH {
-            coarse_share = COARSE_GROWTH / growth;
+impl Core {
+    /// [`damped_step`].
+    pub(crate) fn step<M, N, B, S>(
+        &mut self,
+        scene: &Scene<M, N, B>,
+        loads: &Loads<'_>,
+        state: &mut State<S>,
+        storage: Storage<'_>,
+        damper: Option<&Damper<'_>>,
+    ) -> Status
+    where
+        M: Material,
+        N: AsRef<[NodeInertia]>,
+        B: AsRef<[ElementBlock]>,
+        S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
+    {
+        let nodes = scene.node_count();
+        let room = state.capacity();
+        let mismatch = Status::Mismatch { nodes, room: if room < self.nodes { room } else { self.nodes } };
+        let Storage { vectors, places, dense } = storage;
+        let Self { step, lattice, refresh, scaling, estimate, report, nodes: prepared, damped, rough } = self;
+        let State { displacement, increment, force, time, steps, dt, ledger } = state;
+        let (Some(step), Some(displacement), Some(increment), Some(force), Some(mut tables)) = (
+            step.filter(|_| *prepared == nodes),
+            displacement.as_mut().get_mut(..nodes),
+            increment.as_mut().get_mut(..nodes),
+            force.as_mut().get_mut(..nodes),
+            NodeTables::split(vectors, nodes),
+        ) else {
+            return mismatch;
+        };
+        if nodes == 0 || loads.nodes().is_some_and(|checked| checked != nodes) {
+            return mismatch;
         }
-        coarse_share = coarse_motion(&mut matrices, lattice, coarse_share, refresh);
-        let cells = &*matrices.cells;
-        let damped = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use);
-        let smooth = damped.and_then(|damped| smooth_motion(damped, lattice, increment));
-        let damped = smooth.map(|smooth| Calm { smooth, share: damping });
-        (totals, defects, found) = Settle { given, cells, damped, force, tables }.dispatched();
-    }
-
-    let tables_next: &[NodeVector] = tables.next;
-    let next = |node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector| {
-        let [x, y, z, _] = tables_next.get(node).copied().unwrap_or_default().0;
-        [x, y, z, 0.0]
-    };
-    let entry = Entry::of_totals(&totals, loads, &step)
-        .with_forces(loads, nodal, increment, force, *time, next)
-        .with_motions(loads, displacement, increment, force, *time, &step);
-    let entered = match entry.entered(account, &step) {
-        Ok(entered) => entered,
-        Err(cause) => {
-            let node = culprit(nodal, increment, force, &step, next);
-            return Status::Diverged(Divergence { time: *time, node, cause });
+        let step = step.carried_from(*dt);
+        let nodal = scene.inertia();
+        let mut account = *ledger;
+        if *steps == 0 {
+            account.start = account.start.max(scene.releasable_energy());
         }
-    };
 
-    *ledger = entered;
-    *rough = found;
-    estimate.advance(&defects, external, nodes, scaling.k, step.seconds() * step.seconds());
-    Follow { next: tables.next, displacement, increment }.dispatched();
-    *dt = step.seconds();
-    *time += f64::from(step.seconds());
-    *steps += 1;
-    follow_motions(loads, displacement, increment, *time);
-    refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    refresh.share(coarse_share);
-    let sources = Sources { scene, displacement, increment, lattice, places, scaling };
-    refresh.advance(*steps, sources, tables, &mut matrices);
-    *report = refresh.published.report(held_back.nodes, coarse_share, estimate.error());
-    report.damping = damping;
-    let held = held_back.unused > MUCH_UNUSED * nodes as f32 || coarse_share < LITTLE_MOTION;
-    extremes.status(ledger, held)
+        external_forces(force, 0, nodal, loads, *time);
+        let external = dot(force, displacement);
+        let functions = lattice.functions();
+        let no_lattice = functions == 0;
+        let extremes =
+            M::Law::forces_and_bounds(InternalForces::of(scene, displacement, force, ScalarBeside));
+
+        let places = if no_lattice { &[] } else { places.get(..nodes).unwrap_or_default() };
+        let Some(mut matrices) = Matrices::split(dense, lattice, *damped && lattice.functions() > 0) else {
+            return mismatch;
+        };
+        let mut coarse_share = 1.0;
+        // Without a lattice there is nothing to tell rough from smooth by.
+        let damper = damper.filter(|_| refresh.lattice_in_use && !no_lattice);
+        let damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
+        refresh.look(displacement, *steps);
+        let turns = &turns(&refresh.frames.of_bounds, refresh.frames.functions());
+        let given = Given { step: &step, scaling, inertia: nodal, displacement, increment, places };
+        let (brake, tables) = (refresh.brake, &mut tables);
+        let (held_back, totals, defects, found);
+        if no_lattice {
+            (held_back, totals, defects) = Alone { given, brake, turns, force, tables }.dispatched();
+            found = Rough::NONE;
+        } else {
+            let cells = &mut *matrices.cells;
+            let momentum = matrices.damped.as_mut().map(|damped| &mut *damped.momentum);
+            let growth;
+            (held_back, growth) =
+                Prepare { given, brake, turns, force, tables, cells, momentum }.dispatched();
+            if growth > COARSE_GROWTH {
+                coarse_share = COARSE_GROWTH / growth;
+            }
+            coarse_share = coarse_motion(&mut matrices, lattice, coarse_share, refresh);
+            let cells = &*matrices.cells;
+            let damped = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use);
+            let smooth = damped.and_then(|damped| smooth_motion(damped, lattice, increment));
+            let damped = smooth.map(|smooth| Calm { smooth, share: damping });
+            (totals, defects, found) = Settle { given, cells, damped, force, tables }.dispatched();
+        }
+
+        let tables_next: &[NodeVector] = tables.next;
+        let next = |node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector| {
+            let [x, y, z, _] = tables_next.get(node).copied().unwrap_or_default().0;
+            [x, y, z, 0.0]
+        };
+        let entry = Entry::of_totals(&totals, loads, &step)
+            .with_forces(loads, nodal, increment, force, *time, next)
+            .with_motions(loads, displacement, increment, force, *time, &step);
+        let entered = match entry.entered(account, &step) {
+            Ok(entered) => entered,
+            Err(cause) => {
+                let node = culprit(nodal, increment, force, &step, next);
+                return Status::Diverged(Divergence { time: *time, node, cause });
+            }
+        };
+
+        *ledger = entered;
+        *rough = found;
+        estimate.advance(&defects, external, nodes, scaling.k, step.seconds() * step.seconds());
+        Follow { next: tables.next, displacement, increment }.dispatched();
+        *dt = step.seconds();
+        *time += f64::from(step.seconds());
+        *steps += 1;
+        follow_motions(loads, displacement, increment, *time);
+        refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+        refresh.share(coarse_share);
+        let sources = Sources { scene, displacement, increment, lattice, places, scaling };
+        refresh.advance(*steps, sources, tables, &mut matrices);
+        *report = refresh.published.report(held_back.nodes, coarse_share, estimate.error());
+        report.damping = damping;
+        let held = held_back.unused > MUCH_UNUSED * nodes as f32 || coarse_share < LITTLE_MOTION;
+        extremes.status(ledger, held)
+    }
 }
 
 /// How many times larger than the largest increment what is smooth of them may be: functions that are cut off by the body's

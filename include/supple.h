@@ -1,0 +1,1191 @@
+#ifndef SUPPLE_H
+#define SUPPLE_H
+
+/* Made by cbindgen from src/capi.rs: do not change it here. */
+
+#include <stddef.h>
+#include <stdint.h>
+
+/*
+ * supple moves soft tissue in real time. All objects live in memory of the host, at any address that is a
+ * multiple of SUPPLE_ALIGN: ask for the size (a function, or a constant expression for static memory), hand
+ * the memory to the function that prepares the object, use the pointer it gives back. Nothing is allocated,
+ * nothing needs to be released. Units are SI: m, kg, s, N, Pa, J. Nodes and elements count from zero.
+ *
+ * Every function checks its pointers and numbers before it changes anything and tells by its status. A
+ * pointer to an object must be NULL or lead to memory that belongs to the host; what it finds there tells
+ * whether it is such an object.
+ *
+ * Threads: a supple_scene may be used by any number of threads at once; every other object by one at a
+ * time. Different objects share nothing.
+ */
+
+/* Static memory for an object: SUPPLE_MEMORY(name, bytes); */
+#ifdef __cplusplus
+#define SUPPLE_MEMORY(name, bytes) alignas(SUPPLE_ALIGN) static unsigned char name[bytes]
+#else
+#define SUPPLE_MEMORY(name, bytes) static _Alignas(SUPPLE_ALIGN) unsigned char name[bytes]
+#endif
+
+/* What every configuration begins with: supple_step_config step = {SUPPLE_CONFIG(supple_step_config), 1e-4f, 0.0f}; */
+#define SUPPLE_CONFIG(type) (uint32_t)sizeof(type), SUPPLE_ABI
+
+/* Sizes as constant expressions, equal to those that the functions give. */
+#define SUPPLE_SCENE_SIZE(nodes, elements, tissues)                                                                    \
+    (SUPPLE_SCENE_FRONT + SUPPLE_ROUNDED_(16 * (size_t)(nodes)) + 1024 * SUPPLE_BLOCKS_((size_t)(elements)) +          \
+     SUPPLE_ROUNDED_(16 * (size_t)(tissues)) + ((tissues) > 1 ? SUPPLE_ROUNDED_(2 * (size_t)(elements)) : 0))
+#define SUPPLE_STATE_SIZE(nodes) (SUPPLE_STATE_FRONT + 3 * SUPPLE_ROUNDED_(16 * (size_t)(nodes)))
+#define SUPPLE_LOADS_SIZE(forces, motions)                                                                             \
+    (SUPPLE_LOADS_FRONT + SUPPLE_ROUNDED_(20 * (size_t)(forces)) + 2 * SUPPLE_ROUNDED_(24 * (size_t)(motions)))
+#define SUPPLE_LEARNED_SIZE(nodes, fallback)                                                                           \
+    (SUPPLE_LEARNED_FRONT + SUPPLE_ROUNDED_(48 * (size_t)(nodes)) +                                                    \
+     ((fallback) ? 2 * SUPPLE_ROUNDED_(16 * (size_t)(nodes)) : 0))
+/* For a lattice of x * y * z cells (zeros for SUPPLE_MASS_SCALED); the function's may be less, never more. */
+#define SUPPLE_LARGE_SIZE(nodes, method, x, y, z)                                                                      \
+    (SUPPLE_LARGE_FRONT + SUPPLE_ROUNDED_(((method) == SUPPLE_DAMPED ? 96 : 80) * (size_t)(nodes)) +                   \
+     ((method) == SUPPLE_MASS_SCALED                                                                                   \
+          ? 0                                                                                                          \
+          : SUPPLE_ROUNDED_(24 * (size_t)(nodes)) +                                                                    \
+                SUPPLE_ROUNDED_(4 * SUPPLE_NUMBERS_((method) == SUPPLE_DAMPED, (size_t)(x) * (y) * (z),                \
+                                                    SUPPLE_FUNCTIONS_(x, y, z)))))
+
+/* Parts of the above. */
+#define SUPPLE_ROUNDED_(bytes) (((bytes) + SUPPLE_ALIGN - 1) / SUPPLE_ALIGN * SUPPLE_ALIGN)
+#define SUPPLE_CHUNKS_(elements) ((elements) / 1536 < 1 ? 1 : (elements) / 1536 > 24 ? 24 : (elements) / 1536)
+#define SUPPLE_BLOCKS_(elements) (((elements) + 15) / 16 + 2 * SUPPLE_CHUNKS_(elements) - 2)
+#define SUPPLE_POINTS_(x, y, z) (((size_t)(x) + 1) * ((y) + 1) * ((z) + 1))
+#define SUPPLE_FUNCTIONS_(x, y, z)                                                                                     \
+    (SUPPLE_POINTS_(x, y, z) < SUPPLE_LATTICE_FUNCTIONS ? SUPPLE_POINTS_(x, y, z) : SUPPLE_LATTICE_FUNCTIONS)
+#define SUPPLE_STRIDE_(functions) ((3 * (functions) + 8) / 8 * 8)
+#define SUPPLE_THIRDS_(functions) (((functions) + 2) / 3)
+#define SUPPLE_NUMBERS_(damped, cells, functions)                                                                      \
+    (((damped) ? 64 + 576 : 32 + 576) * (cells) + ((damped) ? 7 : 4) * 3 * (functions)*SUPPLE_STRIDE_(functions) +     \
+     ((damped) ? 6 * SUPPLE_THIRDS_(functions) * SUPPLE_STRIDE_(SUPPLE_THIRDS_(functions)) : 0))
+
+
+/**
+ * Version of the interface: of structures, of functions' arguments, of what statuses mean. Put it into
+ * the field `abi` of every configuration; a library of another version refuses it.
+ */
+#define SUPPLE_ABI 1
+
+/**
+ * No node, element or axis.
+ */
+#define SUPPLE_NONE UINT32_MAX
+
+/**
+ * What the library was compiled for, without more.
+ */
+#define SUPPLE_LEVEL_PORTABLE 0
+
+/**
+ * x86-64 with AVX2 and FMA.
+ */
+#define SUPPLE_LEVEL_AVX2 1
+
+/**
+ * x86-64 with AVX-512 (F, BW, DQ, VL, VNNI).
+ */
+#define SUPPLE_LEVEL_AVX512 2
+
+/**
+ * 64-bit Arm.
+ */
+#define SUPPLE_LEVEL_NEON 3
+
+/**
+ * WebAssembly with simd128.
+ */
+#define SUPPLE_LEVEL_SIMD128 4
+
+/**
+ * The memory of every object begins at a multiple of so many bytes.
+ */
+#define SUPPLE_ALIGN 64
+
+/**
+ * Neo-Hookean, with the constants c and d, Pa.
+ */
+#define SUPPLE_NEO_HOOKEAN 0
+
+/**
+ * Exponential, with the constants a (Pa), b, and d (Pa).
+ */
+#define SUPPLE_EXPONENTIAL 1
+
+/**
+ * Elements must have positive volumes: (x1 - x0) . ((x2 - x0) x (x3 - x0)) > 0.
+ */
+#define SUPPLE_WINDING_CHECKED 0
+
+/**
+ * Elements are turned where needed.
+ */
+#define SUPPLE_WINDING_NORMALISED 1
+
+/**
+ * Bytes before the arrays of a scene.
+ */
+#define SUPPLE_SCENE_FRONT 768
+
+/**
+ * Bytes before the arrays of loads.
+ */
+#define SUPPLE_LOADS_FRONT 64
+
+/**
+ * Bytes before the arrays of a state.
+ */
+#define SUPPLE_STATE_FRONT 128
+
+/**
+ * Most parts of a step.
+ */
+#define SUPPLE_MOST_PARTS 8
+
+/**
+ * Bytes before the arrays of a learned step.
+ */
+#define SUPPLE_LEARNED_FRONT 2048
+
+/**
+ * Inertia is raised where the step would be unstable.
+ */
+#define SUPPLE_MASS_SCALED 0
+
+/**
+ * The same, and smooth motion keeps its true inertia through a coarse lattice.
+ */
+#define SUPPLE_MULTILEVEL 1
+
+/**
+ * The same, and a small network damps what the lattice does not carry. From 20 times the critical step on the most exact.
+ */
+#define SUPPLE_DAMPED 2
+
+/**
+ * Points that a lattice may have.
+ */
+#define SUPPLE_LATTICE_POINTS 1024
+
+/**
+ * Functions that a lattice may have.
+ */
+#define SUPPLE_LATTICE_FUNCTIONS 128
+
+/**
+ * Bytes before the arrays of large steps.
+ */
+#define SUPPLE_LARGE_FRONT 40960
+
+/**
+ * What became of a call. Zero: done. Positive: done, with a remark. Negative: not done, and nothing has changed, except
+ * that memory handed to a function that prepares an object in it holds no object if that fails. Numbers are never given
+ * another meaning.
+ */
+enum supple_status
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Done.
+     */
+    SUPPLE_OK = 0,
+    /**
+     * Steps were taken, but are not exact: elements are beyond the range of their law, there is more kinetic energy than
+     * loads and supports explain, or a large step held much of the motion back. The report tells which.
+     */
+    SUPPLE_LIMITED = 1,
+    /**
+     * Learned steps were taken, with more than one percent of the vertices outside what training has seen.
+     */
+    SUPPLE_OUTSIDE = 2,
+    /**
+     * A learned step was not to be believed and was undone; the exact step has taken over for good.
+     */
+    SUPPLE_FELL_BACK = 3,
+    /**
+     * A pointer that must not be NULL is.
+     */
+    SUPPLE_E_NULL = -1,
+    /**
+     * A pointer is not aligned: memory of objects to SUPPLE_ALIGN bytes, arrays to their numbers.
+     */
+    SUPPLE_E_MISALIGNED = -2,
+    /**
+     * Fewer bytes or numbers (value) than needed (limit).
+     */
+    SUPPLE_E_SHORT = -3,
+    /**
+     * struct_size or abi of a configuration (value) is not this library's (limit).
+     */
+    SUPPLE_E_ABI = -4,
+    /**
+     * The memory holds no object: it was never prepared, or the preparation failed.
+     */
+    SUPPLE_E_NOT_INITIALISED = -5,
+    /**
+     * The memory holds an object of another type.
+     */
+    SUPPLE_E_KIND = -6,
+    /**
+     * A number that stands for a choice (value) is none of the choices.
+     */
+    SUPPLE_E_CHOICE = -7,
+    /**
+     * Objects that do not belong together: for scenes with other numbers of nodes (value, limit).
+     */
+    SUPPLE_E_MISMATCH = -8,
+    /**
+     * More (value) than there is room for (limit).
+     */
+    SUPPLE_E_CAPACITY = -9,
+    /**
+     * Entry or element `index` names a node that is not there (node; limit: nodes).
+     */
+    SUPPLE_E_INDEX = -10,
+    /**
+     * Entry or node `index` has a number (value) that is NaN or infinite.
+     */
+    SUPPLE_E_NOT_FINITE = -11,
+    /**
+     * Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s).
+     */
+    SUPPLE_E_NEGATIVE = -12,
+    /**
+     * An array that is written overlaps the object that is read.
+     */
+    SUPPLE_E_OVERLAP = -13,
+    /**
+     * The mesh has no nodes or no elements.
+     */
+    SUPPLE_E_MESH_EMPTY = -20,
+    /**
+     * Element `index` names `node` twice.
+     */
+    SUPPLE_E_MESH_REPEATED_NODE = -21,
+    /**
+     * Element `index` is flat (value: volume, m^3).
+     */
+    SUPPLE_E_MESH_DEGENERATE = -22,
+    /**
+     * Element `index` has a negative volume (value, m^3) and winding is SUPPLE_WINDING_CHECKED.
+     */
+    SUPPLE_E_MESH_INVERTED = -23,
+    /**
+     * `node` belongs to no element.
+     */
+    SUPPLE_E_MESH_UNUSED_NODE = -24,
+    /**
+     * A constant of the law of element `index` (value) is not a finite positive number.
+     */
+    SUPPLE_E_CONSTANT = -25,
+    /**
+     * The density of element `index` (value, kg/m^3) is not a finite positive number.
+     */
+    SUPPLE_E_DENSITY = -26,
+    /**
+     * Element `index` is of a tissue that is not there.
+     */
+    SUPPLE_E_TISSUE = -27,
+    /**
+     * Every element has four fixed nodes.
+     */
+    SUPPLE_E_NOTHING_MOVES = -28,
+    /**
+     * The law (value) is not in this library.
+     */
+    SUPPLE_E_LAW = -29,
+    /**
+     * Motion `index` moves `node` along an axis on which no support that moves holds it.
+     */
+    SUPPLE_E_NOT_HELD = -30,
+    /**
+     * No step has been set: supple_set_step comes first.
+     */
+    SUPPLE_E_NO_STEP = -31,
+    /**
+     * The step (value, s) is not a finite positive number.
+     */
+    SUPPLE_E_STEP = -32,
+    /**
+     * The step (value, s) is above the critical step (limit, s), which `node` sets.
+     */
+    SUPPLE_E_UNSTABLE = -33,
+    /**
+     * Weights do not begin at a multiple of four bytes.
+     */
+    SUPPLE_E_WEIGHTS_MISALIGNED = -40,
+    /**
+     * Fewer bytes (value) than the weight file has (limit).
+     */
+    SUPPLE_E_WEIGHTS_SHORT = -41,
+    /**
+     * Not a weight file.
+     */
+    SUPPLE_E_NOT_WEIGHTS = -42,
+    /**
+     * A version of the weight format (value) that this library does not read.
+     */
+    SUPPLE_E_WEIGHTS_VERSION = -43,
+    /**
+     * The weights are damaged.
+     */
+    SUPPLE_E_WEIGHTS_CHECKSUM = -44,
+    /**
+     * A number in the weights (value; index: layer) is not one it can be.
+     */
+    SUPPLE_E_WEIGHTS_CONTENT = -45,
+    /**
+     * A network with other inputs (value) or outputs than are needed here.
+     */
+    SUPPLE_E_WEIGHTS_SHAPE = -46,
+    /**
+     * The exact step has not led up to this moment: supple_learned_lead comes first.
+     */
+    SUPPLE_E_NOT_LED = -50,
+    /**
+     * The network's step (value, s) is no whole number of the exact one (limit, s).
+     */
+    SUPPLE_E_STEP_RATIO = -51,
+    /**
+     * The damping (value, 1/s) is not that of the training (limit, 1/s).
+     */
+    SUPPLE_E_DAMPING = -52,
+    /**
+     * A lattice of impossible cells: each count at least 1, SUPPLE_LATTICE_POINTS points and SUPPLE_LATTICE_FUNCTIONS
+     * functions at most.
+     */
+    SUPPLE_E_LATTICE = -60,
+    /**
+     * The state is not finite, or so stiff at `node` that no step can be bounded.
+     */
+    SUPPLE_E_TOO_STIFF = -61,
+    /**
+     * Not a saved state.
+     */
+    SUPPLE_E_NOT_SAVED = -70,
+    /**
+     * A saved state of a version (value) that this library does not read.
+     */
+    SUPPLE_E_SAVED_VERSION = -71,
+    /**
+     * The saved state is damaged.
+     */
+    SUPPLE_E_SAVED_CHECKSUM = -72,
+    /**
+     * This processor does not have these instructions.
+     */
+    SUPPLE_E_LEVEL = -80,
+    /**
+     * The step was not taken: a displacement, first of `node`, would not be a finite number.
+     */
+    SUPPLE_E_DIVERGED = -90,
+    /**
+     * The step was not taken: the kinetic energy (value, J), most of it at `node`, is several times what loads and supports
+     * ever gave (limit, J).
+     */
+    SUPPLE_E_DIVERGED_ENERGY = -91,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum supple_status supple_status;
+#else
+typedef int32_t supple_status;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Inertia for steps of one length, computed anew a little in each step. One thread at a time. It may be copied with memcpy
+ * together with its state.
+ */
+typedef struct supple_large supple_large;
+
+/**
+ * A network, and what it keeps for each node. One thread at a time. It may be copied with memcpy; copies use the same
+ * weights.
+ */
+typedef struct supple_learned supple_learned;
+
+/**
+ * What acts on a scene. One thread at a time; a call that takes steps changes it as well.
+ */
+typedef struct supple_loads supple_loads;
+
+/**
+ * What is simulated: element tables, masses, supports. After supple_scene_init nothing changes it: any
+ * number of threads may use one scene at the same time.
+ */
+typedef struct supple_scene supple_scene;
+
+/**
+ * What moves. One thread at a time. It may be copied with memcpy, to any memory aligned to SUPPLE_ALIGN, and the copy goes on as
+ * the original would, to the bit.
+ */
+typedef struct supple_state supple_state;
+
+/**
+ * A node that does not move freely: along held axes it stands still, or follows motions.
+ */
+typedef struct {
+    /**
+     * From zero.
+     */
+    uint32_t node;
+    /**
+     * Held axes: 1 for x, 2 for y, 4 for z, or their sum; 7 for all.
+     */
+    uint32_t axes;
+    /**
+     * 0: stands still. 1: motions may be prescribed.
+     */
+    uint32_t moves;
+} supple_support;
+
+/**
+ * The constants of a law, and a density.
+ */
+typedef struct {
+    /**
+     * Neo-Hookean: c, d, unused. Exponential: a, b, d. Finite and positive.
+     */
+    float constants[3];
+    /**
+     * At rest, kg/m^3; finite and positive.
+     */
+    float density;
+} supple_tissue;
+
+/**
+ * What a scene is built from. Everything is copied; nothing needs to stay.
+ */
+typedef struct {
+    /**
+     * sizeof(supple_scene_config).
+     */
+    uint32_t struct_size;
+    /**
+     * SUPPLE_ABI.
+     */
+    uint32_t abi;
+    /**
+     * SUPPLE_NEO_HOOKEAN or SUPPLE_EXPONENTIAL, for all elements.
+     */
+    uint32_t law;
+    /**
+     * SUPPLE_WINDING_CHECKED or SUPPLE_WINDING_NORMALISED.
+     */
+    uint32_t winding;
+    /**
+     * Nodes, at least 4.
+     */
+    uint32_t nodes;
+    /**
+     * Elements, at least 1.
+     */
+    uint32_t elements;
+    /**
+     * Supports; a node may have several.
+     */
+    uint32_t supports;
+    /**
+     * Tissues, 1 to 65535.
+     */
+    uint32_t tissues;
+    /**
+     * Three coordinates of each node, m. Keep the origin near the body: they are float32.
+     */
+    const float *points;
+    /**
+     * Four nodes of each element, from zero.
+     */
+    const uint32_t *tetrahedra;
+    /**
+     * The supports; may be NULL if there are none.
+     */
+    const supple_support *support;
+    /**
+     * The tissues.
+     */
+    const supple_tissue *tissue;
+    /**
+     * With more than one tissue: of which each element is. With one: NULL.
+     */
+    const uint16_t *tissue_of_element;
+} supple_scene_config;
+
+/**
+ * Where and with which value something went wrong. What does not apply is SUPPLE_NONE or zero.
+ */
+typedef struct {
+    /**
+     * What the function returned.
+     */
+    supple_status status;
+    /**
+     * Position in a list, or number of an element, from zero.
+     */
+    uint32_t index;
+    /**
+     * Number of a node, from zero.
+     */
+    uint32_t node;
+    /**
+     * 0, 1, 2 for x, y, z.
+     */
+    uint32_t axis;
+    /**
+     * The offending value; its unit stands with the status.
+     */
+    double value;
+    /**
+     * What it was held against.
+     */
+    double limit;
+} supple_error;
+
+/**
+ * Sizes and costs of a scene.
+ */
+typedef struct {
+    /**
+     * Nodes.
+     */
+    uint32_t nodes;
+    /**
+     * Elements that take part; those with four fixed nodes were left out.
+     */
+    uint32_t elements;
+    /**
+     * Memory of the scene, bytes.
+     */
+    uint64_t bytes;
+    /**
+     * Floating-point operations of one exact step without loads, the same for every step.
+     */
+    uint64_t operations;
+    /**
+     * Mass of the body, kg.
+     */
+    double mass;
+} supple_scene_facts;
+
+/**
+ * A force on one node. Forces on the same node add up.
+ */
+typedef struct {
+    /**
+     * From zero.
+     */
+    uint32_t node;
+    /**
+     * Full force, N.
+     */
+    float newton[3];
+    /**
+     * Seconds from the start of the simulation over which it grows to that, zero or more.
+     */
+    float ramp;
+} supple_force;
+
+/**
+ * A displacement that one node follows along axes on which a support that moves holds it. Of several for
+ * the same axis the last one holds.
+ */
+typedef struct {
+    /**
+     * From zero.
+     */
+    uint32_t node;
+    /**
+     * Axes that follow: 1 for x, 2 for y, 4 for z, or their sum.
+     */
+    uint32_t axes;
+    /**
+     * Full displacement from rest, m.
+     */
+    float metre[3];
+    /**
+     * Seconds from the start of the simulation over which it grows to that. Zero: it is reached at the end of the next
+     * call that takes steps, evenly from where the node is, which is what a host that follows an instrument wants.
+     */
+    float ramp;
+} supple_motion;
+
+/**
+ * The step, and how motion is damped.
+ */
+typedef struct {
+    /**
+     * sizeof(supple_step_config).
+     */
+    uint32_t struct_size;
+    /**
+     * SUPPLE_ABI.
+     */
+    uint32_t abi;
+    /**
+     * Length of a step, s: at most the critical step.
+     */
+    float seconds;
+    /**
+     * Damping proportional to mass, 1/s, zero or more.
+     */
+    float damping;
+} supple_step_config;
+
+/**
+ * Computes part `part` of what `work` stands for. It may be called from any thread, once for each part; a second call for the
+ * same part does nothing.
+ */
+typedef void (*supple_part)(const void *work, uint32_t part);
+
+/**
+ * Threads of the host. A step calls `each` twice: it shall call `part(work, p)` for every `p` below `parts`, on
+ * whichever threads, side by side or not, and return when all those calls have. Parts share nothing, and the result does not
+ * depend on where they run, to the bit. What `each` leaves out is computed when it has returned.
+ */
+typedef struct {
+    /**
+     * Handed to `each`.
+     */
+    void *context;
+    /**
+     * Parts that a step shall be cut into; there will be SUPPLE_MOST_PARTS at most, and fewer if the scene is small.
+     */
+    uint32_t parts;
+    /**
+     * See above.
+     */
+    void (*each)(void *context, supple_part part, const void *work, uint32_t parts);
+} supple_threads;
+
+/**
+ * What the steps of a call found. Every call that takes steps writes all of it.
+ */
+typedef struct {
+    /**
+     * Simulated time at the end, s; of a step that was not taken, at its start.
+     */
+    double time;
+    /**
+     * Kinetic energy at the latest step, J.
+     */
+    double kinetic;
+    /**
+     * The most energy that loads and supports ever gave, J.
+     */
+    double available;
+    /**
+     * Steps taken by this call.
+     */
+    uint32_t steps;
+    /**
+     * The node at which a step diverged, else SUPPLE_NONE.
+     */
+    uint32_t node;
+    /**
+     * Smallest volume of an element over its volume at rest, where it left the range of its law; else 1.
+     */
+    float least_volume_ratio;
+    /**
+     * Largest exponent over its cap, of the exponential law: above 1 the law went on along its tangent. Zero if nothing came near.
+     */
+    float saturation;
+    /**
+     * Kinetic energy beyond the account, as a share of the most that was ever in it.
+     */
+    float energy_excess;
+    /**
+     * Learned steps: the largest share of the free vertices whose prediction was clipped.
+     */
+    float clipped;
+    /**
+     * Learned steps: the largest share with an input outside what training has seen.
+     */
+    float outside;
+    /**
+     * Large steps: mean over the nodes of the inertia added, in masses of the node.
+     */
+    float added_mass;
+    /**
+     * Large steps: most nodes that were held back in a step.
+     */
+    uint32_t held_back;
+    /**
+     * Large steps: estimate of the error so far, m, mean over the nodes; it tells the scale and is no bound.
+     */
+    float error;
+} supple_report;
+
+/**
+ * Vectors where they are, without a copy: three floats each, `stride` bytes apart.
+ */
+typedef struct {
+    /**
+     * The first component of the first vector.
+     */
+    const float *first;
+    /**
+     * Bytes from one vector to the next.
+     */
+    size_t stride;
+    /**
+     * Vectors, one for each node.
+     */
+    uint32_t count;
+} supple_vectors;
+
+/**
+ * What a learned step needs.
+ */
+typedef struct {
+    /**
+     * sizeof(supple_learned_config).
+     */
+    uint32_t struct_size;
+    /**
+     * SUPPLE_ABI.
+     */
+    uint32_t abi;
+    /**
+     * 1: a learned step that diverges, or has more kinetic energy than loads and supports explain, is undone and the exact
+     * step takes over for good. 0: the caller decides by status and report. Needs memory for two vectors a node.
+     */
+    uint32_t fallback;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+    /**
+     * A weight file, at a multiple of 4 bytes, better of 64. It is used where it is, without a copy: it must stay, unchanged, as long as
+     * the object is used.
+     */
+    const void *weights;
+    /**
+     * Its bytes; what lies behind the file is ignored.
+     */
+    size_t weights_bytes;
+} supple_learned_config;
+
+/**
+ * What a network was trained for, and what a prediction costs.
+ */
+typedef struct {
+    /**
+     * Length of a learned step, s.
+     */
+    float seconds;
+    /**
+     * Damping of the training, 1/s; the state's step must have the same.
+     */
+    float damping;
+    /**
+     * Density of the training, kg/m^3.
+     */
+    float density;
+    /**
+     * Length of the exact step that it learned from, s.
+     */
+    float exact_seconds;
+    /**
+     * Multiplications with additions of one node's prediction.
+     */
+    uint64_t multiply_adds;
+    /**
+     * Whether the exact step has taken over for good.
+     */
+    uint32_t fell_back;
+} supple_learned_facts;
+
+/**
+ * What large steps need.
+ */
+typedef struct {
+    /**
+     * sizeof(supple_large_config).
+     */
+    uint32_t struct_size;
+    /**
+     * SUPPLE_ABI.
+     */
+    uint32_t abi;
+    /**
+     * SUPPLE_MASS_SCALED, SUPPLE_MULTILEVEL or SUPPLE_DAMPED.
+     */
+    uint32_t method;
+    /**
+     * Length of a step, s.
+     */
+    float seconds;
+    /**
+     * Damping proportional to mass, 1/s, zero or more.
+     */
+    float damping;
+    /**
+     * Cells of the lattice along x, y, z; zeros: chosen for the scene. Not used by SUPPLE_MASS_SCALED.
+     */
+    uint32_t cells[3];
+    /**
+     * For SUPPLE_DAMPED the weight file of a damper, at a multiple of 4 bytes. It is used where it is and must stay. NULL otherwise.
+     */
+    const void *weights;
+    /**
+     * Its bytes.
+     */
+    size_t weights_bytes;
+} supple_large_config;
+
+
+
+
+
+
+
+
+
+
+
+
+
+
+
+
+
+
+
+
+
+
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * The instructions that steps use: the best of this processor, or those chosen.
+ */
+uint32_t supple_level(void);
+
+/**
+ * Makes all later steps of this process use these instructions. Call it before threads take steps.
+ */
+supple_status supple_set_level(uint32_t level);
+
+/**
+ * Version of the interface that the library has. SUPPLE_ABI is the one of the header.
+ */
+uint32_t supple_abi(void);
+
+/**
+ * Version of the library, such as "0.1.0". There for as long as the library is.
+ */
+const char *supple_version(void);
+
+/**
+ * The sentence for a status, in English and without its numbers; for a number that is no status, that it is none.
+ * Never NULL, and there for as long as the library is.
+ */
+const char *supple_status_text(int32_t status);
+
+/**
+ * Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant.
+ */
+size_t supple_scene_size(uint32_t nodes,
+                         uint32_t elements,
+                         uint32_t tissues);
+
+/**
+ * Builds a scene in `memory` of at least supple_scene_size bytes, aligned to SUPPLE_ALIGN. On success `*scene` is the scene,
+ * at the beginning of that memory.
+ *
+ * @param error may be NULL; index is that of an element, a support or a node as the status says.
+ */
+supple_status supple_scene_init(void *memory,
+                                size_t bytes,
+                                const supple_scene_config *config,
+                                supple_scene **scene,
+                                supple_error *error);
+
+/**
+ * Writes sizes and costs of a scene.
+ */
+supple_status supple_scene_describe(const supple_scene *scene, supple_scene_facts *facts);
+
+/**
+ * Bytes of memory that loads need with room for so many forces and motions. SUPPLE_LOADS_SIZE is the same as a constant.
+ */
+size_t supple_loads_size(uint32_t forces,
+                         uint32_t motions);
+
+/**
+ * Prepares loads for a scene in `memory` of at least supple_loads_size bytes, aligned to SUPPLE_ALIGN: none yet,
+ * with room for so many forces and motions.
+ */
+supple_status supple_loads_init(void *memory,
+                                size_t bytes,
+                                const supple_scene *scene,
+                                uint32_t forces,
+                                uint32_t motions,
+                                supple_loads **loads);
+
+/**
+ * Sets gravity, three components, m/s^2.
+ */
+supple_status supple_set_gravity(supple_loads *loads, const float *gravity);
+
+/**
+ * Replaces all forces by `count` others, which are copied; none with a count of zero.
+ *
+ * @param error may be NULL; index is that of a force.
+ */
+supple_status supple_set_forces(supple_loads *loads,
+                                const supple_force *forces,
+                                uint32_t count,
+                                supple_error *error);
+
+/**
+ * Replaces all motions by `count` others, which are copied; none with a count of zero: moved nodes then stay where they are.
+ *
+ * @param error may be NULL; index is that of a motion.
+ */
+supple_status supple_set_motions(supple_loads *loads,
+                                 const supple_scene *scene,
+                                 const supple_motion *motions,
+                                 uint32_t count,
+                                 supple_error *error);
+
+/**
+ * Bytes of memory that the state of so many nodes needs. SUPPLE_STATE_SIZE is the same as a constant.
+ */
+size_t supple_state_size(uint32_t nodes);
+
+/**
+ * Prepares the state of a scene, at rest, in `memory` of at least supple_state_size bytes, aligned to SUPPLE_ALIGN.
+ */
+supple_status supple_state_init(void *memory,
+                                size_t bytes,
+                                const supple_scene *scene,
+                                supple_state **state);
+
+/**
+ * Puts a state back to rest at time zero. Its step stays.
+ */
+supple_status supple_state_reset(supple_state *state);
+
+/**
+ * Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It costs a few
+ * force evaluations; tissue that is deformed is stiffer, so ask again from time to time.
+ *
+ * @param seconds receives the step, s.
+ * @param node may be NULL; receives the node that sets it.
+ */
+supple_status supple_critical_step(const supple_scene *scene,
+                                   supple_state *state,
+                                   float *seconds,
+                                   uint32_t *node);
+
+/**
+ * Sets the exact step of a state, for all calls that follow. Refused above the critical step at the state's
+ * displacements. It may be changed at any time.
+ *
+ * @param error may be NULL.
+ */
+supple_status supple_set_step(const supple_scene *scene,
+                              supple_state *state,
+                              const supple_step_config *config,
+                              supple_error *error);
+
+/**
+ * Writes the simulated time, s, and how many steps have been taken; either may be NULL.
+ */
+supple_status supple_state_time(const supple_state *state, double *seconds, uint64_t *steps);
+
+/**
+ * Takes `count` exact steps. Stops at the first that is not to be believed: that one is not taken, the state is as before it,
+ * and the status tells.
+ *
+ * @param loads what acts; NULL: nothing, supports stand still.
+ * @param threads NULL: the calling thread alone.
+ * @param report may be NULL.
+ */
+supple_status supple_step(const supple_scene *scene,
+                          supple_loads *loads,
+                          supple_state *state,
+                          uint32_t count,
+                          const supple_threads *threads,
+                          supple_report *report);
+
+/**
+ * Tells where the displacements of a state are, m. They stay there for as long as the state does; read them between calls that
+ * change it.
+ */
+supple_status supple_displacements(const supple_state *state,
+                                   supple_vectors *vectors);
+
+/**
+ * Copies the displacement of each node, m, to three floats each.
+ *
+ * @param floats room in `out`: three times the nodes at least.
+ */
+supple_status supple_copy_displacements(const supple_state *state, float *out, size_t floats);
+
+/**
+ * Copies where each node is, m: the point at rest with its displacement.
+ *
+ * @param points the points that the scene was built from, three coordinates each.
+ * @param floats room in `out`: three times the nodes at least. `out` may not be `points`.
+ */
+supple_status supple_copy_positions(const supple_state *state,
+                                    const float *points,
+                                    float *out,
+                                    size_t floats);
+
+/**
+ * Copies the velocity of each node over the latest step, m/s.
+ *
+ * @param floats room in `out`: three times the nodes at least.
+ */
+supple_status supple_copy_velocities(const supple_state *state, float *out, size_t floats);
+
+/**
+ * Copies the total force on each node at the start of the latest step, N. At held nodes its opposite is the reaction of the
+ * support, which is what a hand that holds the instrument feels, apart from the inertia of a moved one. Zero
+ * after supple_critical_step or supple_set_step until the next step.
+ *
+ * @param floats room in `out`: three times the nodes at least.
+ */
+supple_status supple_copy_forces(const supple_state *state,
+                                 float *out,
+                                 size_t floats);
+
+/**
+ * Bytes that a saved state of so many nodes has.
+ */
+size_t supple_saved_size(uint32_t nodes);
+
+/**
+ * Saves a state with its step to `to`, at any address.
+ *
+ * @param bytes room there: supple_saved_size at least.
+ */
+supple_status supple_save(const supple_state *state, void *to, size_t bytes);
+
+/**
+ * Restores a saved state, from any address, into one prepared for the same scene: it goes on as the saved one would have, to
+ * the bit. Forces are zero until the next step.
+ */
+supple_status supple_restore(supple_state *state,
+                             const void *from,
+                             size_t bytes);
+
+/**
+ * Bytes of memory that learned steps of so many nodes need, with fallback (1) or without (0). SUPPLE_LEARNED_SIZE is the
+ * same as a constant.
+ */
+size_t supple_learned_size(uint32_t nodes,
+                           uint32_t fallback);
+
+/**
+ * Prepares learned steps of a scene in `memory` of at least supple_learned_size bytes, aligned to SUPPLE_ALIGN.
+ *
+ * @param error may be NULL; index is that of a layer.
+ */
+supple_status supple_learned_init(void *memory,
+                                  size_t bytes,
+                                  const supple_scene *scene,
+                                  const supple_learned_config *config,
+                                  supple_learned **learned,
+                                  supple_error *error);
+
+/**
+ * For a motion from rest: frames as at the start, the network has not been led, the exact step has not taken over.
+ */
+supple_status supple_learned_reset(supple_learned *learned);
+
+/**
+ * Writes what a network was trained for.
+ */
+supple_status supple_learned_describe(const supple_learned *learned, supple_learned_facts *facts);
+
+/**
+ * Lets the exact step lead, `count` times over the length of a learned step, while the frames of the nodes follow. The network
+ * can take over at the end of it. In the paper the exact step leads for 0.3 s from rest.
+ *
+ * @param loads what acts; NULL: nothing, supports stand still.
+ * @param threads NULL: the calling thread alone.
+ * @param report may be NULL; its steps are exact ones.
+ */
+supple_status supple_learned_lead(const supple_scene *scene,
+                                  supple_loads *loads,
+                                  supple_state *state,
+                                  supple_learned *learned,
+                                  uint32_t count,
+                                  const supple_threads *threads,
+                                  supple_report *report);
+
+/**
+ * Takes `count` learned steps after supple_learned_lead, or after other learned steps. Stops at the first that is not to be
+ * believed: without fallback that one is not taken, and the state is as before it.
+ *
+ * @param loads what acts; NULL: nothing, supports stand still.
+ * @param threads NULL: the calling thread alone.
+ * @param report may be NULL.
+ */
+supple_status supple_learned_step(const supple_scene *scene,
+                                  supple_loads *loads,
+                                  supple_state *state,
+                                  supple_learned *learned,
+                                  uint32_t count,
+                                  const supple_threads *threads,
+                                  supple_report *report);
+
+/**
+ * Writes how many bytes of memory large steps of a scene need; it depends on the lattice. SUPPLE_LARGE_SIZE is never less.
+ *
+ * @param points the points that the scene was built from, three coordinates each.
+ * @param error may be NULL.
+ */
+supple_status supple_large_size(const supple_scene *scene,
+                                const float *points,
+                                const supple_large_config *config,
+                                size_t *bytes,
+                                supple_error *error);
+
+/**
+ * Prepares large steps from the state as it is, in `memory` of at least supple_large_size bytes, aligned to SUPPLE_ALIGN. It
+ * takes as long as some steps.
+ *
+ * @param points the points that the scene was built from, three coordinates each.
+ * @param error may be NULL.
+ */
+supple_status supple_large_init(void *memory,
+                                size_t bytes,
+                                const supple_scene *scene,
+                                supple_state *state,
+                                const float *points,
+                                const supple_large_config *config,
+                                supple_large **large,
+                                supple_error *error);
+
+/**
+ * Takes `count` large steps. Stops at the first that is not to be believed: that one is not taken, the state is as before it,
+ * and the status tells.
+ *
+ * @param loads what acts; NULL: nothing, supports stand still.
+ * @param report may be NULL.
+ */
+supple_status supple_large_step(const supple_scene *scene,
+                                supple_loads *loads,
+                                supple_state *state,
+                                supple_large *large,
+                                uint32_t count,
+                                supple_report *report);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* SUPPLE_H */

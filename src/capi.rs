@@ -1,0 +1,36 @@
+//! The C face: `include/supple.h`, which cbindgen makes from these files. Every object lives in memory of the host,
+//! begins with what it is and how large, and holds no pointer into itself. A function checks all it is given before it
+//! changes anything; what it found comes back as a status, with place and value in a [`supple_error`].
+//!
+//! Types and functions have the names that C sees. Their docs are the header's: written for a reader of C.
+#![allow(non_camel_case_types, unreachable_pub, unsafe_code)]
+
+/// Version of the interface: of structures, of functions' arguments, of what statuses mean. Put it into
+/// the field `abi` of every configuration; a library of another version refuses it.
+pub const SUPPLE_ABI: u32 = 1;
+
+/// No node, element or axis.
+pub const SUPPLE_NONE: u32 = u32::MAX;
+
+// In the order of the header.
+mod level;
+
+mod status;
+
+mod memory;
+
+mod scene;
+
+mod loads;
+
+mod state;
+
+mod step;
+
+mod vectors;
+
+mod saved;
+
+mod learned;
+
+mod large;

@@ -1,0 +1,264 @@
+//! What acts on a scene, for C: forces, motions and gravity, which the host changes between steps as it likes.
+
+use core::ffi::c_void;
+
+use crate::loads::{LoadError, Loads, Motion, NodalForce};
+use crate::state::NodeVector;
+
+use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, place_for};
+use super::scene::{AnyScene, axes_of, carved, check_choice, supple_scene, with_scene};
+use super::status::{Answer, mismatch, supple_error, supple_status};
+use supple_status::*;
+
+/// A force on one node. Forces on the same node add up.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct supple_force {
+    /// From zero.
+    pub node: u32,
+    /// Full force, N.
+    pub newton: [f32; 3],
+    /// Seconds from the start of the simulation over which it grows to that, zero or more.
+    pub ramp: f32,
+}
+
+/// A displacement that one node follows along axes on which a support that moves holds it. Of several for
+/// the same axis the last one holds.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct supple_motion {
+    /// From zero.
+    pub node: u32,
+    /// Axes that follow: 1 for x, 2 for y, 4 for z, or their sum.
+    pub axes: u32,
+    /// Full displacement from rest, m.
+    pub metre: [f32; 3],
+    /// Seconds from the start of the simulation over which it grows to that. Zero: it is reached at the end of the next
+    /// call that takes steps, evenly from where the node is, which is what a host that follows an instrument wants.
+    pub ramp: f32,
+}
+
+/// What acts on a scene. One thread at a time; a call that takes steps changes it as well.
+#[repr(C, align(64))]
+pub struct supple_loads {
+    head: Head,
+    /// Of the scene.
+    nodes: u32,
+    force_room: u32,
+    motion_room: u32,
+    forces: u32,
+    motions: u32,
+    gravity: [f32; 3],
+}
+
+// SAFETY: `repr(C)`, begins with a head.
+unsafe impl Object for supple_loads {
+    const MAGIC: [u8; 8] = magic(b'L');
+    const FRONT: usize = 64;
+}
+
+/// Bytes before the arrays of loads.
+pub const SUPPLE_LOADS_FRONT: usize = 64;
+const _: () = assert!(SUPPLE_LOADS_FRONT == <supple_loads as Object>::FRONT);
+
+fn layout(forces: u32, motions: u32) -> Layout {
+    // Motions twice: as they are asked for, and where they are in the next step.
+    Layout::of::<supple_loads>()
+        .and::<NodalForce>(forces as usize)
+        .and::<Motion>(motions as usize)
+        .and::<Motion>(motions as usize)
+}
+
+/// Bytes of memory that loads need with room for so many forces and motions. SUPPLE_LOADS_SIZE is the same as a constant.
+#[unsafe(no_mangle)]
+pub extern "C" fn supple_loads_size(forces: u32, motions: u32) -> usize {
+    layout(forces, motions).bytes()
+}
+
+/// Prepares loads for a scene in `memory` of at least supple_loads_size bytes, aligned to SUPPLE_ALIGN: none yet,
+/// with room for so many forces and motions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_loads_init(
+    memory: *mut c_void,
+    bytes: usize,
+    scene: *const supple_scene,
+    forces: u32,
+    motions: u32,
+    loads: *mut *mut supple_loads,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller, here and below.
+    let init = || unsafe {
+        let (any, loads) = (carved(scene)?, place_for(loads)?);
+        let nodes = with_scene!(any, scene => scene.node_count() as u32);
+        let place = Place::new(memory, bytes, layout(forces, motions))?;
+        let object = place.put(|head| supple_loads {
+            head,
+            nodes,
+            force_room: forces,
+            motion_room: motions,
+            forces: 0,
+            motions: 0,
+            gravity: [0.0; 3],
+        });
+        place.done::<supple_loads>();
+        loads.write(object);
+        Ok(SUPPLE_OK)
+    };
+    init().unwrap_or_else(|error: supple_error| error.status)
+}
+
+/// Sets gravity, three components, m/s^2.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_set_gravity(loads: *mut supple_loads, gravity: *const f32) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let set = || unsafe {
+        let loads = memory::change(loads)?;
+        let gravity = *memory::one(gravity.cast::<[f32; 3]>())?;
+        if !gravity.iter().all(|component| component.is_finite()) {
+            return Err(SUPPLE_E_NOT_FINITE.into());
+        }
+        loads.gravity = gravity;
+        Ok(SUPPLE_OK)
+    };
+    set().unwrap_or_else(|error: supple_error| error.status)
+}
+
+/// Replaces all forces by `count` others, which are copied; none with a count of zero.
+///
+/// @param error may be NULL; index is that of a force.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_set_forces(
+    loads: *mut supple_loads,
+    forces: *const supple_force,
+    count: u32,
+    error: *mut supple_error,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let set = || unsafe {
+        memory::is(loads.cast_const())?;
+        let mut arrays = Arrays::behind(loads.cast_const());
+        let object = memory::change(loads)?;
+        let forces = array(forces, count as usize)?;
+        room_for(count, object.force_room)?;
+        for (index, force) in forces.iter().enumerate() {
+            sound(index, force.node, object.nodes, &force.newton, force.ramp)?;
+        }
+        // Whatever was there is overwritten, never read.
+        let room = arrays.next::<NodalForce>(object.force_room as usize);
+        for (place, &supple_force { node, newton, ramp }) in room.iter_mut().zip(forces) {
+            *place = NodalForce { node, newton, ramp };
+        }
+        object.forces = count;
+        Ok(SUPPLE_OK)
+    };
+    // SAFETY: as above.
+    unsafe { memory::answered(set(), error) }
+}
+
+/// Replaces all motions by `count` others, which are copied; none with a count of zero: moved nodes then stay where they are.
+///
+/// @param error may be NULL; index is that of a motion.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_set_motions(
+    loads: *mut supple_loads,
+    scene: *const supple_scene,
+    motions: *const supple_motion,
+    count: u32,
+    error: *mut supple_error,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let set = || unsafe {
+        memory::is(loads.cast_const())?;
+        let mut arrays = Arrays::behind(loads.cast_const());
+        let object = memory::change(loads)?;
+        let any = carved(scene)?;
+        let motions = array(motions, count as usize)?;
+        belongs(object.nodes, &any)?;
+        room_for(count, object.motion_room)?;
+        for (index, motion) in motions.iter().enumerate() {
+            sound(index, motion.node, object.nodes, &motion.metre, motion.ramp)?;
+            check_choice(index, motion.axes, 7)?;
+            let movable = with_scene!(&any, scene => scene.movable(motion.node as usize));
+            let held = |axis: &usize| motion.axes >> axis & 1 == 1 && !movable.has(*axis);
+            if let Some(axis) = (0..3).find(held) {
+                return Err(supple_error::from(SUPPLE_E_NOT_HELD).at(index).node(motion.node).axis(axis));
+            }
+        }
+        let _ = arrays.next::<NodalForce>(object.force_room as usize);
+        let asked = arrays.next::<Motion>(object.motion_room as usize);
+        let now = arrays.next::<Motion>(object.motion_room as usize);
+        for ((asked, now), motion) in asked.iter_mut().zip(now).zip(motions) {
+            let &supple_motion { node, axes, metre, ramp } = motion;
+            *asked = Motion { node, axes: axes_of(axes), metre, ramp };
+            *now = *asked;
+        }
+        object.motions = count;
+        Ok(SUPPLE_OK)
+    };
+    // SAFETY: as above.
+    unsafe { memory::answered(set(), error) }
+}
+
+fn room_for(count: u32, room: u32) -> Answer<()> {
+    if count <= room {
+        return Ok(());
+    }
+    Err(supple_error::from(SUPPLE_E_CAPACITY).value(count.into(), room.into()))
+}
+
+fn sound(index: usize, node: u32, nodes: u32, vector: &[f32; 3], ramp: f32) -> Answer<()> {
+    crate::loads::check("", index, node, nodes as usize, vector, ramp)
+        .map_err(|error: LoadError| error.into())
+}
+
+/// That something was made for the scene's number of nodes.
+pub(super) fn belongs(nodes: u32, scene: &AnyScene<'_>) -> Answer<()> {
+    let of_scene = with_scene!(scene, scene => scene.node_count());
+    if nodes as usize == of_scene { Ok(()) } else { Err(mismatch(nodes as usize, of_scene)) }
+}
+
+/// Loads that a call takes steps with.
+pub(super) struct Acting<'a> {
+    gravity: [f32; 3],
+    forces: &'a [NodalForce],
+    asked: &'a [Motion],
+    now: &'a mut [Motion],
+    nodes: usize,
+}
+
+impl<'a> Acting<'a> {
+    /// Of an object, or none at all.
+    ///
+    /// # Safety
+    /// As at [`memory::change`].
+    pub(super) unsafe fn of(loads: *mut supple_loads, scene: &AnyScene<'_>) -> Answer<Self> {
+        let nodes = with_scene!(scene, scene => scene.node_count());
+        if loads.is_null() {
+            return Ok(Self { gravity: [0.0; 3], forces: &[], asked: &[], now: &mut [], nodes });
+        }
+        // SAFETY: the caller's promise; entries up to the counts were written.
+        unsafe {
+            memory::is(loads.cast_const())?;
+            let mut arrays = Arrays::behind(loads.cast_const());
+            let object = memory::change(loads)?;
+            belongs(object.nodes, scene)?;
+            let (force_room, motion_room) = (object.force_room as usize, object.motion_room as usize);
+            let forces = arrays.written::<NodalForce>(object.forces as usize, force_room);
+            let asked = arrays.written::<Motion>(object.motions as usize, motion_room);
+            let now = arrays.written::<Motion>(object.motions as usize, motion_room);
+            Ok(Self { gravity: object.gravity, forces, asked, now, nodes })
+        }
+    }
+
+    /// Loads of the next of `left` steps.
+    pub(super) fn next(&mut self, displacement: &[NodeVector], left: u32) -> Loads<'_> {
+        for (now, asked) in self.now.iter_mut().zip(self.asked).filter(|(_, asked)| asked.ramp == 0.0) {
+            let at = displacement.get(asked.node as usize).copied().unwrap_or_default().to_array();
+            for (axis, metre) in now.metre.iter_mut().enumerate() {
+                let (to, from) = (asked.metre[axis], at[axis]);
+                *metre = if left > 1 { from + (to - from) / left as f32 } else { to };
+            }
+        }
+        Loads::checked(self.gravity, self.forces, self.now, self.nodes)
+    }
+}

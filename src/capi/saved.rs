@@ -1,0 +1,161 @@
+//! A state as bytes that may lie in a file: little endian, with a version and a checksum.
+
+use core::ffi::c_void;
+use core::{ptr, slice};
+
+use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
+
+use crate::ledger::Ledger;
+use crate::state::NodeVector;
+use crate::tled::Step;
+
+use super::memory::{self, array, place_for};
+use super::state::{Field, Moment, View, field, step_of, supple_state};
+use super::status::{Answer, mismatch, short, supple_error, supple_status};
+use super::vectors::overlap;
+use supple_status::*;
+
+const MAGIC: [u8; 8] = *b"SUPPLE-M";
+const VERSION: u32 = 1;
+
+/// Before displacements and increments, four floats each.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Front {
+    magic: [u8; 8],
+    version: u32,
+    /// CRC-32 of all that follows.
+    checksum: u32,
+    nodes: u32,
+    dt: f32,
+    /// Zero without a step.
+    step_seconds: f32,
+    step_damping: f32,
+    time: f64,
+    steps: u64,
+    ledger: [f64; 6],
+}
+
+/// Of the front's bytes those that the checksum covers begin here.
+const CHECKED: usize = 16;
+const FRONT: usize = size_of::<Front>();
+
+/// Bytes that a saved state of so many nodes has.
+#[unsafe(no_mangle)]
+pub extern "C" fn supple_saved_size(nodes: u32) -> usize {
+    (nodes as usize)
+        .checked_mul(2 * size_of::<NodeVector>())
+        .and_then(|bytes| bytes.checked_add(FRONT))
+        .unwrap_or(0)
+}
+
+/// Saves a state with its step to `to`, at any address.
+///
+/// @param bytes room there: supple_saved_size at least.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_save(
+    state: *const supple_state,
+    to: *mut c_void,
+    bytes: usize,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let save = || unsafe {
+        let object = memory::read(state)?;
+        let to = place_for(to.cast::<u8>())?;
+        let needed = supple_saved_size(object.nodes);
+        if bytes < needed {
+            return Err(short(bytes, needed));
+        }
+        if overlap(state.cast(), memory::bytes_of(state), to.cast(), needed) {
+            return Err(supple_error::from(SUPPLE_E_OVERLAP));
+        }
+        let Moment { time, steps, dt, ledger } = object.moment;
+        let Ledger { start, work, dissipated, kinetic, uncertainty, peak } = ledger;
+        let step = step_of(object).ok();
+        let mut front = Front {
+            magic: MAGIC,
+            version: VERSION,
+            checksum: 0,
+            nodes: object.nodes,
+            dt,
+            step_seconds: step.map_or(0.0, |step| step.seconds()),
+            step_damping: step.map_or(0.0, |step| step.damping()),
+            time,
+            steps,
+            ledger: [start, work, dissipated, kinetic, uncertainty, peak],
+        };
+        let to = slice::from_raw_parts_mut(to, needed);
+        let vectors = [field(state, Field::Displacement)?, field(state, Field::Increment)?];
+        let (first, rest) = to.split_at_mut_checked(FRONT).ok_or(short(bytes, needed))?;
+        let places = rest.chunks_exact_mut(size_of_val(vectors[0]).max(1));
+        for (place, vectors) in places.zip(vectors) {
+            put(place, cast_slice(vectors));
+        }
+        front.checksum = checksum(&front, rest);
+        put(first, bytes_of(&front));
+        Ok(SUPPLE_OK)
+    };
+    save().unwrap_or_else(|error: supple_error| error.status)
+}
+
+/// Restores a saved state, from any address, into one prepared for the same scene: it goes on as the saved one would have, to
+/// the bit. Forces are zero until the next step.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_restore(
+    state: *mut supple_state,
+    from: *const c_void,
+    bytes: usize,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let restore = || unsafe {
+        let nodes = memory::change(state)?.nodes;
+        let from = array(from.cast::<u8>(), bytes)?;
+        let (first, rest) = from.split_at_checked(FRONT).ok_or(short(bytes, FRONT))?;
+        let front = ptr::read_unaligned(first.as_ptr().cast::<Front>());
+        if front.magic != MAGIC {
+            return Err(SUPPLE_E_NOT_SAVED.into());
+        }
+        if front.version != VERSION {
+            return Err(
+                supple_error::from(SUPPLE_E_SAVED_VERSION).value(front.version.into(), VERSION.into())
+            );
+        }
+        if front.nodes != nodes {
+            return Err(mismatch(front.nodes as usize, nodes as usize));
+        }
+        let needed = supple_saved_size(nodes);
+        let rest = rest.get(..needed - FRONT).ok_or(short(bytes, needed))?;
+        if checksum(&front, rest) != front.checksum {
+            return Err(SUPPLE_E_SAVED_CHECKSUM.into());
+        }
+        let object = &mut *state;
+        let [start, work, dissipated, kinetic, uncertainty, peak] = front.ledger;
+        let ledger = Ledger { start, work, dissipated, kinetic, uncertainty, peak };
+        object.moment = Moment { time: front.time, steps: front.steps, dt: front.dt, ledger };
+        object.set_step(Step::insist(front.step_seconds, front.step_damping).ok());
+        let mut view = View::of(state);
+        let places = [&mut view.state.displacement, &mut view.state.increment];
+        let (displacement, increment) = rest.split_at_checked(rest.len() / 2).unwrap_or_default();
+        for (place, saved) in places.into_iter().zip([displacement, increment]) {
+            for (vector, bytes) in place.iter_mut().zip(saved.as_chunks().0) {
+                *vector = bytemuck::pod_read_unaligned::<NodeVector>(bytes as &[u8; 16]);
+            }
+        }
+        view.state.force.fill(NodeVector::ZERO);
+        Ok(SUPPLE_OK)
+    };
+    let answer: Answer<supple_status> = restore();
+    answer.unwrap_or_else(|error| error.status)
+}
+
+/// Copies bytes. Slices know a function for it, with a way to panic in it.
+fn put(to: &mut [u8], from: &[u8]) {
+    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+}
+
+fn checksum(front: &Front, rest: &[u8]) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(bytes_of(front).get(CHECKED..).unwrap_or_default());
+    hasher.update(rest);
+    hasher.finalize()
+}
