@@ -1,0 +1,156 @@
+/* A state goes on to the bit where it stops: copied by memcpy to other memory, saved to bytes and restored, cut into any number of
+ * parts in any order of threads; and every step leads there: exact, learned, mass-scaled, multilevel, damped. */
+#include "body.h"
+
+enum { ROOM = 4 << 20 };
+SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
+SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
+SUPPLE_MEMORY(weights, 40000);
+SUPPLE_MEMORY(damper, 4000);
+/* Twice each: the original and its copy. */
+SUPPLE_MEMORY(state_memory, 2 * SUPPLE_STATE_SIZE(NODES));
+SUPPLE_MEMORY(learned_memory, 2 * SUPPLE_LEARNED_SIZE(NODES, 1));
+SUPPLE_MEMORY(large_memory, 2 * ROOM);
+static unsigned char saved[1 + 32 * NODES + 128];
+
+static supple_scene *scene;
+static supple_loads *loads;
+
+static supple_state *fresh(void) {
+    supple_state *state;
+    const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), 1e-4f, 20.0f};
+    CHECK(supple_state_init(state_memory, SUPPLE_STATE_SIZE(NODES), scene, &state) == SUPPLE_OK);
+    CHECK(supple_set_step(scene, state, &step, NULL) == SUPPLE_OK);
+    return state;
+}
+
+/* Displacements and time. */
+static uint64_t where(const supple_state *state) {
+    supple_vectors vectors;
+    double time;
+    CHECK(supple_displacements(state, &vectors) == SUPPLE_OK && vectors.count == NODES);
+    CHECK(supple_state_time(state, &time, NULL) == SUPPLE_OK);
+    return hash(vectors.first, vectors.stride * vectors.count) ^ hash(&time, sizeof time);
+}
+
+/* Whose threads run parts: here one, which takes them in a strange order, and forgets some. */
+static void backwards(void *context, supple_part part, const void *work, uint32_t parts) {
+    unsigned *most = context;
+    *most = parts > *most ? parts : *most;
+    for (uint32_t p = parts; p-- > 1;) {
+        part(work, p);
+        part(work, p);
+        part(work, parts + p);
+    }
+}
+
+static void exact_in_parts(void) {
+    uint64_t alone = 0;
+    for (uint32_t parts = 0; parts <= 12; parts++) {
+        unsigned most = 0;
+        const supple_threads threads = {&most, parts, backwards};
+        supple_state *state = fresh();
+        move_end(scene, loads, 0.01f, -0.005f, 0.01f);
+        CHECK(supple_step(scene, loads, state, 200, parts ? &threads : NULL, NULL) == SUPPLE_OK);
+        CHECK(most == (parts < PARTS ? parts : PARTS));
+        alone = parts ? alone : where(state);
+        CHECK(where(state) == alone);
+    }
+    printf("copies: 200 steps alone and in 1 to %d parts: the same bits\n", PARTS);
+}
+
+static void exact_copied(void) {
+    supple_state *state = fresh();
+    supple_report report;
+    move_end(scene, loads, 0.01f, -0.005f, 0.01f);
+    CHECK(supple_step(scene, loads, state, 100, NULL, NULL) == SUPPLE_OK);
+    /* Copied by memcpy. */
+    unsigned char *other = state_memory + SUPPLE_STATE_SIZE(NODES);
+    memcpy(other, state_memory, SUPPLE_STATE_SIZE(NODES));
+    supple_state *copy = (supple_state *)(void *)other;
+    /* Saved to an odd address. */
+    CHECK(supple_saved_size(NODES) <= sizeof saved - 1);
+    CHECK(supple_save(state, saved + 1, sizeof saved - 1) == SUPPLE_OK);
+    CHECK(supple_step(scene, loads, state, 300, NULL, &report) == SUPPLE_OK && report.steps == 300);
+    const uint64_t end = where(state);
+    CHECK(supple_step(scene, loads, copy, 300, NULL, NULL) == SUPPLE_OK);
+    CHECK(where(copy) == end);
+    CHECK(supple_state_reset(copy) == SUPPLE_OK && where(copy) != end);
+    CHECK(supple_restore(copy, saved + 1, sizeof saved - 1) == SUPPLE_OK);
+    CHECK(supple_step(scene, loads, copy, 300, NULL, NULL) == SUPPLE_OK);
+    CHECK(where(copy) == end);
+    /* Moved nodes are where they were sent, and what is copied out is what is there. */
+    static float out[3 * NODES], positions[3 * NODES];
+    CHECK(supple_copy_displacements(state, out, 3 * NODES) == SUPPLE_OK);
+    CHECK(supple_copy_positions(state, points[0], positions, 3 * NODES) == SUPPLE_OK);
+    CHECK(out[3 * (NODES - 1)] == 0.01f && out[3 * (NODES - 1) + 1] == -0.005f);
+    for (int at = 0; at < 3 * NODES; at++) {
+        CHECK(positions[at] == points[at / 3][at % 3] + out[at]);
+    }
+    printf("copies: memcpy and save at step 100: the same bits at step 400\n");
+}
+
+static void learned_copied(void) {
+    size_t bytes;
+    const void *file_of_weights = file("weights/compact-10-i8.weights", weights, sizeof weights, &bytes);
+    const supple_learned_config config = {SUPPLE_CONFIG(supple_learned_config), 1, 0, file_of_weights, bytes};
+    supple_state *state = fresh();
+    supple_learned *learned;
+    supple_learned_facts facts;
+    CHECK(supple_learned_init(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 1), scene, &config, &learned, NULL) == SUPPLE_OK);
+    CHECK(supple_learned_describe(learned, &facts) == SUPPLE_OK && facts.multiply_adds > 0);
+    const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 3.0f, facts.damping};
+    CHECK(supple_set_step(scene, state, &step, NULL) == SUPPLE_OK);
+    move_end(scene, loads, 0.01f, -0.005f, 0.01f);
+    supple_report report;
+    CHECK(supple_learned_lead(scene, loads, state, learned, 300, NULL, &report) >= 0 && report.steps == 900);
+    CHECK(supple_learned_step(scene, loads, state, learned, 10, NULL, &report) >= 0);
+    CHECK(report.outside > 0.0f || report.clipped >= 0.0f);
+    memcpy(state_memory + SUPPLE_STATE_SIZE(NODES), state_memory, SUPPLE_STATE_SIZE(NODES));
+    memcpy(learned_memory + SUPPLE_LEARNED_SIZE(NODES, 1), learned_memory, SUPPLE_LEARNED_SIZE(NODES, 1));
+    supple_state *state_copy = (supple_state *)(void *)(state_memory + SUPPLE_STATE_SIZE(NODES));
+    supple_learned *copy = (supple_learned *)(void *)(learned_memory + SUPPLE_LEARNED_SIZE(NODES, 1));
+    const supple_status first = supple_learned_step(scene, loads, state, learned, 300, NULL, &report);
+    CHECK(first >= 0);
+    CHECK(supple_learned_step(scene, loads, state_copy, copy, 300, NULL, NULL) == first);
+    CHECK(where(state) == where(state_copy));
+    printf("copies: learned steps: the same bits after 300 more (%s; outside %.1f %% at most)\n",
+           supple_status_text(first), 100.0 * report.outside);
+}
+
+static void large_copied(uint32_t method, const char *name) {
+    size_t bytes = 0, of_damper = 0, needed = 0;
+    file("weights/damper.weights", damper, sizeof damper, &of_damper);
+    bytes = method == SUPPLE_DAMPED ? of_damper : 0;
+    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), method, 2e-3f, 20.0f, {0, 0, 0},
+                                        bytes ? damper : NULL, bytes};
+    supple_state *state = fresh();
+    supple_large *large;
+    supple_report report;
+    move_end(scene, loads, 0.01f, -0.005f, 0.01f);
+    CHECK(supple_large_size(scene, points[0], &config, &needed, NULL) == SUPPLE_OK && needed <= ROOM);
+    CHECK(supple_large_init(large_memory, ROOM, scene, state, points[0], &config, &large, NULL) == SUPPLE_OK);
+    CHECK(supple_large_step(scene, loads, state, large, 50, NULL) >= 0);
+    memcpy(state_memory + SUPPLE_STATE_SIZE(NODES), state_memory, SUPPLE_STATE_SIZE(NODES));
+    memcpy(large_memory + ROOM, large_memory, needed);
+    supple_state *state_copy = (supple_state *)(void *)(state_memory + SUPPLE_STATE_SIZE(NODES));
+    CHECK(supple_large_step(scene, loads, state, large, 200, &report) >= 0 && report.steps == 200);
+    CHECK(supple_large_step(scene, loads, state_copy, (supple_large *)(void *)(large_memory + ROOM), 200, NULL) >= 0);
+    CHECK(where(state) == where(state_copy));
+    CHECK(report.added_mass > 0.0f);
+    printf("copies: %s: the same bits after 200 more; %zu bytes, %.1f masses added, error about %.3f mm\n", name, needed,
+           (double)report.added_mass, 1e3 * (double)report.error);
+}
+
+int main(void) {
+    const supple_scene_config config = bar_config();
+    CHECK(supple_scene_init(scene_memory, sizeof scene_memory, &config, &scene, NULL) == SUPPLE_OK);
+    CHECK(supple_loads_init(loads_memory, sizeof loads_memory, scene, FORCES, MOTIONS, &loads) == SUPPLE_OK);
+    exact_in_parts();
+    exact_copied();
+    learned_copied();
+    large_copied(SUPPLE_MASS_SCALED, "mass-scaled");
+    large_copied(SUPPLE_MULTILEVEL, "multilevel");
+    large_copied(SUPPLE_DAMPED, "damped");
+    return 0;
+}

@@ -1,0 +1,489 @@
+/* Every way to use the library wrongly has its own status, names the place and the value, and changes nothing; and every status of
+ * the header comes up here. */
+#include "body.h"
+
+SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
+SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES));
+SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
+SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 1));
+SUPPLE_MEMORY(large_memory, 1 << 20);
+/* Of another scene, of one element. */
+SUPPLE_MEMORY(small_scene_memory, SUPPLE_SCENE_SIZE(4, 1, 1));
+SUPPLE_MEMORY(small_state_memory, SUPPLE_STATE_SIZE(4));
+SUPPLE_MEMORY(small_loads_memory, SUPPLE_LOADS_SIZE(1, 1));
+/* Where objects are tried that shall not be made. */
+SUPPLE_MEMORY(spare, 4 << 20);
+SUPPLE_MEMORY(weights, 40000);
+SUPPLE_MEMORY(damper, 4000);
+static unsigned char saved[32 * NODES + 128];
+static float out[3 * NODES];
+
+static supple_scene *scene, *small_scene;
+static supple_state *state, *small_state;
+static supple_loads *loads, *small_loads;
+static supple_learned *learned;
+static supple_large *large;
+static supple_error error;
+static unsigned char seen[256];
+static unsigned calls;
+
+static const supple_step_config length = {SUPPLE_CONFIG(supple_step_config), 1e-4f, 20.0f};
+
+/* Whether everything is looked at after each call. Not with an argument: under valgrind, which sees bad reads by itself, it would
+ * take minutes, and what the compiler leaves between the members of an object counts as never written. */
+static int watched;
+
+static uint64_t everything(void) {
+    if (!watched) {
+        return 0;
+    }
+    return hash(scene_memory, sizeof scene_memory) ^ 3 * hash(state_memory, sizeof state_memory) ^
+           5 * hash(loads_memory, sizeof loads_memory) ^ 7 * hash(learned_memory, sizeof learned_memory) ^
+           9 * hash(large_memory, sizeof large_memory) ^ 11 * hash(small_scene_memory, sizeof small_scene_memory) ^
+           13 * hash(small_state_memory, sizeof small_state_memory) ^ 15 * hash(saved, sizeof saved) ^ 17 * hash(out, sizeof out);
+}
+
+static void note(supple_status status) { seen[(unsigned char)(status + 128)] = 1; }
+
+/* A call that must be refused like this, and change nothing. */
+#define REFUSED(expected, call)                                                                                        \
+    do {                                                                                                               \
+        memset(&error, 0, sizeof error);                                                                               \
+        const uint64_t before = everything();                                                                          \
+        const supple_status got = (call);                                                                              \
+        if (got != (expected) || everything() != before) {                                                             \
+            fprintf(stderr, "%s:%d: %s: %d (%s) instead of %s, %s\n", __FILE__, __LINE__, #call, (int)got,             \
+                    supple_status_text(got), #expected, everything() == before ? "unchanged" : "changed");             \
+            exit(1);                                                                                                   \
+        }                                                                                                              \
+        CHECK(error.status == 0 || error.status == got);                                                               \
+        note(got);                                                                                                     \
+        calls++;                                                                                                       \
+    } while (0)
+
+#define DONE(call)                                                                                                     \
+    do {                                                                                                               \
+        const supple_status got = (call);                                                                              \
+        note(got);                                                                                                     \
+        if (got < 0) {                                                                                                 \
+            fprintf(stderr, "%s:%d: %s: %s\n", __FILE__, __LINE__, #call, supple_status_text(got));                    \
+            exit(1);                                                                                                   \
+        }                                                                                                              \
+    } while (0)
+
+static uint32_t crc32_of(const unsigned char *bytes, size_t count) {
+    uint32_t sum = ~0u;
+    for (size_t at = 0; at < count; at++) {
+        sum ^= bytes[at];
+        for (int bit = 0; bit < 8; bit++) {
+            sum = sum >> 1 ^ (sum & 1 ? 0xedb88320u : 0u);
+        }
+    }
+    return ~sum;
+}
+
+/* Where the energy account and the vectors are in it. */
+enum { LEDGER = 48, FRONT = 96 };
+
+/* A saved state with one number changed and the checksum put right. */
+static void forge(size_t at, const void *bytes, size_t count) {
+    DONE(supple_save(state, saved, sizeof saved));
+    memcpy(saved + at, bytes, count);
+    const uint32_t sum = crc32_of(saved + 16, supple_saved_size(NODES) - 16);
+    memcpy(saved + 12, &sum, 4);
+}
+
+static supple_status scene_with(supple_scene_config config) {
+    supple_scene *none = NULL;
+    memset(spare, 0, SUPPLE_SCENE_FRONT);
+    const supple_status status = supple_scene_init(spare, sizeof spare, &config, &none, &error);
+    CHECK(status == SUPPLE_OK || none == NULL);
+    CHECK(status == SUPPLE_OK || supple_scene_describe((supple_scene *)(void *)spare, NULL) == SUPPLE_E_NOT_INITIALISED);
+    return status;
+}
+
+static void scenes(void) {
+    const supple_scene_config good = bar_config();
+    supple_scene_config bad = good;
+    supple_scene *none = NULL;
+    REFUSED(SUPPLE_E_NULL, supple_scene_init(NULL, sizeof spare, &good, &none, &error));
+    REFUSED(SUPPLE_E_NULL, supple_scene_init(spare, sizeof spare, NULL, &none, &error));
+    REFUSED(SUPPLE_E_NULL, supple_scene_init(spare, sizeof spare, &good, NULL, &error));
+    REFUSED(SUPPLE_E_MISALIGNED, supple_scene_init(spare + 32, sizeof spare - 32, &good, &none, &error));
+    REFUSED(SUPPLE_E_SHORT, supple_scene_init(spare, sizeof scene_memory - 1, &good, &none, &error));
+    CHECK(error.value == sizeof scene_memory - 1 && error.limit == sizeof scene_memory);
+    REFUSED(SUPPLE_E_SHORT, supple_scene_init(spare, 0, &good, &none, NULL));
+#define SCENE(expected, change)                                                                                        \
+    bad = good, (change);                                                                                              \
+    REFUSED(expected, scene_with(bad))
+    SCENE(SUPPLE_E_ABI, bad.struct_size = 4);
+    CHECK(error.value == 4 && error.limit == sizeof bad);
+    SCENE(SUPPLE_E_ABI, bad.abi = SUPPLE_ABI + 1);
+    SCENE(SUPPLE_E_LAW, bad.law = 7);
+    CHECK(error.value == 7);
+    SCENE(SUPPLE_E_CHOICE, bad.winding = 2);
+    SCENE(SUPPLE_E_MESH_EMPTY, bad.elements = 0);
+    SCENE(SUPPLE_E_MESH_EMPTY, bad.nodes = 0);
+    SCENE(SUPPLE_E_NULL, bad.points = NULL);
+    SCENE(SUPPLE_E_NULL, bad.tetrahedra = NULL);
+    SCENE(SUPPLE_E_NULL, bad.support = NULL);
+    SCENE(SUPPLE_E_NULL, bad.tissue = NULL);
+    SCENE(SUPPLE_E_MISALIGNED, bad.points = (const float *)(const void *)((const char *)points + 2));
+    SCENE(SUPPLE_E_TISSUE, bad.tissues = 0);
+    SCENE(SUPPLE_E_TISSUE, bad.tissues = 65536);
+    SCENE(SUPPLE_E_NULL, bad.tissues = 2);
+
+    supple_tissue tissues[2] = {tissue, tissue};
+    static uint16_t of_element[TETS];
+    bad.tissue = tissues, bad.tissue_of_element = of_element;
+    of_element[17] = 2;
+    REFUSED(SUPPLE_E_TISSUE, scene_with(bad));
+    CHECK(error.index == 17);
+    of_element[17] = 1;
+    tissues[1].constants[1] = -1.0f;
+    REFUSED(SUPPLE_E_CONSTANT, scene_with(bad));
+    CHECK(error.index == 17 && error.value == -1.0);
+    tissues[1] = tissue, tissues[1].density = NAN;
+    REFUSED(SUPPLE_E_DENSITY, scene_with(bad));
+    CHECK(error.index == 17);
+    tissues[1] = tissue;
+    DONE(scene_with(bad));
+
+#define MESH(expected, place, value)                                                                                   \
+    do {                                                                                                               \
+        const __typeof__(place) kept = place;                                                                          \
+        place = (value);                                                                                               \
+        REFUSED(expected, scene_with(good));                                                                           \
+        place = kept;                                                                                                  \
+    } while (0)
+    MESH(SUPPLE_E_NOT_FINITE, points[9][1], NAN);
+    CHECK(error.index == 9 && error.node == 9 && error.axis == 1);
+    MESH(SUPPLE_E_INDEX, tets[5][2], NODES);
+    CHECK(error.index == 5 && error.node == NODES && error.limit == NODES);
+    MESH(SUPPLE_E_MESH_REPEATED_NODE, tets[5][2], tets[5][1]);
+    CHECK(error.index == 5 && error.node == tets[5][1]);
+    MESH(SUPPLE_E_MESH_DEGENERATE, points[tets[0][3]][0], points[tets[0][0]][0]);
+    MESH(SUPPLE_E_MESH_INVERTED, points[tets[0][3]][2], -0.1f);
+    CHECK(error.value < 0.0);
+    MESH(SUPPLE_E_INDEX, supports[3].node, NODES);
+    CHECK(error.index == 3 && error.node == NODES);
+    MESH(SUPPLE_E_CHOICE, supports[3].axes, 8);
+    CHECK(error.index == 3 && error.value == 8);
+    MESH(SUPPLE_E_CHOICE, supports[3].moves, 2);
+    /* A mesh without the elements of its last layer. */
+    SCENE(SUPPLE_E_MESH_UNUSED_NODE, bad.elements = TETS - 6 * X * Y);
+    CHECK(error.node == NODES - LAYER);
+    supple_support all[NODES];
+    for (uint32_t n = 0; n < NODES; n++) {
+        all[n] = (supple_support){n, 7, 0};
+    }
+    SCENE(SUPPLE_E_NOTHING_MOVES, (bad.support = all, bad.supports = NODES));
+
+    supple_scene_facts facts;
+    REFUSED(SUPPLE_E_NULL, supple_scene_describe(NULL, &facts));
+    REFUSED(SUPPLE_E_NULL, supple_scene_describe(scene, NULL));
+    REFUSED(SUPPLE_E_KIND, supple_scene_describe((supple_scene *)(void *)state, &facts));
+    REFUSED(SUPPLE_E_MISALIGNED, supple_scene_describe((supple_scene *)(void *)(scene_memory + 8), &facts));
+    DONE(supple_scene_describe(scene, &facts));
+    CHECK(facts.nodes == NODES && facts.elements == TETS && facts.bytes == sizeof scene_memory && facts.operations > 100000);
+}
+
+static void acting(void) {
+    supple_loads *none = NULL;
+    REFUSED(SUPPLE_E_NULL, supple_loads_init(spare, sizeof spare, NULL, 1, 1, &none));
+    REFUSED(SUPPLE_E_SHORT, supple_loads_init(spare, SUPPLE_LOADS_SIZE(1, 1) - 1, scene, 1, 1, &none));
+    REFUSED(SUPPLE_E_SHORT, supple_loads_init(spare, 1000, scene, UINT32_MAX, UINT32_MAX, &none));
+    CHECK(none == NULL);
+    const float up[3] = {0.0f, 0.0f, -9.81f}, nowhere[3] = {0.0f, INFINITY, 0.0f};
+    REFUSED(SUPPLE_E_NULL, supple_set_gravity(NULL, up));
+    REFUSED(SUPPLE_E_NULL, supple_set_gravity(loads, NULL));
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_set_gravity(loads, nowhere));
+    DONE(supple_set_gravity(loads, up));
+
+    supple_force forces[FORCES + 1] = {{0, {0.0f, 0.0f, 0.0f}, 0.0f}};
+    REFUSED(SUPPLE_E_CAPACITY, supple_set_forces(loads, forces, FORCES + 1, &error));
+    CHECK(error.value == FORCES + 1 && error.limit == FORCES);
+    REFUSED(SUPPLE_E_NULL, supple_set_forces(loads, NULL, 1, &error));
+    forces[2].node = NODES;
+    REFUSED(SUPPLE_E_INDEX, supple_set_forces(loads, forces, 4, &error));
+    CHECK(error.index == 2 && error.node == NODES && error.limit == NODES);
+    forces[2].node = 0, forces[2].newton[1] = NAN;
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_set_forces(loads, forces, 4, &error));
+    CHECK(error.index == 2 && isnan(error.value));
+    forces[2].newton[1] = 0.0f, forces[2].ramp = -1.0f;
+    REFUSED(SUPPLE_E_NEGATIVE, supple_set_forces(loads, forces, 4, &error));
+    CHECK(error.index == 2 && error.value == -1.0);
+    DONE(supple_set_forces(loads, NULL, 0, &error));
+
+    supple_motion motions[2] = {{NODES - 1, 7, {0.0f, 0.0f, 0.0f}, 0.0f}, {NODES - 2, 7, {0.0f, 0.0f, 0.0f}, 0.0f}};
+    motions[1].node = LAYER;
+    REFUSED(SUPPLE_E_NOT_HELD, supple_set_motions(loads, scene, motions, 2, &error));
+    CHECK(error.index == 1 && error.node == LAYER && error.axis == 0);
+    motions[1].node = NODES - 2, motions[1].axes = 15;
+    REFUSED(SUPPLE_E_CHOICE, supple_set_motions(loads, scene, motions, 2, &error));
+    motions[1].axes = 7, motions[1].metre[2] = NAN;
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_set_motions(loads, scene, motions, 2, &error));
+    REFUSED(SUPPLE_E_MISMATCH, supple_set_motions(loads, small_scene, motions, 1, &error));
+    REFUSED(SUPPLE_E_CAPACITY, supple_set_motions(loads, scene, motions, MOTIONS + 1, &error));
+    REFUSED(SUPPLE_E_KIND, supple_set_motions((supple_loads *)(void *)scene, scene, motions, 1, &error));
+}
+
+static void states(void) {
+    supple_state *none = NULL;
+    supple_state *nothing = (supple_state *)(void *)spare;
+    float seconds = 0.0f;
+    memset(spare, 0, sizeof spare);
+    REFUSED(SUPPLE_E_SHORT, supple_state_init(spare, sizeof state_memory - 1, scene, &none));
+    REFUSED(SUPPLE_E_NOT_INITIALISED, supple_step(scene, loads, nothing, 1, NULL, NULL));
+    REFUSED(SUPPLE_E_NOT_INITIALISED, supple_step((supple_scene *)(void *)spare, loads, state, 1, NULL, NULL));
+    REFUSED(SUPPLE_E_NOT_INITIALISED, supple_step(scene, (supple_loads *)(void *)spare, state, 1, NULL, NULL));
+    REFUSED(SUPPLE_E_NO_STEP, supple_step(scene, loads, state, 1, NULL, NULL));
+    REFUSED(SUPPLE_E_MISMATCH, supple_critical_step(scene, small_state, &seconds, NULL));
+    REFUSED(SUPPLE_E_NULL, supple_critical_step(scene, state, NULL, NULL));
+    supple_step_config bad = length;
+#define STEP(expected, change)                                                                                         \
+    bad = length, (change);                                                                                            \
+    REFUSED(expected, supple_set_step(scene, state, &bad, &error))
+    STEP(SUPPLE_E_ABI, bad.abi = 0);
+    STEP(SUPPLE_E_ABI, bad.struct_size = 0);
+    STEP(SUPPLE_E_STEP, bad.seconds = 0.0f);
+    STEP(SUPPLE_E_STEP, bad.seconds = NAN);
+    STEP(SUPPLE_E_NEGATIVE, bad.damping = -1.0f);
+    CHECK(error.value == -1.0);
+    STEP(SUPPLE_E_UNSTABLE, bad.seconds = 0.1f);
+    DONE(supple_critical_step(scene, state, &seconds, NULL));
+    CHECK(error.value == (double)0.1f && error.limit == (double)seconds && error.node < NODES);
+    REFUSED(SUPPLE_E_MISMATCH, supple_set_step(scene, small_state, &length, &error));
+    DONE(supple_set_step(scene, state, &length, &error));
+    REFUSED(SUPPLE_E_MISMATCH, supple_step(scene, small_loads, state, 1, NULL, NULL));
+    REFUSED(SUPPLE_E_MISMATCH, supple_step(small_scene, NULL, state, 1, NULL, NULL));
+    const supple_threads threads = {NULL, 2, NULL};
+    REFUSED(SUPPLE_E_NULL, supple_step(scene, loads, state, 1, &threads, NULL));
+    REFUSED(SUPPLE_E_MISALIGNED, supple_step(scene, loads, state, 1, NULL, (supple_report *)(void *)(spare + 1)));
+
+    supple_vectors vectors;
+    REFUSED(SUPPLE_E_NULL, supple_displacements(state, NULL));
+    REFUSED(SUPPLE_E_NULL, supple_displacements(NULL, &vectors));
+    REFUSED(SUPPLE_E_SHORT, supple_copy_displacements(state, out, 3 * NODES - 1));
+    REFUSED(SUPPLE_E_NULL, supple_copy_velocities(state, NULL, 3 * NODES));
+    REFUSED(SUPPLE_E_MISALIGNED, supple_copy_forces(state, (float *)(void *)((char *)out + 1), 3 * NODES - 1));
+    REFUSED(SUPPLE_E_OVERLAP, supple_copy_forces(state, (float *)(void *)(state_memory + 256), 3 * NODES));
+    REFUSED(SUPPLE_E_OVERLAP, supple_copy_positions(state, out, out, 3 * NODES));
+    REFUSED(SUPPLE_E_NULL, supple_copy_positions(state, NULL, out, 3 * NODES));
+    REFUSED(SUPPLE_E_NULL, supple_state_time(NULL, NULL, NULL));
+    REFUSED(SUPPLE_E_NULL, supple_state_reset(NULL));
+}
+
+static void bytes_of_states(void) {
+    const size_t bytes = supple_saved_size(NODES);
+    REFUSED(SUPPLE_E_SHORT, supple_save(state, saved, bytes - 1));
+    REFUSED(SUPPLE_E_NULL, supple_save(state, NULL, bytes));
+    REFUSED(SUPPLE_E_OVERLAP, supple_save(state, state_memory, bytes));
+    DONE(supple_save(state, saved, sizeof saved));
+    REFUSED(SUPPLE_E_SHORT, supple_restore(state, saved, bytes - 1));
+    REFUSED(SUPPLE_E_SHORT, supple_restore(state, saved, 3));
+    REFUSED(SUPPLE_E_NULL, supple_restore(state, NULL, bytes));
+    REFUSED(SUPPLE_E_MISMATCH, supple_restore(small_state, saved, bytes));
+    REFUSED(SUPPLE_E_NOT_SAVED, supple_restore(state, points, sizeof points));
+    saved[8] = 9;
+    REFUSED(SUPPLE_E_SAVED_VERSION, supple_restore(state, saved, bytes));
+    saved[8] = 1, saved[bytes - 1] ^= 1;
+    REFUSED(SUPPLE_E_SAVED_CHECKSUM, supple_restore(state, saved, bytes));
+}
+
+static void networks(void) {
+    size_t bytes, of_damper;
+    file("weights/compact-10.weights", weights, sizeof weights, &bytes);
+    file("weights/damper.weights", damper, sizeof damper, &of_damper);
+    const supple_learned_config good = {SUPPLE_CONFIG(supple_learned_config), 1, 0, weights, bytes};
+    supple_learned_config bad = good;
+    supple_learned *none = NULL;
+#define LEARNED(expected, change)                                                                                      \
+    bad = good, (change);                                                                                              \
+    REFUSED(expected, supple_learned_init(spare, sizeof spare, scene, &bad, &none, &error))
+    LEARNED(SUPPLE_E_ABI, bad.abi = 77);
+    LEARNED(SUPPLE_E_CHOICE, bad.fallback = 2);
+    LEARNED(SUPPLE_E_CHOICE, bad.reserved = 1);
+    LEARNED(SUPPLE_E_NULL, bad.weights = NULL);
+    LEARNED(SUPPLE_E_WEIGHTS_MISALIGNED, bad.weights = weights + 1);
+    LEARNED(SUPPLE_E_WEIGHTS_SHORT, bad.weights_bytes = 20);
+    LEARNED(SUPPLE_E_WEIGHTS_SHORT, bad.weights_bytes = bytes - 1);
+    CHECK(error.value == (double)(bytes - 1) && error.limit == (double)bytes);
+    LEARNED(SUPPLE_E_NOT_WEIGHTS, bad.weights = points);
+    LEARNED(SUPPLE_E_WEIGHTS_SHAPE, (bad.weights = damper, bad.weights_bytes = of_damper));
+    CHECK(error.value == 4);
+    weights[8] = 9;
+    LEARNED(SUPPLE_E_WEIGHTS_VERSION, bad.abi = SUPPLE_ABI);
+    CHECK(error.value == 9);
+    weights[8] = 1, weights[bytes / 2] ^= 1;
+    LEARNED(SUPPLE_E_WEIGHTS_CHECKSUM, bad.abi = SUPPLE_ABI);
+    weights[bytes / 2] ^= 1;
+    /* A layer table that begins with no inputs, in a file whose checksum is right. */
+    static unsigned char kept[sizeof weights];
+    memcpy(kept, weights, sizeof weights);
+    weights[24] = 0;
+    const uint32_t sum = crc32_of(weights + 20, bytes - 20);
+    memcpy(weights + 16, &sum, 4);
+    LEARNED(SUPPLE_E_WEIGHTS_CONTENT, bad.abi = SUPPLE_ABI);
+    memcpy(weights, kept, sizeof weights);
+    REFUSED(SUPPLE_E_SHORT, supple_learned_init(spare, SUPPLE_LEARNED_SIZE(NODES, 0), scene, &good, &none, &error));
+    CHECK(none == NULL);
+
+    supple_learned_facts facts;
+    DONE(supple_learned_init(learned_memory, sizeof learned_memory, scene, &good, &learned, &error));
+    DONE(supple_learned_describe(learned, &facts));
+    supple_step_config step = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 2.5f, facts.damping};
+    DONE(supple_set_step(scene, state, &step, NULL));
+    REFUSED(SUPPLE_E_STEP_RATIO, supple_learned_lead(scene, loads, state, learned, 1, NULL, NULL));
+    step.seconds = facts.seconds / 3.0f, step.damping = facts.damping + 1.0f;
+    DONE(supple_set_step(scene, state, &step, NULL));
+    REFUSED(SUPPLE_E_DAMPING, supple_learned_lead(scene, loads, state, learned, 1, NULL, NULL));
+    step.damping = facts.damping;
+    DONE(supple_set_step(scene, state, &step, NULL));
+    REFUSED(SUPPLE_E_NOT_LED, supple_learned_step(scene, loads, state, learned, 1, NULL, NULL));
+    REFUSED(SUPPLE_E_MISMATCH, supple_learned_lead(small_scene, NULL, small_state, learned, 1, NULL, NULL));
+    REFUSED(SUPPLE_E_NULL, supple_learned_lead(scene, loads, state, NULL, 1, NULL, NULL));
+    DONE(supple_learned_lead(scene, loads, state, learned, 5, NULL, NULL));
+    DONE(supple_step(scene, loads, state, 1, NULL, NULL));
+    REFUSED(SUPPLE_E_NOT_LED, supple_learned_step(scene, loads, state, learned, 1, NULL, NULL));
+
+    const supple_large_config calm = {SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {1, 1, 3}, damper, of_damper};
+    supple_large_config wrong = calm;
+    supple_large *no_large = NULL;
+    size_t needed = 0;
+#define LARGE(expected, change)                                                                                        \
+    wrong = calm, (change);                                                                                            \
+    REFUSED(expected, supple_large_init(spare, sizeof spare, scene, state, points[0], &wrong, &no_large, &error))
+    LARGE(SUPPLE_E_ABI, wrong.struct_size++);
+    LARGE(SUPPLE_E_CHOICE, wrong.method = 3);
+    LARGE(SUPPLE_E_STEP, wrong.seconds = -1.0f);
+    LARGE(SUPPLE_E_LATTICE, wrong.cells[0] = 5000);
+    LARGE(SUPPLE_E_LATTICE, wrong.cells[0] = 0);
+    LARGE(SUPPLE_E_NULL, wrong.weights = NULL);
+    LARGE(SUPPLE_E_WEIGHTS_SHAPE, (wrong.weights = weights, wrong.weights_bytes = bytes));
+    REFUSED(SUPPLE_E_SHORT, supple_large_init(spare, 50000, scene, state, points[0], &calm, &no_large, &error));
+    REFUSED(SUPPLE_E_NULL, supple_large_init(spare, sizeof spare, scene, state, NULL, &calm, &no_large, &error));
+    REFUSED(SUPPLE_E_NULL, supple_large_size(scene, points[0], &calm, NULL, &error));
+    DONE(supple_large_size(scene, points[0], &calm, &needed, &error));
+    DONE(supple_large_init(large_memory, needed, scene, state, points[0], &calm, &large, &error));
+    REFUSED(SUPPLE_E_KIND, supple_large_step(scene, loads, state, (supple_large *)(void *)learned, 1, NULL));
+    REFUSED(SUPPLE_E_MISMATCH, supple_large_step(small_scene, NULL, small_state, large, 1, NULL));
+}
+
+/* Steps that are not to be believed are not taken. */
+static void divergence(void) {
+    supple_report report;
+    DONE(supple_state_reset(state));
+    DONE(supple_set_step(scene, state, &length, NULL));
+    supple_force force = {NODES / 2, {3e38f, 0.0f, 0.0f}, 0.0f};
+    DONE(supple_set_motions(loads, scene, NULL, 0, NULL));
+    DONE(supple_set_forces(loads, &force, 1, NULL));
+    supple_vectors vectors;
+    DONE(supple_displacements(state, &vectors));
+    const uint64_t before = hash(vectors.first, vectors.stride * vectors.count);
+    const supple_status burst = supple_step(scene, loads, state, 3, NULL, &report);
+    note(burst);
+    CHECK(burst == SUPPLE_E_DIVERGED && report.steps == 0 && report.node < NODES);
+    CHECK(hash(vectors.first, vectors.stride * vectors.count) == before);
+    DONE(supple_set_forces(loads, NULL, 0, NULL));
+
+    /* A state whose energy no load has given. */
+    DONE(supple_step(scene, NULL, state, 1, NULL, NULL));
+    const float fast[3] = {1e-3f, 0.0f, 0.0f};
+    forge(FRONT + 16 * NODES + 16 * (NODES / 2), fast, sizeof fast);
+    DONE(supple_restore(state, saved, sizeof saved));
+    const supple_status kick = supple_step(scene, NULL, state, 3, NULL, &report);
+    note(kick);
+    CHECK(kick == SUPPLE_E_DIVERGED_ENERGY && report.node == NODES / 2 && report.steps == 0);
+
+    /* One that is no number: nothing can be bounded. */
+    const float nan = NAN;
+    float seconds;
+    forge(FRONT + 16 * (NODES / 2), &nan, sizeof nan);
+    DONE(supple_restore(state, saved, sizeof saved));
+    CHECK(supple_critical_step(scene, state, &seconds, NULL) == SUPPLE_E_TOO_STIFF);
+    CHECK(supple_set_step(scene, state, &length, &error) == SUPPLE_E_TOO_STIFF);
+    note(SUPPLE_E_TOO_STIFF);
+
+    /* With half the energy in the account: the step is taken, and told not to be exact. */
+    DONE(supple_state_reset(state));
+    DONE(supple_set_step(scene, state, &length, NULL));
+    move_end(scene, loads, 0.01f, 0.0f, 0.01f);
+    DONE(supple_step(scene, loads, state, 100, NULL, &report));
+    const double account[6] = {0.0, 0.0, 0.0, report.kinetic, 0.0, 0.5 * report.kinetic};
+    forge(LEDGER, account, sizeof account);
+    DONE(supple_restore(state, saved, sizeof saved));
+    const supple_status limited = supple_step(scene, NULL, state, 1, NULL, &report);
+    note(limited);
+    CHECK(limited == SUPPLE_LIMITED && report.steps == 1 && report.energy_excess > 0.5f && report.energy_excess < 3.0f);
+
+    /* A network far from its training tells so. With half the energy in the account its step is undone, and the exact one
+     * has taken over for good. */
+    DONE(supple_state_reset(state));
+    DONE(supple_learned_reset(learned));
+    supple_learned_facts facts;
+    DONE(supple_learned_describe(learned, &facts));
+    const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 3.0f, facts.damping};
+    DONE(supple_set_step(scene, state, &step, NULL));
+    move_end(scene, loads, 0.03f, 0.0f, 0.03f);
+    DONE(supple_learned_lead(scene, loads, state, learned, 100, NULL, &report));
+    const supple_status outside = supple_learned_step(scene, loads, state, learned, 50, NULL, &report);
+    note(outside);
+    CHECK(outside == SUPPLE_OUTSIDE && report.steps == 50 && report.outside > 0.01f);
+
+    DONE(supple_state_reset(state));
+    DONE(supple_learned_reset(learned));
+    move_end(scene, loads, 0.01f, 0.0f, 0.01f);
+    DONE(supple_learned_lead(scene, loads, state, learned, 100, NULL, &report));
+    const double less[6] = {0.0, 0.0, 0.0, report.kinetic, 0.0, 0.5 * report.kinetic};
+    forge(LEDGER, less, sizeof less);
+    DONE(supple_restore(state, saved, sizeof saved));
+    const supple_status fell = supple_learned_step(scene, NULL, state, learned, 2, NULL, &report);
+    note(fell);
+    CHECK(fell == SUPPLE_FELL_BACK && report.steps == 6);
+    DONE(supple_learned_describe(learned, &facts));
+    CHECK(facts.fell_back == 1);
+    CHECK(supple_learned_step(scene, loads, state, learned, 1, NULL, &report) == SUPPLE_FELL_BACK && report.steps == 3);
+}
+
+int main(int argc, char **argv) {
+    (void)argv;
+    watched = argc == 1;
+    CHECK(supple_abi() == SUPPLE_ABI && strlen(supple_version()) > 4);
+    const supple_scene_config config = bar_config();
+    static const float corner[4][3] = {{0, 0, 0}, {0.01f, 0, 0}, {0, 0.01f, 0}, {0, 0, 0.01f}};
+    static const uint32_t one[4] = {0, 1, 2, 3};
+    supple_scene_config small = config;
+    small.nodes = 4, small.elements = 1, small.supports = 1, small.points = corner[0], small.tetrahedra = one;
+    DONE(supple_scene_init(scene_memory, sizeof scene_memory, &config, &scene, &error));
+    DONE(supple_scene_init(small_scene_memory, sizeof small_scene_memory, &small, &small_scene, &error));
+    DONE(supple_state_init(state_memory, sizeof state_memory, scene, &state));
+    DONE(supple_state_init(small_state_memory, sizeof small_state_memory, small_scene, &small_state));
+    DONE(supple_loads_init(loads_memory, sizeof loads_memory, scene, FORCES, MOTIONS, &loads));
+    DONE(supple_loads_init(small_loads_memory, sizeof small_loads_memory, small_scene, 1, 1, &small_loads));
+    CHECK((void *)scene == (void *)scene_memory && (void *)state == (void *)state_memory);
+
+    REFUSED(SUPPLE_E_CHOICE, supple_set_level(99));
+    REFUSED(SUPPLE_E_LEVEL, supple_set_level(supple_level() == SUPPLE_LEVEL_NEON ? SUPPLE_LEVEL_AVX2 : SUPPLE_LEVEL_NEON));
+    DONE(supple_set_level(supple_level()));
+    scenes();
+    acting();
+    states();
+    bytes_of_states();
+    networks();
+    divergence();
+
+    unsigned statuses = 0;
+    const char *const none = supple_status_text(100);
+    for (int status = -128; status < 128; status++) {
+        if (supple_status_text(status) != none) {
+            statuses++;
+            if (!seen[(unsigned char)(status + 128)]) {
+                fprintf(stderr, "status %d (%s) never came up\n", status, supple_status_text(status));
+                return 1;
+            }
+        }
+    }
+    printf("misuse: %u calls refused%s; all %u statuses came up\n", calls, watched ? ", nothing changed" : "", statuses);
+    return 0;
+}

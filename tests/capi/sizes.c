@@ -1,0 +1,54 @@
+/* The constant expressions for sizes are those that the library computes, over the sizes of scenes people have; for lattices
+ * they are never less. */
+#include "body.h"
+
+SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
+
+static supple_large_config large_of(uint32_t method, uint32_t x, uint32_t y, uint32_t z) {
+    return (supple_large_config){SUPPLE_CONFIG(supple_large_config), method, 1e-3f, 10.0f, {x, y, z}, NULL, 0};
+}
+
+int main(void) {
+    unsigned long checked = 0;
+    for (uint32_t nodes = 1; nodes < 3000000; nodes += nodes / 7 + 1) {
+        CHECK(supple_state_size(nodes) == SUPPLE_STATE_SIZE(nodes));
+        for (uint32_t fallback = 0; fallback < 2; fallback++) {
+            CHECK(supple_learned_size(nodes, fallback) == SUPPLE_LEARNED_SIZE(nodes, fallback));
+        }
+        for (uint32_t elements = 1; elements < 12000000; elements += elements / 5 + 1) {
+            for (uint32_t tissues = 1; tissues < 65536; tissues += 4 * tissues) {
+                CHECK(supple_scene_size(nodes, elements, tissues) == SUPPLE_SCENE_SIZE(nodes, elements, tissues));
+                checked++;
+            }
+        }
+    }
+    for (uint32_t forces = 0; forces < 5000; forces += forces / 3 + 1) {
+        for (uint32_t motions = 0; motions < 5000; motions += motions / 3 + 1) {
+            CHECK(supple_loads_size(forces, motions) == SUPPLE_LOADS_SIZE(forces, motions));
+        }
+    }
+
+    const supple_scene_config config = bar_config();
+    supple_scene *scene;
+    CHECK(supple_scene_init(scene_memory, sizeof scene_memory, &config, &scene, NULL) == SUPPLE_OK);
+    size_t most = 0;
+    for (uint32_t x = 1; x < 5; x++) {
+        for (uint32_t z = 1; z < 6; z++) {
+            for (uint32_t method = SUPPLE_MASS_SCALED; method <= SUPPLE_DAMPED; method++) {
+                const supple_large_config large = large_of(method, x, x, z);
+                size_t bytes = 0;
+                const supple_status status = supple_large_size(scene, points[0], &large, &bytes, NULL);
+                const size_t room = SUPPLE_LARGE_SIZE(NODES, method, x, x, z);
+                if (status == SUPPLE_E_LATTICE) {
+                    CHECK((x + 1) * (x + 1) * (z + 1) > SUPPLE_LATTICE_FUNCTIONS);
+                    continue;
+                }
+                CHECK(status == SUPPLE_OK && bytes <= room && bytes > SUPPLE_LARGE_FRONT);
+                CHECK(method != SUPPLE_MASS_SCALED || bytes == SUPPLE_LARGE_SIZE(NODES, method, 0, 0, 0));
+                most = room - bytes > most ? room - bytes : most;
+            }
+        }
+    }
+    printf("sizes: %lu scenes equal; lattices at most %zu bytes more than needed\n", checked, most);
+    return 0;
+}
