@@ -1,0 +1,708 @@
+#ifndef SUPPLE_HPP
+#define SUPPLE_HPP
+
+// supple for C++17: the functions of supple.h with types, and nothing else. Nothing is allocated, nothing throws,
+// nothing is virtual. Objects live in memory of the host; scene, loads, state, learned and large only point to
+// them: copy them like pointers, there is nothing to release, but the memory must stay as long as they are used.
+// Units are SI: m, kg, s, N, Pa, J. What a call does in detail stands in supple.h.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <type_traits>
+#include <utility>
+
+#include "supple.h"
+
+namespace supple {
+
+// No node, element or axis.
+inline constexpr std::uint32_t none = SUPPLE_NONE;
+// Memory of objects begins at a multiple of so many bytes.
+inline constexpr std::size_t align = SUPPLE_ALIGN;
+
+using support = supple_support;
+using tissue = supple_tissue;
+using force = supple_force;
+using motion = supple_motion;
+using threads = supple_threads;
+using report = supple_report;
+using scene_facts = supple_scene_facts;
+using learned_facts = supple_learned_facts;
+// Where and with which value something went wrong; `describe` makes a sentence of it.
+using error = supple_error;
+
+// What became of a call: zero is done, positive done with a remark, negative not done. See supple_status.
+enum class [[nodiscard]] status : std::int32_t {
+    ok = SUPPLE_OK,
+    limited = SUPPLE_LIMITED,
+    outside = SUPPLE_OUTSIDE,
+    fell_back = SUPPLE_FELL_BACK,
+
+    e_null = SUPPLE_E_NULL,
+    e_misaligned = SUPPLE_E_MISALIGNED,
+    e_short = SUPPLE_E_SHORT,
+    e_abi = SUPPLE_E_ABI,
+    e_not_initialised = SUPPLE_E_NOT_INITIALISED,
+    e_kind = SUPPLE_E_KIND,
+    e_choice = SUPPLE_E_CHOICE,
+    e_mismatch = SUPPLE_E_MISMATCH,
+    e_capacity = SUPPLE_E_CAPACITY,
+    e_index = SUPPLE_E_INDEX,
+    e_not_finite = SUPPLE_E_NOT_FINITE,
+    e_negative = SUPPLE_E_NEGATIVE,
+    e_overlap = SUPPLE_E_OVERLAP,
+
+    e_mesh_empty = SUPPLE_E_MESH_EMPTY,
+    e_mesh_repeated_node = SUPPLE_E_MESH_REPEATED_NODE,
+    e_mesh_degenerate = SUPPLE_E_MESH_DEGENERATE,
+    e_mesh_inverted = SUPPLE_E_MESH_INVERTED,
+    e_mesh_unused_node = SUPPLE_E_MESH_UNUSED_NODE,
+    e_constant = SUPPLE_E_CONSTANT,
+    e_density = SUPPLE_E_DENSITY,
+    e_tissue = SUPPLE_E_TISSUE,
+    e_nothing_moves = SUPPLE_E_NOTHING_MOVES,
+    e_law = SUPPLE_E_LAW,
+
+    e_not_held = SUPPLE_E_NOT_HELD,
+    e_no_step = SUPPLE_E_NO_STEP,
+    e_step = SUPPLE_E_STEP,
+    e_unstable = SUPPLE_E_UNSTABLE,
+
+    e_weights_misaligned = SUPPLE_E_WEIGHTS_MISALIGNED,
+    e_weights_short = SUPPLE_E_WEIGHTS_SHORT,
+    e_not_weights = SUPPLE_E_NOT_WEIGHTS,
+    e_weights_version = SUPPLE_E_WEIGHTS_VERSION,
+    e_weights_checksum = SUPPLE_E_WEIGHTS_CHECKSUM,
+    e_weights_content = SUPPLE_E_WEIGHTS_CONTENT,
+    e_weights_shape = SUPPLE_E_WEIGHTS_SHAPE,
+
+    e_not_led = SUPPLE_E_NOT_LED,
+    e_step_ratio = SUPPLE_E_STEP_RATIO,
+    e_damping = SUPPLE_E_DAMPING,
+
+    e_lattice = SUPPLE_E_LATTICE,
+    e_too_stiff = SUPPLE_E_TOO_STIFF,
+
+    e_not_saved = SUPPLE_E_NOT_SAVED,
+    e_saved_version = SUPPLE_E_SAVED_VERSION,
+    e_saved_checksum = SUPPLE_E_SAVED_CHECKSUM,
+
+    e_level = SUPPLE_E_LEVEL,
+
+    e_diverged = SUPPLE_E_DIVERGED,
+    e_diverged_energy = SUPPLE_E_DIVERGED_ENERGY,
+};
+
+// For all elements of a scene: neo_hookean with c, d (Pa), exponential with a (Pa), b, d (Pa).
+enum class law : std::uint32_t { neo_hookean = SUPPLE_NEO_HOOKEAN, exponential = SUPPLE_EXPONENTIAL };
+
+// checked: elements must have positive volumes. normalised: they are turned where needed.
+enum class winding : std::uint32_t { checked = SUPPLE_WINDING_CHECKED, normalised = SUPPLE_WINDING_NORMALISED };
+
+// How large steps are kept stable.
+enum class method : std::uint32_t {
+    mass_scaled = SUPPLE_MASS_SCALED,
+    multilevel = SUPPLE_MULTILEVEL,
+    damped = SUPPLE_DAMPED
+};
+
+// Instructions that steps use.
+enum class level : std::uint32_t {
+    portable = SUPPLE_LEVEL_PORTABLE,
+    avx2 = SUPPLE_LEVEL_AVX2,
+    avx512 = SUPPLE_LEVEL_AVX512,
+    neon = SUPPLE_LEVEL_NEON,
+    simd128 = SUPPLE_LEVEL_SIMD128
+};
+
+// Whether a call did what it was asked for, with a remark or without.
+[[nodiscard]] constexpr bool is_done(status code) noexcept { return static_cast<std::int32_t>(code) >= 0; }
+
+// A sentence without numbers; there for as long as the library is.
+[[nodiscard]] inline const char *text(status code) noexcept {
+    return supple_status_text(static_cast<std::int32_t>(code));
+}
+
+// Elements of an array that belongs to somebody else.
+template <class T> class span {
+public:
+    constexpr span() noexcept = default;
+    constexpr span(T *first, std::size_t count) noexcept : first_(first), count_(count) {}
+    template <std::size_t Count>
+    constexpr span(T (&array)[Count]) noexcept : first_(array), count_(Count) {}
+    // Of anything with data() and size(): std::vector, std::array, std::span.
+    template <class Array, class Data = decltype(std::declval<Array &>().data()),
+              class = std::enable_if_t<std::is_convertible_v<std::remove_pointer_t<Data> (*)[], T (*)[]>>>
+    constexpr span(Array &&array) noexcept : first_(array.data()), count_(array.size()) {}
+
+    [[nodiscard]] constexpr T *data() const noexcept { return first_; }
+    [[nodiscard]] constexpr std::size_t size() const noexcept { return count_; }
+    [[nodiscard]] constexpr T &operator[](std::size_t index) const noexcept { return first_[index]; }
+    [[nodiscard]] constexpr T *begin() const noexcept { return first_; }
+    [[nodiscard]] constexpr T *end() const noexcept { return first_ + count_; }
+
+private:
+    T *first_ = nullptr;
+    std::size_t count_ = 0;
+};
+
+namespace detail {
+
+// `void` with or without const, and its bytes.
+template <class Void> class raw {
+    template <class T> static constexpr bool fits = std::is_convertible_v<T *, Void *> &&
+                                                    std::is_trivially_copyable_v<T>;
+
+public:
+    constexpr raw() noexcept = default;
+    constexpr raw(Void *first, std::size_t bytes) noexcept : first_(first), bytes_(bytes) {}
+    template <class T, std::size_t Count, class = std::enable_if_t<fits<T>>>
+    constexpr raw(T (&array)[Count]) noexcept : first_(array), bytes_(sizeof array) {}
+    template <class Array, class Data = decltype(std::declval<Array &>().data()),
+              class = std::enable_if_t<fits<std::remove_pointer_t<Data>>>>
+    constexpr raw(Array &&array) noexcept : first_(array.data()), bytes_(array.size() * sizeof *array.data()) {}
+
+    [[nodiscard]] constexpr Void *data() const noexcept { return first_; }
+    [[nodiscard]] constexpr std::size_t size() const noexcept { return bytes_; }
+
+private:
+    Void *first_ = nullptr;
+    std::size_t bytes_ = 0;
+};
+
+constexpr status of(supple_status code) noexcept { return static_cast<status>(code); }
+
+constexpr error nothing(status code, double value = 0.0, double limit = 0.0) noexcept {
+    return {static_cast<supple_status>(code), none, none, none, value, limit};
+}
+
+template <class Config> constexpr Config config() noexcept {
+    Config made{};
+    made.struct_size = sizeof(Config);
+    made.abi = SUPPLE_ABI;
+    return made;
+}
+
+// That no status of supple.h is forgotten: with -Wall compilers warn of one that is missing in this switch.
+constexpr bool every(supple_status code) noexcept {
+    switch (code) {
+    case SUPPLE_OK: return status::ok == of(code);
+    case SUPPLE_LIMITED: return status::limited == of(code);
+    case SUPPLE_OUTSIDE: return status::outside == of(code);
+    case SUPPLE_FELL_BACK: return status::fell_back == of(code);
+    case SUPPLE_E_NULL: return status::e_null == of(code);
+    case SUPPLE_E_MISALIGNED: return status::e_misaligned == of(code);
+    case SUPPLE_E_SHORT: return status::e_short == of(code);
+    case SUPPLE_E_ABI: return status::e_abi == of(code);
+    case SUPPLE_E_NOT_INITIALISED: return status::e_not_initialised == of(code);
+    case SUPPLE_E_KIND: return status::e_kind == of(code);
+    case SUPPLE_E_CHOICE: return status::e_choice == of(code);
+    case SUPPLE_E_MISMATCH: return status::e_mismatch == of(code);
+    case SUPPLE_E_CAPACITY: return status::e_capacity == of(code);
+    case SUPPLE_E_INDEX: return status::e_index == of(code);
+    case SUPPLE_E_NOT_FINITE: return status::e_not_finite == of(code);
+    case SUPPLE_E_NEGATIVE: return status::e_negative == of(code);
+    case SUPPLE_E_OVERLAP: return status::e_overlap == of(code);
+    case SUPPLE_E_MESH_EMPTY: return status::e_mesh_empty == of(code);
+    case SUPPLE_E_MESH_REPEATED_NODE: return status::e_mesh_repeated_node == of(code);
+    case SUPPLE_E_MESH_DEGENERATE: return status::e_mesh_degenerate == of(code);
+    case SUPPLE_E_MESH_INVERTED: return status::e_mesh_inverted == of(code);
+    case SUPPLE_E_MESH_UNUSED_NODE: return status::e_mesh_unused_node == of(code);
+    case SUPPLE_E_CONSTANT: return status::e_constant == of(code);
+    case SUPPLE_E_DENSITY: return status::e_density == of(code);
+    case SUPPLE_E_TISSUE: return status::e_tissue == of(code);
+    case SUPPLE_E_NOTHING_MOVES: return status::e_nothing_moves == of(code);
+    case SUPPLE_E_LAW: return status::e_law == of(code);
+    case SUPPLE_E_NOT_HELD: return status::e_not_held == of(code);
+    case SUPPLE_E_NO_STEP: return status::e_no_step == of(code);
+    case SUPPLE_E_STEP: return status::e_step == of(code);
+    case SUPPLE_E_UNSTABLE: return status::e_unstable == of(code);
+    case SUPPLE_E_WEIGHTS_MISALIGNED: return status::e_weights_misaligned == of(code);
+    case SUPPLE_E_WEIGHTS_SHORT: return status::e_weights_short == of(code);
+    case SUPPLE_E_NOT_WEIGHTS: return status::e_not_weights == of(code);
+    case SUPPLE_E_WEIGHTS_VERSION: return status::e_weights_version == of(code);
+    case SUPPLE_E_WEIGHTS_CHECKSUM: return status::e_weights_checksum == of(code);
+    case SUPPLE_E_WEIGHTS_CONTENT: return status::e_weights_content == of(code);
+    case SUPPLE_E_WEIGHTS_SHAPE: return status::e_weights_shape == of(code);
+    case SUPPLE_E_NOT_LED: return status::e_not_led == of(code);
+    case SUPPLE_E_STEP_RATIO: return status::e_step_ratio == of(code);
+    case SUPPLE_E_DAMPING: return status::e_damping == of(code);
+    case SUPPLE_E_LATTICE: return status::e_lattice == of(code);
+    case SUPPLE_E_TOO_STIFF: return status::e_too_stiff == of(code);
+    case SUPPLE_E_NOT_SAVED: return status::e_not_saved == of(code);
+    case SUPPLE_E_SAVED_VERSION: return status::e_saved_version == of(code);
+    case SUPPLE_E_SAVED_CHECKSUM: return status::e_saved_checksum == of(code);
+    case SUPPLE_E_LEVEL: return status::e_level == of(code);
+    case SUPPLE_E_DIVERGED: return status::e_diverged == of(code);
+    case SUPPLE_E_DIVERGED_ENERGY: return status::e_diverged_energy == of(code);
+    }
+    return false;
+}
+static_assert(every(SUPPLE_OK));
+
+// What index, value and limit of an error stand for; what does not apply is left out of sentences.
+struct meaning {
+    const char *index;
+    const char *unit;
+    bool has_value;
+    bool has_limit;
+};
+
+constexpr meaning meaning_of(status code) noexcept {
+    switch (code) {
+    case status::e_short:
+    case status::e_mismatch:
+    case status::e_capacity:
+    case status::e_abi:
+    case status::e_weights_short: return {"entry", "", true, true};
+    case status::e_choice: return {"entry", "", true, false};
+    case status::e_index: return {"entry", "", false, true};
+    case status::e_not_finite:
+    case status::e_negative: return {"entry", "", true, false};
+    case status::e_mesh_degenerate:
+    case status::e_mesh_inverted: return {"element", " m^3", true, false};
+    case status::e_constant: return {"element", "", true, false};
+    case status::e_density: return {"element", " kg/m^3", true, false};
+    case status::e_mesh_repeated_node:
+    case status::e_tissue: return {"element", "", false, false};
+    case status::e_law: return {"entry", "", true, false};
+    case status::e_not_held: return {"motion", "", false, false};
+    case status::e_step: return {"entry", " s", true, false};
+    case status::e_unstable:
+    case status::e_step_ratio: return {"entry", " s", true, true};
+    case status::e_weights_version:
+    case status::e_weights_shape:
+    case status::e_saved_version: return {"entry", "", true, false};
+    case status::e_weights_content: return {"layer", "", true, false};
+    case status::e_damping: return {"entry", " 1/s", true, true};
+    case status::e_diverged_energy: return {"entry", " J", true, true};
+    default: return {"entry", "", false, false};
+    }
+}
+
+} // namespace detail
+
+// Memory for an object, aligned to supple::align; of an array, std::vector, std::array, or a pointer with its bytes.
+using memory = detail::raw<void>;
+// Bytes that are only read, such as a weight file, in the same ways.
+using bytes = detail::raw<const void>;
+
+// Something that was made, or why it was not. `value` is of use only if `made`.
+template <class T> struct [[nodiscard]] result {
+    supple::status status;
+    supple::error error;
+    T value;
+
+    [[nodiscard]] constexpr explicit operator bool() const noexcept { return is_done(status); }
+};
+
+// Writes a sentence with place and value, cut where the buffer ends, and returns the buffer; "" without one.
+[[nodiscard]] inline const char *describe(const error &what, span<char> out) noexcept {
+    if (out.size() == 0) return "";
+    const status code = detail::of(what.status);
+    const detail::meaning means = detail::meaning_of(code);
+    std::size_t used = 0;
+    const auto add = [&](int written) {
+        used += written > 0 ? static_cast<std::size_t>(written) : 0;
+        if (used >= out.size()) used = out.size() - 1;
+    };
+    const auto at = [&] { return out.data() + used; };
+    const auto left = [&] { return out.size() - used; };
+    const char *next = ": ";
+    const auto separate = [&] { add(std::snprintf(at(), left(), "%s", next)), next = ", "; };
+    add(std::snprintf(at(), left(), "%s", text(code)));
+    if (what.index != none) separate(), add(std::snprintf(at(), left(), "%s %lu", means.index, 0ul + what.index));
+    if (what.node != none) separate(), add(std::snprintf(at(), left(), "node %lu", 0ul + what.node));
+    if (what.axis < 3) separate(), add(std::snprintf(at(), left(), "axis %c", "xyz"[what.axis]));
+    if (means.has_value) separate(), add(std::snprintf(at(), left(), "%.6g%s", what.value, means.unit));
+    if (means.has_limit) separate(), add(std::snprintf(at(), left(), "against %.6g%s", what.limit, means.unit));
+    return out.data();
+}
+
+// Whether the library has the interface of this header.
+[[nodiscard]] inline bool is_of_this_abi() noexcept { return supple_abi() == SUPPLE_ABI; }
+
+// Such as "0.1.0".
+[[nodiscard]] inline const char *version() noexcept { return supple_version(); }
+
+// The instructions that steps use.
+[[nodiscard]] inline level current_level() noexcept { return static_cast<level>(supple_level()); }
+
+// Makes all later steps of this process use these instructions. Call it before threads take steps.
+inline status set_level(level chosen) noexcept {
+    return detail::of(supple_set_level(static_cast<std::uint32_t>(chosen)));
+}
+
+// What a scene is built from. All is copied.
+struct body {
+    supple::law law = law::neo_hookean;
+    supple::winding winding = winding::checked;
+    span<const float> points;               // three coordinates of each node, m
+    span<const std::uint32_t> tetrahedra;   // four nodes of each element, from zero
+    span<const support> supports;
+    span<const tissue> tissues;
+    span<const std::uint16_t> tissue_of_element; // with one tissue: empty
+};
+
+// What is simulated. Any number of threads may use one at the same time.
+class scene {
+public:
+    constexpr scene() noexcept = default;
+    constexpr explicit scene(supple_scene *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_scene *raw() const noexcept { return raw_; }
+
+    // Bytes of memory that one needs.
+    [[nodiscard]] static constexpr std::size_t size(std::uint32_t nodes, std::uint32_t elements,
+                                                    std::uint32_t tissues = 1) noexcept {
+        return SUPPLE_SCENE_SIZE(nodes, elements, tissues);
+    }
+
+    // Builds one in memory of at least `size` bytes.
+    static result<scene> make(memory place, const body &from) noexcept {
+        result<scene> made{status::ok, detail::nothing(status::ok), {}};
+        const auto refuse = [&](status code, std::size_t value, std::size_t limit) {
+            made.status = code;
+            made.error = detail::nothing(code, static_cast<double>(value), static_cast<double>(limit));
+            return made;
+        };
+        const std::size_t elements = from.tetrahedra.size() / 4;
+        for (const std::size_t count : {from.points.size(), from.tetrahedra.size(), from.supports.size()})
+            if (count > UINT32_MAX) return refuse(status::e_capacity, count, UINT32_MAX);
+        if (from.tissues.size() > UINT16_MAX) return refuse(status::e_capacity, from.tissues.size(), UINT16_MAX);
+        if (from.points.size() % 3 != 0)
+            return refuse(status::e_short, from.points.size(), from.points.size() / 3 * 3 + 3);
+        if (from.tetrahedra.size() % 4 != 0)
+            return refuse(status::e_short, from.tetrahedra.size(), elements * 4 + 4);
+        if (from.tissues.size() > 1 && from.tissue_of_element.size() < elements)
+            return refuse(status::e_short, from.tissue_of_element.size(), elements);
+        auto config = detail::config<supple_scene_config>();
+        config.law = static_cast<std::uint32_t>(from.law);
+        config.winding = static_cast<std::uint32_t>(from.winding);
+        config.nodes = static_cast<std::uint32_t>(from.points.size() / 3);
+        config.elements = static_cast<std::uint32_t>(elements);
+        config.supports = static_cast<std::uint32_t>(from.supports.size());
+        config.tissues = static_cast<std::uint32_t>(from.tissues.size());
+        config.points = from.points.data();
+        config.tetrahedra = from.tetrahedra.data();
+        config.support = from.supports.data();
+        config.tissue = from.tissues.data();
+        config.tissue_of_element = from.tissues.size() > 1 ? from.tissue_of_element.data() : nullptr;
+        made.status =
+            detail::of(supple_scene_init(place.data(), place.size(), &config, &made.value.raw_, &made.error));
+        return made;
+    }
+
+    // Sizes and costs.
+    [[nodiscard]] result<scene_facts> describe() const noexcept {
+        result<scene_facts> found{};
+        found.status = detail::of(supple_scene_describe(raw_, &found.value));
+        found.error = detail::nothing(found.status);
+        return found;
+    }
+
+private:
+    supple_scene *raw_ = nullptr;
+};
+
+// What acts on a scene. One thread at a time.
+class loads {
+public:
+    // No loads: supports stand still.
+    constexpr loads() noexcept = default;
+    constexpr explicit loads(supple_loads *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_loads *raw() const noexcept { return raw_; }
+
+    // Bytes of memory that some with room for so many forces and motions need.
+    [[nodiscard]] static constexpr std::size_t size(std::uint32_t forces, std::uint32_t motions) noexcept {
+        return SUPPLE_LOADS_SIZE(forces, motions);
+    }
+
+    // Prepares them, none yet, in memory of at least `size` bytes.
+    static result<loads> make(memory place, scene of, std::uint32_t forces, std::uint32_t motions) noexcept {
+        result<loads> made{};
+        made.status = detail::of(
+            supple_loads_init(place.data(), place.size(), of.raw(), forces, motions, &made.value.raw_));
+        made.error = detail::nothing(made.status);
+        return made;
+    }
+
+    // m/s^2.
+    status set_gravity(const std::array<float, 3> &gravity) const noexcept {
+        return detail::of(supple_set_gravity(raw_, gravity.data()));
+    }
+
+    // Replaces all forces; they are copied.
+    status set_forces(span<const force> all, error *why = nullptr) const noexcept {
+        if (all.size() > UINT32_MAX) return too_many(all.size(), why);
+        const auto count = static_cast<std::uint32_t>(all.size());
+        return detail::of(supple_set_forces(raw_, all.data(), count, why));
+    }
+
+    // Replaces all motions; they are copied. A ramp of zero: reached evenly over the next call that takes steps.
+    status set_motions(scene of, span<const motion> all, error *why = nullptr) const noexcept {
+        if (all.size() > UINT32_MAX) return too_many(all.size(), why);
+        const auto count = static_cast<std::uint32_t>(all.size());
+        return detail::of(supple_set_motions(raw_, of.raw(), all.data(), count, why));
+    }
+
+private:
+    static status too_many(std::size_t count, error *why) noexcept {
+        if (why) *why = detail::nothing(status::e_capacity, static_cast<double>(count), UINT32_MAX);
+        return status::e_capacity;
+    }
+
+    supple_loads *raw_ = nullptr;
+};
+
+// Vectors of a state where they are, three floats each. Read them between calls that change the state.
+class vectors {
+public:
+    constexpr vectors() noexcept = default;
+    constexpr explicit vectors(const supple_vectors &raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr std::uint32_t size() const noexcept { return raw_.count; }
+    [[nodiscard]] const float *operator[](std::uint32_t node) const noexcept {
+        return reinterpret_cast<const float *>(reinterpret_cast<const unsigned char *>(raw_.first) +
+                                               raw_.stride * node);
+    }
+
+private:
+    supple_vectors raw_{};
+};
+
+// Bound on the stable step, and the node that sets it.
+struct critical_step {
+    float seconds;
+    std::uint32_t node;
+};
+
+// Simulated time, and steps taken.
+struct moment {
+    double seconds;
+    std::uint64_t steps;
+};
+
+// What moves. One thread at a time. It may be copied with memcpy.
+class state {
+public:
+    constexpr state() noexcept = default;
+    constexpr explicit state(supple_state *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_state *raw() const noexcept { return raw_; }
+
+    // Bytes of memory that one needs.
+    [[nodiscard]] static constexpr std::size_t size(std::uint32_t nodes) noexcept {
+        return SUPPLE_STATE_SIZE(nodes);
+    }
+
+    // Prepares one, at rest, in memory of at least `size` bytes.
+    static result<state> make(memory place, scene of) noexcept {
+        result<state> made{};
+        made.status = detail::of(supple_state_init(place.data(), place.size(), of.raw(), &made.value.raw_));
+        made.error = detail::nothing(made.status);
+        return made;
+    }
+
+    // Back to rest at time zero; the step stays.
+    status reset() const noexcept { return detail::of(supple_state_reset(raw_)); }
+
+    // Bound on the stable step at these displacements, s; costs a few force evaluations.
+    [[nodiscard]] result<supple::critical_step> critical_step(scene of) const noexcept {
+        result<supple::critical_step> found{};
+        found.status =
+            detail::of(supple_critical_step(of.raw(), raw_, &found.value.seconds, &found.value.node));
+        found.error = detail::nothing(found.status);
+        return found;
+    }
+
+    // Sets the exact step, s, and the damping, 1/s.
+    status set_step(scene of, float seconds, float damping, error *why = nullptr) const noexcept {
+        auto config = detail::config<supple_step_config>();
+        config.seconds = seconds;
+        config.damping = damping;
+        return detail::of(supple_set_step(of.raw(), raw_, &config, why));
+    }
+
+    // Takes exact steps; all of the calling thread's, or on threads of the host.
+    status step(scene of, loads acting, std::uint32_t count, report *found = nullptr,
+                const threads *on = nullptr) const noexcept {
+        return detail::of(supple_step(of.raw(), acting.raw(), raw_, count, on, found));
+    }
+
+    // Simulated time, s, and steps taken.
+    [[nodiscard]] result<moment> now() const noexcept {
+        result<moment> found{};
+        found.status = detail::of(supple_state_time(raw_, &found.value.seconds, &found.value.steps));
+        found.error = detail::nothing(found.status);
+        return found;
+    }
+
+    // Where the displacements are, m, for as long as the state is there.
+    [[nodiscard]] result<vectors> displacements() const noexcept {
+        supple_vectors found{};
+        const status code = detail::of(supple_displacements(raw_, &found));
+        return {code, detail::nothing(code), vectors(found)};
+    }
+
+    // Displacements, m, three floats a node.
+    status copy_displacements(span<float> out) const noexcept {
+        return detail::of(supple_copy_displacements(raw_, out.data(), out.size()));
+    }
+
+    // Points at rest (those of the scene) with their displacements, m, three floats a node.
+    status copy_positions(span<const float> points, span<float> out) const noexcept {
+        const auto there = displacements();
+        if (there && points.size() / 3 < there.value.size()) return status::e_short;
+        return detail::of(supple_copy_positions(raw_, points.data(), out.data(), out.size()));
+    }
+
+    // Velocities over the latest step, m/s, three floats a node.
+    status copy_velocities(span<float> out) const noexcept {
+        return detail::of(supple_copy_velocities(raw_, out.data(), out.size()));
+    }
+
+    // Forces on the nodes at the start of the latest step, N, three floats a node; minus the reaction where held.
+    status copy_forces(span<float> out) const noexcept {
+        return detail::of(supple_copy_forces(raw_, out.data(), out.size()));
+    }
+
+    // Bytes that a saved state has.
+    [[nodiscard]] static std::size_t saved_size(std::uint32_t nodes) noexcept { return supple_saved_size(nodes); }
+
+    // Saves the state with its step, to any address.
+    status save(memory to) const noexcept { return detail::of(supple_save(raw_, to.data(), to.size())); }
+
+    // Goes on as the saved state would have, to the bit.
+    status restore(bytes from) const noexcept {
+        return detail::of(supple_restore(raw_, from.data(), from.size()));
+    }
+
+private:
+    supple_state *raw_ = nullptr;
+};
+
+// Learned steps. One thread at a time.
+class learned {
+public:
+    constexpr learned() noexcept = default;
+    constexpr explicit learned(supple_learned *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_learned *raw() const noexcept { return raw_; }
+
+    // Bytes of memory that they need.
+    [[nodiscard]] static constexpr std::size_t size(std::uint32_t nodes, bool fallback) noexcept {
+        return SUPPLE_LEARNED_SIZE(nodes, fallback);
+    }
+
+    // Prepares them in memory of at least `size` bytes. The weights are not copied: they must stay. With fallback
+    // the exact step takes over for good where a learned one is not to be believed.
+    static result<learned> make(memory place, scene of, bytes weights, bool fallback) noexcept {
+        result<learned> made{status::ok, detail::nothing(status::ok), {}};
+        auto config = detail::config<supple_learned_config>();
+        config.fallback = fallback ? 1 : 0;
+        config.weights = weights.data();
+        config.weights_bytes = weights.size();
+        made.status = detail::of(supple_learned_init(place.data(), place.size(), of.raw(), &config,
+                                                     &made.value.raw_, &made.error));
+        return made;
+    }
+
+    // For a motion from rest: not led, not fallen back.
+    status reset() const noexcept { return detail::of(supple_learned_reset(raw_)); }
+
+    // What the network was trained for.
+    [[nodiscard]] result<learned_facts> describe() const noexcept {
+        result<learned_facts> found{};
+        found.status = detail::of(supple_learned_describe(raw_, &found.value));
+        found.error = detail::nothing(found.status);
+        return found;
+    }
+
+    // The exact step leads, `count` times over the length of a learned step.
+    status lead(scene of, loads acting, state moved, std::uint32_t count, report *found = nullptr,
+                const threads *on = nullptr) const noexcept {
+        return detail::of(supple_learned_lead(of.raw(), acting.raw(), moved.raw(), raw_, count, on, found));
+    }
+
+    // Takes learned steps.
+    status step(scene of, loads acting, state moved, std::uint32_t count, report *found = nullptr,
+                const threads *on = nullptr) const noexcept {
+        return detail::of(supple_learned_step(of.raw(), acting.raw(), moved.raw(), raw_, count, on, found));
+    }
+
+private:
+    supple_learned *raw_ = nullptr;
+};
+
+// What large steps need.
+struct large_steps {
+    supple::method method = method::multilevel;
+    float seconds = 0.0f;                    // length of a step, s
+    float damping = 0.0f;                    // proportional to mass, 1/s
+    std::array<std::uint32_t, 3> cells = {}; // of the lattice along x, y, z; zeros: chosen for the scene
+    bytes weights = {};                      // of a damper, for method::damped; not copied: they must stay
+};
+
+// Steps beyond the critical one. One thread at a time.
+class large {
+public:
+    constexpr large() noexcept = default;
+    constexpr explicit large(supple_large *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_large *raw() const noexcept { return raw_; }
+
+    // Bytes of memory that they need. `points` are those of the scene, m.
+    static result<std::size_t> size(scene of, span<const float> points, const large_steps &steps) noexcept {
+        result<std::size_t> found{status::ok, detail::nothing(status::ok), 0};
+        if (!has_points(of, points, found)) return found;
+        const auto config = config_of(steps);
+        found.status =
+            detail::of(supple_large_size(of.raw(), points.data(), &config, &found.value, &found.error));
+        return found;
+    }
+
+    // Prepares them from the state as it is, in memory of at least `size` bytes; takes as long as some steps.
+    static result<large> make(memory place, scene of, state moved, span<const float> points,
+                              const large_steps &steps) noexcept {
+        result<large> made{status::ok, detail::nothing(status::ok), {}};
+        if (!has_points(of, points, made)) return made;
+        const auto config = config_of(steps);
+        made.status = detail::of(supple_large_init(place.data(), place.size(), of.raw(), moved.raw(),
+                                                   points.data(), &config, &made.value.raw_, &made.error));
+        return made;
+    }
+
+    // Takes large steps.
+    status step(scene of, loads acting, state moved, std::uint32_t count, report *found = nullptr) const noexcept {
+        return detail::of(supple_large_step(of.raw(), acting.raw(), moved.raw(), raw_, count, found));
+    }
+
+private:
+    static supple_large_config config_of(const large_steps &steps) noexcept {
+        auto config = detail::config<supple_large_config>();
+        config.method = static_cast<std::uint32_t>(steps.method);
+        config.seconds = steps.seconds;
+        config.damping = steps.damping;
+        for (std::size_t axis = 0; axis < 3; axis++) config.cells[axis] = steps.cells[axis];
+        config.weights = steps.weights.data();
+        config.weights_bytes = steps.weights.size();
+        return config;
+    }
+
+    // The library takes the number of points on trust; here it is known.
+    template <class T> static bool has_points(scene of, span<const float> points, result<T> &answer) noexcept {
+        const auto facts = of.describe();
+        answer.status = facts.status;
+        answer.error = facts.error;
+        if (facts && points.size() / 3 < facts.value.nodes) {
+            answer.status = status::e_short;
+            answer.error = detail::nothing(answer.status, static_cast<double>(points.size()),
+                                           3.0 * facts.value.nodes);
+        }
+        return bool(answer);
+    }
+
+    supple_large *raw_ = nullptr;
+};
+
+} // namespace supple
+
+#endif
