@@ -1,0 +1,63 @@
+// Reads what the examples need of a Gmsh 2.2 ASCII mesh: nodes, and tetrahedra (elements of type 4); others are
+// left out. Nodes must be numbered from 1 in order.
+#pragma once
+
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace gmsh {
+
+struct mesh {
+    std::vector<float> points;             // three coordinates of each node, in the file's unit
+    std::vector<std::uint32_t> tetrahedra; // four nodes of each element, from zero
+};
+
+// Throws std::runtime_error with file, line and what is wrong there.
+inline mesh read(const std::string &path) {
+    std::ifstream file(path);
+    if (!file) throw std::runtime_error(path + ": cannot be opened");
+    std::string text, section;
+    std::size_t line = 0;
+    const auto problem = [&](const std::string &what) {
+        return std::runtime_error(path + ", line " + std::to_string(line) + ": " + what);
+    };
+    const auto next = [&] { return line++, static_cast<bool>(std::getline(file, text)); };
+    mesh read;
+    while (next()) {
+        const bool nodes = text.rfind("$Nodes", 0) == 0, elements = text.rfind("$Elements", 0) == 0;
+        if (text.rfind("$MeshFormat", 0) == 0 && next() && text.rfind("2.2 0", 0) != 0)
+            throw problem("format '" + text + "', not Gmsh 2.2 ASCII");
+        if (!nodes && !elements) continue;
+        next();
+        const unsigned long count = std::strtoul(text.c_str(), nullptr, 10);
+        for (unsigned long entry = 0; entry < count; entry++) {
+            if (!next()) throw problem("the file ends before entry " + std::to_string(entry + 1));
+            std::istringstream words(text);
+            unsigned long number = 0, type = 0, tags = 0, skipped = 0, node = 0;
+            words >> number;
+            if (nodes) {
+                float x = 0, y = 0, z = 0;
+                if (!(words >> x >> y >> z) || number != entry + 1)
+                    throw problem("not node " + std::to_string(entry + 1) + " with three coordinates");
+                read.points.insert(read.points.end(), {x, y, z});
+                continue;
+            }
+            words >> type >> tags;
+            if (type != 4) continue;
+            while (tags-- > 0) words >> skipped;
+            for (int corner = 0; corner < 4; corner++) {
+                if (!(words >> node) || node < 1) throw problem("not an element with four nodes");
+                read.tetrahedra.push_back(static_cast<std::uint32_t>(node - 1));
+            }
+        }
+    }
+    if (read.points.empty() || read.tetrahedra.empty()) throw problem("no nodes or no tetrahedra up to here");
+    return read;
+}
+
+} // namespace gmsh

@@ -1,0 +1,306 @@
+// A host in C++ that shows tissue 60 times a second: a liver lobe hangs from its back, a small sphere presses its
+// dome 10 mm in, moves sideways and out again, over and over. Each frame takes the steps for 1/60 s; the host reads
+// the guard and the force that the sphere needs. All memory is there before the first frame.
+//
+//     c++ -std=c++17 -O2 -Iinclude examples/instrument.cpp -lsupple -o instrument
+//     ./instrument [--mesh FILE] [--method exact|damped|mass-scaled] [--weights FILE] [--frames N] [--out DIR]
+//                  [--realtime] [--jitter N]
+//
+// Run from the repository it finds meshes/lobe.msh and weights/damper.weights itself. --out leaves frames for
+// ParaView, ten a second. --realtime waits for the clock between frames. --jitter N then times N single steps.
+#include <array>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <supple.hpp>
+
+#include "gmsh.hpp"
+#include "vtu.hpp"
+
+namespace {
+
+using clock_type = std::chrono::steady_clock;
+
+constexpr int RATE = 60;                          // frames a second
+constexpr float FRAME = 1.0f / RATE;              // s
+constexpr float BUDGET = 1000.0f * FRAME;         // ms
+constexpr supple::tissue LIVER = {{1500.0f, 8.023f, 40000.0f}, 1060.0f}; // a Pa, b, d Pa; density kg/m^3
+constexpr float DAMPING = 20.0f;                  // 1/s
+constexpr float BACK = 0.030f;                    // nodes behind this plane hang on the diaphragm, m
+constexpr float CONTACT = 0.012f, CAP = 0.004f;   // nodes touched: so near to the top, and so little below it, m
+constexpr unsigned LARGE_STEPS = 4;               // a frame: each some 20 critical steps
+constexpr int FRAMES_A_PICTURE = 6;
+
+struct options {
+    std::string mesh = "meshes/lobe.msh", weights = "weights/damper.weights", method = "damped", out;
+    long frames = 240, jitter = 0;
+    bool realtime = false;
+};
+
+options read_options(int count, char **words) {
+    options chosen;
+    for (int at = 1; at < count; at++) {
+        const std::string word = words[at];
+        if (word == "--realtime") {
+            chosen.realtime = true;
+            continue;
+        }
+        if (at + 1 == count) throw std::runtime_error(word + ": no such option, or without its value");
+        const std::string value = words[++at];
+        const auto number = [&](long least) {
+            char *end = nullptr;
+            const long found = std::strtol(value.c_str(), &end, 10);
+            if (*end != '\0' || found < least)
+                throw std::runtime_error(word + " " + value + ": not a number of at least " +
+                                         std::to_string(least));
+            return found;
+        };
+        if (word == "--mesh") chosen.mesh = value;
+        else if (word == "--weights") chosen.weights = value;
+        else if (word == "--method") chosen.method = value;
+        else if (word == "--out") chosen.out = value;
+        else if (word == "--frames") chosen.frames = number(1);
+        else if (word == "--jitter") chosen.jitter = number(1000);
+        else throw std::runtime_error(word + ": no such option");
+    }
+    if (chosen.method != "exact" && chosen.method != "damped" && chosen.method != "mass-scaled")
+        throw std::runtime_error("--method " + chosen.method + ": not exact, damped or mass-scaled");
+    return chosen;
+}
+
+// Memory for an object of the library, from the heap.
+struct alignas(supple::align) line {
+    unsigned char bytes[supple::align];
+};
+std::vector<line> room(std::size_t bytes) {
+    return std::vector<line>((bytes + sizeof(line) - 1) / sizeof(line));
+}
+
+// What was made; the end of the program if it was not.
+template <class T> T made(const char *what, const supple::result<T> &result) {
+    char sentence[200];
+    if (!result) throw std::runtime_error(std::string(what) + ": " + supple::describe(result.error, sentence));
+    return result.value;
+}
+
+void done(const char *what, supple::status status) {
+    if (!supple::is_done(status)) throw std::runtime_error(std::string(what) + ": " + supple::text(status));
+}
+
+// From 0 to 1 with neither a jump nor a kink.
+double smooth(double share) { return 0.5 - 0.5 * std::cos(3.14159265358979 * std::clamp(share, 0.0, 1.0)); }
+
+// Where the sphere is after so many seconds, from where it first touches, m: in, sideways, out, a rest.
+std::array<float, 3> sphere(double seconds) {
+    const double now = std::fmod(seconds, 2.0), out = smooth((now - 1.0) / 0.5);
+    const double in = smooth(now / 0.5) - out, aside = smooth((now - 0.5) / 0.5) - out;
+    return {float(0.006 * aside), float(0.002 * in), float(-0.010 * in)};
+}
+
+double milliseconds(clock_type::duration time) {
+    return std::chrono::duration<double, std::milli>(time).count();
+}
+
+// The body with all that moves it.
+struct host {
+    gmsh::mesh mesh;
+    std::vector<std::uint32_t> touched; // nodes that the sphere moves
+    std::vector<supple::motion> motions;
+    std::vector<float> forces; // of the latest step, N
+    std::vector<unsigned char> weights;
+    std::vector<line> scene_room, loads_room, state_room, large_room;
+    supple::scene scene;
+    supple::loads loads;
+    supple::state state;
+    supple::large large; // not used by the exact step
+    bool exact;
+
+    explicit host(const options &chosen) : mesh(gmsh::read(chosen.mesh)), exact(chosen.method == "exact") {
+        const std::vector<float> &points = mesh.points;
+        const auto nodes = static_cast<std::uint32_t>(points.size() / 3);
+        const auto at = [&](std::uint32_t node) { return &points[3 * node]; };
+        std::uint32_t top = 0;
+        for (std::uint32_t node = 1; node < nodes; node++) top = at(node)[2] > at(top)[2] ? node : top;
+        std::vector<supple::support> supports;
+        for (std::uint32_t node = 0; node < nodes; node++) {
+            const float *here = at(node), *dome = at(top);
+            if (here[1] > BACK) supports.push_back({node, 7, 0});
+            else if (std::hypot(here[0] - dome[0], here[1] - dome[1], here[2] - dome[2]) < CONTACT &&
+                     here[2] > dome[2] - CAP) {
+                supports.push_back({node, 7, 1});
+                touched.push_back(node);
+                motions.push_back({node, 7, {0.0f, 0.0f, 0.0f}, 0.0f});
+            }
+        }
+        forces.resize(points.size());
+
+        const auto elements = static_cast<std::uint32_t>(mesh.tetrahedra.size() / 4);
+        const auto moved = static_cast<std::uint32_t>(motions.size());
+        scene_room = room(supple::scene::size(nodes, elements));
+        loads_room = room(supple::loads::size(0, moved));
+        state_room = room(supple::state::size(nodes));
+        supple::body body;
+        body.law = supple::law::exponential;
+        body.points = points;
+        body.tetrahedra = mesh.tetrahedra;
+        body.supports = supports;
+        body.tissues = {&LIVER, 1};
+        scene = made("scene", supple::scene::make(scene_room, body));
+        loads = made("loads", supple::loads::make(loads_room, scene, 0, moved));
+        state = made("state", supple::state::make(state_room, scene));
+        done("gravity", loads.set_gravity({0.0f, 0.0f, -9.81f}));
+        if (exact) return;
+
+        supple::large_steps steps;
+        steps.method = supple::method::mass_scaled;
+        steps.seconds = FRAME / LARGE_STEPS;
+        steps.damping = DAMPING;
+        if (chosen.method == "damped") {
+            std::ifstream file(chosen.weights, std::ios::binary);
+            if (!file) throw std::runtime_error(chosen.weights + ": cannot be opened");
+            weights.assign(std::istreambuf_iterator<char>(file), {});
+            steps.method = supple::method::damped;
+            steps.weights = weights;
+        }
+        large_room = room(made("large steps", supple::large::size(scene, points, steps)));
+        large = made("large steps", supple::large::make(large_room, scene, state, points, steps));
+    }
+
+    std::size_t bytes() const {
+        return sizeof(line) * (scene_room.size() + loads_room.size() + state_room.size() + large_room.size());
+    }
+
+    // As many exact steps as a frame needs; tissue that is pressed together is stiffer and needs more.
+    unsigned set_exact_step() {
+        const float longest = 0.9f * made("critical step", state.critical_step(scene)).seconds;
+        const auto count = static_cast<unsigned>(std::ceil(FRAME / longest));
+        done("step", state.set_step(scene, FRAME / float(count), DAMPING));
+        return count;
+    }
+
+    supple::status step(unsigned count, supple::report &report) {
+        if (exact) return state.step(scene, loads, count, &report);
+        return large.step(scene, loads, state, count, &report);
+    }
+
+    // One frame: the sphere goes evenly to where it is at the frame's end, the tissue follows.
+    supple::status frame(double end, supple::report &report) {
+        const auto tip = sphere(end);
+        for (supple::motion &motion : motions) std::copy(tip.begin(), tip.end(), motion.metre);
+        done("motions", loads.set_motions(scene, motions));
+        const supple::status status = step(exact ? set_exact_step() : LARGE_STEPS, report);
+        done("forces", state.copy_forces(forces));
+        return status;
+    }
+
+    // What the sphere pushes the tissue with, N: it holds up what the tissue does to its nodes.
+    std::array<double, 3> push() const {
+        std::array<double, 3> sum = {};
+        for (const std::uint32_t node : touched)
+            for (std::size_t axis = 0; axis < 3; axis++) sum[axis] -= double(forces[3 * node + axis]);
+        return sum;
+    }
+};
+
+// Times single steps while the sphere stands still. The project's goal: 999 of 1000 within 1.5 times the median.
+void measure_jitter(host &host, long count) {
+    std::vector<double> times(static_cast<std::size_t>(count));
+    if (host.exact) host.set_exact_step();
+    supple::report report;
+    for (int warm = 0; warm < 1000; warm++) done("step", host.step(1, report));
+    for (double &time : times) {
+        const auto start = clock_type::now();
+        const supple::status status = host.step(1, report);
+        time = 1000.0 * milliseconds(clock_type::now() - start);
+        done("step", status);
+    }
+    std::sort(times.begin(), times.end());
+    const auto part = [&](double share) { return times[std::size_t(share * double(times.size() - 1))]; };
+    std::printf("%ld single steps: median %.1f us, p99 %.1f us, p99.9 %.1f us, most %.1f us; p99.9 / median %.2f\n",
+                count, part(0.5), part(0.99), part(0.999), times.back(), part(0.999) / part(0.5));
+}
+
+void run(const options &chosen) {
+    if (!supple::is_of_this_abi()) throw std::runtime_error("supple.h and the library are of different versions");
+    host host(chosen);
+    std::printf("%zu nodes, %zu tetrahedra, %zu nodes touched, %s steps, %zu bytes for the library\n",
+                host.mesh.points.size() / 3, host.mesh.tetrahedra.size() / 4, host.touched.size(),
+                chosen.method.c_str(), host.bytes());
+    std::puts("second  mean ms  worst ms  steps  least volume  energy excess  push x, y, z N        guard");
+
+    const std::size_t floats = host.mesh.points.size();
+    const long pictures = chosen.out.empty() ? 0 : chosen.frames / FRAMES_A_PICTURE;
+    std::vector<float> kept(floats * static_cast<std::size_t>(pictures));
+    double sum = 0.0, worst = 0.0, worst_of_all = 0.0;
+    long late = 0, steps = 0;
+    float volume = 1.0f, excess = 0.0f;
+    supple::status remark = supple::status::ok;
+    const auto start = clock_type::now();
+    for (long frame = 1; frame <= chosen.frames; frame++) {
+        const auto before = clock_type::now();
+        supple::report report{};
+        const supple::status status = host.frame(double(frame) / RATE, report);
+        const double time = milliseconds(clock_type::now() - before);
+        if (!supple::is_done(status)) {
+            std::printf("frame %ld, %.4f s, node %lu: %s\n", frame, report.time, 0ul + report.node,
+                        supple::text(status));
+            throw std::runtime_error("the motion was stopped");
+        }
+        sum += time, worst = std::max(worst, time), late += time > BUDGET, steps += report.steps;
+        volume = std::min(volume, report.least_volume_ratio), excess = std::max(excess, report.energy_excess);
+        remark = status == supple::status::ok ? remark : status;
+        if (frame % FRAMES_A_PICTURE == 0 && pictures > 0) {
+            float *to = &kept[floats * std::size_t(frame / FRAMES_A_PICTURE - 1)];
+            done("displacements", host.state.copy_displacements({to, floats}));
+        }
+        if (frame % RATE == 0 || frame == chosen.frames) {
+            const long frames = frame % RATE == 0 ? RATE : frame % RATE;
+            const auto push = host.push();
+            std::printf("%6.2f  %7.2f  %8.2f  %5ld  %12.3f  %13.3g  %6.3f %6.3f %6.3f  %s\n",
+                        double(frame) / RATE, sum / double(frames), worst, steps, double(volume), double(excess),
+                        push[0], push[1], push[2], supple::text(remark));
+            worst_of_all = std::max(worst_of_all, worst);
+            sum = worst = 0.0, steps = 0, volume = 1.0f, excess = 0.0f, remark = supple::status::ok;
+        }
+        if (chosen.realtime)
+            std::this_thread::sleep_until(start + frame * std::chrono::nanoseconds(1000000000 / RATE));
+    }
+    std::printf("worst frame %.2f ms of %.1f ms; %ld of %ld frames too late\n", worst_of_all, double(BUDGET), late,
+                chosen.frames);
+
+    if (pictures > 0) {
+        std::filesystem::create_directories(chosen.out);
+        std::vector<vtu::frame> list;
+        for (long picture = 0; picture < pictures; picture++) {
+            const double seconds = double((picture + 1) * FRAMES_A_PICTURE) / RATE;
+            list.push_back({seconds, "frame" + std::to_string(picture) + ".vtu"});
+            vtu::write(chosen.out + "/" + list.back().file, host.mesh.points, &kept[floats * std::size_t(picture)],
+                       host.mesh.tetrahedra);
+        }
+        vtu::write_list(chosen.out + "/frames.pvd", list);
+        std::printf("%ld frames in %s/frames.pvd\n", pictures, chosen.out.c_str());
+    }
+    if (chosen.jitter > 0) measure_jitter(host, chosen.jitter);
+}
+
+} // namespace
+
+int main(int count, char **words) {
+    try {
+        run(read_options(count, words));
+    } catch (const std::exception &problem) {
+        std::fprintf(stderr, "instrument: %s\n", problem.what());
+        return 1;
+    }
+    return 0;
+}
