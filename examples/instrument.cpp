@@ -284,8 +284,8 @@ void run(const options &chosen) {
         for (long picture = 0; picture < pictures; picture++) {
             const double seconds = double((picture + 1) * FRAMES_A_PICTURE) / RATE;
             list.push_back({seconds, "frame" + std::to_string(picture) + ".vtu"});
-            vtu::write(chosen.out + "/" + list.back().file, host.mesh.points, &kept[floats * std::size_t(picture)],
-                       host.mesh.tetrahedra);
+            vtu::write(chosen.out + "/" + list.back().file, host.mesh.points,
+                       &kept[floats * std::size_t(picture)], host.mesh.tetrahedra);
         }
         vtu::write_list(chosen.out + "/frames.pvd", list);
         std::printf("%ld frames in %s/frames.pvd\n", pictures, chosen.out.c_str());

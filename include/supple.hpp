@@ -173,9 +173,10 @@ private:
 };
 
 constexpr status of(supple_status code) noexcept { return static_cast<status>(code); }
+constexpr supple_status of(status code) noexcept { return static_cast<supple_status>(code); }
 
 constexpr error nothing(status code, double value = 0.0, double limit = 0.0) noexcept {
-    return {static_cast<supple_status>(code), none, none, none, value, limit};
+    return {of(code), none, none, none, value, limit};
 }
 
 template <class Config> constexpr Config config() noexcept {
@@ -185,58 +186,24 @@ template <class Config> constexpr Config config() noexcept {
     return made;
 }
 
-// That no status of supple.h is forgotten: with -Wall compilers warn of one that is missing in this switch.
+// That no status of supple.h is forgotten above: with -Wall compilers warn of one that is missing in this switch.
 constexpr bool every(supple_status code) noexcept {
+    using s = status;
     switch (code) {
-    case SUPPLE_OK: return status::ok == of(code);
-    case SUPPLE_LIMITED: return status::limited == of(code);
-    case SUPPLE_OUTSIDE: return status::outside == of(code);
-    case SUPPLE_FELL_BACK: return status::fell_back == of(code);
-    case SUPPLE_E_NULL: return status::e_null == of(code);
-    case SUPPLE_E_MISALIGNED: return status::e_misaligned == of(code);
-    case SUPPLE_E_SHORT: return status::e_short == of(code);
-    case SUPPLE_E_ABI: return status::e_abi == of(code);
-    case SUPPLE_E_NOT_INITIALISED: return status::e_not_initialised == of(code);
-    case SUPPLE_E_KIND: return status::e_kind == of(code);
-    case SUPPLE_E_CHOICE: return status::e_choice == of(code);
-    case SUPPLE_E_MISMATCH: return status::e_mismatch == of(code);
-    case SUPPLE_E_CAPACITY: return status::e_capacity == of(code);
-    case SUPPLE_E_INDEX: return status::e_index == of(code);
-    case SUPPLE_E_NOT_FINITE: return status::e_not_finite == of(code);
-    case SUPPLE_E_NEGATIVE: return status::e_negative == of(code);
-    case SUPPLE_E_OVERLAP: return status::e_overlap == of(code);
-    case SUPPLE_E_MESH_EMPTY: return status::e_mesh_empty == of(code);
-    case SUPPLE_E_MESH_REPEATED_NODE: return status::e_mesh_repeated_node == of(code);
-    case SUPPLE_E_MESH_DEGENERATE: return status::e_mesh_degenerate == of(code);
-    case SUPPLE_E_MESH_INVERTED: return status::e_mesh_inverted == of(code);
-    case SUPPLE_E_MESH_UNUSED_NODE: return status::e_mesh_unused_node == of(code);
-    case SUPPLE_E_CONSTANT: return status::e_constant == of(code);
-    case SUPPLE_E_DENSITY: return status::e_density == of(code);
-    case SUPPLE_E_TISSUE: return status::e_tissue == of(code);
-    case SUPPLE_E_NOTHING_MOVES: return status::e_nothing_moves == of(code);
-    case SUPPLE_E_LAW: return status::e_law == of(code);
-    case SUPPLE_E_NOT_HELD: return status::e_not_held == of(code);
-    case SUPPLE_E_NO_STEP: return status::e_no_step == of(code);
-    case SUPPLE_E_STEP: return status::e_step == of(code);
-    case SUPPLE_E_UNSTABLE: return status::e_unstable == of(code);
-    case SUPPLE_E_WEIGHTS_MISALIGNED: return status::e_weights_misaligned == of(code);
-    case SUPPLE_E_WEIGHTS_SHORT: return status::e_weights_short == of(code);
-    case SUPPLE_E_NOT_WEIGHTS: return status::e_not_weights == of(code);
-    case SUPPLE_E_WEIGHTS_VERSION: return status::e_weights_version == of(code);
-    case SUPPLE_E_WEIGHTS_CHECKSUM: return status::e_weights_checksum == of(code);
-    case SUPPLE_E_WEIGHTS_CONTENT: return status::e_weights_content == of(code);
-    case SUPPLE_E_WEIGHTS_SHAPE: return status::e_weights_shape == of(code);
-    case SUPPLE_E_NOT_LED: return status::e_not_led == of(code);
-    case SUPPLE_E_STEP_RATIO: return status::e_step_ratio == of(code);
-    case SUPPLE_E_DAMPING: return status::e_damping == of(code);
-    case SUPPLE_E_LATTICE: return status::e_lattice == of(code);
-    case SUPPLE_E_TOO_STIFF: return status::e_too_stiff == of(code);
-    case SUPPLE_E_NOT_SAVED: return status::e_not_saved == of(code);
-    case SUPPLE_E_SAVED_VERSION: return status::e_saved_version == of(code);
-    case SUPPLE_E_SAVED_CHECKSUM: return status::e_saved_checksum == of(code);
-    case SUPPLE_E_LEVEL: return status::e_level == of(code);
-    case SUPPLE_E_DIVERGED: return status::e_diverged == of(code);
-    case SUPPLE_E_DIVERGED_ENERGY: return status::e_diverged_energy == of(code);
+    case of(s::ok): case of(s::limited): case of(s::outside): case of(s::fell_back): case of(s::e_null):
+    case of(s::e_misaligned): case of(s::e_short): case of(s::e_abi): case of(s::e_not_initialised):
+    case of(s::e_kind): case of(s::e_choice): case of(s::e_mismatch): case of(s::e_capacity):
+    case of(s::e_index): case of(s::e_not_finite): case of(s::e_negative): case of(s::e_overlap):
+    case of(s::e_mesh_empty): case of(s::e_mesh_repeated_node): case of(s::e_mesh_degenerate):
+    case of(s::e_mesh_inverted): case of(s::e_mesh_unused_node): case of(s::e_constant):
+    case of(s::e_density): case of(s::e_tissue): case of(s::e_nothing_moves): case of(s::e_law):
+    case of(s::e_not_held): case of(s::e_no_step): case of(s::e_step): case of(s::e_unstable):
+    case of(s::e_weights_misaligned): case of(s::e_weights_short): case of(s::e_not_weights):
+    case of(s::e_weights_version): case of(s::e_weights_checksum): case of(s::e_weights_content):
+    case of(s::e_weights_shape): case of(s::e_not_led): case of(s::e_step_ratio): case of(s::e_damping):
+    case of(s::e_lattice): case of(s::e_too_stiff): case of(s::e_not_saved): case of(s::e_saved_version):
+    case of(s::e_saved_checksum): case of(s::e_level): case of(s::e_diverged):
+    case of(s::e_diverged_energy): return true;
     }
     return false;
 }
@@ -284,7 +251,7 @@ constexpr meaning meaning_of(status code) noexcept {
 
 } // namespace detail
 
-// Memory for an object, aligned to supple::align; of an array, std::vector, std::array, or a pointer with its bytes.
+// Memory for an object, aligned to supple::align; of an array, std::vector, std::array, or pointer and bytes.
 using memory = detail::raw<void>;
 // Bytes that are only read, such as a weight file, in the same ways.
 using bytes = detail::raw<const void>;
@@ -671,7 +638,8 @@ public:
     }
 
     // Takes large steps.
-    status step(scene of, loads acting, state moved, std::uint32_t count, report *found = nullptr) const noexcept {
+    status step(scene of, loads acting, state moved, std::uint32_t count,
+                report *found = nullptr) const noexcept {
         return detail::of(supple_large_step(of.raw(), acting.raw(), moved.raw(), raw_, count, found));
     }
 
