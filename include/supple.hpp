@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <type_traits>
 #include <utility>
 
@@ -175,7 +176,10 @@ private:
 constexpr status of(supple_status code) noexcept { return static_cast<status>(code); }
 constexpr supple_status of(status code) noexcept { return static_cast<supple_status>(code); }
 
-constexpr error nothing(status code, double value = 0.0, double limit = 0.0) noexcept {
+// Of functions that tell no more than a status, value and limit are not known: NaN.
+inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+constexpr error nothing(status code, double value = unknown, double limit = unknown) noexcept {
     return {of(code), none, none, none, value, limit};
 }
 
@@ -283,8 +287,11 @@ template <class T> struct [[nodiscard]] result {
     if (what.index != none) separate(), add(std::snprintf(at(), left(), "%s %lu", means.index, 0ul + what.index));
     if (what.node != none) separate(), add(std::snprintf(at(), left(), "node %lu", 0ul + what.node));
     if (what.axis < 3) separate(), add(std::snprintf(at(), left(), "axis %c", "xyz"[what.axis]));
-    if (means.has_value) separate(), add(std::snprintf(at(), left(), "%.6g%s", what.value, means.unit));
-    if (means.has_limit) separate(), add(std::snprintf(at(), left(), "against %.6g%s", what.limit, means.unit));
+    const bool is_nan = what.value != what.value;
+    if (means.has_value && (!is_nan || code == status::e_not_finite))
+        separate(), add(std::snprintf(at(), left(), "%.6g%s", what.value, means.unit));
+    if (means.has_limit && what.limit == what.limit)
+        separate(), add(std::snprintf(at(), left(), "against %.6g%s", what.limit, means.unit));
     return out.data();
 }
 

@@ -1,0 +1,180 @@
+// Every function of supple.hpp once, on a single tetrahedron, with the sentences for what is refused.
+//
+//     c++ -std=c++17 -Wall -Wextra -Werror -pedantic -Iinclude tests/hosts/wrapper.cpp -lsupple -o wrapper
+//     ./wrapper weights/compact-10.weights
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <vector>
+
+#include <supple.hpp>
+
+using supple::is_done;
+using supple::status;
+
+static_assert(std::is_trivially_copyable_v<supple::scene> && sizeof(supple::scene) == sizeof(void *));
+static_assert(!std::is_convertible_v<const std::vector<float> &, supple::span<float>>);
+static_assert(!std::is_convertible_v<const std::vector<float> &, supple::memory>);
+static_assert(std::is_convertible_v<const std::vector<float> &, supple::bytes>);
+static_assert(supple::scene::size(4, 1) % supple::align == 0);
+
+namespace {
+
+int wrong = 0;
+
+void expect(bool held, const char *what, int line) {
+    if (held) return;
+    std::printf("line %d: not %s\n", line, what);
+    wrong = 1;
+}
+#define EXPECT(condition) expect(static_cast<bool>(condition), #condition, __LINE__)
+
+void expect_sentence(const supple::error &error, const char *sentence, int line) {
+    char text[160];
+    expect(std::strcmp(supple::describe(error, text), sentence) == 0, sentence, line);
+    if (std::strcmp(text, sentence) != 0) std::printf("         but %s\n", text);
+}
+#define EXPECT_SENTENCE(error, sentence) expect_sentence(error, sentence, __LINE__)
+
+alignas(supple::align) unsigned char scene_memory[supple::scene::size(4, 1)];
+alignas(supple::align) unsigned char loads_memory[supple::loads::size(2, 1)];
+alignas(supple::align) unsigned char state_memory[supple::state::size(4)];
+alignas(supple::align) unsigned char other_memory[supple::state::size(4)];
+alignas(supple::align) unsigned char learned_memory[supple::learned::size(4, true)];
+alignas(supple::align) unsigned char large_memory[SUPPLE_LARGE_SIZE(4, SUPPLE_MASS_SCALED, 0, 0, 0)];
+
+const float points[] = {0, 0, 0, 0.01f, 0, 0, 0, 0.01f, 0, 0, 0, 0.01f};
+const std::uint32_t tetrahedra[] = {0, 1, 2, 3}, turned[] = {0, 2, 1, 3}, outside[] = {0, 1, 2, 9};
+const supple::support supports[] = {{0, 7, 0}, {1, 7, 0}, {2, 3, 1}};
+const supple::tissue tissue = {{500, 25000, 0}, 1000};
+
+supple::body tetrahedron() {
+    supple::body body;
+    body.points = points;
+    body.tetrahedra = tetrahedra;
+    body.supports = supports;
+    body.tissues = {&tissue, 1};
+    return body;
+}
+
+void scenes() {
+    supple::body body = tetrahedron();
+    body.points = {points, 11};
+    EXPECT_SENTENCE(supple::scene::make(scene_memory, body).error, "the memory is too small: 11, against 12");
+    body = tetrahedron();
+    body.tetrahedra = turned;
+    EXPECT(supple::scene::make(scene_memory, body).status == status::e_mesh_inverted);
+    EXPECT_SENTENCE(supple::scene::make(scene_memory, body).error,
+                    "an element has a negative volume: element 0, -1.66667e-07 m^3");
+    body.winding = supple::winding::normalised;
+    EXPECT(supple::scene::make(scene_memory, body));
+    body.tetrahedra = outside;
+    EXPECT_SENTENCE(supple::scene::make(scene_memory, body).error,
+                    "a node that does not exist: entry 0, node 9, against 4");
+    EXPECT(supple::scene::make({scene_memory + 1, 64}, tetrahedron()).status == status::e_misaligned);
+    EXPECT(supple::scene().describe().status == status::e_null);
+}
+
+void acting(supple::scene scene, supple::loads loads) {
+    supple::error error;
+    std::vector<supple::force> forces(3, {3, {0.01f, 0, 0}, 0});
+    EXPECT(loads.set_forces(forces, &error) == status::e_capacity);
+    EXPECT_SENTENCE(error, "more than there is room for: 3, against 2");
+    forces.pop_back();
+    forces[1].ramp = -1;
+    EXPECT(loads.set_forces(forces, &error) == status::e_negative);
+    EXPECT_SENTENCE(error, "a number is negative or not finite: entry 1, -1");
+    forces[1].ramp = 0;
+    EXPECT(is_done(loads.set_forces(forces)));
+    const supple::motion up[] = {{2, 4, {0, 0, 0.001f}, 0}}, aside[] = {{2, 3, {0, 0.0001f, 0}, 0}};
+    EXPECT(loads.set_motions(scene, up, &error) == status::e_not_held);
+    EXPECT_SENTENCE(error, "a motion along an axis that no moving support holds: motion 0, node 2, axis z");
+    EXPECT(is_done(loads.set_motions(scene, aside)));
+    EXPECT(is_done(loads.set_gravity({0, 0, -9.81f})));
+}
+
+void moving(supple::scene scene, supple::loads loads, supple::state state) {
+    supple::error error;
+    supple::report report;
+    EXPECT(state.step(scene, loads, 1) == status::e_no_step);
+    const auto critical = state.critical_step(scene);
+    EXPECT(critical && critical.value.node == 3);
+    EXPECT(state.set_step(scene, 1, 0, &error) == status::e_unstable);
+    EXPECT(error.node == 3 && error.limit == double(critical.value.seconds));
+    EXPECT(is_done(state.set_step(scene, 0.5f * critical.value.seconds, 20)));
+    EXPECT(is_done(state.step(scene, loads, 100, &report)) && report.steps == 100);
+    EXPECT(state.now() && state.now().value.steps == 100 && state.now().value.seconds == report.time);
+
+    std::vector<float> displacements(12), others(12);
+    EXPECT(is_done(state.copy_displacements(displacements)) && displacements[7] == 0.0001f);
+    EXPECT(state.displacements() && state.displacements().value[3][0] == displacements[9]);
+    EXPECT(is_done(state.copy_positions(points, others)) && others[9] == points[9] + displacements[9]);
+    EXPECT(state.copy_positions({points, 3}, others) == status::e_short);
+    EXPECT(is_done(state.copy_velocities(others)) && others[9] != 0.0f && others[0] == 0.0f);
+    EXPECT(is_done(state.copy_forces(others)) && others[9] != 0.0f);
+    EXPECT(state.copy_forces({others.data(), 11}) == status::e_short);
+
+    std::vector<unsigned char> saved(supple::state::saved_size(4));
+    const auto other = supple::state::make(other_memory, scene);
+    EXPECT(is_done(state.save(saved)) && other && is_done(other.value.restore(saved)));
+    EXPECT(is_done(state.step(scene, loads, 50)) && is_done(other.value.step(scene, loads, 50)));
+    EXPECT(is_done(state.copy_displacements(displacements)) && is_done(other.value.copy_displacements(others)));
+    EXPECT(displacements == others);
+    EXPECT_SENTENCE(supple::state::make({other_memory, 8}, scene).error, "the memory is too small");
+    EXPECT(is_done(state.reset()) && state.now().value.steps == 0);
+}
+
+void large(supple::scene scene, supple::loads loads, supple::state state) {
+    supple::large_steps steps;
+    steps.method = supple::method::mass_scaled;
+    steps.seconds = 0.01f;
+    supple::report report;
+    const auto bytes = supple::large::size(scene, points, steps);
+    EXPECT(bytes && bytes.value <= sizeof large_memory);
+    EXPECT_SENTENCE(supple::large::size(scene, {points, 9}, steps).error, "the memory is too small: 9, against 12");
+    const auto made = supple::large::make(large_memory, scene, state, points, steps);
+    EXPECT(made && is_done(made.value.step(scene, loads, state, 3, &report)) && report.added_mass > 0.0f);
+    EXPECT(is_done(state.reset()));
+}
+
+void learned(supple::scene scene, supple::loads loads, supple::state state, const char *path) {
+    std::ifstream file(path, std::ios::binary);
+    const std::vector<char> weights(std::istreambuf_iterator<char>(file), {});
+    const auto refused = supple::learned::make(learned_memory, scene, {weights.data(), 8}, true);
+    EXPECT(refused.status == status::e_weights_short);
+    const auto made = supple::learned::make(learned_memory, scene, weights, true);
+    EXPECT(made);
+    const auto facts = made.value.describe();
+    EXPECT(facts && facts.value.seconds > 0.0f && facts.value.fell_back == 0);
+    EXPECT(is_done(state.set_step(scene, 0.5f * facts.value.seconds, facts.value.damping)));
+    EXPECT(made.value.step(scene, loads, state, 1) == status::e_not_led);
+    supple::report report;
+    EXPECT(is_done(made.value.lead(scene, loads, state, 10, &report)) && report.steps == 20);
+    EXPECT(is_done(made.value.step(scene, loads, state, 5, &report)));
+    EXPECT(is_done(made.value.reset()));
+}
+
+} // namespace
+
+int main(int count, char **words) {
+    if (count != 2) return std::puts("wrapper: the weight file of a network is missing"), 2;
+    EXPECT(supple::is_of_this_abi() && supple::version()[0] != '\0');
+    EXPECT(is_done(supple::set_level(supple::current_level())));
+    EXPECT(std::strcmp(supple::text(status::ok), "done") == 0);
+    char tiny[5];
+    EXPECT(std::strcmp(supple::describe({SUPPLE_E_NULL, supple::none, 0, 0, 0, 0}, tiny), "a po") == 0);
+
+    scenes();
+    const auto scene = supple::scene::make(scene_memory, tetrahedron());
+    const auto state = supple::state::make(state_memory, scene.value);
+    const auto loads = supple::loads::make(loads_memory, scene.value, 2, 1);
+    EXPECT(scene && state && loads);
+    EXPECT(scene.value.describe().value.bytes == sizeof scene_memory);
+    acting(scene.value, loads.value);
+    moving(scene.value, loads.value, state.value);
+    large(scene.value, loads.value, state.value);
+    learned(scene.value, loads.value, state.value, words[1]);
+    std::puts(wrong ? "wrapper: not as expected" : "wrapper: as expected");
+    return wrong;
+}
