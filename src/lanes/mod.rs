@@ -25,6 +25,8 @@ mod level_tests;
 #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
 mod neon;
 mod pair;
+// Not every processor has such registers.
+#[allow(unused_imports, unused_macros)]
 mod register;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 mod simd128;
