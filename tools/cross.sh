@@ -1,13 +1,12 @@
 #!/usr/bin/env bash
-# The same bits on other processors, without having one: builds tests/targets for this processor, for 64-bit Arm and for
-# WebAssembly, runs it here, in an emulator and in node, and compares the checksums. Builds the core for a
-# microcontroller as well.
+# The same bits on other processors, without having one: builds tests/targets for this processor, for 64-bit Arm, for
+# WebAssembly and for a microcontroller (Cortex-M4F), runs it here, in emulators and in node, and compares the checksums.
 #
 #     tools/cross.sh [--tests] [FOLDER]
 #
 # With --tests the library's own tests and some of the core's also run on the emulated Arm processor, which takes
 # several times as long. FOLDER (target/cross) takes a compiler with those targets, from Debian 12's packages: about
-# 260 MB to fetch and 1.5 GB in all. Nothing is installed into the system, except node where there is none.
+# 260 MB to fetch and 1.5 GB in all. Nothing is installed into the system, except node and QEMU where there is none.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -55,11 +54,14 @@ install() {
 
 [ -e "$folder/installed" ] || step install
 command -v node >/dev/null || step apt-get install -y -qq --no-install-recommends nodejs
+command -v qemu-system-arm >/dev/null || step apt-get install -y -qq --no-install-recommends qemu-system-arm
 
 # rustup's compiler brings a linker for WebAssembly and microcontrollers.
 lld=$(rustc --print sysroot)/lib/rustlib/x86_64-unknown-linux-gnu/bin/rust-lld
 export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$lld
 export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS="-C target-feature=+simd128"
+export CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER=$lld
+export CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUSTFLAGS="-C link-arg=-Tlink.x"
 arm=$root/usr/bin/aarch64-linux-gnu
 export CC_aarch64_unknown_linux_gnu=$arm-gcc AR_aarch64_unknown_linux_gnu=$arm-ar
 export CFLAGS_aarch64_unknown_linux_gnu=--sysroot=$root
@@ -77,14 +79,18 @@ step cargo build "${targets[@]}"
 step cross build "${targets[@]}" --target aarch64-unknown-linux-gnu
 step cross rustc "${targets[@]}" --target wasm32-unknown-unknown -Zbuild-std=core --lib --crate-type cdylib \
     --features panic-handler
-step cross build --quiet --release --no-default-features --lib --target-dir "$here" --target thumbv7em-none-eabihf \
-    -Zbuild-std=core
+step cross build --quiet --release --manifest-path tests/targets/m4/Cargo.toml --target-dir "$here" \
+    --target thumbv7em-none-eabihf -Zbuild-std=core
 
 step "$here/release/targets" | tee "$folder/checksums"
 # shellcheck disable=SC2086 # A command with its arguments.
 step $CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER "$here/aarch64-unknown-linux-gnu/release/targets" |
     tee -a "$folder/checksums"
 step node tests/targets/run.mjs "$here/wasm32-unknown-unknown/release/targets.wasm" | tee -a "$folder/checksums"
+# A nanosecond for each instruction, by which it counts its own. A fault would be a loop without end there.
+step timeout 10m qemu-system-arm -machine mps2-an386 -cpu cortex-m4 -icount shift=0 -nographic \
+    -semihosting-config enable=on,target=native -kernel "$here/thumbv7em-none-eabihf/release/m4" |
+    tee -a "$folder/checksums"
 
 grep -E ' (un)?fused ' "$folder/checksums" | sort -u >"$folder/unlike"
 if grep ' 00000000$' "$folder/unlike"; then

@@ -8,7 +8,8 @@ if (!has_simd128()) {
     throw new Error("built without simd128");
 }
 console.error("wasm32: Simd128");
-for (const [what, name] of ["exact", "damped", "network", "learned", "int8"].entries()) {
+const names = ["exact", "damped", "network", "learned", "int8", "exact-208", "learned-int8-208"];
+for (const [what, name] of names.entries()) {
     for (const level of [0, 1]) {
         const checksum = web_checksum(what, level) >>> 0;
         console.log(`${name} unfused ${checksum.toString(16).padStart(8, "0")}`);
