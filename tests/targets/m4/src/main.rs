@@ -54,7 +54,9 @@ fn print_instructions(timer: &mut SYST) -> bool {
 
 fn exit(fine: bool) -> ! {
     debug::exit(if fine { EXIT_SUCCESS } else { EXIT_FAILURE });
-    loop {}
+    loop {
+        cortex_m::asm::wfi();
+    }
 }
 
 #[panic_handler]
