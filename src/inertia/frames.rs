@@ -29,7 +29,8 @@ impl Rotation {
     #[inline(always)]
     pub(super) fn back(&self, v: [f32; 3]) -> [f32; 3] {
         let [x, y, z] = self.0;
-        [0, 1, 2].map(|axis| x[axis] * v[0] + y[axis] * v[1] + z[axis] * v[2])
+        let along = |x: f32, y: f32, z: f32| x * v[0] + y * v[1] + z * v[2];
+        [along(x[0], y[0], z[0]), along(x[1], y[1], z[1]), along(x[2], y[2], z[2])]
     }
 }
 
