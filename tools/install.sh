@@ -49,6 +49,9 @@ fill() {
 install -d "$to/include" "$to/lib/pkgconfig" "$to/lib/cmake/supple"
 install -m 644 include/supple.h* "$to/include"
 install -m 644 "$built/libsupple.a" "$to/lib"
+# Rust's own fmod, sqrt and the like would take the place of the host's, and ask for a function that only Rust programs
+# have. The core needs none of them.
+ar t "$to/lib/libsupple.a" | grep -v '^supple\.' | sort -u | xargs ar d "$to/lib/libsupple.a"
 strip --strip-debug "$to/lib/libsupple.a"
 install -m 755 "$built/libsupple.so" "$to/lib/$shared"
 ln -sf "$shared" "$to/lib/$soname"

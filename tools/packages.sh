@@ -52,15 +52,17 @@ grep -o '\bsupple_[a-z_]*(' include/supple.h | tr -d '(' | sort -u >"$folder/dec
 nm -D --defined-only "$shared" | awk '{ print $3 }' | sort >"$folder/exported"
 diff "$folder/declared" "$folder/exported" || fail "the shared library exports (>) what the header does not declare (<)"
 ok "the shared library exports the $(wc -l <"$folder/declared") functions of the header and nothing else"
-nm -g --defined-only "$static" 2>/dev/null | awk 'NF == 3 && $3 ~ /^supple_/ { print $3 }' | sort >"$folder/exported"
+nm -g --defined-only "$static" | awk 'NF == 3 { print $3 }' | sort >"$folder/exported"
 diff "$folder/declared" "$folder/exported" || fail "the static library defines (>) what the header does not declare (<)"
-ok "the static library defines them all"
+ok "the static library defines the same functions and nothing else"
 
 dynamic=$(readelf -dW "$shared")
 ! grep NEEDED <<<"$dynamic" || fail "the shared library needs others"
-undefined=$(nm -D --undefined-only "$shared" | awk '$1 == "U" { print $2 }' | xargs)
-[ "$undefined" = "memcpy memset" ] || fail "the shared library asks its host for $undefined"
-ok "the shared library needs no other, and of the host: $undefined"
+undefined() { nm "$@" | awk '$1 == "U" { print $2 }' | sort | xargs; }
+for asks in "$(undefined -D "$shared")" "$(undefined "$static")"; do
+    [ "$asks" = "memcpy memset" ] || fail "a library asks its host for: $asks"
+done
+ok "they need no other library, and of the host memcpy and memset"
 soname=$(sed -n 's/.*soname: \[\(.*\)\]/\1/p' <<<"$dynamic")
 case $version in
     0.*) [ "$soname" = "libsupple.so.${version%.*}" ] ;;
@@ -78,7 +80,9 @@ gcc "$folder/empty.c" -Wl,--gc-sections "${keep[@]}" "$static" -o "$folder/every
 ! nm "$folder/everything" | grep -i panicking || fail "the static library can panic"
 ok "no path to a panic, in the shared library nor in a program with all of the static one"
 
-# Runs a program and keeps what it says, for comparison with its likes.
+sources=(examples/bar.c tests/packages/included.cpp)
+
+# run PROGRAM NAME: all programs of a name must say the same.
 run() {
     "$1" >"$folder/said" || fail "$1 failed"
     [ -s "$folder/said" ] || fail "$1 says nothing"
@@ -104,26 +108,32 @@ build() {
     "${compiler[@]}" "${warnings[@]}" "${cflags[@]}" "$source" "$static" -o "$program-static"
     "${compiler[@]}" "${warnings[@]}" "${cflags[@]}" "$source" -static "${all_libs[@]}" -o "$program-alone"
     for linked in static alone; do
-        ! readelf -dW "$program-$linked" | grep libsupple || fail "$program-$linked needs the shared library"
+        ! readelf -dW "$program-$linked" | grep 'NEEDED.*supple' || fail "$program-$linked needs the shared library"
         run "$program-$linked" "$name"
     done
     ok "$name, $1 through pkg-config, shared, static, and all static: $(head -1 "$folder/said")"
 }
-for source in examples/bar.c; do
-    build gcc -std=c11 "$source"
-    build clang -std=c11 "$source"
-done
-for source in tests/packages/included.cpp; do
-    build g++ -std=c++17 "$source"
-    build clang++ -std=c++17 "$source"
+for source in "${sources[@]}"; do
+    case $source in
+        *.c)
+            build gcc -std=c11 "$source"
+            build clang -std=c11 "$source"
+            ;;
+        *)
+            build g++ -std=c++17 "$source"
+            build clang++ -std=c++17 "$source"
+            ;;
+    esac
 done
 
 for compilers in gcc,g++ clang,clang++; do
     cmake -S tests/packages -B "$folder/cmake-$compilers" -DCMAKE_PREFIX_PATH="$prefix" -Dversion="$version" \
+        -Dsources="$(IFS=';' && echo "${sources[*]}")" \
         -DCMAKE_C_COMPILER="${compilers%,*}" -DCMAKE_CXX_COMPILER="${compilers#*,}" -DCMAKE_BUILD_TYPE=Release \
         -DCMAKE_C_FLAGS="${warnings[*]}" -DCMAKE_CXX_FLAGS="${warnings[*]}" >"$folder/cmake.log" || fail "$(<"$folder/cmake.log")"
     cmake --build "$folder/cmake-$compilers" >"$folder/cmake.log" || fail "$(<"$folder/cmake.log")"
-    for name in bar included; do
+    for source in "${sources[@]}"; do
+        name=$(basename "${source%.*}")
         run "$folder/cmake-$compilers/$name-shared" "$name"
         run "$folder/cmake-$compilers/$name-static" "$name"
         ok "$name, $compilers through CMake, shared and static"

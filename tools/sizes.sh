@@ -22,8 +22,8 @@ thumb() {
     CARGO_PROFILE_RELEASE_OPT_LEVEL=$2 RUSTC=$folder/rustc RUSTC_BOOTSTRAP=1 \
         LD_LIBRARY_PATH=$folder/root/usr/lib/x86_64-linux-gnu \
         cargo rustc --quiet --release --lib --no-default-features --features "$1,panic-handler" --crate-type staticlib \
-        --target thumbv7em-none-eabihf -Zbuild-std=core --target-dir "$folder/build"
-    cp "$folder/build/thumbv7em-none-eabihf/release/libsupple.a" "$libraries/thumb-$2-$1.a"
+        --target thumbv7em-none-eabihf -Zbuild-std=core --target-dir "$libraries/build"
+    cp "$libraries/build/thumbv7em-none-eabihf/release/libsupple.a" "$libraries/thumb-$2-$1.a"
 }
 
 for features in capi capi-neo-hookean; do
@@ -44,12 +44,16 @@ learned=(supple_learned_{size,init,reset,describe,lead,step})
 # count LIBRARY FUNCTIONS...: code with its constants, data, zeroed data of a program that calls the functions. The host
 # has memcpy and its like.
 count() {
-    local roots=()
-    for function in "${@:2}"; do
-        roots+=(--undefined="$function" --require-defined="$function")
-    done
-    "$lld" -flavor gnu --gc-sections --entry=0 "${roots[@]}" --defsym=memcpy=0 --defsym=memmove=0 --defsym=memset=0 \
-        --defsym=memcmp=0 --defsym=bcmp=0 "$libraries/$1.a" -o "$libraries/program"
+    local library=$1
+    shift
+    "$lld" -flavor gnu --gc-sections --entry=0 "${@/#/--undefined=}" --defsym=memcpy=0 --defsym=memmove=0 --defsym=memset=0 \
+        --defsym=memcmp=0 --defsym=bcmp=0 "$libraries/$library.a" -o "$libraries/program"
+    local kept
+    kept=$(nm "$libraries/program" | grep -c ' T supple_')
+    if [ "$kept" -lt $# ]; then
+        echo "$kept functions of $# are in $library.a" >&2
+        exit 1
+    fi
     size -A "$libraries/program" | awk '
         $1 ~ /^\.(text|rodata|data\.rel\.ro|got)/ { code += $2; next }
         $1 ~ /^\.(data|tdata)/ { data += $2 }
