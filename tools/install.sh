@@ -13,7 +13,7 @@ usage() {
     exit 2
 }
 
-prefix= destdir= features=capi
+prefix='' destdir='' features=capi
 while [ $# -gt 0 ]; do
     [ $# -ge 2 ] || usage
     case $1 in
