@@ -243,7 +243,7 @@ enum supple_status
      */
     SUPPLE_E_CAPACITY = -9,
     /**
-     * Entry or element `index` names a node that is not there (node; limit: nodes).
+     * Entry `index` of a list (elements, supports, forces, motions) names a node that is not there (node; limit: nodes).
      */
     SUPPLE_E_INDEX = -10,
     /**
@@ -663,7 +663,7 @@ typedef struct {
 } supple_threads;
 
 /**
- * What the steps of a call found. Every call that takes steps writes all of it.
+ * What the steps of a call found, and what stopped it. Every call that takes steps writes all of it.
  */
 typedef struct {
     /**
@@ -717,7 +717,11 @@ typedef struct {
     /**
      * Large steps: estimate of the error so far, m, mean over the nodes; it tells the scale and is no bound.
      */
-    float error;
+    float error_estimate;
+    /**
+     * What stopped the call, with place and value; status SUPPLE_OK if nothing did.
+     */
+    supple_error error;
 } supple_report;
 
 /**
@@ -783,9 +787,13 @@ typedef struct {
      */
     float damping;
     /**
-     * Density of the training, kg/m^3.
+     * Law of the training, SUPPLE_NEO_HOOKEAN or SUPPLE_EXPONENTIAL; in another tissue the network's error is not known.
      */
-    float density;
+    uint32_t law;
+    /**
+     * Its constants and density, as in a scene.
+     */
+    supple_tissue tissue;
     /**
      * Length of the exact step that it learned from, s.
      */
@@ -977,7 +985,7 @@ supple_status supple_state_reset(supple_state *state);
 
 /**
  * Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It costs a few
- * force evaluations; tissue that is deformed is stiffer, so ask again from time to time.
+ * steps; tissue that is deformed is stiffer, so ask again from time to time.
  *
  * @param seconds receives the step, s.
  * @param node may be NULL; receives the node that sets it.
@@ -989,7 +997,7 @@ supple_status supple_critical_step(const supple_scene *scene,
 
 /**
  * Sets the exact step of a state, for all calls that follow. Refused above the critical step at the state's
- * displacements. It may be changed at any time.
+ * displacements, which it computes. It may be changed at any time.
  *
  * @param error may be NULL.
  */
@@ -1009,7 +1017,7 @@ supple_status supple_state_time(const supple_state *state, double *seconds, uint
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
- * @param report may be NULL.
+ * @param report may be NULL; is written whatever the status.
  */
 supple_status supple_step(const supple_scene *scene,
                           supple_loads *loads,
@@ -1051,9 +1059,9 @@ supple_status supple_copy_positions(const supple_state *state,
 supple_status supple_copy_velocities(const supple_state *state, float *out, size_t floats);
 
 /**
- * Copies the total force on each node at the start of the latest step, N. At held nodes its opposite is the reaction of the
- * support, which is what a hand that holds the instrument feels, apart from the inertia of a moved one. Zero
- * after supple_critical_step or supple_set_step until the next step.
+ * Copies the total force on each node at the start of the latest step, N: that of the loads with that of the tissue. At held
+ * nodes it is what presses on the support, and so what a hand that holds the instrument feels, apart from the inertia of a moved
+ * one; the support presses back with the opposite. Zero after supple_critical_step or supple_set_step until the next step.
  *
  * @param floats room in `out`: three times the nodes at least.
  */
@@ -1116,7 +1124,7 @@ supple_status supple_learned_describe(const supple_learned *learned, supple_lear
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
- * @param report may be NULL; its steps are exact ones.
+ * @param report may be NULL; is written whatever the status; its steps are exact ones.
  */
 supple_status supple_learned_lead(const supple_scene *scene,
                                   supple_loads *loads,
@@ -1132,7 +1140,7 @@ supple_status supple_learned_lead(const supple_scene *scene,
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
- * @param report may be NULL.
+ * @param report may be NULL; is written whatever the status.
  */
 supple_status supple_learned_step(const supple_scene *scene,
                                   supple_loads *loads,
@@ -1172,10 +1180,10 @@ supple_status supple_large_init(void *memory,
 
 /**
  * Takes `count` large steps. Stops at the first that is not to be believed: that one is not taken, the state is as before it,
- * and the status tells.
+ * and the status tells. They run on the calling thread alone, and need no supple_set_step.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
- * @param report may be NULL.
+ * @param report may be NULL; is written whatever the status.
  */
 supple_status supple_large_step(const supple_scene *scene,
                                 supple_loads *loads,

@@ -16,7 +16,7 @@ use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, one
 use super::scene::{AnyScene, carved, check_choice, supple_scene, with_scene};
 use super::state::{View, supple_state};
 use super::status::{Answer, supple_error, supple_status};
-use super::step::{Reporting, supple_report, taken};
+use super::step::{reported, supple_report, taken};
 use supple_status::*;
 
 /// Inertia is raised where the step would be unstable.
@@ -228,10 +228,10 @@ fn clean(storage: Storage<'_>) -> Storage<'_> {
 }
 
 /// Takes `count` large steps. Stops at the first that is not to be believed: that one is not taken, the state is as before it,
-/// and the status tells.
+/// and the status tells. They run on the calling thread alone, and need no supple_set_step.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
-/// @param report may be NULL.
+/// @param report may be NULL; is written whatever the status.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_large_step(
     scene: *const supple_scene,
@@ -242,29 +242,25 @@ pub unsafe extern "C" fn supple_large_step(
     report: *mut supple_report,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let step = || unsafe {
+    let step = |found: &mut supple_report| unsafe {
         let any = carved(scene)?;
         let mut acting = Acting::of(loads, &any)?;
         belongs(memory::change(state)?.nodes, &any)?;
         belongs(memory::change(large)?.nodes, &any)?;
-        let report = Reporting::to(report)?;
         let (core, damper) = (&mut (*large).core, (*large).damper.as_ref());
-        let mut found = supple_report::NOTHING;
-        let answer = View::of(state).with(|state| {
+        View::of(state).with(|state| {
             let mut held_back = 0;
-            let answer = with_scene!(&any, scene => taken(count, state, &mut acting, &mut found, |loads, state| {
+            let answer = with_scene!(&any, scene => taken(count, state, &mut acting, found, |loads, state| {
                 let status = core.step(scene, loads, state, storage(large), damper);
                 held_back = held_back.max(core.report().held_back);
                 status
             }));
             found.close(state);
-            found.held_back = held_back;
+            (found.held_back, found.added_mass) = (held_back, core.report().added_mean);
+            found.error_estimate = core.report().error;
             answer
-        });
-        (found.added_mass, found.error) = (core.report().added_mean, core.report().error);
-        report.write(found);
-        answer
+        })
     };
-    let answer: Answer<supple_status> = step();
-    answer.unwrap_or_else(|error| error.status)
+    // SAFETY: as above.
+    unsafe { reported(report, step) }
 }

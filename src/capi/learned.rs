@@ -3,7 +3,7 @@
 
 use core::ffi::c_void;
 
-use crate::mlp::Network;
+use crate::mlp::{Network, TrainedLaw};
 use crate::state::{NodeVector, State};
 use crate::surrogate::{self, Surrogate, SurrogateReport, Vertex};
 use crate::tled::{self, Status, Step};
@@ -11,10 +11,13 @@ use crate::tled::{self, Status, Step};
 use super::SUPPLE_NONE;
 use super::loads::{Acting, belongs, supple_loads};
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, one, place_for, same_abi};
-use super::scene::{AnyScene, carved, check_choice, supple_scene, with_scene};
+use super::scene::{
+    AnyScene, SUPPLE_EXPONENTIAL, SUPPLE_NEO_HOOKEAN, carved, check_choice, supple_scene, supple_tissue,
+    with_scene,
+};
 use super::state::{Moment, View, step_of, supple_state};
 use super::status::{Answer, supple_error, supple_status};
-use super::step::{HostThreads, Reporting, supple_report, supple_threads, worse};
+use super::step::{HostThreads, reported, supple_report, supple_threads, worse};
 use supple_status::*;
 
 /// Share of the vertices outside what training has seen beyond which a step is remarked upon.
@@ -71,8 +74,10 @@ pub struct supple_learned_facts {
     pub seconds: f32,
     /// Damping of the training, 1/s; the state's step must have the same.
     pub damping: f32,
-    /// Density of the training, kg/m^3.
-    pub density: f32,
+    /// Law of the training, SUPPLE_NEO_HOOKEAN or SUPPLE_EXPONENTIAL; in another tissue the network's error is not known.
+    pub law: u32,
+    /// Its constants and density, as in a scene.
+    pub tissue: supple_tissue,
     /// Length of the exact step that it learned from, s.
     pub exact_seconds: f32,
     /// Multiplications with additions of one node's prediction.
@@ -167,10 +172,15 @@ pub unsafe extern "C" fn supple_learned_describe(
     let tell = || unsafe {
         let (object, facts) = (memory::read(learned)?, place_for(facts)?);
         let recipe = object.surrogate.recipe();
+        let (law, constants) = match recipe.law {
+            TrainedLaw::NeoHookean { c, d, .. } => (SUPPLE_NEO_HOOKEAN, [c, d, 0.0]),
+            TrainedLaw::Exponential { a, b, d, .. } => (SUPPLE_EXPONENTIAL, [a, b, d]),
+        };
         facts.write(supple_learned_facts {
             seconds: recipe.step,
             damping: recipe.damping,
-            density: recipe.density,
+            law,
+            tissue: supple_tissue { constants, density: recipe.density },
             exact_seconds: recipe.exact_step,
             multiply_adds: object.surrogate.multiply_adds() as u64,
             fell_back: object.fell_back.into(),
@@ -193,8 +203,7 @@ struct Parts<'a> {
     /// Exact steps in one of the network's.
     ratio: u32,
     threads: HostThreads,
-    report: Reporting,
-    found: supple_report,
+    found: &'a mut supple_report,
 }
 
 impl<'a> Parts<'a> {
@@ -206,7 +215,7 @@ impl<'a> Parts<'a> {
         state: *mut supple_state,
         learned: *mut supple_learned,
         threads: *const supple_threads,
-        report: *mut supple_report,
+        found: &'a mut supple_report,
     ) -> Answer<Self> {
         // SAFETY: the caller's promise.
         unsafe {
@@ -218,7 +227,7 @@ impl<'a> Parts<'a> {
             let mut arrays = Arrays::behind(learned.cast_const());
             let object = memory::change(learned)?;
             belongs(object.nodes, &any)?;
-            let (threads, report) = (HostThreads::of(threads)?, Reporting::to(report)?);
+            let threads = HostThreads::of(threads)?;
             let exact = step_of(moved)?;
             let recipe = object.surrogate.recipe();
             if (exact.damping() - recipe.damping).abs() > 1e-6 * recipe.damping {
@@ -236,20 +245,7 @@ impl<'a> Parts<'a> {
             let copies = if object.fallback { nodes } else { 0 };
             let copies = [arrays.next::<NodeVector>(copies), arrays.next::<NodeVector>(copies)];
             let view = View::of(state);
-            let found = supple_report::NOTHING;
-            Ok(Self {
-                any,
-                acting,
-                object,
-                vertices,
-                copies,
-                view,
-                exact,
-                ratio: whole,
-                threads,
-                report,
-                found,
-            })
+            Ok(Self { any, acting, object, vertices, copies, view, exact, ratio: whole, threads, found })
         }
     }
 
@@ -322,9 +318,8 @@ impl<'a> Parts<'a> {
         Ok(if outside > MUCH_OUTSIDE { worse(answer, SUPPLE_OUTSIDE) } else { answer })
     }
 
-    /// # Safety
-    /// The report's memory is still there.
-    unsafe fn each(
+    /// Takes `count` steps of the network's, or as many as can be believed.
+    fn each(
         mut self,
         count: u32,
         mut step: impl FnMut(&mut Self, u32) -> Answer<supple_status>,
@@ -341,8 +336,6 @@ impl<'a> Parts<'a> {
             }
         }
         self.found.close(&self.view.state);
-        // SAFETY: the caller's promise.
-        unsafe { self.report.write(self.found) };
         answer
     }
 }
@@ -382,7 +375,7 @@ fn is_unexplained(status: &Status) -> bool {
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.
-/// @param report may be NULL; its steps are exact ones.
+/// @param report may be NULL; is written whatever the status; its steps are exact ones.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_learned_lead(
     scene: *const supple_scene,
@@ -394,9 +387,11 @@ pub unsafe extern "C" fn supple_learned_lead(
     report: *mut supple_report,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let lead =
-        || unsafe { Parts::of(scene, loads, state, learned, threads, report)?.each(count, Parts::lead) };
-    lead().unwrap_or_else(|error: supple_error| error.status)
+    let lead = |found: &mut supple_report| unsafe {
+        Parts::of(scene, loads, state, learned, threads, found)?.each(count, Parts::lead)
+    };
+    // SAFETY: as above.
+    unsafe { reported(report, lead) }
 }
 
 /// Takes `count` learned steps after supple_learned_lead, or after other learned steps. Stops at the first that is not to be
@@ -404,7 +399,7 @@ pub unsafe extern "C" fn supple_learned_lead(
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.
-/// @param report may be NULL.
+/// @param report may be NULL; is written whatever the status.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_learned_step(
     scene: *const supple_scene,
@@ -416,12 +411,13 @@ pub unsafe extern "C" fn supple_learned_step(
     report: *mut supple_report,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let step = || unsafe {
-        let parts = Parts::of(scene, loads, state, learned, threads, report)?;
+    let step = |found: &mut supple_report| unsafe {
+        let parts = Parts::of(scene, loads, state, learned, threads, found)?;
         if !parts.object.fell_back && parts.object.led != Some(parts.view.state.steps()) {
             return Err(SUPPLE_E_NOT_LED.into());
         }
         parts.each(count, Parts::learned)
     };
-    step().unwrap_or_else(|error: supple_error| error.status)
+    // SAFETY: as above.
+    unsafe { reported(report, step) }
 }

@@ -104,7 +104,7 @@ pub unsafe extern "C" fn supple_state_reset(state: *mut supple_state) -> supple_
 }
 
 /// Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It costs a few
-/// force evaluations; tissue that is deformed is stiffer, so ask again from time to time.
+/// steps; tissue that is deformed is stiffer, so ask again from time to time.
 ///
 /// @param seconds receives the step, s.
 /// @param node may be NULL; receives the node that sets it.
@@ -134,7 +134,7 @@ pub unsafe extern "C" fn supple_critical_step(
 }
 
 /// Sets the exact step of a state, for all calls that follow. Refused above the critical step at the state's
-/// displacements. It may be changed at any time.
+/// displacements, which it computes. It may be changed at any time.
 ///
 /// @param error may be NULL.
 #[unsafe(no_mangle)]

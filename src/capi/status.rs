@@ -48,7 +48,7 @@ pub enum supple_status {
     SUPPLE_E_MISMATCH = -8,
     /// More (value) than there is room for (limit).
     SUPPLE_E_CAPACITY = -9,
-    /// Entry or element `index` names a node that is not there (node; limit: nodes).
+    /// Entry `index` of a list (elements, supports, forces, motions) names a node that is not there (node; limit: nodes).
     SUPPLE_E_INDEX = -10,
     /// Entry or node `index` has a number (value) that is NaN or infinite.
     SUPPLE_E_NOT_FINITE = -11,
@@ -156,11 +156,20 @@ pub(super) type Answer<T> = Result<T, supple_error>;
 
 impl From<supple_status> for supple_error {
     fn from(status: supple_status) -> Self {
-        Self { status, index: SUPPLE_NONE, node: SUPPLE_NONE, axis: SUPPLE_NONE, value: 0.0, limit: 0.0 }
+        Self { status, ..Self::NONE }
     }
 }
 
 impl supple_error {
+    pub(super) const NONE: Self = Self {
+        status: SUPPLE_OK,
+        index: SUPPLE_NONE,
+        node: SUPPLE_NONE,
+        axis: SUPPLE_NONE,
+        value: 0.0,
+        limit: 0.0,
+    };
+
     pub(super) fn value(self, value: f64, limit: f64) -> Self {
         Self { value, limit, ..self }
     }
@@ -336,7 +345,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         3 => c"a learned step was not to be believed: the exact step has taken over",
         -1 => c"a pointer is NULL",
         -2 => c"a pointer is not aligned",
-        -3 => c"the memory is too small",
+        -3 => c"fewer bytes or numbers than needed",
         -4 => c"a configuration of another version of the interface",
         -5 => c"the memory holds no object",
         -6 => c"the memory holds an object of another type",

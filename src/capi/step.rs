@@ -41,7 +41,7 @@ pub struct supple_threads {
     >,
 }
 
-/// What the steps of a call found. Every call that takes steps writes all of it.
+/// What the steps of a call found, and what stopped it. Every call that takes steps writes all of it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_report {
@@ -70,7 +70,9 @@ pub struct supple_report {
     /// Large steps: most nodes that were held back in a step.
     pub held_back: u32,
     /// Large steps: estimate of the error so far, m, mean over the nodes; it tells the scale and is no bound.
-    pub error: f32,
+    pub error_estimate: f32,
+    /// What stopped the call, with place and value; status SUPPLE_OK if nothing did.
+    pub error: supple_error,
 }
 
 impl supple_report {
@@ -87,7 +89,8 @@ impl supple_report {
         outside: 0.0,
         added_mass: 0.0,
         held_back: 0,
-        error: 0.0,
+        error_estimate: 0.0,
+        error: supple_error::NONE,
     };
 
     /// Enters a step; what it found if it was not taken.
@@ -134,7 +137,7 @@ pub(super) fn worse(a: supple_status, b: supple_status) -> supple_status {
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.
-/// @param report may be NULL.
+/// @param report may be NULL; is written whatever the status.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_step(
     scene: *const supple_scene,
@@ -145,27 +148,23 @@ pub unsafe extern "C" fn supple_step(
     report: *mut supple_report,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let step = || unsafe {
+    let step = |found: &mut supple_report| unsafe {
         let any = carved(scene)?;
         let mut acting = Acting::of(loads, &any)?;
         let object = memory::change(state)?;
         belongs(object.nodes, &any)?;
         let step = step_of(object)?;
         let threads = HostThreads::of(threads)?;
-        let report = Reporting::to(report)?;
-        let mut found = supple_report::NOTHING;
-        let answer = View::of(state).with(|state| {
-            let answer = with_scene!(&any, scene => taken(count, state, &mut acting, &mut found, |loads, state| {
+        View::of(state).with(|state| {
+            let answer = with_scene!(&any, scene => taken(count, state, &mut acting, found, |loads, state| {
                 tled::step_in_parts(scene, loads, state, &step, &threads)
             }));
             found.close(state);
             answer
-        });
-        report.write(found);
-        answer
+        })
     };
-    let answer: Answer<supple_status> = step();
-    answer.unwrap_or_else(|error| error.status)
+    // SAFETY: as above.
+    unsafe { reported(report, step) }
 }
 
 /// Takes steps until one is refused.
@@ -184,25 +183,28 @@ pub(super) fn taken<'a>(
     Ok(worst)
 }
 
-/// Where a report goes, if anywhere.
-pub(super) struct Reporting(Option<*mut supple_report>);
-
-impl Reporting {
-    /// # Safety
-    /// If not NULL, `report` leads to memory for one.
-    pub(super) unsafe fn to(report: *mut supple_report) -> Answer<Self> {
-        // SAFETY: the caller's promise.
-        Ok(Self(if report.is_null() { None } else { Some(unsafe { place_for(report)? }) }))
+/// Has `work` done, and writes what it found and what stopped it to `report`, if that is not NULL.
+///
+/// # Safety
+/// If not NULL, `report` leads to memory for one.
+pub(super) unsafe fn reported(
+    report: *mut supple_report,
+    work: impl FnOnce(&mut supple_report) -> Answer<supple_status>,
+) -> supple_status {
+    let mut found = supple_report::NOTHING;
+    if report.is_null() {
+        return work(&mut found).unwrap_or_else(|error| error.status);
     }
-
-    /// # Safety
-    /// The memory is still there.
-    pub(super) unsafe fn write(&self, found: supple_report) {
-        if let Some(report) = self.0 {
-            // SAFETY: the caller's promise.
-            unsafe { report.write(found) };
-        }
-    }
+    // SAFETY: the caller's promise.
+    let report = match unsafe { place_for(report) } {
+        Ok(report) => report,
+        Err(error) => return error.status,
+    };
+    let answer = work(&mut found);
+    found.error = answer.err().unwrap_or(supple_error::NONE);
+    // SAFETY: aligned, and there.
+    unsafe { report.write(found) };
+    answer.unwrap_or_else(|error| error.status)
 }
 
 /// Threads of the host, or none.

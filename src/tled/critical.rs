@@ -20,7 +20,7 @@
 //!
 //! No term is left out, so the bound holds for any state, inverted elements included.
 
-use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter};
+use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter, dot};
 use crate::material::{Law, Laws, Local, Material, Potential};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
@@ -141,7 +141,7 @@ fn add_bounds<R: Real, L: Law>(
     let terms = Terms::<R>::new::<L>(law, &deformation);
     let mut gradients = [[R::splat(0.0); 3]; 4];
     for corner in 1..4 {
-        gradients[corner] = [0, 1, 2].map(|axis| block.gradient(corner - 1, axis, first));
+        gradients[corner] = block.gradients(corner - 1, first);
     }
     for axis in 0..3 {
         gradients[0][axis] = -(gradients[1][axis] + gradients[2][axis] + gradients[3][axis]);
@@ -150,15 +150,20 @@ fn add_bounds<R: Real, L: Law>(
     for (corner, gradient) in gradients.iter_mut().enumerate() {
         let [x, y, z] = inertia.read_lanes::<R, 4>(&nodes, corner, first);
         let root = x.max(y).max(z).max(R::splat(0.0)).sqrt() * volume;
-        *gradient = gradient.map(|component| component * root);
+        *gradient = [gradient[0] * root, gradient[1] * root, gradient[2] * root];
     }
-    let images = gradients.map(|gradient| terms.images(&deformation, gradient));
-    let total = |length: fn(&Images<R>) -> R| {
-        length(&images[0]) + length(&images[1]) + length(&images[2]) + length(&images[3])
-    };
-    let by_c = terms.volume * total(|image| image.c.length);
-    let by_e = terms.coupling * total(|image| image.e.length);
-    let by_x = terms.stiffening * total(|image| image.x.length);
+    // No closures over vectors from here on: those may stay calls, which do nothing but add two numbers.
+    let [g0, g1, g2, g3] = gradients;
+    let images = [
+        terms.images(&deformation, g0),
+        terms.images(&deformation, g1),
+        terms.images(&deformation, g2),
+        terms.images(&deformation, g3),
+    ];
+    let [i0, i1, i2, i3] = &images;
+    let by_c = terms.volume * (i0.c.length + i1.c.length + i2.c.length + i3.c.length);
+    let by_e = terms.coupling * (i0.e.length + i1.e.length + i2.e.length + i3.e.length);
+    let by_x = terms.stiffening * (i0.x.length + i1.x.length + i2.x.length + i3.x.length);
 
     let mut rows = [R::splat(0.0); 4];
     for a in 0..4 {
@@ -172,21 +177,16 @@ fn add_bounds<R: Real, L: Law>(
     let zero = R::splat(0.0);
     let (mut first_four, mut fifth, mut sixth) = ([[zero; 4]; 4], [[zero; 4]; 4], [[zero; 4]; 4]);
     for corner in 0..4 {
-        let (c, e, x) = (&images[corner].c, &images[corner].e, &images[corner].x);
         let isotropic = rows[corner];
-        let entry = |i: usize, j: usize| c.entry(by_c, i, j) + e.entry(by_e, i, j) + x.entry(by_x, i, j);
-        let matrix = [
-            entry(0, 0) + isotropic,
-            entry(1, 1) + isotropic,
-            entry(2, 2) + isotropic,
-            entry(0, 1),
-            entry(1, 2),
-            entry(2, 0),
+        let of = &images[corner];
+        first_four[corner] = [
+            of.entry([by_c, by_e, by_x], 0, 0) + isotropic,
+            of.entry([by_c, by_e, by_x], 1, 1) + isotropic,
+            of.entry([by_c, by_e, by_x], 2, 2) + isotropic,
+            of.entry([by_c, by_e, by_x], 0, 1),
         ];
-        let [xx, yy, zz, xy, yz, zx] = matrix;
-        first_four[corner] = [xx, yy, zz, xy];
-        fifth[corner][3] = yz;
-        sixth[corner][3] = zx;
+        fifth[corner][3] = of.entry([by_c, by_e, by_x], 1, 2);
+        sixth[corner][3] = of.entry([by_c, by_e, by_x], 2, 0);
     }
     Scatter::new(sums.xx_yy_zz_xy).add_corners(&nodes, first, first_four);
     Scatter::new(sums.yz_in_padding).add_corners(&nodes, first, fifth);
@@ -217,9 +217,8 @@ struct Image<R> {
 impl<R: Real> Image<R> {
     #[inline(always)]
     fn new(vector: Vector<R>) -> Self {
-        let square = vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2];
-        let length = square.sqrt();
-        let inverse = length.map(|length| 1.0 / (length + f32::MIN_POSITIVE));
+        let length = dot(vector, vector).sqrt();
+        let inverse = R::splat(1.0).over(length + R::splat(f32::MIN_POSITIVE));
         Self { vector, length, inverse }
     }
 
@@ -237,6 +236,14 @@ struct Images<R> {
     c: Image<R>,
     e: Image<R>,
     x: Image<R>,
+}
+
+impl<R: Real> Images<R> {
+    /// The three [`Image::entry`]s of an entry.
+    #[inline(always)]
+    fn entry(&self, [by_c, by_e, by_x]: [R; 3], i: usize, j: usize) -> R {
+        self.c.entry(by_c, i, j) + self.e.entry(by_e, i, j) + self.x.entry(by_x, i, j)
+    }
 }
 
 impl<R: Real> Terms<R> {
@@ -257,13 +264,14 @@ impl<R: Real> Terms<R> {
                 e = e + deformation.distortion(i, j) * deformation.distortion(i, j);
             }
         }
-        let ratio = e.zip(c, |e, c| (e + 1e-12) / (c + 1e-12)).sqrt();
+        let little = R::splat(1e-12);
+        let ratio = (e + little).over(c + little).sqrt();
         Self {
             p1: two * slope * g,
             p_j: law.volume_slope(at.j) + slope * dg * i1,
             stiffening: local.stiffening::<L>(law),
             volume: (volume + coupling * ratio).max(zero),
-            coupling: coupling.zip(ratio, |coupling, ratio| coupling / ratio),
+            coupling: coupling.over(ratio),
             x_f: two * g,
             x_c: dg * i1,
         }
@@ -289,10 +297,10 @@ impl<R: Real> Terms<R> {
     #[inline(always)]
     fn geometric(&self, a: &Images<R>, b: &Images<R>) -> R {
         let g = b.gradient;
-        let dot = |row: &Vector<R>| row[0] * g[0] + row[1] * g[1] + row[2] * g[2];
-        let along = (self.p1 * dot(&a.gradient)).abs();
-        let [x, y, z] = [dot(&a.cross[0]), dot(&a.cross[1]), dot(&a.cross[2])];
-        let across = self.p_j.abs() * (x * x + y * y + z * z).sqrt();
+        let along = (self.p1 * dot(a.gradient, g)).abs();
+        let [x, y, z] = a.cross;
+        let turned = [dot(x, g), dot(y, g), dot(z, g)];
+        let across = self.p_j.abs() * dot(turned, turned).sqrt();
         along.max(across) + along.min(across) * R::splat(core::f32::consts::SQRT_2 - 1.0)
     }
 }
@@ -300,9 +308,12 @@ impl<R: Real> Terms<R> {
 /// The matrix of `b -> F (a x b)`.
 #[inline(always)]
 fn cross_matrix<R: Real>(deformation: &Deformation<R>, a: Vector<R>) -> [[R; 3]; 3] {
-    [0, 1, 2].map(|i| {
-        let f = |j: usize| deformation.distortion(i, j) + deformation.cofactor(i, j);
-        let (f0, f1, f2) = (f(0), f(1), f(2));
-        [a[2] * f1 - a[1] * f2, a[0] * f2 - a[2] * f0, a[1] * f0 - a[0] * f1]
-    })
+    let mut matrix = [[R::splat(0.0); 3]; 3];
+    for (i, row) in matrix.iter_mut().enumerate() {
+        let f0 = deformation.distortion(i, 0) + deformation.cofactor(i, 0);
+        let f1 = deformation.distortion(i, 1) + deformation.cofactor(i, 1);
+        let f2 = deformation.distortion(i, 2) + deformation.cofactor(i, 2);
+        *row = [a[2] * f1 - a[1] * f2, a[0] * f2 - a[2] * f0, a[1] * f0 - a[0] * f1];
+    }
+    matrix
 }

@@ -139,7 +139,7 @@ static void large_copied(uint32_t method, const char *name) {
     CHECK(where(state) == where(state_copy));
     CHECK(report.added_mass > 0.0f);
     printf("copies: %s: the same bits after 200 more; %zu bytes, %.1f masses added, error about %.3f mm\n", name, needed,
-           (double)report.added_mass, 1e3 * (double)report.error);
+           (double)report.added_mass, 1e3 * (double)report.error_estimate);
 }
 
 int main(void) {
