@@ -1,0 +1,97 @@
+#!/usr/bin/env bash
+# Tests of the C face against an installed library (`tools/install.sh`): the programs of this folder, the examples, what
+# valgrind says of them, and the command's result beside that of C and Python. Run by `.ci/run`.
+#
+#     tests/capi/run.sh PREFIX COMMAND
+#
+# PREFIX is where the library is installed, COMMAND the program `supple` built from the same sources.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+[ $# = 2 ] || { echo "usage: tests/capi/run.sh PREFIX COMMAND" >&2; exit 2; }
+prefix=$(realpath "$1") command=$(realpath "$2")
+folder=$PWD/target/capi
+rm -rf "$folder"
+mkdir -p "$folder"
+shared=$prefix/lib/libsupple.so static=$prefix/lib/libsupple.a
+warnings=(-O2 -g -Wall -Wextra -Werror -pedantic -I"$prefix/include")
+
+# What the tests count: whoever asks the C library for memory.
+wrapped=-Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc,--wrap=aligned_alloc,--wrap=posix_memalign
+for test in misuse sizes copies heap threads; do
+    options=(-pthread)
+    [ $test != heap ] || options=("$wrapped")
+    for size in large small; do
+        [ $size = large ] || options+=(-DSMALL)
+        gcc -std=c11 "${warnings[@]}" "${options[@]}" tests/capi/$test.c "$static" -o "$folder/$test-$size"
+    done
+    "$folder/$test-large"
+done
+for test in misuse copies heap; do
+    valgrind --quiet --error-exitcode=9 --leak-check=full "$folder/$test-small" under-valgrind >"$folder/said"
+done
+echo "valgrind: no error in misuse, copies, heap"
+valgrind --quiet --error-exitcode=9 --tool=helgrind "$folder/threads-small" >"$folder/said"
+echo "helgrind: no race in threads"
+
+g++ -std=c++17 "${warnings[@]}" tests/hosts/wrapper.cpp "$static" -o "$folder/wrapper"
+"$folder/wrapper" weights/compact-10.weights
+
+# The newcomer's bar, and what the command makes of the same scene.
+gcc -std=c11 "${warnings[@]}" examples/bar.c "$static" -o "$folder/bar"
+cat >"$folder/bar.toml" <<'SCENE'
+damping = 20.0
+[mesh]
+shape = "bar"
+size = [0.02, 0.02, 0.1]
+cells = [2, 2, 10]
+[material]
+law = "neo-hookean"
+c = 500.0
+d = 25000.0
+density = 1000.0
+[[fix]]
+plane = { axis = "z", at = 0.0 }
+[[force]]
+nodes = [94]
+newton = [0.01, 0.0, 0.0]
+ramp = 0.1
+[time]
+step = 2e-4
+end = 0.2
+frames = 1
+SCENE
+"$command" simulate "$folder/bar.toml" --out "$folder/bar.out" >"$folder/said"
+"$folder/bar" | tee "$folder/bar.said"
+awk -F'[ ,]' '
+    FNR == NR { for (i = 0; i < 3; i++) c[i] = $(5 + i); next }
+    $1 == 94 {
+        for (i = 0; i < 3; i++) { off += (c[i] - $(5 + i)) ^ 2; length2 += $(5 + i) ^ 2 }
+        printf "the command is %.1e of that away\n", sqrt(off / length2)
+        found = 1
+        exit !(sqrt(off) <= 1e-6 * sqrt(length2))
+    }
+    END { if (!found) exit 1 }' "$folder/bar.said" "$folder/bar.out/final.csv"
+
+# The lobe: static memory only, and with an instrument, sixty frames a second.
+python3 tools/mesh_to_c.py meshes/lobe.msh "$folder/lobe_mesh.h"
+python3 tools/mesh_to_c.py --bytes weights/compact-10.weights compact "$folder/compact.h"
+gcc -std=c11 "${warnings[@]}" -I"$folder" "$wrapped" examples/lobe.c tests/capi/no_heap.c "$static" -lm -o "$folder/lobe"
+"$folder/lobe"
+g++ -std=c++17 "${warnings[@]}" examples/instrument.cpp "$shared" -Wl,-rpath,"$prefix/lib" -o "$folder/instrument"
+for method in exact damped mass-scaled; do
+    "$folder/instrument" --method $method --frames 60 --out "$folder/$method"
+done
+"$folder/instrument" --jitter 10000 --frames 1
+
+# From Python; a machine without numpy gets its own.
+python=python3
+if ! python3 -c 'import numpy' 2>/dev/null; then
+    python3 -m venv "$folder/venv" 2>/dev/null || {
+        apt-get update -qq && apt-get install -y -qq --no-install-recommends python3-venv
+        python3 -m venv "$folder/venv"
+    }
+    python=$folder/venv/bin/python3
+    "$python" -m pip install --quiet numpy==2.4.6
+fi
+"$python" examples/compare.py "$shared" "$command"
