@@ -2,9 +2,7 @@
 #include <stdio.h>
 #include <supple.h>
 enum { X = 2, Y = 2, Z = 10, LAYER = (X + 1) * (Y + 1), NODES = LAYER * (Z + 1), CELLS = X * Y * Z, TIP = NODES - 5 };
-static float points[NODES][3];
-static uint32_t tets[6 * CELLS][4];
-static supple_support held[LAYER];
+static float points[NODES][3]; static uint32_t tets[6 * CELLS][4]; static supple_support held[LAYER];
 SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, 6 * CELLS, 1));
 SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(1, 0));
@@ -28,7 +26,7 @@ int main(void) {
         .support = held, .tissue = &tissue};
     const supple_step_config length = {SUPPLE_CONFIG(supple_step_config), .seconds = 2e-4f, .damping = 20.0f};
     const supple_force push = {.node = TIP, .newton = {0.01f, 0.0f, 0.0f}, .ramp = 0.1f}; /* N, s */
-    supple_scene *scene; supple_state *state; supple_loads *loads; supple_status status; supple_vectors moved;
+    supple_scene *scene; supple_state *state; supple_loads *loads; supple_vectors moved; supple_status status;
     TRY(supple_scene_init(scene_memory, sizeof scene_memory, &body, &scene, NULL));
     TRY(supple_state_init(state_memory, sizeof state_memory, scene, &state));
     TRY(supple_loads_init(loads_memory, sizeof loads_memory, scene, 1, 0, &loads));
@@ -36,6 +34,6 @@ int main(void) {
     TRY(supple_set_step(scene, state, &length, NULL));
     TRY(supple_step(scene, loads, state, 1000, NULL, NULL));
     TRY(supple_displacements(state, &moved));
-    const float *tip = moved.first + moved.stride / sizeof(float) * TIP;
-    return printf("the tip moved by %.9g %.9g %.9g m\n", tip[0], tip[1], tip[2]) < 0;
+    const float *u = moved.first + moved.stride / sizeof(float) * TIP;
+    return printf("the tip moved by %.9g %.9g %.9g m\n", u[0], u[1], u[2]) < 0;
 }

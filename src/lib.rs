@@ -24,7 +24,7 @@
 //!
 //! With the feature `io` meshes are read and fields written (`io`), with `lab` methods are judged against the
 //! exact step over scenes (`lab`), with `train` networks are trained (`train`), with `safetensors` they go to and from
-//! PyTorch, with `cli` there is the command `supple`.
+//! PyTorch, with `cli` there is the command `supple`, with `capi` the functions of `include/supple.h`.
 //!
 //! # Promises
 //!

@@ -37,8 +37,10 @@ echo "helgrind: no race in threads"
 g++ -std=c++17 "${warnings[@]}" tests/hosts/wrapper.cpp "$static" -o "$folder/wrapper"
 "$folder/wrapper" weights/compact-10.weights
 
-# The newcomer's bar, and what the command makes of the same scene.
-gcc -std=c11 "${warnings[@]}" examples/bar.c "$static" -o "$folder/bar"
+# The newcomer's bar as the README has it, and what the command makes of the same scene.
+sed -n '/^```c$/,/^```$/p' README.md | sed '/^```/d' >"$folder/bar.c"
+diff "$folder/bar.c" examples/bar.c
+gcc -std=c11 "${warnings[@]}" "$folder/bar.c" "$static" -o "$folder/bar"
 cat >"$folder/bar.toml" <<'SCENE'
 damping = 20.0
 [mesh]
