@@ -687,11 +687,11 @@ typedef struct {
      */
     uint32_t node;
     /**
-     * Smallest volume of an element over its volume at rest, where it left the range of its law; else 1.
+     * Smallest volume of an element over its volume at rest, at the start of any of the steps.
      */
     float least_volume_ratio;
     /**
-     * Largest exponent over its cap, of the exponential law: above 1 the law went on along its tangent. Zero if nothing came near.
+     * Largest exponent over its cap, of the exponential law: above 1 the law went on along its tangent.
      */
     float saturation;
     /**

@@ -6,6 +6,7 @@
 
 pub use crate::lanes::NodeVector;
 use crate::ledger::Ledger;
+use crate::tled::Extremes;
 
 /// The state of a scene over storage `S`, with room for at least its nodes.
 #[derive(Clone, Debug)]
@@ -19,6 +20,8 @@ pub struct State<S> {
     /// Step that `increment` spans, s; zero before the first step.
     pub(crate) dt: f32,
     pub(crate) ledger: Ledger,
+    /// At the start of the latest step.
+    pub(crate) extremes: Extremes<f32>,
 }
 
 /// A state with room for `N` nodes, which may be a `static`.
@@ -41,7 +44,16 @@ impl<const N: usize> Default for FixedState<N> {
 impl<S> State<S> {
     /// A state over the given storage, as it is: zeros mean at rest.
     pub const fn over(displacement: S, increment: S, force: S) -> Self {
-        Self { displacement, increment, force, time: 0.0, steps: 0, dt: 0.0, ledger: Ledger::NEW }
+        Self {
+            displacement,
+            increment,
+            force,
+            time: 0.0,
+            steps: 0,
+            dt: 0.0,
+            ledger: Ledger::NEW,
+            extremes: Extremes::REST,
+        }
     }
 
     /// Simulated time, s.
@@ -60,6 +72,19 @@ impl<S> State<S> {
     #[must_use]
     pub const fn ledger(&self) -> &Ledger {
         &self.ledger
+    }
+
+    /// Smallest volume of an element over its volume at rest, at the start of the latest step that was taken; 1 before the first.
+    #[must_use]
+    pub const fn least_volume_ratio(&self) -> f32 {
+        1.0 + self.extremes.least_j
+    }
+
+    /// Largest exponent over its cap, at the start of the latest step that was taken: above 1 the exponential law went on along
+    /// its tangent. Zero for laws without.
+    #[must_use]
+    pub const fn saturation(&self) -> f32 {
+        self.extremes.saturation
     }
 }
 
@@ -128,5 +153,6 @@ impl<S: AsRef<[NodeVector]> + AsMut<[NodeVector]>> State<S> {
         self.steps = 0;
         self.dt = 0.0;
         self.ledger = Ledger::NEW;
+        self.extremes = Extremes::REST;
     }
 }

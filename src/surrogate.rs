@@ -249,7 +249,7 @@ where
     let room = state.capacity().min(surrogate.vertices.as_ref().len());
     let mismatch = Status::Mismatch { nodes, room };
     let Surrogate { network, vertices, step, report } = surrogate;
-    let State { displacement, increment, force, time, steps, dt, ledger } = state;
+    let State { displacement, increment, force, time, steps, dt, ledger, extremes: seen } = state;
     let (Some(displacement), Some(increment), Some(force), Some(vertices)) = (
         displacement.as_mut().get_mut(..nodes),
         increment.as_mut().get_mut(..nodes),
@@ -295,7 +295,7 @@ where
         }
     };
 
-    *ledger = entered;
+    (*ledger, *seen) = (entered, extremes);
     *report = Counts::of_all(found.iter().map(|(_, counts)| counts)).report();
     move_in_parts(elements.chunks, displacement, increment, threads, |nodes, displacement, increment| {
         let vertices = vertices.get(nodes).unwrap_or_default();

@@ -258,7 +258,7 @@ impl<'a> Parts<'a> {
                 let loads = acting.next(state.displacements(), left.saturating_mul(*ratio) - done);
                 let status =
                     with_scene!(&*any, scene => tled::step_in_parts(scene, &loads, state, exact, &*threads));
-                worst = worse(worst, found.enter(&status)?);
+                worst = worse(worst, found.enter(&status, state)?);
             }
             Ok(worst)
         })
@@ -313,7 +313,7 @@ impl<'a> Parts<'a> {
             });
             return self.exact_steps(left).map(|_| SUPPLE_FELL_BACK);
         }
-        let answer = found.enter(&status)?;
+        let answer = found.enter(&status, &self.view.state)?;
         self.object.led = Some(self.view.state.steps());
         Ok(if outside > MUCH_OUTSIDE { worse(answer, SUPPLE_OUTSIDE) } else { answer })
     }

@@ -55,9 +55,9 @@ pub struct supple_report {
     pub steps: u32,
     /// The node at which a step diverged, else SUPPLE_NONE.
     pub node: u32,
-    /// Smallest volume of an element over its volume at rest, where it left the range of its law; else 1.
+    /// Smallest volume of an element over its volume at rest, at the start of any of the steps.
     pub least_volume_ratio: f32,
-    /// Largest exponent over its cap, of the exponential law: above 1 the law went on along its tangent. Zero if nothing came near.
+    /// Largest exponent over its cap, of the exponential law: above 1 the law went on along its tangent.
     pub saturation: f32,
     /// Kinetic energy beyond the account, as a share of the most that was ever in it.
     pub energy_excess: f32,
@@ -94,16 +94,15 @@ impl supple_report {
     };
 
     /// Enters a step; what it found if it was not taken.
-    pub(super) fn enter(&mut self, status: &Status) -> Answer<supple_status> {
+    pub(super) fn enter<S>(&mut self, status: &Status, state: &State<S>) -> Answer<supple_status> {
+        if let Status::Ok | Status::Limited { .. } = status {
+            self.steps += 1;
+            self.least_volume_ratio = self.least_volume_ratio.min(state.least_volume_ratio());
+            self.saturation = self.saturation.max(state.saturation());
+        }
         match *status {
-            Status::Ok => {
-                self.steps += 1;
-                Ok(SUPPLE_OK)
-            }
-            Status::Limited { least_volume_ratio, saturation, energy_excess } => {
-                self.steps += 1;
-                self.least_volume_ratio = self.least_volume_ratio.min(least_volume_ratio);
-                self.saturation = self.saturation.max(saturation);
+            Status::Ok => Ok(SUPPLE_OK),
+            Status::Limited { energy_excess, .. } => {
                 self.energy_excess = self.energy_excess.max(energy_excess);
                 Ok(SUPPLE_LIMITED)
             }
@@ -178,7 +177,8 @@ pub(super) fn taken<'a>(
     let mut worst = SUPPLE_OK;
     for done in 0..count {
         let loads = acting.next(state.displacements(), count - done);
-        worst = worse(worst, found.enter(&step(&loads, state))?);
+        let status = step(&loads, state);
+        worst = worse(worst, found.enter(&status, state)?);
     }
     Ok(worst)
 }

@@ -91,7 +91,7 @@ impl Core {
         let mismatch = Status::Mismatch { nodes, room: if room < self.nodes { room } else { self.nodes } };
         let Storage { vectors, places, dense } = storage;
         let Self { step, lattice, refresh, scaling, estimate, report, nodes: prepared, damped, rough } = self;
-        let State { displacement, increment, force, time, steps, dt, ledger } = state;
+        let State { displacement, increment, force, time, steps, dt, ledger, extremes: seen } = state;
         let (Some(step), Some(displacement), Some(increment), Some(force), Some(mut tables)) = (
             step.filter(|_| *prepared == nodes),
             displacement.as_mut().get_mut(..nodes),
@@ -167,7 +167,7 @@ impl Core {
             }
         };
 
-        *ledger = entered;
+        (*ledger, *seen) = (entered, extremes);
         *rough = found;
         estimate.advance(&defects, external, nodes, scaling.k, step.seconds() * step.seconds());
         Follow { next: tables.next, displacement, increment }.dispatched();

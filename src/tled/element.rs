@@ -117,7 +117,7 @@ pub(crate) const fn operations<L: Law>() -> u32 {
 }
 
 /// How far a step went into the range where laws are continued to stay finite.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub struct Extremes<R> {
     /// Smallest `J - 1`.
     pub(crate) least_j: R,
@@ -142,6 +142,9 @@ impl<R: Real> Extremes<R> {
 }
 
 impl Extremes<f32> {
+    /// Of a body at rest.
+    pub(crate) const REST: Self = Self { least_j: 0.0, saturation: 0.0 };
+
     /// What a step that was taken says of itself; `held` if it held back much of the motion.
     pub(crate) fn status(&self, ledger: &Ledger, held: bool) -> Status {
         let least_volume_ratio = 1.0 + self.least_j;

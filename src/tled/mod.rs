@@ -245,7 +245,7 @@ where
 {
     let nodes = scene.node_count();
     let room = state.capacity();
-    let State { displacement, increment, force, time, steps, dt, ledger } = state;
+    let State { displacement, increment, force, time, steps, dt, ledger, extremes: seen } = state;
     let (Some(displacement), Some(increment), Some(force)) = (
         displacement.as_mut().get_mut(..nodes),
         increment.as_mut().get_mut(..nodes),
@@ -290,7 +290,7 @@ where
         }
     };
 
-    *ledger = entered;
+    (*ledger, *seen) = (entered, extremes);
     let force = &*force;
     move_in_parts(elements.chunks, displacement, increment, threads, |nodes, displacement, increment| {
         let inertia = inertia.get(nodes.clone()).unwrap_or_default();

@@ -72,6 +72,7 @@ static void exact_copied(void) {
     CHECK(supple_saved_size(NODES) <= sizeof saved - 1);
     CHECK(supple_save(state, saved + 1, sizeof saved - 1) == SUPPLE_OK);
     CHECK(supple_step(scene, loads, state, 300, NULL, &report) == SUPPLE_OK && report.steps == 300);
+    CHECK(report.least_volume_ratio > 0.2f && report.least_volume_ratio < 1.0f && report.saturation > 0.0f);
     const uint64_t end = where(state);
     CHECK(supple_step(scene, loads, copy, 300, NULL, NULL) == SUPPLE_OK);
     CHECK(where(copy) == end);
