@@ -7,7 +7,8 @@
 //                  [--realtime] [--jitter N]
 //
 // Run from the repository it finds meshes/lobe.msh and weights/damper.weights itself. --out leaves frames for
-// ParaView, ten a second. --realtime waits for the clock between frames. --jitter N then times N single steps.
+// ParaView, ten a second. --realtime waits for the clock between frames. --jitter N then times N single steps, beside
+// fixed work of the same length: what that varies by is the machine.
 #include <array>
 #include <algorithm>
 #include <chrono>
@@ -213,20 +214,49 @@ struct host {
 };
 
 // Times single steps while the sphere stands still. The project's goal: 999 of 1000 within 1.5 times the median.
-void measure_jitter(host &host, long count) {
-    std::vector<double> times(static_cast<std::size_t>(count));
-    supple::report report;
-    for (int warm = 0; warm < 1000; warm++) done("step", host.step(1, report));
-    for (double &time : times) {
-        const auto start = clock_type::now();
-        const supple::status status = host.step(1, report);
-        time = 1000.0 * milliseconds(clock_type::now() - start);
-        done("step", status);
+struct jitter {
+    std::vector<double> times;
+
+    double part(double share) const { return times[std::size_t(share * double(times.size() - 1))]; }
+
+    void print(const char *what) {
+        std::sort(times.begin(), times.end());
+        std::printf("%s: median %.1f us, p99 %.1f us, p99.9 %.1f us, most %.1f us; p99.9 / median %.2f\n", what, part(0.5),
+                    part(0.99), part(0.999), times.back(), part(0.999) / part(0.5));
     }
-    std::sort(times.begin(), times.end());
-    const auto part = [&](double share) { return times[std::size_t(share * double(times.size() - 1))]; };
-    std::printf("%ld single steps: median %.1f us, p99 %.1f us, p99.9 %.1f us, most %.1f us; p99.9 / median %.2f\n",
-                count, part(0.5), part(0.99), part(0.999), times.back(), part(0.999) / part(0.5));
+};
+
+// Additions that wait for each other, and for nothing else: what the machine itself makes of a fixed piece of work.
+double additions(long count) {
+    double sum = 1.0;
+    for (long at = 0; at < count; at++) sum = sum * 0.999 + 0.1;
+    return sum;
+}
+
+// Single steps, and as much fixed work after each.
+void measure_jitter(host &host, long count) {
+    const auto microseconds = [](clock_type::time_point since) { return 1000.0 * milliseconds(clock_type::now() - since); };
+    jitter steps, work;
+    steps.times.resize(std::size_t(count)), work.times.resize(std::size_t(count));
+    supple::report report;
+    auto start = clock_type::now();
+    for (int warm = 0; warm < 1000; warm++) done("step", host.step(1, report));
+    const double step = microseconds(start) / 1000.0;
+    start = clock_type::now();
+    volatile double sum = additions(1000000);
+    const long as_long = long(1e6 * step / microseconds(start));
+    for (std::size_t at = 0; at < steps.times.size(); at++) {
+        start = clock_type::now();
+        const supple::status status = host.step(1, report);
+        steps.times[at] = microseconds(start);
+        done("step", status);
+        start = clock_type::now();
+        sum = additions(as_long);
+        work.times[at] = microseconds(start);
+    }
+    (void)sum;
+    steps.print((std::to_string(count) + " single steps").c_str());
+    work.print("as many times fixed work in between");
 }
 
 void run(const options &chosen) {

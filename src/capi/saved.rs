@@ -3,7 +3,7 @@
 use core::ffi::c_void;
 use core::{ptr, slice};
 
-use bytemuck::{Pod, Zeroable, bytes_of, cast_slice};
+use bytemuck::{Pod, Zeroable, bytes_of, must_cast_slice};
 
 use crate::ledger::Ledger;
 use crate::state::NodeVector;
@@ -89,7 +89,7 @@ pub unsafe extern "C" fn supple_save(
         let (first, rest) = to.split_at_mut_checked(FRONT).ok_or(short(bytes, needed))?;
         let places = rest.chunks_exact_mut(size_of_val(vectors[0]).max(1));
         for (place, vectors) in places.zip(vectors) {
-            put(place, cast_slice(vectors));
+            put(place, must_cast_slice(vectors));
         }
         front.checksum = checksum(&front, rest);
         put(first, bytes_of(&front));
