@@ -480,7 +480,7 @@ public:
     // Back to rest at time zero; the step stays.
     status reset() const noexcept { return detail::of(supple_state_reset(raw_)); }
 
-    // Bound on the stable step at these displacements, s; costs a few force evaluations.
+    // Bound on the stable step at these displacements, s; takes as long as some steps.
     [[nodiscard]] result<supple::critical_step> critical_step(scene of) const noexcept {
         result<supple::critical_step> found{};
         found.status =

@@ -41,7 +41,7 @@ pub struct CriticalStep {
 const ROUNDING: f32 = 1e-5;
 
 /// A bound on the stable step at the state's displacement (at rest for a fresh one), never above the
-/// exact limit. It costs a few force evaluations and may be called between any two steps. The state's forces and
+/// exact limit. It takes as long as some six steps and may be called between any two steps. The state's forces and
 /// the padding of its vectors serve as scratch. Nothing if the state is too small for the scene or not finite.
 pub fn critical_step<M, N, B, S>(scene: &Scene<M, N, B>, state: &mut State<S>) -> Option<CriticalStep>
 where
