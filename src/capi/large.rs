@@ -250,7 +250,7 @@ pub unsafe extern "C" fn supple_large_step(
         let (core, damper) = (&mut (*large).core, (*large).damper.as_ref());
         View::of(state).with(|state| {
             let mut held_back = 0;
-            let answer = with_scene!(&any, scene => taken(count, state, &mut acting, found, |loads, state| {
+            let answer = with_scene!(&any, scene => taken(count, count, state, &mut acting, found, |loads, state| {
                 let status = core.step(scene, loads, state, storage(large), damper);
                 held_back = held_back.max(core.report().held_back);
                 status

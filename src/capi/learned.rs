@@ -17,7 +17,7 @@ use super::scene::{
 };
 use super::state::{Moment, View, step_of, supple_state};
 use super::status::{Answer, supple_error, supple_status};
-use super::step::{HostThreads, reported, supple_report, supple_threads, worse};
+use super::step::{HostThreads, reported, supple_report, supple_threads, taken, worse};
 use supple_status::*;
 
 /// Share of the vertices outside what training has seen beyond which a step is remarked upon.
@@ -223,9 +223,7 @@ impl<'a> Parts<'a> {
             let acting = Acting::of(loads, &any)?;
             let moved = memory::change(state)?;
             belongs(moved.nodes, &any)?;
-            memory::is(learned.cast_const())?;
-            let mut arrays = Arrays::behind(learned.cast_const());
-            let object = memory::change(learned)?;
+            let (object, mut arrays) = memory::open(learned)?;
             belongs(object.nodes, &any)?;
             let threads = HostThreads::of(threads)?;
             let exact = step_of(moved)?;
@@ -252,15 +250,11 @@ impl<'a> Parts<'a> {
     /// Takes the exact steps of one of the network's. Motions go evenly over all `left` of the network's steps.
     fn exact_steps(&mut self, left: u32) -> Answer<supple_status> {
         let Self { any, acting, view, exact, ratio, threads, found, .. } = self;
+        let left = left.saturating_mul(*ratio);
         view.with(|state| {
-            let mut worst = SUPPLE_OK;
-            for done in 0..*ratio {
-                let loads = acting.next(state.displacements(), left.saturating_mul(*ratio) - done);
-                let status =
-                    with_scene!(&*any, scene => tled::step_in_parts(scene, &loads, state, exact, &*threads));
-                worst = worse(worst, found.enter(&status, state)?);
-            }
-            Ok(worst)
+            with_scene!(&*any, scene => taken(*ratio, left, state, acting, found, |loads, state| {
+                tled::step_in_parts(scene, loads, state, exact, &*threads)
+            }))
         })
     }
 
@@ -324,17 +318,8 @@ impl<'a> Parts<'a> {
         count: u32,
         mut step: impl FnMut(&mut Self, u32) -> Answer<supple_status>,
     ) -> Answer<supple_status> {
-        let mut answer = Ok(SUPPLE_OK);
-        for done in 0..count {
-            let next = step(&mut self, count - done);
-            answer = match (answer, next) {
-                (Ok(worst), Ok(next)) => Ok(worse(worst, next)),
-                (_, refused) => refused,
-            };
-            if answer.is_err() {
-                break;
-            }
-        }
+        let answer =
+            (0..count).try_fold(SUPPLE_OK, |worst, done| Ok(worse(worst, step(&mut self, count - done)?)));
         self.found.close(&self.view.state);
         answer
     }
@@ -347,7 +332,7 @@ fn remember(
 ) -> Moment {
     displacement.iter_mut().zip(state.displacement.iter()).for_each(|(copy, vector)| *copy = *vector);
     increment.iter_mut().zip(state.increment.iter()).for_each(|(copy, vector)| *copy = *vector);
-    Moment { time: state.time, steps: state.steps, dt: state.dt, ledger: state.ledger }
+    Moment::of(state)
 }
 
 fn restore(
@@ -357,8 +342,7 @@ fn restore(
 ) {
     state.displacement.iter_mut().zip(displacement.iter()).for_each(|(vector, copy)| *vector = *copy);
     state.increment.iter_mut().zip(increment.iter()).for_each(|(vector, copy)| *vector = *copy);
-    let Moment { time, steps, dt, ledger } = before;
-    (state.time, state.steps, state.dt, state.ledger) = (time, steps, dt, ledger);
+    before.put(state);
 }
 
 /// Whether energy does not explain a step.

@@ -5,7 +5,7 @@ use core::ffi::c_void;
 use crate::loads::{LoadError, Loads, Motion, NodalForce};
 use crate::state::NodeVector;
 
-use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, place_for};
+use super::memory::{self, Head, Layout, Object, Place, array, magic, place_for};
 use super::scene::{AnyScene, axes_of, carved, check_choice, supple_scene, with_scene};
 use super::status::{Answer, mismatch, supple_error, supple_status};
 use supple_status::*;
@@ -135,9 +135,7 @@ pub unsafe extern "C" fn supple_set_forces(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let set = || unsafe {
-        memory::is(loads.cast_const())?;
-        let mut arrays = Arrays::behind(loads.cast_const());
-        let object = memory::change(loads)?;
+        let (object, mut arrays) = memory::open(loads)?;
         let forces = array(forces, count as usize)?;
         room_for(count, object.force_room)?;
         for (index, force) in forces.iter().enumerate() {
@@ -168,9 +166,7 @@ pub unsafe extern "C" fn supple_set_motions(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let set = || unsafe {
-        memory::is(loads.cast_const())?;
-        let mut arrays = Arrays::behind(loads.cast_const());
-        let object = memory::change(loads)?;
+        let (object, mut arrays) = memory::open(loads)?;
         let any = carved(scene)?;
         let motions = array(motions, count as usize)?;
         belongs(object.nodes, &any)?;
@@ -238,9 +234,7 @@ impl<'a> Acting<'a> {
         }
         // SAFETY: the caller's promise; entries up to the counts were written.
         unsafe {
-            memory::is(loads.cast_const())?;
-            let mut arrays = Arrays::behind(loads.cast_const());
-            let object = memory::change(loads)?;
+            let (object, mut arrays) = memory::open(loads)?;
             belongs(object.nodes, scene)?;
             let (force_room, motion_room) = (object.force_room as usize, object.motion_room as usize);
             let forces = arrays.written::<NodalForce>(object.forces as usize, force_room);

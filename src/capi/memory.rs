@@ -119,7 +119,7 @@ impl Place {
     }
 }
 
-/// Arrays behind an object, one after the other. To be asked for before [`change`], whose reference nobody may read beside.
+/// Arrays behind an object, one after the other.
 pub(super) struct Arrays {
     at: *mut u8,
     left: usize,
@@ -246,6 +246,19 @@ pub(super) unsafe fn change<'a, T: Object>(object: *mut T) -> Answer<&'a mut T> 
     unsafe { is(object.cast_const()).map(|()| &mut *object) }
 }
 
+/// The same with its arrays. They are asked for first: beside the reference nobody may read the object.
+///
+/// # Safety
+/// As at [`change`].
+pub(super) unsafe fn open<'a, T: Object>(object: *mut T) -> Answer<(&'a mut T, Arrays)> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        is(object.cast_const())?;
+        let arrays = Arrays::behind(object.cast_const());
+        Ok((change(object)?, arrays))
+    }
+}
+
 /// Numbers or structures of the host's. None need no memory.
 ///
 /// # Safety
@@ -288,6 +301,15 @@ pub(super) unsafe fn place_for<T>(at: *mut T) -> Answer<*mut T> {
         return Err(SUPPLE_E_MISALIGNED.into());
     }
     Ok(at)
+}
+
+/// The same for what the host may not want.
+///
+/// # Safety
+/// As at [`place_for`].
+pub(super) unsafe fn place_if_wanted<T>(at: *mut T) -> Answer<Option<*mut T>> {
+    // SAFETY: the caller's promise.
+    if at.is_null() { Ok(None) } else { unsafe { place_for(at) }.map(Some) }
 }
 
 /// That a configuration is of this version.

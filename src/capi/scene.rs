@@ -88,7 +88,6 @@ pub struct supple_scene {
     blocks: u32,
     tissues: u32,
     elements: u32,
-    bytes: usize,
     built: Built,
 }
 
@@ -273,7 +272,6 @@ unsafe fn init(
             blocks,
             tissues,
             elements,
-            bytes: layout(nodes, elements, tissues).bytes(),
             built: Built::NOTHING,
         });
         let supports = supports.iter().map(|support| Support {
@@ -384,7 +382,7 @@ pub unsafe extern "C" fn supple_scene_describe(
 /// As [`supple_scene_describe`].
 unsafe fn describe(scene: *const supple_scene, facts: *mut supple_scene_facts) -> Answer<supple_status> {
     // SAFETY: the caller's promise.
-    let (any, bytes, facts) = unsafe { (carved(scene)?, (*scene).bytes, place_for(facts)?) };
+    let (any, bytes, facts) = unsafe { (carved(scene)?, memory::bytes_of(scene), place_for(facts)?) };
     let found = with_scene!(any, scene => supple_scene_facts {
         nodes: scene.node_count() as u32,
         elements: scene.element_count() as u32,

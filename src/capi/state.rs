@@ -7,7 +7,9 @@ use crate::state::{NodeVector, State};
 use crate::tled::{self, Step};
 
 use super::loads::belongs;
-use super::memory::{self, Arrays, Head, Layout, Object, Place, magic, one, place_for, same_abi};
+use super::memory::{
+    self, Arrays, Head, Layout, Object, Place, magic, one, place_for, place_if_wanted, same_abi,
+};
 use super::scene::{carved, supple_scene, with_scene};
 use super::status::{Answer, supple_error, supple_status};
 use supple_status::*;
@@ -40,6 +42,17 @@ pub(super) struct Moment {
     pub(super) steps: u64,
     pub(super) dt: f32,
     pub(super) ledger: Ledger,
+}
+
+impl Moment {
+    pub(super) fn of<S>(&State { time, steps, dt, ledger, .. }: &State<S>) -> Self {
+        Self { time, steps, dt, ledger }
+    }
+
+    pub(super) fn put<S>(self, state: &mut State<S>) {
+        let Self { time, steps, dt, ledger } = self;
+        (state.time, state.steps, state.dt, state.ledger) = (time, steps, dt, ledger);
+    }
 }
 
 /// The step, and how motion is damped.
@@ -120,7 +133,7 @@ pub unsafe extern "C" fn supple_critical_step(
         let (any, object) = (carved(scene)?, memory::change(state)?);
         belongs(object.nodes, &any)?;
         let seconds = place_for(seconds)?;
-        let node = if node.is_null() { None } else { Some(place_for(node)?) };
+        let node = place_if_wanted(node)?;
         let critical =
             View::of(state).with(|state| with_scene!(any, scene => tled::critical_step(&scene, state)));
         let critical = critical.ok_or(supple_error::from(SUPPLE_E_TOO_STIFF))?;
@@ -172,8 +185,7 @@ pub unsafe extern "C" fn supple_state_time(
     // SAFETY: what the header asks of the caller.
     let tell = || unsafe {
         let moment = &memory::read(state)?.moment;
-        let seconds = if seconds.is_null() { None } else { Some(place_for(seconds)?) };
-        let steps = if steps.is_null() { None } else { Some(place_for(steps)?) };
+        let (seconds, steps) = (place_if_wanted(seconds)?, place_if_wanted(steps)?);
         if let Some(seconds) = seconds {
             seconds.write(moment.time);
         }
@@ -214,8 +226,7 @@ impl<'a> View<'a> {
             let mut arrays = Arrays::behind(object.cast_const());
             let mut next = || arrays.next::<NodeVector>(nodes);
             let mut state = State::over(next(), next(), next());
-            let Moment { time, steps, dt, ledger } = *moment;
-            (state.time, state.steps, state.dt, state.ledger) = (time, steps, dt, ledger);
+            moment.put(&mut state);
             Self { state, moment }
         }
     }
@@ -223,8 +234,7 @@ impl<'a> View<'a> {
     /// Does something with the state, and keeps when it is.
     pub(super) fn with<T>(&mut self, work: impl FnOnce(&mut State<&'a mut [NodeVector]>) -> T) -> T {
         let done = work(&mut self.state);
-        let State { time, steps, dt, ledger, .. } = self.state;
-        *self.moment = Moment { time, steps, dt, ledger };
+        *self.moment = Moment::of(&self.state);
         done
     }
 }

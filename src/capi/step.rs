@@ -155,7 +155,7 @@ pub unsafe extern "C" fn supple_step(
         let step = step_of(object)?;
         let threads = HostThreads::of(threads)?;
         View::of(state).with(|state| {
-            let answer = with_scene!(&any, scene => taken(count, state, &mut acting, found, |loads, state| {
+            let answer = with_scene!(&any, scene => taken(count, count, state, &mut acting, found, |loads, state| {
                 tled::step_in_parts(scene, loads, state, &step, &threads)
             }));
             found.close(state);
@@ -166,9 +166,10 @@ pub unsafe extern "C" fn supple_step(
     unsafe { reported(report, step) }
 }
 
-/// Takes steps until one is refused.
+/// Takes `count` steps, or until one is refused; motions go evenly over all `left` that the call takes.
 pub(super) fn taken<'a>(
     count: u32,
+    left: u32,
     state: &mut State<&'a mut [NodeVector]>,
     acting: &mut Acting<'_>,
     found: &mut supple_report,
@@ -176,7 +177,7 @@ pub(super) fn taken<'a>(
 ) -> Answer<supple_status> {
     let mut worst = SUPPLE_OK;
     for done in 0..count {
-        let loads = acting.next(state.displacements(), count - done);
+        let loads = acting.next(state.displacements(), left - done);
         let status = step(&loads, state);
         worst = worse(worst, found.enter(&status, state)?);
     }
