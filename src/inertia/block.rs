@@ -6,7 +6,7 @@ use super::bound::{Bound, MatrixSums};
 use super::frames::{Frames, Rotation};
 use super::lattice::MAX_FUNCTIONS;
 use super::vectors::frame_of;
-use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, write_rows};
+use crate::lanes::{BLOCK, Gather, Kernel, NodeVector, Real, Waiting, write_rows};
 use crate::material::{Law, Laws, Local};
 use crate::scene::ElementBlock;
 use crate::tled::Deformation;
@@ -31,12 +31,15 @@ type Tangents = [[[f32; 4]; BLOCK]; 3];
 impl<L: Law> Kernel for OneBlock<'_, L> {
     type Output = ();
 
+    const ONE_BY_ONE: bool = true;
+
     #[inline(always)]
     fn run<R: Real>(mut self) {
         let block = self.block;
         let mut tangents = [[[0.0; 4]; BLOCK]; 3];
+        let mut waiting = [Waiting::NONE; 2];
         for first in (0..BLOCK).step_by(R::COUNT) {
-            self.bound::<R>(first, &mut tangents);
+            self.bound::<R>(first, &mut tangents, &mut waiting);
         }
         let Some(assembly) = &mut self.assembly else {
             return;
@@ -65,7 +68,7 @@ impl<L: Law> Kernel for OneBlock<'_, L> {
 impl<L: Law> OneBlock<'_, L> {
     /// The bounds of the elements in lanes `first..`, into the sums of their nodes and into `tangents`.
     #[inline(always)]
-    fn bound<R: Real>(&mut self, first: usize, tangents: &mut Tangents) {
+    fn bound<R: Real>(&mut self, first: usize, tangents: &mut Tangents, waiting: &mut [Waiting<4>; 2]) {
         let block = self.block;
         let law = self.laws.widen(|lane| block.element(first + lane));
         let deformation = Deformation::<R>::of_block(block, first, self.displacement);
@@ -86,7 +89,7 @@ impl<L: Law> OneBlock<'_, L> {
                 }
             }
         }
-        self.sums.add(&bound, block, first, &cofactor);
+        self.sums.add(&bound, block, first, &cofactor, waiting);
         if self.assembly.is_none() {
             return;
         }

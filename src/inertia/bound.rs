@@ -36,7 +36,7 @@
 //! `V lambda_G (iso + 3/2 volume |C|^2)`; and the two parts of the mixed term are at most
 //! `(5/4 + 3/2 4/5) |q_ce| |E| |C|` beside `3/2 floor |C|^2`. `|C|^2` and `|E|^2` come from the invariants.
 
-use crate::lanes::{Real, Scatter};
+use crate::lanes::{Real, Scatter, Waiting};
 use crate::material::{Invariants, Law, Local, Potential};
 use crate::scene::ElementBlock;
 use crate::tled::{Beside, Deformation};
@@ -199,6 +199,7 @@ impl MatrixSums<'_> {
         block: &ElementBlock,
         first: usize,
         cofactor: &[[R; 3]; 3],
+        [of_diagonal, of_beside]: &mut [Waiting<4>; 2],
     ) {
         let volume = block.volume::<R>(first);
         let isotropic = volume * bound.iso * block.spread::<R>(first);
@@ -229,7 +230,7 @@ impl MatrixSums<'_> {
             diagonal[corner] = [isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, bound.scalar];
             beside[corner] = [wx * y, wy * z, wz * x, R::splat(0.0)];
         }
-        self.diagonal.add_corners(&nodes, first, diagonal);
-        self.beside.add_corners(&nodes, first, beside);
+        self.diagonal.add_corners(&nodes, first, diagonal, of_diagonal);
+        self.beside.add_corners(&nodes, first, beside, of_beside);
     }
 }

@@ -10,7 +10,7 @@ use reference::tensor::{apply, contraction, determinant, from_fn, product, rotat
 use reference::{EXPONENT_CAP, J_MIN, Mat3, Random, Vec3};
 
 use super::bound::{Bound, MatrixSums};
-use crate::lanes::{NodeVector, Scatter};
+use crate::lanes::{NodeVector, Scatter, Waiting};
 use crate::material::{Exponential, Law, Literal, Local, NeoHookean, Tissue};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
@@ -47,7 +47,11 @@ fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
     let (mut diagonal, mut beside) = ([NodeVector::ZERO; 4], [NodeVector::ZERO; 4]);
     let mut sums = MatrixSums { diagonal: Scatter::new(&mut diagonal), beside: Scatter::new(&mut beside) };
     let rows = [0, 1, 2].map(|i| [0, 1, 2].map(|j| deformation.cofactor(i, j)));
-    sums.add(&bound, block, 0, &rows);
+    // The other lanes of the block have no volume.
+    let mut waiting = [Waiting::NONE; 2];
+    for lane in 0..8 {
+        sums.add(&bound, block, lane, &rows, &mut waiting);
+    }
     let scalar = f64::from(bound.scalar);
 
     // By the crate's numbers of the corners, which are those of the block.

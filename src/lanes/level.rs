@@ -33,8 +33,13 @@ pub enum Level {
 /// with the instructions of the wrapper around it.
 pub(crate) trait Kernel {
     type Output;
+    /// Whether numbers one by one give the same bits: processors without vectors then take them so.
+    const ONE_BY_ONE: bool = false;
     fn run<R: Real>(self) -> Self::Output;
 }
+
+/// Whether the compiler makes vectors of [`Lanes`]: where it does not, they become as many times the code.
+const VECTORS: bool = cfg!(target_arch = "x86_64");
 
 /// All of them, the best first.
 const LEVELS: [Level; 5] = [Level::Avx512, Level::Avx2, Level::Neon, Level::Simd128, Level::Portable];
@@ -120,6 +125,9 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
     if Level::current() == Level::Simd128 {
         return kernel.run::<Pair<Simd128>>();
+    }
+    if K::ONE_BY_ONE && !VECTORS {
+        return kernel.run::<f32>();
     }
     kernel.run::<Lanes<8>>()
 }

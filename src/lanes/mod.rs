@@ -37,7 +37,9 @@ pub(crate) use level::{Kernel, dispatch};
 pub(crate) use pair::Pair;
 pub use vectors::NodeVector;
 use vectors::transpose;
-pub(crate) use vectors::{BlockNodes, Chosen, Following, Gather, Rows, Scatter, axes, dot, write_rows};
+pub(crate) use vectors::{
+    BlockNodes, Chosen, Following, Gather, Rows, Scatter, Waiting, axes, dot, write_rows,
+};
 
 use core::ops::{Add, Mul, Neg, Sub};
 

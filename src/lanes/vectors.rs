@@ -172,9 +172,13 @@ impl<'a, const N: usize> BlockNodes<'a, N> {
     /// The first node, again and again.
     pub(crate) const NONE: Self = Self { rows: [&[0; BLOCK]; N], first: 0, count: 1 };
 
-    /// The nodes, if all are among `count` from `first` on.
+    /// The nodes, if all are among `count` from `first` on. Numbers one by one look at each node when they get there.
     #[inline(always)]
     pub(crate) fn among<R: Real>(rows: [&'a [u32; BLOCK]; N], first: usize, count: usize) -> Option<Self> {
+        if R::COUNT == 1 {
+            // Of no use to wider ones: so many there never are.
+            return Some(Self { rows, first: 0, count: usize::MAX });
+        }
         if are_among::<R, N>(rows, first, count) { Some(Self { rows, first, count }) } else { None }
     }
 
@@ -208,6 +212,10 @@ impl<'a> Gather<'a> {
         corner: usize,
         first: usize,
     ) -> [R; 3] {
+        if R::COUNT == 1 {
+            let vector = self.0.get(nodes.at(corner, first)).copied().unwrap_or_default();
+            return vector.to_array().map(R::splat);
+        }
         if nodes.first + nodes.count > self.0.len() {
             return [R::splat(0.0); 3];
         }
@@ -220,6 +228,17 @@ impl<'a> Gather<'a> {
         });
         [x, y, z]
     }
+}
+
+/// Lanes in whose order vectors of nodes are added to, however wide a vector is.
+const EIGHT: usize = 8;
+
+/// Numbers one by one on their way to the nodes of `N` corners: they wait until there are those of eight elements.
+pub(crate) struct Waiting<const N: usize>([[[f32; 4]; EIGHT]; N]);
+
+impl<const N: usize> Waiting<N> {
+    /// None yet.
+    pub(crate) const NONE: Self = Self([[[0.0; 4]; EIGHT]; N]);
 }
 
 /// Vectors of consecutive nodes to add to.
@@ -250,14 +269,25 @@ impl<'a> Scatter<'a> {
     }
 
     /// Adds for each row of nodes the components in lane `l` to the vector of the node in lane `first + l`, in the order of
-    /// [`Real::corners_to_rows`]; nothing if the nodes are not known to be among the vectors'.
+    /// [`Real::corners_to_rows`]; nothing if the nodes are not known to be among the vectors'. Numbers one by one have to come
+    /// lane after lane.
     #[inline(always)]
     pub(crate) fn add_corners<R: Real, const N: usize>(
         &mut self,
         nodes: &BlockNodes<'_, N>,
         first: usize,
         values: [[R; 4]; N],
+        waiting: &mut Waiting<N>,
     ) {
+        if R::COUNT == 1 {
+            for (eight, values) in waiting.0.iter_mut().zip(values) {
+                R::to_rows(values, |_, row| eight[first % EIGHT] = row);
+            }
+            if first % EIGHT == EIGHT - 1 {
+                self.add_waiting(nodes, first - first % EIGHT, waiting);
+            }
+            return;
+        }
         if nodes.first != self.first || nodes.count > self.vectors.len() {
             return;
         }
@@ -273,6 +303,20 @@ impl<'a> Scatter<'a> {
         });
     }
 
+    /// Adds what waited to those of the nodes in lanes from `first` on that are among those of the vectors.
+    fn add_waiting<const N: usize>(&mut self, nodes: &BlockNodes<'_, N>, first: usize, waiting: &Waiting<N>) {
+        for (corner, eight) in waiting.0.iter().enumerate() {
+            for (lane, row) in (first..).zip(eight) {
+                let node = nodes.at(corner, lane);
+                if let Some(vector) = self.vectors.get_mut(node.wrapping_sub(self.first)) {
+                    for (sum, value) in vector.0.iter_mut().zip(row) {
+                        *sum += value;
+                    }
+                }
+            }
+        }
+    }
+
     /// Adds to those of a block's nodes that are among those of the vectors, slowly, in the same order.
     #[inline(always)]
     pub(crate) fn add_some<R: Real, const N: usize>(
@@ -281,9 +325,9 @@ impl<'a> Scatter<'a> {
         first: usize,
         values: [[R; 4]; N],
     ) {
-        for eight in (0..R::COUNT).step_by(8) {
+        for eight in (0..R::COUNT).step_by(EIGHT) {
             for (nodes, values) in nodes.iter().zip(&values) {
-                for lane in eight..R::COUNT.min(eight + 8) {
+                for lane in eight..R::COUNT.min(eight + EIGHT) {
                     let node = nodes[(first + lane) % BLOCK] as usize;
                     if let Some(vector) = self.vectors.get_mut(node.wrapping_sub(self.first)) {
                         for (sum, value) in vector.0.iter_mut().zip(values) {

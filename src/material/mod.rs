@@ -128,6 +128,8 @@ macro_rules! literal {
                 self.0.unusable_constant()
             }
 
+            // The command takes both; who has no operating system rarely either, and need not wait for them.
+            #[cfg(feature = "std")]
             element_loops!();
         }
     };

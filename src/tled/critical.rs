@@ -20,7 +20,7 @@
 //!
 //! No term is left out, so the bound holds for any state, inverted elements included.
 
-use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter, dot};
+use crate::lanes::{BLOCK, Gather, Kernel, Real, Scatter, Waiting, dot};
 use crate::material::{Law, Laws, Local, Material, Potential};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
@@ -109,14 +109,17 @@ pub struct CriticalBounds<'a, 'b, L> {
 impl<L: Law> Kernel for CriticalBounds<'_, '_, L> {
     type Output = ();
 
+    const ONE_BY_ONE: bool = true;
+
     #[inline(always)]
     fn run<R: Real>(self) {
         // The first three numbers of a node's inertia are its inverse masses.
         let inertia = Gather::new(bytemuck::must_cast_slice(self.inertia));
         for block in self.blocks {
+            let mut waiting = [Waiting::NONE; 3];
             for first in (0..BLOCK).step_by(R::COUNT) {
                 let law = self.laws.widen(|lane| block.element(first + lane));
-                add_bounds::<R, L>(&law, block, first, inertia, self.sums);
+                add_bounds::<R, L>(&law, block, first, inertia, self.sums, &mut waiting);
             }
         }
     }
@@ -132,6 +135,7 @@ fn add_bounds<R: Real, L: Law>(
     first: usize,
     inertia: Gather<'_>,
     sums: &mut Sums<'_>,
+    [of_first_four, of_fifth, of_sixth]: &mut [Waiting<4>; 3],
 ) {
     let displacement = Gather::new(sums.zx_in_padding);
     let Some(nodes) = block.nodes_below::<R>(displacement.count()) else {
@@ -188,9 +192,9 @@ fn add_bounds<R: Real, L: Law>(
         fifth[corner][3] = of.entry([by_c, by_e, by_x], 1, 2);
         sixth[corner][3] = of.entry([by_c, by_e, by_x], 2, 0);
     }
-    Scatter::new(sums.xx_yy_zz_xy).add_corners(&nodes, first, first_four);
-    Scatter::new(sums.yz_in_padding).add_corners(&nodes, first, fifth);
-    Scatter::new(sums.zx_in_padding).add_corners(&nodes, first, sixth);
+    Scatter::new(sums.xx_yy_zz_xy).add_corners(&nodes, first, first_four, of_first_four);
+    Scatter::new(sums.yz_in_padding).add_corners(&nodes, first, fifth, of_fifth);
+    Scatter::new(sums.zx_in_padding).add_corners(&nodes, first, sixth, of_sixth);
 }
 
 /// Magnitudes of the terms of the tangent, Pa.
@@ -316,4 +320,51 @@ fn cross_matrix<R: Real>(deformation: &Deformation<R>, a: Vector<R>) -> [[R; 3];
         *row = [a[2] * f1 - a[1] * f2, a[0] * f2 - a[2] * f0, a[1] * f0 - a[0] * f1];
     }
     matrix
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{vec, vec::Vec};
+
+    use super::*;
+    use crate::lanes::Lanes;
+    use crate::material::{NeoHookean, Tissue};
+    use crate::mesh::{Bar, Mesh, Winding};
+    use crate::scene::blocks_for;
+
+    #[test]
+    fn numbers_one_by_one_give_the_bits_of_eight_side_by_side() {
+        let bar = Bar { size: [0.03, 0.02, 0.05], cells: [3, 2, 5] };
+        let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());
+        let law = NeoHookean { c: 1_500.0, d: 60_000.0 };
+        let (nodes, blocks) =
+            (vec![NodeInertia::EMPTY; points.len()], vec![ElementBlock::EMPTY; blocks_for(tets.len())]);
+        let mut scene = Scene::over(Tissue { law, density: 1000.0 }, nodes, blocks);
+        scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &[]).unwrap();
+        let found = [false, true].map(|one_by_one| {
+            let bent = |&[x, y, z]: &[f32; 3]| NodeVector([0.9 * z * z, 0.2 * x - 0.1 * y, 4.0 * x * z, 0.0]);
+            let mut displacement: Vec<_> = points.iter().map(bent).collect();
+            let mut first = vec![NodeVector::ZERO; points.len()];
+            let mut second = first.clone();
+            let mut sums = Sums {
+                xx_yy_zz_xy: &mut first,
+                yz_in_padding: &mut second,
+                zx_in_padding: &mut displacement,
+            };
+            let (laws, blocks, inertia) = (scene.material().laws(), scene.blocks(), scene.inertia());
+            let kernel = CriticalBounds { laws, blocks, inertia, sums: &mut sums };
+            if one_by_one {
+                kernel.run::<f32>()
+            } else {
+                kernel.run::<Lanes<8>>()
+            }
+            [first, second, displacement]
+                .concat()
+                .into_iter()
+                .map(|vector| vector.0.map(f32::to_bits))
+                .collect()
+        });
+        let [eight, one]: [Vec<[u32; 4]>; 2] = found;
+        assert!(one == eight && one.iter().any(|sums| sums[0] != 0));
+    }
 }

@@ -7,7 +7,7 @@ use core::ops::Range;
 
 use super::Status;
 use crate::chains::{CORNERS, LONGEST};
-use crate::lanes::{BLOCK, BlockNodes, Gather, Pair, Real, Scatter, dot, unrolled};
+use crate::lanes::{BLOCK, BlockNodes, Gather, Pair, Real, Scatter, Waiting, dot, unrolled};
 use crate::ledger::Ledger;
 use crate::material::{Invariants, J_FLOOR, Law, Laws, Local, response_operations};
 use crate::scene::ElementBlock;
@@ -209,14 +209,31 @@ impl<'a, R: Real> Part<'a, R> {
     }
 }
 
-/// Vectors of elements that go through the passes together.
+/// Vectors of elements that go through the passes together; of numbers one by one, those of eight chains.
 const TOGETHER: usize = 8;
+const ONE_BY_ONE: usize = 8 * LONGEST;
 
 /// Adds the internal forces of elements to `force`, with minus sign; the blocks hold chains of that `length`
 /// ([`crate::chains`]), one element of each in every block. In three passes over a few vectors of elements: the law is a
 /// sequence of operations that wait for each other, and gets nothing else in between ([`Pair`]).
 #[inline(always)]
 pub(crate) fn add_forces<R: Real, L: Law>(
+    laws: &Laws<'_, L>,
+    blocks: (&[ElementBlock], usize),
+    displacement: Gather<'_>,
+    force: &mut Scatter<'_>,
+    beside: &mut impl Beside,
+    extremes: &mut Extremes<Pair<R>>,
+) {
+    if R::COUNT == 1 {
+        add_together::<R, L, ONE_BY_ONE>(laws, blocks, displacement, force, beside, extremes);
+    } else {
+        add_together::<R, L, TOGETHER>(laws, blocks, displacement, force, beside, extremes);
+    }
+}
+
+#[inline(always)]
+fn add_together<R: Real, L: Law, const TOGETHER: usize>(
     laws: &Laws<'_, L>,
     (blocks, length): (&[ElementBlock], usize),
     displacement: Gather<'_>,
@@ -227,7 +244,7 @@ pub(crate) fn add_forces<R: Real, L: Law>(
     let Some(first) = blocks.first() else { return };
     let mut parts = [Part::<R>::nothing(first); TOGETHER];
     let chains = blocks.len().checked_div(length).unwrap_or(0) * (BLOCK / R::COUNT);
-    let most = TOGETHER.checked_div(length).unwrap_or(TOGETHER).max(1);
+    let most = if R::COUNT == 1 { 8 } else { TOGETHER.checked_div(length).unwrap_or(TOGETHER).max(1) };
     for start in (0..chains).step_by(most) {
         let chains = start..chains.min(start + most);
         let count = length * chains.len();
@@ -358,6 +375,7 @@ fn nodal_forces<R: Real>(part: &Part<'_, R>) -> [[R; 4]; 4] {
 /// The third pass: forces to the nodes of chains of `K` elements with `N` nodes.
 #[inline(always)]
 fn scatter<R: Real, const K: usize, const N: usize>(parts: &[Part<'_, R>], force: &mut Scatter<'_>) {
+    let mut waiting = Waiting::NONE;
     for parts in parts.as_chunks::<K>().0 {
         let mut rows = [[R::splat(0.0); 4]; N];
         let mut blocks = [parts[0].block; K];
@@ -374,7 +392,7 @@ fn scatter<R: Real, const K: usize, const N: usize>(parts: &[Part<'_, R>], force
         });
         let (nodes, first) = (nodes_of(blocks), parts[0].first);
         match force.all_of::<R, N>(nodes) {
-            Some(nodes) => force.add_corners(&nodes, first, rows),
+            Some(nodes) => force.add_corners(&nodes, first, rows, &mut waiting),
             // Elements between the nodes of two threads.
             None => force.add_some(nodes, first, rows),
         }

@@ -57,6 +57,8 @@ impl<'a, L: Law, H> InternalForces<'a, L, H> {
 impl<L: Law, H: Beside> Kernel for InternalForces<'_, L, H> {
     type Output = Extremes<f32>;
 
+    const ONE_BY_ONE: bool = true;
+
     #[inline(always)]
     fn run<R: Real>(self) -> Extremes<f32> {
         let Self { elements: Elements { laws, blocks, chunks: all }, chunks, displacement, .. } = self;
@@ -182,4 +184,52 @@ pub(crate) fn move_in_parts(
     threads.each(parts.get_mut(..count).unwrap_or_default(), |(nodes, displacement, increment)| {
         moved(nodes.clone(), displacement, increment);
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{println, vec, vec::Vec};
+
+    use super::*;
+    use crate::lanes::Lanes;
+    use crate::material::{Exponential, Tissue};
+    use crate::mesh::{Bar, Mesh, Winding};
+    use crate::scene::blocks_for;
+
+    fn bits(vectors: &[NodeVector]) -> Vec<[u32; 4]> {
+        vectors.iter().map(|vector| vector.0.map(f32::to_bits)).collect()
+    }
+
+    /// The same sums in the same order, on chains of every length, and where a node's elements are of several threads.
+    #[test]
+    fn numbers_one_by_one_give_the_bits_of_eight_side_by_side() {
+        let bar = Bar { size: [0.05, 0.04, 0.2], cells: [7, 5, 28] };
+        let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());
+        let law = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
+        let (nodes, blocks) =
+            (vec![NodeInertia::EMPTY; points.len()], vec![ElementBlock::EMPTY; blocks_for(tets.len())]);
+        let mut scene = Scene::over(Tissue { law, density: 1000.0 }, nodes, blocks);
+        scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &[]).unwrap();
+        let bent: Vec<_> = points
+            .iter()
+            .map(|&[x, y, z]| NodeVector([0.3 * z * z + 0.1 * y, 0.2 * x - 0.1 * y, 0.4 * x * z, 0.0]))
+            .collect();
+        let elements = scene.elements();
+        let lengths: Vec<_> =
+            elements.chunks.touching(elements.chunks.all()).map(|(_, length)| length).collect();
+        assert!((1..=3).all(|length| lengths.contains(&length)));
+        for parts in 1..=3 {
+            for part in 0..parts {
+                let mine = elements.chunks.part(part, elements.chunks.parts(parts));
+                let count = elements.chunks.nodes(&mine).len();
+                let (mut one, mut eight) = (vec![NodeVector::ZERO; count], vec![NodeVector::ZERO; count]);
+                let of = |force| InternalForces::of_chunks(elements, mine.clone(), &bent, force, Nothing);
+                let (by_one, by_eight) = (of(&mut one).run::<f32>(), of(&mut eight).run::<Lanes<8>>());
+                assert!(eight.iter().any(|force| force.0[2] != 0.0));
+                assert_eq!(bits(&one), bits(&eight), "part {part} of {parts}");
+                assert_eq!(by_one.least_j.to_bits(), by_eight.least_j.to_bits());
+                println!("part {part} of {parts}: {count} nodes, least J - 1 {:.3}", by_one.least_j);
+            }
+        }
+    }
 }

@@ -10,7 +10,7 @@ use cortex_m::peripheral::{Peripherals, SYST};
 use cortex_m_rt::entry;
 use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
 use cortex_m_semihosting::{heprintln, hprintln};
-use targets::{Level, NAMES, checksum, long_exact, long_learned};
+use targets::{Level, NAMES, checksum, long_exact, long_learned, rounding};
 
 /// Instructions in a tick of the timer: the board's clock has 25 MHz, and QEMU counts a nanosecond for each instruction
 /// when it is told so (`-icount shift=0`).
@@ -21,7 +21,7 @@ const TICKS: u32 = (1 << 24) - 1;
 #[entry]
 fn main() -> ! {
     for (what, name) in NAMES.into_iter().enumerate() {
-        hprintln!("{name} unfused {:08x}", checksum(what, Level::Portable));
+        hprintln!("{name} {} {:08x}", rounding(what, Level::Portable), checksum(what, Level::Portable));
     }
     let measured =
         Peripherals::take().is_some_and(|mut peripherals| print_instructions(&mut peripherals.SYST));

@@ -1,0 +1,139 @@
+//! What a processor computes with each kind of step, as a checksum of the bits: on small bars, the same everywhere. Every
+//! number is made by the core, none by a standard library, which is another one on another system.
+
+use super::body::{Body, DAMPING, SECONDS};
+use supple::inertia::{self, Damper, Inertia, LatticeNode, damped_numbers_for, damped_vectors_for};
+pub use supple::lanes::Level;
+use supple::loads::NodalForce;
+use supple::mesh::Bar;
+use supple::mlp::Network;
+use supple::scene::blocks_for;
+use supple::state::{FixedState, NodeVector};
+use supple::tled::{Status, Step, critical_step};
+
+const BAR: Bar = Bar { size: [0.03, 0.02, 0.05], cells: [3, 2, 4] };
+const NODES: usize = BAR.node_count();
+const ELEMENTS: usize = BAR.element_count();
+const SMALL: Body<NODES, ELEMENTS, { blocks_for(ELEMENTS) }> = Body {
+    bar: BAR,
+    fixed: 12,
+    force: [NodalForce { node: BAR.node(0, 2, 4), newton: [0.02, -0.03, 0.05], ramp: 0.05 }],
+};
+/// As large as a microcontroller is for.
+const LONG_BAR: Bar = Bar { size: [0.03, 0.03, 0.12], cells: [3, 3, 12] };
+const LONG_NODES: usize = LONG_BAR.node_count();
+const LONG_ELEMENTS: usize = LONG_BAR.element_count();
+const LONG: Body<LONG_NODES, LONG_ELEMENTS, { blocks_for(LONG_ELEMENTS) }> = Body {
+    bar: LONG_BAR,
+    fixed: 16,
+    force: [NodalForce { node: LONG_BAR.node(0, 3, 12), newton: [0.02, -0.03, 0.05], ramp: 0.05 }],
+};
+/// Cells of the lattice, and functions at their corners.
+const CELLS: [u32; 3] = [1, 1, 3];
+const FUNCTIONS: usize = 16;
+/// Vertices that go through a network: enough for activations all over their range.
+const ROWS: usize = 250;
+
+/// A file at a multiple of 64 bytes, where networks may lie.
+#[repr(C, align(64))]
+struct Aligned<T: ?Sized>(T);
+
+static NETWORK: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/compact-10.weights"));
+static COMPACT_INT8: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/compact-10-i8.weights"));
+static INT8: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden-v3.weights"));
+static DAMPER: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/damper.weights"));
+
+/// What is computed. Those with a number are of the long bar, which has so many nodes.
+pub const NAMES: [&str; 8] =
+    ["exact", "damped", "network", "learned", "int8", "exact-208", "learned-int8-208", "critical-208"];
+
+/// How its sums are rounded with the instructions of `level`, on which their bits depend: those of layers of eight bits are
+/// never fused, but the learned step has others besides.
+pub fn rounding(what: usize, level: Level) -> &'static str {
+    let exact = matches!(level, Level::Portable | Level::Simd128);
+    if exact || what == 4 || cfg!(feature = "deterministic") { "unfused" } else { "fused" }
+}
+
+/// Its checksum with the instructions of `level`; zero if it could not be computed.
+pub fn checksum(what: usize, level: Level) -> u32 {
+    if !Level::force(level) {
+        return 0;
+    }
+    let checksum = match what {
+        0 => SMALL.exact(2_000).as_ref().map(of_state),
+        1 => damped(),
+        2 => network(&NETWORK.0),
+        3 => SMALL.learned(&NETWORK.0, 1_000, 50).map(|state| of_state(&state) ^ state.steps() as u32),
+        4 => network(&INT8.0),
+        5 => long_exact(500),
+        6 => long_learned(500, 50),
+        _ => long_critical(500),
+    };
+    checksum.unwrap_or(0)
+}
+
+/// The checksum of the long bar after exact steps.
+pub fn long_exact(steps: u32) -> Option<u32> {
+    LONG.exact(steps).as_ref().map(of_state)
+}
+
+/// The checksum of the long bar after learned steps with layers of eight bits, which go on from exact ones.
+pub fn long_learned(exact: u32, steps: u32) -> Option<u32> {
+    LONG.learned(&COMPACT_INT8.0, exact, steps).map(|state| of_state(&state) ^ state.steps() as u32)
+}
+
+/// Of the critical step of the long bar after exact steps, s.
+fn long_critical(steps: u32) -> Option<u32> {
+    let critical = critical_step(&LONG.scene()?, &mut LONG.exact(steps)?)?;
+    Some(of([critical.seconds, critical.node as f32].into_iter()))
+}
+
+/// FNV-1a over the bits.
+fn of(numbers: impl Iterator<Item = f32>) -> u32 {
+    numbers.fold(0x811c_9dc5, |hash, number| (hash ^ number.to_bits()).wrapping_mul(0x0100_0193))
+}
+
+fn of_state<const N: usize>(state: &FixedState<N>) -> u32 {
+    of(state.displacements().iter().flat_map(|displacement| displacement.to_array()))
+}
+
+/// Large steps, with a lattice and a network that damps.
+fn damped() -> Option<u32> {
+    let (scene, mut state) = (SMALL.scene()?, FixedState::<NODES>::new());
+    let loads = SMALL.loads(&scene)?;
+    let damper = Damper::over(Network::parse(&DAMPER.0).ok()?).ok()?;
+    let mut inertia = Inertia::over(
+        [NodeVector::ZERO; damped_vectors_for(NODES)],
+        [LatticeNode::EMPTY; NODES],
+        [0.0; damped_numbers_for(CELLS, FUNCTIONS)],
+    )
+    .damped();
+    let step = Step::insist(20.0 * SECONDS, DAMPING).ok()?;
+    inertia.prepare(&scene, &SMALL.points(), &mut state, step, CELLS).ok()?;
+    for _ in 0..300 {
+        if let Status::Diverged(_) =
+            inertia::damped_step(&scene, &loads, &mut state, &mut inertia, Some(&damper))
+        {
+            return None;
+        }
+    }
+    Some(of_state(&state))
+}
+
+/// Numbers that are unlike each other, and some that are no ordinary ones, through a network.
+fn network(file: &[u8]) -> Option<u32> {
+    let network = Network::parse(file).ok()?;
+    let mut inputs = [0.0; 7 * ROWS];
+    let mut seed = 8u32;
+    for (at, input) in inputs.iter_mut().enumerate() {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let scale = network.inputs().get(at % 7)?.scale;
+        *input = 2.0 * scale * ((seed >> 8) as f32 / 8_388_608.0 - 1.0);
+    }
+    for (at, number) in [(0, f32::NAN), (10, f32::INFINITY), (20, -0.0), (30, f32::MIN_POSITIVE / 8.0)] {
+        *inputs.get_mut(at)? = number;
+    }
+    let mut outputs = [0.0; 3 * ROWS];
+    network.predict_rows(&inputs, &mut outputs);
+    Some(of(outputs.into_iter()))
+}
