@@ -356,6 +356,8 @@ impl Predict<'_, '_> {
 impl Kernel for Predict<'_, '_> {
     type Output = (Totals, Counts);
 
+    const ONE_BY_ONE: bool = true;
+
     #[inline(always)]
     fn run<R: Real>(self) -> Self::Output {
         if R::MANY_REGISTERS { self.tiles::<R, 2>() } else { self.tiles::<R, 1>() }

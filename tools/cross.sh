@@ -3,19 +3,14 @@
 # microcontroller (Cortex-M4F), runs it in emulators and in node, and compares the checksums with those of
 # tests/targets/checksums.txt, to which the test `targets` holds this processor.
 #
-#     tools/cross.sh [--tests] [FOLDER]
+#     tools/cross.sh [FOLDER]
 #
-# With --tests the library's own tests and some of the core's also run on the emulated Arm processor, which takes
-# several times as long. FOLDER (target/cross) takes a compiler with those targets, from Debian 12's packages: about
-# 260 MB to fetch and 1.5 GB in all. Nothing is installed into the system, except node and QEMU where there is none.
+# The library's own tests and some of the core's run on the emulated Arm processor as well. All of it takes 11 minutes of
+# processor time. FOLDER (target/cross) takes a compiler with those targets, from Debian 12's packages: about 260 MB to
+# fetch and 1.5 GB in all. Nothing is installed into the system, except node and QEMU where there is none.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-tests=false
-if [ "${1:-}" = --tests ]; then
-    tests=true
-    shift
-fi
 mkdir -p "${1:-target/cross}"
 folder=$(realpath "${1:-target/cross}")
 root=$folder/root
@@ -99,13 +94,11 @@ step compare timeout 10m qemu-system-arm -machine mps2-an386 -cpu cortex-m4 -ico
     -semihosting-config enable=on,target=native -kernel "$here/thumbv7em-none-eabihf/release/m4"
 echo "the same bits everywhere"
 
-if $tests; then
-    # As fast to compile as tests can be that are emulated: their dependencies do nothing that takes time.
-    export CARGO_PROFILE_TEST_OPT_LEVEL=1
-    plain=(--config 'profile.test.package."*".opt-level=0')
-    for package in glam libm bytemuck; do
-        plain+=(--config "profile.test.package.$package.opt-level=1")
-    done
-    step cross test "${plain[@]}" --quiet --no-default-features --features std --target-dir "$here" \
-        --target aarch64-unknown-linux-gnu --lib --test same_bits --test int8 --test elements --test patch
-fi
+# As fast to compile as tests can be that are emulated: their dependencies do nothing that takes time.
+export CARGO_PROFILE_TEST_OPT_LEVEL=1
+plain=(--config 'profile.test.package."*".opt-level=0')
+for package in glam libm bytemuck; do
+    plain+=(--config "profile.test.package.$package.opt-level=1")
+done
+step cross test "${plain[@]}" --quiet --no-default-features --features std --target-dir "$here" \
+    --target aarch64-unknown-linux-gnu --lib --test same_bits --test int8 --test elements --test patch

@@ -286,10 +286,9 @@ impl Lattice {
             let function = self.of_point.get(point).copied().unwrap_or(DROPPED);
             vectors.get(usize::from(function)).copied().unwrap_or_default().0
         };
-        let mut largest = 0.0;
-        for point in 0..nx * ny * nz {
-            let here = at(point);
-            let last = [point % nx + 1 == nx, point / nx % ny + 1 == ny, point / nx / ny + 1 == nz];
+        // The largest square from a point to the next ones; there is none behind the last along an axis.
+        let slopes = |point: usize, last: [bool; 3]| {
+            let (here, mut largest) = (at(point), 0.0);
             for (axis, stride) in [1, nx, nx * ny].into_iter().enumerate() {
                 let (last, size, cells) = (last[axis % 3], self.size[axis % 3], self.cells[axis % 3]);
                 if last || size <= 0.0 {
@@ -300,6 +299,14 @@ impl Lattice {
                 let square = along(0) * along(0) + along(1) * along(1) + along(2) * along(2);
                 let per_metre = cells as f32 / size;
                 largest = f32::max(largest, square * per_metre * per_metre);
+            }
+            largest
+        };
+        let (mut largest, mut point) = (0.0, 0);
+        for (k, j) in (0..nz).flat_map(|k| (0..ny).map(move |j| (k, j))) {
+            for i in 0..nx {
+                largest = f32::max(largest, slopes(point, [i + 1 == nx, j + 1 == ny, k + 1 == nz]));
+                point += 1;
             }
         }
         libm::sqrtf(largest)

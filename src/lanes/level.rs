@@ -33,7 +33,7 @@ pub enum Level {
 /// with the instructions of the wrapper around it.
 pub(crate) trait Kernel {
     type Output;
-    /// Whether numbers one by one give the same bits: processors without vectors then take them so.
+    /// Whether numbers one by one move a body by the same bits: processors without vectors then take them so.
     const ONE_BY_ONE: bool = false;
     fn run<R: Real>(self) -> Self::Output;
 }

@@ -194,6 +194,8 @@ struct Rows<'a> {
 impl Kernel for Rows<'_> {
     type Output = ();
 
+    const ONE_BY_ONE: bool = true;
+
     #[inline(always)]
     fn run<R: Real>(self) {
         if R::MANY_REGISTERS { self.tiles::<R, 2>() } else { self.tiles::<R, 1>() }

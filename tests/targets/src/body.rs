@@ -54,34 +54,47 @@ impl<const NODES: usize, const ELEMENTS: usize, const BLOCKS: usize> Body<NODES,
         Loads::new(scene, [0.0, 0.0, -9.81], &self.force, &[]).ok()
     }
 
-    /// After some exact steps.
-    pub(crate) fn exact(&self, steps: u32) -> Option<FixedState<NODES>> {
+    /// After some exact steps; `then` is called after each.
+    pub(crate) fn exact(&self, steps: u32, then: impl FnMut()) -> Option<FixedState<NODES>> {
         let (scene, mut state) = (self.scene()?, FixedState::new());
-        self.advance(&scene, &mut state, steps)?;
+        self.advance(&scene, &mut state, steps, then)?;
         Some(state)
     }
 
-    fn advance(&self, scene: &Scene<NODES, BLOCKS>, state: &mut FixedState<NODES>, steps: u32) -> Option<()> {
+    fn advance(
+        &self,
+        scene: &Scene<NODES, BLOCKS>,
+        state: &mut FixedState<NODES>,
+        steps: u32,
+        mut then: impl FnMut(),
+    ) -> Option<()> {
         let (loads, step) = (self.loads(scene)?, Step::insist(SECONDS, DAMPING).ok()?);
         for _ in 0..steps {
             if tled::step(scene, &loads, state, &step) != Status::Ok {
                 return None;
             }
+            then();
         }
         Some(())
     }
 
-    /// After `steps` learned ones that go on from `exact` ones. Where a step is refused is among what has to be the same; in
-    /// the first half none may be.
-    pub(crate) fn learned(&self, network: &[u8], exact: u32, steps: u32) -> Option<FixedState<NODES>> {
+    /// After `steps` learned ones that go on from `exact` ones; `then` is called after each. Where a step is refused is among
+    /// what has to be the same; in the first half none may be.
+    pub(crate) fn learned(
+        &self,
+        network: &[u8],
+        exact: u32,
+        steps: u32,
+        mut then: impl FnMut(),
+    ) -> Option<FixedState<NODES>> {
         let mut surrogate = Surrogate::over(Network::parse(network).ok()?, [Vertex::NEW; NODES]).ok()?;
         let (scene, mut state) = (self.scene()?, FixedState::new());
-        self.advance(&scene, &mut state, exact)?;
+        self.advance(&scene, &mut state, exact, || ())?;
         let mut before = [NodeVector::ZERO; NODES];
         for (before, displacement) in before.iter_mut().zip(state.displacements()) {
             *before = *displacement;
         }
-        self.advance(&scene, &mut state, 10)?;
+        self.advance(&scene, &mut state, 10, || ())?;
         state.span(&before, surrogate.seconds());
         surrogate.follow(&state);
         let loads = self.loads(&scene)?;
@@ -90,6 +103,7 @@ impl<const NODES: usize, const ELEMENTS: usize, const BLOCKS: usize> Body<NODES,
             if let Status::Diverged(_) = surrogate::step(&scene, &loads, &mut state, &mut surrogate) {
                 break;
             }
+            then();
         }
         (state.steps() - before >= u64::from(steps.div_ceil(2))).then_some(state)
     }

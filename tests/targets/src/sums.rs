@@ -60,31 +60,32 @@ pub fn checksum(what: usize, level: Level) -> u32 {
         return 0;
     }
     let checksum = match what {
-        0 => SMALL.exact(2_000).as_ref().map(of_state),
+        0 => SMALL.exact(2_000, || ()).as_ref().map(of_state),
         1 => damped(),
         2 => network(&NETWORK.0),
-        3 => SMALL.learned(&NETWORK.0, 1_000, 50).map(|state| of_state(&state) ^ state.steps() as u32),
+        3 => SMALL.learned(&NETWORK.0, 1_000, 50, || ()).map(|state| of_state(&state) ^ state.steps() as u32),
         4 => network(&INT8.0),
-        5 => long_exact(500),
-        6 => long_learned(500, 50),
+        5 => long_exact(500, || ()),
+        6 => long_learned(500, 50, || ()),
         _ => long_critical(500),
     };
     checksum.unwrap_or(0)
 }
 
-/// The checksum of the long bar after exact steps.
-pub fn long_exact(steps: u32) -> Option<u32> {
-    LONG.exact(steps).as_ref().map(of_state)
+/// The checksum of the long bar after exact steps; `then` is called after each.
+pub fn long_exact(steps: u32, then: impl FnMut()) -> Option<u32> {
+    LONG.exact(steps, then).as_ref().map(of_state)
 }
 
-/// The checksum of the long bar after learned steps with layers of eight bits, which go on from exact ones.
-pub fn long_learned(exact: u32, steps: u32) -> Option<u32> {
-    LONG.learned(&COMPACT_INT8.0, exact, steps).map(|state| of_state(&state) ^ state.steps() as u32)
+/// The checksum of the long bar after learned steps with layers of eight bits, which go on from exact ones; `then` is called
+/// after each.
+pub fn long_learned(exact: u32, steps: u32, then: impl FnMut()) -> Option<u32> {
+    LONG.learned(&COMPACT_INT8.0, exact, steps, then).map(|state| of_state(&state) ^ state.steps() as u32)
 }
 
 /// Of the critical step of the long bar after exact steps, s.
 fn long_critical(steps: u32) -> Option<u32> {
-    let critical = critical_step(&LONG.scene()?, &mut LONG.exact(steps)?)?;
+    let critical = critical_step(&LONG.scene()?, &mut LONG.exact(steps, || ())?)?;
     Some(of([critical.seconds, critical.node as f32].into_iter()))
 }
 
