@@ -5,7 +5,7 @@
 #[path = "targets/src/body.rs"]
 mod body;
 #[path = "targets/src/sums.rs"]
-mod sums;
+pub mod sums;
 
 use sums::{Level, NAMES, checksum, rounding};
 
