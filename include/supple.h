@@ -40,7 +40,8 @@
 #define SUPPLE_LEARNED_SIZE(nodes, fallback)                                                                           \
     (SUPPLE_LEARNED_FRONT + SUPPLE_ROUNDED_(48 * (size_t)(nodes)) +                                                    \
      ((fallback) ? 2 * SUPPLE_ROUNDED_(16 * (size_t)(nodes)) : 0))
-/* For a lattice of x * y * z cells (zeros for SUPPLE_MASS_SCALED); the function's may be less, never more. */
+/* For a lattice of x * y * z cells (zeros for SUPPLE_MASS_SCALED; not for cells that supple_large_init chooses); the function's
+   may be less, never more. */
 #define SUPPLE_LARGE_SIZE(nodes, method, x, y, z)                                                                      \
     (SUPPLE_LARGE_FRONT + SUPPLE_ROUNDED_(((method) == SUPPLE_DAMPED ? 96 : 80) * (size_t)(nodes)) +                   \
      ((method) == SUPPLE_MASS_SCALED                                                                                   \
@@ -180,9 +181,9 @@
 #define SUPPLE_LARGE_FRONT 40960
 
 /**
- * What became of a call. Zero: done. Positive: done, with a remark. Negative: not done, and nothing has changed, except
- * that memory handed to a function that prepares an object in it holds no object if that fails. Numbers are never given
- * another meaning.
+ * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not done, and
+ * nothing has changed, except that memory handed to a function that prepares an object may hold none afterwards, and that forces
+ * are those of the step that was refused, or zero after a critical step. Numbers are never given another meaning.
  */
 enum supple_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -195,7 +196,7 @@ enum supple_status
     SUPPLE_OK = 0,
     /**
      * Steps were taken, but are not exact: elements are beyond the range of their law, there is more kinetic energy than
-     * loads and supports explain, or a large step held much of the motion back. The report tells which.
+     * loads and supports explain, or a large step held much of the motion back. The report tells which, also where a larger remark hides it.
      */
     SUPPLE_LIMITED = 1,
     /**
@@ -404,8 +405,8 @@ typedef int32_t supple_status;
 typedef struct supple_large supple_large;
 
 /**
- * A network, and what it keeps for each node. One thread at a time. It may be copied with memcpy; copies use the same
- * weights.
+ * A network, and what it keeps for each node of one state. One thread at a time. It may be copied with memcpy; copies use the
+ * same weights.
  */
 typedef struct supple_learned supple_learned;
 
@@ -645,7 +646,8 @@ typedef void (*supple_part)(const void *work, uint32_t part);
 /**
  * Threads of the host. A step calls `each` twice: it shall call `part(work, p)` for every `p` below `parts`, on
  * whichever threads, side by side or not, and return when all those calls have. Parts share nothing, and the result does not
- * depend on where they run, to the bit. What `each` leaves out is computed when it has returned.
+ * depend on where they run, to the bit. What `each` leaves out is computed when it has returned. It must return: no exception and
+ * no longjmp may leave it.
  */
 typedef struct {
     /**
@@ -667,7 +669,8 @@ typedef struct {
  */
 typedef struct {
     /**
-     * Simulated time at the end, s; of a step that was not taken, at its start.
+     * Simulated time at the end, s; of a step that was not taken, at its start; zero, as all else, if the call was refused before
+     * its first step.
      */
     double time;
     /**
@@ -687,7 +690,8 @@ typedef struct {
      */
     uint32_t node;
     /**
-     * Smallest volume of an element over its volume at rest, at the start of any of the steps.
+     * Smallest volume of an element over its volume at rest, at the start of any of the steps: below 0.1 the law went on along
+     * its tangent.
      */
     float least_volume_ratio;
     /**
@@ -695,7 +699,7 @@ typedef struct {
      */
     float saturation;
     /**
-     * Kinetic energy beyond the account, as a share of the most that was ever in it.
+     * Kinetic energy beyond the account, as a share of the most that was ever in it; above 0 it is remarked upon.
      */
     float energy_excess;
     /**
@@ -714,6 +718,10 @@ typedef struct {
      * Large steps: most nodes that were held back in a step.
      */
     uint32_t held_back;
+    /**
+     * Large steps with a lattice: the least share of its motion that was used in a step; below 0.5 it is remarked upon.
+     */
+    float lattice_share;
     /**
      * Large steps: estimate of the error so far, m, mean over the nodes; it tells the scale and is no bound.
      */
@@ -979,7 +987,7 @@ supple_status supple_state_init(void *memory,
                                 supple_state **state);
 
 /**
- * Puts a state back to rest at time zero. Its step stays.
+ * Puts a state back to rest at time zero. Its step stays. Large steps have to be prepared again, learned ones reset and led.
  */
 supple_status supple_state_reset(supple_state *state);
 
@@ -1059,9 +1067,10 @@ supple_status supple_copy_positions(const supple_state *state,
 supple_status supple_copy_velocities(const supple_state *state, float *out, size_t floats);
 
 /**
- * Copies the total force on each node at the start of the latest step, N: that of the loads with that of the tissue. At held
+ * Copies the total force on each node at the start of the latest step, also of one that was refused, N: that of the loads with that of the tissue. At held
  * nodes it is what presses on the support, and so what a hand that holds the instrument feels, apart from the inertia of a moved
- * one; the support presses back with the opposite. Zero after supple_critical_step or supple_set_step until the next step.
+ * one; the support presses back with the opposite. Zero after supple_critical_step or supple_set_step, refused ones too, until the next
+ * step.
  *
  * @param floats room in `out`: three times the nodes at least.
  */
@@ -1082,8 +1091,9 @@ size_t supple_saved_size(uint32_t nodes);
 supple_status supple_save(const supple_state *state, void *to, size_t bytes);
 
 /**
- * Restores a saved state, from any address, into one prepared for the same scene: it goes on as the saved one would have, to
- * the bit. Forces are zero until the next step.
+ * Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the saved one
+ * would have, to the bit. Forces are zero until the next step. Large steps have to be prepared again, and learned ones led;
+ * for the same bits with these, copy their objects with memcpy as well.
  */
 supple_status supple_restore(supple_state *state,
                              const void *from,
@@ -1135,8 +1145,9 @@ supple_status supple_learned_lead(const supple_scene *scene,
                                   supple_report *report);
 
 /**
- * Takes `count` learned steps after supple_learned_lead, or after other learned steps. Stops at the first that is not to be
- * believed: without fallback that one is not taken, and the state is as before it.
+ * Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. Stops at the first
+ * that is not to be believed: without fallback that one is not taken, displacements and time are as before it, and the exact
+ * step has to lead again.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
@@ -1151,7 +1162,8 @@ supple_status supple_learned_step(const supple_scene *scene,
                                   supple_report *report);
 
 /**
- * Writes how many bytes of memory large steps of a scene need; it depends on the lattice. SUPPLE_LARGE_SIZE is never less.
+ * Writes how many bytes of memory large steps of a scene need; it depends on the lattice. For cells that you give SUPPLE_LARGE_SIZE is
+ * never less.
  *
  * @param points the points that the scene was built from, three coordinates each.
  * @param error may be NULL.

@@ -9,6 +9,7 @@ use glam::Vec3;
 
 use crate::material::Material;
 use crate::scene::{Axes, ElementBlock, NodeInertia, Scene};
+use crate::state::NodeVector;
 
 /// A force on one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -168,6 +169,34 @@ impl<'a> Loads<'a> {
     #[must_use]
     pub const fn motions(&self) -> &'a [Motion] {
         self.motions
+    }
+
+    /// Calls `lead` with each motion and axis that it leads at `time` (s), the position there (m), and the node's vector. Of several
+    /// motions of an axis the last one holds: they come last first, and which axes of a node have come stands meanwhile, as bits,
+    /// in the padding of its vector.
+    pub(crate) fn each_led(
+        &self,
+        time: f64,
+        vectors: &mut [NodeVector],
+        mut lead: impl FnMut(usize, usize, f32, &mut [f32; 4]),
+    ) {
+        for motion in self.motions.iter().rev() {
+            let node = motion.node as usize;
+            let Some(NodeVector(vector)) = vectors.get_mut(node) else { continue };
+            let factor = ramp_factor(time, motion.ramp);
+            for axis in 0..3 {
+                let come = vector[3].to_bits();
+                if motion.axes.has(axis) && come >> axis & 1 == 0 {
+                    vector[3] = f32::from_bits(come | 1 << axis);
+                    lead(node, axis, factor * motion.metre[axis], vector);
+                }
+            }
+        }
+        for motion in self.motions {
+            if let Some(NodeVector(vector)) = vectors.get_mut(motion.node as usize) {
+                vector[3] = 0.0;
+            }
+        }
     }
 }
 

@@ -280,6 +280,7 @@ where
     let (found, extremes) = forcing.in_parts(force, vertices, threads, predict);
     let totals = Totals::of_all(found.iter().map(|(totals, _)| totals));
 
+    *report = Counts::of_all(found.iter().map(|(_, counts)| counts)).report();
     let vertices = &*vertices;
     let next = |node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector| {
         vertices.get(node).map_or([0.0; 4], |vertex| vertex.next.0)
@@ -296,7 +297,6 @@ where
     };
 
     (*ledger, *seen) = (entered, extremes);
-    *report = Counts::of_all(found.iter().map(|(_, counts)| counts)).report();
     move_in_parts(elements.chunks, displacement, increment, threads, |nodes, displacement, increment| {
         let vertices = vertices.get(nodes).unwrap_or_default();
         for ((displacement, increment), vertex) in displacement.iter_mut().zip(increment).zip(vertices) {

@@ -48,9 +48,13 @@ install() {
     touch "$folder/installed"
 }
 
+missing=()
+command -v node >/dev/null || missing+=(nodejs)
+command -v qemu-system-arm >/dev/null || missing+=(qemu-system-arm)
+if [ ${#missing[@]} -gt 0 ]; then
+    apt-get update -qq && apt-get install -y -qq --no-install-recommends "${missing[@]}"
+fi
 [ -e "$folder/installed" ] || step install
-command -v node >/dev/null || step apt-get install -y -qq --no-install-recommends nodejs
-command -v qemu-system-arm >/dev/null || step apt-get install -y -qq --no-install-recommends qemu-system-arm
 
 # rustup's compiler brings a linker for WebAssembly and microcontrollers.
 lld=$(rustc --print sysroot)/lib/rustlib/x86_64-unknown-linux-gnu/bin/rust-lld
@@ -92,7 +96,7 @@ step compare node tests/targets/run.mjs "$here/wasm32-unknown-unknown/release/ta
 # A nanosecond for each instruction, by which it counts its own. A fault would be a loop without end there.
 step compare timeout 10m qemu-system-arm -machine mps2-an386 -cpu cortex-m4 -icount shift=0 -nographic \
     -semihosting-config enable=on,target=native -kernel "$here/thumbv7em-none-eabihf/release/m4"
-echo "the same bits everywhere"
+echo "the same bits as on other processors with the same rounding"
 
 # As fast to compile as tests can be that are emulated: their dependencies do nothing that takes time.
 export CARGO_PROFILE_TEST_OPT_LEVEL=1

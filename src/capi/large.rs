@@ -134,7 +134,8 @@ unsafe fn checked<'a>(
     }
 }
 
-/// Writes how many bytes of memory large steps of a scene need; it depends on the lattice. SUPPLE_LARGE_SIZE is never less.
+/// Writes how many bytes of memory large steps of a scene need; it depends on the lattice. For cells that you give SUPPLE_LARGE_SIZE is
+/// never less.
 ///
 /// @param points the points that the scene was built from, three coordinates each.
 /// @param error may be NULL.
@@ -249,15 +250,16 @@ pub unsafe extern "C" fn supple_large_step(
         belongs(memory::change(large)?.nodes, &any)?;
         let (core, damper) = (&mut (*large).core, (*large).damper.as_ref());
         View::of(state).with(|state| {
-            let mut held_back = 0;
+            let (mut held_back, mut lattice_share) = (0, 1.0);
             let answer = with_scene!(&any, scene => taken(count, count, state, &mut acting, found, |loads, state| {
                 let status = core.step(scene, loads, state, storage(large), damper);
                 held_back = held_back.max(core.report().held_back);
+                lattice_share = f32::min(lattice_share, core.report().coarse_share);
                 status
             }));
             found.close(state);
             (found.held_back, found.added_mass) = (held_back, core.report().added_mean);
-            found.error_estimate = core.report().error;
+            (found.lattice_share, found.error_estimate) = (lattice_share, core.report().error);
             answer
         })
     };

@@ -43,8 +43,8 @@ pub struct supple_learned_config {
     pub weights_bytes: usize,
 }
 
-/// A network, and what it keeps for each node. One thread at a time. It may be copied with memcpy; copies use the same
-/// weights.
+/// A network, and what it keeps for each node of one state. One thread at a time. It may be copied with memcpy; copies use the
+/// same weights.
 #[repr(C, align(64))]
 pub struct supple_learned {
     head: Head,
@@ -307,6 +307,8 @@ impl<'a> Parts<'a> {
             });
             return self.exact_steps(left).map(|_| SUPPLE_FELL_BACK);
         }
+        // A step that is not taken leaves what it predicted: the network cannot go on from that.
+        self.object.led = None;
         let answer = found.enter(&status, &self.view.state)?;
         self.object.led = Some(self.view.state.steps());
         Ok(if outside > MUCH_OUTSIDE { worse(answer, SUPPLE_OUTSIDE) } else { answer })
@@ -378,8 +380,9 @@ pub unsafe extern "C" fn supple_learned_lead(
     unsafe { reported(report, lead) }
 }
 
-/// Takes `count` learned steps after supple_learned_lead, or after other learned steps. Stops at the first that is not to be
-/// believed: without fallback that one is not taken, and the state is as before it.
+/// Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. Stops at the first
+/// that is not to be believed: without fallback that one is not taken, displacements and time are as before it, and the exact
+/// step has to lead again.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.

@@ -98,8 +98,9 @@ pub unsafe extern "C" fn supple_save(
     save().unwrap_or_else(|error: supple_error| error.status)
 }
 
-/// Restores a saved state, from any address, into one prepared for the same scene: it goes on as the saved one would have, to
-/// the bit. Forces are zero until the next step.
+/// Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the saved one
+/// would have, to the bit. Forces are zero until the next step. Large steps have to be prepared again, and learned ones led;
+/// for the same bits with these, copy their objects with memcpy as well.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_restore(
     state: *mut supple_state,

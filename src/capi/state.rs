@@ -104,7 +104,7 @@ pub unsafe extern "C" fn supple_state_init(
     init().unwrap_or_else(|error: supple_error| error.status)
 }
 
-/// Puts a state back to rest at time zero. Its step stays.
+/// Puts a state back to rest at time zero. Its step stays. Large steps have to be prepared again, learned ones reset and led.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_state_reset(state: *mut supple_state) -> supple_status {
     // SAFETY: what the header asks of the caller.

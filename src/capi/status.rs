@@ -13,9 +13,9 @@ use crate::tled::StepError;
 
 use super::SUPPLE_NONE;
 
-/// What became of a call. Zero: done. Positive: done, with a remark. Negative: not done, and nothing has changed, except
-/// that memory handed to a function that prepares an object in it holds no object if that fails. Numbers are never given
-/// another meaning.
+/// What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not done, and
+/// nothing has changed, except that memory handed to a function that prepares an object may hold none afterwards, and that forces
+/// are those of the step that was refused, or zero after a critical step. Numbers are never given another meaning.
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[must_use]
@@ -23,7 +23,7 @@ pub enum supple_status {
     /// Done.
     SUPPLE_OK = 0,
     /// Steps were taken, but are not exact: elements are beyond the range of their law, there is more kinetic energy than
-    /// loads and supports explain, or a large step held much of the motion back. The report tells which.
+    /// loads and supports explain, or a large step held much of the motion back. The report tells which, also where a larger remark hides it.
     SUPPLE_LIMITED = 1,
     /// Learned steps were taken, with more than one percent of the vertices outside what training has seen.
     SUPPLE_OUTSIDE = 2,

@@ -27,7 +27,8 @@ pub type supple_part = unsafe extern "C" fn(work: *const c_void, part: u32);
 
 /// Threads of the host. A step calls `each` twice: it shall call `part(work, p)` for every `p` below `parts`, on
 /// whichever threads, side by side or not, and return when all those calls have. Parts share nothing, and the result does not
-/// depend on where they run, to the bit. What `each` leaves out is computed when it has returned.
+/// depend on where they run, to the bit. What `each` leaves out is computed when it has returned. It must return: no exception and
+/// no longjmp may leave it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_threads {
@@ -45,7 +46,8 @@ pub struct supple_threads {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_report {
-    /// Simulated time at the end, s; of a step that was not taken, at its start.
+    /// Simulated time at the end, s; of a step that was not taken, at its start; zero, as all else, if the call was refused before
+    /// its first step.
     pub time: f64,
     /// Kinetic energy at the latest step, J.
     pub kinetic: f64,
@@ -55,11 +57,12 @@ pub struct supple_report {
     pub steps: u32,
     /// The node at which a step diverged, else SUPPLE_NONE.
     pub node: u32,
-    /// Smallest volume of an element over its volume at rest, at the start of any of the steps.
+    /// Smallest volume of an element over its volume at rest, at the start of any of the steps: below 0.1 the law went on along
+    /// its tangent.
     pub least_volume_ratio: f32,
     /// Largest exponent over its cap, of the exponential law: above 1 the law went on along its tangent.
     pub saturation: f32,
-    /// Kinetic energy beyond the account, as a share of the most that was ever in it.
+    /// Kinetic energy beyond the account, as a share of the most that was ever in it; above 0 it is remarked upon.
     pub energy_excess: f32,
     /// Learned steps: the largest share of the free vertices whose prediction was clipped.
     pub clipped: f32,
@@ -69,6 +72,8 @@ pub struct supple_report {
     pub added_mass: f32,
     /// Large steps: most nodes that were held back in a step.
     pub held_back: u32,
+    /// Large steps with a lattice: the least share of its motion that was used in a step; below 0.5 it is remarked upon.
+    pub lattice_share: f32,
     /// Large steps: estimate of the error so far, m, mean over the nodes; it tells the scale and is no bound.
     pub error_estimate: f32,
     /// What stopped the call, with place and value; status SUPPLE_OK if nothing did.
@@ -89,6 +94,7 @@ impl supple_report {
         outside: 0.0,
         added_mass: 0.0,
         held_back: 0,
+        lattice_share: 1.0,
         error_estimate: 0.0,
         error: supple_error::NONE,
     };

@@ -109,6 +109,8 @@ const COARSE_GROWTH: f32 = COARSE * (1.0 - NODE_GROWTH / FINE);
 const LARGEST_KICK: f32 = 0.02;
 /// How much faster from step to step what is held back may move again.
 const RECOVERY: f32 = 1.05;
+/// What it starts from at least: nothing would never grow.
+const LEAST_SHARE: f32 = 1e-6;
 /// Time of a refresh cycle, s: short beside the motions of hands and breath, which stiffen and turn tissue.
 const CYCLE: f32 = 0.04;
 /// Fewest and most steps of a cycle.

@@ -11,7 +11,7 @@ use super::lattice::{LatticeNode, MAX_FUNCTIONS};
 use super::node::Scaling;
 use super::report::HeldBack;
 use super::vectors::{NodeTables, frame_of};
-use super::{LARGEST_KICK, NODE_GROWTH, RECOVERY};
+use super::{LARGEST_KICK, LEAST_SHARE, NODE_GROWTH, RECOVERY};
 use crate::lanes::{BLOCK, Chosen, Following, Kernel, NodeVector, Real, Rows, axes, dispatch};
 use crate::scene::NodeInertia;
 use crate::tled::{Step, Sums, Totals};
@@ -246,7 +246,8 @@ impl Prepare<'_, '_> {
         // Who is let go and held back in turn would be braked each time: back to one only slowly.
         let share = (R::splat(NODE_GROWTH) * grown).min(one).min(most).min(R::splat(RECOVERY) * share_before);
         let keep = R::splat(carry) * share.over(share_before).min(one).root();
-        rows.write(must_cast_slice_mut(inverse_beside), [xy, yz, zx, share]);
+        let kept = share.max(R::splat(LEAST_SHARE));
+        rows.write(must_cast_slice_mut(inverse_beside), [xy, yz, zx, kept]);
         found.least = grown.min(found.least);
         let unused = one - share;
         found.unused = found.unused + unused;

@@ -344,27 +344,19 @@ impl Entry {
         loads: &Loads<'_>,
         displacement: &[NodeVector],
         increment: &[NodeVector],
-        force: &[NodeVector],
+        force: &mut [NodeVector],
         time: f64,
         step: &Step,
     ) -> Self {
-        for motion in loads.motions() {
-            let node = motion.node as usize;
-            let (Some(displacement), Some(increment), Some(force)) =
-                (displacement.get(node), increment.get(node), force.get(node))
-            else {
-                continue;
+        loads.each_led(time + f64::from(step.dt), force, |node, axis, position, force| {
+            let (Some(displacement), Some(increment)) = (displacement.get(node), increment.get(node)) else {
+                return;
             };
-            let factor = ramp_factor(time + f64::from(step.dt), motion.ramp);
-            for axis in 0..3 {
-                if motion.axes.has(axis) {
-                    let next = factor * motion.metre[axis] - displacement.0[axis];
-                    let (force, last) = (f64::from(0.5 * force.0[axis]), increment.0[axis]);
-                    self.work -= force * f64::from(next);
-                    self.jump += force.abs() * f64::from((next - last).abs());
-                }
-            }
-        }
+            let next = position - displacement.0[axis % 4];
+            let (force, last) = (f64::from(0.5 * force[axis % 4]), increment.0[axis % 4]);
+            self.work -= force * f64::from(next);
+            self.jump += force.abs() * f64::from((next - last).abs());
+        });
         self
     }
 

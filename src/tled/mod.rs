@@ -25,7 +25,7 @@ pub use spectrum::exact_critical_step;
 use core::fmt;
 use core::ops::Range;
 
-use crate::loads::{Loads, ramp_factor};
+use crate::loads::Loads;
 use crate::material::{Law, Material};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
 use crate::state::{NodeVector, State};
@@ -394,19 +394,12 @@ pub(crate) fn follow_motions(
     increment: &mut [NodeVector],
     time: f64,
 ) {
-    for motion in loads.motions() {
-        let node = motion.node as usize;
-        if let (Some(displacement), Some(increment)) = (displacement.get_mut(node), increment.get_mut(node)) {
-            let factor = ramp_factor(time, motion.ramp);
-            for axis in 0..3 {
-                if motion.axes.has(axis) {
-                    let position = factor * motion.metre[axis];
-                    increment.0[axis] = position - displacement.0[axis];
-                    displacement.0[axis] = position;
-                }
-            }
+    loads.each_led(time, increment, |node, axis, position, increment| {
+        if let Some(NodeVector(displacement)) = displacement.get_mut(node) {
+            increment[axis % 4] = position - displacement[axis % 4];
+            displacement[axis % 4] = position;
         }
-    }
+    });
 }
 
 /// The node that a refused step names: the first whose next increment is not finite, or else the one with

@@ -444,6 +444,19 @@ static void divergence(void) {
     DONE(supple_learned_describe(learned, &facts));
     CHECK(facts.fell_back == 1);
     CHECK(supple_learned_step(scene, loads, state, learned, 1, NULL, &report) == SUPPLE_FELL_BACK && report.steps == 3);
+
+    /* Without fallback a step that is not to be believed is not taken, and the network cannot go on from what it predicted. */
+    const supple_learned_config without = {SUPPLE_CONFIG(supple_learned_config), 0, 0, weights, sizeof weights};
+    supple_learned *alone = NULL;
+    DONE(supple_learned_init(spare, sizeof spare, scene, &without, &alone, NULL));
+    DONE(supple_state_reset(state));
+    DONE(supple_learned_lead(scene, loads, state, alone, 100, NULL, &report));
+    const double least[6] = {0.0, 0.0, 0.0, 1e-6 * report.kinetic, 0.0, 1e-6 * report.kinetic};
+    forge(LEDGER, least, sizeof least);
+    DONE(supple_restore(state, saved, sizeof saved));
+    CHECK(supple_learned_step(scene, NULL, state, alone, 2, NULL, &report) == SUPPLE_E_DIVERGED_ENERGY && report.steps == 0);
+    DONE(supple_restore(state, saved, sizeof saved));
+    REFUSED(SUPPLE_E_NOT_LED, supple_learned_step(scene, NULL, state, alone, 1, NULL, NULL));
 }
 
 int main(int argc, char **argv) {

@@ -103,6 +103,41 @@ fn an_inertia_serves_only_what_it_was_prepared_for() {
     assert_eq!(inertia::step(&scene, &Loads::NONE, &mut state, &mut inertia), Status::Ok);
 }
 
+/// A host hands over a force that is none, once. What it moved is held back, or the step is refused; afterwards the node follows
+/// its forces again.
+#[test]
+fn a_node_that_a_wild_force_held_back_is_let_go() {
+    let body = small_bar();
+    let scene = body.scene(tissue(NEO), &held(&body));
+    let step = Step::insist(10.0 * limit(&scene), 20.0).unwrap();
+    let node = 94;
+    let moved = |wild: &[f32]| {
+        let mut state = rest_of(&scene);
+        let mut inertia = Method::Scaled.prepared(&body, &scene, &mut state, step);
+        let mut push = |newton: f32, copies: usize, steps: usize| {
+            let force = NodalForce { node, newton: [newton, 0.0, 0.0], ramp: 0.0 };
+            let forces = vec![force; copies];
+            let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+            for _ in 0..steps {
+                let status = inertia::step(&scene, &loads, &mut state, &mut inertia);
+                if newton > 1.0 {
+                    println!("{newton} N: {status:?}");
+                }
+            }
+        };
+        for &newton in wild {
+            // Two of them come to infinity.
+            push(newton, 1, 1);
+            push(newton, 2, 1);
+        }
+        push(0.01, 1, 10_000);
+        state.displacements()[node as usize].to_array()[0]
+    };
+    let (calm, wild) = (moved(&[]), moved(&[3e38]));
+    println!("0.01 N move it by {:.3} mm, after a wild force by {:.3} mm", 1e3 * calm, 1e3 * wild);
+    assert!((wild / calm - 1.0).abs() < 0.05);
+}
+
 /// Where every node is held no function of a lattice is left, and no memory is needed for one.
 #[test]
 fn a_lattice_that_has_nothing_to_move_needs_no_room_and_steps() {

@@ -3,7 +3,9 @@
 #![no_std]
 #![no_main]
 
+use core::ops::Range;
 use core::panic::PanicInfo;
+use core::ptr;
 
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{Peripherals, SYST};
@@ -34,8 +36,9 @@ fn print_instructions(timer: &mut SYST) -> bool {
     timer.set_clock_source(SystClkSource::Core);
     timer.set_reload(TICKS);
     timer.enable_counter();
-    let mut each = Each { timer, count: 0, least: u32::MAX, most: 0 };
-    heprintln!("instructions a step of 208 nodes");
+    let mut each =
+        Each { timer, count: 0, least: u32::MAX, most: 0, painted: ptr::null_mut()..ptr::null_mut() };
+    heprintln!("instructions and stack of a step of 208 nodes");
     let exact = long_exact(1_000, || each.ended());
     let told = each.tell("exact", 1_000);
     let learned = long_learned(100, 100, || each.ended());
@@ -48,6 +51,39 @@ struct Each<'a> {
     count: u32,
     least: u32,
     most: u32,
+    /// Painted words of the stack below that of the caller of steps.
+    painted: Range<*mut u32>,
+}
+
+/// What unused stack is painted with, and how many words of it.
+const PAINT: u32 = 0xa5a5_a5a5;
+const WORDS: usize = 16 * 1024;
+/// What a call that takes no step uses of it, words.
+const OWN: usize = 64;
+
+/// Paints the stack below what is in use.
+#[inline(never)]
+fn paint() -> Range<*mut u32> {
+    let mut here = 0u32;
+    let end = (&raw mut here).wrapping_sub(OWN);
+    let start = end.wrapping_sub(WORDS);
+    let mut word = end;
+    while word > start {
+        word = word.wrapping_sub(1);
+        // SAFETY: below the stack pointer there is nothing but memory, megabytes of it on this board.
+        unsafe { word.write_volatile(PAINT) };
+    }
+    start..end
+}
+
+/// Bytes from the deepest word that is not painted any more to the end.
+fn used(painted: &Range<*mut u32>) -> usize {
+    let mut word = painted.start;
+    // SAFETY: as above.
+    while word < painted.end && unsafe { word.read_volatile() } == PAINT {
+        word = word.wrapping_add(1);
+    }
+    painted.end as usize - word as usize + size_of::<u32>() * OWN
 }
 
 impl Each<'_> {
@@ -55,7 +91,9 @@ impl Each<'_> {
     fn ended(&mut self) {
         let instructions =
             if self.timer.has_wrapped() { u32::MAX } else { (TICKS - SYST::get_current()) * PER_TICK };
-        if self.count > 0 {
+        if self.count == 0 {
+            self.painted = paint();
+        } else {
             (self.least, self.most) = (self.least.min(instructions), self.most.max(instructions));
         }
         self.count += 1;
@@ -64,7 +102,8 @@ impl Each<'_> {
 
     /// Prints them, and is ready for others.
     fn tell(&mut self, name: &str, count: u32) -> bool {
-        heprintln!("{name}: from {} to {} in {} steps", self.least, self.most, self.count);
+        let stack = used(&self.painted);
+        heprintln!("{name}: from {} to {} in {} steps, {stack} bytes", self.least, self.most, self.count);
         let fine = self.count == count && self.most < u32::MAX;
         (self.count, self.least, self.most) = (0, u32::MAX, 0);
         fine

@@ -1,0 +1,104 @@
+/* How much stack the library's calls need: each runs on a thread of its own whose stack was painted, and what is still painted
+ * afterwards was not used. With the best instructions of the processor and with the portable ones. */
+#define _POSIX_C_SOURCE 200809L
+#include <pthread.h>
+
+#include "body.h"
+
+SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
+SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES));
+SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
+SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 0));
+SUPPLE_MEMORY(large_memory, 4 << 20);
+SUPPLE_MEMORY(weights, 40000);
+SUPPLE_MEMORY(damper, 4000);
+
+/* What the README promises, kB. */
+enum { ENOUGH = 160, PAINT = 0xA5 };
+static _Alignas(4096) unsigned char stack[1 << 20];
+
+static supple_scene_config scene_config;
+static supple_learned_config network;
+static supple_large_config beyond;
+static supple_step_config step;
+static supple_scene *scene;
+static supple_state *state;
+static supple_loads *loads;
+static supple_learned *learned;
+static supple_large *large;
+
+static void nothing(void) {}
+static void init_scene(void) {
+    CHECK(supple_scene_init(scene_memory, sizeof scene_memory, &scene_config, &scene, NULL) == SUPPLE_OK);
+}
+static void init_state(void) {
+    CHECK(supple_state_init(state_memory, sizeof state_memory, scene, &state) == SUPPLE_OK);
+}
+static void init_loads(void) {
+    const float gravity[3] = {0.0f, 0.0f, -9.81f};
+    CHECK(supple_loads_init(loads_memory, sizeof loads_memory, scene, FORCES, MOTIONS, &loads) == SUPPLE_OK);
+    CHECK(supple_set_gravity(loads, gravity) == SUPPLE_OK);
+}
+static void set_step(void) { CHECK(supple_set_step(scene, state, &step, NULL) == SUPPLE_OK); }
+static void exact(void) { CHECK(supple_step(scene, loads, state, 2, NULL, NULL) == SUPPLE_OK); }
+static void init_learned(void) {
+    CHECK(supple_learned_init(learned_memory, sizeof learned_memory, scene, &network, &learned, NULL) == SUPPLE_OK);
+}
+static void learn(void) {
+    CHECK(supple_learned_lead(scene, loads, state, learned, 20, NULL, NULL) >= 0);
+    CHECK(supple_learned_step(scene, loads, state, learned, 2, NULL, NULL) >= 0);
+}
+static void init_large(void) {
+    CHECK(supple_large_init(large_memory, sizeof large_memory, scene, state, points[0], &beyond, &large, NULL) == SUPPLE_OK);
+}
+/* More than a cycle, in which everything is renewed once. */
+static void step_large(void) { CHECK(supple_large_step(scene, loads, state, large, 200, NULL) >= 0); }
+
+static void *run(void *call) {
+    (*(void (**)(void))call)();
+    return NULL;
+}
+
+static size_t used_by(void (*call)(void)) {
+    memset(stack, PAINT, sizeof stack);
+    pthread_attr_t attributes;
+    pthread_t thread;
+    CHECK(pthread_attr_init(&attributes) == 0 && pthread_attr_setstack(&attributes, stack, sizeof stack) == 0);
+    CHECK(pthread_create(&thread, &attributes, run, &call) == 0 && pthread_join(thread, NULL) == 0);
+    CHECK(pthread_attr_destroy(&attributes) == 0);
+    size_t untouched = 0;
+    while (untouched < sizeof stack && stack[untouched] == PAINT) {
+        untouched++;
+    }
+    return sizeof stack - untouched;
+}
+
+int main(void) {
+    size_t of_weights, of_damper;
+    file("weights/compact-10.weights", weights, sizeof weights, &of_weights);
+    file("weights/damper.weights", damper, sizeof damper, &of_damper);
+    scene_config = bar_config();
+    network = (supple_learned_config){SUPPLE_CONFIG(supple_learned_config), 0, 0, weights, of_weights};
+    beyond = (supple_large_config){SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {0, 0, 0}, damper, of_damper};
+    step = (supple_step_config){SUPPLE_CONFIG(supple_step_config), 3e-5f, 20.0f};
+    static const struct {
+        const char *name;
+        void (*call)(void);
+    } calls[] = {
+        {"scene_init", init_scene}, {"state_init", init_state},     {"loads_init", init_loads},
+        {"set_step", set_step},     {"step", exact},                {"learned_init", init_learned},
+        {"learned_step", learn},    {"large_init", init_large},     {"large_step", step_large},
+    };
+    const uint32_t levels[2] = {supple_level(), SUPPLE_LEVEL_PORTABLE};
+    for (int level = 0; level < 2; level++) {
+        CHECK(supple_set_level(levels[level]) == SUPPLE_OK);
+        const size_t rest = used_by(nothing);
+        printf("stack, bytes, %s instructions:", level == 0 ? "best" : "portable");
+        for (size_t n = 0; n < sizeof calls / sizeof *calls; n++) {
+            const size_t used = used_by(calls[n].call) - rest;
+            printf(" %s %zu%s", calls[n].name, used, n + 1 < sizeof calls / sizeof *calls ? "," : "\n");
+            CHECK(used < 1024 * ENOUGH);
+        }
+    }
+    return 0;
+}
