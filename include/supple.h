@@ -182,8 +182,9 @@
 
 /**
  * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not done, and
- * nothing has changed, except that memory handed to a function that prepares an object may hold none afterwards, and that forces
- * are those of the step that was refused, or zero after a critical step. Numbers are never given another meaning.
+ * nothing has changed, except that memory handed to a function that prepares an object may hold none afterwards, that forces
+ * are those of the step that was refused, or zero after a critical step, and what supple_learned_step says of a refused one.
+ * Numbers are never given another meaning.
  */
 enum supple_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -196,7 +197,8 @@ enum supple_status
     SUPPLE_OK = 0,
     /**
      * Steps were taken, but are not exact: elements are beyond the range of their law, there is more kinetic energy than
-     * loads and supports explain, or a large step held much of the motion back. The report tells which, also where a larger remark hides it.
+     * loads and supports explain, or a large step held much of the motion back. The report tells the first two, also where a larger remark hides
+     * them.
      */
     SUPPLE_LIMITED = 1,
     /**
@@ -669,8 +671,8 @@ typedef struct {
  */
 typedef struct {
     /**
-     * Simulated time at the end, s; of a step that was not taken, at its start; zero, as all else, if the call was refused before
-     * its first step.
+     * Simulated time at the end, s; of a step that was not taken, at its start; zero, and all else as if there had been no step, if
+     * the call was refused before its first.
      */
     double time;
     /**
@@ -1069,8 +1071,8 @@ supple_status supple_copy_velocities(const supple_state *state, float *out, size
 /**
  * Copies the total force on each node at the start of the latest step, also of one that was refused, N: that of the loads with that of the tissue. At held
  * nodes it is what presses on the support, and so what a hand that holds the instrument feels, apart from the inertia of a moved
- * one; the support presses back with the opposite. Zero after supple_critical_step or supple_set_step, refused ones too, until the next
- * step.
+ * one; the support presses back with the opposite. Zero after supple_critical_step or supple_set_step, also where these refuse what they
+ * computed, until the next step.
  *
  * @param floats room in `out`: three times the nodes at least.
  */
@@ -1146,8 +1148,8 @@ supple_status supple_learned_lead(const supple_scene *scene,
 
 /**
  * Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. Stops at the first
- * that is not to be believed: without fallback that one is not taken, displacements and time are as before it, and the exact
- * step has to lead again.
+ * that is not to be believed: without fallback that one is not taken, displacements and time are as before it, velocities may be
+ * those of the network's own step, and the exact step has to lead again.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.

@@ -59,7 +59,7 @@ ln -sf "$soname" "$to/lib/libsupple.so"
 fill supple.pc lib/pkgconfig
 fill supple-config.cmake lib/cmake/supple
 fill supple-config-version.cmake lib/cmake/supple
-# The loader knows what is in its folders from a cache.
-if [ -z "$destdir" ] && [ "$(id -u)" = 0 ] && command -v ldconfig >/dev/null; then
-    ldconfig
-fi
+# The loader knows what is in its own folders from a cache.
+case $destdir$prefix in
+    /usr | /usr/local) ldconfig || echo "run ldconfig, for programs to find $soname" >&2 ;;
+esac

@@ -8,7 +8,7 @@ use crate::inertia::{
 };
 use crate::mlp::Network;
 use crate::state::NodeVector;
-use crate::tled::Step;
+use crate::tled::{Status, Step};
 
 use super::SUPPLE_NONE;
 use super::loads::{Acting, belongs, supple_loads};
@@ -253,8 +253,11 @@ pub unsafe extern "C" fn supple_large_step(
             let (mut held_back, mut lattice_share) = (0, 1.0);
             let answer = with_scene!(&any, scene => taken(count, count, state, &mut acting, found, |loads, state| {
                 let status = core.step(scene, loads, state, storage(large), damper);
-                held_back = held_back.max(core.report().held_back);
-                lattice_share = f32::min(lattice_share, core.report().coarse_share);
+                // What was refused has no report of its own.
+                if let Status::Ok | Status::Limited { .. } = status {
+                    held_back = held_back.max(core.report().held_back);
+                    lattice_share = f32::min(lattice_share, core.report().coarse_share);
+                }
                 status
             }));
             found.close(state);

@@ -381,8 +381,8 @@ pub unsafe extern "C" fn supple_learned_lead(
 }
 
 /// Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. Stops at the first
-/// that is not to be believed: without fallback that one is not taken, displacements and time are as before it, and the exact
-/// step has to lead again.
+/// that is not to be believed: without fallback that one is not taken, displacements and time are as before it, velocities may be
+/// those of the network's own step, and the exact step has to lead again.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.

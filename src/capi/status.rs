@@ -14,8 +14,9 @@ use crate::tled::StepError;
 use super::SUPPLE_NONE;
 
 /// What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not done, and
-/// nothing has changed, except that memory handed to a function that prepares an object may hold none afterwards, and that forces
-/// are those of the step that was refused, or zero after a critical step. Numbers are never given another meaning.
+/// nothing has changed, except that memory handed to a function that prepares an object may hold none afterwards, that forces
+/// are those of the step that was refused, or zero after a critical step, and what supple_learned_step says of a refused one.
+/// Numbers are never given another meaning.
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[must_use]
@@ -23,7 +24,8 @@ pub enum supple_status {
     /// Done.
     SUPPLE_OK = 0,
     /// Steps were taken, but are not exact: elements are beyond the range of their law, there is more kinetic energy than
-    /// loads and supports explain, or a large step held much of the motion back. The report tells which, also where a larger remark hides it.
+    /// loads and supports explain, or a large step held much of the motion back. The report tells the first two, also where a larger remark hides
+    /// them.
     SUPPLE_LIMITED = 1,
     /// Learned steps were taken, with more than one percent of the vertices outside what training has seen.
     SUPPLE_OUTSIDE = 2,

@@ -46,8 +46,8 @@ pub struct supple_threads {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_report {
-    /// Simulated time at the end, s; of a step that was not taken, at its start; zero, as all else, if the call was refused before
-    /// its first step.
+    /// Simulated time at the end, s; of a step that was not taken, at its start; zero, and all else as if there had been no step, if
+    /// the call was refused before its first.
     pub time: f64,
     /// Kinetic energy at the latest step, J.
     pub kinetic: f64,

@@ -106,8 +106,8 @@ pub unsafe extern "C" fn supple_copy_velocities(
 
 /// Copies the total force on each node at the start of the latest step, also of one that was refused, N: that of the loads with that of the tissue. At held
 /// nodes it is what presses on the support, and so what a hand that holds the instrument feels, apart from the inertia of a moved
-/// one; the support presses back with the opposite. Zero after supple_critical_step or supple_set_step, refused ones too, until the next
-/// step.
+/// one; the support presses back with the opposite. Zero after supple_critical_step or supple_set_step, also where these refuse what they
+/// computed, until the next step.
 ///
 /// @param floats room in `out`: three times the nodes at least.
 #[unsafe(no_mangle)]

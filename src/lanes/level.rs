@@ -38,7 +38,7 @@ pub(crate) trait Kernel {
     fn run<R: Real>(self) -> Self::Output;
 }
 
-/// Whether the compiler makes vectors of [`Lanes`]: where it does not, they become as many times the code.
+/// Whether the compiler is taken to make vectors of [`Lanes`]: where it does not, they become as many times the code.
 const VECTORS: bool = cfg!(target_arch = "x86_64");
 
 /// All of them, the best first.

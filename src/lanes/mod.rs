@@ -1,8 +1,8 @@
 //! Numbers that are computed side by side: one generic body serves one element (`f32`) and `L`
 //! elements at once ([`Lanes`]).
 //!
-//! Element loops are written once over [`Real`]. The compiler turns the fixed-length loops of
-//! [`Lanes`] into vector instructions of whatever width the target has. Only [`Real::fused`] may fuse a multiplication
+//! Element loops are written once over [`Real`]. On x86-64 the compiler turns the fixed-length loops of
+//! [`Lanes`] into vector instructions; other processors without a register type here take numbers one by one. Only [`Real::fused`] may fuse a multiplication
 //! with an addition, and not with the feature `deterministic`: without it every width gives the same bits.
 
 #[cfg(target_arch = "x86_64")]
