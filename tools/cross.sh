@@ -44,7 +44,10 @@ install() {
     rm -r "$folder/debs"
     printf '#!/bin/sh\nLD_LIBRARY_PATH=%s exec %s "$@"\n' "$root/usr/lib/x86_64-linux-gnu:$root/usr/lib" \
         "$root/usr/bin/rustc" >"$folder/rustc"
-    chmod +x "$folder/rustc"
+    # cargo with it, which builds the parts of the standard library that it has only as source.
+    printf '#!/bin/sh\nRUSTC=%s RUSTC_BOOTSTRAP=1 LD_LIBRARY_PATH=%s exec cargo "$@"\n' "$folder/rustc" \
+        "$root/usr/lib/x86_64-linux-gnu" >"$folder/cargo"
+    chmod +x "$folder/rustc" "$folder/cargo"
     touch "$folder/installed"
 }
 
@@ -70,15 +73,12 @@ export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUSTFLAGS="-C link-arg=--sysroot=$
 emulator=$root/usr/bin/qemu-aarch64-static
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="$emulator -L $root/usr/aarch64-linux-gnu"
 
-# cargo with Debian's compiler, which builds the parts of the standard library that it has only as source.
-cross() { RUSTC=$folder/rustc RUSTC_BOOTSTRAP=1 LD_LIBRARY_PATH=$root/usr/lib/x86_64-linux-gnu cargo "$@"; }
-
 here=$folder/build
 targets=(--quiet --release --manifest-path tests/targets/Cargo.toml --target-dir "$here")
-step cross build "${targets[@]}" --target aarch64-unknown-linux-gnu
-step cross rustc "${targets[@]}" --target wasm32-unknown-unknown -Zbuild-std=core --lib --crate-type cdylib \
+step "$folder/cargo" build "${targets[@]}" --target aarch64-unknown-linux-gnu
+step "$folder/cargo" rustc "${targets[@]}" --target wasm32-unknown-unknown -Zbuild-std=core --lib --crate-type cdylib \
     --features panic-handler
-step cross build --quiet --release --manifest-path tests/targets/m4/Cargo.toml --target-dir "$here" \
+step "$folder/cargo" build --quiet --release --manifest-path tests/targets/m4/Cargo.toml --target-dir "$here" \
     --target thumbv7em-none-eabihf -Zbuild-std=core
 
 # compare WHICH COMMAND: says what a processor computes, and that it is what is kept, and all of it that matches WHICH.
@@ -106,5 +106,5 @@ plain=(--config 'profile.test.package."*".opt-level=0')
 for package in glam libm bytemuck; do
     plain+=(--config "profile.test.package.$package.opt-level=1")
 done
-step cross test "${plain[@]}" --quiet --no-default-features --features std --target-dir "$here" \
+step "$folder/cargo" test "${plain[@]}" --quiet --no-default-features --features std --target-dir "$here" \
     --target aarch64-unknown-linux-gnu --lib --test same_bits --test int8 --test elements --test patch

@@ -19,10 +19,9 @@ mkdir -p "$libraries"
 
 # thumb FEATURES LEVEL: the static library for the microcontroller, compiled by the compiler in FOLDER.
 thumb() {
-    CARGO_PROFILE_RELEASE_OPT_LEVEL=$2 RUSTC=$folder/rustc RUSTC_BOOTSTRAP=1 \
-        LD_LIBRARY_PATH=$folder/root/usr/lib/x86_64-linux-gnu \
-        cargo rustc --quiet --release --lib --no-default-features --features "$1,panic-handler" --crate-type staticlib \
-        --target thumbv7em-none-eabihf -Zbuild-std=core --target-dir "$libraries/build"
+    CARGO_PROFILE_RELEASE_OPT_LEVEL=$2 \
+        "$folder/cargo" rustc --quiet --release --lib --no-default-features --features "$1,panic-handler" \
+        --crate-type staticlib --target thumbv7em-none-eabihf -Zbuild-std=core --target-dir "$libraries/build"
     cp "$libraries/build/thumbv7em-none-eabihf/release/libsupple.a" "$libraries/thumb-$2-$1.a"
 }
 

@@ -10,7 +10,7 @@ use reference::tensor::{apply, contraction, determinant, from_fn, product, rotat
 use reference::{EXPONENT_CAP, J_MIN, Mat3, Random, Vec3};
 
 use super::bound::{Bound, MatrixSums};
-use crate::lanes::{NodeVector, Scatter, Waiting};
+use crate::lanes::{EIGHT, NodeVector, Scatter, Waiting};
 use crate::material::{Exponential, Law, Literal, Local, NeoHookean, Tissue};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::{ElementBlock, NodeInertia, Scene};
@@ -49,7 +49,7 @@ fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
     let rows = [0, 1, 2].map(|i| [0, 1, 2].map(|j| deformation.cofactor(i, j)));
     // The other lanes of the block have no volume.
     let mut waiting = [Waiting::NONE; 2];
-    for lane in 0..8 {
+    for lane in 0..EIGHT {
         sums.add(&bound, block, lane, &rows, &mut waiting);
     }
     let scalar = f64::from(bound.scalar);

@@ -38,7 +38,7 @@ pub(crate) use pair::Pair;
 pub use vectors::NodeVector;
 use vectors::transpose;
 pub(crate) use vectors::{
-    BlockNodes, Chosen, Following, Gather, Rows, Scatter, Waiting, axes, dot, write_rows,
+    BlockNodes, Chosen, EIGHT, Following, Gather, Rows, Scatter, Waiting, axes, dot, write_rows,
 };
 
 use core::ops::{Add, Mul, Neg, Sub};

@@ -231,7 +231,7 @@ impl<'a> Gather<'a> {
 }
 
 /// Lanes in whose order vectors of nodes are added to, however wide a vector is.
-const EIGHT: usize = 8;
+pub(crate) const EIGHT: usize = 8;
 
 /// Numbers one by one on their way to the nodes of `N` corners: they wait until there are those of eight elements.
 pub(crate) struct Waiting<const N: usize>([[[f32; 4]; EIGHT]; N]);

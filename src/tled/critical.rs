@@ -328,19 +328,14 @@ mod tests {
 
     use super::*;
     use crate::lanes::Lanes;
-    use crate::material::{NeoHookean, Tissue};
-    use crate::mesh::{Bar, Mesh, Winding};
-    use crate::scene::blocks_for;
+    use crate::material::NeoHookean;
+    use crate::mesh::Bar;
+    use crate::tled::test_scene::scene_of;
 
     #[test]
     fn numbers_one_by_one_give_the_bits_of_eight_side_by_side() {
-        let bar = Bar { size: [0.03, 0.02, 0.05], cells: [3, 2, 5] };
-        let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());
         let law = NeoHookean { c: 1_500.0, d: 60_000.0 };
-        let (nodes, blocks) =
-            (vec![NodeInertia::EMPTY; points.len()], vec![ElementBlock::EMPTY; blocks_for(tets.len())]);
-        let mut scene = Scene::over(Tissue { law, density: 1000.0 }, nodes, blocks);
-        scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &[]).unwrap();
+        let (points, scene) = scene_of(law, Bar { size: [0.03, 0.02, 0.05], cells: [3, 2, 5] });
         let found = [false, true].map(|one_by_one| {
             let bent = |&[x, y, z]: &[f32; 3]| NodeVector([0.9 * z * z, 0.2 * x - 0.1 * y, 4.0 * x * z, 0.0]);
             let mut displacement: Vec<_> = points.iter().map(bent).collect();

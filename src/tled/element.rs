@@ -7,7 +7,7 @@ use core::ops::Range;
 
 use super::Status;
 use crate::chains::{CORNERS, LONGEST};
-use crate::lanes::{BLOCK, BlockNodes, Gather, Pair, Real, Scatter, Waiting, dot, unrolled};
+use crate::lanes::{BLOCK, BlockNodes, EIGHT, Gather, Pair, Real, Scatter, Waiting, dot, unrolled};
 use crate::ledger::Ledger;
 use crate::material::{Invariants, J_FLOOR, Law, Laws, Local, response_operations};
 use crate::scene::ElementBlock;
@@ -209,9 +209,10 @@ impl<'a, R: Real> Part<'a, R> {
     }
 }
 
-/// Vectors of elements that go through the passes together; of numbers one by one, those of eight chains.
+/// Vectors of elements that go through the passes together; of numbers one by one, those of as many chains as wait for each
+/// other.
 const TOGETHER: usize = 8;
-const ONE_BY_ONE: usize = 8 * LONGEST;
+const TOGETHER_ONE_BY_ONE: usize = EIGHT * LONGEST;
 
 /// Adds the internal forces of elements to `force`, with minus sign; the blocks hold chains of that `length`
 /// ([`crate::chains`]), one element of each in every block. In three passes over a few vectors of elements: the law is a
@@ -226,14 +227,14 @@ pub(crate) fn add_forces<R: Real, L: Law>(
     extremes: &mut Extremes<Pair<R>>,
 ) {
     if R::COUNT == 1 {
-        add_together::<R, L, ONE_BY_ONE>(laws, blocks, displacement, force, beside, extremes);
+        add_together::<R, L, TOGETHER_ONE_BY_ONE>(laws, blocks, displacement, force, beside, extremes);
     } else {
         add_together::<R, L, TOGETHER>(laws, blocks, displacement, force, beside, extremes);
     }
 }
 
 #[inline(always)]
-fn add_together<R: Real, L: Law, const TOGETHER: usize>(
+fn add_together<R: Real, L: Law, const PARTS: usize>(
     laws: &Laws<'_, L>,
     (blocks, length): (&[ElementBlock], usize),
     displacement: Gather<'_>,
@@ -242,9 +243,9 @@ fn add_together<R: Real, L: Law, const TOGETHER: usize>(
     extremes: &mut Extremes<Pair<R>>,
 ) {
     let Some(first) = blocks.first() else { return };
-    let mut parts = [Part::<R>::nothing(first); TOGETHER];
+    let mut parts = [Part::<R>::nothing(first); PARTS];
     let chains = blocks.len().checked_div(length).unwrap_or(0) * (BLOCK / R::COUNT);
-    let most = if R::COUNT == 1 { 8 } else { TOGETHER.checked_div(length).unwrap_or(TOGETHER).max(1) };
+    let most = if R::COUNT == 1 { EIGHT } else { PARTS.checked_div(length).unwrap_or(PARTS).max(1) };
     for start in (0..chains).step_by(most) {
         let chains = start..chains.min(start + most);
         let count = length * chains.len();

@@ -16,6 +16,8 @@ mod entry;
 mod parts;
 #[cfg(feature = "std")]
 mod spectrum;
+#[cfg(test)]
+mod test_scene;
 
 pub use critical::{CriticalStep, critical_step};
 pub use energy::{ElementFields, element_fields};

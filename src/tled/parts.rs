@@ -192,9 +192,9 @@ mod tests {
 
     use super::*;
     use crate::lanes::Lanes;
-    use crate::material::{Exponential, Tissue};
-    use crate::mesh::{Bar, Mesh, Winding};
-    use crate::scene::blocks_for;
+    use crate::material::Exponential;
+    use crate::mesh::Bar;
+    use crate::tled::test_scene::scene_of;
 
     fn bits(vectors: &[NodeVector]) -> Vec<[u32; 4]> {
         vectors.iter().map(|vector| vector.0.map(f32::to_bits)).collect()
@@ -203,13 +203,8 @@ mod tests {
     /// The same sums in the same order, on chains of every length, and where a node's elements are of several threads.
     #[test]
     fn numbers_one_by_one_give_the_bits_of_eight_side_by_side() {
-        let bar = Bar { size: [0.05, 0.04, 0.2], cells: [7, 5, 28] };
-        let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());
         let law = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
-        let (nodes, blocks) =
-            (vec![NodeInertia::EMPTY; points.len()], vec![ElementBlock::EMPTY; blocks_for(tets.len())]);
-        let mut scene = Scene::over(Tissue { law, density: 1000.0 }, nodes, blocks);
-        scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &[]).unwrap();
+        let (points, scene) = scene_of(law, Bar { size: [0.05, 0.04, 0.2], cells: [7, 5, 28] });
         let bent: Vec<_> = points
             .iter()
             .map(|&[x, y, z]| NodeVector([0.3 * z * z + 0.1 * y, 0.2 * x - 0.1 * y, 0.4 * x * z, 0.0]))
