@@ -1,5 +1,5 @@
 //! The hot loops, for counting their instructions: `instructions LOOP TIMES` runs one of them so often. The difference
-//! between two numbers of times is the loop's alone. Counts do not depend on how busy the machine is, so that they can guard
+//! between two counts is the loop's alone. Counts do not depend on how busy the machine is, so that they can guard
 //! against a loop that has become slower (`tools/instructions.sh`).
 
 mod common {
@@ -12,34 +12,38 @@ use std::hint::black_box;
 use std::process::ExitCode;
 
 use common::bar::{self, DAMPING, DT, EXPONENTIAL, moved};
-use common::scaled::{DAMPED_LATTICE, LATTICE, scaled};
+use common::scaled::{damped, multilevel, scaled};
 use common::vertices::{ROWS, vertices};
-use supple::lanes::Level;
+use supple::element::ElementLaw;
+use supple::inertia::Method;
+use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::Loads;
-use supple::material::{Law, NeoHookean};
+use supple::material::NeoHookean;
 use supple::mlp::{Network, WeightBytes};
-use supple::surrogate::{self, Surrogate, Vertex};
-use supple::tled::{self, Step};
+use supple::simd::Level;
+use supple::state::{NodeVector, VecState};
+use supple::step::Step;
+use supple::tled;
 
 const COMPACT: &[u8] = include_bytes!("../weights/compact-10.weights");
-/// Small, with layers of eight bits.
+/// Small, with int8 layers.
 const INT8: &[u8] = include_bytes!("../tests/data/golden-v3.weights");
 
-fn exact<L: Law>(law: L, times: u32) {
+fn exact<L: ElementLaw>(law: L, times: u32) {
     let scene = bar::scene(law);
     let forces = bar::forces();
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
-    let mut state = bar::state(scene.node_count());
-    let step = Step::insist(DT, DAMPING).expect("a positive step");
+    let mut state = VecState::at_rest(scene.node_count());
+    let step = Step::unchecked(DT, DAMPING).expect("a positive step");
     (0..times).for_each(|_| moved(tled::step(&scene, &loads, &mut state, &step)));
 }
 
-/// A whole cycle of refreshes each time.
-fn large(cells: [u32; 3], damped: bool, times: u32) {
+/// A whole refresh cycle each time.
+fn large(method: Method<'static>, times: u32) {
     const CYCLE: u32 = 64;
     let (points, forces, scene) = (bar::points(), bar::forces(), bar::scene(EXPONENTIAL));
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
-    let mut run = scaled(&scene, &loads, &points, 20.0, (cells, damped), CYCLE);
+    let mut run = scaled(&scene, &loads, &points, 20.0, method, CYCLE);
     (0..CYCLE * times).for_each(|_| run());
 }
 
@@ -56,9 +60,14 @@ fn learned(times: u32) {
     let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
     let (scene, forces) = (bar::scene(EXPONENTIAL), bar::forces());
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
-    let (mut state, vertices) = (bar::state(scene.node_count()), vec![Vertex::NEW; scene.node_count()]);
-    let mut surrogate = Surrogate::over(network, vertices).expect("a network of the learned step");
-    (0..times).for_each(|_| moved(surrogate::step(&scene, &loads, &mut state, &mut surrogate)));
+    let nodes = scene.node_count();
+    let (mut state, storage) = (VecState::at_rest(nodes), vec![NodeVector::ZERO; vectors_for(nodes, false)]);
+    let mut learned = LearnedStep::new(network, false, storage).expect("a network of the learned step");
+    let exact = Step::unchecked(DT, DAMPING).expect("a positive step");
+    for _ in 0..times {
+        let status = learned.step(scene.view(), &loads, state.view(), &exact);
+        moved(status.expect("it goes on from rest"));
+    }
 }
 
 fn main() -> ExitCode {
@@ -73,15 +82,15 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     };
     let Ok(times) = times.parse() else {
-        eprintln!("{times} is not a number of times");
+        eprintln!("{times} is not a count");
         return ExitCode::FAILURE;
     };
     match name.as_str() {
         "exponential" => exact(EXPONENTIAL, times),
         "neo-hookean" => exact(NeoHookean { c: 500.0, d: 15_000.0 }, times),
-        "mass-scaled" => large([0; 3], false, times),
-        "multilevel" => large(LATTICE, false, times),
-        "damped" => large(DAMPED_LATTICE, true, times),
+        "mass-scaled" => large(Method::MassScaled, times),
+        "multilevel" => large(multilevel(), times),
+        "damped" => large(damped(), times),
         "compact" => forward(COMPACT, times),
         "int8" => forward(INT8, times),
         "learned" => learned(times),

@@ -1,4 +1,4 @@
-//! Time of a step beyond the limit of stability on the paper's bar, beside the exact one.
+//! Time of mass-scaled, multilevel and damped steps on the paper's bar, compared with the exact one.
 //!
 //! `cargo bench --bench large_step` prints criterion's figures, then ratios from interleaved pairs of runs (the
 //! machine's speed drifts; the ratio does not) and what the steps of a refresh cycle cost against their mean.
@@ -9,21 +9,24 @@ mod common {
     pub(crate) mod scaled;
 }
 
-use common::bar::{self, DAMPING, DT, moved, state};
+use common::bar::{self, DAMPING, DT, moved};
 use common::pairs::{median, seconds};
-use common::scaled::{DAMPED_LATTICE, LATTICE, scaled};
+use common::scaled::{damped, multilevel, scaled};
 use criterion::{BenchmarkId, Criterion, Throughput};
+use supple::inertia::Method;
 use supple::loads::Loads;
-use supple::tled::{self, Step};
+use supple::state::VecState;
+use supple::step::Step;
+use supple::tled;
 
-/// How many times longer than the exact one the steps of the scaled methods are, with the steps of their refresh cycles.
+/// How many times longer than the exact one the steps are, with the steps of their refresh cycles.
 const MULTIPLE: f32 = 20.0;
 const CYCLE: u32 = 64;
 const LONGEST: f32 = 100.0;
 const SHORT_CYCLE: u32 = 16;
 const PAIRS: usize = 41;
 
-/// Median time of each step of a cycle over their mean; the first is the step that the cycle stands at.
+/// Median time of each step of a cycle over their mean, from the current step of the cycle on.
 fn phases(run: &mut impl FnMut()) -> Vec<f64> {
     let mut times = vec![Vec::new(); CYCLE as usize];
     for _ in 0..PAIRS {
@@ -42,18 +45,18 @@ fn main() {
     let scene = bar::scene(bar::EXPONENTIAL);
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
 
-    let mut exact_state = state(points.len());
+    let mut exact_state = VecState::at_rest(points.len());
     let critical = tled::critical_step(&scene, &mut exact_state).expect("the bar has a critical step");
     let small = Step::new(DT, DAMPING, critical).expect("dt is below the critical step");
     let mut exact = || moved(tled::step(&scene, &loads, &mut exact_state, &small));
     (0..8_000).for_each(|_| exact());
-    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, ([0; 3], false), CYCLE);
-    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, (LATTICE, false), CYCLE);
-    let mut damped = scaled(&scene, &loads, &points, MULTIPLE, (DAMPED_LATTICE, true), CYCLE);
-    let mut longest = scaled(&scene, &loads, &points, LONGEST, (LATTICE, false), SHORT_CYCLE);
-    let mut longest_damped = scaled(&scene, &loads, &points, LONGEST, (DAMPED_LATTICE, true), SHORT_CYCLE);
+    let mut longest = scaled(&scene, &loads, &points, LONGEST, multilevel(), SHORT_CYCLE);
+    let mut longest_damped = scaled(&scene, &loads, &points, LONGEST, damped(), SHORT_CYCLE);
+    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, Method::MassScaled, CYCLE);
+    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, multilevel(), CYCLE);
+    let mut damped = scaled(&scene, &loads, &points, MULTIPLE, damped(), CYCLE);
 
-    let mut group = criterion.benchmark_group("large step");
+    let mut group = criterion.benchmark_group("beyond the critical step");
     group.throughput(Throughput::Elements(scene.element_count() as u64));
     group.bench_function(BenchmarkId::from_parameter("exact"), |b| b.iter(&mut exact));
     group.bench_function(BenchmarkId::from_parameter("mass-scaled"), |b| b.iter(&mut mass_scaled));

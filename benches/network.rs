@@ -1,4 +1,4 @@
-//! Time of networks: their forward pass at the paper's bar's 1,458 vertices, and learned steps with them beside the exact one.
+//! Time of networks: their forward pass at the paper's bar's 1,458 vertices, and learned steps with them compared with the exact one.
 //!
 //! `cargo bench --bench network` prints criterion's figures, then times from interleaved runs and shares of the machine's
 //! measured peak.
@@ -16,10 +16,12 @@ use common::peak;
 use common::vertices::{ROWS, vertices};
 use criterion::{BenchmarkId, Criterion, Throughput};
 use std::hint::black_box;
+use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::Loads;
 use supple::mlp::{Description, LayerDescription, Network, WeightBytes, write};
-use supple::surrogate::{self, Surrogate, Vertex};
-use supple::tled::{self, Step};
+use supple::state::{NodeVector, VecState};
+use supple::step::Step;
+use supple::tled;
 
 const ROUNDS: usize = 41;
 
@@ -28,7 +30,7 @@ const PAPER_INT8: &[u8] = include_bytes!("../weights/paper-10-i8.weights");
 const COMPACT: &[u8] = include_bytes!("../weights/compact-10.weights");
 const COMPACT_INT8: &[u8] = include_bytes!("../weights/compact-10-i8.weights");
 
-/// A network of one small layer that predicts nothing: what a learned step costs beside its network.
+/// A network of one small layer that predicts zero: what a learned step costs besides its network.
 fn nothing(like: &Network<'_>) -> WeightBytes {
     let layer = LayerDescription {
         inputs: like.inputs().len(),
@@ -79,8 +81,8 @@ fn steps(criterion: &mut Criterion) {
     let scene = bar::scene(bar::EXPONENTIAL);
     let (forces, nodes) = (bar::forces(), scene.node_count());
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
-    let mut exact_state = bar::state(nodes);
-    let exact_step = Step::insist(DT, DAMPING).expect("a positive step");
+    let mut exact_state = VecState::at_rest(nodes);
+    let exact_step = Step::unchecked(DT, DAMPING).expect("a positive step");
     let mut exact = || bar::moved(tled::step(&scene, &loads, &mut exact_state, &exact_step));
     (0..10_000).for_each(|_| exact());
 
@@ -90,11 +92,15 @@ fn steps(criterion: &mut Criterion) {
         [("no network", &empty), ("compact", &compact), ("paper", &paper), ("compact int8", &compact_int8)]
             .map(|(name, bytes)| {
                 let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
-                let mut surrogate = Surrogate::over(network, vec![Vertex::NEW; nodes])
-                    .expect("a network of the learned step");
-                let mut state = bar::state(nodes);
-                let (scene, loads) = (&scene, &loads);
-                let run = move || bar::moved(surrogate::step(scene, loads, &mut state, &mut surrogate));
+                let storage = vec![NodeVector::ZERO; vectors_for(nodes, false)];
+                let mut learned =
+                    LearnedStep::new(network, false, storage).expect("a network of the learned step");
+                let mut state = VecState::at_rest(nodes);
+                let (scene, loads, exact) = (&scene, &loads, &exact_step);
+                let run = move || {
+                    let status = learned.step(scene.view(), loads, state.view(), exact);
+                    bar::moved(status.expect("it goes on from rest"));
+                };
                 (name, run)
             });
     let mut group = criterion.benchmark_group("learned step");

@@ -94,8 +94,8 @@ def microseconds(run, rows, calls=30):
 def ours(program):
     """Medians that the bench prints, us."""
     text = subprocess.run([program, "--bench", "none"], check=True, capture_output=True, text=True).stdout
-    found = re.findall(r"^(paper|compact)( int8)?: ([0-9.]+) us", text, re.MULTILINE)
-    return {(name, bool(quantised)): float(time) for name, quantised, time in found}
+    medians = re.findall(r"^(paper|compact)( int8)?: ([0-9.]+) us", text, re.MULTILINE)
+    return {(name, bool(quantised)): float(time) for name, quantised, time in medians}
 
 
 def main():

@@ -11,11 +11,14 @@ mod common {
 
 use common::bar::{self, DAMPING, DT};
 use common::pairs::{median, seconds};
-use common::scaled::{DAMPED_LATTICE, LATTICE, scaled};
+use common::scaled::{damped, multilevel, scaled};
+use supple::inertia::Method;
+use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::Loads;
 use supple::mlp::{Network, WeightBytes};
-use supple::surrogate::{self, Surrogate, Vertex};
-use supple::tled::{self, Step};
+use supple::state::{NodeVector, VecState};
+use supple::step::Step;
+use supple::tled;
 
 const MULTIPLE: f32 = 20.0;
 const CYCLE: u32 = 64;
@@ -28,16 +31,12 @@ fn main() {
     let (points, forces) = (bar::points(), bar::forces());
     let scene = bar::scene(bar::EXPONENTIAL);
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
-    // The exact step leads for 0.3 s, as in the paper; the networks go on from there.
-    let mut state = bar::state(points.len());
-    let step = Step::insist(DT, DAMPING).expect("a positive step");
+    // After 0.3 s of exact steps, the lead-in of the paper, from which the networks go on.
+    let mut state = VecState::at_rest(points.len());
+    let step = Step::unchecked(DT, DAMPING).expect("a positive step");
     let steps = (1.0 / DT) as u32;
     let long = (1.0 / (MULTIPLE * DT)) as u32;
-    let mut before = Vec::new();
-    for left in (0..10_000).rev() {
-        if left == MULTIPLE as u32 - 1 {
-            before = state.displacements().to_vec();
-        }
+    for _ in 0..10_000 {
         bar::moved(tled::step(&scene, &loads, &mut state, &step));
     }
     let [compact, compact_int8, paper, paper_int8]: [&'static WeightBytes; 4] = [
@@ -49,24 +48,26 @@ fn main() {
     .map(|bytes| &*Box::leak(Box::new(WeightBytes::of(bytes))));
     let learned = |bytes: &'static WeightBytes| {
         let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
-        let mut surrogate =
-            Surrogate::over(network, vec![Vertex::NEW; points.len()]).expect("a network of the learned step");
-        let mut start = state.clone();
-        start.span(&before, MULTIPLE * DT);
-        let (scene, loads) = (&scene, &loads);
+        let storage = vec![NodeVector::ZERO; vectors_for(points.len(), false)];
+        let mut learned = LearnedStep::new(network, false, storage).expect("a network of the learned step");
+        let (scene, loads, exact, mut start) = (&scene, &loads, &step, VecState::at_rest(points.len()));
+        let status = learned.lead(scene.view(), loads, start.view(), (exact, 0.3));
+        bar::moved(status.expect("the exact step fits the network's"));
         move || {
-            let mut state = start.clone();
-            surrogate.reset();
-            (0..long).for_each(|_| bar::moved(surrogate::step(scene, loads, &mut state, &mut surrogate)));
+            let (mut state, mut learned) = (start.clone(), learned.clone());
+            for _ in 0..long {
+                let status = learned.step(scene.view(), loads, state.view(), exact);
+                bar::moved(status.expect("it goes on from the lead-in"));
+            }
         }
     };
-    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, ([0; 3], false), CYCLE);
-    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, (LATTICE, false), CYCLE);
-    let mut damped = scaled(&scene, &loads, &points, MULTIPLE, (DAMPED_LATTICE, true), CYCLE);
+    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, Method::MassScaled, CYCLE);
+    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, multilevel(), CYCLE);
+    let mut damped = scaled(&scene, &loads, &points, MULTIPLE, damped(), CYCLE);
     let mut others: [(&str, Second<'_>); 7] = [
         ("mass-scaled", Box::new(|| (0..long).for_each(|_| mass_scaled()))),
         ("multilevel", Box::new(|| (0..long).for_each(|_| multilevel()))),
-        ("damped (`best`)", Box::new(|| (0..long).for_each(|_| damped()))),
+        ("damped", Box::new(|| (0..long).for_each(|_| damped()))),
         ("compact network", Box::new(learned(compact))),
         ("compact network, int8", Box::new(learned(compact_int8))),
         ("paper's network", Box::new(learned(paper))),
@@ -77,20 +78,20 @@ fn main() {
         || (0..steps).for_each(|_| bar::moved(tled::step(&scene, &loads, &mut exact_state, &step)));
 
     let mut times = Vec::new();
-    let mut found = vec![(Vec::new(), Vec::new()); others.len()];
+    let mut results = vec![(Vec::new(), Vec::new()); others.len()];
     for _ in 0..ROUNDS {
         // The exact step before and after the others: the machine's speed drifts.
         let first = seconds(&mut exact);
         let others: Vec<f64> = others.iter_mut().map(|(_, run)| seconds(run)).collect();
         let time = 0.5 * (first + seconds(&mut exact));
         times.push(time);
-        for (found, other) in found.iter_mut().zip(others) {
-            found.0.push(other);
-            found.1.push(time / other);
+        for (result, other) in results.iter_mut().zip(others) {
+            result.0.push(other);
+            result.1.push(time / other);
         }
     }
     println!("one second, exact: {:.2} s in {steps} steps", median(times));
-    for ((name, _), (times, ratios)) in others.iter().zip(found) {
+    for ((name, _), (times, ratios)) in others.iter().zip(results) {
         println!("{name}: {:.3} s in {long} steps, {:.1} times faster", median(times), median(ratios));
     }
 }

@@ -1,5 +1,5 @@
-//! Time of an exact step from 6.5 thousand tetrahedra to a million, on one thread and on two, and with nodes numbered in order,
-//! as if by chance, and anew ([`supple::numbering`]).
+//! Time of an exact step from 6.5 thousand tetrahedra to a million, on one thread and on two, and with nodes in order,
+//! shuffled, and renumbered ([`supple::mesh::renumber`]).
 //!
 //! `cargo bench --bench size --features parallel` prints medians, and the least time in brackets, of runs in turn. It has no
 //! criterion group: a body of that size takes seconds to prepare.
@@ -16,9 +16,8 @@ use common::bent::Bent;
 use common::pairs::{median, seconds};
 use supple::loads::Loads;
 use supple::material::Exponential;
-use supple::mesh::Bar;
-use supple::numbering::renumber;
-use supple::threads::Rayon;
+use supple::mesh::{Bar, renumber};
+use supple::step::Rayon;
 use supple::tled;
 
 const SIZES: [[u32; 3]; 5] = [[8, 8, 17], [16, 16, 32], [20, 20, 42], [32, 32, 64], [44, 44, 88]];
@@ -44,13 +43,13 @@ impl Body {
             state ^= state << 17;
             (state % count as u64) as usize
         };
-        let mut numbers: Vec<u32> = (0..self.points.len() as u32).collect();
-        (1..numbers.len()).rev().for_each(|last| numbers.swap(last, below(last + 1)));
+        let mut new_nodes: Vec<u32> = (0..self.points.len() as u32).collect();
+        (1..new_nodes.len()).rev().for_each(|last| new_nodes.swap(last, below(last + 1)));
         let mut points = self.points.clone();
-        for (point, &number) in self.points.iter().zip(&numbers) {
-            points[number as usize] = *point;
+        for (point, &node) in self.points.iter().zip(&new_nodes) {
+            points[node as usize] = *point;
         }
-        let mut tets: Vec<_> = self.tets.iter().map(|tet| tet.map(|node| numbers[node as usize])).collect();
+        let mut tets: Vec<_> = self.tets.iter().map(|tet| tet.map(|node| new_nodes[node as usize])).collect();
         (1..tets.len()).rev().for_each(|last| tets.swap(last, below(last + 1)));
         Self { points, tets }
     }
@@ -74,14 +73,14 @@ impl Run {
         Self { body: Bent::new(bar::EXPONENTIAL, points, tets), steps }
     }
 
-    /// Seconds for a step.
+    /// Seconds of a step.
     fn time(&mut self, parts: usize) -> f64 {
         let loads = Loads::NONE;
         let time = seconds(|| {
             for _ in 0..self.steps {
                 let threads = Rayon { parts };
                 let Bent { scene, state, step } = &mut self.body;
-                bar::moved(tled::step_in_parts(scene, &loads, state, step, &threads));
+                bar::moved(tled::step_in_parts(scene.view(), &loads, state.view(), step, &threads));
             }
         });
         time / self.steps as f64
@@ -110,8 +109,8 @@ fn main() {
             for _ in 0..ROUNDS {
                 let [one, two] = [1, 2].map(|parts| in_order.time(parts));
                 ratios.push(one / two);
-                let found = [one, shuffled_run.time(1), renumbered.time(1), two];
-                times.iter_mut().zip(found).for_each(|(times, time)| times.push(time));
+                let round = [one, shuffled_run.time(1), renumbered.time(1), two];
+                times.iter_mut().zip(round).for_each(|(times, time)| times.push(time));
             }
         });
         let [in_order, shuffled, renumbered, two] = times.map(|times| both(&times, unit));

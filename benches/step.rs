@@ -1,4 +1,4 @@
-//! Time of an exact step on the paper's bar, beside the same step in plain scalar code.
+//! Time of an exact step on the paper's bar, compared with the same step in plain scalar code.
 //!
 //! `cargo bench --bench step` prints criterion's figures, then ratios from interleaved pairs of runs (the
 //! machine's speed drifts; the ratio does not) and the share of the machine's measured peak.
@@ -10,27 +10,30 @@ mod common {
     pub(crate) mod plain;
 }
 
-use common::bar::{self, BarScene, DAMPING, DENSITY, DT, HELD, HostState};
+use common::bar::{self, BarScene, DAMPING, DENSITY, DT, HELD};
 use common::pairs::{median, seconds};
 use common::plain::{self, Plain};
 use criterion::{BenchmarkId, Criterion, Throughput};
-use supple::lanes::Level;
+use supple::element::ElementLaw;
 use supple::loads::{Loads, NodalForce};
-use supple::material::{Law, NeoHookean};
+use supple::material::NeoHookean;
 use supple::mesh::{Bar, Mesh, Winding};
-use supple::tled::{self, Step};
+use supple::simd::Level;
+use supple::state::VecState;
+use supple::step::Step;
+use supple::tled;
 
 struct Ours<L> {
     scene: BarScene<L>,
-    state: HostState,
+    state: VecState,
     forces: [NodalForce; 4],
     step: Step,
 }
 
-impl<L: Law> Ours<L> {
+impl<L: ElementLaw> Ours<L> {
     fn new(law: L) -> Self {
         let scene = bar::scene(law);
-        let mut state = bar::state(scene.node_count());
+        let mut state = VecState::at_rest(scene.node_count());
         let critical = tled::critical_step(&scene, &mut state).expect("the bar has a critical step");
         let step = Step::new(DT, DAMPING, critical).expect("dt is below the critical step");
         Self { scene, state, forces: bar::forces(), step }
@@ -55,7 +58,7 @@ fn pairs(mut plain: impl FnMut(), mut ours: impl FnMut(), steps: usize) -> (f64,
     )
 }
 
-fn compare<L: Law>(criterion: &mut Criterion, name: &str, law: L, plain_law: plain::Law) {
+fn compare<L: ElementLaw>(criterion: &mut Criterion, name: &str, law: L, plain_law: plain::Law) {
     let bar = Bar::PAPER;
     let points: Vec<_> = bar.points().collect();
     let tets: Vec<_> = bar.tets().collect();
@@ -83,14 +86,14 @@ fn compare<L: Law>(criterion: &mut Criterion, name: &str, law: L, plain_law: pla
 
     let (ratio, plain_s, ours_s) =
         pairs(|| (0..50).for_each(|_| plain.step(DT, DAMPING, 1.0)), || ours.run(50), 50);
-    let best = Level::current();
+    let before = Level::current();
     assert!(Level::force(Level::Portable), "every processor has it");
     let (portable_ratio, _, portable_s) =
         pairs(|| (0..50).for_each(|_| plain.step(DT, DAMPING, 1.0)), || ours.run(50), 50);
-    assert!(Level::force(best), "it had it before");
+    assert!(Level::force(before), "it had it before");
     let (widest, baseline) = (common::peak::widest(50), common::peak::baseline(50));
     let per_tet = |seconds: f64| seconds * 1e9 / tets.len() as f64;
-    let speed = tled::operations(&ours.scene) as f64 / ours_s * 1e-9;
+    let speed = tled::operations(ours.scene.view()) as f64 / ours_s * 1e-9;
     println!(
         "{name}: plain {:.1} ns/tet, supple {:.1} ns/tet = {:.0} us a step, {ratio:.2} times faster; \
          {speed:.1} GFLOP/s = {:.0} % of the {widest:.0} GFLOP/s peak ({:.0} % of {baseline:.0} without AVX); portable \

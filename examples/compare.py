@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Moves the paper's bar through the C interface, from Python, and through the command, and compares the two.
+"""Moves the paper's bar through the C API, from Python, and through the command, and compares the two.
 
     python3 examples/compare.py target/release/libsupple.so target/release/supple
 
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-ABI, ALIGN, EXPONENTIAL, CHECKED = 1, 64, 1, 0  # SUPPLE_... in include/supple.h
+ABI, ALIGN, EXPONENTIAL, CHECKED = 2, 64, 1, 0  # SUPPLE_... in include/supple.h
 SIZE, CELLS = np.array([0.05, 0.05, 0.1]), (8, 8, 17)  # m
 LAW, DENSITY, DAMPING = (59.0, 8.023, 60000.0), 1000.0, 20.0  # a Pa, b, d Pa; kg/m^3; 1/s
 FORCE, PULL, RAMP = 0.3, 0.005, 0.2  # N, m, s
@@ -29,7 +29,7 @@ class Support(Structure):
 
 
 class Tissue(Structure):
-    _fields_ = [("constants", c_float * 3), ("density", c_float)]
+    _fields_ = [("constants", c_float * 4), ("density", c_float)]
 
 
 class SceneConfig(Structure):

@@ -1,5 +1,6 @@
-// Reads what the examples need of a Gmsh 2.2 ASCII mesh: nodes, and tetrahedra (elements of type 4); others are
-// left out. Nodes must be numbered from 1 in order.
+// Reads what the examples need of a Gmsh mesh, in version 2.2 as text: nodes, and tetrahedra (elements of type 4); others
+// are left out. Nodes must have the numbers 1, 2, 3 and so on. Not read: versions 1 and 4.1 and anything binary, which the command
+// supple reads; Gmsh turns them into this one with `gmsh IN.msh -save -format msh22 -o OUT.msh`.
 #pragma once
 
 #include <cstdint>
@@ -28,10 +29,11 @@ inline mesh read(const std::string &path) {
     };
     const auto next = [&] { return line++, static_cast<bool>(std::getline(file, text)); };
     mesh read;
+    if (!next() || text.rfind("$MeshFormat", 0) != 0 || !next() || text.rfind("2.2 0", 0) != 0)
+        throw problem("not a Gmsh 2.2 file in text; versions 1 and 4.1 and binary files are not read here: "
+                      "turn them into it with `gmsh IN.msh -save -format msh22 -o OUT.msh`");
     while (next()) {
         const bool nodes = text.rfind("$Nodes", 0) == 0, elements = text.rfind("$Elements", 0) == 0;
-        if (text.rfind("$MeshFormat", 0) == 0 && next() && text.rfind("2.2 0", 0) != 0)
-            throw problem("format '" + text + "', not Gmsh 2.2 ASCII");
         if (!nodes && !elements) continue;
         next();
         const unsigned long count = std::strtoul(text.c_str(), nullptr, 10);

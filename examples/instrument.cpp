@@ -7,8 +7,9 @@
 //                  [--realtime] [--jitter N]
 //
 // Run from the repository it finds meshes/lobe.msh and weights/damper.weights itself. --out leaves frames for
-// ParaView, ten a second. --realtime waits for the clock between frames. --jitter N then times N single steps, beside
-// fixed work of the same length: what that varies by is the machine.
+// ParaView, ten a second. --realtime waits for the clock between frames. --jitter N then times N single steps, and after
+// each a fixed piece of work of the same length: what that varies by is the machine. A mesh of your own must be a
+// Gmsh 2.2 file in text (gmsh.hpp).
 #include <array>
 #include <algorithm>
 #include <chrono>
@@ -40,8 +41,8 @@ constexpr float DAMPING = 20.0f;                  // 1/s
 constexpr float BACK = 0.030f;                    // nodes behind this plane hang on the diaphragm, m
 constexpr float CONTACT = 0.012f, CAP = 0.004f;   // nodes touched: so near to the top, and so little below it, m
 constexpr unsigned LARGE_STEPS = 4;               // a frame: each some 20 critical steps
-// Of the critical step at rest. Tissue that is deformed is stiffer: on this path its limit falls to 0.53. To ask
-// for it costs as much as a hundred steps, too much for a frame.
+// Of the critical step at rest. Tissue that is deformed is stiffer: on this path its limit falls to 0.53. To ask for it
+// again would take as long as some six steps in each frame.
 constexpr float EXACT_SHARE = 0.5f;
 constexpr int FRAMES_A_PICTURE = 6;
 
@@ -63,11 +64,11 @@ options read_options(int count, char **words) {
         const std::string value = words[++at];
         const auto number = [&](long least) {
             char *end = nullptr;
-            const long found = std::strtol(value.c_str(), &end, 10);
-            if (*end != '\0' || found < least)
+            const long whole = std::strtol(value.c_str(), &end, 10);
+            if (*end != '\0' || whole < least)
                 throw std::runtime_error(word + " " + value + ": not a number of at least " +
                                          std::to_string(least));
-            return found;
+            return whole;
         };
         if (word == "--mesh") chosen.mesh = value;
         else if (word == "--weights") chosen.weights = value;
@@ -181,8 +182,9 @@ struct host {
             wanted.method = supple::method::damped;
             wanted.weights = weights;
         }
-        large_room = room(made("large steps", supple::large::size(scene, points, wanted)));
-        large = made("large steps", supple::large::make(large_room, scene, state, points, wanted));
+        const char *method = chosen.method.c_str();
+        large_room = room(made(method, supple::large::size(scene, points, wanted)));
+        large = made(method, supple::large::make(large_room, scene, state, points, wanted));
     }
 
     std::size_t bytes() const {
@@ -233,7 +235,7 @@ double additions(long count) {
     return sum;
 }
 
-// Single steps, and as much fixed work after each.
+// Single steps, each followed by as much fixed work.
 void measure_jitter(host &host, long count) {
     const auto microseconds = [](clock_type::time_point since) { return 1000.0 * milliseconds(clock_type::now() - since); };
     jitter steps, work;

@@ -1,6 +1,6 @@
 /* The exact step and the learned one on a liver lobe that leans over under a sixteenth of its weight, in C11, with
- * static memory only: mesh and weights are in the program, nothing comes from a heap. The exact step leads for
- * 0.3 s; then a network moves one state, the exact step another beside it.
+ * static memory only: mesh and weights are in the program, nothing comes from a heap. After a lead-in of 0.3 s a
+ * network moves one state; the exact step moves another, to compare with.
  *
  *     tools/mesh_to_c.py meshes/lobe.msh lobe_mesh.h
  *     tools/mesh_to_c.py --bytes weights/compact-10.weights compact compact.h
@@ -17,7 +17,7 @@ enum {
     NODES = LOBE_NODES,
     EXACT = 3,   /* exact steps in a learned one */
     TICK = 20,   /* learned steps between two looks */
-    LEAD = 50,   /* ticks that the exact step leads: 0.3 s, as in the paper */
+    LEAD_IN = 50, /* ticks of the lead-in: 0.3 s, as in the paper */
     TICKS = 170, /* in all: 1.02 s */
     SHOWN = 15   /* every so many ticks a line */
 };
@@ -86,9 +86,9 @@ int main(void) {
     printf("bytes: scene %zu, loads %zu, each state %zu, learned %zu, weights %zu\n", sizeof scene_memory,
            sizeof loads_memory, sizeof exact_memory, sizeof learned_memory, sizeof compact);
     printf("time s  exact mm  learned mm  apart mm  mean apart mm  clipped %%  outside %%  learned step\n");
-    supple_vectors truth, found;
+    supple_vectors truth, predicted;
     if (!done("displacements", supple_displacements(exact, &truth)) ||
-        !done("displacements", supple_displacements(moved, &found)))
+        !done("displacements", supple_displacements(moved, &predicted)))
         return 1;
     for (int tick = 1; tick <= TICKS; tick++) {
         /* Gravity has no ramp of its own: it is raised here. */
@@ -99,19 +99,19 @@ int main(void) {
             !done("exact", supple_step(scene, loads, exact, TICK * EXACT, NULL, NULL)))
             return 1;
         const supple_status status =
-            tick <= LEAD ? supple_learned_lead(scene, loads, moved, learned, TICK, NULL, &report)
-                         : supple_learned_step(scene, loads, moved, learned, TICK, NULL, &report);
+            tick <= LEAD_IN ? supple_learned_lead(scene, loads, moved, learned, TICK * (double)facts.seconds, NULL, &report)
+                            : supple_learned_step(scene, loads, moved, learned, TICK, NULL, &report);
         if (!done("learned", status)) return 1;
-        if (tick % SHOWN != 0 && tick != LEAD && tick != TICKS) continue;
+        if (tick % SHOWN != 0 && tick != LEAD_IN && tick != TICKS) continue;
         const float rest[3] = {0.0f, 0.0f, 0.0f};
         double apart = 0.0;
         for (uint32_t node = 0; node < NODES; node++)
-            apart += distance(at(truth, node), at(found, node)) / NODES;
+            apart += distance(at(truth, node), at(predicted, node)) / NODES;
         printf("%6.3f  %8.3f  %10.3f  %8.3f  %13.4f  %9.2f  %9.2f  %s\n", report.time,
-               1e3 * distance(at(truth, tip), rest), 1e3 * distance(at(found, tip), rest),
-               1e3 * distance(at(truth, tip), at(found, tip)), 1e3 * apart, 100.0 * (double)report.clipped,
+               1e3 * distance(at(truth, tip), rest), 1e3 * distance(at(predicted, tip), rest),
+               1e3 * distance(at(truth, tip), at(predicted, tip)), 1e3 * apart, 100.0 * (double)report.clipped,
                100.0 * (double)report.outside,
-               tick <= LEAD ? "led by the exact one" : supple_status_text(status));
+               tick <= LEAD_IN ? "lead-in" : supple_status_text(status));
     }
     return 0;
 }

@@ -41,7 +41,7 @@ inline void write(const std::string &path, const std::vector<float> &points, con
 
 struct frame {
     double seconds;
-    std::string file; // beside the list
+    std::string file; // in the folder of the list
 };
 
 inline void write_list(const std::string &path, const std::vector<frame> &frames) {

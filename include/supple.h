@@ -1,7 +1,7 @@
 #ifndef SUPPLE_H
 #define SUPPLE_H
 
-/* Made by cbindgen from src/capi.rs: do not change it here. */
+/* Made by tools/header.sh from src/capi and the list of laws: do not change it here. */
 
 #include <stddef.h>
 #include <stdint.h>
@@ -12,7 +12,7 @@
  * the memory to the function that prepares the object, use the pointer it gives back. Nothing is allocated,
  * nothing needs to be released. Units are SI: m, kg, s, N, Pa, J. Nodes and elements count from zero.
  *
- * Every function checks its pointers and numbers before it changes anything and tells by its status. A
+ * Every function checks its pointers and values before it changes anything and tells by its status. A
  * pointer to an object must be NULL or lead to memory that belongs to the host; what it finds there tells
  * whether it is such an object.
  *
@@ -30,45 +30,32 @@
 /* What every configuration begins with: supple_step_config step = {SUPPLE_CONFIG(supple_step_config), 1e-4f, 0.0f}; */
 #define SUPPLE_CONFIG(type) (uint32_t)sizeof(type), SUPPLE_ABI
 
-/* Sizes as constant expressions, equal to those that the functions give. */
-#define SUPPLE_SCENE_SIZE(nodes, elements, tissues)                                                                    \
-    (SUPPLE_SCENE_FRONT + SUPPLE_ROUNDED_(16 * (size_t)(nodes)) + 1024 * SUPPLE_BLOCKS_((size_t)(elements)) +          \
-     SUPPLE_ROUNDED_(16 * (size_t)(tissues)) + ((tissues) > 1 ? SUPPLE_ROUNDED_(2 * (size_t)(elements)) : 0))
-#define SUPPLE_STATE_SIZE(nodes) (SUPPLE_STATE_FRONT + 3 * SUPPLE_ROUNDED_(16 * (size_t)(nodes)))
-#define SUPPLE_LOADS_SIZE(forces, motions)                                                                             \
-    (SUPPLE_LOADS_FRONT + SUPPLE_ROUNDED_(20 * (size_t)(forces)) + 2 * SUPPLE_ROUNDED_(24 * (size_t)(motions)))
-#define SUPPLE_LEARNED_SIZE(nodes, fallback)                                                                           \
-    (SUPPLE_LEARNED_FRONT + SUPPLE_ROUNDED_(48 * (size_t)(nodes)) +                                                    \
-     ((fallback) ? 2 * SUPPLE_ROUNDED_(16 * (size_t)(nodes)) : 0))
-/* For a lattice of x * y * z cells (zeros for SUPPLE_MASS_SCALED; not for cells that supple_large_init chooses); the function's
-   may be less, never more. */
-#define SUPPLE_LARGE_SIZE(nodes, method, x, y, z)                                                                      \
-    (SUPPLE_LARGE_FRONT + SUPPLE_ROUNDED_(((method) == SUPPLE_DAMPED ? 96 : 80) * (size_t)(nodes)) +                   \
-     ((method) == SUPPLE_MASS_SCALED                                                                                   \
-          ? 0                                                                                                          \
-          : SUPPLE_ROUNDED_(24 * (size_t)(nodes)) +                                                                    \
-                SUPPLE_ROUNDED_(4 * SUPPLE_NUMBERS_((method) == SUPPLE_DAMPED, (size_t)(x) * (y) * (z),                \
-                                                    SUPPLE_FUNCTIONS_(x, y, z)))))
+/* Laws, for all elements of a scene. Each with its constants in the order of supple_tissue. */
+#define SUPPLE_NEO_HOOKEAN 0 /* c (Pa), d (Pa) */
+#define SUPPLE_EXPONENTIAL 1 /* a (Pa), b, d (Pa) */
 
-/* Parts of the above. */
-#define SUPPLE_ROUNDED_(bytes) (((bytes) + SUPPLE_ALIGN - 1) / SUPPLE_ALIGN * SUPPLE_ALIGN)
-#define SUPPLE_CHUNKS_(elements) ((elements) / 1536 < 1 ? 1 : (elements) / 1536 > 24 ? 24 : (elements) / 1536)
-#define SUPPLE_BLOCKS_(elements) (((elements) + 15) / 16 + 2 * SUPPLE_CHUNKS_(elements) - 2)
-#define SUPPLE_POINTS_(x, y, z) (((size_t)(x) + 1) * ((y) + 1) * ((z) + 1))
-#define SUPPLE_FUNCTIONS_(x, y, z)                                                                                     \
-    (SUPPLE_POINTS_(x, y, z) < SUPPLE_LATTICE_FUNCTIONS ? SUPPLE_POINTS_(x, y, z) : SUPPLE_LATTICE_FUNCTIONS)
-#define SUPPLE_STRIDE_(functions) ((3 * (functions) + 8) / 8 * 8)
-#define SUPPLE_THIRDS_(functions) (((functions) + 2) / 3)
-#define SUPPLE_NUMBERS_(damped, cells, functions)                                                                      \
-    (((damped) ? 64 + 576 : 32 + 576) * (cells) + ((damped) ? 7 : 4) * 3 * (functions)*SUPPLE_STRIDE_(functions) +     \
-     ((damped) ? 6 * SUPPLE_THIRDS_(functions) * SUPPLE_STRIDE_(SUPPLE_THIRDS_(functions)) : 0))
+/* Sizes as constant expressions: what the functions give; of a supple_large, with x * y * z cells that you give, never less. */
+#define SUPPLE_SCENE_SIZE(nodes, elements, tissues) (SUPPLE_SCENE_FRONT + SUPPLE_ARRAY_(nodes, 16) +                           \
+    1024 * SUPPLE_TILES_(elements) + SUPPLE_ARRAY_(tissues, 20) + SUPPLE_ARRAY_((tissues) > 1 ? (elements) : 0, 2))
+#define SUPPLE_STATE_SIZE(nodes) (SUPPLE_STATE_FRONT + 3 * SUPPLE_ARRAY_(nodes, 16))
+#define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
+#define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 80 : 48))
+#define SUPPLE_LARGE_SIZE(nodes, method, x, y, z) (SUPPLE_LARGE_FRONT + ((method) == SUPPLE_MASS_SCALED                        \
+    ? SUPPLE_ARRAY_(nodes, 80) : SUPPLE_LATTICE_(nodes, (method) == SUPPLE_DAMPED, x, y, z)))
+#define SUPPLE_ARRAY_(count, bytes) (((size_t)(count) * (bytes) + SUPPLE_ALIGN - 1) / SUPPLE_ALIGN * SUPPLE_ALIGN)
+#define SUPPLE_LEAST_(a, b) ((a) < (b) ? (a) : (b))
+#define SUPPLE_TILES_(elements)                                                                                                \
+    (((size_t)(elements) + 15) / 16 + 2 * SUPPLE_LEAST_((size_t)(elements) / 1536 - ((elements) > 1535), 23))
+#define SUPPLE_FUNCTIONS_(x, y, z) SUPPLE_LEAST_(((size_t)(x) + 1) * ((y) + 1) * ((z) + 1), SUPPLE_LATTICE_FUNCTIONS)
+#define SUPPLE_LATTICE_(nodes, damped, x, y, z) SUPPLE_ARRAY_(1, ((damped) ? 120 : 104) * (size_t)(nodes) + 196 +              \
+    2560 * ((size_t)(x) * (y) * (z)) + ((damped) ? 260 : 144) * SUPPLE_FUNCTIONS_(x, y, z) * (SUPPLE_FUNCTIONS_(x, y, z) + 3))
 
 
 /**
  * Version of the interface: of structures, of functions' arguments, of what statuses mean. Put it into
  * the field `abi` of every configuration; a library of another version refuses it.
  */
-#define SUPPLE_ABI 1
+#define SUPPLE_ABI 2
 
 /**
  * No node, element or axis.
@@ -104,16 +91,6 @@
  * The memory of every object begins at a multiple of so many bytes.
  */
 #define SUPPLE_ALIGN 64
-
-/**
- * Neo-Hookean, with the constants c and d, Pa.
- */
-#define SUPPLE_NEO_HOOKEAN 0
-
-/**
- * Exponential, with the constants a (Pa), b, and d (Pa).
- */
-#define SUPPLE_EXPONENTIAL 1
 
 /**
  * Elements must have positive volumes: (x1 - x0) . ((x2 - x0) x (x3 - x0)) > 0.
@@ -176,7 +153,7 @@
 #define SUPPLE_LATTICE_FUNCTIONS 128
 
 /**
- * Bytes before the arrays of large steps.
+ * Bytes before the arrays of a supple_large.
  */
 #define SUPPLE_LARGE_FRONT 40960
 
@@ -197,8 +174,8 @@ enum supple_status
     SUPPLE_OK = 0,
     /**
      * Steps were taken, but are not exact: elements are beyond the range of their law, there is more kinetic energy than
-     * loads and supports explain, or a large step held much of the motion back. The report tells the first two, also where a larger remark hides
-     * them.
+     * loads and supports explain, or a step of a supple_large held much of the motion back. The report tells the first two, also
+     * where a larger remark hides them.
      */
     SUPPLE_LIMITED = 1,
     /**
@@ -214,11 +191,11 @@ enum supple_status
      */
     SUPPLE_E_NULL = -1,
     /**
-     * A pointer is not aligned: memory of objects to SUPPLE_ALIGN bytes, arrays to their numbers.
+     * A pointer is not aligned: memory of objects to SUPPLE_ALIGN bytes, arrays to their elements.
      */
     SUPPLE_E_MISALIGNED = -2,
     /**
-     * Fewer bytes or numbers (value) than needed (limit).
+     * Fewer bytes or floats (value) than needed (limit).
      */
     SUPPLE_E_SHORT = -3,
     /**
@@ -238,7 +215,7 @@ enum supple_status
      */
     SUPPLE_E_CHOICE = -7,
     /**
-     * Objects that do not belong together: for scenes with other numbers of nodes (value, limit).
+     * Objects for scenes with other numbers of nodes (value, limit).
      */
     SUPPLE_E_MISMATCH = -8,
     /**
@@ -254,7 +231,7 @@ enum supple_status
      */
     SUPPLE_E_NOT_FINITE = -11,
     /**
-     * Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s).
+     * Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s); or a lead-in (s).
      */
     SUPPLE_E_NEGATIVE = -12,
     /**
@@ -346,7 +323,7 @@ enum supple_status
      */
     SUPPLE_E_WEIGHTS_SHAPE = -46,
     /**
-     * The exact step has not led up to this moment: supple_learned_lead comes first.
+     * No lead-in and no learned step has brought the state to this moment: supple_learned_lead comes first.
      */
     SUPPLE_E_NOT_LED = -50,
     /**
@@ -452,9 +429,9 @@ typedef struct {
  */
 typedef struct {
     /**
-     * Neo-Hookean: c, d, unused. Exponential: a, b, d. Finite and positive.
+     * In the order that stands with the law (SUPPLE_NEO_HOOKEAN and so on), finite and positive; the rest is ignored.
      */
-    float constants[3];
+    float constants[4];
     /**
      * At rest, kg/m^3; finite and positive.
      */
@@ -474,7 +451,7 @@ typedef struct {
      */
     uint32_t abi;
     /**
-     * SUPPLE_NEO_HOOKEAN or SUPPLE_EXPONENTIAL, for all elements.
+     * The law of all elements: SUPPLE_NEO_HOOKEAN and so on.
      */
     uint32_t law;
     /**
@@ -490,11 +467,11 @@ typedef struct {
      */
     uint32_t elements;
     /**
-     * Supports; a node may have several.
+     * Entries of `support`; a node may have several.
      */
     uint32_t supports;
     /**
-     * Tissues, 1 to 65535.
+     * Entries of `tissue`, 1 to 65535.
      */
     uint32_t tissues;
     /**
@@ -544,7 +521,7 @@ typedef struct {
      */
     double value;
     /**
-     * What it was held against.
+     * What it may be at most, or should be.
      */
     double limit;
 } supple_error;
@@ -634,7 +611,8 @@ typedef struct {
      */
     float seconds;
     /**
-     * Damping proportional to mass, 1/s, zero or more.
+     * Damping proportional to mass, 1/s, zero or more. Learned steps use it as well; a supple_large has its own, in
+     * supple_large_config.
      */
     float damping;
 } supple_step_config;
@@ -647,7 +625,7 @@ typedef void (*supple_part)(const void *work, uint32_t part);
 
 /**
  * Threads of the host. A step calls `each` twice: it shall call `part(work, p)` for every `p` below `parts`, on
- * whichever threads, side by side or not, and return when all those calls have. Parts share nothing, and the result does not
+ * whichever threads, at the same time or not, and return when all those calls have. Parts share nothing, and the result does not
  * depend on where they run, to the bit. What `each` leaves out is computed when it has returned. It must return: no exception and
  * no longjmp may leave it.
  */
@@ -667,12 +645,12 @@ typedef struct {
 } supple_threads;
 
 /**
- * What the steps of a call found, and what stopped it. Every call that takes steps writes all of it.
+ * What became of the steps of a call, and what stopped it. Every call that takes steps writes all of it.
  */
 typedef struct {
     /**
-     * Simulated time at the end, s; of a step that was not taken, at its start; zero, and all else as if there had been no step, if
-     * the call was refused before its first.
+     * Simulated time at the end, s; of a step that was not taken, at its start; zero, and all else as if there had been no step,
+     * if the call was refused before its first.
      */
     double time;
     /**
@@ -701,7 +679,7 @@ typedef struct {
      */
     float saturation;
     /**
-     * Kinetic energy beyond the account, as a share of the most that was ever in it; above 0 it is remarked upon.
+     * Kinetic energy beyond the energy balance, as a share of the most that was ever in it; above 0 it is remarked upon.
      */
     float energy_excess;
     /**
@@ -713,19 +691,20 @@ typedef struct {
      */
     float outside;
     /**
-     * Large steps: mean over the nodes of the inertia added, in masses of the node.
+     * Steps of a supple_large: mean over the nodes of the inertia added, in masses of the node.
      */
     float added_mass;
     /**
-     * Large steps: most nodes that were held back in a step.
+     * Steps of a supple_large: most nodes that were held back in a step.
      */
     uint32_t held_back;
     /**
-     * Large steps with a lattice: the least share of its motion that was used in a step; below 0.5 it is remarked upon.
+     * Multilevel and damped steps: the least share of the lattice's motion that was used in a step; below 0.5 it is remarked
+     * upon.
      */
     float lattice_share;
     /**
-     * Large steps: estimate of the error so far, m, mean over the nodes; it tells the scale and is no bound.
+     * Steps of a supple_large: estimate of the error so far, m, mean over the nodes; it tells the scale and is no bound.
      */
     float error_estimate;
     /**
@@ -766,7 +745,7 @@ typedef struct {
     uint32_t abi;
     /**
      * 1: a learned step that diverges, or has more kinetic energy than loads and supports explain, is undone and the exact
-     * step takes over for good. 0: the caller decides by status and report. Needs memory for two vectors a node.
+     * step takes over for good. 0: the caller decides by status and report. 1 needs memory for two vectors a node more.
      */
     uint32_t fallback;
     /**
@@ -774,8 +753,8 @@ typedef struct {
      */
     uint32_t reserved;
     /**
-     * A weight file, at a multiple of 4 bytes, better of 64. It is used where it is, without a copy: it must stay, unchanged, as long as
-     * the object is used.
+     * A weight file, at a multiple of 4 bytes, better of 64. It is used where it is, without a copy: it must stay, unchanged, as
+     * long as the object is used.
      */
     const void *weights;
     /**
@@ -797,7 +776,7 @@ typedef struct {
      */
     float damping;
     /**
-     * Law of the training, SUPPLE_NEO_HOOKEAN or SUPPLE_EXPONENTIAL; in another tissue the network's error is not known.
+     * Law of the training, SUPPLE_NEO_HOOKEAN and so on; in another tissue the network's error is not known.
      */
     uint32_t law;
     /**
@@ -819,7 +798,7 @@ typedef struct {
 } supple_learned_facts;
 
 /**
- * What large steps need.
+ * What steps beyond the critical one need.
  */
 typedef struct {
     /**
@@ -839,7 +818,8 @@ typedef struct {
      */
     float seconds;
     /**
-     * Damping proportional to mass, 1/s, zero or more.
+     * Damping proportional to mass, 1/s, zero or more. That of supple_step_config is not used here: give the same value twice if
+     * both kinds of steps move a state.
      */
     float damping;
     /**
@@ -847,7 +827,8 @@ typedef struct {
      */
     uint32_t cells[3];
     /**
-     * For SUPPLE_DAMPED the weight file of a damper, at a multiple of 4 bytes. It is used where it is and must stay. NULL otherwise.
+     * For SUPPLE_DAMPED the weight file of a damper, at a multiple of 4 bytes. It is used where it is and must stay. NULL
+     * otherwise.
      */
     const void *weights;
     /**
@@ -855,28 +836,6 @@ typedef struct {
      */
     size_t weights_bytes;
 } supple_large_config;
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
-
 
 #ifdef __cplusplus
 extern "C" {
@@ -989,13 +948,14 @@ supple_status supple_state_init(void *memory,
                                 supple_state **state);
 
 /**
- * Puts a state back to rest at time zero. Its step stays. Large steps have to be prepared again, learned ones reset and led.
+ * Puts a state back to rest at time zero. Its step stays. A supple_large has to be prepared again, a
+ * supple_learned reset, with a new lead-in.
  */
 supple_status supple_state_reset(supple_state *state);
 
 /**
- * Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It costs a few
- * steps; tissue that is deformed is stiffer, so ask again from time to time.
+ * Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as
+ * long as some six steps; tissue that is deformed is stiffer, so ask again from time to time.
  *
  * @param seconds receives the step, s.
  * @param node may be NULL; receives the node that sets it.
@@ -1069,10 +1029,11 @@ supple_status supple_copy_positions(const supple_state *state,
 supple_status supple_copy_velocities(const supple_state *state, float *out, size_t floats);
 
 /**
- * Copies the total force on each node at the start of the latest step, also of one that was refused, N: that of the loads with that of the tissue. At held
- * nodes it is what presses on the support, and so what a hand that holds the instrument feels, apart from the inertia of a moved
- * one; the support presses back with the opposite. Zero after supple_critical_step or supple_set_step, also where these refuse what they
- * computed, until the next step.
+ * Copies the total force on each node at the start of the latest step, also of one that was refused, N: that of the loads with
+ * that of the tissue. At held nodes it is what presses on the support, and so what a hand that holds the instrument feels, apart
+ * from the inertia of a moved one; the support presses back with the opposite. Not so after steps of a supple_large: raised inertia
+ * delays the tissue, and the force is that of a shape that lags behind. Zero after supple_critical_step or supple_set_step, also where these
+ * refuse what they computed, until the next step.
  *
  * @param floats room in `out`: three times the nodes at least.
  */
@@ -1094,8 +1055,8 @@ supple_status supple_save(const supple_state *state, void *to, size_t bytes);
 
 /**
  * Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the saved one
- * would have, to the bit. Forces are zero until the next step. Large steps have to be prepared again, and learned ones led;
- * for the same bits with these, copy their objects with memcpy as well.
+ * would have, to the bit. Forces are zero until the next step. A supple_large has to be prepared again, and a
+ * supple_learned needs a new lead-in; for the same bits with these, copy their objects with memcpy as well.
  */
 supple_status supple_restore(supple_state *state,
                              const void *from,
@@ -1121,7 +1082,7 @@ supple_status supple_learned_init(void *memory,
                                   supple_error *error);
 
 /**
- * For a motion from rest: frames as at the start, the network has not been led, the exact step has not taken over.
+ * For a motion from rest: frames as at the start, no lead-in yet, the exact step has not taken over.
  */
 supple_status supple_learned_reset(supple_learned *learned);
 
@@ -1131,8 +1092,9 @@ supple_status supple_learned_reset(supple_learned *learned);
 supple_status supple_learned_describe(const supple_learned *learned, supple_learned_facts *facts);
 
 /**
- * Lets the exact step lead, `count` times over the length of a learned step, while the frames of the nodes follow. The network
- * can take over at the end of it. In the paper the exact step leads for 0.3 s from rest.
+ * The lead-in: exact steps for `seconds` while the frames of the nodes follow, in the nearest whole number of the network's steps
+ * (seconds of supple_learned_facts), which may be none. The network can take over at the end of it. In the paper it lasts 0.3 s
+ * from rest. Motions go evenly over all of it. Seconds that are negative or not finite: SUPPLE_E_NEGATIVE.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
@@ -1142,14 +1104,14 @@ supple_status supple_learned_lead(const supple_scene *scene,
                                   supple_loads *loads,
                                   supple_state *state,
                                   supple_learned *learned,
-                                  uint32_t count,
+                                  double seconds,
                                   const supple_threads *threads,
                                   supple_report *report);
 
 /**
  * Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. Stops at the first
  * that is not to be believed: without fallback that one is not taken, displacements and time are as before it, velocities may be
- * those of the network's own step, and the exact step has to lead again.
+ * those of the network's own step, and a new lead-in is needed.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
@@ -1164,8 +1126,8 @@ supple_status supple_learned_step(const supple_scene *scene,
                                   supple_report *report);
 
 /**
- * Writes how many bytes of memory large steps of a scene need; it depends on the lattice. For cells that you give SUPPLE_LARGE_SIZE is
- * never less.
+ * Writes how many bytes of memory a supple_large needs for a scene; it depends on the lattice. For cells that you give
+ * SUPPLE_LARGE_SIZE is never less.
  *
  * @param points the points that the scene was built from, three coordinates each.
  * @param error may be NULL.
@@ -1177,8 +1139,8 @@ supple_status supple_large_size(const supple_scene *scene,
                                 supple_error *error);
 
 /**
- * Prepares large steps from the state as it is, in `memory` of at least supple_large_size bytes, aligned to SUPPLE_ALIGN. It
- * takes as long as some steps.
+ * Prepares steps beyond the critical one, from the state as it is, in `memory` of at least supple_large_size bytes, aligned to
+ * SUPPLE_ALIGN. It takes as long as some steps.
  *
  * @param points the points that the scene was built from, three coordinates each.
  * @param error may be NULL.
@@ -1193,8 +1155,8 @@ supple_status supple_large_init(void *memory,
                                 supple_error *error);
 
 /**
- * Takes `count` large steps. Stops at the first that is not to be believed: that one is not taken, the state is as before it,
- * and the status tells. They run on the calling thread alone, and need no supple_set_step.
+ * Takes `count` steps of the prepared method and length. Stops at the first that is not to be believed: that one is not taken,
+ * the state is as before it, and the status tells. They run on the calling thread alone, and need no supple_set_step.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param report may be NULL; is written whatever the status.

@@ -96,13 +96,16 @@ enum class [[nodiscard]] status : std::int32_t {
     e_diverged_energy = SUPPLE_E_DIVERGED_ENERGY,
 };
 
-// For all elements of a scene: neo_hookean with c, d (Pa), exponential with a (Pa), b, d (Pa).
-enum class law : std::uint32_t { neo_hookean = SUPPLE_NEO_HOOKEAN, exponential = SUPPLE_EXPONENTIAL };
+// For all elements of a scene; each with its constants in the order of tissue::constants. tools/header.sh writes this list.
+enum class law : std::uint32_t {
+    neo_hookean = SUPPLE_NEO_HOOKEAN, // c (Pa), d (Pa)
+    exponential = SUPPLE_EXPONENTIAL, // a (Pa), b, d (Pa)
+};
 
 // checked: elements must have positive volumes. normalised: they are turned where needed.
 enum class winding : std::uint32_t { checked = SUPPLE_WINDING_CHECKED, normalised = SUPPLE_WINDING_NORMALISED };
 
-// How large steps are kept stable.
+// How steps beyond the critical one are kept stable.
 enum class method : std::uint32_t {
     mass_scaled = SUPPLE_MASS_SCALED,
     multilevel = SUPPLE_MULTILEVEL,
@@ -370,10 +373,10 @@ public:
 
     // Sizes and costs.
     [[nodiscard]] result<scene_facts> describe() const noexcept {
-        result<scene_facts> found{};
-        found.status = detail::of(supple_scene_describe(raw_, &found.value));
-        found.error = detail::nothing(found.status);
-        return found;
+        result<scene_facts> facts{};
+        facts.status = detail::of(supple_scene_describe(raw_, &facts.value));
+        facts.error = detail::nothing(facts.status);
+        return facts;
     }
 
 private:
@@ -482,11 +485,11 @@ public:
 
     // Bound on the stable step at these displacements, s; takes as long as some steps.
     [[nodiscard]] result<supple::critical_step> critical_step(scene of) const noexcept {
-        result<supple::critical_step> found{};
-        found.status =
-            detail::of(supple_critical_step(of.raw(), raw_, &found.value.seconds, &found.value.node));
-        found.error = detail::nothing(found.status);
-        return found;
+        result<supple::critical_step> bound{};
+        bound.status =
+            detail::of(supple_critical_step(of.raw(), raw_, &bound.value.seconds, &bound.value.node));
+        bound.error = detail::nothing(bound.status);
+        return bound;
     }
 
     // Sets the exact step, s, and the damping, 1/s.
@@ -498,24 +501,24 @@ public:
     }
 
     // Takes exact steps; all of the calling thread's, or on threads of the host.
-    status step(scene of, loads acting, std::uint32_t count, report *found = nullptr,
+    status step(scene of, loads acting, std::uint32_t count, report *out = nullptr,
                 const threads *on = nullptr) const noexcept {
-        return detail::of(supple_step(of.raw(), acting.raw(), raw_, count, on, found));
+        return detail::of(supple_step(of.raw(), acting.raw(), raw_, count, on, out));
     }
 
     // Simulated time, s, and steps taken.
     [[nodiscard]] result<moment> now() const noexcept {
-        result<moment> found{};
-        found.status = detail::of(supple_state_time(raw_, &found.value.seconds, &found.value.steps));
-        found.error = detail::nothing(found.status);
-        return found;
+        result<moment> now{};
+        now.status = detail::of(supple_state_time(raw_, &now.value.seconds, &now.value.steps));
+        now.error = detail::nothing(now.status);
+        return now;
     }
 
     // Where the displacements are, m, for as long as the state is there.
     [[nodiscard]] result<vectors> displacements() const noexcept {
-        supple_vectors found{};
-        const status code = detail::of(supple_displacements(raw_, &found));
-        return {code, detail::nothing(code), vectors(found)};
+        supple_vectors raw{};
+        const status code = detail::of(supple_displacements(raw_, &raw));
+        return {code, detail::nothing(code), vectors(raw)};
     }
 
     // Displacements, m, three floats a node.
@@ -580,34 +583,34 @@ public:
         return made;
     }
 
-    // For a motion from rest: not led, not fallen back.
+    // For a motion from rest: no lead-in yet, not fallen back.
     status reset() const noexcept { return detail::of(supple_learned_reset(raw_)); }
 
     // What the network was trained for.
     [[nodiscard]] result<learned_facts> describe() const noexcept {
-        result<learned_facts> found{};
-        found.status = detail::of(supple_learned_describe(raw_, &found.value));
-        found.error = detail::nothing(found.status);
-        return found;
+        result<learned_facts> facts{};
+        facts.status = detail::of(supple_learned_describe(raw_, &facts.value));
+        facts.error = detail::nothing(facts.status);
+        return facts;
     }
 
-    // The exact step leads, `count` times over the length of a learned step.
-    status lead(scene of, loads acting, state moved, std::uint32_t count, report *found = nullptr,
+    // The lead-in: exact steps for the nearest whole number of learned ones in so many seconds, which may be none.
+    status lead(scene of, loads acting, state moved, double seconds, report *out = nullptr,
                 const threads *on = nullptr) const noexcept {
-        return detail::of(supple_learned_lead(of.raw(), acting.raw(), moved.raw(), raw_, count, on, found));
+        return detail::of(supple_learned_lead(of.raw(), acting.raw(), moved.raw(), raw_, seconds, on, out));
     }
 
     // Takes learned steps.
-    status step(scene of, loads acting, state moved, std::uint32_t count, report *found = nullptr,
+    status step(scene of, loads acting, state moved, std::uint32_t count, report *out = nullptr,
                 const threads *on = nullptr) const noexcept {
-        return detail::of(supple_learned_step(of.raw(), acting.raw(), moved.raw(), raw_, count, on, found));
+        return detail::of(supple_learned_step(of.raw(), acting.raw(), moved.raw(), raw_, count, on, out));
     }
 
 private:
     supple_learned *raw_ = nullptr;
 };
 
-// What large steps need.
+// What steps beyond the critical one need.
 struct large_steps {
     supple::method method = method::multilevel;
     float seconds = 0.0f;                    // length of a step, s
@@ -625,12 +628,12 @@ public:
 
     // Bytes of memory that they need. `points` are those of the scene, m.
     static result<std::size_t> size(scene of, span<const float> points, const large_steps &steps) noexcept {
-        result<std::size_t> found{status::ok, detail::nothing(status::ok), 0};
-        if (!has_points(of, points, found)) return found;
+        result<std::size_t> bytes{status::ok, detail::nothing(status::ok), 0};
+        if (!has_points(of, points, bytes)) return bytes;
         const auto config = config_of(steps);
-        found.status =
-            detail::of(supple_large_size(of.raw(), points.data(), &config, &found.value, &found.error));
-        return found;
+        bytes.status =
+            detail::of(supple_large_size(of.raw(), points.data(), &config, &bytes.value, &bytes.error));
+        return bytes;
     }
 
     // Prepares them from the state as it is, in memory of at least `size` bytes; takes as long as some steps.
@@ -644,10 +647,10 @@ public:
         return made;
     }
 
-    // Takes large steps.
+    // Takes steps of the prepared method and length.
     status step(scene of, loads acting, state moved, std::uint32_t count,
-                report *found = nullptr) const noexcept {
-        return detail::of(supple_large_step(of.raw(), acting.raw(), moved.raw(), raw_, count, found));
+                report *out = nullptr) const noexcept {
+        return detail::of(supple_large_step(of.raw(), acting.raw(), moved.raw(), raw_, count, out));
     }
 
 private:

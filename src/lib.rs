@@ -2,85 +2,128 @@
 //! mesh of an organ, its material, supports and loads, and calls one step function as often as it needs.
 //! SI units throughout (m, kg, s, N, Pa, J).
 //!
+//! # The three jobs
+//!
+//! A soft bar, fixed at one end, bent by a force at the other. Common to the three:
+//!
+#![cfg_attr(feature = "std", doc = "```")]
+#![cfg_attr(not(feature = "std"), doc = "```ignore")]
+//! # use supple::loads::{Loads, NodalForce};
+//! # use supple::material::{NeoHookean, Tissue};
+//! # use supple::mesh::{Bar, Mesh, Winding};
+//! # use supple::scene::{Support, VecScene};
+//! # use supple::state::VecState;
+//! # use supple::step::{Status, Step};
+//! # use supple::tled;
+//! let bar = Bar { size: [0.02, 0.02, 0.1], cells: [2, 2, 10] };
+//! let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());
+//! let mesh = Mesh::new(&points, &tets, Winding::Checked)?;
+//! let tissue = Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 };
+//! let fixed: Vec<_> = (0..9).map(Support::fixed).collect();
+//! let scene = VecScene::build(tissue, &mesh, &fixed)?;
+//! let mut state = VecState::at_rest(scene.node_count());
+//! let force = [NodalForce { node: bar.node(1, 1, 10), newton: [0.01, 0.0, 0.0], ramp: 0.1 }];
+//! let loads = Loads::new(&scene, [0.0; 3], &force, &[])?;
+//! let critical = tled::critical_step(&scene, &mut state).ok_or("not a finite state")?;
+//! # let step = Step::new(0.9 * critical.seconds, 20.0, critical)?;
+//! # assert_eq!(tled::step(&scene, &loads, &mut state, &step), Status::Ok);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! **Exact steps** ([`tled`]), no longer than the critical step:
+//!
+#![cfg_attr(feature = "std", doc = "```")]
+#![cfg_attr(not(feature = "std"), doc = "```ignore")]
+#![doc = include_str!("doc_common.txt")]
+//! let step = Step::new(0.9 * critical.seconds, 20.0, critical)?;
+//! while state.time() < 0.2 {
+//!     let status = tled::step(&scene, &loads, &mut state, &step);
+//!     assert_eq!(status, Status::Ok);
+//! }
+//! println!("the tip moved {:.2} mm", 1e3 * state.displacements()[94].to_array()[0]);
+//! # assert!(state.displacements()[94].to_array()[0] > 0.003);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! **Damped steps** ([`inertia`]), here twenty times as long:
+//!
+#![cfg_attr(feature = "std", doc = "```")]
+#![cfg_attr(not(feature = "std"), doc = "```ignore")]
+#![doc = include_str!("doc_common.txt")]
+//! use supple::inertia::{Cells, Damper, LargeStep, Method};
+//!
+//! # #[repr(align(64))] struct Aligned<T: ?Sized>(T);
+//! # static WEIGHTS: &Aligned<[u8]> = &Aligned(*include_bytes!("../weights/damper.weights"));
+//! let damper = Damper::new(supple::mlp::Network::parse(&WEIGHTS.0)?)?; // weights/damper.weights
+//! let method = Method::Damped(damper, Cells::Given([1, 1, 4]));
+//! let step = Step::unchecked(20.0 * critical.seconds, 20.0)?;
+//! let mut damped = LargeStep::prepare_in_vec(method, scene.view(), &points, state.view(), step)?;
+//! while state.time() < 0.2 {
+//!     let status = damped.step(scene.view(), &loads, state.view());
+//!     assert!(status.is_taken(), "{status:?}");
+//! }
+//! println!("off by about {:.3} mm", 1e3 * damped.report().error);
+//! # assert!(state.displacements()[94].to_array()[0] > 0.003);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! **Learned steps** ([`learned`]), after a lead-in of exact ones, which take over for good if energy does not explain what the
+//! network does:
+//!
+#![cfg_attr(feature = "std", doc = "```")]
+#![cfg_attr(not(feature = "std"), doc = "```ignore")]
+#![doc = include_str!("doc_common.txt")]
+//! use supple::learned::{LearnedStep, vectors_for};
+//!
+//! # #[repr(align(64))] struct Aligned<T: ?Sized>(T);
+//! # static WEIGHTS: &Aligned<[u8]> = &Aligned(*include_bytes!("../weights/compact-10.weights"));
+//! let network = supple::mlp::Network::parse(&WEIGHTS.0)?; // weights/compact-10.weights
+//! let exact = Step::new(network.recipe().step / 10.0, network.recipe().damping, critical)?;
+//! let storage = vec![supple::state::NodeVector::ZERO; vectors_for(scene.node_count(), true)];
+//! let mut learned = LearnedStep::new(network, true, storage)?;
+//! learned.lead(scene.view(), &loads, state.view(), (&exact, 0.3))?;
+//! while state.time() < 0.5 {
+//!     let status = learned.step(scene.view(), &loads, state.view(), &exact)?;
+//!     assert!(status.is_taken(), "{status:?}");
+//! }
+//! println!("fell back: {:?}", learned.model().fell_back());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Without a heap the scene is a [`scene::FixedScene`], the state a [`state::FixedState`], and storage an array, all of which may
+//! be `static`.
+//!
 //! # Layers
 //!
 //! Data flows one way; nothing below knows what is above.
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`mesh`] | a checked tetrahedral mesh, borrowed from the caller; the structured bar |
+//! | [`simd`] | one generic body for every instruction set |
+//! | [`mesh`] | a checked tetrahedral mesh, borrowed from the caller; renumbering, strips, partitions |
 //! | [`material`] | hyperelastic laws: two scalar functions of the invariants each |
+//! | [`element`] | linear tetrahedra: deformation, internal forces, stiffness bounds |
 //! | [`scene`] | what is simulated, computed once: element tables, masses, supports |
-//! | [`loads`] | what acts on it, set when the host likes: forces, traction, gravity, prescribed motion |
 //! | [`state`] | what moves: displacements and their last increment |
-//! | [`tled`] | the exact step: element forces, central differences, critical step, divergence |
-//! | [`inertia`] | steps beyond the limit: mass scaling and multilevel inertia |
-//! | [`frame`] | the local frame of a vertex and its parallel transport |
+//! | [`loads`] | what acts on it, set when the host likes: forces, traction, gravity, prescribed motion |
+//! | [`step`] | the protocol of every step: begin, compute, energy balance, accept or refuse; threads |
+//! | [`tled`] | the exact step and the critical step |
+//! | [`inertia`] | steps beyond the critical one: mass-scaled, multilevel, damped |
 //! | [`mlp`] | dense layers: the forward pass, the weight file |
-//! | [`surrogate`] | the learned step: features, network, clip, increment |
-//! | [`lanes`] | one generic body for every instruction set |
-//! | [`threads`] | who computes a step: the host's threads, rayon's (feature `parallel`), or the caller alone |
-//! | [`numbering`] | numbers for nodes by where they are |
+//! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
 //!
 //! With the feature `io` meshes are read and fields written (`io`), with `lab` methods are judged against the
 //! exact step over scenes (`lab`), with `train` networks are trained (`train`), with `safetensors` they go to and from
-//! PyTorch, with `cli` there is the command `supple`, with `capi` the functions of `include/supple.h`.
+//! PyTorch, with `capi` there are the functions of `include/supple.h`. The command `supple` is a package of its own.
 //!
 //! # Promises
 //!
-//! The core (`default-features = false`) is `no_std`, never allocates, and does not panic on any input
-//! through its public API. Memory is the caller's: capacity is in the type ([`scene::FixedScene`],
-//! [`state::FixedState`]), in slices or in vectors; too little is an error. A step does the same work every
-//! time and says what became of it ([`tled::Status`]); one that cannot be believed is not taken. The same
-//! input gives the same bits from run to run and for any number of threads; with the feature `deterministic`, which fuses no multiplications and
-//! additions, on every processor. What a scene does not use costs it nothing: no exponential is linked into a
+//! The core, which is what no feature gives, is `no_std`, never allocates, and does not panic on any input
+//! through its public API. Memory is the caller's; too little is an error. A step does the same work every
+//! time and says what became of it ([`step::Status`]); one that cannot be believed is not taken. The same
+//! input gives the same bits from run to run and for any number of threads; with the feature `deterministic`, which fuses no
+//! multiplications and additions, on every processor. What a scene does not use costs it nothing: no exponential is linked into a
 //! neo-Hookean scene, elements whose four nodes are fixed are left out.
-//!
-//! # Example
-//!
-//! A soft bar, fixed at one end, bent by a force at the other.
-//!
-//! ```
-//! use supple::loads::{Loads, NodalForce};
-//! use supple::material::{NeoHookean, Tissue};
-//! use supple::mesh::{Bar, Mesh, Winding};
-//! use supple::scene::{FixedScene, Support, blocks_for};
-//! use supple::state::FixedState;
-//! use supple::tled::{self, Status, Step};
-//!
-//! const BAR: Bar = Bar { size: [0.02, 0.02, 0.1], cells: [2, 2, 10] };
-//! const NODES: usize = BAR.node_count();
-//! const ELEMENTS: usize = BAR.element_count();
-//!
-//! // All memory there will ever be; it may as well stand in a `static`.
-//! let tissue = Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 };
-//! let mut scene: FixedScene<_, NODES, { blocks_for(ELEMENTS) }> = FixedScene::new(tissue);
-//! let mut state: FixedState<NODES> = FixedState::new();
-//!
-//! // The mesh usually comes from elsewhere.
-//! let points: heapless::Vec<[f32; 3], NODES> = BAR.points().collect();
-//! let tets: heapless::Vec<[u32; 4], ELEMENTS> = BAR.tets().collect();
-//! let mesh = Mesh::new(&points, &tets, Winding::Checked)?;
-//! let fixed: heapless::Vec<Support, 9> = (0..9).map(Support::fixed).collect();
-//! scene.build(&mesh, &fixed)?;
-//!
-//! let tip = NodalForce { node: BAR.node(1, 1, 10), newton: [0.01, 0.0, 0.0], ramp: 0.1 };
-//! let forces = [tip];
-//! let loads = Loads::new(&scene, [0.0; 3], &forces, &[])?;
-//!
-//! let critical = tled::critical_step(&scene, &mut state).ok_or("not a finite state")?;
-//! let step = Step::new(0.9 * critical.seconds, 20.0, critical)?;
-//! while state.time() < 0.2 {
-//!     match tled::step(&scene, &loads, &mut state, &step) {
-//!         Status::Ok => {}
-//!         other => panic!("{other:?}"),
-//!     }
-//! }
-//! let [x, _, _] = state.displacements()[tip.node as usize].to_array();
-//! println!("the tip moved {:.2} mm", x * 1e3);
-//! assert!(x > 0.003);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 //!
 //! # Sources
 //!
@@ -96,22 +139,19 @@ extern crate std;
 
 #[cfg(feature = "capi-neo-hookean")]
 mod capi;
-mod chains;
-mod chunks;
-pub mod frame;
+pub mod element;
+mod energy_balance;
 pub mod inertia;
-pub mod lanes;
-mod ledger;
+pub mod learned;
 pub mod loads;
 pub mod material;
 pub mod mesh;
 pub mod mlp;
-pub mod numbering;
+mod padding;
 pub mod scene;
+pub mod simd;
 pub mod state;
-pub mod surrogate;
-mod symmetric;
-pub mod threads;
+pub mod step;
 pub mod tled;
 
 #[cfg(feature = "io")]
@@ -121,8 +161,6 @@ pub mod lab;
 
 #[cfg(feature = "train")]
 pub mod train;
-
-pub use ledger::Ledger;
 
 /// A library for hosts without Rust's standard library has to say what a panic does. The core has none to
 /// raise; this is for what the compiler cannot prove.

@@ -7,9 +7,10 @@ use core::fmt;
 
 use glam::Vec3;
 
-use crate::material::Material;
-use crate::scene::{Axes, ElementBlock, NodeInertia, Scene};
-use crate::state::NodeVector;
+use crate::element::Axes;
+use crate::padding;
+use crate::scene::AsScene;
+use crate::simd::NodeVector;
 
 /// A force on one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,6 +34,24 @@ pub struct Motion {
     pub metre: [f32; 3],
     /// Ramp, s.
     pub ramp: f32,
+}
+
+impl NodalForce {
+    /// Checks entry `index` of a list for a scene of so many nodes.
+    pub fn check(&self, index: usize, nodes: usize) -> Result<(), LoadError> {
+        check("force", index, self.node, nodes, &self.newton, self.ramp)
+    }
+}
+
+impl Motion {
+    /// Checks entry `index` of a list for a scene of so many nodes, on which its node can be moved along these axes.
+    pub fn check(&self, index: usize, nodes: usize, movable: Axes) -> Result<(), LoadError> {
+        check("motion", index, self.node, nodes, &self.metre, self.ramp)?;
+        match (0..3).find(|&axis| self.axes.has(axis) && !movable.has(axis)) {
+            Some(axis) => Err(LoadError::NotHeld { index, node: self.node, axis }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// Why loads were refused.
@@ -117,30 +136,27 @@ impl<'a> Loads<'a> {
 
     /// Checks loads against the scene they will act on. Nodes may be listed more than once: forces add
     /// up, of several motions of an axis the last one holds.
-    pub fn new<M: Material, N: AsRef<[NodeInertia]>, B: AsRef<[ElementBlock]>>(
-        scene: &Scene<M, N, B>,
+    pub fn new(
+        scene: &impl AsScene,
         gravity: [f32; 3],
         forces: &'a [NodalForce],
         motions: &'a [Motion],
     ) -> Result<Self, LoadError> {
+        let scene = scene.as_scene();
         let nodes = scene.node_count();
         finite("gravity", 0, &gravity)?;
         for (index, force) in forces.iter().enumerate() {
-            check("force", index, force.node, nodes, &force.newton, force.ramp)?;
+            force.check(index, nodes)?;
         }
         for (index, motion) in motions.iter().enumerate() {
-            check("motion", index, motion.node, nodes, &motion.metre, motion.ramp)?;
-            let movable = scene.movable(motion.node as usize);
-            if let Some(axis) = (0..3).find(|&axis| motion.axes.has(axis) && !movable.has(axis)) {
-                return Err(LoadError::NotHeld { index, node: motion.node, axis });
-            }
+            motion.check(index, nodes, scene.movable(motion.node as usize))?;
         }
         Ok(Self { gravity, forces, motions, nodes: Some(nodes) })
     }
 
-    /// Loads that were checked one by one against a scene of so many nodes.
-    #[cfg(feature = "capi-neo-hookean")]
-    pub(crate) const fn checked(
+    /// Loads that the caller has checked against a scene of so many nodes. Of those that have not been, nodes that do not exist and
+    /// axes that are not held are ignored, and values that are not finite make a step diverge.
+    pub const fn unchecked(
         gravity: [f32; 3],
         forces: &'a [NodalForce],
         motions: &'a [Motion],
@@ -171,30 +187,28 @@ impl<'a> Loads<'a> {
         self.motions
     }
 
-    /// Calls `lead` with each motion and axis that it leads at `time` (s), the position there (m), and the node's vector. Of several
-    /// motions of an axis the last one holds: they come last first, and which axes of a node have come stands meanwhile, as bits,
-    /// in the padding of its vector.
-    pub(crate) fn each_led(
+    /// Calls `prescribe` with each node and axis that a motion moves, the position there at `time` (s), m, and the node's vector. Of
+    /// several motions of an axis the last one holds: they come last first, and the axes that are done are marked in the padding
+    /// of the vectors ([`crate::padding`]).
+    pub(crate) fn each_prescribed(
         &self,
         time: f64,
         vectors: &mut [NodeVector],
-        mut lead: impl FnMut(usize, usize, f32, &mut [f32; 4]),
+        mut prescribe: impl FnMut(usize, usize, f32, &mut [f32; 4]),
     ) {
         for motion in self.motions.iter().rev() {
             let node = motion.node as usize;
             let Some(NodeVector(vector)) = vectors.get_mut(node) else { continue };
             let factor = ramp_factor(time, motion.ramp);
             for axis in 0..3 {
-                let come = vector[3].to_bits();
-                if motion.axes.has(axis) && come >> axis & 1 == 0 {
-                    vector[3] = f32::from_bits(come | 1 << axis);
-                    lead(node, axis, factor * motion.metre[axis], vector);
+                if motion.axes.has(axis) && padding::mark_axis(vector, axis) {
+                    prescribe(node, axis, factor * motion.metre[axis], vector);
                 }
             }
         }
         for motion in self.motions {
-            if let Some(NodeVector(vector)) = vectors.get_mut(motion.node as usize) {
-                vector[3] = 0.0;
+            if let Some(vector) = vectors.get_mut(motion.node as usize) {
+                padding::clear_marks(vector);
             }
         }
     }
@@ -240,7 +254,7 @@ pub fn traction<'a>(
     })
 }
 
-pub(crate) fn check(
+fn check(
     kind: &'static str,
     index: usize,
     node: u32,

@@ -1,59 +1,44 @@
 //! What moves: the displacement of each node (m), its last increment (m), and the total force (N) that the
-//! latest step saw. Position independent: it may be copied, saved and resumed.
+//! latest step saw. A [`StateView`] borrows it, and every step works on one; [`VecState`] owns it on a host with a heap (feature
+//! `std`), [`FixedState`] without.
 //!
 //! The increment `u_n - u_(n-1)` is kept instead of `u_(n-1)`: in float32 the rounding of
 //! `2 u_n - u_(n-1)` acts as a false spring to the ground (13.8 % after 20,000 steps of the paper's bar).
 
-pub use crate::lanes::NodeVector;
-use crate::ledger::Ledger;
-use crate::tled::Extremes;
+use core::ops::Deref;
 
-/// The state of a scene over storage `S`, with room for at least its nodes.
-#[derive(Clone, Debug)]
-pub struct State<S> {
-    pub(crate) displacement: S,
-    pub(crate) increment: S,
-    pub(crate) force: S,
+use crate::element::Extremes;
+use crate::energy_balance::EnergyBalance;
+pub use crate::simd::NodeVector;
+
+/// How far a simulation has come, apart from its vectors.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
     /// Seconds since the start.
     pub(crate) time: f64,
     pub(crate) steps: u64,
-    /// Step that `increment` spans, s; zero before the first step.
+    pub(crate) energy_balance: EnergyBalance,
+    /// Step that the last increment spans, s; zero before the first step.
     pub(crate) dt: f32,
-    pub(crate) ledger: Ledger,
     /// At the start of the latest step.
     pub(crate) extremes: Extremes<f32>,
 }
 
-/// A state with room for `N` nodes, which may be a `static`.
-pub type FixedState<const N: usize> = State<[NodeVector; N]>;
+impl Progress {
+    /// At rest, at time zero.
+    pub const START: Self =
+        Self { time: 0.0, steps: 0, energy_balance: EnergyBalance::NEW, dt: 0.0, extremes: Extremes::REST };
 
-impl<const N: usize> FixedState<N> {
-    /// At rest.
+    /// A simulation that goes on from here; its displacements and increments are the caller's to restore.
     #[must_use]
-    pub const fn new() -> Self {
-        Self::over([NodeVector::ZERO; N], [NodeVector::ZERO; N], [NodeVector::ZERO; N])
+    pub const fn resumed(time: f64, steps: u64, last_step: f32, energy_balance: EnergyBalance) -> Self {
+        Self { time, steps, energy_balance, dt: last_step, extremes: Extremes::REST }
     }
-}
 
-impl<const N: usize> Default for FixedState<N> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<S> State<S> {
-    /// A state over the given storage, as it is: zeros mean at rest.
-    pub const fn over(displacement: S, increment: S, force: S) -> Self {
-        Self {
-            displacement,
-            increment,
-            force,
-            time: 0.0,
-            steps: 0,
-            dt: 0.0,
-            ledger: Ledger::NEW,
-            extremes: Extremes::REST,
-        }
+    /// Length of the step that the last increment spans, s; zero before the first step.
+    #[must_use]
+    pub const fn last_step(&self) -> f32 {
+        self.dt
     }
 
     /// Simulated time, s.
@@ -68,10 +53,10 @@ impl<S> State<S> {
         self.steps
     }
 
-    /// The energy account.
+    /// The energy balance.
     #[must_use]
-    pub const fn ledger(&self) -> &Ledger {
-        &self.ledger
+    pub const fn energy_balance(&self) -> &EnergyBalance {
+        &self.energy_balance
     }
 
     /// Smallest volume of an element over its volume at rest, at the start of the latest step that was taken; 1 before the first.
@@ -88,11 +73,135 @@ impl<S> State<S> {
     }
 }
 
-impl<S: AsRef<[NodeVector]>> State<S> {
+/// A state over memory of whichever kind.
+#[derive(Debug)]
+pub struct StateView<'a> {
+    pub(crate) displacement: &'a mut [NodeVector],
+    pub(crate) increment: &'a mut [NodeVector],
+    pub(crate) force: &'a mut [NodeVector],
+    pub(crate) progress: &'a mut Progress,
+}
+
+impl Deref for StateView<'_> {
+    type Target = Progress;
+
+    fn deref(&self) -> &Progress {
+        self.progress
+    }
+}
+
+impl<'a> StateView<'a> {
+    /// A state over the given vectors as they are: zeros mean at rest.
+    pub const fn new(
+        displacement: &'a mut [NodeVector],
+        increment: &'a mut [NodeVector],
+        force: &'a mut [NodeVector],
+        progress: &'a mut Progress,
+    ) -> Self {
+        Self { displacement, increment, force, progress }
+    }
+
+    /// The same state for a shorter time.
+    pub const fn reborrow(&mut self) -> StateView<'_> {
+        StateView {
+            displacement: self.displacement,
+            increment: self.increment,
+            force: self.force,
+            progress: self.progress,
+        }
+    }
+
+    /// Displacement of each node, m.
+    #[must_use]
+    pub const fn displacements(&self) -> &[NodeVector] {
+        self.displacement
+    }
+
+    /// How many nodes the vectors hold.
+    #[must_use]
+    pub fn capacity(&self) -> usize {
+        self.displacement.len().min(self.increment.len()).min(self.force.len())
+    }
+
+    /// Makes the last increment span `seconds`: `before` are the displacements of that long ago. A step of that length
+    /// goes on from here. Nodes beyond `before` are left as they are.
+    pub fn span(&mut self, before: &[NodeVector], seconds: f32) {
+        let vectors = self.displacement.iter().zip(self.increment.iter_mut());
+        for ((displacement, increment), before) in vectors.zip(before) {
+            for axis in 0..3 {
+                increment.0[axis] = displacement.0[axis] - before.0[axis];
+            }
+        }
+        self.progress.dt = seconds;
+    }
+
+    /// Makes the last increment span `seconds` at the velocity that it has. A step much shorter than the last goes on
+    /// smoothly from here: it would count half the last step's acceleration into its own otherwise.
+    pub fn respan(&mut self, seconds: f32) {
+        let factor = if self.dt > 0.0 { seconds / self.dt } else { 1.0 };
+        for increment in self.increment.iter_mut() {
+            for component in &mut increment.0 {
+                *component *= factor;
+            }
+        }
+        self.progress.dt = seconds;
+    }
+
+    /// Back to rest at time zero.
+    pub fn reset(&mut self) {
+        for vectors in [&mut *self.displacement, &mut *self.increment, &mut *self.force] {
+            vectors.fill(NodeVector::ZERO);
+        }
+        *self.progress = Progress::START;
+    }
+}
+
+/// What can be seen as a state.
+pub trait AsState {
+    /// The state.
+    fn as_state(&mut self) -> StateView<'_>;
+}
+
+impl AsState for StateView<'_> {
+    fn as_state(&mut self) -> StateView<'_> {
+        self.reborrow()
+    }
+}
+
+/// Memory for the vectors of a state.
+pub trait StateVectors {
+    /// Displacements, increments, forces.
+    fn vectors(&self) -> [&[NodeVector]; 3];
+    /// The same, to be changed.
+    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 3];
+}
+
+/// A state that owns its vectors.
+#[derive(Clone, Debug)]
+pub struct State<S> {
+    vectors: S,
+    progress: Progress,
+}
+
+impl<S> Deref for State<S> {
+    type Target = Progress;
+
+    fn deref(&self) -> &Progress {
+        &self.progress
+    }
+}
+
+impl<S: StateVectors> State<S> {
+    /// The state.
+    pub fn view(&mut self) -> StateView<'_> {
+        let [displacement, increment, force] = self.vectors.vectors_mut();
+        StateView { displacement, increment, force, progress: &mut self.progress }
+    }
+
     /// Displacement of each node, m.
     #[must_use]
     pub fn displacements(&self) -> &[NodeVector] {
-        self.displacement.as_ref()
+        self.vectors.vectors()[0]
     }
 
     /// Total force on each node (external less internal) at the start of the latest step, N. At held nodes
@@ -100,59 +209,92 @@ impl<S: AsRef<[NodeVector]>> State<S> {
     /// was refused these are the forces of that step, and after [`crate::tled::critical_step`] zero.
     #[must_use]
     pub fn forces(&self) -> &[NodeVector] {
-        self.force.as_ref()
+        self.vectors.vectors()[2]
     }
 
     /// Velocity of a node over the latest step, m/s; zero for a node that does not exist.
     #[must_use]
     pub fn velocity(&self, node: usize) -> [f32; 3] {
-        let increment = self.increment.as_ref().get(node).copied().unwrap_or_default();
-        if self.dt > 0.0 { increment.to_array().map(|component| component / self.dt) } else { [0.0; 3] }
+        let increment = self.vectors.vectors()[1].get(node).copied().unwrap_or_default();
+        let dt = self.progress.dt;
+        if dt > 0.0 { increment.to_array().map(|component| component / dt) } else { [0.0; 3] }
     }
 
-    /// How many nodes the storage holds.
+    /// How many nodes there is room for.
     #[must_use]
     pub fn capacity(&self) -> usize {
-        let lengths =
-            [&self.displacement, &self.increment, &self.force].map(|vectors| vectors.as_ref().len());
-        lengths.into_iter().min().unwrap_or(0)
-    }
-}
-
-impl<S: AsRef<[NodeVector]> + AsMut<[NodeVector]>> State<S> {
-    /// Makes the last increment span `seconds`: `before` are the displacements of that long ago. A step of that length
-    /// goes on from here. Nodes beyond `before` are left as they are.
-    pub fn span(&mut self, before: &[NodeVector], seconds: f32) {
-        let vectors = self.displacement.as_ref().iter().zip(self.increment.as_mut());
-        for ((displacement, increment), before) in vectors.zip(before) {
-            for axis in 0..3 {
-                increment.0[axis] = displacement.0[axis] - before.0[axis];
-            }
-        }
-        self.dt = seconds;
-    }
-
-    /// Makes the last increment span `seconds` at the velocity that it has. A step much shorter than the last goes on
-    /// smoothly from here: it would count half the last step's acceleration into its own otherwise.
-    pub fn respan(&mut self, seconds: f32) {
-        let factor = if self.dt > 0.0 { seconds / self.dt } else { 1.0 };
-        for increment in self.increment.as_mut() {
-            for component in &mut increment.0 {
-                *component *= factor;
-            }
-        }
-        self.dt = seconds;
+        self.vectors.vectors().into_iter().map(<[_]>::len).min().unwrap_or(0)
     }
 
     /// Back to rest at time zero.
     pub fn reset(&mut self) {
-        for vectors in [&mut self.displacement, &mut self.increment, &mut self.force] {
-            vectors.as_mut().fill(NodeVector::ZERO);
-        }
-        self.time = 0.0;
-        self.steps = 0;
-        self.dt = 0.0;
-        self.ledger = Ledger::NEW;
-        self.extremes = Extremes::REST;
+        self.view().reset();
+    }
+}
+
+impl<S: StateVectors> AsState for State<S> {
+    fn as_state(&mut self) -> StateView<'_> {
+        self.view()
+    }
+}
+
+/// Vectors of `N` nodes.
+#[derive(Clone, Debug)]
+pub struct FixedVectors<const N: usize>([[NodeVector; N]; 3]);
+
+impl<const N: usize> StateVectors for FixedVectors<N> {
+    fn vectors(&self) -> [&[NodeVector]; 3] {
+        self.0.each_ref().map(<[_; N]>::as_slice)
+    }
+
+    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 3] {
+        self.0.each_mut().map(<[_; N]>::as_mut_slice)
+    }
+}
+
+/// A state with room for `N` nodes, which may be a `static`.
+pub type FixedState<const N: usize> = State<FixedVectors<N>>;
+
+impl<const N: usize> FixedState<N> {
+    /// At rest.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { vectors: FixedVectors([[NodeVector::ZERO; N]; 3]), progress: Progress::START }
+    }
+}
+
+impl<const N: usize> Default for FixedState<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Vectors of as many nodes as there are.
+#[cfg(any(feature = "std", test))]
+#[derive(Clone, Debug)]
+pub struct VecVectors([std::vec::Vec<NodeVector>; 3]);
+
+#[cfg(any(feature = "std", test))]
+impl StateVectors for VecVectors {
+    fn vectors(&self) -> [&[NodeVector]; 3] {
+        self.0.each_ref().map(std::vec::Vec::as_slice)
+    }
+
+    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 3] {
+        self.0.each_mut().map(std::vec::Vec::as_mut_slice)
+    }
+}
+
+/// A state on a host with a heap.
+#[cfg(any(feature = "std", test))]
+pub type VecState = State<VecVectors>;
+
+#[cfg(any(feature = "std", test))]
+impl VecState {
+    /// At rest, with room for `nodes` nodes.
+    #[must_use]
+    pub fn at_rest(nodes: usize) -> Self {
+        let zero = || std::vec![NodeVector::ZERO; nodes];
+        Self { vectors: VecVectors([zero(), zero(), zero()]), progress: Progress::START }
     }
 }

@@ -1,6 +1,5 @@
 //! Training: the same recipe gives the same weights, a training that was stopped goes on as if it had not been, the
 //! data set is the exact motion, and a recipe that cannot be used says why.
-#![cfg(feature = "train")]
 
 use core::ops::ControlFlow;
 
@@ -197,11 +196,11 @@ fn rough_motion_leads_back_to_the_exact_one() {
     assert_eq!(still.rough.targets.len(), 2 * smooth.targets.len());
     assert!(still.rough.weights.iter().all(|&weight| weight > 0.999));
     let (_, scales) = smooth.ranges();
-    let blocks = still.rough.targets.chunks(2 * smooth.vertices).zip(smooth.targets.chunks(smooth.vertices));
-    for (copies, frame) in blocks {
-        for (found, exact) in copies.iter().zip(frame.iter().cycle()) {
+    let frames = still.rough.targets.chunks(2 * smooth.vertices).zip(smooth.targets.chunks(smooth.vertices));
+    for (copies, frame) in frames {
+        for (rough, exact) in copies.iter().zip(frame.iter().cycle()) {
             for axis in 0..3 {
-                assert!((found[axis] - exact[axis]).abs() < 1e-2 * scales[axis].scale, "{found:?} {exact:?}");
+                assert!((rough[axis] - exact[axis]).abs() < 1e-2 * scales[axis].scale, "{rough:?} {exact:?}");
             }
         }
     }
@@ -211,10 +210,10 @@ fn rough_motion_leads_back_to_the_exact_one() {
     let square = |rows: &[[f32; 3]]| {
         rows.iter().flatten().map(|&value| f64::from(value).powi(2)).sum::<f64>() / (3 * rows.len()) as f64
     };
-    let (found, long) = (square(&rough.targets) - square(&smooth.targets), 3e-4f64);
+    let (added, long) = (square(&rough.targets) - square(&smooth.targets), 3e-4f64);
     let expected = (1.5f64.powi(2) + 0.5f64.powi(2)) * (1e-6 / (long * long)).powi(2);
-    println!("{:.2} of what is expected", found / expected);
-    assert!((found / expected - 1.0).abs() < 0.02);
+    println!("{:.2} of what is expected", added / expected);
+    assert!((added / expected - 1.0).abs() < 0.02);
     let force = |rows: &[[f32; 7]]| rows.iter().map(|row| f64::from(row[4]).abs()).sum::<f64>();
     assert!(force(&rough.inputs) > 10.0 * force(&smooth.inputs));
     let taken = (1.5f64.powi(2) + 0.5f64.powi(2)).sqrt() * 1e-6 / (long * long);

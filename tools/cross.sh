@@ -106,5 +106,6 @@ plain=(--config 'profile.test.package."*".opt-level=0')
 for package in glam libm bytemuck; do
     plain+=(--config "profile.test.package.$package.opt-level=1")
 done
-step "$folder/cargo" test "${plain[@]}" --quiet --no-default-features --features std --target-dir "$here" \
-    --target aarch64-unknown-linux-gnu --lib --test same_bits --test int8 --test elements --test patch
+tests=("${plain[@]}" -p supple --quiet --features std --target-dir "$here" --target aarch64-unknown-linux-gnu)
+step "$folder/cargo" test "${tests[@]}" --lib
+step "$folder/cargo" test "${tests[@]}" --test same_bits --test learned --test physics -- levels:: int8:: elements:: patch::

@@ -10,7 +10,7 @@ if ! command -v valgrind >/dev/null; then
     apt-get update -qq && apt-get install -y -qq --no-install-recommends valgrind
 fi
 kept=benches/instructions.txt
-program=$(cargo bench --quiet --no-run --bench instructions --no-default-features --features std --message-format json |
+program=$(cargo bench -p supple --quiet --no-run --bench instructions --features std --message-format json |
     sed -n 's/.*"executable":"\([^"]*instructions-[^"]*\)".*/\1/p' | tail -1)
 
 # Instructions of a whole run.

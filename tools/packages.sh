@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Tests the C library as others get it: installs it, moves the installed folder, looks at what is in it, builds and runs
-# the examples with two compilers through pkg-config and CMake, shared and static. A line for each check.
+# Tests the C library as others get it: installs it, moves the installed folder, looks at what is in it, builds and runs the
+# installed examples with two compilers through pkg-config and CMake, shared and static. A line for each check.
 #
 #     tools/packages.sh
 #
@@ -33,15 +33,31 @@ fail() {
 }
 
 tools/header.sh --verify || fail "include/supple.h is not what tools/header.sh makes"
-ok "the header is that of src/capi.rs"
+ok "the header is that of src/capi"
 
 # Whatever is checked is checked where nothing was installed to.
-tools/install.sh --prefix "$folder/before"
+tools/install.sh --prefix "$folder/before" | tee "$folder/told"
 mv "$folder/before" "$prefix"
 if grep -rl -e "$folder/before" -e "$PWD" "$prefix"; then
     fail "the above name folders of the build"
 fi
 ok "no file names the folder that it was installed to, nor that of the sources"
+
+# What the installer tells is there, and what else a host needs is what it is here.
+while read -r where files; do
+    for file in $files; do
+        [ -e "$prefix${where#"$folder/before"}/$file" ] || fail "the installer tells of $where/$file, which is not there"
+    done
+done <"$folder/told"
+share=$prefix/share/supple
+for kind in weights/*.weights examples/* meshes/*.msh; do
+    cmp "$kind" "$share/$kind" || fail "$kind is not installed"
+done
+for licence in LICENSE-*; do
+    cmp "$licence" "$share/licences/$licence" || fail "$licence is not installed"
+done
+python3 "$share/tools/mesh_to_c.py" "$share/meshes/lobe.msh" "$folder/lobe_mesh.h"
+ok "weights, examples, meshes and licences are those of the sources, and all that the installer tells of is there"
 
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -1)
 shared=$prefix/lib/libsupple.so
@@ -80,12 +96,12 @@ gcc "$folder/empty.c" -Wl,--gc-sections "${keep[@]}" "$static" -o "$folder/every
 ! nm "$folder/everything" | grep -i panicking || fail "the static library can panic"
 ok "no path to a panic, in the shared library nor in a program with all of the static one"
 
-sources=(examples/bar.c examples/instrument.cpp tests/packages/included.cpp)
+sources=("$share/examples/bar.c" "$share/examples/instrument.cpp" "$PWD/tests/packages/included.cpp")
 
-# run PROGRAM NAME: all programs of a name must say the same, apart from times.
+# run PROGRAM NAME: all programs of a name must say the same, apart from times. Their meshes and weights are the installed ones.
 run() {
     if [ "$2" = instrument ]; then
-        "$1" --frames 3 | awk '/^worst/ { next } /^ *[0-9]+\./ { $2 = $3 = "" } { print }'
+        (cd "$share" && "$1" --frames 3) | awk '/^worst/ { next } /^ *[0-9]+\./ { $2 = $3 = "" } { print }'
     else
         "$1"
     fi >"$folder/said" || fail "$1 failed"

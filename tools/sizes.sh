@@ -17,10 +17,13 @@ lld=$(rustc --print sysroot)/lib/rustlib/x86_64-unknown-linux-gnu/bin/rust-lld
 libraries=$folder/sizes
 mkdir -p "$libraries"
 
+# As the installer does.
+export CARGO_PROFILE_RELEASE_LTO=fat CARGO_PROFILE_RELEASE_CODEGEN_UNITS=1
+
 # thumb FEATURES LEVEL: the static library for the microcontroller, compiled by the compiler in FOLDER.
 thumb() {
-    CARGO_PROFILE_RELEASE_OPT_LEVEL=$2 \
-        "$folder/cargo" rustc --quiet --release --lib --no-default-features --features "$1,panic-handler" \
+    CARGO_PROFILE_RELEASE_OPT_LEVEL=$2 CARGO_PROFILE_RELEASE_LTO=fat CARGO_PROFILE_RELEASE_CODEGEN_UNITS=1 \
+        "$folder/cargo" rustc -p supple --quiet --release --lib --features "$1,panic-handler" \
         --crate-type staticlib --target thumbv7em-none-eabihf -Zbuild-std=core --target-dir "$libraries/build"
     cp "$libraries/build/thumbv7em-none-eabihf/release/libsupple.a" "$libraries/thumb-$2-$1.a"
 }
@@ -28,7 +31,7 @@ thumb() {
 for features in capi capi-neo-hookean; do
     thumb $features 3
     thumb $features s
-    tools/install.sh --prefix "$libraries/$features" --features $features
+    tools/install.sh --prefix "$libraries/$features" --features $features >/dev/null
     cp "$libraries/$features/lib/libsupple.a" "$libraries/x86-64-$features.a"
 done
 
@@ -72,9 +75,9 @@ row() {
 echo '| | Cortex-M4F: code and constants | data | the same for size: code and constants | data | x86-64: code and constants | data |'
 echo '|---|---:|---:|---:|---:|---:|---:|'
 row 'Exact steps, neo-Hookean' capi-neo-hookean "${exact[@]}"
-row 'Exact steps, both laws' capi "${exact[@]}"
+row 'Exact steps, all laws' capi "${exact[@]}"
 row 'Exact and learned steps, neo-Hookean' capi-neo-hookean "${exact[@]}" "${learned[@]}"
-row 'Exact and learned steps, both laws' capi "${exact[@]}" "${learned[@]}"
-row 'Everything, both laws' capi "${all[@]}"
+row 'Exact and learned steps, all laws' capi "${exact[@]}" "${learned[@]}"
+row 'Everything, all laws' capi "${all[@]}"
 echo
-echo "Learned steps need weights as well: $(stat -c %s weights/compact-10-i8.weights) bytes for a compact network of 8-bit integers."
+echo "Learned steps need weights as well: $(stat -c %s weights/compact-10-i8.weights) bytes for a compact network in int8."

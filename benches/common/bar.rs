@@ -1,11 +1,11 @@
 //! The paper's bar with twisting forces at its free corners, as every bench has it.
 
+use supple::element::ElementLaw;
 use supple::loads::NodalForce;
-use supple::material::{Exponential, Law, Tissue};
+use supple::material::{Exponential, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
-use supple::scene::{ElementBlock, NodeInertia, Scene, Support, blocks_for};
-use supple::state::{NodeVector, State};
-use supple::tled::Status;
+use supple::scene::{Support, VecScene};
+use supple::step::Status;
 
 /// The paper's step, s, damping, 1/s, and density, kg/m^3.
 pub(crate) const DT: f32 = 3e-5;
@@ -16,30 +16,25 @@ pub(crate) const EXPONENTIAL: Exponential = Exponential { a: 59.0, b: 8.023, d: 
 /// Nodes at the end that is held.
 pub(crate) const HELD: std::ops::Range<u32> = 0..81;
 
-pub(crate) type BarScene<L> = Scene<Tissue<L>, Vec<NodeInertia>, Vec<ElementBlock>>;
-pub(crate) type HostState = State<Vec<NodeVector>>;
+pub(crate) type BarScene<L> = VecScene<Tissue<L>>;
 
 pub(crate) fn points() -> Vec<[f32; 3]> {
     Bar::PAPER.points().collect()
 }
 
-pub(crate) fn scene<L: Law>(law: L) -> BarScene<L> {
+pub(crate) fn scene<L: ElementLaw>(law: L) -> BarScene<L> {
     let fixed: Vec<_> = HELD.map(Support::fixed).collect();
     scene_of(law, &points(), &Bar::PAPER.tets().collect::<Vec<_>>(), &fixed)
 }
 
-pub(crate) fn scene_of<L: Law>(
+pub(crate) fn scene_of<L: ElementLaw>(
     law: L,
     points: &[[f32; 3]],
     tets: &[[u32; 4]],
     fixed: &[Support],
 ) -> BarScene<L> {
     let mesh = Mesh::new(points, tets, Winding::Checked).expect("the bar is sound");
-    let nodes = vec![NodeInertia::EMPTY; points.len()];
-    let blocks = vec![ElementBlock::EMPTY; blocks_for(tets.len())];
-    let mut scene = Scene::over(Tissue { law, density: DENSITY }, nodes, blocks);
-    scene.build(&mesh, fixed).expect("the bar is sound");
-    scene
+    VecScene::build(Tissue { law, density: DENSITY }, &mesh, fixed).expect("the bar is sound")
 }
 
 /// 0.07 N at each free corner.
@@ -52,11 +47,6 @@ pub(crate) fn forces() -> [NodalForce; 4] {
     })
 }
 
-pub(crate) fn state(nodes: usize) -> HostState {
-    let zero = || vec![NodeVector::ZERO; nodes];
-    State::over(zero(), zero(), zero())
-}
-
 pub(crate) fn moved(status: Status) {
-    assert!(matches!(status, Status::Ok | Status::Limited { .. }), "{status:?}");
+    assert!(status.is_taken(), "{status:?}");
 }

@@ -4,13 +4,13 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-const CHAINS: usize = 12;
+const SUMS: usize = 12;
 const ROUNDS: usize = 20_000;
 
-/// Independent chains of vector multiply-adds, as many as the pipelines hold.
+/// Independent sums of vector multiply-adds, as many as the pipelines hold.
 #[inline(always)]
-fn chains<const L: usize>(fused: impl Fn(f32, f32, f32) -> f32) -> f32 {
-    let mut sums = black_box([[1.0f32; L]; CHAINS]);
+fn sums<const L: usize>(fused: impl Fn(f32, f32, f32) -> f32) -> f32 {
+    let mut sums = black_box([[1.0f32; L]; SUMS]);
     let (factor, add) = (black_box([0.999_9f32; L]), black_box([1e-4f32; L]));
     for _ in 0..ROUNDS {
         for sum in &mut sums {
@@ -24,16 +24,16 @@ fn chains<const L: usize>(fused: impl Fn(f32, f32, f32) -> f32) -> f32 {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn chains_fma() -> f32 {
-    chains::<8>(|a, b, c| a.mul_add(b, c))
+fn sums_fma() -> f32 {
+    sums::<8>(|a, b, c| a.mul_add(b, c))
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,fma")]
-fn chains_avx512() -> f32 {
+fn sums_avx512() -> f32 {
     use std::arch::x86_64::{_mm512_fmadd_ps, _mm512_reduce_add_ps, _mm512_set1_ps};
-    // By name: the compiler does not find these vectors by itself.
-    let mut sums = [_mm512_set1_ps(black_box(1.0)); CHAINS];
+    // Explicitly: the compiler does not choose these vectors by itself.
+    let mut sums = [_mm512_set1_ps(black_box(1.0)); SUMS];
     let (factor, add) = (_mm512_set1_ps(black_box(0.999_9)), _mm512_set1_ps(black_box(1e-4)));
     for _ in 0..ROUNDS {
         for sum in &mut sums {
@@ -47,7 +47,7 @@ fn chains_avx512() -> f32 {
     total
 }
 
-fn best<F: Fn() -> f32>(rounds: usize, flops: f64, run: F) -> f64 {
+fn most<F: Fn() -> f32>(rounds: usize, flops: f64, run: F) -> f64 {
     (0..rounds)
         .map(|_| {
             let start = Instant::now();
@@ -59,7 +59,7 @@ fn best<F: Fn() -> f32>(rounds: usize, flops: f64, run: F) -> f64 {
 
 /// GFLOP/s of one core with what the portable build may use.
 pub(crate) fn baseline(rounds: usize) -> f64 {
-    best(rounds, (2 * CHAINS * 4 * ROUNDS) as f64, || chains::<4>(|a, b, c| a * b + c))
+    most(rounds, (2 * SUMS * 4 * ROUNDS) as f64, || sums::<4>(|a, b, c| a * b + c))
 }
 
 /// GFLOP/s of one core with its widest instructions, the best of so many rounds of 40 us. A machine that others use changes
@@ -69,13 +69,13 @@ pub(crate) fn widest(rounds: usize) -> f64 {
     if std::arch::is_x86_feature_detected!("avx512f") {
         #[allow(unsafe_code)]
         // SAFETY: the feature was detected.
-        return best(rounds, (2 * CHAINS * 16 * ROUNDS) as f64, || unsafe { chains_avx512() });
+        return most(rounds, (2 * SUMS * 16 * ROUNDS) as f64, || unsafe { sums_avx512() });
     }
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
         #[allow(unsafe_code)]
         // SAFETY: both features were detected.
-        return best(rounds, (2 * CHAINS * 8 * ROUNDS) as f64, || unsafe { chains_fma() });
+        return most(rounds, (2 * SUMS * 8 * ROUNDS) as f64, || unsafe { sums_fma() });
     }
     baseline(rounds)
 }

@@ -1,4 +1,4 @@
-//! What a person writes first: one tetrahedron after the other, float32, `F = I + grad u`, `F^-T` by its
+//! The plain scalar code that a person writes first: tetrahedron by tetrahedron, float32, `F = I + grad u`, `F^-T` by its
 //! cofactors over `J`, `powf` and `exp` of the standard library. The measure of every faster path.
 
 use supple::mesh::Mesh;

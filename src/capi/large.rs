@@ -1,22 +1,22 @@
 //! Steps beyond the critical one for C: mass-scaled, multilevel, damped.
 
 use core::ffi::c_void;
+use core::mem::MaybeUninit;
 
-use crate::inertia::{
-    Core, Damper, LatticeNode, Storage, damped_numbers_for, damped_vectors_for, lattice_functions,
-    numbers_for, suggested_damped_lattice, suggested_lattice, vectors_for,
-};
+use crate::inertia::{Cells, Damper, Grid, LargeModel, Method, vectors_for_lattice};
 use crate::mlp::Network;
 use crate::state::NodeVector;
-use crate::tled::{Status, Step};
+use crate::step::Step;
 
 use super::SUPPLE_NONE;
-use super::loads::{Acting, belongs, supple_loads};
-use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, one, place_for, same_abi};
+use super::loads::{CallLoads, supple_loads};
+use super::memory::{
+    self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for, same_abi,
+};
 use super::scene::{AnyScene, carved, check_choice, supple_scene, with_scene};
-use super::state::{View, supple_state};
+use super::state::{opened_of, supple_state};
 use super::status::{Answer, supple_error, supple_status};
-use super::step::{reported, supple_report, taken};
+use super::step::{answer, reported, supple_report, take_steps};
 use supple_status::*;
 
 /// Inertia is raised where the step would be unstable.
@@ -33,7 +33,7 @@ pub const SUPPLE_LATTICE_FUNCTIONS: u32 = 128;
 const _: () = assert!(SUPPLE_LATTICE_POINTS as usize == crate::inertia::MAX_POINTS);
 const _: () = assert!(SUPPLE_LATTICE_FUNCTIONS as usize == crate::inertia::MAX_FUNCTIONS);
 
-/// What large steps need.
+/// What steps beyond the critical one need.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_large_config {
@@ -45,11 +45,13 @@ pub struct supple_large_config {
     pub method: u32,
     /// Length of a step, s.
     pub seconds: f32,
-    /// Damping proportional to mass, 1/s, zero or more.
+    /// Damping proportional to mass, 1/s, zero or more. That of supple_step_config is not used here: give the same value twice if
+    /// both kinds of steps move a state.
     pub damping: f32,
     /// Cells of the lattice along x, y, z; zeros: chosen for the scene. Not used by SUPPLE_MASS_SCALED.
     pub cells: [u32; 3],
-    /// For SUPPLE_DAMPED the weight file of a damper, at a multiple of 4 bytes. It is used where it is and must stay. NULL otherwise.
+    /// For SUPPLE_DAMPED the weight file of a damper, at a multiple of 4 bytes. It is used where it is and must stay. NULL
+    /// otherwise.
     pub weights: *const c_void,
     /// Its bytes.
     pub weights_bytes: usize,
@@ -61,9 +63,9 @@ pub struct supple_large_config {
 pub struct supple_large {
     head: Head,
     nodes: u32,
-    sizes: Sizes,
-    damper: Option<Damper<'static>>,
-    core: Core,
+    /// In its storage.
+    vectors: usize,
+    model: LargeModel<'static>,
 }
 
 // SAFETY: `repr(C)`, begins with a head.
@@ -72,70 +74,61 @@ unsafe impl Object for supple_large {
     const FRONT: usize = 40960;
 }
 
-/// Bytes before the arrays of large steps.
+/// Bytes before the arrays of a supple_large.
 pub const SUPPLE_LARGE_FRONT: usize = 40960;
 const _: () = assert!(SUPPLE_LARGE_FRONT == <supple_large as Object>::FRONT);
 
-/// Entries of the storage.
-#[derive(Clone, Copy)]
-struct Sizes {
-    cells: [u32; 3],
+/// A configuration, checked against a scene with these points.
+struct Request<'a> {
+    config: &'a supple_large_config,
+    points: &'a [[f32; 3]],
+    cells: Cells,
+    /// In the storage.
     vectors: usize,
-    places: usize,
-    numbers: usize,
 }
 
-impl Sizes {
-    fn of(scene: &AnyScene<'_>, points: &[[f32; 3]], config: &supple_large_config) -> Answer<Self> {
-        let nodes = with_scene!(scene, scene => scene.node_count());
+impl<'a> Request<'a> {
+    /// # Safety
+    /// As at [`supple_large_size`].
+    unsafe fn of(any: &AnyScene<'_>, points: *const f32, config: *const supple_large_config) -> Answer<Self> {
+        // SAFETY: the caller's promise.
+        let (config, points) = unsafe {
+            let config = one(config)?;
+            same_abi::<supple_large_config>(config.struct_size, config.abi)?;
+            check_choice(SUPPLE_NONE as usize, config.method, SUPPLE_DAMPED)?;
+            (config, array(points.cast::<[f32; 3]>(), any.node_count())?)
+        };
+        let cells = if config.cells == [0; 3] { Cells::Suggested } else { Cells::Given(config.cells) };
         let damped = config.method == SUPPLE_DAMPED;
-        let vectors = match config.method {
-            SUPPLE_MASS_SCALED => {
-                return Ok(Self { cells: [0; 3], vectors: vectors_for(nodes), places: 0, numbers: 0 });
+        let grid = match config.method {
+            SUPPLE_MASS_SCALED => Grid::default(),
+            _ => with_scene!(any, scene => cells.grid(damped, scene, points)?),
+        };
+        Ok(Self { config, points, cells, vectors: vectors_for_lattice(any.node_count(), grid, damped) })
+    }
+
+    /// # Safety
+    /// As at [`supple_large_init`]: the weights stay.
+    unsafe fn method(&self) -> Answer<Method<'static>> {
+        let Self { config, cells, .. } = *self;
+        Ok(match config.method {
+            SUPPLE_MASS_SCALED => Method::MassScaled,
+            SUPPLE_MULTILEVEL => Method::Multilevel(cells),
+            _ => {
+                // SAFETY: the caller's promise.
+                let weights = unsafe { lasting_bytes(config.weights, config.weights_bytes)? };
+                Method::Damped(Damper::new(Network::parse(weights)?)?, cells)
             }
-            SUPPLE_MULTILEVEL => vectors_for(nodes),
-            _ => damped_vectors_for(nodes),
-        };
-        let (cells, functions) = if config.cells == [0; 3] {
-            with_scene!(scene, scene => {
-                if damped { suggested_damped_lattice(scene, points) } else { suggested_lattice(scene, points) }
-            })
-        } else {
-            let cells = config.cells;
-            (cells, with_scene!(scene, scene => lattice_functions(scene, points, cells)?))
-        };
-        let numbers = if damped { damped_numbers_for } else { numbers_for };
-        Ok(Self { cells, vectors, places: nodes, numbers: numbers(cells, functions) })
-    }
-
-    fn layout(&self) -> Layout {
-        let Self { vectors, places, numbers, .. } = *self;
-        Layout::of::<supple_large>().and::<NodeVector>(vectors).and::<LatticeNode>(places).and::<f32>(numbers)
+        })
     }
 }
 
-/// A configuration that makes sense, and the scene's points.
-///
-/// # Safety
-/// As at [`supple_large_size`].
-unsafe fn checked<'a>(
-    any: &AnyScene<'_>,
-    points: *const f32,
-    config: *const supple_large_config,
-) -> Answer<(&'a [[f32; 3]], &'a supple_large_config, Sizes)> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        let config = one(config)?;
-        same_abi::<supple_large_config>(config.struct_size, config.abi)?;
-        check_choice(SUPPLE_NONE as usize, config.method, SUPPLE_DAMPED)?;
-        let nodes = with_scene!(any, scene => scene.node_count());
-        let points = array(points.cast::<[f32; 3]>(), nodes)?;
-        Ok((points, config, Sizes::of(any, points, config)?))
-    }
+fn layout(vectors: usize) -> Layout {
+    Layout::of::<supple_large>().and::<NodeVector>(vectors)
 }
 
-/// Writes how many bytes of memory large steps of a scene need; it depends on the lattice. For cells that you give SUPPLE_LARGE_SIZE is
-/// never less.
+/// Writes how many bytes of memory a supple_large needs for a scene; it depends on the lattice. For cells that you give
+/// SUPPLE_LARGE_SIZE is never less.
 ///
 /// @param points the points that the scene was built from, three coordinates each.
 /// @param error may be NULL.
@@ -150,16 +143,15 @@ pub unsafe extern "C" fn supple_large_size(
     // SAFETY: what the header asks of the caller.
     let size = || unsafe {
         let (any, bytes) = (carved(scene)?, place_for(bytes)?);
-        let (_, _, sizes) = checked(&any, points, config)?;
-        bytes.write(sizes.layout().bytes());
+        bytes.write(layout(Request::of(&any, points, config)?.vectors).bytes());
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
     unsafe { memory::answered(size(), error) }
 }
 
-/// Prepares large steps from the state as it is, in `memory` of at least supple_large_size bytes, aligned to SUPPLE_ALIGN. It
-/// takes as long as some steps.
+/// Prepares steps beyond the critical one, from the state as it is, in `memory` of at least supple_large_size bytes, aligned to
+/// SUPPLE_ALIGN. It takes as long as some steps.
 ///
 /// @param points the points that the scene was built from, three coordinates each.
 /// @param error may be NULL.
@@ -177,28 +169,23 @@ pub unsafe extern "C" fn supple_large_init(
     // SAFETY: what the header asks of the caller: weights stay as long as the object is used.
     let init = || unsafe {
         let (any, large) = (carved(scene)?, place_for(large)?);
-        belongs(memory::change(state)?.nodes, &any)?;
-        let (points, config, sizes) = checked(&any, points, config)?;
-        let damper = if config.method == SUPPLE_DAMPED {
-            if config.weights.is_null() {
-                return Err(SUPPLE_E_NULL.into());
-            }
-            let weights: &'static [u8] = array(config.weights.cast(), config.weights_bytes)?;
-            Some(Damper::over(Network::parse(weights)?)?)
-        } else {
-            None
-        };
-        let step = Step::insist(config.seconds, config.damping)?;
-        let place = Place::new(memory, bytes, sizes.layout())?;
-        let nodes = with_scene!(&any, scene => scene.node_count() as u32);
-        let core = if damper.is_some() { Core::DAMPED } else { Core::NEW };
-        let object = place.put(|head| supple_large { head, nodes, sizes, damper, core });
-        let storage = clean(storage(object));
-        let core = &mut (*object).core;
-        View::of(state).with(|state| {
-            with_scene!(&any, scene => core.prepare(scene, points, state, step, sizes.cells, storage))
-        })?;
-        place.done::<supple_large>();
+        let state = opened_of(&any, state)?;
+        let request = Request::of(&any, points, config)?;
+        let method = request.method()?;
+        let step = Step::unchecked(request.config.seconds, request.config.damping)?;
+        let Request { points, vectors, .. } = request;
+        let place = Place::new(memory, bytes, layout(vectors))?;
+        let nodes = any.node_count() as u32;
+        let storage = storage(place.arrays::<supple_large>(), vectors);
+        let object = place.object::<supple_large>();
+        // Of 38 kB: it is made where it stays, not on the stack.
+        let model = &mut *(&raw mut (*object).model).cast::<MaybeUninit<_>>();
+        with_scene!(any, scene => {
+            LargeModel::prepare_in(model, method, scene, points, state, step, storage)?;
+        });
+        (&raw mut (*object).nodes).write(nodes);
+        (&raw mut (*object).vectors).write(vectors);
+        (&raw mut (*object).head).write(place.head::<supple_large>());
         large.write(object);
         Ok(SUPPLE_OK)
     };
@@ -207,29 +194,14 @@ pub unsafe extern "C" fn supple_large_init(
 }
 
 /// # Safety
-/// `object` has been put or is one, and nobody else uses it.
-unsafe fn storage<'a>(object: *mut supple_large) -> Storage<'a> {
-    // SAFETY: the caller's promise. Any bits are vectors, places and numbers.
-    unsafe {
-        let Sizes { vectors, places, numbers, .. } = (*object).sizes;
-        let mut arrays = Arrays::behind(object.cast_const());
-        Storage {
-            vectors: arrays.next::<NodeVector>(vectors),
-            places: arrays.next::<LatticeNode>(places),
-            dense: arrays.next::<f32>(numbers),
-        }
-    }
+/// The arrays are those of a supple_large, and nobody else uses them.
+unsafe fn storage<'a>(mut arrays: Arrays, vectors: usize) -> &'a mut [NodeVector] {
+    // SAFETY: the caller's promise. Any bits are vectors.
+    unsafe { arrays.change(vectors) }
 }
 
-fn clean(storage: Storage<'_>) -> Storage<'_> {
-    storage.vectors.fill(NodeVector::ZERO);
-    storage.places.fill(LatticeNode::EMPTY);
-    storage.dense.fill(0.0);
-    storage
-}
-
-/// Takes `count` large steps. Stops at the first that is not to be believed: that one is not taken, the state is as before it,
-/// and the status tells. They run on the calling thread alone, and need no supple_set_step.
+/// Takes `count` steps of the prepared method and length. Stops at the first that is not to be believed: that one is not taken,
+/// the state is as before it, and the status tells. They run on the calling thread alone, and need no supple_set_step.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param report may be NULL; is written whatever the status.
@@ -243,28 +215,29 @@ pub unsafe extern "C" fn supple_large_step(
     report: *mut supple_report,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let step = |found: &mut supple_report| unsafe {
+    let step = |report: &mut supple_report| unsafe {
         let any = carved(scene)?;
-        let mut acting = Acting::of(loads, &any)?;
-        belongs(memory::change(state)?.nodes, &any)?;
-        belongs(memory::change(large)?.nodes, &any)?;
-        let (core, damper) = (&mut (*large).core, (*large).damper.as_ref());
-        View::of(state).with(|state| {
-            let (mut held_back, mut lattice_share) = (0, 1.0);
-            let answer = with_scene!(&any, scene => taken(count, count, state, &mut acting, found, |loads, state| {
-                let status = core.step(scene, loads, state, storage(large), damper);
-                // What was refused has no report of its own.
-                if let Status::Ok | Status::Limited { .. } = status {
-                    held_back = held_back.max(core.report().held_back);
-                    lattice_share = f32::min(lattice_share, core.report().coarse_share);
-                }
-                status
-            }));
-            found.close(state);
-            (found.held_back, found.added_mass) = (held_back, core.report().added_mean);
-            (found.lattice_share, found.error_estimate) = (lattice_share, core.report().error);
-            answer
-        })
+        let mut loads = CallLoads::of(loads, &any)?;
+        any.fits(memory::read(state.cast_const())?.nodes)?;
+        let (supple_large { nodes, vectors, model, .. }, arrays) = memory::open(large)?;
+        any.fits(*nodes)?;
+        let storage = storage(arrays, *vectors);
+        let mut state = opened_of(&any, state)?;
+        let count = count.into();
+        let (mut held_back, mut lattice_share) = (0, 1.0);
+        let status = with_scene!(any, scene => take_steps(count, count, &mut state, &mut loads, report, |loads, state| {
+            let status = model.with_storage(storage).step(scene, loads, state);
+            // What was refused has no report of its own.
+            if status.is_taken() {
+                held_back = held_back.max(model.report().held_back);
+                lattice_share = f32::min(lattice_share, model.report().coarse_share);
+            }
+            status
+        }));
+        report.close(&state);
+        (report.held_back, report.added_mass) = (held_back, model.report().added_mean);
+        (report.lattice_share, report.error_estimate) = (lattice_share, model.report().error);
+        answer(&status)
     };
     // SAFETY: as above.
     unsafe { reported(report, step) }

@@ -1,23 +1,23 @@
-//! The learned step for C: the exact step leads, a network takes over, and what it does that energy does not explain may be
-//! undone.
+//! The learned step for C: a network moves the state after a lead-in of exact steps, and with fallback a step that energy does
+//! not explain is undone ([`crate::learned`]). Times in s.
 
 use core::ffi::c_void;
 
-use crate::mlp::{Network, TrainedLaw};
-use crate::state::{NodeVector, State};
-use crate::surrogate::{self, Surrogate, SurrogateReport, Vertex};
-use crate::tled::{self, Status, Step};
+use crate::learned::{LearnedModel, LearnedReport, vectors_for};
+use crate::mlp::Network;
+use crate::state::{NodeVector, StateView};
+use crate::step::{Status, Step};
+use crate::tled;
 
 use super::SUPPLE_NONE;
-use super::loads::{Acting, belongs, supple_loads};
-use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, one, place_for, same_abi};
-use super::scene::{
-    AnyScene, SUPPLE_EXPONENTIAL, SUPPLE_NEO_HOOKEAN, carved, check_choice, supple_scene, supple_tissue,
-    with_scene,
+use super::loads::{CallLoads, supple_loads};
+use super::memory::{
+    self, Arrays, Head, Layout, Object, Place, lasting_bytes, magic, one, place_for, same_abi,
 };
-use super::state::{Moment, View, step_of, supple_state};
-use super::status::{Answer, supple_error, supple_status};
-use super::step::{HostThreads, reported, supple_report, supple_threads, taken, worse};
+use super::scene::{AnyScene, carved, check_choice, supple_scene, supple_tissue, with_scene};
+use super::state::{opened_of, supple_state};
+use super::status::{Answer, status_of, supple_error, supple_status};
+use super::step::{HostThreads, answer, reported, supple_report, supple_threads, take_steps, worse};
 use supple_status::*;
 
 /// Share of the vertices outside what training has seen beyond which a step is remarked upon.
@@ -32,12 +32,12 @@ pub struct supple_learned_config {
     /// SUPPLE_ABI.
     pub abi: u32,
     /// 1: a learned step that diverges, or has more kinetic energy than loads and supports explain, is undone and the exact
-    /// step takes over for good. 0: the caller decides by status and report. Needs memory for two vectors a node.
+    /// step takes over for good. 0: the caller decides by status and report. 1 needs memory for two vectors a node more.
     pub fallback: u32,
     /// 0.
     pub reserved: u32,
-    /// A weight file, at a multiple of 4 bytes, better of 64. It is used where it is, without a copy: it must stay, unchanged, as long as
-    /// the object is used.
+    /// A weight file, at a multiple of 4 bytes, better of 64. It is used where it is, without a copy: it must stay, unchanged, as
+    /// long as the object is used.
     pub weights: *const c_void,
     /// Its bytes; what lies behind the file is ignored.
     pub weights_bytes: usize,
@@ -49,11 +49,7 @@ pub struct supple_learned_config {
 pub struct supple_learned {
     head: Head,
     nodes: u32,
-    fallback: bool,
-    fell_back: bool,
-    /// Steps of the state when the exact step last led or the network last moved it; nothing before.
-    led: Option<u64>,
-    surrogate: Surrogate<'static, ()>,
+    model: LearnedModel<'static>,
 }
 
 // SAFETY: `repr(C)`, begins with a head.
@@ -74,7 +70,7 @@ pub struct supple_learned_facts {
     pub seconds: f32,
     /// Damping of the training, 1/s; the state's step must have the same.
     pub damping: f32,
-    /// Law of the training, SUPPLE_NEO_HOOKEAN or SUPPLE_EXPONENTIAL; in another tissue the network's error is not known.
+    /// Law of the training, SUPPLE_NEO_HOOKEAN and so on; in another tissue the network's error is not known.
     pub law: u32,
     /// Its constants and density, as in a scene.
     pub tissue: supple_tissue,
@@ -86,17 +82,15 @@ pub struct supple_learned_facts {
     pub fell_back: u32,
 }
 
-fn layout(nodes: u32, fallback: u32) -> Layout {
-    let nodes = nodes as usize;
-    let copies = if fallback == 0 { 0 } else { nodes };
-    Layout::of::<supple_learned>().and::<Vertex>(nodes).and::<NodeVector>(copies).and::<NodeVector>(copies)
+fn layout(nodes: u32, fallback: bool) -> Layout {
+    Layout::of::<supple_learned>().and::<NodeVector>(vectors_for(nodes as usize, fallback))
 }
 
 /// Bytes of memory that learned steps of so many nodes need, with fallback (1) or without (0). SUPPLE_LEARNED_SIZE is the
 /// same as a constant.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_learned_size(nodes: u32, fallback: u32) -> usize {
-    layout(nodes, fallback).bytes()
+    layout(nodes, fallback != 0).bytes()
 }
 
 /// Prepares learned steps of a scene in `memory` of at least supple_learned_size bytes, aligned to SUPPLE_ALIGN.
@@ -117,25 +111,13 @@ pub unsafe extern "C" fn supple_learned_init(
         same_abi::<supple_learned_config>(config.struct_size, config.abi)?;
         check_choice(SUPPLE_NONE as usize, config.fallback, 1)?;
         check_choice(SUPPLE_NONE as usize, config.reserved, 0)?;
-        let weights: &'static [u8] = match config.weights.is_null() {
-            true => return Err(SUPPLE_E_NULL.into()),
-            false => array(config.weights.cast(), config.weights_bytes)?,
-        };
-        let surrogate = Surrogate::over(Network::parse(weights)?, ())?;
-        let nodes = with_scene!(any, scene => scene.node_count() as u32);
-        let place = Place::new(memory, bytes, layout(nodes, config.fallback))?;
         let fallback = config.fallback == 1;
-        let object = place.put(|head| supple_learned {
-            head,
-            nodes,
-            fallback,
-            fell_back: false,
-            led: None,
-            surrogate,
-        });
-        vertices(object).fill(Vertex::NEW);
-        place.done::<supple_learned>();
-        learned.write(object);
+        let weights = lasting_bytes(config.weights, config.weights_bytes)?;
+        let mut model = LearnedModel::new(Network::parse(weights)?, fallback)?;
+        let nodes = any.node_count() as u32;
+        let place = Place::new(memory, bytes, layout(nodes, fallback))?;
+        model.with_storage(storage(place.arrays::<supple_learned>(), nodes, fallback)).reset();
+        learned.write(place.put(|head| supple_learned { head, nodes, model }));
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
@@ -143,23 +125,23 @@ pub unsafe extern "C" fn supple_learned_init(
 }
 
 /// # Safety
-/// `object` has been put or is one, and nobody else uses it.
-unsafe fn vertices<'a>(object: *mut supple_learned) -> &'a mut [Vertex] {
-    // SAFETY: the caller's promise. Any bits are vertices.
-    unsafe { Arrays::behind(object.cast_const()).next((*object).nodes as usize) }
+/// The arrays are those of learned steps of so many nodes, and nobody else uses them.
+unsafe fn storage<'a>(mut arrays: Arrays, nodes: u32, fallback: bool) -> &'a mut [NodeVector] {
+    // SAFETY: the caller's promise. Any bits are vectors.
+    unsafe { arrays.change(vectors_for(nodes as usize, fallback)) }
 }
 
-/// For a motion from rest: frames as at the start, the network has not been led, the exact step has not taken over.
+/// For a motion from rest: frames as at the start, no lead-in yet, the exact step has not taken over.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_learned_reset(learned: *mut supple_learned) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let reset = || unsafe {
-        let object = memory::change(learned)?;
-        (object.led, object.fell_back) = (None, false);
-        vertices(learned).fill(Vertex::NEW);
+        let (supple_learned { nodes, model, .. }, arrays) = memory::open(learned)?;
+        let fallback = model.undoes();
+        model.with_storage(storage(arrays, *nodes, fallback)).reset();
         Ok(SUPPLE_OK)
     };
-    reset().unwrap_or_else(|error: supple_error| error.status)
+    status_of(reset())
 }
 
 /// Writes what a network was trained for.
@@ -169,44 +151,40 @@ pub unsafe extern "C" fn supple_learned_describe(
     facts: *mut supple_learned_facts,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let tell = || unsafe {
+    let describe = || unsafe {
         let (object, facts) = (memory::read(learned)?, place_for(facts)?);
-        let recipe = object.surrogate.recipe();
-        let (law, constants) = match recipe.law {
-            TrainedLaw::NeoHookean { c, d, .. } => (SUPPLE_NEO_HOOKEAN, [c, d, 0.0]),
-            TrainedLaw::Exponential { a, b, d, .. } => (SUPPLE_EXPONENTIAL, [a, b, d]),
-        };
+        let network = object.model.network();
+        let recipe = network.recipe();
         facts.write(supple_learned_facts {
             seconds: recipe.step,
             damping: recipe.damping,
-            law,
-            tissue: supple_tissue { constants, density: recipe.density },
+            // The literal form of a law has the number of the law.
+            law: recipe.law.code() / 2,
+            tissue: supple_tissue { constants: recipe.law.values(), density: recipe.density },
             exact_seconds: recipe.exact_step,
-            multiply_adds: object.surrogate.multiply_adds() as u64,
-            fell_back: object.fell_back.into(),
+            multiply_adds: network.multiply_adds() as u64,
+            fell_back: object.model.fell_back().is_some().into(),
         });
         Ok(SUPPLE_OK)
     };
-    tell().unwrap_or_else(|error: supple_error| error.status)
+    status_of(describe())
 }
 
-/// What both calls work with.
-struct Parts<'a> {
+/// What a call that takes learned steps, or a lead-in, works with.
+struct Call<'a> {
     any: AnyScene<'a>,
-    acting: Acting<'a>,
-    object: &'a mut supple_learned,
-    vertices: &'a mut [Vertex],
-    /// Displacements and increments from before a step, with fallback.
-    copies: [&'a mut [NodeVector]; 2],
-    view: View<'a>,
+    loads: CallLoads<'a>,
+    model: &'a mut LearnedModel<'static>,
+    storage: &'a mut [NodeVector],
+    state: StateView<'a>,
     exact: Step,
     /// Exact steps in one of the network's.
     ratio: u32,
     threads: HostThreads,
-    found: &'a mut supple_report,
+    report: &'a mut supple_report,
 }
 
-impl<'a> Parts<'a> {
+impl<'a> Call<'a> {
     /// # Safety
     /// As at [`supple_learned_step`].
     unsafe fn of(
@@ -215,149 +193,85 @@ impl<'a> Parts<'a> {
         state: *mut supple_state,
         learned: *mut supple_learned,
         threads: *const supple_threads,
-        found: &'a mut supple_report,
+        report: &'a mut supple_report,
     ) -> Answer<Self> {
         // SAFETY: the caller's promise.
         unsafe {
             let any = carved(scene)?;
-            let acting = Acting::of(loads, &any)?;
-            let moved = memory::change(state)?;
-            belongs(moved.nodes, &any)?;
-            let (object, mut arrays) = memory::open(learned)?;
-            belongs(object.nodes, &any)?;
+            let loads = CallLoads::of(loads, &any)?;
+            any.fits(memory::read(state.cast_const())?.nodes)?;
+            let (supple_learned { nodes, model, .. }, arrays) = memory::open(learned)?;
+            any.fits(*nodes)?;
             let threads = HostThreads::of(threads)?;
-            let exact = step_of(moved)?;
-            let recipe = object.surrogate.recipe();
-            if (exact.damping() - recipe.damping).abs() > 1e-6 * recipe.damping {
-                let wrong = supple_error::from(SUPPLE_E_DAMPING);
-                return Err(wrong.value(exact.damping().into(), recipe.damping.into()));
-            }
-            let ratio = recipe.step / exact.seconds() + 0.5;
-            let whole = ratio as u32;
-            if whole < 1 || (whole as f32 * exact.seconds() - recipe.step).abs() > 1e-4 * recipe.step {
-                let wrong = supple_error::from(SUPPLE_E_STEP_RATIO);
-                return Err(wrong.value(recipe.step.into(), exact.seconds().into()));
-            }
-            let nodes = object.nodes as usize;
-            let vertices = arrays.next::<Vertex>(nodes);
-            let copies = if object.fallback { nodes } else { 0 };
-            let copies = [arrays.next::<NodeVector>(copies), arrays.next::<NodeVector>(copies)];
-            let view = View::of(state);
-            Ok(Self { any, acting, object, vertices, copies, view, exact, ratio: whole, threads, found })
+            let exact = (*state).step()?;
+            let ratio = model.exact_steps(&exact)?;
+            let storage = storage(arrays, *nodes, model.undoes());
+            let state = opened_of(&any, state)?;
+            Ok(Self { any, loads, model, storage, state, exact, ratio, threads, report })
         }
     }
 
-    /// Takes the exact steps of one of the network's. Motions go evenly over all `left` of the network's steps.
-    fn exact_steps(&mut self, left: u32) -> Answer<supple_status> {
-        let Self { any, acting, view, exact, ratio, threads, found, .. } = self;
-        let left = left.saturating_mul(*ratio);
-        view.with(|state| {
-            with_scene!(&*any, scene => taken(*ratio, left, state, acting, found, |loads, state| {
-                tled::step_in_parts(scene, loads, state, exact, &*threads)
-            }))
-        })
-    }
-
-    /// Exact steps, with frames that follow.
-    fn lead(&mut self, left: u32) -> Answer<supple_status> {
-        for (vertex, &displacement) in self.vertices.iter_mut().zip(self.view.state.displacements()) {
-            vertex.remember(displacement);
-        }
-        self.object.led = None;
-        let answer = self.exact_steps(left)?;
-        for (vertex, &displacement) in self.vertices.iter_mut().zip(self.view.state.displacements()) {
-            vertex.follow_since(displacement);
-        }
-        self.object.led = Some(self.view.state.steps());
-        Ok(answer)
-    }
-
-    /// One learned step, or exact ones once these have taken over.
-    fn learned(&mut self, left: u32) -> Answer<supple_status> {
-        if self.object.fell_back {
-            return self.exact_steps(left).map(|_| SUPPLE_FELL_BACK);
-        }
-        let network = self.object.surrogate.seconds();
-        let Self { any, acting, object, vertices, copies, view, threads, found, .. } = self;
-        let (status, before) = view.with(|state| {
-            if (state.dt - network).abs() > 1e-5 * network {
-                // It has just been led. The exact step goes on from its own increments, the network from those of its own step.
-                let kept = vertices.iter().map(Vertex::kept);
-                state.increment.iter_mut().zip(kept).for_each(|(increment, kept)| *increment = kept);
-                state.dt = network;
-            }
-            let before = object.fallback.then(|| remember(state, copies));
-            let loads = acting.next(state.displacements(), left);
-            let mut surrogate = object.surrogate.with(vertices);
-            let status = with_scene!(&*any, scene => {
-                surrogate::step_in_parts(scene, &loads, state, &mut surrogate, &*threads as &HostThreads)
-            });
-            object.surrogate.set_report(*surrogate.report());
-            (status, before)
+    /// Exact steps while the frames follow, as long as one of the network's steps. Motions go evenly over all `left` of these.
+    fn lead(&mut self, left: u64) -> Answer<supple_status> {
+        let Self { any, loads, model, storage, state, exact, ratio, threads, report } = self;
+        let status = model.with_storage(storage).lead_interval(state, |state| {
+            exact_steps((any, exact, threads), *ratio, left, state, loads, report)
         });
-        let SurrogateReport { clipped, outside, .. } = *self.object.surrogate.report();
-        found.clipped = found.clipped.max(clipped);
-        found.outside = found.outside.max(outside);
-        if let Some(before) = before.filter(|_| is_unexplained(&status)) {
-            self.object.fell_back = true;
-            let (copies, exact) = (&self.copies, self.exact.seconds());
-            self.view.with(|state| {
-                restore(state, copies, before);
-                state.respan(exact);
-            });
-            return self.exact_steps(left).map(|_| SUPPLE_FELL_BACK);
+        answer(&status)
+    }
+
+    /// One learned step; or exact ones, if it was undone or these have taken over.
+    fn step(&mut self, left: u64) -> Answer<supple_status> {
+        let Self { any, loads, model, storage, state, exact, ratio, threads, report } = self;
+        if model.fell_back().is_none() {
+            let mut learned = model.with_storage(storage);
+            let loads = loads.of_next_step(state.displacements(), left);
+            let seconds = exact.seconds();
+            let tried = with_scene!(any, scene => learned.try_step(scene, &loads, state, seconds, threads))?;
+            let LearnedReport { clipped, outside, .. } = *model.report();
+            report.clipped = report.clipped.max(clipped);
+            report.outside = report.outside.max(outside);
+            if let Ok(status) = tried {
+                report.enter(&status, state);
+                let remark = answer(&status)?;
+                return Ok(if outside > MUCH_OUTSIDE { worse(remark, SUPPLE_OUTSIDE) } else { remark });
+            }
         }
-        // A step that is not taken leaves what it predicted: the network cannot go on from that.
-        self.object.led = None;
-        let answer = found.enter(&status, &self.view.state)?;
-        self.object.led = Some(self.view.state.steps());
-        Ok(if outside > MUCH_OUTSIDE { worse(answer, SUPPLE_OUTSIDE) } else { answer })
+        let status = exact_steps((any, exact, threads), *ratio, left, state, loads, report);
+        answer(&status).map(|_| SUPPLE_FELL_BACK)
     }
 
     /// Takes `count` steps of the network's, or as many as can be believed.
     fn each(
         mut self,
-        count: u32,
-        mut step: impl FnMut(&mut Self, u32) -> Answer<supple_status>,
+        count: u64,
+        mut step: impl FnMut(&mut Self, u64) -> Answer<supple_status>,
     ) -> Answer<supple_status> {
         let answer =
             (0..count).try_fold(SUPPLE_OK, |worst, done| Ok(worse(worst, step(&mut self, count - done)?)));
-        self.found.close(&self.view.state);
+        self.report.close(&self.state);
         answer
     }
 }
 
-/// Copies what a learned step changes.
-fn remember(
-    state: &State<&mut [NodeVector]>,
-    [displacement, increment]: &mut [&mut [NodeVector]; 2],
-) -> Moment {
-    displacement.iter_mut().zip(state.displacement.iter()).for_each(|(copy, vector)| *copy = *vector);
-    increment.iter_mut().zip(state.increment.iter()).for_each(|(copy, vector)| *copy = *vector);
-    Moment::of(state)
+/// Takes the exact steps of one of the network's. Motions go evenly over all `left` of the network's.
+fn exact_steps(
+    (any, exact, threads): (&AnyScene<'_>, &Step, &HostThreads),
+    ratio: u32,
+    left: u64,
+    state: &mut StateView<'_>,
+    loads: &mut CallLoads<'_>,
+    report: &mut supple_report,
+) -> Status {
+    let (count, left) = (ratio.into(), left.saturating_mul(ratio.into()));
+    with_scene!(any, scene => take_steps(count, left, state, loads, report, |loads, state| {
+        tled::step_in_parts(scene, loads, state, exact, threads)
+    }))
 }
 
-fn restore(
-    state: &mut State<&mut [NodeVector]>,
-    [displacement, increment]: &[&mut [NodeVector]; 2],
-    before: Moment,
-) {
-    state.displacement.iter_mut().zip(displacement.iter()).for_each(|(vector, copy)| *vector = *copy);
-    state.increment.iter_mut().zip(increment.iter()).for_each(|(vector, copy)| *vector = *copy);
-    before.put(state);
-}
-
-/// Whether energy does not explain a step.
-fn is_unexplained(status: &Status) -> bool {
-    match status {
-        Status::Diverged(_) => true,
-        Status::Limited { energy_excess, .. } => *energy_excess > 0.0,
-        _ => false,
-    }
-}
-
-/// Lets the exact step lead, `count` times over the length of a learned step, while the frames of the nodes follow. The network
-/// can take over at the end of it. In the paper the exact step leads for 0.3 s from rest.
+/// The lead-in: exact steps for `seconds` while the frames of the nodes follow, in the nearest whole number of the network's steps
+/// (seconds of supple_learned_facts), which may be none. The network can take over at the end of it. In the paper it lasts 0.3 s
+/// from rest. Motions go evenly over all of it. Seconds that are negative or not finite: SUPPLE_E_NEGATIVE.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.
@@ -368,13 +282,18 @@ pub unsafe extern "C" fn supple_learned_lead(
     loads: *mut supple_loads,
     state: *mut supple_state,
     learned: *mut supple_learned,
-    count: u32,
+    seconds: f64,
     threads: *const supple_threads,
     report: *mut supple_report,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let lead = |found: &mut supple_report| unsafe {
-        Parts::of(scene, loads, state, learned, threads, found)?.each(count, Parts::lead)
+    let lead = |report: &mut supple_report| unsafe {
+        let call = Call::of(scene, loads, state, learned, threads, report)?;
+        if !(seconds.is_finite() && seconds >= 0.0) {
+            return Err(supple_error::from(SUPPLE_E_NEGATIVE).value(seconds, 0.0));
+        }
+        let count = call.model.intervals(seconds);
+        call.each(count, Call::lead)
     };
     // SAFETY: as above.
     unsafe { reported(report, lead) }
@@ -382,7 +301,7 @@ pub unsafe extern "C" fn supple_learned_lead(
 
 /// Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. Stops at the first
 /// that is not to be believed: without fallback that one is not taken, displacements and time are as before it, velocities may be
-/// those of the network's own step, and the exact step has to lead again.
+/// those of the network's own step, and a new lead-in is needed.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.
@@ -398,12 +317,12 @@ pub unsafe extern "C" fn supple_learned_step(
     report: *mut supple_report,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let step = |found: &mut supple_report| unsafe {
-        let parts = Parts::of(scene, loads, state, learned, threads, found)?;
-        if !parts.object.fell_back && parts.object.led != Some(parts.view.state.steps()) {
+    let step = |report: &mut supple_report| unsafe {
+        let call = Call::of(scene, loads, state, learned, threads, report)?;
+        if call.model.fell_back().is_none() && !call.model.is_led(&call.state) {
             return Err(SUPPLE_E_NOT_LED.into());
         }
-        parts.each(count, Parts::learned)
+        call.each(count.into(), Call::step)
     };
     // SAFETY: as above.
     unsafe { reported(report, step) }

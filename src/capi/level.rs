@@ -2,7 +2,7 @@
 
 use core::ffi::{CStr, c_char};
 
-use crate::lanes::Level;
+use crate::simd::Level;
 
 use super::status::supple_status;
 use supple_status::*;

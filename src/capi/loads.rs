@@ -2,12 +2,12 @@
 
 use core::ffi::c_void;
 
-use crate::loads::{LoadError, Loads, Motion, NodalForce};
+use crate::loads::{Loads, Motion, NodalForce};
 use crate::state::NodeVector;
 
 use super::memory::{self, Head, Layout, Object, Place, array, magic, place_for};
 use super::scene::{AnyScene, axes_of, carved, check_choice, supple_scene, with_scene};
-use super::status::{Answer, mismatch, supple_error, supple_status};
+use super::status::{Answer, status_of, supple_error, supple_status};
 use supple_status::*;
 
 /// A force on one node. Forces on the same node add up.
@@ -89,9 +89,9 @@ pub unsafe extern "C" fn supple_loads_init(
     // SAFETY: what the header asks of the caller, here and below.
     let init = || unsafe {
         let (any, loads) = (carved(scene)?, place_for(loads)?);
-        let nodes = with_scene!(any, scene => scene.node_count() as u32);
+        let nodes = any.node_count() as u32;
         let place = Place::new(memory, bytes, layout(forces, motions))?;
-        let object = place.put(|head| supple_loads {
+        loads.write(place.put(|head| supple_loads {
             head,
             nodes,
             force_room: forces,
@@ -99,12 +99,10 @@ pub unsafe extern "C" fn supple_loads_init(
             forces: 0,
             motions: 0,
             gravity: [0.0; 3],
-        });
-        place.done::<supple_loads>();
-        loads.write(object);
+        }));
         Ok(SUPPLE_OK)
     };
-    init().unwrap_or_else(|error: supple_error| error.status)
+    status_of(init())
 }
 
 /// Sets gravity, three components, m/s^2.
@@ -120,7 +118,7 @@ pub unsafe extern "C" fn supple_set_gravity(loads: *mut supple_loads, gravity: *
         loads.gravity = gravity;
         Ok(SUPPLE_OK)
     };
-    set().unwrap_or_else(|error: supple_error| error.status)
+    status_of(set())
 }
 
 /// Replaces all forces by `count` others, which are copied; none with a count of zero.
@@ -136,16 +134,16 @@ pub unsafe extern "C" fn supple_set_forces(
     // SAFETY: what the header asks of the caller.
     let set = || unsafe {
         let (object, mut arrays) = memory::open(loads)?;
-        let forces = array(forces, count as usize)?;
+        let given = array(forces, count as usize)?;
         room_for(count, object.force_room)?;
-        for (index, force) in forces.iter().enumerate() {
-            sound(index, force.node, object.nodes, &force.newton, force.ramp)?;
+        let forces =
+            given.iter().map(|&supple_force { node, newton, ramp }| NodalForce { node, newton, ramp });
+        for (index, force) in forces.clone().enumerate() {
+            force.check(index, object.nodes as usize)?;
         }
         // Whatever was there is overwritten, never read.
-        let room = arrays.next::<NodalForce>(object.force_room as usize);
-        for (place, &supple_force { node, newton, ramp }) in room.iter_mut().zip(forces) {
-            *place = NodalForce { node, newton, ramp };
-        }
+        let room = arrays.change::<NodalForce>(object.force_room as usize);
+        room.iter_mut().zip(forces).for_each(|(place, force)| *place = force);
         object.forces = count;
         Ok(SUPPLE_OK)
     };
@@ -168,25 +166,25 @@ pub unsafe extern "C" fn supple_set_motions(
     let set = || unsafe {
         let (object, mut arrays) = memory::open(loads)?;
         let any = carved(scene)?;
-        let motions = array(motions, count as usize)?;
-        belongs(object.nodes, &any)?;
+        let given = array(motions, count as usize)?;
+        any.fits(object.nodes)?;
         room_for(count, object.motion_room)?;
-        for (index, motion) in motions.iter().enumerate() {
-            sound(index, motion.node, object.nodes, &motion.metre, motion.ramp)?;
-            check_choice(index, motion.axes, 7)?;
-            let movable = with_scene!(&any, scene => scene.movable(motion.node as usize));
-            let held = |axis: &usize| motion.axes >> axis & 1 == 1 && !movable.has(*axis);
-            if let Some(axis) = (0..3).find(held) {
-                return Err(supple_error::from(SUPPLE_E_NOT_HELD).at(index).node(motion.node).axis(axis));
-            }
+        let motions = given.iter().map(|&supple_motion { node, axes, metre, ramp }| Motion {
+            node,
+            axes: axes_of(axes),
+            metre,
+            ramp,
+        });
+        for (index, (motion, given)) in motions.clone().zip(given).enumerate() {
+            check_choice(index, given.axes, 7)?;
+            let movable = with_scene!(any, scene => scene.movable(motion.node as usize));
+            motion.check(index, object.nodes as usize, movable)?;
         }
-        let _ = arrays.next::<NodalForce>(object.force_room as usize);
-        let asked = arrays.next::<Motion>(object.motion_room as usize);
-        let now = arrays.next::<Motion>(object.motion_room as usize);
+        arrays.change::<NodalForce>(object.force_room as usize);
+        let asked = arrays.change::<Motion>(object.motion_room as usize);
+        let now = arrays.change::<Motion>(object.motion_room as usize);
         for ((asked, now), motion) in asked.iter_mut().zip(now).zip(motions) {
-            let &supple_motion { node, axes, metre, ramp } = motion;
-            *asked = Motion { node, axes: axes_of(axes), metre, ramp };
-            *now = *asked;
+            (*asked, *now) = (motion, motion);
         }
         object.motions = count;
         Ok(SUPPLE_OK)
@@ -202,57 +200,46 @@ fn room_for(count: u32, room: u32) -> Answer<()> {
     Err(supple_error::from(SUPPLE_E_CAPACITY).value(count.into(), room.into()))
 }
 
-fn sound(index: usize, node: u32, nodes: u32, vector: &[f32; 3], ramp: f32) -> Answer<()> {
-    crate::loads::check("", index, node, nodes as usize, vector, ramp)
-        .map_err(|error: LoadError| error.into())
-}
-
-/// That something was made for the scene's number of nodes.
-pub(super) fn belongs(nodes: u32, scene: &AnyScene<'_>) -> Answer<()> {
-    let of_scene = with_scene!(scene, scene => scene.node_count());
-    if nodes as usize == of_scene { Ok(()) } else { Err(mismatch(nodes as usize, of_scene)) }
-}
-
-/// Loads that a call takes steps with.
-pub(super) struct Acting<'a> {
+/// Loads of one call that takes steps.
+pub(super) struct CallLoads<'a> {
     gravity: [f32; 3],
     forces: &'a [NodalForce],
+    /// Motions as they are asked for, and where they are in the next step.
     asked: &'a [Motion],
     now: &'a mut [Motion],
     nodes: usize,
 }
 
-impl<'a> Acting<'a> {
+impl<'a> CallLoads<'a> {
     /// Of an object, or none at all.
     ///
     /// # Safety
     /// As at [`memory::change`].
     pub(super) unsafe fn of(loads: *mut supple_loads, scene: &AnyScene<'_>) -> Answer<Self> {
-        let nodes = with_scene!(scene, scene => scene.node_count());
+        let nodes = scene.node_count();
         if loads.is_null() {
             return Ok(Self { gravity: [0.0; 3], forces: &[], asked: &[], now: &mut [], nodes });
         }
         // SAFETY: the caller's promise; entries up to the counts were written.
         unsafe {
             let (object, mut arrays) = memory::open(loads)?;
-            belongs(object.nodes, scene)?;
+            scene.fits(object.nodes)?;
             let (force_room, motion_room) = (object.force_room as usize, object.motion_room as usize);
-            let forces = arrays.written::<NodalForce>(object.forces as usize, force_room);
-            let asked = arrays.written::<Motion>(object.motions as usize, motion_room);
-            let now = arrays.written::<Motion>(object.motions as usize, motion_room);
+            let forces = arrays.change_first::<NodalForce>(object.forces as usize, force_room);
+            let asked = arrays.change_first::<Motion>(object.motions as usize, motion_room);
+            let now = arrays.change_first::<Motion>(object.motions as usize, motion_room);
             Ok(Self { gravity: object.gravity, forces, asked, now, nodes })
         }
     }
 
-    /// Loads of the next of `left` steps.
-    pub(super) fn next(&mut self, displacement: &[NodeVector], left: u32) -> Loads<'_> {
+    /// Loads of the next of the `left` steps that the call still takes: motions without a ramp go evenly over all of them.
+    pub(super) fn of_next_step(&mut self, displacements: &[NodeVector], left: u64) -> Loads<'_> {
         for (now, asked) in self.now.iter_mut().zip(self.asked).filter(|(_, asked)| asked.ramp == 0.0) {
-            let at = displacement.get(asked.node as usize).copied().unwrap_or_default().to_array();
-            for (axis, metre) in now.metre.iter_mut().enumerate() {
-                let (to, from) = (asked.metre[axis], at[axis]);
+            let at = displacements.get(asked.node as usize).copied().unwrap_or_default().to_array();
+            for (metre, (from, to)) in now.metre.iter_mut().zip(at.into_iter().zip(asked.metre)) {
                 *metre = if left > 1 { from + (to - from) / left as f32 } else { to };
             }
         }
-        Loads::checked(self.gravity, self.forces, self.now, self.nodes)
+        Loads::unchecked(self.gravity, self.forces, self.now, self.nodes)
     }
 }

@@ -35,7 +35,7 @@ pub(super) unsafe trait Object: Sized {
     );
 }
 
-/// All that begin so.
+/// What every magic begins with.
 const FAMILY: [u8; 7] = *b"supple:";
 
 /// The magic of a kind.
@@ -44,7 +44,7 @@ pub(super) const fn magic(kind: u8) -> [u8; 8] {
     [a, b, c, d, e, f, g, kind]
 }
 
-/// Where arrays end that stand behind each other.
+/// The bytes of an object and of the arrays behind it.
 #[derive(Clone, Copy)]
 pub(super) struct Layout {
     end: Option<usize>,
@@ -56,7 +56,7 @@ impl Layout {
         Self { end: Some(T::FRONT) }
     }
 
-    /// With an array more.
+    /// With one more array.
     pub(super) const fn and<T>(self, count: usize) -> Self {
         let Some(end) = self.end else { return self };
         let Some(bytes) = size_of::<T>().checked_mul(count) else { return Self { end: None } };
@@ -77,7 +77,7 @@ impl Layout {
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     start: *mut u8,
-    needed: usize,
+    bytes: usize,
 }
 
 impl Place {
@@ -92,30 +92,44 @@ impl Place {
             return Err(SUPPLE_E_MISALIGNED.into());
         }
         match layout.end {
-            Some(needed) if needed <= bytes => Ok(Self { start, needed }),
+            Some(needed) if needed <= bytes => Ok(Self { start, bytes: needed }),
             Some(needed) => Err(short(bytes, needed)),
             None => Err(short(bytes, usize::MAX)),
         }
     }
 
-    /// Puts an object there, without arrays yet: it counts as none until [`Place::done`].
+    /// The arrays of an object that is not there yet: from now on the memory holds none, until [`Place::put`].
     ///
     /// # Safety
     /// As at `new`. The place's layout began with `T`.
+    pub(super) unsafe fn arrays<T: Object>(self) -> Arrays {
+        let at = self.start.cast::<T>();
+        // SAFETY: there is room for `T::FRONT` bytes, which begin with a head, aligned for it.
+        unsafe {
+            at.cast::<Head>().write(Head { magic: [0; 8], bytes: self.bytes });
+            Arrays::behind(at)
+        }
+    }
+
+    /// Puts the object there.
+    ///
+    /// # Safety
+    /// As at `arrays`; those that are not any bits have been written.
     pub(super) unsafe fn put<T: Object>(self, object: impl FnOnce(Head) -> T) -> *mut T {
         let at = self.start.cast::<T>();
         // SAFETY: there is room for `T::FRONT` bytes, aligned for it.
-        unsafe { at.write(object(Head { magic: [0; 8], bytes: self.needed })) };
+        unsafe { at.write(object(self.head::<T>())) };
         at
     }
 
-    /// From now on it is an object.
-    ///
-    /// # Safety
-    /// After `put` of the same type.
-    pub(super) unsafe fn done<T: Object>(self) {
-        // SAFETY: the object begins with a head.
-        unsafe { (*self.start.cast::<Head>()).magic = T::MAGIC };
+    /// Where the object will be, for one that is too large to be moved there.
+    pub(super) fn object<T: Object>(self) -> *mut T {
+        self.start.cast()
+    }
+
+    /// What such an object begins with, once the rest of it has been written.
+    pub(super) fn head<T: Object>(self) -> Head {
+        Head { magic: T::MAGIC, bytes: self.bytes }
     }
 }
 
@@ -127,79 +141,60 @@ pub(super) struct Arrays {
 
 impl Arrays {
     /// # Safety
-    /// `object` is one, and so large as its head says.
+    /// `object` begins with a head, and there are as many bytes as this says.
     pub(super) unsafe fn behind<T: Object>(object: *const T) -> Self {
         // SAFETY: it begins with a head.
-        let bytes = unsafe { (*object.cast::<Head>()).bytes };
+        let bytes = unsafe { bytes_of(object) };
         let left = bytes.saturating_sub(T::FRONT);
         // SAFETY: objects have at least so many bytes.
         Self { at: unsafe { object.cast_mut().cast::<u8>().add(T::FRONT) }, left }
     }
 
-    /// Where the next array is, which has room for as many of `Room`; nothing of what is not there.
-    fn take<T, Room>(&mut self, count: usize) -> (*mut T, usize) {
+    /// The beginning of an array with room for `room` elements, and how many there are: none if there is no such room.
+    fn take<T>(&mut self, room: usize) -> (*mut T, usize) {
         let none = (ptr::NonNull::dangling().as_ptr(), 0);
-        let Some(bytes) = size_of::<Room>().checked_mul(count) else { return none };
+        let Some(bytes) = size_of::<T>().checked_mul(room) else { return none };
         let taken = bytes.next_multiple_of(SUPPLE_ALIGN);
-        if taken > self.left || align_of::<T>() > SUPPLE_ALIGN || size_of::<T>() > size_of::<Room>() {
+        if taken > self.left || align_of::<T>() > SUPPLE_ALIGN {
             return none;
         }
         let array = self.at.cast();
         self.at = self.at.wrapping_add(taken);
         self.left -= taken;
-        (array, count)
+        (array, room)
     }
 
-    /// The next array, to be changed.
+    /// An array, to be changed.
     ///
     /// # Safety
     /// Any bits are a `T`, or the array was written before. Nobody else uses it for the time of `'a`.
-    pub(super) unsafe fn next<'a, T>(&mut self, count: usize) -> &'a mut [T] {
+    pub(super) unsafe fn change<'a, T>(&mut self, count: usize) -> &'a mut [T] {
         // SAFETY: the caller's promise.
-        unsafe { self.next_of::<T, T>(count) }
+        unsafe { self.change_first(count, count) }
     }
 
-    /// The same of smaller ones where there is room for `Room`s.
+    /// The first elements of an array with room for `room`.
     ///
     /// # Safety
-    /// As at `next`.
-    pub(super) unsafe fn next_of<'a, T, Room>(&mut self, count: usize) -> &'a mut [T] {
-        let (first, count) = self.take::<T, Room>(count);
+    /// As at `change`, for the first `count`.
+    pub(super) unsafe fn change_first<'a, T>(&mut self, count: usize, room: usize) -> &'a mut [T] {
+        let (first, room) = self.take::<T>(room);
         // SAFETY: within the object's memory, which is aligned, behind the arrays before.
-        unsafe { slice::from_raw_parts_mut(first, count) }
-    }
-
-    /// Those of the next array, with room for `room`, that were written.
-    ///
-    /// # Safety
-    /// The first `count` were, and nobody else uses them for the time of `'a`.
-    pub(super) unsafe fn written<'a, T>(&mut self, count: usize, room: usize) -> &'a mut [T] {
-        let (first, room) = self.take::<T, T>(room);
-        // SAFETY: as above.
         unsafe { slice::from_raw_parts_mut(first, count.min(room)) }
     }
 
-    /// The next array, to be read.
+    /// An array, to be read.
     ///
     /// # Safety
-    /// As at `next`, but others may read it.
-    pub(super) unsafe fn look<'a, T>(&mut self, count: usize) -> &'a [T] {
-        // SAFETY: the caller's promise.
-        unsafe { self.look_of::<T, T>(count) }
-    }
-
-    /// The same of smaller ones where there is room for `Room`s.
-    ///
-    /// # Safety
-    /// As at `look`.
-    pub(super) unsafe fn look_of<'a, T, Room>(&mut self, count: usize) -> &'a [T] {
-        let (first, count) = self.take::<T, Room>(count);
-        // SAFETY: within the object's memory, which is aligned, behind the arrays before.
+    /// As at `change`, but others may read it.
+    pub(super) unsafe fn read<'a, T>(&mut self, count: usize) -> &'a [T] {
+        let (first, count) = self.take::<T>(count);
+        // SAFETY: as above.
         unsafe { slice::from_raw_parts(first, count) }
     }
 }
 
-/// Whether a pointer leads to an object of the type.
+/// That a pointer leads to an object of the type.
 ///
 /// # Safety
 /// If not NULL, it leads to memory that was handed to a function of this library, or has at least the size of a head.
@@ -211,8 +206,7 @@ pub(super) unsafe fn is<T: Object>(object: *const T) -> Answer<()> {
         return Err(SUPPLE_E_MISALIGNED.into());
     }
     // SAFETY: as above.
-    let found = unsafe { (*object.cast::<Head>()).magic };
-    match found {
+    match unsafe { (*object.cast::<Head>()).magic } {
         magic if magic == T::MAGIC => Ok(()),
         [a, b, c, d, e, f, g, _] if [a, b, c, d, e, f, g] == FAMILY => Err(SUPPLE_E_KIND.into()),
         _ => Err(SUPPLE_E_NOT_INITIALISED.into()),
@@ -222,9 +216,9 @@ pub(super) unsafe fn is<T: Object>(object: *const T) -> Answer<()> {
 /// Bytes of an object.
 ///
 /// # Safety
-/// It is one.
+/// It begins with a head.
 pub(super) unsafe fn bytes_of<T: Object>(object: *const T) -> usize {
-    // SAFETY: it begins with a head.
+    // SAFETY: the caller's promise.
     unsafe { (*object.cast::<Head>()).bytes }
 }
 
@@ -246,23 +240,23 @@ pub(super) unsafe fn change<'a, T: Object>(object: *mut T) -> Answer<&'a mut T> 
     unsafe { is(object.cast_const()).map(|()| &mut *object) }
 }
 
-/// The same with its arrays. They are asked for first: beside the reference nobody may read the object.
+/// The same with its arrays.
 ///
 /// # Safety
 /// As at [`change`].
 pub(super) unsafe fn open<'a, T: Object>(object: *mut T) -> Answer<(&'a mut T, Arrays)> {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller's promise. The head is read before there is a reference that nobody else may read through.
     unsafe {
         is(object.cast_const())?;
         let arrays = Arrays::behind(object.cast_const());
-        Ok((change(object)?, arrays))
+        Ok((&mut *object, arrays))
     }
 }
 
-/// Numbers or structures of the host's. None need no memory.
+/// An array of the host's, of values or structures. An empty one needs no memory.
 ///
 /// # Safety
-/// If not NULL, `first` leads to `count` of them, in which any bits are a `T`, and nobody writes them meanwhile.
+/// If not NULL, `first` leads to `count` elements, of which any bits are a `T`, and nobody writes them meanwhile.
 pub(super) unsafe fn array<'a, T>(first: *const T, count: usize) -> Answer<&'a [T]> {
     if count == 0 {
         return Ok(&[]);
@@ -280,16 +274,28 @@ pub(super) unsafe fn array<'a, T>(first: *const T, count: usize) -> Answer<&'a [
     }
 }
 
+/// Bytes that are used where they are: they stay, unchanged, as long as what is made of them.
+///
+/// # Safety
+/// As at [`array()`]; and they do stay.
+pub(super) unsafe fn lasting_bytes(first: *const c_void, count: usize) -> Answer<&'static [u8]> {
+    if first.is_null() {
+        return Err(SUPPLE_E_NULL.into());
+    }
+    // SAFETY: the caller's promise.
+    unsafe { array(first.cast(), count) }
+}
+
 /// One structure of the host's.
 ///
 /// # Safety
-/// As at [`array`].
+/// As at [`array()`].
 pub(super) unsafe fn one<'a, T>(at: *const T) -> Answer<&'a T> {
     // SAFETY: the caller's promise.
     unsafe { array(at, 1) }?.first().ok_or(SUPPLE_E_NULL.into())
 }
 
-/// Where a number or a structure goes.
+/// Memory of the host's for a value or a structure.
 ///
 /// # Safety
 /// If not NULL, `at` leads to memory for one.
@@ -332,13 +338,13 @@ pub(super) fn same_abi<T>(struct_size: u32, abi: u32) -> Answer<()> {
 pub(super) unsafe fn answered(answer: Answer<supple_status>, error: *mut supple_error) -> supple_status {
     match answer {
         Ok(status) => status,
-        Err(found) => {
+        Err(problem) => {
             // SAFETY: the caller's promise.
             if let Ok(error) = unsafe { place_for(error) } {
                 // SAFETY: aligned, and there.
-                unsafe { error.write(found) };
+                unsafe { error.write(problem) };
             }
-            found.status
+            problem.status
         }
     }
 }

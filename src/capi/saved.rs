@@ -5,13 +5,12 @@ use core::{ptr, slice};
 
 use bytemuck::{Pod, Zeroable, bytes_of, must_cast_slice};
 
-use crate::ledger::Ledger;
-use crate::state::NodeVector;
-use crate::tled::Step;
+use crate::state::{NodeVector, Progress};
+use crate::step::{EnergyBalance, Step};
 
 use super::memory::{self, array, place_for};
-use super::state::{Field, Moment, View, field, step_of, supple_state};
-use super::status::{Answer, mismatch, short, supple_error, supple_status};
+use super::state::{supple_state, vectors};
+use super::status::{mismatch, short, status_of, supple_error, supple_status};
 use super::vectors::overlap;
 use supple_status::*;
 
@@ -27,13 +26,14 @@ struct Front {
     /// CRC-32 of all that follows.
     checksum: u32,
     nodes: u32,
-    dt: f32,
+    /// That the increments span, s.
+    last_step: f32,
     /// Zero without a step.
     step_seconds: f32,
     step_damping: f32,
     time: f64,
     steps: u64,
-    ledger: [f64; 6],
+    energy_balance: [f64; 6],
 }
 
 /// Of the front's bytes those that the checksum covers begin here.
@@ -69,38 +69,39 @@ pub unsafe extern "C" fn supple_save(
         if overlap(state.cast(), memory::bytes_of(state), to.cast(), needed) {
             return Err(supple_error::from(SUPPLE_E_OVERLAP));
         }
-        let Moment { time, steps, dt, ledger } = object.moment;
-        let Ledger { start, work, dissipated, kinetic, uncertainty, peak } = ledger;
-        let step = step_of(object).ok();
+        let progress = &object.progress;
+        let EnergyBalance { start, work, dissipated, kinetic, uncertainty, peak } =
+            *progress.energy_balance();
+        let step = object.step().ok();
         let mut front = Front {
             magic: MAGIC,
             version: VERSION,
             checksum: 0,
             nodes: object.nodes,
-            dt,
+            last_step: progress.last_step(),
             step_seconds: step.map_or(0.0, |step| step.seconds()),
             step_damping: step.map_or(0.0, |step| step.damping()),
-            time,
-            steps,
-            ledger: [start, work, dissipated, kinetic, uncertainty, peak],
+            time: progress.time(),
+            steps: progress.steps(),
+            energy_balance: [start, work, dissipated, kinetic, uncertainty, peak],
         };
         let to = slice::from_raw_parts_mut(to, needed);
-        let vectors = [field(state, Field::Displacement)?, field(state, Field::Increment)?];
+        let [displacements, increments, _] = vectors(state)?;
         let (first, rest) = to.split_at_mut_checked(FRONT).ok_or(short(bytes, needed))?;
-        let places = rest.chunks_exact_mut(size_of_val(vectors[0]).max(1));
-        for (place, vectors) in places.zip(vectors) {
+        let places = rest.chunks_exact_mut(size_of_val(displacements).max(1));
+        for (place, vectors) in places.zip([displacements, increments]) {
             put(place, must_cast_slice(vectors));
         }
         front.checksum = checksum(&front, rest);
         put(first, bytes_of(&front));
         Ok(SUPPLE_OK)
     };
-    save().unwrap_or_else(|error: supple_error| error.status)
+    status_of(save())
 }
 
 /// Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the saved one
-/// would have, to the bit. Forces are zero until the next step. Large steps have to be prepared again, and learned ones led;
-/// for the same bits with these, copy their objects with memcpy as well.
+/// would have, to the bit. Forces are zero until the next step. A supple_large has to be prepared again, and a
+/// supple_learned needs a new lead-in; for the same bits with these, copy their objects with memcpy as well.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_restore(
     state: *mut supple_state,
@@ -129,24 +130,26 @@ pub unsafe extern "C" fn supple_restore(
         if checksum(&front, rest) != front.checksum {
             return Err(SUPPLE_E_SAVED_CHECKSUM.into());
         }
-        let object = &mut *state;
-        let [start, work, dissipated, kinetic, uncertainty, peak] = front.ledger;
-        let ledger = Ledger { start, work, dissipated, kinetic, uncertainty, peak };
-        object.moment = Moment { time: front.time, steps: front.steps, dt: front.dt, ledger };
-        object.set_step(Step::insist(front.step_seconds, front.step_damping).ok());
-        let mut view = View::of(state);
-        let places = [&mut view.state.displacement, &mut view.state.increment];
-        let (displacement, increment) = rest.split_at_checked(rest.len() / 2).unwrap_or_default();
-        for (place, saved) in places.into_iter().zip([displacement, increment]) {
-            for (vector, bytes) in place.iter_mut().zip(saved.as_chunks().0) {
+        let (object, mut arrays) = memory::open(state)?;
+        let Front { time, steps, last_step, step_seconds, step_damping, energy_balance, .. } = front;
+        let [start, work, dissipated, kinetic, uncertainty, peak] = energy_balance;
+        let energy_balance = EnergyBalance { start, work, dissipated, kinetic, uncertainty, peak };
+        object.progress = Progress::resumed(time, steps, last_step, energy_balance);
+        object.set_step(Step::unchecked(step_seconds, step_damping).ok());
+        let mut vectors = |bytes: &[u8]| {
+            let vectors = arrays.change::<NodeVector>(nodes as usize);
+            for (vector, bytes) in vectors.iter_mut().zip(bytes.as_chunks().0) {
                 *vector = bytemuck::pod_read_unaligned::<NodeVector>(bytes as &[u8; 16]);
             }
-        }
-        view.state.force.fill(NodeVector::ZERO);
+            vectors
+        };
+        let (displacements, increments) = rest.split_at_checked(rest.len() / 2).unwrap_or_default();
+        vectors(displacements);
+        vectors(increments);
+        vectors(&[]).fill(NodeVector::ZERO);
         Ok(SUPPLE_OK)
     };
-    let answer: Answer<supple_status> = restore();
-    answer.unwrap_or_else(|error| error.status)
+    status_of(restore())
 }
 
 /// Copies bytes. Slices know a function for it, with a way to panic in it.

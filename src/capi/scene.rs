@@ -2,22 +2,16 @@
 
 use core::ffi::c_void;
 
-#[cfg(feature = "capi")]
-use crate::material::Exponential;
-use crate::material::{Law, Laws, Material, NeoHookean, Tissue};
+use crate::element::{ElementLaw, ElementTile, NodeInertia};
+use crate::material::{AnyLaw, Law, Laws, MAX_CONSTANTS, Material, Regions, Tissue, for_each_law};
 use crate::mesh::{Mesh, Winding};
-use crate::scene::{Axes, Built, ElementBlock, NodeInertia, Scene, Support, blocks_for};
+use crate::scene::{Axes, SceneFacts, SceneView, Support, tiles_for};
 use crate::tled;
 
 use super::SUPPLE_NONE;
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, one, place_for, same_abi};
-use super::status::{Answer, supple_error, supple_status};
+use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
 use supple_status::*;
-
-/// Neo-Hookean, with the constants c and d, Pa.
-pub const SUPPLE_NEO_HOOKEAN: u32 = 0;
-/// Exponential, with the constants a (Pa), b, and d (Pa).
-pub const SUPPLE_EXPONENTIAL: u32 = 1;
 
 /// Elements must have positive volumes: (x1 - x0) . ((x2 - x0) x (x3 - x0)) > 0.
 pub const SUPPLE_WINDING_CHECKED: u32 = 0;
@@ -40,11 +34,12 @@ pub struct supple_support {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_tissue {
-    /// Neo-Hookean: c, d, unused. Exponential: a, b, d. Finite and positive.
-    pub constants: [f32; 3],
+    /// In the order that stands with the law (SUPPLE_NEO_HOOKEAN and so on), finite and positive; the rest is ignored.
+    pub constants: [f32; 4],
     /// At rest, kg/m^3; finite and positive.
     pub density: f32,
 }
+const _: () = assert!(size_of::<supple_tissue>() == size_of::<f32>() * (MAX_CONSTANTS + 1));
 
 /// What a scene is built from. Everything is copied; nothing needs to stay.
 #[repr(C)]
@@ -54,7 +49,7 @@ pub struct supple_scene_config {
     pub struct_size: u32,
     /// SUPPLE_ABI.
     pub abi: u32,
-    /// SUPPLE_NEO_HOOKEAN or SUPPLE_EXPONENTIAL, for all elements.
+    /// The law of all elements: SUPPLE_NEO_HOOKEAN and so on.
     pub law: u32,
     /// SUPPLE_WINDING_CHECKED or SUPPLE_WINDING_NORMALISED.
     pub winding: u32,
@@ -62,9 +57,9 @@ pub struct supple_scene_config {
     pub nodes: u32,
     /// Elements, at least 1.
     pub elements: u32,
-    /// Supports; a node may have several.
+    /// Entries of `support`; a node may have several.
     pub supports: u32,
-    /// Tissues, 1 to 65535.
+    /// Entries of `tissue`, 1 to 65535.
     pub tissues: u32,
     /// Three coordinates of each node, m. Keep the origin near the body: they are float32.
     pub points: *const f32,
@@ -83,12 +78,12 @@ pub struct supple_scene_config {
 #[repr(C, align(64))]
 pub struct supple_scene {
     head: Head,
-    law: u32,
     nodes: u32,
-    blocks: u32,
-    tissues: u32,
     elements: u32,
-    built: Built,
+    tissues: u32,
+    /// Which of the laws; its constants are those of the tissues.
+    law: AnyLaw,
+    facts: SceneFacts,
 }
 
 // SAFETY: `repr(C)`, begins with a head.
@@ -117,36 +112,17 @@ pub struct supple_scene_facts {
     pub mass: f64,
 }
 
-/// A law that C can ask for.
-pub(super) trait FromConstants: Law {
-    fn from_constants(constants: [f32; 3]) -> Self;
-}
-
-impl FromConstants for NeoHookean {
-    fn from_constants([c, d, _]: [f32; 3]) -> Self {
-        Self { c, d }
-    }
-}
-
-#[cfg(feature = "capi")]
-impl FromConstants for Exponential {
-    fn from_constants([a, b, d]: [f32; 3]) -> Self {
-        Self { a, b, d }
-    }
-}
-
 /// One tissue for all elements, or one of several for each.
 #[derive(Clone, Copy)]
 pub(super) struct Body<'a, L> {
     tissues: &'a [Tissue<L>],
     of_element: &'a [u16],
-    first: Tissue<L>,
 }
 
-impl<'a, L: FromConstants> Body<'a, L> {
-    fn new(tissues: &'a [Tissue<L>], of_element: &'a [u16]) -> Self {
-        let none = Tissue { law: L::from_constants([0.0; 3]), density: 0.0 };
-        Self { tissues, of_element, first: tissues.first().copied().unwrap_or(none) }
+impl<L: Law> Body<'_, L> {
+    /// The tissue of all elements, if there is but one.
+    fn only(&self) -> Option<Tissue<L>> {
+        if self.of_element.is_empty() { self.tissues.first().copied() } else { None }
     }
 }
 
@@ -154,42 +130,132 @@ impl<L: Law> Material for Body<'_, L> {
     type Law = L;
 
     fn tissue(&self, element: usize) -> Option<Tissue<L>> {
-        if self.of_element.is_empty() {
-            return Some(self.first);
-        }
-        let index = usize::from(*self.of_element.get(element)?);
-        self.tissues.get(index).copied()
+        let Self { tissues, of_element } = *self;
+        self.only().or_else(|| Regions { tissues, of_element }.tissue(element))
     }
 
     fn laws(&self) -> Laws<'_, L> {
-        if self.of_element.is_empty() {
-            return Laws::One(self.first.law);
+        let Self { tissues, of_element } = *self;
+        match self.only() {
+            Some(tissue) => Laws::One(tissue.law),
+            None => Laws::Regions { tissues, of_element, beyond: L::default() },
         }
-        Laws::Regions { tissues: self.tissues, of_element: self.of_element, beyond: self.first.law }
     }
 }
 
-/// A scene over the memory of its object.
-pub(super) type Carved<'a, L> = Scene<Body<'a, L>, &'a [NodeInertia], &'a [ElementBlock]>;
-
-/// The same, of whichever law.
-pub(super) enum AnyScene<'a> {
-    NeoHookean(Carved<'a, NeoHookean>),
-    #[cfg(feature = "capi")]
-    Exponential(Carved<'a, Exponential>),
+/// A scene of one law in the memory of its object.
+pub(super) struct Carved<'a, L> {
+    body: Body<'a, L>,
+    nodes: &'a [NodeInertia],
+    tiles: &'a [ElementTile],
+    facts: &'a SceneFacts,
 }
 
-/// Does the same with the scene of whichever law.
-macro_rules! with_scene {
-    ($any:expr, $scene:ident => $work:expr) => {
-        match $any {
-            $crate::capi::scene::AnyScene::NeoHookean($scene) => $work,
-            #[cfg(feature = "capi")]
-            $crate::capi::scene::AnyScene::Exponential($scene) => $work,
+impl<'a, L: ElementLaw> Carved<'a, L> {
+    const FITS: () = assert!(size_of::<Tissue<L>>() <= size_of::<supple_tissue>());
+
+    /// # Safety
+    /// `object` is a scene of this law, which nobody writes.
+    unsafe fn of(object: *const supple_scene) -> Self {
+        let () = Self::FITS;
+        // SAFETY: the caller's promise; all arrays were written by `build`.
+        unsafe {
+            let &supple_scene { nodes, elements, tissues, ref facts, .. } = &*object;
+            let mut arrays = Arrays::behind(object);
+            Self {
+                nodes: arrays.read(nodes as usize),
+                tiles: arrays.read(tiles_for(elements as usize)),
+                body: Body {
+                    tissues: arrays.read(tissues as usize),
+                    of_element: arrays.read(regions(elements, tissues)),
+                },
+                facts,
+            }
+        }
+    }
+
+    pub(super) fn view(&self) -> SceneView<'_, Body<'a, L>> {
+        SceneView::new(&self.body, self.nodes, self.tiles, self.facts)
+    }
+}
+
+macro_rules! any_scene {
+    ($first:ident: $first_law:ty, $($other:ident: $law:ty,)*) => {
+        /// A scene of whichever law this library has: the first of the list, or all with the feature `capi`.
+        pub(super) enum AnyScene<'a> {
+            $first(Carved<'a, $first_law>),
+            $(#[cfg(feature = "capi")] $other(Carved<'a, $law>),)*
+        }
+
+        impl AnyScene<'_> {
+            /// # Safety
+            /// `object` is a scene, which nobody writes.
+            unsafe fn of(object: *const supple_scene) -> Answer<Self> {
+                // SAFETY: the caller's promise; the arrays are of the law that the object names.
+                unsafe {
+                    match (*object).law {
+                        AnyLaw::$first(_) => Ok(Self::$first(Carved::of(object))),
+                        $(#[cfg(feature = "capi")] AnyLaw::$other(_) => Ok(Self::$other(Carved::of(object))),)*
+                        _ => Err(SUPPLE_E_LAW.into()),
+                    }
+                }
+            }
+        }
+
+        impl Parts<'_> {
+            /// Builds a scene of this law.
+            ///
+            /// # Safety
+            /// As at [`Parts::build_of`].
+            unsafe fn build(&self, law: AnyLaw, arrays: Arrays) -> Answer<SceneFacts> {
+                // SAFETY: the caller's promise.
+                unsafe {
+                    match law {
+                        AnyLaw::$first(_) => self.build_of::<$first_law>(arrays),
+                        $(#[cfg(feature = "capi")] AnyLaw::$other(_) => self.build_of::<$law>(arrays),)*
+                        _ => Err(SUPPLE_E_LAW.into()),
+                    }
+                }
+            }
         }
     };
 }
+for_each_law!(any_scene);
+
+/// Does the same with the view of a scene of whichever law.
+macro_rules! with_scene {
+    (@ $any:expr, $scene:ident => $work:expr; $first:ident: $first_law:ty, $($other:ident: $law:ty,)*) => {
+        match &$any {
+            $crate::capi::scene::AnyScene::$first(carved) => {
+                let $scene = carved.view();
+                $work
+            }
+            $(
+                #[cfg(feature = "capi")]
+                $crate::capi::scene::AnyScene::$other(carved) => {
+                    let $scene = carved.view();
+                    $work
+                }
+            )*
+        }
+    };
+    ($any:expr, $scene:ident => $work:expr) => {
+        $crate::material::for_each_law!(with_scene @ $any, $scene => $work;)
+    };
+}
 pub(super) use with_scene;
+
+impl AnyScene<'_> {
+    pub(super) fn node_count(&self) -> usize {
+        with_scene!(self, scene => scene.node_count())
+    }
+
+    /// That something was made for the scene's number of nodes.
+    pub(super) fn fits(&self, nodes: u32) -> Answer<()> {
+        let needed = self.node_count();
+        if nodes as usize == needed { Ok(()) } else { Err(mismatch(nodes as usize, needed)) }
+    }
+}
 
 /// Elements that have a tissue of their own: all, or none where there is only one.
 const fn regions(elements: u32, tissues: u32) -> usize {
@@ -199,8 +265,8 @@ const fn regions(elements: u32, tissues: u32) -> usize {
 fn layout(nodes: u32, elements: u32, tissues: u32) -> Layout {
     Layout::of::<supple_scene>()
         .and::<NodeInertia>(nodes as usize)
-        .and::<ElementBlock>(blocks_for(elements as usize))
-        // Of either law.
+        .and::<ElementTile>(tiles_for(elements as usize))
+        // Enough for the tissues of any law.
         .and::<supple_tissue>(tissues as usize)
         .and::<u16>(regions(elements, tissues))
 }
@@ -224,26 +290,34 @@ pub unsafe extern "C" fn supple_scene_init(
     error: *mut supple_error,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    unsafe { memory::answered(init(memory, bytes, config, scene), error) }
+    let init = || unsafe {
+        let (config, scene) = (one(config)?, place_for(scene)?);
+        let (law, parts) = Parts::checked(config)?;
+        let &supple_scene_config { nodes, elements, tissues, .. } = config;
+        let place = Place::new(memory, bytes, layout(nodes, elements, tissues))?;
+        let facts = parts.build(law, place.arrays::<supple_scene>())?;
+        scene.write(place.put(|head| supple_scene { head, nodes, elements, tissues, law, facts }));
+        Ok(SUPPLE_OK)
+    };
+    // SAFETY: as above.
+    unsafe { memory::answered(init(), error) }
 }
 
-/// # Safety
-/// As [`supple_scene_init`].
-unsafe fn init(
-    memory: *mut c_void,
-    bytes: usize,
-    config: *const supple_scene_config,
-    scene: *mut *mut supple_scene,
-) -> Answer<supple_status> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        let (config, scene) = (one(config)?, place_for(scene)?);
+/// What a scene is built from, checked as far as it can be without building it.
+struct Parts<'a> {
+    mesh: Mesh<'a>,
+    supports: &'a [supple_support],
+    tissues: &'a [supple_tissue],
+    of_element: &'a [u16],
+}
+
+impl<'a> Parts<'a> {
+    /// # Safety
+    /// The arrays of the configuration are as the header says.
+    unsafe fn checked(config: &'a supple_scene_config) -> Answer<(AnyLaw, Self)> {
         same_abi::<supple_scene_config>(config.struct_size, config.abi)?;
-        let &supple_scene_config { law, nodes, elements, tissues, .. } = config;
-        let known = law == SUPPLE_NEO_HOOKEAN || law == SUPPLE_EXPONENTIAL && cfg!(feature = "capi");
-        if !known {
-            return Err(supple_error::from(SUPPLE_E_LAW).value(law.into(), 0.0));
-        }
+        let &supple_scene_config { law: number, nodes, elements, tissues, .. } = config;
+        let law = law_of(number).ok_or(supple_error::from(SUPPLE_E_LAW).value(number.into(), 0.0))?;
         check_choice(SUPPLE_NONE as usize, config.winding, SUPPLE_WINDING_NORMALISED)?;
         let winding =
             if config.winding == SUPPLE_WINDING_CHECKED { Winding::Checked } else { Winding::Normalised };
@@ -253,42 +327,56 @@ unsafe fn init(
         if tissues == 0 || tissues > u32::from(u16::MAX) {
             return Err(supple_error::from(SUPPLE_E_TISSUE).value(tissues.into(), u16::MAX.into()));
         }
-        let points = array(config.points.cast::<[f32; 3]>(), nodes as usize)?;
-        let tets = array(config.tetrahedra.cast::<[u32; 4]>(), elements as usize)?;
-        let supports = array(config.support, config.supports as usize)?;
-        let given = array(config.tissue, tissues as usize)?;
-        let of_element = array(config.tissue_of_element, regions(elements, tissues))?;
+        // SAFETY: the caller's promise.
+        let (points, tets, supports, tissues, of_element) = unsafe {
+            (
+                array(config.points.cast::<[f32; 3]>(), nodes as usize)?,
+                array(config.tetrahedra.cast::<[u32; 4]>(), elements as usize)?,
+                array(config.support, config.supports as usize)?,
+                array(config.tissue, tissues as usize)?,
+                array(config.tissue_of_element, regions(elements, tissues))?,
+            )
+        };
         for (index, support) in supports.iter().enumerate() {
             check_choice(index, support.axes, 7)?;
             check_choice(index, support.moves, 1)?;
         }
-        let mesh = Mesh::new(points, tets, winding)?;
-        let place = Place::new(memory, bytes, layout(nodes, elements, tissues))?;
-        let blocks = blocks_for(elements as usize) as u32;
-        let object = place.put(|head| supple_scene {
-            head,
-            law,
-            nodes,
-            blocks,
-            tissues,
-            elements,
-            built: Built::NOTHING,
-        });
+        Ok((law, Self { mesh: Mesh::new(points, tets, winding)?, supports, tissues, of_element }))
+    }
+
+    /// # Safety
+    /// The arrays are those of a scene of these parts, and nobody else uses them.
+    unsafe fn build_of<L: ElementLaw>(&self, mut arrays: Arrays) -> Answer<SceneFacts> {
+        let Self { mesh, supports, tissues: given, of_element } = self;
+        // SAFETY: the caller's promise; what is not any bits is written before it is read.
+        let (nodes, tiles, tissues, regions) = unsafe {
+            (
+                arrays.change::<NodeInertia>(mesh.points().len()),
+                arrays.change::<ElementTile>(tiles_for(mesh.element_count())),
+                arrays.change::<Tissue<L>>(given.len()),
+                arrays.change::<u16>(of_element.len()),
+            )
+        };
+        for (tissue, given) in tissues.iter_mut().zip(*given) {
+            *tissue = Tissue { law: L::from_constants(given.constants), density: given.density };
+        }
+        for (region, &given) in regions.iter_mut().zip(*of_element) {
+            *region = given;
+        }
         let supports = supports.iter().map(|support| Support {
             node: support.node,
             axes: axes_of(support.axes),
             moves: support.moves == 1,
         });
-        let built = match law {
-            #[cfg(feature = "capi")]
-            SUPPLE_EXPONENTIAL => build::<Exponential>(object, &mesh, supports, given, of_element)?,
-            _ => build::<NeoHookean>(object, &mesh, supports, given, of_element)?,
-        };
-        (*object).built = built;
-        place.done::<supple_scene>();
-        scene.write(object);
-        Ok(SUPPLE_OK)
+        let body = Body { tissues, of_element: regions };
+        Ok(SceneFacts::build(&body, mesh, supports, nodes, tiles)?)
     }
+}
+
+/// The law of a number, if this library has it: the position in the list of laws.
+fn law_of(number: u32) -> Option<AnyLaw> {
+    let has_it = number == 0 || cfg!(feature = "capi");
+    AnyLaw::all().find(|law| has_it && number.checked_mul(2) == Some(law.code()))
 }
 
 /// That entry `index` of a list, or what is in none, is one of the choices up to `most`.
@@ -305,38 +393,6 @@ pub(super) fn axes_of(number: u32) -> Axes {
     axes.filter(|(axis, _)| number >> axis & 1 == 1).fold(Axes::NONE, |sum, (_, axis)| sum.union(axis))
 }
 
-/// # Safety
-/// `object` has been put, with room for its arrays, and nobody else uses it.
-unsafe fn build<L: FromConstants>(
-    object: *mut supple_scene,
-    mesh: &Mesh<'_>,
-    supports: impl Iterator<Item = Support>,
-    given: &[supple_tissue],
-    of_element: &[u16],
-) -> Answer<Built> {
-    const { assert!(size_of::<Tissue<L>>() <= size_of::<supple_tissue>()) };
-    // SAFETY: the caller's promise; what is not any bits is written before it is read.
-    let (nodes, blocks, tissues, regions) = unsafe {
-        let supple_scene { nodes, blocks, tissues, elements, .. } = &*object;
-        let mut arrays = Arrays::behind(object);
-        (
-            arrays.next::<NodeInertia>(*nodes as usize),
-            arrays.next::<ElementBlock>(*blocks as usize),
-            arrays.next_of::<Tissue<L>, supple_tissue>(*tissues as usize),
-            arrays.next::<u16>(self::regions(*elements, *tissues)),
-        )
-    };
-    for (tissue, given) in tissues.iter_mut().zip(given) {
-        *tissue = Tissue { law: L::from_constants(given.constants), density: given.density };
-    }
-    for (region, &given) in regions.iter_mut().zip(of_element) {
-        *region = given;
-    }
-    let mut scene = Scene::over(Body::new(&*tissues, &*regions), nodes, blocks);
-    scene.build_from(mesh, supports)?;
-    Ok(*scene.built())
-}
-
 /// The scene in an object.
 ///
 /// # Safety
@@ -344,26 +400,8 @@ unsafe fn build<L: FromConstants>(
 pub(super) unsafe fn carved<'a>(object: *const supple_scene) -> Answer<AnyScene<'a>> {
     // SAFETY: the caller's promise.
     unsafe {
-        Ok(match memory::read(object)?.law {
-            #[cfg(feature = "capi")]
-            SUPPLE_EXPONENTIAL => AnyScene::Exponential(of_law(object)),
-            _ => AnyScene::NeoHookean(of_law(object)),
-        })
-    }
-}
-
-/// # Safety
-/// `object` is a scene of this law, which nobody writes.
-unsafe fn of_law<'a, L: FromConstants>(object: *const supple_scene) -> Carved<'a, L> {
-    // SAFETY: the caller's promise; all arrays were written by `build`.
-    unsafe {
-        let scene = &*object;
-        let mut arrays = Arrays::behind(object);
-        let nodes = arrays.look::<NodeInertia>(scene.nodes as usize);
-        let blocks = arrays.look::<ElementBlock>(scene.blocks as usize);
-        let tissues = arrays.look_of::<Tissue<L>, supple_tissue>(scene.tissues as usize);
-        let of_element = arrays.look::<u16>(regions(scene.elements, scene.tissues));
-        Scene::again(Body::new(tissues, of_element), nodes, blocks, scene.built)
+        memory::is(object)?;
+        AnyScene::of(object)
     }
 }
 
@@ -374,23 +412,16 @@ pub unsafe extern "C" fn supple_scene_describe(
     facts: *mut supple_scene_facts,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let answer = unsafe { describe(scene, facts) };
-    answer.unwrap_or_else(|error| error.status)
-}
-
-/// # Safety
-/// As [`supple_scene_describe`].
-unsafe fn describe(scene: *const supple_scene, facts: *mut supple_scene_facts) -> Answer<supple_status> {
-    // SAFETY: the caller's promise.
-    let (any, bytes, facts) = unsafe { (carved(scene)?, memory::bytes_of(scene), place_for(facts)?) };
-    let found = with_scene!(any, scene => supple_scene_facts {
-        nodes: scene.node_count() as u32,
-        elements: scene.element_count() as u32,
-        bytes: bytes as u64,
-        operations: tled::operations(&scene),
-        mass: scene.mass(),
-    });
-    // SAFETY: aligned, and there.
-    unsafe { facts.write(found) };
-    Ok(SUPPLE_OK)
+    let describe = || unsafe {
+        let (any, bytes, facts) = (carved(scene)?, memory::bytes_of(scene), place_for(facts)?);
+        facts.write(with_scene!(any, scene => supple_scene_facts {
+            nodes: scene.node_count() as u32,
+            elements: scene.element_count() as u32,
+            bytes: bytes as u64,
+            operations: tled::operations(scene),
+            mass: scene.mass(),
+        }));
+        Ok(SUPPLE_OK)
+    };
+    status_of(describe())
 }

@@ -2,16 +2,15 @@
 
 use core::ffi::c_void;
 
-use crate::ledger::Ledger;
-use crate::state::{NodeVector, State};
-use crate::tled::{self, Step};
+use crate::state::{NodeVector, Progress, StateView};
+use crate::step::{CriticalStep, Step};
+use crate::tled;
 
-use super::loads::belongs;
 use super::memory::{
     self, Arrays, Head, Layout, Object, Place, magic, one, place_for, place_if_wanted, same_abi,
 };
-use super::scene::{carved, supple_scene, with_scene};
-use super::status::{Answer, supple_error, supple_status};
+use super::scene::{AnyScene, carved, supple_scene, with_scene};
+use super::status::{Answer, status_of, supple_error, supple_status};
 use supple_status::*;
 
 /// What moves. One thread at a time. It may be copied with memcpy, to any memory aligned to SUPPLE_ALIGN, and the copy goes on as
@@ -21,7 +20,7 @@ pub struct supple_state {
     head: Head,
     pub(super) nodes: u32,
     has_step: bool,
-    pub(super) moment: Moment,
+    pub(super) progress: Progress,
     step: Step,
 }
 
@@ -35,26 +34,6 @@ unsafe impl Object for supple_state {
 pub const SUPPLE_STATE_FRONT: usize = 128;
 const _: () = assert!(SUPPLE_STATE_FRONT == <supple_state as Object>::FRONT);
 
-/// When it is, and the energy account.
-#[derive(Clone, Copy)]
-pub(super) struct Moment {
-    pub(super) time: f64,
-    pub(super) steps: u64,
-    pub(super) dt: f32,
-    pub(super) ledger: Ledger,
-}
-
-impl Moment {
-    pub(super) fn of<S>(&State { time, steps, dt, ledger, .. }: &State<S>) -> Self {
-        Self { time, steps, dt, ledger }
-    }
-
-    pub(super) fn put<S>(self, state: &mut State<S>) {
-        let Self { time, steps, dt, ledger } = self;
-        (state.time, state.steps, state.dt, state.ledger) = (time, steps, dt, ledger);
-    }
-}
-
 /// The step, and how motion is damped.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +44,8 @@ pub struct supple_step_config {
     pub abi: u32,
     /// Length of a step, s: at most the critical step.
     pub seconds: f32,
-    /// Damping proportional to mass, 1/s, zero or more.
+    /// Damping proportional to mass, 1/s, zero or more. Learned steps use it as well; a supple_large has its own, in
+    /// supple_large_config.
     pub damping: f32,
 }
 
@@ -91,33 +71,31 @@ pub unsafe extern "C" fn supple_state_init(
     // SAFETY: what the header asks of the caller.
     let init = || unsafe {
         let (any, state) = (carved(scene)?, place_for(state)?);
-        let nodes = with_scene!(any, scene => scene.node_count() as u32);
+        let nodes = any.node_count() as u32;
         let place = Place::new(memory, bytes, layout(nodes))?;
-        let step = Step::insist(1.0, 0.0)?;
-        let moment = Moment { time: 0.0, steps: 0, dt: 0.0, ledger: Ledger::NEW };
-        let object = place.put(|head| supple_state { head, nodes, has_step: false, moment, step });
-        View::of(object).state.reset();
-        place.done::<supple_state>();
-        state.write(object);
+        let step = Step::unchecked(1.0, 0.0)?;
+        let mut progress = Progress::START;
+        view(place.arrays::<supple_state>(), nodes, &mut progress).reset();
+        state.write(place.put(|head| supple_state { head, nodes, has_step: false, progress, step }));
         Ok(SUPPLE_OK)
     };
-    init().unwrap_or_else(|error: supple_error| error.status)
+    status_of(init())
 }
 
-/// Puts a state back to rest at time zero. Its step stays. Large steps have to be prepared again, learned ones reset and led.
+/// Puts a state back to rest at time zero. Its step stays. A supple_large has to be prepared again, a
+/// supple_learned reset, with a new lead-in.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_state_reset(state: *mut supple_state) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let reset = || unsafe {
-        memory::is(state.cast_const())?;
-        View::of(state).with(State::reset);
+        opened(state)?.reset();
         Ok(SUPPLE_OK)
     };
-    reset().unwrap_or_else(|error: supple_error| error.status)
+    status_of(reset())
 }
 
-/// Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It costs a few
-/// steps; tissue that is deformed is stiffer, so ask again from time to time.
+/// Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as
+/// long as some six steps; tissue that is deformed is stiffer, so ask again from time to time.
 ///
 /// @param seconds receives the step, s.
 /// @param node may be NULL; receives the node that sets it.
@@ -130,20 +108,22 @@ pub unsafe extern "C" fn supple_critical_step(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let find = || unsafe {
-        let (any, object) = (carved(scene)?, memory::change(state)?);
-        belongs(object.nodes, &any)?;
-        let seconds = place_for(seconds)?;
-        let node = place_if_wanted(node)?;
-        let critical =
-            View::of(state).with(|state| with_scene!(any, scene => tled::critical_step(&scene, state)));
-        let critical = critical.ok_or(supple_error::from(SUPPLE_E_TOO_STIFF))?;
+        let any = carved(scene)?;
+        let mut state = opened_of(&any, state)?;
+        let (seconds, node) = (place_for(seconds)?, place_if_wanted(node)?);
+        let critical = critical_step(&any, &mut state)?;
         seconds.write(critical.seconds);
         if let Some(node) = node {
             node.write(critical.node);
         }
         Ok(SUPPLE_OK)
     };
-    find().unwrap_or_else(|error: supple_error| error.status)
+    status_of(find())
+}
+
+fn critical_step(any: &AnyScene<'_>, state: &mut StateView<'_>) -> Answer<CriticalStep> {
+    let critical = with_scene!(any, scene => tled::critical_step(&scene, state));
+    critical.ok_or(SUPPLE_E_TOO_STIFF.into())
 }
 
 /// Sets the exact step of a state, for all calls that follow. Refused above the critical step at the state's
@@ -161,13 +141,11 @@ pub unsafe extern "C" fn supple_set_step(
     let set = || unsafe {
         let (any, config) = (carved(scene)?, *one(config)?);
         same_abi::<supple_step_config>(config.struct_size, config.abi)?;
-        belongs(memory::change(state)?.nodes, &any)?;
+        let mut view = opened_of(&any, state)?;
         // What is no step at all is told before anything is computed.
-        let step = Step::insist(config.seconds, config.damping)?;
-        let critical =
-            View::of(state).with(|state| with_scene!(any, scene => tled::critical_step(&scene, state)));
-        let critical = critical.ok_or(supple_error::from(SUPPLE_E_TOO_STIFF))?;
-        Step::new(config.seconds, config.damping, critical)?;
+        Step::unchecked(config.seconds, config.damping)?;
+        let critical = critical_step(&any, &mut view)?;
+        let step = Step::new(config.seconds, config.damping, critical)?;
         memory::change(state)?.set_step(Some(step));
         Ok(SUPPLE_OK)
     };
@@ -184,83 +162,72 @@ pub unsafe extern "C" fn supple_state_time(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let tell = || unsafe {
-        let moment = &memory::read(state)?.moment;
+        let progress = &memory::read(state)?.progress;
         let (seconds, steps) = (place_if_wanted(seconds)?, place_if_wanted(steps)?);
         if let Some(seconds) = seconds {
-            seconds.write(moment.time);
+            seconds.write(progress.time());
         }
         if let Some(steps) = steps {
-            steps.write(moment.steps);
+            steps.write(progress.steps());
         }
         Ok(SUPPLE_OK)
     };
-    tell().unwrap_or_else(|error: supple_error| error.status)
+    status_of(tell())
 }
 
 impl supple_state {
+    /// The step that was set.
+    pub(super) fn step(&self) -> Answer<Step> {
+        if self.has_step { Ok(self.step) } else { Err(SUPPLE_E_NO_STEP.into()) }
+    }
+
     pub(super) fn set_step(&mut self, step: Option<Step>) {
         self.has_step = step.is_some();
         self.step = step.unwrap_or(self.step);
     }
 }
 
-/// The step that was set.
-pub(super) fn step_of(object: &supple_state) -> Answer<Step> {
-    if object.has_step { Ok(object.step) } else { Err(SUPPLE_E_NO_STEP.into()) }
+/// # Safety
+/// The arrays are those of a state of so many nodes, and nobody else uses them.
+unsafe fn view<'a>(mut arrays: Arrays, nodes: u32, progress: &'a mut Progress) -> StateView<'a> {
+    // SAFETY: the caller's promise. Any bits are vectors.
+    let [displacements, increments, forces] = [(); 3].map(|()| unsafe { arrays.change(nodes as usize) });
+    StateView::new(displacements, increments, forces, progress)
 }
 
-/// A state over the memory of its object.
-pub(super) struct View<'a> {
-    pub(super) state: State<&'a mut [NodeVector]>,
-    moment: &'a mut Moment,
-}
-
-impl<'a> View<'a> {
-    /// # Safety
-    /// `object` has been put or is one, and nobody else uses it.
-    pub(super) unsafe fn of(object: *mut supple_state) -> Self {
-        // SAFETY: the caller's promise. Any bits are vectors.
-        unsafe {
-            let nodes = (*object).nodes as usize;
-            let moment = &mut (*object).moment;
-            let mut arrays = Arrays::behind(object.cast_const());
-            let mut next = || arrays.next::<NodeVector>(nodes);
-            let mut state = State::over(next(), next(), next());
-            moment.put(&mut state);
-            Self { state, moment }
-        }
-    }
-
-    /// Does something with the state, and keeps when it is.
-    pub(super) fn with<T>(&mut self, work: impl FnOnce(&mut State<&'a mut [NodeVector]>) -> T) -> T {
-        let done = work(&mut self.state);
-        *self.moment = Moment::of(&self.state);
-        done
+/// The state in an object, whose other fields may be used meanwhile.
+///
+/// # Safety
+/// As at [`memory::change`].
+pub(super) unsafe fn opened<'a>(object: *mut supple_state) -> Answer<StateView<'a>> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        memory::is(object.cast_const())?;
+        Ok(view(Arrays::behind(object.cast_const()), (*object).nodes, &mut (*object).progress))
     }
 }
 
-/// One of a state's arrays of vectors.
-#[derive(Clone, Copy)]
-pub(super) enum Field {
-    Displacement,
-    Increment,
-    Force,
+/// The same, of a state that has the nodes of a scene.
+///
+/// # Safety
+/// As at [`memory::change`].
+pub(super) unsafe fn opened_of<'a>(any: &AnyScene<'_>, object: *mut supple_state) -> Answer<StateView<'a>> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        any.fits(memory::read(object.cast_const())?.nodes)?;
+        opened(object)
+    }
 }
 
+/// Displacements, increments and forces of a state.
+///
 /// # Safety
 /// As at [`memory::read`].
-pub(super) unsafe fn field<'a>(object: *const supple_state, field: Field) -> Answer<&'a [NodeVector]> {
+pub(super) unsafe fn vectors<'a>(object: *const supple_state) -> Answer<[&'a [NodeVector]; 3]> {
     // SAFETY: the caller's promise.
     unsafe {
         let nodes = memory::read(object)?.nodes as usize;
         let mut arrays = Arrays::behind(object);
-        let displacement = arrays.look(nodes);
-        let increment = arrays.look(nodes);
-        let force = arrays.look(nodes);
-        Ok(match field {
-            Field::Displacement => displacement,
-            Field::Increment => increment,
-            Field::Force => force,
-        })
+        Ok([(); 3].map(|()| arrays.read(nodes)))
     }
 }

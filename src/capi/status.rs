@@ -4,12 +4,12 @@
 use core::ffi::{CStr, c_char};
 
 use crate::inertia::{DamperError, InertiaError};
+use crate::learned::LearnedError;
 use crate::loads::LoadError;
 use crate::mesh::MeshError;
 use crate::mlp::WeightError;
 use crate::scene::BuildError;
-use crate::surrogate::SurrogateError;
-use crate::tled::StepError;
+use crate::step::StepError;
 
 use super::SUPPLE_NONE;
 
@@ -24,8 +24,8 @@ pub enum supple_status {
     /// Done.
     SUPPLE_OK = 0,
     /// Steps were taken, but are not exact: elements are beyond the range of their law, there is more kinetic energy than
-    /// loads and supports explain, or a large step held much of the motion back. The report tells the first two, also where a larger remark hides
-    /// them.
+    /// loads and supports explain, or a step of a supple_large held much of the motion back. The report tells the first two, also
+    /// where a larger remark hides them.
     SUPPLE_LIMITED = 1,
     /// Learned steps were taken, with more than one percent of the vertices outside what training has seen.
     SUPPLE_OUTSIDE = 2,
@@ -34,9 +34,9 @@ pub enum supple_status {
 
     /// A pointer that must not be NULL is.
     SUPPLE_E_NULL = -1,
-    /// A pointer is not aligned: memory of objects to SUPPLE_ALIGN bytes, arrays to their numbers.
+    /// A pointer is not aligned: memory of objects to SUPPLE_ALIGN bytes, arrays to their elements.
     SUPPLE_E_MISALIGNED = -2,
-    /// Fewer bytes or numbers (value) than needed (limit).
+    /// Fewer bytes or floats (value) than needed (limit).
     SUPPLE_E_SHORT = -3,
     /// struct_size or abi of a configuration (value) is not this library's (limit).
     SUPPLE_E_ABI = -4,
@@ -46,7 +46,7 @@ pub enum supple_status {
     SUPPLE_E_KIND = -6,
     /// A number that stands for a choice (value) is none of the choices.
     SUPPLE_E_CHOICE = -7,
-    /// Objects that do not belong together: for scenes with other numbers of nodes (value, limit).
+    /// Objects for scenes with other numbers of nodes (value, limit).
     SUPPLE_E_MISMATCH = -8,
     /// More (value) than there is room for (limit).
     SUPPLE_E_CAPACITY = -9,
@@ -54,7 +54,7 @@ pub enum supple_status {
     SUPPLE_E_INDEX = -10,
     /// Entry or node `index` has a number (value) that is NaN or infinite.
     SUPPLE_E_NOT_FINITE = -11,
-    /// Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s).
+    /// Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s); or a lead-in (s).
     SUPPLE_E_NEGATIVE = -12,
     /// An array that is written overlaps the object that is read.
     SUPPLE_E_OVERLAP = -13,
@@ -104,7 +104,7 @@ pub enum supple_status {
     /// A network with other inputs (value) or outputs than are needed here.
     SUPPLE_E_WEIGHTS_SHAPE = -46,
 
-    /// The exact step has not led up to this moment: supple_learned_lead comes first.
+    /// No lead-in and no learned step has brought the state to this moment: supple_learned_lead comes first.
     SUPPLE_E_NOT_LED = -50,
     /// The network's step (value, s) is no whole number of the exact one (limit, s).
     SUPPLE_E_STEP_RATIO = -51,
@@ -150,7 +150,7 @@ pub struct supple_error {
     pub axis: u32,
     /// The offending value; its unit stands with the status.
     pub value: f64,
-    /// What it was held against.
+    /// What it may be at most, or should be.
     pub limit: f64,
 }
 
@@ -187,6 +187,11 @@ impl supple_error {
     pub(super) fn axis(self, axis: usize) -> Self {
         Self { axis: axis as u32, ..self }
     }
+}
+
+/// The status of a call that tells no more.
+pub(super) fn status_of(answer: Answer<supple_status>) -> supple_status {
+    answer.unwrap_or_else(|error| error.status)
 }
 
 /// Fewer than needed.
@@ -232,8 +237,9 @@ impl From<BuildError> for supple_error {
             |needed: usize, capacity: usize| is(SUPPLE_E_CAPACITY).value(needed as f64, capacity as f64);
         match error {
             BuildError::Mesh(error) => error.into(),
-            BuildError::NodeCapacity { needed, capacity }
-            | BuildError::BlockCapacity { needed, capacity } => room(needed, capacity),
+            BuildError::NodeCapacity { needed, capacity } | BuildError::TileCapacity { needed, capacity } => {
+                room(needed, capacity)
+            }
             BuildError::SupportNode { support, node, nodes } => {
                 is(SUPPLE_E_INDEX).at(support).node(node).value(node.into(), nodes as f64)
             }
@@ -306,10 +312,21 @@ impl From<WeightError> for supple_error {
     }
 }
 
-impl From<SurrogateError> for supple_error {
-    fn from(error: SurrogateError) -> Self {
-        let SurrogateError::Shape { inputs, outputs } = error;
-        Self::from(SUPPLE_E_WEIGHTS_SHAPE).value(inputs as f64, outputs as f64)
+impl From<LearnedError> for supple_error {
+    fn from(error: LearnedError) -> Self {
+        let is = Self::from;
+        match error {
+            LearnedError::Shape { inputs, outputs } => {
+                is(SUPPLE_E_WEIGHTS_SHAPE).value(inputs as f64, outputs as f64)
+            }
+            LearnedError::Damping { exact, trained } => {
+                is(SUPPLE_E_DAMPING).value(exact.into(), trained.into())
+            }
+            LearnedError::StepRatio { exact, learned } => {
+                is(SUPPLE_E_STEP_RATIO).value(learned.into(), exact.into())
+            }
+            LearnedError::NotLed { .. } => is(SUPPLE_E_NOT_LED),
+        }
     }
 }
 
@@ -347,7 +364,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         3 => c"a learned step was not to be believed: the exact step has taken over",
         -1 => c"a pointer is NULL",
         -2 => c"a pointer is not aligned",
-        -3 => c"fewer bytes or numbers than needed",
+        -3 => c"fewer bytes or floats than needed",
         -4 => c"a configuration of another version of the interface",
         -5 => c"the memory holds no object",
         -6 => c"the memory holds an object of another type",
@@ -379,7 +396,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -44 => c"the weights are damaged",
         -45 => c"a number in the weights is not one it can be",
         -46 => c"a network with other inputs or outputs than are needed here",
-        -50 => c"the exact step has not led up to this moment",
+        -50 => c"the learned step needs a lead-in up to this moment",
         -51 => c"the network's step is no whole number of the exact one",
         -52 => c"the damping is not that of the training",
         -60 => c"a lattice that cannot be",

@@ -1,19 +1,19 @@
-//! The exact step for C, alone or on threads of the host.
+//! The exact step for C, on the calling thread or on threads of the host.
 
 use core::ffi::c_void;
 use core::ptr;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use crate::ledger::Ledger;
-use crate::state::{NodeVector, State};
-use crate::threads::{MOST_PARTS, Threads};
-use crate::tled::{self, Cause, Divergence, Status};
+use crate::loads::Loads;
+use crate::state::{Progress, StateView};
+use crate::step::{Cause, Divergence, EnergyBalance, MOST_PARTS, Status, Threads};
+use crate::tled;
 
 use super::SUPPLE_NONE;
-use super::loads::{Acting, belongs, supple_loads};
+use super::loads::{CallLoads, supple_loads};
 use super::memory::{self, one, place_for};
 use super::scene::{carved, supple_scene, with_scene};
-use super::state::{View, step_of, supple_state};
+use super::state::{opened_of, supple_state};
 use super::status::{Answer, mismatch, supple_error, supple_status};
 use supple_status::*;
 
@@ -26,7 +26,7 @@ const _: () = assert!(SUPPLE_MOST_PARTS as usize == MOST_PARTS);
 pub type supple_part = unsafe extern "C" fn(work: *const c_void, part: u32);
 
 /// Threads of the host. A step calls `each` twice: it shall call `part(work, p)` for every `p` below `parts`, on
-/// whichever threads, side by side or not, and return when all those calls have. Parts share nothing, and the result does not
+/// whichever threads, at the same time or not, and return when all those calls have. Parts share nothing, and the result does not
 /// depend on where they run, to the bit. What `each` leaves out is computed when it has returned. It must return: no exception and
 /// no longjmp may leave it.
 #[repr(C)]
@@ -42,12 +42,12 @@ pub struct supple_threads {
     >,
 }
 
-/// What the steps of a call found, and what stopped it. Every call that takes steps writes all of it.
+/// What became of the steps of a call, and what stopped it. Every call that takes steps writes all of it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_report {
-    /// Simulated time at the end, s; of a step that was not taken, at its start; zero, and all else as if there had been no step, if
-    /// the call was refused before its first.
+    /// Simulated time at the end, s; of a step that was not taken, at its start; zero, and all else as if there had been no step,
+    /// if the call was refused before its first.
     pub time: f64,
     /// Kinetic energy at the latest step, J.
     pub kinetic: f64,
@@ -62,19 +62,20 @@ pub struct supple_report {
     pub least_volume_ratio: f32,
     /// Largest exponent over its cap, of the exponential law: above 1 the law went on along its tangent.
     pub saturation: f32,
-    /// Kinetic energy beyond the account, as a share of the most that was ever in it; above 0 it is remarked upon.
+    /// Kinetic energy beyond the energy balance, as a share of the most that was ever in it; above 0 it is remarked upon.
     pub energy_excess: f32,
     /// Learned steps: the largest share of the free vertices whose prediction was clipped.
     pub clipped: f32,
     /// Learned steps: the largest share with an input outside what training has seen.
     pub outside: f32,
-    /// Large steps: mean over the nodes of the inertia added, in masses of the node.
+    /// Steps of a supple_large: mean over the nodes of the inertia added, in masses of the node.
     pub added_mass: f32,
-    /// Large steps: most nodes that were held back in a step.
+    /// Steps of a supple_large: most nodes that were held back in a step.
     pub held_back: u32,
-    /// Large steps with a lattice: the least share of its motion that was used in a step; below 0.5 it is remarked upon.
+    /// Multilevel and damped steps: the least share of the lattice's motion that was used in a step; below 0.5 it is remarked
+    /// upon.
     pub lattice_share: f32,
-    /// Large steps: estimate of the error so far, m, mean over the nodes; it tells the scale and is no bound.
+    /// Steps of a supple_large: estimate of the error so far, m, mean over the nodes; it tells the scale and is no bound.
     pub error_estimate: f32,
     /// What stopped the call, with place and value; status SUPPLE_OK if nothing did.
     pub error: supple_error,
@@ -99,36 +100,41 @@ impl supple_report {
         error: supple_error::NONE,
     };
 
-    /// Enters a step; what it found if it was not taken.
-    pub(super) fn enter<S>(&mut self, status: &Status, state: &State<S>) -> Answer<supple_status> {
-        if let Status::Ok | Status::Limited { .. } = status {
+    /// Enters a step.
+    pub(super) fn enter(&mut self, status: &Status, progress: &Progress) {
+        if status.is_taken() {
             self.steps += 1;
-            self.least_volume_ratio = self.least_volume_ratio.min(state.least_volume_ratio());
-            self.saturation = self.saturation.max(state.saturation());
+            self.least_volume_ratio = self.least_volume_ratio.min(progress.least_volume_ratio());
+            self.saturation = self.saturation.max(progress.saturation());
         }
         match *status {
-            Status::Ok => Ok(SUPPLE_OK),
             Status::Limited { energy_excess, .. } => {
                 self.energy_excess = self.energy_excess.max(energy_excess);
-                Ok(SUPPLE_LIMITED)
             }
-            Status::Diverged(Divergence { node, cause, .. }) => {
-                self.node = node;
-                Err(match cause {
-                    Cause::NotFinite => supple_error::from(SUPPLE_E_DIVERGED).node(node),
-                    Cause::Energy { kinetic, available } => {
-                        supple_error::from(SUPPLE_E_DIVERGED_ENERGY).node(node).value(kinetic, available)
-                    }
-                })
-            }
-            Status::Mismatch { nodes, room } => Err(mismatch(room, nodes)),
+            Status::Diverged(Divergence { node, .. }) => self.node = node,
+            _ => {}
         }
     }
 
-    /// When it is, and the account.
-    pub(super) fn close<S>(&mut self, state: &State<S>) {
-        let Ledger { kinetic, peak, .. } = *state.ledger();
-        (self.time, self.kinetic, self.available) = (state.time(), kinetic, peak);
+    /// Time and energy at the end of the call.
+    pub(super) fn close(&mut self, progress: &Progress) {
+        let EnergyBalance { kinetic, peak, .. } = *progress.energy_balance();
+        (self.time, self.kinetic, self.available) = (progress.time(), kinetic, peak);
+    }
+}
+
+/// The status of a step for C, or why it was not taken.
+pub(super) fn answer(status: &Status) -> Answer<supple_status> {
+    match *status {
+        Status::Ok => Ok(SUPPLE_OK),
+        Status::Limited { .. } => Ok(SUPPLE_LIMITED),
+        Status::Diverged(Divergence { node, cause, .. }) => Err(match cause {
+            Cause::NotFinite => supple_error::from(SUPPLE_E_DIVERGED).node(node),
+            Cause::Energy { kinetic, available } => {
+                supple_error::from(SUPPLE_E_DIVERGED_ENERGY).node(node).value(kinetic, available)
+            }
+        }),
+        Status::Mismatch { nodes, room } => Err(mismatch(room, nodes)),
     }
 }
 
@@ -153,44 +159,49 @@ pub unsafe extern "C" fn supple_step(
     report: *mut supple_report,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let step = |found: &mut supple_report| unsafe {
+    let step = |report: &mut supple_report| unsafe {
         let any = carved(scene)?;
-        let mut acting = Acting::of(loads, &any)?;
-        let object = memory::change(state)?;
-        belongs(object.nodes, &any)?;
-        let step = step_of(object)?;
+        let mut loads = CallLoads::of(loads, &any)?;
+        any.fits(memory::read(state.cast_const())?.nodes)?;
+        let step = (*state).step()?;
         let threads = HostThreads::of(threads)?;
-        View::of(state).with(|state| {
-            let answer = with_scene!(&any, scene => taken(count, count, state, &mut acting, found, |loads, state| {
-                tled::step_in_parts(scene, loads, state, &step, &threads)
-            }));
-            found.close(state);
-            answer
-        })
+        let mut state = opened_of(&any, state)?;
+        let count = count.into();
+        let status = with_scene!(any, scene => take_steps(count, count, &mut state, &mut loads, report, |loads, state| {
+            tled::step_in_parts(scene, loads, state, &step, &threads)
+        }));
+        report.close(&state);
+        answer(&status)
     };
     // SAFETY: as above.
     unsafe { reported(report, step) }
 }
 
-/// Takes `count` steps, or until one is refused; motions go evenly over all `left` that the call takes.
-pub(super) fn taken<'a>(
-    count: u32,
-    left: u32,
-    state: &mut State<&'a mut [NodeVector]>,
-    acting: &mut Acting<'_>,
-    found: &mut supple_report,
-    mut step: impl FnMut(&crate::loads::Loads<'_>, &mut State<&'a mut [NodeVector]>) -> Status,
-) -> Answer<supple_status> {
-    let mut worst = SUPPLE_OK;
+/// Takes `count` steps, or until one is refused; motions go evenly over all `left` that the call still takes. Gives the worst
+/// status.
+pub(super) fn take_steps(
+    count: u64,
+    left: u64,
+    state: &mut StateView<'_>,
+    loads: &mut CallLoads<'_>,
+    report: &mut supple_report,
+    mut step: impl FnMut(&Loads<'_>, StateView<'_>) -> Status,
+) -> Status {
+    let mut worst = Status::Ok;
     for done in 0..count {
-        let loads = acting.next(state.displacements(), left - done);
-        let status = step(&loads, state);
-        worst = worse(worst, found.enter(&status, state)?);
+        let loads = loads.of_next_step(state.displacements(), left - done);
+        let status = step(&loads, state.reborrow());
+        report.enter(&status, state);
+        match status {
+            Status::Ok => {}
+            Status::Limited { .. } => worst = status,
+            refused => return refused,
+        }
     }
-    Ok(worst)
+    worst
 }
 
-/// Has `work` done, and writes what it found and what stopped it to `report`, if that is not NULL.
+/// Does `work`, and writes its report, with what stopped it, to `report`, if that is not NULL.
 ///
 /// # Safety
 /// If not NULL, `report` leads to memory for one.
@@ -198,19 +209,19 @@ pub(super) unsafe fn reported(
     report: *mut supple_report,
     work: impl FnOnce(&mut supple_report) -> Answer<supple_status>,
 ) -> supple_status {
-    let mut found = supple_report::NOTHING;
+    let mut written = supple_report::NOTHING;
     if report.is_null() {
-        return work(&mut found).unwrap_or_else(|error| error.status);
+        return work(&mut written).unwrap_or_else(|error| error.status);
     }
     // SAFETY: the caller's promise.
     let report = match unsafe { place_for(report) } {
         Ok(report) => report,
         Err(error) => return error.status,
     };
-    let answer = work(&mut found);
-    found.error = answer.err().unwrap_or(supple_error::NONE);
+    let answer = work(&mut written);
+    written.error = answer.err().unwrap_or(supple_error::NONE);
     // SAFETY: aligned, and there.
-    unsafe { report.write(found) };
+    unsafe { report.write(written) };
     answer.unwrap_or_else(|error| error.status)
 }
 
@@ -233,15 +244,15 @@ impl HostThreads {
     }
 }
 
-/// Parts on their way to the host's threads: what to do, where, and what has been begun.
-struct Errand<'a, T, F> {
+/// Parts that threads of the host compute: the work, where the parts are, and which have been begun.
+struct SharedParts<'a, T, F> {
     work: &'a F,
     first: *mut T,
     begun: [AtomicBool; MOST_PARTS],
     count: usize,
 }
 
-impl<T, F: Fn(&mut T)> Errand<'_, T, F> {
+impl<T, F: Fn(&mut T)> SharedParts<'_, T, F> {
     fn run(&self, part: usize) {
         if self.begun.get(part).is_none_or(|begun| part >= self.count || begun.swap(true, Ordering::AcqRel)) {
             return;
@@ -252,11 +263,11 @@ impl<T, F: Fn(&mut T)> Errand<'_, T, F> {
 }
 
 /// # Safety
-/// `work` leads to an errand.
+/// `work` leads to shared parts of these types.
 unsafe extern "C" fn run_part<T, F: Fn(&mut T)>(work: *const c_void, part: u32) {
     // SAFETY: the caller's promise.
-    if let Some(errand) = unsafe { work.cast::<Errand<'_, T, F>>().as_ref() } {
-        errand.run(part as usize);
+    if let Some(shared) = unsafe { work.cast::<SharedParts<'_, T, F>>().as_ref() } {
+        shared.run(part as usize);
     }
 }
 
@@ -270,25 +281,25 @@ impl Threads for HostThreads {
             return parts.iter_mut().for_each(work);
         };
         let count = parts.len().min(MOST_PARTS);
-        let errand = Errand {
+        let shared = SharedParts {
             work: &work,
             first: parts.as_mut_ptr(),
-            begun: [const { AtomicBool::new(false) }; 8],
+            begun: [const { AtomicBool::new(false) }; MOST_PARTS],
             count,
         };
-        hand_out(each, context, &errand, count);
+        call_host(each, context, &shared, count);
         // Nothing is lost if the host forgets a part.
-        (0..count).for_each(|part| errand.run(part));
+        (0..count).for_each(|part| shared.run(part));
     }
 }
 
 /// Calls the host. Parts are `Send` and the work is `Sync`: they may run on its threads.
-fn hand_out<T, F: Fn(&mut T)>(
+fn call_host<T, F: Fn(&mut T)>(
     each: unsafe extern "C" fn(*mut c_void, supple_part, *const c_void, u32),
     context: *mut c_void,
-    errand: &Errand<'_, T, F>,
+    shared: &SharedParts<'_, T, F>,
     count: usize,
 ) {
-    // SAFETY: what the header asks of the host: it returns when all calls have, so that the errand outlives them.
-    unsafe { each(context, run_part::<T, F>, ptr::from_ref(errand).cast(), count as u32) };
+    // SAFETY: what the header asks of the host: it returns when all calls have, so that the parts outlive them.
+    unsafe { each(context, run_part::<T, F>, ptr::from_ref(shared).cast(), count as u32) };
 }

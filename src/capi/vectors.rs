@@ -5,8 +5,8 @@ use core::ffi::c_void;
 use crate::state::NodeVector;
 
 use super::memory::{self, array, place_for};
-use super::state::{Field, field, supple_state};
-use super::status::{Answer, short, supple_error, supple_status};
+use super::state::{supple_state, vectors};
+use super::status::{Answer, short, status_of, supple_status};
 use supple_status::*;
 
 /// Vectors where they are, without a copy: three floats each, `stride` bytes apart.
@@ -29,14 +29,13 @@ pub unsafe extern "C" fn supple_displacements(
     vectors: *mut supple_vectors,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let find = || unsafe {
-        let found = field(state, Field::Displacement)?;
-        let vectors = place_for(vectors)?;
-        let (first, count) = (found.as_ptr().cast(), found.len() as u32);
-        vectors.write(supple_vectors { first, stride: size_of::<NodeVector>(), count });
+    let tell = || unsafe {
+        let [displacements, ..] = self::vectors(state)?;
+        let (first, count) = (displacements.as_ptr().cast(), displacements.len() as u32);
+        place_for(vectors)?.write(supple_vectors { first, stride: size_of::<NodeVector>(), count });
         Ok(SUPPLE_OK)
     };
-    find().unwrap_or_else(|error: supple_error| error.status)
+    status_of(tell())
 }
 
 /// Copies the displacement of each node, m, to three floats each.
@@ -49,7 +48,11 @@ pub unsafe extern "C" fn supple_copy_displacements(
     floats: usize,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    unsafe { copy(state, Field::Displacement, out, floats, |_, vector| vector) }
+    let copy = || unsafe {
+        let [displacements, ..] = vectors(state)?;
+        copy(state, displacements, out, floats, |_, displacement| displacement)
+    };
+    status_of(copy())
 }
 
 /// Copies where each node is, m: the point at rest with its displacement.
@@ -64,24 +67,18 @@ pub unsafe extern "C" fn supple_copy_positions(
     floats: usize,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let points = || unsafe {
-        let nodes = memory::read(state)?.nodes as usize;
-        let points = array(points.cast::<[f32; 3]>(), nodes)?;
+    let copy = || unsafe {
+        let [displacements, ..] = vectors(state)?;
+        let points = array(points.cast::<[f32; 3]>(), displacements.len())?;
         if overlap(points.as_ptr().cast(), size_of_val(points), out.cast(), floats.saturating_mul(4)) {
-            return Err(supple_error::from(SUPPLE_E_OVERLAP));
+            return Err(SUPPLE_E_OVERLAP.into());
         }
-        Ok(points)
+        copy(state, displacements, out, floats, |node, [x, y, z]| {
+            let [px, py, pz] = points.get(node).copied().unwrap_or_default();
+            [px + x, py + y, pz + z]
+        })
     };
-    match points() {
-        // SAFETY: as above.
-        Ok(points) => unsafe {
-            copy(state, Field::Displacement, out, floats, |node, [x, y, z]| {
-                let [px, py, pz] = points.get(node).copied().unwrap_or_default();
-                [px + x, py + y, pz + z]
-            })
-        },
-        Err(error) => error.status,
-    }
+    status_of(copy())
 }
 
 /// Copies the velocity of each node over the latest step, m/s.
@@ -94,20 +91,21 @@ pub unsafe extern "C" fn supple_copy_velocities(
     floats: usize,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    let dt = match unsafe { memory::read(state) } {
-        Ok(object) => object.moment.dt,
-        Err(error) => return error.status,
+    let copy = || unsafe {
+        let [_, increments, _] = vectors(state)?;
+        let seconds = (*state).progress.last_step();
+        copy(state, increments, out, floats, |_, increment| {
+            if seconds > 0.0 { increment.map(|component| component / seconds) } else { [0.0; 3] }
+        })
     };
-    let velocity =
-        |_, increment: [f32; 3]| if dt > 0.0 { increment.map(|component| component / dt) } else { [0.0; 3] };
-    // SAFETY: as above.
-    unsafe { copy(state, Field::Increment, out, floats, velocity) }
+    status_of(copy())
 }
 
-/// Copies the total force on each node at the start of the latest step, also of one that was refused, N: that of the loads with that of the tissue. At held
-/// nodes it is what presses on the support, and so what a hand that holds the instrument feels, apart from the inertia of a moved
-/// one; the support presses back with the opposite. Zero after supple_critical_step or supple_set_step, also where these refuse what they
-/// computed, until the next step.
+/// Copies the total force on each node at the start of the latest step, also of one that was refused, N: that of the loads with
+/// that of the tissue. At held nodes it is what presses on the support, and so what a hand that holds the instrument feels, apart
+/// from the inertia of a moved one; the support presses back with the opposite. Not so after steps of a supple_large: raised inertia
+/// delays the tissue, and the force is that of a shape that lags behind. Zero after supple_critical_step or supple_set_step, also where these
+/// refuse what they computed, until the next step.
 ///
 /// @param floats room in `out`: three times the nodes at least.
 #[unsafe(no_mangle)]
@@ -117,38 +115,39 @@ pub unsafe extern "C" fn supple_copy_forces(
     floats: usize,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
-    unsafe { copy(state, Field::Force, out, floats, |_, vector| vector) }
+    let copy = || unsafe {
+        let [_, _, forces] = vectors(state)?;
+        copy(state, forces, out, floats, |_, force| force)
+    };
+    status_of(copy())
 }
 
+/// Copies vectors `from` a state, each as `change` makes it.
+///
 /// # Safety
-/// If not NULL, `state` is as [`memory::read`] needs it and `out` leads to room for `floats` numbers.
+/// `state` is one. If not NULL, `out` leads to room for `floats` floats.
 unsafe fn copy(
     state: *const supple_state,
-    what: Field,
+    from: &[NodeVector],
     out: *mut f32,
     floats: usize,
-    vector: impl Fn(usize, [f32; 3]) -> [f32; 3],
-) -> supple_status {
+    change: impl Fn(usize, [f32; 3]) -> [f32; 3],
+) -> Answer<supple_status> {
     // SAFETY: the caller's promise.
-    let copy = || unsafe {
-        let from = field(state, what)?;
-        let out = place_for(out)?;
-        let needed = 3 * from.len();
-        if floats < needed {
-            return Err(short(floats, needed));
-        }
-        let bytes = memory::bytes_of(state);
-        if overlap(state.cast(), bytes, out.cast(), 4 * needed) {
-            return Err(supple_error::from(SUPPLE_E_OVERLAP));
-        }
-        let out = core::slice::from_raw_parts_mut(out.cast::<[f32; 3]>(), from.len());
-        for (node, (out, from)) in out.iter_mut().zip(from).enumerate() {
-            *out = vector(node, from.to_array());
-        }
-        Ok(SUPPLE_OK)
-    };
-    let answer: Answer<supple_status> = copy();
-    answer.unwrap_or_else(|error| error.status)
+    let (out, bytes) = unsafe { (place_for(out)?, memory::bytes_of(state)) };
+    let needed = 3 * from.len();
+    if floats < needed {
+        return Err(short(floats, needed));
+    }
+    if overlap(state.cast(), bytes, out.cast(), 4 * needed) {
+        return Err(SUPPLE_E_OVERLAP.into());
+    }
+    // SAFETY: there is room, aligned for floats, which nothing here reads.
+    let out = unsafe { core::slice::from_raw_parts_mut(out.cast::<[f32; 3]>(), from.len()) };
+    for (node, (out, from)) in out.iter_mut().zip(from).enumerate() {
+        *out = change(node, from.to_array());
+    }
+    Ok(SUPPLE_OK)
 }
 
 /// Whether two pieces of memory have bytes in common.

@@ -1,71 +1,79 @@
-//! Sums into the dense matrices of a lattice: its tangent stiffness from the elements' bounds, its mass, and
-//! the scaled inertia seen through its functions.
+//! Assembly of the dense matrices of a lattice: the tangent stiffness `Kc` from the elements' bounds, the mass `Mc`,
+//! and the projected inertia `G` of the nodes (kg).
 //!
 //! ```text
 //! Kc = sum_e V [ iso grad phi_c . grad phi_d I + volume (C grad phi_c)(C grad phi_d)^T ]
 //! Mc = sum_a m w_c w_d I,     G = sum_a w_c w_d (N_a + reserve m I)
 //! ```
-//! with the gradients of the interpolated functions, `grad phi_c = sum_a w_c(a) ga`, so that `Kc` is exactly
-//! `W^T K W` for the elements' bounds. At a node that is held along some axes a function has
-//! one gradient for each axis.
+//! with the gradients of the interpolated functions, `grad phi_c = sum_a w_c(a) ga`, so that `Kc` is exactly `W^T K W`
+//! for the elements' bounds. At a node that is held along some axes a function has a different gradient for each axis.
+//!
+//! Sums of elements and nodes are first made for each cell, where all functions are known, and then added to the
+//! matrices.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, corner_weights, place_of};
-use crate::lanes::{Real, write_rows};
-use crate::scene::NodeInertia;
-use crate::symmetric::Symmetric;
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, corner_weights, node_place};
+use crate::element::symmetric::Symmetric;
+use crate::element::{ElementTile, NodeInertia, TileTangents};
+use crate::simd::{Kernel, Real, TILE, dispatch, write_rows};
 
-/// One element as the assembly sees it.
-pub(super) struct Element {
+/// The bound of the tangent of one element, with `s_c D^2 / 4` as a factor.
+pub(super) struct ElementTangent {
     pub(super) nodes: [usize; 4],
+    /// Shape function gradients, 1/m.
     pub(super) gradients: [[f32; 3]; 4],
-    /// `V iso` and `V volume`, N m.
+    /// `V iso` and `V volume`, kg m^2.
     pub(super) iso: f32,
     pub(super) volume: f32,
     /// Columns of `C`, padded.
     pub(super) cofactor: [[f32; 4]; 3],
 }
 
-/// A dense matrix to add to; only blocks on and below the diagonal are written.
+/// Assembly of the stiffness: the matrix to add to, of which only the 3 x 3 submatrices on and below the diagonal are
+/// written.
 pub(super) struct Assembly<'a> {
     pub(super) lattice: &'a Lattice,
+    /// Places of the nodes.
     pub(super) nodes: &'a [LatticeNode],
     pub(super) inertia: &'a [NodeInertia],
     pub(super) matrix: &'a mut [f32],
     pub(super) stride: usize,
-    /// Of each cell.
-    pub(super) sums: &'a mut [CellSums],
+    /// Sums of each cell.
+    pub(super) sums: &'a mut [CellMatrices],
 }
 
-/// Functions of a cell.
+/// Functions of a cell, one for each corner.
 const CORNERS: usize = 8;
-/// Sums of one cell for each pair of its functions, eight a row: for each function one row of each block. Of elements
-/// the blocks are `xx, yy, zz, xy, yz, zx` of `volume` and the one of `iso`. Of nodes the sums take less: two functions of a
-/// cell multiply to one of 27 products. They are kept 32 a row for the inertia and the mass along each axis, and behind them
-/// a row of the eight functions for each axis of the momentum.
+/// Sums of one cell. While elements are summed: seven 8 x 8 matrices over the pairs of its functions,
+/// `xx, yy, zz, xy, yz, zx` of `volume` and one of `iso`; for each function one row of each matrix. While nodes are
+/// summed, the same memory has rows of 32 for the entries of inertia and mass, because the product of two functions of
+/// a cell is one of only 27 polynomials, and then one row of eight, one for each function, for each axis of the
+/// momentum.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(transparent)]
-pub(super) struct CellSums([[[f32; CORNERS]; BLOCKS]; CORNERS]);
+pub(super) struct CellMatrices([[[f32; CORNERS]; MATRICES]; CORNERS]);
 
-const BLOCKS: usize = 9;
+/// Matrices of a cell; seven are used.
+const MATRICES: usize = 9;
 
-impl CellSums {
-    pub(super) const NONE: Self = Self([[[0.0; CORNERS]; BLOCKS]; CORNERS]);
+impl CellMatrices {
+    pub(super) const NONE: Self = Self([[[0.0; CORNERS]; MATRICES]; CORNERS]);
 }
 
-/// Functions that four nodes can touch.
+/// Most functions that are not zero at the four nodes of an element.
 const TOUCHED: usize = 32;
 const NOT_TOUCHED: u8 = u8::MAX;
-/// Which functions the element at hand touches, none between elements.
+/// For each function its index among those of the element at hand; [`NOT_TOUCHED`] for other functions, and between
+/// elements.
 pub(super) type Slots = [u8; MAX_FUNCTIONS];
 pub(super) const NO_SLOTS: Slots = [NOT_TOUCHED; MAX_FUNCTIONS];
 
-/// Adds a 3 x 3 block where function `c` meets function `d`. Not four wide: the next block would then read what
-/// was just written at another alignment, which stalls until it is in the cache.
+/// Adds a 3 x 3 submatrix at row `c` and column `d` of functions. Rows of four floats would be slower: the next
+/// submatrix would read memory that was just written at another alignment, and wait for the cache.
 #[inline(always)]
-fn add_block(matrix: &mut [f32], stride: usize, c: usize, d: usize, rows: [[f32; 3]; 3]) {
+fn add_submatrix(matrix: &mut [f32], stride: usize, c: usize, d: usize, rows: [[f32; 3]; 3]) {
     let Some(rest) = matrix.get_mut(3 * c * stride + 3 * d..) else {
         return;
     };
@@ -76,10 +84,10 @@ fn add_block(matrix: &mut [f32], stride: usize, c: usize, d: usize, rows: [[f32;
     }
 }
 
-/// In one order: glam's differs from processor to processor.
+/// The sum of the components, in a fixed order; that of glam depends on the processor.
 #[inline(always)]
-fn sum(numbers: Vec4) -> f32 {
-    (numbers.x + numbers.z) + (numbers.y + numbers.w)
+fn sum(vector: Vec4) -> f32 {
+    (vector.x + vector.z) + (vector.y + vector.w)
 }
 
 #[inline(always)]
@@ -89,8 +97,9 @@ fn add_four(row: &mut [f32], column: usize, values: Vec4) {
     }
 }
 
+/// The eight values of a vector.
 #[inline(always)]
-fn store<R: Real>(values: R) -> [f32; CORNERS] {
+fn to_array<R: Real>(values: R) -> [f32; CORNERS] {
     let mut row = [0.0; CORNERS];
     for (corner, place) in row.iter_mut().enumerate() {
         *place = values.lane(corner);
@@ -98,78 +107,126 @@ fn store<R: Real>(values: R) -> [f32; CORNERS] {
     row
 }
 
-/// `row += factors values`, a product after the other.
+/// `row += factor value` for each product, one after the other.
 #[inline(always)]
 fn add_row<R: Real, const N: usize>(row: &mut [f32; CORNERS], products: [(R, R); N]) {
     let mut sum = R::from_fn(|corner| row[corner % CORNERS]);
     for (factor, value) in products {
         sum = factor.fused(value, sum);
     }
-    *row = store(sum);
+    *row = to_array(sum);
 }
 
-/// Gradients of the eight functions of a cell (1/m) and their images under `C`, lane by lane.
+/// Gradients of the eight functions of a cell (1/m) in an element, and their images under `C`.
 #[derive(Clone, Copy)]
-struct Corners<R> {
-    slopes: [R; 3],
+struct CornerGradients<R> {
+    gradients: [R; 3],
     images: [R; 3],
 }
 
-impl<R: Real> Corners<R> {
+impl<R: Real> CornerGradients<R> {
     #[inline(always)]
-    fn new(slopes: [R; 3], element: &Element) -> Self {
+    fn new(gradients: [R; 3], element: &ElementTangent) -> Self {
         let mut images = [R::splat(0.0); 3];
-        for (slope, column) in slopes.iter().zip(&element.cofactor) {
+        for (gradient, column) in gradients.iter().zip(&element.cofactor) {
             for (image, &entry) in images.iter_mut().zip(column) {
-                *image = *image + R::splat(entry) * *slope;
+                *image = *image + R::splat(entry) * *gradient;
             }
         }
-        Self { slopes, images }
+        Self { gradients, images }
     }
 
-    /// Images and slopes of each corner, padded.
+    /// Images and gradients of each corner, padded.
     #[inline(always)]
     fn by_corner(&self) -> [[[f32; 4]; CORNERS]; 2] {
         let mut corners = [[[0.0; 4]; CORNERS]; 2];
-        for ([x, y, z], rows) in [self.images, self.slopes].into_iter().zip(&mut corners) {
+        for ([x, y, z], rows) in [self.images, self.gradients].into_iter().zip(&mut corners) {
             write_rows(rows, 0, [x, y, z, R::splat(0.0)]);
         }
         corners
     }
 
+    /// Zeros at corners where the mask is zero.
     #[inline(always)]
     fn masked(&self, mask: R) -> Self {
-        let [p, q, r] = self.slopes;
+        let [p, q, r] = self.gradients;
         let [x, y, z] = self.images;
-        Self { slopes: [mask * p, mask * q, mask * r], images: [mask * x, mask * y, mask * z] }
+        Self { gradients: [mask * p, mask * q, mask * r], images: [mask * x, mask * y, mask * z] }
     }
 }
 
-/// The cell that all nodes of an element are in, or the lower one of two neighbours along an axis.
-pub(super) struct Home {
+/// The one cell, or the two neighbouring cells, with all nodes of an element.
+pub(super) struct ElementCells {
+    /// The cell, or the lower one of two.
     cell: usize,
+    /// The axis along which there is a second cell.
     pub(super) across: Option<usize>,
-    /// Position of each node from the cell's lowest corner, in cells; and as fourth number one if the node is free, else zero.
+    /// Positions of the nodes in cells, from the cell's lowest corner. The fourth component is one if the node is free,
+    /// else zero.
     nodes: [Vec4; 4],
 }
 
 impl Assembly<'_> {
-    /// Where an element is, if it is in one or two cells and its nodes are wholly free or wholly held.
+    /// Adds the elements of a tile with these tangents.
+    #[inline(never)]
+    pub(super) fn add_tile(self, tile: &ElementTile, tangents: &TileTangents) {
+        dispatch(TileAssembly { assembly: self, tile, tangents });
+    }
+}
+
+/// Not generic over laws, so compiled with this crate, once for each level.
+struct TileAssembly<'a, 'b> {
+    assembly: Assembly<'a>,
+    tile: &'b ElementTile,
+    tangents: &'b TileTangents,
+}
+
+impl Kernel for TileAssembly<'_, '_> {
+    type Output = ();
+
+    const SCALAR: bool = true;
+
     #[inline(always)]
-    pub(super) fn home(&self, nodes: &[usize; 4]) -> Option<Home> {
+    fn run<R: Real>(self) {
+        let Self { mut assembly, tile, tangents } = self;
+        let mut slots = NO_SLOTS;
+        for lane in 0..TILE {
+            let mut gradients = [[0.0; 3]; 4];
+            for corner in 0..3 {
+                for axis in 0..3 {
+                    gradients[corner + 1][axis] = tile.gradient_of(corner, axis, lane);
+                    gradients[0][axis] -= gradients[corner + 1][axis];
+                }
+            }
+            let nodes = [0, 1, 2, 3].map(|corner| tile.node(corner, lane));
+            let columns = tangents.map(|column| column[lane % TILE]);
+            let [[_, _, _, iso], [_, _, _, volume], _] = columns;
+            let cofactor = columns.map(|[x, y, z, _]| [x, y, z, 0.0]);
+            let element = ElementTangent { nodes, gradients, iso, volume, cofactor };
+            if !assembly.add_in_cells::<R::Width8>(&element) {
+                assembly.add_element(&element, &mut slots);
+            }
+        }
+    }
+}
+
+impl Assembly<'_> {
+    /// The cells of an element, if there are at most two, and each of its nodes is free or held along all axes.
+    #[inline(always)]
+    pub(super) fn cells_of(&self, nodes: &[usize; 4]) -> Option<ElementCells> {
         let (mut low, mut high) = (Vec4::splat(f32::MAX), Vec4::ZERO);
         let mut places = [[Vec4::ZERO; 2]; 4];
         for (&node, place) in nodes.iter().zip(&mut places) {
-            let (at, inertia) = (place_of(self.nodes, node)?, self.inertia.get(node)?);
+            let (at, inertia) = (node_place(self.nodes, node)?, self.inertia.get(node)?);
             let [x, y, z] = at.within();
             let free = match inertia.free().cmpgt(Vec4::ZERO).bitmask() {
                 0 => 0.0,
                 0b111 => 1.0,
                 _ => return None,
             };
-            let [i, j, k] = self.lattice.place_of(at.cell()).map(f32::from);
+            let [i, j, k] = self.lattice.cell_indices(at.cell()).map(f32::from);
             *place = [Vec4::new(i, j, k, 0.0), Vec4::new(x, y, z, free)];
-            // A node on the border of two cells is in both.
+            // A node on the border of two cells belongs to both.
             let [least, within] = *place;
             let border = Vec4::select(within.cmple(Vec4::ZERO), Vec4::ONE, Vec4::ZERO);
             low = low.min(least);
@@ -183,85 +240,88 @@ impl Assembly<'_> {
         let across = if more == 0 { None } else { Some(more.trailing_zeros() as usize) };
         let [i, j, k, _] = low.to_array().map(|along| along as u8);
         let nodes = places.map(|[cell, within]| (cell - low) + within);
-        Some(Home { cell: self.lattice.cell_number([i, j, k]), across, nodes })
+        Some(ElementCells { cell: self.lattice.cell_index([i, j, k]), across, nodes })
     }
 
-    /// Adds the stiffness bound of an element to the sums of the cell that it is in, or of the two. Says whether it could.
+    /// Adds the tangent of an element to the sums of its one or two cells. Gives whether this was possible.
     #[inline(always)]
-    pub(super) fn add_in_cells<R: Real>(&mut self, element: &Element) -> bool {
+    pub(super) fn add_in_cells<R: Real>(&mut self, element: &ElementTangent) -> bool {
         if R::COUNT != CORNERS {
             return false;
         }
-        let Some(Home { cell, across, nodes }) = self.home(&element.nodes) else {
+        let Some(ElementCells { cell, across, nodes }) = self.cells_of(&element.nodes) else {
             return false;
         };
-        // Along the axis across, the layers of functions of two cells are numbered 0, 1, 2: `near` has 0 and 1, `far` 1
-        // and 2.
+        // Along `across` two cells have three layers of functions, 0, 1 and 2. `near` has layers 0 and 1, `far` layers
+        // 1 and 2.
         let (mut near, mut far) = ([R::splat(0.0); 3], [R::splat(0.0); 3]);
         for (place, gradient) in nodes.iter().zip(&element.gradients) {
             let weights = corner_weights::<R>(*place, across);
             for axis in 0..3 {
-                let slope = R::splat(place.w * gradient[axis]);
-                near[axis] = near[axis] + weights[0] * slope;
+                let component = R::splat(place.w * gradient[axis]);
+                near[axis] = near[axis] + weights[0] * component;
                 if across.is_some() {
-                    far[axis] = far[axis] + weights[1] * slope;
+                    far[axis] = far[axis] + weights[1] * component;
                 }
             }
         }
-        let near = Corners::new(near, element);
+        let near = CornerGradients::new(near, element);
         let Some(sums) = self.sums.get_mut(cell) else {
             return false;
         };
         sums.add_products(element, &near, |_| near);
         if let Some(axis) = across {
-            let far = Corners::new(far, element);
-            let next = cell + self.lattice.next_along(axis);
-            let Some(sums) = self.sums.get_mut(next) else {
+            let far = CornerGradients::new(far, element);
+            let neighbour = cell + self.lattice.cell_stride(axis);
+            let Some(sums) = self.sums.get_mut(neighbour) else {
                 return false;
             };
-            // What both have, layer 1 with itself, once.
-            let last = R::from_fn(|corner| if corner >> axis & 1 == 1 { 1.0 } else { 0.0 });
-            let beyond = far.masked(last);
+            // Both cells have the products of layer 1 with itself: they are added to the first cell only.
+            let last_layer = R::from_fn(|corner| if corner >> axis & 1 == 1 { 1.0 } else { 0.0 });
+            let beyond = far.masked(last_layer);
             sums.add_products(element, &far, |corner| if corner >> axis & 1 == 1 { far } else { beyond });
-            self.add_ends(element, axis, [cell, next], &near, &far);
+            self.add_outer_layers(element, axis, [cell, neighbour], &near, &far);
         }
         true
     }
 
-    /// Adds what layers 0 and 2 have with each other, which no cell sums.
+    /// Adds the products of layer 0 with layer 2 to the matrix; they belong to no cell.
     #[inline(always)]
-    fn add_ends<R: Real>(
+    fn add_outer_layers<R: Real>(
         &mut self,
-        element: &Element,
+        element: &ElementTangent,
         axis: usize,
         cells: [usize; 2],
-        near: &Corners<R>,
-        far: &Corners<R>,
+        near: &CornerGradients<R>,
+        far: &CornerGradients<R>,
     ) {
         let [low, high] = cells.map(|cell| self.lattice.functions_of(cell));
-        let ([images, slopes], [far_images, far_slopes]) = (near.by_corner(), far.by_corner());
-        // Of the four corners across the axis.
-        let corner = |number: usize| (number >> axis) << (axis + 1) | number & ((1 << axis) - 1);
+        let ([images, gradients], [far_images, far_gradients]) = (near.by_corner(), far.by_corner());
+        // The four corners of the lower side of a cell along the axis.
+        let corner = |index: usize| (index >> axis) << (axis + 1) | index & ((1 << axis) - 1);
         for c in [0, 1, 2, 3].map(corner) {
-            let (image, slope) = (Vec4::from(images[c % CORNERS]), Vec4::from(slopes[c % CORNERS]));
-            for d in [0, 1, 2, 3].map(|number| corner(number) | 1 << axis) {
+            let (image, gradient) = (Vec4::from(images[c % CORNERS]), Vec4::from(gradients[c % CORNERS]));
+            for d in [0, 1, 2, 3].map(|index| corner(index) | 1 << axis) {
                 let (first, last) = (low[c % CORNERS], high[d % CORNERS]);
                 if first >= MAX_FUNCTIONS || last >= MAX_FUNCTIONS {
                     continue;
                 }
                 let far_image = Vec4::from(far_images[d % CORNERS]);
-                let all = element.iso * sum(slope * Vec4::from(far_slopes[d % CORNERS]));
-                let (row, down, column, along) = if first < last {
+                let diagonal = element.iso * sum(gradient * Vec4::from(far_gradients[d % CORNERS]));
+                let (row, row_image, column, column_image) = if first < last {
                     (last, far_image, first, image)
                 } else {
                     (first, image, last, far_image)
                 };
-                let [x, y, z, _] = (element.volume * down).to_array();
+                let [x, y, z, _] = (element.volume * row_image).to_array();
                 let Some(lines) = self.matrix.get_mut(3 * row * self.stride..) else {
                     continue;
                 };
-                let values =
-                    [x * along + all * Vec4::X, y * along + all * Vec4::Y, z * along + all * Vec4::Z];
+                let values = [
+                    x * column_image + diagonal * Vec4::X,
+                    y * column_image + diagonal * Vec4::Y,
+                    z * column_image + diagonal * Vec4::Z,
+                ];
                 for (line, values) in lines.chunks_exact_mut(self.stride.max(1)).zip(values) {
                     add_four(line, 3 * column, values);
                 }
@@ -269,34 +329,34 @@ impl Assembly<'_> {
         }
     }
 
-    /// Adds the sums of a cell to the matrix, and makes room for the next ones.
-    pub(super) fn add_cell(&mut self, number: usize) {
-        let Some(sums) = self.sums.get_mut(number) else {
+    /// Adds the sums of a cell to the matrix, and clears them.
+    pub(super) fn add_cell(&mut self, cell: usize) {
+        let Some(sums) = self.sums.get_mut(cell) else {
             return;
         };
-        let functions = self.lattice.functions_of(number);
+        let functions = self.lattice.functions_of(cell);
         for (c, d, row, column) in pairs(functions) {
-            let at = |block: usize, c: usize, d: usize| sums.0[c % CORNERS][block][d % CORNERS];
-            let all = at(6, c, d);
+            let at = |matrix: usize, c: usize, d: usize| sums.0[c % CORNERS][matrix][d % CORNERS];
+            let diagonal = at(6, c, d);
             let rows = [
-                [at(0, c, d) + all, at(3, c, d), at(5, d, c)],
-                [at(3, d, c), at(1, c, d) + all, at(4, c, d)],
-                [at(5, c, d), at(4, d, c), at(2, c, d) + all],
+                [at(0, c, d) + diagonal, at(3, c, d), at(5, d, c)],
+                [at(3, d, c), at(1, c, d) + diagonal, at(4, c, d)],
+                [at(5, c, d), at(4, d, c), at(2, c, d) + diagonal],
             ];
-            add_block(self.matrix, self.stride, row, column, rows);
+            add_submatrix(self.matrix, self.stride, row, column, rows);
         }
-        *sums = CellSums::NONE;
+        *sums = CellMatrices::NONE;
     }
 
-    /// Adds the stiffness bound of an element.
+    /// Adds the tangent of an element directly to the matrix.
     #[inline(always)]
-    pub(super) fn add_element(&mut self, element: &Element, slots: &mut Slots) {
-        // Derivative of each function along each material axis (the lanes are the spatial axes: a function may be cut
-        // off along some of them).
+    pub(super) fn add_element(&mut self, element: &ElementTangent, slots: &mut Slots) {
+        // Derivatives of each function along the three material axes. Their components are the spatial axes, because a
+        // function may be zero along some of these.
         let mut touched = [[Vec4::ZERO; 3]; TOUCHED];
         let (mut count, mut bits) = (0, 0u128);
         for (&node, gradient) in element.nodes.iter().zip(element.gradients) {
-            let (Some(at), Some(inertia)) = (place_of(self.nodes, node), self.inertia.get(node)) else {
+            let (Some(at), Some(inertia)) = (node_place(self.nodes, node), self.inertia.get(node)) else {
                 continue;
             };
             let free = inertia.free();
@@ -321,7 +381,7 @@ impl Assembly<'_> {
             }
         }
         let [cx, cy, cz] = element.cofactor.map(Vec4::from);
-        // In ascending order of the functions: only blocks on and below the diagonal are kept.
+        // In ascending order of the functions, because only submatrices on and below the diagonal are kept.
         let mut functions = [0usize; TOUCHED];
         let mut images = [Vec4::ZERO; TOUCHED];
         let mut slopes = [[Vec4::ZERO; 3]; TOUCHED];
@@ -351,8 +411,8 @@ impl Assembly<'_> {
             };
             let [x, y, z] = slopes[c].map(|slope| element.iso * slope);
             let image = element.volume * images[c];
-            // A block is added four wide and spills a zero into the next one, which would have to wait for it to reach
-            // the cache: so every other function first.
+            // A submatrix is added with four columns, the last of zeros in the next submatrix. That would then have to
+            // wait for the cache. So every second submatrix is added first.
             for d in (0..=c).step_by(2).chain((1..=c).step_by(2)) {
                 let d = d % TOUCHED;
                 let diagonal = x * slopes[d][0] + y * slopes[d][1] + z * slopes[d][2];
@@ -365,7 +425,7 @@ impl Assembly<'_> {
     }
 }
 
-/// Pairs of a cell's functions on and below the diagonal: two corners, their row and column.
+/// Pairs of a cell's functions on and below the diagonal: two corners and their functions, without dropped ones.
 fn pairs(functions: [usize; CORNERS]) -> impl Iterator<Item = (usize, usize, usize, usize)> {
     let at = move |corner: usize| functions[corner % CORNERS];
     (0..CORNERS)
@@ -373,25 +433,25 @@ fn pairs(functions: [usize; CORNERS]) -> impl Iterator<Item = (usize, usize, usi
         .filter(|&(_, _, row, column)| row < MAX_FUNCTIONS && column < MAX_FUNCTIONS)
 }
 
-impl CellSums {
-    /// Adds an element: for each corner the products with all of `columns`.
+impl CellMatrices {
+    /// Adds the tangent of an element: the products of each corner with `columns` of that corner.
     #[inline(always)]
     fn add_products<R: Real>(
         &mut self,
-        element: &Element,
-        corners: &Corners<R>,
-        columns: impl Fn(usize) -> Corners<R>,
+        element: &ElementTangent,
+        corners: &CornerGradients<R>,
+        columns: impl Fn(usize) -> CornerGradients<R>,
     ) {
         let (volume, iso) = (R::splat(element.volume), R::splat(element.iso));
-        let Corners { slopes: [p, q, r], images: [x, y, z] } = *corners;
-        let (ax, ay, az) = (store(volume * x), store(volume * y), store(volume * z));
-        let (bp, bq, br) = (store(iso * p), store(iso * q), store(iso * r));
+        let CornerGradients { gradients: [p, q, r], images: [x, y, z] } = *corners;
+        let (ax, ay, az) = (to_array(volume * x), to_array(volume * y), to_array(volume * z));
+        let (bp, bq, br) = (to_array(iso * p), to_array(iso * q), to_array(iso * r));
         for (corner, rows) in self.0.iter_mut().enumerate() {
-            let Corners { slopes: [p, q, r], images: [x, y, z] } = columns(corner);
+            let CornerGradients { gradients: [p, q, r], images: [x, y, z] } = columns(corner);
             let corner = corner % CORNERS;
             let (along_x, along_y, along_z) =
                 (R::splat(ax[corner]), R::splat(ay[corner]), R::splat(az[corner]));
-            let [xx, yy, zz, xy, yz, zx, all, ..] = rows;
+            let [xx, yy, zz, xy, yz, zx, diagonal, ..] = rows;
             add_row(xx, [(along_x, x)]);
             add_row(yy, [(along_y, y)]);
             add_row(zz, [(along_z, z)]);
@@ -400,11 +460,11 @@ impl CellSums {
             add_row(zx, [(along_z, x)]);
             let (p_along, q_along, r_along) =
                 (R::splat(bp[corner]), R::splat(bq[corner]), R::splat(br[corner]));
-            add_row(all, [(p_along, p), (q_along, q), (r_along, r)]);
+            add_row(diagonal, [(p_along, p), (q_along, q), (r_along, r)]);
         }
     }
 
-    /// Adds a node's inertia, its mass (kg, zero rows at held axes) and its momentum.
+    /// Adds inertia and mass of a node (kg, with zero rows at held axes) and its momentum.
     #[inline(always)]
     pub(super) fn add_node<R: Real>(
         &mut self,
@@ -415,37 +475,37 @@ impl CellSums {
     ) {
         let Symmetric { xx, yy, zz, xy, yz, zx } = *inertia;
         let entries = [xx, yy, zz, xy, yz, zx, mx, my, mz];
-        // Of two functions along an axis: both near, one of each, both far.
+        // Products of two functions along an axis: both of the near point, one of each, both of the far point.
         let [x, y, z] = node.within().map(|far| [(1.0 - far) * (1.0 - far), (1.0 - far) * far, far * far]);
         let mut products = [0.0; PRODUCTS];
-        let of_yz = z.into_iter().flat_map(|z| y.map(|y| y * z));
-        for (three, of_yz) in products.as_chunks_mut::<3>().0.iter_mut().zip(of_yz) {
-            *three = x.map(|x| x * of_yz);
+        let yz_products = z.into_iter().flat_map(|z| y.map(|y| y * z));
+        for (three, yz) in products.as_chunks_mut::<3>().0.iter_mut().zip(yz_products) {
+            *three = x.map(|x| x * yz);
         }
-        let numbers = self.0.as_flattened_mut().as_flattened_mut();
-        let mut rows = numbers.chunks_exact_mut(PRODUCTS);
+        let floats = self.0.as_flattened_mut().as_flattened_mut();
+        let mut rows = floats.chunks_exact_mut(PRODUCTS);
         for (row, entry) in rows.by_ref().zip(entries) {
             add_times::<R>(row, entry, &products);
         }
         let weights = node.eight_weights();
-        for (row, of) in numbers.chunks_exact_mut(CORNERS).skip(MOMENTA).zip(momentum) {
-            add_times::<R::Eight>(row, of, &weights);
+        for (row, component) in floats.chunks_exact_mut(CORNERS).skip(MOMENTA).zip(momentum) {
+            add_times::<R::Width8>(row, component, &weights);
         }
     }
 
-    /// What has been summed of nodes where functions `c` and `d` of the cell meet.
+    /// The sums over nodes for functions `c` and `d` of the cell.
     #[inline(always)]
-    fn of_nodes(&self, c: usize, d: usize) -> [f32; ENTRIES] {
+    fn node_sums(&self, c: usize, d: usize) -> [f32; ENTRIES] {
         let product = (c & 1) + (d & 1) + 3 * ((c >> 1 & 1) + (d >> 1 & 1)) + 9 * ((c >> 2) + (d >> 2));
-        let numbers = self.0.as_flattened().as_flattened();
+        let floats = self.0.as_flattened().as_flattened();
         let mut entries = [0.0; ENTRIES];
-        for (entry, row) in entries.iter_mut().zip(numbers.chunks_exact(PRODUCTS)) {
+        for (entry, row) in entries.iter_mut().zip(floats.chunks_exact(PRODUCTS)) {
             *entry = row.get(product).copied().unwrap_or(0.0);
         }
         entries
     }
 
-    /// Adds the sums of momenta to those of the functions.
+    /// Adds the sums of momentum to those of the functions.
     fn add_momenta(&self, functions: [usize; CORNERS], momenta: &mut CoarseVectors) {
         let rows = self.0.as_flattened().iter().skip(MOMENTA);
         for (axis, row) in rows.take(3).enumerate() {
@@ -458,54 +518,56 @@ impl CellSums {
     }
 }
 
-/// Products of two functions of a cell: three along each axis, and as many more as make whole vectors.
+/// Products of two functions of a cell: three along each axis, so 27, rounded up to whole vectors.
 const PRODUCTS: usize = 32;
-/// Numbers of a node: its inertia, and its mass along each axis.
+/// Entries that are summed over nodes: six of the inertia, and the mass along each axis.
 const ENTRIES: usize = 9;
-/// Rows of eight before those of the momentum.
+/// Index of the first row of the momentum, in rows of eight.
 const MOMENTA: usize = ENTRIES * PRODUCTS / CORNERS;
 
-/// `row += factor of`.
+/// `row += factor values`.
 #[inline(always)]
-fn add_times<R: Real>(row: &mut [f32], factor: f32, of: &[f32]) {
+fn add_times<R: Real>(row: &mut [f32], factor: f32, values: &[f32]) {
     let factor = R::splat(factor);
-    for (row, of) in row.chunks_exact_mut(R::COUNT).zip(of.chunks_exact(R::COUNT)) {
-        let products = R::from_fn(|lane| of.get(lane).copied().unwrap_or(0.0));
-        let sum = factor.fused(products, R::from_fn(|lane| row.get(lane).copied().unwrap_or(0.0)));
+    for (row, values) in row.chunks_exact_mut(R::COUNT).zip(values.chunks_exact(R::COUNT)) {
+        let values = R::from_fn(|lane| values.get(lane).copied().unwrap_or(0.0));
+        let sum = factor.fused(values, R::from_fn(|lane| row.get(lane).copied().unwrap_or(0.0)));
         for (lane, place) in row.iter_mut().enumerate() {
             *place = sum.lane(lane);
         }
     }
 }
 
-/// Dense matrices for the sums of the nodes.
-pub(super) struct NodeMatrices<'a> {
+/// Assembly of the matrices that come from nodes.
+pub(super) struct CoarseInertia<'a> {
     pub(super) lattice: &'a Lattice,
+    /// `G`.
     pub(super) inertia: &'a mut [f32],
+    /// `S`, to which `(1 + k) Mc` is added.
     pub(super) mass: &'a mut [f32],
-    /// The same once more, with nothing else in it; may be empty.
-    pub(super) mass_alone: &'a mut [f32],
+    /// `(1 + k) Mc` in a matrix of its own; may be empty.
+    pub(super) mass_only: &'a mut [f32],
     pub(super) momenta: &'a mut CoarseVectors,
     pub(super) stride: usize,
 }
 
-impl NodeMatrices<'_> {
-    /// Adds the sums of cell `number`, and makes room for the next ones.
-    pub(super) fn add_cell(&mut self, number: usize, sums: &mut CellSums) {
-        sums.add_momenta(self.lattice.functions_of(number), self.momenta);
-        for (c, d, row, column) in pairs(self.lattice.functions_of(number)) {
-            let [xx, yy, zz, xy, yz, zx, mx, my, mz] = sums.of_nodes(c, d);
+impl CoarseInertia<'_> {
+    /// Adds the sums of a cell, and clears them.
+    pub(super) fn add_cell(&mut self, cell: usize, sums: &mut CellMatrices) {
+        sums.add_momenta(self.lattice.functions_of(cell), self.momenta);
+        for (c, d, row, column) in pairs(self.lattice.functions_of(cell)) {
+            let [xx, yy, zz, xy, yz, zx, mx, my, mz] = sums.node_sums(c, d);
             let rows = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
-            add_block(self.inertia, self.stride, row, column, rows);
+            add_submatrix(self.inertia, self.stride, row, column, rows);
             for (axis, mass) in [mx, my, mz].into_iter().enumerate() {
                 let place = (3 * row + axis) * self.stride + 3 * column + axis;
-                for matrix in [&mut *self.mass, &mut *self.mass_alone] {
+                for matrix in [&mut *self.mass, &mut *self.mass_only] {
                     if let Some(entry) = matrix.get_mut(place) {
                         *entry += mass;
                     }
                 }
             }
         }
-        *sums = CellSums::NONE;
+        *sums = CellMatrices::NONE;
     }
 }

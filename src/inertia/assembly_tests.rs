@@ -1,16 +1,16 @@
-//! The lattice's matrices from sums of its cells, against sums without them.
+//! The lattice's matrices from the sums of its cells, compared with direct sums.
 
-use super::assembly::{Assembly, CellSums, Element, NO_SLOTS, NodeMatrices};
+use super::assembly::{Assembly, CellMatrices, CoarseInertia, ElementTangent, NO_SLOTS};
 use super::dense::stride;
-use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS, order};
-use crate::lanes::{Lanes, NodeVector};
+use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS, sort_by_cell};
+use crate::element::NodeInertia;
+use crate::element::symmetric::Symmetric;
 use crate::mesh::Bar;
-use crate::scene::NodeInertia;
-use crate::symmetric::Symmetric;
+use crate::simd::{Baseline, NodeVector};
 
 const BAR: Bar = Bar { size: [0.06, 0.05, 0.09], cells: [5, 4, 7] };
 
-/// Numbers from -0.5 to 0.5.
+/// Random values from -0.5 to 0.5.
 fn random() -> impl FnMut() -> f32 {
     let mut state = 1u32;
     move || {
@@ -29,14 +29,14 @@ fn scene() -> (Lattice, Vec<LatticeNode>, Vec<NodeInertia>) {
     inertia[100].inverse[1] = 0.0;
     let lattice = Lattice::new([2, 2, 3], &points, &inertia).unwrap();
     let mut places: Vec<_> = points.iter().map(|&point| lattice.place(point)).collect();
-    order(&mut places);
+    sort_by_cell(&mut places);
     (lattice, places, inertia)
 }
 
 fn worst(a: &[f32], b: &[f32], stride: usize) -> f32 {
     let (mut worst, mut largest) = (0.0f32, 0.0f32);
     for (at, (a, b)) in a.iter().zip(b).enumerate() {
-        // Only blocks on and below the diagonal are written.
+        // Only submatrices on and below the diagonal are written.
         if at % stride / 3 <= at / stride / 3 {
             worst = worst.max((a - b).abs());
             largest = largest.max(b.abs());
@@ -46,15 +46,15 @@ fn worst(a: &[f32], b: &[f32], stride: usize) -> f32 {
 }
 
 #[test]
-fn sums_of_the_cells_are_those_of_the_elements_one_by_one() {
+fn stiffness_from_sums_of_the_cells_is_that_from_single_elements() {
     let (lattice, places, inertia) = scene();
     let stride = stride(lattice.functions());
     let empty = vec![0.0; 3 * lattice.functions() * stride];
-    let (mut by_cells, mut one_by_one) = (empty.clone(), empty);
-    let mut sums = vec![CellSums::NONE; lattice.cell_count()];
-    let mut nothing = Vec::new();
+    let (mut by_cells, mut direct) = (empty.clone(), empty);
+    let mut sums = vec![CellMatrices::NONE; lattice.cell_count()];
+    let mut no_sums = Vec::new();
     let mut random = random();
-    let (mut in_one, mut in_two, mut elsewhere) = (0, 0, 0);
+    let (mut in_one, mut in_two, mut in_more) = (0, 0, 0);
     for tet in BAR.tets() {
         let mut gradients = [[0.0; 3]; 4];
         for corner in 1..4 {
@@ -69,46 +69,46 @@ fn sums_of_the_cells_are_those_of_the_elements_one_by_one() {
             column
         });
         let (nodes, iso, volume) = (tet.map(|node| node as usize), 1.0 + random(), 20.0 + random());
-        let element = Element { nodes, gradients, iso, volume, cofactor };
-        let matrix = &mut one_by_one;
+        let element = ElementTangent { nodes, gradients, iso, volume, cofactor };
+        let matrix = &mut direct;
         let (lattice, nodes, inertia) = (&lattice, &places, &inertia);
-        Assembly { lattice, nodes, inertia, matrix, stride, sums: &mut nothing }
+        Assembly { lattice, nodes, inertia, matrix, stride, sums: &mut no_sums }
             .add_element(&element, &mut NO_SLOTS.clone());
         let matrix = &mut by_cells;
         let mut assembly = Assembly { lattice, nodes, inertia, matrix, stride, sums: &mut sums };
-        let across = assembly.home(&element.nodes).map(|home| home.across.is_some());
-        if !assembly.add_in_cells::<Lanes<8>>(&element) {
+        let across = assembly.cells_of(&element.nodes).map(|cells| cells.across.is_some());
+        if !assembly.add_in_cells::<Baseline>(&element) {
             assembly.add_element(&element, &mut NO_SLOTS.clone());
         }
         match across {
             Some(false) => in_one += 1,
             Some(true) => in_two += 1,
-            None => elsewhere += 1,
+            None => in_more += 1,
         }
     }
     let (nodes, matrix) = (&places, &mut by_cells);
     let mut assembly =
         Assembly { lattice: &lattice, nodes, inertia: &inertia, matrix, stride, sums: &mut sums };
     (0..lattice.cell_count()).for_each(|cell| assembly.add_cell(cell));
-    let worst = worst(&by_cells, &one_by_one, stride);
-    println!("{in_one} elements in one cell, {in_two} in two, {elsewhere} one by one: off by {worst:.1e}");
-    assert!(in_one > 100 && in_two > 100 && elsewhere > 100);
+    let worst = worst(&by_cells, &direct, stride);
+    println!("{in_one} elements in one cell, {in_two} in two, {in_more} in more: relative error {worst:.1e}");
+    assert!(in_one > 100 && in_two > 100 && in_more > 100);
     assert!(worst < 2e-6);
 }
 
 #[test]
-fn sums_of_the_nodes_are_those_of_their_functions() {
+fn inertia_from_sums_of_the_cells_is_that_from_single_nodes() {
     let (lattice, places, _) = scene();
     let stride = stride(lattice.functions());
     let empty = vec![0.0; 3 * lattice.functions() * stride];
     let (mut inertia, mut mass) = (empty.clone(), empty.clone());
     let (mut direct_inertia, mut direct_mass) = (empty.clone(), empty);
-    let mut sums = vec![CellSums::NONE; lattice.cell_count()];
+    let mut sums = vec![CellMatrices::NONE; lattice.cell_count()];
     let mut random = random();
     for place in &places {
         let [xx, yy, zz, xy, yz, zx] = [3.0, 3.0, 3.0, 0.0, 0.0, 0.0].map(|mean: f32| mean + random());
         let masses = [1.0, 1.0, 0.0];
-        sums[place.cell()].add_node::<Lanes<8>>(
+        sums[place.cell()].add_node::<Baseline>(
             place,
             &Symmetric { xx, yy, zz, xy, yz, zx },
             masses,
@@ -116,9 +116,9 @@ fn sums_of_the_nodes_are_those_of_their_functions() {
         );
         let rows = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
         let weights = lattice.weights(place).map(|(function, weight)| (function, f64::from(weight)));
-        let kept = || weights.iter().filter(|(function, _)| *function < lattice.functions());
-        for &(c, by) in kept() {
-            for &(d, with) in kept() {
+        let kept_weights = || weights.iter().filter(|(function, _)| *function < lattice.functions());
+        for &(c, by) in kept_weights() {
+            for &(d, with) in kept_weights() {
                 for i in 0..3 {
                     let row = (3 * c + i) * stride + 3 * d;
                     direct_mass[row + i] += (by * with) as f32 * masses[i];
@@ -130,11 +130,11 @@ fn sums_of_the_nodes_are_those_of_their_functions() {
         }
     }
     let mut momenta = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    let mut into = NodeMatrices {
+    let mut into = CoarseInertia {
         lattice: &lattice,
         inertia: &mut inertia,
         mass: &mut mass,
-        mass_alone: &mut [],
+        mass_only: &mut [],
         momenta: &mut momenta,
         stride,
     };
@@ -142,11 +142,11 @@ fn sums_of_the_nodes_are_those_of_their_functions() {
     for (function, momentum) in momenta.iter().enumerate().take(lattice.functions()) {
         let weights = places.iter().flat_map(|place| lattice.weights(place));
         let sum: f64 = weights.filter(|(of, _)| *of == function).map(|(_, weight)| f64::from(weight)).sum();
-        for (axis, found) in momentum.to_array().into_iter().enumerate() {
-            assert!((f64::from(found) / (sum * (axis + 1) as f64) - 1.0).abs() < 2e-6);
+        for (axis, component) in momentum.to_array().into_iter().enumerate() {
+            assert!((f64::from(component) / (sum * (axis + 1) as f64) - 1.0).abs() < 2e-6);
         }
     }
-    let off = [worst(&inertia, &direct_inertia, stride), worst(&mass, &direct_mass, stride)];
-    println!("inertia of the functions off by {:.1e}, mass by {:.1e}", off[0], off[1]);
-    assert!(off.iter().all(|off| *off < 2e-6));
+    let errors = [worst(&inertia, &direct_inertia, stride), worst(&mass, &direct_mass, stride)];
+    println!("relative error of the inertia {:.1e}, of the mass {:.1e}", errors[0], errors[1]);
+    assert!(errors.iter().all(|error| *error < 2e-6));
 }

@@ -1,33 +1,38 @@
-//! The cells of a lattice, and what nodes side by side have to do with them: `W^T v`, summed by cell, and `W x`.
+//! Restriction `W^T v` to the functions of a lattice, summed by cell, and prolongation `W x`, both vectorised over
+//! nodes.
 
 use bytemuck::{Pod, Zeroable, must_cast, must_cast_ref};
 use glam::Vec4;
 
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
-use crate::lanes::{BLOCK, NodeVector, Real, write_rows};
+use crate::simd::{NodeVector, Real, TILE, write_rows};
 
-/// Parts of [`BLOCK`] nodes: sums are kept for as many lanes whatever the width, so that their bits are the same.
-pub(super) const PARTS: usize = 2;
+/// Most vectors that [`TILE`] nodes fill. There are separate sums for each of the [`TILE`] places, so the bits do not
+/// depend on the width.
+pub(super) const VECTORS_PER_TILE: usize = 2;
 
-/// Positions of nodes side by side in their cells, and the cells of the first and the last.
-pub(super) struct Within<'a, R> {
+/// A vector of nodes in the order of the cells.
+pub(super) struct NodesInCells<'a, R> {
+    /// Positions of the nodes in their cells.
     pub(super) position: [R; 3],
+    /// Cells of the first and the last node.
     pub(super) ends: [usize; 2],
     pub(super) places: &'a [LatticeNode],
 }
 
-impl<R: Real> Within<'_, R> {
+impl<R: Real> NodesInCells<'_, R> {
+    /// The cell of a node.
     fn cell(&self, lane: usize) -> usize {
         self.places.get(lane).map_or(0, LatticeNode::cell)
     }
 
-    /// Ones for the nodes in this cell.
+    /// Ones for the nodes in a cell, zeros for the others.
     #[inline(always)]
     fn mask(&self, cell: usize) -> R {
         R::from_fn(|lane| if self.cell(lane) == cell { 1.0 } else { 0.0 })
     }
 
-    /// The next cell that nodes are in.
+    /// The next cell after this one that has nodes.
     #[inline(always)]
     fn after(&self, cell: usize) -> usize {
         let mut next = self.ends[1];
@@ -38,15 +43,15 @@ impl<R: Real> Within<'_, R> {
     }
 }
 
-/// One cell of the lattice. Its trilinear functions are taken apart into the monomials `1, x, y, xy, z, xz, yz, xyz`
-/// of the position within it, which take fewer operations a node: the monomials' factors, or what is to be summed with
-/// them. Two vectors a row.
+/// A vector field on a cell, as coefficients of the monomials `1, x, y, xy, z, xz, yz, xyz` of the position in the
+/// cell. They take fewer operations a node than trilinear functions. Used for the motion of the nodes in a cell
+/// (prolongation), and for sums of nodal vectors times monomials (restriction). Two vectors a row.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(transparent)]
-pub(super) struct Cell([[f32; 8]; 4]);
+pub(super) struct CellPolynomial([[f32; 8]; 4]);
 
-impl Cell {
-    pub(super) const EMPTY: Self = Self([[0.0; 8]; 4]);
+impl CellPolynomial {
+    pub(super) const ZERO: Self = Self([[0.0; 8]; 4]);
 
     /// Adds `W^T v` of a node.
     #[inline(always)]
@@ -60,21 +65,22 @@ impl Cell {
         }
     }
 
-    /// `W x` of nodes side by side.
+    /// The field at the positions of a vector of nodes.
     #[inline(always)]
     pub(super) fn at<R: Real>(&self, [x, y, z]: [R; 3]) -> [R; 3] {
         let mut at = [R::splat(0.0); 3];
         for (axis, at) in at.iter_mut().enumerate() {
-            let factor = |row: usize, half: usize| R::splat(self.0[row % 4][4 * half + axis]);
+            let coefficient = |row: usize, half: usize| R::splat(self.0[row % 4][4 * half + axis]);
             let half = |half: usize| {
-                let near = y.fused(factor(1, half), factor(0, half));
-                z.fused(y.fused(factor(3, half), factor(2, half)), near)
+                let near = y.fused(coefficient(1, half), coefficient(0, half));
+                z.fused(y.fused(coefficient(3, half), coefficient(2, half)), near)
             };
             *at = x.fused(half(1), half(0));
         }
         at
     }
 
+    /// The eight coefficients.
     fn vectors(&self) -> [Vec4; 8] {
         let vectors: &[[f32; 4]; 8] = must_cast_ref(&self.0);
         vectors.map(Vec4::from)
@@ -87,68 +93,75 @@ fn monomials<R: Real>([x, y, z]: [R; 3]) -> [R; 8] {
     [R::splat(1.0), x, y, xy, z, xz, y * z, xy * z]
 }
 
-/// Sums of one cell while its nodes are gone through, in lanes.
-pub(super) struct CellSum<R> {
+/// Sums of nodal vectors times monomials for the cell at hand, vectorised. Kept in registers while the nodes of the
+/// cell are added.
+pub(super) struct CellAccumulator<R> {
     cell: usize,
-    parts: [[[R; 3]; 8]; PARTS],
+    sums: [[[R; 3]; 8]; VECTORS_PER_TILE],
 }
 
-impl<R: Real> CellSum<R> {
+impl<R: Real> CellAccumulator<R> {
     #[inline(always)]
     pub(super) fn new() -> Self {
-        Self { cell: 0, parts: [[[R::splat(0.0); 3]; 8]; PARTS] }
+        Self { cell: 0, sums: [[[R::splat(0.0); 3]; 8]; VECTORS_PER_TILE] }
     }
 
-    /// Adds `W^T v` of nodes side by side.
+    /// Adds `W^T v` of a vector of nodes, the one with index `vector` in its tile.
     #[inline(always)]
-    pub(super) fn add(&mut self, cells: &mut [Cell], within: &Within<'_, R>, part: usize, v: [R; 3]) {
-        let of = monomials(within.position);
-        let [mut cell, last] = within.ends;
+    pub(super) fn add(
+        &mut self,
+        cells: &mut [CellPolynomial],
+        nodes: &NodesInCells<'_, R>,
+        vector: usize,
+        v: [R; 3],
+    ) {
+        let of = monomials(nodes.position);
+        let [mut cell, last] = nodes.ends;
         if cell == last {
             self.enter(cells, cell);
-            self.add_products(part, &of, v);
+            self.add_products(vector, &of, v);
             return;
         }
         loop {
             self.enter(cells, cell);
-            let mask = within.mask(cell);
-            self.add_products(part, &of, [mask * v[0], mask * v[1], mask * v[2]]);
+            let mask = nodes.mask(cell);
+            self.add_products(vector, &of, [mask * v[0], mask * v[1], mask * v[2]]);
             if cell >= last {
                 return;
             }
-            cell = within.after(cell);
+            cell = nodes.after(cell);
         }
     }
 
     #[inline(always)]
-    fn add_products(&mut self, part: usize, of: &[R; 8], v: [R; 3]) {
-        for (sums, of) in self.parts[part % PARTS].iter_mut().zip(of) {
+    fn add_products(&mut self, vector: usize, of: &[R; 8], v: [R; 3]) {
+        for (sums, of) in self.sums[vector % VECTORS_PER_TILE].iter_mut().zip(of) {
             for (sum, v) in sums.iter_mut().zip(v) {
                 *sum = of.fused(v, *sum);
             }
         }
     }
 
-    /// The sums are those of this cell from now on.
+    /// Makes this the cell at hand.
     #[inline(always)]
-    fn enter(&mut self, cells: &mut [Cell], cell: usize) {
+    fn enter(&mut self, cells: &mut [CellPolynomial], cell: usize) {
         if cell != self.cell {
             self.flush(cells);
             self.cell = cell;
         }
     }
 
-    /// Hands the sums to their cell, lane by lane.
+    /// Adds the sums to their cell, in the order of the nodes, and clears them.
     #[inline(always)]
-    pub(super) fn flush(&mut self, cells: &mut [Cell]) {
+    pub(super) fn flush(&mut self, cells: &mut [CellPolynomial]) {
         let Some(cell) = cells.get_mut(self.cell) else {
             return;
         };
         for monomial in 0..8 {
             let mut sum = Vec4::ZERO;
-            for part in self.parts.iter().take(BLOCK / R::COUNT) {
-                let [x, y, z] = part[monomial];
-                let mut rows = [[0.0; 4]; BLOCK];
+            for sums in self.sums.iter().take(TILE / R::COUNT) {
+                let [x, y, z] = sums[monomial];
+                let mut rows = [[0.0; 4]; TILE];
                 write_rows(&mut rows, 0, [x, y, z, R::splat(0.0)]);
                 for row in rows.into_iter().take(R::COUNT) {
                     sum += Vec4::from(row);
@@ -160,19 +173,19 @@ impl<R: Real> CellSum<R> {
                 *place = (Vec4::from(*place) + sum).to_array();
             }
         }
-        self.parts = [[[R::splat(0.0); 3]; 8]; PARTS];
+        self.sums = [[[R::splat(0.0); 3]; 8]; VECTORS_PER_TILE];
     }
 }
 
-/// `W x` of nodes side by side.
+/// `W x` of a vector of nodes.
 #[inline(always)]
-pub(super) fn moved_by<R: Real>(cells: &[Cell], within: &Within<'_, R>) -> [R; 3] {
-    let [mut cell, last] = within.ends;
-    let at = |cell: usize| cells.get(cell).unwrap_or(&Cell::EMPTY).at(within.position);
+pub(super) fn motion_at<R: Real>(cells: &[CellPolynomial], nodes: &NodesInCells<'_, R>) -> [R; 3] {
+    let [mut cell, last] = nodes.ends;
+    let at = |cell: usize| cells.get(cell).unwrap_or(&CellPolynomial::ZERO).at(nodes.position);
     let mut moved = at(cell);
     while cell < last {
-        cell = within.after(cell);
-        let (mask, here) = (within.mask(cell), at(cell));
+        cell = nodes.after(cell);
+        let (mask, here) = (nodes.mask(cell), at(cell));
         for axis in 0..3 {
             moved[axis] = mask.choose(here[axis], moved[axis]);
         }
@@ -180,15 +193,15 @@ pub(super) fn moved_by<R: Real>(cells: &[Cell], within: &Within<'_, R>) -> [R; 3
     moved
 }
 
-/// Gives the cells' sums to their functions.
-pub(super) fn restrict(cells: &[Cell], lattice: &Lattice) -> CoarseVectors {
+/// `W^T v` for each function, from the sums of the cells.
+pub(super) fn restrict(cells: &[CellPolynomial], lattice: &Lattice) -> CoarseVectors {
     let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    for (number, cell) in cells.iter().enumerate() {
+    for (index, cell) in cells.iter().enumerate() {
         let [a, b, c, d, e, f, g, h] = cell.vectors();
         let (a, c, e, g) = (a - b, c - d, e - f, g - h);
         let (a, b, e, f) = (a - c, b - d, e - g, f - h);
         for (vector, function) in
-            [a - e, b - f, c - g, d - h, e, f, g, h].into_iter().zip(lattice.functions_of(number))
+            [a - e, b - f, c - g, d - h, e, f, g, h].into_iter().zip(lattice.functions_of(index))
         {
             if let Some(sum) = sums.get_mut(function) {
                 sum.0 = (Vec4::from(sum.0) + vector).to_array();
@@ -198,14 +211,14 @@ pub(super) fn restrict(cells: &[Cell], lattice: &Lattice) -> CoarseVectors {
     sums
 }
 
-/// The factors of each cell, for vectors of the functions.
-pub(super) fn prolong(vectors: &CoarseVectors, lattice: &Lattice, cells: &mut [Cell]) {
-    for (number, cell) in cells.iter_mut().enumerate() {
+/// Sets the coefficients of each cell from vectors of the functions.
+pub(super) fn prolong(vectors: &CoarseVectors, lattice: &Lattice, cells: &mut [CellPolynomial]) {
+    for (index, cell) in cells.iter_mut().enumerate() {
         let at = |function: usize| Vec4::from(vectors.get(function).copied().unwrap_or_default().0);
-        let [a, b, c, d, e, f, g, h] = lattice.functions_of(number).map(at);
+        let [a, b, c, d, e, f, g, h] = lattice.functions_of(index).map(at);
         let (b, d, f, h) = (b - a, d - c, f - e, h - g);
         let (c, d, g, h) = (c - a, d - b, g - e, h - f);
-        let factors = [a, b, c, d, e - a, f - b, g - c, h - d].map(|factor| factor.to_array());
-        cell.0 = must_cast(factors);
+        let coefficients = [a, b, c, d, e - a, f - b, g - c, h - d].map(|vector| vector.to_array());
+        cell.0 = must_cast(coefficients);
     }
 }

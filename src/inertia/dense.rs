@@ -1,25 +1,25 @@
-//! Dense symmetric matrices of the lattice functions (three unknowns a function): inverted in place, applied
-//! by rows. Plain loops without rearranged sums, so every instruction set gives the same bits.
+//! Dense symmetric matrices of the lattice functions, with three unknowns a function: inverted in place, applied by
+//! rows. The order of sums does not depend on the instruction set, so every one gives the same bits.
 
 use super::lattice::MAX_FUNCTIONS;
-use crate::lanes::{Kernel, Lanes, Real, dispatch};
+use crate::simd::{Kernel, Portable, Real, dispatch};
 
-/// Rows are a multiple of this.
-const LANES: usize = 8;
+/// The length of a row is a multiple of this.
+const WIDTH: usize = 8;
 
-/// Numbers in the longest row.
+/// Length of the longest row.
 const ROW: usize = stride(MAX_FUNCTIONS);
 
-/// Numbers of the functions, as many as are in use.
+/// A row of a matrix, or a vector of unknowns; entries beyond the functions in use are zero.
 pub(super) type Row = [f32; ROW];
 
-/// Length of a row of a matrix for `functions` functions: three numbers each, one spare (a block is
-/// written four wide) and a multiple of eight.
+/// Length of a row of a matrix for this many functions: three entries for each, one more because submatrices are
+/// written with four columns, rounded up to a multiple of eight.
 pub(super) const fn stride(functions: usize) -> usize {
-    (3 * functions + 1).div_ceil(LANES) * LANES
+    (3 * functions + 1).div_ceil(WIDTH) * WIDTH
 }
 
-/// Makes a row and its column `factor` times what the row holds up to the diagonal.
+/// Multiplies a row up to the diagonal by `factor`, and copies it to the column.
 pub(super) fn mirror(matrix: &mut [f32], stride: usize, row: usize, factor: f32) {
     for column in 0..=row {
         let value = factor * matrix.get(row * stride + column).copied().unwrap_or(0.0);
@@ -32,8 +32,9 @@ pub(super) fn mirror(matrix: &mut [f32], stride: usize, row: usize, factor: f32)
 }
 
 /// Three pivots, those of one function, of the inversion in place of a symmetric positive definite matrix by the sweep
-/// operator, on its lower triangle alone; after all of them that is minus the inverse's. No row is exchanged: none has
-/// to be for a positive definite matrix. Returns whether the pivots were positive and finite; if not, nothing has changed.
+/// operator. It works on the lower triangle, which after all pivots holds minus that of the inverse. A positive
+/// definite matrix needs no exchange of rows. Returns whether the pivots were positive and finite; if not, the matrix
+/// is unchanged.
 pub(super) fn sweep(matrix: &mut [f32], size: usize, stride: usize, function: usize) -> bool {
     dispatch(Sweep { matrix, size, stride, first: 3 * function })
 }
@@ -45,22 +46,22 @@ struct Sweep<'a> {
     first: usize,
 }
 
-/// `row -= factor line`, whole vectors up to the one that holds `last`.
+/// `row -= factor line`, in whole vectors up to the one with column `last`.
 #[inline(always)]
 fn subtract(row: &mut [f32], factor: f32, line: &Row, last: usize) {
-    let factor = Lanes([factor; LANES]);
-    let vectors = row.as_chunks_mut::<LANES>().0.iter_mut().zip(line.as_chunks::<LANES>().0);
-    for (value, &line) in vectors.take(last / LANES + 1) {
-        *value = (Lanes(*value) - factor * Lanes(line)).0;
+    let factor = Portable([factor; WIDTH]);
+    let vectors = row.as_chunks_mut::<WIDTH>().0.iter_mut().zip(line.as_chunks::<WIDTH>().0);
+    for (value, &line) in vectors.take(last / WIDTH + 1) {
+        *value = (Portable(*value) - factor * Portable(line)).0;
     }
 }
 
 impl Kernel for Sweep<'_> {
     type Output = bool;
 
-    /// One sweep takes from each number `a_ij` of other rows and columns `a_ip a_pj / a_pp`, divides those of the pivot's row
-    /// and column by `a_pp`, and puts `-1 / a_pp` in its place. The matrix is gone through once for all three: `lines` are
-    /// the pivots' rows and columns as each sweep finds them.
+    /// A sweep with pivot `p` subtracts `a_ip a_pj / a_pp` from each entry `a_ij` of other rows and columns, divides
+    /// the pivot's row and column by `a_pp`, and sets `a_pp` to `-1 / a_pp`. The three sweeps are done in one pass over
+    /// the matrix: `lines` are the pivots' rows and columns before each sweep.
     #[inline(always)]
     fn run<R: Real>(self) -> bool {
         let Self { matrix, size, stride, first } = self;
@@ -96,12 +97,13 @@ impl Kernel for Sweep<'_> {
         for (index, row) in matrix.chunks_exact_mut(stride.max(1)).take(size).enumerate() {
             let factors = [0, 1, 2].map(|k| at(k, index) * inverses[k]);
             if index < first || index > first + 2 {
-                let [a, b, c] = factors.map(|factor| Lanes([factor; LANES]));
-                let [one, two, three] = lines.each_ref().map(|line| line.as_chunks::<LANES>().0);
-                let vectors = row.as_chunks_mut::<LANES>().0.iter_mut().zip(one).zip(two).zip(three);
-                // What lies above the diagonal is never read.
-                for (((value, &one), &two), &three) in vectors.take(index / LANES + 1) {
-                    *value = (Lanes(*value) - a * Lanes(one) - b * Lanes(two) - c * Lanes(three)).0;
+                let [a, b, c] = factors.map(|factor| Portable([factor; WIDTH]));
+                let [one, two, three] = lines.each_ref().map(|line| line.as_chunks::<WIDTH>().0);
+                let vectors = row.as_chunks_mut::<WIDTH>().0.iter_mut().zip(one).zip(two).zip(three);
+                // Entries above the diagonal are never read.
+                for (((value, &one), &two), &three) in vectors.take(index / WIDTH + 1) {
+                    *value =
+                        (Portable(*value) - a * Portable(one) - b * Portable(two) - c * Portable(three)).0;
                 }
                 if index > first {
                     let [a, b, c] = factors;
@@ -126,7 +128,7 @@ impl Kernel for Sweep<'_> {
     }
 }
 
-/// `A x` for a symmetric matrix, in the first numbers of a row; a row of `A` for each number of `x`.
+/// `A x` for a symmetric matrix with as many rows as `x` has components.
 pub(super) fn apply(matrix: &[f32], stride: usize, x: &[f32]) -> Row {
     dispatch(Apply { matrix, stride, x })
 }
@@ -158,7 +160,7 @@ mod tests {
 
     #[test]
     fn inverts_a_stiff_matrix_in_place() {
-        // Mass matrix of a chain plus a stiff rank-one part: condition 1e5.
+        // A tridiagonal mass matrix plus a stiff rank-one part: condition 1e5.
         const FUNCTIONS: usize = 12;
         const SIZE: usize = 3 * FUNCTIONS;
         let stride = stride(FUNCTIONS);

@@ -1,31 +1,31 @@
-//! How far off the motion is because of the inertia that was added. What the scaling absorbs of a node's force,
-//! `d = f - mu m v - m a`, drives the error: `M e'' + mu M e' + K e = d` to first order. It is followed along one
-//! shape, the displacement `u`, with the stiffness of its secant: `e = x u / rms(u)`,
+//! Estimate of the error of the motion (m) that added inertia causes. The part of a node's force that the added
+//! inertia absorbs, the defect `d = f - mu m v - m a` (N), drives the error `e`: `M e'' + mu M e' + K e = d` to first
+//! order. The error is assumed to have one shape, the displacement `u`, with its secant stiffness: `e = x u / rms(u)`,
 //!
 //! ```text
 //! x'' + mu x' + (-u.f_int / u.M u) x = rms(u) (u.d) / (u.M u)
 //! ```
-//! The velocity would be a worse shape: its short waves are far stiffer than the error's.
-//! Work over all nodes, supports as well, so that a support that moves the body bears its stiffness.
+//! The velocity would be a worse shape, because its short waves are much stiffer than the error. The scalar products
+//! are over all nodes, supports included, so that the stiffness at a moving support is included.
 
 use bytemuck::must_cast_slice;
 
 use super::node::Scaling;
-use crate::lanes::{Kernel, NodeVector, Real, dispatch};
-use crate::tled::{Side, Step};
+use crate::simd::{Kernel, NodeVector, Real, dispatch};
+use crate::step::{Addends, Step};
 
-/// The error across the displacement is about as large again as that along it: over the laboratory's scenes,
-/// methods and steps the median of `x` over the mean error of the nodes is a half.
+/// Mean error of the nodes over `x`. There are errors in other directions than the displacement: the median of this
+/// ratio over the laboratory's scenes, methods and steps is two.
 const ACROSS: f32 = 2.0;
 
-/// The error along the displacement, root mean square over the nodes, m: now and a step ago.
+/// The error `x` along the displacement, root mean square over the nodes, m: after the latest step and the one before.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Estimate {
+pub(super) struct ErrorEstimate {
     now: f32,
     before: f32,
 }
 
-/// Sum over the nodes in a fixed order, whatever the instruction set.
+/// Scalar product over the nodes, in an order that does not depend on the instruction set.
 pub(super) fn dot(a: &[NodeVector], b: &[NodeVector]) -> f32 {
     dispatch(Dot { a: must_cast_slice(a), b: must_cast_slice(b) })
 }
@@ -40,17 +40,17 @@ impl Kernel for Dot<'_> {
 
     #[inline(always)]
     fn run<R: Real>(self) -> f32 {
-        // Several sums: each addition waits for the one before.
+        // Several sums, because additions to the same sum depend on each other.
         let mut sums = [R::splat(0.0); 8];
         let (vectors, rest) = self.a.as_chunks::<WIDTH>();
         let (others, other_rest) = self.b.as_chunks::<WIDTH>();
         for (a, b) in vectors.iter().zip(others) {
             for (sum, from) in sums.iter_mut().zip((0..WIDTH).step_by(R::COUNT)) {
-                let of = |numbers: &[f32; WIDTH]| R::from_fn(|lane| numbers[(from + lane) % WIDTH]);
+                let of = |values: &[f32; WIDTH]| R::from_fn(|lane| values[(from + lane) % WIDTH]);
                 *sum = *sum + of(a) * of(b);
             }
         }
-        // The fourth numbers of a node's vectors mean something else.
+        // The fourth component of a nodal vector is not part of it.
         let mut total = 0.0;
         for lane in (0..WIDTH).filter(|lane| lane % 4 < 3) {
             total += sums[lane / R::COUNT % 8].lane(lane % R::COUNT);
@@ -62,39 +62,44 @@ impl Kernel for Dot<'_> {
     }
 }
 
-/// Numbers whose products are summed side by side.
+/// Number of separate sums: floats whose products are added in one iteration.
 const WIDTH: usize = 64;
 
-/// Sums over the nodes of a step, before its displacement changes.
+/// Sums over the nodes of a step along one axis, taken before displacements change.
 #[derive(Clone, Copy)]
-pub(super) struct Defect<V> {
+pub(super) struct DefectSums<V> {
+    /// `D^2`, s^2.
     square: V,
-    /// `1 + k`, and `1 - k` times what carries increments over from another step.
+    /// `1 + k`, and `1 - k` times the ratio of this step to the last one.
     ahead: V,
     behind: V,
+    /// `u.d D^2`, kg m^2.
     defect: V,
+    /// `u.M u`, kg m^2.
     mass: V,
+    /// `u.u`, m^2.
     length: V,
+    /// `u.f`, J.
     total: V,
 }
 
-impl<V: Side> Defect<V> {
-    /// Nothing yet; `splat` repeats a number.
+impl<V: Addends> DefectSums<V> {
+    /// Zero sums; `splat` turns a value into a vector.
     #[inline(always)]
     pub(super) fn new(step: &Step, scaling: &Scaling, splat: impl Fn(f32) -> V) -> Self {
         let k = scaling.k;
-        let numbers = [step.seconds() * step.seconds(), 1.0 + k, (1.0 - k) * step.carry(), 0.0];
-        let [square, ahead, behind, zero] = numbers.map(splat);
+        let values = [step.seconds() * step.seconds(), 1.0 + k, (1.0 - k) * step.carry(), 0.0];
+        let [square, ahead, behind, zero] = values.map(splat);
         Self { square, ahead, behind, defect: zero, mass: zero, length: zero, total: zero }
     }
 
     /// The sums of one lane.
     #[inline(always)]
-    pub(super) fn at(&self, lane: usize) -> Defect<f32>
+    pub(super) fn at(&self, lane: usize) -> DefectSums<f32>
     where
         V: Real,
     {
-        Defect {
+        DefectSums {
             square: self.square.lane(lane),
             ahead: self.ahead.lane(lane),
             behind: self.behind.lane(lane),
@@ -105,7 +110,7 @@ impl<V: Side> Defect<V> {
         }
     }
 
-    /// Adds nodes: masses, ones along free axes, displacements, their increments, total forces and next increments.
+    /// Adds nodes: masses, ones for free axes, displacements, increments, total forces and next increments.
     #[inline(always)]
     pub(super) fn add(&mut self, mass: V, free: V, u: V, increment: V, force: V, next: V) {
         // D^2 d = D^2 f - k m (du+ + du) - m (du+ - du).
@@ -118,18 +123,18 @@ impl<V: Side> Defect<V> {
     }
 }
 
-/// What [`Defect`] comes to.
+/// The sums of [`DefectSums`] over all nodes and axes.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Defects {
+pub(super) struct DefectTotals {
     defect: f32,
     mass: f32,
     length: f32,
     total: f32,
 }
 
-impl Defects {
+impl DefectTotals {
     /// Adds the sums of each axis.
-    pub(super) fn add_axes(&mut self, sums: &[Defect<f32>; 3]) {
+    pub(super) fn add_axes(&mut self, sums: &[DefectSums<f32>; 3]) {
         for sums in sums {
             self.defect += sums.defect;
             self.mass += sums.mass;
@@ -139,7 +144,7 @@ impl Defects {
     }
 }
 
-impl Estimate {
+impl ErrorEstimate {
     pub(super) const NONE: Self = Self { now: 0.0, before: 0.0 };
 
     /// The error, m.
@@ -147,15 +152,22 @@ impl Estimate {
         ACROSS * if self.now < 0.0 { -self.now } else { self.now }
     }
 
-    /// One step of `D^2 = square` on. `external` is displacement times external force, J.
-    pub(super) fn advance(&mut self, of: &Defects, external: f32, nodes: usize, k: f32, square: f32) {
-        if of.mass <= 0.0 {
+    /// Advances by a step with `D^2 = square`. `external` is displacement times external force, J.
+    pub(super) fn advance(
+        &mut self,
+        totals: &DefectTotals,
+        external: f32,
+        nodes: usize,
+        k: f32,
+        square: f32,
+    ) {
+        if totals.mass <= 0.0 {
             return;
         }
-        // Implicit: whatever the stiffness, the estimate does not ring.
-        let internal = external - of.total;
-        let stiffness = if internal > 0.0 { square * internal / of.mass } else { 0.0 };
-        let push = libm::sqrtf(of.length / nodes as f32) * of.defect / of.mass;
+        // An implicit step: the estimate is stable for any stiffness.
+        let internal = external - totals.total;
+        let stiffness = if internal > 0.0 { square * internal / totals.mass } else { 0.0 };
+        let push = libm::sqrtf(totals.length / nodes as f32) * totals.defect / totals.mass;
         let next = (push + 2.0 * self.now - (1.0 - k) * self.before) / (1.0 + k + stiffness);
         *self = Self { now: next, before: self.now };
     }

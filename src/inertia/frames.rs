@@ -1,18 +1,19 @@
-//! How tissue has turned since its bounds were computed. Bounds have directions (volume is stiff along `C ga`), so between two
-//! refreshes they must turn with the tissue: without that a step of twenty times the limit is
-//! unstable once the body has turned by 15 degrees. Each lattice function has a frame: the deformation
-//! gradient of a tetrahedron of four of its nodes, its columns made orthonormal (Gram-Schmidt), now and at the start of the cycle.
-//! Bounds are summed, inverted and applied in the frames of the start of their cycle.
+//! Rotation of the tissue since its bounds were computed. Bounds have directions (volume is stiff along `C ga`), so
+//! between two refreshes they must rotate with the tissue: without that a step of twenty times the critical one is
+//! unstable once the body has rotated by 15 degrees. Each lattice function has a frame: the columns, made orthonormal
+//! (Gram-Schmidt), of the deformation gradient of a tetrahedron of four of its nodes. Its rotation is that from the
+//! frame at the start of the cycle to the present one. Bounds are summed, inverted and applied in the frames at the
+//! start of their cycle.
 
 use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
-use crate::lanes::NodeVector;
+use crate::simd::NodeVector;
 
 /// A 3 x 3 matrix by rows.
 pub(super) type Matrix = [[f32; 3]; 3];
 
 const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// A rotation from where a cycle started to now.
+/// A rotation from the frame at the start of a cycle to the present one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rotation(pub(super) Matrix);
 
@@ -21,36 +22,36 @@ impl Rotation {
 
     /// From the frame to the world.
     #[inline(always)]
-    pub(super) fn out(&self, v: [f32; 3]) -> [f32; 3] {
+    pub(super) fn in_world(&self, v: [f32; 3]) -> [f32; 3] {
         self.0.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
     }
 
     /// From the world to the frame.
     #[inline(always)]
-    pub(super) fn back(&self, v: [f32; 3]) -> [f32; 3] {
+    pub(super) fn in_frame(&self, v: [f32; 3]) -> [f32; 3] {
         let [x, y, z] = self.0;
         let along = |x: f32, y: f32, z: f32| x * v[0] + y * v[1] + z * v[2];
         [along(x[0], y[0], z[0]), along(x[1], y[1], z[1]), along(x[2], y[2], z[2])]
     }
 }
 
-/// Four nodes and the inverse of their edges at rest, 1/m.
+/// Four nodes that define a frame, and the inverse of the matrix of their edges at rest, 1/m.
 #[derive(Clone, Copy, Debug)]
-struct Probe {
+struct FrameNodes {
     nodes: [u32; 4],
     inverse: Matrix,
 }
 
-/// Frames of the functions; one more that never turns, for nodes that no function moves.
+/// The frames of the functions, and a last one that never rotates, for nodes without a function.
 #[derive(Clone, Debug)]
 pub(super) struct Frames {
     functions: usize,
-    probes: [Probe; MAX_FUNCTIONS],
-    /// Orthonormal columns at the start of the cycle whose bounds are in use, and of the cycle under way.
+    nodes: [FrameNodes; MAX_FUNCTIONS],
+    /// Frames at the start of the cycle whose bounds are in use, at the start of the present cycle, and now.
     in_use: [Matrix; MAX_FUNCTIONS],
     under_way: [Matrix; MAX_FUNCTIONS],
     latest: [Matrix; MAX_FUNCTIONS],
-    /// Rotations since then.
+    /// Rotations from the first two of these to the last.
     pub(super) of_bounds: [Rotation; MAX_FUNCTIONS + 1],
     pub(super) of_cycle: [Rotation; MAX_FUNCTIONS + 1],
 }
@@ -58,7 +59,7 @@ pub(super) struct Frames {
 impl Frames {
     pub(super) const NONE: Self = Self {
         functions: 0,
-        probes: [Probe { nodes: [0; 4], inverse: [[0.0; 3]; 3] }; MAX_FUNCTIONS],
+        nodes: [FrameNodes { nodes: [0; 4], inverse: [[0.0; 3]; 3] }; MAX_FUNCTIONS],
         in_use: [IDENTITY; MAX_FUNCTIONS],
         under_way: [IDENTITY; MAX_FUNCTIONS],
         latest: [IDENTITY; MAX_FUNCTIONS],
@@ -66,11 +67,11 @@ impl Frames {
         of_cycle: [Rotation::NONE; MAX_FUNCTIONS + 1],
     };
 
-    /// Chooses four nodes for each function, far apart among those that it moves.
+    /// Chooses four nodes for each function, far apart from each other.
     pub(super) fn choose(&mut self, lattice: &Lattice, points: &[[f32; 3]]) {
         self.functions = lattice.functions();
-        for (function, probe) in self.probes.iter_mut().enumerate().take(self.functions) {
-            *probe = choose(function, lattice, points);
+        for (function, nodes) in self.nodes.iter_mut().enumerate().take(self.functions) {
+            *nodes = choose(function, lattice, points);
         }
     }
 
@@ -78,16 +79,16 @@ impl Frames {
         self.functions
     }
 
-    /// Looks where the frames are now.
-    pub(super) fn look(&mut self, displacement: &[NodeVector]) {
-        let frames = self.probes.iter().zip(&mut self.latest).take(self.functions);
+    /// Computes the present frames and rotations.
+    pub(super) fn update(&mut self, displacement: &[NodeVector]) {
+        let frames = self.nodes.iter().zip(&mut self.latest).take(self.functions);
         let starts = self.in_use.iter().zip(&self.under_way);
         let rotations = self.of_bounds.iter_mut().zip(&mut self.of_cycle);
-        for (((probe, latest), (in_use, under_way)), (of_bounds, of_cycle)) in
+        for (((nodes, latest), (in_use, under_way)), (of_bounds, of_cycle)) in
             frames.zip(starts).zip(rotations)
         {
-            // A tetrahedron that has collapsed says nothing; its frame stays.
-            if let Some(basis) = probe.basis(displacement) {
+            // A collapsed tetrahedron has no frame: the last one is kept.
+            if let Some(basis) = nodes.basis(displacement) {
                 *latest = basis;
             }
             *of_bounds = Rotation(times_transposed(latest, in_use));
@@ -95,31 +96,33 @@ impl Frames {
         }
     }
 
-    /// A cycle starts here.
+    /// Starts a cycle: its bounds are computed in the present frames.
     pub(super) fn start_cycle(&mut self) {
         self.under_way = self.latest;
         self.of_cycle = [Rotation::NONE; MAX_FUNCTIONS + 1];
     }
 
-    /// The bounds of the cycle are in use from now on.
+    /// Ends a cycle: its bounds are in use from now on.
     pub(super) fn end_cycle(&mut self) {
         self.in_use = self.under_way;
         self.of_bounds = self.of_cycle;
     }
 
+    /// Rotation of a frame since the start of the cycle whose bounds are in use.
     #[inline(always)]
     pub(super) fn since_bounds(&self, frame: usize) -> Rotation {
         self.of_bounds.get(frame).copied().unwrap_or(Rotation::NONE)
     }
 
+    /// Rotation of a frame since the start of the present cycle.
     #[inline(always)]
     pub(super) fn since_start(&self, frame: usize) -> Rotation {
         self.of_cycle.get(frame).copied().unwrap_or(Rotation::NONE)
     }
 }
 
-/// Turns each function's vector out of its frame, or back into it.
-pub(super) fn turn(
+/// Rotates the vector of each function, from its frame or into it.
+pub(super) fn rotate(
     vectors: &mut CoarseVectors,
     rotations: &[Rotation],
     by: impl Fn(&Rotation, [f32; 3]) -> [f32; 3],
@@ -132,7 +135,7 @@ pub(super) fn turn(
 
 #[inline(always)]
 fn times_transposed(a: &Matrix, b: &Matrix) -> Matrix {
-    // Loops: closures over rows may stay calls.
+    // Loops, because the compiler may leave closures as function calls.
     let mut product = [[0.0; 3]; 3];
     for i in 0..3 {
         for j in 0..3 {
@@ -168,7 +171,7 @@ fn unit(a: [f32; 3]) -> Option<[f32; 3]> {
     }
 }
 
-impl Probe {
+impl FrameNodes {
     /// The orthonormal columns of the deformation gradient, by rows.
     #[inline(always)]
     fn basis(&self, displacement: &[NodeVector]) -> Option<Matrix> {
@@ -194,10 +197,10 @@ impl Probe {
     }
 }
 
-/// The node nearest to the middle of those that the function moves, the one farthest from it, and those that
-/// span the largest triangle and tetrahedron with them.
-fn choose(function: usize, lattice: &Lattice, points: &[[f32; 3]]) -> Probe {
-    let moved = || {
+/// Chooses among the nodes of a function: the node nearest to their centre, the one farthest from that, the one with
+/// the largest triangle, and the one with the largest tetrahedron.
+fn choose(function: usize, lattice: &Lattice, points: &[[f32; 3]]) -> FrameNodes {
+    let nodes_of_function = || {
         points.iter().enumerate().filter_map(|(node, &point)| {
             let place = lattice.place(point);
             let (_, weight) =
@@ -206,14 +209,14 @@ fn choose(function: usize, lattice: &Lattice, points: &[[f32; 3]]) -> Probe {
         })
     };
     let (mut sum, mut total) = ([0.0f32; 3], 0.0);
-    for (_, point, weight) in moved() {
+    for (_, point, weight) in nodes_of_function() {
         sum = [0, 1, 2].map(|axis| sum[axis] + weight * point[axis]);
         total += weight;
     }
-    let middle = sum.map(|sum| sum / total);
-    let most = |score: &dyn Fn([f32; 3]) -> f32| {
-        let mut best = (f32::NEG_INFINITY, 0, middle);
-        for (node, point, _) in moved() {
+    let centre = sum.map(|sum| sum / total);
+    let node_with_largest = |score: &dyn Fn([f32; 3]) -> f32| {
+        let mut best = (f32::NEG_INFINITY, 0, centre);
+        for (node, point, _) in nodes_of_function() {
             let score = score(point);
             if score > best.0 {
                 best = (score, node, point);
@@ -221,27 +224,27 @@ fn choose(function: usize, lattice: &Lattice, points: &[[f32; 3]]) -> Probe {
         }
         (best.1, best.2)
     };
-    let (a, origin) = most(&|point| -dot(minus(point, middle), minus(point, middle)));
-    let (b, first) = most(&|point| dot(minus(point, origin), minus(point, origin)));
+    let (a, origin) = node_with_largest(&|point| -dot(minus(point, centre), minus(point, centre)));
+    let (b, first) = node_with_largest(&|point| dot(minus(point, origin), minus(point, origin)));
     let e = minus(first, origin);
-    let (c, second) = most(&|point| {
+    let (c, second) = node_with_largest(&|point| {
         let normal = cross(e, minus(point, origin));
         dot(normal, normal)
     });
     let normal = cross(e, minus(second, origin));
-    let (d, third) = most(&|point| {
+    let (d, third) = node_with_largest(&|point| {
         let height = dot(normal, minus(point, origin));
         height * height
     });
     let (f, g) = (minus(second, origin), minus(third, origin));
-    // Rows of the inverse of the matrix with columns e, f, g.
-    let six = dot(e, cross(f, g));
+    // Rows of the inverse of the matrix with columns e, f, g; the determinant is six times the volume.
+    let determinant = dot(e, cross(f, g));
     let extent = dot(e, e);
-    let inverse = if six * six > 1e-12 * extent * extent * extent {
-        [cross(f, g), cross(g, e), cross(e, f)].map(|row| row.map(|entry| entry / six))
+    let inverse = if determinant * determinant > 1e-12 * extent * extent * extent {
+        [cross(f, g), cross(g, e), cross(e, f)].map(|row| row.map(|entry| entry / determinant))
     } else {
-        // Its nodes are in one plane: the frame never turns.
+        // All nodes are in one plane: the frame never rotates.
         [[0.0; 3]; 3]
     };
-    Probe { nodes: [a, b, c, d], inverse }
+    FrameNodes { nodes: [a, b, c, d], inverse }
 }

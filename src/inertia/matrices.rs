@@ -1,100 +1,101 @@
-//! The dense matrices of a lattice over one storage of the caller, and what its cells sum on the way to them. `S` is the lattice's
-//! inertia with what the step adds, `G` that of the nodes as the lattice sees it, `X = S^-1 - G^-1` what a step applies
-//! ([`super::refresh`] has the cycle in which they are computed).
+//! The dense matrices of a lattice (kg, inverses 1/kg) and the sums of its cells, in the caller's storage. `S` is the
+//! inertia of the lattice's motion, with the inertia that the step adds; `G = W^T M W` is the nodes' inertia projected
+//! to the lattice; `X = S^-1 - G^-1` is applied in each step. [`super::refresh`] computes them in cycles.
 
 use bytemuck::must_cast_slice_mut;
 
-use super::assembly::CellSums;
-use super::cells::Cell;
+use super::assembly::CellMatrices;
+use super::cells::CellPolynomial;
 use super::dense::{self, mirror, stride, sweep};
 use super::lattice::Lattice;
 
-/// The dense matrices of a lattice, and what its cells sum.
+/// The dense matrices of a lattice, and the sums of its cells.
 pub(super) struct Matrices<'a> {
-    /// `X`, what a step applies.
+    /// `X` in use.
     pub(super) applied: &'a mut [f32],
-    /// `S` of `X`, not inverted.
-    pub(super) kept: &'a mut [f32],
-    /// The next `S`.
-    pub(super) next: &'a mut [f32],
-    /// The next `G`.
-    pub(super) fine: &'a mut [f32],
-    /// Of a damped step.
+    /// `S` in use; while the next one is inverted, that one.
+    pub(super) coarse: &'a mut [f32],
+    /// The next `S`, then its inverse.
+    pub(super) next_coarse: &'a mut [f32],
+    /// The next `G`, then its inverse.
+    pub(super) next_fine: &'a mut [f32],
+    /// Further matrices of a damped step.
     pub(super) damped: Option<DampedMatrices<'a>>,
-    /// For the passes over the nodes.
-    pub(super) cells: &'a mut [Cell],
-    pub(super) sums: &'a mut [CellSums],
+    /// Used by the passes over the nodes.
+    pub(super) cells: &'a mut [CellPolynomial],
+    pub(super) sums: &'a mut [CellMatrices],
 }
 
-/// What a damped step has beside.
+/// Further matrices of a damped step.
 pub(super) struct DampedMatrices<'a> {
     /// `S^-1` in use.
     pub(super) inverse: &'a mut [f32],
     /// The mass in `S`, `(1 + k) Mc`, in use and next.
     pub(super) mass: &'a mut [f32],
     pub(super) next_mass: &'a mut [f32],
-    /// The inverse of `G` with each node's inertia the mean over its axes, in use and next: one number for two functions,
-    /// and none that turns.
-    pub(super) mean: &'a mut [f32],
-    pub(super) next_mean: &'a mut [f32],
-    /// Sums of the momentum, then what of the increments is smooth.
-    pub(super) momentum: &'a mut [Cell],
+    /// The inverse of `G` for nodal inertia that is the mean over its axes, in use and next: one entry for two
+    /// functions, and independent of rotations.
+    pub(super) mean_inverse: &'a mut [f32],
+    pub(super) next_mean_inverse: &'a mut [f32],
+    /// Sums of the momentum, then the smooth part of the increments.
+    pub(super) momentum: &'a mut [CellPolynomial],
 }
 
-/// Functions of as many unknowns each as [`sweep`] takes at once, for one unknown each of `functions`.
+/// Number of sweeps, of three unknowns each, for a matrix with one unknown a function.
 pub(super) const fn thirds(functions: usize) -> usize {
     functions.div_ceil(3)
 }
 
-/// Numbers of a [`Cell`] and of its sums.
-const CELL_NUMBERS: usize = size_of::<Cell>() / size_of::<f32>();
-const SUM_NUMBERS: usize = size_of::<CellSums>() / size_of::<f32>();
+/// Floats of a [`CellPolynomial`] and of [`CellMatrices`].
+const POLYNOMIAL_FLOATS: usize = size_of::<CellPolynomial>() / size_of::<f32>();
+const SUM_FLOATS: usize = size_of::<CellMatrices>() / size_of::<f32>();
 
-/// Numbers that the matrices of a lattice with this many cells and functions need.
-pub(super) const fn numbers_for(cells: usize, functions: usize, damped: bool) -> usize {
-    let (matrices, per_cell) = if damped { (7, 2 * CELL_NUMBERS) } else { (4, CELL_NUMBERS) };
-    let sums = (per_cell + SUM_NUMBERS).saturating_mul(summing(cells, functions));
+/// Floats of storage for a lattice with this many cells and functions.
+pub(super) const fn floats_for(cells: usize, functions: usize, damped: bool) -> usize {
+    let (matrices, per_cell) = if damped { (7, 2 * POLYNOMIAL_FLOATS) } else { (4, POLYNOMIAL_FLOATS) };
+    let sums = (per_cell + SUM_FLOATS).saturating_mul(cells_with_sums(cells, functions));
     let means = if damped { 2 * 3 * thirds(functions) * stride(thirds(functions)) } else { 0 };
     sums.saturating_add(matrices * 3 * functions * stride(functions) + means)
 }
 
-/// Cells that sum something: none where no function is left.
-const fn summing(cells: usize, functions: usize) -> usize {
+/// Number of cells with sums: none if there are no functions.
+const fn cells_with_sums(cells: usize, functions: usize) -> usize {
     if functions > 0 { cells } else { 0 }
 }
 
 impl<'a> Matrices<'a> {
     pub(super) fn split(dense: &'a mut [f32], lattice: &Lattice, damped: bool) -> Option<Self> {
         let functions = lattice.functions();
-        let one = 3 * functions * stride(functions);
-        let (applied, rest) = dense.split_at_mut_checked(one)?;
-        let (kept, rest) = rest.split_at_mut_checked(one)?;
-        let (next, rest) = rest.split_at_mut_checked(one)?;
-        let (fine, rest) = rest.split_at_mut_checked(one)?;
-        let count = summing(lattice.cell_count(), functions);
-        let (cells, rest) = rest.split_at_mut_checked(CELL_NUMBERS * count)?;
-        let (sums, rest) = rest.split_at_mut_checked(SUM_NUMBERS * count)?;
-        let cells = must_cast_slice_mut(cells.as_chunks_mut::<CELL_NUMBERS>().0);
-        let sums = must_cast_slice_mut(sums.as_chunks_mut::<SUM_NUMBERS>().0);
+        let matrix = 3 * functions * stride(functions);
+        let (applied, rest) = dense.split_at_mut_checked(matrix)?;
+        let (coarse, rest) = rest.split_at_mut_checked(matrix)?;
+        let (next_coarse, rest) = rest.split_at_mut_checked(matrix)?;
+        let (next_fine, rest) = rest.split_at_mut_checked(matrix)?;
+        let count = cells_with_sums(lattice.cell_count(), functions);
+        let (cells, rest) = rest.split_at_mut_checked(POLYNOMIAL_FLOATS * count)?;
+        let (sums, rest) = rest.split_at_mut_checked(SUM_FLOATS * count)?;
+        let cells = must_cast_slice_mut(cells.as_chunks_mut::<POLYNOMIAL_FLOATS>().0);
+        let sums = must_cast_slice_mut(sums.as_chunks_mut::<SUM_FLOATS>().0);
         let damped = if damped {
-            let third = 3 * thirds(functions) * stride(thirds(functions));
-            let (inverse, rest) = rest.split_at_mut_checked(one)?;
-            let (mass, rest) = rest.split_at_mut_checked(one)?;
-            let (next_mass, rest) = rest.split_at_mut_checked(one)?;
-            let (mean, rest) = rest.split_at_mut_checked(third)?;
-            let (next_mean, rest) = rest.split_at_mut_checked(third)?;
-            let momentum = rest.get_mut(..CELL_NUMBERS * count)?;
-            let momentum = must_cast_slice_mut(momentum.as_chunks_mut::<CELL_NUMBERS>().0);
-            Some(DampedMatrices { inverse, mass, next_mass, mean, next_mean, momentum })
+            let mean_matrix = 3 * thirds(functions) * stride(thirds(functions));
+            let (inverse, rest) = rest.split_at_mut_checked(matrix)?;
+            let (mass, rest) = rest.split_at_mut_checked(matrix)?;
+            let (next_mass, rest) = rest.split_at_mut_checked(matrix)?;
+            let (mean_inverse, rest) = rest.split_at_mut_checked(mean_matrix)?;
+            let (next_mean_inverse, rest) = rest.split_at_mut_checked(mean_matrix)?;
+            let momentum = rest.get_mut(..POLYNOMIAL_FLOATS * count)?;
+            let momentum = must_cast_slice_mut(momentum.as_chunks_mut::<POLYNOMIAL_FLOATS>().0);
+            Some(DampedMatrices { inverse, mass, next_mass, mean_inverse, next_mean_inverse, momentum })
         } else {
             None
         };
-        Some(Self { applied, kept, next, fine, damped, cells, sums })
+        Some(Self { applied, coarse, next_coarse, next_fine, damped, cells, sums })
     }
 }
 
-/// The inverse of the mean over the axes of `G`, of which the lower triangle is there. Whether it could be inverted.
-pub(super) fn invert_means(means: &mut [f32], inertia: &[f32], functions: usize, stride: usize) -> bool {
+/// Computes the inverse of the mean over the axes of `G`, from the lower triangle of `G`. Gives whether it could be
+/// inverted.
+pub(super) fn invert_mean(means: &mut [f32], inertia: &[f32], functions: usize, stride: usize) -> bool {
     let (size, row_length) = (3 * thirds(functions), dense::stride(thirds(functions)));
     let at = |row: usize, column: usize| inertia.get(row * stride + column).copied().unwrap_or(0.0);
     for (row, means) in means.chunks_exact_mut(row_length.max(1)).enumerate() {

@@ -1,28 +1,28 @@
-//! What the scaling is doing right now.
+//! The report of a step beyond the critical one: added inertia, what was held back, and the error estimate.
 
-/// Added inertia, reported with every step.
+/// Added inertia and its consequences, reported with every step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
-    /// Mean over the nodes of the inertia added, in masses of the node.
+    /// Added inertia as a multiple of the node's mass, mean over the nodes.
     pub added_mean: f32,
-    /// The largest, and the node that has it.
+    /// The largest added inertia of a node, as a multiple of its mass.
     pub added_largest: f32,
-    /// See `added_largest`.
+    /// The node with the largest added inertia.
     pub added_node: u32,
-    /// Nodes that the latest step held back: their stiffness has grown since their inertia was computed, or
-    /// their force would have moved them by more than a small part of an element.
+    /// Number of nodes that the latest step held back, because their stiffness has grown since their inertia was
+    /// computed, or because their force would have moved them by more than a small part of an element.
     pub held_back: u32,
-    /// Share of the lattice's motion that was used: below one where the body stiffened since its last refresh.
+    /// Share of the lattice's motion that was used: below one if the body has stiffened since the last refresh.
     pub coarse_share: f32,
-    /// Share of the rough motion that the latest damped step took away.
+    /// Share of the rough motion that the latest damped step removed.
     pub damping: f32,
-    /// Estimate of the error that the added inertia has caused so far, m: mean over the nodes of their distance
-    /// from where the exact step would have them. It follows the force that the added inertia absorbs along the
-    /// body's displacement, from rest or from when the inertia was prepared. Of 78 runs of the laboratory 58 were
-    /// within a factor of three of the truth, 70 within five; up to nine times too high where a small error sits
-    /// beside a moved support, up to eleven times too low where mass scaling hardly moves the body at all. It tells
-    /// the scale, it is no bound.
+    /// Estimate of the error that the added inertia has caused so far, m: the distance of the nodes from their
+    /// positions in the exact motion, mean over the nodes. It integrates the force that the added inertia absorbs,
+    /// along the body's displacement, since rest or since the inertia was prepared. Of 78 runs of the laboratory 58
+    /// were within a factor of three of the truth, 70 within five. It was up to nine times too high for a small error
+    /// next to a moved support, and up to eleven times too low where mass scaling hardly moves the body at all. It
+    /// gives the scale and is no bound.
     pub error: f32,
 }
 
@@ -38,18 +38,18 @@ impl Report {
     };
 }
 
-/// Nodes that a step holds back.
+/// Sums over the nodes that a step holds back.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HeldBack {
     pub(super) nodes: u32,
-    /// Sum of the shares of their inverse inertia that are not used.
+    /// Sum of the unused shares of their inverse inertia.
     pub(super) unused: f32,
 }
 
 impl HeldBack {
     pub(super) const NONE: Self = Self { nodes: 0, unused: 0.0 };
 
-    /// Adds nodes, and the sum of the shares that they do not use.
+    /// Adds a number of nodes and the sum of their unused shares.
     #[inline(always)]
     pub(super) fn add(&mut self, nodes: f32, unused: f32) {
         self.nodes += nodes as u32;
@@ -57,16 +57,16 @@ impl HeldBack {
     }
 }
 
-/// Sums of added inertia while it is being computed.
+/// Sums of added inertia over the nodes of a cycle.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Tally {
+pub(super) struct AddedInertiaSums {
     sum: f32,
     nodes: u32,
     largest: f32,
     node: u32,
 }
 
-impl Tally {
+impl AddedInertiaSums {
     pub(super) const NEW: Self = Self { sum: 0.0, nodes: 0, largest: 0.0, node: 0 };
 
     #[inline(always)]

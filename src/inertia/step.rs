@@ -1,237 +1,211 @@
-//! One step with scaled inertia: forces, the fine part of every node with its share of the lattice's force,
-//! the lattice's motion, the account, and only then the state.
+//! One mass-scaled, multilevel or damped step: forces with scalar bounds; the motion of every node by its own inertia,
+//! and its contribution to the lattice; the lattice's motion; its addition to the nodes. After an accepted step, one
+//! part of the refresh.
 
 use glam::Vec4;
 
-use crate::lanes::NodeVector;
+use crate::element::{ElementLaw, ElementMaterial, InternalForces, NodeInertia, ScalarBound};
 use crate::loads::Loads;
-use crate::material::{Law, Material};
-use crate::scene::{ElementBlock, NodeInertia, Scene};
-use crate::state::State;
-use crate::tled::{Divergence, Entry, InternalForces, Status, culprit, external_forces, follow_motions};
+use crate::scene::SceneView;
+use crate::simd::NodeVector;
+use crate::state::StateView;
+use crate::step::{Computed, Status, Step, StepMethod, Trial, external_forces};
 
-use super::bound::ScalarBeside;
-use super::cells::{Cell, prolong, restrict};
-use super::damper::{Damper, Rough};
+use super::cells::{CellPolynomial, prolong, restrict};
+use super::damper::RoughMotion;
 use super::dense::{Row, apply, stride};
-use super::estimate::dot;
-use super::frames::{Rotation, turn};
-use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
+use super::estimate::{DefectTotals, dot};
+use super::frames::{Rotation, rotate};
+use super::large_step::{LargeModel, LargeView, Storage};
+use super::lattice::{Lattice, MAX_FUNCTIONS};
 use super::matrices::{DampedMatrices, Matrices, thirds};
-use super::passes::{Alone, Calm, Follow, Given, Prepare, Settle, turns};
-use super::refresh::{Refresh, Sources, from_numbers, to_numbers};
-use super::vectors::NodeTables;
-use super::{COARSE_GROWTH, Core, Inertia, LARGEST_KICK, Storage};
+use super::passes::{
+    ApplyIncrements, CorrectionPass, FinePass, PassInput, RoughDamping, UncoupledPass, rotation_table,
+};
+use super::refresh::{Refresh, RefreshInput, from_components, to_components};
+use super::report::HeldBack;
+use super::{COARSE_GROWTH, LARGEST_MOVE};
 
-/// More of all nodes' inverse inertia unused than this, or less of the lattice's motion used, makes a step
-/// [`Status::Limited`].
-const MUCH_UNUSED: f32 = 0.05;
-const LITTLE_MOTION: f32 = 0.5;
+/// A step is [`Status::Limited`] if more than this share of the inverse inertia of all nodes is not used, or less than
+/// this share of the lattice's motion is used.
+const LARGEST_UNUSED: f32 = 0.05;
+const LEAST_COARSE_SHARE: f32 = 0.5;
 
-/// Takes one step of the length that the inertia was prepared for. Every call does the same work, one
-/// force evaluation and what the lattice needs. `Mismatch` if the inertia was not prepared for this scene.
-pub fn step<M, N, B, S, V, W, D>(
-    scene: &Scene<M, N, B>,
-    loads: &Loads<'_>,
-    state: &mut State<S>,
-    inertia: &mut Inertia<V, W, D>,
-) -> Status
-where
-    M: Material,
-    N: AsRef<[NodeInertia]>,
-    B: AsRef<[ElementBlock]>,
-    S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
-    V: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
-    W: AsRef<[LatticeNode]> + AsMut<[LatticeNode]>,
-    D: AsRef<[f32]> + AsMut<[f32]>,
-{
-    damped_step(scene, loads, state, inertia, None)
-}
-
-/// [`step()`] with rough motion damped as `damper` says, if there is one and the inertia is [`Inertia::damped`].
-pub fn damped_step<M, N, B, S, V, W, D>(
-    scene: &Scene<M, N, B>,
-    loads: &Loads<'_>,
-    state: &mut State<S>,
-    inertia: &mut Inertia<V, W, D>,
-    damper: Option<&Damper<'_>>,
-) -> Status
-where
-    M: Material,
-    N: AsRef<[NodeInertia]>,
-    B: AsRef<[ElementBlock]>,
-    S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
-    V: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
-    W: AsRef<[LatticeNode]> + AsMut<[LatticeNode]>,
-    D: AsRef<[f32]> + AsMut<[f32]>,
-{
-    let Inertia { vectors, places, dense, core } = inertia;
-    let storage = Storage { vectors: vectors.as_mut(), places: places.as_mut(), dense: dense.as_mut() };
-    core.step(scene, loads, state, storage, damper)
-}
-
-impl Core {
-    /// [`damped_step`].
-    pub(crate) fn step<M, N, B, S>(
-        &mut self,
-        scene: &Scene<M, N, B>,
+impl LargeView<'_, '_> {
+    /// See [`super::LargeStep::step`].
+    pub fn step<M: ElementMaterial>(
+        self,
+        scene: SceneView<'_, M>,
         loads: &Loads<'_>,
-        state: &mut State<S>,
-        storage: Storage<'_>,
-        damper: Option<&Damper<'_>>,
-    ) -> Status
-    where
-        M: Material,
-        N: AsRef<[NodeInertia]>,
-        B: AsRef<[ElementBlock]>,
-        S: AsRef<[NodeVector]> + AsMut<[NodeVector]>,
-    {
-        let nodes = scene.node_count();
-        let room = state.capacity();
-        let mismatch = Status::Mismatch { nodes, room: if room < self.nodes { room } else { self.nodes } };
-        let Storage { vectors, places, dense } = storage;
-        let Self { step, lattice, refresh, scaling, estimate, report, nodes: prepared, damped, rough } = self;
-        let State { displacement, increment, force, time, steps, dt, ledger, extremes: seen } = state;
-        let (Some(step), Some(displacement), Some(increment), Some(force), Some(mut tables)) = (
-            step.filter(|_| *prepared == nodes),
-            displacement.as_mut().get_mut(..nodes),
-            increment.as_mut().get_mut(..nodes),
-            force.as_mut().get_mut(..nodes),
-            NodeTables::split(vectors, nodes),
-        ) else {
+        state: StateView<'_>,
+    ) -> Status {
+        let Self { model, storage } = self;
+        let nodes = model.nodes;
+        let mismatch = Status::Mismatch { nodes: scene.node_count(), room: nodes.min(state.capacity()) };
+        let damped = model.method.damper().is_some();
+        let Some(storage) = Storage::split(storage, nodes, &model.lattice, damped) else {
             return mismatch;
         };
-        if nodes == 0 || loads.nodes().is_some_and(|checked| checked != nodes) {
+        if nodes != scene.node_count() {
             return mismatch;
         }
-        let step = step.carried_from(*dt);
-        let nodal = scene.inertia();
-        let mut account = *ledger;
-        if *steps == 0 {
-            account.start = account.start.max(scene.releasable_energy());
+        let step = model.step.carried_from(state.dt);
+        match Trial::begin(scene, loads, state, nodes) {
+            Ok(trial) => trial.take(&step, &mut InertiaStep::new(&step, model, storage)),
+            Err(refused) => refused,
         }
-
-        external_forces(force, 0, nodal, loads, *time);
-        let external = dot(force, displacement);
-        let functions = lattice.functions();
-        let no_lattice = functions == 0;
-        let extremes =
-            M::Law::forces_and_bounds(InternalForces::of(scene, displacement, force, ScalarBeside));
-
-        let places = if no_lattice { &[] } else { places.get(..nodes).unwrap_or_default() };
-        let Some(mut matrices) = Matrices::split(dense, lattice, *damped && lattice.functions() > 0) else {
-            return mismatch;
-        };
-        let mut coarse_share = 1.0;
-        // Without a lattice there is nothing to tell rough from smooth by.
-        let damper = damper.filter(|_| refresh.lattice_in_use && !no_lattice);
-        let damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
-        refresh.look(displacement, *steps);
-        let turns = &turns(&refresh.frames.of_bounds, refresh.frames.functions());
-        let given = Given { step: &step, scaling, inertia: nodal, displacement, increment, places };
-        let (brake, tables) = (refresh.brake, &mut tables);
-        let (held_back, totals, defects, found);
-        if no_lattice {
-            (held_back, totals, defects) = Alone { given, brake, turns, force, tables }.dispatched();
-            found = Rough::NONE;
-        } else {
-            let cells = &mut *matrices.cells;
-            let momentum = matrices.damped.as_mut().map(|damped| &mut *damped.momentum);
-            let growth;
-            (held_back, growth) =
-                Prepare { given, brake, turns, force, tables, cells, momentum }.dispatched();
-            if growth > COARSE_GROWTH {
-                coarse_share = COARSE_GROWTH / growth;
-            }
-            coarse_share = coarse_motion(&mut matrices, lattice, coarse_share, refresh);
-            let cells = &*matrices.cells;
-            let damped = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use);
-            let smooth = damped.and_then(|damped| smooth_motion(damped, lattice, increment));
-            let damped = smooth.map(|smooth| Calm { smooth, share: damping });
-            (totals, defects, found) = Settle { given, cells, damped, force, tables }.dispatched();
-        }
-
-        let tables_next: &[NodeVector] = tables.next;
-        let next = |node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector| {
-            let [x, y, z, _] = tables_next.get(node).copied().unwrap_or_default().0;
-            [x, y, z, 0.0]
-        };
-        let entry = Entry::of_totals(&totals, loads, &step)
-            .with_forces(loads, nodal, increment, force, *time, next)
-            .with_motions(loads, displacement, increment, force, *time, &step);
-        let entered = match entry.entered(account, &step) {
-            Ok(entered) => entered,
-            Err(cause) => {
-                let node = culprit(nodal, increment, force, &step, next);
-                return Status::Diverged(Divergence { time: *time, node, cause });
-            }
-        };
-
-        (*ledger, *seen) = (entered, extremes);
-        *rough = found;
-        estimate.advance(&defects, external, nodes, scaling.k, step.seconds() * step.seconds());
-        Follow { next: tables.next, displacement, increment }.dispatched();
-        *dt = step.seconds();
-        *time += f64::from(step.seconds());
-        *steps += 1;
-        follow_motions(loads, displacement, increment, *time);
-        refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-        refresh.share(coarse_share);
-        let sources = Sources { scene, displacement, increment, lattice, places, scaling };
-        refresh.advance(*steps, sources, tables, &mut matrices);
-        *report = refresh.published.report(held_back.nodes, coarse_share, estimate.error());
-        report.damping = damping;
-        let held = held_back.unused > MUCH_UNUSED * nodes as f32 || coarse_share < LITTLE_MOTION;
-        extremes.status(ledger, held)
     }
 }
 
-/// How many times larger than the largest increment what is smooth of them may be: functions that are cut off by the body's
-/// surface reach beyond it.
-const SMOOTH: f32 = 10.0;
+/// A step that is being computed, with its results.
+struct InertiaStep<'a, 'w> {
+    step: &'a Step,
+    model: &'a mut LargeModel<'w>,
+    storage: Storage<'a>,
+    /// Displacement times external force, J.
+    external: f32,
+    held_back: HeldBack,
+    defects: DefectTotals,
+    rough: RoughMotion,
+    coarse_share: f32,
+    damping: f32,
+}
 
-/// The cells' sums of momentum become what of the increments is smooth, `W G^-1 W^T M du`. Nothing where that cannot be: `G`
-/// is a cycle old, and where an element has been crushed since, `M` is another.
+impl<'a, 'w> InertiaStep<'a, 'w> {
+    fn new(step: &'a Step, model: &'a mut LargeModel<'w>, storage: Storage<'a>) -> Self {
+        Self {
+            step,
+            model,
+            storage,
+            external: 0.0,
+            held_back: HeldBack::NONE,
+            defects: DefectTotals::default(),
+            rough: RoughMotion::NONE,
+            coarse_share: 1.0,
+            damping: 0.0,
+        }
+    }
+}
+
+impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
+    fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
+        let Self { step, model, storage: Storage { tables, places, matrices }, .. } = self;
+        let LargeModel { lattice, refresh, scaling, rough, method, .. } = &mut **model;
+        let Trial { scene, loads, displacement, increment, force, progress } = trial;
+        let (inertia, force): (_, &mut [NodeVector]) = (scene.inertia, force);
+        external_forces(force, 0, inertia, loads, progress.time);
+        self.external = dot(force, displacement);
+        let has_lattice = lattice.functions() > 0;
+        let extremes = M::Law::forces_and_bounds(InternalForces::of_all(
+            scene.elements(),
+            displacement,
+            force,
+            ScalarBound,
+        ));
+
+        // Without a lattice there is no distinction of smooth and rough motion.
+        let damper = method.damper().filter(|_| refresh.lattice_in_use && has_lattice);
+        self.damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
+        refresh.update_frames(displacement, progress.steps);
+        let rotations = &rotation_table(&refresh.frames.of_bounds, refresh.frames.functions());
+        let input = PassInput { step, scaling, inertia, displacement, increment, places };
+        let velocity_scale = refresh.velocity_scale;
+        let totals;
+        if has_lattice {
+            let cells = &mut *matrices.cells;
+            let momentum = matrices.damped.as_mut().map(|damped| &mut *damped.momentum);
+            let growth;
+            (self.held_back, growth) =
+                FinePass { input, velocity_scale, rotations, force, tables, cells, momentum }.dispatched();
+            let allowed = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
+            self.coarse_share = coarse_motion(matrices, lattice, allowed, refresh);
+            let cells = &*matrices.cells;
+            let damped = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use);
+            let smooth = damped.and_then(|damped| smooth_motion(damped, lattice, increment));
+            let damped = smooth.map(|smooth| RoughDamping { smooth, share: self.damping });
+            (totals, self.defects, self.rough) =
+                CorrectionPass { input, cells, damped, force, tables }.dispatched();
+        } else {
+            (self.held_back, totals, self.defects) =
+                UncoupledPass { input, velocity_scale, rotations, force, tables }.dispatched();
+        }
+        Computed { totals, extremes }
+    }
+
+    fn next_increment(&self, node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector) -> [f32; 4] {
+        let [x, y, z, _] = self.storage.tables.next_increment.get(node).copied().unwrap_or_default().0;
+        [x, y, z, 0.0]
+    }
+
+    fn advance(&mut self, trial: &mut Trial<'_, M>) {
+        let (step, model) = (self.step, &mut *self.model);
+        let square = step.seconds() * step.seconds();
+        model.rough = self.rough;
+        model.estimate.advance(&self.defects, self.external, model.nodes, model.scaling.k, square);
+        let Trial { displacement, increment, .. } = trial;
+        ApplyIncrements { next: self.storage.tables.next_increment, displacement, increment }.dispatched();
+    }
+
+    fn finish(&mut self, trial: &mut Trial<'_, M>) -> bool {
+        let Self { model, storage: Storage { tables, places, matrices }, held_back, coarse_share, .. } = self;
+        let LargeModel { lattice, refresh, scaling, estimate, report, nodes, .. } = &mut **model;
+        refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+        refresh.set_share(*coarse_share);
+        let Trial { scene, displacement, increment, progress, .. } = trial;
+        let input = RefreshInput { scene: *scene, displacement, increment, lattice, places, scaling };
+        refresh.advance(progress.steps, input, tables, matrices);
+        *report = refresh.added.report(held_back.nodes, *coarse_share, estimate.error());
+        report.damping = self.damping;
+        held_back.unused > LARGEST_UNUSED * *nodes as f32 || *coarse_share < LEAST_COARSE_SHARE
+    }
+}
+
+/// Largest ratio of a vector of the smooth motion to the largest increment. It may exceed one, because lattice points
+/// may lie outside the body.
+const LARGEST_SMOOTH: f32 = 10.0;
+
+/// Turns the cells' sums of momentum into the smooth part of the increments, `W G^-1 W^T M du`. None if the result is
+/// implausible: `G` is up to a cycle old, and `M` may have changed much since, where an element was crushed.
 fn smooth_motion<'a>(
     damped: &'a mut DampedMatrices<'_>,
     lattice: &Lattice,
     increment: &[NodeVector],
-) -> Option<&'a [Cell]> {
+) -> Option<&'a [CellPolynomial]> {
     let functions = lattice.functions();
     let momentum = restrict(damped.momentum, lattice);
     let mut smooth = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    let rows = damped.mean.chunks_exact(stride(thirds(functions)).max(1));
+    let rows = damped.mean_inverse.chunks_exact(stride(thirds(functions)).max(1));
     for (smooth, row) in smooth.iter_mut().zip(rows).take(functions) {
         let products = row.iter().zip(&momentum).take(functions);
         let sum: Vec4 = products.map(|(entry, momentum)| *entry * Vec4::from(momentum.0)).sum();
         smooth.0 = sum.to_array();
     }
     let largest = increment.iter().fold(Vec4::ZERO, |most, du| most.max(Vec4::from(du.0).abs()));
-    let most = Vec4::splat(SMOOTH * largest.max_element());
-    if !smooth.iter().all(|vector| Vec4::from(vector.0).abs().cmple(most).all()) {
+    let limit = Vec4::splat(LARGEST_SMOOTH * largest.max_element());
+    if !smooth.iter().all(|vector| Vec4::from(vector.0).abs().cmple(limit).all()) {
         return None;
     }
     prolong(&smooth, lattice, damped.momentum);
     Some(damped.momentum)
 }
 
-/// `share (S^-1 - G^-1) W^T r` less the correction that a change of `S` asked for, from the cells' sums of `r` to what
-/// they move. The share falls where the forces of one step would strain a cell by more than [`LARGEST_KICK`]. With a
-/// damped inertia `S^-1` goes to second order.
+/// Turns the cells' sums of the residual `r` into the lattice's motion: `share (S^-1 - G^-1) W^T r` minus the
+/// correction after a change of `S`. Reduces the share if the forces of one step would strain a cell by more than
+/// [`LARGEST_MOVE`], and returns it. A damped step uses the second-order operator instead of `S^-1` (`damper.rs`).
 fn coarse_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, mut share: f32, refresh: &Refresh) -> f32 {
     let functions = lattice.functions();
     let (size, stride) = (3 * functions, stride(functions));
     let mut restricted = restrict(matrices.cells, lattice);
-    turn(&mut restricted, &refresh.frames.of_bounds, Rotation::back);
-    let forces = to_numbers(&restricted);
+    rotate(&mut restricted, &refresh.frames.of_bounds, Rotation::in_frame);
+    let forces = to_components(&restricted);
     let times = |matrix: &[f32], row: &Row| apply(matrix, stride, row.get(..size).unwrap_or_default());
     let mut moved = times(matrices.applied, &forces);
     if let Some(damped) = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use) {
-        // `A S^-1 g = g - M S^-1 g`: where elements are crushed `A` is too large for products with it.
+        // `A S^-1 g` as `g - M S^-1 g`: where elements are crushed `A` is so large that products with it overflow.
         let first = times(damped.inverse, &forces);
         let mut absorbed = forces;
-        for (absorbed, kept) in absorbed.iter_mut().zip(times(damped.mass, &first)) {
-            *absorbed -= kept;
+        for (absorbed, passed) in absorbed.iter_mut().zip(times(damped.mass, &first)) {
+            *absorbed -= passed;
         }
         let second = times(damped.inverse, &absorbed);
         for (moved, more) in moved.iter_mut().zip(times(damped.inverse, &times(damped.mass, &second))) {
@@ -239,11 +213,11 @@ fn coarse_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, mut share: f32,
         }
     }
     let mut solution = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    from_numbers(moved.get(..size).unwrap_or_default(), &mut solution);
-    turn(&mut solution, &refresh.frames.of_bounds, Rotation::out);
+    from_components(moved.get(..size).unwrap_or_default(), &mut solution);
+    rotate(&mut solution, &refresh.frames.of_bounds, Rotation::in_world);
     let strain = lattice.largest_strain(&solution);
-    if share * strain > LARGEST_KICK {
-        share = LARGEST_KICK / strain;
+    if share * strain > LARGEST_MOVE {
+        share = LARGEST_MOVE / strain;
     }
     for (solution, correction) in solution.iter_mut().zip(&refresh.correction) {
         for (value, correction) in solution.0.iter_mut().zip(correction.0) {

@@ -1,4 +1,4 @@
-//! A position in a file that mixes lines of text with blocks of binary numbers, as VTK and Gmsh files do.
+//! A position in a file that mixes lines of text with binary arrays, as VTK and Gmsh files do.
 //! Every failure names its place: the line while only text has been read, the byte offset after that, because
 //! lines mean nothing once binary data has gone by.
 
@@ -9,7 +9,7 @@ use std::string::String;
 
 use super::error::{Fault, quoted};
 
-/// How numbers are stored.
+/// How values are stored.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Encoding {
     Text,
@@ -22,7 +22,7 @@ pub(super) struct Cursor<'a> {
     at: usize,
     /// Line of `at`, from 1.
     line: usize,
-    /// Where the last token or block began.
+    /// Where the last token or array began.
     mark: usize,
     seen_binary: bool,
     /// Tokens must not be looked for beyond the end of this line.
@@ -149,7 +149,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// A 64-bit count or number of a node.
+    /// A 64-bit count or node tag.
     pub(super) fn size(&mut self, encoding: Encoding, what: impl Display) -> Result<u64, Fault> {
         match encoding {
             Encoding::Text => self.number(what),

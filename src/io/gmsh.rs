@@ -1,6 +1,6 @@
 //! Gmsh files (`.msh`): version 1 (text), versions 2.x and 4.1 (text and binary in either byte order), as specified
 //! in the Gmsh reference manual (<https://gmsh.info/doc/texinfo/gmsh.html#Gmsh-file-formats>). Coordinates are in
-//! file units. Nodes keep the order of the file; their numbers may have gaps.
+//! file units. Nodes keep the order of the file; their tags may have gaps.
 
 use std::collections::HashMap;
 use std::format;
@@ -9,7 +9,7 @@ use std::vec::Vec;
 use super::TetMesh;
 use super::cursor::{Cursor, Encoding};
 use super::error::{Fault, quoted};
-use super::numbering::Numbering;
+use super::node_index::NodeIndex;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Version {
@@ -25,11 +25,11 @@ struct Tags {
     elementary: i32,
 }
 
-/// What is known so far while the sections go by.
+/// What the sections read so far have said.
 struct Gmsh {
     version: Option<Version>,
     encoding: Encoding,
-    numbering: Option<Numbering>,
+    index: Option<NodeIndex>,
     /// The first physical tag of each volume (version 4.1).
     volumes: HashMap<i32, i32>,
     mesh: TetMesh,
@@ -41,7 +41,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, Fault> {
     let mut file = Gmsh {
         version: None,
         encoding: Encoding::Text,
-        numbering: None,
+        index: None,
         volumes: HashMap::new(),
         mesh: TetMesh::default(),
         tags: Vec::new(),
@@ -61,7 +61,7 @@ impl Gmsh {
     fn read_sections(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         while let Some(section) = cursor.token() {
             match (section, self.version) {
-                (b"$Nodes", _) if self.numbering.is_some() => {
+                (b"$Nodes", _) if self.index.is_some() => {
                     return Err(cursor.fault("a second list of nodes"));
                 }
                 (b"$MeshFormat", None) => self.read_format(cursor)?,
@@ -152,20 +152,20 @@ impl Gmsh {
         expect(cursor, "$EndMeshFormat")
     }
 
-    /// Versions 1 and 2: a number and three coordinates each.
+    /// Versions 1 and 2: a tag and three coordinates each.
     fn read_numbered_nodes(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         let encoding = self.encoding;
         let n = count(cursor, "nodes")?;
-        let mut numbering = Numbering::default();
+        let mut index = NodeIndex::default();
         for i in 1..=n {
             cursor.record(encoding, |cursor| {
-                let number = cursor.int(encoding, format_args!("the number of node {i} of {n}"))?;
-                numbering.add(number.into(), cursor)?;
-                self.mesh.points.push(cursor.point(encoding, format_args!("node {number}"))?);
+                let tag = cursor.int(encoding, format_args!("the number of node {i} of {n}"))?;
+                index.add(tag.into(), cursor)?;
+                self.mesh.points.push(cursor.point(encoding, format_args!("node {tag}"))?);
                 Ok(())
             })?;
         }
-        self.numbering = Some(numbering);
+        self.index = Some(index);
         Ok(())
     }
 
@@ -268,14 +268,14 @@ impl Gmsh {
         Ok(())
     }
 
-    /// Blocks `dimension entity parametric node-count` of first numbers, then coordinates
+    /// Blocks `dimension entity parametric node-count` of first tags, then coordinates
     fn read_nodes_4(&mut self, cursor: &mut Cursor<'_>) -> Result<(), Fault> {
         let encoding = self.encoding;
         if encoding != Encoding::Text {
             cursor.rest_of_line();
         }
         let [blocks, n, ..] = read_sizes::<4>(cursor, encoding, "the numbers of blocks and nodes")?;
-        let mut numbering = Numbering::default();
+        let mut index = NodeIndex::default();
         for _ in 0..blocks {
             let (dimension, parametric, block) = cursor.record(encoding, |cursor| {
                 let dimension = cursor.int(encoding, "the dimension of a block of nodes")?;
@@ -283,28 +283,28 @@ impl Gmsh {
                 let parametric = cursor.int(encoding, "the mark of parametric nodes")?;
                 Ok((dimension, parametric, cursor.size(encoding, "the number of nodes in a block")?))
             })?;
-            let mut numbers = Vec::new();
+            let mut tags = Vec::new();
             for _ in 0..block {
-                let number = cursor.record(encoding, |cursor| {
+                let tag = cursor.record(encoding, |cursor| {
                     Ok(cursor.size(encoding, "the number of a node")?.cast_signed())
                 })?;
-                numbering.add(number, cursor)?;
-                numbers.push(number);
+                index.add(tag, cursor)?;
+                tags.push(tag);
             }
-            for number in numbers {
+            for tag in tags {
                 cursor.record(encoding, |cursor| {
-                    self.mesh.points.push(cursor.point(encoding, format_args!("node {number}"))?);
+                    self.mesh.points.push(cursor.point(encoding, format_args!("node {tag}"))?);
                     for _ in 0..if parametric == 0 { 0 } else { dimension } {
-                        cursor.real(encoding, format_args!("the parameters of node {number}"))?;
+                        cursor.real(encoding, format_args!("the parameters of node {tag}"))?;
                     }
                     Ok(())
                 })?;
             }
         }
-        self.numbering = Some(numbering);
-        let found = self.mesh.points.len();
-        if n != found as u64 {
-            return Err(cursor.fault(format_args!("{n} nodes are announced, but the blocks list {found}")));
+        self.index = Some(index);
+        let listed = self.mesh.points.len();
+        if n != listed as u64 {
+            return Err(cursor.fault(format_args!("{n} nodes are announced, but the blocks list {listed}")));
         }
         Ok(())
     }
@@ -316,7 +316,7 @@ impl Gmsh {
             cursor.rest_of_line();
         }
         let [blocks, n, ..] = read_sizes::<4>(cursor, encoding, "the numbers of blocks and elements")?;
-        let mut found = 0_u64;
+        let mut listed = 0_u64;
         for _ in 0..blocks {
             let (entity, kind, block) = cursor.record(encoding, |cursor| {
                 cursor.int(encoding, "the dimension of a block of elements")?;
@@ -330,11 +330,13 @@ impl Gmsh {
                     let number = cursor.size(encoding, "the number of an element")?.cast_signed();
                     self.read_element(cursor, number, kind, Tags { physical, elementary: entity })
                 })?;
-                found += 1;
+                listed += 1;
             }
         }
-        if n != found {
-            return Err(cursor.fault(format_args!("{n} elements are announced, but the blocks list {found}")));
+        if n != listed {
+            return Err(
+                cursor.fault(format_args!("{n} elements are announced, but the blocks list {listed}"))
+            );
         }
         Ok(())
     }
@@ -347,7 +349,7 @@ impl Gmsh {
         kind: i32,
         tags: Tags,
     ) -> Result<(), Fault> {
-        let Some(numbering) = &self.numbering else {
+        let Some(index) = &self.index else {
             return Err(cursor.fault("elements come before the nodes"));
         };
         let (encoding, wide) = (self.encoding, self.version == Some(Version::Four));
@@ -366,9 +368,9 @@ impl Gmsh {
             cursor.fault(reason)
         })?;
         match kind {
-            TRIANGLE => self.mesh.triangles.push(numbering.corners(number, cursor, node)?),
+            TRIANGLE => self.mesh.triangles.push(index.corners(number, cursor, node)?),
             TETRAHEDRON => {
-                self.mesh.tets.push(numbering.corners(number, cursor, node)?);
+                self.mesh.tets.push(index.corners(number, cursor, node)?);
                 self.tags.push(tags);
             }
             _ => {

@@ -5,9 +5,9 @@
 mod cursor;
 mod error;
 mod gmsh;
-mod numbering;
-mod numbers;
+mod node_index;
 mod tetgen;
+mod values;
 mod vtk;
 mod vtk_cells;
 mod vtu;
@@ -43,7 +43,7 @@ pub struct TetMesh {
 /// - `.vtk`: legacy VTK, versions 1 to 5, text or binary
 /// - `.vtu`: VTK XML, text, base64 or raw, plain or zlib
 /// - `.msh`: Gmsh 1, 2.x or 4.1, text or binary
-/// - `.node` or `.ele`: TetGen; the other file is looked for beside the one given
+/// - `.node` or `.ele`: TetGen; the other file must be in the same folder
 ///
 /// Points, lines and surface cells other than triangles are left out. A volume cell that is not a tetrahedron with
 /// four nodes is an error, as is a file without tetrahedra.
@@ -57,8 +57,8 @@ pub fn read_mesh(path: &Path) -> Result<TetMesh, ReadError> {
             let file = |kind| {
                 if extension == kind { path.into() } else { path.with_extension(kind) }
             };
-            let (points, numbering) = parse(&file("node"), tetgen::read_nodes)?;
-            parse(&file("ele"), |bytes| tetgen::read_elements(bytes, points, &numbering))
+            let (points, index) = parse(&file("node"), tetgen::read_nodes)?;
+            parse(&file("ele"), |bytes| tetgen::read_elements(bytes, points, &index))
         }
         _ => Err(Fault::new("", "the extension is none of .vtk, .vtu, .msh, .node and .ele").in_file(path)),
     }?;

@@ -1,13 +1,13 @@
 //! TetGen files: the points (`.node`) and tetrahedra (`.ele`) of one mesh, as specified in the TetGen manual
 //! (<https://wias-berlin.de/software/tetgen/fformats.html>). Coordinates are in file units; the first node has the
-//! number 0 or 1.
+//! tag 0 or 1.
 
 use std::vec::Vec;
 
 use super::TetMesh;
 use super::cursor::{Cursor, Encoding};
 use super::error::{Fault, quoted};
-use super::numbering::Numbering;
+use super::node_index::NodeIndex;
 
 /// Comments run from `#` to the end of the line; blanks in their place keep the line numbers right.
 fn without_comments(bytes: &[u8]) -> Vec<u8> {
@@ -35,8 +35,8 @@ fn expect_end(cursor: &mut Cursor<'_>, n: u64, what: &str) -> Result<(), Fault> 
     }
 }
 
-/// The points of a `.node` file and their numbers.
-pub(super) fn read_nodes(bytes: &[u8]) -> Result<(Vec<[f64; 3]>, Numbering), Fault> {
+/// The points of a `.node` file and their tags.
+pub(super) fn read_nodes(bytes: &[u8]) -> Result<(Vec<[f64; 3]>, NodeIndex), Fault> {
     let bytes = without_comments(bytes);
     let mut cursor = Cursor::new(&bytes, 1);
     let (n, dimension) = cursor.record(Encoding::Text, |cursor| {
@@ -48,18 +48,18 @@ pub(super) fn read_nodes(bytes: &[u8]) -> Result<(Vec<[f64; 3]>, Numbering), Fau
     if dimension != 3 {
         return Err(cursor.fault(format_args!("the dimension is {dimension}; it must be 3")));
     }
-    let (mut points, mut numbering) = (Vec::new(), Numbering::default());
+    let (mut points, mut index) = (Vec::new(), NodeIndex::default());
     for i in 0..n {
         cursor.record(Encoding::Text, |cursor| {
-            let number = cursor.number(format_args!("the number of node {} of {n}", i + 1))?;
-            numbering.add(number, cursor)?;
-            points.push(cursor.point(Encoding::Text, format_args!("node {number}"))?);
+            let tag = cursor.number(format_args!("the number of node {} of {n}", i + 1))?;
+            index.add(tag, cursor)?;
+            points.push(cursor.point(Encoding::Text, format_args!("node {tag}"))?);
             skip_values(cursor);
             Ok(())
         })?;
     }
     expect_end(&mut cursor, n, "nodes")?;
-    Ok((points, numbering))
+    Ok((points, index))
 }
 
 /// The mesh of an `.ele` file on the points of its `.node` file. Regions are the last attribute of the tetrahedra,
@@ -67,7 +67,7 @@ pub(super) fn read_nodes(bytes: &[u8]) -> Result<(Vec<[f64; 3]>, Numbering), Fau
 pub(super) fn read_elements(
     bytes: &[u8],
     points: Vec<[f64; 3]>,
-    numbering: &Numbering,
+    index: &NodeIndex,
 ) -> Result<TetMesh, Fault> {
     let bytes = without_comments(bytes);
     let mut cursor = Cursor::new(&bytes, 1);
@@ -86,7 +86,7 @@ pub(super) fn read_elements(
         cursor.record(Encoding::Text, |cursor| {
             let element = cursor.number(format_args!("the number of element {} of {n}", i + 1))?;
             let node = |cursor: &mut Cursor<'_>| cursor.number(format_args!("a node of element {element}"));
-            mesh.tets.push(numbering.corners(element, cursor, node)?);
+            mesh.tets.push(index.corners(element, cursor, node)?);
             let mut region = None;
             for _ in 0..attributes {
                 region = Some(cursor.number::<f64>(format_args!("an attribute of element {element}"))?);

@@ -10,7 +10,7 @@ use std::vec::Vec;
 use super::TetMesh;
 use super::cursor::{Cursor, Encoding};
 use super::error::{Fault, quoted};
-use super::numbers::{Numbers, Scalar, read_numbers};
+use super::values::{Scalar, Values, read_values};
 use super::vtk_cells::{Cells, names_regions};
 
 const MAGIC: &[u8] = b"# vtk DataFile Version ";
@@ -82,7 +82,7 @@ impl<'a> Legacy<'a> {
                 b"POINTS" => {
                     let n: usize = self.cursor.number("the number of points")?;
                     let scalar = self.scalar("POINTS")?;
-                    let points = self.numbers(n.checked_mul(3), scalar, "POINTS")?.into_points();
+                    let points = self.values(n.checked_mul(3), scalar, "POINTS")?.into_points();
                     self.points = Some(points);
                 }
                 b"CELLS" if major < 5 => self.read_counted_cells()?,
@@ -90,7 +90,7 @@ impl<'a> Legacy<'a> {
                 b"CELL_TYPES" => {
                     let n = self.cursor.number("the number of cell types")?;
                     self.end_header();
-                    self.types = Some(self.whole_numbers(Some(n), Scalar::I32, "CELL_TYPES")?);
+                    self.types = Some(self.whole_values(Some(n), Scalar::I32, "CELL_TYPES")?);
                 }
                 b"POINT_DATA" => owner = Owner::Points(self.cursor.number("the number of points")?),
                 b"CELL_DATA" => owner = Owner::Cells(self.cursor.number("the number of cells")?),
@@ -101,13 +101,13 @@ impl<'a> Legacy<'a> {
         Ok(())
     }
 
-    /// `n p0 .. pn-1` for each cell, `size` numbers in all.
+    /// `n p0 .. pn-1` for each cell, `size` entries in all.
     fn read_counted_cells(&mut self) -> Result<(), Fault> {
         let place = self.cursor.place();
         let n: usize = self.cursor.number("the number of cells")?;
         let size: usize = self.cursor.number("the size of the cell list")?;
         self.end_header();
-        let entries = self.whole_numbers(Some(size), Scalar::I32, "CELLS")?;
+        let entries = self.whole_values(Some(size), Scalar::I32, "CELLS")?;
         let (mut ends, mut connectivity) = (Vec::new(), Vec::new());
         let mut rest = entries.as_slice();
         while let Some((&count, tail)) = rest.split_first() {
@@ -158,7 +158,7 @@ impl<'a> Legacy<'a> {
             return Err(self.cursor.fault(format_args!("{} where {name} is expected", quoted(word))));
         }
         let scalar = self.scalar(name)?;
-        self.whole_numbers(Some(n), scalar, name)
+        self.whole_values(Some(n), scalar, name)
     }
 
     /// An array of point or cell data, or of the whole grid. Only regions are kept; the rest is stepped over.
@@ -240,8 +240,8 @@ impl<'a> Legacy<'a> {
         scalar: Scalar,
         owner: &Owner,
     ) -> Result<(), Fault> {
-        let values = self.numbers(tuples.checked_mul(components), scalar, name)?;
-        if let Numbers::Whole(values) = values
+        let values = self.values(tuples.checked_mul(components), scalar, name)?;
+        if let Values::Whole(values) = values
             && matches!(owner, Owner::Cells(_))
             && components == 1
             && names_regions(name)
@@ -255,10 +255,10 @@ impl<'a> Legacy<'a> {
     /// Colours are bytes in binary files, but real numbers from 0 to 1 in text.
     fn skip_colours(&mut self, n: Option<usize>, name: &str) -> Result<(), Fault> {
         let scalar = if self.encoding == Encoding::Text { Scalar::F32 } else { Scalar::U8 };
-        self.numbers(n, scalar, name).map(drop)
+        self.values(n, scalar, name).map(drop)
     }
 
-    /// The next word that is not about the array before.
+    /// The next word, metadata of the array before it left out.
     fn word(&mut self, what: &str) -> Result<&'a [u8], Fault> {
         loop {
             match self.cursor.word(what)? {
@@ -309,12 +309,12 @@ impl<'a> Legacy<'a> {
         })
     }
 
-    fn numbers(&mut self, n: Option<usize>, scalar: Scalar, what: impl Display) -> Result<Numbers, Fault> {
-        read_numbers(&mut self.cursor, n, scalar, self.encoding, what)
+    fn values(&mut self, n: Option<usize>, scalar: Scalar, what: impl Display) -> Result<Values, Fault> {
+        read_values(&mut self.cursor, n, scalar, self.encoding, what)
     }
 
-    fn whole_numbers(&mut self, n: Option<usize>, scalar: Scalar, what: &str) -> Result<Vec<i64>, Fault> {
-        self.numbers(n, scalar, what)?.into_whole(what).map_err(|reason| self.cursor.fault(reason))
+    fn whole_values(&mut self, n: Option<usize>, scalar: Scalar, what: &str) -> Result<Vec<i64>, Fault> {
+        self.values(n, scalar, what)?.into_whole(what).map_err(|reason| self.cursor.fault(reason))
     }
 
     fn finish(self) -> Result<TetMesh, Fault> {

@@ -13,7 +13,7 @@ use roxmltree::{Document, Node};
 use super::TetMesh;
 use super::cursor::{Cursor, Encoding};
 use super::error::{Fault, quoted};
-use super::numbers::{Numbers, Scalar, read_numbers};
+use super::values::{Scalar, Values, read_values};
 use super::vtk_cells::{Cells, names_regions};
 use super::vtu_data::{Base64, Layout, Source};
 
@@ -106,8 +106,8 @@ impl<'d> Vtu<'d> {
     }
 
     fn child<'i>(&self, node: Node<'d, 'i>, name: &str) -> Result<Node<'d, 'i>, Fault> {
-        let found = node.children().find(|child| child.has_tag_name(name));
-        found.ok_or_else(|| self.fault(node, format_args!("<{name}> is missing")))
+        let child = node.children().find(|child| child.has_tag_name(name));
+        child.ok_or_else(|| self.fault(node, format_args!("<{name}> is missing")))
     }
 
     fn count(&self, node: Node<'_, '_>, name: &str) -> Result<usize, Fault> {
@@ -154,7 +154,7 @@ impl<'d> Vtu<'d> {
         };
         for node in data.children().filter(|node| node.attribute("Name").is_some_and(names_regions)) {
             if node.attribute("NumberOfComponents").unwrap_or("1") == "1"
-                && let Numbers::Whole(regions) = self.array(node, Some(n_cells))?
+                && let Values::Whole(regions) = self.array(node, Some(n_cells))?
             {
                 return Ok(Some(regions));
             }
@@ -162,8 +162,8 @@ impl<'d> Vtu<'d> {
         Ok(None)
     }
 
-    /// The `n` numbers of a `<DataArray>`; `n` is `None` where the count itself overflows.
-    fn array(&self, node: Node<'d, '_>, n: Option<usize>) -> Result<Numbers, Fault> {
+    /// The `n` values of a `<DataArray>`; `n` is `None` where the count itself overflows.
+    fn array(&self, node: Node<'d, '_>, n: Option<usize>) -> Result<Values, Fault> {
         let kind = node.attribute("type").unwrap_or_default();
         let scalar = match kind {
             "Int8" => Scalar::I8,
@@ -183,7 +183,7 @@ impl<'d> Vtu<'d> {
         let source = match node.attribute("format").unwrap_or("ascii") {
             "ascii" => {
                 let mut cursor = Cursor::new(bytes, 1);
-                let values = read_numbers(&mut cursor, n, scalar, Encoding::Text, "the array");
+                let values = read_values(&mut cursor, n, scalar, Encoding::Text, "the array");
                 let extra = cursor.token();
                 return match extra {
                     Some(extra) if values.is_ok() => {
@@ -211,7 +211,7 @@ impl<'d> Vtu<'d> {
         let size = n.and_then(|n| n.checked_mul(scalar.size()));
         let size = size.ok_or_else(|| self.fault(node, "more values are announced than a file can have"))?;
         let bytes = self.layout.read(source, size).map_err(|reason| self.fault(node, reason))?;
-        read_numbers(&mut Cursor::new(&bytes, 1), n, scalar, self.layout.order, "the array")
+        read_values(&mut Cursor::new(&bytes, 1), n, scalar, self.layout.order, "the array")
     }
 }
 

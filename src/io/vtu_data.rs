@@ -38,7 +38,7 @@ impl Source<'_> {
 /// Base64 text that may consist of several encodings in a row, each padded on its own.
 pub(super) struct Base64<'a> {
     text: &'a [u8],
-    /// Decoded bytes that were not asked for yet.
+    /// Decoded bytes that have not been taken yet.
     spare: Vec<u8>,
 }
 
@@ -114,9 +114,9 @@ impl Layout<'_> {
                 .read_to_end(&mut values)
                 .map_err(|error| format!("block {block} is not zlib data: {error}"))?;
             let announced = if block + 1 == compressed.len() && last != 0 { last } else { full };
-            let found = values.len() - start;
-            if found as u64 != announced || values.len() > expected {
-                let what = format!("block {block} has {found} bytes or more instead of {announced}");
+            let actual = values.len() - start;
+            if actual as u64 != announced || values.len() > expected {
+                let what = format!("block {block} has {actual} bytes or more instead of {announced}");
                 return Err(format!("{what}; the array should have {expected} in all"));
             }
         }

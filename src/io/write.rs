@@ -23,9 +23,9 @@ pub struct Frame<'a> {
     pub tets: &'a [[u32; 4]],
     /// Named vectors, one for each point, such as displacements.
     pub point_vectors: &'a [(&'a str, &'a [[f32; 3]])],
-    /// Named numbers, one for each point.
+    /// Named scalars, one for each point.
     pub point_scalars: &'a [(&'a str, &'a [f32])],
-    /// Named numbers, one for each tetrahedron.
+    /// Named scalars, one for each tetrahedron.
     pub cell_scalars: &'a [(&'a str, &'a [f32])],
 }
 
@@ -94,7 +94,7 @@ pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> io::Result<()> {
     })
 }
 
-/// Writes a file so that nobody ever sees half of it: under a temporary name in the same folder, then renamed. If
+/// Writes a file so that no reader ever sees half of it: under a temporary name in the same folder, then renamed. If
 /// `write` or the file system fails, the temporary file is removed and a file of that name stays as it was.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     static COUNT: AtomicU32 = AtomicU32::new(0);
@@ -138,7 +138,7 @@ impl Arrays {
         components: usize,
         values: impl Iterator<Item = [u8; N]>,
     ) -> io::Result<()> {
-        /// Bytes in a block, a multiple of every size of number.
+        /// Bytes in a block, a multiple of every size of value.
         const BLOCK: usize = 1 << 20;
         self.xml += &format!(
             "<DataArray type=\"{kind}\" Name=\"{}\" NumberOfComponents=\"{components}\" format=\"appended\" \
@@ -163,11 +163,11 @@ fn compressed(block: &[u8]) -> io::Result<Vec<u8>> {
     encoder.finish()
 }
 
-fn check(name: &str, found: usize, expected: usize, what: &str) -> io::Result<()> {
-    if found == expected {
+fn check(name: &str, values: usize, expected: usize, what: &str) -> io::Result<()> {
+    if values == expected {
         return Ok(());
     }
-    Err(invalid(format!("the field {name:?} has {found} values for {expected} {what}")))
+    Err(invalid(format!("the field {name:?} has {values} values for {expected} {what}")))
 }
 
 fn invalid(reason: String) -> io::Error {

@@ -6,11 +6,11 @@ use std::vec::Vec;
 
 use crate::inertia::{DamperError, InertiaError};
 use crate::io::ReadError;
+use crate::learned::LearnedError;
 use crate::loads::LoadError;
 use crate::mlp::WeightError;
 use crate::scene::BuildError;
-use crate::surrogate::SurrogateError;
-use crate::tled::{Divergence, StepError};
+use crate::step::{Divergence, StepError};
 
 /// Why the laboratory could not do what it was asked.
 #[derive(Debug)]
@@ -42,12 +42,12 @@ pub enum LabError {
         /// Where and when.
         divergence: Divergence,
     },
-    /// The exact critical step of a scene was not found.
+    /// The exact critical step of a scene did not converge.
     NoCriticalStep {
         /// The scene.
         scene: &'static str,
     },
-    /// State and scene do not belong together.
+    /// State and scene do not fit.
     Mismatch {
         /// Nodes of the scene.
         nodes: usize,
@@ -69,7 +69,7 @@ pub enum LabError {
     /// A file is not usable; the text names it.
     File(String),
     /// A network does not fit the learned step.
-    Surrogate(SurrogateError),
+    LearnedStep(LearnedError),
     /// A network does not fit the damped step.
     Damper(DamperError),
     /// A file could not be written; the text names it.
@@ -99,12 +99,13 @@ impl fmt::Display for LabError {
                 write!(f, "multiple {multiple} misses the snapshots; there are {}", known.join(", "))
             }
             Self::NoNetwork { multiple } => {
-                let known = super::networks::MULTIPLES.map(|multiple| multiple.to_string());
+                let known: Vec<String> =
+                    super::networks::multiples().map(|multiple| multiple.to_string()).collect();
                 write!(f, "there is no network for multiple {multiple}; there are {}", known.join(", "))
             }
             Self::Weights(error) => error.fmt(f),
             Self::File(text) => f.write_str(text),
-            Self::Surrogate(error) => error.fmt(f),
+            Self::LearnedStep(error) => error.fmt(f),
             Self::Damper(error) => error.fmt(f),
             Self::Write(error) => error.fmt(f),
         }
@@ -123,4 +124,4 @@ macro_rules! from {
     };
 }
 
-from!(ReadError => Mesh, BuildError => Build, LoadError => Load, StepError => Step, InertiaError => Inertia, WeightError => Weights, SurrogateError => Surrogate, DamperError => Damper, std::io::Error => Write);
+from!(ReadError => Mesh, BuildError => Build, LoadError => Load, StepError => Step, InertiaError => Inertia, WeightError => Weights, LearnedError => LearnedStep, DamperError => Damper, std::io::Error => Write);

@@ -1,5 +1,5 @@
-//! How well is an error told without knowing the truth? Estimates over true errors, both means over nodes and
-//! time: the method's own, from its added inertia while it runs, and that of a second run with twice the step.
+//! How well do estimates tell the error without the truth? Estimates over true errors, both means over nodes and time, mm: the
+//! method's own, from its added inertia while it runs, and that of a second run with twice the step.
 
 use std::format;
 use std::string::String;

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::string::String;
 use std::vec::Vec;
 
-use super::measure::{Errors, apart};
+use super::measure::{Errors, mean_distance};
 use super::method::Method;
 use super::networks::Size;
 use super::run::{self, Row, Shapes};
@@ -15,7 +15,7 @@ use super::truth::{self, Truth};
 use super::{LabError, MULTIPLES, plot, sweep, table};
 use crate::io::write_atomically;
 
-/// The scene that is swept if nobody says otherwise.
+/// The scene of the sweep unless another is asked for.
 const SWEPT: &str = "reversed";
 
 /// What to evaluate.
@@ -76,7 +76,7 @@ fn unique<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
 }
 
 /// Carries the plan out: truths in `out/truth/`, rows in `out/results.csv`, the sweep in
-/// `out/sweep-SCENE.svg`, all of which replace what an earlier evaluation left. `say` hears how it goes on.
+/// `out/sweep-SCENE.svg`; files of an earlier evaluation are replaced. `say` is given the progress in words.
 pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Vec<Row>, LabError> {
     fs::create_dir_all(out)?;
     let (specs, multiples): (Vec<_>, Vec<_>) = plan.scenes.iter().cloned().unzip();
@@ -100,22 +100,22 @@ pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Ve
     Ok(rows)
 }
 
-/// Runs at multiples in ascending order; where inertia is scaled, each beside one of twice the step, which for a
-/// method of second order is three times the error away.
+/// Runs at multiples in ascending order. Where inertia is scaled, the error is estimated by a run with twice the step: with a
+/// method of second order it is three times the error away.
 fn runs(spec: &SceneSpec, truth: &Truth, method: Method, multiples: &[u32]) -> Result<Vec<Row>, LabError> {
     let mut rows = Vec::new();
     let mut latest: Option<(u32, Shapes)> = None;
-    // From the longest, so that most are there when they are wanted.
+    // From the longest, so that most runs with twice the step are there already.
     for &multiple in multiples.iter().rev() {
-        let (mut row, shapes) = run::follow(spec, truth, method, multiple)?;
+        let (mut row, shapes) = run::run_with_shapes(spec, truth, method, multiple)?;
         let twice = 2 * multiple;
-        if method.scales() && run::hits_snapshots(twice) {
+        if method.scales_inertia() && run::hits_snapshots(twice) {
             let there = latest.take().filter(|(of, _)| *of == twice);
             let other = match there {
                 Some((_, shapes)) => shapes,
-                None => run::follow(spec, truth, method, twice)?.1,
+                None => run::run_with_shapes(spec, truth, method, twice)?.1,
             };
-            row.doubling = apart(&other, &shapes).map(|distance| distance / 3.0);
+            row.doubling = mean_distance(&other, &shapes).map(|distance| distance / 3.0);
         }
         latest = Some((multiple, shapes));
         rows.push(row);

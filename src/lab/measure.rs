@@ -38,7 +38,7 @@ impl Errors {
     }
 
     /// Compares displacements (m) with the next snapshot of the truth.
-    pub fn look(&mut self, truth: &Truth, displacements: &[NodeVector]) -> Result<(), LabError> {
+    pub fn add_snapshot(&mut self, truth: &Truth, displacements: &[NodeVector]) -> Result<(), LabError> {
         let shape = truth.snapshots.get(self.means.len()).map_or(&[][..], Vec::as_slice);
         if shape.is_empty() || shape.len() != displacements.len() {
             return Err(LabError::Mismatch { nodes: shape.len(), room: displacements.len() });
@@ -58,7 +58,7 @@ impl Errors {
     pub fn of_hold(truth: &Truth) -> Result<Self, LabError> {
         let mut errors = Self::default();
         for shape in &truth.snapshots {
-            errors.look(truth, &std::vec![NodeVector::ZERO; shape.len()])?;
+            errors.add_snapshot(truth, &std::vec![NodeVector::ZERO; shape.len()])?;
         }
         Ok(errors)
     }
@@ -66,7 +66,7 @@ impl Errors {
 
 /// Mean distance over the nodes and snapshots of two motions, mm; none if one has fewer snapshots.
 #[must_use]
-pub fn apart(a: &[Vec<[f32; 3]>], b: &[Vec<[f32; 3]>]) -> Option<f64> {
+pub fn mean_distance(a: &[Vec<[f32; 3]>], b: &[Vec<[f32; 3]>]) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0);
     for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
         sum += 1e3 * distance(*a, *b);
@@ -100,9 +100,9 @@ mod tests {
     fn judged(last: [f32; 3]) -> Errors {
         let truth = truth();
         let mut errors = Errors::default();
-        errors.look(&truth, &[NodeVector::ZERO, NodeVector([3e-3, 0.0, 0.0, 0.0])]).unwrap();
+        errors.add_snapshot(&truth, &[NodeVector::ZERO, NodeVector([3e-3, 0.0, 0.0, 0.0])]).unwrap();
         let [x, y, z] = last;
-        errors.look(&truth, &[NodeVector::ZERO, NodeVector([x, y, z, 0.0])]).unwrap();
+        errors.add_snapshot(&truth, &[NodeVector::ZERO, NodeVector([x, y, z, 0.0])]).unwrap();
         errors
     }
 
@@ -135,9 +135,9 @@ mod tests {
     fn fields_that_do_not_fit_are_refused() {
         let truth = truth();
         let mut errors = Errors::default();
-        assert!(errors.look(&truth, &[NodeVector::ZERO]).is_err());
-        errors.look(&truth, &[NodeVector::ZERO; 2]).unwrap();
-        errors.look(&truth, &[NodeVector::ZERO; 2]).unwrap();
-        assert!(errors.look(&truth, &[NodeVector::ZERO; 2]).is_err(), "there is no further snapshot");
+        assert!(errors.add_snapshot(&truth, &[NodeVector::ZERO]).is_err());
+        errors.add_snapshot(&truth, &[NodeVector::ZERO; 2]).unwrap();
+        errors.add_snapshot(&truth, &[NodeVector::ZERO; 2]).unwrap();
+        assert!(errors.add_snapshot(&truth, &[NodeVector::ZERO; 2]).is_err(), "there is no further snapshot");
     }
 }

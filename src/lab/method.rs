@@ -7,19 +7,17 @@ use std::string::{String, ToString};
 use std::vec;
 use std::vec::Vec;
 
-use super::host::{HostScene, HostState};
 use super::networks::{self, Size};
 use super::{DT, LabError};
-use crate::inertia::{
-    Damper, Inertia, LatticeNode, damped_numbers_for, damped_step, damped_vectors_for,
-    suggested_damped_lattice, suggested_lattice,
-};
+use crate::element::ElementMaterial;
+use crate::inertia::{self, Cells, Damper, LargeStep};
+use crate::learned::{self, LearnedStep};
 use crate::loads::Loads;
-use crate::material::Material;
 use crate::mlp::{Network, WeightBytes};
-use crate::state::{NodeVector, State};
-use crate::surrogate::{self, Surrogate, Vertex};
-use crate::tled::{self, Status, Step};
+use crate::scene::SceneView;
+use crate::state::{NodeVector, VecState};
+use crate::step::{CallingThread, Status, Step};
+use crate::tled;
 
 /// A way to move a scene.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -35,18 +33,18 @@ pub enum Method {
     /// The same, with a coarse lattice that gives smooth motion its true inertia back.
     Multilevel,
     /// Multilevel inertia with rough motion damped as the crate's own network says.
-    Best,
-    /// The learned step with a network of the crate, led by the exact step for [`BURN_IN`].
+    Damped,
+    /// The same with a network of the user's.
+    DampedWith(NetworkFile),
+    /// The learned step with a network of the crate, after a lead-in of [`BURN_IN`].
     Learned(Size),
-    /// The learned step with a network that somebody brings, led by the exact step for [`BURN_IN`].
-    Brought(Brought),
-    /// Multilevel inertia with rough motion damped as a network says that somebody brings.
-    Damped(Brought),
+    /// The same with a network of the user's.
+    LearnedWith(NetworkFile),
 }
 
-/// A network at its own step.
+/// A network of the user's at its own step.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub struct Brought {
+pub struct NetworkFile {
     /// For the tables.
     pub name: &'static str,
     /// A weight file, at a multiple of four bytes.
@@ -55,25 +53,26 @@ pub struct Brought {
     pub multiple: u32,
 }
 
-impl Brought {
-    /// A weight file's bytes, which stay in memory for good.
-    pub fn kept(name: &'static str, bytes: &[u8]) -> Result<Self, LabError> {
+impl NetworkFile {
+    /// A copy of a weight file's bytes, which stays in memory for good.
+    pub fn leaked(name: &'static str, bytes: &[u8]) -> Result<Self, LabError> {
         let bytes: &'static [u8] = Box::leak(Box::new(WeightBytes::of(bytes))).bytes();
         let multiple = (Network::parse(bytes)?.recipe().step / DT).round() as u32;
         Ok(Self { name, bytes, multiple })
     }
 }
 
-/// Time that the exact step leads before a network takes over, s (Meister et al. 2018, section 3).
+/// Length of the lead-in, s (Meister et al. 2018, section 3).
 pub const BURN_IN: f64 = 0.3;
 
-/// Moves a state on by one step under loads; what it needs beside that, it holds. Gives the status and, where
-/// the method has one, its own estimate of its error, m. After [`Status::Diverged`] it is not called again.
-pub type Advance<'a> = Box<dyn FnMut(&mut HostState, &Loads<'_>) -> (Status, Found) + 'a>;
+/// Moves a state on by one step under loads; what else it needs, it owns. Gives the status and what the step tells about itself.
+/// After [`Status::Diverged`] it is not called again.
+pub type Advance<'a> =
+    Box<dyn FnMut(&mut VecState, &Loads<'_>) -> Result<(Status, StepReport), LabError> + 'a>;
 
-/// What a step says of itself.
+/// What a step tells about itself, if its method has it.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Found {
+pub struct StepReport {
     /// Estimate of the error so far, m.
     pub estimate: Option<f32>,
     /// Share of the vertices whose prediction was clipped.
@@ -81,14 +80,14 @@ pub struct Found {
 }
 
 impl Method {
-    /// All methods that need nothing brought, in the order of the tables.
+    /// All methods that need no file of the user's, in the order of the tables.
     pub const ALL: [Self; 8] = [
         Self::Tled,
         Self::Hold,
         Self::TledLargeStep,
         Self::MassScaled,
         Self::Multilevel,
-        Self::Best,
+        Self::Damped,
         Self::Learned(Size::Compact),
         Self::Learned(Size::Paper),
     ];
@@ -102,10 +101,10 @@ impl Method {
             Self::TledLargeStep => "tled-large-step",
             Self::MassScaled => "mass-scaled",
             Self::Multilevel => "multilevel",
-            Self::Best => "best",
+            Self::Damped => "best",
             Self::Learned(Size::Compact) => "compact-f32",
             Self::Learned(Size::Paper) => "paper-f32",
-            Self::Brought(network) | Self::Damped(network) => network.name,
+            Self::DampedWith(file) | Self::LearnedWith(file) => file.name,
         }
     }
 
@@ -118,135 +117,122 @@ impl Method {
         })
     }
 
-    /// With the network of a weight file: a damper, or the learned step.
+    /// With the network of a weight file: a damped step, or the learned step.
     pub fn with(path: &Path) -> Result<Self, LabError> {
         let problem = |error: &dyn core::fmt::Display| LabError::File(format!("{}: {error}", path.display()));
         let bytes = std::fs::read(path).map_err(|error| problem(&error))?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let network = Brought::kept(String::leak(name), &bytes).map_err(|error| problem(&error))?;
-        let damps = Damper::over(Network::parse(network.bytes)?).is_ok();
-        Ok(if damps { Self::Damped(network) } else { Self::Brought(network) })
+        let file = NetworkFile::leaked(String::leak(name), &bytes).map_err(|error| problem(&error))?;
+        let damps = Damper::new(Network::parse(file.bytes)?).is_ok();
+        Ok(if damps { Self::DampedWith(file) } else { Self::LearnedWith(file) })
     }
 
-    /// At which multiples of [`super::DT`] it is run if asked for `multiples`. At 1 the large step is the
+    /// At which multiples of [`super::DT`] it is run if asked for `multiples`. At 1 the long step is the
     /// exact one, and what holds still does so at any step.
     #[must_use]
     pub fn multiples(self, multiples: &[u32]) -> Vec<u32> {
+        let those = |wanted: &dyn Fn(u32) -> bool| {
+            multiples.iter().copied().filter(|&multiple| wanted(multiple)).collect()
+        };
         match self {
             Self::Tled | Self::Hold => vec![1],
-            Self::TledLargeStep | Self::MassScaled | Self::Multilevel | Self::Best | Self::Damped(_) => {
-                multiples.iter().copied().filter(|multiple| *multiple > 1).collect()
-            }
-            Self::Learned(_) => {
-                let known = |multiple: &u32| networks::MULTIPLES.contains(multiple);
-                multiples.iter().copied().filter(known).collect()
-            }
-            Self::Brought(network) => vec![network.multiple],
+            Self::Learned(size) => those(&|multiple| networks::learned(size, multiple).is_some()),
+            Self::LearnedWith(file) => vec![file.multiple],
+            _ => those(&|multiple| multiple > 1),
         }
     }
 
     /// Whether it scales inertia, so that its error can be estimated.
     #[must_use]
-    pub const fn scales(self) -> bool {
-        matches!(self, Self::MassScaled | Self::Multilevel | Self::Best | Self::Damped(_))
+    pub const fn scales_inertia(self) -> bool {
+        matches!(self, Self::MassScaled | Self::Multilevel | Self::Damped | Self::DampedWith(_))
     }
 
-    /// Time at the start that another method leads, s.
+    /// Time at the start that exact steps take, s.
     #[must_use]
-    pub const fn led_for(self) -> f64 {
+    pub const fn lead_in(self) -> f64 {
         match self {
-            Self::Brought(_) | Self::Learned(_) => BURN_IN,
+            Self::Learned(_) | Self::LearnedWith(_) => BURN_IN,
             _ => 0.0,
         }
     }
 
     /// What moves a state of the scene on by steps of `dt` (s) with `damping` (1/s).
-    pub fn prepare<'a, M: Material>(
+    pub fn prepare<'a, M: ElementMaterial>(
         self,
-        scene: &'a HostScene<M>,
+        scene: SceneView<'a, M>,
         points: &[[f32; 3]],
         dt: f32,
         damping: f32,
     ) -> Result<Advance<'a>, LabError> {
-        Ok(match self {
-            Self::Hold => Box::new(|_, _| (Status::Ok, Found::default())),
+        let large = |method| {
+            // Scenes start at rest.
+            let mut rest = VecState::at_rest(scene.node_count());
+            let step = Step::unchecked(dt, damping)?;
+            let mut large = LargeStep::prepare_in_vec(method, scene, points, rest.view(), step)?;
+            let advance: Advance<'a> = Box::new(move |state, loads| {
+                let status = large.step(scene, loads, state.view());
+                Ok((status, StepReport { estimate: Some(large.report().error), clipped: None }))
+            });
+            Ok(advance)
+        };
+        let damped = |bytes| {
+            Ok::<_, LabError>(inertia::Method::Damped(Damper::new(Network::parse(bytes)?)?, Cells::Suggested))
+        };
+        match self {
+            Self::Hold => Ok(Box::new(|_, _| Ok((Status::Ok, StepReport::default())))),
             Self::Tled | Self::TledLargeStep => {
-                let step = Step::insist(dt, damping)?;
-                Box::new(move |state, loads| (tled::step(scene, loads, state, &step), Found::default()))
+                let step = Step::unchecked(dt, damping)?;
+                Ok(Box::new(move |state, loads| {
+                    Ok((tled::step(&scene, loads, state, &step), StepReport::default()))
+                }))
             }
-            Self::MassScaled | Self::Multilevel | Self::Best | Self::Damped(_) => {
-                let weights = match self {
-                    Self::Best => Some(networks::damper()),
-                    Self::Damped(network) => Some(network.bytes),
-                    _ => None,
-                };
-                let damper = match weights {
-                    Some(bytes) => Some(Damper::over(Network::parse(bytes)?)?),
-                    None => None,
-                };
-                let (cells, functions) = match (self, &damper) {
-                    (Self::MassScaled, _) => ([0; 3], 0),
-                    (_, None) => suggested_lattice(scene, points),
-                    (_, Some(_)) => suggested_damped_lattice(scene, points),
-                };
-                let nodes = scene.node_count();
-                // Room for either: a damped inertia needs more.
-                let inertia = Inertia::over(
-                    vec![NodeVector::ZERO; damped_vectors_for(nodes)],
-                    vec![LatticeNode::EMPTY; nodes],
-                    vec![0.0; damped_numbers_for(cells, functions)],
-                );
-                let mut inertia = Box::new(if damper.is_some() { inertia.damped() } else { inertia });
-                // Scenes start at rest.
-                let zero = || vec![NodeVector::ZERO; nodes];
-                let mut rest = State::over(zero(), zero(), zero());
-                inertia.prepare(scene, points, &mut rest, Step::insist(dt, damping)?, cells)?;
-                Box::new(move |state, loads| {
-                    let status = damped_step(scene, loads, state, &mut inertia, damper.as_ref());
-                    (status, Found { estimate: Some(inertia.report().error), clipped: None })
-                })
-            }
+            Self::MassScaled => large(inertia::Method::MassScaled),
+            Self::Multilevel => large(inertia::Method::Multilevel(Cells::Suggested)),
+            Self::Damped => large(damped(networks::damper())?),
+            Self::DampedWith(file) => large(damped(file.bytes)?),
             Self::Learned(size) => {
                 let multiple = (dt / DT).round() as u32;
                 let bytes = networks::learned(size, multiple).ok_or(LabError::NoNetwork { multiple })?;
-                learned(scene, bytes, multiple, damping)?
+                learned(scene, bytes, multiple, damping)
             }
-            Self::Brought(network) => learned(scene, network.bytes, network.multiple, damping)?,
-        })
+            Self::LearnedWith(file) => learned(scene, file.bytes, file.multiple, damping),
+        }
     }
 }
 
-/// The learned step after the exact one.
-fn learned<'a, M: Material>(
-    scene: &'a HostScene<M>,
+/// The learned step after its lead-in of exact ones. The lead-in is damped as the scene is, learned steps as the training was:
+/// on a scene with other damping a network is as wrong as it is.
+fn learned<'a, M: ElementMaterial>(
+    scene: SceneView<'a, M>,
     bytes: &'static [u8],
     multiple: u32,
     damping: f32,
 ) -> Result<Advance<'a>, LabError> {
-    let nodes = scene.node_count();
     let network = Network::parse(bytes)?;
-    let mut surrogate = Surrogate::over(network, vec![Vertex::NEW; nodes])?;
-    let exact = Step::insist(DT, damping)?;
-    let zero = || vec![NodeVector::ZERO; nodes];
-    let mut lead = State::over(zero(), zero(), zero());
+    let recipe = *network.recipe();
+    let storage = vec![NodeVector::ZERO; learned::vectors_for(scene.node_count(), false)];
+    let mut learned = LearnedStep::new(network, false, storage)?;
+    let exact = Step::unchecked(DT, damping)?;
+    let trained = Step::unchecked(recipe.step / multiple as f32, recipe.damping)?;
     Ok(Box::new(move |state, loads| {
-        if lead.time() + 0.5 * f64::from(DT) >= BURN_IN {
-            let status = surrogate::step(scene, loads, state, &mut surrogate);
-            return (status, Found { estimate: None, clipped: Some(surrogate.report().clipped) });
+        let mut state = state.view();
+        if state.time() + 0.5 * f64::from(DT) < BURN_IN {
+            let status = learned.view().lead_interval(&mut state, |state| {
+                let mut worst = Status::Ok;
+                for _ in 0..multiple {
+                    match tled::step(&scene, loads, state, &exact) {
+                        Status::Ok => {}
+                        limited @ Status::Limited { .. } => worst = limited,
+                        refused => return refused,
+                    }
+                }
+                worst
+            });
+            return Ok((status, StepReport::default()));
         }
-        let before = lead.displacements().to_vec();
-        let mut worst = Status::Ok;
-        for _ in 0..multiple {
-            match tled::step(scene, loads, &mut lead, &exact) {
-                Status::Ok => {}
-                limited @ Status::Limited { .. } => worst = limited,
-                other => return (other, Found::default()),
-            }
-        }
-        state.clone_from(&lead);
-        state.span(&before, surrogate.seconds());
-        surrogate.follow(state);
-        (worst, Found::default())
+        let status = learned.view().step(scene, loads, state, &trained, &CallingThread)?;
+        Ok((status, StepReport { estimate: None, clipped: Some(learned.model().report().clipped) }))
     }))
 }
 

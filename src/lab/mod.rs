@@ -10,15 +10,14 @@
 //! | [`networks`] | the networks that come with the crate |
 //! | [`run`] | one method, one scene, one step: a row |
 //! | [`measure`] | errors of a motion against the truth |
-//! | [`evaluate`] | all of them, as asked for: a [`evaluate::Plan`] |
-//! | [`estimates`] | how well methods tell their own error |
+//! | [`evaluate`] | rows as asked for in a [`evaluate::Plan`] |
+//! | [`estimates`] | how well methods estimate their own error |
 //! | [`table`] | rows as CSV and as aligned text |
 //! | [`sweep`] | error over step on one scene, with fitted slopes; [`plot`] draws it |
 
 mod error;
 pub mod estimates;
 pub mod evaluate;
-pub mod host;
 pub mod measure;
 pub mod method;
 pub mod networks;

@@ -20,22 +20,26 @@ pub enum Size {
     Compact,
 }
 
+/// Steps over [`super::DT`], each with the paper's and the compact network.
+static LEARNED: [(u32, &[u8], &[u8]); 4] = [
+    (10, file!("paper-10.weights"), file!("compact-10.weights")),
+    (20, file!("paper-20.weights"), file!("compact-20.weights")),
+    (50, file!("paper-50.weights"), file!("compact-50.weights")),
+    (100, file!("paper-100.weights"), file!("compact-100.weights")),
+];
+
 /// Steps over [`super::DT`] that there are networks for.
-pub const MULTIPLES: [u32; 4] = [10, 20, 50, 100];
+pub fn multiples() -> impl Iterator<Item = u32> {
+    LEARNED.iter().map(|(multiple, ..)| *multiple)
+}
 
 /// The weight file of a network for so many times [`super::DT`].
 #[must_use]
 pub fn learned(size: Size, multiple: u32) -> Option<&'static [u8]> {
-    Some(match (size, multiple) {
-        (Size::Paper, 10) => file!("paper-10.weights"),
-        (Size::Paper, 20) => file!("paper-20.weights"),
-        (Size::Paper, 50) => file!("paper-50.weights"),
-        (Size::Paper, 100) => file!("paper-100.weights"),
-        (Size::Compact, 10) => file!("compact-10.weights"),
-        (Size::Compact, 20) => file!("compact-20.weights"),
-        (Size::Compact, 50) => file!("compact-50.weights"),
-        (Size::Compact, 100) => file!("compact-100.weights"),
-        _ => return None,
+    let (_, paper, compact) = LEARNED.iter().find(|(of, ..)| *of == multiple)?;
+    Some(match size {
+        Size::Paper => paper,
+        Size::Compact => compact,
     })
 }
 
@@ -50,13 +54,13 @@ mod tests {
     use super::*;
     use crate::inertia::Damper;
     use crate::lab::DT;
+    use crate::learned::{FEATURES, PREDICTED};
     use crate::mlp::Network;
-    use crate::surrogate::{FEATURES, PREDICTED};
 
     #[test]
     fn every_file_is_a_network_of_its_kind_and_step() {
         for (size, most) in [(Size::Paper, 120_000), (Size::Compact, 6_300)] {
-            for multiple in MULTIPLES {
+            for multiple in multiples() {
                 let network = Network::parse(learned(size, multiple).unwrap()).unwrap();
                 assert_eq!((network.inputs().len(), network.outputs().len()), (FEATURES, PREDICTED));
                 assert_eq!(network.recipe().step, multiple as f32 * DT);
@@ -64,6 +68,6 @@ mod tests {
             }
             assert!(learned(size, 30).is_none());
         }
-        assert!(Damper::over(Network::parse(damper()).unwrap()).is_ok());
+        assert!(Damper::new(Network::parse(damper()).unwrap()).is_ok());
     }
 }

@@ -166,14 +166,14 @@ mod tests {
         ];
         let svg = draw("reversed", &curves, 12.5);
         let tree = roxmltree::Document::parse(&svg).unwrap();
-        let number =
+        let attribute =
             |node: roxmltree::Node<'_, '_>, name| node.attribute(name).unwrap().parse::<f64>().unwrap();
         let circles: Vec<_> = tree.descendants().filter(|node| node.has_tag_name("circle")).collect();
         assert_eq!(circles.len(), 3);
         for circle in circles {
-            assert!((LEFT..RIGHT).contains(&number(circle, "cx")));
+            assert!((LEFT..RIGHT).contains(&attribute(circle, "cx")));
             // Below the marks of divergence.
-            assert!((TOP + 2.0 * MARKS..=BOTTOM).contains(&number(circle, "cy")));
+            assert!((TOP + 2.0 * MARKS..=BOTTOM).contains(&attribute(circle, "cy")));
         }
         for words in ["bold, slope 2.79", "gone, no slope", "standing still", "mean error over time, mm"] {
             assert!(svg.contains(words), "{words}");

@@ -5,14 +5,14 @@ use core::fmt;
 use std::time::{Duration, Instant};
 use std::vec::Vec;
 
-use super::host::Job;
 use super::measure::Errors;
 use super::method::Method;
 use super::scenes::SceneSpec;
 use super::truth::Truth;
 use super::{DT, INTERVAL_STEPS, LabError};
-use crate::material::Material;
-use crate::tled::Status;
+use crate::element::{ElementLaw, LawWork, with_law};
+use crate::state::VecState;
+use crate::step::Status;
 
 /// What a method did on a scene with a step.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,11 +95,11 @@ pub type Shapes = Vec<Vec<[f32; 3]>>;
 
 /// Runs `method` over a scene at `multiple` times [`DT`].
 pub fn run(spec: &SceneSpec, truth: &Truth, method: Method, multiple: u32) -> Result<Row, LabError> {
-    Ok(follow(spec, truth, method, multiple)?.0)
+    Ok(run_with_shapes(spec, truth, method, multiple)?.0)
 }
 
-/// The same, and where the nodes were.
-pub fn follow(
+/// The same, and the displacements at each snapshot.
+pub fn run_with_shapes(
     spec: &SceneSpec,
     truth: &Truth,
     method: Method,
@@ -108,7 +108,7 @@ pub fn follow(
     if !hits_snapshots(multiple) {
         return Err(LabError::Multiple { multiple });
     }
-    let (end, shapes) = spec.with_material(Run { spec, truth, method, multiple })?;
+    let (end, shapes) = with_law(spec.law, Run { spec, truth, method, multiple })?;
     let hold = Errors::of_hold(truth)?.mean_over_time();
     let mut row = Row {
         scene: spec.name,
@@ -132,14 +132,14 @@ struct Run<'a> {
     multiple: u32,
 }
 
-impl Job for Run<'_> {
+impl LawWork for Run<'_> {
     type Output = Result<(End, Shapes), LabError>;
 
-    fn run<M: Material + Copy>(self, material: M) -> Self::Output {
+    fn run<L: ElementLaw>(self, law: L) -> Self::Output {
         let Self { spec, truth, method, multiple } = self;
-        let scene = spec.build(material)?;
-        let mut state = spec.state();
-        let mut advance = method.prepare(&scene, &spec.points, multiple as f32 * DT, spec.damping)?;
+        let scene = spec.build(law)?;
+        let mut state = VecState::at_rest(scene.node_count());
+        let mut advance = method.prepare(scene.view(), &spec.points, multiple as f32 * DT, spec.damping)?;
 
         let (mut errors, mut shapes) = (Errors::default(), Shapes::new());
         let (mut estimates, mut estimate) = (Vec::new(), None);
@@ -147,13 +147,13 @@ impl Job for Run<'_> {
         let (mut clips, mut predictions) = (0.0, 0_u32);
         for interval in 0..spec.intervals {
             let loads = spec.loads(&scene, interval)?;
-            // What leads is not what is timed.
-            let led = state.time() + 0.5 * f64::from(DT) < method.led_for();
+            // A lead-in is not timed.
+            let timed = state.time() + 0.5 * f64::from(DT) >= method.lead_in();
             let start = Instant::now();
             for _ in 0..INTERVAL_STEPS / multiple {
-                let (status, found) = advance(&mut state, &loads);
-                estimate = found.estimate;
-                if let Some(clipped) = found.clipped {
+                let (status, report) = advance(&mut state, &loads)?;
+                estimate = report.estimate;
+                if let Some(clipped) = report.clipped {
                     clips += f64::from(clipped);
                     predictions += 1;
                 }
@@ -163,17 +163,17 @@ impl Job for Run<'_> {
                     Status::Diverged(divergence) => return Ok((End::Diverged(divergence.time), shapes)),
                     Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
                 }
-                taken += u32::from(!led);
+                taken += u32::from(timed);
             }
-            if !led {
+            if timed {
                 spent += start.elapsed();
             }
-            errors.look(truth, state.displacements())?;
+            errors.add_snapshot(truth, state.displacements())?;
             shapes.push(state.displacements().iter().map(|vector| vector.to_array()).collect());
             estimates.extend(estimate.map(|metre| 1e3 * f64::from(metre)));
         }
         let running = (!estimates.is_empty()).then(|| estimates.iter().sum::<f64>() / estimates.len() as f64);
-        // None where another method leads to the end.
+        // The lead-in may last to the end.
         let taken = f64::from(taken.max(1));
         let figures = Figures {
             errors,

@@ -9,10 +9,10 @@ use std::vec::Vec;
 
 use super::{DT, INTERVAL_STEPS, LabError};
 use crate::io::{TetMesh, parse_msh};
-use crate::loads::{Motion, NodalForce};
-use crate::material::{Exponential, NeoHookean};
-use crate::mesh::Bar;
-use crate::scene::{Axes, Support};
+use crate::loads::{Loads, Motion, NodalForce};
+use crate::material::{AnyLaw, Exponential, Law, NeoHookean, Tissue};
+use crate::mesh::{Bar, Mesh, Winding};
+use crate::scene::{AsScene, Axes, BuildError, Support, VecScene};
 
 /// The names of all scenes of the tables, in their order. One more, `bent`, is for training.
 pub const NAMES: [&str; 10] = [
@@ -32,36 +32,27 @@ pub const NAMES: [&str; 10] = [
 pub const PAPER_LAW: Exponential = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
 /// Four times as stiff at rest as [`PAPER_LAW`] (c would be a / 2), since this law does not stiffen.
 pub const NEO_HOOKEAN: NeoHookean = NeoHookean { c: 118.0, d: 60_000.0 };
-/// Ten times the paper's shear modulus, for meshes that are longer than the bar and loaded all over.
+/// Ten times the paper's shear modulus, for meshes that are longer than the bar and loaded everywhere.
 pub const MESH_LAW: Exponential = Exponential { a: 590.0, b: 8.023, d: 60_000.0 };
 
 /// The paper's, kg/m^3.
 const DENSITY: f32 = 1_000.0;
 /// The paper's, 1/s.
 const DAMPING: f32 = 20.0;
-/// A blow rings on: its swing falls to a third in 0.4 s, 1/s.
+/// For sudden loads: a swing falls to a third in 0.4 s, 1/s.
 const LIGHT_DAMPING: f32 = 5.0;
 /// The paper's, s.
 const RAMP: f32 = 1.0;
 /// Snapshots, one each 0.03 s: 1.02 s, the first whole number of them that holds the ramp.
 const INTERVALS: usize = 34;
 
-/// Twist of the bar, N at each corner: the exact limit falls to 3.85e-5 s on the way, so the
+/// Twist of the bar, N at each corner: the exact limit falls to 3.85e-5 s during it, so the
 /// paper's step is about as long as it can be.
 const TORSION: f32 = 15.5;
 /// The bar moves by 4 to 6 cm, and its limit of stability stays above 1e-4 s, N at each corner.
 const GENTLE: f32 = 0.3;
 /// The corners go in by a quarter of the length, N at each corner.
 const COMPRESSION: f32 = 0.05;
-
-/// The law of a scene with its constants.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LawSpec {
-    /// The exponential law.
-    Exponential(Exponential),
-    /// The neo-Hookean law.
-    NeoHookean(NeoHookean),
-}
 
 /// What is simulated.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,7 +64,7 @@ pub struct SceneSpec {
     /// The four nodes of each tetrahedron, of positive volume.
     pub tets: Vec<[u32; 4]>,
     /// The law.
-    pub law: LawSpec,
+    pub law: AnyLaw,
     /// Density, kg/m^3.
     pub density: f32,
     /// Damping, proportional to mass, 1/s.
@@ -105,6 +96,19 @@ impl SceneSpec {
     pub fn duration(&self) -> f64 {
         self.intervals as f64 * f64::from(INTERVAL_STEPS) * f64::from(DT)
     }
+
+    /// Builds the scene; `law` is the [`SceneSpec::law`], of known type.
+    pub fn build<L: Law>(&self, law: L) -> Result<VecScene<Tissue<L>>, LabError> {
+        let mesh = Mesh::new(&self.points, &self.tets, Winding::Checked).map_err(BuildError::Mesh)?;
+        Ok(VecScene::build(Tissue { law, density: self.density }, &mesh, &self.supports)?)
+    }
+
+    /// The loads during an interval between two snapshots, counted from 0, checked against the scene.
+    pub fn loads(&self, scene: &impl AsScene, interval: usize) -> Result<Loads<'_>, LabError> {
+        let released = self.released_after.is_some_and(|last| interval >= last);
+        let forces = if released { &[] } else { self.forces.as_slice() };
+        Ok(Loads::new(scene, [0.0; 3], forces, &self.motions)?)
+    }
 }
 
 /// All scenes.
@@ -120,7 +124,7 @@ pub fn named(name: &str) -> Result<SceneSpec, LabError> {
         "stretch" => Ok(bar("stretch", pull(GENTLE, RAMP))),
         "compression" => Ok(bar("compression", pull(-COMPRESSION, RAMP))),
         "compression-neo-hookean" => Ok(SceneSpec {
-            law: LawSpec::NeoHookean(NEO_HOOKEAN),
+            law: AnyLaw::NeoHookean(NEO_HOOKEAN),
             ..bar("compression-neo-hookean", pull(-COMPRESSION, RAMP))
         }),
         "cylinder" => leaning("cylinder", CYLINDER),
@@ -145,7 +149,7 @@ fn bar(name: &'static str, forces: Vec<NodalForce>) -> SceneSpec {
         name,
         points: bar.points().collect(),
         tets: bar.tets().collect(),
-        law: LawSpec::Exponential(PAPER_LAW),
+        law: AnyLaw::Exponential(PAPER_LAW),
         density: DENSITY,
         damping: DAMPING,
         supports: (0..bar.node(nx, ny, 0) + 1).map(Support::fixed).collect(),
@@ -163,7 +167,7 @@ fn corners() -> [(u32, [f32; 2]); 4] {
         .map(|(i, j, offset)| (Bar::PAPER.node(i, j, nz), offset))
 }
 
-/// `newton` at each corner, at a right angle to the axis and to the way to it; positive turns x to y.
+/// `newton` at each corner, at a right angle to the axis and to the radius; positive turns x to y.
 fn twist(newton: f32, ramp: f32) -> Vec<NodalForce> {
     let along = newton * core::f32::consts::FRAC_1_SQRT_2;
     let force =
@@ -197,12 +201,12 @@ fn leaning(name: &'static str, file: &[u8]) -> Result<SceneSpec, LabError> {
     Ok(scene)
 }
 
-/// The bar, ten times as stiff, held in two layers of nodes that no layer of a lattice ends at, leaning over under a body
-/// force. To learn from: it is in no table.
+/// The bar, ten times as stiff, leaning over under a body force, held at two layers of nodes, which end between layers of a
+/// lattice. For training: it is in no table.
 fn bent() -> SceneSpec {
     /// m/s^2.
     const ACCELERATION: f32 = 0.6;
-    let mut scene = SceneSpec { law: LawSpec::Exponential(MESH_LAW), ..bar("bent", Vec::new()) };
+    let mut scene = SceneSpec { law: AnyLaw::Exponential(MESH_LAW), ..bar("bent", Vec::new()) };
     let [nx, ny, _] = Bar::PAPER.cells;
     scene.supports = (0..Bar::PAPER.node(nx, ny, 1) + 1).map(Support::fixed).collect();
     let forces = (0..).zip(node_masses(&scene));
@@ -216,8 +220,8 @@ fn bent() -> SceneSpec {
 fn pushed_lobe() -> Result<SceneSpec, LabError> {
     /// Nodes of the surface within this distance of the tip follow the instrument: its width, m.
     const PATCH: f32 = 0.012;
-    /// Down (z), m: an eleventh of the free length, which bends the tip without moving the limit of stability.
-    const WAY: f32 = 0.012;
+    /// Down (z), m: an eleventh of the free length, which bends the tip but leaves the limit of stability where it is.
+    const DEPTH: f32 = 0.012;
     let (mut scene, triangles) = held_at_its_end("push", LOBE)?;
     let (axis, _, high) = longest(&scene.points);
     let tip = scene.points.iter().copied().find(|point| point[axis] == high).unwrap_or_default();
@@ -232,8 +236,8 @@ fn pushed_lobe() -> Result<SceneSpec, LabError> {
         let square: f32 = point.iter().zip(tip).map(|(a, b)| (a - b) * (a - b)).sum();
         *surface && square < PATCH * PATCH
     });
-    let follow = |((node, _), _)| Motion { node, axes: Axes::XYZ, metre: [0.0, 0.0, -WAY], ramp: RAMP };
-    scene.motions = patch.map(follow).collect();
+    let motion = |((node, _), _)| Motion { node, axes: Axes::XYZ, metre: [0.0, 0.0, -DEPTH], ramp: RAMP };
+    scene.motions = patch.map(motion).collect();
     scene.supports.extend(scene.motions.iter().map(|motion| Support::moved(motion.node)));
     Ok(scene)
 }
@@ -245,7 +249,7 @@ fn held_at_its_end(name: &'static str, file: &[u8]) -> Result<(SceneSpec, Vec<[u
     let (axis, low, high) = longest(&points);
     let held = (0..).zip(&points).filter(|(_, point)| point[axis] < low + HELD * (high - low));
     let supports = held.map(|(node, _)| Support::fixed(node)).collect();
-    let law = LawSpec::Exponential(MESH_LAW);
+    let law = AnyLaw::Exponential(MESH_LAW);
     Ok((SceneSpec { points, tets, supports, law, ..bar(name, Vec::new()) }, triangles))
 }
 

@@ -38,8 +38,8 @@ impl Curve {
     }
 }
 
-/// The curves of the methods in the rows of `scene` at [`MULTIPLES`]. Of what has no step of its own there is
-/// none.
+/// The curves of the methods in the rows of `scene` at [`MULTIPLES`]. Methods that run at one step only
+/// have none.
 #[must_use]
 pub fn curves(rows: &[Row], scene: &str) -> Vec<Curve> {
     let stepped = Method::ALL.into_iter().filter(|method| !method.multiples(&[2]).contains(&1));
@@ -52,7 +52,7 @@ pub fn curves(rows: &[Row], scene: &str) -> Vec<Curve> {
             let multiple = f64::from(row.multiple);
             match &row.end {
                 End::Diverged(_) => curve.diverged.push(multiple),
-                // A logarithm has no place for no error at all.
+                // An error of zero has no logarithm.
                 End::Reached(figures) if figures.errors.mean_over_time() > 0.0 => {
                     curve.points.push((multiple, figures.errors.mean_over_time()));
                 }

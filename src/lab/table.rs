@@ -8,62 +8,74 @@ use std::string::String;
 use std::vec::Vec;
 
 use super::LabError;
+use super::measure::Errors;
 use super::run::Row;
 use crate::io::write_atomically;
 
-/// Columns of the file.
-pub const COLUMNS: [&str; 17] = [
-    "scene",
-    "method",
-    "multiple",
-    "mean_mm",
-    "sd_mm",
-    "max_mm",
-    "mean_over_time_mm",
-    "hold_mm",
-    "skill",
-    "clip_share",
-    "us_per_step",
-    "us_per_simulated_second",
-    "step_over_limit_rest",
-    "step_over_limit_trajectory",
-    "status",
-    "running_estimate_mm",
-    "doubling_estimate_mm",
+/// A column: its head and what stands in it.
+type Column = (&'static str, fn(&Row) -> String);
+
+/// Of the file.
+const COLUMNS: [Column; 17] = [
+    ("scene", |row| row.scene.into()),
+    ("method", |row| row.method.name().into()),
+    ("multiple", |row| format!("{}", row.multiple)),
+    ("mean_mm", |row| length(error(row, Errors::mean))),
+    ("sd_mm", |row| length(error(row, |errors| errors.sd))),
+    ("max_mm", |row| length(error(row, |errors| errors.max))),
+    ("mean_over_time_mm", |row| length(error(row, Errors::mean_over_time))),
+    ("hold_mm", |row| length(Some(row.hold))),
+    ("skill", |row| length(skill(row))),
+    ("clip_share", |row| length(row.figures().map(|figures| figures.clip_share))),
+    ("us_per_step", |row| time(row.figures().map(|figures| figures.us_per_step))),
+    ("us_per_simulated_second", |row| time(row.figures().map(|figures| figures.us_per_step / row.step()))),
+    ("step_over_limit_rest", |row| length(Some(row.step_over_limit_rest))),
+    ("step_over_limit_trajectory", |row| length(Some(row.step_over_limit_trajectory))),
+    ("status", |row| format!("{}", row.end)),
+    ("running_estimate_mm", |row| length(row.figures().and_then(|figures| figures.running))),
+    ("doubling_estimate_mm", |row| length(row.doubling)),
 ];
 
-fn cells(row: &Row) -> [String; COLUMNS.len()] {
-    let figures = row.figures();
-    let length = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
-    let time = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.3}"));
-    let errors = figures.map(|figures| &figures.errors);
-    let us_per_step = figures.map(|figures| figures.us_per_step);
-    [
-        row.scene.into(),
-        row.method.name().into(),
-        format!("{}", row.multiple),
-        length(errors.map(|errors| errors.mean())),
-        length(errors.map(|errors| errors.sd)),
-        length(errors.map(|errors| errors.max)),
-        length(errors.map(|errors| errors.mean_over_time())),
-        length(Some(row.hold)),
-        length(errors.map(|errors| errors.skill(row.hold))),
-        length(figures.map(|figures| figures.clip_share)),
-        time(us_per_step),
-        time(us_per_step.map(|time| time / row.step())),
-        length(Some(row.step_over_limit_rest)),
-        length(Some(row.step_over_limit_trajectory)),
-        format!("{}", row.end),
-        length(figures.and_then(|figures| figures.running)),
-        length(row.doubling),
-    ]
+/// Of the text: those that matter most to people.
+const TEXT_COLUMNS: [Column; 9] = [
+    ("scene", |row| row.scene.into()),
+    ("method", |row| row.method.name().into()),
+    ("multiple", |row| format!("{}", row.multiple)),
+    ("mean mm", |row| short(error(row, Errors::mean))),
+    ("max mm", |row| short(error(row, |errors| errors.max))),
+    ("over time mm", |row| short(error(row, Errors::mean_over_time))),
+    ("skill", |row| short(skill(row))),
+    ("us/step", |row| {
+        row.figures().map_or_else(|| "-".into(), |figures| format!("{:.1}", figures.us_per_step))
+    }),
+    ("status", |row| format!("{}", row.end)),
+];
+
+fn error(row: &Row, figure: fn(&Errors) -> f64) -> Option<f64> {
+    row.figures().map(|figures| figure(&figures.errors))
 }
 
-/// Writes the rows as comma-separated values under [`COLUMNS`].
+fn skill(row: &Row) -> Option<f64> {
+    row.figures().map(|figures| figures.errors.skill(row.hold))
+}
+
+fn length(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |value| format!("{value:.6}"))
+}
+
+fn time(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |value| format!("{value:.3}"))
+}
+
+fn short(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".into(), |value| format!("{value:.4}"))
+}
+
+/// Writes the rows as comma-separated values under a line of heads.
 pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), LabError> {
     write_atomically(path, |file| {
-        writeln!(file, "{}", COLUMNS.join(","))?;
-        rows.iter().try_for_each(|row| writeln!(file, "{}", cells(row).join(",")))
+        writeln!(file, "{}", COLUMNS.map(|(head, _)| head).join(","))?;
+        rows.iter().try_for_each(|row| writeln!(file, "{}", COLUMNS.map(|(_, cell)| cell(row)).join(",")))
     })?;
     Ok(())
 }
@@ -71,26 +83,10 @@ pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), LabError> {
 /// The rows as aligned text with the columns that matter most to people.
 #[must_use]
 pub fn text(rows: &[Row]) -> String {
-    const HEADS: [&str; 9] =
-        ["scene", "method", "multiple", "mean mm", "max mm", "over time mm", "skill", "us/step", "status"];
-    let short = |row: &Row| {
-        let errors = row.figures().map(|figures| &figures.errors);
-        let number = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.4}"));
-        [
-            row.scene.into(),
-            row.method.name().into(),
-            format!("{}", row.multiple),
-            number(errors.map(|errors| errors.mean())),
-            number(errors.map(|errors| errors.max)),
-            number(errors.map(|errors| errors.mean_over_time())),
-            number(errors.map(|errors| errors.skill(row.hold))),
-            row.figures().map_or_else(|| "-".into(), |figures| format!("{:.1}", figures.us_per_step)),
-            format!("{}", row.end),
-        ]
-    };
-    let lines: Vec<[String; HEADS.len()]> =
-        iter::once(HEADS.map(String::from)).chain(rows.iter().map(short)).collect();
-    let mut widths = [0; HEADS.len()];
+    let heads = TEXT_COLUMNS.map(|(head, _)| String::from(head));
+    let cells = rows.iter().map(|row| TEXT_COLUMNS.map(|(_, cell)| cell(row)));
+    let lines: Vec<_> = iter::once(heads).chain(cells).collect();
+    let mut widths = [0; TEXT_COLUMNS.len()];
     for line in &lines {
         for (width, cell) in widths.iter_mut().zip(line) {
             *width = cell.len().max(*width);
@@ -99,7 +95,7 @@ pub fn text(rows: &[Row]) -> String {
     let mut text = String::new();
     for line in &lines {
         for (column, (cell, width)) in line.iter().zip(widths).enumerate() {
-            // Words to the left, numbers to the right.
+            // Words to the left, figures to the right.
             text += &match column {
                 0 | 1 => format!("{cell:<width$}  "),
                 8 => format!("{cell}\n"),
@@ -113,7 +109,6 @@ pub fn text(rows: &[Row]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::measure::Errors;
     use crate::lab::method::Method;
     use crate::lab::run::{End, Figures};
     use std::vec;
@@ -141,7 +136,7 @@ mod tests {
         write_csv(&path, &rows()).unwrap();
         let text = std::fs::read_to_string(path).unwrap();
         let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(lines[0], COLUMNS.join(","));
+        assert_eq!(lines[0], COLUMNS.map(|(head, _)| head).join(","));
         let known = "lobe,tled-large-step,10,2.000000,0.500000,4.000000,1.500000,3.000000,0.500000,0.250000,\
                      150.000,500000.013,1.500000,2.000000,limited,0.750000,1.250000";
         assert_eq!(lines[1], known);

@@ -2,8 +2,8 @@
 //! limit of stability, at rest and the least along the motion. SI units.
 //!
 //! Truths are kept on disk, one file a scene, little endian: `suppleT1`, key of the scene, counts, limits,
-//! displacements, and an FNV-1a checksum of all that. A file that differs from this in anything is computed
-//! anew: another scene, another kernel or a damaged disk.
+//! displacements, and an FNV-1a checksum of all that. A file that does not match, because scene or kernel have changed or the
+//! disk is damaged, is computed again.
 
 use core::fmt;
 use std::format;
@@ -14,13 +14,15 @@ use std::sync::mpsc;
 use std::thread;
 use std::vec::Vec;
 
-use super::host::{HostScene, HostState, Job};
 use super::scenes::SceneSpec;
 use super::{DT, INTERVAL_STEPS, LabError};
+use crate::element::{ElementLaw, LawWork, with_law};
 use crate::io::write_atomically;
 use crate::loads::Loads;
-use crate::material::Material;
-use crate::tled::{self, Status, Step};
+use crate::scene::AsScene;
+use crate::state::VecState;
+use crate::step::{Status, Step};
+use crate::tled;
 
 /// First bytes of a file, with the version of its format.
 const MAGIC: &[u8; 8] = b"suppleT1";
@@ -28,9 +30,8 @@ const MAGIC: &[u8; 8] = b"suppleT1";
 const HEADER: usize = 64;
 const THREADS: usize = 2;
 
-/// The exact limit is measured at rest, at every snapshot, and in between wherever the bound of
-/// [`tled::critical_step`], looked at every `LOOK_STEPS` steps, is lower by `FALL` than at any measurement
-/// before.
+/// The exact limit is computed at rest and at every snapshot; in between wherever the bound of [`tled::critical_step`], computed
+/// every `LOOK_STEPS` steps, has fallen by the share `FALL` below its least so far.
 const LOOK_STEPS: u32 = 10;
 const FALL: f32 = 0.02;
 
@@ -60,24 +61,24 @@ impl Truth {
 }
 
 /// The truths of `scenes`, in their order, from files in `folder` or computed on two threads and put there.
-/// `tick` hears of each that is ready.
+/// `tick` is called with each that is ready.
 pub fn obtain(
     scenes: &[SceneSpec],
     folder: &Path,
     mut tick: impl FnMut(&SceneSpec, &Truth),
 ) -> Result<Vec<Truth>, LabError> {
     fs::create_dir_all(folder)?;
-    let next = AtomicUsize::new(0);
+    let next_scene = AtomicUsize::new(0);
     let (sender, receiver) = mpsc::channel();
     let mut truths: Vec<(usize, Truth)> = thread::scope(|scope| {
         for _ in 0..THREADS {
-            let (next, sender) = (&next, sender.clone());
+            let (next_scene, sender) = (&next_scene, sender.clone());
             scope.spawn(move || {
                 loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let index = next_scene.fetch_add(1, Ordering::Relaxed);
                     let Some(scene) = scenes.get(index) else { break };
-                    // Nobody listens any more once a truth has failed.
-                    if sender.send((index, scene, one(scene, folder))).is_err() {
+                    // The receiver is gone once a truth has failed.
+                    if sender.send((index, scene, obtain_one(scene, folder))).is_err() {
                         break;
                     }
                 }
@@ -96,7 +97,7 @@ pub fn obtain(
     Ok(truths.into_iter().map(|(_, truth)| truth).collect())
 }
 
-fn one(scene: &SceneSpec, folder: &Path) -> Result<Truth, LabError> {
+fn obtain_one(scene: &SceneSpec, folder: &Path) -> Result<Truth, LabError> {
     let key = key(scene)?;
     let path = folder.join(format!("{}.bin", scene.name));
     let shape = (scene.points.len(), scene.intervals);
@@ -110,7 +111,7 @@ fn one(scene: &SceneSpec, folder: &Path) -> Result<Truth, LabError> {
 
 /// Computes the truth of a scene.
 pub fn compute(scene: &SceneSpec) -> Result<Truth, LabError> {
-    scene.with_material(Compute { spec: scene, steps: INTERVAL_STEPS })
+    with_law(scene.law, Compute { spec: scene, steps: INTERVAL_STEPS })
 }
 
 struct Compute<'a> {
@@ -119,19 +120,19 @@ struct Compute<'a> {
     steps: u32,
 }
 
-impl Job for Compute<'_> {
+impl LawWork for Compute<'_> {
     type Output = Result<Truth, LabError>;
 
-    fn run<M: Material + Copy>(self, material: M) -> Self::Output {
+    fn run<L: ElementLaw>(self, law: L) -> Self::Output {
         let Self { spec, steps } = self;
-        let scene = spec.build(material)?;
-        let mut state = spec.state();
-        let limit = |state: &HostState| {
-            tled::exact_critical_step(&scene, state.displacements())
+        let scene = spec.build(law)?;
+        let mut state = VecState::at_rest(scene.node_count());
+        let limit = |state: &VecState| {
+            tled::exact_critical_step(scene.view(), state.displacements())
                 .ok_or(LabError::NoCriticalStep { scene: spec.name })
         };
         let limit_at_rest = limit(&state)?;
-        let step = Step::insist(DT, spec.damping)?;
+        let step = Step::unchecked(DT, spec.damping)?;
         let mut truth = Truth {
             snapshots: Vec::new(),
             limit_at_rest,
@@ -143,7 +144,7 @@ impl Job for Compute<'_> {
         for interval in 0..spec.intervals {
             let loads = spec.loads(&scene, interval)?;
             for count in 1..=steps {
-                truth.limited_steps += u64::from(take(spec, &scene, &loads, &mut state, &step)?);
+                truth.limited_steps += u64::from(exact_step(spec, &scene, &loads, &mut state, &step)?);
                 let mut measure = count == steps;
                 if count % LOOK_STEPS == 0 {
                     let bound = tled::critical_step(&scene, &mut state).map_or(0.0, |bound| bound.seconds);
@@ -166,12 +167,12 @@ impl Job for Compute<'_> {
     }
 }
 
-/// One exact step; whether it was limited.
-fn take<M: Material>(
+/// Takes an exact step. Gives whether it was limited.
+pub(crate) fn exact_step(
     spec: &SceneSpec,
-    scene: &HostScene<M>,
+    scene: &impl AsScene,
     loads: &Loads<'_>,
-    state: &mut HostState,
+    state: &mut VecState,
     step: &Step,
 ) -> Result<bool, LabError> {
     match tled::step(scene, loads, state, step) {
@@ -203,13 +204,12 @@ impl fmt::Write for Fnv {
     }
 }
 
-/// A hash of all that the truth depends on: the scene in words, for the text of a float32 tells all its digits,
-/// and what the kernel makes of its first steps.
+/// A hash of all that the truth depends on: the scene as text, which has all digits of a float32, and the kernel's first steps.
 fn key(scene: &SceneSpec) -> Result<u64, LabError> {
-    /// Enough that all forces and laws have had their say.
+    /// Enough for all forces and laws to have an effect.
     const STEPS: u32 = 10;
     let brief = SceneSpec { intervals: 1, ..scene.clone() };
-    let start = brief.with_material(Compute { spec: &brief, steps: STEPS })?;
+    let start = with_law(brief.law, Compute { spec: &brief, steps: STEPS })?;
     let mut hash = Fnv::EMPTY.add(&encode(&start, 0));
     // Hashing does not fail.
     let _ = fmt::write(&mut hash, format_args!("{DT} {INTERVAL_STEPS} {LOOK_STEPS} {FALL} {scene:?}"));
@@ -220,11 +220,11 @@ fn encode(truth: &Truth, key: u64) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     let counts = [key, truth.snapshots.first().map_or(0, Vec::len) as u64, truth.snapshots.len() as u64];
     let limits = [truth.limit_at_rest, truth.limit_least, truth.limit_least_time];
-    bytes.extend(counts.iter().flat_map(|number| number.to_le_bytes()));
-    bytes.extend(limits.iter().flat_map(|number| number.to_le_bytes()));
+    bytes.extend(counts.iter().flat_map(|value| value.to_le_bytes()));
+    bytes.extend(limits.iter().flat_map(|value| value.to_le_bytes()));
     bytes.extend(truth.limited_steps.to_le_bytes());
     for shape in &truth.snapshots {
-        bytes.extend(shape.as_flattened().iter().flat_map(|number| number.to_le_bytes()));
+        bytes.extend(shape.as_flattened().iter().flat_map(|value| value.to_le_bytes()));
     }
     let sum = Fnv::EMPTY.add(&bytes).0;
     bytes.extend(sum.to_le_bytes());
@@ -247,8 +247,8 @@ fn decode(bytes: &[u8], expected: u64, (nodes, snapshots): (usize, usize)) -> Op
         return None;
     }
     let [limit_at_rest, limit_least, limit_least_time] = [rest, least, time].map(f64::from_le_bytes);
-    let numbers: Vec<f32> = data.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
-    let snapshots = numbers.as_chunks().0.chunks_exact(nodes).map(<[_]>::to_vec).collect();
+    let floats: Vec<f32> = data.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    let snapshots = floats.as_chunks().0.chunks_exact(nodes).map(<[_]>::to_vec).collect();
     Some(Truth { snapshots, limit_at_rest, limit_least, limit_least_time, limited_steps })
 }
 
@@ -291,15 +291,15 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_file_on_disk_is_computed_anew() {
+    fn a_damaged_file_on_disk_is_computed_again() {
         let folder = tempfile::tempdir().unwrap();
         let mut scene = scenes::named("cylinder").unwrap();
         scene.intervals = 1;
-        let truth = one(&scene, folder.path()).unwrap();
+        let truth = obtain_one(&scene, folder.path()).unwrap();
         let path = fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
         let sound = fs::read(&path).unwrap();
         fs::write(&path, &sound[..sound.len() / 2]).unwrap();
-        assert_eq!(one(&scene, folder.path()).unwrap(), truth);
+        assert_eq!(obtain_one(&scene, folder.path()).unwrap(), truth);
         assert_eq!(fs::read(&path).unwrap(), sound);
     }
 

@@ -2,10 +2,10 @@
 //! after Holzapfel & Ogden 2009). `a` and `d` in Pa, `b` without unit.
 //!
 //! In float32 `exp` overflows at 88. The exponent is capped at [`EXPONENT_CAP`]; beyond it `W` goes on
-//! along its tangent, and the step says [`Limited`](crate::tled::Status::Limited).
+//! along its tangent, and the step says [`Limited`](crate::step::Status::Limited).
 
-use super::{Law, Potential};
-use crate::lanes::Real;
+use super::{Constant, Law, MAX_CONSTANTS, Potential};
+use crate::simd::Real;
 
 /// Largest exponent `b x` before the law is continued along its tangent.
 pub const EXPONENT_CAP: f32 = 40.0;
@@ -55,7 +55,23 @@ impl<R: Real> Potential<R> for Exponential<R> {
 impl Law for Exponential {
     type Wide<R: Real> = Exponential<R>;
 
+    const NAME: &'static str = "exponential";
+
+    const CONSTANTS: &'static [Constant] = &[
+        Constant { name: "a", unit: "Pa" },
+        Constant { name: "b", unit: "" },
+        Constant { name: "d", unit: "Pa" },
+    ];
+
     const OPERATIONS: u32 = 32;
+
+    fn from_constants([a, b, d, _]: [f32; MAX_CONSTANTS]) -> Self {
+        Self { a, b, d }
+    }
+
+    fn constants(&self) -> [f32; MAX_CONSTANTS] {
+        [self.a, self.b, self.d, 0.0]
+    }
 
     #[inline(always)]
     fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Exponential<R> {
@@ -74,10 +90,4 @@ impl Law for Exponential {
         let growth = libm::expm1(inside) + (exponent - inside) * libm::exp(inside);
         a / (2.0 * b) * growth + d * j * j
     }
-
-    fn unusable_constant(&self) -> Option<(&'static str, f32)> {
-        super::first_not_positive(&[("a", self.a), ("b", self.b), ("d", self.d)])
-    }
-
-    super::element_loops!();
 }

@@ -11,55 +11,67 @@
 //! Every function is finite for every `F`: below [`J_FLOOR`] the factor `g` goes on along its tangent,
 //! so an inverted element is pushed back with a force that is still minus the gradient of the energy.
 //!
-//! Adding a law: one short file with the four methods of [`Potential`] and the two of [`Law`]
-//! (`neo_hookean.rs` is the example).
+//! A new law is one short file with a [`Potential`] and a [`Law`] (`neo_hookean.rs` is the example) and one line in the list of
+//! laws below; scene files, weight files, the C API, the laboratory and the kernels of [`crate::element`] read that list.
 
-/// The element loops of a law. In the trait they are compiled where they are used; in the laws of this crate, where nothing in
-/// them is generic, with the crate: not again, for every level, in each program and test. Each is linked only if it is used.
-macro_rules! element_loops {
-    () => {
-        #[doc(hidden)]
-        #[inline(never)]
-        fn forces(
-            kernel: $crate::tled::InternalForces<'_, Self, $crate::tled::Nothing>,
-        ) -> $crate::tled::Extremes<f32> {
-            $crate::lanes::dispatch(kernel)
-        }
-        #[doc(hidden)]
-        #[inline(never)]
-        fn forces_and_bounds(
-            kernel: $crate::tled::InternalForces<'_, Self, $crate::inertia::ScalarBeside>,
-        ) -> $crate::tled::Extremes<f32> {
-            $crate::lanes::dispatch(kernel)
-        }
-        #[doc(hidden)]
-        #[inline(never)]
-        fn critical_bounds(kernel: $crate::tled::CriticalBounds<'_, '_, Self>) {
-            $crate::lanes::dispatch(kernel);
-        }
-        #[doc(hidden)]
-        #[inline(never)]
-        fn bounds_of_block(kernel: $crate::inertia::OneBlock<'_, Self>) {
-            $crate::lanes::dispatch(kernel);
+/// The list of laws, a file and a type each. The position in the list is the law's number in C and in weight files: a line never
+/// moves. `for_each_law!(each first..)` calls `each!` with `first..`, then with the variant of [`AnyLaw`] and the type of each law.
+macro_rules! for_each_law {
+    (@ $use:ident [$($given:tt)*]) => {
+        $crate::material::for_each_law! {
+            @ $use [$($given)*]
+            neo_hookean NeoHookean,
+            exponential Exponential,
         }
     };
+    (@ modules [] $($file:ident $law:ident,)+) => {
+        $(
+            mod $file;
+            pub use $file::$law;
+        )+
+    };
+    (@ types [$each:ident $($first:tt)*] $($file:ident $law:ident,)+) => {
+        $each! { $($first)* $($law: $crate::material::$law,)+ }
+    };
+    ($each:ident $($first:tt)*) => {
+        $crate::material::for_each_law! { @ types [$each $($first)*] }
+    };
 }
-pub(crate) use element_loops;
+pub(crate) use for_each_law;
 
-mod exponential;
-mod neo_hookean;
+for_each_law! { @ modules [] }
+mod any;
+mod literal;
+mod response;
 mod tissue;
 
-pub use exponential::{EXPONENT_CAP, Exponential};
-pub use neo_hookean::NeoHookean;
+pub use any::AnyLaw;
+pub use exponential::EXPONENT_CAP;
+pub use literal::Literal;
+#[cfg(feature = "std")]
+pub(crate) use response::VolumeFactor;
+pub use response::{Invariants, Response};
+pub(crate) use response::{LawState, energy_density, releasable_energy, response, response_operations};
 pub use tissue::{Laws, Material, Regions, Tissue};
 
-use crate::lanes::{Pair, Real};
+use crate::simd::Real;
 
 /// Volume ratio below which `J^(-2/3)` is continued along its tangent.
 pub const J_FLOOR: f32 = 0.1;
 
-/// A law with its constants for the lanes of one chunk of elements.
+/// Most constants that a law has.
+pub const MAX_CONSTANTS: usize = 4;
+
+/// A constant of a law.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub struct Constant {
+    /// Its name in scene files and weight files.
+    pub name: &'static str,
+    /// Its unit, empty for a pure number.
+    pub unit: &'static str,
+}
+
+/// A law whose constants are scalars or vectors, one number for each element.
 pub trait Potential<R: Real>: Copy {
     /// `W'(x)`, Pa.
     fn distortion_slope(&self, x: R) -> R;
@@ -76,10 +88,16 @@ pub trait Potential<R: Real>: Copy {
     }
 }
 
-/// A hyperelastic law: its constants for one element, and how to lay them side by side.
-pub trait Law: Copy + Send + Sync {
-    /// The same law with its constants in lanes.
+/// A hyperelastic law with its constants for one element.
+pub trait Law: Copy + Default + Send + Sync {
+    /// The same law with a vector for each constant.
     type Wide<R: Real>: Potential<R>;
+
+    /// Its name in scene files and weight files.
+    const NAME: &'static str;
+
+    /// Its constants, in the order of [`Law::constants`]; each must be a finite positive number.
+    const CONSTANTS: &'static [Constant];
 
     /// Whether the energy is a function of `I1bar` (true) or, as the paper prints it, of `I1` (false).
     const ISOCHORIC: bool = true;
@@ -87,271 +105,22 @@ pub trait Law: Copy + Send + Sync {
     /// Floating-point operations of `W'(x)` and `U'(J)` for one element.
     const OPERATIONS: u32;
 
-    /// Lane `l` takes the constants of `at(l)`.
+    /// The law with these constants; those beyond [`Law::CONSTANTS`] are ignored.
+    fn from_constants(constants: [f32; MAX_CONSTANTS]) -> Self;
+
+    /// Its constants, zeros beyond [`Law::CONSTANTS`].
+    fn constants(&self) -> [f32; MAX_CONSTANTS];
+
+    /// Element `l` of the vector takes the constants of `at(l)`.
     fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Self::Wide<R>;
 
     /// `W(x) + U(1 + j)` in float64, J/m^3, zero at rest.
     fn energy(&self, x: f64, j: f64) -> f64;
 
-    /// The first constant that is not usable (not finite, or of the wrong sign), by name and value.
-    fn unusable_constant(&self) -> Option<(&'static str, f32)>;
-
-    element_loops!();
-}
-
-/// A law as the paper prints it: a function of `I1 - 3` instead of `I1bar - 3`. At rest it has a residual
-/// stress `2 W'(0)`, so a free body shrinks until the volume term balances it (about 3 % in volume for the
-/// paper's neo-Hookean constants). Kept because the paper's figures came from it. Its volume term is
-/// `d (J - 1)^2`: the linear `d (J - 1)` in the paper is a misprint, no state would be in equilibrium.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Literal<L>(pub L);
-
-macro_rules! literal {
-    ($law:ident) => {
-        impl Law for Literal<$law> {
-            type Wide<R: Real> = $law<R>;
-
-            const ISOCHORIC: bool = false;
-
-            const OPERATIONS: u32 = $law::OPERATIONS;
-
-            #[inline(always)]
-            fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Self::Wide<R> {
-                $law::widen(|lane| at(lane).0)
-            }
-
-            fn energy(&self, x: f64, j: f64) -> f64 {
-                self.0.energy(x, j)
-            }
-
-            fn unusable_constant(&self) -> Option<(&'static str, f32)> {
-                self.0.unusable_constant()
-            }
-
-            // The command takes both; who has no operating system rarely either, and need not wait for them.
-            #[cfg(feature = "std")]
-            element_loops!();
-        }
-    };
-}
-
-literal!(Exponential);
-literal!(NeoHookean);
-
-/// The invariants a law sees, both zero at rest and both free of cancellation.
-#[derive(Clone, Copy, Debug)]
-pub struct Invariants<R> {
-    /// `I1 - 3`.
-    pub i: R,
-    /// `J - 1`.
-    pub j: R,
-}
-
-/// Scalars of the stress `P = p1 (F - cof F) + s cof F`, Pa.
-#[derive(Clone, Copy, Debug)]
-pub struct Response<R> {
-    /// `dPsi/dI1 * 2`.
-    pub p1: R,
-    /// `p1 + dPsi/dJ`.
-    pub s: R,
-    /// [`Potential::saturation`] at this state.
-    pub saturation: R,
-}
-
-/// `g(J) = J^(-2/3)` with its derivative, continued along the tangent below [`J_FLOOR`].
-#[derive(Clone, Copy)]
-pub(crate) struct VolumeFactor<R> {
-    pub(crate) g: R,
-    pub(crate) slope: R,
-    /// `J^(-5/3)` and `J^-1` at the clamped `J`.
-    fifth: R,
-    inverse: R,
-    /// `max(J, J_FLOOR) - 1`.
-    clamped: R,
-    /// `min(J - J_FLOOR, 0)`.
-    below: R,
-    /// `I1bar - 3`.
-    pub(crate) x: R,
-}
-
-impl<R: Real> VolumeFactor<R> {
-    #[inline(always)]
-    pub(crate) fn new(at: Invariants<R>) -> Self {
-        let one = R::splat(1.0);
-        let third = R::splat(1.0 / 3.0);
-        let clamped = at.j.max(R::splat(J_FLOOR - 1.0));
-        let below = (at.j - R::splat(J_FLOOR - 1.0)).min(R::splat(0.0));
-        let y = (one + clamped).inverse_cbrt();
-        // e = y - 1 to full relative accuracy: one Newton step of (1 + j)(1 + e)^3 = 1 in terms of e.
-        let e = y - one;
-        let cube = e * e.fused(R::splat(3.0) + e, R::splat(3.0));
-        let residual = (one + clamped).fused(cube, clamped);
-        let e = e - residual * (third * y);
-        let y = one + e;
-        let square = y * y;
-        let fifth = square * square * y;
-        let slope = fifth * R::splat(-2.0 / 3.0);
-        let i1 = at.i + R::splat(3.0);
-        // I1bar - 3 = g (I1 - 3) + 3 (g - 1), g - 1 = e (2 + e)
-        let x = square.fused(at.i, (R::splat(3.0) * e).fused(R::splat(2.0) + e, slope * below * i1));
-        Self { g: slope.fused(below, square), slope, fifth, inverse: square * y, clamped, below, x }
+    /// The first constant that is not usable (not a finite positive number), by name and value.
+    fn unusable_constant(&self) -> Option<(&'static str, f32)> {
+        let constants = Self::CONSTANTS.iter().zip(self.constants());
+        let unusable = constants.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0));
+        unusable.map(|(constant, value)| (constant.name, value))
     }
-
-    /// Second derivative of `g`: zero where it is continued along its tangent.
-    #[inline(always)]
-    pub(crate) fn curvature(&self) -> R {
-        let inside = R::splat(1.0) - (-self.below).positive();
-        inside * R::splat(10.0 / 9.0) * self.fifth * self.inverse
-    }
-}
-
-/// What stress and tangent share: `W'` and `g` at the given invariants.
-#[derive(Clone, Copy)]
-pub(crate) struct Local<R> {
-    pub(crate) at: Invariants<R>,
-    /// Of an isochoric law.
-    factor: Option<VolumeFactor<R>>,
-    /// `W'(x)`, Pa.
-    pub(crate) slope: R,
-    x: R,
-}
-
-impl<R: Real> Local<R> {
-    #[inline(always)]
-    pub(crate) fn new<L: Law>(law: &L::Wide<R>, at: Invariants<R>) -> Self {
-        let factor = if L::ISOCHORIC { Some(VolumeFactor::new(at)) } else { None };
-        let x = factor.map_or(at.i, |factor| factor.x);
-        Self { at, factor, slope: law.distortion_slope(x), x }
-    }
-
-    /// `W''(x)`, Pa; not negative.
-    #[inline(always)]
-    pub(crate) fn stiffening<L: Law>(&self, law: &L::Wide<R>) -> R {
-        law.distortion_curvature(self.x, self.slope).max(R::splat(0.0))
-    }
-
-    /// `g`, `g'` and `g''`; 1, 0, 0 for a literal law.
-    #[inline(always)]
-    pub(crate) fn volume_factor(&self) -> [R; 3] {
-        match &self.factor {
-            Some(factor) => [factor.g, factor.slope, factor.curvature()],
-            None => [R::splat(1.0), R::splat(0.0), R::splat(0.0)],
-        }
-    }
-
-    /// The stress scalars.
-    #[inline(always)]
-    pub(crate) fn response<L: Law>(&self, law: &L::Wide<R>) -> Response<R> {
-        let two = R::splat(2.0);
-        let slope = two * self.slope;
-        let (p1, s) = match &self.factor {
-            Some(factor) => {
-                // g + g' I1 / 2 = J^(-5/3) (J - 1 - (I1 - 3 + 2 below) / 3): small at small strain
-                let bracket =
-                    factor.fifth * (factor.clamped - (self.at.i + two * factor.below) * R::splat(1.0 / 3.0));
-                (slope * factor.g, slope * bracket)
-            }
-            None => (slope, slope),
-        };
-        Response { p1, s: s + law.volume_slope(self.at.j), saturation: law.saturation(self.x) }
-    }
-}
-
-impl<R: Real> VolumeFactor<Pair<R>> {
-    #[inline(always)]
-    fn split(&self) -> [VolumeFactor<R>; 2] {
-        let Self { g, slope, fifth, inverse, clamped, below, x } = *self;
-        [
-            VolumeFactor {
-                g: g.0,
-                slope: slope.0,
-                fifth: fifth.0,
-                inverse: inverse.0,
-                clamped: clamped.0,
-                below: below.0,
-                x: x.0,
-            },
-            VolumeFactor {
-                g: g.1,
-                slope: slope.1,
-                fifth: fifth.1,
-                inverse: inverse.1,
-                clamped: clamped.1,
-                below: below.1,
-                x: x.1,
-            },
-        ]
-    }
-}
-
-impl<R: Real> Local<Pair<R>> {
-    /// Each half by itself.
-    #[inline(always)]
-    pub(crate) fn split(&self) -> [Local<R>; 2] {
-        let Self { at, factor, slope, x } = *self;
-        let [near, far] = match factor {
-            Some(factor) => {
-                let [near, far] = factor.split();
-                [Some(near), Some(far)]
-            }
-            None => [None, None],
-        };
-        [
-            Local { at: Invariants { i: at.i.0, j: at.j.0 }, factor: near, slope: slope.0, x: x.0 },
-            Local { at: Invariants { i: at.i.1, j: at.j.1 }, factor: far, slope: slope.1, x: x.1 },
-        ]
-    }
-}
-
-/// The stress scalars of law `L` at the given invariants.
-#[inline(always)]
-pub(crate) fn response<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>) -> Response<R> {
-    Local::new::<L>(law, at).response::<L>(law)
-}
-
-/// Floating-point operations of [`response`] for one element, those of the law included.
-pub(crate) const fn response_operations<L: Law>() -> u32 {
-    // Isochoric: 52 for `VolumeFactor::new`, 9 to combine.
-    L::OPERATIONS + if L::ISOCHORIC { 61 } else { 2 }
-}
-
-/// Energy density in float64, J/m^3, of a deformation with the given `I1 - 3` and `J - 1`.
-pub(crate) fn energy<L: Law>(law: &L, i: f64, j: f64) -> f64 {
-    if !L::ISOCHORIC {
-        return law.energy(i, j);
-    }
-    let floor = f64::from(J_FLOOR);
-    let volume = 1.0 + j;
-    let clamped = if volume > floor { volume } else { floor };
-    // g - 1 without cancellation
-    let below_one = libm::expm1(-2.0 / 3.0 * libm::log1p(clamped - 1.0));
-    let slope = -2.0 / 3.0 * (1.0 + below_one) / clamped;
-    let x = (1.0 + below_one) * i + 3.0 * below_one + slope * (volume - clamped) * (i + 3.0);
-    law.energy(x, j)
-}
-
-/// Largest energy density, J/m^3, that a law can release from rest: zero for a stress-free one. The
-/// literal forms can contract; `W` is convex in `x` and, at given `J`, `x >= 3 (J^(2/3) - 1)`, so the
-/// minimum over uniform contractions is found by bisection of its slope.
-pub(crate) fn releasable_energy<L: Law>(law: &L) -> f64 {
-    if L::ISOCHORIC {
-        return 0.0;
-    }
-    let at = |volume: f64| law.energy(3.0 * (libm::pow(volume, 2.0 / 3.0) - 1.0), volume - 1.0);
-    let (mut low, mut high) = (1e-3, 1.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if at(middle * (1.0 + 1e-7)) > at(middle) {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    let least = at(0.5 * (low + high));
-    if least < 0.0 { -least } else { 0.0 }
-}
-
-/// The first of the named constants that is not a finite positive number.
-fn first_not_positive(constants: &[(&'static str, f32)]) -> Option<(&'static str, f32)> {
-    constants.iter().copied().find(|(_, value)| !(value.is_finite() && *value > 0.0))
 }

@@ -1,8 +1,8 @@
 //! Neo-Hookean law `W(x) = c x`, `U(J) = d (J - 1)^2` (Meister et al. 2018, section 3; with `c = mu / 2`,
 //! `d = kappa / 2` the law of NiftySim and DJ-TLED). Constants in Pa.
 
-use super::{Law, Potential};
-use crate::lanes::Real;
+use super::{Constant, Law, MAX_CONSTANTS, Potential};
+use crate::simd::Real;
 
 /// Constants of the neo-Hookean law: half the shear modulus and half the bulk modulus, Pa.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,7 +35,20 @@ impl<R: Real> Potential<R> for NeoHookean<R> {
 impl Law for NeoHookean {
     type Wide<R: Real> = NeoHookean<R>;
 
+    const NAME: &'static str = "neo-hookean";
+
+    const CONSTANTS: &'static [Constant] =
+        &[Constant { name: "c", unit: "Pa" }, Constant { name: "d", unit: "Pa" }];
+
     const OPERATIONS: u32 = 2;
+
+    fn from_constants([c, d, ..]: [f32; MAX_CONSTANTS]) -> Self {
+        Self { c, d }
+    }
+
+    fn constants(&self) -> [f32; MAX_CONSTANTS] {
+        [self.c, self.d, 0.0, 0.0]
+    }
 
     #[inline(always)]
     fn widen<R: Real>(at: impl Fn(usize) -> Self) -> NeoHookean<R> {
@@ -45,10 +58,4 @@ impl Law for NeoHookean {
     fn energy(&self, x: f64, j: f64) -> f64 {
         f64::from(self.c) * x + f64::from(self.d) * j * j
     }
-
-    fn unusable_constant(&self) -> Option<(&'static str, f32)> {
-        super::first_not_positive(&[("c", self.c), ("d", self.d)])
-    }
-
-    super::element_loops!();
 }

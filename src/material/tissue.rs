@@ -1,7 +1,7 @@
 //! What the elements of a mesh are made of: one tissue for all, or one of several for each element.
 
 use super::Law;
-use crate::lanes::Real;
+use crate::simd::Real;
 
 /// A law with a density.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

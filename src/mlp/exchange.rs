@@ -3,7 +3,7 @@
 //! Weights and biases are tensors of float32, named as a module with two lists of linear layers names them: `first.0.weight`
 //! (outputs x inputs), `first.0.bias` (outputs), ..., `second.0.weight`, ... All else that a weight file holds is a JSON
 //! object under the key `supple` of the metadata. It is one key because the order of several would change from run to run.
-//! Numbers are written so that they come back to the bit: a file that [`super::write`] made is the same after there and back.
+//! Floats are written so that they come back to the bit: a file of [`super::write`] is the same after there and back.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -18,9 +18,10 @@ use serde_json::value::RawValue;
 
 use super::file::VERSION;
 use super::{
-    Activation, Description, ForceInput, Layer, LayerDescription, MAX_WIDTH, Network, Numbers, Range,
-    TrainedLaw, WeightError, hexadecimal, write,
+    Activation, Description, ForceInput, Layer, LayerDescription, MAX_WIDTH, Network, Parameters, Range,
+    WeightError, hexadecimal, write,
 };
+use crate::material::{AnyLaw, MAX_CONSTANTS};
 
 /// The key of the metadata.
 const KEY: &str = "supple";
@@ -42,7 +43,7 @@ pub enum ExchangeError {
         /// What it holds.
         found: String,
     },
-    /// A tensor has another shape than its neighbours need.
+    /// A tensor does not have the shape that the layers before and after it need.
     Shape {
         /// Its name.
         tensor: String,
@@ -51,13 +52,13 @@ pub enum ExchangeError {
         /// What it must be.
         wanted: String,
     },
-    /// A number of a tensor is not finite.
+    /// A value of a tensor is not finite.
     NotFinite {
         /// Its name.
         tensor: String,
-        /// Place of the number, counted along the last axis first.
+        /// Its index, the last axis running fastest.
         index: usize,
-        /// The number.
+        /// The value.
         value: f32,
     },
     /// A key of the metadata is missing, unknown, or holds what it cannot hold.
@@ -67,7 +68,7 @@ pub enum ExchangeError {
         /// What is wrong.
         problem: String,
     },
-    /// A layer is of eight bits: what PyTorch trains is the float32 network it was made from.
+    /// A layer is in int8: PyTorch trains the float32 network that it was made from.
     Int8 {
         /// Which layer, from zero.
         layer: u32,
@@ -91,7 +92,7 @@ impl fmt::Display for ExchangeError {
             }
             Self::Key { key, problem } => write!(f, "metadata key {key}: {problem}"),
             Self::Int8 { layer } => {
-                write!(f, "layer {layer} is of eight bits; export the float32 file that it was made from")
+                write!(f, "layer {layer} is in int8; export the float32 file that it was made from")
             }
             Self::Weights(error) => write!(f, "{error}"),
         }
@@ -124,7 +125,7 @@ struct About {
     damping: f32,
     step: f32,
     exact_step: f32,
-    /// Left out for the paper's.
+    /// Left out where it is the paper's.
     #[serde(skip_serializing_if = "Option::is_none")]
     force: Option<ForceInput>,
     recipe: String,
@@ -134,7 +135,7 @@ struct About {
 impl About {
     fn of(network: &Network<'_>) -> Self {
         let ranges = |ranges: &[Range]| {
-            let column = |number: fn(&Range) -> f32| ranges.iter().map(number).collect();
+            let column = |value: fn(&Range) -> f32| ranges.iter().map(value).collect();
             BTreeMap::from([
                 ("scale", column(|range| range.scale)),
                 ("least", column(|range| range.least)),
@@ -150,17 +151,14 @@ impl About {
         };
         let (first, second) = network.layers();
         let recipe = network.recipe();
-        let constants = match recipe.law {
-            TrainedLaw::NeoHookean { c, d, .. } => BTreeMap::from([("c", c), ("d", d)]),
-            TrainedLaw::Exponential { a, b, d, .. } => BTreeMap::from([("a", a), ("b", b), ("d", d)]),
-        };
+        let names = recipe.law.constants().iter().map(|constant| constant.name);
         Self {
             version: VERSION,
             inputs: ranges(network.inputs()),
             outputs: ranges(network.outputs()),
             slopes: BTreeMap::from([("first", slopes(first)), ("second", slopes(second))]),
             law: recipe.law.name(),
-            constants,
+            constants: names.zip(recipe.law.values()).collect(),
             density: recipe.density,
             damping: recipe.damping,
             step: recipe.step,
@@ -183,15 +181,15 @@ pub fn to_safetensors(network: &Network<'_>) -> Result<Vec<u8>, ExchangeError> {
     }
     for (part, layers) in [("first", first), ("second", second)] {
         for (index, layer) in layers.iter().enumerate() {
-            let Numbers::Float { weights, biases } = layer.numbers else {
+            let Parameters::Float { weights, biases } = layer.parameters else {
                 continue;
             };
             let arrays = [
                 ("weight", weights, std::vec![layer.outputs, layer.inputs]),
                 ("bias", biases, std::vec![layer.outputs]),
             ];
-            for (kind, numbers, shape) in arrays {
-                let view = TensorView::new(Dtype::F32, shape, bytemuck::cast_slice(numbers));
+            for (kind, values, shape) in arrays {
+                let view = TensorView::new(Dtype::F32, shape, bytemuck::cast_slice(values));
                 tensors.push((format!("{part}.{index}.{kind}"), view.map_err(|error| file(&error))?));
             }
         }
@@ -267,7 +265,7 @@ fn part(
             }
         };
         let tensor = format!("{name}.{index}.weight");
-        let (shape, weights) = numbers(tensors, &tensor)?;
+        let (shape, weights) = shape_and_values(tensors, &tensor)?;
         let width = match *shape {
             [width, depth] if depth == inputs && (1..=MAX_WIDTH).contains(&width) => width,
             _ => 0,
@@ -277,7 +275,7 @@ fn part(
             return Err(ExchangeError::Shape { tensor, found: shape, wanted: format!("[{rows}, {inputs}]") });
         }
         let tensor = format!("{name}.{index}.bias");
-        let (shape, biases) = numbers(tensors, &tensor)?;
+        let (shape, biases) = shape_and_values(tensors, &tensor)?;
         if shape != [width] {
             return Err(ExchangeError::Shape { tensor, found: shape, wanted: format!("[{width}]") });
         }
@@ -287,17 +285,17 @@ fn part(
     Ok(layers)
 }
 
-/// Shape and numbers of a tensor of float32.
-fn numbers(tensors: &SafeTensors<'_>, name: &str) -> Result<(Vec<usize>, Vec<f32>), ExchangeError> {
+/// Of a tensor of float32.
+fn shape_and_values(tensors: &SafeTensors<'_>, name: &str) -> Result<(Vec<usize>, Vec<f32>), ExchangeError> {
     let tensor = || name.to_string();
     let view = tensors.tensor(name).map_err(|_| ExchangeError::MissingTensor(tensor()))?;
     if view.dtype() != Dtype::F32 {
         return Err(ExchangeError::Type { tensor: tensor(), found: format!("{:?}", view.dtype()) });
     }
     let (words, _) = view.data().as_chunks();
-    let numbers: Vec<f32> = words.iter().map(|word| f32::from_le_bytes(*word)).collect();
-    match numbers.iter().enumerate().find(|(_, number)| !number.is_finite()) {
-        None => Ok((view.shape().to_vec(), numbers)),
+    let values: Vec<f32> = words.iter().map(|word| f32::from_le_bytes(*word)).collect();
+    match values.iter().enumerate().find(|(_, value)| !value.is_finite()) {
+        None => Ok((view.shape().to_vec(), values)),
         Some((index, &value)) => Err(ExchangeError::NotFinite { tensor: tensor(), index, value }),
     }
 }
@@ -318,7 +316,7 @@ fn sha256(text: &str) -> Result<[u8; 32], ExchangeError> {
     Ok(hash)
 }
 
-/// Keys of an object that have not been looked at, and where the object stands.
+/// Keys of an object that have not been taken yet, and the path of the object.
 struct Keys {
     within: String,
     keys: BTreeMap<String, std::boxed::Box<RawValue>>,
@@ -345,7 +343,7 @@ impl Keys {
             return Ok(None);
         };
         serde_json::from_str(value.get()).map(Some).map_err(|error| {
-            // The parser's place is that within this key: the text itself says more.
+            // The parser counts lines and columns within this key, so the message shows its text instead.
             let (error, shown) = (error.to_string(), value.get().chars().take(40).collect::<String>());
             let reason = error.split(" at line ").next().unwrap_or_default();
             refused(&self.name(key), format!("{shown} is not usable: {reason}"))
@@ -357,7 +355,7 @@ impl Keys {
         Ok(Self { within: format!("{}.", self.name(key)), keys: self.take(key)? })
     }
 
-    /// Nothing may be left that nobody has read.
+    /// All keys must have been taken.
     fn end(self) -> Result<(), ExchangeError> {
         match self.keys.keys().next() {
             None => Ok(()),
@@ -369,12 +367,12 @@ impl Keys {
         let mut keys = self.keys(key)?;
         let scale: Vec<f32> = keys.take("scale")?;
         let mut column = |name: &str| {
-            let numbers: Vec<f32> = keys.take(name)?;
-            if numbers.len() != scale.len() {
-                let problem = format!("{} numbers, but {} in {key}.scale", numbers.len(), scale.len());
+            let values: Vec<f32> = keys.take(name)?;
+            if values.len() != scale.len() {
+                let problem = format!("{} numbers, but {} in {key}.scale", values.len(), scale.len());
                 return Err(refused(&format!("{key}.{name}"), problem));
             }
-            Ok(numbers)
+            Ok(values)
         };
         let (least, most) = (column("least")?, column("most")?);
         keys.end()?;
@@ -382,27 +380,20 @@ impl Keys {
         Ok(rows.map(|((scale, least), most)| Range { scale, least, most }).collect())
     }
 
-    fn law(&mut self) -> Result<TrainedLaw, ExchangeError> {
+    fn law(&mut self) -> Result<AnyLaw, ExchangeError> {
         let name: String = self.take("law")?;
         let mut keys = self.keys("constants")?;
-        let (kind, literal) = match name.strip_suffix("-literal") {
-            Some(kind) => (kind, true),
-            None => (name.as_str(), false),
+        let Some(law) = AnyLaw::all().find(|law| law.name() == name) else {
+            let known: Vec<&str> = AnyLaw::all().map(|law| law.name()).collect();
+            let (last, others) = known.split_last().unwrap_or((&"", &[]));
+            let known = format!("{} and {last} are", others.join(", "));
+            return Err(refused("law", format!("\"{name}\" is not known; {known}")));
         };
-        let law = match kind {
-            "neo-hookean" => TrainedLaw::NeoHookean { c: keys.take("c")?, d: keys.take("d")?, literal },
-            "exponential" => TrainedLaw::Exponential {
-                a: keys.take("a")?,
-                b: keys.take("b")?,
-                d: keys.take("d")?,
-                literal,
-            },
-            _ => {
-                let known = "neo-hookean, exponential, neo-hookean-literal and exponential-literal are";
-                return Err(refused("law", format!("\"{name}\" is not known; {known}")));
-            }
-        };
+        let mut values = [0.0; MAX_CONSTANTS];
+        for (value, constant) in values.iter_mut().zip(law.constants()) {
+            *value = keys.take(constant.name)?;
+        }
         keys.end()?;
-        Ok(law)
+        Ok(law.with(values))
     }
 }

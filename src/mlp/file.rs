@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable, try_cast_slice};
 
 use super::layers::{LayerEntry, LongEntry, Place, checked_layer};
 use super::{Layer, MAX_INPUTS, MAX_LAYERS, MAX_OUTPUTS};
+use crate::material::{AnyLaw, MAX_CONSTANTS};
 
 #[cfg(target_endian = "big")]
 compile_error!("weight files are little-endian and read in place");
@@ -15,14 +16,14 @@ compile_error!("weight files are little-endian and read in place");
 pub const MAGIC: [u8; 8] = *b"SUPPLE-W";
 /// All layers in float32.
 pub(super) const VERSION: u32 = 1;
-/// Layers may be of eight bits. Version 2 had another kind of them, and was never released.
+/// Layers may be in int8. Version 2, with another kind of int8, was never released.
 pub(super) const VERSION_INT8: u32 = 3;
 /// Arrays begin at multiples of this.
 pub(super) const ALIGNMENT: usize = 64;
 /// Where the checksum's bytes begin.
 pub(super) const CHECKED: usize = 20;
 
-/// What a file begins with.
+/// The first bytes of a file.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Header {
@@ -35,7 +36,7 @@ pub(super) struct Header {
     pub(super) layers: u32,
     pub(super) first_layers: u32,
     pub(super) law: u32,
-    pub(super) constants: [f32; 4],
+    pub(super) constants: [f32; MAX_CONSTANTS],
     pub(super) density: f32,
     pub(super) damping: f32,
     pub(super) step: f32,
@@ -54,60 +55,12 @@ const _: () = assert!(HEADER == 240);
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Range {
-    /// What one is to the network.
+    /// Divides an input, multiplies an output.
     pub scale: f32,
     /// The least seen in training.
     pub least: f32,
     /// The most.
     pub most: f32,
-}
-
-/// The law of the training's tissue, Pa.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum TrainedLaw {
-    /// [`crate::material::NeoHookean`].
-    NeoHookean {
-        /// Pa.
-        c: f32,
-        /// Pa.
-        d: f32,
-        /// In the paper's literal form.
-        literal: bool,
-    },
-    /// [`crate::material::Exponential`].
-    Exponential {
-        /// Pa.
-        a: f32,
-        /// Without unit.
-        b: f32,
-        /// Pa.
-        d: f32,
-        /// In the paper's literal form.
-        literal: bool,
-    },
-}
-
-impl TrainedLaw {
-    /// As in scene files.
-    #[must_use]
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::NeoHookean { literal: false, .. } => "neo-hookean",
-            Self::NeoHookean { literal: true, .. } => "neo-hookean-literal",
-            Self::Exponential { literal: false, .. } => "exponential",
-            Self::Exponential { literal: true, .. } => "exponential-literal",
-        }
-    }
-}
-
-/// Name and constants, for people.
-impl fmt::Display for TrainedLaw {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::NeoHookean { c, d, .. } => write!(f, "{}, c {c} Pa, d {d} Pa", self.name()),
-            Self::Exponential { a, b, d, .. } => write!(f, "{}, a {a} Pa, b {b}, d {d} Pa", self.name()),
-        }
-    }
 }
 
 /// How the learned step shows a vertex's force to the network.
@@ -130,7 +83,7 @@ pub enum ForceInput {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recipe<'w> {
     /// Law and constants.
-    pub law: TrainedLaw,
+    pub law: AnyLaw,
     /// kg/m^3.
     pub density: f32,
     /// 1/s.
@@ -174,7 +127,7 @@ pub enum WeightError {
         /// As it is.
         found: u32,
     },
-    /// A number of the header is not one it can have.
+    /// A field of the header is not one it can have.
     Header {
         /// Which.
         field: &'static str,
@@ -213,7 +166,7 @@ pub enum WeightError {
         /// Byte of the file.
         at: u32,
     },
-    /// A whole number of an eight-bit layer is not one it can be.
+    /// A whole number of an int8 layer is not one it can be.
     Number {
         /// Which layer, from zero.
         layer: u32,
@@ -224,7 +177,7 @@ pub enum WeightError {
         /// Its value.
         value: i32,
     },
-    /// A scale of an eight-bit layer is not positive.
+    /// A scale of an int8 layer is not positive.
     Scale {
         /// Which layer, from zero.
         layer: u32,
@@ -233,7 +186,7 @@ pub enum WeightError {
         /// Its value.
         value: f32,
     },
-    /// Something other than zero where an eight-bit layer has no input or output.
+    /// Something other than zero where an int8 layer has no input or output.
     Padding {
         /// Which layer, from zero.
         layer: u32,
@@ -293,7 +246,7 @@ impl fmt::Display for WeightError {
 
 impl core::error::Error for WeightError {}
 
-/// A network over the bytes of a weight file.
+/// A network whose parameters lie in the bytes of a weight file.
 #[derive(Clone, Copy, Debug)]
 pub struct Network<'w> {
     pub(super) inputs: &'w [Range],
@@ -302,7 +255,7 @@ pub struct Network<'w> {
     pub(super) count: usize,
     /// Layers of the first part.
     pub(super) first: usize,
-    /// Whether any layer is of eight bits.
+    /// Whether any layer is in int8.
     int8: bool,
     recipe: Recipe<'w>,
 }
@@ -403,7 +356,7 @@ impl<'w> Network<'w> {
             let other = |number: usize| entries.get(number).map_or(LayerEntry::default(), |long| long.entry);
             let last = number + 1 == first || number + 1 == count;
             let place = Place {
-                number: number as u32,
+                layer: number as u32,
                 // The second part sees what the first has predicted.
                 needed: match number {
                     0 => inputs.len(),
@@ -418,7 +371,7 @@ impl<'w> Network<'w> {
         Ok(Self { inputs, outputs, layers, count, first, int8, recipe })
     }
 
-    /// Whether any layer is of eight bits; then the same input gives the same bits on every processor.
+    /// Whether any layer is in int8; then the same input gives the same bits on every processor.
     #[must_use]
     pub const fn has_int8(&self) -> bool {
         self.int8
@@ -456,18 +409,11 @@ impl<'w> Network<'w> {
 }
 
 fn recipe<'w>(header: &Header, bytes: &'w [u8]) -> Result<Recipe<'w>, WeightError> {
-    let constant = |index: usize, field| positive(field, header.constants.get(index).copied().unwrap_or(0.0));
-    let literal = header.law & 1 == 1;
-    let law = match header.law {
-        0 | 1 => TrainedLaw::NeoHookean { c: constant(0, "c")?, d: constant(1, "d")?, literal },
-        2 | 3 => TrainedLaw::Exponential {
-            a: constant(0, "a")?,
-            b: constant(1, "b")?,
-            d: constant(2, "d")?,
-            literal,
-        },
-        law => return Err(WeightError::Header { field: "the law", value: law as f32 }),
-    };
+    let law = AnyLaw::all().find(|law| law.code() == header.law);
+    let law = law.ok_or(WeightError::Header { field: "the law", value: header.law as f32 })?;
+    for (constant, &value) in law.constants().iter().zip(&header.constants) {
+        positive(constant.name, value)?;
+    }
     let damping = header.damping;
     if !(damping.is_finite() && damping >= 0.0) {
         return Err(WeightError::Header { field: "the damping", value: damping });
@@ -482,7 +428,7 @@ fn recipe<'w>(header: &Header, bytes: &'w [u8]) -> Result<Recipe<'w>, WeightErro
     let text =
         end.and_then(|end| bytes.get(at as usize..end)).and_then(|text| core::str::from_utf8(text).ok());
     Ok(Recipe {
-        law,
+        law: law.with(header.constants),
         density: positive("the density", header.density)?,
         damping,
         step: positive("the step", header.step)?,

@@ -1,21 +1,21 @@
-//! The forward pass, for one vertex as it is written down, and for many side by side. Sums are taken in the order
-//! of the inputs, so the result of a vertex does not depend on its neighbours.
+//! The forward pass, scalar for one vertex and vectorised over many. Sums are taken in the order of the inputs, so the result of a
+//! vertex does not depend on the others.
 //!
-//! Many vertices go through in tiles of one or two vectors: a layer's numbers lie vector beside vector, a weight is
-//! repeated over a whole one. Four outputs at a time have their sums in registers, so that a vector that is read and
-//! a weight that is repeated serve several fused multiplications and additions.
+//! Vertices pass in tiles of one or two vectors, and each weight is repeated over a vector. Four outputs at a time have their
+//! sums in registers, so that each loaded vector serves four multiplications and additions.
 //!
-//! A network that has layers of eight bits ([`super::int8`]) fuses nothing, so that it gives the same bits on every processor.
+//! A network with layers in int8 ([`super::int8`]) fuses no multiplication with an addition, so that it gives the same bits on
+//! every processor.
 
 use super::int8::Words;
-use super::{Layer, MAX_INPUTS, MAX_OUTPUTS, MAX_WIDTH, Network, Numbers};
-use crate::lanes::int8::Whole;
-use crate::lanes::{Kernel, Real, dispatch};
+use super::{Layer, MAX_INPUTS, MAX_OUTPUTS, MAX_WIDTH, Network, Parameters};
+use crate::simd::int8::Whole;
+use crate::simd::{Kernel, Real, dispatch};
 
-/// `COLUMNS` vectors of vertices side by side.
+/// A value of as many vertices as `COLUMNS` vectors hold.
 pub(crate) type Tile<R, const COLUMNS: usize> = [R; COLUMNS];
 
-/// What a layer reads and writes, for a tile of vertices.
+/// What layers read and write, for a tile of vertices.
 pub(crate) struct Scratch<R: Real, const COLUMNS: usize> {
     here: [Tile<R, COLUMNS>; MAX_WIDTH],
     there: [Tile<R, COLUMNS>; MAX_WIDTH],
@@ -31,8 +31,8 @@ impl<R: Real, const COLUMNS: usize> Scratch<R, COLUMNS> {
     }
 }
 
-/// Outputs that are computed together.
-const TOGETHER: usize = 4;
+/// Outputs computed at a time.
+const ROW_BATCH: usize = 4;
 
 /// `sums + weight values`.
 #[inline(always)]
@@ -42,7 +42,7 @@ fn plus<R: Real, const COLUMNS: usize, const FUSED: bool>(
     values: &Tile<R, COLUMNS>,
 ) -> Tile<R, COLUMNS> {
     let weight = R::splat(weight);
-    // Not a closure: the compiler may leave a call of it standing.
+    // Not a closure, which the compiler may not inline.
     let mut out = sums;
     for column in 0..COLUMNS {
         out[column] = if FUSED {
@@ -63,16 +63,16 @@ fn dense<R: Real, const COLUMNS: usize, const FUSED: bool>(
     to: &mut [Tile<R, COLUMNS>],
 ) {
     let slope = R::splat(layer.activation.slope());
-    let rows = weights.chunks((TOGETHER * layer.inputs).max(1));
-    for ((rows, biases), to) in rows.zip(biases.chunks(TOGETHER)).zip(to.chunks_mut(TOGETHER)) {
-        // Rows that there are not repeat the first, and are not kept.
+    let rows = weights.chunks((ROW_BATCH * layer.inputs).max(1));
+    for ((rows, biases), to) in rows.zip(biases.chunks(ROW_BATCH)).zip(to.chunks_mut(ROW_BATCH)) {
+        // The last batch may be short: it repeats its first row, and drops the result.
         let row = |index: usize| {
             let start = if index < biases.len() { index * layer.inputs } else { 0 };
             rows.get(start..start + layer.inputs).unwrap_or_default()
         };
         let [mut one, mut two, mut three, mut four] =
             [0, 1, 2, 3].map(|index| [R::splat(biases.get(index).copied().unwrap_or(0.0)); COLUMNS]);
-        // Zipped, so that no index has to be checked; four sums by name, so that the compiler keeps them in registers.
+        // Zipped, so that no index is checked; four variables, which the compiler keeps in registers.
         for ((((values, &a), &b), &c), &d) in from.iter().zip(row(0)).zip(row(1)).zip(row(2)).zip(row(3)) {
             one = plus::<R, COLUMNS, FUSED>(one, a, values);
             two = plus::<R, COLUMNS, FUSED>(two, b, values);
@@ -80,7 +80,7 @@ fn dense<R: Real, const COLUMNS: usize, const FUSED: bool>(
             four = plus::<R, COLUMNS, FUSED>(four, d, values);
         }
         for (to, sums) in to.iter_mut().zip([one, two, three, four]).take(biases.len()) {
-            // For slopes from zero to one.
+            // The leaky ReLU for slopes from zero to one.
             for (to, sum) in to.iter_mut().zip(sums) {
                 *to = sum.max(slope * sum);
             }
@@ -88,7 +88,7 @@ fn dense<R: Real, const COLUMNS: usize, const FUSED: bool>(
     }
 }
 
-/// Layers one after the other, from `here` to what is returned.
+/// The layers of a part, from `here` to what is returned.
 #[inline(always)]
 fn run<'a, R: Real, const COLUMNS: usize, const FUSED: bool>(
     layers: &[Layer<'_>],
@@ -97,11 +97,11 @@ fn run<'a, R: Real, const COLUMNS: usize, const FUSED: bool>(
     let Scratch { here, there, words } = scratch;
     let (mut from, mut to) = (here, there);
     for layer in layers {
-        match &layer.numbers {
-            Numbers::Float { weights, biases } => {
+        match &layer.parameters {
+            Parameters::Float { weights, biases } => {
                 dense::<R, COLUMNS, FUSED>(layer, (weights, biases), from.as_slice(), to.as_mut_slice());
             }
-            Numbers::Int8(int8) => {
+            Parameters::Int8(int8) => {
                 let inputs = from.get(..layer.inputs).unwrap_or_default();
                 int8.run(layer.activation, inputs, words, to.as_mut_slice());
             }
@@ -112,7 +112,7 @@ fn run<'a, R: Real, const COLUMNS: usize, const FUSED: bool>(
 }
 
 impl Network<'_> {
-    /// Outputs of a tile of vertices, in their units, from inputs in theirs; what was not clipped is the second array.
+    /// Outputs of a tile of vertices, in their units, from inputs in theirs: clipped, and as they were before.
     #[inline(always)]
     pub(crate) fn forward<R: Real, const COLUMNS: usize>(
         &self,
@@ -136,21 +136,21 @@ impl Network<'_> {
         let mut scaled = *inputs;
         for (values, range) in scaled.iter_mut().zip(self.inputs) {
             for value in values {
-                *value = value.over(R::splat(range.scale));
+                *value = value.divide(R::splat(range.scale));
             }
         }
         let (count, high) = (self.inputs.len(), self.outputs.len());
         let mut sums = [[R::splat(0.0); COLUMNS]; MAX_OUTPUTS];
-        // One loop body for both parts: it is long, and stands here for every instruction set.
-        for (number, layers) in [first, second].into_iter().enumerate() {
-            if number > 0 && layers.is_empty() {
+        // One loop body for both parts: inlined twice it would be twice the code for every instruction set.
+        for (part, layers) in [first, second].into_iter().enumerate() {
+            if part > 0 && layers.is_empty() {
                 break;
             }
             copy(&scaled, &mut scratch.here, count);
             copy(&sums, scratch.here.get_mut(count..).unwrap_or_default(), high);
             for (sums, values) in sums.iter_mut().zip(run::<R, COLUMNS, FUSED>(layers, scratch)).take(high) {
                 for (sum, &value) in sums.iter_mut().zip(values) {
-                    *sum = if number == 0 { value } else { *sum + value };
+                    *sum = if part == 0 { value } else { *sum + value };
                 }
             }
         }
@@ -178,8 +178,8 @@ impl Network<'_> {
     }
 
     /// The same for many vertices: rows of as many inputs as the network has, and of as many outputs. Rows that are not
-    /// whole, or have no counterpart, are left out. Of float32 layers within rounding of [`Network::predict`], and the same bits
-    /// on every processor with the feature `deterministic`; with layers of eight bits the same as there.
+    /// whole, or have no counterpart, are left out. In float32 it agrees with [`Network::predict`] to rounding, and gives the same
+    /// bits on every processor with the feature `deterministic`; with layers in int8 it gives the bits of [`Network::predict`].
     pub fn predict_rows(&self, inputs: &[f32], outputs: &mut [f32]) {
         dispatch(Rows { network: self, inputs, outputs });
     }
@@ -194,7 +194,7 @@ struct Rows<'a> {
 impl Kernel for Rows<'_> {
     type Output = ();
 
-    const ONE_BY_ONE: bool = true;
+    const SCALAR: bool = true;
 
     #[inline(always)]
     fn run<R: Real>(self) {
@@ -212,9 +212,9 @@ impl Rows<'_> {
         else {
             return;
         };
-        let together = COLUMNS * R::COUNT;
+        let vertices = COLUMNS * R::COUNT;
         let mut scratch = Scratch::<R, COLUMNS>::new();
-        for (inputs, outputs) in inputs.chunks(wide * together).zip(outputs.chunks_mut(high * together)) {
+        for (inputs, outputs) in inputs.chunks(wide * vertices).zip(outputs.chunks_mut(high * vertices)) {
             let mut values = [[R::splat(0.0); COLUMNS]; MAX_INPUTS];
             for (input, values) in values.iter_mut().enumerate().take(wide) {
                 for (column, value) in values.iter_mut().enumerate() {

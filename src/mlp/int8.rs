@@ -1,5 +1,5 @@
-//! Layers of eight-bit weights and activations. The inputs of each vertex are brought to `u8` by a step of its own, as wide as they
-//! need; sums are taken in `i32`, and what comes out is `f32` again:
+//! Layers in int8. The inputs of each vertex are quantised to `u8` with a step of its own, just wide enough for the largest; sums
+//! are taken in `i32` and requantised to `f32`:
 //!
 //! ```text
 //! m = max(max_i x_i, -min_i x_i (255 - zero) / zero)        of this vertex, and at least 2^-100
@@ -7,45 +7,45 @@
 //! S_o = sum_i w_oi (q_i - zero)                             in i32, exact
 //! y_o = act(S_o (scale_o m / (255 - zero)) + b_o)
 //! ```
-//! So nothing is ever cut off, and what is small is as exact as what is large. With steps that are the same for all vertices a
-//! roll-out left their range, which was that of the training: the same ranges in 16 bits lost as much as in 8.
+//! So nothing is ever cut off. With one step for all vertices, from the range of the training, roll-outs left that range, and 16
+//! bits lost as much as 8.
 //!
-//! Vertices lie side by side, as in the float32 layers: a weight is repeated over a vector of vertices, so nothing has to be
-//! transposed between layers of either kind.
+//! Vertices are vectorised as in the float32 layers: a weight is repeated over a vector of vertices, so nothing is transposed
+//! between layers of either kind.
 
 use super::forward::Tile;
 use super::{Activation, MAX_WIDTH};
-use crate::lanes::Real;
-use crate::lanes::int8::{ROUNDING, Whole};
+use crate::simd::Real;
+use crate::simd::int8::{ROUNDING, Whole};
 
-/// Inputs whose bytes stand in one word.
+/// Inputs whose bytes are one word.
 pub const GROUP: usize = 4;
-/// Outputs whose weights stand together.
-pub const BLOCK: usize = 8;
-/// Weights of eight outputs and four inputs, output by output.
-pub type WeightTile = [[i8; GROUP]; BLOCK];
-/// Inputs that are all smaller than this are as good as zero, and their step can still be divided by.
+/// Outputs of a tile of weights.
+pub const TILE_ROWS: usize = 8;
+/// Weights of [`TILE_ROWS`] outputs and [`GROUP`] inputs, by rows.
+pub type WeightTile = [[i8; GROUP]; TILE_ROWS];
+/// The least `m`: a step that can still be divided by.
 const LEAST: f32 = 1.0 / (1u128 << 100) as f32;
 
-/// Numbers of a layer of eight bits.
+/// Parameters of a layer in int8.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Int8<'w> {
     /// The activation that stands for zero, 1 to 254.
     pub zero: u8,
-    /// For each eight outputs a tile for each four inputs; what there is not is zero.
+    /// Tile after tile of the inputs for each [`TILE_ROWS`] outputs, zeros where there is no input or output.
     pub weights: &'w [WeightTile],
-    /// Where sums start: `-zero` times the sum of the weights. One an output, with the zeros behind them a multiple of eight.
+    /// Where sums start: `-zero` times the sum of the weights, one an output, and zeros up to a multiple of [`TILE_ROWS`].
     pub starts: &'w [i32],
-    /// What one of the sum is worth for a step of one, one an output and zeros as well.
+    /// Of each output's weights, and zeros as well.
     pub scales: &'w [f32],
-    /// One an output and zeros as well.
+    /// Of each output, and zeros as well.
     pub biases: &'w [f32],
 }
 
 /// Activations of a tile of vertices, four channels a word.
 pub(crate) type Words<R, const COLUMNS: usize> = [[<R as Real>::Whole; COLUMNS]; MAX_WIDTH / GROUP];
 
-/// Float32 inputs to activations, and what a step of them is; an input that is not a number counts as the least.
+/// Quantises inputs. Gives the step of each vertex; an input that is NaN counts as the least.
 #[inline(always)]
 fn quantise<R: Real, const COLUMNS: usize>(
     zero: u8,
@@ -64,15 +64,15 @@ fn quantise<R: Real, const COLUMNS: usize>(
     let (mut inverses, mut steps) = (most, most);
     for column in 0..COLUMNS {
         let most = most[column].max(least[column] * R::splat(-up / down));
-        inverses[column] = R::splat(up).over(most);
-        steps[column] = most.over(R::splat(up));
+        inverses[column] = R::splat(up).divide(most);
+        steps[column] = most.divide(R::splat(up));
     }
     for (from, to) in from.chunks(GROUP).zip(to) {
         for (column, to) in to.iter_mut().enumerate() {
             let mut bits = [R::splat(ROUNDING); GROUP];
             for (bits, from) in bits.iter_mut().zip(from) {
                 let value = from[column % COLUMNS] * inverses[column % COLUMNS];
-                // Not below but by rounding, or if it is no number.
+                // Only rounding gets below, or NaN.
                 *bits = value.max(R::splat(-down)) + R::splat(ROUNDING + down);
             }
             *to = R::Whole::low_bytes(bits);
@@ -81,7 +81,7 @@ fn quantise<R: Real, const COLUMNS: usize>(
     steps
 }
 
-/// Sums of `N` outputs, `first` the first of eight.
+/// Sums of `N` outputs of a tile from `first` on.
 #[inline(always)]
 fn sums<R: Real, const COLUMNS: usize, const N: usize>(
     tiles: &[WeightTile],
@@ -95,7 +95,7 @@ fn sums<R: Real, const COLUMNS: usize, const N: usize>(
     }
     for (values, tile) in from.iter().zip(tiles) {
         for (output, sums) in sums.iter_mut().enumerate() {
-            let weights = tile[(first + output) % BLOCK];
+            let weights = tile[(first + output) % TILE_ROWS];
             for (sum, &value) in sums.iter_mut().zip(values) {
                 *sum = sum.dot(value, weights);
             }
@@ -105,7 +105,7 @@ fn sums<R: Real, const COLUMNS: usize, const N: usize>(
 }
 
 impl Int8<'_> {
-    /// `N` outputs at a time, of activations with these steps.
+    /// All outputs, `N` at a time, from quantised activations and their steps.
     #[inline(always)]
     fn each<R: Real, const COLUMNS: usize, const N: usize>(
         &self,
@@ -117,7 +117,7 @@ impl Int8<'_> {
         let tiles = self.weights.chunks_exact(inputs.div_ceil(GROUP).max(1));
         let tables =
             self.starts.chunks_exact(N).zip(self.scales.chunks_exact(N)).zip(self.biases.chunks_exact(N));
-        let rows = tiles.flat_map(|tiles| (0..BLOCK).step_by(N).map(move |first| (tiles, first)));
+        let rows = tiles.flat_map(|tiles| (0..TILE_ROWS).step_by(N).map(move |first| (tiles, first)));
         for (((tiles, first), ((starts, scales), biases)), to) in rows.zip(tables).zip(to.chunks_exact_mut(N))
         {
             let sums: [_; N] = sums::<R, COLUMNS, N>(tiles, starts, first, from);

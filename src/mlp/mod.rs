@@ -4,7 +4,7 @@
 //! ```text
 //! p = first(x),  y = clip(p + second([x, p])),   layer: z = W x + b, leaky ReLU or linear
 //! ```
-//! `x` are the inputs, each over its scale; outputs are the network's times theirs. A [`Network`] borrows its
+//! `x` are the inputs, each over its scale; `y` is in units of the outputs' scales. A [`Network`] borrows its
 //! weights from the bytes of a weight file (`weights/FORMAT.md`), from flash or a mapped file, without a copy.
 
 #[cfg(feature = "safetensors")]
@@ -20,9 +20,9 @@ mod write;
 
 #[cfg(feature = "safetensors")]
 pub use exchange::{ExchangeError, from_safetensors, to_safetensors};
-pub use file::{ForceInput, MAGIC, Network, Range, Recipe, TrainedLaw, WeightError};
+pub use file::{ForceInput, MAGIC, Network, Range, Recipe, WeightError};
 pub(crate) use forward::Scratch;
-pub use int8::{BLOCK, GROUP, Int8, WeightTile};
+pub use int8::{GROUP, Int8, TILE_ROWS, WeightTile};
 #[cfg(feature = "std")]
 pub use write::{
     Description, Int8Description, LayerDescription, WeightBytes, hexadecimal, write, write_int8,
@@ -50,7 +50,7 @@ pub enum Activation {
 }
 
 impl Activation {
-    /// Of negative numbers.
+    /// Of negative sums.
     #[inline(always)]
     pub(crate) const fn slope(self) -> f32 {
         match self {
@@ -60,31 +60,31 @@ impl Activation {
     }
 }
 
-/// What a layer multiplies with.
+/// Weights and biases of a layer.
 #[derive(Clone, Copy, Debug)]
-pub enum Numbers<'w> {
-    /// `outputs` rows of `inputs` weights, and a bias for each row.
+pub enum Parameters<'w> {
+    /// In float32: `outputs` rows of `inputs` weights, and a bias for each row.
     Float {
         /// By rows.
         weights: &'w [f32],
         /// One a row.
         biases: &'w [f32],
     },
-    /// The same in eight bits.
+    /// In int8.
     Int8(Int8<'w>),
 }
 
 /// A dense layer.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer<'w> {
-    /// Numbers that go in.
+    /// How many values go in.
     pub inputs: usize,
-    /// Numbers that come out.
+    /// How many come out.
     pub outputs: usize,
-    /// What follows.
+    /// What follows its sums.
     pub activation: Activation,
     /// Weights and biases.
-    pub numbers: Numbers<'w>,
+    pub parameters: Parameters<'w>,
 }
 
 impl Layer<'_> {
@@ -93,13 +93,13 @@ impl Layer<'_> {
         inputs: 0,
         outputs: 0,
         activation: Activation::Linear,
-        numbers: Numbers::Float { weights: &[], biases: &[] },
+        parameters: Parameters::Float { weights: &[], biases: &[] },
     };
 
-    /// Whether its numbers are of eight bits.
+    /// Whether it is in int8.
     #[must_use]
     pub const fn is_int8(&self) -> bool {
-        matches!(self.numbers, Numbers::Int8(_))
+        matches!(self.parameters, Parameters::Int8(_))
     }
 
     /// Multiplications and additions.

@@ -1,34 +1,34 @@
-//! Networks in eight bits from networks in float32, by what passes through them on samples of their inputs (post-training
-//! quantisation, Jacob et al. 2018, Nagel et al. 2021).
+//! Post-training quantisation of float32 networks to int8 (Jacob et al. 2018, Nagel et al. 2021), calibrated by samples of their
+//! inputs.
 //!
-//! Layer by layer the samples go through both networks at once. Weights are rounded with a scale for each output,
+//! The samples pass through both networks, layer by layer. Weights are rounded with a scale for each output,
 //!
 //! ```text
 //! w_oi = round(W_oi / scale_o),   scale_o = max_i |W_oi| / 127
 //! ```
-//! and what that does to the outputs is taken back where nothing is rounded: biases make up for the mean (bias correction), and
-//! the last layer of a part, if it is in float32, is fitted anew to what the float32 network predicts, by least squares.
-//! A sample whose prediction is `y`, in standard deviations, counts as `1 / (1 + y^2)`: motion that is fast or rough must stay right
-//! in proportion, or a roll-out rings, but must not decide about slow motion.
+//! and biases are corrected by the mean error that this makes (bias correction). The last layer of a part, if it stays in float32,
+//! is fitted anew to the float32 network's predictions, by least squares. A sample whose prediction is `y`, in standard deviations,
+//! has the weight `1 / (1 + y^2)`: a relative error for fast and rough motion, without which roll-outs ring, an absolute one for
+//! slow motion.
 
 use core::fmt;
 use std::vec;
 use std::vec::Vec;
 
-use super::{Activation, Description, Int8Description, Layer, Network, Numbers, WeightError};
+use super::{Activation, Description, Int8Description, Layer, Network, Parameters, WeightError};
 
-/// Samples that are looked at, at most.
-const ENOUGH: usize = 16_000;
+/// Most samples that are used.
+const MOST_SAMPLES: usize = 16_000;
 /// Activations that may stand for zero; the more, the smaller may the largest negative input be.
 const ZEROS: [u8; 5] = [8, 16, 32, 64, 128];
-/// What keeps a fit from using differences that samples hardly show, of the mean square of what it fits by.
+/// Ridge of the least-squares fit, over the mean square of its inputs.
 const RIDGE: f64 = 1e-6;
 
 /// Why a network is not quantised.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum QuantiseError {
-    /// A layer is of eight bits already.
+    /// A layer is in int8 already.
     Int8 {
         /// Which, from zero.
         layer: usize,
@@ -47,7 +47,7 @@ pub enum QuantiseError {
 impl fmt::Display for QuantiseError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Int8 { layer } => write!(f, "layer {layer} is of eight bits already"),
+            Self::Int8 { layer } => write!(f, "layer {layer} is in int8 already"),
             Self::NoSamples => write!(f, "there are no samples to quantise by"),
             Self::NotFinite { layer } => write!(f, "the samples are not finite before layer {layer}"),
             Self::Weights(error) => write!(f, "{error}"),
@@ -68,25 +68,25 @@ impl From<WeightError> for QuantiseError {
 pub struct Quantised<'w> {
     /// The network with its new biases and last layers.
     pub description: Description<'w>,
-    /// Its layers of eight bits.
+    /// Its layers in int8.
     pub layers: Vec<Option<Int8Description>>,
-    /// Root mean square difference of what each layer hands on from what it ought to, over the standard deviation of that; of
-    /// the samples, as they count. That is what it does in float32, and of the last layer what is still to be corrected as well.
+    /// Root mean square error of each layer's activations over their standard deviation, over the weighted samples. Exact are
+    /// those of the float32 network; the last layer of the second part has to correct the error of the first as well.
     pub errors: Vec<f64>,
 }
 
-/// Samples by rows, as they leave a layer.
+/// Activations of the samples behind a layer, by rows.
 #[derive(Clone)]
-struct Flow {
+struct Activations {
     width: usize,
     /// In the float32 network.
     exact: Vec<f64>,
     /// In the quantised one.
-    found: Vec<f64>,
+    rounded: Vec<f64>,
 }
 
-/// Quantises by samples, rows of as many numbers as the network has inputs, in their units. The layers of `float`, counted through
-/// both parts, stay in float32.
+/// Quantises by samples, rows of the network's inputs in their units. The layers of `float`, counted through both parts, stay in
+/// float32.
 pub fn quantise<'w>(
     network: &Network<'w>,
     samples: &[f32],
@@ -100,10 +100,10 @@ pub fn quantise<'w>(
     if samples.len() < wide {
         return Err(QuantiseError::NoSamples);
     }
-    if samples.iter().any(|number| !number.is_finite()) {
+    if samples.iter().any(|value| !value.is_finite()) {
         return Err(QuantiseError::NotFinite { layer: 0 });
     }
-    let every = (samples.len() / wide).div_ceil(ENOUGH);
+    let every = (samples.len() / wide).div_ceil(MOST_SAMPLES);
     let rows: Vec<f32> = samples.chunks_exact(wide).step_by(every).flatten().copied().collect();
     let mut predicted = vec![0.0; rows.len() / wide * high];
     network.predict_rows(&rows, &mut predicted);
@@ -118,14 +118,14 @@ pub fn quantise<'w>(
     let scaled: Vec<f64> = rows.chunks_exact(wide).flat_map(scaled).collect();
     let mut quantised =
         Quantised { description: Description::of(network), layers: Vec::new(), errors: Vec::new() };
-    let start = Flow { width: wide, exact: scaled.clone(), found: scaled.clone() };
+    let start = Activations { width: wide, exact: scaled.clone(), rounded: scaled.clone() };
     let one = part(first, start, None, (float, &counts), &mut quantised)?;
     if !second.is_empty() {
         let both = |predicted: &[f64]| -> Vec<f64> {
             let rows = scaled.chunks_exact(wide).zip(predicted.chunks_exact(high));
             rows.flat_map(|(x, p)| x.iter().chain(p).copied()).collect()
         };
-        let start = Flow { width: wide + high, exact: both(&one.exact), found: both(&one.found) };
+        let start = Activations { width: wide + high, exact: both(&one.exact), rounded: both(&one.rounded) };
         part(second, start, Some(&one), (float, &counts), &mut quantised)?;
     }
     Ok(quantised)
@@ -134,56 +134,58 @@ pub fn quantise<'w>(
 /// One part, which has to correct what is left of `before`, the part in front of it.
 fn part<'w>(
     layers: &[Layer<'_>],
-    mut flow: Flow,
-    before: Option<&Flow>,
+    mut flow: Activations,
+    before: Option<&Activations>,
     (float, counts): (&[usize], &[f64]),
     quantised: &mut Quantised<'w>,
-) -> Result<Flow, QuantiseError> {
+) -> Result<Activations, QuantiseError> {
     let start = quantised.layers.len();
     for (at, layer) in layers.iter().enumerate() {
         let number = start + at;
-        if flow.found.iter().any(|number| !number.is_finite()) {
+        if flow.rounded.iter().any(|value| !value.is_finite()) {
             return Err(QuantiseError::NotFinite { layer: number });
         }
-        let Numbers::Float { weights, biases } = layer.numbers else {
+        let Parameters::Float { weights, biases } = layer.parameters else {
             return Err(QuantiseError::Int8 { layer: number });
         };
         let mut wanted = dense(weights, biases, &flow.exact, flow.width);
         let last = at + 1 == layers.len() && layer.activation == Activation::Linear;
         if let (true, Some(before)) = (last, before) {
-            for (wanted, (exact, found)) in wanted.iter_mut().zip(before.exact.iter().zip(&before.found)) {
-                *wanted += exact - found;
+            for (wanted, (exact, rounded)) in wanted.iter_mut().zip(before.exact.iter().zip(&before.rounded))
+            {
+                *wanted += exact - rounded;
             }
         }
-        let eight = (!float.contains(&number)).then(|| eight(layer, weights, &flow.found, counts));
+        let int8 = (!float.contains(&number)).then(|| quantised_layer(layer, weights, &flow.rounded, counts));
         let description = &mut quantised.description;
         let described = description.first.iter_mut().chain(&mut description.second).nth(number);
-        let mut found = match &eight {
+        let mut rounded = match &int8 {
             Some((int8, activations)) => int8_dense(int8, biases, activations, flow.width),
-            None => dense(weights, biases, &flow.found, flow.width),
+            None => dense(weights, biases, &flow.rounded, flow.width),
         };
         if let Some(described) = described {
-            let left: Vec<f64> = wanted.iter().zip(&found).map(|(wanted, found)| wanted - found).collect();
-            if eight.is_some() {
+            let left: Vec<f64> =
+                wanted.iter().zip(&rounded).map(|(wanted, rounded)| wanted - rounded).collect();
+            if int8.is_some() {
                 for (output, bias) in described.biases.iter_mut().enumerate() {
                     let off = mean(left.iter().skip(output).step_by(layer.outputs).copied(), counts);
                     *bias += off as f32;
-                    found.iter_mut().skip(output).step_by(layer.outputs).for_each(|sum| *sum += off);
+                    rounded.iter_mut().skip(output).step_by(layer.outputs).for_each(|sum| *sum += off);
                 }
             } else if last && quantised.layers.iter().skip(start).any(Option::is_some) {
-                let changes = fitted(&flow.found, flow.width, &left, layer.outputs, counts);
+                let changes = fitted(&flow.rounded, flow.width, &left, layer.outputs, counts);
                 let rows = described.weights.chunks_mut(flow.width).zip(&mut described.biases);
                 for ((weights, bias), changes) in rows.zip(&changes) {
-                    for (number, change) in weights.iter_mut().chain([bias]).zip(changes) {
-                        *number += *change as f32;
+                    for (value, change) in weights.iter_mut().chain([bias]).zip(changes) {
+                        *value += *change as f32;
                     }
                 }
-                found = dense(&described.weights, &described.biases, &flow.found, flow.width);
+                rounded = dense(&described.weights, &described.biases, &flow.rounded, flow.width);
             }
         }
         let activated = |sums: Vec<f64>| sums.into_iter().map(|sum| act(layer.activation, sum)).collect();
-        flow = Flow { width: layer.outputs, exact: activated(wanted), found: activated(found) };
-        quantised.layers.push(eight.map(|(int8, _)| int8));
+        flow = Activations { width: layer.outputs, exact: activated(wanted), rounded: activated(rounded) };
+        quantised.layers.push(int8.map(|(int8, _)| int8));
         quantised.errors.push(error(&flow, counts));
     }
     Ok(flow)
@@ -204,8 +206,8 @@ fn dense(weights: &[f32], biases: &[f32], samples: &[f64], wide: usize) -> Vec<f
     sums
 }
 
-/// The same in eight bits.
-fn int8_dense(int8: &Int8Description, biases: &[f32], (words, steps): &Activations, wide: usize) -> Vec<f64> {
+/// The same in int8.
+fn int8_dense(int8: &Int8Description, biases: &[f32], (words, steps): &Words, wide: usize) -> Vec<f64> {
     let zero = i32::from(int8.zero);
     let mut sums = Vec::with_capacity(steps.len() * biases.len());
     for (row, step) in words.chunks_exact(wide).zip(steps) {
@@ -218,7 +220,7 @@ fn int8_dense(int8: &Int8Description, biases: &[f32], (words, steps): &Activatio
     sums
 }
 
-/// Of samples that count so much.
+/// Weighted by `counts`.
 fn mean(values: impl Iterator<Item = f64>, counts: &[f64]) -> f64 {
     let weighted =
         values.zip(counts).fold((0.0, 0.0), |(sum, all), (value, count)| (sum + count * value, all + count));
@@ -226,34 +228,34 @@ fn mean(values: impl Iterator<Item = f64>, counts: &[f64]) -> f64 {
 }
 
 /// See [`Quantised::errors`].
-fn error(flow: &Flow, counts: &[f64]) -> f64 {
+fn error(flow: &Activations, counts: &[f64]) -> f64 {
     let squares = |channel: usize| {
         let column = |values: &'_ [f64]| -> Vec<f64> {
             values.iter().skip(channel).step_by(flow.width).copied().collect()
         };
-        let (exact, found) = (column(&flow.exact), column(&flow.found));
+        let (exact, rounded) = (column(&flow.exact), column(&flow.rounded));
         let centre = mean(exact.iter().copied(), counts);
-        let off = exact.iter().zip(&found).map(|(a, b)| (a - b).powi(2));
+        let off = exact.iter().zip(&rounded).map(|(a, b)| (a - b).powi(2));
         (mean(off, counts), mean(exact.iter().map(|value| (value - centre).powi(2)), counts))
     };
     let (off, of) = (0..flow.width).map(squares).fold((0.0, 0.0), |(off, of), (a, b)| (off + a, of + b));
     if of > 0.0 { (off / of).sqrt() } else { 0.0 }
 }
 
-/// Activations by rows, and what a step of each row is.
-type Activations = (Vec<u8>, Vec<f64>);
+/// Quantised activations by rows, and the step of each row.
+type Words = (Vec<u8>, Vec<f64>);
 
-/// A layer in eight bits, and its activations on the samples.
-fn eight(
+/// A layer in int8, and the quantised activations before it.
+fn quantised_layer(
     layer: &Layer<'_>,
     weights: &[f32],
     samples: &[f64],
     counts: &[f64],
-) -> (Int8Description, Activations) {
+) -> (Int8Description, Words) {
     let rows = || samples.chunks_exact(layer.inputs);
-    // The one with which steps are shortest.
-    let worth = |&zero: &u8| mean(rows().map(|row| step(row, zero).powi(2)), counts);
-    let zero = ZEROS.into_iter().min_by(|a, b| worth(a).total_cmp(&worth(b))).unwrap_or(128);
+    // The zero with the shortest steps.
+    let mean_square = |&zero: &u8| mean(rows().map(|row| step(row, zero).powi(2)), counts);
+    let zero = ZEROS.into_iter().min_by(|a, b| mean_square(a).total_cmp(&mean_square(b))).unwrap_or(128);
     let steps: Vec<f64> = rows().map(|row| step(row, zero)).collect();
     let words = rows().zip(&steps).flat_map(|(row, step)| {
         row.iter().map(move |x| (x / step + f64::from(zero)).round_ties_even() as u8)
@@ -268,13 +270,13 @@ fn eight(
     (Int8Description { zero, weights: rounded, scales }, (words, steps))
 }
 
-/// As wide as a row needs it.
+/// The step that a row's largest activation needs.
 fn step(row: &[f64], zero: u8) -> f64 {
     let (up, down) = (f64::from(u8::MAX - zero), f64::from(zero));
     row.iter().fold(1e-30, |most: f64, &x| most.max(x / up).max(-x / down))
 }
 
-/// What has to be added to weights and bias, the last, of each output for sums that are `left` larger: least squares.
+/// Changes of the weights, and last of the bias, of each output that add `left` to its sums: least squares.
 fn fitted(samples: &[f64], wide: usize, left: &[f64], high: usize, counts: &[f64]) -> Vec<Vec<f64>> {
     let n = wide + 1;
     let (mut products, mut sides) = (vec![0.0; n * n], vec![vec![0.0; n]; high]);
@@ -290,13 +292,13 @@ fn fitted(samples: &[f64], wide: usize, left: &[f64], high: usize, counts: &[f64
     }
     let trace: f64 = products.iter().step_by(n + 1).sum();
     products.iter_mut().step_by(n + 1).for_each(|square| *square += RIDGE * trace / n as f64);
-    // Elimination; with the ridge no pivot is zero but where there is nothing to fit by.
+    // Gaussian elimination; the ridge keeps pivots from zero, unless all inputs are zero.
     for k in 0..n {
         let (above, below) = products.split_at_mut((k + 1) * n);
         let pivot = &above[k * n..];
         for (i, line) in below.chunks_exact_mut(n).enumerate() {
             let factor = line[k] / pivot[k].max(f64::MIN_POSITIVE);
-            line[k..].iter_mut().zip(&pivot[k..]).for_each(|(number, above)| *number -= factor * above);
+            line[k..].iter_mut().zip(&pivot[k..]).for_each(|(value, above)| *value -= factor * above);
             sides.iter_mut().for_each(|side| side[k + 1 + i] -= factor * side[k]);
         }
     }

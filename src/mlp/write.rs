@@ -1,19 +1,21 @@
-//! Weight files from what training found, and memory for them on a host with a heap; [`write`] refuses what
+//! Weight files of trained networks, and memory for them on a host with a heap; [`write`] refuses what
 //! [`Network::parse`] would refuse.
 
 use std::format;
 use std::string::String;
+use std::vec;
 use std::vec::Vec;
 
 use super::file::{ALIGNMENT, CHECKED, HEADER, Header, MAGIC, VERSION, VERSION_INT8};
-use super::int8::{BLOCK, GROUP, WeightTile};
+use super::int8::{GROUP, TILE_ROWS, WeightTile};
 use super::layers::{LayerEntry, LongEntry};
-use super::{Activation, ForceInput, Layer, Network, Numbers, Range, TrainedLaw, WeightError};
+use super::{Activation, ForceInput, Layer, Network, Parameters, Range, WeightError};
+use crate::material::AnyLaw;
 
 /// A layer of a network to be written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerDescription {
-    /// Numbers that go in.
+    /// How many values go in.
     pub inputs: usize,
     /// What follows the sums.
     pub activation: Activation,
@@ -23,7 +25,7 @@ pub struct LayerDescription {
     pub biases: Vec<f32>,
 }
 
-/// A layer's numbers in eight bits, see [`super::Int8`]; its biases are the float32 ones.
+/// Weights of a layer in int8, see [`super::Int8`]; its biases stay in float32.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Int8Description {
     /// The activation that stands for zero, 1 to 254.
@@ -46,7 +48,7 @@ pub struct Description<'a> {
     /// The correction, or nothing.
     pub second: Vec<LayerDescription>,
     /// Of the training's tissue.
-    pub law: TrainedLaw,
+    pub law: AnyLaw,
     /// kg/m^3.
     pub density: f32,
     /// 1/s.
@@ -64,14 +66,14 @@ pub struct Description<'a> {
 }
 
 impl<'a> Description<'a> {
-    /// What a network consists of; layers of eight bits have no weights there.
+    /// What a network consists of, without the weights of int8 layers.
     #[must_use]
     pub fn of(network: &Network<'a>) -> Self {
         let layers = |layers: &[Layer<'_>]| {
             let described = |layer: &Layer<'_>| {
-                let (weights, biases) = match layer.numbers {
-                    Numbers::Float { weights, biases } => (weights, biases),
-                    Numbers::Int8(int8) => (&[][..], int8.biases.get(..layer.outputs).unwrap_or_default()),
+                let (weights, biases) = match layer.parameters {
+                    Parameters::Float { weights, biases } => (weights, biases),
+                    Parameters::Int8(int8) => (&[][..], int8.biases.get(..layer.outputs).unwrap_or_default()),
                 };
                 LayerDescription {
                     inputs: layer.inputs,
@@ -112,7 +114,7 @@ impl WeightBytes {
     /// Copies the bytes.
     #[must_use]
     pub fn of(bytes: &[u8]) -> Self {
-        let mut words = std::vec![0; bytes.len().div_ceil(4)];
+        let mut words = vec![0; bytes.len().div_ceil(4)];
         let whole: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
         for (to, from) in whole.iter_mut().zip(bytes) {
             *to = *from;
@@ -127,40 +129,67 @@ impl WeightBytes {
     }
 }
 
-/// Bytes of a file, each array at its place.
+/// Bytes of a file.
 struct Image(Vec<u8>);
 
 impl Image {
-    /// Adds bytes at the next place for an array, and tells where that is.
+    /// Adds an array at the next multiple of [`ALIGNMENT`]. Gives its offset.
     fn add(&mut self, bytes: &[u8]) -> u32 {
         self.0.resize(self.0.len().next_multiple_of(ALIGNMENT), 0);
         let at = self.0.len();
         self.0.extend_from_slice(bytes);
         at as u32
     }
+
+    /// Adds the arrays of a layer. Gives its entry in the layer table.
+    fn add_layer(&mut self, layer: &LayerDescription, int8: Option<&Int8Description>) -> LongEntry {
+        let (activation, slope) = match layer.activation {
+            Activation::Linear => (0, 0.0),
+            Activation::LeakyRelu { slope } => (1, slope),
+        };
+        let (inputs, outputs) = (layer.inputs, layer.biases.len());
+        let mut long = LongEntry::default();
+        if let Some(int8) = int8 {
+            let sums =
+                int8.weights.chunks(inputs.max(1)).map(|row| row.iter().map(|&w| i32::from(w)).sum::<i32>());
+            let starts: Vec<i32> = sums.map(|sum| -i32::from(int8.zero) * sum).collect();
+            long.entry.precision = 1;
+            long.zero = int8.zero.into();
+            long.entry.weights = self.add(bytemuck::cast_slice(&tiles(&int8.weights, inputs, outputs)));
+            long.starts = self.add(bytemuck::cast_slice(&padded(&starts)));
+            long.scales = self.add(bytemuck::cast_slice(&padded(&int8.scales)));
+            long.entry.biases = self.add(bytemuck::cast_slice(&padded(&layer.biases)));
+        } else {
+            long.entry.weights = self.add(bytemuck::cast_slice(&layer.weights));
+            long.entry.biases = self.add(bytemuck::cast_slice(&layer.biases));
+        }
+        let (inputs, outputs) = (inputs as u32, outputs as u32);
+        long.entry = LayerEntry { inputs, outputs, activation, slope, ..long.entry };
+        long
+    }
 }
 
-/// Tiles of eight outputs by four inputs from rows of weights, zero where there is neither.
+/// Tiles of weights from rows of them, zeros where there is no input or output.
 fn tiles(weights: &[i8], inputs: usize, outputs: usize) -> Vec<WeightTile> {
     let mut tiles = Vec::new();
-    for block in 0..outputs.div_ceil(BLOCK) {
+    for rows in 0..outputs.div_ceil(TILE_ROWS) {
         for group in 0..inputs.div_ceil(GROUP) {
             let weight = |output: usize, input: usize| {
                 let there = output < outputs && input < inputs;
                 there.then(|| weights.get(output * inputs + input)).flatten().copied().unwrap_or(0)
             };
             tiles.push(core::array::from_fn(|row| {
-                core::array::from_fn(|index| weight(block * BLOCK + row, group * GROUP + index))
+                core::array::from_fn(|index| weight(rows * TILE_ROWS + row, group * GROUP + index))
             }));
         }
     }
     tiles
 }
 
-/// With zeros behind, a multiple of eight.
-fn padded<T: Clone + Default>(numbers: &[T]) -> Vec<T> {
-    let mut padded = numbers.to_vec();
-    padded.resize(numbers.len().next_multiple_of(BLOCK), T::default());
+/// With zeros up to a multiple of [`TILE_ROWS`].
+fn padded<T: Clone + Default>(values: &[T]) -> Vec<T> {
+    let mut padded = values.to_vec();
+    padded.resize(values.len().next_multiple_of(TILE_ROWS), T::default());
     padded
 }
 
@@ -169,8 +198,8 @@ pub fn write(description: &Description<'_>) -> Result<Vec<u8>, WeightError> {
     write_int8(description, &[])
 }
 
-/// The same with some layers in eight bits: layer `n` of both parts together has the numbers of `int8[n]`, where there are
-/// any, instead of the description's weights. Version 3 if there is one.
+/// The same with some layers in int8: layer `n`, counted through both parts, has the weights of `int8[n]`, where there are any,
+/// instead of the description's. Version 3 if there is one.
 pub fn write_int8(
     description: &Description<'_>,
     int8: &[Option<Int8Description>],
@@ -180,46 +209,14 @@ pub fn write_int8(
     let version = if int8.iter().any(Option::is_some) { VERSION_INT8 } else { VERSION };
     let entry_size = if version == VERSION { size_of::<LayerEntry>() } else { size_of::<LongEntry>() };
     let tables = size_of::<Range>() * (inputs.len() + outputs.len());
-    let mut image = Image(vec_of(HEADER + tables + entry_size * layers.len()));
+    let mut image = Image(vec![0; HEADER + tables + entry_size * layers.len()]);
     let mut entries: Vec<u8> = Vec::new();
     for (number, layer) in layers.iter().enumerate() {
-        let (activation, slope) = match layer.activation {
-            Activation::Linear => (0, 0.0),
-            Activation::LeakyRelu { slope } => (1, slope),
-        };
-        let (inputs, outputs) = (layer.inputs, layer.biases.len());
-        let mut long = LongEntry {
-            entry: LayerEntry {
-                inputs: inputs as u32,
-                outputs: outputs as u32,
-                activation,
-                slope,
-                ..LayerEntry::default()
-            },
-            ..LongEntry::default()
-        };
-        if let Some(int8) = int8.get(number).and_then(Option::as_ref) {
-            let sums =
-                int8.weights.chunks(inputs.max(1)).map(|row| row.iter().map(|&w| i32::from(w)).sum::<i32>());
-            let starts: Vec<i32> = sums.map(|sum| -i32::from(int8.zero) * sum).collect();
-            long.entry.precision = 1;
-            long.zero = int8.zero.into();
-            long.entry.weights = image.add(bytemuck::cast_slice(&tiles(&int8.weights, inputs, outputs)));
-            long.starts = image.add(bytemuck::cast_slice(&padded(&starts)));
-            long.scales = image.add(bytemuck::cast_slice(&padded(&int8.scales)));
-            long.entry.biases = image.add(bytemuck::cast_slice(&padded(&layer.biases)));
-        } else {
-            long.entry.weights = image.add(bytemuck::cast_slice(&layer.weights));
-            long.entry.biases = image.add(bytemuck::cast_slice(&layer.biases));
-        }
-        entries.extend(bytemuck::bytes_of(&long).iter().take(entry_size));
+        let entry = image.add_layer(layer, int8.get(number).and_then(Option::as_ref));
+        entries.extend(bytemuck::bytes_of(&entry).iter().take(entry_size));
     }
     let recipe = image.add(description.recipe.as_bytes());
     let Image(mut bytes) = image;
-    let (law, constants) = match *law {
-        TrainedLaw::NeoHookean { c, d, literal } => (u32::from(literal), [c, d, 0.0, 0.0]),
-        TrainedLaw::Exponential { a, b, d, literal } => (2 + u32::from(literal), [a, b, d, 0.0]),
-    };
     let mut header = Header {
         magic: MAGIC,
         version,
@@ -229,8 +226,8 @@ pub fn write_int8(
         outputs: outputs.len() as u32,
         layers: layers.len() as u32,
         first_layers: first.len() as u32,
-        law,
-        constants,
+        law: law.code(),
+        constants: law.values(),
         density: description.density,
         damping: description.damping,
         step: description.step,
@@ -257,8 +254,4 @@ pub fn write_int8(
 #[must_use]
 pub fn hexadecimal(hash: &[u8; 32]) -> String {
     hash.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-fn vec_of(length: usize) -> Vec<u8> {
-    std::vec![0; length]
 }

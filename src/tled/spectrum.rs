@@ -8,9 +8,10 @@ use std::vec::Vec;
 
 use glam::{DMat3, DVec3};
 
+use crate::element::ElementTile;
 use crate::material::{Invariants, Law, Material, Potential, VolumeFactor};
-use crate::scene::{ElementBlock, NodeInertia, Scene};
-use crate::state::NodeVector;
+use crate::scene::SceneView;
+use crate::simd::NodeVector;
 
 /// Relative change of the largest eigenvalue over [`CHECK`] iterations at which the iteration ends.
 const TOLERANCE: f64 = 1e-8;
@@ -19,21 +20,16 @@ const MOST_ITERATIONS: usize = 2_000;
 
 /// The exact limit of stability at the given displacements, s; infinite if nothing is stiff. Nothing if
 /// there are fewer displacements than nodes or the iteration does not settle.
-pub fn exact_critical_step<M, N, B>(scene: &Scene<M, N, B>, displacement: &[NodeVector]) -> Option<f64>
-where
-    M: Material,
-    N: AsRef<[NodeInertia]>,
-    B: AsRef<[ElementBlock]>,
-{
+pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &[NodeVector]) -> Option<f64> {
     let displacement = displacement.get(..scene.node_count())?;
     let tangents: Vec<Tangent> = scene
         .places()
-        .map(|(block, lane)| {
-            Tangent::new(&scene.material().laws().of(block.element(lane)), block, lane, displacement)
+        .map(|(tile, lane)| {
+            Tangent::new(&scene.material.laws().of(tile.element(lane)), tile, lane, displacement)
         })
         .collect();
     let roots: Vec<DVec3> = scene
-        .inertia()
+        .inertia
         .iter()
         .map(|inertia| DVec3::from_array(inertia.inverse.map(|inverse| f64::from(inverse).sqrt())))
         .collect();
@@ -74,7 +70,7 @@ fn inner(a: &[DVec3], b: &[DVec3]) -> f64 {
 }
 
 fn largest_eigenvalue(start: Vec<DVec3>, product: impl Fn(&[DVec3]) -> Vec<DVec3>) -> Option<f64> {
-    let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
+    let (mut diagonal, mut off_diagonal) = (Vec::new(), Vec::new());
     let norm = inner(&start, &start).sqrt();
     let mut current: Vec<DVec3> = start.iter().map(|v| *v / norm).collect();
     let mut previous = vec![DVec3::ZERO; start.len()];
@@ -90,7 +86,7 @@ fn largest_eigenvalue(start: Vec<DVec3>, product: impl Fn(&[DVec3]) -> Vec<DVec3
         coupling = inner(&next, &next).sqrt();
         let exhausted = coupling <= 1e-12 * along.abs();
         if iteration % CHECK == 0 || exhausted {
-            let value = largest_of_tridiagonal(&diagonal, &beside);
+            let value = largest_of_tridiagonal(&diagonal, &off_diagonal);
             if exhausted || (value - settled).abs() <= TOLERANCE * value.abs() {
                 return Some(value);
             }
@@ -99,7 +95,7 @@ fn largest_eigenvalue(start: Vec<DVec3>, product: impl Fn(&[DVec3]) -> Vec<DVec3
         if !coupling.is_finite() {
             return None;
         }
-        beside.push(coupling);
+        off_diagonal.push(coupling);
         previous = current;
         current = next.into_iter().map(|v| v / coupling).collect();
     }
@@ -107,10 +103,10 @@ fn largest_eigenvalue(start: Vec<DVec3>, product: impl Fn(&[DVec3]) -> Vec<DVec3
 }
 
 /// Bisection on the number of eigenvalues above a value (Sturm sequence).
-fn largest_of_tridiagonal(diagonal: &[f64], beside: &[f64]) -> f64 {
+fn largest_of_tridiagonal(diagonal: &[f64], off_diagonal: &[f64]) -> f64 {
     let reach = |i: usize| {
-        let left = if i > 0 { beside[i - 1].abs() } else { 0.0 };
-        let right = if i + 1 < diagonal.len() { beside[i].abs() } else { 0.0 };
+        let left = if i > 0 { off_diagonal[i - 1].abs() } else { 0.0 };
+        let right = if i + 1 < diagonal.len() { off_diagonal[i].abs() } else { 0.0 };
         left + right
     };
     let mut high = (0..diagonal.len()).map(|i| diagonal[i] + reach(i)).fold(f64::NEG_INFINITY, f64::max);
@@ -119,7 +115,7 @@ fn largest_of_tridiagonal(diagonal: &[f64], beside: &[f64]) -> f64 {
         let middle = 0.5 * (low + high);
         let mut pivot = 1.0;
         let above = (0..diagonal.len()).any(|i| {
-            let square = if i > 0 { beside[i - 1] * beside[i - 1] } else { 0.0 };
+            let square = if i > 0 { off_diagonal[i - 1] * off_diagonal[i - 1] } else { 0.0 };
             pivot = diagonal[i] - middle - square / pivot;
             if pivot == 0.0 {
                 pivot = f64::MIN_POSITIVE;
@@ -154,10 +150,10 @@ struct Tangent {
 }
 
 impl Tangent {
-    fn new<L: Law>(law: &L, block: &ElementBlock, lane: usize, displacement: &[NodeVector]) -> Self {
-        let nodes = [0, 1, 2, 3].map(|corner| block.node(corner, lane));
+    fn new<L: Law>(law: &L, tile: &ElementTile, lane: usize, displacement: &[NodeVector]) -> Self {
+        let nodes = [0, 1, 2, 3].map(|corner| tile.node(corner, lane));
         let slopes = [0, 1, 2].map(|corner| {
-            DVec3::from_array([0, 1, 2].map(|axis| f64::from(block.gradient::<f32>(corner, axis, lane))))
+            DVec3::from_array([0, 1, 2].map(|axis| f64::from(tile.gradient::<f32>(corner, axis, lane))))
         });
         let gradients = [-(slopes[0] + slopes[1] + slopes[2]), slopes[0], slopes[1], slopes[2]];
         let mut h = DMat3::ZERO;
@@ -175,7 +171,7 @@ impl Tangent {
         let curvature = |x: f32| f64::from(wide.distortion_curvature(x, wide.distortion_slope(x)));
         let volume_slope = f64::from(wide.volume_slope(at.j));
         let volume_curvature = f64::from(wide.volume_curvature(at.j));
-        let volume = f64::from(block.volume::<f32>(lane));
+        let volume = f64::from(tile.volume::<f32>(lane));
         let base = Self {
             nodes,
             gradients,

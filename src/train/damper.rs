@@ -1,6 +1,6 @@
-//! The network that damps rough motion in a multilevel step ([`crate::inertia::Damper`]), found by trying: its weights are
-//! drawn around the best so far (CMA-ES), each draw moves the recipe's scenes from rest to the end, and the exact motion judges it.
-//! No gradient passes through the motion, and what is judged is the whole roll-out, not one step of it.
+//! The network of the damped step ([`crate::inertia::Damper`]), trained by random search (CMA-ES): weights are drawn around the
+//! best so far, each draw moves the recipe's scenes from rest to the end, and is judged by the exact motion. No gradient passes
+//! through the motion, and the whole roll-out is judged, not one step of it.
 //!
 //! ```toml
 //! seed = 1
@@ -21,6 +21,7 @@
 //! What is minimised is the mean over motions and steps of `ln (error / error without damping)`, errors being means over nodes and
 //! time. The search starts from the rule of a constant gain.
 
+use core::fmt;
 use core::ops::ControlFlow;
 use std::format;
 use std::string::{String, ToString};
@@ -33,9 +34,8 @@ use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
 use super::TrainError;
-use super::fit::trained_law;
-use crate::lab::method::{Brought, Method};
-use crate::lab::run::run;
+use crate::lab::method::{Method, NetworkFile};
+use crate::lab::run::{hits_snapshots, run};
 use crate::lab::scenes::{self, SceneSpec};
 use crate::lab::truth::{self, Truth};
 use crate::lab::{DT, LabError};
@@ -46,11 +46,12 @@ const INPUTS: usize = 4;
 /// What the search starts from, and the largest gain.
 const GAIN: f64 = 2.0;
 const MOST: f32 = 20.0;
-/// Where the hidden layer looks first, for each input: a ringing that turns by a hundredth or by all of itself in a step, rough
-/// motion of a thousandth or all of the body's, any cosine, `k` of a thousandth to a seventh.
+/// Where the hidden layer's knots lie at the start, for each input (see [`crate::inertia::Damper`]): changes of rough motion from
+/// a hundredth of it to all of it in a step, rough motion from a thousandth to all of the body's, any cosine, `k` from a
+/// thousandth to a seventh.
 const KNOTS: [(f64, f64); INPUTS] = [(-9.0, 0.0), (-7.0, 0.0), (-1.0, 1.0), (-7.0, -2.0)];
 
-/// See the module.
+/// A recipe as the module documents it.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
@@ -100,9 +101,7 @@ impl Recipe {
     /// Reads and checks a recipe.
     pub fn parse(text: &str) -> Result<Self, TrainError> {
         let recipe: Self = toml::from_str(text).map_err(|error| TrainError::Recipe(error.to_string()))?;
-        let refuse = |what: &str, value: &dyn core::fmt::Display, must: &str| {
-            Err(TrainError::Recipe(format!("{what} = {value}: {must}")))
-        };
+        let refuse = |what, value: &dyn fmt::Display, must: &str| Err(TrainError::refused(what, value, must));
         let Self { damper, motion, search, .. } = &recipe;
         if !(1..=MAX_WIDTH).contains(&damper.hidden) {
             return refuse("hidden", &damper.hidden, &format!("it must be from 1 to {MAX_WIDTH}"));
@@ -114,9 +113,7 @@ impl Recipe {
             if !(load.is_finite() && *load != 0.0) {
                 return refuse("load", load, "it must be a number other than zero");
             }
-            if let Some(multiple) =
-                multiples.iter().find(|multiple| !crate::lab::run::hits_snapshots(**multiple))
-            {
+            if let Some(multiple) = multiples.iter().find(|multiple| !hits_snapshots(**multiple)) {
                 return refuse("multiples", multiple, "the laboratory's snapshots must fall on steps");
             }
         }
@@ -159,7 +156,7 @@ pub struct Judged {
 
 /// What a search came to.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub struct Fitted {
     /// The weight file.
     pub bytes: Vec<u8>,
     /// Every motion at every step.
@@ -186,7 +183,7 @@ impl Trial<'_> {
 pub fn train(
     text: &str,
     mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
-) -> Result<Found, TrainError> {
+) -> Result<Fitted, TrainError> {
     let recipe = Recipe::parse(text)?;
     let mut scenes = Vec::new();
     for motion in &recipe.motion {
@@ -200,59 +197,22 @@ pub fn train(
             motion.multiples.iter().map(|&multiple| Trial { spec, truth, load: motion.load, multiple })
         })
         .collect();
-
     let Some((first, _, _)) = scenes.first() else {
         return Err(TrainError::Recipe("no [[motion]]".to_string()));
     };
     let image = |weights: &[f64]| described(&recipe, text, first, weights);
     let start = rule(recipe.damper.hidden);
-    let scales = scales(recipe.damper.hidden);
     let nothing = damped(image(&vec![0.0; start.len()])?)?;
-    let still: Vec<f64> = trials.iter().map(|trial| trial.error(nothing)).collect::<Result<_, _>>()?;
-
-    let weights = |draw: &DVector<f64>| -> Vec<f64> {
-        start
-            .iter()
-            .zip(&scales)
-            .zip(draw.iter())
-            .map(|((start, scale), draw)| start + scale * draw)
-            .collect()
-    };
-    let judge = |draw: &DVector<f64>| -> f64 {
-        let logarithms = || -> Result<f64, TrainError> {
-            let method = damped(image(&weights(draw))?)?;
-            let mut sum = 0.0;
-            for (trial, still) in trials.iter().zip(&still) {
-                sum += (trial.error(method)? / still).ln();
-            }
-            Ok(sum / trials.len() as f64)
-        };
-        // What cannot be tried is no candidate.
-        logarithms().unwrap_or(f64::MAX)
-    };
-    let Search { generations, population, spread } = recipe.search;
-    let mut search = CMAESOptions::new(vec![0.0; start.len()], spread)
-        .population_size(population)
-        .seed(recipe.seed)
-        .max_generations(generations)
-        .build(judge)
-        .map_err(|error| TrainError::Recipe(format!("{error:?}")))?;
-    let began = Instant::now();
-    for generation in 0..generations {
-        let ended = search.next_parallel().is_some();
-        let best = search.overall_best_individual().map_or(f64::NAN, |individual| individual.value);
-        let done = generation + 1;
-        let remaining = began.elapsed().mul_f64((generations - done) as f64 / done as f64);
-        if progress(&Progress { generation: done, generations, best, remaining }).is_break() {
-            return Err(TrainError::Stopped { epoch: done });
+    let undamped: Vec<f64> = trials.iter().map(|trial| trial.error(nothing)).collect::<Result<_, _>>()?;
+    let judge = |weights: &[f64]| -> Result<f64, TrainError> {
+        let method = damped(image(weights)?)?;
+        let mut sum = 0.0;
+        for (trial, undamped) in trials.iter().zip(&undamped) {
+            sum += (trial.error(method)? / undamped).ln();
         }
-        if ended {
-            break;
-        }
-    }
-    let Some(best) = search.overall_best_individual().map(|individual| weights(&individual.point)) else {
-        return Err(TrainError::Diverged { epoch: 0 });
+        Ok(sum / trials.len() as f64)
     };
+    let best = search(&recipe, &start, judge, &mut progress)?;
 
     let bytes = image(&best)?;
     let methods = [Method::Multilevel, nothing, damped(image(&start)?)?, damped(bytes.clone())?];
@@ -269,16 +229,57 @@ pub fn train(
             errors,
         });
     }
-    Ok(Found { bytes, judged })
+    Ok(Fitted { bytes, judged })
+}
+
+/// The weights for which `judge` is least, searched from `start`.
+fn search(
+    recipe: &Recipe,
+    start: &[f64],
+    judge: impl Fn(&[f64]) -> Result<f64, TrainError> + Sync,
+    progress: &mut impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Vec<f64>, TrainError> {
+    let scales = scales(recipe.damper.hidden);
+    let weights = |draw: &DVector<f64>| -> Vec<f64> {
+        start
+            .iter()
+            .zip(&scales)
+            .zip(draw.iter())
+            .map(|((start, scale), draw)| start + scale * draw)
+            .collect()
+    };
+    let Search { generations, population, spread } = recipe.search;
+    let mut search = CMAESOptions::new(vec![0.0; start.len()], spread)
+        .population_size(population)
+        .seed(recipe.seed)
+        .max_generations(generations)
+        // What cannot be tried is no candidate.
+        .build(|draw: &DVector<f64>| judge(&weights(draw)).unwrap_or(f64::MAX))
+        .map_err(|error| TrainError::Recipe(format!("{error:?}")))?;
+    let began = Instant::now();
+    for generation in 0..generations {
+        let ended = search.next_parallel().is_some();
+        let best = search.overall_best_individual().map_or(f64::NAN, |individual| individual.value);
+        let done = generation + 1;
+        let remaining = began.elapsed().mul_f64((generations - done) as f64 / done as f64);
+        if progress(&Progress { generation: done, generations, best, remaining }).is_break() {
+            return Err(TrainError::Stopped { epoch: done });
+        }
+        if ended {
+            break;
+        }
+    }
+    let best = search.overall_best_individual().map(|individual| weights(&individual.point));
+    best.ok_or(TrainError::Diverged { epoch: 0 })
 }
 
 fn damped(bytes: Vec<u8>) -> Result<Method, TrainError> {
     // A few hundred bytes for each draw, for as long as the program runs.
-    Ok(Method::Damped(Brought::kept("damper", &bytes)?))
+    Ok(Method::DampedWith(NetworkFile::leaked("damper", &bytes)?))
 }
 
-/// A gain of [`GAIN`] whatever goes in: rows of the hidden layer, its biases, the output's weights, its bias. The hidden
-/// layer's rows look at one input each, from a knot of its own on, so that a small change of any weight tells.
+/// A gain of [`GAIN`] whatever the inputs: rows of the hidden layer, its biases, the output's weights, its bias. Each row of the
+/// hidden layer is a ramp of one input from a knot on, so that a small change of any weight has an effect.
 fn rule(hidden: usize) -> Vec<f64> {
     let mut weights = vec![0.0; (INPUTS + 2) * hidden + 1];
     for unit in 0..hidden {
@@ -299,7 +300,7 @@ fn scales(hidden: usize) -> Vec<f64> {
 
 fn described(recipe: &Recipe, text: &str, spec: &SceneSpec, weights: &[f64]) -> Result<Vec<u8>, TrainError> {
     let hidden = recipe.damper.hidden;
-    let numbers = |from: usize, to: usize| weights[from..to].iter().map(|weight| *weight as f32).collect();
+    let floats = |from: usize, to: usize| weights[from..to].iter().map(|weight| *weight as f32).collect();
     let range = |least: f32, most: f32| Range { scale: 1.0, least, most };
     let (rows, biases) = (INPUTS * hidden, (INPUTS + 1) * hidden);
     let multiple = recipe.motion.iter().flat_map(|motion| &motion.multiples).max().copied().unwrap_or(1);
@@ -310,18 +311,18 @@ fn described(recipe: &Recipe, text: &str, spec: &SceneSpec, weights: &[f64]) -> 
             LayerDescription {
                 inputs: INPUTS,
                 activation: Activation::LeakyRelu { slope: 0.0 },
-                weights: numbers(0, rows),
-                biases: numbers(rows, biases),
+                weights: floats(0, rows),
+                biases: floats(rows, biases),
             },
             LayerDescription {
                 inputs: hidden,
                 activation: Activation::Linear,
-                weights: numbers(biases, biases + hidden),
-                biases: numbers(biases + hidden, biases + hidden + 1),
+                weights: floats(biases, biases + hidden),
+                biases: floats(biases + hidden, biases + hidden + 1),
             },
         ],
         second: Vec::new(),
-        law: trained_law(&spec.law),
+        law: spec.law,
         density: spec.density,
         damping: spec.damping,
         step: multiple as f32 * DT,

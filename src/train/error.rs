@@ -1,6 +1,7 @@
 //! Why a training could not be done, in a sentence for the person who asked.
 
 use core::fmt;
+use std::format;
 use std::path::PathBuf;
 use std::string::String;
 
@@ -54,6 +55,13 @@ impl fmt::Display for TrainError {
 }
 
 impl core::error::Error for TrainError {}
+
+impl TrainError {
+    /// Of a recipe in which `what` has a `value` that it cannot have.
+    pub(super) fn refused(what: &str, value: impl fmt::Display, must: &str) -> Self {
+        Self::Recipe(format!("{what} = {value}: {must}"))
+    }
+}
 
 impl From<LabError> for TrainError {
     fn from(error: LabError) -> Self {

@@ -21,10 +21,10 @@ use super::noise::Random;
 use super::recipe::{Decay, Recipe};
 use super::samples::Samples;
 use crate::io::write_atomically;
-use crate::lab::scenes::{self, LawSpec};
+use crate::lab::scenes;
 use crate::lab::{DT, LabError};
-use crate::mlp::{self, Activation, Description, LayerDescription, Network, Range, TrainedLaw, WeightBytes};
-use crate::surrogate::{FEATURES, PREDICTED};
+use crate::learned::{FEATURES, PREDICTED};
+use crate::mlp::{self, Activation, Description, LayerDescription, Network, Range, WeightBytes};
 
 /// Both parts.
 #[derive(Module, Debug)]
@@ -73,7 +73,7 @@ pub struct Progress {
     pub done: usize,
     /// See `done`.
     pub samples: usize,
-    /// Mean loss of this epoch so far, in variances of the target, both losses together.
+    /// Mean over this epoch so far of the sum of both losses, in variances of the target.
     pub loss: f64,
     /// Samples a second.
     pub rate: f64,
@@ -143,53 +143,12 @@ pub fn fit(
         first = epoch;
     }
 
-    let count = seen.inputs.len() + seen.rough.inputs.len();
-    let Recipe { training, network, .. } = recipe;
-    let (mut x, mut y) = (scaled(&seen.inputs, &inputs), scaled(&seen.targets, &targets));
-    x.extend(scaled(&seen.rough.inputs, &inputs));
-    y.extend(scaled(&seen.rough.targets, &targets));
-    let mut weights = std::vec![[1.0]; seen.inputs.len()];
-    weights.extend(seen.rough.weights.iter().map(|&weight| [weight]));
-    let start = Instant::now();
-    let mut taken = 0usize;
+    let rows = Rows::of(&seen, &inputs, &targets);
+    let count = rows.inputs.len();
+    let mut training = Training { recipe, rows, device, start: Instant::now(), taken: 0 };
     let mut loss = f64::NAN;
-    for epoch in first..training.epochs {
-        let order = shuffled(count, recipe.seed.wrapping_add(epoch as u64));
-        let rate = match training.decay {
-            Decay::None => training.rate,
-            Decay::Cosine => {
-                let way = epoch as f64 / training.epochs as f64;
-                0.5 * training.rate * (1.0 + (core::f64::consts::PI * way).cos())
-            }
-        };
-        let (mut sum, mut done) = (0.0, 0);
-        for batch in order.chunks(training.batch) {
-            let (input, target) = (gathered(&x, batch, &device), gathered(&y, batch, &device));
-            let (predicted, corrected) = parts.forward(input, f64::from(network.slope));
-            let weight = gathered(&weights, batch, &device);
-            let squares = (predicted - target.clone()).square() + (corrected - target).square();
-            let both = (squares * weight).mean();
-            let gradients = GradientsParams::from_grads(both.backward(), &parts);
-            parts = adam.step(rate, parts, gradients);
-            sum += f64::from(both.into_scalar::<f32>()) * batch.len() as f64;
-            done += batch.len();
-            taken += batch.len();
-            loss = sum / done as f64;
-            let rate = taken as f64 / start.elapsed().as_secs_f64().max(1e-9);
-            let left = (training.epochs - epoch) * count - done;
-            let told = progress(&Progress {
-                epoch,
-                epochs: training.epochs,
-                done,
-                samples: count,
-                loss,
-                rate,
-                remaining: Duration::from_secs_f64(left as f64 / rate),
-            });
-            if told.is_break() {
-                return Err(TrainError::Stopped { epoch });
-            }
-        }
+    for epoch in first..recipe.training.epochs {
+        (parts, loss) = training.epoch(epoch, parts, &mut adam, progress)?;
         if !loss.is_finite() {
             return Err(TrainError::Diverged { epoch });
         }
@@ -204,6 +163,89 @@ pub fn fit(
     Ok(Fitted { bytes, held_out, samples: count, loss })
 }
 
+/// Samples over their scales, the smooth ones first, and the weight of each in the loss.
+struct Rows {
+    inputs: Vec<[f32; FEATURES]>,
+    targets: Vec<[f32; PREDICTED]>,
+    weights: Vec<[f32; 1]>,
+}
+
+impl Rows {
+    fn of(samples: &Samples, inputs: &[Range], targets: &[Range]) -> Self {
+        let mut rows = Self {
+            inputs: scaled(&samples.inputs, inputs),
+            targets: scaled(&samples.targets, targets),
+            weights: std::vec![[1.0]; samples.inputs.len()],
+        };
+        rows.inputs.extend(scaled(&samples.rough.inputs, inputs));
+        rows.targets.extend(scaled(&samples.rough.targets, targets));
+        rows.weights.extend(samples.rough.weights.iter().map(|&weight| [weight]));
+        rows
+    }
+}
+
+/// What the epochs of a training share.
+struct Training<'a> {
+    recipe: &'a Recipe,
+    rows: Rows,
+    device: Device,
+    start: Instant,
+    /// Samples since the start.
+    taken: usize,
+}
+
+impl Training<'_> {
+    /// Gives the parts after the epoch, and its mean loss.
+    fn epoch(
+        &mut self,
+        epoch: usize,
+        mut parts: Parts,
+        adam: &mut ModuleOptimizer,
+        progress: &mut impl FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<(Parts, f64), TrainError> {
+        let Self { recipe: Recipe { training, network, seed, .. }, rows, device, start, taken } = self;
+        let count = rows.inputs.len();
+        let order = shuffled(count, seed.wrapping_add(epoch as u64));
+        let rate = match training.decay {
+            Decay::None => training.rate,
+            Decay::Cosine => {
+                let share = epoch as f64 / training.epochs as f64;
+                0.5 * training.rate * (1.0 + (core::f64::consts::PI * share).cos())
+            }
+        };
+        let (mut sum, mut done, mut loss) = (0.0, 0, f64::NAN);
+        for batch in order.chunks(training.batch) {
+            let (input, target) =
+                (gathered(&rows.inputs, batch, device), gathered(&rows.targets, batch, device));
+            let (predicted, corrected) = parts.forward(input, f64::from(network.slope));
+            let weight = gathered(&rows.weights, batch, device);
+            let squares = (predicted - target.clone()).square() + (corrected - target).square();
+            let both = (squares * weight).mean();
+            let gradients = GradientsParams::from_grads(both.backward(), &parts);
+            parts = adam.step(rate, parts, gradients);
+            sum += f64::from(both.into_scalar::<f32>()) * batch.len() as f64;
+            done += batch.len();
+            *taken += batch.len();
+            loss = sum / done as f64;
+            let rate = *taken as f64 / start.elapsed().as_secs_f64().max(1e-9);
+            let left = (training.epochs - epoch) * count - done;
+            let told = progress(&Progress {
+                epoch,
+                epochs: training.epochs,
+                done,
+                samples: count,
+                loss,
+                rate,
+                remaining: Duration::from_secs_f64(left as f64 / rate),
+            });
+            if told.is_break() {
+                return Err(TrainError::Stopped { epoch });
+            }
+        }
+        Ok((parts, loss))
+    }
+}
+
 /// Rows over the scales.
 fn scaled<const N: usize>(rows: &[[f32; N]], ranges: &[Range]) -> Vec<[f32; N]> {
     let over = |row: &[f32; N]| core::array::from_fn(|column| row[column] / ranges[column].scale);
@@ -211,26 +253,18 @@ fn scaled<const N: usize>(rows: &[[f32; N]], ranges: &[Range]) -> Vec<[f32; N]> 
 }
 
 fn gathered<const N: usize>(rows: &[[f32; N]], batch: &[u32], device: &Device) -> Tensor<2> {
-    let numbers: Vec<f32> = batch.iter().flat_map(|&row| rows[row as usize]).collect();
-    Tensor::from_data(TensorData::new(numbers, [batch.len(), N]), device)
+    let values: Vec<f32> = batch.iter().flat_map(|&row| rows[row as usize]).collect();
+    Tensor::from_data(TensorData::new(values, [batch.len(), N]), device)
 }
 
-/// The numbers below `count` in an order that the seed decides (Fisher and Yates).
+/// The indices below `count` in an order that the seed decides (Fisher and Yates).
 fn shuffled(count: usize, seed: u64) -> Vec<u32> {
     let mut random = Random(seed);
     let mut order: Vec<u32> = (0..count as u32).collect();
     for last in (1..count).rev() {
-        order.swap(last, (random.next() % (last as u64 + 1)) as usize);
+        order.swap(last, (random.next_u64() % (last as u64 + 1)) as usize);
     }
     order
-}
-
-/// The law as a weight file tells it.
-pub(super) fn trained_law(law: &LawSpec) -> TrainedLaw {
-    match *law {
-        LawSpec::Exponential(law) => TrainedLaw::Exponential { a: law.a, b: law.b, d: law.d, literal: false },
-        LawSpec::NeoHookean(law) => TrainedLaw::NeoHookean { c: law.c, d: law.d, literal: false },
-    }
 }
 
 fn described<'a>(
@@ -242,7 +276,6 @@ fn described<'a>(
     outputs: Vec<Range>,
 ) -> Result<Description<'a>, TrainError> {
     let spec = scenes::named(&recipe.motion.scene)?;
-    let law = trained_law(&spec.law);
     let layers = |layers: &[Linear]| -> Vec<LayerDescription> {
         let last = layers.len() - 1;
         let each = layers.iter().enumerate();
@@ -251,8 +284,8 @@ fn described<'a>(
             let activation = if number < last { Activation::LeakyRelu { slope } } else { Activation::Linear };
             let [count, _] = layer.weight.val().dims();
             // burn keeps a column for each output.
-            let weights = numbers(layer.weight.val().transpose());
-            let biases = layer.bias.as_ref().map(|bias| numbers(bias.val())).unwrap_or_default();
+            let weights = values(layer.weight.val().transpose());
+            let biases = layer.bias.as_ref().map(|bias| values(bias.val())).unwrap_or_default();
             LayerDescription { inputs: count, activation, weights, biases }
         })
         .collect()
@@ -262,7 +295,7 @@ fn described<'a>(
         outputs,
         first: layers(&parts.first),
         second: layers(&parts.second),
-        law,
+        law: spec.law,
         density: spec.density,
         damping: spec.damping,
         step: recipe.multiple as f32 * DT,
@@ -273,20 +306,20 @@ fn described<'a>(
     })
 }
 
-fn numbers<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.into_data().try_to_vec().unwrap_or_default()
 }
 
-/// Root mean square errors of the kernel's own forward pass, unclipped motions and all.
+/// Root mean square errors of [`Network::predict`], in standard deviations of each target.
 pub(super) fn judged(bytes: &[u8], samples: &Samples, outputs: &[Range]) -> [f64; PREDICTED] {
     let memory = WeightBytes::of(bytes);
     let mut squares = [0.0; PREDICTED];
     if let Ok(network) = Network::parse(memory.bytes()) {
         for (input, target) in samples.inputs.iter().zip(&samples.targets) {
-            let mut found = [0.0; PREDICTED];
-            network.predict(input, &mut found);
+            let mut predicted = [0.0; PREDICTED];
+            network.predict(input, &mut predicted);
             for (axis, square) in squares.iter_mut().enumerate() {
-                let off = f64::from(found[axis] - target[axis]) / f64::from(outputs[axis].scale);
+                let off = f64::from(predicted[axis] - target[axis]) / f64::from(outputs[axis].scale);
                 *square += off * off;
             }
         }
@@ -347,7 +380,7 @@ impl Folder<'_> {
         adam.save(&state).map_err(|error| problem(&state, error.to_string()))?;
         let hash = mlp::hexadecimal(self.hash);
         write_atomically(&self.mark(), |file| writeln!(file, "{epoch} {hash}")).map_err(LabError::Write)?;
-        // What is left of the epoch before is of no use.
+        // The files of the epoch before are of no more use.
         for old in epoch.checked_sub(1).map(|before| self.files(before)).into_iter().flatten() {
             let _ = std::fs::remove_file(old);
         }

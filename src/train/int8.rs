@@ -1,5 +1,5 @@
-//! Eight bits after the training: a network is quantised by the samples it was trained on, those of rough motion too, without which
-//! roll-outs at long steps ring. It is judged on frames it has not seen.
+//! A trained network in int8, calibrated by the samples it was trained on, those of rough motion too, without which roll-outs at
+//! long steps ring, and judged on frames it has not seen.
 
 use std::format;
 use std::vec::Vec;
@@ -8,11 +8,11 @@ use super::TrainError;
 use super::fit::{is_held_out, judged};
 use super::recipe::Recipe;
 use super::samples::Samples;
+use crate::learned::PREDICTED;
 use crate::mlp::quantise::quantise;
 use crate::mlp::{self, Description, Network};
-use crate::surrogate::PREDICTED;
 
-/// What came of it. Errors are root mean squares on the frames held out, in standard deviations of each target.
+/// A quantised network. Errors are root mean squares on the frames held out, in standard deviations of each target.
 #[derive(Clone, Debug)]
 pub struct Made {
     /// The weight file.
@@ -25,7 +25,7 @@ pub struct Made {
     pub layers: Vec<f64>,
 }
 
-/// Layers that stay in float32 if nobody says otherwise: the first of each part, which sees inputs of a wide range, and the last,
+/// Layers that stay in float32 by default: the first of each part, which sees inputs of a wide range, and the last,
 /// whose few outputs are summed and clipped. They are a small part of the work.
 #[must_use]
 pub fn usual_float_layers(network: &Network<'_>) -> Vec<usize> {

@@ -5,12 +5,12 @@
 //! |---|---|
 //! | [`recipe`] | the configuration, a TOML file |
 //! | [`samples`] | what the exact step does, seen by each vertex in its frame |
-//! | `noise` | the same of rough motion, with targets that lead back |
+//! | `noise` | the same of rough motion, with targets that return to the exact motion |
 //! | [`fit`] | the network on burn, its losses, checkpoints |
-//! | [`int8`] | the same network in eight bits |
+//! | [`int8`] | the same network in int8 |
 //! | [`damper`] | the network that damps rough motion, by roll-outs |
 //!
-//! Same recipe, seed, number of threads and processor, same weights.
+//! The same recipe, seed, number of threads and processor give the same weights.
 
 pub mod damper;
 mod error;

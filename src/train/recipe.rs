@@ -1,4 +1,4 @@
-//! What a network is trained on and how: a TOML file, kept in the weight file it leads to.
+//! What a network is trained on and how: a TOML file, which is kept in the weight file.
 //!
 //! ```toml
 //! seed = 1
@@ -14,9 +14,9 @@
 //!
 //! [noise]                  # may be left out: copies of every frame, moved at random
 //! copies = 1
-//! least = 2e-7             # standard deviation of a vertex's way, m: from here
+//! least = 2e-7             # standard deviation of a vertex's displacement, m: from here
 //! most = 5e-6              # to here, evenly in its logarithm
-//! back = 1.0               # share of the way that the next step takes back
+//! back = 1.0               # share of the displacement that the next step takes back
 //! before = 1.0             # share of it that was not there a step ago
 //! ease = 0.5               # m/s^2: where more is taken back, errors weigh less
 //!
@@ -34,6 +34,7 @@
 //! held_out = 0.1           # share of the frames that are kept for the error at the end
 //! ```
 
+use core::fmt;
 use std::format;
 use std::string::{String, ToString};
 use std::vec::Vec;
@@ -44,7 +45,7 @@ use super::TrainError;
 use crate::lab::scenes;
 use crate::mlp::{ForceInput, MAX_LAYERS, MAX_WIDTH};
 
-/// See the module.
+/// A recipe as the module documents it.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
@@ -54,7 +55,7 @@ pub struct Recipe {
     pub multiple: u32,
     /// What is learned from.
     pub motion: Motion,
-    /// Rough motion beside it.
+    /// Rough motion to learn from as well.
     #[serde(default)]
     pub noise: Option<Noise>,
     /// What learns.
@@ -88,13 +89,13 @@ pub struct Motion {
 pub struct Noise {
     /// Of each frame.
     pub copies: usize,
-    /// Least standard deviation of a vertex's way along each axis, m.
+    /// Least standard deviation of a vertex's displacement along each axis, m.
     pub least: f64,
     /// And largest; evenly spread in the logarithm.
     pub most: f64,
-    /// Share of the way that the next step takes back.
+    /// Share of the displacement that the next step takes back.
     pub back: f64,
-    /// Share of it that was not there a step ago; what was there instead is another such way.
+    /// Share of it that was not there a step ago; there was another random displacement instead.
     #[serde(default)]
     pub before: f64,
     /// Acceleration beyond which errors weigh less, as its square over that of what is taken back, m/s^2.
@@ -162,59 +163,51 @@ impl Recipe {
     }
 
     fn checked(self) -> Result<Self, TrainError> {
-        let refuse = |what: &str, value: String, must: &str| {
-            Err(TrainError::Recipe(format!("{what} = {value}: {must}")))
-        };
+        let refuse = |what, value: &dyn fmt::Display, must: &str| Err(TrainError::refused(what, value, must));
         let Self { multiple, motion, noise, network, training, .. } = &self;
         if !scenes::NAMES.contains(&motion.scene.as_str()) {
-            return refuse(
-                "scene",
-                format!("{:?}", motion.scene),
-                &format!("there are {}", scenes::NAMES.join(", ")),
-            );
+            let must = format!("there are {}", scenes::NAMES.join(", "));
+            return refuse("scene", &format!("{:?}", motion.scene), &must);
         }
         if !(1..=1_000).contains(multiple) {
-            return refuse("multiple", multiple.to_string(), "it must be from 1 to 1000");
+            return refuse("multiple", multiple, "it must be from 1 to 1000");
         }
         if !(motion.from >= 0.0 && motion.to > motion.from && motion.to <= 10.0) {
             let span = format!("{} to {}", motion.from, motion.to);
-            return refuse("from", span, "they must rise, from zero to ten seconds");
+            return refuse("from", &span, "they must rise, from zero to ten seconds");
         }
         if !(motion.load.is_finite() && motion.load != 0.0) {
-            return refuse("load", motion.load.to_string(), "it must be a number other than zero");
+            return refuse("load", &motion.load, "it must be a number other than zero");
         }
         if motion.frames == 0 || motion.frames > 100_000 {
-            return refuse("frames", motion.frames.to_string(), "it must be from 1 to 100000");
+            return refuse("frames", &motion.frames, "it must be from 1 to 100000");
         }
         if let Some(noise) = noise
             && !noise.usable()
         {
             let must = "1 to 100 copies, 0 < least <= most < 1 m, back and before from 0 to 2, ease > 0";
-            return refuse("noise", format!("{noise:?}"), must);
+            return refuse("noise", &format!("{noise:?}"), must);
         }
         let widths = network.hidden.iter().chain(&network.correction);
         if let Some(width) = widths.clone().find(|width| !(1..=MAX_WIDTH).contains(*width)) {
-            return refuse("a width", width.to_string(), &format!("it must be from 1 to {MAX_WIDTH}"));
+            return refuse("a width", width, &format!("it must be from 1 to {MAX_WIDTH}"));
         }
         if widths.count() + 2 > MAX_LAYERS {
             let layers = network.hidden.len() + network.correction.len();
-            return refuse("layers", layers.to_string(), &format!("at most {} hidden ones", MAX_LAYERS - 2));
+            return refuse("layers", &layers, &format!("at most {} hidden ones", MAX_LAYERS - 2));
         }
         if !(0.0..=1.0).contains(&network.slope) {
-            return refuse("slope", network.slope.to_string(), "it must be from 0 to 1");
+            return refuse("slope", &network.slope, "it must be from 0 to 1");
         }
         if training.epochs == 0 || training.batch == 0 {
-            return refuse(
-                "epochs, batch",
-                format!("{}, {}", training.epochs, training.batch),
-                "one at least",
-            );
+            let value = format!("{}, {}", training.epochs, training.batch);
+            return refuse("epochs, batch", &value, "one at least");
         }
         if !(training.rate > 0.0 && training.rate < 1.0) {
-            return refuse("rate", training.rate.to_string(), "it must be between 0 and 1");
+            return refuse("rate", &training.rate, "it must be between 0 and 1");
         }
         if !(0.0..0.9).contains(&training.held_out) {
-            return refuse("held_out", training.held_out.to_string(), "it must be from 0 to 0.9");
+            return refuse("held_out", &training.held_out, "it must be from 0 to 0.9");
         }
         Ok(self)
     }

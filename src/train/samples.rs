@@ -1,30 +1,31 @@
-//! The data set: what the exact step does over each `D`, seen by each vertex in its frame (Meister et al. 2018, section 2).
+//! The data set: what the exact step does over each `D`, as each vertex sees it in its frame (Meister et al. 2018, section 2).
 //!
 //! ```text
 //! at t: u(t), |u(t) - u(t-D)| / D, f_e - K u;   target (u(t+D) - 2 u(t) + u(t-D)) / D^2
 //! ```
-//! Beside each frame may stand copies of it in rough motion, see [`super::noise`].
+//! Copies of each frame in rough motion may be added, see [`super::noise`].
 //!
-//! Vertices that are held or loaded are left out, as in the paper: boundary conditions make them jump. Frames follow
-//! the motion once each `D`, as they do in a roll-out; where the paper's frames lie closer than `D`, several trains of
-//! frames run side by side, each with its own start.
+//! Vertices that are held or loaded are left out, as in the paper: boundary conditions make them jump. Local frames follow the
+//! motion once each `D`, as they do in a roll-out; where the paper's samples lie closer than `D`, several sequences of local
+//! frames are kept at the same time, each with its own start.
 
 use std::vec;
 use std::vec::Vec;
 
 use glam::{DVec3, Vec3A};
 
-use super::noise::{Moment, Moved, Random, SeenAs};
+use super::noise::{Moment, MovedCopy, Random, SeenAs};
 use super::recipe::Recipe;
-use crate::frame::Frame;
-use crate::lab::host::{HostState, Job};
+use crate::element::{ElementLaw, LawWork, with_law};
 use crate::lab::scenes::{self, SceneSpec};
+use crate::lab::truth::exact_step;
 use crate::lab::{DT, INTERVAL_STEPS, LabError};
-use crate::material::Material;
+use crate::learned::frame::Frame;
+use crate::learned::{FEATURES, PREDICTED};
 use crate::mlp::Range;
-use crate::state::NodeVector;
-use crate::surrogate::{FEATURES, PREDICTED};
-use crate::tled::{self, Status, Step};
+use crate::state::{NodeVector, VecState};
+use crate::step::Step;
+use crate::tled;
 
 /// What vertices saw and did, frame by frame.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,7 +40,7 @@ pub struct Samples {
     pub rough: Rough,
 }
 
-/// What vertices see of rough motion, and what leads back to the exact one.
+/// What vertices see of rough motion, and the accelerations that return to the exact one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rough {
     /// As in [`Samples`].
@@ -50,31 +51,11 @@ pub struct Rough {
     pub weights: Vec<f32>,
 }
 
-/// One train of frames, each `D` after the one before.
-struct Train {
-    /// Step of the exact motion at which it started.
-    start: u64,
-    frames: Vec<Frame>,
-    /// Way of each vertex in the last `D`, m.
-    increments: Vec<DVec3>,
-    /// Displacements now, one and two `D` ago.
-    shapes: [Vec<DVec3>; 3],
-    /// What was seen at the latest moment that is to be sampled.
-    asked: Option<Asked>,
-    moments: u64,
-}
-
-/// What waits for its targets.
-struct Asked {
-    smooth: Vec<[f32; FEATURES]>,
-    rough: Vec<Moved>,
-}
-
 impl Samples {
     /// Simulates the recipe's motion and samples it.
     pub fn collect(recipe: &Recipe) -> Result<Self, LabError> {
         let spec = scenes::named(&recipe.motion.scene)?.with_load(recipe.motion.load);
-        spec.with_material(Collect { spec: &spec, recipe })
+        with_law(spec.law, Collect { spec: &spec, recipe })
     }
 
     /// Those of some frames.
@@ -87,9 +68,9 @@ impl Samples {
             some.targets.extend_from_slice(targets);
         }
         let frames = self.inputs.len() / self.vertices.max(1);
-        let block = self.rough.inputs.len() / frames.max(1);
-        for frame in (0..frames).filter(|&frame| block > 0 && wanted(frame)) {
-            let rows = frame * block..(frame + 1) * block;
+        let copies = self.rough.inputs.len() / frames.max(1);
+        for frame in (0..frames).filter(|&frame| copies > 0 && wanted(frame)) {
+            let rows = frame * copies..(frame + 1) * copies;
             some.rough.inputs.extend_from_slice(&self.rough.inputs[rows.clone()]);
             some.rough.targets.extend_from_slice(&self.rough.targets[rows.clone()]);
             some.rough.weights.extend_from_slice(&self.rough.weights[rows]);
@@ -104,6 +85,16 @@ impl Samples {
         widen(&mut inputs, &self.rough.inputs);
         widen(&mut targets, &self.rough.targets);
         (inputs, targets)
+    }
+
+    /// Turns the normal of each sample about its tangent by a random angle.
+    fn turn_normals(&mut self, random: &mut Random) {
+        for (inputs, targets) in self.inputs.iter_mut().zip(&mut self.targets) {
+            turn_normal(inputs, targets, random);
+        }
+        for (inputs, targets) in self.rough.inputs.iter_mut().zip(&mut self.rough.targets) {
+            turn_normal(inputs, targets, random);
+        }
     }
 }
 
@@ -134,109 +125,7 @@ fn widen<const N: usize>(ranges: &mut [Range], rows: &[[f32; N]]) {
     }
 }
 
-struct Collect<'a> {
-    spec: &'a SceneSpec,
-    recipe: &'a Recipe,
-}
-
-impl Job for Collect<'_> {
-    type Output = Result<Samples, LabError>;
-
-    fn run<M: Material + Copy>(self, material: M) -> Self::Output {
-        let Self { spec, recipe } = self;
-        let scene = spec.build(material)?;
-        let step = Step::insist(DT, spec.damping)?;
-        let mut state = spec.state();
-        let nodes = spec.points.len();
-        let without = |mut marks: Vec<bool>, nodes: &mut dyn Iterator<Item = u32>| {
-            for node in nodes {
-                if let Some(mark) = marks.get_mut(node as usize) {
-                    *mark = false;
-                }
-            }
-            marks
-        };
-        let free = without(vec![true; nodes], &mut spec.supports.iter().map(|support| support.node));
-        let kept = without(free.clone(), &mut spec.forces.iter().map(|force| force.node));
-        let mut random = Random(recipe.seed);
-        let kept: Vec<usize> = (0..nodes).filter(|&node| kept[node]).collect();
-        let seen_as = SeenAs { inertia: scene.inertia(), force: recipe.network.force };
-
-        let dt = f64::from(DT);
-        let every = u64::from(recipe.multiple);
-        let long = every as f64 * dt;
-        let span = recipe.motion.to - recipe.motion.from;
-        let trains = ((recipe.motion.frames as f64 * long / span).ceil() as u64).clamp(1, every);
-        let mut trains: Vec<Train> =
-            (0..trains).map(|number| Train::new(number * every / trains, nodes)).collect();
-        // The moments that are nearest to those of equal intervals.
-        let first = (recipe.motion.from / dt).round() as u64;
-        let spacing = span / recipe.motion.frames as f64 / dt;
-        let mut due = 0;
-        let last = (recipe.motion.to / dt).round() as u64 + every;
-
-        let mut samples = Samples { vertices: kept.len(), ..Samples::default() };
-        let mut place = vec![DVec3::ZERO; nodes];
-        for number in 0..=last {
-            // Before the step: displacements of now. After it: the forces of now.
-            let moments: Vec<usize> =
-                (0..trains.len()).filter(|&at| trains[at].is_due(number, every)).collect();
-            for &at in &moments {
-                trains[at].turn(&place);
-                trains[at].answer(&kept, long, &mut samples);
-            }
-            let interval = number as usize / INTERVAL_STEPS as usize;
-            let loads = spec.loads(&scene, interval)?;
-            let asks = |due: usize| {
-                number >= first
-                    && due < recipe.motion.frames
-                    && (number - first) as f64 >= (due as f64 - 0.5) * spacing
-            };
-            // The step leaves displacements behind that are later than its forces.
-            let before = (recipe.noise.is_some() && !moments.is_empty() && asks(due)).then(|| state.clone());
-            match tled::step(&scene, &loads, &mut state, &step) {
-                Status::Ok | Status::Limited { .. } => {}
-                Status::Diverged(divergence) => {
-                    return Err(LabError::Diverged { scene: spec.name, divergence });
-                }
-                Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
-            }
-            for &at in &moments {
-                if asks(due) {
-                    // Forces are found even by a step that is refused.
-                    let forces_of = |moved: &mut HostState| {
-                        let _ = tled::step(&scene, &loads, moved, &step);
-                    };
-                    let copies = before.iter().zip(&recipe.noise).flat_map(|(before, noise)| {
-                        let moment = trains[at].moment(before, &free, long, seen_as);
-                        (0..noise.copies)
-                            .map(|_| moment.moved(noise, &kept, &mut random, forces_of))
-                            .collect::<Vec<_>>()
-                    });
-                    let copies = copies.collect();
-                    trains[at].ask(&kept, long as f32, state.forces(), seen_as, copies);
-                    due += 1;
-                }
-            }
-            // Increments are exact; a displacement in float32 is rounded, and a second difference shows that.
-            for (place, increment) in place.iter_mut().zip(state.increment.iter()) {
-                *place += Vec3A::from(increment.to_array()).as_dvec3();
-            }
-        }
-        if recipe.motion.turned {
-            for (inputs, targets) in samples.inputs.iter_mut().zip(&mut samples.targets) {
-                turn(inputs, targets, &mut random);
-            }
-            for (inputs, targets) in samples.rough.inputs.iter_mut().zip(&mut samples.rough.targets) {
-                turn(inputs, targets, &mut random);
-            }
-        }
-        Ok(samples)
-    }
-}
-
-/// Turns the normal about the tangent by a random angle.
-fn turn(inputs: &mut [f32; FEATURES], targets: &mut [f32; PREDICTED], random: &mut Random) {
+fn turn_normal(inputs: &mut [f32; FEATURES], targets: &mut [f32; PREDICTED], random: &mut Random) {
     let (sin, cos) = (core::f64::consts::TAU * random.unit()).sin_cos();
     let (sin, cos) = (sin as f32, cos as f32);
     let turned = |normal: f32, binormal: f32| (cos * normal + sin * binormal, cos * binormal - sin * normal);
@@ -245,7 +134,149 @@ fn turn(inputs: &mut [f32; FEATURES], targets: &mut [f32; PREDICTED], random: &m
     (targets[1], targets[2]) = turned(targets[1], targets[2]);
 }
 
-impl Train {
+/// When samples are taken, counted in exact steps.
+struct Schedule {
+    /// Exact steps in `D`.
+    every: u64,
+    /// Sequences of local frames.
+    sequences: u64,
+    /// Of the first sampled frame, and from each to the next.
+    first: u64,
+    spacing: f64,
+    frames: usize,
+    /// Of the last target.
+    last: u64,
+}
+
+impl Schedule {
+    fn of(recipe: &Recipe) -> Self {
+        let (motion, dt) = (&recipe.motion, f64::from(DT));
+        let every = u64::from(recipe.multiple);
+        let span = motion.to - motion.from;
+        let long = every as f64 * dt;
+        Self {
+            every,
+            sequences: ((motion.frames as f64 * long / span).ceil() as u64).clamp(1, every),
+            first: (motion.from / dt).round() as u64,
+            spacing: span / motion.frames as f64 / dt,
+            frames: motion.frames,
+            last: (motion.to / dt).round() as u64 + every,
+        }
+    }
+
+    /// Whether the frame is to be sampled at the moment before this step. Moments are those nearest to equal intervals.
+    fn is_due(&self, frame: usize, step: u64) -> bool {
+        step >= self.first
+            && frame < self.frames
+            && (step - self.first) as f64 >= (frame as f64 - 0.5) * self.spacing
+    }
+}
+
+/// Vertices that may move, and of these the ones without a force on them.
+fn free_and_sampled(spec: &SceneSpec) -> (Vec<bool>, Vec<usize>) {
+    let without = |mut marks: Vec<bool>, nodes: &mut dyn Iterator<Item = u32>| {
+        for node in nodes {
+            if let Some(mark) = marks.get_mut(node as usize) {
+                *mark = false;
+            }
+        }
+        marks
+    };
+    let nodes = spec.points.len();
+    let free = without(vec![true; nodes], &mut spec.supports.iter().map(|support| support.node));
+    let sampled = without(free.clone(), &mut spec.forces.iter().map(|force| force.node));
+    (free, (0..nodes).filter(|&node| sampled[node]).collect())
+}
+
+struct Collect<'a> {
+    spec: &'a SceneSpec,
+    recipe: &'a Recipe,
+}
+
+impl LawWork for Collect<'_> {
+    type Output = Result<Samples, LabError>;
+
+    fn run<L: ElementLaw>(self, law: L) -> Self::Output {
+        let Self { spec, recipe } = self;
+        let scene = spec.build(law)?;
+        let step = Step::unchecked(DT, spec.damping)?;
+        let nodes = spec.points.len();
+        let mut state = VecState::at_rest(nodes);
+        let (free, sampled) = free_and_sampled(spec);
+        let mut random = Random(recipe.seed);
+        let masses: Vec<f32> = (0..nodes).map(|node| scene.view().node_mass(node)).collect();
+        let seen_as = SeenAs { masses: &masses, force: recipe.network.force };
+
+        let schedule = Schedule::of(recipe);
+        let Schedule { every, sequences: count, last, .. } = schedule;
+        let long = every as f64 * f64::from(DT);
+        let mut sequences: Vec<Sequence> =
+            (0..count).map(|number| Sequence::new(number * every / count, nodes)).collect();
+        let mut frame = 0;
+        let mut samples = Samples { vertices: sampled.len(), ..Samples::default() };
+        // Increments are exact; a displacement in float32 is rounded, and a second difference shows that.
+        let mut place = vec![DVec3::ZERO; nodes];
+        for number in 0..=last {
+            // Displacements are those before the step; its forces, of the same moment, are known after it.
+            let moments: Vec<usize> =
+                (0..sequences.len()).filter(|&at| sequences[at].has_moment(number, every)).collect();
+            for &at in &moments {
+                sequences[at].add_shape(&place);
+                sequences[at].add_targets(&sampled, long, &mut samples);
+            }
+            let loads = spec.loads(&scene, number as usize / INTERVAL_STEPS as usize)?;
+            let keeps = recipe.noise.is_some() && !moments.is_empty() && schedule.is_due(frame, number);
+            let before = keeps.then(|| state.clone());
+            exact_step(spec, &scene, &loads, &mut state, &step)?;
+            for &at in &moments {
+                if !schedule.is_due(frame, number) {
+                    continue;
+                }
+                // Forces are known even after a step that is refused.
+                let forces_of = |moved: &mut VecState| {
+                    let _ = tled::step(&scene, &loads, moved, &step);
+                };
+                let copies = before.iter().zip(&recipe.noise).flat_map(|(before, noise)| {
+                    let moment = sequences[at].moment(before, &free, long, seen_as);
+                    let copy = |_| moment.moved(noise, &sampled, &mut random, forces_of);
+                    (0..noise.copies).map(copy).collect::<Vec<_>>()
+                });
+                let copies = copies.collect();
+                sequences[at].sample(&sampled, long as f32, state.forces(), seen_as, copies);
+                frame += 1;
+            }
+            for (place, increment) in place.iter_mut().zip(state.view().increment.iter()) {
+                *place += Vec3A::from(increment.to_array()).as_dvec3();
+            }
+        }
+        if recipe.motion.turned {
+            samples.turn_normals(&mut random);
+        }
+        Ok(samples)
+    }
+}
+
+/// Local frames that follow the motion each `D`.
+struct Sequence {
+    /// Exact steps before its first moment.
+    start: u64,
+    frames: Vec<Frame>,
+    /// Of each vertex in the last `D`, m.
+    increments: Vec<DVec3>,
+    /// Displacements now, one and two `D` ago.
+    shapes: [Vec<DVec3>; 3],
+    /// Inputs of the latest moment, if it was sampled: their targets are known after the next `D`.
+    pending: Option<Pending>,
+    moments: u64,
+}
+
+/// Inputs without targets.
+struct Pending {
+    smooth: Vec<[f32; FEATURES]>,
+    rough: Vec<MovedCopy>,
+}
+
+impl Sequence {
     fn new(start: u64, nodes: usize) -> Self {
         let still = || vec![DVec3::ZERO; nodes];
         let shapes = [still(), still(), still()];
@@ -254,36 +285,36 @@ impl Train {
             frames: vec![Frame::WORLD; nodes],
             increments: still(),
             shapes,
-            asked: None,
+            pending: None,
             moments: 0,
         }
     }
 
-    fn is_due(&self, number: u64, every: u64) -> bool {
+    fn has_moment(&self, number: u64, every: u64) -> bool {
         number >= self.start && (number - self.start).is_multiple_of(every)
     }
 
     /// A `D` has passed.
-    fn turn(&mut self, place: &[DVec3]) {
+    fn add_shape(&mut self, place: &[DVec3]) {
         self.shapes.rotate_right(1);
         self.shapes[0].copy_from_slice(place);
         self.moments += 1;
     }
 
-    /// Targets for what was asked a `D` ago.
-    fn answer(&mut self, kept: &[usize], long: f64, samples: &mut Samples) {
+    /// Completes the samples of a `D` ago, and follows the motion since.
+    fn add_targets(&mut self, sampled: &[usize], long: f64, samples: &mut Samples) {
         let [now, one, two] = &self.shapes;
-        if let Some(asked) = self.asked.take() {
-            samples.inputs.extend(asked.smooth);
-            for copy in asked.rough {
-                for (seen, &node) in copy.seen.iter().zip(kept) {
+        if let Some(pending) = self.pending.take() {
+            samples.inputs.extend(pending.smooth);
+            for copy in pending.rough {
+                for (seen, &node) in copy.seen.iter().zip(sampled) {
                     let acceleration = (now[node] - 2.0 * one[node] + two[node] - seen.back) / (long * long);
                     samples.rough.inputs.push(seen.inputs);
                     samples.rough.targets.push(seen.frame.axes().local(acceleration.as_vec3().to_array()));
                     samples.rough.weights.push(copy.weight);
                 }
             }
-            for &node in kept {
+            for &node in sampled {
                 let acceleration = (now[node] - 2.0 * one[node] + two[node]) / (long * long);
                 samples.targets.push(self.frames[node].axes().local(acceleration.as_vec3().to_array()));
             }
@@ -297,7 +328,7 @@ impl Train {
 
     fn moment<'a>(
         &'a self,
-        state: &'a HostState,
+        state: &'a VecState,
         free: &'a [bool],
         long: f64,
         seen_as: SeenAs<'a>,
@@ -307,23 +338,23 @@ impl Train {
     }
 
     /// Inputs of now.
-    fn ask(
+    fn sample(
         &mut self,
-        kept: &[usize],
+        sampled: &[usize],
         long: f32,
         forces: &[NodeVector],
         seen_as: SeenAs<'_>,
-        rough: Vec<Moved>,
+        rough: Vec<MovedCopy>,
     ) {
         // The first moment has no velocity.
         if self.moments < 2 {
             return;
         }
         let [now, ..] = &self.shapes;
-        let inputs = kept.iter().map(|&node| {
+        let inputs = sampled.iter().map(|&node| {
             let speed = self.increments[node].length() as f32 / long;
             seen_as.features(node, &self.frames[node], now[node].as_vec3().to_array(), speed, forces[node])
         });
-        self.asked = Some(Asked { smooth: inputs.collect(), rough });
+        self.pending = Some(Pending { smooth: inputs.collect(), rough });
     }
 }

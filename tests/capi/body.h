@@ -1,4 +1,4 @@
-/* What the tests of the C face share: a bar of the paper's exponential tissue in static memory, fixed at one end, whose other end
+/* What the tests of the C API share: a bar of the paper's exponential tissue in static memory, fixed at one end, whose other end
  * can be moved; a check that names its line; a hash, to see that nothing has changed. */
 #ifndef BODY_H
 #define BODY_H

@@ -1,5 +1,5 @@
 /* A state goes on to the bit where it stops: copied by memcpy to other memory, saved to bytes and restored, cut into any number of
- * parts in any order of threads; and every step leads there: exact, learned, mass-scaled, multilevel, damped. */
+ * parts in any order of threads; by every step: exact, learned, mass-scaled, multilevel, damped. */
 #include "body.h"
 
 enum { ROOM = 4 << 20 };
@@ -104,7 +104,7 @@ static void learned_copied(void) {
     CHECK(supple_set_step(scene, state, &step, NULL) == SUPPLE_OK);
     move_end(scene, loads, 0.01f, -0.005f, 0.01f);
     supple_report report;
-    CHECK(supple_learned_lead(scene, loads, state, learned, 300, NULL, &report) >= 0 && report.steps == 900);
+    CHECK(supple_learned_lead(scene, loads, state, learned, 300 * (double)facts.seconds, NULL, &report) >= 0 && report.steps == 900);
     CHECK(supple_learned_step(scene, loads, state, learned, 10, NULL, &report) >= 0);
     CHECK(report.outside > 0.0f || report.clipped >= 0.0f);
     memcpy(state_memory + SUPPLE_STATE_SIZE(NODES), state_memory, SUPPLE_STATE_SIZE(NODES));

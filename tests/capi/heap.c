@@ -61,7 +61,7 @@ int main(void) {
     const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 3.0f, facts.damping};
     CHECK(supple_set_step(scene, state, &step, NULL) == SUPPLE_OK);
     CHECK(supple_step(scene, loads, state, 50, NULL, NULL) >= 0);
-    CHECK(supple_learned_lead(scene, loads, state, learned, 50, NULL, NULL) >= 0);
+    CHECK(supple_learned_lead(scene, loads, state, learned, 50 * (double)facts.seconds, NULL, NULL) >= 0);
     CHECK(supple_learned_step(scene, loads, state, learned, 20, NULL, NULL) >= 0);
     CHECK(supple_save(state, saved, sizeof saved) == SUPPLE_OK);
     CHECK(supple_restore(state, saved, sizeof saved) == SUPPLE_OK);

@@ -82,8 +82,8 @@ static uint32_t crc32_of(const unsigned char *bytes, size_t count) {
     return ~sum;
 }
 
-/* Where the energy account and the vectors are in it. */
-enum { LEDGER = 48, FRONT = 96 };
+/* Where the energy balance and the vectors are in it. */
+enum { BALANCE = 48, FRONT = 96 };
 
 /* A saved state with one number changed and the checksum put right. */
 static void forge(size_t at, const void *bytes, size_t count) {
@@ -343,7 +343,13 @@ static void networks(void) {
     REFUSED(SUPPLE_E_NOT_LED, supple_learned_step(scene, loads, state, learned, 1, NULL, NULL));
     REFUSED(SUPPLE_E_MISMATCH, supple_learned_lead(small_scene, NULL, small_state, learned, 1, NULL, NULL));
     REFUSED(SUPPLE_E_NULL, supple_learned_lead(scene, loads, state, NULL, 1, NULL, NULL));
-    DONE(supple_learned_lead(scene, loads, state, learned, 5, NULL, NULL));
+    const double no_seconds[3] = {-1e-9, INFINITY, NAN};
+    for (int n = 0; n < 3; n++) {
+        REFUSED(SUPPLE_E_NEGATIVE, supple_learned_lead(scene, loads, state, learned, no_seconds[n], NULL, NULL));
+    }
+    DONE(supple_learned_lead(scene, loads, state, learned, 0.4 * facts.seconds, NULL, NULL)); /* the nearest number: none */
+    REFUSED(SUPPLE_E_NOT_LED, supple_learned_step(scene, loads, state, learned, 1, NULL, NULL));
+    DONE(supple_learned_lead(scene, loads, state, learned, 5 * (double)facts.seconds, NULL, NULL));
     DONE(supple_step(scene, loads, state, 1, NULL, NULL));
     REFUSED(SUPPLE_E_NOT_LED, supple_learned_step(scene, loads, state, learned, 1, NULL, NULL));
 
@@ -405,19 +411,19 @@ static void divergence(void) {
     CHECK(supple_set_step(scene, state, &length, &error) == SUPPLE_E_TOO_STIFF);
     note(SUPPLE_E_TOO_STIFF);
 
-    /* With half the energy in the account: the step is taken, and told not to be exact. */
+    /* With half of its energy in the balance: the step is taken, and told not to be exact. */
     DONE(supple_state_reset(state));
     DONE(supple_set_step(scene, state, &length, NULL));
     move_end(scene, loads, 0.01f, 0.0f, 0.01f);
     DONE(supple_step(scene, loads, state, 100, NULL, &report));
-    const double account[6] = {0.0, 0.0, 0.0, report.kinetic, 0.0, 0.5 * report.kinetic};
-    forge(LEDGER, account, sizeof account);
+    const double balance[6] = {0.0, 0.0, 0.0, report.kinetic, 0.0, 0.5 * report.kinetic};
+    forge(BALANCE, balance, sizeof balance);
     DONE(supple_restore(state, saved, sizeof saved));
     const supple_status limited = supple_step(scene, NULL, state, 1, NULL, &report);
     note(limited);
     CHECK(limited == SUPPLE_LIMITED && report.steps == 1 && report.energy_excess > 0.5f && report.energy_excess < 3.0f);
 
-    /* A network far from its training tells so. With half the energy in the account its step is undone, and the exact one
+    /* A network far from its training tells so. With half of its energy in the balance its step is undone, and the exact one
      * has taken over for good. */
     DONE(supple_state_reset(state));
     DONE(supple_learned_reset(learned));
@@ -426,7 +432,7 @@ static void divergence(void) {
     const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 3.0f, facts.damping};
     DONE(supple_set_step(scene, state, &step, NULL));
     move_end(scene, loads, 0.03f, 0.0f, 0.03f);
-    DONE(supple_learned_lead(scene, loads, state, learned, 100, NULL, &report));
+    DONE(supple_learned_lead(scene, loads, state, learned, 100 * (double)facts.seconds, NULL, &report));
     const supple_status outside = supple_learned_step(scene, loads, state, learned, 50, NULL, &report);
     note(outside);
     CHECK(outside == SUPPLE_OUTSIDE && report.steps == 50 && report.outside > 0.01f);
@@ -434,9 +440,9 @@ static void divergence(void) {
     DONE(supple_state_reset(state));
     DONE(supple_learned_reset(learned));
     move_end(scene, loads, 0.01f, 0.0f, 0.01f);
-    DONE(supple_learned_lead(scene, loads, state, learned, 100, NULL, &report));
+    DONE(supple_learned_lead(scene, loads, state, learned, 100 * (double)facts.seconds, NULL, &report));
     const double less[6] = {0.0, 0.0, 0.0, report.kinetic, 0.0, 0.5 * report.kinetic};
-    forge(LEDGER, less, sizeof less);
+    forge(BALANCE, less, sizeof less);
     DONE(supple_restore(state, saved, sizeof saved));
     const supple_status fell = supple_learned_step(scene, NULL, state, learned, 2, NULL, &report);
     note(fell);
@@ -450,9 +456,9 @@ static void divergence(void) {
     supple_learned *alone = NULL;
     DONE(supple_learned_init(spare, sizeof spare, scene, &without, &alone, NULL));
     DONE(supple_state_reset(state));
-    DONE(supple_learned_lead(scene, loads, state, alone, 100, NULL, &report));
+    DONE(supple_learned_lead(scene, loads, state, alone, 100 * (double)facts.seconds, NULL, &report));
     const double least[6] = {0.0, 0.0, 0.0, 1e-6 * report.kinetic, 0.0, 1e-6 * report.kinetic};
-    forge(LEDGER, least, sizeof least);
+    forge(BALANCE, least, sizeof least);
     DONE(supple_restore(state, saved, sizeof saved));
     CHECK(supple_learned_step(scene, NULL, state, alone, 2, NULL, &report) == SUPPLE_E_DIVERGED_ENERGY && report.steps == 0);
     DONE(supple_restore(state, saved, sizeof saved));

@@ -44,7 +44,7 @@ static void init_learned(void) {
     CHECK(supple_learned_init(learned_memory, sizeof learned_memory, scene, &network, &learned, NULL) == SUPPLE_OK);
 }
 static void learn(void) {
-    CHECK(supple_learned_lead(scene, loads, state, learned, 20, NULL, NULL) >= 0);
+    CHECK(supple_learned_lead(scene, loads, state, learned, 0.006, NULL, NULL) >= 0);
     CHECK(supple_learned_step(scene, loads, state, learned, 2, NULL, NULL) >= 0);
 }
 static void init_large(void) {
@@ -88,7 +88,7 @@ int main(void) {
     } calls[] = {
         {"scene_init", init_scene, 16}, {"state_init", init_state, 2},     {"loads_init", init_loads, 2},
         {"set_step", set_step, 20},     {"step", exact, 20},               {"learned_init", init_learned, 12},
-        {"learned_step", learn, 140},   {"large_init", init_large, 112},   {"large_step", step_large, 40},
+        {"learned_step", learn, 140},   {"large_init", init_large, 100},   {"large_step", step_large, 40},
     };
     const uint32_t levels[2] = {supple_level(), SUPPLE_LEVEL_PORTABLE};
     for (int level = 0; level < 2; level++) {

@@ -40,6 +40,8 @@ fn bad_scenes_are_refused_in_words() {
         (instead("c = 500.0", "c = 500.0\na = 1.0"), "line 9: the law neo-hookean has no constant a"),
         (instead("c = 500.0", "c = -500.0"), "line 8: c is -500, it must be a positive number"),
         (instead("density = 1000.0", "density = nan"), "line 10: density is NaN"),
+        (instead("density = 1000.0", "density = [1]"), "line 10: invalid type: sequence, expected f32"),
+        (instead("density = 1000.0", ""), "line 6: missing field `density`"),
         (with("[[fix]]\nplane = { axis = \"w\", at = 0.0 }\n"), "unknown variant `w`"),
         (
             with("[[fix]]\nplane = { axis = \"x\", at = 0.5 }\n"),
@@ -59,6 +61,10 @@ fn bad_scenes_are_refused_in_words() {
         (
             with("[[region]]\nplane = { axis = \"z\", at = 0.0 }\nb = 1.0\n"),
             "line 15: the law neo-hookean has no constant b",
+        ),
+        (
+            with("[[region]]\ntags = [3]\nlaw = \"exponential\"\n"),
+            "line 15: unknown field `law`, expected one of `tags`",
         ),
         (
             with(

@@ -1,8 +1,8 @@
-//! `supple evaluate`; what it finds is tested in `tests/evaluate.rs`.
+//! `supple evaluate`: what it refuses. Its results are tested in `tests/lab`.
 use crate::Desk;
 
 #[test]
-fn what_does_not_exist_is_named_beside_what_does() {
+fn what_does_not_exist_is_named_with_what_does() {
     let desk = Desk::new();
     for (flag, value, sentence) in [
         ("--scene", "tension", "scene \"tension\" is not known; there are torsion, reversed, "),

@@ -5,7 +5,7 @@ use super::{Desk, bar, names};
 #[test]
 fn a_sound_mesh_is_described() {
     let desk = Desk::new();
-    let lobe = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/lobe.msh");
+    let lobe = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../meshes/lobe.msh");
     let said = desk.supple(&["inspect", lobe]);
     println!("{}", said.out);
     assert_eq!(said.code, 0, "{}", said.err);

@@ -1,12 +1,13 @@
-//! `[surrogate]` in a scene file: the exact step leads, a network takes over, and what it did is told.
+//! `[learned]` in a scene file: after the lead-in of the exact step a network takes over, and what it did is told.
 
-use supple::mlp::{Activation, Description, LayerDescription, Range, TrainedLaw};
+use supple::material::NeoHookean;
+use supple::mlp::{Activation, Description, LayerDescription, Range};
 
 use super::networks::described;
 use super::{Desk, bar, names};
 
 /// A network that brings every vertex to a stop: `a = -40 v`, and the tangent is the direction of the velocity.
-fn brake() -> Description<'static> {
+fn stopping() -> Description<'static> {
     let mut weights = vec![0.0; 21];
     weights[3] = -40.0;
     let range = |most: f32| Range { scale: 1.0, least: -most, most };
@@ -20,7 +21,7 @@ fn brake() -> Description<'static> {
             biases: vec![0.0; 3],
         }],
         second: vec![],
-        law: TrainedLaw::NeoHookean { c: 500.0, d: 15_000.0, literal: false },
+        law: NeoHookean { c: 500.0, d: 15_000.0 }.into(),
         step: 5e-3,
         exact_step: 5e-4,
         ..described(&[7, 3], &[], 1)
@@ -28,26 +29,26 @@ fn brake() -> Description<'static> {
 }
 
 /// A network that makes every vertex faster, by `push` m/s^2 along each axis of its frame.
-fn rocket(push: f32) -> Description<'static> {
-    let mut network = brake();
+fn accelerating(push: f32) -> Description<'static> {
+    let mut network = stopping();
     network.first[0].weights.fill(0.0);
     network.first[0].biases.fill(push);
     network
 }
 
 /// A bar that leans over under gravity from the side, moved by `a.weights`.
-fn leaning(time: &str, surrogate: &str) -> String {
+fn leaning(time: &str, learned: &str) -> String {
     let body = bar("").replace("damping = 20.0\n", "");
     format!(
         "gravity = [1.0, 0.0, 0.0]\n{body}[[fix]]\nplane = {{ axis = \"z\", at = 0.0 }}\n[time]\n{time}\
-         [surrogate]\nweights = \"a.weights\"\n{surrogate}"
+         [learned]\nweights = \"a.weights\"\n{learned}"
     )
 }
 
 /// The same without a network.
-fn alone(time: &str) -> String {
+fn without_network(time: &str) -> String {
     let scene = leaning(time, "");
-    format!("damping = 20.0\n{}", scene.split("[surrogate]").next().unwrap())
+    format!("damping = 20.0\n{}", scene.split("[learned]").next().unwrap())
 }
 
 fn far(desk: &Desk) -> f64 {
@@ -57,12 +58,12 @@ fn far(desk: &Desk) -> f64 {
 #[test]
 fn a_network_takes_over_after_the_exact_step_and_says_what_it_did() {
     let desk = Desk::new();
-    desk.network("a.weights", &brake());
+    desk.network("a.weights", &stopping());
     // Where the bar has come to a stop.
     assert_eq!(desk.simulate(&leaning("step = \"auto\"\nend = 0.3\n", "burn_in = 0.1\n"), &[]).code, 0);
     let stopped = far(&desk);
-    assert_eq!(desk.simulate(&alone("step = \"auto\"\nend = 0.4\n"), &["--force"]).code, 0);
-    assert!(desk.summary()["surrogate"].is_null());
+    assert_eq!(desk.simulate(&without_network("step = \"auto\"\nend = 0.4\n"), &["--force"]).code, 0);
+    assert!(desk.summary()["learned"].is_null());
     assert!((far(&desk) / stopped - 1.0).abs() > 0.05, "{} {stopped}", far(&desk));
 
     for step in ["\"auto\"", "5e-4"] {
@@ -74,7 +75,7 @@ fn a_network_takes_over_after_the_exact_step_and_says_what_it_did() {
         let summary = desk.summary();
         assert_eq!((&summary["method"], &summary["status"]), (&"learned".into(), &"ok".into()));
         assert_eq!(summary["damping_per_s"], 20.0);
-        let network = &summary["surrogate"];
+        let network = &summary["learned"];
         assert!(network["weights"].as_str().unwrap().ends_with("a.weights"));
         assert_eq!((&network["steps"], &network["step_s"]), (&60.into(), &5e-3.into()));
         assert!((network["from_s"].as_f64().unwrap() - 0.1).abs() < 1e-6);
@@ -96,25 +97,25 @@ fn a_network_takes_over_after_the_exact_step_and_says_what_it_did() {
 }
 
 #[test]
-fn the_last_exact_interval_leads_into_the_first_learned_step() {
+fn the_first_learned_step_goes_on_from_the_last_interval_of_the_lead_in() {
     let desk = Desk::new();
     // No acceleration: every vertex goes on as it went over the last interval.
-    let mut network = brake();
+    let mut network = stopping();
     network.first[0].weights.fill(0.0);
     desk.network("a.weights", &network);
-    let end = |end: f64, surrogate: &str| {
+    let end = |end: f64, learned: &str| {
         let time = format!("step = 5e-4\nend = {end}\n");
-        let scene = if surrogate.is_empty() { alone(&time) } else { leaning(&time, surrogate) };
+        let scene = if learned.is_empty() { without_network(&time) } else { leaning(&time, learned) };
         let said = desk.simulate(&scene, &["--force"]);
         assert_eq!(said.code, 0, "{}", said.err);
         desk.last()
     };
-    let (before, led) = (end(0.045, ""), end(0.05, ""));
+    let (before, after) = (end(0.045, ""), end(0.05, ""));
     let learned = end(0.06, "burn_in = 0.05\n");
-    for ((before, led), learned) in before.iter().zip(&led).zip(&learned) {
+    for ((before, after), learned) in before.iter().zip(&after).zip(&learned) {
         for axis in 4..7 {
-            let foretold = led[axis] + 2.0 * (led[axis] - before[axis]);
-            assert!((learned[axis] - foretold).abs() < 1e-8, "{foretold} {}", learned[axis]);
+            let expected = after[axis] + 2.0 * (after[axis] - before[axis]);
+            assert!((learned[axis] - expected).abs() < 1e-8, "{expected} {}", learned[axis]);
         }
     }
 }
@@ -122,7 +123,7 @@ fn the_last_exact_interval_leads_into_the_first_learned_step() {
 #[test]
 fn shares_that_were_clipped_and_outside_are_told() {
     let desk = Desk::new();
-    let mut network = brake();
+    let mut network = stopping();
     for range in network.inputs.iter_mut().chain(&mut network.outputs) {
         (range.least, range.most) = (-1e-9, 1e-9);
     }
@@ -130,7 +131,7 @@ fn shares_that_were_clipped_and_outside_are_told() {
     let said = desk.simulate(&leaning("step = \"auto\"\nend = 0.2\n", "burn_in = 0.1\n"), &[]);
     println!("{}{}", said.out, said.err);
     assert_eq!(said.code, 0, "{}", said.err);
-    let network = &desk.summary()["surrogate"];
+    let network = &desk.summary()["learned"];
     for share in ["clipped_share", "clipped_share_most", "outside_share", "outside_share_most"] {
         assert_eq!(network[share], 1.0, "{share}");
     }
@@ -141,7 +142,7 @@ fn shares_that_were_clipped_and_outside_are_told() {
 #[test]
 fn a_network_that_cannot_be_believed_ends_the_run_or_gives_way_to_the_exact_step() {
     let desk = Desk::new();
-    desk.network("a.weights", &rocket(900.0));
+    desk.network("a.weights", &accelerating(900.0));
     let time = "step = \"auto\"\nend = 0.4\nframes = 4\n";
     let said = desk.simulate(&leaning(time, "burn_in = 0.1\n"), &[]);
     print!("{}", said.err);
@@ -149,16 +150,16 @@ fn a_network_that_cannot_be_believed_ends_the_run_or_gives_way_to_the_exact_step
     assert!(said.err.contains("loads and supports never gave more"), "{}", said.err);
     assert_eq!(desk.summary()["status"], "diverged");
 
-    assert_eq!(desk.simulate(&alone(time), &["--force"]).code, 0);
+    assert_eq!(desk.simulate(&without_network(time), &["--force"]).code, 0);
     let exact = far(&desk);
     for (push, latest, why) in [(900.0, 0.101, "diverged at 0.1"), (3.0, 0.2, "exceeded what loads")] {
-        desk.network("a.weights", &rocket(push));
+        desk.network("a.weights", &accelerating(push));
         let said = desk.simulate(&leaning(time, "burn_in = 0.1\nfallback = true\n"), &["--force"]);
         print!("{}{}", said.out, said.err);
         assert_eq!(said.code, 0, "{}", said.err);
         let summary = desk.summary();
         assert_eq!(summary["status"], "fell back");
-        let network = &summary["surrogate"];
+        let network = &summary["learned"];
         let at = network["fell_back_at_s"].as_f64().unwrap();
         assert!((0.099..latest).contains(&at), "{at}");
         assert!(network["fell_back_because"].as_str().unwrap().starts_with(why), "{network}");
@@ -174,7 +175,7 @@ fn a_network_that_cannot_be_believed_ends_the_run_or_gives_way_to_the_exact_step
 #[test]
 fn a_tissue_that_the_network_does_not_know_is_remarked_upon() {
     let desk = Desk::new();
-    desk.network("a.weights", &brake());
+    desk.network("a.weights", &stopping());
     let scene = leaning("step = \"auto\"\nend = 0.2\n", "burn_in = 0.1\n");
     for (known, other) in [("c = 500.0", "c = 600.0"), ("density = 1000.0", "density = 1100.0")] {
         let said = desk.simulate(&scene.replace(known, other), &["--force"]);
@@ -193,7 +194,7 @@ fn a_tissue_that_the_network_does_not_know_is_remarked_upon() {
 #[test]
 fn what_does_not_go_together_is_refused_in_words() {
     let desk = Desk::new();
-    desk.network("a.weights", &brake());
+    desk.network("a.weights", &stopping());
     desk.network("wide.weights", &described(&[8, 4, 3], &[], 1));
     desk.write("damaged.weights", &"SUPPLE-W".repeat(40));
     let auto = "step = \"auto\"\nend = 0.4\n";
@@ -210,7 +211,7 @@ fn what_does_not_go_together_is_refused_in_words() {
         (leaning("step = 0.1\nend = 0.4\n", ""), "0.1 s and that of ./a.weights 0.005 s, which is no whole"),
         (
             leaning("step = \"20x\"\nmethod = \"multilevel\"\nend = 0.4\n", ""),
-            "line 15: method is \"multilevel\", but with [surrogate] the exact step leads",
+            "line 15: method is \"multilevel\", but with [learned] the exact step leads",
         ),
         (leaning(auto, "burn_in = -0.1\n"), "line 18: burn_in is -0.1 s, it must be zero or more"),
         (
@@ -242,9 +243,24 @@ fn what_does_not_go_together_is_refused_in_words() {
 }
 
 #[test]
+fn the_table_may_have_its_former_name() {
+    let desk = Desk::new();
+    desk.network("a.weights", &stopping());
+    let scene = leaning("step = 5e-4\nend = 0.02\n", "burn_in = 0.01\n");
+    let former = scene.replace("[learned]", "[surrogate]");
+    let said = desk.simulate(&former, &[]);
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
+    assert_eq!(desk.summary()["learned"]["steps"], 2);
+
+    let said = desk.simulate(&format!("{former}[learned]\nweights = \"a.weights\"\n"), &["--force"]);
+    assert_eq!(said.code, 2);
+    assert!(said.err.contains("duplicate field `learned`"), "{}", said.err);
+}
+
+#[test]
 fn inspect_tells_what_a_learned_step_costs() {
     let desk = Desk::new();
-    desk.network("a.weights", &brake());
+    desk.network("a.weights", &stopping());
     desk.write("scene.toml", &leaning("step = \"auto\"\nend = 0.4\n", ""));
     let said = desk.supple(&["inspect", "scene.toml"]);
     println!("{}", said.out);

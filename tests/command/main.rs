@@ -1,8 +1,8 @@
 //! The command as a person uses it: scene files in, folders out, exit codes and sentences.
 mod errors;
 mod evaluate;
+mod inertia;
 mod inspect;
-mod large_steps;
 mod learned;
 mod simulate;
 mod weights;
@@ -74,8 +74,8 @@ impl Desk {
         let mut lines = text.lines();
         assert_eq!(lines.next(), Some("node,x,y,z,ux,uy,uz"));
         let row = |line: &str| {
-            let numbers: Vec<f64> = line.split(',').map(|number| number.parse().unwrap()).collect();
-            numbers.try_into().unwrap()
+            let values: Vec<f64> = line.split(',').map(|value| value.parse().unwrap()).collect();
+            values.try_into().unwrap()
         };
         lines.map(row).collect()
     }

@@ -74,7 +74,7 @@ def grid(dtype=np.float64, regions=True, tets=slice(None), more=True):
     shift = array("shift", POINTS.astype(np.float32))
     shift.SetComponentName(0, "east")
     out.GetPointData().SetVectors(shift)
-    # Both lead to metadata behind the array.
+    # Both make VTK write metadata after the array.
     out.GetPoints().GetData().GetRange(-1)
     return out
 

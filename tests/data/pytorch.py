@@ -42,5 +42,5 @@ if __name__ == "__main__":
     scale = torch.tensor(network.about["inputs"]["scale"])
     with torch.no_grad():
         x = 4 * scale * (2 * torch.rand(64, len(scale)) - 1)
-        for numbers in torch.cat([x, network(x)], dim=-1).tolist():
-            print(*(f"{number:.9g}" for number in numbers), sep=",")
+        for row in torch.cat([x, network(x)], dim=-1).tolist():
+            print(*(f"{value:.9g}" for value in row), sep=",")

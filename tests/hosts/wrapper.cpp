@@ -47,7 +47,7 @@ alignas(supple::align) unsigned char large_memory[SUPPLE_LARGE_SIZE(4, SUPPLE_MA
 const float points[] = {0, 0, 0, 0.01f, 0, 0, 0, 0.01f, 0, 0, 0, 0.01f};
 const std::uint32_t tetrahedra[] = {0, 1, 2, 3}, turned[] = {0, 2, 1, 3}, outside[] = {0, 1, 2, 9};
 const supple::support supports[] = {{0, 7, 0}, {1, 7, 0}, {2, 3, 1}};
-const supple::tissue tissue = {{500, 25000, 0}, 1000};
+const supple::tissue tissue = {{500, 25000}, 1000};
 
 supple::body tetrahedron() {
     supple::body body;
@@ -61,7 +61,7 @@ supple::body tetrahedron() {
 void scenes() {
     supple::body body = tetrahedron();
     body.points = {points, 11};
-    EXPECT_SENTENCE(supple::scene::make(scene_memory, body).error, "fewer bytes or numbers than needed: 11, against 12");
+    EXPECT_SENTENCE(supple::scene::make(scene_memory, body).error, "fewer bytes or floats than needed: 11, against 12");
     body = tetrahedron();
     body.tetrahedra = turned;
     EXPECT(supple::scene::make(scene_memory, body).status == status::e_mesh_inverted);
@@ -121,7 +121,7 @@ void moving(supple::scene scene, supple::loads loads, supple::state state) {
     EXPECT(is_done(state.step(scene, loads, 50)) && is_done(other.value.step(scene, loads, 50)));
     EXPECT(is_done(state.copy_displacements(displacements)) && is_done(other.value.copy_displacements(others)));
     EXPECT(displacements == others);
-    EXPECT_SENTENCE(supple::state::make({other_memory, 8}, scene).error, "fewer bytes or numbers than needed");
+    EXPECT_SENTENCE(supple::state::make({other_memory, 8}, scene).error, "fewer bytes or floats than needed");
     EXPECT(is_done(state.reset()) && state.now().value.steps == 0);
 }
 
@@ -132,7 +132,7 @@ void large(supple::scene scene, supple::loads loads, supple::state state) {
     supple::report report;
     const auto bytes = supple::large::size(scene, points, steps);
     EXPECT(bytes && bytes.value <= sizeof large_memory);
-    EXPECT_SENTENCE(supple::large::size(scene, {points, 9}, steps).error, "fewer bytes or numbers than needed: 9, against 12");
+    EXPECT_SENTENCE(supple::large::size(scene, {points, 9}, steps).error, "fewer bytes or floats than needed: 9, against 12");
     const auto made = supple::large::make(large_memory, scene, state, points, steps);
     EXPECT(made && is_done(made.value.step(scene, loads, state, 3, &report)) && report.added_mass > 0.0f);
     EXPECT(is_done(state.reset()));
@@ -150,7 +150,7 @@ void learned(supple::scene scene, supple::loads loads, supple::state state, cons
     EXPECT(is_done(state.set_step(scene, 0.5f * facts.value.seconds, facts.value.damping)));
     EXPECT(made.value.step(scene, loads, state, 1) == status::e_not_led);
     supple::report report;
-    EXPECT(is_done(made.value.lead(scene, loads, state, 10, &report)) && report.steps == 20);
+    EXPECT(is_done(made.value.lead(scene, loads, state, 10.0 * facts.value.seconds, &report)) && report.steps == 20);
     EXPECT(is_done(made.value.step(scene, loads, state, 5, &report)));
     EXPECT(is_done(made.value.reset()));
 }

@@ -3,7 +3,7 @@
 //!
 //! `K` is never assembled: `K v` is `V (A : grad v) grad N_a` summed over the elements. The eigenvalue comes
 //! from Lanczos with full reorthogonalisation on `M^-1/2 K M^-1/2` (Golub & Van Loan, Matrix Computations,
-//! ch. 10). `K` may be indefinite; the largest positive eigenvalue is found. Mass-proportional damping does
+//! ch. 10). `K` may be indefinite; wanted is the largest positive eigenvalue. Mass-proportional damping does
 //! not change the limit.
 
 use super::law::Law;
@@ -71,11 +71,11 @@ pub fn critical_step(mesh: &Mesh, law: &Law, density: f64, u: &[Vec3], fixed: &[
 /// A start vector with something of every mode: a linear congruential generator (Knuth's MMIX constants).
 fn seed(nodes: usize) -> Vec<Vec3> {
     let mut state = 1_u64;
-    let mut next = || {
+    let mut random = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     };
-    (0..nodes).map(|_| [next(), next(), next()]).collect()
+    (0..nodes).map(|_| [random(), random(), random()]).collect()
 }
 
 fn inner(a: &[Vec3], b: &[Vec3]) -> f64 {

@@ -34,7 +34,7 @@ pub fn cholesky(a: &Matrix) -> Option<Matrix> {
 }
 
 /// `L^T A L`, whose eigenvalues are those of `L L^T A`.
-pub fn between(l: &Matrix, a: &Matrix) -> Matrix {
+pub fn congruent(l: &Matrix, a: &Matrix) -> Matrix {
     let n = a.len();
     let product = |x: &dyn Fn(usize, usize) -> f64, y: &dyn Fn(usize, usize) -> f64| -> Matrix {
         (0..n).map(|i| (0..n).map(|j| (0..n).map(|k| x(i, k) * y(k, j)).sum()).collect()).collect()
@@ -44,7 +44,7 @@ pub fn between(l: &Matrix, a: &Matrix) -> Matrix {
 }
 
 /// `L^-1 A L^-T`, whose eigenvalues are those of `A x = lambda L L^T x`.
-pub fn beside(l: &Matrix, a: &Matrix) -> Matrix {
+pub fn transformed(l: &Matrix, a: &Matrix) -> Matrix {
     let n = a.len();
     let solved = |b: &Matrix| -> Matrix {
         let mut x = b.clone();

@@ -19,7 +19,7 @@ pub const J_MIN: f64 = 0.1;
 /// Above this value of the exponent `b x` the exponential `W` goes on along its tangent.
 pub const EXPONENT_CAP: f64 = 40.0;
 
-/// A hyperelastic law; `a`, `c`, `d` in Pa, `b` a number.
+/// A hyperelastic law; `a`, `c`, `d` in Pa, `b` a pure number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
     /// `c (I1bar - 3) + d (J - 1)^2`.
@@ -33,7 +33,7 @@ pub enum Law {
 }
 
 impl Law {
-    /// The paper's exponential law, its numbers read as kPa, in isochoric form.
+    /// The paper's exponential law, its constants read as kPa, in isochoric form.
     pub const PAPER: Law = Law::Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
 
     /// Volume modulus `d` of `d (J - 1)^2`.
@@ -71,10 +71,10 @@ impl Law {
         if !self.is_isochoric() {
             return [1.0, 0.0, 0.0];
         }
-        let g = |j: f64| j.powf(-2.0 / 3.0);
-        let dg = |j: f64| -2.0 / 3.0 * j.powf(-5.0 / 3.0);
-        let ddg = |j: f64| 10.0 / 9.0 * j.powf(-8.0 / 3.0);
-        if j >= J_MIN { [g(j), dg(j), ddg(j)] } else { [g(J_MIN) + dg(J_MIN) * (j - J_MIN), dg(J_MIN), 0.0] }
+        let at = j.max(J_MIN);
+        let g = at.powf(-2.0 / 3.0);
+        let dg = -2.0 / 3.0 * g / at;
+        if j >= J_MIN { [g, dg, 10.0 / 9.0 * g / (at * at)] } else { [g + dg * (j - J_MIN), dg, 0.0] }
     }
 
     /// `x = g(J) I1 - 3`, the argument of `W`.
@@ -92,27 +92,19 @@ impl Law {
 
     /// First Piola-Kirchhoff stress `P = dPsi/dF` in Pa; not finite where `J = 0` exactly.
     ///
-    /// With `dI1/dF = 2 F` and `dJ/dF = J F^-T`, above [`J_MIN`]
-    /// `P = 2 W' J^(-2/3) (F - I1/3 F^-T) + 2 d (J - 1) J F^-T`.
+    /// With `dI1/dF = 2 F` and `dJ/dF = J F^-T`: `P = W' (2 g F + g' I1 J F^-T) + 2 d (J - 1) J F^-T`.
     pub fn first_piola(&self, f: &Mat3) -> Mat3 {
         let j = determinant(f);
         let i1 = contraction(f, f);
         let f_inv_t = transpose(&inverse(f));
-        let [_, dw, _] = self.shape_response(self.strain_measure(f));
-        let dx = if !self.is_isochoric() {
-            from_fn(|i, k| 2.0 * f[i][k])
-        } else if j >= J_MIN {
-            let factor = 2.0 * j.powf(-2.0 / 3.0);
-            from_fn(|i, k| factor * (f[i][k] - i1 / 3.0 * f_inv_t[i][k]))
-        } else {
-            let [g, dg, _] = self.volume_factor(j);
-            from_fn(|i, k| 2.0 * g * f[i][k] + dg * i1 * j * f_inv_t[i][k])
-        };
-        from_fn(|i, k| dw * dx[i][k] + 2.0 * self.d() * (j - 1.0) * j * f_inv_t[i][k])
+        let [g, dg, _] = self.volume_factor(j);
+        let [_, dw, _] = self.shape_response(g * i1 - 3.0);
+        let of_j = dw * dg * i1 + 2.0 * self.d() * (j - 1.0);
+        from_fn(|i, k| 2.0 * dw * g * f[i][k] + of_j * j * f_inv_t[i][k])
     }
 
     /// Tangent `A_iJkL = dP_iJ / dF_kL` in Pa, analytic: the second derivative of `Psi(I1(F), J(F))` by the
-    /// chain rule, with `d(J F^-T)_iJ / dF_kL = J (F^-T_iJ F^-T_kL - F^-T_iL F^-T_kJ)`.
+    /// product rule, with `d(J F^-T)_iJ / dF_kL = J (F^-T_iJ F^-T_kL - F^-T_iL F^-T_kJ)`.
     pub fn tangent(&self, f: &Mat3) -> Mat9 {
         let jac = determinant(f);
         let i1 = contraction(f, f);

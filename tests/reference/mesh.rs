@@ -61,14 +61,14 @@ impl Mesh {
         for k in 0..nz {
             for j in 0..ny {
                 for i in 0..nx {
-                    for (number, order) in orders.iter().enumerate() {
+                    for (index, order) in orders.iter().enumerate() {
                         let mut corner = [i, j, k];
                         let mut tet = [id(corner); 4];
                         for (step, axis) in order.iter().enumerate() {
                             corner[*axis] += 1;
                             tet[step + 1] = id(corner);
                         }
-                        if number >= 3 {
+                        if index >= 3 {
                             tet.swap(1, 2);
                         }
                         mesh.tets.push(tet);

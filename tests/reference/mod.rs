@@ -13,9 +13,9 @@
 //! - [`critical_step`]: exact `2 / omega_max` of `M^-1 K(u)`
 //! - [`closed_form`]: stresses written out by hand for simple deformations
 //! - [`dense`]: Cholesky factor and eigenvalues of small dense matrices
-//! - [`random`]: numbers and deformation gradients for tests
+//! - [`random`]: random values and deformation gradients for tests
 //!
-//! Several test crates say `mod reference;` and none uses all of it, hence the `allow`.
+//! Several test crates include it and none uses all of it, hence the `allow`.
 #![allow(dead_code, unreachable_pub, unused_imports)]
 
 pub mod closed_form;

@@ -8,7 +8,7 @@ use super::tensor::{IDENTITY, Mat3, Vec3, determinant, from_fn, product, rotatio
 pub struct Random(pub u64);
 
 impl Random {
-    /// The next number.
+    /// The next one.
     pub fn next(&mut self) -> f64 {
         // SplitMix64 (Steele, Lea, Flood 2014).
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -18,12 +18,12 @@ impl Random {
         (z ^ (z >> 31)) as f64 / u64::MAX as f64 * 2.0 - 1.0
     }
 
-    /// Three numbers.
+    /// Three of them.
     pub fn vector(&mut self) -> Vec3 {
         [self.next(), self.next(), self.next()]
     }
 
-    /// Nine numbers.
+    /// Nine of them.
     pub fn matrix(&mut self) -> Mat3 {
         [self.vector(), self.vector(), self.vector()]
     }

@@ -5,9 +5,8 @@ use std::path::Path;
 use supple::loads::NodalForce;
 use supple::material::Material;
 use supple::mesh::{Bar, Mesh, Winding};
-use supple::scene::{ElementBlock, NodeInertia, Scene, Support, blocks_for};
+use supple::scene::{Support, VecScene};
 
-use super::HostScene;
 use crate::reference::{self, Random};
 
 /// A mesh that owns its nodes and elements.
@@ -128,15 +127,9 @@ impl Body {
         }
     }
 
-    /// A scene with just enough room.
-    pub fn scene<M: Material>(&self, material: M, supports: &[Support]) -> HostScene<M> {
-        let mut scene = Scene::over(
-            material,
-            vec![NodeInertia::EMPTY; self.points.len()],
-            vec![ElementBlock::EMPTY; blocks_for(self.tets.len())],
-        );
-        scene.build(&self.mesh(), supports).unwrap();
-        scene
+    /// A scene of this body.
+    pub fn scene<M: Material>(&self, material: M, supports: &[Support]) -> VecScene<M> {
+        VecScene::build(material, &self.mesh(), supports).unwrap()
     }
 
     /// Nodes whose position at rest satisfies the condition.

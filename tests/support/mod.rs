@@ -1,18 +1,20 @@
 //! What the tests of the physics share: bodies to simulate, the four laws with their float64 twins, and short
 //! ways to build a scene, put it into a state and read its forces.
 //!
-//! Several test crates say `mod support;` and none uses all of it, hence the `allow`.
+//! Several test crates include it and none uses all of it, hence the `allow`.
 #![allow(dead_code, unreachable_pub, unused_imports, unused_macros)]
 
 pub mod bodies;
 
 pub use bodies::Body;
 
+use supple::element::{ElementLaw, ElementMaterial};
 use supple::loads::Loads;
-use supple::material::{Exponential, Law, Literal, Material, NeoHookean, Tissue};
-use supple::scene::{ElementBlock, NodeInertia, Scene, Support};
-use supple::state::{NodeVector, State};
-use supple::tled::{self, CriticalStep, Status, Step};
+use supple::material::{Exponential, Literal, NeoHookean, Tissue};
+use supple::scene::{Support, VecScene};
+use supple::state::{NodeVector, VecState};
+use supple::step::{CriticalStep, Status, Step};
+use supple::tled;
 
 use crate::reference;
 
@@ -23,31 +25,31 @@ pub const NEO: NeoHookean = NeoHookean { c: 500.0, d: 25_000.0 };
 /// The paper's exponential law, its constants read as kPa.
 pub const EXP: Exponential = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
 
-/// Runs a block once for each of both laws in both forms.
+/// Runs statements once for each of both laws in both forms.
 #[macro_export]
 macro_rules! each_law {
-    ($law:ident => $block:block) => {{
+    ($law:ident => $body:block) => {{
         {
             let $law = $crate::support::NEO;
-            $block
+            $body
         }
         {
             let $law = supple::material::Literal($crate::support::NEO);
-            $block
+            $body
         }
         {
             let $law = $crate::support::EXP;
-            $block
+            $body
         }
         {
             let $law = supple::material::Literal($crate::support::EXP);
-            $block
+            $body
         }
     }};
 }
 
 /// A law of the kernel that the reference knows as well.
-pub trait Judged: Law + Default + Send + Sync + 'static {
+pub trait Judged: ElementLaw + 'static {
     /// The same law in float64.
     fn reference(&self) -> reference::Law;
     /// For printing.
@@ -89,20 +91,9 @@ impl Judged for Literal<Exponential> {
     }
 }
 
-/// A scene in vectors.
-pub type HostScene<M> = Scene<M, Vec<NodeInertia>, Vec<ElementBlock>>;
-/// A state in vectors.
-pub type HostState = State<Vec<NodeVector>>;
-
-/// A state at rest with room for `nodes` nodes.
-pub fn at_rest(nodes: usize) -> HostState {
-    let zeros = vec![NodeVector::ZERO; nodes];
-    State::over(zeros.clone(), zeros.clone(), zeros)
-}
-
 /// A state at rest for this scene.
-pub fn rest_of<M>(scene: &HostScene<M>) -> HostState {
-    at_rest(scene.node_count())
+pub fn rest_of<M>(scene: &VecScene<M>) -> VecState {
+    VecState::at_rest(scene.node_count())
 }
 
 /// One tissue of [`DENSITY`].
@@ -116,36 +107,36 @@ pub fn fixed(nodes: &[u32]) -> Vec<Support> {
 }
 
 /// The bound on the stable step at this state.
-pub fn bound<M: Material>(scene: &HostScene<M>, state: &HostState) -> CriticalStep {
+pub fn bound<M: ElementMaterial>(scene: &VecScene<M>, state: &VecState) -> CriticalStep {
     tled::critical_step(scene, &mut state.clone()).expect("a finite state")
 }
 
 /// The scene standing still at displacements `u`, m.
-pub fn displaced<M: Material>(scene: &HostScene<M>, u: &[[f32; 3]]) -> HostState {
+pub fn displaced<M: ElementMaterial>(scene: &VecScene<M>, u: &[[f32; 3]]) -> VecState {
     let mut state = rest_of(scene);
-    let step = Step::insist(1e-15, 0.0).unwrap();
+    let step = Step::unchecked(1e-15, 0.0).unwrap();
     assert!(tled::start(scene, &mut state, &step, |node| (u[node], [0.0; 3])));
     state
 }
 
 /// Total force on each node at displacements `u` without loads, N: minus the internal force. Read from a step
 /// too short to move anything.
-pub fn forces<M: Material>(scene: &HostScene<M>, u: &[[f32; 3]]) -> Vec<[f64; 3]> {
+pub fn forces<M: ElementMaterial>(scene: &VecScene<M>, u: &[[f32; 3]]) -> Vec<[f64; 3]> {
     let mut state = displaced(scene, u);
     assert!(tled::internal_forces(scene, &mut state));
     let forces = to_f64(state.forces());
-    let step = Step::insist(1e-15, 0.0).unwrap();
+    let step = Step::unchecked(1e-15, 0.0).unwrap();
     let status = tled::step(scene, &Loads::NONE, &mut state, &step);
-    assert!(matches!(status, Status::Ok | Status::Limited { .. }), "{status:?}");
+    assert!(status.is_taken(), "{status:?}");
     assert_eq!(to_f64(state.forces()), forces, "not those of the step");
     forces
 }
 
 /// Takes steps; a step that diverges fails the test.
-pub fn run<M: Material>(
-    scene: &HostScene<M>,
+pub fn run<M: ElementMaterial>(
+    scene: &VecScene<M>,
     loads: &Loads<'_>,
-    state: &mut HostState,
+    state: &mut VecState,
     step: &Step,
     count: u64,
 ) {
@@ -182,11 +173,20 @@ pub fn norm_of_sum(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     norm(&sums)
 }
 
-/// The largest distance between two nodes of the same number.
-pub fn largest_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+/// The distance between the nodes of each pair.
+pub fn distances<'a>(a: &'a [[f64; 3]], b: &'a [[f64; 3]]) -> impl Iterator<Item = f64> + 'a {
     assert_eq!(a.len(), b.len());
-    let distance = |(a, b): (&[f64; 3], &[f64; 3])| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
-    a.iter().zip(b).map(distance).fold(0.0, f64::max)
+    a.iter().zip(b).map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt())
+}
+
+/// The largest distance between the nodes of a pair.
+pub fn largest_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    distances(a, b).fold(0.0, f64::max)
+}
+
+/// The mean of these distances.
+pub fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    distances(a, b).sum::<f64>() / a.len() as f64
 }
 
 /// The largest length.
@@ -195,13 +195,13 @@ pub fn largest(vectors: &[[f64; 3]]) -> f64 {
 }
 
 /// Everything that a step may change apart from the forces it saw, bit for bit.
-pub fn bits(state: &HostState) -> Vec<u64> {
+pub fn bits(state: &VecState) -> Vec<u64> {
     let nodes = state.displacements().iter().enumerate();
     let moving = nodes.flat_map(|(node, u)| [u.to_array(), state.velocity(node)].into_iter().flatten());
     moving
         .map(|component| u64::from(component.to_bits()))
         .chain([state.time().to_bits(), state.steps()])
-        // The shortest text that reads back as the same numbers.
-        .chain(format!("{:?}", state.ledger()).bytes().map(u64::from))
+        // The shortest text that reads back as the same values.
+        .chain(format!("{:?}", state.energy_balance()).bytes().map(u64::from))
         .collect()
 }

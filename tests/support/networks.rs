@@ -4,9 +4,9 @@
 
 use std::cell::Cell;
 
-use supple::mlp::{
-    Activation, Description, ForceInput, Int8Description, LayerDescription, Range, TrainedLaw,
-};
+use supple::inertia::Damper;
+use supple::material::Exponential;
+use supple::mlp::{Activation, Description, ForceInput, Int8Description, LayerDescription, Network, Range};
 
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(64))]
@@ -34,7 +34,7 @@ impl Memory {
         &mut bytemuck::cast_slice_mut(&mut self.lines)[..self.length]
     }
 
-    /// Sets four bytes and mends the checksum, as somebody would who edits a file.
+    /// Sets four bytes and mends the checksum, as somebody who edits a file would.
     pub fn with(&self, at: usize, value: [u8; 4]) -> Self {
         let mut edited = self.clone();
         edited.bytes_mut()[at..at + 4].copy_from_slice(&value);
@@ -44,8 +44,8 @@ impl Memory {
     }
 }
 
-/// Numbers from -1 to 1 from a fixed sequence.
-pub fn numbers(seed: u32) -> impl FnMut() -> f32 {
+/// Values from -1 to 1 from a fixed sequence.
+pub fn uniform(seed: u32) -> impl FnMut() -> f32 {
     let state = Cell::new(seed);
     move || {
         state.set(state.get().wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
@@ -57,38 +57,38 @@ fn layer(
     inputs: usize,
     outputs: usize,
     activation: Activation,
-    next: &mut impl FnMut() -> f32,
+    random: &mut impl FnMut() -> f32,
 ) -> LayerDescription {
     let scale = (3.0 / inputs as f32).sqrt();
     LayerDescription {
         inputs,
         activation,
-        weights: (0..inputs * outputs).map(|_| scale * next()).collect(),
-        biases: (0..outputs).map(|_| 0.1 * next()).collect(),
+        weights: (0..inputs * outputs).map(|_| scale * random()).collect(),
+        biases: (0..outputs).map(|_| 0.1 * random()).collect(),
     }
 }
 
-fn part(widths: &[usize], next: &mut impl FnMut() -> f32) -> Vec<LayerDescription> {
+fn part(widths: &[usize], random: &mut impl FnMut() -> f32) -> Vec<LayerDescription> {
     let last = widths.len() - 2;
     (0..=last)
         .map(|at| {
             let activation =
                 if at == last { Activation::Linear } else { Activation::LeakyRelu { slope: 0.01 } };
-            layer(widths[at], widths[at + 1], activation, next)
+            layer(widths[at], widths[at + 1], activation, random)
         })
         .collect()
 }
 
-/// Of these widths, the recipe that of the paper's tissue at ten times its step.
+/// A random network of these widths, its recipe that of the paper's tissue at ten times its step.
 pub fn described(first: &[usize], second: &[usize], seed: u32) -> Description<'static> {
-    let mut next = numbers(seed);
+    let mut random = uniform(seed);
     let range = |scale: f32| Range { scale, least: -3.0 * scale, most: 4.0 * scale };
     Description {
         inputs: (0..first[0]).map(|at| range(0.5 + at as f32)).collect(),
         outputs: (0..*first.last().unwrap()).map(|at| range(2.0 + at as f32)).collect(),
-        first: part(first, &mut next),
-        second: if second.is_empty() { Vec::new() } else { part(second, &mut next) },
-        law: TrainedLaw::Exponential { a: 59.0, b: 8.023, d: 60_000.0, literal: false },
+        first: part(first, &mut random),
+        second: if second.is_empty() { Vec::new() } else { part(second, &mut random) },
+        law: Exponential { a: 59.0, b: 8.023, d: 60_000.0 }.into(),
         density: 1000.0,
         damping: 20.0,
         step: 3e-4,
@@ -99,7 +99,7 @@ pub fn described(first: &[usize], second: &[usize], seed: u32) -> Description<'s
     }
 }
 
-/// The same network in float64, as one would write it down.
+/// The same network in float64, as textbooks have it.
 pub fn predicted(network: &Description<'_>, inputs: &[f32]) -> Vec<f64> {
     let dense = |layer: &LayerDescription, x: &[f64]| -> Vec<f64> {
         let rows = layer.weights.chunks(layer.inputs).zip(&layer.biases);
@@ -129,6 +129,12 @@ pub fn predicted(network: &Description<'_>, inputs: &[f32]) -> Vec<f64> {
         .collect()
 }
 
+/// A damper of constant gain; its memory is never given back.
+pub fn damper(gain: f32) -> Damper<'static> {
+    let weights = Box::leak(Box::new(constant(4, gain)));
+    Damper::new(Network::parse(weights.bytes()).unwrap()).unwrap()
+}
+
 /// A network whose one output is always `value`.
 pub fn constant(inputs: usize, value: f32) -> Memory {
     let range = Range { scale: 1.0, least: -100.0, most: 100.0 };
@@ -148,20 +154,20 @@ pub fn constant(inputs: usize, value: f32) -> Memory {
     Memory::of(&supple::mlp::write(&network).unwrap())
 }
 
-/// Random numbers of eight bits for the layers that `wanted` names, with any zero.
+/// Random int8 weights for the layers that `wanted` names, with any zero.
 pub fn int8(
     description: &Description<'_>,
     wanted: impl Fn(usize) -> bool,
     seed: u32,
 ) -> Vec<Option<Int8Description>> {
-    let mut next = numbers(seed);
+    let mut random = uniform(seed);
     let layers = description.first.iter().chain(&description.second).enumerate();
     let described = |(at, layer): (usize, &LayerDescription)| {
         let spread = 127.0 * (layer.inputs as f32).sqrt();
         let described = Int8Description {
-            zero: (128.0 + 126.0 * next()) as u8,
-            weights: (0..layer.weights.len()).map(|_| (127.0 * next()).round() as i8).collect(),
-            scales: (0..layer.biases.len()).map(|_| (1.5 + next()) / spread).collect(),
+            zero: (128.0 + 126.0 * random()) as u8,
+            weights: (0..layer.weights.len()).map(|_| (127.0 * random()).round() as i8).collect(),
+            scales: (0..layer.biases.len()).map(|_| (1.5 + random()) / spread).collect(),
         };
         wanted(at).then_some(described)
     };

@@ -3,19 +3,18 @@
 
 use std::path::Path;
 
+use indicatif::ProgressBar;
 use supple::io::parse_msh;
 use supple::loads::Motion;
-use supple::material::{Exponential, Material};
+use supple::material::Exponential;
 use supple::mesh::Winding;
 use supple::scene::{Axes, Support};
 
-use crate::body::Body;
-use crate::picture::{self, Panel};
-use crate::prepare::{Job, Setup};
-use crate::report::{self, Folder};
-use crate::run::{self, Start};
-use crate::scene_file::Problem;
-use crate::simulate::End;
+use crate::problem::{End, Problem};
+use crate::results::picture::{self, Panel};
+use crate::scene::body::Body;
+use crate::scene::setup::Setup;
+use crate::simulate::{Simulated, Simulation};
 
 const LOBE: &[u8] = include_bytes!("../../../meshes/lobe.msh");
 /// Liver-like: shear modulus 1.5 kPa at rest, stiffening like the paper's law, nearly incompressible.
@@ -30,7 +29,20 @@ const PATCH: f64 = 0.012;
 const PUSH: ([f32; 3], f32) = ([0.0, 0.002, -0.010], 0.5);
 
 pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
-    let mesh = parse_msh(Path::new("lobe.msh"), LOBE).map_err(|error| Problem(error.to_string()))?;
+    let setup = lobe()?;
+    println!("A liver lobe, held at its back, sags under its own weight; its dome is pushed in by 10 mm.\n");
+    let progress = ProgressBar::hidden();
+    let simulation = Simulation { setup: &setup, out, force: true, unchecked: false, progress };
+    let simulated = setup.tissues.with_material(simulation)?;
+    simulated.folder.write_text("lobe.svg", &draw(&setup.body, &simulated))?;
+    println!("\npicture  {}", simulated.folder.path("lobe.svg").display());
+    println!("frames   {} (opens in ParaView)", simulated.folder.path("frames.pvd").display());
+    Ok(simulated.outcome.divergence.into())
+}
+
+/// The lobe with its supports and its push.
+fn lobe() -> Result<Setup, Problem> {
+    let mesh = parse_msh(Path::new("lobe.msh"), LOBE).map_err(Problem::of)?;
     let body = Body::new(mesh, Winding::Checked, "liver lobe".into());
     let mut setup = Setup::of_body(body, TISSUE, DENSITY);
     let points = &setup.body.mesh.points;
@@ -47,55 +59,25 @@ pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
     }
     setup.gravity = [0.0, 0.0, -9.81];
     setup.damping = DAMPING;
-    setup.with_material(Demo { setup: &setup, out })
+    Ok(setup)
 }
 
-struct Demo<'a> {
-    setup: &'a Setup,
-    out: &'a Path,
-}
-
-impl Job for Demo<'_> {
-    type Output = Result<End, Problem>;
-
-    fn run<M: Material>(self, material: M) -> Self::Output {
-        let setup = self.setup;
-        let (scene, mut state) = setup.build(material)?;
-        println!(
-            "A liver lobe, held at its back, sags under its own weight; its dome is pushed in by 10 mm.\n"
-        );
-        let mut folder = Folder::create(self.out, true)?;
-        let start = Start::new(setup, &scene, &mut state, false)?;
-        let outcome = run::run(
-            setup,
-            &scene,
-            &mut state,
-            start,
-            |_| {},
-            |scene, state| folder.add_frame(&setup.body, scene, state),
-        )?;
-        let figures = report::conclude(&folder, setup, &scene, &state, &outcome)?;
-
-        let rest = &setup.body.mesh.points;
-        let moved: Vec<_> = rest
-            .iter()
-            .zip(state.displacements())
-            .map(|(point, vector)| [0, 1, 2].map(|axis| point[axis] + f64::from(vector.to_array()[axis])))
-            .collect();
-        let lengths = state.displacements().iter().map(|vector| {
-            vector.to_array().iter().map(|component| f64::from(component * component)).sum::<f64>().sqrt()
-        });
-        let lengths: Vec<_> = lengths.collect();
-        let none = vec![0.0; rest.len()];
-        let after = format!("after {:.1} s", state.time());
-        let panels = [
-            Panel { title: "at rest", positions: rest, displacements: &none },
-            Panel { title: &after, positions: &moved, displacements: &lengths },
-        ];
-        let svg = picture::draw(&panels, &setup.body.boundary(), figures.max_displacement);
-        folder.write_text("lobe.svg", &svg)?;
-        println!("\npicture  {}", folder.path("lobe.svg").display());
-        println!("frames   {} (opens in ParaView)", folder.path("frames.pvd").display());
-        Ok(outcome.divergence.map_or(End::Reached, |divergence| End::Diverged(divergence.to_string())))
-    }
+/// The lobe at rest and at the end, as SVG.
+fn draw(body: &Body, Simulated { state, figures, .. }: &Simulated) -> String {
+    let rest = &body.mesh.points;
+    let vectors: Vec<_> = state.displacements().iter().map(|vector| vector.to_array()).collect();
+    let moved: Vec<_> = rest
+        .iter()
+        .zip(&vectors)
+        .map(|(point, vector)| [0, 1, 2].map(|axis| point[axis] + f64::from(vector[axis])))
+        .collect();
+    let length = |vector: &[f32; 3]| vector.iter().map(|c| f64::from(c * c)).sum::<f64>().sqrt();
+    let lengths: Vec<_> = vectors.iter().map(length).collect();
+    let none = vec![0.0; rest.len()];
+    let after = format!("after {:.1} s", state.time());
+    let panels = [
+        Panel { title: "at rest", positions: rest, displacements: &none },
+        Panel { title: &after, positions: &moved, displacements: &lengths },
+    ];
+    picture::draw(&panels, &body.boundary(), figures.max_displacement)
 }

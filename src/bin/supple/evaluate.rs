@@ -7,8 +7,7 @@ use supple::lab::evaluate::{self, Plan};
 use supple::lab::method::Method;
 use supple::lab::{estimates, table};
 
-use crate::scene_file::Problem;
-use crate::simulate::End;
+use crate::problem::{End, Problem};
 
 #[derive(Args)]
 pub(crate) struct Asked {
@@ -34,12 +33,11 @@ pub(crate) struct Asked {
 
 pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
     let Asked { out, scenes, methods, multiples, weights, sweep } = asked;
-    let problem = |error: supple::lab::LabError| Problem(error.to_string());
-    let mut plan = Plan::new(scenes, methods, multiples, sweep.as_deref()).map_err(problem)?;
+    let mut plan = Plan::new(scenes, methods, multiples, sweep.as_deref()).map_err(Problem::of)?;
     for path in weights {
-        plan.methods.push(Method::with(path).map_err(problem)?);
+        plan.methods.push(Method::with(path).map_err(Problem::of)?);
     }
-    let rows = evaluate::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(problem)?;
+    let rows = evaluate::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
     print!("{}", table::text(&rows));
     let judged = estimates::text(&rows);
     if !judged.is_empty() {

@@ -2,37 +2,27 @@
 //!
 //! Exit codes: 0 as asked, 2 the input is not usable, 3 the simulation diverged.
 
-mod body;
-mod cost;
 mod demo;
-mod doubling;
 mod evaluate;
 mod inspect;
-mod large_steps;
-mod learned;
-mod loads;
-mod network;
-mod picture;
-mod prepare;
-#[cfg(feature = "train")]
-mod quantise;
-mod report;
+mod networks;
+mod problem;
+mod results;
 mod run;
-mod scene_file;
-mod select;
+mod scene;
+mod screen;
 mod simulate;
-mod timing;
-mod tissues;
-#[cfg(feature = "train")]
-mod train;
-mod weights;
+mod weight_file;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use simulate::End;
+use networks::convert;
+#[cfg(feature = "train")]
+use networks::train;
+use problem::End;
 
 /// Moves soft tissue: total Lagrangian explicit dynamics on tetrahedral meshes.
 #[derive(Parser)]
@@ -56,7 +46,7 @@ enum Command {
         force: bool,
         /// Take a step above the critical one all the same
         #[arg(long)]
-        insist: bool,
+        unchecked: bool,
     },
     /// Look at a mesh, a scene or a weight file: sizes, quality, critical step, memory, cost, training
     Inspect {
@@ -79,23 +69,25 @@ enum Command {
     Train(train::Asked),
     /// Convert weight files to and from safetensors
     #[command(subcommand)]
-    Weights(weights::Conversion),
+    Weights(convert::Conversion),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
-        Command::Simulate { scene, out, force, insist } => simulate::simulate(&scene, &out, force, insist),
+        Command::Simulate { scene, out, force, unchecked } => {
+            simulate::simulate(&scene, &out, force, unchecked)
+        }
         Command::Inspect { file, accuracy } => inspect::inspect(&file, accuracy).map(|()| End::Reached),
         Command::Demo { out } => demo::demo(&out),
         Command::Evaluate(asked) => evaluate::evaluate(&asked),
         #[cfg(feature = "train")]
         Command::Train(asked) => train::train(&asked),
-        Command::Weights(conversion) => weights::convert(&conversion),
+        Command::Weights(conversion) => convert::convert(&conversion),
     };
     match done {
         Ok(End::Reached) => ExitCode::SUCCESS,
-        Ok(End::Diverged(sentence)) => {
-            eprintln!("error: the simulation {sentence}; the results end before that");
+        Ok(End::Diverged(divergence)) => {
+            eprintln!("error: the simulation {divergence}; the results end before that");
             ExitCode::from(3)
         }
         Err(problem) => {

@@ -3,60 +3,74 @@
 use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use supple::material::Material;
+use supple::element::ElementMaterial;
+use supple::state::VecState;
 
-use crate::prepare::{Job, Setup};
-use crate::report::{self, Folder};
-use crate::run::{self, Start};
-use crate::scene_file::{Problem, SceneFile};
+use crate::problem::{End, Problem};
+use crate::results;
+use crate::results::figures::Figures;
+use crate::results::folder::Folder;
+use crate::run::outcome::Outcome;
+use crate::run::run;
+use crate::run::start::Start;
+use crate::scene::file::SceneFile;
+use crate::scene::setup::Setup;
+use crate::scene::tissues::Job;
+use crate::screen::row;
 
-/// How a simulation ended, for the exit code.
-pub(crate) enum End {
-    Reached,
-    Diverged(String),
-}
-
-pub(crate) fn simulate(path: &Path, out: &Path, force: bool, insist: bool) -> Result<End, Problem> {
-    let file = SceneFile::read(path)?;
-    let setup = Setup::read(&file)?;
-    setup.with_material(Simulation { setup: &setup, out, force, insist })
-}
-
-struct Simulation<'a> {
-    setup: &'a Setup,
-    out: &'a Path,
-    force: bool,
-    insist: bool,
-}
-
-impl Job for Simulation<'_> {
-    type Output = Result<End, Problem>;
-
-    fn run<M: Material>(self, material: M) -> Self::Output {
-        let setup = self.setup;
-        let (scene, mut state) = setup.build(material)?;
-        // All that can be refused is refused before the folder is touched.
-        let start = Start::new(setup, &scene, &mut state, self.insist)?;
-        let mut folder = Folder::create(self.out, self.force)?;
-
-        let progress = ProgressBar::new((setup.time.end * 1e3).ceil() as u64).with_style(progress_style());
-        let tick = |time: f64| progress.set_position((time * 1e3) as u64);
-        let outcome = run::run(setup, &scene, &mut state, start, tick, |scene, state| {
-            folder.add_frame(&setup.body, scene, state)
-        })?;
-        progress.finish_and_clear();
-
-        if outcome.divergence.is_some() {
-            // The last state that may be believed.
-            folder.add_frame(&setup.body, &scene, &state)?;
-        }
-        report::conclude(&folder, setup, &scene, &state, &outcome)?;
-        println!("{:<21} {}", "results", self.out.display());
-        Ok(outcome.divergence.map_or(End::Reached, |divergence| End::Diverged(divergence.to_string())))
-    }
+pub(crate) fn simulate(path: &Path, out: &Path, force: bool, unchecked: bool) -> Result<End, Problem> {
+    let setup = Setup::read(&SceneFile::read(path)?)?;
+    let progress = ProgressBar::new((setup.time.end * 1e3).ceil() as u64).with_style(progress_style());
+    let simulation = Simulation { setup: &setup, out, force, unchecked, progress };
+    let Simulated { outcome, .. } = setup.tissues.with_material(simulation)?;
+    row("results", out.display());
+    Ok(outcome.divergence.into())
 }
 
 fn progress_style() -> ProgressStyle {
     ProgressStyle::with_template("{bar:40} {pos} of {len} ms simulated, {elapsed} so far, {eta} to go")
         .unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+/// A simulation from rest, with its results in a folder and on the screen.
+pub(crate) struct Simulation<'a> {
+    pub(crate) setup: &'a Setup,
+    pub(crate) out: &'a Path,
+    /// Whether results in a folder that is there are overwritten.
+    pub(crate) force: bool,
+    /// Whether a step above the critical one is taken all the same.
+    pub(crate) unchecked: bool,
+    pub(crate) progress: ProgressBar,
+}
+
+/// What a simulation came to.
+pub(crate) struct Simulated {
+    pub(crate) folder: Folder,
+    pub(crate) state: VecState,
+    pub(crate) outcome: Outcome,
+    pub(crate) figures: Figures,
+}
+
+impl Job for Simulation<'_> {
+    type Output = Result<Simulated, Problem>;
+
+    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
+        let Self { setup, out, force, unchecked, progress } = self;
+        let (scene, mut state) = setup.build(material)?;
+        let scene = scene.view();
+        // All that can be refused is refused before the folder is touched.
+        let start = Start::new(setup, scene, &mut state, unchecked)?;
+        let mut folder = Folder::create(out, force)?;
+
+        let tick = |time: f64| progress.set_position((time * 1e3) as u64);
+        let mut frame = |state: &VecState| folder.add_frame(&setup.body, scene, state);
+        let outcome = run(setup, scene, &mut state, start, &tick, &mut frame)?;
+        if outcome.divergence.is_some() {
+            // The last state that may be believed.
+            frame(&state)?;
+        }
+        progress.finish_and_clear();
+        let figures = results::conclude(&folder, setup, scene, &state, &outcome)?;
+        Ok(Simulated { folder, state, outcome, figures })
+    }
 }

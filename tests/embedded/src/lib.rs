@@ -1,19 +1,17 @@
-//! Every public path of the core behind C symbols, on data the compiler knows nothing about. The library
+//! Every public path of the core behind C symbols, on data that the compiler knows nothing about. The library
 //! built from this must link without std, and without `core::panicking`: what could panic would show.
 #![no_std]
 
-use supple::inertia::{
-    self, Damper, Inertia, LatticeNode, MassScaling, damped_numbers_for, damped_vectors_for, numbers_for, vectors_for,
-};
+use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
+use supple::learned::{self, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{Exponential, Literal, NeoHookean, Tissue};
-use supple::mesh::{Bar, Mesh, Winding};
+use supple::material::{Exponential, NeoHookean, Tissue};
+use supple::mesh::{self, Bar, Mesh, Winding};
 use supple::mlp::Network;
-use supple::numbering;
 use supple::scene::{FixedScene, Support};
 use supple::state::{FixedState, NodeVector};
-use supple::surrogate::{self, Surrogate, Vertex};
-use supple::tled::{self, Status, Step};
+use supple::step::{Status, Step};
+use supple::tled;
 
 type Scene<L> = FixedScene<Tissue<L>, 100, 20>;
 type State = FixedState<100>;
@@ -37,7 +35,7 @@ pub extern "C" fn build(
     scene.build(&mesh, supports).map_or(-3, |()| 0)
 }
 
-/// Numbers the nodes anew.
+/// Renumbers the nodes.
 #[unsafe(no_mangle)]
 pub extern "C" fn renumber(
     points: &mut [[f32; 3]; 100],
@@ -45,7 +43,7 @@ pub extern "C" fn renumber(
     old: &mut [u32; 100],
     new: &mut [u32; 100],
 ) -> i32 {
-    numbering::renumber(points, tets, old, new).map_or(-1, |()| 0)
+    mesh::renumber(points, tets, old, new).map_or(-1, |()| 0)
 }
 
 /// The critical step, s.
@@ -67,10 +65,14 @@ pub extern "C" fn step(
     let Ok(loads) = Loads::new(scene, [0.0, 0.0, seconds], forces, motions) else {
         return -1;
     };
-    let Ok(step) = Step::insist(seconds, 1.0) else {
+    let Ok(step) = Step::unchecked(seconds, 1.0) else {
         return -2;
     };
-    tled::start(scene, state, &step, |node| (start.get(node).copied().unwrap_or_default(), [0.0; 3]));
+    let started =
+        tled::start(scene, state, &step, |node| (start.get(node).copied().unwrap_or_default(), [0.0; 3]));
+    if !started {
+        return -3;
+    }
     match tled::step(scene, &loads, state, &step) {
         Status::Ok => 0,
         Status::Diverged(divergence) => divergence.node as i32,
@@ -80,9 +82,16 @@ pub extern "C" fn step(
 
 /// Element fields and energy.
 #[unsafe(no_mangle)]
-pub extern "C" fn fields(scene: &Scene<Literal<NeoHookean>>, state: &State) -> f64 {
-    let stresses = tled::element_fields(scene, state.displacements()).map(|fields| fields.von_mises);
-    stresses.sum::<f64>() + tled::strain_energy(scene, state)
+pub extern "C" fn fields(scene: &Scene<NeoHookean>, state: &State) -> f64 {
+    let stresses = scene.view().element_fields(state.displacements()).map(|fields| fields.von_mises);
+    stresses.sum::<f64>() + tled::strain_energy(scene.view(), state.displacements())
+}
+
+/// Internal forces of the other law, N.
+#[unsafe(no_mangle)]
+pub extern "C" fn internal_forces(scene: &Scene<NeoHookean>, state: &mut State) -> f32 {
+    let known = tled::internal_forces(scene, state);
+    state.forces().iter().map(|force| force.to_array()[0]).sum::<f32>() + f32::from(known)
 }
 
 /// Traction turned into forces.
@@ -97,112 +106,111 @@ pub extern "C" fn bar(bar: &Bar) -> f32 {
     bar.points().map(|[x, _, _]| x).sum::<f32>() + bar.tets().map(|[a, ..]| a as f32).sum::<f32>()
 }
 
-type Vectors = [NodeVector; vectors_for(100)];
+/// The largest lattice here.
+const GRID: Grid = Grid { cells: [2, 2, 2], functions: 27 };
+type Storage = [NodeVector; vectors_for_lattice(100, GRID, true)];
 
-/// Mass scaling: prepared, and a step.
+/// Prepares a method and takes a step of it: error, inertia added and damping.
+fn large(
+    method: Method<'_>,
+    scene: &Scene<Exponential>,
+    state: &mut State,
+    storage: &mut Storage,
+    points: &[[f32; 3]; 100],
+    loads: &Loads<'_>,
+    seconds: f32,
+) -> f32 {
+    let Ok(step) = Step::unchecked(seconds, 1.0) else {
+        return -1.0;
+    };
+    let (scene, needed) = (scene.view(), vectors_for(&method, scene.view(), points));
+    let Some(storage) = needed.ok().and_then(|needed| storage.get_mut(..needed)) else {
+        return -2.0;
+    };
+    let Ok(mut large) = LargeStep::prepare(method, scene, points, state.view(), step, storage) else {
+        return -3.0;
+    };
+    let _ = large.step(scene, loads, state.view());
+    let report = large.report();
+    report.error + report.added_mean + report.damping + large.model().grid().functions as f32
+}
+
+/// A mass-scaled step.
 #[unsafe(no_mangle)]
 pub extern "C" fn scaled(
     scene: &Scene<Exponential>,
     state: &mut State,
-    scaling: &mut MassScaling<Vectors>,
+    storage: &mut Storage,
     points: &[[f32; 3]; 100],
     loads: &Loads<'_>,
     seconds: f32,
 ) -> f32 {
-    let Ok(step) = Step::insist(seconds, 1.0) else {
-        return -1.0;
-    };
-    if scaling.prepare(scene, points, state, step, [0; 3]).is_err() {
-        return -2.0;
-    }
-    let _ = inertia::step(scene, loads, state, scaling);
-    scaling.report().added_mean
+    large(Method::MassScaled, scene, state, storage, points, loads, seconds)
 }
 
-/// Cells and functions of the largest lattice here.
-const LATTICE: [u32; 3] = [2, 2, 2];
-type Multilevel = Inertia<Vectors, [LatticeNode; 100], [f32; numbers_for(LATTICE, 27)]>;
-
-/// Multilevel inertia: the lattice that suits, prepared with another, and a step.
+/// Multilevel steps: with the lattice that suits, and with another.
 #[unsafe(no_mangle)]
 pub extern "C" fn multilevel(
     scene: &Scene<Exponential>,
     state: &mut State,
-    multilevel: &mut Multilevel,
+    storage: &mut Storage,
     points: &[[f32; 3]; 100],
     loads: &Loads<'_>,
     cells: &[u32; 3],
     seconds: f32,
 ) -> f32 {
-    let Ok(step) = Step::insist(seconds, 1.0) else {
-        return -1.0;
-    };
-    let (suggested, functions) = inertia::suggested_lattice(scene, points);
-    if inertia::lattice_functions(scene, points, *cells).is_err() || functions > 27 {
-        return -2.0;
-    }
-    let _ = multilevel.prepare(scene, points, state, step, suggested);
-    if multilevel.prepare(scene, points, state, step, *cells).is_err() {
-        return -3.0;
-    }
-    let _ = inertia::step(scene, loads, state, multilevel);
-    multilevel.report().error + multilevel.functions() as f32
+    let [suggested, given] = [Cells::Suggested, Cells::Given(*cells)].map(Method::Multilevel);
+    large(suggested, scene, state, storage, points, loads, seconds)
+        + large(given, scene, state, storage, points, loads, seconds)
 }
 
-type Damped = Inertia<
-    [NodeVector; damped_vectors_for(100)],
-    [LatticeNode; 100],
-    [f32; damped_numbers_for(LATTICE, 27)],
->;
-
-/// Multilevel inertia with rough motion damped; of [`Inertia::damped`].
+/// A damped step.
 #[unsafe(no_mangle)]
 pub extern "C" fn damped(
     scene: &Scene<Exponential>,
     state: &mut State,
-    damped: &mut Damped,
+    storage: &mut Storage,
     points: &[[f32; 3]; 100],
     loads: &Loads<'_>,
     weights: &[u8; 10_000],
-    cells: &[u32; 3],
     seconds: f32,
 ) -> f32 {
-    let (Ok(step), Ok(network)) = (Step::insist(seconds, 1.0), Network::parse(weights)) else {
-        return -1.0;
+    let Ok(network) = Network::parse(weights) else {
+        return -4.0;
     };
-    let Ok(damper) = Damper::over(network) else {
-        return -2.0;
+    let Ok(damper) = Damper::new(network) else {
+        return -5.0;
     };
-    if damped.prepare(scene, points, state, step, *cells).is_err() {
-        return -3.0;
-    }
-    let _ = inertia::damped_step(scene, loads, state, damped, Some(&damper));
-    damped.report().damping
+    large(Method::Damped(damper, Cells::Suggested), scene, state, storage, points, loads, seconds)
 }
 
-/// A weight file, a prediction, a learned step.
+/// A weight file, a prediction, a lead-in and a learned step with fallback.
 #[unsafe(no_mangle)]
 pub extern "C" fn learned(
     scene: &Scene<Exponential>,
     state: &mut State,
-    vertices: &mut [Vertex; 100],
+    storage: &mut [NodeVector; learned::vectors_for(100, true)],
     weights: &[u8; 100_000],
     length: usize,
     loads: &Loads<'_>,
     outputs: &mut [f32; 8],
+    seconds: f32,
 ) -> i32 {
     let Ok(network) = Network::parse(weights.get(..length).unwrap_or_default()) else {
         return -1;
     };
     network.predict(&outputs.map(|output| output + 1.0), outputs);
-    let Ok(mut surrogate) = Surrogate::over(network, &mut vertices[..]) else {
+    let Ok(mut learned) = LearnedStep::new(network, true, &mut storage[..]) else {
         return network.multiply_adds() as i32;
     };
-    let earlier = [NodeVector::ZERO; 100];
-    state.span(&earlier, surrogate.seconds());
-    surrogate.follow(state);
-    match surrogate::step(scene, loads, state, &mut surrogate) {
-        Status::Ok => (100.0 * surrogate.report().outside) as i32,
-        _ => 1,
+    let Ok(step) = Step::unchecked(seconds, network.recipe().damping) else {
+        return -2;
+    };
+    if learned.lead(scene.view(), loads, state.view(), (&step, 0.3)).is_err() {
+        return -3;
+    }
+    match learned.step(scene.view(), loads, state.view(), &step) {
+        Ok(Status::Ok) => (100.0 * learned.model().report().outside) as i32,
+        _ => learned.model().fell_back().is_some().into(),
     }
 }

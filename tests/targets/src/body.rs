@@ -1,30 +1,30 @@
-//! A bar that stands on its lower end under gravity and a force at a corner, with exact and with learned steps. How large
-//! it is, is known to the compiler, so that nothing needs a heap.
+//! A bar that stands on its lower end under gravity and a force at a corner, with exact and with learned steps. The compiler knows its
+//! size, so that nothing needs a heap.
 
+use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::{Loads, NodalForce};
 use supple::material::{Exponential, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::mlp::Network;
 use supple::scene::{FixedScene, Support};
 use supple::state::{FixedState, NodeVector};
-use supple::surrogate::{self, Surrogate, Vertex};
-use supple::tled::{self, Status, Step};
+use supple::step::{Status, Step};
+use supple::tled;
 
 /// The exact step, s: a tenth of the networks'.
 pub(crate) const SECONDS: f32 = 3e-5;
 pub(crate) const DAMPING: f32 = 20.0;
 
-/// A bar with its number of nodes, of elements and of blocks of elements, its lower end's nodes and its load.
-pub(crate) struct Body<const NODES: usize, const ELEMENTS: usize, const BLOCKS: usize> {
+/// A bar with its number of nodes, of elements and of tiles of elements, its lower end's nodes and its load.
+pub(crate) struct Body<const NODES: usize, const ELEMENTS: usize, const TILES: usize> {
     pub(crate) bar: Bar,
     pub(crate) fixed: usize,
     pub(crate) force: [NodalForce; 1],
 }
 
-pub(crate) type Scene<const NODES: usize, const BLOCKS: usize> =
-    FixedScene<Tissue<Exponential>, NODES, BLOCKS>;
+pub(crate) type Scene<const NODES: usize, const TILES: usize> = FixedScene<Tissue<Exponential>, NODES, TILES>;
 
-impl<const NODES: usize, const ELEMENTS: usize, const BLOCKS: usize> Body<NODES, ELEMENTS, BLOCKS> {
+impl<const NODES: usize, const ELEMENTS: usize, const TILES: usize> Body<NODES, ELEMENTS, TILES> {
     pub(crate) fn points(&self) -> [[f32; 3]; NODES] {
         let mut points = [[0.0; 3]; NODES];
         for (point, of_bar) in points.iter_mut().zip(self.bar.points()) {
@@ -33,7 +33,7 @@ impl<const NODES: usize, const ELEMENTS: usize, const BLOCKS: usize> Body<NODES,
         points
     }
 
-    pub(crate) fn scene(&self) -> Option<Scene<NODES, BLOCKS>> {
+    pub(crate) fn scene(&self) -> Option<Scene<NODES, TILES>> {
         let mut tets = [[0; 4]; ELEMENTS];
         for (tet, of_bar) in tets.iter_mut().zip(self.bar.tets()) {
             *tet = of_bar;
@@ -50,7 +50,7 @@ impl<const NODES: usize, const ELEMENTS: usize, const BLOCKS: usize> Body<NODES,
         Some(scene)
     }
 
-    pub(crate) fn loads(&self, scene: &Scene<NODES, BLOCKS>) -> Option<Loads<'_>> {
+    pub(crate) fn loads(&self, scene: &Scene<NODES, TILES>) -> Option<Loads<'_>> {
         Loads::new(scene, [0.0, 0.0, -9.81], &self.force, &[]).ok()
     }
 
@@ -63,12 +63,12 @@ impl<const NODES: usize, const ELEMENTS: usize, const BLOCKS: usize> Body<NODES,
 
     fn advance(
         &self,
-        scene: &Scene<NODES, BLOCKS>,
+        scene: &Scene<NODES, TILES>,
         state: &mut FixedState<NODES>,
         steps: u32,
         mut then: impl FnMut(),
     ) -> Option<()> {
-        let (loads, step) = (self.loads(scene)?, Step::insist(SECONDS, DAMPING).ok()?);
+        let (loads, step) = (self.loads(scene)?, Step::unchecked(SECONDS, DAMPING).ok()?);
         for _ in 0..steps {
             if tled::step(scene, &loads, state, &step) != Status::Ok {
                 return None;
@@ -78,8 +78,8 @@ impl<const NODES: usize, const ELEMENTS: usize, const BLOCKS: usize> Body<NODES,
         Some(())
     }
 
-    /// After `steps` learned ones that go on from `exact` ones; `then` is called after each. Where a step is refused is among
-    /// what has to be the same; in the first half none may be.
+    /// After `exact` exact steps, a lead-in of one learned step and `steps` learned ones; `then` is called after each of these.
+    /// Which step is refused has to be the same as well; in the first half none may be.
     pub(crate) fn learned(
         &self,
         network: &[u8],
@@ -87,20 +87,20 @@ impl<const NODES: usize, const ELEMENTS: usize, const BLOCKS: usize> Body<NODES,
         steps: u32,
         mut then: impl FnMut(),
     ) -> Option<FixedState<NODES>> {
-        let mut surrogate = Surrogate::over(Network::parse(network).ok()?, [Vertex::NEW; NODES]).ok()?;
+        const NODE_VECTORS: usize = vectors_for(1, false);
+        let mut storage = [[NodeVector::ZERO; NODE_VECTORS]; NODES];
+        let network = Network::parse(network).ok()?;
+        let mut learned = LearnedStep::new(network, false, storage.as_flattened_mut()).ok()?;
         let (scene, mut state) = (self.scene()?, FixedState::new());
         self.advance(&scene, &mut state, exact, || ())?;
-        let mut before = [NodeVector::ZERO; NODES];
-        for (before, displacement) in before.iter_mut().zip(state.displacements()) {
-            *before = *displacement;
+        let (loads, step) = (self.loads(&scene)?, Step::unchecked(SECONDS, DAMPING).ok()?);
+        let lead_in = (&step, f64::from(learned.model().seconds()));
+        if learned.lead(scene.view(), &loads, state.view(), lead_in) != Ok(Status::Ok) {
+            return None;
         }
-        self.advance(&scene, &mut state, 10, || ())?;
-        state.span(&before, surrogate.seconds());
-        surrogate.follow(&state);
-        let loads = self.loads(&scene)?;
         let before = state.steps();
         for _ in 0..steps {
-            if let Status::Diverged(_) = surrogate::step(&scene, &loads, &mut state, &mut surrogate) {
+            if !learned.step(scene.view(), &loads, state.view(), &step).ok()?.is_taken() {
                 break;
             }
             then();

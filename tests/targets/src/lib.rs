@@ -6,7 +6,7 @@ mod sums;
 
 pub use sums::*;
 
-/// Whether this was built with the vectors of WebAssembly.
+/// Whether this was built with the vector instructions of WebAssembly.
 #[unsafe(no_mangle)]
 pub extern "C" fn has_simd128() -> bool {
     Level::force(Level::Simd128)

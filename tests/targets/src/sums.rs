@@ -1,20 +1,21 @@
-//! What a processor computes with each kind of step, as a checksum of the bits: on small bars, the same everywhere. Every
-//! number is made by the core, none by a standard library, which is another one on another system.
+//! What a processor computes with each kind of step, as a checksum of the bits: on small bars, the same everywhere. Only the core
+//! computes, no standard library, which differs between systems.
 
 use super::body::{Body, DAMPING, SECONDS};
-use supple::inertia::{self, Damper, Inertia, LatticeNode, damped_numbers_for, damped_vectors_for};
-pub use supple::lanes::Level;
+use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for_lattice};
 use supple::loads::NodalForce;
 use supple::mesh::Bar;
 use supple::mlp::Network;
-use supple::scene::blocks_for;
+use supple::scene::tiles_for;
+pub use supple::simd::Level;
 use supple::state::{FixedState, NodeVector};
-use supple::tled::{Status, Step, critical_step};
+use supple::step::Step;
+use supple::tled::critical_step;
 
 const BAR: Bar = Bar { size: [0.03, 0.02, 0.05], cells: [3, 2, 4] };
 const NODES: usize = BAR.node_count();
 const ELEMENTS: usize = BAR.element_count();
-const SMALL: Body<NODES, ELEMENTS, { blocks_for(ELEMENTS) }> = Body {
+const SMALL: Body<NODES, ELEMENTS, { tiles_for(ELEMENTS) }> = Body {
     bar: BAR,
     fixed: 12,
     force: [NodalForce { node: BAR.node(0, 2, 4), newton: [0.02, -0.03, 0.05], ramp: 0.05 }],
@@ -23,15 +24,14 @@ const SMALL: Body<NODES, ELEMENTS, { blocks_for(ELEMENTS) }> = Body {
 const LONG_BAR: Bar = Bar { size: [0.03, 0.03, 0.12], cells: [3, 3, 12] };
 const LONG_NODES: usize = LONG_BAR.node_count();
 const LONG_ELEMENTS: usize = LONG_BAR.element_count();
-const LONG: Body<LONG_NODES, LONG_ELEMENTS, { blocks_for(LONG_ELEMENTS) }> = Body {
+const LONG: Body<LONG_NODES, LONG_ELEMENTS, { tiles_for(LONG_ELEMENTS) }> = Body {
     bar: LONG_BAR,
     fixed: 16,
     force: [NodalForce { node: LONG_BAR.node(0, 3, 12), newton: [0.02, -0.03, 0.05], ramp: 0.05 }],
 };
-/// Cells of the lattice, and functions at their corners.
-const CELLS: [u32; 3] = [1, 1, 3];
-const FUNCTIONS: usize = 16;
-/// Vertices that go through a network: enough for activations all over their range.
+/// The lattice: a function at each corner of its cells.
+const GRID: Grid = Grid { cells: [1, 1, 3], functions: 16 };
+/// Vertices whose motion a network predicts: enough for activations all over their range.
 const ROWS: usize = 250;
 
 /// A file at a multiple of 64 bytes, where networks may lie.
@@ -43,18 +43,18 @@ static COMPACT_INT8: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights
 static INT8: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden-v3.weights"));
 static DAMPER: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/damper.weights"));
 
-/// What is computed. Those with a number are of the long bar, which has so many nodes.
+/// What is computed; with a number of nodes, on the long bar.
 pub const NAMES: [&str; 8] =
     ["exact", "damped", "network", "learned", "int8", "exact-208", "learned-int8-208", "critical-208"];
 
-/// How its sums are rounded with the instructions of `level`, on which their bits depend: those of layers of eight bits are
+/// How its sums are rounded at `level`, on which their bits depend: those of int8 layers are
 /// never fused, but the learned step has others besides.
 pub fn rounding(what: usize, level: Level) -> &'static str {
     let exact = matches!(level, Level::Portable | Level::Simd128);
     if exact || what == 4 || cfg!(feature = "deterministic") { "unfused" } else { "fused" }
 }
 
-/// Its checksum with the instructions of `level`; zero if it could not be computed.
+/// Its checksum at `level`; zero if it could not be computed.
 pub fn checksum(what: usize, level: Level) -> u32 {
     if !Level::force(level) {
         return 0;
@@ -77,8 +77,7 @@ pub fn long_exact(steps: u32, then: impl FnMut()) -> Option<u32> {
     LONG.exact(steps, then).as_ref().map(of_state)
 }
 
-/// The checksum of the long bar after learned steps with layers of eight bits, which go on from exact ones; `then` is called
-/// after each.
+/// The checksum of the long bar after exact steps and learned ones with int8 layers; `then` is called after each learned step.
 pub fn long_learned(exact: u32, steps: u32, then: impl FnMut()) -> Option<u32> {
     LONG.learned(&COMPACT_INT8.0, exact, steps, then).map(|state| of_state(&state) ^ state.steps() as u32)
 }
@@ -90,38 +89,34 @@ fn long_critical(steps: u32) -> Option<u32> {
 }
 
 /// FNV-1a over the bits.
-fn of(numbers: impl Iterator<Item = f32>) -> u32 {
-    numbers.fold(0x811c_9dc5, |hash, number| (hash ^ number.to_bits()).wrapping_mul(0x0100_0193))
+fn of(values: impl Iterator<Item = f32>) -> u32 {
+    values.fold(0x811c_9dc5, |hash, value| (hash ^ value.to_bits()).wrapping_mul(0x0100_0193))
 }
 
 fn of_state<const N: usize>(state: &FixedState<N>) -> u32 {
     of(state.displacements().iter().flat_map(|displacement| displacement.to_array()))
 }
 
-/// Large steps, with a lattice and a network that damps.
+/// Damped steps.
 fn damped() -> Option<u32> {
     let (scene, mut state) = (SMALL.scene()?, FixedState::<NODES>::new());
     let loads = SMALL.loads(&scene)?;
-    let damper = Damper::over(Network::parse(&DAMPER.0).ok()?).ok()?;
-    let mut inertia = Inertia::over(
-        [NodeVector::ZERO; damped_vectors_for(NODES)],
-        [LatticeNode::EMPTY; NODES],
-        [0.0; damped_numbers_for(CELLS, FUNCTIONS)],
-    )
-    .damped();
-    let step = Step::insist(20.0 * SECONDS, DAMPING).ok()?;
-    inertia.prepare(&scene, &SMALL.points(), &mut state, step, CELLS).ok()?;
+    let damper = Damper::new(Network::parse(&DAMPER.0).ok()?).ok()?;
+    let method = Method::Damped(damper, Cells::Given(GRID.cells));
+    let mut storage = [NodeVector::ZERO; vectors_for_lattice(NODES, GRID, true)];
+    let step = Step::unchecked(20.0 * SECONDS, DAMPING).ok()?;
+    let mut damped =
+        LargeStep::prepare(method, scene.view(), &SMALL.points(), state.view(), step, &mut storage[..])
+            .ok()?;
     for _ in 0..300 {
-        if let Status::Diverged(_) =
-            inertia::damped_step(&scene, &loads, &mut state, &mut inertia, Some(&damper))
-        {
+        if !damped.step(scene.view(), &loads, state.view()).is_taken() {
             return None;
         }
     }
     Some(of_state(&state))
 }
 
-/// Numbers that are unlike each other, and some that are no ordinary ones, through a network.
+/// Predictions for random inputs, and for some that are not normal floats.
 fn network(file: &[u8]) -> Option<u32> {
     let network = Network::parse(file).ok()?;
     let mut inputs = [0.0; 7 * ROWS];
@@ -131,8 +126,8 @@ fn network(file: &[u8]) -> Option<u32> {
         let scale = network.inputs().get(at % 7)?.scale;
         *input = 2.0 * scale * ((seed >> 8) as f32 / 8_388_608.0 - 1.0);
     }
-    for (at, number) in [(0, f32::NAN), (10, f32::INFINITY), (20, -0.0), (30, f32::MIN_POSITIVE / 8.0)] {
-        *inputs.get_mut(at)? = number;
+    for (at, odd) in [(0, f32::NAN), (10, f32::INFINITY), (20, -0.0), (30, f32::MIN_POSITIVE / 8.0)] {
+        *inputs.get_mut(at)? = odd;
     }
     let mut outputs = [0.0; 3 * ROWS];
     network.predict_rows(&inputs, &mut outputs);

@@ -30,8 +30,8 @@ fn main() -> ! {
     exit(measured)
 }
 
-/// Times a thousand exact and a hundred learned steps one by one: a host counts on none taking longer than the others.
-/// Whether there were as many, and the timer lasted for each.
+/// Times each of a thousand exact and a hundred learned steps: none may take longer than the others.
+/// Gives whether there were as many, and the timer lasted for each.
 fn print_instructions(timer: &mut SYST) -> bool {
     timer.set_clock_source(SystClkSource::Core);
     timer.set_reload(TICKS);
@@ -40,12 +40,12 @@ fn print_instructions(timer: &mut SYST) -> bool {
         Each { timer, count: 0, least: u32::MAX, most: 0, painted: ptr::null_mut()..ptr::null_mut() };
     heprintln!("instructions and stack of a step of 208 nodes");
     let exact = long_exact(1_001, || each.ended());
-    let told = each.tell("exact", 1_000);
+    let exact_told = each.tell("exact", 1_000);
     let learned = long_learned(100, 101, || each.ended());
-    exact.is_some() && told && learned.is_some() && each.tell("learned", 100)
+    exact.is_some() && exact_told && learned.is_some() && each.tell("learned", 100)
 }
 
-/// What steps take that follow each other.
+/// What consecutive steps take.
 struct Each<'a> {
     timer: &'a mut SYST,
     count: u32,

@@ -1,0 +1,191 @@
+//! What a scene costs: critical step, memory, time of a step, and the same for steps beyond the critical one.
+
+use std::time::Instant;
+
+use supple::element::{ElementMaterial, ElementTile, NodeInertia};
+use supple::inertia::{Cells, Grid, Method, vectors_for_lattice};
+use supple::loads::Loads;
+use supple::scene::{SceneView, tiles_for};
+use supple::state::{NodeVector, VecState};
+use supple::step::{CriticalStep, Step};
+use supple::tled;
+
+use super::times::{Times, Walker};
+use super::{doubling, learned_cost};
+use crate::problem::Problem;
+use crate::run::large::{grid, on_grid};
+use crate::run::start::{critical, first_step};
+use crate::scene::setup::Setup;
+use crate::scene::timing::{damper, method_name};
+use crate::scene::tissues::Job;
+use crate::screen::{describe_added, row};
+
+/// Exact steps that are timed.
+const TIMED: u32 = 300;
+
+/// Critical step, memory and cost of a scene.
+pub(crate) struct Cost<'a> {
+    pub(crate) setup: &'a Setup,
+    /// Error that a recommended step may have, mm.
+    pub(crate) accuracy: Option<f64>,
+}
+
+impl Job for Cost<'_> {
+    type Output = Result<(), Problem>;
+
+    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
+        let setup = self.setup;
+        let (scene, mut state) = setup.build(material)?;
+        let scene = scene.view();
+        row("material", &setup.tissues);
+        row("mass", format!("{:.3} g", 1e3 * scene.mass()));
+        row("elements left out", setup.body.mesh.tets.len() - scene.element_count());
+        let bound = critical(scene, &mut state)?;
+        describe_limits(scene, &state, bound);
+        let step = first_step(setup, bound, false);
+        let loads = setup.loads(&scene)?;
+        describe_memory(scene);
+        let seconds = describe_exact(setup, scene, &mut state, &loads, bound)?;
+        if setup.time.method.is_none() {
+            let wanted = step.as_ref().map_or(bound.seconds, |step| step.seconds());
+            row("real-time factor", real_time(wanted, seconds));
+        }
+        let times = describe_beyond(setup, scene, &loads, bound)?;
+        doubling::predict_errors(setup, scene, &loads, bound)?;
+        if let Some(learned) = &setup.learned {
+            learned_cost::describe(learned, setup, scene, &loads)?;
+        }
+        let step = step?;
+        if let Some(method) = &setup.time.method {
+            row("real-time factor", real_time(step.seconds(), times.of(method)));
+        }
+        match self.accuracy {
+            Some(accuracy) => doubling::recommend(setup, scene, &loads, bound, accuracy, &times),
+            None => Ok(()),
+        }
+    }
+}
+
+fn real_time(step: f32, spent: f64) -> String {
+    format!("{:.3} at {step:.3e} s a step", f64::from(step) / spent)
+}
+
+/// Prints the critical step at rest, as a bound and as it is.
+fn describe_limits<M: ElementMaterial>(scene: SceneView<'_, M>, state: &VecState, bound: CriticalStep) {
+    row(
+        "critical step",
+        format!("{:.4e} s at rest, which node {} sets (a bound, safe)", bound.seconds, bound.node),
+    );
+    match tled::exact_critical_step(scene, state.displacements()) {
+        Some(exact) => row(
+            "exact limit",
+            format!("{exact:.4e} s at rest; the bound is {:.2} of it", f64::from(bound.seconds) / exact),
+        ),
+        None => row("exact limit", "not found: the iteration did not settle"),
+    }
+}
+
+/// Prints the memory of scene and state.
+fn describe_memory<M: ElementMaterial>(scene: SceneView<'_, M>) {
+    let of_node = size_of::<NodeInertia>() + 3 * size_of::<NodeVector>();
+    let tiles = tiles_for(scene.element_count()) * size_of::<ElementTile>();
+    row("memory", format!("{:.1} kB", (scene.node_count() * of_node + tiles) as f64 * 1e-3));
+}
+
+/// Prints what an exact step costs. Gives its time, s.
+fn describe_exact<M: ElementMaterial>(
+    setup: &Setup,
+    scene: SceneView<'_, M>,
+    state: &mut VecState,
+    loads: &Loads<'_>,
+    bound: CriticalStep,
+) -> Result<f64, Problem> {
+    let operations = tled::operations(scene);
+    row("operations per step", format!("{operations} floating-point operations"));
+    let step = Step::unchecked(0.5 * bound.seconds, setup.damping).map_err(Problem::of)?;
+    let start = Instant::now();
+    for _ in 0..TIMED {
+        // Only the time counts here; what becomes of the motion is for `simulate`.
+        let _ = tled::step(&scene, loads, state, &step);
+    }
+    let seconds = start.elapsed().as_secs_f64() / f64::from(TIMED);
+    let gflops = operations as f64 / seconds * 1e-9;
+    row("time per step", format!("{:.1} us here and now, {gflops:.1} GFLOP/s", 1e6 * seconds));
+    Ok(seconds)
+}
+
+/// Prints what steps beyond the critical one need and do at rest.
+fn describe_beyond<M: ElementMaterial>(
+    setup: &Setup,
+    scene: SceneView<'_, M>,
+    loads: &Loads<'_>,
+    bound: CriticalStep,
+) -> Result<Times, Problem> {
+    println!("\nsteps beyond the limit");
+    let lattice = lattice(setup, scene)?;
+    let methods = [
+        Method::MassScaled,
+        on_grid(&Method::Multilevel(Cells::Suggested), lattice),
+        on_grid(&Method::Damped(damper()?, Cells::Suggested), lattice),
+    ];
+    let kilobytes = |grid: Grid, damped: bool| {
+        1e-3 * (vectors_for_lattice(scene.node_count(), grid, damped) * size_of::<NodeVector>()) as f64
+    };
+    row(
+        "memory of inertia",
+        format!(
+            "{:.1} kB damped, {:.1} kB multilevel, {:.1} kB mass-scaled, besides the above",
+            kilobytes(lattice, true),
+            kilobytes(lattice, false),
+            kilobytes(Grid::default(), false)
+        ),
+    );
+    let times = Times::measured(&methods, setup, scene, loads, bound)?;
+    for method in &methods {
+        let (seconds, exact) = (times.of(method), times.exact);
+        row(
+            &format!("{} step", method_name(Some(method))),
+            format!(
+                "{:.1} us, {:.2} times an exact one's {:.1} us",
+                1e6 * seconds,
+                seconds / exact,
+                1e6 * exact
+            ),
+        );
+    }
+    let [mass_scaled, multilevel, damped] = &methods;
+    let method = match &setup.time.method {
+        Some(Method::MassScaled) => mass_scaled,
+        Some(Method::Damped(..)) => damped,
+        _ => multilevel,
+    };
+    for multiple in [10.0, 20.0, 50.0] {
+        let walker = Walker::new(method, setup, scene, multiple * bound.seconds)?;
+        row(
+            &format!("added mass at {multiple}x"),
+            format!("{}, {}", describe_added(walker.step.report()), method_name(Some(method))),
+        );
+    }
+    Ok(times)
+}
+
+/// Prints the lattice that suits the scene, and the one that its file gives. Gives the one that it has.
+fn lattice<M: ElementMaterial>(setup: &Setup, scene: SceneView<'_, M>) -> Result<Grid, Problem> {
+    let suggestion = match &setup.time.method {
+        Some(Method::Damped(damper, _)) => Method::Damped(damper.clone(), Cells::Suggested),
+        _ => Method::Multilevel(Cells::Suggested),
+    };
+    let suggested = suggestion.grid(scene, &setup.body.local).map_err(Problem::of)?;
+    let own = match &setup.time.method {
+        Some(method @ (Method::Multilevel(_) | Method::Damped(..))) => grid(setup, scene, method)?,
+        _ => suggested,
+    };
+    match suggested.functions {
+        0 => row("lattice suggested", "none, too few elements"),
+        _ => row("lattice suggested", suggested),
+    }
+    if own != suggested {
+        row("lattice of the scene", own);
+    }
+    Ok(own)
+}

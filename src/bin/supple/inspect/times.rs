@@ -1,0 +1,99 @@
+//! Steps of one method and length from rest, and how long a step of each method takes.
+
+use std::time::Instant;
+
+use supple::element::ElementMaterial;
+use supple::inertia::Method;
+use supple::loads::Loads;
+use supple::scene::SceneView;
+use supple::state::VecState;
+use supple::step::{CriticalStep, Status, Step};
+use supple::tled;
+
+use crate::problem::Problem;
+use crate::run::large::{PreparedStep, prepare};
+use crate::scene::setup::Setup;
+
+/// Steps of each method that are timed, and the length of those beyond the critical step in multiples of it.
+const TIMED: usize = 50;
+const TIMED_MULTIPLE: f32 = 20.0;
+
+/// Median time of a step, s.
+pub(crate) struct Times {
+    pub(crate) exact: f64,
+    mass_scaled: f64,
+    multilevel: f64,
+    damped: f64,
+}
+
+impl Times {
+    pub(crate) const fn of(&self, method: &Method<'_>) -> f64 {
+        match method {
+            Method::MassScaled => self.mass_scaled,
+            Method::Multilevel(_) => self.multilevel,
+            Method::Damped(..) => self.damped,
+        }
+    }
+
+    /// Times exact, mass-scaled, multilevel and damped steps from rest, in turn, so that what else the machine does meets all of
+    /// them.
+    pub(crate) fn measured<M: ElementMaterial>(
+        methods: &[Method<'static>; 3],
+        setup: &Setup,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        bound: CriticalStep,
+    ) -> Result<Self, Problem> {
+        let seconds = TIMED_MULTIPLE * bound.seconds;
+        let mut walkers = vec![];
+        for method in methods {
+            walkers.push(Walker::new(method, setup, scene, seconds)?);
+        }
+        let exact = Step::unchecked(0.5 * bound.seconds, setup.damping).map_err(Problem::of)?;
+        let mut state = setup.state();
+        let mut spent = [(); 4].map(|()| vec![]);
+        for _ in 0..TIMED {
+            spent[0].push(timed(|| tled::step(&scene, loads, &mut state, &exact)));
+            for (walker, spent) in walkers.iter_mut().zip(&mut spent[1..]) {
+                spent.push(timed(|| walker.step(scene, loads)));
+            }
+        }
+        let [exact, mass_scaled, multilevel, damped] = spent.map(|mut seconds| {
+            seconds.sort_by(f64::total_cmp);
+            seconds[TIMED / 2]
+        });
+        Ok(Self { exact, mass_scaled, multilevel, damped })
+    }
+}
+
+/// Seconds that a step takes. What becomes of the motion does not matter here.
+fn timed(step: impl FnOnce() -> Status) -> f64 {
+    let start = Instant::now();
+    let _ = step();
+    start.elapsed().as_secs_f64()
+}
+
+/// A scene on its way from rest, with one method and one length of step.
+pub(crate) struct Walker {
+    pub(crate) state: VecState,
+    pub(crate) step: PreparedStep,
+}
+
+impl Walker {
+    /// At rest; steps take `seconds`.
+    pub(crate) fn new<M: ElementMaterial>(
+        method: &Method<'static>,
+        setup: &Setup,
+        scene: SceneView<'_, M>,
+        seconds: f32,
+    ) -> Result<Self, Problem> {
+        let step = Step::unchecked(seconds, setup.damping).map_err(Problem::of)?;
+        let mut state = setup.state();
+        let step = prepare(method, setup, scene, &mut state, step)?;
+        Ok(Self { state, step })
+    }
+
+    pub(crate) fn step<M: ElementMaterial>(&mut self, scene: SceneView<'_, M>, loads: &Loads<'_>) -> Status {
+        self.step.step(scene, loads, self.state.view())
+    }
+}

@@ -1,0 +1,123 @@
+//! `supple train`: a network from a recipe, with its progress and its error on frames that it has not seen.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use supple::train::damper;
+use supple::train::fit::{Fitted, Progress, fit};
+use supple::train::recipe::Recipe;
+use supple::train::samples::Samples;
+
+use super::quantise::quantise_trained;
+use crate::problem::{End, Problem};
+use crate::weight_file;
+
+#[derive(Args)]
+pub(crate) struct Asked {
+    /// The recipe, a TOML file
+    recipe: PathBuf,
+    /// The weight file to write
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// Checkpoints stand next to the weight file until it is written.
+fn checkpoints(out: &Path) -> PathBuf {
+    let mut name = out.file_name().unwrap_or_default().to_os_string();
+    name.push(".checkpoint");
+    out.with_file_name(name)
+}
+
+pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
+    let Asked { recipe, out } = asked;
+    let problem = |error: &dyn std::fmt::Display| Problem::in_file(recipe, error);
+    let text = std::fs::read_to_string(recipe).map_err(|error| problem(&error))?;
+    if is_damper(&text) {
+        return train_damper(&text, recipe, out);
+    }
+    let parsed = Recipe::parse(&text).map_err(|error| problem(&error))?;
+    let folder = checkpoints(out);
+    eprintln!("simulating the motion to learn from ...");
+    let collected = Samples::collect(&parsed).map_err(|error| problem(&error))?;
+    let bar = ProgressBar::no_length();
+    let style = ProgressStyle::with_template("{bar:30} {msg}").map_err(|error| problem(&error))?;
+    bar.set_style(style);
+    let mut told = None;
+    let fitted = fit(&parsed, &text, &collected, Some(&folder), &mut |at: &Progress| {
+        bar.set_length((at.epochs * at.samples) as u64);
+        bar.set_position((at.epoch * at.samples + at.done) as u64);
+        bar.set_message(said(at));
+        // A line an epoch where no bar can be drawn.
+        if bar.is_hidden() && at.done == at.samples && told != Some(at.epoch) {
+            told = Some(at.epoch);
+            eprintln!("{}", said(at));
+        }
+        ControlFlow::Continue(())
+    });
+    bar.finish_and_clear();
+    let Fitted { bytes, held_out, samples, loss } = fitted.map_err(|error| problem(&error))?;
+    weight_file::write(out, &bytes)?;
+    // Only now that the weights are safe.
+    let _ = std::fs::remove_dir_all(&folder);
+    println!("samples     {samples}");
+    println!("loss        {loss:.4} of the variance, both losses together");
+    if let Some([t, n, b]) = held_out {
+        println!(
+            "held out    error {t:.3}, {n:.3}, {b:.3} of the standard deviation along tangent, normal, binormal"
+        );
+    }
+    println!("weights     {} ({} bytes)", out.display(), bytes.len());
+    quantise_trained(out, &bytes, &parsed, &collected)?;
+    Ok(End::Reached)
+}
+
+fn is_damper(recipe: &str) -> bool {
+    recipe.parse::<toml::Table>().is_ok_and(|table| table.contains_key("damper"))
+}
+
+/// A few minutes of roll-outs: there are no checkpoints.
+fn train_damper(text: &str, recipe: &Path, out: &Path) -> Result<End, Problem> {
+    eprintln!("simulating the motions to be judged by ...");
+    let trained = damper::train(text, |at| {
+        eprintln!(
+            "generation {} of {}, best {:.4}, {} left",
+            at.generation,
+            at.generations,
+            at.best,
+            clock(at.remaining)
+        );
+        ControlFlow::Continue(())
+    });
+    let trained = trained.map_err(|error| Problem::in_file(recipe, error))?;
+    weight_file::write(out, &trained.bytes)?;
+    println!("mean error over nodes and time, mm");
+    println!("scene            load  step  multilevel  undamped      rule   network");
+    for damper::Judged { scene, load, multiple, errors: [multilevel, undamped, rule, network] } in
+        &trained.judged
+    {
+        println!(
+            "{scene:14} {load:6} {multiple:4}x {multilevel:11.4} {undamped:9.4} {rule:9.4} {network:9.4}"
+        );
+    }
+    println!("weights     {} ({} bytes)", out.display(), trained.bytes.len());
+    Ok(End::Reached)
+}
+
+fn said(at: &Progress) -> String {
+    format!(
+        "epoch {} of {}, loss {:.4}, {:.0} samples/s, {} left",
+        at.epoch + 1,
+        at.epochs,
+        at.loss,
+        at.rate,
+        clock(at.remaining)
+    )
+}
+
+fn clock(time: Duration) -> String {
+    let seconds = time.as_secs();
+    format!("{}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60)
+}

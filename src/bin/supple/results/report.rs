@@ -1,0 +1,278 @@
+//! The report of a simulation: one list of what there is to tell, each with a row of the table on the screen and its figures in
+//! `summary.json`.
+
+use serde_json::{Map, Value, json};
+use supple::inertia::Grid;
+
+use super::figures::Figures;
+use crate::run::outcome::{LargeTrace, LearnedTrace, Outcome};
+use crate::scene::learned::LearnedChoice;
+use crate::scene::setup::Setup;
+use crate::screen::describe_added;
+
+#[derive(Default)]
+pub(crate) struct Report {
+    rows: Vec<(&'static str, String)>,
+    figures: Map<String, Value>,
+}
+
+impl Report {
+    /// Adds a row of the table, if there are words for it, and its figures, a JSON object.
+    fn add(&mut self, name: &'static str, words: impl Into<Option<String>>, figures: Value) {
+        self.rows.extend(words.into().map(|words| (name, words)));
+        self.add_figures(figures);
+    }
+
+    /// Adds figures without a row, a JSON object.
+    fn add_figures(&mut self, figures: Value) {
+        if let Value::Object(figures) = figures {
+            self.figures.extend(figures);
+        }
+    }
+
+    /// Adds rows, and their figures as an object of its own.
+    fn add_section(&mut self, name: &str, section: Option<Self>) {
+        let (rows, figures) =
+            section.map_or((vec![], Value::Null), |Self { rows, figures }| (rows, Value::Object(figures)));
+        self.rows.extend(rows);
+        self.figures.insert(name.into(), figures);
+    }
+
+    /// The table on the screen.
+    pub(crate) fn table(&self) -> String {
+        self.rows.iter().map(|(name, words)| format!("{name:<21} {words}\n")).collect()
+    }
+
+    /// `summary.json`.
+    pub(crate) fn summary(&self) -> String {
+        format!("{:#}\n", Value::Object(self.figures.clone()))
+    }
+}
+
+/// All there is to tell.
+pub(crate) fn of(setup: &Setup, outcome: &Outcome, figures: &Figures, warnings: &[String]) -> Report {
+    let mut report = Report::default();
+    add_ending(&mut report, outcome);
+    report.add_figures(json!({ "method": setup.method_name(), "warnings": warnings }));
+    add_scene(&mut report, setup, figures);
+    let learned = setup.learned.as_ref().zip(outcome.learned.as_ref());
+    report.add_section("learned", learned.map(|(choice, trace)| learned_section(choice, trace)));
+    let large = outcome.large.as_ref();
+    report.add_section("inertia", large.map(|trace| large_section(setup.method_name(), trace, outcome)));
+    add_steps(&mut report, setup, outcome, figures);
+    add_motion(&mut report, figures);
+    report
+}
+
+fn add_ending(report: &mut Report, outcome: &Outcome) {
+    let fell_back = outcome.learned.as_ref().is_some_and(|trace| trace.fell_back.is_some());
+    let status = match (&outcome.divergence, outcome.limits.steps) {
+        (Some(_), _) => "diverged",
+        (None, _) if fell_back => "fell back",
+        (None, 0) => "ok",
+        (None, _) => "limited",
+    };
+    report.add_figures(json!({
+        "status": status,
+        "divergence": outcome.divergence.map(|divergence| json!({
+            "time_s": divergence.time, "node": divergence.node, "sentence": divergence.to_string(),
+        })),
+        "steps_limited": outcome.limits.steps,
+    }));
+}
+
+fn add_scene(report: &mut Report, setup: &Setup, figures: &Figures) {
+    let elements = setup.body.mesh.tets.len();
+    report.add(
+        "mesh",
+        format!(
+            "{}: {} nodes, {elements} tetrahedra, {:.1} g",
+            setup.body.name,
+            figures.nodes,
+            1e3 * figures.mass
+        ),
+        json!({
+            "mesh": setup.body.name,
+            "nodes": figures.nodes,
+            "elements": elements,
+            "elements_left_out": elements - figures.elements,
+            "mass_kg": figures.mass,
+        }),
+    );
+    let material = setup.tissues.to_string();
+    report.add("material", material.clone(), json!({ "material": material }));
+    report.add_figures(json!({ "damping_per_s": decimal(setup.damping) }));
+}
+
+fn add_steps(report: &mut Report, setup: &Setup, outcome: &Outcome, figures: &Figures) {
+    let (shortest, longest) = outcome.steps;
+    let range = if shortest == longest { String::new() } else { format!("{shortest:.3e} to ") };
+    let (least, least_at) = outcome.least;
+    report.add(
+        "step",
+        format!(
+            "{range}{longest:.3e} s; stable at rest {:.3e} s, least on the way {:.3e} s",
+            outcome.at_rest.seconds, least.seconds
+        ),
+        json!({
+            "step_shortest_s": decimal(shortest),
+            "step_longest_s": decimal(longest),
+            "critical_step_at_rest_s": decimal(outcome.at_rest.seconds),
+            "critical_step_least_s": decimal(least.seconds),
+            "critical_step_least_at_s": least_at,
+        }),
+    );
+    let undone = match (figures.steps_undone, outcome.divergence) {
+        (undone @ 1.., None) => format!(", {undone} more undone"),
+        _ => String::new(),
+    };
+    report.add(
+        "simulated",
+        format!("{:.3} s in {} steps{undone}", figures.time, figures.steps),
+        json!({
+            "time_s": figures.time,
+            "end_s": setup.time.end,
+            "steps": figures.steps,
+            "steps_undone": figures.steps_undone,
+        }),
+    );
+    let (us, factor) = (figures.us_per_step, figures.real_time_factor);
+    report.add("time per step", format!("{us:.1} us"), json!({ "us_per_step": us }));
+    let words = format!("{factor:.3} (1 and more is real time)");
+    report.add("real-time factor", words, json!({ "real_time_factor": factor }));
+}
+
+fn add_motion(report: &mut Report, figures: &Figures) {
+    let (percent, least) = (100.0 * figures.volume_change, figures.least_volume_ratio);
+    report.add(
+        "volume change",
+        format!("{percent:+.3} % (smallest element {least:.3} of its volume)"),
+        json!({ "volume_change_percent": percent, "least_volume_ratio": least }),
+    );
+    let (mm, node) = (1e3 * figures.max_displacement, figures.max_node);
+    report.add(
+        "maximum displacement",
+        format!("{mm:.3} mm at node {node}"),
+        json!({ "max_displacement_mm": mm, "max_displacement_node": node }),
+    );
+    let energy = &figures.energy;
+    report.add_figures(json!({ "energy_j": {
+        "work": energy.work, "dissipated": energy.dissipated,
+        "kinetic": energy.kinetic, "strain": figures.strain_energy,
+    } }));
+}
+
+/// Mass-scaled, multilevel or damped steps.
+fn large_section(method: &str, trace: &LargeTrace, outcome: &Outcome) -> Report {
+    let mut section = Report::default();
+    let multiple = outcome.steps.1 / outcome.at_rest.seconds;
+    section.add(
+        "method",
+        format!("{method}, steps of {multiple:.1} times the critical step at rest"),
+        json!({ "step_s": decimal(outcome.steps.1), "step_over_critical_at_rest": decimal(multiple) }),
+    );
+    let lattice = (trace.grid != Grid::default()).then_some(trace.grid);
+    section.add(
+        "lattice",
+        lattice.map(|grid| grid.to_string()),
+        json!({
+            "lattice_cells": lattice.map(|grid| grid.cells),
+            "lattice_functions": lattice.map(|grid| grid.functions),
+        }),
+    );
+    section.add(
+        "added mass",
+        describe_added(&trace.report),
+        json!({
+            "added_mass_mean": decimal(trace.report.added_mean),
+            "added_mass_largest": decimal(trace.report.added_largest),
+            "added_mass_node": trace.report.added_node,
+        }),
+    );
+    section.add(
+        "error estimate",
+        format!(
+            "{:.3} mm at the end, {:.3} mm at most, on average over the nodes",
+            1e3 * trace.report.error,
+            1e3 * trace.most_error
+        ),
+        json!({
+            "error_estimate_mm": 1e3 * f64::from(trace.report.error),
+            "error_estimate_largest_mm": 1e3 * f64::from(trace.most_error),
+        }),
+    );
+    let share = trace.steps_held_back as f64 / outcome.computed.max(1) as f64;
+    let words = match trace.most_held_back {
+        0 => "no node in any step".into(),
+        most => format!("nodes in {:.1} % of the steps, at most {most} at once", 100.0 * share),
+    };
+    section.add(
+        "held back",
+        words,
+        json!({ "steps_held_back_share": share, "most_nodes_held_back": trace.most_held_back }),
+    );
+    let coarse = lattice.map(|_| trace.least_coarse_share);
+    section.add(
+        "coarse motion",
+        coarse.map(|share| format!("used to {:.1} % or more", 100.0 * share)),
+        json!({ "coarse_share_least": coarse.map(decimal) }),
+    );
+    let damping = trace.is_damped.then_some(trace.most_damping);
+    section.add(
+        "rough motion",
+        damping.map(|share| format!("at most {:.1} % taken away in a step", 100.0 * share)),
+        json!({ "rough_motion_damped_largest": damping.map(decimal) }),
+    );
+    section
+}
+
+/// Learned steps.
+fn learned_section(choice: &LearnedChoice, trace: &LearnedTrace) -> Report {
+    let mut section = Report::default();
+    let path = choice.path.display().to_string();
+    section.add(
+        "network",
+        format!("{path}, steps of {}", trace.described),
+        json!({ "weights": path, "step_s": decimal(trace.seconds) }),
+    );
+    let us = trace.us_per_step();
+    let real_time = 1e6 * f64::from(trace.seconds) / us;
+    section.add(
+        "learned steps",
+        format!(
+            "{} from {:.3} s on, {us:.1} us each, {real_time:.3} times real time",
+            trace.steps,
+            trace.from.unwrap_or_default()
+        ),
+        json!({ "from_s": trace.from, "steps": trace.steps, "us_per_step": us }),
+    );
+    let share = |mean: f64, most: f32| {
+        format!("{:.2} % of the vertices on average, {:.1} % at most", 100.0 * mean, 100.0 * most)
+    };
+    let ((clipped, outside), most) = (trace.means(), &trace.most);
+    section.add(
+        "clipped",
+        share(clipped, most.clipped),
+        json!({ "clipped_share": clipped, "clipped_share_most": decimal(most.clipped) }),
+    );
+    section.add(
+        "outside training",
+        share(outside, most.outside),
+        json!({ "outside_share": outside, "outside_share_most": decimal(most.outside) }),
+    );
+    let fell_back = trace.fell_back.as_ref();
+    section.add(
+        "fell back",
+        fell_back.map(|(time, why)| format!("to the exact step at {time:.3} s; the learned one {why}")),
+        json!({
+            "fell_back_at_s": fell_back.map(|(time, _)| time),
+            "fell_back_because": fell_back.map(|(_, why)| why),
+        }),
+    );
+    section
+}
+
+/// A float32 as a person wrote it: 3e-5, not 2.9999999242136255e-5.
+fn decimal(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or(f64::from(value))
+}

@@ -1,0 +1,73 @@
+//! What is not as it should be, in sentences.
+
+use supple::material::J_FLOOR;
+
+use crate::run::outcome::{LearnedTrace, Limits, Outcome};
+use crate::scene::setup::Setup;
+
+/// Share of the vertices outside a network's training, on average, from which on it is remarked upon.
+const OUTSIDE: f64 = 0.01;
+
+/// Of the scene, then of what became of it.
+pub(crate) fn of(setup: &Setup, outcome: &Outcome) -> Vec<String> {
+    let mut warnings = setup.warnings.clone();
+    if let Some(time) = outcome.above_from {
+        warnings.push(format!(
+            "from {time:.3} s on the step was above the stable {:.3e} s, as the tissue had stiffened; shorten it or \
+             write step = \"auto\"",
+            outcome.least.0.seconds
+        ));
+    }
+    if let Some(trace) = &outcome.learned {
+        warnings.extend(outside_training(trace));
+        if let Some((time, why)) = &trace.fell_back {
+            warnings
+                .push(format!("from {time:.3} s on the exact step moved the scene: the learned one {why}"));
+        }
+    }
+    if outcome.limits.steps > 0 {
+        warnings.push(not_exact(&outcome.limits));
+    }
+    warnings
+}
+
+fn outside_training(trace: &LearnedTrace) -> Option<String> {
+    let (_, outside) = trace.means();
+    (outside > OUTSIDE).then(|| {
+        format!(
+            "{:.1} % of the vertices had inputs outside the network's training, {:.1} % at most: its error there is \
+             not known",
+            100.0 * outside,
+            100.0 * trace.most.outside
+        )
+    })
+}
+
+/// Why steps were not exact.
+fn not_exact(limits: &Limits) -> String {
+    let mut causes = vec![];
+    if limits.least_volume_ratio < J_FLOOR {
+        causes.push(format!("an element was squeezed to {:.3} of its volume", limits.least_volume_ratio));
+    }
+    if limits.saturation > 1.0 {
+        causes.push(format!("an exponent reached {:.2} times its cap", limits.saturation));
+    }
+    if limits.energy_excess > 0.0 {
+        causes.push(format!(
+            "kinetic energy exceeded the energy balance by {:.0} %",
+            100.0 * limits.energy_excess
+        ));
+    }
+    if limits.held_back > 0 {
+        causes.push(format!(
+            "in {} much of the motion was held back, which a shorter step does less",
+            limits.held_back
+        ));
+    }
+    format!(
+        "{} steps, the first at {:.3} s, were taken but are not exact: {}",
+        limits.steps,
+        limits.first_time,
+        causes.join(", ")
+    )
+}

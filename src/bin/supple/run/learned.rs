@@ -1,0 +1,107 @@
+//! Learned steps of a scene. Time goes in intervals of the network's step `D`: first those of the lead-in, in each of which the exact
+//! step of `[time]` takes as many steps as it needs, then one learned step each. With fallback the first one that energy does not
+//! explain is undone, and the exact step takes over for good.
+
+use std::time::Instant;
+
+use supple::element::ElementMaterial;
+use supple::learned::{LearnedStep, Undone};
+use supple::state::{NodeVector, VecState};
+use supple::step::{CallingThread, Status};
+
+use super::exact::{ExactSteps, Motion};
+use super::outcome::{LearnedTrace, Outcome};
+use crate::problem::Problem;
+use crate::scene::learned::LearnedChoice;
+use crate::weight_file::describe_step;
+
+/// Learned steps on their way.
+pub(crate) struct LearnedRun<'a> {
+    step: LearnedStep<'a, Vec<NodeVector>>,
+    exact: ExactSteps,
+    /// Intervals so far, and in the lead-in.
+    interval: u64,
+    lead_in: u64,
+    pub(crate) trace: LearnedTrace,
+}
+
+impl<'a> LearnedRun<'a> {
+    pub(crate) fn new(choice: &'a LearnedChoice, nodes: usize, exact: ExactSteps) -> Result<Self, Problem> {
+        let step = choice.step(nodes, choice.fallback)?;
+        let model = step.model();
+        let trace = LearnedTrace::new(model.seconds(), describe_step(model.network()));
+        Ok(Self { lead_in: model.intervals(choice.burn_in), step, exact, interval: 0, trace })
+    }
+
+    /// The learned step, s.
+    pub(crate) const fn seconds(&self) -> f32 {
+        self.trace.seconds
+    }
+
+    /// The length of fixed exact steps (s), while they move the scene.
+    pub(crate) fn fixed_exact_seconds(&self) -> Option<f32> {
+        let is_exact = self.interval < self.lead_in || self.trace.fell_back.is_some();
+        match &self.exact {
+            ExactSteps::Fixed(step) if is_exact => Some(step.seconds()),
+            _ => None,
+        }
+    }
+
+    /// Moves on by one interval, or until a step diverges.
+    pub(crate) fn advance<M: ElementMaterial>(
+        &mut self,
+        motion: &Motion<'_, M>,
+        state: &mut VecState,
+        outcome: &mut Outcome,
+    ) -> Result<(), Problem> {
+        self.interval += 1;
+        let seconds = self.trace.seconds;
+        if self.interval <= self.lead_in {
+            return self.lead_in(motion, state, outcome);
+        }
+        if self.trace.fell_back.is_some() {
+            return self.exact.advance(motion, state, outcome, seconds);
+        }
+        self.trace.from.get_or_insert(state.time());
+        let exact_seconds = self.exact.seconds();
+        let clock = Instant::now();
+        let tried = self.step.view().try_step(
+            motion.scene,
+            motion.loads,
+            &mut state.view(),
+            exact_seconds,
+            &CallingThread,
+        );
+        self.trace.enter(self.step.model().report(), clock.elapsed());
+        match tried.map_err(Problem::of)? {
+            Ok(status) => {
+                outcome.steps.1 = outcome.steps.1.max(seconds);
+                outcome.enter(status, state);
+                Ok(())
+            }
+            Err(Undone) => {
+                if let Some(fallback) = self.step.model().fell_back() {
+                    self.trace.enter_fallback(fallback.time, fallback.status);
+                }
+                outcome.computed += 1;
+                self.exact.advance(motion, state, outcome, seconds)
+            }
+        }
+    }
+
+    /// An interval of the lead-in.
+    fn lead_in<M: ElementMaterial>(
+        &mut self,
+        motion: &Motion<'_, M>,
+        state: &mut VecState,
+        outcome: &mut Outcome,
+    ) -> Result<(), Problem> {
+        let mut advanced = Ok(());
+        // A step that diverged is in the outcome, which ends the run.
+        let _ = self.step.view().lead_interval(state, |state| {
+            advanced = self.exact.advance(motion, state, outcome, self.trace.seconds);
+            outcome.divergence.map_or(Status::Ok, Status::Diverged)
+        });
+        advanced
+    }
+}

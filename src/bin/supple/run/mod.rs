@@ -1,0 +1,79 @@
+//! A simulation from rest to its end: steps, frames at even intervals, what became of it.
+
+pub(crate) mod exact;
+pub(crate) mod large;
+pub(crate) mod learned;
+pub(crate) mod outcome;
+pub(crate) mod start;
+
+use std::time::Instant;
+
+use supple::element::ElementMaterial;
+use supple::scene::SceneView;
+use supple::state::VecState;
+
+use crate::problem::Problem;
+use crate::scene::setup::Setup;
+use exact::{ExactSteps, Motion, STEPS_BETWEEN_LOOKS};
+use outcome::{LargeTrace, Outcome};
+use start::{Mover, Start, critical};
+
+/// Runs to the end or to divergence. `frame` is called at rest and after each interval between frames, `tick` with the time (s) now
+/// and then.
+pub(crate) fn run<M: ElementMaterial>(
+    setup: &Setup,
+    scene: SceneView<'_, M>,
+    state: &mut VecState,
+    start: Start<'_>,
+    tick: &dyn Fn(f64),
+    frame: &mut dyn FnMut(&VecState) -> Result<(), Problem>,
+) -> Result<Outcome, Problem> {
+    let loads = setup.loads(&scene)?;
+    let time = &setup.time;
+    let motion = Motion { scene, loads: &loads, damping: setup.damping, end: time.end, tick };
+    let Start { at_rest, step, mut mover } = start;
+    let mut outcome = Outcome::new(at_rest, step.seconds());
+    if let (Mover::Large(large), Some(method)) = (&mover, &time.method) {
+        outcome.large = Some(LargeTrace::new(method, large.model()));
+    }
+    frame(state)?;
+    // Time goes in even intervals, each one step or one of a network, unless exact steps alone set their own pace.
+    let interval = if let Mover::Learned(learned) = &mover { learned.seconds() } else { step.seconds() };
+    let even = !matches!(mover, Mover::Exact(ExactSteps::Automatic(_)));
+    let total = (time.end / f64::from(interval)).round().max(1.0) as u64;
+    let mut taken = 0;
+    // No two frames of one state.
+    let frames = if even { total.min(time.frames.into()) } else { time.frames.into() };
+    for index in 1..=frames {
+        let share = index as f64 / frames as f64;
+        let clock = Instant::now();
+        if let Mover::Exact(ExactSteps::Automatic(pace)) = &mut mover {
+            pace.reach(&motion, state, &mut outcome, time.end * share)?;
+        } else {
+            let target = (total as f64 * share).round() as u64;
+            while taken < target && outcome.divergence.is_none() {
+                taken += 1;
+                mover.advance(&motion, state, &mut outcome, interval)?;
+                if taken % u64::from(STEPS_BETWEEN_LOOKS) == 0 {
+                    tick(state.time());
+                }
+            }
+        }
+        outcome.spent += clock.elapsed();
+        if outcome.divergence.is_some() {
+            break;
+        }
+        let bound = critical(scene, state)?;
+        if bound.seconds < outcome.least.0.seconds {
+            outcome.least = (bound, state.time());
+        }
+        if mover.fixed_exact_seconds().is_some_and(|seconds| seconds > bound.seconds) {
+            outcome.above_from.get_or_insert(state.time());
+        }
+        frame(state)?;
+    }
+    if let Mover::Learned(learned) = mover {
+        outcome.learned = Some(learned.trace);
+    }
+    Ok(outcome)
+}

@@ -1,0 +1,203 @@
+//! What became of a simulation: figures that are taken down step by step.
+
+use std::time::Duration;
+
+use supple::inertia::{Grid, LargeModel, Method, Report};
+use supple::learned::LearnedReport;
+use supple::material::J_FLOOR;
+use supple::state::VecState;
+use supple::step::{CriticalStep, Divergence, Status};
+
+/// Steps that are not exact: elements were beyond the range of their law, there was energy that the balance does not explain, or
+/// motion was held back.
+#[derive(Clone, Copy)]
+pub(crate) struct Limits {
+    pub(crate) steps: u64,
+    /// s.
+    pub(crate) first_time: f64,
+    pub(crate) least_volume_ratio: f32,
+    pub(crate) saturation: f32,
+    pub(crate) energy_excess: f32,
+    /// Steps for no other cause than motion that was held back.
+    pub(crate) held_back: u64,
+}
+
+impl Limits {
+    const NONE: Self = Self {
+        steps: 0,
+        first_time: 0.0,
+        least_volume_ratio: 1.0,
+        saturation: 0.0,
+        energy_excess: 0.0,
+        held_back: 0,
+    };
+}
+
+/// What became of a simulation.
+pub(crate) struct Outcome {
+    pub(crate) at_rest: CriticalStep,
+    /// The smallest bound seen at a frame, with its time.
+    pub(crate) least: (CriticalStep, f64),
+    /// Shortest and longest step taken, s.
+    pub(crate) steps: (f32, f32),
+    /// Steps computed, those undone included.
+    pub(crate) computed: u64,
+    /// Time spent in steps, looks at the critical step included.
+    pub(crate) spent: Duration,
+    pub(crate) limits: Limits,
+    pub(crate) divergence: Option<Divergence>,
+    /// The first frame at which a fixed step was above the bound, s.
+    pub(crate) above_from: Option<f64>,
+    /// With a mass-scaled, multilevel or damped step.
+    pub(crate) large: Option<LargeTrace>,
+    /// With a network.
+    pub(crate) learned: Option<LearnedTrace>,
+}
+
+impl Outcome {
+    /// Before the first step, which is `seconds` long.
+    pub(crate) const fn new(at_rest: CriticalStep, seconds: f32) -> Self {
+        Self {
+            at_rest,
+            least: (at_rest, 0.0),
+            steps: (seconds, seconds),
+            computed: 0,
+            spent: Duration::ZERO,
+            limits: Limits::NONE,
+            divergence: None,
+            above_from: None,
+            large: None,
+            learned: None,
+        }
+    }
+
+    /// Takes down what a step said that led to `state`.
+    pub(crate) fn enter(&mut self, status: Status, state: &VecState) {
+        self.computed += 1;
+        match status {
+            Status::Limited { least_volume_ratio, saturation, energy_excess } => {
+                let limits = &mut self.limits;
+                if limits.steps == 0 {
+                    limits.first_time = state.time();
+                }
+                limits.steps += 1;
+                limits.least_volume_ratio = limits.least_volume_ratio.min(least_volume_ratio);
+                limits.saturation = limits.saturation.max(saturation);
+                limits.energy_excess = limits.energy_excess.max(energy_excess);
+                let within = least_volume_ratio >= J_FLOOR && saturation <= 1.0 && energy_excess <= 0.0;
+                limits.held_back += u64::from(within);
+            }
+            Status::Diverged(divergence) => self.divergence = Some(divergence),
+            // The state and the loads are this scene's own, so they match.
+            _ => {}
+        }
+    }
+}
+
+/// What mass-scaled, multilevel or damped steps did.
+#[derive(Clone, Copy)]
+pub(crate) struct LargeTrace {
+    pub(crate) grid: Grid,
+    pub(crate) is_damped: bool,
+    /// After the latest step.
+    pub(crate) report: Report,
+    /// Steps in which nodes were held back, and the most nodes at once.
+    pub(crate) steps_held_back: u64,
+    pub(crate) most_held_back: u32,
+    pub(crate) least_coarse_share: f32,
+    /// Largest share of the rough motion that was taken away in a step.
+    pub(crate) most_damping: f32,
+    /// The largest estimate of the error, m.
+    pub(crate) most_error: f32,
+}
+
+impl LargeTrace {
+    pub(crate) const fn new(method: &Method<'_>, model: &LargeModel<'_>) -> Self {
+        Self {
+            grid: model.grid(),
+            is_damped: matches!(method, Method::Damped(..)),
+            report: *model.report(),
+            steps_held_back: 0,
+            most_held_back: 0,
+            least_coarse_share: 1.0,
+            most_damping: 0.0,
+            most_error: 0.0,
+        }
+    }
+
+    /// Takes down the report of a step.
+    pub(crate) fn enter(&mut self, report: &Report) {
+        self.report = *report;
+        self.steps_held_back += u64::from(report.held_back > 0);
+        self.most_held_back = self.most_held_back.max(report.held_back);
+        self.least_coarse_share = self.least_coarse_share.min(report.coarse_share);
+        self.most_damping = self.most_damping.max(report.damping);
+        self.most_error = self.most_error.max(report.error);
+    }
+}
+
+/// What learned steps did.
+pub(crate) struct LearnedTrace {
+    /// Of a learned step.
+    pub(crate) seconds: f32,
+    /// The step in words.
+    pub(crate) described: String,
+    /// When the network took over, s.
+    pub(crate) from: Option<f64>,
+    pub(crate) steps: u64,
+    spent: Duration,
+    /// Sums over the steps, and the most.
+    clipped: f64,
+    outside: f64,
+    pub(crate) most: LearnedReport,
+    /// When (s) and why the exact step took over again.
+    pub(crate) fell_back: Option<(f64, String)>,
+}
+
+impl LearnedTrace {
+    pub(crate) fn new(seconds: f32, described: String) -> Self {
+        Self {
+            seconds,
+            described,
+            from: None,
+            steps: 0,
+            spent: Duration::ZERO,
+            clipped: 0.0,
+            outside: 0.0,
+            most: LearnedReport::default(),
+            fell_back: None,
+        }
+    }
+
+    /// Takes down the report of a step.
+    pub(crate) fn enter(&mut self, report: &LearnedReport, spent: Duration) {
+        self.steps += 1;
+        self.spent += spent;
+        self.clipped += f64::from(report.clipped);
+        self.outside += f64::from(report.outside);
+        self.most.clipped = self.most.clipped.max(report.clipped);
+        self.most.outside = self.most.outside.max(report.outside);
+    }
+
+    /// Takes down a step that was undone.
+    pub(crate) fn enter_fallback(&mut self, time: f64, status: Status) {
+        let why = match status {
+            Status::Diverged(divergence) => divergence.to_string(),
+            Status::Limited { energy_excess, .. } => {
+                format!("exceeded what loads and supports ever gave by {:.1} %", 100.0 * energy_excess)
+            }
+            other => format!("{other:?}"),
+        };
+        self.fell_back = Some((time, why));
+    }
+
+    pub(crate) fn us_per_step(&self) -> f64 {
+        1e6 * self.spent.as_secs_f64() / self.steps.max(1) as f64
+    }
+
+    /// Shares of the free vertices that were clipped and outside, on average over the steps.
+    pub(crate) fn means(&self) -> (f64, f64) {
+        let steps = self.steps.max(1) as f64;
+        (self.clipped / steps, self.outside / steps)
+    }
+}

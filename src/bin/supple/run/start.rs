@@ -1,0 +1,133 @@
+//! A simulation at rest: what moves the scene, and the length of its steps. All that can be refused is refused here.
+
+use supple::element::ElementMaterial;
+use supple::scene::SceneView;
+use supple::state::VecState;
+use supple::step::{CriticalStep, Step};
+use supple::tled;
+
+use super::exact::{ExactSteps, Motion, Pace, SHARE};
+use super::large::{PreparedStep, grid, on_grid, prepare};
+use super::learned::LearnedRun;
+use super::outcome::Outcome;
+use crate::problem::Problem;
+use crate::scene::setup::Setup;
+use crate::scene::timing::StepChoice;
+
+/// What moves a scene.
+pub(crate) enum Mover<'a> {
+    Exact(ExactSteps),
+    /// Mass-scaled, multilevel or damped steps.
+    Large(Box<PreparedStep>),
+    Learned(Box<LearnedRun<'a>>),
+}
+
+impl Mover<'_> {
+    /// Moves on by one interval: a step of `seconds`, or one of a network.
+    pub(crate) fn advance<M: ElementMaterial>(
+        &mut self,
+        motion: &Motion<'_, M>,
+        state: &mut VecState,
+        outcome: &mut Outcome,
+        seconds: f32,
+    ) -> Result<(), Problem> {
+        match self {
+            Self::Exact(steps) => steps.advance(motion, state, outcome, seconds),
+            Self::Learned(learned) => learned.advance(motion, state, outcome),
+            Self::Large(large) => {
+                let status = large.step(motion.scene, motion.loads, state.view());
+                if let Some(trace) = &mut outcome.large {
+                    trace.enter(large.report());
+                }
+                outcome.enter(status, state);
+                Ok(())
+            }
+        }
+    }
+
+    /// The length of fixed exact steps (s), while they move the scene.
+    pub(crate) fn fixed_exact_seconds(&self) -> Option<f32> {
+        match self {
+            Self::Exact(ExactSteps::Fixed(step)) => Some(step.seconds()),
+            Self::Learned(learned) => learned.fixed_exact_seconds(),
+            _ => None,
+        }
+    }
+}
+
+/// A simulation at rest.
+pub(crate) struct Start<'a> {
+    pub(crate) at_rest: CriticalStep,
+    /// The step that was asked for, with a network the exact one.
+    pub(crate) step: Step,
+    pub(crate) mover: Mover<'a>,
+}
+
+impl<'a> Start<'a> {
+    pub(crate) fn new<M: ElementMaterial>(
+        setup: &'a Setup,
+        scene: SceneView<'_, M>,
+        state: &mut VecState,
+        unchecked: bool,
+    ) -> Result<Self, Problem> {
+        let at_rest = critical(scene, state)?;
+        let step = first_step(setup, at_rest, unchecked)?;
+        let exact = match setup.time.step {
+            StepChoice::Auto => ExactSteps::Automatic(Pace::at_rest(at_rest)),
+            _ => ExactSteps::Fixed(step),
+        };
+        let mover = match (&setup.time.method, &setup.learned) {
+            (Some(method), _) => {
+                let method = on_grid(method, grid(setup, scene, method)?);
+                Mover::Large(Box::new(prepare(&method, setup, scene, state, step)?))
+            }
+            (None, Some(choice)) => {
+                Mover::Learned(Box::new(LearnedRun::new(choice, scene.node_count(), exact)?))
+            }
+            (None, None) => Mover::Exact(exact),
+        };
+        Ok(Self { at_rest, step, mover })
+    }
+}
+
+/// The step that the scene file asks for. The exact step is refused above the critical one unless `unchecked`.
+pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, unchecked: bool) -> Result<Step, Problem> {
+    let time = &setup.time;
+    let is_exact = time.method.is_none();
+    let seconds = match time.step {
+        StepChoice::Seconds(seconds) => seconds,
+        StepChoice::Multiple(multiple) => multiple * at_rest.seconds,
+        StepChoice::Auto => SHARE * at_rest.seconds,
+    };
+    // An interval of a network is a whole number of exact steps.
+    let seconds = match (&setup.learned, time.step) {
+        (None, _) | (_, StepChoice::Auto) => seconds,
+        (Some(learned), _) => learned.exact_seconds(seconds, time)?,
+    };
+    let step = if unchecked || !is_exact {
+        Step::unchecked(seconds, setup.damping)
+    } else {
+        Step::new(seconds, setup.damping, at_rest)
+    };
+    let step = step.map_err(|error| {
+        let advice = if is_exact {
+            "; shorten it, write step = \"auto\", unchecked with --unchecked, or go beyond with method = \"multilevel\""
+        } else {
+            ""
+        };
+        Problem(format!("{}: {error}{advice}", time.step_at))
+    })?;
+    if !matches!(time.step, StepChoice::Auto) {
+        time.check_length(seconds)?;
+    }
+    Ok(step)
+}
+
+/// The bound of the critical step at the state, or a problem: there is none for a state that is not finite.
+pub(crate) fn critical<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    state: &mut VecState,
+) -> Result<CriticalStep, Problem> {
+    tled::critical_step(&scene, state)
+        .ok_or_else(|| Problem("the stiffness of some element is not a finite number".into()))
+}

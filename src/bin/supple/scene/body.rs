@@ -1,0 +1,173 @@
+//! The mesh of a scene: read or made, scaled to metres, checked, with its boundary.
+
+use std::path::Path;
+
+use supple::io::{self, TetMesh};
+use supple::mesh::{Bar, Mesh, MeshError, Winding};
+use toml::Spanned;
+
+use super::file::{MeshTable, SceneFile};
+use crate::problem::Problem;
+
+/// A mesh in metres, and what the kernel sees of it.
+pub(crate) struct Body {
+    pub(crate) mesh: TetMesh,
+    /// Coordinates less `centre`, which float32 holds better than the corner of a room.
+    pub(crate) local: Vec<[f32; 3]>,
+    pub(crate) winding: Winding,
+    pub(crate) name: String,
+}
+
+impl Body {
+    pub(crate) fn read(path: &Path, scale: f64, winding: Winding) -> Result<Self, Problem> {
+        let mut mesh = io::read_mesh(path).map_err(Problem::of)?;
+        for point in &mut mesh.points {
+            *point = point.map(|component| component * scale);
+        }
+        Ok(Self::new(mesh, winding, path.display().to_string()))
+    }
+
+    pub(crate) fn new(mesh: TetMesh, winding: Winding, name: String) -> Self {
+        let (low, high) = extent(&mesh.points);
+        let centre = [0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis]));
+        let local = mesh.points.iter().map(|point| [0, 1, 2].map(|axis| (point[axis] - centre[axis]) as f32));
+        let local = local.collect();
+        Self { mesh, local, winding, name }
+    }
+
+    fn bar(bar: Bar) -> Self {
+        // Without the noise of float32, for the people who read the files; far below it in size.
+        let clean = |component: f32| (f64::from(component) * 1e9).round() / 1e9;
+        let points = bar.points().map(|point| point.map(clean)).collect();
+        let mesh = TetMesh { points, tets: bar.tets().collect(), triangles: vec![], regions: vec![] };
+        Self::new(mesh, Winding::Checked, "bar".into())
+    }
+
+    /// The checked mesh.
+    pub(crate) fn checked(&self) -> Result<Mesh<'_>, Problem> {
+        Mesh::new(&self.local, &self.mesh.tets, self.winding).map_err(|error| self.mesh_problem(error))
+    }
+
+    pub(crate) fn mesh_problem(&self, error: MeshError) -> Problem {
+        let advice = match error {
+            MeshError::Inverted { .. } => {
+                let volumes =
+                    self.mesh.tets.iter().map(|tet| volume(tet.map(|n| self.mesh.points[n as usize])));
+                let negative = volumes.filter(|volume| *volume < 0.0).count();
+                format!(
+                    "; {negative} of {} elements have negative volume; winding = \"normalise\" under [mesh] turns them",
+                    self.mesh.tets.len()
+                )
+            }
+            MeshError::UnusedNode { .. } => "; remove it, it has no mass and cannot move".into(),
+            _ => String::new(),
+        };
+        Problem(format!("{}: {error}{advice}", self.name))
+    }
+
+    pub(crate) fn diagonal(&self) -> f64 {
+        let (low, high) = extent(&self.mesh.points);
+        (0..3).map(|axis| (high[axis] - low[axis]).powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// Triangles that belong to one element only.
+    pub(crate) fn boundary(&self) -> Vec<[u32; 3]> {
+        const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+        let mut faces: Vec<([u32; 3], [u32; 3])> = self
+            .mesh
+            .tets
+            .iter()
+            .flat_map(|tet| {
+                FACES.map(|face| {
+                    let face = face.map(|corner| tet[corner]);
+                    let mut key = face;
+                    key.sort_unstable();
+                    (key, face)
+                })
+            })
+            .collect();
+        faces.sort_unstable();
+        let single = |index: usize| {
+            let key = faces[index].0;
+            (index == 0 || faces[index - 1].0 != key)
+                && faces.get(index + 1).is_none_or(|following| following.0 != key)
+        };
+        (0..faces.len()).filter(|&index| single(index)).map(|index| faces[index].1).collect()
+    }
+}
+
+/// Signed volume of a tetrahedron, m^3.
+pub(crate) fn volume([a, b, c, d]: [[f64; 3]; 4]) -> f64 {
+    let edge = |p: [f64; 3]| [p[0] - a[0], p[1] - a[1], p[2] - a[2]];
+    let (u, v, w) = (edge(b), edge(c), edge(d));
+    (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0])
+        + u[2] * (v[0] * w[1] - v[1] * w[0]))
+        / 6.0
+}
+
+/// Least and largest coordinates.
+pub(crate) fn extent(points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
+    let mut range = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for point in points {
+        for axis in 0..3 {
+            range.0[axis] = range.0[axis].min(point[axis]);
+            range.1[axis] = range.1[axis].max(point[axis]);
+        }
+    }
+    range
+}
+
+pub(crate) fn read_body(file: &SceneFile, at: &Spanned<MeshTable>) -> Result<Body, Problem> {
+    let table = at.get_ref();
+    let winding = match table.winding.as_ref().map(|winding| (winding, winding.get_ref().as_str())) {
+        None | Some((_, "checked")) => Winding::Checked,
+        Some((_, "normalise")) => Winding::Normalised,
+        Some((at, other)) => {
+            return Err(file.problem(
+                at,
+                format!("winding \"{other}\" is not known; \"checked\" and \"normalise\" are"),
+            ));
+        }
+    };
+    let scale = table.scale.as_ref().map_or(1.0, |scale| *scale.get_ref());
+    if let Some(at) = &table.scale
+        && !(scale.is_finite() && scale > 0.0)
+    {
+        return Err(file.problem(at, format!("scale is {scale}, it must be a positive number")));
+    }
+    match (&table.file, &table.shape) {
+        (Some(path), None) => {
+            let body = Body::read(&file.resolve(path.get_ref()), scale, winding)
+                .map_err(|problem| file.problem(path, problem))?;
+            body.checked().map_err(|problem| file.problem(path, problem))?;
+            Ok(body)
+        }
+        (None, Some(shape)) if shape.get_ref() == "bar" => {
+            let (Some(size), Some(cells)) = (&table.size, &table.cells) else {
+                return Err(file.problem(shape, "a bar needs size = [x, y, z] in m and cells = [x, y, z]"));
+            };
+            let bar = Bar {
+                size: size.get_ref().map(|edge| (f64::from(edge) * scale) as f32),
+                cells: *cells.get_ref(),
+            };
+            if let Some(edge) = bar.size.iter().find(|edge| !(edge.is_finite() && **edge > 0.0)) {
+                return Err(file.problem(size, format!("size holds {edge} m, edges must be positive")));
+            }
+            if bar.cells.contains(&0) || bar.element_count() > 100_000_000 {
+                return Err(file.problem(
+                    cells,
+                    format!(
+                        "cells are {:?}: at least 1 along each axis, and at most 1e8 tetrahedra",
+                        bar.cells
+                    ),
+                ));
+            }
+            Ok(Body::bar(bar))
+        }
+        (None, Some(shape)) => {
+            Err(file.problem(shape, format!("shape \"{}\" is not known; \"bar\" is", shape.get_ref())))
+        }
+        (Some(_), Some(shape)) => Err(file.problem(shape, "[mesh] has both a file and a shape; give one")),
+        (None, None) => Err(file.problem(at, "[mesh] needs a file or a shape")),
+    }
+}

@@ -1,0 +1,101 @@
+//! Supports, forces, motions and tractions of a scene file.
+
+use supple::loads::{Motion, NodalForce, traction};
+use supple::scene::{Axes, Support};
+use toml::Spanned;
+
+use super::body::Body;
+use super::file::SceneFile;
+use super::select::select;
+use crate::problem::Problem;
+
+type Lists = (Vec<Support>, Vec<NodalForce>, Vec<Motion>);
+
+pub(crate) fn read_loads(file: &SceneFile, body: &Body) -> Result<Lists, Problem> {
+    let scene = &file.scene;
+    let (mut supports, mut forces, mut motions) = (vec![], vec![], vec![]);
+    for at in &scene.fix {
+        let axes = read_axes(file, at.get_ref().axes.as_ref())?;
+        let nodes = select(file, at, &at.get_ref().selection(), body)?;
+        supports.extend(nodes.into_iter().map(|node| Support { node, axes, moves: false }));
+    }
+    for at in &scene.motion {
+        let axes = read_axes(file, at.get_ref().axes.as_ref())?;
+        let metre = read_vector(file, "metre", &at.get_ref().metre)?;
+        let ramp = read_ramp(file, at.get_ref().ramp.as_ref())?;
+        for node in select(file, at, &at.get_ref().selection(), body)? {
+            supports.push(Support { node, axes, moves: true });
+            motions.push(Motion { node, axes, metre, ramp });
+        }
+    }
+    for at in &scene.force {
+        let newton = read_vector(file, "newton", &at.get_ref().newton)?;
+        let ramp = read_ramp(file, at.get_ref().ramp.as_ref())?;
+        let nodes = select(file, at, &at.get_ref().selection(), body)?;
+        forces.extend(nodes.into_iter().map(|node| NodalForce { node, newton, ramp }));
+    }
+    let boundary = if scene.traction.is_empty() { vec![] } else { body.boundary() };
+    for at in &scene.traction {
+        let pascal = read_vector(file, "pascal", &at.get_ref().pascal)?;
+        let ramp = read_ramp(file, at.get_ref().ramp.as_ref())?;
+        let mut selected = vec![false; body.local.len()];
+        for node in select(file, at, &at.get_ref().selection(), body)? {
+            selected[node as usize] = true;
+        }
+        let triangles: Vec<_> = boundary
+            .iter()
+            .filter(|triangle| triangle.iter().all(|&node| selected[node as usize]))
+            .copied()
+            .collect();
+        if triangles.is_empty() {
+            return Err(file.problem(
+                at,
+                "this traction selects nodes, but no boundary triangle with all three of its nodes",
+            ));
+        }
+        for force in traction(&body.local, &triangles, pascal, ramp) {
+            forces.push(force.map_err(|error| file.problem(at, error))?);
+        }
+    }
+    Ok((supports, forces, motions))
+}
+
+fn read_ramp(file: &SceneFile, ramp: Option<&Spanned<f32>>) -> Result<f32, Problem> {
+    let Some(at) = ramp else {
+        return Ok(0.0);
+    };
+    let ramp = *at.get_ref();
+    if !(ramp.is_finite() && ramp >= 0.0) {
+        return Err(file.problem(at, format!("ramp is {ramp} s, it must be zero or more")));
+    }
+    Ok(ramp)
+}
+
+fn read_vector(file: &SceneFile, name: &str, at: &Spanned<[f32; 3]>) -> Result<[f32; 3], Problem> {
+    let vector = *at.get_ref();
+    match vector.iter().find(|component| !component.is_finite()) {
+        Some(component) => Err(file.problem(at, format!("{name} holds {component}"))),
+        None => Ok(vector),
+    }
+}
+
+fn read_axes(file: &SceneFile, axes: Option<&Spanned<String>>) -> Result<Axes, Problem> {
+    let Some(at) = axes else {
+        return Ok(Axes::XYZ);
+    };
+    let mut held = Axes::NONE;
+    for letter in at.get_ref().chars() {
+        held = held.union(match letter {
+            'x' => Axes::X,
+            'y' => Axes::Y,
+            'z' => Axes::Z,
+            other => {
+                return Err(file.problem(at, format!("axes holds '{other}'; x, y and z may stand there")));
+            }
+        });
+    }
+    if held == Axes::NONE {
+        return Err(file.problem(at, "axes is empty; x, y and z may stand there"));
+    }
+    Ok(held)
+}

@@ -1,0 +1,12 @@
+//! From a scene file to what the kernel wants. Everything that can be wrong with a scene is told here, before any time passes.
+//!
+//! `file` is what a person may write, `setup` what comes of it; in between each file reads one part.
+
+pub(crate) mod body;
+pub(crate) mod file;
+pub(crate) mod learned;
+pub(crate) mod loads;
+pub(crate) mod select;
+pub(crate) mod setup;
+pub(crate) mod timing;
+pub(crate) mod tissues;

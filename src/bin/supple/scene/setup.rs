@@ -1,0 +1,111 @@
+//! A scene ready to be built: nodes in float32 around the body's centre, supports, loads, tissues, method.
+
+use supple::loads::{Loads, Motion, NodalForce};
+use supple::material::{AnyLaw, Material, Tissue};
+use supple::scene::{AsScene, BuildError, Support, VecScene};
+use supple::state::VecState;
+
+use super::body::{Body, read_body};
+use super::file::SceneFile;
+use super::learned::LearnedChoice;
+use super::loads::read_loads;
+use super::timing::{Timing, method_name};
+use super::tissues::Tissues;
+use crate::problem::Problem;
+
+/// Diagonals of bodies that are believed without a remark, m.
+const USUAL_DIAGONALS: std::ops::RangeInclusive<f64> = 1e-3..=5.0;
+
+/// A scene ready to be built.
+pub(crate) struct Setup {
+    pub(crate) body: Body,
+    pub(crate) tissues: Tissues,
+    pub(crate) supports: Vec<Support>,
+    pub(crate) forces: Vec<NodalForce>,
+    pub(crate) motions: Vec<Motion>,
+    pub(crate) gravity: [f32; 3],
+    /// 1/s.
+    pub(crate) damping: f32,
+    pub(crate) time: Timing,
+    /// The network that takes over from the exact step.
+    pub(crate) learned: Option<LearnedChoice>,
+    pub(crate) warnings: Vec<String>,
+}
+
+impl Setup {
+    pub(crate) fn read(file: &SceneFile) -> Result<Self, Problem> {
+        let scene = &file.scene;
+        let body = read_body(file, &scene.mesh)?;
+        let mut warnings = vec![];
+        let diagonal = body.diagonal();
+        if !USUAL_DIAGONALS.contains(&diagonal) {
+            let warning = format!(
+                "the body is {diagonal:.4} m across; is scale right? (0.001 turns millimetres into metres)"
+            );
+            warnings.push(file.problem(&scene.mesh, warning).to_string());
+        }
+        let gravity = file.gravity()?;
+        if let Some(at) = &scene.damping
+            && let damping = *at.get_ref()
+            && !(damping.is_finite() && damping >= 0.0)
+        {
+            return Err(file.problem(at, format!("damping is {damping} 1/s, it must be zero or more")));
+        }
+        let time = Timing::read(file)?;
+        let learned = match &scene.learned {
+            Some(table) => Some(LearnedChoice::read(file, table.get_ref(), &time)?),
+            None => None,
+        };
+        let damping = match &learned {
+            Some(learned) => learned.damping(file, scene.damping.as_ref())?,
+            None => scene.damping.as_ref().map_or(0.0, |damping| *damping.get_ref()),
+        };
+        let (supports, forces, motions) = read_loads(file, &body)?;
+        let tissues = Tissues::read(file, &body)?;
+        if let Some(learned) = &learned {
+            warnings.extend(learned.warning(&tissues)?);
+        }
+        Ok(Self { body, tissues, supports, forces, motions, gravity, damping, time, learned, warnings })
+    }
+
+    /// The lobe of `supple demo`, which has no scene file.
+    pub(crate) fn of_body(body: Body, law: impl Into<AnyLaw>, density: f32) -> Self {
+        Self {
+            body,
+            tissues: Tissues::one(Tissue { law: law.into(), density }),
+            supports: vec![],
+            forces: vec![],
+            motions: vec![],
+            gravity: [0.0; 3],
+            damping: 0.0,
+            time: Timing::of_demo(),
+            learned: None,
+            warnings: vec![],
+        }
+    }
+
+    /// What moves the scene, by name.
+    pub(crate) const fn method_name(&self) -> &'static str {
+        if self.learned.is_some() { "learned" } else { method_name(self.time.method.as_ref()) }
+    }
+
+    /// The kernel's scene, and a state at rest.
+    pub(crate) fn build<M: Material>(&self, material: M) -> Result<(VecScene<M>, VecState), Problem> {
+        let mesh = self.body.checked()?;
+        let scene = VecScene::build(material, &mesh, &self.supports).map_err(|error| match error {
+            BuildError::Mesh(error) => self.body.mesh_problem(error),
+            error => Problem(format!("{}: {error}", self.body.name)),
+        })?;
+        Ok((scene, self.state()))
+    }
+
+    /// A state at rest.
+    pub(crate) fn state(&self) -> VecState {
+        VecState::at_rest(self.body.local.len())
+    }
+
+    /// What acts on the scene.
+    pub(crate) fn loads(&self, scene: &impl AsScene) -> Result<Loads<'_>, Problem> {
+        Loads::new(scene, self.gravity, &self.forces, &self.motions).map_err(Problem::of)
+    }
+}

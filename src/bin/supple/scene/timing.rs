@@ -1,0 +1,176 @@
+//! `[time]` of a scene file: the method, its step, the end, the frames.
+
+use supple::inertia::{Cells, Damper, Method};
+use supple::lab::networks;
+use supple::mlp::Network;
+use toml::Spanned;
+
+use super::file::{SceneFile, StepLength, TimeTable};
+use crate::problem::Problem;
+
+/// A length of step as asked for.
+#[derive(Clone, Copy)]
+pub(crate) enum StepChoice {
+    Seconds(f32),
+    /// Times the bound of the critical step at rest.
+    Multiple(f32),
+    /// 0.9 of the critical step, asked again while running.
+    Auto,
+}
+
+/// What `[time]` asks for.
+pub(crate) struct Timing {
+    /// None is the exact step.
+    pub(crate) method: Option<Method<'static>>,
+    pub(crate) step: StepChoice,
+    /// Where the step was asked for, for complaints.
+    pub(crate) step_at: String,
+    /// Where the cells of the lattice were, if they were.
+    pub(crate) lattice_at: Option<String>,
+    /// s.
+    pub(crate) end: f64,
+    pub(crate) frames: u32,
+}
+
+impl Timing {
+    pub(crate) fn read(file: &SceneFile) -> Result<Self, Problem> {
+        let time = file.scene.time.get_ref();
+        let method = read_method(file, time)?;
+        let step = read_step(file, &time.step, method.as_ref())?;
+        let method = match (method, &time.lattice) {
+            (method, Some(at)) => Some(with_lattice(file, at, method)?),
+            (method, None) => method,
+        };
+        let end = *time.end.get_ref();
+        if !(end.is_finite() && end > 0.0) {
+            return Err(file.problem(&time.end, format!("end is {end} s, it must be a positive number")));
+        }
+        let frames = time.frames.as_ref().map_or(1, |frames| *frames.get_ref());
+        if let (0, Some(at)) = (frames, &time.frames) {
+            return Err(file.problem(at, "frames is 0; the last state is always written, so give 1 or more"));
+        }
+        let lattice_at = time.lattice.as_ref().map(|at| file.place(at));
+        let timing = Self { method, step, step_at: file.place(&time.step), lattice_at, end, frames };
+        if let StepChoice::Seconds(seconds) = step {
+            timing.check_length(seconds)?;
+        }
+        Ok(timing)
+    }
+
+    /// The exact step at its automatic length for one second.
+    pub(crate) fn of_demo() -> Self {
+        Self {
+            method: None,
+            step: StepChoice::Auto,
+            step_at: "demo".into(),
+            lattice_at: None,
+            end: 1.0,
+            frames: 30,
+        }
+    }
+
+    /// Refuses a step beyond the end.
+    pub(crate) fn check_length(&self, seconds: f32) -> Result<(), Problem> {
+        if f64::from(seconds) <= self.end {
+            return Ok(());
+        }
+        Err(Problem(format!(
+            "{}: the step of {seconds} s is longer than the end, {} s",
+            self.step_at, self.end
+        )))
+    }
+}
+
+/// The name of a method in scene files; none is the exact step.
+pub(crate) const fn method_name(method: Option<&Method<'_>>) -> &'static str {
+    match method {
+        None => "tled",
+        Some(Method::MassScaled) => "mass-scaled",
+        Some(Method::Multilevel(_)) => "multilevel",
+        Some(Method::Damped(..)) => "damped",
+    }
+}
+
+/// The crate's own damper.
+pub(crate) fn damper() -> Result<Damper<'static>, Problem> {
+    let network = Network::parse(networks::damper()).map_err(Problem::of)?;
+    Damper::new(network).map_err(Problem::of)
+}
+
+fn read_method(file: &SceneFile, time: &TimeTable) -> Result<Option<Method<'static>>, Problem> {
+    let Some(at) = &time.method else {
+        return Ok(None);
+    };
+    match at.get_ref().as_str() {
+        "tled" => Ok(None),
+        "mass-scaled" => Ok(Some(Method::MassScaled)),
+        "multilevel" => Ok(Some(Method::Multilevel(Cells::Suggested))),
+        "damped" => Ok(Some(Method::Damped(damper()?, Cells::Suggested))),
+        name => Err(file.problem(
+            at,
+            format!(
+                "method \"{name}\" is not known; \"tled\", \"mass-scaled\", \"multilevel\" and \"damped\" are"
+            ),
+        )),
+    }
+}
+
+fn read_step(
+    file: &SceneFile,
+    at: &Spanned<StepLength>,
+    method: Option<&Method<'_>>,
+) -> Result<StepChoice, Problem> {
+    let positive = |value: f32| value.is_finite() && value > 0.0;
+    match at.get_ref() {
+        StepLength::Seconds(seconds) if positive(*seconds) => Ok(StepChoice::Seconds(*seconds)),
+        StepLength::Seconds(seconds) => {
+            Err(file.problem(at, format!("step is {seconds} s, it must be a positive number")))
+        }
+        StepLength::Named(name) if name == "auto" && method.is_none() => Ok(StepChoice::Auto),
+        StepLength::Named(name) if name == "auto" => Err(file.problem(
+            at,
+            format!(
+                "step \"auto\" stays below the critical step, which method \"{}\" is there to exceed; give seconds, \
+                 or a multiple of the critical step, as in \"20x\"",
+                method_name(method)
+            ),
+        )),
+        StepLength::Named(name) => match name.strip_suffix('x').and_then(|number| number.parse().ok()) {
+            Some(multiple) if positive(multiple) => Ok(StepChoice::Multiple(multiple)),
+            Some(_) => Err(file.problem(at, format!("step is \"{name}\", it must be a positive multiple"))),
+            None => Err(file.problem(
+                at,
+                format!(
+                    "step \"{name}\" is not known; give seconds, \"auto\", or a multiple of the critical step, \
+                     as in \"20x\""
+                ),
+            )),
+        },
+    }
+}
+
+/// The method with its lattice given by hand.
+fn with_lattice(
+    file: &SceneFile,
+    at: &Spanned<[u32; 3]>,
+    method: Option<Method<'static>>,
+) -> Result<Method<'static>, Problem> {
+    let cells = *at.get_ref();
+    let given = match method {
+        Some(Method::Multilevel(_)) => Method::Multilevel(Cells::Given(cells)),
+        Some(Method::Damped(damper, _)) => Method::Damped(damper, Cells::Given(cells)),
+        without => {
+            return Err(file.problem(
+                at,
+                format!(
+                    "lattice is {cells:?}, but method \"{}\" has none; \"multilevel\" and \"damped\" have",
+                    method_name(without.as_ref())
+                ),
+            ));
+        }
+    };
+    if cells.contains(&0) {
+        return Err(file.problem(at, format!("lattice is {cells:?}; give at least 1 cell along each axis")));
+    }
+    Ok(given)
+}

@@ -1,0 +1,226 @@
+//! What a scene is made of: the tissue of `[material]`, and of each `[[region]]` that differs from it.
+
+use std::collections::BTreeSet;
+use std::fmt;
+
+use serde::de::DeserializeOwned;
+use supple::element::{ElementLaw, ElementMaterial, LawWork, with_law};
+use supple::material::{AnyLaw, Regions, Tissue};
+use supple::mlp::Recipe;
+use toml::Spanned;
+
+use super::body::Body;
+use super::file::{SceneFile, Selection, TissueTable};
+use super::select::inside;
+use crate::problem::Problem;
+
+/// Tissues of one law.
+pub(crate) struct Tissues {
+    /// That of `[material]`, then of each region.
+    tissues: Vec<Tissue<AnyLaw>>,
+    /// For each element the index of its tissue.
+    of_element: Vec<u16>,
+}
+
+/// Work that is compiled once for each kind of material.
+pub(crate) trait Job {
+    type Output;
+    fn run<M: ElementMaterial>(self, material: M) -> Self::Output;
+}
+
+impl Tissues {
+    /// The same everywhere.
+    pub(crate) fn one(tissue: Tissue<AnyLaw>) -> Self {
+        Self { tissues: vec![tissue], of_element: vec![] }
+    }
+
+    pub(crate) fn read(file: &SceneFile, body: &Body) -> Result<Self, Problem> {
+        let material = Table::new(file, &file.scene.material, &["law", "density"])?;
+        let law = read_law(file, &material.required("law")?)?;
+        let density = material.required("density")?;
+        let base =
+            Tissue { law: material.constants(law, true)?, density: positive(file, "density", &density)? };
+        let mut tissues = vec![base];
+        let mut of_element = vec![0; body.mesh.tets.len()];
+        for at in &file.scene.region {
+            let region = Table::new(file, at, &["tags", "plane", "box", "density"])?;
+            let law = region.constants(base.law, false)?;
+            let density = match region.get("density")? {
+                Some(density) => positive(file, "density", &density)?,
+                None => base.density,
+            };
+            let index = u16::try_from(tissues.len());
+            let index = index.map_err(|_| file.problem(at, "more than 65,535 regions"))?;
+            for element in region.elements(body)? {
+                of_element[element] = index;
+            }
+            tissues.push(Tissue { law, density });
+        }
+        Ok(Self { tissues, of_element })
+    }
+
+    /// Whether all of it is the tissue that a network learned from.
+    pub(crate) fn is_of(&self, recipe: &Recipe<'_>) -> bool {
+        let same_tissue = |Tissue { law, density }: &Tissue<AnyLaw>| {
+            let mut constants = law.values().into_iter().zip(recipe.law.values());
+            law.name() == recipe.law.name()
+                && same(*density, recipe.density)
+                && constants.all(|(here, there)| same(here, there))
+        };
+        self.tissues.iter().all(same_tissue)
+    }
+
+    /// Runs `job` with the material.
+    pub(crate) fn with_material<J: Job>(&self, job: J) -> J::Output {
+        with_law(self.tissues[0].law, WithLaw { tissues: self, job })
+    }
+}
+
+impl fmt::Display for Tissues {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Tissue { law, density } = &self.tissues[0];
+        write!(f, "{law}, {density} kg/m^3")?;
+        match self.tissues.len() - 1 {
+            0 => Ok(()),
+            1 => write!(f, ", 1 further region"),
+            more => write!(f, ", {more} further regions"),
+        }
+    }
+}
+
+/// A job for the material of tissues whose law is known.
+struct WithLaw<'a, J> {
+    tissues: &'a Tissues,
+    job: J,
+}
+
+impl<J: Job> LawWork for WithLaw<'_, J> {
+    type Output = J::Output;
+
+    fn run<L: ElementLaw>(self, _: L) -> J::Output {
+        let Self { tissues: Tissues { tissues, of_element }, job } = self;
+        let of_law = |&Tissue { law, density }: &Tissue<AnyLaw>| Tissue {
+            law: L::from_constants(law.values()),
+            density,
+        };
+        if let [only] = tissues.as_slice() {
+            return job.run(of_law(only));
+        }
+        let tissues: Vec<_> = tissues.iter().map(of_law).collect();
+        job.run(Regions { tissues: &tissues, of_element })
+    }
+}
+
+/// Whether two values differ by no more than by how a person may write them.
+pub(crate) fn same(a: f32, b: f32) -> bool {
+    (a - b).abs() <= 1e-6 * a.abs().max(b.abs())
+}
+
+fn read_law(file: &SceneFile, at: &Spanned<String>) -> Result<AnyLaw, Problem> {
+    let name = at.get_ref();
+    AnyLaw::all().find(|law| law.name() == name).ok_or_else(|| {
+        let mut known: Vec<_> = AnyLaw::all().map(|law| format!("\"{}\"", law.name())).collect();
+        let last = known.pop().unwrap_or_default();
+        file.problem(at, format!("law \"{name}\" is not known; {} and {last} are", known.join(", ")))
+    })
+}
+
+/// Names of the constants of all laws.
+fn constant_names() -> BTreeSet<&'static str> {
+    AnyLaw::all().flat_map(|law| law.constants()).map(|constant| constant.name).collect()
+}
+
+/// A table with constants of a law among its keys.
+struct Table<'a> {
+    file: &'a SceneFile,
+    at: &'a Spanned<TissueTable>,
+}
+
+impl<'a> Table<'a> {
+    /// A key that is neither one of `keys` nor a constant of some law is a problem.
+    fn new(file: &'a SceneFile, at: &'a Spanned<TissueTable>, keys: &[&str]) -> Result<Self, Problem> {
+        let names = constant_names();
+        let mut unknown = at
+            .get_ref()
+            .iter()
+            .filter(|(key, _)| !keys.contains(&key.as_str()) && !names.contains(key.as_str()));
+        match unknown.next() {
+            Some((key, value)) => {
+                let known: Vec<_> = keys.iter().chain(&names).map(|key| format!("`{key}`")).collect();
+                Err(file
+                    .problem(value, format!("unknown field `{key}`, expected one of {}", known.join(", "))))
+            }
+            None => Ok(Self { file, at }),
+        }
+    }
+
+    fn get<T: DeserializeOwned>(&self, key: &str) -> Result<Option<Spanned<T>>, Problem> {
+        let Some(value) = self.at.get_ref().get(key) else {
+            return Ok(None);
+        };
+        match value.get_ref().clone().try_into() {
+            Ok(read) => Ok(Some(Spanned::new(value.span(), read))),
+            Err(error) => Err(self.file.problem(value, error.message())),
+        }
+    }
+
+    fn required<T: DeserializeOwned>(&self, key: &str) -> Result<Spanned<T>, Problem> {
+        self.get(key)?.ok_or_else(|| self.file.problem(self.at, format!("missing field `{key}`")))
+    }
+
+    /// The law with the constants that are given; with `complete` they must be all that it has.
+    fn constants(&self, law: AnyLaw, complete: bool) -> Result<AnyLaw, Problem> {
+        let mut values = law.values();
+        for name in constant_names() {
+            let place = law.constants().iter().position(|constant| constant.name == name);
+            match (place, self.get(name)?) {
+                (Some(place), Some(value)) => values[place] = positive(self.file, name, &value)?,
+                (None, Some(value)) => {
+                    let message = format!("the law {} has no constant {name}", law.name());
+                    return Err(self.file.problem::<f32>(&value, message));
+                }
+                (Some(_), None) if complete => {
+                    return Err(self.file.problem(self.at, format!("the law {} needs {name}", law.name())));
+                }
+                _ => {}
+            }
+        }
+        Ok(law.with(values))
+    }
+
+    /// The elements of a region, by tag or by their middle; none is an error.
+    fn elements(&self, body: &Body) -> Result<Vec<usize>, Problem> {
+        let Self { file, at } = self;
+        let tags = self.get::<Vec<i32>>("tags")?;
+        let plane = self.get("plane")?.map(Spanned::into_inner);
+        let bounds = self.get("box")?.map(Spanned::into_inner);
+        let elements: Vec<_> = if let Some(tags) = tags {
+            if plane.is_some() || bounds.is_some() {
+                return Err(file.problem(at, "give exactly one of tags, plane and box"));
+            }
+            let tagged = body.mesh.regions.iter().enumerate();
+            tagged.filter(|(_, tag)| tags.get_ref().contains(tag)).map(|(element, _)| element).collect()
+        } else {
+            let inside = inside(file, at, &Selection { nodes: None, plane, bounds }, body)?;
+            let middle = |tet: [u32; 4]| {
+                let corners = tet.map(|node| body.mesh.points[node as usize]);
+                [0, 1, 2].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<f64>() / 4.0)
+            };
+            let tets = body.mesh.tets.iter().enumerate();
+            tets.filter(|(_, tet)| inside(middle(**tet))).map(|(element, _)| element).collect()
+        };
+        if elements.is_empty() {
+            let message = "this region selects no element (by tag, or by the middle of the element)";
+            return Err(file.problem(at, message));
+        }
+        Ok(elements)
+    }
+}
+
+fn positive(file: &SceneFile, name: &str, at: &Spanned<f32>) -> Result<f32, Problem> {
+    let value = *at.get_ref();
+    if !(value.is_finite() && value > 0.0) {
+        return Err(file.problem(at, format!("{name} is {value}, it must be a positive number")));
+    }
+    Ok(value)
+}

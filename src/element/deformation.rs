@@ -1,0 +1,110 @@
+//! The deformation of linear tetrahedra from the displacements (m) of their nodes: `H = grad u = F - I` with its
+//! cofactor and the invariants `I1 - 3` and `J - 1`, all zero at rest. Shape function gradients (1/m) are stored for
+//! nodes 1, 2, 3; that of node 0 is minus their sum, so that a translation gives exactly zero.
+
+use crate::material::Invariants;
+use crate::simd::{Gather, Real, TileNodes, dot};
+
+use super::ElementTile;
+
+/// A vector and a matrix, of one element or of a vector of elements; rows are spatial axes, columns material axes.
+pub(crate) type Vector<R> = [R; 3];
+pub(crate) type Matrix<R> = [[R; 3]; 3];
+
+/// Deformation of a vector of elements.
+#[derive(Clone, Copy)]
+pub(crate) struct Deformation<R> {
+    /// `H = grad u = F - I`.
+    pub(crate) h: Matrix<R>,
+    /// `cof H`.
+    pub(crate) cof_h: Matrix<R>,
+    /// `tr H`.
+    pub(crate) trace: R,
+    pub(crate) invariants: Invariants<R>,
+}
+
+impl<R: Real> Deformation<R> {
+    /// From the displacement gradient: `J - 1 = tr H + tr cof H + det H`, `I1 - 3 = 2 tr H + H:H`.
+    #[inline(always)]
+    pub(crate) fn new(h: Matrix<R>) -> Self {
+        let zero = Invariants { i: R::splat(0.0), j: R::splat(0.0) };
+        let Self { cof_h, trace, .. } = Self::with(h, zero);
+        let second = cof_h[0][0] + cof_h[1][1] + cof_h[2][2];
+        let j = trace + second + dot(h[0], cof_h[0]);
+        let i = trace + trace + (dot(h[0], h[0]) + dot(h[1], h[1]) + dot(h[2], h[2]));
+        Self { h, cof_h, trace, invariants: Invariants { i, j } }
+    }
+
+    /// From the displacement gradient and its invariants.
+    #[inline(always)]
+    pub(super) fn with(h: Matrix<R>, invariants: Invariants<R>) -> Self {
+        let minor = |i: usize, j: usize| {
+            let (p, q, r, s) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
+            h[p][r].fused(h[q][s], -(h[p][s] * h[q][r]))
+        };
+        let cof_h = [
+            [minor(0, 0), minor(0, 1), minor(0, 2)],
+            [minor(1, 0), minor(1, 1), minor(1, 2)],
+            [minor(2, 0), minor(2, 1), minor(2, 2)],
+        ];
+        let trace = h[0][0] + h[1][1] + h[2][2];
+        Self { h, cof_h, trace, invariants }
+    }
+
+    /// Deformation of the elements from place `first` of a tile on; zero if the tile has nodes out of range.
+    #[inline(always)]
+    pub(crate) fn of_tile(tile: &ElementTile, first: usize, displacement: Gather<'_>) -> Self {
+        let nodes = tile.nodes_below::<R>(displacement.count()).unwrap_or(TileNodes::ALL_ZERO);
+        let at = |corner: usize| displacement.read_nodes::<R, 4>(&nodes, corner, first);
+        Self::of_displacements(tile, first, [at(0), at(1), at(2), at(3)])
+    }
+
+    /// From the displacements of the corners.
+    #[inline(always)]
+    pub(super) fn of_displacements(
+        tile: &ElementTile,
+        first: usize,
+        [origin, a, b, c]: [Vector<R>; 4],
+    ) -> Self {
+        let mut h = [[R::splat(0.0); 3]; 3];
+        for (corner, displacement) in [a, b, c].into_iter().enumerate() {
+            for j in 0..3 {
+                let gradient = tile.gradient::<R>(corner, j, first);
+                for i in 0..3 {
+                    // Not fused: in ill-conditioned states this lowers the error of the forces by a fifth.
+                    h[i][j] = h[i][j] + (displacement[i] - origin[i]) * gradient;
+                }
+            }
+        }
+        Self::new(h)
+    }
+
+    /// `F - cof F = H + H^T - tr H I - cof H`.
+    #[inline(always)]
+    pub(crate) fn distortion(&self, i: usize, j: usize) -> R {
+        let (i, j) = (i % 3, j % 3);
+        let sum = self.h[i][j] + self.h[j][i] - self.cof_h[i][j];
+        if i == j { sum - self.trace } else { sum }
+    }
+
+    /// `cof F = (1 + tr H) I - H^T + cof H`.
+    #[inline(always)]
+    pub(crate) fn cofactor(&self, i: usize, j: usize) -> R {
+        let (i, j) = (i % 3, j % 3);
+        let rest = self.cof_h[i][j] - self.h[j][i];
+        if i == j { rest + (R::splat(1.0) + self.trace) } else { rest }
+    }
+
+    /// First Piola-Kirchhoff stress `p1 (F - cof F) + s cof F`, Pa.
+    #[inline(always)]
+    pub(crate) fn stress(&self, p1: R, s: R) -> Matrix<R> {
+        // Loops, because the compiler may leave closures over vectors as function calls.
+        let mut stress = [[p1; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                stress[i][j] = p1.fused(self.distortion(i, j), s * self.cofactor(i, j));
+            }
+        }
+        stress
+    }
+}

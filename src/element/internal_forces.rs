@@ -1,0 +1,359 @@
+//! Internal forces (N) of linear tetrahedra, vectorised: `f_a = -V P grad N_a` from the first Piola-Kirchhoff stress
+//! `P` (Pa) of [`crate::material`], the rest volume `V` (m^3) and the gradients of the shape functions `N_a` (1/m);
+//! Miller et al. 2007. The four forces of an element add up to zero.
+
+use core::ops::Range;
+
+use crate::material::{Invariants, Law, LawState, Laws, response_operations};
+use crate::mesh::partition::Partitions;
+use crate::mesh::strips::{CORNERS, LONGEST};
+use crate::simd::{
+    Gather, Kernel, NodeVector, Pair, Real, SCATTER_WIDTH, Scatter, ScatterBuffer, TILE, TileNodes, dot,
+    unrolled,
+};
+
+use super::ElementTile;
+use super::deformation::{Deformation, Matrix};
+
+/// The elements of a scene with their laws.
+#[derive(Clone, Copy)]
+pub(crate) struct Elements<'a, L> {
+    pub(crate) laws: Laws<'a, L>,
+    pub(crate) tiles: &'a [ElementTile],
+    pub(crate) partitions: &'a Partitions,
+}
+
+/// Floating-point operations of [`add_forces`] for one element: displacement gradient 63, invariants 57, stress 63,
+/// nodal forces 65, sums 12, and those of the law.
+pub(crate) const fn operations<L: Law>() -> u32 {
+    63 + 57 + 63 + 65 + 12 + response_operations::<L>()
+}
+
+/// Extreme states among the elements of a step: they tell how near it is to where laws are cut off to stay finite.
+#[derive(Clone, Copy, Debug)]
+pub struct Extremes<R> {
+    /// Smallest `J - 1`.
+    pub(crate) least_j: R,
+    /// Largest saturation of the law.
+    pub(crate) saturation: R,
+}
+
+impl<R: Real> Extremes<R> {
+    /// The extremes of an empty set of elements.
+    pub(crate) fn none() -> Self {
+        Self { least_j: R::splat(f32::INFINITY), saturation: R::splat(f32::NEG_INFINITY) }
+    }
+
+    /// The extremes of both, over all values of the vectors in `other`.
+    pub(crate) fn merged_with<O: Real>(mut self, other: &Extremes<O>) -> Self {
+        for lane in 0..O::COUNT {
+            self.least_j = self.least_j.min(R::splat(other.least_j.lane(lane)));
+            self.saturation = self.saturation.max(R::splat(other.saturation.lane(lane)));
+        }
+        self
+    }
+}
+
+impl Extremes<f32> {
+    /// The extremes of a body at rest.
+    pub(crate) const REST: Self = Self { least_j: 0.0, saturation: 0.0 };
+}
+
+/// A further computation from the deformation of an element, in the same pass as its forces.
+pub(crate) trait ElementVisitor {
+    /// Called for each vector of elements, those from place `first` of the tile on. Its result is added to the fourth
+    /// component of the forces of their nodes.
+    fn visit<R: Real, L: Law>(
+        &mut self,
+        law: &L::Wide<R>,
+        tile: &ElementTile,
+        first: usize,
+        deformation: &Deformation<R>,
+        local: &LawState<R>,
+    ) -> R;
+}
+
+/// A visitor that computes nothing.
+pub struct NoVisitor;
+
+impl ElementVisitor for NoVisitor {
+    #[inline(always)]
+    fn visit<R: Real, L: Law>(
+        &mut self,
+        _: &L::Wide<R>,
+        _: &ElementTile,
+        _: usize,
+        _: &Deformation<R>,
+        _: &LawState<R>,
+    ) -> R {
+        R::splat(0.0)
+    }
+}
+
+/// The kernel that adds internal forces to the nodes of some partitions, in the order of the elements.
+pub struct InternalForces<'a, L, V> {
+    elements: Elements<'a, L>,
+    /// Forces of the nodes in these partitions are computed.
+    partitions: Range<usize>,
+    displacement: Gather<'a>,
+    force: Scatter<'a>,
+    visitor: V,
+}
+
+impl<'a, L: Law, V> InternalForces<'a, L, V> {
+    /// Forces of all nodes.
+    pub(crate) fn of_all(
+        elements: Elements<'a, L>,
+        displacement: &'a [NodeVector],
+        force: &'a mut [NodeVector],
+        visitor: V,
+    ) -> Self {
+        Self::of_partitions(elements, elements.partitions.all(), displacement, force, visitor)
+    }
+
+    /// Forces of the nodes in `partitions`; `force` has one vector for each of these.
+    pub(crate) fn of_partitions(
+        elements: Elements<'a, L>,
+        partitions: Range<usize>,
+        displacement: &'a [NodeVector],
+        force: &'a mut [NodeVector],
+        visitor: V,
+    ) -> Self {
+        let force = Scatter::from(elements.partitions.nodes(&partitions).start, force);
+        Self { elements, partitions, displacement: Gather::new(displacement), force, visitor }
+    }
+}
+
+impl<L: Law, V: ElementVisitor> Kernel for InternalForces<'_, L, V> {
+    type Output = Extremes<f32>;
+
+    const SCALAR: bool = true;
+
+    #[inline(always)]
+    fn run<R: Real>(self) -> Extremes<f32> {
+        in_batches::<R, L, BATCH>(self)
+    }
+
+    #[inline(always)]
+    fn run_scalar(self) -> Extremes<f32> {
+        in_batches::<f32, L, SCALAR_BATCH>(self)
+    }
+}
+
+#[inline(always)]
+fn in_batches<R: Real, L: Law, const SIZE: usize>(
+    kernel: InternalForces<'_, L, impl ElementVisitor>,
+) -> Extremes<f32> {
+    let InternalForces { elements, partitions, displacement, mut force, mut visitor } = kernel;
+    let Elements { laws, tiles, partitions: all } = elements;
+    let mut extremes = Extremes::<Pair<R>>::none();
+    for (touching, length) in all.touching(partitions) {
+        let tiles = (tiles.get(touching).unwrap_or_default(), length);
+        add_forces::<R, L, SIZE>(&laws, tiles, displacement, &mut force, &mut visitor, &mut extremes);
+    }
+    Extremes::none().merged_with(&extremes)
+}
+
+/// A vector of elements, those of a tile from place `first` on, with what the passes of [`add_forces`] compute for
+/// them.
+#[derive(Clone, Copy)]
+struct ElementVector<'a, R> {
+    tile: &'a ElementTile,
+    first: usize,
+    /// Displacement gradient.
+    h: Matrix<R>,
+    invariants: Invariants<R>,
+    /// Scalars of the stress, Pa.
+    p1: R,
+    s: R,
+    /// Fourth component of the forces.
+    fourth: R,
+}
+
+impl<'a, R: Real> ElementVector<'a, R> {
+    #[inline(always)]
+    fn zero(tile: &'a ElementTile) -> Self {
+        let zero = R::splat(0.0);
+        let invariants = Invariants { i: zero, j: zero };
+        Self { tile, first: 0, h: [[zero; 3]; 3], invariants, p1: zero, s: zero, fourth: zero }
+    }
+}
+
+/// Vectors of elements in a batch. A batch of scalar code has the elements of as many strips as the scatter buffer
+/// holds.
+const BATCH: usize = 8;
+#[cfg_attr(target_arch = "x86_64", allow(dead_code))]
+const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
+
+/// Adds the internal forces of elements to `force`, with minus sign. Every `length` consecutive tiles hold strips of
+/// that length ([`crate::mesh::strips`]), one element of each strip in every tile.
+///
+/// A batch of a few vectors of elements goes through three passes: deformation, law, scatter. The law is a long
+/// sequence of dependent operations; in a pass of its own two vectors can be interleaved ([`Pair`]).
+#[inline(always)]
+pub(crate) fn add_forces<R: Real, L: Law, const SIZE: usize>(
+    laws: &Laws<'_, L>,
+    (tiles, length): (&[ElementTile], usize),
+    displacement: Gather<'_>,
+    force: &mut Scatter<'_>,
+    visitor: &mut impl ElementVisitor,
+    extremes: &mut Extremes<Pair<R>>,
+) {
+    let Some(first) = tiles.first() else { return };
+    let mut batch = [ElementVector::<R>::zero(first); SIZE];
+    let strip_count = tiles.len().checked_div(length).unwrap_or(0) * (TILE / R::COUNT);
+    let most = if R::COUNT == 1 { SCATTER_WIDTH } else { SIZE.checked_div(length).unwrap_or(SIZE).max(1) };
+    for start in (0..strip_count).step_by(most) {
+        let strips = start..strip_count.min(start + most);
+        let count = length * strips.len();
+        match length {
+            3 => deform::<R, 3, 6>(tiles, strips, displacement, &mut batch),
+            2 => deform::<R, 2, 5>(tiles, strips, displacement, &mut batch),
+            _ => deform::<R, 1, 4>(tiles, strips, displacement, &mut batch),
+        }
+        // If the count is odd, the second vector of the last pair is an old one; its result is not used.
+        for (index, pair) in batch.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
+            let locals = respond::<R, L>(laws, pair, extremes);
+            for (elements, local) in pair.iter_mut().zip(&locals).take(count - 2 * index) {
+                visit::<R, L>(laws, elements, local, visitor);
+            }
+        }
+        let batch = batch.get(..count).unwrap_or_default();
+        match length {
+            3 => scatter::<R, 3, 6>(batch, force),
+            2 => scatter::<R, 2, 5>(batch, force),
+            _ => scatter::<R, 1, 4>(batch, force),
+        }
+    }
+}
+
+/// The nodes of strips of `K` elements: four of the first element, and the first of each other element.
+#[inline(always)]
+fn nodes_of<const K: usize, const N: usize>(tiles: [&ElementTile; K]) -> [&[u32; TILE]; N] {
+    let mut nodes = [tiles[0].nodes()[0]; N];
+    for node in 1..N {
+        nodes[node] = if node < 4 { tiles[0].nodes()[node] } else { tiles[(node - 3) % K].nodes()[0] };
+    }
+    nodes
+}
+
+/// The first pass: deformation of the elements of some strips of `K` elements with `N` nodes. Elements of tiles with
+/// nodes out of range do not deform.
+#[inline(always)]
+fn deform<'a, R: Real, const K: usize, const N: usize>(
+    tiles: &'a [ElementTile],
+    strips: Range<usize>,
+    displacement: Gather<'_>,
+    batch: &mut [ElementVector<'a, R>],
+) {
+    let (tiles, vectors) = (tiles.as_chunks::<K>().0, TILE / R::COUNT);
+    for (strip, elements) in strips.zip(batch.as_chunks_mut::<K>().0) {
+        let Some(tiles) = tiles.get(strip / vectors) else { return };
+        let first = strip % vectors * R::COUNT;
+        let nodes = TileNodes::in_range::<R>(nodes_of(tiles.each_ref()), 0, displacement.count());
+        let nodes = nodes.unwrap_or(TileNodes::<N>::ALL_ZERO);
+        let mut displacements = [[R::splat(0.0); 3]; N];
+        unrolled!(node < N => {
+            displacements[node] = displacement.read_nodes::<R, N>(&nodes, node, first);
+        });
+        unrolled!(element < K => {
+            let [a, b, c, d] = CORNERS[element % LONGEST];
+            let corners =
+                [displacements[a % N], displacements[b % N], displacements[c % N], displacements[d % N]];
+            let deformation = Deformation::of_displacements(&tiles[element], first, corners);
+            let vector = &mut elements[element];
+            (vector.tile, vector.first) = (&tiles[element], first);
+            (vector.h, vector.invariants) = (deformation.h, deformation.invariants);
+        });
+    }
+}
+
+/// The second pass: the stress of the law.
+#[inline(always)]
+fn respond<R: Real, L: Law>(
+    laws: &Laws<'_, L>,
+    pair: &mut [ElementVector<'_, R>; 2],
+    extremes: &mut Extremes<Pair<R>>,
+) -> [LawState<R>; 2] {
+    let law = laws.widen::<Pair<R>>(|lane| {
+        let elements = &pair[lane / R::COUNT % 2];
+        elements.tile.element(elements.first + lane % R::COUNT)
+    });
+    let [first, second] = pair;
+    let invariants = Invariants {
+        i: Pair(first.invariants.i, second.invariants.i),
+        j: Pair(first.invariants.j, second.invariants.j),
+    };
+    let local = LawState::new::<L>(&law, invariants);
+    let response = local.response::<L>(&law);
+    (first.p1, first.s) = (response.p1.0, response.s.0);
+    (second.p1, second.s) = (response.p1.1, response.s.1);
+    extremes.least_j = invariants.j.min(extremes.least_j);
+    extremes.saturation = response.saturation.max(extremes.saturation);
+    local.split()
+}
+
+/// Calls the visitor.
+#[inline(always)]
+fn visit<R: Real, L: Law>(
+    laws: &Laws<'_, L>,
+    elements: &mut ElementVector<'_, R>,
+    local: &LawState<R>,
+    visitor: &mut impl ElementVisitor,
+) {
+    let law = laws.widen(|lane| elements.tile.element(elements.first + lane));
+    let deformation = Deformation::with(elements.h, elements.invariants);
+    elements.fourth = visitor.visit::<R, L>(&law, elements.tile, elements.first, &deformation, local);
+}
+
+/// Nodal forces from the stress, with the fourth component of the visitor.
+#[inline(always)]
+fn nodal_forces<R: Real>(elements: &ElementVector<'_, R>) -> [[R; 4]; 4] {
+    let ElementVector { tile, first, .. } = *elements;
+    let deformation = Deformation::with(elements.h, elements.invariants);
+    let stress = deformation.stress(elements.p1, elements.s);
+    let minus_volume = -tile.volume::<R>(first);
+    let mut forces = [[R::splat(0.0); 3]; 4];
+    for axis in 0..3 {
+        let [x, y, z] = stress[axis];
+        let row = [x * minus_volume, y * minus_volume, z * minus_volume];
+        for corner in 0..3 {
+            forces[corner + 1][axis] = dot(row, tile.gradients::<R>(corner, first));
+        }
+        forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
+    }
+    let ([a, b, c, d], fourth) = (forces, elements.fourth);
+    [
+        [a[0], a[1], a[2], fourth],
+        [b[0], b[1], b[2], fourth],
+        [c[0], c[1], c[2], fourth],
+        [d[0], d[1], d[2], fourth],
+    ]
+}
+
+/// The third pass: adds the forces to the nodes of strips of `K` elements with `N` nodes.
+#[inline(always)]
+fn scatter<R: Real, const K: usize, const N: usize>(batch: &[ElementVector<'_, R>], force: &mut Scatter<'_>) {
+    let mut buffer = ScatterBuffer::NONE;
+    for strip in batch.as_chunks::<K>().0 {
+        let mut rows = [[R::splat(0.0); 4]; N];
+        let mut tiles = [strip[0].tile; K];
+        unrolled!(element < K => {
+            tiles[element] = strip[element].tile;
+            let forces = nodal_forces(&strip[element]);
+            for corner in 0..4 {
+                let row = &mut rows[CORNERS[element % LONGEST][corner] % N];
+                for axis in 0..4 {
+                    let first = element == 0 || corner == 0;
+                    row[axis] = if first { forces[corner][axis] } else { row[axis] + forces[corner][axis] };
+                }
+            }
+        });
+        let (nodes, first) = (nodes_of(tiles), strip[0].first);
+        match force.checked::<R, N>(nodes) {
+            Some(nodes) => force.add_corners(&nodes, first, rows, &mut buffer),
+            // Elements with nodes of another thread's partitions.
+            None => force.add_present(nodes, first, rows),
+        }
+    }
+}

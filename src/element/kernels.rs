@@ -1,0 +1,82 @@
+//! The loops over elements, compiled with this crate for each law of the list and each instruction-set level: nothing in them is
+//! generic, so that no other crate compiles them again. Each is linked only where it is used.
+
+#[cfg(any(feature = "std", test))]
+use crate::material::{AnyLaw, Exponential, Literal, NeoHookean};
+use crate::material::{Law, for_each_law};
+use crate::simd::dispatch;
+
+use super::{CriticalBounds, Extremes, InternalForces, NoVisitor, ScalarBound, TileBounds, TileTangents};
+
+/// A law with its kernels.
+pub trait ElementLaw: Law {
+    /// Internal forces.
+    #[doc(hidden)]
+    fn forces(kernel: InternalForces<'_, Self, NoVisitor>) -> Extremes<f32>;
+    /// The same with the scalar stiffness bound of each element.
+    #[doc(hidden)]
+    fn forces_and_bounds(kernel: InternalForces<'_, Self, ScalarBound>) -> Extremes<f32>;
+    /// Bounds for the critical step.
+    #[doc(hidden)]
+    fn critical_bounds(kernel: CriticalBounds<'_, '_, Self>);
+    /// Stiffness bounds of one tile.
+    #[doc(hidden)]
+    fn tile_bounds(kernel: TileBounds<'_, Self>) -> TileTangents;
+}
+
+macro_rules! kernels {
+    ($($variant:ident: $law:ty,)*) => {
+        $(
+            impl ElementLaw for $law {
+                #[inline(never)]
+                fn forces(kernel: InternalForces<'_, Self, NoVisitor>) -> Extremes<f32> {
+                    dispatch(kernel)
+                }
+                #[inline(never)]
+                fn forces_and_bounds(kernel: InternalForces<'_, Self, ScalarBound>) -> Extremes<f32> {
+                    dispatch(kernel)
+                }
+                #[inline(never)]
+                fn critical_bounds(kernel: CriticalBounds<'_, '_, Self>) {
+                    dispatch(kernel);
+                }
+                #[inline(never)]
+                fn tile_bounds(kernel: TileBounds<'_, Self>) -> TileTangents {
+                    dispatch(kernel)
+                }
+            }
+        )*
+    };
+}
+for_each_law!(kernels);
+
+// Who has no operating system does not compare with the paper's figures, and need not compile these.
+#[cfg(any(feature = "std", test))]
+kernels! {
+    LiteralNeoHookean: Literal<NeoHookean>,
+    LiteralExponential: Literal<Exponential>,
+}
+
+/// Work that is compiled once for each law.
+#[cfg(any(feature = "std", test))]
+pub trait LawWork {
+    /// What it gives.
+    type Output;
+    /// Does it with the type of the law; the constants may come from elsewhere.
+    fn run<L: ElementLaw>(self, law: L) -> Self::Output;
+}
+
+macro_rules! with_any_law {
+    ($($variant:ident: $law:ty,)*) => {
+        /// Does `work` with a law that is known only when a file has named it.
+        #[cfg(any(feature = "std", test))]
+        pub fn with_law<W: LawWork>(law: AnyLaw, work: W) -> W::Output {
+            match law {
+                $(AnyLaw::$variant(law) => work.run(law),)*
+                AnyLaw::LiteralNeoHookean(law) => work.run(law),
+                AnyLaw::LiteralExponential(law) => work.run(law),
+            }
+        }
+    };
+}
+for_each_law!(with_any_law);

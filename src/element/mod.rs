@@ -1,0 +1,36 @@
+//! Linear tetrahedra (T4): their tables, deformation, internal forces, bounds of their tangent stiffness, and what they tell
+//! about themselves. Loops over elements are written once, for any law and any instruction-set level ([`crate::simd`]); they are
+//! compiled for each law of the list (`kernels.rs`), and linked only where a scene uses that law.
+
+mod critical_bounds;
+mod deformation;
+mod fields;
+mod internal_forces;
+mod kernels;
+mod node;
+mod stiffness_bound;
+#[cfg(test)]
+mod stiffness_bound_tests;
+pub(crate) mod symmetric;
+mod tile;
+mod tile_bounds;
+
+pub use fields::ElementFields;
+pub use kernels::ElementLaw;
+#[cfg(any(feature = "std", test))]
+pub use kernels::{LawWork, with_law};
+pub use node::{Axes, NodeInertia};
+pub use tile::ElementTile;
+
+pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
+pub(crate) use fields::element_fields;
+pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};
+pub(crate) use stiffness_bound::{MatrixSums, ScalarBound};
+pub(crate) use tile_bounds::{TileBounds, TileTangents};
+
+use crate::material::Material;
+
+/// A material whose law has kernels: any of this crate.
+pub trait ElementMaterial: Material<Law: ElementLaw> {}
+
+impl<M: Material<Law: ElementLaw>> ElementMaterial for M {}

@@ -1,0 +1,241 @@
+//! An upper bound of an element's tangent stiffness, without iteration and for every state, inverted elements included:
+//! `dF:A:dF <= iso |dF|^2 + volume (C:dF)^2` (Pa), with `A = dP/dF` and `C = cof F`.
+//!
+//! With `P = p1 F + pJ C`, `E = F - C` (zero at rest), `e = E:dF`, `c = C:dF`:
+//!
+//! ```text
+//! dF:A:dF = p1 |dF|^2 + pJ dF:(dC/dF):dF                                     geometric
+//!         + (U'' + W' (4 g' + g'' I1)) c^2 + 4 W' g' c e + W'' (xf e + (xf + xc) c)^2
+//! xf = 2 g,  xc = g' I1
+//! ```
+//! **Geometric part.** The extreme eigenvalues of the map `dF -> dC` are roots of `m^3 - I1 m - 2 J = 0`. With
+//! `q = I1 / 3` and `m = r sqrt q`, the largest `r` is a concave function of `J / q^(3/2)`. So it is below the tangents
+//! of that function, here those at `r = 2` (F a multiple of a rotation) and at `r = 5/4` (F nearly a multiple of a
+//! reflection). The smallest eigenvalue is minus the largest at `-J`. So the geometric part is at most
+//! `p1 + min(16/9 t + 2/9 u, 125/54 t + 32/27 u)` with `t = |pJ| sqrt q`, `u = pJ J / q`. At rest this is 2.13 p1; the
+//! exact value is 2 p1.
+//!
+//! **Other terms**, `q_cc c^2 + 2 q_ce c e + q_ee e^2`. The mixed term is split by
+//! `2 |q_ce c e| <= eta c^2 + q_ce^2 / eta e^2`, and `e^2 <= |E|^2 |dF|^2`. The value `eta = 4/5 |q_ce| |E| / |C|` is
+//! near the optimum. Where `E` is small, `eta` is at least a fiftieth of the volume stiffness, which adds little to
+//! `volume` and keeps the contribution to `iso` small.
+//!
+//! **Matrices of the nodes.** With `dF = sum_a v_a (x) ga` and `c = sum_a (C ga).va`, and by Cauchy-Schwarz with the
+//! weights `|C ga|`, the element's tangent is bounded by a matrix that couples no two nodes. It has one 3 x 3 submatrix
+//! (N/m) a node:
+//!
+//! ```text
+//! D_a = V (iso lambda_G I + volume (sum_b |C gb|) (C ga)(C ga)^T / |C ga|),   lambda_G = lambda_max(sum_a ga ga^T)
+//! ```
+//! **Scalar bound.** Between refreshes a step only needs to know how far stiffness has grown. It uses a value (N/m)
+//! that no eigenvalue of the four matrices exceeds, and that takes neither roots nor divisions:
+//!
+//! ```text
+//! V lambda_G (p1 + |pJ| (I1 + 3) / 3 + (q_ee + 5/4 |q_ce|) |E|^2 + (3/2 (q_cc + floor) + 5/4 |q_ce|) |C|^2)
+//! ```
+//! with 0 in place of a negative `q_cc`, and with the least `eta` as `floor`. Proof: `|J| <= q^(3/2)`, so the geometric
+//! part without `p1` is at most `2 |pJ| sqrt q <= |pJ| (q + 1)`. `x_a sum_b x_b <= 3/2 sum_b x_b^2` for four values, so
+//! the largest eigenvalue is at most `V lambda_G (iso + 3/2 volume |C|^2)`. The two parts of the mixed term add up to
+//! at most `(5/4 + 3/2 4/5) |q_ce| |E| |C| + 3/2 floor |C|^2`. `|C|^2` and `|E|^2` are bounded by the invariants.
+
+use crate::material::{Invariants, Law, LawState, Potential};
+use crate::simd::{Real, Scatter, ScatterBuffer};
+
+use super::ElementTile;
+use super::deformation::Deformation;
+use super::internal_forces::ElementVisitor;
+
+/// The parts of the bound that depend on the invariants alone, Pa.
+#[derive(Clone, Copy)]
+struct Coefficients<R> {
+    /// `p1` and `pJ`.
+    p1: R,
+    p_j: R,
+    /// `q_cc`, `q_ce`, `q_ee`.
+    cc: R,
+    ce: R,
+    ee: R,
+    /// The least `eta`.
+    floor: R,
+}
+
+/// The least `eta`, divided by the volume stiffness.
+const FLOOR: f32 = 0.02;
+
+/// `eta |C| / (|q_ce| |E|)`.
+const SPLIT: f32 = 0.8;
+
+/// Lower limit of `|C|^2` and `I1 / 3` where they are divisors.
+const LEAST: f32 = 1e-6;
+
+/// Upper bound of `x_a sum_b x_b` over the sum of the squares of four values.
+const WEIGHT: f32 = 1.5;
+
+/// Half of `1 / SPLIT + WEIGHT SPLIT`, rounded up.
+const MIXED: f32 = 1.25;
+
+impl<R: Real> Coefficients<R> {
+    #[inline(always)]
+    fn new<L: Law>(law: &L::Wide<R>, local: &LawState<R>) -> Self {
+        let four = R::splat(4.0);
+        let at = local.at;
+        let i1 = at.i + R::splat(3.0);
+        let (slope, stiffening, [g, dg, ddg]) =
+            (local.slope, local.stiffening::<L>(law), local.volume_factor());
+        let (x_f, x_c) = (g + g, dg * i1);
+        let along = x_f + x_c;
+        let bulk = law.volume_curvature(at.j);
+        let p1 = slope * x_f;
+        let p_j = slope.fused(x_c, law.volume_slope(at.j));
+
+        let (stiff_c, stiff_f) = (stiffening * along, stiffening * x_f);
+        let cc = stiff_c.fused(along, slope.fused(ddg.fused(i1, four * dg), bulk));
+        let ce = stiff_f.fused(along, slope * (dg + dg));
+        let ee = stiff_f * x_f;
+        Self { p1, p_j, cc, ce, ee, floor: R::splat(FLOOR) * (bulk + p1 + ce.abs()) }
+    }
+
+    /// Bound of the geometric part, Pa.
+    #[inline(always)]
+    fn geometric(&self, at: Invariants<R>) -> R {
+        // Raising q is safe: the roots grow with it.
+        let q = (at.i * R::splat(1.0 / 3.0) + R::splat(1.0)).max(R::splat(LEAST));
+        let (t, u) = (self.p_j.abs() * q.root(), (self.p_j + self.p_j * at.j).divide(q));
+        let sphere = R::splat(16.0 / 9.0) * t + R::splat(2.0 / 9.0) * u;
+        let inverted = R::splat(125.0 / 54.0) * t + R::splat(32.0 / 27.0) * u;
+        self.p1 + sphere.min(inverted)
+    }
+
+    /// `iso` and `volume`, Pa, from `distortion` `|E|^2` and `cofactor` `|C|^2`.
+    #[inline(always)]
+    fn split(&self, at: Invariants<R>, distortion: R, cofactor: R) -> (R, R) {
+        let ratio = distortion.divide(cofactor.max(R::splat(LEAST))).root();
+        let eta = (R::splat(SPLIT) * self.ce.abs() * ratio).max(self.floor);
+        // ce / eta first: ce^2 may overflow where the law is at its cap.
+        let mixed = self.ce * self.ce.divide(eta);
+        (self.geometric(at) + (self.ee + mixed) * distortion, (self.cc + eta).max(R::splat(0.0)))
+    }
+}
+
+/// An upper bound (N/m) of the eigenvalues of an element's four matrices, from the invariants `i = I1 - 3` and
+/// `j = J - 1` alone: `|C|^2 <= I1^2 / 3`, and with it `|E|^2 = I1 + |C|^2 - 6 J`.
+#[inline(always)]
+fn scalar_bound<R: Real>(
+    coefficients: &Coefficients<R>,
+    at: Invariants<R>,
+    tile: &ElementTile,
+    first: usize,
+) -> R {
+    let (zero, third) = (R::splat(0.0), R::splat(1.0 / 3.0));
+    let i1 = at.i + R::splat(3.0);
+    let cofactor = i1 * i1 * third;
+    let distortion = (i1 + cofactor) - R::splat(6.0) * (at.j + R::splat(1.0));
+    let &Coefficients { p1, p_j, cc, ce, ee, floor } = coefficients;
+    let geometric = p_j.abs().fused(i1.fused(third, R::splat(1.0)), p1);
+    let rest = ee.fused(distortion, geometric);
+    let rest = (R::splat(MIXED) * ce.abs()).fused(distortion + cofactor, rest);
+    let scale = tile.volume::<R>(first) * tile.gradient_eigenvalue::<R>(first);
+    scale * (R::splat(WEIGHT) * (cc.max(zero) + floor)).fused(cofactor, rest)
+}
+
+/// `iso` and `volume` of a vector of elements, Pa.
+#[derive(Clone, Copy)]
+pub(super) struct Bound<R> {
+    pub(super) iso: R,
+    pub(super) volume: R,
+    /// [`scalar_bound`], N/m.
+    pub(super) scalar: R,
+}
+
+impl<R: Real> Bound<R> {
+    #[inline(always)]
+    pub(super) fn new<L: Law>(
+        law: &L::Wide<R>,
+        tile: &ElementTile,
+        first: usize,
+        deformation: &Deformation<R>,
+        local: &LawState<R>,
+    ) -> Self {
+        let coefficients = Coefficients::<R>::new::<L>(law, local);
+        let (mut distortion, mut cofactor) = (R::splat(0.0), R::splat(0.0));
+        for i in 0..3 {
+            for j in 0..3 {
+                let (e, c) = (deformation.distortion(i, j), deformation.cofactor(i, j));
+                distortion = distortion + e * e;
+                cofactor = cofactor + c * c;
+            }
+        }
+        let (iso, volume) = coefficients.split(local.at, distortion, cofactor);
+        Self { iso, volume, scalar: scalar_bound(&coefficients, local.at, tile, first) }
+    }
+}
+
+/// Adds [`scalar_bound`] to the fourth component of the forces of each element's nodes.
+pub struct ScalarBound;
+
+impl ElementVisitor for ScalarBound {
+    #[inline(always)]
+    fn visit<R: Real, L: Law>(
+        &mut self,
+        law: &L::Wide<R>,
+        tile: &ElementTile,
+        first: usize,
+        _: &Deformation<R>,
+        local: &LawState<R>,
+    ) -> R {
+        scalar_bound(&Coefficients::<R>::new::<L>(law, local), local.at, tile, first)
+    }
+}
+
+/// Sums over the elements, for each node: the matrices `D_a` as `xx, yy, zz` and `xy, yz, zx`. The fourth component of
+/// the first vector is the sum of [`scalar_bound`].
+pub(crate) struct MatrixSums<'a> {
+    pub(crate) diagonal: Scatter<'a>,
+    pub(crate) off_diagonal: Scatter<'a>,
+}
+
+impl MatrixSums<'_> {
+    /// Adds the matrices of the elements from place `first` of a tile on. They are in the frame of the rows of
+    /// `cofactor`.
+    #[inline(always)]
+    pub(super) fn add<R: Real>(
+        &mut self,
+        bound: &Bound<R>,
+        tile: &ElementTile,
+        first: usize,
+        cofactor: &[[R; 3]; 3],
+        [diagonal_buffer, off_diagonal_buffer]: &mut [ScatterBuffer<4>; 2],
+    ) {
+        let volume = tile.volume::<R>(first);
+        let isotropic = volume * bound.iso * tile.gradient_eigenvalue::<R>(first);
+        let mut images = [[R::splat(0.0); 3]; 4];
+        for corner in 0..3 {
+            let gradient = tile.gradients::<R>(corner, first);
+            for i in 0..3 {
+                let c = &cofactor[i];
+                images[corner + 1][i] = c[0] * gradient[0] + c[1] * gradient[1] + c[2] * gradient[2];
+                images[0][i] = images[0][i] - images[corner + 1][i];
+            }
+        }
+        // A loop, because the compiler does not unroll `map` over four vectors.
+        let mut lengths = [R::splat(0.0); 4];
+        for (length, [x, y, z]) in lengths.iter_mut().zip(images) {
+            *length = (x * x + y * y + z * z).root();
+        }
+        let Some(nodes) = self.diagonal.checked::<R, 4>(tile.nodes()) else {
+            return;
+        };
+        let weight = volume * bound.volume * (lengths[0] + lengths[1] + lengths[2] + lengths[3]);
+        let mut diagonal = [[R::splat(0.0); 4]; 4];
+        let mut off_diagonal = [[R::splat(0.0); 4]; 4];
+        for (corner, ([x, y, z], length)) in images.into_iter().zip(lengths).enumerate() {
+            // Avoids 0 / 0; a length below this limit contributes nothing.
+            let weight = weight.divide(length.max(R::splat(1e-12)));
+            let (wx, wy, wz) = (weight * x, weight * y, weight * z);
+            diagonal[corner] = [isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, bound.scalar];
+            off_diagonal[corner] = [wx * y, wy * z, wz * x, R::splat(0.0)];
+        }
+        self.diagonal.add_corners(&nodes, first, diagonal, diagonal_buffer);
+        self.off_diagonal.add_corners(&nodes, first, off_diagonal, off_diagonal_buffer);
+    }
+}

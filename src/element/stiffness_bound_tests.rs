@@ -1,0 +1,372 @@
+//! The bound of an element's tangent is an upper bound, and a close one: 10,000 random states of random tetrahedra,
+//! slivers included, from small strain to inverted. The tangent (N/m) in float64 is a central difference of the forces
+//! of the tests' reference, which shares no code with the crate.
+
+#[path = "../../tests/reference/mod.rs"]
+mod reference;
+
+use reference::dense::{self, Matrix, cholesky, eigenvalues, symmetric_part, transformed};
+use reference::tensor::{apply, contraction, determinant, from_fn, product, rotation};
+use reference::{EXPONENT_CAP, J_MIN, Mat3, Random, Vec3};
+
+use super::deformation::Deformation;
+use super::stiffness_bound::{Bound, MatrixSums};
+use crate::material::{Exponential, Law, LawState, Literal, NeoHookean, Tissue};
+use crate::mesh::{Mesh, Winding};
+use crate::scene::VecScene;
+use crate::simd::{NodeVector, SCATTER_WIDTH, Scatter, ScatterBuffer};
+
+const STATES: usize = 10_000;
+
+/// Largest allowed median of: largest eigenvalue of the bound over that of the tangent.
+const CLOSE: f64 = 4.0;
+
+/// A tetrahedron under a deformation, and the crate's bounds.
+struct Sample {
+    /// Gradients of the shape functions (1/m) and volume (m^3), as in the crate's tables.
+    gradients: [Vec3; 4],
+    volume: f64,
+    /// The matrices `D_a` of the four nodes as computed by the crate, N/m.
+    matrices: [Matrix; 4],
+    /// The same, computed in float64 from the crate's `iso` and `volume`.
+    exact: [Matrix; 4],
+    /// The scalar bound, N/m.
+    scalar: f64,
+}
+
+fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
+    let tets = [[0, 1, 2, 3]];
+    let tissue = Tissue { law, density: 1000.0 };
+    let scene =
+        VecScene::build(tissue, &Mesh::new(points, &tets, Winding::Normalised).unwrap(), &[]).unwrap();
+    let scene = scene.view();
+    let tile = &scene.tiles[0];
+    let deformation = Deformation::<f32>::new(h);
+    let wide = L::widen::<f32>(|_| law);
+    let local = LawState::new::<L>(&wide, deformation.invariants);
+    let bound = Bound::<f32>::new::<L>(&wide, tile, 0, &deformation, &local);
+    let (mut diagonal, mut off_diagonal) = ([NodeVector::ZERO; 4], [NodeVector::ZERO; 4]);
+    let mut sums =
+        MatrixSums { diagonal: Scatter::new(&mut diagonal), off_diagonal: Scatter::new(&mut off_diagonal) };
+    let rows = [0, 1, 2].map(|i| [0, 1, 2].map(|j| deformation.cofactor(i, j)));
+    // The other places of the tile have no volume.
+    let mut buffer = [ScatterBuffer::NONE; 2];
+    for lane in 0..SCATTER_WIDTH {
+        sums.add(&bound, tile, lane, &rows, &mut buffer);
+    }
+    let scalar = f64::from(bound.scalar);
+
+    // The crate may have permuted the corners; those of the tile are used.
+    let node = |corner: usize| tile.node(corner, 0);
+    let matrices = [0, 1, 2, 3].map(|corner| {
+        let [xx, yy, zz, _] = diagonal[node(corner)].0.map(f64::from);
+        let [xy, yz, zx, _] = off_diagonal[node(corner)].0.map(f64::from);
+        vec![vec![xx, xy, zx], vec![xy, yy, yz], vec![zx, yz, zz]]
+    });
+    let slopes = [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| f64::from(tile.gradient_of(corner, axis, 0))));
+    let origin = [0, 1, 2].map(|axis| -(slopes[0][axis] + slopes[1][axis] + slopes[2][axis]));
+    let gradients = [origin, slopes[0], slopes[1], slopes[2]];
+    let volume = f64::from(tile.volume::<f32>(0));
+    let sum = from_fn(|i, j| gradients.iter().map(|g| g[i] * g[j]).sum());
+    let gradient_eigenvalue = *eigenvalues(&sum.iter().map(|row| row.to_vec()).collect()).last().unwrap();
+    let cofactor = from_fn(|i, j| f64::from(deformation.cofactor(i, j)));
+    let images = gradients.map(|gradient| apply(&cofactor, gradient));
+    let lengths = images.map(|image| image.iter().map(|x| x * x).sum::<f64>().sqrt());
+    let exact = [0, 1, 2, 3].map(|node| {
+        let image = images[node];
+        let weight = lengths.iter().sum::<f64>() / lengths[node];
+        let entry = |i: usize, j: usize| {
+            let along = weight * f64::from(bound.volume) * image[i] * image[j];
+            volume * (along + if i == j { f64::from(bound.iso) * gradient_eigenvalue } else { 0.0 })
+        };
+        (0..3).map(|i| (0..3).map(|j| entry(i, j)).collect()).collect()
+    });
+    Sample { gradients, volume, matrices, exact, scalar }
+}
+
+/// Forces on the four nodes, N.
+fn forces(law: &reference::Law, sample: &Sample, f: &Mat3) -> Vec<f64> {
+    let p = law.first_piola(f);
+    sample.gradients.iter().flat_map(|g| apply(&p, *g).map(|x| sample.volume * x)).collect()
+}
+
+/// The 12 x 12 tangent (N/m) by central differences of fourth order, with steps that change `F` by `size`.
+fn tangent(law: &reference::Law, sample: &Sample, f: &Mat3, size: f64) -> Matrix {
+    let mut k = dense::zeros(12);
+    for (node, gradient) in sample.gradients.iter().enumerate() {
+        let length = gradient.iter().map(|x| x * x).sum::<f64>().sqrt();
+        for axis in 0..3 {
+            let at = |times: f64| {
+                let moved = from_fn(|i, j| {
+                    f[i][j] + if i == axis { times * size * gradient[j] / length } else { 0.0 }
+                });
+                forces(law, sample, &moved)
+            };
+            let (far_back, back, on, far_on) = (at(-2.0), at(-1.0), at(1.0), at(2.0));
+            for row in 0..12 {
+                let difference = 8.0 * (on[row] - back[row]) - (far_on[row] - far_back[row]);
+                k[row][3 * node + axis] = difference * length / (12.0 * size);
+            }
+        }
+    }
+    k
+}
+
+fn norm(a: &Matrix) -> f64 {
+    a.iter().flatten().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// The 12 x 12 matrix with these submatrices on its diagonal.
+fn direct_sum(matrices: &[Matrix; 4]) -> Matrix {
+    let mut whole = dense::zeros(12);
+    for (node, matrix) in matrices.iter().enumerate() {
+        for i in 0..3 {
+            for j in 0..3 {
+                whole[3 * node + i][3 * node + j] = matrix[i][j];
+            }
+        }
+    }
+    whole
+}
+
+/// Comparison of the bounds with the tangent `K` in one state.
+struct Comparison {
+    /// Largest `lambda` of `K x = lambda D x`, with the matrices in float64 and with those of the crate.
+    generalised: f64,
+    summed: f64,
+    /// Largest eigenvalue of `D` over that of `K`.
+    ratio: f64,
+    /// Largest eigenvalue of a `D_a` over the scalar bound.
+    over_scalar: f64,
+    /// Relative distance of the tangent from that with twice the step of differences, and from the analytic one.
+    converged: f64,
+    analytic: f64,
+}
+
+fn compare<L: Law>(
+    law: L,
+    reference_law: &reference::Law,
+    points: &[[f32; 3]],
+    h: [[f32; 3]; 3],
+) -> Comparison {
+    let sample = sample(law, points, h);
+    let f = from_fn(|i, j| f64::from(h[i][j]) + if i == j { 1.0 } else { 0.0 });
+    let size = step_size(reference_law, &f);
+    let k = tangent(reference_law, &sample, &f, size);
+    let coarser = tangent(reference_law, &sample, &f, 2.0 * size);
+    let a = reference_law.tangent(&f);
+    let mut by_formula = dense::zeros(12);
+    for (row, column) in (0..12).flat_map(|row| (0..12).map(move |column| (row, column))) {
+        let (g, other) = (sample.gradients[row / 3], sample.gradients[column / 3]);
+        by_formula[row][column] = sample.volume
+            * (0..9)
+                .map(|at| a[3 * (row % 3) + at / 3][3 * (column % 3) + at % 3] * g[at / 3] * other[at % 3])
+                .sum::<f64>();
+    }
+    let distance = |other: &Matrix| {
+        let square: f64 = k.iter().flatten().zip(other.iter().flatten()).map(|(x, y)| (x - y).powi(2)).sum();
+        square.sqrt() / norm(&k)
+    };
+    let largest = |matrix: &Matrix| *eigenvalues(matrix).last().unwrap();
+    let against = |matrices: &[Matrix; 4]| {
+        let root = cholesky(&direct_sum(matrices)).expect("the bound is positive");
+        largest(&transformed(&root, &symmetric_part(&k)))
+    };
+    let of_bound = sample.exact.iter().map(largest).fold(0.0, f64::max);
+    let summed = sample.matrices.iter().map(largest).fold(0.0, f64::max);
+    Comparison {
+        generalised: against(&sample.exact),
+        summed: against(&sample.matrices),
+        ratio: of_bound / largest(&k),
+        over_scalar: of_bound.max(summed) / sample.scalar,
+        converged: distance(&coarser),
+        analytic: distance(&by_formula),
+    }
+}
+
+/// Change of `F` in a difference: small compared with `F`, and with the change that raises the exponent of the law by
+/// one.
+fn step_size(law: &reference::Law, f: &Mat3) -> f64 {
+    let length = contraction(f, f).sqrt();
+    let [g, slope, _] = law.volume_factor(determinant(f));
+    let exponent = match *law {
+        reference::Law::Exponential { b, .. } | reference::Law::ExponentialLiteral { b, .. } => b,
+        _ => 0.0,
+    };
+    let rate = 2.0 * g * length + slope.abs() * length.powi(4);
+    3e-4 / (1.0 / length + exponent * rate)
+}
+
+/// Whether the differences would include a kink of the law, at `J_MIN` or at the cap of the exponent.
+fn at_a_kink(law: &reference::Law, f: &Mat3) -> bool {
+    let j = determinant(f);
+    let size = 4.0 * step_size(law, f);
+    let of_j = size * (1.0 + contraction(f, f));
+    let near_floor = law.is_isochoric() && (j - J_MIN).abs() < of_j;
+    let near_cap = match *law {
+        reference::Law::Exponential { b, .. } | reference::Law::ExponentialLiteral { b, .. } => {
+            (b * law.strain_measure(f) - EXPONENT_CAP).abs() < 0.01
+        }
+        _ => false,
+    };
+    near_floor || near_cap
+}
+
+/// A random tetrahedron of 0.1 mm to 10 cm; one in four is a sliver.
+fn tetrahedron(random: &mut Random) -> Vec<[f32; 3]> {
+    let size = 10.0_f64.powf(-2.5 + 1.5 * random.next());
+    let flat = if random.next() > 0.5 { 10.0_f64.powf(-1.25 + 0.75 * random.next()) } else { 1.0 };
+    let rotated = rotation(random.vector(), 3.0 * random.next());
+    loop {
+        let corners: [Vec3; 4] = [(); 4].map(|()| random.vector());
+        let edges = [1, 2, 3].map(|i| [0, 1, 2].map(|axis| corners[i][axis] - corners[0][axis]));
+        if determinant(&edges).abs() < 0.3 {
+            continue;
+        }
+        return corners
+            .iter()
+            .map(|[x, y, z]| apply(&rotated, [*x, *y, flat * z]).map(|x| (size * x) as f32))
+            .collect();
+    }
+}
+
+const CLASSES: [&str; 6] = ["small strain", "ordinary", "large", "crushed", "inverted", "any matrix"];
+
+const FORMS: [&str; 4] = ["neo-Hookean", "exponential", "neo-Hookean, literal", "exponential, literal"];
+
+/// A random `F` of a class.
+fn deformation(random: &mut Random, class: usize) -> Mat3 {
+    loop {
+        let mut stretched = |low: f64, high: f64| {
+            let stretch = random.vector().map(|x| 0.5 * (low + high) + 0.5 * (high - low) * x);
+            let (q, r) = (
+                rotation(random.vector(), 3.0 * random.next()),
+                rotation(random.vector(), 3.0 * random.next()),
+            );
+            let diagonal = from_fn(|i, j| if i == j { stretch[i] } else { 0.0 });
+            product(&q, &product(&diagonal, &r))
+        };
+        let f = match class {
+            0 => stretched(0.99, 1.01),
+            1 => stretched(0.5, 1.5),
+            2 => stretched(0.2, 3.0),
+            3 => stretched(0.05, 0.8),
+            4 => stretched(-1.5, 1.5),
+            _ => {
+                let size = random.next().abs() * 3.0;
+                let entries = random.matrix();
+                from_fn(|i, j| size * entries[i][j])
+            }
+        };
+        let j = determinant(&f);
+        let fits = match class {
+            0 | 2 => true,
+            1 => (0.7..1.4).contains(&j),
+            3 => j > 0.0 && j < 0.2,
+            4 => j < -0.01,
+            _ => j.abs() > 1e-4,
+        };
+        if fits {
+            return f;
+        }
+    }
+}
+
+/// The comparison for a law of a form with random constants; none at a kink of the law.
+fn compare_random_law(random: &mut Random, points: &[[f32; 3]], f: &Mat3, form: usize) -> Option<Comparison> {
+    // Rounded to float32 first, so that crate and reference get the same state.
+    let h = [0, 1, 2].map(|i| [0, 1, 2].map(|j| (f[i][j] - if i == j { 1.0 } else { 0.0 }) as f32));
+    let f = from_fn(|i, j| f64::from(h[i][j]) + if i == j { 1.0 } else { 0.0 });
+    let modulus = 10.0_f64.powf(2.5 + 1.5 * random.next());
+    let a = modulus as f32;
+    let d = (modulus * 10.0_f64.powf(1.5 + 1.5 * random.next())) as f32;
+    let b = 10.0_f64.powf(0.7 + 0.7 * random.next()) as f32;
+    let (wide_a, wide_b, wide_d) = (f64::from(a), f64::from(b), f64::from(d));
+    let (neo, exp) = (NeoHookean { c: a, d }, Exponential { a, b, d });
+    let reference_law = match form {
+        0 => reference::Law::NeoHookean { c: wide_a, d: wide_d },
+        1 => reference::Law::Exponential { a: wide_a, b: wide_b, d: wide_d },
+        2 => reference::Law::NeoHookeanLiteral { c: wide_a, d: wide_d },
+        _ => reference::Law::ExponentialLiteral { a: wide_a, b: wide_b, d: wide_d },
+    };
+    if at_a_kink(&reference_law, &f) {
+        return None;
+    }
+    Some(match form {
+        0 => compare(neo, &reference_law, points, h),
+        1 => compare(exp, &reference_law, points, h),
+        2 => compare(Literal(neo), &reference_law, points, h),
+        _ => compare(Literal(exp), &reference_law, points, h),
+    })
+}
+
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    sorted[((sorted.len() - 1) as f64 * share) as usize]
+}
+
+#[test]
+fn the_bound_of_an_element_is_an_upper_bound_and_close() {
+    let mut random = Random(41);
+    let mut ratios: [[Vec<f64>; 4]; CLASSES.len()] = Default::default();
+    let (mut generalised, mut summed, mut over_scalar) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let (mut converged, mut analytic) = (0.0_f64, 0.0_f64);
+    let (mut taken, mut kinks) = (0, 0);
+    let mut wrong = Vec::new();
+    while taken < STATES {
+        let (class, form) = (taken % CLASSES.len(), taken / CLASSES.len() % 4);
+        let points = tetrahedron(&mut random);
+        let f = deformation(&mut random, class);
+        let Some(state) = compare_random_law(&mut random, &points, &f, form) else {
+            kinks += 1;
+            continue;
+        };
+        taken += 1;
+        (generalised, summed) = (generalised.max(state.generalised), summed.max(state.summed));
+        over_scalar = over_scalar.max(state.over_scalar);
+        (converged, analytic) = (converged.max(state.converged), analytic.max(state.analytic));
+        if state.generalised.is_nan()
+            || state.generalised > 1.0 + 1e-3
+            || state.ratio.is_nan()
+            || state.ratio < 1.0 - 1e-3
+        {
+            wrong.push((CLASSES[class], form, determinant(&f), state.generalised, state.ratio));
+        }
+        ratios[class][form].push(state.ratio);
+    }
+    println!(
+        "tangent by differences: within {converged:.1e} of that with twice the step, {analytic:.1e} of the formula; {kinks} states at a kink left out"
+    );
+    println!(
+        "largest eigenvalue of the tangent against the bound: {generalised:.5}, against the sums in float32 {summed:.5}"
+    );
+    println!("largest eigenvalue of a node's matrix over the scalar bound: {over_scalar:.6}");
+    let line = |name: &str, values: &[f64]| {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let [least, median, high, most] = [0.0, 0.5, 0.95, 1.0].map(|share| quantile(&sorted, share));
+        println!("{name:35} | {least:6.3} | {median:6.3} | {high:9.3} | {most:9.1}");
+        median
+    };
+    println!("{:35} |  least | median |      95 % | most", "largest of bound / largest of tangent");
+    let medians = CLASSES.iter().zip(&ratios).map(|(class, forms)| {
+        for (form, values) in FORMS.iter().zip(forms) {
+            line(&format!("{class}, {form}"), values);
+        }
+        line(class, &forms.concat())
+    });
+    let medians: Vec<f64> = medians.collect();
+    let median = line("all", &ratios.as_flattened().concat());
+    assert!(converged < 1e-5 && analytic < 1e-5, "the differences have not converged");
+    assert!(
+        wrong.is_empty(),
+        "{} not bounded (class, form, J, eigenvalue, ratio): {:?}",
+        wrong.len(),
+        &wrong[..wrong.len().min(20)]
+    );
+    assert!(summed <= 1.0 + 1e-2);
+    assert!(over_scalar <= 1.0 + 1e-5, "an eigenvalue exceeds the scalar bound");
+    println!("median over all states: {median:.3}, wanted at most {CLOSE}");
+    assert!(median <= CLOSE);
+    // Most states of tissue belong to the first class; added inertia is small where the bound is close.
+    assert!(medians[0] <= 2.0);
+}

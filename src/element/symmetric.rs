@@ -1,0 +1,140 @@
+//! Symmetric 3 x 3 matrices, for the stiffness (N/m) or inertia (kg) of a node.
+
+use crate::simd::Real;
+
+/// `[[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]`, of one node or of a vector of nodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Symmetric<R = f32> {
+    pub(crate) xx: R,
+    pub(crate) yy: R,
+    pub(crate) zz: R,
+    pub(crate) xy: R,
+    pub(crate) yz: R,
+    pub(crate) zx: R,
+}
+
+impl<R: Real> Symmetric<R> {
+    /// The matrix with zero rows and columns at held axes, those without a positive inverse mass.
+    #[inline(always)]
+    pub(crate) fn on_free(self, [x, y, z]: [R; 3]) -> Self {
+        let (x, y, z) = (x.positive(), y.positive(), z.positive());
+        Self {
+            xx: self.xx * x,
+            yy: self.yy * y,
+            zz: self.zz * z,
+            xy: self.xy * x * y,
+            yz: self.yz * y * z,
+            zx: self.zx * z * x,
+        }
+    }
+
+    /// `diagonal I + factor A`.
+    #[inline(always)]
+    pub(crate) fn scaled_plus(self, factor: R, diagonal: R) -> Self {
+        Self {
+            xx: diagonal + factor * self.xx,
+            yy: diagonal + factor * self.yy,
+            zz: diagonal + factor * self.zz,
+            xy: factor * self.xy,
+            yz: factor * self.yz,
+            zx: factor * self.zx,
+        }
+    }
+
+    /// `factor A`.
+    #[inline(always)]
+    pub(crate) fn scaled(self, factor: R) -> Self {
+        self.scaled_plus(factor, R::splat(0.0))
+    }
+
+    #[inline(always)]
+    pub(crate) fn times(&self, [x, y, z]: [R; 3]) -> [R; 3] {
+        [
+            self.xx * x + self.xy * y + self.zx * z,
+            self.xy * x + self.yy * y + self.yz * z,
+            self.zx * x + self.yz * y + self.zz * z,
+        ]
+    }
+
+    #[inline(always)]
+    pub(crate) fn trace(&self) -> R {
+        self.xx + self.yy + self.zz
+    }
+
+    /// The inverse of a positive definite matrix by its factors `L diag(p) L^T`. The diagonal is scaled to one first,
+    /// so that no product leaves the range of float32. Cofactors would be less accurate where one direction is much
+    /// stiffer than another, because their terms cancel twice.
+    #[inline(always)]
+    pub(crate) fn inverse(&self) -> Self {
+        let one = R::splat(1.0);
+        let (a, b, c) = (one.divide(self.xx.root()), one.divide(self.yy.root()), one.divide(self.zz.root()));
+        let (d, e, f) = (self.xy * a * b, self.yz * b * c, self.zx * c * a);
+        // L = [1, 0, 0; d, 1, 0; f, g, 1]
+        let second = one.divide(one - d * d);
+        let below = e - d * f;
+        let g = below * second;
+        let third = one.divide((one - f * f) - below * g);
+        // The last row of L^-1 is [h, -g, 1].
+        let h = d * g - f;
+        Self {
+            xx: (one + d * d * second + h * h * third) * a * a,
+            yy: (second + g * g * third) * b * b,
+            zz: third * c * c,
+            xy: -((d * second + h * g * third) * a * b),
+            yz: -(g * third * b * c),
+            zx: h * third * c * a,
+        }
+    }
+
+    /// A close upper bound of the largest eigenvalue of a positive semidefinite matrix, by Newton's iteration on the
+    /// characteristic polynomial. It starts above the largest root, where the polynomial is convex, so no iterate falls
+    /// below the root. Zero or NaN if the trace is zero or NaN.
+    #[inline(always)]
+    pub(crate) fn largest_eigenvalue(&self) -> R {
+        let (one, two, three) = (R::splat(1.0), R::splat(2.0), R::splat(3.0));
+        let mean = self.trace().divide(three);
+        // The matrix divided by the mean of its diagonal, minus the identity.
+        let scaled = |entry: R| entry.divide(mean);
+        let (a, b, c) = (scaled(self.xx) - one, scaled(self.yy) - one, scaled(self.zz) - one);
+        let (d, e, f) = (scaled(self.xy), scaled(self.yz), scaled(self.zx));
+        let q = (a * a + b * b + c * c + two * (d * d + e * e + f * f)).divide(R::splat(6.0));
+        let determinant = a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f);
+        // The roots of t^3 - 3 q t - determinant; none is above 2 sqrt q.
+        let mut root = two * q.root();
+        for _ in 0..4 {
+            let slope = three * (root * root - q);
+            let next = root - (root * (root * root - three * q) - determinant).divide(slope);
+            root = (slope - R::splat(1e-6)).choose(next.min(root), root);
+        }
+        mean.choose(mean * (one + root), mean)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Symmetric;
+
+    #[test]
+    fn inverse_and_eigenvalue_of_a_stiff_direction() {
+        // 2 I + 1e4 n n^T: largest eigenvalue 10002, inverse 0.5 I - ... n n^T
+        let n = [0.48f32, 0.6, 0.64];
+        let rank = Symmetric {
+            xx: n[0] * n[0],
+            yy: n[1] * n[1],
+            zz: n[2] * n[2],
+            xy: n[0] * n[1],
+            yz: n[1] * n[2],
+            zx: n[2] * n[0],
+        };
+        let matrix = rank.scaled_plus(1e4, 2.0);
+        let largest = matrix.largest_eigenvalue();
+        assert!((10_001.9..10_003.0).contains(&largest), "{largest}");
+        let across = [0.6, -0.48, 0.0];
+        let solved = matrix.inverse().times(across);
+        for axis in 0..3 {
+            assert!((solved[axis] - 0.5 * across[axis]).abs() < 2e-3, "{solved:?}");
+        }
+        let along = matrix.inverse().times(n);
+        assert!((along[1] * 10_002.0 / n[1] - 1.0).abs() < 0.2, "{along:?}");
+    }
+}

@@ -1,0 +1,78 @@
+//! Stiffness bounds of one tile of elements, in the frames of their first nodes: the matrices `D_a` go to the sums of the
+//! nodes (N/m), what a coarse stiffness needs to know of each element comes back.
+
+use crate::material::{Law, LawState, Laws};
+use crate::simd::{Gather, Kernel, Real, ScatterBuffer, TILE, write_rows};
+
+use super::ElementTile;
+use super::deformation::Deformation;
+use super::stiffness_bound::{Bound, MatrixSums};
+
+/// A 3 x 3 matrix by rows.
+pub(crate) type Rotation = [[f32; 3]; 3];
+
+pub struct TileBounds<'a, L> {
+    pub(crate) laws: Laws<'a, L>,
+    pub(crate) tile: &'a ElementTile,
+    pub(crate) displacement: Gather<'a>,
+    pub(crate) sums: MatrixSums<'a>,
+    /// From the frame of each element's first node to the world.
+    pub(crate) rotations: &'a [Rotation; TILE],
+    /// Factor of the tangents, s^2; zero if nobody needs them.
+    pub(crate) weight: f32,
+}
+
+/// A column of `C` of each element in its frame, and as fourth components `weight V iso`, `weight V volume` and zero.
+pub(crate) type TileTangents = [[[f32; 4]; TILE]; 3];
+
+impl<L: Law> Kernel for TileBounds<'_, L> {
+    type Output = TileTangents;
+
+    const SCALAR: bool = true;
+
+    #[inline(always)]
+    fn run<R: Real>(mut self) -> TileTangents {
+        let mut tangents = [[[0.0; 4]; TILE]; 3];
+        let mut buffer = [ScatterBuffer::NONE; 2];
+        for first in (0..TILE).step_by(R::COUNT) {
+            self.bound::<R>(first, &mut tangents, &mut buffer);
+        }
+        tangents
+    }
+}
+
+impl<L: Law> TileBounds<'_, L> {
+    /// The bounds of the elements from place `first` on.
+    #[inline(always)]
+    fn bound<R: Real>(
+        &mut self,
+        first: usize,
+        tangents: &mut TileTangents,
+        buffer: &mut [ScatterBuffer<4>; 2],
+    ) {
+        let tile = self.tile;
+        let law = self.laws.widen(|lane| tile.element(first + lane));
+        let deformation = Deformation::<R>::of_tile(tile, first, self.displacement);
+        let local = LawState::new::<L>(&law, deformation.invariants);
+        let bound = Bound::<R>::new::<L>(&law, tile, first, &deformation, &local);
+        // C in the frame of the element's first node.
+        let mut cofactor = [[R::splat(0.0); 3]; 3];
+        for i in 0..3 {
+            for k in 0..3 {
+                let along = R::from_fn(|lane| self.rotations[(first + lane) % TILE][k][i]);
+                for j in 0..3 {
+                    cofactor[i][j] = cofactor[i][j] + along * deformation.cofactor(k, j);
+                }
+            }
+        }
+        self.sums.add(&bound, tile, first, &cofactor, buffer);
+        if self.weight == 0.0 {
+            return;
+        }
+        let weight = tile.volume::<R>(first) * R::splat(self.weight);
+        let fourth = [weight * bound.iso, weight * bound.volume, R::splat(0.0)];
+        for (j, (column, fourth)) in tangents.iter_mut().zip(fourth).enumerate() {
+            write_rows(column, first, [cofactor[0][j], cofactor[1][j], cofactor[2][j], fourth]);
+        }
+    }
+}

@@ -1,0 +1,327 @@
+//! A mass-scaled, multilevel or damped step as one object: a method, prepared for a scene and a step length, in the
+//! caller's storage.
+
+use core::mem::MaybeUninit;
+
+use bytemuck::must_cast_slice_mut;
+
+use crate::element::ElementMaterial;
+use crate::loads::Loads;
+use crate::scene::SceneView;
+use crate::simd::{Contiguous, NodeVector};
+use crate::state::StateView;
+use crate::step::{Status, Step};
+
+use super::damper::RoughMotion;
+use super::estimate::ErrorEstimate;
+use super::lattice::{self, Grid, Lattice, LatticeNode};
+use super::matrices::Matrices;
+use super::method::{Method, largest_grid, vectors_for_lattice, vectors_of_places};
+use super::node::Scaling;
+use super::node_tables::{NodeTables, read_matrices};
+use super::refresh::{Refresh, RefreshInput};
+use super::{COARSE, CYCLE, CYCLE_STEPS, FINE, FINE_WITHOUT_LATTICE, InertiaError, Report, node_tables};
+
+/// A prepared step without its storage; it may be moved in memory.
+#[derive(Clone, Debug)]
+pub struct LargeModel<'w> {
+    pub(super) nodes: usize,
+    pub(super) method: Method<'w>,
+    /// Rough motion in the latest damped step.
+    pub(super) rough: RoughMotion,
+    pub(super) step: Step,
+    pub(super) lattice: Lattice,
+    pub(super) refresh: Refresh,
+    pub(super) scaling: Scaling,
+    pub(super) estimate: ErrorEstimate,
+    pub(super) report: Report,
+}
+
+/// The storage of a prepared step.
+pub(super) struct Storage<'a> {
+    pub(super) tables: NodeTables<'a>,
+    pub(super) places: &'a mut [LatticeNode],
+    pub(super) matrices: Matrices<'a>,
+}
+
+impl<'a> Storage<'a> {
+    /// None if `storage` is shorter than [`vectors_for_lattice`].
+    pub(super) fn split(
+        storage: &'a mut [NodeVector],
+        nodes: usize,
+        lattice: &Lattice,
+        damped: bool,
+    ) -> Option<Self> {
+        let (tables, rest) = storage.split_at_mut_checked(node_tables::vectors_for(nodes, damped))?;
+        let tables = NodeTables::split(tables, nodes)?;
+        let has_lattice = lattice.functions() > 0;
+        let places = if has_lattice { vectors_of_places(nodes) } else { 0 };
+        let (places, rest) = rest.split_at_mut_checked(places)?;
+        let places: &mut [[LatticeNode; 2]] = must_cast_slice_mut(places.as_chunks_mut::<3>().0);
+        let places = places.as_flattened_mut().get_mut(..if has_lattice { nodes } else { 0 })?;
+        let matrices = Matrices::split(must_cast_slice_mut(rest), lattice, damped && has_lattice)?;
+        Some(Self { tables, places, matrices })
+    }
+}
+
+impl<'w> LargeModel<'w> {
+    /// Computes the inertia for `step` from the present state, for a scene with these `points` (m) at rest. It takes as
+    /// long as a few steps, with a lattice as long as a cycle of steps. `storage` of [`super::vectors_for`] vectors is
+    /// overwritten.
+    pub fn prepare<M: ElementMaterial>(
+        method: Method<'w>,
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        state: StateView<'_>,
+        step: Step,
+        storage: &mut [NodeVector],
+    ) -> Result<Self, InertiaError> {
+        let mut model = Self::unprepared(method, scene, points, step)?;
+        model.first_cycle(scene, points, state, storage)?;
+        Ok(model)
+    }
+
+    /// The same where the model shall stay, for hosts with little stack: a model has 38 kB.
+    pub fn prepare_in<'m, M: ElementMaterial>(
+        place: &'m mut MaybeUninit<Self>,
+        method: Method<'w>,
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        state: StateView<'_>,
+        step: Step,
+        storage: &mut [NodeVector],
+    ) -> Result<&'m mut Self, InertiaError> {
+        let model = Self::unprepared_in(place, method, scene, points, step)?;
+        model.first_cycle(scene, points, state, storage)?;
+        Ok(model)
+    }
+
+    /// Not inlined: its stack is free again in the first cycle.
+    #[inline(never)]
+    fn unprepared_in<'m, M: ElementMaterial>(
+        place: &'m mut MaybeUninit<Self>,
+        method: Method<'w>,
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        step: Step,
+    ) -> Result<&'m mut Self, InertiaError> {
+        Ok(place.write(Self::unprepared(method, scene, points, step)?))
+    }
+
+    fn unprepared<M: ElementMaterial>(
+        method: Method<'w>,
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        step: Step,
+    ) -> Result<Self, InertiaError> {
+        let nodes = scene.node_count();
+        if points.len() != nodes {
+            return Err(InertiaError::Points { points: points.len(), nodes });
+        }
+        let lattice = Lattice::of(method.grid(scene, points)?, points, scene.inertia)?;
+        Ok(Self {
+            nodes,
+            method,
+            rough: RoughMotion::NONE,
+            step,
+            scaling: scaling(step, lattice.functions() > 0),
+            refresh: Refresh::new(
+                cycle(step),
+                scene.tiles.len(),
+                nodes,
+                lattice.functions(),
+                lattice.cell_count(),
+            ),
+            lattice,
+            estimate: ErrorEstimate::NONE,
+            report: Report::NONE,
+        })
+    }
+
+    /// Chooses the frames, and computes all bounds and inertia.
+    fn first_cycle<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        state: StateView<'_>,
+        storage: &mut [NodeVector],
+    ) -> Result<(), InertiaError> {
+        let check = |kind, needed, capacity| {
+            if capacity < needed { Err(InertiaError::Capacity { kind, needed, capacity }) } else { Ok(()) }
+        };
+        let (damped, capacity) = (self.method.damper().is_some(), storage.len());
+        let needed = vectors_for_lattice(self.nodes, self.grid(), damped);
+        check("vectors", needed, capacity)?;
+        check("nodes in the state", self.nodes, state.capacity())?;
+        storage.fill(NodeVector::ZERO);
+        let Some(Storage { mut tables, places, mut matrices }) =
+            Storage::split(storage, self.nodes, &self.lattice, damped)
+        else {
+            return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
+        };
+        write_heights(scene, &mut tables);
+        let uncoupled = self.lattice.functions() == 0;
+        let frame_lattice = if uncoupled { frame_lattice(scene, points)? } else { self.lattice.clone() };
+        self.refresh.frames.choose(&frame_lattice, points);
+        for (node, (&point, inertia)) in points.iter().zip(scene.inertia).enumerate() {
+            let place = frame_lattice.place(point);
+            tables.set_frame(node, frame_lattice.frame(&place, inertia));
+            if let Some(to) = places.get_mut(node) {
+                *to = place;
+            }
+        }
+        lattice::sort_by_cell(places);
+        let StateView { displacement, increment, .. } = state;
+        let nodes = self.nodes;
+        let input = RefreshInput {
+            scene,
+            displacement: displacement.get(..nodes).unwrap_or_default(),
+            increment: increment.get_mut(..nodes).unwrap_or_default(),
+            lattice: &self.lattice,
+            places,
+            scaling: &self.scaling,
+        };
+        self.refresh.whole_cycle(input, &mut tables, &mut matrices);
+        self.report = self.refresh.added.report(0, 1.0, 0.0);
+        let unbounded = (0..nodes).find(|&node| {
+            let (inverse, [scalar, _]) =
+                read_matrices::<f32>(Contiguous(node), tables.inverse_diagonal, tables.inverse_off_diagonal);
+            !(inverse.trace().is_finite() && scalar.is_finite())
+        });
+        match unbounded {
+            Some(node) => Err(InertiaError::NotFinite { node: node as u32 }),
+            None => Ok(()),
+        }
+    }
+
+    /// Report of the latest step, or of the preparation.
+    #[must_use]
+    pub const fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// The lattice.
+    #[must_use]
+    pub const fn grid(&self) -> Grid {
+        Grid { cells: self.lattice.cells(), functions: self.lattice.functions() }
+    }
+
+    /// Steps of a cycle, in which all bounds and inertia are renewed: those of 0.04 s, but at least 16 and at most 64.
+    #[must_use]
+    pub const fn cycle(&self) -> u32 {
+        self.refresh.steps()
+    }
+
+    /// The model with the storage in which it was prepared.
+    pub const fn with_storage<'a>(&'a mut self, storage: &'a mut [NodeVector]) -> LargeView<'a, 'w> {
+        LargeView { model: self, storage }
+    }
+}
+
+/// Steps of a cycle.
+fn cycle(step: Step) -> u32 {
+    (CYCLE / step.seconds()).clamp(CYCLE_STEPS.0, CYCLE_STEPS.1) as u32
+}
+
+fn scaling(step: Step, has_lattice: bool) -> Scaling {
+    let (dt, damping) = (step.seconds(), step.damping());
+    let k = 0.5 * damping * dt;
+    let fine = if has_lattice { FINE } else { FINE_WITHOUT_LATTICE };
+    Scaling {
+        weight: 0.25 * fine * dt * dt,
+        k,
+        reserve: if has_lattice { k * (1.0 + k) } else { k },
+        loss: 2.0 * damping * dt * cycle(step) as f32,
+        coarse_weight: 0.25 * COARSE * dt * dt,
+    }
+}
+
+/// A prepared step with borrowed storage.
+#[derive(Debug)]
+pub struct LargeView<'a, 'w> {
+    pub(super) model: &'a mut LargeModel<'w>,
+    pub(super) storage: &'a mut [NodeVector],
+}
+
+/// A prepared step with storage `S` of the caller.
+#[derive(Clone, Debug)]
+pub struct LargeStep<'w, S> {
+    model: LargeModel<'w>,
+    storage: S,
+}
+
+impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
+    /// See [`LargeModel::prepare`].
+    pub fn prepare<M: ElementMaterial>(
+        method: Method<'w>,
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        state: StateView<'_>,
+        step: Step,
+        mut storage: S,
+    ) -> Result<Self, InertiaError> {
+        let model = LargeModel::prepare(method, scene, points, state, step, storage.as_mut())?;
+        Ok(Self { model, storage })
+    }
+
+    /// The model: report and sizes.
+    pub const fn model(&self) -> &LargeModel<'w> {
+        &self.model
+    }
+
+    /// Report of the latest step, or of the preparation.
+    pub const fn report(&self) -> &Report {
+        &self.model.report
+    }
+
+    /// Takes one step of the length for which it was prepared. Every call does the same work: one force evaluation and
+    /// that of the lattice. `Mismatch` if it was not prepared for a scene of this size.
+    pub fn step<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: StateView<'_>,
+    ) -> Status {
+        self.model.with_storage(self.storage.as_mut()).step(scene, loads, state)
+    }
+}
+
+#[cfg(any(feature = "std", test))]
+impl<'w> LargeStep<'w, std::vec::Vec<NodeVector>> {
+    /// The same with storage from the heap.
+    pub fn prepare_in_vec<M: ElementMaterial>(
+        method: Method<'w>,
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        state: StateView<'_>,
+        step: Step,
+    ) -> Result<Self, InertiaError> {
+        let storage = std::vec![NodeVector::ZERO; super::vectors_for(&method, scene, points)?];
+        Self::prepare(method, scene, points, state, step, storage)
+    }
+}
+
+/// The lattice of mass scaling; its functions only define frames.
+fn frame_lattice<M>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<Lattice, InertiaError> {
+    let Grid { cells, functions } = largest_grid(scene, points, 400);
+    Lattice::new(if functions > 0 { cells } else { [1; 3] }, points, scene.inertia)
+}
+
+/// Writes the least height `1 / |ga|` (m) among the elements of each node.
+fn write_heights<M>(scene: SceneView<'_, M>, tables: &mut NodeTables<'_>) {
+    // First the largest |ga|^2, then the height.
+    tables.next_increment.fill(NodeVector::ZERO);
+    for (tile, lane) in scene.places() {
+        let slopes = [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| tile.gradient_of(corner, axis, lane)));
+        let origin = [0, 1, 2].map(|axis| slopes[0][axis] + slopes[1][axis] + slopes[2][axis]);
+        for (corner, [x, y, z]) in [origin, slopes[0], slopes[1], slopes[2]].into_iter().enumerate() {
+            if let Some(node) = tables.next_increment.get_mut(tile.node(corner, lane)) {
+                let square = x * x + y * y + z * z;
+                node.0[3] = if square > node.0[3] { square } else { node.0[3] };
+            }
+        }
+    }
+    for node in tables.next_increment.iter_mut() {
+        node.0[3] = if node.0[3] > 0.0 { 1.0 / libm::sqrtf(node.0[3]) } else { f32::MAX };
+    }
+}

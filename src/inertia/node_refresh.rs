@@ -1,0 +1,132 @@
+//! The next inertia (kg) of a batch of nodes, vectorised: from the summed bounds (N/m) of their elements to the inverse
+//! inertia ([`super::node`]), and to the sums of the lattice's cells for the mass, the projected inertia and the
+//! momentum.
+
+use bytemuck::{must_cast_slice, must_cast_slice_mut};
+
+use super::assembly::CellMatrices;
+use super::frames::{Frames, Rotation};
+use super::lattice::{LatticeNode, node_place};
+use super::node::{Scaling, new_inertia};
+use super::node_tables::{NodeTables, read_matrices, write_matrices};
+use super::report::AddedInertiaSums;
+use crate::element::NodeInertia;
+use crate::element::symmetric::Symmetric;
+use crate::simd::{Indexed, Kernel, NodeVector, Real, Rows, TILE, dispatch};
+
+/// Nodes of a batch.
+pub(super) const NODE_BATCH: usize = 8;
+
+/// A batch of nodes whose next inertia is computed.
+pub(super) struct NodeBatch<'a, 'b> {
+    pub(super) inertia: &'a [NodeInertia],
+    pub(super) increment: &'a mut [NodeVector],
+    /// Empty without a lattice.
+    pub(super) places: &'a [LatticeNode],
+    pub(super) scaling: &'a Scaling,
+    pub(super) frames: &'a Frames,
+    pub(super) added: &'a mut AddedInertiaSums,
+    pub(super) tables: &'a mut NodeTables<'b>,
+    pub(super) sums: &'a mut [CellMatrices],
+    /// The first node of the batch.
+    pub(super) first: usize,
+    /// No inertia is in use yet.
+    pub(super) first_cycle: bool,
+}
+
+impl NodeBatch<'_, '_> {
+    /// Compiled with this crate, as it is not generic.
+    #[inline(never)]
+    pub(super) fn dispatched(self) {
+        dispatch(self);
+    }
+}
+
+impl Kernel for NodeBatch<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: Real>(mut self) {
+        let (first, count) = (self.first, self.inertia.len());
+        // Places after the last node repeat it.
+        let mut rows = [0; TILE];
+        for (lane, row) in rows.iter_mut().enumerate().take(NODE_BATCH) {
+            let at = (first + lane).min(count.saturating_sub(1));
+            *row = self.places.get(at).map_or(at, LatticeNode::node) as u32;
+        }
+        if let Some(rows) = Indexed::below::<R>(rows, count) {
+            self.refresh::<R::Width8, R>(rows, count - first.min(count));
+        }
+    }
+}
+
+impl NodeBatch<'_, '_> {
+    /// Computes the next inertia of the nodes of these rows, of which `left` are not repeated. `W` is the widest vector
+    /// of the level.
+    #[inline(always)]
+    fn refresh<R: Real, W: Real>(&mut self, rows: Indexed, left: usize) {
+        const { assert!(R::COUNT == NODE_BATCH) };
+        let Self { inertia, increment, places, scaling, frames, added, tables, sums, .. } = self;
+        let [x, y, z, mass] = rows.read::<R>(must_cast_slice(inertia));
+        let free = [x, y, z];
+        let [vx, vy, vz, padding] = rows.read::<R>(must_cast_slice(increment));
+        let velocity = [vx, vy, vz];
+        let (mut since_start, mut since_bounds) =
+            ([Rotation::NONE; NODE_BATCH], [Rotation::NONE; NODE_BATCH]);
+        for (lane, (start, bounds)) in since_start.iter_mut().zip(&mut since_bounds).enumerate() {
+            let frame = tables.frame(rows.index::<R>(lane));
+            (*start, *bounds) = (frames.since_start(frame), frames.since_bounds(frame));
+        }
+        let local_velocity = to_frames(&since_start, velocity);
+        let (stiffness, [scalar, _]) = read_matrices(rows, tables.sum_diagonal, tables.sum_off_diagonal);
+        let old = (!self.first_cycle).then(|| {
+            let inverse = read_matrices(rows, tables.inverse_diagonal, tables.inverse_off_diagonal).0;
+            (inverse, to_frames(&since_bounds, velocity))
+        });
+        let new = new_inertia(free, mass, stiffness, old, local_velocity, scaling);
+        let fourth = [scalar, R::splat(0.0)];
+        write_matrices(rows, tables.sum_diagonal, tables.sum_off_diagonal, &new.inverse, fourth);
+        let mut kept = velocity;
+        for axis in 0..3 {
+            kept[axis] = free[axis].choose(velocity[axis] * new.velocity, velocity[axis]);
+        }
+        rows.write(must_cast_slice_mut(increment), [kept[0], kept[1], kept[2], padding]);
+        for lane in 0..left.min(R::COUNT) {
+            added.add(rows.index::<R>(lane), new.added.lane(lane));
+        }
+
+        if places.is_empty() {
+            return;
+        }
+        let [vx, vy, vz] = local_velocity;
+        let momentum = new.inertia.times([vx * new.velocity, vy * new.velocity, vz * new.velocity]);
+        for lane in 0..left.min(R::COUNT) {
+            let node = rows.index::<R>(lane);
+            let (Some(place), Some(inertia)) = (node_place(places, node), inertia.get(node)) else {
+                continue;
+            };
+            // A held axis follows its support: no inertia.
+            let mass = inertia.free() * inertia.mass * (1.0 + scaling.k);
+            let Symmetric { xx, yy, zz, xy, yz, zx } = new.inertia;
+            let of = |entry: R| entry.lane(lane);
+            let matrix = Symmetric { xx: of(xx), yy: of(yy), zz: of(zz), xy: of(xy), yz: of(yz), zx: of(zx) };
+            let [x, y, z] = momentum;
+            if let Some(sums) = sums.get_mut(place.cell()) {
+                sums.add_node::<W>(place, &matrix, mass.truncate().to_array(), [of(x), of(y), of(z)]);
+            }
+        }
+    }
+}
+
+/// The vectors of a vector of nodes in their frames.
+#[inline(always)]
+fn to_frames<R: Real>(rotations: &[Rotation; NODE_BATCH], vectors: [R; 3]) -> [R; 3] {
+    let mut local = [R::splat(0.0); 3];
+    for (row, along) in vectors.into_iter().enumerate() {
+        for column in 0..3 {
+            let entry = R::from_fn(|lane| rotations[lane % NODE_BATCH].0[row][column]);
+            local[column] = local[column] + entry * along;
+        }
+    }
+    local
+}

@@ -1,0 +1,100 @@
+//! Tables over the nodes in the caller's storage: five vectors of four floats for each node, six for a damped step.
+
+use bytemuck::{must_cast_slice, must_cast_slice_mut};
+
+use crate::element::symmetric::Symmetric;
+use crate::padding;
+use crate::simd::{NodeVector, Real, Rows};
+
+/// Vectors of the tables of `nodes` nodes.
+pub(super) const fn vectors_for(nodes: usize, damped: bool) -> usize {
+    nodes.saturating_mul(if damped { 6 } else { 5 })
+}
+
+pub(super) struct NodeTables<'a> {
+    /// `xx, yy, zz` of the inverse inertia in use (1/kg), and the scalar bound from which it was computed (N/m).
+    pub(super) inverse_diagonal: &'a mut [NodeVector],
+    /// `xy, yz, zx` of the inverse inertia, and the share of it that the node may use (below one if it is held back).
+    pub(super) inverse_off_diagonal: &'a mut [NodeVector],
+    /// Sums of the elements' bounds (N/m), later the next inverse inertia; the same layout.
+    pub(super) sum_diagonal: &'a mut [NodeVector],
+    pub(super) sum_off_diagonal: &'a mut [NodeVector],
+    /// The next increment of each node, m. The fourth component is the least height of its elements, m, with the frame
+    /// of the node in its last eight bits ([`crate::padding`]).
+    pub(super) next_increment: &'a mut [NodeVector],
+    /// Rough part of each node's last increment, m, for a damped step; else empty.
+    pub(super) rough: &'a mut [NodeVector],
+}
+
+impl<'a> NodeTables<'a> {
+    pub(super) fn split(vectors: &'a mut [NodeVector], nodes: usize) -> Option<Self> {
+        let (inverse_diagonal, rest) = vectors.split_at_mut_checked(nodes)?;
+        let (inverse_off_diagonal, rest) = rest.split_at_mut_checked(nodes)?;
+        let (sum_diagonal, rest) = rest.split_at_mut_checked(nodes)?;
+        let (sum_off_diagonal, rest) = rest.split_at_mut_checked(nodes)?;
+        let (next_increment, rest) = rest.split_at_mut_checked(nodes)?;
+        Some(Self {
+            inverse_diagonal,
+            inverse_off_diagonal,
+            sum_diagonal,
+            sum_off_diagonal,
+            next_increment,
+            rough: rest.get_mut(..nodes).unwrap_or_default(),
+        })
+    }
+
+    pub(super) fn clear_sums(&mut self) {
+        self.sum_diagonal.fill(NodeVector::ZERO);
+        self.sum_off_diagonal.fill(NodeVector::ZERO);
+    }
+
+    /// Sets the frame of a node, below 256. Its height must be there already.
+    pub(super) fn set_frame(&mut self, node: usize, frame: usize) {
+        if let Some(vector) = self.next_increment.get_mut(node) {
+            vector.0[3] = padding::with_frame(vector.0[3], frame);
+        }
+    }
+
+    /// The frame of a node.
+    #[inline(always)]
+    pub(super) fn frame(&self, node: usize) -> usize {
+        self.next_increment.get(node).map_or(0, |vector| padding::frame_of(vector.0[3]))
+    }
+
+    /// Puts the next inverses into use. The shares are kept; in the first cycle they are set to one.
+    pub(super) fn put_in_use(&mut self, first: bool) {
+        for (inverse, next) in self.inverse_diagonal.iter_mut().zip(&*self.sum_diagonal) {
+            *inverse = *next;
+        }
+        for (inverse, next) in self.inverse_off_diagonal.iter_mut().zip(&*self.sum_off_diagonal) {
+            let share = if first { 1.0 } else { inverse.0[3] };
+            let [xy, yz, zx, _] = next.0;
+            inverse.0 = [xy, yz, zx, share];
+        }
+    }
+}
+
+/// Reads the matrices of a vector of nodes, and the fourth components of both tables.
+#[inline(always)]
+pub(super) fn read_matrices<R: Real>(
+    rows: impl Rows,
+    diagonal: &[NodeVector],
+    off_diagonal: &[NodeVector],
+) -> (Symmetric<R>, [R; 2]) {
+    let [xx, yy, zz, fourth] = rows.read::<R>(must_cast_slice(diagonal));
+    let [xy, yz, zx, last] = rows.read::<R>(must_cast_slice(off_diagonal));
+    (Symmetric { xx, yy, zz, xy, yz, zx }, [fourth, last])
+}
+
+/// Writes what [`read_matrices`] reads.
+#[inline(always)]
+pub(super) fn write_matrices<R: Real>(
+    rows: impl Rows,
+    diagonal: &mut [NodeVector],
+    off_diagonal: &mut [NodeVector],
+    &Symmetric { xx, yy, zz, xy, yz, zx }: &Symmetric<R>,
+    [fourth, last]: [R; 2],
+) {
+    rows.write(must_cast_slice_mut(diagonal), [xx, yy, zz, fourth]);
+    rows.write(must_cast_slice_mut(off_diagonal), [xy, yz, zx, last]);
+}

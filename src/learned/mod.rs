@@ -1,0 +1,513 @@
+//! The learned step (Meister et al. 2018, section 2): a network predicts each vertex's acceleration for a step `D` that is
+//! 10 to 100 times longer than the exact one may be.
+//!
+//! ```text
+//! v = (u(t) - u(t-D)) / D,  f = f_e - K u                 the vertex's state, in its local frame (frame.rs)
+//! a = network(u, |v|, f)                                  clipped to what training has seen
+//! u(t+D) - u(t) = u(t) - u(t-D) + D^2 a                   increments: 2 u - u(t-D) would round away the motion
+//! ```
+//! Velocity and acceleration are differences over `D`, so exact steps have to come first: in the lead-in
+//! ([`LearnedStep::lead`], 0.3 s in the paper) the frames follow their motion over each `D`, and the first learned step goes on
+//! from there. A state that has not moved yet needs no lead-in.
+//!
+//! The network knows nothing of energy. What it does is entered in the same energy balance as every other step
+//! ([`crate::step::EnergyBalance`]): with several times more kinetic energy than loads and supports have ever given the step is
+//! refused. With fallback a step that has more kinetic energy than the balance explains at all is undone, and exact steps take
+//! over for good.
+
+pub mod frame;
+mod predict;
+
+#[cfg(feature = "train")]
+pub(crate) use predict::VertexInput;
+pub use predict::{FEATURES, PREDICTED};
+
+use core::fmt;
+use core::ops::Range;
+
+use bytemuck::{Pod, Zeroable, must_cast_slice_mut};
+use glam::Vec4;
+
+use crate::element::{ElementMaterial, NodeInertia};
+use crate::loads::Loads;
+use crate::mlp::Network;
+use crate::scene::SceneView;
+use crate::simd::NodeVector;
+use crate::state::{AsState, Progress, StateView};
+use crate::step::{
+    CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial, move_in_parts,
+};
+use crate::tled;
+use frame::Frame;
+use predict::{Counts, Predict};
+
+/// What the learned step keeps for each vertex: its frame, and its next increment while a step is computed.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Vertex {
+    frame: Frame,
+    /// m. In a lead-in the displacement at the start of the interval, and after it the increment over the interval.
+    next: NodeVector,
+}
+
+impl Vertex {
+    /// In the world's axes.
+    const NEW: Self = Self { frame: Frame::WORLD, next: NodeVector::ZERO };
+}
+
+/// Vectors in the storage of a [`Vertex`].
+const VERTEX_VECTORS: usize = size_of::<Vertex>() / size_of::<NodeVector>();
+
+/// Vectors of storage that learned steps of so many nodes need, with fallback or without.
+#[must_use]
+pub const fn vectors_for(nodes: usize, fallback: bool) -> usize {
+    (VERTEX_VECTORS + if fallback { 2 } else { 0 }).saturating_mul(nodes)
+}
+
+/// Why a network cannot move a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum LearnedError {
+    /// It does not have the inputs and outputs of the learned step.
+    Shape {
+        /// Its inputs.
+        inputs: usize,
+        /// Its outputs.
+        outputs: usize,
+    },
+    /// The exact step has another damping than the training.
+    Damping {
+        /// That of the exact step, 1/s.
+        exact: f32,
+        /// That of the training, 1/s.
+        trained: f32,
+    },
+    /// The network's step is no whole number of exact steps.
+    StepRatio {
+        /// The exact step, s.
+        exact: f32,
+        /// The network's, s.
+        learned: f32,
+    },
+    /// The state has moved by steps that neither the lead-in nor this network took.
+    NotLed {
+        /// Steps that the state has taken.
+        steps: u64,
+    },
+}
+
+impl fmt::Display for LearnedError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Shape { inputs, outputs } => write!(
+                f,
+                "a network of {inputs} inputs and {outputs} outputs; the learned step needs {FEATURES} and {PREDICTED}"
+            ),
+            Self::Damping { exact, trained } => {
+                write!(f, "damping is {exact} 1/s, the network learned a motion damped by {trained} 1/s")
+            }
+            Self::StepRatio { exact, learned } => {
+                write!(f, "the network's step of {learned} s is no whole number of exact steps of {exact} s")
+            }
+            Self::NotLed { steps } => write!(
+                f,
+                "after {steps} steps the network does not know the motion: a lead-in of exact steps is needed"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for LearnedError {}
+
+/// What the latest step found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct LearnedReport {
+    /// Share of the free vertices whose predicted acceleration was clipped.
+    pub clipped: f32,
+    /// Share of the free vertices with an input outside what training has seen.
+    pub outside: f32,
+}
+
+/// When and why exact steps have taken over for good.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fallback {
+    /// Start of the step that was undone, s.
+    pub time: f64,
+    /// What became of it.
+    pub status: Status,
+}
+
+/// A learned step apart from its storage: position independent, and the same for every scene.
+#[derive(Clone, Debug)]
+pub struct LearnedModel<'w> {
+    network: Network<'w>,
+    step: Step,
+    /// Whether an unexplained step is undone.
+    undoes: bool,
+    fell_back: Option<Fallback>,
+    /// Steps of the state when a lead-in or a learned step ended last.
+    led: Option<u64>,
+    report: LearnedReport,
+}
+
+impl<'w> LearnedModel<'w> {
+    /// Step length and damping are those of the training.
+    pub fn new(network: Network<'w>, fallback: bool) -> Result<Self, LearnedError> {
+        let (inputs, outputs) = (network.inputs().len(), network.outputs().len());
+        let recipe = network.recipe();
+        // The weight file has been checked: its step is a positive number.
+        match Step::unchecked(recipe.step, recipe.damping) {
+            Ok(step) if inputs == FEATURES && outputs == PREDICTED => Ok(Self {
+                network,
+                step,
+                undoes: fallback,
+                fell_back: None,
+                led: None,
+                report: LearnedReport::default(),
+            }),
+            _ => Err(LearnedError::Shape { inputs, outputs }),
+        }
+    }
+
+    /// The network.
+    #[must_use]
+    pub const fn network(&self) -> &Network<'w> {
+        &self.network
+    }
+
+    /// The step, s.
+    #[must_use]
+    pub const fn seconds(&self) -> f32 {
+        self.step.seconds()
+    }
+
+    /// What the latest learned step found.
+    #[must_use]
+    pub const fn report(&self) -> &LearnedReport {
+        &self.report
+    }
+
+    /// Whether exact steps have taken over for good.
+    #[must_use]
+    pub const fn fell_back(&self) -> Option<&Fallback> {
+        self.fell_back.as_ref()
+    }
+
+    /// Whether the latest steps of a state were a lead-in or learned ones.
+    #[must_use]
+    pub fn is_led(&self, progress: &Progress) -> bool {
+        self.led == Some(progress.steps)
+    }
+
+    /// Whether steps can be taken back.
+    #[must_use]
+    pub const fn undoes(&self) -> bool {
+        self.undoes
+    }
+
+    /// Exact steps in one of the network's.
+    pub fn exact_steps(&self, exact: &Step) -> Result<u32, LearnedError> {
+        let recipe = self.network.recipe();
+        if (exact.damping() - recipe.damping).abs() > 1e-6 * recipe.damping {
+            return Err(LearnedError::Damping { exact: exact.damping(), trained: recipe.damping });
+        }
+        let count = (recipe.step / exact.seconds() + 0.5) as u32;
+        if count < 1 || (count as f32 * exact.seconds() - recipe.step).abs() > 1e-4 * recipe.step {
+            return Err(LearnedError::StepRatio { exact: exact.seconds(), learned: recipe.step });
+        }
+        Ok(count)
+    }
+
+    /// Learned steps in a lead-in of `seconds`.
+    #[must_use]
+    pub fn intervals(&self, seconds: f64) -> u64 {
+        libm::round(seconds / f64::from(self.seconds())) as u64
+    }
+
+    /// With its storage, [`vectors_for`] the nodes.
+    pub const fn with_storage<'a>(&'a mut self, storage: &'a mut [NodeVector]) -> LearnedView<'a, 'w> {
+        LearnedView { model: self, storage }
+    }
+}
+
+/// A learned step with storage `S` of the caller for what it keeps of each vertex: [`vectors_for`] the nodes.
+#[derive(Clone, Debug)]
+pub struct LearnedStep<'w, S> {
+    model: LearnedModel<'w>,
+    storage: S,
+}
+
+impl<'w, S: AsMut<[NodeVector]>> LearnedStep<'w, S> {
+    /// For a motion from rest; `storage` is overwritten.
+    pub fn new(network: Network<'w>, fallback: bool, storage: S) -> Result<Self, LearnedError> {
+        let mut learned = Self { model: LearnedModel::new(network, fallback)?, storage };
+        learned.view().reset();
+        Ok(learned)
+    }
+
+    /// What it is apart from its storage.
+    pub const fn model(&self) -> &LearnedModel<'w> {
+        &self.model
+    }
+
+    /// The lead-in on the calling thread: see [`LearnedView::lead`].
+    pub fn lead<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: StateView<'_>,
+        lead_in: (&Step, f64),
+    ) -> Result<Status, LearnedError> {
+        self.view().lead(scene, loads, state, lead_in, &CallingThread)
+    }
+
+    /// A step on the calling thread: see [`LearnedView::step`].
+    pub fn step<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: StateView<'_>,
+        exact: &Step,
+    ) -> Result<Status, LearnedError> {
+        self.view().step(scene, loads, state, exact, &CallingThread)
+    }
+
+    /// The learned step, whatever its storage.
+    pub fn view(&mut self) -> LearnedView<'_, 'w> {
+        self.model.with_storage(self.storage.as_mut())
+    }
+}
+
+/// A learned step over storage of whichever kind.
+#[derive(Debug)]
+pub struct LearnedView<'a, 'w> {
+    model: &'a mut LearnedModel<'w>,
+    storage: &'a mut [NodeVector],
+}
+
+/// A step that was undone: the state is as before it, and exact steps go on from there.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub struct Undone;
+
+impl LearnedView<'_, '_> {
+    /// For a motion from rest: frames as at the start, no lead-in yet, exact steps have not taken over.
+    pub fn reset(&mut self) {
+        self.storage.fill(NodeVector::ZERO);
+        vertices(self.storage, usize::MAX).fill(Vertex::NEW);
+        (self.model.fell_back, self.model.led) = (None, None);
+    }
+
+    /// The lead-in: exact steps of `exact` for as many of the network's as `seconds` have, while the frames follow. Gives the
+    /// worst status, or the first of a step that was refused.
+    pub fn lead<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        mut state: StateView<'_>,
+        (exact, seconds): (&Step, f64),
+        threads: &impl Threads,
+    ) -> Result<Status, LearnedError> {
+        let count = self.model.exact_steps(exact)?;
+        let mut worst = Status::Ok;
+        for _ in 0..self.model.intervals(seconds) {
+            let status = self.lead_interval(&mut state, |state| {
+                exact_steps(count, |_| tled::step_in_parts(scene, loads, state.reborrow(), exact, threads))
+            });
+            match status {
+                Status::Ok => {}
+                limited @ Status::Limited { .. } => worst = limited,
+                refused => return Ok(refused),
+            }
+        }
+        Ok(worst)
+    }
+
+    /// One interval of the lead-in: `exact` takes exact steps that last as long as one of the network's, while the frames follow.
+    pub fn lead_interval<S: AsState>(
+        &mut self,
+        state: &mut S,
+        exact: impl FnOnce(&mut S) -> Status,
+    ) -> Status {
+        self.model.led = None;
+        let before = state.as_state();
+        let vertices = vertices(self.storage, before.displacement.len());
+        for (vertex, &displacement) in vertices.iter_mut().zip(&*before.displacement) {
+            vertex.next = displacement;
+        }
+        let status = exact(state);
+        if !status.is_taken() {
+            return status;
+        }
+        let after = state.as_state();
+        for (vertex, displacement) in vertices.iter_mut().zip(&*after.displacement) {
+            let increment = Vec4::from(displacement.0) - Vec4::from(vertex.next.0);
+            vertex.next = NodeVector(increment.to_array());
+            vertex.frame.follow(vertex.next.to_array());
+        }
+        self.model.led = Some(after.steps);
+        status
+    }
+
+    /// Takes one learned step, or as many exact ones if it was undone or exact steps have taken over. Every learned step does the
+    /// same work.
+    pub fn step<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        mut state: StateView<'_>,
+        exact: &Step,
+        threads: &impl Threads,
+    ) -> Result<Status, LearnedError> {
+        let count = self.model.exact_steps(exact)?;
+        match self.try_step(scene, loads, &mut state, exact.seconds(), threads)? {
+            Ok(status) => Ok(status),
+            Err(Undone) => Ok(exact_steps(count, |_| {
+                tled::step_in_parts(scene, loads, state.reborrow(), exact, threads)
+            })),
+        }
+    }
+
+    /// Takes one learned step, if exact ones have not taken over; if energy does not explain it, and with fallback, it is undone. The
+    /// last increment of the state then spans `exact` seconds, and the caller takes exact steps. Without fallback a first step that
+    /// diverges leaves displacements and time as before it, and increments that span the network's step.
+    pub fn try_step<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: &mut StateView<'_>,
+        exact: f32,
+        threads: &impl Threads,
+    ) -> Result<Result<Status, Undone>, LearnedError> {
+        if self.model.fell_back.is_some() {
+            return Ok(Err(Undone));
+        }
+        let nodes = scene.node_count();
+        let per_node = if self.model.undoes { VERTEX_VECTORS + 2 } else { VERTEX_VECTORS };
+        let room = self.storage.len() / per_node;
+        if let Err(refused) = Trial::check(scene, loads, state, room) {
+            return Ok(Ok(refused));
+        }
+        self.take_over(state)?;
+        let Self { model, storage } = self;
+        let before = *state.progress;
+        let (vertex_vectors, saved) = storage.split_at_mut(storage.len().min(VERTEX_VECTORS * nodes));
+        if model.undoes {
+            save(state, saved);
+        }
+        // What a refused step has predicted the network cannot go on from.
+        model.led = None;
+        let status = match Trial::begin(scene, loads, state.reborrow(), room) {
+            Err(refused) => refused,
+            Ok(trial) => {
+                let LearnedModel { network, step, report, .. } = &mut **model;
+                let vertices = vertices(vertex_vectors, nodes);
+                trial.take(step, &mut Learned { network, step, report, vertices, threads })
+            }
+        };
+        if model.undoes && status.is_unexplained() {
+            model.fell_back = Some(Fallback { time: before.time, status });
+            *state.progress = before;
+            restore(state, saved);
+            state.respan(exact);
+            return Ok(Err(Undone));
+        }
+        if status.is_taken() {
+            model.led = Some(state.steps);
+        }
+        Ok(Ok(status))
+    }
+
+    /// After a lead-in exact steps have their own increments; the network goes on from those of its own step.
+    fn take_over(&mut self, state: &mut StateView<'_>) -> Result<(), LearnedError> {
+        let seconds = self.model.seconds();
+        let spans = state.dt <= 0.0 || (state.dt - seconds).abs() <= 1e-5 * seconds;
+        if self.model.is_led(state) && !spans {
+            let vertices = vertices(self.storage, state.increment.len());
+            for (increment, vertex) in state.increment.iter_mut().zip(vertices) {
+                *increment = vertex.next;
+            }
+            state.progress.dt = seconds;
+            return Ok(());
+        }
+        if spans && (self.model.is_led(state) || state.dt <= 0.0) {
+            return Ok(());
+        }
+        Err(LearnedError::NotLed { steps: state.steps })
+    }
+}
+
+/// The vertices of so many nodes, or as many as there is storage for.
+fn vertices(storage: &mut [NodeVector], nodes: usize) -> &mut [Vertex] {
+    let (vertices, _) = storage.as_chunks_mut::<VERTEX_VECTORS>();
+    let nodes = nodes.min(vertices.len());
+    must_cast_slice_mut(vertices.get_mut(..nodes).unwrap_or_default())
+}
+
+/// Takes `count` exact steps, or until one is refused. Gives the worst status.
+fn exact_steps(count: u32, mut step: impl FnMut(u32) -> Status) -> Status {
+    let mut worst = Status::Ok;
+    for number in 0..count {
+        match step(number) {
+            Status::Ok => {}
+            limited @ Status::Limited { .. } => worst = limited,
+            refused => return refused,
+        }
+    }
+    worst
+}
+
+/// Copies what a learned step changes.
+fn save(state: &StateView<'_>, saved: &mut [NodeVector]) {
+    let (displacement, increment) = saved.split_at_mut(saved.len() / 2);
+    displacement.iter_mut().zip(&*state.displacement).for_each(|(copy, vector)| *copy = *vector);
+    increment.iter_mut().zip(&*state.increment).for_each(|(copy, vector)| *copy = *vector);
+}
+
+fn restore(state: &mut StateView<'_>, saved: &[NodeVector]) {
+    let (displacement, increment) = saved.split_at(saved.len() / 2);
+    state.displacement.iter_mut().zip(displacement).for_each(|(vector, copy)| *vector = *copy);
+    state.increment.iter_mut().zip(increment).for_each(|(vector, copy)| *vector = *copy);
+}
+
+struct Learned<'a, 'w, T> {
+    network: &'a Network<'w>,
+    step: &'a Step,
+    report: &'a mut LearnedReport,
+    vertices: &'a mut [Vertex],
+    threads: &'a T,
+}
+
+impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
+    fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
+        let Trial { scene, loads, displacement, increment, force, progress } = trial;
+        let (network, step, inertia) = (self.network, self.step, scene.inertia);
+        let forcing =
+            Forcing { elements: scene.elements(), inertia, displacement, loads, time: progress.time };
+        let predict = |nodes: Range<usize>, force: &[NodeVector], vertices: &mut [Vertex]| {
+            let inertia = inertia.get(nodes.clone()).unwrap_or_default();
+            let displacement = displacement.get(nodes.clone()).unwrap_or_default();
+            let increment = increment.get(nodes).unwrap_or_default();
+            Predict { network, step, inertia, displacement, increment, force, vertices }.dispatched()
+        };
+        let (results, extremes) = forcing.in_parts(force, self.vertices, self.threads, predict);
+        *self.report = Counts::of_all(results.iter().map(|(_, counts)| counts)).report();
+        Computed { totals: Totals::of_all(results.iter().map(|(totals, _)| totals)), extremes }
+    }
+
+    fn next_increment(&self, node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector) -> [f32; 4] {
+        self.vertices.get(node).map_or([0.0; 4], |vertex| vertex.next.0)
+    }
+
+    fn advance(&mut self, trial: &mut Trial<'_, M>) {
+        let Trial { scene, displacement, increment, .. } = trial;
+        let (partitions, vertices) = (scene.elements().partitions, &*self.vertices);
+        move_in_parts(partitions, displacement, increment, self.threads, |nodes, displacement, increment| {
+            let vertices = vertices.get(nodes).unwrap_or_default();
+            for ((displacement, increment), vertex) in displacement.iter_mut().zip(increment).zip(vertices) {
+                *increment = vertex.next;
+                displacement.0 = (Vec4::from(displacement.0) + Vec4::from(vertex.next.0)).to_array();
+            }
+        });
+    }
+}

@@ -1,0 +1,58 @@
+//! Data kept in spare bits of nodal vectors, so that a pass over the nodes reads one vector less. Everything of that kind:
+//!
+//! | where | what | written by | read by |
+//! |---|---|---|---|
+//! | sign of a zero inverse mass | the axis is held, but motions may move it | [`crate::element`], when a scene is built | [`crate::loads`] |
+//! | fourth component of an increment or force | axes whose motion has been prescribed, as bits | [`crate::loads`] | the same, which clears it |
+//! | fourth component of increment and displacement | entries `yz`, `zx` of a node's stiffness bound | [`crate::tled::critical_step`] | the same, which clears them |
+//! | fourth component of a force | scalar stiffness bound of the node, N/m | element loops with a bound | [`crate::inertia`], which clears it |
+//! | last eight bits of a height | number of the frame that a node turns with | [`crate::inertia`], when it is prepared | its passes |
+//! | fourth component of a lattice position | number of the node | the same | the same |
+
+use crate::simd::NodeVector;
+
+/// Inverse mass of a held axis that motions may move: zero, told from that of a fixed axis by its sign.
+pub(crate) const MOVABLE: f32 = -0.0;
+
+/// Whether an inverse mass is [`MOVABLE`].
+pub(crate) fn is_movable(inverse: f32) -> bool {
+    inverse.to_bits() == MOVABLE.to_bits()
+}
+
+/// Marks an axis in the padding of a vector. Gives whether it had no mark yet.
+pub(crate) fn mark_axis(vector: &mut [f32; 4], axis: usize) -> bool {
+    let marks = vector[3].to_bits();
+    vector[3] = f32::from_bits(marks | 1 << (axis % 4));
+    marks >> (axis % 4) & 1 == 0
+}
+
+/// Removes the marks of all axes.
+pub(crate) fn clear_marks(NodeVector(vector): &mut NodeVector) {
+    vector[3] = 0.0;
+}
+
+/// The bits of a height that tell the frame: it then has 16 binary digits left, and only tells how far is far.
+const FRAME: u32 = 0xFF;
+
+/// A height (m) with the number of a frame below 256.
+pub(crate) fn with_frame(height: f32, frame: usize) -> f32 {
+    f32::from_bits(height.to_bits() & !FRAME | frame as u32 & FRAME)
+}
+
+/// The number of the frame in a height.
+#[inline(always)]
+pub(crate) fn frame_of(height: f32) -> usize {
+    (height.to_bits() & FRAME) as usize
+}
+
+/// A node's number as a float with the same bits.
+#[inline(always)]
+pub(crate) fn from_index(node: u32) -> f32 {
+    f32::from_bits(node)
+}
+
+/// The number of a node from [`from_index`].
+#[inline(always)]
+pub(crate) fn to_index(bits: f32) -> u32 {
+    bits.to_bits()
+}

@@ -1,0 +1,173 @@
+//! The protocol that every step follows, exact or not (`StepMethod`): begin (borrow the state, check that everything fits),
+//! compute forces and next increments, enter them in the energy balance, and only then accept the step and move the state, or
+//! refuse it with the node at which it went wrong. A step that is refused leaves the state as it was.
+
+mod energy_sums;
+mod length;
+mod parts;
+mod status;
+pub(crate) mod threads;
+
+pub(crate) use crate::element::Extremes;
+pub use crate::energy_balance::EnergyBalance;
+pub(crate) use energy_sums::{Addends, Sums, Totals};
+pub use length::{CriticalStep, Step, StepError};
+pub(crate) use parts::{Forcing, external_forces, move_in_parts};
+pub use status::{Cause, Divergence, Status};
+#[cfg(feature = "parallel")]
+pub use threads::Rayon;
+pub use threads::{CallingThread, MOST_PARTS, Threads};
+
+use crate::element::{ElementMaterial, NodeInertia};
+use crate::loads::Loads;
+use crate::scene::SceneView;
+use crate::simd::NodeVector;
+use crate::state::{Progress, StateView};
+use energy_sums::Entry;
+
+/// A step that is being computed: nothing has moved yet.
+pub(crate) struct Trial<'a, M> {
+    pub(crate) scene: SceneView<'a, M>,
+    pub(crate) loads: &'a Loads<'a>,
+    /// One vector for each node of the scene.
+    pub(crate) displacement: &'a mut [NodeVector],
+    pub(crate) increment: &'a mut [NodeVector],
+    pub(crate) force: &'a mut [NodeVector],
+    pub(crate) progress: &'a mut Progress,
+}
+
+/// The result of [`StepMethod::compute`]: sums over nodes and extremes over elements.
+pub(crate) struct Computed {
+    pub(crate) totals: Totals,
+    pub(crate) extremes: Extremes<f32>,
+}
+
+/// A way to compute the next increments.
+pub(crate) trait StepMethod<M> {
+    /// Computes the total forces and the next increments.
+    fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed;
+
+    /// The next increment of a node, m, from its number, inertia, last increment and total force.
+    fn next_increment(
+        &self,
+        node: usize,
+        inertia: &NodeInertia,
+        increment: &NodeVector,
+        force: &NodeVector,
+    ) -> [f32; 4];
+
+    /// Moves the nodes: the step is accepted.
+    fn advance(&mut self, trial: &mut Trial<'_, M>);
+
+    /// What is left to do once prescribed motions have been followed. Gives whether much of the motion was held back.
+    fn finish(&mut self, _trial: &mut Trial<'_, M>) -> bool {
+        false
+    }
+}
+
+impl<'a, M: ElementMaterial> Trial<'a, M> {
+    /// Borrows what a step needs; `room` is that of the method's own storage, in nodes.
+    pub(crate) fn begin(
+        scene: SceneView<'a, M>,
+        loads: &'a Loads<'a>,
+        state: StateView<'a>,
+        room: usize,
+    ) -> Result<Self, Status> {
+        Self::check(scene, loads, &state, room)?;
+        let nodes = scene.node_count();
+        let StateView { displacement, increment, force, progress } = state;
+        Ok(Self {
+            scene,
+            loads,
+            displacement: displacement.get_mut(..nodes).unwrap_or_default(),
+            increment: increment.get_mut(..nodes).unwrap_or_default(),
+            force: force.get_mut(..nodes).unwrap_or_default(),
+            progress,
+        })
+    }
+
+    /// Whether scene, loads, state and storage belong together.
+    pub(crate) fn check(
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: &StateView<'_>,
+        room: usize,
+    ) -> Result<(), Status> {
+        let (nodes, room) = (scene.node_count(), room.min(state.capacity()));
+        if nodes == 0 || room < nodes || loads.nodes().is_some_and(|checked| checked != nodes) {
+            return Err(Status::Mismatch { nodes, room });
+        }
+        Ok(())
+    }
+
+    /// Takes the step, or refuses it.
+    pub(crate) fn take(mut self, step: &Step, method: &mut impl StepMethod<M>) -> Status {
+        let Computed { totals, extremes } = method.compute(&mut self);
+        let balance = match self.balance(step, method, &totals) {
+            Ok(balance) => balance,
+            Err(cause) => {
+                let node = self.culprit(step, method);
+                return Status::Diverged(Divergence { time: self.progress.time, node, cause });
+            }
+        };
+        (self.progress.energy_balance, self.progress.extremes) = (balance, extremes);
+        method.advance(&mut self);
+        self.progress.dt = step.seconds();
+        self.progress.time += f64::from(step.seconds());
+        self.progress.steps += 1;
+        self.follow_motions();
+        let limited = method.finish(&mut self);
+        Status::of_taken(&extremes, &self.progress.energy_balance, limited)
+    }
+
+    /// The energy balance after the step, or why the step cannot be believed.
+    fn balance(
+        &mut self,
+        step: &Step,
+        method: &impl StepMethod<M>,
+        totals: &Totals,
+    ) -> Result<EnergyBalance, Cause> {
+        let Self { scene, loads, displacement, increment, force, progress } = self;
+        let mut balance = progress.energy_balance;
+        if progress.steps == 0 {
+            balance.start = balance.start.max(scene.releasable_energy());
+        }
+        let next = |node, inertia: &_, increment: &_, force: &_| {
+            method.next_increment(node, inertia, increment, force)
+        };
+        Entry::of_totals(totals, loads, step)
+            .with_forces(loads, scene.inertia, increment, force, progress.time, next)
+            .with_motions(loads, displacement, increment, force, progress.time, step)
+            .entered(balance, step)
+    }
+
+    /// The node that a refused step names: the first whose next increment is not finite, or else the one with
+    /// the most kinetic energy (increments may still be finite where their energy no longer is).
+    fn culprit(&self, step: &Step, method: &impl StepMethod<M>) -> u32 {
+        let mut most = (0.0, 0);
+        let nodes = self.scene.inertia.iter().zip(&*self.increment).zip(&*self.force);
+        for (node, ((inertia, increment), force)) in nodes.enumerate() {
+            let next = method.next_increment(node, inertia, increment, force);
+            if next.iter().any(|value| !value.is_finite()) {
+                return node as u32;
+            }
+            let sums = next.iter().zip(increment.0).map(|(next, last)| next + step.carry() * last);
+            let square: f32 = sums.map(|sum| sum * sum).sum();
+            if inertia.mass * square > most.0 {
+                most = (inertia.mass * square, node as u32);
+            }
+        }
+        most.1
+    }
+
+    /// Puts the nodes of motions where they belong by now.
+    fn follow_motions(&mut self) {
+        let Self { loads, displacement, increment, progress, .. } = self;
+        loads.each_prescribed(progress.time, increment, |node, axis, position, increment| {
+            if let Some(NodeVector(displacement)) = displacement.get_mut(node) {
+                increment[axis % 4] = position - displacement[axis % 4];
+                displacement[axis % 4] = position;
+            }
+        });
+    }
+}

@@ -1,0 +1,171 @@
+//! The work of a step in parts that share nothing, one for each thread ([`crate::mesh::partition`], [`Threads`]): first the
+//! total force on each node (N) and the sums over the nodes; when all parts have these, the moves of the nodes.
+
+use core::array::from_fn;
+use core::ops::Range;
+
+use crate::element::{ElementLaw, Elements, Extremes, InternalForces, NoVisitor, NodeInertia};
+use crate::loads::{Loads, ramp_factor};
+use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
+use crate::simd::NodeVector;
+
+use super::threads::{Threads, take};
+
+/// The input of the total forces.
+#[derive(Clone, Copy)]
+pub(crate) struct Forcing<'a, L> {
+    pub(crate) elements: Elements<'a, L>,
+    pub(crate) inertia: &'a [NodeInertia],
+    pub(crate) displacement: &'a [NodeVector],
+    pub(crate) loads: &'a Loads<'a>,
+    /// Of the loads, s.
+    pub(crate) time: f64,
+}
+
+/// The partitions of one thread, with their share of the arrays.
+struct Part<'a, T, F> {
+    partitions: Range<usize>,
+    force: &'a mut [NodeVector],
+    extra: &'a mut [T],
+    results: &'a mut [F],
+    extremes: Extremes<f32>,
+}
+
+impl<L: ElementLaw> Forcing<'_, L> {
+    /// Total forces, and for each partition the result of `then` from its nodes, their forces and their entries of `extra`, an array
+    /// that the step keeps for the nodes.
+    pub(crate) fn in_parts<T: Send, F: Copy + Default + Send>(
+        &self,
+        mut force: &mut [NodeVector],
+        mut extra: &mut [T],
+        threads: &impl Threads,
+        then: impl Fn(Range<usize>, &[NodeVector], &mut [T]) -> F + Sync,
+    ) -> ([F; MAX_PARTITIONS], Extremes<f32>) {
+        let partitions = self.elements.partitions;
+        let count = partitions.parts(threads.parts());
+        let mut results = [F::default(); MAX_PARTITIONS];
+        let mut rest = &mut results[..];
+        let mut parts: [_; MOST_PARTS] = from_fn(|part| {
+            let mine = partitions.part(part, count);
+            let nodes = partitions.nodes(&mine).len();
+            let (force, extra) = (take(&mut force, nodes), take(&mut extra, nodes));
+            let results = take(&mut rest, mine.len());
+            Part { partitions: mine, force, extra, results, extremes: Extremes::none() }
+        });
+        let parts = parts.get_mut(..count).unwrap_or_default();
+        threads.each(parts, |part| self.compute(part, &then));
+        let extremes = parts.iter().fold(Extremes::none(), |sum, part| sum.merged_with(&part.extremes));
+        (results, extremes)
+    }
+
+    fn compute<T, F>(
+        &self,
+        part: &mut Part<'_, T, F>,
+        then: &impl Fn(Range<usize>, &[NodeVector], &mut [T]) -> F,
+    ) {
+        let Part { partitions, force, extra, results, extremes } = part;
+        let all = self.elements.partitions;
+        let nodes = all.nodes(partitions);
+        let inertia = self.inertia.get(nodes.clone()).unwrap_or_default();
+        external_forces(force, nodes.start, inertia, self.loads, self.time);
+        let (elements, displacement) = (self.elements, self.displacement);
+        let mine = partitions.clone();
+        *extremes = L::forces(InternalForces::of_partitions(elements, mine, displacement, force, NoVisitor));
+        let (mut force, mut extra) = (&mut **force, &mut **extra);
+        for (partition, result) in partitions.clone().zip(&mut **results) {
+            let nodes = all.nodes(&(partition..partition + 1));
+            let count = nodes.len();
+            *result = then(nodes, take(&mut force, count), take(&mut extra, count));
+        }
+    }
+}
+
+/// Gravity and nodal forces on the nodes from `first` on, N.
+pub(crate) fn external_forces(
+    force: &mut [NodeVector],
+    first: usize,
+    inertia: &[NodeInertia],
+    loads: &Loads<'_>,
+    time: f64,
+) {
+    let [gx, gy, gz] = loads.gravity();
+    if loads.gravity() == [0.0; 3] {
+        force.fill(NodeVector::ZERO);
+    } else {
+        for (vector, inertia) in force.iter_mut().zip(inertia) {
+            vector.0 = [gx, gy, gz, 0.0].map(|component| component * inertia.mass);
+        }
+    }
+    for load in loads.forces() {
+        let factor = ramp_factor(time, load.ramp);
+        if let Some(vector) = force.get_mut((load.node as usize).wrapping_sub(first)) {
+            for (sum, newton) in vector.0.iter_mut().zip(load.newton) {
+                *sum += factor * newton;
+            }
+        }
+    }
+}
+
+/// Calls `advance` with the node range, displacements and increments of each part.
+pub(crate) fn move_in_parts(
+    partitions: &Partitions,
+    mut displacement: &mut [NodeVector],
+    mut increment: &mut [NodeVector],
+    threads: &impl Threads,
+    advance: impl Fn(Range<usize>, &mut [NodeVector], &mut [NodeVector]) + Sync,
+) {
+    let count = partitions.parts(threads.parts());
+    let mut parts: [_; MOST_PARTS] = from_fn(|part| {
+        let nodes = partitions.nodes(&partitions.part(part, count));
+        let count = nodes.len();
+        (nodes, take(&mut displacement, count), take(&mut increment, count))
+    });
+    threads.each(parts.get_mut(..count).unwrap_or_default(), |(nodes, displacement, increment)| {
+        advance(nodes.clone(), displacement, increment);
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{println, vec, vec::Vec};
+
+    use super::*;
+    use crate::material::Exponential;
+    use crate::mesh::Bar;
+    use crate::scene::test_scene::scene_of;
+    use crate::simd::{Baseline, Kernel};
+
+    fn bits(vectors: &[NodeVector]) -> Vec<[u32; 4]> {
+        vectors.iter().map(|vector| vector.0.map(f32::to_bits)).collect()
+    }
+
+    /// The same sums in the same order, on strips of every length, and where a node's elements are of several threads.
+    #[test]
+    fn scalars_give_the_bits_of_vectors_of_eight() {
+        let law = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
+        let (points, scene) = scene_of(law, Bar { size: [0.05, 0.04, 0.2], cells: [7, 5, 28] });
+        let bent: Vec<_> = points
+            .iter()
+            .map(|&[x, y, z]| NodeVector([0.3 * z * z + 0.1 * y, 0.2 * x - 0.1 * y, 0.4 * x * z, 0.0]))
+            .collect();
+        let scene = scene.view();
+        let elements = scene.elements();
+        let lengths: Vec<_> =
+            elements.partitions.touching(elements.partitions.all()).map(|(_, length)| length).collect();
+        assert!((1..=3).all(|length| lengths.contains(&length)));
+        for parts in 1..=3 {
+            for part in 0..parts {
+                let mine = elements.partitions.part(part, elements.partitions.parts(parts));
+                let count = elements.partitions.nodes(&mine).len();
+                let (mut one, mut eight) = (vec![NodeVector::ZERO; count], vec![NodeVector::ZERO; count]);
+                let of =
+                    |force| InternalForces::of_partitions(elements, mine.clone(), &bent, force, NoVisitor);
+                let (by_one, by_eight) = (of(&mut one).run_scalar(), of(&mut eight).run::<Baseline>());
+                assert!(eight.iter().any(|force| force.0[2] != 0.0));
+                assert_eq!(bits(&one), bits(&eight), "part {part} of {parts}");
+                assert_eq!(by_one.least_j.to_bits(), by_eight.least_j.to_bits());
+                println!("part {part} of {parts}: {count} nodes, least J - 1 {:.3}", by_one.least_j);
+            }
+        }
+    }
+}

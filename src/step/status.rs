@@ -1,0 +1,104 @@
+//! What became of a step: taken, taken but not exact, or refused, with the node at which it went wrong.
+
+use core::fmt;
+
+use super::EnergyBalance;
+use crate::element::Extremes;
+use crate::material::J_FLOOR;
+
+/// What became of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use = "a step that diverged has not moved the state"]
+#[non_exhaustive]
+pub enum Status {
+    /// The step was taken.
+    Ok,
+    /// The step was taken, but is not exact: some elements are beyond the range of their law (squeezed below
+    /// [`J_FLOOR`](crate::material::J_FLOOR) or stretched beyond the exponent cap, where the law goes on along its tangent), or there
+    /// is more kinetic energy than the energy balance explains ([`EnergyBalance`]). For a step with scaled inertia
+    /// also: much of the motion was held back ([`crate::inertia::Report`]).
+    Limited {
+        /// Smallest volume ratio of an element.
+        least_volume_ratio: f32,
+        /// Largest exponent over its cap; above 1 the cap was hit.
+        saturation: f32,
+        /// Kinetic energy beyond the energy balance, as a share of the most that was ever in it; zero if none.
+        energy_excess: f32,
+    },
+    /// The step was not taken and the state is as before.
+    Diverged(Divergence),
+    /// The step was not taken: the state has room for fewer nodes than the scene, or the loads were
+    /// checked against a scene with another number of nodes.
+    Mismatch {
+        /// Nodes of the scene.
+        nodes: usize,
+        /// Nodes that the state has room for.
+        room: usize,
+    },
+}
+
+/// Where and when a simulation stopped being believable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Divergence {
+    /// Start of the refused step, s.
+    pub time: f64,
+    /// The first node that is not finite, or else the one with the most kinetic energy.
+    pub node: u32,
+    /// What was wrong.
+    pub cause: Cause,
+}
+
+/// What was wrong with a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cause {
+    /// A displacement would not be a finite number.
+    NotFinite,
+    /// There is several times more kinetic energy than loads and supports can have given.
+    Energy {
+        /// Kinetic energy, J.
+        kinetic: f64,
+        /// The most that was ever in the energy balance, J.
+        available: f64,
+    },
+}
+
+impl fmt::Display for Divergence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "diverged at {:.6} s, first at node {}: ", self.time, self.node)?;
+        match self.cause {
+            Cause::NotFinite => write!(f, "its displacement is no longer a finite number"),
+            Cause::Energy { kinetic, available } => write!(
+                f,
+                "kinetic energy {kinetic:.3e} J, but loads and supports never gave more than {available:.3e} J"
+            ),
+        }
+    }
+}
+
+impl Status {
+    /// Of a step that was taken, from its extremes; `limited` if it held back much of the motion.
+    pub(crate) fn of_taken(extremes: &Extremes<f32>, energy_balance: &EnergyBalance, limited: bool) -> Self {
+        let least_volume_ratio = 1.0 + extremes.least_j;
+        let (saturation, energy_excess) = (extremes.saturation, energy_balance.excess() as f32);
+        if limited || least_volume_ratio < J_FLOOR || saturation > 1.0 || energy_excess > 0.0 {
+            return Self::Limited { least_volume_ratio, saturation, energy_excess };
+        }
+        Self::Ok
+    }
+
+    /// Whether the step was taken.
+    #[must_use]
+    pub const fn is_taken(&self) -> bool {
+        matches!(self, Self::Ok | Self::Limited { .. })
+    }
+
+    /// Whether the energy balance does not explain the step, taken or not.
+    #[must_use]
+    pub const fn is_unexplained(&self) -> bool {
+        match self {
+            Self::Diverged(_) => true,
+            Self::Limited { energy_excess, .. } => *energy_excess > 0.0,
+            _ => false,
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! Steps beyond the critical one: `method`, `step = "20x"` and `lattice` under `[time]`, and what `inspect` says of them.
+
+use super::{Desk, bar};
+
+/// A bar of 960 elements that leans over under gravity from the side, its foot held.
+fn leaning(time: &str) -> String {
+    let body = bar("").replace("cells = [2, 2, 5]", "cells = [4, 4, 10]");
+    format!("gravity = [1.0, 0.0, 0.0]\n{body}[[fix]]\nplane = {{ axis = \"z\", at = 0.0 }}\n[time]\n{time}")
+}
+
+fn far(desk: &Desk) -> f64 {
+    desk.summary()["max_displacement_mm"].as_f64().unwrap()
+}
+
+#[test]
+fn long_steps_reach_where_short_ones_do_and_say_what_they_did() {
+    let desk = Desk::new();
+    let said = desk.simulate(&leaning("step = \"auto\"\nend = 0.3\n"), &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(desk.summary()["inertia"].is_null() && !said.out.contains("added mass"), "{}", said.out);
+    let exact = far(&desk);
+
+    for (method, lattice) in [("damped", true), ("multilevel", true), ("mass-scaled", false)] {
+        let time = format!("method = \"{method}\"\nstep = \"10x\"\nend = 0.3\nframes = 3\n");
+        let said = desk.simulate(&leaning(&time), &["--force"]);
+        println!("{}", said.out);
+        assert_eq!(said.code, 0, "{}", said.err);
+        let summary = desk.summary();
+        assert_eq!(summary["method"], method);
+        assert_eq!(summary["status"], "ok", "{summary:#}");
+        let inertia = &summary["inertia"];
+        let figure = |name: &str| inertia[name].as_f64().unwrap();
+        let critical = summary["critical_step_at_rest_s"].as_f64().unwrap();
+        assert!((figure("step_over_critical_at_rest") - 10.0).abs() < 1e-4, "{inertia:#}");
+        assert!((figure("step_s") / (10.0 * critical) - 1.0).abs() < 1e-6, "{inertia:#}");
+        assert_eq!(summary["steps"].as_f64(), Some((0.3 / figure("step_s")).round()));
+        assert!(figure("added_mass_mean") > 1.0, "{inertia:#}");
+        assert!(figure("added_mass_largest") > figure("added_mass_mean"), "{inertia:#}");
+        assert!(inertia["added_mass_node"].as_u64().unwrap() < 275);
+        let (last, most) = (figure("error_estimate_mm"), figure("error_estimate_largest_mm"));
+        assert!(last > 0.0 && most >= last, "{inertia:#}");
+        assert!((0.0..=1.0).contains(&figure("steps_held_back_share")), "{inertia:#}");
+        for part in ["times the critical step", "times its own mass", "error estimate", "held back"] {
+            assert!(said.out.contains(part), "{part}: {}", said.out);
+        }
+        for name in ["lattice_cells", "lattice_functions", "coarse_share_least"] {
+            assert_eq!(inertia[name].is_null(), !lattice, "{name}");
+        }
+        let damped = inertia["rough_motion_damped_largest"].as_f64();
+        assert_eq!(
+            damped.is_some_and(|share| share > 0.0 && share <= 0.5),
+            method == "damped",
+            "{inertia:#}"
+        );
+        assert_eq!(said.out.contains("taken away in a step"), method == "damped", "{}", said.out);
+        assert_eq!(
+            said.out.contains("coarse motion") && said.out.contains("lattice "),
+            lattice,
+            "{}",
+            said.out
+        );
+        println!("{method}: {:.3} mm, the exact step {exact:.3} mm", far(&desk));
+        if lattice {
+            assert!((far(&desk) / exact - 1.0).abs() < 0.1, "{} {exact}", far(&desk));
+        }
+    }
+}
+
+#[test]
+fn a_lattice_and_a_step_may_be_given_by_hand() {
+    let desk = Desk::new();
+    let time = "method = \"multilevel\"\nstep = 0.004\nlattice = [1, 2, 3]\nend = 0.02\nframes = 100\n";
+    let said = desk.simulate(&leaning(time), &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let summary = desk.summary();
+    assert_eq!(summary["steps"], 5);
+    assert_eq!(summary["inertia"]["step_s"], 0.004);
+    assert_eq!(summary["inertia"]["lattice_cells"], serde_json::json!([1, 2, 3]));
+    // The foot is held: 2 x 3 points above it at each of three heights, and those at the foot that reach up.
+    let functions = summary["inertia"]["lattice_functions"].as_u64().unwrap();
+    assert!((18..=24).contains(&functions), "{functions}");
+    // Five steps leave five frames after that at rest.
+    assert!(desk.path("out/frame_0005.vtu").exists() && !desk.path("out/frame_0006.vtu").exists());
+}
+
+#[test]
+fn the_exact_step_takes_multiples_up_to_one() {
+    let desk = Desk::new();
+    assert_eq!(desk.simulate(&leaning("step = \"1x\"\nend = 0.002\n"), &[]).code, 0);
+    let summary = desk.summary();
+    assert_eq!(summary["step_longest_s"], summary["critical_step_at_rest_s"]);
+    let said = desk.simulate(&leaning("step = \"1.1x\"\nend = 0.002\n"), &["--force"]);
+    assert_eq!(said.code, 2);
+    for part in ["scene.toml, line 15: the step of", "is above the stable", "method = \"multilevel\""] {
+        assert!(said.err.contains(part), "{part}: {}", said.err);
+    }
+}
+
+#[test]
+fn what_does_not_go_together_is_refused_in_words() {
+    let cases = [
+        ("method = \"fast\"\nstep = 0.001\nend = 1.0\n", "line 15: method \"fast\" is not known; \"tled\", "),
+        ("step = \"auto\"\nmethod = \"multilevel\"\nend = 1.0\n", "line 15: step \"auto\" stays below the "),
+        (
+            "step = \"auto\"\nmethod = \"mass-scaled\"\nend = 1.0\n",
+            "method \"mass-scaled\" is there to exceed",
+        ),
+        (
+            "end = 1.0\nstep = \"x\"\n",
+            "line 16: step \"x\" is not known; give seconds, \"auto\", or a multiple",
+        ),
+        ("end = 1.0\nstep = \"-20x\"\n", "line 16: step is \"-20x\", it must be a positive multiple"),
+        ("end = 1.0\nstep = \"nanx\"\n", "line 16: step is \"nanx\""),
+        ("end = 0.1\nstep = \"5000x\"\nmethod = \"multilevel\"\n", "line 16: the step of 2.3"),
+        (
+            "step = 0.001\nend = 1.0\nlattice = [2, 2, 4]\n",
+            "line 17: lattice is [2, 2, 4], but method \"tled\" has none; \"multilevel\" and \"damped\" have",
+        ),
+        (
+            "step = 0.001\nmethod = \"mass-scaled\"\nend = 1.0\nlattice = [2, 2, 4]\n",
+            "line 18: lattice is [2, 2, 4], but method \"mass-scaled\" has none",
+        ),
+        (
+            "step = 0.001\nmethod = \"multilevel\"\nend = 1.0\nlattice = [2, 0, 4]\n",
+            "line 18: lattice is [2, 0, 4]; give at least 1 cell along each axis",
+        ),
+        (
+            "step = 0.001\nmethod = \"multilevel\"\nend = 1.0\nlattice = [9, 9, 9]\n",
+            "line 18: a lattice of 9 x 9 x 9 cells has more than 128 functions",
+        ),
+        (
+            "step = 0.001\nmethod = \"multilevel\"\nend = 1.0\nlattice = [99, 99, 99]\n",
+            "line 18: a lattice of 99 x 99 x 99 cells: each must be at least 1, with at most 1024 points",
+        ),
+        ("step = 0.001\nmethod = \"multilevel\"\nend = 1.0\nlattice = [2, 2]\n", "line 18: "),
+    ];
+    let desk = Desk::new();
+    for (time, fragment) in cases {
+        let said = desk.simulate(&leaning(time), &[]);
+        print!("{}", said.err);
+        assert_eq!(said.code, 2, "expected a complaint with \"{fragment}\" of:\n{time}\n{}", said.err);
+        assert!(said.err.contains(fragment), "\"{fragment}\" is not in: {}", said.err);
+        assert!(!desk.path("out").exists(), "a refused scene left a folder behind");
+    }
+    let tiny = bar("[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[time]\nstep = \"20x\"\nmethod = \"multilevel\"\nend = 1.0\n")
+        .replace("cells = [2, 2, 5]", "cells = [1, 1, 2]");
+    let said = desk.simulate(&tiny, &[]);
+    print!("{}", said.err);
+    assert!(said.err.contains("bar: with 12 elements the mesh is too small for a lattice"), "{}", said.err);
+}
+
+#[test]
+fn inspect_tells_what_steps_beyond_the_limit_cost() {
+    let desk = Desk::new();
+    desk.write("scene.toml", &leaning("method = \"multilevel\"\nstep = \"20x\"\nend = 1.0\n"));
+    let said = desk.supple(&["inspect", "scene.toml", "--accuracy", "0.5"]);
+    println!("{}", said.out);
+    assert_eq!(said.code, 0, "{}", said.err);
+    for part in [
+        "steps beyond the limit",
+        "lattice suggested",
+        "memory of inertia",
+        "mass-scaled step",
+        "multilevel step",
+        "added mass at 10x",
+        "added mass at 50x",
+        "expected error",
+        "over the first 0.200 s",
+        "recommended",
+    ] {
+        assert!(said.out.contains(part), "{part}: {}", said.out);
+    }
+    // The table falls with the step, and the longest below half a millimetre is recommended.
+    let row = |name: &str| {
+        let line = said.out.lines().find(|line| line.starts_with(&format!("{name} "))).unwrap();
+        line.split_whitespace().map(str::to_string).collect::<Vec<_>>()
+    };
+    let error = |name: &str| row(name)[2].parse::<f64>().unwrap();
+    let names = ["50x", "40x", "30x", "20x", "10x", "5x"];
+    assert!(error("50x") > error("10x") && error("10x") > error("5x"));
+    let below = names.iter().rev().take_while(|name| error(name) < 0.5).last().unwrap();
+    let recommended = said.out.lines().find(|line| line.starts_with("recommended")).unwrap();
+    assert!(recommended.contains(&format!("step = \"{below}\"")), "{below}: {recommended}");
+
+    let said = desk.supple(&["inspect", "scene.toml", "--accuracy", "1e-9"]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(
+        said.out.contains("method = \"tled\": none of these multilevel steps stays below"),
+        "{}",
+        said.out
+    );
+}
+
+#[test]
+fn accuracy_is_for_scenes_and_a_positive_number() {
+    let desk = Desk::new();
+    desk.write("scene.toml", &leaning("step = \"auto\"\nend = 1.0\n"));
+    let said = desk.supple(&["inspect", "scene.toml", "--accuracy", "0"]);
+    assert_eq!((said.code, said.err.trim()), (2, "error: --accuracy is 0 mm, it must be a positive number"));
+    let lobe = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../meshes/lobe.msh");
+    let said = desk.supple(&["inspect", lobe, "--accuracy", "0.1"]);
+    assert_eq!(said.code, 2);
+    assert!(
+        said.err.contains("--accuracy recommends a step for a scene (.toml), this is a mesh"),
+        "{}",
+        said.err
+    );
+}

@@ -1,0 +1,13 @@
+//! What the core promises whatever it is given: no allocation, errors that name place and value, the same bits for any number of
+//! threads.
+
+#[path = "../support/networks.rs"]
+mod networks;
+#[path = "../reference/mod.rs"]
+mod reference;
+#[path = "../support/mod.rs"]
+mod support;
+
+mod errors;
+mod no_allocation;
+mod parts;

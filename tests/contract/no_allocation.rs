@@ -1,0 +1,320 @@
+//! The core never allocates: a counting global allocator sees nothing while a scene is built, loads are checked, the
+//! critical step is computed and steps are taken, in memory that is a `static`. Too little memory is an error.
+#![allow(unsafe_code)] // A global allocator is an unsafe trait.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::Mutex;
+
+use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
+use supple::learned::{self, LearnedError, LearnedStep};
+use supple::loads::{Loads, Motion, NodalForce, traction};
+use supple::material::{Exponential, NeoHookean, Tissue};
+use supple::mesh::{Bar, Mesh, Winding};
+use supple::mlp::Network;
+use supple::scene::{Axes, BuildError, FixedScene, Support, tiles_for};
+use supple::state::{FixedState, NodeVector};
+use supple::step::{Status, Step};
+use supple::tled;
+
+/// Counts the allocations of each thread; the test harness allocates on others.
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+// SAFETY: every call goes on to the system's allocator with the arguments as they are.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+        // SAFETY: as promised by the caller.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: as promised by the caller.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+        // SAFETY: as promised by the caller.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations() -> u64 {
+    ALLOCATIONS.with(Cell::get)
+}
+
+const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [2, 2, 4] };
+const NODES: usize = BAR.node_count();
+const TETS: usize = BAR.element_count();
+const TILES: usize = tiles_for(TETS);
+const TISSUE: Tissue<Exponential> =
+    Tissue { law: Exponential { a: 59.0, b: 8.023, d: 60_000.0 }, density: 1000.0 };
+
+static SCENE: Mutex<FixedScene<Tissue<Exponential>, NODES, TILES>> = Mutex::new(FixedScene::new(TISSUE));
+static STATE: Mutex<FixedState<NODES>> = Mutex::new(FixedState::new());
+
+/// Points and elements in arrays.
+fn mesh() -> ([[f32; 3]; NODES], [[u32; 4]; TETS]) {
+    let (mut points, mut tets) = ([[0.0; 3]; NODES], [[0; 4]; TETS]);
+    for (place, point) in points.iter_mut().zip(BAR.points()) {
+        *place = point;
+    }
+    for (place, tet) in tets.iter_mut().zip(BAR.tets()) {
+        *place = tet;
+    }
+    (points, tets)
+}
+
+/// The nine nodes at z = 0 fixed, one at the far end moved along z.
+fn supports() -> [Support; 10] {
+    let mut supports = [Support::fixed(0); 10];
+    for (node, support) in (0..9).zip(&mut supports) {
+        *support = Support::fixed(node);
+    }
+    supports[9] = Support { node: NODES as u32 - 1, axes: Axes::Z, moves: true };
+    supports
+}
+
+#[test]
+fn the_allocator_counts() {
+    let before = allocations();
+    let mut vector = Vec::with_capacity(3);
+    vector.extend([1, 2, 3]);
+    std::hint::black_box(&vector);
+    vector.extend([4; 100]);
+    assert!(std::hint::black_box(vector).len() == 103 && allocations() >= before + 2);
+}
+
+#[test]
+fn building_and_stepping_in_statics_allocates_nothing() {
+    let (points, tets) = mesh();
+    let (mut scene, mut state) = (SCENE.lock().unwrap(), STATE.lock().unwrap());
+    let (scene, state) = (&mut *scene, &mut *state);
+    let before = allocations();
+
+    let mesh = Mesh::new(&points, &tets, Winding::Checked).unwrap();
+    scene.build(&mesh, &supports()).unwrap();
+    let critical = tled::critical_step(scene, state).unwrap();
+    let step = Step::new(0.3 * critical.seconds, 5.0, critical).unwrap();
+    let mut forces = [NodalForce::default(); 7];
+    forces[0] = NodalForce { node: NODES as u32 - 3, newton: [1e-3, 0.0, 0.0], ramp: 0.01 };
+    let triangles = [[36, 38, 42], [38, 44, 42]];
+    for (force, share) in forces.iter_mut().skip(1).zip(traction(&points, &triangles, [0.0, 5.0, 0.0], 0.0)) {
+        *force = share.unwrap();
+    }
+    let motions = [Motion { node: NODES as u32 - 1, axes: Axes::Z, metre: [0.0, 0.0, 1e-3], ramp: 0.01 }];
+    let loads = Loads::new(scene, [0.0, 0.0, -9.81], &forces, &motions).unwrap();
+    assert!(tled::start(scene, state, &step, |_| ([0.0; 3], [0.0; 3])));
+    let mut taken = 0;
+    for _ in 0..200 {
+        taken += u32::from(tled::step(scene, &loads, state, &step) == Status::Ok);
+    }
+    let energy = tled::strain_energy(scene.view(), state.displacements());
+    let volume: f64 = scene.view().element_fields(state.displacements()).map(|f| f.volume_ratio).sum();
+    assert!(tled::critical_step(scene, state).is_some());
+    state.reset();
+
+    // Refusals as well.
+    assert!(Step::new(1.0, 0.0, critical).is_err());
+    let huge = [NodalForce { newton: [f32::MAX; 3], ..forces[0] }];
+    let loads = Loads::new(scene, [0.0; 3], &huge, &[]).unwrap();
+    let diverged = (0..100).any(|_| matches!(tled::step(scene, &loads, state, &step), Status::Diverged(_)));
+    assert!(scene.build(&mesh, &[Support::fixed(10_000)]).is_err());
+
+    assert_eq!(allocations(), before);
+    println!("200 steps, strain energy {energy:.3e} J, no allocation");
+    assert!(taken == 200 && energy > 0.0 && diverged && (volume / TETS as f64 - 1.0).abs() < 0.1);
+}
+
+const LATTICE: [u32; 3] = [1, 1, 2];
+/// Three layers of four points, of which the held end drops one.
+const GRID: Grid = Grid { cells: LATTICE, functions: 12 };
+const DAMPED_VECTORS: usize = vectors_for_lattice(NODES, GRID, true);
+
+/// Storage of mass-scaled, multilevel and damped steps.
+static LARGE: Mutex<[NodeVector; DAMPED_VECTORS]> = Mutex::new([NodeVector::ZERO; DAMPED_VECTORS]);
+
+#[test]
+fn steps_beyond_the_limit_in_statics_allocate_nothing() {
+    let (points, tets) = mesh();
+    let mut storage = LARGE.lock().unwrap();
+    let mut scene = FixedScene::<_, NODES, TILES>::new(TISSUE);
+    let mut state = FixedState::<NODES>::new();
+    let before = allocations();
+
+    scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &supports()).unwrap();
+    let critical = tled::critical_step(&scene, &mut state).unwrap();
+    let step = Step::unchecked(20.0 * critical.seconds, 5.0).unwrap();
+    let forces = [NodalForce { node: NODES as u32 - 3, newton: [1e-5, 0.0, 0.0], ramp: 0.01 }];
+    let loads = Loads::new(&scene, [0.0, 0.0, -0.01], &forces, &[]).unwrap();
+    let suggested = Method::Multilevel(Cells::Suggested).grid(scene.view(), &points).unwrap();
+    let multilevel = Method::Multilevel(Cells::Given(LATTICE));
+    let grid = multilevel.grid(scene.view(), &points).unwrap();
+    assert!(suggested.functions <= GRID.functions && grid.functions <= GRID.functions);
+    assert!(vectors_for(&multilevel, scene.view(), &points).is_ok_and(|count| count <= storage.len()));
+    let mut taken = 0;
+    let mut added = [0.0; 2];
+    for (method, added) in [Method::MassScaled, multilevel.clone()].into_iter().zip(&mut added) {
+        state.reset();
+        let mut large =
+            LargeStep::prepare(method, scene.view(), &points, state.view(), step, &mut storage[..]).unwrap();
+        // More than three cycles of a refresh.
+        for _ in 0..100 {
+            taken += u32::from(large.step(scene.view(), &loads, state.view()) == Status::Ok);
+        }
+        *added = large.report().added_mean;
+        // Refusals as well.
+        let too_small = &mut FixedState::<{ NODES - 1 }>::new();
+        let refused = large.step(scene.view(), &loads, too_small.view());
+        assert!(matches!(refused, Status::Mismatch { .. }) && state.steps() == 100);
+    }
+    let other_points = &points[1..];
+    let storage = &mut storage[..];
+    assert!(LargeStep::prepare(multilevel, scene.view(), other_points, state.view(), step, storage).is_err());
+
+    assert_eq!(allocations(), before);
+    println!(
+        "200 steps at 20 times the limit, {taken} of them exact, no allocation; inertia added {added:.1?}"
+    );
+    assert!(taken > 0 && added[0] > 1.0);
+}
+
+static DAMPER: &Flash<[u8]> = &Flash(*include_bytes!("../../weights/damper.weights"));
+
+#[test]
+fn a_damped_roll_out_in_statics_allocates_nothing() {
+    let (points, tets) = mesh();
+    let mut storage = LARGE.lock().unwrap();
+    let mut scene = FixedScene::<_, NODES, TILES>::new(TISSUE);
+    let mut state = FixedState::<NODES>::new();
+    let before = allocations();
+
+    scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &supports()).unwrap();
+    let critical = tled::critical_step(&scene, &mut state).unwrap();
+    let step = Step::unchecked(20.0 * critical.seconds, 5.0).unwrap();
+    let forces = [NodalForce { node: NODES as u32 - 3, newton: [1e-5, 0.0, 0.0], ramp: 0.0 }];
+    let loads = Loads::new(&scene, [0.0, 0.0, -0.01], &forces, &[]).unwrap();
+    let damper = Damper::new(Network::parse(&DAMPER.0).unwrap()).unwrap();
+    let method = Method::Damped(damper, Cells::Given(LATTICE));
+    let mut damped =
+        LargeStep::prepare(method, scene.view(), &points, state.view(), step, &mut storage[..]).unwrap();
+    let mut most = 0.0_f32;
+    for _ in 0..100 {
+        assert!(damped.step(scene.view(), &loads, state.view()).is_taken());
+        most = most.max(damped.report().damping);
+    }
+
+    assert_eq!(allocations(), before);
+    println!("100 damped steps, at most {most:.3} of the rough motion taken away, no allocation");
+    assert!(most > 0.0 && most <= 0.5);
+}
+
+/// A weight file as it would lie in flash.
+#[repr(C, align(64))]
+struct Flash<B: ?Sized>(B);
+
+static WEIGHTS: &Flash<[u8]> = &Flash(*include_bytes!("../data/golden-v1.weights"));
+/// With int8 layers.
+static INT8: &Flash<[u8]> = &Flash(*include_bytes!("../data/golden-v3.weights"));
+
+const LEARNED_VECTORS: usize = learned::vectors_for(NODES, true);
+static LEARNED: Mutex<[NodeVector; LEARNED_VECTORS]> = Mutex::new([NodeVector::ZERO; LEARNED_VECTORS]);
+
+#[test]
+fn a_learned_roll_out_in_statics_allocates_nothing() {
+    for (weights, has_int8) in [(&WEIGHTS.0, false), (&INT8.0, true)] {
+        assert_eq!(Network::parse(weights).unwrap().has_int8(), has_int8);
+        for fallback in [false, true] {
+            learned_roll_out(weights, fallback);
+        }
+    }
+}
+
+fn learned_roll_out(weights: &[u8], fallback: bool) {
+    let (points, tets) = mesh();
+    let mut storage = LEARNED.lock().unwrap();
+    let mut scene = FixedScene::<_, NODES, TILES>::new(TISSUE);
+    let mut state = FixedState::<NODES>::new();
+    let before = allocations();
+
+    scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &supports()).unwrap();
+    let network = Network::parse(weights).unwrap();
+    let mut learned = LearnedStep::new(network, fallback, &mut storage[..]).unwrap();
+    let forces = [NodalForce { node: NODES as u32 - 3, newton: [1e-2, 0.0, 0.0], ramp: 0.0 }];
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+    let seconds = learned.model().seconds();
+    let exact = Step::unchecked(0.1 * seconds, 20.0).unwrap();
+    let lead_in = (&exact, 50.0 * f64::from(seconds));
+    assert!(learned.lead(scene.view(), &loads, state.view(), lead_in).unwrap().is_taken());
+    let exact_steps = state.steps();
+    // This network has learned nothing: in the end its step is refused or undone, which allocates nothing either.
+    let mut step = || learned.step(scene.view(), &loads, state.view(), &exact);
+    let refused = (0..1_000).map(|_| step()).find(|status| !status.is_ok_and(|status| status.is_taken()));
+    let again = step();
+    let fell_back = learned.model().fell_back().is_some();
+    let damaged = Network::parse(&weights[..100]);
+
+    assert_eq!(allocations(), before);
+    let taken = state.steps() - exact_steps;
+    println!("{taken} learned steps, no allocation; then {refused:?}, fell back: {fell_back}");
+    assert!(taken > 0 && damaged.is_err());
+    match (refused, again) {
+        (None, Ok(again)) => assert!(again.is_taken()),
+        // Exact steps have taken over, too late.
+        (Some(Ok(Status::Diverged(_))), Ok(Status::Diverged(_))) => assert!(fell_back),
+        (Some(Ok(Status::Diverged(_))), Err(LearnedError::NotLed { .. })) => assert!(!fell_back),
+        unexpected => panic!("{unexpected:?}"),
+    }
+}
+
+/// Of one vertex and of many, with int8 layers.
+#[test]
+fn a_forward_pass_allocates_nothing() {
+    let mut outputs = [0.0; 3 * 37];
+    let before = allocations();
+
+    let network = Network::parse(&INT8.0).unwrap();
+    let inputs: [f32; 7 * 37] = std::array::from_fn(|at| (at % 11) as f32 - 5.0);
+    network.predict_rows(&inputs, &mut outputs);
+    let many = outputs;
+    network.predict(&inputs, &mut outputs);
+
+    assert_eq!(allocations(), before);
+    assert_eq!(many, outputs);
+    assert!(network.has_int8() && outputs.iter().all(|output| output.is_finite()));
+}
+
+#[test]
+fn too_few_nodes_or_tiles_is_an_error_and_leaves_the_scene_empty() {
+    let (points, tets) = mesh();
+    let mesh = Mesh::new(&points, &tets, Winding::Checked).unwrap();
+    let tissue = Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 };
+    let mut scene = FixedScene::<_, { NODES - 1 }, TILES>::new(tissue);
+    assert_eq!(scene.build(&mesh, &[]), Err(BuildError::NodeCapacity { needed: NODES, capacity: NODES - 1 }));
+    assert_eq!((scene.node_count(), scene.element_count()), (0, 0));
+
+    let mut scene = FixedScene::<_, NODES, { TILES - 1 }>::new(tissue);
+    assert_eq!(scene.build(&mesh, &[]), Err(BuildError::TileCapacity { needed: TILES, capacity: TILES - 1 }));
+    assert_eq!((scene.node_count(), scene.element_count()), (0, 0));
+
+    // More room than needed does no harm.
+    let mut scene = FixedScene::<_, { NODES + 5 }, { TILES + 2 }>::new(tissue);
+    assert_eq!(scene.build(&mesh, &[]), Ok(()));
+    assert_eq!((scene.node_count(), scene.element_count()), (NODES, TETS));
+
+    // A state with too little room is refused everywhere.
+    let mut state = FixedState::<{ NODES - 1 }>::new();
+    let step = Step::unchecked(1e-4, 0.0).unwrap();
+    let refused = Status::Mismatch { nodes: NODES, room: NODES - 1 };
+    assert_eq!(tled::step(&scene, &Loads::NONE, &mut state, &step), refused);
+    assert_eq!(tled::critical_step(&scene, &mut state), None);
+    assert_eq!(tled::exact_critical_step(scene.view(), state.displacements()), None);
+    assert!(!tled::start(&scene, &mut state, &step, |_| ([0.0; 3], [0.0; 3])));
+    assert_eq!(state.steps(), 0);
+}

@@ -1,0 +1,5 @@
+//! Meshes in, fields out.
+
+mod malformed;
+mod read;
+mod write;

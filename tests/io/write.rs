@@ -1,0 +1,135 @@
+//! What `supple::io` writes, it reads; VTK 9.7.2 (the reader in ParaView) and meshio 5.3.5 were seen to read it too.
+
+use std::fs;
+use std::io::{self, ErrorKind};
+use std::path::Path;
+
+use supple::io::{Frame, TetMesh, read_mesh, write_atomically, write_pvd, write_vtu};
+
+fn mesh() -> TetMesh {
+    read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/vtk_raw.vtu")).unwrap()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// The values of a Float32 array in a file of ours: the header of an array with one zlib block is four counts.
+fn field(bytes: &[u8], name: &str) -> Vec<f32> {
+    let find = |text: &str| bytes.windows(text.len()).position(|window| window == text.as_bytes());
+    let start = find(&format!("Name=\"{name}\"")).unwrap();
+    let element = std::str::from_utf8(&bytes[start..start + 120]).unwrap();
+    let offset: usize =
+        element.split("offset=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap();
+    let block = &bytes[find("\n_").unwrap() + 2 + offset..];
+    let count = |i: usize| u64::from_le_bytes(block[8 * i..8 * i + 8].try_into().unwrap()) as usize;
+    assert_eq!(count(0), 1, "one block");
+    let mut values = Vec::new();
+    io::copy(&mut flate2::read::ZlibDecoder::new(&block[32..32 + count(3)]), &mut values).unwrap();
+    assert_eq!(values.len(), count(2));
+    values.chunks(4).map(|chunk| f32::from_le_bytes(chunk.try_into().unwrap())).collect()
+}
+
+#[test]
+fn a_frame_comes_back_with_its_fields() {
+    let mesh = mesh();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("frame.vtu");
+    let displacement: Vec<[f32; 3]> = mesh.points.iter().map(|p| p.map(|x| 0.1 * x as f32)).collect();
+    let distance: Vec<f32> = (0..mesh.points.len()).map(|i| i as f32 / 3.0).collect();
+    let stress: Vec<f32> = (0..mesh.tets.len()).map(|i| 1000.0 + i as f32).collect();
+    let frame = Frame {
+        points: &mesh.points,
+        tets: &mesh.tets,
+        point_vectors: &[("displacement", &displacement)],
+        point_scalars: &[("a < \"b\" & c", &distance)],
+        cell_scalars: &[("von Mises stress", &stress)],
+    };
+    write_vtu(&path, &frame).unwrap();
+    let back = read_mesh(&path).unwrap();
+    assert_eq!((back.points, back.tets), (mesh.points, mesh.tets));
+    let bytes = fs::read(&path).unwrap();
+    assert_eq!(field(&bytes, "displacement"), displacement.as_flattened());
+    assert_eq!(field(&bytes, "a &lt; &quot;b&quot; &amp; c"), distance);
+    assert_eq!(field(&bytes, "von Mises stress"), stress);
+    assert_eq!(names(folder.path()), ["frame.vtu"]);
+}
+
+#[test]
+fn arrays_of_several_blocks() {
+    // 1.2 MB of coordinates and 3.2 MB of connectivity, in blocks of 1 MiB.
+    let points: Vec<[f64; 3]> = (0..50_000).map(|i| [f64::from(i), 0.5, -1.0 / f64::from(i + 1)]).collect();
+    let tets: Vec<[u32; 4]> = (0..100_000).map(|i| [i % 50_000, (i * 7) % 50_000, 3, i / 2]).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("large.vtu");
+    let frame =
+        Frame { points: &points, tets: &tets, point_vectors: &[], point_scalars: &[], cell_scalars: &[] };
+    write_vtu(&path, &frame).unwrap();
+    let back = read_mesh(&path).unwrap();
+    assert_eq!((back.points, back.tets), (points, tets));
+}
+
+#[test]
+fn what_does_not_fit_is_refused_and_nothing_written() {
+    let mesh = mesh();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("frame.vtu");
+    let frame = Frame {
+        points: &mesh.points,
+        tets: &mesh.tets,
+        point_vectors: &[],
+        point_scalars: &[],
+        cell_scalars: &[("stress", &[1.0, 2.0])],
+    };
+    let error = write_vtu(&path, &frame).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::InvalidInput);
+    assert_eq!(error.to_string(), "the field \"stress\" has 2 values for 24 tetrahedra");
+    let frame = Frame { points: &mesh.points[..17], cell_scalars: &[], ..frame };
+    let error = write_vtu(&path, &frame).unwrap_err();
+    assert!(error.to_string().contains("of 17"), "{error}");
+    assert!(names(folder.path()).is_empty());
+}
+
+#[test]
+fn a_series_lists_times_and_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("series.pvd");
+    write_pvd(&path, &[(0.0, "a.vtu".into()), (0.02, "b & c.vtu".into())]).unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    let document = roxmltree::Document::parse(&text).unwrap();
+    assert_eq!(document.root_element().attribute("type"), Some("Collection"));
+    let sets: Vec<_> = document.descendants().filter(|node| node.has_tag_name("DataSet")).collect();
+    let values: Vec<_> = sets.iter().map(|set| (set.attribute("timestep"), set.attribute("file"))).collect();
+    assert_eq!(values, [(Some("0"), Some("a.vtu")), (Some("0.02"), Some("b & c.vtu"))]);
+}
+
+#[test]
+fn a_failed_write_leaves_the_old_file_and_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("result.csv");
+    write_atomically(&path, |w| w.write_all(b"old")).unwrap();
+    let error = write_atomically(&path, |w| {
+        w.write_all(b"new")?;
+        Err(io::Error::other("the disk is on fire"))
+    });
+    assert!(error.unwrap_err().to_string().ends_with("result.csv: the disk is on fire"));
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    write_atomically(&path, |w| write!(w, "new {}", 7)).unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"new 7");
+    assert_eq!(names(folder.path()), ["result.csv"]);
+}
+
+#[test]
+fn errors_name_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("missing").join("result.csv");
+    let error = write_atomically(&path, |_| Ok(())).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::NotFound);
+    assert!(error.to_string().contains("result.csv"), "{error}");
+    assert_eq!(write_atomically(Path::new("/"), |_| Ok(())).unwrap_err().kind(), ErrorKind::InvalidInput);
+}

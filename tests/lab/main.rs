@@ -1,0 +1,7 @@
+//! Methods judged against the exact step over the scenes of the laboratory.
+
+#[cfg(feature = "slow-tests")]
+mod damper;
+mod evaluate;
+#[cfg(feature = "slow-tests")]
+mod paper;

@@ -1,0 +1,113 @@
+//! Damped steps: what a network may take away, and what it may not.
+
+use supple::inertia::{Cells, Damper, DamperError, LargeStep, Method};
+use supple::loads::Loads;
+use supple::mlp::Network;
+use supple::state::VecState;
+use supple::step::{Status, Step};
+use supple::tled;
+
+use crate::support::bodies::{corner_torsion, held, small_bar};
+use crate::support::{Body, EXP, NEO, bound, mean_distance, rest_of, tissue, to_f64};
+use crate::{GAIN, Kind, networks};
+
+#[test]
+fn networks_of_another_shape_are_refused() {
+    let weights = networks::constant(7, 0.1);
+    let refused = Damper::new(Network::parse(weights.bytes()).unwrap()).unwrap_err();
+    assert_eq!(refused, DamperError::Shape { inputs: 7, outputs: 1 });
+    assert_eq!(refused.to_string(), "a network of 7 inputs and 1 outputs; a damper needs 4 and 1");
+}
+
+/// Less than zero is zero, to the bit.
+#[test]
+fn without_output_it_is_the_undamped_step() {
+    let body = small_bar();
+    let scene = body.scene(tissue(EXP), &held(&body));
+    let forces = corner_torsion(&body, 1e-3, 0.02);
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+    let step = Step::unchecked(20.0 * bound(&scene, &rest_of(&scene)).seconds, 5.0).unwrap();
+    let moved = |gain: f32| {
+        let mut state = rest_of(&scene);
+        let mut damped = Kind::Damped.prepared(&body, &scene, &mut state, step, gain);
+        let mut most = 0.0_f32;
+        for _ in 0..100 {
+            let status = damped.step(scene.view(), &loads, state.view());
+            assert!(status.is_taken(), "{status:?}");
+            most = most.max(damped.report().damping);
+        }
+        (state.displacements().to_vec(), most)
+    };
+    let (undamped, most) = moved(0.0);
+    assert!(undamped.iter().any(|u| u.to_array() != [0.0; 3]) && most == 0.0);
+    assert_eq!((undamped.clone(), most), moved(-1.0));
+    let (damped, most) = moved(0.2);
+    assert!(undamped != damped && most > 0.0);
+}
+
+/// A free body that flies and spreads evenly: all of that is in the lattice, and stays.
+#[test]
+fn smooth_motion_is_left_alone() {
+    let body = small_bar();
+    let scene = body.scene(tissue(NEO), &[]);
+    let step = Step::unchecked(20.0 * bound(&scene, &rest_of(&scene)).seconds, 0.0).unwrap();
+    let mut state = rest_of(&scene);
+    assert!(tled::start(&scene, &mut state, &step, |_| ([0.0; 3], [0.3, -0.2, 0.1])));
+    let mut large = Kind::Damped.prepared(&body, &scene, &mut state, step, GAIN);
+    for _ in 0..200 {
+        let status = large.step(scene.view(), &Loads::NONE, state.view());
+        assert!(!matches!(status, Status::Diverged(_)), "{status:?}");
+    }
+    let worst = (0..body.points.len())
+        .flat_map(|node| {
+            let v = state.velocity(node);
+            [v[0] - 0.3, v[1] + 0.2, v[2] - 0.1]
+        })
+        .fold(0.0_f32, |worst, off| worst.max(off.abs()));
+    println!("after 200 steps at ten times the shipped gain: velocity off by {worst:.1e} of 0.37 m/s");
+    assert!(large.report().damping > 0.0, "nothing was damped");
+    assert!(worst < 1e-3);
+}
+
+/// A bar of a coarser mesh than the damper was made for, twisted, at eight times the critical step: there most of the error is
+/// the lattice's.
+#[test]
+fn on_another_mesh_the_shipped_damper_does_no_harm() {
+    let body = Body::bar([0.05, 0.05, 0.1], [6, 6, 12]);
+    let scene = body.scene(tissue(EXP), &held(&body));
+    let forces = corner_torsion(&body, 0.02, 0.3);
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+    let weights = networks::Memory::of(include_bytes!("../../weights/damper.weights"));
+    let damper = Damper::new(Network::parse(weights.bytes()).unwrap()).unwrap();
+    let limit = 0.8 * bound(&scene, &rest_of(&scene)).seconds;
+    let exact = Step::unchecked(limit, 20.0).unwrap();
+    let long = Step::unchecked(10.0 * limit, 20.0).unwrap();
+    let (mut truth, mut undamped, mut damped) = (rest_of(&scene), rest_of(&scene), rest_of(&scene));
+    let method = Method::Damped(damper, Cells::Suggested);
+    let cells = Cells::Given(method.grid(scene.view(), &body.points).unwrap().cells);
+    let [mut multilevel, mut with_damper] =
+        [(Method::Multilevel(cells), &mut undamped), (method, &mut damped)].map(|(method, state)| {
+            LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), long).unwrap()
+        });
+    let mean = |a: &VecState, b: &VecState| {
+        1e3 * mean_distance(&to_f64(a.displacements()), &to_f64(b.displacements()))
+    };
+    let (mut errors, mut hold, mut count) = ([0.0; 2], 0.0, 0.0);
+    while truth.time() < 0.6 {
+        for _ in 0..10 {
+            assert_eq!(tled::step(&scene, &loads, &mut truth, &exact), Status::Ok);
+        }
+        let _ = multilevel.step(scene.view(), &loads, undamped.view());
+        let _ = with_damper.step(scene.view(), &loads, damped.view());
+        errors[0] += mean(&truth, &undamped);
+        errors[1] += mean(&truth, &damped);
+        hold += mean(&truth, &rest_of(&scene));
+        count += 1.0;
+    }
+    let [undamped, damped] = errors.map(|error| error / count);
+    println!(
+        "mean over nodes and time: multilevel {undamped:.4} mm, damped {damped:.4} mm, hold {:.2} mm",
+        hold / count
+    );
+    assert!(hold / count > 3.0 && damped < undamped);
+}
