@@ -33,6 +33,7 @@
 /* Laws, for all elements of a scene. Each with its constants in the order of supple_tissue. */
 #define SUPPLE_NEO_HOOKEAN 0 /* c (Pa), d (Pa) */
 #define SUPPLE_EXPONENTIAL 1 /* a (Pa), b, d (Pa) */
+#define SUPPLE_POLYNOMIAL 2 /* c (Pa), e (Pa), d (Pa) */
 
 /* Sizes as constant expressions: what the functions give; of a supple_large, with x * y * z cells that you give, never less. */
 #define SUPPLE_SCENE_SIZE(nodes, elements, tissues) (SUPPLE_SCENE_FRONT + SUPPLE_ARRAY_(nodes, 16) +                           \

@@ -100,6 +100,7 @@ enum class [[nodiscard]] status : std::int32_t {
 enum class law : std::uint32_t {
     neo_hookean = SUPPLE_NEO_HOOKEAN, // c (Pa), d (Pa)
     exponential = SUPPLE_EXPONENTIAL, // a (Pa), b, d (Pa)
+    polynomial = SUPPLE_POLYNOMIAL, // c (Pa), e (Pa), d (Pa)
 };
 
 // checked: elements must have positive volumes. normalised: they are turned where needed.

@@ -22,6 +22,7 @@ macro_rules! for_each_law {
             @ $use [$($given)*]
             neo_hookean NeoHookean,
             exponential Exponential,
+            polynomial Polynomial,
         }
     };
     (@ modules [] $($file:ident $law:ident,)+) => {

@@ -259,7 +259,7 @@ fn every_wrong_field_has_its_own_error() {
     refused(24, whole(9), "the number of outputs is 9");
     refused(28, whole(17), "the number of layers is 17");
     refused(32, whole(5), "the number of layers of the first part is 5");
-    refused(36, whole(4), "the law is 4");
+    refused(36, whole(40), "the law is 40");
     refused(40, real(-1.0), "a is -1");
     refused(44, real(f32::NAN), "b is NaN");
     refused(48, real(0.0), "d is 0");

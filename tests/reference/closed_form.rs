@@ -22,6 +22,7 @@ fn slope(law: &Law, x: f64) -> f64 {
     match *law {
         Law::NeoHookean { c, .. } | Law::NeoHookeanLiteral { c, .. } => c,
         Law::Exponential { a, b, .. } | Law::ExponentialLiteral { a, b, .. } => a / 2.0 * (b * x).exp(),
+        Law::Polynomial { c, e, .. } => c + 2.0 * e * x,
     }
 }
 

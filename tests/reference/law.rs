@@ -5,7 +5,7 @@
 //! - isochoric form: `x = J^(-2/3) I1 - 3`, stress-free at rest;
 //! - literal form, as the paper prints it: `x = I1 - 3`, with the residual stress `2 W'(0)` at rest
 //!   (the misprinted volume term `d (J - 1)` is read as its square);
-//! - neo-Hookean `W = c x`; exponential `W = a / (2 b) (exp(b x) - 1)`.
+//! - neo-Hookean `W = c x`; exponential `W = a / (2 b) (exp(b x) - 1)`; reduced polynomial `W = c x + e x^2`.
 //!
 //! Two conventions of the fast kernel are reproduced, both C1 (stress continuous, tangent with a jump):
 //! [`J_MIN`] and [`EXPONENT_CAP`].
@@ -19,13 +19,15 @@ pub const J_MIN: f64 = 0.1;
 /// Above this value of the exponent `b x` the exponential `W` goes on along its tangent.
 pub const EXPONENT_CAP: f64 = 40.0;
 
-/// A hyperelastic law; `a`, `c`, `d` in Pa, `b` a pure number.
+/// A hyperelastic law; `a`, `c`, `d`, `e` in Pa, `b` a pure number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
     /// `c (I1bar - 3) + d (J - 1)^2`.
     NeoHookean { c: f64, d: f64 },
     /// `a / (2 b) (exp(b (I1bar - 3)) - 1) + d (J - 1)^2`.
     Exponential { a: f64, b: f64, d: f64 },
+    /// `c (I1bar - 3) + e (I1bar - 3)^2 + d (J - 1)^2`.
+    Polynomial { c: f64, e: f64, d: f64 },
     /// `c (I1 - 3) + d (J - 1)^2`.
     NeoHookeanLiteral { c: f64, d: f64 },
     /// `a / (2 b) (exp(b (I1 - 3)) - 1) + d (J - 1)^2`.
@@ -41,18 +43,20 @@ impl Law {
         match *self {
             Law::NeoHookean { d, .. } | Law::NeoHookeanLiteral { d, .. } => d,
             Law::Exponential { d, .. } | Law::ExponentialLiteral { d, .. } => d,
+            Law::Polynomial { d, .. } => d,
         }
     }
 
     /// Whether `x` is made of `I1bar` (true) or of `I1` (false).
     pub fn is_isochoric(&self) -> bool {
-        matches!(self, Law::NeoHookean { .. } | Law::Exponential { .. })
+        matches!(self, Law::NeoHookean { .. } | Law::Exponential { .. } | Law::Polynomial { .. })
     }
 
     /// `W`, `W'` and `W''` at `x`.
     pub fn shape_response(&self, x: f64) -> [f64; 3] {
         match *self {
             Law::NeoHookean { c, .. } | Law::NeoHookeanLiteral { c, .. } => [c * x, c, 0.0],
+            Law::Polynomial { c, e, .. } => [(c + e * x) * x, c + 2.0 * e * x, 2.0 * e],
             Law::Exponential { a, b, .. } | Law::ExponentialLiteral { a, b, .. } => {
                 if b * x <= EXPONENT_CAP {
                     let e = (b * x).exp();

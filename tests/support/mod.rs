@@ -10,7 +10,7 @@ pub use bodies::Body;
 
 use supple::element::{ElementLaw, ElementMaterial};
 use supple::loads::Loads;
-use supple::material::{Exponential, Literal, NeoHookean, Tissue};
+use supple::material::{Exponential, Literal, NeoHookean, Polynomial, Tissue};
 use supple::scene::{Support, VecScene};
 use supple::state::{NodeVector, VecState};
 use supple::step::{CriticalStep, Status, Step};
@@ -25,7 +25,10 @@ pub const NEO: NeoHookean = NeoHookean { c: 500.0, d: 25_000.0 };
 /// The paper's exponential law, its constants read as kPa.
 pub const EXP: Exponential = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
 
-/// Runs statements once for each of both laws in both forms.
+/// The neo-Hookean tissue, four times as stiff where `I1bar - 3` is one.
+pub const POLYNOMIAL: Polynomial = Polynomial { c: 500.0, e: 750.0, d: 25_000.0 };
+
+/// Runs statements once for each law, the paper's two in both forms.
 #[macro_export]
 macro_rules! each_law {
     ($law:ident => $body:block) => {{
@@ -45,6 +48,10 @@ macro_rules! each_law {
             let $law = supple::material::Literal($crate::support::EXP);
             $body
         }
+        {
+            let $law = $crate::support::POLYNOMIAL;
+            $body
+        }
     }};
 }
 
@@ -59,6 +66,7 @@ pub trait Judged: ElementLaw + 'static {
             reference::Law::NeoHookeanLiteral { .. } => "neo-Hookean, literal",
             reference::Law::Exponential { .. } => "exponential",
             reference::Law::ExponentialLiteral { .. } => "exponential, literal",
+            reference::Law::Polynomial { .. } => "polynomial",
         }
     }
 }
@@ -88,6 +96,13 @@ impl Judged for Literal<Exponential> {
     fn reference(&self) -> reference::Law {
         let [a, b, d] = [self.0.a, self.0.b, self.0.d].map(f64::from);
         reference::Law::ExponentialLiteral { a, b, d }
+    }
+}
+
+impl Judged for Polynomial {
+    fn reference(&self) -> reference::Law {
+        let [c, e, d] = [self.c, self.e, self.d].map(f64::from);
+        reference::Law::Polynomial { c, e, d }
     }
 }
 
