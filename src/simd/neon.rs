@@ -17,7 +17,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 
 use super::functions::Bits;
 use super::int8_neon::Bytes16;
-use super::register::{memory, same_methods};
+use super::register::{four_rows, memory, same_methods};
 use super::{Pair, Real};
 
 /// Four float32 values in one register.
@@ -60,22 +60,8 @@ impl Real for Neon {
     type Whole = Bytes16;
 
     same_methods!();
+    four_rows!();
 
-    #[inline(always)]
-    fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
-        transpose([
-            Self::from_array(row(0)),
-            Self::from_array(row(1)),
-            Self::from_array(row(2)),
-            Self::from_array(row(3)),
-        ])
-    }
-    #[inline(always)]
-    fn to_rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
-        for (lane, values) in transpose(columns).into_iter().enumerate() {
-            row(lane, values.to_array());
-        }
-    }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]
     fn fused(self, factor: Self, addend: Self) -> Self {

@@ -47,4 +47,27 @@ macro_rules! same_methods {
     };
 }
 
-pub(super) use {memory, same_methods};
+/// Rows of a register of four values, by the `transpose` of its own module.
+macro_rules! four_rows {
+    () => {
+        #[inline(always)]
+        fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
+            transpose([
+                Self::from_array(row(0)),
+                Self::from_array(row(1)),
+                Self::from_array(row(2)),
+                Self::from_array(row(3)),
+            ])
+        }
+        #[inline(always)]
+        fn to_rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
+            let [a, b, c, d] = transpose(columns);
+            row(0, a.to_array());
+            row(1, b.to_array());
+            row(2, c.to_array());
+            row(3, d.to_array());
+        }
+    };
+}
+
+pub(super) use {four_rows, memory, same_methods};

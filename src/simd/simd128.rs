@@ -12,7 +12,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 
 use super::functions::Bits;
 use super::int8_simd128::Bytes16;
-use super::register::{memory, same_methods};
+use super::register::{four_rows, memory, same_methods};
 use super::{Pair, Real};
 
 /// Four float32 values in one vector.
@@ -52,22 +52,8 @@ impl Real for Simd128 {
     type Whole = Bytes16;
 
     same_methods!();
+    four_rows!();
 
-    #[inline(always)]
-    fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
-        transpose([
-            Self::from_array(row(0)),
-            Self::from_array(row(1)),
-            Self::from_array(row(2)),
-            Self::from_array(row(3)),
-        ])
-    }
-    #[inline(always)]
-    fn to_rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
-        for (lane, values) in transpose(columns).into_iter().enumerate() {
-            row(lane, values.to_array());
-        }
-    }
     #[inline(always)]
     fn choose(self, yes: Self, no: Self) -> Self {
         Self(v128_bitselect(yes.0, no.0, f32x4_gt(self.0, f32x4_splat(0.0))))

@@ -14,7 +14,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 
 use super::functions::Bits;
 use super::int8_sse2::Bytes16;
-use super::register::{memory, same_methods};
+use super::register::{four_rows, memory, same_methods};
 use super::{Pair, Real};
 
 /// Four float32 values in one register.
@@ -56,24 +56,8 @@ impl Real for Sse2 {
     type Whole = Bytes16;
 
     same_methods!();
+    four_rows!();
 
-    #[inline(always)]
-    fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
-        transpose([
-            Self::from_array(row(0)),
-            Self::from_array(row(1)),
-            Self::from_array(row(2)),
-            Self::from_array(row(3)),
-        ])
-    }
-    #[inline(always)]
-    fn to_rows(columns: [Self; 4], mut row: impl FnMut(usize, [f32; 4])) {
-        let [a, b, c, d] = transpose(columns);
-        row(0, a.to_array());
-        row(1, b.to_array());
-        row(2, c.to_array());
-        row(3, d.to_array());
-    }
     #[inline(always)]
     fn choose(self, yes: Self, no: Self) -> Self {
         // SAFETY: as above.
