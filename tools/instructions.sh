@@ -22,9 +22,7 @@ count() {
 counted=$(mktemp)
 trap 'rm -f "$counted"' EXIT
 for loop in $("$program"); do
-    once=$(count "$loop" 1)
-    thrice=$(count "$loop" 3)
-    echo "$loop $(((thrice - once) / 2))" | tee -a "$counted"
+    echo "$loop $(($(count "$loop" 1) - $(count "$loop" 0)))" | tee -a "$counted"
 done
 if [ "${1:-}" = --keep ]; then
     cp "$counted" "$kept"
