@@ -5,7 +5,7 @@
 use supple::element::ElementLaw;
 use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::{Loads, NodalForce};
-use supple::material::{Exponential, Literal, NeoHookean, Tissue};
+use supple::material::{Exponential, Literal, NeoHookean, Polynomial, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::mlp::{Network, write, write_int8};
 use supple::scene::{Support, VecScene};
@@ -98,6 +98,8 @@ fn compare<L: ElementLaw>(name: &str, law: L) {
 fn levels_differ_by_rounding_or_not_at_all() {
     let _guard = level_guard();
     compare("neo-Hookean", NeoHookean { c: 500.0, d: 15_000.0 });
+    compare("neo-Hookean, literal", Literal(NeoHookean { c: 500.0, d: 15_000.0 }));
+    compare("polynomial", Polynomial { c: 500.0, e: 750.0, d: 15_000.0 });
     compare("exponential", Exponential { a: 59.0, b: 8.023, d: 60_000.0 });
     compare("exponential, literal", Literal(Exponential { a: 59.0, b: 8.023, d: 60_000.0 }));
 }
