@@ -120,7 +120,21 @@ pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, unchecked: bool) 
     if !matches!(time.step, StepChoice::Auto) {
         time.check_length(seconds)?;
     }
-    Ok(step)
+    if setup.learned.is_some() || matches!(time.step, StepChoice::Auto) {
+        return Ok(step);
+    }
+    Step::unchecked(fitted(seconds, time.end, time.frames), setup.damping)
+        .map_err(|error| Problem(format!("{}: {error}", time.step_at)))
+}
+
+/// The longest step, at most `seconds` but for rounding, of which whole numbers reach the frames and the end (s); only the
+/// end, if there are more frames than steps.
+fn fitted(seconds: f32, end: f64, frames: u32) -> f32 {
+    let steps_in =
+        |interval: f64| (interval / f64::from(seconds) * (1.0 - f64::from(f32::EPSILON))).ceil().max(1.0);
+    let between_frames = end / f64::from(frames);
+    let interval = if between_frames < f64::from(seconds) { end } else { between_frames };
+    (interval / steps_in(interval)) as f32
 }
 
 /// The bound of the critical step at the state, or a problem: there is none for a state that is not finite.
