@@ -159,7 +159,7 @@ proptest! {
             }
         }
         println!("{line}");
-        prop_assert!(spread > 50.0 && volumes.iter().all(|volume| *volume > 0.0));
+        prop_assert!(spread > 30.0 && volumes.iter().all(|volume| *volume > 0.0));
     }
 }
 
