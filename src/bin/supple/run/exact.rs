@@ -116,7 +116,7 @@ impl Pace {
         target: f64,
     ) -> Result<(), Problem> {
         let remaining = target - state.time();
-        let count = (remaining / f64::from(self.longest)).ceil().max(1.0);
+        let count = whole_steps(remaining, f64::from(self.longest));
         let step = Step::unchecked((remaining / count) as f32, motion.damping).map_err(Problem::of)?;
         let before = (state.clone(), outcome.limits);
         let count = count.min(f64::from(self.steps)) as u32;
@@ -139,6 +139,11 @@ impl Pace {
         }
         Ok(())
     }
+}
+
+/// The least number of equal steps, each at most `longest` (s), that make up a span (s).
+pub(crate) fn whole_steps(span: f64, longest: f64) -> f64 {
+    (span / longest).ceil().max(1.0)
 }
 
 /// Takes so many exact steps, or until one diverges.

@@ -6,7 +6,7 @@ use supple::state::VecState;
 use supple::step::{CriticalStep, Step};
 use supple::tled;
 
-use super::exact::{ExactSteps, Motion, Pace, SHARE};
+use super::exact::{ExactSteps, Motion, Pace, SHARE, whole_steps};
 use super::large::{PreparedStep, grid, on_grid, prepare};
 use super::learned::LearnedRun;
 use super::outcome::Outcome;
@@ -117,24 +117,25 @@ pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, unchecked: bool) 
         };
         Problem(format!("{}: {error}{advice}", time.step_at))
     })?;
-    if !matches!(time.step, StepChoice::Auto) {
-        time.check_length(seconds)?;
-    }
-    if setup.learned.is_some() || matches!(time.step, StepChoice::Auto) {
+    if matches!(time.step, StepChoice::Auto) {
         return Ok(step);
     }
-    Step::unchecked(fitted(seconds, time.end, time.frames), setup.damping)
-        .map_err(|error| Problem(format!("{}: {error}", time.step_at)))
+    time.check_length(seconds)?;
+    if setup.learned.is_some() {
+        return Ok(step);
+    }
+    Step::unchecked(fitted(seconds, time.end, time.frames), setup.damping).map_err(Problem::of)
 }
 
-/// The longest step, at most `seconds` but for rounding, of which whole numbers reach the frames and the end (s); only the
+/// The longest step, at most `seconds`, of which whole numbers reach the frames and the end (s) but for rounding; only the
 /// end, if there are more frames than steps.
 fn fitted(seconds: f32, end: f64, frames: u32) -> f32 {
-    let steps_in =
-        |interval: f64| (interval / f64::from(seconds) * (1.0 - f64::from(f32::EPSILON))).ceil().max(1.0);
+    let longest = f64::from(seconds);
     let between_frames = end / f64::from(frames);
-    let interval = if between_frames < f64::from(seconds) { end } else { between_frames };
-    (interval / steps_in(interval)) as f32
+    let interval = if between_frames < longest { end } else { between_frames };
+    // `seconds` may have been rounded down.
+    let count = whole_steps(interval, longest * (1.0 + f64::from(f32::EPSILON)));
+    ((interval / count) as f32).min(seconds)
 }
 
 /// The bound of the critical step at the state, or a problem: there is none for a state that is not finite.
