@@ -11,7 +11,7 @@ mod common {
 
 use common::bar::{self, DAMPING, DT, moved};
 use common::pairs::{median, seconds};
-use common::scaled::{damped, multilevel, scaled};
+use common::scaled::{CYCLE, damped, multilevel, scaled};
 use criterion::{BenchmarkId, Criterion, Throughput};
 use supple::inertia::Method;
 use supple::loads::Loads;
@@ -19,11 +19,9 @@ use supple::state::VecState;
 use supple::step::Step;
 use supple::tled;
 
-/// How many times longer than the exact one the steps are, with the steps of their refresh cycles.
+/// How many times longer than the exact one the steps are.
 const MULTIPLE: f32 = 20.0;
-const CYCLE: u32 = 64;
 const LONGEST: f32 = 100.0;
-const SHORT_CYCLE: u32 = 16;
 const PAIRS: usize = 41;
 
 /// Median time of each step of a cycle over their mean, from the current step of the cycle on.
@@ -50,11 +48,11 @@ fn main() {
     let small = Step::new(DT, DAMPING, critical).expect("dt is below the critical step");
     let mut exact = || moved(tled::step(&scene, &loads, &mut exact_state, &small));
     (0..8_000).for_each(|_| exact());
-    let mut longest = scaled(&scene, &loads, &points, LONGEST, multilevel(), SHORT_CYCLE);
-    let mut longest_damped = scaled(&scene, &loads, &points, LONGEST, damped(), SHORT_CYCLE);
-    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, Method::MassScaled, CYCLE);
-    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, multilevel(), CYCLE);
-    let mut damped = scaled(&scene, &loads, &points, MULTIPLE, damped(), CYCLE);
+    let mut longest = scaled(&scene, &loads, &points, LONGEST, multilevel());
+    let mut longest_damped = scaled(&scene, &loads, &points, LONGEST, damped());
+    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, Method::MassScaled);
+    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, multilevel());
+    let mut damped = scaled(&scene, &loads, &points, MULTIPLE, damped());
 
     let mut group = criterion.benchmark_group("beyond the critical step");
     group.throughput(Throughput::Elements(scene.element_count() as u64));
@@ -67,14 +65,13 @@ fn main() {
     let mut times = Vec::new();
     let mut ratios = [const { Vec::new() }; 5];
     for _ in 0..PAIRS {
-        let steps = 4 * SHORT_CYCLE;
         let one = seconds(|| (0..CYCLE).for_each(|_| exact())) / f64::from(CYCLE);
         let others = [
             seconds(|| (0..CYCLE).for_each(|_| mass_scaled())) / f64::from(CYCLE),
             seconds(|| (0..CYCLE).for_each(|_| multilevel())) / f64::from(CYCLE),
-            seconds(|| (0..steps).for_each(|_| longest())) / f64::from(steps),
+            seconds(|| (0..CYCLE).for_each(|_| longest())) / f64::from(CYCLE),
             seconds(|| (0..CYCLE).for_each(|_| damped())) / f64::from(CYCLE),
-            seconds(|| (0..steps).for_each(|_| longest_damped())) / f64::from(steps),
+            seconds(|| (0..CYCLE).for_each(|_| longest_damped())) / f64::from(CYCLE),
         ];
         times.push(one);
         for (ratios, other) in ratios.iter_mut().zip(others) {
@@ -88,7 +85,7 @@ fn main() {
     println!(
         "exact {:.0} us a step; at {MULTIPLE} times its length mass-scaled {mass_scaled_ratio:.2} times that, multilevel \
          {multilevel_ratio:.2} times; the dearest step of a cycle {most:.2} times their mean; at {LONGEST} times its \
-         length, where a cycle has {SHORT_CYCLE} steps, multilevel {longest_ratio:.2} times. Damped: {damped_ratio:.2} times, the \
+         length multilevel {longest_ratio:.2} times. Damped: {damped_ratio:.2} times, the \
          dearest step {most_damped:.2} times, at {LONGEST} times its length {longest_damped_ratio:.2} times",
         median(times) * 1e6,
     );

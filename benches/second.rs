@@ -21,7 +21,6 @@ use supple::step::Step;
 use supple::tled;
 
 const MULTIPLE: f32 = 20.0;
-const CYCLE: u32 = 64;
 const ROUNDS: usize = 5;
 
 /// Takes the steps of a second.
@@ -61,9 +60,9 @@ fn main() {
             }
         }
     };
-    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, Method::MassScaled, CYCLE);
-    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, multilevel(), CYCLE);
-    let mut damped = scaled(&scene, &loads, &points, MULTIPLE, damped(), CYCLE);
+    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, Method::MassScaled);
+    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, multilevel());
+    let mut damped = scaled(&scene, &loads, &points, MULTIPLE, damped());
     let mut others: [(&str, Second<'_>); 7] = [
         ("mass-scaled", Box::new(|| (0..long).for_each(|_| mass_scaled()))),
         ("multilevel", Box::new(|| (0..long).for_each(|_| multilevel()))),

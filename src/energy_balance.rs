@@ -51,8 +51,19 @@ impl EnergyBalance {
     /// zero for a step that is exact as far as energy tells.
     #[must_use]
     pub fn excess(&self) -> f64 {
-        let over = self.kinetic - self.balance() - self.uncertainty - SLACK * self.peak;
+        let over = self.surplus();
         if over > 0.0 { over / (self.peak + self.uncertainty) } else { 0.0 }
+    }
+
+    /// The kinetic energy beyond the balance and its slack, J; negative if there is less.
+    fn surplus(&self) -> f64 {
+        self.kinetic - self.balance() - self.uncertainty - SLACK * self.peak
+    }
+
+    /// The share of the kinetic energy that the balance allows, at most one.
+    pub(crate) fn allowed_share(&self) -> f32 {
+        let over = self.surplus();
+        if over > 0.0 { (1.0 - over / self.kinetic).max(0.0) as f32 } else { 1.0 }
     }
 
     /// The most kinetic energy that a step can have without having diverged.

@@ -141,6 +141,13 @@ pub const fn tiles_for(elements: usize) -> usize {
     most_tiles(elements)
 }
 
+const FNV_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// FNV-1a over words of 32 bits, from a start (Fowler, Noll, Vo): against accidents, not against forgery.
+fn checksum(words: &[u32], start: u64) -> u64 {
+    words.iter().fold(start, |sum, &word| (sum ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3))
+}
+
 /// Sizes, mass and partitions of a scene: all that is known of it apart from its tables.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneFacts {
@@ -149,6 +156,7 @@ pub struct SceneFacts {
     partitions: Partitions,
     mass: f64,
     releasable_energy: f64,
+    checksum: u64,
 }
 
 impl SceneFacts {
@@ -159,6 +167,7 @@ impl SceneFacts {
         partitions: Partitions::NONE,
         mass: 0.0,
         releasable_energy: 0.0,
+        checksum: 0,
     };
 
     /// Builds a scene in memory of the caller, `nodes` and `tiles` ([`tiles_for`]), from a mesh, what it is made of, and its supports;
@@ -202,7 +211,9 @@ impl SceneFacts {
             });
         }
         let (mass, releasable_energy) = lump_masses(material, mesh, nodes)?;
-        Ok(Self { node_count: nodes.len(), element_count, partitions, mass, releasable_energy })
+        let checksum =
+            checksum(bytemuck::cast_slice(nodes), checksum(bytemuck::cast_slice(tiles), FNV_BASIS));
+        Ok(Self { node_count: nodes.len(), element_count, partitions, mass, releasable_energy, checksum })
     }
 
     /// Number of nodes.
@@ -215,6 +226,11 @@ impl SceneFacts {
     #[must_use]
     pub const fn element_count(&self) -> usize {
         self.element_count
+    }
+
+    /// A checksum of nodes, supports, masses and elements, to tell scenes of the same size apart.
+    pub(crate) const fn checksum(&self) -> u64 {
+        self.checksum
     }
 
     /// Total mass, kg.

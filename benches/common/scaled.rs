@@ -23,22 +23,23 @@ pub(crate) fn damped() -> Method<'static> {
     Method::Damped(Damper::new(network).expect("a damper"), Cells::Given([2, 2, 5]))
 }
 
-/// A step of this method, from a state that it has deformed for eight refresh cycles.
+/// Steps of a refresh cycle with a lattice, a multiple of those without one.
+pub(crate) const CYCLE: u32 = 256;
+
+/// A step of this method, from a state that it has deformed for two refresh cycles, eight without a lattice.
 pub(crate) fn scaled<'a>(
     scene: &'a BarScene<Exponential>,
     loads: &'a Loads<'a>,
     points: &[[f32; 3]],
     multiple: f32,
     method: Method<'static>,
-    cycle: u32,
 ) -> impl FnMut() + use<'a> {
     let mut state = VecState::at_rest(points.len());
     let step = Step::unchecked(multiple * DT, DAMPING).expect("a positive step");
     let mut large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step)
         .expect("the bar can be prepared");
-    assert_eq!(large.model().cycle(), cycle);
+    assert!(CYCLE.is_multiple_of(large.model().cycle()), "the steps below are no whole cycles");
     let mut run = move || moved(large.step(scene.view(), loads, state.view()));
-    // Whole cycles.
-    (0..8 * cycle).for_each(|_| run());
+    (0..2 * CYCLE).for_each(|_| run());
     run
 }

@@ -102,9 +102,10 @@ impl<'a> Request<'a> {
         let damped = config.method == SUPPLE_DAMPED;
         let grid = match config.method {
             SUPPLE_MASS_SCALED => Grid::default(),
-            _ => with_scene!(any, scene => cells.grid(damped, scene, points)?),
+            _ => with_scene!(any, scene => cells.grid(scene, points)?),
         };
-        Ok(Self { config, points, cells, vectors: vectors_for_lattice(any.node_count(), grid, damped) })
+        let vectors = with_scene!(any, scene => vectors_for_lattice(scene.node_count(), scene.element_count(), grid, damped));
+        Ok(Self { config, points, cells, vectors })
     }
 
     /// # Safety

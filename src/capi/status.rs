@@ -342,7 +342,9 @@ impl From<InertiaError> for supple_error {
         let is = Self::from;
         match error {
             InertiaError::Capacity { needed, capacity, .. } => short(capacity, needed),
-            InertiaError::Cells { .. } | InertiaError::Functions { .. } => is(SUPPLE_E_LATTICE),
+            InertiaError::Cells { .. } | InertiaError::Functions { .. } | InertiaError::Singular { .. } => {
+                is(SUPPLE_E_LATTICE)
+            }
             InertiaError::Points { points, nodes } => mismatch(points, nodes),
             InertiaError::NotFinite { node } => is(SUPPLE_E_TOO_STIFF).node(node),
         }

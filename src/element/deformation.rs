@@ -6,6 +6,7 @@ use crate::material::Invariants;
 use crate::simd::{Gather, Real, TileNodes, dot};
 
 use super::ElementTile;
+use super::symmetric::Symmetric;
 
 /// A vector and a matrix, of one element or of a vector of elements; rows are spatial axes, columns material axes.
 pub(crate) type Vector<R> = [R; 3];
@@ -93,6 +94,23 @@ impl<R: Real> Deformation<R> {
         let (i, j) = (i % 3, j % 3);
         let rest = self.cof_h[i][j] - self.h[j][i];
         if i == j { rest + (R::splat(1.0) + self.trace) } else { rest }
+    }
+
+    /// `F F^T`.
+    #[inline(always)]
+    pub(super) fn left_cauchy_green(&self) -> Symmetric<R> {
+        let one = R::splat(1.0);
+        let [[a, b, c], [d, e, f], [g, h, i]] = self.h;
+        let rows = [[one + a, b, c], [d, one + e, f], [g, h, one + i]];
+        let product = |i: usize, j: usize| dot(rows[i], rows[j]);
+        Symmetric {
+            xx: product(0, 0),
+            yy: product(1, 1),
+            zz: product(2, 2),
+            xy: product(0, 1),
+            yz: product(1, 2),
+            zx: product(2, 0),
+        }
     }
 
     /// First Piola-Kirchhoff stress `p1 (F - cof F) + s cof F`, Pa.

@@ -20,6 +20,17 @@
 //! near the optimum. Where `E` is small, `eta` is at least a fiftieth of the volume stiffness, which adds little to
 //! `volume` and keeps the contribution to `iso` small.
 //!
+//! **A bound that rotations do not feel**, for the motion of a lattice. With `L = dF F^-1 = D + Omega`, `b = F F^T` and
+//! the Kirchhoff stress `tau = p1 b + pJ J I`, of which `t` is the largest eigenvalue, the geometric part is
+//! `p1 tr(L b L^T) + pJ J ((tr L)^2 - tr L^2)`. In the principal axes of `b` each pair of axes has the quadratic form
+//!
+//! ```text
+//! d^2 (tau_i + tau_j - 4 pJ J) + w^2 (tau_i + tau_j) + 2 (tau_j - tau_i) d w      d = D_ij, w = Omega_ij
+//! ```
+//! and `2 |d w| <= d^2 + w^2` gives `(t - 2 pJ J) |D|^2 + max(t, 0) |Omega|^2 + pJ J (tr D)^2`. A rotation of an element
+//! without tension costs nothing. The other terms have `c = J tr D` and `e = (b - J I):D`, and are split as above. At
+//! rest this is exactly linear elasticity. In a crushed element `F^-1` is too large: there the first bound is used.
+//!
 //! **Matrices of the nodes.** With `dF = sum_a v_a (x) ga` and `c = sum_a (C ga).va`, and by Cauchy-Schwarz with the
 //! weights `|C ga|`, the element's tangent is bounded by a matrix that couples no two nodes. It has one 3 x 3 submatrix
 //! (N/m) a node:
@@ -67,6 +78,9 @@ const SPLIT: f32 = 0.8;
 
 /// Lower limit of `|C|^2` and `I1 / 3` where they are divisors.
 const LEAST: f32 = 1e-6;
+
+/// The same for the bound that rotations do not feel: near the optimum, as `(tr D)^2 <= 3 |D|^2`.
+const SPATIAL_SPLIT: f32 = 0.6;
 
 /// Upper bound of `x_a sum_b x_b` over the sum of the squares of four values.
 const WEIGHT: f32 = 1.5;
@@ -145,6 +159,16 @@ pub(super) struct Bound<R> {
     pub(super) volume: R,
     /// [`scalar_bound`], N/m.
     pub(super) scalar: R,
+    coefficients: Coefficients<R>,
+}
+
+/// The bound that rotations do not feel, Pa: of `|D|^2`, `(tr D)^2` and `|L|^2`, with `L = dF F^-1` and `D` its
+/// symmetric part.
+#[derive(Clone, Copy)]
+pub(super) struct SpatialBound<R> {
+    pub(super) shear: R,
+    pub(super) volume: R,
+    pub(super) stress: R,
 }
 
 impl<R: Real> Bound<R> {
@@ -166,7 +190,33 @@ impl<R: Real> Bound<R> {
             }
         }
         let (iso, volume) = coefficients.split(local.at, distortion, cofactor);
-        Self { iso, volume, scalar: scalar_bound(&coefficients, local.at, tile, first) }
+        Self { iso, volume, scalar: scalar_bound(&coefficients, local.at, tile, first), coefficients }
+    }
+
+    /// The bound that rotations do not feel; only for elements that are not crushed.
+    #[inline(always)]
+    pub(super) fn spatial(&self, deformation: &Deformation<R>) -> SpatialBound<R> {
+        let (zero, one) = (R::splat(0.0), R::splat(1.0));
+        let Coefficients { p1, p_j, cc, ce, ee, .. } = self.coefficients;
+        let volume_ratio = one + deformation.invariants.j;
+        let b = deformation.left_cauchy_green();
+        let pressure = p_j * volume_ratio;
+        let tension = p1.fused(b.largest_eigenvalue(), pressure);
+        let difference = b.scaled_plus(one, -volume_ratio);
+        let square = difference.xx * difference.xx
+            + difference.yy * difference.yy
+            + difference.zz * difference.zz
+            + R::splat(2.0)
+                * (difference.xy * difference.xy
+                    + difference.yz * difference.yz
+                    + difference.zx * difference.zx);
+        let mixed = ce.abs() * square.root() * volume_ratio;
+        let shear = (tension.min(zero) - (pressure + pressure)).max(zero);
+        SpatialBound {
+            shear: shear + ee * square + R::splat(1.0 / SPATIAL_SPLIT) * mixed,
+            volume: (pressure + cc * volume_ratio * volume_ratio + R::splat(SPATIAL_SPLIT) * mixed).max(zero),
+            stress: tension.max(zero),
+        }
     }
 }
 

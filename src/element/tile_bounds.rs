@@ -22,8 +22,21 @@ pub struct TileBounds<'a, L> {
     pub(crate) weight: f32,
 }
 
-/// A column of `C` of each element in its frame, and as fourth components `weight V iso`, `weight V volume` and zero.
-pub(crate) type TileTangents = [[[f32; 4]; TILE]; 3];
+/// Bounds of the tangents of a tile's elements for the motion of a lattice, each in the frame of its first node.
+pub struct TileTangents {
+    /// Columns of the matrix that takes a material gradient to its image: of `F^-T`, or of `C` in a crushed element.
+    pub(crate) columns: [[[f32; 4]; TILE]; 3],
+    /// Factors with `weight V` (kg m^2): of the product of the gradients, of the outer product of the images, of that of
+    /// the images exchanged; and one if the first is a product of images, zero if one of material gradients.
+    pub(crate) factors: [[f32; 4]; TILE],
+}
+
+impl TileTangents {
+    const NONE: Self = Self { columns: [[[0.0; 4]; TILE]; 3], factors: [[0.0; 4]; TILE] };
+}
+
+/// Least volume ratio of an element that is not crushed.
+const LEAST_VOLUME: f32 = 0.2;
 
 impl<L: Law> Kernel for TileBounds<'_, L> {
     type Output = TileTangents;
@@ -32,7 +45,7 @@ impl<L: Law> Kernel for TileBounds<'_, L> {
 
     #[inline(always)]
     fn run<R: Real>(mut self) -> TileTangents {
-        let mut tangents = [[[0.0; 4]; TILE]; 3];
+        let mut tangents = TileTangents::NONE;
         let mut buffer = [ScatterBuffer::NONE; 2];
         for first in (0..TILE).step_by(R::COUNT) {
             self.bound::<R>(first, &mut tangents, &mut buffer);
@@ -69,10 +82,23 @@ impl<L: Law> TileBounds<'_, L> {
         if self.weight == 0.0 {
             return;
         }
+        let (zero, one) = (R::splat(0.0), R::splat(1.0));
         let weight = tile.volume::<R>(first) * R::splat(self.weight);
-        let fourth = [weight * bound.iso, weight * bound.volume, R::splat(0.0)];
-        for (j, (column, fourth)) in tangents.iter_mut().zip(fourth).enumerate() {
-            write_rows(column, first, [cofactor[0][j], cofactor[1][j], cofactor[2][j], fourth]);
+        let volume_ratio = one + local.at.j;
+        let sound = volume_ratio - R::splat(LEAST_VOLUME);
+        let spatial = bound.spatial(&deformation);
+        let half = R::splat(0.5) * spatial.shear;
+        let factors = [
+            weight * sound.choose(half + spatial.stress, bound.iso),
+            weight * sound.choose(spatial.volume, bound.volume),
+            weight * sound.choose(half, zero),
+            sound.choose(one, zero),
+        ];
+        write_rows(&mut tangents.factors, first, factors);
+        let scale = sound.choose(one.divide(volume_ratio), one);
+        for (j, column) in tangents.columns.iter_mut().enumerate() {
+            let [x, y, z] = cofactor.map(|row| scale * row[j]);
+            write_rows(column, first, [x, y, z, zero]);
         }
     }
 }

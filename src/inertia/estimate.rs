@@ -23,6 +23,8 @@ const ACROSS: f32 = 2.0;
 pub(super) struct ErrorEstimate {
     now: f32,
     before: f32,
+    /// Length of the body, m: the forces of crushed elements would give any value.
+    largest: f32,
 }
 
 /// Scalar product over the nodes, in an order that does not depend on the instruction set.
@@ -84,11 +86,11 @@ pub(super) struct DefectSums<V> {
 }
 
 impl<V: Addends> DefectSums<V> {
-    /// Zero sums; `splat` turns a value into a vector.
+    /// Zero sums; `square` is `D^2`, and `splat` turns a value into a vector.
     #[inline(always)]
-    pub(super) fn new(step: &Step, scaling: &Scaling, splat: impl Fn(f32) -> V) -> Self {
+    pub(super) fn new(step: &Step, scaling: &Scaling, square: f32, splat: impl Fn(f32) -> V) -> Self {
         let k = scaling.k;
-        let values = [step.seconds() * step.seconds(), 1.0 + k, (1.0 - k) * step.carry(), 0.0];
+        let values = [square, 1.0 + k, (1.0 - k) * step.carry(), 0.0];
         let [square, ahead, behind, zero] = values.map(splat);
         Self { square, ahead, behind, defect: zero, mass: zero, length: zero, total: zero }
     }
@@ -145,7 +147,15 @@ impl DefectTotals {
 }
 
 impl ErrorEstimate {
-    pub(super) const NONE: Self = Self { now: 0.0, before: 0.0 };
+    /// No error yet; it is never estimated above `largest`, m.
+    pub(super) const fn new(largest: f32) -> Self {
+        Self { now: 0.0, before: 0.0, largest }
+    }
+
+    /// No error yet, of the same body.
+    pub(super) const fn cleared(&self) -> Self {
+        Self::new(self.largest)
+    }
 
     /// The error, m.
     pub(super) fn error(&self) -> f32 {
@@ -169,6 +179,7 @@ impl ErrorEstimate {
         let stiffness = if internal > 0.0 { square * internal / totals.mass } else { 0.0 };
         let push = libm::sqrtf(totals.length / nodes as f32) * totals.defect / totals.mass;
         let next = (push + 2.0 * self.now - (1.0 - k) * self.before) / (1.0 + k + stiffness);
-        *self = Self { now: next, before: self.now };
+        let next = next.max(-self.largest).min(self.largest);
+        *self = Self { now: next, before: self.now, ..*self };
     }
 }

@@ -5,6 +5,8 @@
 //! frame at the start of the cycle to the present one. Bounds are summed, inverted and applied in the frames at the
 //! start of their cycle.
 
+use glam::Mat3;
+
 use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
 use crate::simd::NodeVector;
 
@@ -51,6 +53,8 @@ pub(super) struct Frames {
     in_use: [Matrix; MAX_FUNCTIONS],
     under_way: [Matrix; MAX_FUNCTIONS],
     latest: [Matrix; MAX_FUNCTIONS],
+    /// Rotations in the latest step.
+    in_latest_step: [Matrix; MAX_FUNCTIONS],
     /// Rotations from the first two of these to the last.
     pub(super) of_bounds: [Rotation; MAX_FUNCTIONS + 1],
     pub(super) of_cycle: [Rotation; MAX_FUNCTIONS + 1],
@@ -63,6 +67,7 @@ impl Frames {
         in_use: [IDENTITY; MAX_FUNCTIONS],
         under_way: [IDENTITY; MAX_FUNCTIONS],
         latest: [IDENTITY; MAX_FUNCTIONS],
+        in_latest_step: [IDENTITY; MAX_FUNCTIONS],
         of_bounds: [Rotation::NONE; MAX_FUNCTIONS + 1],
         of_cycle: [Rotation::NONE; MAX_FUNCTIONS + 1],
     };
@@ -81,16 +86,19 @@ impl Frames {
 
     /// Computes the present frames and rotations.
     pub(super) fn update(&mut self, displacement: &[NodeVector]) {
-        let frames = self.nodes.iter().zip(&mut self.latest).take(self.functions);
+        let turns = self.latest.iter_mut().zip(&mut self.in_latest_step);
+        let frames = self.nodes.iter().zip(turns).take(self.functions);
         let starts = self.in_use.iter().zip(&self.under_way);
         let rotations = self.of_bounds.iter_mut().zip(&mut self.of_cycle);
-        for (((nodes, latest), (in_use, under_way)), (of_bounds, of_cycle)) in
+        for (((nodes, (latest, turn)), (in_use, under_way)), (of_bounds, of_cycle)) in
             frames.zip(starts).zip(rotations)
         {
             // A collapsed tetrahedron has no frame: the last one is kept.
+            let previous = *latest;
             if let Some(basis) = nodes.basis(displacement) {
                 *latest = basis;
             }
+            *turn = times_transposed(latest, &previous);
             *of_bounds = Rotation(times_transposed(latest, in_use));
             *of_cycle = Rotation(times_transposed(latest, under_way));
         }
@@ -108,7 +116,24 @@ impl Frames {
         self.of_bounds = self.of_cycle;
     }
 
-    /// Rotation of a frame since the start of the cycle whose bounds are in use.
+    /// Rotation in the latest step.
+    #[inline(always)]
+    pub(super) fn in_latest_step(&self, function: usize) -> Mat3 {
+        let turn = self.in_latest_step.get(function).unwrap_or(&IDENTITY);
+        Mat3::from_cols_array_2d(turn).transpose()
+    }
+
+    /// Rotation of each function since rest.
+    pub(super) fn since_rest(&self) -> &[Matrix] {
+        self.latest.get(..self.functions).unwrap_or_default()
+    }
+
+    /// Rotation of each function since its bounds were computed that are in use.
+    pub(super) fn of_functions(&self) -> &[Rotation] {
+        self.of_bounds.get(..self.functions).unwrap_or_default()
+    }
+
+    /// Rotation of a frame since its bounds were computed that are in use.
     #[inline(always)]
     pub(super) fn since_bounds(&self, frame: usize) -> Rotation {
         self.of_bounds.get(frame).copied().unwrap_or(Rotation::NONE)

@@ -12,20 +12,29 @@ use crate::simd::{Contiguous, NodeVector};
 use crate::state::StateView;
 use crate::step::{Status, Step};
 
+use super::assembly::sort_by_patch;
 use super::damper::RoughMotion;
 use super::estimate::ErrorEstimate;
 use super::lattice::{self, Grid, Lattice, LatticeNode};
 use super::matrices::Matrices;
-use super::method::{Method, largest_grid, vectors_for_lattice, vectors_of_places};
+use super::method::{Method, largest_grid, vectors_for_lattice, vectors_of_order, vectors_of_places};
 use super::node::Scaling;
 use super::node_tables::{NodeTables, read_matrices};
 use super::refresh::{Refresh, RefreshInput};
-use super::{COARSE, CYCLE, CYCLE_STEPS, FINE, FINE_WITHOUT_LATTICE, InertiaError, Report, node_tables};
+use super::{
+    COARSE, CYCLE, CYCLE_STEPS, FINE, FINE_WITHOUT_LATTICE, InertiaError, LATTICE_CYCLE_STEPS, Report,
+    node_tables,
+};
 
 /// A prepared step without its storage; it may be moved in memory.
 #[derive(Clone, Debug)]
 pub struct LargeModel<'w> {
     pub(super) nodes: usize,
+    pub(super) elements: usize,
+    /// Checksum of the scene.
+    scene: u64,
+    /// Steps of the state after the latest step, or at the preparation: inertia belongs to that state.
+    pub(super) steps: u64,
     pub(super) method: Method<'w>,
     /// Rough motion in the latest damped step.
     pub(super) rough: RoughMotion,
@@ -34,6 +43,8 @@ pub struct LargeModel<'w> {
     pub(super) refresh: Refresh,
     pub(super) scaling: Scaling,
     pub(super) estimate: ErrorEstimate,
+    /// The least share of its inverse inertia that a node used in the latest step.
+    pub(super) least_share: f32,
     pub(super) report: Report,
 }
 
@@ -41,6 +52,8 @@ pub struct LargeModel<'w> {
 pub(super) struct Storage<'a> {
     pub(super) tables: NodeTables<'a>,
     pub(super) places: &'a mut [LatticeNode],
+    /// The elements in the order of their patches of cells (`assembly.rs`); empty without a lattice.
+    pub(super) order: &'a mut [u32],
     pub(super) matrices: Matrices<'a>,
 }
 
@@ -48,7 +61,7 @@ impl<'a> Storage<'a> {
     /// None if `storage` is shorter than [`vectors_for_lattice`].
     pub(super) fn split(
         storage: &'a mut [NodeVector],
-        nodes: usize,
+        [nodes, elements]: [usize; 2],
         lattice: &Lattice,
         damped: bool,
     ) -> Option<Self> {
@@ -59,8 +72,12 @@ impl<'a> Storage<'a> {
         let (places, rest) = rest.split_at_mut_checked(places)?;
         let places: &mut [[LatticeNode; 2]] = must_cast_slice_mut(places.as_chunks_mut::<3>().0);
         let places = places.as_flattened_mut().get_mut(..if has_lattice { nodes } else { 0 })?;
-        let matrices = Matrices::split(must_cast_slice_mut(rest), lattice, damped && has_lattice)?;
-        Some(Self { tables, places, matrices })
+        let (order, rest) =
+            rest.split_at_mut_checked(if has_lattice { vectors_of_order(elements) } else { 0 })?;
+        let order: &mut [u32] = must_cast_slice_mut(order);
+        let order = order.get_mut(..if has_lattice { elements } else { 0 })?;
+        let matrices = Matrices::split(must_cast_slice_mut(rest), lattice)?;
+        Some(Self { tables, places, order, matrices })
     }
 }
 
@@ -119,21 +136,26 @@ impl<'w> LargeModel<'w> {
             return Err(InertiaError::Points { points: points.len(), nodes });
         }
         let lattice = Lattice::of(method.grid(scene, points)?, points, scene.inertia)?;
+        let size = lattice::size_of(points);
         Ok(Self {
             nodes,
+            elements: scene.element_count(),
+            scene: scene.checksum(),
+            steps: 0,
             method,
             rough: RoughMotion::NONE,
             step,
             scaling: scaling(step, lattice.functions() > 0),
             refresh: Refresh::new(
-                cycle(step),
+                cycle(step, lattice.functions() > 0),
                 scene.tiles.len(),
                 nodes,
                 lattice.functions(),
                 lattice.cell_count(),
             ),
             lattice,
-            estimate: ErrorEstimate::NONE,
+            estimate: ErrorEstimate::new(libm::hypotf(libm::hypotf(size[0], size[1]), size[2])),
+            least_share: 1.0,
             report: Report::NONE,
         })
     }
@@ -150,12 +172,12 @@ impl<'w> LargeModel<'w> {
             if capacity < needed { Err(InertiaError::Capacity { kind, needed, capacity }) } else { Ok(()) }
         };
         let (damped, capacity) = (self.method.damper().is_some(), storage.len());
-        let needed = vectors_for_lattice(self.nodes, self.grid(), damped);
+        let needed = vectors_for_lattice(self.nodes, self.elements, self.grid(), damped);
         check("vectors", needed, capacity)?;
         check("nodes in the state", self.nodes, state.capacity())?;
         storage.fill(NodeVector::ZERO);
-        let Some(Storage { mut tables, places, mut matrices }) =
-            Storage::split(storage, self.nodes, &self.lattice, damped)
+        let Some(Storage { mut tables, places, order, mut matrices }) =
+            Storage::split(storage, [self.nodes, self.elements], &self.lattice, damped)
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
         };
@@ -171,7 +193,9 @@ impl<'w> LargeModel<'w> {
             }
         }
         lattice::sort_by_cell(places);
-        let StateView { displacement, increment, .. } = state;
+        sort_by_patch(order, scene, &self.lattice, places);
+        let StateView { displacement, increment, progress, .. } = state;
+        self.steps = progress.steps;
         let nodes = self.nodes;
         let input = RefreshInput {
             scene,
@@ -179,6 +203,7 @@ impl<'w> LargeModel<'w> {
             increment: increment.get_mut(..nodes).unwrap_or_default(),
             lattice: &self.lattice,
             places,
+            order,
             scaling: &self.scaling,
         };
         self.refresh.whole_cycle(input, &mut tables, &mut matrices);
@@ -190,8 +215,18 @@ impl<'w> LargeModel<'w> {
         });
         match unbounded {
             Some(node) => Err(InertiaError::NotFinite { node: node as u32 }),
+            None if !uncoupled && !self.refresh.lattice_in_use => {
+                Err(InertiaError::Singular { cells: self.lattice.cells() })
+            }
             None => Ok(()),
         }
+    }
+
+    /// Whether it was prepared for this scene.
+    pub(super) fn is_for<M>(&self, scene: SceneView<'_, M>) -> bool {
+        self.nodes == scene.node_count()
+            && self.elements == scene.element_count()
+            && self.scene == scene.checksum()
     }
 
     /// Report of the latest step, or of the preparation.
@@ -206,7 +241,8 @@ impl<'w> LargeModel<'w> {
         Grid { cells: self.lattice.cells(), functions: self.lattice.functions() }
     }
 
-    /// Steps of a cycle, in which all bounds and inertia are renewed: those of 0.04 s, but at least 16 and at most 64.
+    /// Largest number of steps of a cycle, in which all bounds and inertia are renewed: 256 with a lattice, and sooner while
+    /// the tissue deforms fast; without one those of 0.04 s, but at least 4 and at most 64.
     #[must_use]
     pub const fn cycle(&self) -> u32 {
         self.refresh.steps()
@@ -218,9 +254,10 @@ impl<'w> LargeModel<'w> {
     }
 }
 
-/// Steps of a cycle.
-fn cycle(step: Step) -> u32 {
-    (CYCLE / step.seconds()).clamp(CYCLE_STEPS.0, CYCLE_STEPS.1) as u32
+/// Largest number of steps of a cycle. Without a lattice nothing measures how fast the tissue deforms.
+fn cycle(step: Step, has_lattice: bool) -> u32 {
+    let (least, most) = CYCLE_STEPS;
+    if has_lattice { LATTICE_CYCLE_STEPS } else { ((CYCLE / step.seconds()) as u32).clamp(least, most) }
 }
 
 fn scaling(step: Step, has_lattice: bool) -> Scaling {
@@ -231,7 +268,7 @@ fn scaling(step: Step, has_lattice: bool) -> Scaling {
         weight: 0.25 * fine * dt * dt,
         k,
         reserve: if has_lattice { k * (1.0 + k) } else { k },
-        loss: 2.0 * damping * dt * cycle(step) as f32,
+        loss: 2.0 * damping * dt * cycle(step, has_lattice) as f32,
         coarse_weight: 0.25 * COARSE * dt * dt,
     }
 }
@@ -275,7 +312,8 @@ impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
     }
 
     /// Takes one step of the length for which it was prepared. Every call does the same work: one force evaluation and
-    /// that of the lattice. `Mismatch` if it was not prepared for a scene of this size.
+    /// that of the lattice. In a state that another step has moved, that was reset or restored, the first step computes
+    /// all inertia anew. `Mismatch` with room for no node if it was prepared for another scene.
     pub fn step<M: ElementMaterial>(
         &mut self,
         scene: SceneView<'_, M>,
@@ -303,7 +341,7 @@ impl<'w> LargeStep<'w, std::vec::Vec<NodeVector>> {
 
 /// The lattice of mass scaling; its functions only define frames.
 fn frame_lattice<M>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<Lattice, InertiaError> {
-    let Grid { cells, functions } = largest_grid(scene, points, 400);
+    let Grid { cells, functions } = largest_grid(scene, points);
     Lattice::new(if functions > 0 { cells } else { [1; 3] }, points, scene.inertia)
 }
 

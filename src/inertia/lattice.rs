@@ -6,23 +6,26 @@
 use core::{array, fmt};
 
 use bytemuck::{Pod, Zeroable};
+
 use glam::Vec4;
 
 use super::InertiaError;
+use super::frames::{Frames, Matrix};
 use crate::element::NodeInertia;
 use crate::padding;
-use crate::simd::{NodeVector, Real};
+use crate::simd::NodeVector;
 
 /// Largest number of lattice points.
 pub const MAX_POINTS: usize = 1024;
 /// Largest number of functions, without the dropped ones.
 pub const MAX_FUNCTIONS: usize = 128;
-/// Stands for a dropped function.
-const DROPPED: u8 = MAX_FUNCTIONS as u8;
-/// Functions with less than this share of the largest mass of a function are dropped.
+/// Stands for a point that supports hold: its function is zero.
+const HELD: u8 = MAX_FUNCTIONS as u8;
+/// Stands for a point without a function, because too little of the body is near it.
+const EMPTY: u8 = HELD + 1;
+/// Points with less than this share of the largest free mass of a point have no function.
 const LEAST_MASS: f32 = 0.02;
 
-/// The place of a node in the lattice. The list of places is in the order of the cells.
 /// A lattice around a body.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub struct Grid {
@@ -39,10 +42,11 @@ impl fmt::Display for Grid {
     }
 }
 
+/// The place of a node in the lattice. The list of places is in the order of the cells.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct LatticeNode {
-    /// Position in the cell, 0 to 1 along each axis.
+    /// Position in the cell, 0 to 1 along each axis, or a little outside ([`Lattice::place`]).
     within: [f32; 3],
     /// Index of the node.
     node: u32,
@@ -84,29 +88,6 @@ impl LatticeNode {
         let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
         [a * nz, b * nz, c * nz, d * nz, a * z, b * z, c * z, d * z]
     }
-}
-
-/// Weights of the functions at the corners of a cell for a node at `position`, in cells from the cell's lowest corner.
-/// With an axis `across`, the node may also be in the next cell along that axis: the second result is the weights of
-/// the corners of that cell.
-#[inline(always)]
-pub(super) fn corner_weights<R: Real>(position: Vec4, across: Option<usize>) -> [R; 2] {
-    let mut weights = [R::splat(1.0); 2];
-    // Along each axis the weights of three layers of functions, at 0, 1 and 2 cells.
-    let first = (Vec4::ONE - position).max(Vec4::ZERO).to_array();
-    let third = (position - Vec4::ONE).max(Vec4::ZERO).to_array();
-    let second = (Vec4::ONE - (position - Vec4::ONE).abs()).to_array();
-    for axis in 0..3 {
-        let far = R::from_fn(|corner| if corner >> axis & 1 == 1 { 1.0 } else { 0.0 });
-        let [first, second, third] = [first[axis], second[axis], third[axis]].map(R::splat);
-        let along = far.choose(second, first);
-        weights[0] = weights[0] * along;
-        if across.is_some() {
-            let beyond = far.choose(third, second);
-            weights[1] = weights[1] * if across == Some(axis) { beyond } else { along };
-        }
-    }
-    weights
 }
 
 /// The place of a node.
@@ -156,6 +137,13 @@ pub(super) fn sort_by_cell(places: &mut [LatticeNode]) {
     }
 }
 
+/// Free and held mass of the nodes around a lattice point, kg.
+#[derive(Clone, Copy, Debug, Default)]
+struct PointMass {
+    free: f32,
+    held: f32,
+}
+
 /// A lattice on the box around a body.
 #[derive(Clone, Debug)]
 pub(super) struct Lattice {
@@ -165,7 +153,7 @@ pub(super) struct Lattice {
     low: [f32; 3],
     size: [f32; 3],
     functions: usize,
-    /// Function of each lattice point; [`MAX_FUNCTIONS`] for a dropped one.
+    /// Function of each lattice point, or [`HELD`] or [`EMPTY`].
     function_of_point: [u8; MAX_POINTS],
     /// Indices of each cell along the axes, at most 255.
     indices_of_cell: [[u8; 3]; MAX_POINTS],
@@ -177,7 +165,7 @@ impl Lattice {
         low: [0.0; 3],
         size: [0.0; 3],
         functions: 0,
-        function_of_point: [DROPPED; MAX_POINTS],
+        function_of_point: [HELD; MAX_POINTS],
         indices_of_cell: [[0; 3]; MAX_POINTS],
     };
 
@@ -211,44 +199,130 @@ impl Lattice {
         for (cell, indices) in lattice.indices_of_cell.iter_mut().enumerate() {
             *indices = [cell % along, cell / along % across, cell / along / across].map(|at| at as u8);
         }
-        let mut mass = [0.0f32; MAX_POINTS];
-        for (&point, inertia) in points.iter().zip(inertia) {
-            let free = inertia.inverse.iter().filter(|&&inverse| inverse > 0.0).count() as f32 / 3.0;
-            let node = lattice.place(point);
-            for (point, weight) in lattice.corner_points(node.cell()).into_iter().zip(node.eight_weights()) {
-                if let Some(mass) = mass.get_mut(point) {
-                    *mass += inertia.mass * weight * free;
-                }
-            }
+        let mut masses = lattice.point_masses(points, inertia);
+        if lattice.mark_empty_points(&masses) {
+            masses = lattice.point_masses(points, inertia);
         }
-        let largest = mass.iter().copied().fold(0.0, f32::max);
-        for (function, mass) in lattice.function_of_point.iter_mut().zip(mass) {
-            if mass > LEAST_MASS * largest {
-                if lattice.functions == MAX_FUNCTIONS {
-                    return Err(InertiaError::Functions { cells });
-                }
-                *function = lattice.functions as u8;
+        let largest = masses.iter().fold(0.0, |most, mass| f32::max(most, mass.free));
+        let mut full = false;
+        lattice.for_each_point(|lattice, point| {
+            let (Some(function), Some(mass)) = (lattice.function_of_point.get_mut(point), masses.get(point))
+            else {
+                return;
+            };
+            if *function != EMPTY
+                && mass.free > 0.0
+                && (mass.free > LEAST_MASS * largest || mass.held <= mass.free)
+            {
+                full |= lattice.functions == MAX_FUNCTIONS;
+                *function = lattice.functions.min(MAX_FUNCTIONS - 1) as u8;
                 lattice.functions += 1;
             }
+        });
+        if full {
+            return Err(InertiaError::Functions { cells });
         }
         Ok(lattice)
     }
 
-    /// The place of a point (m), in cells.
+    /// The axes from that with the fewest cells to that with the most: the order of the functions.
+    #[inline(always)]
+    pub(super) fn axes(&self) -> [usize; 3] {
+        let [x, y, z] = self.cells;
+        let [a, b] = if y < x { [1, 0] } else { [0, 1] };
+        if z < self.cells[a] {
+            [2, a, b]
+        } else if z < self.cells[b] {
+            [a, 2, b]
+        } else {
+            [a, b, 2]
+        }
+    }
+
+    /// Calls `visit` with each point, layer by layer along the longest axis: so the functions of an element have numbers
+    /// close to each other, and the matrices narrow bands.
+    fn for_each_point(&mut self, mut visit: impl FnMut(&mut Self, usize)) {
+        let counts = self.cells.map(|count| count as usize + 1);
+        let strides = [1, counts[0], counts[0] * counts[1]];
+        let [inner, middle, outer] = self.axes().map(|axis| (counts[axis % 3], strides[axis % 3]));
+        for (k, j) in (0..outer.0).flat_map(|k| (0..middle.0).map(move |j| (k, j))) {
+            for i in 0..inner.0 {
+                visit(self, i * inner.1 + j * middle.1 + k * outer.1);
+            }
+        }
+    }
+
+    /// The masses of the points, kg.
+    fn point_masses(&self, points: &[[f32; 3]], inertia: &[NodeInertia]) -> [PointMass; MAX_POINTS] {
+        let mut masses = [PointMass::default(); MAX_POINTS];
+        for (&point, inertia) in points.iter().zip(inertia) {
+            let free = inertia.inverse.iter().filter(|&&inverse| inverse > 0.0).count() as f32 / 3.0;
+            let node = self.place(point);
+            for (point, weight) in self.corner_points(node.cell()).into_iter().zip(node.eight_weights()) {
+                if let Some(mass) = masses.get_mut(point) {
+                    mass.free += inertia.mass * weight * free;
+                    mass.held += inertia.mass * weight * (1.0 - free);
+                }
+            }
+        }
+        masses
+    }
+
+    /// Marks the points with too little mass that supports do not hold. Gives whether there were any. None is marked
+    /// if no cell would be left.
+    fn mark_empty_points(&mut self, masses: &[PointMass]) -> bool {
+        let before = self.function_of_point;
+        let largest = masses.iter().fold(0.0, |most, mass| f32::max(most, mass.free));
+        for (function, mass) in self.function_of_point.iter_mut().zip(masses) {
+            let light = mass.free <= LEAST_MASS * largest && mass.held <= mass.free;
+            if light && mass.free > 0.0 {
+                *function = EMPTY;
+            }
+        }
+        if (0..self.cell_count()).any(|cell| self.is_whole(cell)) {
+            return self.function_of_point != before;
+        }
+        self.function_of_point = before;
+        false
+    }
+
+    /// Whether no corner of a cell is empty.
+    fn is_whole(&self, cell: usize) -> bool {
+        let of = |point: usize| self.function_of_point.get(point).copied().unwrap_or(EMPTY);
+        self.corner_points(cell).into_iter().all(|point| of(point) != EMPTY)
+    }
+
+    /// The place of a point (m): in its cell, or outside the nearest cell without empty corners. So the functions add up
+    /// to one wherever no support holds them, and reproduce linear fields.
     pub(super) fn place(&self, point: [f32; 3]) -> LatticeNode {
-        let mut node = LatticeNode::default();
+        let mut position = [0.0; 3];
         let mut indices = [0; 3];
         for axis in 0..3 {
-            let (count, size) = (self.cells[axis], self.size[axis]);
-            let position =
-                if size > 0.0 { (point[axis] - self.low[axis]) / size * count as f32 } else { 0.0 };
-            // Rounding may put the last node slightly outside the box.
-            let cell = (position as u32).min(count.saturating_sub(1));
-            indices[axis] = cell as u8;
-            node.within[axis] = (position - cell as f32).clamp(0.0, 1.0);
+            let (count, size) = (self.cells[axis] as f32, self.size[axis]);
+            if size > 0.0 {
+                // Rounding may put the last node slightly outside the box.
+                position[axis] = ((point[axis] - self.low[axis]) / size * count).clamp(0.0, count);
+            }
+            indices[axis] = (position[axis] as u32).min(self.cells[axis].saturating_sub(1)) as u8;
         }
-        node.cell = self.cell_index(indices) as u32;
-        node
+        let mut cell = self.cell_index(indices);
+        if !self.is_whole(cell) {
+            let mut least = f32::INFINITY;
+            for other in (0..self.cell_count()).filter(|&other| self.is_whole(other)) {
+                let corner = self.cell_indices(other).map(f32::from);
+                let mut square = 0.0;
+                for axis in 0..3 {
+                    let beyond = (corner[axis] - position[axis]).max(position[axis] - corner[axis] - 1.0);
+                    square += beyond.max(0.0) * beyond.max(0.0);
+                }
+                if square < least {
+                    (least, cell) = (square, other);
+                }
+            }
+        }
+        let corner = self.cell_indices(cell).map(f32::from);
+        let within = [0, 1, 2].map(|axis| position[axis] - corner[axis]);
+        LatticeNode { within, cell: cell as u32, ..LatticeNode::default() }
     }
 
     /// The function whose frame a node uses: the one with the largest weight. [`MAX_FUNCTIONS`], a frame that does not
@@ -267,7 +341,9 @@ impl Lattice {
     /// Lattice points at the corners of a cell.
     #[inline(always)]
     fn corner_points(&self, cell: usize) -> [usize; 8] {
-        let [i, j, k] = self.cell_indices(cell).map(usize::from);
+        // No closures, because the compiler may leave them as function calls.
+        let [i, j, k] = self.cell_indices(cell);
+        let (i, j, k) = (usize::from(i), usize::from(j), usize::from(k));
         let row = self.cells[0] as usize + 1;
         let layer = row * (self.cells[1] as usize + 1);
         let first = i + j * row + k * layer;
@@ -288,11 +364,13 @@ impl Lattice {
         i + self.cells[0] as usize * (j + self.cells[1] as usize * k)
     }
 
-    /// Difference of the indices of neighbouring cells along an axis.
+    /// The function of the point that is this far from the lowest corner of a cell; [`MAX_FUNCTIONS`] or more if there
+    /// is none.
     #[inline(always)]
-    pub(super) fn cell_stride(&self, axis: usize) -> usize {
-        let [along, across, _] = self.cells.map(|count| count as usize);
-        [1, along, along * across][axis % 3]
+    pub(super) fn function_at(&self, cell: [u8; 3], offset: [u8; 3]) -> usize {
+        let [x, y, _] = self.cells.map(|count| count as usize + 1);
+        let [i, j, k] = [0, 1, 2].map(|axis| usize::from(cell[axis]) + usize::from(offset[axis]));
+        self.function_of_point.get(i + x * (j + y * k)).copied().map_or(MAX_FUNCTIONS, usize::from)
     }
 
     /// Number of cells.
@@ -300,46 +378,102 @@ impl Lattice {
         self.cells.iter().map(|&count| count as usize).product()
     }
 
-    /// Largest strain of a lattice edge for vectors of the functions (m): difference of the vectors at its ends over
-    /// its length. Points with a dropped function do not move.
-    pub(super) fn largest_strain(&self, vectors: &CoarseVectors) -> f32 {
-        let [nx, ny, nz] = self.cells.map(|count| count as usize + 1);
-        let at = |point: usize| {
-            let function = self.function_of_point.get(point).copied().unwrap_or(DROPPED);
-            vectors.get(usize::from(function)).copied().unwrap_or_default().0
-        };
-        // The largest square over the edges from a point to the next points; there are none after the last along an
-        // axis.
-        let largest_square = |point: usize, last: [bool; 3]| {
-            let (here, mut largest) = (at(point), 0.0);
-            for (axis, stride) in [1, nx, nx * ny].into_iter().enumerate() {
-                let (last, size, cells) = (last[axis % 3], self.size[axis % 3], self.cells[axis % 3]);
-                if last || size <= 0.0 {
-                    continue;
-                }
-                let there = at(point + stride);
-                let along = |i: usize| there[i] - here[i];
-                let square = along(0) * along(0) + along(1) * along(1) + along(2) * along(2);
-                let per_metre = cells as f32 / size;
-                largest = f32::max(largest, square * per_metre * per_metre);
+    /// Largest strain of a cell for vectors of the functions (m), with the rotation of each function since rest. A
+    /// translation or a rotation is none.
+    pub(super) fn largest_strain(&self, vectors: &CoarseVectors, rotations: &[Matrix]) -> f32 {
+        let mut largest = 0.0;
+        let mut per_metre = [0.0; 3];
+        for axis in 0..3 {
+            if self.size[axis] > 0.0 {
+                per_metre[axis] = 0.25 * self.cells[axis] as f32 / self.size[axis];
             }
-            largest
-        };
-        let (mut largest, mut point) = (0.0, 0);
+        }
+        for cell in 0..self.cell_count() {
+            let functions = self.functions_of(cell);
+            let Some(rotation) = functions.iter().find_map(|&function| rotations.get(function)) else {
+                continue;
+            };
+            if functions.contains(&usize::from(EMPTY)) {
+                continue;
+            }
+            let mut at = [Vec4::ZERO; 8];
+            for (at, function) in at.iter_mut().zip(functions) {
+                *at = vectors.get(function).map_or(Vec4::ZERO, |vector| Vec4::from(vector.0));
+            }
+            let [a, b, c, d, e, f, g, h] = at;
+            // Mean differences along the cell's edges, in the axes at rest.
+            let along = [
+                (b + d + f + h) - (a + c + e + g),
+                (c + d + g + h) - (a + b + e + f),
+                (e + f + g + h) - (a + b + c + d),
+            ];
+            let rows = rotation.map(|[x, y, z]| Vec4::new(x, y, z, 0.0));
+            let mut gradient = [[0.0; 4]; 3];
+            for axis in 0..3 {
+                let [x, y, z, _] = (per_metre[axis] * along[axis]).to_array();
+                gradient[axis] = (rows[0] * x + rows[1] * y + rows[2] * z).to_array();
+            }
+            let mut square = 0.0;
+            for i in 0..3 {
+                for j in 0..3 {
+                    let strain = 0.5 * (gradient[i][j] + gradient[j][i]);
+                    square += strain * strain;
+                }
+            }
+            largest = f32::max(largest, square);
+        }
+        libm::sqrtf(largest)
+    }
+
+    /// Largest rotation of neighbouring functions relative to each other in the latest step, rad.
+    pub(super) fn largest_bending(&self, frames: &Frames) -> f32 {
+        let mut largest = 0.0;
+        self.for_each_edge(|a, b, _| {
+            if a < MAX_FUNCTIONS && b < MAX_FUNCTIONS {
+                let difference = frames.in_latest_step(a) - frames.in_latest_step(b);
+                let square = difference.to_cols_array().iter().map(|entry| entry * entry).sum::<f32>();
+                largest = f32::max(largest, 0.5 * square);
+            }
+        });
+        libm::sqrtf(largest)
+    }
+
+    /// Calls `visit` with the functions at the ends of each edge, [`MAX_FUNCTIONS`] at a held end, and the edge's inverse
+    /// length squared, 1/m^2. Edges to empty points and between held ones are left out.
+    #[inline(always)]
+    pub(super) fn for_each_edge(&self, mut visit: impl FnMut(usize, usize, f32)) {
+        let [nx, ny, nz] = self.cells.map(|count| count as usize + 1);
+        let mut weights = [0.0; 3];
+        for axis in 0..3 {
+            let per_metre =
+                if self.size[axis] > 0.0 { self.cells[axis] as f32 / self.size[axis] } else { 0.0 };
+            weights[axis] = per_metre * per_metre;
+        }
+        let of = |point: usize| self.function_of_point.get(point).copied().unwrap_or(EMPTY);
+        let mut point = 0;
         for (k, j) in (0..nz).flat_map(|k| (0..ny).map(move |j| (k, j))) {
             for i in 0..nx {
-                largest = f32::max(largest, largest_square(point, [i + 1 == nx, j + 1 == ny, k + 1 == nz]));
+                let next = [(1, i + 1 < nx), (nx, j + 1 < ny), (nx * ny, k + 1 < nz)];
+                for ((stride, _), weight) in next.into_iter().zip(weights).filter(|((_, inside), _)| *inside)
+                {
+                    let (a, b) = (of(point), of(point + stride));
+                    if a != EMPTY && b != EMPTY && (a != HELD || b != HELD) {
+                        visit(usize::from(a), usize::from(b), weight);
+                    }
+                }
                 point += 1;
             }
         }
-        libm::sqrtf(largest)
     }
 
     /// Functions at the corners of a cell; [`MAX_FUNCTIONS`] for dropped ones.
     #[inline(always)]
     pub(super) fn functions_of(&self, cell: usize) -> [usize; 8] {
-        self.corner_points(cell)
-            .map(|point| usize::from(self.function_of_point.get(point).copied().unwrap_or(DROPPED)))
+        let mut functions = [MAX_FUNCTIONS; 8];
+        for (function, point) in functions.iter_mut().zip(self.corner_points(cell)) {
+            *function = usize::from(self.function_of_point.get(point).copied().unwrap_or(HELD));
+        }
+        functions
     }
 
     /// Functions and weights of a node; [`MAX_FUNCTIONS`] for dropped functions.
@@ -364,10 +498,15 @@ fn bounding_box(points: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
     (low, [0, 1, 2].map(|axis| high[axis] - low[axis]))
 }
 
+/// Size of the box around the points, m.
+pub(super) fn size_of(points: &[[f32; 3]]) -> [f32; 3] {
+    bounding_box(points).1
+}
+
 /// Two grids of near-cubic cells, with `parts` cells along the longest side of the box around the points. Along the
 /// other sides the number of cells is rounded down in the first grid, and to the nearest integer in the second.
 pub(super) fn near_cubic(points: &[[f32; 3]], parts: u32) -> [[u32; 3]; 2] {
-    let (_, size) = bounding_box(points);
+    let size = size_of(points);
     let longest = size.iter().copied().fold(0.0, f32::max);
     // 0.01, because rounding may make an integer slightly smaller.
     [0.01, 0.5].map(|up| size.map(|size| (libm::floorf(size / longest * parts as f32 + up) as u32).max(1)))

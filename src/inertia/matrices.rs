@@ -1,61 +1,56 @@
-//! The dense matrices of a lattice (kg, inverses 1/kg) and the sums of its cells, in the caller's storage. `S` is the
-//! inertia of the lattice's motion, with the inertia that the step adds; `G = W^T M W` is the nodes' inertia projected
-//! to the lattice; `X = S^-1 - G^-1` is applied in each step. [`super::refresh`] computes them in cycles.
+//! The matrices of a lattice (kg, inverses 1/kg) and the sums of its cells, in the caller's storage. `S` is the inertia
+//! of the lattice's motion, with the inertia that the step adds; `G` is a bound of the nodes' inertia projected to the
+//! lattice. [`super::refresh`] computes their inverses in cycles.
 
 use bytemuck::must_cast_slice_mut;
 
-use super::assembly::CellMatrices;
 use super::cells::CellPolynomial;
-use super::dense::{self, mirror, stride, sweep};
+use super::dense::{invert, row_length, stride};
 use super::lattice::Lattice;
+use super::nodal_sums::FunctionInertia;
+use super::projected_inertia::CellSums;
 
-/// The dense matrices of a lattice, and the sums of its cells.
+/// The matrices of a lattice, and the sums of its cells.
 pub(super) struct Matrices<'a> {
-    /// `X` in use.
-    pub(super) applied: &'a mut [f32],
-    /// `S` in use; while the next one is inverted, that one.
-    pub(super) coarse: &'a mut [f32],
-    /// The next `S`, then its inverse.
+    /// `S^-1` in use, and the next `S`, then its inverse.
+    pub(super) coarse_inverse: &'a mut [f32],
     pub(super) next_coarse: &'a mut [f32],
-    /// The next `G`, then its inverse.
+    /// `G^-1` in use, if any, and the next `G`, then its inverse.
+    pub(super) fine_inverse: &'a mut [f32],
     pub(super) next_fine: &'a mut [f32],
-    /// Further matrices of a damped step.
-    pub(super) damped: Option<DampedMatrices<'a>>,
-    /// Used by the passes over the nodes.
-    pub(super) cells: &'a mut [CellPolynomial],
-    pub(super) sums: &'a mut [CellMatrices],
-}
-
-/// Further matrices of a damped step.
-pub(super) struct DampedMatrices<'a> {
-    /// `S^-1` in use.
-    pub(super) inverse: &'a mut [f32],
-    /// The mass in `S`, `(1 + k) Mc`, in use and next.
+    /// The inverse of the bound of `G` in use, and the next bound, for each function.
+    pub(super) bound_inverse: &'a mut [FunctionInertia],
+    pub(super) next_bound: &'a mut [FunctionInertia],
+    /// `Mc` and its inverse, one after the other for each axis, with one unknown a function. They are constant, as is the
+    /// following.
     pub(super) mass: &'a mut [f32],
-    pub(super) next_mass: &'a mut [f32],
-    /// The inverse of `G` for nodal inertia that is the mean over its axes, in use and next: one entry for two
-    /// functions, and independent of rotations.
-    pub(super) mean_inverse: &'a mut [f32],
-    pub(super) next_mean_inverse: &'a mut [f32],
-    /// Sums of the momentum, then the smooth part of the increments.
-    pub(super) momentum: &'a mut [CellPolynomial],
+    pub(super) mass_inverse: &'a mut [f32],
+    /// See [`super::transport`].
+    pub(super) edge_inverse: &'a mut [f32],
+    /// Used by the passes over the nodes: sums of the residual, later the lattice's motion; the motion that the nodes'
+    /// own inertia gives to the lattice; sums of the momentum, later the smooth part of the increments.
+    pub(super) cells: &'a mut [CellPolynomial],
+    pub(super) fine_cells: &'a mut [CellPolynomial],
+    pub(super) smooth_cells: &'a mut [CellPolynomial],
+    /// Used by the assembly of `G`.
+    pub(super) sums: &'a mut [CellSums],
 }
 
-/// Number of sweeps, of three unknowns each, for a matrix with one unknown a function.
-pub(super) const fn thirds(functions: usize) -> usize {
-    functions.div_ceil(3)
-}
-
-/// Floats of a [`CellPolynomial`] and of [`CellMatrices`].
+/// Floats of a [`CellPolynomial`], of [`CellSums`] and of a [`FunctionInertia`].
 const POLYNOMIAL_FLOATS: usize = size_of::<CellPolynomial>() / size_of::<f32>();
-const SUM_FLOATS: usize = size_of::<CellMatrices>() / size_of::<f32>();
+const SUM_FLOATS: usize = size_of::<CellSums>() / size_of::<f32>();
+const INERTIA_FLOATS: usize = size_of::<FunctionInertia>() / size_of::<f32>();
+
+/// Floats of a matrix with three unknowns a function, and of one with one.
+const fn matrix_floats(functions: usize) -> [usize; 2] {
+    [3 * functions * stride(functions), functions * row_length(functions)]
+}
 
 /// Floats of storage for a lattice with this many cells and functions.
-pub(super) const fn floats_for(cells: usize, functions: usize, damped: bool) -> usize {
-    let (matrices, per_cell) = if damped { (7, 2 * POLYNOMIAL_FLOATS) } else { (4, POLYNOMIAL_FLOATS) };
-    let sums = (per_cell + SUM_FLOATS).saturating_mul(cells_with_sums(cells, functions));
-    let means = if damped { 2 * 3 * thirds(functions) * stride(thirds(functions)) } else { 0 };
-    sums.saturating_add(matrices * 3 * functions * stride(functions) + means)
+pub(super) const fn floats_for(cells: usize, functions: usize) -> usize {
+    let [matrix, scalar_matrix] = matrix_floats(functions);
+    let sums = (3 * POLYNOMIAL_FLOATS + SUM_FLOATS).saturating_mul(cells_with_sums(cells, functions));
+    sums.saturating_add(4 * matrix + 7 * scalar_matrix + 2 * INERTIA_FLOATS * functions)
 }
 
 /// Number of cells with sums: none if there are no functions.
@@ -64,50 +59,61 @@ const fn cells_with_sums(cells: usize, functions: usize) -> usize {
 }
 
 impl<'a> Matrices<'a> {
-    pub(super) fn split(dense: &'a mut [f32], lattice: &Lattice, damped: bool) -> Option<Self> {
-        let functions = lattice.functions();
-        let matrix = 3 * functions * stride(functions);
-        let (applied, rest) = dense.split_at_mut_checked(matrix)?;
-        let (coarse, rest) = rest.split_at_mut_checked(matrix)?;
+    pub(super) fn split(dense: &'a mut [f32], lattice: &Lattice) -> Option<Self> {
+        let [matrix, scalar_matrix] = matrix_floats(lattice.functions());
+        let count = cells_with_sums(lattice.cell_count(), lattice.functions());
+        let (coarse_inverse, rest) = dense.split_at_mut_checked(matrix)?;
         let (next_coarse, rest) = rest.split_at_mut_checked(matrix)?;
+        let (fine_inverse, rest) = rest.split_at_mut_checked(matrix)?;
         let (next_fine, rest) = rest.split_at_mut_checked(matrix)?;
-        let count = cells_with_sums(lattice.cell_count(), functions);
-        let (cells, rest) = rest.split_at_mut_checked(POLYNOMIAL_FLOATS * count)?;
+        let (mass, rest) = rest.split_at_mut_checked(3 * scalar_matrix)?;
+        let (mass_inverse, rest) = rest.split_at_mut_checked(3 * scalar_matrix)?;
+        let (edge_inverse, rest) = rest.split_at_mut_checked(scalar_matrix)?;
+        let (cells, rest) = split_polynomials(rest, count)?;
+        let (fine_cells, rest) = split_polynomials(rest, count)?;
+        let (smooth_cells, rest) = split_polynomials(rest, count)?;
         let (sums, rest) = rest.split_at_mut_checked(SUM_FLOATS * count)?;
-        let cells = must_cast_slice_mut(cells.as_chunks_mut::<POLYNOMIAL_FLOATS>().0);
         let sums = must_cast_slice_mut(sums.as_chunks_mut::<SUM_FLOATS>().0);
-        let damped = if damped {
-            let mean_matrix = 3 * thirds(functions) * stride(thirds(functions));
-            let (inverse, rest) = rest.split_at_mut_checked(matrix)?;
-            let (mass, rest) = rest.split_at_mut_checked(matrix)?;
-            let (next_mass, rest) = rest.split_at_mut_checked(matrix)?;
-            let (mean_inverse, rest) = rest.split_at_mut_checked(mean_matrix)?;
-            let (next_mean_inverse, rest) = rest.split_at_mut_checked(mean_matrix)?;
-            let momentum = rest.get_mut(..POLYNOMIAL_FLOATS * count)?;
-            let momentum = must_cast_slice_mut(momentum.as_chunks_mut::<POLYNOMIAL_FLOATS>().0);
-            Some(DampedMatrices { inverse, mass, next_mass, mean_inverse, next_mean_inverse, momentum })
-        } else {
-            None
-        };
-        Some(Self { applied, coarse, next_coarse, next_fine, damped, cells, sums })
+        let inertia = rest.get_mut(..2 * INERTIA_FLOATS * lattice.functions())?;
+        let inertia: &mut [FunctionInertia] =
+            must_cast_slice_mut(inertia.as_chunks_mut::<INERTIA_FLOATS>().0);
+        let (bound_inverse, next_bound) = inertia.split_at_mut_checked(lattice.functions())?;
+        Some(Self {
+            coarse_inverse,
+            fine_inverse,
+            next_coarse,
+            next_fine,
+            mass,
+            mass_inverse,
+            edge_inverse,
+            cells,
+            fine_cells,
+            smooth_cells,
+            bound_inverse,
+            next_bound,
+            sums,
+        })
     }
 }
 
-/// Computes the inverse of the mean over the axes of `G`, from the lower triangle of `G`. Gives whether it could be
-/// inverted.
-pub(super) fn invert_mean(means: &mut [f32], inertia: &[f32], functions: usize, stride: usize) -> bool {
-    let (size, row_length) = (3 * thirds(functions), dense::stride(thirds(functions)));
-    let at = |row: usize, column: usize| inertia.get(row * stride + column).copied().unwrap_or(0.0);
-    for (row, means) in means.chunks_exact_mut(row_length.max(1)).enumerate() {
-        for (column, mean) in means.iter_mut().enumerate().take(row + 1) {
-            let sum: f32 = (0..3).map(|axis| at(3 * row + axis, 3 * column + axis)).sum();
-            *mean = if row < functions { sum / 3.0 } else { f32::from(u8::from(row == column)) };
-        }
-    }
-    let sound =
-        (0..thirds(functions)).fold(true, |sound, three| sound & sweep(means, size, row_length, three));
-    (0..size).for_each(|row| mirror(means, row_length, row, -1.0));
-    sound
+fn split_polynomials(floats: &mut [f32], count: usize) -> Option<(&mut [CellPolynomial], &mut [f32])> {
+    let (polynomials, rest) = floats.split_at_mut_checked(POLYNOMIAL_FLOATS * count)?;
+    Some((must_cast_slice_mut(polynomials.as_chunks_mut::<POLYNOMIAL_FLOATS>().0), rest))
+}
+
+/// The matrix of each axis.
+pub(super) fn of_axes(matrices: &[f32]) -> [&[f32]; 3] {
+    let size = matrices.len() / 3;
+    let mut parts = matrices.chunks_exact(size.max(1));
+    [(); 3].map(|()| parts.next().unwrap_or_default())
+}
+
+/// Computes the inverses of such matrices from their lower triangles. Gives whether they could be inverted.
+pub(super) fn invert_axes(inverses: &mut [f32], matrices: &[f32], functions: usize) -> bool {
+    copy(inverses, matrices);
+    let size = inverses.len() / 3;
+    let mut parts = inverses.chunks_exact_mut(size.max(1));
+    parts.by_ref().fold(true, |sound, matrix| sound & invert(matrix, functions, row_length(functions)))
 }
 
 pub(super) fn copy(to: &mut [f32], from: &[f32]) {

@@ -24,9 +24,9 @@ pub enum Method<'w> {
 /// Cells of a lattice.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub enum Cells {
-    /// The largest near-cubic lattice whose cost is a small part of the step's: with `n` unknowns, three for each
-    /// function, `n^3` is at most 400 times the number of elements; 700 times for [`Method::Damped`], as a finer
-    /// lattice pays when rough motion is damped. No lattice if even one cell costs too much.
+    /// The largest near-cubic lattice whose points are at least 1.5 times as far apart as the nodes, and whose matrices
+    /// cost little to renew: with `n` unknowns, three for each function, `n^3` is at most 4000 times the number of
+    /// elements. At least four nodes for each function. No lattice if the mesh is too small for one cell.
     #[default]
     Suggested,
     /// This many along x, y, z, at least one each.
@@ -49,22 +49,20 @@ impl<'w> Method<'w> {
     ) -> Result<Grid, InertiaError> {
         match self {
             Self::MassScaled => Ok(Grid::default()),
-            Self::Multilevel(cells) => cells.grid(false, scene, points),
-            Self::Damped(_, cells) => cells.grid(true, scene, points),
+            Self::Multilevel(cells) | Self::Damped(_, cells) => cells.grid(scene, points),
         }
     }
 }
 
 impl Cells {
-    /// The lattice of [`Method::Multilevel`] or (`damped`) [`Method::Damped`] on a scene with these `points` (m).
+    /// The lattice on a scene with these `points` (m).
     pub fn grid<M: Material>(
         self,
-        damped: bool,
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
     ) -> Result<Grid, InertiaError> {
         match self {
-            Self::Suggested => Ok(largest_grid(scene, points, if damped { 700 } else { 400 })),
+            Self::Suggested => Ok(largest_grid(scene, points)),
             Self::Given(cells) => {
                 let functions = Lattice::new(cells, points, scene.inertia)?.functions();
                 Ok(Grid { cells, functions })
@@ -80,21 +78,21 @@ pub fn vectors_for<M: Material>(
     points: &[[f32; 3]],
 ) -> Result<usize, InertiaError> {
     let grid = method.grid(scene, points)?;
-    Ok(vectors_for_lattice(scene.node_count(), grid, method.damper().is_some()))
+    Ok(vectors_for_lattice(scene.node_count(), scene.element_count(), grid, method.damper().is_some()))
 }
 
-/// The same for this many nodes and a known lattice.
+/// The same for this many nodes and elements and a known lattice.
 #[must_use]
-pub const fn vectors_for_lattice(nodes: usize, grid: Grid, damped: bool) -> usize {
+pub const fn vectors_for_lattice(nodes: usize, elements: usize, grid: Grid, damped: bool) -> usize {
     let tables = node_tables::vectors_for(nodes, damped);
     if grid.functions == 0 {
         return tables;
     }
     let [x, y, z] = grid.cells;
     let cells = (x as usize).saturating_mul(y as usize).saturating_mul(z as usize);
-    let floats = matrices::floats_for(cells, grid.functions, damped);
-    let places = vectors_of_places(nodes);
-    tables.saturating_add(places).saturating_add(floats.div_ceil(FLOATS))
+    let floats = matrices::floats_for(cells, grid.functions);
+    let lists = vectors_of_places(nodes).saturating_add(vectors_of_order(elements));
+    tables.saturating_add(lists).saturating_add(floats.div_ceil(FLOATS))
 }
 
 /// Floats of a vector.
@@ -108,18 +106,38 @@ pub(super) const fn vectors_of_places(nodes: usize) -> usize {
     3 * nodes.div_ceil(2)
 }
 
-/// The largest near-cubic lattice for which the third power of the number of unknowns is at most `multiply_adds` times
-/// the number of elements.
-pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], multiply_adds: u64) -> Grid {
+/// Vectors of storage for the order of this many elements.
+pub(super) const fn vectors_of_order(elements: usize) -> usize {
+    elements.div_ceil(FLOATS)
+}
+
+/// Least spacing of the points of a suggested lattice, as a multiple of the nodes'.
+const LEAST_SPACING: f32 = 1.5;
+
+/// Least number of nodes for each function of a suggested lattice.
+const NODES_PER_FUNCTION: usize = 4;
+
+/// Limit of the third power of the number of unknowns of a suggested lattice, as a multiple of the number of elements.
+const MULTIPLY_ADDS: u64 = 4000;
+
+/// See [`Cells::Suggested`].
+pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Grid {
+    let volume: f32 = scene.places().map(|(tile, lane)| tile.volume::<f32>(lane)).sum();
+    let spacing = libm::cbrtf(volume / points.len().max(1) as f32);
+    let least = lattice::size_of(points).map(|size| LEAST_SPACING * spacing / size);
     let mut best = Grid::default();
     for cells in (1..64).flat_map(|parts| lattice::near_cubic(points, parts)) {
+        if cells.iter().zip(least).any(|(&cells, least)| cells > 1 && cells as f32 * least > 1.0) {
+            continue;
+        }
         let Ok(lattice) = Lattice::new(cells, points, scene.inertia) else {
             break;
         };
         let functions = lattice.functions();
         let unknowns = 3 * functions as u64;
         if functions > best.functions
-            && unknowns * unknowns * unknowns <= multiply_adds * scene.element_count() as u64
+            && NODES_PER_FUNCTION * functions <= points.len()
+            && unknowns * unknowns * unknowns <= MULTIPLY_ADDS * scene.element_count() as u64
         {
             best = Grid { cells, functions };
         }

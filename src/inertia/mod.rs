@@ -4,19 +4,27 @@
 //!
 //! Three methods share the code ([`Method`]): *mass scaling* (no lattice), *multilevel inertia* (with a lattice), and
 //! the *damped* step, which is multilevel inertia with a small network that damps rough motion. Bounds and coarse
-//! inertia are renewed in cycles, an equal part in each step (`refresh.rs`). Precedents: selective mass scaling
+//! inertia are renewed in cycles, sooner where tissue deforms fast (`refresh.rs`). Precedents: selective mass scaling
 //! (Olovsson et al. 2005), reciprocal mass matrices (Tkachuk & Bischoff 2015).
 //!
 //! # The step
 //!
 //! ```text
-//! r   = D^2 f - 2 k m du                            k = mu D / 2
-//! du+ = du + M^-1 r + W (S^-1 - G^-1) W^T r         M = N + reserve m      (node.rs)
-//! S   = (1 + k) Mc + s_c D^2 / 4 Kc,  G = W^T M W                          (assembly.rs)
+//! r   = D^2 f - 2 k m du,  g = W^T r                              k = mu D / 2
+//! du+ = du + M^-1 r + W (S^-1 (g + A w) - G^-1 g - drag T^2 c)     M = N + reserve m     (node.rs)
+//! S   = (1 + k) Mc + A,  A = s_c D^2 / 4 Kc,  T = S^-1 A,  G >= W^T M W              (assembly.rs, nodal_sums.rs)
 //! ```
-//! `N >= s D^2 / 4 sum_e D_a`, with the bounds `D_a` of the elements' stiffness (`src/element/stiffness_bound.rs`). The
-//! operator is symmetric and positive: with `du = W c + y` and `W^T M y = 0`, its inverse has the quadratic form
-//! `c^T S c + y^T M y`.
+//! `N >= s D^2 / 4 sum_e D_a`, with the bounds `D_a` of the elements' stiffness, and `Kc` from a bound that rotations do
+//! not feel (`src/element/stiffness_bound.rs`). `G^-1 g` removes what the nodes' own inertia gives to the lattice's
+//! motion, which has its inertia in `S`. The operator is symmetric, and positive because `W G^-1 W^T <= M^-1`. In slow
+//! motion `G = W^T M W`. In fast motion a bound of it with one 3 x 3 matrix for each function is cheaper to renew, and
+//! leaves a share of about mass over inertia. The functions `W` reproduce linear fields
+//! wherever no support holds them, so translations and rotations of the shape at rest are the lattice's alone, and as
+//! `A` is zero for them their momentum is conserved. `w` is the change of velocity that rotation alone brings
+//! (`transport.rs`). In the first step `D^2` is halved: a force that acts from the start on has acted for half a step.
+//! `c` is the lattice's part of `du`. `T` is zero for rigid motion and small for motion that the step resolves, so the
+//! drag takes neither momentum nor slow motion. It is there because `S` changes with the state while velocities are
+//! kept, which would feed deformation that the step cannot resolve.
 //!
 //! # Why it is stable
 //!
@@ -27,31 +35,42 @@
 //! ```text
 //! lambda_max(B K) <= lambda_max(M^-1 K) + lambda_max(S^-1 W^T K W) <= 4 / D^2 (1 / s + 1 / s_c)
 //! ```
-//! The first term because `K <= sum_e D_a <= 4 / (s D^2) N`, the second because `W^T K W <= Kc`. Both come from the
-//! same bound of each element's tangent, for any mesh, support, material and state. With `s` = 1.35 and `s_c` = 6 the
-//! bracket is 0.907. This margin allows the stiffness of a node to grow by 5 % and that of the lattice's motion by 33 %
-//! during a cycle.
+//! The first term because `K <= sum_e D_a <= 4 / (s D^2) N`, the second because `W^T K W <= Kc`. Both come from bounds
+//! of each element's tangent, for any mesh, support, material and state. With `s` = 1.8 and `s_c` = 2.8 the bracket is
+//! 0.913. This margin allows the stiffness of a node to grow by 5 % and that of the lattice's motion by 17 % during a
+//! cycle. Drag on the last increment lowers the limit: with a share `d` of rough motion and `drag` of the lattice's,
+//! `K <= 4 / D^2 B^-1` becomes `K <= (4 B^-1 - 2 C) / D^2`, and with `2 a b <= e a^2 + b^2 / e` for the two parts of a
+//! motion it holds if `(1 + e) / s_c <= 1 - drag / 2` and `(1 + 1 / e) / s <= 1 - d / 2`. With `drag` = 0.1 that allows
+//! `d` = 0.22; the damper removes at most 0.1.
 //!
-//! Between refreshes the bounds are out of date. Two measures compensate for that:
+//! Between refreshes the bounds are out of date. Four measures compensate for that:
 //! - Bounds have directions, and tissue rotates. So bounds are kept in frames that rotate with the tissue
 //!   (`frames.rs`). Without them a free body that has rotated by 15 degrees is unstable at 20 times its critical step.
 //!   Mass scaling has a lattice for these frames only.
-//! - Where tissue stiffens more than the margin allows, the step is held back. Each step computes a scalar bound of
-//!   every element in the same pass as the forces. Where the sum at a node has grown beyond its margin, the inverse
-//!   inertia of the node is divided by the growth, and the lattice's part is multiplied by `1.33 / growth`.
+//! - Motion without change of volume becomes stiff where the shape has changed by `e` since, with a share `e^2` of the
+//!   stiffness of volume. So a cycle takes the shorter, the faster the lattice changes its shape and the stiffer the
+//!   tissue is in volume, down to one step (`refresh.rs`).
+//! - Where tissue stiffens more than the margin allows, the step is held back, and a cycle is completed at once. Each
+//!   step computes a scalar bound of every element in the same pass as the forces. Where the sum at a node has grown
+//!   beyond its margin, the inverse inertia of the node is divided by the growth, and the lattice's part is multiplied
+//!   by `share = 1.17 / growth`.
+//! - Where inertia grows while velocities are kept, `1/2 v^T S v` grows as well. So where only a share of the lattice's
+//!   part is used, `1 - sqrt(share)` of `T c` and of the rough motion is removed. The same is done with kinetic energy
+//!   that cannot have come from the loads, which the energy balance shows. Neither takes momentum.
 //!
-//! `G` may be out of date without harm: it is not in the inequality. Between refreshes this is a safeguard and no
-//! proof: a change of a bound's directions other than the rotation of its frame is covered by the margin only. Without
-//! a lattice the nodes have the whole bracket: with `s` = 1.1 it is 0.91, and 0.955 where the stiffness of a node has
-//! grown by 5 %. A cycle takes 0.04 s, short compared with the motions of hands and breathing, but at least 16 and at
-//! most 64 steps.
+//! Where nodes use only a share of their inverse inertia, `G^-1` is multiplied by the least share, which keeps the
+//! operator positive. Between refreshes this is a safeguard and no proof: a change of a bound's directions other than the rotation of its frame is covered by the
+//! margin only. Without a lattice the nodes have the whole bracket: with `s` = 1.1 it is 0.91, and 0.955 where the
+//! stiffness of a node has grown by 5 %. A cycle takes at most 256 steps, without a lattice at most
+//! 64 and 0.04 s, short compared with the motions of hands and breathing.
 //!
 //! A linear bound does not cover a step that is large compared with the range of the law. So the forces of one step may
-//! move a node from rest by at most a fiftieth of the least height of its elements ([`Report::held_back`]), and strain
-//! a cell of the lattice by at most a fiftieth ([`Report::coarse_share`]). And float32 cannot invert matrices that are
-//! too ill-conditioned: an inverse that does not reproduce a known right-hand side is not used, and until the next
-//! cycle the lattice has no part in the motion. What is conserved when inertia changes is stated in `node.rs`. If a
-//! step goes wrong all the same, the energy balance detects it, and the step is refused.
+//! move a node, relative to the lattice, by at most a fiftieth of the least height of its elements
+//! ([`Report::held_back`]), and strain a cell of the lattice by at most a tenth ([`Report::coarse_share`]). And float32
+//! cannot invert matrices that are too ill-conditioned. At the start that is an error ([`InertiaError::Singular`]).
+//! Later, where elements are crushed, an inverse that does not take the image of a known vector back to it is not used:
+//! the step is one of mass scaling until the next cycle, with a [`Report::coarse_share`] of zero. If a step goes wrong
+//! all the same, the energy balance detects it, and the step is refused.
 //!
 //! # What it costs
 //!
@@ -70,13 +89,16 @@ mod large_step;
 mod lattice;
 mod matrices;
 mod method;
+mod nodal_sums;
 mod node;
 mod node_refresh;
 mod node_tables;
 mod passes;
+mod projected_inertia;
 mod refresh;
 mod report;
 mod step;
+mod transport;
 
 pub use damper::{Damper, DamperError};
 pub use large_step::{LargeModel, LargeStep, LargeView};
@@ -89,8 +111,8 @@ use core::fmt;
 /// `s` without a lattice: `NODE_GROWTH`, and as much again for changes of a bound's directions within a cycle.
 const FINE_WITHOUT_LATTICE: f32 = 1.1;
 /// `s` and `s_c` with a lattice.
-const FINE: f32 = 1.35;
-const COARSE: f32 = 6.0;
+const FINE: f32 = 1.8;
+const COARSE: f32 = 2.8;
 /// Growth of the stiffness of a node above which the node is held back.
 const NODE_GROWTH: f32 = 1.05;
 /// The same for the lattice's motion: `NODE_GROWTH / FINE + COARSE_GROWTH / COARSE = 1`.
@@ -98,14 +120,21 @@ const COARSE_GROWTH: f32 = COARSE * (1.0 - NODE_GROWTH / FINE);
 /// Largest distance by which a node's force may move it in one step from rest, as a part of the least height of its
 /// elements.
 const LARGEST_MOVE: f32 = 0.02;
+/// Largest strain of a cell of the lattice by which the forces of one step may move it from rest.
+const LARGEST_STRAIN: f32 = 0.1;
+/// Share of the last increment's unresolved deformation of the lattice that a step removes.
+const DRAG: f32 = 0.1;
 /// Largest growth, from step to step, of the share of its motion that a held-back node may use.
 const RECOVERY: f32 = 1.05;
 /// Least share, so that it can grow again.
 const LEAST_SHARE: f32 = 1e-6;
-/// Time of a refresh cycle, s: short compared with the motions of hands and breathing, which stiffen and rotate tissue.
+/// Largest time of a refresh cycle without a lattice, s: short compared with the motions of hands and breathing, which
+/// stiffen and rotate tissue.
 const CYCLE: f32 = 0.04;
-/// Least and largest number of steps of a cycle.
-const CYCLE_STEPS: (f32, f32) = (16.0, 64.0);
+/// Limits of the largest number of steps of a cycle.
+const CYCLE_STEPS: (u32, u32) = (4, 64);
+/// The same with a lattice, which shows how fast the tissue deforms.
+const LATTICE_CYCLE_STEPS: u32 = 256;
 
 /// Why a step beyond the critical one could not be prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,6 +156,11 @@ pub enum InertiaError {
     },
     /// A lattice has more than [`MAX_FUNCTIONS`] functions.
     Functions {
+        /// Cells along x, y, z.
+        cells: [u32; 3],
+    },
+    /// Single precision does not suffice for the inertia of a lattice.
+    Singular {
         /// Cells along x, y, z.
         cells: [u32; 3],
     },
@@ -157,6 +191,10 @@ impl fmt::Display for InertiaError {
             Self::Functions { cells: [x, y, z] } => {
                 write!(f, "a lattice of {x} x {y} x {z} cells has more than {MAX_FUNCTIONS} functions")
             }
+            Self::Singular { cells: [x, y, z] } => write!(
+                f,
+                "a lattice of {x} x {y} x {z} cells is too fine for this mesh and step: its inertia cannot be inverted"
+            ),
             Self::Points { points, nodes } => {
                 write!(f, "{points} points for a scene of {nodes} nodes")
             }

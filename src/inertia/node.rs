@@ -11,12 +11,12 @@
 //! `D^2 f - 2 k m du`, and it is divided by the inertia `N + k (1 + k) m`. This gives
 //! `N (du+ - du) + k m (du+ + du) = D^2 f` for the nodes, and a margin for the lattice's part.
 //!
-//! **What is conserved while inertia changes.** As long as `N` is constant, a stable step conserves `1/2 v^T N v` plus
-//! strain energy up to terms of the order of the step. When `N` of a moving node grows, neither its momentum nor its
-//! velocity may be kept: if `N` grew and shrank in turn, that would add energy. So the velocity is scaled down to keep
-//! `v^T N v`; when `N` shrinks, the velocity is kept. A change of inertia never adds energy. In slow motion this would
-//! damp too much, so half of the energy that damping took meanwhile is given back ([`GIVEN_BACK`]); the sum of both is
-//! still a loss.
+//! **What is conserved while inertia changes.** With a lattice, velocities are kept, and with them all momentum; the
+//! lattice's drag and the damper take what changes of inertia add. Without a lattice, smooth motion has the inertia of
+//! the nodes too. As long as `N` is constant, a stable step conserves `1/2 v^T N v` plus strain energy, up to terms of
+//! the order of the step. If `N` grew and shrank in turn with the velocity kept, that would add energy. So where `N`
+//! grows, the velocity is scaled down to keep `v^T N v`. In slow motion this would damp too much, so half of the energy
+//! that damping took meanwhile is given back ([`GIVEN_BACK`]); the sum of both is still a loss.
 
 use crate::element::symmetric::Symmetric;
 use crate::simd::Real;
@@ -33,7 +33,7 @@ pub(super) struct Scaling {
     pub(super) k: f32,
     /// Inertia added for damping, as a multiple of the mass: `k`, or `k (1 + k)` with a lattice.
     pub(super) reserve: f32,
-    /// `2 mu` times the time since the inertia was last computed.
+    /// `2 mu` times the time of a cycle.
     pub(super) loss: f32,
     /// `s_c D^2 / 4`, s^2.
     pub(super) coarse_weight: f32,
@@ -45,17 +45,8 @@ pub(super) struct NewInertia<R> {
     pub(super) inverse: Symmetric<R>,
     /// `N + reserve m` with zero rows at held axes, kg.
     pub(super) inertia: Symmetric<R>,
-    /// Factor of the velocity.
-    pub(super) velocity: R,
     /// Added inertia, mean over the three axes, as a multiple of the node's mass.
     pub(super) added: R,
-}
-
-/// `v^T A v`.
-#[inline(always)]
-fn quadratic_form<R: Real>(matrix: &Symmetric<R>, v: [R; 3]) -> R {
-    let [x, y, z] = matrix.times(v);
-    x * v[0] + y * v[1] + z * v[2]
 }
 
 /// The matrix with ones on the diagonal at held axes, so that it can be inverted.
@@ -68,15 +59,12 @@ fn with_ones_at_held_axes<R: Real>(mut matrix: Symmetric<R>, [x, y, z]: [R; 3]) 
     matrix
 }
 
-/// The inertia from the summed bounds (N/m) of the nodes' elements; `free` is positive along free axes. `old` is the
-/// inverse in use so far and the velocity in its frame; there is none at the start.
+/// The inertia from the summed bounds (N/m) of the nodes' elements; `free` is positive along free axes.
 #[inline(always)]
 pub(super) fn new_inertia<R: Real>(
     free: [R; 3],
     mass: R,
     stiffness: Symmetric<R>,
-    old: Option<(Symmetric<R>, [R; 3])>,
-    velocity: [R; 3],
     scaling: &Scaling,
 ) -> NewInertia<R> {
     let (zero, one) = (R::splat(0.0), R::splat(1.0));
@@ -85,25 +73,40 @@ pub(super) fn new_inertia<R: Real>(
     let factor = (largest - mass).choose(one - mass.divide(largest), zero);
     let scaled = needed.scaled_plus(factor, mass).on_free(free);
     let added = (factor * needed.trace()).divide(R::splat(3.0) * mass);
-    let reserve = R::splat(scaling.reserve) * mass;
-
-    let mut keep = one;
-    if let Some((old, old_velocity)) = old {
-        // The old inertia, from its inverse.
-        let old_inertia = with_ones_at_held_axes(old, free).inverse().on_free(free);
-        let mut square = zero;
-        for axis in 0..3 {
-            square = square + free[axis].choose(velocity[axis] * velocity[axis], zero);
-        }
-        let energy = quadratic_form(&scaled, velocity);
-        let old_energy = quadratic_form(&old_inertia, old_velocity) - reserve * square;
-        // Allowed beyond the old energy: rounding, and a share of what damping took.
-        let given_back = R::splat(GIVEN_BACK * scaling.loss) * mass * square;
-        let excess = energy - (old_energy * R::splat(1.0 + 1e-5) + given_back);
-        let allowed = (old_energy + given_back).divide(energy).max(zero).root();
-        keep = excess.choose(energy.choose(allowed, one), one);
-    }
-    let inertia = scaled.scaled_plus(one, reserve).on_free(free);
+    let inertia = scaled.scaled_plus(one, R::splat(scaling.reserve) * mass).on_free(free);
     let inverse = with_ones_at_held_axes(inertia, free).inverse().on_free(free);
-    NewInertia { inverse, inertia, velocity: keep, added }
+    NewInertia { inverse, inertia, added }
+}
+
+/// `v^T A v`.
+#[inline(always)]
+fn quadratic_form<R: Real>(matrix: &Symmetric<R>, v: [R; 3]) -> R {
+    let [x, y, z] = matrix.times(v);
+    x * v[0] + y * v[1] + z * v[2]
+}
+
+/// The factor by which the velocities of a vector of nodes are scaled down where their inertia grows, from the inverse
+/// in use so far and the velocity in its frame, and from the new inertia and the velocity in that frame.
+#[inline(always)]
+pub(super) fn velocity_factor<R: Real>(
+    free: [R; 3],
+    mass: R,
+    (old_inverse, old_velocity): (Symmetric<R>, [R; 3]),
+    (inertia, velocity): (&Symmetric<R>, [R; 3]),
+    scaling: &Scaling,
+) -> R {
+    let (zero, one) = (R::splat(0.0), R::splat(1.0));
+    let old_inertia = with_ones_at_held_axes(old_inverse, free).inverse().on_free(free);
+    let mut square = zero;
+    for axis in 0..3 {
+        square = square + free[axis].choose(velocity[axis] * velocity[axis], zero);
+    }
+    let reserve = R::splat(scaling.reserve) * mass * square;
+    let energy = quadratic_form(inertia, velocity) - reserve;
+    let old_energy = quadratic_form(&old_inertia, old_velocity) - reserve;
+    // Allowed beyond the old energy: rounding, and a share of what damping took.
+    let given_back = R::splat(GIVEN_BACK * scaling.loss) * mass * square;
+    let excess = energy - (old_energy * R::splat(1.0 + 1e-5) + given_back);
+    let allowed = (old_energy + given_back).divide(energy).max(zero).root();
+    excess.choose(energy.choose(allowed, one), one)
 }

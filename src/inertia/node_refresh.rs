@@ -1,14 +1,15 @@
 //! The next inertia (kg) of a batch of nodes, vectorised: from the summed bounds (N/m) of their elements to the inverse
-//! inertia ([`super::node`]), and to the sums of the lattice's cells for the mass, the projected inertia and the
-//! momentum.
+//! inertia ([`super::node`]), and to the sums of the lattice's functions. Without a
+//! lattice, velocities are scaled down where inertia grows.
 
 use bytemuck::{must_cast_slice, must_cast_slice_mut};
 
-use super::assembly::CellMatrices;
 use super::frames::{Frames, Rotation};
-use super::lattice::{LatticeNode, node_place};
-use super::node::{Scaling, new_inertia};
+use super::lattice::{Lattice, LatticeNode, node_place};
+use super::nodal_sums::{FunctionInertia, add_inertia};
+use super::node::{Scaling, new_inertia, velocity_factor};
 use super::node_tables::{NodeTables, read_matrices, write_matrices};
+use super::projected_inertia::CellSums;
 use super::report::AddedInertiaSums;
 use crate::element::NodeInertia;
 use crate::element::symmetric::Symmetric;
@@ -20,18 +21,21 @@ pub(super) const NODE_BATCH: usize = 8;
 /// A batch of nodes whose next inertia is computed.
 pub(super) struct NodeBatch<'a, 'b> {
     pub(super) inertia: &'a [NodeInertia],
-    pub(super) increment: &'a mut [NodeVector],
+    /// The velocities to scale down, with the frames of the nodes; none with a lattice, or where no inertia is in use
+    /// yet.
+    pub(super) moving: Option<(&'a mut [NodeVector], &'a Frames)>,
+    pub(super) lattice: &'a Lattice,
     /// Empty without a lattice.
     pub(super) places: &'a [LatticeNode],
     pub(super) scaling: &'a Scaling,
-    pub(super) frames: &'a Frames,
     pub(super) added: &'a mut AddedInertiaSums,
     pub(super) tables: &'a mut NodeTables<'b>,
-    pub(super) sums: &'a mut [CellMatrices],
+    /// Sums of the nodes' inertia for each function.
+    pub(super) bounds: &'a mut [FunctionInertia],
+    /// The same for each cell; may be empty.
+    pub(super) sums: &'a mut [CellSums],
     /// The first node of the batch.
     pub(super) first: usize,
-    /// No inertia is in use yet.
-    pub(super) first_cycle: bool,
 }
 
 impl NodeBatch<'_, '_> {
@@ -66,31 +70,37 @@ impl NodeBatch<'_, '_> {
     #[inline(always)]
     fn refresh<R: Real, W: Real>(&mut self, rows: Indexed, left: usize) {
         const { assert!(R::COUNT == NODE_BATCH) };
-        let Self { inertia, increment, places, scaling, frames, added, tables, sums, .. } = self;
+        let Self { inertia, moving, lattice, places, scaling, added, tables, bounds, sums, .. } = self;
         let [x, y, z, mass] = rows.read::<R>(must_cast_slice(inertia));
-        let free = [x, y, z];
-        let [vx, vy, vz, padding] = rows.read::<R>(must_cast_slice(increment));
-        let velocity = [vx, vy, vz];
-        let (mut since_start, mut since_bounds) =
-            ([Rotation::NONE; NODE_BATCH], [Rotation::NONE; NODE_BATCH]);
-        for (lane, (start, bounds)) in since_start.iter_mut().zip(&mut since_bounds).enumerate() {
-            let frame = tables.frame(rows.index::<R>(lane));
-            (*start, *bounds) = (frames.since_start(frame), frames.since_bounds(frame));
-        }
-        let local_velocity = to_frames(&since_start, velocity);
         let (stiffness, [scalar, _]) = read_matrices(rows, tables.sum_diagonal, tables.sum_off_diagonal);
-        let old = (!self.first_cycle).then(|| {
-            let inverse = read_matrices(rows, tables.inverse_diagonal, tables.inverse_off_diagonal).0;
-            (inverse, to_frames(&since_bounds, velocity))
-        });
-        let new = new_inertia(free, mass, stiffness, old, local_velocity, scaling);
+        let free = [x, y, z];
+        let new = new_inertia(free, mass, stiffness, scaling);
+        if let Some((increment, frames)) = moving {
+            let [vx, vy, vz, padding] = rows.read::<R>(must_cast_slice(increment));
+            let velocity = [vx, vy, vz];
+            let in_frames = |rotation: &dyn Fn(usize) -> Rotation| {
+                let mut rotations = [Rotation::NONE; NODE_BATCH];
+                for (lane, of_lane) in rotations.iter_mut().enumerate() {
+                    *of_lane = rotation(tables.frame(rows.index::<R>(lane)));
+                }
+                to_frames(&rotations, velocity)
+            };
+            let old = read_matrices(rows, tables.inverse_diagonal, tables.inverse_off_diagonal).0;
+            let factor = velocity_factor(
+                free,
+                mass,
+                (old, in_frames(&|frame| frames.since_bounds(frame))),
+                (&new.inertia, in_frames(&|frame| frames.since_start(frame))),
+                scaling,
+            );
+            let mut kept = velocity;
+            for axis in 0..3 {
+                kept[axis] = free[axis].choose(velocity[axis] * factor, velocity[axis]);
+            }
+            rows.write(must_cast_slice_mut(increment), [kept[0], kept[1], kept[2], padding]);
+        }
         let fourth = [scalar, R::splat(0.0)];
         write_matrices(rows, tables.sum_diagonal, tables.sum_off_diagonal, &new.inverse, fourth);
-        let mut kept = velocity;
-        for axis in 0..3 {
-            kept[axis] = free[axis].choose(velocity[axis] * new.velocity, velocity[axis]);
-        }
-        rows.write(must_cast_slice_mut(increment), [kept[0], kept[1], kept[2], padding]);
         for lane in 0..left.min(R::COUNT) {
             added.add(rows.index::<R>(lane), new.added.lane(lane));
         }
@@ -98,21 +108,17 @@ impl NodeBatch<'_, '_> {
         if places.is_empty() {
             return;
         }
-        let [vx, vy, vz] = local_velocity;
-        let momentum = new.inertia.times([vx * new.velocity, vy * new.velocity, vz * new.velocity]);
         for lane in 0..left.min(R::COUNT) {
             let node = rows.index::<R>(lane);
-            let (Some(place), Some(inertia)) = (node_place(places, node), inertia.get(node)) else {
+            let Some(place) = node_place(places, node) else {
                 continue;
             };
-            // A held axis follows its support: no inertia.
-            let mass = inertia.free() * inertia.mass * (1.0 + scaling.k);
             let Symmetric { xx, yy, zz, xy, yz, zx } = new.inertia;
             let of = |entry: R| entry.lane(lane);
             let matrix = Symmetric { xx: of(xx), yy: of(yy), zz: of(zz), xy: of(xy), yz: of(yz), zx: of(zx) };
-            let [x, y, z] = momentum;
+            add_inertia(bounds, lattice, place, &matrix);
             if let Some(sums) = sums.get_mut(place.cell()) {
-                sums.add_node::<W>(place, &matrix, mass.truncate().to_array(), [of(x), of(y), of(z)]);
+                sums.add_node::<W>(place, &matrix);
             }
         }
     }

@@ -47,6 +47,8 @@ fn sums_of_row<R: Real, T>(
 pub(super) struct PassInput<'a> {
     pub(super) step: &'a Step,
     pub(super) scaling: &'a Scaling,
+    /// `D^2`, s^2; half of it in the first step: a force that acts from the start on has acted for half a step.
+    pub(super) square: f32,
     pub(super) inertia: &'a [NodeInertia],
     pub(super) displacement: &'a [NodeVector],
     pub(super) increment: &'a [NodeVector],
@@ -93,213 +95,151 @@ impl PassInput<'_> {
     }
 }
 
-/// The pass before the lattice's motion. For each node: the share of its inverse inertia that it may use; its next
-/// increment without the lattice's part; and its residual, summed over the cells for the lattice. Gives sums over the
-/// nodes that were held back, and the largest growth of a bound.
-pub(super) struct FinePass<'a, 'b> {
+/// The pass before the lattice's motion: residual and momentum of each node, summed over the cells for the lattice. Gives
+/// the largest growth of a bound.
+pub(super) struct RestrictionPass<'a, 'b> {
     pub(super) input: PassInput<'a>,
-    /// Factor of the velocities.
-    pub(super) velocity_scale: f32,
-    pub(super) rotations: &'a RotationTable,
     pub(super) force: &'a [NodeVector],
-    pub(super) tables: &'a mut NodeTables<'b>,
+    pub(super) tables: &'a NodeTables<'b>,
     pub(super) cells: &'a mut [CellPolynomial],
-    /// Receives sums of the momentum in a damped step.
-    pub(super) momentum: Option<&'a mut [CellPolynomial]>,
+    pub(super) momentum: &'a mut [CellPolynomial],
 }
 
-/// Lower limits of the inverse inertia of a node, 1/kg, and of the determinant of its correlations.
-const LEAST_INVERSE: f32 = 1e-30;
-const LEAST_DETERMINANT: f32 = 1e-6;
-
-/// Growth of the bounds and held-back nodes, vectorised.
-#[derive(Clone, Copy)]
-struct GrowthSums<R> {
-    /// The inverse of the largest growth.
-    inverse_growth: R,
-    /// Number of held-back nodes, and sum of the unused shares of their inverse inertia.
-    held: R,
-    unused: R,
-}
-
-impl<R: Real> GrowthSums<R> {
-    #[inline(always)]
-    fn new() -> Self {
-        Self { inverse_growth: R::splat(1.0), held: R::splat(0.0), unused: R::splat(0.0) }
-    }
-
-    /// The held-back nodes and the largest growth; `rest` is for the nodes after the last whole tile.
-    #[inline(always)]
-    fn total(
-        sums: &[Self; VECTORS_PER_TILE],
-        lane_of_row: impl Fn(usize) -> usize,
-        mut rest: GrowthSums<f32>,
-    ) -> (HeldBack, f32) {
-        let mut held_back = HeldBack::NONE;
-        for row in 0..TILE {
-            let (sums, lane) = sums_of_row::<R, _>(sums, row, &lane_of_row);
-            rest.inverse_growth = sums.inverse_growth.lane(lane).min(rest.inverse_growth);
-            held_back.add(sums.held.lane(lane), sums.unused.lane(lane));
-        }
-        held_back.add(rest.held, rest.unused);
-        (held_back, 1.0 / rest.inverse_growth)
-    }
-}
-
-/// Result of [`FinePass`] for a vector of nodes.
-struct FineResult<R> {
-    /// The next increment without the lattice's part, and the least height of the node's elements.
-    next: [R; 4],
-    /// The residual for the lattice.
-    residual: [R; 3],
-    /// The inverse inertia.
-    inverse: [R; 6],
-}
-
-impl FinePass<'_, '_> {
+impl RestrictionPass<'_, '_> {
     /// Compiled with this crate, as it is not generic.
     #[inline(never)]
-    pub(super) fn dispatched(self) -> (HeldBack, f32) {
+    pub(super) fn dispatched(self) -> f32 {
         dispatch(self)
+    }
+
+    /// The inverse of the largest growth so far, with that of a vector of nodes.
+    #[inline(always)]
+    fn inverse_growth<R: Real>(&self, rows: impl Rows, nodes: &NodeValues<R>, least: R) -> R {
+        let [_, _, _, bound_before] = rows.read::<R>(must_cast_slice(self.tables.inverse_diagonal));
+        self.input.inverse_growth(nodes, bound_before).min(least)
     }
 }
 
-impl Kernel for FinePass<'_, '_> {
-    type Output = (HeldBack, f32);
+impl Kernel for RestrictionPass<'_, '_> {
+    type Output = f32;
 
     #[inline(always)]
-    fn run<R: Real>(mut self) -> Self::Output {
+    fn run<R: Real>(self) -> f32 {
         let input = self.input;
         let nodes = input.inertia.len().min(input.places.len());
         let whole = nodes - nodes % TILE;
-        let mut growth = [GrowthSums::<R>::new(); VECTORS_PER_TILE];
+        let mut least = R::splat(1.0);
         self.cells.fill(CellPolynomial::ZERO);
         let mut residual_sums = CellAccumulator::new();
         let mut momentum_sums = CellAccumulator::new();
-        if let Some(momentum) = &mut self.momentum {
-            momentum.fill(CellPolynomial::ZERO);
-        }
+        self.momentum.fill(CellPolynomial::ZERO);
         for first in (0..whole).step_by(TILE) {
             for vector in 0..TILE / R::COUNT {
                 let Some((rows, places)) = input.in_order::<R>(first + vector * R::COUNT) else {
                     continue;
                 };
-                let nodes = self.input.read::<R>(rows, self.force);
-                let fine = self.nodes(rows, &nodes, &mut growth[vector % VECTORS_PER_TILE]);
-                rows.write(must_cast_slice_mut(self.tables.next_increment), fine.next);
-                if let Some(momentum) = &mut self.momentum {
-                    momentum_sums.add(momentum, &places, vector, momentum_of(&nodes, fine.inverse));
-                }
-                residual_sums.add(self.cells, &places, vector, fine.residual);
+                let nodes = input.read::<R>(rows, self.force);
+                least = self.inverse_growth(rows, &nodes, least);
+                momentum_sums.add(self.momentum, &places, vector, nodes.momentum());
+                residual_sums.add(self.cells, &places, vector, input.residual(&nodes));
             }
         }
         residual_sums.flush(self.cells);
-        if let Some(momentum) = &mut self.momentum {
-            momentum_sums.flush(momentum);
-        }
-        let mut rest = GrowthSums::new();
+        momentum_sums.flush(self.momentum);
+        let mut rest = 1.0;
         for at in whole..nodes {
-            let Some(place) = self.input.places.get(at) else {
+            let Some(place) = input.places.get(at) else {
                 continue;
             };
             let rows = Contiguous(place.node());
-            let nodes = self.input.read::<f32>(rows, self.force);
-            let fine = self.nodes(rows, &nodes, &mut rest);
-            rows.write(must_cast_slice_mut(self.tables.next_increment), fine.next);
-            if let Some(cell) = self.momentum.as_mut().and_then(|cells| cells.get_mut(place.cell())) {
-                cell.add(place, momentum_of(&nodes, fine.inverse));
+            let nodes = input.read::<f32>(rows, self.force);
+            rest = self.inverse_growth(rows, &nodes, rest);
+            if let Some(cell) = self.momentum.get_mut(place.cell()) {
+                cell.add(place, nodes.momentum());
             }
             if let Some(cell) = self.cells.get_mut(place.cell()) {
-                cell.add(place, fine.residual);
+                cell.add(place, input.residual(&nodes));
             }
         }
-        GrowthSums::total(&growth, |row| row, rest)
-    }
-}
-
-impl FinePass<'_, '_> {
-    #[inline(always)]
-    fn nodes<R: Real>(
-        &mut self,
-        rows: impl Rows,
-        nodes: &NodeValues<R>,
-        growth: &mut GrowthSums<R>,
-    ) -> FineResult<R> {
-        let PassInput { step, scaling, .. } = self.input;
-        let carry = self.velocity_scale * step.carry();
-        let NodeTables { inverse_diagonal, inverse_off_diagonal, next_increment, .. } = &mut *self.tables;
-        let &NodeValues { free, mass, force, bound, increment: [vx, vy, vz] } = nodes;
-
-        let loss = R::splat(2.0 * scaling.k * carry) * mass;
-        let square = R::splat(step.seconds() * step.seconds());
-        let rx = free[0] * (square * force[0] - loss * vx);
-        let ry = free[1] * (square * force[1] - loss * vy);
-        let rz = free[2] * (square * force[2] - loss * vz);
-
-        let [_, _, _, height] = rows.read::<R>(must_cast_slice(next_increment));
-        // The frame is in the last bits of the height, see `NodeTables`.
-        let rotation = |lane: usize| {
-            let frame = padding::frame_of(height.lane(lane));
-            &self.rotations[frame.min(MAX_FUNCTIONS)]
-        };
-        let rotation = [
-            R::from_rows(|lane| rotation(lane)[0]),
-            R::from_rows(|lane| rotation(lane)[1]),
-            R::from_rows(|lane| rotation(lane)[2]),
-        ];
-        let bx = rotation[0][0] * rx + rotation[1][0] * ry + rotation[2][0] * rz;
-        let by = rotation[0][1] * rx + rotation[1][1] * ry + rotation[2][1] * rz;
-        let bz = rotation[0][2] * rx + rotation[1][2] * ry + rotation[2][2] * rz;
-        let [xx, yy, zz, bound_before] = rows.read::<R>(must_cast_slice(inverse_diagonal));
-        let [xy, yz, zx, share_before] = rows.read::<R>(must_cast_slice(inverse_off_diagonal));
-        let own = [xx * bx + xy * by + zx * bz, xy * bx + yy * by + yz * bz, zx * bx + yz * by + zz * bz];
-
-        // The inverse of the growth of the bound, with the mass added to both, because growth below the mass is
-        // harmless.
-        let weight = R::splat(scaling.weight);
-        let inverse_growth = (mass + weight * bound_before).divide(mass + weight * bound);
-        let distance = (own[0] * own[0] + own[1] * own[1] + own[2] * own[2]).root();
-        let one = R::splat(1.0);
-        let limit = (R::splat(LARGEST_MOVE) * height).divide(distance);
-        // The share recovers only slowly, because each fall of it slows the node down.
-        let share = (R::splat(NODE_GROWTH) * inverse_growth)
-            .min(one)
-            .min(limit)
-            .min(R::splat(RECOVERY) * share_before);
-        let keep = R::splat(carry) * share.divide(share_before).min(one).root();
-        let kept = share.max(R::splat(LEAST_SHARE));
-        rows.write(must_cast_slice_mut(inverse_off_diagonal), [xy, yz, zx, kept]);
-        growth.inverse_growth = inverse_growth.min(growth.inverse_growth);
-        let unused = one - share;
-        growth.unused = growth.unused + unused;
-        growth.held = growth.held + unused.positive();
-
-        let mut moved = [keep * vx, keep * vy, keep * vz, height];
-        for row in 0..3 {
-            let along = rotation[row][0] * own[0] + rotation[row][1] * own[1] + rotation[row][2] * own[2];
-            moved[row] = moved[row] + share * along;
+        for lane in 0..R::COUNT {
+            rest = least.lane(lane).min(rest);
         }
-        FineResult { next: moved, residual: [rx, ry, rz], inverse: [xx, yy, zz, xy, yz, zx] }
+        1.0 / rest
     }
 }
 
-/// The momentum of nodes with the mean of `M` over the axes, from the inverse of `M`, which gets ones at held axes. It
-/// is computed with the correlations `p, q, r`, because at a crushed element the inverse is so small that products of
-/// its entries underflow.
-#[inline(always)]
-fn momentum_of<R: Real>(nodes: &NodeValues<R>, [xx, yy, zz, xy, yz, zx]: [R; 6]) -> [R; 3] {
-    let (one, least) = (R::splat(1.0), R::splat(LEAST_INVERSE));
-    let [fx, fy, fz] = nodes.free;
-    let (a, b, c) =
-        ((xx + (one - fx)).max(least), (yy + (one - fy)).max(least), (zz + (one - fz)).max(least));
-    let (ra, rb, rc) = (a.root(), b.root(), c.root());
-    let (p, q, r) = (xy.divide(ra * rb), yz.divide(rb * rc), zx.divide(rc * ra));
-    let (pp, qq, rr) = (p * p, q * q, r * r);
-    let determinant = one + R::splat(2.0) * p * q * r - pp - qq - rr;
-    let sum = (fx * (one - qq)).divide(a) + (fy * (one - rr)).divide(b) + (fz * (one - pp)).divide(c);
-    let mean = R::splat(1.0 / 3.0) * sum.divide(determinant.max(R::splat(LEAST_DETERMINANT)));
-    let [vx, vy, vz] = nodes.increment;
-    [mean * vx, mean * vy, mean * vz]
+impl<R: Real> NodeValues<R> {
+    /// The momentum of free axes times the step, kg m.
+    #[inline(always)]
+    fn momentum(&self) -> [R; 3] {
+        let [vx, vy, vz] = self.increment;
+        let [x, y, z] = self.free;
+        [self.mass * x * vx, self.mass * y * vy, self.mass * z * vz]
+    }
+}
+
+impl PassInput<'_> {
+    /// `D^2 f - 2 k m du`, kg m.
+    #[inline(always)]
+    fn residual<R: Real>(&self, nodes: &NodeValues<R>) -> [R; 3] {
+        let &NodeValues { free, mass, force: [fx, fy, fz], increment: [vx, vy, vz], .. } = nodes;
+        let loss = R::splat(2.0 * self.scaling.k * self.step.carry()) * mass;
+        let square = R::splat(self.square);
+        [
+            free[0] * (square * fx - loss * vx),
+            free[1] * (square * fy - loss * vy),
+            free[2] * (square * fz - loss * vz),
+        ]
+    }
+
+    /// The inverse of the growth of the bound, with the mass added to both, because growth below the mass is harmless.
+    #[inline(always)]
+    fn inverse_growth<R: Real>(&self, nodes: &NodeValues<R>, bound_before: R) -> R {
+        let weight = R::splat(self.scaling.weight);
+        (nodes.mass + weight * bound_before).divide(nodes.mass + weight * nodes.bound)
+    }
+}
+
+/// Sums over held-back nodes, vectorised.
+#[derive(Clone, Copy)]
+struct HeldSums<R> {
+    /// Number of held-back nodes, and sum of the unused shares of their inverse inertia.
+    held: R,
+    unused: R,
+    /// The least share.
+    least: R,
+}
+
+impl<R: Real> HeldSums<R> {
+    #[inline(always)]
+    fn new() -> Self {
+        Self { held: R::splat(0.0), unused: R::splat(0.0), least: R::splat(1.0) }
+    }
+
+    /// Adds the shares of a vector of nodes.
+    #[inline(always)]
+    fn add(&mut self, share: R) {
+        let unused = R::splat(1.0) - share;
+        self.held = self.held + unused.positive();
+        self.unused = self.unused + unused;
+        self.least = share.min(self.least);
+    }
+
+    /// The sums; `rest` is for the nodes after the last whole tile.
+    #[inline(always)]
+    fn total(
+        sums: &[Self; VECTORS_PER_TILE],
+        lane_of_row: impl Fn(usize) -> usize,
+        rest: &HeldSums<f32>,
+    ) -> HeldBack {
+        let mut held_back = HeldBack::NONE;
+        for row in 0..TILE {
+            let (sums, lane) = sums_of_row::<R, _>(sums, row, &lane_of_row);
+            held_back.add(sums.held.lane(lane), sums.unused.lane(lane), sums.least.lane(lane));
+        }
+        held_back.add(rest.held, rest.unused, rest.least);
+        held_back
+    }
 }
 
 /// The smooth part of the last increment, and the share of the rest, the rough part, that is removed.
@@ -308,17 +248,52 @@ pub(super) struct RoughDamping<'a> {
     pub(super) share: f32,
 }
 
-/// The pass after the lattice's motion is known: adds it to the next increments, damps rough motion, and removes the
-/// bounds from the fourth component of the forces. Gives sums for the energy balance, the error estimate and the
-/// damper.
-pub(super) struct CorrectionPass<'a, 'b> {
-    pub(super) input: PassInput<'a>,
-    /// The lattice's motion.
+/// The motion of the lattice in a step.
+pub(super) struct LatticeMotion<'a> {
+    /// Added to the increments of the nodes.
     pub(super) cells: &'a [CellPolynomial],
+    /// `W G^-1 W^T r`: the smooth part of what the nodes' own inertia would give.
+    pub(super) fine: &'a [CellPolynomial],
     /// Damping of rough motion, if any.
     pub(super) damped: Option<RoughDamping<'a>>,
+    /// Whether there is a motion of the lattice: if not, the step is one of mass scaling.
+    pub(super) in_use: bool,
+}
+
+/// The same at a vector of nodes.
+struct MotionAt<R> {
+    coarse: [R; 3],
+    fine: [R; 3],
+    smooth: [R; 3],
+}
+
+/// The pass that computes the next increments: by the nodes' own inertia, as far as their share of it allows, and by
+/// the lattice's motion. It damps rough motion and removes the bounds from the fourth component of the forces. Gives
+/// sums for the energy balance, the error estimate and the damper, and over the nodes that were held back.
+pub(super) struct MotionPass<'a, 'b> {
+    pub(super) input: PassInput<'a>,
+    pub(super) rotations: &'a RotationTable,
+    /// None without a lattice.
+    pub(super) lattice: Option<LatticeMotion<'a>>,
     pub(super) force: &'a mut [NodeVector],
     pub(super) tables: &'a mut NodeTables<'b>,
+}
+
+/// The motion of a vector of nodes by their own inertia, m; the least height of their elements, m; the share of their
+/// inverse inertia that was used; the factor of their velocities without a lattice ([`super::node`]).
+struct OwnMotion<R> {
+    own: [R; 3],
+    height: R,
+    share: R,
+    keep: R,
+}
+
+/// Result of [`MotionPass`].
+pub(super) struct PassTotals {
+    pub(super) totals: Totals,
+    pub(super) defects: DefectTotals,
+    pub(super) rough: RoughMotion,
+    pub(super) held_back: HeldBack,
 }
 
 /// Sums for each axis, vectorised over nodes.
@@ -333,7 +308,7 @@ struct AxisSums<R> {
 impl<R: Real> AxisSums<R> {
     #[inline(always)]
     fn new(input: &PassInput<'_>) -> Self {
-        let defects = [DefectSums::new(input.step, input.scaling, R::splat); 3];
+        let defects = [DefectSums::new(input.step, input.scaling, input.square, R::splat); 3];
         Self { sums: [Sums::new(input.step, R::splat); 3], defects, rough: [R::splat(0.0); 4] }
     }
 
@@ -353,7 +328,8 @@ impl<R: Real> AxisSums<R> {
         sums: &[Self; VECTORS_PER_TILE],
         lane_of_row: impl Fn(usize) -> usize,
         rest: &AxisSums<f32>,
-    ) -> (Totals, DefectTotals, RoughMotion) {
+        held_back: HeldBack,
+    ) -> PassTotals {
         let (mut totals, mut defects, mut rough) =
             (Totals::default(), DefectTotals::default(), RoughMotion::NONE);
         for row in 0..TILE {
@@ -366,149 +342,196 @@ impl<R: Real> AxisSums<R> {
         totals.add_axes(&rest.sums);
         defects.add_axes(&rest.defects);
         rough.add(rest.rough);
-        (totals, defects, rough)
+        PassTotals { totals, defects, rough, held_back }
     }
 }
 
-impl CorrectionPass<'_, '_> {
+impl MotionPass<'_, '_> {
     /// Compiled with this crate, as it is not generic.
     #[inline(never)]
-    pub(super) fn dispatched(self) -> (Totals, DefectTotals, RoughMotion) {
+    pub(super) fn dispatched(self) -> PassTotals {
         dispatch(self)
     }
 }
 
-impl Kernel for CorrectionPass<'_, '_> {
-    type Output = (Totals, DefectTotals, RoughMotion);
+impl Kernel for MotionPass<'_, '_> {
+    type Output = PassTotals;
 
     #[inline(always)]
-    fn run<R: Real>(mut self) -> Self::Output {
+    fn run<R: Real>(mut self) -> PassTotals {
+        if self.lattice.is_some() { self.with_lattice::<R>() } else { self.without_lattice::<R>() }
+    }
+}
+
+impl MotionPass<'_, '_> {
+    #[inline(always)]
+    fn with_lattice<R: Real>(&mut self) -> PassTotals {
         let input = self.input;
         let nodes = input.inertia.len().min(input.places.len());
         let whole = nodes - nodes % TILE;
         let mut sums = [AxisSums::<R>::new(&self.input); VECTORS_PER_TILE];
+        let mut held = [HeldSums::<R>::new(); VECTORS_PER_TILE];
         for first in (0..whole).step_by(TILE) {
             for vector in 0..TILE / R::COUNT {
-                let Some((rows, places)) = input.in_order::<R>(first + vector * R::COUNT) else {
+                let (Some((rows, places)), Some(lattice)) =
+                    (input.in_order::<R>(first + vector * R::COUNT), &self.lattice)
+                else {
                     continue;
                 };
-                let coarse = motion_at(self.cells, &places);
-                let mut smooth = [R::splat(0.0); 3];
-                if let Some(damping) = &self.damped {
-                    smooth = motion_at(damping.smooth, &places);
-                }
-                self.nodes(rows, coarse, smooth, &mut sums[vector % VECTORS_PER_TILE]);
+                let at = |cells: &[CellPolynomial]| motion_at(cells, &places);
+                let smooth = lattice.damped.as_ref().map_or([R::splat(0.0); 3], |damped| at(damped.smooth));
+                let motion = MotionAt { coarse: at(lattice.cells), fine: at(lattice.fine), smooth };
+                let index = vector % VECTORS_PER_TILE;
+                self.nodes(rows, Some(motion), &mut sums[index], &mut held[index]);
             }
         }
-        let mut rest = AxisSums::new(&self.input);
+        let (mut rest, mut rest_held) = (AxisSums::new(&self.input), HeldSums::new());
         for at in whole..nodes {
-            let Some(place) = self.input.places.get(at) else {
+            let (Some(place), Some(lattice)) = (input.places.get(at), &self.lattice) else {
                 continue;
             };
-            let rows = Contiguous(place.node());
             let at = |cells: &[CellPolynomial]| {
                 cells.get(place.cell()).map_or([0.0; 3], |cell| cell.at(place.within()))
             };
-            let smooth = self.damped.as_ref().map_or([0.0; 3], |damping| at(damping.smooth));
-            self.nodes(rows, at(self.cells), smooth, &mut rest);
+            let smooth = lattice.damped.as_ref().map_or([0.0; 3], |damped| at(damped.smooth));
+            let motion = MotionAt { coarse: at(lattice.cells), fine: at(lattice.fine), smooth };
+            self.nodes(Contiguous(place.node()), Some(motion), &mut rest, &mut rest_held);
         }
-        AxisSums::total(&sums, |row| row, &rest)
+        AxisSums::total(&sums, |row| row, &rest, HeldSums::total(&held, |row| row, &rest_held))
     }
-}
 
-impl CorrectionPass<'_, '_> {
     #[inline(always)]
-    fn nodes<R: Real>(&mut self, rows: impl Rows, coarse: [R; 3], smooth: [R; 3], sums: &mut AxisSums<R>) {
+    fn without_lattice<R: Real>(&mut self) -> PassTotals {
+        let nodes = self.input.inertia.len();
+        let whole = nodes - nodes % TILE;
+        let mut sums = [AxisSums::<R>::new(&self.input); VECTORS_PER_TILE];
+        let mut held = [HeldSums::<R>::new(); VECTORS_PER_TILE];
+        for first in (0..whole).step_by(TILE) {
+            for vector in 0..TILE / R::COUNT {
+                let rows = Contiguous(first + vector * R::COUNT);
+                let index = vector % VECTORS_PER_TILE;
+                self.nodes(rows, None, &mut sums[index], &mut held[index]);
+            }
+        }
+        let (mut rest, mut rest_held) = (AxisSums::new(&self.input), HeldSums::new());
+        for node in whole..nodes {
+            self.nodes::<f32>(Contiguous(node), None, &mut rest, &mut rest_held);
+        }
+        let held_back = HeldSums::total(&held, R::lane_of_row, &rest_held);
+        AxisSums::total(&sums, R::lane_of_row, &rest, held_back)
+    }
+
+    #[inline(always)]
+    fn nodes<R: Real>(
+        &mut self,
+        rows: impl Rows,
+        motion: Option<MotionAt<R>>,
+        sums: &mut AxisSums<R>,
+        held: &mut HeldSums<R>,
+    ) {
         let nodes = self.input.read::<R>(rows, self.force);
         let NodeValues { free, mass, force: [fx, fy, fz], increment, .. } = nodes;
         let displacement = rows.read::<R>(must_cast_slice(self.input.displacement));
-        let mut moved = rows.read::<R>(must_cast_slice(self.tables.next_increment));
-        let mut removed = [R::splat(0.0); 3];
-        if let Some(damping) = &self.damped {
-            let mut rough = rows.read::<R>(must_cast_slice(self.tables.rough));
+        let OwnMotion { own, height, share, keep } =
+            self.own_motion(rows, &nodes, motion.as_ref().map(|motion| motion.fine));
+        held.add(share);
+        let keep =
+            if self.lattice.as_ref().is_some_and(|lattice| lattice.in_use) { R::splat(1.0) } else { keep };
+        let carry = keep * R::splat(self.input.step.carry());
+        let mut next = [height; 4];
+        for axis in 0..3 {
+            next[axis] = carry.fused(increment[axis], own[axis]);
+        }
+        if let Some(motion) = &motion {
+            for axis in 0..3 {
+                next[axis] = next[axis] + motion.coarse[axis];
+            }
+        }
+        for axis in 0..3 {
+            next[axis] = free[axis] * next[axis];
+        }
+        let damped = self.lattice.as_ref().and_then(|lattice| lattice.damped.as_ref());
+        if let (Some(damping), Some(motion)) = (damped, &motion) {
+            let has_table = !self.tables.rough.is_empty();
+            let mut rough = if has_table {
+                rows.read::<R>(must_cast_slice(self.tables.rough))
+            } else {
+                [R::splat(0.0); 4]
+            };
             let [square, change, both, whole] = &mut sums.rough;
             for axis in 0..3 {
-                let here = free[axis] * (increment[axis] - smooth[axis]);
+                let here = free[axis] * (increment[axis] - motion.smooth[axis]);
                 let difference = here - rough[axis];
                 *square = *square + mass * here * here;
                 *change = *change + mass * difference * difference;
                 *both = *both + mass * here * difference;
                 *whole = *whole + mass * free[axis] * increment[axis] * increment[axis];
                 // In a crushed body `here` may be infinite or NaN; with a share of zero it must not be used.
-                removed[axis] =
-                    if damping.share > 0.0 { R::splat(damping.share) * here } else { removed[axis] };
+                if damping.share > 0.0 {
+                    next[axis] = next[axis] - R::splat(damping.share) * here;
+                }
                 rough[axis] = here;
             }
-            rows.write(must_cast_slice_mut(self.tables.rough), rough);
-        }
-        for axis in 0..3 {
-            moved[axis] = free[axis] * (moved[axis] + coarse[axis]) - removed[axis];
-        }
-        sums.add(&nodes, displacement, moved);
-        rows.write(must_cast_slice_mut(self.tables.next_increment), moved);
-        rows.write(must_cast_slice_mut(self.force), [fx, fy, fz, R::splat(0.0)]);
-    }
-}
-
-/// Both passes in one, without a lattice.
-pub(super) struct UncoupledPass<'a, 'b> {
-    pub(super) input: PassInput<'a>,
-    pub(super) velocity_scale: f32,
-    pub(super) rotations: &'a RotationTable,
-    pub(super) force: &'a mut [NodeVector],
-    pub(super) tables: &'a mut NodeTables<'b>,
-}
-
-impl UncoupledPass<'_, '_> {
-    /// Compiled with this crate, as it is not generic.
-    #[inline(never)]
-    pub(super) fn dispatched(self) -> (HeldBack, Totals, DefectTotals) {
-        dispatch(self)
-    }
-}
-
-impl Kernel for UncoupledPass<'_, '_> {
-    type Output = (HeldBack, Totals, DefectTotals);
-
-    #[inline(always)]
-    fn run<R: Real>(mut self) -> Self::Output {
-        let nodes = self.input.inertia.len();
-        let whole = nodes - nodes % TILE;
-        let mut growth = [GrowthSums::<R>::new(); VECTORS_PER_TILE];
-        let mut sums = [AxisSums::<R>::new(&self.input); VECTORS_PER_TILE];
-        for first in (0..whole).step_by(TILE) {
-            for vector in 0..TILE / R::COUNT {
-                let rows = Contiguous(first + vector * R::COUNT);
-                let index = vector % VECTORS_PER_TILE;
-                self.nodes(rows, &mut growth[index], &mut sums[index]);
+            if has_table {
+                rows.write(must_cast_slice_mut(self.tables.rough), rough);
             }
         }
-        let (mut rest_growth, mut rest) = (GrowthSums::new(), AxisSums::new(&self.input));
-        for node in whole..nodes {
-            self.nodes::<f32>(Contiguous(node), &mut rest_growth, &mut rest);
-        }
-        let (totals, defects, _) = AxisSums::total(&sums, R::lane_of_row, &rest);
-        (GrowthSums::total(&growth, R::lane_of_row, rest_growth).0, totals, defects)
-    }
-}
-
-impl UncoupledPass<'_, '_> {
-    #[inline(always)]
-    fn nodes<R: Real>(&mut self, rows: Contiguous, growth: &mut GrowthSums<R>, sums: &mut AxisSums<R>) {
-        let &mut Self { input, velocity_scale, rotations, .. } = self;
-        let nodes = input.read::<R>(rows, self.force);
-        let [fx, fy, fz] = nodes.force;
-        let tables = &mut *self.tables;
-        let (cells, momentum): (&mut [CellPolynomial], _) = (&mut [], None);
-        let mut next = FinePass { input, velocity_scale, rotations, force: &[], tables, cells, momentum }
-            .nodes(rows, &nodes, growth)
-            .next;
-        for axis in 0..3 {
-            next[axis] = nodes.free[axis] * next[axis];
-        }
-        sums.add(&nodes, rows.read::<R>(must_cast_slice(input.displacement)), next);
+        sums.add(&nodes, displacement, next);
         rows.write(must_cast_slice_mut(self.tables.next_increment), next);
         rows.write(must_cast_slice_mut(self.force), [fx, fy, fz, R::splat(0.0)]);
+    }
+
+    /// `fine` is the smooth part of that motion.
+    #[inline(always)]
+    fn own_motion<R: Real>(
+        &mut self,
+        rows: impl Rows,
+        nodes: &NodeValues<R>,
+        fine: Option<[R; 3]>,
+    ) -> OwnMotion<R> {
+        let NodeTables { inverse_diagonal, inverse_off_diagonal, next_increment, .. } = &mut *self.tables;
+        let [rx, ry, rz] = self.input.residual(nodes);
+        let [_, _, _, height] = rows.read::<R>(must_cast_slice(next_increment));
+        // The frame is in the last bits of the height, see `NodeTables`.
+        let rotation = |lane: usize| {
+            let frame = padding::frame_of(height.lane(lane));
+            &self.rotations[frame.min(MAX_FUNCTIONS)]
+        };
+        let rotation = [
+            R::from_rows(|lane| rotation(lane)[0]),
+            R::from_rows(|lane| rotation(lane)[1]),
+            R::from_rows(|lane| rotation(lane)[2]),
+        ];
+        let bx = rotation[0][0] * rx + rotation[1][0] * ry + rotation[2][0] * rz;
+        let by = rotation[0][1] * rx + rotation[1][1] * ry + rotation[2][1] * rz;
+        let bz = rotation[0][2] * rx + rotation[1][2] * ry + rotation[2][2] * rz;
+        let [xx, yy, zz, bound_before] = rows.read::<R>(must_cast_slice(inverse_diagonal));
+        let [xy, yz, zx, share_before] = rows.read::<R>(must_cast_slice(inverse_off_diagonal));
+        let turned = [xx * bx + xy * by + zx * bz, xy * bx + yy * by + yz * bz, zx * bx + yz * by + zz * bz];
+        let mut own = [R::splat(0.0); 3];
+        for row in 0..3 {
+            own[row] =
+                rotation[row][0] * turned[0] + rotation[row][1] * turned[1] + rotation[row][2] * turned[2];
+        }
+        // What the node would do relative to the lattice.
+        let mut square = R::splat(0.0);
+        for axis in 0..3 {
+            let relative = fine.map_or(own[axis], |fine| own[axis] - nodes.free[axis] * fine[axis]);
+            square = relative.fused(relative, square);
+        }
+        let limit = (R::splat(LARGEST_MOVE) * height).divide(square.root());
+        // The share recovers only slowly: it may have fallen for a reason that returns.
+        let share = (R::splat(NODE_GROWTH) * self.input.inverse_growth(nodes, bound_before))
+            .min(R::splat(1.0))
+            .min(limit)
+            .min(R::splat(RECOVERY) * share_before);
+        let kept = share.max(R::splat(LEAST_SHARE));
+        rows.write(must_cast_slice_mut(inverse_off_diagonal), [xy, yz, zx, kept]);
+        for own in &mut own {
+            *own = share * *own;
+        }
+        let keep = share.divide(share_before).min(R::splat(1.0)).root();
+        OwnMotion { own, height, share, keep }
     }
 }
 

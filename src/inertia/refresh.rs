@@ -1,36 +1,36 @@
-//! The refresh of bounds, nodal inertia (kg) and coarse inertia, distributed over the steps of a cycle. A cycle has six
-//! stages, and each step does an equal part of the work of the whole cycle. The refresh only uses states after accepted
-//! steps.
+//! The refresh of bounds, nodal inertia (kg) and coarse inertia, distributed over the steps of a cycle. A cycle has up to
+//! five stages. A step does a part of its work that grows with the rate of deformation, at most all of it. The refresh only
+//! uses states after accepted steps.
 //!
 //! ```text
-//! elements   D_a (bound) and s_c D^2 / 4 Kc, most of it in sums of the lattice's cells
-//! cells      S = those sums
-//! nodes      N_a, Mc and G = W^T (N + reserve m) W in sums of the cells, p = W^T (N + reserve m) v
-//! cells      S += (1 + k) Mc, G
-//! inversions G^-1, then S^-1; N_a and X = S^-1 - G^-1 are in use from then on
+//! elements   D_a (bound) and S = (1 + k) Mc + s_c D^2 / 4 Kc
+//! nodes      N_a and a bound of G (nodal_sums.rs); in slow motion G in sums of the cells (projected_inertia.rs)
+//! cells      in slow motion G from those sums
+//! inversions in slow motion G^-1, then S^-1; all is in use from then on
 //! ```
-//! Mass scaling has only two stages, `D_a` of the elements and `N_a` of the nodes. The coarse part of the velocity is
-//! `c = G^-1 p`, its energy `c^T S c`. As for the nodes ([`super::node`]), a change of `S` must not add energy: `c` is
-//! scaled down to the energy that it had.
+//! In fast motion the bound replaces `G`, as a cycle may take only a few steps. Mass scaling has only the first two
+//! stages. An inverse is in use only if it takes the image of a known vector back
+//! to it.
 
-use super::assembly::{Assembly, CellMatrices, CoarseInertia};
-use super::dense::{Row, apply, mirror, stride, sweep};
-use super::frames::{Frames, Rotation, rotate};
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
-use super::matrices::{Matrices, copy, invert_mean};
+use super::assembly::{Assembly, BATCH, ElementTangent};
+use super::dense::{Row, apply, apply_lower, mirror, row_length, stride, sweep, sweeps};
+use super::frames::{Frames, Rotation};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode};
+use super::matrices::{Matrices, copy, invert_axes, of_axes};
+use super::nodal_sums::{self, FunctionInertia, add_mass, write_mass};
 use super::node::Scaling;
 use super::node_refresh::{NODE_BATCH, NodeBatch};
 use super::node_tables::NodeTables;
+use super::projected_inertia::{CellSums, add_cell};
 use super::report::AddedInertiaSums;
-use super::{COARSE, FINE};
-use crate::element::{ElementLaw, ElementMaterial, MatrixSums, TileBounds};
+use super::transport::invert_edges;
+use crate::element::{ElementLaw, ElementMaterial, ElementTile, MatrixSums, TileBounds, TileTangents};
 use crate::scene::SceneView;
 use crate::simd::{Gather, NodeVector, Scatter, TILE};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Elements,
-    ElementCells,
     Nodes,
     NodeCells,
     InvertFine,
@@ -43,23 +43,22 @@ pub(super) struct Refresh {
     stage: Stage,
     /// Pieces of work done in this stage: tiles, cells, batches of nodes, or functions and rows of a matrix.
     done: usize,
-    /// Cost of the work that is due now, and cost of the work of a step.
+    /// Cost of the work that is due now, and cost of the work of a cycle.
     due: i64,
-    cost_per_step: i64,
-    /// Steps of a cycle.
+    cost: i64,
+    /// Largest number of steps of a cycle, and whether one has ended.
     steps: u32,
-    /// This is the first cycle: nothing is in use yet.
+    ended: bool,
+    /// Stiffness of volume and of shear: of the present cycle, and of the last complete one.
+    next_stiffness: Stiffness,
+    stiffness: Stiffness,
+    /// Nothing is in use yet that belongs to this motion.
     first_cycle: bool,
     pub(super) frames: Frames,
     /// Step count of the state for which the frames were computed.
     frames_at: Option<u64>,
-    /// Coarse velocity that the next step removes, m a step.
-    pub(super) correction: CoarseVectors,
-    /// `p`.
-    momentum: CoarseVectors,
-    /// Share of `X` that the last step used, and the factor of the velocities in the next step.
-    share: f32,
-    pub(super) velocity_scale: f32,
+    /// The image of [`PROBE`] under the matrix that is being inverted.
+    image: Row,
     /// Whether all inversions of this cycle were accurate.
     sound: bool,
     /// Whether those of the matrices in use were.
@@ -67,9 +66,12 @@ pub(super) struct Refresh {
     /// Added inertia: sums of the present cycle, and of the last complete one.
     next_added: AddedInertiaSums,
     pub(super) added: AddedInertiaSums,
+    /// Whether the present cycle is slow enough for `G`, and whether `G` is in use, else its bound.
+    slow: bool,
+    pub(super) fine_in_use: bool,
 }
 
-/// Measured costs of a tile, of a tile without a lattice, of a cell, of a node, and of an entry of a row that is
+/// Measured costs of a tile, of a tile without a lattice, of a cell, of a cell, of a node, and of an entry of a row that is
 /// mirrored. The unit is the time of a floating-point operation of a pivot.
 const TILE_COST: i64 = 47_000;
 const TILE_UNCOUPLED_COST: i64 = 18_000;
@@ -77,47 +79,81 @@ const CELL_COST: i64 = 16_000;
 const NODE_COST: i64 = 1_500;
 const ROW_COST: i64 = 12;
 
+/// Tiles of a batch.
+const BATCH_TILES: usize = BATCH / TILE;
+
 /// Cost of a tile.
 const fn tile_cost(functions: usize) -> i64 {
     if functions > 0 { TILE_COST } else { TILE_UNCOUPLED_COST }
 }
 
-/// Allowance for rounding in sums over the lattice.
-const SLACK: f32 = 1e-3;
+/// Change of the lattice's shape within which a cycle has to end, for tissue that is as stiff in volume as in shear.
+const LARGEST_CHANGE: f32 = 0.8;
 
-/// A fall of the share of `X` reduces the velocities only below this share.
-const SMALL_SHARE: f32 = 0.5;
+/// Least sensitivity to a change of shape: the stiffness changes with the shape for any tissue.
+const LEAST_SENSITIVITY: f32 = 8.0;
+
+/// Share of a cycle in a step above which `G` is replaced by its bound.
+const SLOW: f32 = 0.5;
+
+/// Sums over the elements of the bounds of volume and shear stiffness, kg.
+#[derive(Clone, Copy, Debug)]
+struct Stiffness {
+    volume: f32,
+    shear: f32,
+}
+
+impl Stiffness {
+    const NONE: Self = Self { volume: 0.0, shear: 0.0 };
+
+    fn add(&mut self, tangents: &TileTangents) {
+        for [_, outer, exchanged, _] in tangents.factors {
+            self.volume += outer;
+            self.shear += 2.0 * exchanged;
+        }
+    }
+
+    /// How much sooner bounds are out of date than with equal stiffness of volume and shear. A change `e` of shape gives
+    /// motion without change of volume a share `e^2` of the stiffness of volume.
+    fn sensitivity(&self) -> f32 {
+        libm::sqrtf(1.0 + self.volume / self.shear.max(f32::MIN_POSITIVE))
+    }
+}
+
+/// Largest ratio of inertia to mass for which a matrix is inverted. Elements that are crushed exceed it.
+const LARGEST_RATIO: f32 = 1e6;
+
 /// Largest relative error of a sound inverse.
 const LARGEST_ERROR: f32 = 0.05;
 
-const NO_VECTORS: CoarseVectors = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+/// A vector of ones with signs in no order that a mode of a body has (the last bits of a multiplicative generator).
+static PROBE: Row = {
+    let (mut probe, mut at, mut random) = ([1.0; _], 0, 1u32);
+    while at < size_of::<Row>() / size_of::<f32>() {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        if random >> 31 == 1 {
+            probe[at] = -1.0;
+        }
+        at += 1;
+    }
+    probe
+};
 
-/// Inputs of a refresh, and the increments, which it may scale.
+/// Inputs of a refresh.
 pub(super) struct RefreshInput<'a, M> {
     pub(super) scene: SceneView<'a, M>,
     pub(super) displacement: &'a [NodeVector],
     pub(super) increment: &'a mut [NodeVector],
     pub(super) lattice: &'a Lattice,
     pub(super) places: &'a [LatticeNode],
+    pub(super) order: &'a [u32],
     pub(super) scaling: &'a Scaling,
 }
 
 impl<M> RefreshInput<'_, M> {
     /// The assembly of the coarse stiffness.
-    fn assembly<'a>(
-        &'a self,
-        matrix: &'a mut [f32],
-        sums: &'a mut [CellMatrices],
-        stride: usize,
-    ) -> Assembly<'a> {
-        Assembly {
-            lattice: self.lattice,
-            nodes: self.places,
-            inertia: self.scene.inertia,
-            matrix,
-            stride,
-            sums,
-        }
+    fn assembly<'a>(&'a self, matrix: &'a mut [f32], stride: usize) -> Assembly<'a> {
+        Assembly { lattice: self.lattice, nodes: self.places, inertia: self.scene.inertia, matrix, stride }
     }
 }
 
@@ -126,29 +162,32 @@ impl Refresh {
         stage: Stage::Elements,
         done: 0,
         due: 0,
-        cost_per_step: 0,
+        cost: 0,
         steps: 1,
+        ended: false,
+        next_stiffness: Stiffness::NONE,
+        stiffness: Stiffness::NONE,
         first_cycle: true,
         frames: Frames::NONE,
         frames_at: None,
-        correction: NO_VECTORS,
-        momentum: NO_VECTORS,
-        share: 1.0,
-        velocity_scale: 1.0,
+        image: [0.0; _],
         sound: true,
         lattice_in_use: false,
         next_added: AddedInertiaSums::NEW,
         added: AddedInertiaSums::NEW,
+        slow: true,
+        fine_in_use: true,
     };
 
     /// Cycles of `steps` steps for a scene with this many tiles and nodes, and a lattice with this many functions and
     /// cells.
     pub(super) fn new(steps: u32, tiles: usize, nodes: usize, functions: usize, cells: usize) -> Self {
-        let whole = tiles as i64 * tile_cost(functions)
-            + 2 * cells as i64 * CELL_COST
+        let whole = tiles.next_multiple_of(BATCH_TILES) as i64 * tile_cost(functions)
             + nodes.next_multiple_of(NODE_BATCH) as i64 * NODE_COST
-            + 2 * functions as i64 * (pivots_cost(functions) + 3 * row_cost(functions));
-        Self { cost_per_step: whole / i64::from(steps.max(1)) + 1, steps, ..Self::NEW }
+            + cells as i64 * CELL_COST
+            + 2 * (sweeps(3 * functions) as i64 * sweep_cost(functions)
+                + 3 * functions as i64 * row_cost(functions));
+        Self { cost: whole, steps, ..Self::NEW }
     }
 
     pub(super) const fn steps(&self) -> u32 {
@@ -163,18 +202,35 @@ impl Refresh {
         }
     }
 
-    /// Does one step's part of the cycle, after step number `steps`.
+    /// Does one step's part of the cycle, after step number `steps`, in which the shape of the lattice has changed by
+    /// `change` (strain, or rad of bending): the faster the tissue deforms, the more of the cycle. Where one step is
+    /// more than bounds can be out of date, it does a whole cycle from the start.
     pub(super) fn advance<M: ElementMaterial>(
         &mut self,
         steps: u64,
+        change: f32,
         mut input: RefreshInput<'_, M>,
         tables: &mut NodeTables<'_>,
         matrices: &mut Matrices<'_>,
     ) {
-        self.due += self.cost_per_step;
         self.update_frames(input.displacement, steps);
-        while self.due > 0 {
-            self.due -= self.work(&mut input, tables, matrices);
+        let pace = change * self.stiffness.sensitivity().max(LEAST_SENSITIVITY) / LARGEST_CHANGE;
+        if self.stage == Stage::Elements {
+            self.slow = pace < SLOW;
+        }
+        if pace < 1.0 {
+            self.due += (pace.max(1.0 / self.steps as f32) * self.cost as f32) as i64 + 1;
+            while self.due > 0 {
+                self.due -= self.work(&mut input, tables, matrices);
+            }
+        } else {
+            self.due = 0;
+            self.slow = false;
+            self.enter(Stage::Elements);
+            self.ended = false;
+            while !self.ended {
+                self.work(&mut input, tables, matrices);
+            }
         }
     }
 
@@ -185,7 +241,32 @@ impl Refresh {
         tables: &mut NodeTables<'_>,
         matrices: &mut Matrices<'_>,
     ) {
+        let (lattice, functions) = (input.lattice, input.lattice.functions());
+        if functions > 0 {
+            write_mass(matrices.mass, lattice, input.places, input.scene.inertia);
+            self.sound &= invert_axes(matrices.mass_inverse, matrices.mass, functions);
+            self.sound &= invert_edges(matrices.edge_inverse, lattice);
+        }
         self.frames.update(input.displacement);
+        while self.first_cycle {
+            self.work(&mut input, tables, matrices);
+        }
+    }
+
+    /// Does a whole cycle at once for a state that does not follow from the last one.
+    pub(super) fn renew<M: ElementMaterial>(
+        &mut self,
+        mut input: RefreshInput<'_, M>,
+        tables: &mut NodeTables<'_>,
+        matrices: &mut Matrices<'_>,
+    ) {
+        // Twice: no rotation in the latest step.
+        self.frames.update(input.displacement);
+        self.frames.update(input.displacement);
+        self.frames_at = None;
+        self.due = 0;
+        (self.first_cycle, self.slow) = (true, true);
+        self.enter(Stage::Elements);
         while self.first_cycle {
             self.work(&mut input, tables, matrices);
         }
@@ -202,7 +283,6 @@ impl Refresh {
         self.done += 1;
         match self.stage {
             Stage::Elements => self.add_elements(input, tables, matrices, at),
-            Stage::ElementCells => self.add_element_cell(input, matrices, at),
             Stage::Nodes => self.add_nodes(input, tables, matrices, at),
             Stage::NodeCells => self.add_node_cell(input, matrices, at),
             Stage::InvertFine => self.invert_fine(input, matrices, at),
@@ -210,7 +290,7 @@ impl Refresh {
         }
     }
 
-    /// The bounds of the elements of tile `at`.
+    /// The bounds of the elements of batch `at` of the tiles.
     fn add_elements<M: ElementMaterial>(
         &mut self,
         input: &RefreshInput<'_, M>,
@@ -221,30 +301,34 @@ impl Refresh {
         let functions = input.lattice.functions();
         if at == 0 {
             tables.clear_sums();
+            (self.next_stiffness, self.next_added) = (Stiffness::NONE, AddedInertiaSums::NEW);
+            let factor = 1.0 + input.scaling.k;
             matrices.next_coarse.fill(0.0);
-            matrices.sums.fill(CellMatrices::NONE);
+            add_mass(matrices.next_coarse, stride(functions), matrices.mass, functions, factor);
             self.frames.start_cycle();
         }
-        self.add_tile(input, tables, matrices, at);
-        if self.done >= input.scene.tiles.len() {
-            self.enter(if functions > 0 { Stage::ElementCells } else { Stage::Nodes });
+        let mut batch = [ElementTangent::NONE; BATCH];
+        let mut parts = batch.chunks_exact_mut(TILE);
+        for at in at * BATCH_TILES..self.done * BATCH_TILES {
+            let part = parts.next().unwrap_or_default();
+            if functions > 0 {
+                let places = input.order.chunks(TILE).nth(at).unwrap_or_default();
+                let tile = ElementTile::gather(input.scene.tiles, places);
+                self.add_tile(input, tables, &tile, part.get_mut(..places.len()).unwrap_or_default());
+            } else if let Some(tile) = input.scene.tiles.get(at) {
+                self.add_tile(input, tables, tile, &mut []);
+            }
         }
-        tile_cost(functions)
-    }
-
-    /// The sums over elements of cell `at`, added to the next `S`.
-    fn add_element_cell<M>(
-        &mut self,
-        input: &RefreshInput<'_, M>,
-        matrices: &mut Matrices<'_>,
-        at: usize,
-    ) -> i64 {
-        let stride = stride(input.lattice.functions());
-        input.assembly(matrices.next_coarse, matrices.sums, stride).add_cell(at);
-        if self.done >= input.lattice.cell_count() {
+        if functions > 0 {
+            let stride = stride(functions);
+            let elements = input.order.len().saturating_sub(at * BATCH);
+            input.assembly(matrices.next_coarse, stride).add(batch.get(..elements).unwrap_or(&batch));
+        }
+        let tiles = if functions > 0 { input.order.len().div_ceil(TILE) } else { input.scene.tiles.len() };
+        if self.done * BATCH_TILES >= tiles {
             self.enter(Stage::Nodes);
         }
-        CELL_COST
+        BATCH_TILES as i64 * tile_cost(functions)
     }
 
     /// The inertia of batch `at` of the nodes.
@@ -256,13 +340,16 @@ impl Refresh {
         at: usize,
     ) -> i64 {
         if at == 0 {
-            matrices.next_fine.fill(0.0);
-            self.momentum = NO_VECTORS;
+            matrices.next_bound.fill(FunctionInertia::default());
+            if self.slow {
+                matrices.next_fine.fill(0.0);
+                matrices.sums.fill(CellSums::NONE);
+            }
         }
         self.refresh_nodes(input, tables, matrices, at * NODE_BATCH);
         if self.done * NODE_BATCH >= input.scene.node_count() {
             if input.lattice.functions() > 0 {
-                self.enter(Stage::NodeCells);
+                self.enter(if self.slow { Stage::NodeCells } else { Stage::InvertCoarse });
             } else {
                 self.end(tables, matrices);
             }
@@ -270,7 +357,7 @@ impl Refresh {
         NODE_BATCH as i64 * NODE_COST
     }
 
-    /// The sums over nodes of cell `at`, added to the next `S` and `G`.
+    /// The sums over nodes of cell `at`, added to the next `G`.
     fn add_node_cell<M>(
         &mut self,
         input: &RefreshInput<'_, M>,
@@ -278,17 +365,8 @@ impl Refresh {
         at: usize,
     ) -> i64 {
         let lattice = input.lattice;
-        let mass_only = match &mut matrices.damped {
-            Some(damped) => &mut *damped.next_mass,
-            None => &mut [],
-        };
-        if at == 0 {
-            mass_only.fill(0.0);
-        }
-        let (inertia, mass) = (&mut *matrices.next_fine, &mut *matrices.next_coarse);
         if let Some(sums) = matrices.sums.get_mut(at) {
-            let (momenta, stride) = (&mut self.momentum, stride(lattice.functions()));
-            CoarseInertia { lattice, inertia, mass, mass_only, momenta, stride }.add_cell(at, sums);
+            add_cell(matrices.next_fine, stride(lattice.functions()), lattice.functions_of(at), sums);
         }
         if self.done >= lattice.cell_count() {
             self.enter(Stage::InvertFine);
@@ -296,31 +374,16 @@ impl Refresh {
         CELL_COST
     }
 
-    /// A part of the inversion of the next `G`: three pivots, later one row.
+    /// A part of the inversion of the next `G`.
     fn invert_fine<M>(&mut self, input: &RefreshInput<'_, M>, matrices: &mut Matrices<'_>, at: usize) -> i64 {
-        let functions = input.lattice.functions();
-        let (size, stride) = (3 * functions, stride(functions));
-        if let Some(damped) = matrices.damped.as_mut().filter(|_| at == 0) {
-            self.sound &= invert_mean(damped.next_mean_inverse, matrices.next_fine, functions, stride);
-        }
-        if at < functions {
-            self.sound &= sweep(matrices.next_fine, size, stride, at);
-            return pivots_cost(functions);
-        }
-        let row = at - functions;
-        mirror(matrices.next_fine, stride, row, -1.0);
-        mirror(matrices.next_coarse, stride, row, 1.0);
-        if let Some(damped) = &mut matrices.damped {
-            mirror(damped.next_mass, stride, row, 1.0);
-        }
-        if row + 1 == size {
-            self.keep_energy(matrices, size, stride);
+        let (cost, ended) = self.invert(matrices.next_fine, matrices.mass, input.lattice.functions(), at);
+        if ended {
             self.enter(Stage::InvertCoarse);
         }
-        row_cost(functions)
+        cost
     }
 
-    /// A part of the inversion of the next `S`: three pivots, later one row.
+    /// A part of the inversion of the next `S`.
     fn invert_coarse<M>(
         &mut self,
         input: &RefreshInput<'_, M>,
@@ -328,19 +391,31 @@ impl Refresh {
         matrices: &mut Matrices<'_>,
         at: usize,
     ) -> i64 {
-        let functions = input.lattice.functions();
-        let (size, stride) = (3 * functions, stride(functions));
-        if at < functions {
-            self.sound &= sweep(matrices.next_coarse, size, stride, at);
-            return pivots_cost(functions);
-        }
-        let row = at - functions;
-        mirror(matrices.next_coarse, stride, row, -1.0);
-        if row + 1 == size {
-            self.sound &= self.inverse_is_accurate(matrices, size, stride);
+        let (cost, ended) = self.invert(matrices.next_coarse, matrices.mass, input.lattice.functions(), at);
+        if ended {
             self.end(tables, matrices);
         }
-        row_cost(functions)
+        cost
+    }
+
+    /// A part of an inversion: a step of it, later one row. Gives its cost, and whether it was the last one.
+    fn invert(&mut self, matrix: &mut [f32], mass: &[f32], functions: usize, at: usize) -> (i64, bool) {
+        let (size, stride) = (3 * functions, stride(functions));
+        if at == 0 {
+            self.sound &= is_conditioned(matrix, mass, functions);
+            self.image = apply_lower(matrix, stride, probe(size));
+        }
+        if at < sweeps(size) {
+            self.sound &= sweep(matrix, size, stride, at);
+            return (sweep_cost(functions), false);
+        }
+        let row = at - sweeps(size);
+        mirror(matrix, stride, row, -1.0);
+        let ended = row + 1 == size;
+        if ended {
+            self.sound &= self.is_accurate(matrix, size, stride);
+        }
+        (row_cost(functions), ended)
     }
 
     fn enter(&mut self, stage: Stage) {
@@ -355,18 +430,15 @@ impl Refresh {
         self.enter(Stage::Elements);
     }
 
-    /// Adds the bounds of the elements of tile `at` to the sums of nodes and lattice.
+    /// Adds the bounds of the elements of a tile to the sums of the nodes. With a lattice, writes their tangents.
     fn add_tile<M: ElementMaterial>(
-        &self,
+        &mut self,
         input: &RefreshInput<'_, M>,
         tables: &mut NodeTables<'_>,
-        matrices: &mut Matrices<'_>,
-        at: usize,
+        tile: &ElementTile,
+        elements: &mut [ElementTangent],
     ) {
         let displacement = Gather::new(input.displacement);
-        let Some(tile) = input.scene.tiles.get(at) else {
-            return;
-        };
         let has_lattice = input.lattice.functions() > 0;
         let mut rotations = [Rotation::NONE.0; TILE];
         for (lane, rotation) in rotations.iter_mut().enumerate() {
@@ -379,8 +451,10 @@ impl Refresh {
         let rotations = &rotations;
         let tangents = M::Law::tile_bounds(TileBounds { laws, tile, displacement, sums, rotations, weight });
         if has_lattice {
-            let stride = stride(input.lattice.functions());
-            input.assembly(matrices.next_coarse, matrices.sums, stride).add_tile(tile, &tangents);
+            self.next_stiffness.add(&tangents);
+            for (lane, element) in elements.iter_mut().enumerate() {
+                *element = ElementTangent::of(tile, &tangents, lane);
+            }
         }
     }
 
@@ -392,81 +466,40 @@ impl Refresh {
         matrices: &mut Matrices<'_>,
         first: usize,
     ) {
-        let Self { frames, next_added: added, first_cycle, .. } = self;
         let RefreshInput { scene, increment, lattice, places, scaling, .. } = input;
-        let sums = &mut *matrices.sums;
-        let first_cycle = *first_cycle;
+        let (bounds, added) = (&mut *matrices.next_bound, &mut self.next_added);
+        let sums = if self.slow { &mut *matrices.sums } else { &mut [] };
         let inertia = scene.inertia;
         let places = if lattice.functions() > 0 { *places } else { &[] };
-        NodeBatch { inertia, increment, places, scaling, frames, added, tables, sums, first, first_cycle }
+        let moving = (!self.lattice_in_use && !self.first_cycle).then_some((&mut **increment, &self.frames));
+        NodeBatch { inertia, moving, lattice, places, scaling, added, tables, bounds, sums, first }
             .dispatched();
     }
 
-    /// Sets the share of `X` that a step used. A smaller share is a larger inertia of the lattice, which must not add
-    /// energy. The lattice's part of the velocity is not known in each step, so all velocities are scaled; but only at
-    /// small shares, because at large ones this would remove more motion than necessary.
-    pub(super) fn set_share(&mut self, share: f32) {
-        let (new, old) = (share.min(SMALL_SHARE), self.share.min(SMALL_SHARE));
-        self.velocity_scale = if new < old { libm::sqrtf(new / old) } else { 1.0 };
-        self.share = share;
-    }
-
-    /// Computes the correction of the coarse velocity with which the next `S` adds no energy. The next `G` is inverted
-    /// already, the next `S` is not.
-    fn keep_energy(&mut self, matrices: &mut Matrices<'_>, size: usize, stride: usize) {
-        let momentum = to_components(&self.momentum);
-        let momentum = momentum.get(..size).unwrap_or_default();
-        let velocity = apply(matrices.next_fine, stride, momentum);
-        let velocity = velocity.get(..size).unwrap_or_default();
-        let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
-        let energy = |matrix: &[f32], velocity: &[f32]| dot(velocity, &apply(matrix, stride, velocity));
-        // The velocity in the world, and in the frames of `S` in use.
-        let mut world = NO_VECTORS;
-        from_components(velocity, &mut world);
-        rotate(&mut world, &self.frames.of_cycle, Rotation::in_world);
-        let mut vectors = world;
-        rotate(&mut vectors, &self.frames.of_bounds, Rotation::in_frame);
-        let old = to_components(&vectors);
-        let before = energy(matrices.coarse, old.get(..size).unwrap_or_default());
-        let after = energy(matrices.next_coarse, velocity);
-        // `S <= COARSE / FINE G`, so `c^T S c <= COARSE / FINE c^T p`. If that is violated, `G` was too ill-conditioned
-        // to be inverted: the velocity is meaningless, and `X` will not be used.
-        self.sound &= after <= dot(velocity, momentum) * (COARSE / FINE + SLACK);
-        if self.sound && !self.first_cycle && after > before * (1.0 + 1e-5) && after > 0.0 {
-            let lost = 1.0 - libm::sqrtf(if before > 0.0 { before / after } else { 0.0 });
-            for (correction, velocity) in self.correction.iter_mut().zip(&world) {
-                correction.0 = velocity.0.map(|component| lost * component);
-            }
-        }
-        copy(matrices.coarse, matrices.next_coarse);
-    }
-
-    /// Whether `S S^-1 p = p`, except for rounding.
-    fn inverse_is_accurate(&self, matrices: &Matrices<'_>, size: usize, stride: usize) -> bool {
-        let momentum = to_components(&self.momentum);
-        let momentum = momentum.get(..size).unwrap_or_default();
-        let solved = apply(matrices.next_coarse, stride, momentum);
-        let back = apply(matrices.coarse, stride, solved.get(..size).unwrap_or_default());
-        let (mut error, mut all) = (0.0, 0.0);
-        for (back, momentum) in back.iter().zip(momentum) {
-            error += (back - momentum) * (back - momentum);
-            all += momentum * momentum;
-        }
-        error <= LARGEST_ERROR * LARGEST_ERROR * all
+    /// Whether an inverse takes the image of [`PROBE`] back to it, except for rounding.
+    fn is_accurate(&self, inverse: &[f32], size: usize, stride: usize) -> bool {
+        let back = apply(inverse, stride, self.image.get(..size).unwrap_or_default());
+        let errors = back.iter().zip(probe(size)).map(|(back, probe)| (back - probe) * (back - probe));
+        errors.sum::<f32>() <= LARGEST_ERROR * LARGEST_ERROR * size as f32
     }
 
     /// Puts the matrices of the cycle into use, and prepares the next cycle.
     fn put_in_use(&mut self, matrices: &mut Matrices<'_>) {
-        let inverses = matrices.next_coarse.iter().zip(matrices.next_fine.iter());
-        for (applied, (coarse, fine)) in matrices.applied.iter_mut().zip(inverses) {
-            *applied = if self.sound { coarse - fine } else { 0.0 };
-        }
-        if let Some(damped) = &mut matrices.damped {
-            copy(damped.inverse, matrices.next_coarse);
-            copy(damped.mass, damped.next_mass);
-            copy(damped.mean_inverse, damped.next_mean_inverse);
+        if self.sound {
+            copy(matrices.coarse_inverse, matrices.next_coarse);
+            nodal_sums::invert(matrices.bound_inverse, matrices.next_bound);
+            if self.slow {
+                copy(matrices.fine_inverse, matrices.next_fine);
+            }
+        } else {
+            matrices.coarse_inverse.fill(0.0);
+            matrices.fine_inverse.fill(0.0);
+            matrices.bound_inverse.fill(FunctionInertia::default());
         }
         self.lattice_in_use = self.sound;
+        self.fine_in_use = self.slow;
+        self.ended = true;
+        (self.stiffness, self.next_stiffness) = (self.next_stiffness, Stiffness::NONE);
         self.frames.end_cycle();
         self.added = self.next_added;
         self.next_added = AddedInertiaSums::NEW;
@@ -475,9 +508,24 @@ impl Refresh {
     }
 }
 
-/// Cost of three pivots: a multiplication and an addition for each entry of the lower triangle and each pivot.
-fn pivots_cost(functions: usize) -> i64 {
-    3 * (3 * functions * stride(functions)) as i64
+/// Whether the inertia of each unknown is at most [`LARGEST_RATIO`] times its mass, as far as single precision goes.
+fn is_conditioned(inertia: &[f32], mass: &[f32], functions: usize) -> bool {
+    let (stride, length) = (stride(functions), row_length(functions));
+    (0..3).zip(of_axes(mass)).all(|(axis, mass)| {
+        let masses = mass.iter().step_by(length + 1).take(functions);
+        let inertia = inertia.iter().skip(axis * (stride + 1)).step_by(3 * (stride + 1));
+        inertia.zip(masses).all(|(inertia, mass)| *inertia <= LARGEST_RATIO * mass)
+    })
+}
+
+/// The first components of [`PROBE`].
+fn probe(size: usize) -> &'static [f32] {
+    PROBE.get(..size).unwrap_or_default()
+}
+
+/// Cost of a step of an inversion: a multiplication and an addition for each entry of the lower triangle and each pivot.
+fn sweep_cost(functions: usize) -> i64 {
+    12 * (3 * functions * stride(functions)) as i64
 }
 
 /// Cost of a row that is mirrored.

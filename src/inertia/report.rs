@@ -44,16 +44,19 @@ pub(super) struct HeldBack {
     pub(super) nodes: u32,
     /// Sum of the unused shares of their inverse inertia.
     pub(super) unused: f32,
+    /// The least share.
+    pub(super) least: f32,
 }
 
 impl HeldBack {
-    pub(super) const NONE: Self = Self { nodes: 0, unused: 0.0 };
+    pub(super) const NONE: Self = Self { nodes: 0, unused: 0.0, least: 1.0 };
 
-    /// Adds a number of nodes and the sum of their unused shares.
+    /// Adds a number of nodes, the sum of their unused shares and the least share.
     #[inline(always)]
-    pub(super) fn add(&mut self, nodes: f32, unused: f32) {
+    pub(super) fn add(&mut self, nodes: f32, unused: f32, least: f32) {
         self.nodes += nodes as u32;
         self.unused += unused;
+        self.least = self.least.min(least);
     }
 }
 

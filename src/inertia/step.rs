@@ -11,25 +11,28 @@ use crate::simd::NodeVector;
 use crate::state::StateView;
 use crate::step::{Computed, Status, Step, StepMethod, Trial, external_forces};
 
-use super::cells::{CellPolynomial, prolong, restrict};
+use super::cells::{prolong, restrict};
 use super::damper::RoughMotion;
-use super::dense::{Row, apply, stride};
+use super::dense::{Row, apply, apply_by_axis, apply_to_two, stride};
 use super::estimate::{DefectTotals, dot};
 use super::frames::{Rotation, rotate};
 use super::large_step::{LargeModel, LargeView, Storage};
-use super::lattice::{Lattice, MAX_FUNCTIONS};
-use super::matrices::{DampedMatrices, Matrices, thirds};
+use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
+use super::matrices::{Matrices, of_axes};
+use super::nodal_sums;
 use super::passes::{
-    ApplyIncrements, CorrectionPass, FinePass, PassInput, RoughDamping, UncoupledPass, rotation_table,
+    ApplyIncrements, LatticeMotion, MotionPass, PassInput, PassTotals, RestrictionPass, RoughDamping,
+    rotation_table,
 };
 use super::refresh::{Refresh, RefreshInput, from_components, to_components};
 use super::report::HeldBack;
-use super::{COARSE_GROWTH, LARGEST_MOVE};
+use super::transport::turned_part;
+use super::{COARSE_GROWTH, DRAG, LARGEST_STRAIN, NODE_GROWTH};
 
 /// A step is [`Status::Limited`] if more than this share of the inverse inertia of all nodes is not used, or less than
 /// this share of the lattice's motion is used.
 const LARGEST_UNUSED: f32 = 0.05;
-const LEAST_COARSE_SHARE: f32 = 0.5;
+const LEAST_COARSE_SHARE: f32 = 0.8;
 
 impl LargeView<'_, '_> {
     /// See [`super::LargeStep::step`].
@@ -43,11 +46,11 @@ impl LargeView<'_, '_> {
         let nodes = model.nodes;
         let mismatch = Status::Mismatch { nodes: scene.node_count(), room: nodes.min(state.capacity()) };
         let damped = model.method.damper().is_some();
-        let Some(storage) = Storage::split(storage, nodes, &model.lattice, damped) else {
+        let Some(storage) = Storage::split(storage, [nodes, model.elements], &model.lattice, damped) else {
             return mismatch;
         };
-        if nodes != scene.node_count() {
-            return mismatch;
+        if !model.is_for(scene) {
+            return Status::Mismatch { nodes: scene.node_count(), room: 0 };
         }
         let step = model.step.carried_from(state.dt);
         match Trial::begin(scene, loads, state, nodes) {
@@ -69,6 +72,8 @@ struct InertiaStep<'a, 'w> {
     rough: RoughMotion,
     coarse_share: f32,
     damping: f32,
+    /// Change of the lattice's shape by the last increment.
+    change: f32,
 }
 
 impl<'a, 'w> InertiaStep<'a, 'w> {
@@ -83,19 +88,30 @@ impl<'a, 'w> InertiaStep<'a, 'w> {
             rough: RoughMotion::NONE,
             coarse_share: 1.0,
             damping: 0.0,
+            change: 0.0,
         }
     }
 }
 
 impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
-        let Self { step, model, storage: Storage { tables, places, matrices }, .. } = self;
-        let LargeModel { lattice, refresh, scaling, rough, method, .. } = &mut **model;
+        let Self { step, model, storage: Storage { tables, places, order, matrices }, .. } = self;
+        let LargeModel { lattice, refresh, scaling, rough, method, least_share, steps, estimate, .. } =
+            &mut **model;
         let Trial { scene, loads, displacement, increment, force, progress } = trial;
+        if *steps != progress.steps {
+            // Another step has moved the state, or it was reset or restored.
+            let input =
+                RefreshInput { scene: *scene, displacement, increment, lattice, places, order, scaling };
+            refresh.renew(input, tables, matrices);
+            (*rough, *least_share, *estimate) = (RoughMotion::NONE, 1.0, estimate.cleared());
+            tables.rough.fill(NodeVector::ZERO);
+            *steps = progress.steps;
+        }
         let (inertia, force): (_, &mut [NodeVector]) = (scene.inertia, force);
         external_forces(force, 0, inertia, loads, progress.time);
         self.external = dot(force, displacement);
-        let has_lattice = lattice.functions() > 0;
+        let (has_lattice, damped) = (lattice.functions() > 0, method.damper().is_some());
         let extremes = M::Law::forces_and_bounds(InternalForces::of_all(
             scene.elements(),
             displacement,
@@ -108,27 +124,37 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
         self.damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
         refresh.update_frames(displacement, progress.steps);
         let rotations = &rotation_table(&refresh.frames.of_bounds, refresh.frames.functions());
-        let input = PassInput { step, scaling, inertia, displacement, increment, places };
-        let velocity_scale = refresh.velocity_scale;
-        let totals;
-        if has_lattice {
-            let cells = &mut *matrices.cells;
-            let momentum = matrices.damped.as_mut().map(|damped| &mut *damped.momentum);
-            let growth;
-            (self.held_back, growth) =
-                FinePass { input, velocity_scale, rotations, force, tables, cells, momentum }.dispatched();
-            let allowed = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
-            self.coarse_share = coarse_motion(matrices, lattice, allowed, refresh);
-            let cells = &*matrices.cells;
-            let damped = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use);
-            let smooth = damped.and_then(|damped| smooth_motion(damped, lattice, increment));
-            let damped = smooth.map(|smooth| RoughDamping { smooth, share: self.damping });
-            (totals, self.defects, self.rough) =
-                CorrectionPass { input, cells, damped, force, tables }.dispatched();
+        let square = step.seconds() * step.seconds() * if progress.steps == 0 { 0.5 } else { 1.0 };
+        let input = PassInput { step, scaling, square, inertia, displacement, increment, places };
+        let lattice = if has_lattice {
+            let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
+            let growth = RestrictionPass { input, force, tables, cells, momentum }.dispatched();
+            let share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
+            let smooth = smooth_motion(matrices, lattice, increment).filter(|_| refresh.lattice_in_use);
+            let motion = CoarseMotion {
+                lattice,
+                refresh,
+                second_order: damped,
+                k: scaling.k,
+                least_share: least_share.min(NODE_GROWTH / growth),
+                smooth: smooth.as_ref(),
+                allowed: progress.energy_balance.allowed_share(),
+            };
+            let (share, change) = motion.compute(matrices, share);
+            // Where bounds have grown beyond their margin they are out of date whatever the lattice does.
+            self.change = if growth <= COARSE_GROWTH { change } else { f32::INFINITY };
+            self.coarse_share = if refresh.lattice_in_use { share } else { 0.0 };
+            let (cells, fine) = (&*matrices.cells, &*matrices.fine_cells);
+            let share = self.damping.max(removed_share(share.min(motion.allowed)));
+            let damped = (smooth.is_some() && (damped || share > 0.0))
+                .then_some(RoughDamping { smooth: matrices.smooth_cells, share });
+            Some(LatticeMotion { cells, fine, damped, in_use: smooth.is_some() })
         } else {
-            (self.held_back, totals, self.defects) =
-                UncoupledPass { input, velocity_scale, rotations, force, tables }.dispatched();
-        }
+            None
+        };
+        let passed = MotionPass { input, rotations, lattice, force, tables }.dispatched();
+        let totals;
+        PassTotals { totals, defects: self.defects, rough: self.rough, held_back: self.held_back } = passed;
         Computed { totals, extremes }
     }
 
@@ -147,13 +173,16 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
     }
 
     fn finish(&mut self, trial: &mut Trial<'_, M>) -> bool {
-        let Self { model, storage: Storage { tables, places, matrices }, held_back, coarse_share, .. } = self;
-        let LargeModel { lattice, refresh, scaling, estimate, report, nodes, .. } = &mut **model;
-        refresh.correction = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-        refresh.set_share(*coarse_share);
+        let Self {
+            model, storage: Storage { tables, places, order, matrices }, held_back, coarse_share, ..
+        } = self;
+        let LargeModel { lattice, refresh, scaling, estimate, report, nodes, least_share, steps, .. } =
+            &mut **model;
+        *least_share = held_back.least;
         let Trial { scene, displacement, increment, progress, .. } = trial;
-        let input = RefreshInput { scene: *scene, displacement, increment, lattice, places, scaling };
-        refresh.advance(progress.steps, input, tables, matrices);
+        *steps = progress.steps;
+        let input = RefreshInput { scene: *scene, displacement, increment, lattice, places, order, scaling };
+        refresh.advance(progress.steps, self.change, input, tables, matrices);
         *report = refresh.added.report(held_back.nodes, *coarse_share, estimate.error());
         report.damping = self.damping;
         held_back.unused > LARGEST_UNUSED * *nodes as f32 || *coarse_share < LEAST_COARSE_SHARE
@@ -164,66 +193,159 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
 /// may lie outside the body.
 const LARGEST_SMOOTH: f32 = 10.0;
 
-/// Turns the cells' sums of momentum into the smooth part of the increments, `W G^-1 W^T M du`. None if the result is
-/// implausible: `G` is up to a cycle old, and `M` may have changed much since, where an element was crushed.
-fn smooth_motion<'a>(
-    damped: &'a mut DampedMatrices<'_>,
+/// The lattice's part `c = Mc^-1 W^T m du` of the increments. Turns the cells' sums of momentum into the smooth part of the
+/// increments, `W` times that. To remove a share of the rest changes no momentum of the lattice, so neither that of the
+/// body. None if the result is not plausible.
+fn smooth_motion(
+    matrices: &mut Matrices<'_>,
     lattice: &Lattice,
     increment: &[NodeVector],
-) -> Option<&'a [CellPolynomial]> {
-    let functions = lattice.functions();
-    let momentum = restrict(damped.momentum, lattice);
-    let mut smooth = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    let rows = damped.mean_inverse.chunks_exact(stride(thirds(functions)).max(1));
-    for (smooth, row) in smooth.iter_mut().zip(rows).take(functions) {
-        let products = row.iter().zip(&momentum).take(functions);
-        let sum: Vec4 = products.map(|(entry, momentum)| *entry * Vec4::from(momentum.0)).sum();
-        smooth.0 = sum.to_array();
-    }
+) -> Option<CoarseVectors> {
+    let momentum = restrict(matrices.smooth_cells, lattice);
+    let mut motion = [NodeVector::ZERO; _];
+    let components =
+        apply_by_axis(of_axes(matrices.mass_inverse), lattice.functions(), &to_components(&momentum));
+    from_components(&components, &mut motion);
     let largest = increment.iter().fold(Vec4::ZERO, |most, du| most.max(Vec4::from(du.0).abs()));
     let limit = Vec4::splat(LARGEST_SMOOTH * largest.max_element());
-    if !smooth.iter().all(|vector| Vec4::from(vector.0).abs().cmple(limit).all()) {
+    if !motion.iter().all(|vector| Vec4::from(vector.0).abs().cmple(limit).all()) {
         return None;
     }
-    prolong(&smooth, lattice, damped.momentum);
-    Some(damped.momentum)
+    prolong(&motion, lattice, matrices.smooth_cells);
+    Some(motion)
 }
 
-/// Turns the cells' sums of the residual `r` into the lattice's motion: `share (S^-1 - G^-1) W^T r` minus the
-/// correction after a change of `S`. Reduces the share if the forces of one step would strain a cell by more than
-/// [`LARGEST_MOVE`], and returns it. A damped step uses the second-order operator instead of `S^-1` (`damper.rs`).
-fn coarse_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, mut share: f32, refresh: &Refresh) -> f32 {
-    let functions = lattice.functions();
-    let (size, stride) = (3 * functions, stride(functions));
-    let mut restricted = restrict(matrices.cells, lattice);
-    rotate(&mut restricted, &refresh.frames.of_bounds, Rotation::in_frame);
-    let forces = to_components(&restricted);
-    let times = |matrix: &[f32], row: &Row| apply(matrix, stride, row.get(..size).unwrap_or_default());
-    let mut moved = times(matrices.applied, &forces);
-    if let Some(damped) = matrices.damped.as_mut().filter(|_| refresh.lattice_in_use) {
-        // `A S^-1 g` as `g - M S^-1 g`: where elements are crushed `A` is so large that products with it overflow.
-        let first = times(damped.inverse, &forces);
-        let mut absorbed = forces;
-        for (absorbed, passed) in absorbed.iter_mut().zip(times(damped.mass, &first)) {
-            *absorbed -= passed;
+/// Share of the strain rates that a step removes where only this share of the lattice's motion is used. There inertia is
+/// about to grow by the inverse of the share; what is left has no more energy with the new inertia than it had before.
+fn removed_share(share: f32) -> f32 {
+    1.0 - libm::sqrtf(share)
+}
+
+/// The motion of the lattice in a step.
+struct CoarseMotion<'a> {
+    lattice: &'a Lattice,
+    refresh: &'a Refresh,
+    /// A damped step uses the second-order operator instead of `S^-1` (`damper.rs`).
+    second_order: bool,
+    /// `mu D / 2`.
+    k: f32,
+    /// The least share of a node: with it the operator is positive whatever the shares of the others are.
+    least_share: f32,
+    /// The lattice's part of the last increment.
+    smooth: Option<&'a CoarseVectors>,
+    /// The share of the kinetic energy that can have come from the loads.
+    allowed: f32,
+}
+
+impl CoarseMotion<'_> {
+    /// Turns the cells' sums of the residual `r` into the lattice's motion and what the nodes' own inertia would give to
+    /// it, `G^-1 g` with `g = W^T r`. The motion is
+    ///
+    /// ```text
+    /// share S^-1 (g - M w) + w - (removed T + drag T^2) c - least G^-1 g     M = (1 + k) Mc,  T = S^-1 A = 1 - S^-1 M
+    /// ```
+    /// with the rotation `w` of the velocities (`transport.rs`). Reduces the share if the forces of one step would
+    /// strain a cell by more than [`LARGEST_STRAIN`]. Gives it, and by how much the step changes the lattice's shape.
+    fn compute(&self, matrices: &mut Matrices<'_>, mut share: f32) -> (f32, f32) {
+        let Self { lattice, refresh, .. } = *self;
+        let forces = self.in_frames(&restrict(matrices.cells, lattice));
+        let fine = self.in_world(&self.fine(matrices, &forces));
+        let (mut turned, mut last) = ([NodeVector::ZERO; _], [0.0; _]);
+        if let Some(smooth) = self.smooth {
+            turned = turned_part(smooth, lattice, &refresh.frames, matrices.edge_inverse);
+            last = self.in_frames(smooth);
         }
-        let second = times(damped.inverse, &absorbed);
-        for (moved, more) in moved.iter_mut().zip(times(damped.inverse, &times(damped.mass, &second))) {
-            *moved += more;
+        let forces = self.without(forces, &self.times_mass(matrices, &self.in_frames(&turned)));
+        let [answer, kept] =
+            self.times_two(matrices.coarse_inverse, [&forces, &self.times_mass(matrices, &last)]);
+        let strained = self.without(last, &kept);
+        let kept = self.times(matrices.coarse_inverse, &self.times_mass(matrices, &strained));
+        let [strained, twice] = [strained, self.without(strained, &kept)].map(|row| self.in_world(&row));
+        let mut solution = self.in_world(&self.of_second_order(matrices, forces, answer));
+        let strain = lattice.largest_strain(&solution, refresh.frames.since_rest());
+        if share * strain > LARGEST_STRAIN {
+            share = LARGEST_STRAIN / strain;
         }
-    }
-    let mut solution = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    from_components(moved.get(..size).unwrap_or_default(), &mut solution);
-    rotate(&mut solution, &refresh.frames.of_bounds, Rotation::in_world);
-    let strain = lattice.largest_strain(&solution);
-    if share * strain > LARGEST_MOVE {
-        share = LARGEST_MOVE / strain;
-    }
-    for (solution, correction) in solution.iter_mut().zip(&refresh.correction) {
-        for (value, correction) in solution.0.iter_mut().zip(correction.0) {
-            *value = share * *value - correction;
+        let removed = removed_share(share.min(self.allowed));
+        for (((solution, turned), (strained, twice)), fine) in
+            solution.iter_mut().zip(&turned).zip(strained.iter().zip(&twice)).zip(&fine)
+        {
+            let [answer, turned, strained, twice, fine] =
+                [*solution, *turned, *strained, *twice, *fine].map(|vector| Vec4::from(vector.0));
+            let lost = removed * strained + DRAG * twice;
+            solution.0 = (share * answer + turned - lost - self.least_share * fine).to_array();
         }
+        prolong(&solution, lattice, matrices.cells);
+        prolong(&fine, lattice, matrices.fine_cells);
+        for (next, last) in solution.iter_mut().zip(self.smooth.into_iter().flatten()) {
+            next.0 = (Vec4::from(next.0) + Vec4::from(last.0)).to_array();
+        }
+        let change = lattice.largest_strain(&solution, refresh.frames.since_rest());
+        (share, change + lattice.largest_bending(&refresh.frames))
     }
-    prolong(&solution, lattice, matrices.cells);
-    share
+
+    /// `S^-1 g`, from `g` and itself, or the same of second order.
+    fn of_second_order(&self, matrices: &Matrices<'_>, forces: Row, mut moved: Row) -> Row {
+        if self.second_order {
+            // `A S^-1 g` as `g - M S^-1 g`: where elements are crushed `A` is so large that products with it overflow.
+            let forces = self.without(forces, &self.times_mass(matrices, &moved));
+            let second = self.times(matrices.coarse_inverse, &forces);
+            let passed = self.times_mass(matrices, &second);
+            for (moved, more) in moved.iter_mut().zip(self.times(matrices.coarse_inverse, &passed)) {
+                *moved += more;
+            }
+        }
+        moved
+    }
+
+    fn without(&self, mut row: Row, other: &Row) -> Row {
+        let used = 3 * self.lattice.functions();
+        row.iter_mut().zip(other).take(used).for_each(|(component, other)| *component -= other);
+        row
+    }
+
+    /// Components in the frames of the bounds.
+    fn in_frames(&self, vectors: &CoarseVectors) -> Row {
+        let mut vectors = *vectors;
+        rotate(&mut vectors, self.refresh.frames.of_functions(), Rotation::in_frame);
+        to_components(&vectors)
+    }
+
+    /// `G^-1 g`, in fast motion with the bound of `G`.
+    fn fine(&self, matrices: &Matrices<'_>, forces: &Row) -> Row {
+        if self.refresh.fine_in_use {
+            return self.times(matrices.fine_inverse, forces);
+        }
+        let mut moved = [0.0; _];
+        let vectors = moved.as_chunks_mut::<3>().0.iter_mut().zip(forces.as_chunks::<3>().0);
+        for ((moved, force), inverse) in vectors.zip(&*matrices.bound_inverse) {
+            *moved = nodal_sums::times(inverse, *force);
+        }
+        moved
+    }
+
+    /// `M` times a vector.
+    fn times_mass(&self, matrices: &Matrices<'_>, row: &Row) -> Row {
+        let product = apply_by_axis(of_axes(matrices.mass), self.lattice.functions(), row);
+        product.map(|component| (1.0 + self.k) * component)
+    }
+
+    fn times(&self, matrix: &[f32], row: &Row) -> Row {
+        let functions = self.lattice.functions();
+        apply(matrix, stride(functions), row.get(..3 * functions).unwrap_or_default())
+    }
+
+    fn times_two(&self, matrix: &[f32], rows: [&Row; 2]) -> [Row; 2] {
+        let functions = self.lattice.functions();
+        let rows = rows.map(|row| row.get(..3 * functions).unwrap_or_default());
+        apply_to_two(matrix, stride(functions), rows)
+    }
+
+    /// Vectors in the world from components in the frames of the bounds.
+    fn in_world(&self, components: &Row) -> CoarseVectors {
+        let mut vectors = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+        from_components(components.get(..3 * self.lattice.functions()).unwrap_or_default(), &mut vectors);
+        rotate(&mut vectors, self.refresh.frames.of_functions(), Rotation::in_world);
+        vectors
+    }
 }

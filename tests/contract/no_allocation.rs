@@ -135,7 +135,7 @@ fn building_and_stepping_in_statics_allocates_nothing() {
 const LATTICE: [u32; 3] = [1, 1, 2];
 /// Three layers of four points, of which the held end drops one.
 const GRID: Grid = Grid { cells: LATTICE, functions: 12 };
-const DAMPED_VECTORS: usize = vectors_for_lattice(NODES, GRID, true);
+const DAMPED_VECTORS: usize = vectors_for_lattice(NODES, TETS, GRID, true);
 
 /// Storage of mass-scaled, multilevel and damped steps.
 static LARGE: Mutex<[NodeVector; DAMPED_VECTORS]> = Mutex::new([NodeVector::ZERO; DAMPED_VECTORS]);

@@ -12,6 +12,8 @@ mod support;
 mod damper;
 mod estimate;
 mod refused;
+mod switching;
+mod turning;
 mod wild;
 
 use reference::dense::{Matrix, cholesky, congruent, eigenvalues, symmetric_part, zeros};

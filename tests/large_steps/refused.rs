@@ -163,7 +163,9 @@ fn a_lattice_that_has_nothing_to_move_needs_no_room_and_steps() {
     let cells = [1, 1, 2];
     let grid = given(cells).grid(scene.view(), &body.points).unwrap();
     assert_eq!(grid, Grid { cells, functions: 0 });
-    assert_eq!(vectors_for_lattice(nodes, grid, false), vectors_for_lattice(nodes, Grid::default(), false));
+    let elements = scene.element_count();
+    let vectors = |grid| vectors_for_lattice(nodes, elements, grid, false);
+    assert_eq!(vectors(grid), vectors(Grid::default()));
     let mut state = rest_of(&scene);
     let step = Step::unchecked(1e-3, 0.0).unwrap();
     let (method, points) = (given(cells), &body.points);

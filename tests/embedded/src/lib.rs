@@ -108,7 +108,7 @@ pub extern "C" fn bar(bar: &Bar) -> f32 {
 
 /// The largest lattice here.
 const GRID: Grid = Grid { cells: [2, 2, 2], functions: 27 };
-type Storage = [NodeVector; vectors_for_lattice(100, GRID, true)];
+type Storage = [NodeVector; vectors_for_lattice(100, 400, GRID, true)];
 
 /// Prepares a method and takes a step of it: error, inertia added and damping.
 fn large(

@@ -103,7 +103,7 @@ fn damped() -> Option<u32> {
     let loads = SMALL.loads(&scene)?;
     let damper = Damper::new(Network::parse(&DAMPER.0).ok()?).ok()?;
     let method = Method::Damped(damper, Cells::Given(GRID.cells));
-    let mut storage = [NodeVector::ZERO; vectors_for_lattice(NODES, GRID, true)];
+    let mut storage = [NodeVector::ZERO; vectors_for_lattice(NODES, ELEMENTS, GRID, true)];
     let step = Step::unchecked(20.0 * SECONDS, DAMPING).ok()?;
     let mut damped =
         LargeStep::prepare(method, scene.view(), &SMALL.points(), state.view(), step, &mut storage[..])

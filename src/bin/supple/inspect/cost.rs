@@ -129,7 +129,8 @@ fn describe_beyond<M: ElementMaterial>(
         on_grid(&Method::Damped(damper()?, Cells::Suggested), lattice),
     ];
     let kilobytes = |grid: Grid, damped: bool| {
-        1e-3 * (vectors_for_lattice(scene.node_count(), grid, damped) * size_of::<NodeVector>()) as f64
+        1e-3 * (vectors_for_lattice(scene.node_count(), scene.element_count(), grid, damped)
+            * size_of::<NodeVector>()) as f64
     };
     row(
         "memory of inertia",

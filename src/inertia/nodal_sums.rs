@@ -1,0 +1,108 @@
+//! What the nodes contribute to a lattice (kg): its mass, and a bound `G` of the nodes' own inertia projected to it.
+//!
+//! ```text
+//! Mc = sum_a m w_c w_d I,     G_c = sum_a |w_c| (sum_d |w_d|) (N_a + reserve m I)
+//! ```
+//! `G` has one 3 x 3 matrix for each function. `G >= W^T M W` with the nodes' inertia `M`, because
+//! `(sum_c w_c x_c)^2 <= (sum_d |w_d|) sum_c |w_c| x_c^2`. For translations away from supports and inside the cells,
+//! where weights are positive and add up to one, both are the same.
+
+use glam::Vec4;
+
+use super::dense::row_length;
+use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
+use crate::element::NodeInertia;
+use crate::element::symmetric::Symmetric;
+
+/// A symmetric 3 x 3 matrix as `xx, yy, zz, 0` and `xy, yz, zx, 0`.
+pub(super) type FunctionInertia = [[f32; 4]; 2];
+
+/// Adds the inertia of a node, kg, with zero rows at held axes, to the functions that move it.
+#[inline(always)]
+pub(super) fn add_inertia(
+    sums: &mut [FunctionInertia],
+    lattice: &Lattice,
+    place: &LatticeNode,
+    inertia: &Symmetric,
+) {
+    let weights = lattice.weights(place);
+    let mut total = 0.0;
+    for (function, weight) in weights {
+        total += if function < MAX_FUNCTIONS { weight.abs() } else { 0.0 };
+    }
+    let Symmetric { xx, yy, zz, xy, yz, zx } = *inertia;
+    let rows = [Vec4::new(xx, yy, zz, 0.0), Vec4::new(xy, yz, zx, 0.0)];
+    for (function, weight) in weights {
+        if let Some(sums) = sums.get_mut(function) {
+            for (sum, row) in sums.iter_mut().zip(rows) {
+                *sum = (Vec4::from(*sum) + weight.abs() * total * row).to_array();
+            }
+        }
+    }
+}
+
+/// The inverses of such sums, 1/kg, with zeros along axes that no node of a function can move along.
+pub(super) fn invert(inverses: &mut [FunctionInertia], sums: &[FunctionInertia]) {
+    for (inverse, [[xx, yy, zz, _], [xy, yz, zx, _]]) in inverses.iter_mut().zip(sums.iter().copied()) {
+        let free = [xx, yy, zz];
+        let one_if_held = |entry: f32| if entry > 0.0 { entry } else { 1.0 };
+        let [xx, yy, zz] = free.map(one_if_held);
+        let Symmetric { xx, yy, zz, xy, yz, zx } =
+            Symmetric { xx, yy, zz, xy, yz, zx }.inverse().on_free(free);
+        *inverse = [[xx, yy, zz, 0.0], [xy, yz, zx, 0.0]];
+    }
+}
+
+/// The product with a vector.
+#[inline(always)]
+pub(super) fn times([[xx, yy, zz, _], [xy, yz, zx, _]]: &FunctionInertia, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    [xx * x + xy * y + zx * z, xy * x + yy * y + yz * z, zx * x + yz * y + zz * z]
+}
+
+/// Computes `Mc`: for each axis a matrix of one unknown for each function, one after the other, in rows of
+/// [`row_length`].
+pub(super) fn write_mass(
+    matrices: &mut [f32],
+    lattice: &Lattice,
+    places: &[LatticeNode],
+    inertia: &[NodeInertia],
+) {
+    matrices.fill(0.0);
+    let (size, functions) = (matrices.len() / 3, lattice.functions());
+    let length = row_length(functions);
+    for place in places {
+        let Some(node) = inertia.get(place.node()) else {
+            continue;
+        };
+        // A held axis follows its support: no inertia.
+        let masses = (node.free() * node.mass).truncate().to_array();
+        let weights = lattice.weights(place);
+        for (matrix, mass) in matrices.chunks_exact_mut(size.max(1)).zip(masses) {
+            for (row, by) in weights.into_iter().filter(|(row, _)| *row < MAX_FUNCTIONS) {
+                for (column, with) in weights.into_iter().filter(|(column, _)| *column < MAX_FUNCTIONS) {
+                    let entry = matrix.get_mut(row * length + column);
+                    entry.into_iter().for_each(|entry| *entry += by * with * mass);
+                }
+            }
+        }
+    }
+    // An axis along which all nodes of a function are held has no force either: any mass serves.
+    for matrix in matrices.chunks_exact_mut(size.max(1)) {
+        for entry in matrix.iter_mut().step_by(length + 1).take(functions).filter(|entry| **entry <= 0.0) {
+            *entry = 1.0;
+        }
+    }
+}
+
+/// Adds `factor Mc` to the lower triangle of a matrix with three unknowns for each function, in rows of `stride` entries.
+pub(super) fn add_mass(matrix: &mut [f32], stride: usize, masses: &[f32], functions: usize, factor: f32) {
+    let (size, length) = (masses.len() / 3, row_length(functions));
+    for (axis, mass) in masses.chunks_exact(size.max(1)).enumerate() {
+        for (function, masses) in mass.chunks_exact(length.max(1)).enumerate() {
+            let row = matrix.get_mut((3 * function + axis) * stride + axis..).unwrap_or_default();
+            for (entry, mass) in row.iter_mut().step_by(3).zip(masses).take(function + 1) {
+                *entry += factor * mass;
+            }
+        }
+    }
+}
