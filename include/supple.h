@@ -41,15 +41,16 @@
 #define SUPPLE_STATE_SIZE(nodes) (SUPPLE_STATE_FRONT + 3 * SUPPLE_ARRAY_(nodes, 16))
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 80 : 48))
-#define SUPPLE_LARGE_SIZE(nodes, method, x, y, z) (SUPPLE_LARGE_FRONT + ((method) == SUPPLE_MASS_SCALED                        \
-    ? SUPPLE_ARRAY_(nodes, 80) : SUPPLE_LATTICE_(nodes, (method) == SUPPLE_DAMPED, x, y, z)))
+#define SUPPLE_LARGE_SIZE(nodes, elements, method, x, y, z) (SUPPLE_LARGE_FRONT + ((method) == SUPPLE_MASS_SCALED              \
+    ? SUPPLE_ARRAY_(nodes, 80) : SUPPLE_LATTICE_(nodes, elements, (method) == SUPPLE_DAMPED, x, y, z)))
 #define SUPPLE_ARRAY_(count, bytes) (((size_t)(count) * (bytes) + SUPPLE_ALIGN - 1) / SUPPLE_ALIGN * SUPPLE_ALIGN)
 #define SUPPLE_LEAST_(a, b) ((a) < (b) ? (a) : (b))
 #define SUPPLE_TILES_(elements)                                                                                                \
     (((size_t)(elements) + 15) / 16 + 2 * SUPPLE_LEAST_((size_t)(elements) / 1536 - ((elements) > 1535), 23))
 #define SUPPLE_FUNCTIONS_(x, y, z) SUPPLE_LEAST_(((size_t)(x) + 1) * ((y) + 1) * ((z) + 1), SUPPLE_LATTICE_FUNCTIONS)
-#define SUPPLE_LATTICE_(nodes, damped, x, y, z) SUPPLE_ARRAY_(1, ((damped) ? 120 : 104) * (size_t)(nodes) + 196 +              \
-    2560 * ((size_t)(x) * (y) * (z)) + ((damped) ? 260 : 144) * SUPPLE_FUNCTIONS_(x, y, z) * (SUPPLE_FUNCTIONS_(x, y, z) + 3))
+#define SUPPLE_LATTICE_(nodes, elements, damped, x, y, z) SUPPLE_ARRAY_(1, ((damped) ? 120 : 104) * (size_t)(nodes) +           \
+    4 * (size_t)(elements) + 212 + 1152 * ((size_t)(x) * (y) * (z)) + 172 * SUPPLE_FUNCTIONS_(x, y, z) *                       \
+    (SUPPLE_FUNCTIONS_(x, y, z) + 8))
 
 
 /**
@@ -156,7 +157,7 @@
 /**
  * Bytes before the arrays of a supple_large.
  */
-#define SUPPLE_LARGE_FRONT 40960
+#define SUPPLE_LARGE_FRONT 43008
 
 /**
  * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not done, and

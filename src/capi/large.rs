@@ -71,11 +71,11 @@ pub struct supple_large {
 // SAFETY: `repr(C)`, begins with a head.
 unsafe impl Object for supple_large {
     const MAGIC: [u8; 8] = magic(b'I');
-    const FRONT: usize = 40960;
+    const FRONT: usize = 43008;
 }
 
 /// Bytes before the arrays of a supple_large.
-pub const SUPPLE_LARGE_FRONT: usize = 40960;
+pub const SUPPLE_LARGE_FRONT: usize = 43008;
 const _: () = assert!(SUPPLE_LARGE_FRONT == <supple_large as Object>::FRONT);
 
 /// A configuration, checked against a scene with these points.

@@ -273,14 +273,16 @@ impl Lattice {
     fn mark_empty_points(&mut self, masses: &[PointMass]) -> bool {
         let before = self.function_of_point;
         let largest = masses.iter().fold(0.0, |most, mass| f32::max(most, mass.free));
+        let mut any = false;
         for (function, mass) in self.function_of_point.iter_mut().zip(masses) {
             let light = mass.free <= LEAST_MASS * largest && mass.held <= mass.free;
             if light && mass.free > 0.0 {
                 *function = EMPTY;
+                any = true;
             }
         }
         if (0..self.cell_count()).any(|cell| self.is_whole(cell)) {
-            return self.function_of_point != before;
+            return any;
         }
         self.function_of_point = before;
         false

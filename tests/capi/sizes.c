@@ -38,13 +38,13 @@ int main(void) {
                 const supple_large_config large = large_of(method, x, x, z);
                 size_t bytes = 0;
                 const supple_status status = supple_large_size(scene, points[0], &large, &bytes, NULL);
-                const size_t room = SUPPLE_LARGE_SIZE(NODES, method, x, x, z);
+                const size_t room = SUPPLE_LARGE_SIZE(NODES, TETS, method, x, x, z);
                 if (status == SUPPLE_E_LATTICE) {
                     CHECK((x + 1) * (x + 1) * (z + 1) > SUPPLE_LATTICE_FUNCTIONS);
                     continue;
                 }
                 CHECK(status == SUPPLE_OK && bytes <= room && bytes > SUPPLE_LARGE_FRONT);
-                CHECK(method != SUPPLE_MASS_SCALED || bytes == SUPPLE_LARGE_SIZE(NODES, method, 0, 0, 0));
+                CHECK(method != SUPPLE_MASS_SCALED || bytes == SUPPLE_LARGE_SIZE(NODES, TETS, method, 0, 0, 0));
                 most = room - bytes > most ? room - bytes : most;
             }
         }

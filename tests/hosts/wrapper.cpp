@@ -42,7 +42,7 @@ alignas(supple::align) unsigned char loads_memory[supple::loads::size(2, 1)];
 alignas(supple::align) unsigned char state_memory[supple::state::size(4)];
 alignas(supple::align) unsigned char other_memory[supple::state::size(4)];
 alignas(supple::align) unsigned char learned_memory[supple::learned::size(4, true)];
-alignas(supple::align) unsigned char large_memory[SUPPLE_LARGE_SIZE(4, SUPPLE_MASS_SCALED, 0, 0, 0)];
+alignas(supple::align) unsigned char large_memory[SUPPLE_LARGE_SIZE(4, 1, SUPPLE_MASS_SCALED, 0, 0, 0)];
 
 const float points[] = {0, 0, 0, 0.01f, 0, 0, 0, 0.01f, 0, 0, 0, 0.01f};
 const std::uint32_t tetrahedra[] = {0, 1, 2, 3}, turned[] = {0, 2, 1, 3}, outside[] = {0, 1, 2, 9};
