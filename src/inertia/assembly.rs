@@ -205,7 +205,7 @@ struct Located {
 }
 
 /// Elements whose products are summed before they are added to the matrix.
-const GROUP: usize = 16;
+const GROUP: usize = 8;
 /// Most functions of a patch, rounded up to whole vectors.
 const SLOTS: usize = 2 * TILE;
 /// The three derivatives of each function of a patch along the spatial axes, with five factors: one, that of the inner
