@@ -141,11 +141,12 @@ pub const fn tiles_for(elements: usize) -> usize {
     most_tiles(elements)
 }
 
-const FNV_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
-
-/// FNV-1a over words of 32 bits, from a start (Fowler, Noll, Vo): against accidents, not against forgery.
-fn checksum(words: &[u32], start: u64) -> u64 {
-    words.iter().fold(start, |sum, &word| (sum ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3))
+/// CRC32 of all tables, to tell scenes of the same size apart.
+fn checksum(nodes: &[NodeInertia], tiles: &[ElementTile]) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(bytemuck::must_cast_slice(nodes));
+    hasher.update(bytemuck::must_cast_slice(tiles));
+    hasher.finalize()
 }
 
 /// Sizes, mass and partitions of a scene: all that is known of it apart from its tables.
@@ -156,7 +157,7 @@ pub struct SceneFacts {
     partitions: Partitions,
     mass: f64,
     releasable_energy: f64,
-    checksum: u64,
+    checksum: u32,
 }
 
 impl SceneFacts {
@@ -211,8 +212,7 @@ impl SceneFacts {
             });
         }
         let (mass, releasable_energy) = lump_masses(material, mesh, nodes)?;
-        let checksum =
-            checksum(bytemuck::cast_slice(nodes), checksum(bytemuck::cast_slice(tiles), FNV_BASIS));
+        let checksum = checksum(nodes, tiles);
         Ok(Self { node_count: nodes.len(), element_count, partitions, mass, releasable_energy, checksum })
     }
 
@@ -229,7 +229,7 @@ impl SceneFacts {
     }
 
     /// A checksum of nodes, supports, masses and elements, to tell scenes of the same size apart.
-    pub(crate) const fn checksum(&self) -> u64 {
+    pub(crate) const fn checksum(&self) -> u32 {
         self.checksum
     }
 

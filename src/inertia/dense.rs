@@ -44,7 +44,7 @@ pub(super) fn mirror(matrix: &mut [f32], stride: usize, row: usize, factor: f32)
 }
 
 /// Unknowns that one step of an inversion eliminates.
-const PIVOTS: usize = 12;
+pub(super) const PIVOTS: usize = 12;
 
 /// Steps of the inversion of a matrix with `size` unknowns.
 pub(super) const fn sweeps(size: usize) -> usize {
@@ -66,12 +66,12 @@ struct Sweep<'a> {
     first: usize,
 }
 
-/// A matrix of the pivots, with padded rows.
-type PivotMatrix = [[f32; WIDTH]; PIVOTS];
+/// The pivots' rows in some columns: in their own ones a matrix with padded rows.
+type Panel = [[f32; WIDTH]; PIVOTS];
 
 /// `L d L^T` of the pivots' symmetric matrix: `L` without the ones on the diagonal, `L^-1`, and the inverses of the `d`.
 struct Factors {
-    lower: PivotMatrix,
+    lower: Panel,
     inverse: Panel,
     inverse_diagonal: [f32; PIVOTS],
 }
@@ -79,7 +79,7 @@ struct Factors {
 impl Factors {
     /// None if a pivot is not positive and finite.
     #[inline(always)]
-    fn new(mut matrix: PivotMatrix) -> Option<Self> {
+    fn new(mut matrix: Panel) -> Option<Self> {
         let mut inverse = [[0.0; WIDTH]; PIVOTS];
         let mut inverse_diagonal = [0.0; PIVOTS];
         for k in 0..PIVOTS {
@@ -143,9 +143,6 @@ impl Factors {
         x
     }
 }
-
-/// The pivots' rows in some columns.
-type Panel = [[f32; WIDTH]; PIVOTS];
 
 // Loops, because the compiler may leave closures as function calls.
 #[inline(always)]

@@ -32,7 +32,7 @@ pub struct LargeModel<'w> {
     pub(super) nodes: usize,
     pub(super) elements: usize,
     /// Checksum of the scene.
-    scene: u64,
+    scene: u32,
     /// Steps of the state after the latest step, or at the preparation: inertia belongs to that state.
     pub(super) steps: u64,
     pub(super) method: Method<'w>,

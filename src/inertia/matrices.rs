@@ -1,5 +1,5 @@
 //! The matrices of a lattice (kg, inverses 1/kg) and the sums of its cells, in the caller's storage. `S` is the inertia
-//! of the lattice's motion, with the inertia that the step adds; `G` is a bound of the nodes' inertia projected to the
+//! of the lattice's motion, with the inertia that the step adds; `G` is the nodes' inertia projected to the
 //! lattice. [`super::refresh`] computes their inverses in cycles.
 
 use bytemuck::must_cast_slice_mut;

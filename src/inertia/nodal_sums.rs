@@ -1,9 +1,9 @@
-//! What the nodes contribute to a lattice (kg): its mass, and a bound `G` of the nodes' own inertia projected to it.
+//! What the nodes contribute to a lattice (kg): its mass, and a bound of their own inertia `G` projected to it.
 //!
 //! ```text
 //! Mc = sum_a m w_c w_d I,     G_c = sum_a |w_c| (sum_d |w_d|) (N_a + reserve m I)
 //! ```
-//! `G` has one 3 x 3 matrix for each function. `G >= W^T M W` with the nodes' inertia `M`, because
+//! The bound has one 3 x 3 matrix `G_c` for each function. It is above `W^T M W` with the nodes' inertia `M`, because
 //! `(sum_c w_c x_c)^2 <= (sum_d |w_d|) sum_c |w_c| x_c^2`. For translations away from supports and inside the cells,
 //! where weights are positive and add up to one, both are the same.
 
@@ -11,6 +11,7 @@ use glam::Vec4;
 
 use super::dense::row_length;
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
+use super::node::inverse_on_free;
 use crate::element::NodeInertia;
 use crate::element::symmetric::Symmetric;
 
@@ -41,22 +42,23 @@ pub(super) fn add_inertia(
     }
 }
 
+fn to_symmetric([[xx, yy, zz, _], [xy, yz, zx, _]]: FunctionInertia) -> Symmetric {
+    Symmetric { xx, yy, zz, xy, yz, zx }
+}
+
 /// The inverses of such sums, 1/kg, with zeros along axes that no node of a function can move along.
 pub(super) fn invert(inverses: &mut [FunctionInertia], sums: &[FunctionInertia]) {
-    for (inverse, [[xx, yy, zz, _], [xy, yz, zx, _]]) in inverses.iter_mut().zip(sums.iter().copied()) {
-        let free = [xx, yy, zz];
-        let one_if_held = |entry: f32| if entry > 0.0 { entry } else { 1.0 };
-        let [xx, yy, zz] = free.map(one_if_held);
-        let Symmetric { xx, yy, zz, xy, yz, zx } =
-            Symmetric { xx, yy, zz, xy, yz, zx }.inverse().on_free(free);
+    for (inverse, &sum) in inverses.iter_mut().zip(sums) {
+        let sum = to_symmetric(sum);
+        let Symmetric { xx, yy, zz, xy, yz, zx } = inverse_on_free(sum, [sum.xx, sum.yy, sum.zz]);
         *inverse = [[xx, yy, zz, 0.0], [xy, yz, zx, 0.0]];
     }
 }
 
 /// The product with a vector.
 #[inline(always)]
-pub(super) fn times([[xx, yy, zz, _], [xy, yz, zx, _]]: &FunctionInertia, [x, y, z]: [f32; 3]) -> [f32; 3] {
-    [xx * x + xy * y + zx * z, xy * x + yy * y + yz * z, zx * x + yz * y + zz * z]
+pub(super) fn times(inertia: &FunctionInertia, vector: [f32; 3]) -> [f32; 3] {
+    to_symmetric(*inertia).times(vector)
 }
 
 /// Computes `Mc`: for each axis a matrix of one unknown for each function, one after the other, in rows of

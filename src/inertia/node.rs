@@ -49,14 +49,14 @@ pub(super) struct NewInertia<R> {
     pub(super) added: R,
 }
 
-/// The matrix with ones on the diagonal at held axes, so that it can be inverted.
+/// The inverse of a matrix on the free axes, where `free` is positive; zeros at held axes.
 #[inline(always)]
-fn with_ones_at_held_axes<R: Real>(mut matrix: Symmetric<R>, [x, y, z]: [R; 3]) -> Symmetric<R> {
-    let one = R::splat(1.0);
+pub(super) fn inverse_on_free<R: Real>(mut matrix: Symmetric<R>, free: [R; 3]) -> Symmetric<R> {
+    let (one, [x, y, z]) = (R::splat(1.0), free);
     matrix.xx = x.choose(matrix.xx, one);
     matrix.yy = y.choose(matrix.yy, one);
     matrix.zz = z.choose(matrix.zz, one);
-    matrix
+    matrix.inverse().on_free(free)
 }
 
 /// The inertia from the summed bounds (N/m) of the nodes' elements; `free` is positive along free axes.
@@ -74,7 +74,7 @@ pub(super) fn new_inertia<R: Real>(
     let scaled = needed.scaled_plus(factor, mass).on_free(free);
     let added = (factor * needed.trace()).divide(R::splat(3.0) * mass);
     let inertia = scaled.scaled_plus(one, R::splat(scaling.reserve) * mass).on_free(free);
-    let inverse = with_ones_at_held_axes(inertia, free).inverse().on_free(free);
+    let inverse = inverse_on_free(inertia, free);
     NewInertia { inverse, inertia, added }
 }
 
@@ -96,7 +96,7 @@ pub(super) fn velocity_factor<R: Real>(
     scaling: &Scaling,
 ) -> R {
     let (zero, one) = (R::splat(0.0), R::splat(1.0));
-    let old_inertia = with_ones_at_held_axes(old_inverse, free).inverse().on_free(free);
+    let old_inertia = inverse_on_free(old_inverse, free);
     let mut square = zero;
     for axis in 0..3 {
         square = square + free[axis].choose(velocity[axis] * velocity[axis], zero);

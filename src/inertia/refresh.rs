@@ -9,11 +9,10 @@
 //! inversions in slow motion G^-1, then S^-1; all is in use from then on
 //! ```
 //! In fast motion the bound replaces `G`, as a cycle may take only a few steps. Mass scaling has only the first two
-//! stages. An inverse is in use only if it takes the image of a known vector back
-//! to it.
+//! stages. An inverse is in use only if it takes the image of a known vector back to it.
 
 use super::assembly::{Assembly, BATCH, ElementTangent};
-use super::dense::{Row, apply, apply_lower, mirror, row_length, stride, sweep, sweeps};
+use super::dense::{PIVOTS, Row, apply, apply_lower, mirror, row_length, stride, sweep, sweeps};
 use super::frames::{Frames, Rotation};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode};
 use super::matrices::{Matrices, copy, invert_axes, of_axes};
@@ -71,7 +70,7 @@ pub(super) struct Refresh {
     pub(super) fine_in_use: bool,
 }
 
-/// Measured costs of a tile, of a tile without a lattice, of a cell, of a cell, of a node, and of an entry of a row that is
+/// Measured costs of a tile, of a tile without a lattice, of a cell, of a node, and of an entry of a row that is
 /// mirrored. The unit is the time of a floating-point operation of a pivot.
 const TILE_COST: i64 = 47_000;
 const TILE_UNCOUPLED_COST: i64 = 18_000;
@@ -525,7 +524,7 @@ fn probe(size: usize) -> &'static [f32] {
 
 /// Cost of a step of an inversion: a multiplication and an addition for each entry of the lower triangle and each pivot.
 fn sweep_cost(functions: usize) -> i64 {
-    12 * (3 * functions * stride(functions)) as i64
+    (PIVOTS * 3 * functions * stride(functions)) as i64
 }
 
 /// Cost of a row that is mirrored.
