@@ -58,6 +58,8 @@ pub enum LabError {
     Multiple {
         /// The multiple.
         multiple: u32,
+        /// Steps between two snapshots.
+        interval: u32,
     },
     /// There is no network for this multiple.
     NoNetwork {
@@ -92,9 +94,8 @@ impl fmt::Display for LabError {
             Self::Mismatch { nodes, room } => {
                 write!(f, "the scene has {nodes} nodes, the other side {room}")
             }
-            Self::Multiple { multiple } => {
-                let steps = super::INTERVAL_STEPS;
-                let known = (1..=steps).filter(|multiple| steps.is_multiple_of(*multiple));
+            Self::Multiple { multiple, interval: steps } => {
+                let known = (1..=*steps).filter(|multiple| steps.is_multiple_of(*multiple));
                 let known: Vec<String> = known.map(|multiple| multiple.to_string()).collect();
                 write!(f, "multiple {multiple} misses the snapshots; there are {}", known.join(", "))
             }

@@ -94,6 +94,8 @@ mod tests {
             scene: "lobe",
             method: Method::Multilevel,
             multiple: 10,
+            step: 3e-4,
+            hold_at_end: 3.5,
             hold: 3.0,
             step_over_limit_rest: 1.5,
             step_over_limit_trajectory: 2.0,

@@ -1,4 +1,4 @@
-//! An evaluation: methods over scenes at multiples of [`super::DT`], the table, and a sweep.
+//! An evaluation: methods over scenes at multiples of a scene's step, the table, and a sweep.
 
 use std::format;
 use std::fs;
@@ -41,15 +41,12 @@ impl Plan {
     ) -> Result<Self, LabError> {
         let mut names = unique(scenes.iter().map(String::as_str));
         if names.is_empty() {
-            names = scenes::NAMES.to_vec();
+            names = scenes::names().collect();
         }
         let methods: Vec<Method> = match methods {
             [] => Method::ALL.into_iter().filter(|method| *method != Method::Learned(Size::Paper)).collect(),
             names => names.iter().map(|name| Method::named(name)).collect::<Result<_, _>>()?,
         };
-        if let Some(&multiple) = multiples.iter().find(|multiple| !run::hits_snapshots(**multiple)) {
-            return Err(LabError::Multiple { multiple });
-        }
         let multiples = if multiples.is_empty() { &MULTIPLES } else { multiples };
         let sweep = sweep.or_else(|| names.contains(&SWEPT).then_some(SWEPT));
         let mut plan = Self { scenes: Vec::new(), methods: unique(methods), sweep: sweep.map(String::from) };
@@ -59,7 +56,9 @@ impl Plan {
             let mut all = [asked, swept].concat();
             all.sort_unstable();
             all.dedup();
-            plan.scenes.push((scenes::named(name)?, all));
+            let scene = scenes::named(name)?;
+            all.iter().try_for_each(|&multiple| scene.timing.check(multiple))?;
+            plan.scenes.push((scene, all));
         }
         Ok(plan)
     }
@@ -85,12 +84,17 @@ pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Ve
     for ((spec, truth), multiples) in specs.iter().zip(&truths).zip(multiples) {
         for method in &plan.methods {
             say(&format!("{}: {}", spec.name, method.name()));
-            rows.extend(runs(spec, truth, *method, &method.multiples(&multiples))?);
+            rows.extend(runs(spec, truth, *method, &method.multiples(&spec.timing, &multiples))?);
         }
         if plan.sweep.as_deref() == Some(spec.name) {
             let curves = sweep::curves(&rows, spec.name);
             if !curves.is_empty() {
-                let svg = plot::draw(spec.name, &curves, Errors::of_hold(truth)?.mean_over_time());
+                let svg = plot::draw(
+                    spec.name,
+                    spec.timing.step,
+                    &curves,
+                    Errors::of_hold(truth)?.mean_over_time(),
+                );
                 let path = out.join(format!("sweep-{}.svg", spec.name));
                 write_atomically(&path, |file| file.write_all(svg.as_bytes()))?;
             }
@@ -109,7 +113,7 @@ fn runs(spec: &SceneSpec, truth: &Truth, method: Method, multiples: &[u32]) -> R
     for &multiple in multiples.iter().rev() {
         let (mut row, shapes) = run::run_with_shapes(spec, truth, method, multiple)?;
         let twice = 2 * multiple;
-        if method.scales_inertia() && run::hits_snapshots(twice) {
+        if method.scales_inertia() && spec.timing.hits_snapshots(twice) {
             let there = latest.take().filter(|(of, _)| *of == twice);
             let other = match there {
                 Some((_, shapes)) => shapes,
@@ -148,7 +152,7 @@ mod tests {
     #[test]
     fn nothing_asked_means_everything() {
         let plan = plan(&[], &[], None);
-        assert_eq!(plan.len(), 10);
+        assert_eq!(plan.len(), 34);
         assert_eq!(plan[0], ("torsion", MULTIPLES.to_vec()));
         assert_eq!(plan[1], ("reversed", sweep::MULTIPLES.to_vec()));
     }

@@ -8,21 +8,23 @@ use std::vec;
 use std::vec::Vec;
 
 use super::networks::{self, Size};
-use super::{DT, LabError};
+use super::scenes::SceneSpec;
+use super::timing::Timing;
+use super::{DT, LabError, implicit};
 use crate::element::ElementMaterial;
 use crate::inertia::{self, Cells, Damper, LargeStep};
 use crate::learned::{self, LearnedStep};
 use crate::loads::Loads;
 use crate::mlp::{Network, WeightBytes};
 use crate::scene::SceneView;
-use crate::state::{NodeVector, VecState};
+use crate::state::{NodeVector, StateView, VecState};
 use crate::step::{CallingThread, Status, Step};
 use crate::tled;
 
 /// A way to move a scene.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Method {
-    /// The exact step at [`super::DT`]: the truth itself, for its time.
+    /// The exact steps of the truth, for their time: as many as a step of the scene has ([`super::timing::Timing::refinement`]).
     Tled,
     /// Nothing moves: what a method has to beat.
     Hold,
@@ -36,6 +38,10 @@ pub enum Method {
     Damped,
     /// The same with a network of the user's.
     DampedWith(NetworkFile),
+    /// Backward Euler, to compare with.
+    BackwardEuler,
+    /// The implicit midpoint rule, to compare with.
+    ImplicitMidpoint,
     /// The learned step with a network of the crate, after a lead-in of [`BURN_IN`].
     Learned(Size),
     /// The same with a network of the user's.
@@ -81,13 +87,15 @@ pub struct StepReport {
 
 impl Method {
     /// All methods that need no file of the user's, in the order of the tables.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Tled,
         Self::Hold,
         Self::TledLargeStep,
         Self::MassScaled,
         Self::Multilevel,
         Self::Damped,
+        Self::BackwardEuler,
+        Self::ImplicitMidpoint,
         Self::Learned(Size::Compact),
         Self::Learned(Size::Paper),
     ];
@@ -102,6 +110,8 @@ impl Method {
             Self::MassScaled => "mass-scaled",
             Self::Multilevel => "multilevel",
             Self::Damped => "best",
+            Self::BackwardEuler => "backward-euler",
+            Self::ImplicitMidpoint => "implicit-midpoint",
             Self::Learned(Size::Compact) => "compact-f32",
             Self::Learned(Size::Paper) => "paper-f32",
             Self::DampedWith(file) | Self::LearnedWith(file) => file.name,
@@ -127,14 +137,15 @@ impl Method {
         Ok(if damps { Self::DampedWith(file) } else { Self::LearnedWith(file) })
     }
 
-    /// At which multiples of [`super::DT`] it is run if asked for `multiples`. At 1 the long step is the
-    /// exact one, and what holds still does so at any step.
+    /// At which multiples of a scene's step it is run if asked for `multiples`. At 1 the long step is the exact one, and what
+    /// holds still does so at any step; networks of the learned step are for multiples of the paper's.
     #[must_use]
-    pub fn multiples(self, multiples: &[u32]) -> Vec<u32> {
+    pub fn multiples(self, timing: &Timing, multiples: &[u32]) -> Vec<u32> {
         let those = |wanted: &dyn Fn(u32) -> bool| {
             multiples.iter().copied().filter(|&multiple| wanted(multiple)).collect()
         };
         match self {
+            Self::Learned(_) | Self::LearnedWith(_) if timing.step != DT => Vec::new(),
             Self::Tled | Self::Hold => vec![1],
             Self::Learned(size) => those(&|multiple| networks::learned(size, multiple).is_some()),
             Self::LearnedWith(file) => vec![file.multiple],
@@ -157,22 +168,28 @@ impl Method {
         }
     }
 
-    /// What moves a state of the scene on by steps of `dt` (s) with `damping` (1/s).
+    /// What moves a state of a scene on by steps of `dt` (s), from `state`.
     pub fn prepare<'a, M: ElementMaterial>(
         self,
+        spec: &SceneSpec,
         scene: SceneView<'a, M>,
-        points: &[[f32; 3]],
+        state: &mut VecState,
         dt: f32,
-        damping: f32,
     ) -> Result<Advance<'a>, LabError> {
-        let large = |method| {
-            // Scenes start at rest.
-            let mut rest = VecState::at_rest(scene.node_count());
+        let damping = spec.damping;
+        let large = |method, state: &mut VecState| {
             let step = Step::unchecked(dt, damping)?;
-            let mut large = LargeStep::prepare_in_vec(method, scene, points, rest.view(), step)?;
+            let mut large = LargeStep::prepare_in_vec(method, scene, &spec.points, state.view(), step)?;
             let advance: Advance<'a> = Box::new(move |state, loads| {
                 let status = large.step(scene, loads, state.view());
                 Ok((status, StepReport { estimate: Some(large.report().error), clipped: None }))
+            });
+            Ok(advance)
+        };
+        let exact = |count: u32| {
+            let step = Step::unchecked(dt / count as f32, damping)?;
+            let advance: Advance<'a> = Box::new(move |state, loads| {
+                Ok((exact_steps(count, scene, loads, &mut state.view(), &step), StepReport::default()))
             });
             Ok(advance)
         };
@@ -181,16 +198,18 @@ impl Method {
         };
         match self {
             Self::Hold => Ok(Box::new(|_, _| Ok((Status::Ok, StepReport::default())))),
-            Self::Tled | Self::TledLargeStep => {
-                let step = Step::unchecked(dt, damping)?;
-                Ok(Box::new(move |state, loads| {
-                    Ok((tled::step(&scene, loads, state, &step), StepReport::default()))
-                }))
+            Self::Tled => exact(spec.timing.refinement),
+            Self::TledLargeStep => exact(1),
+            Self::MassScaled => large(inertia::Method::MassScaled, state),
+            Self::Multilevel => large(inertia::Method::Multilevel(Cells::Suggested), state),
+            Self::Damped => large(damped(networks::damper())?, state),
+            Self::DampedWith(file) => large(damped(file.bytes)?, state),
+            Self::BackwardEuler => {
+                Ok(implicit::prepare(implicit::Rule::BackwardEuler, scene, state, dt, damping))
             }
-            Self::MassScaled => large(inertia::Method::MassScaled),
-            Self::Multilevel => large(inertia::Method::Multilevel(Cells::Suggested)),
-            Self::Damped => large(damped(networks::damper())?),
-            Self::DampedWith(file) => large(damped(file.bytes)?),
+            Self::ImplicitMidpoint => {
+                Ok(implicit::prepare(implicit::Rule::Midpoint, scene, state, dt, damping))
+            }
             Self::Learned(size) => {
                 let multiple = (dt / DT).round() as u32;
                 let bytes = networks::learned(size, multiple).ok_or(LabError::NoNetwork { multiple })?;
@@ -199,6 +218,25 @@ impl Method {
             Self::LearnedWith(file) => learned(scene, file.bytes, file.multiple, damping),
         }
     }
+}
+
+/// Takes exact steps until one is refused. Says if one was limited.
+fn exact_steps<M: ElementMaterial>(
+    count: u32,
+    scene: SceneView<'_, M>,
+    loads: &Loads<'_>,
+    state: &mut StateView<'_>,
+    step: &Step,
+) -> Status {
+    let mut worst = Status::Ok;
+    for _ in 0..count {
+        match tled::step(&scene, loads, state, step) {
+            Status::Ok => {}
+            limited @ Status::Limited { .. } => worst = limited,
+            refused => return refused,
+        }
+    }
+    worst
 }
 
 /// The learned step after its lead-in of exact ones. The lead-in is damped as the scene is, learned steps as the training was:
@@ -218,17 +256,8 @@ fn learned<'a, M: ElementMaterial>(
     Ok(Box::new(move |state, loads| {
         let mut state = state.view();
         if state.time() + 0.5 * f64::from(DT) < BURN_IN {
-            let status = learned.view().lead_interval(&mut state, |state| {
-                let mut worst = Status::Ok;
-                for _ in 0..multiple {
-                    match tled::step(&scene, loads, state, &exact) {
-                        Status::Ok => {}
-                        limited @ Status::Limited { .. } => worst = limited,
-                        refused => return refused,
-                    }
-                }
-                worst
-            });
+            let lead = |state: &mut StateView<'_>| exact_steps(multiple, scene, loads, state, &exact);
+            let status = learned.view().lead_interval(&mut state, lead);
             return Ok((status, StepReport::default()));
         }
         let status = learned.view().step(scene, loads, state, &trained, &CallingThread)?;
@@ -248,8 +277,8 @@ mod tests {
         let said = Method::named("euler").unwrap_err().to_string();
         assert_eq!(
             said,
-            "method \"euler\" is not known; there are tled, hold, tled-large-step, mass-scaled, multilevel, best, compact-f32, \
-             paper-f32"
+            "method \"euler\" is not known; there are tled, hold, tled-large-step, mass-scaled, multilevel, best, \
+             backward-euler, implicit-midpoint, compact-f32, paper-f32"
         );
     }
 }

@@ -1,12 +1,15 @@
 //! The laboratory: how far is a method from the truth, and what does it cost? Methods run over scenes at
-//! multiples of the step [`DT`]; the truth is the exact step ([`crate::tled`]) at [`DT`] on the same mesh.
+//! multiples of a step of the scene ([`timing::Timing`]), for the paper's bar [`DT`]; the truth is the exact step
+//! ([`crate::tled`]) at that step or a part of it on the same mesh.
 //! SI units inside, millimetres and microseconds in the tables for people.
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`scenes`] | bodies, supports and loads as data |
+//! | [`scenes`] | bodies, supports and loads as data; [`moving`] those that fall, turn and swing |
+//! | [`timing`] | how time is counted in a scene |
 //! | [`truth`] | the exact motion of a scene, kept on disk |
 //! | [`method`] | what is compared: one match arm each |
+//! | [`implicit`] | backward Euler and the implicit midpoint rule, to compare with |
 //! | [`networks`] | the networks that come with the crate |
 //! | [`run`] | one method, one scene, one step: a row |
 //! | [`measure`] | errors of a motion against the truth |
@@ -18,14 +21,17 @@
 mod error;
 pub mod estimates;
 pub mod evaluate;
+pub mod implicit;
 pub mod measure;
 pub mod method;
+pub mod moving;
 pub mod networks;
 pub mod plot;
 pub mod run;
 pub mod scenes;
 pub mod sweep;
 pub mod table;
+pub mod timing;
 pub mod truth;
 
 pub use error::LabError;
@@ -36,5 +42,5 @@ pub const DT: f32 = 3e-5;
 /// Steps of [`DT`] between two snapshots of the truth (0.03 s): ten steps of the paper's hundredfold step.
 pub const INTERVAL_STEPS: u32 = 1_000;
 
-/// Multiples of [`DT`] in the table of results. Each divides [`INTERVAL_STEPS`].
+/// Multiples of a scene's step in the table of results.
 pub const MULTIPLES: [u32; 5] = [1, 10, 20, 50, 100];

@@ -1,11 +1,10 @@
-//! A sweep as a picture: SVG with logarithmic axes, error in mm over multiples of [`super::DT`].
+//! A sweep as a picture: SVG with logarithmic axes, error in mm over multiples of the scene's step.
 
 use core::fmt::Write;
 use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-use super::DT;
 use super::sweep::{Curve, MULTIPLES};
 
 const WIDTH: f64 = 760.0;
@@ -21,7 +20,7 @@ const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00
 
 /// Draws the curves of `scene`; `hold` (mm) is the error of a body that never moves.
 #[must_use]
-pub fn draw(scene: &str, curves: &[Curve], hold: f64) -> String {
+pub fn draw(scene: &str, step: f32, curves: &[Curve], hold: f64) -> String {
     let frame = Frame::around(curves, hold);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{HEIGHT}\" \
@@ -29,7 +28,7 @@ pub fn draw(scene: &str, curves: &[Curve], hold: f64) -> String {
          <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n\
          <text x=\"{LEFT}\" y=\"26\" font-size=\"16\">Error over step: {scene}</text>\n"
     );
-    axes(&mut svg, &frame);
+    axes(&mut svg, &frame, step);
     let y = frame.y(hold);
     line(&mut svg, (LEFT, y), (RIGHT, y), "#777\" stroke-dasharray=\"6 4");
     key(&mut svg, 0, "#777", "standing still");
@@ -93,7 +92,7 @@ impl Frame {
     }
 }
 
-fn axes(svg: &mut String, frame: &Frame) {
+fn axes(svg: &mut String, frame: &Frame, step: f32) {
     for decade in frame.low as i32..=frame.high as i32 {
         let error = 10.0_f64.powi(decade);
         let y = frame.y(error);
@@ -115,7 +114,7 @@ fn axes(svg: &mut String, frame: &Frame) {
         ),
     );
     let (x, y) = (0.5 * (LEFT + RIGHT), BOTTOM + 44.0);
-    let step = f64::from(DT * 1e6).round();
+    let step = f64::from(step * 1e6).round();
     put(
         svg,
         format_args!(
@@ -164,7 +163,7 @@ mod tests {
             Curve { name: "bold", points, diverged: vec![100.0, 200.0] },
             Curve { name: "gone", points: vec![], diverged: vec![2.0] },
         ];
-        let svg = draw("reversed", &curves, 12.5);
+        let svg = draw("reversed", 3e-5, &curves, 12.5);
         let tree = roxmltree::Document::parse(&svg).unwrap();
         let attribute =
             |node: roxmltree::Node<'_, '_>, name| node.attribute(name).unwrap().parse::<f64>().unwrap();

@@ -5,13 +5,12 @@ use core::fmt;
 use std::time::{Duration, Instant};
 use std::vec::Vec;
 
+use super::LabError;
 use super::measure::Errors;
 use super::method::Method;
 use super::scenes::SceneSpec;
 use super::truth::Truth;
-use super::{DT, INTERVAL_STEPS, LabError};
 use crate::element::{ElementLaw, LawWork, with_law};
-use crate::state::VecState;
 use crate::step::Status;
 
 /// What a method did on a scene with a step.
@@ -21,10 +20,14 @@ pub struct Row {
     pub scene: &'static str,
     /// The method.
     pub method: Method,
-    /// Its step over [`DT`].
+    /// Its step over that of the scene.
     pub multiple: u32,
+    /// Its step, s.
+    pub step: f64,
     /// Mean error over time of a body that never moves, mm.
     pub hold: f64,
+    /// The same at the end.
+    pub hold_at_end: f64,
     /// Step over the exact limit of stability at rest.
     pub step_over_limit_rest: f64,
     /// Step over the least exact limit along the motion.
@@ -68,12 +71,6 @@ impl fmt::Display for End {
 }
 
 impl Row {
-    /// The step, s.
-    #[must_use]
-    pub fn step(&self) -> f64 {
-        f64::from(self.multiple) * f64::from(DT)
-    }
-
     /// The figures, if the run reached its end.
     #[must_use]
     pub const fn figures(&self) -> Option<&Figures> {
@@ -84,16 +81,10 @@ impl Row {
     }
 }
 
-/// Whether every snapshot falls on a step of `multiple` times [`DT`].
-#[must_use]
-pub const fn hits_snapshots(multiple: u32) -> bool {
-    multiple != 0 && INTERVAL_STEPS.is_multiple_of(multiple)
-}
-
 /// Displacement of each node (m) at each snapshot that was reached.
 pub type Shapes = Vec<Vec<[f32; 3]>>;
 
-/// Runs `method` over a scene at `multiple` times [`DT`].
+/// Runs `method` over a scene at `multiple` times its step.
 pub fn run(spec: &SceneSpec, truth: &Truth, method: Method, multiple: u32) -> Result<Row, LabError> {
     Ok(run_with_shapes(spec, truth, method, multiple)?.0)
 }
@@ -105,23 +96,22 @@ pub fn run_with_shapes(
     method: Method,
     multiple: u32,
 ) -> Result<(Row, Shapes), LabError> {
-    if !hits_snapshots(multiple) {
-        return Err(LabError::Multiple { multiple });
-    }
+    spec.timing.check(multiple)?;
     let (end, shapes) = with_law(spec.law, Run { spec, truth, method, multiple })?;
-    let hold = Errors::of_hold(truth)?.mean_over_time();
-    let mut row = Row {
+    let hold = Errors::of_hold(truth)?;
+    let step = f64::from(multiple) * f64::from(spec.timing.step);
+    let row = Row {
         scene: spec.name,
         method,
         multiple,
-        hold,
-        step_over_limit_rest: 0.0,
-        step_over_limit_trajectory: 0.0,
+        step,
+        hold: hold.mean_over_time(),
+        hold_at_end: hold.mean(),
+        step_over_limit_rest: step / truth.limit_at_rest,
+        step_over_limit_trajectory: step / truth.limit_least,
         doubling: None,
         end,
     };
-    row.step_over_limit_rest = row.step() / truth.limit_at_rest;
-    row.step_over_limit_trajectory = row.step() / truth.limit_least;
     Ok((row, shapes))
 }
 
@@ -138,8 +128,9 @@ impl LawWork for Run<'_> {
     fn run<L: ElementLaw>(self, law: L) -> Self::Output {
         let Self { spec, truth, method, multiple } = self;
         let scene = spec.build(law)?;
-        let mut state = VecState::at_rest(scene.node_count());
-        let mut advance = method.prepare(scene.view(), &spec.points, multiple as f32 * DT, spec.damping)?;
+        let dt = multiple as f32 * spec.timing.step;
+        let mut state = spec.state(&scene, dt)?;
+        let mut advance = method.prepare(spec, scene.view(), &mut state, dt)?;
 
         let (mut errors, mut shapes) = (Errors::default(), Shapes::new());
         let (mut estimates, mut estimate) = (Vec::new(), None);
@@ -148,9 +139,9 @@ impl LawWork for Run<'_> {
         for interval in 0..spec.intervals {
             let loads = spec.loads(&scene, interval)?;
             // A lead-in is not timed.
-            let timed = state.time() + 0.5 * f64::from(DT) >= method.lead_in();
+            let timed = state.time() + 0.5 * f64::from(spec.timing.step) >= method.lead_in();
             let start = Instant::now();
-            for _ in 0..INTERVAL_STEPS / multiple {
+            for _ in 0..spec.timing.interval / multiple {
                 let (status, report) = advance(&mut state, &loads)?;
                 estimate = report.estimate;
                 if let Some(clipped) = report.clipped {

@@ -7,15 +7,26 @@ use std::string::ToString;
 use std::vec;
 use std::vec::Vec;
 
-use super::{DT, INTERVAL_STEPS, LabError};
+use glam::Vec3;
+
+use super::timing::Timing;
+use super::{LabError, moving};
 use crate::io::{TetMesh, parse_msh};
 use crate::loads::{Loads, Motion, NodalForce};
 use crate::material::{AnyLaw, Exponential, Law, NeoHookean, Tissue};
 use crate::mesh::{Bar, Mesh, Winding};
 use crate::scene::{AsScene, Axes, BuildError, Support, VecScene};
+use crate::state::VecState;
+use crate::step::Step;
+use crate::tled;
 
 /// The names of all scenes of the tables, in their order. One more, `bent`, is for training.
-pub const NAMES: [&str; 10] = [
+pub fn names() -> impl Iterator<Item = &'static str> {
+    RAMPED.into_iter().chain(moving::names())
+}
+
+/// The names of scenes at multiples of the paper's step: slow ramps and small rotations, but for the last three.
+pub const RAMPED: [&str; 10] = [
     "torsion",
     "reversed",
     "stretch",
@@ -57,7 +68,7 @@ const COMPRESSION: f32 = 0.05;
 /// What is simulated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneSpec {
-    /// One of [`NAMES`].
+    /// One of [`names`].
     pub name: &'static str,
     /// Node coordinates, m.
     pub points: Vec<[f32; 3]>,
@@ -71,14 +82,29 @@ pub struct SceneSpec {
     pub damping: f32,
     /// Held nodes.
     pub supports: Vec<Support>,
+    /// Velocities at the start.
+    pub start: RigidVelocity,
+    /// Gravity, m/s^2.
+    pub gravity: [f32; 3],
     /// Forces.
     pub forces: Vec<NodalForce>,
     /// Prescribed motions.
     pub motions: Vec<Motion>,
     /// After so many intervals the forces are gone, at once.
     pub released_after: Option<usize>,
-    /// Duration in intervals of [`INTERVAL_STEPS`] steps of [`DT`].
+    /// How time is counted.
+    pub timing: Timing,
+    /// Duration in intervals of [`Timing::interval`].
     pub intervals: usize,
+}
+
+/// Velocities of a body that moves rigidly.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RigidVelocity {
+    /// Of the mean of the nodes, m/s.
+    pub linear: [f32; 3],
+    /// About it, 1/s.
+    pub angular: [f32; 3],
 }
 
 impl SceneSpec {
@@ -94,7 +120,7 @@ impl SceneSpec {
     /// Duration, s.
     #[must_use]
     pub fn duration(&self) -> f64 {
-        self.intervals as f64 * f64::from(INTERVAL_STEPS) * f64::from(DT)
+        self.intervals as f64 * self.timing.interval_seconds()
     }
 
     /// Builds the scene; `law` is the [`SceneSpec::law`], of known type.
@@ -107,13 +133,32 @@ impl SceneSpec {
     pub fn loads(&self, scene: &impl AsScene, interval: usize) -> Result<Loads<'_>, LabError> {
         let released = self.released_after.is_some_and(|last| interval >= last);
         let forces = if released { &[] } else { self.forces.as_slice() };
-        Ok(Loads::new(scene, [0.0; 3], forces, &self.motions)?)
+        Ok(Loads::new(scene, self.gravity, forces, &self.motions)?)
+    }
+
+    /// The state at the start, for steps of `dt` (s).
+    pub fn state(&self, scene: &impl AsScene, dt: f32) -> Result<VecState, LabError> {
+        let count = self.points.len();
+        let mut state = VecState::at_rest(count);
+        if self.start != RigidVelocity::default() {
+            let [linear, angular] = [self.start.linear, self.start.angular].map(Vec3::from);
+            let centre = self.points.iter().copied().map(Vec3::from).sum::<Vec3>() / count as f32;
+            let velocity = |node: usize| {
+                let point = self.points.get(node).copied().map_or(centre, Vec3::from);
+                (linear + angular.cross(point - centre)).to_array()
+            };
+            let step = Step::unchecked(dt, self.damping)?;
+            if !tled::start(scene, &mut state, &step, |node| ([0.0; 3], velocity(node))) {
+                return Err(LabError::Mismatch { nodes: scene.as_scene().node_count(), room: count });
+            }
+        }
+        Ok(state)
     }
 }
 
 /// All scenes.
 pub fn all() -> Result<Vec<SceneSpec>, LabError> {
-    NAMES.into_iter().map(named).collect()
+    names().map(named).collect()
 }
 
 /// The scene with this name.
@@ -138,11 +183,14 @@ pub fn named(name: &str) -> Result<SceneSpec, LabError> {
         }
         "push" => pushed_lobe(),
         "bent" => Ok(bent()),
-        _ => Err(LabError::Unknown { kind: "scene", name: name.to_string(), known: NAMES.join(", ") }),
+        _ => moving::named(name).unwrap_or_else(|| {
+            let known = names().collect::<Vec<_>>().join(", ");
+            Err(LabError::Unknown { kind: "scene", name: name.to_string(), known })
+        }),
     }
 }
 
-fn bar(name: &'static str, forces: Vec<NodalForce>) -> SceneSpec {
+pub(super) fn bar(name: &'static str, forces: Vec<NodalForce>) -> SceneSpec {
     let bar = Bar::PAPER;
     let [nx, ny, _] = bar.cells;
     SceneSpec {
@@ -153,9 +201,12 @@ fn bar(name: &'static str, forces: Vec<NodalForce>) -> SceneSpec {
         density: DENSITY,
         damping: DAMPING,
         supports: (0..bar.node(nx, ny, 0) + 1).map(Support::fixed).collect(),
+        start: RigidVelocity::default(),
+        gravity: [0.0; 3],
         forces,
         motions: Vec::new(),
         released_after: None,
+        timing: Timing::PAPER,
         intervals: INTERVALS,
     }
 }
@@ -181,7 +232,7 @@ fn pull(newton: f32, ramp: f32) -> Vec<NodalForce> {
 }
 
 const CYLINDER: &[u8] = include_bytes!("../../meshes/cylinder.msh");
-const LOBE: &[u8] = include_bytes!("../../meshes/lobe.msh");
+pub(super) const LOBE: &[u8] = include_bytes!("../../meshes/lobe.msh");
 /// The held end of a mesh, as a share of its length: more than a layer of elements.
 const HELD: f32 = 0.12;
 
@@ -243,7 +294,10 @@ fn pushed_lobe() -> Result<SceneSpec, LabError> {
 }
 
 /// A mesh held at the low end of its longest axis, and the triangles of its surface.
-fn held_at_its_end(name: &'static str, file: &[u8]) -> Result<(SceneSpec, Vec<[u32; 3]>), LabError> {
+pub(super) fn held_at_its_end(
+    name: &'static str,
+    file: &[u8],
+) -> Result<(SceneSpec, Vec<[u32; 3]>), LabError> {
     let TetMesh { points, tets, triangles, .. } = parse_msh(Path::new(name), file)?;
     let points: Vec<_> = points.into_iter().map(|point| point.map(|component| component as f32)).collect();
     let (axis, low, high) = longest(&points);
@@ -289,8 +343,11 @@ mod tests {
 
     #[test]
     fn every_name_has_its_scene_and_others_are_refused_with_the_names() {
-        for (scene, name) in all().unwrap().iter().zip(NAMES) {
+        for (scene, name) in all().unwrap().iter().zip(names()) {
             assert_eq!(scene.name, name);
+        }
+        for name in RAMPED {
+            let scene = named(name).unwrap();
             assert!((scene.duration() - 1.02).abs() < 1e-6);
             assert!(!scene.supports.is_empty(), "{name}");
             assert!(scene.forces.is_empty() != scene.motions.is_empty(), "{name}");

@@ -5,8 +5,9 @@ use std::vec::Vec;
 
 use super::method::Method;
 use super::run::{End, Row};
+use super::timing::Timing;
 
-/// Multiples of [`super::DT`] in a sweep. Each divides [`super::INTERVAL_STEPS`].
+/// Multiples of a scene's step in a sweep. Each divides the steps of an interval of any scene.
 pub const MULTIPLES: [u32; 8] = [1, 2, 5, 10, 20, 50, 100, 200];
 
 /// A method's errors over its steps.
@@ -42,7 +43,8 @@ impl Curve {
 /// have none.
 #[must_use]
 pub fn curves(rows: &[Row], scene: &str) -> Vec<Curve> {
-    let stepped = Method::ALL.into_iter().filter(|method| !method.multiples(&[2]).contains(&1));
+    let stepped =
+        Method::ALL.into_iter().filter(|method| !method.multiples(&Timing::PAPER, &[2]).contains(&1));
     let curve = |method: Method| {
         let mut curve = Curve { name: method.name(), points: Vec::new(), diverged: Vec::new() };
         for row in rows {

@@ -16,7 +16,7 @@ use crate::io::write_atomically;
 type Column = (&'static str, fn(&Row) -> String);
 
 /// Of the file.
-const COLUMNS: [Column; 17] = [
+const COLUMNS: [Column; 18] = [
     ("scene", |row| row.scene.into()),
     ("method", |row| row.method.name().into()),
     ("multiple", |row| format!("{}", row.multiple)),
@@ -28,12 +28,13 @@ const COLUMNS: [Column; 17] = [
     ("skill", |row| length(skill(row))),
     ("clip_share", |row| length(row.figures().map(|figures| figures.clip_share))),
     ("us_per_step", |row| time(row.figures().map(|figures| figures.us_per_step))),
-    ("us_per_simulated_second", |row| time(row.figures().map(|figures| figures.us_per_step / row.step()))),
+    ("us_per_simulated_second", |row| time(row.figures().map(|figures| figures.us_per_step / row.step))),
     ("step_over_limit_rest", |row| length(Some(row.step_over_limit_rest))),
     ("step_over_limit_trajectory", |row| length(Some(row.step_over_limit_trajectory))),
     ("status", |row| format!("{}", row.end)),
     ("running_estimate_mm", |row| length(row.figures().and_then(|figures| figures.running))),
     ("doubling_estimate_mm", |row| length(row.doubling)),
+    ("hold_at_end_mm", |row| length(Some(row.hold_at_end))),
 ];
 
 /// Of the text: those that matter most to people.
@@ -120,7 +121,9 @@ mod tests {
             scene: "lobe",
             method: Method::TledLargeStep,
             multiple: 10,
+            step: 3e-4,
             hold: 3.0,
+            hold_at_end: 3.5,
             step_over_limit_rest: 1.5,
             step_over_limit_trajectory: 2.0,
             doubling: Some(1.25),
@@ -138,9 +141,10 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[0], COLUMNS.map(|(head, _)| head).join(","));
         let known = "lobe,tled-large-step,10,2.000000,0.500000,4.000000,1.500000,3.000000,0.500000,0.250000,\
-                     150.000,500000.013,1.500000,2.000000,limited,0.750000,1.250000";
+                     150.000,500000.000,1.500000,2.000000,limited,0.750000,1.250000,3.500000";
         assert_eq!(lines[1], known);
-        let unknown = "lobe,tled-large-step,10,,,,,3.000000,,,,,1.500000,2.000000,diverged at 0.013 s,,";
+        let unknown =
+            "lobe,tled-large-step,10,,,,,3.000000,,,,,1.500000,2.000000,diverged at 0.013 s,,,3.500000";
         assert_eq!(lines[2], unknown);
     }
 

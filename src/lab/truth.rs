@@ -1,4 +1,4 @@
-//! The truth: the exact step at [`DT`], with displacements after every [`INTERVAL_STEPS`] steps and the exact
+//! The truth: the exact step at a scene's step or a part of it, with displacements after every interval and the exact
 //! limit of stability, at rest and the least along the motion. SI units.
 //!
 //! Truths are kept on disk, one file a scene, little endian: `suppleT1`, key of the scene, counts, limits,
@@ -14,8 +14,8 @@ use std::sync::mpsc;
 use std::thread;
 use std::vec::Vec;
 
+use super::LabError;
 use super::scenes::SceneSpec;
-use super::{DT, INTERVAL_STEPS, LabError};
 use crate::element::{ElementLaw, LawWork, with_law};
 use crate::io::write_atomically;
 use crate::loads::Loads;
@@ -111,7 +111,7 @@ fn obtain_one(scene: &SceneSpec, folder: &Path) -> Result<Truth, LabError> {
 
 /// Computes the truth of a scene.
 pub fn compute(scene: &SceneSpec) -> Result<Truth, LabError> {
-    with_law(scene.law, Compute { spec: scene, steps: INTERVAL_STEPS })
+    with_law(scene.law, Compute { spec: scene, steps: scene.timing.interval * scene.timing.refinement })
 }
 
 struct Compute<'a> {
@@ -126,13 +126,14 @@ impl LawWork for Compute<'_> {
     fn run<L: ElementLaw>(self, law: L) -> Self::Output {
         let Self { spec, steps } = self;
         let scene = spec.build(law)?;
-        let mut state = VecState::at_rest(scene.node_count());
+        let dt = spec.timing.step / spec.timing.refinement as f32;
+        let mut state = spec.state(&scene, dt)?;
         let limit = |state: &VecState| {
             tled::exact_critical_step(scene.view(), state.displacements())
                 .ok_or(LabError::NoCriticalStep { scene: spec.name })
         };
         let limit_at_rest = limit(&state)?;
-        let step = Step::unchecked(DT, spec.damping)?;
+        let step = Step::unchecked(dt, spec.damping)?;
         let mut truth = Truth {
             snapshots: Vec::new(),
             limit_at_rest,
@@ -212,7 +213,7 @@ fn key(scene: &SceneSpec) -> Result<u64, LabError> {
     let start = with_law(brief.law, Compute { spec: &brief, steps: STEPS })?;
     let mut hash = Fnv::EMPTY.add(&encode(&start, 0));
     // Hashing does not fail.
-    let _ = fmt::write(&mut hash, format_args!("{DT} {INTERVAL_STEPS} {LOOK_STEPS} {FALL} {scene:?}"));
+    let _ = fmt::write(&mut hash, format_args!("{LOOK_STEPS} {FALL} {scene:?}"));
     Ok(hash.0)
 }
 

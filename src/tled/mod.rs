@@ -11,6 +11,8 @@ mod central_differences;
 mod critical;
 #[cfg(feature = "std")]
 mod spectrum;
+#[cfg(feature = "std")]
+pub(crate) mod tangent;
 
 pub use critical::critical_step;
 #[cfg(feature = "std")]

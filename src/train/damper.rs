@@ -35,8 +35,9 @@ use sha2::{Digest, Sha256};
 
 use super::TrainError;
 use crate::lab::method::{Method, NetworkFile};
-use crate::lab::run::{hits_snapshots, run};
+use crate::lab::run::run;
 use crate::lab::scenes::{self, SceneSpec};
+use crate::lab::timing::Timing;
 use crate::lab::truth::{self, Truth};
 use crate::lab::{DT, LabError};
 use crate::mlp::{self, Activation, Description, LayerDescription, MAX_WIDTH, Range};
@@ -113,7 +114,9 @@ impl Recipe {
             if !(load.is_finite() && *load != 0.0) {
                 return refuse("load", load, "it must be a number other than zero");
             }
-            if let Some(multiple) = multiples.iter().find(|multiple| !hits_snapshots(**multiple)) {
+            if let Some(multiple) =
+                multiples.iter().find(|multiple| !Timing::PAPER.hits_snapshots(**multiple))
+            {
                 return refuse("multiples", multiple, "the laboratory's snapshots must fall on steps");
             }
         }

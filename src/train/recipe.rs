@@ -68,7 +68,7 @@ pub struct Recipe {
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {
-    /// One of [`scenes::NAMES`].
+    /// One of [`scenes::RAMPED`].
     pub scene: String,
     /// Times the scene's forces.
     pub load: f32,
@@ -165,8 +165,8 @@ impl Recipe {
     fn checked(self) -> Result<Self, TrainError> {
         let refuse = |what, value: &dyn fmt::Display, must: &str| Err(TrainError::refused(what, value, must));
         let Self { multiple, motion, noise, network, training, .. } = &self;
-        if !scenes::NAMES.contains(&motion.scene.as_str()) {
-            let must = format!("there are {}", scenes::NAMES.join(", "));
+        if !scenes::RAMPED.contains(&motion.scene.as_str()) {
+            let must = format!("there are {}", scenes::RAMPED.join(", "));
             return refuse("scene", &format!("{:?}", motion.scene), &must);
         }
         if !(1..=1_000).contains(multiple) {

@@ -1,0 +1,215 @@
+//! An element's stress and tangent in float64, `P = p1 F + pJ C`, `dP = p1 dF + dp1 F + dpJ C + pJ dC` with the cofactor matrix
+//! `C` of the deformation gradient `F`: for tools and tests. SI units.
+
+use core::array::from_fn;
+
+use glam::{DMat3, DVec3};
+
+use crate::element::ElementTile;
+use crate::material::{Invariants, Law, Material, Potential, VolumeFactor};
+use crate::scene::SceneView;
+use crate::simd::NodeVector;
+
+/// One element at given displacements: its stress and the derivative of it.
+pub(crate) struct ElementTangent {
+    pub(crate) nodes: [usize; 4],
+    gradients: [DVec3; 4],
+    volume: f64,
+    f: DMat3,
+    cofactor: DMat3,
+    /// `p1`, `pJ`, `W''`, `2 W' g'`, `U'' + W' g'' I1`.
+    p1: f64,
+    p_j: f64,
+    stiffening: f64,
+    coupling: f64,
+    bulk: f64,
+    /// `dx/dF = x_f F + x_c C`.
+    x_f: f64,
+    x_c: f64,
+}
+
+impl ElementTangent {
+    /// Of the element in a lane of a tile, at the displacements (m) of all nodes.
+    pub(crate) fn of<M: Material>(
+        scene: SceneView<'_, M>,
+        tile: &ElementTile,
+        lane: usize,
+        displacement: &[NodeVector],
+    ) -> Self {
+        let at = |node: usize| {
+            let [x, y, z] = displacement[node].to_array().map(f64::from);
+            DVec3::new(x, y, z)
+        };
+        Self::new(&scene.material.laws().of(tile.element(lane)), tile, lane, at)
+    }
+
+    /// The same with displacements in float64.
+    pub(crate) fn new<L: Law>(
+        law: &L,
+        tile: &ElementTile,
+        lane: usize,
+        displacement: impl Fn(usize) -> DVec3,
+    ) -> Self {
+        let nodes = [0, 1, 2, 3].map(|corner| tile.node(corner, lane));
+        let slopes = [0, 1, 2].map(|corner| {
+            DVec3::from_array([0, 1, 2].map(|axis| f64::from(tile.gradient::<f32>(corner, axis, lane))))
+        });
+        let gradients = [-(slopes[0] + slopes[1] + slopes[2]), slopes[0], slopes[1], slopes[2]];
+        let mut h = DMat3::ZERO;
+        for (&node, gradient) in nodes.iter().zip(gradients) {
+            h += outer(displacement(node), gradient);
+        }
+        let f = DMat3::IDENTITY + h;
+        let cofactor = cofactor(f);
+        let square = inner3(f, f);
+        let volume_ratio = f.determinant();
+        let at = Invariants { i: (square - 3.0) as f32, j: (volume_ratio - 1.0) as f32 };
+        let wide = law_at(law);
+        let slope = |x: f32| f64::from(wide.distortion_slope(x));
+        let curvature = |x: f32| f64::from(wide.distortion_curvature(x, wide.distortion_slope(x)));
+        let volume_slope = f64::from(wide.volume_slope(at.j));
+        let volume_curvature = f64::from(wide.volume_curvature(at.j));
+        let volume = f64::from(tile.volume::<f32>(lane));
+        let base = Self {
+            nodes,
+            gradients,
+            volume,
+            f,
+            cofactor,
+            p1: 2.0 * slope(at.i),
+            p_j: volume_slope,
+            stiffening: curvature(at.i),
+            coupling: 0.0,
+            bulk: volume_curvature,
+            x_f: 2.0,
+            x_c: 0.0,
+        };
+        if !L::ISOCHORIC {
+            return base;
+        }
+        let factor = VolumeFactor::new(at);
+        let (g, slope_g, curvature_g) =
+            (f64::from(factor.g), f64::from(factor.slope), f64::from(factor.curvature()));
+        Self {
+            p1: 2.0 * slope(factor.x) * g,
+            p_j: volume_slope + slope(factor.x) * slope_g * square,
+            stiffening: curvature(factor.x),
+            coupling: 2.0 * slope(factor.x) * slope_g,
+            bulk: volume_curvature + slope(factor.x) * curvature_g * square,
+            x_f: 2.0 * g,
+            x_c: slope_g * square,
+            ..base
+        }
+    }
+
+    /// Forces with which the element acts on its nodes, N.
+    pub(crate) fn forces(&self) -> [DVec3; 4] {
+        let stress = self.f * self.p1 + self.cofactor * self.p_j;
+        self.gradients.map(|gradient| -(stress * gradient * self.volume))
+    }
+
+    /// `K v`, N, for displacements `v` (m) of its nodes.
+    pub(crate) fn product(&self, vector: [DVec3; 4]) -> [DVec3; 4] {
+        let mut df = DMat3::ZERO;
+        for (vector, gradient) in vector.into_iter().zip(self.gradients) {
+            df += outer(vector, gradient);
+        }
+        let (f, c) = (self.f, self.cofactor);
+        let (df_f, df_c) = (inner3(f, df), inner3(c, df));
+        let dx = self.x_f * df_f + self.x_c * df_c;
+        let d_cofactor = cofactor(f + df) - cofactor(f - df);
+        let stress = df * self.p1
+            + (f * self.x_f + c * self.x_c) * (self.stiffening * dx)
+            + f * (self.coupling * df_c)
+            + c * (self.coupling * df_f + self.bulk * df_c)
+            + d_cofactor * (0.5 * self.p_j);
+        self.gradients.map(|gradient| stress * gradient * self.volume)
+    }
+
+    /// The parts of `K`, N/m, by rows and columns of nodes. With `a = F g`, `c = C g`, `y = x_f a + x_c c` for the gradient `g` of each
+    /// node: `p1 g_i.g_j + W'' y_i y_j^T + coupling (a_i c_j^T + c_i a_j^T) + bulk c_i c_j^T - pJ [F (g_i x g_j)]_x`, times the volume.
+    pub(crate) fn stiffness(&self) -> [[DMat3; 4]; 4] {
+        let along_f = self.gradients.map(|gradient| self.f * gradient);
+        let along_c = self.gradients.map(|gradient| self.cofactor * gradient);
+        from_fn(|i| {
+            let (a, c) = (along_f[i], along_c[i]);
+            let y = (a * self.x_f + c * self.x_c) * self.stiffening;
+            from_fn(|j| {
+                let (b, d) = (along_f[j], along_c[j]);
+                let turning = self.f * self.gradients[i].cross(self.gradients[j]) * self.p_j;
+                let sum =
+                    DMat3::from_diagonal(DVec3::splat(self.p1 * self.gradients[i].dot(self.gradients[j])))
+                        + outer(y, b * self.x_f + d * self.x_c)
+                        + outer(a * self.coupling + c * self.bulk, d)
+                        + outer(c * self.coupling, b)
+                        - cross_matrix(turning);
+                sum * self.volume
+            })
+        })
+    }
+}
+
+fn law_at<L: Law>(law: &L) -> L::Wide<f32> {
+    L::widen(|_| *law)
+}
+
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+fn inner3(a: DMat3, b: DMat3) -> f64 {
+    a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis)
+}
+
+/// `[a]_x`, so that `[a]_x b` is the cross product of a and b.
+fn cross_matrix(a: DVec3) -> DMat3 {
+    DMat3::from_cols(DVec3::new(0.0, a.z, -a.y), DVec3::new(-a.z, 0.0, a.x), DVec3::new(a.y, -a.x, 0.0))
+}
+
+/// The cofactor matrix, quadratic in `f`: a central difference of it is its exact derivative.
+fn cofactor(f: DMat3) -> DMat3 {
+    DMat3::from_cols(f.y_axis.cross(f.z_axis), f.z_axis.cross(f.x_axis), f.x_axis.cross(f.y_axis))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::println;
+
+    use super::*;
+    use crate::material::Exponential;
+    use crate::mesh::Bar;
+    use crate::scene::test_scene::scene_of;
+
+    /// Both the product and the parts of the stiffness are derivatives of the forces, far from rest.
+    #[test]
+    fn the_tangent_is_the_derivative_of_the_forces() {
+        let bar = Bar { size: [0.02, 0.03, 0.04], cells: [1, 1, 1] };
+        let (_, scene) = scene_of(Exponential { a: 500.0, b: 8.0, d: 6e4 }, bar);
+        let wave = |node: usize, k: f64| {
+            DVec3::new((node as f64 + k).sin(), (2.0 * node as f64 + k).cos(), (3.0 * node as f64 - k).sin())
+        };
+        let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+        for (tile, lane) in scene.view().places() {
+            let law = scene.view().material.laws().of(tile.element(lane));
+            let at = |t: f64| {
+                ElementTangent::new(&law, tile, lane, |node| 2e-3 * wave(node, 0.3) + t * wave(node, 1.1))
+            };
+            let tangent = at(0.0);
+            // The law is evaluated in float32: a step much smaller would be lost in its rounding.
+            let h = 2e-6;
+            let (after, before) = (at(h).forces(), at(-h).forces());
+            let directions = tangent.nodes.map(|node| wave(node, 1.1));
+            let products = tangent.product(directions);
+            let parts = tangent.stiffness();
+            for i in 0..4 {
+                let numeric = (before[i] - after[i]) / (2.0 * h);
+                let by_parts: DVec3 = (0..4).map(|j| parts[i][j] * directions[j]).sum();
+                worst =
+                    worst.max((products[i] - numeric).length()).max((by_parts - products[i]).length() * 1e6);
+                largest = largest.max(products[i].length());
+            }
+        }
+        println!("difference {worst:.1e} of {largest:.1e} N/m");
+        assert!(worst < 2e-3 * largest && largest > 1.0);
+    }
+}
