@@ -119,6 +119,8 @@ const NODES_PER_FUNCTION: usize = 4;
 
 /// Limit of the third power of the number of unknowns of a suggested lattice, as a multiple of the number of elements.
 const MULTIPLY_ADDS: u64 = 4000;
+/// The same for bodies with few elements: what a microsecond's worth of work more per step allows.
+const FEW_MULTIPLY_ADDS: u64 = 5_000_000;
 
 /// See [`Cells::Suggested`].
 pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Grid {
@@ -137,7 +139,8 @@ pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> G
         let unknowns = 3 * functions as u64;
         if functions > best.functions
             && NODES_PER_FUNCTION * functions <= points.len()
-            && unknowns * unknowns * unknowns <= MULTIPLY_ADDS * scene.element_count() as u64
+            && unknowns * unknowns * unknowns
+                <= (MULTIPLY_ADDS * scene.element_count() as u64).max(FEW_MULTIPLY_ADDS)
         {
             best = Grid { cells, functions };
         }

@@ -24,7 +24,8 @@
 //! (`transport.rs`). In the first step `D^2` is halved: a force that acts from the start on has acted for half a step.
 //! `c` is the lattice's part of `du`. `T` is zero for rigid motion and small for motion that the step resolves, so the
 //! drag takes neither momentum nor slow motion. It is there because `S` changes with the state while velocities are
-//! kept, which would feed deformation that the step cannot resolve.
+//! kept, which would feed deformation that the step cannot resolve; so it follows the rate at which the shape changes,
+//! up to 0.1.
 //!
 //! # Why it is stable
 //!
@@ -40,7 +41,7 @@
 //! 0.913. This margin allows the stiffness of a node to grow by 5 % and that of the lattice's motion by 17 % during a
 //! cycle. Drag on the last increment lowers the limit: with a share `d` of rough motion and `drag` of the lattice's,
 //! `K <= 4 / D^2 B^-1` becomes `K <= (4 B^-1 - 2 C) / D^2`, and with `2 a b <= e a^2 + b^2 / e` for the two parts of a
-//! motion it holds if `(1 + e) / s_c <= 1 - drag / 2` and `(1 + 1 / e) / s <= 1 - d / 2`. With `drag` = 0.1 that allows
+//! motion it holds if `(1 + e) / s_c <= 1 - drag / 2` and `(1 + 1 / e) / s <= 1 - d / 2`. With `drag` at most 0.1 that allows
 //! `d` = 0.22; the damper removes at most 0.1.
 //!
 //! Between refreshes the bounds are out of date. Four measures compensate for that:
@@ -122,8 +123,12 @@ const COARSE_GROWTH: f32 = COARSE * (1.0 - NODE_GROWTH / FINE);
 const LARGEST_MOVE: f32 = 0.02;
 /// Largest strain of a cell of the lattice by which the forces of one step may move it from rest.
 const LARGEST_STRAIN: f32 = 0.1;
-/// Share of the last increment's unresolved deformation of the lattice that a step removes.
-const DRAG: f32 = 0.1;
+/// Share of the last increment's unresolved deformation of the lattice that a step removes where a step renews all bounds, and the
+/// largest share.
+const DRAG_AT_WHOLE_CYCLES: f32 = 0.02;
+const LARGEST_DRAG: f32 = 0.1;
+/// The same for each multiple of the mass that is added, which grows with the square of the step.
+const DRAG_OF_ADDED: f32 = 4e-5;
 /// Largest growth, from step to step, of the share of its motion that a held-back node may use.
 const RECOVERY: f32 = 1.05;
 /// Least share, so that it can grow again.

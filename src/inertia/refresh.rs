@@ -23,6 +23,7 @@ use super::node_tables::NodeTables;
 use super::projected_inertia::{CellSums, add_cell};
 use super::report::AddedInertiaSums;
 use super::transport::invert_edges;
+use super::{DRAG_AT_WHOLE_CYCLES, DRAG_OF_ADDED, LARGEST_DRAG};
 use crate::element::{ElementLaw, ElementMaterial, ElementTile, MatrixSums, TileBounds, TileTangents};
 use crate::scene::SceneView;
 use crate::simd::{Gather, NodeVector, Scatter, TILE};
@@ -45,6 +46,8 @@ pub(super) struct Refresh {
     /// Cost of the work that is due now, and cost of the work of a cycle.
     due: i64,
     cost: i64,
+    /// The share of a cycle that the motion of the last step asks for; may exceed one.
+    pace: f32,
     /// Largest number of steps of a cycle, and whether one has ended.
     steps: u32,
     ended: bool,
@@ -162,6 +165,7 @@ impl Refresh {
         done: 0,
         due: 0,
         cost: 0,
+        pace: 0.0,
         steps: 1,
         ended: false,
         next_stiffness: Stiffness::NONE,
@@ -193,6 +197,12 @@ impl Refresh {
         self.steps
     }
 
+    /// The share of the last increment's unresolved deformation of the lattice that a step removes. Deformation is fed by `S`
+    /// changing while velocities are kept, so the share follows the rate of that change.
+    pub(super) fn drag(&self) -> f32 {
+        (DRAG_OF_ADDED * self.added.mean()).max(DRAG_AT_WHOLE_CYCLES * self.pace).min(LARGEST_DRAG)
+    }
+
     /// Computes the frames, unless that was done for this state, which has taken `steps` steps.
     pub(super) fn update_frames(&mut self, displacement: &[NodeVector], steps: u64) {
         if self.frames_at != Some(steps) {
@@ -214,6 +224,7 @@ impl Refresh {
     ) {
         self.update_frames(input.displacement, steps);
         let pace = change * self.stiffness.sensitivity().max(LEAST_SENSITIVITY) / LARGEST_CHANGE;
+        self.pace = pace;
         if self.stage == Stage::Elements {
             self.slow = pace < SLOW;
         }
@@ -263,7 +274,7 @@ impl Refresh {
         self.frames.update(input.displacement);
         self.frames.update(input.displacement);
         self.frames_at = None;
-        self.due = 0;
+        (self.due, self.pace) = (0, 0.0);
         (self.first_cycle, self.slow) = (true, true);
         self.enter(Stage::Elements);
         while self.first_cycle {

@@ -82,10 +82,14 @@ impl AddedInertiaSums {
         }
     }
 
+    /// As a multiple of the mass.
+    pub(super) fn mean(&self) -> f32 {
+        self.sum / self.nodes.max(1) as f32
+    }
+
     pub(super) fn report(&self, held_back: u32, coarse_share: f32, error: f32) -> Report {
-        let count = if self.nodes > 0 { self.nodes as f32 } else { 1.0 };
         Report {
-            added_mean: self.sum / count,
+            added_mean: self.mean(),
             added_largest: self.largest,
             added_node: self.node,
             held_back,

@@ -27,7 +27,7 @@ use super::passes::{
 use super::refresh::{Refresh, RefreshInput, from_components, to_components};
 use super::report::HeldBack;
 use super::transport::turned_part;
-use super::{COARSE_GROWTH, DRAG, LARGEST_STRAIN, NODE_GROWTH};
+use super::{COARSE_GROWTH, LARGEST_STRAIN, NODE_GROWTH};
 
 /// A step is [`Status::Limited`] if more than this share of the inverse inertia of all nodes is not used, or less than
 /// this share of the lattice's motion is used.
@@ -266,13 +266,13 @@ impl CoarseMotion<'_> {
         if share * strain > LARGEST_STRAIN {
             share = LARGEST_STRAIN / strain;
         }
-        let removed = removed_share(share.min(self.allowed));
+        let (removed, drag) = (removed_share(share.min(self.allowed)), refresh.drag());
         for (((solution, turned), (strained, twice)), fine) in
             solution.iter_mut().zip(&turned).zip(strained.iter().zip(&twice)).zip(&fine)
         {
             let [answer, turned, strained, twice, fine] =
                 [*solution, *turned, *strained, *twice, *fine].map(|vector| Vec4::from(vector.0));
-            let lost = removed * strained + DRAG * twice;
+            let lost = removed * strained + drag * twice;
             solution.0 = (share * answer + turned - lost - self.least_share * fine).to_array();
         }
         prolong(&solution, lattice, matrices.cells);

@@ -342,7 +342,9 @@ fn free_vibration_keeps_its_energy_bounded_and_damping_takes_it() {
         let damped = vibration(kind, 5.0);
         let parts: Vec<f64> = damped.chunks(400).map(most).collect();
         println!("{kind:?}: damped, in parts of 400 steps at most {parts:.3?}");
-        assert!(parts.windows(2).all(|pair| pair[1] <= pair[0]), "damped energy grows");
+        // Below that the bar is at rest but for rounding.
+        const REST: f64 = 1e-12;
+        assert!(parts.windows(2).all(|pair| pair[1] <= pair[0].max(REST)), "damped energy grows");
         assert!(parts[4] < 0.5 * parts[0]);
     }
 }
