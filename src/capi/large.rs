@@ -108,8 +108,11 @@ impl<'a> Request<'a> {
         Ok(Self { config, points, cells, vectors })
     }
 
+    /// Not inlined: the preparation does without its stack.
+    ///
     /// # Safety
     /// As at [`supple_large_init`]: the weights stay.
+    #[inline(never)]
     unsafe fn method(&self) -> Answer<Method<'static>> {
         let Self { config, cells, .. } = *self;
         Ok(match config.method {

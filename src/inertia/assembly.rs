@@ -101,6 +101,12 @@ impl Patch {
         let ([i, j, k], [x, y, z]) = (self.low, self.cells);
         u64::from_le_bytes([i, j, k, x, y, z, 0, 0])
     }
+
+    #[inline(always)]
+    fn of_key(key: u64) -> Self {
+        let [i, j, k, x, y, z, _, _] = key.to_le_bytes();
+        Self { low: [i, j, k], cells: [x, y, z] }
+    }
 }
 
 /// The patch of an element and the positions of its nodes in it, if each of its nodes is free or held along all axes.
@@ -195,22 +201,38 @@ fn exchange(list: &mut [u32], a: usize, b: usize) {
     }
 }
 
-/// Where an element lies.
+/// Where an element lies in its patch.
 #[derive(Clone, Copy, Default)]
 struct Located {
-    patch: Patch,
-    /// For each node its cell, from the lowest one of the patch, and its position in the cell, 0 to 1 or outside. The
-    /// fourth component is one if the node is free, else zero.
-    nodes: [[Vec4; 2]; 4],
+    /// The position of each node in its cell, 0 to 1 or outside. The fourth component is one if the node is free, else zero.
+    within: [[f32; 4]; 4],
+    /// The cell of each node, from the lowest one of the patch. In bytes, because a batch is on the stack.
+    cells: [[u8; 3]; 4],
 }
 
 /// Elements whose products are summed before they are added to the matrix.
 const GROUP: usize = 8;
 /// Most functions of a patch, rounded up to whole vectors.
 const SLOTS: usize = 2 * TILE;
-/// The three derivatives of each function of a patch along the spatial axes, with five factors: one, that of the inner
-/// product, that of the outer one, that of the exchanged one, and the sum of the latter two.
-type Derivatives = [[[f32; SLOTS]; 3]; 5];
+/// The three derivatives of each function of a patch along the spatial axes.
+type Derivatives = [[f32; SLOTS]; 3];
+/// Those of one vector of functions, with four factors: that of the inner product, that of the outer one, that of the
+/// exchanged one, and the sum of the latter two.
+type Scaled<R> = [[R; 3]; 4];
+
+/// Both for a group of elements.
+struct Scratch<R> {
+    derivatives: [Derivatives; GROUP],
+    scaled: [Scaled<R>; GROUP],
+}
+
+impl<R: Real> Scratch<R> {
+    #[inline(always)]
+    fn new() -> Self {
+        let zero = R::splat(0.0);
+        Self { derivatives: [[[0.0; SLOTS]; 3]; GROUP], scaled: [[[zero; 3]; 4]; GROUP] }
+    }
+}
 
 impl Assembly<'_> {
     /// Adds these elements, at most [`BATCH`].
@@ -243,14 +265,19 @@ impl Kernel for Batch<'_, '_> {
                 .filter(|_| element.is_spatial())
             {
                 Some((patch, nodes)) => {
-                    located[index] = Located { patch, nodes };
+                    for corner in 0..4 {
+                        let [cell, within] = nodes[corner];
+                        let [x, y, z, _] = cell.to_array();
+                        located[index].cells[corner] = [x as u8, y as u8, z as u8];
+                        located[index].within[corner] = within.to_array();
+                    }
                     keys[index] = patch.key() << 8 | index as u64;
                 }
                 _ => assembly.add_element(element, &mut slots),
             }
         }
-        let mut derivatives = [[[[0.0; SLOTS]; 3]; 5]; GROUP];
-        let of = |key: u64| located[(key & 0xff) as usize % BATCH];
+        // Vectors of eight, because most patches have 8 or 12 functions.
+        let mut scratch = Scratch::<R::Width8>::new();
         let mut rest: &[u64] = &keys;
         while let Some(&key) = rest.first() {
             let same = rest.iter().take(GROUP).take_while(|other| **other >> 8 == key >> 8).count();
@@ -258,29 +285,25 @@ impl Kernel for Batch<'_, '_> {
                 return;
             };
             rest = after;
-            if key == 0 {
-                continue;
+            let first = (key & 0xff) as usize;
+            let (group, located) = (elements.get(first..first + group.len()), located.get(first..));
+            if let Some((group, located)) = group.zip(located).filter(|_| key != 0) {
+                let slots = PatchSlots::new(Patch::of_key(key >> 8), assembly.lattice);
+                assembly.add_group(group, located, &slots, &mut scratch);
             }
-            let patch = of(key).patch;
-            let group = group.iter().filter_map(|&key| Some((elements.get((key & 0xff) as usize)?, of(key))));
-            let slots = PatchSlots::new(patch, assembly.lattice);
-            // Vectors of eight, because most patches have 8 or 12 functions.
-            assembly.add_group::<R::Width8>(group, &slots, &mut derivatives);
         }
     }
 }
 
 /// Weights along an axis of the layers of functions of a patch for a node in cell `cell` of it, at `within`.
 #[inline(always)]
-fn layer_weights(cell: f32, within: f32) -> [f32; 3] {
+fn layer_weights(cell: u8, within: f32) -> [f32; 3] {
     let (near, far) = (1.0 - within, within);
-    if cell == 0.0 {
-        [near, far, 0.0]
-    } else if cell == 1.0 {
-        [0.0, near, far]
-    } else {
+    match cell {
+        0 => [near, far, 0.0],
+        1 => [0.0, near, far],
         // On the upper border of the patch.
-        [0.0, 0.0, near]
+        _ => [0.0, 0.0, near],
     }
 }
 
@@ -335,23 +358,28 @@ impl PatchSlots {
 impl Assembly<'_> {
     /// Adds the tangents of elements of one patch, at most [`GROUP`].
     #[inline(always)]
-    fn add_group<'e, R: Real>(
+    fn add_group<R: Real>(
         &mut self,
-        group: impl Iterator<Item = (&'e ElementTangent, Located)>,
+        group: &[ElementTangent],
+        located: &[Located],
         slots: &PatchSlots,
-        derivatives: &mut [Derivatives; GROUP],
+        scratch: &mut Scratch<R>,
     ) {
-        let mut elements = 0;
-        for ((element, located), derivatives) in group.zip(derivatives.iter_mut()) {
-            derive::<R>(element, &located, slots, derivatives);
-            elements += 1;
+        let Scratch { derivatives, scaled } = scratch;
+        let (Some(derivatives), Some(scaled)) =
+            (derivatives.get_mut(..group.len()), scaled.get_mut(..group.len()))
+        else {
+            return;
+        };
+        for ((element, located), derivatives) in group.iter().zip(located).zip(derivatives.iter_mut()) {
+            derive::<R>(element, located, slots, derivatives);
         }
-        let derivatives = derivatives.get(..elements).unwrap_or_default();
-        for row in (0..slots.count).step_by(2) {
-            for first in (0..slots.count.min(row + 2)).step_by(R::COUNT) {
-                let [sums, next] = products::<R>(derivatives, row, first);
-                self.add_products(&sums, row, first, slots);
-                self.add_products(&next, row + 1, first, slots);
+        for first in (0..slots.count).step_by(R::COUNT) {
+            for ((scaled, derivatives), element) in scaled.iter_mut().zip(&*derivatives).zip(group) {
+                *scaled = scale(element, derivatives, first);
+            }
+            for row in first..slots.count {
+                self.add_products(&products(derivatives, scaled, row), row, first, slots);
             }
         }
     }
@@ -397,10 +425,9 @@ fn derive<R: Real>(
 ) {
     let [cx, cy, cz] = element.columns.map(Vec4::from);
     let images = element.gradients.map(|[x, y, z]| (cx * x + cy * y + cz * z).to_array());
-    let [inner, outer, exchanged, _] = element.factors;
     let mut weights = [[[0.0; 3]; 3]; 4];
     for corner in 0..4 {
-        let [cell, within] = located.nodes[corner];
+        let (cell, within) = (located.cells[corner], Vec4::from(located.within[corner]));
         for axis in 0..3 {
             weights[corner][axis] = layer_weights(cell[axis], within[axis]);
         }
@@ -424,43 +451,48 @@ fn derive<R: Real>(
             }
         }
         for axis in 0..3 {
-            write_slots(&mut derivatives[0][axis], first, sums[axis]);
-            write_slots(&mut derivatives[1][axis], first, R::splat(inner) * sums[axis]);
-            write_slots(&mut derivatives[2][axis], first, R::splat(outer) * sums[axis]);
-            write_slots(&mut derivatives[3][axis], first, R::splat(exchanged) * sums[axis]);
-            write_slots(&mut derivatives[4][axis], first, R::splat(outer + exchanged) * sums[axis]);
+            write_slots(&mut derivatives[axis], first, sums[axis]);
         }
     }
 }
 
-/// The submatrices of two functions, those in slots `row` and `row + 1`, with the functions in the slots from `first` on.
+/// The derivatives of the functions in the slots from `first` on, with an element's factors.
 #[inline(always)]
-fn products<R: Real>(elements: &[Derivatives], row: usize, first: usize) -> [[[R; 3]; 3]; 2] {
+fn scale<R: Real>(element: &ElementTangent, derivatives: &Derivatives, first: usize) -> Scaled<R> {
+    let [inner, outer, exchanged, _] = element.factors;
+    let mut scaled = [[R::splat(0.0); 3]; 4];
+    for (scaled, factor) in scaled.iter_mut().zip([inner, outer, exchanged, outer + exchanged]) {
+        for axis in 0..3 {
+            scaled[axis] = R::splat(factor) * slots_from(&derivatives[axis], first);
+        }
+    }
+    scaled
+}
+
+/// The submatrices of the function in slot `row` with those of `scaled`. The sums of one row fit into 16 registers.
+#[inline(always)]
+fn products<R: Real>(derivatives: &[Derivatives], scaled: &[Scaled<R>], row: usize) -> [[R; 3]; 3] {
     let zero = R::splat(0.0);
-    let (mut sums, mut diagonals) = ([[[zero; 3]; 3]; 2], [zero; 2]);
-    for [own, inner, outer, exchanged, both] in elements {
-        for k in 0..2 {
-            let mut scalars = [zero; 3];
-            for i in 0..3 {
-                scalars[i] = R::splat(own[i][(row + k) % SLOTS]);
-            }
-            for i in 0..3 {
-                diagonals[k] = scalars[i].fused(slots_from(&inner[i], first), diagonals[k]);
-                for j in 0..3 {
-                    sums[k][i][j] = if i == j {
-                        scalars[i].fused(slots_from(&both[i], first), sums[k][i][j])
-                    } else {
-                        let sum = scalars[j].fused(slots_from(&exchanged[i], first), sums[k][i][j]);
-                        scalars[i].fused(slots_from(&outer[j], first), sum)
-                    };
-                }
+    let (mut sums, mut diagonal) = ([[zero; 3]; 3], zero);
+    for (own, [inner, outer, exchanged, both]) in derivatives.iter().zip(scaled) {
+        let mut scalars = [zero; 3];
+        for i in 0..3 {
+            scalars[i] = R::splat(own[i][row % SLOTS]);
+        }
+        for i in 0..3 {
+            diagonal = scalars[i].fused(inner[i], diagonal);
+            for j in 0..3 {
+                sums[i][j] = if i == j {
+                    scalars[i].fused(both[i], sums[i][j])
+                } else {
+                    let sum = scalars[j].fused(exchanged[i], sums[i][j]);
+                    scalars[i].fused(outer[j], sum)
+                };
             }
         }
     }
-    for (sums, diagonal) in sums.iter_mut().zip(diagonals) {
-        for i in 0..3 {
-            sums[i][i] = sums[i][i] + diagonal;
-        }
+    for i in 0..3 {
+        sums[i][i] = sums[i][i] + diagonal;
     }
     sums
 }

@@ -280,14 +280,13 @@ impl Kernel for Sweep<'_> {
 }
 
 /// `A x` for a symmetric matrix with as many rows as `x` has components.
-pub(super) fn apply(matrix: &[f32], stride: usize, x: &[f32]) -> Row {
-    let [out] = dispatch(Apply { matrix, stride, x: [x] });
-    out
+pub(super) fn apply(matrix: &[f32], stride: usize, x: &[f32], out: &mut Row) {
+    dispatch(Apply { matrix, stride, x: [x], out: [out] });
 }
 
 /// The products with two vectors of the same length, in one pass over the matrix.
-pub(super) fn apply_to_two(matrix: &[f32], stride: usize, x: [&[f32]; 2]) -> [Row; 2] {
-    dispatch(Apply { matrix, stride, x })
+pub(super) fn apply_to_two(matrix: &[f32], stride: usize, x: [&[f32]; 2], [a, b]: [&mut Row; 2]) {
+    dispatch(Apply { matrix, stride, x, out: [a, b] });
 }
 
 /// `A x` for a symmetric matrix of which only the lower triangle is there.
@@ -307,26 +306,34 @@ pub(super) fn apply_lower(matrix: &[f32], stride: usize, x: &[f32]) -> Row {
     out
 }
 
-/// The product of a symmetric matrix of one unknown for each function with each axis of a vector of three unknowns for
-/// each function.
-pub(super) fn apply_to_axes(matrix: &[f32], functions: usize, x: &Row) -> Row {
-    let parts = by_axis(x);
-    let x = parts.each_ref().map(|part| part.get(..functions).unwrap_or_default());
-    from_axes(&dispatch(Apply { matrix, stride: row_length(functions), x }))
+/// The unknowns of one axis; entries beyond the functions in use are zero.
+type AxisRow = [f32; MAX_FUNCTIONS];
+const _: () = assert!(row_length(MAX_FUNCTIONS) == MAX_FUNCTIONS);
+
+/// Replaces each axis of a vector of three unknowns for each function by its product with a symmetric matrix of one
+/// unknown for each function.
+#[inline(never)]
+pub(super) fn apply_to_axes(matrix: &[f32], functions: usize, row: &mut Row) {
+    let (parts, [mut x, mut y, mut z]) = (by_axis(row), [[0.0; MAX_FUNCTIONS]; 3]);
+    let parts = parts.each_ref().map(|part| part.get(..functions).unwrap_or_default());
+    dispatch(Apply { matrix, stride: row_length(functions), x: parts, out: [&mut x, &mut y, &mut z] });
+    write_axes([&x, &y, &z], row);
 }
 
 /// The same with a matrix of its own for each axis.
-pub(super) fn apply_by_axis(matrices: [&[f32]; 3], functions: usize, x: &Row) -> Row {
-    let mut parts = by_axis(x);
-    for (part, matrix) in parts.iter_mut().zip(matrices) {
-        *part = apply(matrix, row_length(functions), part.get(..functions).unwrap_or_default());
+#[inline(never)]
+pub(super) fn apply_by_axis(matrices: [&[f32]; 3], functions: usize, row: &mut Row) {
+    let (parts, [mut x, mut y, mut z]) = (by_axis(row), [[0.0; MAX_FUNCTIONS]; 3]);
+    for ((matrix, part), out) in matrices.into_iter().zip(&parts).zip([&mut x, &mut y, &mut z]) {
+        let part = [part.get(..functions).unwrap_or_default()];
+        dispatch(Apply { matrix, stride: row_length(functions), x: part, out: [out] });
     }
-    from_axes(&parts)
+    write_axes([&x, &y, &z], row);
 }
 
 /// The unknowns of each axis.
-fn by_axis(x: &Row) -> [Row; 3] {
-    let mut parts = [[0.0; ROW]; 3];
+fn by_axis(x: &Row) -> [AxisRow; 3] {
+    let mut parts = [[0.0; MAX_FUNCTIONS]; 3];
     let [a, b, c] = &mut parts;
     for (&[x, y, z], ((a, b), c)) in x.as_chunks::<3>().0.iter().zip(a.iter_mut().zip(b).zip(c)) {
         (*a, *b, *c) = (x, y, z);
@@ -334,25 +341,29 @@ fn by_axis(x: &Row) -> [Row; 3] {
     parts
 }
 
-fn from_axes([x, y, z]: &[Row; 3]) -> Row {
-    let mut row = [0.0; ROW];
+fn write_axes([x, y, z]: [&AxisRow; 3], row: &mut Row) {
+    row.fill(0.0);
     for (vector, ((&x, &y), &z)) in row.as_chunks_mut::<3>().0.iter_mut().zip(x.iter().zip(y).zip(z)) {
         *vector = [x, y, z];
     }
-    row
 }
 
+/// Most vectors of [`WIDTH`] columns; these have at least eight values.
+const VECTORS: usize = 2;
+
+/// Writes to the first columns of `out`, as many as a row has.
 struct Apply<'a, const X: usize> {
     matrix: &'a [f32],
     stride: usize,
     x: [&'a [f32]; X],
+    out: [&'a mut [f32]; X],
 }
 
 impl<const X: usize> Apply<'_, X> {
     /// The products in `N` times [`WIDTH`] columns from `first` on.
     #[inline(always)]
-    fn columns<R: Real, const N: usize>(&self, first: usize, out: &mut [Row; X]) {
-        let mut sums = [[[R::splat(0.0); WIDTH]; N]; X];
+    fn columns<R: Real, const N: usize>(&mut self, first: usize) {
+        let mut sums = [[[R::splat(0.0); VECTORS]; N]; X];
         for (index, row) in self.matrix.chunks_exact(self.stride.max(1)).enumerate() {
             let values = row.get(first..).unwrap_or_default().as_chunks::<WIDTH>().0.first_chunk::<N>();
             let Some(values) = values else {
@@ -365,17 +376,18 @@ impl<const X: usize> Apply<'_, X> {
                 for n in 0..N {
                     for vector in 0..WIDTH / R::COUNT {
                         let value = R::from_fn(|lane| values[n][(vector * R::COUNT + lane) % WIDTH]);
-                        sums[k][n][vector] = R::splat(x).fused(value, sums[k][n][vector]);
+                        let sum = &mut sums[k][n][vector % VECTORS];
+                        *sum = R::splat(x).fused(value, *sum);
                     }
                 }
             }
         }
-        for (out, sums) in out.iter_mut().zip(&sums) {
+        for (out, sums) in self.out.iter_mut().zip(&sums) {
             let out = out.get_mut(first..).unwrap_or_default().as_chunks_mut::<WIDTH>().0;
             for (out, sums) in out.iter_mut().zip(sums) {
                 for vector in 0..WIDTH / R::COUNT {
                     for lane in 0..R::COUNT {
-                        out[(vector * R::COUNT + lane) % WIDTH] = sums[vector].lane(lane);
+                        out[(vector * R::COUNT + lane) % WIDTH] = sums[vector % VECTORS].lane(lane);
                     }
                 }
             }
@@ -384,22 +396,20 @@ impl<const X: usize> Apply<'_, X> {
 }
 
 impl<const X: usize> Kernel for Apply<'_, X> {
-    type Output = [Row; X];
+    type Output = ();
 
     #[inline(always)]
-    fn run<R: Real>(self) -> [Row; X] {
-        let mut out = [[0.0; ROW]; X];
+    fn run<R: Real>(mut self) {
         let mut first = 0;
         while first < self.stride {
             if first + 4 * WIDTH <= self.stride {
-                self.columns::<R, 4>(first, &mut out);
+                self.columns::<R, 4>(first);
                 first += 4 * WIDTH;
             } else {
-                self.columns::<R, 1>(first, &mut out);
+                self.columns::<R, 1>(first);
                 first += WIDTH;
             }
         }
-        out
     }
 }
 
@@ -432,11 +442,13 @@ mod tests {
         }
         (0..SIZE).for_each(|row| mirror(&mut matrix, stride, row, -1.0));
         let x: Vec<f32> = (0..SIZE).map(|i| (i as f32 * 0.7).sin()).collect();
-        let product = apply(&original, stride, &x);
+        let mut product = [0.0; super::ROW];
+        apply(&original, stride, &x, &mut product);
         let lower = apply_lower(&lower, stride, &x);
         assert!((0..SIZE).all(|i| (product[i] - lower[i]).abs() < 1e-5 * product[i].abs().max(1e4)));
-        let image = apply(&matrix, stride, &x);
-        let back = apply(&original, stride, &image[..SIZE]);
+        let (mut image, mut back) = ([0.0; super::ROW], [0.0; super::ROW]);
+        apply(&matrix, stride, &x, &mut image);
+        apply(&original, stride, &image[..SIZE], &mut back);
         let worst = (0..SIZE).map(|i| (back[i] - x[i]).abs()).fold(0.0, f32::max);
         println!("A (A^-1 x) is off by {worst:.1e} at a condition of 1e5");
         assert!(worst < 2e-2);

@@ -93,8 +93,9 @@ impl<'w> LargeModel<'w> {
         step: Step,
         storage: &mut [NodeVector],
     ) -> Result<Self, InertiaError> {
-        let mut model = Self::unprepared(method, scene, points, step)?;
-        model.first_cycle(scene, points, state, storage)?;
+        let grid = checked_grid(&method, scene, points)?;
+        let mut model = Self::new(method, scene, points, step, grid);
+        model.first_cycle(grid, scene, points, state, storage)?;
         Ok(model)
     }
 
@@ -108,36 +109,25 @@ impl<'w> LargeModel<'w> {
         step: Step,
         storage: &mut [NodeVector],
     ) -> Result<&'m mut Self, InertiaError> {
-        let model = Self::unprepared_in(place, method, scene, points, step)?;
-        model.first_cycle(scene, points, state, storage)?;
+        let grid = checked_grid(&method, scene, points)?;
+        let model = place.write(Self::new(method, scene, points, step, grid));
+        model.first_cycle(grid, scene, points, state, storage)?;
         Ok(model)
     }
 
-    /// Not inlined: its stack is free again in the first cycle.
-    #[inline(never)]
-    fn unprepared_in<'m, M: ElementMaterial>(
-        place: &'m mut MaybeUninit<Self>,
+    /// A model without its lattice. Always inlined: it is made where it stays.
+    #[inline(always)]
+    fn new<M: ElementMaterial>(
         method: Method<'w>,
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
         step: Step,
-    ) -> Result<&'m mut Self, InertiaError> {
-        Ok(place.write(Self::unprepared(method, scene, points, step)?))
-    }
-
-    fn unprepared<M: ElementMaterial>(
-        method: Method<'w>,
-        scene: SceneView<'_, M>,
-        points: &[[f32; 3]],
-        step: Step,
-    ) -> Result<Self, InertiaError> {
-        let nodes = scene.node_count();
-        if points.len() != nodes {
-            return Err(InertiaError::Points { points: points.len(), nodes });
-        }
-        let lattice = Lattice::of(method.grid(scene, points)?, points, scene.inertia)?;
+        grid: Grid,
+    ) -> Self {
+        let (nodes, has_lattice) = (scene.node_count(), grid.functions > 0);
         let size = lattice::size_of(points);
-        Ok(Self {
+        let cells = grid.cells.iter().map(|&count| count as usize).product();
+        Self {
             nodes,
             elements: scene.element_count(),
             scene: scene.checksum(),
@@ -145,34 +135,32 @@ impl<'w> LargeModel<'w> {
             method,
             rough: RoughMotion::NONE,
             step,
-            scaling: scaling(step, lattice.functions() > 0),
-            refresh: Refresh::new(
-                cycle(step, lattice.functions() > 0),
-                scene.tiles.len(),
-                nodes,
-                lattice.functions(),
-                lattice.cell_count(),
-            ),
-            lattice,
+            scaling: scaling(step, has_lattice),
+            refresh: Refresh::new(cycle(step, has_lattice), scene.tiles.len(), nodes, grid.functions, cells),
+            lattice: Lattice::NONE,
             estimate: ErrorEstimate::new(libm::hypotf(libm::hypotf(size[0], size[1]), size[2])),
             least_share: 1.0,
             report: Report::NONE,
-        })
+        }
     }
 
-    /// Chooses the frames, and computes all bounds and inertia.
+    /// Makes the lattice, chooses the frames, and computes all bounds and inertia.
     fn first_cycle<M: ElementMaterial>(
         &mut self,
+        grid: Grid,
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
         state: StateView<'_>,
         storage: &mut [NodeVector],
     ) -> Result<(), InertiaError> {
+        if grid.cells != [0; 3] {
+            self.lattice.set(grid.cells, points, scene.inertia)?;
+        }
         let check = |kind, needed, capacity| {
             if capacity < needed { Err(InertiaError::Capacity { kind, needed, capacity }) } else { Ok(()) }
         };
         let (damped, capacity) = (self.method.damper().is_some(), storage.len());
-        let needed = vectors_for_lattice(self.nodes, self.elements, self.grid(), damped);
+        let needed = vectors_for_lattice(self.nodes, self.elements, grid, damped);
         check("vectors", needed, capacity)?;
         check("nodes in the state", self.nodes, state.capacity())?;
         storage.fill(NodeVector::ZERO);
@@ -182,16 +170,7 @@ impl<'w> LargeModel<'w> {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
         };
         write_heights(scene, &mut tables);
-        let uncoupled = self.lattice.functions() == 0;
-        let frame_lattice = if uncoupled { frame_lattice(scene, points)? } else { self.lattice.clone() };
-        self.refresh.frames.choose(&frame_lattice, points);
-        for (node, (&point, inertia)) in points.iter().zip(scene.inertia).enumerate() {
-            let place = frame_lattice.place(point);
-            tables.set_frame(node, frame_lattice.frame(&place, inertia));
-            if let Some(to) = places.get_mut(node) {
-                *to = place;
-            }
-        }
+        self.choose_frames(scene, points, &mut tables, places)?;
         lattice::sort_by_cell(places);
         sort_by_patch(order, scene, &self.lattice, places);
         let StateView { displacement, increment, progress, .. } = state;
@@ -215,11 +194,42 @@ impl<'w> LargeModel<'w> {
         });
         match unbounded {
             Some(node) => Err(InertiaError::NotFinite { node: node as u32 }),
-            None if !uncoupled && !self.refresh.lattice_in_use => {
+            None if self.lattice.functions() > 0 && !self.refresh.lattice_in_use => {
                 Err(InertiaError::Singular { cells: self.lattice.cells() })
             }
             None => Ok(()),
         }
+    }
+
+    /// Chooses the frames and those of the nodes, and writes the places of the nodes if there is a lattice. Not inlined: the
+    /// first cycle does without its stack.
+    #[inline(never)]
+    fn choose_frames<M>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        tables: &mut NodeTables<'_>,
+        places: &mut [LatticeNode],
+    ) -> Result<(), InertiaError> {
+        let mut of_frames = Lattice::NONE;
+        let lattice = if self.lattice.functions() > 0 {
+            &self.lattice
+        } else {
+            // Mass scaling has a lattice only to define frames.
+            let Grid { cells, functions } = largest_grid(scene, points);
+            let cells = if functions > 0 { cells } else { [1; 3] };
+            of_frames.set(cells, points, scene.inertia)?;
+            &of_frames
+        };
+        self.refresh.frames.choose(lattice, points);
+        for (node, (&point, inertia)) in points.iter().zip(scene.inertia).enumerate() {
+            let place = lattice.place(point);
+            tables.set_frame(node, lattice.frame(&place, inertia));
+            if let Some(to) = places.get_mut(node) {
+                *to = place;
+            }
+        }
+        Ok(())
     }
 
     /// Whether it was prepared for this scene.
@@ -339,10 +349,17 @@ impl<'w> LargeStep<'w, std::vec::Vec<NodeVector>> {
     }
 }
 
-/// The lattice of mass scaling; its functions only define frames.
-fn frame_lattice<M>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<Lattice, InertiaError> {
-    let Grid { cells, functions } = largest_grid(scene, points);
-    Lattice::new(if functions > 0 { cells } else { [1; 3] }, points, scene.inertia)
+/// The lattice of a method, and that there are as many points as nodes.
+fn checked_grid<M: ElementMaterial>(
+    method: &Method<'_>,
+    scene: SceneView<'_, M>,
+    points: &[[f32; 3]],
+) -> Result<Grid, InertiaError> {
+    let nodes = scene.node_count();
+    if points.len() != nodes {
+        return Err(InertiaError::Points { points: points.len(), nodes });
+    }
+    method.grid(scene, points)
 }
 
 /// Writes the least height `1 / |ga|` (m) among the elements of each node.

@@ -177,35 +177,55 @@ impl Lattice {
         self.cells
     }
 
-    /// The lattice of a grid; without functions if the grid has no cells.
-    pub(super) fn of(grid: Grid, points: &[[f32; 3]], inertia: &[NodeInertia]) -> Result<Self, InertiaError> {
-        if grid.cells == [0; 3] { Ok(Self::NONE) } else { Self::new(grid.cells, points, inertia) }
-    }
-
     /// A lattice of these cells on the box around the points (m).
     pub(super) fn new(
         cells: [u32; 3],
         points: &[[f32; 3]],
         inertia: &[NodeInertia],
     ) -> Result<Self, InertiaError> {
+        let mut lattice = Self::NONE;
+        lattice.set(cells, points, inertia)?;
+        Ok(lattice)
+    }
+
+    /// Number of functions of such a lattice. Not inlined: its stack is free again afterwards.
+    #[inline(never)]
+    pub(super) fn functions_for(
+        cells: [u32; 3],
+        points: &[[f32; 3]],
+        inertia: &[NodeInertia],
+    ) -> Result<usize, InertiaError> {
+        Ok(Self::new(cells, points, inertia)?.functions)
+    }
+
+    /// Makes [`Self::NONE`] such a lattice.
+    #[inline(never)]
+    pub(super) fn set(
+        &mut self,
+        cells: [u32; 3],
+        points: &[[f32; 3]],
+        inertia: &[NodeInertia],
+    ) -> Result<(), InertiaError> {
         let fits = cells.iter().all(|&count| (1..MAX_POINTS as u32).contains(&count))
             && cells.iter().map(|&count| count as usize + 1).product::<usize>() <= MAX_POINTS;
         if !fits {
             return Err(InertiaError::Cells { cells });
         }
-        let (low, size) = bounding_box(points);
-        let mut lattice = Self { cells, low, size, ..Self::NONE };
+        self.cells = cells;
+        (self.low, self.size) = bounding_box(points);
         let [along, across, _] = cells.map(|count| (count as usize).max(1));
-        for (cell, indices) in lattice.indices_of_cell.iter_mut().enumerate() {
+        for (cell, indices) in self.indices_of_cell.iter_mut().enumerate() {
             *indices = [cell % along, cell / along % across, cell / along / across].map(|at| at as u8);
         }
-        let mut masses = lattice.point_masses(points, inertia);
-        if lattice.mark_empty_points(&masses) {
-            masses = lattice.point_masses(points, inertia);
+        let mut masses = [PointMass::default(); MAX_POINTS];
+        self.add_masses(points, inertia, &mut masses);
+        if self.mark_empty_points(&masses) {
+            masses.fill(PointMass::default());
+            self.add_masses(points, inertia, &mut masses);
         }
         let largest = masses.iter().fold(0.0, |most, mass| f32::max(most, mass.free));
         let mut full = false;
-        lattice.for_each_point(|lattice, point| {
+        self.for_each_point(|lattice, point| {
             let (Some(function), Some(mass)) = (lattice.function_of_point.get_mut(point), masses.get(point))
             else {
                 return;
@@ -219,10 +239,7 @@ impl Lattice {
                 lattice.functions += 1;
             }
         });
-        if full {
-            return Err(InertiaError::Functions { cells });
-        }
-        Ok(lattice)
+        if full { Err(InertiaError::Functions { cells }) } else { Ok(()) }
     }
 
     /// The axes from that with the fewest cells to that with the most: the order of the functions.
@@ -252,9 +269,8 @@ impl Lattice {
         }
     }
 
-    /// The masses of the points, kg.
-    fn point_masses(&self, points: &[[f32; 3]], inertia: &[NodeInertia]) -> [PointMass; MAX_POINTS] {
-        let mut masses = [PointMass::default(); MAX_POINTS];
+    /// Adds the masses (kg) of the nodes to those of the points.
+    fn add_masses(&self, points: &[[f32; 3]], inertia: &[NodeInertia], masses: &mut [PointMass; MAX_POINTS]) {
         for (&point, inertia) in points.iter().zip(inertia) {
             let free = inertia.inverse.iter().filter(|&&inverse| inverse > 0.0).count() as f32 / 3.0;
             let node = self.place(point);
@@ -265,7 +281,6 @@ impl Lattice {
                 }
             }
         }
-        masses
     }
 
     /// Marks the points with too little mass that supports do not hold. Gives whether there were any. None is marked

@@ -64,7 +64,7 @@ impl Cells {
         match self {
             Self::Suggested => Ok(largest_grid(scene, points)),
             Self::Given(cells) => {
-                let functions = Lattice::new(cells, points, scene.inertia)?.functions();
+                let functions = Lattice::functions_for(cells, points, scene.inertia)?;
                 Ok(Grid { cells, functions })
             }
         }
@@ -132,10 +132,9 @@ pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> G
         if cells.iter().zip(least).any(|(&cells, least)| cells > 1 && cells as f32 * least > 1.0) {
             continue;
         }
-        let Ok(lattice) = Lattice::new(cells, points, scene.inertia) else {
+        let Ok(functions) = Lattice::functions_for(cells, points, scene.inertia) else {
             break;
         };
-        let functions = lattice.functions();
         let unknowns = 3 * functions as u64;
         if functions > best.functions
             && NODES_PER_FUNCTION * functions <= points.len()

@@ -300,7 +300,8 @@ impl Refresh {
         }
     }
 
-    /// The bounds of the elements of batch `at` of the tiles.
+    /// The bounds of the elements of batch `at` of the tiles. Not inlined: inversions do without its stack.
+    #[inline(never)]
     fn add_elements<M: ElementMaterial>(
         &mut self,
         input: &RefreshInput<'_, M>,
@@ -412,8 +413,7 @@ impl Refresh {
     fn invert(&mut self, matrix: &mut [f32], mass: &[f32], functions: usize, at: usize) -> (i64, bool) {
         let (size, stride) = (3 * functions, stride(functions));
         if at == 0 {
-            self.sound &= is_conditioned(matrix, mass, functions);
-            self.image = apply_lower(matrix, stride, probe(size));
+            self.start_inversion(matrix, mass, functions);
         }
         if at < sweeps(size) {
             self.sound &= sweep(matrix, size, stride, at);
@@ -426,6 +426,13 @@ impl Refresh {
             self.sound &= self.is_accurate(matrix, size, stride);
         }
         (row_cost(functions), ended)
+    }
+
+    /// Computes the image of [`PROBE`]. Not inlined: the inversion does without its stack.
+    #[inline(never)]
+    fn start_inversion(&mut self, matrix: &[f32], mass: &[f32], functions: usize) {
+        self.sound &= is_conditioned(matrix, mass, functions);
+        self.image = apply_lower(matrix, stride(functions), probe(3 * functions));
     }
 
     fn enter(&mut self, stage: Stage) {
@@ -486,9 +493,11 @@ impl Refresh {
             .dispatched();
     }
 
-    /// Whether an inverse takes the image of [`PROBE`] back to it, except for rounding.
+    /// Whether an inverse takes the image of [`PROBE`] back to it, except for rounding. Not inlined, as above.
+    #[inline(never)]
     fn is_accurate(&self, inverse: &[f32], size: usize, stride: usize) -> bool {
-        let back = apply(inverse, stride, self.image.get(..size).unwrap_or_default());
+        let mut back = [0.0; _];
+        apply(inverse, stride, self.image.get(..size).unwrap_or_default(), &mut back);
         let errors = back.iter().zip(probe(size)).map(|(back, probe)| (back - probe) * (back - probe));
         errors.sum::<f32>() <= LARGEST_ERROR * LARGEST_ERROR * size as f32
     }

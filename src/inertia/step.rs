@@ -15,11 +15,12 @@ use super::cells::{prolong, restrict};
 use super::damper::RoughMotion;
 use super::dense::{Row, apply, apply_by_axis, apply_to_two, stride};
 use super::estimate::{DefectTotals, dot};
-use super::frames::{Rotation, rotate};
+use super::frames::{Frames, Rotation, rotate};
 use super::large_step::{LargeModel, LargeView, Storage};
 use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
 use super::matrices::{Matrices, of_axes};
 use super::nodal_sums;
+use super::node_tables::NodeTables;
 use super::passes::{
     ApplyIncrements, LatticeMotion, MotionPass, PassInput, PassTotals, RestrictionPass, RoughDamping,
     rotation_table,
@@ -94,6 +95,8 @@ impl<'a, 'w> InertiaStep<'a, 'w> {
 }
 
 impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
+    /// Not inlined, like [`Self::finish`]: the stack of one is free in the other.
+    #[inline(never)]
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let Self { step, model, storage: Storage { tables, places, order, matrices }, .. } = self;
         let LargeModel { lattice, refresh, scaling, rough, method, least_share, steps, estimate, .. } =
@@ -123,7 +126,6 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
         let damper = method.damper().filter(|_| refresh.lattice_in_use && has_lattice);
         self.damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
         refresh.update_frames(displacement, progress.steps);
-        let rotations = &rotation_table(&refresh.frames.of_bounds, refresh.frames.functions());
         let square = step.seconds() * step.seconds() * if progress.steps == 0 { 0.5 } else { 1.0 };
         let input = PassInput { step, scaling, square, inertia, displacement, increment, places };
         let lattice = if has_lattice {
@@ -152,7 +154,7 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
         } else {
             None
         };
-        let passed = MotionPass { input, rotations, lattice, force, tables }.dispatched();
+        let passed = motion_pass(input, &refresh.frames, lattice, force, tables);
         let totals;
         PassTotals { totals, defects: self.defects, rough: self.rough, held_back: self.held_back } = passed;
         Computed { totals, extremes }
@@ -172,6 +174,7 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
         ApplyIncrements { next: self.storage.tables.next_increment, displacement, increment }.dispatched();
     }
 
+    #[inline(never)]
     fn finish(&mut self, trial: &mut Trial<'_, M>) -> bool {
         let Self {
             model, storage: Storage { tables, places, order, matrices }, held_back, coarse_share, ..
@@ -189,6 +192,19 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
     }
 }
 
+/// Not inlined: the lattice's motion does without the stack of the rotations.
+#[inline(never)]
+fn motion_pass(
+    input: PassInput<'_>,
+    frames: &Frames,
+    lattice: Option<LatticeMotion<'_>>,
+    force: &mut [NodeVector],
+    tables: &mut NodeTables<'_>,
+) -> PassTotals {
+    let rotations = &rotation_table(&frames.of_bounds, frames.functions());
+    MotionPass { input, rotations, lattice, force, tables }.dispatched()
+}
+
 /// Largest ratio of a vector of the smooth motion to the largest increment. It may exceed one, because lattice points
 /// may lie outside the body.
 const LARGEST_SMOOTH: f32 = 10.0;
@@ -201,10 +217,9 @@ fn smooth_motion(
     lattice: &Lattice,
     increment: &[NodeVector],
 ) -> Option<CoarseVectors> {
-    let momentum = restrict(matrices.smooth_cells, lattice);
-    let mut motion = [NodeVector::ZERO; _];
-    let components =
-        apply_by_axis(of_axes(matrices.mass_inverse), lattice.functions(), &to_components(&momentum));
+    let mut motion = restrict(matrices.smooth_cells, lattice);
+    let mut components = to_components(&motion);
+    apply_by_axis(of_axes(matrices.mass_inverse), lattice.functions(), &mut components);
     from_components(&components, &mut motion);
     let largest = increment.iter().fold(Vec4::ZERO, |most, du| most.max(Vec4::from(du.0).abs()));
     let limit = Vec4::splat(LARGEST_SMOOTH * largest.max_element());
@@ -248,20 +263,19 @@ impl CoarseMotion<'_> {
     /// strain a cell by more than [`LARGEST_STRAIN`]. Gives it, and by how much the step changes the lattice's shape.
     fn compute(&self, matrices: &mut Matrices<'_>, mut share: f32) -> (f32, f32) {
         let Self { lattice, refresh, .. } = *self;
-        let forces = self.in_frames(&restrict(matrices.cells, lattice));
-        let fine = self.in_world(&self.fine(matrices, &forces));
-        let (mut turned, mut last) = ([NodeVector::ZERO; _], [0.0; _]);
-        if let Some(smooth) = self.smooth {
-            turned = turned_part(smooth, lattice, &refresh.frames, matrices.edge_inverse);
-            last = self.in_frames(smooth);
+        let mut forces = self.forces(matrices);
+        let fine = self.fine(matrices, &forces);
+        let turned = self.turned(matrices);
+        let mut last = self.smooth.map_or([0.0; _], |smooth| self.in_frames(smooth));
+        self.subtract_momentum(matrices, &mut forces, &turned);
+        let mut answer = [0.0; _];
+        self.first_order(matrices, &forces, &mut answer, &mut last);
+        let strained = self.in_world(&last);
+        let twice = self.strained_twice(matrices, &mut last);
+        if self.second_order {
+            self.add_second_order(matrices, &mut forces, &mut answer);
         }
-        let forces = self.without(forces, &self.times_mass(matrices, &self.in_frames(&turned)));
-        let [answer, kept] =
-            self.times_two(matrices.coarse_inverse, [&forces, &self.times_mass(matrices, &last)]);
-        let strained = self.without(last, &kept);
-        let kept = self.times(matrices.coarse_inverse, &self.times_mass(matrices, &strained));
-        let [strained, twice] = [strained, self.without(strained, &kept)].map(|row| self.in_world(&row));
-        let mut solution = self.in_world(&self.of_second_order(matrices, forces, answer));
+        let mut solution = self.in_world(&answer);
         let strain = lattice.largest_strain(&solution, refresh.frames.since_rest());
         if share * strain > LARGEST_STRAIN {
             share = LARGEST_STRAIN / strain;
@@ -284,27 +298,75 @@ impl CoarseMotion<'_> {
         (share, change + lattice.largest_bending(&refresh.frames))
     }
 
-    /// `S^-1 g`, from `g` and itself, or the same of second order.
-    fn of_second_order(&self, matrices: &Matrices<'_>, forces: Row, mut moved: Row) -> Row {
-        if self.second_order {
-            // `A S^-1 g` as `g - M S^-1 g`: where elements are crushed `A` is so large that products with it overflow.
-            let forces = self.without(forces, &self.times_mass(matrices, &moved));
-            let second = self.times(matrices.coarse_inverse, &forces);
-            let passed = self.times_mass(matrices, &second);
-            for (moved, more) in moved.iter_mut().zip(self.times(matrices.coarse_inverse, &passed)) {
-                *moved += more;
-            }
-        }
-        moved
+    // The parts of the above are not inlined: the stack of one is free in the others.
+
+    /// `g` in the frames.
+    #[inline(never)]
+    fn forces(&self, matrices: &Matrices<'_>) -> Row {
+        self.in_frames(&restrict(matrices.cells, self.lattice))
     }
 
-    fn without(&self, mut row: Row, other: &Row) -> Row {
+    /// `w`; zero without `c`.
+    #[inline(never)]
+    fn turned(&self, matrices: &Matrices<'_>) -> CoarseVectors {
+        let Self { lattice, refresh, .. } = *self;
+        match self.smooth {
+            Some(smooth) => turned_part(smooth, lattice, &refresh.frames, matrices.edge_inverse),
+            None => [NodeVector::ZERO; _],
+        }
+    }
+
+    /// Subtracts `M w` from `g`.
+    #[inline(never)]
+    fn subtract_momentum(&self, matrices: &Matrices<'_>, forces: &mut Row, turned: &CoarseVectors) {
+        let mut momentum = self.in_frames(turned);
+        self.times_mass(matrices, &mut momentum);
+        self.subtract(forces, &momentum);
+    }
+
+    /// Writes `S^-1 g`, and makes `T c` of `c`.
+    #[inline(never)]
+    fn first_order(&self, matrices: &Matrices<'_>, forces: &Row, answer: &mut Row, last: &mut Row) {
+        let (mut momentum, mut kept) = (*last, [0.0; _]);
+        self.times_mass(matrices, &mut momentum);
+        let (stride, rows) =
+            (stride(self.lattice.functions()), [forces, &momentum].map(|row| self.used(row)));
+        apply_to_two(matrices.coarse_inverse, stride, rows, [answer, &mut kept]);
+        self.subtract(last, &kept);
+    }
+
+    /// `T^2 c` in the world from `T c`, of which it makes `T^2 c` in the frames.
+    #[inline(never)]
+    fn strained_twice(&self, matrices: &Matrices<'_>, strained: &mut Row) -> CoarseVectors {
+        let (mut momentum, mut kept) = (*strained, [0.0; _]);
+        self.times_mass(matrices, &mut momentum);
+        self.times(matrices.coarse_inverse, &momentum, &mut kept);
+        self.subtract(strained, &kept);
+        self.in_world(strained)
+    }
+
+    /// Makes the answer `S^-1 g` that of second order. What is left of `forces` is of no use.
+    #[inline(never)]
+    fn add_second_order(&self, matrices: &Matrices<'_>, forces: &mut Row, answer: &mut Row) {
+        // `A S^-1 g` as `g - M S^-1 g`: where elements are crushed `A` is so large that products with it overflow.
+        let mut passed = *answer;
+        self.times_mass(matrices, &mut passed);
+        self.subtract(forces, &passed);
+        self.times(matrices.coarse_inverse, forces, &mut passed);
+        self.times_mass(matrices, &mut passed);
+        self.times(matrices.coarse_inverse, &passed, forces);
+        for (answer, more) in answer.iter_mut().zip(forces) {
+            *answer += *more;
+        }
+    }
+
+    fn subtract(&self, row: &mut Row, other: &Row) {
         let used = 3 * self.lattice.functions();
         row.iter_mut().zip(other).take(used).for_each(|(component, other)| *component -= other);
-        row
     }
 
     /// Components in the frames of the bounds.
+    #[inline(never)]
     fn in_frames(&self, vectors: &CoarseVectors) -> Row {
         let mut vectors = *vectors;
         rotate(&mut vectors, self.refresh.frames.of_functions(), Rotation::in_frame);
@@ -312,39 +374,39 @@ impl CoarseMotion<'_> {
     }
 
     /// `G^-1 g`, in fast motion with the bound of `G`.
-    fn fine(&self, matrices: &Matrices<'_>, forces: &Row) -> Row {
+    #[inline(never)]
+    fn fine(&self, matrices: &Matrices<'_>, forces: &Row) -> CoarseVectors {
+        let mut moved: Row = [0.0; _];
         if self.refresh.fine_in_use {
-            return self.times(matrices.fine_inverse, forces);
+            self.times(matrices.fine_inverse, forces, &mut moved);
+            return self.in_world(&moved);
         }
-        let mut moved = [0.0; _];
         let vectors = moved.as_chunks_mut::<3>().0.iter_mut().zip(forces.as_chunks::<3>().0);
         for ((moved, force), inverse) in vectors.zip(&*matrices.bound_inverse) {
             *moved = nodal_sums::times(inverse, *force);
         }
-        moved
+        self.in_world(&moved)
     }
 
-    /// `M` times a vector.
-    fn times_mass(&self, matrices: &Matrices<'_>, row: &Row) -> Row {
-        let product = apply_by_axis(of_axes(matrices.mass), self.lattice.functions(), row);
-        product.map(|component| (1.0 + self.k) * component)
+    /// Replaces a vector by `M` times it.
+    fn times_mass(&self, matrices: &Matrices<'_>, row: &mut Row) {
+        apply_by_axis(of_axes(matrices.mass), self.lattice.functions(), row);
+        row.iter_mut().for_each(|component| *component *= 1.0 + self.k);
     }
 
-    fn times(&self, matrix: &[f32], row: &Row) -> Row {
-        let functions = self.lattice.functions();
-        apply(matrix, stride(functions), row.get(..3 * functions).unwrap_or_default())
+    fn times(&self, matrix: &[f32], row: &Row, out: &mut Row) {
+        apply(matrix, stride(self.lattice.functions()), self.used(row), out);
     }
 
-    fn times_two(&self, matrix: &[f32], rows: [&Row; 2]) -> [Row; 2] {
-        let functions = self.lattice.functions();
-        let rows = rows.map(|row| row.get(..3 * functions).unwrap_or_default());
-        apply_to_two(matrix, stride(functions), rows)
+    /// The components of functions.
+    fn used<'a>(&self, row: &'a Row) -> &'a [f32] {
+        row.get(..3 * self.lattice.functions()).unwrap_or_default()
     }
 
     /// Vectors in the world from components in the frames of the bounds.
     fn in_world(&self, components: &Row) -> CoarseVectors {
         let mut vectors = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-        from_components(components.get(..3 * self.lattice.functions()).unwrap_or_default(), &mut vectors);
+        from_components(self.used(components), &mut vectors);
         rotate(&mut vectors, self.refresh.frames.of_functions(), Rotation::in_world);
         vectors
     }

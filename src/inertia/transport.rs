@@ -63,7 +63,8 @@ pub(super) fn turned_part(
             }
         }
     });
-    let mut turned = [NodeVector::ZERO; _];
-    from_components(&apply_to_axes(inverse, lattice.functions(), &to_components(&sums)), &mut turned);
-    turned
+    let mut components = to_components(&sums);
+    apply_to_axes(inverse, lattice.functions(), &mut components);
+    from_components(&components, &mut sums);
+    sums
 }

@@ -146,6 +146,13 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     if K::SCALAR {
         return kernel.run_scalar();
     }
+    with_baseline(kernel)
+}
+
+/// Not inlined where there are other levels, because these would take its stack as well.
+#[cfg_attr(target_arch = "x86_64", inline(never))]
+#[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+fn with_baseline<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Baseline>()
 }
 

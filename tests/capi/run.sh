@@ -18,7 +18,7 @@ warnings=(-O2 -g -Wall -Wextra -Werror -pedantic -I"$prefix/include")
 
 # What the tests count: whoever asks the C library for memory.
 wrapped=-Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc,--wrap=aligned_alloc,--wrap=posix_memalign
-for test in misuse sizes copies heap threads stack; do
+for test in misuse sizes copies switching heap threads stack; do
     options=(-pthread)
     [ $test != heap ] || options=("$wrapped")
     for size in large small; do

@@ -88,7 +88,7 @@ int main(void) {
     } calls[] = {
         {"scene_init", init_scene, 16}, {"state_init", init_state, 2},     {"loads_init", init_loads, 2},
         {"set_step", set_step, 20},     {"step", exact, 20},               {"learned_init", init_learned, 12},
-        {"learned_step", learn, 140},   {"large_init", init_large, 100},   {"large_step", step_large, 90},
+        {"learned_step", learn, 140},   {"large_init", init_large, 36},    {"large_step", step_large, 36},
     };
     const uint32_t levels[2] = {supple_level(), SUPPLE_LEVEL_PORTABLE};
     for (int level = 0; level < 2; level++) {
