@@ -8,7 +8,6 @@ use std::vec::Vec;
 
 use super::measure::{Errors, mean_distance};
 use super::method::Method;
-use super::networks::Size;
 use super::run::{self, Row, Shapes};
 use super::scenes::{self, SceneSpec};
 use super::truth::{self, Truth};
@@ -30,8 +29,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan from names; an empty list stands for all there are, of methods all but the paper's network, which takes half
-    /// an hour over all scenes. The scene of the sweep is run at
+    /// A plan from names, of scenes also of groups ([`scenes::of_group`]); an empty list stands for all there are, of methods all but [`Method::SLOW`]. The scene of the sweep is run at
     /// [`sweep::MULTIPLES`] too. Without a name it is `reversed`, if that is among the scenes.
     pub fn new(
         scenes: &[String],
@@ -39,12 +37,12 @@ impl Plan {
         multiples: &[u32],
         sweep: Option<&str>,
     ) -> Result<Self, LabError> {
-        let mut names = unique(scenes.iter().map(String::as_str));
+        let mut names = unique(scenes.iter().flat_map(|name| scenes::of_group(name)));
         if names.is_empty() {
             names = scenes::names().collect();
         }
         let methods: Vec<Method> = match methods {
-            [] => Method::ALL.into_iter().filter(|method| *method != Method::Learned(Size::Paper)).collect(),
+            [] => Method::ALL.into_iter().filter(|method| !Method::SLOW.contains(method)).collect(),
             names => names.iter().map(|name| Method::named(name)).collect::<Result<_, _>>()?,
         };
         let multiples = if multiples.is_empty() { &MULTIPLES } else { multiples };

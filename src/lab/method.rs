@@ -100,6 +100,9 @@ impl Method {
         Self::Learned(Size::Paper),
     ];
 
+    /// Those that take more than ten minutes over all scenes.
+    pub const SLOW: [Self; 3] = [Self::BackwardEuler, Self::ImplicitMidpoint, Self::Learned(Size::Paper)];
+
     /// Its name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -15,9 +15,11 @@
 //! | [`measure`] | errors of a motion against the truth |
 //! | [`evaluate`] | rows as asked for in a [`evaluate::Plan`] |
 //! | [`estimates`] | how well methods estimate their own error |
+//! | [`equal_error`] | how much longer implicit steps take for the same error |
 //! | [`table`] | rows as CSV and as aligned text |
 //! | [`sweep`] | error over step on one scene, with fitted slopes; [`plot`] draws it |
 
+pub mod equal_error;
 mod error;
 pub mod estimates;
 pub mod evaluate;

@@ -25,6 +25,15 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     RAMPED.into_iter().chain(moving::names())
 }
 
+/// The scenes of a group, `ramped` or `moving` ([`moving`]); for any other name the scene of that name.
+pub(super) fn of_group(name: &str) -> Vec<&str> {
+    match name {
+        "ramped" => RAMPED.to_vec(),
+        "moving" => moving::names().collect(),
+        name => vec![name],
+    }
+}
+
 /// The names of scenes at multiples of the paper's step: slow ramps and small rotations, but for the last three.
 pub const RAMPED: [&str; 10] = [
     "torsion",
@@ -184,7 +193,8 @@ pub fn named(name: &str) -> Result<SceneSpec, LabError> {
         "push" => pushed_lobe(),
         "bent" => Ok(bent()),
         _ => moving::named(name).unwrap_or_else(|| {
-            let known = names().collect::<Vec<_>>().join(", ");
+            let known: Vec<_> = names().chain(["ramped", "moving"]).collect();
+            let known = known.join(", ");
             Err(LabError::Unknown { kind: "scene", name: name.to_string(), known })
         }),
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use supple::lab::evaluate::{self, Plan};
 use supple::lab::method::Method;
-use supple::lab::{estimates, table};
+use supple::lab::{equal_error, estimates, table};
 
 use crate::problem::{End, Problem};
 
@@ -14,13 +14,13 @@ pub(crate) struct Asked {
     /// Folder for results.csv, the sweep and the truths; results of an earlier evaluation are overwritten
     #[arg(long)]
     out: PathBuf,
-    /// Scene, all unless given; may be repeated
+    /// Scene, or `ramped` or `moving` for a group of them, all 34 unless given; may be repeated
     #[arg(long = "scene", value_name = "NAME")]
     scenes: Vec<String>,
-    /// Method, all but paper-f32 unless given (it takes half an hour over all scenes); may be repeated
+    /// Method, unless given all but paper-f32, backward-euler and implicit-midpoint, which take far longer; may be repeated
     #[arg(long = "method", value_name = "NAME")]
     methods: Vec<String>,
-    /// Step as a multiple of 30 us, 1 10 20 50 100 unless given; may be repeated
+    /// Step as a multiple of the scene's, 1 10 20 50 100 unless given; may be repeated
     #[arg(long = "multiple", value_name = "N")]
     multiples: Vec<u32>,
     /// Weight file of a network to judge as well, a learned step's at its own step, a damper's at all; may be repeated
@@ -39,9 +39,10 @@ pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
     }
     let rows = evaluate::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
     print!("{}", table::text(&rows));
-    let judged = estimates::text(&rows);
-    if !judged.is_empty() {
-        print!("\n{judged}");
+    for judged in [estimates::text(&rows), equal_error::text(&rows)] {
+        if !judged.is_empty() {
+            print!("\n{judged}");
+        }
     }
     println!("\nresults  {}", out.join("results.csv").display());
     Ok(End::Reached)
