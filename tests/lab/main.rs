@@ -4,4 +4,6 @@
 mod damper;
 mod evaluate;
 #[cfg(feature = "slow-tests")]
+mod moving;
+#[cfg(feature = "slow-tests")]
 mod paper;
