@@ -56,6 +56,8 @@ pub enum LabError {
     },
     /// Steps of this multiple do not divide the interval between two snapshots.
     Multiple {
+        /// The scene.
+        scene: &'static str,
         /// The multiple.
         multiple: u32,
         /// Steps between two snapshots.
@@ -94,10 +96,14 @@ impl fmt::Display for LabError {
             Self::Mismatch { nodes, room } => {
                 write!(f, "the scene has {nodes} nodes, the other side {room}")
             }
-            Self::Multiple { multiple, interval: steps } => {
+            Self::Multiple { scene, multiple, interval: steps } => {
                 let known = (1..=*steps).filter(|multiple| steps.is_multiple_of(*multiple));
                 let known: Vec<String> = known.map(|multiple| multiple.to_string()).collect();
-                write!(f, "multiple {multiple} misses the snapshots; there are {}", known.join(", "))
+                write!(
+                    f,
+                    "multiple {multiple} misses the snapshots of {scene}; there are {}",
+                    known.join(", ")
+                )
             }
             Self::NoNetwork { multiple } => {
                 let known: Vec<String> =

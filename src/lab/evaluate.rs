@@ -29,7 +29,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan from names, of scenes also of groups ([`scenes::of_group`]); an empty list stands for all there are, of methods all but [`Method::SLOW`]. The scene of the sweep is run at
+    /// A plan from names, of scenes also of the groups `ramped` and `moving`; an empty list stands for all there are, of methods all but [`Method::SLOW`]. The scene of the sweep is run at
     /// [`sweep::MULTIPLES`] too. Without a name it is `reversed`, if that is among the scenes.
     pub fn new(
         scenes: &[String],
@@ -55,7 +55,7 @@ impl Plan {
             all.sort_unstable();
             all.dedup();
             let scene = scenes::named(name)?;
-            all.iter().try_for_each(|&multiple| scene.timing.check(multiple))?;
+            all.iter().try_for_each(|&multiple| scene.check_multiple(multiple))?;
             plan.scenes.push((scene, all));
         }
         Ok(plan)

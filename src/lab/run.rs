@@ -96,7 +96,7 @@ pub fn run_with_shapes(
     method: Method,
     multiple: u32,
 ) -> Result<(Row, Shapes), LabError> {
-    spec.timing.check(multiple)?;
+    spec.check_multiple(multiple)?;
     let (end, shapes) = with_law(spec.law, Run { spec, truth, method, multiple })?;
     let hold = Errors::of_hold(truth)?;
     let step = f64::from(multiple) * f64::from(spec.timing.step);

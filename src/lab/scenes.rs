@@ -132,6 +132,14 @@ impl SceneSpec {
         self.intervals as f64 * self.timing.interval_seconds()
     }
 
+    /// Fails unless every snapshot falls on a step of `multiple` times that of the scene.
+    pub fn check_multiple(&self, multiple: u32) -> Result<(), LabError> {
+        if self.timing.hits_snapshots(multiple) {
+            return Ok(());
+        }
+        Err(LabError::Multiple { scene: self.name, multiple, interval: self.timing.interval })
+    }
+
     /// Builds the scene; `law` is the [`SceneSpec::law`], of known type.
     pub fn build<L: Law>(&self, law: L) -> Result<VecScene<Tissue<L>>, LabError> {
         let mesh = Mesh::new(&self.points, &self.tets, Winding::Checked).map_err(BuildError::Mesh)?;

@@ -1,6 +1,6 @@
 //! How time is counted in a scene: the step that multiples are of, the steps between two snapshots, the exact steps of the truth.
 
-use super::{DT, INTERVAL_STEPS, LabError};
+use super::{DT, INTERVAL_STEPS};
 
 /// How time is counted in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,15 +33,6 @@ impl Timing {
     #[must_use]
     pub fn interval_seconds(&self) -> f64 {
         f64::from(self.interval) * f64::from(self.step)
-    }
-
-    /// Fails unless every snapshot falls on a step of `multiple` times [`Timing::step`].
-    pub fn check(&self, multiple: u32) -> Result<(), LabError> {
-        if self.hits_snapshots(multiple) {
-            Ok(())
-        } else {
-            Err(LabError::Multiple { multiple, interval: self.interval })
-        }
     }
 
     /// Whether every snapshot falls on a step of `multiple` times [`Timing::step`].
