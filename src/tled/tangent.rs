@@ -1,6 +1,7 @@
 //! An element's stress and tangent in float64, `P = p1 F + pJ C`, `dP = p1 dF + dp1 F + dpJ C + pJ dC` with the cofactor matrix
 //! `C` of the deformation gradient `F`: for tools and tests. SI units.
 
+#[cfg(any(feature = "lab", test))]
 use core::array::from_fn;
 
 use glam::{DMat3, DVec3};
@@ -103,6 +104,7 @@ impl ElementTangent {
     }
 
     /// Forces with which the element acts on its nodes, N.
+    #[cfg(any(feature = "lab", test))]
     pub(crate) fn forces(&self) -> [DVec3; 4] {
         let stress = self.f * self.p1 + self.cofactor * self.p_j;
         self.gradients.map(|gradient| -(stress * gradient * self.volume))
@@ -128,6 +130,7 @@ impl ElementTangent {
 
     /// The parts of `K`, N/m, by rows and columns of nodes. With `a = F g`, `c = C g`, `y = x_f a + x_c c` for the gradient `g` of each
     /// node: `p1 g_i.g_j + W'' y_i y_j^T + coupling (a_i c_j^T + c_i a_j^T) + bulk c_i c_j^T - pJ [F (g_i x g_j)]_x`, times the volume.
+    #[cfg(any(feature = "lab", test))]
     pub(crate) fn stiffness(&self) -> [[DMat3; 4]; 4] {
         let along_f = self.gradients.map(|gradient| self.f * gradient);
         let along_c = self.gradients.map(|gradient| self.cofactor * gradient);
@@ -162,6 +165,7 @@ fn inner3(a: DMat3, b: DMat3) -> f64 {
 }
 
 /// `[a]_x`, so that `[a]_x b` is the cross product of a and b.
+#[cfg(any(feature = "lab", test))]
 fn cross_matrix(a: DVec3) -> DMat3 {
     DMat3::from_cols(DVec3::new(0.0, a.z, -a.y), DVec3::new(-a.z, 0.0, a.x), DVec3::new(a.y, -a.x, 0.0))
 }
