@@ -5,11 +5,9 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
+use super::estimates::{LEAST, Ratios, multiples};
 use super::method::Method;
 use super::run::Row;
-
-/// Errors below are not judged, mm: their scale is that of float32.
-const LEAST: f64 = 1e-4;
 
 /// Error (mm) and time of a simulated second (us).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,9 +38,8 @@ fn time_at(curve: &[Point], error: f64) -> Option<f64> {
     Some(within.unwrap_or(if error <= first.error { first.time } else { last.time }))
 }
 
-/// Times of an implicit method at the errors of `method` at a multiple, over its times, in ascending order.
-#[must_use]
-pub fn ratios(rows: &[Row], method: Method, multiple: u32, implicit: Method) -> Vec<f64> {
+/// Times of an implicit method at the errors of `method` at a multiple, over its times.
+fn ratios(rows: &[Row], method: Method, multiple: u32, implicit: Method) -> Ratios {
     let ratio = |row: &Row| {
         let mut curve: Vec<(u32, Point)> = rows
             .iter()
@@ -55,31 +52,25 @@ pub fn ratios(rows: &[Row], method: Method, multiple: u32, implicit: Method) -> 
         Some(time_at(&curve, point.error)? / point.time)
     };
     let rows = rows.iter().filter(|row| row.method == method && row.multiple == multiple);
-    let mut ratios: Vec<f64> = rows.filter_map(ratio).collect();
-    ratios.sort_by(f64::total_cmp);
-    ratios
+    Ratios::new(rows.filter_map(ratio).collect())
 }
 
 /// A line for each implicit method, explicit method and multiple; nothing if no implicit method was run.
 #[must_use]
 pub fn text(rows: &[Row]) -> String {
-    let mut multiples: Vec<u32> = rows.iter().map(|row| row.multiple).collect();
-    multiples.sort_unstable();
-    multiples.dedup();
+    let multiples = multiples(rows);
     let mut text = String::new();
     for implicit in [Method::BackwardEuler, Method::ImplicitMidpoint] {
         for method in [Method::Tled, Method::MassScaled, Method::Multilevel, Method::Damped] {
             for &multiple in &multiples {
                 let ratios = ratios(rows, method, multiple, implicit);
-                let (Some(least), Some(most)) = (ratios.first(), ratios.last()) else {
+                let (Some([median, least, most]), (_, scenes)) = (ratios.spread(), ratios.good()) else {
                     continue;
                 };
-                let median = ratios.get(ratios.len() / 2).copied().unwrap_or_default();
                 text += &format!(
-                    "{:<18} {:<12} {multiple:>8}  {median:>7.1}  {least:>7.2} to {most:>8.1}  {}\n",
+                    "{:<18} {:<12} {multiple:>8}  {median:>7.1}  {least:>7.2} to {most:>8.1}  {scenes}\n",
                     implicit.name(),
-                    method.name(),
-                    ratios.len()
+                    method.name()
                 );
             }
         }

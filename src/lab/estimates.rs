@@ -9,23 +9,26 @@ use super::method::Method;
 use super::run::Row;
 
 /// Errors below are not judged, mm: their scale is that of float32.
-const LEAST: f64 = 1e-4;
+pub(super) const LEAST: f64 = 1e-4;
 /// A factor that an estimate may be off by, either way.
 const FACTOR: f64 = 3.0;
 
-/// Estimates over true errors of some runs, in ascending order.
+/// Ratios of some runs, in ascending order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ratios(Vec<f64>);
 
 impl Ratios {
-    /// Of the rows of a method at a multiple; `estimate` gives a row's, mm.
+    /// Estimates over true errors of the rows of a method at a multiple; `estimate` gives a row's, mm.
     pub fn of(rows: &[Row], method: Method, multiple: u32, estimate: impl Fn(&Row) -> Option<f64>) -> Self {
         let rows = rows.iter().filter(|row| row.method == method && row.multiple == multiple);
         let ratio = |row: &Row| {
             let error = row.figures()?.errors.mean_over_time();
             (error > LEAST).then_some(estimate(row)? / error)
         };
-        let mut ratios: Vec<f64> = rows.filter_map(ratio).collect();
+        Self::new(rows.filter_map(ratio).collect())
+    }
+
+    pub(super) fn new(mut ratios: Vec<f64>) -> Self {
         ratios.sort_by(f64::total_cmp);
         Self(ratios)
     }
@@ -47,15 +50,21 @@ impl Ratios {
     }
 }
 
+/// The multiples of the rows, in ascending order.
+pub(super) fn multiples(rows: &[Row]) -> Vec<u32> {
+    let mut multiples: Vec<u32> = rows.iter().map(|row| row.multiple).collect();
+    multiples.sort_unstable();
+    multiples.dedup();
+    multiples
+}
+
 /// A line for each estimate, method and multiple; nothing if no row has an estimate.
 #[must_use]
 pub fn text(rows: &[Row]) -> String {
     type Estimate = fn(&Row) -> Option<f64>;
     let running: Estimate = |row| row.figures().and_then(|figures| figures.running);
     let doubling: Estimate = |row| row.doubling;
-    let mut multiples: Vec<u32> = rows.iter().map(|row| row.multiple).collect();
-    multiples.sort_unstable();
-    multiples.dedup();
+    let multiples = multiples(rows);
     let mut text = String::new();
     for (name, estimate) in [("running", running), ("doubling", doubling)] {
         for method in Method::ALL {

@@ -29,8 +29,9 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan from names, of scenes also of the groups `ramped` and `moving`; an empty list stands for all there are, of methods all but [`Method::SLOW`]. The scene of the sweep is run at
-    /// [`sweep::MULTIPLES`] too. Without a name it is `reversed`, if that is among the scenes.
+    /// A plan from names, of scenes also of the groups `ramped` and `moving`; an empty list stands for all there are, of methods
+    /// all but [`Method::SLOW`]. The scene of the sweep is run at [`sweep::MULTIPLES`] too. Without a name it is `reversed`, if
+    /// that is among the scenes.
     pub fn new(
         scenes: &[String],
         methods: &[String],

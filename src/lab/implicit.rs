@@ -66,6 +66,8 @@ struct Body<'a, M> {
     free: Vec<DVec3>,
     displacement: Vec<DVec3>,
     velocity: Vec<DVec3>,
+    /// At the latest residual.
+    tangents: Vec<ElementTangent>,
     matrix: Matrix,
 }
 
@@ -82,6 +84,7 @@ impl<'a, M: Material> Body<'a, M> {
             free: scene.inertia.iter().map(|inertia| inertia.free().truncate().as_dvec3()).collect(),
             displacement: state.displacements().iter().map(|u| vector(u.to_array())).collect(),
             velocity: nodes.map(|node| vector(state.velocity(node))).collect(),
+            tangents: Vec::with_capacity(scene.element_count()),
             matrix: Matrix::of(scene),
         }
     }
@@ -102,8 +105,7 @@ impl<'a, M: Material> Body<'a, M> {
         // What supports add to the velocities of the step before.
         let mut added: Vec<DVec3> =
             self.velocity.iter().zip(&self.free).map(|(v, free)| *v * (*free - DVec3::ONE)).collect();
-        let mut marks = vec![NodeVector::ZERO; self.free.len()];
-        loads.each_prescribed(self.time + self.dt, &mut marks, |node, axis, metre, _| {
+        loads.each_prescribed(self.time + self.dt, &mut external, |node, axis, metre, _| {
             added[node][axis] += (f64::from(metre) - self.displacement[node][axis]) / self.dt;
         });
         if !self.solve(h, &external, &added, &mut velocity) {
@@ -128,7 +130,8 @@ impl<'a, M: Material> Body<'a, M> {
 
     /// Improves velocities until the momentum balance holds, with what supports add to them. Says whether it does.
     fn solve(&mut self, h: f64, external: &[NodeVector], added: &[DVec3], velocity: &mut Vec<DVec3>) -> bool {
-        let Residual { mut left, scale } = self.residual(h, external, velocity, true);
+        let Residual { mut left, scale } = self.residual(h, external, velocity);
+        self.assemble(h);
         // Nodes near moved supports go with them, or their elements would be crushed.
         let moved = self.matrix.product(added, &self.free);
         for (left, moved) in left.iter_mut().zip(moved) {
@@ -137,8 +140,11 @@ impl<'a, M: Material> Body<'a, M> {
         let enough = (NEWTON_TOLERANCE * norm(&left)).max(ROUNDING * scale);
         for iteration in 0..MOST_NEWTON_STEPS {
             let before = norm(&left);
-            if before <= enough && iteration > 0 {
-                return true;
+            if iteration > 0 {
+                if before <= enough {
+                    return true;
+                }
+                self.assemble(h);
             }
             let change = self.matrix.solve(&left, &self.free);
             let mut share = 1.0;
@@ -149,9 +155,9 @@ impl<'a, M: Material> Body<'a, M> {
                         velocity[node] + added - share * change[node]
                     })
                     .collect();
-                let remaining = self.residual(h, external, &trial, false);
+                left = self.residual(h, external, &trial).left;
                 // The first step goes to the supports' positions in any case.
-                if norm(&remaining.left) < before || iteration == 0 {
+                if norm(&left) < before || iteration == 0 {
                     *velocity = trial;
                     break;
                 }
@@ -160,13 +166,12 @@ impl<'a, M: Material> Body<'a, M> {
                     return false;
                 }
             }
-            left = self.residual(h, external, velocity, true).left;
         }
         false
     }
 
-    /// What is left of the momentum balance, N s, along free axes; with `tangent` its derivative goes into the matrix.
-    fn residual(&mut self, h: f64, external: &[NodeVector], velocity: &[DVec3], tangent: bool) -> Residual {
+    /// What is left of the momentum balance, N s, along free axes. Keeps the elements' tangents.
+    fn residual(&mut self, h: f64, external: &[NodeVector], velocity: &[DVec3]) -> Residual {
         let scene = self.scene;
         let laws = scene.material.laws();
         let inert = 1.0 + self.damping * h;
@@ -176,25 +181,30 @@ impl<'a, M: Material> Body<'a, M> {
                 self.mass(node) * (inert * velocity[node] - self.velocity[node]) - h * force
             })
             .collect();
-        if tangent {
-            self.matrix.start(|node| inert * f64::from(scene.node_mass(node)));
-        }
         let mut scale = 0.0;
-        for (element, (tile, lane)) in scene.places().enumerate() {
+        self.tangents.clear();
+        for (tile, lane) in scene.places() {
             let at = |node: usize| self.displacement[node] + h * velocity[node];
-            let element_tangent = ElementTangent::new(&laws.of(tile.element(lane)), tile, lane, at);
-            for (node, force) in element_tangent.nodes.into_iter().zip(element_tangent.forces()) {
+            let tangent = ElementTangent::new(&laws.of(tile.element(lane)), tile, lane, at);
+            for (node, force) in tangent.nodes.into_iter().zip(tangent.forces()) {
                 left[node] -= h * force;
                 scale += h * h * force.length_squared();
             }
-            if tangent {
-                self.matrix.add(element, &element_tangent.stiffness(), h * h);
-            }
+            self.tangents.push(tangent);
         }
         for (left, free) in left.iter_mut().zip(&self.free) {
             *left *= *free;
         }
         Residual { left, scale: scale.sqrt() }
+    }
+
+    /// The derivative of the latest residual, into the matrix.
+    fn assemble(&mut self, h: f64) {
+        let (scene, inert) = (self.scene, 1.0 + self.damping * h);
+        self.matrix.start(|node| inert * f64::from(scene.node_mass(node)));
+        for (element, tangent) in self.tangents.iter().enumerate() {
+            self.matrix.add(element, &tangent.stiffness(), h * h);
+        }
     }
 }
 
