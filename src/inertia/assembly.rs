@@ -15,8 +15,8 @@
 use glam::Vec4;
 
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS, node_place};
+use super::patches::{Patch, locate};
 use crate::element::{ElementTile, NodeInertia, TileTangents};
-use crate::scene::SceneView;
 use crate::simd::{Kernel, Real, TILE, dispatch, write_rows};
 
 /// The bound of the tangent of one element, with `s_c D^2 / 4` as a factor.
@@ -82,122 +82,6 @@ pub(super) const NO_SLOTS: Slots = [NOT_TOUCHED; MAX_FUNCTIONS];
 fn add_four(row: &mut [f32], column: usize, values: Vec4) {
     if let Some(place) = row.get_mut(column..).and_then(<[f32]>::first_chunk_mut::<4>) {
         *place = (Vec4::from(*place) + values).to_array();
-    }
-}
-
-/// A patch of one or two cells along each axis.
-#[derive(Clone, Copy, Default, Eq, PartialEq)]
-pub(super) struct Patch {
-    /// Indices of its lowest cell along the axes.
-    low: [u8; 3],
-    /// Cells along the axes, at least one.
-    pub(super) cells: [u8; 3],
-}
-
-impl Patch {
-    /// An integer for each patch, at least one.
-    #[inline(always)]
-    fn key(&self) -> u64 {
-        let ([i, j, k], [x, y, z]) = (self.low, self.cells);
-        u64::from_le_bytes([i, j, k, x, y, z, 0, 0])
-    }
-
-    #[inline(always)]
-    fn of_key(key: u64) -> Self {
-        let [i, j, k, x, y, z, _, _] = key.to_le_bytes();
-        Self { low: [i, j, k], cells: [x, y, z] }
-    }
-}
-
-/// The patch of an element and the positions of its nodes in it, if each of its nodes is free or held along all axes.
-#[inline(always)]
-pub(super) fn locate(
-    lattice: &Lattice,
-    places: &[LatticeNode],
-    inertia: &[NodeInertia],
-    nodes: &[usize; 4],
-) -> Option<(Patch, [[Vec4; 2]; 4])> {
-    let (mut low, mut high) = (Vec4::splat(f32::MAX), Vec4::ZERO);
-    let mut positions = [[Vec4::ZERO; 2]; 4];
-    for (&node, position) in nodes.iter().zip(&mut positions) {
-        let (at, inertia) = (node_place(places, node)?, inertia.get(node)?);
-        let [x, y, z] = at.within();
-        let free = match inertia.free().cmpgt(Vec4::ZERO).bitmask() {
-            0 => 0.0,
-            0b111 => 1.0,
-            _ => return None,
-        };
-        let [i, j, k] = lattice.cell_indices(at.cell()).map(f32::from);
-        let (cell, within) = (Vec4::new(i, j, k, 0.0), Vec4::new(x, y, z, free));
-        *position = [cell, within];
-        // A node on the border of two cells belongs to both.
-        let border = Vec4::select(within.cmpeq(Vec4::ZERO), Vec4::ONE, Vec4::ZERO);
-        low = low.min(cell);
-        high = high.max(cell - border);
-    }
-    let span = (high - low).max(Vec4::ZERO);
-    if span.cmpgt(Vec4::ONE).any() {
-        return None;
-    }
-    let indices = |vector: Vec4| vector.truncate().to_array().map(|along| along as u8);
-    let patch = Patch { low: indices(low), cells: indices(span + Vec4::ONE) };
-    Some((patch, positions.map(|[cell, within]| [cell - low, within])))
-}
-
-/// Sorts the elements by their patches, those in no patch first. The list has the places of all elements: `TILE` times the
-/// index of a tile plus that in the tile.
-pub(super) fn sort_by_patch<M>(
-    order: &mut [u32],
-    scene: SceneView<'_, M>,
-    lattice: &Lattice,
-    nodes: &[LatticeNode],
-) {
-    let tiles = scene.tiles;
-    let places = (0u32..).zip(tiles.iter().flat_map(|tile| (0..TILE).map(move |lane| (tile, lane))));
-    let elements = places.filter(|(_, (tile, lane))| tile.volume::<f32>(*lane) > 0.0);
-    order.iter_mut().zip(elements).for_each(|(to, (place, _))| *to = place);
-    sort(order, |place| {
-        let nodes_of =
-            |tile: &ElementTile| [0, 1, 2, 3].map(|corner| tile.node(corner, place as usize % TILE));
-        let patch = tiles
-            .get(place as usize / TILE)
-            .and_then(|tile| locate(lattice, nodes, scene.inertia, &nodes_of(tile)));
-        (patch.map_or(0, |(patch, _)| patch.key()), place)
-    });
-}
-
-/// Heap sort: that of the standard library can panic.
-fn sort<K: Ord>(list: &mut [u32], key: impl Fn(u32) -> K) {
-    let count = list.len();
-    for root in (0..count / 2).rev() {
-        sift(list, root, count, &key);
-    }
-    for end in (1..count).rev() {
-        exchange(list, 0, end);
-        sift(list, 0, end, &key);
-    }
-}
-
-/// Lets the entry at `root` sink into the heap of the first `end` entries.
-fn sift<K: Ord>(list: &mut [u32], mut root: usize, end: usize, key: &impl Fn(u32) -> K) {
-    let key_at = |list: &[u32], at: usize| list.get(at).filter(|_| at < end).map(|&entry| key(entry));
-    while 2 * root + 1 < end {
-        let mut child = 2 * root + 1;
-        if key_at(list, child) < key_at(list, child + 1) {
-            child += 1;
-        }
-        if key_at(list, root) >= key_at(list, child) {
-            return;
-        }
-        exchange(list, root, child);
-        root = child;
-    }
-}
-
-fn exchange(list: &mut [u32], a: usize, b: usize) {
-    if let (Some(&first), Some(&second)) = (list.get(a), list.get(b)) {
-        list.get_mut(a).into_iter().for_each(|entry| *entry = second);
-        list.get_mut(b).into_iter().for_each(|entry| *entry = first);
     }
 }
 
@@ -584,19 +468,5 @@ impl Assembly<'_> {
                 add_four(row_z, column, image.z * images[d] + ez * pz + diagonal * Vec4::Z);
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::sort;
-
-    #[test]
-    fn sorts() {
-        let mut list: Vec<u32> = (0..1000u32).map(|at| at.wrapping_mul(2_654_435_761) % 977).collect();
-        let mut expected = list.clone();
-        expected.sort_by_key(|&entry| std::cmp::Reverse(entry));
-        sort(&mut list, std::cmp::Reverse);
-        assert_eq!(list, expected);
     }
 }

@@ -1,9 +1,10 @@
 //! The lattice's matrices, compared with direct sums.
 
-use super::assembly::{Assembly, BATCH, ElementTangent, NO_SLOTS, locate};
+use super::assembly::{Assembly, BATCH, ElementTangent, NO_SLOTS};
 use super::dense::{row_length, stride};
 use super::lattice::{Lattice, LatticeNode, sort_by_cell};
 use super::nodal_sums::{FunctionInertia, add_inertia, add_mass, times, write_mass};
+use super::patches::locate;
 use super::projected_inertia::{CellSums, add_cell};
 use crate::element::NodeInertia;
 use crate::element::symmetric::Symmetric;

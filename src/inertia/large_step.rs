@@ -12,7 +12,6 @@ use crate::simd::{Contiguous, NodeVector};
 use crate::state::StateView;
 use crate::step::{Status, Step};
 
-use super::assembly::sort_by_patch;
 use super::damper::RoughMotion;
 use super::estimate::ErrorEstimate;
 use super::lattice::{self, Grid, Lattice, LatticeNode};
@@ -20,6 +19,7 @@ use super::matrices::Matrices;
 use super::method::{Method, largest_grid, vectors_for_lattice, vectors_of_order, vectors_of_places};
 use super::node::Scaling;
 use super::node_tables::{NodeTables, read_matrices};
+use super::patches::sort_by_patch;
 use super::refresh::{Refresh, RefreshInput};
 use super::{
     COARSE, CYCLE, CYCLE_STEPS, FINE, FINE_WITHOUT_LATTICE, InertiaError, LATTICE_CYCLE_STEPS, Report,

@@ -95,6 +95,7 @@ mod node;
 mod node_refresh;
 mod node_tables;
 mod passes;
+mod patches;
 mod projected_inertia;
 mod refresh;
 mod report;
