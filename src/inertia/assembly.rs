@@ -49,6 +49,26 @@ impl ElementTangent {
         Self { nodes, gradients, columns, factors: tangents.factors[lane % TILE] }
     }
 
+    /// The product of the tangent with displacements of the nodes: forces, with the factor.
+    pub(super) fn times(&self, displacements: [Vec4; 4]) -> [Vec4; 4] {
+        let [cx, cy, cz] = self.columns.map(Vec4::from);
+        let images = self.gradients.map(|[x, y, z]| cx * x + cy * y + cz * z);
+        let slopes =
+            if self.is_spatial() { images } else { self.gradients.map(|[x, y, z]| Vec4::new(x, y, z, 0.0)) };
+        let [inner, outer, exchanged, _] = self.factors;
+        let mut forces = [Vec4::ZERO; 4];
+        for (force, (slope, image)) in forces.iter_mut().zip(slopes.into_iter().zip(images)) {
+            for (displacement, (other_slope, other_image)) in
+                displacements.into_iter().zip(slopes.into_iter().zip(images))
+            {
+                *force += inner * slope.dot(other_slope) * displacement
+                    + outer * other_image.dot(displacement) * image
+                    + exchanged * image.dot(displacement) * other_image;
+            }
+        }
+        forces
+    }
+
     /// Whether the first factor is of products of images.
     #[inline(always)]
     fn is_spatial(&self) -> bool {

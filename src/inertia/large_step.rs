@@ -31,6 +31,8 @@ use super::{
 pub struct LargeModel<'w> {
     pub(super) nodes: usize,
     pub(super) elements: usize,
+    /// Elements that touch a node that motions may move: the first ones in the order.
+    pub(super) moved_elements: usize,
     /// Checksum of the scene.
     scene: u32,
     /// Steps of the state after the latest step, or at the preparation: inertia belongs to that state.
@@ -130,6 +132,7 @@ impl<'w> LargeModel<'w> {
         Self {
             nodes,
             elements: scene.element_count(),
+            moved_elements: 0,
             scene: scene.checksum(),
             steps: 0,
             method,
@@ -172,7 +175,7 @@ impl<'w> LargeModel<'w> {
         write_heights(scene, &mut tables);
         self.choose_frames(scene, points, &mut tables, places)?;
         lattice::sort_by_cell(places);
-        sort_by_patch(order, scene, &self.lattice, places);
+        self.moved_elements = sort_by_patch(order, scene, &self.lattice, places);
         let StateView { displacement, increment, progress, .. } = state;
         self.steps = progress.steps;
         let nodes = self.nodes;
@@ -322,7 +325,8 @@ impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
     }
 
     /// Takes one step of the length for which it was prepared. Every call does the same work: one force evaluation and
-    /// that of the lattice. In a state that another step has moved, that was reset or restored, the first step computes
+    /// that of the lattice; more while the tissue deforms fast, and for the elements at supports that change their speed,
+    /// at most a whole cycle. In a state that another step has moved, that was reset or restored, the first step computes
     /// all inertia anew. `Mismatch` with room for no node if it was prepared for another scene.
     pub fn step<M: ElementMaterial>(
         &mut self,

@@ -4,7 +4,7 @@
 use glam::Vec4;
 
 use super::lattice::{Lattice, LatticeNode, node_place};
-use crate::element::{ElementTile, NodeInertia};
+use crate::element::{Axes, NodeInertia};
 use crate::scene::SceneView;
 use crate::simd::TILE;
 
@@ -67,26 +67,30 @@ pub(super) fn locate(
     Some((patch, positions.map(|[cell, within]| [cell - low, within])))
 }
 
-/// Sorts the elements by their patches, those in no patch first. The list has the places of all elements: `TILE` times the
-/// index of a tile plus that in the tile.
+/// Sorts the elements by their patches, those in no patch first, and before all others those that touch a node that motions may
+/// move. Gives the number of these. The list has the places of all elements: `TILE` times the index of a tile plus that in the
+/// tile.
 pub(super) fn sort_by_patch<M>(
     order: &mut [u32],
     scene: SceneView<'_, M>,
     lattice: &Lattice,
     nodes: &[LatticeNode],
-) {
+) -> usize {
     let tiles = scene.tiles;
     let places = (0u32..).zip(tiles.iter().flat_map(|tile| (0..TILE).map(move |lane| (tile, lane))));
     let elements = places.filter(|(_, (tile, lane))| tile.volume::<f32>(*lane) > 0.0);
     order.iter_mut().zip(elements).for_each(|(to, (place, _))| *to = place);
+    let nodes_of = |place: u32| {
+        let tile = tiles.get(place as usize / TILE)?;
+        Some([0, 1, 2, 3].map(|corner| tile.node(corner, place as usize % TILE)))
+    };
+    let touches = |nodes: &[usize; 4]| nodes.iter().any(|&node| scene.movable(node) != Axes::NONE);
     sort(order, |place| {
-        let nodes_of =
-            |tile: &ElementTile| [0, 1, 2, 3].map(|corner| tile.node(corner, place as usize % TILE));
-        let patch = tiles
-            .get(place as usize / TILE)
-            .and_then(|tile| locate(lattice, nodes, scene.inertia, &nodes_of(tile)));
-        (patch.map_or(0, |(patch, _)| patch.key()), place)
+        let nodes_of = nodes_of(place);
+        let patch = nodes_of.and_then(|nodes_of| locate(lattice, nodes, scene.inertia, &nodes_of));
+        (!nodes_of.as_ref().is_some_and(touches), patch.map_or(0, |(patch, _)| patch.key()), place)
     });
+    order.iter().take_while(|&&place| nodes_of(place).as_ref().is_some_and(touches)).count()
 }
 
 /// Heap sort: that of the standard library can panic.

@@ -2,6 +2,8 @@
 //! and its contribution to the lattice; the lattice's motion; its addition to the nodes. After an accepted step, one
 //! part of the refresh.
 
+use core::iter;
+
 use glam::Vec4;
 
 use crate::element::{ElementLaw, ElementMaterial, InternalForces, NodeInertia, ScalarBound};
@@ -27,6 +29,7 @@ use super::passes::{
 };
 use super::refresh::{Refresh, RefreshInput, from_components, to_components};
 use super::report::HeldBack;
+use super::supports::MovingSupports;
 use super::transport::turned_part;
 use super::{COARSE_GROWTH, LARGEST_STRAIN, NODE_GROWTH};
 
@@ -99,8 +102,18 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
     #[inline(never)]
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let Self { step, model, storage: Storage { tables, places, order, matrices }, .. } = self;
-        let LargeModel { lattice, refresh, scaling, rough, method, least_share, steps, estimate, .. } =
-            &mut **model;
+        let LargeModel {
+            lattice,
+            refresh,
+            scaling,
+            rough,
+            method,
+            moved_elements,
+            least_share,
+            steps,
+            estimate,
+            ..
+        } = &mut **model;
         let Trial { scene, loads, displacement, increment, force, progress } = trial;
         if *steps != progress.steps {
             // Another step has moved the state, or it was reset or restored.
@@ -127,6 +140,16 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
         self.damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
         refresh.update_frames(displacement, progress.steps);
         let square = step.seconds() * step.seconds() * if progress.steps == 0 { 0.5 } else { 1.0 };
+        let supports = MovingSupports {
+            scene: *scene,
+            lattice,
+            places,
+            elements: order.get(..*moved_elements).unwrap_or_default(),
+            weight: scaling.coarse_weight,
+            displacement,
+        };
+        let supports = supports.residual(loads, progress.time, step, increment, tables.next_increment);
+        let mut work = 0.0;
         let input = PassInput { step, scaling, square, inertia, displacement, increment, places };
         let lattice = if has_lattice {
             let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
@@ -140,9 +163,11 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
                 k: scaling.k,
                 least_share: least_share.min(NODE_GROWTH / growth),
                 smooth: smooth.as_ref(),
+                supports: supports.as_ref(),
                 allowed: progress.energy_balance.allowed_share(),
             };
-            let (share, change) = motion.compute(matrices, share);
+            let MotionResult { share, change, work: gained } = motion.compute(matrices, share);
+            work = gained / (step.seconds() * step.seconds());
             // Where bounds have grown beyond their margin they are out of date whatever the lattice does.
             self.change = if growth <= COARSE_GROWTH { change } else { f32::INFINITY };
             self.coarse_share = if refresh.lattice_in_use { share } else { 0.0 };
@@ -155,8 +180,9 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
             None
         };
         let passed = motion_pass(input, &refresh.frames, lattice, force, tables);
-        let totals;
+        let mut totals;
         PassTotals { totals, defects: self.defects, rough: self.rough, held_back: self.held_back } = passed;
+        totals.add_work(work);
         Computed { totals, extremes }
     }
 
@@ -248,8 +274,20 @@ struct CoarseMotion<'a> {
     least_share: f32,
     /// The lattice's part of the last increment.
     smooth: Option<&'a CoarseVectors>,
+    /// What supports whose speed changes add to the residual of the lattice (`supports.rs`).
+    supports: Option<&'a CoarseVectors>,
     /// The share of the kinetic energy that can have come from the loads.
     allowed: f32,
+}
+
+/// How the lattice moves.
+struct MotionResult {
+    /// Share of the motion that is used.
+    share: f32,
+    /// By how much the step changes the lattice's shape.
+    change: f32,
+    /// Work of the supports on the lattice, times `D^2`: kg m^2.
+    work: f32,
 }
 
 impl CoarseMotion<'_> {
@@ -257,12 +295,13 @@ impl CoarseMotion<'_> {
     /// it, `G^-1 g` with `g = W^T r`. The motion is
     ///
     /// ```text
-    /// share S^-1 (g - M w) + w - (removed T + drag T^2) c - least G^-1 g     M = (1 + k) Mc,  T = S^-1 A = 1 - S^-1 M
+    /// share S^-1 (g - M w) + p + w - (removed T + drag T^2) c - least G^-1 g     M = (1 + k) Mc,  T = S^-1 A = 1 - S^-1 M
     /// ```
-    /// with the rotation `w` of the velocities (`transport.rs`). Reduces the share if the forces of one step would
-    /// strain a cell by more than [`LARGEST_STRAIN`]. Gives it, and by how much the step changes the lattice's shape.
-    fn compute(&self, matrices: &mut Matrices<'_>, mut share: f32) -> (f32, f32) {
+    /// with the rotation `w` of the velocities (`transport.rs`), and `p = -S^-1 A_s d` from the supports. Reduces the share
+    /// if the forces of one step would strain a cell by more than [`LARGEST_STRAIN`].
+    fn compute(&self, matrices: &mut Matrices<'_>, mut share: f32) -> MotionResult {
         let Self { lattice, refresh, .. } = *self;
+        let pulled = self.supports.map(|supports| self.pulled(matrices, supports, share));
         let mut forces = self.forces(matrices);
         let fine = self.fine(matrices, &forces);
         let turned = self.turned(matrices);
@@ -289,13 +328,18 @@ impl CoarseMotion<'_> {
             let lost = removed * strained + drag * twice;
             solution.0 = (share * answer + turned - lost - self.least_share * fine).to_array();
         }
+        for (solution, pulled) in solution.iter_mut().zip(pulled.iter().flatten()) {
+            solution.0 = (Vec4::from(solution.0) + Vec4::from(pulled.0)).to_array();
+        }
         prolong(&solution, lattice, matrices.cells);
         prolong(&fine, lattice, matrices.fine_cells);
         for (next, last) in solution.iter_mut().zip(self.smooth.into_iter().flatten()) {
             next.0 = (Vec4::from(next.0) + Vec4::from(last.0)).to_array();
         }
-        let change = lattice.largest_strain(&solution, refresh.frames.since_rest());
-        (share, change + lattice.largest_bending(&refresh.frames))
+        let strain = lattice.largest_strain(&solution, refresh.frames.since_rest());
+        let change = strain + lattice.largest_bending(&refresh.frames);
+        let work = pulled.map_or(0.0, |pulled| self.work(matrices, &pulled, &solution));
+        MotionResult { share, change, work }
     }
 
     // The parts of the above are not inlined: the stack of one is free in the others.
@@ -322,6 +366,29 @@ impl CoarseMotion<'_> {
         let mut momentum = self.in_frames(turned);
         self.times_mass(matrices, &mut momentum);
         self.subtract(forces, &momentum);
+    }
+
+    /// `p`, as far as bounds have not grown beyond their margin.
+    #[inline(never)]
+    fn pulled(&self, matrices: &Matrices<'_>, supports: &CoarseVectors, share: f32) -> CoarseVectors {
+        let mut answer = [0.0; _];
+        self.times(matrices.coarse_inverse, &self.in_frames(supports), &mut answer);
+        answer.iter_mut().for_each(|component| *component *= share);
+        self.in_world(&answer)
+    }
+
+    /// Work with which supports give the lattice the momentum of `p`, times `D^2`, from the lattice's part of the next
+    /// increments.
+    #[inline(never)]
+    fn work(&self, matrices: &Matrices<'_>, pulled: &CoarseVectors, next: &CoarseVectors) -> f32 {
+        let mut momentum = to_components(pulled);
+        apply_by_axis(of_axes(matrices.mass), self.lattice.functions(), &mut momentum);
+        let last = self.smooth.into_iter().flatten().chain(iter::repeat(&NodeVector::ZERO));
+        let vectors = momentum.as_chunks::<3>().0.iter().zip(next.iter().zip(last));
+        vectors.fold(0.0, |sum, (&[x, y, z], (next, last))| {
+            let mean = 0.5 * (Vec4::from(next.0) + Vec4::from(last.0));
+            sum + Vec4::new(x, y, z, 0.0).dot(mean)
+        })
     }
 
     /// Writes `S^-1 g`, and makes `T c` of `c`.

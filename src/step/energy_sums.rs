@@ -81,6 +81,8 @@ pub(crate) struct Totals {
     kinetic: f64,
     momentum: [f64; 3],
     prescribed: f64,
+    /// Other work of supports, J.
+    work: f64,
 }
 
 impl Totals {
@@ -90,11 +92,17 @@ impl Totals {
         for part in parts {
             all.kinetic += part.kinetic;
             all.prescribed += part.prescribed;
+            all.work += part.work;
             for (sum, momentum) in all.momentum.iter_mut().zip(part.momentum) {
                 *sum += momentum;
             }
         }
         all
+    }
+
+    /// Adds work that supports do on free nodes directly, J.
+    pub(crate) fn add_work(&mut self, joule: f32) {
+        self.work += f64::from(joule);
     }
 
     /// Adds vectorised sums of nodes, one for each axis.
@@ -140,7 +148,7 @@ impl Entry {
             finite: totals.kinetic.is_finite(),
             kinetic: 0.5 * totals.kinetic / (dt * dt),
             // What a support exerts is minus the total force on its node.
-            work: gravity - 0.5 * totals.prescribed,
+            work: gravity - 0.5 * totals.prescribed + totals.work,
             jump: 0.0,
         }
     }

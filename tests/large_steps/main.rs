@@ -11,6 +11,7 @@ mod support;
 
 mod damper;
 mod estimate;
+mod pulled;
 mod refused;
 mod switching;
 mod turning;

@@ -1,0 +1,108 @@
+//! Supports that start and stop at once: the body follows them as it follows them in exact steps.
+
+use supple::loads::{Loads, Motion};
+use supple::material::NeoHookean;
+use supple::scene::{Axes, Support, VecScene};
+use supple::state::VecState;
+use supple::step::{Status, Step};
+use supple::tled;
+
+use crate::support::bodies::Body;
+use crate::support::{mean_distance, rest_of, tissue, to_f64};
+use crate::{Kind, limit};
+
+/// A bar with one end that moves.
+struct Pulled {
+    body: Body,
+    motions: Vec<Motion>,
+    supports: Vec<Support>,
+    law: NeoHookean,
+}
+
+impl Pulled {
+    /// The end moves by `metre` (m) in `ramp` seconds; the other end is held, or free.
+    fn new(law: NeoHookean, metre: [f32; 3], ramp: f32, held: bool) -> Self {
+        const LENGTH: f32 = 0.1;
+        let body = Body::bar([0.02, 0.02, LENGTH], [3, 3, 12]);
+        let end = body.nodes_where(|[_, _, z]| z == LENGTH);
+        let motions: Vec<_> =
+            end.into_iter().map(|node| Motion { node, axes: Axes::XYZ, metre, ramp }).collect();
+        let mut supports: Vec<_> = motions.iter().map(|motion| Support::moved(motion.node)).collect();
+        if held {
+            supports.extend(body.nodes_where(|[_, _, z]| z == 0.0).into_iter().map(Support::fixed));
+        }
+        Self { body, motions, supports, law }
+    }
+
+    /// Mean distance from the exact motion after each of these numbers of steps, and the mean displacement there, m.
+    fn compare(&self, kind: Kind, multiple: f32, damping: f32, after: &[u32]) -> Vec<[f64; 2]> {
+        /// Steps of the exact motion in one large step, for each multiple of the limit.
+        const FINER: u32 = 4;
+        let scene = self.body.scene(tissue(self.law), &self.supports);
+        let loads = Loads::new(&scene, [0.0; 3], &[], &self.motions).unwrap();
+        let step = Step::unchecked(multiple * limit(&scene), damping).unwrap();
+        let parts = FINER * multiple as u32;
+        let fine = Step::unchecked(step.seconds() / parts as f32, damping).unwrap();
+        let [mut state, mut exact] = [rest_of(&scene), rest_of(&scene)];
+        let mut large = kind.prepared(&self.body, &scene, &mut state, step, 0.0);
+        let mut compared = Vec::new();
+        for taken in 1..=after.iter().copied().max().unwrap() {
+            assert!(large.step(scene.view(), &loads, state.view()).is_taken(), "{kind:?}: step {taken}");
+            exact_steps(&scene, &loads, &mut exact, &fine, parts);
+            if after.contains(&taken) {
+                let [moved, truth] = [&state, &exact].map(|state| to_f64(state.displacements()));
+                let rest = vec![[0.0; 3]; truth.len()];
+                compared.push([mean_distance(&moved, &truth), mean_distance(&truth, &rest)]);
+            }
+        }
+        compared
+    }
+}
+
+fn exact_steps<M: supple::element::ElementMaterial>(
+    scene: &VecScene<M>,
+    loads: &Loads<'_>,
+    state: &mut VecState,
+    step: &Step,
+    count: u32,
+) {
+    for _ in 0..count {
+        assert_eq!(tled::step(scene, loads, state, step), Status::Ok);
+    }
+}
+
+#[test]
+fn a_support_that_starts_takes_the_body_along_from_the_first_step_on() {
+    // Stiff enough for a wave to run through the bar in a step of 100 times the limit: it moves nearly as one.
+    let pulled = Pulled::new(NeoHookean { c: 40_000.0, d: 400_000.0 }, [0.1, 0.0, 0.3], 0.3, false);
+    for kind in [Kind::Multilevel, Kind::Damped] {
+        for (multiple, steps, most) in [(50.0, 8, 0.1), (100.0, 1, 0.1)] {
+            let [error, motion] = pulled.compare(kind, multiple, 20.0, &[steps])[0].map(|metre| 1e3 * metre);
+            println!("{kind:?} at {multiple}, {steps} steps: off by {error:.2} of {motion:.1} mm");
+            assert!(error < most * motion);
+        }
+    }
+}
+
+#[test]
+fn a_bar_follows_a_fast_pull() {
+    /// s
+    const RAMP: f32 = 0.04;
+    for ratio in [10.0, 50.0, 1000.0] {
+        let law = NeoHookean { c: 20_000.0, d: 20_000.0 * ratio };
+        let pulled = Pulled::new(law, [0.0, 0.0, 0.05], RAMP, true);
+        let limit = limit(&pulled.body.scene(tissue(law), &pulled.supports));
+        for (kind, multiple) in
+            [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|k| [10.0, 20.0].map(|m| (k, m)))
+        {
+            let ramp = (RAMP / (multiple * limit)) as u32;
+            let figures = pulled.compare(kind, multiple, 20.0, &[ramp / 2, ramp, 2 * ramp]);
+            let shares: Vec<_> = figures.iter().map(|[error, motion]| error / motion).collect();
+            println!(
+                "bulk over shear {ratio}, {kind:?} at {multiple}: error over motion while the support \
+                moves, when it stops, and later {shares:.3?}"
+            );
+            assert!(shares.iter().all(|share| *share < 0.1), "{figures:?}");
+        }
+    }
+}
