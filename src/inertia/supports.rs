@@ -1,7 +1,7 @@
 //! Supports whose speed changes, coupled to the motion of the lattice. A step solves `S c + A_s d = g` for the lattice, where `d`
 //! (m) is the change of the supports' increments and `A_s = s_c D^2 / 4 W^T K_s` (kg) the stiffness between the lattice's functions
 //! and the supports, with the bound `K` of `assembly.rs`. Without the second term a support that starts leaves the body behind until
-//! the elements beside it are stretched by a whole step's motion; with it the lattice follows as far as `A` resists the strain.
+//! its elements are stretched by a whole step's motion; with it the lattice follows as far as `A` resists the strain.
 //! Supports that stand still or keep their speed add nothing.
 
 use glam::Vec4;

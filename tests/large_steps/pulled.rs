@@ -36,7 +36,7 @@ impl Pulled {
 
     /// Mean distance from the exact motion after each of these numbers of steps, and the mean displacement there, m.
     fn compare(&self, kind: Kind, multiple: f32, damping: f32, after: &[u32]) -> Vec<[f64; 2]> {
-        /// Steps of the exact motion in one large step, for each multiple of the limit.
+        /// Exact steps in one long step, for each multiple of the limit.
         const FINER: u32 = 4;
         let scene = self.body.scene(tissue(self.law), &self.supports);
         let loads = Loads::new(&scene, [0.0; 3], &[], &self.motions).unwrap();
