@@ -2,8 +2,6 @@
 //! and its contribution to the lattice; the lattice's motion; its addition to the nodes. After an accepted step, one
 //! part of the refresh.
 
-use core::iter;
-
 use glam::Vec4;
 
 use crate::element::{ElementLaw, ElementMaterial, InternalForces, NodeInertia, ScalarBound};
@@ -29,7 +27,7 @@ use super::passes::{
 };
 use super::refresh::{Refresh, RefreshInput, from_components, to_components};
 use super::report::HeldBack;
-use super::supports::MovingSupports;
+use super::supports::{MovingSupports, Pull};
 use super::transport::turned_part;
 use super::{COARSE_GROWTH, LARGEST_STRAIN, NODE_GROWTH};
 
@@ -148,7 +146,7 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
             weight: scaling.coarse_weight,
             displacement,
         };
-        let supports = supports.residual(loads, progress.time, step, increment, tables.next_increment);
+        let supports = supports.pull(loads, progress.time, step, increment, tables.next_increment);
         let mut work = 0.0;
         let input = PassInput { step, scaling, square, inertia, displacement, increment, places };
         let lattice = if has_lattice {
@@ -274,8 +272,8 @@ struct CoarseMotion<'a> {
     least_share: f32,
     /// The lattice's part of the last increment.
     smooth: Option<&'a CoarseVectors>,
-    /// What supports whose speed changes add to the residual of the lattice (`supports.rs`).
-    supports: Option<&'a CoarseVectors>,
+    /// Supports whose speed changes (`supports.rs`).
+    supports: Option<&'a Pull>,
     /// The share of the kinetic energy that can have come from the loads.
     allowed: f32,
 }
@@ -301,7 +299,7 @@ impl CoarseMotion<'_> {
     /// if the forces of one step would strain a cell by more than [`LARGEST_STRAIN`].
     fn compute(&self, matrices: &mut Matrices<'_>, mut share: f32) -> MotionResult {
         let Self { lattice, refresh, .. } = *self;
-        let pulled = self.supports.map(|supports| self.pulled(matrices, supports, share));
+        let pulled = self.supports.map(|pull| self.pulled(matrices, pull, share));
         let mut forces = self.forces(matrices);
         let fine = self.fine(matrices, &forces);
         let turned = self.turned(matrices);
@@ -328,7 +326,8 @@ impl CoarseMotion<'_> {
             let lost = removed * strained + drag * twice;
             solution.0 = (share * answer + turned - lost - self.least_share * fine).to_array();
         }
-        for (solution, pulled) in solution.iter_mut().zip(pulled.iter().flatten()) {
+        let moved = pulled.iter().flat_map(|(moved, _)| moved);
+        for (solution, pulled) in solution.iter_mut().zip(moved) {
             solution.0 = (Vec4::from(solution.0) + Vec4::from(pulled.0)).to_array();
         }
         prolong(&solution, lattice, matrices.cells);
@@ -338,7 +337,10 @@ impl CoarseMotion<'_> {
         }
         let strain = lattice.largest_strain(&solution, refresh.frames.since_rest());
         let change = strain + lattice.largest_bending(&refresh.frames);
-        let work = pulled.map_or(0.0, |pulled| self.work(matrices, &pulled, &solution));
+        let work = match (self.supports, &pulled) {
+            (Some(pull), Some((_, share))) => self.work(pull, *share, &solution),
+            _ => 0.0,
+        };
         MotionResult { share, change, work }
     }
 
@@ -368,27 +370,28 @@ impl CoarseMotion<'_> {
         self.subtract(forces, &momentum);
     }
 
-    /// `p`, as far as bounds have not grown beyond their margin.
+    /// `p`, as far as bounds have not grown beyond their margin, and its share of `-S^-1 A_s d`.
     #[inline(never)]
-    fn pulled(&self, matrices: &Matrices<'_>, supports: &CoarseVectors, share: f32) -> CoarseVectors {
+    fn pulled(&self, matrices: &Matrices<'_>, pull: &Pull, mut share: f32) -> (CoarseVectors, f32) {
         let mut answer = [0.0; _];
-        self.times(matrices.coarse_inverse, &self.in_frames(supports), &mut answer);
-        answer.iter_mut().for_each(|component| *component *= share);
-        self.in_world(&answer)
+        self.times(matrices.coarse_inverse, &self.in_frames(&pull.residual), &mut answer);
+        let mut answer = self.in_world(&answer);
+        let energy: f32 = dot(&pull.residual, &answer);
+        if energy > pull.energy {
+            share = share.min(pull.energy / energy);
+        }
+        for vector in &mut answer {
+            vector.0 = (share * Vec4::from(vector.0)).to_array();
+        }
+        (answer, share)
     }
 
-    /// Work with which supports give the lattice the momentum of `p`, times `D^2`, from the lattice's part of the next
+    /// Work of this share of the supports' residual on the lattice, times `D^2`, from the lattice's part of the next
     /// increments.
     #[inline(never)]
-    fn work(&self, matrices: &Matrices<'_>, pulled: &CoarseVectors, next: &CoarseVectors) -> f32 {
-        let mut momentum = to_components(pulled);
-        apply_by_axis(of_axes(matrices.mass), self.lattice.functions(), &mut momentum);
-        let last = self.smooth.into_iter().flatten().chain(iter::repeat(&NodeVector::ZERO));
-        let vectors = momentum.as_chunks::<3>().0.iter().zip(next.iter().zip(last));
-        vectors.fold(0.0, |sum, (&[x, y, z], (next, last))| {
-            let mean = 0.5 * (Vec4::from(next.0) + Vec4::from(last.0));
-            sum + Vec4::new(x, y, z, 0.0).dot(mean)
-        })
+    fn work(&self, pull: &Pull, share: f32, next: &CoarseVectors) -> f32 {
+        let last = self.smooth.map_or(0.0, |smooth| dot(&pull.residual, smooth));
+        0.5 * share * (dot(&pull.residual, next) + last)
     }
 
     /// Writes `S^-1 g`, and makes `T c` of `c`.

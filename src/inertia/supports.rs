@@ -3,6 +3,9 @@
 //! and the supports, with the bound `K` of `assembly.rs`. Without the second term a support that starts leaves the body behind until
 //! its elements are stretched by a whole step's motion; with it the lattice follows as far as `A` resists the strain.
 //! Supports that stand still or keep their speed add nothing.
+//!
+//! The bound of elements and supports together is positive, so `S^-1 A_s d` gets at most the energy `d K_ss d` of supports that move
+//! alone. Where it would get more, `S` is from before tissue at the supports has stiffened, and the motion is scaled down.
 
 use glam::Vec4;
 
@@ -17,6 +20,14 @@ use crate::scene::SceneView;
 use crate::simd::{Gather, NodeVector, Scatter, TILE};
 use crate::step::Step;
 
+/// What supports whose speed changes do to the lattice.
+pub(super) struct Pull {
+    /// `-A_s d` for each function, kg m.
+    pub(super) residual: CoarseVectors,
+    /// `s_c D^2 / 4 d K_ss d`, kg m^2.
+    pub(super) energy: f32,
+}
+
 /// The supports of a scene that motions may move, in a state.
 pub(super) struct MovingSupports<'a, M> {
     pub(super) scene: SceneView<'a, M>,
@@ -30,17 +41,17 @@ pub(super) struct MovingSupports<'a, M> {
 }
 
 impl<M: ElementMaterial> MovingSupports<'_, M> {
-    /// `-A_s d` (kg m) for each function; none if no support changes its speed. `time` (s) is that of the state, `changes` are
+    /// None if no support changes its speed. `time` (s) is that of the state, `changes` are
     /// vectors of the nodes whose first three components are free.
     #[inline(never)]
-    pub(super) fn residual(
+    pub(super) fn pull(
         &self,
         loads: &Loads<'_>,
         time: f64,
         step: &Step,
         increment: &mut [NodeVector],
         changes: &mut [NodeVector],
-    ) -> Option<CoarseVectors> {
+    ) -> Option<Pull> {
         if loads.motions().is_empty() || self.elements.is_empty() {
             return None;
         }
@@ -69,21 +80,15 @@ impl<M: ElementMaterial> MovingSupports<'_, M> {
         if !moves {
             return None;
         }
-        let mut residual = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+        let mut pull = Pull { residual: [NodeVector::ZERO; MAX_FUNCTIONS + 1], energy: 0.0 };
         for (tile, places) in tiles.zip(self.elements.chunks(TILE)) {
-            self.add_tile(&tile, places.len(), changes, &mut residual);
+            self.add_tile(&tile, places.len(), changes, &mut pull);
         }
-        Some(residual)
+        Some(pull)
     }
 
     /// Adds the elements at the first `count` places of a tile.
-    fn add_tile(
-        &self,
-        tile: &ElementTile,
-        count: usize,
-        changes: &[NodeVector],
-        residual: &mut CoarseVectors,
-    ) {
+    fn add_tile(&self, tile: &ElementTile, count: usize, changes: &[NodeVector], pull: &mut Pull) {
         let tangents = self.tangents(tile);
         for lane in 0..count {
             let element = ElementTangent::of(tile, &tangents, lane);
@@ -93,8 +98,10 @@ impl<M: ElementMaterial> MovingSupports<'_, M> {
             if changes == [Vec4::ZERO; 4] {
                 continue;
             }
-            for (node, force) in element.nodes.into_iter().zip(element.times(changes)) {
-                self.add_force(node, force, residual);
+            for ((node, force), change) in element.nodes.into_iter().zip(element.times(changes)).zip(changes)
+            {
+                pull.energy += force.dot(change);
+                self.add_force(node, force, &mut pull.residual);
             }
         }
     }
@@ -171,7 +178,7 @@ mod tests {
             weight: 1e-6,
             displacement: state.displacement,
         };
-        let residual = supports.residual(&loads, 0.0, &step, state.increment, &mut changes).unwrap();
+        let pull = supports.pull(&loads, 0.0, &step, state.increment, &mut changes).unwrap();
 
         let stride = stride(lattice.functions());
         let mut matrix = vec![0.0; 3 * lattice.functions() * stride];
@@ -188,7 +195,7 @@ mod tests {
         let shift: Vec<_> = SHIFT.into_iter().cycle().take(3 * lattice.functions()).collect();
         let resistance = apply_lower(&matrix, stride, &shift);
         let (mut worst, mut largest) = (0.0f32, 0.0f32);
-        for (a, b) in to_components(&residual).iter().zip(&resistance).take(shift.len()) {
+        for (a, b) in to_components(&pull.residual).iter().zip(&resistance).take(shift.len()) {
             worst = worst.max((a - b).abs());
             largest = largest.max(b.abs());
         }
@@ -196,6 +203,6 @@ mod tests {
         assert!(largest > 0.0 && worst < 1e-5 * largest);
         // The supports now keep their speed.
         state.increment[..25].fill(NodeVector([SHIFT[0], SHIFT[1], SHIFT[2], 0.0]));
-        assert!(supports.residual(&loads, 0.0, &step, state.increment, &mut changes).is_none());
+        assert!(supports.pull(&loads, 0.0, &step, state.increment, &mut changes).is_none());
     }
 }
