@@ -21,7 +21,8 @@
 //! leaves a share of about mass over inertia. The functions `W` reproduce linear fields
 //! wherever no support holds them, so translations and rotations of the shape at rest are the lattice's alone, and as
 //! `A` is zero for them their momentum is conserved. `w` is the change of velocity that rotation alone brings
-//! (`transport.rs`). `A_s d` couples supports whose increments change by `d` (`supports.rs`). In the first step `D^2` is halved: a force that acts from the start on has acted for half a step.
+//! (`transport.rs`). `A_s d` couples supports whose increments change by `d` (`supports.rs`). In the first step
+//! `D^2` is halved: a force that acts from the start on has acted for half a step.
 //! `c` is the lattice's part of `du`. `T` is zero for rigid motion and small for motion that the step resolves, so the
 //! drag takes neither momentum nor slow motion. It is there because `S` changes with the state while velocities are
 //! kept, which would feed deformation that the step cannot resolve; so it follows the rate at which the shape changes,

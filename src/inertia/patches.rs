@@ -4,7 +4,7 @@
 use glam::Vec4;
 
 use super::lattice::{Lattice, LatticeNode, node_place};
-use crate::element::{Axes, NodeInertia};
+use crate::element::{Axes, ElementTile, NodeInertia};
 use crate::scene::SceneView;
 use crate::simd::TILE;
 
@@ -80,10 +80,7 @@ pub(super) fn sort_by_patch<M>(
     let places = (0u32..).zip(tiles.iter().flat_map(|tile| (0..TILE).map(move |lane| (tile, lane))));
     let elements = places.filter(|(_, (tile, lane))| tile.volume::<f32>(*lane) > 0.0);
     order.iter_mut().zip(elements).for_each(|(to, (place, _))| *to = place);
-    let nodes_of = |place: u32| {
-        let tile = tiles.get(place as usize / TILE)?;
-        Some([0, 1, 2, 3].map(|corner| tile.node(corner, place as usize % TILE)))
-    };
+    let nodes_of = |place| nodes_of(tiles, place);
     let touches = |nodes: &[usize; 4]| nodes.iter().any(|&node| scene.movable(node) != Axes::NONE);
     sort(order, |place| {
         let nodes_of = nodes_of(place);
@@ -91,6 +88,12 @@ pub(super) fn sort_by_patch<M>(
         (!nodes_of.as_ref().is_some_and(touches), patch.map_or(0, |(patch, _)| patch.key()), place)
     });
     order.iter().take_while(|&&place| nodes_of(place).as_ref().is_some_and(touches)).count()
+}
+
+/// The nodes of the element at a place of the list.
+pub(super) fn nodes_of(tiles: &[ElementTile], place: u32) -> Option<[usize; 4]> {
+    let tile = tiles.get(place as usize / TILE)?;
+    Some([0, 1, 2, 3].map(|corner| tile.node(corner, place as usize % TILE)))
 }
 
 /// Heap sort: that of the standard library can panic.

@@ -376,7 +376,7 @@ impl CoarseMotion<'_> {
         let mut answer = [0.0; _];
         self.times(matrices.coarse_inverse, &self.in_frames(&pull.residual), &mut answer);
         let mut answer = self.in_world(&answer);
-        let energy: f32 = dot(&pull.residual, &answer);
+        let energy = dot(&pull.residual, &answer);
         if energy > pull.energy {
             share = share.min(pull.energy / energy);
         }

@@ -12,6 +12,7 @@ use glam::Vec4;
 use super::assembly::ElementTangent;
 use super::frames::Rotation;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, node_place};
+use super::patches::nodes_of;
 use crate::element::{
     ElementLaw, ElementMaterial, ElementTile, MatrixSums, NodeInertia, TileBounds, TileTangents,
 };
@@ -55,12 +56,10 @@ impl<M: ElementMaterial> MovingSupports<'_, M> {
         if loads.motions().is_empty() || self.elements.is_empty() {
             return None;
         }
-        let tiles = self.elements.chunks(TILE).map(|places| ElementTile::gather(self.scene.tiles, places));
-        for tile in tiles.clone() {
-            for node in tile.nodes().into_iter().flatten() {
-                if let Some(NodeVector([x, y, z, _])) = changes.get_mut(*node as usize) {
-                    (*x, *y, *z) = (0.0, 0.0, 0.0);
-                }
+        let tiles = self.scene.tiles;
+        for node in self.elements.iter().filter_map(|&place| nodes_of(tiles, place)).flatten() {
+            if let Some(NodeVector([x, y, z, _])) = changes.get_mut(node) {
+                (*x, *y, *z) = (0.0, 0.0, 0.0);
             }
         }
         let mut moves = false;
@@ -81,8 +80,8 @@ impl<M: ElementMaterial> MovingSupports<'_, M> {
             return None;
         }
         let mut pull = Pull { residual: [NodeVector::ZERO; MAX_FUNCTIONS + 1], energy: 0.0 };
-        for (tile, places) in tiles.zip(self.elements.chunks(TILE)) {
-            self.add_tile(&tile, places.len(), changes, &mut pull);
+        for places in self.elements.chunks(TILE) {
+            self.add_tile(&ElementTile::gather(tiles, places), places.len(), changes, &mut pull);
         }
         Some(pull)
     }

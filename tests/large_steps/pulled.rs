@@ -2,13 +2,11 @@
 
 use supple::loads::{Loads, Motion};
 use supple::material::NeoHookean;
-use supple::scene::{Axes, Support, VecScene};
-use supple::state::VecState;
-use supple::step::{Status, Step};
-use supple::tled;
+use supple::scene::{Axes, Support};
+use supple::step::Step;
 
 use crate::support::bodies::Body;
-use crate::support::{mean_distance, rest_of, tissue, to_f64};
+use crate::support::{mean_distance, rest_of, run, tissue, to_f64};
 use crate::{Kind, limit};
 
 /// A bar with one end that moves.
@@ -48,7 +46,7 @@ impl Pulled {
         let mut compared = Vec::new();
         for taken in 1..=after.iter().copied().max().unwrap() {
             assert!(large.step(scene.view(), &loads, state.view()).is_taken(), "{kind:?}: step {taken}");
-            exact_steps(&scene, &loads, &mut exact, &fine, parts);
+            run(&scene, &loads, &mut exact, &fine, u64::from(parts));
             if after.contains(&taken) {
                 let [moved, truth] = [&state, &exact].map(|state| to_f64(state.displacements()));
                 let rest = vec![[0.0; 3]; truth.len()];
@@ -56,18 +54,6 @@ impl Pulled {
             }
         }
         compared
-    }
-}
-
-fn exact_steps<M: supple::element::ElementMaterial>(
-    scene: &VecScene<M>,
-    loads: &Loads<'_>,
-    state: &mut VecState,
-    step: &Step,
-    count: u32,
-) {
-    for _ in 0..count {
-        assert_eq!(tled::step(scene, loads, state, step), Status::Ok);
     }
 }
 
