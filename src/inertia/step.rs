@@ -8,19 +8,18 @@ use crate::element::{ElementLaw, ElementMaterial, InternalForces, NodeInertia, S
 use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::state::StateView;
-use crate::step::{Computed, Status, Step, StepMethod, Trial, external_forces};
+use crate::state::{Progress, StateView};
+use crate::step::{Computed, Status, Step, StepMethod, Totals, Trial, external_forces};
 
 use super::cells::{prolong, restrict};
 use super::damper::RoughMotion;
 use super::dense::{Row, apply, apply_by_axis, apply_to_two, stride};
 use super::estimate::{DefectTotals, dot};
-use super::frames::{Frames, Rotation, rotate};
+use super::frames::{Rotation, rotate};
 use super::large_step::{LargeModel, LargeView, Storage};
 use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
 use super::matrices::{Matrices, of_axes};
 use super::nodal_sums;
-use super::node_tables::NodeTables;
 use super::passes::{
     ApplyIncrements, LatticeMotion, MotionPass, PassInput, PassTotals, RestrictionPass, RoughDamping,
     rotation_table,
@@ -96,92 +95,20 @@ impl<'a, 'w> InertiaStep<'a, 'w> {
 }
 
 impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
-    /// Not inlined, like [`Self::finish`]: the stack of one is free in the other.
-    #[inline(never)]
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
-        let Self { step, model, storage: Storage { tables, places, order, matrices }, .. } = self;
-        let LargeModel {
-            lattice,
-            refresh,
-            scaling,
-            rough,
-            method,
-            moved_elements,
-            least_share,
-            steps,
-            estimate,
-            ..
-        } = &mut **model;
-        let Trial { scene, loads, displacement, increment, force, progress } = trial;
-        if *steps != progress.steps {
-            // Another step has moved the state, or it was reset or restored.
-            let input =
-                RefreshInput { scene: *scene, displacement, increment, lattice, places, order, scaling };
-            refresh.renew(input, tables, matrices);
-            (*rough, *least_share, *estimate) = (RoughMotion::NONE, 1.0, estimate.cleared());
-            tables.rough.fill(NodeVector::ZERO);
-            *steps = progress.steps;
-        }
-        let (inertia, force): (_, &mut [NodeVector]) = (scene.inertia, force);
-        external_forces(force, 0, inertia, loads, progress.time);
+        self.renew_if_stale(trial);
+        let Trial { scene, loads, displacement, force, progress, .. } = &mut *trial;
+        external_forces(force, 0, scene.inertia, loads, progress.time);
         self.external = dot(force, displacement);
-        let (has_lattice, damped) = (lattice.functions() > 0, method.damper().is_some());
         let extremes = M::Law::forces_and_bounds(InternalForces::of_all(
             scene.elements(),
             displacement,
             force,
             ScalarBound,
         ));
-
-        // Without a lattice there is no distinction of smooth and rough motion.
-        let damper = method.damper().filter(|_| refresh.lattice_in_use && has_lattice);
-        self.damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
-        refresh.update_frames(displacement, progress.steps);
-        let square = step.seconds() * step.seconds() * if progress.steps == 0 { 0.5 } else { 1.0 };
-        let supports = MovingSupports {
-            scene: *scene,
-            lattice,
-            places,
-            elements: order.get(..*moved_elements).unwrap_or_default(),
-            weight: scaling.coarse_weight,
-            displacement,
-        };
-        let supports = supports.pull(loads, progress.time, step, increment, tables.next_increment);
-        let mut work = 0.0;
-        let input = PassInput { step, scaling, square, inertia, displacement, increment, places };
-        let lattice = if has_lattice {
-            let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
-            let growth = RestrictionPass { input, force, tables, cells, momentum }.dispatched();
-            let share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
-            let smooth = smooth_motion(matrices, lattice, increment).filter(|_| refresh.lattice_in_use);
-            let motion = CoarseMotion {
-                lattice,
-                refresh,
-                second_order: damped,
-                k: scaling.k,
-                least_share: least_share.min(NODE_GROWTH / growth),
-                smooth: smooth.as_ref(),
-                supports: supports.as_ref(),
-                allowed: progress.energy_balance.allowed_share(),
-            };
-            let MotionResult { share, change, work: gained } = motion.compute(matrices, share);
-            work = gained / (step.seconds() * step.seconds());
-            // Where bounds have grown beyond their margin they are out of date whatever the lattice does.
-            self.change = if growth <= COARSE_GROWTH { change } else { f32::INFINITY };
-            self.coarse_share = if refresh.lattice_in_use { share } else { 0.0 };
-            let (cells, fine) = (&*matrices.cells, &*matrices.fine_cells);
-            let share = self.damping.max(removed_share(share.min(motion.allowed)));
-            let damped = (smooth.is_some() && (damped || share > 0.0))
-                .then_some(RoughDamping { smooth: matrices.smooth_cells, share });
-            Some(LatticeMotion { cells, fine, damped, in_use: smooth.is_some() })
-        } else {
-            None
-        };
-        let passed = motion_pass(input, &refresh.frames, lattice, force, tables);
-        let mut totals;
-        PassTotals { totals, defects: self.defects, rough: self.rough, held_back: self.held_back } = passed;
-        totals.add_work(work);
-        Computed { totals, extremes }
+        self.model.refresh.update_frames(displacement, progress.steps);
+        let moved = self.move_lattice(trial);
+        Computed { totals: self.move_nodes(trial, moved), extremes }
     }
 
     fn next_increment(&self, node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector) -> [f32; 4] {
@@ -216,17 +143,116 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
     }
 }
 
-/// Not inlined: the lattice's motion does without the stack of the rotations.
-#[inline(never)]
-fn motion_pass(
-    input: PassInput<'_>,
-    frames: &Frames,
-    lattice: Option<LatticeMotion<'_>>,
-    force: &mut [NodeVector],
-    tables: &mut NodeTables<'_>,
-) -> PassTotals {
-    let rotations = &rotation_table(&frames.of_bounds, frames.functions());
-    MotionPass { input, rotations, lattice, force, tables }.dispatched()
+/// What a step does with the lattice, apart from its motion.
+struct MovedLattice {
+    /// Whether rough motion of the nodes can be told from smooth motion.
+    has_smooth: bool,
+    /// Share of the rough motion that is removed.
+    removed: f32,
+    /// Work of the supports on the lattice, J.
+    work: f32,
+}
+
+// Not inlined, like `finish`: the stack of one is free in the others.
+impl InertiaStep<'_, '_> {
+    /// Computes all inertia anew if another step has moved the state, or it was reset or restored.
+    #[inline(never)]
+    fn renew_if_stale<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) {
+        let Self { model, storage: Storage { tables, places, order, matrices }, .. } = self;
+        let LargeModel { lattice, refresh, scaling, rough, least_share, steps, estimate, .. } = &mut **model;
+        let Trial { scene, displacement, increment, progress, .. } = trial;
+        if *steps == progress.steps {
+            return;
+        }
+        let input = RefreshInput { scene: *scene, displacement, increment, lattice, places, order, scaling };
+        refresh.renew(input, tables, matrices);
+        (*rough, *least_share, *estimate) = (RoughMotion::NONE, 1.0, estimate.cleared());
+        tables.rough.fill(NodeVector::ZERO);
+        *steps = progress.steps;
+    }
+
+    /// `D^2`, half of it in the first step: see [`PassInput::square`].
+    fn square(&self, progress: &Progress) -> f32 {
+        self.step.seconds() * self.step.seconds() * if progress.steps == 0 { 0.5 } else { 1.0 }
+    }
+
+    /// Computes the motion of the lattice. None without one.
+    #[inline(never)]
+    fn move_lattice<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) -> Option<MovedLattice> {
+        let square = self.square(trial.progress);
+        let Self { step, model, storage: Storage { tables, places, order, matrices }, .. } = self;
+        let LargeModel { lattice, refresh, scaling, rough, method, moved_elements, least_share, .. } =
+            &mut **model;
+        if lattice.functions() == 0 {
+            return None;
+        }
+        let Trial { scene, loads, displacement, increment, force, progress } = trial;
+        let supports = MovingSupports {
+            scene: *scene,
+            lattice,
+            places,
+            elements: order.get(..*moved_elements).unwrap_or_default(),
+            weight: scaling.coarse_weight,
+            displacement,
+        };
+        let supports = supports.pull(loads, progress.time, step, increment, tables.next_increment);
+        let input =
+            PassInput { step, scaling, square, inertia: scene.inertia, displacement, increment, places };
+        let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
+        let growth = RestrictionPass { input, force, tables, cells, momentum }.dispatched();
+        let share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
+        let smooth = smooth_motion(matrices, lattice, increment).filter(|_| refresh.lattice_in_use);
+        let motion = CoarseMotion {
+            lattice,
+            refresh,
+            second_order: method.damper().is_some(),
+            k: scaling.k,
+            least_share: least_share.min(NODE_GROWTH / growth),
+            smooth: smooth.as_ref(),
+            supports: supports.as_ref(),
+            allowed: progress.energy_balance.allowed_share(),
+        };
+        let MotionResult { share, change, work } = motion.compute(matrices, share);
+        // Without a lattice in use there is no distinction of smooth and rough motion.
+        let damper = method.damper().filter(|_| refresh.lattice_in_use);
+        self.damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
+        // Where bounds have grown beyond their margin they are out of date whatever the lattice does.
+        self.change = if growth <= COARSE_GROWTH { change } else { f32::INFINITY };
+        self.coarse_share = if refresh.lattice_in_use { share } else { 0.0 };
+        Some(MovedLattice {
+            has_smooth: smooth.is_some(),
+            removed: self.damping.max(removed_share(share.min(motion.allowed))),
+            work: work / (step.seconds() * step.seconds()),
+        })
+    }
+
+    /// Computes the next increments of the nodes.
+    #[inline(never)]
+    fn move_nodes<M: ElementMaterial>(
+        &mut self,
+        trial: &mut Trial<'_, M>,
+        moved: Option<MovedLattice>,
+    ) -> Totals {
+        let square = self.square(trial.progress);
+        let Self { step, model, storage: Storage { tables, places, matrices, .. }, .. } = self;
+        let LargeModel { refresh, scaling, method, .. } = &**model;
+        let Trial { scene, displacement, increment, force, .. } = trial;
+        let input =
+            PassInput { step, scaling, square, inertia: scene.inertia, displacement, increment, places };
+        let lattice = moved.as_ref().map(|moved| LatticeMotion {
+            cells: matrices.cells,
+            fine: matrices.fine_cells,
+            damped: (moved.has_smooth && (method.damper().is_some() || moved.removed > 0.0))
+                .then_some(RoughDamping { smooth: matrices.smooth_cells, share: moved.removed }),
+            in_use: moved.has_smooth,
+        });
+        let rotations = &rotation_table(&refresh.frames.of_bounds, refresh.frames.functions());
+        let passed = MotionPass { input, rotations, lattice, force, tables }.dispatched();
+        let mut totals;
+        PassTotals { totals, defects: self.defects, rough: self.rough, held_back: self.held_back } = passed;
+        totals.add_work(moved.map_or(0.0, |moved| moved.work));
+        totals
+    }
 }
 
 /// Largest ratio of a vector of the smooth motion to the largest increment. It may exceed one, because lattice points
@@ -299,12 +325,12 @@ impl CoarseMotion<'_> {
     /// if the forces of one step would strain a cell by more than [`LARGEST_STRAIN`].
     fn compute(&self, matrices: &mut Matrices<'_>, mut share: f32) -> MotionResult {
         let Self { lattice, refresh, .. } = *self;
-        let pulled = self.supports.map(|pull| self.pulled(matrices, pull, share));
         let mut forces = self.forces(matrices);
         let fine = self.fine(matrices, &forces);
-        let turned = self.turned(matrices);
+        let mut given = self.turned(matrices);
         let mut last = self.smooth.map_or([0.0; _], |smooth| self.in_frames(smooth));
-        self.subtract_momentum(matrices, &mut forces, &turned);
+        self.subtract_momentum(matrices, &mut forces, &given);
+        let pulled = self.supports.map(|pull| self.add_pulled(matrices, pull, share, &mut given));
         let mut answer = [0.0; _];
         self.first_order(matrices, &forces, &mut answer, &mut last);
         let strained = self.in_world(&last);
@@ -318,17 +344,13 @@ impl CoarseMotion<'_> {
             share = LARGEST_STRAIN / strain;
         }
         let (removed, drag) = (removed_share(share.min(self.allowed)), refresh.drag());
-        for (((solution, turned), (strained, twice)), fine) in
-            solution.iter_mut().zip(&turned).zip(strained.iter().zip(&twice)).zip(&fine)
+        for (((solution, given), (strained, twice)), fine) in
+            solution.iter_mut().zip(&given).zip(strained.iter().zip(&twice)).zip(&fine)
         {
-            let [answer, turned, strained, twice, fine] =
-                [*solution, *turned, *strained, *twice, *fine].map(|vector| Vec4::from(vector.0));
+            let [answer, given, strained, twice, fine] =
+                [*solution, *given, *strained, *twice, *fine].map(|vector| Vec4::from(vector.0));
             let lost = removed * strained + drag * twice;
-            solution.0 = (share * answer + turned - lost - self.least_share * fine).to_array();
-        }
-        let moved = pulled.iter().flat_map(|(moved, _)| moved);
-        for (solution, pulled) in solution.iter_mut().zip(moved) {
-            solution.0 = (Vec4::from(solution.0) + Vec4::from(pulled.0)).to_array();
+            solution.0 = (share * answer + given - lost - self.least_share * fine).to_array();
         }
         prolong(&solution, lattice, matrices.cells);
         prolong(&fine, lattice, matrices.fine_cells);
@@ -337,8 +359,8 @@ impl CoarseMotion<'_> {
         }
         let strain = lattice.largest_strain(&solution, refresh.frames.since_rest());
         let change = strain + lattice.largest_bending(&refresh.frames);
-        let work = match (self.supports, &pulled) {
-            (Some(pull), Some((_, share))) => self.work(pull, *share, &solution),
+        let work = match (self.supports, pulled) {
+            (Some(pull), Some(share)) => self.work(pull, share, &solution),
             _ => 0.0,
         };
         MotionResult { share, change, work }
@@ -370,20 +392,26 @@ impl CoarseMotion<'_> {
         self.subtract(forces, &momentum);
     }
 
-    /// `p`, as far as bounds have not grown beyond their margin, and its share of `-S^-1 A_s d`.
+    /// Adds `p`, as far as bounds have not grown beyond their margin. Gives its share of `-S^-1 A_s d`.
     #[inline(never)]
-    fn pulled(&self, matrices: &Matrices<'_>, pull: &Pull, mut share: f32) -> (CoarseVectors, f32) {
+    fn add_pulled(
+        &self,
+        matrices: &Matrices<'_>,
+        pull: &Pull,
+        mut share: f32,
+        motion: &mut CoarseVectors,
+    ) -> f32 {
         let mut answer = [0.0; _];
         self.times(matrices.coarse_inverse, &self.in_frames(&pull.residual), &mut answer);
-        let mut answer = self.in_world(&answer);
+        let answer = self.in_world(&answer);
         let energy = dot(&pull.residual, &answer);
         if energy > pull.energy {
             share = share.min(pull.energy / energy);
         }
-        for vector in &mut answer {
-            vector.0 = (share * Vec4::from(vector.0)).to_array();
+        for (vector, answer) in motion.iter_mut().zip(&answer) {
+            vector.0 = (Vec4::from(vector.0) + share * Vec4::from(answer.0)).to_array();
         }
-        (answer, share)
+        share
     }
 
     /// Work of this share of the supports' residual on the lattice, times `D^2`, from the lattice's part of the next
