@@ -1,5 +1,5 @@
 //! Time of an exact step from 6.5 thousand tetrahedra to a million, on one thread and on two, and with nodes in order,
-//! shuffled, and renumbered ([`supple::mesh::renumber`]).
+//! shuffled, and renumbered ([`supple::mesh::renumber`]); and of a multilevel step on one thread and on two.
 //!
 //! `cargo bench --bench size --features parallel` prints medians, and the least time in brackets, of runs in turn. It has no
 //! criterion group: a body of that size takes seconds to prepare.
@@ -14,14 +14,18 @@ mod common {
 use common::bar;
 use common::bent::Bent;
 use common::pairs::{median, seconds};
+use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::Loads;
 use supple::material::Exponential;
 use supple::mesh::{Bar, renumber};
-use supple::step::Rayon;
+use supple::step::{Rayon, Step};
 use supple::tled;
 
 const SIZES: [[u32; 3]; 5] = [[8, 8, 17], [16, 16, 32], [20, 20, 42], [32, 32, 64], [44, 44, 88]];
 const ROUNDS: usize = 21;
+const MULTIPLE: f32 = 20.0;
+const MULTILEVEL_SIZE: [u32; 3] = [20, 20, 42];
+const MULTILEVEL_STEPS: usize = 50;
 
 /// A bar with its nodes and elements in some order.
 struct Body {
@@ -93,6 +97,48 @@ fn both(times: &[f64], unit: f64) -> String {
     format!("{:.1} ({:.1})", median(times.to_vec()) * unit, least * unit)
 }
 
+/// Times of a multilevel step at [`MULTIPLE`] times the critical step, on one thread and on two, compared with an exact one.
+fn multilevel(pool: &rayon::ThreadPool) {
+    let Body { points, tets } = Body::in_order(MULTILEVEL_SIZE);
+    let Bent { scene, mut state, step } = Bent::new(bar::EXPONENTIAL, &points, &tets);
+    let scene = scene.view();
+    let mut exact_state = state.clone();
+    let length = Step::unchecked(MULTIPLE * step.seconds(), step.damping()).expect("a length");
+    let method = Method::Multilevel(Cells::Suggested);
+    let mut large = LargeStep::prepare_in_vec(method, scene, &points, state.view(), length).expect("a bar");
+    let loads = Loads::NONE;
+    let (mut times, mut ratios) = ([const { Vec::new() }; 2], [const { Vec::new() }; 3]);
+    pool.install(|| {
+        for _ in 0..ROUNDS {
+            let mut of = |parts| {
+                let mut step = || {
+                    bar::moved(large.step_in_parts(scene, &loads, state.view(), &Rayon { parts }));
+                };
+                seconds(|| (0..MULTILEVEL_STEPS).for_each(|_| step())) / MULTILEVEL_STEPS as f64
+            };
+            let [one, two] = [of(1), of(2)];
+            let mut of = |parts| {
+                let mut exact = || {
+                    let view = exact_state.view();
+                    bar::moved(tled::step_in_parts(scene, &loads, view, &step, &Rayon { parts }));
+                };
+                seconds(|| (0..MULTILEVEL_STEPS).for_each(|_| exact())) / MULTILEVEL_STEPS as f64
+            };
+            let [plain, plain_two] = [of(1), of(2)];
+            times.iter_mut().zip([one, two]).for_each(|(times, time)| times.push(time));
+            let round = [one / two, plain / plain_two, one / plain];
+            ratios.iter_mut().zip(round).for_each(|(ratios, ratio)| ratios.push(ratio));
+        }
+    });
+    let [one, two] = times.map(|times| both(&times, 1e6));
+    let [ratio, exact, cost] = ratios.map(median);
+    println!(
+        "{} tetrahedra, multilevel at {MULTIPLE} times the critical step: {one} us on one thread, {cost:.2} times an exact \
+         step; {two} us on two threads, {ratio:.2} times faster (an exact step {exact:.2} times)",
+        tets.len()
+    );
+}
+
 fn main() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads");
     println!("tetrahedra | ns/tet in order | shuffled | renumbered | two threads, ns/tet | times faster");
@@ -120,4 +166,5 @@ fn main() {
             median(ratios)
         );
     }
+    multilevel(&pool);
 }

@@ -626,7 +626,7 @@ typedef struct {
 typedef void (*supple_part)(const void *work, uint32_t part);
 
 /**
- * Threads of the host. A step calls `each` twice: it shall call `part(work, p)` for every `p` below `parts`, on
+ * Threads of the host. A step calls `each` two to four times: it shall call `part(work, p)` for every `p` below `parts`, on
  * whichever threads, at the same time or not, and return when all those calls have. Parts share nothing, and the result does not
  * depend on where they run, to the bit. What `each` leaves out is computed when it has returned. It must return: no exception and
  * no longjmp may leave it.
@@ -1158,9 +1158,10 @@ supple_status supple_large_init(void *memory,
 
 /**
  * Takes `count` steps of the prepared method and length. Stops at the first that is not to be believed: that one is not taken,
- * the state is as before it, and the status tells. They run on the calling thread alone, and need no supple_set_step.
+ * the state is as before it, and the status tells. They need no supple_set_step.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
+ * @param threads NULL: the calling thread alone. What a cycle assembles and inverts runs on that one in any case.
  * @param report may be NULL; is written whatever the status.
  */
 supple_status supple_large_step(const supple_scene *scene,
@@ -1168,6 +1169,7 @@ supple_status supple_large_step(const supple_scene *scene,
                                 supple_state *state,
                                 supple_large *large,
                                 uint32_t count,
+                                const supple_threads *threads,
                                 supple_report *report);
 
 #ifdef __cplusplus

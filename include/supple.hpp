@@ -648,10 +648,10 @@ public:
         return made;
     }
 
-    // Takes steps of the prepared method and length.
-    status step(scene of, loads acting, state moved, std::uint32_t count,
-                report *out = nullptr) const noexcept {
-        return detail::of(supple_large_step(of.raw(), acting.raw(), moved.raw(), raw_, count, out));
+    // Takes steps of the prepared method and length; all of the calling thread's, or on threads of the host.
+    status step(scene of, loads acting, state moved, std::uint32_t count, report *out = nullptr,
+                const threads *on = nullptr) const noexcept {
+        return detail::of(supple_large_step(of.raw(), acting.raw(), moved.raw(), raw_, count, on, out));
     }
 
 private:

@@ -16,7 +16,7 @@ use super::memory::{
 use super::scene::{AnyScene, carved, check_choice, supple_scene, with_scene};
 use super::state::{opened_of, supple_state};
 use super::status::{Answer, supple_error, supple_status};
-use super::step::{answer, reported, supple_report, take_steps};
+use super::step::{HostThreads, answer, reported, supple_report, supple_threads, take_steps};
 use supple_status::*;
 
 /// Inertia is raised where the step would be unstable.
@@ -205,9 +205,10 @@ unsafe fn storage<'a>(mut arrays: Arrays, vectors: usize) -> &'a mut [NodeVector
 }
 
 /// Takes `count` steps of the prepared method and length. Stops at the first that is not to be believed: that one is not taken,
-/// the state is as before it, and the status tells. They run on the calling thread alone, and need no supple_set_step.
+/// the state is as before it, and the status tells. They need no supple_set_step.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
+/// @param threads NULL: the calling thread alone. What a cycle assembles and inverts runs on that one in any case.
 /// @param report may be NULL; is written whatever the status.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_large_step(
@@ -216,6 +217,7 @@ pub unsafe extern "C" fn supple_large_step(
     state: *mut supple_state,
     large: *mut supple_large,
     count: u32,
+    threads: *const supple_threads,
     report: *mut supple_report,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
@@ -226,11 +228,12 @@ pub unsafe extern "C" fn supple_large_step(
         let (supple_large { nodes, vectors, model, .. }, arrays) = memory::open(large)?;
         any.fits(*nodes)?;
         let storage = storage(arrays, *vectors);
+        let threads = HostThreads::of(threads)?;
         let mut state = opened_of(&any, state)?;
         let count = count.into();
         let (mut held_back, mut lattice_share) = (0, 1.0);
         let status = with_scene!(any, scene => take_steps(count, count, &mut state, &mut loads, report, |loads, state| {
-            let status = model.with_storage(storage).step(scene, loads, state);
+            let status = model.with_storage(storage).step_in_parts(scene, loads, state, &threads);
             // What was refused has no report of its own.
             if status.is_taken() {
                 held_back = held_back.max(model.report().held_back);

@@ -25,7 +25,7 @@ const _: () = assert!(SUPPLE_MOST_PARTS as usize == MOST_PARTS);
 /// same part does nothing.
 pub type supple_part = unsafe extern "C" fn(work: *const c_void, part: u32);
 
-/// Threads of the host. A step calls `each` twice: it shall call `part(work, p)` for every `p` below `parts`, on
+/// Threads of the host. A step calls `each` two to four times: it shall call `part(work, p)` for every `p` below `parts`, on
 /// whichever threads, at the same time or not, and return when all those calls have. Parts share nothing, and the result does not
 /// depend on where they run, to the bit. What `each` leaves out is computed when it has returned. It must return: no exception and
 /// no longjmp may leave it.

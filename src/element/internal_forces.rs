@@ -74,6 +74,7 @@ pub(crate) trait ElementVisitor {
 }
 
 /// A visitor that computes nothing.
+#[derive(Clone, Copy)]
 pub struct NoVisitor;
 
 impl ElementVisitor for NoVisitor {

@@ -24,6 +24,23 @@ pub trait ElementLaw: Law {
     fn tile_bounds(kernel: TileBounds<'_, Self>) -> TileTangents;
 }
 
+/// A visitor with which the internal forces of every law are compiled.
+pub(crate) trait ForcesVisitor<L: ElementLaw>: Copy + Sync {
+    fn forces(kernel: InternalForces<'_, L, Self>) -> Extremes<f32>;
+}
+
+impl<L: ElementLaw> ForcesVisitor<L> for NoVisitor {
+    fn forces(kernel: InternalForces<'_, L, Self>) -> Extremes<f32> {
+        L::forces(kernel)
+    }
+}
+
+impl<L: ElementLaw> ForcesVisitor<L> for ScalarBound {
+    fn forces(kernel: InternalForces<'_, L, Self>) -> Extremes<f32> {
+        L::forces_and_bounds(kernel)
+    }
+}
+
 macro_rules! kernels {
     ($($variant:ident: $law:ty,)*) => {
         $(

@@ -17,6 +17,7 @@ mod tile_bounds;
 
 pub use fields::ElementFields;
 pub use kernels::ElementLaw;
+pub(crate) use kernels::ForcesVisitor;
 #[cfg(any(feature = "std", test))]
 pub use kernels::{LawWork, with_law};
 pub use node::{Axes, NodeInertia};

@@ -221,6 +221,7 @@ impl<R: Real> Bound<R> {
 }
 
 /// Adds [`scalar_bound`] to the fourth component of the forces of each element's nodes.
+#[derive(Clone, Copy)]
 pub struct ScalarBound;
 
 impl ElementVisitor for ScalarBound {

@@ -5,13 +5,13 @@ use bytemuck::{Pod, Zeroable, must_cast, must_cast_ref};
 use glam::Vec4;
 
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
-use crate::simd::{NodeVector, Real, TILE, write_rows};
+use crate::simd::{NodeVector, Real, TILE};
 
 /// Most vectors that [`TILE`] nodes fill. There are separate sums for each of the [`TILE`] places, so the bits do not
 /// depend on the width.
 pub(super) const VECTORS_PER_TILE: usize = 2;
 
-/// A vector of nodes in the order of the cells.
+/// A vector of consecutive nodes in the order of the cells, where [`Real::lane_of_row`] puts them.
 pub(super) struct NodesInCells<'a, R> {
     /// Positions of the nodes in their cells.
     pub(super) position: [R; 3],
@@ -21,9 +21,9 @@ pub(super) struct NodesInCells<'a, R> {
 }
 
 impl<R: Real> NodesInCells<'_, R> {
-    /// The cell of a node.
+    /// The cell of the node in a lane.
     fn cell(&self, lane: usize) -> usize {
-        self.places.get(lane).map_or(0, LatticeNode::cell)
+        self.places.get(R::row_of_lane(lane)).map_or(0, LatticeNode::cell)
     }
 
     /// Ones for the nodes in a cell, zeros for the others.
@@ -43,6 +43,23 @@ impl<R: Real> NodesInCells<'_, R> {
     }
 }
 
+/// The sums of the cells of some consecutive nodes. The first cell may have nodes before these too, which another thread may be
+/// adding, so its sum is separate.
+pub(super) struct CellSlots<'a> {
+    pub(super) first: usize,
+    pub(super) head: &'a mut CellPolynomial,
+    /// Cells from this one on.
+    pub(super) from: usize,
+    pub(super) rest: &'a mut [CellPolynomial],
+}
+
+impl CellSlots<'_> {
+    #[inline(always)]
+    pub(super) fn get_mut(&mut self, cell: usize) -> Option<&mut CellPolynomial> {
+        if cell == self.first { Some(self.head) } else { self.rest.get_mut(cell.wrapping_sub(self.from)) }
+    }
+}
+
 /// A vector field on a cell, as coefficients of the monomials `1, x, y, xy, z, xz, yz, xyz` of the position in the
 /// cell. They take fewer operations a node than trilinear functions. Used for the motion of the nodes in a cell
 /// (prolongation), and for sums of nodal vectors times monomials (restriction). Two vectors a row.
@@ -52,6 +69,13 @@ pub(super) struct CellPolynomial([[f32; 8]; 4]);
 
 impl CellPolynomial {
     pub(super) const ZERO: Self = Self([[0.0; 8]; 4]);
+
+    /// Adds other sums.
+    pub(super) fn add_sums(&mut self, other: &Self) {
+        for (sum, other) in self.0.as_flattened_mut().iter_mut().zip(other.0.as_flattened()) {
+            *sum += other;
+        }
+    }
 
     /// Adds `W^T v` of a node.
     #[inline(always)]
@@ -102,15 +126,16 @@ pub(super) struct CellAccumulator<R> {
 
 impl<R: Real> CellAccumulator<R> {
     #[inline(always)]
-    pub(super) fn new() -> Self {
-        Self { cell: 0, sums: [[[R::splat(0.0); 3]; 8]; VECTORS_PER_TILE] }
+    /// `cell` is that of the first node.
+    pub(super) fn new(cell: usize) -> Self {
+        Self { cell, sums: [[[R::splat(0.0); 3]; 8]; VECTORS_PER_TILE] }
     }
 
     /// Adds `W^T v` of a vector of nodes, the one with index `vector` in its tile.
     #[inline(always)]
     pub(super) fn add(
         &mut self,
-        cells: &mut [CellPolynomial],
+        cells: &mut CellSlots<'_>,
         nodes: &NodesInCells<'_, R>,
         vector: usize,
         v: [R; 3],
@@ -144,7 +169,7 @@ impl<R: Real> CellAccumulator<R> {
 
     /// Makes this the cell at hand.
     #[inline(always)]
-    fn enter(&mut self, cells: &mut [CellPolynomial], cell: usize) {
+    fn enter(&mut self, cells: &mut CellSlots<'_>, cell: usize) {
         if cell != self.cell {
             self.flush(cells);
             self.cell = cell;
@@ -153,7 +178,7 @@ impl<R: Real> CellAccumulator<R> {
 
     /// Adds the sums to their cell, in the order of the nodes, and clears them.
     #[inline(always)]
-    pub(super) fn flush(&mut self, cells: &mut [CellPolynomial]) {
+    pub(super) fn flush(&mut self, cells: &mut CellSlots<'_>) {
         let Some(cell) = cells.get_mut(self.cell) else {
             return;
         };
@@ -162,7 +187,8 @@ impl<R: Real> CellAccumulator<R> {
             for sums in self.sums.iter().take(TILE / R::COUNT) {
                 let [x, y, z] = sums[monomial];
                 let mut rows = [[0.0; 4]; TILE];
-                write_rows(&mut rows, 0, [x, y, z, R::splat(0.0)]);
+                let here = rows.get_mut(..R::COUNT).unwrap_or_default();
+                R::to_consecutive_rows([x, y, z, R::splat(0.0)], here);
                 for row in rows.into_iter().take(R::COUNT) {
                     sum += Vec4::from(row);
                 }

@@ -115,6 +115,11 @@ pub(super) struct RoughMotion {
 impl RoughMotion {
     pub(super) const NONE: Self = Self { square: 0.0, change: 0.0, both: 0.0, whole: 0.0 };
 
+    /// Adds the sums of other nodes.
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.add([other.square, other.change, other.both, other.whole]);
+    }
+
     /// Adds sums in the order of the fields.
     pub(super) fn add(&mut self, [square, change, both, whole]: [f32; 4]) {
         self.square += square;

@@ -8,10 +8,9 @@
 //! The velocity would be a worse shape, because its short waves are much stiffer than the error. The scalar products
 //! are over all nodes, supports included, so that the stiffness at a moving support is included.
 
-use bytemuck::must_cast_slice;
-
 use super::node::Scaling;
-use crate::simd::{Kernel, NodeVector, Real, dispatch};
+use crate::loads::{Loads, ramp_factor};
+use crate::simd::{NodeVector, Real};
 use crate::step::{Addends, Step};
 
 /// Mean error of the nodes over `x`. There are errors in other directions than the displacement: the median of this
@@ -26,46 +25,6 @@ pub(super) struct ErrorEstimate {
     /// Length of the body, m: the forces of crushed elements would give any value.
     largest: f32,
 }
-
-/// Scalar product over the nodes, in an order that does not depend on the instruction set.
-pub(super) fn dot(a: &[NodeVector], b: &[NodeVector]) -> f32 {
-    dispatch(Dot { a: must_cast_slice(a), b: must_cast_slice(b) })
-}
-
-struct Dot<'a> {
-    a: &'a [f32],
-    b: &'a [f32],
-}
-
-impl Kernel for Dot<'_> {
-    type Output = f32;
-
-    #[inline(always)]
-    fn run<R: Real>(self) -> f32 {
-        // Several sums, because additions to the same sum depend on each other.
-        let mut sums = [R::splat(0.0); 8];
-        let (vectors, rest) = self.a.as_chunks::<WIDTH>();
-        let (others, other_rest) = self.b.as_chunks::<WIDTH>();
-        for (a, b) in vectors.iter().zip(others) {
-            for (sum, from) in sums.iter_mut().zip((0..WIDTH).step_by(R::COUNT)) {
-                let of = |values: &[f32; WIDTH]| R::from_fn(|lane| values[(from + lane) % WIDTH]);
-                *sum = *sum + of(a) * of(b);
-            }
-        }
-        // The fourth component of a nodal vector is not part of it.
-        let mut total = 0.0;
-        for lane in (0..WIDTH).filter(|lane| lane % 4 < 3) {
-            total += sums[lane / R::COUNT % 8].lane(lane % R::COUNT);
-        }
-        for (at, (a, b)) in rest.iter().zip(other_rest).enumerate() {
-            total += if at % 4 < 3 { a * b } else { 0.0 };
-        }
-        total
-    }
-}
-
-/// Number of separate sums: floats whose products are added in one iteration.
-const WIDTH: usize = 64;
 
 /// Sums over the nodes of a step along one axis, taken before displacements change.
 #[derive(Clone, Copy)]
@@ -83,6 +42,8 @@ pub(super) struct DefectSums<V> {
     length: V,
     /// `u.f`, J.
     total: V,
+    /// `M u`, kg m.
+    moment: V,
 }
 
 impl<V: Addends> DefectSums<V> {
@@ -92,7 +53,7 @@ impl<V: Addends> DefectSums<V> {
         let k = scaling.k;
         let values = [square, 1.0 + k, (1.0 - k) * step.carry(), 0.0];
         let [square, ahead, behind, zero] = values.map(splat);
-        Self { square, ahead, behind, defect: zero, mass: zero, length: zero, total: zero }
+        Self { square, ahead, behind, defect: zero, mass: zero, length: zero, total: zero, moment: zero }
     }
 
     /// The sums of one lane.
@@ -109,6 +70,7 @@ impl<V: Addends> DefectSums<V> {
             mass: self.mass.lane(lane),
             length: self.length.lane(lane),
             total: self.total.lane(lane),
+            moment: self.moment.lane(lane),
         }
     }
 
@@ -117,33 +79,64 @@ impl<V: Addends> DefectSums<V> {
     pub(super) fn add(&mut self, mass: V, free: V, u: V, increment: V, force: V, next: V) {
         // D^2 d = D^2 f - k m (du+ + du) - m (du+ - du).
         let taken = mass * (self.ahead * next - self.behind * increment);
-        let along = free * u;
+        let (along, moment) = (free * u, mass * u);
         self.defect = self.defect + along * (self.square * force - taken);
-        self.mass = self.mass + along * (mass * u);
+        self.mass = self.mass + along * moment;
         self.length = self.length + u * u;
         self.total = self.total + u * force;
+        self.moment = self.moment + moment;
     }
 }
 
 /// The sums of [`DefectSums`] over all nodes and axes.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(super) struct DefectTotals {
     defect: f32,
     mass: f32,
     length: f32,
     total: f32,
+    /// Along each axis.
+    moment: [f32; 3],
 }
 
 impl DefectTotals {
+    pub(super) const NONE: Self = Self { defect: 0.0, mass: 0.0, length: 0.0, total: 0.0, moment: [0.0; 3] };
+
     /// Adds the sums of each axis.
     pub(super) fn add_axes(&mut self, sums: &[DefectSums<f32>; 3]) {
-        for sums in sums {
+        for (sums, moment) in sums.iter().zip(&mut self.moment) {
             self.defect += sums.defect;
             self.mass += sums.mass;
             self.length += sums.length;
             self.total += sums.total;
+            *moment += sums.moment;
         }
     }
+
+    /// Adds those of other nodes.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.defect += other.defect;
+        self.mass += other.mass;
+        self.length += other.length;
+        self.total += other.total;
+        for (moment, other) in self.moment.iter_mut().zip(other.moment) {
+            *moment += other;
+        }
+    }
+
+    /// Displacement times the external force at a time (s), J.
+    fn external(&self, loads: &Loads<'_>, time: f64, displacement: &[NodeVector]) -> f32 {
+        let mut work = dot(self.moment, loads.gravity());
+        for load in loads.forces() {
+            let u = displacement.get(load.node as usize).copied().unwrap_or_default();
+            work += ramp_factor(time, load.ramp) * dot(u.to_array(), load.newton);
+        }
+        work
+    }
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 impl ErrorEstimate {
@@ -162,12 +155,13 @@ impl ErrorEstimate {
         ACROSS * if self.now < 0.0 { -self.now } else { self.now }
     }
 
-    /// Advances by a step with `D^2 = square`. `external` is displacement times external force, J.
+    /// Advances by a step with `D^2 = square`, from the displacements (m) and the loads at its start (`time`, s).
     pub(super) fn advance(
         &mut self,
         totals: &DefectTotals,
-        external: f32,
-        nodes: usize,
+        loads: &Loads<'_>,
+        time: f64,
+        displacement: &[NodeVector],
         k: f32,
         square: f32,
     ) {
@@ -175,9 +169,9 @@ impl ErrorEstimate {
             return;
         }
         // An implicit step: the estimate is stable for any stiffness.
-        let internal = external - totals.total;
+        let internal = totals.external(loads, time, displacement) - totals.total;
         let stiffness = if internal > 0.0 { square * internal / totals.mass } else { 0.0 };
-        let push = libm::sqrtf(totals.length / nodes as f32) * totals.defect / totals.mass;
+        let push = libm::sqrtf(totals.length / displacement.len() as f32) * totals.defect / totals.mass;
         let next = (push + 2.0 * self.now - (1.0 - k) * self.before) / (1.0 + k + stiffness);
         let next = next.max(-self.largest).min(self.largest);
         *self = Self { now: next, before: self.now, ..*self };

@@ -10,11 +10,11 @@ use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::{Contiguous, NodeVector};
 use crate::state::StateView;
-use crate::step::{Status, Step};
+use crate::step::{Status, Step, Threads};
 
 use super::damper::RoughMotion;
 use super::estimate::ErrorEstimate;
-use super::lattice::{self, Grid, Lattice, LatticeNode};
+use super::lattice::{self, Grid, Lattice, LatticeNode, node_at, rank_of, sort_by_cell};
 use super::matrices::Matrices;
 use super::method::{Method, largest_grid, vectors_for_lattice, vectors_of_order, vectors_of_places};
 use super::node::Scaling;
@@ -174,7 +174,6 @@ impl<'w> LargeModel<'w> {
         };
         write_heights(scene, &mut tables);
         self.choose_frames(scene, points, &mut tables, places)?;
-        lattice::sort_by_cell(places);
         self.moved_elements = sort_by_patch(order, scene, &self.lattice, places);
         let StateView { displacement, increment, progress, .. } = state;
         self.steps = progress.steps;
@@ -191,8 +190,9 @@ impl<'w> LargeModel<'w> {
         self.refresh.whole_cycle(input, &mut tables, &mut matrices);
         self.report = self.refresh.added.report(0, 1.0, 0.0);
         let unbounded = (0..nodes).find(|&node| {
+            let at = Contiguous(rank_of(places, node));
             let (inverse, [scalar, _]) =
-                read_matrices::<f32>(Contiguous(node), tables.inverse_diagonal, tables.inverse_off_diagonal);
+                read_matrices::<f32>(at, tables.inverse_diagonal, tables.inverse_off_diagonal);
             !(inverse.trace().is_finite() && scalar.is_finite())
         });
         match unbounded {
@@ -204,8 +204,8 @@ impl<'w> LargeModel<'w> {
         }
     }
 
-    /// Chooses the frames and those of the nodes, and writes the places of the nodes if there is a lattice. Not inlined: the
-    /// first cycle does without its stack.
+    /// Chooses the frames and those of the nodes, and writes the places of the nodes, sorted by cell, if there is a lattice. Not
+    /// inlined: the first cycle does without its stack.
     #[inline(never)]
     fn choose_frames<M>(
         &mut self,
@@ -225,12 +225,21 @@ impl<'w> LargeModel<'w> {
             &of_frames
         };
         self.refresh.frames.choose(lattice, points);
+        // The frame of a node goes with its height until its rank is known.
         for (node, (&point, inertia)) in points.iter().zip(scene.inertia).enumerate() {
             let place = lattice.place(point);
-            tables.set_frame(node, lattice.frame(&place, inertia));
+            if let Some(sums) = tables.sum_diagonal.get_mut(node) {
+                sums.0[1] = lattice.frame(&place, inertia) as f32;
+            }
             if let Some(to) = places.get_mut(node) {
                 *to = place;
             }
+        }
+        sort_by_cell(places);
+        for rank in 0..scene.node_count() {
+            let [height, frame, ..] =
+                tables.sum_diagonal.get(node_at(places, rank)).copied().unwrap_or_default().0;
+            tables.set_node(rank, height, frame as usize);
         }
         Ok(())
     }
@@ -336,6 +345,17 @@ impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
     ) -> Status {
         self.model.with_storage(self.storage.as_mut()).step(scene, loads, state)
     }
+
+    /// See [`LargeView::step_in_parts`].
+    pub fn step_in_parts<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: StateView<'_>,
+        threads: &impl Threads,
+    ) -> Status {
+        self.model.with_storage(self.storage.as_mut()).step_in_parts(scene, loads, state, threads)
+    }
 }
 
 #[cfg(any(feature = "std", test))]
@@ -366,21 +386,22 @@ fn checked_grid<M: ElementMaterial>(
     method.grid(scene, points)
 }
 
-/// Writes the least height `1 / |ga|` (m) among the elements of each node.
+/// Writes the least height `1 / |ga|` (m) among the elements of each node to the node's first sum.
 fn write_heights<M>(scene: SceneView<'_, M>, tables: &mut NodeTables<'_>) {
     // First the largest |ga|^2, then the height.
-    tables.next_increment.fill(NodeVector::ZERO);
+    let heights = &mut *tables.sum_diagonal;
+    heights.fill(NodeVector::ZERO);
     for (tile, lane) in scene.places() {
         let slopes = [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| tile.gradient_of(corner, axis, lane)));
         let origin = [0, 1, 2].map(|axis| slopes[0][axis] + slopes[1][axis] + slopes[2][axis]);
         for (corner, [x, y, z]) in [origin, slopes[0], slopes[1], slopes[2]].into_iter().enumerate() {
-            if let Some(node) = tables.next_increment.get_mut(tile.node(corner, lane)) {
+            if let Some(node) = heights.get_mut(tile.node(corner, lane)) {
                 let square = x * x + y * y + z * z;
-                node.0[3] = if square > node.0[3] { square } else { node.0[3] };
+                node.0[0] = if square > node.0[0] { square } else { node.0[0] };
             }
         }
     }
-    for node in tables.next_increment.iter_mut() {
-        node.0[3] = if node.0[3] > 0.0 { 1.0 / libm::sqrtf(node.0[3]) } else { f32::MAX };
+    for node in heights.iter_mut() {
+        node.0[0] = if node.0[0] > 0.0 { 1.0 / libm::sqrtf(node.0[0]) } else { f32::MAX };
     }
 }

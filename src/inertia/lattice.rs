@@ -93,7 +93,19 @@ impl LatticeNode {
 /// The place of a node.
 #[inline(always)]
 pub(super) fn node_place(places: &[LatticeNode], node: usize) -> Option<&LatticeNode> {
-    places.get(places.get(node)?.rank as usize)
+    places.get(rank_of(places, node))
+}
+
+/// The index of a node in the order of the cells; without a lattice, which has no places, that of the node.
+#[inline(always)]
+pub(super) fn rank_of(places: &[LatticeNode], node: usize) -> usize {
+    places.get(node).map_or(node, |entry| entry.rank as usize)
+}
+
+/// The node at an index in that order.
+#[inline(always)]
+pub(super) fn node_at(places: &[LatticeNode], rank: usize) -> usize {
+    places.get(rank).map_or(rank, LatticeNode::node)
 }
 
 /// Sorts the places of the nodes by their cells.

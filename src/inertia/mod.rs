@@ -96,6 +96,7 @@ mod nodal_sums;
 mod node;
 mod node_refresh;
 mod node_tables;
+mod parts;
 mod passes;
 mod patches;
 mod projected_inertia;

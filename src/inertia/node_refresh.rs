@@ -5,7 +5,7 @@
 use bytemuck::{must_cast_slice, must_cast_slice_mut};
 
 use super::frames::{Frames, Rotation};
-use super::lattice::{Lattice, LatticeNode, node_place};
+use super::lattice::{Lattice, LatticeNode, node_at};
 use super::nodal_sums::{FunctionInertia, add_inertia};
 use super::node::{Scaling, new_inertia, velocity_factor};
 use super::node_tables::{NodeTables, read_matrices, write_matrices};
@@ -53,22 +53,23 @@ impl Kernel for NodeBatch<'_, '_> {
     fn run<R: Real>(mut self) {
         let (first, count) = (self.first, self.inertia.len());
         // Places after the last node repeat it.
-        let mut rows = [0; TILE];
-        for (lane, row) in rows.iter_mut().enumerate().take(NODE_BATCH) {
+        let (mut ranks, mut rows) = ([0; TILE], [0; TILE]);
+        for (lane, (rank, row)) in ranks.iter_mut().zip(&mut rows).enumerate().take(NODE_BATCH) {
             let at = (first + lane).min(count.saturating_sub(1));
-            *row = self.places.get(at).map_or(at, LatticeNode::node) as u32;
+            (*rank, *row) = (at as u32, node_at(self.places, at) as u32);
         }
-        if let Some(rows) = Indexed::below::<R>(rows, count) {
-            self.refresh::<R::Width8, R>(rows, count - first.min(count));
+        let checked = |rows| Indexed::below::<R>(rows, count);
+        if let (Some(rows), Some(ranks)) = (checked(rows), checked(ranks)) {
+            self.refresh::<R::Width8, R>(rows, ranks, count - first.min(count));
         }
     }
 }
 
 impl NodeBatch<'_, '_> {
-    /// Computes the next inertia of the nodes of these rows, of which `left` are not repeated. `W` is the widest vector
-    /// of the level.
+    /// Computes the next inertia of the nodes in these rows, with these ranks, of which `left` are not repeated. `W` is the
+    /// widest vector of the level.
     #[inline(always)]
-    fn refresh<R: Real, W: Real>(&mut self, rows: Indexed, left: usize) {
+    fn refresh<R: Real, W: Real>(&mut self, rows: Indexed, ranks: Indexed, left: usize) {
         const { assert!(R::COUNT == NODE_BATCH) };
         let Self { inertia, moving, lattice, places, scaling, added, tables, bounds, sums, .. } = self;
         let [x, y, z, mass] = rows.read::<R>(must_cast_slice(inertia));
@@ -81,11 +82,11 @@ impl NodeBatch<'_, '_> {
             let in_frames = |rotation: &dyn Fn(usize) -> Rotation| {
                 let mut rotations = [Rotation::NONE; NODE_BATCH];
                 for (lane, of_lane) in rotations.iter_mut().enumerate() {
-                    *of_lane = rotation(tables.frame(rows.index::<R>(lane)));
+                    *of_lane = rotation(tables.frame(ranks.index::<R>(lane)));
                 }
                 to_frames(&rotations, velocity)
             };
-            let old = read_matrices(rows, tables.inverse_diagonal, tables.inverse_off_diagonal).0;
+            let old = read_matrices(ranks, tables.inverse_diagonal, tables.inverse_off_diagonal).0;
             let factor = velocity_factor(
                 free,
                 mass,
@@ -109,8 +110,7 @@ impl NodeBatch<'_, '_> {
             return;
         }
         for lane in 0..left.min(R::COUNT) {
-            let node = rows.index::<R>(lane);
-            let Some(place) = node_place(places, node) else {
+            let Some(place) = places.get(ranks.index::<R>(lane)) else {
                 continue;
             };
             let Symmetric { xx, yy, zz, xy, yz, zx } = new.inertia;

@@ -1,7 +1,10 @@
-//! Tables over the nodes in the caller's storage: five vectors of four floats for each node, six for a damped step.
+//! Tables over the nodes in the caller's storage: five vectors of four floats for each node, six for a damped step. Those that a
+//! step reads are in the order of the cells, in which it takes the nodes ([`super::lattice::rank_of`]); the sums over elements
+//! are in the order of the nodes.
 
 use bytemuck::{must_cast_slice, must_cast_slice_mut};
 
+use super::lattice::{LatticeNode, node_at};
 use crate::element::symmetric::Symmetric;
 use crate::padding;
 use crate::simd::{NodeVector, Real, Rows};
@@ -16,7 +19,7 @@ pub(super) struct NodeTables<'a> {
     pub(super) inverse_diagonal: &'a mut [NodeVector],
     /// `xy, yz, zx` of the inverse inertia, and the share of it that the node may use (below one if it is held back).
     pub(super) inverse_off_diagonal: &'a mut [NodeVector],
-    /// Sums of the elements' bounds (N/m), later the next inverse inertia; the same layout.
+    /// Sums of the elements' bounds (N/m), later the next inverse inertia; the same layout, in the order of the nodes.
     pub(super) sum_diagonal: &'a mut [NodeVector],
     pub(super) sum_off_diagonal: &'a mut [NodeVector],
     /// The next increment of each node, m. The fourth component is the least height of its elements, m, with the frame
@@ -48,27 +51,29 @@ impl<'a> NodeTables<'a> {
         self.sum_off_diagonal.fill(NodeVector::ZERO);
     }
 
-    /// Sets the frame of a node, below 256. Its height must be there already.
-    pub(super) fn set_frame(&mut self, node: usize, frame: usize) {
-        if let Some(vector) = self.next_increment.get_mut(node) {
-            vector.0[3] = padding::with_frame(vector.0[3], frame);
+    /// Sets the height (m) and the frame, below 256, of the node of a rank.
+    pub(super) fn set_node(&mut self, rank: usize, height: f32, frame: usize) {
+        if let Some(vector) = self.next_increment.get_mut(rank) {
+            vector.0[3] = padding::with_frame(height, frame);
         }
     }
 
-    /// The frame of a node.
+    /// The frame of the node of a rank.
     #[inline(always)]
-    pub(super) fn frame(&self, node: usize) -> usize {
-        self.next_increment.get(node).map_or(0, |vector| padding::frame_of(vector.0[3]))
+    pub(super) fn frame(&self, rank: usize) -> usize {
+        self.next_increment.get(rank).map_or(0, |vector| padding::frame_of(vector.0[3]))
     }
 
     /// Puts the next inverses into use. The shares are kept; in the first cycle they are set to one.
-    pub(super) fn put_in_use(&mut self, first: bool) {
-        for (inverse, next) in self.inverse_diagonal.iter_mut().zip(&*self.sum_diagonal) {
-            *inverse = *next;
+    pub(super) fn put_in_use(&mut self, places: &[LatticeNode], first: bool) {
+        let next_of =
+            |sums: &[NodeVector], rank| sums.get(node_at(places, rank)).copied().unwrap_or_default();
+        for (rank, inverse) in self.inverse_diagonal.iter_mut().enumerate() {
+            *inverse = next_of(self.sum_diagonal, rank);
         }
-        for (inverse, next) in self.inverse_off_diagonal.iter_mut().zip(&*self.sum_off_diagonal) {
+        for (rank, inverse) in self.inverse_off_diagonal.iter_mut().enumerate() {
             let share = if first { 1.0 } else { inverse.0[3] };
-            let [xy, yz, zx, _] = next.0;
+            let [xy, yz, zx, _] = next_of(self.sum_off_diagonal, rank).0;
             inverse.0 = [xy, yz, zx, share];
         }
     }

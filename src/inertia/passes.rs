@@ -2,20 +2,22 @@
 //! lattice's motion is computed. They take the nodes in the order of the cells, so that sums and coefficients of a cell
 //! stay in registers. Without a lattice both are done in one pass.
 
-use bytemuck::{must_cast_slice, must_cast_slice_mut};
+use core::ops::Range;
 
-use super::cells::{CellAccumulator, CellPolynomial, NodesInCells, VECTORS_PER_TILE, motion_at};
+use bytemuck::{must_cast_slice, must_cast_slice_mut};
+use glam::Vec4;
+
+use super::cells::{CellAccumulator, CellPolynomial, CellSlots, NodesInCells, VECTORS_PER_TILE, motion_at};
 use super::damper::RoughMotion;
 use super::estimate::{DefectSums, DefectTotals};
 use super::frames::Rotation;
-use super::lattice::{LatticeNode, MAX_FUNCTIONS};
+use super::lattice::{LatticeNode, MAX_FUNCTIONS, rank_of};
 use super::node::Scaling;
-use super::node_tables::NodeTables;
 use super::report::HeldBack;
 use super::{LARGEST_MOVE, LEAST_SHARE, NODE_GROWTH, RECOVERY};
 use crate::element::NodeInertia;
 use crate::padding;
-use crate::simd::{Contiguous, Indexed, Kernel, NodeVector, Real, Rows, TILE, axes, dispatch};
+use crate::simd::{Contiguous, Indexed, Kernel, NodeVector, Real, Rows, TILE, dispatch};
 use crate::step::{Step, Sums, Totals};
 
 /// For each frame the rotation from the frame of the bounds to the world, as padded rows; the identity for frames that
@@ -34,12 +36,8 @@ pub(super) fn rotation_table(rotations: &[Rotation], functions: usize) -> Rotati
 
 /// The vector of sums, and the lane in it, that belong to a row of a tile.
 #[inline(always)]
-fn sums_of_row<R: Real, T>(
-    sums: &[T; VECTORS_PER_TILE],
-    row: usize,
-    lane_of_row: impl Fn(usize) -> usize,
-) -> (&T, usize) {
-    (&sums[row / R::COUNT % VECTORS_PER_TILE], lane_of_row(row % R::COUNT))
+fn sums_of_row<R: Real, T>(sums: &[T; VECTORS_PER_TILE], row: usize) -> (&T, usize) {
+    (&sums[row / R::COUNT % VECTORS_PER_TILE], R::lane_of_row(row % R::COUNT))
 }
 
 /// Inputs of all passes.
@@ -78,11 +76,12 @@ impl PassInput<'_> {
         NodeValues { free, mass, force: [fx, fy, fz], bound, increment: [vx, vy, vz] }
     }
 
-    /// The nodes from index `first` on in the order of the cells: their rows in the tables, and their places.
+    /// The nodes from rank `first` on: their rows in scene and state, and their places.
     #[inline(always)]
     fn in_order<R: Real>(&self, first: usize) -> Option<(Indexed, NodesInCells<'_, R>)> {
         let places = self.places.get(first..first + R::COUNT)?;
-        let [x, y, z, nodes] = R::from_rows(|lane| places.get(lane).map_or([0.0; 4], LatticeNode::row));
+        let place = |lane| places.get(R::row_of_lane(lane));
+        let [x, y, z, nodes] = R::from_rows(|lane| place(lane).map_or([0.0; 4], LatticeNode::row));
         let mut rows = [0; TILE];
         for (lane, row) in rows.iter_mut().enumerate().take(R::COUNT) {
             *row = padding::to_index(nodes.lane(lane));
@@ -95,76 +94,117 @@ impl PassInput<'_> {
     }
 }
 
-/// The pass before the lattice's motion: residual and momentum of each node, summed over the cells for the lattice. Gives
-/// the largest growth of a bound.
-pub(super) struct RestrictionPass<'a, 'b> {
+/// The pass before the lattice's motion: residual and momentum of each node, added to the sums of the cells for the lattice.
+pub(super) struct RestrictionPass<'a> {
     pub(super) input: PassInput<'a>,
+    /// Ranks of the nodes.
+    pub(super) ranks: Range<usize>,
     pub(super) force: &'a [NodeVector],
-    pub(super) tables: &'a NodeTables<'b>,
-    pub(super) cells: &'a mut [CellPolynomial],
-    pub(super) momentum: &'a mut [CellPolynomial],
+    /// [`NodeTables::inverse_diagonal`].
+    pub(super) inverse_diagonal: &'a [NodeVector],
+    pub(super) residual: CellSlots<'a>,
+    pub(super) momentum: CellSlots<'a>,
 }
 
-impl RestrictionPass<'_, '_> {
+/// Extremes over the nodes of a [`RestrictionPass`].
+#[derive(Clone, Copy)]
+pub(super) struct RestrictionExtremes<R> {
+    /// The inverse of the largest growth of a bound.
+    pub(super) inverse_growth: R,
+    /// The largest component of an increment, m.
+    pub(super) increment: R,
+}
+
+impl<R: Real> RestrictionExtremes<R> {
+    #[inline(always)]
+    pub(super) fn none() -> Self {
+        Self { inverse_growth: R::splat(1.0), increment: R::splat(0.0) }
+    }
+
+    #[inline(always)]
+    pub(super) fn merged_with(self, other: Self) -> Self {
+        Self {
+            inverse_growth: other.inverse_growth.min(self.inverse_growth),
+            increment: other.increment.max(self.increment),
+        }
+    }
+
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> RestrictionExtremes<f32> {
+        RestrictionExtremes {
+            inverse_growth: self.inverse_growth.lane(lane),
+            increment: self.increment.lane(lane),
+        }
+    }
+}
+
+impl RestrictionPass<'_> {
     /// Compiled with this crate, as it is not generic.
     #[inline(never)]
-    pub(super) fn dispatched(self) -> f32 {
+    pub(super) fn dispatched(self) -> RestrictionExtremes<f32> {
         dispatch(self)
     }
 
-    /// The inverse of the largest growth so far, with that of a vector of nodes.
+    /// The extremes so far, with those of a vector of nodes.
     #[inline(always)]
-    fn inverse_growth<R: Real>(&self, rows: impl Rows, nodes: &NodeValues<R>, least: R) -> R {
-        let [_, _, _, bound_before] = rows.read::<R>(must_cast_slice(self.tables.inverse_diagonal));
-        self.input.inverse_growth(nodes, bound_before).min(least)
+    fn with_nodes<R: Real>(
+        &self,
+        extremes: RestrictionExtremes<R>,
+        rank: usize,
+        nodes: &NodeValues<R>,
+    ) -> RestrictionExtremes<R> {
+        let [_, _, _, bound_before] = Contiguous(rank).read::<R>(must_cast_slice(self.inverse_diagonal));
+        let [vx, vy, vz] = nodes.increment.map(R::abs);
+        extremes.merged_with(RestrictionExtremes {
+            inverse_growth: self.input.inverse_growth(nodes, bound_before),
+            increment: vx.max(vy).max(vz),
+        })
     }
 }
 
-impl Kernel for RestrictionPass<'_, '_> {
-    type Output = f32;
+impl Kernel for RestrictionPass<'_> {
+    type Output = RestrictionExtremes<f32>;
 
     #[inline(always)]
-    fn run<R: Real>(self) -> f32 {
+    fn run<R: Real>(mut self) -> RestrictionExtremes<f32> {
         let input = self.input;
-        let nodes = input.inertia.len().min(input.places.len());
-        let whole = nodes - nodes % TILE;
-        let mut least = R::splat(1.0);
-        self.cells.fill(CellPolynomial::ZERO);
-        let mut residual_sums = CellAccumulator::new();
-        let mut momentum_sums = CellAccumulator::new();
-        self.momentum.fill(CellPolynomial::ZERO);
-        for first in (0..whole).step_by(TILE) {
+        let Range { start, end } = self.ranks;
+        let whole = end - (end - start) % TILE;
+        let mut extremes = RestrictionExtremes::<R>::none();
+        let mut residual_sums = CellAccumulator::new(self.residual.first);
+        let mut momentum_sums = CellAccumulator::new(self.momentum.first);
+        for first in (start..whole).step_by(TILE) {
             for vector in 0..TILE / R::COUNT {
-                let Some((rows, places)) = input.in_order::<R>(first + vector * R::COUNT) else {
+                let rank = first + vector * R::COUNT;
+                let Some((rows, places)) = input.in_order::<R>(rank) else {
                     continue;
                 };
                 let nodes = input.read::<R>(rows, self.force);
-                least = self.inverse_growth(rows, &nodes, least);
-                momentum_sums.add(self.momentum, &places, vector, nodes.momentum());
-                residual_sums.add(self.cells, &places, vector, input.residual(&nodes));
+                extremes = self.with_nodes(extremes, rank, &nodes);
+                momentum_sums.add(&mut self.momentum, &places, vector, nodes.momentum());
+                residual_sums.add(&mut self.residual, &places, vector, input.residual(&nodes));
             }
         }
-        residual_sums.flush(self.cells);
-        momentum_sums.flush(self.momentum);
-        let mut rest = 1.0;
-        for at in whole..nodes {
-            let Some(place) = input.places.get(at) else {
+        residual_sums.flush(&mut self.residual);
+        momentum_sums.flush(&mut self.momentum);
+        let mut all = RestrictionExtremes::<f32>::none();
+        for rank in whole..end {
+            let Some(place) = input.places.get(rank) else {
                 continue;
             };
-            let rows = Contiguous(place.node());
-            let nodes = input.read::<f32>(rows, self.force);
-            rest = self.inverse_growth(rows, &nodes, rest);
+            let nodes = input.read::<f32>(Contiguous(place.node()), self.force);
+            all = self.with_nodes(all, rank, &nodes);
             if let Some(cell) = self.momentum.get_mut(place.cell()) {
                 cell.add(place, nodes.momentum());
             }
-            if let Some(cell) = self.cells.get_mut(place.cell()) {
+            if let Some(cell) = self.residual.get_mut(place.cell()) {
                 cell.add(place, input.residual(&nodes));
             }
         }
         for lane in 0..R::COUNT {
-            rest = least.lane(lane).min(rest);
+            all = all.merged_with(extremes.lane(lane));
         }
-        1.0 / rest
+        all
     }
 }
 
@@ -227,14 +267,10 @@ impl<R: Real> HeldSums<R> {
 
     /// The sums; `rest` is for the nodes after the last whole tile.
     #[inline(always)]
-    fn total(
-        sums: &[Self; VECTORS_PER_TILE],
-        lane_of_row: impl Fn(usize) -> usize,
-        rest: &HeldSums<f32>,
-    ) -> HeldBack {
+    fn total(sums: &[Self; VECTORS_PER_TILE], rest: &HeldSums<f32>) -> HeldBack {
         let mut held_back = HeldBack::NONE;
         for row in 0..TILE {
-            let (sums, lane) = sums_of_row::<R, _>(sums, row, &lane_of_row);
+            let (sums, lane) = sums_of_row::<R, _>(sums, row);
             held_back.add(sums.held.lane(lane), sums.unused.lane(lane), sums.least.lane(lane));
         }
         held_back.add(rest.held, rest.unused, rest.least);
@@ -267,16 +303,26 @@ struct MotionAt<R> {
     smooth: [R; 3],
 }
 
+/// The tables of the nodes of some consecutive ranks.
+pub(super) struct MotionTables<'a> {
+    pub(super) inverse_diagonal: &'a [NodeVector],
+    pub(super) inverse_off_diagonal: &'a mut [NodeVector],
+    pub(super) next_increment: &'a mut [NodeVector],
+    pub(super) rough: &'a mut [NodeVector],
+}
+
 /// The pass that computes the next increments: by the nodes' own inertia, as far as their share of it allows, and by
-/// the lattice's motion. It damps rough motion and removes the bounds from the fourth component of the forces. Gives
-/// sums for the energy balance, the error estimate and the damper, and over the nodes that were held back.
-pub(super) struct MotionPass<'a, 'b> {
+/// the lattice's motion. It damps rough motion. Gives sums for the energy balance, the error estimate and the damper, and
+/// over the nodes that were held back.
+pub(super) struct MotionPass<'a> {
     pub(super) input: PassInput<'a>,
     pub(super) rotations: &'a RotationTable,
     /// None without a lattice.
-    pub(super) lattice: Option<LatticeMotion<'a>>,
-    pub(super) force: &'a mut [NodeVector],
-    pub(super) tables: &'a mut NodeTables<'b>,
+    pub(super) lattice: Option<&'a LatticeMotion<'a>>,
+    /// Ranks of the nodes.
+    pub(super) ranks: Range<usize>,
+    pub(super) force: &'a [NodeVector],
+    pub(super) tables: MotionTables<'a>,
 }
 
 /// The motion of a vector of nodes by their own inertia, m; the least height of their elements, m; the share of their
@@ -289,6 +335,7 @@ struct OwnMotion<R> {
 }
 
 /// Result of [`MotionPass`].
+#[derive(Clone, Copy)]
 pub(super) struct PassTotals {
     pub(super) totals: Totals,
     pub(super) defects: DefectTotals,
@@ -324,16 +371,10 @@ impl<R: Real> AxisSums<R> {
     }
 
     #[inline(always)]
-    fn total(
-        sums: &[Self; VECTORS_PER_TILE],
-        lane_of_row: impl Fn(usize) -> usize,
-        rest: &AxisSums<f32>,
-        held_back: HeldBack,
-    ) -> PassTotals {
-        let (mut totals, mut defects, mut rough) =
-            (Totals::default(), DefectTotals::default(), RoughMotion::NONE);
+    fn total(sums: &[Self; VECTORS_PER_TILE], rest: &AxisSums<f32>, held_back: HeldBack) -> PassTotals {
+        let (mut totals, mut defects, mut rough) = (Totals::NONE, DefectTotals::NONE, RoughMotion::NONE);
         for row in 0..TILE {
-            let (sums, lane) = sums_of_row::<R, _>(sums, row, &lane_of_row);
+            let (sums, lane) = sums_of_row::<R, _>(sums, row);
             let ([a, b, c], [d, e, f], [g, h, i, j]) = (&sums.sums, &sums.defects, &sums.rough);
             totals.add_axes(&[a.at(lane), b.at(lane), c.at(lane)]);
             defects.add_axes(&[d.at(lane), e.at(lane), f.at(lane)]);
@@ -346,7 +387,7 @@ impl<R: Real> AxisSums<R> {
     }
 }
 
-impl MotionPass<'_, '_> {
+impl MotionPass<'_> {
     /// Compiled with this crate, as it is not generic.
     #[inline(never)]
     pub(super) fn dispatched(self) -> PassTotals {
@@ -354,40 +395,42 @@ impl MotionPass<'_, '_> {
     }
 }
 
-impl Kernel for MotionPass<'_, '_> {
+impl Kernel for MotionPass<'_> {
     type Output = PassTotals;
 
     #[inline(always)]
     fn run<R: Real>(mut self) -> PassTotals {
-        if self.lattice.is_some() { self.with_lattice::<R>() } else { self.without_lattice::<R>() }
+        match self.lattice {
+            Some(lattice) => self.with_lattice::<R>(lattice),
+            None => self.without_lattice::<R>(),
+        }
     }
 }
 
-impl MotionPass<'_, '_> {
+impl MotionPass<'_> {
     #[inline(always)]
-    fn with_lattice<R: Real>(&mut self) -> PassTotals {
+    fn with_lattice<R: Real>(&mut self, lattice: &LatticeMotion<'_>) -> PassTotals {
         let input = self.input;
-        let nodes = input.inertia.len().min(input.places.len());
-        let whole = nodes - nodes % TILE;
+        let Range { start, end } = self.ranks;
+        let whole = end - (end - start) % TILE;
         let mut sums = [AxisSums::<R>::new(&self.input); VECTORS_PER_TILE];
         let mut held = [HeldSums::<R>::new(); VECTORS_PER_TILE];
-        for first in (0..whole).step_by(TILE) {
+        for first in (start..whole).step_by(TILE) {
             for vector in 0..TILE / R::COUNT {
-                let (Some((rows, places)), Some(lattice)) =
-                    (input.in_order::<R>(first + vector * R::COUNT), &self.lattice)
-                else {
+                let rank = first + vector * R::COUNT;
+                let Some((rows, places)) = input.in_order::<R>(rank) else {
                     continue;
                 };
                 let at = |cells: &[CellPolynomial]| motion_at(cells, &places);
                 let smooth = lattice.damped.as_ref().map_or([R::splat(0.0); 3], |damped| at(damped.smooth));
                 let motion = MotionAt { coarse: at(lattice.cells), fine: at(lattice.fine), smooth };
                 let index = vector % VECTORS_PER_TILE;
-                self.nodes(rows, Some(motion), &mut sums[index], &mut held[index]);
+                self.nodes(Contiguous(rank - start), rows, Some(motion), &mut sums[index], &mut held[index]);
             }
         }
         let (mut rest, mut rest_held) = (AxisSums::new(&self.input), HeldSums::new());
-        for at in whole..nodes {
-            let (Some(place), Some(lattice)) = (input.places.get(at), &self.lattice) else {
+        for rank in whole..end {
+            let Some(place) = input.places.get(rank) else {
                 continue;
             };
             let at = |cells: &[CellPolynomial]| {
@@ -395,45 +438,58 @@ impl MotionPass<'_, '_> {
             };
             let smooth = lattice.damped.as_ref().map_or([0.0; 3], |damped| at(damped.smooth));
             let motion = MotionAt { coarse: at(lattice.cells), fine: at(lattice.fine), smooth };
-            self.nodes(Contiguous(place.node()), Some(motion), &mut rest, &mut rest_held);
+            self.nodes(
+                Contiguous(rank - start),
+                Contiguous(place.node()),
+                Some(motion),
+                &mut rest,
+                &mut rest_held,
+            );
         }
-        AxisSums::total(&sums, |row| row, &rest, HeldSums::total(&held, |row| row, &rest_held))
+        AxisSums::total(&sums, &rest, HeldSums::total(&held, &rest_held))
     }
 
     #[inline(always)]
     fn without_lattice<R: Real>(&mut self) -> PassTotals {
-        let nodes = self.input.inertia.len();
-        let whole = nodes - nodes % TILE;
+        let Range { start, end } = self.ranks;
+        let whole = end - (end - start) % TILE;
         let mut sums = [AxisSums::<R>::new(&self.input); VECTORS_PER_TILE];
         let mut held = [HeldSums::<R>::new(); VECTORS_PER_TILE];
-        for first in (0..whole).step_by(TILE) {
+        for first in (start..whole).step_by(TILE) {
             for vector in 0..TILE / R::COUNT {
-                let rows = Contiguous(first + vector * R::COUNT);
+                let node = first + vector * R::COUNT;
                 let index = vector % VECTORS_PER_TILE;
-                self.nodes(rows, None, &mut sums[index], &mut held[index]);
+                self.nodes(
+                    Contiguous(node - start),
+                    Contiguous(node),
+                    None,
+                    &mut sums[index],
+                    &mut held[index],
+                );
             }
         }
         let (mut rest, mut rest_held) = (AxisSums::new(&self.input), HeldSums::new());
-        for node in whole..nodes {
-            self.nodes::<f32>(Contiguous(node), None, &mut rest, &mut rest_held);
+        for node in whole..end {
+            self.nodes::<f32>(Contiguous(node - start), Contiguous(node), None, &mut rest, &mut rest_held);
         }
-        let held_back = HeldSums::total(&held, R::lane_of_row, &rest_held);
-        AxisSums::total(&sums, R::lane_of_row, &rest, held_back)
+        AxisSums::total(&sums, &rest, HeldSums::total(&held, &rest_held))
     }
 
+    /// Computes a vector of nodes: `at` are their rows in the tables, `rows` those in scene and state.
     #[inline(always)]
     fn nodes<R: Real>(
         &mut self,
+        at: Contiguous,
         rows: impl Rows,
         motion: Option<MotionAt<R>>,
         sums: &mut AxisSums<R>,
         held: &mut HeldSums<R>,
     ) {
         let nodes = self.input.read::<R>(rows, self.force);
-        let NodeValues { free, mass, force: [fx, fy, fz], increment, .. } = nodes;
+        let NodeValues { free, mass, increment, .. } = nodes;
         let displacement = rows.read::<R>(must_cast_slice(self.input.displacement));
         let OwnMotion { own, height, share, keep } =
-            self.own_motion(rows, &nodes, motion.as_ref().map(|motion| motion.fine));
+            self.own_motion(at, &nodes, motion.as_ref().map(|motion| motion.fine));
         held.add(share);
         let keep =
             if self.lattice.as_ref().is_some_and(|lattice| lattice.in_use) { R::splat(1.0) } else { keep };
@@ -453,11 +509,8 @@ impl MotionPass<'_, '_> {
         let damped = self.lattice.as_ref().and_then(|lattice| lattice.damped.as_ref());
         if let (Some(damping), Some(motion)) = (damped, &motion) {
             let has_table = !self.tables.rough.is_empty();
-            let mut rough = if has_table {
-                rows.read::<R>(must_cast_slice(self.tables.rough))
-            } else {
-                [R::splat(0.0); 4]
-            };
+            let mut rough =
+                if has_table { at.read::<R>(must_cast_slice(self.tables.rough)) } else { [R::splat(0.0); 4] };
             let [square, change, both, whole] = &mut sums.rough;
             for axis in 0..3 {
                 let here = free[axis] * (increment[axis] - motion.smooth[axis]);
@@ -473,25 +526,24 @@ impl MotionPass<'_, '_> {
                 rough[axis] = here;
             }
             if has_table {
-                rows.write(must_cast_slice_mut(self.tables.rough), rough);
+                at.write(must_cast_slice_mut(self.tables.rough), rough);
             }
         }
         sums.add(&nodes, displacement, next);
-        rows.write(must_cast_slice_mut(self.tables.next_increment), next);
-        rows.write(must_cast_slice_mut(self.force), [fx, fy, fz, R::splat(0.0)]);
+        at.write(must_cast_slice_mut(self.tables.next_increment), next);
     }
 
     /// `fine` is the smooth part of that motion.
     #[inline(always)]
     fn own_motion<R: Real>(
         &mut self,
-        rows: impl Rows,
+        at: Contiguous,
         nodes: &NodeValues<R>,
         fine: Option<[R; 3]>,
     ) -> OwnMotion<R> {
-        let NodeTables { inverse_diagonal, inverse_off_diagonal, next_increment, .. } = &mut *self.tables;
+        let MotionTables { inverse_diagonal, inverse_off_diagonal, next_increment, .. } = &mut self.tables;
         let [rx, ry, rz] = self.input.residual(nodes);
-        let [_, _, _, height] = rows.read::<R>(must_cast_slice(next_increment));
+        let [_, _, _, height] = at.read::<R>(must_cast_slice(next_increment));
         // The frame is in the last bits of the height, see `NodeTables`.
         let rotation = |lane: usize| {
             let frame = padding::frame_of(height.lane(lane));
@@ -505,8 +557,8 @@ impl MotionPass<'_, '_> {
         let bx = rotation[0][0] * rx + rotation[1][0] * ry + rotation[2][0] * rz;
         let by = rotation[0][1] * rx + rotation[1][1] * ry + rotation[2][1] * rz;
         let bz = rotation[0][2] * rx + rotation[1][2] * ry + rotation[2][2] * rz;
-        let [xx, yy, zz, bound_before] = rows.read::<R>(must_cast_slice(inverse_diagonal));
-        let [xy, yz, zx, share_before] = rows.read::<R>(must_cast_slice(inverse_off_diagonal));
+        let [xx, yy, zz, bound_before] = at.read::<R>(must_cast_slice(inverse_diagonal));
+        let [xy, yz, zx, share_before] = at.read::<R>(must_cast_slice(inverse_off_diagonal));
         let turned = [xx * bx + xy * by + zx * bz, xy * bx + yy * by + yz * bz, zx * bx + yz * by + zz * bz];
         let mut own = [R::splat(0.0); 3];
         for row in 0..3 {
@@ -526,7 +578,7 @@ impl MotionPass<'_, '_> {
             .min(limit)
             .min(R::splat(RECOVERY) * share_before);
         let kept = share.max(R::splat(LEAST_SHARE));
-        rows.write(must_cast_slice_mut(inverse_off_diagonal), [xy, yz, zx, kept]);
+        at.write(must_cast_slice_mut(inverse_off_diagonal), [xy, yz, zx, kept]);
         for own in &mut own {
             *own = share * *own;
         }
@@ -535,52 +587,20 @@ impl MotionPass<'_, '_> {
     }
 }
 
-/// Moves the nodes by their next increments.
-pub(super) struct ApplyIncrements<'a> {
-    pub(super) next: &'a [NodeVector],
-    pub(super) displacement: &'a mut [NodeVector],
-    pub(super) increment: &'a mut [NodeVector],
-}
-
-impl ApplyIncrements<'_> {
-    /// Compiled with this crate, as it is not generic.
-    #[inline(never)]
-    pub(super) fn dispatched(self) {
-        dispatch(self);
-    }
-}
-
-impl Kernel for ApplyIncrements<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<R: Real>(self) {
-        // The fourth component is no increment.
-        let axes = axes::<R>();
-        let (next, rest) = must_cast_slice::<_, f32>(self.next).as_chunks::<TILE>();
-        let (displacement, rest_of_displacement) =
-            must_cast_slice_mut::<_, f32>(self.displacement).as_chunks_mut::<TILE>();
-        let (increment, rest_of_increment) =
-            must_cast_slice_mut::<_, f32>(self.increment).as_chunks_mut::<TILE>();
-        for ((next, displacement), increment) in next.iter().zip(displacement).zip(increment) {
-            // Results are collected in local arrays: the compiler cannot know that the two tables do not overlap.
-            let (mut moved, mut there) = ([0.0; TILE], [0.0; TILE]);
-            for from in (0..TILE).step_by(R::COUNT) {
-                let of = |values: &[f32; TILE]| R::from_fn(|lane| values[(from + lane) % TILE]);
-                let next = axes.choose(of(next), R::splat(0.0));
-                let sum = of(displacement) + next;
-                for lane in 0..R::COUNT {
-                    moved[(from + lane) % TILE] = next.lane(lane);
-                    there[(from + lane) % TILE] = sum.lane(lane);
-                }
-            }
-            (*increment, *displacement) = (moved, there);
-        }
-        for (at, (next, (displacement, increment))) in
-            rest.iter().zip(rest_of_displacement.iter_mut().zip(rest_of_increment)).enumerate()
-        {
-            *increment = if at % 4 == 3 { 0.0 } else { *next };
-            *displacement += *increment;
-        }
+/// Moves some consecutive nodes by their next increments.
+pub(super) fn apply_increments(
+    first: usize,
+    places: &[LatticeNode],
+    next: &[NodeVector],
+    displacement: &mut [NodeVector],
+    increment: &mut [NodeVector],
+) {
+    // The fourth component is no increment.
+    let axes = Vec4::new(1.0, 1.0, 1.0, 0.0).cmpgt(Vec4::ZERO);
+    for (node, (displacement, increment)) in (first..).zip(displacement.iter_mut().zip(increment)) {
+        let next = next.get(rank_of(places, node)).copied().unwrap_or_default();
+        let next = Vec4::select(axes, Vec4::from(next.0), Vec4::ZERO);
+        displacement.0 = (Vec4::from(displacement.0) + next).to_array();
+        increment.0 = next.to_array();
     }
 }

@@ -14,7 +14,7 @@
 use super::assembly::{Assembly, BATCH, ElementTangent};
 use super::dense::{PIVOTS, Row, apply, apply_lower, mirror, row_length, stride, sweep, sweeps};
 use super::frames::{Frames, Rotation};
-use super::lattice::{CoarseVectors, Lattice, LatticeNode};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, rank_of};
 use super::matrices::{Matrices, copy, invert_axes, of_axes};
 use super::nodal_sums::{self, FunctionInertia, add_mass, write_mass};
 use super::node::Scaling;
@@ -362,7 +362,7 @@ impl Refresh {
             if input.lattice.functions() > 0 {
                 self.enter(if self.slow { Stage::NodeCells } else { Stage::InvertCoarse });
             } else {
-                self.end(tables, matrices);
+                self.end(input.places, tables, matrices);
             }
         }
         NODE_BATCH as i64 * NODE_COST
@@ -404,7 +404,7 @@ impl Refresh {
     ) -> i64 {
         let (cost, ended) = self.invert(matrices.next_coarse, matrices.mass, input.lattice.functions(), at);
         if ended {
-            self.end(tables, matrices);
+            self.end(input.places, tables, matrices);
         }
         cost
     }
@@ -441,8 +441,8 @@ impl Refresh {
     }
 
     /// Ends the cycle: its results are in use from now on.
-    fn end(&mut self, tables: &mut NodeTables<'_>, matrices: &mut Matrices<'_>) {
-        tables.put_in_use(self.first_cycle);
+    fn end(&mut self, places: &[LatticeNode], tables: &mut NodeTables<'_>, matrices: &mut Matrices<'_>) {
+        tables.put_in_use(places, self.first_cycle);
         self.put_in_use(matrices);
         self.enter(Stage::Elements);
     }
@@ -459,7 +459,8 @@ impl Refresh {
         let has_lattice = input.lattice.functions() > 0;
         let mut rotations = [Rotation::NONE.0; TILE];
         for (lane, rotation) in rotations.iter_mut().enumerate() {
-            *rotation = self.frames.since_start(tables.frame(tile.node(0, lane))).0;
+            let rank = rank_of(input.places, tile.node(0, lane));
+            *rotation = self.frames.since_start(tables.frame(rank)).0;
         }
         let diagonal = Scatter::new(tables.sum_diagonal);
         let sums = MatrixSums { diagonal, off_diagonal: Scatter::new(tables.sum_off_diagonal) };

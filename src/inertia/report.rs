@@ -58,6 +58,13 @@ impl HeldBack {
         self.unused += unused;
         self.least = self.least.min(least);
     }
+
+    /// Adds those of other nodes.
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.nodes += other.nodes;
+        self.unused += other.unused;
+        self.least = self.least.min(other.least);
+    }
 }
 
 /// Sums of added inertia over the nodes of a cycle.

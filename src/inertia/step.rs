@@ -4,26 +4,24 @@
 
 use glam::Vec4;
 
-use crate::element::{ElementLaw, ElementMaterial, InternalForces, NodeInertia, ScalarBound};
+use crate::element::{ElementMaterial, NodeInertia, ScalarBound};
 use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::{Progress, StateView};
-use crate::step::{Computed, Status, Step, StepMethod, Totals, Trial, external_forces};
+use crate::step::{CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial};
 
 use super::cells::{prolong, restrict};
 use super::damper::RoughMotion;
 use super::dense::{Row, apply, apply_by_axis, apply_to_two, stride};
-use super::estimate::{DefectTotals, dot};
+use super::estimate::DefectTotals;
 use super::frames::{Rotation, rotate};
 use super::large_step::{LargeModel, LargeView, Storage};
-use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
+use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS, rank_of};
 use super::matrices::{Matrices, of_axes};
 use super::nodal_sums;
-use super::passes::{
-    ApplyIncrements, LatticeMotion, MotionPass, PassInput, PassTotals, RestrictionPass, RoughDamping,
-    rotation_table,
-};
+use super::parts::NodeParts;
+use super::passes::{LatticeMotion, PassInput, PassTotals, RoughDamping, rotation_table};
 use super::refresh::{Refresh, RefreshInput, from_components, to_components};
 use super::report::HeldBack;
 use super::supports::{MovingSupports, Pull};
@@ -43,6 +41,18 @@ impl LargeView<'_, '_> {
         loads: &Loads<'_>,
         state: StateView<'_>,
     ) -> Status {
+        self.step_in_parts(scene, loads, state, &CallingThread)
+    }
+
+    /// The same step, to the bit, on several threads of the host: the work on elements and nodes, not the inversions and the
+    /// assembly of a cycle.
+    pub fn step_in_parts<M: ElementMaterial>(
+        self,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: StateView<'_>,
+        threads: &impl Threads,
+    ) -> Status {
         let Self { model, storage } = self;
         let nodes = model.nodes;
         let mismatch = Status::Mismatch { nodes: scene.node_count(), room: nodes.min(state.capacity()) };
@@ -55,19 +65,18 @@ impl LargeView<'_, '_> {
         }
         let step = model.step.carried_from(state.dt);
         match Trial::begin(scene, loads, state, nodes) {
-            Ok(trial) => trial.take(&step, &mut InertiaStep::new(&step, model, storage)),
+            Ok(trial) => trial.take(&step, &mut InertiaStep::new(&step, model, storage, threads)),
             Err(refused) => refused,
         }
     }
 }
 
 /// A step that is being computed, with its results.
-struct InertiaStep<'a, 'w> {
+struct InertiaStep<'a, 'w, T> {
+    threads: &'a T,
     step: &'a Step,
     model: &'a mut LargeModel<'w>,
     storage: Storage<'a>,
-    /// Displacement times external force, J.
-    external: f32,
     held_back: HeldBack,
     defects: DefectTotals,
     rough: RoughMotion,
@@ -77,15 +86,15 @@ struct InertiaStep<'a, 'w> {
     change: f32,
 }
 
-impl<'a, 'w> InertiaStep<'a, 'w> {
-    fn new(step: &'a Step, model: &'a mut LargeModel<'w>, storage: Storage<'a>) -> Self {
+impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
+    fn new(step: &'a Step, model: &'a mut LargeModel<'w>, storage: Storage<'a>, threads: &'a T) -> Self {
         Self {
+            threads,
             step,
             model,
             storage,
-            external: 0.0,
             held_back: HeldBack::NONE,
-            defects: DefectTotals::default(),
+            defects: DefectTotals::NONE,
             rough: RoughMotion::NONE,
             coarse_share: 1.0,
             damping: 0.0,
@@ -94,25 +103,21 @@ impl<'a, 'w> InertiaStep<'a, 'w> {
     }
 }
 
-impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
+impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         self.renew_if_stale(trial);
         let Trial { scene, loads, displacement, force, progress, .. } = &mut *trial;
-        external_forces(force, 0, scene.inertia, loads, progress.time);
-        self.external = dot(force, displacement);
-        let extremes = M::Law::forces_and_bounds(InternalForces::of_all(
-            scene.elements(),
-            displacement,
-            force,
-            ScalarBound,
-        ));
+        let (elements, inertia, time) = (scene.elements(), scene.inertia, progress.time);
+        let forcing = Forcing { elements, visitor: ScalarBound, inertia, displacement, loads, time };
+        let (_, extremes) = forcing.in_parts(force, &mut [], self.threads, |_, _, _: &mut [()]| ());
         self.model.refresh.update_frames(displacement, progress.steps);
         let moved = self.move_lattice(trial);
         Computed { totals: self.move_nodes(trial, moved), extremes }
     }
 
     fn next_increment(&self, node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector) -> [f32; 4] {
-        let [x, y, z, _] = self.storage.tables.next_increment.get(node).copied().unwrap_or_default().0;
+        let Storage { tables, places, .. } = &self.storage;
+        let [x, y, z, _] = tables.next_increment.get(rank_of(places, node)).copied().unwrap_or_default().0;
         [x, y, z, 0.0]
     }
 
@@ -120,9 +125,15 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
         let (step, model) = (self.step, &mut *self.model);
         let square = step.seconds() * step.seconds();
         model.rough = self.rough;
-        model.estimate.advance(&self.defects, self.external, model.nodes, model.scaling.k, square);
-        let Trial { displacement, increment, .. } = trial;
-        ApplyIncrements { next: self.storage.tables.next_increment, displacement, increment }.dispatched();
+        let Trial { scene, loads, displacement, increment, progress, .. } = trial;
+        model.estimate.advance(&self.defects, loads, progress.time, displacement, model.scaling.k, square);
+        let Storage { tables, places, .. } = &self.storage;
+        node_parts(scene, self.threads).apply_increments(
+            places,
+            tables.next_increment,
+            displacement,
+            increment,
+        );
     }
 
     #[inline(never)]
@@ -143,6 +154,10 @@ impl<M: ElementMaterial> StepMethod<M> for InertiaStep<'_, '_> {
     }
 }
 
+fn node_parts<'a, M: ElementMaterial, T>(scene: &SceneView<'a, M>, threads: &'a T) -> NodeParts<'a, T> {
+    NodeParts { partitions: scene.elements().partitions, threads }
+}
+
 /// What a step does with the lattice, apart from its motion.
 struct MovedLattice {
     /// Whether rough motion of the nodes can be told from smooth motion.
@@ -154,7 +169,7 @@ struct MovedLattice {
 }
 
 // Not inlined, like `finish`: the stack of one is free in the others.
-impl InertiaStep<'_, '_> {
+impl<T: Threads> InertiaStep<'_, '_, T> {
     /// Computes all inertia anew if another step has moved the state, or it was reset or restored.
     #[inline(never)]
     fn renew_if_stale<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) {
@@ -199,9 +214,11 @@ impl InertiaStep<'_, '_> {
         let input =
             PassInput { step, scaling, square, inertia: scene.inertia, displacement, increment, places };
         let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
-        let growth = RestrictionPass { input, force, tables, cells, momentum }.dispatched();
+        let extremes =
+            node_parts(scene, self.threads).restrict(input, force, tables.inverse_diagonal, cells, momentum);
+        let growth = 1.0 / extremes.inverse_growth;
         let share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
-        let smooth = smooth_motion(matrices, lattice, increment).filter(|_| refresh.lattice_in_use);
+        let smooth = smooth_motion(matrices, lattice, extremes.increment).filter(|_| refresh.lattice_in_use);
         let motion = CoarseMotion {
             lattice,
             refresh,
@@ -247,7 +264,8 @@ impl InertiaStep<'_, '_> {
             in_use: moved.has_smooth,
         });
         let rotations = &rotation_table(&refresh.frames.of_bounds, refresh.frames.functions());
-        let passed = MotionPass { input, rotations, lattice, force, tables }.dispatched();
+        let parts = node_parts(scene, self.threads);
+        let passed = parts.move_nodes(input, rotations, lattice.as_ref(), force, tables);
         let mut totals;
         PassTotals { totals, defects: self.defects, rough: self.rough, held_back: self.held_back } = passed;
         totals.add_work(moved.map_or(0.0, |moved| moved.work));
@@ -260,19 +278,14 @@ impl InertiaStep<'_, '_> {
 const LARGEST_SMOOTH: f32 = 10.0;
 
 /// The lattice's part `c = Mc^-1 W^T m du` of the increments. Turns the cells' sums of momentum into the smooth part of the
-/// increments, `W` times that. To remove a share of the rest changes no momentum of the lattice, so neither that of the
+/// increments, of which `largest` is the largest component, `W` times that. To remove a share of the rest changes no momentum of the lattice, so neither that of the
 /// body. None if the result is not plausible.
-fn smooth_motion(
-    matrices: &mut Matrices<'_>,
-    lattice: &Lattice,
-    increment: &[NodeVector],
-) -> Option<CoarseVectors> {
+fn smooth_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, largest: f32) -> Option<CoarseVectors> {
     let mut motion = restrict(matrices.smooth_cells, lattice);
     let mut components = to_components(&motion);
     apply_by_axis(of_axes(matrices.mass_inverse), lattice.functions(), &mut components);
     from_components(&components, &mut motion);
-    let largest = increment.iter().fold(Vec4::ZERO, |most, du| most.max(Vec4::from(du.0).abs()));
-    let limit = Vec4::splat(LARGEST_SMOOTH * largest.max_element());
+    let limit = Vec4::splat(LARGEST_SMOOTH * largest);
     if !motion.iter().all(|vector| Vec4::from(vector.0).abs().cmple(limit).all()) {
         return None;
     }
@@ -284,6 +297,11 @@ fn smooth_motion(
 /// about to grow by the inverse of the share; what is left has no more energy with the new inertia than it had before.
 fn removed_share(share: f32) -> f32 {
     1.0 - libm::sqrtf(share)
+}
+
+/// Scalar product of two motions of the lattice.
+fn inner(a: &CoarseVectors, b: &CoarseVectors) -> f32 {
+    a.iter().zip(b).map(|(a, b)| Vec4::from(a.0).dot(Vec4::from(b.0))).sum()
 }
 
 /// The motion of the lattice in a step.
@@ -404,7 +422,7 @@ impl CoarseMotion<'_> {
         let mut answer = [0.0; _];
         self.times(matrices.coarse_inverse, &self.in_frames(&pull.residual), &mut answer);
         let answer = self.in_world(&answer);
-        let energy = dot(&pull.residual, &answer);
+        let energy = inner(&pull.residual, &answer);
         if energy > pull.energy {
             share = share.min(pull.energy / energy);
         }
@@ -418,8 +436,8 @@ impl CoarseMotion<'_> {
     /// increments.
     #[inline(never)]
     fn work(&self, pull: &Pull, share: f32, next: &CoarseVectors) -> f32 {
-        let last = self.smooth.map_or(0.0, |smooth| dot(&pull.residual, smooth));
-        0.5 * share * (dot(&pull.residual, next) + last)
+        let last = self.smooth.map_or(0.0, |smooth| inner(&pull.residual, smooth));
+        0.5 * share * (inner(&pull.residual, next) + last)
     }
 
     /// Writes `S^-1 g`, and makes `T c` of `c`.

@@ -28,7 +28,7 @@ use core::ops::Range;
 use bytemuck::{Pod, Zeroable, must_cast_slice_mut};
 use glam::Vec4;
 
-use crate::element::{ElementMaterial, NodeInertia};
+use crate::element::{ElementMaterial, NoVisitor, NodeInertia};
 use crate::loads::Loads;
 use crate::mlp::Network;
 use crate::scene::SceneView;
@@ -482,8 +482,14 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let Trial { scene, loads, displacement, increment, force, progress } = trial;
         let (network, step, inertia) = (self.network, self.step, scene.inertia);
-        let forcing =
-            Forcing { elements: scene.elements(), inertia, displacement, loads, time: progress.time };
+        let forcing = Forcing {
+            elements: scene.elements(),
+            visitor: NoVisitor,
+            inertia,
+            displacement,
+            loads,
+            time: progress.time,
+        };
         let predict = |nodes: Range<usize>, force: &[NodeVector], vertices: &mut [Vertex]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let displacement = displacement.get(nodes.clone()).unwrap_or_default();

@@ -117,6 +117,10 @@ impl Real for Avx2 {
     fn lane_of_row(row: usize) -> usize {
         4 * (row % 2) + row / 2
     }
+    #[inline(always)]
+    fn row_of_lane(lane: usize) -> usize {
+        2 * (lane % 4) + lane / 4
+    }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]
     fn fused(self, factor: Self, addend: Self) -> Self {

@@ -125,6 +125,10 @@ impl Real for Avx512 {
     fn lane_of_row(row: usize) -> usize {
         4 * (row % 4) + row / 4
     }
+    #[inline(always)]
+    fn row_of_lane(lane: usize) -> usize {
+        4 * (lane % 4) + lane / 4
+    }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]
     fn fused(self, factor: Self, addend: Self) -> Self {

@@ -120,6 +120,11 @@ pub trait Real:
     fn lane_of_row(row: usize) -> usize {
         row
     }
+    /// The row that [`Real::from_consecutive_rows`] takes to a lane.
+    #[inline(always)]
+    fn row_of_lane(lane: usize) -> usize {
+        lane
+    }
     /// Whether all indices are in the range of `count` indices from `first` on.
     #[inline(always)]
     fn all_in_range<const N: usize>(rows: [&[u32; TILE]; N], first: u32, count: u32) -> bool {

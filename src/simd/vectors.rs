@@ -84,7 +84,7 @@ pub(crate) struct Contiguous(pub(crate) usize);
 impl Rows for Contiguous {
     #[inline(always)]
     fn index<R: Real>(&self, lane: usize) -> usize {
-        self.0 + (0..R::COUNT).find(|&row| R::lane_of_row(row) == lane).unwrap_or(0)
+        self.0 + R::row_of_lane(lane)
     }
     #[inline(always)]
     fn read<R: Real>(&self, rows: &[[f32; 4]]) -> [R; 4] {

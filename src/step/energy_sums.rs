@@ -86,6 +86,8 @@ pub(crate) struct Totals {
 }
 
 impl Totals {
+    pub(crate) const NONE: Self = Self { kinetic: 0.0, momentum: [0.0; 3], prescribed: 0.0, work: 0.0 };
+
     /// Adds the totals of all partitions.
     pub(crate) fn of_all<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut all = Self::default();

@@ -4,7 +4,7 @@
 use core::array::from_fn;
 use core::ops::Range;
 
-use crate::element::{ElementLaw, Elements, Extremes, InternalForces, NoVisitor, NodeInertia};
+use crate::element::{ElementLaw, Elements, Extremes, ForcesVisitor, InternalForces, NodeInertia};
 use crate::loads::{Loads, ramp_factor};
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
 use crate::simd::NodeVector;
@@ -13,8 +13,10 @@ use super::threads::{Threads, take};
 
 /// The input of the total forces.
 #[derive(Clone, Copy)]
-pub(crate) struct Forcing<'a, L> {
+pub(crate) struct Forcing<'a, L, V> {
     pub(crate) elements: Elements<'a, L>,
+    /// What is computed with the forces of each element.
+    pub(crate) visitor: V,
     pub(crate) inertia: &'a [NodeInertia],
     pub(crate) displacement: &'a [NodeVector],
     pub(crate) loads: &'a Loads<'a>,
@@ -31,7 +33,7 @@ struct Part<'a, T, F> {
     extremes: Extremes<f32>,
 }
 
-impl<L: ElementLaw> Forcing<'_, L> {
+impl<L: ElementLaw, V: ForcesVisitor<L>> Forcing<'_, L, V> {
     /// Total forces, and for each partition the result of `then` from its nodes, their forces and their entries of `extra`, an array
     /// that the step keeps for the nodes.
     pub(crate) fn in_parts<T: Send, F: Copy + Default + Send>(
@@ -70,7 +72,8 @@ impl<L: ElementLaw> Forcing<'_, L> {
         external_forces(force, nodes.start, inertia, self.loads, self.time);
         let (elements, displacement) = (self.elements, self.displacement);
         let mine = partitions.clone();
-        *extremes = L::forces(InternalForces::of_partitions(elements, mine, displacement, force, NoVisitor));
+        *extremes =
+            V::forces(InternalForces::of_partitions(elements, mine, displacement, force, self.visitor));
         let (mut force, mut extra) = (&mut **force, &mut **extra);
         for (partition, result) in partitions.clone().zip(&mut **results) {
             let nodes = all.nodes(&(partition..partition + 1));
@@ -130,6 +133,7 @@ mod tests {
     use std::{println, vec, vec::Vec};
 
     use super::*;
+    use crate::element::NoVisitor;
     use crate::material::Exponential;
     use crate::mesh::Bar;
     use crate::scene::test_scene::scene_of;

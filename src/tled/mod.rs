@@ -60,7 +60,8 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let Trial { scene, loads, displacement, increment, force, progress } = trial;
         let (elements, inertia, step) = (scene.elements(), scene.inertia, self.step);
-        let forcing = Forcing { elements, inertia, displacement, loads, time: progress.time };
+        let forcing =
+            Forcing { elements, visitor: NoVisitor, inertia, displacement, loads, time: progress.time };
         let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let increment = increment.get(nodes).unwrap_or_default();

@@ -131,12 +131,12 @@ static void large_copied(uint32_t method, const char *name) {
     move_end(scene, loads, 0.01f, -0.005f, 0.01f);
     CHECK(supple_large_size(scene, points[0], &config, &needed, NULL) == SUPPLE_OK && needed <= ROOM);
     CHECK(supple_large_init(large_memory, ROOM, scene, state, points[0], &config, &large, NULL) == SUPPLE_OK);
-    CHECK(supple_large_step(scene, loads, state, large, 50, NULL) >= 0);
+    CHECK(supple_large_step(scene, loads, state, large, 50, NULL, NULL) >= 0);
     memcpy(state_memory + SUPPLE_STATE_SIZE(NODES), state_memory, SUPPLE_STATE_SIZE(NODES));
     memcpy(large_memory + ROOM, large_memory, needed);
     supple_state *state_copy = (supple_state *)(void *)(state_memory + SUPPLE_STATE_SIZE(NODES));
-    CHECK(supple_large_step(scene, loads, state, large, 200, &report) >= 0 && report.steps == 200);
-    CHECK(supple_large_step(scene, loads, state_copy, (supple_large *)(void *)(large_memory + ROOM), 200, NULL) >= 0);
+    CHECK(supple_large_step(scene, loads, state, large, 200, NULL, &report) >= 0 && report.steps == 200);
+    CHECK(supple_large_step(scene, loads, state_copy, (supple_large *)(void *)(large_memory + ROOM), 200, NULL, NULL) >= 0);
     CHECK(where(state) == where(state_copy));
     CHECK(report.added_mass > 0.0f);
     printf("copies: %s: the same bits after 200 more; %zu bytes, %.1f masses added, error about %.3f mm\n", name, needed,

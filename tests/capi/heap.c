@@ -67,7 +67,7 @@ int main(void) {
     CHECK(supple_restore(state, saved, sizeof saved) == SUPPLE_OK);
     CHECK(supple_state_reset(state) == SUPPLE_OK);
     CHECK(supple_large_init(large_memory, sizeof large_memory, scene, state, points[0], &beyond, &large, NULL) == SUPPLE_OK);
-    CHECK(supple_large_step(scene, loads, state, large, 100, NULL) >= 0);
+    CHECK(supple_large_step(scene, loads, state, large, 100, NULL, NULL) >= 0);
     CHECK(asked == 0);
     printf("heap: a scene, exact, learned and damped steps: never asked\n");
     return 0;

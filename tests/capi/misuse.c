@@ -356,6 +356,7 @@ static void networks(void) {
     const supple_large_config calm = {SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {1, 1, 3}, damper, of_damper};
     supple_large_config wrong = calm;
     supple_large *no_large = NULL;
+    const supple_threads threads = {NULL, 2, NULL};
     size_t needed = 0;
 #define LARGE(expected, change)                                                                                        \
     wrong = calm, (change);                                                                                            \
@@ -372,8 +373,9 @@ static void networks(void) {
     REFUSED(SUPPLE_E_NULL, supple_large_size(scene, points[0], &calm, NULL, &error));
     DONE(supple_large_size(scene, points[0], &calm, &needed, &error));
     DONE(supple_large_init(large_memory, needed, scene, state, points[0], &calm, &large, &error));
-    REFUSED(SUPPLE_E_KIND, supple_large_step(scene, loads, state, (supple_large *)(void *)learned, 1, NULL));
-    REFUSED(SUPPLE_E_MISMATCH, supple_large_step(small_scene, NULL, small_state, large, 1, NULL));
+    REFUSED(SUPPLE_E_KIND, supple_large_step(scene, loads, state, (supple_large *)(void *)learned, 1, NULL, NULL));
+    REFUSED(SUPPLE_E_MISMATCH, supple_large_step(small_scene, NULL, small_state, large, 1, NULL, NULL));
+    REFUSED(SUPPLE_E_NULL, supple_large_step(scene, loads, state, large, 1, &threads, NULL));
 }
 
 /* Steps that are not to be believed are not taken. */

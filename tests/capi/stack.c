@@ -51,7 +51,7 @@ static void init_large(void) {
     CHECK(supple_large_init(large_memory, sizeof large_memory, scene, state, points[0], &beyond, &large, NULL) == SUPPLE_OK);
 }
 /* More than a cycle, in which everything is renewed once. */
-static void step_large(void) { CHECK(supple_large_step(scene, loads, state, large, 200, NULL) >= 0); }
+static void step_large(void) { CHECK(supple_large_step(scene, loads, state, large, 200, NULL, NULL) >= 0); }
 
 static void *run(void *call) {
     (*(void (**)(void))call)();

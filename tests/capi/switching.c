@@ -59,7 +59,7 @@ static void take(supple_state *state, supple_large *large, int phase) {
         move_end(scene, loads, along, 0.0f, -along);
         supple_report report;
         if (large) {
-            CHECK(supple_large_step(scene, loads, state, large, large_steps, &report) == SUPPLE_OK);
+            CHECK(supple_large_step(scene, loads, state, large, large_steps, NULL, &report) == SUPPLE_OK);
             CHECK(report.steps == large_steps);
         } else {
             CHECK(supple_step(scene, loads, state, exact_steps, NULL, &report) == SUPPLE_OK);
@@ -96,9 +96,9 @@ static void in_turn(uint32_t method, size_t of_damper) {
     printf("\n");
     /* Of another scene, which fits the state: nothing is changed. */
     const uint64_t was = hash(state_memory, sizeof state_memory);
-    CHECK(supple_large_step(other_scene, loads, state, large, 1, NULL) == SUPPLE_E_MISMATCH);
+    CHECK(supple_large_step(other_scene, loads, state, large, 1, NULL, NULL) == SUPPLE_E_MISMATCH);
     CHECK(hash(state_memory, sizeof state_memory) == was);
-    CHECK(supple_large_step(scene, loads, state, large, 1, NULL) == SUPPLE_OK);
+    CHECK(supple_large_step(scene, loads, state, large, 1, NULL, NULL) == SUPPLE_OK);
 }
 
 int main(void) {

@@ -3,6 +3,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use supple::inertia::{Cells, Damper, LargeStep, Method};
 use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::{Loads, Motion};
 use supple::mlp::{ForceInput, Network, Range, write};
@@ -128,6 +129,56 @@ fn learned(body: &Body, threads: &impl Threads) -> Vec<u64> {
     let mut all = bits(&state);
     all.extend([report.clipped, report.outside].map(|share| u64::from(share.to_bits())));
     all
+}
+
+/// The mass-scaled, multilevel and damped step.
+const METHODS: [&str; 3] = ["mass-scaled", "multilevel", "damped"];
+
+/// The same after 30 steps of a method of `supple::inertia`, with their report.
+fn large(method: &str, body: &Body, threads: &impl Threads) -> Vec<u64> {
+    let far = body.farthest(2);
+    let mut supports = held(body);
+    supports.push(Support::moved(far));
+    let scene = body.scene(tissue(EXP), &supports);
+    let forces = corner_torsion(body, 0.2, 0.0);
+    let motions = [Motion { node: far, axes: Axes::XYZ, metre: [1e-3, 0.0, 2e-3], ramp: 1e-2 }];
+    let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &forces, &motions).unwrap();
+    let memory = Memory::of(include_bytes!("../../weights/damper.weights"));
+    let method = match method {
+        "mass-scaled" => Method::MassScaled,
+        "multilevel" => Method::Multilevel(Cells::Suggested),
+        _ => {
+            let damper = Damper::new(Network::parse(memory.bytes()).unwrap()).unwrap();
+            Method::Damped(damper, Cells::Suggested)
+        }
+    };
+    let mut state = rest_of(&scene);
+    let step = Step::unchecked(20.0 * DT, 20.0).unwrap();
+    let mut large =
+        LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
+    for _ in 0..30 {
+        taken(large.step_in_parts(scene.view(), &loads, state.view(), threads));
+    }
+    let moved = largest(&support::to_f64(state.displacements()));
+    assert!(moved > 1e-3, "moved by {:.3} mm", 1e3 * moved);
+    let report = large.report();
+    let mut all = bits(&state);
+    all.push(state.energy_balance().kinetic.to_bits());
+    all.extend([report.added_mean, report.error, report.damping].map(|value| u64::from(value.to_bits())));
+    all
+}
+
+#[test]
+fn any_number_of_parts_gives_the_same_bits_of_large_steps() {
+    for (name, body) in [("in order", body()), ("shuffled", shuffled())] {
+        for method in METHODS {
+            let of = |parts| large(method, &body, &Backwards { parts, most: AtomicUsize::new(0) });
+            let one = of(1);
+            for parts in [2, 3, 5, 8] {
+                assert!(of(parts) == one, "{name}: {parts} parts of a {method} step");
+            }
+        }
+    }
 }
 
 #[test]

@@ -1,0 +1,205 @@
+//! The passes over the nodes of a step (`passes.rs`) in parts, one for each thread of the host (`src/step/threads.rs`). Sums are
+//! taken for each partition of the scene (`src/mesh/partition.rs`), which has as many ranks as nodes. They are added in the
+//! order of the partitions, so the bits do not depend on the number of threads.
+
+use core::array::from_fn;
+use core::ops::Range;
+
+use super::cells::{CellPolynomial, CellSlots};
+use super::damper::RoughMotion;
+use super::estimate::DefectTotals;
+use super::lattice::LatticeNode;
+use super::node_tables::NodeTables;
+use super::passes::{
+    LatticeMotion, MotionPass, MotionTables, PassInput, PassTotals, RestrictionExtremes, RestrictionPass,
+    RotationTable, apply_increments,
+};
+use super::report::HeldBack;
+use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
+use crate::simd::NodeVector;
+use crate::step::threads::take;
+use crate::step::{Threads, Totals, move_in_parts};
+
+/// The parts of a step: partitions of the nodes, and who computes them.
+pub(super) struct NodeParts<'a, T> {
+    pub(super) partitions: &'a Partitions,
+    pub(super) threads: &'a T,
+}
+
+/// What a partition adds to its first cell, of residual and momentum, and its extremes.
+#[derive(Clone, Copy)]
+struct Restricted {
+    heads: [CellPolynomial; 2],
+    extremes: RestrictionExtremes<f32>,
+}
+
+impl Restricted {
+    fn none() -> Self {
+        Self { heads: [CellPolynomial::ZERO; 2], extremes: RestrictionExtremes::none() }
+    }
+}
+
+/// The partitions of one thread, their cells from `from` on, and results for each partition.
+struct RestrictionPart<'a> {
+    partitions: Range<usize>,
+    from: usize,
+    residual: &'a mut [CellPolynomial],
+    momentum: &'a mut [CellPolynomial],
+    results: &'a mut [Restricted],
+}
+
+struct MotionPart<'a> {
+    partitions: Range<usize>,
+    inverse_off_diagonal: &'a mut [NodeVector],
+    next_increment: &'a mut [NodeVector],
+    rough: &'a mut [NodeVector],
+    results: &'a mut [PassTotals],
+}
+
+impl<T: Threads> NodeParts<'_, T> {
+    /// Writes the cells' sums of residual and momentum. Not inlined: the lattice's motion does without its stack.
+    #[inline(never)]
+    pub(super) fn restrict(
+        &self,
+        input: PassInput<'_>,
+        force: &[NodeVector],
+        inverse_diagonal: &[NodeVector],
+        residual: &mut [CellPolynomial],
+        momentum: &mut [CellPolynomial],
+    ) -> RestrictionExtremes<f32> {
+        residual.fill(CellPolynomial::ZERO);
+        momentum.fill(CellPolynomial::ZERO);
+        let mut results = [Restricted::none(); MAX_PARTITIONS];
+        let (all, count) = (self.partitions, self.count());
+        let (mut rest, mut cells) = (&mut results[..], (&mut *residual, &mut *momentum));
+        let mut end = 0;
+        let mut parts: [_; MOST_PARTS] = from_fn(|part| {
+            let partitions = all.part(part, count);
+            let mine = cells_of(&all.nodes(&partitions), input.places);
+            // The first cell, whose sum is separate, may be the last one of the part before.
+            let from = (mine.start + 1).max(end);
+            take(&mut cells.0, from - end);
+            take(&mut cells.1, from - end);
+            end = mine.end.max(from);
+            let (residual, momentum) = (take(&mut cells.0, end - from), take(&mut cells.1, end - from));
+            let results = take(&mut rest, partitions.len());
+            RestrictionPart { partitions, from, residual, momentum, results }
+        });
+        self.threads.each(parts.get_mut(..count).unwrap_or_default(), |part| {
+            for (partition, result) in part.partitions.clone().zip(&mut *part.results) {
+                let (ranks, from) = (all.nodes(&(partition..partition + 1)), part.from);
+                let first = cells_of(&ranks, input.places).start;
+                let [residual, momentum] = &mut result.heads;
+                let residual = CellSlots { first, head: residual, from, rest: &mut *part.residual };
+                let momentum = CellSlots { first, head: momentum, from, rest: &mut *part.momentum };
+                result.extremes =
+                    RestrictionPass { input, ranks, force, inverse_diagonal, residual, momentum }
+                        .dispatched();
+            }
+        });
+        let mut extremes = RestrictionExtremes::none();
+        for (partition, result) in all.all().zip(&results) {
+            let first = cells_of(&all.nodes(&(partition..partition + 1)), input.places).start;
+            for (cells, head) in [&mut *residual, &mut *momentum].into_iter().zip(&result.heads) {
+                if let Some(cell) = cells.get_mut(first) {
+                    cell.add_sums(head);
+                }
+            }
+            extremes = extremes.merged_with(result.extremes);
+        }
+        extremes
+    }
+
+    /// Writes the next increments.
+    pub(super) fn move_nodes(
+        &self,
+        input: PassInput<'_>,
+        rotations: &RotationTable,
+        lattice: Option<&LatticeMotion<'_>>,
+        force: &[NodeVector],
+        tables: &mut NodeTables<'_>,
+    ) -> PassTotals {
+        let mut results = [PassTotals::NONE; MAX_PARTITIONS];
+        let NodeTables { inverse_diagonal, inverse_off_diagonal, next_increment, rough, .. } = tables;
+        let (mut off_diagonal, mut next) = (&mut **inverse_off_diagonal, &mut **next_increment);
+        let (mut rough, mut rest) = (&mut **rough, &mut results[..]);
+        let (all, count) = (self.partitions, self.count());
+        let mut parts: [_; MOST_PARTS] = from_fn(|part| {
+            let partitions = all.part(part, count);
+            let nodes = all.nodes(&partitions).len();
+            MotionPart {
+                inverse_off_diagonal: take(&mut off_diagonal, nodes),
+                next_increment: take(&mut next, nodes),
+                rough: take(&mut rough, nodes),
+                results: take(&mut rest, partitions.len()),
+                partitions,
+            }
+        });
+        self.threads.each(parts.get_mut(..count).unwrap_or_default(), |part| {
+            let (mut off_diagonal, mut next) = (&mut *part.inverse_off_diagonal, &mut *part.next_increment);
+            let mut rough = &mut *part.rough;
+            for (partition, result) in part.partitions.clone().zip(&mut *part.results) {
+                let ranks = all.nodes(&(partition..partition + 1));
+                let nodes = ranks.len();
+                let tables = MotionTables {
+                    inverse_diagonal: inverse_diagonal.get(ranks.clone()).unwrap_or_default(),
+                    inverse_off_diagonal: take(&mut off_diagonal, nodes),
+                    next_increment: take(&mut next, nodes),
+                    rough: take(&mut rough, nodes),
+                };
+                *result = MotionPass { input, rotations, lattice, ranks, force, tables }.dispatched();
+            }
+        });
+        PassTotals::of_all(results.get(all.all()).unwrap_or_default())
+    }
+
+    /// Moves the nodes by their next increments.
+    pub(super) fn apply_increments(
+        &self,
+        places: &[LatticeNode],
+        next: &[NodeVector],
+        displacement: &mut [NodeVector],
+        increment: &mut [NodeVector],
+    ) {
+        move_in_parts(
+            self.partitions,
+            displacement,
+            increment,
+            self.threads,
+            |nodes, displacement, increment| {
+                apply_increments(nodes.start, places, next, displacement, increment);
+            },
+        );
+    }
+
+    fn count(&self) -> usize {
+        self.partitions.parts(self.threads.parts())
+    }
+}
+
+/// The cells of the nodes of some ranks.
+fn cells_of(ranks: &Range<usize>, places: &[LatticeNode]) -> Range<usize> {
+    let cell = |rank: usize| places.get(rank).map_or(0, LatticeNode::cell);
+    if ranks.is_empty() { 0..0 } else { cell(ranks.start)..cell(ranks.end - 1) + 1 }
+}
+
+impl PassTotals {
+    const NONE: Self = Self {
+        totals: Totals::NONE,
+        defects: DefectTotals::NONE,
+        rough: RoughMotion::NONE,
+        held_back: HeldBack::NONE,
+    };
+
+    /// The totals of all partitions.
+    fn of_all(partitions: &[Self]) -> Self {
+        let mut all =
+            Self { totals: Totals::of_all(partitions.iter().map(|each| &each.totals)), ..Self::NONE };
+        for each in partitions {
+            all.defects.add(&each.defects);
+            all.rough.merge(&each.rough);
+            all.held_back.merge(&each.held_back);
+        }
+        all
+    }
+}
