@@ -12,7 +12,9 @@ pub(crate) use crate::element::Extremes;
 pub use crate::energy_balance::EnergyBalance;
 pub(crate) use energy_sums::{Addends, Sums, Totals};
 pub use length::{CriticalStep, Step, StepError};
-pub(crate) use parts::{Forcing, external_forces, move_in_parts};
+#[cfg(feature = "lab")]
+pub(crate) use parts::external_forces;
+pub(crate) use parts::{Forcing, move_in_parts};
 pub use status::{Cause, Divergence, Status};
 #[cfg(feature = "parallel")]
 pub use threads::Rayon;
