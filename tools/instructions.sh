@@ -13,16 +13,22 @@ kept=benches/instructions.txt
 program=$(cargo bench -p supple --quiet --no-run --bench instructions --features std --message-format json |
     sed -n 's/.*"executable":"\([^"]*instructions-[^"]*\)".*/\1/p' | tail -1)
 
-# Instructions of a whole run.
+# Instructions of a whole run; valgrind tells what it does not know and ends with the status of the program.
 count() {
-    valgrind --tool=callgrind --callgrind-out-file=/dev/null "$program" "$1" "$2" 2>&1 |
-        sed -n 's/.*Collected : \([0-9]*\).*/\1/p'
+    local told
+    if ! told=$(valgrind --tool=callgrind --callgrind-out-file=/dev/null "$program" "$1" "$2" 2>&1); then
+        echo "$told" >&2
+        return 1
+    fi
+    sed -n 's/.*Collected : \([0-9]*\).*/\1/p' <<<"$told"
 }
 
 counted=$(mktemp)
 trap 'rm -f "$counted"' EXIT
 for loop in $("$program"); do
-    echo "$loop $(($(count "$loop" 1) - $(count "$loop" 0)))" | tee -a "$counted"
+    none=$(count "$loop" 0)
+    some=$(count "$loop" 1)
+    echo "$loop $((some - none))" | tee -a "$counted"
 done
 if [ "${1:-}" = --keep ]; then
     cp "$counted" "$kept"
