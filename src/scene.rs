@@ -8,7 +8,10 @@
 use core::fmt;
 use core::ops::Deref;
 
-use crate::element::{ElementFields, ElementMaterial, ElementTile, Elements, NodeInertia, element_fields};
+use crate::element::{
+    ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, element_fields,
+    volume_energy_difference,
+};
 use crate::material::{Law, Material, releasable_energy};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
 use crate::mesh::strips::Numbered;
@@ -64,6 +67,13 @@ pub enum BuildError {
         /// Room.
         capacity: usize,
     },
+    /// More elements than a scene can number.
+    ElementCount {
+        /// Elements of the mesh.
+        elements: usize,
+        /// Most of them.
+        most: usize,
+    },
     /// A support names a node that is not there.
     SupportNode {
         /// Position in the list of supports.
@@ -115,6 +125,9 @@ impl fmt::Display for BuildError {
                 f,
                 "the mesh needs {needed} tiles of {TILE} elements, the scene has room for {capacity}"
             ),
+            Self::ElementCount { elements, most } => {
+                write!(f, "the mesh has {elements} elements, a scene can have {most}")
+            }
             Self::SupportNode { support, node, nodes } => {
                 write!(f, "support {support}: node {node} does not exist, the mesh has {nodes} nodes")
             }
@@ -173,8 +186,8 @@ impl SceneFacts {
 
     /// Builds a scene in memory of the caller, `nodes` and `tiles` ([`tiles_for`]), from a mesh, what it is made of, and its supports;
     /// a node may be listed more than once. Allocates nothing.
-    pub fn build(
-        material: &impl Material,
+    pub fn build<M: Material>(
+        material: &M,
         mesh: &Mesh<'_>,
         supports: impl Iterator<Item = Support>,
         nodes: &mut [NodeInertia],
@@ -185,10 +198,16 @@ impl SceneFacts {
         let Some(nodes) = nodes.get_mut(..needed) else {
             return Err(BuildError::NodeCapacity { needed, capacity });
         };
+        if mesh.element_count() > MOST_ELEMENTS {
+            return Err(BuildError::ElementCount { elements: mesh.element_count(), most: MOST_ELEMENTS });
+        }
         nodes.fill(NodeInertia::EMPTY);
         mark_supports(nodes, supports)?;
+        if M::NODAL_PRESSURE {
+            mark_neighbours(nodes, mesh);
+        }
         let still = |tet: [u32; 4]| {
-            tet.iter().all(|&node| nodes.get(node as usize).is_some_and(NodeInertia::is_marked_fixed))
+            tet.iter().all(|&node| nodes.get(node as usize).is_some_and(NodeInertia::is_left_out))
         };
         let elements = mesh.tets().enumerate().filter(|&(_, nodes)| !still(nodes));
         let elements = elements.map(|(element, nodes)| Numbered { element, nodes });
@@ -210,6 +229,9 @@ impl SceneFacts {
                     element_count += 1;
                 }
             });
+        }
+        if M::NODAL_PRESSURE && material.laws().differ() {
+            find_slots(material, mesh, nodes, tiles);
         }
         let (mass, releasable_energy) = lump_masses(material, mesh, nodes)?;
         let checksum = checksum(nodes, tiles);
@@ -265,6 +287,48 @@ fn mark_supports(
     Ok(())
 }
 
+/// Marks the nodes of all elements that can move. With nodal pressure an element between fixed nodes is left out only if it has none of
+/// these: it counts in the volume around them.
+fn mark_neighbours(nodes: &mut [NodeInertia], mesh: &Mesh<'_>) {
+    for tet in mesh.tets() {
+        let fixed = |&node: &u32| nodes.get(node as usize).is_some_and(NodeInertia::is_marked_fixed);
+        if tet.iter().all(fixed) {
+            continue;
+        }
+        for node in tet {
+            if let Some(inertia) = nodes.get_mut(node as usize) {
+                inertia.mark_neighbour();
+            }
+        }
+    }
+}
+
+/// Finds for each corner of each element which of the tissues at that node it is of ([`ElementTile::slot`]).
+fn find_slots(
+    material: &impl Material,
+    mesh: &Mesh<'_>,
+    nodes: &mut [NodeInertia],
+    tiles: &mut [ElementTile],
+) {
+    nodes.iter_mut().for_each(NodeInertia::clear_regions);
+    for (element, tet) in mesh.tets().enumerate() {
+        for node in tet {
+            if let Some(inertia) = nodes.get_mut(node as usize) {
+                inertia.add_region(material.region(element));
+            }
+        }
+    }
+    for tile in tiles {
+        for lane in 0..TILE {
+            let region = material.region(tile.element(lane));
+            let slots = [0, 1, 2, 3].map(|corner| {
+                nodes.get(tile.node(corner, lane)).map_or(0, |inertia| inertia.slot_of_region(region))
+            });
+            tile.set_slots(lane, slots);
+        }
+    }
+}
+
 /// Adds a quarter of each element's mass to each of its nodes, whose supports have been marked. Gives the mass (kg) and the energy
 /// that the material can release from rest (J).
 fn lump_masses(
@@ -273,6 +337,7 @@ fn lump_masses(
     nodes: &mut [NodeInertia],
 ) -> Result<(f64, f64), BuildError> {
     let (mut mass, mut releasable) = (0.0, 0.0);
+    nodes.iter_mut().for_each(NodeInertia::clear_mass);
     for (element, tet) in mesh.tets().enumerate() {
         let Some(tissue) = material.tissue(element) else {
             return Err(BuildError::NoTissue { element });
@@ -385,11 +450,17 @@ impl<'a, M: Material> SceneView<'a, M> {
             .map(move |(tile, lane)| element_fields(&laws.of(tile.element(lane)), tile, lane, displacement))
     }
 
-    /// Strain energy under the given displacements (m), J.
-    pub(crate) fn strain_energy(self, displacement: &[NodeVector]) -> f64 {
+    /// Strain energy under the given displacements (m), J, with the nodes' volumes where the material needs them.
+    pub(crate) fn strain_energy(self, displacement: &[NodeVector], volumes: &[NodeVector]) -> f64 {
         let laws = self.material.laws();
         let energies = self.places().map(|(tile, lane)| {
-            element_fields(&laws.of(tile.element(lane)), tile, lane, displacement).energy
+            let law = laws.of(tile.element(lane));
+            let fields = element_fields(&law, tile, lane, displacement);
+            if M::NODAL_PRESSURE {
+                fields.energy + volume_energy_difference(&law, tile, lane, fields.volume_ratio, volumes)
+            } else {
+                fields.energy
+            }
         });
         energies.sum()
     }

@@ -9,6 +9,7 @@ use core::ops::Deref;
 
 use crate::element::Extremes;
 use crate::energy_balance::EnergyBalance;
+use crate::material::Material;
 pub use crate::simd::NodeVector;
 
 /// How far a simulation has come, apart from its vectors.
@@ -79,6 +80,8 @@ pub struct StateView<'a> {
     pub(crate) displacement: &'a mut [NodeVector],
     pub(crate) increment: &'a mut [NodeVector],
     pub(crate) force: &'a mut [NodeVector],
+    /// Of scenes with nodal pressure ([`crate::element`]), empty for others.
+    pub(crate) volume: &'a mut [NodeVector],
     pub(crate) progress: &'a mut Progress,
 }
 
@@ -91,14 +94,16 @@ impl Deref for StateView<'_> {
 }
 
 impl<'a> StateView<'a> {
-    /// A state over the given vectors as they are: zeros mean at rest.
+    /// A state over the given vectors as they are: zeros mean at rest. `volume` is as long as the others for scenes with
+    /// [`NodalPressure`](crate::material::NodalPressure), and may be empty for others.
     pub const fn new(
         displacement: &'a mut [NodeVector],
         increment: &'a mut [NodeVector],
         force: &'a mut [NodeVector],
+        volume: &'a mut [NodeVector],
         progress: &'a mut Progress,
     ) -> Self {
-        Self { displacement, increment, force, progress }
+        Self { displacement, increment, force, volume, progress }
     }
 
     /// The same state for a shorter time.
@@ -107,6 +112,7 @@ impl<'a> StateView<'a> {
             displacement: self.displacement,
             increment: self.increment,
             force: self.force,
+            volume: self.volume,
             progress: self.progress,
         }
     }
@@ -121,6 +127,12 @@ impl<'a> StateView<'a> {
     #[must_use]
     pub fn capacity(&self) -> usize {
         self.displacement.len().min(self.increment.len()).min(self.force.len())
+    }
+
+    /// How many nodes of a scene of this material the vectors hold.
+    pub(crate) fn capacity_for<M: Material>(&self) -> usize {
+        let volumes = if M::NODAL_PRESSURE { self.volume.len() } else { usize::MAX };
+        self.capacity().min(volumes)
     }
 
     /// Makes the last increment span `seconds`: `before` are the displacements of that long ago. A step of that length
@@ -170,10 +182,10 @@ impl AsState for StateView<'_> {
 
 /// Memory for the vectors of a state.
 pub trait StateVectors {
-    /// Displacements, increments, forces.
-    fn vectors(&self) -> [&[NodeVector]; 3];
+    /// Displacements, increments, forces; volumes of the nodes, or nothing.
+    fn vectors(&self) -> [&[NodeVector]; 4];
     /// The same, to be changed.
-    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 3];
+    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 4];
 }
 
 /// A state that owns its vectors.
@@ -194,8 +206,8 @@ impl<S> Deref for State<S> {
 impl<S: StateVectors> State<S> {
     /// The state.
     pub fn view(&mut self) -> StateView<'_> {
-        let [displacement, increment, force] = self.vectors.vectors_mut();
-        StateView { displacement, increment, force, progress: &mut self.progress }
+        let [displacement, increment, force, volume] = self.vectors.vectors_mut();
+        StateView { displacement, increment, force, volume, progress: &mut self.progress }
     }
 
     /// Displacement of each node, m.
@@ -223,7 +235,8 @@ impl<S: StateVectors> State<S> {
     /// How many nodes there is room for.
     #[must_use]
     pub fn capacity(&self) -> usize {
-        self.vectors.vectors().into_iter().map(<[_]>::len).min().unwrap_or(0)
+        let [displacement, increment, force, _] = self.vectors.vectors();
+        displacement.len().min(increment.len()).min(force.len())
     }
 
     /// Back to rest at time zero.
@@ -238,32 +251,39 @@ impl<S: StateVectors> AsState for State<S> {
     }
 }
 
-/// Vectors of `N` nodes.
+/// Vectors of `N` nodes, volumes of `P`.
 #[derive(Clone, Debug)]
-pub struct FixedVectors<const N: usize>([[NodeVector; N]; 3]);
+pub struct FixedVectors<const N: usize, const P: usize> {
+    vectors: [[NodeVector; N]; 3],
+    volumes: [NodeVector; P],
+}
 
-impl<const N: usize> StateVectors for FixedVectors<N> {
-    fn vectors(&self) -> [&[NodeVector]; 3] {
-        self.0.each_ref().map(<[_; N]>::as_slice)
+impl<const N: usize, const P: usize> StateVectors for FixedVectors<N, P> {
+    fn vectors(&self) -> [&[NodeVector]; 4] {
+        let [displacement, increment, force] = &self.vectors;
+        [displacement, increment, force, &self.volumes]
     }
 
-    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 3] {
-        self.0.each_mut().map(<[_; N]>::as_mut_slice)
+    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 4] {
+        let [displacement, increment, force] = &mut self.vectors;
+        [displacement, increment, force, &mut self.volumes]
     }
 }
 
-/// A state with room for `N` nodes, which may be a `static`.
-pub type FixedState<const N: usize> = State<FixedVectors<N>>;
+/// A state with room for `N` nodes, which may be a `static`; of scenes with [`NodalPressure`](crate::material::NodalPressure) if `P`
+/// is `N`, of others if it is zero.
+pub type FixedState<const N: usize, const P: usize = 0> = State<FixedVectors<N, P>>;
 
-impl<const N: usize> FixedState<N> {
+impl<const N: usize, const P: usize> FixedState<N, P> {
     /// At rest.
     #[must_use]
     pub const fn new() -> Self {
-        Self { vectors: FixedVectors([[NodeVector::ZERO; N]; 3]), progress: Progress::START }
+        let (vectors, volumes) = ([[NodeVector::ZERO; N]; 3], [NodeVector::ZERO; P]);
+        Self { vectors: FixedVectors { vectors, volumes }, progress: Progress::START }
     }
 }
 
-impl<const N: usize> Default for FixedState<N> {
+impl<const N: usize, const P: usize> Default for FixedState<N, P> {
     fn default() -> Self {
         Self::new()
     }
@@ -272,15 +292,15 @@ impl<const N: usize> Default for FixedState<N> {
 /// Vectors of as many nodes as there are.
 #[cfg(any(feature = "std", test))]
 #[derive(Clone, Debug)]
-pub struct VecVectors([std::vec::Vec<NodeVector>; 3]);
+pub struct VecVectors([std::vec::Vec<NodeVector>; 4]);
 
 #[cfg(any(feature = "std", test))]
 impl StateVectors for VecVectors {
-    fn vectors(&self) -> [&[NodeVector]; 3] {
+    fn vectors(&self) -> [&[NodeVector]; 4] {
         self.0.each_ref().map(std::vec::Vec::as_slice)
     }
 
-    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 3] {
+    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 4] {
         self.0.each_mut().map(std::vec::Vec::as_mut_slice)
     }
 }
@@ -291,10 +311,10 @@ pub type VecState = State<VecVectors>;
 
 #[cfg(any(feature = "std", test))]
 impl VecState {
-    /// At rest, with room for `nodes` nodes.
+    /// At rest, with room for `nodes` nodes of any scene.
     #[must_use]
     pub fn at_rest(nodes: usize) -> Self {
         let zero = || std::vec![NodeVector::ZERO; nodes];
-        Self { vectors: VecVectors([zero(), zero(), zero()]), progress: Progress::START }
+        Self { vectors: VecVectors([zero(), zero(), zero(), zero()]), progress: Progress::START }
     }
 }

@@ -141,6 +141,10 @@ impl<L: Law> Material for Body<'_, L> {
             None => Laws::Regions { tissues, of_element, beyond: L::default() },
         }
     }
+
+    fn region(&self, element: usize) -> u16 {
+        self.of_element.get(element).copied().unwrap_or_default()
+    }
 }
 
 /// A scene of one law in the memory of its object.

@@ -192,7 +192,7 @@ impl supple_state {
 unsafe fn view<'a>(mut arrays: Arrays, nodes: u32, progress: &'a mut Progress) -> StateView<'a> {
     // SAFETY: the caller's promise. Any bits are vectors.
     let [displacements, increments, forces] = [(); 3].map(|()| unsafe { arrays.change(nodes as usize) });
-    StateView::new(displacements, increments, forces, progress)
+    StateView::new(displacements, increments, forces, &mut [], progress)
 }
 
 /// The state in an object, whose other fields may be used meanwhile.

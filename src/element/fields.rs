@@ -62,3 +62,22 @@ pub(crate) fn element_fields<L: Law>(
     let von_mises = if volume_ratio > 0.0 { p1 / volume_ratio * libm::sqrt(1.5 * square) } else { f64::NAN };
     ElementFields { element: tile.element(lane), volume_ratio, von_mises, energy }
 }
+
+/// What the energy (J) of an element changes by when its energy of volume is that of its nodes ([`super::pressure`]).
+pub(crate) fn volume_energy_difference<L: Law>(
+    law: &L,
+    tile: &ElementTile,
+    lane: usize,
+    volume_ratio: f64,
+    volumes: &[NodeVector],
+) -> f64 {
+    let own = law.energy(0.0, volume_ratio - 1.0);
+    let corners = (0..4).map(|corner| {
+        let row = volumes.get(tile.node(corner, lane)).copied().unwrap_or_default().0;
+        match tile.slot(corner, lane) {
+            slot @ (0 | 1) => law.energy(0.0, f64::from(row[usize::from(slot)])) - own,
+            _ => 0.0,
+        }
+    });
+    0.25 * f64::from(tile.volume::<f32>(lane)) * corners.sum::<f64>()
+}

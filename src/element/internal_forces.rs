@@ -14,6 +14,7 @@ use crate::simd::{
 
 use super::ElementTile;
 use super::deformation::{Deformation, Matrix};
+use super::pressure::{OwnPressure, Pressure};
 
 /// The elements of a scene with their laws.
 #[derive(Clone, Copy)]
@@ -92,8 +93,9 @@ impl ElementVisitor for NoVisitor {
 }
 
 /// The kernel that adds internal forces to the nodes of some partitions, in the order of the elements.
-pub struct InternalForces<'a, L, V> {
+pub struct InternalForces<'a, L, V, P = OwnPressure> {
     elements: Elements<'a, L>,
+    pressure: P,
     /// Forces of the nodes in these partitions are computed.
     partitions: Range<usize>,
     displacement: Gather<'a>,
@@ -101,56 +103,48 @@ pub struct InternalForces<'a, L, V> {
     visitor: V,
 }
 
-impl<'a, L: Law, V> InternalForces<'a, L, V> {
-    /// Forces of all nodes.
-    pub(crate) fn of_all(
-        elements: Elements<'a, L>,
-        displacement: &'a [NodeVector],
-        force: &'a mut [NodeVector],
-        visitor: V,
-    ) -> Self {
-        Self::of_partitions(elements, elements.partitions.all(), displacement, force, visitor)
-    }
-
+impl<'a, L: Law, V, P> InternalForces<'a, L, V, P> {
     /// Forces of the nodes in `partitions`; `force` has one vector for each of these.
     pub(crate) fn of_partitions(
         elements: Elements<'a, L>,
+        pressure: P,
         partitions: Range<usize>,
         displacement: &'a [NodeVector],
         force: &'a mut [NodeVector],
         visitor: V,
     ) -> Self {
         let force = Scatter::from(elements.partitions.nodes(&partitions).start, force);
-        Self { elements, partitions, displacement: Gather::new(displacement), force, visitor }
+        Self { elements, pressure, partitions, displacement: Gather::new(displacement), force, visitor }
     }
 }
 
-impl<L: Law, V: ElementVisitor> Kernel for InternalForces<'_, L, V> {
+impl<L: Law, V: ElementVisitor, P: Pressure> Kernel for InternalForces<'_, L, V, P> {
     type Output = Extremes<f32>;
 
     const SCALAR: bool = true;
 
     #[inline(always)]
     fn run<R: Real>(self) -> Extremes<f32> {
-        in_batches::<R, L, BATCH>(self)
+        in_batches::<R, L, P, BATCH>(self)
     }
 
     #[inline(always)]
     fn run_scalar(self) -> Extremes<f32> {
-        in_batches::<f32, L, SCALAR_BATCH>(self)
+        in_batches::<f32, L, P, SCALAR_BATCH>(self)
     }
 }
 
 #[inline(always)]
-fn in_batches<R: Real, L: Law, const SIZE: usize>(
-    kernel: InternalForces<'_, L, impl ElementVisitor>,
+fn in_batches<R: Real, L: Law, P: Pressure, const SIZE: usize>(
+    kernel: InternalForces<'_, L, impl ElementVisitor, P>,
 ) -> Extremes<f32> {
-    let InternalForces { elements, partitions, displacement, mut force, mut visitor } = kernel;
+    let InternalForces { elements, pressure, partitions, displacement, mut force, mut visitor } = kernel;
     let Elements { laws, tiles, partitions: all } = elements;
     let mut extremes = Extremes::<Pair<R>>::none();
     for (touching, length) in all.touching(partitions) {
         let tiles = (tiles.get(touching).unwrap_or_default(), length);
-        add_forces::<R, L, SIZE>(&laws, tiles, displacement, &mut force, &mut visitor, &mut extremes);
+        let input = (displacement, pressure);
+        add_forces::<R, L, P, SIZE>(&laws, tiles, input, &mut force, &mut visitor, &mut extremes);
     }
     Extremes::none().merged_with(&extremes)
 }
@@ -158,12 +152,14 @@ fn in_batches<R: Real, L: Law, const SIZE: usize>(
 /// A vector of elements, those of a tile from place `first` on, with what the passes of [`add_forces`] compute for
 /// them.
 #[derive(Clone, Copy)]
-struct ElementVector<'a, R> {
-    tile: &'a ElementTile,
-    first: usize,
+pub(super) struct ElementVector<'a, R, V> {
+    pub(super) tile: &'a ElementTile,
+    pub(super) first: usize,
     /// Displacement gradient.
     h: Matrix<R>,
-    invariants: Invariants<R>,
+    pub(super) invariants: Invariants<R>,
+    /// What the pressure follows from.
+    volume_response: V,
     /// Scalars of the stress, Pa.
     p1: R,
     s: R,
@@ -171,20 +167,21 @@ struct ElementVector<'a, R> {
     fourth: R,
 }
 
-impl<'a, R: Real> ElementVector<'a, R> {
+impl<'a, R: Real, V> ElementVector<'a, R, V> {
     #[inline(always)]
-    fn zero(tile: &'a ElementTile) -> Self {
+    pub(super) fn zero(tile: &'a ElementTile, volume_response: V) -> Self {
         let zero = R::splat(0.0);
         let invariants = Invariants { i: zero, j: zero };
-        Self { tile, first: 0, h: [[zero; 3]; 3], invariants, p1: zero, s: zero, fourth: zero }
+        let h = [[zero; 3]; 3];
+        Self { tile, first: 0, h, invariants, volume_response, p1: zero, s: zero, fourth: zero }
     }
 }
 
 /// Vectors of elements in a batch. A batch of scalar code has the elements of as many strips as the scatter buffer
 /// holds.
-const BATCH: usize = 8;
+pub(super) const BATCH: usize = 8;
 #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
-const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
+pub(super) const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
 
 /// Adds the internal forces of elements to `force`, with minus sign. Every `length` consecutive tiles hold strips of
 /// that length ([`crate::mesh::strips`]), one element of each strip in every tile.
@@ -192,40 +189,48 @@ const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
 /// A batch of a few vectors of elements goes through three passes: deformation, law, scatter. The law is a long
 /// sequence of dependent operations; in a pass of its own two vectors can be interleaved ([`Pair`]).
 #[inline(always)]
-pub(crate) fn add_forces<R: Real, L: Law, const SIZE: usize>(
+pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
     laws: &Laws<'_, L>,
     (tiles, length): (&[ElementTile], usize),
-    displacement: Gather<'_>,
+    input: (Gather<'_>, P),
     force: &mut Scatter<'_>,
     visitor: &mut impl ElementVisitor,
     extremes: &mut Extremes<Pair<R>>,
 ) {
     let Some(first) = tiles.first() else { return };
-    let mut batch = [ElementVector::<R>::zero(first); SIZE];
-    let strip_count = tiles.len().checked_div(length).unwrap_or(0) * (TILE / R::COUNT);
-    let most = if R::COUNT == 1 { SCATTER_WIDTH } else { SIZE.checked_div(length).unwrap_or(SIZE).max(1) };
-    for start in (0..strip_count).step_by(most) {
-        let strips = start..strip_count.min(start + most);
+    let mut batch = [ElementVector::<R, P::Response<R>>::zero(first, P::none()); SIZE];
+    for strips in batches::<R, SIZE>(tiles, length) {
         let count = length * strips.len();
         match length {
-            3 => deform::<R, 3, 6>(tiles, strips, displacement, &mut batch),
-            2 => deform::<R, 2, 5>(tiles, strips, displacement, &mut batch),
-            _ => deform::<R, 1, 4>(tiles, strips, displacement, &mut batch),
+            3 => deform::<R, L, P, 3, 6>(laws, tiles, strips, input, &mut batch),
+            2 => deform::<R, L, P, 2, 5>(laws, tiles, strips, input, &mut batch),
+            _ => deform::<R, L, P, 1, 4>(laws, tiles, strips, input, &mut batch),
         }
         // If the count is odd, the second vector of the last pair is an old one; its result is not used.
         for (index, pair) in batch.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
-            let locals = respond::<R, L>(laws, pair, extremes);
+            let locals = respond::<R, L, P>(laws, pair, extremes);
             for (elements, local) in pair.iter_mut().zip(&locals).take(count - 2 * index) {
-                visit::<R, L>(laws, elements, local, visitor);
+                visit::<R, L, P>(laws, elements, local, visitor);
             }
         }
         let batch = batch.get(..count).unwrap_or_default();
         match length {
-            3 => scatter::<R, 3, 6>(batch, force),
-            2 => scatter::<R, 2, 5>(batch, force),
-            _ => scatter::<R, 1, 4>(batch, force),
+            3 => scatter::<R, _, NodalForces, 3, 6>(batch, force),
+            2 => scatter::<R, _, NodalForces, 2, 5>(batch, force),
+            _ => scatter::<R, _, NodalForces, 1, 4>(batch, force),
         }
     }
+}
+
+/// Strips of the batches: a batch has at most `SIZE` vectors of elements.
+#[inline(always)]
+pub(super) fn batches<R: Real, const SIZE: usize>(
+    tiles: &[ElementTile],
+    length: usize,
+) -> impl Iterator<Item = Range<usize>> + use<R, SIZE> {
+    let strip_count = tiles.len().checked_div(length).unwrap_or(0) * (TILE / R::COUNT);
+    let most = if R::COUNT == 1 { SCATTER_WIDTH } else { SIZE.checked_div(length).unwrap_or(SIZE).max(1) };
+    (0..strip_count).step_by(most).map(move |start| start..strip_count.min(start + most))
 }
 
 /// The nodes of strips of `K` elements: four of the first element, and the first of each other element.
@@ -241,11 +246,12 @@ fn nodes_of<const K: usize, const N: usize>(tiles: [&ElementTile; K]) -> [&[u32;
 /// The first pass: deformation of the elements of some strips of `K` elements with `N` nodes. Elements of tiles with
 /// nodes out of range do not deform.
 #[inline(always)]
-fn deform<'a, R: Real, const K: usize, const N: usize>(
+pub(super) fn deform<'a, R: Real, L: Law, P: Pressure, const K: usize, const N: usize>(
+    laws: &Laws<'_, L>,
     tiles: &'a [ElementTile],
     strips: Range<usize>,
-    displacement: Gather<'_>,
-    batch: &mut [ElementVector<'a, R>],
+    (displacement, pressure): (Gather<'_>, P),
+    batch: &mut [ElementVector<'a, R, P::Response<R>>],
 ) {
     let (tiles, vectors) = (tiles.as_chunks::<K>().0, TILE / R::COUNT);
     for (strip, elements) in strips.zip(batch.as_chunks_mut::<K>().0) {
@@ -254,8 +260,10 @@ fn deform<'a, R: Real, const K: usize, const N: usize>(
         let nodes = TileNodes::in_range::<R>(nodes_of(tiles.each_ref()), 0, displacement.count());
         let nodes = nodes.unwrap_or(TileNodes::<N>::ALL_ZERO);
         let mut displacements = [[R::splat(0.0); 3]; N];
+        let mut volumes = [P::no_volumes::<R>(); N];
         unrolled!(node < N => {
             displacements[node] = displacement.read_nodes::<R, N>(&nodes, node, first);
+            volumes[node] = pressure.read::<R, N>(&nodes, node, first);
         });
         unrolled!(element < K => {
             let [a, b, c, d] = CORNERS[element % LONGEST];
@@ -265,15 +273,18 @@ fn deform<'a, R: Real, const K: usize, const N: usize>(
             let vector = &mut elements[element];
             (vector.tile, vector.first) = (&tiles[element], first);
             (vector.h, vector.invariants) = (deformation.h, deformation.invariants);
+            let volumes = [volumes[a % N], volumes[b % N], volumes[c % N], volumes[d % N]];
+            vector.volume_response =
+                P::response::<R, L>(laws, &tiles[element], first, volumes, deformation.invariants.j);
         });
     }
 }
 
 /// The second pass: the stress of the law.
 #[inline(always)]
-fn respond<R: Real, L: Law>(
+fn respond<R: Real, L: Law, P: Pressure>(
     laws: &Laws<'_, L>,
-    pair: &mut [ElementVector<'_, R>; 2],
+    pair: &mut [ElementVector<'_, R, P::Response<R>>; 2],
     extremes: &mut Extremes<Pair<R>>,
 ) -> [LawState<R>; 2] {
     let law = laws.widen::<Pair<R>>(|lane| {
@@ -285,7 +296,7 @@ fn respond<R: Real, L: Law>(
         i: Pair(first.invariants.i, second.invariants.i),
         j: Pair(first.invariants.j, second.invariants.j),
     };
-    let local = LawState::new::<L>(&law, invariants);
+    let local = P::state::<R, L>(&law, invariants, [first.volume_response, second.volume_response]);
     let response = local.response::<L>(&law);
     (first.p1, first.s) = (response.p1.0, response.s.0);
     (second.p1, second.s) = (response.p1.1, response.s.1);
@@ -296,9 +307,9 @@ fn respond<R: Real, L: Law>(
 
 /// Calls the visitor.
 #[inline(always)]
-fn visit<R: Real, L: Law>(
+fn visit<R: Real, L: Law, P: Pressure>(
     laws: &Laws<'_, L>,
-    elements: &mut ElementVector<'_, R>,
+    elements: &mut ElementVector<'_, R, P::Response<R>>,
     local: &LawState<R>,
     visitor: &mut impl ElementVisitor,
 ) {
@@ -307,41 +318,55 @@ fn visit<R: Real, L: Law>(
     elements.fourth = visitor.visit::<R, L>(&law, elements.tile, elements.first, &deformation, local);
 }
 
-/// Nodal forces from the stress, with the fourth component of the visitor.
-#[inline(always)]
-fn nodal_forces<R: Real>(elements: &ElementVector<'_, R>) -> [[R; 4]; 4] {
-    let ElementVector { tile, first, .. } = *elements;
-    let deformation = Deformation::with(elements.h, elements.invariants);
-    let stress = deformation.stress(elements.p1, elements.s);
-    let minus_volume = -tile.volume::<R>(first);
-    let mut forces = [[R::splat(0.0); 3]; 4];
-    for axis in 0..3 {
-        let [x, y, z] = stress[axis];
-        let row = [x * minus_volume, y * minus_volume, z * minus_volume];
-        for corner in 0..3 {
-            forces[corner + 1][axis] = dot(row, tile.gradients::<R>(corner, first));
-        }
-        forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
-    }
-    let ([a, b, c, d], fourth) = (forces, elements.fourth);
-    [
-        [a[0], a[1], a[2], fourth],
-        [b[0], b[1], b[2], fourth],
-        [c[0], c[1], c[2], fourth],
-        [d[0], d[1], d[2], fourth],
-    ]
+/// What elements add to the vectors of their nodes.
+pub(super) trait Corners<R, V> {
+    /// One row a corner.
+    fn rows(elements: &ElementVector<'_, R, V>) -> [[R; 4]; 4];
 }
 
-/// The third pass: adds the forces to the nodes of strips of `K` elements with `N` nodes.
+/// Nodal forces from the stress, with the fourth component of the visitor.
+struct NodalForces;
+
+impl<R: Real, V> Corners<R, V> for NodalForces {
+    #[inline(always)]
+    fn rows(elements: &ElementVector<'_, R, V>) -> [[R; 4]; 4] {
+        let ElementVector { tile, first, p1, s, fourth, .. } = elements;
+        let first = *first;
+        let deformation = Deformation::with(elements.h, elements.invariants);
+        let stress = deformation.stress(*p1, *s);
+        let minus_volume = -tile.volume::<R>(first);
+        let mut forces = [[R::splat(0.0); 3]; 4];
+        for axis in 0..3 {
+            let [x, y, z] = stress[axis];
+            let row = [x * minus_volume, y * minus_volume, z * minus_volume];
+            for corner in 0..3 {
+                forces[corner + 1][axis] = dot(row, tile.gradients::<R>(corner, first));
+            }
+            forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
+        }
+        let ([a, b, c, d], fourth) = (forces, *fourth);
+        [
+            [a[0], a[1], a[2], fourth],
+            [b[0], b[1], b[2], fourth],
+            [c[0], c[1], c[2], fourth],
+            [d[0], d[1], d[2], fourth],
+        ]
+    }
+}
+
+/// The third pass: adds the rows to the nodes of strips of `K` elements with `N` nodes.
 #[inline(always)]
-fn scatter<R: Real, const K: usize, const N: usize>(batch: &[ElementVector<'_, R>], force: &mut Scatter<'_>) {
+pub(super) fn scatter<R: Real, V, C: Corners<R, V>, const K: usize, const N: usize>(
+    batch: &[ElementVector<'_, R, V>],
+    force: &mut Scatter<'_>,
+) {
     let mut buffer = ScatterBuffer::NONE;
     for strip in batch.as_chunks::<K>().0 {
         let mut rows = [[R::splat(0.0); 4]; N];
         let mut tiles = [strip[0].tile; K];
         unrolled!(element < K => {
             tiles[element] = strip[element].tile;
-            let forces = nodal_forces(&strip[element]);
+            let forces = C::rows(&strip[element]);
             for corner in 0..4 {
                 let row = &mut rows[CORNERS[element % LONGEST][corner] % N];
                 for axis in 0..4 {

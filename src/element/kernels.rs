@@ -6,7 +6,9 @@ use crate::material::{AnyLaw, Exponential, Literal, NeoHookean};
 use crate::material::{Law, for_each_law};
 use crate::simd::dispatch;
 
-use super::{CriticalBounds, Extremes, InternalForces, NoVisitor, ScalarBound, TileBounds, TileTangents};
+use super::{
+    CriticalBounds, Extremes, InternalForces, MeanPressure, NoVisitor, ScalarBound, TileBounds, TileTangents,
+};
 
 /// A law with its kernels.
 pub trait ElementLaw: Law {
@@ -16,6 +18,14 @@ pub trait ElementLaw: Law {
     /// The same with the scalar stiffness bound of each element.
     #[doc(hidden)]
     fn forces_and_bounds(kernel: InternalForces<'_, Self, ScalarBound>) -> Extremes<f32>;
+    /// Internal forces with nodal pressure.
+    #[doc(hidden)]
+    fn nodal_pressure_forces(kernel: InternalForces<'_, Self, NoVisitor, MeanPressure<'_>>) -> Extremes<f32>;
+    /// The same with the scalar stiffness bound of each element.
+    #[doc(hidden)]
+    fn nodal_pressure_forces_and_bounds(
+        kernel: InternalForces<'_, Self, ScalarBound, MeanPressure<'_>>,
+    ) -> Extremes<f32>;
     /// Bounds for the critical step.
     #[doc(hidden)]
     fn critical_bounds(kernel: CriticalBounds<'_, '_, Self>);
@@ -27,17 +37,26 @@ pub trait ElementLaw: Law {
 /// A visitor with which the internal forces of every law are compiled.
 pub(crate) trait ForcesVisitor<L: ElementLaw>: Copy + Sync {
     fn forces(kernel: InternalForces<'_, L, Self>) -> Extremes<f32>;
+    fn nodal_pressure_forces(kernel: InternalForces<'_, L, Self, MeanPressure<'_>>) -> Extremes<f32>;
 }
 
 impl<L: ElementLaw> ForcesVisitor<L> for NoVisitor {
     fn forces(kernel: InternalForces<'_, L, Self>) -> Extremes<f32> {
         L::forces(kernel)
     }
+
+    fn nodal_pressure_forces(kernel: InternalForces<'_, L, Self, MeanPressure<'_>>) -> Extremes<f32> {
+        L::nodal_pressure_forces(kernel)
+    }
 }
 
 impl<L: ElementLaw> ForcesVisitor<L> for ScalarBound {
     fn forces(kernel: InternalForces<'_, L, Self>) -> Extremes<f32> {
         L::forces_and_bounds(kernel)
+    }
+
+    fn nodal_pressure_forces(kernel: InternalForces<'_, L, Self, MeanPressure<'_>>) -> Extremes<f32> {
+        L::nodal_pressure_forces_and_bounds(kernel)
     }
 }
 
@@ -51,6 +70,18 @@ macro_rules! kernels {
                 }
                 #[inline(never)]
                 fn forces_and_bounds(kernel: InternalForces<'_, Self, ScalarBound>) -> Extremes<f32> {
+                    dispatch(kernel)
+                }
+                #[inline(never)]
+                fn nodal_pressure_forces(
+                    kernel: InternalForces<'_, Self, NoVisitor, MeanPressure<'_>>,
+                ) -> Extremes<f32> {
+                    dispatch(kernel)
+                }
+                #[inline(never)]
+                fn nodal_pressure_forces_and_bounds(
+                    kernel: InternalForces<'_, Self, ScalarBound, MeanPressure<'_>>,
+                ) -> Extremes<f32> {
                     dispatch(kernel)
                 }
                 #[inline(never)]

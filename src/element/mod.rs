@@ -1,4 +1,5 @@
-//! Linear tetrahedra (T4): their tables, deformation, internal forces, bounds of their tangent stiffness, and what they tell
+//! Tetrahedra with linear displacements (T4), their pressure from their own volume or from the volumes around their nodes
+//! ([`crate::material::NodalPressure`]): their tables, deformation, internal forces, bounds of their tangent stiffness, and what they tell
 //! about themselves. Loops over elements are written once, for any law and any instruction-set level ([`crate::simd`]); they are
 //! compiled for each law of the list (`kernels.rs`), and linked only where a scene uses that law.
 
@@ -7,7 +8,9 @@ mod deformation;
 mod fields;
 mod internal_forces;
 mod kernels;
+mod nodal_volume;
 mod node;
+mod pressure;
 mod stiffness_bound;
 #[cfg(test)]
 mod stiffness_bound_tests;
@@ -22,10 +25,13 @@ pub(crate) use kernels::ForcesVisitor;
 pub use kernels::{LawWork, with_law};
 pub use node::{Axes, NodeInertia};
 pub use tile::ElementTile;
+pub(crate) use tile::MOST_ELEMENTS;
 
 pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
-pub(crate) use fields::element_fields;
+pub(crate) use fields::{element_fields, volume_energy_difference};
 pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};
+pub(crate) use nodal_volume::NodalVolumes;
+pub(crate) use pressure::{MeanPressure, OwnPressure};
 pub(crate) use stiffness_bound::{MatrixSums, ScalarBound};
 pub(crate) use tile_bounds::{TileBounds, TileTangents};
 

@@ -93,6 +93,56 @@ impl NodeInertia {
         self.inverse == [FIXED; 3]
     }
 
+    /// Marks a node of an element that can move.
+    pub(crate) fn mark_neighbour(&mut self) {
+        self.mass = 1.0;
+    }
+
+    /// Whether the node is marked as fixed, and not as one of an element that can move.
+    pub(crate) fn is_left_out(&self) -> bool {
+        self.is_marked_fixed() && self.mass == 0.0
+    }
+
+    /// Forgets the tissues of the node. While a scene is being built the mass holds
+    /// the lowest two, as bits; tissues have indices below 65,535.
+    pub(crate) fn clear_regions(&mut self) {
+        self.mass = f32::from_bits(u32::MAX);
+    }
+
+    /// Notes a tissue of the node.
+    pub(crate) fn add_region(&mut self, region: u16) {
+        let [lowest, second] = self.regions();
+        let regions = match region {
+            region if region == lowest || region == second => return,
+            region if region < lowest => [region, lowest],
+            region if region < second => [lowest, region],
+            _ => return,
+        };
+        self.mass = f32::from_bits(u32::from(regions[0]) | u32::from(regions[1]) << 16);
+    }
+
+    fn regions(&self) -> [u16; 2] {
+        let bits = self.mass.to_bits();
+        [bits as u16, (bits >> 16) as u16]
+    }
+
+    /// Which of the tissues of the node this is: 0 or 1, 2 for any further one.
+    pub(crate) fn slot_of_region(&self, region: u16) -> u8 {
+        let [lowest, second] = self.regions();
+        if region == lowest {
+            0
+        } else if region == second {
+            1
+        } else {
+            2
+        }
+    }
+
+    /// Forgets what the mass has held so far.
+    pub(crate) fn clear_mass(&mut self) {
+        self.mass = 0.0;
+    }
+
     /// Turns the marks into the inverse of the mass.
     pub(crate) fn invert(&mut self) {
         let inverse = 1.0 / self.mass;

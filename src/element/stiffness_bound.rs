@@ -49,7 +49,7 @@
 //! the largest eigenvalue is at most `V lambda_G (iso + 3/2 volume |C|^2)`. The two parts of the mixed term add up to
 //! at most `(5/4 + 3/2 4/5) |q_ce| |E| |C| + 3/2 floor |C|^2`. `|C|^2` and `|E|^2` are bounded by the invariants.
 
-use crate::material::{Invariants, Law, LawState, Potential};
+use crate::material::{Invariants, Law, LawState};
 use crate::simd::{Real, Scatter, ScatterBuffer};
 
 use super::ElementTile;
@@ -98,9 +98,9 @@ impl<R: Real> Coefficients<R> {
             (local.slope, local.stiffening::<L>(law), local.volume_factor());
         let (x_f, x_c) = (g + g, dg * i1);
         let along = x_f + x_c;
-        let bulk = law.volume_curvature(at.j);
+        let bulk = local.bulk;
         let p1 = slope * x_f;
-        let p_j = slope.fused(x_c, law.volume_slope(at.j));
+        let p_j = slope.fused(x_c, local.pressure);
 
         let (stiff_c, stiff_f) = (stiffening * along, stiffening * x_f);
         let cc = stiff_c.fused(along, slope.fused(ddg.fused(i1, four * dg), bulk));

@@ -9,6 +9,13 @@ use crate::mesh::gradients;
 use crate::mesh::strips::Numbered;
 use crate::simd::{Real, TILE, TileNodes};
 
+/// Bits of an element's index: a mesh has fewer elements than this.
+const ELEMENT_BITS: u32 = 24;
+const ELEMENT: u32 = (1 << ELEMENT_BITS) - 1;
+
+/// Most elements of a mesh.
+pub(crate) const MOST_ELEMENTS: usize = ELEMENT as usize;
+
 /// Tables of [`TILE`] elements as a structure of arrays. The elements of a tile come from different parts of the mesh.
 /// Neighbours share nodes, and additions to a shared node one after the other would each wait for the last one. Places
 /// without an element have volume zero and the nodes of another element, to which they add zero.
@@ -21,7 +28,8 @@ pub struct ElementTile {
     gradients: [[[f32; TILE]; 3]; 3],
     /// Rest volumes, m^3.
     volumes: [f32; TILE],
-    /// Index of each element in the mesh.
+    /// Index of each element in the mesh; in the upper eight bits, two for each corner, which of the tissues at that node it is
+    /// of ([`ElementTile::slot`]).
     elements: [u32; TILE],
     /// Largest eigenvalue of `sum_a ga ga^T` over the four shape function gradients, 1/m^2.
     gradient_eigenvalues: [f32; TILE],
@@ -58,7 +66,20 @@ impl ElementTile {
     /// Index in the mesh of the element at place `lane`.
     #[inline(always)]
     pub(crate) fn element(&self, lane: usize) -> usize {
-        self.elements[lane % TILE] as usize
+        (self.elements[lane % TILE] & ELEMENT) as usize
+    }
+
+    /// Which of the tissues at node `corner` the element at place `lane` is of: 0 or 1, 2 for any further one.
+    #[inline(always)]
+    pub(crate) fn slot(&self, corner: usize, lane: usize) -> u8 {
+        (self.elements[lane % TILE] >> (ELEMENT_BITS + 2 * (corner as u32 % 4)) & 3) as u8
+    }
+
+    /// Sets [`ElementTile::slot`] of all corners.
+    pub(crate) fn set_slots(&mut self, lane: usize, slots: [u8; 4]) {
+        let bits = slots.iter().rev().fold(0, |bits, &slot| bits << 2 | u32::from(slot & 3));
+        let element = &mut self.elements[lane % TILE];
+        *element = *element & ELEMENT | bits << ELEMENT_BITS;
     }
 
     /// A gradient component of shape function `corner + 1` (`corner` 0 to 2), of the elements from place `first` on,

@@ -106,10 +106,10 @@ impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         self.renew_if_stale(trial);
-        let Trial { scene, loads, displacement, force, progress, .. } = &mut *trial;
-        let (elements, inertia, time) = (scene.elements(), scene.inertia, progress.time);
-        let forcing = Forcing { elements, visitor: ScalarBound, inertia, displacement, loads, time };
-        let (_, extremes) = forcing.in_parts(force, &mut [], self.threads, |_, _, _: &mut [()]| ());
+        let Trial { scene, loads, displacement, force, volume, progress, .. } = &mut *trial;
+        let forcing =
+            Forcing { scene: *scene, visitor: ScalarBound, displacement, loads, time: progress.time };
+        let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
         self.model.refresh.update_frames(displacement, progress.steps);
         let moved = self.move_lattice(trial);
         Computed { totals: self.move_nodes(trial, moved), extremes }
@@ -201,7 +201,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         if lattice.functions() == 0 {
             return None;
         }
-        let Trial { scene, loads, displacement, increment, force, progress } = trial;
+        let Trial { scene, loads, displacement, increment, force, progress, .. } = trial;
         let supports = MovingSupports {
             scene: *scene,
             lattice,

@@ -480,23 +480,16 @@ struct Learned<'a, 'w, T> {
 
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
-        let Trial { scene, loads, displacement, increment, force, progress } = trial;
+        let Trial { scene, loads, displacement, increment, force, volume, progress } = trial;
         let (network, step, inertia) = (self.network, self.step, scene.inertia);
-        let forcing = Forcing {
-            elements: scene.elements(),
-            visitor: NoVisitor,
-            inertia,
-            displacement,
-            loads,
-            time: progress.time,
-        };
+        let forcing = Forcing { scene: *scene, visitor: NoVisitor, displacement, loads, time: progress.time };
         let predict = |nodes: Range<usize>, force: &[NodeVector], vertices: &mut [Vertex]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let displacement = displacement.get(nodes.clone()).unwrap_or_default();
             let increment = increment.get(nodes).unwrap_or_default();
             Predict { network, step, inertia, displacement, increment, force, vertices }.dispatched()
         };
-        let (results, extremes) = forcing.in_parts(force, self.vertices, self.threads, predict);
+        let (results, extremes) = forcing.in_parts(volume, force, self.vertices, self.threads, predict);
         *self.report = Counts::of_all(results.iter().map(|(_, counts)| counts)).report();
         Computed { totals: Totals::of_all(results.iter().map(|(totals, _)| totals)), extremes }
     }

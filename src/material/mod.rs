@@ -53,7 +53,7 @@ pub use literal::Literal;
 pub(crate) use response::VolumeFactor;
 pub use response::{Invariants, Response};
 pub(crate) use response::{LawState, energy_density, releasable_energy, response, response_operations};
-pub use tissue::{Laws, Material, Regions, Tissue};
+pub use tissue::{Laws, Material, NodalPressure, Regions, Tissue};
 
 use crate::simd::Real;
 

@@ -79,15 +79,29 @@ pub(crate) struct LawState<R> {
     factor: Option<VolumeFactor<R>>,
     /// `W'(x)`, Pa.
     pub(crate) slope: R,
+    /// `U'` and `U''`, Pa: at the element's volume, or their mean over its nodes ([`super::NodalPressure`]).
+    pub(crate) pressure: R,
+    pub(crate) bulk: R,
     x: R,
 }
 
 impl<R: Real> LawState<R> {
     #[inline(always)]
     pub(crate) fn new<L: Law>(law: &L::Wide<R>, at: Invariants<R>) -> Self {
+        Self::with_volume_response::<L>(law, at, law.volume_slope(at.j), law.volume_curvature(at.j))
+    }
+
+    /// With a pressure and a bulk stiffness from elsewhere, Pa.
+    #[inline(always)]
+    pub(crate) fn with_volume_response<L: Law>(
+        law: &L::Wide<R>,
+        at: Invariants<R>,
+        pressure: R,
+        bulk: R,
+    ) -> Self {
         let factor = if L::ISOCHORIC { Some(VolumeFactor::new(at)) } else { None };
         let x = factor.map_or(at.i, |factor| factor.x);
-        Self { at, factor, slope: law.distortion_slope(x), x }
+        Self { at, factor, slope: law.distortion_slope(x), pressure, bulk, x }
     }
 
     /// `W''(x)`, Pa; not negative.
@@ -119,7 +133,7 @@ impl<R: Real> LawState<R> {
             }
             None => (slope, slope),
         };
-        Response { p1, s: s + law.volume_slope(self.at.j), saturation: law.saturation(self.x) }
+        Response { p1, s: s + self.pressure, saturation: law.saturation(self.x) }
     }
 }
 
@@ -154,7 +168,7 @@ impl<R: Real> LawState<Pair<R>> {
     /// Each half by itself.
     #[inline(always)]
     pub(crate) fn split(&self) -> [LawState<R>; 2] {
-        let Self { at, factor, slope, x } = *self;
+        let Self { at, factor, slope, pressure, bulk, x } = *self;
         let [near, far] = match factor {
             Some(factor) => {
                 let [near, far] = factor.split();
@@ -163,8 +177,22 @@ impl<R: Real> LawState<Pair<R>> {
             None => [None, None],
         };
         [
-            LawState { at: Invariants { i: at.i.0, j: at.j.0 }, factor: near, slope: slope.0, x: x.0 },
-            LawState { at: Invariants { i: at.i.1, j: at.j.1 }, factor: far, slope: slope.1, x: x.1 },
+            LawState {
+                at: Invariants { i: at.i.0, j: at.j.0 },
+                factor: near,
+                slope: slope.0,
+                pressure: pressure.0,
+                bulk: bulk.0,
+                x: x.0,
+            },
+            LawState {
+                at: Invariants { i: at.i.1, j: at.j.1 },
+                factor: far,
+                slope: slope.1,
+                pressure: pressure.1,
+                bulk: bulk.1,
+                x: x.1,
+            },
         ]
     }
 }

@@ -13,15 +13,47 @@ pub struct Tissue<L> {
 }
 
 /// The tissue of each element. A scene with one [`Tissue`] does not pay for the choice.
-pub trait Material {
+pub trait Material: Sync {
     /// The law all elements share; its constants may differ.
     type Law: Law;
+
+    /// Whether the pressure of an element is the mean of its nodes' ([`NodalPressure`]).
+    const NODAL_PRESSURE: bool = false;
 
     /// The tissue of mesh element `element`, or nothing where the material names none.
     fn tissue(&self, element: usize) -> Option<Tissue<Self::Law>>;
 
     /// The constants of all elements.
     fn laws(&self) -> Laws<'_, Self::Law>;
+
+    /// Index of the tissue of mesh element `element`. With [`NodalPressure`] the volume around a node is averaged over the
+    /// elements of one index, so that no pressure is smeared across where tissues meet.
+    fn region(&self, _element: usize) -> u16 {
+        0
+    }
+}
+
+/// The same material in tetrahedra with average nodal pressure (Bonet & Burton 1998; for TLED with several tissues Joldes,
+/// Wittek & Miller 2009), which do not lock where tissue hardly changes its volume: see [`crate::element`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NodalPressure<M>(pub M);
+
+impl<M: Material> Material for NodalPressure<M> {
+    type Law = M::Law;
+
+    const NODAL_PRESSURE: bool = true;
+
+    fn tissue(&self, element: usize) -> Option<Tissue<M::Law>> {
+        self.0.tissue(element)
+    }
+
+    fn laws(&self) -> Laws<'_, M::Law> {
+        self.0.laws()
+    }
+
+    fn region(&self, element: usize) -> u16 {
+        self.0.region(element)
+    }
 }
 
 /// The constants of each element, as the element loops want them.
@@ -41,6 +73,12 @@ pub enum Laws<'a, L> {
 }
 
 impl<L: Law> Laws<'_, L> {
+    /// Whether elements may be of different tissues.
+    #[inline(always)]
+    pub(crate) const fn differ(&self) -> bool {
+        matches!(self, Self::Regions { .. })
+    }
+
     /// The constants of mesh element `element`.
     #[must_use]
     #[inline(always)]
@@ -96,5 +134,9 @@ impl<L: Law + Default> Material for Regions<'_, L> {
 
     fn laws(&self) -> Laws<'_, L> {
         Laws::Regions { tissues: self.tissues, of_element: self.of_element, beyond: L::default() }
+    }
+
+    fn region(&self, element: usize) -> u16 {
+        self.of_element.get(element).copied().unwrap_or_default()
     }
 }

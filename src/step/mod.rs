@@ -14,7 +14,7 @@ pub(crate) use energy_sums::{Addends, Sums, Totals};
 pub use length::{CriticalStep, Step, StepError};
 #[cfg(feature = "lab")]
 pub(crate) use parts::external_forces;
-pub(crate) use parts::{Forcing, move_in_parts};
+pub(crate) use parts::{Forcing, internal_forces, move_in_parts, nodal_volumes};
 pub use status::{Cause, Divergence, Status};
 #[cfg(feature = "parallel")]
 pub use threads::Rayon;
@@ -35,6 +35,8 @@ pub(crate) struct Trial<'a, M> {
     pub(crate) displacement: &'a mut [NodeVector],
     pub(crate) increment: &'a mut [NodeVector],
     pub(crate) force: &'a mut [NodeVector],
+    /// Rows of [`crate::element::NodalVolumes`] for materials with nodal pressure, empty for others.
+    pub(crate) volume: &'a mut [NodeVector],
     pub(crate) progress: &'a mut Progress,
 }
 
@@ -77,13 +79,14 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     ) -> Result<Self, Status> {
         Self::check(scene, loads, &state, room)?;
         let nodes = scene.node_count();
-        let StateView { displacement, increment, force, progress } = state;
+        let StateView { displacement, increment, force, volume, progress } = state;
         Ok(Self {
             scene,
             loads,
             displacement: displacement.get_mut(..nodes).unwrap_or_default(),
             increment: increment.get_mut(..nodes).unwrap_or_default(),
             force: force.get_mut(..nodes).unwrap_or_default(),
+            volume: volume.get_mut(..nodes).unwrap_or_default(),
             progress,
         })
     }
@@ -95,7 +98,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         state: &StateView<'_>,
         room: usize,
     ) -> Result<(), Status> {
-        let (nodes, room) = (scene.node_count(), room.min(state.capacity()));
+        let (nodes, room) = (scene.node_count(), room.min(state.capacity_for::<M>()));
         if nodes == 0 || room < nodes || loads.nodes().is_some_and(|checked| checked != nodes) {
             return Err(Status::Mismatch { nodes, room });
         }
@@ -129,7 +132,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         method: &impl StepMethod<M>,
         totals: &Totals,
     ) -> Result<EnergyBalance, Cause> {
-        let Self { scene, loads, displacement, increment, force, progress } = self;
+        let Self { scene, loads, displacement, increment, force, progress, .. } = self;
         let mut balance = progress.energy_balance;
         if progress.steps == 0 {
             balance.start = balance.start.max(scene.releasable_energy());

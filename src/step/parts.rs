@@ -4,20 +4,22 @@
 use core::array::from_fn;
 use core::ops::Range;
 
-use crate::element::{ElementLaw, Elements, Extremes, ForcesVisitor, InternalForces, NodeInertia};
+use crate::element::{
+    ElementMaterial, Extremes, ForcesVisitor, InternalForces, MeanPressure, NodalVolumes, NodeInertia,
+    OwnPressure,
+};
 use crate::loads::{Loads, ramp_factor};
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
-use crate::simd::NodeVector;
+use crate::scene::SceneView;
+use crate::simd::{Gather, NodeVector};
 
 use super::threads::{Threads, take};
 
 /// The input of the total forces.
-#[derive(Clone, Copy)]
-pub(crate) struct Forcing<'a, L, V> {
-    pub(crate) elements: Elements<'a, L>,
+pub(crate) struct Forcing<'a, M, V> {
+    pub(crate) scene: SceneView<'a, M>,
     /// What is computed with the forces of each element.
     pub(crate) visitor: V,
-    pub(crate) inertia: &'a [NodeInertia],
     pub(crate) displacement: &'a [NodeVector],
     pub(crate) loads: &'a Loads<'a>,
     /// Of the loads, s.
@@ -33,17 +35,43 @@ struct Part<'a, T, F> {
     extremes: Extremes<f32>,
 }
 
-impl<L: ElementLaw, V: ForcesVisitor<L>> Forcing<'_, L, V> {
-    /// Total forces, and for each partition the result of `then` from its nodes, their forces and their entries of `extra`, an array
+/// Volume ratios of all nodes for materials with nodal pressure ([`NodalVolumes`]); nothing for others.
+pub(crate) fn nodal_volumes<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    displacement: &[NodeVector],
+    mut volumes: &mut [NodeVector],
+    threads: &impl Threads,
+) {
+    if !M::NODAL_PRESSURE {
+        return;
+    }
+    let elements = scene.elements();
+    let (all, tiles, differ) = (elements.partitions, elements.tiles, elements.laws.differ());
+    let count = all.parts(threads.parts());
+    let mut parts: [_; MOST_PARTS] = from_fn(|part| {
+        let mine = all.part(part, count);
+        let rows = take(&mut volumes, all.nodes(&mine).len());
+        (mine, rows)
+    });
+    threads.each(parts.get_mut(..count).unwrap_or_default(), |(mine, rows)| {
+        NodalVolumes { tiles, all, partitions: mine.clone(), differ, displacement, rows }.compute();
+    });
+}
+
+impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
+    /// Total forces, with the nodes' [`nodal_volumes`] where the material needs them, and for each partition the result of `then` from its nodes, their forces and their entries of `extra`, an array
     /// that the step keeps for the nodes.
     pub(crate) fn in_parts<T: Send, F: Copy + Default + Send>(
         &self,
+        volumes: &mut [NodeVector],
         mut force: &mut [NodeVector],
         mut extra: &mut [T],
         threads: &impl Threads,
         then: impl Fn(Range<usize>, &[NodeVector], &mut [T]) -> F + Sync,
     ) -> ([F; MAX_PARTITIONS], Extremes<f32>) {
-        let partitions = self.elements.partitions;
+        nodal_volumes(self.scene, self.displacement, volumes, threads);
+        let volumes = &*volumes;
+        let partitions = self.scene.elements().partitions;
         let count = partitions.parts(threads.parts());
         let mut results = [F::default(); MAX_PARTITIONS];
         let mut rest = &mut results[..];
@@ -55,7 +83,7 @@ impl<L: ElementLaw, V: ForcesVisitor<L>> Forcing<'_, L, V> {
             Part { partitions: mine, force, extra, results, extremes: Extremes::none() }
         });
         let parts = parts.get_mut(..count).unwrap_or_default();
-        threads.each(parts, |part| self.compute(part, &then));
+        threads.each(parts, |part| self.compute(part, volumes, &then));
         let extremes = parts.iter().fold(Extremes::none(), |sum, part| sum.merged_with(&part.extremes));
         (results, extremes)
     }
@@ -63,23 +91,45 @@ impl<L: ElementLaw, V: ForcesVisitor<L>> Forcing<'_, L, V> {
     fn compute<T, F>(
         &self,
         part: &mut Part<'_, T, F>,
+        volumes: &[NodeVector],
         then: &impl Fn(Range<usize>, &[NodeVector], &mut [T]) -> F,
     ) {
         let Part { partitions, force, extra, results, extremes } = part;
-        let all = self.elements.partitions;
+        let elements = self.scene.elements();
+        let all = elements.partitions;
         let nodes = all.nodes(partitions);
-        let inertia = self.inertia.get(nodes.clone()).unwrap_or_default();
+        let inertia = self.scene.inertia.get(nodes.clone()).unwrap_or_default();
         external_forces(force, nodes.start, inertia, self.loads, self.time);
-        let (elements, displacement) = (self.elements, self.displacement);
-        let mine = partitions.clone();
         *extremes =
-            V::forces(InternalForces::of_partitions(elements, mine, displacement, force, self.visitor));
+            internal_forces(self.scene, partitions.clone(), self.displacement, volumes, force, self.visitor);
         let (mut force, mut extra) = (&mut **force, &mut **extra);
         for (partition, result) in partitions.clone().zip(&mut **results) {
             let nodes = all.nodes(&(partition..partition + 1));
             let count = nodes.len();
             *result = then(nodes, take(&mut force, count), take(&mut extra, count));
         }
+    }
+}
+
+/// Adds internal forces to those of the nodes in `partitions`, from the [`nodal_volumes`] where the material needs them.
+pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
+    scene: SceneView<'_, M>,
+    partitions: Range<usize>,
+    displacement: &[NodeVector],
+    volumes: &[NodeVector],
+    force: &mut [NodeVector],
+    visitor: V,
+) -> Extremes<f32> {
+    let elements = scene.elements();
+    if M::NODAL_PRESSURE {
+        let pressure = MeanPressure(Gather::new(volumes));
+        let kernel =
+            InternalForces::of_partitions(elements, pressure, partitions, displacement, force, visitor);
+        V::nodal_pressure_forces(kernel)
+    } else {
+        let kernel =
+            InternalForces::of_partitions(elements, OwnPressure, partitions, displacement, force, visitor);
+        V::forces(kernel)
     }
 }
 
@@ -162,8 +212,16 @@ mod tests {
                 let mine = elements.partitions.part(part, elements.partitions.parts(parts));
                 let count = elements.partitions.nodes(&mine).len();
                 let (mut one, mut eight) = (vec![NodeVector::ZERO; count], vec![NodeVector::ZERO; count]);
-                let of =
-                    |force| InternalForces::of_partitions(elements, mine.clone(), &bent, force, NoVisitor);
+                let of = |force| {
+                    InternalForces::of_partitions(
+                        elements,
+                        OwnPressure,
+                        mine.clone(),
+                        &bent,
+                        force,
+                        NoVisitor,
+                    )
+                };
                 let (by_one, by_eight) = (of(&mut one).run_scalar(), of(&mut eight).run::<Baseline>());
                 assert!(eight.iter().any(|force| force.0[2] != 0.0));
                 assert_eq!(bits(&one), bits(&eight), "part {part} of {parts}");

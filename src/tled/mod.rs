@@ -20,14 +20,15 @@ pub use spectrum::exact_critical_step;
 
 use core::ops::Range;
 
-use crate::element::{self, ElementLaw, ElementMaterial, InternalForces, NoVisitor, NodeInertia};
+use crate::element::{self, ElementMaterial, NoVisitor, NodeInertia};
 use crate::loads::Loads;
 use crate::material::Material;
 use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::{
-    CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial, move_in_parts,
+    self, CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial, move_in_parts,
+    nodal_volumes,
 };
 use central_differences::{Advance, EnergySums, next_increment};
 
@@ -58,16 +59,15 @@ struct Exact<'a, T> {
 
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
-        let Trial { scene, loads, displacement, increment, force, progress } = trial;
-        let (elements, inertia, step) = (scene.elements(), scene.inertia, self.step);
-        let forcing =
-            Forcing { elements, visitor: NoVisitor, inertia, displacement, loads, time: progress.time };
+        let Trial { scene, loads, displacement, increment, force, volume, progress } = trial;
+        let (inertia, step) = (scene.inertia, self.step);
+        let forcing = Forcing { scene: *scene, visitor: NoVisitor, displacement, loads, time: progress.time };
         let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let increment = increment.get(nodes).unwrap_or_default();
             EnergySums { step, inertia, increment, force }.total()
         };
-        let (totals, extremes) = forcing.in_parts(force, &mut [], self.threads, totals_of);
+        let (totals, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, totals_of);
         Computed { totals: Totals::of_all(&totals), extremes }
     }
 
@@ -134,35 +134,49 @@ pub fn start(
             }
         }
     }
-    let strain = scene.strain_energy(state.displacement);
+    let Some(strain) = strain_energy_of(scene, state.reborrow()) else { return false };
     state.progress.dt = step.seconds();
     state.progress.energy_balance.start = kinetic + strain + scene.releasable_energy();
     true
 }
 
-/// Strain energy of the scene under the given displacements (m), J, zero at rest.
-pub fn strain_energy<M: Material>(scene: SceneView<'_, M>, displacement: &[NodeVector]) -> f64 {
-    scene.strain_energy(displacement)
+/// Strain energy of the scene at the state's displacements, J, zero at rest. Nothing if the state has no room for the scene.
+pub fn strain_energy(scene: &impl AsScene, state: &mut impl AsState) -> Option<f64> {
+    strain_energy_of(scene.as_scene(), state.as_state())
+}
+
+fn strain_energy_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -> Option<f64> {
+    let nodes = scene.node_count();
+    if state.capacity_for::<M>() < nodes {
+        return None;
+    }
+    nodal_volumes(
+        scene,
+        state.displacement,
+        state.volume.get_mut(..nodes).unwrap_or_default(),
+        &CallingThread,
+    );
+    Some(scene.strain_energy(state.displacement, state.volume))
 }
 
 /// Forces with which the elements act on the nodes at the state's displacements, N ([`crate::state::State::forces`], until the next
 /// step). Returns whether the state has room for the scene.
 #[must_use = "a state without room for the scene has no forces"]
 pub fn internal_forces(scene: &impl AsScene, state: &mut impl AsState) -> bool {
-    let (scene, StateView { displacement, force, .. }) = (scene.as_scene(), state.as_state());
-    let nodes = scene.node_count();
-    let (Some(displacement), Some(force)) = (displacement.get(..nodes), force.get_mut(..nodes)) else {
-        return false;
-    };
-    force.fill(NodeVector::ZERO);
-    forces(scene, displacement, force);
-    true
+    internal_forces_of(scene.as_scene(), state.as_state())
 }
 
-fn forces<M: ElementMaterial>(
-    scene: SceneView<'_, M>,
-    displacement: &[NodeVector],
-    force: &mut [NodeVector],
-) {
-    M::Law::forces(InternalForces::of_all(scene.elements(), displacement, force, NoVisitor));
+fn internal_forces_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -> bool {
+    let nodes = scene.node_count();
+    if state.capacity_for::<M>() < nodes {
+        return false;
+    }
+    let StateView { displacement, force, volume, .. } = state;
+    let vectors = (displacement.get(..nodes), force.get_mut(..nodes));
+    let (Some(displacement), Some(force)) = vectors else { return false };
+    let volume = volume.get_mut(..nodes).unwrap_or_default();
+    nodal_volumes(scene, displacement, volume, &CallingThread);
+    force.fill(NodeVector::ZERO);
+    step::internal_forces(scene, scene.elements().partitions.all(), displacement, volume, force, NoVisitor);
+    true
 }

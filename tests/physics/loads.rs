@@ -472,7 +472,7 @@ fn a_run_that_is_resumed_equals_one_that_was_not_interrupted() {
         for _ in 0..4 {
             support::run(&again, &loads, &mut saved, &step, 100);
             tled::critical_step(&again, &mut saved).unwrap();
-            assert!(tled::strain_energy(again.view(), saved.displacements()).is_finite());
+            assert!(tled::strain_energy(&again, &mut saved.clone()).expect("room").is_finite());
         }
         assert!(bits(&whole) == bits(&saved), "{}", law.name());
         saved.reset();

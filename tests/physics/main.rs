@@ -11,6 +11,7 @@ mod alarms;
 mod divergence;
 mod elements;
 mod loads;
+mod nodal_pressure;
 mod patch;
 mod reference_self;
 mod stability;

@@ -23,6 +23,7 @@ pub mod critical;
 pub mod dense;
 pub mod law;
 pub mod mesh;
+pub mod nodal_pressure;
 pub mod random;
 pub mod simulation;
 pub mod tensor;

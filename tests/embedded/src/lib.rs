@@ -84,7 +84,7 @@ pub extern "C" fn step(
 #[unsafe(no_mangle)]
 pub extern "C" fn fields(scene: &Scene<NeoHookean>, state: &State) -> f64 {
     let stresses = scene.view().element_fields(state.displacements()).map(|fields| fields.von_mises);
-    stresses.sum::<f64>() + tled::strain_energy(scene.view(), state.displacements())
+    stresses.sum::<f64>() + tled::strain_energy(&scene.view(), &mut state).expect("room")
 }
 
 /// Internal forces of the other law, N.

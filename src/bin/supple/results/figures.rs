@@ -58,7 +58,7 @@ impl Figures {
             least_volume_ratio: ratios.fold(f64::INFINITY, f64::min),
             max_displacement: length(furthest),
             max_node: furthest,
-            strain_energy: tled::strain_energy(scene, displacements),
+            strain_energy: tled::strain_energy(&scene, &mut state.clone()).expect("room"),
             energy: *state.energy_balance(),
         }
     }

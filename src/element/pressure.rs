@@ -1,0 +1,160 @@
+//! Where the pressure `dU/dJ` (Pa) of an element comes from: its own volume in linear tetrahedra, or the mean over its four nodes
+//! ([`crate::material::NodalPressure`]). Around a node `a` the volume ratio is `J_a = sum_e (V_e / 4) J_e / V_a` with
+//! `V_a = sum_e V_e / 4` (Bonet & Burton 1998). The energy of volume is `sum_a V_a U(J_a)`, so that
+//!
+//! ```text
+//! dPsi/du = sum_e V_e p_e C_e : dF_e/du,   p_e = sum_{a in e} U'(J_a) / 4,   C = cof F
+//! ```
+//! which is the stress of the linear element with `p_e` in place of `U'(J_e)`. Where tissues meet, a node has a volume ratio for
+//! each of the first two; elements of a third one keep their own there.
+
+use crate::material::{Invariants, Law, LawState, Laws, Potential};
+use crate::simd::{Gather, Pair, Real, TileNodes};
+
+use super::ElementTile;
+
+/// Where the pressure of elements comes from.
+pub(crate) trait Pressure: Copy {
+    /// What is read at a node.
+    type Volumes<R: Real>: Copy;
+    /// What an element gets.
+    type Response<R: Real>: Copy;
+
+    /// Nothing read yet.
+    fn no_volumes<R: Real>() -> Self::Volumes<R>;
+    /// Nothing known yet.
+    fn none<R: Real>() -> Self::Response<R>;
+    /// Reads a node of each element ([`Gather::read_nodes`]).
+    fn read<R: Real, const N: usize>(
+        &self,
+        nodes: &TileNodes<'_, N>,
+        corner: usize,
+        first: usize,
+    ) -> Self::Volumes<R>;
+    /// Of the elements from place `first` of a tile on, from their corners and their own `J - 1`.
+    fn response<R: Real, L: Law>(
+        laws: &Laws<'_, L>,
+        tile: &ElementTile,
+        first: usize,
+        corners: [Self::Volumes<R>; 4],
+        own: R,
+    ) -> Self::Response<R>;
+    /// The state of the law in two vectors of elements.
+    fn state<R: Real, L: Law>(
+        law: &L::Wide<Pair<R>>,
+        at: Invariants<Pair<R>>,
+        responses: [Self::Response<R>; 2],
+    ) -> LawState<Pair<R>>;
+}
+
+/// Each element's own pressure, from its volume.
+#[derive(Clone, Copy)]
+pub struct OwnPressure;
+
+impl Pressure for OwnPressure {
+    type Volumes<R: Real> = ();
+    type Response<R: Real> = ();
+
+    #[inline(always)]
+    fn no_volumes<R: Real>() {}
+
+    #[inline(always)]
+    fn none<R: Real>() {}
+
+    #[inline(always)]
+    fn read<R: Real, const N: usize>(&self, _: &TileNodes<'_, N>, _: usize, _: usize) {}
+
+    #[inline(always)]
+    fn response<R: Real, L: Law>(_: &Laws<'_, L>, _: &ElementTile, _: usize, _: [(); 4], _: R) {}
+
+    #[inline(always)]
+    fn state<R: Real, L: Law>(
+        law: &L::Wide<Pair<R>>,
+        at: Invariants<Pair<R>>,
+        _: [(); 2],
+    ) -> LawState<Pair<R>> {
+        LawState::new::<L>(law, at)
+    }
+}
+
+/// The mean over the nodes, from the rows of [`super::NodalVolumes`].
+#[derive(Clone, Copy)]
+pub struct MeanPressure<'a>(pub(crate) Gather<'a>);
+
+/// `U'` and `U''`, Pa, means over the nodes.
+#[derive(Clone, Copy)]
+pub(crate) struct VolumeResponse<R> {
+    pressure: R,
+    bulk: R,
+}
+
+impl<R: Real> VolumeResponse<R> {
+    /// Of the elements from place `first` of a tile on, from `J - 1` of the two tissues at each corner.
+    #[inline(always)]
+    fn new<L: Law>(
+        laws: &Laws<'_, L>,
+        tile: &ElementTile,
+        first: usize,
+        corners: [[R; 2]; 4],
+        own: R,
+    ) -> Self {
+        let law = laws.widen::<R>(|lane| tile.element(first + lane));
+        let mut sum = Self { pressure: R::splat(0.0), bulk: R::splat(0.0) };
+        for (corner, [one, other]) in corners.into_iter().enumerate() {
+            let j = if laws.differ() {
+                // 0, 1 or 2: positive minus a half is of the first tissue, and so on.
+                let slot = R::from_fn(|lane| f32::from(tile.slot(corner, first + lane)));
+                let half = R::splat(0.5);
+                (half - slot).choose(one, (slot - (half + R::splat(1.0))).choose(own, other))
+            } else {
+                one
+            };
+            sum.pressure = sum.pressure + law.volume_slope(j);
+            sum.bulk = sum.bulk + law.volume_curvature(j);
+        }
+        let quarter = R::splat(0.25);
+        Self { pressure: quarter * sum.pressure, bulk: quarter * sum.bulk }
+    }
+}
+
+impl Pressure for MeanPressure<'_> {
+    type Volumes<R: Real> = [R; 2];
+    type Response<R: Real> = VolumeResponse<R>;
+
+    #[inline(always)]
+    fn no_volumes<R: Real>() -> [R; 2] {
+        [R::splat(0.0); 2]
+    }
+
+    #[inline(always)]
+    fn none<R: Real>() -> VolumeResponse<R> {
+        VolumeResponse { pressure: R::splat(0.0), bulk: R::splat(0.0) }
+    }
+
+    #[inline(always)]
+    fn read<R: Real, const N: usize>(&self, nodes: &TileNodes<'_, N>, corner: usize, first: usize) -> [R; 2] {
+        let [one, other, _] = self.0.read_nodes::<R, N>(nodes, corner, first);
+        [one, other]
+    }
+
+    #[inline(always)]
+    fn response<R: Real, L: Law>(
+        laws: &Laws<'_, L>,
+        tile: &ElementTile,
+        first: usize,
+        corners: [[R; 2]; 4],
+        own: R,
+    ) -> VolumeResponse<R> {
+        VolumeResponse::new::<L>(laws, tile, first, corners, own)
+    }
+
+    #[inline(always)]
+    fn state<R: Real, L: Law>(
+        law: &L::Wide<Pair<R>>,
+        at: Invariants<Pair<R>>,
+        [one, other]: [VolumeResponse<R>; 2],
+    ) -> LawState<Pair<R>> {
+        let (pressure, bulk) = (Pair(one.pressure, other.pressure), Pair(one.bulk, other.bulk));
+        LawState::with_volume_response::<L>(law, at, pressure, bulk)
+    }
+}
