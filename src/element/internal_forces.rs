@@ -235,7 +235,7 @@ pub(super) fn batches<R: Real, const SIZE: usize>(
 
 /// The nodes of strips of `K` elements: four of the first element, and the first of each other element.
 #[inline(always)]
-fn nodes_of<const K: usize, const N: usize>(tiles: [&ElementTile; K]) -> [&[u32; TILE]; N] {
+pub(super) fn nodes_of<const K: usize, const N: usize>(tiles: [&ElementTile; K]) -> [&[u32; TILE]; N] {
     let mut nodes = [tiles[0].nodes()[0]; N];
     for node in 1..N {
         nodes[node] = if node < 4 { tiles[0].nodes()[node] } else { tiles[(node - 3) % K].nodes()[0] };

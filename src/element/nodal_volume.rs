@@ -3,13 +3,15 @@
 
 use core::ops::Range;
 
-use crate::material::{Laws, NeoHookean};
-use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, dispatch};
-
-use super::ElementTile;
-use super::internal_forces::{BATCH, Corners, ElementVector, SCALAR_BATCH, batches, deform, scatter};
-use super::pressure::OwnPressure;
 use crate::mesh::partition::Partitions;
+use crate::mesh::strips::{CORNERS, LONGEST};
+use crate::simd::{
+    Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, TileNodes, dispatch, unrolled,
+};
+
+use super::deformation::Deformation;
+use super::internal_forces::nodes_of;
+use super::{ElementTile, NodeInertia};
 
 /// The kernel that computes the rows of the nodes in some partitions: `J - 1` in the first tissue of the node and in the second,
 /// then the volumes that these are means over, m^3.
@@ -17,8 +19,9 @@ pub(crate) struct NodalVolumes<'a> {
     pub(crate) tiles: &'a [ElementTile],
     pub(crate) all: &'a Partitions,
     pub(crate) partitions: Range<usize>,
-    /// Whether elements may be of different tissues.
-    pub(crate) differ: bool,
+    /// The density of all elements, kg/m^3, if they are of one tissue.
+    pub(crate) density: Option<f32>,
+    pub(crate) inertia: &'a [NodeInertia],
     pub(crate) displacement: &'a [NodeVector],
     /// Of the nodes in these partitions.
     pub(crate) rows: &'a mut [NodeVector],
@@ -39,28 +42,34 @@ impl Kernel for NodalVolumes<'_> {
 
     #[inline(always)]
     fn run<R: Real>(self) {
-        in_batches::<R, BATCH>(self);
-    }
-
-    #[inline(always)]
-    fn run_scalar(self) {
-        in_batches::<f32, SCALAR_BATCH>(self);
+        add_all::<R>(self);
     }
 }
 
 #[inline(always)]
-fn in_batches<R: Real, const SIZE: usize>(kernel: NodalVolumes<'_>) {
-    let NodalVolumes { tiles, all, partitions, differ, displacement, rows } = kernel;
+fn add_all<R: Real>(kernel: NodalVolumes<'_>) {
+    let NodalVolumes { tiles, all, partitions, density, inertia, displacement, rows } = kernel;
     rows.fill(NodeVector::ZERO);
     let displacement = Gather::new(displacement);
-    let mut sums = Scatter::from(all.nodes(&partitions).start, rows);
+    let nodes = all.nodes(&partitions);
+    let mut sums = Scatter::from(nodes.start, rows);
     for (touching, length) in all.touching(partitions) {
-        let tiles = (tiles.get(touching).unwrap_or_default(), length);
-        if differ {
-            add_volumes::<R, OfTwoTissues, SIZE>(tiles, displacement, &mut sums);
-        } else {
-            add_volumes::<R, OfOneTissue, SIZE>(tiles, displacement, &mut sums);
+        let tiles = tiles.get(touching).unwrap_or_default();
+        match (length, density.is_some()) {
+            (3, true) => add_strips::<R, OneTissue, 3, 6>(tiles, displacement, &mut sums),
+            (2, true) => add_strips::<R, OneTissue, 2, 5>(tiles, displacement, &mut sums),
+            (_, true) => add_strips::<R, OneTissue, 1, 4>(tiles, displacement, &mut sums),
+            (3, false) => add_strips::<R, TwoTissues, 3, 6>(tiles, displacement, &mut sums),
+            (2, false) => add_strips::<R, TwoTissues, 2, 5>(tiles, displacement, &mut sums),
+            (_, false) => add_strips::<R, TwoTissues, 1, 4>(tiles, displacement, &mut sums),
         }
+    }
+    if let Some(density) = density {
+        for (row, inertia) in rows.iter_mut().zip(inertia.get(nodes).unwrap_or_default()) {
+            let volume = inertia.mass / density;
+            row.0 = [row.0[0] / volume, 0.0, volume, 0.0];
+        }
+        return;
     }
     for row in rows {
         let [change, volume, other_change, other_volume] = row.0;
@@ -69,64 +78,144 @@ fn in_batches<R: Real, const SIZE: usize>(kernel: NodalVolumes<'_>) {
     }
 }
 
-/// In passes as [`super::internal_forces::add_forces`].
+/// Adds the volumes of strips of `K` elements with `N` nodes.
 #[inline(always)]
-fn add_volumes<R: Real, C: Corners<R, ()>, const SIZE: usize>(
-    (tiles, length): (&[ElementTile], usize),
+fn add_strips<R: Real, T: Tissues, const K: usize, const N: usize>(
+    tiles: &[ElementTile],
     displacement: Gather<'_>,
     sums: &mut Scatter<'_>,
 ) {
-    let Some(first) = tiles.first() else { return };
-    let mut batch = [ElementVector::<R, ()>::zero(first, ()); SIZE];
-    // No pressure is asked of the law.
-    let (laws, input) = (Laws::One(NeoHookean::default()), (displacement, OwnPressure));
-    for strips in batches::<R, SIZE>(tiles, length) {
-        let count = length * strips.len();
-        match length {
-            3 => deform::<R, _, _, 3, 6>(&laws, tiles, strips, input, &mut batch),
-            2 => deform::<R, _, _, 2, 5>(&laws, tiles, strips, input, &mut batch),
-            _ => deform::<R, _, _, 1, 4>(&laws, tiles, strips, input, &mut batch),
-        }
-        let batch = batch.get(..count).unwrap_or_default();
-        match length {
-            3 => scatter::<R, _, C, 3, 6>(batch, sums),
-            2 => scatter::<R, _, C, 2, 5>(batch, sums),
-            _ => scatter::<R, _, C, 1, 4>(batch, sums),
+    for tiles in tiles.as_chunks::<K>().0 {
+        let mut buffer = ScatterBuffer::NONE;
+        let rows = nodes_of(tiles.each_ref());
+        let inside = sums.checked::<R, N>(rows);
+        let nodes = inside.or_else(|| TileNodes::in_range::<R>(rows, 0, displacement.count()));
+        let nodes = nodes.unwrap_or(TileNodes::<N>::ALL_ZERO);
+        for first in (0..TILE).step_by(R::COUNT) {
+            let mut at = [[R::splat(0.0); 3]; N];
+            unrolled!(node < N => {
+                at[node] = displacement.read_nodes::<R, N>(&nodes, node, first);
+            });
+            let mut shares = [T::none::<R>(); N];
+            unrolled!(element < K => {
+                let [a, b, c, d] = CORNERS[element % LONGEST];
+                let corners = [at[a % N], at[b % N], at[c % N], at[d % N]];
+                let change = Deformation::of_displacements(&tiles[element], first, corners).invariants.j;
+                let volume = R::splat(0.25) * tiles[element].volume::<R>(first);
+                for corner in 0..4 {
+                    let share = &mut shares[CORNERS[element % LONGEST][corner] % N];
+                    *share = T::add(*share, &tiles[element], first, corner, volume * change, volume);
+                }
+            });
+            match &inside {
+                Some(nodes) => T::scatter(sums, nodes, first, shares, &mut buffer),
+                // Elements with nodes of another thread's partitions.
+                None => sums.add_present(rows, first, T::rows(shares)),
+            }
         }
     }
 }
 
-/// A quarter of each element's volume and of its change.
-#[inline(always)]
-fn shares<R: Real>(elements: &ElementVector<'_, R, ()>) -> [R; 2] {
-    let volume = R::splat(0.25) * elements.tile.volume::<R>(elements.first);
-    [volume * elements.invariants.j, volume]
+/// Of how many tissues elements may be.
+trait Tissues {
+    /// What goes to a node.
+    type Share<R: Real>: Copy;
+    fn none<R: Real>() -> Self::Share<R>;
+    /// With the change of volume and the volume of a vector of elements that have the node at `corner`.
+    fn add<R: Real>(
+        share: Self::Share<R>,
+        tile: &ElementTile,
+        first: usize,
+        corner: usize,
+        change: R,
+        volume: R,
+    ) -> Self::Share<R>;
+    /// As rows: change of volume and volume of the two tissues at the node.
+    fn rows<R: Real, const N: usize>(shares: [Self::Share<R>; N]) -> [[R; 4]; N];
+    fn scatter<R: Real, const N: usize>(
+        sums: &mut Scatter<'_>,
+        nodes: &TileNodes<'_, N>,
+        first: usize,
+        shares: [Self::Share<R>; N],
+        buffer: &mut ScatterBuffer<N>,
+    );
 }
 
-struct OfOneTissue;
+/// The volume of a node follows from its mass.
+struct OneTissue;
 
-impl<R: Real> Corners<R, ()> for OfOneTissue {
+impl Tissues for OneTissue {
+    type Share<R: Real> = R;
+
     #[inline(always)]
-    fn rows(elements: &ElementVector<'_, R, ()>) -> [[R; 4]; 4] {
-        let ([change, volume], zero) = (shares(elements), R::splat(0.0));
-        [[change, volume, zero, zero]; 4]
+    fn none<R: Real>() -> R {
+        R::splat(0.0)
+    }
+
+    #[inline(always)]
+    fn add<R: Real>(share: R, _: &ElementTile, _: usize, _: usize, change: R, _: R) -> R {
+        share + change
+    }
+
+    #[inline(always)]
+    fn rows<R: Real, const N: usize>(shares: [R; N]) -> [[R; 4]; N] {
+        shares.map(|share| [share, R::splat(0.0), R::splat(0.0), R::splat(0.0)])
+    }
+
+    #[inline(always)]
+    fn scatter<R: Real, const N: usize>(
+        sums: &mut Scatter<'_>,
+        nodes: &TileNodes<'_, N>,
+        first: usize,
+        shares: [R; N],
+        buffer: &mut ScatterBuffer<N>,
+    ) {
+        sums.add_numbers(nodes, first, shares, buffer);
     }
 }
 
-struct OfTwoTissues;
+struct TwoTissues;
 
-impl<R: Real> Corners<R, ()> for OfTwoTissues {
+impl Tissues for TwoTissues {
+    type Share<R: Real> = [R; 4];
+
     #[inline(always)]
-    fn rows(elements: &ElementVector<'_, R, ()>) -> [[R; 4]; 4] {
-        let [change, volume] = shares(elements);
-        let mut rows = [[change, volume, change, volume]; 4];
-        for (corner, row) in rows.iter_mut().enumerate() {
-            let is = |slot: u8| {
-                R::from_fn(|lane| f32::from(elements.tile.slot(corner, elements.first + lane) == slot))
-            };
-            let (one, other) = (is(0), is(1));
-            *row = [one * row[0], one * row[1], other * row[2], other * row[3]];
-        }
-        rows
+    fn none<R: Real>() -> [R; 4] {
+        [R::splat(0.0); 4]
+    }
+
+    #[inline(always)]
+    fn add<R: Real>(
+        [first_change, first_volume, second_change, second_volume]: [R; 4],
+        tile: &ElementTile,
+        first: usize,
+        corner: usize,
+        change: R,
+        volume: R,
+    ) -> [R; 4] {
+        let is = |slot: u8| R::from_fn(|lane| f32::from(u8::from(tile.slot(corner, first + lane) == slot)));
+        let (one, other) = (is(0), is(1));
+        [
+            first_change + one * change,
+            first_volume + one * volume,
+            second_change + other * change,
+            second_volume + other * volume,
+        ]
+    }
+
+    #[inline(always)]
+    fn rows<R: Real, const N: usize>(shares: [[R; 4]; N]) -> [[R; 4]; N] {
+        shares
+    }
+
+    #[inline(always)]
+    fn scatter<R: Real, const N: usize>(
+        sums: &mut Scatter<'_>,
+        nodes: &TileNodes<'_, N>,
+        first: usize,
+        shares: [[R; 4]; N],
+        buffer: &mut ScatterBuffer<N>,
+    ) {
+        sums.add_corners(nodes, first, shares, buffer);
     }
 }

@@ -307,6 +307,37 @@ impl<'a> Scatter<'a> {
         });
     }
 
+    /// The same with one number instead of a vector, which goes to the first component.
+    #[inline(always)]
+    pub(crate) fn add_numbers<R: Real, const N: usize>(
+        &mut self,
+        nodes: &TileNodes<'_, N>,
+        first: usize,
+        values: [R; N],
+        buffer: &mut ScatterBuffer<N>,
+    ) {
+        if R::COUNT == 1 {
+            let zero = R::splat(0.0);
+            self.add_corners(nodes, first, values.map(|value| [value, zero, zero, zero]), buffer);
+            return;
+        }
+        if nodes.first != self.first || nodes.count > self.vectors.len() {
+            return;
+        }
+        // The place that node 0 would have, so that nodes need no subtraction.
+        let vectors = self.vectors.as_mut_ptr().wrapping_sub(self.first);
+        for start in (0..R::COUNT).step_by(SCATTER_WIDTH) {
+            for (corner, value) in values.iter().enumerate() {
+                for lane in start..R::COUNT.min(start + SCATTER_WIDTH) {
+                    #[allow(unsafe_code)]
+                    // SAFETY: all nodes are in the range of `nodes.count` from `self.first` on, and each of these has a vector.
+                    let vector = unsafe { &mut *vectors.wrapping_add(nodes.at(corner, first + lane)) };
+                    vector.0[0] += value.lane(lane);
+                }
+            }
+        }
+    }
+
     /// Adds the buffered values to the nodes in places from `first` on, those that have a vector here.
     fn add_buffered<const N: usize>(
         &mut self,

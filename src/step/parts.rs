@@ -46,7 +46,9 @@ pub(crate) fn nodal_volumes<M: ElementMaterial>(
         return;
     }
     let elements = scene.elements();
-    let (all, tiles, differ) = (elements.partitions, elements.tiles, elements.laws.differ());
+    let (all, tiles, inertia) = (elements.partitions, elements.tiles, scene.inertia);
+    let density =
+        if elements.laws.differ() { None } else { scene.material.tissue(0).map(|tissue| tissue.density) };
     let count = all.parts(threads.parts());
     let mut parts: [_; MOST_PARTS] = from_fn(|part| {
         let mine = all.part(part, count);
@@ -54,7 +56,7 @@ pub(crate) fn nodal_volumes<M: ElementMaterial>(
         (mine, rows)
     });
     threads.each(parts.get_mut(..count).unwrap_or_default(), |(mine, rows)| {
-        NodalVolumes { tiles, all, partitions: mine.clone(), differ, displacement, rows }.compute();
+        NodalVolumes { tiles, all, partitions: mine.clone(), density, inertia, displacement, rows }.compute();
     });
 }
 
