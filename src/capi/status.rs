@@ -240,6 +240,7 @@ impl From<BuildError> for supple_error {
             BuildError::NodeCapacity { needed, capacity } | BuildError::TileCapacity { needed, capacity } => {
                 room(needed, capacity)
             }
+            BuildError::ElementCount { elements, most } => room(elements, most),
             BuildError::SupportNode { support, node, nodes } => {
                 is(SUPPLE_E_INDEX).at(support).node(node).value(node.into(), nodes as f64)
             }

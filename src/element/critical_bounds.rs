@@ -16,12 +16,18 @@
 //! `|K_ab| = sqrt(p1^2 (ga.gb)^2 + pJ^2 |F (ga x gb)|^2)`, rounded up by at most 8 %. The other parts keep the
 //! directions of `C ga`: compared with row sums of norms (Gershgorin) the step is up to `sqrt 3` times as large.
 //!
+//! With nodal pressure ([`super::pressure`]) the energy of volume is `sum_a V_a U(J_a)`. As `J_a` is a mean of the `J_e`, with weights
+//! `V_e / 4`, the square of its variation is at most the mean of theirs (Cauchy-Schwarz):
+//! `sum_a V_a U''(J_a) (dJ_a)^2 <= sum_e V_e (sum_{a in e} U''(J_a) / 4) (C:dF)^2`. So the terms above hold with the means of `U'` and
+//! `U''` over the nodes of an element.
+//!
 //! No term is left out, so the bound holds for any state, inverted elements included.
 
-use crate::material::{Law, LawState, Laws, Potential};
+use crate::material::{Law, LawState, Laws};
 use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, dot};
 
 use super::deformation::{Deformation, Vector};
+use super::pressure::{OwnPressure, Pressure};
 use super::symmetric::Symmetric;
 use super::{ElementTile, NodeInertia};
 
@@ -53,14 +59,15 @@ impl NodeMatrices<'_> {
 }
 
 /// The kernel that adds the bounds of all elements to the matrices of their nodes.
-pub struct CriticalBounds<'a, 'b, L> {
+pub struct CriticalBounds<'a, 'b, L, P = OwnPressure> {
     pub(crate) laws: Laws<'a, L>,
+    pub(crate) pressure: P,
     pub(crate) tiles: &'a [ElementTile],
     pub(crate) inertia: &'a [NodeInertia],
     pub(crate) sums: &'a mut NodeMatrices<'b>,
 }
 
-impl<L: Law> Kernel for CriticalBounds<'_, '_, L> {
+impl<L: Law, P: Pressure> Kernel for CriticalBounds<'_, '_, L, P> {
     type Output = ();
 
     const SCALAR: bool = true;
@@ -72,8 +79,8 @@ impl<L: Law> Kernel for CriticalBounds<'_, '_, L> {
         for tile in self.tiles {
             let mut buffer = [ScatterBuffer::NONE; 3];
             for first in (0..TILE).step_by(R::COUNT) {
-                let law = self.laws.widen(|lane| tile.element(first + lane));
-                add_bounds::<R, L>(&law, tile, first, inertia, self.sums, &mut buffer);
+                let law = (&self.laws, self.pressure);
+                add_bounds::<R, L, P>(law, tile, first, inertia, self.sums, &mut buffer);
             }
         }
     }
@@ -83,8 +90,8 @@ impl<L: Law> Kernel for CriticalBounds<'_, '_, L> {
 /// square root of volume over nodal mass. This stays in the range of float32, and gives a closer bound where light
 /// nodes have heavy neighbours. Nodes that are held along all axes have an infinite mass.
 #[inline(always)]
-fn add_bounds<R: Real, L: Law>(
-    law: &L::Wide<R>,
+fn add_bounds<R: Real, L: Law, P: Pressure>(
+    (laws, pressure): (&Laws<'_, L>, P),
     tile: &ElementTile,
     first: usize,
     inertia: Gather<'_>,
@@ -96,7 +103,9 @@ fn add_bounds<R: Real, L: Law>(
         return;
     };
     let deformation = Deformation::<R>::of_tile(tile, first, displacement);
-    let terms = Terms::<R>::new::<L>(law, &deformation);
+    let law = laws.widen(|lane| tile.element(first + lane));
+    let local = pressure.local::<R, L>(laws, tile, first, deformation.invariants);
+    let terms = Terms::<R>::new::<L>(&law, &local, &deformation);
     let mut gradients = [[R::splat(0.0); 3]; 4];
     for corner in 1..4 {
         gradients[corner] = tile.gradients(corner - 1, first);
@@ -206,13 +215,12 @@ impl<R: Real> Images<R> {
 
 impl<R: Real> Terms<R> {
     #[inline(always)]
-    fn new<L: Law>(law: &L::Wide<R>, deformation: &Deformation<R>) -> Self {
+    fn new<L: Law>(law: &L::Wide<R>, local: &LawState<R>, deformation: &Deformation<R>) -> Self {
         let at = deformation.invariants;
         let (zero, two) = (R::splat(0.0), R::splat(2.0));
-        let local = LawState::new::<L>(law, at);
         let (slope, [g, dg, ddg]) = (local.slope, local.volume_factor());
         let i1 = at.i + R::splat(3.0);
-        let volume = law.volume_curvature(at.j) + slope * (R::splat(4.0) * dg + ddg * i1);
+        let volume = local.bulk + slope * (R::splat(4.0) * dg + ddg * i1);
         // 4 W' g' (C:dF)(E:dF), split with r = |E| / |C|.
         let coupling = (two * slope * dg).abs();
         let (mut c, mut e) = (zero, zero);
@@ -226,7 +234,7 @@ impl<R: Real> Terms<R> {
         let ratio = (e + tiny).divide(c + tiny).sqrt();
         Self {
             p1: two * slope * g,
-            p_j: law.volume_slope(at.j) + slope * dg * i1,
+            p_j: local.pressure + slope * dg * i1,
             stiffening: local.stiffening::<L>(law),
             volume: (volume + coupling * ratio).max(zero),
             coupling: coupling.divide(ratio),
@@ -303,7 +311,7 @@ mod tests {
             };
             let scene = scene.view();
             let (laws, tiles, inertia) = (scene.material.laws(), scene.tiles, scene.inertia);
-            let kernel = CriticalBounds { laws, tiles, inertia, sums: &mut sums };
+            let kernel = CriticalBounds { laws, pressure: OwnPressure, tiles, inertia, sums: &mut sums };
             if scalar {
                 kernel.run_scalar()
             } else {

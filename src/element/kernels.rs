@@ -4,10 +4,11 @@
 #[cfg(any(feature = "std", test))]
 use crate::material::{AnyLaw, Exponential, Literal, NeoHookean};
 use crate::material::{Law, for_each_law};
-use crate::simd::dispatch;
+use crate::simd::{NodeVector, dispatch};
 
 use super::{
-    CriticalBounds, Extremes, InternalForces, MeanPressure, NoVisitor, ScalarBound, TileBounds, TileTangents,
+    CriticalBounds, ElementMaterial, Extremes, InternalForces, MeanPressure, NoVisitor, ScalarBound,
+    TileBounds, TileTangents,
 };
 
 /// A law with its kernels.
@@ -29,9 +30,27 @@ pub trait ElementLaw: Law {
     /// Bounds for the critical step.
     #[doc(hidden)]
     fn critical_bounds(kernel: CriticalBounds<'_, '_, Self>);
+    /// The same with nodal pressure.
+    #[doc(hidden)]
+    fn nodal_pressure_critical_bounds(kernel: CriticalBounds<'_, '_, Self, MeanPressure<'_>>);
     /// Stiffness bounds of one tile.
     #[doc(hidden)]
     fn tile_bounds(kernel: TileBounds<'_, Self>) -> TileTangents;
+    /// The same with nodal pressure.
+    #[doc(hidden)]
+    fn nodal_pressure_tile_bounds(kernel: TileBounds<'_, Self, MeanPressure<'_>>) -> TileTangents;
+}
+
+/// [`ElementLaw::tile_bounds`] for a material, from the volumes of the nodes where it needs them.
+pub(crate) fn tile_bounds<M: ElementMaterial>(
+    kernel: TileBounds<'_, M::Law>,
+    volumes: &[NodeVector],
+) -> TileTangents {
+    if M::NODAL_PRESSURE {
+        M::Law::nodal_pressure_tile_bounds(kernel.with_nodal_volumes(volumes))
+    } else {
+        M::Law::tile_bounds(kernel)
+    }
 }
 
 /// A visitor with which the internal forces of every law are compiled.
@@ -87,6 +106,16 @@ macro_rules! kernels {
                 #[inline(never)]
                 fn critical_bounds(kernel: CriticalBounds<'_, '_, Self>) {
                     dispatch(kernel);
+                }
+                #[inline(never)]
+                fn nodal_pressure_critical_bounds(kernel: CriticalBounds<'_, '_, Self, MeanPressure<'_>>) {
+                    dispatch(kernel);
+                }
+                #[inline(never)]
+                fn nodal_pressure_tile_bounds(
+                    kernel: TileBounds<'_, Self, MeanPressure<'_>>,
+                ) -> TileTangents {
+                    dispatch(kernel)
                 }
                 #[inline(never)]
                 fn tile_bounds(kernel: TileBounds<'_, Self>) -> TileTangents {

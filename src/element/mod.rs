@@ -20,7 +20,7 @@ mod tile_bounds;
 
 pub use fields::ElementFields;
 pub use kernels::ElementLaw;
-pub(crate) use kernels::ForcesVisitor;
+pub(crate) use kernels::{ForcesVisitor, tile_bounds};
 #[cfg(any(feature = "std", test))]
 pub use kernels::{LawWork, with_law};
 pub use node::{Axes, NodeInertia};

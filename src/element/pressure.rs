@@ -45,6 +45,14 @@ pub(crate) trait Pressure: Copy {
         at: Invariants<Pair<R>>,
         responses: [Self::Response<R>; 2],
     ) -> LawState<Pair<R>>;
+    /// The state of the law in the elements from place `first` of a tile on, of which `laws` are the constants.
+    fn local<R: Real, L: Law>(
+        &self,
+        laws: &Laws<'_, L>,
+        tile: &ElementTile,
+        first: usize,
+        at: Invariants<R>,
+    ) -> LawState<R>;
 }
 
 /// Each element's own pressure, from its volume.
@@ -74,6 +82,17 @@ impl Pressure for OwnPressure {
         _: [(); 2],
     ) -> LawState<Pair<R>> {
         LawState::new::<L>(law, at)
+    }
+
+    #[inline(always)]
+    fn local<R: Real, L: Law>(
+        &self,
+        laws: &Laws<'_, L>,
+        tile: &ElementTile,
+        first: usize,
+        at: Invariants<R>,
+    ) -> LawState<R> {
+        LawState::new::<L>(&laws.widen(|lane| tile.element(first + lane)), at)
     }
 }
 
@@ -156,5 +175,24 @@ impl Pressure for MeanPressure<'_> {
     ) -> LawState<Pair<R>> {
         let (pressure, bulk) = (Pair(one.pressure, other.pressure), Pair(one.bulk, other.bulk));
         LawState::with_volume_response::<L>(law, at, pressure, bulk)
+    }
+
+    #[inline(always)]
+    fn local<R: Real, L: Law>(
+        &self,
+        laws: &Laws<'_, L>,
+        tile: &ElementTile,
+        first: usize,
+        at: Invariants<R>,
+    ) -> LawState<R> {
+        let nodes = tile.nodes_below::<R>(self.0.count()).unwrap_or(TileNodes::ALL_ZERO);
+        // A loop, because the compiler may leave a closure over vectors as a function call.
+        let mut corners = [Self::no_volumes::<R>(); 4];
+        for (corner, volumes) in corners.iter_mut().enumerate() {
+            *volumes = self.read::<R, 4>(&nodes, corner, first);
+        }
+        let VolumeResponse { pressure, bulk } = VolumeResponse::new(laws, tile, first, corners, at.j);
+        let law = laws.widen(|lane| tile.element(first + lane));
+        LawState::with_volume_response::<L>(&law, at, pressure, bulk)
     }
 }

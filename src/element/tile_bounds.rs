@@ -1,18 +1,20 @@
 //! Stiffness bounds of one tile of elements, in the frames of their first nodes: the matrices `D_a` go to the sums of the
 //! nodes (N/m), what a coarse stiffness needs to know of each element comes back.
 
-use crate::material::{Law, LawState, Laws};
-use crate::simd::{Gather, Kernel, Real, ScatterBuffer, TILE, write_rows};
+use crate::material::{Law, Laws};
+use crate::simd::{Gather, Kernel, NodeVector, Real, ScatterBuffer, TILE, write_rows};
 
 use super::ElementTile;
 use super::deformation::Deformation;
+use super::pressure::{MeanPressure, OwnPressure, Pressure};
 use super::stiffness_bound::{Bound, MatrixSums};
 
 /// A 3 x 3 matrix by rows.
 pub(crate) type Rotation = [[f32; 3]; 3];
 
-pub struct TileBounds<'a, L> {
+pub struct TileBounds<'a, L, P = OwnPressure> {
     pub(crate) laws: Laws<'a, L>,
+    pub(crate) pressure: P,
     pub(crate) tile: &'a ElementTile,
     pub(crate) displacement: Gather<'a>,
     pub(crate) sums: MatrixSums<'a>,
@@ -20,6 +22,15 @@ pub struct TileBounds<'a, L> {
     pub(crate) rotations: &'a [Rotation; TILE],
     /// Factor of the tangents, s^2; zero if nobody needs them.
     pub(crate) weight: f32,
+}
+
+impl<'a, L> TileBounds<'a, L> {
+    /// With the pressures that follow from the volumes of the nodes.
+    pub(crate) fn with_nodal_volumes(self, volumes: &'a [NodeVector]) -> TileBounds<'a, L, MeanPressure<'a>> {
+        let Self { laws, tile, displacement, sums, rotations, weight, .. } = self;
+        let pressure = MeanPressure(Gather::new(volumes));
+        TileBounds { laws, pressure, tile, displacement, sums, rotations, weight }
+    }
 }
 
 /// Bounds of the tangents of a tile's elements for the motion of a lattice, each in the frame of its first node.
@@ -38,7 +49,7 @@ impl TileTangents {
 /// Least volume ratio of an element that is not crushed.
 const LEAST_VOLUME: f32 = 0.2;
 
-impl<L: Law> Kernel for TileBounds<'_, L> {
+impl<L: Law, P: Pressure> Kernel for TileBounds<'_, L, P> {
     type Output = TileTangents;
 
     const SCALAR: bool = true;
@@ -54,7 +65,7 @@ impl<L: Law> Kernel for TileBounds<'_, L> {
     }
 }
 
-impl<L: Law> TileBounds<'_, L> {
+impl<L: Law, P> TileBounds<'_, L, P> {
     /// The bounds of the elements from place `first` on.
     #[inline(always)]
     fn bound<R: Real>(
@@ -62,11 +73,13 @@ impl<L: Law> TileBounds<'_, L> {
         first: usize,
         tangents: &mut TileTangents,
         buffer: &mut [ScatterBuffer<4>; 2],
-    ) {
+    ) where
+        P: Pressure,
+    {
         let tile = self.tile;
         let law = self.laws.widen(|lane| tile.element(first + lane));
         let deformation = Deformation::<R>::of_tile(tile, first, self.displacement);
-        let local = LawState::new::<L>(&law, deformation.invariants);
+        let local = self.pressure.local::<R, L>(&self.laws, tile, first, deformation.invariants);
         let bound = Bound::<R>::new::<L>(&law, tile, first, &deformation, &local);
         // C in the frame of the element's first node.
         let mut cofactor = [[R::splat(0.0); 3]; 3];

@@ -10,7 +10,7 @@ use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::{Contiguous, NodeVector};
 use crate::state::StateView;
-use crate::step::{Status, Step, Threads};
+use crate::step::{CallingThread, Status, Step, Threads, nodal_volumes};
 
 use super::damper::RoughMotion;
 use super::estimate::ErrorEstimate;
@@ -165,7 +165,7 @@ impl<'w> LargeModel<'w> {
         let (damped, capacity) = (self.method.damper().is_some(), storage.len());
         let needed = vectors_for_lattice(self.nodes, self.elements, grid, damped);
         check("vectors", needed, capacity)?;
-        check("nodes in the state", self.nodes, state.capacity())?;
+        check("nodes in the state", self.nodes, state.capacity_for::<M>())?;
         storage.fill(NodeVector::ZERO);
         let Some(Storage { mut tables, places, order, mut matrices }) =
             Storage::split(storage, [self.nodes, self.elements], &self.lattice, damped)
@@ -175,12 +175,16 @@ impl<'w> LargeModel<'w> {
         write_heights(scene, &mut tables);
         self.choose_frames(scene, points, &mut tables, places)?;
         self.moved_elements = sort_by_patch(order, scene, &self.lattice, places);
-        let StateView { displacement, increment, progress, .. } = state;
+        let StateView { displacement, increment, volume, progress, .. } = state;
         self.steps = progress.steps;
         let nodes = self.nodes;
+        let displacement = displacement.get(..nodes).unwrap_or_default();
+        let volume = volume.get_mut(..nodes).unwrap_or_default();
+        nodal_volumes(scene, displacement, volume, &CallingThread);
         let input = RefreshInput {
             scene,
-            displacement: displacement.get(..nodes).unwrap_or_default(),
+            displacement,
+            volume,
             increment: increment.get_mut(..nodes).unwrap_or_default(),
             lattice: &self.lattice,
             places,

@@ -24,7 +24,9 @@ use super::projected_inertia::{CellSums, add_cell};
 use super::report::AddedInertiaSums;
 use super::transport::invert_edges;
 use super::{DRAG_AT_WHOLE_CYCLES, DRAG_OF_ADDED, LARGEST_DRAG};
-use crate::element::{ElementLaw, ElementMaterial, ElementTile, MatrixSums, TileBounds, TileTangents};
+use crate::element::{
+    ElementMaterial, ElementTile, MatrixSums, OwnPressure, TileBounds, TileTangents, tile_bounds,
+};
 use crate::scene::SceneView;
 use crate::simd::{Gather, NodeVector, Scatter, TILE};
 
@@ -145,6 +147,8 @@ static PROBE: Row = {
 pub(super) struct RefreshInput<'a, M> {
     pub(super) scene: SceneView<'a, M>,
     pub(super) displacement: &'a [NodeVector],
+    /// Of the nodes, for materials with nodal pressure.
+    pub(super) volume: &'a [NodeVector],
     pub(super) increment: &'a mut [NodeVector],
     pub(super) lattice: &'a Lattice,
     pub(super) places: &'a [LatticeNode],
@@ -467,7 +471,10 @@ impl Refresh {
         let laws = input.scene.material.laws();
         let weight = if has_lattice { input.scaling.coarse_weight } else { 0.0 };
         let rotations = &rotations;
-        let tangents = M::Law::tile_bounds(TileBounds { laws, tile, displacement, sums, rotations, weight });
+        let tangents = tile_bounds::<M>(
+            TileBounds { laws, pressure: OwnPressure, tile, displacement, sums, rotations, weight },
+            input.volume,
+        );
         if has_lattice {
             self.next_stiffness.add(&tangents);
             for (lane, element) in elements.iter_mut().enumerate() {

@@ -9,7 +9,9 @@ use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::{Progress, StateView};
-use crate::step::{CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial};
+use crate::step::{
+    CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial, nodal_volumes,
+};
 
 use super::cells::{prolong, restrict};
 use super::damper::RoughMotion;
@@ -144,9 +146,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
         let LargeModel { lattice, refresh, scaling, estimate, report, nodes, least_share, steps, .. } =
             &mut **model;
         *least_share = held_back.least;
-        let Trial { scene, displacement, increment, progress, .. } = trial;
+        let Trial { scene, displacement, increment, volume, progress, .. } = trial;
         *steps = progress.steps;
-        let input = RefreshInput { scene: *scene, displacement, increment, lattice, places, order, scaling };
+        let input =
+            RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
         refresh.advance(progress.steps, self.change, input, tables, matrices);
         *report = refresh.added.report(held_back.nodes, *coarse_share, estimate.error());
         report.damping = self.damping;
@@ -175,11 +178,13 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
     fn renew_if_stale<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) {
         let Self { model, storage: Storage { tables, places, order, matrices }, .. } = self;
         let LargeModel { lattice, refresh, scaling, rough, least_share, steps, estimate, .. } = &mut **model;
-        let Trial { scene, displacement, increment, progress, .. } = trial;
+        let Trial { scene, displacement, increment, volume, progress, .. } = trial;
         if *steps == progress.steps {
             return;
         }
-        let input = RefreshInput { scene: *scene, displacement, increment, lattice, places, order, scaling };
+        nodal_volumes(*scene, displacement, volume, &CallingThread);
+        let input =
+            RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
         refresh.renew(input, tables, matrices);
         (*rough, *least_share, *estimate) = (RoughMotion::NONE, 1.0, estimate.cleared());
         tables.rough.fill(NodeVector::ZERO);
@@ -201,7 +206,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         if lattice.functions() == 0 {
             return None;
         }
-        let Trial { scene, loads, displacement, increment, force, progress, .. } = trial;
+        let Trial { scene, loads, displacement, increment, force, volume, progress } = trial;
         let supports = MovingSupports {
             scene: *scene,
             lattice,
@@ -209,6 +214,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             elements: order.get(..*moved_elements).unwrap_or_default(),
             weight: scaling.coarse_weight,
             displacement,
+            volume,
         };
         let supports = supports.pull(loads, progress.time, step, increment, tables.next_increment);
         let input =

@@ -14,7 +14,7 @@ use super::frames::Rotation;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, node_place};
 use super::patches::nodes_of;
 use crate::element::{
-    ElementLaw, ElementMaterial, ElementTile, MatrixSums, NodeInertia, TileBounds, TileTangents,
+    ElementMaterial, ElementTile, MatrixSums, NodeInertia, OwnPressure, TileBounds, TileTangents, tile_bounds,
 };
 use crate::loads::Loads;
 use crate::scene::SceneView;
@@ -39,6 +39,8 @@ pub(super) struct MovingSupports<'a, M> {
     /// `s_c D^2 / 4`, s^2.
     pub(super) weight: f32,
     pub(super) displacement: &'a [NodeVector],
+    /// Of the nodes, for materials with nodal pressure.
+    pub(super) volume: &'a [NodeVector],
 }
 
 impl<M: ElementMaterial> MovingSupports<'_, M> {
@@ -111,7 +113,10 @@ impl<M: ElementMaterial> MovingSupports<'_, M> {
         // No sums over the nodes.
         let sums = MatrixSums { diagonal: Scatter::new(&mut []), off_diagonal: Scatter::new(&mut []) };
         let rotations = &[Rotation::NONE.0; TILE];
-        M::Law::tile_bounds(TileBounds { laws, tile, displacement, sums, rotations, weight })
+        tile_bounds::<M>(
+            TileBounds { laws, pressure: OwnPressure, tile, displacement, sums, rotations, weight },
+            self.volume,
+        )
     }
 
     /// Subtracts the share of each function in a node's force.
@@ -176,6 +181,7 @@ mod tests {
             elements: &order[..touching],
             weight: 1e-6,
             displacement: state.displacement,
+            volume: &[],
         };
         let pull = supports.pull(&loads, 0.0, &step, state.increment, &mut changes).unwrap();
 

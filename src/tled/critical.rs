@@ -3,10 +3,11 @@
 //! damping does not lower the limit, as it is taken at the middle of the step.
 //! The bound of [`crate::element`] needs no iteration.
 
-use crate::element::{CriticalBounds, ElementLaw, ElementMaterial, NodeMatrices};
+use crate::element::{CriticalBounds, ElementLaw, ElementMaterial, MeanPressure, NodeMatrices, OwnPressure};
 use crate::scene::{AsScene, SceneView};
+use crate::simd::Gather;
 use crate::state::{AsState, StateView};
-use crate::step::CriticalStep;
+use crate::step::{CallingThread, CriticalStep, nodal_volumes};
 
 /// Relative rounding of the sums; the bound is lowered by it.
 const ROUNDING: f32 = 1e-5;
@@ -20,7 +21,12 @@ pub fn critical_step(scene: &impl AsScene, state: &mut impl AsState) -> Option<C
 
 fn critical<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -> Option<CriticalStep> {
     let count = scene.node_count();
-    let StateView { displacement, increment, force, .. } = state;
+    if state.capacity_for::<M>() < count {
+        return None;
+    }
+    let StateView { displacement, increment, force, volume, .. } = state;
+    let volume = volume.get_mut(..count).unwrap_or_default();
+    nodal_volumes(scene, displacement.get(..count)?, volume, &CallingThread);
     let mut sums = NodeMatrices {
         xx_yy_zz_xy: force.get_mut(..count)?,
         yz_in_padding: increment.get_mut(..count)?,
@@ -28,7 +34,14 @@ fn critical<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -
     };
     sums.clear();
     let (laws, tiles, inertia) = (scene.material.laws(), scene.tiles, scene.inertia);
-    M::Law::critical_bounds(CriticalBounds { laws, tiles, inertia, sums: &mut sums });
+    if M::NODAL_PRESSURE {
+        let pressure = MeanPressure(Gather::new(volume));
+        let kernel = CriticalBounds { laws, pressure, tiles, inertia, sums: &mut sums };
+        M::Law::nodal_pressure_critical_bounds(kernel);
+    } else {
+        let pressure = OwnPressure;
+        M::Law::critical_bounds(CriticalBounds { laws, pressure, tiles, inertia, sums: &mut sums });
+    }
     let mut largest = (0.0, 0);
     let mut finite = true;
     for (node, inertia) in scene.inertia.iter().enumerate() {

@@ -9,7 +9,7 @@ use std::vec::Vec;
 use glam::DVec3;
 
 use super::tangent::ElementTangent;
-use crate::material::Material;
+use crate::material::{Law, Material, Potential};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 
@@ -24,6 +24,11 @@ pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &
     let displacement = displacement.get(..scene.node_count())?;
     let tangents: Vec<ElementTangent> =
         scene.places().map(|(tile, lane)| ElementTangent::of(scene, tile, lane, displacement)).collect();
+    let nodal = if M::NODAL_PRESSURE { Some(NodalTangent::new(scene, &tangents)) } else { None };
+    let tangents = match &nodal {
+        Some(nodal) => nodal.with_pressures(tangents),
+        None => tangents,
+    };
     let roots: Vec<DVec3> = scene
         .inertia
         .iter()
@@ -37,6 +42,9 @@ pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &
                 out[node] += product;
             }
         }
+        if let Some(nodal) = &nodal {
+            nodal.add(&tangents, |node| roots[node] * vector[node], &mut out);
+        }
         for (sum, root) in out.iter_mut().zip(&roots) {
             *sum *= *root;
         }
@@ -44,6 +52,84 @@ pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &
     };
     let largest = largest_eigenvalue(start_vector(&roots), product)?;
     Some(if largest > 0.0 { 2.0 / largest.sqrt() } else { f64::INFINITY })
+}
+
+/// What nodal pressure adds to the tangents of the elements: `sum_a V_a U''(J_a) (dJ_a)^2` ([`crate::element`]). Where an element keeps
+/// its own volume it has an entry of its own.
+struct NodalTangent {
+    /// For each element the entries of its corners.
+    entries: Vec<[usize; 4]>,
+    /// For each entry: volume, m^3, `J - 1`.
+    volumes: Vec<f64>,
+    changes: Vec<f64>,
+    /// `U'` and `U''`, Pa, at the corners of each element.
+    slopes: Vec<[f64; 4]>,
+    curvatures: Vec<[f64; 4]>,
+}
+
+impl NodalTangent {
+    fn new<M: Material>(scene: SceneView<'_, M>, tangents: &[ElementTangent]) -> Self {
+        let nodes = scene.node_count();
+        let places = scene.places().enumerate();
+        let entries: Vec<_> = places
+            .map(|(element, (tile, lane))| {
+                [0, 1, 2, 3].map(|corner| match tile.slot(corner, lane) {
+                    slot @ (0 | 1) => 2 * tile.node(corner, lane) + usize::from(slot),
+                    _ => 2 * nodes + element,
+                })
+            })
+            .collect();
+        let mut volumes = vec![0.0; 2 * nodes + tangents.len()];
+        let mut changes = volumes.clone();
+        for (tangent, entries) in tangents.iter().zip(&entries) {
+            for &entry in entries {
+                volumes[entry] += tangent.quarter();
+                changes[entry] += tangent.quarter() * tangent.change;
+            }
+        }
+        for (change, volume) in changes.iter_mut().zip(&volumes) {
+            *change /= volume.max(f64::MIN_POSITIVE);
+        }
+        let laws = scene.material.laws();
+        let of = |at: &dyn Fn(<M::Law as Law>::Wide<f32>, f32) -> f32| {
+            let elements = scene.places().zip(&entries);
+            let corners = elements.map(|((tile, lane), entries)| {
+                let law = laws.of(tile.element(lane));
+                entries.map(|entry| f64::from(at(M::Law::widen(|_| law), changes[entry] as f32)))
+            });
+            corners.collect::<Vec<_>>()
+        };
+        let slopes = of(&|law, j| law.volume_slope(j));
+        let curvatures = of(&|law, j| law.volume_curvature(j));
+        Self { entries, volumes, changes, slopes, curvatures }
+    }
+
+    /// The tangents with the mean pressures of their corners.
+    fn with_pressures(&self, tangents: Vec<ElementTangent>) -> Vec<ElementTangent> {
+        let elements = tangents.into_iter().zip(&self.slopes);
+        elements.map(|(tangent, slopes)| tangent.with_pressure(0.25 * slopes.iter().sum::<f64>())).collect()
+    }
+
+    /// Adds the products with displacements (m) of the nodes, N.
+    fn add(&self, tangents: &[ElementTangent], at: impl Fn(usize) -> DVec3, out: &mut [DVec3]) {
+        let mut changes = vec![0.0; self.changes.len()];
+        for (tangent, entries) in tangents.iter().zip(&self.entries) {
+            let change = tangent.quarter() * tangent.change_by(tangent.nodes.map(&at));
+            for &entry in entries {
+                changes[entry] += change / self.volumes[entry];
+            }
+        }
+        for ((tangent, entries), curvatures) in tangents.iter().zip(&self.entries).zip(&self.curvatures) {
+            let pressure: f64 = entries
+                .iter()
+                .zip(curvatures)
+                .map(|(&entry, curvature)| 0.25 * curvature * changes[entry])
+                .sum();
+            for (&node, force) in tangent.nodes.iter().zip(tangent.forces_of(pressure)) {
+                out[node] += force;
+            }
+        }
+    }
 }
 
 /// A fixed vector with a share of every mode.

@@ -24,6 +24,11 @@ pub(crate) struct ElementTangent {
     stiffening: f64,
     coupling: f64,
     bulk: f64,
+    /// `U'` and `U''` at the element's own volume.
+    volume_slope: f64,
+    volume_curvature: f64,
+    /// `J - 1`.
+    pub(super) change: f64,
     /// `dx/dF = x_f F + x_c C`.
     x_f: f64,
     x_c: f64,
@@ -82,6 +87,9 @@ impl ElementTangent {
             stiffening: curvature(at.i),
             coupling: 0.0,
             bulk: volume_curvature,
+            volume_slope,
+            volume_curvature,
+            change: volume_ratio - 1.0,
             x_f: 2.0,
             x_c: 0.0,
         };
@@ -101,6 +109,32 @@ impl ElementTangent {
             x_c: slope_g * square,
             ..base
         }
+    }
+
+    /// The same with another pressure `U'`, Pa, and without the stiffness of its change.
+    pub(super) fn with_pressure(mut self, pressure: f64) -> Self {
+        self.p_j += pressure - self.volume_slope;
+        self.bulk -= self.volume_curvature;
+        self
+    }
+
+    /// A quarter of the volume, m^3.
+    pub(super) fn quarter(&self) -> f64 {
+        0.25 * self.volume
+    }
+
+    /// Change of `J` with displacements `v` (m) of its nodes.
+    pub(super) fn change_by(&self, vector: [DVec3; 4]) -> f64 {
+        self.gradients
+            .iter()
+            .zip(vector)
+            .map(|(gradient, vector)| (self.cofactor * *gradient).dot(vector))
+            .sum()
+    }
+
+    /// Change of its nodes' forces against it, N, with the pressure (Pa).
+    pub(super) fn forces_of(&self, pressure: f64) -> [DVec3; 4] {
+        self.gradients.map(|gradient| self.cofactor * gradient * (pressure * self.volume))
     }
 
     /// Forces with which the element acts on its nodes, N.

@@ -5,7 +5,7 @@
 use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{Exponential, NeoHookean, Tissue};
+use supple::material::{Exponential, NeoHookean, NodalPressure, Regions, Tissue};
 use supple::mesh::{self, Bar, Mesh, Winding};
 use supple::mlp::Network;
 use supple::scene::{FixedScene, Support};
@@ -33,6 +33,35 @@ pub extern "C" fn build(
         return -2;
     };
     scene.build(&mesh, supports).map_or(-3, |()| 0)
+}
+
+/// Builds a scene of several tissues with nodal pressure, asks for its critical step and takes one.
+#[unsafe(no_mangle)]
+pub extern "C" fn nodal_pressure(
+    tissues: &'static [Tissue<NeoHookean>; 3],
+    of_element: &'static [u16; 300],
+    points: &[[f32; 3]; 100],
+    tets: &[[u32; 4]; 300],
+    supports: &[Support; 9],
+    state: &mut FixedState<100, 100>,
+) -> f32 {
+    let mut scene = FixedScene::<_, 100, 20>::new(NodalPressure(Regions { tissues, of_element }));
+    let Ok(mesh) = Mesh::new(points, tets, Winding::Normalised) else {
+        return -1.0;
+    };
+    if scene.build(&mesh, supports).is_err() {
+        return -2.0;
+    }
+    let Some(critical) = tled::critical_step(&scene, state) else {
+        return -3.0;
+    };
+    let Ok(step) = Step::unchecked(0.9 * critical.seconds, 1.0) else {
+        return -4.0;
+    };
+    match tled::step(&scene, &Loads::NONE, state, &step) {
+        Status::Ok => tled::strain_energy(&scene, state).map_or(-5.0, |energy| energy as f32),
+        _ => -6.0,
+    }
 }
 
 /// Renumbers the nodes.
@@ -82,9 +111,9 @@ pub extern "C" fn step(
 
 /// Element fields and energy.
 #[unsafe(no_mangle)]
-pub extern "C" fn fields(scene: &Scene<NeoHookean>, state: &State) -> f64 {
+pub extern "C" fn fields(scene: &Scene<NeoHookean>, state: &mut State) -> f64 {
     let stresses = scene.view().element_fields(state.displacements()).map(|fields| fields.von_mises);
-    stresses.sum::<f64>() + tled::strain_energy(&scene.view(), &mut state).expect("room")
+    stresses.sum::<f64>() + tled::strain_energy(scene, state).unwrap_or(f64::NAN)
 }
 
 /// Internal forces of the other law, N.
