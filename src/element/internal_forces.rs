@@ -152,12 +152,12 @@ fn in_batches<R: Real, L: Law, P: Pressure, const SIZE: usize>(
 /// A vector of elements, those of a tile from place `first` on, with what the passes of [`add_forces`] compute for
 /// them.
 #[derive(Clone, Copy)]
-pub(super) struct ElementVector<'a, R, V> {
-    pub(super) tile: &'a ElementTile,
-    pub(super) first: usize,
+struct ElementVector<'a, R, V> {
+    tile: &'a ElementTile,
+    first: usize,
     /// Displacement gradient.
     h: Matrix<R>,
-    pub(super) invariants: Invariants<R>,
+    invariants: Invariants<R>,
     /// What the pressure follows from.
     volume_response: V,
     /// Scalars of the stress, Pa.
@@ -169,7 +169,7 @@ pub(super) struct ElementVector<'a, R, V> {
 
 impl<'a, R: Real, V> ElementVector<'a, R, V> {
     #[inline(always)]
-    pub(super) fn zero(tile: &'a ElementTile, volume_response: V) -> Self {
+    fn zero(tile: &'a ElementTile, volume_response: V) -> Self {
         let zero = R::splat(0.0);
         let invariants = Invariants { i: zero, j: zero };
         let h = [[zero; 3]; 3];
@@ -179,9 +179,9 @@ impl<'a, R: Real, V> ElementVector<'a, R, V> {
 
 /// Vectors of elements in a batch. A batch of scalar code has the elements of as many strips as the scatter buffer
 /// holds.
-pub(super) const BATCH: usize = 8;
+const BATCH: usize = 8;
 #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
-pub(super) const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
+const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
 
 /// Adds the internal forces of elements to `force`, with minus sign. Every `length` consecutive tiles hold strips of
 /// that length ([`crate::mesh::strips`]), one element of each strip in every tile.
@@ -199,7 +199,10 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
 ) {
     let Some(first) = tiles.first() else { return };
     let mut batch = [ElementVector::<R, P::Response<R>>::zero(first, P::none()); SIZE];
-    for strips in batches::<R, SIZE>(tiles, length) {
+    let strip_count = tiles.len().checked_div(length).unwrap_or(0) * (TILE / R::COUNT);
+    let most = if R::COUNT == 1 { SCATTER_WIDTH } else { SIZE.checked_div(length).unwrap_or(SIZE).max(1) };
+    for start in (0..strip_count).step_by(most) {
+        let strips = start..strip_count.min(start + most);
         let count = length * strips.len();
         match length {
             3 => deform::<R, L, P, 3, 6>(laws, tiles, strips, input, &mut batch),
@@ -215,22 +218,11 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
         }
         let batch = batch.get(..count).unwrap_or_default();
         match length {
-            3 => scatter::<R, _, NodalForces, 3, 6>(batch, force),
-            2 => scatter::<R, _, NodalForces, 2, 5>(batch, force),
-            _ => scatter::<R, _, NodalForces, 1, 4>(batch, force),
+            3 => scatter::<R, _, 3, 6>(batch, force),
+            2 => scatter::<R, _, 2, 5>(batch, force),
+            _ => scatter::<R, _, 1, 4>(batch, force),
         }
     }
-}
-
-/// Strips of the batches: a batch has at most `SIZE` vectors of elements.
-#[inline(always)]
-pub(super) fn batches<R: Real, const SIZE: usize>(
-    tiles: &[ElementTile],
-    length: usize,
-) -> impl Iterator<Item = Range<usize>> + use<R, SIZE> {
-    let strip_count = tiles.len().checked_div(length).unwrap_or(0) * (TILE / R::COUNT);
-    let most = if R::COUNT == 1 { SCATTER_WIDTH } else { SIZE.checked_div(length).unwrap_or(SIZE).max(1) };
-    (0..strip_count).step_by(most).map(move |start| start..strip_count.min(start + most))
 }
 
 /// The nodes of strips of `K` elements: four of the first element, and the first of each other element.
@@ -246,7 +238,7 @@ pub(super) fn nodes_of<const K: usize, const N: usize>(tiles: [&ElementTile; K])
 /// The first pass: deformation of the elements of some strips of `K` elements with `N` nodes. Elements of tiles with
 /// nodes out of range do not deform.
 #[inline(always)]
-pub(super) fn deform<'a, R: Real, L: Law, P: Pressure, const K: usize, const N: usize>(
+fn deform<'a, R: Real, L: Law, P: Pressure, const K: usize, const N: usize>(
     laws: &Laws<'_, L>,
     tiles: &'a [ElementTile],
     strips: Range<usize>,
@@ -296,7 +288,8 @@ fn respond<R: Real, L: Law, P: Pressure>(
         i: Pair(first.invariants.i, second.invariants.i),
         j: Pair(first.invariants.j, second.invariants.j),
     };
-    let local = P::state::<R, L>(&law, invariants, [first.volume_response, second.volume_response]);
+    let volume_response = P::paired(first.volume_response, second.volume_response);
+    let local = P::state::<Pair<R>, L>(&law, invariants, volume_response);
     let response = local.response::<L>(&law);
     (first.p1, first.s) = (response.p1.0, response.s.0);
     (second.p1, second.s) = (response.p1.1, response.s.1);
@@ -318,45 +311,34 @@ fn visit<R: Real, L: Law, P: Pressure>(
     elements.fourth = visitor.visit::<R, L>(&law, elements.tile, elements.first, &deformation, local);
 }
 
-/// What elements add to the vectors of their nodes.
-pub(super) trait Corners<R, V> {
-    /// One row a corner.
-    fn rows(elements: &ElementVector<'_, R, V>) -> [[R; 4]; 4];
-}
-
 /// Nodal forces from the stress, with the fourth component of the visitor.
-struct NodalForces;
-
-impl<R: Real, V> Corners<R, V> for NodalForces {
-    #[inline(always)]
-    fn rows(elements: &ElementVector<'_, R, V>) -> [[R; 4]; 4] {
-        let ElementVector { tile, first, p1, s, fourth, .. } = elements;
-        let first = *first;
-        let deformation = Deformation::with(elements.h, elements.invariants);
-        let stress = deformation.stress(*p1, *s);
-        let minus_volume = -tile.volume::<R>(first);
-        let mut forces = [[R::splat(0.0); 3]; 4];
-        for axis in 0..3 {
-            let [x, y, z] = stress[axis];
-            let row = [x * minus_volume, y * minus_volume, z * minus_volume];
-            for corner in 0..3 {
-                forces[corner + 1][axis] = dot(row, tile.gradients::<R>(corner, first));
-            }
-            forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
+#[inline(always)]
+fn nodal_forces<R: Real, V: Copy>(elements: &ElementVector<'_, R, V>) -> [[R; 4]; 4] {
+    let ElementVector { tile, first, .. } = *elements;
+    let deformation = Deformation::with(elements.h, elements.invariants);
+    let stress = deformation.stress(elements.p1, elements.s);
+    let minus_volume = -tile.volume::<R>(first);
+    let mut forces = [[R::splat(0.0); 3]; 4];
+    for axis in 0..3 {
+        let [x, y, z] = stress[axis];
+        let row = [x * minus_volume, y * minus_volume, z * minus_volume];
+        for corner in 0..3 {
+            forces[corner + 1][axis] = dot(row, tile.gradients::<R>(corner, first));
         }
-        let ([a, b, c, d], fourth) = (forces, *fourth);
-        [
-            [a[0], a[1], a[2], fourth],
-            [b[0], b[1], b[2], fourth],
-            [c[0], c[1], c[2], fourth],
-            [d[0], d[1], d[2], fourth],
-        ]
+        forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
     }
+    let ([a, b, c, d], fourth) = (forces, elements.fourth);
+    [
+        [a[0], a[1], a[2], fourth],
+        [b[0], b[1], b[2], fourth],
+        [c[0], c[1], c[2], fourth],
+        [d[0], d[1], d[2], fourth],
+    ]
 }
 
-/// The third pass: adds the rows to the nodes of strips of `K` elements with `N` nodes.
+/// The third pass: adds the forces to the nodes of strips of `K` elements with `N` nodes.
 #[inline(always)]
-pub(super) fn scatter<R: Real, V, C: Corners<R, V>, const K: usize, const N: usize>(
+fn scatter<R: Real, V: Copy, const K: usize, const N: usize>(
     batch: &[ElementVector<'_, R, V>],
     force: &mut Scatter<'_>,
 ) {
@@ -366,7 +348,7 @@ pub(super) fn scatter<R: Real, V, C: Corners<R, V>, const K: usize, const N: usi
         let mut tiles = [strip[0].tile; K];
         unrolled!(element < K => {
             tiles[element] = strip[element].tile;
-            let forces = C::rows(&strip[element]);
+            let forces = nodal_forces(&strip[element]);
             for corner in 0..4 {
                 let row = &mut rows[CORNERS[element % LONGEST][corner] % N];
                 for axis in 0..4 {

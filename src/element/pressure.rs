@@ -39,20 +39,35 @@ pub(crate) trait Pressure: Copy {
         corners: [Self::Volumes<R>; 4],
         own: R,
     ) -> Self::Response<R>;
-    /// The state of the law in two vectors of elements.
+    /// Of two vectors of elements.
+    fn paired<R: Real>(one: Self::Response<R>, other: Self::Response<R>) -> Self::Response<Pair<R>>;
+    /// The state of the law.
     fn state<R: Real, L: Law>(
-        law: &L::Wide<Pair<R>>,
-        at: Invariants<Pair<R>>,
-        responses: [Self::Response<R>; 2],
-    ) -> LawState<Pair<R>>;
+        law: &L::Wide<R>,
+        at: Invariants<R>,
+        response: Self::Response<R>,
+    ) -> LawState<R>;
+    /// Number of nodes that can be read.
+    fn count(&self) -> usize;
+
     /// The state of the law in the elements from place `first` of a tile on, of which `laws` are the constants.
+    #[inline(always)]
     fn local<R: Real, L: Law>(
         &self,
         laws: &Laws<'_, L>,
         tile: &ElementTile,
         first: usize,
         at: Invariants<R>,
-    ) -> LawState<R>;
+    ) -> LawState<R> {
+        let nodes = tile.nodes_below::<R>(self.count()).unwrap_or(TileNodes::ALL_ZERO);
+        // A loop, because the compiler may leave a closure over vectors as a function call.
+        let mut corners = [Self::no_volumes::<R>(); 4];
+        for (corner, volumes) in corners.iter_mut().enumerate() {
+            *volumes = self.read::<R, 4>(&nodes, corner, first);
+        }
+        let response = Self::response::<R, L>(laws, tile, first, corners, at.j);
+        Self::state::<R, L>(&laws.widen(|lane| tile.element(first + lane)), at, response)
+    }
 }
 
 /// Each element's own pressure, from its volume.
@@ -76,23 +91,16 @@ impl Pressure for OwnPressure {
     fn response<R: Real, L: Law>(_: &Laws<'_, L>, _: &ElementTile, _: usize, _: [(); 4], _: R) {}
 
     #[inline(always)]
-    fn state<R: Real, L: Law>(
-        law: &L::Wide<Pair<R>>,
-        at: Invariants<Pair<R>>,
-        _: [(); 2],
-    ) -> LawState<Pair<R>> {
+    fn paired<R: Real>((): (), (): ()) {}
+
+    #[inline(always)]
+    fn state<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>, (): ()) -> LawState<R> {
         LawState::new::<L>(law, at)
     }
 
     #[inline(always)]
-    fn local<R: Real, L: Law>(
-        &self,
-        laws: &Laws<'_, L>,
-        tile: &ElementTile,
-        first: usize,
-        at: Invariants<R>,
-    ) -> LawState<R> {
-        LawState::new::<L>(&laws.widen(|lane| tile.element(first + lane)), at)
+    fn count(&self) -> usize {
+        0
     }
 }
 
@@ -105,35 +113,6 @@ pub struct MeanPressure<'a>(pub(crate) Gather<'a>);
 pub(crate) struct VolumeResponse<R> {
     pressure: R,
     bulk: R,
-}
-
-impl<R: Real> VolumeResponse<R> {
-    /// Of the elements from place `first` of a tile on, from `J - 1` of the two tissues at each corner.
-    #[inline(always)]
-    fn new<L: Law>(
-        laws: &Laws<'_, L>,
-        tile: &ElementTile,
-        first: usize,
-        corners: [[R; 2]; 4],
-        own: R,
-    ) -> Self {
-        let law = laws.widen::<R>(|lane| tile.element(first + lane));
-        let mut sum = Self { pressure: R::splat(0.0), bulk: R::splat(0.0) };
-        for (corner, [one, other]) in corners.into_iter().enumerate() {
-            let j = if laws.differ() {
-                // 0, 1 or 2: positive minus a half is of the first tissue, and so on.
-                let slot = R::from_fn(|lane| f32::from(tile.slot(corner, first + lane)));
-                let half = R::splat(0.5);
-                (half - slot).choose(one, (slot - (half + R::splat(1.0))).choose(own, other))
-            } else {
-                one
-            };
-            sum.pressure = sum.pressure + law.volume_slope(j);
-            sum.bulk = sum.bulk + law.volume_curvature(j);
-        }
-        let quarter = R::splat(0.25);
-        Self { pressure: quarter * sum.pressure, bulk: quarter * sum.bulk }
-    }
 }
 
 impl Pressure for MeanPressure<'_> {
@@ -164,35 +143,41 @@ impl Pressure for MeanPressure<'_> {
         corners: [[R; 2]; 4],
         own: R,
     ) -> VolumeResponse<R> {
-        VolumeResponse::new::<L>(laws, tile, first, corners, own)
+        let law = laws.widen::<R>(|lane| tile.element(first + lane));
+        let mut sum = Self::none::<R>();
+        for (corner, [one, other]) in corners.into_iter().enumerate() {
+            let j = if laws.differ() {
+                // 0, 1 or 2: positive minus a half is of the first tissue, and so on.
+                let slot = R::from_fn(|lane| f32::from(tile.slot(corner, first + lane)));
+                let half = R::splat(0.5);
+                (half - slot).choose(one, (slot - (half + R::splat(1.0))).choose(own, other))
+            } else {
+                one
+            };
+            sum.pressure = sum.pressure + law.volume_slope(j);
+            sum.bulk = sum.bulk + law.volume_curvature(j);
+        }
+        let quarter = R::splat(0.25);
+        VolumeResponse { pressure: quarter * sum.pressure, bulk: quarter * sum.bulk }
+    }
+
+    #[inline(always)]
+    fn paired<R: Real>(one: VolumeResponse<R>, other: VolumeResponse<R>) -> VolumeResponse<Pair<R>> {
+        let (pressure, bulk) = (Pair(one.pressure, other.pressure), Pair(one.bulk, other.bulk));
+        VolumeResponse { pressure, bulk }
     }
 
     #[inline(always)]
     fn state<R: Real, L: Law>(
-        law: &L::Wide<Pair<R>>,
-        at: Invariants<Pair<R>>,
-        [one, other]: [VolumeResponse<R>; 2],
-    ) -> LawState<Pair<R>> {
-        let (pressure, bulk) = (Pair(one.pressure, other.pressure), Pair(one.bulk, other.bulk));
+        law: &L::Wide<R>,
+        at: Invariants<R>,
+        VolumeResponse { pressure, bulk }: VolumeResponse<R>,
+    ) -> LawState<R> {
         LawState::with_volume_response::<L>(law, at, pressure, bulk)
     }
 
     #[inline(always)]
-    fn local<R: Real, L: Law>(
-        &self,
-        laws: &Laws<'_, L>,
-        tile: &ElementTile,
-        first: usize,
-        at: Invariants<R>,
-    ) -> LawState<R> {
-        let nodes = tile.nodes_below::<R>(self.0.count()).unwrap_or(TileNodes::ALL_ZERO);
-        // A loop, because the compiler may leave a closure over vectors as a function call.
-        let mut corners = [Self::no_volumes::<R>(); 4];
-        for (corner, volumes) in corners.iter_mut().enumerate() {
-            *volumes = self.read::<R, 4>(&nodes, corner, first);
-        }
-        let VolumeResponse { pressure, bulk } = VolumeResponse::new(laws, tile, first, corners, at.j);
-        let law = laws.widen(|lane| tile.element(first + lane));
-        LawState::with_volume_response::<L>(&law, at, pressure, bulk)
+    fn count(&self) -> usize {
+        self.0.count()
     }
 }

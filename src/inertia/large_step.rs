@@ -179,7 +179,6 @@ impl<'w> LargeModel<'w> {
         self.steps = progress.steps;
         let nodes = self.nodes;
         let displacement = displacement.get(..nodes).unwrap_or_default();
-        let volume = volume.get_mut(..nodes).unwrap_or_default();
         nodal_volumes(scene, displacement, volume, &CallingThread);
         let input = RefreshInput {
             scene,

@@ -25,8 +25,7 @@ fn critical<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -
         return None;
     }
     let StateView { displacement, increment, force, volume, .. } = state;
-    let volume = volume.get_mut(..count).unwrap_or_default();
-    nodal_volumes(scene, displacement.get(..count)?, volume, &CallingThread);
+    nodal_volumes(scene, displacement, volume, &CallingThread);
     let mut sums = NodeMatrices {
         xx_yy_zz_xy: force.get_mut(..count)?,
         yz_in_padding: increment.get_mut(..count)?,

@@ -150,12 +150,7 @@ fn strain_energy_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateVie
     if state.capacity_for::<M>() < nodes {
         return None;
     }
-    nodal_volumes(
-        scene,
-        state.displacement,
-        state.volume.get_mut(..nodes).unwrap_or_default(),
-        &CallingThread,
-    );
+    nodal_volumes(scene, state.displacement, state.volume, &CallingThread);
     Some(scene.strain_energy(state.displacement, state.volume))
 }
 
@@ -172,9 +167,7 @@ fn internal_forces_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateV
         return false;
     }
     let StateView { displacement, force, volume, .. } = state;
-    let vectors = (displacement.get(..nodes), force.get_mut(..nodes));
-    let (Some(displacement), Some(force)) = vectors else { return false };
-    let volume = volume.get_mut(..nodes).unwrap_or_default();
+    let force = force.get_mut(..nodes).unwrap_or_default();
     nodal_volumes(scene, displacement, volume, &CallingThread);
     force.fill(NodeVector::ZERO);
     step::internal_forces(scene, scene.elements().partitions.all(), displacement, volume, force, NoVisitor);

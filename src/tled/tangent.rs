@@ -132,7 +132,7 @@ impl ElementTangent {
             .sum()
     }
 
-    /// Change of its nodes' forces against it, N, with the pressure (Pa).
+    /// Forces (N) on its nodes, with minus sign, from a pressure (Pa).
     pub(super) fn forces_of(&self, pressure: f64) -> [DVec3; 4] {
         self.gradients.map(|gradient| self.cofactor * gradient * (pressure * self.volume))
     }

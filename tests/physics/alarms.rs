@@ -56,7 +56,7 @@ fn attempt<M: ElementMaterial>(
         let loads = Loads::new(scene, [0.0; 3], &forces, &motions).unwrap();
         match tled::step(scene, &loads, &mut state, step) {
             Status::Diverged(divergence) => {
-                let strain = tled::strain_energy(&scene.view(), &mut state).expect("room");
+                let strain = tled::strain_energy(scene, &mut state).expect("room");
                 let critical = critical(&mut state);
                 if step.seconds() > 0.5 * critical {
                     return Outcome::TooLong;
@@ -347,7 +347,7 @@ fn a_step_that_changes() {
                 let share = if n / every % 2 == 0 { 0.5 } else { 0.05 };
                 let step = Step::unchecked(share * critical, 5.0).unwrap();
                 if let Status::Diverged(divergence) = tled::step(&scene, &loads, &mut state, &step) {
-                    let strain = tled::strain_energy(&scene.view(), &mut state).expect("room");
+                    let strain = tled::strain_energy(&scene, &mut state).expect("room");
                     alarms.0.push(format!(
                         "{}, every {every} steps, step {n}: {divergence}; strain energy {strain:.3e} J",
                         law.name()
