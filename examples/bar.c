@@ -4,7 +4,7 @@
 enum { X = 2, Y = 2, Z = 10, LAYER = (X + 1) * (Y + 1), NODES = LAYER * (Z + 1), CELLS = X * Y * Z, TIP = NODES - 5 };
 static float points[NODES][3]; static uint32_t tets[6 * CELLS][4]; static supple_support held[LAYER];
 SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, 6 * CELLS, 1));
-SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES));
+SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, SUPPLE_NODAL_PRESSURE));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(1, 0));
 #define TRY(call) if ((status = (call)) < 0) return printf("%s: %s\n", #call, supple_status_text(status)), 1
 int main(void) {
@@ -23,7 +23,7 @@ int main(void) {
     const supple_tissue tissue = {.constants = {500.0f, 25000.0f}, .density = 1000.0f}; /* c and d, Pa; kg/m^3 */
     const supple_scene_config body = {SUPPLE_CONFIG(supple_scene_config), .law = SUPPLE_NEO_HOOKEAN, .nodes = NODES,
         .elements = 6 * CELLS, .supports = LAYER, .tissues = 1, .points = points[0], .tetrahedra = tets[0],
-        .support = held, .tissue = &tissue};
+        .support = held, .tissue = &tissue, .element = SUPPLE_NODAL_PRESSURE};
     const supple_step_config length = {SUPPLE_CONFIG(supple_step_config), .seconds = 2e-4f, .damping = 20.0f};
     const supple_force push = {.node = TIP, .newton = {0.01f, 0.0f, 0.0f}, .ramp = 0.1f}; /* N, s */
     supple_scene *scene; supple_state *state; supple_loads *loads; supple_vectors moved; supple_status status;

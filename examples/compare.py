@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-ABI, ALIGN, EXPONENTIAL, CHECKED = 2, 64, 1, 0  # SUPPLE_... in include/supple.h
+ABI, ALIGN, EXPONENTIAL, CHECKED, NODAL_PRESSURE = 3, 64, 1, 0, 1  # SUPPLE_... in include/supple.h
 SIZE, CELLS = np.array([0.05, 0.05, 0.1]), (8, 8, 17)  # m
 LAW, DENSITY, DAMPING = (59.0, 8.023, 60000.0), 1000.0, 20.0  # a Pa, b, d Pa; kg/m^3; 1/s
 FORCE, PULL, RAMP = 0.3, 0.005, 0.2  # N, m, s
@@ -38,6 +38,7 @@ class SceneConfig(Structure):
         *((name, c_uint32) for name in ("nodes", "elements", "supports", "tissues")),
         ("points", POINTER(c_float)), ("tetrahedra", POINTER(c_uint32)), ("support", POINTER(Support)),
         ("tissue", POINTER(Tissue)), ("tissue_of_element", POINTER(c_uint16)),
+        ("element", c_uint32), ("reserved", c_uint32),
     ]
 
 
@@ -139,11 +140,11 @@ def moved_by_library(path, points, tetrahedra, forces, pulled):
     config = SceneConfig(
         ctypes.sizeof(SceneConfig), ABI, EXPONENTIAL, CHECKED, nodes, elements, len(held), 1,
         local.ctypes.data_as(POINTER(c_float)), tetrahedra.ctypes.data_as(POINTER(c_uint32)), held,
-        ctypes.pointer(tissue), None,
+        ctypes.pointer(tissue), None, NODAL_PRESSURE, 0,
     )
     size = library.size("supple_scene_size", nodes, elements, 1)
     scene = library.made("supple_scene_init", size, byref(config), after=(None,))
-    state = library.made("supple_state_init", library.size("supple_state_size", nodes), scene)
+    state = library.made("supple_state_init", library.size("supple_state_size", nodes, NODAL_PRESSURE), scene)
     size = library.size("supple_loads_size", len(forces), 1)
     acting = library.made("supple_loads_init", size, scene, c_uint32(len(forces)), c_uint32(1))
     pushes = (Force * len(forces))(*(Force(node, newton, RAMP) for node, newton in forces))

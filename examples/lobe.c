@@ -29,8 +29,8 @@ static const supple_tissue TISSUE = {{590.0f, 8.023f, 60000.0f}, 1000.0f};
 static supple_support held[NODES];
 SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, LOBE_TETRAHEDRA, 1));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(0, 0));
-SUPPLE_MEMORY(exact_memory, SUPPLE_STATE_SIZE(NODES));
-SUPPLE_MEMORY(moved_memory, SUPPLE_STATE_SIZE(NODES));
+SUPPLE_MEMORY(exact_memory, SUPPLE_STATE_SIZE(NODES, SUPPLE_LINEAR));
+SUPPLE_MEMORY(moved_memory, SUPPLE_STATE_SIZE(NODES, SUPPLE_LINEAR));
 SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 1));
 
 /* Whether a call did what it was asked for; says what not. */
@@ -63,7 +63,8 @@ int main(void) {
 
     const supple_scene_config body = {SUPPLE_CONFIG(supple_scene_config), SUPPLE_EXPONENTIAL,
                                       SUPPLE_WINDING_CHECKED, NODES, LOBE_TETRAHEDRA, supports, 1,
-                                      lobe_points[0], lobe_tetrahedra[0], held, &TISSUE, NULL};
+                                      lobe_points[0], lobe_tetrahedra[0], held, &TISSUE, NULL,
+                                      SUPPLE_LINEAR /* as in the network's training */, 0};
     const supple_learned_config network = {SUPPLE_CONFIG(supple_learned_config), 1, 0, compact, sizeof compact};
     supple_scene *scene;
     supple_loads *loads;

@@ -38,7 +38,8 @@
 /* Sizes as constant expressions: what the functions give; of a supple_large, with x * y * z cells that you give, never less. */
 #define SUPPLE_SCENE_SIZE(nodes, elements, tissues) (SUPPLE_SCENE_FRONT + SUPPLE_ARRAY_(nodes, 16) +                           \
     1024 * SUPPLE_TILES_(elements) + SUPPLE_ARRAY_(tissues, 20) + SUPPLE_ARRAY_((tissues) > 1 ? (elements) : 0, 2))
-#define SUPPLE_STATE_SIZE(nodes) (SUPPLE_STATE_FRONT + 3 * SUPPLE_ARRAY_(nodes, 16))
+#define SUPPLE_STATE_SIZE(nodes, element) \
+    (SUPPLE_STATE_FRONT + ((element) == SUPPLE_NODAL_PRESSURE ? 4 : 3) * SUPPLE_ARRAY_(nodes, 16))
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 80 : 48))
 #define SUPPLE_LARGE_SIZE(nodes, elements, method, x, y, z) (SUPPLE_LARGE_FRONT + ((method) == SUPPLE_MASS_SCALED              \
@@ -57,7 +58,7 @@
  * Version of the interface: of structures, of functions' arguments, of what statuses mean. Put it into
  * the field `abi` of every configuration; a library of another version refuses it.
  */
-#define SUPPLE_ABI 2
+#define SUPPLE_ABI 3
 
 /**
  * No node, element or axis.
@@ -103,6 +104,16 @@
  * Elements are turned where needed.
  */
 #define SUPPLE_WINDING_NORMALISED 1
+
+/**
+ * Linear tetrahedra. They lock, that is bend too little, where tissue hardly changes its volume (Poisson's ratio above 0.45).
+ */
+#define SUPPLE_LINEAR 0
+
+/**
+ * Tetrahedra with average nodal pressure, which do not lock. Take these unless you compare with others' linear ones.
+ */
+#define SUPPLE_NODAL_PRESSURE 1
 
 /**
  * Bytes before the arrays of a scene.
@@ -240,6 +251,10 @@ enum supple_status
      * An array that is written overlaps the object that is read.
      */
     SUPPLE_E_OVERLAP = -13,
+    /**
+     * The state was prepared for a scene of other elements (value: its own, limit: the scene's).
+     */
+    SUPPLE_E_ELEMENT = -14,
     /**
      * The mesh has no nodes or no elements.
      */
@@ -496,6 +511,14 @@ typedef struct {
      * With more than one tissue: of which each element is. With one: NULL.
      */
     const uint16_t *tissue_of_element;
+    /**
+     * SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE.
+     */
+    uint32_t element;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
 } supple_scene_config;
 
 /**
@@ -797,6 +820,10 @@ typedef struct {
      * Whether the exact step has taken over for good.
      */
     uint32_t fell_back;
+    /**
+     * Elements of the training, SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE; in a scene of others the network's error is not known.
+     */
+    uint32_t element;
 } supple_learned_facts;
 
 /**
@@ -937,9 +964,13 @@ supple_status supple_set_motions(supple_loads *loads,
                                  supple_error *error);
 
 /**
- * Bytes of memory that the state of so many nodes needs. SUPPLE_STATE_SIZE is the same as a constant.
+ * Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is the same
+ * as a constant.
+ *
+ * @param element of the scene: SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE.
  */
-size_t supple_state_size(uint32_t nodes);
+size_t supple_state_size(uint32_t nodes,
+                         uint32_t element);
 
 /**
  * Prepares the state of a scene, at rest, in `memory` of at least supple_state_size bytes, aligned to SUPPLE_ALIGN.
@@ -957,7 +988,7 @@ supple_status supple_state_reset(supple_state *state);
 
 /**
  * Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as
- * long as some six steps; tissue that is deformed is stiffer, so ask again from time to time.
+ * long as some six steps, with nodal pressure some twenty; tissue that is deformed is stiffer, so ask again from time to time.
  *
  * @param seconds receives the step, s.
  * @param node may be NULL; receives the node that sets it.

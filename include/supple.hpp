@@ -54,6 +54,7 @@ enum class [[nodiscard]] status : std::int32_t {
     e_not_finite = SUPPLE_E_NOT_FINITE,
     e_negative = SUPPLE_E_NEGATIVE,
     e_overlap = SUPPLE_E_OVERLAP,
+    e_element = SUPPLE_E_ELEMENT,
 
     e_mesh_empty = SUPPLE_E_MESH_EMPTY,
     e_mesh_repeated_node = SUPPLE_E_MESH_REPEATED_NODE,
@@ -102,6 +103,9 @@ enum class law : std::uint32_t {
     exponential = SUPPLE_EXPONENTIAL, // a (Pa), b, d (Pa)
     polynomial = SUPPLE_POLYNOMIAL, // c (Pa), e (Pa), d (Pa)
 };
+
+// linear: tetrahedra that lock, that is bend too little, where tissue hardly changes its volume. nodal_pressure: these do not.
+enum class element : std::uint32_t { linear = SUPPLE_LINEAR, nodal_pressure = SUPPLE_NODAL_PRESSURE };
 
 // checked: elements must have positive volumes. normalised: they are turned where needed.
 enum class winding : std::uint32_t { checked = SUPPLE_WINDING_CHECKED, normalised = SUPPLE_WINDING_NORMALISED };
@@ -202,6 +206,7 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_misaligned): case of(s::e_short): case of(s::e_abi): case of(s::e_not_initialised):
     case of(s::e_kind): case of(s::e_choice): case of(s::e_mismatch): case of(s::e_capacity):
     case of(s::e_index): case of(s::e_not_finite): case of(s::e_negative): case of(s::e_overlap):
+    case of(s::e_element):
     case of(s::e_mesh_empty): case of(s::e_mesh_repeated_node): case of(s::e_mesh_degenerate):
     case of(s::e_mesh_inverted): case of(s::e_mesh_unused_node): case of(s::e_constant):
     case of(s::e_density): case of(s::e_tissue): case of(s::e_nothing_moves): case of(s::e_law):
@@ -316,6 +321,7 @@ inline status set_level(level chosen) noexcept {
 // What a scene is built from. All is copied.
 struct body {
     supple::law law = law::neo_hookean;
+    supple::element element = element::nodal_pressure;
     supple::winding winding = winding::checked;
     span<const float> points;               // three coordinates of each node, m
     span<const std::uint32_t> tetrahedra;   // four nodes of each element, from zero
@@ -358,6 +364,7 @@ public:
         auto config = detail::config<supple_scene_config>();
         config.law = static_cast<std::uint32_t>(from.law);
         config.winding = static_cast<std::uint32_t>(from.winding);
+        config.element = static_cast<std::uint32_t>(from.element);
         config.nodes = static_cast<std::uint32_t>(from.points.size() / 3);
         config.elements = static_cast<std::uint32_t>(elements);
         config.supports = static_cast<std::uint32_t>(from.supports.size());
@@ -469,8 +476,9 @@ public:
     [[nodiscard]] constexpr supple_state *raw() const noexcept { return raw_; }
 
     // Bytes of memory that one needs.
-    [[nodiscard]] static constexpr std::size_t size(std::uint32_t nodes) noexcept {
-        return SUPPLE_STATE_SIZE(nodes);
+    [[nodiscard]] static constexpr std::size_t size(std::uint32_t nodes,
+                                                    element of = element::nodal_pressure) noexcept {
+        return SUPPLE_STATE_SIZE(nodes, static_cast<std::uint32_t>(of));
     }
 
     // Prepares one, at rest, in memory of at least `size` bytes.

@@ -9,7 +9,7 @@
 #![cfg_attr(feature = "std", doc = "```")]
 #![cfg_attr(not(feature = "std"), doc = "```ignore")]
 //! # use supple::loads::{Loads, NodalForce};
-//! # use supple::material::{NeoHookean, Tissue};
+//! # use supple::material::{NeoHookean, NodalPressure, Tissue};
 //! # use supple::mesh::{Bar, Mesh, Winding};
 //! # use supple::scene::{Support, VecScene};
 //! # use supple::state::VecState;
@@ -18,7 +18,7 @@
 //! let bar = Bar { size: [0.02, 0.02, 0.1], cells: [2, 2, 10] };
 //! let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());
 //! let mesh = Mesh::new(&points, &tets, Winding::Checked)?;
-//! let tissue = Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 };
+//! let tissue = NodalPressure(Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 });
 //! let fixed: Vec<_> = (0..9).map(Support::fixed).collect();
 //! let scene = VecScene::build(tissue, &mesh, &fixed)?;
 //! let mut state = VecState::at_rest(scene.node_count());

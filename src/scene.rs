@@ -12,7 +12,7 @@ use crate::element::{
     ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, element_fields,
     volume_energy_difference,
 };
-use crate::material::{Law, Material, releasable_energy};
+use crate::material::{Element, Law, Material, releasable_energy};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
 use crate::mesh::strips::Numbered;
 use crate::mesh::{Mesh, MeshError, volume};
@@ -203,7 +203,7 @@ impl SceneFacts {
         }
         nodes.fill(NodeInertia::EMPTY);
         mark_supports(nodes, supports)?;
-        if M::NODAL_PRESSURE {
+        if M::ELEMENT.is_nodal_pressure() {
             mark_neighbours(nodes, mesh);
         }
         let still = |tet: [u32; 4]| {
@@ -230,7 +230,7 @@ impl SceneFacts {
                 }
             });
         }
-        if M::NODAL_PRESSURE && material.laws().differ() {
+        if M::ELEMENT.is_nodal_pressure() && material.laws().differ() {
             find_slots(material, mesh, nodes, tiles);
         }
         let (mass, releasable_energy) = lump_masses(material, mesh, nodes)?;
@@ -435,6 +435,12 @@ impl<'a, M> SceneView<'a, M> {
 }
 
 impl<'a, M: Material> SceneView<'a, M> {
+    /// The tetrahedra that it is made of.
+    #[must_use]
+    pub const fn element(&self) -> Element {
+        M::ELEMENT
+    }
+
     /// What internal forces are computed from.
     pub(crate) fn elements(&self) -> Elements<'a, M::Law> {
         Elements { laws: self.material.laws(), tiles: self.tiles, partitions: &self.facts.partitions }
@@ -450,13 +456,20 @@ impl<'a, M: Material> SceneView<'a, M> {
             .map(move |(tile, lane)| element_fields(&laws.of(tile.element(lane)), tile, lane, displacement))
     }
 
+    /// Every element, as its place in the tables with its law.
+    #[cfg(feature = "std")]
+    pub(crate) fn laws_at_places(self) -> impl Iterator<Item = (&'a ElementTile, usize, M::Law)> {
+        let laws = self.material.laws();
+        self.places().map(move |(tile, lane)| (tile, lane, laws.of(tile.element(lane))))
+    }
+
     /// Strain energy under the given displacements (m), J, with the nodes' volumes where the material needs them.
     pub(crate) fn strain_energy(self, displacement: &[NodeVector], volumes: &[NodeVector]) -> f64 {
         let laws = self.material.laws();
         let energies = self.places().map(|(tile, lane)| {
             let law = laws.of(tile.element(lane));
             let fields = element_fields(&law, tile, lane, displacement);
-            if M::NODAL_PRESSURE {
+            if M::ELEMENT.is_nodal_pressure() {
                 fields.energy + volume_energy_difference(&law, tile, lane, fields.volume_ratio, volumes)
             } else {
                 fields.energy

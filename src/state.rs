@@ -131,7 +131,7 @@ impl<'a> StateView<'a> {
 
     /// How many nodes of a scene of this material the vectors hold.
     pub(crate) fn capacity_for<M: Material>(&self) -> usize {
-        let volumes = if M::NODAL_PRESSURE { self.volume.len() } else { usize::MAX };
+        let volumes = if M::ELEMENT.is_nodal_pressure() { self.volume.len() } else { usize::MAX };
         self.capacity().min(volumes)
     }
 

@@ -80,6 +80,8 @@ pub struct supple_learned_facts {
     pub multiply_adds: u64,
     /// Whether the exact step has taken over for good.
     pub fell_back: u32,
+    /// Elements of the training, SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE; in a scene of others the network's error is not known.
+    pub element: u32,
 }
 
 fn layout(nodes: u32, fallback: bool) -> Layout {
@@ -164,6 +166,7 @@ pub unsafe extern "C" fn supple_learned_describe(
             exact_seconds: recipe.exact_step,
             multiply_adds: network.multiply_adds() as u64,
             fell_back: object.model.fell_back().is_some().into(),
+            element: recipe.element.code(),
         });
         Ok(SUPPLE_OK)
     };

@@ -3,7 +3,9 @@
 use core::ffi::c_void;
 
 use crate::element::{ElementLaw, ElementTile, NodeInertia};
-use crate::material::{AnyLaw, Law, Laws, MAX_CONSTANTS, Material, Regions, Tissue, for_each_law};
+use crate::material::{
+    AnyLaw, Element, Law, Laws, MAX_CONSTANTS, Material, NodalPressure, Regions, Tissue, for_each_law,
+};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::{Axes, SceneFacts, SceneView, Support, tiles_for};
 use crate::tled;
@@ -17,6 +19,13 @@ use supple_status::*;
 pub const SUPPLE_WINDING_CHECKED: u32 = 0;
 /// Elements are turned where needed.
 pub const SUPPLE_WINDING_NORMALISED: u32 = 1;
+
+/// Linear tetrahedra. They lock, that is bend too little, where tissue hardly changes its volume (Poisson's ratio above 0.45).
+pub const SUPPLE_LINEAR: u32 = 0;
+/// Tetrahedra with average nodal pressure, which do not lock. Take these unless you compare with others' linear ones.
+pub const SUPPLE_NODAL_PRESSURE: u32 = 1;
+const _: () = assert!(SUPPLE_LINEAR == Element::Linear.code());
+const _: () = assert!(SUPPLE_NODAL_PRESSURE == Element::NodalPressure.code());
 
 /// A node that does not move freely: along held axes it stands still, or follows motions.
 #[repr(C)]
@@ -71,6 +80,10 @@ pub struct supple_scene_config {
     pub tissue: *const supple_tissue,
     /// With more than one tissue: of which each element is. With one: NULL.
     pub tissue_of_element: *const u16,
+    /// SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE.
+    pub element: u32,
+    /// 0.
+    pub reserved: u32,
 }
 
 /// What is simulated: element tables, masses, supports. After supple_scene_init nothing changes it: any
@@ -81,6 +94,7 @@ pub struct supple_scene {
     nodes: u32,
     elements: u32,
     tissues: u32,
+    element: Element,
     /// Which of the laws; its constants are those of the tissues.
     law: AnyLaw,
     facts: SceneFacts,
@@ -149,7 +163,8 @@ impl<L: Law> Material for Body<'_, L> {
 
 /// A scene of one law in the memory of its object.
 pub(super) struct Carved<'a, L> {
-    body: Body<'a, L>,
+    element: Element,
+    body: NodalPressure<Body<'a, L>>,
     nodes: &'a [NodeInertia],
     tiles: &'a [ElementTile],
     facts: &'a SceneFacts,
@@ -164,21 +179,33 @@ impl<'a, L: ElementLaw> Carved<'a, L> {
         let () = Self::FITS;
         // SAFETY: the caller's promise; all arrays were written by `build`.
         unsafe {
-            let &supple_scene { nodes, elements, tissues, ref facts, .. } = &*object;
+            let &supple_scene { nodes, elements, tissues, element, ref facts, .. } = &*object;
             let mut arrays = Arrays::behind(object);
             Self {
+                element,
                 nodes: arrays.read(nodes as usize),
                 tiles: arrays.read(tiles_for(elements as usize)),
-                body: Body {
+                body: NodalPressure(Body {
                     tissues: arrays.read(tissues as usize),
                     of_element: arrays.read(regions(elements, tissues)),
-                },
+                }),
                 facts,
             }
         }
     }
 
-    pub(super) fn view(&self) -> SceneView<'_, Body<'a, L>> {
+    pub(super) const fn element(&self) -> Element {
+        self.element
+    }
+
+    /// The scene, of linear elements.
+    pub(super) fn linear(&self) -> SceneView<'_, Body<'a, L>> {
+        SceneView::new(&self.body.0, self.nodes, self.tiles, self.facts)
+    }
+
+    /// The scene, of elements with nodal pressure.
+    #[cfg(feature = "capi-nodal-pressure")]
+    pub(super) fn nodal_pressure(&self) -> SceneView<'_, NodalPressure<Body<'a, L>>> {
         SceneView::new(&self.body, self.nodes, self.tiles, self.facts)
     }
 }
@@ -211,12 +238,12 @@ macro_rules! any_scene {
             ///
             /// # Safety
             /// As at [`Parts::build_of`].
-            unsafe fn build(&self, law: AnyLaw, arrays: Arrays) -> Answer<SceneFacts> {
+            unsafe fn build(&self, law: AnyLaw, element: Element, arrays: Arrays) -> Answer<SceneFacts> {
                 // SAFETY: the caller's promise.
                 unsafe {
                     match law {
-                        AnyLaw::$first(_) => self.build_of::<$first_law>(arrays),
-                        $(#[cfg(feature = "capi")] AnyLaw::$other(_) => self.build_of::<$law>(arrays),)*
+                        AnyLaw::$first(_) => self.build_of::<$first_law>(element, arrays),
+                        $(#[cfg(feature = "capi")] AnyLaw::$other(_) => self.build_of::<$law>(element, arrays),)*
                         _ => Err(SUPPLE_E_LAW.into()),
                     }
                 }
@@ -228,18 +255,25 @@ for_each_law!(any_scene);
 
 /// Does the same with the view of a scene of whichever law.
 macro_rules! with_scene {
-    (@ $any:expr, $scene:ident => $work:expr; $first:ident: $first_law:ty, $($other:ident: $law:ty,)*) => {
-        match &$any {
-            $crate::capi::scene::AnyScene::$first(carved) => {
-                let $scene = carved.view();
+    (@ of $carved:ident, $scene:ident => $work:expr) => {
+        match $carved.element() {
+            #[cfg(feature = "capi-nodal-pressure")]
+            $crate::material::Element::NodalPressure => {
+                let $scene = $carved.nodal_pressure();
                 $work
             }
+            _ => {
+                let $scene = $carved.linear();
+                $work
+            }
+        }
+    };
+    (@ $any:expr, $scene:ident => $work:expr; $first:ident: $first_law:ty, $($other:ident: $law:ty,)*) => {
+        match &$any {
+            $crate::capi::scene::AnyScene::$first(carved) => with_scene!(@ of carved, $scene => $work),
             $(
                 #[cfg(feature = "capi")]
-                $crate::capi::scene::AnyScene::$other(carved) => {
-                    let $scene = carved.view();
-                    $work
-                }
+                $crate::capi::scene::AnyScene::$other(carved) => with_scene!(@ of carved, $scene => $work),
             )*
         }
     };
@@ -252,6 +286,10 @@ pub(super) use with_scene;
 impl AnyScene<'_> {
     pub(super) fn node_count(&self) -> usize {
         with_scene!(self, scene => scene.node_count())
+    }
+
+    pub(super) fn element(&self) -> Element {
+        with_scene!(self, scene => scene.element())
     }
 
     /// That something was made for the scene's number of nodes.
@@ -296,16 +334,19 @@ pub unsafe extern "C" fn supple_scene_init(
     // SAFETY: what the header asks of the caller.
     let init = || unsafe {
         let (config, scene) = (one(config)?, place_for(scene)?);
-        let (law, parts) = Parts::checked(config)?;
+        let (law, element, parts) = Parts::checked(config)?;
         let &supple_scene_config { nodes, elements, tissues, .. } = config;
         let place = Place::new(memory, bytes, layout(nodes, elements, tissues))?;
-        let facts = parts.build(law, place.arrays::<supple_scene>())?;
-        scene.write(place.put(|head| supple_scene { head, nodes, elements, tissues, law, facts }));
+        let facts = parts.build(law, element, place.arrays::<supple_scene>())?;
+        scene.write(place.put(|head| supple_scene { head, nodes, elements, tissues, element, law, facts }));
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
     unsafe { memory::answered(init(), error) }
 }
+
+/// Whether this library has elements with nodal pressure.
+const NODAL_PRESSURE: bool = cfg!(feature = "capi-nodal-pressure");
 
 /// What a scene is built from, checked as far as it can be without building it.
 struct Parts<'a> {
@@ -318,11 +359,14 @@ struct Parts<'a> {
 impl<'a> Parts<'a> {
     /// # Safety
     /// The arrays of the configuration are as the header says.
-    unsafe fn checked(config: &'a supple_scene_config) -> Answer<(AnyLaw, Self)> {
+    unsafe fn checked(config: &'a supple_scene_config) -> Answer<(AnyLaw, Element, Self)> {
         same_abi::<supple_scene_config>(config.struct_size, config.abi)?;
         let &supple_scene_config { law: number, nodes, elements, tissues, .. } = config;
         let law = law_of(number).ok_or(supple_error::from(SUPPLE_E_LAW).value(number.into(), 0.0))?;
         check_choice(SUPPLE_NONE as usize, config.winding, SUPPLE_WINDING_NORMALISED)?;
+        check_choice(SUPPLE_NONE as usize, config.element, if NODAL_PRESSURE { 1 } else { 0 })?;
+        check_choice(SUPPLE_NONE as usize, config.reserved, 0)?;
+        let element = if config.element == SUPPLE_LINEAR { Element::Linear } else { Element::NodalPressure };
         let winding =
             if config.winding == SUPPLE_WINDING_CHECKED { Winding::Checked } else { Winding::Normalised };
         if nodes == 0 || elements == 0 {
@@ -345,12 +389,12 @@ impl<'a> Parts<'a> {
             check_choice(index, support.axes, 7)?;
             check_choice(index, support.moves, 1)?;
         }
-        Ok((law, Self { mesh: Mesh::new(points, tets, winding)?, supports, tissues, of_element }))
+        Ok((law, element, Self { mesh: Mesh::new(points, tets, winding)?, supports, tissues, of_element }))
     }
 
     /// # Safety
     /// The arrays are those of a scene of these parts, and nobody else uses them.
-    unsafe fn build_of<L: ElementLaw>(&self, mut arrays: Arrays) -> Answer<SceneFacts> {
+    unsafe fn build_of<L: ElementLaw>(&self, element: Element, mut arrays: Arrays) -> Answer<SceneFacts> {
         let Self { mesh, supports, tissues: given, of_element } = self;
         // SAFETY: the caller's promise; what is not any bits is written before it is read.
         let (nodes, tiles, tissues, regions) = unsafe {
@@ -373,7 +417,11 @@ impl<'a> Parts<'a> {
             moves: support.moves == 1,
         });
         let body = Body { tissues, of_element: regions };
-        Ok(SceneFacts::build(&body, mesh, supports, nodes, tiles)?)
+        Ok(match element {
+            #[cfg(feature = "capi-nodal-pressure")]
+            Element::NodalPressure => SceneFacts::build(&NodalPressure(body), mesh, supports, nodes, tiles)?,
+            _ => SceneFacts::build(&body, mesh, supports, nodes, tiles)?,
+        })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use core::ffi::c_void;
 
+use crate::material::Element;
 use crate::state::{NodeVector, Progress, StateView};
 use crate::step::{CriticalStep, Step};
 use crate::tled;
@@ -19,6 +20,8 @@ use supple_status::*;
 pub struct supple_state {
     head: Head,
     pub(super) nodes: u32,
+    /// Of the scene that it was prepared for.
+    element: Element,
     has_step: bool,
     pub(super) progress: Progress,
     step: Step,
@@ -49,15 +52,32 @@ pub struct supple_step_config {
     pub damping: f32,
 }
 
-fn layout(nodes: u32) -> Layout {
-    let nodes = nodes as usize;
-    Layout::of::<supple_state>().and::<NodeVector>(nodes).and::<NodeVector>(nodes).and::<NodeVector>(nodes)
+/// Volume ratios of the nodes, which only elements with nodal pressure need.
+const fn volumes(nodes: u32, element: Element) -> usize {
+    match element {
+        Element::Linear => 0,
+        Element::NodalPressure => nodes as usize,
+    }
 }
 
-/// Bytes of memory that the state of so many nodes needs. SUPPLE_STATE_SIZE is the same as a constant.
+fn layout(nodes: u32, element: Element) -> Layout {
+    let volumes = volumes(nodes, element);
+    let nodes = nodes as usize;
+    Layout::of::<supple_state>()
+        .and::<NodeVector>(nodes)
+        .and::<NodeVector>(nodes)
+        .and::<NodeVector>(nodes)
+        .and::<NodeVector>(volumes)
+}
+
+/// Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is the same
+/// as a constant.
+///
+/// @param element of the scene: SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE.
 #[unsafe(no_mangle)]
-pub extern "C" fn supple_state_size(nodes: u32) -> usize {
-    layout(nodes).bytes()
+pub extern "C" fn supple_state_size(nodes: u32, element: u32) -> usize {
+    let element = Element::ALL.into_iter().find(|known| known.code() == element);
+    element.map_or(0, |element| layout(nodes, element).bytes())
 }
 
 /// Prepares the state of a scene, at rest, in `memory` of at least supple_state_size bytes, aligned to SUPPLE_ALIGN.
@@ -72,11 +92,12 @@ pub unsafe extern "C" fn supple_state_init(
     let init = || unsafe {
         let (any, state) = (carved(scene)?, place_for(state)?);
         let nodes = any.node_count() as u32;
-        let place = Place::new(memory, bytes, layout(nodes))?;
+        let element = any.element();
+        let place = Place::new(memory, bytes, layout(nodes, element))?;
         let step = Step::unchecked(1.0, 0.0)?;
         let mut progress = Progress::START;
-        view(place.arrays::<supple_state>(), nodes, &mut progress).reset();
-        state.write(place.put(|head| supple_state { head, nodes, has_step: false, progress, step }));
+        view(place.arrays::<supple_state>(), nodes, element, &mut progress).reset();
+        state.write(place.put(|head| supple_state { head, nodes, element, has_step: false, progress, step }));
         Ok(SUPPLE_OK)
     };
     status_of(init())
@@ -95,7 +116,7 @@ pub unsafe extern "C" fn supple_state_reset(state: *mut supple_state) -> supple_
 }
 
 /// Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as
-/// long as some six steps; tissue that is deformed is stiffer, so ask again from time to time.
+/// long as some six steps, with nodal pressure some twenty; tissue that is deformed is stiffer, so ask again from time to time.
 ///
 /// @param seconds receives the step, s.
 /// @param node may be NULL; receives the node that sets it.
@@ -189,10 +210,17 @@ impl supple_state {
 
 /// # Safety
 /// The arrays are those of a state of so many nodes, and nobody else uses them.
-unsafe fn view<'a>(mut arrays: Arrays, nodes: u32, progress: &'a mut Progress) -> StateView<'a> {
+unsafe fn view<'a>(
+    mut arrays: Arrays,
+    nodes: u32,
+    element: Element,
+    progress: &'a mut Progress,
+) -> StateView<'a> {
     // SAFETY: the caller's promise. Any bits are vectors.
     let [displacements, increments, forces] = [(); 3].map(|()| unsafe { arrays.change(nodes as usize) });
-    StateView::new(displacements, increments, forces, &mut [], progress)
+    // SAFETY: as above.
+    let volumes = unsafe { arrays.change(volumes(nodes, element)) };
+    StateView::new(displacements, increments, forces, volumes, progress)
 }
 
 /// The state in an object, whose other fields may be used meanwhile.
@@ -203,18 +231,24 @@ pub(super) unsafe fn opened<'a>(object: *mut supple_state) -> Answer<StateView<'
     // SAFETY: the caller's promise.
     unsafe {
         memory::is(object.cast_const())?;
-        Ok(view(Arrays::behind(object.cast_const()), (*object).nodes, &mut (*object).progress))
+        let (nodes, element) = ((*object).nodes, (*object).element);
+        Ok(view(Arrays::behind(object.cast_const()), nodes, element, &mut (*object).progress))
     }
 }
 
-/// The same, of a state that has the nodes of a scene.
+/// The same, of a state that was prepared for a scene of these nodes and elements.
 ///
 /// # Safety
 /// As at [`memory::change`].
 pub(super) unsafe fn opened_of<'a>(any: &AnyScene<'_>, object: *mut supple_state) -> Answer<StateView<'a>> {
     // SAFETY: the caller's promise.
     unsafe {
-        any.fits(memory::read(object.cast_const())?.nodes)?;
+        let &supple_state { nodes, element, .. } = memory::read(object.cast_const())?;
+        any.fits(nodes)?;
+        if element != any.element() {
+            let (own, scene) = (f64::from(element.code()), f64::from(any.element().code()));
+            return Err(supple_error::from(SUPPLE_E_ELEMENT).value(own, scene));
+        }
         opened(object)
     }
 }

@@ -58,6 +58,8 @@ pub enum supple_status {
     SUPPLE_E_NEGATIVE = -12,
     /// An array that is written overlaps the object that is read.
     SUPPLE_E_OVERLAP = -13,
+    /// The state was prepared for a scene of other elements (value: its own, limit: the scene's).
+    SUPPLE_E_ELEMENT = -14,
 
     /// The mesh has no nodes or no elements.
     SUPPLE_E_MESH_EMPTY = -20,
@@ -378,6 +380,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -11 => c"a number is not finite",
         -12 => c"a number is negative or not finite",
         -13 => c"an array that is written overlaps the object that is read",
+        -14 => c"the state was prepared for a scene of other elements",
         -20 => c"the mesh has no elements",
         -21 => c"an element names a node twice",
         -22 => c"an element is flat",

@@ -19,12 +19,13 @@
 //! With nodal pressure ([`super::pressure`]) the energy of volume is `sum_a V_a U(J_a)`. As `J_a` is a mean of the `J_e`, with weights
 //! `V_e / 4`, the square of its variation is at most the mean of theirs (Cauchy-Schwarz):
 //! `sum_a V_a U''(J_a) (dJ_a)^2 <= sum_e V_e (sum_{a in e} U''(J_a) / 4) (C:dF)^2`. So the terms above hold with the means of `U'` and
-//! `U''` over the nodes of an element.
+//! `U''` over the nodes of an element. Where all elements are of one tissue, [`super::nodal_volume_bounds`] bounds the energy of
+//! volume closer.
 //!
 //! No term is left out, so the bound holds for any state, inverted elements included.
 
 use crate::material::{Law, LawState, Laws};
-use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, dot};
+use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, TileNodes, dot};
 
 use super::deformation::{Deformation, Vector};
 use super::pressure::{OwnPressure, Pressure};
@@ -49,6 +50,41 @@ impl NodeMatrices<'_> {
         }
     }
 
+    /// Writes the matrix of a node.
+    pub(super) fn set(&mut self, node: usize, matrix: Symmetric) {
+        let Symmetric { xx, yy, zz, xy, yz, zx } = matrix;
+        if let Some(vector) = self.xx_yy_zz_xy.get_mut(node) {
+            vector.0 = [xx, yy, zz, xy];
+        }
+        if let Some(vector) = self.yz_in_padding.get_mut(node) {
+            vector.0[3] = yz;
+        }
+        if let Some(vector) = self.zx_in_padding.get_mut(node) {
+            vector.0[3] = zx;
+        }
+    }
+
+    /// Adds matrices to the nodes at the corners of a vector of elements.
+    #[inline(always)]
+    pub(super) fn add_corners<R: Real>(
+        &mut self,
+        nodes: &TileNodes<'_, 4>,
+        first: usize,
+        matrices: [Symmetric<R>; 4],
+        [first_four_buffer, fifth_buffer, sixth_buffer]: &mut [ScatterBuffer<4>; 3],
+    ) {
+        let zero = R::splat(0.0);
+        let (mut first_four, mut fifth, mut sixth) = ([[zero; 4]; 4], [[zero; 4]; 4], [[zero; 4]; 4]);
+        for corner in 0..4 {
+            let Symmetric { xx, yy, zz, xy, yz, zx } = matrices[corner];
+            first_four[corner] = [xx, yy, zz, xy];
+            (fifth[corner][3], sixth[corner][3]) = (yz, zx);
+        }
+        Scatter::new(self.xx_yy_zz_xy).add_corners(nodes, first, first_four, first_four_buffer);
+        Scatter::new(self.yz_in_padding).add_corners(nodes, first, fifth, fifth_buffer);
+        Scatter::new(self.zx_in_padding).add_corners(nodes, first, sixth, sixth_buffer);
+    }
+
     /// A close upper bound of the largest eigenvalue of the node's matrix on its free axes, 1/s^2.
     pub(crate) fn largest_eigenvalue(&self, node: usize, inverse: [f32; 3]) -> f32 {
         let read = |vectors: &[NodeVector]| vectors.get(node).copied().unwrap_or_default().0;
@@ -64,6 +100,8 @@ pub struct CriticalBounds<'a, 'b, L, P = OwnPressure> {
     pub(crate) pressure: P,
     pub(crate) tiles: &'a [ElementTile],
     pub(crate) inertia: &'a [NodeInertia],
+    /// Whether the volume term is added, which nodes may bound closer ([`super::NodalVolumeBounds`]).
+    pub(crate) with_volume: bool,
     pub(crate) sums: &'a mut NodeMatrices<'b>,
 }
 
@@ -79,33 +117,23 @@ impl<L: Law, P: Pressure> Kernel for CriticalBounds<'_, '_, L, P> {
         for tile in self.tiles {
             let mut buffer = [ScatterBuffer::NONE; 3];
             for first in (0..TILE).step_by(R::COUNT) {
-                let law = (&self.laws, self.pressure);
+                let law = (&self.laws, self.pressure, self.with_volume);
                 add_bounds::<R, L, P>(law, tile, first, inertia, self.sums, &mut buffer);
             }
         }
     }
 }
 
-/// Adds the matrices of a vector of elements to the sums, those of `M^-1/2 K M^-1/2`: gradients are multiplied by the
-/// square root of volume over nodal mass. This stays in the range of float32, and gives a closer bound where light
-/// nodes have heavy neighbours. Nodes that are held along all axes have an infinite mass.
+/// Shape function gradients at the corners for a bound of `M^-1/2 K M^-1/2`: multiplied by the square root of volume over nodal
+/// mass, m^(1/2) kg^(-1/2); and the square root of the volume. This stays in the range of float32, and gives a closer bound where
+/// light nodes have heavy neighbours. Nodes that are held along all axes have an infinite mass.
 #[inline(always)]
-fn add_bounds<R: Real, L: Law, P: Pressure>(
-    (laws, pressure): (&Laws<'_, L>, P),
+pub(super) fn mass_weighted_gradients<R: Real>(
     tile: &ElementTile,
     first: usize,
+    nodes: &TileNodes<'_, 4>,
     inertia: Gather<'_>,
-    sums: &mut NodeMatrices<'_>,
-    [first_four_buffer, fifth_buffer, sixth_buffer]: &mut [ScatterBuffer<4>; 3],
-) {
-    let displacement = Gather::new(sums.zx_in_padding);
-    let Some(nodes) = tile.nodes_below::<R>(displacement.count()) else {
-        return;
-    };
-    let deformation = Deformation::<R>::of_tile(tile, first, displacement);
-    let law = laws.widen(|lane| tile.element(first + lane));
-    let local = pressure.local::<R, L>(laws, tile, first, deformation.invariants);
-    let terms = Terms::<R>::new::<L>(&law, &local, &deformation);
+) -> ([Vector<R>; 4], R) {
     let mut gradients = [[R::splat(0.0); 3]; 4];
     for corner in 1..4 {
         gradients[corner] = tile.gradients(corner - 1, first);
@@ -115,10 +143,35 @@ fn add_bounds<R: Real, L: Law, P: Pressure>(
     }
     let volume = tile.volume::<R>(first).sqrt();
     for (corner, gradient) in gradients.iter_mut().enumerate() {
-        let [x, y, z] = inertia.read_nodes::<R, 4>(&nodes, corner, first);
+        let [x, y, z] = inertia.read_nodes::<R, 4>(nodes, corner, first);
         let root = x.max(y).max(z).max(R::splat(0.0)).sqrt() * volume;
         *gradient = [gradient[0] * root, gradient[1] * root, gradient[2] * root];
     }
+    (gradients, volume)
+}
+
+/// Adds the matrices of a vector of elements to the sums ([`mass_weighted_gradients`]).
+#[inline(always)]
+fn add_bounds<R: Real, L: Law, P: Pressure>(
+    (laws, pressure, with_volume): (&Laws<'_, L>, P, bool),
+    tile: &ElementTile,
+    first: usize,
+    inertia: Gather<'_>,
+    sums: &mut NodeMatrices<'_>,
+    buffers: &mut [ScatterBuffer<4>; 3],
+) {
+    let displacement = Gather::new(sums.zx_in_padding);
+    let Some(nodes) = tile.nodes_below::<R>(displacement.count()) else {
+        return;
+    };
+    let deformation = Deformation::<R>::of_tile(tile, first, displacement);
+    let law = laws.widen(|lane| tile.element(first + lane));
+    let mut local = pressure.local::<R, L>(laws, tile, first, deformation.invariants);
+    if !with_volume {
+        local.bulk = R::splat(0.0);
+    }
+    let terms = Terms::<R>::new::<L>(&law, &local, &deformation);
+    let (gradients, _) = mass_weighted_gradients(tile, first, &nodes, inertia);
     // No closures over vectors from here on: the compiler may leave them as function calls, even for one addition.
     let [g0, g1, g2, g3] = gradients;
     let images = [
@@ -142,22 +195,20 @@ fn add_bounds<R: Real, L: Law, P: Pressure>(
         }
     }
     let zero = R::splat(0.0);
-    let (mut first_four, mut fifth, mut sixth) = ([[zero; 4]; 4], [[zero; 4]; 4], [[zero; 4]; 4]);
+    let mut matrices = [Symmetric { xx: zero, yy: zero, zz: zero, xy: zero, yz: zero, zx: zero }; 4];
     for corner in 0..4 {
         let isotropic = row_sums[corner];
         let image = &images[corner];
-        first_four[corner] = [
-            image.entry([weight_c, weight_e, weight_x], 0, 0) + isotropic,
-            image.entry([weight_c, weight_e, weight_x], 1, 1) + isotropic,
-            image.entry([weight_c, weight_e, weight_x], 2, 2) + isotropic,
-            image.entry([weight_c, weight_e, weight_x], 0, 1),
-        ];
-        fifth[corner][3] = image.entry([weight_c, weight_e, weight_x], 1, 2);
-        sixth[corner][3] = image.entry([weight_c, weight_e, weight_x], 2, 0);
+        matrices[corner] = Symmetric {
+            xx: image.entry([weight_c, weight_e, weight_x], 0, 0) + isotropic,
+            yy: image.entry([weight_c, weight_e, weight_x], 1, 1) + isotropic,
+            zz: image.entry([weight_c, weight_e, weight_x], 2, 2) + isotropic,
+            xy: image.entry([weight_c, weight_e, weight_x], 0, 1),
+            yz: image.entry([weight_c, weight_e, weight_x], 1, 2),
+            zx: image.entry([weight_c, weight_e, weight_x], 2, 0),
+        };
     }
-    Scatter::new(sums.xx_yy_zz_xy).add_corners(&nodes, first, first_four, first_four_buffer);
-    Scatter::new(sums.yz_in_padding).add_corners(&nodes, first, fifth, fifth_buffer);
-    Scatter::new(sums.zx_in_padding).add_corners(&nodes, first, sixth, sixth_buffer);
+    sums.add_corners(&nodes, first, matrices, buffers);
 }
 
 /// Magnitudes of the terms of the tangent, Pa.
@@ -175,9 +226,9 @@ struct Terms<R> {
 }
 
 /// The image of a shape function gradient under a matrix: the vector, its length and the inverse of the length.
-struct Image<R> {
-    vector: Vector<R>,
-    length: R,
+pub(super) struct Image<R> {
+    pub(super) vector: Vector<R>,
+    pub(super) length: R,
     inverse: R,
 }
 
@@ -189,7 +240,31 @@ impl<R: Real> Image<R> {
         Self { vector, length, inverse }
     }
 
-    /// `weight v_i v_j / |v|`.
+    /// Of `g` under `C`.
+    #[inline(always)]
+    pub(super) fn of_cofactor(deformation: &Deformation<R>, gradient: Vector<R>) -> Self {
+        let mut c = [R::splat(0.0); 3];
+        for (i, component) in c.iter_mut().enumerate() {
+            for (j, &along) in gradient.iter().enumerate() {
+                *component = *component + deformation.cofactor(i, j) * along;
+            }
+        }
+        Self::new(c)
+    }
+
+    /// `weight v v^T / |v|`.
+    #[inline(always)]
+    pub(super) fn matrix(&self, weight: R) -> Symmetric<R> {
+        Symmetric {
+            xx: self.entry(weight, 0, 0),
+            yy: self.entry(weight, 1, 1),
+            zz: self.entry(weight, 2, 2),
+            xy: self.entry(weight, 0, 1),
+            yz: self.entry(weight, 1, 2),
+            zx: self.entry(weight, 2, 0),
+        }
+    }
+
     #[inline(always)]
     fn entry(&self, weight: R, i: usize, j: usize) -> R {
         (self.inverse * self.vector[i]) * (weight * self.vector[j])
@@ -311,7 +386,14 @@ mod tests {
             };
             let scene = scene.view();
             let (laws, tiles, inertia) = (scene.material.laws(), scene.tiles, scene.inertia);
-            let kernel = CriticalBounds { laws, pressure: OwnPressure, tiles, inertia, sums: &mut sums };
+            let kernel = CriticalBounds {
+                laws,
+                pressure: OwnPressure,
+                tiles,
+                inertia,
+                with_volume: true,
+                sums: &mut sums,
+            };
             if scalar {
                 kernel.run_scalar()
             } else {

@@ -4,6 +4,8 @@
 use glam::{DMat3, DVec3};
 
 use super::ElementTile;
+#[cfg(feature = "std")]
+use crate::material::Potential;
 use crate::material::{Invariants, Law, energy_density, response};
 use crate::simd::NodeVector;
 
@@ -61,6 +63,28 @@ pub(crate) fn element_fields<L: Law>(
     let volume_ratio = 1.0 + j;
     let von_mises = if volume_ratio > 0.0 { p1 / volume_ratio * libm::sqrt(1.5 * square) } else { f64::NAN };
     ElementFields { element: tile.element(lane), volume_ratio, von_mises, energy }
+}
+
+/// Pressure at a corner of an element, Pa, positive where tissue is compressed: `-U'` at the volume ratio that its energy of
+/// volume is taken at, the node's with nodal pressure ([`super::pressure`]) and the element's own in linear tetrahedra.
+#[cfg(feature = "std")]
+pub(crate) fn pressure_at<L: Law>(
+    law: &L,
+    tile: &ElementTile,
+    lane: usize,
+    corner: usize,
+    volume_ratio: f64,
+    volumes: Option<&[NodeVector]>,
+) -> f64 {
+    let own = (volume_ratio - 1.0) as f32;
+    let change = volumes.map_or(own, |volumes| {
+        let row = volumes.get(tile.node(corner, lane)).copied().unwrap_or_default().0;
+        match tile.slot(corner, lane) {
+            slot @ (0 | 1) => row[usize::from(slot)],
+            _ => own,
+        }
+    });
+    -f64::from(L::widen::<f32>(|_| *law).volume_slope(change))
 }
 
 /// What the energy (J) of an element changes by when its energy of volume is that of its nodes ([`super::pressure`]).

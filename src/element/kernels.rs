@@ -2,7 +2,7 @@
 //! generic, so that no other crate compiles them again. Each is linked only where it is used.
 
 #[cfg(any(feature = "std", test))]
-use crate::material::{AnyLaw, Exponential, Literal, NeoHookean};
+use crate::material::{AnyLaw, Element, Exponential, Literal, NeoHookean, NodalPressure};
 use crate::material::{Law, for_each_law};
 use crate::simd::{NodeVector, dispatch};
 
@@ -46,7 +46,7 @@ pub(crate) fn tile_bounds<M: ElementMaterial>(
     kernel: TileBounds<'_, M::Law>,
     volumes: &[NodeVector],
 ) -> TileTangents {
-    if M::NODAL_PRESSURE {
+    if M::ELEMENT.is_nodal_pressure() {
         M::Law::nodal_pressure_tile_bounds(kernel.with_nodal_volumes(volumes))
     } else {
         M::Law::tile_bounds(kernel)
@@ -157,3 +157,25 @@ macro_rules! with_any_law {
     };
 }
 for_each_law!(with_any_law);
+
+/// Work that is compiled once for each kind of material.
+#[cfg(any(feature = "std", test))]
+pub trait MaterialWork {
+    /// What it gives.
+    type Output;
+    /// Does it with a material.
+    fn run<M: ElementMaterial>(self, material: M) -> Self::Output;
+}
+
+/// Does `work` with a material in tetrahedra that are known only when a file has named them.
+#[cfg(any(feature = "std", test))]
+pub fn with_element<M: ElementMaterial, W: MaterialWork>(
+    element: Element,
+    material: M,
+    work: W,
+) -> W::Output {
+    match element {
+        Element::Linear => work.run(material),
+        Element::NodalPressure => work.run(NodalPressure(material)),
+    }
+}

@@ -9,6 +9,7 @@ mod fields;
 mod internal_forces;
 mod kernels;
 mod nodal_volume;
+mod nodal_volume_bounds;
 mod node;
 mod pressure;
 mod stiffness_bound;
@@ -22,15 +23,18 @@ pub use fields::ElementFields;
 pub use kernels::ElementLaw;
 pub(crate) use kernels::{ForcesVisitor, tile_bounds};
 #[cfg(any(feature = "std", test))]
-pub use kernels::{LawWork, with_law};
+pub use kernels::{LawWork, MaterialWork, with_element, with_law};
 pub use node::{Axes, NodeInertia};
 pub use tile::ElementTile;
 pub(crate) use tile::MOST_ELEMENTS;
 
 pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
+#[cfg(feature = "std")]
+pub(crate) use fields::pressure_at;
 pub(crate) use fields::{element_fields, volume_energy_difference};
 pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};
-pub(crate) use nodal_volume::NodalVolumes;
+pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes};
+pub(crate) use nodal_volume_bounds::NodalVolumeBounds;
 pub(crate) use pressure::{MeanPressure, OwnPressure};
 pub(crate) use stiffness_bound::{MatrixSums, ScalarBound};
 pub(crate) use tile_bounds::{TileBounds, TileTangents};

@@ -8,7 +8,7 @@ use std::vec::Vec;
 use super::LabError;
 use super::scenes::{LOBE, RigidVelocity, SceneSpec, bar, held_at_its_end};
 use super::timing::Timing;
-use crate::element::{ElementLaw, LawWork, with_law};
+use crate::element::{ElementMaterial, MaterialWork};
 use crate::loads::{Motion, NodalForce};
 use crate::material::{AnyLaw, Exponential, NeoHookean};
 use crate::mesh::Bar;
@@ -61,7 +61,7 @@ fn finished(name: &'static str, scene: Scene) -> Result<SceneSpec, LabError> {
     const MARGIN: f32 = 0.95;
     let Scene { mut spec, seconds, refinement } = scene;
     spec.name = name;
-    let bound = with_law(spec.law, CriticalStep { spec: &spec })?;
+    let bound = spec.with_material(CriticalStep { spec: &spec })?;
     (spec.timing, spec.intervals) = Timing::of_longest(MARGIN * bound, seconds, refinement);
     Ok(spec)
 }
@@ -71,11 +71,11 @@ struct CriticalStep<'a> {
     spec: &'a SceneSpec,
 }
 
-impl LawWork for CriticalStep<'_> {
+impl MaterialWork for CriticalStep<'_> {
     type Output = Result<f32, LabError>;
 
-    fn run<L: ElementLaw>(self, law: L) -> Self::Output {
-        let scene = self.spec.build(law)?;
+    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
+        let scene = self.spec.build(material)?;
         let bound = tled::critical_step(&scene, &mut VecState::at_rest(scene.node_count()));
         bound.map(|bound| bound.seconds).ok_or(LabError::NoCriticalStep { scene: self.spec.name })
     }
@@ -203,7 +203,7 @@ mod tests {
             };
             assert!((bulk / shear / ratio - 1.0).abs() < 1e-6, "{name}: {bulk} over {shear}");
             assert!((0.25..1.01).contains(&spec.duration()), "{name}");
-            let bound = with_law(spec.law, CriticalStep { spec: &spec }).unwrap();
+            let bound = spec.with_material(CriticalStep { spec: &spec }).unwrap();
             let step = spec.timing.step;
             assert!((0.6..0.96).contains(&(step / bound)), "{name}: {step} of {bound}");
         }

@@ -10,7 +10,7 @@ use super::measure::Errors;
 use super::method::Method;
 use super::scenes::SceneSpec;
 use super::truth::Truth;
-use crate::element::{ElementLaw, LawWork, with_law};
+use crate::element::{ElementMaterial, MaterialWork};
 use crate::step::Status;
 
 /// What a method did on a scene with a step.
@@ -97,7 +97,7 @@ pub fn run_with_shapes(
     multiple: u32,
 ) -> Result<(Row, Shapes), LabError> {
     spec.check_multiple(multiple)?;
-    let (end, shapes) = with_law(spec.law, Run { spec, truth, method, multiple })?;
+    let (end, shapes) = spec.with_material(Run { spec, truth, method, multiple })?;
     let hold = Errors::of_hold(truth)?;
     let step = f64::from(multiple) * f64::from(spec.timing.step);
     let row = Row {
@@ -122,12 +122,12 @@ struct Run<'a> {
     multiple: u32,
 }
 
-impl LawWork for Run<'_> {
+impl MaterialWork for Run<'_> {
     type Output = Result<(End, Shapes), LabError>;
 
-    fn run<L: ElementLaw>(self, law: L) -> Self::Output {
+    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
         let Self { spec, truth, method, multiple } = self;
-        let scene = spec.build(law)?;
+        let scene = spec.build(material)?;
         let dt = multiple as f32 * spec.timing.step;
         let mut state = spec.state(&scene, dt)?;
         let mut advance = method.prepare(spec, scene.view(), &mut state, dt)?;

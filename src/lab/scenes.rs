@@ -11,9 +11,10 @@ use glam::Vec3;
 
 use super::timing::Timing;
 use super::{LabError, moving};
+use crate::element::{ElementLaw, LawWork, MaterialWork, with_element, with_law};
 use crate::io::{TetMesh, parse_msh};
 use crate::loads::{Loads, Motion, NodalForce};
-use crate::material::{AnyLaw, Exponential, Law, NeoHookean, Tissue};
+use crate::material::{AnyLaw, Element, Exponential, Material, NeoHookean, Tissue};
 use crate::mesh::{Bar, Mesh, Winding};
 use crate::scene::{AsScene, Axes, BuildError, Support, VecScene};
 use crate::state::VecState;
@@ -85,6 +86,8 @@ pub struct SceneSpec {
     pub tets: Vec<[u32; 4]>,
     /// The law.
     pub law: AnyLaw,
+    /// Tetrahedra; the scenes of the paper are of linear ones.
+    pub element: Element,
     /// Density, kg/m^3.
     pub density: f32,
     /// Damping, proportional to mass, 1/s.
@@ -116,6 +119,21 @@ pub struct RigidVelocity {
     pub angular: [f32; 3],
 }
 
+/// Work with the material of a scene whose law is known.
+struct OfLaw<'a, W> {
+    spec: &'a SceneSpec,
+    work: W,
+}
+
+impl<W: MaterialWork> LawWork for OfLaw<'_, W> {
+    type Output = W::Output;
+
+    fn run<L: ElementLaw>(self, law: L) -> W::Output {
+        let Self { spec, work } = self;
+        with_element(spec.element, Tissue { law, density: spec.density }, work)
+    }
+}
+
 impl SceneSpec {
     /// The scene under `times` its forces.
     #[must_use]
@@ -140,10 +158,15 @@ impl SceneSpec {
         Err(LabError::Multiple { scene: self.name, multiple, interval: self.timing.interval })
     }
 
-    /// Builds the scene; `law` is the [`SceneSpec::law`], of known type.
-    pub fn build<L: Law>(&self, law: L) -> Result<VecScene<Tissue<L>>, LabError> {
+    /// Does `work` with the material that the scene is made of.
+    pub fn with_material<W: MaterialWork>(&self, work: W) -> W::Output {
+        with_law(self.law, OfLaw { spec: self, work })
+    }
+
+    /// Builds the scene; `material` is that of [`SceneSpec::with_material`].
+    pub fn build<M: Material>(&self, material: M) -> Result<VecScene<M>, LabError> {
         let mesh = Mesh::new(&self.points, &self.tets, Winding::Checked).map_err(BuildError::Mesh)?;
-        Ok(VecScene::build(Tissue { law, density: self.density }, &mesh, &self.supports)?)
+        Ok(VecScene::build(material, &mesh, &self.supports)?)
     }
 
     /// The loads during an interval between two snapshots, counted from 0, checked against the scene.
@@ -216,6 +239,7 @@ pub(super) fn bar(name: &'static str, forces: Vec<NodalForce>) -> SceneSpec {
         points: bar.points().collect(),
         tets: bar.tets().collect(),
         law: AnyLaw::Exponential(PAPER_LAW),
+        element: Element::Linear,
         density: DENSITY,
         damping: DAMPING,
         supports: (0..bar.node(nx, ny, 0) + 1).map(Support::fixed).collect(),

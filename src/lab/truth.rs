@@ -16,7 +16,7 @@ use std::vec::Vec;
 
 use super::LabError;
 use super::scenes::SceneSpec;
-use crate::element::{ElementLaw, LawWork, with_law};
+use crate::element::{ElementMaterial, MaterialWork};
 use crate::io::write_atomically;
 use crate::loads::Loads;
 use crate::scene::AsScene;
@@ -111,7 +111,7 @@ fn obtain_one(scene: &SceneSpec, folder: &Path) -> Result<Truth, LabError> {
 
 /// Computes the truth of a scene.
 pub fn compute(scene: &SceneSpec) -> Result<Truth, LabError> {
-    with_law(scene.law, Compute { spec: scene, steps: scene.timing.interval * scene.timing.refinement })
+    scene.with_material(Compute { spec: scene, steps: scene.timing.interval * scene.timing.refinement })
 }
 
 struct Compute<'a> {
@@ -120,12 +120,12 @@ struct Compute<'a> {
     steps: u32,
 }
 
-impl LawWork for Compute<'_> {
+impl MaterialWork for Compute<'_> {
     type Output = Result<Truth, LabError>;
 
-    fn run<L: ElementLaw>(self, law: L) -> Self::Output {
+    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
         let Self { spec, steps } = self;
-        let scene = spec.build(law)?;
+        let scene = spec.build(material)?;
         let dt = spec.timing.step / spec.timing.refinement as f32;
         let mut state = spec.state(&scene, dt)?;
         let limit = |state: &VecState| {
@@ -210,7 +210,7 @@ fn key(scene: &SceneSpec) -> Result<u64, LabError> {
     /// Enough for all forces and laws to have an effect.
     const STEPS: u32 = 10;
     let brief = SceneSpec { intervals: 1, ..scene.clone() };
-    let start = with_law(brief.law, Compute { spec: &brief, steps: STEPS })?;
+    let start = brief.with_material(Compute { spec: &brief, steps: STEPS })?;
     let mut hash = Fnv::EMPTY.add(&encode(&start, 0));
     // Hashing does not fail.
     let _ = fmt::write(&mut hash, format_args!("{LOOK_STEPS} {FALL} {scene:?}"));

@@ -3,7 +3,7 @@
 
 use core::fmt;
 
-use super::{Constant, Exponential, Law, Literal, MAX_CONSTANTS, NeoHookean};
+use super::{Constant, Exponential, Law, Literal, MAX_CONSTANTS, Moduli, NeoHookean};
 
 macro_rules! any_law {
     ($($variant:ident: $law:ty,)*) => {
@@ -72,6 +72,16 @@ macro_rules! any_law {
                     $(Self::$variant(law) => law.constants(),)*
                     Self::LiteralNeoHookean(law) => law.constants(),
                     Self::LiteralExponential(law) => law.constants(),
+                }
+            }
+
+            /// Its moduli at rest.
+            #[must_use]
+            pub fn moduli(&self) -> Moduli {
+                match self {
+                    $(Self::$variant(law) => Moduli::of(law),)*
+                    Self::LiteralNeoHookean(law) => Moduli::of(law),
+                    Self::LiteralExponential(law) => Moduli::of(law),
                 }
             }
 

@@ -43,17 +43,19 @@ pub(crate) use for_each_law;
 for_each_law! { @ modules [] }
 mod any;
 mod literal;
+mod moduli;
 mod response;
 mod tissue;
 
 pub use any::AnyLaw;
 pub use exponential::EXPONENT_CAP;
 pub use literal::Literal;
+pub use moduli::Moduli;
 #[cfg(feature = "std")]
 pub(crate) use response::VolumeFactor;
 pub use response::{Invariants, Response};
 pub(crate) use response::{LawState, energy_density, releasable_energy, response, response_operations};
-pub use tissue::{Laws, Material, NodalPressure, Regions, Tissue};
+pub use tissue::{Element, Laws, Material, NodalPressure, Regions, Tissue};
 
 use crate::simd::Real;
 

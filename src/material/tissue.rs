@@ -12,13 +12,53 @@ pub struct Tissue<L> {
     pub density: f32,
 }
 
+/// Which tetrahedra a scene is made of.
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
+#[cfg_attr(
+    any(feature = "safetensors", feature = "train"),
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "kebab-case")
+)]
+pub enum Element {
+    /// Linear tetrahedra, each with the pressure of its own volume. They lock, that is bend too little, where tissue hardly
+    /// changes its volume (a Poisson's ratio above 0.45 or so).
+    #[default]
+    Linear,
+    /// The same with the mean of the nodes' pressures: see [`NodalPressure`].
+    NodalPressure,
+}
+
+impl Element {
+    /// Every element.
+    pub const ALL: [Self; 2] = [Self::Linear, Self::NodalPressure];
+
+    /// Its name in scene files, recipes and results.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::NodalPressure => "nodal-pressure",
+        }
+    }
+
+    pub(crate) const fn is_nodal_pressure(self) -> bool {
+        matches!(self, Self::NodalPressure)
+    }
+
+    /// Its number in weight files and in C.
+    #[must_use]
+    pub const fn code(self) -> u32 {
+        self as u32
+    }
+}
+
 /// The tissue of each element. A scene with one [`Tissue`] does not pay for the choice.
 pub trait Material: Sync {
     /// The law all elements share; its constants may differ.
     type Law: Law;
 
-    /// Whether the pressure of an element is the mean of its nodes' ([`NodalPressure`]).
-    const NODAL_PRESSURE: bool = false;
+    /// Which tetrahedra: with [`NodalPressure`] around a material those.
+    const ELEMENT: Element = Element::Linear;
 
     /// The tissue of mesh element `element`, or nothing where the material names none.
     fn tissue(&self, element: usize) -> Option<Tissue<Self::Law>>;
@@ -41,7 +81,7 @@ pub struct NodalPressure<M>(pub M);
 impl<M: Material> Material for NodalPressure<M> {
     type Law = M::Law;
 
-    const NODAL_PRESSURE: bool = true;
+    const ELEMENT: Element = Element::NodalPressure;
 
     fn tissue(&self, element: usize) -> Option<Tissue<M::Law>> {
         self.0.tissue(element)

@@ -21,7 +21,7 @@ use super::{
     Activation, Description, ForceInput, Layer, LayerDescription, MAX_WIDTH, Network, Parameters, Range,
     WeightError, hexadecimal, write,
 };
-use crate::material::{AnyLaw, MAX_CONSTANTS};
+use crate::material::{AnyLaw, Element, MAX_CONSTANTS};
 
 /// The key of the metadata.
 const KEY: &str = "supple";
@@ -122,6 +122,9 @@ struct About {
     law: &'static str,
     constants: BTreeMap<&'static str, f32>,
     density: f32,
+    /// Left out where it is the linear one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    element: Option<Element>,
     damping: f32,
     step: f32,
     exact_step: f32,
@@ -160,6 +163,7 @@ impl About {
             law: recipe.law.name(),
             constants: names.zip(recipe.law.values()).collect(),
             density: recipe.density,
+            element: (recipe.element != Element::default()).then_some(recipe.element),
             damping: recipe.damping,
             step: recipe.step,
             exact_step: recipe.exact_step,
@@ -222,6 +226,7 @@ pub fn from_safetensors(bytes: &[u8]) -> Result<Vec<u8>, ExchangeError> {
         outputs,
         law,
         density: about.take("density")?,
+        element: about.take_if_there("element")?.unwrap_or_default(),
         damping: about.take("damping")?,
         step: about.take("step")?,
         exact_step: about.take("exact_step")?,

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable, try_cast_slice};
 
 use super::layers::{LayerEntry, LongEntry, Place, checked_layer};
 use super::{Layer, MAX_INPUTS, MAX_LAYERS, MAX_OUTPUTS};
-use crate::material::{AnyLaw, MAX_CONSTANTS};
+use crate::material::{AnyLaw, Element, MAX_CONSTANTS};
 
 #[cfg(target_endian = "big")]
 compile_error!("weight files are little-endian and read in place");
@@ -45,7 +45,8 @@ pub(super) struct Header {
     pub(super) recipe_length: u32,
     pub(super) recipe_hash: [u8; 32],
     pub(super) force: u32,
-    pub(super) reserved: [u8; 124],
+    pub(super) element: u32,
+    pub(super) reserved: [u8; 120],
 }
 
 pub(super) const HEADER: usize = size_of::<Header>();
@@ -86,6 +87,8 @@ pub struct Recipe<'w> {
     pub law: AnyLaw,
     /// kg/m^3.
     pub density: f32,
+    /// Tetrahedra of the motion it learned from.
+    pub element: Element,
     /// 1/s.
     pub damping: f32,
     /// Step that the network predicts for, s.
@@ -423,6 +426,9 @@ fn recipe<'w>(header: &Header, bytes: &'w [u8]) -> Result<Recipe<'w>, WeightErro
         1 => ForceInput::PerMass,
         code => return Err(WeightError::Header { field: "the unit of force", value: code as f32 }),
     };
+    let element = Element::ALL.into_iter().find(|element| element.code() == header.element);
+    let element =
+        element.ok_or(WeightError::Header { field: "the element", value: header.element as f32 })?;
     let (at, length) = (header.recipe, header.recipe_length);
     let end = (at as usize).checked_add(length as usize);
     let text =
@@ -430,6 +436,7 @@ fn recipe<'w>(header: &Header, bytes: &'w [u8]) -> Result<Recipe<'w>, WeightErro
     Ok(Recipe {
         law: law.with(header.constants),
         density: positive("the density", header.density)?,
+        element,
         damping,
         step: positive("the step", header.step)?,
         exact_step: positive("the exact step", header.exact_step)?,

@@ -10,7 +10,7 @@ use super::file::{ALIGNMENT, CHECKED, HEADER, Header, MAGIC, VERSION, VERSION_IN
 use super::int8::{GROUP, TILE_ROWS, WeightTile};
 use super::layers::{LayerEntry, LongEntry};
 use super::{Activation, ForceInput, Layer, Network, Parameters, Range, WeightError};
-use crate::material::AnyLaw;
+use crate::material::{AnyLaw, Element};
 
 /// A layer of a network to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,6 +51,8 @@ pub struct Description<'a> {
     pub law: AnyLaw,
     /// kg/m^3.
     pub density: f32,
+    /// Tetrahedra of the motion it learned from.
+    pub element: Element,
     /// 1/s.
     pub damping: f32,
     /// Step that the network predicts for, s.
@@ -93,6 +95,7 @@ impl<'a> Description<'a> {
             second: layers(second),
             law: recipe.law,
             density: recipe.density,
+            element: recipe.element,
             damping: recipe.damping,
             step: recipe.step,
             exact_step: recipe.exact_step,
@@ -236,7 +239,8 @@ pub fn write_int8(
         recipe_length: description.recipe.len() as u32,
         recipe_hash: description.recipe_hash,
         force: u32::from(description.force == ForceInput::PerMass),
-        reserved: [0; 124],
+        element: description.element.code(),
+        reserved: [0; 120],
     };
     let place =
         |bytes: &mut Vec<u8>, at: usize, part: &[u8]| bytes[at..at + part.len()].copy_from_slice(part);

@@ -42,7 +42,7 @@ pub(crate) fn nodal_volumes<M: ElementMaterial>(
     mut volumes: &mut [NodeVector],
     threads: &impl Threads,
 ) {
-    if !M::NODAL_PRESSURE {
+    if !M::ELEMENT.is_nodal_pressure() {
         return;
     }
     let elements = scene.elements();
@@ -123,7 +123,7 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     visitor: V,
 ) -> Extremes<f32> {
     let elements = scene.elements();
-    if M::NODAL_PRESSURE {
+    if M::ELEMENT.is_nodal_pressure() {
         let pressure = MeanPressure(Gather::new(volumes));
         let kernel =
             InternalForces::of_partitions(elements, pressure, partitions, displacement, force, visitor);

@@ -10,11 +10,15 @@
 mod central_differences;
 mod critical;
 #[cfg(feature = "std")]
+mod pressures;
+#[cfg(feature = "std")]
 mod spectrum;
 #[cfg(feature = "std")]
 pub(crate) mod tangent;
 
 pub use critical::critical_step;
+#[cfg(feature = "std")]
+pub use pressures::nodal_pressures;
 #[cfg(feature = "std")]
 pub use spectrum::exact_critical_step;
 
@@ -96,7 +100,8 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
 /// Floating-point operations of the internal forces.
 #[must_use]
 pub fn element_operations<M: Material>(scene: SceneView<'_, M>) -> u64 {
-    scene.element_count() as u64 * u64::from(element::operations::<M::Law>())
+    let nodal = if M::ELEMENT.is_nodal_pressure() { element::NODAL_PRESSURE_OPERATIONS } else { 0 };
+    scene.element_count() as u64 * u64::from(element::operations::<M::Law>() + nodal)
 }
 
 /// Floating-point operations of one step without loads, the same for every step.

@@ -24,7 +24,7 @@ pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &
     let displacement = displacement.get(..scene.node_count())?;
     let tangents: Vec<ElementTangent> =
         scene.places().map(|(tile, lane)| ElementTangent::of(scene, tile, lane, displacement)).collect();
-    let nodal = if M::NODAL_PRESSURE { Some(NodalTangent::new(scene, &tangents)) } else { None };
+    let nodal = if M::ELEMENT.is_nodal_pressure() { Some(NodalTangent::new(scene, &tangents)) } else { None };
     let tangents = match &nodal {
         Some(nodal) => nodal.with_pressures(tangents),
         None => tangents,

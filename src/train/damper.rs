@@ -327,6 +327,7 @@ fn described(recipe: &Recipe, text: &str, spec: &SceneSpec, weights: &[f64]) -> 
         second: Vec::new(),
         law: spec.law,
         density: spec.density,
+        element: spec.element,
         damping: spec.damping,
         step: multiple as f32 * DT,
         exact_step: DT,

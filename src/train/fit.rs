@@ -297,6 +297,7 @@ fn described<'a>(
         second: layers(&parts.second),
         law: spec.law,
         density: spec.density,
+        element: recipe.motion.element,
         damping: spec.damping,
         step: recipe.multiple as f32 * DT,
         exact_step: DT,

@@ -6,6 +6,7 @@
 //!
 //! [motion]
 //! scene = "torsion"        # of the laboratory
+//! element = "linear"       # or "nodal-pressure"
 //! load = 1.0               # times the scene's forces
 //! from = 0.3               # s
 //! to = 1.0
@@ -43,6 +44,7 @@ use serde::Deserialize;
 
 use super::TrainError;
 use crate::lab::scenes;
+use crate::material::Element;
 use crate::mlp::{ForceInput, MAX_LAYERS, MAX_WIDTH};
 
 /// A recipe as the module documents it.
@@ -70,6 +72,9 @@ pub struct Recipe {
 pub struct Motion {
     /// One of [`scenes::RAMPED`].
     pub scene: String,
+    /// Tetrahedra that it is made of.
+    #[serde(default)]
+    pub element: Element,
     /// Times the scene's forces.
     pub load: f32,
     /// s.

@@ -16,7 +16,7 @@ use glam::{DVec3, Vec3A};
 
 use super::noise::{Moment, MovedCopy, Random, SeenAs};
 use super::recipe::Recipe;
-use crate::element::{ElementLaw, LawWork, with_law};
+use crate::element::{ElementMaterial, MaterialWork};
 use crate::lab::scenes::{self, SceneSpec};
 use crate::lab::truth::exact_step;
 use crate::lab::{DT, INTERVAL_STEPS, LabError};
@@ -54,8 +54,9 @@ pub struct Rough {
 impl Samples {
     /// Simulates the recipe's motion and samples it.
     pub fn collect(recipe: &Recipe) -> Result<Self, LabError> {
-        let spec = scenes::named(&recipe.motion.scene)?.with_load(recipe.motion.load);
-        with_law(spec.law, Collect { spec: &spec, recipe })
+        let mut spec = scenes::named(&recipe.motion.scene)?.with_load(recipe.motion.load);
+        spec.element = recipe.motion.element;
+        spec.with_material(Collect { spec: &spec, recipe })
     }
 
     /// Those of some frames.
@@ -193,12 +194,12 @@ struct Collect<'a> {
     recipe: &'a Recipe,
 }
 
-impl LawWork for Collect<'_> {
+impl MaterialWork for Collect<'_> {
     type Output = Result<Samples, LabError>;
 
-    fn run<L: ElementLaw>(self, law: L) -> Self::Output {
+    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
         let Self { spec, recipe } = self;
-        let scene = spec.build(law)?;
+        let scene = spec.build(material)?;
         let step = Step::unchecked(DT, spec.damping)?;
         let nodes = spec.points.len();
         let mut state = VecState::at_rest(nodes);

@@ -17,6 +17,10 @@
         }                                                                                                              \
     } while (0)
 
+#ifndef ELEMENT
+#define ELEMENT SUPPLE_NODAL_PRESSURE
+#endif
+
 #ifdef SMALL /* for valgrind, which takes fifty times as long */
 enum { X = 3, Y = 3, Z = 6, PARTS = 1 };
 #else /* enough elements for four parts */
@@ -54,7 +58,7 @@ static inline supple_scene_config bar_config(void) {
         supports[LAYER + n] = (supple_support){NODES - LAYER + n, 7, 1};
     }
     return (supple_scene_config){SUPPLE_CONFIG(supple_scene_config), SUPPLE_EXPONENTIAL, SUPPLE_WINDING_CHECKED, NODES, TETS,
-                                 2 * LAYER, 1, points[0], tets[0], supports, &tissue, NULL};
+                                 2 * LAYER, 1, points[0], tets[0], supports, &tissue, NULL, ELEMENT, 0};
 }
 
 /* All motions of the moved end, to the same displacement, m. */

@@ -8,7 +8,7 @@ SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(weights, 40000);
 SUPPLE_MEMORY(damper, 4000);
 /* Twice each: the original and its copy. */
-SUPPLE_MEMORY(state_memory, 2 * SUPPLE_STATE_SIZE(NODES));
+SUPPLE_MEMORY(state_memory, 2 * SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(learned_memory, 2 * SUPPLE_LEARNED_SIZE(NODES, 1));
 SUPPLE_MEMORY(large_memory, 2 * ROOM);
 static unsigned char saved[1 + 32 * NODES + 128];
@@ -19,7 +19,7 @@ static supple_loads *loads;
 static supple_state *fresh(void) {
     supple_state *state;
     const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), 1e-4f, 20.0f};
-    CHECK(supple_state_init(state_memory, SUPPLE_STATE_SIZE(NODES), scene, &state) == SUPPLE_OK);
+    CHECK(supple_state_init(state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT), scene, &state) == SUPPLE_OK);
     CHECK(supple_set_step(scene, state, &step, NULL) == SUPPLE_OK);
     return state;
 }
@@ -65,8 +65,8 @@ static void exact_copied(void) {
     move_end(scene, loads, 0.01f, -0.005f, 0.01f);
     CHECK(supple_step(scene, loads, state, 100, NULL, NULL) == SUPPLE_OK);
     /* Copied by memcpy. */
-    unsigned char *other = state_memory + SUPPLE_STATE_SIZE(NODES);
-    memcpy(other, state_memory, SUPPLE_STATE_SIZE(NODES));
+    unsigned char *other = state_memory + SUPPLE_STATE_SIZE(NODES, ELEMENT);
+    memcpy(other, state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
     supple_state *copy = (supple_state *)(void *)other;
     /* Saved to an odd address. */
     CHECK(supple_saved_size(NODES) <= sizeof saved - 1);
@@ -107,9 +107,9 @@ static void learned_copied(void) {
     CHECK(supple_learned_lead(scene, loads, state, learned, 300 * (double)facts.seconds, NULL, &report) >= 0 && report.steps == 900);
     CHECK(supple_learned_step(scene, loads, state, learned, 10, NULL, &report) >= 0);
     CHECK(report.outside > 0.0f || report.clipped >= 0.0f);
-    memcpy(state_memory + SUPPLE_STATE_SIZE(NODES), state_memory, SUPPLE_STATE_SIZE(NODES));
+    memcpy(state_memory + SUPPLE_STATE_SIZE(NODES, ELEMENT), state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
     memcpy(learned_memory + SUPPLE_LEARNED_SIZE(NODES, 1), learned_memory, SUPPLE_LEARNED_SIZE(NODES, 1));
-    supple_state *state_copy = (supple_state *)(void *)(state_memory + SUPPLE_STATE_SIZE(NODES));
+    supple_state *state_copy = (supple_state *)(void *)(state_memory + SUPPLE_STATE_SIZE(NODES, ELEMENT));
     supple_learned *copy = (supple_learned *)(void *)(learned_memory + SUPPLE_LEARNED_SIZE(NODES, 1));
     const supple_status first = supple_learned_step(scene, loads, state, learned, 300, NULL, &report);
     CHECK(first >= 0);
@@ -132,9 +132,9 @@ static void large_copied(uint32_t method, const char *name) {
     CHECK(supple_large_size(scene, points[0], &config, &needed, NULL) == SUPPLE_OK && needed <= ROOM);
     CHECK(supple_large_init(large_memory, ROOM, scene, state, points[0], &config, &large, NULL) == SUPPLE_OK);
     CHECK(supple_large_step(scene, loads, state, large, 50, NULL, NULL) >= 0);
-    memcpy(state_memory + SUPPLE_STATE_SIZE(NODES), state_memory, SUPPLE_STATE_SIZE(NODES));
+    memcpy(state_memory + SUPPLE_STATE_SIZE(NODES, ELEMENT), state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
     memcpy(large_memory + ROOM, large_memory, needed);
-    supple_state *state_copy = (supple_state *)(void *)(state_memory + SUPPLE_STATE_SIZE(NODES));
+    supple_state *state_copy = (supple_state *)(void *)(state_memory + SUPPLE_STATE_SIZE(NODES, ELEMENT));
     CHECK(supple_large_step(scene, loads, state, large, 200, NULL, &report) >= 0 && report.steps == 200);
     CHECK(supple_large_step(scene, loads, state_copy, (supple_large *)(void *)(large_memory + ROOM), 200, NULL, NULL) >= 0);
     CHECK(where(state) == where(state_copy));

@@ -3,13 +3,13 @@
 #include "body.h"
 
 SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
-SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES));
+SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 1));
 SUPPLE_MEMORY(large_memory, 1 << 20);
 /* Of another scene, of one element. */
 SUPPLE_MEMORY(small_scene_memory, SUPPLE_SCENE_SIZE(4, 1, 1));
-SUPPLE_MEMORY(small_state_memory, SUPPLE_STATE_SIZE(4));
+SUPPLE_MEMORY(small_state_memory, SUPPLE_STATE_SIZE(4, ELEMENT));
 SUPPLE_MEMORY(small_loads_memory, SUPPLE_LOADS_SIZE(1, 1));
 /* Where objects are tried that shall not be made. */
 SUPPLE_MEMORY(spare, 4 << 20);
@@ -122,6 +122,9 @@ static void scenes(void) {
     SCENE(SUPPLE_E_LAW, bad.law = 7);
     CHECK(error.value == 7);
     SCENE(SUPPLE_E_CHOICE, bad.winding = 2);
+    SCENE(SUPPLE_E_CHOICE, bad.element = 2);
+    CHECK(error.value == 2 && error.limit == SUPPLE_NODAL_PRESSURE);
+    SCENE(SUPPLE_E_CHOICE, bad.reserved = 1);
     SCENE(SUPPLE_E_MESH_EMPTY, bad.elements = 0);
     SCENE(SUPPLE_E_MESH_EMPTY, bad.nodes = 0);
     SCENE(SUPPLE_E_NULL, bad.points = NULL);
@@ -435,9 +438,9 @@ static void divergence(void) {
     DONE(supple_set_step(scene, state, &step, NULL));
     move_end(scene, loads, 0.03f, 0.0f, 0.03f);
     DONE(supple_learned_lead(scene, loads, state, learned, 100 * (double)facts.seconds, NULL, &report));
-    const supple_status outside = supple_learned_step(scene, loads, state, learned, 50, NULL, &report);
+    const supple_status outside = supple_learned_step(scene, loads, state, learned, 20, NULL, &report);
     note(outside);
-    CHECK(outside == SUPPLE_OUTSIDE && report.steps == 50 && report.outside > 0.01f);
+    CHECK(outside == SUPPLE_OUTSIDE && report.steps == 20 && report.outside > 0.01f);
 
     DONE(supple_state_reset(state));
     DONE(supple_learned_reset(learned));
@@ -467,6 +470,24 @@ static void divergence(void) {
     REFUSED(SUPPLE_E_NOT_LED, supple_learned_step(scene, NULL, state, alone, 1, NULL, NULL));
 }
 
+/* A state of one element does not move a scene of another. */
+static supple_scene *other_element(supple_scene_config config) {
+    supple_scene *other = NULL;
+    config.element = SUPPLE_NODAL_PRESSURE - config.element;
+    DONE(supple_scene_init(spare, sizeof spare, &config, &other, &error));
+    return other;
+}
+
+static void elements(supple_scene_config config) {
+    supple_scene *other = other_element(config);
+    float seconds;
+    REFUSED(SUPPLE_E_ELEMENT, supple_critical_step(other, state, &seconds, NULL));
+    const supple_step_config length = {SUPPLE_CONFIG(supple_step_config), 1e-5f, 0.0f};
+    REFUSED(SUPPLE_E_ELEMENT, supple_set_step(other, state, &length, &error));
+    CHECK(error.value != error.limit && error.limit == SUPPLE_NODAL_PRESSURE - config.element);
+    CHECK(supple_state_size(NODES, 2) == 0);
+}
+
 int main(int argc, char **argv) {
     (void)argv;
     watched = argc == 1;
@@ -488,11 +509,14 @@ int main(int argc, char **argv) {
     REFUSED(SUPPLE_E_LEVEL, supple_set_level(supple_level() == SUPPLE_LEVEL_NEON ? SUPPLE_LEVEL_AVX2 : SUPPLE_LEVEL_NEON));
     DONE(supple_set_level(supple_level()));
     scenes();
+    elements(config);
     acting();
     states();
     bytes_of_states();
     networks();
     divergence();
+    DONE(supple_state_reset(state));
+    REFUSED(SUPPLE_E_ELEMENT, supple_step(other_element(config), NULL, state, 1, NULL, NULL));
 
     unsigned statuses = 0;
     const char *const none = supple_status_text(100);

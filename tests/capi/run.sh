@@ -21,11 +21,13 @@ wrapped=-Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc,--wrap=aligned_alloc,--wr
 for test in misuse sizes copies switching heap threads stack; do
     options=(-pthread)
     [ $test != heap ] || options=("$wrapped")
-    for size in large small; do
-        [ $size = large ] || options+=(-DSMALL)
-        gcc -std=c11 "${warnings[@]}" "${options[@]}" tests/capi/$test.c "$static" -o "$folder/$test-$size"
+    declare -A meant=([large]= [linear]=-DELEMENT=SUPPLE_LINEAR [small]=-DSMALL)
+    for kind in "${!meant[@]}"; do
+        # shellcheck disable=SC2086 # At most one option.
+        gcc -std=c11 "${warnings[@]}" "${options[@]}" ${meant[$kind]} tests/capi/$test.c "$static" -o "$folder/$test-$kind"
     done
     "$folder/$test-large"
+    "$folder/$test-linear"
 done
 for test in misuse copies heap; do
     valgrind --quiet --error-exitcode=9 --leak-check=full "$folder/$test-small" under-valgrind >"$folder/said"

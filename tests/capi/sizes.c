@@ -11,7 +11,9 @@ static supple_large_config large_of(uint32_t method, uint32_t x, uint32_t y, uin
 int main(void) {
     unsigned long checked = 0;
     for (uint32_t nodes = 1; nodes < 3000000; nodes += nodes / 7 + 1) {
-        CHECK(supple_state_size(nodes) == SUPPLE_STATE_SIZE(nodes));
+        for (uint32_t element = SUPPLE_LINEAR; element <= SUPPLE_NODAL_PRESSURE; element++) {
+            CHECK(supple_state_size(nodes, element) == SUPPLE_STATE_SIZE(nodes, element));
+        }
         for (uint32_t fallback = 0; fallback < 2; fallback++) {
             CHECK(supple_learned_size(nodes, fallback) == SUPPLE_LEARNED_SIZE(nodes, fallback));
         }

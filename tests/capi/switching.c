@@ -5,8 +5,8 @@
 enum { PHASES = 5, FRAMES = 10, ROOM = 4 << 20 };
 SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
 SUPPLE_MEMORY(other_scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
-SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES));
-SUPPLE_MEMORY(exact_memory, SUPPLE_STATE_SIZE(NODES));
+SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
+SUPPLE_MEMORY(exact_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(large_memory, ROOM);
 SUPPLE_MEMORY(damper, 4000);
@@ -23,7 +23,7 @@ static supple_loads *loads;
 
 static supple_state *fresh(void *memory) {
     supple_state *state;
-    CHECK(supple_state_init(memory, SUPPLE_STATE_SIZE(NODES), scene, &state) == SUPPLE_OK);
+    CHECK(supple_state_init(memory, SUPPLE_STATE_SIZE(NODES, ELEMENT), scene, &state) == SUPPLE_OK);
     CHECK(supple_set_step(scene, state, &exact_step, NULL) == SUPPLE_OK);
     return state;
 }

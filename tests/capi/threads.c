@@ -4,7 +4,7 @@
 #include <pthread.h>
 
 SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
-SUPPLE_MEMORY(state_memory, 4 * SUPPLE_STATE_SIZE(NODES));
+SUPPLE_MEMORY(state_memory, 4 * SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(loads_memory, 4 * SUPPLE_LOADS_SIZE(0, MOTIONS));
 static supple_scene *scene;
 
@@ -17,7 +17,7 @@ struct body {
 static struct body body(int number) {
     struct body made = {NULL, NULL, SUPPLE_OK};
     const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), 1e-4f, 20.0f};
-    const size_t of_state = SUPPLE_STATE_SIZE(NODES), of_loads = SUPPLE_LOADS_SIZE(0, MOTIONS);
+    const size_t of_state = SUPPLE_STATE_SIZE(NODES, ELEMENT), of_loads = SUPPLE_LOADS_SIZE(0, MOTIONS);
     CHECK(supple_state_init(state_memory + (size_t)number * of_state, of_state, scene, &made.state) == SUPPLE_OK);
     CHECK(supple_loads_init(loads_memory + (size_t)number * of_loads, of_loads, scene, 0, MOTIONS, &made.loads) == SUPPLE_OK);
     CHECK(supple_set_step(scene, made.state, &step, NULL) == SUPPLE_OK);

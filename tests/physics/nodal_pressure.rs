@@ -216,6 +216,13 @@ fn the_bound_of_the_critical_step_is_below_the_exact_one() {
         / tled::exact_critical_step(linear.view(), at_rest.displacements()).expect("it settles");
     println!("beam: exact critical step {ratio:.3} of the linear element's");
     assert!((ratio - 1.285).abs() < 2e-3);
+    for (name, body) in [("beam", &beam), ("lobe", &Body::lobe())] {
+        let (nodal, linear) = (body.scene(NodalPressure(tissue(law)), &[]), body.scene(tissue(law), &[]));
+        let ratio = support::bound(&nodal, &rest_of(&nodal)).seconds
+            / support::bound(&linear, &rest_of(&linear)).seconds;
+        println!("{name}: bound of the critical step {ratio:.3} of the linear element's");
+        assert!(ratio > 1.2);
+    }
 
     let bodies = [
         ("beam", beam),
@@ -237,8 +244,8 @@ fn the_bound_of_the_critical_step_is_below_the_exact_one() {
                     law.d,
                     bound / exact
                 );
-                // In slivers the mean over the nodes takes away most of the stiffness of volume; the bound does not know.
-                let least = if name == "slivers" { 0.05 } else { 0.4 };
+                // The noise turns slivers inside out: the bound adds up pressures that nearly cancel.
+                let least = if name == "slivers" && share > 0.0 { 0.05 } else { 0.6 };
                 assert!(bound <= exact && bound > least * exact);
             }
         }

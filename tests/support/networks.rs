@@ -5,7 +5,7 @@
 use std::cell::Cell;
 
 use supple::inertia::Damper;
-use supple::material::Exponential;
+use supple::material::{Element, Exponential};
 use supple::mlp::{Activation, Description, ForceInput, Int8Description, LayerDescription, Network, Range};
 
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -90,6 +90,7 @@ pub fn described(first: &[usize], second: &[usize], seed: u32) -> Description<'s
         second: if second.is_empty() { Vec::new() } else { part(second, &mut random) },
         law: Exponential { a: 59.0, b: 8.023, d: 60_000.0 }.into(),
         density: 1000.0,
+        element: Element::Linear,
         damping: 20.0,
         step: 3e-4,
         exact_step: 3e-5,

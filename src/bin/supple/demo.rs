@@ -33,7 +33,7 @@ pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
     println!("A liver lobe, held at its back, sags under its own weight; its dome is pushed in by 10 mm.\n");
     let progress = ProgressBar::hidden();
     let simulation = Simulation { setup: &setup, out, force: true, unchecked: false, progress };
-    let simulated = setup.tissues.with_material(simulation)?;
+    let simulated = setup.with_material(simulation)?;
     simulated.folder.write_text("lobe.svg", &draw(&setup.body, &simulated))?;
     println!("\npicture  {}", simulated.folder.path("lobe.svg").display());
     println!("frames   {} (opens in ParaView)", simulated.folder.path("frames.pvd").display());

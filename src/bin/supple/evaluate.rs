@@ -6,7 +6,9 @@ use clap::Args;
 use supple::lab::evaluate::{self, Plan};
 use supple::lab::method::Method;
 use supple::lab::{equal_error, estimates, table};
+use supple::material::Element;
 
+use crate::element_name::element_named;
 use crate::problem::{End, Problem};
 
 #[derive(Args)]
@@ -23,6 +25,9 @@ pub(crate) struct Asked {
     /// Step as a multiple of the scene's, 1 10 20 50 100 unless given; may be repeated
     #[arg(long = "multiple", value_name = "N")]
     multiples: Vec<u32>,
+    /// Tetrahedra of the scenes, linear or nodal-pressure; linear unless given, as in the paper
+    #[arg(long, value_name = "NAME", value_parser = element_named)]
+    element: Option<Element>,
     /// Weight file of a network to judge as well, a learned step's at its own step, a damper's at all; may be repeated
     #[arg(long, value_name = "FILE")]
     weights: Vec<PathBuf>,
@@ -32,8 +37,11 @@ pub(crate) struct Asked {
 }
 
 pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
-    let Asked { out, scenes, methods, multiples, weights, sweep } = asked;
+    let Asked { out, scenes, methods, multiples, element, weights, sweep } = asked;
     let mut plan = Plan::new(scenes, methods, multiples, sweep.as_deref()).map_err(Problem::of)?;
+    for (scene, _) in &mut plan.scenes {
+        scene.element = element.unwrap_or(scene.element);
+    }
     for path in weights {
         plan.methods.push(Method::with(path).map_err(Problem::of)?);
     }

@@ -3,6 +3,7 @@
 //! Exit codes: 0 as asked, 2 the input is not usable, 3 the simulation diverged.
 
 mod demo;
+mod element_name;
 mod evaluate;
 mod inspect;
 mod networks;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use supple::element::ElementMaterial;
+use supple::element::{ElementMaterial, MaterialWork};
 use supple::state::VecState;
 
 use crate::problem::{End, Problem};
@@ -15,14 +15,13 @@ use crate::run::run;
 use crate::run::start::Start;
 use crate::scene::file::SceneFile;
 use crate::scene::setup::Setup;
-use crate::scene::tissues::Job;
 use crate::screen::row;
 
 pub(crate) fn simulate(path: &Path, out: &Path, force: bool, unchecked: bool) -> Result<End, Problem> {
     let setup = Setup::read(&SceneFile::read(path)?)?;
     let progress = ProgressBar::new((setup.time.end * 1e3).ceil() as u64).with_style(progress_style());
     let simulation = Simulation { setup: &setup, out, force, unchecked, progress };
-    let Simulated { outcome, .. } = setup.tissues.with_material(simulation)?;
+    let Simulated { outcome, .. } = setup.with_material(simulation)?;
     row("results", out.display());
     Ok(outcome.divergence.into())
 }
@@ -51,7 +50,7 @@ pub(crate) struct Simulated {
     pub(crate) figures: Figures,
 }
 
-impl Job for Simulation<'_> {
+impl MaterialWork for Simulation<'_> {
     type Output = Result<Simulated, Problem>;
 
     fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
@@ -63,11 +62,11 @@ impl Job for Simulation<'_> {
         let mut folder = Folder::create(out, force)?;
 
         let tick = |time: f64| progress.set_position((time * 1e3) as u64);
-        let mut frame = |state: &VecState| folder.add_frame(&setup.body, scene, state);
+        let mut frame = |state: &mut VecState| folder.add_frame(&setup.body, scene, state);
         let outcome = run(setup, scene, &mut state, start, &tick, &mut frame)?;
         if outcome.divergence.is_some() {
             // The last state that may be believed.
-            frame(&state)?;
+            frame(&mut state)?;
         }
         progress.finish_and_clear();
         let figures = results::conclude(&folder, setup, scene, &state, &outcome)?;

@@ -54,5 +54,5 @@ pub(crate) fn describe_step(network: &Network<'_>) -> String {
 /// The tissue of a network's training.
 pub(crate) fn describe_tissue(network: &Network<'_>) -> String {
     let recipe = network.recipe();
-    format!("{}, {} kg/m^3", recipe.law, recipe.density)
+    format!("{}, {} kg/m^3, {} tetrahedra", recipe.law, recipe.density, recipe.element.name())
 }

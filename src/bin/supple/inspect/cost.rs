@@ -2,9 +2,10 @@
 
 use std::time::Instant;
 
-use supple::element::{ElementMaterial, ElementTile, NodeInertia};
+use supple::element::{ElementMaterial, ElementTile, MaterialWork, NodeInertia};
 use supple::inertia::{Cells, Grid, Method, vectors_for_lattice};
 use supple::loads::Loads;
+use supple::material::{Element, Moduli};
 use supple::scene::{SceneView, tiles_for};
 use supple::state::{NodeVector, VecState};
 use supple::step::{CriticalStep, Step};
@@ -17,7 +18,6 @@ use crate::run::large::{grid, on_grid};
 use crate::run::start::{critical, first_step};
 use crate::scene::setup::Setup;
 use crate::scene::timing::{damper, method_name};
-use crate::scene::tissues::Job;
 use crate::screen::{describe_added, row};
 
 /// Exact steps that are timed.
@@ -30,7 +30,7 @@ pub(crate) struct Cost<'a> {
     pub(crate) accuracy: Option<f64>,
 }
 
-impl Job for Cost<'_> {
+impl MaterialWork for Cost<'_> {
     type Output = Result<(), Problem>;
 
     fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
@@ -38,6 +38,11 @@ impl Job for Cost<'_> {
         let (scene, mut state) = setup.build(material)?;
         let scene = scene.view();
         row("material", &setup.tissues);
+        for (tissue, moduli) in setup.tissues.moduli().enumerate() {
+            let name = if tissue == 0 { "moduli at rest".into() } else { format!("of region {tissue}") };
+            row(&name, describe_moduli(moduli));
+        }
+        row("element", setup.element.name());
         row("mass", format!("{:.3} g", 1e3 * scene.mass()));
         row("elements left out", setup.body.mesh.tets.len() - scene.element_count());
         let bound = critical(scene, &mut state)?;
@@ -66,6 +71,17 @@ impl Job for Cost<'_> {
     }
 }
 
+fn describe_moduli(moduli: Moduli) -> String {
+    let kilo = |pascal: f64| 1e-3 * pascal;
+    format!(
+        "E {:.4} kPa, nu {:.5} (shear modulus {:.4} kPa, bulk modulus {:.4} kPa)",
+        kilo(moduli.young()),
+        moduli.poisson_ratio(),
+        kilo(moduli.shear),
+        kilo(moduli.bulk)
+    )
+}
+
 fn real_time(step: f32, spent: f64) -> String {
     format!("{:.3} at {step:.3e} s a step", f64::from(step) / spent)
 }
@@ -87,7 +103,11 @@ fn describe_limits<M: ElementMaterial>(scene: SceneView<'_, M>, state: &VecState
 
 /// Prints the memory of scene and state.
 fn describe_memory<M: ElementMaterial>(scene: SceneView<'_, M>) {
-    let of_node = size_of::<NodeInertia>() + 3 * size_of::<NodeVector>();
+    let vectors = match scene.element() {
+        Element::Linear => 3,
+        Element::NodalPressure => 4,
+    };
+    let of_node = size_of::<NodeInertia>() + vectors * size_of::<NodeVector>();
     let tiles = tiles_for(scene.element_count()) * size_of::<ElementTile>();
     row("memory", format!("{:.1} kB", (scene.node_count() * of_node + tiles) as f64 * 1e-3));
 }

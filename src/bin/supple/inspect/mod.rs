@@ -31,7 +31,7 @@ pub(crate) fn inspect(path: &Path, accuracy: Option<f64>) -> Result<(), Problem>
         for warning in &setup.warnings {
             println!("warning: {warning}");
         }
-        return setup.tissues.with_material(Cost { setup: &setup, accuracy });
+        return setup.with_material(Cost { setup: &setup, accuracy });
     }
     let is_weights = is_weights(path);
     if accuracy.is_some() {

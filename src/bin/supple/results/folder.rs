@@ -8,6 +8,7 @@ use supple::element::ElementMaterial;
 use supple::io::{Frame, write_atomically, write_pvd, write_vtu};
 use supple::scene::SceneView;
 use supple::state::VecState;
+use supple::tled;
 
 use crate::problem::Problem;
 use crate::scene::body::Body;
@@ -47,13 +48,16 @@ impl Folder {
         self.path.join(name)
     }
 
-    /// Adds a frame: displacement (m), velocity (m/s), von Mises stress (Pa), volume ratio J.
+    /// Adds a frame: displacement (m), velocity (m/s), pressure (Pa) of the nodes; von Mises stress (Pa), volume ratio J of the
+    /// elements.
     pub(crate) fn add_frame<M: ElementMaterial>(
         &mut self,
         body: &Body,
         scene: SceneView<'_, M>,
-        state: &VecState,
+        state: &mut VecState,
     ) -> Result<(), Problem> {
+        let pressure = tled::nodal_pressures(&scene, state)
+            .ok_or_else(|| Problem("the state does not have the nodes of the scene".into()))?;
         let displacement: Vec<_> = state.displacements().iter().map(|vector| vector.to_array()).collect();
         let velocity: Vec<_> = (0..displacement.len()).map(|node| state.velocity(node)).collect();
         // Elements that were left out have four fixed nodes: no stress, no change of volume.
@@ -68,7 +72,7 @@ impl Folder {
             points: &body.mesh.points,
             tets: &body.mesh.tets,
             point_vectors: &[("displacement", &displacement), ("velocity", &velocity)],
-            point_scalars: &[],
+            point_scalars: &[("pressure", &pressure)],
             cell_scalars: &[("von_mises", &von_mises), ("volume_ratio", &volume_ratio)],
         };
         let path = self.path(&name);

@@ -26,7 +26,7 @@ pub(crate) fn run<M: ElementMaterial>(
     state: &mut VecState,
     start: Start<'_>,
     tick: &dyn Fn(f64),
-    frame: &mut dyn FnMut(&VecState) -> Result<(), Problem>,
+    frame: &mut dyn FnMut(&mut VecState) -> Result<(), Problem>,
 ) -> Result<Outcome, Problem> {
     let loads = setup.loads(&scene)?;
     let time = &setup.time;

@@ -46,6 +46,7 @@ pub(crate) struct MeshTable {
     pub(crate) file: Option<Spanned<PathBuf>>,
     pub(crate) scale: Option<Spanned<f64>>,
     pub(crate) winding: Option<Spanned<String>>,
+    pub(crate) element: Option<Spanned<String>>,
     pub(crate) shape: Option<Spanned<String>>,
     pub(crate) size: Option<Spanned<[f32; 3]>>,
     pub(crate) cells: Option<Spanned<[u32; 3]>>,

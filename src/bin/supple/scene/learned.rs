@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use supple::lab::method::BURN_IN;
 use supple::learned::{self, LearnedModel, LearnedStep};
+use supple::material::Element;
 use supple::mlp::{Network, WeightBytes};
 use supple::state::NodeVector;
 use toml::Spanned;
@@ -107,17 +108,24 @@ impl LearnedChoice {
     }
 
     /// What a user should know before trusting the network on these tissues.
-    pub(crate) fn warning(&self, tissues: &Tissues) -> Result<Option<String>, Problem> {
+    pub(crate) fn warning(&self, tissues: &Tissues, element: Element) -> Result<Option<String>, Problem> {
         let network = self.network()?;
-        if tissues.is_of(network.recipe()) {
+        let recipe = network.recipe();
+        if tissues.is_of(recipe) && element == recipe.element {
             return Ok(None);
         }
         Ok(Some(format!(
-            "{}: {} learned from {}; the scene is {tissues}: its error there is not known",
+            "{}: {} learned from {}; the scene is {tissues}, {} tetrahedra: its error there is not known",
             self.place,
             self.path.display(),
-            describe_tissue(&network)
+            describe_tissue(&network),
+            element.name()
         )))
+    }
+
+    /// The tetrahedra of the training.
+    pub(crate) fn element(&self) -> Result<Element, Problem> {
+        Ok(self.network()?.recipe().element)
     }
 
     fn problem(&self, error: impl std::fmt::Display) -> Problem {

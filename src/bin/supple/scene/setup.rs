@@ -1,7 +1,8 @@
 //! A scene ready to be built: nodes in float32 around the body's centre, supports, loads, tissues, method.
 
+use supple::element::MaterialWork;
 use supple::loads::{Loads, Motion, NodalForce};
-use supple::material::{AnyLaw, Material, Tissue};
+use supple::material::{AnyLaw, Element, Material, Tissue};
 use supple::scene::{AsScene, BuildError, Support, VecScene};
 use supple::state::VecState;
 
@@ -11,6 +12,7 @@ use super::learned::LearnedChoice;
 use super::loads::read_loads;
 use super::timing::{Timing, method_name};
 use super::tissues::Tissues;
+use crate::element_name::element_named;
 use crate::problem::Problem;
 
 /// Diagonals of bodies that are believed without a remark, m.
@@ -20,6 +22,7 @@ const USUAL_DIAGONALS: std::ops::RangeInclusive<f64> = 1e-3..=5.0;
 pub(crate) struct Setup {
     pub(crate) body: Body,
     pub(crate) tissues: Tissues,
+    pub(crate) element: Element,
     pub(crate) supports: Vec<Support>,
     pub(crate) forces: Vec<NodalForce>,
     pub(crate) motions: Vec<Motion>,
@@ -62,10 +65,24 @@ impl Setup {
         };
         let (supports, forces, motions) = read_loads(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
+        let element = read_element(file, learned.as_ref())?;
+        warnings.extend(locking(&file.place(&scene.mesh), element, &tissues));
         if let Some(learned) = &learned {
-            warnings.extend(learned.warning(&tissues)?);
+            warnings.extend(learned.warning(&tissues, element)?);
         }
-        Ok(Self { body, tissues, supports, forces, motions, gravity, damping, time, learned, warnings })
+        Ok(Self {
+            body,
+            tissues,
+            element,
+            supports,
+            forces,
+            motions,
+            gravity,
+            damping,
+            time,
+            learned,
+            warnings,
+        })
     }
 
     /// The lobe of `supple demo`, which has no scene file.
@@ -73,6 +90,7 @@ impl Setup {
         Self {
             body,
             tissues: Tissues::one(Tissue { law: law.into(), density }),
+            element: Element::Linear,
             supports: vec![],
             forces: vec![],
             motions: vec![],
@@ -82,6 +100,11 @@ impl Setup {
             learned: None,
             warnings: vec![],
         }
+    }
+
+    /// Does `work` with the material of the scene.
+    pub(crate) fn with_material<W: MaterialWork>(&self, work: W) -> W::Output {
+        self.tissues.with_material(self.element, work)
     }
 
     /// What moves the scene, by name.
@@ -108,4 +131,25 @@ impl Setup {
     pub(crate) fn loads(&self, scene: &impl AsScene) -> Result<Loads<'_>, Problem> {
         Loads::new(scene, self.gravity, &self.forces, &self.motions).map_err(Problem::of)
     }
+}
+
+/// A warning if linear tetrahedra bend too little in one of the tissues.
+fn locking(place: &str, element: Element, tissues: &Tissues) -> Option<String> {
+    /// Above it a bar of 4 x 4 cells bends less than 0.6 times as far as it should.
+    const MOST_POISSON_RATIO: f64 = 0.45;
+    let ratio = tissues.moduli().map(|moduli| moduli.poisson_ratio()).fold(f64::NEG_INFINITY, f64::max);
+    (element == Element::Linear && ratio > MOST_POISSON_RATIO).then(|| {
+        format!(
+            "{place}: element = \"linear\" bends too little in tissue that hardly changes its volume (nu is {ratio:.4}, above \
+             {MOST_POISSON_RATIO}); element = \"nodal-pressure\" does not"
+        )
+    })
+}
+
+/// The tetrahedra that `[mesh]` asks for; without a word those that a network learned from, or the ones that do not lock.
+fn read_element(file: &SceneFile, learned: Option<&LearnedChoice>) -> Result<Element, Problem> {
+    let Some(at) = &file.scene.mesh.get_ref().element else {
+        return learned.map_or(Ok(Element::NodalPressure), LearnedChoice::element);
+    };
+    element_named(at.get_ref()).map_err(|message| file.problem(at, message))
 }

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use serde::de::DeserializeOwned;
-use supple::element::{ElementLaw, ElementMaterial, LawWork, with_law};
-use supple::material::{AnyLaw, Regions, Tissue};
+use supple::element::{ElementLaw, LawWork, MaterialWork, with_element, with_law};
+use supple::material::{AnyLaw, Element, Moduli, Regions, Tissue};
 use supple::mlp::Recipe;
 use toml::Spanned;
 
@@ -20,12 +20,6 @@ pub(crate) struct Tissues {
     tissues: Vec<Tissue<AnyLaw>>,
     /// For each element the index of its tissue.
     of_element: Vec<u16>,
-}
-
-/// Work that is compiled once for each kind of material.
-pub(crate) trait Job {
-    type Output;
-    fn run<M: ElementMaterial>(self, material: M) -> Self::Output;
 }
 
 impl Tissues {
@@ -59,6 +53,11 @@ impl Tissues {
         Ok(Self { tissues, of_element })
     }
 
+    /// Of each tissue, that of `[material]` first.
+    pub(crate) fn moduli(&self) -> impl Iterator<Item = Moduli> {
+        self.tissues.iter().map(|tissue| tissue.law.moduli())
+    }
+
     /// Whether all of it is the tissue that a network learned from.
     pub(crate) fn is_of(&self, recipe: &Recipe<'_>) -> bool {
         let same_tissue = |Tissue { law, density }: &Tissue<AnyLaw>| {
@@ -70,9 +69,9 @@ impl Tissues {
         self.tissues.iter().all(same_tissue)
     }
 
-    /// Runs `job` with the material.
-    pub(crate) fn with_material<J: Job>(&self, job: J) -> J::Output {
-        with_law(self.tissues[0].law, WithLaw { tissues: self, job })
+    /// Does `work` with the material in these tetrahedra.
+    pub(crate) fn with_material<W: MaterialWork>(&self, element: Element, work: W) -> W::Output {
+        with_law(self.tissues[0].law, WithLaw { tissues: self, element, work })
     }
 }
 
@@ -88,26 +87,27 @@ impl fmt::Display for Tissues {
     }
 }
 
-/// A job for the material of tissues whose law is known.
-struct WithLaw<'a, J> {
+/// Work with the material of tissues whose law is known.
+struct WithLaw<'a, W> {
     tissues: &'a Tissues,
-    job: J,
+    element: Element,
+    work: W,
 }
 
-impl<J: Job> LawWork for WithLaw<'_, J> {
-    type Output = J::Output;
+impl<W: MaterialWork> LawWork for WithLaw<'_, W> {
+    type Output = W::Output;
 
-    fn run<L: ElementLaw>(self, _: L) -> J::Output {
-        let Self { tissues: Tissues { tissues, of_element }, job } = self;
+    fn run<L: ElementLaw>(self, _: L) -> W::Output {
+        let Self { tissues: Tissues { tissues, of_element }, element, work } = self;
         let of_law = |&Tissue { law, density }: &Tissue<AnyLaw>| Tissue {
             law: L::from_constants(law.values()),
             density,
         };
         if let [only] = tissues.as_slice() {
-            return job.run(of_law(only));
+            return with_element(element, of_law(only), work);
         }
         let tissues: Vec<_> = tissues.iter().map(of_law).collect();
-        job.run(Regions { tissues: &tissues, of_element })
+        with_element(element, Regions { tissues: &tissues, of_element }, work)
     }
 }
 

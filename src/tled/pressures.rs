@@ -1,0 +1,39 @@
+//! Pressures at nodes, Pa, for display: `-U'(J)` of the law (Bonet & Burton 1998), which is minus the mean Cauchy stress, as the
+//! other part of the energy is isochoric.
+
+use std::vec;
+use std::vec::Vec;
+
+use crate::element::{ElementMaterial, element_fields, pressure_at};
+use crate::scene::{AsScene, SceneView};
+use crate::state::{AsState, StateView};
+use crate::step::{CallingThread, nodal_volumes};
+
+/// Pressure at every node of the scene, Pa, positive where tissue is compressed: the mean over the elements around it, weighted
+/// by their volumes at rest. With nodal pressure that is the node's own but where tissues meet; in linear tetrahedra it hides
+/// how far apart the elements' pressures are. Zero at nodes without elements. Nothing if the state is too small.
+pub fn nodal_pressures(scene: &impl AsScene, state: &mut impl AsState) -> Option<Vec<f32>> {
+    nodal_pressures_of(scene.as_scene(), state.as_state())
+}
+
+fn nodal_pressures_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -> Option<Vec<f32>> {
+    let nodes = scene.node_count();
+    if state.capacity_for::<M>() < nodes {
+        return None;
+    }
+    nodal_volumes(scene, state.displacement, state.volume, &CallingThread);
+    let volumes = M::ELEMENT.is_nodal_pressure().then_some(&*state.volume);
+    let mut sums = vec![(0.0, 0.0); nodes];
+    for (tile, lane, law) in scene.laws_at_places() {
+        let volume = f64::from(tile.volume::<f32>(lane));
+        let ratio = element_fields(&law, tile, lane, state.displacement).volume_ratio;
+        for corner in 0..4 {
+            if let Some((sum, weight)) = sums.get_mut(tile.node(corner, lane)) {
+                *sum += volume * pressure_at(&law, tile, lane, corner, ratio, volumes);
+                *weight += volume;
+            }
+        }
+    }
+    let mean = |(sum, weight): (f64, f64)| if weight > 0.0 { (sum / weight) as f32 } else { 0.0 };
+    Some(sums.into_iter().map(mean).collect())
+}
