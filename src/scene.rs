@@ -591,6 +591,16 @@ impl<M: Material> VecScene<M> {
     }
 }
 
+#[cfg(feature = "lab")]
+impl<M> VecScene<M> {
+    /// Adds a point mass (kg) to a node, which inertia, gravity and damping act on as on tissue.
+    pub(crate) fn add_mass(&mut self, node: usize, kilogram: f32) {
+        if let Some(inertia) = self.tables.nodes.get_mut(node) {
+            inertia.add_mass(kilogram);
+        }
+    }
+}
+
 /// A scene for unit tests of loops over elements.
 #[cfg(test)]
 pub(crate) mod test_scene {
