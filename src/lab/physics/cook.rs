@@ -7,9 +7,8 @@ use std::vec::Vec;
 
 use super::body::{Body, Elastic, Element, SceneWork};
 use super::grid::Grid;
-use super::pressure::oscillation;
 use super::rest::{Rest, at_rest, mean_displacement};
-use super::{LabError, Row, report};
+use super::{LabError, Row, pressure, report};
 use crate::element::ElementMaterial;
 use crate::loads::{Loads, NodalForce};
 use crate::scene::{Axes, Support, VecScene};
@@ -50,7 +49,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
                 source: SOURCE,
                 ..row("rise of the corner", "mm", 1e3 * value)
             });
-            rows.push(row("pressure oscillation over mean pressure", "", pressure));
+            rows.extend(pressure::rows(pressure, &row("", "", 0.0)));
         }
         rows.extend(report::order_of_differences(&values));
     }
@@ -76,13 +75,13 @@ struct Run<'a> {
 
 impl SceneWork for Run<'_> {
     /// Rise, m; oscillation of the pressure; microseconds for a simulated second.
-    type Output = (f64, f64, f64);
+    type Output = (f64, (f64, Option<f64>), f64);
 
     fn run<M: ElementMaterial>(self, scene: &VecScene<M>) -> Result<Self::Output, LabError> {
         let loads = Loads::new(scene, [0.0; 3], self.forces, &[])?;
         let Rest { state, us_per_second } =
             at_rest(NAME, scene, &loads, OMEGA, |state| mean_displacement(state, self.corner, 1))?;
-        let pressure = oscillation(self.body, self.element, state.displacements());
+        let pressure = pressure::oscillation(self.body, self.element, state.displacements());
         Ok((mean_displacement(&state, self.corner, 1), pressure, us_per_second))
     }
 }

@@ -1,7 +1,7 @@
 //! How much pressure oscillates from node to node: the root mean square of a pressure's distance from the mean of its neighbours',
-//! over the mean magnitude of pressure. `p = U'(J) = 2 d (J - 1)`, Pa. With nodal pressure the pressures and neighbours are those of
-//! nodes, `J_a` the mean volume ratio around a node; of linear tetrahedra those of elements that share a face. A smooth field gives
-//! a number that vanishes with the square of the width of a cell.
+//! over the mean magnitude of pressure. `p = U'(J) = 2 d (J - 1)`, Pa. Neighbours are elements that share a face, and with nodal
+//! pressure also nodes that share an edge: the pressure of a node is that of the mean volume ratio around it, the pressure of an
+//! element, which its stress has, the mean of its four nodes'. Zero for a pressure that is the same everywhere.
 
 use std::collections::HashMap;
 use std::vec;
@@ -9,11 +9,12 @@ use std::vec::Vec;
 
 use glam::DVec3;
 
+use super::Row;
 use super::body::{Body, Element};
 use crate::simd::NodeVector;
 
-/// See the module.
-pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVector]) -> f64 {
+/// The oscillation from element to element, and with nodal pressure from node to node.
+pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVector]) -> (f64, Option<f64>) {
     let tets = &body.grid.tets;
     let volumes: Vec<(f64, f64)> = tets
         .iter()
@@ -28,23 +29,33 @@ pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVe
         .collect();
     let bulk = body.elastic.bulk();
     let pressure = |(rest, moved): (f64, f64)| bulk * (moved / rest - 1.0);
-    match element {
-        Element::Linear => {
-            let pressures: Vec<f64> = volumes.into_iter().map(pressure).collect();
-            roughness(&pressures, &across_faces(tets))
-        }
-        Element::NodalPressure => {
-            let mut sums = vec![(0.0, 0.0); body.grid.points.len()];
-            for (tet, (rest, moved)) in tets.iter().zip(volumes) {
-                for &node in tet {
-                    let sum = &mut sums[node as usize];
-                    *sum = (sum.0 + rest, sum.1 + moved);
-                }
-            }
-            let pressures: Vec<f64> = sums.into_iter().map(pressure).collect();
-            roughness(&pressures, &along_edges(tets))
+    let faces = across_faces(tets);
+    if element == Element::Linear {
+        let pressures: Vec<f64> = volumes.into_iter().map(pressure).collect();
+        return (roughness(&pressures, &faces), None);
+    }
+    let mut sums = vec![(0.0, 0.0); body.grid.points.len()];
+    for (tet, (rest, moved)) in tets.iter().zip(volumes) {
+        for &node in tet {
+            let sum = &mut sums[node as usize];
+            *sum = (sum.0 + rest, sum.1 + moved);
         }
     }
+    let of_nodes: Vec<f64> = sums.into_iter().map(pressure).collect();
+    let of_elements: Vec<f64> =
+        tets.iter().map(|tet| tet.map(|node| of_nodes[node as usize]).iter().sum::<f64>() / 4.0).collect();
+    (roughness(&of_elements, &faces), Some(roughness(&of_nodes, &along_edges(tets))))
+}
+
+/// Its rows.
+pub(super) fn rows((elements, nodes): (f64, Option<f64>), row: &Row) -> Vec<Row> {
+    let of = |neighbours: &str, value| Row {
+        quantity: std::format!("pressure oscillation between {neighbours} over mean pressure"),
+        value: Some(value),
+        ..row.clone()
+    };
+    let nodes = nodes.map(|value| of("nodes", value));
+    [of("elements", elements)].into_iter().chain(nodes).collect()
 }
 
 fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {

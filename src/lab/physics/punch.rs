@@ -8,9 +8,8 @@ use std::vec::Vec;
 
 use super::body::{Body, Elastic, Element, SceneWork};
 use super::grid::Grid;
-use super::pressure::oscillation;
 use super::rest::{Rest, at_rest};
-use super::{LabError, Row};
+use super::{LabError, Row, pressure};
 use crate::element::ElementMaterial;
 use crate::loads::{Loads, Motion};
 use crate::scene::{Axes, Support, VecScene};
@@ -48,7 +47,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
             };
             rows.push(Row { reference: Some(reference), source: SOURCE, ..row("force", "N", force) });
             rows.push(row("error if the body ended at its far surfaces", "%", 100.0 * (fixed / force - 1.0)));
-            rows.push(row("pressure oscillation over mean pressure", "", pressure));
+            rows.extend(pressure::rows(pressure, &row("", "", 0.0)));
         }
     }
     Ok(rows)
@@ -143,13 +142,13 @@ impl<'a> Run<'a> {
 
 impl SceneWork for Run<'_> {
     /// Force, N; oscillation of the pressure; microseconds for a simulated second.
-    type Output = (f64, f64, f64);
+    type Output = (f64, (f64, Option<f64>), f64);
 
     fn run<M: ElementMaterial>(self, scene: &VecScene<M>) -> Result<Self::Output, LabError> {
         let loads = Loads::new(scene, [0.0; 3], &[], &self.motions)?;
         let Rest { mut state, us_per_second } =
             at_rest(NAME, scene, &loads, OMEGA, |state| self.force(scene, state))?;
-        let pressure = oscillation(self.body, self.element, state.displacements());
+        let pressure = pressure::oscillation(self.body, self.element, state.displacements());
         Ok((self.force(scene, &mut state), pressure, us_per_second))
     }
 }

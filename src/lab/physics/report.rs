@@ -63,13 +63,14 @@ pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), LabError> {
     Ok(())
 }
 
-/// The rows as aligned text; of the beam's markers the left one only.
+/// The rows as aligned text; of the beam's recordings the first and its left marker only.
 #[must_use]
 pub fn text(rows: &[Row]) -> String {
     let heads =
         ["case", "element", "method", "tetrahedra", "value", "reference", "error %", "s/s", "quantity"];
     let mut lines = vec![heads.map(String::from)];
-    let shown = |row: &&Row| !row.quantity.contains("top") && !row.quantity.contains("right");
+    let hidden = ["-b ", " top:", " right:"];
+    let shown = |row: &&Row| !hidden.iter().any(|words| row.quantity.contains(words));
     for row in rows.iter().filter(shown) {
         let short = |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.4}"));
         // Small forces and displacements in their own powers of ten.

@@ -75,7 +75,8 @@ fn compared(load: &str, recordings: &[Recording; 2], found: Option<[Measured; 3]
                 rows.push(Row {
                     quantity: format!("{name} {marker}: {quantity}"),
                     unit,
-                    value,
+                    // A body that does not swing has no period.
+                    value: value.filter(|value| value.is_finite()),
                     reference: Some(reference),
                     ..row.clone()
                 });
