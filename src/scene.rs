@@ -171,6 +171,8 @@ pub struct SceneFacts {
     mass: f64,
     releasable_energy: f64,
     checksum: u32,
+    /// Whether a node's mass may be more than that of the tissue around it.
+    has_point_masses: bool,
 }
 
 impl SceneFacts {
@@ -182,6 +184,7 @@ impl SceneFacts {
         mass: 0.0,
         releasable_energy: 0.0,
         checksum: 0,
+        has_point_masses: false,
     };
 
     /// Builds a scene in memory of the caller, `nodes` and `tiles` ([`tiles_for`]), from a mesh, what it is made of, and its supports;
@@ -235,13 +238,25 @@ impl SceneFacts {
         }
         let (mass, releasable_energy) = lump_masses(material, mesh, nodes)?;
         let checksum = checksum(nodes, tiles);
-        Ok(Self { node_count: nodes.len(), element_count, partitions, mass, releasable_energy, checksum })
+        Ok(Self {
+            node_count: nodes.len(),
+            element_count,
+            partitions,
+            mass,
+            releasable_energy,
+            checksum,
+            has_point_masses: false,
+        })
     }
 
     /// Number of nodes.
     #[must_use]
     pub const fn node_count(&self) -> usize {
         self.node_count
+    }
+
+    pub(crate) const fn has_point_masses(&self) -> bool {
+        self.has_point_masses
     }
 
     /// Number of elements that take part; those with four fixed nodes were left out.
@@ -601,6 +616,17 @@ impl<M: Material> VecScene<M> {
         let facts = SceneFacts::build(&material, mesh, supports.iter().copied(), &mut nodes, &mut tiles)?;
         tiles.truncate(facts.tile_count());
         Ok(Self { material, tables: VecTables { nodes, tiles }, facts })
+    }
+}
+
+#[cfg(feature = "lab")]
+impl<M> VecScene<M> {
+    /// Adds a point mass (kg) to a node, which inertia, gravity and damping act on as on tissue.
+    pub(crate) fn add_mass(&mut self, node: usize, kilogram: f32) {
+        if let Some(inertia) = self.tables.nodes.get_mut(node) {
+            inertia.add_mass(kilogram);
+            self.facts.has_point_masses = true;
+        }
     }
 }
 

@@ -23,7 +23,7 @@ pub(crate) struct NodalVolumes<'a> {
     pub(crate) tiles: &'a [ElementTile],
     pub(crate) all: &'a Partitions,
     pub(crate) partitions: Range<usize>,
-    /// The density of all elements, kg/m^3, if they are of one tissue.
+    /// The density of all elements, kg/m^3, if they are of one tissue and a node's mass is that of the tissue around it.
     pub(crate) density: Option<f32>,
     pub(crate) inertia: &'a [NodeInertia],
     pub(crate) displacement: &'a [NodeVector],

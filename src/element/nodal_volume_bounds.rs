@@ -30,31 +30,32 @@ enum Pass {
     Matrices,
 }
 
-/// The bound over all elements. A row of a node holds `J - 1`, then its weight `x`, `k`, and the largest eigenvalue of `D`.
+/// The bound over all elements. A row of a node holds `J - 1`, its weight `x`, `k`, and its volume (m^3).
 pub(crate) struct NodalVolumeBounds<'a> {
     pub(crate) tiles: &'a [ElementTile],
     pub(crate) inertia: &'a [NodeInertia],
-    /// kg/m^3.
-    pub(crate) density: f32,
     pub(crate) rows: &'a mut [NodeVector],
 }
 
 impl NodalVolumeBounds<'_> {
-    /// All weights one.
+    /// All weights one, from the rows of [`super::NodalVolumes`].
     pub(crate) fn start(&mut self) {
         for row in &mut *self.rows {
-            row.0[1] = 1.0;
+            let [j, _, volume, _] = row.0;
+            row.0 = [j, 1.0, 0.0, volume];
         }
     }
 
     /// Adds `D` to matrices that are zero. `curvature` is `U''` (Pa) of `J - 1`.
     pub(crate) fn add(&mut self, sums: &mut NodeMatrices<'_>, curvature: impl Fn(f32) -> f32) {
         self.pass(Pass::Sums, sums);
-        for (node, (row, inertia)) in self.rows.iter_mut().zip(self.inertia).enumerate() {
+        for (node, row) in self.rows.iter_mut().enumerate() {
             let [x, y, z, others] = sums.xx_yy_zz_xy.get(node).copied().unwrap_or_default().0;
             let length = libm::sqrtf(x * x + y * y + z * z);
-            let [j, weight, ..] = row.0;
-            let k = curvature(j).max(0.0) * (others + length * weight) * self.density / inertia.mass;
+            let [j, weight, _, volume] = row.0;
+            // A node of no element that takes part has none.
+            let per_volume = if volume > 0.0 { 1.0 / volume } else { 0.0 };
+            let k = curvature(j).max(0.0) * (others + length * weight) * per_volume;
             row.0[2] = k;
             // The gradient of the node's own volume.
             let own = if length > 0.0 { k / length / weight } else { 0.0 };
@@ -64,18 +65,17 @@ impl NodalVolumeBounds<'_> {
         self.pass(Pass::Matrices, sums);
     }
 
-    /// Takes down the largest eigenvalue of a node's matrix.
-    pub(crate) fn enter(&mut self, node: usize, rate: f32) {
+    /// Weighs a node by the largest eigenvalue of its matrix.
+    pub(crate) fn weigh(&mut self, node: usize, rate: f32) {
         if let Some(row) = self.rows.get_mut(node) {
-            row.0[3] = rate;
+            row.0[1] *= rate;
         }
     }
 
-    /// Weights that balance the eigenvalues, of which `largest` is the largest.
+    /// Divides the weights by the largest eigenvalue.
     pub(crate) fn balance(&mut self, largest: f32) {
         for row in &mut *self.rows {
-            let [_, weight, _, rate] = row.0;
-            let share = weight * rate / largest;
+            let share = row.0[1] / largest;
             // Not a number where nothing moves.
             row.0[1] = if share > LEAST_WEIGHT { share.min(1.0) } else { LEAST_WEIGHT };
         }

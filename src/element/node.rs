@@ -152,4 +152,12 @@ impl NodeInertia {
             _ => 0.0,
         });
     }
+
+    /// Adds a point mass, kg, to a node that is built.
+    #[cfg(feature = "lab")]
+    pub(crate) fn add_mass(&mut self, kilogram: f32) {
+        self.mass += kilogram;
+        let inverse = 1.0 / self.mass;
+        self.inverse = self.inverse.map(|free| if free > 0.0 { inverse } else { free });
+    }
 }

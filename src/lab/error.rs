@@ -18,7 +18,7 @@ use crate::step::{Divergence, StepError};
 pub enum LabError {
     /// No scene or method has this name.
     Unknown {
-        /// "scene" or "method".
+        /// "scene", "method" or "case".
         kind: &'static str,
         /// The name asked for.
         name: String,
@@ -46,6 +46,11 @@ pub enum LabError {
     NoCriticalStep {
         /// The scene.
         scene: &'static str,
+    },
+    /// A case of [`super::physics`] did not come to rest.
+    NotAtRest {
+        /// The case.
+        case: &'static str,
     },
     /// State and scene do not fit.
     Mismatch {
@@ -93,6 +98,7 @@ impl fmt::Display for LabError {
             Self::Inertia(error) => error.fmt(f),
             Self::Diverged { scene, divergence } => write!(f, "the truth of {scene} {divergence}"),
             Self::NoCriticalStep { scene } => write!(f, "{scene}: the exact critical step was not found"),
+            Self::NotAtRest { case } => write!(f, "{case} did not come to rest"),
             Self::Mismatch { nodes, room } => {
                 write!(f, "the scene has {nodes} nodes, the other side {room}")
             }

@@ -16,6 +16,7 @@
 //! | [`evaluate`] | rows as asked for in a [`evaluate::Plan`] |
 //! | [`estimates`] | how well methods estimate their own error |
 //! | [`equal_error`] | how much longer implicit steps take for the same error |
+//! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
 //! | [`table`] | rows as CSV and as aligned text |
 //! | [`sweep`] | error over step on one scene, with fitted slopes; [`plot`] draws it |
 
@@ -28,6 +29,7 @@ pub mod measure;
 pub mod method;
 pub mod moving;
 pub mod networks;
+pub mod physics;
 pub mod plot;
 pub mod run;
 pub mod scenes;

@@ -16,7 +16,8 @@ const BOTTOM: f64 = 400.0;
 /// Marks of divergence stand in lines of their own above the largest error, one a curve, so far apart.
 const MARKS: f64 = 16.0;
 /// Okabe and Ito's palette, which colour-blind people tell apart.
-const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
+pub(super) const COLOURS: [&str; 7] =
+    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"];
 
 /// Draws the curves of `scene`; `hold` (mm) is the error of a body that never moves.
 #[must_use]
@@ -137,7 +138,7 @@ fn key(svg: &mut String, index: usize, colour: &str, words: &str) {
     put(svg, format_args!("<text x=\"{}\" y=\"{y}\">{words}</text>", x + 24.0));
 }
 
-fn line(svg: &mut String, (x1, y1): (f64, f64), (x2, y2): (f64, f64), stroke: &str) {
+pub(super) fn line(svg: &mut String, (x1, y1): (f64, f64), (x2, y2): (f64, f64), stroke: &str) {
     put(
         svg,
         format_args!(
@@ -146,7 +147,7 @@ fn line(svg: &mut String, (x1, y1): (f64, f64), (x2, y2): (f64, f64), stroke: &s
     );
 }
 
-fn put(svg: &mut String, element: core::fmt::Arguments<'_>) {
+pub(super) fn put(svg: &mut String, element: core::fmt::Arguments<'_>) {
     // A string takes whatever is written to it.
     let _ = writeln!(svg, "{element}");
 }

@@ -47,8 +47,8 @@ pub(crate) fn nodal_volumes<M: ElementMaterial>(
     }
     let elements = scene.elements();
     let (all, tiles, inertia) = (elements.partitions, elements.tiles, scene.inertia);
-    let density =
-        if elements.laws.differ() { None } else { scene.material.tissue(0).map(|tissue| tissue.density) };
+    let from_masses = !elements.laws.differ() && !scene.has_point_masses();
+    let density = if from_masses { scene.material.tissue(0).map(|tissue| tissue.density) } else { None };
     let count = all.parts(threads.parts());
     let mut parts: [_; MOST_PARTS] = from_fn(|part| {
         let mine = all.part(part, count);

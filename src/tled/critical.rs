@@ -47,15 +47,15 @@ fn critical<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -
         let kernel = CriticalBounds { laws, pressure, tiles, inertia, with_volume: true, sums: &mut sums };
         M::Law::critical_bounds(kernel);
         rate = Largest::of(&sums, inertia, |_, _| ());
-    } else if let (Laws::One(law), Some(tissue)) = (laws, scene.material.tissue(0)) {
+    } else if let Laws::One(law) = laws {
         let law = <M::Law as Law>::widen::<f32>(|_| law);
-        let mut volumes = NodalVolumeBounds { tiles, inertia, density: tissue.density, rows: volume };
+        let mut volumes = NodalVolumeBounds { tiles, inertia, rows: &mut *volume };
         volumes.start();
         let curvature = |j| law.volume_curvature(j);
         for _ in 0..BALANCING_SWEEPS {
             sums.clear();
             volumes.add(&mut sums, curvature);
-            let largest = Largest::of(&sums, inertia, |node, rate| volumes.enter(node, rate));
+            let largest = Largest::of(&sums, inertia, |node, rate| volumes.weigh(node, rate));
             volumes.balance(largest.rate);
         }
         sums.clear();

@@ -1,4 +1,4 @@
-//! `supple evaluate`: what it refuses. Its results are tested in `tests/lab`.
+//! `supple evaluate`: what it refuses, and the files of `--physics`. Its results are tested in `tests/lab`.
 use crate::Desk;
 
 #[test]
@@ -15,4 +15,24 @@ fn what_does_not_exist_is_named_with_what_does() {
         assert!(said.err.starts_with(&format!("error: {sentence}")), "{}", said.err);
         assert!(!desk.path("out").exists());
     }
+}
+
+#[test]
+fn physics_of_a_case_is_a_table_with_orders_of_convergence() {
+    let desk = Desk::new();
+    let said = desk.supple(&["evaluate", "--physics", "--scene", "torsion", "--out", "out"]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(said.out.contains("order of convergence"), "{}", said.out);
+    let csv = std::fs::read_to_string(desk.path("out/physics.csv")).unwrap();
+    let heads = "case,element,method,nodes,tetrahedra,quantity,unit,value,reference,source,error_percent,us_per_simulated_second";
+    assert_eq!(csv.lines().next(), Some(heads));
+    // Three meshes and an order for each of two elements.
+    assert_eq!(csv.lines().count(), 9);
+
+    let said = desk.supple(&["evaluate", "--physics", "--scene", "lobe", "--out", "none"]);
+    assert_eq!(said.code, 2);
+    let sentence =
+        "error: case \"lobe\" is not known; there are silicone-beam, bending, cook, cylinder, torsion, punch";
+    assert!(said.err.starts_with(sentence), "{}", said.err);
+    assert!(!desk.path("none").exists());
 }

@@ -7,3 +7,4 @@ mod evaluate;
 mod moving;
 #[cfg(feature = "slow-tests")]
 mod paper;
+mod physics;

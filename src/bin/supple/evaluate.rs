@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use supple::lab::evaluate::{self, Plan};
 use supple::lab::method::Method;
-use supple::lab::{equal_error, estimates, table};
+use supple::lab::{equal_error, estimates, physics, table};
 use supple::material::Element;
 
 use crate::element_name::element_named;
@@ -34,10 +34,17 @@ pub(crate) struct Asked {
     /// Scene whose error is drawn over the step; reversed unless given, if that is among the scenes
     #[arg(long, value_name = "SCENE")]
     sweep: Option<String>,
+    /// Judge elements against nature, closed forms and published values instead: physics.csv and a picture; a scene is one of
+    /// silicone-beam, bending, cook, cylinder, torsion, punch, all of them unless given
+    #[arg(long, conflicts_with_all = ["methods", "multiples", "element", "weights", "sweep"])]
+    physics: bool,
 }
 
 pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
-    let Asked { out, scenes, methods, multiples, element, weights, sweep } = asked;
+    if asked.physics {
+        return evaluate_physics(asked);
+    }
+    let Asked { out, scenes, methods, multiples, element, weights, sweep, .. } = asked;
     let mut plan = Plan::new(scenes, methods, multiples, sweep.as_deref()).map_err(Problem::of)?;
     for (scene, _) in &mut plan.scenes {
         scene.element = element.unwrap_or(scene.element);
@@ -53,5 +60,13 @@ pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
         }
     }
     println!("\nresults  {}", out.join("results.csv").display());
+    Ok(End::Reached)
+}
+
+fn evaluate_physics(Asked { out, scenes, .. }: &Asked) -> Result<End, Problem> {
+    let plan = physics::Plan::new(scenes).map_err(Problem::of)?;
+    let rows = physics::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
+    print!("{}", physics::report::text(&rows));
+    println!("\nresults  {}", out.join("physics.csv").display());
     Ok(End::Reached)
 }
