@@ -1,6 +1,6 @@
 //! `[learned]` in a scene file: after the lead-in of the exact step a network takes over, and what it did is told.
 
-use supple::material::NeoHookean;
+use supple::material::{Element, NeoHookean};
 use supple::mlp::{Activation, Description, LayerDescription, Range};
 
 use super::networks::described;
@@ -22,6 +22,7 @@ fn stopping() -> Description<'static> {
         }],
         second: vec![],
         law: NeoHookean { c: 500.0, d: 15_000.0 }.into(),
+        element: Element::NodalPressure,
         step: 5e-3,
         exact_step: 5e-4,
         ..described(&[7, 3], &[], 1)
@@ -183,11 +184,38 @@ fn a_tissue_that_the_network_does_not_know_is_remarked_upon() {
         assert_eq!(said.code, 0, "{}", said.err);
         for part in [
             "line 17: ",
-            "a.weights learned from neo-hookean, c 500 Pa, d 15000 Pa, 1000 kg/m^3; the scene is neo-hookean, c ",
+            "a.weights learned from neo-hookean, c 500 Pa, d 15000 Pa, 1000 kg/m^3, nodal-pressure tetrahedra; the scene is \
+             neo-hookean, c ",
         ] {
             assert!(said.err.contains(part), "{part}: {}", said.err);
         }
         assert_eq!(desk.summary()["warnings"].as_array().unwrap().len(), 1);
+    }
+}
+
+#[test]
+fn tetrahedra_that_bend_too_little_are_remarked_upon() {
+    let desk = Desk::new();
+    desk.network("a.weights", &Description { element: Element::Linear, ..stopping() });
+    let time = "step = \"auto\"\nend = 0.2\n";
+    let locking = leaning(time, "burn_in = 0.1\n");
+    let named = without_network(time).replace("[mesh]\n", "[mesh]\nelement = \"linear\"\n");
+    for (scene, fragment) in [
+        (&locking, "line 17: a.weights learned from linear tetrahedra, which bend too little in tissue"),
+        (
+            &named,
+            "line 3: element = \"linear\" bends too little in tissue that hardly changes its volume (nu is 0.4835",
+        ),
+        // Tissue that does change its volume.
+        (&named.replace("d = 15000.0", "d = 1000.0"), ""),
+        (&without_network(time), ""),
+    ] {
+        let said = desk.simulate(scene, &["--force"]);
+        print!("{}", said.err);
+        assert_eq!(said.code, 0, "{}", said.err);
+        let heard = said.err.replace("./", "");
+        assert!(heard.contains(fragment), "\"{fragment}\" is not in: {}", said.err);
+        assert!(!fragment.is_empty() || heard.is_empty(), "{heard}");
     }
 }
 

@@ -1,7 +1,7 @@
 //! `supple simulate`: the scene file's keys do what they say, and the results are where they should be.
 
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{NeoHookean, Tissue};
+use supple::material::{NeoHookean, NodalPressure, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::scene::{Axes, Support, VecScene};
 use supple::state::VecState;
@@ -61,7 +61,7 @@ fn a_scene_with_every_key_equals_the_kernel_called_directly() {
         points.iter().map(|p| [(p[0] - 0.01) as f32, (p[1] - 0.01) as f32, (p[2] - 0.025) as f32]).collect();
     let tets: Vec<_> = shape.tets().collect();
     let mesh = Mesh::new(&local, &tets, Winding::Checked).unwrap();
-    let tissue = Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 };
+    let tissue = NodalPressure(Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 });
     let mut supports: Vec<_> = (0..9).map(Support::fixed).collect();
     supports.push(Support { node: 9, axes: Axes::X.union(Axes::Y), moves: false });
     supports.push(Support::moved(53));

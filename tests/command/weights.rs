@@ -16,7 +16,7 @@ fn a_network_is_described() {
         "weights a.weights",
         "network 7 inputs, 3 outputs, 356 multiply-adds per vertex",
         "step 3.000e-4 s, 10.0 times the exact step it learned from (3.000e-5 s)",
-        "learned from exponential, a 59 Pa, b 8.023, d 60000 Pa, 1000 kg/m^3",
+        "learned from exponential, a 59 Pa, b 8.023, d 60000 Pa, 1000 kg/m^3, linear tetrahedra",
         "damping 20 1/s",
         "first 0 7 20 leaky ReLU 0.01 float32 140 640",
         "second 1 12 3 none float32 36 156",

@@ -115,9 +115,7 @@ impl LearnedChoice {
             return Ok(None);
         }
         Ok(Some(format!(
-            "{}: {} learned from {}; the scene is {tissues}, {} tetrahedra: its error there is not known",
-            self.place,
-            self.path.display(),
+            "{self} learned from {}; the scene is {tissues}, {} tetrahedra: its error there is not known",
             describe_tissue(&network),
             element.name()
         )))
@@ -129,6 +127,13 @@ impl LearnedChoice {
     }
 
     fn problem(&self, error: impl std::fmt::Display) -> Problem {
-        Problem(format!("{}: {}: {error}", self.place, self.path.display()))
+        Problem(format!("{self}: {error}"))
+    }
+}
+
+/// Where the scene file names the network, and its name.
+impl std::fmt::Display for LearnedChoice {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(formatter, "{}: {}", self.place, self.path.display())
     }
 }

@@ -66,7 +66,8 @@ impl Setup {
         let (supports, forces, motions) = read_loads(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
         let element = read_element(file, learned.as_ref())?;
-        warnings.extend(locking(&file.place(&scene.mesh), element, &tissues));
+        let of_the_network = learned.as_ref().filter(|_| scene.mesh.get_ref().element.is_none());
+        warnings.extend(locking(&file.place(&scene.mesh), of_the_network, element, &tissues));
         if let Some(learned) = &learned {
             warnings.extend(learned.warning(&tissues, element)?);
         }
@@ -133,17 +134,29 @@ impl Setup {
     }
 }
 
-/// A warning if linear tetrahedra bend too little in one of the tissues.
-fn locking(place: &str, element: Element, tissues: &Tissues) -> Option<String> {
+/// A warning if linear tetrahedra, the scene file's or those that a network learned from, bend too little in one of the tissues.
+fn locking(
+    place: &str,
+    network: Option<&LearnedChoice>,
+    element: Element,
+    tissues: &Tissues,
+) -> Option<String> {
     /// Above it a bar of 4 x 4 cells bends less than 0.6 times as far as it should.
     const MOST_POISSON_RATIO: f64 = 0.45;
     let ratio = tissues.moduli().map(|moduli| moduli.poisson_ratio()).fold(f64::NEG_INFINITY, f64::max);
-    (element == Element::Linear && ratio > MOST_POISSON_RATIO).then(|| {
-        format!(
-            "{place}: element = \"linear\" bends too little in tissue that hardly changes its volume (nu is {ratio:.4}, above \
-             {MOST_POISSON_RATIO}); element = \"nodal-pressure\" does not"
-        )
-    })
+    if element != Element::Linear || ratio <= MOST_POISSON_RATIO {
+        return None;
+    }
+    let (subject, cure) = match network {
+        Some(network) => {
+            (format!("{network} learned from linear tetrahedra, which bend"), "a network that learned from")
+        }
+        None => (format!("{place}: element = \"linear\" bends"), "element ="),
+    };
+    Some(format!(
+        "{subject} too little in tissue that hardly changes its volume (nu is {ratio:.4}, above {MOST_POISSON_RATIO}); {cure} \
+         \"nodal-pressure\" does not"
+    ))
 }
 
 /// The tetrahedra that `[mesh]` asks for; without a word those that a network learned from, or the ones that do not lock.
