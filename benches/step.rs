@@ -1,4 +1,5 @@
-//! Time of an exact step on the paper's bar, compared with the same step in plain scalar code.
+//! Time of an exact step on the paper's bar, compared with the same step in plain scalar code, and with nodal pressure compared
+//! with linear tetrahedra.
 //!
 //! `cargo bench --bench step` prints criterion's figures, then ratios from interleaved pairs of runs (the
 //! machine's speed drifts; the ratio does not) and the share of the machine's measured peak.
@@ -10,33 +11,36 @@ mod common {
     pub(crate) mod plain;
 }
 
-use common::bar::{self, BarScene, DAMPING, DENSITY, DT, HELD};
+use common::bar::{self, DAMPING, DENSITY, DT, HELD};
 use common::pairs::{median, seconds};
 use common::plain::{self, Plain};
 use criterion::{BenchmarkId, Criterion, Throughput};
-use supple::element::ElementLaw;
+use supple::element::{ElementLaw, ElementMaterial};
 use supple::loads::{Loads, NodalForce};
-use supple::material::NeoHookean;
+use supple::material::{NeoHookean, NodalPressure, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
+use supple::scene::VecScene;
 use supple::simd::Level;
 use supple::state::VecState;
 use supple::step::Step;
 use supple::tled;
 
-struct Ours<L> {
-    scene: BarScene<L>,
+struct Ours<M> {
+    scene: VecScene<M>,
     state: VecState,
     forces: [NodalForce; 4],
     step: Step,
+    /// s.
+    critical: f32,
 }
 
-impl<L: ElementLaw> Ours<L> {
-    fn new(law: L) -> Self {
-        let scene = bar::scene(law);
+impl<M: ElementMaterial> Ours<M> {
+    fn new(material: M) -> Self {
+        let scene = bar::scene_in(material);
         let mut state = VecState::at_rest(scene.node_count());
         let critical = tled::critical_step(&scene, &mut state).expect("the bar has a critical step");
         let step = Step::new(DT, DAMPING, critical).expect("dt is below the critical step");
-        Self { scene, state, forces: bar::forces(), step }
+        Self { scene, state, forces: bar::forces(), step, critical: critical.seconds }
     }
 
     fn run(&mut self, steps: usize) {
@@ -66,7 +70,7 @@ fn compare<L: ElementLaw>(criterion: &mut Criterion, name: &str, law: L, plain_l
     let loads = bar::forces().map(|force| (force.node, force.newton));
     let fixed: Vec<u32> = HELD.collect();
     let mut plain = Plain::new(&mesh, plain_law, DENSITY, &fixed, &loads);
-    let mut ours = Ours::new(law);
+    let mut ours = Ours::new(Tissue { law, density: DENSITY });
     // Both are timed in a deformed state, and must agree on it.
     (0..2_000).for_each(|_| plain.step(DT, DAMPING, 1.0));
     ours.run(2_000);
@@ -107,6 +111,24 @@ fn compare<L: ElementLaw>(criterion: &mut Criterion, name: &str, law: L, plain_l
     );
 }
 
+/// Nodal pressure compared with linear tetrahedra, both in a deformed state.
+fn compare_elements<L: ElementLaw>(name: &str, law: L) {
+    let tissue = Tissue { law, density: DENSITY };
+    let (mut linear, mut nodal) = (Ours::new(tissue), Ours::new(NodalPressure(tissue)));
+    linear.run(2_000);
+    nodal.run(2_000);
+    let (ratio, linear_s, nodal_s) = pairs(|| nodal.run(50), || linear.run(50), 50);
+    let longer = nodal.critical / linear.critical;
+    let per_tet = |seconds: f64| seconds * 1e9 / Bar::PAPER.tets().count() as f64;
+    println!(
+        "{name}: nodal pressure {:.1} ns/tet, {ratio:.2} times linear tetrahedra's {:.1}; safe step {longer:.2} times theirs, so \
+         a simulated second {:.2} times",
+        per_tet(linear_s),
+        per_tet(nodal_s),
+        ratio / f64::from(longer),
+    );
+}
+
 fn main() {
     let mut criterion = Criterion::default().configure_from_args().sample_size(30);
     compare(&mut criterion, "exponential", bar::EXPONENTIAL, plain::Law::Exponential(59.0, 8.023, 60_000.0));
@@ -116,5 +138,7 @@ fn main() {
         NeoHookean { c: 500.0, d: 15_000.0 },
         plain::Law::NeoHookean(500.0, 15_000.0),
     );
+    compare_elements("exponential", bar::EXPONENTIAL);
+    compare_elements("neo-Hookean", NeoHookean { c: 500.0, d: 15_000.0 });
     criterion.final_summary();
 }

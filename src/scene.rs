@@ -9,8 +9,8 @@ use core::fmt;
 use core::ops::Deref;
 
 use crate::element::{
-    ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, element_fields,
-    volume_energy_difference,
+    ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, VolumeRows,
+    element_fields, volume_energy_difference,
 };
 use crate::material::{Element, Law, Material, releasable_energy};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
@@ -478,9 +478,14 @@ impl<'a, M: Material> SceneView<'a, M> {
         self.places().map(move |(tile, lane)| (tile, lane, laws.of(tile.element(lane))))
     }
 
+    /// The volumes of the nodes in rows of [`crate::element::NodalVolumes`].
+    pub(crate) fn volume_rows(self, rows: &[NodeVector]) -> VolumeRows<'_> {
+        VolumeRows { rows, several_tissues: self.material.laws().differ() }
+    }
+
     /// Strain energy under the given displacements (m), J, with the nodes' volumes where the material needs them.
     pub(crate) fn strain_energy(self, displacement: &[NodeVector], volumes: &[NodeVector]) -> f64 {
-        let laws = self.material.laws();
+        let (laws, volumes) = (self.material.laws(), self.volume_rows(volumes));
         let energies = self.places().map(|(tile, lane)| {
             let law = laws.of(tile.element(lane));
             let fields = element_fields(&law, tile, lane, displacement);

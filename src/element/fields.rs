@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::ElementTile;
+use super::{ElementTile, VolumeRows};
 #[cfg(feature = "std")]
 use crate::material::Potential;
 use crate::material::{Invariants, Law, energy_density, response};
@@ -74,16 +74,11 @@ pub(crate) fn pressure_at<L: Law>(
     lane: usize,
     corner: usize,
     volume_ratio: f64,
-    volumes: Option<&[NodeVector]>,
+    volumes: Option<VolumeRows<'_>>,
 ) -> f64 {
     let own = (volume_ratio - 1.0) as f32;
-    let change = volumes.map_or(own, |volumes| {
-        let row = volumes.get(tile.node(corner, lane)).copied().unwrap_or_default().0;
-        match tile.slot(corner, lane) {
-            slot @ (0 | 1) => row[usize::from(slot)],
-            _ => own,
-        }
-    });
+    let change = volumes.and_then(|rows| rows.change(tile.node(corner, lane), tile.slot(corner, lane)));
+    let change = change.unwrap_or(own);
     -f64::from(L::widen::<f32>(|_| *law).volume_slope(change))
 }
 
@@ -93,15 +88,12 @@ pub(crate) fn volume_energy_difference<L: Law>(
     tile: &ElementTile,
     lane: usize,
     volume_ratio: f64,
-    volumes: &[NodeVector],
+    volumes: VolumeRows<'_>,
 ) -> f64 {
     let own = law.energy(0.0, volume_ratio - 1.0);
     let corners = (0..4).map(|corner| {
-        let row = volumes.get(tile.node(corner, lane)).copied().unwrap_or_default().0;
-        match tile.slot(corner, lane) {
-            slot @ (0 | 1) => law.energy(0.0, f64::from(row[usize::from(slot)])) - own,
-            _ => 0.0,
-        }
+        let change = volumes.change(tile.node(corner, lane), tile.slot(corner, lane));
+        change.map_or(0.0, |change| law.energy(0.0, f64::from(change)) - own)
     });
     0.25 * f64::from(tile.volume::<f32>(lane)) * corners.sum::<f64>()
 }

@@ -140,6 +140,7 @@ fn in_batches<R: Real, L: Law, P: Pressure, const SIZE: usize>(
 ) -> Extremes<f32> {
     let InternalForces { elements, pressure, partitions, displacement, mut force, mut visitor } = kernel;
     let Elements { laws, tiles, partitions: all } = elements;
+    let displacement = pressure.displacement().unwrap_or(displacement);
     let mut extremes = Extremes::<Pair<R>>::none();
     for (touching, length) in all.touching(partitions) {
         let tiles = (tiles.get(touching).unwrap_or_default(), length);
@@ -254,8 +255,9 @@ fn deform<'a, R: Real, L: Law, P: Pressure, const K: usize, const N: usize>(
         let mut displacements = [[R::splat(0.0); 3]; N];
         let mut volumes = [P::no_volumes::<R>(); N];
         unrolled!(node < N => {
-            displacements[node] = displacement.read_nodes::<R, N>(&nodes, node, first);
-            volumes[node] = pressure.read::<R, N>(&nodes, node, first);
+            let [x, y, z, fourth] = displacement.read_rows::<R, N>(&nodes, node, first);
+            displacements[node] = [x, y, z];
+            volumes[node] = pressure.read_with::<R, N>(fourth, &nodes, node, first);
         });
         unrolled!(element < K => {
             let [a, b, c, d] = CORNERS[element % LONGEST];

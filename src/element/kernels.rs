@@ -44,10 +44,10 @@ pub trait ElementLaw: Law {
 /// [`ElementLaw::tile_bounds`] for a material, from the volumes of the nodes where it needs them.
 pub(crate) fn tile_bounds<M: ElementMaterial>(
     kernel: TileBounds<'_, M::Law>,
-    volumes: &[NodeVector],
+    rows: &[NodeVector],
 ) -> TileTangents {
     if M::ELEMENT.is_nodal_pressure() {
-        M::Law::nodal_pressure_tile_bounds(kernel.with_nodal_volumes(volumes))
+        M::Law::nodal_pressure_tile_bounds(kernel.with_nodal_volumes(rows))
     } else {
         M::Law::tile_bounds(kernel)
     }

@@ -33,7 +33,7 @@ pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
 pub(crate) use fields::pressure_at;
 pub(crate) use fields::{element_fields, volume_energy_difference};
 pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};
-pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes};
+pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes, VolumeRows};
 pub(crate) use nodal_volume_bounds::NodalVolumeBounds;
 pub(crate) use pressure::{MeanPressure, OwnPressure};
 pub(crate) use stiffness_bound::{MatrixSums, ScalarBound};

@@ -1,15 +1,18 @@
 //! Volume ratios of the nodes, the first of two passes over tetrahedra with average nodal pressure ([`super::pressure`]): each
-//! element adds a quarter of its volume (m^3) and of its change to its nodes.
+//! element adds its volume (m^3) and its change to its nodes, whose quarters cancel in the ratios.
 
 use core::ops::Range;
+
+use bytemuck::must_cast_slice_mut;
 
 use crate::mesh::partition::Partitions;
 use crate::mesh::strips::{CORNERS, LONGEST};
 use crate::simd::{
-    Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, TileNodes, dispatch, unrolled,
+    Gather, Kernel, NodeVector, NumberBuffer, Real, Scatter, ScatterBuffer, ScatterNumbers, TILE, TileNodes,
+    dispatch, unrolled,
 };
 
-use super::deformation::Deformation;
+use super::deformation::{Deformation, Matrix, Vector};
 use super::internal_forces::nodes_of;
 use super::{ElementTile, NodeInertia};
 
@@ -17,12 +20,32 @@ use super::{ElementTile, NodeInertia};
 /// sums 4; `U'` of four nodes instead of one, of a law linear in `J` 3, and their mean 4.
 pub(crate) const NODAL_PRESSURE_OPERATIONS: u32 = 63 + 29 + 2 + 4 + 3 + 4;
 
-/// The kernel that computes the rows of the nodes in some partitions: `J - 1` in the first tissue of the node and in the second,
-/// then the volumes that these are means over, m^3.
+/// The rows of all nodes. In a body of one tissue: the displacement (m), so that forces read one row a node, and `J - 1`. With
+/// several: `J - 1` in the first tissue of the node and in the second.
+#[derive(Clone, Copy)]
+pub(crate) struct VolumeRows<'a> {
+    pub(crate) rows: &'a [NodeVector],
+    pub(crate) several_tissues: bool,
+}
+
+impl VolumeRows<'_> {
+    /// `J - 1` of a node in the tissue of an element of this slot ([`ElementTile::slot`]); none in further tissues.
+    pub(super) fn change(&self, node: usize, slot: u8) -> Option<f32> {
+        let row = self.rows.get(node).copied().unwrap_or_default().0;
+        match (self.several_tissues, slot) {
+            (false, _) => Some(row[3]),
+            (true, 0 | 1) => Some(row[usize::from(slot)]),
+            (true, _) => None,
+        }
+    }
+}
+
+/// The kernel that computes the rows of the nodes in some partitions ([`VolumeRows`]).
 pub(crate) struct NodalVolumes<'a> {
     pub(crate) tiles: &'a [ElementTile],
     pub(crate) all: &'a Partitions,
     pub(crate) partitions: Range<usize>,
+    pub(crate) several_tissues: bool,
     /// The density of all elements, kg/m^3, if they are of one tissue and a node's mass is that of the tissue around it.
     pub(crate) density: Option<f32>,
     pub(crate) inertia: &'a [NodeInertia],
@@ -46,51 +69,108 @@ impl Kernel for NodalVolumes<'_> {
 
     #[inline(always)]
     fn run<R: Real>(self) {
-        add_all::<R>(self);
+        match self.density {
+            Some(density) => from_changes::<R>(self, density),
+            None => from_changes_and_volumes::<R>(self),
+        }
     }
 }
 
+/// The rows from sums of changes alone: the volume of a node follows from its mass.
 #[inline(always)]
-fn add_all<R: Real>(kernel: NodalVolumes<'_>) {
-    let NodalVolumes { tiles, all, partitions, density, inertia, displacement, rows } = kernel;
-    rows.fill(NodeVector::ZERO);
-    let displacement = Gather::new(displacement);
+fn from_changes<R: Real>(kernel: NodalVolumes<'_>, density: f32) {
+    let NodalVolumes { tiles, all, partitions, inertia, displacement, rows, .. } = kernel;
     let nodes = all.nodes(&partitions);
-    let mut sums = Scatter::from(nodes.start, rows);
-    for (touching, length) in all.touching(partitions) {
-        let tiles = tiles.get(touching).unwrap_or_default();
-        match (length, density.is_some()) {
-            (3, true) => add_strips::<R, OneTissue, 3, 6>(tiles, displacement, &mut sums),
-            (2, true) => add_strips::<R, OneTissue, 2, 5>(tiles, displacement, &mut sums),
-            (_, true) => add_strips::<R, OneTissue, 1, 4>(tiles, displacement, &mut sums),
-            (3, false) => add_strips::<R, TwoTissues, 3, 6>(tiles, displacement, &mut sums),
-            (2, false) => add_strips::<R, TwoTissues, 2, 5>(tiles, displacement, &mut sums),
-            (_, false) => add_strips::<R, TwoTissues, 1, 4>(tiles, displacement, &mut sums),
+    let inertia = inertia.get(nodes.clone()).unwrap_or_default();
+    let moved = displacement.get(nodes.clone()).unwrap_or_default();
+    let count = rows.len();
+    let components: &mut [f32] = must_cast_slice_mut(rows);
+    // The sums are in the first quarter of the rows, so that they stay in the cache.
+    let sums = components.get_mut(..count).unwrap_or_default();
+    sums.fill(0.0);
+    add_partitions::<R, _>(
+        (tiles, all, partitions),
+        displacement,
+        Changes(ScatterNumbers::from(nodes.start, sums)),
+    );
+    // The last rows first: each is written over sums of later nodes.
+    for first in (0..count).step_by(TILE).rev() {
+        let (mut changes, mut masses) = ([0.0; TILE], [1.0; TILE]);
+        let sums = components.get(first..count).unwrap_or_default();
+        let of = inertia.get(first..).unwrap_or_default();
+        for (change, sum) in changes.iter_mut().zip(sums) {
+            *change = *sum;
+        }
+        for (mass, inertia) in masses.iter_mut().zip(of) {
+            *mass = inertia.mass;
+        }
+        for from in (0..TILE).step_by(R::COUNT) {
+            let change = R::from_fn(|lane| changes[(from + lane) % TILE]);
+            let mass = R::from_fn(|lane| masses[(from + lane) % TILE]);
+            let ratio = (R::splat(0.25 * density) * change).divide(mass);
+            for lane in 0..R::COUNT {
+                changes[(from + lane) % TILE] = ratio.lane(lane);
+            }
+        }
+        let rows = components.as_chunks_mut::<4>().0.get_mut(first..).unwrap_or_default();
+        let moved = moved.get(first..).unwrap_or_default();
+        for ((row, moved), change) in rows.iter_mut().zip(moved).zip(changes) {
+            *row = moved.0;
+            row[3] = change;
         }
     }
-    if let Some(density) = density {
-        for (row, inertia) in rows.iter_mut().zip(inertia.get(nodes).unwrap_or_default()) {
-            let volume = inertia.mass / density;
-            row.0 = [row.0[0] / volume, 0.0, volume, 0.0];
-        }
-        return;
-    }
-    for row in rows {
+}
+
+/// The rows from sums of changes and of volumes for each tissue.
+#[inline(always)]
+fn from_changes_and_volumes<R: Real>(kernel: NodalVolumes<'_>) {
+    let NodalVolumes { tiles, all, partitions, several_tissues, displacement, rows, .. } = kernel;
+    let nodes = all.nodes(&partitions);
+    rows.fill(NodeVector::ZERO);
+    add_partitions::<R, _>(
+        (tiles, all, partitions),
+        displacement,
+        ChangesAndVolumes(Scatter::from(nodes.start, rows)),
+    );
+    for (row, moved) in rows.iter_mut().zip(displacement.get(nodes).unwrap_or_default()) {
         let [change, volume, other_change, other_volume] = row.0;
         let ratio = |change: f32, volume: f32| if volume > 0.0 { change / volume } else { 0.0 };
-        row.0 = [ratio(change, volume), ratio(other_change, other_volume), volume, other_volume];
+        let [x, y, z] = moved.to_array();
+        row.0 = if several_tissues {
+            [ratio(change, volume), ratio(other_change, other_volume), 0.0, 0.0]
+        } else {
+            [x, y, z, ratio(change, volume)]
+        };
+    }
+}
+
+/// Adds the volumes of the elements that touch some partitions.
+#[inline(always)]
+fn add_partitions<R: Real, S: Sums>(
+    (tiles, all, partitions): (&[ElementTile], &Partitions, Range<usize>),
+    displacement: &[NodeVector],
+    mut sums: S,
+) {
+    let displacement = Gather::new(displacement);
+    for (touching, length) in all.touching(partitions) {
+        let tiles = tiles.get(touching).unwrap_or_default();
+        match length {
+            3 => add_strips::<R, S, 3, 6>(tiles, displacement, &mut sums),
+            2 => add_strips::<R, S, 2, 5>(tiles, displacement, &mut sums),
+            _ => add_strips::<R, S, 1, 4>(tiles, displacement, &mut sums),
+        }
     }
 }
 
 /// Adds the volumes of strips of `K` elements with `N` nodes.
 #[inline(always)]
-fn add_strips<R: Real, T: Tissues, const K: usize, const N: usize>(
+fn add_strips<R: Real, S: Sums, const K: usize, const N: usize>(
     tiles: &[ElementTile],
     displacement: Gather<'_>,
-    sums: &mut Scatter<'_>,
+    sums: &mut S,
 ) {
     for tiles in tiles.as_chunks::<K>().0 {
-        let mut buffer = ScatterBuffer::NONE;
+        let mut buffer = S::buffer::<N>();
         let rows = nodes_of(tiles.each_ref());
         let inside = sums.checked::<R, N>(rows);
         let nodes = inside.or_else(|| TileNodes::in_range::<R>(rows, 0, displacement.count()));
@@ -100,56 +180,83 @@ fn add_strips<R: Real, T: Tissues, const K: usize, const N: usize>(
             unrolled!(node < N => {
                 at[node] = displacement.read_nodes::<R, N>(&nodes, node, first);
             });
-            let mut shares = [T::none::<R>(); N];
+            // All gradients before all volumes: their operations do not wait for each other.
+            let mut gradients = [[[R::splat(0.0); 3]; 3]; K];
             unrolled!(element < K => {
                 let [a, b, c, d] = CORNERS[element % LONGEST];
                 let corners = [at[a % N], at[b % N], at[c % N], at[d % N]];
-                let change = Deformation::of_displacements(&tiles[element], first, corners).invariants.j;
-                let volume = R::splat(0.25) * tiles[element].volume::<R>(first);
+                gradients[element] = fused_gradient(&tiles[element], first, corners);
+            });
+            let mut shares = [S::none::<R>(); N];
+            unrolled!(element < K => {
+                let volume = tiles[element].volume::<R>(first);
+                let change = volume * Deformation::new(gradients[element]).invariants.j;
                 for corner in 0..4 {
                     let share = &mut shares[CORNERS[element % LONGEST][corner] % N];
-                    *share = T::add(*share, &tiles[element], first, corner, volume * change, volume);
+                    let added = S::share((&tiles[element], first, corner), change, volume);
+                    // The node's first element in the strip.
+                    let new = element == 0 || corner == 0;
+                    *share = if new { added } else { S::sum(*share, added) };
                 }
             });
             match &inside {
-                Some(nodes) => T::scatter(sums, nodes, first, shares, &mut buffer),
+                Some(nodes) => sums.scatter(nodes, first, shares, &mut buffer),
                 // Elements with nodes of another thread's partitions.
-                None => sums.add_present(rows, first, T::rows(shares)),
+                None => sums.scatter_present(rows, first, shares),
             }
         }
     }
 }
 
-/// Of how many tissues elements may be.
-trait Tissues {
+/// The displacement gradients of elements from the displacements of their corners, with as few operations as possible.
+#[inline(always)]
+fn fused_gradient<R: Real>(tile: &ElementTile, first: usize, [origin, a, b, c]: [Vector<R>; 4]) -> Matrix<R> {
+    let mut h = [[R::splat(0.0); 3]; 3];
+    for (corner, displacement) in [a, b, c].into_iter().enumerate() {
+        for j in 0..3 {
+            let gradient = tile.gradient::<R>(corner, j, first);
+            for i in 0..3 {
+                let along = displacement[i] - origin[i];
+                h[i][j] = if corner == 0 { along * gradient } else { along.fused(gradient, h[i][j]) };
+            }
+        }
+    }
+    h
+}
+
+/// Sums over the elements around each node.
+trait Sums {
     /// What goes to a node.
     type Share<R: Real>: Copy;
+    /// What scalar code collects.
+    type Buffer<const N: usize>;
+
     fn none<R: Real>() -> Self::Share<R>;
-    /// With the change of volume and the volume of a vector of elements that have the node at `corner`.
-    fn add<R: Real>(
-        share: Self::Share<R>,
-        tile: &ElementTile,
-        first: usize,
-        corner: usize,
-        change: R,
-        volume: R,
-    ) -> Self::Share<R>;
-    /// As rows: change of volume and volume of the two tissues at the node.
-    fn rows<R: Real, const N: usize>(shares: [Self::Share<R>; N]) -> [[R; 4]; N];
+    fn buffer<const N: usize>() -> Self::Buffer<N>;
+    /// Of the change of volume and the volume of the elements from a place of a tile on that have the node at a corner.
+    fn share<R: Real>(place: (&ElementTile, usize, usize), change: R, volume: R) -> Self::Share<R>;
+    fn sum<R: Real>(one: Self::Share<R>, other: Self::Share<R>) -> Self::Share<R>;
+    fn checked<'b, R: Real, const N: usize>(&self, rows: [&'b [u32; TILE]; N]) -> Option<TileNodes<'b, N>>;
     fn scatter<R: Real, const N: usize>(
-        sums: &mut Scatter<'_>,
+        &mut self,
         nodes: &TileNodes<'_, N>,
         first: usize,
         shares: [Self::Share<R>; N],
-        buffer: &mut ScatterBuffer<N>,
+        buffer: &mut Self::Buffer<N>,
+    );
+    fn scatter_present<R: Real, const N: usize>(
+        &mut self,
+        nodes: [&[u32; TILE]; N],
+        first: usize,
+        shares: [Self::Share<R>; N],
     );
 }
 
-/// The volume of a node follows from its mass.
-struct OneTissue;
+struct Changes<'a>(ScatterNumbers<'a>);
 
-impl Tissues for OneTissue {
+impl Sums for Changes<'_> {
     type Share<R: Real> = R;
+    type Buffer<const N: usize> = NumberBuffer<N>;
 
     #[inline(always)]
     fn none<R: Real>() -> R {
@@ -157,31 +264,53 @@ impl Tissues for OneTissue {
     }
 
     #[inline(always)]
-    fn add<R: Real>(share: R, _: &ElementTile, _: usize, _: usize, change: R, _: R) -> R {
-        share + change
+    fn buffer<const N: usize>() -> NumberBuffer<N> {
+        NumberBuffer::NONE
     }
 
     #[inline(always)]
-    fn rows<R: Real, const N: usize>(shares: [R; N]) -> [[R; 4]; N] {
-        shares.map(|share| [share, R::splat(0.0), R::splat(0.0), R::splat(0.0)])
+    fn share<R: Real>(_: (&ElementTile, usize, usize), change: R, _: R) -> R {
+        change
+    }
+
+    #[inline(always)]
+    fn sum<R: Real>(one: R, other: R) -> R {
+        one + other
+    }
+
+    #[inline(always)]
+    fn checked<'b, R: Real, const N: usize>(&self, rows: [&'b [u32; TILE]; N]) -> Option<TileNodes<'b, N>> {
+        self.0.checked::<R, N>(rows)
     }
 
     #[inline(always)]
     fn scatter<R: Real, const N: usize>(
-        sums: &mut Scatter<'_>,
+        &mut self,
         nodes: &TileNodes<'_, N>,
         first: usize,
         shares: [R; N],
-        buffer: &mut ScatterBuffer<N>,
+        buffer: &mut NumberBuffer<N>,
     ) {
-        sums.add_numbers(nodes, first, shares, buffer);
+        self.0.add_corners(nodes, first, shares, buffer);
+    }
+
+    #[inline(always)]
+    fn scatter_present<R: Real, const N: usize>(
+        &mut self,
+        nodes: [&[u32; TILE]; N],
+        first: usize,
+        shares: [R; N],
+    ) {
+        self.0.add_present(nodes, first, shares);
     }
 }
 
-struct TwoTissues;
+/// Change and volume of the two tissues at a node.
+struct ChangesAndVolumes<'a>(Scatter<'a>);
 
-impl Tissues for TwoTissues {
+impl Sums for ChangesAndVolumes<'_> {
     type Share<R: Real> = [R; 4];
+    type Buffer<const N: usize> = ScatterBuffer<N>;
 
     #[inline(always)]
     fn none<R: Real>() -> [R; 4] {
@@ -189,37 +318,45 @@ impl Tissues for TwoTissues {
     }
 
     #[inline(always)]
-    fn add<R: Real>(
-        [first_change, first_volume, second_change, second_volume]: [R; 4],
-        tile: &ElementTile,
-        first: usize,
-        corner: usize,
-        change: R,
-        volume: R,
-    ) -> [R; 4] {
-        let is = |slot: u8| R::from_fn(|lane| f32::from(u8::from(tile.slot(corner, first + lane) == slot)));
-        let (one, other) = (is(0), is(1));
-        [
-            first_change + one * change,
-            first_volume + one * volume,
-            second_change + other * change,
-            second_volume + other * volume,
-        ]
+    fn buffer<const N: usize>() -> ScatterBuffer<N> {
+        ScatterBuffer::NONE
     }
 
     #[inline(always)]
-    fn rows<R: Real, const N: usize>(shares: [[R; 4]; N]) -> [[R; 4]; N] {
-        shares
+    fn share<R: Real>((tile, first, corner): (&ElementTile, usize, usize), change: R, volume: R) -> [R; 4] {
+        let is = |slot: u8| R::from_fn(|lane| f32::from(u8::from(tile.slot(corner, first + lane) == slot)));
+        let (one, other) = (is(0), is(1));
+        [one * change, one * volume, other * change, other * volume]
+    }
+
+    #[inline(always)]
+    fn sum<R: Real>(one: [R; 4], other: [R; 4]) -> [R; 4] {
+        [one[0] + other[0], one[1] + other[1], one[2] + other[2], one[3] + other[3]]
+    }
+
+    #[inline(always)]
+    fn checked<'b, R: Real, const N: usize>(&self, rows: [&'b [u32; TILE]; N]) -> Option<TileNodes<'b, N>> {
+        self.0.checked::<R, N>(rows)
     }
 
     #[inline(always)]
     fn scatter<R: Real, const N: usize>(
-        sums: &mut Scatter<'_>,
+        &mut self,
         nodes: &TileNodes<'_, N>,
         first: usize,
         shares: [[R; 4]; N],
         buffer: &mut ScatterBuffer<N>,
     ) {
-        sums.add_corners(nodes, first, shares, buffer);
+        self.0.add_corners(nodes, first, shares, buffer);
+    }
+
+    #[inline(always)]
+    fn scatter_present<R: Real, const N: usize>(
+        &mut self,
+        nodes: [&[u32; TILE]; N],
+        first: usize,
+        shares: [[R; 4]; N],
+    ) {
+        self.0.add_present(nodes, first, shares);
     }
 }

@@ -30,7 +30,7 @@ enum Pass {
     Matrices,
 }
 
-/// The bound over all elements. A row of a node holds `J - 1`, its weight `x`, `k`, and its volume (m^3).
+/// The bound over all elements. A row of a node holds its weight `x`, `k`, its volume (m^3), and `J - 1`.
 pub(crate) struct NodalVolumeBounds<'a> {
     pub(crate) tiles: &'a [ElementTile],
     pub(crate) inertia: &'a [NodeInertia],
@@ -41,8 +41,16 @@ impl NodalVolumeBounds<'_> {
     /// All weights one, from the rows of [`super::NodalVolumes`].
     pub(crate) fn start(&mut self) {
         for row in &mut *self.rows {
-            let [j, _, volume, _] = row.0;
-            row.0 = [j, 1.0, 0.0, volume];
+            row.0 = [1.0, 0.0, 0.0, row.0[3]];
+        }
+        for tile in self.tiles {
+            for lane in 0..TILE {
+                for corner in 0..4 {
+                    if let Some(row) = self.rows.get_mut(tile.node(corner, lane)) {
+                        row.0[2] += 0.25 * tile.volume::<f32>(lane);
+                    }
+                }
+            }
         }
     }
 
@@ -52,11 +60,11 @@ impl NodalVolumeBounds<'_> {
         for (node, row) in self.rows.iter_mut().enumerate() {
             let [x, y, z, others] = sums.xx_yy_zz_xy.get(node).copied().unwrap_or_default().0;
             let length = libm::sqrtf(x * x + y * y + z * z);
-            let [j, weight, _, volume] = row.0;
+            let [weight, _, volume, j] = row.0;
             // A node of no element that takes part has none.
             let per_volume = if volume > 0.0 { 1.0 / volume } else { 0.0 };
             let k = curvature(j).max(0.0) * (others + length * weight) * per_volume;
-            row.0[2] = k;
+            row.0[1] = k;
             // The gradient of the node's own volume.
             let own = if length > 0.0 { k / length / weight } else { 0.0 };
             let matrix = Symmetric { xx: x * x, yy: y * y, zz: z * z, xy: x * y, yz: y * z, zx: z * x };
@@ -68,16 +76,16 @@ impl NodalVolumeBounds<'_> {
     /// Weighs a node by the largest eigenvalue of its matrix.
     pub(crate) fn weigh(&mut self, node: usize, rate: f32) {
         if let Some(row) = self.rows.get_mut(node) {
-            row.0[1] *= rate;
+            row.0[0] *= rate;
         }
     }
 
     /// Divides the weights by the largest eigenvalue.
     pub(crate) fn balance(&mut self, largest: f32) {
         for row in &mut *self.rows {
-            let share = row.0[1] / largest;
+            let share = row.0[0] / largest;
             // Not a number where nothing moves.
-            row.0[1] = if share > LEAST_WEIGHT { share.min(1.0) } else { LEAST_WEIGHT };
+            row.0[0] = if share > LEAST_WEIGHT { share.min(1.0) } else { LEAST_WEIGHT };
         }
     }
 
@@ -140,7 +148,7 @@ fn add_elements<R: Real>(
     let zero = R::splat(0.0);
     let (mut lengths, mut weights, mut factors) = ([zero; 4], [zero; 4], [zero; 4]);
     for corner in 0..4 {
-        let [_, weight, k] = rows.read_nodes::<R, 4>(&nodes, corner, first);
+        let [weight, k, _] = rows.read_nodes::<R, 4>(&nodes, corner, first);
         lengths[corner] = quarter * images[corner].length * weight;
         (weights[corner], factors[corner]) = (weight, k);
     }

@@ -11,7 +11,7 @@
 use crate::material::{Invariants, Law, LawState, Laws, Potential};
 use crate::simd::{Gather, Pair, Real, TileNodes};
 
-use super::ElementTile;
+use super::{ElementTile, VolumeRows};
 
 /// Where the pressure of elements comes from.
 pub(crate) trait Pressure: Copy {
@@ -24,9 +24,19 @@ pub(crate) trait Pressure: Copy {
     fn no_volumes<R: Real>() -> Self::Volumes<R>;
     /// Nothing known yet.
     fn none<R: Real>() -> Self::Response<R>;
+    /// Rows in which displacements are read as well, if any.
+    fn displacement(&self) -> Option<Gather<'_>>;
     /// Reads a node of each element ([`Gather::read_nodes`]).
     fn read<R: Real, const N: usize>(
         &self,
+        nodes: &TileNodes<'_, N>,
+        corner: usize,
+        first: usize,
+    ) -> Self::Volumes<R>;
+    /// The same with the fourth component of the displacement known.
+    fn read_with<R: Real, const N: usize>(
+        &self,
+        fourth: R,
         nodes: &TileNodes<'_, N>,
         corner: usize,
         first: usize,
@@ -85,7 +95,15 @@ impl Pressure for OwnPressure {
     fn none<R: Real>() {}
 
     #[inline(always)]
+    fn displacement(&self) -> Option<Gather<'_>> {
+        None
+    }
+
+    #[inline(always)]
     fn read<R: Real, const N: usize>(&self, _: &TileNodes<'_, N>, _: usize, _: usize) {}
+
+    #[inline(always)]
+    fn read_with<R: Real, const N: usize>(&self, _: R, _: &TileNodes<'_, N>, _: usize, _: usize) {}
 
     #[inline(always)]
     fn response<R: Real, L: Law>(_: &Laws<'_, L>, _: &ElementTile, _: usize, _: [(); 4], _: R) {}
@@ -106,7 +124,16 @@ impl Pressure for OwnPressure {
 
 /// The mean over the nodes, from the rows of [`super::NodalVolumes`].
 #[derive(Clone, Copy)]
-pub struct MeanPressure<'a>(pub(crate) Gather<'a>);
+pub struct MeanPressure<'a> {
+    rows: Gather<'a>,
+    several_tissues: bool,
+}
+
+impl<'a> MeanPressure<'a> {
+    pub(crate) const fn new(VolumeRows { rows, several_tissues }: VolumeRows<'a>) -> Self {
+        Self { rows: Gather::new(rows), several_tissues }
+    }
+}
 
 /// `U'` and `U''`, Pa, means over the nodes.
 #[derive(Clone, Copy)]
@@ -130,9 +157,25 @@ impl Pressure for MeanPressure<'_> {
     }
 
     #[inline(always)]
+    fn displacement(&self) -> Option<Gather<'_>> {
+        if self.several_tissues { None } else { Some(self.rows) }
+    }
+
+    #[inline(always)]
     fn read<R: Real, const N: usize>(&self, nodes: &TileNodes<'_, N>, corner: usize, first: usize) -> [R; 2] {
-        let [one, other, _] = self.0.read_nodes::<R, N>(nodes, corner, first);
-        [one, other]
+        let [one, other, _, fourth] = self.rows.read_rows::<R, N>(nodes, corner, first);
+        if self.several_tissues { [one, other] } else { [fourth, fourth] }
+    }
+
+    #[inline(always)]
+    fn read_with<R: Real, const N: usize>(
+        &self,
+        fourth: R,
+        nodes: &TileNodes<'_, N>,
+        corner: usize,
+        first: usize,
+    ) -> [R; 2] {
+        if self.several_tissues { self.read(nodes, corner, first) } else { [fourth, fourth] }
     }
 
     #[inline(always)]
@@ -178,6 +221,6 @@ impl Pressure for MeanPressure<'_> {
 
     #[inline(always)]
     fn count(&self) -> usize {
-        self.0.count()
+        self.rows.count()
     }
 }

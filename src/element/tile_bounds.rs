@@ -4,10 +4,10 @@
 use crate::material::{Law, Laws};
 use crate::simd::{Gather, Kernel, NodeVector, Real, ScatterBuffer, TILE, write_rows};
 
-use super::ElementTile;
 use super::deformation::Deformation;
 use super::pressure::{MeanPressure, OwnPressure, Pressure};
 use super::stiffness_bound::{Bound, MatrixSums};
+use super::{ElementTile, VolumeRows};
 
 /// A 3 x 3 matrix by rows.
 pub(crate) type Rotation = [[f32; 3]; 3];
@@ -24,11 +24,11 @@ pub struct TileBounds<'a, L, P = OwnPressure> {
     pub(crate) weight: f32,
 }
 
-impl<'a, L> TileBounds<'a, L> {
+impl<'a, L: Law> TileBounds<'a, L> {
     /// With the pressures that follow from the volumes of the nodes.
-    pub(crate) fn with_nodal_volumes(self, volumes: &'a [NodeVector]) -> TileBounds<'a, L, MeanPressure<'a>> {
+    pub(crate) fn with_nodal_volumes(self, rows: &'a [NodeVector]) -> TileBounds<'a, L, MeanPressure<'a>> {
         let Self { laws, tile, displacement, sums, rotations, weight, .. } = self;
-        let pressure = MeanPressure(Gather::new(volumes));
+        let pressure = MeanPressure::new(VolumeRows { rows, several_tissues: laws.differ() });
         TileBounds { laws, pressure, tile, displacement, sums, rotations, weight }
     }
 }

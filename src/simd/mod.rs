@@ -26,6 +26,7 @@ mod level;
 mod level_tests;
 #[cfg(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"))]
 mod neon;
+mod numbers;
 mod pair;
 // Unused on processors without a register type here.
 #[allow(unused_imports, unused_macros)]
@@ -40,6 +41,7 @@ mod vectors;
 pub(crate) use level::Baseline;
 pub use level::Level;
 pub(crate) use level::{Kernel, dispatch};
+pub(crate) use numbers::{NumberBuffer, ScatterNumbers};
 pub(crate) use pair::Pair;
 pub use vectors::NodeVector;
 use vectors::transpose;

@@ -165,8 +165,8 @@ pub(crate) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
 pub(crate) struct TileNodes<'a, const N: usize> {
     rows: [&'a [u32; TILE]; N],
     /// The range.
-    first: usize,
-    count: usize,
+    pub(super) first: usize,
+    pub(super) count: usize,
 }
 
 impl<'a, const N: usize> TileNodes<'a, N> {
@@ -186,7 +186,7 @@ impl<'a, const N: usize> TileNodes<'a, N> {
 
     /// The node in row `corner` and `lane`.
     #[inline(always)]
-    fn at(&self, corner: usize, lane: usize) -> usize {
+    pub(super) fn at(&self, corner: usize, lane: usize) -> usize {
         self.rows[corner % N][lane % TILE] as usize
     }
 }
@@ -214,21 +214,31 @@ impl<'a> Gather<'a> {
         corner: usize,
         first: usize,
     ) -> [R; 3] {
+        let [x, y, z, _] = self.read_rows::<R, N>(nodes, corner, first);
+        [x, y, z]
+    }
+
+    /// The same with the fourth component.
+    #[inline(always)]
+    pub(crate) fn read_rows<R: Real, const N: usize>(
+        &self,
+        nodes: &TileNodes<'_, N>,
+        corner: usize,
+        first: usize,
+    ) -> [R; 4] {
         if R::COUNT == 1 {
-            let vector = self.0.get(nodes.at(corner, first)).copied().unwrap_or_default();
-            return vector.to_array().map(R::splat);
+            return self.0.get(nodes.at(corner, first)).copied().unwrap_or_default().0.map(R::splat);
         }
         if nodes.first + nodes.count > self.0.len() {
-            return [R::splat(0.0); 3];
+            return [R::splat(0.0); 4];
         }
-        let [x, y, z, _] = R::from_rows(|lane| {
+        R::from_rows(|lane| {
             #[allow(unsafe_code)]
             // SAFETY: all nodes are below `nodes.first + nodes.count`, which is at most the number of vectors.
             unsafe {
                 self.0.get_unchecked(nodes.at(corner, first + lane)).0
             }
-        });
-        [x, y, z]
+        })
     }
 }
 
@@ -305,37 +315,6 @@ impl<'a> Scatter<'a> {
                 *sum += value;
             }
         });
-    }
-
-    /// The same with one number instead of a vector, which goes to the first component.
-    #[inline(always)]
-    pub(crate) fn add_numbers<R: Real, const N: usize>(
-        &mut self,
-        nodes: &TileNodes<'_, N>,
-        first: usize,
-        values: [R; N],
-        buffer: &mut ScatterBuffer<N>,
-    ) {
-        if R::COUNT == 1 {
-            let zero = R::splat(0.0);
-            self.add_corners(nodes, first, values.map(|value| [value, zero, zero, zero]), buffer);
-            return;
-        }
-        if nodes.first != self.first || nodes.count > self.vectors.len() {
-            return;
-        }
-        // The place that node 0 would have, so that nodes need no subtraction.
-        let vectors = self.vectors.as_mut_ptr().wrapping_sub(self.first);
-        for start in (0..R::COUNT).step_by(SCATTER_WIDTH) {
-            for (corner, value) in values.iter().enumerate() {
-                for lane in start..R::COUNT.min(start + SCATTER_WIDTH) {
-                    #[allow(unsafe_code)]
-                    // SAFETY: all nodes are in the range of `nodes.count` from `self.first` on, and each of these has a vector.
-                    let vector = unsafe { &mut *vectors.wrapping_add(nodes.at(corner, first + lane)) };
-                    vector.0[0] += value.lane(lane);
-                }
-            }
-        }
     }
 
     /// Adds the buffered values to the nodes in places from `first` on, those that have a vector here.

@@ -11,7 +11,7 @@ use crate::element::{
 use crate::loads::{Loads, ramp_factor};
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
 use crate::scene::SceneView;
-use crate::simd::{Gather, NodeVector};
+use crate::simd::NodeVector;
 
 use super::threads::{Threads, take};
 
@@ -47,7 +47,8 @@ pub(crate) fn nodal_volumes<M: ElementMaterial>(
     }
     let elements = scene.elements();
     let (all, tiles, inertia) = (elements.partitions, elements.tiles, scene.inertia);
-    let from_masses = !elements.laws.differ() && !scene.has_point_masses();
+    let several_tissues = elements.laws.differ();
+    let from_masses = !several_tissues && !scene.has_point_masses();
     let density = if from_masses { scene.material.tissue(0).map(|tissue| tissue.density) } else { None };
     let count = all.parts(threads.parts());
     let mut parts: [_; MOST_PARTS] = from_fn(|part| {
@@ -56,7 +57,9 @@ pub(crate) fn nodal_volumes<M: ElementMaterial>(
         (mine, rows)
     });
     threads.each(parts.get_mut(..count).unwrap_or_default(), |(mine, rows)| {
-        NodalVolumes { tiles, all, partitions: mine.clone(), density, inertia, displacement, rows }.compute();
+        let partitions = mine.clone();
+        NodalVolumes { tiles, all, partitions, several_tissues, density, inertia, displacement, rows }
+            .compute();
     });
 }
 
@@ -124,7 +127,7 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
 ) -> Extremes<f32> {
     let elements = scene.elements();
     if M::ELEMENT.is_nodal_pressure() {
-        let pressure = MeanPressure(Gather::new(volumes));
+        let pressure = MeanPressure::new(scene.volume_rows(volumes));
         let kernel =
             InternalForces::of_partitions(elements, pressure, partitions, displacement, force, visitor);
         V::nodal_pressure_forces(kernel)

@@ -5,11 +5,11 @@
 
 use crate::element::{
     CriticalBounds, ElementLaw, ElementMaterial, MeanPressure, NodalVolumeBounds, NodeInertia, NodeMatrices,
-    OwnPressure,
+    OwnPressure, VolumeRows,
 };
 use crate::material::{Law, Laws, Potential};
 use crate::scene::{AsScene, SceneView};
-use crate::simd::{Gather, NodeVector};
+use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::{CallingThread, CriticalStep, nodal_volumes};
 
@@ -18,7 +18,7 @@ const ROUNDING: f32 = 1e-5;
 
 /// Times that weights of the nodes' volumes are chosen: on bars the step is 1.12 times the linear element's with none, 1.22 with one,
 /// 1.26 with two.
-const BALANCING_SWEEPS: usize = 1;
+const BALANCING_SWEEPS: usize = 3;
 
 /// A bound on the stable step at the state's displacement (at rest for a fresh one), never above the
 /// exact limit. It takes as long as some six steps, with nodal pressure some twenty, and may be called between any two steps. The state's forces and
@@ -60,12 +60,12 @@ fn critical<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -
         }
         sums.clear();
         volumes.add(&mut sums, curvature);
-        let pressure = MeanPressure(Gather::new(volumes.rows));
+        let pressure = MeanPressure::new(VolumeRows { rows: volumes.rows, several_tissues: false });
         let kernel = CriticalBounds { laws, pressure, tiles, inertia, with_volume: false, sums: &mut sums };
         M::Law::nodal_pressure_critical_bounds(kernel);
         rate = Largest::of(&sums, inertia, |_, _| ());
     } else {
-        let pressure = MeanPressure(Gather::new(volume));
+        let pressure = MeanPressure::new(VolumeRows { rows: volume, several_tissues: true });
         let kernel = CriticalBounds { laws, pressure, tiles, inertia, with_volume: true, sums: &mut sums };
         M::Law::nodal_pressure_critical_bounds(kernel);
         rate = Largest::of(&sums, inertia, |_, _| ());

@@ -22,7 +22,7 @@ fn nodal_pressures_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateV
         return None;
     }
     nodal_volumes(scene, state.displacement, state.volume, &CallingThread);
-    let volumes = M::ELEMENT.is_nodal_pressure().then_some(&*state.volume);
+    let volumes = M::ELEMENT.is_nodal_pressure().then(|| scene.volume_rows(state.volume));
     let mut sums = vec![(0.0, 0.0); nodes];
     for (tile, lane, law) in scene.laws_at_places() {
         let volume = f64::from(tile.volume::<f32>(lane));

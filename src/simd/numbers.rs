@@ -1,0 +1,107 @@
+//! Scatter of one number for each node, as [`super::vectors`] scatters vectors, and in the same order.
+
+use super::vectors::SCATTER_WIDTH;
+use super::{Real, TILE, TileNodes};
+
+/// Numbers of consecutive nodes to add to.
+pub(crate) struct ScatterNumbers<'a> {
+    numbers: &'a mut [f32],
+    /// Node of the first number.
+    first: usize,
+}
+
+/// Scalar code collects here what goes to the `N` corners of eight elements, as in [`super::ScatterBuffer`].
+pub(crate) struct NumberBuffer<const N: usize>([[f32; SCATTER_WIDTH]; N]);
+
+impl<const N: usize> NumberBuffer<N> {
+    /// An empty buffer.
+    pub(crate) const NONE: Self = Self([[0.0; SCATTER_WIDTH]; N]);
+}
+
+impl<'a> ScatterNumbers<'a> {
+    /// Numbers of the nodes from `first` on.
+    pub(crate) const fn from(first: usize, numbers: &'a mut [f32]) -> Self {
+        Self { numbers, first }
+    }
+
+    /// The nodes of a tile, if all of them have a number here.
+    #[inline(always)]
+    pub(crate) fn checked<'b, R: Real, const N: usize>(
+        &self,
+        rows: [&'b [u32; TILE]; N],
+    ) -> Option<TileNodes<'b, N>> {
+        TileNodes::in_range::<R>(rows, self.first, self.numbers.len())
+    }
+
+    /// Adds for each corner the value in lane `l` to the number of the node in place `first + l`; nothing if the nodes have not
+    /// been checked by [`ScatterNumbers::checked`]. Scalar code has to call this for all places in order.
+    #[inline(always)]
+    pub(crate) fn add_corners<R: Real, const N: usize>(
+        &mut self,
+        nodes: &TileNodes<'_, N>,
+        first: usize,
+        values: [R; N],
+        buffer: &mut NumberBuffer<N>,
+    ) {
+        if R::COUNT == 1 {
+            for (buffered, value) in buffer.0.iter_mut().zip(values) {
+                buffered[first % SCATTER_WIDTH] = value.lane(0);
+            }
+            if first % SCATTER_WIDTH == SCATTER_WIDTH - 1 {
+                self.add_buffered(nodes, first - first % SCATTER_WIDTH, buffer);
+            }
+            return;
+        }
+        if nodes.first != self.first || nodes.count > self.numbers.len() {
+            return;
+        }
+        // The place that node 0 would have, so that nodes need no subtraction.
+        let numbers = self.numbers.as_mut_ptr().wrapping_sub(self.first);
+        for start in (0..R::COUNT).step_by(SCATTER_WIDTH) {
+            for (corner, value) in values.iter().enumerate() {
+                for lane in start..R::COUNT.min(start + SCATTER_WIDTH) {
+                    #[allow(unsafe_code)]
+                    // SAFETY: all nodes are in the range of `nodes.count` from `self.first` on, and each of these has a number.
+                    let number = unsafe { &mut *numbers.wrapping_add(nodes.at(corner, first + lane)) };
+                    *number += value.lane(lane);
+                }
+            }
+        }
+    }
+
+    /// Adds the buffered values to the nodes in places from `first` on, those that have a number here.
+    fn add_buffered<const N: usize>(
+        &mut self,
+        nodes: &TileNodes<'_, N>,
+        first: usize,
+        buffer: &NumberBuffer<N>,
+    ) {
+        for (corner, buffered) in buffer.0.iter().enumerate() {
+            for (lane, value) in (first..).zip(buffered) {
+                if let Some(number) = self.numbers.get_mut(nodes.at(corner, lane).wrapping_sub(self.first)) {
+                    *number += value;
+                }
+            }
+        }
+    }
+
+    /// Adds to those nodes of a tile that have a number here, in the same order but slower.
+    #[inline(always)]
+    pub(crate) fn add_present<R: Real, const N: usize>(
+        &mut self,
+        nodes: [&[u32; TILE]; N],
+        first: usize,
+        values: [R; N],
+    ) {
+        for start in (0..R::COUNT).step_by(SCATTER_WIDTH) {
+            for (nodes, value) in nodes.iter().zip(&values) {
+                for lane in start..R::COUNT.min(start + SCATTER_WIDTH) {
+                    let node = nodes[(first + lane) % TILE] as usize;
+                    if let Some(number) = self.numbers.get_mut(node.wrapping_sub(self.first)) {
+                        *number += value.lane(lane);
+                    }
+                }
+            }
+        }
+    }
+}
