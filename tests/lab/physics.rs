@@ -27,14 +27,15 @@ fn a_cylinder_under_pressure_grows_as_lame_says_with_nodal_pressure_only() {
     for mesh in ["grid", "Gmsh"] {
         for surface in ["inner", "outer"] {
             let quantity = format!("radial displacement of the {surface} surface");
-            for method in ["exact", "damped 20x"] {
-                let [linear, nodal, ..] =
-                    Element::ALL.map(|element| error(&rows, (mesh, element, method), &quantity));
-                println!("{mesh}, {method}, {quantity}: linear {linear:.2} %, nodal pressure {nodal:.2} %");
-                assert!(nodal.abs() < 1.5 && linear < -15.0);
-            }
+            let [linear, nodal, ..] =
+                Element::ALL.map(|element| error(&rows, (mesh, element, "exact"), &quantity));
+            println!("{mesh}, {quantity}: linear {linear:.2} %, nodal pressure {nodal:.2} %");
+            assert!(nodal.abs() < 1.5 && linear < -15.0);
         }
     }
+    // No lattice can carry motion along the axis, where nothing moves: a row without a value says so.
+    let damped = rows.iter().find(|row| row.mesh == "grid" && row.method == "damped 20x").unwrap();
+    assert!(damped.value.is_none() && damped.note.contains("inertia cannot be inverted"), "{damped:?}");
     assert_eq!(csv.lines().next(), Some(HEADS));
     assert_eq!(csv.lines().count(), rows.len() + 1);
     let columns = HEADS.split(',').count();
@@ -57,8 +58,8 @@ fn torsion_converges_with_every_element_and_either_step() {
 fn a_graded_grid_brings_cooks_membrane_nearer() {
     let (rows, _) = run("cook", 1);
     for element in Element::ALL {
-        let [equal, graded] = ["grid", "graded grid"]
-            .map(|mesh| error(&rows, (mesh, element, "damped 20x"), "rise of the corner"));
+        let [equal, graded] =
+            ["grid", "graded grid"].map(|mesh| error(&rows, (mesh, element, "exact"), "rise of the corner"));
         println!("{}: rise {equal:+.2} %, on a graded grid {graded:+.2} %", element.name());
         assert!(equal < graded && graded < 0.0);
     }

@@ -47,7 +47,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
                     }
                 }
             }
-            rows.extend(report::order_of_errors(&errors));
+            rows.extend(report::order_of_errors("radial displacement of the inner surface", &errors));
         }
     }
     Ok(rows)

@@ -16,24 +16,24 @@ pub const HEADS: &str = "case,mesh,element,method,nodes,tetrahedra,quantity,unit
 /// A row of a mesh without quantity, its cells along a side, and what was measured on it.
 pub(super) type Measured = (Row, f64, f64);
 
-/// Quantity of an order.
+/// How the quantity of an order begins.
 pub(super) const ORDER: &str = "order of convergence";
 
-/// The order by relative errors.
-pub(super) fn order_of_errors(meshes: &[Measured]) -> Option<Row> {
+/// The order by relative errors of a quantity.
+pub(super) fn order_of_errors(quantity: &str, meshes: &[Measured]) -> Option<Row> {
     let [.., first, _, (row, cells, error)] = meshes else { return None };
-    Some(order_row(row, (first.2 / error).abs().ln() / (cells / first.1).ln()))
+    Some(order_row(quantity, row, (first.2 / error).abs().ln() / (cells / first.1).ln()))
 }
 
 /// The order by differences from mesh to mesh, each twice as fine as the last.
-pub(super) fn order_of_differences(meshes: &[Measured]) -> Option<Row> {
+pub(super) fn order_of_differences(quantity: &str, meshes: &[Measured]) -> Option<Row> {
     let [.., (_, _, coarse), (_, _, middle), (row, _, fine)] = meshes else { return None };
-    Some(order_row(row, ((middle - coarse) / (fine - middle)).abs().log2()))
+    Some(order_row(quantity, row, ((middle - coarse) / (fine - middle)).abs().log2()))
 }
 
-fn order_row(row: &Row, order: f64) -> Row {
+fn order_row(quantity: &str, row: &Row, order: f64) -> Row {
     Row {
-        quantity: ORDER.into(),
+        quantity: format!("{ORDER}; {quantity}"),
         value: Some(order),
         reference: Some(2.0),
         source: "theory of linear elements",

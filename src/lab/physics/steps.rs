@@ -1,5 +1,5 @@
-//! The ways to take steps that are compared: exact ones at nine tenths of the critical step, damped and mass-scaled ones far above
-//! it, and backward Euler at steps of milliseconds as most packages have it ([`implicit`]), which is of linear tetrahedra only.
+//! The ways to take steps that are compared: exact ones at nine tenths of the critical step, damped ones far above it, and
+//! backward Euler at steps of milliseconds as most packages have it ([`implicit`]), which is of linear tetrahedra only.
 
 use std::boxed::Box;
 
@@ -26,8 +26,6 @@ pub(super) enum Kind {
     Exact,
     /// Steps over the critical one.
     Damped(f32),
-    /// The same.
-    MassScaled(f32),
     /// Steps in s.
     BackwardEuler(f32),
 }
@@ -35,15 +33,14 @@ pub(super) enum Kind {
 pub(super) const EXACT: Steps = Steps { name: "exact", kind: Kind::Exact };
 pub(super) const DAMPED_20: Steps = Steps { name: "damped 20x", kind: Kind::Damped(20.0) };
 pub(super) const DAMPED_100: Steps = Steps { name: "damped 100x", kind: Kind::Damped(100.0) };
-pub(super) const MASS_SCALED_20: Steps = Steps { name: "mass-scaled 20x", kind: Kind::MassScaled(20.0) };
 /// A frame of 60 a second, and parts of it.
 pub(super) const BACKWARD_EULER: [Steps; 3] = [
     Steps { name: "backward Euler 1 ms", kind: Kind::BackwardEuler(1e-3) },
     Steps { name: "backward Euler 5 ms", kind: Kind::BackwardEuler(5e-3) },
     Steps { name: "backward Euler 16.7 ms", kind: Kind::BackwardEuler(1.0 / 60.0) },
 ];
-/// How shapes at rest are reached. The last needs no lattice.
-pub(super) const TO_REST: [Steps; 3] = [EXACT, DAMPED_20, MASS_SCALED_20];
+/// How shapes at rest are reached.
+pub(super) const TO_REST: [Steps; 2] = [EXACT, DAMPED_20];
 
 /// Share of the critical step that exact steps take: tissue stiffens on the way.
 const SAFETY: f32 = 0.9;
@@ -70,23 +67,18 @@ impl<M: ElementMaterial> Setup<'_, M> {
             }));
         }
         let critical = tled::critical_step(scene, state).ok_or(LabError::NoCriticalStep { scene: case })?;
-        let (multiple, method) = match steps.kind {
-            Kind::Damped(multiple) => {
-                let damper = Damper::new(Network::parse(networks::damper())?)?;
-                (multiple, inertia::Method::Damped(damper, Cells::Suggested))
-            }
-            Kind::MassScaled(multiple) => (multiple, inertia::Method::MassScaled),
-            _ => {
-                let step = Step::unchecked(SAFETY * critical.seconds, damping)?;
-                return Ok(Box::new(move |state, loads, until| {
-                    while state.time() < until {
-                        taken(tled::step(scene, loads, state, &step))?;
-                    }
-                    Ok(())
-                }));
-            }
+        let Kind::Damped(multiple) = steps.kind else {
+            let step = Step::unchecked(SAFETY * critical.seconds, damping)?;
+            return Ok(Box::new(move |state, loads, until| {
+                while state.time() < until {
+                    taken(tled::step(scene, loads, state, &step))?;
+                }
+                Ok(())
+            }));
         };
         let step = Step::unchecked(multiple * critical.seconds, damping)?;
+        let damper = Damper::new(Network::parse(networks::damper())?)?;
+        let method = inertia::Method::Damped(damper, Cells::Suggested);
         let mut large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step)?;
         Ok(Box::new(move |state, loads, until| {
             while state.time() < until {

@@ -8,8 +8,8 @@ use std::vec::Vec;
 use super::mesh::GRID;
 use super::recordings::Recording;
 use super::report::ORDER;
-use super::steps::{DAMPED_20, DAMPED_100, EXACT, MASS_SCALED_20, Steps, TO_REST};
-use super::{Row, pressure, silicone};
+use super::steps::{DAMPED_20, DAMPED_100, EXACT, Steps, TO_REST};
+use super::{Row, cook, pressure, silicone};
 use crate::material::Element;
 
 /// All tables that the rows fill.
@@ -188,16 +188,21 @@ impl Rows<'_> {
     }
 
     fn cases(&self) -> Option<String> {
-        let wanted =
-            |row: &Row| row.reference.is_some() && row.quantity != ORDER && !row.quantity.contains("outer");
+        let wanted = |row: &Row| {
+            let other = row.quantity.contains("outer") || row.quantity.starts_with(ORDER);
+            !other && (row.reference.is_some() || row.quantity == cook::SIDE)
+        };
         let line = |group: Vec<&Row>| {
             let first = group[0];
             let of = |steps: Steps| group.iter().filter(move |row| row.method == steps.name);
-            let errors = TO_REST.map(|steps| join(of(steps).map(|row| percent(row)))).join(" | ");
+            let value = |row: &Row| Some(format!("{} {}", short(row.value?), row.unit));
+            let errors =
+                TO_REST.map(|steps| join(of(steps).map(|row| percent(row).or(value(row))))).join(" | ");
             let seconds = |steps| of(steps).next_back().and_then(|row| row.computing_seconds).map(short);
-            let order = self
-                .of_case(first.case)
-                .find(|row| (row.mesh, row.element) == (first.mesh, first.element) && row.quantity == ORDER);
+            let order = self.of_case(first.case).find(|row| {
+                (row.mesh, row.element) == (first.mesh, first.element)
+                    && row.quantity.strip_prefix(ORDER) == Some(&format!("; {}", first.quantity))
+            });
             let order = order.and_then(|row| row.value).map(|order| format!("{order:.2}"));
             format!(
                 "| {}: {} | {} | {} | {errors} | {} | {} |",
@@ -209,42 +214,32 @@ impl Rows<'_> {
                 join(TO_REST.map(seconds).into_iter())
             )
         };
-        let heads = "| case | mesh | element | error from coarse to fine, %, exact steps | damped 20x | mass-scaled 20x | \
-                     order | s to rest on the finest mesh, exact, damped, mass-scaled |";
-        table(
-            "Shapes at rest against closed forms and a benchmark",
-            heads,
-            self.groups(wanted).into_iter().map(line).collect(),
-        )
+        let heads = "| case | mesh | element | error from coarse to fine, %, exact steps | damped 20x | order | \
+                     s to rest on the finest mesh, exact, damped |";
+        let lines = self.groups(wanted).into_iter().map(line).collect();
+        table("Shapes at rest against closed forms and a benchmark", heads, lines)
     }
 
-    /// Why runs have no value.
+    /// Why runs have no value: of each case, mesh, element and kind of steps the first reason.
     fn notes(&self) -> Option<String> {
-        let mut lines: Vec<String> = Vec::new();
+        let mut firsts: Vec<&Row> = Vec::new();
+        let kind = |row: &Row| (row.case, row.mesh, row.element, row.method);
         for row in self.0.iter().filter(|row| !row.note.is_empty()) {
-            let Row { case, mesh, method, tetrahedra, note, .. } = row;
-            let line = format!("- {case}, {mesh}, {} ({tetrahedra}), {method}: {note}", row.element.name());
-            if !lines.contains(&line) {
-                lines.push(line);
+            if !firsts.iter().any(|first| kind(first) == kind(row)) {
+                firsts.push(row);
             }
         }
-        (!lines.is_empty()).then(|| format!("**Runs without a value**\n\n{}\n", lines.join("\n")))
+        let line = |row: &&Row| {
+            let Row { case, mesh, method, tetrahedra, note, .. } = row;
+            format!("| {case} | {mesh} | {} | {method} | {tetrahedra} | {note} |", row.element.name())
+        };
+        let heads = "| case | mesh | element | steps | tetrahedra | first reason |";
+        table("Runs without a value", heads, firsts.iter().map(line).collect())
     }
 
-    /// Of exact steps, or of mass-scaled ones where those reach a finer mesh.
     fn pressure(&self) -> Option<String> {
-        let of = |steps: Steps| {
-            self.groups(move |row| row.quantity == pressure::ELEMENTS && row.method == steps.name)
-        };
-        let longer = |exact: Vec<&Row>| {
-            let same = |group: &Vec<&Row>| {
-                let [a, b] = [group[0], exact[0]];
-                (a.case, a.mesh, a.element) == (b.case, b.mesh, b.element) && group.len() > exact.len()
-            };
-            of(MASS_SCALED_20).into_iter().find(same)
-        };
+        let wanted = |row: &Row| row.quantity == pressure::ELEMENTS && row.method == EXACT.name;
         let line = |group: Vec<&Row>| {
-            let group = longer(group.clone()).unwrap_or(group);
             let first = group[0];
             let between_nodes = group.iter().map(|row| {
                 let nodes = self.find(row.case, key(row), pressure::NODES);
@@ -254,7 +249,8 @@ impl Rows<'_> {
             format!("| {} | {} | {} | {elements} | {nodes} |", first.case, first.mesh, first.element.name())
         };
         let heads = "| case | mesh | element | between elements, coarse to fine | between nodes |";
-        table("Oscillation of pressure over its mean", heads, of(EXACT).into_iter().map(line).collect())
+        let lines = self.groups(wanted).into_iter().map(line).collect();
+        table("Oscillation of pressure over its mean, exact steps", heads, lines)
     }
 }
 

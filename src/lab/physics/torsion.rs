@@ -51,7 +51,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
                 });
             }
         }
-        rows.extend(report::order_of_errors(&errors));
+        rows.extend(report::order_of_errors("torque", &errors));
     }
     Ok(rows)
 }
