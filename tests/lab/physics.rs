@@ -30,7 +30,7 @@ fn a_cylinder_under_pressure_grows_as_lame_says_with_nodal_pressure_only() {
             let [linear, nodal, ..] =
                 Element::ALL.map(|element| error(&rows, (mesh, element, "exact"), &quantity));
             println!("{mesh}, {quantity}: linear {linear:.2} %, nodal pressure {nodal:.2} %");
-            assert!(nodal.abs() < 1.5 && linear < -15.0);
+            assert!(nodal.abs() < 2.0 && linear < -15.0);
         }
     }
     // No lattice can carry motion along the axis, where nothing moves: a row without a value says so.
