@@ -25,10 +25,13 @@ pub(super) fn order_of_errors(quantity: &str, meshes: &[Measured]) -> Option<Row
     Some(order_row(quantity, row, (first.2 / error).abs().ln() / (cells / first.1).ln()))
 }
 
-/// The order by differences from mesh to mesh, each twice as fine as the last.
+/// The order by differences from mesh to mesh, each twice as fine as the last; without a value while they grow.
 pub(super) fn order_of_differences(quantity: &str, meshes: &[Measured]) -> Option<Row> {
     let [.., (_, _, coarse), (_, _, middle), (row, _, fine)] = meshes else { return None };
-    Some(order_row(quantity, row, ((middle - coarse) / (fine - middle)).abs().log2()))
+    let order = ((middle - coarse) / (fine - middle)).abs().log2();
+    let row = order_row(quantity, row, order);
+    let grows = "differences from mesh to mesh still grow";
+    Some(if order > 0.0 { row } else { Row { value: None, note: grows.into(), ..row } })
 }
 
 fn order_row(quantity: &str, row: &Row, order: f64) -> Row {

@@ -8,7 +8,7 @@ use std::vec::Vec;
 use super::mesh::GRID;
 use super::recordings::Recording;
 use super::report::ORDER;
-use super::steps::{DAMPED_20, DAMPED_100, EXACT, Steps, TO_REST};
+use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT, Steps, TO_REST};
 use super::{Row, cook, pressure, silicone};
 use crate::material::Element;
 
@@ -148,7 +148,9 @@ impl Rows<'_> {
             )
         };
         let mut shown: Vec<&Row> = self.of_case(silicone::NAME).filter(wanted).collect();
-        shown.sort_by_key(|row| (row.element.code(), row.method));
+        let kinds = [DAMPED_20, DAMPED_100].into_iter().chain(BACKWARD_EULER);
+        let place = |row: &Row| kinds.clone().position(|steps| steps.name == row.method);
+        shown.sort_by_key(|row| (row.element.code(), place(row)));
         let heads = "| element | steps | tetrahedra | at rest, mm | error, % | lowest point, mm | error, % | \
                      from a tenth to there, s | error, % | period error, % | curve, mm | s/s |";
         table("The same under gravity on grids, other steps", heads, shown.into_iter().map(line).collect())
@@ -203,7 +205,8 @@ impl Rows<'_> {
                 (row.mesh, row.element) == (first.mesh, first.element)
                     && row.quantity.strip_prefix(ORDER) == Some(&format!("; {}", first.quantity))
             });
-            let order = order.and_then(|row| row.value).map(|order| format!("{order:.2}"));
+            let order =
+                order.map(|row| row.value.map_or_else(|| "none yet".into(), |order| format!("{order:.2}")));
             format!(
                 "| {}: {} | {} | {} | {errors} | {} | {} |",
                 first.case,
@@ -224,7 +227,7 @@ impl Rows<'_> {
     fn notes(&self) -> Option<String> {
         let mut firsts: Vec<&Row> = Vec::new();
         let kind = |row: &Row| (row.case, row.mesh, row.element, row.method);
-        for row in self.0.iter().filter(|row| !row.note.is_empty()) {
+        for row in self.0.iter().filter(|row| !row.note.is_empty() && !row.quantity.starts_with(ORDER)) {
             if !firsts.iter().any(|first| kind(first) == kind(row)) {
                 firsts.push(row);
             }
