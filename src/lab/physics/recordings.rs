@@ -4,7 +4,7 @@
 //! times in s. The clock starts at the last frame before the release, so that the release is known to a frame or two. Measures that need
 //! no clock are the time from where a tenth of the lowest drop is reached to the lowest point, and the period, from there to the
 //! next. A lowest point is that of a parabola through three frames; the tenth is reached where the root of the drop, which grows evenly in a
-//! free fall, is interpolated between two frames. [`super::swing`] does the same with what is simulated.
+//! free fall, is interpolated between two frames. The module `swing` does the same with what is simulated.
 
 /// Of a marker.
 #[derive(Clone, Copy, Debug)]
