@@ -51,6 +51,10 @@ pub enum LabError {
     NotAtRest {
         /// The case.
         case: &'static str,
+        /// By which share its quantity changed in the end, over the time of the lowest frequency.
+        change: f64,
+        /// Kinetic energy over the work of the loads in the end.
+        kinetic: f64,
     },
     /// State and scene do not fit.
     Mismatch {
@@ -98,7 +102,10 @@ impl fmt::Display for LabError {
             Self::Inertia(error) => error.fmt(f),
             Self::Diverged { scene, divergence } => write!(f, "the truth of {scene} {divergence}"),
             Self::NoCriticalStep { scene } => write!(f, "{scene}: the exact critical step was not found"),
-            Self::NotAtRest { case } => write!(f, "{case} did not come to rest"),
+            Self::NotAtRest { case, change, kinetic } => write!(
+                f,
+                "{case} did not come to rest: it still changes by {change:.1e}, kinetic energy over work is {kinetic:.1e}"
+            ),
             Self::Mismatch { nodes, room } => {
                 write!(f, "the scene has {nodes} nodes, the other side {room}")
             }

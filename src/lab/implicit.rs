@@ -121,10 +121,15 @@ impl<'a, M: Material> Body<'a, M> {
         }
         self.time += self.dt;
         let view = state.view();
+        let narrow = |vector: DVec3| NodeVector(vector.as_vec3().extend(0.0).to_array());
         for (to, from) in view.displacement.iter_mut().zip(&self.displacement) {
-            let [x, y, z] = from.as_vec3().to_array();
-            *to = NodeVector([x, y, z, 0.0]);
+            *to = narrow(*from);
         }
+        // For what goes on from here.
+        for (to, from) in view.increment.iter_mut().zip(&self.velocity) {
+            *to = narrow(self.dt * *from);
+        }
+        (view.progress.time, view.progress.dt) = (self.time, self.dt as f32);
         Status::Ok
     }
 

@@ -22,12 +22,15 @@ fn physics_of_a_case_is_a_table_with_orders_of_convergence() {
     let desk = Desk::new();
     let said = desk.supple(&["evaluate", "--physics", "--scene", "torsion", "--out", "out"]);
     assert_eq!(said.code, 0, "{}", said.err);
-    assert!(said.out.contains("order of convergence"), "{}", said.out);
+    let table = std::fs::read_to_string(desk.path("out/physics.md")).unwrap();
+    assert!(table.contains("\n| case | mesh | element |") && said.out.starts_with(&table), "{table}");
     let csv = std::fs::read_to_string(desk.path("out/physics.csv")).unwrap();
-    let heads = "case,element,method,nodes,tetrahedra,quantity,unit,value,reference,source,error_percent,us_per_simulated_second";
+    let heads = "case,mesh,element,method,nodes,tetrahedra,quantity,unit,value,reference,source,error_percent,\
+                 us_per_simulated_second,computing_seconds,note";
     assert_eq!(csv.lines().next(), Some(heads));
-    // Three meshes and an order for each of two elements.
-    assert_eq!(csv.lines().count(), 9);
+    // Two kinds of steps on three meshes and an order, for each of two elements.
+    assert_eq!(csv.lines().count(), 15);
+    assert_eq!(csv.matches("order of convergence").count(), 2);
 
     let said = desk.supple(&["evaluate", "--physics", "--scene", "lobe", "--out", "none"]);
     assert_eq!(said.code, 2);

@@ -34,7 +34,7 @@ pub(crate) struct Asked {
     /// Scene whose error is drawn over the step; reversed unless given, if that is among the scenes
     #[arg(long, value_name = "SCENE")]
     sweep: Option<String>,
-    /// Judge elements against nature, closed forms and published values instead: physics.csv and a picture; a scene is one of
+    /// Judge elements against nature, closed forms and published values instead: physics.csv, physics.md and pictures; a scene is one of
     /// silicone-beam, bending, cook, cylinder, torsion, punch, all of them unless given
     #[arg(long, conflicts_with_all = ["methods", "multiples", "element", "weights", "sweep"])]
     physics: bool,
@@ -66,7 +66,7 @@ pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
 fn evaluate_physics(Asked { out, scenes, .. }: &Asked) -> Result<End, Problem> {
     let plan = physics::Plan::new(scenes).map_err(Problem::of)?;
     let rows = physics::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
-    print!("{}", physics::report::text(&rows));
+    print!("{}", physics::tables::tables(&rows));
     println!("\nresults  {}", out.join("physics.csv").display());
     Ok(End::Reached)
 }

@@ -5,14 +5,15 @@
 use std::format;
 use std::vec::Vec;
 
-use super::body::{Body, Elastic, SceneWork};
-use super::grid::Grid;
-use super::rest::{Rest, at_rest, mean_displacement};
+use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
+use super::mesh::{BodyMesh, same};
+use super::rest::mean_displacement;
+use super::steps::TO_REST;
 use super::{LabError, Row};
 use crate::element::ElementMaterial;
 use crate::loads::{Loads, NodalForce};
 use crate::material::Element;
-use crate::scene::{Axes, Support, VecScene};
+use crate::scene::Axes;
 
 pub(super) const NAME: &str = "bending";
 const LENGTH: f64 = 0.08;
@@ -36,22 +37,23 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
             let per_newton = LENGTH.powi(3) / (3.0 * YOUNG * inertia)
                 + LENGTH / (shear_factor * elastic.shear() * WIDTH * WIDTH);
             let reference = DEFLECTION * LENGTH;
-            let tip = body.grid.nodes(|[i, ..]| i == body.grid.bar.cells[0]);
+            let tip = body.mesh.nodes(|[x, ..]| same(x, LENGTH));
             let omega = 3.516 / LENGTH.powi(2) * (YOUNG * inertia / (DENSITY * WIDTH * WIDTH)).sqrt();
             let pascal = reference / per_newton / (WIDTH * WIDTH);
-            let forces = body.grid.traction(&tip, (2.0 / omega) as f32, |_| [0.0, 0.0, -pascal]);
+            let forces = body.mesh.traction(&tip, (2.0 / omega) as f32, |_| [0.0, 0.0, -pascal]);
             for element in Element::ALL {
-                let run = Run { forces: &forces, tip: &tip, omega };
-                let (value, us) = body.with(element, run)?;
-                rows.push(Row {
-                    quantity: format!("tip deflection at nu {poisson}"),
-                    unit: "mm",
-                    value: Some(1e3 * value),
-                    reference: Some(1e3 * reference),
-                    source: SOURCE,
-                    us_per_simulated_second: Some(us),
-                    ..body.row(NAME, element, "exact")
-                });
+                for steps in TO_REST {
+                    let run = Run { forces: &forces, tip: &tip, omega };
+                    let (value, row) = body.measure(NAME, element, steps, run);
+                    rows.push(Row {
+                        quantity: format!("tip deflection at nu {poisson}"),
+                        unit: "mm",
+                        value: value.map(|value| 1e3 * value),
+                        reference: Some(1e3 * reference),
+                        source: SOURCE,
+                        ..row
+                    });
+                }
             }
         }
     }
@@ -60,18 +62,15 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
 
 fn body(cells: u32, elastic: Elastic) -> Body {
     let map = |[x, y, z]: [f64; 3]| [LENGTH * x, WIDTH * y, WIDTH * z];
-    let grid = Grid::new([8 * cells, cells, cells], 0.0, map);
-    let held = |axes: Axes, chosen: &dyn Fn([u32; 3]) -> bool| -> Vec<Support> {
-        let nodes = grid.nodes(|at| at[0] == 0 && chosen(at));
-        nodes.into_iter().map(|node| Support { node, axes, moves: false }).collect()
-    };
+    let mesh = BodyMesh::grid([8 * cells, cells, cells], map);
+    let middle = 0.5 * WIDTH;
     let supports = [
-        held(Axes::X, &|_| true),
-        held(Axes::Y, &|[_, j, _]| j == cells / 2),
-        held(Axes::Z, &|[_, _, k]| k == cells / 2),
+        fixed(mesh.nodes(|[x, ..]| same(x, 0.0)), Axes::X),
+        fixed(mesh.nodes(|[x, y, _]| same(x, 0.0) && same(y, middle)), Axes::Y),
+        fixed(mesh.nodes(|[x, _, z]| same(x, 0.0) && same(z, middle)), Axes::Z),
     ]
     .concat();
-    Body { grid, elastic, density: DENSITY as f32, supports, masses: Vec::new() }
+    Body { mesh, elastic, density: DENSITY as f32, supports, masses: Vec::new() }
 }
 
 struct Run<'a> {
@@ -81,13 +80,13 @@ struct Run<'a> {
 }
 
 impl SceneWork for Run<'_> {
-    /// Deflection, m, and microseconds for a simulated second.
-    type Output = (f64, f64);
+    /// Deflection, m.
+    type Output = f64;
 
-    fn run<M: ElementMaterial>(self, scene: &VecScene<M>) -> Result<Self::Output, LabError> {
-        let loads = Loads::new(scene, [0.0; 3], self.forces, &[])?;
-        let Rest { state, us_per_second } =
-            at_rest(NAME, scene, &loads, self.omega, |state| mean_displacement(state, self.tip, 2))?;
-        Ok((-mean_displacement(&state, self.tip, 2), us_per_second))
+    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(f64, Cost), LabError> {
+        let loads = Loads::new(setup.scene, [0.0; 3], self.forces, &[])?;
+        let (state, cost) =
+            setup.at_rest(&loads, self.omega, |state| mean_displacement(state, self.tip, 2))?;
+        Ok((-mean_displacement(&state, self.tip, 2), cost))
     }
 }

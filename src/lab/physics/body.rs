@@ -1,15 +1,19 @@
-//! A body of one neo-Hookean tissue, `W = c (I1bar - 3) + d (J - 1)^2`, with its supports and point masses, and the element that it is
-//! cut in. `c = E / (4 (1 + nu))`, `d = E / (6 (1 - 2 nu))`: half the shear and half the bulk modulus, Pa. SI units.
+//! A body of one neo-Hookean tissue, `W = c (I1bar - 3) + d (J - 1)^2`, with its supports and point masses, and what is measured on it
+//! with an element and a way to take steps. `c = E / (4 (1 + nu))`, `d = E / (6 (1 - 2 nu))`: half the shear and half the bulk
+//! modulus, Pa. SI units.
 
+use std::string::{String, ToString};
+use std::time::Duration;
 use std::vec::Vec;
 
 use super::Row;
-use super::grid::Grid;
+use super::mesh::BodyMesh;
+use super::steps::Steps;
 use crate::element::{ElementMaterial, MaterialWork, with_element};
 use crate::lab::LabError;
 use crate::material::{Element, NeoHookean, Tissue};
 use crate::mesh::{Mesh, Winding};
-use crate::scene::{BuildError, Support, VecScene};
+use crate::scene::{Axes, BuildError, Support, VecScene};
 
 /// Young's modulus (Pa) and Poisson's ratio.
 #[derive(Clone, Copy)]
@@ -36,7 +40,7 @@ impl Elastic {
 
 /// A body.
 pub(super) struct Body {
-    pub(super) grid: Grid,
+    pub(super) mesh: BodyMesh,
     pub(super) elastic: Elastic,
     /// kg/m^3.
     pub(super) density: f32,
@@ -45,33 +49,69 @@ pub(super) struct Body {
     pub(super) masses: Vec<(u32, f32)>,
 }
 
+/// A body as a scene, and how it moves.
+pub(super) struct Setup<'a, M: ElementMaterial> {
+    /// The case, for errors.
+    pub(super) case: &'static str,
+    pub(super) scene: &'a VecScene<M>,
+    /// m.
+    pub(super) points: &'a [[f32; 3]],
+    pub(super) steps: Steps,
+}
+
 /// What is done with a scene of either element.
 pub(super) trait SceneWork {
     type Output;
-    fn run<M: ElementMaterial>(self, scene: &VecScene<M>) -> Result<Self::Output, LabError>;
+    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(Self::Output, Cost), LabError>;
+}
+
+/// How long was simulated (s), and how long that took.
+#[derive(Clone, Copy)]
+pub(super) struct Cost {
+    pub(super) simulated: f64,
+    pub(super) computing: Duration,
+}
+
+/// These nodes, fixed along axes.
+pub(super) fn fixed(nodes: Vec<u32>, axes: Axes) -> Vec<Support> {
+    nodes.into_iter().map(|node| Support { node, axes, moves: false }).collect()
 }
 
 impl Body {
-    /// Builds the scene with an element and does the work.
-    pub(super) fn with<W: SceneWork>(&self, element: Element, work: W) -> Result<W::Output, LabError> {
+    /// Does the work; gives what it found and a row without quantity. If it finds nothing, the row says why.
+    pub(super) fn measure<W: SceneWork>(
+        &self,
+        case: &'static str,
+        element: Element,
+        steps: Steps,
+        work: W,
+    ) -> (Option<W::Output>, Row) {
         let tissue = Tissue { law: self.elastic.law(), density: self.density };
-        with_element(element, tissue, OfBody { body: self, work })
-    }
-
-    /// A row without quantity.
-    pub(super) fn row(&self, case: &'static str, element: Element, method: &'static str) -> Row {
-        Row {
+        let found = with_element(element, tissue, OfBody { body: self, case, steps, work });
+        let row = Row {
             case,
+            mesh: self.mesh.family,
             element,
-            method,
-            nodes: self.grid.points.len(),
-            tetrahedra: self.grid.tets.len(),
-            quantity: "".into(),
+            method: steps.name,
+            nodes: self.mesh.points.len(),
+            tetrahedra: self.mesh.tets.len(),
+            quantity: String::new(),
             unit: "",
             value: None,
             reference: None,
             source: "",
             us_per_simulated_second: None,
+            computing_seconds: None,
+            note: String::new(),
+        };
+        match found {
+            Ok((output, Cost { simulated, computing })) => {
+                let seconds = computing.as_secs_f64();
+                let us_per_simulated_second = Some(1e6 * seconds / simulated);
+                (Some(output), Row { us_per_simulated_second, computing_seconds: Some(seconds), ..row })
+            }
+            Err(LabError::Diverged { divergence, .. }) => (None, Row { note: divergence.to_string(), ..row }),
+            Err(error) => (None, Row { note: error.to_string(), ..row }),
         }
     }
 }
@@ -79,19 +119,48 @@ impl Body {
 /// Work with the scene of a body.
 struct OfBody<'a, W> {
     body: &'a Body,
+    case: &'static str,
+    steps: Steps,
     work: W,
 }
 
 impl<W: SceneWork> MaterialWork for OfBody<'_, W> {
-    type Output = Result<W::Output, LabError>;
+    type Output = Result<(W::Output, Cost), LabError>;
 
     fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
-        let Body { grid: Grid { points, tets, .. }, supports, masses, .. } = self.body;
+        let Self { body: Body { mesh: BodyMesh { points, tets, .. }, supports, masses, .. }, .. } = self;
         let mesh = Mesh::new(points, tets, Winding::Checked).map_err(BuildError::Mesh)?;
         let mut scene = VecScene::build(material, &mesh, supports)?;
         for &(node, kilogram) in masses {
             scene.add_mass(node as usize, kilogram);
         }
-        self.work.run(&scene)
+        self.work.run(&Setup { case: self.case, scene: &scene, points, steps: self.steps })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::silicone::{LOADS, body, grid};
+    use super::super::steps::EXACT;
+    use super::*;
+
+    struct Fails;
+
+    impl SceneWork for Fails {
+        type Output = f64;
+
+        fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(f64, Cost), LabError> {
+            Err(LabError::NotAtRest { case: setup.case, change: 0.01, kinetic: 1e-3 })
+        }
+    }
+
+    #[test]
+    fn a_run_that_fails_says_why_in_its_row() {
+        let body = body(grid([2, 1, 1]), LOADS[0]);
+        let (value, row) = body.measure("beam", Element::NodalPressure, EXACT, Fails);
+        assert_eq!(value, None);
+        let note =
+            "beam did not come to rest: it still changes by 1.0e-2, kinetic energy over work is 1.0e-3";
+        assert_eq!((row.note.as_str(), row.computing_seconds), (note, None));
     }
 }

@@ -3,29 +3,34 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | `silicone` | a silicone beam under gravity and with a weight, against motion capture ([`recordings`]) |
+//! | `silicone`, `swing` | a silicone beam under gravity and with a weight, against motion capture ([`recordings`]) |
 //! | `bending` | a slender cantilever, against Timoshenko's beam |
 //! | `cook` | Cook's membrane, nearly incompressible, against published values |
 //! | `cylinder` | a thick-walled cylinder under internal pressure, against Lamé's solution |
 //! | `torsion` | a square bar, against Saint-Venant's torsion constant |
 //! | `punch` | a flat circular punch on a half-space, against the closed form |
-//! | `body`, `grid` | a body with its element; mapped grids of tetrahedra |
-//! | `rest` | the shape at rest, by damped exact steps |
+//! | `body`, `mesh` | a body with its element; mapped grids and irregular meshes of tetrahedra |
+//! | `steps`, `rest` | exact steps, damped ones and backward Euler; the shape at rest |
 //! | `pressure` | how much pressure oscillates from node to node |
-//! | [`report`], `figure` | rows as CSV and text; error over computing time as a picture |
+//! | [`report`], [`tables`] | rows as a file, and as the tables of the documentation |
+//! | `figure`, `locking` | pictures of error over computing time, and of the beam at rest |
 
 mod bending;
 mod body;
 mod cook;
 mod cylinder;
 mod figure;
-mod grid;
+mod locking;
+mod mesh;
 mod pressure;
 mod punch;
 pub mod recordings;
 pub mod report;
 mod rest;
 mod silicone;
+mod steps;
+mod swing;
+pub mod tables;
 mod torsion;
 
 use std::fs;
@@ -35,7 +40,6 @@ use std::vec::Vec;
 
 use super::LabError;
 use crate::io::write_atomically;
-
 use crate::material::Element;
 
 /// One quantity of one run.
@@ -43,9 +47,11 @@ use crate::material::Element;
 pub struct Row {
     /// The case.
     pub case: &'static str,
+    /// What made the mesh: a grid, a graded grid or Gmsh.
+    pub mesh: &'static str,
     /// The element.
     pub element: Element,
-    /// The method, with the step over the critical one where that is above 1.
+    /// The steps: exact ones, damped ones and how far above the critical step, or backward Euler.
     pub method: &'static str,
     /// Nodes of the mesh.
     pub nodes: usize,
@@ -55,7 +61,7 @@ pub struct Row {
     pub quantity: String,
     /// Its unit, empty for a pure number.
     pub unit: &'static str,
-    /// What the run gives; none if it diverged.
+    /// What the run gives; none if it diverged or found no rest: see the note.
     pub value: Option<f64>,
     /// What it should be, if that is known.
     pub reference: Option<f64>,
@@ -63,6 +69,10 @@ pub struct Row {
     pub source: &'static str,
     /// Computing time for a simulated second, microseconds.
     pub us_per_simulated_second: Option<f64>,
+    /// Computing time of the run, of a swing or of the way to rest, s.
+    pub computing_seconds: Option<f64>,
+    /// Why there is no value.
+    pub note: String,
 }
 
 impl Row {
@@ -117,8 +127,8 @@ impl Plan {
     }
 }
 
-/// Carries the plan out: rows in `out/physics.csv`, the beam's errors over computing time in `out/physics.svg`; files of an earlier
-/// evaluation are replaced. `say` is given the progress in words.
+/// Carries the plan out: rows in `out/physics.csv`, tables of them in `out/physics.md`, and of the beam the errors over computing time in
+/// `out/physics.svg` and the shapes at rest in `out/locking.svg`; files of an earlier evaluation are replaced. `say` is given the progress in words.
 pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Vec<Row>, LabError> {
     fs::create_dir_all(out)?;
     let mut rows = Vec::new();
@@ -127,8 +137,12 @@ pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Ve
         rows.extend(run(plan.meshes)?);
         report::write_csv(&out.join("physics.csv"), &rows)?;
     }
+    let write =
+        |name: &str, text: &str| write_atomically(&out.join(name), |file| file.write_all(text.as_bytes()));
+    write("physics.md", &tables::tables(&rows))?;
     if let Some(svg) = figure::draw(&rows) {
-        write_atomically(&out.join("physics.svg"), |file| file.write_all(svg.as_bytes()))?;
+        write("physics.svg", &svg)?;
+        write("locking.svg", &locking::draw(plan.meshes)?)?;
     }
     Ok(rows)
 }

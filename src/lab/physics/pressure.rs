@@ -14,13 +14,16 @@ use super::body::Body;
 use crate::material::Element;
 use crate::simd::NodeVector;
 
+pub(super) const ELEMENTS: &str = "pressure oscillation between elements over mean pressure";
+pub(super) const NODES: &str = "pressure oscillation between nodes over mean pressure";
+
 /// The oscillation from element to element, and with nodal pressure from node to node.
 pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVector]) -> (f64, Option<f64>) {
-    let tets = &body.grid.tets;
+    let tets = &body.mesh.tets;
     let volumes: Vec<(f64, f64)> = tets
         .iter()
         .map(|tet| {
-            let rest = tet.map(|node| DVec3::from_array(body.grid.point(node)));
+            let rest = tet.map(|node| DVec3::from_array(body.mesh.point(node)));
             let moved = [0, 1, 2, 3].map(|corner| {
                 let u = displacements[tet[corner] as usize].to_array().map(f64::from);
                 rest[corner] + DVec3::from_array(u)
@@ -35,7 +38,7 @@ pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVe
         let pressures: Vec<f64> = volumes.into_iter().map(pressure).collect();
         return (roughness(&pressures, &faces), None);
     }
-    let mut sums = vec![(0.0, 0.0); body.grid.points.len()];
+    let mut sums = vec![(0.0, 0.0); body.mesh.points.len()];
     for (tet, (rest, moved)) in tets.iter().zip(volumes) {
         for &node in tet {
             let sum = &mut sums[node as usize];
@@ -48,15 +51,12 @@ pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVe
     (roughness(&of_elements, &faces), Some(roughness(&of_nodes, &along_edges(tets))))
 }
 
-/// Its rows.
-pub(super) fn rows((elements, nodes): (f64, Option<f64>), row: &Row) -> Vec<Row> {
-    let of = |neighbours: &str, value| Row {
-        quantity: std::format!("pressure oscillation between {neighbours} over mean pressure"),
-        value: Some(value),
-        ..row.clone()
-    };
-    let nodes = nodes.map(|value| of("nodes", value));
-    [of("elements", elements)].into_iter().chain(nodes).collect()
+/// Its rows; none without a result.
+pub(super) fn rows(oscillation: Option<(f64, Option<f64>)>, row: &Row) -> Vec<Row> {
+    let of = |quantity: &str, value| Row { quantity: quantity.into(), value: Some(value), ..row.clone() };
+    let Some((elements, nodes)) = oscillation else { return Vec::new() };
+    let nodes = nodes.map(|value| of(NODES, value));
+    [of(ELEMENTS, elements)].into_iter().chain(nodes).collect()
 }
 
 fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {

@@ -6,9 +6,9 @@
 
 use std::vec::Vec;
 
-use super::body::{Body, Elastic, SceneWork};
-use super::grid::Grid;
-use super::rest::{Rest, at_rest};
+use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
+use super::mesh::{BodyMesh, same};
+use super::steps::TO_REST;
 use super::{LabError, Row, pressure};
 use crate::element::ElementMaterial;
 use crate::loads::{Loads, Motion};
@@ -36,19 +36,35 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
     for cells in MESHES.into_iter().take(meshes) {
         let body = body(cells);
         for element in Element::ALL {
-            let run = |share: f64| body.with(element, Run::new(&body, cells, element, share * reference));
-            let ((fixed, ..), (moved, pressure, us)) = (run(0.0)?, run(1.0)?);
-            let force = fixed / (1.0 - (moved - fixed) / reference);
-            let row = |quantity: &str, unit, value| Row {
-                quantity: quantity.into(),
-                unit,
-                value: Some(value),
-                us_per_simulated_second: Some(us),
-                ..body.row(NAME, element, "exact")
-            };
-            rows.push(Row { reference: Some(reference), source: SOURCE, ..row("force", "N", force) });
-            rows.push(row("error if the body ended at its far surfaces", "%", 100.0 * (fixed / force - 1.0)));
-            rows.extend(pressure::rows(pressure, &row("", "", 0.0)));
+            for steps in TO_REST {
+                let run = |share: f64| {
+                    body.measure(NAME, element, steps, Run::new(&body, element, share * reference))
+                };
+                let ((standing, of_standing), (moved, of_moved)) = (run(0.0), run(1.0));
+                let oscillation = moved.map(|(_, oscillation)| oscillation);
+                let forces = standing.zip(moved).map(|((standing, _), (moved, _))| {
+                    let force = standing / (1.0 - (moved - standing) / reference);
+                    (force, 100.0 * (standing / force - 1.0))
+                });
+                let computing = of_standing.computing_seconds.zip(of_moved.computing_seconds);
+                let note = if standing.is_none() { of_standing.note } else { of_moved.note.clone() };
+                let row = Row { computing_seconds: computing.map(|(a, b)| a + b), note, ..of_moved };
+                rows.push(Row {
+                    quantity: "force".into(),
+                    unit: "N",
+                    value: forces.map(|(force, _)| force),
+                    reference: Some(reference),
+                    source: SOURCE,
+                    ..row.clone()
+                });
+                rows.push(Row {
+                    quantity: "error if the body ended at its far surfaces".into(),
+                    unit: "%",
+                    value: forces.map(|(_, error)| error),
+                    ..row.clone()
+                });
+                rows.extend(pressure::rows(oscillation, &row));
+            }
         }
     }
     Ok(rows)
@@ -74,26 +90,25 @@ fn body(cells: u32) -> Body {
         let angle = core::f64::consts::FRAC_PI_4 * if s >= t { t / s } else { 2.0 - s / t };
         [radius * angle.cos(), radius * angle.sin(), below]
     };
-    let count = 3 * cells;
-    let grid = Grid::new([count; 3], 0.0, map);
-    let held = |axes: Axes, moves: bool, chosen: &dyn Fn([u32; 3]) -> bool| -> Vec<Support> {
-        grid.nodes(chosen).into_iter().map(|node| Support { node, axes, moves }).collect()
+    let mesh = BodyMesh::grid([3 * cells; 3], map);
+    let moved = |axes: Axes, nodes: Vec<u32>| -> Vec<Support> {
+        nodes.into_iter().map(|node| Support { node, axes, moves: true }).collect()
     };
     let supports = [
-        held(Axes::X, false, &|[i, ..]| i == 0),
-        held(Axes::Y, false, &|[_, j, _]| j == 0),
-        held(Axes::XYZ, true, &|at| is_far(at, count)),
-        held(Axes::Z, true, &|at| is_under(at, cells)),
+        fixed(mesh.nodes(|[x, ..]| same(x, 0.0)), Axes::X),
+        fixed(mesh.nodes(|[_, y, _]| same(y, 0.0)), Axes::Y),
+        moved(Axes::XYZ, mesh.nodes(is_far)),
+        moved(Axes::Z, mesh.nodes(is_under)),
     ];
-    Body { supports: supports.concat(), grid, elastic: ELASTIC, density: 1000.0, masses: Vec::new() }
+    Body { supports: supports.concat(), mesh, elastic: ELASTIC, density: 1000.0, masses: Vec::new() }
 }
 
-fn is_far([i, j, k]: [u32; 3], count: u32) -> bool {
-    i == count || j == count || k == 0
+fn is_far([x, y, z]: [f64; 3]) -> bool {
+    same(x.hypot(y), distance(1.0)) || same(-z, distance(1.0))
 }
 
-fn is_under([i, j, k]: [u32; 3], cells: u32) -> bool {
-    i.max(j) <= cells && k == 3 * cells
+fn is_under([x, y, z]: [f64; 3]) -> bool {
+    (x.hypot(y) < RADIUS || same(x.hypot(y), RADIUS)) && same(z, 0.0)
 }
 
 /// Displacement (m) of a half-space below z = 0 under a force (N) down at its origin.
@@ -118,13 +133,13 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(body: &'a Body, cells: u32, element: Element, far_force: f64) -> Self {
+    fn new(body: &'a Body, element: Element, far_force: f64) -> Self {
         let ramp = (2.0 / OMEGA) as f32;
-        let under = body.grid.nodes(|at| is_under(at, cells));
+        let under = body.mesh.nodes(is_under);
         let pressed =
             under.iter().map(|&node| Motion { node, axes: Axes::Z, metre: [0.0, 0.0, -DEPTH as f32], ramp });
-        let far = body.grid.nodes(|at| is_far(at, 3 * cells)).into_iter().map(|node| {
-            let metre = boussinesq(body.grid.point(node), far_force).map(|x| x as f32);
+        let far = body.mesh.nodes(is_far).into_iter().map(|node| {
+            let metre = boussinesq(body.mesh.point(node), far_force).map(|x| x as f32);
             Motion { node, axes: Axes::XYZ, metre, ramp }
         });
         let motions = pressed.chain(far).collect();
@@ -142,14 +157,13 @@ impl<'a> Run<'a> {
 }
 
 impl SceneWork for Run<'_> {
-    /// Force, N; oscillation of the pressure; microseconds for a simulated second.
-    type Output = (f64, (f64, Option<f64>), f64);
+    /// Force, N, and oscillation of the pressure.
+    type Output = (f64, (f64, Option<f64>));
 
-    fn run<M: ElementMaterial>(self, scene: &VecScene<M>) -> Result<Self::Output, LabError> {
-        let loads = Loads::new(scene, [0.0; 3], &[], &self.motions)?;
-        let Rest { mut state, us_per_second } =
-            at_rest(NAME, scene, &loads, OMEGA, |state| self.force(scene, state))?;
+    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(Self::Output, Cost), LabError> {
+        let loads = Loads::new(setup.scene, [0.0; 3], &[], &self.motions)?;
+        let (mut state, cost) = setup.at_rest(&loads, OMEGA, |state| self.force(setup.scene, state))?;
         let pressure = pressure::oscillation(self.body, self.element, state.displacements());
-        Ok((self.force(scene, &mut state), pressure, us_per_second))
+        Ok(((self.force(setup.scene, &mut state), pressure), cost))
     }
 }

@@ -1,63 +1,67 @@
-//! The shape at rest under loads, by exact steps with mass-proportional damping `mu = 2 omega`, critical for the lowest frequency
+//! The shape at rest under loads, by steps with mass-proportional damping `mu = 2 omega`, critical for the lowest frequency
 //! `omega` (1/s, an estimate of the case). It ends when a quantity changes by less than two in ten thousand over `1 / omega`, three
 //! times in a row, and the body stands still. Displacements are float32: what is left of the way to rest is at least `6e-8 / (omega dt)` of it.
 
 use std::time::{Duration, Instant};
 
+use super::body::{Cost, Setup};
+use super::steps::Kind;
 use crate::element::ElementMaterial;
 use crate::lab::LabError;
 use crate::loads::Loads;
-use crate::scene::VecScene;
 use crate::state::VecState;
-use crate::step::{Status, Step};
-use crate::tled;
 
-/// A body at rest.
-pub(super) struct Rest {
-    pub(super) state: VecState,
-    /// Computing time for a simulated second, microseconds.
-    pub(super) us_per_second: f64,
-}
-
-/// Share of the critical step: tissue stiffens on the way.
-const SAFETY: f32 = 0.9;
 /// Rounding of float32 in a sum of forces is half of it.
 const TOLERANCE: f64 = 2e-4;
 const MOST_WINDOWS: u32 = 120;
 /// Kinetic energy over the work of the loads, at most: rounding of displacements leaves 1e-5 where steps are short.
 const STILL: f64 = 3e-5;
 
-/// Takes steps until `quantity` rests; fails where it does not.
-pub(super) fn at_rest<M: ElementMaterial>(
-    case: &'static str,
-    scene: &VecScene<M>,
-    loads: &Loads<'_>,
-    omega: f64,
-    quantity: impl Fn(&mut VecState) -> f64,
-) -> Result<Rest, LabError> {
-    let mut state = VecState::at_rest(scene.node_count());
-    let (mut spent, mut calm, mut latest) = (Duration::ZERO, 0, f64::NAN);
-    for window in 1..=MOST_WINDOWS {
-        let critical =
-            tled::critical_step(scene, &mut state).ok_or(LabError::NoCriticalStep { scene: case })?;
-        let step = Step::unchecked(SAFETY * critical.seconds, 2.0 * omega as f32)?;
-        let start = Instant::now();
-        while state.time() * omega < f64::from(window) {
-            if let Status::Diverged(divergence) = tled::step(scene, loads, &mut state, &step) {
-                return Err(LabError::Diverged { scene: case, divergence });
+impl<M: ElementMaterial> Setup<'_, M> {
+    /// Takes steps from rest until `quantity` rests; fails where it does not.
+    pub(super) fn at_rest(
+        &self,
+        loads: &Loads<'_>,
+        omega: f64,
+        quantity: impl Fn(&mut VecState) -> f64,
+    ) -> Result<(VecState, Cost), LabError> {
+        let mut state = VecState::at_rest(self.scene.node_count());
+        let cost = self.settle(&mut state, loads, omega, quantity)?;
+        Ok((state, cost))
+    }
+
+    /// The same from a state on.
+    pub(super) fn settle(
+        &self,
+        state: &mut VecState,
+        loads: &Loads<'_>,
+        omega: f64,
+        quantity: impl Fn(&mut VecState) -> f64,
+    ) -> Result<Cost, LabError> {
+        let (from, mut computing) = (state.time(), Duration::ZERO);
+        let (mut calm, mut latest, mut change, mut kinetic) = (0, f64::NAN, f64::NAN, f64::NAN);
+        let damping = 2.0 * omega as f32;
+        let mut advance = self.advance(state, damping)?;
+        for window in 1..=MOST_WINDOWS {
+            let start = Instant::now();
+            advance(state, loads, from + f64::from(window) / omega)?;
+            computing += start.elapsed();
+            let value = quantity(state);
+            change = (value / latest - 1.0).abs();
+            kinetic = state.energy_balance().kinetic / state.energy_balance().work.abs();
+            calm = if change <= TOLERANCE { calm + 1 } else { 0 };
+            latest = value;
+            // Backward Euler has no energy balance.
+            if calm >= 3 && (kinetic.is_nan() || kinetic <= STILL) {
+                return Ok(Cost { simulated: state.time() - from, computing });
+            }
+            // The critical step changes with the shape; damped steps follow it by themselves.
+            if self.steps.kind == Kind::Exact {
+                advance = self.advance(state, damping)?;
             }
         }
-        spent += start.elapsed();
-        let value = quantity(&mut state);
-        let settled = (value - latest).abs() <= TOLERANCE * value.abs();
-        calm = if settled { calm + 1 } else { 0 };
-        latest = value;
-        if calm == 3 && state.energy_balance().kinetic <= STILL * state.energy_balance().work.abs() {
-            let us_per_second = 1e6 * spent.as_secs_f64() / state.time();
-            return Ok(Rest { state, us_per_second });
-        }
+        Err(LabError::NotAtRest { case: self.case, change, kinetic })
     }
-    Err(LabError::NotAtRest { case })
 }
 
 /// Mean displacement (m) of nodes along an axis.

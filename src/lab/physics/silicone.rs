@@ -1,240 +1,223 @@
 //! The silicone beam of [`super::recordings`]: E 263,824 Pa (the source's fit), nu 0.499, 1070 kg/m^3, gravity 9.80709 m/s^2, clamped at
-//! one end, let go at time zero. The weight is a point mass along the upper edge of the free end. Markers are fixed to the free
-//! end: the vertical displacement of its nodes, fitted by a linear function of the place in the end's plane, is taken at theirs.
-//! Each run swings until twice the first lowest point has come, and is then damped critically until it rests.
+//! one end, let go at time zero. The weight is a point mass along the upper edge of the free end. Each run swings until twice the
+//! first lowest point has come, and is then damped critically until it rests. The damping of the swing is fitted on the finest grid: its rows
+//! say how far the curves are from the recorded ones over the damping.
 
 use std::format;
-use std::time::{Duration, Instant};
+use std::string::String;
 use std::vec::Vec;
 
-use super::body::{Body, Elastic, SceneWork};
-use super::grid::Grid;
-use super::recordings::{DAMPING, GRAVITY, LOAD, MARKERS, Measured, Recording};
+use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
+use super::mesh::{BodyMesh, GRID, same};
+use super::recordings::{DAMPING, GRAVITY, LEFT, LOAD, MARKERS, Measured, Recording};
+use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
+use super::swing::{Markers, Swing};
 use super::{LabError, Row};
 use crate::element::ElementMaterial;
-use crate::inertia::{self, Cells, Damper, LargeStep};
-use crate::lab::networks;
 use crate::loads::Loads;
 use crate::material::Element;
-use crate::mlp::Network;
-use crate::scene::{Support, VecScene};
+use crate::scene::{Axes, Support};
 use crate::state::VecState;
-use crate::step::{Status, Step};
-use crate::tled;
 
 pub(super) const NAME: &str = "silicone-beam";
 /// The quantity of the picture.
-pub(super) const DISTANCE: &str = "gravity: mean distance to the recordings at rest and at the lowest point";
-const SIZE: [f64; 3] = [0.1, 0.03, 0.03];
-/// 0.51012 N at the recordings' gravity.
-const WEIGHT: f64 = 0.052_015;
+pub(super) const DISTANCE: &str = "gravity: rms distance over time; clock shifted; mean of the recordings";
+pub(super) const SIZE: [f64; 3] = [0.1, 0.03, 0.03];
 const PULL: f32 = -9.80709;
 const SOURCE: &str = "Soft Robotics Lab; ETH Zurich; srl-ethz/diffPD_sim2real (MIT)";
 /// Cells along, across and up.
-const MESHES: [[u32; 3]; 4] = [[6, 2, 2], [13, 4, 4], [20, 6, 6], [26, 8, 8]];
-/// Time between samples of the swing, s, if steps are shorter.
-const SAMPLE: f64 = 1e-3;
+const GRIDS: [[u32; 3]; 4] = [[6, 2, 2], [13, 4, 4], [20, 6, 6], [26, 8, 8]];
+/// Irregular meshes of about as many tetrahedra as the grids but the coarsest.
+const FILES: [(&str, &[u8]); 3] = [
+    ("beam-coarse.msh", include_bytes!("../../../meshes/physics/beam-coarse.msh")),
+    ("beam-middle.msh", include_bytes!("../../../meshes/physics/beam-middle.msh")),
+    ("beam-fine.msh", include_bytes!("../../../meshes/physics/beam-fine.msh")),
+];
+/// Dampings that are tried, 1/s.
+pub(super) const DAMPINGS: [f32; 7] = [4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0];
 
-/// Steps over the critical one; none are exact ones.
-const METHODS: [(&str, Option<f32>); 3] =
-    [("exact", None), ("damped 20x", Some(20.0)), ("damped 100x", Some(100.0))];
+/// What pulls at the beam, and for how long it is watched.
+#[derive(Clone, Copy)]
+pub(super) struct Load {
+    pub(super) name: &'static str,
+    pub(super) recordings: &'static [Recording; 2],
+    seconds: f64,
+    /// Of the weight.
+    kilogram: f64,
+}
 
+/// The weight is 0.51012 N at the recordings' gravity.
+pub(super) const LOADS: [Load; 2] = [
+    Load { name: "gravity", recordings: &GRAVITY, seconds: 0.3, kilogram: 0.0 },
+    Load { name: "52 g", recordings: &LOAD, seconds: 0.58, kilogram: 0.052_015 },
+];
+
+/// On `meshes` grids and one irregular mesh less.
 pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
     let mut rows = Vec::new();
-    for cells in MESHES.into_iter().take(meshes) {
-        for (load, recordings, seconds, kilogram) in
-            [("gravity", &GRAVITY, 0.3, 0.0), ("52 g", &LOAD, 0.58, WEIGHT)]
-        {
-            let body = body(cells, kilogram);
-            let end = body.grid.nodes(|[i, ..]| i == cells[0]);
+    for load in LOADS {
+        let grids = GRIDS.into_iter().take(meshes).map(|cells| Ok(grid(cells)));
+        let irregular = FILES.into_iter().take(meshes.saturating_sub(1));
+        for mesh in grids.chain(irregular.map(|(name, bytes)| BodyMesh::gmsh(name, bytes))) {
+            let body = body(mesh?, load);
             for element in Element::ALL {
-                for (method, multiple) in METHODS {
-                    let run = Run { body: &body, end: &end, seconds, multiple };
-                    let (found, us) = body.with(element, run)?;
-                    let row = Row {
-                        unit: "mm",
-                        source: SOURCE,
-                        us_per_simulated_second: Some(us),
-                        ..body.row(NAME, element, method)
-                    };
-                    rows.extend(compared(load, recordings, found, &row));
+                let implicit = load.kilogram == 0.0 && element == Element::Linear && body.mesh.family == GRID;
+                let implicit = BACKWARD_EULER.into_iter().filter(|_| implicit);
+                for steps in [EXACT, DAMPED_20, DAMPED_100].into_iter().chain(implicit) {
+                    let (found, row) = body.measure(NAME, element, steps, Run { body: &body, load });
+                    compared(load, found, &Row { unit: "mm", source: SOURCE, ..row }, &mut rows);
                 }
             }
         }
+    }
+    if meshes >= GRIDS.len() {
+        rows.extend(fit());
     }
     Ok(rows)
 }
 
 /// Rows of one run against both recordings.
-fn compared(load: &str, recordings: &[Recording; 2], found: Option<[Measured; 3]>, row: &Row) -> Vec<Row> {
-    let mut rows = Vec::new();
-    let (mut sum, mut count) = (0.0, 0.0);
-    for Recording { name, markers } in recordings {
+fn compared(load: Load, found: Option<(Swing, [Measured; 3])>, row: &Row, rows: &mut Vec<Row>) {
+    let mut add = |quantity: String, unit, value: Option<f64>, reference| {
+        // A body that does not swing has no period.
+        let value = value.filter(|value| value.is_finite());
+        rows.push(Row { quantity, unit, value, reference, ..row.clone() });
+    };
+    let mut distances = Vec::new();
+    for Recording { name, markers, left } in load.recordings {
         for (index, (reference, (marker, _))) in markers.iter().zip(MARKERS).enumerate() {
-            let found = found.map(|found| found[index]);
-            let mut add = |quantity: &str, unit, value: Option<f64>, reference: f64| {
-                rows.push(Row {
-                    quantity: format!("{name} {marker}: {quantity}"),
-                    unit,
-                    // A body that does not swing has no period.
-                    value: value.filter(|value| value.is_finite()),
-                    reference: Some(reference),
-                    ..row.clone()
-                });
+            let mut add = |quantity, unit, of: fn(&Measured) -> f64| {
+                let value = found.as_ref().map(|(_, found)| of(&found[index]));
+                add(format!("{name} {marker}: {quantity}"), unit, value, Some(of(reference)));
             };
-            add("drop at rest", "mm", found.map(|found| found.rest), reference.rest);
-            add("drop at the lowest point", "mm", found.map(|found| found.lowest), reference.lowest);
-            add("time of the lowest point", "s", found.map(|found| found.time), reference.time);
-            add("period", "s", found.map(|found| found.period), reference.period);
-            if let Some(found) = found {
-                sum += (found.rest - reference.rest).abs() + (found.lowest - reference.lowest).abs();
-                count += 2.0;
-            }
+            add("drop at rest", "mm", |of| of.rest);
+            add("drop at the lowest point", "mm", |of| of.lowest);
+            add("time of the lowest point", "s", |of| of.time);
+            add("from a tenth of the drop to the lowest point", "s", |of| of.since_tenth);
+            add("period", "s", |of| of.period);
         }
+        let swing = found.as_ref().map(|(swing, _)| swing);
+        let best = swing.map(|swing| swing.best_offset(left));
+        let recorded = swing.map(|swing| swing.distance(left, 0.0));
+        add(format!("{name} left: rms distance over time"), "mm", recorded, None);
+        let shifted = best.map(|(_, distance)| distance);
+        add(format!("{name} left: rms distance over time; clock shifted"), "mm", shifted, None);
+        add(format!("{name} left: clock shift"), "s", best.map(|(offset, _)| offset), None);
+        distances.extend(shifted);
     }
     let (_, what) = DISTANCE.split_once(": ").unwrap_or_default();
-    let quantity = format!("{load}: {what}");
-    rows.push(Row { quantity, value: (count > 0.0).then(|| sum / count), ..row.clone() });
+    let mean = (!distances.is_empty()).then(|| distances.iter().sum::<f64>() / distances.len() as f64);
+    add(format!("{}: {what}", load.name), "mm", mean, None);
+}
+
+/// How far the curves of the finest grid with nodal pressure are from the recorded ones, over the damping: for each recording in mm, the
+/// clock shifted, and of all the root mean square in shares of the drop at rest.
+fn fit() -> Vec<Row> {
+    let mut rows = Vec::new();
+    let bodies = LOADS.map(|load| (load, body(grid(GRIDS[GRIDS.len() - 1]), load)));
+    for damping in DAMPINGS {
+        let (mut squares, mut all) = (Vec::new(), None);
+        for (load, body) in &bodies {
+            let swing = LetGo { body, load: *load, damping };
+            let (found, row) = body.measure(NAME, Element::NodalPressure, EXACT, swing);
+            for Recording { name, markers, left } in load.recordings {
+                let distance = found.as_ref().map(|swing| swing.best_offset(left).1);
+                squares.extend(distance.map(|distance| (distance / markers[LEFT].rest).powi(2)));
+                rows.push(Row {
+                    quantity: format!("{name} left: rms distance over time; damping {damping} 1/s"),
+                    unit: "mm",
+                    value: distance,
+                    source: SOURCE,
+                    ..row.clone()
+                });
+            }
+            all = Some(row);
+        }
+        let misfit = 100.0 * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        rows.extend(all.map(|row| Row {
+            quantity: format!("all recordings: rms distance over drop at rest; damping {damping} 1/s"),
+            unit: "%",
+            value: Some(misfit),
+            source: SOURCE,
+            ..row
+        }));
+    }
     rows
 }
 
-fn body(cells: [u32; 3], kilogram: f64) -> Body {
-    let grid = Grid::new(cells, 0.0, |at| core::array::from_fn(|axis| at[axis] * SIZE[axis]));
-    let supports = grid.nodes(|[i, ..]| i == 0).into_iter().map(Support::fixed).collect();
-    let share = kilogram / f64::from(cells[1]);
-    let masses = (0..=cells[1])
-        .map(|j| {
-            let whole = if j == 0 || j == cells[1] { 0.5 } else { 1.0 };
-            (grid.bar.node(cells[0], j, cells[2]), (share * whole) as f32)
-        })
-        .collect();
-    Body { grid, elastic: Elastic { young: 263_824.0, poisson: 0.499 }, density: 1070.0, supports, masses }
+pub(super) fn grid(cells: [u32; 3]) -> BodyMesh {
+    BodyMesh::grid(cells, |at| core::array::from_fn(|axis| at[axis] * SIZE[axis]))
+}
+
+pub(super) fn body(mesh: BodyMesh, load: Load) -> Body {
+    let supports: Vec<Support> = fixed(mesh.nodes(|[x, ..]| same(x, 0.0)), Axes::XYZ);
+    // Each node of the edge has half of the way to its neighbours.
+    let mut edge = mesh.nodes(|[x, _, z]| same(x, SIZE[0]) && same(z, SIZE[2]));
+    let across = |node: u32| mesh.point(node)[1];
+    edge.sort_by(|&a, &b| across(a).total_cmp(&across(b)));
+    let mut masses: Vec<(u32, f32)> = edge.iter().map(|&node| (node, 0.0)).collect();
+    for (index, pair) in edge.windows(2).enumerate() {
+        let half = 0.5 * load.kilogram * (across(pair[1]) - across(pair[0])) / SIZE[1];
+        masses[index].1 += half as f32;
+        masses[index + 1].1 += half as f32;
+    }
+    Body { mesh, elastic: Elastic { young: 263_824.0, poisson: 0.499 }, density: 1070.0, supports, masses }
+}
+
+pub(super) fn markers(mesh: &BodyMesh) -> Markers {
+    Markers::on(mesh, &mesh.nodes(|[x, ..]| same(x, SIZE[0])))
 }
 
 struct Run<'a> {
     body: &'a Body,
-    end: &'a [u32],
-    seconds: f64,
-    multiple: Option<f32>,
+    load: Load,
 }
 
 impl SceneWork for Run<'_> {
-    /// What the markers do, unless the run diverged, and microseconds for a simulated second of the swing.
-    type Output = (Option<[Measured; 3]>, f64);
+    /// The swing, and what the markers do; the cost is that of the swing.
+    type Output = (Swing, [Measured; 3]);
 
-    fn run<M: ElementMaterial>(self, scene: &VecScene<M>) -> Result<Self::Output, LabError> {
-        let mut state = VecState::at_rest(scene.node_count());
-        let loads = Loads::new(scene, [0.0, 0.0, PULL], &[], &[])?;
-        let (mut curve, mut spent) = (std::vec![(0.0, [0.0; 3])], Duration::ZERO);
-        let mut advance = self.advance(scene, &mut state, DAMPING)?;
-        while state.time() < self.seconds {
-            let (until, start) = (state.time() + SAMPLE, Instant::now());
-            let taken = advance(&mut state, &loads, until);
-            spent += start.elapsed();
-            if !taken {
-                return Ok((None, 1e6 * spent.as_secs_f64() / state.time()));
-            }
-            curve.push((state.time(), self.drops(&state)));
-        }
-        let us = 1e6 * spent.as_secs_f64() / state.time();
-        let first = lowest_between(&curve, 1, 0.0, self.seconds).0;
-
-        // Critical damping of the swing, whose frequency is pi over the time of its lowest point.
-        let mut advance = self.advance(scene, &mut state, (2.0 * core::f64::consts::PI / first) as f32)?;
-        let mut before = [f64::NAN; 3];
-        for _ in 0..60 {
-            let until = state.time() + first;
-            if !advance(&mut state, &loads, until) {
-                return Ok((None, us));
-            }
-            let now = self.drops(&state);
-            let settled = now.iter().zip(before).all(|(now, before)| (now - before).abs() < 1e-4 * now);
-            before = now;
-            if settled {
-                let measured = core::array::from_fn(|marker| {
-                    let (time, lowest) = lowest_between(&curve, marker, 0.0, self.seconds);
-                    let (next, _) = lowest_between(&curve, marker, 2.2 * time, 4.0 * time);
-                    Measured { rest: now[marker], lowest, time, period: next - time }
-                });
-                return Ok((Some(measured), us));
-            }
-        }
-        Err(LabError::NotAtRest { case: NAME })
+    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(Self::Output, Cost), LabError> {
+        let loads = Loads::new(setup.scene, [0.0, 0.0, PULL], &[], &[])?;
+        let mut state = VecState::at_rest(setup.scene.node_count());
+        let markers = markers(&self.body.mesh);
+        let (swing, cost) = Swing::of(setup, &loads, &mut state, &markers, (self.load.seconds, DAMPING))?;
+        let omega = core::f64::consts::PI / swing.half_period();
+        setup.settle(&mut state, &loads, omega, |state| markers.drops(state)[LEFT])?;
+        let measured = swing.measured(markers.drops(&state));
+        Ok(((swing, measured), cost))
     }
 }
 
-/// Takes steps until a time, s. Says whether they were taken.
-type Advance<'a> = std::boxed::Box<dyn FnMut(&mut VecState, &Loads<'_>, f64) -> bool + 'a>;
+/// The swing alone.
+struct LetGo<'a> {
+    body: &'a Body,
+    load: Load,
+    damping: f32,
+}
 
-impl Run<'_> {
-    fn advance<'a, M: ElementMaterial>(
-        &self,
-        scene: &'a VecScene<M>,
-        state: &mut VecState,
-        damping: f32,
-    ) -> Result<Advance<'a>, LabError> {
-        // At rest, as a host would choose it.
-        let mut at_rest = VecState::at_rest(scene.node_count());
-        let critical =
-            tled::critical_step(scene, &mut at_rest).ok_or(LabError::NoCriticalStep { scene: NAME })?;
-        let Some(multiple) = self.multiple else {
-            let step = Step::unchecked(0.9 * critical.seconds, damping)?;
-            return Ok(std::boxed::Box::new(move |state, loads, until| {
-                while state.time() < until {
-                    if let Status::Diverged(_) = tled::step(scene, loads, state, &step) {
-                        return false;
-                    }
-                }
-                true
-            }));
-        };
-        let step = Step::unchecked(multiple * critical.seconds, damping)?;
-        let damper = Damper::new(Network::parse(networks::damper())?)?;
-        let method = inertia::Method::Damped(damper, Cells::Suggested);
-        let points = &self.body.grid.points;
-        let mut large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step)?;
-        Ok(std::boxed::Box::new(move |state, loads, until| {
-            while state.time() < until {
-                if !large.step(scene.view(), loads, state.view()).is_taken() {
-                    return false;
-                }
-            }
-            true
-        }))
-    }
+impl SceneWork for LetGo<'_> {
+    type Output = Swing;
 
-    /// How far the markers have sunk, mm.
-    fn drops(&self, state: &VecState) -> [f64; 3] {
-        let count = self.end.len() as f64;
-        let (mut mean, mut slopes, mut squares) = (0.0, [0.0; 2], [0.0; 2]);
-        for &node in self.end {
-            let [_, y, z] = self.body.grid.point(node);
-            let drop = -f64::from(state.displacements()[node as usize].to_array()[2]);
-            mean += drop / count;
-            for (axis, from_middle) in [y - 0.5 * SIZE[1], z - 0.5 * SIZE[2]].into_iter().enumerate() {
-                slopes[axis] += drop * from_middle;
-                squares[axis] += from_middle * from_middle;
-            }
-        }
-        MARKERS.map(|(_, [y, z])| {
-            let [across, up] = [y - 500.0 * SIZE[1], z - 500.0 * SIZE[2]];
-            1e3 * mean + across * slopes[0] / squares[0] + up * slopes[1] / squares[1]
-        })
+    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(Swing, Cost), LabError> {
+        let loads = Loads::new(setup.scene, [0.0, 0.0, PULL], &[], &[])?;
+        let mut state = VecState::at_rest(setup.scene.node_count());
+        Swing::of(setup, &loads, &mut state, &markers(&self.body.mesh), (self.load.seconds, self.damping))
     }
 }
 
-/// Time (s) and drop (mm) of the lowest point of a marker between two times, of a parabola through three samples.
-fn lowest_between(curve: &[(f64, [f64; 3])], marker: usize, from: f64, to: f64) -> (f64, f64) {
-    let triples = curve.windows(3).filter(|triple| triple[1].0 > from && triple[1].0 < to);
-    let best = triples.max_by(|a, b| a[1].1[marker].total_cmp(&b[1].1[marker]));
-    let Some([a, b, c]) = best.and_then(|triple| triple.first_chunk::<3>()) else {
-        return (f64::NAN, f64::NAN);
-    };
-    let [before, here, after] = [a, b, c].map(|sample| sample.1[marker]);
-    let bend = before - 2.0 * here + after;
-    if bend >= 0.0 {
-        return (b.0, here);
+/// The shape at rest, without a swing.
+pub(super) struct Hung<'a> {
+    pub(super) body: &'a Body,
+}
+
+impl SceneWork for Hung<'_> {
+    type Output = VecState;
+
+    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(VecState, Cost), LabError> {
+        let loads = Loads::new(setup.scene, [0.0, 0.0, PULL], &[], &[])?;
+        let markers = markers(&self.body.mesh);
+        // Half a period of 0.23 s.
+        setup.at_rest(&loads, 27.0, |state| markers.drops(state)[LEFT])
     }
-    let offset = 0.5 * (before - after) / bend;
-    (b.0 + offset * 0.5 * (c.0 - a.0), here - 0.25 * (before - after) * offset)
 }

@@ -1,0 +1,90 @@
+//! The ways to take steps that are compared: exact ones at nine tenths of the critical step, damped ones far above it, and
+//! backward Euler at steps of milliseconds as most packages have it ([`implicit`]), which is of linear tetrahedra only.
+
+use std::boxed::Box;
+
+use super::body::Setup;
+use crate::element::ElementMaterial;
+use crate::inertia::{self, Cells, Damper, LargeStep};
+use crate::lab::{LabError, implicit, networks};
+use crate::loads::Loads;
+use crate::mlp::Network;
+use crate::state::VecState;
+use crate::step::{Status, Step};
+use crate::tled;
+
+/// A way to take steps.
+#[derive(Clone, Copy)]
+pub(super) struct Steps {
+    /// For the tables.
+    pub(super) name: &'static str,
+    pub(super) kind: Kind,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Kind {
+    Exact,
+    /// Steps over the critical one.
+    Damped(f32),
+    /// Steps in s.
+    BackwardEuler(f32),
+}
+
+pub(super) const EXACT: Steps = Steps { name: "exact", kind: Kind::Exact };
+pub(super) const DAMPED_20: Steps = Steps { name: "damped 20x", kind: Kind::Damped(20.0) };
+pub(super) const DAMPED_100: Steps = Steps { name: "damped 100x", kind: Kind::Damped(100.0) };
+/// A frame of 60 a second, and parts of it.
+pub(super) const BACKWARD_EULER: [Steps; 3] = [
+    Steps { name: "backward Euler 1 ms", kind: Kind::BackwardEuler(1e-3) },
+    Steps { name: "backward Euler 5 ms", kind: Kind::BackwardEuler(5e-3) },
+    Steps { name: "backward Euler 16.7 ms", kind: Kind::BackwardEuler(1.0 / 60.0) },
+];
+/// How shapes at rest are reached.
+pub(super) const TO_REST: [Steps; 2] = [EXACT, DAMPED_20];
+
+/// Share of the critical step that exact steps take: tissue stiffens on the way.
+const SAFETY: f32 = 0.9;
+
+/// Takes steps until a time, s.
+pub(super) type Advance<'a> = Box<dyn FnMut(&mut VecState, &Loads<'_>, f64) -> Result<(), LabError> + 'a>;
+
+impl<M: ElementMaterial> Setup<'_, M> {
+    /// What takes steps with `damping` (1/s) from a state, by the critical step there.
+    pub(super) fn advance(&self, state: &mut VecState, damping: f32) -> Result<Advance<'_>, LabError> {
+        let Self { case, scene, points, steps } = *self;
+        let taken = move |status| match status {
+            Status::Diverged(divergence) => Err(LabError::Diverged { scene: case, divergence }),
+            Status::Mismatch { nodes, room } => Err(LabError::Mismatch { nodes, room }),
+            Status::Ok | Status::Limited { .. } => Ok(()),
+        };
+        if let Kind::BackwardEuler(dt) = steps.kind {
+            let mut step = implicit::prepare(implicit::Rule::BackwardEuler, scene.view(), state, dt, damping);
+            return Ok(Box::new(move |state, loads, until| {
+                while state.time() < until {
+                    taken(step(state, loads)?.0)?;
+                }
+                Ok(())
+            }));
+        }
+        let critical = tled::critical_step(scene, state).ok_or(LabError::NoCriticalStep { scene: case })?;
+        let Kind::Damped(multiple) = steps.kind else {
+            let step = Step::unchecked(SAFETY * critical.seconds, damping)?;
+            return Ok(Box::new(move |state, loads, until| {
+                while state.time() < until {
+                    taken(tled::step(scene, loads, state, &step))?;
+                }
+                Ok(())
+            }));
+        };
+        let step = Step::unchecked(multiple * critical.seconds, damping)?;
+        let damper = Damper::new(Network::parse(networks::damper())?)?;
+        let method = inertia::Method::Damped(damper, Cells::Suggested);
+        let mut large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step)?;
+        Ok(Box::new(move |state, loads, until| {
+            while state.time() < until {
+                taken(large.step(scene.view(), loads, state.view()))?;
+            }
+            Ok(())
+        }))
+    }
+}
