@@ -1,5 +1,5 @@
-//! Time of an exact step on the paper's bar, compared with the same step in plain scalar code, and with nodal pressure compared
-//! with linear tetrahedra.
+//! Time of an exact step on the paper's bar, compared with the same step in plain scalar code, and of other elements compared with
+//! linear ones.
 //!
 //! `cargo bench --bench step` prints criterion's figures, then ratios from interleaved pairs of runs (the
 //! machine's speed drifts; the ratio does not) and the share of the machine's measured peak.
@@ -17,12 +17,12 @@ use common::plain::{self, Plain};
 use criterion::{BenchmarkId, Criterion, Throughput};
 use supple::element::{ElementLaw, ElementMaterial};
 use supple::loads::{Loads, NodalForce};
-use supple::material::{NeoHookean, NodalPressure, Tissue};
+use supple::material::{NeoHookean, NodalPressure, NodalStrain, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
-use supple::scene::VecScene;
+use supple::scene::{Support, VecScene};
 use supple::simd::Level;
 use supple::state::VecState;
-use supple::step::Step;
+use supple::step::{CriticalStep, Step};
 use supple::tled;
 
 struct Ours<M> {
@@ -35,12 +35,15 @@ struct Ours<M> {
 }
 
 impl<M: ElementMaterial> Ours<M> {
-    fn new(material: M) -> Self {
-        let scene = bar::scene_in(material);
+    fn new(scene: VecScene<M>) -> Self {
         let mut state = VecState::at_rest(scene.node_count());
         let critical = tled::critical_step(&scene, &mut state).expect("the bar has a critical step");
         let step = Step::new(DT, DAMPING, critical).expect("dt is below the critical step");
         Self { scene, state, forces: bar::forces(), step, critical: critical.seconds }
+    }
+
+    fn bound(&mut self) -> Option<CriticalStep> {
+        tled::critical_step(&self.scene, &mut self.state)
     }
 
     fn run(&mut self, steps: usize) {
@@ -70,7 +73,7 @@ fn compare<L: ElementLaw>(criterion: &mut Criterion, name: &str, law: L, plain_l
     let loads = bar::forces().map(|force| (force.node, force.newton));
     let fixed: Vec<u32> = HELD.collect();
     let mut plain = Plain::new(&mesh, plain_law, DENSITY, &fixed, &loads);
-    let mut ours = Ours::new(Tissue { law, density: DENSITY });
+    let mut ours = Ours::new(bar::scene(law));
     // Both are timed in a deformed state, and must agree on it.
     (0..2_000).for_each(|_| plain.step(DT, DAMPING, 1.0));
     ours.run(2_000);
@@ -111,21 +114,27 @@ fn compare<L: ElementLaw>(criterion: &mut Criterion, name: &str, law: L, plain_l
     );
 }
 
-/// Nodal pressure compared with linear tetrahedra, both in a deformed state.
-fn compare_elements<L: ElementLaw>(name: &str, law: L) {
-    let tissue = Tissue { law, density: DENSITY };
-    let (mut linear, mut nodal) = (Ours::new(tissue), Ours::new(NodalPressure(tissue)));
+/// Another element compared with linear tetrahedra, both in a deformed state.
+fn compare_elements<L: ElementLaw, M: ElementMaterial>(name: &str, law: L, other: impl Fn(Tissue<L>) -> M) {
+    let (points, tets): (Vec<_>, Vec<_>) = (bar::points(), Bar::PAPER.tets().collect());
+    let mesh = Mesh::new(&points, &tets, Winding::Checked).expect("the bar is sound");
+    let fixed: Vec<_> = HELD.map(Support::fixed).collect();
+    let scene = VecScene::build(other(Tissue { law, density: DENSITY }), &mesh, &fixed);
+    let (mut linear, mut other) = (Ours::new(bar::scene(law)), Ours::new(scene.expect("the bar is sound")));
     linear.run(2_000);
-    nodal.run(2_000);
-    let (ratio, linear_s, nodal_s) = pairs(|| nodal.run(50), || linear.run(50), 50);
-    let longer = nodal.critical / linear.critical;
+    other.run(2_000);
+    let (ratio, other_s, linear_s) = pairs(|| other.run(50), || linear.run(50), 50);
+    let critical_s = median((0..11).map(|_| seconds(|| assert!(other.bound().is_some()))).collect());
+    let longer = other.critical / linear.critical;
     let per_tet = |seconds: f64| seconds * 1e9 / Bar::PAPER.tets().count() as f64;
     println!(
-        "{name}: nodal pressure {:.1} ns/tet, {ratio:.2} times linear tetrahedra's {:.1}; safe step {longer:.2} times theirs, so \
-         a simulated second {:.2} times",
+        "{name}, {}: {:.1} ns/tet, {ratio:.2} times linear tetrahedra's {:.1}; safe step {longer:.2} times theirs, so a simulated second \
+         {:.2} times; critical step as long as {:.0} steps",
+        other.scene.view().element().name(),
+        per_tet(other_s),
         per_tet(linear_s),
-        per_tet(nodal_s),
         ratio / f64::from(longer),
+        critical_s / other_s,
     );
 }
 
@@ -138,7 +147,10 @@ fn main() {
         NeoHookean { c: 500.0, d: 15_000.0 },
         plain::Law::NeoHookean(500.0, 15_000.0),
     );
-    compare_elements("exponential", bar::EXPONENTIAL);
-    compare_elements("neo-Hookean", NeoHookean { c: 500.0, d: 15_000.0 });
+    let neo_hookean = NeoHookean { c: 500.0, d: 15_000.0 };
+    compare_elements("exponential", bar::EXPONENTIAL, NodalPressure);
+    compare_elements("neo-Hookean", neo_hookean, NodalPressure);
+    compare_elements("exponential", bar::EXPONENTIAL, NodalStrain);
+    compare_elements("neo-Hookean", neo_hookean, NodalStrain);
     criterion.final_summary();
 }

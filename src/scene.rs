@@ -9,8 +9,8 @@ use core::fmt;
 use core::ops::Deref;
 
 use crate::element::{
-    ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, VolumeRows,
-    element_fields, volume_energy_difference,
+    ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, Patches, VolumeRows,
+    element_fields, patch_energies, volume_energy_difference,
 };
 use crate::material::{Element, Law, Material, releasable_energy};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
@@ -19,6 +19,8 @@ use crate::mesh::{Mesh, MeshError, volume};
 use crate::simd::{NodeVector, TILE};
 
 pub use crate::element::Axes;
+#[cfg(any(feature = "std", test))]
+use crate::element::VecPatches;
 
 /// A node that does not move freely along some axes: it stands still, or follows a
 /// [`Motion`](crate::loads::Motion).
@@ -106,6 +108,8 @@ pub enum BuildError {
     },
     /// Every element has four fixed nodes, so nothing can move.
     NothingMoves,
+    /// Tetrahedra with nodal strain in a scene of a fixed capacity, which has no room for their patches.
+    NoPatches,
 }
 
 impl From<MeshError> for BuildError {
@@ -140,6 +144,9 @@ impl fmt::Display for BuildError {
             }
             Self::Density { element, value } => {
                 write!(f, "element {element}: density is {value} kg/m^3, it must be a finite positive number")
+            }
+            Self::NoPatches => {
+                write!(f, "a scene of a fixed capacity has no room for tetrahedra with nodal strain")
             }
             Self::NothingMoves => write!(f, "all nodes of all elements are fixed, so nothing can move"),
         }
@@ -206,7 +213,7 @@ impl SceneFacts {
         }
         nodes.fill(NodeInertia::EMPTY);
         mark_supports(nodes, supports)?;
-        if M::ELEMENT.is_nodal_pressure() {
+        if M::ELEMENT != Element::Linear {
             mark_neighbours(nodes, mesh);
         }
         let still = |tet: [u32; 4]| {
@@ -302,7 +309,7 @@ fn mark_supports(
     Ok(())
 }
 
-/// Marks the nodes of all elements that can move. With nodal pressure an element between fixed nodes is left out only if it has none of
+/// Marks the nodes of all elements that can move. With nodal pressure or strain an element between fixed nodes is left out only if it has none of
 /// these: it counts in the volume around them.
 fn mark_neighbours(nodes: &mut [NodeInertia], mesh: &Mesh<'_>) {
     for tet in mesh.tets() {
@@ -388,6 +395,8 @@ pub struct SceneView<'a, M> {
     pub(crate) material: &'a M,
     pub(crate) inertia: &'a [NodeInertia],
     pub(crate) tiles: &'a [ElementTile],
+    /// For materials with nodal strain.
+    pub(crate) patches: Patches<'a>,
     facts: &'a SceneFacts,
 }
 
@@ -420,8 +429,15 @@ impl<'a, M> SceneView<'a, M> {
             material,
             inertia: nodes.get(..facts.node_count).unwrap_or_default(),
             tiles: tiles.get(..facts.tile_count()).unwrap_or_default(),
+            patches: Patches::NONE,
             facts,
         }
+    }
+
+    /// Bytes of the patches of nodes that tetrahedra with nodal strain need.
+    #[must_use]
+    pub fn patch_bytes(&self) -> usize {
+        self.patches.bytes()
     }
 
     /// Places of the elements, tile and number in the tile, in the order of the tables.
@@ -486,6 +502,9 @@ impl<'a, M: Material> SceneView<'a, M> {
     /// Strain energy under the given displacements (m), J, with the nodes' volumes where the material needs them.
     pub(crate) fn strain_energy(self, displacement: &[NodeVector], volumes: &[NodeVector]) -> f64 {
         let (laws, volumes) = (self.material.laws(), self.volume_rows(volumes));
+        if M::ELEMENT.is_nodal_strain() {
+            return patch_energies(&laws, self.patches, self.places(), displacement);
+        }
         let energies = self.places().map(|(tile, lane)| {
             let law = laws.of(tile.element(lane));
             let fields = element_fields(&law, tile, lane, displacement);
@@ -519,6 +538,10 @@ impl<M: ElementMaterial> AsScene for SceneView<'_, M> {
 pub trait SceneTables {
     /// Nodes and tiles.
     fn tables(&self) -> (&[NodeInertia], &[ElementTile]);
+    /// Patches of materials with nodal strain.
+    fn patches(&self) -> Patches<'_> {
+        Patches::NONE
+    }
 }
 
 /// A scene that owns its tables.
@@ -541,7 +564,10 @@ impl<M, S: SceneTables> Scene<M, S> {
     /// The scene.
     pub fn view(&self) -> SceneView<'_, M> {
         let (nodes, tiles) = self.tables.tables();
-        SceneView::new(&self.material, nodes, tiles, &self.facts)
+        SceneView {
+            patches: self.tables.patches(),
+            ..SceneView::new(&self.material, nodes, tiles, &self.facts)
+        }
     }
 }
 
@@ -583,6 +609,9 @@ impl<M: Material, const N: usize, const T: usize> FixedScene<M, N, T> {
     pub fn build(&mut self, mesh: &Mesh<'_>, supports: &[Support]) -> Result<(), BuildError> {
         let Self { material, tables: FixedTables { nodes, tiles }, facts } = self;
         *facts = SceneFacts::EMPTY;
+        if M::ELEMENT.is_nodal_strain() {
+            return Err(BuildError::NoPatches);
+        }
         // All of it: what is too little is told with what is needed.
         let _ = nodes.resize(N, NodeInertia::EMPTY);
         let _ = tiles.resize(T, ElementTile::EMPTY);
@@ -599,12 +628,17 @@ impl<M: Material, const N: usize, const T: usize> FixedScene<M, N, T> {
 pub struct VecTables {
     nodes: std::vec::Vec<NodeInertia>,
     tiles: std::vec::Vec<ElementTile>,
+    patches: VecPatches,
 }
 
 #[cfg(any(feature = "std", test))]
 impl SceneTables for VecTables {
     fn tables(&self) -> (&[NodeInertia], &[ElementTile]) {
         (&self.nodes, &self.tiles)
+    }
+
+    fn patches(&self) -> Patches<'_> {
+        self.patches.view()
     }
 }
 
@@ -620,7 +654,12 @@ impl<M: Material> VecScene<M> {
         let mut tiles = std::vec![ElementTile::EMPTY; tiles_for(mesh.element_count())];
         let facts = SceneFacts::build(&material, mesh, supports.iter().copied(), &mut nodes, &mut tiles)?;
         tiles.truncate(facts.tile_count());
-        Ok(Self { material, tables: VecTables { nodes, tiles }, facts })
+        let patches = if M::ELEMENT.is_nodal_strain() {
+            VecPatches::build(nodes.len(), &tiles, &facts.partitions, |element| material.region(element))
+        } else {
+            VecPatches::none()
+        };
+        Ok(Self { material, tables: VecTables { nodes, tiles, patches }, facts })
     }
 }
 

@@ -9,7 +9,7 @@ use core::ops::Deref;
 
 use crate::element::Extremes;
 use crate::energy_balance::EnergyBalance;
-use crate::material::Material;
+use crate::material::{Element, Material};
 pub use crate::simd::NodeVector;
 
 /// How far a simulation has come, apart from its vectors.
@@ -131,7 +131,7 @@ impl<'a> StateView<'a> {
 
     /// How many nodes of a scene of this material the vectors hold.
     pub(crate) fn capacity_for<M: Material>(&self) -> usize {
-        let volumes = if M::ELEMENT.is_nodal_pressure() { self.volume.len() } else { usize::MAX };
+        let volumes = if M::ELEMENT == Element::Linear { usize::MAX } else { self.volume.len() };
         self.capacity().min(volumes)
     }
 

@@ -1,6 +1,6 @@
 //! The paper's bar with twisting forces at its free corners, as every bench has it.
 
-use supple::element::{ElementLaw, ElementMaterial};
+use supple::element::ElementLaw;
 use supple::loads::NodalForce;
 use supple::material::{Exponential, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
@@ -23,15 +23,8 @@ pub(crate) fn points() -> Vec<[f32; 3]> {
 }
 
 pub(crate) fn scene<L: ElementLaw>(law: L) -> BarScene<L> {
-    scene_in(Tissue { law, density: DENSITY })
-}
-
-/// In tetrahedra of either kind.
-pub(crate) fn scene_in<M: ElementMaterial>(material: M) -> VecScene<M> {
     let fixed: Vec<_> = HELD.map(Support::fixed).collect();
-    let (points, tets) = (points(), Bar::PAPER.tets().collect::<Vec<_>>());
-    let mesh = Mesh::new(&points, &tets, Winding::Checked).expect("the bar is sound");
-    VecScene::build(material, &mesh, &fixed).expect("the bar is sound")
+    scene_of(law, &points(), &Bar::PAPER.tets().collect::<Vec<_>>(), &fixed)
 }
 
 pub(crate) fn scene_of<L: ElementLaw>(

@@ -253,6 +253,8 @@ impl From<BuildError> for supple_error {
             BuildError::Density { element, value } => {
                 is(SUPPLE_E_DENSITY).at(element).value(value.into(), 0.0)
             }
+            // No scene of this interface is of nodal strain.
+            BuildError::NoPatches => is(SUPPLE_E_CHOICE),
             BuildError::NothingMoves => is(SUPPLE_E_NOTHING_MOVES),
         }
     }
@@ -348,6 +350,7 @@ impl From<InertiaError> for supple_error {
             InertiaError::Cells { .. } | InertiaError::Functions { .. } | InertiaError::Singular { .. } => {
                 is(SUPPLE_E_LATTICE)
             }
+            InertiaError::NodalStrain => is(SUPPLE_E_CHOICE),
             InertiaError::Points { points, nodes } => mismatch(points, nodes),
             InertiaError::NotFinite { node } => is(SUPPLE_E_TOO_STIFF).node(node),
         }

@@ -66,16 +66,16 @@ impl NodeMatrices<'_> {
 
     /// Adds matrices to the nodes at the corners of a vector of elements.
     #[inline(always)]
-    pub(super) fn add_corners<R: Real>(
+    pub(super) fn add_corners<R: Real, const N: usize>(
         &mut self,
-        nodes: &TileNodes<'_, 4>,
+        nodes: &TileNodes<'_, N>,
         first: usize,
-        matrices: [Symmetric<R>; 4],
-        [first_four_buffer, fifth_buffer, sixth_buffer]: &mut [ScatterBuffer<4>; 3],
+        matrices: [Symmetric<R>; N],
+        [first_four_buffer, fifth_buffer, sixth_buffer]: &mut [ScatterBuffer<N>; 3],
     ) {
         let zero = R::splat(0.0);
-        let (mut first_four, mut fifth, mut sixth) = ([[zero; 4]; 4], [[zero; 4]; 4], [[zero; 4]; 4]);
-        for corner in 0..4 {
+        let (mut first_four, mut fifth, mut sixth) = ([[zero; 4]; N], [[zero; 4]; N], [[zero; 4]; N]);
+        for corner in 0..N {
             let Symmetric { xx, yy, zz, xy, yz, zx } = matrices[corner];
             first_four[corner] = [xx, yy, zz, xy];
             (fifth[corner][3], sixth[corner][3]) = (yz, zx);
@@ -212,17 +212,18 @@ fn add_bounds<R: Real, L: Law, P: Pressure>(
 }
 
 /// Magnitudes of the terms of the tangent, Pa.
-struct Terms<R> {
-    p1: R,
-    p_j: R,
-    stiffening: R,
+#[derive(Clone, Copy)]
+pub(super) struct Terms<R> {
+    pub(super) p1: R,
+    pub(super) p_j: R,
+    pub(super) stiffening: R,
     /// Factor of `(C:dF)^2`, its part of the coupling included.
-    volume: R,
+    pub(super) volume: R,
     /// Factor of `(E:dF)^2`: the other part of the coupling.
-    coupling: R,
+    pub(super) coupling: R,
     /// Factors in `X = x_f F + x_c C`.
-    x_f: R,
-    x_c: R,
+    pub(super) x_f: R,
+    pub(super) x_c: R,
 }
 
 /// The image of a shape function gradient under a matrix: the vector, its length and the inverse of the length.
@@ -234,7 +235,7 @@ pub(super) struct Image<R> {
 
 impl<R: Real> Image<R> {
     #[inline(always)]
-    fn new(vector: Vector<R>) -> Self {
+    pub(super) fn new(vector: Vector<R>) -> Self {
         let length = dot(vector, vector).sqrt();
         let inverse = R::splat(1.0).divide(length + R::splat(f32::MIN_POSITIVE));
         Self { vector, length, inverse }
@@ -290,7 +291,7 @@ impl<R: Real> Images<R> {
 
 impl<R: Real> Terms<R> {
     #[inline(always)]
-    fn new<L: Law>(law: &L::Wide<R>, local: &LawState<R>, deformation: &Deformation<R>) -> Self {
+    pub(super) fn new<L: Law>(law: &L::Wide<R>, local: &LawState<R>, deformation: &Deformation<R>) -> Self {
         let at = deformation.invariants;
         let (zero, two) = (R::splat(0.0), R::splat(2.0));
         let (slope, [g, dg, ddg]) = (local.slope, local.volume_factor());

@@ -3,10 +3,9 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{ElementTile, VolumeRows};
-#[cfg(feature = "std")]
-use crate::material::Potential;
-use crate::material::{Invariants, Law, energy_density, response};
+use super::patch_forces::STABILISATION;
+use super::{ElementTile, Patches, VolumeRows};
+use crate::material::{Invariants, Law, Laws, Potential, energy_density, response};
 use crate::simd::NodeVector;
 
 /// State of one element.
@@ -18,8 +17,33 @@ pub struct ElementFields {
     pub volume_ratio: f64,
     /// Von Mises stress of the Cauchy stress `P F^T / J`, Pa; NaN for an element without positive volume.
     pub von_mises: f64,
-    /// Strain energy, J.
+    /// Strain energy of its own deformation, J. With nodal strain the body's energy is that of its nodes
+    /// ([`crate::tled::strain_energy`]).
     pub energy: f64,
+}
+
+/// The displacement gradient of the element at place `lane` of a tile, from the displacements of nodes.
+fn gradient_of(tile: &ElementTile, lane: usize, at: impl Fn(usize) -> DVec3) -> DMat3 {
+    let mut h = DMat3::ZERO;
+    for corner in 0..3 {
+        let gradient =
+            DVec3::from_array([0, 1, 2].map(|axis| f64::from(tile.gradient_of(corner, axis, lane))));
+        let along = at(tile.node(corner + 1, lane)) - at(tile.node(0, lane));
+        h += DMat3::from_cols(along * gradient.x, along * gradient.y, along * gradient.z);
+    }
+    h
+}
+
+/// `I1 - 3`, `J - 1` and `H:H` of a displacement gradient `H`.
+pub(crate) fn invariants(h: DMat3) -> (f64, f64, f64) {
+    let trace = h.x_axis.x + h.y_axis.y + h.z_axis.z;
+    let square = h.x_axis.length_squared() + h.y_axis.length_squared() + h.z_axis.length_squared();
+    // Sum of the principal minors of H, so that J - 1 keeps its digits at small strain.
+    let minors = h.x_axis.x * h.y_axis.y - h.x_axis.y * h.y_axis.x + h.y_axis.y * h.z_axis.z
+        - h.y_axis.z * h.z_axis.y
+        + h.x_axis.x * h.z_axis.z
+        - h.x_axis.z * h.z_axis.x;
+    (2.0 * trace + square, trace + minors + h.determinant(), square)
 }
 
 /// Fields of the element at place `lane` of a tile, under the given displacements (m).
@@ -29,26 +53,13 @@ pub(crate) fn element_fields<L: Law>(
     lane: usize,
     displacement: &[NodeVector],
 ) -> ElementFields {
-    let at = |corner: usize| {
-        let [x, y, z] = displacement.get(tile.node(corner, lane)).copied().unwrap_or_default().to_array();
+    let at = |node: usize| {
+        let [x, y, z] = displacement.get(node).copied().unwrap_or_default().to_array();
         DVec3::new(f64::from(x), f64::from(y), f64::from(z))
     };
-    let mut h = DMat3::ZERO;
-    for corner in 0..3 {
-        let gradient =
-            DVec3::from_array([0, 1, 2].map(|axis| f64::from(tile.gradient::<f32>(corner, axis, lane))));
-        let along = at(corner + 1) - at(0);
-        h += DMat3::from_cols(along * gradient.x, along * gradient.y, along * gradient.z);
-    }
+    let h = gradient_of(tile, lane, at);
     let f = DMat3::IDENTITY + h;
-    let trace = h.x_axis.x + h.y_axis.y + h.z_axis.z;
-    let square = h.x_axis.length_squared() + h.y_axis.length_squared() + h.z_axis.length_squared();
-    // Sum of the principal minors of H, so that J - 1 keeps its digits at small strain.
-    let minors = h.x_axis.x * h.y_axis.y - h.x_axis.y * h.y_axis.x + h.y_axis.y * h.z_axis.z
-        - h.y_axis.z * h.z_axis.y
-        + h.x_axis.x * h.z_axis.z
-        - h.x_axis.z * h.z_axis.x;
-    let (i, j) = (2.0 * trace + square, trace + minors + h.determinant());
+    let (i, j, _) = invariants(h);
     let energy = energy_density(law, i, j) * f64::from(tile.volume::<f32>(lane));
 
     // The deviator of P F^T needs only p1 F F^T: cof(F) F^T = J I.
@@ -96,4 +107,35 @@ pub(crate) fn volume_energy_difference<L: Law>(
         change.map_or(0.0, |change| law.energy(0.0, f64::from(change)) - own)
     });
     0.25 * f64::from(tile.volume::<f32>(lane)) * corners.sum::<f64>()
+}
+
+/// Modulus of the stabilising energy of nodal strain, `s mu`, Pa, with the shear modulus `mu = 2 W'(0)` at rest.
+pub(crate) fn stabilising_modulus<L: Law>(law: &L) -> f64 {
+    2.0 * f64::from(STABILISATION) * f64::from(L::widen::<f32>(|_| *law).distortion_slope(0.0))
+}
+
+/// Strain energy of tetrahedra with nodal strain, J ([`super::patch_forces`]), of the elements at `places`.
+pub(crate) fn patch_energies<'a, L: Law>(
+    laws: &Laws<'_, L>,
+    patches: Patches<'_>,
+    places: impl Iterator<Item = (&'a ElementTile, usize)>,
+    displacement: &[NodeVector],
+) -> f64 {
+    let at = |node: usize| {
+        let [x, y, z] = displacement.get(node).copied().unwrap_or_default().to_array();
+        DVec3::new(f64::from(x), f64::from(y), f64::from(z))
+    };
+    let stabilising = |law: &L| 0.5 * stabilising_modulus(law);
+    let mut energy = 0.0;
+    for (tile, lane) in patches.places() {
+        let law = laws.of(tile.element(lane));
+        let h = tile.gradient(patches.neighbours_of(tile), lane, at);
+        let (i, j, square) = invariants(h);
+        energy += tile.volume(lane) * (energy_density(&law, i, j) - stabilising(&law) * square);
+    }
+    for (tile, lane) in places {
+        let (_, _, square) = invariants(gradient_of(tile, lane, at));
+        energy += f64::from(tile.volume::<f32>(lane)) * stabilising(&laws.of(tile.element(lane))) * square;
+    }
+    energy
 }

@@ -2,13 +2,13 @@
 //! generic, so that no other crate compiles them again. Each is linked only where it is used.
 
 #[cfg(any(feature = "std", test))]
-use crate::material::{AnyLaw, Element, Exponential, Literal, NeoHookean, NodalPressure};
+use crate::material::{AnyLaw, Element, Exponential, Literal, NeoHookean, NodalPressure, NodalStrain};
 use crate::material::{Law, for_each_law};
 use crate::simd::{NodeVector, dispatch};
 
 use super::{
-    CriticalBounds, ElementMaterial, Extremes, InternalForces, MeanPressure, NoVisitor, ScalarBound,
-    TileBounds, TileTangents,
+    CriticalBounds, ElementMaterial, Extremes, InternalForces, MeanPressure, NoVisitor, PatchBounds,
+    PatchForces, ScalarBound, TileBounds, TileTangents,
 };
 
 /// A law with its kernels.
@@ -27,6 +27,12 @@ pub trait ElementLaw: Law {
     fn nodal_pressure_forces_and_bounds(
         kernel: InternalForces<'_, Self, ScalarBound, MeanPressure<'_>>,
     ) -> Extremes<f32>;
+    /// Internal forces with nodal strain.
+    #[doc(hidden)]
+    fn patch_forces(kernel: PatchForces<'_, Self>) -> Extremes<f32>;
+    /// Bounds for the critical step with nodal strain.
+    #[doc(hidden)]
+    fn patch_bounds(kernel: PatchBounds<'_, '_, Self>);
     /// Bounds for the critical step.
     #[doc(hidden)]
     fn critical_bounds(kernel: CriticalBounds<'_, '_, Self>);
@@ -104,6 +110,14 @@ macro_rules! kernels {
                     dispatch(kernel)
                 }
                 #[inline(never)]
+                fn patch_forces(kernel: PatchForces<'_, Self>) -> Extremes<f32> {
+                    dispatch(kernel)
+                }
+                #[inline(never)]
+                fn patch_bounds(kernel: PatchBounds<'_, '_, Self>) {
+                    dispatch(kernel);
+                }
+                #[inline(never)]
                 fn critical_bounds(kernel: CriticalBounds<'_, '_, Self>) {
                     dispatch(kernel);
                 }
@@ -177,5 +191,6 @@ pub fn with_element<M: ElementMaterial, W: MaterialWork>(
     match element {
         Element::Linear => work.run(material),
         Element::NodalPressure => work.run(NodalPressure(material)),
+        Element::NodalStrain => work.run(NodalStrain(material)),
     }
 }

@@ -1,7 +1,8 @@
-//! Tetrahedra with linear displacements (T4), their pressure from their own volume or from the volumes around their nodes
-//! ([`crate::material::NodalPressure`]): their tables, deformation, internal forces, bounds of their tangent stiffness, and what they tell
-//! about themselves. Loops over elements are written once, for any law and any instruction-set level ([`crate::simd`]); they are
-//! compiled for each law of the list (`kernels.rs`), and linked only where a scene uses that law.
+//! Tetrahedra with linear displacements (T4): stress and pressure from each element's own deformation, with the pressure of the volumes
+//! around its nodes ([`crate::material::NodalPressure`]), or all from the mean strain around nodes ([`crate::material::NodalStrain`]).
+//! Their tables, deformation, internal forces, bounds of their tangent stiffness, and what they tell about themselves. Loops over
+//! elements are written once, for any law and any instruction-set level ([`crate::simd`]); they are compiled for each law of the list
+//! (`kernels.rs`), and linked only where a scene uses that law.
 
 mod critical_bounds;
 mod deformation;
@@ -11,6 +12,9 @@ mod kernels;
 mod nodal_volume;
 mod nodal_volume_bounds;
 mod node;
+mod patch;
+mod patch_bounds;
+mod patch_forces;
 mod pressure;
 mod stiffness_bound;
 #[cfg(test)]
@@ -25,16 +29,21 @@ pub(crate) use kernels::{ForcesVisitor, tile_bounds};
 #[cfg(any(feature = "std", test))]
 pub use kernels::{LawWork, MaterialWork, with_element, with_law};
 pub use node::{Axes, NodeInertia};
+#[cfg(any(feature = "std", test))]
+pub use patch::VecPatches;
+pub use patch::{Neighbours, PatchLayout, PatchTile, Patches};
+pub(crate) use patch_bounds::PatchBounds;
+pub(crate) use patch_forces::PatchForces;
 pub use tile::ElementTile;
 pub(crate) use tile::MOST_ELEMENTS;
 
 pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
+pub(crate) use fields::{element_fields, patch_energies, volume_energy_difference};
 #[cfg(feature = "std")]
-pub(crate) use fields::pressure_at;
-pub(crate) use fields::{element_fields, volume_energy_difference};
+pub(crate) use fields::{invariants, pressure_at, stabilising_modulus};
 pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};
 pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes, VolumeRows};
-pub(crate) use nodal_volume_bounds::NodalVolumeBounds;
+pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};
 pub(crate) use stiffness_bound::{MatrixSums, ScalarBound};
 pub(crate) use tile_bounds::{TileBounds, TileTangents};

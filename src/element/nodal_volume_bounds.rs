@@ -73,25 +73,25 @@ impl NodalVolumeBounds<'_> {
         self.pass(Pass::Matrices, sums);
     }
 
-    /// Weighs a node by the largest eigenvalue of its matrix.
-    pub(crate) fn weigh(&mut self, node: usize, rate: f32) {
-        if let Some(row) = self.rows.get_mut(node) {
-            row.0[0] *= rate;
-        }
-    }
-
-    /// Divides the weights by the largest eigenvalue.
-    pub(crate) fn balance(&mut self, largest: f32) {
-        for row in &mut *self.rows {
-            let share = row.0[0] / largest;
-            // Not a number where nothing moves.
-            row.0[0] = if share > LEAST_WEIGHT { share.min(1.0) } else { LEAST_WEIGHT };
-        }
-    }
-
     #[inline(never)]
     fn pass(&self, pass: Pass, sums: &mut NodeMatrices<'_>) {
         dispatch(OnePass { pass, tiles: self.tiles, inertia: self.inertia, rows: self.rows, sums });
+    }
+}
+
+/// Weighs a node by the largest eigenvalue of its matrix; weights are the first numbers of the nodes' rows.
+pub(crate) fn weigh(rows: &mut [NodeVector], node: usize, rate: f32) {
+    if let Some(row) = rows.get_mut(node) {
+        row.0[0] *= rate;
+    }
+}
+
+/// Divides the weights by the largest eigenvalue.
+pub(crate) fn balance(rows: &mut [NodeVector], largest: f32) {
+    for row in rows {
+        let share = row.0[0] / largest;
+        // Not a number where nothing moves.
+        row.0[0] = if share > LEAST_WEIGHT { share.min(1.0) } else { LEAST_WEIGHT };
     }
 }
 

@@ -168,7 +168,7 @@ impl ElementTile {
 
 /// The vector of values from place `first` of a row of a tile on.
 #[inline(always)]
-fn vector_at<R: Real>(row: &[f32; TILE], first: usize) -> R {
+pub(super) fn vector_at<R: Real>(row: &[f32; TILE], first: usize) -> R {
     // `first` is a multiple of the width already. This shows the compiler that no index is out of range.
     let vectors = (TILE / R::COUNT).max(1);
     let first = first / R::COUNT % vectors * R::COUNT;

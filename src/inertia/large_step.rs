@@ -382,6 +382,9 @@ fn checked_grid<M: ElementMaterial>(
     scene: SceneView<'_, M>,
     points: &[[f32; 3]],
 ) -> Result<Grid, InertiaError> {
+    if M::ELEMENT.is_nodal_strain() {
+        return Err(InertiaError::NodalStrain);
+    }
     let nodes = scene.node_count();
     if points.len() != nodes {
         return Err(InertiaError::Points { points: points.len(), nodes });

@@ -150,6 +150,8 @@ const LATTICE_CYCLE_STEPS: u32 = 256;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum InertiaError {
+    /// Tetrahedra with nodal strain, whose stiffness these steps do not know.
+    NodalStrain,
     /// Less memory than the scene or the lattice needs.
     Capacity {
         /// "vectors" or "nodes in the state".
@@ -191,6 +193,11 @@ pub enum InertiaError {
 impl fmt::Display for InertiaError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
+            Self::NodalStrain => write!(
+                f,
+                "tetrahedra with nodal strain take exact steps only; mass-scaled, multilevel and damped ones need \"nodal-pressure\" or \
+                 \"linear\""
+            ),
             Self::Capacity { kind, needed, capacity } => {
                 write!(f, "the inertia needs {needed} {kind}, there is room for {capacity}")
             }

@@ -55,7 +55,7 @@ pub use moduli::Moduli;
 pub(crate) use response::VolumeFactor;
 pub use response::{Invariants, Response};
 pub(crate) use response::{LawState, energy_density, releasable_energy, response, response_operations};
-pub use tissue::{Element, Laws, Material, NodalPressure, Regions, Tissue};
+pub use tissue::{Element, Laws, Material, NodalPressure, NodalStrain, Regions, Tissue};
 
 use crate::simd::Real;
 

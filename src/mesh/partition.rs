@@ -74,9 +74,14 @@ impl Partitions {
         strips(elements, move |nodes| partitions.span(nodes))
     }
 
+    /// The partition of a node.
+    pub(crate) fn of_node(&self, node: usize) -> usize {
+        node.checked_div(self.size).unwrap_or(0)
+    }
+
     /// First and last partition of an element's nodes.
     fn span(&self, nodes: [u32; 4]) -> (usize, usize) {
-        let partitions = nodes.map(|node| (node as usize).checked_div(self.size).unwrap_or(0));
+        let partitions = nodes.map(|node| self.of_node(node as usize));
         partitions
             .into_iter()
             .fold((usize::MAX, 0), |(first, last), partition| (first.min(partition), last.max(partition)))

@@ -5,13 +5,13 @@ use core::array::from_fn;
 use core::ops::Range;
 
 use crate::element::{
-    ElementMaterial, Extremes, ForcesVisitor, InternalForces, MeanPressure, NodalVolumes, NodeInertia,
-    OwnPressure,
+    ElementLaw, ElementMaterial, Extremes, ForcesVisitor, InternalForces, MeanPressure, NodalVolumes,
+    NodeInertia, OwnPressure, PatchForces,
 };
 use crate::loads::{Loads, ramp_factor};
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
 use crate::scene::SceneView;
-use crate::simd::NodeVector;
+use crate::simd::{NodeVector, Scatter};
 
 use super::threads::{Threads, take};
 
@@ -126,7 +126,11 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     visitor: V,
 ) -> Extremes<f32> {
     let elements = scene.elements();
-    if M::ELEMENT.is_nodal_pressure() {
+    if M::ELEMENT.is_nodal_strain() {
+        let force = Scatter::from(elements.partitions.nodes(&partitions).start, force);
+        let (laws, patches) = (elements.laws, scene.patches);
+        M::Law::patch_forces(PatchForces { laws, patches, partitions, displacement, force })
+    } else if M::ELEMENT.is_nodal_pressure() {
         let pressure = MeanPressure::new(scene.volume_rows(volumes));
         let kernel =
             InternalForces::of_partitions(elements, pressure, partitions, displacement, force, visitor);

@@ -100,6 +100,9 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
 /// Floating-point operations of the internal forces.
 #[must_use]
 pub fn element_operations<M: Material>(scene: SceneView<'_, M>) -> u64 {
+    if M::ELEMENT.is_nodal_strain() {
+        return scene.patches.operations::<M::Law>();
+    }
     let nodal = if M::ELEMENT.is_nodal_pressure() { element::NODAL_PRESSURE_OPERATIONS } else { 0 };
     scene.element_count() as u64 * u64::from(element::operations::<M::Law>() + nodal)
 }

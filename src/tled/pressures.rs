@@ -4,8 +4,12 @@
 use std::vec;
 use std::vec::Vec;
 
-use crate::element::{ElementMaterial, element_fields, pressure_at};
+use glam::DVec3;
+
+use crate::element::{ElementMaterial, element_fields, invariants, pressure_at};
+use crate::material::{Law, Potential};
 use crate::scene::{AsScene, SceneView};
+use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::{CallingThread, nodal_volumes};
 
@@ -24,6 +28,10 @@ fn nodal_pressures_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateV
     nodal_volumes(scene, state.displacement, state.volume, &CallingThread);
     let volumes = M::ELEMENT.is_nodal_pressure().then(|| scene.volume_rows(state.volume));
     let mut sums = vec![(0.0, 0.0); nodes];
+    if M::ELEMENT.is_nodal_strain() {
+        add_patches(scene, state.displacement, &mut sums);
+        return Some(means(sums));
+    }
     for (tile, lane, law) in scene.laws_at_places() {
         let volume = f64::from(tile.volume::<f32>(lane));
         let ratio = element_fields(&law, tile, lane, state.displacement).volume_ratio;
@@ -34,6 +42,28 @@ fn nodal_pressures_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateV
             }
         }
     }
+    Some(means(sums))
+}
+
+fn means(sums: Vec<(f64, f64)>) -> Vec<f32> {
     let mean = |(sum, weight): (f64, f64)| if weight > 0.0 { (sum / weight) as f32 } else { 0.0 };
-    Some(sums.into_iter().map(mean).collect())
+    sums.into_iter().map(mean).collect()
+}
+
+/// Adds pressures and volumes of the patches of nodal strain to their nodes.
+fn add_patches<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    displacement: &[NodeVector],
+    sums: &mut [(f64, f64)],
+) {
+    let laws = scene.material.laws();
+    let at = |node: usize| DVec3::from_array(displacement[node].to_array().map(f64::from));
+    for (tile, lane) in scene.patches.places() {
+        let law = M::Law::widen::<f32>(|_| laws.of(tile.element(lane)));
+        let h = tile.gradient(scene.patches.neighbours_of(tile), lane, at);
+        let pressure = -f64::from(law.volume_slope(invariants(h).1 as f32));
+        let (sum, weight) = &mut sums[tile.node(lane)];
+        *sum += tile.volume(lane) * pressure;
+        *weight += tile.volume(lane);
+    }
 }

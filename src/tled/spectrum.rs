@@ -8,7 +8,8 @@ use std::vec::Vec;
 
 use glam::DVec3;
 
-use super::tangent::ElementTangent;
+use super::tangent::{ElementTangent, LawTangent};
+use crate::element::stabilising_modulus;
 use crate::material::{Law, Material, Potential};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
@@ -29,6 +30,8 @@ pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &
         Some(nodal) => nodal.with_pressures(tangents),
         None => tangents,
     };
+    let strain =
+        if M::ELEMENT.is_nodal_strain() { Some(PatchTangents::new(scene, displacement)) } else { None };
     let roots: Vec<DVec3> = scene
         .inertia
         .iter()
@@ -36,14 +39,17 @@ pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &
         .collect();
     let product = |vector: &[DVec3]| {
         let mut out = vec![DVec3::ZERO; vector.len()];
-        for tangent in &tangents {
-            let products = tangent.product(tangent.nodes.map(|node| roots[node] * vector[node]));
-            for (&node, product) in tangent.nodes.iter().zip(products) {
-                out[node] += product;
+        let at = |node: usize| roots[node] * vector[node];
+        match &strain {
+            Some(strain) => strain.add(scene, &tangents, at, &mut out),
+            None => {
+                for tangent in &tangents {
+                    add_to_nodes(tangent, tangent.product(tangent.nodes.map(at)), &mut out);
+                }
             }
         }
         if let Some(nodal) = &nodal {
-            nodal.add(&tangents, |node| roots[node] * vector[node], &mut out);
+            nodal.add(&tangents, at, &mut out);
         }
         for (sum, root) in out.iter_mut().zip(&roots) {
             *sum *= *root;
@@ -84,7 +90,7 @@ impl NodalTangent {
         for (tangent, entries) in tangents.iter().zip(&entries) {
             for &entry in entries {
                 volumes[entry] += tangent.quarter();
-                changes[entry] += tangent.quarter() * tangent.change;
+                changes[entry] += tangent.quarter() * tangent.at.change;
             }
         }
         for (change, volume) in changes.iter_mut().zip(&volumes) {
@@ -125,9 +131,55 @@ impl NodalTangent {
                 .zip(curvatures)
                 .map(|(&entry, curvature)| 0.25 * curvature * changes[entry])
                 .sum();
-            for (&node, force) in tangent.nodes.iter().zip(tangent.forces_of(pressure)) {
-                out[node] += force;
-            }
+            add_to_nodes(tangent, tangent.forces_of(pressure), out);
+        }
+    }
+}
+
+fn add_to_nodes(tangent: &ElementTangent, forces: [DVec3; 4], out: &mut [DVec3]) {
+    for (&node, force) in tangent.nodes.iter().zip(forces) {
+        out[node] += force;
+    }
+}
+
+/// Tangents of the patches of nodal strain and of its stabilising energy ([`crate::element`]).
+struct PatchTangents {
+    patches: Vec<LawTangent>,
+    /// `s mu`, Pa, of each element.
+    moduli: Vec<f64>,
+}
+
+impl PatchTangents {
+    fn new<M: Material>(scene: SceneView<'_, M>, displacement: &[NodeVector]) -> Self {
+        let laws = scene.material.laws();
+        let at = |node: usize| DVec3::from_array(displacement[node].to_array().map(f64::from));
+        let patches = scene.patches.places().map(|(tile, lane)| {
+            let h = tile.gradient(scene.patches.neighbours_of(tile), lane, at);
+            LawTangent::new(&laws.of(tile.element(lane)), h)
+        });
+        let moduli = scene.places().map(|(tile, lane)| stabilising_modulus(&laws.of(tile.element(lane))));
+        Self { patches: patches.collect(), moduli: moduli.collect() }
+    }
+
+    /// Adds the products with displacements (m) of the nodes, N.
+    fn add<M: Material>(
+        &self,
+        scene: SceneView<'_, M>,
+        tangents: &[ElementTangent],
+        at: impl Fn(usize) -> DVec3 + Copy,
+        out: &mut [DVec3],
+    ) {
+        let laws = scene.material.laws();
+        for ((tile, lane), tangent) in scene.patches.places().zip(&self.patches) {
+            let neighbours = scene.patches.neighbours_of(tile);
+            let change = tile.gradient(neighbours, lane, at);
+            let modulus = stabilising_modulus(&laws.of(tile.element(lane)));
+            let stress = tangent.stress_by(change) - change * modulus;
+            tile.each_gradient(neighbours, lane, |node, gradient| out[node] += stress * gradient);
+        }
+        for (tangent, modulus) in tangents.iter().zip(&self.moduli) {
+            let stress = tangent.gradient_by(tangent.nodes.map(at)) * *modulus;
+            add_to_nodes(tangent, tangent.forces_of_stress(stress), out);
         }
     }
 }

@@ -16,6 +16,11 @@ pub(crate) struct ElementTangent {
     pub(crate) nodes: [usize; 4],
     gradients: [DVec3; 4],
     volume: f64,
+    pub(super) at: LawTangent,
+}
+
+/// The stress of a law at a deformation gradient, and the derivative of it.
+pub(super) struct LawTangent {
     f: DMat3,
     cofactor: DMat3,
     /// `p1`, `pJ`, `W''`, `2 W' g'`, `U'' + W' g'' I1`.
@@ -65,6 +70,84 @@ impl ElementTangent {
         for (&node, gradient) in nodes.iter().zip(gradients) {
             h += outer(displacement(node), gradient);
         }
+        let volume = f64::from(tile.volume::<f32>(lane));
+        Self { nodes, gradients, volume, at: LawTangent::new(law, h) }
+    }
+
+    /// The same with another pressure `U'`, Pa, and without the stiffness of its change.
+    pub(super) fn with_pressure(mut self, pressure: f64) -> Self {
+        self.at.p_j += pressure - self.at.volume_slope;
+        self.at.bulk -= self.at.volume_curvature;
+        self
+    }
+
+    /// A quarter of the volume, m^3.
+    pub(super) fn quarter(&self) -> f64 {
+        0.25 * self.volume
+    }
+
+    /// Change of `J` with displacements `v` (m) of its nodes.
+    pub(super) fn change_by(&self, vector: [DVec3; 4]) -> f64 {
+        self.gradients
+            .iter()
+            .zip(vector)
+            .map(|(gradient, vector)| (self.at.cofactor * *gradient).dot(vector))
+            .sum()
+    }
+
+    /// Forces (N) on its nodes, with minus sign, from a pressure (Pa).
+    pub(super) fn forces_of(&self, pressure: f64) -> [DVec3; 4] {
+        self.gradients.map(|gradient| self.at.cofactor * gradient * (pressure * self.volume))
+    }
+
+    /// Change of the displacement gradient with displacements `v` (m) of its nodes.
+    pub(super) fn gradient_by(&self, vector: [DVec3; 4]) -> DMat3 {
+        vector.into_iter().zip(self.gradients).fold(DMat3::ZERO, |sum, (v, g)| sum + outer(v, g))
+    }
+
+    /// Forces (N) on its nodes, with minus sign, from a stress (Pa).
+    pub(super) fn forces_of_stress(&self, stress: DMat3) -> [DVec3; 4] {
+        self.gradients.map(|gradient| stress * gradient * self.volume)
+    }
+
+    /// Forces with which the element acts on its nodes, N.
+    #[cfg(any(feature = "lab", test))]
+    pub(crate) fn forces(&self) -> [DVec3; 4] {
+        self.forces_of_stress(-self.at.stress())
+    }
+
+    /// `K v`, N, for displacements `v` (m) of its nodes.
+    pub(crate) fn product(&self, vector: [DVec3; 4]) -> [DVec3; 4] {
+        self.forces_of_stress(self.at.stress_by(self.gradient_by(vector)))
+    }
+
+    /// The parts of `K`, N/m, by rows and columns of nodes. With `a = F g`, `c = C g`, `y = x_f a + x_c c` for the gradient `g` of each
+    /// node: `p1 g_i.g_j + W'' y_i y_j^T + coupling (a_i c_j^T + c_i a_j^T) + bulk c_i c_j^T - pJ [F (g_i x g_j)]_x`, times the volume.
+    #[cfg(any(feature = "lab", test))]
+    pub(crate) fn stiffness(&self) -> [[DMat3; 4]; 4] {
+        let LawTangent { f, cofactor, p1, p_j, stiffening, coupling, bulk, x_f, x_c, .. } = self.at;
+        let along_f = self.gradients.map(|gradient| f * gradient);
+        let along_c = self.gradients.map(|gradient| cofactor * gradient);
+        from_fn(|i| {
+            let (a, c) = (along_f[i], along_c[i]);
+            let y = (a * x_f + c * x_c) * stiffening;
+            from_fn(|j| {
+                let (b, d) = (along_f[j], along_c[j]);
+                let turning = f * self.gradients[i].cross(self.gradients[j]) * p_j;
+                let sum = DMat3::from_diagonal(DVec3::splat(p1 * self.gradients[i].dot(self.gradients[j])))
+                    + outer(y, b * x_f + d * x_c)
+                    + outer(a * coupling + c * bulk, d)
+                    + outer(c * coupling, b)
+                    - cross_matrix(turning);
+                sum * self.volume
+            })
+        })
+    }
+}
+
+impl LawTangent {
+    /// At the displacement gradient `h`.
+    pub(super) fn new<L: Law>(law: &L, h: DMat3) -> Self {
         let f = DMat3::IDENTITY + h;
         let cofactor = cofactor(f);
         let square = inner3(f, f);
@@ -75,11 +158,7 @@ impl ElementTangent {
         let curvature = |x: f32| f64::from(wide.distortion_curvature(x, wide.distortion_slope(x)));
         let volume_slope = f64::from(wide.volume_slope(at.j));
         let volume_curvature = f64::from(wide.volume_curvature(at.j));
-        let volume = f64::from(tile.volume::<f32>(lane));
         let base = Self {
-            nodes,
-            gradients,
-            volume,
             f,
             cofactor,
             p1: 2.0 * slope(at.i),
@@ -111,78 +190,23 @@ impl ElementTangent {
         }
     }
 
-    /// The same with another pressure `U'`, Pa, and without the stiffness of its change.
-    pub(super) fn with_pressure(mut self, pressure: f64) -> Self {
-        self.p_j += pressure - self.volume_slope;
-        self.bulk -= self.volume_curvature;
-        self
-    }
-
-    /// A quarter of the volume, m^3.
-    pub(super) fn quarter(&self) -> f64 {
-        0.25 * self.volume
-    }
-
-    /// Change of `J` with displacements `v` (m) of its nodes.
-    pub(super) fn change_by(&self, vector: [DVec3; 4]) -> f64 {
-        self.gradients
-            .iter()
-            .zip(vector)
-            .map(|(gradient, vector)| (self.cofactor * *gradient).dot(vector))
-            .sum()
-    }
-
-    /// Forces (N) on its nodes, with minus sign, from a pressure (Pa).
-    pub(super) fn forces_of(&self, pressure: f64) -> [DVec3; 4] {
-        self.gradients.map(|gradient| self.cofactor * gradient * (pressure * self.volume))
-    }
-
-    /// Forces with which the element acts on its nodes, N.
+    /// The first Piola-Kirchhoff stress, Pa.
     #[cfg(any(feature = "lab", test))]
-    pub(crate) fn forces(&self) -> [DVec3; 4] {
-        let stress = self.f * self.p1 + self.cofactor * self.p_j;
-        self.gradients.map(|gradient| -(stress * gradient * self.volume))
+    fn stress(&self) -> DMat3 {
+        self.f * self.p1 + self.cofactor * self.p_j
     }
 
-    /// `K v`, N, for displacements `v` (m) of its nodes.
-    pub(crate) fn product(&self, vector: [DVec3; 4]) -> [DVec3; 4] {
-        let mut df = DMat3::ZERO;
-        for (vector, gradient) in vector.into_iter().zip(self.gradients) {
-            df += outer(vector, gradient);
-        }
+    /// Its change with one of the deformation gradient.
+    pub(super) fn stress_by(&self, df: DMat3) -> DMat3 {
         let (f, c) = (self.f, self.cofactor);
         let (df_f, df_c) = (inner3(f, df), inner3(c, df));
         let dx = self.x_f * df_f + self.x_c * df_c;
         let d_cofactor = cofactor(f + df) - cofactor(f - df);
-        let stress = df * self.p1
+        df * self.p1
             + (f * self.x_f + c * self.x_c) * (self.stiffening * dx)
             + f * (self.coupling * df_c)
             + c * (self.coupling * df_f + self.bulk * df_c)
-            + d_cofactor * (0.5 * self.p_j);
-        self.gradients.map(|gradient| stress * gradient * self.volume)
-    }
-
-    /// The parts of `K`, N/m, by rows and columns of nodes. With `a = F g`, `c = C g`, `y = x_f a + x_c c` for the gradient `g` of each
-    /// node: `p1 g_i.g_j + W'' y_i y_j^T + coupling (a_i c_j^T + c_i a_j^T) + bulk c_i c_j^T - pJ [F (g_i x g_j)]_x`, times the volume.
-    #[cfg(any(feature = "lab", test))]
-    pub(crate) fn stiffness(&self) -> [[DMat3; 4]; 4] {
-        let along_f = self.gradients.map(|gradient| self.f * gradient);
-        let along_c = self.gradients.map(|gradient| self.cofactor * gradient);
-        from_fn(|i| {
-            let (a, c) = (along_f[i], along_c[i]);
-            let y = (a * self.x_f + c * self.x_c) * self.stiffening;
-            from_fn(|j| {
-                let (b, d) = (along_f[j], along_c[j]);
-                let turning = self.f * self.gradients[i].cross(self.gradients[j]) * self.p_j;
-                let sum =
-                    DMat3::from_diagonal(DVec3::splat(self.p1 * self.gradients[i].dot(self.gradients[j])))
-                        + outer(y, b * self.x_f + d * self.x_c)
-                        + outer(a * self.coupling + c * self.bulk, d)
-                        + outer(c * self.coupling, b)
-                        - cross_matrix(turning);
-                sum * self.volume
-            })
-        })
+            + d_cofactor * (0.5 * self.p_j)
     }
 }
 

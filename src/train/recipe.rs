@@ -6,7 +6,7 @@
 //!
 //! [motion]
 //! scene = "torsion"        # of the laboratory
-//! element = "linear"       # or "nodal-pressure"
+//! element = "linear"       # or "nodal-pressure", "nodal-strain"
 //! load = 1.0               # times the scene's forces
 //! from = 0.3               # s
 //! to = 1.0

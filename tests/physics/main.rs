@@ -12,6 +12,7 @@ mod divergence;
 mod elements;
 mod loads;
 mod nodal_pressure;
+mod nodal_strain;
 mod patch;
 mod reference_self;
 mod stability;

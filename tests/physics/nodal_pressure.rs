@@ -20,13 +20,13 @@ use crate::support::{
 use crate::{each_law, reference, support};
 
 /// Random displacements of at most `size` m.
-fn noise(body: &Body, size: f64, seed: u64) -> Vec<[f32; 3]> {
+pub(crate) fn noise(body: &Body, size: f64, seed: u64) -> Vec<[f32; 3]> {
     let mut random = Random(seed);
     body.points.iter().map(|_| random.vector().map(|x| (size * x) as f32)).collect()
 }
 
 /// Elements that turn inside out in a state.
-fn inverted(body: &Body, u: &[[f32; 3]]) -> usize {
+pub(crate) fn inverted(body: &Body, u: &[[f32; 3]]) -> usize {
     let gradients = body.reference().deformation_gradients(&widened(u));
     gradients.iter().filter(|f| reference::tensor::determinant(f) <= 0.0).count()
 }
@@ -288,6 +288,27 @@ fn the_energy_of_a_swinging_body_does_not_drift() {
     assert!((end / start - 1.0).abs() < 1e-3);
 }
 
+/// Bits of a state after fifty steps under gravity, by so many threads.
+pub(crate) fn ended<M: ElementMaterial>(scene: &VecScene<M>, parts: usize) -> Vec<u64> {
+    struct Parts(usize);
+    impl Threads for Parts {
+        fn parts(&self) -> usize {
+            self.0
+        }
+        fn each<T: Send>(&self, parts: &mut [T], work: impl Fn(&mut T) + Sync) {
+            std::thread::scope(|scope| parts.iter_mut().for_each(|part| drop(scope.spawn(|| work(part)))));
+        }
+    }
+    let mut state = rest_of(scene);
+    let step = Step::unchecked(0.5 * support::bound(scene, &state).seconds, 5.0).unwrap();
+    let loads = Loads::new(scene, [3.0, 0.0, -9.81], &[], &[]).unwrap();
+    for _ in 0..50 {
+        let status = tled::step_in_parts(scene.view(), &loads, state.view(), &step, &Parts(parts));
+        assert_eq!(status, Status::Ok);
+    }
+    bits(&state)
+}
+
 /// Parts on several threads and every instruction set give the same steps, one tissue or two.
 #[test]
 fn any_number_of_parts_gives_the_same_bits() {
@@ -295,27 +316,6 @@ fn any_number_of_parts_gives_the_same_bits() {
     let of_element: Vec<u16> =
         (0..body.tets.len()).map(|element| u16::from(element.is_multiple_of(5))).collect();
     let tissues = [support::EXP, Exponential { a: 90.0, ..support::EXP }].map(tissue);
-    fn ended<M: ElementMaterial>(scene: &VecScene<M>, parts: usize) -> Vec<u64> {
-        struct Parts(usize);
-        impl Threads for Parts {
-            fn parts(&self) -> usize {
-                self.0
-            }
-            fn each<T: Send>(&self, parts: &mut [T], work: impl Fn(&mut T) + Sync) {
-                std::thread::scope(|scope| {
-                    parts.iter_mut().for_each(|part| drop(scope.spawn(|| work(part))))
-                });
-            }
-        }
-        let mut state = rest_of(scene);
-        let step = Step::unchecked(0.5 * support::bound(scene, &state).seconds, 5.0).unwrap();
-        let loads = Loads::new(scene, [3.0, 0.0, -9.81], &[], &[]).unwrap();
-        for _ in 0..50 {
-            let status = tled::step_in_parts(scene.view(), &loads, state.view(), &step, &Parts(parts));
-            assert_eq!(status, Status::Ok);
-        }
-        bits(&state)
-    }
     let one = body.scene(NodalPressure(tissues[0]), &held(&body));
     let two = body.scene(NodalPressure(Regions { tissues: &tissues, of_element: &of_element }), &held(&body));
     let (of_one, of_two) = (ended(&one, 1), ended(&two, 1));

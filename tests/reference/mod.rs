@@ -24,6 +24,7 @@ pub mod dense;
 pub mod law;
 pub mod mesh;
 pub mod nodal_pressure;
+pub mod nodal_strain;
 pub mod random;
 pub mod simulation;
 pub mod tensor;

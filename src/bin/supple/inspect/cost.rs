@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use supple::element::{ElementMaterial, ElementTile, MaterialWork, NodeInertia};
-use supple::inertia::{Cells, Grid, Method, vectors_for_lattice};
+use supple::inertia::{Cells, Grid, InertiaError, Method, vectors_for_lattice};
 use supple::loads::Loads;
 use supple::material::{Element, Moduli};
 use supple::scene::{SceneView, tiles_for};
@@ -55,6 +55,13 @@ impl MaterialWork for Cost<'_> {
             let wanted = step.as_ref().map_or(bound.seconds, |step| step.seconds());
             row("real-time factor", real_time(wanted, seconds));
         }
+        if setup.element == Element::NodalStrain && setup.time.method.is_none() && self.accuracy.is_none() {
+            row("steps beyond it", InertiaError::NodalStrain);
+            return match &setup.learned {
+                Some(learned) => learned_cost::describe(learned, setup, scene, &loads),
+                None => Ok(()),
+            };
+        }
         let times = describe_beyond(setup, scene, &loads, bound)?;
         doubling::predict_errors(setup, scene, &loads, bound)?;
         if let Some(learned) = &setup.learned {
@@ -103,12 +110,9 @@ fn describe_limits<M: ElementMaterial>(scene: SceneView<'_, M>, state: &VecState
 
 /// Prints the memory of scene and state.
 fn describe_memory<M: ElementMaterial>(scene: SceneView<'_, M>) {
-    let vectors = match scene.element() {
-        Element::Linear => 3,
-        Element::NodalPressure => 4,
-    };
+    let vectors = if scene.element() == Element::NodalPressure { 4 } else { 3 };
     let of_node = size_of::<NodeInertia>() + vectors * size_of::<NodeVector>();
-    let tiles = tiles_for(scene.element_count()) * size_of::<ElementTile>();
+    let tiles = tiles_for(scene.element_count()) * size_of::<ElementTile>() + scene.patch_bytes();
     row("memory", format!("{:.1} kB", (scene.node_count() * of_node + tiles) as f64 * 1e-3));
 }
 
