@@ -5,6 +5,8 @@
 //! (feature `std`), [`FixedScene`] for a fixed capacity, which may be a `static`, or memory of any kind through
 //! [`SceneFacts::build`].
 
+mod owned;
+
 use core::fmt;
 use core::ops::Deref;
 
@@ -19,8 +21,9 @@ use crate::mesh::{Mesh, MeshError, volume};
 use crate::simd::{NodeVector, TILE};
 
 pub use crate::element::Axes;
+pub use owned::{FixedScene, FixedTables, Scene, SceneTables};
 #[cfg(any(feature = "std", test))]
-use crate::element::VecPatches;
+pub use owned::{VecScene, VecTables};
 
 /// A node that does not move freely along some axes: it stands still, or follows a
 /// [`Motion`](crate::loads::Motion).
@@ -108,7 +111,7 @@ pub enum BuildError {
     },
     /// Every element has four fixed nodes, so nothing can move.
     NothingMoves,
-    /// Tetrahedra with nodal strain in a scene of a fixed capacity, which has no room for their patches.
+    /// Tetrahedra with nodal strain in memory of the caller or of a fixed capacity, which has no room for their patches.
     NoPatches,
 }
 
@@ -146,7 +149,7 @@ impl fmt::Display for BuildError {
                 write!(f, "element {element}: density is {value} kg/m^3, it must be a finite positive number")
             }
             Self::NoPatches => {
-                write!(f, "a scene of a fixed capacity has no room for tetrahedra with nodal strain")
+                write!(f, "only a scene on the heap has room for tetrahedra with nodal strain")
             }
             Self::NothingMoves => write!(f, "all nodes of all elements are fixed, so nothing can move"),
         }
@@ -197,6 +200,20 @@ impl SceneFacts {
     /// Builds a scene in memory of the caller, `nodes` and `tiles` ([`tiles_for`]), from a mesh, what it is made of, and its supports;
     /// a node may be listed more than once. Allocates nothing.
     pub fn build<M: Material>(
+        material: &M,
+        mesh: &Mesh<'_>,
+        supports: impl Iterator<Item = Support>,
+        nodes: &mut [NodeInertia],
+        tiles: &mut [ElementTile],
+    ) -> Result<Self, BuildError> {
+        if M::ELEMENT.is_nodal_strain() {
+            return Err(BuildError::NoPatches);
+        }
+        Self::without_patches(material, mesh, supports, nodes, tiles)
+    }
+
+    /// The same for nodal strain as well, whose patches the caller has to add.
+    fn without_patches<M: Material>(
         material: &M,
         mesh: &Mesh<'_>,
         supports: impl Iterator<Item = Support>,
@@ -531,146 +548,6 @@ impl<M: ElementMaterial> AsScene for SceneView<'_, M> {
 
     fn as_scene(&self) -> SceneView<'_, M> {
         *self
-    }
-}
-
-/// Memory for the tables of a scene.
-pub trait SceneTables {
-    /// Nodes and tiles.
-    fn tables(&self) -> (&[NodeInertia], &[ElementTile]);
-    /// Patches of materials with nodal strain.
-    fn patches(&self) -> Patches<'_> {
-        Patches::NONE
-    }
-}
-
-/// A scene that owns its tables.
-#[derive(Clone, Debug)]
-pub struct Scene<M, S> {
-    material: M,
-    tables: S,
-    facts: SceneFacts,
-}
-
-impl<M, S> Deref for Scene<M, S> {
-    type Target = SceneFacts;
-
-    fn deref(&self) -> &SceneFacts {
-        &self.facts
-    }
-}
-
-impl<M, S: SceneTables> Scene<M, S> {
-    /// The scene.
-    pub fn view(&self) -> SceneView<'_, M> {
-        let (nodes, tiles) = self.tables.tables();
-        SceneView {
-            patches: self.tables.patches(),
-            ..SceneView::new(&self.material, nodes, tiles, &self.facts)
-        }
-    }
-}
-
-impl<M: ElementMaterial, S: SceneTables> AsScene for Scene<M, S> {
-    type Material = M;
-
-    fn as_scene(&self) -> SceneView<'_, M> {
-        self.view()
-    }
-}
-
-/// Tables for at most `N` nodes and `T` tiles of elements.
-#[derive(Clone, Debug)]
-pub struct FixedTables<const N: usize, const T: usize> {
-    nodes: heapless::Vec<NodeInertia, N>,
-    tiles: heapless::Vec<ElementTile, T>,
-}
-
-impl<const N: usize, const T: usize> SceneTables for FixedTables<N, T> {
-    fn tables(&self) -> (&[NodeInertia], &[ElementTile]) {
-        (&self.nodes, &self.tiles)
-    }
-}
-
-/// A scene of at most `N` nodes and `T` tiles of elements ([`tiles_for`]), which may be a `static`.
-pub type FixedScene<M, const N: usize, const T: usize> = Scene<M, FixedTables<N, T>>;
-
-impl<M, const N: usize, const T: usize> FixedScene<M, N, T> {
-    /// An empty scene.
-    pub const fn new(material: M) -> Self {
-        let tables = FixedTables { nodes: heapless::Vec::new(), tiles: heapless::Vec::new() };
-        Self { material, tables, facts: SceneFacts::EMPTY }
-    }
-}
-
-impl<M: Material, const N: usize, const T: usize> FixedScene<M, N, T> {
-    /// Builds the scene in place from a mesh and its supports; a node may be listed more than once.
-    /// On an error the scene is empty.
-    pub fn build(&mut self, mesh: &Mesh<'_>, supports: &[Support]) -> Result<(), BuildError> {
-        let Self { material, tables: FixedTables { nodes, tiles }, facts } = self;
-        *facts = SceneFacts::EMPTY;
-        if M::ELEMENT.is_nodal_strain() {
-            return Err(BuildError::NoPatches);
-        }
-        // All of it: what is too little is told with what is needed.
-        let _ = nodes.resize(N, NodeInertia::EMPTY);
-        let _ = tiles.resize(T, ElementTile::EMPTY);
-        *facts = SceneFacts::build(material, mesh, supports.iter().copied(), nodes, tiles)?;
-        nodes.truncate(facts.node_count);
-        tiles.truncate(facts.tile_count());
-        Ok(())
-    }
-}
-
-/// Tables of as many nodes and elements as there are.
-#[cfg(any(feature = "std", test))]
-#[derive(Clone, Debug)]
-pub struct VecTables {
-    nodes: std::vec::Vec<NodeInertia>,
-    tiles: std::vec::Vec<ElementTile>,
-    patches: VecPatches,
-}
-
-#[cfg(any(feature = "std", test))]
-impl SceneTables for VecTables {
-    fn tables(&self) -> (&[NodeInertia], &[ElementTile]) {
-        (&self.nodes, &self.tiles)
-    }
-
-    fn patches(&self) -> Patches<'_> {
-        self.patches.view()
-    }
-}
-
-/// A scene on a host with a heap.
-#[cfg(any(feature = "std", test))]
-pub type VecScene<M> = Scene<M, VecTables>;
-
-#[cfg(any(feature = "std", test))]
-impl<M: Material> VecScene<M> {
-    /// Builds a scene from a mesh, what it is made of, and its supports; a node may be listed more than once.
-    pub fn build(material: M, mesh: &Mesh<'_>, supports: &[Support]) -> Result<Self, BuildError> {
-        let mut nodes = std::vec![NodeInertia::EMPTY; mesh.points().len()];
-        let mut tiles = std::vec![ElementTile::EMPTY; tiles_for(mesh.element_count())];
-        let facts = SceneFacts::build(&material, mesh, supports.iter().copied(), &mut nodes, &mut tiles)?;
-        tiles.truncate(facts.tile_count());
-        let patches = if M::ELEMENT.is_nodal_strain() {
-            VecPatches::build(nodes.len(), &tiles, &facts.partitions, |element| material.region(element))
-        } else {
-            VecPatches::none()
-        };
-        Ok(Self { material, tables: VecTables { nodes, tiles, patches }, facts })
-    }
-}
-
-#[cfg(feature = "lab")]
-impl<M> VecScene<M> {
-    /// Adds a point mass (kg) to a node, which inertia, gravity and damping act on as on tissue.
-    pub(crate) fn add_mass(&mut self, node: usize, kilogram: f32) {
-        if let Some(inertia) = self.tables.nodes.get_mut(node) {
-            inertia.add_mass(kilogram);
-            self.facts.has_point_masses = true;
-        }
     }
 }
 

@@ -1,0 +1,150 @@
+//! Scenes that own their tables: with a fixed capacity, in a `static` if wanted, or on a host with a heap.
+
+use core::ops::Deref;
+
+#[cfg(any(feature = "std", test))]
+use super::tiles_for;
+use super::{AsScene, BuildError, SceneFacts, SceneView, Support};
+#[cfg(any(feature = "std", test))]
+use crate::element::VecPatches;
+use crate::element::{ElementMaterial, ElementTile, NodeInertia, Patches};
+use crate::material::Material;
+use crate::mesh::Mesh;
+
+/// Memory for the tables of a scene.
+pub trait SceneTables {
+    /// Nodes and tiles.
+    fn tables(&self) -> (&[NodeInertia], &[ElementTile]);
+    /// Patches of materials with nodal strain.
+    fn patches(&self) -> Patches<'_> {
+        Patches::NONE
+    }
+}
+
+/// A scene that owns its tables.
+#[derive(Clone, Debug)]
+pub struct Scene<M, S> {
+    material: M,
+    tables: S,
+    facts: SceneFacts,
+}
+
+impl<M, S> Deref for Scene<M, S> {
+    type Target = SceneFacts;
+
+    fn deref(&self) -> &SceneFacts {
+        &self.facts
+    }
+}
+
+impl<M, S: SceneTables> Scene<M, S> {
+    /// The scene.
+    pub fn view(&self) -> SceneView<'_, M> {
+        let (nodes, tiles) = self.tables.tables();
+        SceneView {
+            patches: self.tables.patches(),
+            ..SceneView::new(&self.material, nodes, tiles, &self.facts)
+        }
+    }
+}
+
+impl<M: ElementMaterial, S: SceneTables> AsScene for Scene<M, S> {
+    type Material = M;
+
+    fn as_scene(&self) -> SceneView<'_, M> {
+        self.view()
+    }
+}
+
+/// Tables for at most `N` nodes and `T` tiles of elements.
+#[derive(Clone, Debug)]
+pub struct FixedTables<const N: usize, const T: usize> {
+    nodes: heapless::Vec<NodeInertia, N>,
+    tiles: heapless::Vec<ElementTile, T>,
+}
+
+impl<const N: usize, const T: usize> SceneTables for FixedTables<N, T> {
+    fn tables(&self) -> (&[NodeInertia], &[ElementTile]) {
+        (&self.nodes, &self.tiles)
+    }
+}
+
+/// A scene of at most `N` nodes and `T` tiles of elements ([`tiles_for`]), which may be a `static`.
+pub type FixedScene<M, const N: usize, const T: usize> = Scene<M, FixedTables<N, T>>;
+
+impl<M, const N: usize, const T: usize> FixedScene<M, N, T> {
+    /// An empty scene.
+    pub const fn new(material: M) -> Self {
+        let tables = FixedTables { nodes: heapless::Vec::new(), tiles: heapless::Vec::new() };
+        Self { material, tables, facts: SceneFacts::EMPTY }
+    }
+}
+
+impl<M: Material, const N: usize, const T: usize> FixedScene<M, N, T> {
+    /// Builds the scene in place from a mesh and its supports; a node may be listed more than once.
+    /// On an error the scene is empty.
+    pub fn build(&mut self, mesh: &Mesh<'_>, supports: &[Support]) -> Result<(), BuildError> {
+        let Self { material, tables: FixedTables { nodes, tiles }, facts } = self;
+        *facts = SceneFacts::EMPTY;
+        // All of it: what is too little is told with what is needed.
+        let _ = nodes.resize(N, NodeInertia::EMPTY);
+        let _ = tiles.resize(T, ElementTile::EMPTY);
+        *facts = SceneFacts::build(material, mesh, supports.iter().copied(), nodes, tiles)?;
+        nodes.truncate(facts.node_count);
+        tiles.truncate(facts.tile_count());
+        Ok(())
+    }
+}
+
+/// Tables of as many nodes and elements as there are.
+#[cfg(any(feature = "std", test))]
+#[derive(Clone, Debug)]
+pub struct VecTables {
+    nodes: std::vec::Vec<NodeInertia>,
+    tiles: std::vec::Vec<ElementTile>,
+    patches: VecPatches,
+}
+
+#[cfg(any(feature = "std", test))]
+impl SceneTables for VecTables {
+    fn tables(&self) -> (&[NodeInertia], &[ElementTile]) {
+        (&self.nodes, &self.tiles)
+    }
+
+    fn patches(&self) -> Patches<'_> {
+        self.patches.view()
+    }
+}
+
+/// A scene on a host with a heap.
+#[cfg(any(feature = "std", test))]
+pub type VecScene<M> = Scene<M, VecTables>;
+
+#[cfg(any(feature = "std", test))]
+impl<M: Material> VecScene<M> {
+    /// Builds a scene from a mesh, what it is made of, and its supports; a node may be listed more than once.
+    pub fn build(material: M, mesh: &Mesh<'_>, supports: &[Support]) -> Result<Self, BuildError> {
+        let mut nodes = std::vec![NodeInertia::EMPTY; mesh.points().len()];
+        let mut tiles = std::vec![ElementTile::EMPTY; tiles_for(mesh.element_count())];
+        let supports = supports.iter().copied();
+        let facts = SceneFacts::without_patches(&material, mesh, supports, &mut nodes, &mut tiles)?;
+        tiles.truncate(facts.tile_count());
+        let patches = if M::ELEMENT.is_nodal_strain() {
+            VecPatches::build(nodes.len(), &tiles, &facts.partitions, |element| material.region(element))
+        } else {
+            VecPatches::none()
+        };
+        Ok(Self { material, tables: VecTables { nodes, tiles, patches }, facts })
+    }
+}
+
+#[cfg(feature = "lab")]
+impl<M> VecScene<M> {
+    /// Adds a point mass (kg) to a node, which inertia, gravity and damping act on as on tissue.
+    pub(crate) fn add_mass(&mut self, node: usize, kilogram: f32) {
+        if let Some(inertia) = self.tables.nodes.get_mut(node) {
+            inertia.add_mass(kilogram);
+            self.facts.has_point_masses = true;
+        }
+    }
+}
