@@ -73,8 +73,7 @@ impl<R: Real> Deformation<R> {
                 let gradient = tile.gradient::<R>(corner, j, first);
                 for i in 0..3 {
                     // Not fused: in ill-conditioned states this lowers the error of the forces by a fifth.
-                    let product = (displacement[i] - origin[i]) * gradient;
-                    h[i][j] = if corner == 0 { product } else { h[i][j] + product };
+                    h[i][j] = h[i][j] + (displacement[i] - origin[i]) * gradient;
                 }
             }
         }
