@@ -270,7 +270,7 @@ fn every_wrong_field_has_its_own_error() {
     refused(72, whole(5_000), "the recipe, 9 bytes from byte 5000 on, is not text in the file");
     refused(76, whole(u32::MAX), "the recipe, 4294967295 bytes from byte 1472 on, is not text in the file");
     refused(112, whole(2), "the unit of force is 2");
-    refused(116, whole(2), "the element is 2");
+    refused(116, whole(3), "the element is 3");
     refused(120, whole(1), "a reserved byte is 1");
     refused(240, real(0.0), "input 0: scale 0, range -1.5 to 2");
     refused(264 + 4, real(f32::NAN), "input 2: scale 2.5, range NaN to 10");
