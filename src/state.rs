@@ -80,7 +80,7 @@ pub struct StateView<'a> {
     pub(crate) displacement: &'a mut [NodeVector],
     pub(crate) increment: &'a mut [NodeVector],
     pub(crate) force: &'a mut [NodeVector],
-    /// Of scenes with nodal pressure ([`crate::element`]), empty for others.
+    /// Of scenes with nodal pressure or strain ([`crate::element`]), empty for others.
     pub(crate) volume: &'a mut [NodeVector],
     pub(crate) progress: &'a mut Progress,
 }
@@ -95,7 +95,8 @@ impl Deref for StateView<'_> {
 
 impl<'a> StateView<'a> {
     /// A state over the given vectors as they are: zeros mean at rest. `volume` is as long as the others for scenes with
-    /// [`NodalPressure`](crate::material::NodalPressure), and may be empty for others.
+    /// [`NodalPressure`](crate::material::NodalPressure) or [`NodalStrain`](crate::material::NodalStrain), and may be empty for
+    /// linear tetrahedra.
     pub const fn new(
         displacement: &'a mut [NodeVector],
         increment: &'a mut [NodeVector],
