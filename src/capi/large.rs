@@ -104,7 +104,7 @@ impl<'a> Request<'a> {
             SUPPLE_MASS_SCALED => Grid::default(),
             _ => with_scene!(any, scene => cells.grid(scene, points)?),
         };
-        let vectors = with_scene!(any, scene => vectors_for_lattice(scene.node_count(), scene.element_count(), grid, damped));
+        let vectors = with_scene!(any, scene => vectors_for_lattice(scene.element(), scene.node_count(), scene.element_count(), grid, damped));
         Ok(Self { config, points, cells, vectors })
     }
 

@@ -350,7 +350,6 @@ impl From<InertiaError> for supple_error {
             InertiaError::Cells { .. } | InertiaError::Functions { .. } | InertiaError::Singular { .. } => {
                 is(SUPPLE_E_LATTICE)
             }
-            InertiaError::NodalStrain => is(SUPPLE_E_CHOICE),
             InertiaError::Points { points, nodes } => mismatch(points, nodes),
             InertiaError::NotFinite { node } => is(SUPPLE_E_TOO_STIFF).node(node),
         }

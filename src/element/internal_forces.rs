@@ -62,6 +62,9 @@ impl Extremes<f32> {
 
 /// A further computation from the deformation of an element, in the same pass as its forces.
 pub(crate) trait ElementVisitor {
+    /// Whether patches with nodal strain add the scalar stiffness bound to the fourth component of the forces of their nodes.
+    const BOUNDS_PATCHES: bool = false;
+
     /// Called for each vector of elements, those from place `first` of the tile on. Its result is added to the fourth
     /// component of the forces of their nodes.
     fn visit<R: Real, L: Law>(

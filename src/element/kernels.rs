@@ -8,7 +8,7 @@ use crate::simd::{NodeVector, dispatch};
 
 use super::{
     CriticalBounds, ElementMaterial, Extremes, InternalForces, MeanPressure, NoVisitor, PatchBounds,
-    PatchForces, ScalarBound, TileBounds, TileTangents,
+    PatchForces, PatchTileBounds, ScalarBound, TileBounds, TileTangents,
 };
 
 /// A law with its kernels.
@@ -29,7 +29,10 @@ pub trait ElementLaw: Law {
     ) -> Extremes<f32>;
     /// Internal forces with nodal strain.
     #[doc(hidden)]
-    fn patch_forces(kernel: PatchForces<'_, Self>) -> Extremes<f32>;
+    fn patch_forces(kernel: PatchForces<'_, Self, NoVisitor>) -> Extremes<f32>;
+    /// The same with scalar stiffness bounds.
+    #[doc(hidden)]
+    fn patch_forces_and_bounds(kernel: PatchForces<'_, Self, ScalarBound>) -> Extremes<f32>;
     /// Bounds for the critical step with nodal strain.
     #[doc(hidden)]
     fn patch_bounds(kernel: PatchBounds<'_, '_, Self>);
@@ -45,6 +48,9 @@ pub trait ElementLaw: Law {
     /// The same with nodal pressure.
     #[doc(hidden)]
     fn nodal_pressure_tile_bounds(kernel: TileBounds<'_, Self, MeanPressure<'_>>) -> TileTangents;
+    /// Stiffness bounds of one tile of patches.
+    #[doc(hidden)]
+    fn patch_tile_bounds(kernel: PatchTileBounds<'_, Self>) -> TileTangents;
 }
 
 /// [`ElementLaw::tile_bounds`] for a material, from the volumes of the nodes where it needs them.
@@ -63,6 +69,7 @@ pub(crate) fn tile_bounds<M: ElementMaterial>(
 pub(crate) trait ForcesVisitor<L: ElementLaw>: Copy + Sync {
     fn forces(kernel: InternalForces<'_, L, Self>) -> Extremes<f32>;
     fn nodal_pressure_forces(kernel: InternalForces<'_, L, Self, MeanPressure<'_>>) -> Extremes<f32>;
+    fn patch_forces(kernel: PatchForces<'_, L, Self>) -> Extremes<f32>;
 }
 
 impl<L: ElementLaw> ForcesVisitor<L> for NoVisitor {
@@ -73,6 +80,10 @@ impl<L: ElementLaw> ForcesVisitor<L> for NoVisitor {
     fn nodal_pressure_forces(kernel: InternalForces<'_, L, Self, MeanPressure<'_>>) -> Extremes<f32> {
         L::nodal_pressure_forces(kernel)
     }
+
+    fn patch_forces(kernel: PatchForces<'_, L, Self>) -> Extremes<f32> {
+        L::patch_forces(kernel)
+    }
 }
 
 impl<L: ElementLaw> ForcesVisitor<L> for ScalarBound {
@@ -82,6 +93,10 @@ impl<L: ElementLaw> ForcesVisitor<L> for ScalarBound {
 
     fn nodal_pressure_forces(kernel: InternalForces<'_, L, Self, MeanPressure<'_>>) -> Extremes<f32> {
         L::nodal_pressure_forces_and_bounds(kernel)
+    }
+
+    fn patch_forces(kernel: PatchForces<'_, L, Self>) -> Extremes<f32> {
+        L::patch_forces_and_bounds(kernel)
     }
 }
 
@@ -110,7 +125,11 @@ macro_rules! kernels {
                     dispatch(kernel)
                 }
                 #[inline(never)]
-                fn patch_forces(kernel: PatchForces<'_, Self>) -> Extremes<f32> {
+                fn patch_forces(kernel: PatchForces<'_, Self, NoVisitor>) -> Extremes<f32> {
+                    dispatch(kernel)
+                }
+                #[inline(never)]
+                fn patch_forces_and_bounds(kernel: PatchForces<'_, Self, ScalarBound>) -> Extremes<f32> {
                     dispatch(kernel)
                 }
                 #[inline(never)]
@@ -129,6 +148,10 @@ macro_rules! kernels {
                 fn nodal_pressure_tile_bounds(
                     kernel: TileBounds<'_, Self, MeanPressure<'_>>,
                 ) -> TileTangents {
+                    dispatch(kernel)
+                }
+                #[inline(never)]
+                fn patch_tile_bounds(kernel: PatchTileBounds<'_, Self>) -> TileTangents {
                     dispatch(kernel)
                 }
                 #[inline(never)]

@@ -15,6 +15,7 @@ mod node;
 mod patch;
 mod patch_bounds;
 mod patch_forces;
+mod patch_tile_bounds;
 mod pressure;
 mod stiffness_bound;
 #[cfg(test)]
@@ -34,13 +35,15 @@ pub use patch::VecPatches;
 pub use patch::{Neighbours, PatchLayout, PatchTile, Patches};
 pub(crate) use patch_bounds::PatchBounds;
 pub(crate) use patch_forces::PatchForces;
+pub(crate) use patch_tile_bounds::PatchTileBounds;
 pub use tile::ElementTile;
 pub(crate) use tile::MOST_ELEMENTS;
 
 pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
+pub(crate) use fields::stabilising_modulus;
 pub(crate) use fields::{element_fields, patch_energies, volume_energy_difference};
 #[cfg(feature = "std")]
-pub(crate) use fields::{invariants, pressure_at, stabilising_modulus};
+pub(crate) use fields::{invariants, pressure_at};
 pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};
 pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes, VolumeRows};
 pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};

@@ -12,6 +12,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};
 
 use super::internal_forces::operations;
+use super::tile::vector_at;
 use crate::material::Law;
 use crate::mesh::partition::MAX_PARTITIONS;
 use crate::simd::{Real, TILE, TileNodes};
@@ -62,6 +63,28 @@ impl PatchTile {
         sum * f64::from(self.inverse_volumes[lane % TILE])
     }
 
+    /// The nodes of the patch at place `lane` with `c_ab / V_a` (1/m), its own node last, and then with their `k_ab` (m), zero for it.
+    pub(crate) fn gradients<'a>(
+        &'a self,
+        neighbours: &'a [Neighbours],
+        lane: usize,
+    ) -> impl Iterator<Item = (usize, [f32; 3], f32)> + Clone + 'a {
+        let lane = lane % TILE;
+        let inverse = self.inverse_volumes[lane];
+        let mut own = [0.0; 3];
+        let of_neighbours = neighbours.iter().map(Some).chain([None]);
+        of_neighbours.map(move |neighbour| match neighbour {
+            Some(neighbour) => {
+                let gradient = neighbour.gradients.map(|row| row[lane] * inverse);
+                for (own, along) in own.iter_mut().zip(gradient) {
+                    *own -= along;
+                }
+                (neighbour.nodes[lane] as usize, gradient, neighbour.couplings[lane])
+            }
+            None => (self.nodes[lane] as usize, own, 0.0),
+        })
+    }
+
     /// Calls `with` with the patch's own node and its neighbours and their `c_ab`, m^2.
     #[cfg(feature = "std")]
     pub(crate) fn each_gradient(
@@ -80,7 +103,6 @@ impl PatchTile {
     }
 
     /// Node of the patch at place `lane`.
-    #[cfg(feature = "std")]
     pub(crate) fn node(&self, lane: usize) -> usize {
         self.nodes[lane % TILE] as usize
     }
@@ -114,6 +136,13 @@ pub struct Neighbours {
 }
 
 impl Neighbours {
+    /// `c_ab` (m^2) from place `first` of the tile on.
+    #[inline(always)]
+    pub(super) fn gradient<R: Real>(&self, first: usize) -> [R; 3] {
+        let [x, y, z] = &self.gradients;
+        [vector_at(x, first), vector_at(y, first), vector_at(z, first)]
+    }
+
     #[inline(always)]
     pub(super) fn nodes_below<R: Real>(&self, count: usize) -> Option<TileNodes<'_, 1>> {
         TileNodes::in_range::<R>([&self.nodes], 0, count)
@@ -176,6 +205,11 @@ impl<'a> Patches<'a> {
             group.checked_sub(1).and_then(|last| self.layout.ends.get(last)).map_or(0, |&end| end as usize)
         };
         groups.flat_map(move |group| self.tiles.get(start(group)..start(group + 1)).unwrap_or_default())
+    }
+
+    /// The table of patches.
+    pub(crate) const fn tiles(&self) -> &'a [PatchTile] {
+        self.tiles
     }
 
     /// Every patch, as its place.

@@ -8,30 +8,33 @@
 //! energy). With `P_a = dPsi/dF(F_a) - s mu H_a` a patch gives its neighbour `b` the force `-P_a c_ab`, and its own node the opposite
 //! and `s mu sum_b k_ab (u_b - u_a)`, `k_ab = -sum_e V_e g_a . g_b`.
 
+use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::material::{Law, LawState, Laws, Potential};
 use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, TileNodes, dot};
 
 use super::deformation::{Deformation, Matrix, Vector};
-use super::internal_forces::Extremes;
+use super::internal_forces::{ElementVisitor, Extremes};
 use super::patch::{Neighbours, PatchTile, Patches};
+use super::stiffness_bound::Bound;
 use super::tile::vector_at;
 
 /// Share of the shear modulus at rest in the stabilising energy. Less follows bending on coarse meshes more closely and is too soft on
 /// fine ones; below 0.2 rough motion is hardly held.
 pub(crate) const STABILISATION: f32 = 0.4;
 
-/// The kernel that adds internal forces to the nodes of some partitions.
-pub struct PatchForces<'a, L> {
+/// The kernel that adds internal forces to the nodes of some partitions, and what the visitor asks for.
+pub struct PatchForces<'a, L, V> {
     pub(crate) laws: Laws<'a, L>,
     pub(crate) patches: Patches<'a>,
     pub(crate) partitions: Range<usize>,
     pub(crate) displacement: &'a [NodeVector],
     pub(crate) force: Scatter<'a>,
+    pub(crate) visitor: PhantomData<V>,
 }
 
-impl<L: Law> Kernel for PatchForces<'_, L> {
+impl<L: Law, V: ElementVisitor> Kernel for PatchForces<'_, L, V> {
     type Output = Extremes<f32>;
 
     const SCALAR: bool = true;
@@ -40,26 +43,29 @@ impl<L: Law> Kernel for PatchForces<'_, L> {
     fn run<R: Real>(self) -> Extremes<f32> {
         // Vectors in a tile.
         match R::COUNT {
-            16 => add_all::<R, L, 1>(self),
-            8 => add_all::<R, L, 2>(self),
-            4 => add_all::<R, L, 4>(self),
-            _ => add_all::<R, L, TILE>(self),
+            16 => add_all::<R, L, V, 1>(self),
+            8 => add_all::<R, L, V, 2>(self),
+            4 => add_all::<R, L, V, 4>(self),
+            _ => add_all::<R, L, V, TILE>(self),
         }
     }
 }
 
 #[inline(always)]
-fn add_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchForces<'_, L>) -> Extremes<f32> {
-    let PatchForces { laws, patches, partitions, displacement, mut force } = kernel;
+fn add_all<R: Real, L: Law, V: ElementVisitor, const PARTS: usize>(
+    kernel: PatchForces<'_, L, V>,
+) -> Extremes<f32> {
+    let PatchForces { laws, patches, partitions, displacement, mut force, .. } = kernel;
     let displacement = Gather::new(displacement);
     let mut extremes = Extremes::<R>::none();
     for tile in patches.touching(partitions) {
         let neighbours = patches.neighbours_of(tile);
         let mut stresses = [Stress::<R>::zero(); PARTS];
         for (part, stress) in stresses.iter_mut().enumerate() {
-            *stress = stress_of(&laws, tile, neighbours, part * R::COUNT, displacement, &mut extremes);
+            *stress =
+                stress_of::<R, L, V>(&laws, tile, neighbours, part * R::COUNT, displacement, &mut extremes);
         }
-        scatter::<R, PARTS>(tile, neighbours, stresses, &mut force);
+        scatter::<R, V, PARTS>(tile, neighbours, stresses, &mut force);
     }
     Extremes::none().merged_with(&extremes)
 }
@@ -71,12 +77,16 @@ struct Stress<R> {
     p: Matrix<R>,
     /// Stabilising force on the own node, N.
     own: Vector<R>,
+    /// Stiffness bound of a neighbour over the length of its `c_ab`, N/m^3, and that of the own node, N/m; zero if nobody asks.
+    scalar: R,
+    own_scalar: R,
 }
 
 impl<R: Real> Stress<R> {
     #[inline(always)]
     fn zero() -> Self {
-        Self { p: [[R::splat(0.0); 3]; 3], own: [R::splat(0.0); 3] }
+        let zero = R::splat(0.0);
+        Self { p: [[zero; 3]; 3], own: [zero; 3], scalar: zero, own_scalar: zero }
     }
 }
 
@@ -112,7 +122,7 @@ pub(super) fn gradient<R: Real>(
 }
 
 #[inline(always)]
-fn stress_of<R: Real, L: Law>(
+fn stress_of<R: Real, L: Law, V: ElementVisitor>(
     laws: &Laws<'_, L>,
     tile: &PatchTile,
     neighbours: &[Neighbours],
@@ -123,7 +133,8 @@ fn stress_of<R: Real, L: Law>(
     let (h, pull) = gradient::<R>(tile, neighbours, first, displacement);
     let deformation = Deformation::new(h);
     let law = laws.widen(|lane| tile.element(first + lane));
-    let response = LawState::new::<L>(&law, deformation.invariants).response::<L>(&law);
+    let local = LawState::new::<L>(&law, deformation.invariants);
+    let response = local.response::<L>(&law);
     extremes.least_j = deformation.invariants.j.min(extremes.least_j);
     extremes.saturation = response.saturation.max(extremes.saturation);
     // mu = 2 W'(0).
@@ -134,12 +145,51 @@ fn stress_of<R: Real, L: Law>(
             p[i][j] = p[i][j] - modulus * h[i][j];
         }
     }
-    Stress { p, own: [modulus * pull[0], modulus * pull[1], modulus * pull[2]] }
+    let own = [modulus * pull[0], modulus * pull[1], modulus * pull[2]];
+    let stress = Stress { p, own, ..Stress::zero() };
+    if !V::BOUNDS_PATCHES {
+        return stress;
+    }
+    let lengths = GradientLengths::<R>::of(neighbours, first);
+    let scale = lengths.sum * vector_at::<R>(&tile.inverse_volumes, first);
+    let scalar = Bound::of_patches::<L>(&law, &deformation, &local, modulus, scale).scalar;
+    Stress { scalar, own_scalar: scalar.fused(lengths.own, modulus * lengths.couplings), ..stress }
+}
+
+/// Lengths of the gradients `c_ab` of a vector of patches.
+#[derive(Clone, Copy)]
+pub(super) struct GradientLengths<R> {
+    /// Sum over the neighbours and the own node, and that of the own node, m^2.
+    pub(super) sum: R,
+    pub(super) own: R,
+    /// `sum_b k_ab + |k_ab|`, m: with `s mu` a bound of the rows of the own node in the stabilising energy.
+    pub(super) couplings: R,
+}
+
+impl<R: Real> GradientLengths<R> {
+    /// Of the patches from place `first` of a tile on.
+    #[inline(always)]
+    pub(super) fn of(neighbours: &[Neighbours], first: usize) -> Self {
+        let zero = R::splat(0.0);
+        let (mut lengths, mut own) = (Self { sum: zero, own: zero, couplings: zero }, [zero; 3]);
+        for neighbour in neighbours {
+            let gradient = neighbour.gradient::<R>(first);
+            lengths.sum = lengths.sum + dot(gradient, gradient).root();
+            for axis in 0..3 {
+                own[axis] = own[axis] - gradient[axis];
+            }
+            let coupling = vector_at::<R>(&neighbour.couplings, first);
+            lengths.couplings = lengths.couplings + (coupling + coupling.abs());
+        }
+        lengths.own = dot(own, own).root();
+        lengths.sum = lengths.sum + lengths.own;
+        lengths
+    }
 }
 
 /// Adds the forces of a tile, neighbour by neighbour, those of the patches in the order of their places whatever the width of a vector.
 #[inline(always)]
-fn scatter<R: Real, const PARTS: usize>(
+fn scatter<R: Real, V: ElementVisitor, const PARTS: usize>(
     tile: &PatchTile,
     neighbours: &[Neighbours],
     mut stresses: [Stress<R>; PARTS],
@@ -151,9 +201,11 @@ fn scatter<R: Real, const PARTS: usize>(
         let nodes = force.checked::<R, 1>([&neighbour.nodes]);
         for (part, stress) in stresses.iter_mut().enumerate() {
             let first = part * R::COUNT;
-            let [x, y, z] = &neighbour.gradients;
-            let gradient = [vector_at::<R>(x, first), vector_at::<R>(y, first), vector_at::<R>(z, first)];
+            let gradient = neighbour.gradient::<R>(first);
             let mut row = [zero; 4];
+            if V::BOUNDS_PATCHES {
+                row[3] = stress.scalar * dot(gradient, gradient).root();
+            }
             for i in 0..3 {
                 let pulled = dot(stress.p[i], gradient);
                 stress.own[i] = stress.own[i] + pulled;
@@ -169,9 +221,10 @@ fn scatter<R: Real, const PARTS: usize>(
     let nodes = force.checked::<R, 1>([&tile.nodes]);
     for (part, stress) in stresses.iter().enumerate() {
         let [x, y, z] = stress.own;
+        let row = [x, y, z, stress.own_scalar];
         match &nodes {
-            Some(nodes) => force.add_corners(nodes, part * R::COUNT, [[x, y, z, zero]], &mut buffer),
-            None => force.add_present([&tile.nodes], part * R::COUNT, [[x, y, z, zero]]),
+            Some(nodes) => force.add_corners(nodes, part * R::COUNT, [row], &mut buffer),
+            None => force.add_present([&tile.nodes], part * R::COUNT, [row]),
         }
     }
 }

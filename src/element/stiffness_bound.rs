@@ -109,6 +109,12 @@ impl<R: Real> Coefficients<R> {
         Self { p1, p_j, cc, ce, ee, floor: R::splat(FLOOR) * (bulk + p1 + ce.abs()) }
     }
 
+    /// With `modulus |dF|^2` taken off.
+    #[inline(always)]
+    fn less(self, modulus: R) -> Self {
+        Self { p1: self.p1 - modulus, ..self }
+    }
+
     /// Bound of the geometric part, Pa.
     #[inline(always)]
     fn geometric(&self, at: Invariants<R>) -> R {
@@ -132,14 +138,9 @@ impl<R: Real> Coefficients<R> {
 }
 
 /// An upper bound (N/m) of the eigenvalues of an element's four matrices, from the invariants `i = I1 - 3` and
-/// `j = J - 1` alone: `|C|^2 <= I1^2 / 3`, and with it `|E|^2 = I1 + |C|^2 - 6 J`.
+/// `j = J - 1` alone: `|C|^2 <= I1^2 / 3`, and with it `|E|^2 = I1 + |C|^2 - 6 J`. `scale` (m) is `V lambda_G`.
 #[inline(always)]
-fn scalar_bound<R: Real>(
-    coefficients: &Coefficients<R>,
-    at: Invariants<R>,
-    tile: &ElementTile,
-    first: usize,
-) -> R {
+fn scalar_bound<R: Real>(coefficients: &Coefficients<R>, at: Invariants<R>, scale: R) -> R {
     let (zero, third) = (R::splat(0.0), R::splat(1.0 / 3.0));
     let i1 = at.i + R::splat(3.0);
     let cofactor = i1 * i1 * third;
@@ -148,8 +149,13 @@ fn scalar_bound<R: Real>(
     let geometric = p_j.abs().fused(i1.fused(third, R::splat(1.0)), p1);
     let rest = ee.fused(distortion, geometric);
     let rest = (R::splat(MIXED) * ce.abs()).fused(distortion + cofactor, rest);
-    let scale = tile.volume::<R>(first) * tile.gradient_eigenvalue::<R>(first);
     scale * (R::splat(WEIGHT) * (cc.max(zero) + floor)).fused(cofactor, rest)
+}
+
+/// `V lambda_G` of the elements from place `first` of a tile on, m.
+#[inline(always)]
+fn scale_of<R: Real>(tile: &ElementTile, first: usize) -> R {
+    tile.volume::<R>(first) * tile.gradient_eigenvalue::<R>(first)
 }
 
 /// `iso` and `volume` of a vector of elements, Pa.
@@ -157,9 +163,23 @@ fn scalar_bound<R: Real>(
 pub(super) struct Bound<R> {
     pub(super) iso: R,
     pub(super) volume: R,
-    /// [`scalar_bound`], N/m.
+    /// Upper bound of the eigenvalues of the nodes' matrices, N/m; of patches per length of `c_ab`, N/m^3.
     pub(super) scalar: R,
     coefficients: Coefficients<R>,
+}
+
+/// `|E|^2` and `|C|^2`.
+#[inline(always)]
+fn squares<R: Real>(deformation: &Deformation<R>) -> [R; 2] {
+    let [mut distortion, mut cofactor] = [R::splat(0.0); 2];
+    for i in 0..3 {
+        for j in 0..3 {
+            let (e, c) = (deformation.distortion(i, j), deformation.cofactor(i, j));
+            distortion = distortion + e * e;
+            cofactor = cofactor + c * c;
+        }
+    }
+    [distortion, cofactor]
 }
 
 /// The bound that rotations do not feel, Pa: of `|D|^2`, `(tr D)^2` and `|L|^2`, with `L = dF F^-1` and `D` its
@@ -181,21 +201,34 @@ impl<R: Real> Bound<R> {
         local: &LawState<R>,
     ) -> Self {
         let coefficients = Coefficients::<R>::new::<L>(law, local);
-        let (mut distortion, mut cofactor) = (R::splat(0.0), R::splat(0.0));
-        for i in 0..3 {
-            for j in 0..3 {
-                let (e, c) = (deformation.distortion(i, j), deformation.cofactor(i, j));
-                distortion = distortion + e * e;
-                cofactor = cofactor + c * c;
-            }
-        }
+        let scalar = scalar_bound(&coefficients, local.at, scale_of(tile, first));
+        let [distortion, cofactor] = squares(deformation);
         let (iso, volume) = coefficients.split(local.at, distortion, cofactor);
-        Self { iso, volume, scalar: scalar_bound(&coefficients, local.at, tile, first), coefficients }
+        Self { iso, volume, scalar, coefficients }
     }
 
-    /// The bound that rotations do not feel; only for elements that are not crushed.
+    /// Of patches with nodal strain, whose stabilising energy has this `modulus` (Pa). As there are fewer of them than elements, the
+    /// scalar bound is a close one: `scale (iso + volume |C|^2)`, with `scale` in m.
     #[inline(always)]
-    pub(super) fn spatial(&self, deformation: &Deformation<R>) -> SpatialBound<R> {
+    pub(super) fn of_patches<L: Law>(
+        law: &L::Wide<R>,
+        deformation: &Deformation<R>,
+        local: &LawState<R>,
+        modulus: R,
+        scale: R,
+    ) -> Self {
+        let coefficients = Coefficients::<R>::new::<L>(law, local).less(modulus);
+        let [distortion, cofactor] = squares(deformation);
+        let (iso, volume) = coefficients.split(local.at, distortion, cofactor);
+        let iso = iso.max(R::splat(0.0));
+        Self { iso, volume, scalar: scale * volume.fused(cofactor, iso), coefficients }
+    }
+
+    /// The bound that rotations do not feel; only for elements that are not crushed. With `modulus`, that of the stabilising energy of
+    /// patches (Pa), `stress` may be negative, as far as that energy resists rotations itself: in the principal axes it has
+    /// `modulus (b_i + b_j) w^2`.
+    #[inline(always)]
+    pub(super) fn spatial(&self, deformation: &Deformation<R>, modulus: Option<R>) -> SpatialBound<R> {
         let (zero, one) = (R::splat(0.0), R::splat(1.0));
         let Coefficients { p1, p_j, cc, ce, ee, .. } = self.coefficients;
         let volume_ratio = one + deformation.invariants.j;
@@ -211,11 +244,19 @@ impl<R: Real> Bound<R> {
                     + difference.yz * difference.yz
                     + difference.zx * difference.zx);
         let mixed = ce.abs() * square.root() * volume_ratio;
-        let shear = (tension.min(zero) - (pressure + pressure)).max(zero);
+        let least = match modulus {
+            Some(modulus) => {
+                let trace = b.trace();
+                -(modulus * (trace - b.scaled_plus(-one, trace).largest_eigenvalue()).max(zero))
+            }
+            None => zero,
+        };
+        let stress = tension.max(least);
+        let shear = ((tension - stress) - (pressure + pressure)).max(zero);
         SpatialBound {
             shear: shear + ee * square + R::splat(1.0 / SPATIAL_SPLIT) * mixed,
             volume: (pressure + cc * volume_ratio * volume_ratio + R::splat(SPATIAL_SPLIT) * mixed).max(zero),
-            stress: tension.max(zero),
+            stress,
         }
     }
 }
@@ -225,6 +266,8 @@ impl<R: Real> Bound<R> {
 pub struct ScalarBound;
 
 impl ElementVisitor for ScalarBound {
+    const BOUNDS_PATCHES: bool = true;
+
     #[inline(always)]
     fn visit<R: Real, L: Law>(
         &mut self,
@@ -234,7 +277,7 @@ impl ElementVisitor for ScalarBound {
         _: &Deformation<R>,
         local: &LawState<R>,
     ) -> R {
-        scalar_bound(&Coefficients::<R>::new::<L>(law, local), local.at, tile, first)
+        scalar_bound(&Coefficients::<R>::new::<L>(law, local), local.at, scale_of(tile, first))
     }
 }
 

@@ -4,7 +4,7 @@
 use crate::material::{Law, Laws};
 use crate::simd::{Gather, Kernel, NodeVector, Real, ScatterBuffer, TILE, write_rows};
 
-use super::deformation::Deformation;
+use super::deformation::{Deformation, Matrix};
 use super::pressure::{MeanPressure, OwnPressure, Pressure};
 use super::stiffness_bound::{Bound, MatrixSums};
 use super::{ElementTile, VolumeRows};
@@ -43,7 +43,7 @@ pub struct TileTangents {
 }
 
 impl TileTangents {
-    const NONE: Self = Self { columns: [[[0.0; 4]; TILE]; 3], factors: [[0.0; 4]; TILE] };
+    pub(super) const NONE: Self = Self { columns: [[[0.0; 4]; TILE]; 3], factors: [[0.0; 4]; TILE] };
 }
 
 /// Least volume ratio of an element that is not crushed.
@@ -81,25 +81,51 @@ impl<L: Law, P> TileBounds<'_, L, P> {
         let deformation = Deformation::<R>::of_tile(tile, first, self.displacement);
         let local = self.pressure.local::<R, L>(&self.laws, tile, first, deformation.invariants);
         let bound = Bound::<R>::new::<L>(&law, tile, first, &deformation, &local);
-        // C in the frame of the element's first node.
-        let mut cofactor = [[R::splat(0.0); 3]; 3];
-        for i in 0..3 {
-            for k in 0..3 {
-                let along = R::from_fn(|lane| self.rotations[(first + lane) % TILE][k][i]);
-                for j in 0..3 {
-                    cofactor[i][j] = cofactor[i][j] + along * deformation.cofactor(k, j);
-                }
+        let cofactor = cofactor_in_frames(self.rotations, first, &deformation);
+        self.sums.add(&bound, tile, first, &cofactor, buffer);
+        if self.weight != 0.0 {
+            let weight = tile.volume::<R>(first) * R::splat(self.weight);
+            tangents.write(first, weight, &bound, &deformation, &cofactor, None);
+        }
+    }
+}
+
+/// `C` in the frame of the first node of each element from place `first` on, or of the node of each patch.
+#[inline(always)]
+pub(super) fn cofactor_in_frames<R: Real>(
+    rotations: &[Rotation; TILE],
+    first: usize,
+    deformation: &Deformation<R>,
+) -> Matrix<R> {
+    let mut cofactor = [[R::splat(0.0); 3]; 3];
+    for i in 0..3 {
+        for k in 0..3 {
+            let along = R::from_fn(|lane| rotations[(first + lane) % TILE][k][i]);
+            for j in 0..3 {
+                cofactor[i][j] = cofactor[i][j] + along * deformation.cofactor(k, j);
             }
         }
-        self.sums.add(&bound, tile, first, &cofactor, buffer);
-        if self.weight == 0.0 {
-            return;
-        }
+    }
+    cofactor
+}
+
+impl TileTangents {
+    /// Writes the tangents from place `first` on, with `weight` (kg m^2 / Pa) as a factor, from their bounds and `cofactor`, `C` in the
+    /// frames. For `modulus` see [`Bound::spatial`].
+    #[inline(always)]
+    pub(super) fn write<R: Real>(
+        &mut self,
+        first: usize,
+        weight: R,
+        bound: &Bound<R>,
+        deformation: &Deformation<R>,
+        cofactor: &Matrix<R>,
+        modulus: Option<R>,
+    ) {
         let (zero, one) = (R::splat(0.0), R::splat(1.0));
-        let weight = tile.volume::<R>(first) * R::splat(self.weight);
-        let volume_ratio = one + local.at.j;
+        let volume_ratio = one + deformation.invariants.j;
         let sound = volume_ratio - R::splat(LEAST_VOLUME);
-        let spatial = bound.spatial(&deformation);
+        let spatial = bound.spatial(deformation, modulus);
         let half = R::splat(0.5) * spatial.shear;
         let factors = [
             weight * sound.choose(half + spatial.stress, bound.iso),
@@ -107,9 +133,9 @@ impl<L: Law, P> TileBounds<'_, L, P> {
             weight * sound.choose(half, zero),
             sound.choose(one, zero),
         ];
-        write_rows(&mut tangents.factors, first, factors);
+        write_rows(&mut self.factors, first, factors);
         let scale = sound.choose(one.divide(volume_ratio), one);
-        for (j, column) in tangents.columns.iter_mut().enumerate() {
+        for (j, column) in self.columns.iter_mut().enumerate() {
             let [x, y, z] = cofactor.map(|row| scale * row[j]);
             write_rows(column, first, [x, y, z, zero]);
         }

@@ -4,7 +4,7 @@
 //! Kc = sum_e V [ (shear / 2 + stress) p_c . p_d I + volume p_c p_d^T + shear / 2 p_d p_c^T ],   p = F^-T grad phi
 //! ```
 //! with the gradients of the interpolated functions, `grad phi_c = sum_a w_c(a) ga`, so that `Kc` is exactly `W^T K W`
-//! for the elements' bounds, and zero for rotations of tissue without tension. In crushed elements the terms are
+//! for the elements' bounds (with nodal strain those of the patches, `ga = c_ab / V_a`), and zero for rotations of tissue without tension. In crushed elements the terms are
 //! `iso grad phi_c . grad phi_d I + volume (C grad phi_c)(C grad phi_d)^T`. At a node that is held along some axes a
 //! function has a different gradient for each axis.
 //!
@@ -19,24 +19,64 @@ use super::patches::{Patch, locate};
 use crate::element::{ElementTile, NodeInertia, TileTangents};
 use crate::simd::{Kernel, Real, TILE, dispatch, write_rows};
 
-/// The bound of the tangent of one element, with `s_c D^2 / 4` as a factor.
+/// The bound of the tangent of an element or of a patch with nodal strain, with `s_c D^2 / 4` as a factor: see [`TileTangents`].
+#[derive(Clone, Copy)]
+pub(super) struct Tangent {
+    pub(super) columns: [[f32; 4]; 3],
+    pub(super) factors: [f32; 4],
+}
+
+impl Tangent {
+    const NONE: Self = Self { columns: [[0.0; 4]; 3], factors: [0.0; 4] };
+
+    /// That of a place of a tile.
+    #[inline(always)]
+    pub(super) fn of(tangents: &TileTangents, lane: usize) -> Self {
+        let columns = [0, 1, 2].map(|column| tangents.columns[column][lane % TILE]);
+        Self { columns, factors: tangents.factors[lane % TILE] }
+    }
+
+    /// `factor |dF|^2`, with `factor` in kg m^2.
+    pub(super) const fn isotropic(factor: f32) -> Self {
+        let columns = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+        Self { columns, factors: [factor, 0.0, 0.0, 0.0] }
+    }
+
+    /// Image of a gradient, and what the first factor is of products of.
+    pub(super) fn image(&self, [x, y, z]: [f32; 3]) -> [Vec4; 2] {
+        let [cx, cy, cz] = self.columns.map(Vec4::from);
+        let image = cx * x + cy * y + cz * z;
+        [image, if self.is_spatial() { image } else { Vec4::new(x, y, z, 0.0) }]
+    }
+
+    /// Whether the first factor is of products of images.
+    #[inline(always)]
+    fn is_spatial(&self) -> bool {
+        self.factors[3] > 0.0
+    }
+}
+
+/// The tangent of one element with its nodes.
 #[derive(Clone, Copy)]
 pub(super) struct ElementTangent {
     pub(super) nodes: [usize; 4],
     /// Shape function gradients, 1/m.
     pub(super) gradients: [[f32; 3]; 4],
-    /// See [`TileTangents`].
-    pub(super) columns: [[f32; 4]; 3],
-    pub(super) factors: [f32; 4],
+    pub(super) tangent: Tangent,
 }
 
 impl ElementTangent {
-    pub(super) const NONE: Self =
-        Self { nodes: [0; 4], gradients: [[0.0; 3]; 4], columns: [[0.0; 4]; 3], factors: [0.0; 4] };
+    pub(super) const NONE: Self = Self { nodes: [0; 4], gradients: [[0.0; 3]; 4], tangent: Tangent::NONE };
 
     /// That of an element of a tile.
     #[inline(always)]
     pub(super) fn of(tile: &ElementTile, tangents: &TileTangents, lane: usize) -> Self {
+        Self::with(tile, lane, Tangent::of(tangents, lane))
+    }
+
+    /// An element of a tile with a tangent.
+    #[inline(always)]
+    pub(super) fn with(tile: &ElementTile, lane: usize, tangent: Tangent) -> Self {
         let mut gradients = [[0.0; 3]; 4];
         for corner in 0..3 {
             for axis in 0..3 {
@@ -45,34 +85,39 @@ impl ElementTangent {
             }
         }
         let nodes = [0, 1, 2, 3].map(|corner| tile.node(corner, lane));
-        let columns = [0, 1, 2].map(|column| tangents.columns[column][lane % TILE]);
-        Self { nodes, gradients, columns, factors: tangents.factors[lane % TILE] }
+        Self { nodes, gradients, tangent }
     }
 
-    /// The product of the tangent with displacements of the nodes: forces, with the factor.
-    pub(super) fn times(&self, displacements: [Vec4; 4]) -> [Vec4; 4] {
-        let [cx, cy, cz] = self.columns.map(Vec4::from);
-        let images = self.gradients.map(|[x, y, z]| cx * x + cy * y + cz * z);
-        let slopes =
-            if self.is_spatial() { images } else { self.gradients.map(|[x, y, z]| Vec4::new(x, y, z, 0.0)) };
-        let [inner, outer, exchanged, _] = self.factors;
-        let mut forces = [Vec4::ZERO; 4];
-        for (force, (slope, image)) in forces.iter_mut().zip(slopes.into_iter().zip(images)) {
-            for (displacement, (other_slope, other_image)) in
-                displacements.into_iter().zip(slopes.into_iter().zip(images))
-            {
-                *force += inner * slope.dot(other_slope) * displacement
-                    + outer * other_image.dot(displacement) * image
-                    + exchanged * image.dot(displacement) * other_image;
-            }
-        }
-        forces
-    }
-
-    /// Whether the first factor is of products of images.
+    /// Its nodes and gradients.
     #[inline(always)]
-    fn is_spatial(&self) -> bool {
-        self.factors[3] > 0.0
+    pub(super) fn corners(&self) -> impl Iterator<Item = (usize, [f32; 3])> + Clone + use<> {
+        self.nodes.into_iter().zip(self.gradients)
+    }
+}
+
+/// The product of a tangent with displacements of nodes: calls `add` with each node and its force, with the factor. `corners` are
+/// nodes with their gradients.
+pub(super) fn forces(
+    tangent: &Tangent,
+    corners: impl Iterator<Item = (usize, [f32; 3])> + Clone,
+    displacement: impl Fn(usize) -> Vec4,
+    mut add: impl FnMut(usize, Vec4),
+) {
+    // Sums of the outer products of displacements with gradients and of images with displacements, by their columns.
+    let (mut along, mut across, mut trace) = ([Vec4::ZERO; 3], [Vec4::ZERO; 3], 0.0);
+    for (node, gradient) in corners.clone() {
+        let (displacement, [image, slope]) = (displacement(node), tangent.image(gradient));
+        for axis in 0..3 {
+            along[axis] += displacement * slope[axis];
+            across[axis] += image * displacement[axis];
+        }
+        trace += image.dot(displacement);
+    }
+    let [inner, outer, exchanged, _] = tangent.factors;
+    let times = |[x, y, z]: [Vec4; 3], vector: Vec4| x * vector.x + y * vector.y + z * vector.z;
+    for (node, gradient) in corners {
+        let [image, slope] = tangent.image(gradient);
+        add(node, inner * times(along, slope) + outer * trace * image + exchanged * times(across, image));
     }
 }
 
@@ -92,6 +137,8 @@ pub(super) struct Assembly<'a> {
 
 /// Most functions that are not zero at the four nodes of an element.
 const TOUCHED: usize = 32;
+/// The same for a patch with nodal strain, which may have any number of nodes.
+const TOUCHED_BY_PATCH: usize = MAX_FUNCTIONS;
 const NOT_TOUCHED: u8 = u8::MAX;
 /// For each function its index among those of the element at hand; [`NOT_TOUCHED`] for other functions, and between
 /// elements.
@@ -166,7 +213,7 @@ impl Kernel for Batch<'_, '_> {
         for (index, element) in elements.iter().enumerate().take(BATCH) {
             // Crushed elements have other products.
             match locate(assembly.lattice, assembly.nodes, assembly.inertia, &element.nodes)
-                .filter(|_| element.is_spatial())
+                .filter(|_| element.tangent.is_spatial())
             {
                 Some((patch, nodes)) => {
                     for corner in 0..4 {
@@ -177,7 +224,7 @@ impl Kernel for Batch<'_, '_> {
                     }
                     keys[index] = patch.key() << 8 | index as u64;
                 }
-                _ => assembly.add_element(element, &mut slots),
+                _ => assembly.add_directly::<TOUCHED>(element.corners(), &element.tangent, &mut slots),
             }
         }
         // Vectors of eight, because most patches have 8 or 12 functions.
@@ -327,7 +374,7 @@ fn derive<R: Real>(
     slots: &PatchSlots,
     derivatives: &mut Derivatives,
 ) {
-    let [cx, cy, cz] = element.columns.map(Vec4::from);
+    let [cx, cy, cz] = element.tangent.columns.map(Vec4::from);
     let images = element.gradients.map(|[x, y, z]| (cx * x + cy * y + cz * z).to_array());
     let mut weights = [[[0.0; 3]; 3]; 4];
     for corner in 0..4 {
@@ -363,7 +410,7 @@ fn derive<R: Real>(
 /// The derivatives of the functions in the slots from `first` on, with an element's factors.
 #[inline(always)]
 fn scale<R: Real>(element: &ElementTangent, derivatives: &Derivatives, first: usize) -> Scaled<R> {
-    let [inner, outer, exchanged, _] = element.factors;
+    let [inner, outer, exchanged, _] = element.tangent.factors;
     let mut scaled = [[R::splat(0.0); 3]; 4];
     for (scaled, factor) in scaled.iter_mut().zip([inner, outer, exchanged, outer + exchanged]) {
         for axis in 0..3 {
@@ -402,14 +449,36 @@ fn products<R: Real>(derivatives: &[Derivatives], scaled: &[Scaled<R>], row: usi
 }
 
 impl Assembly<'_> {
-    /// Adds the tangent of an element directly to the matrix.
-    #[inline(always)]
+    /// Adds the tangent of an element.
+    #[inline(never)]
     pub(super) fn add_element(&mut self, element: &ElementTangent, slots: &mut Slots) {
+        self.add_directly::<TOUCHED>(element.corners(), &element.tangent, slots);
+    }
+
+    /// Adds the tangent of a patch with these nodes and gradients.
+    #[inline(never)]
+    pub(super) fn add_patch(
+        &mut self,
+        nodes: impl Iterator<Item = (usize, [f32; 3])>,
+        tangent: &Tangent,
+        slots: &mut Slots,
+    ) {
+        self.add_directly::<TOUCHED_BY_PATCH>(nodes, tangent, slots);
+    }
+
+    /// Adds a tangent directly to the matrix; its nodes touch at most `T` functions.
+    #[inline(always)]
+    fn add_directly<const T: usize>(
+        &mut self,
+        corners: impl Iterator<Item = (usize, [f32; 3])>,
+        tangent: &Tangent,
+        slots: &mut Slots,
+    ) {
         // Derivatives of each function along the three material axes. Their components are the spatial axes, because a
         // function may be zero along some of these.
-        let mut touched = [[Vec4::ZERO; 3]; TOUCHED];
+        let mut touched = [[Vec4::ZERO; 3]; T];
         let (mut count, mut bits) = (0, 0u128);
-        for (&node, gradient) in element.nodes.iter().zip(element.gradients) {
+        for (node, gradient) in corners {
             let (Some(at), Some(inertia)) = (node_place(self.nodes, node), self.inertia.get(node)) else {
                 continue;
             };
@@ -434,14 +503,14 @@ impl Assembly<'_> {
                 }
             }
         }
-        let [cx, cy, cz] = element.columns.map(Vec4::from);
-        let [inner, outer, exchanged, _] = element.factors;
+        let [cx, cy, cz] = tangent.columns.map(Vec4::from);
+        let [inner, outer, exchanged, _] = tangent.factors;
         // In ascending order of the functions, because only submatrices on and below the diagonal are kept.
-        let mut functions = [0usize; TOUCHED];
-        let mut images = [Vec4::ZERO; TOUCHED];
-        let mut slopes = [[Vec4::ZERO; 3]; TOUCHED];
+        let mut functions = [0usize; T];
+        let mut images = [Vec4::ZERO; T];
+        let mut slopes = [[Vec4::ZERO; 3]; T];
         // The derivative of each function along each spatial axis; components as in `touched`.
-        let mut derivatives = [[Vec4::ZERO; 3]; TOUCHED];
+        let mut derivatives = [[Vec4::ZERO; 3]; T];
         for place in 0..count {
             let function = bits.trailing_zeros() as usize;
             bits &= bits.wrapping_sub(1);
@@ -452,15 +521,14 @@ impl Assembly<'_> {
                 return;
             };
             *slot = NOT_TOUCHED;
-            functions[place % TOUCHED] = function;
-            images[place % TOUCHED] = cx * x + cy * y + cz * z;
+            functions[place % T] = function;
+            images[place % T] = cx * x + cy * y + cz * z;
             let along = |axis: usize| cx[axis] * x + cy[axis] * y + cz[axis] * z;
-            derivatives[place % TOUCHED] = [along(0), along(1), along(2)];
-            slopes[place % TOUCHED] =
-                if element.is_spatial() { derivatives[place % TOUCHED] } else { [x, y, z] };
+            derivatives[place % T] = [along(0), along(1), along(2)];
+            slopes[place % T] = if tangent.is_spatial() { derivatives[place % T] } else { [x, y, z] };
         }
         for c in 0..count {
-            let c = c % TOUCHED;
+            let c = c % T;
             let first = 3 * functions[c] * self.stride;
             let rows = self.matrix.get_mut(first..first + 3 * self.stride);
             let Some((row_x, rows)) = rows.and_then(|rows| rows.split_at_mut_checked(self.stride)) else {
@@ -478,7 +546,7 @@ impl Assembly<'_> {
             // A submatrix is added with four columns, the last of zeros in the next submatrix. That would then have to
             // wait for the cache. So every second submatrix is added first.
             for d in (0..=c).step_by(2).chain((1..=c).step_by(2)) {
-                let d = d % TOUCHED;
+                let d = d % T;
                 let diagonal = x * slopes[d][0] + y * slopes[d][1] + z * slopes[d][2];
                 let column = 3 * functions[d];
                 let [ex, ey, ez] = exchanged_rows;

@@ -1,6 +1,6 @@
 //! The lattice's matrices, compared with direct sums.
 
-use super::assembly::{Assembly, BATCH, ElementTangent, NO_SLOTS};
+use super::assembly::{Assembly, BATCH, ElementTangent, NO_SLOTS, Tangent};
 use super::dense::{row_length, stride};
 use super::lattice::{Lattice, LatticeNode, sort_by_cell};
 use super::nodal_sums::{FunctionInertia, add_inertia, add_mass, times, write_mass};
@@ -73,7 +73,8 @@ fn stiffness_from_patches_is_that_from_single_elements() {
         let nodes = tet.map(|node| node as usize);
         let factors =
             [1.0 + random(), 20.0 + random(), 5.0 + random(), if random() > 0.0 { 1.0 } else { 0.0 }];
-        let element = ElementTangent { nodes, gradients, columns, factors };
+        let tangent = Tangent { columns, factors };
+        let element = ElementTangent { nodes, gradients, tangent };
         let matrix = &mut direct;
         let mut assembly = Assembly { lattice: &lattice, nodes: &places, inertia: &inertia, matrix, stride };
         assembly.add_element(&element, &mut NO_SLOTS.clone());

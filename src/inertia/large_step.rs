@@ -7,6 +7,7 @@ use bytemuck::must_cast_slice_mut;
 
 use crate::element::ElementMaterial;
 use crate::loads::Loads;
+use crate::material::Element;
 use crate::scene::SceneView;
 use crate::simd::{Contiguous, NodeVector};
 use crate::state::StateView;
@@ -31,6 +32,7 @@ use super::{
 pub struct LargeModel<'w> {
     pub(super) nodes: usize,
     pub(super) elements: usize,
+    pub(super) element: Element,
     /// Elements that touch a node that motions may move: the first ones in the order.
     pub(super) moved_elements: usize,
     /// Checksum of the scene.
@@ -54,7 +56,7 @@ pub struct LargeModel<'w> {
 pub(super) struct Storage<'a> {
     pub(super) tables: NodeTables<'a>,
     pub(super) places: &'a mut [LatticeNode],
-    /// The elements in the order of their patches of cells (`assembly.rs`); empty without a lattice.
+    /// The elements in the order of their patches of cells (`assembly.rs`); empty without a lattice, and with nodal strain.
     pub(super) order: &'a mut [u32],
     pub(super) matrices: Matrices<'a>,
 }
@@ -63,6 +65,7 @@ impl<'a> Storage<'a> {
     /// None if `storage` is shorter than [`vectors_for_lattice`].
     pub(super) fn split(
         storage: &'a mut [NodeVector],
+        element: Element,
         [nodes, elements]: [usize; 2],
         lattice: &Lattice,
         damped: bool,
@@ -74,11 +77,11 @@ impl<'a> Storage<'a> {
         let (places, rest) = rest.split_at_mut_checked(places)?;
         let places: &mut [[LatticeNode; 2]] = must_cast_slice_mut(places.as_chunks_mut::<3>().0);
         let places = places.as_flattened_mut().get_mut(..if has_lattice { nodes } else { 0 })?;
-        let (order, rest) =
-            rest.split_at_mut_checked(if has_lattice { vectors_of_order(elements) } else { 0 })?;
+        let order = if has_lattice { vectors_of_order(element, elements) } else { 0 };
+        let (order, rest) = rest.split_at_mut_checked(order)?;
         let order: &mut [u32] = must_cast_slice_mut(order);
-        let order = order.get_mut(..if has_lattice { elements } else { 0 })?;
-        let matrices = Matrices::split(must_cast_slice_mut(rest), lattice)?;
+        let order = order.get_mut(..elements.min(order.len()))?;
+        let matrices = Matrices::split(must_cast_slice_mut(rest), lattice, element.is_nodal_strain())?;
         Some(Self { tables, places, order, matrices })
     }
 }
@@ -132,6 +135,7 @@ impl<'w> LargeModel<'w> {
         Self {
             nodes,
             elements: scene.element_count(),
+            element: M::ELEMENT,
             moved_elements: 0,
             scene: scene.checksum(),
             steps: 0,
@@ -139,7 +143,7 @@ impl<'w> LargeModel<'w> {
             rough: RoughMotion::NONE,
             step,
             scaling: scaling(step, has_lattice),
-            refresh: Refresh::new(cycle(step, has_lattice), scene.tiles.len(), nodes, grid.functions, cells),
+            refresh: Refresh::new(cycle(step, has_lattice), scene, grid.functions, cells),
             lattice: Lattice::NONE,
             estimate: ErrorEstimate::new(libm::hypotf(libm::hypotf(size[0], size[1]), size[2])),
             least_share: 1.0,
@@ -163,18 +167,20 @@ impl<'w> LargeModel<'w> {
             if capacity < needed { Err(InertiaError::Capacity { kind, needed, capacity }) } else { Ok(()) }
         };
         let (damped, capacity) = (self.method.damper().is_some(), storage.len());
-        let needed = vectors_for_lattice(self.nodes, self.elements, grid, damped);
+        let needed = vectors_for_lattice(M::ELEMENT, self.nodes, self.elements, grid, damped);
         check("vectors", needed, capacity)?;
         check("nodes in the state", self.nodes, state.capacity_for::<M>())?;
         storage.fill(NodeVector::ZERO);
         let Some(Storage { mut tables, places, order, mut matrices }) =
-            Storage::split(storage, [self.nodes, self.elements], &self.lattice, damped)
+            Storage::split(storage, M::ELEMENT, [self.nodes, self.elements], &self.lattice, damped)
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
         };
         write_heights(scene, &mut tables);
         self.choose_frames(scene, points, &mut tables, places)?;
-        self.moved_elements = sort_by_patch(order, scene, &self.lattice, places);
+        if !M::ELEMENT.is_nodal_strain() {
+            self.moved_elements = sort_by_patch(order, scene, &self.lattice, places);
+        }
         let StateView { displacement, increment, volume, progress, .. } = state;
         self.steps = progress.steps;
         let nodes = self.nodes;
@@ -248,8 +254,9 @@ impl<'w> LargeModel<'w> {
     }
 
     /// Whether it was prepared for this scene.
-    pub(super) fn is_for<M>(&self, scene: SceneView<'_, M>) -> bool {
-        self.nodes == scene.node_count()
+    pub(super) fn is_for<M: ElementMaterial>(&self, scene: SceneView<'_, M>) -> bool {
+        self.element == M::ELEMENT
+            && self.nodes == scene.node_count()
             && self.elements == scene.element_count()
             && self.scene == scene.checksum()
     }
@@ -382,9 +389,6 @@ fn checked_grid<M: ElementMaterial>(
     scene: SceneView<'_, M>,
     points: &[[f32; 3]],
 ) -> Result<Grid, InertiaError> {
-    if M::ELEMENT.is_nodal_strain() {
-        return Err(InertiaError::NodalStrain);
-    }
     let nodes = scene.node_count();
     if points.len() != nodes {
         return Err(InertiaError::Points { points: points.len(), nodes });

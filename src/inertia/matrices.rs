@@ -25,6 +25,8 @@ pub(super) struct Matrices<'a> {
     /// following.
     pub(super) mass: &'a mut [f32],
     pub(super) mass_inverse: &'a mut [f32],
+    /// The stiffness of the stabilising energy of nodal strain, with the factor `s_c D^2 / 4`; laid out as `Mc`, empty for others.
+    pub(super) stabilising: &'a mut [f32],
     /// See [`super::transport`].
     pub(super) edge_inverse: &'a mut [f32],
     /// Used by the passes over the nodes: sums of the residual, later the lattice's motion; the motion that the nodes'
@@ -46,11 +48,12 @@ const fn matrix_floats(functions: usize) -> [usize; 2] {
     [3 * functions * stride(functions), functions * row_length(functions)]
 }
 
-/// Floats of storage for a lattice with this many cells and functions.
-pub(super) const fn floats_for(cells: usize, functions: usize) -> usize {
+/// Floats of storage for a lattice with this many cells and functions, on a scene with nodal strain or without.
+pub(super) const fn floats_for(cells: usize, functions: usize, nodal_strain: bool) -> usize {
     let [matrix, scalar_matrix] = matrix_floats(functions);
+    let scalar_matrices = if nodal_strain { 10 } else { 7 };
     let sums = (3 * POLYNOMIAL_FLOATS + SUM_FLOATS).saturating_mul(cells_with_sums(cells, functions));
-    sums.saturating_add(4 * matrix + 7 * scalar_matrix + 2 * INERTIA_FLOATS * functions)
+    sums.saturating_add(4 * matrix + scalar_matrices * scalar_matrix + 2 * INERTIA_FLOATS * functions)
 }
 
 /// Number of cells with sums: none if there are no functions.
@@ -59,7 +62,7 @@ const fn cells_with_sums(cells: usize, functions: usize) -> usize {
 }
 
 impl<'a> Matrices<'a> {
-    pub(super) fn split(dense: &'a mut [f32], lattice: &Lattice) -> Option<Self> {
+    pub(super) fn split(dense: &'a mut [f32], lattice: &Lattice, nodal_strain: bool) -> Option<Self> {
         let [matrix, scalar_matrix] = matrix_floats(lattice.functions());
         let count = cells_with_sums(lattice.cell_count(), lattice.functions());
         let (coarse_inverse, rest) = dense.split_at_mut_checked(matrix)?;
@@ -68,6 +71,8 @@ impl<'a> Matrices<'a> {
         let (next_fine, rest) = rest.split_at_mut_checked(matrix)?;
         let (mass, rest) = rest.split_at_mut_checked(3 * scalar_matrix)?;
         let (mass_inverse, rest) = rest.split_at_mut_checked(3 * scalar_matrix)?;
+        let stabilising = if nodal_strain { 3 * scalar_matrix } else { 0 };
+        let (stabilising, rest) = rest.split_at_mut_checked(stabilising)?;
         let (edge_inverse, rest) = rest.split_at_mut_checked(scalar_matrix)?;
         let (cells, rest) = split_polynomials(rest, count)?;
         let (fine_cells, rest) = split_polynomials(rest, count)?;
@@ -85,6 +90,7 @@ impl<'a> Matrices<'a> {
             next_fine,
             mass,
             mass_inverse,
+            stabilising,
             edge_inverse,
             cells,
             fine_cells,

@@ -1,6 +1,6 @@
 //! Which of the three methods a step beyond the critical one uses, the lattice it needs, and the storage for both.
 
-use crate::material::Material;
+use crate::material::{Element, Material};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 
@@ -77,21 +77,27 @@ pub fn vectors_for<M: Material>(
     scene: SceneView<'_, M>,
     points: &[[f32; 3]],
 ) -> Result<usize, InertiaError> {
-    let grid = method.grid(scene, points)?;
-    Ok(vectors_for_lattice(scene.node_count(), scene.element_count(), grid, method.damper().is_some()))
+    let (nodes, elements, grid) = (scene.node_count(), scene.element_count(), method.grid(scene, points)?);
+    Ok(vectors_for_lattice(M::ELEMENT, nodes, elements, grid, method.damper().is_some()))
 }
 
 /// The same for this many nodes and elements and a known lattice.
 #[must_use]
-pub const fn vectors_for_lattice(nodes: usize, elements: usize, grid: Grid, damped: bool) -> usize {
+pub const fn vectors_for_lattice(
+    element: Element,
+    nodes: usize,
+    elements: usize,
+    grid: Grid,
+    damped: bool,
+) -> usize {
     let tables = node_tables::vectors_for(nodes, damped);
     if grid.functions == 0 {
         return tables;
     }
     let [x, y, z] = grid.cells;
     let cells = (x as usize).saturating_mul(y as usize).saturating_mul(z as usize);
-    let floats = matrices::floats_for(cells, grid.functions);
-    let lists = vectors_of_places(nodes).saturating_add(vectors_of_order(elements));
+    let floats = matrices::floats_for(cells, grid.functions, element.is_nodal_strain());
+    let lists = vectors_of_places(nodes).saturating_add(vectors_of_order(element, elements));
     tables.saturating_add(lists).saturating_add(floats.div_ceil(FLOATS))
 }
 
@@ -106,9 +112,9 @@ pub(super) const fn vectors_of_places(nodes: usize) -> usize {
     3 * nodes.div_ceil(2)
 }
 
-/// Vectors of storage for the order of this many elements.
-pub(super) const fn vectors_of_order(elements: usize) -> usize {
-    elements.div_ceil(FLOATS)
+/// Vectors of storage for the order of this many elements; patches with nodal strain have none.
+pub(super) const fn vectors_of_order(element: Element, elements: usize) -> usize {
+    if element.is_nodal_strain() { 0 } else { elements.div_ceil(FLOATS) }
 }
 
 /// Least spacing of the points of a suggested lattice, as a multiple of the nodes'.

@@ -92,6 +92,7 @@ mod large_step;
 mod lattice;
 mod matrices;
 mod method;
+mod nodal_strain;
 mod nodal_sums;
 mod node;
 mod node_refresh;
@@ -127,7 +128,7 @@ const COARSE_GROWTH: f32 = COARSE * (1.0 - NODE_GROWTH / FINE);
 /// elements.
 const LARGEST_MOVE: f32 = 0.02;
 /// Largest strain of a cell of the lattice by which the forces of one step may move it from rest.
-const LARGEST_STRAIN: f32 = 0.1;
+const LARGEST_STRAIN: f32 = 0.2;
 /// Share of the last increment's unresolved deformation of the lattice that a step removes where a step renews all bounds, and the
 /// largest share.
 const DRAG_AT_WHOLE_CYCLES: f32 = 0.02;
@@ -150,8 +151,6 @@ const LATTICE_CYCLE_STEPS: u32 = 256;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum InertiaError {
-    /// Tetrahedra with nodal strain, whose stiffness these steps do not know.
-    NodalStrain,
     /// Less memory than the scene or the lattice needs.
     Capacity {
         /// "vectors" or "nodes in the state".
@@ -193,11 +192,6 @@ pub enum InertiaError {
 impl fmt::Display for InertiaError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::NodalStrain => write!(
-                f,
-                "tetrahedra with nodal strain take exact steps only; mass-scaled, multilevel and damped ones need \"nodal-pressure\" or \
-                 \"linear\""
-            ),
             Self::Capacity { kind, needed, capacity } => {
                 write!(f, "the inertia needs {needed} {kind}, there is room for {capacity}")
             }

@@ -16,6 +16,7 @@ use super::dense::{PIVOTS, Row, apply, apply_lower, mirror, row_length, stride, 
 use super::frames::{Frames, Rotation};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, rank_of};
 use super::matrices::{Matrices, copy, invert_axes, of_axes};
+use super::nodal_strain::{self, write_stabilising};
 use super::nodal_sums::{self, FunctionInertia, add_mass, write_mass};
 use super::node::Scaling;
 use super::node_refresh::{NODE_BATCH, NodeBatch};
@@ -75,10 +76,12 @@ pub(super) struct Refresh {
     pub(super) fine_in_use: bool,
 }
 
-/// Measured costs of a tile, of a tile without a lattice, of a cell, of a node, and of an entry of a row that is
+/// Measured costs of a tile, of a tile without a lattice, of both with patches of nodal strain, of a cell, of a node, and of an entry of a row that is
 /// mirrored. The unit is the time of a floating-point operation of a pivot.
 const TILE_COST: i64 = 47_000;
 const TILE_UNCOUPLED_COST: i64 = 18_000;
+const PATCH_TILE_COST: i64 = 600_000;
+const PATCH_TILE_UNCOUPLED_COST: i64 = 30_000;
 const CELL_COST: i64 = 16_000;
 const NODE_COST: i64 = 1_500;
 const ROW_COST: i64 = 12;
@@ -89,6 +92,11 @@ const BATCH_TILES: usize = BATCH / TILE;
 /// Cost of a tile.
 const fn tile_cost(functions: usize) -> i64 {
     if functions > 0 { TILE_COST } else { TILE_UNCOUPLED_COST }
+}
+
+/// Cost of a tile of patches.
+const fn patch_tile_cost(functions: usize) -> i64 {
+    if functions > 0 { PATCH_TILE_COST } else { PATCH_TILE_UNCOUPLED_COST }
 }
 
 /// Change of the lattice's shape within which a cycle has to end, for tissue that is as stiff in volume as in shear.
@@ -158,7 +166,7 @@ pub(super) struct RefreshInput<'a, M> {
 
 impl<M> RefreshInput<'_, M> {
     /// The assembly of the coarse stiffness.
-    fn assembly<'a>(&'a self, matrix: &'a mut [f32], stride: usize) -> Assembly<'a> {
+    pub(super) fn assembly<'a>(&'a self, matrix: &'a mut [f32], stride: usize) -> Assembly<'a> {
         Assembly { lattice: self.lattice, nodes: self.places, inertia: self.scene.inertia, matrix, stride }
     }
 }
@@ -186,10 +194,20 @@ impl Refresh {
         fine_in_use: true,
     };
 
-    /// Cycles of `steps` steps for a scene with this many tiles and nodes, and a lattice with this many functions and
-    /// cells.
-    pub(super) fn new(steps: u32, tiles: usize, nodes: usize, functions: usize, cells: usize) -> Self {
-        let whole = tiles.next_multiple_of(BATCH_TILES) as i64 * tile_cost(functions)
+    /// Cycles of `steps` steps for a scene, and a lattice with this many functions and cells.
+    pub(super) fn new<M: ElementMaterial>(
+        steps: u32,
+        scene: SceneView<'_, M>,
+        functions: usize,
+        cells: usize,
+    ) -> Self {
+        let (nodes, tiles) = (scene.node_count(), scene.tiles.len());
+        let bounds = if M::ELEMENT.is_nodal_strain() {
+            scene.patches.tiles().len() as i64 * patch_tile_cost(functions)
+        } else {
+            tiles.next_multiple_of(BATCH_TILES) as i64 * tile_cost(functions)
+        };
+        let whole = bounds
             + nodes.next_multiple_of(NODE_BATCH) as i64 * NODE_COST
             + cells as i64 * CELL_COST
             + 2 * (sweeps(3 * functions) as i64 * sweep_cost(functions)
@@ -260,6 +278,9 @@ impl Refresh {
             write_mass(matrices.mass, lattice, input.places, input.scene.inertia);
             self.sound &= invert_axes(matrices.mass_inverse, matrices.mass, functions);
             self.sound &= invert_edges(matrices.edge_inverse, lattice);
+            if M::ELEMENT.is_nodal_strain() {
+                write_stabilising(matrices.stabilising, matrices.next_coarse, &input);
+            }
         }
         self.frames.update(input.displacement);
         while self.first_cycle {
@@ -296,6 +317,7 @@ impl Refresh {
         let at = self.done;
         self.done += 1;
         match self.stage {
+            Stage::Elements if M::ELEMENT.is_nodal_strain() => self.add_patches(input, tables, matrices, at),
             Stage::Elements => self.add_elements(input, tables, matrices, at),
             Stage::Nodes => self.add_nodes(input, tables, matrices, at),
             Stage::NodeCells => self.add_node_cell(input, matrices, at),
@@ -315,12 +337,7 @@ impl Refresh {
     ) -> i64 {
         let functions = input.lattice.functions();
         if at == 0 {
-            tables.clear_sums();
-            (self.next_stiffness, self.next_added) = (Stiffness::NONE, AddedInertiaSums::NEW);
-            let factor = 1.0 + input.scaling.k;
-            matrices.next_coarse.fill(0.0);
-            add_mass(matrices.next_coarse, stride(functions), matrices.mass, functions, factor);
-            self.frames.start_cycle();
+            self.start_cycle(input, tables, matrices);
         }
         let mut batch = [ElementTangent::NONE; BATCH];
         let mut parts = batch.chunks_exact_mut(TILE);
@@ -344,6 +361,50 @@ impl Refresh {
             self.enter(Stage::Nodes);
         }
         BATCH_TILES as i64 * tile_cost(functions)
+    }
+
+    /// The bounds of tile `at` of the patches of nodal strain. Not inlined, as above.
+    #[inline(never)]
+    fn add_patches<M: ElementMaterial>(
+        &mut self,
+        input: &RefreshInput<'_, M>,
+        tables: &mut NodeTables<'_>,
+        matrices: &mut Matrices<'_>,
+        at: usize,
+    ) -> i64 {
+        let functions = input.lattice.functions();
+        if at == 0 {
+            self.start_cycle(input, tables, matrices);
+        }
+        let (tiles, stride) = (input.scene.patches.tiles(), stride(functions));
+        if let Some(tile) = tiles.get(at) {
+            let mut assembly = (functions > 0).then(|| input.assembly(matrices.next_coarse, stride));
+            let tangents = nodal_strain::add_tile(input, &self.frames, tables, tile, assembly.as_mut());
+            if functions > 0 {
+                self.next_stiffness.add(&tangents);
+            }
+        }
+        if self.done >= tiles.len() {
+            self.enter(Stage::Nodes);
+        }
+        patch_tile_cost(functions)
+    }
+
+    /// Prepares sums and matrices for the bounds of a cycle.
+    fn start_cycle<M>(
+        &mut self,
+        input: &RefreshInput<'_, M>,
+        tables: &mut NodeTables<'_>,
+        matrices: &mut Matrices<'_>,
+    ) {
+        let functions = input.lattice.functions();
+        tables.clear_sums();
+        (self.next_stiffness, self.next_added) = (Stiffness::NONE, AddedInertiaSums::NEW);
+        let factor = 1.0 + input.scaling.k;
+        matrices.next_coarse.fill(0.0);
+        add_mass(matrices.next_coarse, stride(functions), matrices.mass, functions, factor);
+        add_mass(matrices.next_coarse, stride(functions), matrices.stabilising, functions, 1.0);
+        self.frames.start_cycle();
     }
 
     /// The inertia of batch `at` of the nodes.

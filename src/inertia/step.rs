@@ -59,7 +59,9 @@ impl LargeView<'_, '_> {
         let nodes = model.nodes;
         let mismatch = Status::Mismatch { nodes: scene.node_count(), room: nodes.min(state.capacity()) };
         let damped = model.method.damper().is_some();
-        let Some(storage) = Storage::split(storage, [nodes, model.elements], &model.lattice, damped) else {
+        let Some(storage) =
+            Storage::split(storage, model.element, [nodes, model.elements], &model.lattice, damped)
+        else {
             return mismatch;
         };
         if !model.is_for(scene) {

@@ -9,10 +9,10 @@
 
 use glam::Vec4;
 
-use super::assembly::ElementTangent;
+use super::assembly::{ElementTangent, forces};
 use super::frames::Rotation;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, node_place};
-use super::patches::nodes_of;
+use super::nodal_strain;
 use crate::element::{
     ElementMaterial, ElementTile, MatrixSums, NodeInertia, OwnPressure, TileBounds, TileTangents, tile_bounds,
 };
@@ -34,7 +34,7 @@ pub(super) struct MovingSupports<'a, M> {
     pub(super) scene: SceneView<'a, M>,
     pub(super) lattice: &'a Lattice,
     pub(super) places: &'a [LatticeNode],
-    /// The elements that touch a node that motions may move.
+    /// The elements that touch a node that motions may move; with nodal strain none.
     pub(super) elements: &'a [u32],
     /// `s_c D^2 / 4`, s^2.
     pub(super) weight: f32,
@@ -55,14 +55,11 @@ impl<M: ElementMaterial> MovingSupports<'_, M> {
         increment: &mut [NodeVector],
         changes: &mut [NodeVector],
     ) -> Option<Pull> {
-        if loads.motions().is_empty() || self.elements.is_empty() {
+        if loads.motions().is_empty() || (self.elements.is_empty() && !M::ELEMENT.is_nodal_strain()) {
             return None;
         }
-        let tiles = self.scene.tiles;
-        for node in self.elements.iter().filter_map(|&place| nodes_of(tiles, place)).flatten() {
-            if let Some(NodeVector([x, y, z, _])) = changes.get_mut(node) {
-                (*x, *y, *z) = (0.0, 0.0, 0.0);
-            }
+        for NodeVector([x, y, z, _]) in &mut *changes {
+            (*x, *y, *z) = (0.0, 0.0, 0.0);
         }
         let mut moves = false;
         loads.each_prescribed(
@@ -82,27 +79,31 @@ impl<M: ElementMaterial> MovingSupports<'_, M> {
             return None;
         }
         let mut pull = Pull { residual: [NodeVector::ZERO; MAX_FUNCTIONS + 1], energy: 0.0 };
-        for places in self.elements.chunks(TILE) {
-            self.add_tile(&ElementTile::gather(tiles, places), places.len(), changes, &mut pull);
+        let changed = |node: usize| {
+            changes.get(node).map_or(Vec4::ZERO, |&NodeVector([x, y, z, _])| Vec4::new(x, y, z, 0.0))
+        };
+        let mut add = |node, force: Vec4| {
+            pull.energy += force.dot(changed(node));
+            self.add_force(node, force, &mut pull.residual);
+        };
+        if M::ELEMENT.is_nodal_strain() {
+            nodal_strain::resist(self.scene, self.weight, self.displacement, changed, add);
+        } else {
+            for places in self.elements.chunks(TILE) {
+                self.add_tile(places, changed, &mut add);
+            }
         }
         Some(pull)
     }
 
-    /// Adds the elements at the first `count` places of a tile.
-    fn add_tile(&self, tile: &ElementTile, count: usize, changes: &[NodeVector], pull: &mut Pull) {
-        let tangents = self.tangents(tile);
-        for lane in 0..count {
-            let element = ElementTangent::of(tile, &tangents, lane);
-            let changes = element.nodes.map(|node| {
-                changes.get(node).map_or(Vec4::ZERO, |&NodeVector([x, y, z, _])| Vec4::new(x, y, z, 0.0))
-            });
-            if changes == [Vec4::ZERO; 4] {
-                continue;
-            }
-            for ((node, force), change) in element.nodes.into_iter().zip(element.times(changes)).zip(changes)
-            {
-                pull.energy += force.dot(change);
-                self.add_force(node, force, &mut pull.residual);
+    /// Calls `add` with the nodes of the elements at these places and the forces by which they resist the changes.
+    fn add_tile(&self, places: &[u32], changed: impl Fn(usize) -> Vec4, mut add: impl FnMut(usize, Vec4)) {
+        let tile = ElementTile::gather(self.scene.tiles, places);
+        let tangents = self.tangents(&tile);
+        for lane in 0..places.len() {
+            let element = ElementTangent::of(&tile, &tangents, lane);
+            if element.nodes.iter().any(|&node| changed(node) != Vec4::ZERO) {
+                forces(&element.tangent, element.corners(), &changed, &mut add);
             }
         }
     }

@@ -105,7 +105,7 @@ impl<M: Material> Material for NodalPressure<M> {
 
 /// The same material in tetrahedra with stabilised nodal strain, which bend as they should on coarse meshes: all energy is taken at the
 /// nodes, from the mean displacement gradient of the elements of one tissue around them, and a quadratic energy holds what the mean
-/// does not see (Dohrmann et al. 2000; Puso & Solberg 2006). For exact steps. Under strains above a half elements at sharp edges may
+/// does not see (Dohrmann et al. 2000; Puso & Solberg 2006). Under strains above a half elements at sharp edges may
 /// turn inside out, and laws that stiffen much are too soft there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodalStrain<M>(pub M);

@@ -2,11 +2,12 @@
 //! total force on each node (N) and the sums over the nodes; when all parts have these, the moves of the nodes.
 
 use core::array::from_fn;
+use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::element::{
-    ElementLaw, ElementMaterial, Extremes, ForcesVisitor, InternalForces, MeanPressure, NodalVolumes,
-    NodeInertia, OwnPressure, PatchForces,
+    ElementMaterial, Extremes, ForcesVisitor, InternalForces, MeanPressure, NodalVolumes, NodeInertia,
+    OwnPressure, PatchForces,
 };
 use crate::loads::{Loads, ramp_factor};
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
@@ -129,7 +130,8 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     if M::ELEMENT.is_nodal_strain() {
         let force = Scatter::from(elements.partitions.nodes(&partitions).start, force);
         let (laws, patches) = (elements.laws, scene.patches);
-        M::Law::patch_forces(PatchForces { laws, patches, partitions, displacement, force })
+        let visitor = PhantomData;
+        V::patch_forces(PatchForces { laws, patches, partitions, displacement, force, visitor })
     } else if M::ELEMENT.is_nodal_pressure() {
         let pressure = MeanPressure::new(scene.volume_rows(volumes));
         let kernel =

@@ -28,8 +28,8 @@ fn physics_of_a_case_is_a_table_with_orders_of_convergence() {
     let heads = "case,mesh,element,method,nodes,tetrahedra,quantity,unit,value,reference,source,error_percent,\
                  us_per_simulated_second,computing_seconds,note";
     assert_eq!(csv.lines().next(), Some(heads));
-    // Two kinds of steps on three meshes and an order, for each of two elements; nodal strain takes exact steps only.
-    assert_eq!(csv.lines().count(), 1 + 2 * 7 + 4);
+    // Two kinds of steps on three meshes and an order, for each of three elements.
+    assert_eq!(csv.lines().count(), 1 + 3 * 7);
     assert_eq!(csv.matches("order of convergence").count(), 3);
 
     let said = desk.supple(&["evaluate", "--physics", "--scene", "lobe", "--out", "none"]);

@@ -9,7 +9,7 @@ use std::sync::Mutex;
 use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedError, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{Exponential, NeoHookean, Tissue};
+use supple::material::{Element, Exponential, NeoHookean, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::mlp::Network;
 use supple::scene::{Axes, BuildError, FixedScene, Support, tiles_for};
@@ -135,7 +135,7 @@ fn building_and_stepping_in_statics_allocates_nothing() {
 const LATTICE: [u32; 3] = [1, 1, 2];
 /// Three layers of four points, of which the held end drops one.
 const GRID: Grid = Grid { cells: LATTICE, functions: 12 };
-const DAMPED_VECTORS: usize = vectors_for_lattice(NODES, TETS, GRID, true);
+const DAMPED_VECTORS: usize = vectors_for_lattice(Element::Linear, NODES, TETS, GRID, true);
 
 /// Storage of mass-scaled, multilevel and damped steps.
 static LARGE: Mutex<[NodeVector; DAMPED_VECTORS]> = Mutex::new([NodeVector::ZERO; DAMPED_VECTORS]);

@@ -18,11 +18,13 @@ mod turning;
 mod wild;
 
 use reference::dense::{Matrix, cholesky, congruent, eigenvalues, symmetric_part, zeros};
+use reference::nodal_pressure::Tissues;
+use reference::nodal_strain;
 use reference::{Random, tangent_product};
 use supple::element::ElementMaterial;
 use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::{Loads, NodalForce};
-use supple::material::{NeoHookean, Regions};
+use supple::material::{Exponential, NeoHookean, NodalStrain, Regions, Tissue};
 use supple::scene::{Axes, Support, VecScene};
 use supple::state::{NodeVector, VecState};
 use supple::step::{Status, Step};
@@ -303,12 +305,104 @@ fn the_operator_stays_bounded_while_the_body_turns() {
     assert!(wrong.is_empty(), "unstable: {wrong:?}");
 }
 
+/// The tangent of a body with nodal strain in a state, N/m, from differences of the reference's forces, and these forces.
+fn tangent_with_nodal_strain(
+    body: &Body,
+    law: NeoHookean,
+    u: &[reference::Vec3],
+    free: &[(usize, usize)],
+) -> (Matrix, Vec<reference::Vec3>) {
+    /// m
+    const DELTA: f64 = 1e-7;
+    let (mesh, laws) = (body.reference(), [law.reference()]);
+    let of_element = vec![0; mesh.tets.len()];
+    let tissues = Tissues { mesh: &mesh, laws: &laws, of_element: &of_element };
+    let mut k = zeros(free.len());
+    for (column, &(node, axis)) in free.iter().enumerate() {
+        let [above, below] = [DELTA, -DELTA].map(|delta| {
+            let mut u = u.to_vec();
+            u[node][axis] += delta;
+            nodal_strain::forces(&tissues, &u)
+        });
+        for (row, &(node, axis)) in free.iter().enumerate() {
+            k[row][column] = (below[node][axis] - above[node][axis]) / (2.0 * DELTA);
+        }
+    }
+    (k, nodal_strain::forces(&tissues, u))
+}
+
+/// With nodal strain, in equilibrium at rest and strained by a third, with shaken nodes. The operator is what a force changes in the
+/// first step.
+#[test]
+fn the_operator_is_positive_and_bounded_with_nodal_strain() {
+    let body = Body::irregular([0.02, 0.02, 0.04], [2, 2, 4]);
+    let supports = support::fixed(&body.nodes_where(|x| x[2] == 0.0));
+    let mut wrong = Vec::new();
+    for (name, f, ratio) in [
+        ("at rest", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 50.0),
+        ("at rest", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 1000.0),
+        ("stretched", [[0.86, 0.0, 0.0], [0.0, 0.86, 0.0], [0.0, 0.0, 1.35]], 10.0),
+        ("compressed", [[1.2, 0.0, 0.0], [0.0, 1.2, 0.0], [0.0, 0.0, 0.7]], 50.0),
+        ("sheared", [[1.0, 0.0, 0.5], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 1000.0),
+    ] {
+        let law = NeoHookean { c: 100.0, d: 100.0 * ratio };
+        let scene = body.scene(NodalStrain(tissue(law)), &supports);
+        let free = free_axes(&scene);
+        let mut random = Random(9);
+        let shaken =
+            body.affine(&f, [0.0; 3]).into_iter().map(|u| u.map(|x| x + (2e-4 * random.next()) as f32));
+        let state = displaced(&scene, &shaken.collect::<Vec<_>>());
+        let (k, inner) = tangent_with_nodal_strain(&body, law, &to_f64(state.displacements()), &free);
+        let balance = (0u32..).zip(&inner).map(|(node, force)| NodalForce {
+            node,
+            newton: force.map(|x| -x as f32),
+            ramp: 0.0,
+        });
+        let balance: Vec<_> = balance.collect();
+        let step = Step::unchecked(20.0 * limit(&scene), 0.0).unwrap();
+        let square = f64::from(step.seconds()).powi(2);
+        for kind in KINDS {
+            let mut start = state.clone();
+            let large = kind.prepared(&body, &scene, &mut start, step, 0.0);
+            let first_step = |node: usize, axis: usize, newton: f32| -> Vec<f64> {
+                let mut forces = balance.clone();
+                forces[node].newton[axis] += newton;
+                let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+                let (mut state, mut large) = (start.clone(), large.clone());
+                assert!(large.step(scene.view(), &loads, state.view()).is_taken());
+                let moved =
+                    |&(node, axis): &(usize, usize)| f64::from(state.velocity(node)[axis] * step.seconds());
+                free.iter().map(moved).collect()
+            };
+            let still = first_step(0, 0, 0.0);
+            let mut b = zeros(free.len());
+            for (column, &(node, axis)) in free.iter().enumerate() {
+                let newton = (1e-4 * f64::from(scene.view().node_mass(node)) / square) as f32;
+                for (row, (moved, still)) in first_step(node, axis, newton).iter().zip(&still).enumerate() {
+                    b[row][column] = (moved - still) / (square * f64::from(newton));
+                }
+            }
+            let root = cholesky(&symmetric_part(&b)).expect("a positive operator");
+            let most = *eigenvalues(&congruent(&root, &k)).last().unwrap() * square / 4.0;
+            println!("{name}, bulk over shear {ratio}, {kind:?}: lambda_max(B K) D^2 / 4 = {most:.3}");
+            if !(0.2..=1.0).contains(&most) {
+                wrong.push((name, ratio, kind, most));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
 // Energy.
 
 /// A bar let go from a slight bend: kinetic and strain energy over those at the start, at every step.
-fn vibration(kind: Kind, damping: f32) -> Vec<f64> {
+fn vibration<M: ElementMaterial>(
+    material: impl Fn(Tissue<NeoHookean>) -> M,
+    kind: Kind,
+    damping: f32,
+) -> Vec<f64> {
     let body = small_bar();
-    let scene = body.scene(tissue(NEO), &held(&body));
+    let scene = body.scene(material(tissue(NEO)), &held(&body));
     let step = Step::unchecked(20.0 * limit(&scene), damping).unwrap();
     let mut state = rest_of(&scene);
     let bent = |node: usize| {
@@ -329,19 +423,24 @@ fn vibration(kind: Kind, damping: f32) -> Vec<f64> {
 
 #[test]
 fn free_vibration_keeps_its_energy_bounded_and_damping_takes_it() {
+    vibrates("linear", |tissue| tissue);
+    vibrates("nodal strain", NodalStrain);
+}
+
+fn vibrates<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<NeoHookean>) -> M) {
     for kind in KINDS {
-        let free = vibration(kind, 0.0);
+        let free = vibration(&material, kind, 0.0);
         let most = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
         let (first, last) = (most(&free[..200]), most(&free[1_800..]));
         println!(
-            "{kind:?}: energy at most {:.3} of the start's, {first:.3} in the first 200 steps, {last:.3} in the last",
+            "{element}, {kind:?}: energy at most {:.3} of the start's, {first:.3} in the first 200 steps, {last:.3} in the last",
             most(&free)
         );
         assert!(most(&free) < 1.1, "energy grows");
         assert!(last < 1.1 * first);
-        let damped = vibration(kind, 5.0);
+        let damped = vibration(&material, kind, 5.0);
         let parts: Vec<f64> = damped.chunks(400).map(most).collect();
-        println!("{kind:?}: damped, in parts of 400 steps at most {parts:.3?}");
+        println!("{element}, {kind:?}: damped, in parts of 400 steps at most {parts:.3?}");
         // Below that the bar is at rest but for rounding.
         const REST: f64 = 1e-12;
         assert!(parts.windows(2).all(|pair| pair[1] <= pair[0].max(REST)), "damped energy grows");
@@ -357,8 +456,13 @@ const FINEST: u32 = 400;
 
 #[test]
 fn sudden_torsion_does_not_diverge_and_is_followed() {
+    is_followed("linear", |tissue| tissue);
+    is_followed("nodal strain", NodalStrain);
+}
+
+fn is_followed<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<Exponential>) -> M) {
     let body = Body::bar([0.05, 0.05, 0.1], [4, 4, 8]);
-    let scene = body.scene(tissue(EXP), &held(&body));
+    let scene = body.scene(material(tissue(EXP)), &held(&body));
     let forces = corner_torsion(&body, 0.02, 0.0);
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
     let dt = 0.8 * limit(&scene);
@@ -372,7 +476,7 @@ fn sudden_torsion_does_not_diverge_and_is_followed() {
         .collect();
     let hold: f64 = truth.iter().map(|u| mean_distance(u, &vec![[0.0; 3]; u.len()])).sum();
     println!(
-        "exact step {dt:.2e} s, {:.2} s, mean displacement {:.2} mm, largest {:.2} mm",
+        "{element}: exact step {dt:.2e} s, {:.2} s, mean displacement {:.2} mm, largest {:.2} mm",
         state.time(),
         1e3 * hold / INTERVALS as f64,
         1e3 * truth.iter().map(|u| largest(u)).fold(0.0, f64::max)
@@ -394,8 +498,8 @@ fn sudden_torsion_does_not_diverge_and_is_followed() {
         });
         let skill = 1.0 - error / hold;
         match diverged {
-            Some(divergence) => println!("{kind:?} at {multiple}: {divergence}"),
-            None => println!("{kind:?} at {multiple}: skill {skill:.3}, {:?}", large.report()),
+            Some(divergence) => println!("{element}, {kind:?} at {multiple}: {divergence}"),
+            None => println!("{element}, {kind:?} at {multiple}: skill {skill:.3}, {:?}", large.report()),
         }
         if diverged.is_some() || multiple <= 20 && skill <= 0.0 {
             wrong.push((kind, multiple, skill));

@@ -4,7 +4,7 @@ use supple::inertia::{
     Cells, Grid, InertiaError, LargeModel, LargeStep, Method, vectors_for, vectors_for_lattice,
 };
 use supple::loads::{Loads, Motion, NodalForce};
-use supple::material::{NeoHookean, Tissue};
+use supple::material::{Element, NeoHookean, Tissue};
 use supple::scene::{Axes, Support, VecScene};
 use supple::state::{NodeVector, VecState};
 use supple::step::{Status, Step};
@@ -164,7 +164,7 @@ fn a_lattice_that_has_nothing_to_move_needs_no_room_and_steps() {
     let grid = given(cells).grid(scene.view(), &body.points).unwrap();
     assert_eq!(grid, Grid { cells, functions: 0 });
     let elements = scene.element_count();
-    let vectors = |grid| vectors_for_lattice(nodes, elements, grid, false);
+    let vectors = |grid| vectors_for_lattice(Element::Linear, nodes, elements, grid, false);
     assert_eq!(vectors(grid), vectors(Grid::default()));
     let mut state = rest_of(&scene);
     let step = Step::unchecked(1e-3, 0.0).unwrap();

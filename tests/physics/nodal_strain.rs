@@ -1,7 +1,6 @@
 //! Tetrahedra with stabilised nodal strain against their definition in float64: forces, energy, tissues that meet, patch test, rigid
 //! motion, critical step, drift, parts.
 
-use supple::inertia::{InertiaError, LargeStep, Method};
 use supple::loads::Loads;
 use supple::material::{Exponential, NeoHookean, NodalStrain, Regions};
 use supple::scene::{BuildError, FixedScene};
@@ -230,16 +229,4 @@ fn a_fixed_capacity_is_refused() {
     let body = small_bar();
     let mut scene = FixedScene::<_, 500, 100>::new(NodalStrain(tissue(support::NEO)));
     assert_eq!(scene.build(&body.mesh(), &held(&body)), Err(BuildError::NoPatches));
-}
-
-/// A scene of nodal strain takes exact steps only: others do not know its stiffness.
-#[test]
-fn large_steps_are_refused() {
-    let body = small_bar();
-    let scene = body.scene(NodalStrain(tissue(support::NEO)), &held(&body));
-    let mut state = rest_of(&scene);
-    let step = Step::unchecked(1e-3, 5.0).unwrap();
-    let refused =
-        LargeStep::prepare_in_vec(Method::MassScaled, scene.view(), &body.points, state.view(), step);
-    assert!(matches!(refused, Err(InertiaError::NodalStrain)));
 }

@@ -8,7 +8,6 @@ use crate::element::ElementMaterial;
 use crate::inertia::{self, Cells, Damper, LargeStep};
 use crate::lab::{LabError, implicit, networks};
 use crate::loads::Loads;
-use crate::material::Element;
 use crate::mlp::Network;
 use crate::state::VecState;
 use crate::step::{Status, Step};
@@ -29,13 +28,6 @@ pub(super) enum Kind {
     Damped(f32),
     /// Steps in s.
     BackwardEuler(f32),
-}
-
-impl Steps {
-    /// Whether tetrahedra of this kind can be moved so.
-    pub(super) fn take(self, element: Element) -> bool {
-        element != Element::NodalStrain || !matches!(self.kind, Kind::Damped(_))
-    }
 }
 
 pub(super) const EXACT: Steps = Steps { name: "exact", kind: Kind::Exact };

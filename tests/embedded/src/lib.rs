@@ -5,7 +5,7 @@
 use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{Exponential, NeoHookean, NodalPressure, Regions, Tissue};
+use supple::material::{Element, Exponential, NeoHookean, NodalPressure, Regions, Tissue};
 use supple::mesh::{self, Bar, Mesh, Winding};
 use supple::mlp::Network;
 use supple::scene::{FixedScene, Support};
@@ -137,7 +137,7 @@ pub extern "C" fn bar(bar: &Bar) -> f32 {
 
 /// The largest lattice here.
 const GRID: Grid = Grid { cells: [2, 2, 2], functions: 27 };
-type Storage = [NodeVector; vectors_for_lattice(100, 400, GRID, true)];
+type Storage = [NodeVector; vectors_for_lattice(Element::Linear, 100, 400, GRID, true)];
 
 /// Prepares a method and takes a step of it: error, inertia added and damping.
 fn large(

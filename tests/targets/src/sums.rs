@@ -4,6 +4,7 @@
 use super::body::{Body, DAMPING, SECONDS};
 use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for_lattice};
 use supple::loads::NodalForce;
+use supple::material::Element;
 use supple::mesh::Bar;
 use supple::mlp::Network;
 use supple::scene::tiles_for;
@@ -103,7 +104,7 @@ fn damped() -> Option<u32> {
     let loads = SMALL.loads(&scene)?;
     let damper = Damper::new(Network::parse(&DAMPER.0).ok()?).ok()?;
     let method = Method::Damped(damper, Cells::Given(GRID.cells));
-    let mut storage = [NodeVector::ZERO; vectors_for_lattice(NODES, ELEMENTS, GRID, true)];
+    let mut storage = [NodeVector::ZERO; vectors_for_lattice(Element::Linear, NODES, ELEMENTS, GRID, true)];
     let step = Step::unchecked(20.0 * SECONDS, DAMPING).ok()?;
     let mut damped =
         LargeStep::prepare(method, scene.view(), &SMALL.points(), state.view(), step, &mut storage[..])

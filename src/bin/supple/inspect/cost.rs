@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use supple::element::{ElementMaterial, ElementTile, MaterialWork, NodeInertia};
-use supple::inertia::{Cells, Grid, InertiaError, Method, vectors_for_lattice};
+use supple::inertia::{Cells, Grid, Method, vectors_for_lattice};
 use supple::loads::Loads;
 use supple::material::{Element, Moduli};
 use supple::scene::{SceneView, tiles_for};
@@ -54,13 +54,6 @@ impl MaterialWork for Cost<'_> {
         if setup.time.method.is_none() {
             let wanted = step.as_ref().map_or(bound.seconds, |step| step.seconds());
             row("real-time factor", real_time(wanted, seconds));
-        }
-        if setup.element == Element::NodalStrain && setup.time.method.is_none() && self.accuracy.is_none() {
-            row("steps beyond it", InertiaError::NodalStrain);
-            return match &setup.learned {
-                Some(learned) => learned_cost::describe(learned, setup, scene, &loads),
-                None => Ok(()),
-            };
         }
         let times = describe_beyond(setup, scene, &loads, bound)?;
         doubling::predict_errors(setup, scene, &loads, bound)?;
@@ -153,7 +146,7 @@ fn describe_beyond<M: ElementMaterial>(
         on_grid(&Method::Damped(damper()?, Cells::Suggested), lattice),
     ];
     let kilobytes = |grid: Grid, damped: bool| {
-        1e-3 * (vectors_for_lattice(scene.node_count(), scene.element_count(), grid, damped)
+        1e-3 * (vectors_for_lattice(scene.element(), scene.node_count(), scene.element_count(), grid, damped)
             * size_of::<NodeVector>()) as f64
     };
     row(

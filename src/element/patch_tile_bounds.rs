@@ -1,0 +1,181 @@
+//! Stiffness bounds of one tile of patches with nodal strain, as [`super::tile_bounds`] has them of elements: matrices `D_b` of the
+//! nodes (N/m), in the frames of the patches' own nodes, and what a coarse stiffness needs to know of each patch. With
+//! `dF_a = sum_b v_b (c_ab / V_a)^T` the bound of [`super::stiffness_bound`] gives, by Cauchy-Schwarz,
+//!
+//! ```text
+//! D_b = (iso |c_ab| sum_d |c_ad| I + volume (sum_d |C c_ad|) (C c_ab)(C c_ab)^T / |C c_ab|) / V_a
+//! ```
+//! and the own node gets `s mu sum_b (k_ab + |k_ab|) I` from the stabilising energy, the sum of the absolute values of its row. That
+//! energy is not in the tangents, as it does not change with the state.
+
+use crate::material::{Law, LawState, Laws, Potential};
+use crate::simd::{Gather, Kernel, Real, ScatterBuffer, TILE, dot};
+
+use super::deformation::{Deformation, Matrix, Vector};
+use super::patch::{Neighbours, PatchTile};
+use super::patch_forces::{GradientLengths, STABILISATION, gradient};
+use super::stiffness_bound::{Bound, MatrixSums};
+use super::tile::vector_at;
+use super::tile_bounds::{Rotation, TileTangents, cofactor_in_frames};
+
+pub struct PatchTileBounds<'a, L> {
+    pub(crate) laws: Laws<'a, L>,
+    pub(crate) tile: &'a PatchTile,
+    pub(crate) neighbours: &'a [Neighbours],
+    pub(crate) displacement: Gather<'a>,
+    pub(crate) sums: MatrixSums<'a>,
+    /// From the frame of each patch's node to the world.
+    pub(crate) rotations: &'a [Rotation; TILE],
+    /// Factor of the tangents, s^2; zero if nobody needs them.
+    pub(crate) weight: f32,
+}
+
+impl<L: Law> Kernel for PatchTileBounds<'_, L> {
+    type Output = TileTangents;
+
+    const SCALAR: bool = true;
+
+    #[inline(always)]
+    fn run<R: Real>(self) -> TileTangents {
+        match R::COUNT {
+            16 => bound_all::<R, L, 1>(self),
+            8 => bound_all::<R, L, 2>(self),
+            4 => bound_all::<R, L, 4>(self),
+            _ => bound_all::<R, L, TILE>(self),
+        }
+    }
+}
+
+/// What the nodes of a vector of patches get.
+#[derive(Clone, Copy)]
+struct Shares<R> {
+    /// `C`.
+    cofactor: Matrix<R>,
+    /// Factors of `|c_ab|` and of the outer product of `C c_ab` over its length, and of `|c_ab|` in the scalar bound, N/m^3.
+    isotropic: R,
+    volume: R,
+    scalar: R,
+    /// Gradient of the own node (m^2), and what the stabilising energy adds to it, N/m.
+    own: Vector<R>,
+    own_couplings: R,
+}
+
+#[inline(always)]
+fn bound_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchTileBounds<'_, L>) -> TileTangents {
+    let PatchTileBounds { tile, neighbours, .. } = kernel;
+    let mut tangents = TileTangents::NONE;
+    let mut shares = [Shares::<R>::none(); PARTS];
+    for (part, shares) in shares.iter_mut().enumerate() {
+        *shares = kernel.shares(part * R::COUNT, &mut tangents);
+    }
+    let PatchTileBounds { mut sums, .. } = kernel;
+    for neighbour in neighbours {
+        add(&mut sums, &neighbour.nodes, Some(neighbour), &shares);
+    }
+    add(&mut sums, &tile.nodes, None, &shares);
+    tangents
+}
+
+/// Adds the matrices of a neighbour of each patch, or of its own node, in the order of the places whatever the width of a vector.
+#[inline(always)]
+fn add<R: Real, const PARTS: usize>(
+    sums: &mut MatrixSums<'_>,
+    nodes: &[u32; TILE],
+    neighbour: Option<&Neighbours>,
+    shares: &[Shares<R>; PARTS],
+) {
+    let Some(nodes) = sums.diagonal.checked::<R, 1>([nodes]) else { return };
+    let mut buffers = [ScatterBuffer::NONE; 2];
+    for (part, shares) in shares.iter().enumerate() {
+        let first = part * R::COUNT;
+        let (gradient, more) = match neighbour {
+            Some(neighbour) => (neighbour.gradient(first), R::splat(0.0)),
+            None => (shares.own, shares.own_couplings),
+        };
+        let [diagonal, off_diagonal] = shares.matrix(gradient, more);
+        sums.diagonal.add_corners(&nodes, first, [diagonal], &mut buffers[0]);
+        sums.off_diagonal.add_corners(&nodes, first, [off_diagonal], &mut buffers[1]);
+    }
+}
+
+impl<L: Law> PatchTileBounds<'_, L> {
+    /// Bounds of the patches from place `first` on.
+    #[inline(always)]
+    fn shares<R: Real>(&self, first: usize, tangents: &mut TileTangents) -> Shares<R> {
+        let Self { laws, tile, neighbours, displacement, rotations, weight, .. } = self;
+        let (h, _) = gradient::<R>(tile, neighbours, first, *displacement);
+        let deformation = Deformation::new(h);
+        let law = laws.widen(|lane| tile.element(first + lane));
+        let local = LawState::new::<L>(&law, deformation.invariants);
+        let modulus = R::splat(2.0 * STABILISATION) * law.distortion_slope(R::splat(0.0));
+        let inverse = vector_at::<R>(&tile.inverse_volumes, first);
+        let lengths = GradientLengths::<R>::of(neighbours, first);
+        let scale = inverse * lengths.sum;
+        let bound = Bound::of_patches::<L>(&law, &deformation, &local, modulus, scale);
+        let cofactor = cofactor_in_frames(rotations, first, &deformation);
+        if *weight != 0.0 {
+            let weight = vector_at::<R>(&tile.volumes, first) * R::splat(*weight);
+            tangents.write(first, weight, &bound, &deformation, &cofactor, Some(modulus));
+        }
+        let mut shares = Shares {
+            cofactor,
+            isotropic: bound.iso * scale,
+            scalar: bound.scalar,
+            own_couplings: modulus * lengths.couplings,
+            ..Shares::none()
+        };
+        let mut images = R::splat(0.0);
+        for neighbour in *neighbours {
+            let gradient = neighbour.gradient::<R>(first);
+            images = images + shares.image(gradient).1;
+            for axis in 0..3 {
+                shares.own[axis] = shares.own[axis] - gradient[axis];
+            }
+        }
+        images = images + shares.image(shares.own).1;
+        shares.volume = inverse * bound.volume * images;
+        shares
+    }
+}
+
+impl<R: Real> Shares<R> {
+    #[inline(always)]
+    fn none() -> Self {
+        let zero = R::splat(0.0);
+        Self {
+            cofactor: [[zero; 3]; 3],
+            isotropic: zero,
+            volume: zero,
+            scalar: zero,
+            own: [zero; 3],
+            own_couplings: zero,
+        }
+    }
+
+    /// Image of a gradient under `C`, and its length.
+    #[inline(always)]
+    fn image(&self, gradient: Vector<R>) -> (Vector<R>, R) {
+        let mut image = [R::splat(0.0); 3];
+        for (image, row) in image.iter_mut().zip(&self.cofactor) {
+            *image = dot(*row, gradient);
+        }
+        (image, dot(image, image).root())
+    }
+
+    /// What the node with this gradient gets, with more along all axes: diagonal and scalar bound, and the other entries.
+    #[inline(always)]
+    fn matrix(&self, gradient: Vector<R>, more: R) -> [[R; 4]; 2] {
+        let length = dot(gradient, gradient).root();
+        let ([x, y, z], image) = self.image(gradient);
+        // Avoids 0 / 0; a length below this limit contributes nothing.
+        let inverse = R::splat(1.0).divide(image.max(R::splat(1e-30)));
+        let isotropic = self.isotropic.fused(length, more);
+        let (wx, wy, wz) = (self.volume * x, self.volume * y, self.volume * z);
+        let (x, y, z) = (inverse * x, inverse * y, inverse * z);
+        let scalar = self.scalar.fused(length, more);
+        [
+            [isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, scalar],
+            [wx * y, wy * z, wz * x, R::splat(0.0)],
+        ]
+    }
+}
