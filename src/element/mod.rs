@@ -23,6 +23,7 @@ mod stiffness_bound_tests;
 pub(crate) mod symmetric;
 mod tile;
 mod tile_bounds;
+mod volume_check;
 
 pub use fields::ElementFields;
 pub use kernels::ElementLaw;
@@ -50,6 +51,7 @@ pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};
 pub(crate) use stiffness_bound::{MatrixSums, ScalarBound};
 pub(crate) use tile_bounds::{TileBounds, TileTangents};
+pub(crate) use volume_check::VolumeCheck;
 
 use crate::material::Material;
 

@@ -111,8 +111,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         self.renew_if_stale(trial);
         let Trial { scene, loads, displacement, force, volume, progress, .. } = &mut *trial;
-        let forcing =
-            Forcing { scene: *scene, visitor: ScalarBound, displacement, loads, time: progress.time };
+        let forcing = Forcing { scene: *scene, visitor: ScalarBound, displacement, loads, progress };
         let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
         self.model.refresh.update_frames(displacement, progress.steps);
         let moved = self.move_lattice(trial);

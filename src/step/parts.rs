@@ -7,12 +7,13 @@ use core::ops::Range;
 
 use crate::element::{
     ElementMaterial, Extremes, ForcesVisitor, InternalForces, MeanPressure, NodalVolumes, NodeInertia,
-    OwnPressure, PatchForces,
+    OwnPressure, PatchForces, VolumeCheck,
 };
 use crate::loads::{Loads, ramp_factor};
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
 use crate::scene::SceneView;
 use crate::simd::{NodeVector, Scatter};
+use crate::state::Progress;
 
 use super::threads::{Threads, take};
 
@@ -23,8 +24,8 @@ pub(crate) struct Forcing<'a, M, V> {
     pub(crate) visitor: V,
     pub(crate) displacement: &'a [NodeVector],
     pub(crate) loads: &'a Loads<'a>,
-    /// Of the loads, s.
-    pub(crate) time: f64,
+    /// Of the state, for the time of the loads.
+    pub(crate) progress: &'a Progress,
 }
 
 /// The partitions of one thread, with their share of the arrays.
@@ -90,7 +91,12 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         });
         let parts = parts.get_mut(..count).unwrap_or_default();
         threads.each(parts, |part| self.compute(part, volumes, &then));
-        let extremes = parts.iter().fold(Extremes::none(), |sum, part| sum.merged_with(&part.extremes));
+        let mut extremes = parts.iter().fold(Extremes::none(), |sum, part| sum.merged_with(&part.extremes));
+        if M::ELEMENT.is_nodal_strain() {
+            let (tiles, displacement) = (self.scene.tiles, self.displacement);
+            let check = VolumeCheck { tiles, displacement, steps: self.progress.steps };
+            extremes.least_j = check.least_change().min(extremes.least_j);
+        }
         (results, extremes)
     }
 
@@ -105,7 +111,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         let all = elements.partitions;
         let nodes = all.nodes(partitions);
         let inertia = self.scene.inertia.get(nodes.clone()).unwrap_or_default();
-        external_forces(force, nodes.start, inertia, self.loads, self.time);
+        external_forces(force, nodes.start, inertia, self.loads, self.progress.time);
         *extremes =
             internal_forces(self.scene, partitions.clone(), self.displacement, volumes, force, self.visitor);
         let (mut force, mut extra) = (&mut **force, &mut **extra);

@@ -65,7 +65,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let Trial { scene, loads, displacement, increment, force, volume, progress } = trial;
         let (inertia, step) = (scene.inertia, self.step);
-        let forcing = Forcing { scene: *scene, visitor: NoVisitor, displacement, loads, time: progress.time };
+        let forcing = Forcing { scene: *scene, visitor: NoVisitor, displacement, loads, progress };
         let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let increment = increment.get(nodes).unwrap_or_default();

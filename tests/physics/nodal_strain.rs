@@ -10,7 +10,7 @@ use supple::tled;
 use crate::nodal_pressure::{ended, inverted, noise};
 use crate::reference::Mat3;
 use crate::reference::nodal_pressure::Tissues;
-use crate::reference::nodal_strain::{energy, forces as exact_forces};
+use crate::reference::nodal_strain::{energy, forces as exact_forces, least_nodal_ratio};
 use crate::reference::tensor::{product, rotation};
 use crate::support::bodies::{held, small_bar};
 use crate::support::{Body, Judged, displaced, fixed, forces, norm, norm_of_sum, rest_of, tissue, widened};
@@ -229,4 +229,33 @@ fn a_fixed_capacity_is_refused() {
     let body = small_bar();
     let mut scene = FixedScene::<_, 500, 100>::new(NodalStrain(tissue(support::NEO)));
     assert_eq!(scene.build(&body.mesh(), &held(&body)), Err(BuildError::NoPatches));
+}
+
+/// The mean strain around nodes hardly changes where a node inside the body is pushed through its neighbours; the elements there do.
+/// Each element is looked at once in 16 steps.
+#[test]
+fn elements_that_are_turned_inside_out_are_told() {
+    let body = Body::bar([0.04; 3], [4; 3]);
+    let scene = body.scene(NodalStrain(tissue(support::NEO)), &[]);
+    let inside = body.nodes_where(|x| x == [0.02; 3])[0] as usize;
+    // So short that nothing moves.
+    let step = Step::unchecked(1e-9, 0.0).unwrap();
+    for push in [0.0, 0.011] {
+        let mut u = vec![[0.0; 3]; body.points.len()];
+        u[inside] = [push, 0.0, 0.0];
+        let tissues = [support::NEO.reference()];
+        let of_element = vec![0; body.tets.len()];
+        let mesh = body.reference();
+        let pushed = Tissues { mesh: &mesh, laws: &tissues, of_element: &of_element };
+        let least_of_nodes = least_nodal_ratio(&pushed, &widened(&u));
+        let mut state = displaced(&scene, &u);
+        let told = (0..16).filter_map(|_| match tled::step(&scene, &Loads::NONE, &mut state, &step) {
+            Status::Limited { least_volume_ratio, .. } => Some(least_volume_ratio),
+            _ => None,
+        });
+        let told: Vec<_> = told.collect();
+        println!("pushed by {push} m: least volume ratio of a node {least_of_nodes:.2}, told {told:?}");
+        assert!(least_of_nodes > 0.5);
+        assert_eq!(push > 0.0, told.iter().any(|ratio| *ratio < 0.0));
+    }
 }

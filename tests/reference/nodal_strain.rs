@@ -3,7 +3,7 @@
 //! modulus at rest (Dohrmann et al. 2000; Puso & Solberg 2006).
 
 use super::nodal_pressure::Tissues;
-use super::tensor::{IDENTITY, Mat3, Vec3, apply, from_fn};
+use super::tensor::{IDENTITY, Mat3, Vec3, apply, determinant, from_fn};
 
 const SHARE: f64 = 0.4;
 
@@ -47,6 +47,12 @@ pub fn energy(body: &Tissues<'_>, u: &[Vec3]) -> f64 {
         }
     }
     energy
+}
+
+/// The least volume ratio of the mean deformation around a node.
+pub fn least_nodal_ratio(body: &Tissues<'_>, u: &[Vec3]) -> f64 {
+    let means = means(body, &body.mesh.deformation_gradients(u));
+    means.iter().flatten().map(|(f, _)| determinant(f)).fold(f64::INFINITY, f64::min)
 }
 
 /// Forces of the elements on the nodes, N.
