@@ -452,6 +452,9 @@ impl Refresh {
 
     /// A part of the inversion of the next `G`.
     fn invert_fine<M>(&mut self, input: &RefreshInput<'_, M>, matrices: &mut Matrices<'_>, at: usize) -> i64 {
+        if at == 0 {
+            fill_held_axes(matrices.next_fine, matrices.mass, input.lattice.functions());
+        }
         let (cost, ended) = self.invert(matrices.next_fine, matrices.mass, input.lattice.functions(), at);
         if ended {
             self.enter(Stage::InvertCoarse);
@@ -604,6 +607,19 @@ fn is_conditioned(inertia: &[f32], mass: &[f32], functions: usize) -> bool {
         let inertia = inertia.iter().skip(axis * (stride + 1)).step_by(3 * (stride + 1));
         inertia.zip(masses).all(|(inertia, mass)| *inertia <= LARGEST_RATIO * mass)
     })
+}
+
+/// Gives an axis along which all nodes of a function are held, and no force acts, the mass that [`write_mass`] has there.
+fn fill_held_axes(inertia: &mut [f32], mass: &[f32], functions: usize) {
+    let (stride, length) = (stride(functions), row_length(functions));
+    for (axis, mass) in of_axes(mass).into_iter().enumerate() {
+        let diagonal = inertia.iter_mut().skip(axis * (stride + 1)).step_by(3 * (stride + 1));
+        for (inertia, mass) in diagonal.zip(mass.iter().step_by(length + 1)).take(functions) {
+            if *inertia == 0.0 {
+                *inertia = *mass;
+            }
+        }
+    }
 }
 
 /// The first components of [`PROBE`].
