@@ -200,13 +200,13 @@ impl<'a, L: ElementLaw> Carved<'a, L> {
 
     /// The scene, of linear elements.
     pub(super) fn linear(&self) -> SceneView<'_, Body<'a, L>> {
-        SceneView::new(&self.body.0, self.nodes, self.tiles, self.facts)
+        SceneView::new(&self.body.0, self.nodes, self.tiles, &[], self.facts)
     }
 
     /// The scene, of elements with nodal pressure.
     #[cfg(feature = "capi-nodal-pressure")]
     pub(super) fn nodal_pressure(&self) -> SceneView<'_, NodalPressure<Body<'a, L>>> {
-        SceneView::new(&self.body, self.nodes, self.tiles, self.facts)
+        SceneView::new(&self.body, self.nodes, self.tiles, &[], self.facts)
     }
 }
 
@@ -419,8 +419,10 @@ impl<'a> Parts<'a> {
         let body = Body { tissues, of_element: regions };
         Ok(match element {
             #[cfg(feature = "capi-nodal-pressure")]
-            Element::NodalPressure => SceneFacts::build(&NodalPressure(body), mesh, supports, nodes, tiles)?,
-            _ => SceneFacts::build(&body, mesh, supports, nodes, tiles)?,
+            Element::NodalPressure => {
+                SceneFacts::build(&NodalPressure(body), mesh, supports, nodes, tiles, &mut [])?
+            }
+            _ => SceneFacts::build(&body, mesh, supports, nodes, tiles, &mut [])?,
         })
     }
 }

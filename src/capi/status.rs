@@ -254,7 +254,7 @@ impl From<BuildError> for supple_error {
                 is(SUPPLE_E_DENSITY).at(element).value(value.into(), 0.0)
             }
             // No scene of this interface is of nodal strain.
-            BuildError::NoPatches => is(SUPPLE_E_CHOICE),
+            BuildError::PatchCapacity { .. } => is(SUPPLE_E_CHOICE),
             BuildError::NothingMoves => is(SUPPLE_E_NOTHING_MOVES),
         }
     }

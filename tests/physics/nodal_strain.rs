@@ -4,7 +4,6 @@
 use supple::inertia::{InertiaError, LargeStep, Method};
 use supple::loads::Loads;
 use supple::material::{Exponential, NeoHookean, NodalStrain, Regions};
-use supple::scene::{BuildError, FixedScene};
 use supple::step::{Status, Step};
 use supple::tled;
 
@@ -222,14 +221,6 @@ fn any_number_of_parts_gives_the_same_bits() {
     for parts in [2, 3, 5] {
         assert!(ended(&one, parts) == of_one && ended(&two, parts) == of_two, "{parts} parts");
     }
-}
-
-/// A scene without patches would have no forces: it is not built.
-#[test]
-fn a_fixed_capacity_is_refused() {
-    let body = small_bar();
-    let mut scene = FixedScene::<_, 500, 100>::new(NodalStrain(tissue(support::NEO)));
-    assert_eq!(scene.build(&body.mesh(), &held(&body)), Err(BuildError::NoPatches));
 }
 
 /// A scene of nodal strain takes exact steps only: others do not know its stiffness.
