@@ -2,7 +2,7 @@
  * (-Wl,--wrap=malloc and so on) and counted, while scenes are built and all kinds of steps are taken. */
 #include "body.h"
 
-SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
+SUPPLE_MEMORY(scene_memory, SCENE_SIZE);
 SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 1));
@@ -66,9 +66,11 @@ int main(void) {
     CHECK(supple_save(state, saved, sizeof saved) == SUPPLE_OK);
     CHECK(supple_restore(state, saved, sizeof saved) == SUPPLE_OK);
     CHECK(supple_state_reset(state) == SUPPLE_OK);
-    CHECK(supple_large_init(large_memory, sizeof large_memory, scene, state, points[0], &beyond, &large, NULL) == SUPPLE_OK);
-    CHECK(supple_large_step(scene, loads, state, large, 100, NULL, NULL) >= 0);
+    if (ELEMENT != SUPPLE_NODAL_STRAIN) {
+        CHECK(supple_large_init(large_memory, sizeof large_memory, scene, state, points[0], &beyond, &large, NULL) == SUPPLE_OK);
+        CHECK(supple_large_step(scene, loads, state, large, 100, NULL, NULL) >= 0);
+    }
     CHECK(asked == 0);
-    printf("heap: a scene, exact, learned and damped steps: never asked\n");
+    printf("heap: a scene, exact, learned%s steps: never asked\n", ELEMENT == SUPPLE_NODAL_STRAIN ? "" : " and damped");
     return 0;
 }
