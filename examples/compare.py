@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Moves the paper's bar through the C API, from Python, and through the command, and compares the two.
 
-    python3 examples/compare.py target/release/libsupple.so target/release/supple
+    python3 examples/compare.py target/release/libsupple.so target/release/supple [ELEMENT]
 
 The bar (50 x 50 x 100 mm, 6,528 tetrahedra) is held at z = 0, twisted by a force at each corner of its end
-and pulled at the middle of it, for 0.15 s. Needs numpy. Ends with 1 if a node is further off than a millionth of
-the largest displacement.
+and pulled at the middle of it, for 0.15 s. ELEMENT is linear, nodal-pressure (if nothing is said) or nodal-strain.
+Needs numpy. Ends with 1 if a node is further off than a millionth of the largest displacement.
 """
 import ctypes
 import subprocess
@@ -16,7 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-ABI, ALIGN, EXPONENTIAL, CHECKED, NODAL_PRESSURE = 3, 64, 1, 0, 1  # SUPPLE_... in include/supple.h
+ABI, ALIGN, EXPONENTIAL, CHECKED = 3, 64, 1, 0  # SUPPLE_... in include/supple.h
+ELEMENTS = {"linear": 0, "nodal-pressure": 1, "nodal-strain": 2}
 SIZE, CELLS = np.array([0.05, 0.05, 0.1]), (8, 8, 17)  # m
 LAW, DENSITY, DAMPING = (59.0, 8.023, 60000.0), 1000.0, 20.0  # a Pa, b, d Pa; kg/m^3; 1/s
 FORCE, PULL, RAMP = 0.3, 0.005, 0.2  # N, m, s
@@ -85,9 +86,10 @@ def loads():
     return forces, node_at(x // 2, y // 2, z)
 
 
-def scene_file(forces, pulled):
+def scene_file(element, forces, pulled):
     lines = [
         f"damping = {DAMPING}", "[mesh]", 'shape = "bar"', f"size = {SIZE.tolist()}", f"cells = {list(CELLS)}",
+        f'element = "{element}"',
         "[material]", 'law = "exponential"', "a = {}\nb = {}\nd = {}".format(*LAW), f"density = {DENSITY}",
         "[[fix]]", 'plane = { axis = "z", at = 0.0 }',
         "[[move]]", f"nodes = [{pulled}]", f"metre = [0.0, 0.0, {PULL}]", f"ramp = {RAMP}",
@@ -128,8 +130,8 @@ class Library:
         return made
 
 
-def moved_by_library(path, points, tetrahedra, forces, pulled):
-    library = Library(path)
+def moved_by_library(path, element, points, tetrahedra, forces, pulled):
+    library, element = Library(path), ELEMENTS[element]
     nodes, elements = len(points), len(tetrahedra)
     # As in the command: around the middle of the body, where float32 is finest.
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -140,11 +142,13 @@ def moved_by_library(path, points, tetrahedra, forces, pulled):
     config = SceneConfig(
         ctypes.sizeof(SceneConfig), ABI, EXPONENTIAL, CHECKED, nodes, elements, len(held), 1,
         local.ctypes.data_as(POINTER(c_float)), tetrahedra.ctypes.data_as(POINTER(c_uint32)), held,
-        ctypes.pointer(tissue), None, NODAL_PRESSURE, 0,
+        ctypes.pointer(tissue), None, element, 0,
     )
     size = library.size("supple_scene_size", nodes, elements, 1)
+    if element == ELEMENTS["nodal-strain"]:
+        size += library.size("supple_patches_size", nodes, elements, 1)
     scene = library.made("supple_scene_init", size, byref(config), after=(None,))
-    state = library.made("supple_state_init", library.size("supple_state_size", nodes, NODAL_PRESSURE), scene)
+    state = library.made("supple_state_init", library.size("supple_state_size", nodes, element), scene)
     size = library.size("supple_loads_size", len(forces), 1)
     acting = library.made("supple_loads_init", size, scene, c_uint32(len(forces)), c_uint32(1))
     pushes = (Force * len(forces))(*(Force(node, newton, RAMP) for node, newton in forces))
@@ -174,13 +178,13 @@ def moved_by_command(path, scene):
 
 
 def main(words):
-    if len(words) != 2:
+    if len(words) not in (2, 3) or words[2:3] not in ([], *([element] for element in ELEMENTS)):
         sys.exit(__doc__)
-    library, command = words
+    library, command, element = (*words, "nodal-pressure")[:3]
     points, tetrahedra = bar()
     forces, pulled = loads()
-    mine = moved_by_library(library, points, tetrahedra, forces, pulled)
-    theirs = moved_by_command(command, scene_file(forces, pulled))
+    mine = moved_by_library(library, element, points, tetrahedra, forces, pulled)
+    theirs = moved_by_command(command, scene_file(element, forces, pulled))
     if theirs.shape != (len(points), 7) or not np.allclose(theirs[:, 1:4], points, rtol=0.0, atol=1e-9):
         sys.exit(f"{command}: its nodes are not those of this script")
     # The file has the fewest digits that name a float32.

@@ -35,22 +35,28 @@
 #define SUPPLE_EXPONENTIAL 1 /* a (Pa), b, d (Pa) */
 #define SUPPLE_POLYNOMIAL 2 /* c (Pa), e (Pa), d (Pa) */
 
-/* Sizes as constant expressions: what the functions give; of a supple_large, with x * y * z cells that you give, never less. */
+/* Sizes as constant expressions: what the functions give; with SUPPLE_NODAL_STRAIN a scene needs SUPPLE_SCENE_SIZE and
+ * SUPPLE_PATCHES_SIZE together; of a supple_large, with x * y * z cells that you give, never less. */
 #define SUPPLE_SCENE_SIZE(nodes, elements, tissues) (SUPPLE_SCENE_FRONT + SUPPLE_ARRAY_(nodes, 16) +                           \
     1024 * SUPPLE_TILES_(elements) + SUPPLE_ARRAY_(tissues, 20) + SUPPLE_ARRAY_((tissues) > 1 ? (elements) : 0, 2))
+#define SUPPLE_PATCHES_SIZE(nodes, elements, tissues) ((size_t)320 * (9 + SUPPLE_GROUPS_(elements) *                             \
+    (1 + SUPPLE_LEAST_((size_t)(nodes), 48)) + SUPPLE_PATCHES_(nodes, elements, tissues) / 16 +                                \
+    (4 * (size_t)(elements) + 2 * SUPPLE_PATCHES_(nodes, elements, tissues) + 15) / 16 + (((size_t)(nodes) + 1) / 2 + 39) / 40 + \
+    (2 * (size_t)(elements) + 39) / 40 + (SUPPLE_PATCHES_(nodes, elements, tissues) + 39) / 40))
 #define SUPPLE_STATE_SIZE(nodes, element) \
-    (SUPPLE_STATE_FRONT + ((element) == SUPPLE_NODAL_PRESSURE ? 4 : 3) * SUPPLE_ARRAY_(nodes, 16))
+    (SUPPLE_STATE_FRONT + ((element) == SUPPLE_LINEAR ? 3 : 4) * SUPPLE_ARRAY_(nodes, 16))
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 80 : 48))
 #define SUPPLE_LARGE_SIZE(nodes, elements, method, x, y, z) (SUPPLE_LARGE_FRONT + ((method) == SUPPLE_MASS_SCALED              \
     ? SUPPLE_ARRAY_(nodes, 80) : SUPPLE_LATTICE_(nodes, elements, (method) == SUPPLE_DAMPED, x, y, z)))
 #define SUPPLE_ARRAY_(count, bytes) (((size_t)(count) * (bytes) + SUPPLE_ALIGN - 1) / SUPPLE_ALIGN * SUPPLE_ALIGN)
 #define SUPPLE_LEAST_(a, b) ((a) < (b) ? (a) : (b))
-#define SUPPLE_TILES_(elements)                                                                                                \
-    (((size_t)(elements) + 15) / 16 + 2 * SUPPLE_LEAST_((size_t)(elements) / 1536 - ((elements) > 1535), 23))
+#define SUPPLE_GROUPS_(elements) (2 * SUPPLE_LEAST_((size_t)(elements) / 1536 - ((elements) > 1535), 23) + 1)
+#define SUPPLE_TILES_(elements) (((size_t)(elements) + 15) / 16 + SUPPLE_GROUPS_(elements) - 1)
+#define SUPPLE_PATCHES_(nodes, elements, tissues) SUPPLE_LEAST_((size_t)(nodes) * (tissues), 4 * (size_t)(elements))
 #define SUPPLE_FUNCTIONS_(x, y, z) SUPPLE_LEAST_(((size_t)(x) + 1) * ((y) + 1) * ((z) + 1), SUPPLE_LATTICE_FUNCTIONS)
 #define SUPPLE_LATTICE_(nodes, elements, damped, x, y, z) SUPPLE_ARRAY_(1, ((damped) ? 120 : 104) * (size_t)(nodes) +           \
-    4 * (size_t)(elements) + 212 + 1152 * ((size_t)(x) * (y) * (z)) + 172 * SUPPLE_FUNCTIONS_(x, y, z) *                       \
+    4 * (size_t)(elements) + 212 + 1152 * ((size_t)(x) * (y) * (z)) + 184 * SUPPLE_FUNCTIONS_(x, y, z) *                       \
     (SUPPLE_FUNCTIONS_(x, y, z) + 8))
 
 
@@ -114,6 +120,13 @@
  * Tetrahedra with average nodal pressure, which do not lock. Take these unless you compare with others' linear ones.
  */
 #define SUPPLE_NODAL_PRESSURE 1
+
+/**
+ * Tetrahedra with stabilised nodal strain, which bend well on coarse meshes and take less time than linear ones, but more memory:
+ * supple_patches_size. Under strains above a half elements at sharp edges may turn inside out, which the status tells within 16
+ * steps. Only in a library with all laws.
+ */
+#define SUPPLE_NODAL_STRAIN 2
 
 /**
  * Bytes before the arrays of a scene.
@@ -512,7 +525,7 @@ typedef struct {
      */
     const uint16_t *tissue_of_element;
     /**
-     * SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE.
+     * SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
      */
     uint32_t element;
     /**
@@ -564,7 +577,7 @@ typedef struct {
      */
     uint32_t elements;
     /**
-     * Memory of the scene, bytes.
+     * Memory that the scene takes, bytes: what a copy of it needs. With nodal strain less than it was built in.
      */
     uint64_t bytes;
     /**
@@ -821,7 +834,7 @@ typedef struct {
      */
     uint32_t fell_back;
     /**
-     * Elements of the training, SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE; in a scene of others the network's error is not known.
+     * Elements of the training, SUPPLE_LINEAR and so on; in a scene of others the network's error is not known.
      */
     uint32_t element;
 } supple_learned_facts;
@@ -897,15 +910,27 @@ const char *supple_version(void);
 const char *supple_status_text(int32_t status);
 
 /**
- * Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant.
+ * Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant. With
+ * SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more.
  */
 size_t supple_scene_size(uint32_t nodes,
                          uint32_t elements,
                          uint32_t tissues);
 
 /**
- * Builds a scene in `memory` of at least supple_scene_size bytes, aligned to SUPPLE_ALIGN. On success `*scene` is the scene,
- * at the beginning of that memory.
+ * Bytes of memory that a scene with SUPPLE_NODAL_STRAIN needs more than supple_scene_size: enough to build it from any mesh whose
+ * elements of a tissue around a node are joined by faces, with at most 48 neighbours of a node. For others supple_scene_init
+ * returns SUPPLE_E_SHORT, and the error's limit is enough. The scene takes about half of these bytes: supple_scene_describe tells.
+ * SUPPLE_PATCHES_SIZE is the same as a constant.
+ */
+size_t supple_patches_size(uint32_t nodes,
+                           uint32_t elements,
+                           uint32_t tissues);
+
+/**
+ * Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size, aligned to
+ * SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning of that memory. What it takes of it is told by
+ * supple_scene_describe; the rest is free for other use.
  *
  * @param error may be NULL; index is that of an element, a support or a node as the status says.
  */
@@ -967,7 +992,7 @@ supple_status supple_set_motions(supple_loads *loads,
  * Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is the same
  * as a constant.
  *
- * @param element of the scene: SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE.
+ * @param element of the scene: SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
  */
 size_t supple_state_size(uint32_t nodes,
                          uint32_t element);
@@ -988,7 +1013,8 @@ supple_status supple_state_reset(supple_state *state);
 
 /**
  * Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as
- * long as some six steps, with nodal pressure some twenty; tissue that is deformed is stiffer, so ask again from time to time.
+ * long as some six steps, with nodal pressure some twenty, with nodal strain some thirty; tissue that is deformed is stiffer, so ask
+ * again from time to time.
  *
  * @param seconds receives the step, s.
  * @param node may be NULL; receives the node that sets it.

@@ -105,7 +105,12 @@ enum class law : std::uint32_t {
 };
 
 // linear: tetrahedra that lock, that is bend too little, where tissue hardly changes its volume. nodal_pressure: these do not.
-enum class element : std::uint32_t { linear = SUPPLE_LINEAR, nodal_pressure = SUPPLE_NODAL_PRESSURE };
+// nodal_strain: these bend well on coarse meshes as well, but take no steps of a supple::large, and need more memory.
+enum class element : std::uint32_t {
+    linear = SUPPLE_LINEAR,
+    nodal_pressure = SUPPLE_NODAL_PRESSURE,
+    nodal_strain = SUPPLE_NODAL_STRAIN
+};
 
 // checked: elements must have positive volumes. normalised: they are turned where needed.
 enum class winding : std::uint32_t { checked = SUPPLE_WINDING_CHECKED, normalised = SUPPLE_WINDING_NORMALISED };
@@ -337,10 +342,11 @@ public:
     constexpr explicit scene(supple_scene *raw) noexcept : raw_(raw) {}
     [[nodiscard]] constexpr supple_scene *raw() const noexcept { return raw_; }
 
-    // Bytes of memory that one needs.
-    [[nodiscard]] static constexpr std::size_t size(std::uint32_t nodes, std::uint32_t elements,
-                                                    std::uint32_t tissues = 1) noexcept {
-        return SUPPLE_SCENE_SIZE(nodes, elements, tissues);
+    // Bytes of memory that are enough to build one; what it then takes of them is in its facts.
+    [[nodiscard]] static constexpr std::size_t size(std::uint32_t nodes, std::uint32_t elements, std::uint32_t tissues = 1,
+                                                    element of = element::nodal_pressure) noexcept {
+        return SUPPLE_SCENE_SIZE(nodes, elements, tissues) +
+               (of == element::nodal_strain ? SUPPLE_PATCHES_SIZE(nodes, elements, tissues) : 0);
     }
 
     // Builds one in memory of at least `size` bytes.

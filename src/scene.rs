@@ -5,22 +5,23 @@
 //! (feature `std`), [`FixedScene`] for a fixed capacity, which may be a `static`, or memory of any kind through
 //! [`SceneFacts::build`].
 
+mod build_error;
 mod owned;
 
-use core::fmt;
 use core::ops::Deref;
 
 use crate::element::{
-    ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, Patches, VolumeRows,
-    element_fields, patch_energies, volume_energy_difference,
+    ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, PatchBuilder,
+    PatchRow, Patches, VolumeRows, element_fields, patch_energies, volume_energy_difference,
 };
-use crate::material::{Element, Law, Material, releasable_energy};
+use crate::material::{Element, Law, Laws, Material, releasable_energy};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
 use crate::mesh::strips::Numbered;
 use crate::mesh::{Mesh, MeshError, volume};
 use crate::simd::{NodeVector, TILE};
 
-pub use crate::element::Axes;
+pub use crate::element::{Axes, patch_rows_for};
+pub use build_error::BuildError;
 pub use owned::{FixedScene, FixedTables, Scene, SceneTables};
 #[cfg(any(feature = "std", test))]
 pub use owned::{VecScene, VecTables};
@@ -52,121 +53,24 @@ impl Support {
     }
 }
 
-/// Why a scene could not be built. The scene is empty afterwards.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum BuildError {
-    /// The mesh is not sound.
-    Mesh(MeshError),
-    /// More nodes than the scene has room for.
-    NodeCapacity {
-        /// Nodes of the mesh.
-        needed: usize,
-        /// Room.
-        capacity: usize,
-    },
-    /// More tiles of elements than the scene has room for.
-    TileCapacity {
-        /// Tiles needed, of [`TILE`] elements each.
-        needed: usize,
-        /// Room.
-        capacity: usize,
-    },
-    /// More elements than a scene can number.
-    ElementCount {
-        /// Elements of the mesh.
-        elements: usize,
-        /// Most of them.
-        most: usize,
-    },
-    /// A support names a node that is not there.
-    SupportNode {
-        /// Position in the list of supports.
-        support: usize,
-        /// The node it names.
-        node: u32,
-        /// Nodes in the mesh.
-        nodes: usize,
-    },
-    /// The material names no tissue for an element.
-    NoTissue {
-        /// The element.
-        element: usize,
-    },
-    /// A constant of the law is not a finite positive number.
-    Constant {
-        /// The element.
-        element: usize,
-        /// The constant.
-        name: &'static str,
-        /// Its value.
-        value: f32,
-    },
-    /// A density is not a finite positive number.
-    Density {
-        /// The element.
-        element: usize,
-        /// The density, kg/m^3.
-        value: f32,
-    },
-    /// Every element has four fixed nodes, so nothing can move.
-    NothingMoves,
-    /// Tetrahedra with nodal strain in memory of the caller or of a fixed capacity, which has no room for their patches.
-    NoPatches,
-}
-
-impl From<MeshError> for BuildError {
-    fn from(error: MeshError) -> Self {
-        Self::Mesh(error)
-    }
-}
-
-impl fmt::Display for BuildError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Mesh(error) => error.fmt(f),
-            Self::NodeCapacity { needed, capacity } => {
-                write!(f, "the mesh has {needed} nodes, the scene has room for {capacity}")
-            }
-            Self::TileCapacity { needed, capacity } => write!(
-                f,
-                "the mesh needs {needed} tiles of {TILE} elements, the scene has room for {capacity}"
-            ),
-            Self::ElementCount { elements, most } => {
-                write!(f, "the mesh has {elements} elements, a scene can have {most}")
-            }
-            Self::SupportNode { support, node, nodes } => {
-                write!(f, "support {support}: node {node} does not exist, the mesh has {nodes} nodes")
-            }
-            Self::NoTissue { element } => write!(f, "element {element}: the material names no tissue"),
-            Self::Constant { element, name, value } => {
-                write!(
-                    f,
-                    "element {element}: constant {name} is {value}, it must be a finite positive number"
-                )
-            }
-            Self::Density { element, value } => {
-                write!(f, "element {element}: density is {value} kg/m^3, it must be a finite positive number")
-            }
-            Self::NoPatches => {
-                write!(f, "only a scene on the heap has room for tetrahedra with nodal strain")
-            }
-            Self::NothingMoves => write!(f, "all nodes of all elements are fixed, so nothing can move"),
-        }
-    }
-}
-
-impl core::error::Error for BuildError {}
-
 /// Tiles that are enough for any `elements` elements.
 #[must_use]
 pub const fn tiles_for(elements: usize) -> usize {
     most_tiles(elements)
 }
 
+/// How many tissues the elements of a material may be of.
+pub(crate) fn tissue_count(material: &impl Material) -> usize {
+    match material.laws() {
+        Laws::One(_) => 1,
+        Laws::Regions { tissues, .. } => tissues.len(),
+    }
+}
+
 /// CRC32 of all tables, to tell scenes of the same size apart.
-fn checksum(nodes: &[NodeInertia], tiles: &[ElementTile]) -> u32 {
+fn checksum(element: Element, nodes: &[NodeInertia], tiles: &[ElementTile]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&element.code().to_le_bytes());
     hasher.update(bytemuck::must_cast_slice(nodes));
     hasher.update(bytemuck::must_cast_slice(tiles));
     hasher.finalize()
@@ -178,6 +82,7 @@ pub struct SceneFacts {
     node_count: usize,
     element_count: usize,
     partitions: Partitions,
+    patch_rows: usize,
     mass: f64,
     releasable_energy: f64,
     checksum: u32,
@@ -191,28 +96,50 @@ impl SceneFacts {
         node_count: 0,
         element_count: 0,
         partitions: Partitions::NONE,
+        patch_rows: 0,
         mass: 0.0,
         releasable_energy: 0.0,
         checksum: 0,
         has_point_masses: false,
     };
 
-    /// Builds a scene in memory of the caller, `nodes` and `tiles` ([`tiles_for`]), from a mesh, what it is made of, and its supports;
-    /// a node may be listed more than once. Allocates nothing.
+    /// Builds a scene in memory of the caller, `nodes`, `tiles` ([`tiles_for`]) and for nodal strain `patches` ([`patch_rows_for`];
+    /// none otherwise), from a mesh, what it is made of, and its supports; a node may be listed more than once. Allocates nothing.
     pub fn build<M: Material>(
         material: &M,
         mesh: &Mesh<'_>,
         supports: impl Iterator<Item = Support>,
         nodes: &mut [NodeInertia],
         tiles: &mut [ElementTile],
+        patches: &mut [PatchRow],
     ) -> Result<Self, BuildError> {
+        let mut facts = Self::without_patches(material, mesh, supports, nodes, tiles)?;
         if M::ELEMENT.is_nodal_strain() {
-            return Err(BuildError::NoPatches);
+            facts.build_patches(material, tiles, patches)?;
         }
-        Self::without_patches(material, mesh, supports, nodes, tiles)
+        Ok(facts)
     }
 
-    /// The same for nodal strain as well, whose patches the caller has to add.
+    fn build_patches(
+        &mut self,
+        material: &impl Material,
+        tiles: &[ElementTile],
+        rows: &mut [PatchRow],
+    ) -> Result<(), BuildError> {
+        let builder = PatchBuilder {
+            nodes: self.node_count,
+            elements: self.element_count,
+            tiles: tiles.get(..self.tile_count()).unwrap_or_default(),
+            partitions: &self.partitions,
+            tissues: tissue_count(material),
+            region: |element| material.region(element),
+        };
+        let built = builder.build(rows);
+        self.patch_rows =
+            built.map_err(|needed| BuildError::PatchCapacity { needed, capacity: rows.len() })?;
+        Ok(())
+    }
+
     fn without_patches<M: Material>(
         material: &M,
         mesh: &Mesh<'_>,
@@ -261,11 +188,12 @@ impl SceneFacts {
             find_slots(material, mesh, nodes, tiles);
         }
         let (mass, releasable_energy) = lump_masses(material, mesh, nodes)?;
-        let checksum = checksum(nodes, tiles);
+        let checksum = checksum(M::ELEMENT, nodes, tiles);
         Ok(Self {
             node_count: nodes.len(),
             element_count,
             partitions,
+            patch_rows: 0,
             mass,
             releasable_energy,
             checksum,
@@ -289,7 +217,7 @@ impl SceneFacts {
         self.element_count
     }
 
-    /// A checksum of nodes, supports, masses and elements, to tell scenes of the same size apart.
+    /// A checksum of nodes, supports, masses, elements and their kind, to tell scenes of the same size apart.
     pub(crate) const fn checksum(&self) -> u32 {
         self.checksum
     }
@@ -304,6 +232,12 @@ impl SceneFacts {
     #[must_use]
     pub fn tile_count(&self) -> usize {
         self.partitions.tiles()
+    }
+
+    /// Rows of patches in use, for nodal strain.
+    #[must_use]
+    pub const fn patch_row_count(&self) -> usize {
+        self.patch_rows
     }
 
     /// Energy that the material can release from rest, J; zero for the isochoric laws.
@@ -440,21 +374,16 @@ impl<'a, M> SceneView<'a, M> {
         material: &'a M,
         nodes: &'a [NodeInertia],
         tiles: &'a [ElementTile],
+        patches: &'a [PatchRow],
         facts: &'a SceneFacts,
     ) -> Self {
         Self {
             material,
             inertia: nodes.get(..facts.node_count).unwrap_or_default(),
             tiles: tiles.get(..facts.tile_count()).unwrap_or_default(),
-            patches: Patches::NONE,
+            patches: Patches::of(patches.get(..facts.patch_rows).unwrap_or_default()),
             facts,
         }
-    }
-
-    /// Bytes of the patches of nodes that tetrahedra with nodal strain need.
-    #[must_use]
-    pub fn patch_bytes(&self) -> usize {
-        self.patches.bytes()
     }
 
     /// Places of the elements, tile and number in the tile, in the order of the tables.

@@ -15,7 +15,7 @@
 #     DIR/share/supple/licences    MIT and Apache 2.0, to choose from
 #
 # --destdir is put before the prefix, to make packages. FEATURES (capi) are those of Cargo.toml: capi-nodal-pressure has only the
-# first of the laws, capi-neo-hookean of that only linear tetrahedra; deterministic may be added after a comma.
+# first of the laws and no nodal strain, capi-neo-hookean of that only linear tetrahedra; deterministic may be added after a comma.
 set -euo pipefail
 
 usage() {

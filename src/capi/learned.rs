@@ -80,7 +80,7 @@ pub struct supple_learned_facts {
     pub multiply_adds: u64,
     /// Whether the exact step has taken over for good.
     pub fell_back: u32,
-    /// Elements of the training, SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE; in a scene of others the network's error is not known.
+    /// Elements of the training, SUPPLE_LINEAR and so on; in a scene of others the network's error is not known.
     pub element: u32,
 }
 

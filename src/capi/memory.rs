@@ -98,6 +98,11 @@ impl Place {
         }
     }
 
+    /// The same place for an object whose last array turned out to be shorter.
+    pub(super) fn shrunk(self, layout: Layout) -> Self {
+        Self { bytes: self.bytes.min(layout.bytes()), ..self }
+    }
+
     /// The arrays of an object that is not there yet: from now on the memory holds none, until [`Place::put`].
     ///
     /// # Safety

@@ -2,17 +2,18 @@
 
 use core::ffi::c_void;
 
-use crate::element::{ElementLaw, ElementTile, NodeInertia};
+use crate::element::{ElementLaw, ElementTile, NodeInertia, PatchRow};
 use crate::material::{
-    AnyLaw, Element, Law, Laws, MAX_CONSTANTS, Material, NodalPressure, Regions, Tissue, for_each_law,
+    AnyLaw, Element, Law, Laws, MAX_CONSTANTS, Material, NodalPressure, NodalStrain, Regions, Tissue,
+    for_each_law,
 };
 use crate::mesh::{Mesh, Winding};
-use crate::scene::{Axes, SceneFacts, SceneView, Support, tiles_for};
+use crate::scene::{Axes, SceneFacts, SceneView, Support, patch_rows_for, tiles_for};
 use crate::tled;
 
 use super::SUPPLE_NONE;
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, one, place_for, same_abi};
-use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
+use super::status::{Answer, mismatch, short, status_of, supple_error, supple_status};
 use supple_status::*;
 
 /// Elements must have positive volumes: (x1 - x0) . ((x2 - x0) x (x3 - x0)) > 0.
@@ -24,8 +25,13 @@ pub const SUPPLE_WINDING_NORMALISED: u32 = 1;
 pub const SUPPLE_LINEAR: u32 = 0;
 /// Tetrahedra with average nodal pressure, which do not lock. Take these unless you compare with others' linear ones.
 pub const SUPPLE_NODAL_PRESSURE: u32 = 1;
+/// Tetrahedra with stabilised nodal strain, which bend well on coarse meshes and take less time than linear ones, but more memory:
+/// supple_patches_size. Under strains above a half elements at sharp edges may turn inside out, which the status tells within 16
+/// steps. Only in a library with all laws.
+pub const SUPPLE_NODAL_STRAIN: u32 = 2;
 const _: () = assert!(SUPPLE_LINEAR == Element::Linear.code());
 const _: () = assert!(SUPPLE_NODAL_PRESSURE == Element::NodalPressure.code());
+const _: () = assert!(SUPPLE_NODAL_STRAIN == Element::NodalStrain.code());
 
 /// A node that does not move freely: along held axes it stands still, or follows motions.
 #[repr(C)]
@@ -80,7 +86,7 @@ pub struct supple_scene_config {
     pub tissue: *const supple_tissue,
     /// With more than one tissue: of which each element is. With one: NULL.
     pub tissue_of_element: *const u16,
-    /// SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE.
+    /// SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
     pub element: u32,
     /// 0.
     pub reserved: u32,
@@ -118,7 +124,7 @@ pub struct supple_scene_facts {
     pub nodes: u32,
     /// Elements that take part; those with four fixed nodes were left out.
     pub elements: u32,
-    /// Memory of the scene, bytes.
+    /// Memory that the scene takes, bytes: what a copy of it needs. With nodal strain less than it was built in.
     pub bytes: u64,
     /// Floating-point operations of one exact step without loads, the same for every step.
     pub operations: u64,
@@ -164,9 +170,11 @@ impl<L: Law> Material for Body<'_, L> {
 /// A scene of one law in the memory of its object.
 pub(super) struct Carved<'a, L> {
     element: Element,
-    body: NodalPressure<Body<'a, L>>,
+    /// With the wrappers of all elements: the outermost one counts.
+    body: NodalStrain<NodalPressure<Body<'a, L>>>,
     nodes: &'a [NodeInertia],
     tiles: &'a [ElementTile],
+    patches: &'a [PatchRow],
     facts: &'a SceneFacts,
 }
 
@@ -185,10 +193,11 @@ impl<'a, L: ElementLaw> Carved<'a, L> {
                 element,
                 nodes: arrays.read(nodes as usize),
                 tiles: arrays.read(tiles_for(elements as usize)),
-                body: NodalPressure(Body {
+                body: NodalStrain(NodalPressure(Body {
                     tissues: arrays.read(tissues as usize),
                     of_element: arrays.read(regions(elements, tissues)),
-                }),
+                })),
+                patches: arrays.read(facts.patch_row_count()),
                 facts,
             }
         }
@@ -200,13 +209,23 @@ impl<'a, L: ElementLaw> Carved<'a, L> {
 
     /// The scene, of linear elements.
     pub(super) fn linear(&self) -> SceneView<'_, Body<'a, L>> {
-        SceneView::new(&self.body.0, self.nodes, self.tiles, self.facts)
+        self.view(&self.body.0.0)
     }
 
     /// The scene, of elements with nodal pressure.
     #[cfg(feature = "capi-nodal-pressure")]
     pub(super) fn nodal_pressure(&self) -> SceneView<'_, NodalPressure<Body<'a, L>>> {
-        SceneView::new(&self.body, self.nodes, self.tiles, self.facts)
+        self.view(&self.body.0)
+    }
+
+    /// The scene, of elements with nodal strain.
+    #[cfg(feature = "capi")]
+    pub(super) fn nodal_strain(&self) -> SceneView<'_, NodalStrain<NodalPressure<Body<'a, L>>>> {
+        self.view(&self.body)
+    }
+
+    fn view<'b, M>(&'b self, body: &'b M) -> SceneView<'b, M> {
+        SceneView::new(body, self.nodes, self.tiles, self.patches, self.facts)
     }
 }
 
@@ -238,12 +257,21 @@ macro_rules! any_scene {
             ///
             /// # Safety
             /// As at [`Parts::build_of`].
-            unsafe fn build(&self, law: AnyLaw, element: Element, arrays: Arrays) -> Answer<SceneFacts> {
+            unsafe fn build(
+                &self,
+                law: AnyLaw,
+                element: Element,
+                patch_rows: usize,
+                arrays: Arrays,
+            ) -> Answer<SceneFacts> {
                 // SAFETY: the caller's promise.
                 unsafe {
                     match law {
-                        AnyLaw::$first(_) => self.build_of::<$first_law>(element, arrays),
-                        $(#[cfg(feature = "capi")] AnyLaw::$other(_) => self.build_of::<$law>(element, arrays),)*
+                        AnyLaw::$first(_) => self.build_of::<$first_law>(element, patch_rows, arrays),
+                        $(
+                            #[cfg(feature = "capi")]
+                            AnyLaw::$other(_) => self.build_of::<$law>(element, patch_rows, arrays),
+                        )*
                         _ => Err(SUPPLE_E_LAW.into()),
                     }
                 }
@@ -260,6 +288,11 @@ macro_rules! with_scene {
             #[cfg(feature = "capi-nodal-pressure")]
             $crate::material::Element::NodalPressure => {
                 let $scene = $carved.nodal_pressure();
+                $work
+            }
+            #[cfg(feature = "capi")]
+            $crate::material::Element::NodalStrain => {
+                let $scene = $carved.nodal_strain();
                 $work
             }
             _ => {
@@ -304,23 +337,37 @@ const fn regions(elements: u32, tissues: u32) -> usize {
     if tissues > 1 { elements as usize } else { 0 }
 }
 
-fn layout(nodes: u32, elements: u32, tissues: u32) -> Layout {
+/// With so many rows of patches.
+fn layout(nodes: u32, elements: u32, tissues: u32, patch_rows: usize) -> Layout {
     Layout::of::<supple_scene>()
         .and::<NodeInertia>(nodes as usize)
         .and::<ElementTile>(tiles_for(elements as usize))
         // Enough for the tissues of any law.
         .and::<supple_tissue>(tissues as usize)
         .and::<u16>(regions(elements, tissues))
+        .and::<PatchRow>(patch_rows)
 }
 
-/// Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant.
+/// Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant. With
+/// SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_scene_size(nodes: u32, elements: u32, tissues: u32) -> usize {
-    layout(nodes, elements, tissues).bytes()
+    layout(nodes, elements, tissues, 0).bytes()
 }
 
-/// Builds a scene in `memory` of at least supple_scene_size bytes, aligned to SUPPLE_ALIGN. On success `*scene` is the scene,
-/// at the beginning of that memory.
+/// Bytes of memory that a scene with SUPPLE_NODAL_STRAIN needs more than supple_scene_size: enough to build it from any mesh whose
+/// elements of a tissue around a node are joined by faces, with at most 48 neighbours of a node. For others supple_scene_init
+/// returns SUPPLE_E_SHORT, and the error's limit is enough. The scene takes about half of these bytes: supple_scene_describe tells.
+/// SUPPLE_PATCHES_SIZE is the same as a constant.
+#[unsafe(no_mangle)]
+pub extern "C" fn supple_patches_size(nodes: u32, elements: u32, tissues: u32) -> usize {
+    let rows = patch_rows_for(nodes as usize, elements as usize, tissues as usize);
+    rows.checked_mul(size_of::<PatchRow>()).unwrap_or(0)
+}
+
+/// Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size, aligned to
+/// SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning of that memory. What it takes of it is told by
+/// supple_scene_describe; the rest is free for other use.
 ///
 /// @param error may be NULL; index is that of an element, a support or a node as the status says.
 #[unsafe(no_mangle)]
@@ -336,8 +383,20 @@ pub unsafe extern "C" fn supple_scene_init(
         let (config, scene) = (one(config)?, place_for(scene)?);
         let (law, element, parts) = Parts::checked(config)?;
         let &supple_scene_config { nodes, elements, tissues, .. } = config;
-        let place = Place::new(memory, bytes, layout(nodes, elements, tissues))?;
-        let facts = parts.build(law, element, place.arrays::<supple_scene>())?;
+        let without_patches = layout(nodes, elements, tissues, 0).bytes();
+        let room = match bytes.min(isize::MAX as usize).checked_sub(without_patches) {
+            _ if element != Element::NodalStrain => 0,
+            Some(rest) => rest / size_of::<PatchRow>(),
+            None => patch_rows_for(nodes as usize, elements as usize, tissues as usize),
+        };
+        let place = Place::new(memory, bytes, layout(nodes, elements, tissues, room))?;
+        let facts = parts.build(law, element, room, place.arrays::<supple_scene>());
+        let facts = facts.map_err(|error| match error.status {
+            // So far of the patches alone.
+            SUPPLE_E_SHORT => short(bytes, without_patches.saturating_add(error.limit as usize)),
+            _ => error,
+        })?;
+        let place = place.shrunk(layout(nodes, elements, tissues, facts.patch_row_count()));
         scene.write(place.put(|head| supple_scene { head, nodes, elements, tissues, element, law, facts }));
         Ok(SUPPLE_OK)
     };
@@ -345,8 +404,12 @@ pub unsafe extern "C" fn supple_scene_init(
     unsafe { memory::answered(init(), error) }
 }
 
-/// Whether this library has elements with nodal pressure.
-const NODAL_PRESSURE: bool = cfg!(feature = "capi-nodal-pressure");
+/// The elements that this library has; the number of each is its place.
+const ELEMENTS: &[Element] = match () {
+    () if cfg!(feature = "capi") => &Element::ALL,
+    () if cfg!(feature = "capi-nodal-pressure") => &[Element::Linear, Element::NodalPressure],
+    () => &[Element::Linear],
+};
 
 /// What a scene is built from, checked as far as it can be without building it.
 struct Parts<'a> {
@@ -364,9 +427,11 @@ impl<'a> Parts<'a> {
         let &supple_scene_config { law: number, nodes, elements, tissues, .. } = config;
         let law = law_of(number).ok_or(supple_error::from(SUPPLE_E_LAW).value(number.into(), 0.0))?;
         check_choice(SUPPLE_NONE as usize, config.winding, SUPPLE_WINDING_NORMALISED)?;
-        check_choice(SUPPLE_NONE as usize, config.element, if NODAL_PRESSURE { 1 } else { 0 })?;
         check_choice(SUPPLE_NONE as usize, config.reserved, 0)?;
-        let element = if config.element == SUPPLE_LINEAR { Element::Linear } else { Element::NodalPressure };
+        let element = ELEMENTS.get(config.element as usize).copied();
+        let most = ELEMENTS.len().saturating_sub(1) as u32;
+        check_choice(SUPPLE_NONE as usize, config.element, most)?;
+        let element = element.unwrap_or_default();
         let winding =
             if config.winding == SUPPLE_WINDING_CHECKED { Winding::Checked } else { Winding::Normalised };
         if nodes == 0 || elements == 0 {
@@ -394,15 +459,21 @@ impl<'a> Parts<'a> {
 
     /// # Safety
     /// The arrays are those of a scene of these parts, and nobody else uses them.
-    unsafe fn build_of<L: ElementLaw>(&self, element: Element, mut arrays: Arrays) -> Answer<SceneFacts> {
+    unsafe fn build_of<L: ElementLaw>(
+        &self,
+        element: Element,
+        patch_rows: usize,
+        mut arrays: Arrays,
+    ) -> Answer<SceneFacts> {
         let Self { mesh, supports, tissues: given, of_element } = self;
         // SAFETY: the caller's promise; what is not any bits is written before it is read.
-        let (nodes, tiles, tissues, regions) = unsafe {
+        let (nodes, tiles, tissues, regions, patches) = unsafe {
             (
                 arrays.change::<NodeInertia>(mesh.points().len()),
                 arrays.change::<ElementTile>(tiles_for(mesh.element_count())),
                 arrays.change::<Tissue<L>>(given.len()),
                 arrays.change::<u16>(of_element.len()),
+                arrays.change::<PatchRow>(patch_rows),
             )
         };
         for (tissue, given) in tissues.iter_mut().zip(*given) {
@@ -419,8 +490,14 @@ impl<'a> Parts<'a> {
         let body = Body { tissues, of_element: regions };
         Ok(match element {
             #[cfg(feature = "capi-nodal-pressure")]
-            Element::NodalPressure => SceneFacts::build(&NodalPressure(body), mesh, supports, nodes, tiles)?,
-            _ => SceneFacts::build(&body, mesh, supports, nodes, tiles)?,
+            Element::NodalPressure => {
+                SceneFacts::build(&NodalPressure(body), mesh, supports, nodes, tiles, patches)?
+            }
+            #[cfg(feature = "capi")]
+            Element::NodalStrain => {
+                SceneFacts::build(&NodalStrain(body), mesh, supports, nodes, tiles, patches)?
+            }
+            _ => SceneFacts::build(&body, mesh, supports, nodes, tiles, patches)?,
         })
     }
 }

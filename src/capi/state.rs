@@ -52,11 +52,11 @@ pub struct supple_step_config {
     pub damping: f32,
 }
 
-/// Volume ratios of the nodes, which only elements with nodal pressure need.
+/// Volume ratios of the nodes, or weights for the critical step, which linear elements do not need.
 const fn volumes(nodes: u32, element: Element) -> usize {
     match element {
-        Element::NodalPressure => nodes as usize,
-        _ => 0,
+        Element::Linear => 0,
+        _ => nodes as usize,
     }
 }
 
@@ -73,11 +73,10 @@ fn layout(nodes: u32, element: Element) -> Layout {
 /// Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is the same
 /// as a constant.
 ///
-/// @param element of the scene: SUPPLE_LINEAR or SUPPLE_NODAL_PRESSURE.
+/// @param element of the scene: SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_state_size(nodes: u32, element: u32) -> usize {
-    let known = [Element::Linear, Element::NodalPressure];
-    let element = known.into_iter().find(|known| known.code() == element);
+    let element = Element::ALL.into_iter().find(|known| known.code() == element);
     element.map_or(0, |element| layout(nodes, element).bytes())
 }
 
@@ -117,7 +116,8 @@ pub unsafe extern "C" fn supple_state_reset(state: *mut supple_state) -> supple_
 }
 
 /// Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as
-/// long as some six steps, with nodal pressure some twenty; tissue that is deformed is stiffer, so ask again from time to time.
+/// long as some six steps, with nodal pressure some twenty, with nodal strain some thirty; tissue that is deformed is stiffer, so ask
+/// again from time to time.
 ///
 /// @param seconds receives the step, s.
 /// @param node may be NULL; receives the node that sets it.

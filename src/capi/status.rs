@@ -3,6 +3,7 @@
 
 use core::ffi::{CStr, c_char};
 
+use crate::element::PatchRow;
 use crate::inertia::{DamperError, InertiaError};
 use crate::learned::LearnedError;
 use crate::loads::LoadError;
@@ -253,8 +254,10 @@ impl From<BuildError> for supple_error {
             BuildError::Density { element, value } => {
                 is(SUPPLE_E_DENSITY).at(element).value(value.into(), 0.0)
             }
-            // No scene of this interface is of nodal strain.
-            BuildError::NoPatches => is(SUPPLE_E_CHOICE),
+            BuildError::PatchCapacity { needed, capacity } => {
+                let bytes = |rows: usize| rows.saturating_mul(size_of::<PatchRow>());
+                short(bytes(capacity), bytes(needed))
+            }
             BuildError::NothingMoves => is(SUPPLE_E_NOTHING_MOVES),
         }
     }

@@ -14,6 +14,7 @@ mod nodal_volume_bounds;
 mod node;
 mod patch;
 mod patch_bounds;
+mod patch_builder;
 mod patch_forces;
 mod patch_tile_bounds;
 mod pressure;
@@ -31,10 +32,10 @@ pub(crate) use kernels::{ForcesVisitor, tile_bounds};
 #[cfg(any(feature = "std", test))]
 pub use kernels::{LawWork, MaterialWork, with_element, with_law};
 pub use node::{Axes, NodeInertia};
-#[cfg(any(feature = "std", test))]
-pub use patch::VecPatches;
-pub use patch::{Neighbours, PatchLayout, PatchTile, Patches};
+pub use patch::{Neighbours, PatchLayout, PatchRow, PatchTile, Patches};
 pub(crate) use patch_bounds::PatchBounds;
+pub(crate) use patch_builder::PatchBuilder;
+pub use patch_builder::patch_rows_for;
 pub(crate) use patch_forces::PatchForces;
 pub(crate) use patch_tile_bounds::PatchTileBounds;
 pub use tile::ElementTile;

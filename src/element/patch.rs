@@ -4,11 +4,12 @@
 //! H_a = (1 / V_a) sum_b (u_b - u_a) c_ab^T,   c_ab = sum_{e with a, b} V_e / 4 g_b,   V_a = sum_e V_e / 4
 //! ```
 //! with the gradients `g_b` (1/m) of the shape functions (Dohrmann et al. 2000, "Node-based uniform strain elements"). Tables of
-//! [`TILE`] patches as a structure of arrays, and one of their neighbours after the other.
+//! [`TILE`] patches as a structure of arrays, and one of their neighbours after the other, in rows of equal size, which
+//! [`super::patch_builder`] fills.
 
 use core::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck::{Pod, Zeroable, must_cast_ref, must_cast_slice};
 use glam::{DMat3, DVec3};
 
 use super::internal_forces::operations;
@@ -16,6 +17,18 @@ use super::tile::vector_at;
 use crate::material::Law;
 use crate::mesh::partition::MAX_PARTITIONS;
 use crate::simd::{Real, TILE, TileNodes};
+
+/// Memory for a row of the tables of patches: how many there are, then tiles of patches, then their neighbours.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct PatchRow([u64; ROW_WORDS]);
+
+pub(super) const ROW_WORDS: usize = 40;
+
+impl PatchRow {
+    /// An empty row.
+    pub const EMPTY: Self = Self([0; ROW_WORDS]);
+}
 
 /// [`TILE`] patches. Places without a patch have volume zero.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -35,7 +48,6 @@ pub struct PatchTile {
 }
 
 impl PatchTile {
-    #[cfg(any(feature = "std", test))]
     pub(super) const EMPTY: Self = Self {
         nodes: [0; TILE],
         volumes: [0.0; TILE],
@@ -149,18 +161,29 @@ impl Neighbours {
     }
 }
 
-/// Where the patches of each partition are: first those with all neighbours in it, then those with some in later ones.
-#[derive(Clone, Copy, Debug)]
+/// How many tiles of patches and rows of neighbours there are, and where the patches of each partition are: first those with all
+/// neighbours in it, then those with some in later ones.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(64))]
 pub struct PatchLayout {
     /// For each group the tile after its last one.
     pub(super) ends: [u32; 2 * MAX_PARTITIONS],
     /// For each partition the last one that its patches have nodes in.
     pub(super) reach: [u8; MAX_PARTITIONS],
+    pub(super) tiles: u32,
+    pub(super) neighbours: u32,
+    padding: [u32; 24],
 }
 
 impl PatchLayout {
     /// Of a scene without patches.
-    pub const NONE: Self = Self { ends: [0; 2 * MAX_PARTITIONS], reach: [0; MAX_PARTITIONS] };
+    pub const NONE: Self = Self {
+        ends: [0; 2 * MAX_PARTITIONS],
+        reach: [0; MAX_PARTITIONS],
+        tiles: 0,
+        neighbours: 0,
+        padding: [0; 24],
+    };
 }
 
 /// The patches of a scene, none for elements that need none.
@@ -175,9 +198,13 @@ impl<'a> Patches<'a> {
     /// No patches.
     pub const NONE: Self = Self { tiles: &[], neighbours: &[], layout: &PatchLayout::NONE };
 
-    /// Bytes of the tables.
-    pub(crate) fn bytes(&self) -> usize {
-        size_of_val(self.tiles) + size_of_val(self.neighbours)
+    /// The patches in rows that a scene was built with.
+    pub(crate) fn of(rows: &'a [PatchRow]) -> Self {
+        let Some((layout, rest)) = rows.split_first() else { return Self::NONE };
+        let layout: &PatchLayout = must_cast_ref(layout);
+        let Some((tiles, rest)) = rest.split_at_checked(layout.tiles as usize) else { return Self::NONE };
+        let neighbours = rest.get(..layout.neighbours as usize).unwrap_or_default();
+        Self { tiles: must_cast_slice(tiles), neighbours: must_cast_slice(neighbours), layout }
     }
 
     /// Floating-point operations of internal forces: 51 for a neighbour, and for a patch those of an element with other kinematics,
@@ -216,180 +243,5 @@ impl<'a> Patches<'a> {
     pub(crate) fn places(self) -> impl Iterator<Item = (&'a PatchTile, usize)> {
         let places = self.tiles.iter().flat_map(|tile| (0..TILE).map(move |lane| (tile, lane)));
         places.filter(|(tile, lane)| tile.volumes[*lane] > 0.0)
-    }
-}
-
-#[cfg(any(feature = "std", test))]
-pub use build::VecPatches;
-
-#[cfg(any(feature = "std", test))]
-mod build {
-    use std::vec::Vec;
-
-    use super::{MAX_PARTITIONS, Neighbours, PatchLayout, PatchTile, Patches, TILE};
-    use crate::element::ElementTile;
-    use crate::mesh::partition::Partitions;
-
-    /// Patches on a host with a heap.
-    #[derive(Clone, Debug)]
-    pub struct VecPatches {
-        tiles: Vec<PatchTile>,
-        neighbours: Vec<Neighbours>,
-        layout: PatchLayout,
-    }
-
-    /// A patch with its neighbours: node, `c_ab`, coupling.
-    struct Patch {
-        node: u32,
-        element: u32,
-        volume: f64,
-        neighbours: Vec<(u32, [f64; 3], f64)>,
-        /// First and last partition of its nodes.
-        span: (usize, usize),
-    }
-
-    impl VecPatches {
-        /// No patches.
-        pub(crate) const fn none() -> Self {
-            Self { tiles: Vec::new(), neighbours: Vec::new(), layout: PatchLayout::NONE }
-        }
-
-        pub(crate) fn view(&self) -> Patches<'_> {
-            Patches { tiles: &self.tiles, neighbours: &self.neighbours, layout: &self.layout }
-        }
-
-        /// The patches of all nodes, one for each tissue of a node; `region` is the tissue of an element of the mesh.
-        pub(crate) fn build(
-            nodes: usize,
-            tiles: &[ElementTile],
-            partitions: &Partitions,
-            region: impl Fn(usize) -> u16,
-        ) -> Self {
-            let mut patches = patches(nodes, tiles, &region);
-            for patch in &mut patches {
-                let of = |node: u32| partitions.of_node(node as usize);
-                let all = patch.neighbours.iter().map(|(node, ..)| of(*node)).chain([of(patch.node)]);
-                patch.span = all.fold((usize::MAX, 0), |(first, last), at| (first.min(at), last.max(at)));
-            }
-            // Those with as many neighbours next to each other.
-            patches.sort_by_key(|patch| {
-                let (first, last) = patch.span;
-                (first, last > first, core::cmp::Reverse(patch.neighbours.len()), patch.node)
-            });
-            let mut built = Self::none();
-            for group in 0..2 * MAX_PARTITIONS {
-                let is_in =
-                    |patch: &&Patch| 2 * patch.span.0 + usize::from(patch.span.1 > patch.span.0) == group;
-                let first = patches.partition_point(|patch| {
-                    2 * patch.span.0 + usize::from(patch.span.1 > patch.span.0) < group
-                });
-                let members: Vec<&Patch> = patches[first..].iter().take_while(is_in).collect();
-                for patch in &members {
-                    let reach = &mut built.layout.reach[patch.span.0];
-                    *reach = (*reach).max(patch.span.1 as u8);
-                }
-                members.chunks(TILE).for_each(|members| built.push(members));
-                built.layout.ends[group] = built.tiles.len() as u32;
-            }
-            built
-        }
-
-        fn push(&mut self, members: &[&Patch]) {
-            let count = members.iter().map(|patch| patch.neighbours.len()).max().unwrap_or(0);
-            let mut tile =
-                PatchTile { first: self.neighbours.len() as u32, count: count as u32, ..PatchTile::EMPTY };
-            for lane in 0..TILE {
-                // Places without a patch name the first one's node and element.
-                let patch = members.get(lane).unwrap_or(&members[0]);
-                (tile.nodes[lane], tile.elements[lane]) = (patch.node, patch.element);
-            }
-            for (lane, patch) in members.iter().enumerate() {
-                tile.volumes[lane] = patch.volume as f32;
-                tile.inverse_volumes[lane] = (1.0 / patch.volume) as f32;
-            }
-            for index in 0..count {
-                let mut entry =
-                    Neighbours { nodes: tile.nodes, gradients: [[0.0; TILE]; 3], couplings: [0.0; TILE] };
-                for (lane, patch) in members.iter().enumerate() {
-                    let Some((node, gradient, coupling)) = patch.neighbours.get(index) else { continue };
-                    entry.nodes[lane] = *node;
-                    for axis in 0..3 {
-                        entry.gradients[axis][lane] = gradient[axis] as f32;
-                    }
-                    entry.couplings[lane] = *coupling as f32;
-                }
-                self.neighbours.push(entry);
-            }
-            self.tiles.push(tile);
-        }
-    }
-
-    /// The patches in the order of their nodes.
-    fn patches(nodes: usize, tiles: &[ElementTile], region: &impl Fn(usize) -> u16) -> Vec<Patch> {
-        let places = || {
-            let places = tiles.iter().flat_map(|tile| (0..TILE).map(move |lane| (tile, lane)));
-            places.filter(|(tile, lane)| tile.volume::<f32>(*lane) > 0.0)
-        };
-        // The elements of each node, one list after the other.
-        let mut starts = std::vec![0_usize; nodes + 1];
-        for (tile, lane) in places() {
-            (0..4).for_each(|corner| starts[tile.node(corner, lane) + 1] += 1);
-        }
-        for node in 0..nodes {
-            starts[node + 1] += starts[node];
-        }
-        let mut filled = starts.clone();
-        let mut elements = std::vec![(0_u16, 0_usize, 0_usize); starts[nodes]];
-        for (index, tile) in tiles.iter().enumerate() {
-            for lane in (0..TILE).filter(|&lane| tile.volume::<f32>(lane) > 0.0) {
-                for corner in 0..4 {
-                    let at = &mut filled[tile.node(corner, lane)];
-                    elements[*at] = (region(tile.element(lane)), index, lane);
-                    *at += 1;
-                }
-            }
-        }
-        let mut patches = Vec::with_capacity(nodes);
-        for node in 0..nodes {
-            let around = &mut elements[starts[node]..starts[node + 1]];
-            around.sort_unstable();
-            for around in around.chunk_by(|one, other| one.0 == other.0) {
-                let around = around.iter().map(|&(_, tile, lane)| (&tiles[tile], lane));
-                patches.extend(patch(node as u32, around));
-            }
-        }
-        patches
-    }
-
-    fn patch<'a>(node: u32, around: impl Iterator<Item = (&'a ElementTile, usize)>) -> Option<Patch> {
-        let mut patch = Patch { node, element: 0, volume: 0.0, neighbours: Vec::new(), span: (0, 0) };
-        for (tile, lane) in around {
-            patch.element = tile.element(lane) as u32;
-            let volume = f64::from(tile.volume::<f32>(lane));
-            patch.volume += 0.25 * volume;
-            let gradient = |corner: usize| -> [f64; 3] {
-                let at = |corner: usize, axis: usize| f64::from(tile.gradient_of(corner, axis, lane));
-                core::array::from_fn(|axis| match corner {
-                    0 => -(at(0, axis) + at(1, axis) + at(2, axis)),
-                    _ => at(corner - 1, axis),
-                })
-            };
-            let own = (0..4).find(|&corner| tile.node(corner, lane) == node as usize)?;
-            let own_gradient = gradient(own);
-            for corner in (0..4).filter(|&corner| corner != own) {
-                let (other, gradient) = (tile.node(corner, lane) as u32, gradient(corner));
-                let place = patch.neighbours.binary_search_by_key(&other, |(node, ..)| *node);
-                let place = place.unwrap_or_else(|place| {
-                    patch.neighbours.insert(place, (other, [0.0; 3], 0.0));
-                    place
-                });
-                let (_, sum, coupling) = &mut patch.neighbours[place];
-                for axis in 0..3 {
-                    sum[axis] += 0.25 * volume * gradient[axis];
-                    *coupling -= volume * gradient[axis] * own_gradient[axis];
-                }
-            }
-        }
-        (patch.volume > 0.0).then_some(patch)
     }
 }

@@ -36,10 +36,14 @@ const fn partitions_for(elements: usize) -> usize {
     }
 }
 
+/// Most groups of elements of a scene with that many: two for each partition, one for the last.
+pub(crate) const fn most_groups(elements: usize) -> usize {
+    2 * partitions_for(elements) - 1
+}
+
 /// Most tiles that this many elements can need: the last tile of each group may be partly empty.
 pub(crate) const fn most_tiles(elements: usize) -> usize {
-    let groups = 2 * partitions_for(elements) - 1;
-    elements.div_ceil(TILE) + groups - 1
+    elements.div_ceil(TILE) + most_groups(elements) - 1
 }
 
 /// Kinds of elements of a partition: for each of its two groups, strips of three, two and one elements. Tiles are in

@@ -2,12 +2,10 @@
 
 use core::ops::Deref;
 
-#[cfg(any(feature = "std", test))]
-use super::tiles_for;
 use super::{AsScene, BuildError, SceneFacts, SceneView, Support};
 #[cfg(any(feature = "std", test))]
-use crate::element::VecPatches;
-use crate::element::{ElementMaterial, ElementTile, NodeInertia, Patches};
+use super::{patch_rows_for, tiles_for, tissue_count};
+use crate::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
 use crate::material::Material;
 use crate::mesh::Mesh;
 
@@ -15,9 +13,9 @@ use crate::mesh::Mesh;
 pub trait SceneTables {
     /// Nodes and tiles.
     fn tables(&self) -> (&[NodeInertia], &[ElementTile]);
-    /// Patches of materials with nodal strain.
-    fn patches(&self) -> Patches<'_> {
-        Patches::NONE
+    /// Rows of patches of materials with nodal strain.
+    fn patches(&self) -> &[PatchRow] {
+        &[]
     }
 }
 
@@ -41,10 +39,7 @@ impl<M, S: SceneTables> Scene<M, S> {
     /// The scene.
     pub fn view(&self) -> SceneView<'_, M> {
         let (nodes, tiles) = self.tables.tables();
-        SceneView {
-            patches: self.tables.patches(),
-            ..SceneView::new(&self.material, nodes, tiles, &self.facts)
-        }
+        SceneView::new(&self.material, nodes, tiles, self.tables.patches(), &self.facts)
     }
 }
 
@@ -56,40 +51,51 @@ impl<M: ElementMaterial, S: SceneTables> AsScene for Scene<M, S> {
     }
 }
 
-/// Tables for at most `N` nodes and `T` tiles of elements.
+/// Tables for at most `N` nodes, `T` tiles of elements and `P` rows of patches.
 #[derive(Clone, Debug)]
-pub struct FixedTables<const N: usize, const T: usize> {
+pub struct FixedTables<const N: usize, const T: usize, const P: usize = 0> {
     nodes: heapless::Vec<NodeInertia, N>,
     tiles: heapless::Vec<ElementTile, T>,
+    /// An array, of which none takes no bytes.
+    patches: [PatchRow; P],
 }
 
-impl<const N: usize, const T: usize> SceneTables for FixedTables<N, T> {
+impl<const N: usize, const T: usize, const P: usize> SceneTables for FixedTables<N, T, P> {
     fn tables(&self) -> (&[NodeInertia], &[ElementTile]) {
         (&self.nodes, &self.tiles)
     }
+
+    fn patches(&self) -> &[PatchRow] {
+        &self.patches
+    }
 }
 
-/// A scene of at most `N` nodes and `T` tiles of elements ([`tiles_for`]), which may be a `static`.
-pub type FixedScene<M, const N: usize, const T: usize> = Scene<M, FixedTables<N, T>>;
+/// A scene of at most `N` nodes and `T` tiles of elements ([`tiles_for`](super::tiles_for)), with nodal strain of at most `P` rows of patches
+/// ([`patch_rows_for`](super::patch_rows_for)), which may be a `static`.
+pub type FixedScene<M, const N: usize, const T: usize, const P: usize = 0> = Scene<M, FixedTables<N, T, P>>;
 
-impl<M, const N: usize, const T: usize> FixedScene<M, N, T> {
+impl<M, const N: usize, const T: usize, const P: usize> FixedScene<M, N, T, P> {
     /// An empty scene.
     pub const fn new(material: M) -> Self {
-        let tables = FixedTables { nodes: heapless::Vec::new(), tiles: heapless::Vec::new() };
+        let tables = FixedTables {
+            nodes: heapless::Vec::new(),
+            tiles: heapless::Vec::new(),
+            patches: [PatchRow::EMPTY; P],
+        };
         Self { material, tables, facts: SceneFacts::EMPTY }
     }
 }
 
-impl<M: Material, const N: usize, const T: usize> FixedScene<M, N, T> {
+impl<M: Material, const N: usize, const T: usize, const P: usize> FixedScene<M, N, T, P> {
     /// Builds the scene in place from a mesh and its supports; a node may be listed more than once.
     /// On an error the scene is empty.
     pub fn build(&mut self, mesh: &Mesh<'_>, supports: &[Support]) -> Result<(), BuildError> {
-        let Self { material, tables: FixedTables { nodes, tiles }, facts } = self;
+        let Self { material, tables: FixedTables { nodes, tiles, patches }, facts } = self;
         *facts = SceneFacts::EMPTY;
         // All of it: what is too little is told with what is needed.
         let _ = nodes.resize(N, NodeInertia::EMPTY);
         let _ = tiles.resize(T, ElementTile::EMPTY);
-        *facts = SceneFacts::build(material, mesh, supports.iter().copied(), nodes, tiles)?;
+        *facts = SceneFacts::build(material, mesh, supports.iter().copied(), nodes, tiles, patches)?;
         nodes.truncate(facts.node_count);
         tiles.truncate(facts.tile_count());
         Ok(())
@@ -102,7 +108,7 @@ impl<M: Material, const N: usize, const T: usize> FixedScene<M, N, T> {
 pub struct VecTables {
     nodes: std::vec::Vec<NodeInertia>,
     tiles: std::vec::Vec<ElementTile>,
-    patches: VecPatches,
+    patches: std::vec::Vec<PatchRow>,
 }
 
 #[cfg(any(feature = "std", test))]
@@ -111,8 +117,8 @@ impl SceneTables for VecTables {
         (&self.nodes, &self.tiles)
     }
 
-    fn patches(&self) -> Patches<'_> {
-        self.patches.view()
+    fn patches(&self) -> &[PatchRow] {
+        &self.patches
     }
 }
 
@@ -127,13 +133,22 @@ impl<M: Material> VecScene<M> {
         let mut nodes = std::vec![NodeInertia::EMPTY; mesh.points().len()];
         let mut tiles = std::vec![ElementTile::EMPTY; tiles_for(mesh.element_count())];
         let supports = supports.iter().copied();
-        let facts = SceneFacts::without_patches(&material, mesh, supports, &mut nodes, &mut tiles)?;
+        let mut facts = SceneFacts::without_patches(&material, mesh, supports, &mut nodes, &mut tiles)?;
         tiles.truncate(facts.tile_count());
-        let patches = if M::ELEMENT.is_nodal_strain() {
-            VecPatches::build(nodes.len(), &tiles, &facts.partitions, |element| material.region(element))
-        } else {
-            VecPatches::none()
-        };
+        let mut patches = std::vec::Vec::new();
+        if M::ELEMENT.is_nodal_strain() {
+            let mut rows = patch_rows_for(nodes.len(), facts.element_count, tissue_count(&material));
+            loop {
+                patches.resize(rows, PatchRow::EMPTY);
+                match facts.build_patches(&material, &tiles, &mut patches) {
+                    Ok(()) => break,
+                    Err(BuildError::PatchCapacity { needed, .. }) if needed > rows => rows = needed,
+                    Err(error) => return Err(error),
+                }
+            }
+            patches.truncate(facts.patch_rows);
+            patches.shrink_to_fit();
+        }
         Ok(Self { material, tables: VecTables { nodes, tiles, patches }, facts })
     }
 }

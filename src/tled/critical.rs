@@ -21,7 +21,7 @@ const ROUNDING: f32 = 1e-5;
 const BALANCING_SWEEPS: usize = 3;
 
 /// A bound on the stable step at the state's displacement (at rest for a fresh one), never above the
-/// exact limit. It takes as long as some six steps, with nodal pressure or strain some thirty, and may be called between any two steps. The state's forces and
+/// exact limit. It takes as long as some six steps, with nodal pressure some twenty, with nodal strain some thirty, and may be called between any two steps. The state's forces and
 /// volumes and the padding of its vectors serve as scratch. Nothing if the state is too small for the scene or not finite.
 pub fn critical_step(scene: &impl AsScene, state: &mut impl AsState) -> Option<CriticalStep> {
     critical(scene.as_scene(), state.as_state())

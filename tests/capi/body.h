@@ -34,6 +34,10 @@ enum {
     MOTIONS = LAYER
 };
 
+/* Bytes of the bar's scene. */
+#define SCENE_SIZE                                                                                                     \
+    (SUPPLE_SCENE_SIZE(NODES, TETS, 1) + (ELEMENT == SUPPLE_NODAL_STRAIN ? SUPPLE_PATCHES_SIZE(NODES, TETS, 1) : 0))
+
 static float points[NODES][3];
 static uint32_t tets[TETS][4];
 static supple_support supports[2 * LAYER];

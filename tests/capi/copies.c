@@ -3,7 +3,7 @@
 #include "body.h"
 
 enum { ROOM = 4 << 20 };
-SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
+SUPPLE_MEMORY(scene_memory, SCENE_SIZE);
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(weights, 40000);
 SUPPLE_MEMORY(damper, 4000);

@@ -2,7 +2,7 @@
  * (-Wl,--wrap=malloc and so on) and counted, while scenes are built and all kinds of steps are taken. */
 #include "body.h"
 
-SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
+SUPPLE_MEMORY(scene_memory, SCENE_SIZE);
 SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 1));

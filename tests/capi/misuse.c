@@ -122,8 +122,8 @@ static void scenes(void) {
     SCENE(SUPPLE_E_LAW, bad.law = 7);
     CHECK(error.value == 7);
     SCENE(SUPPLE_E_CHOICE, bad.winding = 2);
-    SCENE(SUPPLE_E_CHOICE, bad.element = 2);
-    CHECK(error.value == 2 && error.limit == SUPPLE_NODAL_PRESSURE);
+    SCENE(SUPPLE_E_CHOICE, bad.element = 3);
+    CHECK(error.value == 3 && error.limit == SUPPLE_NODAL_STRAIN);
     SCENE(SUPPLE_E_CHOICE, bad.reserved = 1);
     SCENE(SUPPLE_E_MESH_EMPTY, bad.elements = 0);
     SCENE(SUPPLE_E_MESH_EMPTY, bad.nodes = 0);
@@ -485,7 +485,7 @@ static void elements(supple_scene_config config) {
     const supple_step_config length = {SUPPLE_CONFIG(supple_step_config), 1e-5f, 0.0f};
     REFUSED(SUPPLE_E_ELEMENT, supple_set_step(other, state, &length, &error));
     CHECK(error.value != error.limit && error.limit == SUPPLE_NODAL_PRESSURE - config.element);
-    CHECK(supple_state_size(NODES, 2) == 0);
+    CHECK(supple_state_size(NODES, 3) == 0);
 }
 
 int main(int argc, char **argv) {

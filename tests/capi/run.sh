@@ -29,10 +29,17 @@ for test in misuse sizes copies switching heap threads stack; do
     "$folder/$test-large"
     "$folder/$test-linear"
 done
-for test in misuse copies heap; do
+for test in sizes copies switching heap threads stack strain; do
+    options=(-pthread)
+    [ $test != heap ] || options=("$wrapped")
+    gcc -std=c11 "${warnings[@]}" "${options[@]}" -DELEMENT=SUPPLE_NODAL_STRAIN tests/capi/$test.c "$static" -o "$folder/$test-strain"
+    "$folder/$test-strain"
+done
+gcc -std=c11 "${warnings[@]}" -DSMALL tests/capi/strain.c "$static" -o "$folder/strain-small"
+for test in misuse copies heap strain; do
     valgrind --quiet --error-exitcode=9 --leak-check=full "$folder/$test-small" under-valgrind >"$folder/said"
 done
-echo "valgrind: no error in misuse, copies, heap"
+echo "valgrind: no error in misuse, copies, heap, strain"
 valgrind --quiet --error-exitcode=9 --tool=helgrind "$folder/threads-small" >"$folder/said"
 echo "helgrind: no race in threads"
 
@@ -103,4 +110,6 @@ if ! python3 -c 'import numpy' 2>/dev/null; then
     python=$folder/venv/bin/python3
     "$python" -m pip install --quiet numpy==2.4.6
 fi
-"$python" examples/compare.py "$shared" "$command"
+for element in nodal-pressure nodal-strain; do
+    "$python" examples/compare.py "$shared" "$command" $element
+done

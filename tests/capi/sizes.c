@@ -2,7 +2,7 @@
  * they are never less. */
 #include "body.h"
 
-SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
+SUPPLE_MEMORY(scene_memory, SCENE_SIZE);
 
 static supple_large_config large_of(uint32_t method, uint32_t x, uint32_t y, uint32_t z) {
     return (supple_large_config){SUPPLE_CONFIG(supple_large_config), method, 1e-3f, 10.0f, {x, y, z}, NULL, 0};
@@ -11,7 +11,7 @@ static supple_large_config large_of(uint32_t method, uint32_t x, uint32_t y, uin
 int main(void) {
     unsigned long checked = 0;
     for (uint32_t nodes = 1; nodes < 3000000; nodes += nodes / 7 + 1) {
-        for (uint32_t element = SUPPLE_LINEAR; element <= SUPPLE_NODAL_PRESSURE; element++) {
+        for (uint32_t element = SUPPLE_LINEAR; element <= SUPPLE_NODAL_STRAIN; element++) {
             CHECK(supple_state_size(nodes, element) == SUPPLE_STATE_SIZE(nodes, element));
         }
         for (uint32_t fallback = 0; fallback < 2; fallback++) {
@@ -20,6 +20,7 @@ int main(void) {
         for (uint32_t elements = 1; elements < 12000000; elements += elements / 5 + 1) {
             for (uint32_t tissues = 1; tissues < 65536; tissues += 4 * tissues) {
                 CHECK(supple_scene_size(nodes, elements, tissues) == SUPPLE_SCENE_SIZE(nodes, elements, tissues));
+                CHECK(supple_patches_size(nodes, elements, tissues) == SUPPLE_PATCHES_SIZE(nodes, elements, tissues));
                 checked++;
             }
         }

@@ -5,7 +5,7 @@
 
 #include "body.h"
 
-SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
+SUPPLE_MEMORY(scene_memory, SCENE_SIZE);
 SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 0));
@@ -90,14 +90,15 @@ int main(void) {
         {"set_step", set_step, 20},     {"step", exact, 20},               {"learned_init", init_learned, 12},
         {"learned_step", learn, 140},   {"large_init", init_large, 36},    {"large_step", step_large, 36},
     };
+    const size_t count = sizeof calls / sizeof *calls;
     const uint32_t levels[2] = {supple_level(), SUPPLE_LEVEL_PORTABLE};
     for (int level = 0; level < 2; level++) {
         CHECK(supple_set_level(levels[level]) == SUPPLE_OK);
         const size_t rest = used_by(nothing);
         printf("stack, bytes, %s instructions:", level == 0 ? "best" : "portable");
-        for (size_t n = 0; n < sizeof calls / sizeof *calls; n++) {
+        for (size_t n = 0; n < count; n++) {
             const size_t used = used_by(calls[n].call) - rest;
-            printf(" %s %zu%s", calls[n].name, used, n + 1 < sizeof calls / sizeof *calls ? "," : "\n");
+            printf(" %s %zu%s", calls[n].name, used, n + 1 < count ? "," : "\n");
             CHECK(used < 1024 * calls[n].most);
         }
     }

@@ -3,7 +3,7 @@
 #include "body.h"
 #include <pthread.h>
 
-SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, TETS, 1));
+SUPPLE_MEMORY(scene_memory, SCENE_SIZE);
 SUPPLE_MEMORY(state_memory, 4 * SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(loads_memory, 4 * SUPPLE_LOADS_SIZE(0, MOTIONS));
 static supple_scene *scene;

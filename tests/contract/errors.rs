@@ -2,9 +2,9 @@
 //! empty and the state where it was.
 
 use supple::loads::{LoadError, Loads, Motion, NodalForce, traction};
-use supple::material::{Exponential, Literal, Material, NeoHookean, Regions, Tissue};
+use supple::material::{Exponential, Literal, Material, NeoHookean, NodalStrain, Regions, Tissue};
 use supple::mesh::{Mesh, MeshError, Winding};
-use supple::scene::{Axes, BuildError, FixedScene, Support};
+use supple::scene::{Axes, BuildError, FixedScene, Support, patch_rows_for};
 use supple::state::FixedState;
 use supple::step::{Status, Step, StepError};
 use supple::tled;
@@ -145,6 +145,11 @@ fn build_errors_say_what_is_wrong_and_leave_the_scene_empty() {
         assert_eq!(error, expected);
         assert_eq!(error.to_string(), text);
     }
+    let strain = refused(FixedScene::new(NodalStrain(TISSUE)), &good(), &[]);
+    let needed = patch_rows_for(5, 2, 1);
+    assert_eq!(strain, BuildError::PatchCapacity { needed, capacity: 0 });
+    let text = format!("{needed} rows of patches are enough for nodal strain, the scene has room for 0");
+    assert_eq!(strain.to_string(), text);
     let short = Regions { tissues: &[TISSUE], of_element: &[0] };
     assert_eq!(refused(FixedScene::new(short), &good(), &[]), BuildError::NoTissue { element: 1 });
     let all = [0, 1, 2, 3, 4].map(Support::moved);

@@ -11,3 +11,4 @@ mod support;
 mod errors;
 mod no_allocation;
 mod parts;
+mod patches;

@@ -9,10 +9,10 @@ use std::sync::Mutex;
 use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedError, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{Element, Exponential, NeoHookean, Tissue};
+use supple::material::{Element, Exponential, NeoHookean, NodalStrain, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::mlp::Network;
-use supple::scene::{Axes, BuildError, FixedScene, Support, tiles_for};
+use supple::scene::{Axes, BuildError, FixedScene, Support, patch_rows_for, tiles_for};
 use supple::state::{FixedState, NodeVector};
 use supple::step::{Status, Step};
 use supple::tled;
@@ -130,6 +130,32 @@ fn building_and_stepping_in_statics_allocates_nothing() {
     assert_eq!(allocations(), before);
     println!("200 steps, strain energy {energy:.3e} J, no allocation");
     assert!(taken == 200 && energy > 0.0 && diverged && (volume / TETS as f64 - 1.0).abs() < 0.1);
+}
+
+const ROWS: usize = patch_rows_for(NODES, TETS, 1);
+static PATCHES: Mutex<FixedScene<NodalStrain<Tissue<Exponential>>, NODES, TILES, ROWS>> =
+    Mutex::new(FixedScene::new(NodalStrain(TISSUE)));
+
+#[test]
+fn nodal_strain_in_a_static_allocates_nothing() {
+    let (points, tets) = mesh();
+    let (mut scene, mut state) = (PATCHES.lock().unwrap(), FixedState::<NODES, NODES>::new());
+    let scene = &mut *scene;
+    let before = allocations();
+
+    scene.build(&Mesh::new(&points, &tets, Winding::Checked).unwrap(), &supports()).unwrap();
+    let critical = tled::critical_step(scene, &mut state).unwrap();
+    let step = Step::new(0.5 * critical.seconds, 5.0, critical).unwrap();
+    let loads = Loads::new(scene, [9.81, 0.0, 0.0], &[], &[]).unwrap();
+    let taken = (0..200).filter(|_| tled::step(scene, &loads, &mut state, &step) == Status::Ok).count();
+    let energy = tled::strain_energy(scene, &mut state).expect("room");
+
+    assert_eq!(allocations(), before);
+    println!(
+        "200 steps, {} rows of patches of {ROWS}, strain energy {energy:.3e} J, no allocation",
+        scene.patch_row_count()
+    );
+    assert!(taken == 200 && energy > 0.0);
 }
 
 const LATTICE: [u32; 3] = [1, 1, 2];

@@ -18,6 +18,8 @@ static_assert(!std::is_convertible_v<const std::vector<float> &, supple::span<fl
 static_assert(!std::is_convertible_v<const std::vector<float> &, supple::memory>);
 static_assert(std::is_convertible_v<const std::vector<float> &, supple::bytes>);
 static_assert(supple::scene::size(4, 1) % supple::align == 0);
+static_assert(supple::scene::size(4, 1, 1, supple::element::nodal_strain) ==
+              supple::scene::size(4, 1) + SUPPLE_PATCHES_SIZE(4, 1, 1));
 
 namespace {
 

@@ -3,7 +3,6 @@
 
 use supple::loads::Loads;
 use supple::material::{Exponential, NeoHookean, NodalStrain, Regions};
-use supple::scene::{BuildError, FixedScene};
 use supple::step::{Status, Step};
 use supple::tled;
 
@@ -221,14 +220,6 @@ fn any_number_of_parts_gives_the_same_bits() {
     for parts in [2, 3, 5] {
         assert!(ended(&one, parts) == of_one && ended(&two, parts) == of_two, "{parts} parts");
     }
-}
-
-/// A scene without patches would have no forces: it is not built.
-#[test]
-fn a_fixed_capacity_is_refused() {
-    let body = small_bar();
-    let mut scene = FixedScene::<_, 500, 100>::new(NodalStrain(tissue(support::NEO)));
-    assert_eq!(scene.build(&body.mesh(), &held(&body)), Err(BuildError::NoPatches));
 }
 
 /// The mean strain around nodes hardly changes where a node inside the body is pushed through its neighbours; the elements there do.

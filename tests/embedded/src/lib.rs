@@ -2,13 +2,14 @@
 //! built from this must link without std, and without `core::panicking`: what could panic would show.
 #![no_std]
 
+use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
 use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{Element, Exponential, NeoHookean, NodalPressure, Regions, Tissue};
+use supple::material::{Element, Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue};
 use supple::mesh::{self, Bar, Mesh, Winding};
 use supple::mlp::Network;
-use supple::scene::{FixedScene, Support};
+use supple::scene::{AsScene, FixedScene, SceneFacts, SceneView, Support};
 use supple::state::{FixedState, NodeVector};
 use supple::step::{Status, Step};
 use supple::tled;
@@ -52,14 +53,49 @@ pub extern "C" fn nodal_pressure(
     if scene.build(&mesh, supports).is_err() {
         return -2.0;
     }
-    let Some(critical) = tled::critical_step(&scene, state) else {
+    at_critical_step(&scene, state)
+}
+
+/// The same with nodal strain, in a scene of a fixed capacity and in memory of the host.
+#[unsafe(no_mangle)]
+pub extern "C" fn nodal_strain(
+    tissues: &'static [Tissue<NeoHookean>; 3],
+    of_element: &'static [u16; 300],
+    points: &[[f32; 3]; 100],
+    tets: &[[u32; 4]; 300],
+    supports: &[Support; 9],
+    state: &mut FixedState<100, 100>,
+    rows: &mut [PatchRow; 200],
+) -> f32 {
+    let material = NodalStrain(Regions { tissues, of_element });
+    let mut scene = FixedScene::<_, 100, 20, 200>::new(material);
+    let Ok(mesh) = Mesh::new(points, tets, Winding::Normalised) else {
+        return -1.0;
+    };
+    if scene.build(&mesh, supports).is_err() {
+        return -2.0;
+    }
+    let (mut nodes, mut tiles) = ([NodeInertia::EMPTY; 100], [ElementTile::EMPTY; 20]);
+    let supports = supports.iter().copied();
+    let Ok(facts) = SceneFacts::build(&material, &mesh, supports, &mut nodes, &mut tiles, rows) else {
+        return -2.0;
+    };
+    let lent = SceneView::new(&material, &nodes, &tiles, rows, &facts);
+    at_critical_step(&scene, state) + at_critical_step(&lent, state)
+}
+
+fn at_critical_step<M: ElementMaterial>(
+    scene: &impl AsScene<Material = M>,
+    state: &mut FixedState<100, 100>,
+) -> f32 {
+    let Some(critical) = tled::critical_step(scene, state) else {
         return -3.0;
     };
     let Ok(step) = Step::unchecked(0.9 * critical.seconds, 1.0) else {
         return -4.0;
     };
-    match tled::step(&scene, &Loads::NONE, state, &step) {
-        Status::Ok => tled::strain_energy(&scene, state).map_or(-5.0, |energy| energy as f32),
+    match tled::step(scene, &Loads::NONE, state, &step) {
+        Status::Ok => tled::strain_energy(scene, state).map_or(-5.0, |energy| energy as f32),
         _ => -6.0,
     }
 }

@@ -1,15 +1,18 @@
-//! A bar that stands on its lower end under gravity and a force at a corner, with exact and with learned steps. The compiler knows its
-//! size, so that nothing needs a heap.
+//! A bar that stands on its lower end under gravity and a force at a corner, with exact steps in any tetrahedra and with learned ones.
+//! The compiler knows its size, so that nothing needs a heap.
 
 use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::{Loads, NodalForce};
-use supple::material::{Exponential, Tissue};
+use supple::material::{Exponential, Material, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::mlp::Network;
-use supple::scene::{FixedScene, Support};
-use supple::state::{FixedState, NodeVector};
+use supple::scene::{AsScene, FixedScene, Support};
+use supple::state::{AsState, FixedState, NodeVector};
 use supple::step::{Status, Step};
 use supple::tled;
+
+pub(crate) const TISSUE: Tissue<Exponential> =
+    Tissue { law: Exponential { a: 59.0, b: 8.023, d: 60_000.0 }, density: 1000.0 };
 
 /// The exact step, s: a tenth of the networks'.
 pub(crate) const SECONDS: f32 = 3e-5;
@@ -34,6 +37,14 @@ impl<const NODES: usize, const ELEMENTS: usize, const TILES: usize> Body<NODES, 
     }
 
     pub(crate) fn scene(&self) -> Option<Scene<NODES, TILES>> {
+        self.scene_of(TISSUE)
+    }
+
+    /// Of a material with room for so many rows of patches.
+    pub(crate) fn scene_of<M: Material, const ROWS: usize>(
+        &self,
+        material: M,
+    ) -> Option<FixedScene<M, NODES, TILES, ROWS>> {
         let mut tets = [[0; 4]; ELEMENTS];
         for (tet, of_bar) in tets.iter_mut().zip(self.bar.tets()) {
             *tet = of_bar;
@@ -42,15 +53,14 @@ impl<const NODES: usize, const ELEMENTS: usize, const TILES: usize> Body<NODES, 
         for (node, support) in (0..).zip(&mut fixed) {
             support.node = node;
         }
-        let law = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
-        let mut scene = Scene::new(Tissue { law, density: 1000.0 });
+        let mut scene = FixedScene::new(material);
         let points = self.points();
         let mesh = Mesh::new(&points, &tets, Winding::Checked).ok()?;
         scene.build(&mesh, fixed.get(..self.fixed)?).ok()?;
         Some(scene)
     }
 
-    pub(crate) fn loads(&self, scene: &Scene<NODES, TILES>) -> Option<Loads<'_>> {
+    pub(crate) fn loads(&self, scene: &impl AsScene) -> Option<Loads<'_>> {
         Loads::new(scene, [0.0, 0.0, -9.81], &self.force, &[]).ok()
     }
 
@@ -61,10 +71,10 @@ impl<const NODES: usize, const ELEMENTS: usize, const TILES: usize> Body<NODES, 
         Some(state)
     }
 
-    fn advance(
+    pub(crate) fn advance(
         &self,
-        scene: &Scene<NODES, TILES>,
-        state: &mut FixedState<NODES>,
+        scene: &impl AsScene,
+        state: &mut impl AsState,
         steps: u32,
         mut then: impl FnMut(),
     ) -> Option<()> {

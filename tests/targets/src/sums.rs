@@ -1,13 +1,13 @@
 //! What a processor computes with each kind of step, as a checksum of the bits: on small bars, the same everywhere. Only the core
 //! computes, no standard library, which differs between systems.
 
-use super::body::{Body, DAMPING, SECONDS};
+use super::body::{Body, DAMPING, SECONDS, TISSUE};
 use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for_lattice};
 use supple::loads::NodalForce;
-use supple::material::Element;
+use supple::material::{Element, NodalPressure, NodalStrain};
 use supple::mesh::Bar;
 use supple::mlp::Network;
-use supple::scene::tiles_for;
+use supple::scene::{AsScene, patch_rows_for, tiles_for};
 pub use supple::simd::Level;
 use supple::state::{FixedState, NodeVector};
 use supple::step::Step;
@@ -21,6 +21,7 @@ const SMALL: Body<NODES, ELEMENTS, { tiles_for(ELEMENTS) }> = Body {
     fixed: 12,
     force: [NodalForce { node: BAR.node(0, 2, 4), newton: [0.02, -0.03, 0.05], ramp: 0.05 }],
 };
+const ROWS_OF_PATCHES: usize = patch_rows_for(NODES, ELEMENTS, 1);
 /// As large as a microcontroller is for.
 const LONG_BAR: Bar = Bar { size: [0.03, 0.03, 0.12], cells: [3, 3, 12] };
 const LONG_NODES: usize = LONG_BAR.node_count();
@@ -45,8 +46,18 @@ static INT8: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden-v3.wei
 static DAMPER: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/damper.weights"));
 
 /// What is computed; with a number of nodes, on the long bar.
-pub const NAMES: [&str; 8] =
-    ["exact", "damped", "network", "learned", "int8", "exact-208", "learned-int8-208", "critical-208"];
+pub const NAMES: [&str; 10] = [
+    "exact",
+    "damped",
+    "network",
+    "learned",
+    "int8",
+    "exact-208",
+    "learned-int8-208",
+    "critical-208",
+    "nodal-pressure",
+    "nodal-strain",
+];
 
 /// How its sums are rounded at `level`, on which their bits depend: those of int8 layers are
 /// never fused, but the learned step has others besides.
@@ -68,7 +79,9 @@ pub fn checksum(what: usize, level: Level) -> u32 {
         4 => network(&INT8.0),
         5 => long_exact(500, || ()),
         6 => long_learned(500, 50, || ()),
-        _ => long_critical(500),
+        7 => long_critical(500),
+        8 => in_other_tetrahedra(SMALL.scene_of::<_, 0>(NodalPressure(TISSUE))),
+        _ => in_other_tetrahedra(SMALL.scene_of::<_, ROWS_OF_PATCHES>(NodalStrain(TISSUE))),
     };
     checksum.unwrap_or(0)
 }
@@ -89,12 +102,20 @@ fn long_critical(steps: u32) -> Option<u32> {
     Some(of([critical.seconds, critical.node as f32].into_iter()))
 }
 
+/// Of the small bar after exact steps, and of its critical step then, s.
+fn in_other_tetrahedra(scene: Option<impl AsScene>) -> Option<u32> {
+    let (scene, mut state) = (scene?, FixedState::<NODES, NODES>::new());
+    SMALL.advance(&scene, &mut state, 2_000, || ())?;
+    let critical = critical_step(&scene, &mut state)?;
+    Some(of_state(&state) ^ of([critical.seconds, critical.node as f32].into_iter()))
+}
+
 /// FNV-1a over the bits.
 fn of(values: impl Iterator<Item = f32>) -> u32 {
     values.fold(0x811c_9dc5, |hash, value| (hash ^ value.to_bits()).wrapping_mul(0x0100_0193))
 }
 
-fn of_state<const N: usize>(state: &FixedState<N>) -> u32 {
+fn of_state<const N: usize, const P: usize>(state: &FixedState<N, P>) -> u32 {
     of(state.displacements().iter().flat_map(|displacement| displacement.to_array()))
 }
 

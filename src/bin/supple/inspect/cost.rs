@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use supple::element::{ElementMaterial, ElementTile, MaterialWork, NodeInertia};
+use supple::element::{ElementMaterial, ElementTile, MaterialWork, NodeInertia, PatchRow};
 use supple::inertia::{Cells, Grid, Method, vectors_for_lattice};
 use supple::loads::Loads;
 use supple::material::{Element, Moduli};
@@ -105,7 +105,8 @@ fn describe_limits<M: ElementMaterial>(scene: SceneView<'_, M>, state: &VecState
 fn describe_memory<M: ElementMaterial>(scene: SceneView<'_, M>) {
     let vectors = if scene.element() == Element::NodalPressure { 4 } else { 3 };
     let of_node = size_of::<NodeInertia>() + vectors * size_of::<NodeVector>();
-    let tiles = tiles_for(scene.element_count()) * size_of::<ElementTile>() + scene.patch_bytes();
+    let tiles = tiles_for(scene.element_count()) * size_of::<ElementTile>()
+        + scene.patch_row_count() * size_of::<PatchRow>();
     row("memory", format!("{:.1} kB", (scene.node_count() * of_node + tiles) as f64 * 1e-3));
 }
 
