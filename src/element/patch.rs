@@ -224,14 +224,15 @@ mod build {
             Patches { tiles: &self.tiles, neighbours: &self.neighbours, layout: &self.layout }
         }
 
-        /// The patches of all nodes, one for each tissue of a node; `region` is the tissue of an element of the mesh.
+        /// The patches of all nodes, one for each tissue of a node; `region` is the tissue of an element of the mesh. Not generic: compiled
+        /// once, not for each material.
         pub(crate) fn build(
             nodes: usize,
             tiles: &[ElementTile],
             partitions: &Partitions,
-            region: impl Fn(usize) -> u16,
+            region: &dyn Fn(usize) -> u16,
         ) -> Self {
-            let mut patches = patches(nodes, tiles, &region);
+            let mut patches = patches(nodes, tiles, region);
             for patch in &mut patches {
                 let of = |node: u32| partitions.of_node(node as usize);
                 let all = patch.neighbours.iter().map(|(node, ..)| of(*node)).chain([of(patch.node)]);
@@ -291,7 +292,7 @@ mod build {
     }
 
     /// The patches in the order of their nodes.
-    fn patches(nodes: usize, tiles: &[ElementTile], region: &impl Fn(usize) -> u16) -> Vec<Patch> {
+    fn patches(nodes: usize, tiles: &[ElementTile], region: &dyn Fn(usize) -> u16) -> Vec<Patch> {
         let places = || {
             let places = tiles.iter().flat_map(|tile| (0..TILE).map(move |lane| (tile, lane)));
             places.filter(|(tile, lane)| tile.volume::<f32>(*lane) > 0.0)

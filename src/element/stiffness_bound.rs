@@ -58,7 +58,7 @@ use super::internal_forces::ElementVisitor;
 
 /// The parts of the bound that depend on the invariants alone, Pa.
 #[derive(Clone, Copy)]
-struct Coefficients<R> {
+pub(super) struct Coefficients<R> {
     /// `p1` and `pJ`.
     p1: R,
     p_j: R,
@@ -90,7 +90,7 @@ const MIXED: f32 = 1.25;
 
 impl<R: Real> Coefficients<R> {
     #[inline(always)]
-    fn new<L: Law>(law: &L::Wide<R>, local: &LawState<R>) -> Self {
+    pub(super) fn new<L: Law>(law: &L::Wide<R>, local: &LawState<R>) -> Self {
         let four = R::splat(4.0);
         let at = local.at;
         let i1 = at.i + R::splat(3.0);
@@ -173,14 +173,13 @@ pub(super) struct SpatialBound<R> {
 
 impl<R: Real> Bound<R> {
     #[inline(always)]
-    pub(super) fn new<L: Law>(
-        law: &L::Wide<R>,
+    pub(super) fn of(
+        coefficients: Coefficients<R>,
         tile: &ElementTile,
         first: usize,
         deformation: &Deformation<R>,
-        local: &LawState<R>,
     ) -> Self {
-        let coefficients = Coefficients::<R>::new::<L>(law, local);
+        let at = deformation.invariants;
         let (mut distortion, mut cofactor) = (R::splat(0.0), R::splat(0.0));
         for i in 0..3 {
             for j in 0..3 {
@@ -189,8 +188,8 @@ impl<R: Real> Bound<R> {
                 cofactor = cofactor + c * c;
             }
         }
-        let (iso, volume) = coefficients.split(local.at, distortion, cofactor);
-        Self { iso, volume, scalar: scalar_bound(&coefficients, local.at, tile, first), coefficients }
+        let (iso, volume) = coefficients.split(at, distortion, cofactor);
+        Self { iso, volume, scalar: scalar_bound(&coefficients, at, tile, first), coefficients }
     }
 
     /// The bound that rotations do not feel; only for elements that are not crushed.

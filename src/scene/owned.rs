@@ -130,7 +130,7 @@ impl<M: Material> VecScene<M> {
         let facts = SceneFacts::without_patches(&material, mesh, supports, &mut nodes, &mut tiles)?;
         tiles.truncate(facts.tile_count());
         let patches = if M::ELEMENT.is_nodal_strain() {
-            VecPatches::build(nodes.len(), &tiles, &facts.partitions, |element| material.region(element))
+            VecPatches::build(nodes.len(), &tiles, &facts.partitions, &|element| material.region(element))
         } else {
             VecPatches::none()
         };
