@@ -119,14 +119,15 @@ impl<L: Law, P: Pressure> Kernel for CriticalBounds<'_, '_, L, P> {
             for first in (0..TILE).step_by(R::COUNT) {
                 let displacement = Gather::new(self.sums.zx_in_padding);
                 let read = ReadTile::<R, P>::new(tile, first, displacement, self.pressure);
-                let (deformation, ratios) = R::run_part(read);
+                // By reference: a copy would take a kilobyte of stack.
+                let (deformation, ratios) = &R::run_part(read);
                 let law = self.laws.widen(|lane| tile.element(first + lane));
-                let mut local = P::state::<R, L>(&law, deformation.invariants, ratios);
+                let mut local = P::state::<R, L>(&law, deformation.invariants, *ratios);
                 if !self.with_volume {
                     local.bulk = R::splat(0.0);
                 }
-                let terms = &Terms::new::<L>(&law, &local, &deformation);
-                let (deformation, sums, buffers) = (&deformation, &mut *self.sums, &mut buffers);
+                let terms = &Terms::new::<L>(&law, &local, deformation);
+                let (sums, buffers) = (&mut *self.sums, &mut buffers);
                 R::run_part(AddBounds { tile, first, deformation, terms, inertia, sums, buffers });
             }
         }

@@ -125,7 +125,11 @@ impl<L: Law, V: ElementVisitor, P: Pressure> Kernel for InternalForces<'_, L, V,
 
     #[inline(always)]
     fn run<R: Real>(self) -> Extremes<f32> {
-        in_batches::<R, L, P, BATCH>(self)
+        if R::COUNT > 8 {
+            in_batches::<R, L, P, WIDE_BATCH>(self)
+        } else {
+            in_batches::<R, L, P, BATCH>(self)
+        }
     }
 
     #[inline(always)]
@@ -181,6 +185,8 @@ impl<'a, R: Real, V> ElementVector<'a, R, V> {
 /// Vectors of elements in a batch. A batch of scalar code has the elements of as many strips as the scatter buffer
 /// holds.
 const BATCH: usize = 12;
+/// Of long vectors fewer, as they need more stack.
+const WIDE_BATCH: usize = 8;
 #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
 const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
 

@@ -60,14 +60,15 @@ impl<L: Law, P: Pressure> Kernel for TileBounds<'_, L, P> {
         let mut tangents = TileTangents::NONE;
         let mut buffer = [ScatterBuffer::NONE; 2];
         for first in (0..TILE).step_by(R::COUNT) {
+            // By reference: a copy would take a kilobyte of stack.
             let (deformation, ratios) =
-                R::run_part(ReadTile::<R, P>::new(tile, first, displacement, pressure));
+                &R::run_part(ReadTile::<R, P>::new(tile, first, displacement, pressure));
             let law = laws.widen(|lane| tile.element(first + lane));
-            let local = P::state::<R, L>(&law, deformation.invariants, ratios);
+            let local = P::state::<R, L>(&law, deformation.invariants, *ratios);
             R::run_part(AddBounds {
                 tile,
                 first,
-                deformation: &deformation,
+                deformation,
                 coefficients: &Coefficients::new::<L>(&law, &local),
                 rotations,
                 weight,
