@@ -25,10 +25,10 @@
 //! No term is left out, so the bound holds for any state, inverted elements included.
 
 use crate::material::{Law, LawState, Laws};
-use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, TileNodes, dot};
+use crate::simd::{Gather, Kernel, NodeVector, Part, Real, Scatter, ScatterBuffer, TILE, TileNodes, dot};
 
 use super::deformation::{Deformation, Vector};
-use super::pressure::{OwnPressure, Pressure};
+use super::pressure::{OwnPressure, Pressure, ReadTile};
 use super::symmetric::Symmetric;
 use super::{ElementTile, NodeInertia};
 
@@ -115,10 +115,20 @@ impl<L: Law, P: Pressure> Kernel for CriticalBounds<'_, '_, L, P> {
         // The first three components of a node's inertia are its inverse masses.
         let inertia = Gather::new(bytemuck::must_cast_slice(self.inertia));
         for tile in self.tiles {
-            let mut buffer = [ScatterBuffer::NONE; 3];
+            let mut buffers = [ScatterBuffer::NONE; 3];
             for first in (0..TILE).step_by(R::COUNT) {
-                let law = (&self.laws, self.pressure, self.with_volume);
-                add_bounds::<R, L, P>(law, tile, first, inertia, self.sums, &mut buffer);
+                let displacement = Gather::new(self.sums.zx_in_padding);
+                let read = ReadTile::<R, P>::new(tile, first, displacement, self.pressure);
+                // By reference: a copy would take a kilobyte of stack.
+                let (deformation, ratios) = &R::run_part(read);
+                let law = self.laws.widen(|lane| tile.element(first + lane));
+                let mut local = P::state::<R, L>(&law, deformation.invariants, *ratios);
+                if !self.with_volume {
+                    local.bulk = R::splat(0.0);
+                }
+                let terms = &Terms::new::<L>(&law, &local, deformation);
+                let (sums, buffers) = (&mut *self.sums, &mut buffers);
+                R::run_part(AddBounds { tile, first, deformation, terms, inertia, sums, buffers });
             }
         }
     }
@@ -151,34 +161,39 @@ pub(super) fn mass_weighted_gradients<R: Real>(
 }
 
 /// Adds the matrices of a vector of elements to the sums ([`mass_weighted_gradients`]).
-#[inline(always)]
-fn add_bounds<R: Real, L: Law, P: Pressure>(
-    (laws, pressure, with_volume): (&Laws<'_, L>, P, bool),
-    tile: &ElementTile,
+struct AddBounds<'a, 'b, R> {
+    tile: &'a ElementTile,
     first: usize,
-    inertia: Gather<'_>,
-    sums: &mut NodeMatrices<'_>,
-    buffers: &mut [ScatterBuffer<4>; 3],
-) {
-    let displacement = Gather::new(sums.zx_in_padding);
-    let Some(nodes) = tile.nodes_below::<R>(displacement.count()) else {
+    deformation: &'a Deformation<R>,
+    terms: &'a Terms<R>,
+    inertia: Gather<'a>,
+    sums: &'a mut NodeMatrices<'b>,
+    buffers: &'a mut [ScatterBuffer<4>; 3],
+}
+
+impl<R: Real> Part for AddBounds<'_, '_, R> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        add_bounds(self);
+    }
+}
+
+#[inline(always)]
+fn add_bounds<R: Real>(part: AddBounds<'_, '_, R>) {
+    let AddBounds { tile, first, deformation, terms, inertia, sums, buffers } = part;
+    let Some(nodes) = tile.nodes_below::<R>(sums.zx_in_padding.len()) else {
         return;
     };
-    let deformation = Deformation::<R>::of_tile(tile, first, displacement);
-    let law = laws.widen(|lane| tile.element(first + lane));
-    let mut local = pressure.local::<R, L>(laws, tile, first, deformation.invariants);
-    if !with_volume {
-        local.bulk = R::splat(0.0);
-    }
-    let terms = Terms::<R>::new::<L>(&law, &local, &deformation);
     let (gradients, _) = mass_weighted_gradients(tile, first, &nodes, inertia);
     // No closures over vectors from here on: the compiler may leave them as function calls, even for one addition.
     let [g0, g1, g2, g3] = gradients;
     let images = [
-        terms.images(&deformation, g0),
-        terms.images(&deformation, g1),
-        terms.images(&deformation, g2),
-        terms.images(&deformation, g3),
+        terms.images(deformation, g0),
+        terms.images(deformation, g1),
+        terms.images(deformation, g2),
+        terms.images(deformation, g3),
     ];
     let [i0, i1, i2, i3] = &images;
     let weight_c = terms.volume * (i0.c.length + i1.c.length + i2.c.length + i3.c.length);

@@ -8,8 +8,8 @@ use crate::material::{Invariants, Law, LawState, Laws, response_operations};
 use crate::mesh::partition::Partitions;
 use crate::mesh::strips::{CORNERS, LONGEST};
 use crate::simd::{
-    Gather, Kernel, NodeVector, Pair, Real, SCATTER_WIDTH, Scatter, ScatterBuffer, TILE, TileNodes, dot,
-    unrolled,
+    Gather, Kernel, NodeVector, Pair, Part, Real, SCATTER_WIDTH, Scatter, ScatterBuffer, TILE, TileNodes,
+    dot, unrolled,
 };
 
 use super::ElementTile;
@@ -128,7 +128,11 @@ impl<L: Law, V: ElementVisitor, P: Pressure> Kernel for InternalForces<'_, L, V,
 
     #[inline(always)]
     fn run<R: Real>(self) -> Extremes<f32> {
-        in_batches::<R, L, P, BATCH>(self)
+        if R::COUNT > 8 {
+            in_batches::<R, L, P, WIDE_BATCH>(self)
+        } else {
+            in_batches::<R, L, P, BATCH>(self)
+        }
     }
 
     #[inline(always)]
@@ -162,8 +166,8 @@ struct ElementVector<'a, R, V> {
     /// Displacement gradient.
     h: Matrix<R>,
     invariants: Invariants<R>,
-    /// What the pressure follows from.
-    volume_response: V,
+    /// What the pressure follows from, where it is not the element's own volume.
+    ratios: V,
     /// Scalars of the stress, Pa.
     p1: R,
     s: R,
@@ -173,17 +177,19 @@ struct ElementVector<'a, R, V> {
 
 impl<'a, R: Real, V> ElementVector<'a, R, V> {
     #[inline(always)]
-    fn zero(tile: &'a ElementTile, volume_response: V) -> Self {
+    fn zero(tile: &'a ElementTile, ratios: V) -> Self {
         let zero = R::splat(0.0);
         let invariants = Invariants { i: zero, j: zero };
         let h = [[zero; 3]; 3];
-        Self { tile, first: 0, h, invariants, volume_response, p1: zero, s: zero, fourth: zero }
+        Self { tile, first: 0, h, invariants, ratios, p1: zero, s: zero, fourth: zero }
     }
 }
 
 /// Vectors of elements in a batch. A batch of scalar code has the elements of as many strips as the scatter buffer
 /// holds.
-const BATCH: usize = 8;
+const BATCH: usize = 12;
+/// Of long vectors fewer, as they need more stack.
+const WIDE_BATCH: usize = 8;
 #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
 const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
 
@@ -202,17 +208,14 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
     extremes: &mut Extremes<Pair<R>>,
 ) {
     let Some(first) = tiles.first() else { return };
-    let mut batch = [ElementVector::<R, P::Response<R>>::zero(first, P::none()); SIZE];
+    let (displacement, pressure) = input;
+    let mut batch = [ElementVector::<R, P::Ratios<R>>::zero(first, P::none()); SIZE];
     let strip_count = tiles.len().checked_div(length).unwrap_or(0) * (TILE / R::COUNT);
     let most = if R::COUNT == 1 { SCATTER_WIDTH } else { SIZE.checked_div(length).unwrap_or(SIZE).max(1) };
     for start in (0..strip_count).step_by(most) {
         let strips = start..strip_count.min(start + most);
         let count = length * strips.len();
-        match length {
-            3 => deform::<R, L, P, 3, 6>(laws, tiles, strips, input, &mut batch),
-            2 => deform::<R, L, P, 2, 5>(laws, tiles, strips, input, &mut batch),
-            _ => deform::<R, L, P, 1, 4>(laws, tiles, strips, input, &mut batch),
-        }
+        R::run_part(Deform { tiles, length, strips, displacement, pressure, batch: &mut batch });
         // If the count is odd, the second vector of the last pair is an old one; its result is not used.
         for (index, pair) in batch.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
             let locals = respond::<R, L, P>(laws, pair, extremes);
@@ -221,11 +224,7 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
             }
         }
         let batch = batch.get(..count).unwrap_or_default();
-        match length {
-            3 => scatter::<R, _, 3, 6>(batch, force),
-            2 => scatter::<R, _, 2, 5>(batch, force),
-            _ => scatter::<R, _, 1, 4>(batch, force),
-        }
+        R::run_part(AddForces { batch, length, force: force.reborrow() });
     }
 }
 
@@ -239,16 +238,34 @@ pub(super) fn nodes_of<const K: usize, const N: usize>(tiles: [&ElementTile; K])
     nodes
 }
 
-/// The first pass: deformation of the elements of some strips of `K` elements with `N` nodes. Elements of tiles with
-/// nodes out of range do not deform.
-#[inline(always)]
-fn deform<'a, R: Real, L: Law, P: Pressure, const K: usize, const N: usize>(
-    laws: &Laws<'_, L>,
+/// The first pass: deformation of the elements of some strips.
+struct Deform<'a, 'b, R: Real, P: Pressure> {
     tiles: &'a [ElementTile],
+    /// Elements of a strip.
+    length: usize,
     strips: Range<usize>,
-    (displacement, pressure): (Gather<'_>, P),
-    batch: &mut [ElementVector<'a, R, P::Response<R>>],
-) {
+    displacement: Gather<'b>,
+    pressure: P,
+    batch: &'b mut [ElementVector<'a, R, P::Ratios<R>>],
+}
+
+impl<R: Real, P: Pressure> Part for Deform<'_, '_, R, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        match self.length {
+            3 => deform::<R, P, 3, 6>(self),
+            2 => deform::<R, P, 2, 5>(self),
+            _ => deform::<R, P, 1, 4>(self),
+        }
+    }
+}
+
+/// The same for strips of `K` elements with `N` nodes. Elements of tiles with nodes out of range do not deform.
+#[inline(always)]
+fn deform<R: Real, P: Pressure, const K: usize, const N: usize>(pass: Deform<'_, '_, R, P>) {
+    let Deform { tiles, strips, displacement, pressure, batch, .. } = pass;
     let (tiles, vectors) = (tiles.as_chunks::<K>().0, TILE / R::COUNT);
     for (strip, elements) in strips.zip(batch.as_chunks_mut::<K>().0) {
         let Some(tiles) = tiles.get(strip / vectors) else { return };
@@ -271,8 +288,7 @@ fn deform<'a, R: Real, L: Law, P: Pressure, const K: usize, const N: usize>(
             (vector.tile, vector.first) = (&tiles[element], first);
             (vector.h, vector.invariants) = (deformation.h, deformation.invariants);
             let volumes = [volumes[a % N], volumes[b % N], volumes[c % N], volumes[d % N]];
-            vector.volume_response =
-                P::response::<R, L>(laws, &tiles[element], first, volumes, deformation.invariants.j);
+            vector.ratios = pressure.ratios(&tiles[element], first, volumes, deformation.invariants.j);
         });
     }
 }
@@ -281,7 +297,7 @@ fn deform<'a, R: Real, L: Law, P: Pressure, const K: usize, const N: usize>(
 #[inline(always)]
 fn respond<R: Real, L: Law, P: Pressure>(
     laws: &Laws<'_, L>,
-    pair: &mut [ElementVector<'_, R, P::Response<R>>; 2],
+    pair: &mut [ElementVector<'_, R, P::Ratios<R>>; 2],
     extremes: &mut Extremes<Pair<R>>,
 ) -> [LawState<R>; 2] {
     let law = laws.widen::<Pair<R>>(|lane| {
@@ -293,8 +309,8 @@ fn respond<R: Real, L: Law, P: Pressure>(
         i: Pair(first.invariants.i, second.invariants.i),
         j: Pair(first.invariants.j, second.invariants.j),
     };
-    let volume_response = P::paired(first.volume_response, second.volume_response);
-    let local = P::state::<Pair<R>, L>(&law, invariants, volume_response);
+    let ratios = P::paired(first.ratios, second.ratios);
+    let local = P::state::<Pair<R>, L>(&law, invariants, ratios);
     let response = local.response::<L>(&law);
     (first.p1, first.s) = (response.p1.0, response.s.0);
     (second.p1, second.s) = (response.p1.1, response.s.1);
@@ -307,7 +323,7 @@ fn respond<R: Real, L: Law, P: Pressure>(
 #[inline(always)]
 fn visit<R: Real, L: Law, P: Pressure>(
     laws: &Laws<'_, L>,
-    elements: &mut ElementVector<'_, R, P::Response<R>>,
+    elements: &mut ElementVector<'_, R, P::Ratios<R>>,
     local: &LawState<R>,
     visitor: &mut impl ElementVisitor,
 ) {
@@ -341,11 +357,33 @@ fn nodal_forces<R: Real, V: Copy>(elements: &ElementVector<'_, R, V>) -> [[R; 4]
     ]
 }
 
-/// The third pass: adds the forces to the nodes of strips of `K` elements with `N` nodes.
+/// The third pass: adds the forces of some strips to their nodes.
+struct AddForces<'a, 'b, R, V> {
+    batch: &'a [ElementVector<'b, R, V>],
+    /// Elements of a strip.
+    length: usize,
+    force: Scatter<'a>,
+}
+
+impl<R: Real, V: Copy> Part for AddForces<'_, '_, R, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { batch, length, force } = self;
+        match length {
+            3 => scatter::<R, V, 3, 6>(batch, force),
+            2 => scatter::<R, V, 2, 5>(batch, force),
+            _ => scatter::<R, V, 1, 4>(batch, force),
+        }
+    }
+}
+
+/// The same for strips of `K` elements with `N` nodes.
 #[inline(always)]
 fn scatter<R: Real, V: Copy, const K: usize, const N: usize>(
     batch: &[ElementVector<'_, R, V>],
-    force: &mut Scatter<'_>,
+    mut force: Scatter<'_>,
 ) {
     let mut buffer = ScatterBuffer::NONE;
     for strip in batch.as_chunks::<K>().0 {

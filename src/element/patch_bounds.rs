@@ -9,7 +9,7 @@
 //! absolute values.
 
 use crate::material::{Law, LawState, Laws, Potential};
-use crate::simd::{Gather, Kernel, NodeVector, Real, ScatterBuffer, TILE, TileNodes, dot};
+use crate::simd::{Gather, Kernel, NodeVector, Part, Real, ScatterBuffer, TILE, TileNodes, dot};
 
 use super::NodeInertia;
 use super::critical_bounds::{Image, NodeMatrices, Terms};
@@ -50,6 +50,8 @@ impl<L: Law> Kernel for PatchBounds<'_, '_, L> {
 struct Bound<R> {
     deformation: Deformation<R>,
     terms: Terms<R>,
+    /// Of the stabilising energy, Pa.
+    modulus: R,
     /// Of all gradients: weighted sums of the lengths of their images under `C`, `E` and `X`, and of their own.
     lengths: [R; 4],
     /// Factor of the product of the lengths of two gradients.
@@ -67,13 +69,64 @@ fn add_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchBounds<'_, '_, L>) 
     // The first three components of a node's inertia are its inverse masses.
     let inertia: Gather<'_> = Gather::new(bytemuck::must_cast_slice::<NodeInertia, NodeVector>(inertia));
     let weights = Gather::new(weights);
-    let below = inertia.count().min(weights.count());
     for tile in patches.tiles {
         let neighbours = patches.neighbours_of(tile);
-        // Loops, because the compiler may leave closures over vectors as function calls.
         let mut bounds = [Bound::<R>::none(); PARTS];
+        let displacement = Gather::new(sums.zx_in_padding);
+        R::run_part(Deform { tile, neighbours, displacement, bounds: &mut bounds });
+        // A loop, because the compiler may leave closures over vectors as function calls.
         for (part, bound) in bounds.iter_mut().enumerate() {
-            *bound = bound_of(&laws, tile, neighbours, part * R::COUNT, sums, (inertia, weights));
+            let law = laws.widen(|lane| tile.element(part * R::COUNT + lane));
+            let local = LawState::new::<L>(&law, bound.deformation.invariants);
+            bound.terms = Terms::new::<L>(&law, &local, &bound.deformation);
+            bound.modulus = R::splat(2.0 * STABILISATION) * law.distortion_slope(R::splat(0.0));
+        }
+        let (bounds, sums) = (&mut bounds, &mut *sums);
+        R::run_part(AddBounds { tile, neighbours, inertia, weights, bounds, sums });
+    }
+}
+
+/// Deformations of the patches of a tile.
+struct Deform<'a, R, const PARTS: usize> {
+    tile: &'a PatchTile,
+    neighbours: &'a [Neighbours],
+    displacement: Gather<'a>,
+    bounds: &'a mut [Bound<R>; PARTS],
+}
+
+impl<R: Real, const PARTS: usize> Part for Deform<'_, R, PARTS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { tile, neighbours, displacement, bounds } = self;
+        for (part, bound) in bounds.iter_mut().enumerate() {
+            let (h, _) = gradient::<R>(tile, neighbours, part * R::COUNT, displacement);
+            bound.deformation = Deformation::new(h);
+        }
+    }
+}
+
+/// Adds the matrices of the patches of a tile, of which deformation and terms are known.
+struct AddBounds<'a, 'b, R, const PARTS: usize> {
+    tile: &'a PatchTile,
+    neighbours: &'a [Neighbours],
+    inertia: Gather<'a>,
+    weights: Gather<'a>,
+    bounds: &'a mut [Bound<R>; PARTS],
+    sums: &'a mut NodeMatrices<'b>,
+}
+
+impl<R: Real, const PARTS: usize> Part for AddBounds<'_, '_, R, PARTS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { tile, neighbours, inertia, weights, bounds, sums } = self;
+        let below = inertia.count().min(weights.count());
+        // Loops, because the compiler may leave closures over vectors as function calls.
+        for (part, bound) in bounds.iter_mut().enumerate() {
+            bound.sum(tile, neighbours, part * R::COUNT, (inertia, weights));
         }
         for neighbour in neighbours {
             let mut buffers = [ScatterBuffer::NONE; 3];
@@ -82,12 +135,8 @@ fn add_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchBounds<'_, '_, L>) 
                 let first = part * R::COUNT;
                 let weighted = weighted_gradient(neighbour, first, &nodes, bound.root, inertia);
                 let [weight, ..] = weights.read_nodes::<R, 1>(&nodes, 0, first);
-                sums.add_corners(
-                    &nodes,
-                    first,
-                    [bound.matrix(weighted, weight, R::splat(0.0))],
-                    &mut buffers,
-                );
+                let matrix = bound.matrix(weighted, weight, R::splat(0.0));
+                sums.add_corners(&nodes, first, [matrix], &mut buffers);
             }
         }
         let mut buffers = [ScatterBuffer::NONE; 3];
@@ -121,52 +170,6 @@ fn weighted_gradient<R: Real>(
     [factor * vector_at::<R>(x, first), factor * vector_at::<R>(y, first), factor * vector_at::<R>(z, first)]
 }
 
-#[inline(always)]
-fn bound_of<R: Real, L: Law>(
-    laws: &Laws<'_, L>,
-    tile: &PatchTile,
-    neighbours: &[Neighbours],
-    first: usize,
-    sums: &NodeMatrices<'_>,
-    (inertia, weights): (Gather<'_>, Gather<'_>),
-) -> Bound<R> {
-    let zero = R::splat(0.0);
-    let (h, _) = gradient::<R>(tile, neighbours, first, Gather::new(sums.zx_in_padding));
-    let deformation = Deformation::new(h);
-    let law = laws.widen(|lane| tile.element(first + lane));
-    let local = LawState::new::<L>(&law, deformation.invariants);
-    let terms = Terms::<R>::new::<L>(&law, &local, &deformation);
-    let modulus = R::splat(2.0 * STABILISATION) * law.distortion_slope(zero);
-    // |F g| <= (1 + |H|) |g|, and the root of p^2 + q^2 is at most p + (sqrt 2 - 1) q for p >= q >= 0.
-    let square = dot(h[0], h[0]) + dot(h[1], h[1]) + dot(h[2], h[2]);
-    let along = (terms.p1 - modulus).abs();
-    let across = terms.p_j.abs() * (R::splat(1.0) + square.sqrt());
-    let isotropic = along.max(across) + along.min(across) * R::splat(core::f32::consts::SQRT_2 - 1.0);
-    let root = vector_at::<R>(&tile.inverse_volumes, first).sqrt();
-    let own_nodes = tile.nodes_below::<R>(inertia.count()).unwrap_or(TileNodes::ALL_ZERO);
-    let own_root = mass_root::<R>(&own_nodes, first, inertia);
-    let [own_weight, ..] = weights.read_nodes::<R, 1>(&own_nodes, 0, first);
-    let mut bound = Bound { deformation, terms, isotropic, root, ..Bound::none() };
-    let mut own = [zero; 3];
-    for neighbour in neighbours {
-        let nodes = neighbour.nodes_below::<R>(inertia.count()).unwrap_or(TileNodes::ALL_ZERO);
-        let [weight, ..] = weights.read_nodes::<R, 1>(&nodes, 0, first);
-        bound.enter(weighted_gradient(neighbour, first, &nodes, root, inertia), weight);
-        let coupling = vector_at::<R>(&neighbour.couplings, first);
-        let other_root = mass_root::<R>(&nodes, first, inertia);
-        let other = other_root * weight.divide(own_weight);
-        bound.laplacian = bound.laplacian + coupling * own_root + coupling.abs() * other;
-        for axis in 0..3 {
-            own[axis] = own[axis] - vector_at::<R>(&neighbour.gradients[axis], first);
-        }
-    }
-    bound.laplacian = modulus * own_root * bound.laplacian;
-    let factor = root * own_root;
-    bound.own = [own[0] * factor, own[1] * factor, own[2] * factor];
-    bound.enter(bound.own, own_weight);
-    bound
-}
-
 impl<R: Real> Bound<R> {
     #[inline(always)]
     fn none() -> Self {
@@ -183,12 +186,52 @@ impl<R: Real> Bound<R> {
         Self {
             deformation: Deformation::new([[zero; 3]; 3]),
             terms,
+            modulus: zero,
             lengths: [zero; 4],
             isotropic: zero,
             root: zero,
             own: [zero; 3],
             laplacian: zero,
         }
+    }
+
+    /// The sums over the nodes of a patch, from its deformation and its terms.
+    #[inline(always)]
+    fn sum(
+        &mut self,
+        tile: &PatchTile,
+        neighbours: &[Neighbours],
+        first: usize,
+        (inertia, weights): (Gather<'_>, Gather<'_>),
+    ) {
+        let zero = R::splat(0.0);
+        let (h, terms, modulus) = (self.deformation.h, &self.terms, self.modulus);
+        // |F g| <= (1 + |H|) |g|, and the root of p^2 + q^2 is at most p + (sqrt 2 - 1) q for p >= q >= 0.
+        let square = dot(h[0], h[0]) + dot(h[1], h[1]) + dot(h[2], h[2]);
+        let along = (terms.p1 - modulus).abs();
+        let across = terms.p_j.abs() * (R::splat(1.0) + square.sqrt());
+        self.isotropic = along.max(across) + along.min(across) * R::splat(core::f32::consts::SQRT_2 - 1.0);
+        self.root = vector_at::<R>(&tile.inverse_volumes, first).sqrt();
+        let own_nodes = tile.nodes_below::<R>(inertia.count()).unwrap_or(TileNodes::ALL_ZERO);
+        let own_root = mass_root::<R>(&own_nodes, first, inertia);
+        let [own_weight, ..] = weights.read_nodes::<R, 1>(&own_nodes, 0, first);
+        let mut own = [zero; 3];
+        for neighbour in neighbours {
+            let nodes = neighbour.nodes_below::<R>(inertia.count()).unwrap_or(TileNodes::ALL_ZERO);
+            let [weight, ..] = weights.read_nodes::<R, 1>(&nodes, 0, first);
+            self.enter(weighted_gradient(neighbour, first, &nodes, self.root, inertia), weight);
+            let coupling = vector_at::<R>(&neighbour.couplings, first);
+            let other_root = mass_root::<R>(&nodes, first, inertia);
+            let other = other_root * weight.divide(own_weight);
+            self.laplacian = self.laplacian + coupling * own_root + coupling.abs() * other;
+            for axis in 0..3 {
+                own[axis] = own[axis] - vector_at::<R>(&neighbour.gradients[axis], first);
+            }
+        }
+        self.laplacian = modulus * own_root * self.laplacian;
+        let factor = self.root * own_root;
+        self.own = [own[0] * factor, own[1] * factor, own[2] * factor];
+        self.enter(self.own, own_weight);
     }
 
     /// Images of a gradient under `C`, `E` and `X`, and its length.

@@ -17,7 +17,7 @@ use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE
 use super::deformation::{Deformation, Matrix, Vector};
 use super::internal_forces::{ElementVisitor, Extremes};
 use super::patch::{Neighbours, PatchTile, Patches};
-use super::stiffness_bound::Bound;
+use super::stiffness_bound::{Bound, Coefficients};
 use super::tile::vector_at;
 
 /// Share of the shear modulus at rest in the stabilising energy. Less follows bending on coarse meshes more closely and is too soft on
@@ -152,7 +152,8 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor>(
     }
     let lengths = GradientLengths::<R>::of(neighbours, first);
     let scale = lengths.sum * vector_at::<R>(&tile.inverse_volumes, first);
-    let scalar = Bound::of_patches::<L>(&law, &deformation, &local, modulus, scale).scalar;
+    let coefficients = Coefficients::new::<L>(&law, &local);
+    let scalar = Bound::of_patches(coefficients, &deformation, modulus, scale).scalar;
     Stress { scalar, own_scalar: scalar.fused(lengths.own, modulus * lengths.couplings), ..stress }
 }
 

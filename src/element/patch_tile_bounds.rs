@@ -9,12 +9,12 @@
 //! energy is not in the tangents, as it does not change with the state.
 
 use crate::material::{Law, LawState, Laws, Potential};
-use crate::simd::{Gather, Kernel, Real, ScatterBuffer, TILE, dot};
+use crate::simd::{Gather, Kernel, Part, Real, ScatterBuffer, TILE, dot};
 
 use super::deformation::{Deformation, Matrix, Vector};
 use super::patch::{Neighbours, PatchTile};
 use super::patch_forces::{GradientLengths, STABILISATION, gradient};
-use super::stiffness_bound::{Bound, MatrixSums};
+use super::stiffness_bound::{Bound, Coefficients, MatrixSums};
 use super::tile::vector_at;
 use super::tile_bounds::{Rotation, TileTangents, cofactor_in_frames};
 
@@ -49,7 +49,11 @@ impl<L: Law> Kernel for PatchTileBounds<'_, L> {
 /// What the nodes of a vector of patches get.
 #[derive(Clone, Copy)]
 struct Shares<R> {
-    /// `C`.
+    deformation: Deformation<R>,
+    coefficients: Coefficients<R>,
+    /// Of the stabilising energy, Pa.
+    modulus: R,
+    /// `C` in the frames.
     cofactor: Matrix<R>,
     /// Factors of `|c_ab|` and of the outer product of `C c_ab` over its length, and of `|c_ab|` in the scalar bound, N/m^3.
     isotropic: R,
@@ -62,18 +66,67 @@ struct Shares<R> {
 
 #[inline(always)]
 fn bound_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchTileBounds<'_, L>) -> TileTangents {
-    let PatchTileBounds { tile, neighbours, .. } = kernel;
+    let PatchTileBounds { laws, tile, neighbours, displacement, sums, rotations, weight } = kernel;
     let mut tangents = TileTangents::NONE;
     let mut shares = [Shares::<R>::none(); PARTS];
+    R::run_part(Deform { tile, neighbours, displacement, shares: &mut shares });
     for (part, shares) in shares.iter_mut().enumerate() {
-        *shares = kernel.shares(part * R::COUNT, &mut tangents);
+        let law = laws.widen(|lane| tile.element(part * R::COUNT + lane));
+        let local = LawState::new::<L>(&law, shares.deformation.invariants);
+        shares.coefficients = Coefficients::new::<L>(&law, &local);
+        shares.modulus = R::splat(2.0 * STABILISATION) * law.distortion_slope(R::splat(0.0));
     }
-    let PatchTileBounds { mut sums, .. } = kernel;
-    for neighbour in neighbours {
-        add(&mut sums, &neighbour.nodes, Some(neighbour), &shares);
-    }
-    add(&mut sums, &tile.nodes, None, &shares);
+    let (shares, tangents_out) = (&mut shares, &mut tangents);
+    R::run_part(AddBounds { tile, neighbours, rotations, weight, shares, sums, tangents: tangents_out });
     tangents
+}
+
+/// Deformations of the patches of a tile.
+struct Deform<'a, R, const PARTS: usize> {
+    tile: &'a PatchTile,
+    neighbours: &'a [Neighbours],
+    displacement: Gather<'a>,
+    shares: &'a mut [Shares<R>; PARTS],
+}
+
+impl<R: Real, const PARTS: usize> Part for Deform<'_, R, PARTS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { tile, neighbours, displacement, shares } = self;
+        for (part, shares) in shares.iter_mut().enumerate() {
+            let (h, _) = gradient::<R>(tile, neighbours, part * R::COUNT, displacement);
+            shares.deformation = Deformation::new(h);
+        }
+    }
+}
+
+/// Adds the bounds of the patches of a tile, of which deformation and coefficients are known.
+struct AddBounds<'a, 'b, R, const PARTS: usize> {
+    tile: &'a PatchTile,
+    neighbours: &'a [Neighbours],
+    rotations: &'a [Rotation; TILE],
+    weight: f32,
+    shares: &'a mut [Shares<R>; PARTS],
+    sums: MatrixSums<'b>,
+    tangents: &'a mut TileTangents,
+}
+
+impl<R: Real, const PARTS: usize> Part for AddBounds<'_, '_, R, PARTS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { tile, neighbours, rotations, weight, shares, mut sums, tangents } = self;
+        for (part, shares) in shares.iter_mut().enumerate() {
+            shares.sum(tile, neighbours, part * R::COUNT, rotations, weight, tangents);
+        }
+        for neighbour in neighbours {
+            add(&mut sums, &neighbour.nodes, Some(neighbour), shares);
+        }
+        add(&mut sums, &tile.nodes, None, shares);
+    }
 }
 
 /// Adds the matrices of a neighbour of each patch, or of its own node, in the order of the places whatever the width of a vector.
@@ -98,51 +151,14 @@ fn add<R: Real, const PARTS: usize>(
     }
 }
 
-impl<L: Law> PatchTileBounds<'_, L> {
-    /// Bounds of the patches from place `first` on.
-    #[inline(always)]
-    fn shares<R: Real>(&self, first: usize, tangents: &mut TileTangents) -> Shares<R> {
-        let Self { laws, tile, neighbours, displacement, rotations, weight, .. } = self;
-        let (h, _) = gradient::<R>(tile, neighbours, first, *displacement);
-        let deformation = Deformation::new(h);
-        let law = laws.widen(|lane| tile.element(first + lane));
-        let local = LawState::new::<L>(&law, deformation.invariants);
-        let modulus = R::splat(2.0 * STABILISATION) * law.distortion_slope(R::splat(0.0));
-        let inverse = vector_at::<R>(&tile.inverse_volumes, first);
-        let lengths = GradientLengths::<R>::of(neighbours, first);
-        let scale = inverse * lengths.sum;
-        let bound = Bound::of_patches::<L>(&law, &deformation, &local, modulus, scale);
-        let cofactor = cofactor_in_frames(rotations, first, &deformation);
-        if *weight != 0.0 {
-            let weight = vector_at::<R>(&tile.volumes, first) * R::splat(*weight);
-            tangents.write(first, weight, &bound, &deformation, &cofactor, Some(modulus));
-        }
-        let mut shares = Shares {
-            cofactor,
-            isotropic: bound.iso * scale,
-            scalar: bound.scalar,
-            own_couplings: modulus * lengths.couplings,
-            ..Shares::none()
-        };
-        let mut images = R::splat(0.0);
-        for neighbour in *neighbours {
-            let gradient = neighbour.gradient::<R>(first);
-            images = images + shares.image(gradient).1;
-            for axis in 0..3 {
-                shares.own[axis] = shares.own[axis] - gradient[axis];
-            }
-        }
-        images = images + shares.image(shares.own).1;
-        shares.volume = inverse * bound.volume * images;
-        shares
-    }
-}
-
 impl<R: Real> Shares<R> {
     #[inline(always)]
     fn none() -> Self {
         let zero = R::splat(0.0);
         Self {
+            deformation: Deformation::new([[zero; 3]; 3]),
+            coefficients: Coefficients::zero(),
+            modulus: zero,
             cofactor: [[zero; 3]; 3],
             isotropic: zero,
             volume: zero,
@@ -150,6 +166,41 @@ impl<R: Real> Shares<R> {
             own: [zero; 3],
             own_couplings: zero,
         }
+    }
+
+    /// Computes the factors from deformation and coefficients, and writes the tangents.
+    #[inline(always)]
+    fn sum(
+        &mut self,
+        tile: &PatchTile,
+        neighbours: &[Neighbours],
+        first: usize,
+        rotations: &[Rotation; TILE],
+        weight: f32,
+        tangents: &mut TileTangents,
+    ) {
+        let inverse = vector_at::<R>(&tile.inverse_volumes, first);
+        let lengths = GradientLengths::<R>::of(neighbours, first);
+        let scale = inverse * lengths.sum;
+        let bound = Bound::of_patches(self.coefficients, &self.deformation, self.modulus, scale);
+        self.cofactor = cofactor_in_frames(rotations, first, &self.deformation);
+        if weight != 0.0 {
+            let weight = vector_at::<R>(&tile.volumes, first) * R::splat(weight);
+            tangents.write(first, weight, &bound, &self.deformation, &self.cofactor, Some(self.modulus));
+        }
+        self.isotropic = bound.iso * scale;
+        self.scalar = bound.scalar;
+        self.own_couplings = self.modulus * lengths.couplings;
+        let mut images = R::splat(0.0);
+        for neighbour in neighbours {
+            let gradient = neighbour.gradient::<R>(first);
+            images = images + self.image(gradient).1;
+            for axis in 0..3 {
+                self.own[axis] = self.own[axis] - gradient[axis];
+            }
+        }
+        images = images + self.image(self.own).1;
+        self.volume = inverse * bound.volume * images;
     }
 
     /// Image of a gradient under `C`, and its length.

@@ -8,22 +8,25 @@
 //! which is the stress of the linear element with `p_e` in place of `U'(J_e)`. Where tissues meet, a node has a volume ratio for
 //! each of the first two; elements of a third one keep their own there.
 
-use crate::material::{Invariants, Law, LawState, Laws, Potential};
-use crate::simd::{Gather, Pair, Real, TileNodes};
+use core::marker::PhantomData;
 
+use crate::material::{Invariants, Law, LawState, Potential};
+use crate::simd::{Gather, Pair, Part, Real, TileNodes};
+
+use super::deformation::Deformation;
 use super::{ElementTile, VolumeRows};
 
 /// Where the pressure of elements comes from.
 pub(crate) trait Pressure: Copy {
     /// What is read at a node.
     type Volumes<R: Real>: Copy;
-    /// What an element gets.
-    type Response<R: Real>: Copy;
+    /// What an element keeps of its nodes.
+    type Ratios<R: Real>: Copy;
 
     /// Nothing read yet.
     fn no_volumes<R: Real>() -> Self::Volumes<R>;
     /// Nothing known yet.
-    fn none<R: Real>() -> Self::Response<R>;
+    fn none<R: Real>() -> Self::Ratios<R>;
     /// Rows in which displacements are read as well, if any.
     fn displacement(&self) -> Option<Gather<'_>>;
     /// Reads a node of each element ([`Gather::read_nodes`]).
@@ -42,41 +45,51 @@ pub(crate) trait Pressure: Copy {
         first: usize,
     ) -> Self::Volumes<R>;
     /// Of the elements from place `first` of a tile on, from their corners and their own `J - 1`.
-    fn response<R: Real, L: Law>(
-        laws: &Laws<'_, L>,
+    fn ratios<R: Real>(
+        &self,
         tile: &ElementTile,
         first: usize,
         corners: [Self::Volumes<R>; 4],
         own: R,
-    ) -> Self::Response<R>;
+    ) -> Self::Ratios<R>;
     /// Of two vectors of elements.
-    fn paired<R: Real>(one: Self::Response<R>, other: Self::Response<R>) -> Self::Response<Pair<R>>;
+    fn paired<R: Real>(one: Self::Ratios<R>, other: Self::Ratios<R>) -> Self::Ratios<Pair<R>>;
     /// The state of the law.
-    fn state<R: Real, L: Law>(
-        law: &L::Wide<R>,
-        at: Invariants<R>,
-        response: Self::Response<R>,
-    ) -> LawState<R>;
+    fn state<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>, ratios: Self::Ratios<R>) -> LawState<R>;
     /// Number of nodes that can be read.
     fn count(&self) -> usize;
+}
 
-    /// The state of the law in the elements from place `first` of a tile on, of which `laws` are the constants.
+/// Reads the deformation of the elements from place `first` of a tile on, and what their pressure follows from.
+pub(super) struct ReadTile<'a, R, P> {
+    tile: &'a ElementTile,
+    first: usize,
+    displacement: Gather<'a>,
+    pressure: P,
+    vector: PhantomData<R>,
+}
+
+impl<'a, R: Real, P: Pressure> ReadTile<'a, R, P> {
     #[inline(always)]
-    fn local<R: Real, L: Law>(
-        &self,
-        laws: &Laws<'_, L>,
-        tile: &ElementTile,
-        first: usize,
-        at: Invariants<R>,
-    ) -> LawState<R> {
-        let nodes = tile.nodes_below::<R>(self.count()).unwrap_or(TileNodes::ALL_ZERO);
+    pub(super) fn new(tile: &'a ElementTile, first: usize, displacement: Gather<'a>, pressure: P) -> Self {
+        Self { tile, first, displacement, pressure, vector: PhantomData }
+    }
+}
+
+impl<R: Real, P: Pressure> Part for ReadTile<'_, R, P> {
+    type Output = (Deformation<R>, P::Ratios<R>);
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let Self { tile, first, displacement, pressure, .. } = self;
+        let deformation = Deformation::of_tile(tile, first, displacement);
+        let nodes = tile.nodes_below::<R>(pressure.count()).unwrap_or(TileNodes::ALL_ZERO);
         // A loop, because the compiler may leave a closure over vectors as a function call.
-        let mut corners = [Self::no_volumes::<R>(); 4];
+        let mut corners = [P::no_volumes::<R>(); 4];
         for (corner, volumes) in corners.iter_mut().enumerate() {
-            *volumes = self.read::<R, 4>(&nodes, corner, first);
+            *volumes = pressure.read::<R, 4>(&nodes, corner, first);
         }
-        let response = Self::response::<R, L>(laws, tile, first, corners, at.j);
-        Self::state::<R, L>(&laws.widen(|lane| tile.element(first + lane)), at, response)
+        (deformation, pressure.ratios(tile, first, corners, deformation.invariants.j))
     }
 }
 
@@ -86,7 +99,7 @@ pub struct OwnPressure;
 
 impl Pressure for OwnPressure {
     type Volumes<R: Real> = ();
-    type Response<R: Real> = ();
+    type Ratios<R: Real> = ();
 
     #[inline(always)]
     fn no_volumes<R: Real>() {}
@@ -106,7 +119,7 @@ impl Pressure for OwnPressure {
     fn read_with<R: Real, const N: usize>(&self, _: R, _: &TileNodes<'_, N>, _: usize, _: usize) {}
 
     #[inline(always)]
-    fn response<R: Real, L: Law>(_: &Laws<'_, L>, _: &ElementTile, _: usize, _: [(); 4], _: R) {}
+    fn ratios<R: Real>(&self, _: &ElementTile, _: usize, _: [(); 4], _: R) {}
 
     #[inline(always)]
     fn paired<R: Real>((): (), (): ()) {}
@@ -135,16 +148,10 @@ impl<'a> MeanPressure<'a> {
     }
 }
 
-/// `U'` and `U''`, Pa, means over the nodes.
-#[derive(Clone, Copy)]
-pub(crate) struct VolumeResponse<R> {
-    pressure: R,
-    bulk: R,
-}
-
 impl Pressure for MeanPressure<'_> {
     type Volumes<R: Real> = [R; 2];
-    type Response<R: Real> = VolumeResponse<R>;
+    /// `J - 1` at the four nodes.
+    type Ratios<R: Real> = [R; 4];
 
     #[inline(always)]
     fn no_volumes<R: Real>() -> [R; 2] {
@@ -152,8 +159,8 @@ impl Pressure for MeanPressure<'_> {
     }
 
     #[inline(always)]
-    fn none<R: Real>() -> VolumeResponse<R> {
-        VolumeResponse { pressure: R::splat(0.0), bulk: R::splat(0.0) }
+    fn none<R: Real>() -> [R; 4] {
+        [R::splat(0.0); 4]
     }
 
     #[inline(always)]
@@ -179,17 +186,10 @@ impl Pressure for MeanPressure<'_> {
     }
 
     #[inline(always)]
-    fn response<R: Real, L: Law>(
-        laws: &Laws<'_, L>,
-        tile: &ElementTile,
-        first: usize,
-        corners: [[R; 2]; 4],
-        own: R,
-    ) -> VolumeResponse<R> {
-        let law = laws.widen::<R>(|lane| tile.element(first + lane));
-        let mut sum = Self::none::<R>();
+    fn ratios<R: Real>(&self, tile: &ElementTile, first: usize, corners: [[R; 2]; 4], own: R) -> [R; 4] {
+        let mut ratios = [own; 4];
         for (corner, [one, other]) in corners.into_iter().enumerate() {
-            let j = if laws.differ() {
+            ratios[corner] = if self.several_tissues {
                 // 0, 1 or 2: positive minus a half is of the first tissue, and so on.
                 let slot = R::from_fn(|lane| f32::from(tile.slot(corner, first + lane)));
                 let half = R::splat(0.5);
@@ -197,26 +197,24 @@ impl Pressure for MeanPressure<'_> {
             } else {
                 one
             };
-            sum.pressure = sum.pressure + law.volume_slope(j);
-            sum.bulk = sum.bulk + law.volume_curvature(j);
+        }
+        ratios
+    }
+
+    #[inline(always)]
+    fn paired<R: Real>([a, b, c, d]: [R; 4], [e, f, g, h]: [R; 4]) -> [Pair<R>; 4] {
+        [Pair(a, e), Pair(b, f), Pair(c, g), Pair(d, h)]
+    }
+
+    #[inline(always)]
+    fn state<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>, ratios: [R; 4]) -> LawState<R> {
+        let (mut pressure, mut bulk) = (R::splat(0.0), R::splat(0.0));
+        for j in ratios {
+            pressure = pressure + law.volume_slope(j);
+            bulk = bulk + law.volume_curvature(j);
         }
         let quarter = R::splat(0.25);
-        VolumeResponse { pressure: quarter * sum.pressure, bulk: quarter * sum.bulk }
-    }
-
-    #[inline(always)]
-    fn paired<R: Real>(one: VolumeResponse<R>, other: VolumeResponse<R>) -> VolumeResponse<Pair<R>> {
-        let (pressure, bulk) = (Pair(one.pressure, other.pressure), Pair(one.bulk, other.bulk));
-        VolumeResponse { pressure, bulk }
-    }
-
-    #[inline(always)]
-    fn state<R: Real, L: Law>(
-        law: &L::Wide<R>,
-        at: Invariants<R>,
-        VolumeResponse { pressure, bulk }: VolumeResponse<R>,
-    ) -> LawState<R> {
-        LawState::with_volume_response::<L>(law, at, pressure, bulk)
+        LawState::with_volume_response::<L>(law, at, quarter * pressure, quarter * bulk)
     }
 
     #[inline(always)]

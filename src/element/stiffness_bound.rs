@@ -58,7 +58,7 @@ use super::internal_forces::ElementVisitor;
 
 /// The parts of the bound that depend on the invariants alone, Pa.
 #[derive(Clone, Copy)]
-struct Coefficients<R> {
+pub(super) struct Coefficients<R> {
     /// `p1` and `pJ`.
     p1: R,
     p_j: R,
@@ -90,7 +90,7 @@ const MIXED: f32 = 1.25;
 
 impl<R: Real> Coefficients<R> {
     #[inline(always)]
-    fn new<L: Law>(law: &L::Wide<R>, local: &LawState<R>) -> Self {
+    pub(super) fn new<L: Law>(law: &L::Wide<R>, local: &LawState<R>) -> Self {
         let four = R::splat(4.0);
         let at = local.at;
         let i1 = at.i + R::splat(3.0);
@@ -107,6 +107,13 @@ impl<R: Real> Coefficients<R> {
         let ce = stiff_f.fused(along, slope * (dg + dg));
         let ee = stiff_f * x_f;
         Self { p1, p_j, cc, ce, ee, floor: R::splat(FLOOR) * (bulk + p1 + ce.abs()) }
+    }
+
+    /// Of a law without stress or stiffness.
+    #[inline(always)]
+    pub(super) fn zero() -> Self {
+        let zero = R::splat(0.0);
+        Self { p1: zero, p_j: zero, cc: zero, ce: zero, ee: zero, floor: zero }
     }
 
     /// With `modulus |dF|^2` taken off.
@@ -193,33 +200,30 @@ pub(super) struct SpatialBound<R> {
 
 impl<R: Real> Bound<R> {
     #[inline(always)]
-    pub(super) fn new<L: Law>(
-        law: &L::Wide<R>,
+    pub(super) fn of(
+        coefficients: Coefficients<R>,
         tile: &ElementTile,
         first: usize,
         deformation: &Deformation<R>,
-        local: &LawState<R>,
     ) -> Self {
-        let coefficients = Coefficients::<R>::new::<L>(law, local);
-        let scalar = scalar_bound(&coefficients, local.at, scale_of(tile, first));
+        let at = deformation.invariants;
         let [distortion, cofactor] = squares(deformation);
-        let (iso, volume) = coefficients.split(local.at, distortion, cofactor);
-        Self { iso, volume, scalar, coefficients }
+        let (iso, volume) = coefficients.split(at, distortion, cofactor);
+        Self { iso, volume, scalar: scalar_bound(&coefficients, at, scale_of(tile, first)), coefficients }
     }
 
     /// Of patches with nodal strain, whose stabilising energy has this `modulus` (Pa). As there are fewer of them than elements, the
     /// scalar bound is a close one: `scale (iso + volume |C|^2)`, with `scale` in m.
     #[inline(always)]
-    pub(super) fn of_patches<L: Law>(
-        law: &L::Wide<R>,
+    pub(super) fn of_patches(
+        coefficients: Coefficients<R>,
         deformation: &Deformation<R>,
-        local: &LawState<R>,
         modulus: R,
         scale: R,
     ) -> Self {
-        let coefficients = Coefficients::<R>::new::<L>(law, local).less(modulus);
+        let coefficients = coefficients.less(modulus);
         let [distortion, cofactor] = squares(deformation);
-        let (iso, volume) = coefficients.split(local.at, distortion, cofactor);
+        let (iso, volume) = coefficients.split(deformation.invariants, distortion, cofactor);
         let iso = iso.max(R::splat(0.0));
         Self { iso, volume, scalar: scale * volume.fused(cofactor, iso), coefficients }
     }

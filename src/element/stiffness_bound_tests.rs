@@ -10,7 +10,7 @@ use reference::tensor::{apply, contraction, determinant, from_fn, product, rotat
 use reference::{EXPONENT_CAP, J_MIN, Mat3, Random, Vec3};
 
 use super::deformation::Deformation;
-use super::stiffness_bound::{Bound, MatrixSums};
+use super::stiffness_bound::{Bound, Coefficients, MatrixSums};
 use crate::material::{Exponential, Law, LawState, Literal, NeoHookean, Tissue};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::VecScene;
@@ -44,7 +44,7 @@ fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
     let deformation = Deformation::<f32>::new(h);
     let wide = L::widen::<f32>(|_| law);
     let local = LawState::new::<L>(&wide, deformation.invariants);
-    let bound = Bound::<f32>::new::<L>(&wide, tile, 0, &deformation, &local);
+    let bound = Bound::of(Coefficients::new::<L>(&wide, &local), tile, 0, &deformation);
     let (mut diagonal, mut off_diagonal) = ([NodeVector::ZERO; 4], [NodeVector::ZERO; 4]);
     let mut sums =
         MatrixSums { diagonal: Scatter::new(&mut diagonal), off_diagonal: Scatter::new(&mut off_diagonal) };

@@ -2,11 +2,11 @@
 //! nodes (N/m), what a coarse stiffness needs to know of each element comes back.
 
 use crate::material::{Law, Laws};
-use crate::simd::{Gather, Kernel, NodeVector, Real, ScatterBuffer, TILE, write_rows};
+use crate::simd::{Gather, Kernel, NodeVector, Part, Real, ScatterBuffer, TILE, write_rows};
 
 use super::deformation::{Deformation, Matrix};
-use super::pressure::{MeanPressure, OwnPressure, Pressure};
-use super::stiffness_bound::{Bound, MatrixSums};
+use super::pressure::{MeanPressure, OwnPressure, Pressure, ReadTile};
+use super::stiffness_bound::{Bound, Coefficients, MatrixSums};
 use super::{ElementTile, VolumeRows};
 
 /// A 3 x 3 matrix by rows.
@@ -55,37 +55,57 @@ impl<L: Law, P: Pressure> Kernel for TileBounds<'_, L, P> {
     const SCALAR: bool = true;
 
     #[inline(always)]
-    fn run<R: Real>(mut self) -> TileTangents {
+    fn run<R: Real>(self) -> TileTangents {
+        let Self { laws, pressure, tile, displacement, mut sums, rotations, weight } = self;
         let mut tangents = TileTangents::NONE;
         let mut buffer = [ScatterBuffer::NONE; 2];
         for first in (0..TILE).step_by(R::COUNT) {
-            self.bound::<R>(first, &mut tangents, &mut buffer);
+            // By reference: a copy would take a kilobyte of stack.
+            let (deformation, ratios) =
+                &R::run_part(ReadTile::<R, P>::new(tile, first, displacement, pressure));
+            let law = laws.widen(|lane| tile.element(first + lane));
+            let local = P::state::<R, L>(&law, deformation.invariants, *ratios);
+            R::run_part(AddBounds {
+                tile,
+                first,
+                deformation,
+                coefficients: &Coefficients::new::<L>(&law, &local),
+                rotations,
+                weight,
+                sums: &mut sums,
+                buffer: &mut buffer,
+                tangents: &mut tangents,
+            });
         }
         tangents
     }
 }
 
-impl<L: Law, P> TileBounds<'_, L, P> {
-    /// The bounds of the elements from place `first` on.
+/// The bounds of the elements from place `first` on.
+struct AddBounds<'a, 'b, R> {
+    tile: &'a ElementTile,
+    first: usize,
+    deformation: &'a Deformation<R>,
+    coefficients: &'a Coefficients<R>,
+    rotations: &'a [Rotation; TILE],
+    weight: f32,
+    sums: &'a mut MatrixSums<'b>,
+    buffer: &'a mut [ScatterBuffer<4>; 2],
+    tangents: &'a mut TileTangents,
+}
+
+impl<R: Real> Part for AddBounds<'_, '_, R> {
+    type Output = ();
+
     #[inline(always)]
-    fn bound<R: Real>(
-        &mut self,
-        first: usize,
-        tangents: &mut TileTangents,
-        buffer: &mut [ScatterBuffer<4>; 2],
-    ) where
-        P: Pressure,
-    {
-        let tile = self.tile;
-        let law = self.laws.widen(|lane| tile.element(first + lane));
-        let deformation = Deformation::<R>::of_tile(tile, first, self.displacement);
-        let local = self.pressure.local::<R, L>(&self.laws, tile, first, deformation.invariants);
-        let bound = Bound::<R>::new::<L>(&law, tile, first, &deformation, &local);
-        let cofactor = cofactor_in_frames(self.rotations, first, &deformation);
-        self.sums.add(&bound, tile, first, &cofactor, buffer);
-        if self.weight != 0.0 {
-            let weight = tile.volume::<R>(first) * R::splat(self.weight);
-            tangents.write(first, weight, &bound, &deformation, &cofactor, None);
+    fn run(self) {
+        let Self { tile, first, deformation, coefficients, rotations, weight, sums, buffer, tangents } = self;
+        let bound = Bound::of(*coefficients, tile, first, deformation);
+        let cofactor = cofactor_in_frames(rotations, first, deformation);
+        sums.add(&bound, tile, first, &cofactor, buffer);
+        if weight != 0.0 {
+            let weight = tile.volume::<R>(first) * R::splat(weight);
+            tangents.write(first, weight, &bound, deformation, &cofactor, None);
         }
     }
 }

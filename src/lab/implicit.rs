@@ -14,6 +14,7 @@ use std::vec::Vec;
 use glam::{DMat3, DVec3};
 
 use super::method::{Advance, StepReport};
+use crate::element::NodeInertia;
 use crate::loads::Loads;
 use crate::material::Material;
 use crate::scene::SceneView;
@@ -51,17 +52,48 @@ pub(super) fn prepare<'a, M: Material>(
     dt: f32,
     damping: f32,
 ) -> Advance<'a> {
-    let mut body = Body::new(rule, scene, state, f64::from(dt), f64::from(damping));
+    let laws = scene.material.laws();
+    let tangents =
+        Box::new(move |displacement: &dyn Fn(usize) -> DVec3, tangents: &mut Vec<ElementTangent>| {
+            tangents.clear();
+            tangents.extend(scene.places().map(|(tile, lane)| {
+                ElementTangent::new(&laws.of(tile.element(lane)), tile, lane, displacement)
+            }));
+        });
+    let elements: Vec<[usize; 4]> =
+        scene.places().map(|(tile, lane)| [0, 1, 2, 3].map(|corner| tile.node(corner, lane))).collect();
+    let vector = |values: [f32; 3]| DVec3::from_array(values.map(f64::from));
+    let nodes = 0..scene.node_count();
+    let mut body = Body {
+        rule,
+        inertia: scene.inertia,
+        tangents_at: tangents,
+        dt: f64::from(dt),
+        damping: f64::from(damping),
+        time: state.time(),
+        masses: nodes.clone().map(|node| f64::from(scene.node_mass(node))).collect(),
+        free: scene.inertia.iter().map(|inertia| inertia.free().truncate().as_dvec3()).collect(),
+        displacement: state.displacements().iter().map(|u| vector(u.to_array())).collect(),
+        velocity: nodes.map(|node| vector(state.velocity(node))).collect(),
+        tangents: Vec::with_capacity(elements.len()),
+        matrix: Matrix::of(scene.node_count(), &elements),
+    };
     Box::new(move |state, loads| Ok((body.step(loads, state), StepReport::default())))
 }
 
+/// Computes the tangents of all elements from the displacements (m) of the nodes. Of all that follows only this needs the law, so only
+/// this is compiled for each.
+type TangentsAt<'a> = Box<dyn Fn(&dyn Fn(usize) -> DVec3, &mut Vec<ElementTangent>) + 'a>;
+
 /// A body in motion, in float64.
-struct Body<'a, M> {
+struct Body<'a> {
     rule: Rule,
-    scene: SceneView<'a, M>,
+    inertia: &'a [NodeInertia],
+    tangents_at: TangentsAt<'a>,
     dt: f64,
     damping: f64,
     time: f64,
+    masses: Vec<f64>,
     /// Ones along free axes.
     free: Vec<DVec3>,
     displacement: Vec<DVec3>,
@@ -71,28 +103,7 @@ struct Body<'a, M> {
     matrix: Matrix,
 }
 
-impl<'a, M: Material> Body<'a, M> {
-    fn new(rule: Rule, scene: SceneView<'a, M>, state: &VecState, dt: f64, damping: f64) -> Self {
-        let vector = |values: [f32; 3]| DVec3::from_array(values.map(f64::from));
-        let nodes = 0..scene.node_count();
-        Self {
-            rule,
-            scene,
-            dt,
-            damping,
-            time: state.time(),
-            free: scene.inertia.iter().map(|inertia| inertia.free().truncate().as_dvec3()).collect(),
-            displacement: state.displacements().iter().map(|u| vector(u.to_array())).collect(),
-            velocity: nodes.map(|node| vector(state.velocity(node))).collect(),
-            tangents: Vec::with_capacity(scene.element_count()),
-            matrix: Matrix::of(scene),
-        }
-    }
-
-    fn mass(&self, node: usize) -> f64 {
-        f64::from(self.scene.node_mass(node))
-    }
-
+impl Body<'_> {
     /// Takes a step and gives it to `state`.
     fn step(&mut self, loads: &Loads<'_>, state: &mut VecState) -> Status {
         let h = match self.rule {
@@ -100,7 +111,7 @@ impl<'a, M: Material> Body<'a, M> {
             Rule::Midpoint => 0.5 * self.dt,
         };
         let mut external = vec![NodeVector::ZERO; self.free.len()];
-        external_forces(&mut external, 0, self.scene.inertia, loads, self.time + h);
+        external_forces(&mut external, 0, self.inertia, loads, self.time + h);
         let mut velocity = self.velocity.clone();
         // What supports add to the velocities of the step before.
         let mut added: Vec<DVec3> =
@@ -177,25 +188,21 @@ impl<'a, M: Material> Body<'a, M> {
 
     /// What is left of the momentum balance, N s, along free axes. Keeps the elements' tangents.
     fn residual(&mut self, h: f64, external: &[NodeVector], velocity: &[DVec3]) -> Residual {
-        let scene = self.scene;
-        let laws = scene.material.laws();
         let inert = 1.0 + self.damping * h;
         let mut left: Vec<DVec3> = (0..velocity.len())
             .map(|node| {
                 let force = DVec3::from_array(external[node].to_array().map(f64::from));
-                self.mass(node) * (inert * velocity[node] - self.velocity[node]) - h * force
+                self.masses[node] * (inert * velocity[node] - self.velocity[node]) - h * force
             })
             .collect();
         let mut scale = 0.0;
-        self.tangents.clear();
-        for (tile, lane) in scene.places() {
-            let at = |node: usize| self.displacement[node] + h * velocity[node];
-            let tangent = ElementTangent::new(&laws.of(tile.element(lane)), tile, lane, at);
+        let at = |node: usize| self.displacement[node] + h * velocity[node];
+        (self.tangents_at)(&at, &mut self.tangents);
+        for tangent in &self.tangents {
             for (node, force) in tangent.nodes.into_iter().zip(tangent.forces()) {
                 left[node] -= h * force;
                 scale += h * h * force.length_squared();
             }
-            self.tangents.push(tangent);
         }
         for (left, free) in left.iter_mut().zip(&self.free) {
             *left *= *free;
@@ -205,8 +212,8 @@ impl<'a, M: Material> Body<'a, M> {
 
     /// The derivative of the latest residual, into the matrix.
     fn assemble(&mut self, h: f64) {
-        let (scene, inert) = (self.scene, 1.0 + self.damping * h);
-        self.matrix.start(|node| inert * f64::from(scene.node_mass(node)));
+        let inert = 1.0 + self.damping * h;
+        self.matrix.start(|node| inert * self.masses[node]);
         for (element, tangent) in self.tangents.iter().enumerate() {
             self.matrix.add(element, &tangent.stiffness(), h * h);
         }
@@ -239,11 +246,10 @@ struct Matrix {
 }
 
 impl Matrix {
-    fn of<M: Material>(scene: SceneView<'_, M>) -> Self {
-        let elements: Vec<[usize; 4]> =
-            scene.places().map(|(tile, lane)| [0, 1, 2, 3].map(|corner| tile.node(corner, lane))).collect();
-        let mut neighbours: Vec<Vec<u32>> = (0..scene.node_count() as u32).map(|node| vec![node]).collect();
-        for nodes in &elements {
+    /// With the nodes of each element.
+    fn of(node_count: usize, elements: &[[usize; 4]]) -> Self {
+        let mut neighbours: Vec<Vec<u32>> = (0..node_count as u32).map(|node| vec![node]).collect();
+        for nodes in elements {
             for &node in nodes {
                 neighbours[node].extend(nodes.map(|other| other as u32));
             }
@@ -259,7 +265,7 @@ impl Matrix {
             starts[row] + neighbours[row].binary_search(&(column as u32)).unwrap_or_default()
         };
         Self {
-            diagonal: (0..scene.node_count()).map(|node| place(node, node)).collect(),
+            diagonal: (0..node_count).map(|node| place(node, node)).collect(),
             places: elements
                 .iter()
                 .map(|nodes| nodes.map(|row| nodes.map(|column| place(row, column))))

@@ -20,7 +20,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 use super::functions::Bits;
 use super::int8_avx2::Bytes32;
 use super::register::{memory, same_methods};
-use super::{Real, TILE};
+use super::{Part, Real, TILE};
 
 /// Width8 float32 values in one register.
 #[derive(Clone, Copy)]
@@ -63,6 +63,16 @@ impl Real for Avx2 {
 
     same_methods!();
 
+    #[inline(always)]
+    fn run_part<P: Part>(part: P) -> P::Output {
+        #[target_feature(enable = "avx2,fma")]
+        #[inline(never)]
+        fn with_instructions<P: Part>(part: P) -> P::Output {
+            part.run()
+        }
+        // SAFETY: the processor has these instructions, see the module.
+        unsafe { with_instructions(part) }
+    }
     #[inline(always)]
     fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
         // Rows 0 and 4 in the two halves of a register, and so on; then both halves are transposed at once.

@@ -50,6 +50,15 @@ pub(crate) trait Kernel {
     }
 }
 
+/// A part of a kernel that is the same for several kernels, as for all laws: a function of its own ([`Real::run_part`]),
+/// so that it is compiled once for each level. `run` must be `#[inline(always)]`.
+pub trait Part {
+    /// What it gives.
+    type Output;
+    /// Does it.
+    fn run(self) -> Self::Output;
+}
+
 /// All levels, the best first.
 const LEVELS: [Level; 5] = [Level::Avx512, Level::Avx2, Level::Neon, Level::Simd128, Level::Portable];
 

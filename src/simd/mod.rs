@@ -40,6 +40,7 @@ mod vectors;
 #[cfg(test)]
 pub(crate) use level::Baseline;
 pub use level::Level;
+pub use level::Part;
 pub(crate) use level::{Kernel, dispatch};
 pub(crate) use numbers::{NumberBuffer, ScatterNumbers};
 pub(crate) use pair::Pair;
@@ -86,6 +87,9 @@ pub trait Real:
     type Width8: Real;
     /// A vector of as many integers of 32 bits.
     type Whole: Whole<Self>;
+
+    /// Runs a part as a function of its own, compiled with the instructions of the level to which the vector belongs.
+    fn run_part<P: Part>(part: P) -> P::Output;
 
     /// The vector whose value in each `lane` is `at(lane)`.
     fn from_fn(at: impl Fn(usize) -> f32) -> Self;
@@ -219,6 +223,10 @@ impl Real for f32 {
     type Width8 = Portable<8>;
     type Whole = Packed<1>;
 
+    #[inline(never)]
+    fn run_part<P: Part>(part: P) -> P::Output {
+        part.run()
+    }
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {
         at(0)
@@ -255,6 +263,10 @@ impl<const L: usize> Real for Portable<L> {
     type Width8 = Portable<8>;
     type Whole = Packed<L>;
 
+    #[inline(never)]
+    fn run_part<P: Part>(part: P) -> P::Output {
+        part.run()
+    }
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {
         let mut out = [0.0; L];

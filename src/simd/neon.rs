@@ -18,7 +18,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 use super::functions::Bits;
 use super::int8_neon::Bytes16;
 use super::register::{four_rows, memory, same_methods};
-use super::{Pair, Real};
+use super::{Pair, Part, Real};
 
 /// Four float32 values in one register.
 #[derive(Clone, Copy)]
@@ -62,6 +62,10 @@ impl Real for Neon {
     same_methods!();
     four_rows!();
 
+    #[inline(never)]
+    fn run_part<P: Part>(part: P) -> P::Output {
+        part.run()
+    }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]
     fn fused(self, factor: Self, addend: Self) -> Self {

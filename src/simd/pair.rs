@@ -7,7 +7,7 @@
 use core::ops::{Add, Mul, Neg, Sub};
 
 use super::int8::Whole;
-use super::{Real, TILE};
+use super::{Part, Real, TILE};
 
 /// The values of the first vector, then those of the second.
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +53,10 @@ impl<R: Real> Real for Pair<R> {
     type Width8 = R::Width8;
     type Whole = Pair<R::Whole>;
 
+    #[inline(always)]
+    fn run_part<P: Part>(part: P) -> P::Output {
+        R::run_part(part)
+    }
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {
         Self(R::from_fn(&at), R::from_fn(|lane| at(R::COUNT + lane)))

@@ -13,7 +13,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 use super::functions::Bits;
 use super::int8_simd128::Bytes16;
 use super::register::{four_rows, memory, same_methods};
-use super::{Pair, Real};
+use super::{Pair, Part, Real};
 
 /// Four float32 values in one vector.
 #[derive(Clone, Copy)]
@@ -54,6 +54,10 @@ impl Real for Simd128 {
     same_methods!();
     four_rows!();
 
+    #[inline(never)]
+    fn run_part<P: Part>(part: P) -> P::Output {
+        part.run()
+    }
     #[inline(always)]
     fn choose(self, yes: Self, no: Self) -> Self {
         Self(v128_bitselect(yes.0, no.0, f32x4_gt(self.0, f32x4_splat(0.0))))

@@ -15,7 +15,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 use super::functions::Bits;
 use super::int8_sse2::Bytes16;
 use super::register::{four_rows, memory, same_methods};
-use super::{Pair, Real};
+use super::{Pair, Part, Real};
 
 /// Four float32 values in one register.
 #[derive(Clone, Copy)]
@@ -58,6 +58,10 @@ impl Real for Sse2 {
     same_methods!();
     four_rows!();
 
+    #[inline(never)]
+    fn run_part<P: Part>(part: P) -> P::Output {
+        part.run()
+    }
     #[inline(always)]
     fn choose(self, yes: Self, no: Self) -> Self {
         // SAFETY: as above.

@@ -273,6 +273,12 @@ impl<'a> Scatter<'a> {
         Self { vectors, first }
     }
 
+    /// The same vectors.
+    #[inline(always)]
+    pub(crate) const fn reborrow(&mut self) -> Scatter<'_> {
+        Scatter { vectors: self.vectors, first: self.first }
+    }
+
     /// The nodes of a tile, if all of them have a vector here.
     #[inline(always)]
     pub(crate) fn checked<'b, R: Real, const N: usize>(
