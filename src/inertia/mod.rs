@@ -128,7 +128,9 @@ const COARSE_GROWTH: f32 = COARSE * (1.0 - NODE_GROWTH / FINE);
 /// elements.
 const LARGEST_MOVE: f32 = 0.02;
 /// Largest strain of a cell of the lattice by which the forces of one step may move it from rest.
-const LARGEST_STRAIN: f32 = 0.2;
+const LARGEST_STRAIN: f32 = 0.1;
+/// The same with nodal strain, whose critical step is half as long again: strains of a step grow with its square.
+const LARGEST_STRAIN_OF_PATCHES: f32 = 0.2;
 /// Share of the last increment's unresolved deformation of the lattice that a step removes where a step renews all bounds, and the
 /// largest share.
 const DRAG_AT_WHOLE_CYCLES: f32 = 0.02;

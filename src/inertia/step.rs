@@ -28,7 +28,7 @@ use super::refresh::{Refresh, RefreshInput, from_components, to_components};
 use super::report::HeldBack;
 use super::supports::{MovingSupports, Pull};
 use super::transport::turned_part;
-use super::{COARSE_GROWTH, LARGEST_STRAIN, NODE_GROWTH};
+use super::{COARSE_GROWTH, LARGEST_STRAIN, LARGEST_STRAIN_OF_PATCHES, NODE_GROWTH};
 
 /// A step is [`Status::Limited`] if more than this share of the inverse inertia of all nodes is not used, or less than
 /// this share of the lattice's motion is used.
@@ -235,6 +235,11 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             smooth: smooth.as_ref(),
             supports: supports.as_ref(),
             allowed: progress.energy_balance.allowed_share(),
+            largest_strain: if M::ELEMENT.is_nodal_strain() {
+                LARGEST_STRAIN_OF_PATCHES
+            } else {
+                LARGEST_STRAIN
+            },
         };
         let MotionResult { share, change, work } = motion.compute(matrices, share);
         // Without a lattice in use there is no distinction of smooth and rough motion.
@@ -327,6 +332,8 @@ struct CoarseMotion<'a> {
     supports: Option<&'a Pull>,
     /// The share of the kinetic energy that can have come from the loads.
     allowed: f32,
+    /// Largest strain of a cell by which the forces of the step may move it from rest.
+    largest_strain: f32,
 }
 
 /// How the lattice moves.
@@ -347,7 +354,7 @@ impl CoarseMotion<'_> {
     /// share S^-1 (g - M w) + p + w - (removed T + drag T^2) c - least G^-1 g     M = (1 + k) Mc,  T = S^-1 A = 1 - S^-1 M
     /// ```
     /// with the rotation `w` of the velocities (`transport.rs`), and `p = -S^-1 A_s d` from the supports. Reduces the share
-    /// if the forces of one step would strain a cell by more than [`LARGEST_STRAIN`].
+    /// if the forces of one step would strain a cell by more than `largest_strain`.
     fn compute(&self, matrices: &mut Matrices<'_>, mut share: f32) -> MotionResult {
         let Self { lattice, refresh, .. } = *self;
         let mut forces = self.forces(matrices);
@@ -365,8 +372,8 @@ impl CoarseMotion<'_> {
         }
         let mut solution = self.in_world(&answer);
         let strain = lattice.largest_strain(&solution, refresh.frames.since_rest());
-        if share * strain > LARGEST_STRAIN {
-            share = LARGEST_STRAIN / strain;
+        if share * strain > self.largest_strain {
+            share = self.largest_strain / strain;
         }
         let (removed, drag) = (removed_share(share.min(self.allowed)), refresh.drag());
         for (((solution, given), (strained, twice)), fine) in
