@@ -81,19 +81,18 @@ impl PatchTile {
         neighbours: &'a [Neighbours],
         lane: usize,
     ) -> impl Iterator<Item = (usize, [f32; 3], f32)> + Clone + 'a {
-        let lane = lane % TILE;
-        let inverse = self.inverse_volumes[lane];
+        let inverse = self.inverse_volumes[lane % TILE];
         let mut own = [0.0; 3];
         let of_neighbours = neighbours.iter().map(Some).chain([None]);
         of_neighbours.map(move |neighbour| match neighbour {
             Some(neighbour) => {
-                let gradient = neighbour.gradients.map(|row| row[lane] * inverse);
+                let gradient = neighbour.gradients.map(|row| row[lane % TILE] * inverse);
                 for (own, along) in own.iter_mut().zip(gradient) {
                     *own -= along;
                 }
-                (neighbour.nodes[lane] as usize, gradient, neighbour.couplings[lane])
+                (neighbour.nodes[lane % TILE] as usize, gradient, neighbour.couplings[lane % TILE])
             }
-            None => (self.nodes[lane] as usize, own, 0.0),
+            None => (self.nodes[lane % TILE] as usize, own, 0.0),
         })
     }
 
