@@ -141,6 +141,7 @@ extern crate std;
 mod capi;
 pub mod element;
 mod energy_balance;
+mod heap_sort;
 pub mod inertia;
 pub mod learned;
 pub mod loads;

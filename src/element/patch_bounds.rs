@@ -8,14 +8,14 @@
 //! energy the part `-s mu |dF_a|^2` lowers the isotropic term; the other one is a graph Laplacian, whose rows are bounded by their
 //! absolute values.
 
-use crate::material::{Law, LawState, Laws, Potential};
+use crate::material::{Law, LawState, Laws};
 use crate::simd::{Gather, Kernel, NodeVector, Part, Real, ScatterBuffer, TILE, TileNodes, dot};
 
 use super::NodeInertia;
 use super::critical_bounds::{Image, NodeMatrices, Terms};
 use super::deformation::{Deformation, Vector};
 use super::patch::{Neighbours, PatchTile, Patches};
-use super::patch_forces::{STABILISATION, gradient};
+use super::patch_forces::{gradient, modulus_of};
 use super::symmetric::Symmetric;
 use super::tile::vector_at;
 
@@ -79,7 +79,7 @@ fn add_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchBounds<'_, '_, L>) 
             let law = laws.widen(|lane| tile.element(part * R::COUNT + lane));
             let local = LawState::new::<L>(&law, bound.deformation.invariants);
             bound.terms = Terms::new::<L>(&law, &local, &bound.deformation);
-            bound.modulus = R::splat(2.0 * STABILISATION) * law.distortion_slope(R::splat(0.0));
+            bound.modulus = modulus_of::<R, L>(&law);
         }
         let (bounds, sums) = (&mut bounds, &mut *sums);
         R::run_part(AddBounds { tile, neighbours, inertia, weights, bounds, sums });
@@ -166,8 +166,8 @@ fn weighted_gradient<R: Real>(
     inertia: Gather<'_>,
 ) -> Vector<R> {
     let factor = root * mass_root::<R>(nodes, first, inertia);
-    let [x, y, z] = &neighbour.gradients;
-    [factor * vector_at::<R>(x, first), factor * vector_at::<R>(y, first), factor * vector_at::<R>(z, first)]
+    let [x, y, z] = neighbour.gradient::<R>(first);
+    [factor * x, factor * y, factor * z]
 }
 
 impl<R: Real> Bound<R> {

@@ -6,6 +6,7 @@ use bytemuck::{must_cast_mut, must_cast_slice_mut};
 
 use super::ElementTile;
 use super::patch::{Neighbours, PatchLayout, PatchRow, PatchTile, ROW_WORDS};
+use crate::heap_sort::sort;
 use crate::mesh::partition::{Partitions, most_groups};
 use crate::simd::TILE;
 
@@ -215,7 +216,7 @@ impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
             for (key, &number) in sorted.iter_mut().zip(&*of_node) {
                 *key = u64::from(self.region_of(number)) << 32 | u64::from(number);
             }
-            sort(sorted);
+            sort(sorted, |key| key);
             for (number, &key) in of_node.iter_mut().zip(&*sorted) {
                 *number = key as u32;
             }
@@ -262,7 +263,7 @@ impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
             }
         }
         let pairs = pairs.get_mut(..count).unwrap_or_default();
-        sort(pairs);
+        sort(pairs, |pair| pair);
         pairs
     }
 
@@ -282,7 +283,7 @@ impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
             }
             *key = key_of(2 * from + usize::from(to > from), count, first);
         }
-        sort(order);
+        sort(order, |key| key);
     }
 
     fn write(
@@ -401,35 +402,4 @@ fn tiles_of(order: &[u64]) -> impl Iterator<Item = &[u64]> {
         rest = others;
         Some(members)
     })
-}
-
-/// Sorts by heaps: of the sorts of `core` some can panic.
-fn sort(values: &mut [u64]) {
-    let count = values.len();
-    for root in (0..count / 2).rev() {
-        sift_down(values, root);
-    }
-    for last in (1..count).rev() {
-        swap(values, 0, last);
-        sift_down(values.get_mut(..last).unwrap_or_default(), 0);
-    }
-}
-
-/// Moves a value down a heap until none below it is larger.
-fn sift_down(heap: &mut [u64], mut root: usize) {
-    loop {
-        let of = |place: usize| heap.get(place).copied();
-        let below = (2 * root + 1).max(if of(2 * root + 2) > of(2 * root + 1) { 2 * root + 2 } else { 0 });
-        if of(below).is_none() || of(below) <= of(root) {
-            return;
-        }
-        swap(heap, root, below);
-        root = below;
-    }
-}
-
-fn swap(values: &mut [u64], a: usize, b: usize) {
-    if let Ok([a, b]) = values.get_disjoint_mut([a, b]) {
-        core::mem::swap(a, b);
-    }
 }

@@ -70,6 +70,12 @@ fn add_all<R: Real, L: Law, V: ElementVisitor, const PARTS: usize>(
     Extremes::none().merged_with(&extremes)
 }
 
+/// Modulus of the stabilising energy, Pa, with `mu = 2 W'(0)`.
+#[inline(always)]
+pub(super) fn modulus_of<R: Real, L: Law>(law: &L::Wide<R>) -> R {
+    R::splat(2.0 * STABILISATION) * law.distortion_slope(R::splat(0.0))
+}
+
 /// What a vector of patches gives to its nodes.
 #[derive(Clone, Copy)]
 struct Stress<R> {
@@ -137,8 +143,7 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor>(
     let response = local.response::<L>(&law);
     extremes.least_j = deformation.invariants.j.min(extremes.least_j);
     extremes.saturation = response.saturation.max(extremes.saturation);
-    // mu = 2 W'(0).
-    let modulus = R::splat(2.0 * STABILISATION) * law.distortion_slope(R::splat(0.0));
+    let modulus = modulus_of::<R, L>(&law);
     let mut p = deformation.stress(response.p1, response.s);
     for i in 0..3 {
         for j in 0..3 {

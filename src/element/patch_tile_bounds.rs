@@ -8,12 +8,12 @@
 //! and the own node gets `s mu sum_b (k_ab + |k_ab|) I` from the stabilising energy, the sum of the absolute values of its row. That
 //! energy is not in the tangents, as it does not change with the state.
 
-use crate::material::{Law, LawState, Laws, Potential};
+use crate::material::{Law, LawState, Laws};
 use crate::simd::{Gather, Kernel, Part, Real, ScatterBuffer, TILE, dot};
 
 use super::deformation::{Deformation, Matrix, Vector};
 use super::patch::{Neighbours, PatchTile};
-use super::patch_forces::{GradientLengths, STABILISATION, gradient};
+use super::patch_forces::{GradientLengths, gradient, modulus_of};
 use super::stiffness_bound::{Bound, Coefficients, MatrixSums};
 use super::tile::vector_at;
 use super::tile_bounds::{Rotation, TileTangents, cofactor_in_frames};
@@ -74,7 +74,7 @@ fn bound_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchTileBounds<'_, L>
         let law = laws.widen(|lane| tile.element(part * R::COUNT + lane));
         let local = LawState::new::<L>(&law, shares.deformation.invariants);
         shares.coefficients = Coefficients::new::<L>(&law, &local);
-        shares.modulus = R::splat(2.0 * STABILISATION) * law.distortion_slope(R::splat(0.0));
+        shares.modulus = modulus_of::<R, L>(&law);
     }
     let (shares, tangents_out) = (&mut shares, &mut tangents);
     R::run_part(AddBounds { tile, neighbours, rotations, weight, shares, sums, tangents: tangents_out });

@@ -254,9 +254,8 @@ impl<'w> LargeModel<'w> {
     }
 
     /// Whether it was prepared for this scene.
-    pub(super) fn is_for<M: ElementMaterial>(&self, scene: SceneView<'_, M>) -> bool {
-        self.element == M::ELEMENT
-            && self.nodes == scene.node_count()
+    pub(super) fn is_for<M>(&self, scene: SceneView<'_, M>) -> bool {
+        self.nodes == scene.node_count()
             && self.elements == scene.element_count()
             && self.scene == scene.checksum()
     }

@@ -9,8 +9,9 @@
 
 use glam::Vec4;
 
-use super::dense::row_length;
+use super::dense::{row_length, stride};
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
+use super::matrices::of_axes;
 use super::node::inverse_on_free;
 use crate::element::NodeInertia;
 use crate::element::symmetric::Symmetric;
@@ -92,6 +93,19 @@ pub(super) fn write_mass(
     for matrix in matrices.chunks_exact_mut(size.max(1)) {
         for entry in matrix.iter_mut().step_by(length + 1).take(functions).filter(|entry| **entry <= 0.0) {
             *entry = 1.0;
+        }
+    }
+}
+
+/// Gives an axis along which all nodes of a function are held, and no force acts, the mass that [`write_mass`] has there.
+pub(super) fn fill_held_axes(inertia: &mut [f32], mass: &[f32], functions: usize) {
+    let (stride, length) = (stride(functions), row_length(functions));
+    for (axis, mass) in of_axes(mass).into_iter().enumerate() {
+        let diagonal = inertia.iter_mut().skip(axis * (stride + 1)).step_by(3 * (stride + 1));
+        for (inertia, mass) in diagonal.zip(mass.iter().step_by(length + 1)).take(functions) {
+            if *inertia == 0.0 {
+                *inertia = *mass;
+            }
         }
     }
 }

@@ -5,6 +5,7 @@ use glam::Vec4;
 
 use super::lattice::{Lattice, LatticeNode, node_place};
 use crate::element::{Axes, ElementTile, NodeInertia};
+use crate::heap_sort::sort;
 use crate::scene::SceneView;
 use crate::simd::TILE;
 
@@ -94,53 +95,4 @@ pub(super) fn sort_by_patch<M>(
 pub(super) fn nodes_of(tiles: &[ElementTile], place: u32) -> Option<[usize; 4]> {
     let tile = tiles.get(place as usize / TILE)?;
     Some([0, 1, 2, 3].map(|corner| tile.node(corner, place as usize % TILE)))
-}
-
-/// Heap sort: that of the standard library can panic.
-fn sort<K: Ord>(list: &mut [u32], key: impl Fn(u32) -> K) {
-    let count = list.len();
-    for root in (0..count / 2).rev() {
-        sift(list, root, count, &key);
-    }
-    for end in (1..count).rev() {
-        exchange(list, 0, end);
-        sift(list, 0, end, &key);
-    }
-}
-
-/// Lets the entry at `root` sink into the heap of the first `end` entries.
-fn sift<K: Ord>(list: &mut [u32], mut root: usize, end: usize, key: &impl Fn(u32) -> K) {
-    let key_at = |list: &[u32], at: usize| list.get(at).filter(|_| at < end).map(|&entry| key(entry));
-    while 2 * root + 1 < end {
-        let mut child = 2 * root + 1;
-        if key_at(list, child) < key_at(list, child + 1) {
-            child += 1;
-        }
-        if key_at(list, root) >= key_at(list, child) {
-            return;
-        }
-        exchange(list, root, child);
-        root = child;
-    }
-}
-
-fn exchange(list: &mut [u32], a: usize, b: usize) {
-    if let (Some(&first), Some(&second)) = (list.get(a), list.get(b)) {
-        list.get_mut(a).into_iter().for_each(|entry| *entry = second);
-        list.get_mut(b).into_iter().for_each(|entry| *entry = first);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::sort;
-
-    #[test]
-    fn sorts() {
-        let mut list: Vec<u32> = (0..1000u32).map(|at| at.wrapping_mul(2_654_435_761) % 977).collect();
-        let mut expected = list.clone();
-        expected.sort_by_key(|&entry| std::cmp::Reverse(entry));
-        sort(&mut list, std::cmp::Reverse);
-        assert_eq!(list, expected);
-    }
 }

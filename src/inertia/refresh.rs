@@ -17,7 +17,7 @@ use super::frames::{Frames, Rotation};
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, rank_of};
 use super::matrices::{Matrices, copy, invert_axes, of_axes};
 use super::nodal_strain::{self, write_stabilising};
-use super::nodal_sums::{self, FunctionInertia, add_mass, write_mass};
+use super::nodal_sums::{self, FunctionInertia, add_mass, fill_held_axes, write_mass};
 use super::node::Scaling;
 use super::node_refresh::{NODE_BATCH, NodeBatch};
 use super::node_tables::NodeTables;
@@ -76,8 +76,8 @@ pub(super) struct Refresh {
     pub(super) fine_in_use: bool,
 }
 
-/// Measured costs of a tile, of a tile without a lattice, of both with patches of nodal strain, of a cell, of a node, and of an entry of a row that is
-/// mirrored. The unit is the time of a floating-point operation of a pivot.
+/// Measured costs of a tile, of a tile without a lattice, of both with patches of nodal strain, of a cell, of a node, and of an entry
+/// of a row that is mirrored. The unit is the time of a floating-point operation of a pivot.
 const TILE_COST: i64 = 47_000;
 const TILE_UNCOUPLED_COST: i64 = 18_000;
 const PATCH_TILE_COST: i64 = 600_000;
@@ -316,6 +316,9 @@ impl Refresh {
     ) -> i64 {
         let at = self.done;
         self.done += 1;
+        if at == 0 && self.stage == Stage::Elements {
+            self.start_cycle(input, tables, matrices);
+        }
         match self.stage {
             Stage::Elements if M::ELEMENT.is_nodal_strain() => self.add_patches(input, tables, matrices, at),
             Stage::Elements => self.add_elements(input, tables, matrices, at),
@@ -336,9 +339,6 @@ impl Refresh {
         at: usize,
     ) -> i64 {
         let functions = input.lattice.functions();
-        if at == 0 {
-            self.start_cycle(input, tables, matrices);
-        }
         let mut batch = [ElementTangent::NONE; BATCH];
         let mut parts = batch.chunks_exact_mut(TILE);
         for at in at * BATCH_TILES..self.done * BATCH_TILES {
@@ -373,9 +373,6 @@ impl Refresh {
         at: usize,
     ) -> i64 {
         let functions = input.lattice.functions();
-        if at == 0 {
-            self.start_cycle(input, tables, matrices);
-        }
         let (tiles, stride) = (input.scene.patches.tiles(), stride(functions));
         if let Some(tile) = tiles.get(at) {
             let mut assembly = (functions > 0).then(|| input.assembly(matrices.next_coarse, stride));
@@ -607,19 +604,6 @@ fn is_conditioned(inertia: &[f32], mass: &[f32], functions: usize) -> bool {
         let inertia = inertia.iter().skip(axis * (stride + 1)).step_by(3 * (stride + 1));
         inertia.zip(masses).all(|(inertia, mass)| *inertia <= LARGEST_RATIO * mass)
     })
-}
-
-/// Gives an axis along which all nodes of a function are held, and no force acts, the mass that [`write_mass`] has there.
-fn fill_held_axes(inertia: &mut [f32], mass: &[f32], functions: usize) {
-    let (stride, length) = (stride(functions), row_length(functions));
-    for (axis, mass) in of_axes(mass).into_iter().enumerate() {
-        let diagonal = inertia.iter_mut().skip(axis * (stride + 1)).step_by(3 * (stride + 1));
-        for (inertia, mass) in diagonal.zip(mass.iter().step_by(length + 1)).take(functions) {
-            if *inertia == 0.0 {
-                *inertia = *mass;
-            }
-        }
-    }
 }
 
 /// The first components of [`PROBE`].

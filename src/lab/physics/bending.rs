@@ -42,7 +42,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
             let pascal = reference / per_newton / (WIDTH * WIDTH);
             let forces = body.mesh.traction(&tip, (2.0 / omega) as f32, |_| [0.0, 0.0, -pascal]);
             for element in Element::ALL {
-                for steps in TO_REST.into_iter() {
+                for steps in TO_REST {
                     let run = Run { forces: &forces, tip: &tip, omega };
                     let (value, row) = body.measure(NAME, element, steps, run);
                     rows.push(Row {

@@ -47,7 +47,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
     let mut rows = Vec::new();
     for graded in [false, true] {
         for element in Element::ALL {
-            for steps in TO_REST.into_iter() {
+            for steps in TO_REST {
                 let (mut corners, mut sides) = (Vec::new(), Vec::new());
                 for cells in MESHES.into_iter().take(meshes) {
                     let (rises, row) = measured(&body(cells, graded), element, steps, &mut rows);

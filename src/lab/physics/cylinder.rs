@@ -40,7 +40,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
         for element in Element::ALL {
             let mut errors = Vec::new();
             for (body, fineness) in bodies.iter().zip([1.0, 2.0, 4.0]) {
-                for steps in TO_REST.into_iter() {
+                for steps in TO_REST {
                     let (found, row) = measured(body, element, steps, &mut rows);
                     if let (Some([inner, _]), true) = (found, steps.kind == EXACT.kind) {
                         errors.push((row, fineness, inner / exact(INNER) - 1.0));

@@ -36,7 +36,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
     for cells in MESHES.into_iter().take(meshes) {
         let body = body(cells);
         for element in Element::ALL {
-            for steps in TO_REST.into_iter() {
+            for steps in TO_REST {
                 let run = |share: f64| {
                     body.measure(NAME, element, steps, Run::new(&body, element, share * reference))
                 };

@@ -36,7 +36,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
         for cells in MESHES.into_iter().take(meshes) {
             let body = body(cells);
             let end = body.mesh.nodes(|[.., z]| same(z, LENGTH));
-            for steps in TO_REST.into_iter() {
+            for steps in TO_REST {
                 let (value, row) = body.measure(NAME, element, steps, Run { mesh: &body.mesh, end: &end });
                 if let (Some(value), true) = (value, steps.kind == EXACT.kind) {
                     errors.push((row.clone(), f64::from(cells), value / reference - 1.0));
