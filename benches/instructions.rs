@@ -14,12 +14,13 @@ use std::process::ExitCode;
 use common::bar::{self, DAMPING, DT, EXPONENTIAL, moved};
 use common::scaled::{damped, multilevel, scaled};
 use common::vertices::{ROWS, vertices};
-use supple::element::ElementLaw;
+use supple::element::ElementMaterial;
 use supple::inertia::Method;
 use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::Loads;
-use supple::material::NeoHookean;
+use supple::material::{NeoHookean, NodalPressure, NodalStrain};
 use supple::mlp::{Network, WeightBytes};
+use supple::scene::VecScene;
 use supple::simd::Level;
 use supple::state::{NodeVector, VecState};
 use supple::step::Step;
@@ -29,13 +30,12 @@ const COMPACT: &[u8] = include_bytes!("../weights/compact-10.weights");
 /// Small, with int8 layers.
 const INT8: &[u8] = include_bytes!("../tests/data/golden-v3.weights");
 
-fn exact<L: ElementLaw>(law: L, times: u32) {
-    let scene = bar::scene(law);
+fn exact<M: ElementMaterial>(scene: &VecScene<M>, times: u32) {
     let forces = bar::forces();
-    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
+    let loads = Loads::new(scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
     let mut state = VecState::at_rest(scene.node_count());
     let step = Step::unchecked(DT, DAMPING).expect("a positive step");
-    (0..times).for_each(|_| moved(tled::step(&scene, &loads, &mut state, &step)));
+    (0..times).for_each(|_| moved(tled::step(scene, &loads, &mut state, &step)));
 }
 
 /// 64 steps each time: a whole refresh cycle without a lattice, with one a quarter at least.
@@ -79,7 +79,9 @@ fn main() -> ExitCode {
     }
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     let [name, times] = arguments.as_slice() else {
-        println!("exponential neo-hookean mass-scaled multilevel damped compact int8 learned");
+        println!(
+            "exponential neo-hookean nodal-pressure nodal-strain mass-scaled multilevel damped compact int8 learned"
+        );
         return ExitCode::SUCCESS;
     };
     let Ok(times) = times.parse() else {
@@ -87,8 +89,10 @@ fn main() -> ExitCode {
         return ExitCode::FAILURE;
     };
     match name.as_str() {
-        "exponential" => exact(EXPONENTIAL, times),
-        "neo-hookean" => exact(NeoHookean { c: 500.0, d: 15_000.0 }, times),
+        "exponential" => exact(&bar::scene(EXPONENTIAL), times),
+        "neo-hookean" => exact(&bar::scene(NeoHookean { c: 500.0, d: 15_000.0 }), times),
+        "nodal-pressure" => exact(&bar::scene_with(NodalPressure(bar::tissue(EXPONENTIAL))), times),
+        "nodal-strain" => exact(&bar::scene_with(NodalStrain(bar::tissue(EXPONENTIAL))), times),
         "mass-scaled" => large(Method::MassScaled, times),
         "multilevel" => large(multilevel(), times),
         "damped" => large(damped(), times),

@@ -19,7 +19,7 @@ use supple::element::{ElementLaw, ElementMaterial};
 use supple::loads::{Loads, NodalForce};
 use supple::material::{NeoHookean, NodalPressure, NodalStrain, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
-use supple::scene::{Support, VecScene};
+use supple::scene::VecScene;
 use supple::simd::Level;
 use supple::state::VecState;
 use supple::step::{CriticalStep, Step};
@@ -116,11 +116,8 @@ fn compare<L: ElementLaw>(criterion: &mut Criterion, name: &str, law: L, plain_l
 
 /// Another element compared with linear tetrahedra, both in a deformed state.
 fn compare_elements<L: ElementLaw, M: ElementMaterial>(name: &str, law: L, other: impl Fn(Tissue<L>) -> M) {
-    let (points, tets): (Vec<_>, Vec<_>) = (bar::points(), Bar::PAPER.tets().collect());
-    let mesh = Mesh::new(&points, &tets, Winding::Checked).expect("the bar is sound");
-    let fixed: Vec<_> = HELD.map(Support::fixed).collect();
-    let scene = VecScene::build(other(Tissue { law, density: DENSITY }), &mesh, &fixed);
-    let (mut linear, mut other) = (Ours::new(bar::scene(law)), Ours::new(scene.expect("the bar is sound")));
+    let other = bar::scene_with(other(bar::tissue(law)));
+    let (mut linear, mut other) = (Ours::new(bar::scene(law)), Ours::new(other));
     linear.run(2_000);
     other.run(2_000);
     let (ratio, other_s, linear_s) = pairs(|| other.run(50), || linear.run(50), 50);

@@ -1,6 +1,6 @@
 //! The paper's bar with twisting forces at its free corners, as every bench has it.
 
-use supple::element::ElementLaw;
+use supple::element::{ElementLaw, ElementMaterial};
 use supple::loads::NodalForce;
 use supple::material::{Exponential, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
@@ -22,19 +22,27 @@ pub(crate) fn points() -> Vec<[f32; 3]> {
     Bar::PAPER.points().collect()
 }
 
-pub(crate) fn scene<L: ElementLaw>(law: L) -> BarScene<L> {
-    let fixed: Vec<_> = HELD.map(Support::fixed).collect();
-    scene_of(law, &points(), &Bar::PAPER.tets().collect::<Vec<_>>(), &fixed)
+pub(crate) fn tissue<L: ElementLaw>(law: L) -> Tissue<L> {
+    Tissue { law, density: DENSITY }
 }
 
-pub(crate) fn scene_of<L: ElementLaw>(
-    law: L,
+pub(crate) fn scene<L: ElementLaw>(law: L) -> BarScene<L> {
+    scene_with(tissue(law))
+}
+
+pub(crate) fn scene_with<M: ElementMaterial>(material: M) -> VecScene<M> {
+    let fixed: Vec<_> = HELD.map(Support::fixed).collect();
+    scene_of(material, &points(), &Bar::PAPER.tets().collect::<Vec<_>>(), &fixed)
+}
+
+pub(crate) fn scene_of<M: ElementMaterial>(
+    material: M,
     points: &[[f32; 3]],
     tets: &[[u32; 4]],
     fixed: &[Support],
-) -> BarScene<L> {
+) -> VecScene<M> {
     let mesh = Mesh::new(points, tets, Winding::Checked).expect("the bar is sound");
-    VecScene::build(Tissue { law, density: DENSITY }, &mesh, fixed).expect("the bar is sound")
+    VecScene::build(material, &mesh, fixed).expect("the bar is sound")
 }
 
 /// 0.07 N at each free corner.

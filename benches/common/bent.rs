@@ -20,7 +20,7 @@ impl<L: ElementLaw> Bent<L> {
     pub(crate) fn new(law: L, points: &[[f32; 3]], tets: &[[u32; 4]]) -> Self {
         let held = points.iter().enumerate().filter(|(_, point)| point[2] == 0.0);
         let held: Vec<_> = held.map(|(node, _)| Support::fixed(node as u32)).collect();
-        let scene = bar::scene_of(law, points, tets, &held);
+        let scene = bar::scene_of(bar::tissue(law), points, tets, &held);
         let mut state = VecState::at_rest(points.len());
         let critical = tled::critical_step(&scene, &mut state).expect("the bar has a critical step");
         let step = Step::new(critical.seconds, DAMPING, critical).expect("that step");

@@ -120,9 +120,9 @@ impl<L: Law, P: Pressure> Kernel for CriticalBounds<'_, '_, L, P> {
                 let displacement = Gather::new(self.sums.zx_in_padding);
                 let read = ReadTile::<R, P>::new(tile, first, displacement, self.pressure);
                 // By reference: a copy would take a kilobyte of stack.
-                let (deformation, ratios) = &R::run_part(read);
+                let (deformation, change) = &R::run_part(read);
                 let law = self.laws.widen(|lane| tile.element(first + lane));
-                let mut local = P::state::<R, L>(&law, deformation.invariants, *ratios);
+                let mut local = LawState::with_volume_change::<L>(&law, deformation.invariants, *change);
                 if !self.with_volume {
                     local.bulk = R::splat(0.0);
                 }

@@ -90,7 +90,7 @@ pub(crate) fn pressure_at<L: Law>(
     let own = (volume_ratio - 1.0) as f32;
     let change = volumes.and_then(|rows| rows.change(tile.node(corner, lane), tile.slot(corner, lane)));
     let change = change.unwrap_or(own);
-    -f64::from(L::widen::<f32>(|_| *law).volume_slope(change))
+    -f64::from(L::widen::<f32>(|_| *law).bulk_modulus() * change)
 }
 
 /// What the energy (J) of an element changes by when its energy of volume is that of its nodes ([`super::pressure`]).

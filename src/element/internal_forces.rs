@@ -160,14 +160,14 @@ fn in_batches<R: Real, L: Law, P: Pressure, const SIZE: usize>(
 /// A vector of elements, those of a tile from place `first` on, with what the passes of [`add_forces`] compute for
 /// them.
 #[derive(Clone, Copy)]
-struct ElementVector<'a, R, V> {
+struct ElementVector<'a, R> {
     tile: &'a ElementTile,
     first: usize,
     /// Displacement gradient.
     h: Matrix<R>,
     invariants: Invariants<R>,
-    /// What the pressure follows from, where it is not the element's own volume.
-    ratios: V,
+    /// `J - 1` at which the pressure is taken.
+    change: R,
     /// Scalars of the stress, Pa.
     p1: R,
     s: R,
@@ -175,13 +175,13 @@ struct ElementVector<'a, R, V> {
     fourth: R,
 }
 
-impl<'a, R: Real, V> ElementVector<'a, R, V> {
+impl<'a, R: Real> ElementVector<'a, R> {
     #[inline(always)]
-    fn zero(tile: &'a ElementTile, ratios: V) -> Self {
+    fn zero(tile: &'a ElementTile) -> Self {
         let zero = R::splat(0.0);
         let invariants = Invariants { i: zero, j: zero };
         let h = [[zero; 3]; 3];
-        Self { tile, first: 0, h, invariants, ratios, p1: zero, s: zero, fourth: zero }
+        Self { tile, first: 0, h, invariants, change: zero, p1: zero, s: zero, fourth: zero }
     }
 }
 
@@ -189,7 +189,7 @@ impl<'a, R: Real, V> ElementVector<'a, R, V> {
 /// holds.
 const BATCH: usize = 12;
 /// Of long vectors fewer, as they need more stack.
-const WIDE_BATCH: usize = 8;
+const WIDE_BATCH: usize = 6;
 #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
 const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
 
@@ -209,7 +209,7 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
 ) {
     let Some(first) = tiles.first() else { return };
     let (displacement, pressure) = input;
-    let mut batch = [ElementVector::<R, P::Ratios<R>>::zero(first, P::none()); SIZE];
+    let mut batch = [ElementVector::<R>::zero(first); SIZE];
     let strip_count = tiles.len().checked_div(length).unwrap_or(0) * (TILE / R::COUNT);
     let most = if R::COUNT == 1 { SCATTER_WIDTH } else { SIZE.checked_div(length).unwrap_or(SIZE).max(1) };
     for start in (0..strip_count).step_by(most) {
@@ -218,9 +218,9 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
         R::run_part(Deform { tiles, length, strips, displacement, pressure, batch: &mut batch });
         // If the count is odd, the second vector of the last pair is an old one; its result is not used.
         for (index, pair) in batch.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
-            let locals = respond::<R, L, P>(laws, pair, extremes);
+            let locals = respond::<R, L>(laws, pair, extremes);
             for (elements, local) in pair.iter_mut().zip(&locals).take(count - 2 * index) {
-                visit::<R, L, P>(laws, elements, local, visitor);
+                visit::<R, L>(laws, elements, local, visitor);
             }
         }
         let batch = batch.get(..count).unwrap_or_default();
@@ -246,7 +246,7 @@ struct Deform<'a, 'b, R: Real, P: Pressure> {
     strips: Range<usize>,
     displacement: Gather<'b>,
     pressure: P,
-    batch: &'b mut [ElementVector<'a, R, P::Ratios<R>>],
+    batch: &'b mut [ElementVector<'a, R>],
 }
 
 impl<R: Real, P: Pressure> Part for Deform<'_, '_, R, P> {
@@ -288,16 +288,16 @@ fn deform<R: Real, P: Pressure, const K: usize, const N: usize>(pass: Deform<'_,
             (vector.tile, vector.first) = (&tiles[element], first);
             (vector.h, vector.invariants) = (deformation.h, deformation.invariants);
             let volumes = [volumes[a % N], volumes[b % N], volumes[c % N], volumes[d % N]];
-            vector.ratios = pressure.ratios(&tiles[element], first, volumes, deformation.invariants.j);
+            vector.change = pressure.change(&tiles[element], first, volumes, deformation.invariants.j);
         });
     }
 }
 
 /// The second pass: the stress of the law.
 #[inline(always)]
-fn respond<R: Real, L: Law, P: Pressure>(
+fn respond<R: Real, L: Law>(
     laws: &Laws<'_, L>,
-    pair: &mut [ElementVector<'_, R, P::Ratios<R>>; 2],
+    pair: &mut [ElementVector<'_, R>; 2],
     extremes: &mut Extremes<Pair<R>>,
 ) -> [LawState<R>; 2] {
     let law = laws.widen::<Pair<R>>(|lane| {
@@ -309,8 +309,8 @@ fn respond<R: Real, L: Law, P: Pressure>(
         i: Pair(first.invariants.i, second.invariants.i),
         j: Pair(first.invariants.j, second.invariants.j),
     };
-    let ratios = P::paired(first.ratios, second.ratios);
-    let local = P::state::<Pair<R>, L>(&law, invariants, ratios);
+    let change = Pair(first.change, second.change);
+    let local = LawState::with_volume_change::<L>(&law, invariants, change);
     let response = local.response::<L>(&law);
     (first.p1, first.s) = (response.p1.0, response.s.0);
     (second.p1, second.s) = (response.p1.1, response.s.1);
@@ -321,9 +321,9 @@ fn respond<R: Real, L: Law, P: Pressure>(
 
 /// Calls the visitor.
 #[inline(always)]
-fn visit<R: Real, L: Law, P: Pressure>(
+fn visit<R: Real, L: Law>(
     laws: &Laws<'_, L>,
-    elements: &mut ElementVector<'_, R, P::Ratios<R>>,
+    elements: &mut ElementVector<'_, R>,
     local: &LawState<R>,
     visitor: &mut impl ElementVisitor,
 ) {
@@ -334,7 +334,7 @@ fn visit<R: Real, L: Law, P: Pressure>(
 
 /// Nodal forces from the stress, with the fourth component of the visitor.
 #[inline(always)]
-fn nodal_forces<R: Real, V: Copy>(elements: &ElementVector<'_, R, V>) -> [[R; 4]; 4] {
+fn nodal_forces<R: Real>(elements: &ElementVector<'_, R>) -> [[R; 4]; 4] {
     let ElementVector { tile, first, .. } = *elements;
     let deformation = Deformation::with(elements.h, elements.invariants);
     let stress = deformation.stress(elements.p1, elements.s);
@@ -358,33 +358,30 @@ fn nodal_forces<R: Real, V: Copy>(elements: &ElementVector<'_, R, V>) -> [[R; 4]
 }
 
 /// The third pass: adds the forces of some strips to their nodes.
-struct AddForces<'a, 'b, R, V> {
-    batch: &'a [ElementVector<'b, R, V>],
+struct AddForces<'a, 'b, R> {
+    batch: &'a [ElementVector<'b, R>],
     /// Elements of a strip.
     length: usize,
     force: Scatter<'a>,
 }
 
-impl<R: Real, V: Copy> Part for AddForces<'_, '_, R, V> {
+impl<R: Real> Part for AddForces<'_, '_, R> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
         let Self { batch, length, force } = self;
         match length {
-            3 => scatter::<R, V, 3, 6>(batch, force),
-            2 => scatter::<R, V, 2, 5>(batch, force),
-            _ => scatter::<R, V, 1, 4>(batch, force),
+            3 => scatter::<R, 3, 6>(batch, force),
+            2 => scatter::<R, 2, 5>(batch, force),
+            _ => scatter::<R, 1, 4>(batch, force),
         }
     }
 }
 
 /// The same for strips of `K` elements with `N` nodes.
 #[inline(always)]
-fn scatter<R: Real, V: Copy, const K: usize, const N: usize>(
-    batch: &[ElementVector<'_, R, V>],
-    mut force: Scatter<'_>,
-) {
+fn scatter<R: Real, const K: usize, const N: usize>(batch: &[ElementVector<'_, R>], mut force: Scatter<'_>) {
     let mut buffer = ScatterBuffer::NONE;
     for strip in batch.as_chunks::<K>().0 {
         let mut rows = [[R::splat(0.0); 4]; N];

@@ -17,8 +17,8 @@ use super::internal_forces::nodes_of;
 use super::{ElementTile, NodeInertia};
 
 /// Floating-point operations that nodal pressure adds for one element: displacement gradient 63, volume ratio 29, share of a node 2,
-/// sums 4; `U'` of four nodes instead of one, of a law linear in `J` 3, and their mean 4.
-pub(crate) const NODAL_PRESSURE_OPERATIONS: u32 = 63 + 29 + 2 + 4 + 3 + 4;
+/// sums 4; mean over the nodes 4.
+pub(crate) const NODAL_PRESSURE_OPERATIONS: u32 = 63 + 29 + 2 + 4 + 4;
 
 /// The rows of all nodes. In a body of one tissue: the displacement (m), so that forces read one row a node, and `J - 1`. With
 /// several: `J - 1` in the first tissue of the node and in the second.

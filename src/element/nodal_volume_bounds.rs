@@ -5,7 +5,7 @@
 //! ```text
 //! V_a dJ_a = sum_b w_ab . v_b,   w_ab = sum_{e with a, b} V_e / 4 C_e g_b       C = cof F, g_b the gradient at b
 //! (V_a dJ_a)^2 <= S_a sum_b (w_ab . v_b)^2 / (|w_ab| x_b),   S_a = sum_b |w_ab| x_b       Cauchy-Schwarz, any x_b > 0
-//! sum_a U''(J_a) V_a (dJ_a)^2 <= sum_b v_b . D_b v_b,   D_b = sum_a k_a w_ab w_ab^T / (|w_ab| x_b),   k_a = U''(J_a) S_a / V_a
+//! k sum_a V_a (dJ_a)^2 <= sum_b v_b . D_b v_b,   D_b = sum_a k_a w_ab w_ab^T / (|w_ab| x_b),   k_a = k S_a / V_a
 //! ```
 //! `w_aa` is summed over the elements first: inside a tissue it is zero, as a node alone does not change the volume around it. The
 //! others are taken element by element, which is again Cauchy-Schwarz. Weights `x_b` that are smaller where `D_b` is small balance the
@@ -30,7 +30,7 @@ enum Pass {
     Matrices,
 }
 
-/// The bound over all elements. A row of a node holds its weight `x`, `k`, its volume (m^3), and `J - 1`.
+/// The bound over all elements. A row of a node holds its weight `x`, `k_a`, its volume (m^3), and `J - 1`.
 pub(crate) struct NodalVolumeBounds<'a> {
     pub(crate) tiles: &'a [ElementTile],
     pub(crate) inertia: &'a [NodeInertia],
@@ -54,16 +54,16 @@ impl NodalVolumeBounds<'_> {
         }
     }
 
-    /// Adds `D` to matrices that are zero. `curvature` is `U''` (Pa) of `J - 1`.
-    pub(crate) fn add(&mut self, sums: &mut NodeMatrices<'_>, curvature: impl Fn(f32) -> f32) {
+    /// Adds `D` to matrices that are zero. `bulk` is the bulk modulus, Pa.
+    pub(crate) fn add(&mut self, sums: &mut NodeMatrices<'_>, bulk: f32) {
         self.pass(Pass::Sums, sums);
         for (node, row) in self.rows.iter_mut().enumerate() {
             let [x, y, z, others] = sums.xx_yy_zz_xy.get(node).copied().unwrap_or_default().0;
             let length = libm::sqrtf(x * x + y * y + z * z);
-            let [weight, _, volume, j] = row.0;
+            let [weight, _, volume, _] = row.0;
             // A node of no element that takes part has none.
             let per_volume = if volume > 0.0 { 1.0 / volume } else { 0.0 };
-            let k = curvature(j).max(0.0) * (others + length * weight) * per_volume;
+            let k = bulk * (others + length * weight) * per_volume;
             row.0[1] = k;
             // The gradient of the node's own volume.
             let own = if length > 0.0 { k / length / weight } else { 0.0 };

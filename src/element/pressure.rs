@@ -5,13 +5,13 @@
 //! ```text
 //! dPsi/du = sum_e V_e p_e C_e : dF_e/du,   p_e = sum_{a in e} U'(J_a) / 4,   C = cof F
 //! ```
-//! which is the stress of the linear element with `p_e` in place of `U'(J_e)`. Where tissues meet, a node has a volume ratio for
+//! which is the stress of the linear element with `p_e` in place of `U'(J_e)`. As `U'` is linear in `J` in all laws, that is its
+//! pressure at the mean volume ratio of its nodes. Where tissues meet, a node has a volume ratio for
 //! each of the first two; elements of a third one keep their own there.
 
 use core::marker::PhantomData;
 
-use crate::material::{Invariants, Law, LawState, Potential};
-use crate::simd::{Gather, Pair, Part, Real, TileNodes};
+use crate::simd::{Gather, Part, Real, TileNodes};
 
 use super::deformation::Deformation;
 use super::{ElementTile, VolumeRows};
@@ -20,13 +20,8 @@ use super::{ElementTile, VolumeRows};
 pub(crate) trait Pressure: Copy {
     /// What is read at a node.
     type Volumes<R: Real>: Copy;
-    /// What an element keeps of its nodes.
-    type Ratios<R: Real>: Copy;
-
     /// Nothing read yet.
     fn no_volumes<R: Real>() -> Self::Volumes<R>;
-    /// Nothing known yet.
-    fn none<R: Real>() -> Self::Ratios<R>;
     /// Rows in which displacements are read as well, if any.
     fn displacement(&self) -> Option<Gather<'_>>;
     /// Reads a node of each element ([`Gather::read_nodes`]).
@@ -44,23 +39,13 @@ pub(crate) trait Pressure: Copy {
         corner: usize,
         first: usize,
     ) -> Self::Volumes<R>;
-    /// Of the elements from place `first` of a tile on, from their corners and their own `J - 1`.
-    fn ratios<R: Real>(
-        &self,
-        tile: &ElementTile,
-        first: usize,
-        corners: [Self::Volumes<R>; 4],
-        own: R,
-    ) -> Self::Ratios<R>;
-    /// Of two vectors of elements.
-    fn paired<R: Real>(one: Self::Ratios<R>, other: Self::Ratios<R>) -> Self::Ratios<Pair<R>>;
-    /// The state of the law.
-    fn state<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>, ratios: Self::Ratios<R>) -> LawState<R>;
+    /// `J - 1` at which the elements from place `first` of a tile on take their pressure, from their corners and their own.
+    fn change<R: Real>(&self, tile: &ElementTile, first: usize, corners: [Self::Volumes<R>; 4], own: R) -> R;
     /// Number of nodes that can be read.
     fn count(&self) -> usize;
 }
 
-/// Reads the deformation of the elements from place `first` of a tile on, and what their pressure follows from.
+/// Reads the deformation of the elements from place `first` of a tile on, and `J - 1` at which they take their pressure.
 pub(super) struct ReadTile<'a, R, P> {
     tile: &'a ElementTile,
     first: usize,
@@ -77,7 +62,7 @@ impl<'a, R: Real, P: Pressure> ReadTile<'a, R, P> {
 }
 
 impl<R: Real, P: Pressure> Part for ReadTile<'_, R, P> {
-    type Output = (Deformation<R>, P::Ratios<R>);
+    type Output = (Deformation<R>, R);
 
     #[inline(always)]
     fn run(self) -> Self::Output {
@@ -89,7 +74,7 @@ impl<R: Real, P: Pressure> Part for ReadTile<'_, R, P> {
         for (corner, volumes) in corners.iter_mut().enumerate() {
             *volumes = pressure.read::<R, 4>(&nodes, corner, first);
         }
-        (deformation, pressure.ratios(tile, first, corners, deformation.invariants.j))
+        (deformation, pressure.change(tile, first, corners, deformation.invariants.j))
     }
 }
 
@@ -99,13 +84,9 @@ pub struct OwnPressure;
 
 impl Pressure for OwnPressure {
     type Volumes<R: Real> = ();
-    type Ratios<R: Real> = ();
 
     #[inline(always)]
     fn no_volumes<R: Real>() {}
-
-    #[inline(always)]
-    fn none<R: Real>() {}
 
     #[inline(always)]
     fn displacement(&self) -> Option<Gather<'_>> {
@@ -119,14 +100,8 @@ impl Pressure for OwnPressure {
     fn read_with<R: Real, const N: usize>(&self, _: R, _: &TileNodes<'_, N>, _: usize, _: usize) {}
 
     #[inline(always)]
-    fn ratios<R: Real>(&self, _: &ElementTile, _: usize, _: [(); 4], _: R) {}
-
-    #[inline(always)]
-    fn paired<R: Real>((): (), (): ()) {}
-
-    #[inline(always)]
-    fn state<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>, (): ()) -> LawState<R> {
-        LawState::new::<L>(law, at)
+    fn change<R: Real>(&self, _: &ElementTile, _: usize, _: [(); 4], own: R) -> R {
+        own
     }
 
     #[inline(always)]
@@ -150,17 +125,10 @@ impl<'a> MeanPressure<'a> {
 
 impl Pressure for MeanPressure<'_> {
     type Volumes<R: Real> = [R; 2];
-    /// `J - 1` at the four nodes.
-    type Ratios<R: Real> = [R; 4];
 
     #[inline(always)]
     fn no_volumes<R: Real>() -> [R; 2] {
         [R::splat(0.0); 2]
-    }
-
-    #[inline(always)]
-    fn none<R: Real>() -> [R; 4] {
-        [R::splat(0.0); 4]
     }
 
     #[inline(always)]
@@ -186,35 +154,19 @@ impl Pressure for MeanPressure<'_> {
     }
 
     #[inline(always)]
-    fn ratios<R: Real>(&self, tile: &ElementTile, first: usize, corners: [[R; 2]; 4], own: R) -> [R; 4] {
-        let mut ratios = [own; 4];
-        for (corner, [one, other]) in corners.into_iter().enumerate() {
-            ratios[corner] = if self.several_tissues {
+    fn change<R: Real>(&self, tile: &ElementTile, first: usize, corners: [[R; 2]; 4], own: R) -> R {
+        let [[a, _], [b, _], [c, _], [d, _]] = corners;
+        let mut changes = [a, b, c, d];
+        if self.several_tissues {
+            for (corner, [one, other]) in corners.into_iter().enumerate() {
                 // 0, 1 or 2: positive minus a half is of the first tissue, and so on.
                 let slot = R::from_fn(|lane| f32::from(tile.slot(corner, first + lane)));
                 let half = R::splat(0.5);
-                (half - slot).choose(one, (slot - (half + R::splat(1.0))).choose(own, other))
-            } else {
-                one
-            };
+                changes[corner] =
+                    (half - slot).choose(one, (slot - (half + R::splat(1.0))).choose(own, other));
+            }
         }
-        ratios
-    }
-
-    #[inline(always)]
-    fn paired<R: Real>([a, b, c, d]: [R; 4], [e, f, g, h]: [R; 4]) -> [Pair<R>; 4] {
-        [Pair(a, e), Pair(b, f), Pair(c, g), Pair(d, h)]
-    }
-
-    #[inline(always)]
-    fn state<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>, ratios: [R; 4]) -> LawState<R> {
-        let (mut pressure, mut bulk) = (R::splat(0.0), R::splat(0.0));
-        for j in ratios {
-            pressure = pressure + law.volume_slope(j);
-            bulk = bulk + law.volume_curvature(j);
-        }
-        let quarter = R::splat(0.25);
-        LawState::with_volume_response::<L>(law, at, quarter * pressure, quarter * bulk)
+        R::splat(0.25) * ((changes[0] + changes[1]) + (changes[2] + changes[3]))
     }
 
     #[inline(always)]

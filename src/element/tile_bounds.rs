@@ -1,7 +1,7 @@
 //! Stiffness bounds of one tile of elements, in the frames of their first nodes: the matrices `D_a` go to the sums of the
 //! nodes (N/m), what a coarse stiffness needs to know of each element comes back.
 
-use crate::material::{Law, Laws};
+use crate::material::{Law, LawState, Laws};
 use crate::simd::{Gather, Kernel, NodeVector, Part, Real, ScatterBuffer, TILE, write_rows};
 
 use super::deformation::{Deformation, Matrix};
@@ -61,10 +61,10 @@ impl<L: Law, P: Pressure> Kernel for TileBounds<'_, L, P> {
         let mut buffer = [ScatterBuffer::NONE; 2];
         for first in (0..TILE).step_by(R::COUNT) {
             // By reference: a copy would take a kilobyte of stack.
-            let (deformation, ratios) =
+            let (deformation, change) =
                 &R::run_part(ReadTile::<R, P>::new(tile, first, displacement, pressure));
             let law = laws.widen(|lane| tile.element(first + lane));
-            let local = P::state::<R, L>(&law, deformation.invariants, *ratios);
+            let local = LawState::with_volume_change::<L>(&law, deformation.invariants, *change);
             R::run_part(AddBounds {
                 tile,
                 first,

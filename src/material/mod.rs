@@ -80,10 +80,8 @@ pub trait Potential<R: Real>: Copy {
     fn distortion_slope(&self, x: R) -> R;
     /// `W''(x)`, Pa, given `slope = W'(x)`: the two usually share their costly part.
     fn distortion_curvature(&self, x: R, slope: R) -> R;
-    /// `U'(J)` of `j = J - 1`, Pa.
-    fn volume_slope(&self, j: R) -> R;
-    /// `U''(J)` of `j = J - 1`, Pa.
-    fn volume_curvature(&self, j: R) -> R;
+    /// `k`, Pa, of the energy of volume `U(J) = k (J - 1)^2 / 2`.
+    fn bulk_modulus(&self) -> R;
     /// How close `x` comes to the range where the law is continued to keep it finite: above 1 it is beyond.
     #[inline(always)]
     fn saturation(&self, _x: R) -> R {

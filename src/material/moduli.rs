@@ -17,7 +17,7 @@ impl Moduli {
     #[must_use]
     pub fn of<L: Law>(law: &L) -> Self {
         let law = L::widen::<f32>(|_| *law);
-        Self { shear: 2.0 * f64::from(law.distortion_slope(0.0)), bulk: f64::from(law.volume_curvature(0.0)) }
+        Self { shear: 2.0 * f64::from(law.distortion_slope(0.0)), bulk: f64::from(law.bulk_modulus()) }
     }
 
     /// Young's modulus `E`, Pa.

@@ -25,11 +25,7 @@ impl<R: Real> Potential<R> for Polynomial<R> {
         self.e + self.e
     }
     #[inline(always)]
-    fn volume_slope(&self, j: R) -> R {
-        (self.d + self.d) * j
-    }
-    #[inline(always)]
-    fn volume_curvature(&self, _j: R) -> R {
+    fn bulk_modulus(&self) -> R {
         self.d + self.d
     }
 }

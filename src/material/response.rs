@@ -88,20 +88,16 @@ pub(crate) struct LawState<R> {
 impl<R: Real> LawState<R> {
     #[inline(always)]
     pub(crate) fn new<L: Law>(law: &L::Wide<R>, at: Invariants<R>) -> Self {
-        Self::with_volume_response::<L>(law, at, law.volume_slope(at.j), law.volume_curvature(at.j))
+        Self::with_volume_change::<L>(law, at, at.j)
     }
 
-    /// With a pressure and a bulk stiffness from elsewhere, Pa.
+    /// With the pressure at another `J - 1` than the element's own.
     #[inline(always)]
-    pub(crate) fn with_volume_response<L: Law>(
-        law: &L::Wide<R>,
-        at: Invariants<R>,
-        pressure: R,
-        bulk: R,
-    ) -> Self {
+    pub(crate) fn with_volume_change<L: Law>(law: &L::Wide<R>, at: Invariants<R>, change: R) -> Self {
         let factor = if L::ISOCHORIC { Some(VolumeFactor::new(at)) } else { None };
         let x = factor.map_or(at.i, |factor| factor.x);
-        Self { at, factor, slope: law.distortion_slope(x), pressure, bulk, x }
+        let bulk = law.bulk_modulus();
+        Self { at, factor, slope: law.distortion_slope(x), pressure: bulk * change, bulk, x }
     }
 
     /// `W''(x)`, Pa; not negative.

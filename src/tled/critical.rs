@@ -60,18 +60,17 @@ fn critical<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -
         M::Law::critical_bounds(kernel);
         rate = Largest::of(&sums, inertia, |_, _| ());
     } else if let Laws::One(law) = laws {
-        let law = <M::Law as Law>::widen::<f32>(|_| law);
+        let bulk = <M::Law as Law>::widen::<f32>(|_| law).bulk_modulus();
         let mut volumes = NodalVolumeBounds { tiles, inertia, rows: &mut *volume };
         volumes.start();
-        let curvature = |j| law.volume_curvature(j);
         for _ in 0..BALANCING_SWEEPS {
             sums.clear();
-            volumes.add(&mut sums, curvature);
+            volumes.add(&mut sums, bulk);
             let largest = Largest::of(&sums, inertia, |node, rate| weigh(volumes.rows, node, rate));
             balance(volumes.rows, largest.rate);
         }
         sums.clear();
-        volumes.add(&mut sums, curvature);
+        volumes.add(&mut sums, bulk);
         let pressure = MeanPressure::new(VolumeRows { rows: volumes.rows, several_tissues: false });
         let kernel = CriticalBounds { laws, pressure, tiles, inertia, with_volume: false, sums: &mut sums };
         M::Law::nodal_pressure_critical_bounds(kernel);

@@ -61,7 +61,7 @@ fn add_patches<M: ElementMaterial>(
     for (tile, lane) in scene.patches.places() {
         let law = M::Law::widen::<f32>(|_| laws.of(tile.element(lane)));
         let h = tile.gradient(scene.patches.neighbours_of(tile), lane, at);
-        let pressure = -f64::from(law.volume_slope(invariants(h).1 as f32));
+        let pressure = -f64::from(law.bulk_modulus() * invariants(h).1 as f32);
         let (sum, weight) = &mut sums[tile.node(lane)];
         *sum += tile.volume(lane) * pressure;
         *weight += tile.volume(lane);

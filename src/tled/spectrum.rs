@@ -60,7 +60,7 @@ pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &
     Some(if largest > 0.0 { 2.0 / largest.sqrt() } else { f64::INFINITY })
 }
 
-/// What nodal pressure adds to the tangents of the elements: `sum_a V_a U''(J_a) (dJ_a)^2` ([`crate::element`]). Where an element keeps
+/// What nodal pressure adds to the tangents of the elements: `k sum_a V_a (dJ_a)^2` ([`crate::element`]). Where an element keeps
 /// its own volume it has an entry of its own.
 struct NodalTangent {
     /// For each element the entries of its corners.
@@ -68,9 +68,8 @@ struct NodalTangent {
     /// For each entry: volume, m^3, `J - 1`.
     volumes: Vec<f64>,
     changes: Vec<f64>,
-    /// `U'` and `U''`, Pa, at the corners of each element.
-    slopes: Vec<[f64; 4]>,
-    curvatures: Vec<[f64; 4]>,
+    /// Bulk modulus of each element, Pa.
+    bulk_moduli: Vec<f64>,
 }
 
 impl NodalTangent {
@@ -96,24 +95,15 @@ impl NodalTangent {
         for (change, volume) in changes.iter_mut().zip(&volumes) {
             *change /= volume.max(f64::MIN_POSITIVE);
         }
-        let laws = scene.material.laws();
-        let of = |at: &dyn Fn(<M::Law as Law>::Wide<f32>, f32) -> f32| {
-            let elements = scene.places().zip(&entries);
-            let corners = elements.map(|((tile, lane), entries)| {
-                let law = laws.of(tile.element(lane));
-                entries.map(|entry| f64::from(at(M::Law::widen(|_| law), changes[entry] as f32)))
-            });
-            corners.collect::<Vec<_>>()
-        };
-        let slopes = of(&|law, j| law.volume_slope(j));
-        let curvatures = of(&|law, j| law.volume_curvature(j));
-        Self { entries, volumes, changes, slopes, curvatures }
+        let laws = scene.laws_at_places().map(|(_, _, law)| M::Law::widen::<f32>(|_| law));
+        let bulk_moduli = laws.map(|law| f64::from(law.bulk_modulus())).collect();
+        Self { entries, volumes, changes, bulk_moduli }
     }
 
     /// The tangents with the mean pressures of their corners.
     fn with_pressures(&self, tangents: Vec<ElementTangent>) -> Vec<ElementTangent> {
-        let elements = tangents.into_iter().zip(&self.slopes);
-        elements.map(|(tangent, slopes)| tangent.with_pressure(0.25 * slopes.iter().sum::<f64>())).collect()
+        let elements = tangents.into_iter().zip(&self.entries);
+        elements.map(|(tangent, entries)| tangent.with_change(mean_at(entries, &self.changes))).collect()
     }
 
     /// Adds the products with displacements (m) of the nodes, N.
@@ -125,15 +115,15 @@ impl NodalTangent {
                 changes[entry] += change / self.volumes[entry];
             }
         }
-        for ((tangent, entries), curvatures) in tangents.iter().zip(&self.entries).zip(&self.curvatures) {
-            let pressure: f64 = entries
-                .iter()
-                .zip(curvatures)
-                .map(|(&entry, curvature)| 0.25 * curvature * changes[entry])
-                .sum();
-            add_to_nodes(tangent, tangent.forces_of(pressure), out);
+        for ((tangent, entries), bulk) in tangents.iter().zip(&self.entries).zip(&self.bulk_moduli) {
+            add_to_nodes(tangent, tangent.forces_of(bulk * mean_at(entries, &changes)), out);
         }
     }
+}
+
+/// The mean of four entries.
+fn mean_at(entries: &[usize; 4], values: &[f64]) -> f64 {
+    0.25 * entries.iter().map(|&entry| values[entry]).sum::<f64>()
 }
 
 fn add_to_nodes(tangent: &ElementTangent, forces: [DVec3; 4], out: &mut [DVec3]) {

@@ -29,9 +29,8 @@ pub(super) struct LawTangent {
     stiffening: f64,
     coupling: f64,
     bulk: f64,
-    /// `U'` and `U''` at the element's own volume.
-    volume_slope: f64,
-    volume_curvature: f64,
+    /// Bulk modulus of the law.
+    bulk_modulus: f64,
     /// `J - 1`.
     pub(super) change: f64,
     /// `dx/dF = x_f F + x_c C`.
@@ -74,10 +73,10 @@ impl ElementTangent {
         Self { nodes, gradients, volume, at: LawTangent::new(law, h) }
     }
 
-    /// The same with another pressure `U'`, Pa, and without the stiffness of its change.
-    pub(super) fn with_pressure(mut self, pressure: f64) -> Self {
-        self.at.p_j += pressure - self.at.volume_slope;
-        self.at.bulk -= self.at.volume_curvature;
+    /// The same with the pressure at another `J - 1`, and without the stiffness of its change.
+    pub(super) fn with_change(mut self, change: f64) -> Self {
+        self.at.p_j += self.at.bulk_modulus * (change - self.at.change);
+        self.at.bulk -= self.at.bulk_modulus;
         self
     }
 
@@ -156,19 +155,17 @@ impl LawTangent {
         let wide = law_at(law);
         let slope = |x: f32| f64::from(wide.distortion_slope(x));
         let curvature = |x: f32| f64::from(wide.distortion_curvature(x, wide.distortion_slope(x)));
-        let volume_slope = f64::from(wide.volume_slope(at.j));
-        let volume_curvature = f64::from(wide.volume_curvature(at.j));
+        let (bulk_modulus, change) = (f64::from(wide.bulk_modulus()), volume_ratio - 1.0);
         let base = Self {
             f,
             cofactor,
             p1: 2.0 * slope(at.i),
-            p_j: volume_slope,
+            p_j: bulk_modulus * change,
             stiffening: curvature(at.i),
             coupling: 0.0,
-            bulk: volume_curvature,
-            volume_slope,
-            volume_curvature,
-            change: volume_ratio - 1.0,
+            bulk: bulk_modulus,
+            bulk_modulus,
+            change,
             x_f: 2.0,
             x_c: 0.0,
         };
@@ -180,10 +177,10 @@ impl LawTangent {
             (f64::from(factor.g), f64::from(factor.slope), f64::from(factor.curvature()));
         Self {
             p1: 2.0 * slope(factor.x) * g,
-            p_j: volume_slope + slope(factor.x) * slope_g * square,
+            p_j: bulk_modulus * change + slope(factor.x) * slope_g * square,
             stiffening: curvature(factor.x),
             coupling: 2.0 * slope(factor.x) * slope_g,
-            bulk: volume_curvature + slope(factor.x) * curvature_g * square,
+            bulk: bulk_modulus + slope(factor.x) * curvature_g * square,
             x_f: 2.0 * g,
             x_c: slope_g * square,
             ..base
