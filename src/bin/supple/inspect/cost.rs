@@ -103,7 +103,7 @@ fn describe_limits<M: ElementMaterial>(scene: SceneView<'_, M>, state: &VecState
 
 /// Prints the memory of scene and state.
 fn describe_memory<M: ElementMaterial>(scene: SceneView<'_, M>) {
-    let vectors = if scene.element() == Element::NodalPressure { 4 } else { 3 };
+    let vectors = if scene.element() == Element::Linear { 3 } else { 4 };
     let of_node = size_of::<NodeInertia>() + vectors * size_of::<NodeVector>();
     let tiles = tiles_for(scene.element_count()) * size_of::<ElementTile>()
         + scene.patch_row_count() * size_of::<PatchRow>();
