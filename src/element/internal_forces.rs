@@ -188,7 +188,7 @@ impl<'a, R: Real> ElementVector<'a, R> {
 /// Vectors of elements in a batch. A batch of scalar code has the elements of as many strips as the scatter buffer
 /// holds.
 const BATCH: usize = 12;
-/// Of long vectors fewer, as they need more stack.
+/// Of long vectors fewer, as they need more stack: whole strips of every length.
 const WIDE_BATCH: usize = 6;
 #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
 const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;

@@ -6,8 +6,8 @@
 //! dPsi/du = sum_e V_e p_e C_e : dF_e/du,   p_e = sum_{a in e} U'(J_a) / 4,   C = cof F
 //! ```
 //! which is the stress of the linear element with `p_e` in place of `U'(J_e)`. As `U'` is linear in `J` in all laws, that is its
-//! pressure at the mean volume ratio of its nodes. Where tissues meet, a node has a volume ratio for
-//! each of the first two; elements of a third one keep their own there.
+//! pressure at the mean volume ratio of its nodes. Where tissues meet, a node has a volume ratio for each of the first two; elements of a
+//! third one keep their own there.
 
 use core::marker::PhantomData;
 
@@ -20,6 +20,7 @@ use super::{ElementTile, VolumeRows};
 pub(crate) trait Pressure: Copy {
     /// What is read at a node.
     type Volumes<R: Real>: Copy;
+
     /// Nothing read yet.
     fn no_volumes<R: Real>() -> Self::Volumes<R>;
     /// Rows in which displacements are read as well, if any.

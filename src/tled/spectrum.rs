@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use super::tangent::{ElementTangent, LawTangent};
 use crate::element::stabilising_modulus;
-use crate::material::{Law, Material, Potential};
+use crate::material::Material;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 
@@ -68,8 +68,6 @@ struct NodalTangent {
     /// For each entry: volume, m^3, `J - 1`.
     volumes: Vec<f64>,
     changes: Vec<f64>,
-    /// Bulk modulus of each element, Pa.
-    bulk_moduli: Vec<f64>,
 }
 
 impl NodalTangent {
@@ -95,9 +93,7 @@ impl NodalTangent {
         for (change, volume) in changes.iter_mut().zip(&volumes) {
             *change /= volume.max(f64::MIN_POSITIVE);
         }
-        let laws = scene.laws_at_places().map(|(_, _, law)| M::Law::widen::<f32>(|_| law));
-        let bulk_moduli = laws.map(|law| f64::from(law.bulk_modulus())).collect();
-        Self { entries, volumes, changes, bulk_moduli }
+        Self { entries, volumes, changes }
     }
 
     /// The tangents with the mean pressures of their corners.
@@ -115,8 +111,8 @@ impl NodalTangent {
                 changes[entry] += change / self.volumes[entry];
             }
         }
-        for ((tangent, entries), bulk) in tangents.iter().zip(&self.entries).zip(&self.bulk_moduli) {
-            add_to_nodes(tangent, tangent.forces_of(bulk * mean_at(entries, &changes)), out);
+        for (tangent, entries) in tangents.iter().zip(&self.entries) {
+            add_to_nodes(tangent, tangent.forces_of_change(mean_at(entries, &changes)), out);
         }
     }
 }

@@ -94,8 +94,9 @@ impl ElementTangent {
             .sum()
     }
 
-    /// Forces (N) on its nodes, with minus sign, from a pressure (Pa).
-    pub(super) fn forces_of(&self, pressure: f64) -> [DVec3; 4] {
+    /// Forces (N) on its nodes, with minus sign, from a change of the `J` at which the pressure is taken.
+    pub(super) fn forces_of_change(&self, change: f64) -> [DVec3; 4] {
+        let pressure = self.at.bulk_modulus * change;
         self.gradients.map(|gradient| self.at.cofactor * gradient * (pressure * self.volume))
     }
 
