@@ -17,7 +17,7 @@ What MuJoCo is given. Elements:
 Masses are rho times volume over four at each corner of a tetrahedron (Simpson's weights in quadratic cells): a flexcomp gives each node the same.
 The clamp is `pin`. Contact is off. integrator="discrete" is MuJoCo's only one that is implicit in position; implicit and implicitfast refuse elastic
 flexes, and explicit Euler would need supple's critical step. A step is one linearised backward Euler step, which damps by itself by about omega^2 h: at
-2 ms as much again as the recordings' damping ("falls by" in the table, 1/s; 5.7 to 6.0 in the recordings). Damping is mass-proportional, 4.5 1/s as in
+2 ms as much again as the recordings' damping ("falls by" in the table, 1/s; 5.7 to 6.0 in the recordings). Damping is mass-proportional, that of
 supple, set in dof_damping after compilation, because the compiler refuses joint damping of flex bodies; in MJCF there is stiffness-proportional damping only.
 How each step's equations are solved:
 - default: MuJoCo's options as they are, up to 100 iterations of conjugate gradients. At nu 0.499 they do not converge and MuJoCo warns ("unsolved" in the
@@ -36,6 +36,7 @@ import csv
 import itertools
 import math
 import os
+import re
 import statistics
 import subprocess
 import tempfile
@@ -53,7 +54,10 @@ QUANTITIES = {"drop at rest": "mm", "drop at the lowest point": "mm", "time of t
 DISTANCE = "gravity: mean distance to the recordings at rest and at the lowest point"
 # As in src/lab/physics: silicone.rs and recordings.rs.
 SIZE = np.array([0.1, 0.03, 0.03])
-YOUNG, POISSON, DENSITY, GRAVITY, DAMPING = 263824.0, 0.499, 1070.0, 9.80709, 4.5
+YOUNG, POISSON, DENSITY, GRAVITY = 263824.0, 0.499, 1070.0, 9.80709
+# Fitted there, so read from there, 1/s.
+RECORDINGS_SOURCE = Path(__file__).resolve().parents[1] / "src/lab/physics/recordings.rs"
+DAMPING = float(re.search(r"pub const DAMPING: f32 = ([0-9.]+);", RECORDINGS_SOURCE.read_text())[1])
 SECONDS = 0.3
 MARKERS = {"top": (15.0, 36.0), "left": (-6.0, 24.0), "right": (36.0, 6.0)}
 RECORDINGS = ["gravity-a", "gravity-b"]
