@@ -16,6 +16,7 @@ mod node;
 mod patch;
 mod patch_bounds;
 mod patch_builder;
+mod patch_deformation;
 mod patch_forces;
 mod patch_tile_bounds;
 mod pressure;

@@ -15,7 +15,8 @@ use super::NodeInertia;
 use super::critical_bounds::{Image, NodeMatrices, Terms};
 use super::deformation::{Deformation, Vector};
 use super::patch::{Neighbours, PatchTile, Patches};
-use super::patch_forces::{gradient, modulus_of};
+use super::patch_deformation::PatchDeformations;
+use super::patch_forces::modulus_of;
 use super::symmetric::Symmetric;
 use super::tile::vector_at;
 
@@ -73,37 +74,18 @@ fn add_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchBounds<'_, '_, L>) 
         let neighbours = patches.neighbours_of(tile);
         let mut bounds = [Bound::<R>::none(); PARTS];
         let displacement = Gather::new(sums.zx_in_padding);
-        R::run_part(Deform { tile, neighbours, displacement, bounds: &mut bounds });
+        let mut deformations = [Deformation::new([[R::splat(0.0); 3]; 3]); PARTS];
+        R::run_part(PatchDeformations { tile, neighbours, displacement, deformations: &mut deformations });
         // A loop, because the compiler may leave closures over vectors as function calls.
-        for (part, bound) in bounds.iter_mut().enumerate() {
+        for (part, (bound, deformation)) in bounds.iter_mut().zip(&deformations).enumerate() {
             let law = laws.widen(|lane| tile.element(part * R::COUNT + lane));
-            let local = LawState::new::<L>(&law, bound.deformation.invariants);
-            bound.terms = Terms::new::<L>(&law, &local, &bound.deformation);
+            let local = LawState::new::<L>(&law, deformation.invariants);
+            bound.deformation = *deformation;
+            bound.terms = Terms::new::<L>(&law, &local, deformation);
             bound.modulus = modulus_of::<R, L>(&law);
         }
         let (bounds, sums) = (&mut bounds, &mut *sums);
         R::run_part(AddBounds { tile, neighbours, inertia, weights, bounds, sums });
-    }
-}
-
-/// Deformations of the patches of a tile.
-struct Deform<'a, R, const PARTS: usize> {
-    tile: &'a PatchTile,
-    neighbours: &'a [Neighbours],
-    displacement: Gather<'a>,
-    bounds: &'a mut [Bound<R>; PARTS],
-}
-
-impl<R: Real, const PARTS: usize> Part for Deform<'_, R, PARTS> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Self { tile, neighbours, displacement, bounds } = self;
-        for (part, bound) in bounds.iter_mut().enumerate() {
-            let (h, _) = gradient::<R>(tile, neighbours, part * R::COUNT, displacement);
-            bound.deformation = Deformation::new(h);
-        }
     }
 }
 

@@ -12,11 +12,12 @@ use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::material::{Law, LawState, Laws, Potential};
-use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, TileNodes, dot};
+use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, dot};
 
 use super::deformation::{Deformation, Matrix, Vector};
 use super::internal_forces::{ElementVisitor, Extremes};
 use super::patch::{Neighbours, PatchTile, Patches};
+use super::patch_deformation::{GradientLengths, gradient};
 use super::stiffness_bound::{Bound, Coefficients};
 use super::tile::vector_at;
 
@@ -96,37 +97,6 @@ impl<R: Real> Stress<R> {
     }
 }
 
-/// The displacement gradient of the patches from place `first` of a tile on, and `sum_b k_ab (u_b - u_a)`.
-#[inline(always)]
-pub(super) fn gradient<R: Real>(
-    tile: &PatchTile,
-    neighbours: &[Neighbours],
-    first: usize,
-    displacement: Gather<'_>,
-) -> (Matrix<R>, Vector<R>) {
-    let zero = R::splat(0.0);
-    let (mut h, mut pull) = ([[zero; 3]; 3], [zero; 3]);
-    let Some(nodes) = tile.nodes_below::<R>(displacement.count()) else { return (h, pull) };
-    let own = displacement.read_nodes::<R, 1>(&nodes, 0, first);
-    for neighbour in neighbours {
-        let nodes = neighbour.nodes_below::<R>(displacement.count()).unwrap_or(TileNodes::ALL_ZERO);
-        let at = displacement.read_nodes::<R, 1>(&nodes, 0, first);
-        let along = [at[0] - own[0], at[1] - own[1], at[2] - own[2]];
-        let coupling = vector_at::<R>(&neighbour.couplings, first);
-        for i in 0..3 {
-            pull[i] = along[i].fused(coupling, pull[i]);
-            for j in 0..3 {
-                h[i][j] = along[i].fused(vector_at(&neighbour.gradients[j], first), h[i][j]);
-            }
-        }
-    }
-    let inverse = vector_at::<R>(&tile.inverse_volumes, first);
-    for row in &mut h {
-        *row = [row[0] * inverse, row[1] * inverse, row[2] * inverse];
-    }
-    (h, pull)
-}
-
 #[inline(always)]
 fn stress_of<R: Real, L: Law, V: ElementVisitor>(
     laws: &Laws<'_, L>,
@@ -160,37 +130,6 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor>(
     let coefficients = Coefficients::new::<L>(&law, &local);
     let scalar = Bound::of_patches(coefficients, &deformation, modulus, scale).scalar;
     Stress { scalar, own_scalar: scalar.fused(lengths.own, modulus * lengths.couplings), ..stress }
-}
-
-/// Lengths of the gradients `c_ab` of a vector of patches.
-#[derive(Clone, Copy)]
-pub(super) struct GradientLengths<R> {
-    /// Sum over the neighbours and the own node, and that of the own node, m^2.
-    pub(super) sum: R,
-    pub(super) own: R,
-    /// `sum_b k_ab + |k_ab|`, m: with `s mu` a bound of the rows of the own node in the stabilising energy.
-    pub(super) couplings: R,
-}
-
-impl<R: Real> GradientLengths<R> {
-    /// Of the patches from place `first` of a tile on.
-    #[inline(always)]
-    pub(super) fn of(neighbours: &[Neighbours], first: usize) -> Self {
-        let zero = R::splat(0.0);
-        let (mut lengths, mut own) = (Self { sum: zero, own: zero, couplings: zero }, [zero; 3]);
-        for neighbour in neighbours {
-            let gradient = neighbour.gradient::<R>(first);
-            lengths.sum = lengths.sum + dot(gradient, gradient).root();
-            for axis in 0..3 {
-                own[axis] = own[axis] - gradient[axis];
-            }
-            let coupling = vector_at::<R>(&neighbour.couplings, first);
-            lengths.couplings = lengths.couplings + (coupling + coupling.abs());
-        }
-        lengths.own = dot(own, own).root();
-        lengths.sum = lengths.sum + lengths.own;
-        lengths
-    }
 }
 
 /// Adds the forces of a tile, neighbour by neighbour, those of the patches in the order of their places whatever the width of a vector.

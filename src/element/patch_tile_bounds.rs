@@ -13,7 +13,8 @@ use crate::simd::{Gather, Kernel, Part, Real, ScatterBuffer, TILE, dot};
 
 use super::deformation::{Deformation, Matrix, Vector};
 use super::patch::{Neighbours, PatchTile};
-use super::patch_forces::{GradientLengths, gradient, modulus_of};
+use super::patch_deformation::{GradientLengths, PatchDeformations};
+use super::patch_forces::modulus_of;
 use super::stiffness_bound::{Bound, Coefficients, MatrixSums};
 use super::tile::vector_at;
 use super::tile_bounds::{Rotation, TileTangents, cofactor_in_frames};
@@ -69,37 +70,18 @@ fn bound_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchTileBounds<'_, L>
     let PatchTileBounds { laws, tile, neighbours, displacement, sums, rotations, weight } = kernel;
     let mut tangents = TileTangents::NONE;
     let mut shares = [Shares::<R>::none(); PARTS];
-    R::run_part(Deform { tile, neighbours, displacement, shares: &mut shares });
-    for (part, shares) in shares.iter_mut().enumerate() {
+    let mut deformations = [Deformation::new([[R::splat(0.0); 3]; 3]); PARTS];
+    R::run_part(PatchDeformations { tile, neighbours, displacement, deformations: &mut deformations });
+    for (part, (shares, deformation)) in shares.iter_mut().zip(&deformations).enumerate() {
         let law = laws.widen(|lane| tile.element(part * R::COUNT + lane));
-        let local = LawState::new::<L>(&law, shares.deformation.invariants);
+        let local = LawState::new::<L>(&law, deformation.invariants);
+        shares.deformation = *deformation;
         shares.coefficients = Coefficients::new::<L>(&law, &local);
         shares.modulus = modulus_of::<R, L>(&law);
     }
     let (shares, tangents_out) = (&mut shares, &mut tangents);
     R::run_part(AddBounds { tile, neighbours, rotations, weight, shares, sums, tangents: tangents_out });
     tangents
-}
-
-/// Deformations of the patches of a tile.
-struct Deform<'a, R, const PARTS: usize> {
-    tile: &'a PatchTile,
-    neighbours: &'a [Neighbours],
-    displacement: Gather<'a>,
-    shares: &'a mut [Shares<R>; PARTS],
-}
-
-impl<R: Real, const PARTS: usize> Part for Deform<'_, R, PARTS> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let Self { tile, neighbours, displacement, shares } = self;
-        for (part, shares) in shares.iter_mut().enumerate() {
-            let (h, _) = gradient::<R>(tile, neighbours, part * R::COUNT, displacement);
-            shares.deformation = Deformation::new(h);
-        }
-    }
 }
 
 /// Adds the bounds of the patches of a tile, of which deformation and coefficients are known.

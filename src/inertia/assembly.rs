@@ -4,17 +4,18 @@
 //! Kc = sum_e V [ (shear / 2 + stress) p_c . p_d I + volume p_c p_d^T + shear / 2 p_d p_c^T ],   p = F^-T grad phi
 //! ```
 //! with the gradients of the interpolated functions, `grad phi_c = sum_a w_c(a) ga`, so that `Kc` is exactly `W^T K W`
-//! for the elements' bounds (with nodal strain those of the patches, `ga = c_ab / V_a`), and zero for rotations of tissue without tension. In crushed elements the terms are
-//! `iso grad phi_c . grad phi_d I + volume (C grad phi_c)(C grad phi_d)^T`. At a node that is held along some axes a
-//! function has a different gradient for each axis.
+//! for the elements' bounds (with nodal strain those of the patches, `ga = c_ab / V_a`), and zero for rotations of tissue
+//! without tension. In crushed elements the terms are `iso grad phi_c . grad phi_d I + volume (C grad phi_c)(C grad phi_d)^T`.
+//! At a node that is held along some axes a function has a different gradient for each axis.
 //!
 //! Most elements lie in a patch of at most two cells along each axis, with 8, 12, 18 or 27 functions. Elements of a
 //! batch that share a patch are added together: first products over the patch's functions, then one addition to the
-//! matrix for each pair of functions. The others are added to the matrix directly.
+//! matrix for each pair of functions. The others are added to the matrix directly (direct_assembly.rs).
 
 use glam::Vec4;
 
-use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS, node_place};
+use super::direct_assembly::{NO_SLOTS, TOUCHED};
+use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::patches::{Patch, locate};
 use crate::element::{ElementTile, NodeInertia, TileTangents};
 use crate::simd::{Kernel, Real, TILE, dispatch, write_rows};
@@ -51,7 +52,7 @@ impl Tangent {
 
     /// Whether the first factor is of products of images.
     #[inline(always)]
-    fn is_spatial(&self) -> bool {
+    pub(super) fn is_spatial(&self) -> bool {
         self.factors[3] > 0.0
     }
 }
@@ -135,18 +136,9 @@ pub(super) struct Assembly<'a> {
     pub(super) stride: usize,
 }
 
-/// Most functions that are not zero at the four nodes of an element.
-const TOUCHED: usize = 32;
-/// The same for a patch with nodal strain, which may have any number of nodes.
-const TOUCHED_BY_PATCH: usize = MAX_FUNCTIONS;
-const NOT_TOUCHED: u8 = u8::MAX;
-/// For each function its index among those of the element at hand; [`NOT_TOUCHED`] for other functions, and between
-/// elements.
-pub(super) type Slots = [u8; MAX_FUNCTIONS];
-pub(super) const NO_SLOTS: Slots = [NOT_TOUCHED; MAX_FUNCTIONS];
-
+/// Adds to four columns of a row.
 #[inline(always)]
-fn add_four(row: &mut [f32], column: usize, values: Vec4) {
+pub(super) fn add_four(row: &mut [f32], column: usize, values: Vec4) {
     if let Some(place) = row.get_mut(column..).and_then(<[f32]>::first_chunk_mut::<4>) {
         *place = (Vec4::from(*place) + values).to_array();
     }
@@ -446,115 +438,4 @@ fn products<R: Real>(derivatives: &[Derivatives], scaled: &[Scaled<R>], row: usi
         sums[i][i] = sums[i][i] + diagonal;
     }
     sums
-}
-
-impl Assembly<'_> {
-    /// Adds the tangent of an element.
-    #[inline(never)]
-    pub(super) fn add_element(&mut self, element: &ElementTangent, slots: &mut Slots) {
-        self.add_directly::<TOUCHED>(element.corners(), &element.tangent, slots);
-    }
-
-    /// Adds the tangent of a patch with these nodes and gradients.
-    #[inline(never)]
-    pub(super) fn add_patch(
-        &mut self,
-        nodes: impl Iterator<Item = (usize, [f32; 3])>,
-        tangent: &Tangent,
-        slots: &mut Slots,
-    ) {
-        self.add_directly::<TOUCHED_BY_PATCH>(nodes, tangent, slots);
-    }
-
-    /// Adds a tangent directly to the matrix; its nodes touch at most `T` functions.
-    #[inline(always)]
-    fn add_directly<const T: usize>(
-        &mut self,
-        corners: impl Iterator<Item = (usize, [f32; 3])>,
-        tangent: &Tangent,
-        slots: &mut Slots,
-    ) {
-        // Derivatives of each function along the three material axes. Their components are the spatial axes, because a
-        // function may be zero along some of these.
-        let mut touched = [[Vec4::ZERO; 3]; T];
-        let (mut count, mut bits) = (0, 0u128);
-        for (node, gradient) in corners {
-            let (Some(at), Some(inertia)) = (node_place(self.nodes, node), self.inertia.get(node)) else {
-                continue;
-            };
-            let free = inertia.free();
-            let along = gradient.map(|slope| slope * free);
-            for (function, weight) in self.lattice.weights(at) {
-                let Some(slot) = slots.get_mut(function) else {
-                    continue;
-                };
-                if weight == 0.0 {
-                    continue;
-                }
-                if let Some(touch) = touched.get_mut(usize::from(*slot)) {
-                    for (slope, along) in touch.iter_mut().zip(along) {
-                        *slope += weight * along;
-                    }
-                } else if let Some(touch) = touched.get_mut(count) {
-                    *slot = count as u8;
-                    *touch = along.map(|along| weight * along);
-                    bits |= 1 << function;
-                    count += 1;
-                }
-            }
-        }
-        let [cx, cy, cz] = tangent.columns.map(Vec4::from);
-        let [inner, outer, exchanged, _] = tangent.factors;
-        // In ascending order of the functions, because only submatrices on and below the diagonal are kept.
-        let mut functions = [0usize; T];
-        let mut images = [Vec4::ZERO; T];
-        let mut slopes = [[Vec4::ZERO; 3]; T];
-        // The derivative of each function along each spatial axis; components as in `touched`.
-        let mut derivatives = [[Vec4::ZERO; 3]; T];
-        for place in 0..count {
-            let function = bits.trailing_zeros() as usize;
-            bits &= bits.wrapping_sub(1);
-            let Some(slot) = slots.get_mut(function) else {
-                return;
-            };
-            let Some(&[x, y, z]) = touched.get(usize::from(*slot)) else {
-                return;
-            };
-            *slot = NOT_TOUCHED;
-            functions[place % T] = function;
-            images[place % T] = cx * x + cy * y + cz * z;
-            let along = |axis: usize| cx[axis] * x + cy[axis] * y + cz[axis] * z;
-            derivatives[place % T] = [along(0), along(1), along(2)];
-            slopes[place % T] = if tangent.is_spatial() { derivatives[place % T] } else { [x, y, z] };
-        }
-        for c in 0..count {
-            let c = c % T;
-            let first = 3 * functions[c] * self.stride;
-            let rows = self.matrix.get_mut(first..first + 3 * self.stride);
-            let Some((row_x, rows)) = rows.and_then(|rows| rows.split_at_mut_checked(self.stride)) else {
-                return;
-            };
-            let Some((row_y, row_z)) = rows.split_at_mut_checked(self.stride) else {
-                return;
-            };
-            let [x, y, z] = slopes[c].map(|slope| inner * slope);
-            let image = outer * images[c];
-            // Row `i` of the submatrix gets `d_j phi_c` for axis `i` times `d_i phi_d` for axis `j`.
-            let [dx, dy, dz] = derivatives[c].map(|derivative| exchanged * derivative);
-            let row_of = |axis: usize| Vec4::new(dx[axis], dy[axis], dz[axis], 0.0);
-            let exchanged_rows = [row_of(0), row_of(1), row_of(2)];
-            // A submatrix is added with four columns, the last of zeros in the next submatrix. That would then have to
-            // wait for the cache. So every second submatrix is added first.
-            for d in (0..=c).step_by(2).chain((1..=c).step_by(2)) {
-                let d = d % T;
-                let diagonal = x * slopes[d][0] + y * slopes[d][1] + z * slopes[d][2];
-                let column = 3 * functions[d];
-                let [ex, ey, ez] = exchanged_rows;
-                let [px, py, pz] = derivatives[d];
-                add_four(row_x, column, image.x * images[d] + ex * px + diagonal * Vec4::X);
-                add_four(row_y, column, image.y * images[d] + ey * py + diagonal * Vec4::Y);
-                add_four(row_z, column, image.z * images[d] + ez * pz + diagonal * Vec4::Z);
-            }
-        }
-    }
 }

@@ -1,7 +1,8 @@
 //! The lattice's matrices, compared with direct sums.
 
-use super::assembly::{Assembly, BATCH, ElementTangent, NO_SLOTS, Tangent};
+use super::assembly::{Assembly, BATCH, ElementTangent, Tangent};
 use super::dense::{row_length, stride};
+use super::direct_assembly::NO_SLOTS;
 use super::lattice::{Lattice, LatticeNode, sort_by_cell};
 use super::nodal_sums::{FunctionInertia, add_inertia, add_mass, times, write_mass};
 use super::patches::locate;

@@ -1,7 +1,7 @@
 //! Dense symmetric matrices of the lattice functions, with three unknowns a function: inverted in place, applied by
 //! rows.
 
-use super::lattice::MAX_FUNCTIONS;
+use super::lattice::{CoarseVectors, MAX_FUNCTIONS};
 use crate::simd::{Kernel, Real, dispatch};
 
 /// The length of a row is a multiple of this.
@@ -22,6 +22,22 @@ pub(super) const fn stride(functions: usize) -> usize {
 /// This many columns, rounded up to whole vectors.
 pub(super) const fn row_length(columns: usize) -> usize {
     columns.div_ceil(WIDTH) * WIDTH
+}
+
+/// The components of vectors, three for each function.
+pub(super) fn to_components(vectors: &CoarseVectors) -> Row {
+    let mut components = [0.0; _];
+    for (three, vector) in components.as_chunks_mut::<3>().0.iter_mut().zip(vectors) {
+        *three = vector.to_array();
+    }
+    components
+}
+
+/// Sets vectors from their components, as many as there are.
+pub(super) fn from_components(components: &[f32], vectors: &mut CoarseVectors) {
+    for (&[x, y, z], vector) in components.as_chunks::<3>().0.iter().zip(vectors) {
+        vector.0 = [x, y, z, 0.0];
+    }
 }
 
 /// Inverts a symmetric positive definite matrix in place, from its lower triangle. Gives whether it could be inverted.

@@ -62,9 +62,9 @@
 //!   that cannot have come from the loads, which the energy balance shows. Neither takes momentum.
 //!
 //! Where nodes use only a share of their inverse inertia, `G^-1` is multiplied by the least share, which keeps the
-//! operator positive. Between refreshes this is a safeguard and no proof: a change of a bound's directions other than the rotation of its frame is covered by the
-//! margin only. Without a lattice the nodes have the whole bracket: with `s` = 1.1 it is 0.91, and 0.955 where the
-//! stiffness of a node has grown by 5 %. A cycle takes at most 256 steps, without a lattice at most
+//! operator positive. Between refreshes this is a safeguard and no proof: a change of a bound's directions other than the
+//! rotation of its frame is covered by the margin only. Without a lattice the nodes have the whole bracket: with `s` = 1.1
+//! it is 0.91, and 0.955 where the stiffness of a node has grown by 5 %. A cycle takes at most 256 steps, without a lattice at most
 //! 64 and 0.04 s, short compared with the motions of hands and breathing.
 //!
 //! A linear bound does not cover a step that is large compared with the range of the law. So the forces of one step may
@@ -86,23 +86,27 @@ mod assembly_tests;
 mod cells;
 mod damper;
 mod dense;
+mod direct_assembly;
 mod estimate;
 mod frames;
+mod inversion;
 mod large_step;
 mod lattice;
 mod matrices;
 mod method;
+mod motion_pass;
 mod nodal_strain;
 mod nodal_sums;
 mod node;
 mod node_refresh;
 mod node_tables;
 mod parts;
-mod passes;
+mod pass_input;
 mod patches;
 mod projected_inertia;
 mod refresh;
 mod report;
+mod restriction_pass;
 mod step;
 mod supports;
 mod transport;

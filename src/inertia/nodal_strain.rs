@@ -9,8 +9,9 @@
 
 use glam::Vec4;
 
-use super::assembly::{Assembly, ElementTangent, NO_SLOTS, Tangent, forces};
+use super::assembly::{Assembly, ElementTangent, Tangent, forces};
 use super::dense::{row_length, stride};
+use super::direct_assembly::NO_SLOTS;
 use super::frames::{Frames, Rotation};
 use super::lattice::rank_of;
 use super::node_tables::NodeTables;

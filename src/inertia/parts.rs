@@ -1,6 +1,6 @@
-//! The passes over the nodes of a step (`passes.rs`) in parts, one for each thread of the host (`src/step/threads.rs`). Sums are
-//! taken for each partition of the scene (`src/mesh/partition.rs`), which has as many ranks as nodes. They are added in the
-//! order of the partitions, so the bits do not depend on the number of threads.
+//! The passes over the nodes of a step (`restriction_pass.rs`, `motion_pass.rs`) in parts, one for each thread of the host
+//! (`src/step/threads.rs`). Sums are taken for each partition of the scene (`src/mesh/partition.rs`), which has as many ranks as nodes.
+//! They are added in the order of the partitions, so the bits do not depend on the number of threads.
 
 use core::array::from_fn;
 use core::ops::Range;
@@ -9,12 +9,13 @@ use super::cells::{CellPolynomial, CellSlots};
 use super::damper::RoughMotion;
 use super::estimate::DefectTotals;
 use super::lattice::LatticeNode;
-use super::node_tables::NodeTables;
-use super::passes::{
-    LatticeMotion, MotionPass, MotionTables, PassInput, PassTotals, RestrictionExtremes, RestrictionPass,
-    RotationTable, apply_increments,
+use super::motion_pass::{
+    LatticeMotion, MotionPass, MotionTables, PassTotals, RotationTable, apply_increments,
 };
+use super::node_tables::NodeTables;
+use super::pass_input::PassInput;
 use super::report::HeldBack;
+use super::restriction_pass::{RestrictionExtremes, RestrictionPass};
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
 use crate::simd::NodeVector;
 use crate::step::threads::take;

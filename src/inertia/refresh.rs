@@ -9,13 +9,15 @@
 //! inversions in slow motion G^-1, then S^-1; all is in use from then on
 //! ```
 //! In fast motion the bound replaces `G`, as a cycle may take only a few steps. Mass scaling has only the first two
-//! stages. An inverse is in use only if it takes the image of a known vector back to it.
+//! stages. An inverse is in use only if it
+//! is sound (inversion.rs).
 
 use super::assembly::{Assembly, BATCH, ElementTangent};
-use super::dense::{PIVOTS, Row, apply, apply_lower, mirror, row_length, stride, sweep, sweeps};
+use super::dense::stride;
 use super::frames::{Frames, Rotation};
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, rank_of};
-use super::matrices::{Matrices, copy, invert_axes, of_axes};
+use super::inversion::Inversion;
+use super::lattice::{Lattice, LatticeNode, rank_of};
+use super::matrices::{Matrices, copy, invert_axes};
 use super::nodal_strain::{self, write_stabilising};
 use super::nodal_sums::{self, FunctionInertia, add_mass, fill_held_axes, write_mass};
 use super::node::Scaling;
@@ -62,10 +64,8 @@ pub(super) struct Refresh {
     pub(super) frames: Frames,
     /// Step count of the state for which the frames were computed.
     frames_at: Option<u64>,
-    /// The image of [`PROBE`] under the matrix that is being inverted.
-    image: Row,
-    /// Whether all inversions of this cycle were accurate.
-    sound: bool,
+    /// The inversions of this cycle.
+    inversion: Inversion,
     /// Whether those of the matrices in use were.
     pub(super) lattice_in_use: bool,
     /// Added inertia: sums of the present cycle, and of the last complete one.
@@ -76,15 +76,14 @@ pub(super) struct Refresh {
     pub(super) fine_in_use: bool,
 }
 
-/// Measured costs of a tile, of a tile without a lattice, of both with patches of nodal strain, of a cell, of a node, and of an entry
-/// of a row that is mirrored. The unit is the time of a floating-point operation of a pivot.
+/// Measured costs of a tile, of a tile without a lattice, of both with patches of nodal strain, of a cell and of a node.
+/// The unit is the time of a floating-point operation of a pivot.
 const TILE_COST: i64 = 47_000;
 const TILE_UNCOUPLED_COST: i64 = 18_000;
 const PATCH_TILE_COST: i64 = 600_000;
 const PATCH_TILE_UNCOUPLED_COST: i64 = 30_000;
 const CELL_COST: i64 = 16_000;
 const NODE_COST: i64 = 1_500;
-const ROW_COST: i64 = 12;
 
 /// Tiles of a batch.
 const BATCH_TILES: usize = BATCH / TILE;
@@ -132,25 +131,6 @@ impl Stiffness {
     }
 }
 
-/// Largest ratio of inertia to mass for which a matrix is inverted. Elements that are crushed exceed it.
-const LARGEST_RATIO: f32 = 1e6;
-
-/// Largest relative error of a sound inverse.
-const LARGEST_ERROR: f32 = 0.05;
-
-/// A vector of ones with signs in no order that a mode of a body has (the last bits of a multiplicative generator).
-static PROBE: Row = {
-    let (mut probe, mut at, mut random) = ([1.0; _], 0, 1u32);
-    while at < size_of::<Row>() / size_of::<f32>() {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        if random >> 31 == 1 {
-            probe[at] = -1.0;
-        }
-        at += 1;
-    }
-    probe
-};
-
 /// Inputs of a refresh.
 pub(super) struct RefreshInput<'a, M> {
     pub(super) scene: SceneView<'a, M>,
@@ -185,8 +165,7 @@ impl Refresh {
         first_cycle: true,
         frames: Frames::NONE,
         frames_at: None,
-        image: [0.0; _],
-        sound: true,
+        inversion: Inversion::NEW,
         lattice_in_use: false,
         next_added: AddedInertiaSums::NEW,
         added: AddedInertiaSums::NEW,
@@ -210,8 +189,7 @@ impl Refresh {
         let whole = bounds
             + nodes.next_multiple_of(NODE_BATCH) as i64 * NODE_COST
             + cells as i64 * CELL_COST
-            + 2 * (sweeps(3 * functions) as i64 * sweep_cost(functions)
-                + 3 * functions as i64 * row_cost(functions));
+            + 2 * Inversion::cost(functions);
         Self { cost: whole, steps, ..Self::NEW }
     }
 
@@ -276,8 +254,8 @@ impl Refresh {
         let (lattice, functions) = (input.lattice, input.lattice.functions());
         if functions > 0 {
             write_mass(matrices.mass, lattice, input.places, input.scene.inertia);
-            self.sound &= invert_axes(matrices.mass_inverse, matrices.mass, functions);
-            self.sound &= invert_edges(matrices.edge_inverse, lattice);
+            self.inversion.sound &= invert_axes(matrices.mass_inverse, matrices.mass, functions);
+            self.inversion.sound &= invert_edges(matrices.edge_inverse, lattice);
             if M::ELEMENT.is_nodal_strain() {
                 write_stabilising(matrices.stabilising, matrices.next_coarse, &input);
             }
@@ -452,7 +430,8 @@ impl Refresh {
         if at == 0 {
             fill_held_axes(matrices.next_fine, matrices.mass, input.lattice.functions());
         }
-        let (cost, ended) = self.invert(matrices.next_fine, matrices.mass, input.lattice.functions(), at);
+        let (cost, ended) =
+            self.inversion.advance(matrices.next_fine, matrices.mass, input.lattice.functions(), at);
         if ended {
             self.enter(Stage::InvertCoarse);
         }
@@ -467,37 +446,12 @@ impl Refresh {
         matrices: &mut Matrices<'_>,
         at: usize,
     ) -> i64 {
-        let (cost, ended) = self.invert(matrices.next_coarse, matrices.mass, input.lattice.functions(), at);
+        let (cost, ended) =
+            self.inversion.advance(matrices.next_coarse, matrices.mass, input.lattice.functions(), at);
         if ended {
             self.end(input.places, tables, matrices);
         }
         cost
-    }
-
-    /// A part of an inversion: a step of it, later one row. Gives its cost, and whether it was the last one.
-    fn invert(&mut self, matrix: &mut [f32], mass: &[f32], functions: usize, at: usize) -> (i64, bool) {
-        let (size, stride) = (3 * functions, stride(functions));
-        if at == 0 {
-            self.start_inversion(matrix, mass, functions);
-        }
-        if at < sweeps(size) {
-            self.sound &= sweep(matrix, size, stride, at);
-            return (sweep_cost(functions), false);
-        }
-        let row = at - sweeps(size);
-        mirror(matrix, stride, row, -1.0);
-        let ended = row + 1 == size;
-        if ended {
-            self.sound &= self.is_accurate(matrix, size, stride);
-        }
-        (row_cost(functions), ended)
-    }
-
-    /// Computes the image of [`PROBE`]. Not inlined: the inversion does without its stack.
-    #[inline(never)]
-    fn start_inversion(&mut self, matrix: &[f32], mass: &[f32], functions: usize) {
-        self.sound &= is_conditioned(matrix, mass, functions);
-        self.image = apply_lower(matrix, stride(functions), probe(3 * functions));
     }
 
     fn enter(&mut self, stage: Stage) {
@@ -562,18 +516,9 @@ impl Refresh {
             .dispatched();
     }
 
-    /// Whether an inverse takes the image of [`PROBE`] back to it, except for rounding. Not inlined, as above.
-    #[inline(never)]
-    fn is_accurate(&self, inverse: &[f32], size: usize, stride: usize) -> bool {
-        let mut back = [0.0; _];
-        apply(inverse, stride, self.image.get(..size).unwrap_or_default(), &mut back);
-        let errors = back.iter().zip(probe(size)).map(|(back, probe)| (back - probe) * (back - probe));
-        errors.sum::<f32>() <= LARGEST_ERROR * LARGEST_ERROR * size as f32
-    }
-
     /// Puts the matrices of the cycle into use, and prepares the next cycle.
     fn put_in_use(&mut self, matrices: &mut Matrices<'_>) {
-        if self.sound {
+        if self.inversion.sound {
             copy(matrices.coarse_inverse, matrices.next_coarse);
             nodal_sums::invert(matrices.bound_inverse, matrices.next_bound);
             if self.slow {
@@ -584,55 +529,14 @@ impl Refresh {
             matrices.fine_inverse.fill(0.0);
             matrices.bound_inverse.fill(FunctionInertia::default());
         }
-        self.lattice_in_use = self.sound;
+        self.lattice_in_use = self.inversion.sound;
         self.fine_in_use = self.slow;
         self.ended = true;
         (self.stiffness, self.next_stiffness) = (self.next_stiffness, Stiffness::NONE);
         self.frames.end_cycle();
         self.added = self.next_added;
         self.next_added = AddedInertiaSums::NEW;
-        self.sound = true;
+        self.inversion.sound = true;
         self.first_cycle = false;
-    }
-}
-
-/// Whether the inertia of each unknown is at most [`LARGEST_RATIO`] times its mass, as far as single precision goes.
-fn is_conditioned(inertia: &[f32], mass: &[f32], functions: usize) -> bool {
-    let (stride, length) = (stride(functions), row_length(functions));
-    (0..3).zip(of_axes(mass)).all(|(axis, mass)| {
-        let masses = mass.iter().step_by(length + 1).take(functions);
-        let inertia = inertia.iter().skip(axis * (stride + 1)).step_by(3 * (stride + 1));
-        inertia.zip(masses).all(|(inertia, mass)| *inertia <= LARGEST_RATIO * mass)
-    })
-}
-
-/// The first components of [`PROBE`].
-fn probe(size: usize) -> &'static [f32] {
-    PROBE.get(..size).unwrap_or_default()
-}
-
-/// Cost of a step of an inversion: a multiplication and an addition for each entry of the lower triangle and each pivot.
-fn sweep_cost(functions: usize) -> i64 {
-    (PIVOTS * 3 * functions * stride(functions)) as i64
-}
-
-/// Cost of a row that is mirrored.
-fn row_cost(functions: usize) -> i64 {
-    ROW_COST * stride(functions) as i64
-}
-
-/// The components of vectors, three for each function.
-pub(super) fn to_components(vectors: &CoarseVectors) -> Row {
-    let mut components = [0.0; _];
-    for (three, vector) in components.as_chunks_mut::<3>().0.iter_mut().zip(vectors) {
-        *three = vector.to_array();
-    }
-    components
-}
-
-/// Sets vectors from their components, as many as there are.
-pub(super) fn from_components(components: &[f32], vectors: &mut CoarseVectors) {
-    for (&[x, y, z], vector) in components.as_chunks::<3>().0.iter().zip(vectors) {
-        vector.0 = [x, y, z, 0.0];
     }
 }

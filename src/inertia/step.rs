@@ -15,16 +15,17 @@ use crate::step::{
 
 use super::cells::{prolong, restrict};
 use super::damper::RoughMotion;
-use super::dense::{Row, apply, apply_by_axis, apply_to_two, stride};
+use super::dense::{Row, apply, apply_by_axis, apply_to_two, from_components, stride, to_components};
 use super::estimate::DefectTotals;
 use super::frames::{Rotation, rotate};
 use super::large_step::{LargeModel, LargeView, Storage};
 use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS, rank_of};
 use super::matrices::{Matrices, of_axes};
+use super::motion_pass::{LatticeMotion, PassTotals, RoughDamping, rotation_table};
 use super::nodal_sums;
 use super::parts::NodeParts;
-use super::passes::{LatticeMotion, PassInput, PassTotals, RoughDamping, rotation_table};
-use super::refresh::{Refresh, RefreshInput, from_components, to_components};
+use super::pass_input::PassInput;
+use super::refresh::{Refresh, RefreshInput};
 use super::report::HeldBack;
 use super::supports::{MovingSupports, Pull};
 use super::transport::turned_part;
@@ -290,8 +291,8 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
 const LARGEST_SMOOTH: f32 = 10.0;
 
 /// The lattice's part `c = Mc^-1 W^T m du` of the increments. Turns the cells' sums of momentum into the smooth part of the
-/// increments, of which `largest` is the largest component, `W` times that. To remove a share of the rest changes no momentum of the lattice, so neither that of the
-/// body. None if the result is not plausible.
+/// increments, of which `largest` is the largest component, `W` times that. To remove a share of the rest changes no momentum of the
+/// lattice, so neither that of the body. None if the result is not plausible.
 fn smooth_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, largest: f32) -> Option<CoarseVectors> {
     let mut motion = restrict(matrices.smooth_cells, lattice);
     let mut components = to_components(&motion);

@@ -139,10 +139,10 @@ mod tests {
     use super::*;
     use crate::element::Axes;
     use crate::inertia::assembly::Assembly;
+    use crate::inertia::dense::to_components;
     use crate::inertia::dense::{apply_lower, stride};
     use crate::inertia::lattice::sort_by_cell;
     use crate::inertia::patches::sort_by_patch;
-    use crate::inertia::refresh::to_components;
     use crate::loads::Motion;
     use crate::material::{NeoHookean, Tissue};
     use crate::mesh::{Bar, Mesh, Winding};

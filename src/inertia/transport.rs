@@ -12,10 +12,9 @@
 
 use glam::{Mat3, Vec3, Vec4};
 
-use super::dense::{apply_to_axes, invert, row_length};
+use super::dense::{apply_to_axes, from_components, invert, row_length, to_components};
 use super::frames::Frames;
 use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
-use super::refresh::{from_components, to_components};
 use crate::simd::NodeVector;
 
 /// Added to the diagonal, so that the matrix of a body without supports can be inverted: a translation of `w` is of no

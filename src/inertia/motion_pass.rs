@@ -1,24 +1,24 @@
-//! The passes over the nodes of a step, vectorised. With a lattice there are two, one before and one after the
-//! lattice's motion is computed. They take the nodes in the order of the cells, so that sums and coefficients of a cell
-//! stay in registers. Without a lattice both are done in one pass.
+//! The pass over the nodes that computes the next increments, vectorised: by the nodes' own inertia, as far as their share of it
+//! allows, and by the lattice's motion. It damps rough motion. Gives sums for the energy balance, the error estimate and the damper, and
+//! over the nodes that were held back. With a lattice it takes the nodes in the order of the cells, so that the coefficients of a cell
+//! stay in registers.
 
 use core::ops::Range;
 
 use bytemuck::{must_cast_slice, must_cast_slice_mut};
 use glam::Vec4;
 
-use super::cells::{CellAccumulator, CellPolynomial, CellSlots, NodesInCells, VECTORS_PER_TILE, motion_at};
+use super::cells::{CellPolynomial, VECTORS_PER_TILE, motion_at};
 use super::damper::RoughMotion;
 use super::estimate::{DefectSums, DefectTotals};
 use super::frames::Rotation;
 use super::lattice::{LatticeNode, MAX_FUNCTIONS, rank_of};
-use super::node::Scaling;
+use super::pass_input::{NodeValues, PassInput};
 use super::report::HeldBack;
 use super::{LARGEST_MOVE, LEAST_SHARE, NODE_GROWTH, RECOVERY};
-use crate::element::NodeInertia;
 use crate::padding;
-use crate::simd::{Contiguous, Indexed, Kernel, NodeVector, Real, Rows, TILE, dispatch};
-use crate::step::{Step, Sums, Totals};
+use crate::simd::{Contiguous, Kernel, NodeVector, Real, Rows, TILE, dispatch};
+use crate::step::{Sums, Totals};
 
 /// For each frame the rotation from the frame of the bounds to the world, as padded rows; the identity for frames that
 /// are not used.
@@ -38,206 +38,6 @@ pub(super) fn rotation_table(rotations: &[Rotation], functions: usize) -> Rotati
 #[inline(always)]
 fn sums_of_row<R: Real, T>(sums: &[T; VECTORS_PER_TILE], row: usize) -> (&T, usize) {
     (&sums[row / R::COUNT % VECTORS_PER_TILE], R::lane_of_row(row % R::COUNT))
-}
-
-/// Inputs of all passes.
-#[derive(Clone, Copy)]
-pub(super) struct PassInput<'a> {
-    pub(super) step: &'a Step,
-    pub(super) scaling: &'a Scaling,
-    /// `D^2`, s^2; half of it in the first step: a force that acts from the start on has acted for half a step.
-    pub(super) square: f32,
-    pub(super) inertia: &'a [NodeInertia],
-    pub(super) displacement: &'a [NodeVector],
-    pub(super) increment: &'a [NodeVector],
-    /// Empty without a lattice.
-    pub(super) places: &'a [LatticeNode],
-}
-
-/// Values of a vector of nodes.
-#[derive(Clone, Copy)]
-struct NodeValues<R> {
-    /// Ones along free axes.
-    free: [R; 3],
-    mass: R,
-    force: [R; 3],
-    /// Scalar stiffness bound, from the fourth component of the force, N/m.
-    bound: R,
-    increment: [R; 3],
-}
-
-impl PassInput<'_> {
-    #[inline(always)]
-    fn read<R: Real>(&self, rows: impl Rows, force: &[NodeVector]) -> NodeValues<R> {
-        let [ix, iy, iz, mass] = rows.read::<R>(must_cast_slice(self.inertia));
-        let [fx, fy, fz, bound] = rows.read::<R>(must_cast_slice(force));
-        let [vx, vy, vz, _] = rows.read::<R>(must_cast_slice(self.increment));
-        let free = [ix.positive(), iy.positive(), iz.positive()];
-        NodeValues { free, mass, force: [fx, fy, fz], bound, increment: [vx, vy, vz] }
-    }
-
-    /// The nodes from rank `first` on: their rows in scene and state, and their places.
-    #[inline(always)]
-    fn in_order<R: Real>(&self, first: usize) -> Option<(Indexed, NodesInCells<'_, R>)> {
-        let places = self.places.get(first..first + R::COUNT)?;
-        let place = |lane| places.get(R::row_of_lane(lane));
-        let [x, y, z, nodes] = R::from_rows(|lane| place(lane).map_or([0.0; 4], LatticeNode::row));
-        let mut rows = [0; TILE];
-        for (lane, row) in rows.iter_mut().enumerate().take(R::COUNT) {
-            *row = padding::to_index(nodes.lane(lane));
-        }
-        let ends = [places.first()?.cell(), places.last()?.cell()];
-        Some((
-            Indexed::below::<R>(rows, self.places.len())?,
-            NodesInCells { position: [x, y, z], ends, places },
-        ))
-    }
-}
-
-/// The pass before the lattice's motion: residual and momentum of each node, added to the sums of the cells for the lattice.
-pub(super) struct RestrictionPass<'a> {
-    pub(super) input: PassInput<'a>,
-    /// Ranks of the nodes.
-    pub(super) ranks: Range<usize>,
-    pub(super) force: &'a [NodeVector],
-    /// [`NodeTables::inverse_diagonal`].
-    pub(super) inverse_diagonal: &'a [NodeVector],
-    pub(super) residual: CellSlots<'a>,
-    pub(super) momentum: CellSlots<'a>,
-}
-
-/// Extremes over the nodes of a [`RestrictionPass`].
-#[derive(Clone, Copy)]
-pub(super) struct RestrictionExtremes<R> {
-    /// The inverse of the largest growth of a bound.
-    pub(super) inverse_growth: R,
-    /// The largest component of an increment, m.
-    pub(super) increment: R,
-}
-
-impl<R: Real> RestrictionExtremes<R> {
-    #[inline(always)]
-    pub(super) fn none() -> Self {
-        Self { inverse_growth: R::splat(1.0), increment: R::splat(0.0) }
-    }
-
-    #[inline(always)]
-    pub(super) fn merged_with(self, other: Self) -> Self {
-        Self {
-            inverse_growth: other.inverse_growth.min(self.inverse_growth),
-            increment: other.increment.max(self.increment),
-        }
-    }
-
-    #[inline(always)]
-    fn lane(&self, lane: usize) -> RestrictionExtremes<f32> {
-        RestrictionExtremes {
-            inverse_growth: self.inverse_growth.lane(lane),
-            increment: self.increment.lane(lane),
-        }
-    }
-}
-
-impl RestrictionPass<'_> {
-    /// Compiled with this crate, as it is not generic.
-    #[inline(never)]
-    pub(super) fn dispatched(self) -> RestrictionExtremes<f32> {
-        dispatch(self)
-    }
-
-    /// The extremes so far, with those of a vector of nodes.
-    #[inline(always)]
-    fn with_nodes<R: Real>(
-        &self,
-        extremes: RestrictionExtremes<R>,
-        rank: usize,
-        nodes: &NodeValues<R>,
-    ) -> RestrictionExtremes<R> {
-        let [_, _, _, bound_before] = Contiguous(rank).read::<R>(must_cast_slice(self.inverse_diagonal));
-        let [vx, vy, vz] = nodes.increment.map(R::abs);
-        extremes.merged_with(RestrictionExtremes {
-            inverse_growth: self.input.inverse_growth(nodes, bound_before),
-            increment: vx.max(vy).max(vz),
-        })
-    }
-}
-
-impl Kernel for RestrictionPass<'_> {
-    type Output = RestrictionExtremes<f32>;
-
-    #[inline(always)]
-    fn run<R: Real>(mut self) -> RestrictionExtremes<f32> {
-        let input = self.input;
-        let Range { start, end } = self.ranks;
-        let whole = end - (end - start) % TILE;
-        let mut extremes = RestrictionExtremes::<R>::none();
-        let mut residual_sums = CellAccumulator::new(self.residual.first);
-        let mut momentum_sums = CellAccumulator::new(self.momentum.first);
-        for first in (start..whole).step_by(TILE) {
-            for vector in 0..TILE / R::COUNT {
-                let rank = first + vector * R::COUNT;
-                let Some((rows, places)) = input.in_order::<R>(rank) else {
-                    continue;
-                };
-                let nodes = input.read::<R>(rows, self.force);
-                extremes = self.with_nodes(extremes, rank, &nodes);
-                momentum_sums.add(&mut self.momentum, &places, vector, nodes.momentum());
-                residual_sums.add(&mut self.residual, &places, vector, input.residual(&nodes));
-            }
-        }
-        residual_sums.flush(&mut self.residual);
-        momentum_sums.flush(&mut self.momentum);
-        let mut all = RestrictionExtremes::<f32>::none();
-        for rank in whole..end {
-            let Some(place) = input.places.get(rank) else {
-                continue;
-            };
-            let nodes = input.read::<f32>(Contiguous(place.node()), self.force);
-            all = self.with_nodes(all, rank, &nodes);
-            if let Some(cell) = self.momentum.get_mut(place.cell()) {
-                cell.add(place, nodes.momentum());
-            }
-            if let Some(cell) = self.residual.get_mut(place.cell()) {
-                cell.add(place, input.residual(&nodes));
-            }
-        }
-        for lane in 0..R::COUNT {
-            all = all.merged_with(extremes.lane(lane));
-        }
-        all
-    }
-}
-
-impl<R: Real> NodeValues<R> {
-    /// The momentum of free axes times the step, kg m.
-    #[inline(always)]
-    fn momentum(&self) -> [R; 3] {
-        let [vx, vy, vz] = self.increment;
-        let [x, y, z] = self.free;
-        [self.mass * x * vx, self.mass * y * vy, self.mass * z * vz]
-    }
-}
-
-impl PassInput<'_> {
-    /// `D^2 f - 2 k m du`, kg m.
-    #[inline(always)]
-    fn residual<R: Real>(&self, nodes: &NodeValues<R>) -> [R; 3] {
-        let &NodeValues { free, mass, force: [fx, fy, fz], increment: [vx, vy, vz], .. } = nodes;
-        let loss = R::splat(2.0 * self.scaling.k * self.step.carry()) * mass;
-        let square = R::splat(self.square);
-        [
-            free[0] * (square * fx - loss * vx),
-            free[1] * (square * fy - loss * vy),
-            free[2] * (square * fz - loss * vz),
-        ]
-    }
-
-    /// The inverse of the growth of the bound, with the mass added to both, because growth below the mass is harmless.
-    #[inline(always)]
-    fn inverse_growth<R: Real>(&self, nodes: &NodeValues<R>, bound_before: R) -> R {
-        let weight = R::splat(self.scaling.weight);
-        (nodes.mass + weight * bound_before).divide(nodes.mass + weight * nodes.bound)
-    }
 }
 
 /// Sums over held-back nodes, vectorised.
@@ -311,9 +111,7 @@ pub(super) struct MotionTables<'a> {
     pub(super) rough: &'a mut [NodeVector],
 }
 
-/// The pass that computes the next increments: by the nodes' own inertia, as far as their share of it allows, and by
-/// the lattice's motion. It damps rough motion. Gives sums for the energy balance, the error estimate and the damper, and
-/// over the nodes that were held back.
+/// Inputs and tables of the pass.
 pub(super) struct MotionPass<'a> {
     pub(super) input: PassInput<'a>,
     pub(super) rotations: &'a RotationTable,

@@ -1,0 +1,96 @@
+//! What the passes over the nodes of a step read: values of a vector of nodes, their residual and momentum. With a lattice the nodes
+//! are taken in the order of its cells, else in that of the scene.
+
+use bytemuck::must_cast_slice;
+
+use super::cells::NodesInCells;
+use super::lattice::LatticeNode;
+use super::node::Scaling;
+use crate::element::NodeInertia;
+use crate::padding;
+use crate::simd::{Indexed, NodeVector, Real, Rows, TILE};
+use crate::step::Step;
+
+/// Inputs of all passes.
+#[derive(Clone, Copy)]
+pub(super) struct PassInput<'a> {
+    pub(super) step: &'a Step,
+    pub(super) scaling: &'a Scaling,
+    /// `D^2`, s^2; half of it in the first step: a force that acts from the start on has acted for half a step.
+    pub(super) square: f32,
+    pub(super) inertia: &'a [NodeInertia],
+    pub(super) displacement: &'a [NodeVector],
+    pub(super) increment: &'a [NodeVector],
+    /// Empty without a lattice.
+    pub(super) places: &'a [LatticeNode],
+}
+
+/// Values of a vector of nodes.
+#[derive(Clone, Copy)]
+pub(super) struct NodeValues<R> {
+    /// Ones along free axes.
+    pub(super) free: [R; 3],
+    pub(super) mass: R,
+    pub(super) force: [R; 3],
+    /// Scalar stiffness bound, from the fourth component of the force, N/m.
+    pub(super) bound: R,
+    pub(super) increment: [R; 3],
+}
+
+impl PassInput<'_> {
+    #[inline(always)]
+    pub(super) fn read<R: Real>(&self, rows: impl Rows, force: &[NodeVector]) -> NodeValues<R> {
+        let [ix, iy, iz, mass] = rows.read::<R>(must_cast_slice(self.inertia));
+        let [fx, fy, fz, bound] = rows.read::<R>(must_cast_slice(force));
+        let [vx, vy, vz, _] = rows.read::<R>(must_cast_slice(self.increment));
+        let free = [ix.positive(), iy.positive(), iz.positive()];
+        NodeValues { free, mass, force: [fx, fy, fz], bound, increment: [vx, vy, vz] }
+    }
+
+    /// The nodes from rank `first` on: their rows in scene and state, and their places.
+    #[inline(always)]
+    pub(super) fn in_order<R: Real>(&self, first: usize) -> Option<(Indexed, NodesInCells<'_, R>)> {
+        let places = self.places.get(first..first + R::COUNT)?;
+        let place = |lane| places.get(R::row_of_lane(lane));
+        let [x, y, z, nodes] = R::from_rows(|lane| place(lane).map_or([0.0; 4], LatticeNode::row));
+        let mut rows = [0; TILE];
+        for (lane, row) in rows.iter_mut().enumerate().take(R::COUNT) {
+            *row = padding::to_index(nodes.lane(lane));
+        }
+        let ends = [places.first()?.cell(), places.last()?.cell()];
+        Some((
+            Indexed::below::<R>(rows, self.places.len())?,
+            NodesInCells { position: [x, y, z], ends, places },
+        ))
+    }
+
+    /// `D^2 f - 2 k m du`, kg m.
+    #[inline(always)]
+    pub(super) fn residual<R: Real>(&self, nodes: &NodeValues<R>) -> [R; 3] {
+        let &NodeValues { free, mass, force: [fx, fy, fz], increment: [vx, vy, vz], .. } = nodes;
+        let loss = R::splat(2.0 * self.scaling.k * self.step.carry()) * mass;
+        let square = R::splat(self.square);
+        [
+            free[0] * (square * fx - loss * vx),
+            free[1] * (square * fy - loss * vy),
+            free[2] * (square * fz - loss * vz),
+        ]
+    }
+
+    /// The inverse of the growth of the bound, with the mass added to both, because growth below the mass is harmless.
+    #[inline(always)]
+    pub(super) fn inverse_growth<R: Real>(&self, nodes: &NodeValues<R>, bound_before: R) -> R {
+        let weight = R::splat(self.scaling.weight);
+        (nodes.mass + weight * bound_before).divide(nodes.mass + weight * nodes.bound)
+    }
+}
+
+impl<R: Real> NodeValues<R> {
+    /// The momentum of free axes times the step, kg m.
+    #[inline(always)]
+    pub(super) fn momentum(&self) -> [R; 3] {
+        let [vx, vy, vz] = self.increment;
+        let [x, y, z] = self.free;
+        [self.mass * x * vx, self.mass * y * vy, self.mass * z * vz]
+    }
+}
