@@ -177,7 +177,7 @@ pub(crate) fn check_patch<M: ElementMaterial>(
     forces
 }
 
-/// A rigid motion of [`irregular`] gives no forces beside those of a deformation, for a law without stress at rest.
+/// A rigid motion of [`irregular`] gives no forces compared with those of a deformation, for a law without stress at rest.
 pub(crate) fn check_rigid<M: ElementMaterial>(name: &str, scene: &VecScene<M>, of_deformation: &[[f64; 3]]) {
     let moved = irregular().affine(&rotation([0.3, -1.0, 0.8], 1.5), [0.02, -0.01, 0.03]);
     let ratio = norm(&forces(scene, &moved)) / norm(of_deformation);
