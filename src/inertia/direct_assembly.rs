@@ -63,18 +63,22 @@ impl Assembly<'_> {
         tangent: &Tangent,
         slots: &mut Slots,
     ) {
-        let touched = self.touched::<T>(corners, slots);
-        self.add_pairs(&touched.factors(tangent, slots), tangent);
+        // Written in place: the compiler would copy what is given back.
+        let mut touched = Touched::<T>::NONE;
+        self.touch(corners, slots, &mut touched);
+        let mut factors = Factors::<T>::NONE;
+        touched.write_factors(tangent, slots, &mut factors);
+        self.add_pairs(&factors, tangent);
     }
 
-    /// The functions that nodes touch, with what the gradients at the nodes give them; their places are in `slots` then.
+    /// Adds the functions that nodes touch, with what the gradients at the nodes give them; their places are in `slots` then.
     #[inline(always)]
-    fn touched<const T: usize>(
+    fn touch<const T: usize>(
         &self,
         corners: impl Iterator<Item = (usize, [f32; 3])>,
         slots: &mut Slots,
-    ) -> Touched<T> {
-        let mut touched = Touched { gradients: [[Vec4::ZERO; 3]; T], count: 0, functions: 0 };
+        touched: &mut Touched<T>,
+    ) {
         for (node, gradient) in corners {
             let (Some(at), Some(inertia)) = (node_place(self.nodes, node), self.inertia.get(node)) else {
                 continue;
@@ -100,7 +104,6 @@ impl Assembly<'_> {
                 }
             }
         }
-        touched
     }
 
     /// Adds the products of all pairs of functions.
@@ -140,21 +143,28 @@ impl Assembly<'_> {
     }
 }
 
+impl<const T: usize> Factors<T> {
+    const NONE: Self = Self {
+        functions: [0; T],
+        images: [Vec4::ZERO; T],
+        slopes: [[Vec4::ZERO; 3]; T],
+        derivatives: [[Vec4::ZERO; 3]; T],
+        count: 0,
+    };
+}
+
 impl<const T: usize> Touched<T> {
-    /// What the products of a tangent are of, in ascending order of the functions; `slots` are empty again then.
+    const NONE: Self = Self { gradients: [[Vec4::ZERO; 3]; T], count: 0, functions: 0 };
+
+    /// Writes what the products of a tangent are of, in ascending order of the functions; `slots` are empty again then.
     #[inline(always)]
-    fn factors(mut self, tangent: &Tangent, slots: &mut Slots) -> Factors<T> {
+    fn write_factors(&self, tangent: &Tangent, slots: &mut Slots, factors: &mut Factors<T>) {
         let [cx, cy, cz] = tangent.columns.map(Vec4::from);
-        let mut factors = Factors {
-            functions: [0; T],
-            images: [Vec4::ZERO; T],
-            slopes: [[Vec4::ZERO; 3]; T],
-            derivatives: [[Vec4::ZERO; 3]; T],
-            count: self.count,
-        };
+        let mut bits = self.functions;
+        factors.count = self.count;
         for place in 0..self.count {
-            let function = self.functions.trailing_zeros() as usize;
-            self.functions &= self.functions.wrapping_sub(1);
+            let function = bits.trailing_zeros() as usize;
+            bits &= bits.wrapping_sub(1);
             let Some(slot) = slots.get_mut(function) else { continue };
             let [x, y, z] = self.gradients.get(usize::from(*slot)).copied().unwrap_or_default();
             *slot = NOT_TOUCHED;
@@ -165,6 +175,5 @@ impl<const T: usize> Touched<T> {
             factors.derivatives[place % T] = derivatives;
             factors.slopes[place % T] = if tangent.is_spatial() { derivatives } else { [x, y, z] };
         }
-        factors
     }
 }
