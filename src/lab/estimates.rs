@@ -109,6 +109,7 @@ mod tests {
             step_over_limit_rest: 1.5,
             step_over_limit_trajectory: 2.0,
             doubling: None,
+            frames: vec![],
             end: End::Reached(figures),
         }
     }

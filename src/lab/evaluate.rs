@@ -137,29 +137,3 @@ fn about(spec: &SceneSpec, truth: &Truth) -> String {
         1e3 * truth.most(),
     )
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn plan(scenes: &[&str], multiples: &[u32], sweep: Option<&str>) -> Vec<(&'static str, Vec<u32>)> {
-        let scenes: Vec<String> = scenes.iter().copied().map(String::from).collect();
-        let plan = Plan::new(&scenes, &[], multiples, sweep).unwrap();
-        plan.scenes.into_iter().map(|(spec, multiples)| (spec.name, multiples)).collect()
-    }
-
-    #[test]
-    fn nothing_asked_means_everything() {
-        let plan = plan(&[], &[], None);
-        assert_eq!(plan.len(), 34);
-        assert_eq!(plan[0], ("torsion", MULTIPLES.to_vec()));
-        assert_eq!(plan[1], ("reversed", sweep::MULTIPLES.to_vec()));
-    }
-
-    #[test]
-    fn what_is_asked_twice_is_done_once_and_a_sweep_brings_its_scene() {
-        let wanted = [("lobe", [10].to_vec()), ("push", sweep::MULTIPLES.to_vec())];
-        assert_eq!(plan(&["lobe", "lobe"], &[10, 10], Some("push")), wanted);
-        assert_eq!(plan(&["lobe"], &[10], None), wanted[..1]);
-    }
-}

@@ -216,9 +216,9 @@ impl Method {
             Self::Learned(size) => {
                 let multiple = (dt / DT).round() as u32;
                 let bytes = networks::learned(size, multiple).ok_or(LabError::NoNetwork { multiple })?;
-                learned(scene, bytes, multiple, damping)
+                learned(scene, bytes, exact_steps_in(dt, &spec.timing), damping)
             }
-            Self::LearnedWith(file) => learned(scene, file.bytes, file.multiple, damping),
+            Self::LearnedWith(file) => learned(scene, file.bytes, exact_steps_in(dt, &spec.timing), damping),
         }
     }
 }
@@ -242,24 +242,29 @@ fn exact_steps<M: ElementMaterial>(
     worst
 }
 
-/// The learned step after its lead-in of exact ones. The lead-in is damped as the scene is, learned steps as the training was:
+/// Exact steps of a scene in a step of `dt` (s).
+fn exact_steps_in(dt: f32, timing: &Timing) -> u32 {
+    (dt * timing.refinement as f32 / timing.step - 0.01).ceil().max(1.0) as u32
+}
+
+/// The learned step after its lead-in of exact ones, `count` in each of the network's. The lead-in is damped as the scene is, learned steps as the training was:
 /// on a scene with other damping a network is as wrong as it is.
 fn learned<'a, M: ElementMaterial>(
     scene: SceneView<'a, M>,
     bytes: &'static [u8],
-    multiple: u32,
+    count: u32,
     damping: f32,
 ) -> Result<Advance<'a>, LabError> {
     let network = Network::parse(bytes)?;
     let recipe = *network.recipe();
     let storage = vec![NodeVector::ZERO; learned::vectors_for(scene.node_count(), false)];
     let mut learned = LearnedStep::new(network, false, storage)?;
-    let exact = Step::unchecked(DT, damping)?;
-    let trained = Step::unchecked(recipe.step / multiple as f32, recipe.damping)?;
+    let exact = Step::unchecked(recipe.step / count as f32, damping)?;
+    let trained = Step::unchecked(recipe.step / count as f32, recipe.damping)?;
     Ok(Box::new(move |state, loads| {
         let mut state = state.view();
         if state.time() + 0.5 * f64::from(DT) < BURN_IN {
-            let lead = |state: &mut StateView<'_>| exact_steps(multiple, scene, loads, state, &exact);
+            let lead = |state: &mut StateView<'_>| exact_steps(count, scene, loads, state, &exact);
             let status = learned.view().lead_interval(&mut state, lead);
             return Ok((status, StepReport::default()));
         }

@@ -6,6 +6,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`scenes`] | bodies, supports and loads as data; [`moving`] those that fall, turn and swing |
+//! | [`course`] | how loads vary over time |
 //! | [`timing`] | how time is counted in a scene |
 //! | [`truth`] | the exact motion of a scene, kept on disk |
 //! | [`method`] | what is compared: one match arm each |
@@ -16,14 +17,17 @@
 //! | [`evaluate`] | rows as asked for in a [`evaluate::Plan`] |
 //! | [`estimates`] | how well methods estimate their own error |
 //! | [`equal_error`] | how much longer implicit steps take for the same error |
+//! | [`hard`] | is a run ever wrong without a word? |
 //! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
 //! | [`table`] | rows as CSV and as aligned text |
 //! | [`sweep`] | error over step on one scene, with fitted slopes; [`plot`] draws it |
 
+pub mod course;
 pub mod equal_error;
 mod error;
 pub mod estimates;
 pub mod evaluate;
+pub mod hard;
 pub mod implicit;
 pub mod measure;
 pub mod method;

@@ -34,8 +34,23 @@ pub struct Row {
     pub step_over_limit_trajectory: f64,
     /// Error estimated by a run with twice the step, where there is one, mm.
     pub doubling: Option<f64>,
+    /// What was known at each snapshot that was reached.
+    pub frames: Vec<Frame>,
     /// How it ended.
     pub end: End,
+}
+
+/// What a host and the truth knew at a snapshot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Mean error of the nodes, mm.
+    pub mean: f64,
+    /// The largest, mm.
+    pub max: f64,
+    /// The method's own estimate of the mean error, mm.
+    pub estimate: Option<f64>,
+    /// Whether all steps since the snapshot before were [`Status::Ok`].
+    pub ok: bool,
 }
 
 /// How a run ended.
@@ -97,7 +112,7 @@ pub fn run_with_shapes(
     multiple: u32,
 ) -> Result<(Row, Shapes), LabError> {
     spec.check_multiple(multiple)?;
-    let (end, shapes) = spec.with_material(Run { spec, truth, method, multiple })?;
+    let (end, frames, shapes) = spec.with_material(Run { spec, truth, method, multiple })?;
     let hold = Errors::of_hold(truth)?;
     let step = f64::from(multiple) * f64::from(spec.timing.step);
     let row = Row {
@@ -110,6 +125,7 @@ pub fn run_with_shapes(
         step_over_limit_rest: step / truth.limit_at_rest,
         step_over_limit_trajectory: step / truth.limit_least,
         doubling: None,
+        frames,
         end,
     };
     Ok((row, shapes))
@@ -123,7 +139,7 @@ struct Run<'a> {
 }
 
 impl MaterialWork for Run<'_> {
-    type Output = Result<(End, Shapes), LabError>;
+    type Output = Result<(End, Vec<Frame>, Shapes), LabError>;
 
     fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
         let Self { spec, truth, method, multiple } = self;
@@ -133,15 +149,17 @@ impl MaterialWork for Run<'_> {
         let mut advance = method.prepare(spec, scene.view(), &mut state, dt)?;
 
         let (mut errors, mut shapes) = (Errors::default(), Shapes::new());
-        let (mut estimates, mut estimate) = (Vec::new(), None);
+        let (mut frames, mut estimate) = (Vec::new(), None);
         let (mut taken, mut limited, mut spent) = (0_u32, 0_u32, Duration::ZERO);
         let (mut clips, mut predictions) = (0.0, 0_u32);
-        for interval in 0..spec.intervals {
-            let loads = spec.loads(&scene, interval)?;
+        let mut loads = spec.loads(&scene)?;
+        for _ in 0..spec.intervals {
+            let mut ok = true;
             // A lead-in is not timed.
             let timed = state.time() + 0.5 * f64::from(spec.timing.step) >= method.lead_in();
             let start = Instant::now();
             for _ in 0..spec.timing.interval / multiple {
+                let loads = loads.of_step(state.time(), f64::from(dt));
                 let (status, report) = advance(&mut state, &loads)?;
                 estimate = report.estimate;
                 if let Some(clipped) = report.clipped {
@@ -151,9 +169,12 @@ impl MaterialWork for Run<'_> {
                 match status {
                     Status::Ok => {}
                     Status::Limited { .. } => limited += 1,
-                    Status::Diverged(divergence) => return Ok((End::Diverged(divergence.time), shapes)),
+                    Status::Diverged(divergence) => {
+                        return Ok((End::Diverged(divergence.time), frames, shapes));
+                    }
                     Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
                 }
+                ok &= status == Status::Ok;
                 taken += u32::from(timed);
             }
             if timed {
@@ -161,8 +182,10 @@ impl MaterialWork for Run<'_> {
             }
             errors.add_snapshot(truth, state.displacements())?;
             shapes.push(state.displacements().iter().map(|vector| vector.to_array()).collect());
-            estimates.extend(estimate.map(|metre| 1e3 * f64::from(metre)));
+            let estimate = estimate.map(|metre| 1e3 * f64::from(metre));
+            frames.push(Frame { mean: errors.mean(), max: errors.max, estimate, ok });
         }
+        let estimates: Vec<f64> = frames.iter().filter_map(|frame| frame.estimate).collect();
         let running = (!estimates.is_empty()).then(|| estimates.iter().sum::<f64>() / estimates.len() as f64);
         // The lead-in may last to the end.
         let taken = f64::from(taken.max(1));
@@ -176,58 +199,6 @@ impl MaterialWork for Run<'_> {
             },
             us_per_step: 1e6 * spent.as_secs_f64() / taken,
         };
-        Ok((End::Reached(figures), shapes))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::lab::{scenes, truth};
-
-    /// A tenth of a second of a light scene.
-    fn short(name: &str) -> (SceneSpec, Truth) {
-        let mut scene = scenes::named(name).unwrap();
-        scene.intervals = 3;
-        let truth = truth::compute(&scene).unwrap();
-        (scene, truth)
-    }
-
-    #[test]
-    fn the_exact_step_is_the_truth_and_long_steps_diverge_and_say_so() {
-        let (scene, truth) = short("cylinder");
-        let exact = run(&scene, &truth, Method::Tled, 1).unwrap();
-        let figures = exact.figures().unwrap();
-        assert_eq!(figures.errors.skill(exact.hold), 1.0);
-        assert_eq!(exact.end.to_string(), "ok");
-        let hold = run(&scene, &truth, Method::Hold, 1).unwrap();
-        assert_eq!(hold.figures().unwrap().errors.skill(hold.hold), 0.0);
-        let long = run(&scene, &truth, Method::TledLargeStep, 100).unwrap();
-        assert!(long.step_over_limit_rest > 1.0);
-        assert!(matches!(long.end, End::Diverged(time) if time < 0.1), "{:?}", long.end);
-    }
-
-    #[test]
-    fn multiples_that_miss_the_snapshots_are_refused() {
-        let (scene, truth) = short("cylinder");
-        for multiple in [0, 3] {
-            assert!(matches!(run(&scene, &truth, Method::Hold, multiple), Err(LabError::Multiple { .. })));
-        }
-    }
-
-    #[test]
-    fn a_release_lets_go_after_its_interval() {
-        let mut scene = scenes::named("release").unwrap();
-        scene.released_after = Some(2);
-        let whole = |scene: &SceneSpec| {
-            let Ok(truth) = truth::compute(scene) else { panic!("no truth") };
-            truth
-        };
-        scene.intervals = 4;
-        let let_go = whole(&scene);
-        scene.released_after = None;
-        let kept = whole(&scene);
-        assert_eq!(let_go.snapshots[..2], kept.snapshots[..2]);
-        assert_ne!(let_go.snapshots[2], kept.snapshots[2]);
+        Ok((End::Reached(figures), frames, shapes))
     }
 }

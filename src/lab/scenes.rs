@@ -9,12 +9,13 @@ use std::vec::Vec;
 
 use glam::Vec3;
 
+use super::course::{Course, CurrentLoads};
 use super::timing::Timing;
 use super::{LabError, moving};
 use crate::element::{ElementLaw, LawWork, MaterialWork, with_element, with_law};
 use crate::io::{TetMesh, parse_msh};
-use crate::loads::{Loads, Motion, NodalForce};
-use crate::material::{AnyLaw, Element, Exponential, Material, NeoHookean, Tissue};
+use crate::loads::{Motion, NodalForce};
+use crate::material::{AnyLaw, Element, Exponential, Material, NeoHookean, Regions, Tissue};
 use crate::mesh::{Bar, Mesh, Winding};
 use crate::scene::{AsScene, Axes, BuildError, Support, VecScene};
 use crate::state::VecState;
@@ -102,12 +103,23 @@ pub struct SceneSpec {
     pub forces: Vec<NodalForce>,
     /// Prescribed motions.
     pub motions: Vec<Motion>,
-    /// After so many intervals the forces are gone, at once.
-    pub released_after: Option<usize>,
+    /// How forces and motions vary over time.
+    pub course: Course,
+    /// A second tissue of some elements, of the same kind of law.
+    pub second: Option<SecondTissue>,
     /// How time is counted.
     pub timing: Timing,
     /// Duration in intervals of [`Timing::interval`].
     pub intervals: usize,
+}
+
+/// Tissue of some elements of a scene: only with [`AnyLaw::NeoHookean`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct SecondTissue {
+    /// Its law and density.
+    pub tissue: Tissue<NeoHookean>,
+    /// One for each element of it, zero for the others.
+    pub of_element: Vec<u16>,
 }
 
 /// Velocities of a body that moves rigidly.
@@ -160,6 +172,14 @@ impl SceneSpec {
 
     /// Does `work` with the material that the scene is made of.
     pub fn with_material<W: MaterialWork>(&self, work: W) -> W::Output {
+        if let (AnyLaw::NeoHookean(law), Some(second)) = (self.law, &self.second) {
+            let tissues = [Tissue { law, density: self.density }, second.tissue];
+            return with_element(
+                self.element,
+                Regions { tissues: &tissues, of_element: &second.of_element },
+                work,
+            );
+        }
         with_law(self.law, OfLaw { spec: self, work })
     }
 
@@ -169,11 +189,9 @@ impl SceneSpec {
         Ok(VecScene::build(material, &mesh, &self.supports)?)
     }
 
-    /// The loads during an interval between two snapshots, counted from 0, checked against the scene.
-    pub fn loads(&self, scene: &impl AsScene, interval: usize) -> Result<Loads<'_>, LabError> {
-        let released = self.released_after.is_some_and(|last| interval >= last);
-        let forces = if released { &[] } else { self.forces.as_slice() };
-        Ok(Loads::new(scene, self.gravity, forces, &self.motions)?)
+    /// The loads, checked against the scene.
+    pub fn loads(&self, scene: &impl AsScene) -> Result<CurrentLoads<'_>, LabError> {
+        CurrentLoads::new(self, scene)
     }
 
     /// The state at the start, for steps of `dt` (s).
@@ -219,7 +237,8 @@ pub fn named(name: &str) -> Result<SceneSpec, LabError> {
         }
         // Held for a hundredth of a second after the ramp, so that it is let go at a snapshot.
         "release" => {
-            Ok(SceneSpec { released_after: Some(INTERVALS / 2), ..bar("release", pull(GENTLE, 0.5)) })
+            let course = Course::Released((INTERVALS / 2) as f64 * Timing::PAPER.interval_seconds());
+            Ok(SceneSpec { course, ..bar("release", pull(GENTLE, 0.5)) })
         }
         "push" => pushed_lobe(),
         "bent" => Ok(bent()),
@@ -247,7 +266,8 @@ pub(super) fn bar(name: &'static str, forces: Vec<NodalForce>) -> SceneSpec {
         gravity: [0.0; 3],
         forces,
         motions: Vec::new(),
-        released_after: None,
+        course: Course::Steady,
+        second: None,
         timing: Timing::PAPER,
         intervals: INTERVALS,
     }
@@ -384,21 +404,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_name_has_its_scene_and_others_are_refused_with_the_names() {
-        for (scene, name) in all().unwrap().iter().zip(names()) {
-            assert_eq!(scene.name, name);
-        }
-        for name in RAMPED {
-            let scene = named(name).unwrap();
-            assert!((scene.duration() - 1.02).abs() < 1e-6);
-            assert!(!scene.supports.is_empty(), "{name}");
-            assert!(scene.forces.is_empty() != scene.motions.is_empty(), "{name}");
-        }
-        let said = named("tension").unwrap_err().to_string();
-        assert!(said.starts_with("scene \"tension\" is not known; there are torsion, reversed,"), "{said}");
-    }
-
-    #[test]
     fn forces_of_a_twist_turn_but_do_not_push() {
         let forces = twist(2.0, 1.0);
         for axis in 0..3 {
@@ -411,26 +416,5 @@ mod tests {
             let arm = 0.025 * core::f32::consts::SQRT_2;
             assert!((moment - 2.0 * arm).abs() < 1e-6);
         }
-    }
-
-    #[test]
-    fn body_forces_add_up_to_mass_times_acceleration() {
-        // Masses from the volumes in meshes/README.md.
-        for (name, axis, kilogram) in [("cylinder", 0, 0.2875), ("lobe", 1, 0.2886)] {
-            let scene = named(name).unwrap();
-            let total: f32 = scene.forces.iter().map(|force| force.newton[axis]).sum();
-            assert!((total + 0.6 * kilogram).abs() < 1e-4, "{name}: {total} N");
-        }
-    }
-
-    #[test]
-    fn the_push_moves_a_patch_at_the_free_end() {
-        let scene = named("push").unwrap();
-        assert!(scene.motions.len() > 5, "{}", scene.motions.len());
-        for motion in &scene.motions {
-            assert!(scene.points[motion.node as usize][0] > 0.07);
-        }
-        let fixed = scene.supports.len() - scene.motions.len();
-        assert!(fixed > 20, "{fixed}");
     }
 }

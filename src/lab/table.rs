@@ -127,6 +127,7 @@ mod tests {
             step_over_limit_rest: 1.5,
             step_over_limit_trajectory: 2.0,
             doubling: Some(1.25),
+            frames: vec![],
             end: End::Reached(figures),
         };
         [row.clone(), Row { doubling: None, end: End::Diverged(0.0126), ..row }]

@@ -19,7 +19,7 @@ use super::recipe::Recipe;
 use crate::element::{ElementMaterial, MaterialWork};
 use crate::lab::scenes::{self, SceneSpec};
 use crate::lab::truth::exact_step;
-use crate::lab::{DT, INTERVAL_STEPS, LabError};
+use crate::lab::{DT, LabError};
 use crate::learned::frame::Frame;
 use crate::learned::{FEATURES, PREDICTED};
 use crate::mlp::Range;
@@ -217,6 +217,7 @@ impl MaterialWork for Collect<'_> {
         let mut samples = Samples { vertices: sampled.len(), ..Samples::default() };
         // Increments are exact; a displacement in float32 is rounded, and a second difference shows that.
         let mut place = vec![DVec3::ZERO; nodes];
+        let mut loads = spec.loads(&scene)?;
         for number in 0..=last {
             // Displacements are those before the step; its forces, of the same moment, are known after it.
             let moments: Vec<usize> =
@@ -225,7 +226,7 @@ impl MaterialWork for Collect<'_> {
                 sequences[at].add_shape(&place);
                 sequences[at].add_targets(&sampled, long, &mut samples);
             }
-            let loads = spec.loads(&scene, number as usize / INTERVAL_STEPS as usize)?;
+            let loads = loads.of_step(state.time(), f64::from(DT));
             let keeps = recipe.noise.is_some() && !moments.is_empty() && schedule.is_due(frame, number);
             let before = keeps.then(|| state.clone());
             exact_step(spec, &scene, &loads, &mut state, &step)?;

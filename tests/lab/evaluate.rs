@@ -1,6 +1,7 @@
 //! An evaluation from plan to files.
 
 use supple::lab::evaluate::{self, Plan};
+use supple::lab::{MULTIPLES, sweep};
 
 const HEAD: &str = "scene,method,multiple,mean_mm,sd_mm,max_mm,mean_over_time_mm,hold_mm,skill,clip_share,\
                     us_per_step,us_per_simulated_second,step_over_limit_rest,step_over_limit_trajectory,status,\
@@ -46,4 +47,25 @@ fn a_table_says_how_far_off_methods_are_and_what_they_cost() {
 
     let picture = std::fs::read_to_string(out.join("sweep-cylinder.svg")).unwrap();
     assert!(picture.contains("tled-large-step, slope "), "{picture}");
+}
+
+fn plan(scenes: &[&str], multiples: &[u32], sweep: Option<&str>) -> Vec<(&'static str, Vec<u32>)> {
+    let scenes: Vec<String> = scenes.iter().copied().map(String::from).collect();
+    let plan = Plan::new(&scenes, &[], multiples, sweep).unwrap();
+    plan.scenes.into_iter().map(|(spec, multiples)| (spec.name, multiples)).collect()
+}
+
+#[test]
+fn nothing_asked_means_everything() {
+    let plan = plan(&[], &[], None);
+    assert_eq!(plan.len(), 34);
+    assert_eq!(plan[0], ("torsion", MULTIPLES.to_vec()));
+    assert_eq!(plan[1], ("reversed", sweep::MULTIPLES.to_vec()));
+}
+
+#[test]
+fn what_is_asked_twice_is_done_once_and_a_sweep_brings_its_scene() {
+    let wanted = [("lobe", [10].to_vec()), ("push", sweep::MULTIPLES.to_vec())];
+    assert_eq!(plan(&["lobe", "lobe"], &[10, 10], Some("push")), wanted);
+    assert_eq!(plan(&["lobe"], &[10], None), wanted[..1]);
 }

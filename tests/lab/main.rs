@@ -3,8 +3,11 @@
 #[cfg(feature = "slow-tests")]
 mod damper;
 mod evaluate;
+mod hard;
 #[cfg(feature = "slow-tests")]
 mod moving;
 #[cfg(feature = "slow-tests")]
 mod paper;
 mod physics;
+mod run;
+mod scenes;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use supple::lab::evaluate::{self, Plan};
 use supple::lab::method::Method;
-use supple::lab::{equal_error, estimates, physics, table};
+use supple::lab::{equal_error, estimates, hard, physics, table};
 use supple::material::Element;
 
 use crate::element_name::element_named;
@@ -38,11 +38,21 @@ pub(crate) struct Asked {
     /// silicone-beam, bending, cook, cylinder, torsion, punch, all of them unless given
     #[arg(long, conflicts_with_all = ["methods", "multiples", "element", "weights", "sweep"])]
     physics: bool,
+    /// Judge whether runs are ever wrong without a word instead: hard.csv, hard-frames.csv and a picture; a scene is a hard case or one of
+    /// the laboratory's, all of them unless given
+    #[arg(long, conflicts_with_all = ["physics", "multiples", "element", "weights", "sweep"])]
+    hard: bool,
+    /// Random scenes among the hard cases
+    #[arg(long, value_name = "N", default_value_t = 200, requires = "hard")]
+    random: u32,
 }
 
 pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
     if asked.physics {
         return evaluate_physics(asked);
+    }
+    if asked.hard {
+        return evaluate_hard(asked);
     }
     let Asked { out, scenes, methods, multiples, element, weights, sweep, .. } = asked;
     let mut plan = Plan::new(scenes, methods, multiples, sweep.as_deref()).map_err(Problem::of)?;
@@ -68,5 +78,13 @@ fn evaluate_physics(Asked { out, scenes, .. }: &Asked) -> Result<End, Problem> {
     let rows = physics::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
     print!("{}", physics::tables::tables(&rows));
     println!("\nresults  {}", out.join("physics.csv").display());
+    Ok(End::Reached)
+}
+
+fn evaluate_hard(Asked { out, scenes, methods, random, .. }: &Asked) -> Result<End, Problem> {
+    let plan = hard::Plan::new(scenes, methods, *random).map_err(Problem::of)?;
+    let judged = hard::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
+    print!("{}", hard::report::text(&judged));
+    println!("\nresults  {}", out.join("hard.csv").display());
     Ok(End::Reached)
 }

@@ -1,0 +1,201 @@
+//! Hard cases: is a run ever wrong without a word? Scenes made to break a step, and random ones, at 10 to 100 times the critical step.
+//! A snapshot is wrong if the mean error of the nodes exceeds a millimetre and a fifth of the motion so far; it is silently wrong if
+//! every step since the snapshot before was [`crate::step::Status::Ok`].
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`cases`] | scenes that are made to break a step |
+//! | [`random`] | random bodies, materials, supports and loads |
+//! | [`verdict`] | what was wrong, what was told, and how far off the estimates are |
+//! | [`report`] | tables for people and programs, and the picture |
+
+pub mod cases;
+pub mod random;
+pub mod report;
+pub mod verdict;
+
+use std::path::Path;
+use std::string::String;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::vec::Vec;
+use std::{format, fs};
+
+use super::method::Method;
+use super::networks::{self, Size};
+use super::run::{self, Row};
+use super::scenes::SceneSpec;
+use super::timing::Timing;
+use super::truth::{self, Truth};
+use super::{DT, LabError};
+use verdict::Judged;
+
+/// Steps over the critical step of a body at rest.
+pub const TIMES_CRITICAL: [u32; 4] = [10, 20, 50, 100];
+
+/// What to judge.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Hand-made cases.
+    pub cases: Vec<SceneSpec>,
+    /// The number of random scenes.
+    pub random: u32,
+    /// Methods.
+    pub methods: Vec<Method>,
+}
+
+impl Plan {
+    /// A plan from names of cases and methods: all there are if there are none; so many random scenes.
+    pub fn new(cases: &[String], methods: &[String], random: u32) -> Result<Self, LabError> {
+        let methods = match methods {
+            [] => Vec::from([
+                Method::MassScaled,
+                Method::Multilevel,
+                Method::Damped,
+                Method::Learned(Size::Compact),
+            ]),
+            names => names.iter().map(|name| Method::named(name)).collect::<Result<_, _>>()?,
+        };
+        let cases = match cases {
+            [] => cases::names().map(cases::named).collect::<Result<_, _>>()?,
+            names => names.iter().map(|name| cases::named(name)).collect::<Result<_, _>>()?,
+        };
+        Ok(Self { cases, random, methods })
+    }
+}
+
+/// Time in steps of at most 0.95 of the critical one that the learned steps of the crate are multiples of, and in snapshots that steps
+/// a hundred times as long as the critical one divide: timing and number of intervals of about `seconds`.
+fn timing_of(critical: f32, seconds: f32) -> (Timing, usize) {
+    // The shortest learned step, s, and a multiple of all of them.
+    let (learned, common) = (10.0 * DT, 1000.0 * DT);
+    let parts = (learned / (0.95 * critical)).ceil().max(1.0);
+    let step = learned / parts;
+    let length = common * (100.0 * critical / common).ceil();
+    let timing = Timing { step, interval: (length / step).round() as u32, refinement: 1 };
+    (timing, (seconds / length).ceil().max(2.0) as usize)
+}
+
+/// The multiple of the scene's step that divides its interval and is nearest to so many times the critical step.
+fn multiple_near(timing: &Timing, critical: f32, times: u32) -> u32 {
+    let wanted = times as f32 * critical / timing.step;
+    let off = |multiple: &u32| (*multiple as f32 / wanted).ln().abs();
+    let divisors = (1..=timing.interval).filter(|&multiple| timing.hits_snapshots(multiple));
+    divisors.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(1)
+}
+
+/// Carries the plan out on two threads: truths in `out/truth/`, tables and a picture in `out`. `say` is given the progress in words.
+pub fn evaluate(plan: &Plan, out: &Path, say: impl Fn(&str) + Sync) -> Result<Vec<Judged>, LabError> {
+    const THREADS: usize = 2;
+    let truths = out.join("truth");
+    fs::create_dir_all(&truths)?;
+    let (count, next) = (plan.cases.len() + plan.random as usize, AtomicUsize::new(0));
+    let results = Mutex::new(Vec::new());
+    thread::scope(|scope| {
+        for _ in 0..THREADS {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    if index >= count {
+                        break;
+                    }
+                    let found = match plan.cases.get(index) {
+                        Some(case) => with_truth(case.clone(), &truths).map(Some),
+                        None => random_scene((index - plan.cases.len()) as u32, &truths),
+                    };
+                    let rows = found.and_then(|found| match found {
+                        Some((spec, truth)) => {
+                            say(&format!("{}: moves by {:.1} mm", spec.name, 1e3 * truth.most()));
+                            runs(&spec, &truth, &plan.methods)
+                        }
+                        None => Ok(Vec::new()),
+                    });
+                    if let Ok(mut results) = results.lock() {
+                        results.push((index, rows));
+                    }
+                }
+            });
+        }
+    });
+    let mut results = results.into_inner().unwrap_or_default();
+    results.sort_by_key(|(index, _)| *index);
+    let mut judged = Vec::new();
+    for (_, rows) in results {
+        judged.extend(rows?);
+    }
+    report::write(&judged, out)?;
+    Ok(judged)
+}
+
+/// The truth in shorter steps, if the critical one falls along the motion.
+fn with_truth(mut spec: SceneSpec, folder: &Path) -> Result<(SceneSpec, Truth), LabError> {
+    loop {
+        match truth::obtain_one(&spec, folder) {
+            Err(LabError::Diverged { .. }) if spec.timing.refinement < 20 => spec.timing.refinement *= 3,
+            other => return other.map(|truth| (spec, truth)),
+        }
+    }
+}
+
+/// The first attempt whose truth moves by more than a millimetre and neither diverges nor leaves the range of its law. None if ten do.
+fn random_scene(number: u32, folder: &Path) -> Result<Option<(SceneSpec, Truth)>, LabError> {
+    for attempt in 0..10 {
+        match with_truth(random::scene(number, attempt)?, folder) {
+            Ok((spec, truth)) if truth.limited_steps == 0 && truth.most() > 1e-3 => {
+                return Ok(Some((spec, truth)));
+            }
+            Ok(_) | Err(LabError::Diverged { .. } | LabError::NoCriticalStep { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(None)
+}
+
+/// All methods over a scene, judged.
+fn runs(spec: &SceneSpec, truth: &Truth, methods: &[Method]) -> Result<Vec<Judged>, LabError> {
+    let mut judged = Vec::new();
+    for &method in methods {
+        let multiples: Vec<u32> = match method {
+            Method::Learned(_) => networks::multiples()
+                .filter(|_| spec.damping == 20.0)
+                .map(|multiple| (multiple as f32 * DT / spec.timing.step).round() as u32)
+                .filter(|&multiple| multiple as f32 * spec.timing.step > 0.99 * 10.0 * DT)
+                .collect(),
+            Method::Tled => Vec::from([1]),
+            _ => TIMES_CRITICAL
+                .map(|times| multiple_near(&spec.timing, truth.limit_at_rest as f32, times))
+                .to_vec(),
+        };
+        for multiple in multiples {
+            let (row, _): (Row, _) = run::run_with_shapes(spec, truth, method, multiple)?;
+            judged.push(Judged::new(row, truth, spec.timing.interval_seconds()));
+        }
+    }
+    Ok(judged)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_divide_the_snapshots_and_are_near_the_wanted_ones() {
+        for critical in [2e-6_f32, 1.3e-5, 9e-5, 3e-4, 1.1e-3, 5e-3] {
+            let (timing, intervals) = timing_of(critical, 0.4);
+            assert!(timing.step < critical && timing.interval_seconds() * intervals as f64 > 0.399);
+            for multiple in networks::multiples() {
+                let learned = (multiple as f32 * DT / timing.step).round() as u32;
+                assert!(timing.hits_snapshots(learned), "{critical}: {multiple}");
+            }
+            for times in TIMES_CRITICAL {
+                let multiple = multiple_near(&timing, critical, times);
+                let ratio = multiple as f32 * timing.step / critical / times as f32;
+                assert!(
+                    timing.hits_snapshots(multiple) && (0.6..1.7).contains(&ratio),
+                    "{critical}: {ratio}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! What was wrong in a run, whether the run told, and how far off its estimates were.
+
+use std::vec::Vec;
+
+use super::super::run::{Frame, Row};
+use super::super::truth::Truth;
+
+/// A mean error below is never wrong, mm.
+const LEAST: f64 = 1.0;
+/// Nor is one below this share of the motion so far.
+const SHARE: f64 = 0.2;
+
+/// A run with what the truth says of it.
+#[derive(Clone, Debug)]
+pub struct Judged {
+    /// The run.
+    pub row: Row,
+    /// Mean motion of the nodes in the truth so far, at each snapshot, mm.
+    pub motion: Vec<f64>,
+    /// Between two snapshots, s.
+    pub interval: f64,
+}
+
+/// What became of a run.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum Verdict {
+    /// Never wrong.
+    Right,
+    /// Wrong, with a word at every wrong snapshot; or refused.
+    Told,
+    /// Wrong at a snapshot, and all steps since the one before were `ok`.
+    Silent,
+}
+
+impl Judged {
+    /// A run of a scene with this truth.
+    pub(super) fn new(row: Row, truth: &Truth, interval: f64) -> Self {
+        let mut most = 0.0_f64;
+        let motion = truth.snapshots.iter().map(|shape| {
+            let length = |u: &[f32; 3]| u.iter().map(|u| f64::from(*u).powi(2)).sum::<f64>().sqrt();
+            most = most.max(1e3 * shape.iter().map(length).sum::<f64>() / shape.len() as f64);
+            most
+        });
+        Self { motion: motion.collect(), row, interval }
+    }
+
+    /// The snapshots that were reached, with the motion so far, mm.
+    fn frames(&self) -> impl Iterator<Item = (usize, &Frame, f64)> {
+        self.row.frames.iter().zip(&self.motion).enumerate().map(|(at, (frame, motion))| (at, frame, *motion))
+    }
+
+    fn wrong(&self) -> impl Iterator<Item = (usize, &Frame)> {
+        // An error that is no number is wrong.
+        let wrong =
+            |frame: &Frame, motion: f64| frame.mean.is_nan() || frame.mean > LEAST.max(SHARE * motion);
+        self.frames()
+            .filter(move |(_, frame, motion)| wrong(frame, *motion))
+            .map(|(at, frame, _)| (at, frame))
+    }
+
+    /// What became of it.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        if self.wrong().any(|(_, frame)| frame.ok) {
+            Verdict::Silent
+        } else if self.wrong().next().is_some() || self.row.figures().is_none() {
+            Verdict::Told
+        } else {
+            Verdict::Right
+        }
+    }
+
+    /// Snapshots that are wrong without a word.
+    #[must_use]
+    pub fn silent(&self) -> usize {
+        self.wrong().filter(|(_, frame)| frame.ok).count()
+    }
+
+    /// The snapshot with the largest mean error.
+    #[must_use]
+    pub fn worst(&self) -> Option<&Frame> {
+        self.row.frames.iter().max_by(|a, b| a.mean.total_cmp(&b.mean))
+    }
+
+    /// Time of the first wrong snapshot, s.
+    #[must_use]
+    pub fn wrong_from(&self) -> Option<f64> {
+        self.wrong().next().map(|(at, _)| (at + 1) as f64 * self.interval)
+    }
+
+    /// Mean motion of the truth, mm.
+    #[must_use]
+    pub fn motion(&self) -> f64 {
+        self.motion.last().copied().unwrap_or_default()
+    }
+
+    /// True mean errors over estimates, of snapshots with an estimate and an error above a hundredth of a millimetre and a thousandth
+    /// of the motion.
+    pub fn ratios(&self) -> impl Iterator<Item = f64> {
+        self.frames().filter_map(|(_, frame, motion)| {
+            (frame.mean > f64::max(0.01, 1e-3 * motion)).then_some(frame.mean / frame.estimate?)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::measure::Errors;
+    use crate::lab::method::Method;
+    use crate::lab::run::{End, Figures};
+    use std::vec;
+
+    fn judged(frames: &[(f64, bool)]) -> Verdict {
+        let frames: Vec<Frame> =
+            frames.iter().map(|&(mean, ok)| Frame { mean, max: mean, estimate: None, ok }).collect();
+        let figures = Figures { errors: Errors::default(), running: None, clip_share: 0.0, us_per_step: 1.0 };
+        let row = Row {
+            scene: "lobe",
+            method: Method::Multilevel,
+            multiple: 10,
+            step: 3e-4,
+            hold_at_end: 3.5,
+            hold: 3.0,
+            step_over_limit_rest: 1.5,
+            step_over_limit_trajectory: 2.0,
+            doubling: None,
+            frames,
+            end: End::Reached(figures),
+        };
+        Judged { row, motion: vec![2.0, 20.0, 20.0], interval: 0.1 }.verdict()
+    }
+
+    #[test]
+    fn wrong_is_above_a_millimetre_and_a_fifth_of_the_motion() {
+        assert_eq!(judged(&[(0.9, true), (3.9, true)]), Verdict::Right);
+        assert_eq!(judged(&[(1.1, false), (3.9, true)]), Verdict::Told);
+        assert_eq!(judged(&[(1.1, true), (3.9, true)]), Verdict::Silent);
+        // A word before or after does not help at the wrong snapshot.
+        assert_eq!(judged(&[(0.1, false), (4.1, true), (0.1, false)]), Verdict::Silent);
+        assert_eq!(judged(&[(0.1, true), (f64::NAN, true)]), Verdict::Silent);
+    }
+}
