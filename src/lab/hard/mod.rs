@@ -24,7 +24,7 @@ use std::{format, fs};
 
 use super::method::Method;
 use super::networks::{self, Size};
-use super::run::{self, Row};
+use super::run;
 use super::scenes::SceneSpec;
 use super::timing::Timing;
 use super::truth::{self, Truth};
@@ -107,7 +107,7 @@ pub fn evaluate(plan: &Plan, out: &Path, say: impl Fn(&str) + Sync) -> Result<Ve
                     let rows = found.and_then(|found| match found {
                         Some((spec, truth)) => {
                             say(&format!("{}: moves by {:.1} mm", spec.name, 1e3 * truth.most()));
-                            runs(&spec, &truth, &plan.methods)
+                            runs(&spec, &truth, &plan.methods, &say)
                         }
                         None => Ok(Vec::new()),
                     });
@@ -153,7 +153,12 @@ fn random_scene(number: u32, folder: &Path) -> Result<Option<(SceneSpec, Truth)>
 }
 
 /// All methods over a scene, judged.
-fn runs(spec: &SceneSpec, truth: &Truth, methods: &[Method]) -> Result<Vec<Judged>, LabError> {
+fn runs(
+    spec: &SceneSpec,
+    truth: &Truth,
+    methods: &[Method],
+    say: &impl Fn(&str),
+) -> Result<Vec<Judged>, LabError> {
     let mut judged = Vec::new();
     for &method in methods {
         let multiples: Vec<u32> = match method {
@@ -168,7 +173,14 @@ fn runs(spec: &SceneSpec, truth: &Truth, methods: &[Method]) -> Result<Vec<Judge
                 .to_vec(),
         };
         for multiple in multiples {
-            let (row, _): (Row, _) = run::run_with_shapes(spec, truth, method, multiple)?;
+            let row = match run::run(spec, truth, method, multiple) {
+                // Refused before it has begun: not wrong.
+                Err(LabError::Inertia(error)) => {
+                    say(&format!("{}: {} refuses: {error}", spec.name, method.name()));
+                    continue;
+                }
+                row => row?,
+            };
             judged.push(Judged::new(row, truth, spec.timing.interval_seconds()));
         }
     }
