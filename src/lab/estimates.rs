@@ -99,19 +99,7 @@ mod tests {
     fn row(error: f64, running: f64) -> Row {
         let errors = Errors { means: vec![error], sd: 0.0, max: 0.0 };
         let figures = Figures { errors, running: Some(running), clip_share: 0.0, us_per_step: 1.0 };
-        Row {
-            scene: "lobe",
-            method: Method::Multilevel,
-            multiple: 10,
-            step: 3e-4,
-            hold_at_end: 3.5,
-            hold: 3.0,
-            step_over_limit_rest: 1.5,
-            step_over_limit_trajectory: 2.0,
-            doubling: None,
-            frames: vec![],
-            end: End::Reached(figures),
-        }
+        Row::example(End::Reached(figures))
     }
 
     #[test]

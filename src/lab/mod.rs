@@ -35,10 +35,12 @@ pub mod moving;
 pub mod networks;
 pub mod physics;
 pub mod plot;
+pub(crate) mod random_numbers;
 pub mod run;
 pub mod scenes;
 pub mod sweep;
 pub mod table;
+mod threads;
 pub mod timing;
 pub mod truth;
 

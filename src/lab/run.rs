@@ -202,3 +202,23 @@ impl MaterialWork for Run<'_> {
         Ok((End::Reached(figures), frames, shapes))
     }
 }
+
+#[cfg(test)]
+impl Row {
+    /// A row for tests of what is made of rows.
+    pub(super) const fn example(end: End) -> Self {
+        Self {
+            scene: "lobe",
+            method: Method::Multilevel,
+            multiple: 10,
+            step: 3e-4,
+            hold: 3.0,
+            hold_at_end: 3.5,
+            step_over_limit_rest: 1.5,
+            step_over_limit_trajectory: 2.0,
+            doubling: None,
+            frames: Vec::new(),
+            end,
+        }
+    }
+}

@@ -118,17 +118,9 @@ mod tests {
         let errors = Errors { means: vec![1.0, 2.0], sd: 0.5, max: 4.0 };
         let figures = Figures { errors, running: Some(0.75), clip_share: 0.25, us_per_step: 150.0 };
         let row = Row {
-            scene: "lobe",
             method: Method::TledLargeStep,
-            multiple: 10,
-            step: 3e-4,
-            hold: 3.0,
-            hold_at_end: 3.5,
-            step_over_limit_rest: 1.5,
-            step_over_limit_trajectory: 2.0,
             doubling: Some(1.25),
-            frames: vec![],
-            end: End::Reached(figures),
+            ..Row::example(End::Reached(figures))
         };
         [row.clone(), Row { doubling: None, end: End::Diverged(0.0126), ..row }]
     }

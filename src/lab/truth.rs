@@ -9,13 +9,11 @@ use core::fmt;
 use std::format;
 use std::fs;
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc;
-use std::thread;
 use std::vec::Vec;
 
 use super::LabError;
 use super::scenes::SceneSpec;
+use super::threads::in_parallel;
 use crate::element::{ElementMaterial, MaterialWork};
 use crate::io::write_atomically;
 use crate::loads::Loads;
@@ -28,7 +26,6 @@ use crate::tled;
 const MAGIC: &[u8; 8] = b"suppleT1";
 /// Magic, key, nodes, snapshots, three limits, limited steps.
 const HEADER: usize = 64;
-const THREADS: usize = 2;
 
 /// The exact limit is computed at rest and at every snapshot; in between wherever the bound of [`tled::critical_step`], computed
 /// every `LOOK_STEPS` steps, has fallen by the share `FALL` below its least so far.
@@ -68,33 +65,11 @@ pub fn obtain(
     mut tick: impl FnMut(&SceneSpec, &Truth),
 ) -> Result<Vec<Truth>, LabError> {
     fs::create_dir_all(folder)?;
-    let next_scene = AtomicUsize::new(0);
-    let (sender, receiver) = mpsc::channel();
-    let mut truths: Vec<(usize, Truth)> = thread::scope(|scope| {
-        for _ in 0..THREADS {
-            let (next_scene, sender) = (&next_scene, sender.clone());
-            scope.spawn(move || {
-                loop {
-                    let index = next_scene.fetch_add(1, Ordering::Relaxed);
-                    let Some(scene) = scenes.get(index) else { break };
-                    // The receiver is gone once a truth has failed.
-                    if sender.send((index, scene, obtain_one(scene, folder))).is_err() {
-                        break;
-                    }
-                }
-            });
-        }
-        drop(sender);
-        let mut truths = Vec::new();
-        for (index, scene, truth) in receiver {
-            let truth = truth?;
-            tick(scene, &truth);
-            truths.push((index, truth));
-        }
-        Ok::<_, LabError>(truths)
-    })?;
-    truths.sort_by_key(|(index, _)| *index);
-    Ok(truths.into_iter().map(|(_, truth)| truth).collect())
+    in_parallel(
+        scenes.len(),
+        |index| obtain_one(&scenes[index], folder),
+        |index, truth| tick(&scenes[index], truth),
+    )
 }
 
 pub(super) fn obtain_one(scene: &SceneSpec, folder: &Path) -> Result<Truth, LabError> {

@@ -17,10 +17,10 @@ use burn::tensor::{Device, Tensor, TensorData};
 use sha2::{Digest, Sha256};
 
 use super::TrainError;
-use super::noise::Random;
 use super::recipe::{Decay, Recipe};
 use super::samples::Samples;
 use crate::io::write_atomically;
+use crate::lab::random_numbers::Random;
 use crate::lab::scenes;
 use crate::lab::{DT, LabError};
 use crate::learned::{FEATURES, PREDICTED};

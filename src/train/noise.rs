@@ -19,23 +19,13 @@ use std::vec::Vec;
 use glam::DVec3;
 
 use super::recipe::Noise;
+use crate::lab::random_numbers::Random;
 use crate::learned::frame::Frame;
 use crate::learned::{FEATURES, VertexInput};
 use crate::mlp::ForceInput;
 use crate::state::{NodeVector, VecState};
 
-/// SplitMix64.
-pub(super) struct Random(pub(super) u64);
-
 impl Random {
-    pub(super) fn next_u64(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
     /// Above 0, up to 1.
     pub(super) fn unit(&mut self) -> f64 {
         ((self.next_u64() >> 11) + 1) as f64 / (1u64 << 53) as f64

@@ -14,9 +14,10 @@ use std::vec::Vec;
 
 use glam::{DVec3, Vec3A};
 
-use super::noise::{Moment, MovedCopy, Random, SeenAs};
+use super::noise::{Moment, MovedCopy, SeenAs};
 use super::recipe::Recipe;
 use crate::element::{ElementMaterial, MaterialWork};
+use crate::lab::random_numbers::Random;
 use crate::lab::scenes::{self, SceneSpec};
 use crate::lab::truth::exact_step;
 use crate::lab::{DT, LabError};

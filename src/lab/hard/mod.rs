@@ -16,9 +16,6 @@ pub mod verdict;
 
 use std::path::Path;
 use std::string::String;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
 use std::vec::Vec;
 use std::{format, fs};
 
@@ -26,6 +23,7 @@ use super::method::Method;
 use super::networks::{self, Size};
 use super::run;
 use super::scenes::SceneSpec;
+use super::threads::in_parallel;
 use super::timing::Timing;
 use super::truth::{self, Truth};
 use super::{DT, LabError};
@@ -33,6 +31,9 @@ use verdict::Judged;
 
 /// Steps over the critical step of a body at rest.
 pub const TIMES_CRITICAL: [u32; 4] = [10, 20, 50, 100];
+
+/// Damping of the motions that the networks of the crate learned, 1/s.
+const TRAINED_DAMPING: f32 = 20.0;
 
 /// What to judge.
 #[derive(Clone, Debug)]
@@ -87,43 +88,18 @@ fn multiple_near(timing: &Timing, critical: f32, times: u32) -> u32 {
 
 /// Carries the plan out on two threads: truths in `out/truth/`, tables and a picture in `out`. `say` is given the progress in words.
 pub fn evaluate(plan: &Plan, out: &Path, say: impl Fn(&str) + Sync) -> Result<Vec<Judged>, LabError> {
-    const THREADS: usize = 2;
     let truths = out.join("truth");
     fs::create_dir_all(&truths)?;
-    let (count, next) = (plan.cases.len() + plan.random as usize, AtomicUsize::new(0));
-    let results = Mutex::new(Vec::new());
-    thread::scope(|scope| {
-        for _ in 0..THREADS {
-            scope.spawn(|| {
-                loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    if index >= count {
-                        break;
-                    }
-                    let found = match plan.cases.get(index) {
-                        Some(case) => with_truth(case.clone(), &truths).map(Some),
-                        None => random_scene((index - plan.cases.len()) as u32, &truths),
-                    };
-                    let rows = found.and_then(|found| match found {
-                        Some((spec, truth)) => {
-                            say(&format!("{}: moves by {:.1} mm", spec.name, 1e3 * truth.most()));
-                            runs(&spec, &truth, &plan.methods, &say)
-                        }
-                        None => Ok(Vec::new()),
-                    });
-                    if let Ok(mut results) = results.lock() {
-                        results.push((index, rows));
-                    }
-                }
-            });
-        }
-    });
-    let mut results = results.into_inner().unwrap_or_default();
-    results.sort_by_key(|(index, _)| *index);
-    let mut judged = Vec::new();
-    for (_, rows) in results {
-        judged.extend(rows?);
-    }
+    let judge = |index: usize| {
+        let found = match plan.cases.get(index) {
+            Some(case) => Some(with_truth(case.clone(), &truths)?),
+            None => random_scene((index - plan.cases.len()) as u32, &truths)?,
+        };
+        let Some((spec, truth)) = found else { return Ok(Vec::new()) };
+        say(&format!("{}: moves by {:.1} mm", spec.name, 1e3 * truth.most()));
+        runs(&spec, &truth, &plan.methods, &say)
+    };
+    let judged = in_parallel(plan.cases.len() + plan.random as usize, judge, |_, _| ())?.concat();
     report::write(&judged, out)?;
     Ok(judged)
 }
@@ -163,9 +139,10 @@ fn runs(
     for &method in methods {
         let multiples: Vec<u32> = match method {
             Method::Learned(_) => networks::multiples()
-                .filter(|_| spec.damping == 20.0)
-                .map(|multiple| (multiple as f32 * DT / spec.timing.step).round() as u32)
-                .filter(|&multiple| multiple as f32 * spec.timing.step > 0.99 * 10.0 * DT)
+                .filter(|_| spec.damping == TRAINED_DAMPING)
+                .map(|multiple| multiple as f32 * DT / spec.timing.step)
+                .filter(|multiple| (multiple - multiple.round()).abs() < 1e-3)
+                .map(|multiple| multiple.round() as u32)
                 .collect(),
             Method::Tled => Vec::from([1]),
             _ => TIMES_CRITICAL

@@ -9,6 +9,7 @@ use glam::Vec3;
 use super::super::LabError;
 use super::super::course::Course;
 use super::super::moving::critical_step;
+use super::super::random_numbers::Random;
 use super::super::scenes::{LOBE, RigidVelocity, SceneSpec, SecondTissue, bar, held_at_its_end};
 use super::timing_of;
 use crate::loads::{Motion, NodalForce};
@@ -16,21 +17,10 @@ use crate::material::{AnyLaw, Element, Exponential, NeoHookean, Tissue};
 use crate::mesh::{Bar, volume};
 use crate::scene::{Axes, Support};
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
-struct Random(u64);
-
 impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
     /// From `low` to `high`.
     fn between(&mut self, low: f32, high: f32) -> f32 {
-        low + (high - low) * ((self.next() >> 40) as f32 / (1_u32 << 24) as f32)
+        low + (high - low) * ((self.next_u64() >> 40) as f32 / (1_u32 << 24) as f32)
     }
 
     /// The same with a uniform logarithm.
@@ -39,7 +29,7 @@ impl Random {
     }
 
     fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
-        choices[(self.next() % choices.len() as u64) as usize]
+        choices[(self.next_u64() % choices.len() as u64) as usize]
     }
 
     fn chance(&mut self, share: f32) -> bool {
@@ -106,7 +96,7 @@ fn body(random: &mut Random) -> Result<SceneSpec, LabError> {
             })
             .collect();
         for index in (1..spec.tets.len()).rev() {
-            spec.tets.swap(index, (random.next() % (index as u64 + 1)) as usize);
+            spec.tets.swap(index, (random.next_u64() % (index as u64 + 1)) as usize);
         }
         if spec.tets.iter().all(|tet| volume_of(&spec, tet) > 0.0) {
             return Ok(spec);
@@ -181,13 +171,13 @@ fn load(spec: &mut SceneSpec, random: &mut Random, (shear, seconds): (f32, f32),
     let size = volume.cbrt();
     let ramp = if random.chance(0.4) { 0.0 } else { random.between(0.1, 0.8) * seconds };
     let seconds = f64::from(seconds);
-    let course = |random: &mut Random| match random.next() % 5 {
+    let course = |random: &mut Random| match random.next_u64() % 5 {
         0 => Course::Released(seconds * f64::from(random.between(0.3, 0.7))),
         1 => Course::Reversed(seconds * f64::from(random.between(0.3, 0.7))),
         2 => Course::Alternating(f64::from(random.scale(0.01, 0.5))),
         _ => Course::Steady,
     };
-    let kind = if free { random.next() % 2 } else { random.next() % 4 };
+    let kind = if free { random.next_u64() % 2 } else { random.next_u64() % 4 };
     if free && kind == 0 {
         spec.start = RigidVelocity {
             linear: (random.direction() * random.between(0.0, 0.5)).to_array(),

@@ -107,7 +107,6 @@ impl Judged {
 mod tests {
     use super::*;
     use crate::lab::measure::Errors;
-    use crate::lab::method::Method;
     use crate::lab::run::{End, Figures};
     use std::vec;
 
@@ -115,19 +114,7 @@ mod tests {
         let frames: Vec<Frame> =
             frames.iter().map(|&(mean, ok)| Frame { mean, max: mean, estimate: None, ok }).collect();
         let figures = Figures { errors: Errors::default(), running: None, clip_share: 0.0, us_per_step: 1.0 };
-        let row = Row {
-            scene: "lobe",
-            method: Method::Multilevel,
-            multiple: 10,
-            step: 3e-4,
-            hold_at_end: 3.5,
-            hold: 3.0,
-            step_over_limit_rest: 1.5,
-            step_over_limit_trajectory: 2.0,
-            doubling: None,
-            frames,
-            end: End::Reached(figures),
-        };
+        let row = Row { frames, ..Row::example(End::Reached(figures)) };
         Judged { row, motion: vec![2.0, 20.0, 20.0], interval: 0.1 }.verdict()
     }
 

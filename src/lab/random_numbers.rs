@@ -1,0 +1,14 @@
+//! Random numbers that are the same on every machine: SplitMix64 (Steele, Lea, Flood 2014).
+
+/// The generator; its state is the seed at first.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next_u64(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+}
