@@ -143,13 +143,51 @@ fn bad_meshes_are_refused_in_words() {
 }
 
 #[test]
-fn a_body_of_the_wrong_unit_is_remarked_upon() {
+fn a_wrong_unit_is_remarked_upon_with_the_place_and_the_right_one() {
     let desk = Desk::new();
-    let scene = bar(&format!("{FIX}{TIME}")).replace("[0.02, 0.02, 0.05]", "[20.0, 20.0, 50.0]");
-    let said = desk.simulate(&scene, &[]);
-    assert_eq!(said.code, 0, "{}", said.err);
-    assert!(said.err.contains("line 2: the body is 57.4456 m across; is scale right?"), "{}", said.err);
-    assert_eq!(desk.summary()["warnings"].as_array().unwrap().len(), 1);
+    let whole = bar(&format!("{FIX}{TIME}"));
+    let with = |more: &str| bar(&format!("{FIX}{more}{TIME}"));
+    let end = "[[move]]\nplane = { axis = \"z\", at = 0.05 }\n";
+    let cases = [
+        (
+            whole.replace("[0.02, 0.02, 0.05]", "[20.0, 20.0, 50.0]"),
+            "line 2: the body is 57.4456 m across; is scale right? (0.001 turns millimetres into metres)",
+        ),
+        (
+            whole.replace("density = 1000.0", "density = 1.06"),
+            "line 6: a density of 1.06 kg/m^3; tissue has about 1000 (1 g/cm^3 is 1000 kg/m^3)",
+        ),
+        (
+            whole.replace("c = 500.0", "c = 0.5").replace("d = 15000.0", "d = 15.0"),
+            "line 6: Young's modulus of the tissue is 2.967e0 Pa; soft tissue has 1e3 to 1e5 (1 kPa is 1000 Pa)",
+        ),
+        (
+            format!("gravity = [0.0, 0.0, -9810.0]\n{whole}"),
+            "gravity is 9810 m/s^2, that of the earth is 9.81 (9810 mm/s^2 is 9.81 m/s^2)",
+        ),
+        (
+            with(&format!("{end}metre = [2.0, 0.0, 0.0]\nramp = 100.0\n")),
+            "line 13: nodes move by 2 m, the body is 0.057 m across (1 mm is 0.001 m)",
+        ),
+        (
+            with(&format!("{end}metre = [0.005, 0.0, 0.0]\n")),
+            "line 13: nodes move by 5.0 mm in the first step; with a ramp they take time",
+        ),
+        (
+            with(&format!("{end}metre = [0.005, 0.0, 0.0]\nramp = 0.002\n")),
+            "line 13: nodes move at 2.50 m/s, faster than shear waves in the softest tissue (1.00 m/s), which cannot follow; a \
+             ramp of 0.010 s is slower",
+        ),
+    ];
+    for (scene, words) in cases {
+        let said = desk.simulate(&scene, &["--force"]);
+        print!("{}", said.err);
+        assert!(said.err.contains(words), "\"{words}\" is not in: {}", said.err);
+        let warnings = desk.summary()["warnings"].as_array().unwrap().clone();
+        assert!(warnings.iter().any(|warning| warning.as_str().unwrap().contains(words)), "{warnings:?}");
+    }
+    let said = desk.simulate(&whole, &["--force"]);
+    assert_eq!((said.code, said.err.as_str()), (0, ""));
 }
 
 #[test]

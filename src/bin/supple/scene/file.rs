@@ -154,6 +154,11 @@ impl SceneFile {
         Problem(format!("{}: {message}", self.place(at)))
     }
 
+    /// Where it is.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// The file and the line of something in it.
     pub(crate) fn place<T>(&self, at: &Spanned<T>) -> String {
         format!("{}, line {}", self.path.display(), line_of(&self.text, at.span().start))

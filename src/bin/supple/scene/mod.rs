@@ -6,6 +6,7 @@ pub(crate) mod body;
 pub(crate) mod file;
 pub(crate) mod learned;
 pub(crate) mod loads;
+mod plausible;
 pub(crate) mod select;
 pub(crate) mod setup;
 pub(crate) mod timing;

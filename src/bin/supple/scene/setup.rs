@@ -10,13 +10,11 @@ use super::body::{Body, read_body};
 use super::file::SceneFile;
 use super::learned::LearnedChoice;
 use super::loads::read_loads;
+use super::plausible;
 use super::timing::{Timing, method_name};
 use super::tissues::Tissues;
 use crate::element_name::element_named;
 use crate::problem::Problem;
-
-/// Diagonals of bodies that are believed without a remark, m.
-const USUAL_DIAGONALS: std::ops::RangeInclusive<f64> = 1e-3..=5.0;
 
 /// A scene ready to be built.
 pub(crate) struct Setup {
@@ -39,14 +37,6 @@ impl Setup {
     pub(crate) fn read(file: &SceneFile) -> Result<Self, Problem> {
         let scene = &file.scene;
         let body = read_body(file, &scene.mesh)?;
-        let mut warnings = vec![];
-        let diagonal = body.diagonal();
-        if !USUAL_DIAGONALS.contains(&diagonal) {
-            let warning = format!(
-                "the body is {diagonal:.4} m across; is scale right? (0.001 turns millimetres into metres)"
-            );
-            warnings.push(file.problem(&scene.mesh, warning).to_string());
-        }
         let gravity = file.gravity()?;
         if let Some(at) = &scene.damping
             && let damping = *at.get_ref()
@@ -65,6 +55,7 @@ impl Setup {
         };
         let (supports, forces, motions) = read_loads(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
+        let mut warnings = plausible::warnings(file, &body, &tissues, gravity);
         let element = read_element(file, learned.as_ref())?;
         let of_the_network = learned.as_ref().filter(|_| scene.mesh.get_ref().element.is_none());
         warnings.extend(locking(&file.place(&scene.mesh), of_the_network, element, &tissues));

@@ -58,6 +58,11 @@ impl Tissues {
         self.tissues.iter().map(|tissue| tissue.law.moduli())
     }
 
+    /// Of each tissue, kg/m^3.
+    pub(crate) fn densities(&self) -> impl Iterator<Item = f32> {
+        self.tissues.iter().map(|tissue| tissue.density)
+    }
+
     /// Whether all of it is the tissue that a network learned from.
     pub(crate) fn is_of(&self, recipe: &Recipe<'_>) -> bool {
         let same_tissue = |Tissue { law, density }: &Tissue<AnyLaw>| {
