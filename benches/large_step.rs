@@ -11,7 +11,7 @@ mod common {
 
 use common::bar::{self, DAMPING, DT, moved};
 use common::pairs::{median, seconds};
-use common::scaled::{CYCLE, damped, multilevel, scaled};
+use common::scaled::{CYCLE, damped, guarded, multilevel, scaled};
 use criterion::{BenchmarkId, Criterion, Throughput};
 use supple::inertia::Method;
 use supple::loads::Loads;
@@ -19,6 +19,8 @@ use supple::state::VecState;
 use supple::step::Step;
 use supple::tled;
 
+/// Steps in one of a guard's second run.
+const EVERY: [u32; 3] = [2, 3, 10];
 /// How many times longer than the exact one the steps are.
 const MULTIPLE: f32 = 20.0;
 const LONGEST: f32 = 100.0;
@@ -52,6 +54,8 @@ fn main() {
     let mut longest_damped = scaled(&scene, &loads, &points, LONGEST, damped());
     let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, Method::MassScaled);
     let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, multilevel());
+    let mut with_guards =
+        EVERY.map(|every| guarded(&scene, &loads, &points, MULTIPLE, damped(), Some(every)));
     let mut damped = scaled(&scene, &loads, &points, MULTIPLE, damped());
 
     let mut group = criterion.benchmark_group("beyond the critical step");
@@ -64,6 +68,7 @@ fn main() {
 
     let mut times = Vec::new();
     let mut ratios = [const { Vec::new() }; 5];
+    let mut guards = [const { Vec::new() }; EVERY.len()];
     for _ in 0..PAIRS {
         let one = seconds(|| (0..CYCLE).for_each(|_| exact())) / f64::from(CYCLE);
         let others = [
@@ -73,6 +78,9 @@ fn main() {
             seconds(|| (0..CYCLE).for_each(|_| damped())) / f64::from(CYCLE),
             seconds(|| (0..CYCLE).for_each(|_| longest_damped())) / f64::from(CYCLE),
         ];
+        for (guards, guarded) in guards.iter_mut().zip(&mut with_guards) {
+            guards.push(seconds(|| (0..CYCLE).for_each(|_| guarded())) / f64::from(CYCLE) / others[3]);
+        }
         times.push(one);
         for (ratios, other) in ratios.iter_mut().zip(others) {
             ratios.push(other / one);
@@ -88,6 +96,10 @@ fn main() {
          length multilevel {longest_ratio:.2} times. Damped: {damped_ratio:.2} times, the \
          dearest step {most_damped:.2} times, at {LONGEST} times its length {longest_damped_ratio:.2} times",
         median(times) * 1e6,
+    );
+    println!(
+        "damped steps with a guard whose second run takes one step in {EVERY:?}: {:.2?} times those without",
+        guards.map(median)
     );
     criterion.final_summary();
 }

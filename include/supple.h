@@ -64,7 +64,7 @@
  * Version of the interface: of structures, of functions' arguments, of what statuses mean. Put it into
  * the field `abi` of every configuration; a library of another version refuses it.
  */
-#define SUPPLE_ABI 3
+#define SUPPLE_ABI 4
 
 /**
  * No node, element or axis.
@@ -212,6 +212,10 @@ enum supple_status
      * A learned step was not to be believed and was undone; the exact step has taken over for good.
      */
     SUPPLE_FELL_BACK = 3,
+    /**
+     * A supple_guard estimates that the error is more than is allowed.
+     */
+    SUPPLE_INEXACT = 4,
     /**
      * A pointer that must not be NULL is.
      */
@@ -406,6 +410,11 @@ typedef enum supple_status supple_status;
 typedef int32_t supple_status;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
+
+/**
+ * A second run of a state. One thread at a time. It may be copied with memcpy together with its state.
+ */
+typedef struct supple_guard supple_guard;
 
 /**
  * Inertia for steps of one length, computed anew a little in each step. One thread at a time. It may be copied with memcpy
@@ -742,10 +751,6 @@ typedef struct {
      */
     float lattice_share;
     /**
-     * Steps of a supple_large: estimate of the error so far, m, mean over the nodes; it tells the scale and is no bound.
-     */
-    float error_estimate;
-    /**
      * What stopped the call, with place and value; status SUPPLE_OK if nothing did.
      */
     supple_error error;
@@ -878,6 +883,62 @@ typedef struct {
      */
     size_t weights_bytes;
 } supple_large_config;
+
+/**
+ * What a guard needs.
+ */
+typedef struct {
+    /**
+     * sizeof(supple_guard_config).
+     */
+    uint32_t struct_size;
+    /**
+     * SUPPLE_ABI.
+     */
+    uint32_t abi;
+    /**
+     * Length of the steps that are guarded, s, and their damping, 1/s.
+     */
+    float seconds;
+    float damping;
+    /**
+     * How many times as long the second run's steps are, at least 1 and at least the number of steps between two calls of
+     * supple_guard_follow. More costs less time, about a multilevel step in so many, and calls more right steps inexact. 3 is a good
+     * choice, the steps of a frame another; 1 for learned steps.
+     */
+    uint32_t every;
+    /**
+     * Mean error of the nodes that is allowed, m; 0: a fifth of the mean motion so far, where that is more than a millimetre and a
+     * hundredth of the size of the body.
+     */
+    float tolerance;
+} supple_guard_config;
+
+/**
+ * What a guard estimates, m.
+ */
+typedef struct {
+    /**
+     * 1 if there is an estimate: after the first comparison. 0: the other fields mean nothing.
+     */
+    uint32_t known;
+    /**
+     * The node with the largest error.
+     */
+    uint32_t node;
+    /**
+     * Mean error of the nodes.
+     */
+    float mean;
+    /**
+     * The largest.
+     */
+    float largest;
+    /**
+     * What is allowed for the mean.
+     */
+    float allowed;
+} supple_estimate;
 
 #ifdef __cplusplus
 extern "C" {
@@ -1228,6 +1289,49 @@ supple_status supple_large_step(const supple_scene *scene,
                                 uint32_t count,
                                 const supple_threads *threads,
                                 supple_report *report);
+
+/**
+ * Writes how many bytes of memory a supple_guard needs for a scene.
+ *
+ * @param points the points that the scene was built from, three coordinates each.
+ * @param error may be NULL.
+ */
+supple_status supple_guard_size(const supple_scene *scene,
+                                const float *points,
+                                size_t *bytes,
+                                supple_error *error);
+
+/**
+ * Prepares a guard, from the state as it is, in `memory` of at least supple_guard_size bytes, aligned to SUPPLE_ALIGN. It takes as
+ * long as some steps.
+ *
+ * @param points the points that the scene was built from, three coordinates each.
+ * @param error may be NULL.
+ */
+supple_status supple_guard_init(void *memory,
+                                size_t bytes,
+                                const supple_scene *scene,
+                                supple_state *state,
+                                const float *points,
+                                const supple_guard_config *config,
+                                supple_guard **guard,
+                                supple_error *error);
+
+/**
+ * To be called after each call that moves the state, with the same loads, at the latest after `every` steps of the configuration.
+ * Now and then it moves the second run and compares. SUPPLE_INEXACT if the estimate exceeds what is allowed. A state that was reset or
+ * restored begins a new second run.
+ *
+ * @param loads as of the steps; NULL: nothing, supports stand still.
+ * @param threads NULL: the calling thread alone.
+ * @param estimate may be NULL.
+ */
+supple_status supple_guard_follow(const supple_scene *scene,
+                                  supple_loads *loads,
+                                  supple_state *state,
+                                  supple_guard *guard,
+                                  const supple_threads *threads,
+                                  supple_estimate *estimate);
 
 #ifdef __cplusplus
 }  // extern "C"

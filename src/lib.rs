@@ -50,6 +50,7 @@
 #![cfg_attr(feature = "std", doc = "```")]
 #![cfg_attr(not(feature = "std"), doc = "```ignore")]
 #![doc = include_str!("doc_common.txt")]
+//! use supple::guard::{EVERY, Guard};
 //! use supple::inertia::{Cells, Damper, LargeStep, Method};
 //!
 //! # #[repr(align(64))] struct Aligned<T: ?Sized>(T);
@@ -58,11 +59,16 @@
 //! let method = Method::Damped(damper, Cells::Given([1, 1, 4]));
 //! let step = Step::unchecked(20.0 * critical.seconds, 20.0)?;
 //! let mut damped = LargeStep::prepare_in_vec(method, scene.view(), &points, state.view(), step)?;
+//! // A second run, three times as long in each step, estimates the error.
+//! let mut guard = Guard::prepare_in_vec(scene.view(), &points, state.view(), step, EVERY)?;
 //! while state.time() < 0.2 {
 //!     let status = damped.step(scene.view(), &loads, state.view());
+//!     let status = guard.follow(status, scene.view(), &loads, &state.view());
 //!     assert!(status.is_taken(), "{status:?}");
 //! }
-//! println!("off by about {:.3} mm", 1e3 * damped.report().error);
+//! if let Some(estimate) = guard.estimate() {
+//!     println!("off by at most about {:.3} mm on average", 1e3 * estimate.mean);
+//! }
 //! # assert!(state.displacements()[94].to_array()[0] > 0.003);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -108,6 +114,7 @@
 //! | [`loads`] | what acts on it, set when the host likes: forces, traction, gravity, prescribed motion |
 //! | [`step`] | the protocol of every step: begin, compute, energy balance, accept or refuse; threads |
 //! | [`tled`] | the exact step and the critical step |
+//! | [`guard`] | may a step be believed: a second run that estimates its error |
 //! | [`inertia`] | steps beyond the critical one: mass-scaled, multilevel, damped |
 //! | [`mlp`] | dense layers: the forward pass, the weight file |
 //! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
@@ -141,6 +148,7 @@ extern crate std;
 mod capi;
 pub mod element;
 mod energy_balance;
+pub mod guard;
 mod heap_sort;
 pub mod inertia;
 pub mod learned;

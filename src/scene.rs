@@ -14,7 +14,7 @@ use crate::element::{
     ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, PatchBuilder,
     PatchRow, Patches, VolumeRows, element_fields, patch_energies, volume_energy_difference,
 };
-use crate::material::{Element, Law, Laws, Material, releasable_energy};
+use crate::material::{Element, Law, Laws, Material, Moduli, releasable_energy};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
 use crate::mesh::strips::Numbered;
 use crate::mesh::{Mesh, MeshError, volume};
@@ -240,7 +240,7 @@ impl SceneFacts {
         self.patch_rows
     }
 
-    /// Energy that the material can release from rest, J; zero for the isochoric laws.
+    /// Energy that the material can release from rest, J, almost zero for the isochoric laws.
     pub(crate) const fn releasable_energy(&self) -> f64 {
         self.releasable_energy
     }
@@ -302,8 +302,11 @@ fn find_slots(
     }
 }
 
+/// A strain whose energy proves nothing: rounding and the noise of a network may have put it there.
+const ROUNDED_STRAIN: f64 = 1e-4;
+
 /// Adds a quarter of each element's mass to each of its nodes, whose supports have been marked. Gives the mass (kg) and the energy
-/// that the material can release from rest (J).
+/// that the material can release from rest, with that of a rounded strain (J).
 fn lump_masses(
     material: &impl Material,
     mesh: &Mesh<'_>,
@@ -324,7 +327,8 @@ fn lump_masses(
         let volume = volume(mesh.corners(tet));
         let share = 0.25 * volume * f64::from(tissue.density);
         mass += 4.0 * share;
-        releasable += volume * releasable_energy(&tissue.law);
+        let rounding = 0.5 * Moduli::of(&tissue.law).shear * ROUNDED_STRAIN * ROUNDED_STRAIN;
+        releasable += volume * (releasable_energy(&tissue.law) + rounding);
         for node in tet {
             if let Some(inertia) = nodes.get_mut(node as usize) {
                 inertia.mass += share as f32;

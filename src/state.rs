@@ -25,7 +25,21 @@ pub struct Progress {
     pub(crate) extremes: Extremes<f32>,
 }
 
+/// Tells a state from others that have taken as many steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Moment {
+    steps: u64,
+    time: f64,
+    work: f64,
+    kinetic: f64,
+}
+
 impl Progress {
+    pub(crate) const fn moment(&self) -> Moment {
+        let EnergyBalance { work, kinetic, .. } = self.energy_balance;
+        Moment { steps: self.steps, time: self.time, work, kinetic }
+    }
+
     /// At rest, at time zero.
     pub const START: Self =
         Self { time: 0.0, steps: 0, energy_balance: EnergyBalance::NEW, dt: 0.0, extremes: Extremes::REST };

@@ -1,5 +1,6 @@
 //! Mass-scaled, multilevel and damped steps on the paper's bar.
 
+use supple::guard::Guard;
 use supple::inertia::{Cells, Damper, LargeStep, Method};
 use supple::loads::Loads;
 use supple::material::Exponential;
@@ -34,12 +35,33 @@ pub(crate) fn scaled<'a>(
     multiple: f32,
     method: Method<'static>,
 ) -> impl FnMut() + use<'a> {
+    guarded(scene, loads, points, multiple, method, None)
+}
+
+/// The same with a guard whose second run takes one step in `every`, if any.
+pub(crate) fn guarded<'a>(
+    scene: &'a BarScene<Exponential>,
+    loads: &'a Loads<'a>,
+    points: &[[f32; 3]],
+    multiple: f32,
+    method: Method<'static>,
+    every: Option<u32>,
+) -> impl FnMut() + use<'a> {
     let mut state = VecState::at_rest(points.len());
     let step = Step::unchecked(multiple * DT, DAMPING).expect("a positive step");
     let mut large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step)
         .expect("the bar can be prepared");
     assert!(CYCLE.is_multiple_of(large.model().cycle()), "the steps below are no whole cycles");
-    let mut run = move || moved(large.step(scene.view(), loads, state.view()));
+    let mut guard = every.map(|every| {
+        Guard::prepare_in_vec(scene.view(), points, state.view(), step, every).expect("a guard of the bar")
+    });
+    let mut run = move || {
+        let status = large.step(scene.view(), loads, state.view());
+        moved(match &mut guard {
+            Some(guard) => guard.follow(status, scene.view(), loads, &state.view()),
+            None => status,
+        });
+    };
     (0..2 * CYCLE).for_each(|_| run());
     run
 }

@@ -243,7 +243,7 @@ pub unsafe extern "C" fn supple_large_step(
         }));
         report.close(&state);
         (report.held_back, report.added_mass) = (held_back, model.report().added_mean);
-        (report.lattice_share, report.error_estimate) = (lattice_share, model.report().error);
+        report.lattice_share = lattice_share;
         answer(&status)
     };
     // SAFETY: as above.

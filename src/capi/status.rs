@@ -32,6 +32,8 @@ pub enum supple_status {
     SUPPLE_OUTSIDE = 2,
     /// A learned step was not to be believed and was undone; the exact step has taken over for good.
     SUPPLE_FELL_BACK = 3,
+    /// A supple_guard estimates that the error is more than is allowed.
+    SUPPLE_INEXACT = 4,
 
     /// A pointer that must not be NULL is.
     SUPPLE_E_NULL = -1,
@@ -354,6 +356,7 @@ impl From<InertiaError> for supple_error {
                 is(SUPPLE_E_LATTICE)
             }
             InertiaError::Points { points, nodes } => mismatch(points, nodes),
+            InertiaError::Step { seconds, most } => is(SUPPLE_E_STEP).value(seconds.into(), most.into()),
             InertiaError::NotFinite { node } => is(SUPPLE_E_TOO_STIFF).node(node),
         }
     }
@@ -372,6 +375,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         1 => c"steps were taken, but are not exact",
         2 => c"learned steps were taken, with inputs outside what training has seen",
         3 => c"a learned step was not to be believed: the exact step has taken over",
+        4 => c"the error is estimated to be more than is allowed",
         -1 => c"a pointer is NULL",
         -2 => c"a pointer is not aligned",
         -3 => c"fewer bytes or floats than needed",

@@ -75,8 +75,6 @@ pub struct supple_report {
     /// Multilevel and damped steps: the least share of the lattice's motion that was used in a step; below 0.5 it is remarked
     /// upon.
     pub lattice_share: f32,
-    /// Steps of a supple_large: estimate of the error so far, m, mean over the nodes; it tells the scale and is no bound.
-    pub error_estimate: f32,
     /// What stopped the call, with place and value; status SUPPLE_OK if nothing did.
     pub error: supple_error,
 }
@@ -96,7 +94,6 @@ impl supple_report {
         added_mass: 0.0,
         held_back: 0,
         lattice_share: 1.0,
-        error_estimate: 0.0,
         error: supple_error::NONE,
     };
 
@@ -128,6 +125,7 @@ pub(super) fn answer(status: &Status) -> Answer<supple_status> {
     match *status {
         Status::Ok => Ok(SUPPLE_OK),
         Status::Limited { .. } => Ok(SUPPLE_LIMITED),
+        Status::Inexact { .. } => Ok(SUPPLE_INEXACT),
         Status::Diverged(Divergence { node, cause, .. }) => Err(match cause {
             Cause::NotFinite => supple_error::from(SUPPLE_E_DIVERGED).node(node),
             Cause::Energy { kinetic, available } => {
@@ -194,7 +192,7 @@ pub(super) fn take_steps(
         report.enter(&status, state);
         match status {
             Status::Ok => {}
-            Status::Limited { .. } => worst = status,
+            Status::Limited { .. } | Status::Inexact { .. } => worst = status,
             refused => return refused,
         }
     }

@@ -10,14 +10,13 @@ use crate::loads::Loads;
 use crate::material::Element;
 use crate::scene::SceneView;
 use crate::simd::{Contiguous, NodeVector};
-use crate::state::StateView;
+use crate::state::{Moment, Progress, StateView};
 use crate::step::{CallingThread, Status, Step, Threads, nodal_volumes};
 
 use super::damper::RoughMotion;
-use super::estimate::ErrorEstimate;
-use super::lattice::{self, Grid, Lattice, LatticeNode, node_at, rank_of, sort_by_cell};
+use super::lattice::{Grid, Lattice, LatticeNode, node_at, rank_of, sort_by_cell};
 use super::matrices::Matrices;
-use super::method::{Method, largest_grid, vectors_for_lattice, vectors_of_order, vectors_of_places};
+use super::method::{Cells, Method, largest_grid, vectors_for_lattice, vectors_of_order, vectors_of_places};
 use super::node::Scaling;
 use super::node_tables::{NodeTables, read_matrices};
 use super::patches::sort_by_patch;
@@ -37,16 +36,17 @@ pub struct LargeModel<'w> {
     pub(super) moved_elements: usize,
     /// Checksum of the scene.
     scene: u32,
-    /// Steps of the state after the latest step, or at the preparation: inertia belongs to that state.
-    pub(super) steps: u64,
+    /// The state after the latest step, or at the preparation: inertia belongs to it.
+    pub(super) moment: Moment,
     pub(super) method: Method<'w>,
     /// Rough motion in the latest damped step.
     pub(super) rough: RoughMotion,
+    /// The next step, at most as long as the one that it was prepared for.
     pub(super) step: Step,
+    prepared: Step,
     pub(super) lattice: Lattice,
     pub(super) refresh: Refresh,
     pub(super) scaling: Scaling,
-    pub(super) estimate: ErrorEstimate,
     /// The least share of its inverse inertia that a node used in the latest step.
     pub(super) least_share: f32,
     pub(super) report: Report,
@@ -99,8 +99,8 @@ impl<'w> LargeModel<'w> {
         storage: &mut [NodeVector],
     ) -> Result<Self, InertiaError> {
         let grid = checked_grid(&method, scene, points)?;
-        let mut model = Self::new(method, scene, points, step, grid);
-        model.first_cycle(grid, scene, points, state, storage)?;
+        let mut model = Self::new(method, scene, step, grid);
+        model.first_cycles(grid, scene, points, state, storage)?;
         Ok(model)
     }
 
@@ -115,37 +115,60 @@ impl<'w> LargeModel<'w> {
         storage: &mut [NodeVector],
     ) -> Result<&'m mut Self, InertiaError> {
         let grid = checked_grid(&method, scene, points)?;
-        let model = place.write(Self::new(method, scene, points, step, grid));
-        model.first_cycle(grid, scene, points, state, storage)?;
+        let model = place.write(Self::new(method, scene, step, grid));
+        model.first_cycles(grid, scene, points, state, storage)?;
         Ok(model)
+    }
+
+    /// The first cycle, with coarser lattices as long as single precision cannot invert the matrices of a suggested one.
+    fn first_cycles<M: ElementMaterial>(
+        &mut self,
+        mut grid: Grid,
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        mut state: StateView<'_>,
+        storage: &mut [NodeVector],
+    ) -> Result<(), InertiaError> {
+        loop {
+            let answer = self.first_cycle(grid, scene, points, state.reborrow(), storage);
+            if !matches!(answer, Err(InertiaError::Singular { .. }))
+                || self.method.cells() != Some(Cells::Suggested)
+            {
+                return answer;
+            }
+            let coarser = largest_grid(scene, points, grid.functions);
+            if coarser.functions == 0 {
+                return answer;
+            }
+            grid = coarser;
+            self.lattice = Lattice::NONE;
+            self.refresh = Self::refresh_of(scene, self.step, grid);
+        }
+    }
+
+    fn refresh_of<M: ElementMaterial>(scene: SceneView<'_, M>, step: Step, grid: Grid) -> Refresh {
+        let cells = grid.cells.iter().map(|&count| count as usize).product();
+        Refresh::new(cycle(step, grid.functions > 0), scene, grid.functions, cells)
     }
 
     /// A model without its lattice. Always inlined: it is made where it stays.
     #[inline(always)]
-    fn new<M: ElementMaterial>(
-        method: Method<'w>,
-        scene: SceneView<'_, M>,
-        points: &[[f32; 3]],
-        step: Step,
-        grid: Grid,
-    ) -> Self {
+    fn new<M: ElementMaterial>(method: Method<'w>, scene: SceneView<'_, M>, step: Step, grid: Grid) -> Self {
         let (nodes, has_lattice) = (scene.node_count(), grid.functions > 0);
-        let size = lattice::size_of(points);
-        let cells = grid.cells.iter().map(|&count| count as usize).product();
         Self {
             nodes,
             elements: scene.element_count(),
             element: M::ELEMENT,
             moved_elements: 0,
             scene: scene.checksum(),
-            steps: 0,
+            moment: Progress::START.moment(),
             method,
             rough: RoughMotion::NONE,
             step,
+            prepared: step,
             scaling: scaling(step, has_lattice),
-            refresh: Refresh::new(cycle(step, has_lattice), scene, grid.functions, cells),
+            refresh: Self::refresh_of(scene, step, grid),
             lattice: Lattice::NONE,
-            estimate: ErrorEstimate::new(libm::hypotf(libm::hypotf(size[0], size[1]), size[2])),
             least_share: 1.0,
             report: Report::NONE,
         }
@@ -182,7 +205,7 @@ impl<'w> LargeModel<'w> {
             self.moved_elements = sort_by_patch(order, scene, &self.lattice, places);
         }
         let StateView { displacement, increment, volume, progress, .. } = state;
-        self.steps = progress.steps;
+        self.moment = progress.moment();
         let nodes = self.nodes;
         let displacement = displacement.get(..nodes).unwrap_or_default();
         nodal_volumes(scene, displacement, volume, &CallingThread);
@@ -197,7 +220,7 @@ impl<'w> LargeModel<'w> {
             scaling: &self.scaling,
         };
         self.refresh.whole_cycle(input, &mut tables, &mut matrices);
-        self.report = self.refresh.added.report(0, 1.0, 0.0);
+        self.report = self.refresh.added.report(0, 1.0);
         let unbounded = (0..nodes).find(|&node| {
             let at = Contiguous(rank_of(places, node));
             let (inverse, [scalar, _]) =
@@ -228,7 +251,7 @@ impl<'w> LargeModel<'w> {
             &self.lattice
         } else {
             // Mass scaling has a lattice only to define frames.
-            let Grid { cells, functions } = largest_grid(scene, points);
+            let Grid { cells, functions } = largest_grid(scene, points, usize::MAX);
             let cells = if functions > 0 { cells } else { [1; 3] };
             of_frames.set(cells, points, scene.inertia)?;
             &of_frames
@@ -264,6 +287,25 @@ impl<'w> LargeModel<'w> {
     #[must_use]
     pub const fn report(&self) -> &Report {
         &self.report
+    }
+
+    /// Length of the next steps, s: at most the one that it was prepared for, which is the longest that its inertia makes stable. A
+    /// shorter step has the inertia of that one, so it is less accurate than one that was prepared for its own length. To be changed now
+    /// and then: central differences whose step changes all the time gain energy (Skeel 1993).
+    pub fn set_seconds(&mut self, seconds: f32) -> Result<(), InertiaError> {
+        let most = self.prepared.seconds();
+        match Step::unchecked(seconds, self.prepared.damping()) {
+            Ok(step) if seconds <= most => {
+                self.step = step;
+                Ok(())
+            }
+            _ => Err(InertiaError::Step { seconds, most }),
+        }
+    }
+
+    /// The clock of the state has been set since the latest step: inertia still belongs to it.
+    pub(crate) const fn is_at(&mut self, progress: &Progress) {
+        self.moment = progress.moment();
     }
 
     /// The lattice.
@@ -342,7 +384,12 @@ impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
         &self.model.report
     }
 
-    /// Takes one step of the length for which it was prepared. Every call does the same work: one force evaluation and
+    /// See [`LargeModel::set_seconds`].
+    pub fn set_seconds(&mut self, seconds: f32) -> Result<(), InertiaError> {
+        self.model.set_seconds(seconds)
+    }
+
+    /// Takes one step of the length for which it was prepared, or that was set since ([`LargeModel::set_seconds`]). Every call does the same work: one force evaluation and
     /// that of the lattice; more while the tissue deforms fast, and for the elements at supports that change their speed,
     /// at most a whole cycle. In a state that another step has moved, that was reset or restored, the first step computes
     /// all inertia anew. `Mismatch` with room for no node if it was prepared for another scene.

@@ -26,7 +26,8 @@ pub enum Method<'w> {
 pub enum Cells {
     /// The largest near-cubic lattice whose points are at least 1.5 times as far apart as the nodes, and whose matrices
     /// cost little to renew: with `n` unknowns, three for each function, `n^3` is at most 4000 times the number of
-    /// elements. At least four nodes for each function. No lattice if the mesh is too small for one cell.
+    /// elements. At least four nodes for each function, two where no lattice has four. A step takes a coarser one where single
+    /// precision cannot invert the matrices of this one. No lattice if the mesh is too small for one cell.
     #[default]
     Suggested,
     /// This many along x, y, z, at least one each.
@@ -38,6 +39,13 @@ impl<'w> Method<'w> {
         match self {
             Self::Damped(damper, _) => Some(damper),
             _ => None,
+        }
+    }
+
+    pub(super) const fn cells(&self) -> Option<Cells> {
+        match self {
+            Self::MassScaled => None,
+            Self::Multilevel(cells) | Self::Damped(_, cells) => Some(*cells),
         }
     }
 
@@ -62,7 +70,7 @@ impl Cells {
         points: &[[f32; 3]],
     ) -> Result<Grid, InertiaError> {
         match self {
-            Self::Suggested => Ok(largest_grid(scene, points)),
+            Self::Suggested => Ok(largest_grid(scene, points, usize::MAX)),
             Self::Given(cells) => {
                 let functions = Lattice::functions_for(cells, points, scene.inertia)?;
                 Ok(Grid { cells, functions })
@@ -120,16 +128,23 @@ pub(super) const fn vectors_of_order(element: Element, elements: usize) -> usize
 /// Least spacing of the points of a suggested lattice, as a multiple of the nodes'.
 const LEAST_SPACING: f32 = 1.5;
 
-/// Least number of nodes for each function of a suggested lattice.
-const NODES_PER_FUNCTION: usize = 4;
+/// Least number of nodes for each function of a suggested lattice, and on meshes that are too small for that.
+const NODES_PER_FUNCTION: [usize; 2] = [4, 2];
 
 /// Limit of the third power of the number of unknowns of a suggested lattice, as a multiple of the number of elements.
 const MULTIPLY_ADDS: u64 = 4000;
 /// The same for bodies with few elements: what a microsecond's worth of work more per step allows.
 const FEW_MULTIPLY_ADDS: u64 = 5_000_000;
 
-/// See [`Cells::Suggested`].
-pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Grid {
+/// See [`Cells::Suggested`]; of the lattices with fewer than `below` functions.
+pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], below: usize) -> Grid {
+    let grids = NODES_PER_FUNCTION.map(|nodes| below.min(points.len() / nodes + 1));
+    let [many, few] = grids.map(|below| grid_below(scene, points, below));
+    if many.functions > 0 { many } else { few }
+}
+
+/// The largest suitable lattice with fewer than `below` functions.
+fn grid_below<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], below: usize) -> Grid {
     let volume: f32 = scene.places().map(|(tile, lane)| tile.volume::<f32>(lane)).sum();
     let spacing = libm::cbrtf(volume / points.len().max(1) as f32);
     let least = lattice::size_of(points).map(|size| LEAST_SPACING * spacing / size);
@@ -143,7 +158,7 @@ pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> G
         };
         let unknowns = 3 * functions as u64;
         if functions > best.functions
-            && NODES_PER_FUNCTION * functions <= points.len()
+            && functions < below
             && unknowns * unknowns * unknowns
                 <= (MULTIPLY_ADDS * scene.element_count() as u64).max(FEW_MULTIPLY_ADDS)
         {

@@ -87,7 +87,6 @@ mod cells;
 mod damper;
 mod dense;
 mod direct_assembly;
-mod estimate;
 mod frames;
 mod inversion;
 mod large_step;
@@ -188,6 +187,13 @@ pub enum InertiaError {
         /// Nodes of the scene.
         nodes: usize,
     },
+    /// A step that is longer than the one that was prepared, or not a positive number.
+    Step {
+        /// The step, s.
+        seconds: f32,
+        /// The one that was prepared.
+        most: f32,
+    },
     /// The state is not finite, or so stiff that no step can be bounded.
     NotFinite {
         /// The first node for which this holds.
@@ -214,6 +220,12 @@ impl fmt::Display for InertiaError {
             ),
             Self::Points { points, nodes } => {
                 write!(f, "{points} points for a scene of {nodes} nodes")
+            }
+            Self::Step { seconds, most } => {
+                write!(
+                    f,
+                    "a step of {seconds:e} s: it must be above zero and at most the prepared {most:e} s"
+                )
             }
             Self::NotFinite { node } => write!(f, "node {node}: its stiffness is not a finite number"),
         }

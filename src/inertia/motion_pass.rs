@@ -1,5 +1,5 @@
 //! The pass over the nodes that computes the next increments, vectorised: by the nodes' own inertia, as far as their share of it
-//! allows, and by the lattice's motion. It damps rough motion. Gives sums for the energy balance, the error estimate and the damper, and
+//! allows, and by the lattice's motion. It damps rough motion. Gives sums for the energy balance and the damper, and
 //! over the nodes that were held back. With a lattice it takes the nodes in the order of the cells, so that the coefficients of a cell
 //! stay in registers.
 
@@ -10,7 +10,6 @@ use glam::Vec4;
 
 use super::cells::{CellPolynomial, VECTORS_PER_TILE, motion_at};
 use super::damper::RoughMotion;
-use super::estimate::{DefectSums, DefectTotals};
 use super::frames::Rotation;
 use super::lattice::{LatticeNode, MAX_FUNCTIONS, rank_of};
 use super::pass_input::{NodeValues, PassInput};
@@ -136,7 +135,6 @@ struct OwnMotion<R> {
 #[derive(Clone, Copy)]
 pub(super) struct PassTotals {
     pub(super) totals: Totals,
-    pub(super) defects: DefectTotals,
     pub(super) rough: RoughMotion,
     pub(super) held_back: HeldBack,
 }
@@ -145,7 +143,6 @@ pub(super) struct PassTotals {
 #[derive(Clone, Copy)]
 struct AxisSums<R> {
     sums: [Sums<R>; 3],
-    defects: [DefectSums<R>; 3],
     /// In the order of [`RoughMotion::add`].
     rough: [R; 4],
 }
@@ -153,35 +150,31 @@ struct AxisSums<R> {
 impl<R: Real> AxisSums<R> {
     #[inline(always)]
     fn new(input: &PassInput<'_>) -> Self {
-        let defects = [DefectSums::new(input.step, input.scaling, input.square, R::splat); 3];
-        Self { sums: [Sums::new(input.step, R::splat); 3], defects, rough: [R::splat(0.0); 4] }
+        Self { sums: [Sums::new(input.step, R::splat); 3], rough: [R::splat(0.0); 4] }
     }
 
     /// Adds nodes with their displacements and next increments.
     #[inline(always)]
-    fn add(&mut self, nodes: &NodeValues<R>, displacement: [R; 4], next: [R; 4]) {
+    fn add(&mut self, nodes: &NodeValues<R>, next: [R; 4]) {
         for axis in 0..3 {
             let (free, increment, force, next) =
                 (nodes.free[axis], nodes.increment[axis], nodes.force[axis], next[axis]);
             self.sums[axis].add(nodes.mass, free, increment, force, next);
-            self.defects[axis].add(nodes.mass, free, displacement[axis], increment, force, next);
         }
     }
 
     #[inline(always)]
     fn total(sums: &[Self; VECTORS_PER_TILE], rest: &AxisSums<f32>, held_back: HeldBack) -> PassTotals {
-        let (mut totals, mut defects, mut rough) = (Totals::NONE, DefectTotals::NONE, RoughMotion::NONE);
+        let (mut totals, mut rough) = (Totals::NONE, RoughMotion::NONE);
         for row in 0..TILE {
             let (sums, lane) = sums_of_row::<R, _>(sums, row);
-            let ([a, b, c], [d, e, f], [g, h, i, j]) = (&sums.sums, &sums.defects, &sums.rough);
+            let ([a, b, c], [d, e, f, g]) = (&sums.sums, &sums.rough);
             totals.add_axes(&[a.at(lane), b.at(lane), c.at(lane)]);
-            defects.add_axes(&[d.at(lane), e.at(lane), f.at(lane)]);
-            rough.add([g.lane(lane), h.lane(lane), i.lane(lane), j.lane(lane)]);
+            rough.add([d.lane(lane), e.lane(lane), f.lane(lane), g.lane(lane)]);
         }
         totals.add_axes(&rest.sums);
-        defects.add_axes(&rest.defects);
         rough.add(rest.rough);
-        PassTotals { totals, defects, rough, held_back }
+        PassTotals { totals, rough, held_back }
     }
 }
 
@@ -285,7 +278,6 @@ impl MotionPass<'_> {
     ) {
         let nodes = self.input.read::<R>(rows, self.force);
         let NodeValues { free, mass, increment, .. } = nodes;
-        let displacement = rows.read::<R>(must_cast_slice(self.input.displacement));
         let OwnMotion { own, height, share, keep } =
             self.own_motion(at, &nodes, motion.as_ref().map(|motion| motion.fine));
         held.add(share);
@@ -327,7 +319,7 @@ impl MotionPass<'_> {
                 at.write(must_cast_slice_mut(self.tables.rough), rough);
             }
         }
-        sums.add(&nodes, displacement, next);
+        sums.add(&nodes, next);
         at.write(must_cast_slice_mut(self.tables.next_increment), next);
     }
 

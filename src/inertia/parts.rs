@@ -7,7 +7,6 @@ use core::ops::Range;
 
 use super::cells::{CellPolynomial, CellSlots};
 use super::damper::RoughMotion;
-use super::estimate::DefectTotals;
 use super::lattice::LatticeNode;
 use super::motion_pass::{
     LatticeMotion, MotionPass, MotionTables, PassTotals, RotationTable, apply_increments,
@@ -185,19 +184,13 @@ fn cells_of(ranks: &Range<usize>, places: &[LatticeNode]) -> Range<usize> {
 }
 
 impl PassTotals {
-    const NONE: Self = Self {
-        totals: Totals::NONE,
-        defects: DefectTotals::NONE,
-        rough: RoughMotion::NONE,
-        held_back: HeldBack::NONE,
-    };
+    const NONE: Self = Self { totals: Totals::NONE, rough: RoughMotion::NONE, held_back: HeldBack::NONE };
 
     /// The totals of all partitions.
     fn of_all(partitions: &[Self]) -> Self {
         let mut all =
             Self { totals: Totals::of_all(partitions.iter().map(|each| &each.totals)), ..Self::NONE };
         for each in partitions {
-            all.defects.add(&each.defects);
             all.rough.merge(&each.rough);
             all.held_back.merge(&each.held_back);
         }

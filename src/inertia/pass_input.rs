@@ -11,15 +11,33 @@ use crate::padding;
 use crate::simd::{Indexed, NodeVector, Real, Rows, TILE};
 use crate::step::Step;
 
+/// Factors of the residual of a node, `D^2 f - 2 k m du`.
+#[derive(Clone, Copy)]
+pub(super) struct ResidualFactors {
+    /// `D^2`, s^2; half of it in the first step: a force that acts from the start on has acted for half a step.
+    square: f32,
+    /// `2 k`, times the ratio of the step to the last one.
+    loss: f32,
+}
+
+impl ResidualFactors {
+    /// Those of a step with the inertia of one that may be longer. Inertia contains `1 + k` times the mass: in a shorter step, with a
+    /// smaller `k`, the residual is larger by the ratio of both.
+    pub(super) fn new(step: &Step, scaling: &Scaling, is_first: bool) -> Self {
+        let k = 0.5 * step.damping() * step.seconds();
+        let ratio = (1.0 + scaling.k) / (1.0 + k);
+        let square = step.seconds() * step.seconds() * if is_first { 0.5 } else { 1.0 };
+        Self { square: ratio * square, loss: ratio * 2.0 * k * step.carry() }
+    }
+}
+
 /// Inputs of all passes.
 #[derive(Clone, Copy)]
 pub(super) struct PassInput<'a> {
     pub(super) step: &'a Step,
     pub(super) scaling: &'a Scaling,
-    /// `D^2`, s^2; half of it in the first step: a force that acts from the start on has acted for half a step.
-    pub(super) square: f32,
+    pub(super) residual: ResidualFactors,
     pub(super) inertia: &'a [NodeInertia],
-    pub(super) displacement: &'a [NodeVector],
     pub(super) increment: &'a [NodeVector],
     /// Empty without a lattice.
     pub(super) places: &'a [LatticeNode],
@@ -68,8 +86,8 @@ impl PassInput<'_> {
     #[inline(always)]
     pub(super) fn residual<R: Real>(&self, nodes: &NodeValues<R>) -> [R; 3] {
         let &NodeValues { free, mass, force: [fx, fy, fz], increment: [vx, vy, vz], .. } = nodes;
-        let loss = R::splat(2.0 * self.scaling.k * self.step.carry()) * mass;
-        let square = R::splat(self.square);
+        let ResidualFactors { square, loss } = self.residual;
+        let (square, loss) = (R::splat(square), R::splat(loss) * mass);
         [
             free[0] * (square * fx - loss * vx),
             free[1] * (square * fy - loss * vy),

@@ -1,4 +1,4 @@
-//! The report of a step beyond the critical one: added inertia, what was held back, and the error estimate.
+//! The report of a step beyond the critical one: added inertia and what was held back.
 
 /// Added inertia and its consequences, reported with every step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -17,13 +17,6 @@ pub struct Report {
     pub coarse_share: f32,
     /// Share of the rough motion that the latest damped step removed.
     pub damping: f32,
-    /// Estimate of the error that the added inertia has caused so far, m: the distance of the nodes from their
-    /// positions in the exact motion, mean over the nodes. It integrates the force that the added inertia absorbs,
-    /// along the body's displacement, since rest or since the inertia was prepared. Of 78 runs of the laboratory 58
-    /// were within a factor of three of the truth, 70 within five. It was up to nine times too high for a small error
-    /// next to a moved support, and up to eleven times too low where mass scaling hardly moves the body at all. It
-    /// gives the scale and is no bound.
-    pub error: f32,
 }
 
 impl Report {
@@ -34,7 +27,6 @@ impl Report {
         held_back: 0,
         coarse_share: 1.0,
         damping: 0.0,
-        error: 0.0,
     };
 }
 
@@ -94,7 +86,7 @@ impl AddedInertiaSums {
         self.sum / self.nodes.max(1) as f32
     }
 
-    pub(super) fn report(&self, held_back: u32, coarse_share: f32, error: f32) -> Report {
+    pub(super) fn report(&self, held_back: u32, coarse_share: f32) -> Report {
         Report {
             added_mean: self.mean(),
             added_largest: self.largest,
@@ -102,7 +94,6 @@ impl AddedInertiaSums {
             held_back,
             coarse_share,
             damping: 0.0,
-            error,
         }
     }
 }

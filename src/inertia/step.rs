@@ -8,7 +8,7 @@ use crate::element::{ElementMaterial, NodeInertia, ScalarBound};
 use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::state::{Progress, StateView};
+use crate::state::StateView;
 use crate::step::{
     CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial, nodal_volumes,
 };
@@ -16,7 +16,6 @@ use crate::step::{
 use super::cells::{prolong, restrict};
 use super::damper::RoughMotion;
 use super::dense::{Row, apply, apply_by_axis, apply_to_two, from_components, stride, to_components};
-use super::estimate::DefectTotals;
 use super::frames::{Rotation, rotate};
 use super::large_step::{LargeModel, LargeView, Storage};
 use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS, rank_of};
@@ -24,7 +23,7 @@ use super::matrices::{Matrices, of_axes};
 use super::motion_pass::{LatticeMotion, PassTotals, RoughDamping, rotation_table};
 use super::nodal_sums;
 use super::parts::NodeParts;
-use super::pass_input::PassInput;
+use super::pass_input::{PassInput, ResidualFactors};
 use super::refresh::{Refresh, RefreshInput};
 use super::report::HeldBack;
 use super::supports::{MovingSupports, Pull};
@@ -83,7 +82,6 @@ struct InertiaStep<'a, 'w, T> {
     model: &'a mut LargeModel<'w>,
     storage: Storage<'a>,
     held_back: HeldBack,
-    defects: DefectTotals,
     rough: RoughMotion,
     coarse_share: f32,
     damping: f32,
@@ -99,7 +97,6 @@ impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
             model,
             storage,
             held_back: HeldBack::NONE,
-            defects: DefectTotals::NONE,
             rough: RoughMotion::NONE,
             coarse_share: 1.0,
             damping: 0.0,
@@ -126,11 +123,9 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     }
 
     fn advance(&mut self, trial: &mut Trial<'_, M>) {
-        let (step, model) = (self.step, &mut *self.model);
-        let square = step.seconds() * step.seconds();
+        let model = &mut *self.model;
         model.rough = self.rough;
-        let Trial { scene, loads, displacement, increment, progress, .. } = trial;
-        model.estimate.advance(&self.defects, loads, progress.time, displacement, model.scaling.k, square);
+        let Trial { scene, displacement, increment, .. } = trial;
         let Storage { tables, places, .. } = &self.storage;
         node_parts(scene, self.threads).apply_increments(
             places,
@@ -145,15 +140,14 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
         let Self {
             model, storage: Storage { tables, places, order, matrices }, held_back, coarse_share, ..
         } = self;
-        let LargeModel { lattice, refresh, scaling, estimate, report, nodes, least_share, steps, .. } =
-            &mut **model;
+        let LargeModel { lattice, refresh, scaling, report, nodes, least_share, moment, .. } = &mut **model;
         *least_share = held_back.least;
         let Trial { scene, displacement, increment, volume, progress, .. } = trial;
-        *steps = progress.steps;
+        *moment = progress.moment();
         let input =
             RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
         refresh.advance(progress.steps, self.change, input, tables, matrices);
-        *report = refresh.added.report(held_back.nodes, *coarse_share, estimate.error());
+        *report = refresh.added.report(held_back.nodes, *coarse_share);
         report.damping = self.damping;
         held_back.unused > LARGEST_UNUSED * *nodes as f32 || *coarse_share < LEAST_COARSE_SHARE
     }
@@ -179,29 +173,23 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
     #[inline(never)]
     fn renew_if_stale<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) {
         let Self { model, storage: Storage { tables, places, order, matrices }, .. } = self;
-        let LargeModel { lattice, refresh, scaling, rough, least_share, steps, estimate, .. } = &mut **model;
+        let LargeModel { lattice, refresh, scaling, rough, least_share, moment, .. } = &mut **model;
         let Trial { scene, displacement, increment, volume, progress, .. } = trial;
-        if *steps == progress.steps {
+        if *moment == progress.moment() {
             return;
         }
         nodal_volumes(*scene, displacement, volume, &CallingThread);
         let input =
             RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
         refresh.renew(input, tables, matrices);
-        (*rough, *least_share, *estimate) = (RoughMotion::NONE, 1.0, estimate.cleared());
+        (*rough, *least_share) = (RoughMotion::NONE, 1.0);
         tables.rough.fill(NodeVector::ZERO);
-        *steps = progress.steps;
-    }
-
-    /// `D^2`, half of it in the first step: see [`PassInput::square`].
-    fn square(&self, progress: &Progress) -> f32 {
-        self.step.seconds() * self.step.seconds() * if progress.steps == 0 { 0.5 } else { 1.0 }
+        *moment = progress.moment();
     }
 
     /// Computes the motion of the lattice. None without one.
     #[inline(never)]
     fn move_lattice<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) -> Option<MovedLattice> {
-        let square = self.square(trial.progress);
         let Self { step, model, storage: Storage { tables, places, order, matrices }, .. } = self;
         let LargeModel { lattice, refresh, scaling, rough, method, moved_elements, least_share, .. } =
             &mut **model;
@@ -219,8 +207,8 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             volume,
         };
         let supports = supports.pull(loads, progress.time, step, increment, tables.next_increment);
-        let input =
-            PassInput { step, scaling, square, inertia: scene.inertia, displacement, increment, places };
+        let residual = ResidualFactors::new(step, scaling, progress.steps == 0);
+        let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
         let extremes =
             node_parts(scene, self.threads).restrict(input, force, tables.inverse_diagonal, cells, momentum);
@@ -245,7 +233,8 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let MotionResult { share, change, work } = motion.compute(matrices, share);
         // Without a lattice in use there is no distinction of smooth and rough motion.
         let damper = method.damper().filter(|_| refresh.lattice_in_use);
-        self.damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, scaling.k));
+        self.damping = damper
+            .map_or(0.0, |damper| step.carry() * damper.share(rough, 0.5 * step.damping() * step.seconds()));
         // Where bounds have grown beyond their margin they are out of date whatever the lattice does.
         self.change = if growth <= COARSE_GROWTH { change } else { f32::INFINITY };
         self.coarse_share = if refresh.lattice_in_use { share } else { 0.0 };
@@ -263,12 +252,11 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         trial: &mut Trial<'_, M>,
         moved: Option<MovedLattice>,
     ) -> Totals {
-        let square = self.square(trial.progress);
         let Self { step, model, storage: Storage { tables, places, matrices, .. }, .. } = self;
         let LargeModel { refresh, scaling, method, .. } = &**model;
-        let Trial { scene, displacement, increment, force, .. } = trial;
-        let input =
-            PassInput { step, scaling, square, inertia: scene.inertia, displacement, increment, places };
+        let Trial { scene, increment, force, progress, .. } = trial;
+        let residual = ResidualFactors::new(step, scaling, progress.steps == 0);
+        let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let lattice = moved.as_ref().map(|moved| LatticeMotion {
             cells: matrices.cells,
             fine: matrices.fine_cells,
@@ -280,7 +268,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let parts = node_parts(scene, self.threads);
         let passed = parts.move_nodes(input, rotations, lattice.as_ref(), force, tables);
         let mut totals;
-        PassTotals { totals, defects: self.defects, rough: self.rough, held_back: self.held_back } = passed;
+        PassTotals { totals, rough: self.rough, held_back: self.held_back } = passed;
         totals.add_work(moved.map_or(0.0, |moved| moved.work));
         totals
     }

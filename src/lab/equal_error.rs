@@ -5,8 +5,8 @@ use std::format;
 use std::string::String;
 use std::vec::Vec;
 
-use super::estimates::{LEAST, Ratios, multiples};
 use super::method::Method;
+use super::ratios::{LEAST, Ratios, multiples};
 use super::run::Row;
 
 /// Error (mm) and time of a simulated second (us).
@@ -64,7 +64,7 @@ pub fn text(rows: &[Row]) -> String {
         for method in [Method::Tled, Method::MassScaled, Method::Multilevel, Method::Damped] {
             for &multiple in &multiples {
                 let ratios = ratios(rows, method, multiple, implicit);
-                let (Some([median, least, most]), (_, scenes)) = (ratios.spread(), ratios.good()) else {
+                let (Some([median, least, most]), scenes) = (ratios.spread(), ratios.count()) else {
                     continue;
                 };
                 text += &format!(

@@ -6,9 +6,9 @@ use std::path::Path;
 use std::string::String;
 use std::vec::Vec;
 
-use super::measure::{Errors, mean_distance};
+use super::measure::Errors;
 use super::method::Method;
-use super::run::{self, Row, Shapes};
+use super::run::{self, Row};
 use super::scenes::{self, SceneSpec};
 use super::truth::{self, Truth};
 use super::{LabError, MULTIPLES, plot, sweep, table};
@@ -83,7 +83,9 @@ pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Ve
     for ((spec, truth), multiples) in specs.iter().zip(&truths).zip(multiples) {
         for method in &plan.methods {
             say(&format!("{}: {}", spec.name, method.name()));
-            rows.extend(runs(spec, truth, *method, &method.multiples(&spec.timing, &multiples))?);
+            for multiple in method.multiples(&spec.timing, &multiples) {
+                rows.push(run::run(spec, truth, *method, multiple)?);
+            }
         }
         if plan.sweep.as_deref() == Some(spec.name) {
             let curves = sweep::curves(&rows, spec.name);
@@ -100,30 +102,6 @@ pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Ve
         }
     }
     table::write_csv(&out.join("results.csv"), &rows)?;
-    Ok(rows)
-}
-
-/// Runs at multiples in ascending order. Where inertia is scaled, the error is estimated by a run with twice the step: with a
-/// method of second order it is three times the error away.
-fn runs(spec: &SceneSpec, truth: &Truth, method: Method, multiples: &[u32]) -> Result<Vec<Row>, LabError> {
-    let mut rows = Vec::new();
-    let mut latest: Option<(u32, Shapes)> = None;
-    // From the longest, so that most runs with twice the step are there already.
-    for &multiple in multiples.iter().rev() {
-        let (mut row, shapes) = run::run_with_shapes(spec, truth, method, multiple)?;
-        let twice = 2 * multiple;
-        if method.scales_inertia() && spec.timing.hits_snapshots(twice) {
-            let there = latest.take().filter(|(of, _)| *of == twice);
-            let other = match there {
-                Some((_, shapes)) => shapes,
-                None => run::run_with_shapes(spec, truth, method, twice)?.1,
-            };
-            row.doubling = mean_distance(&other, &shapes).map(|distance| distance / 3.0);
-        }
-        latest = Some((multiple, shapes));
-        rows.push(row);
-    }
-    rows.reverse();
     Ok(rows)
 }
 

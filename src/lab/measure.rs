@@ -64,17 +64,6 @@ impl Errors {
     }
 }
 
-/// Mean distance over the nodes and snapshots of two motions, mm; none if one has fewer snapshots.
-#[must_use]
-pub fn mean_distance(a: &[Vec<[f32; 3]>], b: &[Vec<[f32; 3]>]) -> Option<f64> {
-    let (mut sum, mut count) = (0.0, 0);
-    for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
-        sum += 1e3 * distance(*a, *b);
-        count += 1;
-    }
-    (a.len() == b.len() && count > 0).then(|| sum / f64::from(count))
-}
-
 fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
     let square: f64 = a.into_iter().zip(b).map(|(a, b)| (f64::from(a) - f64::from(b)).powi(2)).sum();
     square.sqrt()

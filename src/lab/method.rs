@@ -79,8 +79,6 @@ pub type Advance<'a> =
 /// What a step tells about itself, if its method has it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StepReport {
-    /// Estimate of the error so far, m.
-    pub estimate: Option<f32>,
     /// Share of the vertices whose prediction was clipped.
     pub clipped: Option<f32>,
 }
@@ -185,7 +183,7 @@ impl Method {
             let mut large = LargeStep::prepare_in_vec(method, scene, &spec.points, state.view(), step)?;
             let advance: Advance<'a> = Box::new(move |state, loads| {
                 let status = large.step(scene, loads, state.view());
-                Ok((status, StepReport { estimate: Some(large.report().error), clipped: None }))
+                Ok((status, StepReport::default()))
             });
             Ok(advance)
         };
@@ -269,7 +267,7 @@ fn learned<'a, M: ElementMaterial>(
             return Ok((status, StepReport::default()));
         }
         let status = learned.view().step(scene, loads, state, &trained, &CallingThread)?;
-        Ok((status, StepReport { estimate: None, clipped: Some(learned.model().report().clipped) }))
+        Ok((status, StepReport { clipped: Some(learned.model().report().clipped) }))
     }))
 }
 

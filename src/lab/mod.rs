@@ -15,7 +15,6 @@
 //! | [`run`] | one method, one scene, one step: a row |
 //! | [`measure`] | errors of a motion against the truth |
 //! | [`evaluate`] | rows as asked for in a [`evaluate::Plan`] |
-//! | [`estimates`] | how well methods estimate their own error |
 //! | [`equal_error`] | how much longer implicit steps take for the same error |
 //! | [`hard`] | is a run ever wrong without a word? |
 //! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
@@ -25,7 +24,6 @@
 pub mod course;
 pub mod equal_error;
 mod error;
-pub mod estimates;
 pub mod evaluate;
 pub mod hard;
 pub mod implicit;
@@ -36,6 +34,7 @@ pub mod networks;
 pub mod physics;
 pub mod plot;
 pub(crate) mod random_numbers;
+mod ratios;
 pub mod run;
 pub mod scenes;
 pub mod sweep;

@@ -11,7 +11,8 @@ use super::method::Method;
 use super::scenes::SceneSpec;
 use super::truth::Truth;
 use crate::element::{ElementMaterial, MaterialWork};
-use crate::step::Status;
+use crate::guard::Guard;
+use crate::step::{Status, Step};
 
 /// What a method did on a scene with a step.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,8 +33,6 @@ pub struct Row {
     pub step_over_limit_rest: f64,
     /// Step over the least exact limit along the motion.
     pub step_over_limit_trajectory: f64,
-    /// Error estimated by a run with twice the step, where there is one, mm.
-    pub doubling: Option<f64>,
     /// What was known at each snapshot that was reached.
     pub frames: Vec<Frame>,
     /// How it ended.
@@ -47,8 +46,8 @@ pub struct Frame {
     pub mean: f64,
     /// The largest, mm.
     pub max: f64,
-    /// The method's own estimate of the mean error, mm.
-    pub estimate: Option<f64>,
+    /// Estimates of the mean error and of the largest, mm.
+    pub estimate: Option<[f64; 2]>,
     /// Whether all steps since the snapshot before were [`Status::Ok`].
     pub ok: bool,
 }
@@ -67,8 +66,6 @@ pub enum End {
 pub struct Figures {
     /// How far off it was.
     pub errors: Errors,
-    /// The method's own estimate of its error, mean over the snapshots, mm.
-    pub running: Option<f64>,
     /// Share of the steps that were [`Status::Limited`]; of a learned step, that of its predictions that were clipped.
     pub clip_share: f64,
     /// Time of a step, microseconds.
@@ -101,18 +98,19 @@ pub type Shapes = Vec<Vec<[f32; 3]>>;
 
 /// Runs `method` over a scene at `multiple` times its step.
 pub fn run(spec: &SceneSpec, truth: &Truth, method: Method, multiple: u32) -> Result<Row, LabError> {
-    Ok(run_with_shapes(spec, truth, method, multiple)?.0)
+    Ok(run_with_shapes(spec, truth, method, multiple, None)?.0)
 }
 
-/// The same, and the displacements at each snapshot.
+/// The same with a guard whose second run's steps are `every` times as long, and the displacements at each snapshot.
 pub fn run_with_shapes(
     spec: &SceneSpec,
     truth: &Truth,
     method: Method,
     multiple: u32,
+    every: Option<u32>,
 ) -> Result<(Row, Shapes), LabError> {
     spec.check_multiple(multiple)?;
-    let (end, frames, shapes) = spec.with_material(Run { spec, truth, method, multiple })?;
+    let (end, frames, shapes) = spec.with_material(Run { spec, truth, method, multiple, every })?;
     let hold = Errors::of_hold(truth)?;
     let step = f64::from(multiple) * f64::from(spec.timing.step);
     let row = Row {
@@ -124,7 +122,6 @@ pub fn run_with_shapes(
         hold_at_end: hold.mean(),
         step_over_limit_rest: step / truth.limit_at_rest,
         step_over_limit_trajectory: step / truth.limit_least,
-        doubling: None,
         frames,
         end,
     };
@@ -136,17 +133,25 @@ struct Run<'a> {
     truth: &'a Truth,
     method: Method,
     multiple: u32,
+    every: Option<u32>,
 }
 
 impl MaterialWork for Run<'_> {
     type Output = Result<(End, Vec<Frame>, Shapes), LabError>;
 
     fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
-        let Self { spec, truth, method, multiple } = self;
+        let Self { spec, truth, method, multiple, every } = self;
         let scene = spec.build(material)?;
         let dt = multiple as f32 * spec.timing.step;
         let mut state = spec.state(&scene, dt)?;
         let mut advance = method.prepare(spec, scene.view(), &mut state, dt)?;
+        let mut guard = match every {
+            Some(every) => {
+                let step = Step::unchecked(dt, spec.damping)?;
+                Some(Guard::prepare_in_vec(scene.view(), &spec.points, state.view(), step, every)?)
+            }
+            None => None,
+        };
 
         let (mut errors, mut shapes) = (Errors::default(), Shapes::new());
         let (mut frames, mut estimate) = (Vec::new(), None);
@@ -160,15 +165,18 @@ impl MaterialWork for Run<'_> {
             let start = Instant::now();
             for _ in 0..spec.timing.interval / multiple {
                 let loads = loads.of_step(state.time(), f64::from(dt));
-                let (status, report) = advance(&mut state, &loads)?;
-                estimate = report.estimate;
+                let (mut status, report) = advance(&mut state, &loads)?;
+                if let Some(guard) = &mut guard {
+                    status = guard.follow(status, scene.view(), &loads, &state.view());
+                    estimate = guard.estimate().map(|estimate| [estimate.mean, estimate.largest]);
+                }
                 if let Some(clipped) = report.clipped {
                     clips += f64::from(clipped);
                     predictions += 1;
                 }
                 match status {
                     Status::Ok => {}
-                    Status::Limited { .. } => limited += 1,
+                    Status::Limited { .. } | Status::Inexact { .. } => limited += 1,
                     Status::Diverged(divergence) => {
                         return Ok((End::Diverged(divergence.time), frames, shapes));
                     }
@@ -182,16 +190,13 @@ impl MaterialWork for Run<'_> {
             }
             errors.add_snapshot(truth, state.displacements())?;
             shapes.push(state.displacements().iter().map(|vector| vector.to_array()).collect());
-            let estimate = estimate.map(|metre| 1e3 * f64::from(metre));
+            let estimate = estimate.map(|metres| metres.map(|metre| 1e3 * f64::from(metre)));
             frames.push(Frame { mean: errors.mean(), max: errors.max, estimate, ok });
         }
-        let estimates: Vec<f64> = frames.iter().filter_map(|frame| frame.estimate).collect();
-        let running = (!estimates.is_empty()).then(|| estimates.iter().sum::<f64>() / estimates.len() as f64);
         // The lead-in may last to the end.
         let taken = f64::from(taken.max(1));
         let figures = Figures {
             errors,
-            running,
             clip_share: if predictions > 0 {
                 clips / f64::from(predictions)
             } else {
@@ -216,7 +221,6 @@ impl Row {
             hold_at_end: 3.5,
             step_over_limit_rest: 1.5,
             step_over_limit_trajectory: 2.0,
-            doubling: None,
             frames: Vec::new(),
             end,
         }

@@ -16,7 +16,7 @@ use crate::io::write_atomically;
 type Column = (&'static str, fn(&Row) -> String);
 
 /// Of the file.
-const COLUMNS: [Column; 18] = [
+const COLUMNS: [Column; 16] = [
     ("scene", |row| row.scene.into()),
     ("method", |row| row.method.name().into()),
     ("multiple", |row| format!("{}", row.multiple)),
@@ -32,8 +32,6 @@ const COLUMNS: [Column; 18] = [
     ("step_over_limit_rest", |row| length(Some(row.step_over_limit_rest))),
     ("step_over_limit_trajectory", |row| length(Some(row.step_over_limit_trajectory))),
     ("status", |row| format!("{}", row.end)),
-    ("running_estimate_mm", |row| length(row.figures().and_then(|figures| figures.running))),
-    ("doubling_estimate_mm", |row| length(row.doubling)),
     ("hold_at_end_mm", |row| length(Some(row.hold_at_end))),
 ];
 
@@ -116,13 +114,9 @@ mod tests {
 
     fn rows() -> [Row; 2] {
         let errors = Errors { means: vec![1.0, 2.0], sd: 0.5, max: 4.0 };
-        let figures = Figures { errors, running: Some(0.75), clip_share: 0.25, us_per_step: 150.0 };
-        let row = Row {
-            method: Method::TledLargeStep,
-            doubling: Some(1.25),
-            ..Row::example(End::Reached(figures))
-        };
-        [row.clone(), Row { doubling: None, end: End::Diverged(0.0126), ..row }]
+        let figures = Figures { errors, clip_share: 0.25, us_per_step: 150.0 };
+        let row = Row { method: Method::TledLargeStep, ..Row::example(End::Reached(figures)) };
+        [row.clone(), Row { end: End::Diverged(0.0126), ..row }]
     }
 
     #[test]
@@ -134,10 +128,10 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[0], COLUMNS.map(|(head, _)| head).join(","));
         let known = "lobe,tled-large-step,10,2.000000,0.500000,4.000000,1.500000,3.000000,0.500000,0.250000,\
-                     150.000,500000.000,1.500000,2.000000,limited,0.750000,1.250000,3.500000";
+                     150.000,500000.000,1.500000,2.000000,limited,3.500000";
         assert_eq!(lines[1], known);
         let unknown =
-            "lobe,tled-large-step,10,,,,,3.000000,,,,,1.500000,2.000000,diverged at 0.013 s,,,3.500000";
+            "lobe,tled-large-step,10,,,,,3.000000,,,,,1.500000,2.000000,diverged at 0.013 s,3.500000";
         assert_eq!(lines[2], unknown);
     }
 

@@ -154,7 +154,7 @@ pub(crate) fn exact_step(
 ) -> Result<bool, LabError> {
     match tled::step(scene, loads, state, step) {
         Status::Ok => Ok(false),
-        Status::Limited { .. } => Ok(true),
+        Status::Limited { .. } | Status::Inexact { .. } => Ok(true),
         Status::Diverged(divergence) => Err(LabError::Diverged { scene: spec.name, divergence }),
         Status::Mismatch { nodes, room } => Err(LabError::Mismatch { nodes, room }),
     }

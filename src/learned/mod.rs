@@ -33,7 +33,7 @@ use crate::loads::Loads;
 use crate::mlp::Network;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::state::{AsState, Progress, StateView};
+use crate::state::{AsState, Moment, Progress, StateView};
 use crate::step::{
     CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial, move_in_parts,
 };
@@ -146,8 +146,8 @@ pub struct LearnedModel<'w> {
     /// Whether an unexplained step is undone.
     undoes: bool,
     fell_back: Option<Fallback>,
-    /// Steps of the state when a lead-in or a learned step ended last.
-    led: Option<u64>,
+    /// The state when a lead-in or a learned step ended last.
+    led: Option<Moment>,
     report: LearnedReport,
 }
 
@@ -197,7 +197,7 @@ impl<'w> LearnedModel<'w> {
     /// Whether the latest steps of a state were a lead-in or learned ones.
     #[must_use]
     pub fn is_led(&self, progress: &Progress) -> bool {
-        self.led == Some(progress.steps)
+        self.led == Some(progress.moment())
     }
 
     /// Whether steps can be taken back.
@@ -345,7 +345,7 @@ impl LearnedView<'_, '_> {
             vertex.next = NodeVector(increment.to_array());
             vertex.frame.follow(vertex.next.to_array());
         }
-        self.model.led = Some(after.steps);
+        self.model.led = Some(after.moment());
         status
     }
 
@@ -413,7 +413,7 @@ impl LearnedView<'_, '_> {
             return Ok(Err(Undone));
         }
         if status.is_taken() {
-            model.led = Some(state.steps);
+            model.led = Some(state.moment());
         }
         Ok(Ok(status))
     }

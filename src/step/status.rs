@@ -25,6 +25,13 @@ pub enum Status {
         /// Kinetic energy beyond the energy balance, as a share of the most that was ever in it; zero if none.
         energy_excess: f32,
     },
+    /// The step was taken, but its error is estimated to be more than is allowed. Only a [`crate::guard`] says so.
+    Inexact {
+        /// Estimate of the mean error of the nodes, m.
+        error: f32,
+        /// What is allowed, m.
+        allowed: f32,
+    },
     /// The step was not taken and the state is as before.
     Diverged(Divergence),
     /// The step was not taken: the state has room for fewer nodes than the scene, or the loads were
@@ -89,7 +96,7 @@ impl Status {
     /// Whether the step was taken.
     #[must_use]
     pub const fn is_taken(&self) -> bool {
-        matches!(self, Self::Ok | Self::Limited { .. })
+        matches!(self, Self::Ok | Self::Limited { .. } | Self::Inexact { .. })
     }
 
     /// Whether the energy balance does not explain the step, taken or not.

@@ -7,6 +7,7 @@ SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 1));
 SUPPLE_MEMORY(large_memory, 4 << 20);
+SUPPLE_MEMORY(guard_memory, 4 << 20);
 SUPPLE_MEMORY(weights, 40000);
 SUPPLE_MEMORY(damper, 4000);
 static unsigned char saved[32 * NODES + 128];
@@ -67,8 +68,14 @@ int main(void) {
     CHECK(supple_restore(state, saved, sizeof saved) == SUPPLE_OK);
     CHECK(supple_state_reset(state) == SUPPLE_OK);
     CHECK(supple_large_init(large_memory, sizeof large_memory, scene, state, points[0], &beyond, &large, NULL) == SUPPLE_OK);
-    CHECK(supple_large_step(scene, loads, state, large, 100, NULL, NULL) >= 0);
+    const supple_guard_config guarded = {SUPPLE_CONFIG(supple_guard_config), 1e-3f, 20.0f, 4, 0.001f};
+    supple_guard *guard;
+    CHECK(supple_guard_init(guard_memory, sizeof guard_memory, scene, state, points[0], &guarded, &guard, NULL) == SUPPLE_OK);
+    for (int frame = 0; frame < 25; frame++) {
+        CHECK(supple_large_step(scene, loads, state, large, 4, NULL, NULL) >= 0);
+        CHECK(supple_guard_follow(scene, loads, state, guard, NULL, NULL) >= 0);
+    }
     CHECK(asked == 0);
-    printf("heap: a scene, exact, learned and damped steps: never asked\n");
+    printf("heap: a scene, exact, learned and damped steps, a guard: never asked\n");
     return 0;
 }

@@ -10,6 +10,7 @@ SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 0));
 SUPPLE_MEMORY(large_memory, 4 << 20);
+SUPPLE_MEMORY(guard_memory, 4 << 20);
 SUPPLE_MEMORY(weights, 40000);
 SUPPLE_MEMORY(damper, 4000);
 
@@ -19,12 +20,14 @@ static _Alignas(4096) unsigned char stack[1 << 20];
 static supple_scene_config scene_config;
 static supple_learned_config network;
 static supple_large_config beyond;
+static supple_guard_config guarded;
 static supple_step_config step;
 static supple_scene *scene;
 static supple_state *state;
 static supple_loads *loads;
 static supple_learned *learned;
 static supple_large *large;
+static supple_guard *guard;
 
 static void nothing(void) {}
 static void init_scene(void) {
@@ -53,6 +56,16 @@ static void init_large(void) {
 /* More than a cycle, in which everything is renewed once. */
 static void step_large(void) { CHECK(supple_large_step(scene, loads, state, large, 200, NULL, NULL) >= 0); }
 
+static void init_guard(void) {
+    CHECK(supple_guard_init(guard_memory, sizeof guard_memory, scene, state, points[0], &guarded, &guard, NULL) == SUPPLE_OK);
+}
+static void follow(void) {
+    for (int n = 0; n < 10; n++) {
+        CHECK(supple_large_step(scene, loads, state, large, 4, NULL, NULL) >= 0);
+        CHECK(supple_guard_follow(scene, loads, state, guard, NULL, NULL) >= 0);
+    }
+}
+
 static void *run(void *call) {
     (*(void (**)(void))call)();
     return NULL;
@@ -79,6 +92,7 @@ int main(void) {
     scene_config = bar_config();
     network = (supple_learned_config){SUPPLE_CONFIG(supple_learned_config), 0, 0, weights, of_weights};
     beyond = (supple_large_config){SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {0, 0, 0}, damper, of_damper};
+    guarded = (supple_guard_config){SUPPLE_CONFIG(supple_guard_config), 1e-3f, 20.0f, 4, 0.0f};
     step = (supple_step_config){SUPPLE_CONFIG(supple_step_config), 3e-5f, 20.0f};
     static const struct {
         const char *name;
@@ -89,6 +103,7 @@ int main(void) {
         {"scene_init", init_scene, 16}, {"state_init", init_state, 2},     {"loads_init", init_loads, 2},
         {"set_step", set_step, 20},     {"step", exact, 20},               {"learned_init", init_learned, 12},
         {"learned_step", learn, 140},   {"large_init", init_large, 36},    {"large_step", step_large, 36},
+        {"guard_init", init_guard, 36},    {"guard_follow", follow, 40},
     };
     const size_t count = sizeof calls / sizeof *calls;
     const uint32_t levels[2] = {supple_level(), SUPPLE_LEVEL_PORTABLE};

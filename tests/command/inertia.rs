@@ -27,7 +27,10 @@ fn long_steps_reach_where_short_ones_do_and_say_what_they_did() {
         assert_eq!(said.code, 0, "{}", said.err);
         let summary = desk.summary();
         assert_eq!(summary["method"], method);
-        assert_eq!(summary["status"], "ok", "{summary:#}");
+        // The host is told what a guard has seen, whatever it is.
+        let inexact = summary["steps_inexact"].as_u64().unwrap();
+        assert_eq!(summary["status"], if inexact > 0 { "inexact" } else { "ok" }, "{summary:#}");
+        assert!(inexact == 0 || said.err.contains("the error may be more than is allowed: "), "{}", said.err);
         let inertia = &summary["inertia"];
         let figure = |name: &str| inertia[name].as_f64().unwrap();
         let critical = summary["critical_step_at_rest_s"].as_f64().unwrap();
@@ -40,8 +43,10 @@ fn long_steps_reach_where_short_ones_do_and_say_what_they_did() {
         assert!(figure("added_mass_mean") > 1.0, "{inertia:#}");
         assert!(figure("added_mass_largest") > figure("added_mass_mean"), "{inertia:#}");
         assert!(inertia["added_mass_node"].as_u64().unwrap() < 275);
-        let (last, most) = (figure("error_estimate_mm"), figure("error_estimate_largest_mm"));
-        assert!(last > 0.0 && most >= last, "{inertia:#}");
+        let estimate = |name: &str| summary[name].as_f64().unwrap();
+        let (last, most) = (estimate("error_estimate_mm"), estimate("error_estimate_largest_mm"));
+        assert!(last > 0.0 && most >= last, "{summary:#}");
+        assert!(estimate("error_estimate_worst_node_mm") >= last, "{summary:#}");
         assert!((0.0..=1.0).contains(&figure("steps_held_back_share")), "{inertia:#}");
         for part in ["times the critical step", "times its own mass", "error estimate", "held back"] {
             assert!(said.out.contains(part), "{part}: {}", said.out);

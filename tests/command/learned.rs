@@ -72,9 +72,12 @@ fn a_network_takes_over_after_the_exact_step_and_says_what_it_did() {
         let said = desk.simulate(&leaning(&time, "burn_in = 0.1\n"), &["--force"]);
         println!("{}{}", said.out, said.err);
         assert_eq!(said.code, 0, "{}", said.err);
-        assert_eq!(said.err, "", "the tissue is that of the training");
+        // A network that stops the bar in its swing is wrong, and that is the only remark: the tissue is that of the training.
+        assert_eq!(said.err.lines().count(), 1, "{}", said.err);
+        assert!(said.err.contains("the error may be more than is allowed: "), "{}", said.err);
         let summary = desk.summary();
-        assert_eq!((&summary["method"], &summary["status"]), (&"learned".into(), &"ok".into()));
+        assert_eq!((&summary["method"], &summary["status"]), (&"learned".into(), &"inexact".into()));
+        assert!(summary["steps_inexact"].as_u64().unwrap() > 10, "{summary:#}");
         assert_eq!(summary["damping_per_s"], 20.0);
         let network = &summary["learned"];
         assert!(network["weights"].as_str().unwrap().ends_with("a.weights"));
@@ -189,7 +192,8 @@ fn a_tissue_that_the_network_does_not_know_is_remarked_upon() {
         ] {
             assert!(said.err.contains(part), "{part}: {}", said.err);
         }
-        assert_eq!(desk.summary()["warnings"].as_array().unwrap().len(), 1);
+        // That it stops the bar is another.
+        assert_eq!(desk.summary()["warnings"].as_array().unwrap().len(), 2);
     }
 }
 

@@ -5,7 +5,7 @@ use supple::lab::{MULTIPLES, sweep};
 
 const HEAD: &str = "scene,method,multiple,mean_mm,sd_mm,max_mm,mean_over_time_mm,hold_mm,skill,clip_share,\
                     us_per_step,us_per_simulated_second,step_over_limit_rest,step_over_limit_trajectory,status,\
-                    running_estimate_mm,doubling_estimate_mm,hold_at_end_mm";
+                    hold_at_end_mm";
 
 #[test]
 fn a_table_says_how_far_off_methods_are_and_what_they_cost() {

@@ -10,7 +10,7 @@ mod reference;
 mod support;
 
 mod damper;
-mod estimate;
+mod guard;
 mod pulled;
 mod refused;
 mod switching;

@@ -84,6 +84,39 @@ fn inertia_of_another_state_is_computed_anew() {
     }
 }
 
+/// The number of steps alone does not tell a state.
+#[test]
+fn inertia_of_another_state_with_as_many_steps_is_computed_anew() {
+    let body = small_bar();
+    let scene = body.scene(tissue(NEO), &held(&body));
+    let forces = torsion(&body, 5e-3, 0.05);
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+    let step = Step::unchecked(10.0 * limit(&scene), 5.0).unwrap();
+    let short = Step::unchecked(0.4 * limit(&scene), 5.0).unwrap();
+    for kind in KINDS {
+        let (mut bent, mut other) = (rest_of(&scene), rest_of(&scene));
+        let mut large = kind.prepared(&body, &scene, &mut bent, step, 2.0);
+        for _ in 0..60 {
+            assert!(large.step(scene.view(), &loads, bent.view()).is_taken());
+            assert_eq!(tled::step(&scene, &Loads::NONE, &mut other, &short), Status::Ok);
+        }
+        assert_eq!(bent.steps(), other.steps());
+        let stale = large.report().added_mean;
+        let mut first = other.clone();
+        let mut fresh = kind.prepared(&body, &scene, &mut first, step, 2.0);
+        for _ in 0..5 {
+            assert!(fresh.step(scene.view(), &loads, first.view()).is_taken());
+            assert!(large.step(scene.view(), &loads, other.view()).is_taken());
+        }
+        let apart = largest_distance(&to_f64(first.displacements()), &to_f64(other.displacements()));
+        let added = [stale, fresh.report().added_mean, large.report().added_mean];
+        println!(
+            "{kind:?}: added inertia {added:.0?} of the bent, the own and the renewed state, {apart:.1e} m apart"
+        );
+        assert!(apart < 1e-8 && (added[2] / added[1] - 1.0).abs() < 1e-3, "{added:?}");
+    }
+}
+
 /// Two scenes with the same number of nodes and elements.
 #[test]
 fn inertia_of_another_scene_of_the_same_size_is_refused() {

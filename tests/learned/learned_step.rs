@@ -4,8 +4,9 @@
 use supple::learned::{LearnedError, LearnedStep, vectors_for};
 use supple::loads::{Loads, NodalForce};
 use supple::material::{Exponential, Tissue};
+use supple::mesh::{Mesh, Winding};
 use supple::mlp::{Description, ForceInput, Network, Range, write};
-use supple::scene::VecScene;
+use supple::scene::{Support, VecScene};
 use supple::state::{NodeVector, VecState};
 use supple::step::{Cause, Status, Step};
 
@@ -359,4 +360,44 @@ fn a_step_that_energy_does_not_explain_is_undone_and_exact_steps_take_over() {
     assert!(off < 0.05);
     learned.view().reset();
     assert!(learned.model().fell_back().is_none());
+}
+
+#[test]
+fn the_noise_of_a_network_at_rest_is_no_reason_to_refuse_its_first_steps() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/weights/compact-10.weights");
+    let memory = Memory::of(&std::fs::read(path).unwrap());
+    let points = [[0.0, 0.0, 0.0], [5e-3, 0.0, 0.0], [0.0, 5e-3, 0.0], [0.0, 0.0, 5e-3]];
+    let mesh = Mesh::new(&points, &[[0, 1, 2, 3]], Winding::Checked).unwrap();
+    let scene = VecScene::build(tissue(EXP), &mesh, &[Support::fixed(0)]).unwrap();
+    let network = Network::parse(memory.bytes()).unwrap();
+    let exact = Step::unchecked(DT, network.recipe().damping).unwrap();
+    let storage = vec![NodeVector::ZERO; vectors_for(4, true)];
+    let mut learned = LearnedStep::new(network, true, storage).unwrap();
+    let mut state = VecState::at_rest(4);
+    assert_eq!(learned.lead(scene.view(), &Loads::NONE, state.view(), (&exact, 0.03)).unwrap(), Status::Ok);
+    for _ in 0..5 {
+        let status = learned.step(scene.view(), &Loads::NONE, state.view(), &exact).unwrap();
+        assert_eq!(status, Status::Ok);
+    }
+    let kinetic = state.energy_balance().kinetic;
+    assert!(kinetic > 0.0, "{kinetic}");
+    assert!(learned.model().fell_back().is_none(), "{:?}", learned.model().fell_back());
+    println!("at rest it moves by {:.2e} m", support::largest(&to_f64(state.displacements())));
+}
+
+#[test]
+fn a_lead_in_is_of_one_state_not_of_any_with_as_many_steps() {
+    let (body, scene, forces) = twisted();
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+    let description = network(3);
+    let memory = Memory::of(&write(&description).unwrap());
+    let mut learned = learned_step(Network::parse(memory.bytes()).unwrap(), body.points.len());
+    let exact = Step::unchecked(DT, 20.0).unwrap();
+    let (mut led, mut other) = (rest_of(&scene), rest_of(&scene));
+    let time = 20.0 * MULTIPLE as f64 * f64::from(DT);
+    let _ = learned.lead(scene.view(), &loads, led.view(), (&exact, time)).unwrap();
+    support::run(&scene, &Loads::NONE, &mut other, &exact, led.steps());
+    assert_eq!(other.steps(), led.steps());
+    let refused = learned.step(scene.view(), &loads, other.view(), &exact);
+    assert_eq!(refused, Err(LearnedError::NotLed { steps: other.steps() }));
 }

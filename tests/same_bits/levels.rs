@@ -3,6 +3,7 @@
 //! Networks with int8 layers give the same bits either way.
 
 use supple::element::ElementMaterial;
+use supple::guard::{EVERY, Guard};
 use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::{Loads, NodalForce};
 use supple::material::{
@@ -46,8 +47,10 @@ fn run<M: ElementMaterial>(material: M, level: Level, method: Option<Method<'_>>
     if let Some(method) = method {
         let step = Step::unchecked(20.0 * 5e-5, 10.0).unwrap();
         let mut large = LargeStep::prepare_in_vec(method, scene.view(), &points, state.view(), step).unwrap();
+        let mut guard = Guard::prepare_in_vec(scene.view(), &points, state.view(), step, EVERY).unwrap();
         for _ in 0..400 / EMULATED {
             let status = large.step(scene.view(), &loads, state.view());
+            let status = guard.follow(status, scene.view(), &loads, &state.view());
             // Where a step is refused is among what has to be the same.
             if let Status::Diverged(divergence) = status {
                 println!("after {} steps: {divergence}", state.steps());
@@ -56,7 +59,7 @@ fn run<M: ElementMaterial>(material: M, level: Level, method: Option<Method<'_>>
         }
         assert!(state.steps() > 10);
         assert!(large.report().added_mean > 0.0);
-        estimate = large.report().error;
+        estimate = guard.estimate().unwrap().mean;
         assert!(estimate > 0.0);
     } else {
         let step = Step::unchecked(5e-5, 10.0).unwrap();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use supple::lab::evaluate::{self, Plan};
 use supple::lab::method::Method;
-use supple::lab::{equal_error, estimates, hard, physics, table};
+use supple::lab::{equal_error, hard, physics, table};
 use supple::material::Element;
 
 use crate::element_name::element_named;
@@ -45,6 +45,9 @@ pub(crate) struct Asked {
     /// Random scenes among the hard cases
     #[arg(long, value_name = "N", default_value_t = 200, requires = "hard")]
     random: u32,
+    /// Steps of a run in one of its guard's second run
+    #[arg(long, value_name = "N", default_value_t = supple::guard::EVERY, requires = "hard")]
+    every: u32,
 }
 
 pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
@@ -64,10 +67,9 @@ pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
     }
     let rows = evaluate::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
     print!("{}", table::text(&rows));
-    for judged in [estimates::text(&rows), equal_error::text(&rows)] {
-        if !judged.is_empty() {
-            print!("\n{judged}");
-        }
+    let judged = equal_error::text(&rows);
+    if !judged.is_empty() {
+        print!("\n{judged}");
     }
     println!("\nresults  {}", out.join("results.csv").display());
     Ok(End::Reached)
@@ -81,8 +83,8 @@ fn evaluate_physics(Asked { out, scenes, .. }: &Asked) -> Result<End, Problem> {
     Ok(End::Reached)
 }
 
-fn evaluate_hard(Asked { out, scenes, methods, random, .. }: &Asked) -> Result<End, Problem> {
-    let plan = hard::Plan::new(scenes, methods, *random).map_err(Problem::of)?;
+fn evaluate_hard(Asked { out, scenes, methods, random, every, .. }: &Asked) -> Result<End, Problem> {
+    let plan = hard::Plan::new(scenes, methods, *random, *every).map_err(Problem::of)?;
     let judged = hard::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
     print!("{}", hard::report::text(&judged));
     println!("\nresults  {}", out.join("hard.csv").display());

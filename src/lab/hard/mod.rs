@@ -27,6 +27,7 @@ use super::threads::in_parallel;
 use super::timing::Timing;
 use super::truth::{self, Truth};
 use super::{DT, LabError};
+use crate::guard::EVERY_LEARNED;
 use verdict::Judged;
 
 /// Steps over the critical step of a body at rest.
@@ -44,11 +45,13 @@ pub struct Plan {
     pub random: u32,
     /// Methods.
     pub methods: Vec<Method>,
+    /// Steps of a run in one of its guard's second run, except for learned steps.
+    pub every: u32,
 }
 
 impl Plan {
-    /// A plan from names of cases and methods: all there are if there are none; so many random scenes.
-    pub fn new(cases: &[String], methods: &[String], random: u32) -> Result<Self, LabError> {
+    /// A plan from names of cases and methods: all there are if there are none; so many random scenes, and guards with `every`.
+    pub fn new(cases: &[String], methods: &[String], random: u32, every: u32) -> Result<Self, LabError> {
         let methods = match methods {
             [] => Vec::from([
                 Method::MassScaled,
@@ -62,7 +65,7 @@ impl Plan {
             [] => cases::names().map(cases::named).collect::<Result<_, _>>()?,
             names => names.iter().map(|name| cases::named(name)).collect::<Result<_, _>>()?,
         };
-        Ok(Self { cases, random, methods })
+        Ok(Self { cases, random, methods, every })
     }
 }
 
@@ -97,7 +100,7 @@ pub fn evaluate(plan: &Plan, out: &Path, say: impl Fn(&str) + Sync) -> Result<Ve
         };
         let Some((spec, truth)) = found else { return Ok(Vec::new()) };
         say(&format!("{}: moves by {:.1} mm", spec.name, 1e3 * truth.most()));
-        runs(&spec, &truth, &plan.methods, &say)
+        runs(&spec, &truth, plan, &say)
     };
     let judged = in_parallel(plan.cases.len() + plan.random as usize, judge, |_, _| ())?.concat();
     report::write(&judged, out)?;
@@ -129,14 +132,9 @@ fn random_scene(number: u32, folder: &Path) -> Result<Option<(SceneSpec, Truth)>
 }
 
 /// All methods over a scene, judged.
-fn runs(
-    spec: &SceneSpec,
-    truth: &Truth,
-    methods: &[Method],
-    say: &impl Fn(&str),
-) -> Result<Vec<Judged>, LabError> {
+fn runs(spec: &SceneSpec, truth: &Truth, plan: &Plan, say: &impl Fn(&str)) -> Result<Vec<Judged>, LabError> {
     let mut judged = Vec::new();
-    for &method in methods {
+    for &method in &plan.methods {
         let multiples: Vec<u32> = match method {
             Method::Learned(_) => networks::multiples()
                 .filter(|_| spec.damping == TRAINED_DAMPING)
@@ -149,14 +147,19 @@ fn runs(
                 .map(|times| multiple_near(&spec.timing, truth.limit_at_rest as f32, times))
                 .to_vec(),
         };
+        let every = match method {
+            Method::Tled => None,
+            Method::Learned(_) | Method::LearnedWith(_) => Some(EVERY_LEARNED),
+            _ => Some(plan.every),
+        };
         for multiple in multiples {
-            let row = match run::run(spec, truth, method, multiple) {
+            let row = match run::run_with_shapes(spec, truth, method, multiple, every) {
                 // Refused before it has begun: not wrong.
                 Err(LabError::Inertia(error)) => {
                     say(&format!("{}: {} refuses: {error}", spec.name, method.name()));
                     continue;
                 }
-                row => row?,
+                row => row?.0,
             };
             judged.push(Judged::new(row, truth, spec.timing.interval_seconds()));
         }

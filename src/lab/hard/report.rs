@@ -23,20 +23,21 @@ pub(super) fn write(judged: &[Judged], out: &Path) -> Result<(), LabError> {
     write_atomically(&out.join("hard-frames.csv"), |file| {
         writeln!(
             file,
-            "case,method,times_critical,time_s,motion_mm,mean_error_mm,largest_error_mm,estimate_mm,ok"
+            "case,method,times_critical,time_s,motion_mm,mean_error_mm,largest_error_mm,estimate_mm,largest_estimate_mm,ok"
         )?;
         for run in judged {
             for (at, (frame, motion)) in run.row.frames.iter().zip(&run.motion).enumerate() {
                 let time = (at + 1) as f64 * run.interval;
                 writeln!(
                     file,
-                    "{},{},{:.1},{time:.4},{motion:.5},{:.5},{:.5},{},{}",
+                    "{},{},{:.1},{time:.4},{motion:.5},{:.5},{:.5},{},{},{}",
                     run.row.scene,
                     run.row.method.name(),
                     run.row.step_over_limit_rest,
                     frame.mean,
                     frame.max,
-                    optional(frame.estimate),
+                    optional(frame.estimate.map(|[mean, _]| mean)),
+                    optional(frame.estimate.map(|[_, largest]| largest)),
                     frame.ok
                 )?;
             }
@@ -70,7 +71,7 @@ fn csv(run: &Judged) -> String {
         row.step_over_limit_rest,
         run.motion(),
         optional(worst.map(|frame| frame.mean)),
-        optional(worst.and_then(|frame| frame.estimate)),
+        optional(worst.and_then(|frame| Some(frame.estimate?[0]))),
         name(run.verdict()),
         run.silent(),
         optional(run.wrong_from()),
@@ -95,8 +96,9 @@ fn methods(judged: &[Judged]) -> Vec<Method> {
 pub fn text(judged: &[Judged]) -> String {
     let mut text = String::from(
         "wrong: more than 1 mm and a fifth of the motion so far (mean over the nodes) at a snapshot\n\
-         silent: all steps before it were ok; error over estimate: share of the snapshots above 1 and above 2, and the median\n\n\
-         method        x critical   runs  right   told  silent   above 1  above 2  median\n",
+         silent: all steps before it were ok; error over estimate: share of the snapshots above 1 and above 2, and the median\n\
+         doubted: share of the snapshots within 0.25 mm or a twentieth of the motion that were not ok\n\n\
+         method        x critical   runs  right   told  silent  doubted   above 1  above 2  median\n",
     );
     let bands = [(0.0, 14.0), (14.0, 32.0), (32.0, 71.0), (71.0, f64::INFINITY)];
     for method in methods(judged) {
@@ -115,16 +117,21 @@ pub fn text(judged: &[Judged]) -> String {
                 let above = ratios.iter().filter(|ratio| **ratio > limit).count();
                 100.0 * above as f64 / ratios.len() as f64
             };
+            let (good, doubted) = runs.iter().fold((0, 0), |(good, doubted), run| {
+                let (more_good, more_doubted) = run.doubted();
+                (good + more_good, doubted + more_doubted)
+            });
             let steps =
                 runs.iter().map(|run| run.row.step_over_limit_rest.ln()).sum::<f64>() / runs.len() as f64;
             text += &format!(
-                "{:<13} {:>10.1} {:>6} {:>6} {:>6} {:>7}",
+                "{:<13} {:>10.1} {:>6} {:>6} {:>6} {:>7} {:>6.1} %",
                 method.name(),
                 steps.exp(),
                 runs.len(),
                 count(Verdict::Right),
                 count(Verdict::Told),
-                count(Verdict::Silent)
+                count(Verdict::Silent),
+                100.0 * doubted as f64 / good.max(1) as f64
             );
             text += &match ratios.get(ratios.len() / 2) {
                 Some(median) => format!(" {:>7.1} % {:>6.1} % {median:>7.2}\n", above(1.0), above(2.0)),
@@ -187,7 +194,7 @@ fn draw(judged: &[Judged]) -> String {
     line(&mut svg, (x(1e-3), y(1e-3)), (x(1e3), y(1e3)), "#777");
     for run in judged {
         let Some(frame) = run.worst() else { continue };
-        let Some(estimate) = frame.estimate else { continue };
+        let Some([estimate, _]) = frame.estimate else { continue };
         let colour = if run.verdict() == Verdict::Silent { "#d55e00" } else { "#0072b2" };
         put(
             &mut svg,

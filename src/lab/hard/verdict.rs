@@ -98,8 +98,15 @@ impl Judged {
     /// of the motion.
     pub fn ratios(&self) -> impl Iterator<Item = f64> {
         self.frames().filter_map(|(_, frame, motion)| {
-            (frame.mean > f64::max(0.01, 1e-3 * motion)).then_some(frame.mean / frame.estimate?)
+            (frame.mean > f64::max(0.01, 1e-3 * motion)).then_some(frame.mean / frame.estimate?[0])
         })
+    }
+
+    /// Snapshots with an error below a quarter of a millimetre or a twentieth of the motion, and how many of them were not `ok`.
+    #[must_use]
+    pub fn doubted(&self) -> (usize, usize) {
+        let good = self.frames().filter(|(_, frame, motion)| frame.mean <= f64::max(0.25, 0.05 * motion));
+        good.fold((0, 0), |(all, doubted), (_, frame, _)| (all + 1, doubted + usize::from(!frame.ok)))
     }
 }
 
@@ -111,11 +118,16 @@ mod tests {
     use std::vec;
 
     fn judged(frames: &[(f64, bool)]) -> Verdict {
+        run(frames).verdict()
+    }
+
+    /// With motions of 2, 20 and 20 mm so far.
+    fn run(frames: &[(f64, bool)]) -> Judged {
         let frames: Vec<Frame> =
             frames.iter().map(|&(mean, ok)| Frame { mean, max: mean, estimate: None, ok }).collect();
-        let figures = Figures { errors: Errors::default(), running: None, clip_share: 0.0, us_per_step: 1.0 };
+        let figures = Figures { errors: Errors::default(), clip_share: 0.0, us_per_step: 1.0 };
         let row = Row { frames, ..Row::example(End::Reached(figures)) };
-        Judged { row, motion: vec![2.0, 20.0, 20.0], interval: 0.1 }.verdict()
+        Judged { row, motion: vec![2.0, 20.0, 20.0], interval: 0.1 }
     }
 
     #[test]
@@ -126,5 +138,11 @@ mod tests {
         // A word before or after does not help at the wrong snapshot.
         assert_eq!(judged(&[(0.1, false), (4.1, true), (0.1, false)]), Verdict::Silent);
         assert_eq!(judged(&[(0.1, true), (f64::NAN, true)]), Verdict::Silent);
+    }
+
+    #[test]
+    fn a_good_snapshot_that_is_not_ok_is_doubted() {
+        let run = run(&[(0.2, false), (0.9, true), (1.1, false)]);
+        assert_eq!(run.doubted(), (2, 1));
     }
 }

@@ -55,7 +55,7 @@ impl<M: ElementMaterial> Setup<'_, M> {
         let taken = move |status| match status {
             Status::Diverged(divergence) => Err(LabError::Diverged { scene: case, divergence }),
             Status::Mismatch { nodes, room } => Err(LabError::Mismatch { nodes, room }),
-            Status::Ok | Status::Limited { .. } => Ok(()),
+            Status::Ok | Status::Limited { .. } | Status::Inexact { .. } => Ok(()),
         };
         if let Kind::BackwardEuler(dt) = steps.kind {
             let mut step = implicit::prepare(implicit::Rule::BackwardEuler, scene.view(), state, dt, damping);

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use supple::inertia::Grid;
 
 use super::figures::Figures;
-use crate::run::outcome::{LargeTrace, LearnedTrace, Outcome};
+use crate::run::outcome::{GuardTrace, LargeTrace, LearnedTrace, Outcome};
 use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
 use crate::screen::describe_added;
@@ -60,17 +60,20 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome, figures: &Figures, warnings: 
     let large = outcome.large.as_ref();
     report.add_section("inertia", large.map(|trace| large_section(setup.method_name(), trace, outcome)));
     add_steps(&mut report, setup, outcome, figures);
+    add_estimate(&mut report, outcome.guard.as_ref());
     add_motion(&mut report, figures);
     report
 }
 
 fn add_ending(report: &mut Report, outcome: &Outcome) {
     let fell_back = outcome.learned.as_ref().is_some_and(|trace| trace.fell_back.is_some());
+    let inexact = outcome.guard.is_some_and(|guard| guard.inexact > 0);
     let status = match (&outcome.divergence, outcome.limits.steps) {
         (Some(_), _) => "diverged",
         (None, _) if fell_back => "fell back",
+        (None, 1..) => "limited",
+        (None, 0) if inexact => "inexact",
         (None, 0) => "ok",
-        (None, _) => "limited",
     };
     report.add_figures(json!({
         "status": status,
@@ -142,6 +145,29 @@ fn add_steps(report: &mut Report, setup: &Setup, outcome: &Outcome, figures: &Fi
     report.add("real-time factor", words, json!({ "real_time_factor": factor }));
 }
 
+/// The error that the guard estimates; nothing with exact steps, which have none.
+fn add_estimate(report: &mut Report, guard: Option<&GuardTrace>) {
+    let latest = guard.and_then(|guard| guard.latest);
+    report.add(
+        "error estimate",
+        guard.zip(latest).map(|(guard, latest)| {
+            format!(
+                "{:.3} mm on average over the nodes, {:.3} mm at node {}; at most {:.3} mm on average",
+                1e3 * latest.mean,
+                1e3 * latest.largest,
+                latest.node,
+                1e3 * guard.most
+            )
+        }),
+        json!({
+            "error_estimate_mm": latest.map(|latest| 1e3 * f64::from(latest.mean)),
+            "error_estimate_worst_node_mm": latest.map(|latest| 1e3 * f64::from(latest.largest)),
+            "error_estimate_largest_mm": guard.map(|guard| 1e3 * f64::from(guard.most)),
+            "steps_inexact": guard.map(|guard| guard.inexact),
+        }),
+    );
+}
+
 fn add_motion(report: &mut Report, figures: &Figures) {
     let (percent, least) = (100.0 * figures.volume_change, figures.least_volume_ratio);
     report.add(
@@ -187,18 +213,6 @@ fn large_section(method: &str, trace: &LargeTrace, outcome: &Outcome) -> Report 
             "added_mass_mean": decimal(trace.report.added_mean),
             "added_mass_largest": decimal(trace.report.added_largest),
             "added_mass_node": trace.report.added_node,
-        }),
-    );
-    section.add(
-        "error estimate",
-        format!(
-            "{:.3} mm at the end, {:.3} mm at most, on average over the nodes",
-            1e3 * trace.report.error,
-            1e3 * trace.most_error
-        ),
-        json!({
-            "error_estimate_mm": 1e3 * f64::from(trace.report.error),
-            "error_estimate_largest_mm": 1e3 * f64::from(trace.most_error),
         }),
     );
     let share = trace.steps_held_back as f64 / outcome.computed.max(1) as f64;

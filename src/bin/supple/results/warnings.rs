@@ -28,6 +28,15 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome) -> Vec<String> {
     if outcome.limits.steps > 0 {
         warnings.push(not_exact(&outcome.limits));
     }
+    if let Some((inexact, first)) = outcome.guard.and_then(|guard| Some((guard.inexact, guard.first?))) {
+        let (time, error, allowed) = first;
+        warnings.push(format!(
+            "after {inexact} steps, first at {time:.3} s, the error may be more than is allowed: {:.2} mm, allowed {:.2} mm; a \
+             shorter step has less",
+            1e3 * error,
+            1e3 * allowed
+        ));
+    }
     warnings
 }
 

@@ -11,6 +11,7 @@ use std::time::Instant;
 use supple::element::ElementMaterial;
 use supple::scene::SceneView;
 use supple::state::VecState;
+use supple::step::Status;
 
 use crate::problem::Problem;
 use crate::scene::setup::Setup;
@@ -31,7 +32,7 @@ pub(crate) fn run<M: ElementMaterial>(
     let loads = setup.loads(&scene)?;
     let time = &setup.time;
     let motion = Motion { scene, loads: &loads, damping: setup.damping, end: time.end, tick };
-    let Start { at_rest, step, mut mover } = start;
+    let Start { at_rest, step, mut mover, mut guard } = start;
     let mut outcome = Outcome::new(at_rest, step.seconds());
     if let (Mover::Large(large), Some(method)) = (&mover, &time.method) {
         outcome.large = Some(LargeTrace::new(method, large.model()));
@@ -54,6 +55,11 @@ pub(crate) fn run<M: ElementMaterial>(
             while taken < target && outcome.divergence.is_none() {
                 taken += 1;
                 mover.advance(&motion, state, &mut outcome, interval)?;
+                if let Some(guard) = guard.as_mut().filter(|_| outcome.divergence.is_none()) {
+                    let status = guard.follow(Status::Ok, scene, &loads, &state.view());
+                    let trace = outcome.guard.get_or_insert_default();
+                    trace.enter(status, guard.estimate(), state.time());
+                }
                 if taken % u64::from(STEPS_BETWEEN_LOOKS) == 0 {
                     tick(state.time());
                 }

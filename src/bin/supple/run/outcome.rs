@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use supple::guard::Estimate;
 use supple::inertia::{Grid, LargeModel, Method, Report};
 use supple::learned::LearnedReport;
 use supple::material::J_FLOOR;
@@ -52,6 +53,8 @@ pub(crate) struct Outcome {
     pub(crate) large: Option<LargeTrace>,
     /// With a network.
     pub(crate) learned: Option<LearnedTrace>,
+    /// With steps beyond the critical one.
+    pub(crate) guard: Option<GuardTrace>,
 }
 
 impl Outcome {
@@ -68,6 +71,7 @@ impl Outcome {
             above_from: None,
             large: None,
             learned: None,
+            guard: None,
         }
     }
 
@@ -107,8 +111,6 @@ pub(crate) struct LargeTrace {
     pub(crate) least_coarse_share: f32,
     /// Largest share of the rough motion that was taken away in a step.
     pub(crate) most_damping: f32,
-    /// The largest estimate of the error, m.
-    pub(crate) most_error: f32,
 }
 
 impl LargeTrace {
@@ -121,7 +123,6 @@ impl LargeTrace {
             most_held_back: 0,
             least_coarse_share: 1.0,
             most_damping: 0.0,
-            most_error: 0.0,
         }
     }
 
@@ -132,7 +133,30 @@ impl LargeTrace {
         self.most_held_back = self.most_held_back.max(report.held_back);
         self.least_coarse_share = self.least_coarse_share.min(report.coarse_share);
         self.most_damping = self.most_damping.max(report.damping);
-        self.most_error = self.most_error.max(report.error);
+    }
+}
+
+/// What a guard said of the steps.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct GuardTrace {
+    /// The latest estimate.
+    pub(crate) latest: Option<Estimate>,
+    /// The largest of the mean error, m.
+    pub(crate) most: f32,
+    /// Steps whose estimate exceeded what is allowed, the time of the first, s, and its estimate and what was allowed, m.
+    pub(crate) inexact: u64,
+    pub(crate) first: Option<(f64, f32, f32)>,
+}
+
+impl GuardTrace {
+    /// Takes down what the guard said of a step that led to `time`, s.
+    pub(crate) fn enter(&mut self, status: Status, estimate: Option<Estimate>, time: f64) {
+        self.latest = estimate;
+        self.most = self.most.max(estimate.map_or(0.0, |estimate| estimate.mean));
+        if let Status::Inexact { error, allowed } = status {
+            self.inexact += 1;
+            self.first.get_or_insert((time, error, allowed));
+        }
     }
 }
 

@@ -1,8 +1,9 @@
 //! A simulation at rest: what moves the scene, and the length of its steps. All that can be refused is refused here.
 
 use supple::element::ElementMaterial;
+use supple::guard::{self, Guard};
 use supple::scene::SceneView;
-use supple::state::VecState;
+use supple::state::{NodeVector, VecState};
 use supple::step::{CriticalStep, Step};
 use supple::tled;
 
@@ -61,6 +62,8 @@ pub(crate) struct Start<'a> {
     /// The step that was asked for, with a network the exact one.
     pub(crate) step: Step,
     pub(crate) mover: Mover<'a>,
+    /// Of steps beyond the critical one.
+    pub(crate) guard: Option<Guard<Vec<NodeVector>>>,
 }
 
 impl<'a> Start<'a> {
@@ -86,7 +89,22 @@ impl<'a> Start<'a> {
             }
             (None, None) => Mover::Exact(exact),
         };
-        Ok(Self { at_rest, step, mover })
+        let guard = match &mover {
+            Mover::Exact(_) => None,
+            Mover::Large(_) => Some((step.seconds(), guard::EVERY)),
+            Mover::Learned(learned) => Some((learned.seconds(), guard::EVERY_LEARNED)),
+        };
+        let guard = match guard {
+            None => None,
+            Some((seconds, every)) => {
+                let step = Step::unchecked(seconds, setup.damping).map_err(Problem::of)?;
+                Some(
+                    Guard::prepare_in_vec(scene, &setup.body.local, state.view(), step, every)
+                        .map_err(|error| Problem(format!("{}: {error}", setup.body.name)))?,
+                )
+            }
+        };
+        Ok(Self { at_rest, step, mover, guard })
     }
 }
 

@@ -1,0 +1,55 @@
+//! The distance between two runs of a body, and how far it has moved: means and maxima over the nodes, m.
+
+use glam::Vec4;
+
+use crate::simd::NodeVector;
+
+/// What a comparison found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Comparison {
+    /// Mean distance of the nodes, m.
+    pub(super) mean: f32,
+    /// The largest, m, and its node.
+    pub(super) largest: f32,
+    pub(super) node: u32,
+    /// Mean displacement of the nodes, of the run that moved farther, m.
+    pub(super) motion: f32,
+}
+
+/// Compares the displacements (m) of so many nodes.
+pub(super) fn compare(nodes: usize, first: &[NodeVector], second: &[NodeVector]) -> Comparison {
+    let axes = Vec4::new(1.0, 1.0, 1.0, 0.0);
+    let (mut sum, mut motions, mut largest, mut at) = (0.0, [0.0; 2], 0.0, 0);
+    let pairs = first.iter().zip(second).take(nodes);
+    for (node, (first, second)) in pairs.enumerate() {
+        let (first, second) = (axes * Vec4::from(first.0), axes * Vec4::from(second.0));
+        let square = (first - second).length_squared();
+        sum += libm::sqrtf(square);
+        motions[0] += first.length();
+        motions[1] += second.length();
+        if square > largest {
+            (largest, at) = (square, node as u32);
+        }
+    }
+    let share = 1.0 / nodes.max(1) as f32;
+    Comparison {
+        mean: share * sum,
+        largest: libm::sqrtf(largest),
+        node: at,
+        motion: share * motions[0].max(motions[1]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_and_maxima_leave_out_the_fourth_component() {
+        let first = [NodeVector([0.003, 0.0, 0.004, 9.0]), NodeVector([0.0, 0.001, 0.0, 7.0])];
+        let second = [NodeVector([0.003, 0.0, 0.004, 1.0]), NodeVector([0.0, 0.004, 0.004, 2.0])];
+        let Comparison { mean, largest, node, motion } = compare(2, &first, &second);
+        assert!((mean - 0.0025).abs() < 1e-8 && (largest - 0.005).abs() < 1e-8 && node == 1);
+        assert!((motion - 0.5 * (0.005 + 0.0056568)).abs() < 1e-7, "{motion}");
+    }
+}

@@ -1,0 +1,206 @@
+//! From distances to one estimate a frame: an envelope. A distance passes through zero where one run overtakes the other, an error does
+//! not; so the estimate follows a larger distance at once, and forgets it by half in a fifth of a second. Between two comparisons it
+//! goes on growing as it grew between the two before.
+
+use super::ESTIMATE;
+use super::compare::Comparison;
+use crate::step::Status;
+
+/// Time in which a held estimate falls by half, s.
+const HALF_LIFE: f32 = 0.2;
+/// Share of the motion so far that an error may have unless the caller says otherwise, and share of the size of the body below which
+/// it does not count.
+const SHARE_OF_MOTION: f32 = 0.2;
+const SHARE_OF_SIZE: f32 = 0.01;
+/// The same in metres at most: what matters in guidance.
+const LEAST: f32 = 0.001;
+
+/// In the first steps from rest no two runs differ much. So at the first comparisons, one a step, the error may be as large as the
+/// motion.
+const FIRST_COMPARISONS: u32 = 3;
+
+/// The error that a run may have before its steps are called inexact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Allowed {
+    /// A fifth of the mean motion of the nodes so far; errors below a millimetre and a hundredth of the body's size do not count.
+    #[default]
+    ShareOfMotion,
+    /// A mean error of the nodes of this many metres.
+    Metres(f32),
+}
+
+/// Estimated error of the positions of the nodes, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Mean over the nodes.
+    pub mean: f32,
+    /// The largest.
+    pub largest: f32,
+    /// The node that had it at the latest comparison.
+    pub node: u32,
+    /// What is allowed for the mean at present.
+    pub allowed: f32,
+}
+
+/// Estimates over time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Envelope {
+    pub(super) allowed: Allowed,
+    /// Errors below do not count, m.
+    least: f32,
+    /// Largest mean motion so far, m.
+    motion: f32,
+    /// None before the first comparison.
+    held: Option<Comparison>,
+    comparisons: u32,
+    /// By how much the mean and the largest grow in a second, m/s, and the seconds since the latest comparison.
+    growth: [f32; 2],
+    waited: f32,
+}
+
+impl Envelope {
+    /// For a body with these points at rest, m.
+    pub(super) fn new(points: &[[f32; 3]]) -> Self {
+        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for point in points {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(point[axis]);
+                high[axis] = high[axis].max(point[axis]);
+            }
+        }
+        let square: f32 = [0, 1, 2].map(|axis| high[axis] - low[axis]).iter().map(|side| side * side).sum();
+        let least = LEAST.min(SHARE_OF_SIZE * libm::sqrtf(square));
+        Self {
+            allowed: Allowed::default(),
+            least,
+            motion: 0.0,
+            held: None,
+            comparisons: 0,
+            growth: [0.0; 2],
+            waited: 0.0,
+        }
+    }
+
+    /// The state is another one.
+    pub(super) fn forget(&mut self) {
+        *self = Self { motion: 0.0, held: None, comparisons: 0, growth: [0.0; 2], waited: 0.0, ..*self };
+    }
+
+    /// Enters a comparison, so many seconds after the one before.
+    pub(super) fn add(&mut self, found: &Comparison, seconds: f32) {
+        let kept = libm::exp2f(-seconds / HALF_LIFE);
+        let before = self.held.unwrap_or_default();
+        self.motion = self.motion.max(found.motion);
+        // A distance that is no number stays one: it is no reason to be content.
+        let at_least = |value: f32, least: f32| if value <= least { least } else { value };
+        let least = if self.is_new() { found.motion } else { 0.0 };
+        self.comparisons = self.comparisons.saturating_add(1);
+        let mean = at_least(at_least(found.mean, kept * before.mean), least);
+        let largest = at_least(at_least(found.largest, kept * before.largest), mean);
+        let growth = |now: f32, before: f32| ((now - before) / seconds).max(0.0);
+        self.growth = [growth(mean, before.mean), growth(largest, before.largest)];
+        self.waited = 0.0;
+        self.held = Some(Comparison { mean, largest, ..*found });
+    }
+
+    /// Whether the first comparisons are not over.
+    pub(super) const fn is_new(&self) -> bool {
+        self.comparisons < FIRST_COMPARISONS
+    }
+
+    /// So many seconds have gone since the latest comparison.
+    pub(super) const fn wait(&mut self, seconds: f32) {
+        self.waited = seconds;
+    }
+
+    /// Nothing could be compared: the error may be as large as the motion.
+    pub(super) fn lose(&mut self, seconds: f32) {
+        let before = self.held.unwrap_or_default();
+        let mean = before.mean.max(self.motion);
+        self.add(&Comparison { mean, largest: before.largest.max(mean), ..before }, seconds);
+    }
+
+    pub(super) fn estimate(&self) -> Option<Estimate> {
+        let Comparison { mean, largest, node, .. } = self.held?;
+        let allowed = match self.allowed {
+            Allowed::ShareOfMotion => self.least.max(SHARE_OF_MOTION * self.motion),
+            Allowed::Metres(metres) => metres,
+        };
+        let [mean, largest] = [(mean, self.growth[0]), (largest, self.growth[1])]
+            .map(|(held, growth)| ESTIMATE * (held + growth * self.waited));
+        Some(Estimate { mean, largest, node, allowed })
+    }
+
+    /// The status of a step that was taken.
+    pub(super) fn judge(&self, taken: Status) -> Status {
+        match (taken, self.estimate()) {
+            // An estimate that is no number exceeds everything.
+            (Status::Ok, Some(Estimate { mean, allowed, .. })) if mean.is_nan() || mean > allowed => {
+                Status::Inexact { error: mean, allowed }
+            }
+            _ => taken,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn distance(mean: f32) -> Comparison {
+        Comparison { mean, largest: 2.0 * mean, node: 3, motion: 0.05 }
+    }
+
+    /// Of a body of 5 cm, after the first comparisons.
+    fn later() -> Envelope {
+        Envelope { comparisons: FIRST_COMPARISONS, ..Envelope::new(&[[0.0; 3], [0.03, 0.04, 0.0]]) }
+    }
+
+    #[test]
+    fn at_first_the_error_may_be_the_whole_motion() {
+        let mut envelope = Envelope::new(&[[0.0; 3], [0.03, 0.04, 0.0]]);
+        assert_eq!(envelope.estimate(), None);
+        for _ in 0..FIRST_COMPARISONS {
+            envelope.add(&distance(0.001), 1e-3);
+            assert!(envelope.estimate().unwrap().mean > ESTIMATE * 0.049);
+        }
+        envelope.add(&distance(0.001), 10.0 * HALF_LIFE);
+        assert_eq!(envelope.estimate().unwrap().mean, ESTIMATE * 0.001);
+    }
+
+    #[test]
+    fn an_envelope_follows_at_once_and_forgets_by_half_in_a_fifth_of_a_second() {
+        let mut envelope = later();
+        envelope.add(&distance(0.004), 0.01);
+        envelope.add(&distance(0.0), HALF_LIFE);
+        let Estimate { mean, largest, .. } = envelope.estimate().unwrap();
+        assert!((mean - ESTIMATE * 0.002).abs() < 1e-8 && (largest - ESTIMATE * 0.004).abs() < 1e-8);
+        envelope.add(&distance(0.006), HALF_LIFE);
+        assert_eq!(envelope.estimate().unwrap().mean, ESTIMATE * 0.006);
+    }
+
+    #[test]
+    fn a_step_is_inexact_above_a_share_of_the_motion_or_above_the_tolerance() {
+        let mut envelope = later();
+        assert_eq!(envelope.judge(Status::Ok), Status::Ok);
+        envelope.add(&distance(0.2 * 0.05 / ESTIMATE * 0.99), 0.01);
+        assert_eq!(envelope.judge(Status::Ok), Status::Ok);
+        envelope.allowed = Allowed::Metres(0.001);
+        let Status::Inexact { error, allowed } = envelope.judge(Status::Ok) else { panic!() };
+        assert!(error > 0.009 && allowed == 0.001);
+        // What is worse stays.
+        let limited = Status::Limited { least_volume_ratio: 0.0, saturation: 0.0, energy_excess: 1.0 };
+        assert_eq!(envelope.judge(limited), limited);
+        envelope.allowed = Allowed::default();
+        envelope.add(&distance(f32::NAN), 0.01);
+        assert!(matches!(envelope.judge(Status::Ok), Status::Inexact { .. }));
+    }
+
+    #[test]
+    fn where_nothing_can_be_compared_the_error_may_be_the_whole_motion() {
+        let mut envelope = later();
+        envelope.add(&distance(0.001), 0.01);
+        envelope.lose(0.01);
+        assert_eq!(envelope.estimate().unwrap().mean, ESTIMATE * 0.05);
+    }
+}

@@ -1,0 +1,318 @@
+//! May a step be believed? A *second run* moves the same body by multilevel steps that are several times as long as those of the first
+//! run, under the same loads. The distance between the two runs estimates the error of the first: the second is the less accurate one,
+//! so the distance is mostly an error of its own. That holds on bodies, materials and loads that nobody has tuned anything on, and for
+//! every method: exact steps above their critical one, mass-scaled, multilevel, damped and learned ones. A frozen body shows, because the
+//! second run's lattice has the true inertia of smooth motion.
+//!
+//! Step doubling (Hairer, Norsett & Wanner 1993, II.4) takes the difference as the leading term of an error of known order. Here it is
+//! taken as it is, times [`ESTIMATE`]: the order lies between one and four, depending on what motion the step resolves, and
+//! extrapolation with a measured order was less certain than none. How often the truth is larger: `docs/accuracy.md`.
+//!
+//! Comparisons take place at each of the first three steps, where the second run takes two steps in one of the first, after two steps
+//! more, after three more, and so on up to what the caller says ([`EVERY`]). A guard costs a multilevel step in each comparison, and
+//! memory for a second state and the second run's inertia ([`vectors_for`]). A scene without a guard pays nothing, and knows nothing of
+//! its error.
+
+mod compare;
+mod estimate;
+
+pub use estimate::{Allowed, Estimate};
+
+use crate::element::ElementMaterial;
+use crate::inertia::{Cells, InertiaError, LargeModel, Method, vectors_for as vectors_for_method};
+use crate::loads::Loads;
+use crate::material::{Element, Material};
+use crate::scene::SceneView;
+use crate::simd::NodeVector;
+use crate::state::{Progress, StateView};
+use crate::step::{CallingThread, Status, Step, Threads};
+use compare::compare;
+use estimate::Envelope;
+
+/// Steps of the first run in one of the second, where nothing speaks for another number. With more, a guard costs less and calls more
+/// right steps inexact.
+pub const EVERY: u32 = 3;
+/// The same for learned steps: their error does not grow with their length, and they take far more time than a multilevel step.
+pub const EVERY_LEARNED: u32 = 1;
+/// The estimate over the distance of the two runs.
+pub const ESTIMATE: f32 = 2.0;
+
+/// Relative error of times that are sums of steps.
+const ROUNDING: f64 = 1e-4;
+
+pub(crate) const SECOND_RUN: Method<'static> = Method::Multilevel(Cells::Suggested);
+
+/// Vectors of storage that a guard needs on a scene with these `points` (m).
+pub fn vectors_for<M: Material>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<usize, InertiaError> {
+    Ok(vectors_of_state::<M>(scene.node_count()) + vectors_for_method(&SECOND_RUN, scene, points)?)
+}
+
+/// Displacements, increments and forces; volumes for elements that have them.
+const fn vectors_of_state<M: Material>(nodes: usize) -> usize {
+    if matches!(M::ELEMENT, Element::Linear) { 3 * nodes } else { 4 * nodes }
+}
+
+/// A guard without its storage; it may be moved in memory.
+#[derive(Clone, Debug)]
+pub struct GuardModel {
+    second: LargeModel<'static>,
+    watch: Watch,
+}
+
+/// What a guard knows apart from the second run's inertia.
+#[derive(Clone, Debug)]
+pub(crate) struct Watch {
+    progress: Progress,
+    nodes: usize,
+    /// Longest time between two comparisons, s.
+    longest: f32,
+    /// Time to the next comparison, s.
+    interval: f32,
+    /// Steps of the first run after the latest step that the guard has seen.
+    steps: u64,
+    envelope: Envelope,
+}
+
+impl GuardModel {
+    /// A guard for steps of `step`, from the present state, for a scene with these `points` (m) at rest; the second run's steps are
+    /// `every` times as long, or fewer where that is longer than single precision allows. `storage` of [`vectors_for`] vectors is
+    /// overwritten.
+    pub fn prepare<M: ElementMaterial>(
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        state: StateView<'_>,
+        step: Step,
+        every: u32,
+        storage: &mut [NodeVector],
+    ) -> Result<Self, InertiaError> {
+        let (second, watch) =
+            Watch::prepare(scene, points, state, step, every, storage, |state, step, storage| {
+                LargeModel::prepare(SECOND_RUN, scene, points, state, step, storage)
+            })?;
+        Ok(Self { second, watch })
+    }
+
+    /// What errors are allowed before a step is [`Status::Inexact`].
+    pub const fn allow(&mut self, allowed: Allowed) {
+        self.watch.allow(allowed);
+    }
+
+    /// Estimate of the error of the first run; none before the first comparison.
+    #[must_use]
+    pub fn estimate(&self) -> Option<Estimate> {
+        self.watch.estimate()
+    }
+
+    /// The model with the storage in which it was prepared.
+    pub const fn with_storage<'a>(&'a mut self, storage: &'a mut [NodeVector]) -> GuardView<'a> {
+        GuardView { second: &mut self.second, watch: &mut self.watch, storage }
+    }
+}
+
+impl Watch {
+    /// See [`GuardModel::prepare`]. `second` prepares the second run.
+    pub(crate) fn prepare<M: ElementMaterial, T>(
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        mut state: StateView<'_>,
+        step: Step,
+        every: u32,
+        storage: &mut [NodeVector],
+        mut second: impl FnMut(StateView<'_>, Step, &mut [NodeVector]) -> Result<T, InertiaError>,
+    ) -> Result<(T, Self), InertiaError> {
+        let nodes = scene.node_count();
+        let mut progress = Progress::START;
+        let (needed, capacity) = (vectors_for(scene, points)?, storage.len());
+        let Some((mut copied, of_second)) =
+            split::<M>(storage, nodes, &mut progress).filter(|_| capacity >= needed)
+        else {
+            return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
+        };
+        copy(&mut copied, &state, nodes);
+        let mut every = every.max(1);
+        let (second, longest) = loop {
+            let seconds = every as f32 * step.seconds();
+            let longest = Step::unchecked(seconds, step.damping())
+                .map_err(|_| InertiaError::Step { seconds, most: f32::MAX })?;
+            match second(state.reborrow(), longest, of_second) {
+                Ok(second) => break (second, longest),
+                // The step is too long for single precision.
+                Err(InertiaError::Singular { .. }) if every > 1 => every /= 2,
+                Err(error) => return Err(error),
+            }
+        };
+        let steps = state.steps();
+        let envelope = Envelope::new(points);
+        Ok((second, Self { progress, nodes, longest: longest.seconds(), interval: 0.0, steps, envelope }))
+    }
+
+    /// See [`GuardModel::allow`].
+    pub(crate) const fn allow(&mut self, allowed: Allowed) {
+        self.envelope.allowed = allowed;
+    }
+
+    /// See [`GuardModel::estimate`].
+    pub(crate) fn estimate(&self) -> Option<Estimate> {
+        self.envelope.estimate()
+    }
+}
+
+/// A guard with borrowed storage.
+#[derive(Debug)]
+pub struct GuardView<'a> {
+    pub(crate) second: &'a mut LargeModel<'static>,
+    pub(crate) watch: &'a mut Watch,
+    pub(crate) storage: &'a mut [NodeVector],
+}
+
+impl GuardView<'_> {
+    /// See [`Guard::follow`].
+    pub fn follow<M: ElementMaterial>(
+        self,
+        taken: Status,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: &StateView<'_>,
+        threads: &impl Threads,
+    ) -> Status {
+        let Self { second: large, watch, storage } = self;
+        let Watch { progress, nodes, longest, interval, steps, envelope } = watch;
+        let nodes = *nodes;
+        if !taken.is_taken() {
+            return taken;
+        }
+        let mismatch = Status::Mismatch { nodes: scene.node_count(), room: nodes };
+        let Some((mut second, of_second)) = split::<M>(storage, nodes, progress) else {
+            return mismatch;
+        };
+        if scene.node_count() != nodes || state.capacity_for::<M>() < nodes {
+            return mismatch;
+        }
+        let gone = state.time() - second.time();
+        let follows = *steps < state.steps() && gone <= (1.0 + ROUNDING) * f64::from(*longest);
+        *steps = state.steps();
+        if !follows {
+            // The state was restored or reset, or has gone on without the guard.
+            envelope.forget();
+            *interval = 0.0;
+            copy(&mut second, state, nodes);
+            return taken;
+        }
+        if gone < (1.0 - ROUNDING) * f64::from(*interval) {
+            envelope.wait(gone as f32);
+            return envelope.judge(taken);
+        }
+        // At the start a load may begin within a step, of which the first run's first step knows nothing.
+        let parts: u32 = if envelope.is_new() { 2 } else { 1 };
+        let (gone, seconds) = (gone as f32, f32::min(gone as f32 / parts as f32, *longest));
+        let mut followed = large.set_seconds(seconds).is_ok();
+        for _ in 0..parts {
+            let large = large.with_storage(of_second);
+            followed &= large.step_in_parts(scene, loads, second.reborrow(), threads).is_taken();
+        }
+        if followed {
+            // Else the rounding of each step would part them in a long session.
+            second.progress.time = state.time();
+            large.is_at(second.progress);
+            envelope.add(&compare(nodes, state.displacement, second.displacement), gone);
+            let more = if envelope.is_new() { 0.0 } else { state.last_step() };
+            *interval = (gone + more).min(*longest);
+        } else {
+            // The second run cannot follow: nothing is known but that the body has moved.
+            envelope.lose(gone);
+            copy(&mut second, state, nodes);
+            *interval = state.last_step();
+        }
+        envelope.judge(taken)
+    }
+}
+
+/// The second run's state and the rest of the storage.
+fn split<'a, M: Material>(
+    storage: &'a mut [NodeVector],
+    nodes: usize,
+    progress: &'a mut Progress,
+) -> Option<(StateView<'a>, &'a mut [NodeVector])> {
+    let (displacement, rest) = storage.split_at_mut_checked(nodes)?;
+    let (increment, rest) = rest.split_at_mut_checked(nodes)?;
+    let (force, rest) = rest.split_at_mut_checked(nodes)?;
+    let volumes = vectors_of_state::<M>(nodes) - 3 * nodes;
+    let (volume, rest) = rest.split_at_mut_checked(volumes)?;
+    Some((StateView::new(displacement, increment, force, volume, progress), rest))
+}
+
+/// Makes the second run start from the state of the first.
+fn copy(second: &mut StateView<'_>, state: &StateView<'_>, nodes: usize) {
+    for (to, from) in
+        [(&mut *second.displacement, &*state.displacement), (&mut *second.increment, &*state.increment)]
+    {
+        for (to, from) in to.iter_mut().zip(from).take(nodes) {
+            *to = *from;
+        }
+    }
+    *second.progress = *state.progress;
+}
+
+/// A guard with storage `S` of the caller.
+#[derive(Clone, Debug)]
+pub struct Guard<S> {
+    model: GuardModel,
+    storage: S,
+}
+
+impl<S: AsMut<[NodeVector]>> Guard<S> {
+    /// See [`GuardModel::prepare`].
+    pub fn prepare<M: ElementMaterial>(
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        state: StateView<'_>,
+        step: Step,
+        every: u32,
+        mut storage: S,
+    ) -> Result<Self, InertiaError> {
+        let model = GuardModel::prepare(scene, points, state, step, every, storage.as_mut())?;
+        Ok(Self { model, storage })
+    }
+
+    /// See [`GuardModel::allow`].
+    #[must_use]
+    pub const fn allowing(mut self, allowed: Allowed) -> Self {
+        self.model.allow(allowed);
+        self
+    }
+
+    /// See [`GuardModel::estimate`].
+    #[must_use]
+    pub fn estimate(&self) -> Option<Estimate> {
+        self.model.estimate()
+    }
+
+    /// To be called after each step of the first run, or after each few, with what it answered, the loads that it had and the state that
+    /// it left. Every so often it moves the second run and compares. Gives that status, or [`Status::Inexact`] in place of [`Status::Ok`] if the estimate
+    /// exceeds what is allowed. A state that has been restored or reset, or has gone on for longer
+    /// than a step of the second run, begins a new second run.
+    pub fn follow<M: ElementMaterial>(
+        &mut self,
+        taken: Status,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: &StateView<'_>,
+    ) -> Status {
+        self.model.with_storage(self.storage.as_mut()).follow(taken, scene, loads, state, &CallingThread)
+    }
+}
+
+#[cfg(any(feature = "std", test))]
+impl Guard<std::vec::Vec<NodeVector>> {
+    /// The same with storage from the heap.
+    pub fn prepare_in_vec<M: ElementMaterial>(
+        scene: SceneView<'_, M>,
+        points: &[[f32; 3]],
+        state: StateView<'_>,
+        step: Step,
+        every: u32,
+    ) -> Result<Self, InertiaError> {
+        let vectors = vectors_for(scene, points)?;
+        Self::prepare(scene, points, state, step, every, std::vec![NodeVector::ZERO; vectors])
+    }
+}
