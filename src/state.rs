@@ -30,14 +30,12 @@ pub struct Progress {
 pub(crate) struct Moment {
     steps: u64,
     time: f64,
-    work: f64,
     kinetic: f64,
 }
 
 impl Progress {
     pub(crate) const fn moment(&self) -> Moment {
-        let EnergyBalance { work, kinetic, .. } = self.energy_balance;
-        Moment { steps: self.steps, time: self.time, work, kinetic }
+        Moment { steps: self.steps, time: self.time, kinetic: self.energy_balance.kinetic }
     }
 
     /// At rest, at time zero.

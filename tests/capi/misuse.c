@@ -462,7 +462,7 @@ static void divergence(void) {
     DONE(supple_learned_init(spare, sizeof spare, scene, &without, &alone, NULL));
     DONE(supple_state_reset(state));
     DONE(supple_learned_lead(scene, loads, state, alone, 100 * (double)facts.seconds, NULL, &report));
-    const double least[6] = {0.0, 0.0, 0.0, 1e-6 * report.kinetic, 0.0, 1e-6 * report.kinetic};
+    const double least[6] = {0.0, 0.0, 0.0, report.kinetic, 0.0, 1e-6 * report.kinetic};
     forge(BALANCE, least, sizeof least);
     DONE(supple_restore(state, saved, sizeof saved));
     CHECK(supple_learned_step(scene, NULL, state, alone, 2, NULL, &report) == SUPPLE_E_DIVERGED_ENERGY && report.steps == 0);
