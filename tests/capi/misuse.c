@@ -488,6 +488,38 @@ static void elements(supple_scene_config config) {
     CHECK(supple_state_size(NODES, 3) == 0);
 }
 
+static void guards(void) {
+    static const supple_guard_config good = {SUPPLE_CONFIG(supple_guard_config), 3e-4f, 20.0f, 3, 1e-9f};
+    supple_guard *none = NULL, *guard = NULL;
+    size_t bytes = 0;
+    supple_guard_config bad = good;
+    DONE(supple_state_reset(state));
+    REFUSED(SUPPLE_E_NULL, supple_guard_size(scene, NULL, &bytes, &error));
+    DONE(supple_guard_size(scene, points[0], &bytes, &error));
+    CHECK(bytes <= sizeof spare);
+    REFUSED(SUPPLE_E_SHORT, supple_guard_init(spare, bytes - 1, scene, state, points[0], &good, &none, &error));
+    bad.abi++;
+    REFUSED(SUPPLE_E_ABI, supple_guard_init(spare, sizeof spare, scene, state, points[0], &bad, &none, &error));
+    bad = good, bad.tolerance = NAN;
+    REFUSED(SUPPLE_E_NEGATIVE, supple_guard_init(spare, sizeof spare, scene, state, points[0], &bad, &none, &error));
+    bad = good, bad.seconds = 0.0f;
+    REFUSED(SUPPLE_E_STEP, supple_guard_init(spare, sizeof spare, scene, state, points[0], &bad, &none, &error));
+    DONE(supple_guard_init(spare, sizeof spare, scene, state, points[0], &good, &guard, &error));
+    REFUSED(SUPPLE_E_NULL, supple_guard_follow(scene, loads, state, NULL, NULL, NULL));
+    REFUSED(SUPPLE_E_MISMATCH, supple_guard_follow(small_scene, small_loads, small_state, guard, NULL, NULL));
+    const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), 3e-5f, 20.0f};
+    DONE(supple_set_step(scene, state, &step, NULL));
+    move_end(scene, loads, 1e-4f, 0.0f, 1e-4f);
+    supple_estimate estimate = {0, 0, 0.0f, 0.0f, 0.0f};
+    supple_status told = SUPPLE_OK;
+    for (int n = 0; n < 30; n++) {
+        CHECK(supple_step(scene, loads, state, 10, NULL, NULL) >= 0);
+        told = supple_guard_follow(scene, loads, state, guard, NULL, &estimate);
+    }
+    note(told);
+    CHECK(told == SUPPLE_INEXACT && estimate.known == 1 && estimate.mean > estimate.allowed && estimate.allowed == 1e-9f);
+}
+
 int main(int argc, char **argv) {
     (void)argv;
     watched = argc == 1;
@@ -515,6 +547,7 @@ int main(int argc, char **argv) {
     bytes_of_states();
     networks();
     divergence();
+    guards();
     DONE(supple_state_reset(state));
     REFUSED(SUPPLE_E_ELEMENT, supple_step(other_element(config), NULL, state, 1, NULL, NULL));
 
