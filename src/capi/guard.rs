@@ -9,9 +9,10 @@ use crate::state::NodeVector;
 use crate::step::{Status, Step};
 
 use super::SUPPLE_NONE;
+use super::large::storage;
 use super::loads::{CallLoads, supple_loads};
 use super::memory::{
-    self, Arrays, Head, Layout, Object, Place, array, magic, one, place_for, place_if_wanted, same_abi,
+    self, Head, Layout, Object, Place, array, magic, one, place_for, place_if_wanted, same_abi,
 };
 use super::scene::{carved, supple_scene, with_scene};
 use super::state::{opened_of, supple_state};
@@ -155,13 +156,6 @@ fn allowed(tolerance: f32) -> Answer<Allowed> {
         metres if metres.is_finite() && metres > 0.0 => Ok(Allowed::Metres(metres)),
         other => Err(supple_error::from(SUPPLE_E_NEGATIVE).value(other.into(), 0.0)),
     }
-}
-
-/// # Safety
-/// The arrays are those of a supple_guard, and nobody else uses them.
-unsafe fn storage<'a>(mut arrays: Arrays, vectors: usize) -> &'a mut [NodeVector] {
-    // SAFETY: the caller's promise. Any bits are vectors.
-    unsafe { arrays.change(vectors) }
 }
 
 /// To be called after each call that moves the state, with the same loads, at the latest after `every` steps of the configuration.

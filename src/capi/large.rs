@@ -198,8 +198,8 @@ pub unsafe extern "C" fn supple_large_init(
 }
 
 /// # Safety
-/// The arrays are those of a supple_large, and nobody else uses them.
-unsafe fn storage<'a>(mut arrays: Arrays, vectors: usize) -> &'a mut [NodeVector] {
+/// The arrays are those of an object with so many vectors, and nobody else uses them.
+pub(super) unsafe fn storage<'a>(mut arrays: Arrays, vectors: usize) -> &'a mut [NodeVector] {
     // SAFETY: the caller's promise. Any bits are vectors.
     unsafe { arrays.change(vectors) }
 }

@@ -4,6 +4,7 @@
 
 use super::ESTIMATE;
 use super::compare::Comparison;
+use crate::inertia::size_of;
 use crate::step::Status;
 
 /// Time in which a held estimate falls by half, s.
@@ -61,14 +62,7 @@ pub(super) struct Envelope {
 impl Envelope {
     /// For a body with these points at rest, m.
     pub(super) fn new(points: &[[f32; 3]]) -> Self {
-        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        for point in points {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(point[axis]);
-                high[axis] = high[axis].max(point[axis]);
-            }
-        }
-        let square: f32 = [0, 1, 2].map(|axis| high[axis] - low[axis]).iter().map(|side| side * side).sum();
+        let square: f32 = size_of(points).iter().map(|side| side * side).sum();
         let least = LEAST.min(SHARE_OF_SIZE * libm::sqrtf(square));
         Self {
             allowed: Allowed::default(),

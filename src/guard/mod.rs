@@ -208,7 +208,7 @@ impl GuardView<'_> {
         let mut followed = large.set_seconds(seconds).is_ok();
         for _ in 0..parts {
             let large = large.with_storage(of_second);
-            followed &= large.step_in_parts(scene, loads, second.reborrow(), threads).is_taken();
+            followed = followed && large.step_in_parts(scene, loads, second.reborrow(), threads).is_taken();
         }
         if followed {
             // Else the rounding of each step would part them in a long session.

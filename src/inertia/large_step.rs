@@ -17,7 +17,7 @@ use super::damper::RoughMotion;
 use super::lattice::{Grid, Lattice, LatticeNode, node_at, rank_of, sort_by_cell};
 use super::matrices::Matrices;
 use super::method::{Cells, Method, largest_grid, vectors_for_lattice, vectors_of_order, vectors_of_places};
-use super::node::Scaling;
+use super::node::{Scaling, half_damping};
 use super::node_tables::{NodeTables, read_matrices};
 use super::patches::sort_by_patch;
 use super::refresh::{Refresh, RefreshInput};
@@ -335,7 +335,7 @@ fn cycle(step: Step, has_lattice: bool) -> u32 {
 
 fn scaling(step: Step, has_lattice: bool) -> Scaling {
     let (dt, damping) = (step.seconds(), step.damping());
-    let k = 0.5 * damping * dt;
+    let k = half_damping(&step);
     let fine = if has_lattice { FINE } else { FINE_WITHOUT_LATTICE };
     Scaling {
         weight: 0.25 * fine * dt * dt,

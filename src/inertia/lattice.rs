@@ -528,7 +528,7 @@ fn bounding_box(points: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
 }
 
 /// Size of the box around the points, m.
-pub(super) fn size_of(points: &[[f32; 3]]) -> [f32; 3] {
+pub(crate) fn size_of(points: &[[f32; 3]]) -> [f32; 3] {
     bounding_box(points).1
 }
 

@@ -78,7 +78,7 @@
 //! # What it costs
 //!
 //! Accuracy: motion that neither has its true inertia nor is carried by the lattice is too slow. [`Report`] says how
-//! much inertia was added, and where, and estimates the error in metres (`estimate.rs`). Memory: see [`vectors_for`].
+//! much inertia was added, and where; a [`crate::guard`] estimates the error. Memory: see [`vectors_for`].
 
 mod assembly;
 #[cfg(test)]
@@ -112,6 +112,7 @@ mod transport;
 
 pub use damper::{Damper, DamperError};
 pub use large_step::{LargeModel, LargeStep, LargeView};
+pub(crate) use lattice::size_of;
 pub use lattice::{Grid, MAX_FUNCTIONS, MAX_POINTS};
 pub use method::{Cells, Method, vectors_for, vectors_for_lattice};
 pub use report::Report;

@@ -153,7 +153,7 @@ impl<R: Real> AxisSums<R> {
         Self { sums: [Sums::new(input.step, R::splat); 3], rough: [R::splat(0.0); 4] }
     }
 
-    /// Adds nodes with their displacements and next increments.
+    /// Adds nodes with their next increments.
     #[inline(always)]
     fn add(&mut self, nodes: &NodeValues<R>, next: [R; 4]) {
         for axis in 0..3 {

@@ -20,6 +20,7 @@
 
 use crate::element::symmetric::Symmetric;
 use crate::simd::Real;
+use crate::step::Step;
 
 /// Share of the energy taken by damping that a growing inertia may give back.
 const GIVEN_BACK: f32 = 0.5;
@@ -37,6 +38,11 @@ pub(super) struct Scaling {
     pub(super) loss: f32,
     /// `s_c D^2 / 4`, s^2.
     pub(super) coarse_weight: f32,
+}
+
+/// `k = mu D / 2` of a step.
+pub(super) fn half_damping(step: &Step) -> f32 {
+    0.5 * step.damping() * step.seconds()
 }
 
 /// The new inertia of a vector of nodes.

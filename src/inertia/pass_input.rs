@@ -5,7 +5,7 @@ use bytemuck::must_cast_slice;
 
 use super::cells::NodesInCells;
 use super::lattice::LatticeNode;
-use super::node::Scaling;
+use super::node::{Scaling, half_damping};
 use crate::element::NodeInertia;
 use crate::padding;
 use crate::simd::{Indexed, NodeVector, Real, Rows, TILE};
@@ -24,7 +24,7 @@ impl ResidualFactors {
     /// Those of a step with the inertia of one that may be longer. Inertia contains `1 + k` times the mass: in a shorter step, with a
     /// smaller `k`, the residual is larger by the ratio of both.
     pub(super) fn new(step: &Step, scaling: &Scaling, is_first: bool) -> Self {
-        let k = 0.5 * step.damping() * step.seconds();
+        let k = half_damping(step);
         let ratio = (1.0 + scaling.k) / (1.0 + k);
         let square = step.seconds() * step.seconds() * if is_first { 0.5 } else { 1.0 };
         Self { square: ratio * square, loss: ratio * 2.0 * k * step.carry() }

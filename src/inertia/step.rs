@@ -22,6 +22,7 @@ use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS, rank_of};
 use super::matrices::{Matrices, of_axes};
 use super::motion_pass::{LatticeMotion, PassTotals, RoughDamping, rotation_table};
 use super::nodal_sums;
+use super::node::half_damping;
 use super::parts::NodeParts;
 use super::pass_input::{PassInput, ResidualFactors};
 use super::refresh::{Refresh, RefreshInput};
@@ -233,8 +234,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let MotionResult { share, change, work } = motion.compute(matrices, share);
         // Without a lattice in use there is no distinction of smooth and rough motion.
         let damper = method.damper().filter(|_| refresh.lattice_in_use);
-        self.damping = damper
-            .map_or(0.0, |damper| step.carry() * damper.share(rough, 0.5 * step.damping() * step.seconds()));
+        self.damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, half_damping(step)));
         // Where bounds have grown beyond their margin they are out of date whatever the lattice does.
         self.change = if growth <= COARSE_GROWTH { change } else { f32::INFINITY };
         self.coarse_share = if refresh.lattice_in_use { share } else { 0.0 };

@@ -6,8 +6,42 @@ use std::string::String;
 use std::vec::Vec;
 
 use super::method::Method;
-use super::ratios::{LEAST, Ratios, multiples};
 use super::run::Row;
+
+/// Errors below are not judged, mm: their scale is that of float32.
+const LEAST: f64 = 1e-4;
+
+/// Ratios of some runs, in ascending order.
+#[derive(Clone, Debug, PartialEq)]
+struct Ratios(Vec<f64>);
+
+impl Ratios {
+    fn new(mut ratios: Vec<f64>) -> Self {
+        ratios.sort_by(f64::total_cmp);
+        Self(ratios)
+    }
+
+    /// How many there are.
+    const fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Median, least and largest.
+    fn spread(&self) -> Option<[f64; 3]> {
+        let Self(ratios) = self;
+        let at = |index: usize| ratios.get(index).copied();
+        let last = ratios.len().checked_sub(1)?;
+        Some([0.5 * (at(last / 2)? + at(last.div_ceil(2))?), at(0)?, at(last)?])
+    }
+}
+
+/// The multiples of the rows, in ascending order.
+fn multiples(rows: &[Row]) -> Vec<u32> {
+    let mut multiples: Vec<u32> = rows.iter().map(|row| row.multiple).collect();
+    multiples.sort_unstable();
+    multiples.dedup();
+    multiples
+}
 
 /// Error (mm) and time of a simulated second (us).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,5 +128,11 @@ mod tests {
             assert!((found / time - 1.0).abs() < 1e-9, "{error}: {found}");
         }
         assert_eq!(time_at(&[], 1.0), None);
+    }
+
+    #[test]
+    fn a_spread_is_median_least_and_largest() {
+        assert_eq!(Ratios::new(vec![10.0, 2.0, 0.5, 1.0]).spread(), Some([1.5, 0.5, 10.0]));
+        assert_eq!(Ratios::new(vec![]).spread(), None);
     }
 }

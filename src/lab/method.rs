@@ -154,12 +154,6 @@ impl Method {
         }
     }
 
-    /// Whether it scales inertia, so that its error can be estimated.
-    #[must_use]
-    pub const fn scales_inertia(self) -> bool {
-        matches!(self, Self::MassScaled | Self::Multilevel | Self::Damped | Self::DampedWith(_))
-    }
-
     /// Time at the start that exact steps take, s.
     #[must_use]
     pub const fn lead_in(self) -> f64 {

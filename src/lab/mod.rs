@@ -34,7 +34,6 @@ pub mod networks;
 pub mod physics;
 pub mod plot;
 pub(crate) mod random_numbers;
-mod ratios;
 pub mod run;
 pub mod scenes;
 pub mod sweep;

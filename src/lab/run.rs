@@ -93,27 +93,24 @@ impl Row {
     }
 }
 
-/// Displacement of each node (m) at each snapshot that was reached.
-pub type Shapes = Vec<Vec<[f32; 3]>>;
-
 /// Runs `method` over a scene at `multiple` times its step.
 pub fn run(spec: &SceneSpec, truth: &Truth, method: Method, multiple: u32) -> Result<Row, LabError> {
-    Ok(run_with_shapes(spec, truth, method, multiple, None)?.0)
+    run_guarded(spec, truth, method, multiple, None)
 }
 
-/// The same with a guard whose second run's steps are `every` times as long, and the displacements at each snapshot.
-pub fn run_with_shapes(
+/// The same with a guard whose second run's steps are `every` times as long, if any.
+pub fn run_guarded(
     spec: &SceneSpec,
     truth: &Truth,
     method: Method,
     multiple: u32,
     every: Option<u32>,
-) -> Result<(Row, Shapes), LabError> {
+) -> Result<Row, LabError> {
     spec.check_multiple(multiple)?;
-    let (end, frames, shapes) = spec.with_material(Run { spec, truth, method, multiple, every })?;
+    let (end, frames) = spec.with_material(Run { spec, truth, method, multiple, every })?;
     let hold = Errors::of_hold(truth)?;
     let step = f64::from(multiple) * f64::from(spec.timing.step);
-    let row = Row {
+    Ok(Row {
         scene: spec.name,
         method,
         multiple,
@@ -124,8 +121,7 @@ pub fn run_with_shapes(
         step_over_limit_trajectory: step / truth.limit_least,
         frames,
         end,
-    };
-    Ok((row, shapes))
+    })
 }
 
 struct Run<'a> {
@@ -137,7 +133,7 @@ struct Run<'a> {
 }
 
 impl MaterialWork for Run<'_> {
-    type Output = Result<(End, Vec<Frame>, Shapes), LabError>;
+    type Output = Result<(End, Vec<Frame>), LabError>;
 
     fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
         let Self { spec, truth, method, multiple, every } = self;
@@ -153,7 +149,7 @@ impl MaterialWork for Run<'_> {
             None => None,
         };
 
-        let (mut errors, mut shapes) = (Errors::default(), Shapes::new());
+        let mut errors = Errors::default();
         let (mut frames, mut estimate) = (Vec::new(), None);
         let (mut taken, mut limited, mut spent) = (0_u32, 0_u32, Duration::ZERO);
         let (mut clips, mut predictions) = (0.0, 0_u32);
@@ -178,7 +174,7 @@ impl MaterialWork for Run<'_> {
                     Status::Ok => {}
                     Status::Limited { .. } | Status::Inexact { .. } => limited += 1,
                     Status::Diverged(divergence) => {
-                        return Ok((End::Diverged(divergence.time), frames, shapes));
+                        return Ok((End::Diverged(divergence.time), frames));
                     }
                     Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
                 }
@@ -189,7 +185,6 @@ impl MaterialWork for Run<'_> {
                 spent += start.elapsed();
             }
             errors.add_snapshot(truth, state.displacements())?;
-            shapes.push(state.displacements().iter().map(|vector| vector.to_array()).collect());
             let estimate = estimate.map(|metres| metres.map(|metre| 1e3 * f64::from(metre)));
             frames.push(Frame { mean: errors.mean(), max: errors.max, estimate, ok });
         }
@@ -204,7 +199,7 @@ impl MaterialWork for Run<'_> {
             },
             us_per_step: 1e6 * spent.as_secs_f64() / taken,
         };
-        Ok((End::Reached(figures), frames, shapes))
+        Ok((End::Reached(figures), frames))
     }
 }
 

@@ -153,13 +153,13 @@ fn runs(spec: &SceneSpec, truth: &Truth, plan: &Plan, say: &impl Fn(&str)) -> Re
             _ => Some(plan.every),
         };
         for multiple in multiples {
-            let row = match run::run_with_shapes(spec, truth, method, multiple, every) {
+            let row = match run::run_guarded(spec, truth, method, multiple, every) {
                 // Refused before it has begun: not wrong.
                 Err(LabError::Inertia(error)) => {
                     say(&format!("{}: {} refuses: {error}", spec.name, method.name()));
                     continue;
                 }
-                row => row?.0,
+                row => row?,
             };
             judged.push(Judged::new(row, truth, spec.timing.interval_seconds()));
         }

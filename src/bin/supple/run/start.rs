@@ -94,16 +94,12 @@ impl<'a> Start<'a> {
             Mover::Large(_) => Some((step.seconds(), guard::EVERY)),
             Mover::Learned(learned) => Some((learned.seconds(), guard::EVERY_LEARNED)),
         };
-        let guard = match guard {
-            None => None,
-            Some((seconds, every)) => {
-                let step = Step::unchecked(seconds, setup.damping).map_err(Problem::of)?;
-                Some(
-                    Guard::prepare_in_vec(scene, &setup.body.local, state.view(), step, every)
-                        .map_err(|error| Problem(format!("{}: {error}", setup.body.name)))?,
-                )
-            }
-        };
+        let guard = guard.map(|(seconds, every)| {
+            let step = Step::unchecked(seconds, setup.damping).map_err(Problem::of)?;
+            Guard::prepare_in_vec(scene, &setup.body.local, state.view(), step, every)
+                .map_err(|error| Problem(format!("{}: {error}", setup.body.name)))
+        });
+        let guard = guard.transpose()?;
         Ok(Self { at_rest, step, mover, guard })
     }
 }
