@@ -44,6 +44,8 @@ pub struct LargeModel<'w> {
     /// The next step, at most as long as the one that it was prepared for.
     pub(super) step: Step,
     prepared: Step,
+    /// Inertia in use is that of another length of step.
+    pub(super) is_for_other_step: bool,
     pub(super) lattice: Lattice,
     pub(super) refresh: Refresh,
     pub(super) scaling: Scaling,
@@ -166,6 +168,7 @@ impl<'w> LargeModel<'w> {
             rough: RoughMotion::NONE,
             step,
             prepared: step,
+            is_for_other_step: false,
             scaling: scaling(step, has_lattice),
             refresh: Self::refresh_of(scene, step, grid),
             lattice: Lattice::NONE,
@@ -303,6 +306,17 @@ impl<'w> LargeModel<'w> {
         }
     }
 
+    /// Goes over to steps of another length, longer or shorter. The next step computes all inertia anew, which takes as long as a
+    /// cycle of steps. With steps so long that single precision cannot invert the lattice's matrices the steps are those of mass
+    /// scaling, with a [`Report::coarse_share`] of zero, and [`Status::Limited`].
+    pub fn change_step(&mut self, step: Step) {
+        let has_lattice = self.lattice.functions() > 0;
+        (self.step, self.prepared) = (step, step);
+        self.scaling = scaling(step, has_lattice);
+        self.refresh.set_steps(cycle(step, has_lattice));
+        self.is_for_other_step = true;
+    }
+
     /// The clock of the state has been set since the latest step: inertia still belongs to it.
     pub(crate) const fn is_at(&mut self, progress: &Progress) {
         self.moment = progress.moment();
@@ -387,6 +401,22 @@ impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
     /// See [`LargeModel::set_seconds`].
     pub fn set_seconds(&mut self, seconds: f32) -> Result<(), InertiaError> {
         self.model.set_seconds(seconds)
+    }
+
+    /// See [`LargeModel::change_step`].
+    pub fn change_step(&mut self, step: Step) {
+        self.model.change_step(step);
+    }
+
+    /// See [`LargeView::shorten`].
+    pub fn shorten<M: ElementMaterial>(
+        &mut self,
+        seconds: f32,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: StateView<'_>,
+    ) -> Status {
+        self.model.with_storage(self.storage.as_mut()).shorten(seconds, scene, loads, state, &CallingThread)
     }
 
     /// Takes one step of the length for which it was prepared, or that was set since ([`LargeModel::set_seconds`]). Every call does the same work: one force evaluation and

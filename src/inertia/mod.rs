@@ -106,6 +106,7 @@ mod projected_inertia;
 mod refresh;
 mod report;
 mod restriction_pass;
+mod shorten;
 mod step;
 mod supports;
 mod transport;
@@ -116,6 +117,7 @@ pub(crate) use lattice::size_of;
 pub use lattice::{Grid, MAX_FUNCTIONS, MAX_POINTS};
 pub use method::{Cells, Method, vectors_for, vectors_for_lattice};
 pub use report::Report;
+pub(crate) use shorten::carry;
 
 use core::fmt;
 

@@ -11,10 +11,14 @@ use crate::padding;
 use crate::simd::{Indexed, NodeVector, Real, Rows, TILE};
 use crate::step::Step;
 
+/// Longest time for which a force acts in a step, over the step: inertia makes the step stable for one.
+const LONGEST_SPAN: f32 = 1.25;
+
 /// Factors of the residual of a node, `D^2 f - 2 k m du`.
 #[derive(Clone, Copy)]
 pub(super) struct ResidualFactors {
-    /// `D^2`, s^2; half of it in the first step: a force that acts from the start on has acted for half a step.
+    /// `D (h + D) / 2` after a step of `h`, s^2: a force acts from the middle of the last step to that of the next one. In the first step
+    /// it has acted from the start on.
     square: f32,
     /// `2 k`, times the ratio of the step to the last one.
     loss: f32,
@@ -26,7 +30,8 @@ impl ResidualFactors {
     pub(super) fn new(step: &Step, scaling: &Scaling, is_first: bool) -> Self {
         let k = half_damping(step);
         let ratio = (1.0 + scaling.k) / (1.0 + k);
-        let square = step.seconds() * step.seconds() * if is_first { 0.5 } else { 1.0 };
+        let span = if is_first { 0.5 } else { (0.5 * (1.0 + 1.0 / step.carry())).min(LONGEST_SPAN) };
+        let square = step.seconds() * step.seconds() * span;
         Self { square: ratio * square, loss: ratio * 2.0 * k * step.carry() }
     }
 }

@@ -193,6 +193,10 @@ impl Refresh {
         Self { cost: whole, steps, ..Self::NEW }
     }
 
+    pub(super) const fn set_steps(&mut self, steps: u32) {
+        self.steps = steps;
+    }
+
     pub(super) const fn steps(&self) -> u32 {
         self.steps
     }
@@ -234,13 +238,23 @@ impl Refresh {
                 self.due -= self.work(&mut input, tables, matrices);
             }
         } else {
-            self.due = 0;
             self.slow = false;
-            self.enter(Stage::Elements);
-            self.ended = false;
-            while !self.ended {
-                self.work(&mut input, tables, matrices);
-            }
+            self.from_start(input, tables, matrices);
+        }
+    }
+
+    /// Does a whole cycle at once, from the start.
+    pub(super) fn from_start<M: ElementMaterial>(
+        &mut self,
+        mut input: RefreshInput<'_, M>,
+        tables: &mut NodeTables<'_>,
+        matrices: &mut Matrices<'_>,
+    ) {
+        self.due = 0;
+        self.enter(Stage::Elements);
+        self.ended = false;
+        while !self.ended {
+            self.work(&mut input, tables, matrices);
         }
     }
 

@@ -77,11 +77,11 @@ impl LargeView<'_, '_> {
 }
 
 /// A step that is being computed, with its results.
-struct InertiaStep<'a, 'w, T> {
+pub(super) struct InertiaStep<'a, 'w, T> {
     threads: &'a T,
     step: &'a Step,
     model: &'a mut LargeModel<'w>,
-    storage: Storage<'a>,
+    pub(super) storage: Storage<'a>,
     held_back: HeldBack,
     rough: RoughMotion,
     coarse_share: f32,
@@ -91,7 +91,12 @@ struct InertiaStep<'a, 'w, T> {
 }
 
 impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
-    fn new(step: &'a Step, model: &'a mut LargeModel<'w>, storage: Storage<'a>, threads: &'a T) -> Self {
+    pub(super) fn new(
+        step: &'a Step,
+        model: &'a mut LargeModel<'w>,
+        storage: Storage<'a>,
+        threads: &'a T,
+    ) -> Self {
         Self {
             threads,
             step,
@@ -170,18 +175,25 @@ struct MovedLattice {
 
 // Not inlined, like `finish`: the stack of one is free in the others.
 impl<T: Threads> InertiaStep<'_, '_, T> {
-    /// Computes all inertia anew if another step has moved the state, or it was reset or restored.
+    /// Computes all inertia anew if another step has moved the state, or it was reset or restored, or if the length of steps was changed.
     #[inline(never)]
     fn renew_if_stale<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) {
         let Self { model, storage: Storage { tables, places, order, matrices }, .. } = self;
-        let LargeModel { lattice, refresh, scaling, rough, least_share, moment, .. } = &mut **model;
+        let LargeModel { lattice, refresh, scaling, rough, least_share, moment, is_for_other_step, .. } =
+            &mut **model;
         let Trial { scene, displacement, increment, volume, progress, .. } = trial;
-        if *moment == progress.moment() {
+        let follows = *moment == progress.moment();
+        if follows && !*is_for_other_step {
             return;
         }
+        *is_for_other_step = false;
         nodal_volumes(*scene, displacement, volume, &CallingThread);
         let input =
             RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
+        if follows {
+            refresh.from_start(input, tables, matrices);
+            return;
+        }
         refresh.renew(input, tables, matrices);
         (*rough, *least_share) = (RoughMotion::NONE, 1.0);
         tables.rough.fill(NodeVector::ZERO);

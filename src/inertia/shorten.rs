@@ -1,0 +1,109 @@
+//! From steps beyond the critical one to shorter ones. Increments span the time from `t - D` to `t`, velocities are those of its middle:
+//! a shorter step would have to add the force of half a long step at once, and where inertia was added the force of true inertia tears
+//! the mesh. So the last increment `du` is replaced by that of a step of `r D` which ends at `t`, with the acceleration `(du+ - du) / D^2`
+//! that the long step gives:
+//!
+//! ```text
+//! du' = r (du + du+) / 2 - r^2 (du+ - du) / 2
+//! ```
+
+use super::large_step::{LargeView, Storage};
+use super::lattice::rank_of;
+use super::step::InertiaStep;
+use crate::element::ElementMaterial;
+use crate::loads::{Loads, ramp_factor};
+use crate::scene::SceneView;
+use crate::simd::NodeVector;
+use crate::state::StateView;
+use crate::step::{Status, Step, StepMethod, Threads, Trial};
+
+/// The same without acceleration, where a step was refused: its forces are those of a load that has acted for no time yet.
+pub(crate) fn carry(seconds: f32, state: StateView<'_>) {
+    let share = seconds / state.dt;
+    if !(share > 0.0 && share < 1.0) {
+        return;
+    }
+    for NodeVector(last) in state.increment.iter_mut() {
+        *last = last.map(|component| share * component);
+    }
+    state.progress.dt = seconds;
+}
+
+impl LargeView<'_, '_> {
+    /// To be called between the last long step and the first shorter one of any method, of `seconds`. Moves no node, and costs a step. A
+    /// state whose last step was shorter stays as it is.
+    pub fn shorten<M: ElementMaterial>(
+        self,
+        seconds: f32,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        state: StateView<'_>,
+        threads: &impl Threads,
+    ) -> Status {
+        let Self { model, storage } = self;
+        let nodes = model.nodes;
+        let mismatch = Status::Mismatch { nodes: scene.node_count(), room: nodes.min(state.capacity()) };
+        let damped = model.method.damper().is_some();
+        let Some(storage) =
+            Storage::split(storage, model.element, [nodes, model.elements], &model.lattice, damped)
+        else {
+            return mismatch;
+        };
+        if !model.is_for(scene) {
+            return mismatch;
+        }
+        // Nothing to do for a state at rest, and for lengths that are none.
+        let Ok(step) = Step::unchecked(state.dt, model.step.damping()) else { return Status::Ok };
+        let share = seconds / state.dt;
+        if !(share > 0.0 && share < 1.0) {
+            return Status::Ok;
+        }
+        let mut trial = match Trial::begin(scene, loads, state, nodes) {
+            Ok(trial) => trial,
+            Err(refused) => return refused,
+        };
+        let mut method = InertiaStep::new(&step, model, storage, threads);
+        let _ = method.compute(&mut trial);
+        let next = |node| {
+            let rank = rank_of(method.storage.places, node);
+            method.storage.tables.next_increment.get(rank).copied().unwrap_or_default().0
+        };
+        let all_finite = (0..nodes).all(|node| next(node).iter().take(3).all(|value| value.is_finite()));
+        let Trial { scene, loads, increment, force, progress, .. } = trial;
+        let (mut work, gravity) = (0.0, loads.gravity());
+        let shortened = |last: f32, next: f32, free: bool| {
+            let gain = if all_finite && free { 0.5 * (next - last) } else { 0.0 };
+            share * (last + gain) - share * share * gain
+        };
+        // What acts now has acted since the middle of the last step.
+        for load in loads.forces() {
+            let node = load.node as usize;
+            let (Some(NodeVector(last)), Some(inertia)) = (increment.get(node), scene.inertia.get(node))
+            else {
+                continue;
+            };
+            let (next, factor) = (next(node), ramp_factor(progress.time, load.ramp));
+            for axis in (0..3).filter(|&axis| inertia.inverse[axis] > 0.0) {
+                let way = 0.5 * (last[axis] - shortened(last[axis], next[axis], true));
+                work += f64::from(factor * load.newton[axis] * way);
+            }
+        }
+        let nodes = increment.iter_mut().zip(scene.inertia).zip(&*force);
+        for (node, ((NodeVector(last), inertia), force)) in nodes.enumerate() {
+            let next = next(node);
+            for axis in 0..3 {
+                let free = inertia.inverse[axis] > 0.0;
+                let shortened = shortened(last[axis], next[axis], free);
+                let way = 0.5 * (last[axis] - shortened);
+                work += f64::from(way * if free { inertia.mass * gravity[axis] } else { -force.0[axis] });
+                last[axis] = shortened;
+            }
+        }
+        if work.is_finite() {
+            let balance = progress.energy_balance;
+            progress.energy_balance = balance.entered(work, 0.0, balance.kinetic, 0.0);
+        }
+        progress.dt = seconds;
+        Status::Ok
+    }
+}
