@@ -115,6 +115,7 @@
 //! | [`step`] | the protocol of every step: begin, compute, energy balance, accept or refuse; threads |
 //! | [`tled`] | the exact step and the critical step |
 //! | [`guard`] | may a step be believed: a second run that estimates its error |
+//! | [`adaptive`] | steps that choose their length so that their error stays below a tolerance |
 //! | [`inertia`] | steps beyond the critical one: mass-scaled, multilevel, damped |
 //! | [`mlp`] | dense layers: the forward pass, the weight file |
 //! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
@@ -144,6 +145,7 @@
 #[cfg(any(feature = "std", test))]
 extern crate std;
 
+pub mod adaptive;
 #[cfg(feature = "capi-neo-hookean")]
 mod capi;
 pub mod element;

@@ -11,6 +11,7 @@ use crate::element::Axes;
 use crate::padding;
 use crate::scene::AsScene;
 use crate::simd::NodeVector;
+use crate::state::StateView;
 
 /// A force on one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -128,6 +129,18 @@ pub struct Loads<'a> {
     motions: &'a [Motion],
     /// Nodes of the scene they were checked against.
     nodes: Option<usize>,
+}
+
+/// Loads of each step of a span of time, for prescribed motions that go on within it.
+pub trait LoadsOverTime {
+    /// Loads of the next step of `seconds`, from this state; so many steps are left to the end of the span, this one included.
+    fn of_step(&mut self, state: &StateView<'_>, seconds: f32, left: u32) -> Loads<'_>;
+}
+
+impl LoadsOverTime for Loads<'_> {
+    fn of_step(&mut self, _: &StateView<'_>, _: f32, _: u32) -> Loads<'_> {
+        *self
+    }
 }
 
 impl<'a> Loads<'a> {

@@ -54,6 +54,10 @@ pub(super) struct Envelope {
     /// None before the first comparison.
     held: Option<Comparison>,
     comparisons: u32,
+    /// Of them, those at which the error may be as large as the motion.
+    first: u32,
+    /// Mean distance at the latest comparison, m.
+    distance: f32,
     /// By how much the mean and the largest grow in a second, m/s, and the seconds since the latest comparison.
     growth: [f32; 2],
     waited: f32,
@@ -70,6 +74,8 @@ impl Envelope {
             motion: 0.0,
             held: None,
             comparisons: 0,
+            first: FIRST_COMPARISONS,
+            distance: 0.0,
             growth: [0.0; 2],
             waited: 0.0,
         }
@@ -89,6 +95,7 @@ impl Envelope {
         let at_least = |value: f32, least: f32| if value <= least { least } else { value };
         let least = if self.is_new() { found.motion } else { 0.0 };
         self.comparisons = self.comparisons.saturating_add(1);
+        self.distance = found.mean;
         let mean = at_least(at_least(found.mean, kept * before.mean), least);
         let largest = at_least(at_least(found.largest, kept * before.largest), mean);
         let growth = |now: f32, before: f32| ((now - before) / seconds).max(0.0);
@@ -99,7 +106,20 @@ impl Envelope {
 
     /// Whether the first comparisons are not over.
     pub(super) const fn is_new(&self) -> bool {
-        self.comparisons < FIRST_COMPARISONS
+        self.comparisons < self.first
+    }
+
+    /// See [`super::Watch::start_is_exact`].
+    pub(super) const fn start_is_exact(&mut self) {
+        self.first = 0;
+    }
+
+    pub(super) const fn distance(&self) -> f32 {
+        self.distance
+    }
+
+    pub(super) const fn comparisons(&self) -> u32 {
+        self.comparisons
     }
 
     /// So many seconds have gone since the latest comparison.

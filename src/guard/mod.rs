@@ -19,7 +19,7 @@ mod estimate;
 pub use estimate::{Allowed, Estimate};
 
 use crate::element::ElementMaterial;
-use crate::inertia::{Cells, InertiaError, LargeModel, Method, vectors_for as vectors_for_method};
+use crate::inertia::{Cells, InertiaError, LargeModel, Method, carry, vectors_for as vectors_for_method};
 use crate::loads::Loads;
 use crate::material::{Element, Material};
 use crate::scene::SceneView;
@@ -37,6 +37,8 @@ pub const EVERY_LEARNED: u32 = 1;
 /// The estimate over the distance of the two runs.
 pub const ESTIMATE: f32 = 2.0;
 
+/// Lengths of its steps by which the second run may be behind the first.
+const MOST_BEHIND: f64 = 2.0;
 /// Relative error of times that are sums of steps.
 const ROUNDING: f64 = 1e-4;
 
@@ -146,6 +148,32 @@ impl Watch {
         Ok((second, Self { progress, nodes, longest: longest.seconds(), interval: 0.0, steps, envelope }))
     }
 
+    /// Compares at the next call, though no step has been taken.
+    pub(crate) const fn compare_next(&mut self) {
+        self.interval = 0.0;
+        self.steps = self.steps.saturating_sub(1);
+    }
+
+    /// The second run starts from the state at the next call.
+    pub(crate) const fn begin_anew(&mut self) {
+        self.steps = u64::MAX;
+    }
+
+    /// The first run takes exact steps: it has no error in its first steps from rest.
+    pub(crate) const fn start_is_exact(&mut self) {
+        self.envelope.start_is_exact();
+    }
+
+    /// Distance of the two runs at the latest comparison, m.
+    pub(crate) const fn distance(&self) -> f32 {
+        self.envelope.distance()
+    }
+
+    /// How many comparisons there were.
+    pub(crate) const fn comparisons(&self) -> u32 {
+        self.envelope.comparisons()
+    }
+
     /// See [`GuardModel::allow`].
     pub(crate) const fn allow(&mut self, allowed: Allowed) {
         self.envelope.allowed = allowed;
@@ -166,6 +194,28 @@ pub struct GuardView<'a> {
 }
 
 impl GuardView<'_> {
+    /// The second run's steps become so many seconds long, where it is at the time of the first; with the loads that acted until then,
+    /// if they still do.
+    pub(crate) fn change_step<M: ElementMaterial>(
+        self,
+        step: Step,
+        scene: SceneView<'_, M>,
+        loads: Option<&Loads<'_>>,
+        threads: &impl Threads,
+    ) {
+        let Self { second: large, watch, storage } = self;
+        let seconds = step.seconds();
+        match (split::<M>(storage, watch.nodes, &mut watch.progress), loads) {
+            (Some((second, of_second)), Some(loads)) => {
+                let _ = large.with_storage(of_second).shorten(seconds, scene, loads, second, threads);
+            }
+            (Some((second, _)), None) => carry(seconds, second),
+            (None, _) => {}
+        }
+        large.change_step(step);
+        (watch.longest, watch.interval) = (seconds, seconds);
+    }
+
     /// See [`Guard::follow`].
     pub fn follow<M: ElementMaterial>(
         self,
@@ -189,21 +239,22 @@ impl GuardView<'_> {
             return mismatch;
         }
         let gone = state.time() - second.time();
-        let follows = *steps < state.steps() && gone <= (1.0 + ROUNDING) * f64::from(*longest);
+        let follows = *steps < state.steps() && gone <= MOST_BEHIND * f64::from(*longest);
         *steps = state.steps();
         if !follows {
             // The state was restored or reset, or has gone on without the guard.
             envelope.forget();
-            *interval = 0.0;
+            // Right after a start errors are least certain.
+            *interval = if envelope.is_new() { 0.0 } else { *longest };
             copy(&mut second, state, nodes);
             return taken;
         }
-        if gone < (1.0 - ROUNDING) * f64::from(*interval) {
+        if gone <= 0.0 || gone < (1.0 - ROUNDING) * f64::from(*interval) {
             envelope.wait(gone as f32);
             return envelope.judge(taken);
         }
         // At the start a load may begin within a step, of which the first run's first step knows nothing.
-        let parts: u32 = if envelope.is_new() { 2 } else { 1 };
+        let parts = if envelope.is_new() || gone > (1.0 + ROUNDING) * f64::from(*longest) { 2 } else { 1 };
         let (gone, seconds) = (gone as f32, f32::min(gone as f32 / parts as f32, *longest));
         let mut followed = large.set_seconds(seconds).is_ok();
         for _ in 0..parts {
@@ -216,7 +267,9 @@ impl GuardView<'_> {
             large.is_at(second.progress);
             envelope.add(&compare(nodes, state.displacement, second.displacement), gone);
             let more = if envelope.is_new() { 0.0 } else { state.last_step() };
-            *interval = (gone + more).min(*longest);
+            // Whole steps of the first run: the second run's are then of one length.
+            let grown = gone + more;
+            *interval = if grown <= (1.0 + ROUNDING as f32) * *longest { grown } else { gone.min(*longest) };
         } else {
             // The second run cannot follow: nothing is known but that the body has moved.
             envelope.lose(gone);

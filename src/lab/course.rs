@@ -4,8 +4,9 @@ use std::vec::Vec;
 
 use super::LabError;
 use super::scenes::SceneSpec;
-use crate::loads::{Loads, Motion, NodalForce};
+use crate::loads::{Loads, LoadsOverTime, Motion, NodalForce};
 use crate::scene::AsScene;
+use crate::state::StateView;
 
 /// The factor of the loads over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +64,12 @@ impl<'a> CurrentLoads<'a> {
             }
         }
         Loads::unchecked(self.spec.gravity, &self.forces, &self.motions, self.nodes)
+    }
+}
+
+impl LoadsOverTime for CurrentLoads<'_> {
+    fn of_step(&mut self, state: &StateView<'_>, seconds: f32, _: u32) -> Loads<'_> {
+        Self::of_step(self, state.time(), f64::from(seconds))
     }
 }
 

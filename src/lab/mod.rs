@@ -17,6 +17,7 @@
 //! | [`evaluate`] | rows as asked for in a [`evaluate::Plan`] |
 //! | [`equal_error`] | how much longer implicit steps take for the same error |
 //! | [`hard`] | is a run ever wrong without a word? |
+//! | [`tolerance`] | does an adaptive step keep its tolerance, and what does it cost? |
 //! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
 //! | [`table`] | rows as CSV and as aligned text |
 //! | [`sweep`] | error over step on one scene, with fitted slopes; [`plot`] draws it |
@@ -40,6 +41,7 @@ pub mod sweep;
 pub mod table;
 mod threads;
 pub mod timing;
+pub mod tolerance;
 pub mod truth;
 
 pub use error::LabError;

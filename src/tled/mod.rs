@@ -9,6 +9,7 @@
 
 mod central_differences;
 mod critical;
+mod pace;
 #[cfg(feature = "std")]
 mod pressures;
 #[cfg(feature = "std")]
@@ -17,6 +18,7 @@ mod spectrum;
 pub(crate) mod tangent;
 
 pub use critical::critical_step;
+pub use pace::{Approach, Pace, vectors_for_pace};
 #[cfg(feature = "std")]
 pub use pressures::nodal_pressures;
 #[cfg(feature = "std")]

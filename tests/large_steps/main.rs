@@ -9,6 +9,7 @@ mod reference;
 #[path = "../support/mod.rs"]
 mod support;
 
+mod adaptive;
 mod damper;
 mod guard;
 mod pulled;

@@ -67,6 +67,21 @@ impl Plan {
         };
         Ok(Self { cases, random, methods, every })
     }
+
+    /// How many scenes there are.
+    pub(super) const fn scenes(&self) -> usize {
+        self.cases.len() + self.random as usize
+    }
+
+    /// A scene by its number, with its truth, which is kept in `out/truth`. None for a random scene that cannot be found.
+    pub(super) fn scene(&self, index: usize, out: &Path) -> Result<Option<(SceneSpec, Truth)>, LabError> {
+        let truths = out.join("truth");
+        fs::create_dir_all(&truths)?;
+        match self.cases.get(index) {
+            Some(case) => with_truth(case.clone(), &truths).map(Some),
+            None => random_scene((index - self.cases.len()) as u32, &truths),
+        }
+    }
 }
 
 /// Time in steps of at most 0.95 of the critical one that the learned steps of the crate are multiples of, and in snapshots that steps
@@ -91,18 +106,12 @@ fn multiple_near(timing: &Timing, critical: f32, times: u32) -> u32 {
 
 /// Carries the plan out on two threads: truths in `out/truth/`, tables and a picture in `out`. `say` is given the progress in words.
 pub fn evaluate(plan: &Plan, out: &Path, say: impl Fn(&str) + Sync) -> Result<Vec<Judged>, LabError> {
-    let truths = out.join("truth");
-    fs::create_dir_all(&truths)?;
     let judge = |index: usize| {
-        let found = match plan.cases.get(index) {
-            Some(case) => Some(with_truth(case.clone(), &truths)?),
-            None => random_scene((index - plan.cases.len()) as u32, &truths)?,
-        };
-        let Some((spec, truth)) = found else { return Ok(Vec::new()) };
+        let Some((spec, truth)) = plan.scene(index, out)? else { return Ok(Vec::new()) };
         say(&format!("{}: moves by {:.1} mm", spec.name, 1e3 * truth.most()));
         runs(&spec, &truth, plan, &say)
     };
-    let judged = in_parallel(plan.cases.len() + plan.random as usize, judge, |_, _| ())?.concat();
+    let judged = in_parallel(plan.scenes(), judge, |_, _| ())?.concat();
     report::write(&judged, out)?;
     Ok(judged)
 }

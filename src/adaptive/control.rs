@@ -1,0 +1,209 @@
+//! When does a step change its length? Lengths are numbered by how often the longest one is halved; exact steps are the last. An
+//! error that one length makes grows about as its power 1.5 (measured: between 1 and 2), so an estimate above the tolerance says by how
+//! many halvings the step is too long, and one far below it that the next longer step would do.
+
+use crate::guard::ESTIMATE;
+
+/// Power of the length with which errors grow.
+const ORDER: f32 = 1.5;
+/// Share of the tolerance that is aimed at.
+const AIM: f32 = 0.7;
+/// Comparisons and seconds that a longer step has to wait for after a change.
+const COMPARISONS: u32 = 3;
+const WAIT: f32 = 0.02;
+/// Seconds within which a shortened step is shortened again only if the error grows by this factor.
+const SETTLE: f32 = 0.1;
+const GROWTH: f32 = 1.25;
+/// By which factor it must have fallen for the shortened step to be kept for as long again.
+const FALL: f32 = 0.9;
+/// Time in which the body forgets half of an error, s; that of the guard's envelope.
+const HALF_LIFE: f32 = 0.2;
+/// Least and most time between two probes, least length of a probe, s, and its least number of comparisons.
+const REST: [f32; 2] = [0.05, 1.6];
+const PROBE: f32 = 0.04;
+const PROBE_COMPARISONS: u32 = 8;
+/// Most halvings: more are beyond single precision in any case.
+const MOST: u32 = 16;
+
+/// How many lengths there are beyond the critical step, at least one, if the longest is so many times the least.
+pub(super) fn lengths(ratio: f32) -> u32 {
+    (0..MOST).take_while(|&halvings| halvings == 0 || libm::exp2f(halvings as f32) <= ratio).count() as u32
+}
+
+/// The present length, and what is known of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Control {
+    tolerance: f32,
+    lengths: u32,
+    halvings: u32,
+    /// Since the latest change, or since a probe has begun or ended.
+    seconds: f32,
+    comparisons: u32,
+    /// Estimate of the mean error at the latest shortening, m.
+    error: f32,
+    /// Estimates of the mean and the largest error that exact steps began with, m, halved every [`HALF_LIFE`].
+    left_behind: [f32; 2],
+    probe: Probe,
+    /// Time to the next probe, s.
+    rest: f32,
+    /// Largest mean distance in the present probe, m.
+    distance: f32,
+}
+
+/// While exact steps move the first run, the second run takes some steps now and then, to see whether they would do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Probe {
+    None,
+    Begins,
+    Runs,
+}
+
+impl Control {
+    /// Begins with exact steps.
+    pub(super) const fn new(tolerance: f32, lengths: u32) -> Self {
+        Self {
+            tolerance,
+            lengths,
+            halvings: lengths,
+            seconds: 0.0,
+            comparisons: 0,
+            error: 0.0,
+            left_behind: [0.0; 2],
+            probe: Probe::Begins,
+            rest: REST[0],
+            distance: 0.0,
+        }
+    }
+
+    pub(super) const fn lengths(&self) -> u32 {
+        self.lengths
+    }
+
+    /// How often the longest step is halved; none for exact steps.
+    pub(super) fn halvings(&self) -> Option<u32> {
+        (self.halvings < self.lengths).then_some(self.halvings)
+    }
+
+    /// The same of the second run; none: twice the longest.
+    pub(super) const fn halvings_of_second(&self) -> Option<u32> {
+        self.halvings.checked_sub(1)
+    }
+
+    /// See [`super::Chooser::estimate`].
+    pub(super) const fn left_behind(&self) -> [f32; 2] {
+        self.left_behind
+    }
+
+    /// So many seconds have passed.
+    pub(super) fn wait(&mut self, seconds: f32) {
+        self.seconds += seconds;
+        let kept = libm::exp2f(-seconds / HALF_LIFE);
+        self.left_behind = self.left_behind.map(|error| kept * error);
+    }
+
+    /// Whether a probe begins with the next step.
+    pub(super) fn begins_probe(&mut self) -> bool {
+        if self.probe == Probe::None && self.seconds >= self.rest {
+            self.probe = Probe::Begins;
+        }
+        let begins = self.probe == Probe::Begins;
+        if begins {
+            self.probe = Probe::Runs;
+            self.changed();
+        }
+        begins
+    }
+
+    /// Whether the second run follows exact steps at present.
+    pub(super) fn probes(&self) -> bool {
+        self.probe == Probe::Runs
+    }
+
+    /// A comparison in a probe found this mean distance, m.
+    pub(super) fn probed(&mut self, distance: f32) {
+        self.comparisons += 1;
+        // One that is no number stays.
+        self.distance = if distance <= self.distance { self.distance } else { distance };
+        if !(ESTIMATE * self.distance <= self.tolerance) {
+            self.rest();
+        }
+    }
+
+    /// Decides upon the end of a probe. Gives whether steps beyond the critical one follow. An error that a body forgets by half in
+    /// [`HALF_LIFE`] grows for about so long.
+    pub(super) fn ends_probe(&mut self) -> bool {
+        if !self.probes() || self.comparisons < PROBE_COMPARISONS || self.seconds < PROBE {
+            return false;
+        }
+        let error = ESTIMATE * self.distance * (HALF_LIFE / self.seconds).max(1.0);
+        let share = (error + self.left_behind[0]) / self.tolerance;
+        self.rest();
+        // The probe has shown what the shortest length would do.
+        share <= AIM && self.lengthen()
+    }
+
+    /// Ends a probe without a result. Each is followed by a longer rest than the one before.
+    pub(super) fn rest(&mut self) {
+        self.probe = Probe::None;
+        let [_, most] = REST;
+        self.rest = (2.0 * self.rest).min(most);
+        self.changed();
+    }
+
+    /// Decides after a comparison with steps beyond the critical one, which gave these estimates of the mean and the largest error
+    /// (m). Gives whether the length is to change.
+    pub(super) fn decide(&mut self, [mean, largest]: [f32; 2]) -> bool {
+        self.comparisons += 1;
+        let share = mean / self.tolerance;
+        // An error that is no number is too large.
+        if !(share <= 1.0) {
+            let grows = !(mean <= GROWTH * self.error);
+            if self.seconds < SETTLE && !grows {
+                return false;
+            }
+            if mean < FALL * self.error {
+                // The body forgets what longer steps have left behind.
+                self.error = mean;
+                self.changed();
+                return false;
+            }
+            let halvings = libm::ceilf(libm::log2f(share / AIM) / ORDER);
+            let halvings = if halvings >= 1.0 { (halvings as u32).min(MOST) } else { MOST };
+            self.shorten(halvings, [mean, largest]);
+            return true;
+        }
+        self.comparisons >= COMPARISONS
+            && self.seconds >= WAIT
+            && share * libm::exp2f(ORDER) <= AIM
+            && self.lengthen()
+    }
+
+    /// Doubles the length. Gives whether it could.
+    fn lengthen(&mut self) -> bool {
+        let longer = self.halvings > 0;
+        if longer {
+            self.halvings -= 1;
+            self.changed();
+        }
+        longer
+    }
+
+    /// A step was refused: the next are half as long.
+    pub(super) fn refused(&mut self, errors: [f32; 2]) {
+        self.shorten(1, errors);
+    }
+
+    fn shorten(&mut self, halvings: u32, [mean, largest]: [f32; 2]) {
+        self.halvings = (self.halvings + halvings).min(self.lengths);
+        self.error = mean;
+        if self.halvings == self.lengths {
+            self.left_behind = [mean, largest];
+            self.rest = REST[0];
+        }
+        self.changed();
+    }
+
+    const fn changed(&mut self) {
+        (self.seconds, self.comparisons, self.distance) = (0.0, 0, 0.0);
+    }
+}
