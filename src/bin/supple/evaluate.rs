@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use supple::lab::evaluate::{self, Plan};
 use supple::lab::method::Method;
-use supple::lab::{equal_error, hard, physics, table};
+use supple::lab::{equal_error, hard, physics, table, tolerance};
 use supple::material::Element;
 
 use crate::element_name::element_named;
@@ -42,8 +42,12 @@ pub(crate) struct Asked {
     /// the laboratory's, all of them unless given
     #[arg(long, conflicts_with_all = ["physics", "multiples", "element", "weights", "sweep"])]
     hard: bool,
+    /// Judge adaptive steps of this tolerance (mm) over the hard cases instead, against fixed steps of the methods, damped ones unless
+    /// given: tolerance.csv; may be repeated
+    #[arg(long = "tolerance", value_name = "MM", conflicts_with_all = ["physics", "hard", "multiples", "element", "weights", "sweep"])]
+    tolerances: Vec<f64>,
     /// Random scenes among the hard cases
-    #[arg(long, value_name = "N", default_value_t = 200, requires = "hard")]
+    #[arg(long, value_name = "N", default_value_t = 200)]
     random: u32,
     /// Steps of a run in one of its guard's second run
     #[arg(long, value_name = "N", default_value_t = supple::guard::EVERY, requires = "hard")]
@@ -53,6 +57,9 @@ pub(crate) struct Asked {
 pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
     if asked.physics {
         return evaluate_physics(asked);
+    }
+    if !asked.tolerances.is_empty() {
+        return evaluate_tolerances(asked);
     }
     if asked.hard {
         return evaluate_hard(asked);
@@ -88,5 +95,20 @@ fn evaluate_hard(Asked { out, scenes, methods, random, every, .. }: &Asked) -> R
     let judged = hard::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
     print!("{}", hard::report::text(&judged));
     println!("\nresults  {}", out.join("hard.csv").display());
+    Ok(End::Reached)
+}
+
+fn evaluate_tolerances(
+    Asked { out, scenes, methods, tolerances, random, every, .. }: &Asked,
+) -> Result<End, Problem> {
+    if let Some(wrong) = tolerances.iter().find(|tolerance| !(tolerance.is_finite() && **tolerance > 0.0)) {
+        return Err(Problem(format!("--tolerance {wrong}: it must be a positive number of mm")));
+    }
+    let methods = if methods.is_empty() { &[Method::Damped.name().to_owned()] } else { &**methods };
+    let plan = hard::Plan::new(scenes, methods, *random, *every).map_err(Problem::of)?;
+    let rows =
+        tolerance::evaluate(&plan, tolerances, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
+    print!("{}", tolerance::text(&rows));
+    println!("\nresults  {}", out.join("tolerance.csv").display());
     Ok(End::Reached)
 }

@@ -2,10 +2,11 @@
 //! `summary.json`.
 
 use serde_json::{Map, Value, json};
+use supple::adaptive::Taken;
 use supple::inertia::Grid;
 
 use super::figures::Figures;
-use crate::run::outcome::{GuardTrace, LargeTrace, LearnedTrace, Outcome};
+use crate::run::outcome::{AdaptiveTrace, GuardTrace, LargeTrace, LearnedTrace, Outcome};
 use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
 use crate::screen::describe_added;
@@ -60,6 +61,7 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome, figures: &Figures, warnings: 
     let large = outcome.large.as_ref();
     report.add_section("inertia", large.map(|trace| large_section(setup.method_name(), trace, outcome)));
     add_steps(&mut report, setup, outcome, figures);
+    report.add_section("adaptive", outcome.adaptive.as_ref().map(adaptive_section));
     add_estimate(&mut report, outcome.guard.as_ref());
     add_motion(&mut report, figures);
     report
@@ -236,6 +238,24 @@ fn large_section(method: &str, trace: &LargeTrace, outcome: &Outcome) -> Report 
         "rough motion",
         damping.map(|share| format!("at most {:.1} % taken away in a step", 100.0 * share)),
         json!({ "rough_motion_damped_largest": damping.map(decimal) }),
+    );
+    section
+}
+
+/// Steps that choose their length.
+fn adaptive_section(AdaptiveTrace { tolerance, taken }: &AdaptiveTrace) -> Report {
+    let mut section = Report::default();
+    let millimetres = 1e3 * f64::from(*tolerance);
+    section.add(
+        "tolerance",
+        format!("{millimetres:.3} mm on average over the nodes"),
+        json!({ "tolerance_mm": millimetres }),
+    );
+    let Taken { exact, large, changes } = taken;
+    section.add(
+        "steps chosen",
+        format!("{exact} exact, {large} beyond the critical step, {changes} changes of length"),
+        json!({ "steps_exact": exact, "steps_beyond_critical": large, "changes": changes }),
     );
     section
 }

@@ -57,17 +57,19 @@ impl<'a> LearnedRun<'a> {
         self.interval += 1;
         let seconds = self.trace.seconds;
         if self.interval <= self.lead_in {
-            return self.lead_in(motion, state, outcome);
+            self.lead_in(motion, state, outcome);
+            return Ok(());
         }
         if self.trace.fell_back.is_some() {
-            return self.exact.advance(motion, state, outcome, seconds);
+            self.exact.advance(motion, state, outcome, seconds);
+            return Ok(());
         }
         self.trace.from.get_or_insert(state.time());
         let exact_seconds = self.exact.seconds();
         let clock = Instant::now();
         let tried = self.step.view().try_step(
             motion.scene,
-            motion.loads,
+            &motion.loads,
             &mut state.view(),
             exact_seconds,
             &CallingThread,
@@ -76,17 +78,17 @@ impl<'a> LearnedRun<'a> {
         match tried.map_err(Problem::of)? {
             Ok(status) => {
                 outcome.steps.1 = outcome.steps.1.max(seconds);
-                outcome.enter(status, state);
-                Ok(())
+                outcome.enter(status, &state.view());
             }
             Err(Undone) => {
                 if let Some(fallback) = self.step.model().fell_back() {
                     self.trace.enter_fallback(fallback.time, fallback.status);
                 }
                 outcome.computed += 1;
-                self.exact.advance(motion, state, outcome, seconds)
+                self.exact.advance(motion, state, outcome, seconds);
             }
         }
+        Ok(())
     }
 
     /// An interval of the lead-in.
@@ -95,13 +97,11 @@ impl<'a> LearnedRun<'a> {
         motion: &Motion<'_, M>,
         state: &mut VecState,
         outcome: &mut Outcome,
-    ) -> Result<(), Problem> {
-        let mut advanced = Ok(());
+    ) {
         // A step that diverged is in the outcome, which ends the run.
         let _ = self.step.view().lead_interval(state, |state| {
-            advanced = self.exact.advance(motion, state, outcome, self.trace.seconds);
+            self.exact.advance(motion, state, outcome, self.trace.seconds);
             outcome.divergence.map_or(Status::Ok, Status::Diverged)
         });
-        advanced
     }
 }

@@ -1,5 +1,6 @@
 //! A simulation from rest to its end: steps, frames at even intervals, what became of it.
 
+pub(crate) mod adaptive;
 pub(crate) mod exact;
 pub(crate) mod large;
 pub(crate) mod learned;
@@ -12,10 +13,11 @@ use supple::element::ElementMaterial;
 use supple::scene::SceneView;
 use supple::state::VecState;
 use supple::step::Status;
+use supple::tled::Pace;
 
 use crate::problem::Problem;
 use crate::scene::setup::Setup;
-use exact::{ExactSteps, Motion, STEPS_BETWEEN_LOOKS};
+use exact::{ExactSteps, Motion};
 use outcome::{LargeTrace, Outcome};
 use start::{Mover, Start, critical};
 
@@ -31,11 +33,16 @@ pub(crate) fn run<M: ElementMaterial>(
 ) -> Result<Outcome, Problem> {
     let loads = setup.loads(&scene)?;
     let time = &setup.time;
-    let motion = Motion { scene, loads: &loads, damping: setup.damping, end: time.end, tick };
+    let motion = Motion { scene, loads, damping: setup.damping, end: time.end, tick };
     let Start { at_rest, step, mut mover, mut guard } = start;
     let mut outcome = Outcome::new(at_rest, step.seconds());
     if let (Mover::Large(large), Some(method)) = (&mover, &time.method) {
         outcome.large = Some(LargeTrace::new(method, large.model()));
+    }
+    if let Mover::Adaptive(_) = &mover {
+        // They begin as exact ones.
+        outcome.steps.0 = outcome.steps.0.min(Pace::SHARE * at_rest.seconds);
+        outcome.steps.1 = outcome.steps.0;
     }
     frame(state)?;
     // Time goes in even intervals, each one step or one of a network, unless exact steps alone set their own pace.
@@ -48,8 +55,8 @@ pub(crate) fn run<M: ElementMaterial>(
     for index in 1..=frames {
         let share = index as f64 / frames as f64;
         let clock = Instant::now();
-        if let Mover::Exact(ExactSteps::Automatic(pace)) = &mut mover {
-            pace.reach(&motion, state, &mut outcome, time.end * share)?;
+        if let Mover::Exact(ExactSteps::Automatic(automatic)) = &mut mover {
+            automatic.reach(&motion, state, &mut outcome, time.end * share);
         } else {
             let target = (total as f64 * share).round() as u64;
             while taken < target && outcome.divergence.is_none() {
@@ -60,7 +67,7 @@ pub(crate) fn run<M: ElementMaterial>(
                     let trace = outcome.guard.get_or_insert_default();
                     trace.enter(status, guard.estimate(), state.time());
                 }
-                if taken % u64::from(STEPS_BETWEEN_LOOKS) == 0 {
+                if taken % u64::from(Pace::STEPS_BETWEEN_LOOKS) == 0 {
                     tick(state.time());
                 }
             }

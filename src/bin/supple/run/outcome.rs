@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
+use supple::adaptive::Taken;
 use supple::guard::Estimate;
 use supple::inertia::{Grid, LargeModel, Method, Report};
 use supple::learned::LearnedReport;
 use supple::material::J_FLOOR;
-use supple::state::VecState;
+use supple::state::StateView;
 use supple::step::{CriticalStep, Divergence, Status};
 
 /// Steps that are not exact: elements were beyond the range of their law, there was energy that the balance does not explain, or
@@ -53,6 +54,8 @@ pub(crate) struct Outcome {
     pub(crate) large: Option<LargeTrace>,
     /// With a network.
     pub(crate) learned: Option<LearnedTrace>,
+    /// With steps that choose their length.
+    pub(crate) adaptive: Option<AdaptiveTrace>,
     /// With steps beyond the critical one.
     pub(crate) guard: Option<GuardTrace>,
 }
@@ -71,12 +74,13 @@ impl Outcome {
             above_from: None,
             large: None,
             learned: None,
+            adaptive: None,
             guard: None,
         }
     }
 
     /// Takes down what a step said that led to `state`.
-    pub(crate) fn enter(&mut self, status: Status, state: &VecState) {
+    pub(crate) fn enter(&mut self, status: Status, state: &StateView<'_>) {
         self.computed += 1;
         match status {
             Status::Limited { least_volume_ratio, saturation, energy_excess } => {
@@ -134,6 +138,14 @@ impl LargeTrace {
         self.least_coarse_share = self.least_coarse_share.min(report.coarse_share);
         self.most_damping = self.most_damping.max(report.damping);
     }
+}
+
+/// What adaptive steps did.
+#[derive(Clone, Copy)]
+pub(crate) struct AdaptiveTrace {
+    /// m.
+    pub(crate) tolerance: f32,
+    pub(crate) taken: Taken,
 }
 
 /// What a guard said of the steps.

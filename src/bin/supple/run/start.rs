@@ -1,13 +1,14 @@
 //! A simulation at rest: what moves the scene, and the length of its steps. All that can be refused is refused here.
 
 use supple::element::ElementMaterial;
-use supple::guard::{self, Guard};
+use supple::guard::{self, Allowed, Guard};
 use supple::scene::SceneView;
 use supple::state::{NodeVector, VecState};
 use supple::step::{CriticalStep, Step};
-use supple::tled;
+use supple::tled::{self, Pace};
 
-use super::exact::{ExactSteps, Motion, Pace, SHARE, whole_steps};
+use super::adaptive::AdaptiveRun;
+use super::exact::{Automatic, ExactSteps, Motion, whole_steps};
 use super::large::{PreparedStep, grid, on_grid, prepare};
 use super::learned::LearnedRun;
 use super::outcome::Outcome;
@@ -21,6 +22,7 @@ pub(crate) enum Mover<'a> {
     /// Mass-scaled, multilevel or damped steps.
     Large(Box<PreparedStep>),
     Learned(Box<LearnedRun<'a>>),
+    Adaptive(Box<AdaptiveRun>),
 }
 
 impl Mover<'_> {
@@ -33,14 +35,21 @@ impl Mover<'_> {
         seconds: f32,
     ) -> Result<(), Problem> {
         match self {
-            Self::Exact(steps) => steps.advance(motion, state, outcome, seconds),
+            Self::Exact(steps) => {
+                steps.advance(motion, state, outcome, seconds);
+                Ok(())
+            }
             Self::Learned(learned) => learned.advance(motion, state, outcome),
+            Self::Adaptive(adaptive) => {
+                adaptive.advance(motion, state, outcome, seconds);
+                Ok(())
+            }
             Self::Large(large) => {
-                let status = large.step(motion.scene, motion.loads, state.view());
+                let status = large.step(motion.scene, &motion.loads, state.view());
                 if let Some(trace) = &mut outcome.large {
                     trace.enter(large.report());
                 }
-                outcome.enter(status, state);
+                outcome.enter(status, &state.view());
                 Ok(())
             }
         }
@@ -55,6 +64,9 @@ impl Mover<'_> {
         }
     }
 }
+
+/// Longest adaptive step that is tried unless the scene file says otherwise, over the critical one.
+const LONGEST: f32 = 100.0;
 
 /// A simulation at rest.
 pub(crate) struct Start<'a> {
@@ -76,10 +88,13 @@ impl<'a> Start<'a> {
         let at_rest = critical(scene, state)?;
         let step = first_step(setup, at_rest, unchecked)?;
         let exact = match setup.time.step {
-            StepChoice::Auto => ExactSteps::Automatic(Pace::at_rest(at_rest)),
+            StepChoice::Auto => ExactSteps::Automatic(Automatic::at_rest(at_rest, scene.node_count())),
             _ => ExactSteps::Fixed(step),
         };
         let mover = match (&setup.time.method, &setup.learned) {
+            (Some(method), _) if setup.time.is_adaptive => {
+                Mover::Adaptive(Box::new(AdaptiveRun::new(method, setup, scene, state, step)?))
+            }
             (Some(method), _) => {
                 let method = on_grid(method, grid(setup, scene, method)?);
                 Mover::Large(Box::new(prepare(&method, setup, scene, state, step)?))
@@ -90,13 +105,17 @@ impl<'a> Start<'a> {
             (None, None) => Mover::Exact(exact),
         };
         let guard = match &mover {
-            Mover::Exact(_) => None,
+            Mover::Exact(_) | Mover::Adaptive(_) => None,
             Mover::Large(_) => Some((step.seconds(), guard::EVERY)),
             Mover::Learned(learned) => Some((learned.seconds(), guard::EVERY_LEARNED)),
         };
         let guard = guard.map(|(seconds, every)| {
             let step = Step::unchecked(seconds, setup.damping).map_err(Problem::of)?;
             Guard::prepare_in_vec(scene, &setup.body.local, state.view(), step, every)
+                .map(|guard| match setup.time.tolerance {
+                    Some(metres) => guard.allowing(Allowed::Metres(metres)),
+                    None => guard,
+                })
                 .map_err(|error| Problem(format!("{}: {error}", setup.body.name)))
         });
         let guard = guard.transpose()?;
@@ -111,7 +130,10 @@ pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, unchecked: bool) 
     let seconds = match time.step {
         StepChoice::Seconds(seconds) => seconds,
         StepChoice::Multiple(multiple) => multiple * at_rest.seconds,
-        StepChoice::Auto => SHARE * at_rest.seconds,
+        StepChoice::Auto if time.is_adaptive => {
+            (LONGEST * at_rest.seconds).min((time.end / f64::from(time.frames)) as f32)
+        }
+        StepChoice::Auto => Pace::SHARE * at_rest.seconds,
     };
     // An interval of a network is a whole number of exact steps.
     let seconds = match (&setup.learned, time.step) {
@@ -131,7 +153,7 @@ pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, unchecked: bool) 
         };
         Problem(format!("{}: {error}{advice}", time.step_at))
     })?;
-    if matches!(time.step, StepChoice::Auto) {
+    if matches!(time.step, StepChoice::Auto) && !time.is_adaptive {
         return Ok(step);
     }
     time.check_length(seconds)?;

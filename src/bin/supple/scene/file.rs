@@ -115,7 +115,8 @@ entry!(TractionTable { pascal: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>> });
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TimeTable {
-    pub(crate) step: Spanned<StepLength>,
+    pub(crate) step: Option<Spanned<StepLength>>,
+    pub(crate) tolerance: Option<Spanned<f32>>,
     pub(crate) end: Spanned<f64>,
     pub(crate) frames: Option<Spanned<u32>>,
     pub(crate) method: Option<Spanned<String>>,

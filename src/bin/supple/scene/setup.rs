@@ -101,7 +101,11 @@ impl Setup {
 
     /// What moves the scene, by name.
     pub(crate) const fn method_name(&self) -> &'static str {
-        if self.learned.is_some() { "learned" } else { method_name(self.time.method.as_ref()) }
+        match &self.time {
+            _ if self.learned.is_some() => "learned",
+            time if time.is_adaptive => "auto",
+            time => method_name(time.method.as_ref()),
+        }
     }
 
     /// The kernel's scene, and a state at rest.

@@ -14,7 +14,7 @@ pub(crate) enum StepChoice {
     Seconds(f32),
     /// Times the bound of the critical step at rest.
     Multiple(f32),
-    /// 0.9 of the critical step, asked again while running.
+    /// 0.9 of the critical step, asked again while running; of adaptive steps the longest that pays.
     Auto,
 }
 
@@ -23,6 +23,10 @@ pub(crate) struct Timing {
     /// None is the exact step.
     pub(crate) method: Option<Method<'static>>,
     pub(crate) step: StepChoice,
+    /// Whether steps choose their length, up to `step`.
+    pub(crate) is_adaptive: bool,
+    /// Mean error of the nodes that is accepted, m.
+    pub(crate) tolerance: Option<f32>,
     /// Where the step was asked for, for complaints.
     pub(crate) step_at: String,
     /// Where the cells of the lattice were, if they were.
@@ -35,8 +39,28 @@ pub(crate) struct Timing {
 impl Timing {
     pub(crate) fn read(file: &SceneFile) -> Result<Self, Problem> {
         let time = file.scene.time.get_ref();
-        let method = read_method(file, time)?;
-        let step = read_step(file, &time.step, method.as_ref())?;
+        let (method, names_auto) = read_method(file, time)?;
+        let tolerance = read_tolerance(file, time, method.as_ref())?;
+        let is_auto = match &time.step {
+            Some(at) => matches!(at.get_ref(), StepLength::Named(name) if name == "auto"),
+            None => true,
+        };
+        let has_lattice = matches!(method, Some(Method::Multilevel(_) | Method::Damped(..)));
+        let is_adaptive = names_auto || (has_lattice && tolerance.is_some() && is_auto);
+        let step = match &time.step {
+            Some(at) => read_step(file, at, method.as_ref().filter(|_| !is_adaptive))?,
+            None if is_adaptive || method.is_none() => StepChoice::Auto,
+            None => {
+                let name = method_name(method.as_ref());
+                return Err(file.problem(
+                    &file.scene.time,
+                    format!(
+                        "step is missing: method \"{name}\" needs seconds, or a multiple of the critical step, as in \"20x\"; \
+                         method = \"auto\" chooses its own"
+                    ),
+                ));
+            }
+        };
         let method = match (method, &time.lattice) {
             (method, Some(at)) => Some(with_lattice(file, at, method)?),
             (method, None) => method,
@@ -50,7 +74,8 @@ impl Timing {
             return Err(file.problem(at, "frames is 0; the last state is always written, so give 1 or more"));
         }
         let lattice_at = time.lattice.as_ref().map(|at| file.place(at));
-        let timing = Self { method, step, step_at: file.place(&time.step), lattice_at, end, frames };
+        let step_at = time.step.as_ref().map_or_else(|| file.place(&file.scene.time), |at| file.place(at));
+        let timing = Self { method, step, is_adaptive, tolerance, step_at, lattice_at, end, frames };
         if let StepChoice::Seconds(seconds) = step {
             timing.check_length(seconds)?;
         }
@@ -62,6 +87,8 @@ impl Timing {
         Self {
             method: None,
             step: StepChoice::Auto,
+            is_adaptive: false,
+            tolerance: None,
             step_at: "demo".into(),
             lattice_at: None,
             end: 1.0,
@@ -97,22 +124,47 @@ pub(crate) fn damper() -> Result<Damper<'static>, Problem> {
     Damper::new(network).map_err(Problem::of)
 }
 
-fn read_method(file: &SceneFile, time: &TimeTable) -> Result<Option<Method<'static>>, Problem> {
+/// The method, and whether it is "auto".
+fn read_method(file: &SceneFile, time: &TimeTable) -> Result<(Option<Method<'static>>, bool), Problem> {
     let Some(at) = &time.method else {
-        return Ok(None);
+        return Ok((None, false));
     };
-    match at.get_ref().as_str() {
-        "tled" => Ok(None),
-        "mass-scaled" => Ok(Some(Method::MassScaled)),
-        "multilevel" => Ok(Some(Method::Multilevel(Cells::Suggested))),
-        "damped" => Ok(Some(Method::Damped(damper()?, Cells::Suggested))),
-        name => Err(file.problem(
-            at,
-            format!(
-                "method \"{name}\" is not known; \"tled\", \"mass-scaled\", \"multilevel\" and \"damped\" are"
-            ),
-        )),
+    let damped = || Ok(Method::Damped(damper()?, Cells::Suggested));
+    let fixed = match at.get_ref().as_str() {
+        "auto" => return Ok((Some(damped()?), true)),
+        "tled" => None,
+        "mass-scaled" => Some(Method::MassScaled),
+        "multilevel" => Some(Method::Multilevel(Cells::Suggested)),
+        "damped" => Some(damped()?),
+        name => {
+            return Err(file.problem(
+                at,
+                format!(
+                    "method \"{name}\" is not known; \"tled\", \"mass-scaled\", \"multilevel\", \"damped\" and \"auto\" are"
+                ),
+            ));
+        }
+    };
+    Ok((fixed, false))
+}
+
+fn read_tolerance(
+    file: &SceneFile,
+    time: &TimeTable,
+    method: Option<&Method<'_>>,
+) -> Result<Option<f32>, Problem> {
+    let Some(at) = &time.tolerance else { return Ok(None) };
+    let tolerance = *at.get_ref();
+    if !(tolerance.is_finite() && tolerance > 0.0) {
+        return Err(file.problem(at, format!("tolerance is {tolerance} m, it must be a positive number")));
     }
+    if method.is_none() && file.scene.learned.is_none() {
+        return Err(file.problem(
+            at,
+            "tolerance is given, but exact steps have no error to be tolerated; method = \"auto\" takes longer ones within it",
+        ));
+    }
+    Ok(Some(tolerance))
 }
 
 fn read_step(
