@@ -412,6 +412,11 @@ typedef int32_t supple_status;
 #endif // __cplusplus
 
 /**
+ * Steps that choose their length. One thread at a time. It may be copied with memcpy together with its state.
+ */
+typedef struct supple_adaptive supple_adaptive;
+
+/**
  * A second run of a state. One thread at a time. It may be copied with memcpy together with its state.
  */
 typedef struct supple_guard supple_guard;
@@ -940,6 +945,32 @@ typedef struct {
     float allowed;
 } supple_estimate;
 
+/**
+ * What a call of supple_adaptive_advance took.
+ */
+typedef struct {
+    /**
+     * Exact steps, those included that were undone.
+     */
+    uint32_t exact;
+    /**
+     * Steps beyond the critical one.
+     */
+    uint32_t large;
+    /**
+     * Changes of the length of the steps; each costs about a cycle of steps.
+     */
+    uint32_t changes;
+    /**
+     * Length of the next steps, s.
+     */
+    float next_seconds;
+    /**
+     * Estimate of the error at the end.
+     */
+    supple_estimate estimate;
+} supple_adaptive_report;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -1332,6 +1363,58 @@ supple_status supple_guard_follow(const supple_scene *scene,
                                   supple_guard *guard,
                                   const supple_threads *threads,
                                   supple_estimate *estimate);
+
+/**
+ * Writes how many bytes of memory a supple_adaptive needs for a scene; it depends on the lattice.
+ *
+ * @param points the points that the scene was built from, three coordinates each.
+ * @param config of the steps beyond the critical one.
+ * @param error may be NULL.
+ */
+supple_status supple_adaptive_size(const supple_scene *scene,
+                                   const float *points,
+                                   const supple_large_config *config,
+                                   size_t *bytes,
+                                   supple_error *error);
+
+/**
+ * Prepares adaptive steps, from the state as it is, in `memory` of at least supple_adaptive_size bytes, aligned to SUPPLE_ALIGN. It
+ * takes as long as some steps. They begin as exact steps.
+ *
+ * @param points the points that the scene was built from, three coordinates each.
+ * @param config of the steps beyond the critical one; its `seconds` are those of the longest step, usually a frame.
+ * @param tolerance the mean error of the nodes that you accept, m.
+ * @param error may be NULL.
+ */
+supple_status supple_adaptive_init(void *memory,
+                                   size_t bytes,
+                                   const supple_scene *scene,
+                                   supple_state *state,
+                                   const float *points,
+                                   const supple_large_config *config,
+                                   float tolerance,
+                                   supple_adaptive **adaptive,
+                                   supple_error *error);
+
+/**
+ * Moves on by `seconds`, usually a frame, and ends there exactly. SUPPLE_INEXACT if the estimate of the error exceeded the tolerance at
+ * any step: steps become shorter at once, down to exact ones, but an error that is there stays until the body has forgotten it. A
+ * step that is not to be believed is taken again with shorter ones; where exact ones are not either, the state is that before it, and
+ * the status tells.
+ *
+ * @param loads what acts; NULL: nothing, supports stand still. Motions without a ramp go evenly over the call.
+ * @param threads NULL: the calling thread alone.
+ * @param report may be NULL; is written whatever the status.
+ * @param taken may be NULL.
+ */
+supple_status supple_adaptive_advance(const supple_scene *scene,
+                                      supple_loads *loads,
+                                      supple_state *state,
+                                      supple_adaptive *adaptive,
+                                      float seconds,
+                                      const supple_threads *threads,
+                                      supple_report *report,
+                                      supple_adaptive_report *taken);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -189,14 +189,14 @@ pub unsafe extern "C" fn supple_guard_follow(
         let view = GuardView { second, watch: &mut *watch, storage };
         let status = with_scene!(any, scene => view.follow(Status::Ok, scene, &loads, &state, &threads));
         if let Some(place) = written {
-            place.write(of(watch.estimate()));
+            place.write(estimated(watch.estimate()));
         }
         answer(&status)
     };
     status_of(follow())
 }
 
-const fn of(estimate: Option<Estimate>) -> supple_estimate {
+pub(super) const fn estimated(estimate: Option<Estimate>) -> supple_estimate {
     match estimate {
         Some(Estimate { mean, largest, node, allowed }) => {
             supple_estimate { known: 1, node, mean, largest, allowed }

@@ -79,18 +79,22 @@ pub const SUPPLE_LARGE_FRONT: usize = 43008;
 const _: () = assert!(SUPPLE_LARGE_FRONT == <supple_large as Object>::FRONT);
 
 /// A configuration, checked against a scene with these points.
-struct Request<'a> {
-    config: &'a supple_large_config,
-    points: &'a [[f32; 3]],
+pub(super) struct LargeRequest<'a> {
+    pub(super) config: &'a supple_large_config,
+    pub(super) points: &'a [[f32; 3]],
     cells: Cells,
     /// In the storage.
-    vectors: usize,
+    pub(super) vectors: usize,
 }
 
-impl<'a> Request<'a> {
+impl<'a> LargeRequest<'a> {
     /// # Safety
     /// As at [`supple_large_size`].
-    unsafe fn of(any: &AnyScene<'_>, points: *const f32, config: *const supple_large_config) -> Answer<Self> {
+    pub(super) unsafe fn of(
+        any: &AnyScene<'_>,
+        points: *const f32,
+        config: *const supple_large_config,
+    ) -> Answer<Self> {
         // SAFETY: the caller's promise.
         let (config, points) = unsafe {
             let config = one(config)?;
@@ -113,7 +117,7 @@ impl<'a> Request<'a> {
     /// # Safety
     /// As at [`supple_large_init`]: the weights stay.
     #[inline(never)]
-    unsafe fn method(&self) -> Answer<Method<'static>> {
+    pub(super) unsafe fn method(&self) -> Answer<Method<'static>> {
         let Self { config, cells, .. } = *self;
         Ok(match config.method {
             SUPPLE_MASS_SCALED => Method::MassScaled,
@@ -147,7 +151,7 @@ pub unsafe extern "C" fn supple_large_size(
     // SAFETY: what the header asks of the caller.
     let size = || unsafe {
         let (any, bytes) = (carved(scene)?, place_for(bytes)?);
-        bytes.write(layout(Request::of(&any, points, config)?.vectors).bytes());
+        bytes.write(layout(LargeRequest::of(&any, points, config)?.vectors).bytes());
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
@@ -174,10 +178,10 @@ pub unsafe extern "C" fn supple_large_init(
     let init = || unsafe {
         let (any, large) = (carved(scene)?, place_for(large)?);
         let state = opened_of(&any, state)?;
-        let request = Request::of(&any, points, config)?;
+        let request = LargeRequest::of(&any, points, config)?;
         let method = request.method()?;
         let step = Step::unchecked(request.config.seconds, request.config.damping)?;
-        let Request { points, vectors, .. } = request;
+        let LargeRequest { points, vectors, .. } = request;
         let place = Place::new(memory, bytes, layout(vectors))?;
         let nodes = any.node_count() as u32;
         let storage = storage(place.arrays::<supple_large>(), vectors);

@@ -37,3 +37,5 @@ mod learned;
 mod large;
 
 mod guard;
+
+mod adaptive;

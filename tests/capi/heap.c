@@ -8,6 +8,7 @@ SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 1));
 SUPPLE_MEMORY(large_memory, 4 << 20);
 SUPPLE_MEMORY(guard_memory, 4 << 20);
+SUPPLE_MEMORY(adaptive_memory, 8 << 20);
 SUPPLE_MEMORY(weights, 40000);
 SUPPLE_MEMORY(damper, 4000);
 static unsigned char saved[32 * NODES + 128];
@@ -75,7 +76,12 @@ int main(void) {
         CHECK(supple_large_step(scene, loads, state, large, 4, NULL, NULL) >= 0);
         CHECK(supple_guard_follow(scene, loads, state, guard, NULL, NULL) >= 0);
     }
+    supple_adaptive *adaptive;
+    CHECK(supple_adaptive_init(adaptive_memory, sizeof adaptive_memory, scene, state, points[0], &beyond, 0.001f, &adaptive, NULL) == SUPPLE_OK);
+    for (int frame = 0; frame < 25; frame++) {
+        CHECK(supple_adaptive_advance(scene, loads, state, adaptive, 0.01f, NULL, NULL, NULL) >= 0);
+    }
     CHECK(asked == 0);
-    printf("heap: a scene, exact, learned and damped steps, a guard: never asked\n");
+    printf("heap: a scene, exact, learned, damped and adaptive steps, a guard: never asked\n");
     return 0;
 }

@@ -520,6 +520,45 @@ static void guards(void) {
     CHECK(told == SUPPLE_INEXACT && estimate.known == 1 && estimate.mean > estimate.allowed && estimate.allowed == 1e-9f);
 }
 
+static void adaptive_steps(void) {
+    static const supple_large_config good = {SUPPLE_CONFIG(supple_large_config), SUPPLE_MULTILEVEL, 1.0f / 60.0f, 20.0f, {0, 0, 0}, NULL, 0};
+    supple_adaptive *none = NULL, *adaptive = NULL;
+    size_t bytes = 0;
+    supple_large_config bad = good;
+    DONE(supple_state_reset(state));
+    REFUSED(SUPPLE_E_NULL, supple_adaptive_size(scene, NULL, &good, &bytes, &error));
+    DONE(supple_adaptive_size(scene, points[0], &good, &bytes, &error));
+    CHECK(bytes <= sizeof spare);
+    REFUSED(SUPPLE_E_SHORT, supple_adaptive_init(spare, bytes - 1, scene, state, points[0], &good, 1e-4f, &none, &error));
+    CHECK(error.limit == (double)bytes);
+    bad.abi++;
+    REFUSED(SUPPLE_E_ABI, supple_adaptive_init(spare, sizeof spare, scene, state, points[0], &bad, 1e-4f, &none, &error));
+    bad = good, bad.seconds = NAN;
+    REFUSED(SUPPLE_E_STEP, supple_adaptive_init(spare, sizeof spare, scene, state, points[0], &bad, 1e-4f, &none, &error));
+    REFUSED(SUPPLE_E_NEGATIVE, supple_adaptive_init(spare, sizeof spare, scene, state, points[0], &good, 0.0f, &none, &error));
+    REFUSED(SUPPLE_E_NEGATIVE, supple_adaptive_init(spare, sizeof spare, scene, state, points[0], &good, NAN, &none, &error));
+    DONE(supple_adaptive_init(spare, sizeof spare, scene, state, points[0], &good, 1e-4f, &adaptive, &error));
+    supple_report report;
+    supple_adaptive_report taken;
+    REFUSED(SUPPLE_E_NULL, supple_adaptive_advance(scene, loads, state, NULL, 0.01f, NULL, NULL, NULL));
+    REFUSED(SUPPLE_E_STEP, supple_adaptive_advance(scene, loads, state, adaptive, NAN, NULL, &report, &taken));
+    REFUSED(SUPPLE_E_STEP, supple_adaptive_advance(scene, loads, state, adaptive, -1.0f, NULL, &report, &taken));
+    REFUSED(SUPPLE_E_MISMATCH, supple_adaptive_advance(small_scene, small_loads, small_state, adaptive, 0.01f, NULL, NULL, NULL));
+    uint32_t exact = 0, large = 0;
+    for (int frame = 0; frame < 60; frame++) {
+        move_end(scene, loads, 1e-4f * (float)(frame < 20 ? frame : 20), 0.0f, 0.0f);
+        CHECK(supple_adaptive_advance(scene, loads, state, adaptive, 1.0f / 60.0f, NULL, &report, &taken) >= 0);
+        CHECK(report.steps == taken.exact + taken.large && taken.next_seconds > 0.0f && taken.estimate.allowed == 1e-4f);
+        exact += taken.exact, large += taken.large;
+    }
+    CHECK(fabs(report.time - 1.0) < 1e-6 && exact > 0 && large > 0);
+    supple_vectors moved;
+    DONE(supple_displacements(state, &moved));
+    CHECK(fabsf(moved.first[moved.stride * (NODES - 1)] - 2e-3f) < 1e-7f);
+    printf("adaptive: %u exact steps and %u longer ones a second, error at most %.4f mm\n", (unsigned)exact, (unsigned)large,
+           1e3 * (double)taken.estimate.mean);
+}
+
 int main(int argc, char **argv) {
     (void)argv;
     watched = argc == 1;
@@ -548,6 +587,7 @@ int main(int argc, char **argv) {
     networks();
     divergence();
     guards();
+    adaptive_steps();
     DONE(supple_state_reset(state));
     REFUSED(SUPPLE_E_ELEMENT, supple_step(other_element(config), NULL, state, 1, NULL, NULL));
 

@@ -11,6 +11,7 @@ SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 0));
 SUPPLE_MEMORY(large_memory, 4 << 20);
 SUPPLE_MEMORY(guard_memory, 4 << 20);
+SUPPLE_MEMORY(adaptive_memory, 8 << 20);
 SUPPLE_MEMORY(weights, 40000);
 SUPPLE_MEMORY(damper, 4000);
 
@@ -28,6 +29,7 @@ static supple_loads *loads;
 static supple_learned *learned;
 static supple_large *large;
 static supple_guard *guard;
+static supple_adaptive *adaptive;
 
 static void nothing(void) {}
 static void init_scene(void) {
@@ -63,6 +65,15 @@ static void follow(void) {
     for (int n = 0; n < 10; n++) {
         CHECK(supple_large_step(scene, loads, state, large, 4, NULL, NULL) >= 0);
         CHECK(supple_guard_follow(scene, loads, state, guard, NULL, NULL) >= 0);
+    }
+}
+
+static void init_adaptive(void) {
+    CHECK(supple_adaptive_init(adaptive_memory, sizeof adaptive_memory, scene, state, points[0], &beyond, 0.001f, &adaptive, NULL) == SUPPLE_OK);
+}
+static void advance(void) {
+    for (int n = 0; n < 25; n++) {
+        CHECK(supple_adaptive_advance(scene, loads, state, adaptive, 0.01f, NULL, NULL, NULL) >= 0);
     }
 }
 
@@ -102,8 +113,9 @@ int main(void) {
     } calls[] = {
         {"scene_init", init_scene, 16}, {"state_init", init_state, 2},     {"loads_init", init_loads, 2},
         {"set_step", set_step, 20},     {"step", exact, 20},               {"learned_init", init_learned, 12},
-        {"learned_step", learn, 140},   {"large_init", init_large, 36},    {"large_step", step_large, 36},
+        {"learned_step", learn, 140},   {"large_init", init_large, 36},    {"large_step", step_large, 38},
         {"guard_init", init_guard, 36},    {"guard_follow", follow, 40},
+        {"adaptive_init", init_adaptive, 36}, {"adaptive_advance", advance, 40},
     };
     const size_t count = sizeof calls / sizeof *calls;
     const uint32_t levels[2] = {supple_level(), SUPPLE_LEVEL_PORTABLE};
