@@ -14,10 +14,10 @@ pub mod random;
 pub mod report;
 pub mod verdict;
 
+use std::format;
 use std::path::Path;
 use std::string::String;
 use std::vec::Vec;
-use std::{format, fs};
 
 use super::method::Method;
 use super::networks::{self, Size};
@@ -92,7 +92,7 @@ fn multiple_near(timing: &Timing, critical: f32, times: u32) -> u32 {
 /// Carries the plan out on two threads: truths in `out/truth/`, tables and a picture in `out`. `say` is given the progress in words.
 pub fn evaluate(plan: &Plan, out: &Path, say: impl Fn(&str) + Sync) -> Result<Vec<Judged>, LabError> {
     let truths = out.join("truth");
-    fs::create_dir_all(&truths)?;
+    super::create_folder(&truths)?;
     let judge = |index: usize| {
         let found = match plan.cases.get(index) {
             Some(case) => Some(with_truth(case.clone(), &truths)?),
