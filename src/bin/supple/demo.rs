@@ -14,6 +14,7 @@ use crate::problem::{End, Problem};
 use crate::results::picture::{self, Panel};
 use crate::scene::body::Body;
 use crate::scene::setup::Setup;
+use crate::screen::output;
 use crate::simulate::{Simulated, Simulation};
 
 const LOBE: &[u8] = include_bytes!("../../../meshes/lobe.msh");
@@ -30,13 +31,13 @@ const PUSH: ([f32; 3], f32) = ([0.0, 0.002, -0.010], 0.5);
 
 pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
     let setup = lobe()?;
-    println!("A liver lobe, held at its back, sags under its own weight; its dome is pushed in by 10 mm.\n");
+    output!("A liver lobe, held at its back, sags under its own weight; its dome is pushed in by 10 mm.\n");
     let progress = ProgressBar::hidden();
     let simulation = Simulation { setup: &setup, out, force: true, unchecked: false, progress };
     let simulated = setup.with_material(simulation)?;
     simulated.folder.write_text("lobe.svg", &draw(&setup.body, &simulated))?;
-    println!("\npicture  {}", simulated.folder.path("lobe.svg").display());
-    println!("frames   {} (opens in ParaView)", simulated.folder.path("frames.pvd").display());
+    output!("\npicture  {}", simulated.folder.path("lobe.svg").display());
+    output!("frames   {} (opens in ParaView)", simulated.folder.path("frames.pvd").display());
     Ok(simulated.outcome.divergence.into())
 }
 

@@ -14,6 +14,7 @@ use supple::state::VecState;
 use crate::problem::Problem;
 use crate::run::outcome::Outcome;
 use crate::scene::setup::Setup;
+use crate::screen::{message, print};
 use figures::Figures;
 use folder::Folder;
 
@@ -30,9 +31,9 @@ pub(crate) fn conclude<M: ElementMaterial>(
     let report = report::of(setup, outcome, &figures, &warnings);
     folder.write_final(&setup.body, state)?;
     folder.write_text("summary.json", &report.summary())?;
-    print!("{}", report.table());
+    print(report.table());
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        message!("warning: {warning}");
     }
     Ok(figures)
 }

@@ -5,10 +5,10 @@ use serde_json::{Map, Value, json};
 use supple::inertia::Grid;
 
 use super::figures::Figures;
+use crate::added_mass::describe_added;
 use crate::run::outcome::{GuardTrace, LargeTrace, LearnedTrace, Outcome};
 use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
-use crate::screen::describe_added;
 
 #[derive(Default)]
 pub(crate) struct Report {
