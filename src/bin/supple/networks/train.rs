@@ -61,8 +61,6 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     bar.finish_and_clear();
     let Fitted { bytes, held_out, samples, loss } = fitted.map_err(|error| problem(&error))?;
     weight_file::write(out, &bytes)?;
-    // Only now that the weights are safe.
-    let _ = std::fs::remove_dir_all(&folder);
     output!("samples     {samples}");
     output!("loss        {loss:.4} of the variance, both losses together");
     if let Some([t, n, b]) = held_out {
@@ -72,6 +70,8 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     }
     output!("weights     {} ({} bytes)", out.display(), bytes.len());
     quantise_trained(out, &bytes, &parsed, &collected)?;
+    // Only now that both weight files are safe.
+    let _ = std::fs::remove_dir_all(&folder);
     Ok(End::Reached)
 }
 
