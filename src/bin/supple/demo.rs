@@ -11,6 +11,7 @@ use supple::mesh::Winding;
 use supple::scene::{Axes, Support};
 
 use crate::problem::{End, Problem};
+use crate::results::folder::PICTURE;
 use crate::results::picture::{self, Panel};
 use crate::scene::body::Body;
 use crate::scene::setup::Setup;
@@ -35,10 +36,13 @@ pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
     let progress = ProgressBar::hidden();
     let simulation = Simulation { setup: &setup, out, force: true, unchecked: false, progress };
     let simulated = setup.with_material(simulation)?;
-    simulated.folder.write_text("lobe.svg", &draw(&setup.body, &simulated))?;
-    output!("\npicture  {}", simulated.folder.path("lobe.svg").display());
-    output!("frames   {} (opens in ParaView)", simulated.folder.path("frames.pvd").display());
-    Ok(simulated.outcome.divergence.into())
+    simulated.folder.write_text(PICTURE, &draw(&setup.body, &simulated))?;
+    let Simulated { folder, outcome, conclusion, .. } = simulated;
+    folder.publish()?;
+    conclusion.print();
+    output!("\npicture  {}", out.join(PICTURE).display());
+    output!("frames   {} (opens in ParaView)", out.join("frames.pvd").display());
+    Ok(outcome.divergence.into())
 }
 
 /// The lobe with its supports and its push.
@@ -64,7 +68,7 @@ fn lobe() -> Result<Setup, Problem> {
 }
 
 /// The lobe at rest and at the end, as SVG.
-fn draw(body: &Body, Simulated { state, figures, .. }: &Simulated) -> String {
+fn draw(body: &Body, Simulated { state, conclusion, .. }: &Simulated) -> String {
     let rest = &body.mesh.points;
     let vectors: Vec<_> = state.displacements().iter().map(|vector| vector.to_array()).collect();
     let moved: Vec<_> = rest
@@ -80,5 +84,5 @@ fn draw(body: &Body, Simulated { state, figures, .. }: &Simulated) -> String {
         Panel { title: "at rest", positions: rest, displacements: &none },
         Panel { title: &after, positions: &moved, displacements: &lengths },
     ];
-    picture::draw(&panels, &body.boundary(), figures.max_displacement)
+    picture::draw(&panels, &body.boundary(), conclusion.figures.max_displacement)
 }
