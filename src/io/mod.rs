@@ -6,6 +6,7 @@ mod cursor;
 mod error;
 mod gmsh;
 mod node_index;
+mod replace;
 mod tetgen;
 mod values;
 mod vtk;
@@ -20,7 +21,8 @@ use std::vec::Vec;
 
 use error::Fault;
 pub use error::ReadError;
-pub use write::{Frame, write_atomically, write_pvd, write_vtu};
+pub use replace::write_atomically;
+pub use write::{Frame, write_pvd, write_vtu};
 
 /// A tetrahedral mesh as its file has it; nothing is scaled, renumbered or turned.
 #[derive(Clone, Debug, Default, PartialEq)]

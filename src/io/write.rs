@@ -2,17 +2,16 @@
 //! Formats" (<https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>). Arrays are appended as raw
 //! bytes, little endian, compressed with zlib: the smallest of the encodings, and ParaView and meshio read it.
 
-use core::sync::atomic::{AtomicU32, Ordering};
-use std::ffi::OsString;
 use std::format;
-use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 use std::string::String;
 use std::vec::Vec;
 
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
+
+use super::replace::replace;
 
 /// The mesh and its fields at one time.
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +28,8 @@ pub struct Frame<'a> {
     pub cell_scalars: &'a [(&'a str, &'a [f32])],
 }
 
-/// Writes one frame as a `.vtu` file, atomically. A field whose length does not fit the mesh is an error of the kind
+/// Writes one frame as a `.vtu` file, atomically as [`write_atomically`](super::write_atomically) does, but for power cuts: who has
+/// written a series may synchronise its files. A field whose length does not fit the mesh is an error of the kind
 /// [`InvalidInput`](io::ErrorKind::InvalidInput), as is a tetrahedron that names a point beyond the last.
 pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
     let (n_points, n_tets) = (frame.points.len(), frame.tets.len());
@@ -64,7 +64,7 @@ pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
     arrays.add("types", "UInt8", 1, frame.tets.iter().map(|_| [10]))?;
     arrays.close("Cells");
 
-    write_atomically(path, |w| {
+    replace(path, false, |w| {
         w.write_all(
             b"<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" \
               byte_order=\"LittleEndian\" header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n",
@@ -80,10 +80,10 @@ pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
     })
 }
 
-/// Writes a `.pvd` file, atomically: the frames of a simulation as pairs of a time in s and the name of a `.vtu` file
+/// Writes a `.pvd` file, as [`write_vtu`] does: the frames of a simulation as pairs of a time in s and the name of a `.vtu` file
 /// relative to the folder of the `.pvd` file.
 pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> io::Result<()> {
-    write_atomically(path, |w| {
+    replace(path, false, |w| {
         w.write_all(
             b"<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n",
         )?;
@@ -91,28 +91,6 @@ pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> io::Result<()> {
             writeln!(w, "<DataSet timestep=\"{time}\" part=\"0\" file=\"{}\"/>", escaped(file))?;
         }
         w.write_all(b"</Collection>\n</VTKFile>\n")
-    })
-}
-
-/// Writes a file so that no reader ever sees half of it: under a temporary name in the same folder, then renamed. If
-/// `write` or the file system fails, the temporary file is removed and a file of that name stays as it was.
-pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    static COUNT: AtomicU32 = AtomicU32::new(0);
-    let name =
-        path.file_name().ok_or_else(|| invalid(format!("{} is not the name of a file", path.display())))?;
-    let mut temporary = OsString::from(".");
-    temporary.push(name);
-    temporary.push(format!(".{}-{}.tmp", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
-    let temporary = path.with_file_name(temporary);
-    let named = |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", path.display()));
-    let mut file = BufWriter::new(fs::File::create_new(&temporary).map_err(named)?);
-    let written = write(&mut file).and_then(|()| file.flush());
-    // Closed first: Windows neither renames nor removes an open file.
-    drop(file);
-    written.and_then(|()| fs::rename(&temporary, path)).map_err(|error| {
-        // The first error is the one to report.
-        let _ = fs::remove_file(&temporary);
-        named(error)
     })
 }
 
@@ -170,7 +148,7 @@ fn check(name: &str, values: usize, expected: usize, what: &str) -> io::Result<(
     Err(invalid(format!("the field {name:?} has {values} values for {expected} {what}")))
 }
 
-fn invalid(reason: String) -> io::Error {
+pub(super) fn invalid(reason: String) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidInput, reason)
 }
 

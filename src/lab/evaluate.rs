@@ -1,7 +1,6 @@
 //! An evaluation: methods over scenes at multiples of a scene's step, the table, and a sweep.
 
 use std::format;
-use std::fs;
 use std::path::Path;
 use std::string::String;
 use std::vec::Vec;
@@ -76,7 +75,7 @@ fn unique<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
 /// Carries the plan out: truths in `out/truth/`, rows in `out/results.csv`, the sweep in
 /// `out/sweep-SCENE.svg`; files of an earlier evaluation are replaced. `say` is given the progress in words.
 pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Vec<Row>, LabError> {
-    fs::create_dir_all(out)?;
+    super::create_folder(out)?;
     let (specs, multiples): (Vec<_>, Vec<_>) = plan.scenes.iter().cloned().unzip();
     let truths = truth::obtain(&specs, &out.join("truth"), |spec, truth| say(&about(spec, truth)))?;
     let mut rows = Vec::new();

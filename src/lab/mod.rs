@@ -44,6 +44,9 @@ pub mod timing;
 pub mod tolerance;
 pub mod truth;
 
+use std::path::Path;
+use std::{format, fs, io};
+
 pub use error::LabError;
 
 /// The paper's step, s.
@@ -54,3 +57,11 @@ pub const INTERVAL_STEPS: u32 = 1_000;
 
 /// Multiples of a scene's step in the table of results.
 pub const MULTIPLES: [u32; 5] = [1, 10, 20, 50, 100];
+
+/// Makes a folder for results, unless it is there.
+fn create_folder(path: &Path) -> Result<(), LabError> {
+    fs::create_dir_all(path).map_err(|error| {
+        let words = format!("{}: cannot be made: {error}", path.display());
+        LabError::Write(io::Error::new(error.kind(), words))
+    })
+}

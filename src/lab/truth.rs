@@ -64,7 +64,7 @@ pub fn obtain(
     folder: &Path,
     mut tick: impl FnMut(&SceneSpec, &Truth),
 ) -> Result<Vec<Truth>, LabError> {
-    fs::create_dir_all(folder)?;
+    super::create_folder(folder)?;
     in_parallel(
         scenes.len(),
         |index| obtain_one(&scenes[index], folder),

@@ -4,6 +4,7 @@
 
 use core::ops::ControlFlow;
 use std::format;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::string::{String, ToString};
 use std::time::{Duration, Instant};
@@ -379,6 +380,11 @@ impl Folder<'_> {
         let [weights, state] = self.files(epoch);
         parts.clone().save_file(&weights).map_err(|error| problem(&weights, error.to_string()))?;
         adam.save(&state).map_err(|error| problem(&state, error.to_string()))?;
+        // On the disk before the file that names them.
+        for path in [&weights, &state] {
+            let synchronised = File::options().write(true).open(path).and_then(|file| file.sync_all());
+            synchronised.map_err(|error| problem(path, error.to_string()))?;
+        }
         let hash = mlp::hexadecimal(self.hash);
         write_atomically(&self.mark(), |file| writeln!(file, "{epoch} {hash}")).map_err(LabError::Write)?;
         // The files of the epoch before are of no more use.

@@ -3,7 +3,9 @@ mod errors;
 mod evaluate;
 mod inertia;
 mod inspect;
+mod interrupted;
 mod learned;
+mod screen;
 mod simulate;
 mod weights;
 
@@ -15,6 +17,8 @@ use std::process::{Command, Output};
 
 use tempfile::TempDir;
 
+const SUPPLE: &str = env!("CARGO_BIN_EXE_supple");
+
 /// A folder that goes away with the test.
 struct Desk(TempDir);
 
@@ -23,6 +27,13 @@ struct Said {
     code: i32,
     out: String,
     err: String,
+}
+
+impl Said {
+    fn of(Output { status, stdout, stderr }: Output) -> Self {
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        Self { code: status.code().unwrap(), out: text(stdout), err: text(stderr) }
+    }
 }
 
 impl Desk {
@@ -46,14 +57,14 @@ impl Desk {
         path
     }
 
+    fn command(&self, program: &str, arguments: &[&str]) -> Command {
+        let mut command = Command::new(program);
+        command.args(arguments).current_dir(self.0.path());
+        command
+    }
+
     fn supple(&self, arguments: &[&str]) -> Said {
-        let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_supple"))
-            .args(arguments)
-            .current_dir(self.0.path())
-            .output()
-            .unwrap();
-        let text = |bytes| String::from_utf8(bytes).unwrap();
-        Said { code: status.code().unwrap(), out: text(stdout), err: text(stderr) }
+        Said::of(self.command(SUPPLE, arguments).output().unwrap())
     }
 
     /// Simulates `scene` into the folder `out`.

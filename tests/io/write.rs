@@ -117,10 +117,50 @@ fn a_failed_write_leaves_the_old_file_and_no_other() {
         w.write_all(b"new")?;
         Err(io::Error::other("the disk is on fire"))
     });
-    assert!(error.unwrap_err().to_string().ends_with("result.csv: the disk is on fire"));
+    assert!(error.unwrap_err().to_string().ends_with("result.csv: cannot be written: the disk is on fire"));
     assert_eq!(fs::read(&path).unwrap(), b"old");
     write_atomically(&path, |w| write!(w, "new {}", 7)).unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"new 7");
+    assert_eq!(names(folder.path()), ["result.csv"]);
+}
+
+#[test]
+fn a_write_removes_what_killed_writes_of_the_file_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| fs::File::create(folder.path().join(name)).unwrap();
+    file(".result.csv.7-0.tmp");
+    // The first numbers of this process, as in a container, where every process may have the same.
+    for count in 0..20 {
+        file(&format!(".result.csv.{}-{count}.tmp", std::process::id()));
+    }
+    // One that is being written, and others' files.
+    let kept = [".other.csv.7-0.tmp", ".result.csv.8-0.tmp", ".result.csv.tmp", ".result.csv.x-1.tmp"];
+    let files = kept.map(file);
+    files[1].lock().unwrap();
+    let path = folder.path().join("result.csv");
+    write_atomically(&path, |w| w.write_all(b"new")).unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"new");
+    let mut expected = kept.to_vec();
+    expected.push("result.csv");
+    assert_eq!(names(folder.path()), expected);
+}
+
+#[test]
+fn writes_of_one_file_at_once_leave_one_of_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("result.csv");
+    std::thread::scope(|scope| {
+        for writer in 0..4u8 {
+            let path = &path;
+            scope.spawn(move || {
+                for _ in 0..50 {
+                    write_atomically(path, |w| w.write_all(&[b'0' + writer; 100_000])).unwrap();
+                }
+            });
+        }
+    });
+    let bytes = fs::read(&path).unwrap();
+    assert!(bytes.len() == 100_000 && bytes.iter().all(|byte| *byte == bytes[0]));
     assert_eq!(names(folder.path()), ["result.csv"]);
 }
 

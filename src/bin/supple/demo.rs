@@ -11,9 +11,11 @@ use supple::mesh::Winding;
 use supple::scene::{Axes, Support};
 
 use crate::problem::{End, Problem};
+use crate::results::folder::PICTURE;
 use crate::results::picture::{self, Panel};
 use crate::scene::body::Body;
 use crate::scene::setup::Setup;
+use crate::screen::output;
 use crate::simulate::{Simulated, Simulation};
 
 const LOBE: &[u8] = include_bytes!("../../../meshes/lobe.msh");
@@ -30,14 +32,17 @@ const PUSH: ([f32; 3], f32) = ([0.0, 0.002, -0.010], 0.5);
 
 pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
     let setup = lobe()?;
-    println!("A liver lobe, held at its back, sags under its own weight; its dome is pushed in by 10 mm.\n");
+    output!("A liver lobe, held at its back, sags under its own weight; its dome is pushed in by 10 mm.\n");
     let progress = ProgressBar::hidden();
     let simulation = Simulation { setup: &setup, out, force: true, unchecked: false, progress };
     let simulated = setup.with_material(simulation)?;
-    simulated.folder.write_text("lobe.svg", &draw(&setup.body, &simulated))?;
-    println!("\npicture  {}", simulated.folder.path("lobe.svg").display());
-    println!("frames   {} (opens in ParaView)", simulated.folder.path("frames.pvd").display());
-    Ok(simulated.outcome.divergence.into())
+    simulated.folder.write_text(PICTURE, &draw(&setup.body, &simulated))?;
+    let Simulated { folder, outcome, conclusion, .. } = simulated;
+    folder.publish()?;
+    conclusion.print();
+    output!("\npicture  {}", out.join(PICTURE).display());
+    output!("frames   {} (opens in ParaView)", out.join("frames.pvd").display());
+    Ok(outcome.divergence.into())
 }
 
 /// The lobe with its supports and its push.
@@ -63,7 +68,7 @@ fn lobe() -> Result<Setup, Problem> {
 }
 
 /// The lobe at rest and at the end, as SVG.
-fn draw(body: &Body, Simulated { state, figures, .. }: &Simulated) -> String {
+fn draw(body: &Body, Simulated { state, conclusion, .. }: &Simulated) -> String {
     let rest = &body.mesh.points;
     let vectors: Vec<_> = state.displacements().iter().map(|vector| vector.to_array()).collect();
     let moved: Vec<_> = rest
@@ -79,5 +84,5 @@ fn draw(body: &Body, Simulated { state, figures, .. }: &Simulated) -> String {
         Panel { title: "at rest", positions: rest, displacements: &none },
         Panel { title: &after, positions: &moved, displacements: &lengths },
     ];
-    picture::draw(&panels, &body.boundary(), figures.max_displacement)
+    picture::draw(&panels, &body.boundary(), conclusion.figures.max_displacement)
 }

@@ -10,6 +10,7 @@ use supple::material::Element;
 
 use crate::element_name::element_named;
 use crate::problem::{End, Problem};
+use crate::screen::{message, output, print};
 
 #[derive(Args)]
 pub(crate) struct Asked {
@@ -72,29 +73,29 @@ pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
     for path in weights {
         plan.methods.push(Method::with(path).map_err(Problem::of)?);
     }
-    let rows = evaluate::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
-    print!("{}", table::text(&rows));
+    let rows = evaluate::evaluate(&plan, out, |words| message!("{words}")).map_err(Problem::of)?;
+    print(table::text(&rows));
     let judged = equal_error::text(&rows);
     if !judged.is_empty() {
-        print!("\n{judged}");
+        print(format_args!("\n{judged}"));
     }
-    println!("\nresults  {}", out.join("results.csv").display());
+    output!("\nresults  {}", out.join("results.csv").display());
     Ok(End::Reached)
 }
 
 fn evaluate_physics(Asked { out, scenes, .. }: &Asked) -> Result<End, Problem> {
     let plan = physics::Plan::new(scenes).map_err(Problem::of)?;
-    let rows = physics::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
-    print!("{}", physics::tables::tables(&rows));
-    println!("\nresults  {}", out.join("physics.csv").display());
+    let rows = physics::evaluate(&plan, out, |words| message!("{words}")).map_err(Problem::of)?;
+    print(physics::tables::tables(&rows));
+    output!("\nresults  {}", out.join("physics.csv").display());
     Ok(End::Reached)
 }
 
 fn evaluate_hard(Asked { out, scenes, methods, random, every, .. }: &Asked) -> Result<End, Problem> {
     let plan = hard::Plan::new(scenes, methods, *random, *every).map_err(Problem::of)?;
-    let judged = hard::evaluate(&plan, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
-    print!("{}", hard::report::text(&judged));
-    println!("\nresults  {}", out.join("hard.csv").display());
+    let judged = hard::evaluate(&plan, out, |words| message!("{words}")).map_err(Problem::of)?;
+    print(hard::report::text(&judged));
+    output!("\nresults  {}", out.join("hard.csv").display());
     Ok(End::Reached)
 }
 
@@ -107,8 +108,8 @@ fn evaluate_tolerances(
     let methods = if methods.is_empty() { &[Method::Damped.name().to_owned()] } else { &**methods };
     let plan = hard::Plan::new(scenes, methods, *random, *every).map_err(Problem::of)?;
     let rows =
-        tolerance::evaluate(&plan, tolerances, out, |words| eprintln!("{words}")).map_err(Problem::of)?;
-    print!("{}", tolerance::text(&rows));
-    println!("\nresults  {}", out.join("tolerance.csv").display());
+        tolerance::evaluate(&plan, tolerances, out, |words| message!("{words}")).map_err(Problem::of)?;
+    print(tolerance::text(&rows));
+    output!("\nresults  {}", out.join("tolerance.csv").display());
     Ok(End::Reached)
 }

@@ -1,7 +1,12 @@
 //! The command `supple`: simulate a scene, inspect a mesh, a scene or a network, show what the kernel does, judge methods.
 //!
-//! Exit codes: 0 as asked, 2 the input is not usable, 3 the simulation diverged.
+//! Exit codes: 0 as asked, 2 the input is not usable or the results cannot be written, 3 the simulation diverged, 141 as asked
+//! but nobody read what was printed.
 
+// Where nobody reads they panic; `screen` has what prints.
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
+mod added_mass;
 mod demo;
 mod element_name;
 mod evaluate;
@@ -24,6 +29,7 @@ use networks::convert;
 #[cfg(feature = "train")]
 use networks::train;
 use problem::End;
+use screen::message;
 
 /// Moves soft tissue: total Lagrangian explicit dynamics on tetrahedral meshes.
 #[derive(Parser)]
@@ -86,13 +92,13 @@ fn main() -> ExitCode {
         Command::Weights(conversion) => convert::convert(&conversion),
     };
     match done {
-        Ok(End::Reached) => ExitCode::SUCCESS,
+        Ok(End::Reached) => screen::exit_code(),
         Ok(End::Diverged(divergence)) => {
-            eprintln!("error: the simulation {divergence}; the results end before that");
+            message!("error: the simulation {divergence}; the results end before that");
             ExitCode::from(3)
         }
         Err(problem) => {
-            eprintln!("error: {problem}");
+            message!("error: {problem}");
             ExitCode::from(2)
         }
     }

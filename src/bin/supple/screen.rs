@@ -1,25 +1,62 @@
-//! What several commands print: rows of tables, added mass in words.
+//! What commands print: results on standard output, progress and warnings on standard error.
+//!
+//! `println!` panics where nobody reads it any more (`supple inspect FILE | head`) or the disk is full. Here the first failure of
+//! standard output is kept for the end and no more is written to it: files, warnings and the exit code do not depend on who reads
+//! the table. Without a reader the command says nothing of it and ends with the code of the signal that ends other programs then.
 
 use std::fmt::Display;
+use std::io::{self, ErrorKind, Write as _};
+use std::process::ExitCode;
+use std::sync::OnceLock;
 
-use supple::inertia::Report;
+/// The first failure of standard output.
+static FAILURE: OnceLock<io::Error> = OnceLock::new();
+/// 128 and the number of SIGPIPE, as shells have it.
+const NO_READER: u8 = 141;
+
+/// Prints a line on standard output.
+macro_rules! output {
+    ($($argument:tt)*) => {
+        $crate::screen::print(format_args!("{}\n", format_args!($($argument)*)))
+    };
+}
+
+/// Prints a line on standard error.
+macro_rules! message {
+    ($($argument:tt)*) => {
+        $crate::screen::print_message(format_args!($($argument)*))
+    };
+}
+
+pub(crate) use {message, output};
+
+/// Prints text that ends its lines itself.
+pub(crate) fn print(text: impl Display) {
+    if FAILURE.get().is_none()
+        && let Err(error) = write!(io::stdout().lock(), "{text}")
+    {
+        let _ = FAILURE.set(error);
+    }
+}
+
+pub(crate) fn print_message(text: impl Display) {
+    // There is no other place to complain.
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// The exit code of a command that did as asked.
+pub(crate) fn exit_code() -> ExitCode {
+    match FAILURE.get() {
+        None => ExitCode::SUCCESS,
+        Some(error) if error.kind() == ErrorKind::BrokenPipe => ExitCode::from(NO_READER),
+        Some(error) => {
+            message!("error: standard output: cannot be written: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
 
 /// Prints a row: what it is and its value.
 pub(crate) fn row(name: &str, value: impl Display) {
-    println!("{name:<21} {value}");
-}
-
-/// Added mass in words.
-pub(crate) fn describe_added(report: &Report) -> String {
-    // Three figures for what may be a hundredth or thousands.
-    let figure = |value: f32| {
-        let decimals = if value < 10.0 { 2 } else { usize::from(value < 100.0) };
-        format!("{value:.decimals$}")
-    };
-    format!(
-        "on average {}, at most {} times its own mass (node {})",
-        figure(report.added_mean),
-        figure(report.added_largest),
-        report.added_node
-    )
+    output!("{name:<21} {value}");
 }

@@ -7,9 +7,8 @@ use supple::element::{ElementMaterial, MaterialWork};
 use supple::state::VecState;
 
 use crate::problem::{End, Problem};
-use crate::results;
-use crate::results::figures::Figures;
 use crate::results::folder::Folder;
+use crate::results::{self, Conclusion};
 use crate::run::outcome::Outcome;
 use crate::run::run;
 use crate::run::start::Start;
@@ -21,7 +20,9 @@ pub(crate) fn simulate(path: &Path, out: &Path, force: bool, unchecked: bool) ->
     let setup = Setup::read(&SceneFile::read(path)?)?;
     let progress = ProgressBar::new((setup.time.end * 1e3).ceil() as u64).with_style(progress_style());
     let simulation = Simulation { setup: &setup, out, force, unchecked, progress };
-    let Simulated { outcome, .. } = setup.with_material(simulation)?;
+    let Simulated { folder, outcome, conclusion, .. } = setup.with_material(simulation)?;
+    folder.publish()?;
+    conclusion.print();
     row("results", out.display());
     Ok(outcome.divergence.into())
 }
@@ -31,7 +32,7 @@ fn progress_style() -> ProgressStyle {
         .unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
-/// A simulation from rest, with its results in a folder and on the screen.
+/// A simulation from rest, with its results in a folder that is not in its place yet.
 pub(crate) struct Simulation<'a> {
     pub(crate) setup: &'a Setup,
     pub(crate) out: &'a Path,
@@ -47,7 +48,7 @@ pub(crate) struct Simulated {
     pub(crate) folder: Folder,
     pub(crate) state: VecState,
     pub(crate) outcome: Outcome,
-    pub(crate) figures: Figures,
+    pub(crate) conclusion: Conclusion,
 }
 
 impl MaterialWork for Simulation<'_> {
@@ -57,7 +58,7 @@ impl MaterialWork for Simulation<'_> {
         let Self { setup, out, force, unchecked, progress } = self;
         let (scene, mut state) = setup.build(material)?;
         let scene = scene.view();
-        // All that can be refused is refused before the folder is touched.
+        // All that can be refused in the scene is refused before there is a folder.
         let start = Start::new(setup, scene, &mut state, unchecked)?;
         let mut folder = Folder::create(out, force)?;
 
@@ -69,7 +70,7 @@ impl MaterialWork for Simulation<'_> {
             frame(&mut state)?;
         }
         progress.finish_and_clear();
-        let figures = results::conclude(&folder, setup, scene, &state, &outcome)?;
-        Ok(Simulated { folder, state, outcome, figures })
+        let conclusion = results::conclude(&folder, setup, scene, &state, &outcome)?;
+        Ok(Simulated { folder, state, outcome, conclusion })
     }
 }

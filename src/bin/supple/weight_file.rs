@@ -37,8 +37,7 @@ pub(crate) fn parse<'w>(path: &Path, memory: &'w WeightBytes) -> Result<Network<
 
 /// Replaces a file by these bytes, or leaves it as it is.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
-    write_atomically(path, |file| file.write_all(bytes))
-        .map_err(|error| Problem::in_file(path, format!("cannot be written: {error}")))
+    write_atomically(path, |file| file.write_all(bytes)).map_err(Problem::of)
 }
 
 /// The step of a network.

@@ -14,10 +14,10 @@ pub mod random;
 pub mod report;
 pub mod verdict;
 
+use std::format;
 use std::path::Path;
 use std::string::String;
 use std::vec::Vec;
-use std::{format, fs};
 
 use super::method::Method;
 use super::networks::{self, Size};
@@ -76,7 +76,7 @@ impl Plan {
     /// A scene by its number, with its truth, which is kept in `out/truth`. None for a random scene that cannot be found.
     pub(super) fn scene(&self, index: usize, out: &Path) -> Result<Option<(SceneSpec, Truth)>, LabError> {
         let truths = out.join("truth");
-        fs::create_dir_all(&truths)?;
+        super::create_folder(&truths)?;
         match self.cases.get(index) {
             Some(case) => with_truth(case.clone(), &truths).map(Some),
             None => random_scene((index - self.cases.len()) as u32, &truths),

@@ -33,7 +33,6 @@ mod swing;
 pub mod tables;
 mod torsion;
 
-use std::fs;
 use std::path::Path;
 use std::string::{String, ToString};
 use std::vec::Vec;
@@ -130,13 +129,13 @@ impl Plan {
 /// Carries the plan out: rows in `out/physics.csv`, tables of them in `out/physics.md`, and of the beam the errors over computing time in
 /// `out/physics.svg` and the shapes at rest in `out/locking.svg`; files of an earlier evaluation are replaced. `say` is given the progress in words.
 pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Vec<Row>, LabError> {
-    fs::create_dir_all(out)?;
+    super::create_folder(out)?;
     let mut rows = Vec::new();
     for (name, run) in &plan.cases {
         say(name);
         rows.extend(run(plan.meshes)?);
-        report::write_csv(&out.join("physics.csv"), &rows)?;
     }
+    report::write_csv(&out.join("physics.csv"), &rows)?;
     let write =
         |name: &str, text: &str| write_atomically(&out.join(name), |file| file.write_all(text.as_bytes()));
     write("physics.md", &tables::tables(&rows))?;

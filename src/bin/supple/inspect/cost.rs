@@ -13,12 +13,13 @@ use supple::tled;
 
 use super::times::{Times, Walker};
 use super::{doubling, learned_cost};
+use crate::added_mass::describe_added;
 use crate::problem::Problem;
 use crate::run::large::{grid, on_grid};
 use crate::run::start::{critical, first_step};
 use crate::scene::setup::Setup;
 use crate::scene::timing::{damper, method_name};
-use crate::screen::{describe_added, row};
+use crate::screen::{output, row};
 
 /// Exact steps that are timed.
 const TIMED: u32 = 300;
@@ -139,7 +140,7 @@ fn describe_beyond<M: ElementMaterial>(
     loads: &Loads<'_>,
     bound: CriticalStep,
 ) -> Result<Times, Problem> {
-    println!("\nsteps beyond the limit");
+    output!("\nsteps beyond the limit");
     let lattice = lattice(setup, scene)?;
     let methods = [
         Method::MassScaled,

@@ -16,7 +16,7 @@ use crate::problem::Problem;
 use crate::run::large::{grid, on_grid};
 use crate::scene::setup::Setup;
 use crate::scene::timing::method_name;
-use crate::screen::row;
+use crate::screen::{output, row};
 
 /// Lengths that are tried, times the critical step.
 const MULTIPLES: [f32; 6] = [50.0, 40.0, 30.0, 20.0, 10.0, 5.0];
@@ -60,10 +60,14 @@ pub(crate) fn recommend<M: ElementMaterial>(
     let method = judged(setup, scene)?;
     let name = method_name(Some(&method));
     let span = (SHARE * setup.time.end).max(LEAST).min(setup.time.end);
-    println!("\n{name} steps, their error estimated by two of half their length, over the first {span:.3} s");
-    println!(
+    output!("\n{name} steps, their error estimated by two of half their length, over the first {span:.3} s");
+    output!(
         "{:<21} {:>12} {:>14} {:>14} {:>17}",
-        "step", "seconds", "estimate, mm", "moved, mm", "real-time factor"
+        "step",
+        "seconds",
+        "estimate, mm",
+        "moved, mm",
+        "real-time factor"
     );
     let mut longest = None;
     let mut unbroken = true;
@@ -91,7 +95,7 @@ pub(crate) fn recommend<M: ElementMaterial>(
         }
         rows.push(format!("{:<21} {seconds:>12.3e} {words}", format!("{multiple}x")));
     }
-    rows.iter().rev().for_each(|row| println!("{row}"));
+    rows.iter().rev().for_each(|row| output!("{row}"));
     match longest {
         Some((multiple, error)) => row(
             "recommended",

@@ -12,7 +12,7 @@ use supple::step::CallingThread;
 use crate::problem::Problem;
 use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
-use crate::screen::row;
+use crate::screen::{output, row};
 use crate::weight_file::describe_step;
 
 /// Steps that are timed.
@@ -41,7 +41,7 @@ pub(crate) fn describe<M: ElementMaterial>(
     }
     let seconds = spent.as_secs_f64() / f64::from(TIMED);
     let network = learned.model().network();
-    println!("\nlearned step");
+    output!("\nlearned step");
     row(
         "network",
         format!("{}, {} multiply-adds per vertex", choice.path.display(), network.multiply_adds()),

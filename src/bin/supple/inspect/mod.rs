@@ -15,6 +15,7 @@ use crate::problem::Problem;
 use crate::scene::body::Body;
 use crate::scene::file::SceneFile;
 use crate::scene::setup::Setup;
+use crate::screen::output;
 use crate::weight_file::is_weights;
 use cost::Cost;
 
@@ -29,7 +30,7 @@ pub(crate) fn inspect(path: &Path, accuracy: Option<f64>) -> Result<(), Problem>
         let setup = Setup::read(&SceneFile::read(path)?)?;
         mesh::describe(&setup.body)?;
         for warning in &setup.warnings {
-            println!("warning: {warning}");
+            output!("warning: {warning}");
         }
         return setup.with_material(Cost { setup: &setup, accuracy });
     }

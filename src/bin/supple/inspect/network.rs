@@ -7,7 +7,7 @@ use supple::learned::{FEATURES, LearnedModel, PREDICTED};
 use supple::mlp::{Activation, ForceInput, Int8, Layer, Parameters, Range, hexadecimal};
 
 use crate::problem::Problem;
-use crate::screen::row;
+use crate::screen::{output, row};
 use crate::weight_file::{self, describe_step, describe_tissue};
 
 /// Inputs and outputs of the learned step: what they are, the unit for people, and how many of it the SI unit is.
@@ -69,14 +69,20 @@ pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
     row("learned from", describe_tissue(&network));
     row("damping", format!("{} 1/s", recipe.damping));
 
-    println!(
+    output!(
         "\n{:<21} {:>7} {:>8}  {:<16} {:<9} {:>14} {:>9}",
-        "layer", "inputs", "outputs", "activation", "precision", "multiply-adds", "bytes"
+        "layer",
+        "inputs",
+        "outputs",
+        "activation",
+        "precision",
+        "multiply-adds",
+        "bytes"
     );
     let (first, second) = network.layers();
     for (part, layers) in [("first", first), ("second", second)] {
         for (index, layer) in layers.iter().enumerate() {
-            println!("{}", layer_row(&format!("{part} {index}"), layer));
+            output!("{}", layer_row(&format!("{part} {index}"), layer));
         }
     }
     let learned_step = inputs.len() == FEATURES && outputs.len() == PREDICTED;
@@ -89,9 +95,9 @@ pub(crate) fn inspect(path: &Path) -> Result<(), Problem> {
     ranges("input", if damps { "possible" } else { "in training" }, inputs, input_names);
     ranges("output", "clipped to", outputs, output_names);
 
-    println!("\nrecipe, SHA-256 {}", hexadecimal(&recipe.hash));
+    output!("\nrecipe, SHA-256 {}", hexadecimal(&recipe.hash));
     for line in recipe.text.lines() {
-        println!("{}", format!("    {line}").trim_end());
+        output!("{}", format!("    {line}").trim_end());
     }
     match LearnedModel::new(network, false) {
         Ok(_) => Ok(()),
@@ -121,11 +127,11 @@ fn layer_row(name: &str, layer: &Layer<'_>) -> String {
 
 /// Prints a table of ranges; what has no name in `quantities` has a number and no unit.
 fn ranges(kind: &str, what: &str, ranges: &[Range], quantities: &[Quantity]) {
-    println!("\n{kind:<24} {:<6} {:>11}  {what}", "unit", "scale");
+    output!("\n{kind:<24} {:<6} {:>11}  {what}", "unit", "scale");
     for (index, Range { scale, least, most }) in ranges.iter().enumerate() {
         let number = format!("{kind} {index}");
         let (name, unit, factor) = quantities.get(index).copied().unwrap_or((&number, "", 1.0));
-        println!(
+        output!(
             "{name:<24} {unit:<6} {:>11.4}  {:.4} to {:.4}",
             factor * scale,
             factor * least,

@@ -9,6 +9,7 @@ use supple::mlp::{from_safetensors, to_safetensors};
 #[cfg(feature = "train")]
 use super::quantise;
 use crate::problem::{End, Problem};
+use crate::screen::output;
 use crate::weight_file;
 
 #[derive(Subcommand)]
@@ -48,6 +49,6 @@ pub(crate) fn convert(conversion: &Conversion) -> Result<End, Problem> {
     };
     let written = written.map_err(|error| Problem::in_file(from, error))?;
     weight_file::write(out, &written)?;
-    println!("{} ({} bytes)", out.display(), written.len());
+    output!("{} ({} bytes)", out.display(), written.len());
     Ok(End::Reached)
 }

@@ -10,6 +10,7 @@ use supple::train::recipe::Recipe;
 use supple::train::samples::Samples;
 
 use crate::problem::{End, Problem};
+use crate::screen::{message, output};
 use crate::weight_file;
 
 #[derive(Args)]
@@ -34,7 +35,7 @@ pub(crate) fn quantise(asked: &Asked) -> Result<End, Problem> {
     if let Some(layer) = float.iter().find(|&&layer| layer >= count) {
         return Err(Problem::in_file(path, format!("--float {layer}, but there are {count} layers")));
     }
-    eprintln!("simulating the motion it learned from ...");
+    message!("simulating the motion it learned from ...");
     let samples = Samples::collect(&recipe).map_err(|error| Problem::in_file(path, error))?;
     let float = if float.is_empty() { usual_float_layers(&network) } else { float.clone() };
     let made = int8(&network, &recipe, &samples, &float).map_err(|error| Problem::in_file(path, error))?;
@@ -63,11 +64,11 @@ fn tell(made: &Made, out: &Path) -> Result<(), Problem> {
     let memory = WeightBytes::of(&made.bytes);
     let network = Network::parse(memory.bytes()).map_err(Problem::of)?;
     let Made { bytes, held_out, float, layers: errors } = made;
-    println!(
+    output!(
         "\nprecision               error held out, of the standard deviation along tangent, normal, binormal"
     );
     for (name, [t, n, b]) in [("float32", float), ("int8", held_out)] {
-        println!("{name:<22}  {t:.4} {n:.4} {b:.4}");
+        output!("{name:<22}  {t:.4} {n:.4} {b:.4}");
     }
     let (first, second) = network.layers();
     let layers: Vec<(String, &Layer<'_>)> = [("first", first), ("second", second)]
@@ -76,17 +77,13 @@ fn tell(made: &Made, out: &Path) -> Result<(), Problem> {
             layers.iter().enumerate().map(move |(at, layer)| (format!("{part} {at}"), layer))
         })
         .collect();
-    println!("\nlayer     precision  multiply-adds   error of what it hands on, of its standard deviation");
+    output!("\nlayer     precision  multiply-adds   error of what it hands on, of its standard deviation");
     for ((name, layer), error) in layers.iter().zip(errors) {
         let precision = if layer.is_int8() { "int8" } else { "float32" };
-        println!("{name:<9} {precision:<9} {:>14}   {error:.4}", layer.multiply_adds());
+        output!("{name:<9} {precision:<9} {:>14}   {error:.4}", layer.multiply_adds());
     }
     let of_int8 = layers.iter().filter(|(_, layer)| layer.is_int8()).map(|(_, layer)| layer.multiply_adds());
     let share = 100.0 * of_int8.sum::<usize>() as f64 / network.multiply_adds() as f64;
-    println!(
-        "weights   {} ({} bytes), {share:.1} % of the multiply-adds in int8",
-        out.display(),
-        bytes.len()
-    );
+    output!("weights   {} ({} bytes), {share:.1} % of the multiply-adds in int8", out.display(), bytes.len());
     Ok(())
 }

@@ -13,6 +13,7 @@ use supple::train::samples::Samples;
 
 use super::quantise::quantise_trained;
 use crate::problem::{End, Problem};
+use crate::screen::{message, output};
 use crate::weight_file;
 
 #[derive(Args)]
@@ -40,7 +41,7 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     }
     let parsed = Recipe::parse(&text).map_err(|error| problem(&error))?;
     let folder = checkpoints(out);
-    eprintln!("simulating the motion to learn from ...");
+    message!("simulating the motion to learn from ...");
     let collected = Samples::collect(&parsed).map_err(|error| problem(&error))?;
     let bar = ProgressBar::no_length();
     let style = ProgressStyle::with_template("{bar:30} {msg}").map_err(|error| problem(&error))?;
@@ -53,24 +54,24 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
         // A line an epoch where no bar can be drawn.
         if bar.is_hidden() && at.done == at.samples && told != Some(at.epoch) {
             told = Some(at.epoch);
-            eprintln!("{}", said(at));
+            message!("{}", said(at));
         }
         ControlFlow::Continue(())
     });
     bar.finish_and_clear();
     let Fitted { bytes, held_out, samples, loss } = fitted.map_err(|error| problem(&error))?;
     weight_file::write(out, &bytes)?;
-    // Only now that the weights are safe.
-    let _ = std::fs::remove_dir_all(&folder);
-    println!("samples     {samples}");
-    println!("loss        {loss:.4} of the variance, both losses together");
+    output!("samples     {samples}");
+    output!("loss        {loss:.4} of the variance, both losses together");
     if let Some([t, n, b]) = held_out {
-        println!(
+        output!(
             "held out    error {t:.3}, {n:.3}, {b:.3} of the standard deviation along tangent, normal, binormal"
         );
     }
-    println!("weights     {} ({} bytes)", out.display(), bytes.len());
+    output!("weights     {} ({} bytes)", out.display(), bytes.len());
     quantise_trained(out, &bytes, &parsed, &collected)?;
+    // Only now that both weight files are safe.
+    let _ = std::fs::remove_dir_all(&folder);
     Ok(End::Reached)
 }
 
@@ -80,9 +81,9 @@ fn is_damper(recipe: &str) -> bool {
 
 /// A few minutes of roll-outs: there are no checkpoints.
 fn train_damper(text: &str, recipe: &Path, out: &Path) -> Result<End, Problem> {
-    eprintln!("simulating the motions to be judged by ...");
+    message!("simulating the motions to be judged by ...");
     let trained = damper::train(text, |at| {
-        eprintln!(
+        message!(
             "generation {} of {}, best {:.4}, {} left",
             at.generation,
             at.generations,
@@ -93,16 +94,16 @@ fn train_damper(text: &str, recipe: &Path, out: &Path) -> Result<End, Problem> {
     });
     let trained = trained.map_err(|error| Problem::in_file(recipe, error))?;
     weight_file::write(out, &trained.bytes)?;
-    println!("mean error over nodes and time, mm");
-    println!("scene            load  step  multilevel  undamped      rule   network");
+    output!("mean error over nodes and time, mm");
+    output!("scene            load  step  multilevel  undamped      rule   network");
     for damper::Judged { scene, load, multiple, errors: [multilevel, undamped, rule, network] } in
         &trained.judged
     {
-        println!(
+        output!(
             "{scene:14} {load:6} {multiple:4}x {multilevel:11.4} {undamped:9.4} {rule:9.4} {network:9.4}"
         );
     }
-    println!("weights     {} ({} bytes)", out.display(), trained.bytes.len());
+    output!("weights     {} ({} bytes)", out.display(), trained.bytes.len());
     Ok(End::Reached)
 }
 

@@ -1,7 +1,7 @@
-//! The folder of a simulation's results: frames and tables.
+//! The results of a simulation: frames and tables, in a folder that takes its place when they are complete.
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use supple::element::ElementMaterial;
@@ -10,42 +10,34 @@ use supple::scene::SceneView;
 use supple::state::VecState;
 use supple::tled;
 
+use super::staging::Staging;
 use crate::problem::Problem;
 use crate::scene::body::Body;
 
+/// Results but frames, by the names of their files.
+const TABLES: [&str; 4] = ["frames.pvd", "final.csv", "summary.json", PICTURE];
+/// The picture of a demo.
+pub(crate) const PICTURE: &str = "lobe.svg";
+
 /// The folder of a simulation's results.
 pub(crate) struct Folder {
-    path: PathBuf,
+    staging: Staging,
     frames: Vec<(f64, String)>,
 }
 
 impl Folder {
-    /// Makes the folder; one that is there is left alone unless `force`.
+    /// Begins a folder; one that is there is left alone unless `force`, and until the new one is complete.
     pub(crate) fn create(path: &Path, force: bool) -> Result<Self, Problem> {
-        if path.exists() && !force {
-            return Err(Problem::in_file(path, "is there already; --force overwrites the results in it"));
-        }
-        std::fs::create_dir_all(path).map_err(|error| cannot_write(path, &error))?;
-        let folder = Self { path: path.to_path_buf(), frames: vec![] };
-        folder.remove_old_frames().map_err(|error| cannot_write(path, &error))?;
-        Ok(folder)
+        Ok(Self { staging: Staging::open(path, force, is_result)?, frames: vec![] })
     }
 
-    /// Frames of an earlier run would mix with ours; nothing else is touched.
-    fn remove_old_frames(&self) -> io::Result<()> {
-        for entry in std::fs::read_dir(&self.path)? {
-            let path = entry?.path();
-            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-            let number = name.strip_prefix("frame_").and_then(|rest| rest.strip_suffix(".vtu"));
-            if number.is_some_and(|number| number.parse::<u32>().is_ok()) {
-                std::fs::remove_file(path)?;
-            }
-        }
-        Ok(())
+    /// Puts the complete folder into its place.
+    pub(crate) fn publish(self) -> Result<(), Problem> {
+        self.staging.publish()
     }
 
-    pub(crate) fn path(&self, name: &str) -> PathBuf {
-        self.path.join(name)
+    fn path(&self, name: &str) -> PathBuf {
+        self.staging.folder().join(name)
     }
 
     /// Adds a frame: displacement (m), velocity (m/s), pressure (Pa) of the nodes; von Mises stress (Pa), volume ratio J of the
@@ -75,12 +67,10 @@ impl Folder {
             point_scalars: &[("pressure", &pressure)],
             cell_scalars: &[("von_mises", &von_mises), ("volume_ratio", &volume_ratio)],
         };
-        let path = self.path(&name);
-        write_vtu(&path, &frame).map_err(|error| cannot_write(&path, &error))?;
+        write_vtu(&self.path(&name), &frame).map_err(Problem::of)?;
         self.frames.push((state.time(), name));
         // Always complete, so that a look while the simulation runs sees the frames there are.
-        let path = self.path("frames.pvd");
-        write_pvd(&path, &self.frames).map_err(|error| cannot_write(&path, &error))
+        write_pvd(&self.path("frames.pvd"), &self.frames).map_err(Problem::of)
     }
 
     /// Positions at rest and displacements of all nodes, m.
@@ -95,12 +85,16 @@ impl Folder {
     }
 
     pub(crate) fn write_text(&self, name: &str, text: &str) -> Result<(), Problem> {
-        let path = self.path(name);
-        write_atomically(&path, |out| out.write_all(text.as_bytes()))
-            .map_err(|error| cannot_write(&path, &error))
+        write_atomically(&self.path(name), |out| out.write_all(text.as_bytes())).map_err(Problem::of)
     }
 }
 
-fn cannot_write(path: &Path, error: &io::Error) -> Problem {
-    Problem::in_file(path, format!("cannot be written: {error}"))
+/// Whether a file of this name is a result of a simulation, or one that a killed process was writing.
+fn is_result(name: &OsStr) -> bool {
+    let Some(name) = name.to_str() else { return false };
+    // `.NAME.PROCESS-COUNT.tmp`
+    let temporary = name.strip_prefix('.').and_then(|rest| rest.strip_suffix(".tmp"));
+    let name = temporary.and_then(|rest| rest.rsplit_once('.')).map_or(name, |(name, _)| name);
+    let number = name.strip_prefix("frame_").and_then(|rest| rest.strip_suffix(".vtu"));
+    TABLES.contains(&name) || number.is_some_and(|number| number.parse::<u32>().is_ok())
 }

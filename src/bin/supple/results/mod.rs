@@ -5,6 +5,7 @@ pub(crate) mod figures;
 pub(crate) mod folder;
 pub(crate) mod picture;
 pub(crate) mod report;
+mod staging;
 pub(crate) mod warnings;
 
 use supple::element::ElementMaterial;
@@ -14,25 +15,40 @@ use supple::state::VecState;
 use crate::problem::Problem;
 use crate::run::outcome::Outcome;
 use crate::scene::setup::Setup;
+use crate::screen::{message, print};
 use figures::Figures;
 use folder::Folder;
+use report::Report;
 
-/// Leaves `final.csv` and `summary.json` in the folder, the table and the warnings on the screen.
+/// What there is to tell of a simulation once its results are in their place.
+pub(crate) struct Conclusion {
+    pub(crate) figures: Figures,
+    report: Report,
+    warnings: Vec<String>,
+}
+
+/// Adds `final.csv` and `summary.json` to the folder.
 pub(crate) fn conclude<M: ElementMaterial>(
     folder: &Folder,
     setup: &Setup,
     scene: SceneView<'_, M>,
     state: &VecState,
     outcome: &Outcome,
-) -> Result<Figures, Problem> {
+) -> Result<Conclusion, Problem> {
     let figures = Figures::new(setup, scene, state, outcome);
     let warnings = warnings::of(setup, outcome);
     let report = report::of(setup, outcome, &figures, &warnings);
     folder.write_final(&setup.body, state)?;
     folder.write_text("summary.json", &report.summary())?;
-    print!("{}", report.table());
-    for warning in warnings {
-        eprintln!("warning: {warning}");
+    Ok(Conclusion { figures, report, warnings })
+}
+
+impl Conclusion {
+    /// Prints the table and the warnings.
+    pub(crate) fn print(&self) {
+        print(self.report.table());
+        for warning in &self.warnings {
+            message!("warning: {warning}");
+        }
     }
-    Ok(figures)
 }

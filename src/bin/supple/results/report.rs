@@ -6,10 +6,10 @@ use supple::adaptive::Taken;
 use supple::inertia::Grid;
 
 use super::figures::Figures;
+use crate::added_mass::describe_added;
 use crate::run::outcome::{AdaptiveTrace, GuardTrace, LargeTrace, LearnedTrace, Outcome};
 use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
-use crate::screen::describe_added;
 
 #[derive(Default)]
 pub(crate) struct Report {
