@@ -30,6 +30,11 @@ pub(super) fn lengths(ratio: f32) -> u32 {
     (0..MOST).take_while(|&halvings| halvings == 0 || libm::exp2f(halvings as f32) <= ratio).count() as u32
 }
 
+/// Whether an error is above a limit; one that is no number is.
+pub(super) fn exceeds(error: f32, limit: f32) -> bool {
+    error.is_nan() || error > limit
+}
+
 /// The present length, and what is known of it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Control {
@@ -124,7 +129,7 @@ impl Control {
         self.comparisons += 1;
         // One that is no number stays.
         self.distance = if distance <= self.distance { self.distance } else { distance };
-        if !(ESTIMATE * self.distance <= self.tolerance) {
+        if exceeds(ESTIMATE * self.distance, self.tolerance) {
             self.rest();
         }
     }
@@ -155,9 +160,8 @@ impl Control {
     pub(super) fn decide(&mut self, [mean, largest]: [f32; 2]) -> bool {
         self.comparisons += 1;
         let share = mean / self.tolerance;
-        // An error that is no number is too large.
-        if !(share <= 1.0) {
-            let grows = !(mean <= GROWTH * self.error);
+        if exceeds(share, 1.0) {
+            let grows = exceeds(mean, GROWTH * self.error);
             if self.seconds < SETTLE && !grows {
                 return false;
             }
@@ -205,5 +209,100 @@ impl Control {
 
     const fn changed(&mut self) {
         (self.seconds, self.comparisons, self.distance) = (0.0, 0, 0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TOLERANCE: f32 = 1e-3;
+    const LENGTHS: u32 = 5;
+
+    /// Beyond the critical step, after so many halvings and a long time.
+    fn running(halvings: u32) -> Control {
+        Control {
+            halvings,
+            probe: Probe::None,
+            seconds: 10.0,
+            comparisons: 10,
+            ..Control::new(TOLERANCE, LENGTHS)
+        }
+    }
+
+    #[test]
+    fn lengths_are_halved_down_to_the_least() {
+        assert_eq!(
+            [0.1, 1.0, 1.9, 2.0, 17.0, f32::NAN, f32::INFINITY].map(lengths),
+            [1, 1, 1, 2, 5, 1, MOST]
+        );
+    }
+
+    #[test]
+    fn a_probe_that_shows_little_error_ends_exact_steps() {
+        for (distance, longer) in [(0.01, true), (0.1, false), (f32::NAN, false)] {
+            let mut control = Control::new(TOLERANCE, LENGTHS);
+            assert!(control.begins_probe() && control.probes() && !control.begins_probe());
+            let mut ended = false;
+            for _ in 0..2 * PROBE_COMPARISONS {
+                control.wait(PROBE / PROBE_COMPARISONS as f32);
+                control.probed(distance * TOLERANCE);
+                ended |= control.ends_probe();
+            }
+            assert_eq!((ended, control.halvings()), (longer, longer.then_some(LENGTHS - 1)), "{distance}");
+        }
+    }
+
+    #[test]
+    fn rests_between_probes_become_longer() {
+        let mut control = Control::new(TOLERANCE, LENGTHS);
+        let mut begun = 0;
+        for _ in 0..1000 {
+            begun += u32::from(control.begins_probe());
+            if control.probes() {
+                control.probed(TOLERANCE);
+            }
+            control.wait(0.01);
+        }
+        assert!((5..=12).contains(&begun), "{begun} probes in 10 s");
+    }
+
+    #[test]
+    fn a_small_error_doubles_the_length_and_a_large_one_divides_it() {
+        let mut control = running(3);
+        assert!(control.decide([0.2 * TOLERANCE; 2]) && control.halvings() == Some(2));
+        // Not at once again.
+        assert!(!control.decide([0.2 * TOLERANCE; 2]));
+        let mut control = running(1);
+        assert!(!control.decide([0.9 * TOLERANCE; 2]));
+        assert!(control.decide([4.0 * TOLERANCE; 2]) && control.halvings() == Some(3));
+        // As large as before: what was wrong stays for a while.
+        control.wait(0.5 * SETTLE);
+        assert!(!control.decide([4.0 * TOLERANCE; 2]));
+        // Larger: the steps are still too long.
+        assert!(control.decide([8.0 * TOLERANCE; 2]) && control.halvings().is_none());
+        assert_eq!(control.left_behind(), [8.0 * TOLERANCE; 2]);
+        control.wait(HALF_LIFE);
+        assert!((control.left_behind()[0] - 4.0 * TOLERANCE).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_error_that_falls_keeps_the_length() {
+        let mut control = running(0);
+        assert!(control.decide([2.0 * TOLERANCE; 2]));
+        let shortened = control.halvings();
+        for share in [1.7, 1.5, 1.3, 1.1] {
+            control.wait(SETTLE);
+            assert!(!control.decide([share * TOLERANCE; 2]) && control.halvings() == shortened);
+        }
+    }
+
+    #[test]
+    fn an_error_that_is_no_number_and_refusals_shorten_the_steps() {
+        let mut control = running(1);
+        assert!(control.decide([f32::NAN; 2]) && control.halvings().is_none());
+        let mut control = running(1);
+        control.refused([0.0; 2]);
+        assert_eq!(control.halvings(), Some(2));
     }
 }

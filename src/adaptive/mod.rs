@@ -24,7 +24,7 @@ use crate::simd::NodeVector;
 use crate::state::StateView;
 use crate::step::{CallingThread, Status, Step, Threads};
 use crate::tled::{self, Approach, Pace, vectors_for_pace};
-use control::Control;
+use control::{Control, exceeds};
 
 /// Least length of a step beyond the critical one, over the critical step.
 const LEAST_MULTIPLE: f32 = 6.0;
@@ -257,7 +257,7 @@ impl AdaptiveView<'_, '_> {
         loop {
             let left = end - state.time();
             // A remainder of rounding is no step, and a span that is no number none either.
-            if !(left > ROUNDING * f64::from(seconds)) {
+            if left.is_nan() || left <= ROUNDING * f64::from(seconds) {
                 return (worst, taken);
             }
             let state = state.reborrow();
@@ -417,8 +417,7 @@ impl AdaptiveView<'_, '_> {
 
 /// The status of a step that was taken, with an estimate of the mean error (m).
 fn judged(status: Status, error: f32, allowed: f32) -> Status {
-    // An estimate that is no number exceeds everything.
-    if status == Status::Ok && !(error <= allowed) { Status::Inexact { error, allowed } } else { status }
+    if status == Status::Ok && exceeds(error, allowed) { Status::Inexact { error, allowed } } else { status }
 }
 
 /// The worse of two statuses of steps that were taken.

@@ -239,12 +239,12 @@ impl Refresh {
             }
         } else {
             self.slow = false;
-            self.from_start(input, tables, matrices);
+            self.restart(input, tables, matrices);
         }
     }
 
     /// Does a whole cycle at once, from the start.
-    pub(super) fn from_start<M: ElementMaterial>(
+    pub(super) fn restart<M: ElementMaterial>(
         &mut self,
         mut input: RefreshInput<'_, M>,
         tables: &mut NodeTables<'_>,

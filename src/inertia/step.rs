@@ -191,7 +191,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let input =
             RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
         if follows {
-            refresh.from_start(input, tables, matrices);
+            refresh.restart(input, tables, matrices);
             return;
         }
         refresh.renew(input, tables, matrices);
