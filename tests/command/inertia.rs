@@ -74,6 +74,44 @@ fn long_steps_reach_where_short_ones_do_and_say_what_they_did() {
     }
 }
 
+/// `method = "auto"` and an end are enough; a tolerance is kept with fewer steps the larger it is.
+#[test]
+fn a_step_may_be_left_to_the_tolerance() {
+    let desk = Desk::new();
+    let said = desk.simulate(&leaning("end = 1.5\n"), &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    let (exact, exact_steps) = (desk.last(), desk.summary()["steps"].as_u64().unwrap());
+    let mut steps = vec![exact_steps];
+    for (asked, millimetres) in [("tolerance = 0.0001\n", 0.1), ("", 0.287), ("tolerance = 0.002\n", 2.0)] {
+        let said = desk
+            .simulate(&leaning(&format!("method = \"auto\"\nend = 1.5\nframes = 60\n{asked}")), &["--force"]);
+        assert_eq!(said.code, 0, "{}", said.err);
+        let summary = desk.summary();
+        let adaptive = &summary["adaptive"];
+        let figure = |name: &str| adaptive[name].as_f64().unwrap();
+        let distances = exact
+            .iter()
+            .zip(desk.last())
+            .map(|(exact, node)| (4..7).map(|axis| (exact[axis] - node[axis]).powi(2)).sum::<f64>().sqrt());
+        let error = 1e3 * distances.sum::<f64>() / exact.len() as f64;
+        println!("{asked}{error:.4} mm of {:.1} off, {adaptive}", far(&desk));
+        assert!(far(&desk) > 10.0 && error < figure("tolerance_mm"), "{error} {adaptive}");
+        assert!((figure("tolerance_mm") - millimetres).abs() < 1e-3, "{adaptive}");
+        assert_eq!(
+            (&summary["method"], summary["time_s"].as_f64().map(f64::round)),
+            (&"auto".into(), Some(2.0))
+        );
+        assert!(figure("steps_beyond_critical") > 0.0 && figure("changes") > 0.0, "{adaptive}");
+        assert!(
+            said.out.contains(" beyond the critical step, ") && said.out.contains("tolerance "),
+            "{}",
+            said.out
+        );
+        steps.push(summary["steps"].as_u64().unwrap());
+    }
+    assert!(steps.is_sorted_by(|a, b| a >= b) && steps[3] < exact_steps / 4, "{steps:?}");
+}
+
 #[test]
 fn a_lattice_and_a_step_may_be_given_by_hand() {
     let desk = Desk::new();
@@ -114,6 +152,18 @@ fn what_does_not_go_together_is_refused_in_words() {
         (
             "step = \"auto\"\nmethod = \"mass-scaled\"\nend = 1.0\n",
             "method \"mass-scaled\" is there to exceed",
+        ),
+        (
+            "end = 1.0\ntolerance = 0.0005\n",
+            "line 16: tolerance is given, but exact steps have no error to be tolerated; method = \"auto\"",
+        ),
+        (
+            "method = \"auto\"\nend = 1.0\ntolerance = -1.0\n",
+            "line 17: tolerance is -1 m, it must be a positive",
+        ),
+        (
+            "method = \"damped\"\nend = 1.0\n",
+            "line 14: step is missing: method \"damped\" needs seconds, or a multiple of the critical step",
         ),
         (
             "end = 1.0\nstep = \"x\"\n",

@@ -1,6 +1,7 @@
 //! Irregular meshes and random loads: nothing diverges.
 
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use supple::element::ElementMaterial;
 use supple::loads::{Loads, Motion, NodalForce};
 use supple::material::{NodalStrain, Tissue};
@@ -151,6 +152,8 @@ proptest! {
     #![proptest_config(ProptestConfig {
         cases: if cfg!(feature = "slow-tests") { 40 } else { 5 },
         failure_persistence: None,
+        // The same bodies in every run: others are drawn by hand.
+        rng_seed: RngSeed::Fixed(1),
         max_shrink_iters: 0,
         ..ProptestConfig::default()
     })]
