@@ -61,7 +61,7 @@ fn layout(vectors: usize) -> Layout {
     Layout::of::<supple_adaptive>().and::<NodeVector>(vectors)
 }
 
-/// Vectors of the storage, of a request of large steps with so many.
+/// Vectors of the storage.
 fn vectors_of(any: &AnyScene<'_>, request: &LargeRequest<'_>) -> Answer<usize> {
     let of_guard = with_scene!(any, scene => guard::vectors_for(scene, request.points)?);
     Ok(vectors_for_pace(any.node_count()) + request.vectors + of_guard)
