@@ -55,7 +55,7 @@
 #define SUPPLE_TILES_(elements) (((size_t)(elements) + 15) / 16 + SUPPLE_GROUPS_(elements) - 1)
 #define SUPPLE_PATCHES_(nodes, elements, tissues) SUPPLE_LEAST_((size_t)(nodes) * (tissues), 4 * (size_t)(elements))
 #define SUPPLE_FUNCTIONS_(x, y, z) SUPPLE_LEAST_(((size_t)(x) + 1) * ((y) + 1) * ((z) + 1), SUPPLE_LATTICE_FUNCTIONS)
-#define SUPPLE_LATTICE_(nodes, elements, damped, x, y, z) SUPPLE_ARRAY_(1, ((damped) ? 120 : 104) * (size_t)(nodes) +           \
+#define SUPPLE_LATTICE_(nodes, elements, damped, x, y, z) SUPPLE_ARRAY_(1, ((damped) ? 136 : 104) * (size_t)(nodes) +           \
     4 * (size_t)(elements) + 212 + 1152 * ((size_t)(x) * (y) * (z)) + 184 * SUPPLE_FUNCTIONS_(x, y, z) *                       \
     (SUPPLE_FUNCTIONS_(x, y, z) + 8))
 
