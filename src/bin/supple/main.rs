@@ -5,6 +5,8 @@
 mod demo;
 mod element_name;
 mod evaluate;
+#[cfg(test)]
+mod hostile;
 mod inspect;
 mod networks;
 mod problem;
