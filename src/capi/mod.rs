@@ -37,3 +37,6 @@ mod learned;
 mod large;
 
 mod guard;
+
+#[cfg(test)]
+mod memory_tests;
