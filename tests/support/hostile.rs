@@ -281,11 +281,8 @@ impl Changes<'_> {
                 bytes.splice(to..to, line);
             }
             14 => {
-                let word: &[u8] = if self.words.is_empty() || dice.one_in(3) {
-                    dice.pick(&PIECES)
-                } else {
-                    dice.pick(self.words)
-                };
+                let from = if self.words.is_empty() || dice.one_in(3) { &PIECES[..] } else { self.words };
+                let word = *dice.pick(from);
                 // Nesting that is deeper than a stack.
                 let times = if dice.one_in(20) { 20_000 } else { 1 };
                 bytes.splice(at..at, word.repeat(times));
