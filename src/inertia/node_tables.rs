@@ -41,7 +41,7 @@ impl<'a> NodeTables<'a> {
         let (sum_diagonal, rest) = rest.split_at_mut_checked(nodes)?;
         let (sum_off_diagonal, rest) = rest.split_at_mut_checked(nodes)?;
         let (next_increment, rest) = rest.split_at_mut_checked(nodes)?;
-        let (rough, rough_before) = rest.split_at_mut(nodes.min(rest.len()));
+        let (rough, rough_before) = rest.split_at_mut_checked(nodes).unwrap_or_default();
         Some(Self {
             inverse_diagonal,
             inverse_off_diagonal,

@@ -17,9 +17,9 @@ use crate::data;
 use crate::hostile::{Changes, Run, measured};
 use crate::support::{NEO, tissue};
 
-/// Bytes of memory for a byte of a file: a number of two characters becomes eight bytes in a vector that grows, and a list of them
-/// another list.
-const BYTES: u64 = 64;
+/// Bytes of memory for a byte of a file: an XML element of three characters becomes a node of 72 bytes in a vector that grows; of a
+/// list of numbers two characters become eight bytes, and again eight.
+const BYTES: u64 = 128;
 /// Bytes of memory for any file: names, messages, buffers.
 const ANY: u64 = 20_000;
 /// zlib makes at most so many bytes of one (Gailly & Adler, zlib technical details).
