@@ -55,7 +55,7 @@
 #define SUPPLE_TILES_(elements) (((size_t)(elements) + 15) / 16 + SUPPLE_GROUPS_(elements) - 1)
 #define SUPPLE_PATCHES_(nodes, elements, tissues) SUPPLE_LEAST_((size_t)(nodes) * (tissues), 4 * (size_t)(elements))
 #define SUPPLE_FUNCTIONS_(x, y, z) SUPPLE_LEAST_(((size_t)(x) + 1) * ((y) + 1) * ((z) + 1), SUPPLE_LATTICE_FUNCTIONS)
-#define SUPPLE_LATTICE_(nodes, elements, damped, x, y, z) SUPPLE_ARRAY_(1, ((damped) ? 120 : 104) * (size_t)(nodes) +           \
+#define SUPPLE_LATTICE_(nodes, elements, damped, x, y, z) SUPPLE_ARRAY_(1, ((damped) ? 136 : 104) * (size_t)(nodes) +           \
     4 * (size_t)(elements) + 212 + 1152 * ((size_t)(x) * (y) * (z)) + 184 * SUPPLE_FUNCTIONS_(x, y, z) *                       \
     (SUPPLE_FUNCTIONS_(x, y, z) + 8))
 
@@ -361,7 +361,7 @@ enum supple_status
      */
     SUPPLE_E_NOT_LED = -50,
     /**
-     * The network's step (value, s) is no whole number of the exact one (limit, s).
+     * The network's step (value, s) is no whole number of the exact one (limit, s), or of more than 65536.
      */
     SUPPLE_E_STEP_RATIO = -51,
     /**
@@ -1206,7 +1206,8 @@ supple_status supple_save(const supple_state *state, void *to, size_t bytes);
 
 /**
  * Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the saved one
- * would have, to the bit. Forces are zero until the next step. A supple_large has to be prepared again, and a
+ * would have, to the bit. Forces are zero until the next step. A saved state with a time, a displacement or an increment that is not
+ * finite is refused: SUPPLE_E_NOT_FINITE. A supple_large has to be prepared again, and a
  * supple_learned needs a new lead-in; for the same bits with these, copy their objects with memcpy as well.
  */
 supple_status supple_restore(supple_state *state,

@@ -6,6 +6,7 @@
 //! | fourth component of an increment or force | axes whose motion has been prescribed, as bits | [`crate::loads`] | the same, which clears it |
 //! | fourth component of increment and displacement | entries `yz`, `zx` of a node's stiffness bound | [`crate::tled::critical_step`] | the same, which clears them |
 //! | fourth component of a force | scalar stiffness bound of the node, N/m | element loops with a bound | [`crate::inertia`], which clears it |
+//! | fourth component of a sum of bounds `xy, yz, zx` | share of its inverse inertia that a node could use before the step | [`crate::inertia`], while a step is computed | the same, if the step is refused |
 //! | last eight bits of a height | number of the frame that a node turns with | [`crate::inertia`], when it is prepared | its passes |
 //! | fourth component of a lattice position | number of the node | the same | the same |
 

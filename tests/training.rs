@@ -1,6 +1,14 @@
 //! Training: the same recipe gives the same weights, a training that was stopped goes on as if it had not been, the
 //! data set is the exact motion, and a recipe that cannot be used says why.
 
+#[path = "support/hostile.rs"]
+mod hostile;
+#[path = "hostile/recipes.rs"]
+mod recipes;
+
+#[global_allocator]
+static ALLOCATOR: hostile::Counting = hostile::Counting;
+
 use core::ops::ControlFlow;
 
 use supple::mlp::Network;

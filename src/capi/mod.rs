@@ -39,3 +39,6 @@ mod large;
 mod guard;
 
 mod adaptive;
+
+#[cfg(test)]
+mod memory_tests;

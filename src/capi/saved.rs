@@ -10,7 +10,7 @@ use crate::step::{EnergyBalance, Step};
 
 use super::memory::{self, array, place_for};
 use super::state::{supple_state, vectors};
-use super::status::{mismatch, short, status_of, supple_error, supple_status};
+use super::status::{Answer, mismatch, short, status_of, supple_error, supple_status};
 use super::vectors::overlap;
 use supple_status::*;
 
@@ -100,7 +100,8 @@ pub unsafe extern "C" fn supple_save(
 }
 
 /// Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the saved one
-/// would have, to the bit. Forces are zero until the next step. A supple_large has to be prepared again, and a
+/// would have, to the bit. Forces are zero until the next step. A saved state with a time, a displacement or an increment that is not
+/// finite is refused: SUPPLE_E_NOT_FINITE. A supple_large has to be prepared again, and a
 /// supple_learned needs a new lead-in; for the same bits with these, copy their objects with memcpy as well.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_restore(
@@ -130,6 +131,7 @@ pub unsafe extern "C" fn supple_restore(
         if checksum(&front, rest) != front.checksum {
             return Err(SUPPLE_E_SAVED_CHECKSUM.into());
         }
+        check_finite(&front, rest)?;
         let (object, mut arrays) = memory::open(state)?;
         let Front { time, steps, last_step, step_seconds, step_damping, energy_balance, .. } = front;
         let [start, work, dissipated, kinetic, uncertainty, peak] = energy_balance;
@@ -150,6 +152,17 @@ pub unsafe extern "C" fn supple_restore(
         Ok(SUPPLE_OK)
     };
     status_of(restore())
+}
+
+/// That a step can have left these numbers. Others have been made, with the right checksum.
+fn check_finite(front: &Front, rest: &[u8]) -> Answer<()> {
+    let (components, _) = rest.as_chunks::<4>();
+    // The fourth of each vector is padding.
+    let three =
+        |vector: &[[u8; 4]]| vector.iter().take(3).all(|&bytes| f32::from_le_bytes(bytes).is_finite());
+    let vectors = components.chunks(4).all(three);
+    let length = front.last_step.is_finite() && front.last_step >= 0.0;
+    if vectors && length && front.time.is_finite() { Ok(()) } else { Err(SUPPLE_E_NOT_FINITE.into()) }
 }
 
 /// Copies bytes. Slices know a function for it, with a way to panic in it.

@@ -111,7 +111,7 @@ pub enum supple_status {
 
     /// No lead-in and no learned step has brought the state to this moment: supple_learned_lead comes first.
     SUPPLE_E_NOT_LED = -50,
-    /// The network's step (value, s) is no whole number of the exact one (limit, s).
+    /// The network's step (value, s) is no whole number of the exact one (limit, s), or of more than 65536.
     SUPPLE_E_STEP_RATIO = -51,
     /// The damping (value, 1/s) is not that of the training (limit, 1/s).
     SUPPLE_E_DAMPING = -52,
@@ -412,7 +412,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -45 => c"a number in the weights is not one it can be",
         -46 => c"a network with other inputs or outputs than are needed here",
         -50 => c"the learned step needs a lead-in up to this moment",
-        -51 => c"the network's step is no whole number of the exact one",
+        -51 => c"the network's step is no whole number of the exact one, or of too many",
         -52 => c"the damping is not that of the training",
         -60 => c"a lattice that cannot be",
         -61 => c"too stiff, or not finite",

@@ -106,8 +106,11 @@ struct MotionAt<R> {
 pub(super) struct MotionTables<'a> {
     pub(super) inverse_diagonal: &'a [NodeVector],
     pub(super) inverse_off_diagonal: &'a mut [NodeVector],
+    /// Their fourth components receive the shares before the step.
+    pub(super) sum_off_diagonal: &'a mut [NodeVector],
     pub(super) next_increment: &'a mut [NodeVector],
     pub(super) rough: &'a mut [NodeVector],
+    pub(super) rough_before: &'a mut [NodeVector],
 }
 
 /// Inputs and tables of the pass.
@@ -299,8 +302,11 @@ impl MotionPass<'_> {
         let damped = self.lattice.as_ref().and_then(|lattice| lattice.damped.as_ref());
         if let (Some(damping), Some(motion)) = (damped, &motion) {
             let has_table = !self.tables.rough.is_empty();
-            let mut rough =
-                if has_table { at.read::<R>(must_cast_slice(self.tables.rough)) } else { [R::splat(0.0); 4] };
+            let mut rough = [R::splat(0.0); 4];
+            if has_table {
+                rough = at.read::<R>(must_cast_slice(self.tables.rough));
+                at.write(must_cast_slice_mut(self.tables.rough_before), rough);
+            }
             let [square, change, both, whole] = &mut sums.rough;
             for axis in 0..3 {
                 let here = free[axis] * (increment[axis] - motion.smooth[axis]);
@@ -331,7 +337,8 @@ impl MotionPass<'_> {
         nodes: &NodeValues<R>,
         fine: Option<[R; 3]>,
     ) -> OwnMotion<R> {
-        let MotionTables { inverse_diagonal, inverse_off_diagonal, next_increment, .. } = &mut self.tables;
+        let MotionTables { inverse_diagonal, inverse_off_diagonal, sum_off_diagonal, next_increment, .. } =
+            &mut self.tables;
         let [rx, ry, rz] = self.input.residual(nodes);
         let [_, _, _, height] = at.read::<R>(must_cast_slice(next_increment));
         // The frame is in the last bits of the height, see `NodeTables`.
@@ -369,6 +376,8 @@ impl MotionPass<'_> {
             .min(R::splat(RECOVERY) * share_before);
         let kept = share.max(R::splat(LEAST_SHARE));
         at.write(must_cast_slice_mut(inverse_off_diagonal), [xy, yz, zx, kept]);
+        let [a, b, c, _] = at.read::<R>(must_cast_slice(sum_off_diagonal));
+        at.write(must_cast_slice_mut(sum_off_diagonal), [a, b, c, share_before]);
         for own in &mut own {
             *own = share * *own;
         }

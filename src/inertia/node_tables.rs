@@ -1,6 +1,9 @@
-//! Tables over the nodes in the caller's storage: five vectors of four floats for each node, six for a damped step. Those that a
+//! Tables over the nodes in the caller's storage: five vectors of four floats for each node, seven for a damped step. Those that a
 //! step reads are in the order of the cells, in which it takes the nodes ([`super::lattice::rank_of`]); the sums over elements
 //! are in the order of the nodes.
+//!
+//! A step changes shares and rough motion before it is known whether it will be taken, and keeps what they were for the case that
+//! it is not ([`NodeTables::take_back`]).
 
 use bytemuck::{must_cast_slice, must_cast_slice_mut};
 
@@ -11,7 +14,7 @@ use crate::simd::{NodeVector, Real, Rows};
 
 /// Vectors of the tables of `nodes` nodes.
 pub(super) const fn vectors_for(nodes: usize, damped: bool) -> usize {
-    nodes.saturating_mul(if damped { 6 } else { 5 })
+    nodes.saturating_mul(if damped { 7 } else { 5 })
 }
 
 pub(super) struct NodeTables<'a> {
@@ -19,14 +22,16 @@ pub(super) struct NodeTables<'a> {
     pub(super) inverse_diagonal: &'a mut [NodeVector],
     /// `xy, yz, zx` of the inverse inertia, and the share of it that the node may use (below one if it is held back).
     pub(super) inverse_off_diagonal: &'a mut [NodeVector],
-    /// Sums of the elements' bounds (N/m), later the next inverse inertia; the same layout, in the order of the nodes.
+    /// Sums of the elements' bounds (N/m), later the next inverse inertia; the same layout, in the order of the nodes. There is no
+    /// sum of shares: while a step is computed its place has the shares before it, in the order of the cells.
     pub(super) sum_diagonal: &'a mut [NodeVector],
     pub(super) sum_off_diagonal: &'a mut [NodeVector],
     /// The next increment of each node, m. The fourth component is the least height of its elements, m, with the frame
     /// of the node in its last eight bits ([`crate::padding`]).
     pub(super) next_increment: &'a mut [NodeVector],
-    /// Rough part of each node's last increment, m, for a damped step; else empty.
+    /// Rough part of each node's last increment, m, for a damped step; else empty. Then the same before the step.
     pub(super) rough: &'a mut [NodeVector],
+    pub(super) rough_before: &'a mut [NodeVector],
 }
 
 impl<'a> NodeTables<'a> {
@@ -36,13 +41,15 @@ impl<'a> NodeTables<'a> {
         let (sum_diagonal, rest) = rest.split_at_mut_checked(nodes)?;
         let (sum_off_diagonal, rest) = rest.split_at_mut_checked(nodes)?;
         let (next_increment, rest) = rest.split_at_mut_checked(nodes)?;
+        let (rough, rough_before) = rest.split_at_mut_checked(nodes).unwrap_or_default();
         Some(Self {
             inverse_diagonal,
             inverse_off_diagonal,
             sum_diagonal,
             sum_off_diagonal,
             next_increment,
-            rough: rest.get_mut(..nodes).unwrap_or_default(),
+            rough,
+            rough_before: rough_before.get_mut(..nodes).unwrap_or_default(),
         })
     }
 
@@ -62,6 +69,18 @@ impl<'a> NodeTables<'a> {
     #[inline(always)]
     pub(super) fn frame(&self, rank: usize) -> usize {
         self.next_increment.get(rank).map_or(0, |vector| padding::frame_of(vector.0[3]))
+    }
+
+    /// Shares, and rough motion if the step has changed it, as they were before a step that is not taken.
+    pub(super) fn take_back(&mut self, rough: bool) {
+        for (inverse, before) in self.inverse_off_diagonal.iter_mut().zip(&*self.sum_off_diagonal) {
+            inverse.0[3] = before.0[3];
+        }
+        if rough {
+            for (vector, before) in self.rough.iter_mut().zip(&*self.rough_before) {
+                *vector = *before;
+            }
+        }
     }
 
     /// Puts the next inverses into use. The shares are kept; in the first cycle they are set to one.

@@ -51,8 +51,10 @@ struct RestrictionPart<'a> {
 struct MotionPart<'a> {
     partitions: Range<usize>,
     inverse_off_diagonal: &'a mut [NodeVector],
+    sum_off_diagonal: &'a mut [NodeVector],
     next_increment: &'a mut [NodeVector],
     rough: &'a mut [NodeVector],
+    rough_before: &'a mut [NodeVector],
     results: &'a mut [PassTotals],
 }
 
@@ -120,32 +122,46 @@ impl<T: Threads> NodeParts<'_, T> {
         tables: &mut NodeTables<'_>,
     ) -> PassTotals {
         let mut results = [PassTotals::NONE; MAX_PARTITIONS];
-        let NodeTables { inverse_diagonal, inverse_off_diagonal, next_increment, rough, .. } = tables;
-        let (mut off_diagonal, mut next) = (&mut **inverse_off_diagonal, &mut **next_increment);
-        let (mut rough, mut rest) = (&mut **rough, &mut results[..]);
+        let NodeTables {
+            inverse_diagonal,
+            inverse_off_diagonal,
+            sum_off_diagonal,
+            next_increment,
+            rough,
+            rough_before,
+            ..
+        } = tables;
+        let (mut off_diagonal, mut sums) = (&mut **inverse_off_diagonal, &mut **sum_off_diagonal);
+        let (mut next, mut rest) = (&mut **next_increment, &mut results[..]);
+        let (mut rough, mut before) = (&mut **rough, &mut **rough_before);
         let (all, count) = (self.partitions, self.count());
         let mut parts: [_; MOST_PARTS] = from_fn(|part| {
             let partitions = all.part(part, count);
             let nodes = all.nodes(&partitions).len();
             MotionPart {
                 inverse_off_diagonal: take(&mut off_diagonal, nodes),
+                sum_off_diagonal: take(&mut sums, nodes),
                 next_increment: take(&mut next, nodes),
                 rough: take(&mut rough, nodes),
+                rough_before: take(&mut before, nodes),
                 results: take(&mut rest, partitions.len()),
                 partitions,
             }
         });
         self.threads.each(parts.get_mut(..count).unwrap_or_default(), |part| {
             let (mut off_diagonal, mut next) = (&mut *part.inverse_off_diagonal, &mut *part.next_increment);
-            let mut rough = &mut *part.rough;
+            let mut sums = &mut *part.sum_off_diagonal;
+            let (mut rough, mut before) = (&mut *part.rough, &mut *part.rough_before);
             for (partition, result) in part.partitions.clone().zip(&mut *part.results) {
                 let ranks = all.nodes(&(partition..partition + 1));
                 let nodes = ranks.len();
                 let tables = MotionTables {
                     inverse_diagonal: inverse_diagonal.get(ranks.clone()).unwrap_or_default(),
                     inverse_off_diagonal: take(&mut off_diagonal, nodes),
+                    sum_off_diagonal: take(&mut sums, nodes),
                     next_increment: take(&mut next, nodes),
                     rough: take(&mut rough, nodes),
+                    rough_before: take(&mut before, nodes),
                 };
                 *result = MotionPass { input, rotations, lattice, ranks, force, tables }.dispatched();
             }

@@ -84,6 +84,8 @@ pub(super) struct InertiaStep<'a, 'w, T> {
     pub(super) storage: Storage<'a>,
     held_back: HeldBack,
     rough: RoughMotion,
+    /// Whether the table of rough motion is that of this step.
+    rough_written: bool,
     coarse_share: f32,
     damping: f32,
     /// Change of the lattice's shape by the last increment.
@@ -104,6 +106,7 @@ impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
             storage,
             held_back: HeldBack::NONE,
             rough: RoughMotion::NONE,
+            rough_written: false,
             coarse_share: 1.0,
             damping: 0.0,
             change: 0.0,
@@ -126,6 +129,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
         let Storage { tables, places, .. } = &self.storage;
         let [x, y, z, _] = tables.next_increment.get(rank_of(places, node)).copied().unwrap_or_default().0;
         [x, y, z, 0.0]
+    }
+
+    fn refuse(&mut self) {
+        self.storage.tables.take_back(self.rough_written);
     }
 
     fn advance(&mut self, trial: &mut Trial<'_, M>) {
@@ -276,6 +283,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
                 .then_some(RoughDamping { smooth: matrices.smooth_cells, share: moved.removed }),
             in_use: moved.has_smooth,
         });
+        self.rough_written = lattice.as_ref().is_some_and(|lattice| lattice.damped.is_some());
         let rotations = &rotation_table(&refresh.frames.of_bounds, refresh.frames.functions());
         let parts = node_parts(scene, self.threads);
         let passed = parts.move_nodes(input, rotations, lattice.as_ref(), force, tables);

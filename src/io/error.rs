@@ -59,12 +59,22 @@ pub(super) struct Fault {
 
 impl Fault {
     pub(super) fn new(place: impl Into<String>, reason: impl fmt::Display) -> Self {
-        Self { place: place.into(), reason: format!("{reason}") }
+        Self { place: on_a_line(&place.into()), reason: on_a_line(&format!("{reason}")) }
     }
 
     pub(super) fn in_file(self, path: &Path) -> ReadError {
         ReadError::Malformed { path: path.into(), place: self.place, reason: self.reason }
     }
+}
+
+/// The beginning of a text without characters that a terminal obeys: names of a file may be in it, of any length and content.
+fn on_a_line(text: &str) -> String {
+    const LONGEST: usize = 400;
+    let mut line: String = text.chars().take(LONGEST).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if text.chars().nth(LONGEST).is_some() {
+        line.push_str("...");
+    }
+    line
 }
 
 /// Up to 40 characters of a file's bytes between quotes, so that a message shows any value on one line.

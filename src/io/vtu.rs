@@ -2,6 +2,7 @@
 //! (<https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>): arrays as text, as base64 in their
 //! element, or appended as base64 or raw bytes, each plain or compressed with zlib. Coordinates are in file units.
 
+use core::cell::Cell;
 use core::fmt::Display;
 use std::borrow::Cow;
 use std::format;
@@ -21,11 +22,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, Fault> {
     let (head, appended) = split_appended(bytes);
     let text = core::str::from_utf8(&head)
         .map_err(|error| Fault::new(format!("byte {}", error.valid_up_to()), "the text is not UTF-8"))?;
-    let document = Document::parse(text).map_err(|error| {
-        // The message may quote a line break.
-        let reason = format!("{error}").replace(char::is_control, " ");
-        Fault::new(format!("line {}", error.pos().row), reason)
-    })?;
+    let document =
+        Document::parse(text).map_err(|error| Fault::new(format!("line {}", error.pos().row), error))?;
     let file = Vtu::open(&document, appended)?;
     let mut mesh = TetMesh::default();
     for piece in file.child(document.root_element(), "UnstructuredGrid")?.children() {
@@ -59,6 +57,9 @@ struct Vtu<'d> {
     layout: Layout<'d>,
     appended: &'d [u8],
     appended_raw: bool,
+    /// Bytes that arrays may still have from the appended ones. Without a limit many small elements that name the same array would
+    /// take memory without end.
+    appended_left: Cell<u64>,
 }
 
 impl<'d> Vtu<'d> {
@@ -98,7 +99,9 @@ impl<'d> Vtu<'d> {
             Some("raw") => true,
             Some(other) => return Err(fault(format!("the encoding {other:?} is neither base64 nor raw"))),
         };
-        Ok(Self { document, layout: Layout { order, wide, compressor }, appended, appended_raw })
+        let layout = Layout { order, wide, compressor };
+        let appended_left = Cell::new(layout.most(appended.len() as u64));
+        Ok(Self { document, layout, appended, appended_raw, appended_left })
     }
 
     fn fault(&self, node: Node<'_, '_>, reason: impl Display) -> Fault {
@@ -180,6 +183,7 @@ impl<'d> Vtu<'d> {
         };
         let text = node.children().find(Node::is_text);
         let bytes = text.and_then(|text| text.text()).unwrap_or_default().as_bytes();
+        let size = n.and_then(|n| n.checked_mul(scalar.size()));
         let source = match node.attribute("format").unwrap_or("ascii") {
             "ascii" => {
                 let mut cursor = Cursor::new(bytes, 1);
@@ -202,16 +206,24 @@ impl<'d> Vtu<'d> {
                         format_args!("the offset {offset} is beyond the {length} appended bytes"),
                     )
                 })?;
+                self.share(size).map_err(|reason| self.fault(node, reason))?;
                 if self.appended_raw { Source::Raw(data) } else { Source::Base64(Base64::new(data)) }
             }
             other => {
                 return Err(self.fault(node, format_args!("the format {other:?} of the array is unknown")));
             }
         };
-        let size = n.and_then(|n| n.checked_mul(scalar.size()));
         let size = size.ok_or_else(|| self.fault(node, "more values are announced than a file can have"))?;
         let bytes = self.layout.read(source, size).map_err(|reason| self.fault(node, reason))?;
         read_values(&mut Cursor::new(&bytes, 1), n, scalar, self.layout.order, "the array")
+    }
+
+    /// Takes the bytes of an array from those that all appended arrays may have together.
+    fn share(&self, size: Option<usize>) -> Result<(), &'static str> {
+        let left = size.and_then(|size| self.appended_left.get().checked_sub(size as u64));
+        self.appended_left
+            .set(left.ok_or("the arrays so far have more bytes together than the appended data can hold")?);
+        Ok(())
     }
 }
 

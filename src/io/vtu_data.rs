@@ -77,7 +77,15 @@ pub(super) struct Layout<'a> {
     pub(super) compressor: Option<&'a str>,
 }
 
+/// zlib makes at most so many bytes of one (Gailly & Adler, zlib technical details).
+const ZLIB: u64 = 1032;
+
 impl Layout<'_> {
+    /// The most bytes that arrays can have that are stored in so many.
+    pub(super) fn most(self, bytes: u64) -> u64 {
+        if self.compressor.is_some() { bytes.saturating_mul(ZLIB) } else { bytes }
+    }
+
     /// The values of an array that must have `expected` bytes.
     pub(super) fn read(self, mut source: Source<'_>, expected: usize) -> Result<Vec<u8>, String> {
         match self.compressor {
@@ -108,7 +116,7 @@ impl Layout<'_> {
             let bytes = source.take(usize::try_from(size).unwrap_or(usize::MAX))?;
             let start = values.len();
             // One byte more than allowed tells that there are too many.
-            let limit = (expected - start) as u64 + 1;
+            let limit = ((expected - start) as u64).saturating_add(1);
             ZlibDecoder::new(bytes.as_slice())
                 .take(limit)
                 .read_to_end(&mut values)

@@ -55,6 +55,9 @@ impl Vertex {
     const NEW: Self = Self { frame: Frame::WORLD, next: NodeVector::ZERO };
 }
 
+/// Most exact steps in one of the network's: with more a call would not end in any time that matters.
+const MOST_EXACT_STEPS: u32 = 65_536;
+
 /// Vectors in the storage of a [`Vertex`].
 const VERTEX_VECTORS: usize = size_of::<Vertex>() / size_of::<NodeVector>();
 
@@ -82,7 +85,7 @@ pub enum LearnedError {
         /// That of the training, 1/s.
         trained: f32,
     },
-    /// The network's step is no whole number of exact steps.
+    /// The network's step is no whole number of exact steps, or of more than 65,536.
     StepRatio {
         /// The exact step, s.
         exact: f32,
@@ -107,7 +110,10 @@ impl fmt::Display for LearnedError {
                 write!(f, "damping is {exact} 1/s, the network learned a motion damped by {trained} 1/s")
             }
             Self::StepRatio { exact, learned } => {
-                write!(f, "the network's step of {learned} s is no whole number of exact steps of {exact} s")
+                write!(
+                    f,
+                    "the network's step of {learned} s is no whole number of exact steps of {exact} s, at most {MOST_EXACT_STEPS}"
+                )
             }
             Self::NotLed { steps } => write!(
                 f,
@@ -213,7 +219,9 @@ impl<'w> LearnedModel<'w> {
             return Err(LearnedError::Damping { exact: exact.damping(), trained: recipe.damping });
         }
         let count = (recipe.step / exact.seconds() + 0.5) as u32;
-        if count < 1 || (count as f32 * exact.seconds() - recipe.step).abs() > 1e-4 * recipe.step {
+        if !(1..=MOST_EXACT_STEPS).contains(&count)
+            || (count as f32 * exact.seconds() - recipe.step).abs() > 1e-4 * recipe.step
+        {
             return Err(LearnedError::StepRatio { exact: exact.seconds(), learned: recipe.step });
         }
         Ok(count)

@@ -204,7 +204,8 @@ fn has(state: u64, [ebx, ecx]: [u32; 2]) -> bool {
             _xgetbv(0)
         }
     }
-    if __cpuid(0).eax < 7 || __cpuid(1).ecx & FMA_OSXSAVE_AVX != FMA_OSXSAVE_AVX {
+    // Miri has no cpuid.
+    if cfg!(miri) || __cpuid(0).eax < 7 || __cpuid(1).ecx & FMA_OSXSAVE_AVX != FMA_OSXSAVE_AVX {
         return false;
     }
     // SAFETY: OSXSAVE is set, so xgetbv is there.

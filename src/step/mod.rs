@@ -1,6 +1,7 @@
 //! The protocol that every step follows, exact or not (`StepMethod`): begin (borrow the state, check that everything fits),
 //! compute forces and next increments, enter them in the energy balance, and only then accept the step and move the state, or
-//! refuse it with the node at which it went wrong. A step that is refused leaves the state as it was.
+//! refuse it with the node at which it went wrong. A step that is refused leaves the state as it was, and what a method
+//! keeps of it: the next step is the same, to the bit, as if there had been none.
 
 mod energy_sums;
 mod length;
@@ -60,6 +61,9 @@ pub(crate) trait StepMethod<M> {
         force: &NodeVector,
     ) -> [f32; 4];
 
+    /// Takes back what the method has noted for itself: the step is refused.
+    fn refuse(&mut self) {}
+
     /// Moves the nodes: the step is accepted.
     fn advance(&mut self, trial: &mut Trial<'_, M>);
 
@@ -112,6 +116,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             Ok(balance) => balance,
             Err(cause) => {
                 let node = self.culprit(step, method);
+                method.refuse();
                 return Status::Diverged(Divergence { time: self.progress.time, node, cause });
             }
         };

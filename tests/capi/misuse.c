@@ -407,10 +407,22 @@ static void divergence(void) {
     note(kick);
     CHECK(kick == SUPPLE_E_DIVERGED_ENERGY && report.node == NODES / 2 && report.steps == 0);
 
-    /* One that is no number: nothing can be bounded. */
+    /* One that is no number. */
     const float nan = NAN;
-    float seconds;
+    const double no_time = INFINITY;
     forge(FRONT + 16 * (NODES / 2), &nan, sizeof nan);
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_restore(state, saved, sizeof saved));
+    forge(28, &nan, sizeof nan);
+    DONE(supple_restore(state, saved, sizeof saved)); /* no step is set */
+    forge(20, &nan, sizeof nan);
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_restore(state, saved, sizeof saved));
+    forge(32, &no_time, sizeof no_time);
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_restore(state, saved, sizeof saved));
+
+    /* One that is so large that nothing can be bounded. */
+    const float far = 3e38f;
+    float seconds;
+    forge(FRONT + 16 * (NODES / 2), &far, sizeof far);
     DONE(supple_restore(state, saved, sizeof saved));
     CHECK(supple_critical_step(scene, state, &seconds, NULL) == SUPPLE_E_TOO_STIFF);
     CHECK(supple_set_step(scene, state, &length, &error) == SUPPLE_E_TOO_STIFF);

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Tests of the C API against an installed library (`tools/install.sh`): the programs of this folder, the examples, what
-# valgrind says of them, and the results of C and Python compared with those of the command. Run by `.ci/run`.
+# Tests of the C API against an installed library (`tools/install.sh`): the programs of this folder, random calls, the examples, what
+# valgrind and the sanitizers of gcc say of them, and the results of C and Python compared with those of the command. Run by `.ci/run`.
 #
 #     tests/capi/run.sh PREFIX COMMAND
 #
@@ -42,6 +42,21 @@ done
 echo "valgrind: no error in misuse, copies, heap, strain"
 valgrind --quiet --error-exitcode=9 --tool=helgrind "$folder/threads-small" >"$folder/said"
 echo "helgrind: no race in threads"
+
+# The hosts with every access of their own checked, and what the library does in their memory as far as the C library sees it. Rust
+# has no sanitizers in a stable compiler, so within the library it is valgrind, and memory that must not be touched around every object
+# of the random calls.
+sanitized=(-fsanitize=address,undefined -fno-sanitize-recover=all)
+for test in misuse copies strain hostile; do
+    element=()
+    [ $test != strain ] || element=(-DELEMENT=SUPPLE_NODAL_STRAIN)
+    gcc -std=c11 "${warnings[@]}" -O1 "${sanitized[@]}" -DSMALL "${element[@]}" tests/capi/$test.c "$static" -lm -o "$folder/$test-sanitized"
+done
+for test in misuse copies strain; do
+    "$folder/$test-sanitized" >"$folder/said"
+done
+echo "sanitizers: no error in misuse, copies, strain"
+"$folder/hostile-sanitized" 10000
 
 g++ -std=c++17 "${warnings[@]}" tests/hosts/wrapper.cpp "$static" -o "$folder/wrapper"
 "$folder/wrapper" weights/compact-10.weights

@@ -119,6 +119,33 @@ fn not_a_number_is_left_to_the_check_of_the_mesh() {
     assert_eq!(mesh.points[1][1..], [f64::NEG_INFINITY, f64::INFINITY]);
 }
 
+#[test]
+fn names_in_messages_are_cut_and_cannot_control_a_terminal() {
+    let name = format!("\u{1b}[2J{}", "long".repeat(10_000));
+    let arrays = format!("CELL_DATA 1\nSCALARS {name} int\nLOOKUP_TABLE default\nx\n");
+    let cells = VTU.replace("<Cells>", "<Cel--->").replace("--->", &format!("{}>", "-".repeat(10_000)));
+    for (file, content) in [("a.vtk", [VTK, &arrays].concat()), ("a.vtu", cells)] {
+        let error = read(file, content.as_bytes()).unwrap_err().to_string();
+        assert!(
+            error.len() < 600 && error.ends_with("...") && !error.contains(char::is_control),
+            "{error:?}"
+        );
+    }
+}
+
+#[test]
+fn as_many_compressed_bytes_as_can_be_counted_are_missing() {
+    let zlib = VTU.replace("type=\"Unstr", "compressor=\"vtkZLibDataCompressor\" type=\"Unstr");
+    let points = zlib.replace("NumberOfPoints=\"4\"", &format!("NumberOfPoints=\"{}\"", u64::MAX / 3));
+    // One block, of an empty text.
+    let empty = points.replace(
+        "format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1",
+        "format=\"binary\">AQAAAAAAAAAAAAAACAAAAA==eJwDAAAAAAE=",
+    );
+    let bytes = empty.replace("Float64", "UInt8");
+    assert_refused("bad.vtu", bytes.as_bytes(), "the array has 0 bytes instead of 18446744073709551615");
+}
+
 /// In `sound`, the first text of a change is replaced by the second; the message must contain the third.
 fn assert_changes_refused(name: &str, sound: &str, changes: &[(&str, &str, &str)]) {
     for (from, to, expected) in changes {

@@ -274,6 +274,8 @@ fn a_step_that_must_not_be_taken_changes_nothing() {
     };
     assert_eq!(refused(DT, 10.0), LearnedError::Damping { exact: 10.0, trained: 20.0 });
     assert_eq!(refused(7e-5, 20.0), LearnedError::StepRatio { exact: 7e-5, learned: 3e-4 });
+    // A whole number, but one that no host waits for.
+    assert_eq!(refused(3e-11, 20.0), LearnedError::StepRatio { exact: 3e-11, learned: 3e-4 });
     unchanged(&tried, &state);
 
     // Too little storage.

@@ -10,6 +10,8 @@ mod added_mass;
 mod demo;
 mod element_name;
 mod evaluate;
+#[cfg(test)]
+mod hostile;
 mod inspect;
 mod networks;
 mod problem;

@@ -1,0 +1,622 @@
+/* Random calls with arguments as no sound host makes them, within what the header allows: counts, sizes, versions, choices, nodes,
+ * numbers, addresses and objects are wrong as often as right. Memory that no call may touch lies on both sides of everything, and any
+ * access to it ends the program. After each call: the status is one of the header's, a refused call has changed nothing and named its
+ * status, what was taken is finite, objects that were not handed over are as before; and after a refused step the next one is the
+ * same, to the bit, as without it.
+ *
+ *     hostile [CALLS | SECONDSs] [SEED]
+ */
+#define _GNU_SOURCE
+#include <sys/mman.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "body.h"
+
+/* Random numbers (splitmix64). */
+static uint64_t random_state;
+static uint64_t bits(void) {
+    uint64_t z = random_state += 0x9e3779b97f4a7c15u;
+    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+    return z ^ z >> 31;
+}
+static uint32_t below(uint32_t count) { return (uint32_t)(bits() % count); }
+/* While it is set nothing is wrong on purpose. */
+static int is_calm;
+static int one_in(uint32_t count) { return below(count) == 0 && (!is_calm || count < 5); }
+static float share(void) { return (float)(bits() >> 40) / 16777216.0f; }
+
+/* Of a usual size mostly, now and then anything. */
+static float wild(float usual) {
+    static const float odd[] = {0.0f, -0.0f, 1e-40f, 1e-30f, 1e10f, 1e19f, 1e30f, 3e38f, -3e38f, INFINITY, -INFINITY, NAN};
+    switch (is_calm ? 3 : below(40)) {
+        case 0: return odd[below(sizeof odd / sizeof *odd)];
+        case 1: {
+            const uint32_t any = (uint32_t)bits();
+            float value;
+            memcpy(&value, &any, sizeof value);
+            return value;
+        }
+        case 2: return usual * powf(10.0f, (float)below(20) - 10.0f);
+        default: return usual * (2.0f * share() - 1.0f);
+    }
+}
+
+/* A right number, or one of the wrong ones. */
+static uint32_t number(uint32_t right) {
+    static const uint32_t odd[] = {0, 1, 2, 3, 7, 8, 255, 65535, 65536, 0x7fffffffu, 0x80000000u, UINT32_MAX};
+    if (is_calm || !one_in(30)) {
+        return right;
+    }
+    return one_in(3) ? right + below(3) - 1 : odd[below(sizeof odd / sizeof *odd)];
+}
+
+/* Memory between two pieces that must not be touched; what is handed out ends at the second. */
+typedef struct {
+    unsigned char *start;
+    size_t room;
+} arena;
+
+static arena arena_of(size_t bytes) {
+    const size_t page = (size_t)sysconf(_SC_PAGESIZE), room = (bytes + page - 1) / page * page;
+    unsigned char *all = mmap(NULL, room + 2 * page, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    CHECK(all != MAP_FAILED && mprotect(all + page, room, PROT_READ | PROT_WRITE) == 0);
+    return (arena){all + page, room};
+}
+
+/* The last `bytes` of an arena. */
+static void *end_of(const arena *in, size_t bytes) {
+    CHECK(bytes <= in->room);
+    return in->start + (in->room - bytes);
+}
+
+/* Objects of all kinds: what a call is told to be at an address may be of any kind. */
+enum { SCENE, STATE, LOADS, LEARNED, LARGE, GUARD, KINDS };
+enum { EACH = 3, SLOTS = KINDS * EACH };
+static struct {
+    arena in;
+    unsigned char *at;
+    size_t bytes;
+    uint64_t before;
+    int written;
+} slots[SLOTS];
+static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_damper, of_out, of_saved, copies[4];
+static size_t weights_bytes, damper_bytes;
+static const char *doing;
+static supple_report report;
+static supple_error error;
+static unsigned long calls, refused, counted[256];
+
+#define NO_OBJECT ((void *)0)
+
+/* An object of a kind; seldom NULL, misaligned, or of another kind. `is_written`: the call may change it. */
+static void *object(int kind, int is_written) {
+    if (one_in(60)) {
+        return NO_OBJECT;
+    }
+    const int slot = (one_in(60) ? (int)below(KINDS) : kind) * EACH + (int)(!is_calm && one_in(8) ? below(EACH) : 0);
+    slots[slot].written |= is_written;
+    return one_in(100) ? slots[slot].at + 8 : slots[slot].at;
+}
+
+/* Room for an object that needs `bytes`: mostly so many, seldom fewer. */
+static void *room(int kind, size_t needed, size_t *bytes) {
+    /* The first of a kind is left as it is, mostly. */
+    const int slot = kind * EACH + (int)(is_calm ? 0 : one_in(6) ? 0 : 1 + below(EACH - 1));
+    if (needed > slots[slot].in.room) {
+        needed = slots[slot].in.room;
+    }
+    *bytes = needed;
+    if (one_in(20)) {
+        *bytes = needed < 64 ? 0 : 64 * below((uint32_t)(needed / 64));
+    }
+    const size_t taken = (*bytes + 63) / 64 * 64;
+    slots[slot].at = end_of(&slots[slot].in, taken < 64 ? 64 : taken);
+    slots[slot].bytes = taken < 64 ? 64 : taken;
+    slots[slot].written = 1;
+    return one_in(100) ? NO_OBJECT : slots[slot].at;
+}
+
+static uint64_t slot_hash(int slot) { return hash(slots[slot].at, slots[slot].in.start + slots[slot].in.room - slots[slot].at); }
+
+/* Displacements, time and steps of a state, and whether the first are finite. */
+static uint64_t state_hash(const supple_state *state, int *finite) {
+    supple_vectors vectors;
+    double seconds = 0.0;
+    uint64_t steps = 0, sum = 0;
+    if (supple_displacements(state, &vectors) != SUPPLE_OK || supple_state_time(state, &seconds, &steps) != SUPPLE_OK) {
+        return 0;
+    }
+    for (uint32_t node = 0; node < vectors.count; node++) {
+        const float *u = (const float *)(const void *)((const char *)vectors.first + node * vectors.stride);
+        *finite &= isfinite(u[0]) && isfinite(u[1]) && isfinite(u[2]);
+        /* The critical step may make a zero of a negative zero. */
+        const float same[3] = {u[0] + 0.0f, u[1] + 0.0f, u[2] + 0.0f};
+        sum = sum * 31 + hash(same, sizeof same);
+    }
+    return sum ^ hash(&seconds, sizeof seconds) ^ 3 * steps;
+}
+
+static void fail(const char *what, int status) {
+    fprintf(stderr, "call %lu, %s: %s (%d, %s)\n", calls, doing, what, status, supple_status_text(status));
+    exit(1);
+}
+
+/* Parts in any order, some twice, some not at all. */
+static void each(void *context, supple_part part, const void *work, uint32_t parts) {
+    (void)context;
+    for (uint32_t n = below(2 * parts + 1); n > 0; n--) {
+        part(work, below(parts));
+    }
+}
+
+static const supple_threads *threads(supple_threads *room) {
+    *room = (supple_threads){NULL, one_in(10) ? (uint32_t)bits() : below(9), one_in(40) ? NULL : each};
+    return one_in(2) ? NULL : room;
+}
+
+static supple_error *wanted(void) {
+    memset(&error, 0, sizeof error);
+    return &error;
+}
+
+/* The bar in a configuration with a few changes. */
+static supple_status make_scene(void) {
+    static const float constants[3][3] = {{500.0f, 25000.0f, 0.0f}, {59.0f, 8.023f, 60000.0f}, {500.0f, 750.0f, 25000.0f}};
+    const int is_small = one_in(5);
+    const uint32_t nodes = is_small ? 4 : NODES, elements = is_small ? 1 : TETS;
+    const uint32_t law = number(below(3)), tissues_there = one_in(4) ? 2 : 1;
+    const uint32_t supports_there = is_small ? below(4) : 2 * LAYER;
+    float *p = end_of(&of_points, 12 * (size_t)nodes);
+    uint32_t *t = end_of(&of_tets, 16 * (size_t)elements);
+    supple_support *s = end_of(&of_supports, sizeof(supple_support) * supports_there);
+    supple_tissue *c = end_of(&of_tissues, sizeof(supple_tissue) * tissues_there);
+    uint16_t *r = end_of(&of_regions, 2 * (size_t)elements);
+    memcpy(p, points, 12 * (size_t)nodes);
+    memcpy(t, tets, 16 * (size_t)elements);
+    if (is_small) {
+        static const float corners[12] = {0, 0, 0, 0.01f, 0, 0, 0, 0.01f, 0, 0, 0, 0.01f};
+        memcpy(p, corners, sizeof corners);
+        for (uint32_t n = 0; n < 4; n++) {
+            t[n] = n;
+        }
+    }
+    memcpy(s, supports, sizeof(supple_support) * supports_there);
+    for (uint32_t n = 0; n < tissues_there; n++) {
+        for (int k = 0; k < 3; k++) {
+            c[n].constants[k] = constants[law < 3 ? law : 0][k] * (one_in(40) ? wild(2.0f) : 1.0f);
+        }
+        c[n].constants[3] = 0.0f, c[n].density = one_in(40) ? wild(1e3f) : 1000.0f;
+    }
+    for (uint32_t n = 0; n < elements; n++) {
+        r[n] = (uint16_t)below(tissues_there);
+    }
+    for (uint32_t n = below(4); n > 0 && one_in(5); n--) {
+        switch (below(5)) {
+            case 0: p[below(3 * nodes)] = wild(0.05f); break;
+            case 1: t[below(4 * elements)] = one_in(2) ? below(nodes) : number(nodes); break;
+            case 2: r[below(elements)] = (uint16_t)bits(); break;
+            default:
+                if (supports_there > 0) {
+                    s[below(supports_there)] = (supple_support){number(below(nodes)), number(below(8)), number(below(2))};
+                }
+        }
+    }
+    supple_scene_config config = {SUPPLE_CONFIG(supple_scene_config), law, number(below(2)), nodes, elements, supports_there,
+                                  tissues_there, p, t, s, c, tissues_there > 1 || one_in(9) ? r : NULL, number(below(3)), 0};
+    config.struct_size = number(config.struct_size), config.abi = number(config.abi), config.reserved = number(0);
+    /* Fewer than there are, or none: more would be memory that is not the host's. */
+    config.supports = one_in(20) ? below(supports_there + 1) : config.supports;
+    config.elements = one_in(20) ? below(elements + 1) : config.elements;
+    config.nodes = one_in(20) ? below(nodes + 1) : config.nodes;
+    config.tissues = one_in(20) ? below(tissues_there + 1) : config.tissues;
+    if (one_in(40)) {
+        const void **const pointers[5] = {(const void **)&config.points, (const void **)&config.tetrahedra, (const void **)&config.support,
+                                          (const void **)&config.tissue, (const void **)&config.tissue_of_element};
+        const void **pointer = pointers[below(5)];
+        *pointer = one_in(2) || *pointer == NULL ? NULL : (const void *)((const char *)*pointer - 1);
+    }
+    size_t needed = supple_scene_size(config.nodes, config.elements, config.tissues), bytes;
+    needed += config.element == SUPPLE_NODAL_STRAIN ? supple_patches_size(config.nodes, config.elements, config.tissues) : 0;
+    supple_scene *made = NULL;
+    void *at = room(SCENE, needed, &bytes);
+    return supple_scene_init(at, bytes, one_in(60) ? NULL : &config, one_in(60) ? NULL : &made, wanted());
+}
+
+static uint32_t nodes_of(const supple_scene *scene) {
+    supple_scene_facts facts = {0, 0, 0, 0, 0};
+    return supple_scene_describe(scene, &facts) == SUPPLE_OK ? facts.nodes : 0;
+}
+
+/* The points of a scene of so many nodes, of which a few may be wild. */
+static const float *points_for(uint32_t nodes) {
+    if (nodes == 0 || nodes > NODES || one_in(60)) {
+        return NULL;
+    }
+    float *p = end_of(&of_points, 12 * (size_t)nodes);
+    memcpy(p, points, 12 * (size_t)nodes);
+    if (one_in(20)) {
+        p[below(3 * nodes)] = wild(0.05f);
+    }
+    return p;
+}
+
+static supple_status make_state(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    const uint32_t nodes = nodes_of(scene);
+    size_t bytes;
+    supple_state *made = NULL;
+    void *at = room(STATE, supple_state_size(nodes, is_calm ? SUPPLE_NODAL_PRESSURE : below(3)), &bytes);
+    return supple_state_init(at, bytes, scene, one_in(60) ? NULL : &made);
+}
+
+static supple_status make_loads(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    const uint32_t forces = number(FORCES), motions = number(MOTIONS);
+    size_t bytes;
+    supple_loads *made = NULL;
+    void *at = room(LOADS, supple_loads_size(forces, motions), &bytes);
+    return supple_loads_init(at, bytes, scene, forces, motions, one_in(60) ? NULL : &made);
+}
+
+static supple_status make_learned(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    const uint32_t nodes = nodes_of(scene), fallback = number(below(2));
+    supple_learned_config config = {number(sizeof config), number(SUPPLE_ABI), fallback, number(0), NULL, 0};
+    config.weights = one_in(40) ? NULL : end_of(&of_weights, (weights_bytes + 63) / 64 * 64);
+    config.weights_bytes = one_in(20) ? below((uint32_t)weights_bytes) : weights_bytes;
+    if (one_in(40) && config.weights != NULL) {
+        config.weights = (const char *)config.weights + 4 * below(16), config.weights_bytes -= config.weights_bytes < 64 ? 0 : 64;
+    }
+    size_t bytes;
+    supple_learned *made = NULL;
+    void *at = room(LEARNED, supple_learned_size(nodes, fallback != 0), &bytes);
+    return supple_learned_init(at, bytes, scene, &config, one_in(60) ? NULL : &made, wanted());
+}
+
+static supple_status make_large(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    supple_state *state = object(STATE, 1);
+    const uint32_t method = number(below(3));
+    supple_large_config config = {number(sizeof config), number(SUPPLE_ABI), method, one_in(5) ? wild(1e-2f) : 2e-3f,
+                                  one_in(5) ? wild(20.0f) : 20.0f, {0, 0, 0}, NULL, 0};
+    if (one_in(3)) {
+        for (int axis = 0; axis < 3; axis++) {
+            config.cells[axis] = number(1 + below(3));
+        }
+    }
+    if (method == SUPPLE_DAMPED || one_in(10)) {
+        config.weights = one_in(40) ? NULL : end_of(&of_damper, (damper_bytes + 63) / 64 * 64), config.weights_bytes = damper_bytes;
+    }
+    const float *p = points_for(nodes_of(scene));
+    size_t needed = 64, bytes;
+    const supple_status sized = supple_large_size(scene, p, &config, one_in(60) ? NULL : &needed, wanted());
+    if (sized < 0) {
+        return sized;
+    }
+    supple_large *made = NULL;
+    void *at = room(LARGE, needed, &bytes);
+    return supple_large_init(at, bytes, scene, state, p, &config, one_in(60) ? NULL : &made, wanted());
+}
+
+static supple_status make_guard(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    supple_state *state = object(STATE, 1);
+    supple_guard_config config = {number(sizeof config), number(SUPPLE_ABI), one_in(5) ? wild(1e-2f) : 1e-3f, 20.0f, number(3),
+                                  one_in(3) ? wild(1e-3f) : 0.0f};
+    const float *p = points_for(nodes_of(scene));
+    size_t needed = 64, bytes;
+    const supple_status sized = supple_guard_size(scene, p, one_in(60) ? NULL : &needed, wanted());
+    if (sized < 0) {
+        return sized;
+    }
+    supple_guard *made = NULL;
+    void *at = room(GUARD, needed, &bytes);
+    return supple_guard_init(at, bytes, scene, state, p, &config, one_in(60) ? NULL : &made, wanted());
+}
+
+static supple_status set_loads(void) {
+    static supple_force forces[FORCES + 2];
+    static supple_motion motions[MOTIONS + 2];
+    supple_loads *loads = object(LOADS, 1);
+    const int is_wild = one_in(4);
+    const float strong = is_wild ? powf(10.0f, (float)below(38)) : 0.05f, far = is_wild ? powf(10.0f, (float)below(20) - 4.0f) : 0.003f;
+    switch (below(3)) {
+        case 0: {
+            float *gravity = end_of(&of_out, 12);
+            for (int axis = 0; axis < 3; axis++) {
+                gravity[axis] = is_wild ? wild(10.0f) : 10.0f * share();
+            }
+            return supple_set_gravity(loads, one_in(60) ? NULL : gravity);
+        }
+        case 1: {
+            const uint32_t count = one_in(20) ? below(FORCES + 3) : below(4);
+            for (uint32_t n = 0; n < count; n++) {
+                forces[n] = (supple_force){number(below(NODES)), {strong * share(), strong * share(), wild(strong)}, one_in(30) ? wild(0.1f) : 0.0f};
+            }
+            supple_force *f = end_of(&of_out, sizeof *forces * count);
+            memcpy(f, forces, sizeof *forces * count);
+            return supple_set_forces(loads, one_in(60) ? NULL : f, count, wanted());
+        }
+        default: {
+            const uint32_t count = one_in(20) ? below(MOTIONS + 3) : below(6);
+            for (uint32_t n = 0; n < count; n++) {
+                motions[n] = (supple_motion){number(NODES - LAYER + below(LAYER)), number(7), {far * share(), wild(far), 0.0f},
+                                             one_in(5) ? wild(0.1f) : 0.0f};
+            }
+            supple_motion *m = end_of(&of_out, sizeof *motions * count);
+            memcpy(m, motions, sizeof *motions * count);
+            return supple_set_motions(loads, object(SCENE, 0), one_in(60) ? NULL : m, count, wanted());
+        }
+    }
+}
+
+static supple_status read_state(void) {
+    const supple_state *state = object(STATE, 0);
+    supple_vectors vectors;
+    if (supple_displacements(state, &vectors) != SUPPLE_OK) {
+        return supple_displacements(state, one_in(2) ? NULL : &vectors);
+    }
+    const size_t floats = one_in(10) ? below(3 * vectors.count) : 3 * (size_t)vectors.count;
+    float *out = end_of(&of_out, 4 * floats);
+    if (one_in(40)) {
+        out = (float *)(void *)((char *)out - 2);
+    } else if (one_in(40)) {
+        out = NULL;
+    }
+    switch (below(4)) {
+        case 0: return supple_copy_displacements(state, out, floats);
+        case 1: return supple_copy_positions(state, points_for(vectors.count), out, floats);
+        case 2: return supple_copy_velocities(state, out, floats);
+        default: return supple_copy_forces(state, out, floats);
+    }
+}
+
+static supple_status set_step(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    supple_state *state = object(STATE, 1);
+    if (one_in(5)) {
+        float seconds;
+        uint32_t node;
+        return supple_critical_step(scene, state, one_in(40) ? NULL : &seconds, one_in(2) ? NULL : &node);
+    }
+    const supple_step_config config = {number(sizeof config), number(SUPPLE_ABI), one_in(4) ? wild(1e-3f) : 1e-4f,
+                                       one_in(4) ? wild(50.0f) : 20.0f};
+    return supple_set_step(scene, state, one_in(60) ? NULL : &config, wanted());
+}
+
+static uint32_t crc32_of(const unsigned char *bytes, size_t count) {
+    uint32_t sum = ~0u;
+    for (size_t at = 0; at < count; at++) {
+        sum ^= bytes[at];
+        for (int bit = 0; bit < 8; bit++) {
+            sum = sum >> 1 ^ (sum & 1 ? 0xedb88320u : 0u);
+        }
+    }
+    return ~sum;
+}
+
+/* Where a saved state, damaged and its checksum put right, may come from. */
+static supple_status save_and_restore(void) {
+    supple_state *state = object(STATE, 1);
+    supple_vectors vectors;
+    if (supple_displacements(state, &vectors) != SUPPLE_OK) {
+        return supple_save(state, end_of(&of_saved, 64), 64);
+    }
+    const size_t needed = supple_saved_size(vectors.count);
+    unsigned char *saved = end_of(&of_saved, needed);
+    const supple_status done = supple_save(state, saved, one_in(20) ? below((uint32_t)needed) : needed);
+    if (done < 0) {
+        return done;
+    }
+    for (uint32_t n = one_in(2) ? 0 : below(6); n > 0; n--) {
+        const size_t at = one_in(2) ? below(96) : below((uint32_t)needed);
+        if (one_in(2)) {
+            saved[at] ^= (unsigned char)(1 << below(8));
+        } else {
+            const float value = wild(0.01f);
+            memcpy(saved + at / 4 * 4, &value, 4);
+        }
+    }
+    if (!one_in(10)) {
+        const uint32_t sum = crc32_of(saved + 16, needed - 16);
+        memcpy(saved + 12, &sum, 4);
+    }
+    return supple_restore(object(STATE, 1), saved, one_in(20) ? below((uint32_t)needed) : needed);
+}
+
+/* Whether a step of a state, and of the large or exact kind, leaves the same after a refused one as without. */
+static void same_as_without(const supple_scene *scene, supple_state *state, supple_large *large, int state_slot, int large_slot) {
+    supple_state *copy = end_of(&copies[0], slots[state_slot].bytes);
+    supple_large *large_copy = large == NULL ? NULL : end_of(&copies[1], slots[large_slot].bytes);
+    int finite = 1;
+    uint64_t sums[2];
+    supple_status told[2];
+    supple_state *const states[2] = {state, copy};
+    supple_large *const larges[2] = {large, large_copy};
+    for (int n = 0; n < 2; n++) {
+        told[n] = large == NULL ? supple_step(scene, NULL, states[n], 2, NULL, NULL)
+                                : supple_large_step(scene, NULL, states[n], larges[n], 2, NULL, NULL);
+        sums[n] = state_hash(states[n], &finite);
+    }
+    if (told[0] != told[1] || sums[0] != sums[1]) {
+        fail("a refused step is seen in the next", told[0]);
+    }
+}
+
+static supple_status step(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    supple_loads *loads = one_in(8) ? NULL : object(LOADS, 1);
+    supple_state *state = object(STATE, 1);
+    const uint32_t count = one_in(20) ? 0 : 1 + below(4);
+    supple_threads room;
+    const supple_threads *on = threads(&room);
+    memset(&report, 0xa5, sizeof report);
+    supple_report *told = one_in(8) ? NULL : &report;
+    supple_status status;
+    const uint32_t kind = below(5);
+    if (kind < 3) {
+        supple_large *large = kind == 0 ? NULL : object(LARGE, 1);
+        int state_slot = -1, large_slot = -1;
+        for (int slot = 0; slot < SLOTS; slot++) {
+            state_slot = slots[slot].at == (void *)state && slot / EACH == STATE ? slot : state_slot;
+            large_slot = large != NULL && slots[slot].at == (void *)large && slot / EACH == LARGE ? slot : large_slot;
+        }
+        const int compared = state_slot >= 0 && (large == NULL || large_slot >= 0);
+        if (compared) {
+            memcpy(end_of(&copies[0], slots[state_slot].bytes), state, slots[state_slot].bytes);
+            if (large != NULL) {
+                memcpy(end_of(&copies[1], slots[large_slot].bytes), large, slots[large_slot].bytes);
+            }
+        }
+        status = kind == 0 ? supple_step(scene, loads, state, count, on, told) : supple_large_step(scene, loads, state, large, count, on, told);
+        if (compared && told != NULL && status < 0 && report.steps == 0) {
+            same_as_without(scene, state, large, state_slot, large_slot);
+        }
+    } else {
+        supple_learned *learned = object(LEARNED, 1);
+        if (one_in(20)) {
+            return supple_learned_reset(learned);
+        }
+        /* A long lead-in takes long: that is no mistake of the library. */
+        const float drawn = one_in(10) ? wild(0.001f) : 0.003f;
+        const double seconds = drawn > 0.01f && isfinite(drawn) ? 0.01 : (double)drawn;
+        status = kind == 3 ? supple_learned_lead(scene, loads, state, learned, seconds, on, told)
+                           : supple_learned_step(scene, loads, state, learned, count, on, told);
+    }
+    if (told != NULL) {
+        if (!isfinite(report.time) || report.error.status != (status < 0 ? status : SUPPLE_OK) || report.steps > 1000000) {
+            fail("a report that does not fit", status);
+        }
+        if (status >= 0 && kind < 3 && report.steps != count) {
+            fail("steps are missing", status);
+        }
+    }
+    return status;
+}
+
+static supple_status follow(void) {
+    supple_estimate estimate;
+    memset(&estimate, 0xff, sizeof estimate);
+    supple_threads room;
+    const supple_status status = supple_guard_follow(object(SCENE, 0), one_in(8) ? NULL : object(LOADS, 1), object(STATE, 1),
+                                                     object(GUARD, 1), threads(&room), &estimate);
+    if (status == SUPPLE_OK && (estimate.known > 1 || (estimate.known && !(estimate.mean <= estimate.allowed)))) {
+        fail("an estimate that is no number, or too large, is called good", status);
+    }
+    return status;
+}
+
+static supple_status other(void) {
+    supple_learned_facts facts;
+    supple_scene_facts of_scene;
+    switch (below(4)) {
+        case 0: return supple_scene_describe(object(SCENE, 0), one_in(20) ? NULL : &of_scene);
+        case 1: return supple_learned_describe(object(LEARNED, 0), one_in(20) ? NULL : &facts);
+        case 2: return one_in(5) ? supple_state_reset(object(STATE, 1)) : SUPPLE_OK;
+        default: return one_in(2) ? SUPPLE_OK : supple_set_level(one_in(2) ? supple_level() : 5 + below(100));
+    }
+}
+
+/* Sound objects, one of each kind, with a law, an element, a method and a threading of their own. */
+static void begin_anew(void) {
+    static supple_status (*const makers[])(void) = {make_scene, make_state, set_step, make_loads, make_learned, make_large, make_guard};
+    is_calm = 1, doing = "sound objects";
+    for (size_t n = 0; n < sizeof makers / sizeof *makers; n++) {
+        const supple_status status = makers[n]();
+        if (status < 0 && makers[n] != make_large && makers[n] != make_guard && makers[n] != set_step) {
+            fail("refused", status);
+        }
+    }
+    is_calm = 0;
+}
+
+static void one_call(void) {
+    static const struct {
+        const char *name;
+        supple_status (*call)(void);
+        int often;
+    } all[] = {{"a scene", make_scene, 6}, {"a state", make_state, 4}, {"loads", make_loads, 3}, {"a learned step", make_learned, 3},
+               {"steps beyond the critical one", make_large, 6}, {"a guard", make_guard, 2}, {"set loads", set_loads, 20}, {"read", read_state, 8},
+               {"set a step", set_step, 8}, {"save and restore", save_and_restore, 6}, {"steps", step, 50}, {"follow", follow, 8},
+               {"other", other, 4}};
+    int at = 0;
+    for (int draw = (int)below(128); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
+        draw -= all[at].often;
+    }
+    doing = all[at].name;
+    uint64_t states[EACH];
+    int finite = 1;
+    for (int slot = 0; slot < SLOTS; slot++) {
+        slots[slot].written = 0;
+        slots[slot].before = slot_hash(slot);
+    }
+    for (int n = 0; n < EACH; n++) {
+        states[n] = state_hash((supple_state *)(void *)slots[STATE * EACH + n].at, &finite);
+    }
+    report.steps = 0, error.status = SUPPLE_OK;
+    const supple_status status = all[at].call();
+    calls++, refused += status < 0;
+    counted[(unsigned char)(status + 128)]++;
+    if (supple_status_text(status) == supple_status_text(100)) {
+        fail("no status", status);
+    }
+    if (error.status != SUPPLE_OK && error.status != status) {
+        fail("an error with another status", status);
+    }
+    finite = 1;
+    for (int n = 0; n < EACH; n++) {
+        const int slot = STATE * EACH + n;
+        const uint64_t now = state_hash((supple_state *)(void *)slots[slot].at, &finite);
+        /* Steps are taken one after the other, and a report may not have been asked for: those may have moved it. */
+        const int may_move = all[at].call == step || all[at].call == make_state || status >= 0;
+        if (!(may_move && slots[slot].written) && now != states[n]) {
+            fail("a state has moved", status);
+        }
+    }
+    if (!finite) {
+        fail("a displacement is not finite", status);
+    }
+    for (int slot = 0; slot < SLOTS; slot++) {
+        if (!slots[slot].written && slot_hash(slot) != slots[slot].before) {
+            fail("an object has changed that was not handed over", status);
+        }
+    }
+}
+
+int main(int argc, char **argv) {
+    const char *const amount = argc > 1 ? argv[1] : "10000";
+    const int is_time = strchr(amount, 's') != NULL;
+    const unsigned long most = strtoul(amount, NULL, 10);
+    random_state = argc > 2 ? strtoul(argv[2], NULL, 10) : 1;
+    (void)bar_config();
+    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20};
+    for (int slot = 0; slot < SLOTS; slot++) {
+        slots[slot].in = arena_of(sizes_of[slot / EACH]);
+        slots[slot].at = end_of(&slots[slot].in, 64), slots[slot].bytes = 64;
+    }
+    of_points = arena_of(sizeof points), of_tets = arena_of(sizeof tets), of_supports = arena_of(sizeof supports);
+    of_tissues = arena_of(2 * sizeof(supple_tissue)), of_regions = arena_of(2 * TETS);
+    of_weights = arena_of(1 << 16), of_damper = arena_of(1 << 13), of_out = arena_of(1 << 13), of_saved = arena_of(1 << 13);
+    copies[0] = arena_of(sizes_of[STATE]), copies[1] = arena_of(sizes_of[LARGE]);
+    file("weights/compact-10.weights", of_weights.start, of_weights.room, &weights_bytes);
+    memmove(end_of(&of_weights, (weights_bytes + 63) / 64 * 64), of_weights.start, weights_bytes);
+    file("weights/damper.weights", of_damper.start, of_damper.room, &damper_bytes);
+    memmove(end_of(&of_damper, (damper_bytes + 63) / 64 * 64), of_damper.start, damper_bytes);
+    const time_t start = time(NULL);
+    while (is_time ? time(NULL) - start < (time_t)most : calls < most) {
+        if (calls % 300 == 0) {
+            begin_anew();
+        }
+        one_call();
+    }
+    printf("hostile: %lu calls, %lu refused; statuses:", calls, refused);
+    for (int status = -128; status < 128; status++) {
+        if (counted[(unsigned char)(status + 128)] > 0) {
+            printf(" %d: %lu", status, counted[(unsigned char)(status + 128)]);
+        }
+    }
+    printf("\n");
+    return 0;
+}
