@@ -16,9 +16,29 @@ pub(super) struct Comparison {
     pub(super) motion: f32,
 }
 
-/// Compares the displacements (m) of so many nodes.
+/// Far enough that the square of no displacement is infinite.
+const FAR: f32 = 1.0 / (1u128 << 70) as f32;
+
+/// Compares the displacements (m) of so many nodes. What it finds is finite if they are.
 pub(super) fn compare(nodes: usize, first: &[NodeVector], second: &[NodeVector]) -> Comparison {
-    let axes = Vec4::new(1.0, 1.0, 1.0, 0.0);
+    let near = scaled(1.0, nodes, first, second);
+    if near.mean.is_finite() && near.largest.is_finite() && near.motion.is_finite() {
+        return near;
+    }
+    // Squares overflow long before distances.
+    let far = scaled(FAR, nodes, first, second);
+    let [mean, largest, motion] = [far.mean, far.largest, far.motion].map(|length| finite(length / FAR));
+    Comparison { mean, largest, motion, ..far }
+}
+
+/// The same, or the largest number instead of infinity.
+pub(super) const fn finite(value: f32) -> f32 {
+    if value == f32::INFINITY { f32::MAX } else { value }
+}
+
+/// Compares displacements times `scale`.
+fn scaled(scale: f32, nodes: usize, first: &[NodeVector], second: &[NodeVector]) -> Comparison {
+    let axes = Vec4::new(scale, scale, scale, 0.0);
     let (mut sum, mut motions, mut largest, mut at) = (0.0, [0.0; 2], 0.0, 0);
     let pairs = first.iter().zip(second).take(nodes);
     for (node, (first, second)) in pairs.enumerate() {
@@ -43,6 +63,17 @@ pub(super) fn compare(nodes: usize, first: &[NodeVector], second: &[NodeVector])
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn distances_are_finite_where_their_squares_are_not() {
+        for (far, expected) in [(1e30, 1e30), (3e38, f32::MAX)] {
+            let first = [NodeVector([far, far, 0.0, 0.0]), NodeVector::ZERO];
+            let second = [NodeVector([-far, far, 0.0, 0.0]), NodeVector::ZERO];
+            let Comparison { mean, largest, node, motion } = compare(2, &first, &second);
+            assert!((mean / expected - 1.0).abs() < 0.2 && largest.is_finite() && largest >= mean, "{mean}");
+            assert!((motion / far - 0.5 * 2.0_f32.sqrt()).abs() < 1e-5 && node == 0, "{motion}");
+        }
+    }
 
     #[test]
     fn means_and_maxima_leave_out_the_fourth_component() {

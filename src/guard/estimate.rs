@@ -3,7 +3,7 @@
 //! goes on growing as it grew between the two before.
 
 use super::ESTIMATE;
-use super::compare::Comparison;
+use super::compare::{Comparison, finite};
 use crate::inertia::size_of;
 use crate::step::Status;
 
@@ -98,7 +98,7 @@ impl Envelope {
         self.distance = found.mean;
         let mean = at_least(at_least(found.mean, kept * before.mean), least);
         let largest = at_least(at_least(found.largest, kept * before.largest), mean);
-        let growth = |now: f32, before: f32| ((now - before) / seconds).max(0.0);
+        let growth = |now: f32, before: f32| finite(((now - before) / seconds).max(0.0));
         self.growth = [growth(mean, before.mean), growth(largest, before.largest)];
         self.waited = 0.0;
         self.held = Some(Comparison { mean, largest, ..*found });
@@ -141,7 +141,7 @@ impl Envelope {
             Allowed::Metres(metres) => metres,
         };
         let [mean, largest] = [(mean, self.growth[0]), (largest, self.growth[1])]
-            .map(|(held, growth)| ESTIMATE * (held + growth * self.waited));
+            .map(|(held, growth)| finite(ESTIMATE * (held + growth * self.waited)));
         Some(Estimate { mean, largest, node, allowed })
     }
 
@@ -207,6 +207,17 @@ mod tests {
         assert_eq!(envelope.judge(limited), limited);
         envelope.allowed = Allowed::default();
         envelope.add(&distance(f32::NAN), 0.01);
+        assert!(matches!(envelope.judge(Status::Ok), Status::Inexact { .. }));
+    }
+
+    /// Above what is allowed, which is a share of a finite motion.
+    #[test]
+    fn a_distance_as_large_as_there_are_numbers_is_inexact() {
+        let mut envelope = later();
+        envelope.add(&Comparison { motion: f32::MAX, ..distance(f32::MAX / 2.0) }, 1e-3);
+        envelope.wait(1e-3);
+        let Estimate { mean, largest, allowed, .. } = envelope.estimate().unwrap();
+        assert!(mean == f32::MAX && largest == f32::MAX && allowed < mean);
         assert!(matches!(envelope.judge(Status::Ok), Status::Inexact { .. }));
     }
 
