@@ -3,6 +3,8 @@
 //! A run is determined by its seed: try `n` of a run is the same whatever the number of tries. `SUPPLE_SECONDS=600` goes on for ten
 //! minutes instead of the number of tries of an ordinary test, `SUPPLE_SEED=2` makes other tries, `SUPPLE_TRY=17` makes only that
 //! one. A failure names the seed and the try.
+// The command, whose own printing does not panic, has it in its unit tests.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
 #![allow(dead_code, unreachable_pub, unsafe_code)] // A global allocator is an unsafe trait.
 
 use std::alloc::{GlobalAlloc, Layout, System};
