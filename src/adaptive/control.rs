@@ -16,7 +16,7 @@ const SETTLE: f32 = 0.1;
 const GROWTH: f32 = 1.25;
 /// By which factor it must have fallen for the shortened step to be kept for as long again.
 const FALL: f32 = 0.9;
-/// Time in which the body forgets half of an error, s; that of the guard's envelope.
+/// Least time in which a body forgets half of an error, s; that of the guard's envelope. A vibration needs `2 ln 2 / mu`.
 const HALF_LIFE: f32 = 0.2;
 /// Least and most time between two probes, least length of a probe, s, and its least number of comparisons.
 const REST: [f32; 2] = [0.05, 1.6];
@@ -39,6 +39,8 @@ pub(super) fn exceeds(error: f32, limit: f32) -> bool {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Control {
     tolerance: f32,
+    /// Time in which the body forgets half of an error, s; infinite without damping.
+    half_life: f32,
     lengths: u32,
     halvings: u32,
     /// Since the latest change, or since a probe has begun or ended.
@@ -46,7 +48,7 @@ pub(super) struct Control {
     comparisons: u32,
     /// Estimate of the mean error at the latest shortening, m.
     error: f32,
-    /// Estimates of the mean and the largest error that exact steps began with, m, halved every [`HALF_LIFE`].
+    /// Estimates of the mean and the largest error that exact steps began with, m, halved every `half_life`.
     left_behind: [f32; 2],
     probe: Probe,
     /// Time to the next probe, s.
@@ -65,8 +67,9 @@ enum Probe {
 
 impl Control {
     /// Begins with exact steps.
-    pub(super) const fn new(tolerance: f32, lengths: u32) -> Self {
+    pub(super) fn new(tolerance: f32, lengths: u32, damping: f32) -> Self {
         Self {
+            half_life: (2.0 * core::f32::consts::LN_2 / damping).max(HALF_LIFE),
             tolerance,
             lengths,
             halvings: lengths,
@@ -102,7 +105,7 @@ impl Control {
     /// So many seconds have passed.
     pub(super) fn wait(&mut self, seconds: f32) {
         self.seconds += seconds;
-        let kept = libm::exp2f(-seconds / HALF_LIFE);
+        let kept = libm::exp2f(-seconds / self.half_life);
         self.left_behind = self.left_behind.map(|error| kept * error);
     }
 
@@ -218,6 +221,7 @@ mod tests {
 
     const TOLERANCE: f32 = 1e-3;
     const LENGTHS: u32 = 5;
+    const DAMPING: f32 = 20.0;
 
     /// Beyond the critical step, after so many halvings and a long time.
     fn running(halvings: u32) -> Control {
@@ -226,7 +230,7 @@ mod tests {
             probe: Probe::None,
             seconds: 10.0,
             comparisons: 10,
-            ..Control::new(TOLERANCE, LENGTHS)
+            ..Control::new(TOLERANCE, LENGTHS, DAMPING)
         }
     }
 
@@ -241,7 +245,7 @@ mod tests {
     #[test]
     fn a_probe_that_shows_little_error_ends_exact_steps() {
         for (distance, longer) in [(0.01, true), (0.1, false), (f32::NAN, false)] {
-            let mut control = Control::new(TOLERANCE, LENGTHS);
+            let mut control = Control::new(TOLERANCE, LENGTHS, DAMPING);
             assert!(control.begins_probe() && control.probes() && !control.begins_probe());
             let mut ended = false;
             for _ in 0..2 * PROBE_COMPARISONS {
@@ -255,7 +259,7 @@ mod tests {
 
     #[test]
     fn rests_between_probes_become_longer() {
-        let mut control = Control::new(TOLERANCE, LENGTHS);
+        let mut control = Control::new(TOLERANCE, LENGTHS, DAMPING);
         let mut begun = 0;
         for _ in 0..1000 {
             begun += u32::from(control.begins_probe());
@@ -284,6 +288,14 @@ mod tests {
         assert_eq!(control.left_behind(), [8.0 * TOLERANCE; 2]);
         control.wait(HALF_LIFE);
         assert!((control.left_behind()[0] - 4.0 * TOLERANCE).abs() < 1e-6);
+    }
+
+    #[test]
+    fn without_damping_nothing_is_forgotten() {
+        let mut control = Control { halvings: LENGTHS - 1, ..Control::new(TOLERANCE, LENGTHS, 0.0) };
+        control.refused([TOLERANCE; 2]);
+        control.wait(100.0);
+        assert_eq!(control.left_behind(), [TOLERANCE; 2]);
     }
 
     #[test]

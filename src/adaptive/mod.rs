@@ -135,7 +135,7 @@ impl Chooser {
         let critical = tled::critical_step(&scene, &mut state).ok_or(InertiaError::NotFinite { node: 0 })?;
         let lengths = control::lengths(request.longest.seconds() / (LEAST_MULTIPLE * critical.seconds));
         Ok(Self {
-            control: Control::new(request.tolerance, lengths),
+            control: Control::new(request.tolerance, lengths, request.longest.damping()),
             pace: Pace::new(critical),
             nodes: scene.node_count(),
             vectors: vectors_for_method(method, scene, points)?,
