@@ -1,9 +1,9 @@
 //! The adaptive step: the host says which mean error of the nodes it accepts (m), and the step chooses its length while it runs, as
 //! long as possible and as short as needed, down to the exact step.
 //!
-//! Its lengths are the longest one that the host allows, usually a frame's time, and halves of it down to [`LEAST_MULTIPLE`] times the
+//! Its lengths are the longest one that the host allows, usually a frame's time, and halves of it down to six times the
 //! critical step; below, there are exact steps. A [`crate::guard`] estimates the error; its second run takes the steps of the next
-//! longer length, so that it also knows what that length would do. [`control`] decides after each comparison. A change of length
+//! longer length, so that it also knows what that length would do. `control.rs` decides after each comparison. A change of length
 //! computes all inertia anew in the next step and changes neither displacements nor velocities.
 //!
 //! What a span of time costs is bounded: it is never cut in more steps than exact ones need, and between two comparisons the length
