@@ -112,7 +112,12 @@ static void *room(int kind, size_t needed, size_t *bytes) {
         *bytes = needed < 64 ? 0 : 64 * below((uint32_t)(needed / 64));
     }
     const size_t taken = (*bytes + 63) / 64 * 64;
-    slots[slot].at = end_of(&slots[slot].in, taken < 64 ? 64 : taken);
+    unsigned char *at = end_of(&slots[slot].in, taken < 64 ? 64 : taken);
+    if (at != slots[slot].at) {
+        /* An object elsewhere in this memory would be overwritten in part: it is gone. */
+        memset(slots[slot].in.start, 0xa5, slots[slot].in.room);
+    }
+    slots[slot].at = at;
     slots[slot].bytes = taken < 64 ? 64 : taken;
     slots[slot].written = 1;
     return one_in(100) ? NO_OBJECT : slots[slot].at;
