@@ -148,6 +148,7 @@ extern crate std;
 pub mod adaptive;
 #[cfg(feature = "capi-neo-hookean")]
 mod capi;
+mod copy;
 pub mod element;
 mod energy_balance;
 pub mod guard;

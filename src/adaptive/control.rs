@@ -2,7 +2,7 @@
 //! error that one length makes grows about as its power 1.5 (measured: between 1 and 2), so an estimate above the tolerance says by how
 //! many halvings the step is too long, and one far below it that the next longer step would do.
 
-use crate::guard::ESTIMATE;
+use crate::guard::{ESTIMATE, exceeds};
 
 /// Power of the length with which errors grow.
 const ORDER: f32 = 1.5;
@@ -28,11 +28,6 @@ const MOST: u32 = 16;
 /// How many lengths there are beyond the critical step, at least one, if the longest is so many times the least.
 pub(super) fn lengths(ratio: f32) -> u32 {
     (0..MOST).take_while(|&halvings| halvings == 0 || libm::exp2f(halvings as f32) <= ratio).count() as u32
-}
-
-/// Whether an error is above a limit; one that is no number is.
-pub(super) fn exceeds(error: f32, limit: f32) -> bool {
-    error.is_nan() || error > limit
 }
 
 /// The present length, and what is known of it.

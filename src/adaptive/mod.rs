@@ -15,7 +15,7 @@ mod control;
 use core::ops::Add;
 
 use crate::element::ElementMaterial;
-use crate::guard::{self, Allowed, Estimate, GuardView, Watch};
+use crate::guard::{self, Allowed, Estimate, GuardView, Watch, judged};
 use crate::inertia::{InertiaError, LargeModel, Method, Report, carry, vectors_for as vectors_for_method};
 use crate::loads::{Loads, LoadsOverTime};
 use crate::material::Material;
@@ -24,7 +24,7 @@ use crate::simd::NodeVector;
 use crate::state::StateView;
 use crate::step::{CallingThread, Status, Step, Threads};
 use crate::tled::{self, Approach, Pace, vectors_for_pace};
-use control::{Control, exceeds};
+use control::Control;
 
 /// Least length of a step beyond the critical one, over the critical step.
 const LEAST_MULTIPLE: f32 = 6.0;
@@ -46,8 +46,16 @@ pub fn vectors_for<M: Material>(
     scene: SceneView<'_, M>,
     points: &[[f32; 3]],
 ) -> Result<usize, InertiaError> {
-    let kept = vectors_for_pace(scene.node_count());
-    Ok(kept + vectors_for_method(method, scene, points)? + guard::vectors_for(scene, points)?)
+    vectors_with(vectors_for_method(method, scene, points)?, scene, points)
+}
+
+/// The same for a method that needs so many.
+pub(crate) fn vectors_with<M: Material>(
+    of_method: usize,
+    scene: SceneView<'_, M>,
+    points: &[[f32; 3]],
+) -> Result<usize, InertiaError> {
+    Ok(vectors_for_pace(scene.node_count()) + of_method + guard::vectors_for(scene, points)?)
 }
 
 /// What chooses the length of the steps.
@@ -150,9 +158,7 @@ impl Chooser {
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
     ) -> Result<Parts<'a>, InertiaError> {
-        let kept = vectors_for_pace(self.nodes);
-        let needed = kept + self.vectors + guard::vectors_for(scene, points)?;
-        let capacity = storage.len();
+        let (needed, capacity) = (vectors_with(self.vectors, scene, points)?, storage.len());
         let error = InertiaError::Capacity { kind: "vectors", needed, capacity };
         if capacity < needed { Err(error) } else { self.parts(storage).ok_or(error) }
     }
@@ -177,16 +183,17 @@ impl Chooser {
 
     /// The step after so many halvings.
     fn step_of(&self, halvings: u32) -> Result<Step, InertiaError> {
-        let longest = self.request.longest;
-        let seconds = longest.seconds() * libm::exp2f(-(halvings as f32));
+        let (longest, seconds) = (self.request.longest, self.seconds_of(halvings));
         Step::unchecked(seconds, longest.damping())
             .map_err(|_| InertiaError::Step { seconds, most: longest.seconds() })
     }
 
     pub(crate) fn seconds(&self) -> f32 {
-        let longest = self.request.longest.seconds();
-        let halvings = self.control.halvings();
-        halvings.map_or(self.pace.seconds(), |halvings| longest * libm::exp2f(-(halvings as f32)))
+        self.control.halvings().map_or(self.pace.seconds(), |halvings| self.seconds_of(halvings))
+    }
+
+    fn seconds_of(&self, halvings: u32) -> f32 {
+        self.request.longest.seconds() * libm::exp2f(-(halvings as f32))
     }
 
     /// Exact steps have no error of their own; what steps before them have left behind is forgotten with time.
@@ -413,11 +420,6 @@ impl AdaptiveView<'_, '_> {
             guard.change_step(step, scene, loads, threads);
         }
     }
-}
-
-/// The status of a step that was taken, with an estimate of the mean error (m).
-fn judged(status: Status, error: f32, allowed: f32) -> Status {
-    if status == Status::Ok && exceeds(error, allowed) { Status::Inexact { error, allowed } } else { status }
 }
 
 /// The worse of two statuses of steps that were taken.

@@ -4,13 +4,12 @@
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
 
-use crate::adaptive::{AdaptiveView, Chooser, Parts, Request, Taken};
-use crate::guard::{self, SECOND_RUN, Watch};
+use crate::adaptive::{AdaptiveView, Chooser, Parts, Request, Taken, vectors_with};
+use crate::guard::{SECOND_RUN, Watch};
 use crate::inertia::LargeModel;
 use crate::loads::{Loads, LoadsOverTime};
 use crate::state::{NodeVector, StateView};
 use crate::step::Step;
-use crate::tled::vectors_for_pace;
 
 use super::guard::{estimated, supple_estimate};
 use super::large::{LargeRequest, storage, supple_large_config};
@@ -63,8 +62,7 @@ fn layout(vectors: usize) -> Layout {
 
 /// Vectors of the storage.
 fn vectors_of(any: &AnyScene<'_>, request: &LargeRequest<'_>) -> Answer<usize> {
-    let of_guard = with_scene!(any, scene => guard::vectors_for(scene, request.points)?);
-    Ok(vectors_for_pace(any.node_count()) + request.vectors + of_guard)
+    Ok(with_scene!(any, scene => vectors_with(request.vectors, scene, request.points)?))
 }
 
 /// Writes how many bytes of memory a supple_adaptive needs for a scene; it depends on the lattice.

@@ -5,6 +5,7 @@ use core::{ptr, slice};
 
 use bytemuck::{Pod, Zeroable, bytes_of, must_cast_slice};
 
+use crate::copy::copy;
 use crate::state::{NodeVector, Progress};
 use crate::step::{EnergyBalance, Step};
 
@@ -90,10 +91,10 @@ pub unsafe extern "C" fn supple_save(
         let (first, rest) = to.split_at_mut_checked(FRONT).ok_or(short(bytes, needed))?;
         let places = rest.chunks_exact_mut(size_of_val(displacements).max(1));
         for (place, vectors) in places.zip([displacements, increments]) {
-            put(place, must_cast_slice(vectors));
+            copy(place, must_cast_slice(vectors));
         }
         front.checksum = checksum(&front, rest);
-        put(first, bytes_of(&front));
+        copy(first, bytes_of(&front));
         Ok(SUPPLE_OK)
     };
     status_of(save())
@@ -163,11 +164,6 @@ fn check_finite(front: &Front, rest: &[u8]) -> Answer<()> {
     let vectors = components.chunks(4).all(three);
     let length = front.last_step.is_finite() && front.last_step >= 0.0;
     if vectors && length && front.time.is_finite() { Ok(()) } else { Err(SUPPLE_E_NOT_FINITE.into()) }
-}
-
-/// Copies bytes. Slices know a function for it, with a way to panic in it.
-fn put(to: &mut [u8], from: &[u8]) {
-    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
 }
 
 fn checksum(front: &Front, rest: &[u8]) -> u32 {

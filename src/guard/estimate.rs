@@ -147,14 +147,18 @@ impl Envelope {
 
     /// The status of a step that was taken.
     pub(super) fn judge(&self, taken: Status) -> Status {
-        match (taken, self.estimate()) {
-            // An estimate that is no number exceeds everything.
-            (Status::Ok, Some(Estimate { mean, allowed, .. })) if mean.is_nan() || mean > allowed => {
-                Status::Inexact { error: mean, allowed }
-            }
-            _ => taken,
-        }
+        self.estimate().map_or(taken, |Estimate { mean, allowed, .. }| judged(taken, mean, allowed))
     }
+}
+
+/// Whether an error is above a limit; one that is no number is.
+pub(crate) fn exceeds(error: f32, limit: f32) -> bool {
+    error.is_nan() || error > limit
+}
+
+/// The status of a step that was taken, with an estimate of the mean error and what is allowed, m.
+pub(crate) fn judged(taken: Status, error: f32, allowed: f32) -> Status {
+    if taken == Status::Ok && exceeds(error, allowed) { Status::Inexact { error, allowed } } else { taken }
 }
 
 #[cfg(test)]

@@ -17,7 +17,9 @@ mod compare;
 mod estimate;
 
 pub use estimate::{Allowed, Estimate};
+pub(crate) use estimate::{exceeds, judged};
 
+use crate::copy::copy;
 use crate::element::ElementMaterial;
 use crate::inertia::{Cells, InertiaError, LargeModel, Method, carry, vectors_for as vectors_for_method};
 use crate::loads::Loads;
@@ -130,7 +132,7 @@ impl Watch {
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
         };
-        copy(&mut copied, &state, nodes);
+        start_from(&state, &mut copied);
         let mut every = every.max(1);
         let (second, longest) = loop {
             let seconds = every as f32 * step.seconds();
@@ -246,7 +248,7 @@ impl GuardView<'_> {
             envelope.forget();
             // Right after a start errors are least certain.
             *interval = if envelope.is_new() { 0.0 } else { *longest };
-            copy(&mut second, state, nodes);
+            start_from(state, &mut second);
             return taken;
         }
         if gone <= 0.0 || gone < (1.0 - ROUNDING) * f64::from(*interval) {
@@ -273,7 +275,7 @@ impl GuardView<'_> {
         } else {
             // The second run cannot follow: nothing is known but that the body has moved.
             envelope.lose(gone);
-            copy(&mut second, state, nodes);
+            start_from(state, &mut second);
             *interval = state.last_step();
         }
         envelope.judge(taken)
@@ -295,14 +297,9 @@ fn split<'a, M: Material>(
 }
 
 /// Makes the second run start from the state of the first.
-fn copy(second: &mut StateView<'_>, state: &StateView<'_>, nodes: usize) {
-    for (to, from) in
-        [(&mut *second.displacement, &*state.displacement), (&mut *second.increment, &*state.increment)]
-    {
-        for (to, from) in to.iter_mut().zip(from).take(nodes) {
-            *to = *from;
-        }
-    }
+fn start_from(state: &StateView<'_>, second: &mut StateView<'_>) {
+    copy(second.displacement, state.displacement);
+    copy(second.increment, state.increment);
     *second.progress = *state.progress;
 }
 

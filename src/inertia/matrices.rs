@@ -9,6 +9,7 @@ use super::dense::{invert, row_length, stride};
 use super::lattice::Lattice;
 use super::nodal_sums::FunctionInertia;
 use super::projected_inertia::CellSums;
+use crate::copy::copy;
 
 /// The matrices of a lattice, and the sums of its cells.
 pub(super) struct Matrices<'a> {
@@ -120,10 +121,4 @@ pub(super) fn invert_axes(inverses: &mut [f32], matrices: &[f32], functions: usi
     let size = inverses.len() / 3;
     let mut parts = inverses.chunks_exact_mut(size.max(1));
     parts.by_ref().fold(true, |sound, matrix| sound & invert(matrix, functions, row_length(functions)))
-}
-
-pub(super) fn copy(to: &mut [f32], from: &[f32]) {
-    for (to, from) in to.iter_mut().zip(from) {
-        *to = *from;
-    }
 }

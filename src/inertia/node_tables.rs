@@ -8,6 +8,7 @@
 use bytemuck::{must_cast_slice, must_cast_slice_mut};
 
 use super::lattice::{LatticeNode, node_at};
+use crate::copy::copy;
 use crate::element::symmetric::Symmetric;
 use crate::padding;
 use crate::simd::{NodeVector, Real, Rows};
@@ -77,9 +78,7 @@ impl<'a> NodeTables<'a> {
             inverse.0[3] = before.0[3];
         }
         if rough {
-            for (vector, before) in self.rough.iter_mut().zip(&*self.rough_before) {
-                *vector = *before;
-            }
+            copy(self.rough, self.rough_before);
         }
     }
 

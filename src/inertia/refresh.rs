@@ -17,7 +17,7 @@ use super::dense::stride;
 use super::frames::{Frames, Rotation};
 use super::inversion::Inversion;
 use super::lattice::{Lattice, LatticeNode, rank_of};
-use super::matrices::{Matrices, copy, invert_axes};
+use super::matrices::{Matrices, invert_axes};
 use super::nodal_strain::{self, write_stabilising};
 use super::nodal_sums::{self, FunctionInertia, add_mass, fill_held_axes, write_mass};
 use super::node::Scaling;
@@ -27,6 +27,7 @@ use super::projected_inertia::{CellSums, add_cell};
 use super::report::AddedInertiaSums;
 use super::transport::invert_edges;
 use super::{DRAG_AT_WHOLE_CYCLES, DRAG_OF_ADDED, LARGEST_DRAG};
+use crate::copy::copy;
 use crate::element::{
     ElementMaterial, ElementTile, MatrixSums, OwnPressure, TileBounds, TileTangents, tile_bounds,
 };

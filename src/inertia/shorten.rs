@@ -7,7 +7,7 @@
 //! du' = r (du + du+) / 2 - r^2 (du+ - du) / 2
 //! ```
 
-use super::large_step::{LargeView, Storage};
+use super::large_step::LargeView;
 use super::lattice::rank_of;
 use super::step::InertiaStep;
 use crate::element::ElementMaterial;
@@ -17,12 +17,15 @@ use crate::simd::NodeVector;
 use crate::state::StateView;
 use crate::step::{Status, Step, StepMethod, Threads, Trial};
 
+/// What share of the last step a shorter one of `seconds` is. None for longer ones, for a state at rest, and for lengths that are none.
+fn share_of(seconds: f32, state: &StateView<'_>) -> Option<f32> {
+    let share = seconds / state.dt;
+    (share > 0.0 && share < 1.0).then_some(share)
+}
+
 /// The same without acceleration, where a step was refused: its forces are those of a load that has acted for no time yet.
 pub(crate) fn carry(seconds: f32, state: StateView<'_>) {
-    let share = seconds / state.dt;
-    if !(share > 0.0 && share < 1.0) {
-        return;
-    }
+    let Some(share) = share_of(seconds, &state) else { return };
     for NodeVector(last) in state.increment.iter_mut() {
         *last = last.map(|component| share * component);
     }
@@ -40,24 +43,13 @@ impl LargeView<'_, '_> {
         state: StateView<'_>,
         threads: &impl Threads,
     ) -> Status {
-        let Self { model, storage } = self;
-        let nodes = model.nodes;
-        let mismatch = Status::Mismatch { nodes: scene.node_count(), room: nodes.min(state.capacity()) };
-        let damped = model.method.damper().is_some();
-        let Some(storage) =
-            Storage::split(storage, model.element, [nodes, model.elements], &model.lattice, damped)
-        else {
-            return mismatch;
+        let (model, storage) = match self.opened(scene, &state) {
+            Ok(opened) => opened,
+            Err(mismatch) => return mismatch,
         };
-        if !model.is_for(scene) {
-            return mismatch;
-        }
-        // Nothing to do for a state at rest, and for lengths that are none.
+        let nodes = model.nodes;
+        let Some(share) = share_of(seconds, &state) else { return Status::Ok };
         let Ok(step) = Step::unchecked(state.dt, model.step.damping()) else { return Status::Ok };
-        let share = seconds / state.dt;
-        if !(share > 0.0 && share < 1.0) {
-            return Status::Ok;
-        }
         let mut trial = match Trial::begin(scene, loads, state, nodes) {
             Ok(trial) => trial,
             Err(refused) => return refused,

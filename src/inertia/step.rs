@@ -56,23 +56,32 @@ impl LargeView<'_, '_> {
         state: StateView<'_>,
         threads: &impl Threads,
     ) -> Status {
-        let Self { model, storage } = self;
-        let nodes = model.nodes;
-        let mismatch = Status::Mismatch { nodes: scene.node_count(), room: nodes.min(state.capacity()) };
-        let damped = model.method.damper().is_some();
-        let Some(storage) =
-            Storage::split(storage, model.element, [nodes, model.elements], &model.lattice, damped)
-        else {
-            return mismatch;
+        let (model, storage) = match self.opened(scene, &state) {
+            Ok(opened) => opened,
+            Err(mismatch) => return mismatch,
         };
-        if !model.is_for(scene) {
-            return Status::Mismatch { nodes: scene.node_count(), room: 0 };
-        }
         let step = model.step.carried_from(state.dt);
-        match Trial::begin(scene, loads, state, nodes) {
+        match Trial::begin(scene, loads, state, model.nodes) {
             Ok(trial) => trial.take(&step, &mut InertiaStep::new(&step, model, storage, threads)),
             Err(refused) => refused,
         }
+    }
+}
+
+impl<'a, 'w> LargeView<'a, 'w> {
+    /// The model and the parts of its storage, if they are for this scene.
+    pub(super) fn opened<M>(
+        self,
+        scene: SceneView<'_, M>,
+        state: &StateView<'_>,
+    ) -> Result<(&'a mut LargeModel<'w>, Storage<'a>), Status> {
+        let Self { model, storage } = self;
+        let nodes = model.nodes;
+        let mismatch = |room| Status::Mismatch { nodes: scene.node_count(), room };
+        let damped = model.method.damper().is_some();
+        let storage = Storage::split(storage, model.element, [nodes, model.elements], &model.lattice, damped)
+            .ok_or_else(|| mismatch(nodes.min(state.capacity())))?;
+        if model.is_for(scene) { Ok((model, storage)) } else { Err(mismatch(0)) }
     }
 }
 

@@ -25,6 +25,12 @@ impl Errors {
         self.means.last().copied().unwrap_or(f64::NAN)
     }
 
+    /// The largest mean over the nodes at a snapshot.
+    #[must_use]
+    pub fn largest_mean(&self) -> f64 {
+        self.means.iter().copied().fold(0.0, f64::max)
+    }
+
     /// Mean over the snapshots of the mean over the nodes.
     #[must_use]
     pub fn mean_over_time(&self) -> f64 {

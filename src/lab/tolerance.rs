@@ -23,6 +23,9 @@ use crate::io::write_atomically;
 use crate::mlp::Network;
 use crate::step::{Status, Step};
 
+/// The longest step that is tried, over the critical one.
+const LONGEST: u32 = TIMES_CRITICAL[TIMES_CRITICAL.len() - 1];
+
 /// What a scene gave with a tolerance.
 #[derive(Clone, Debug)]
 pub struct Row {
@@ -87,9 +90,7 @@ fn rows(spec: &SceneSpec, truth: &Truth, plan: &Scenes, tolerances: &[f64]) -> R
         let mut multiples: Vec<u32> = (1..=spec.timing.interval)
             .filter(|&multiple| {
                 let times = multiple as f32 * spec.timing.step / limit;
-                spec.timing.hits_snapshots(multiple)
-                    && times > 3.0
-                    && times < 1.5 * TIMES_CRITICAL.iter().max().copied().unwrap_or(1) as f32
+                spec.timing.hits_snapshots(multiple) && (3.0..1.5 * LONGEST as f32).contains(&times)
             })
             .collect();
         // A ladder is enough.
@@ -106,12 +107,11 @@ fn rows(spec: &SceneSpec, truth: &Truth, plan: &Scenes, tolerances: &[f64]) -> R
             }
         }
     }
+    let motion = Errors::of_hold(truth)?.largest_mean();
     tolerances
         .iter()
         .map(|&tolerance| {
             let run = spec.with_material(AdaptiveRun { spec, truth, tolerance })?;
-            let hold = Errors::of_hold(truth)?;
-            let motion = hold.means.iter().copied().fold(0.0, f64::max);
             let right = fixed.iter().filter(|fixed| fixed.error <= tolerance);
             let best = right.min_by(|a, b| a.time.total_cmp(&b.time));
             let best = best.map(|best| (best.method, best.times_critical, best.time));
@@ -122,11 +122,10 @@ fn rows(spec: &SceneSpec, truth: &Truth, plan: &Scenes, tolerances: &[f64]) -> R
 
 fn entry(row: &run::Row) -> Option<Fixed> {
     let figures = row.figures()?;
-    let error = figures.errors.means.iter().copied().fold(0.0, f64::max);
     Some(Fixed {
         method: row.method.name(),
         times_critical: row.step_over_limit_rest,
-        error,
+        error: figures.errors.largest_mean(),
         time: figures.us_per_step / row.step,
     })
 }
@@ -145,8 +144,7 @@ impl MaterialWork for AdaptiveRun<'_> {
         let scene = spec.build(material)?;
         let mut state = spec.state(&scene, spec.timing.step / spec.timing.refinement as f32)?;
         let interval = spec.timing.interval_seconds();
-        let most = TIMES_CRITICAL.iter().max().copied().unwrap_or(1);
-        let parts = (interval / (f64::from(most) * truth.limit_at_rest)).ceil().max(1.0);
+        let parts = (interval / (f64::from(LONGEST) * truth.limit_at_rest)).ceil().max(1.0);
         let longest = Step::unchecked((interval / parts) as f32, spec.damping)?;
         let request = Request { tolerance: (1e-3 * tolerance) as f32, longest };
         let damper = Damper::new(Network::parse(networks::damper())?)?;
@@ -175,13 +173,12 @@ impl MaterialWork for AdaptiveRun<'_> {
                 break;
             }
         }
-        let error = errors.means.iter().copied().fold(0.0, f64::max);
         let share = |count: u32| f64::from(count) / spec.intervals as f64;
         Ok(Row {
             scene: spec.name,
             tolerance,
             motion: 0.0,
-            error: if refused { f64::INFINITY } else { error },
+            error: if refused { f64::INFINITY } else { errors.largest_mean() },
             doubted: share(doubted),
             silent: share(silent),
             time: 1e6 * spent / state.time(),

@@ -2,6 +2,7 @@
 //! after which it turns out to be shorter than they were are undone and taken again in halves: a sudden load on one node may stiffen its
 //! elements tenfold in one step.
 
+use crate::copy::copy;
 use crate::element::ElementMaterial;
 use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::SceneView;
@@ -11,10 +12,6 @@ use crate::step::{CriticalStep, Status, Step, Threads};
 
 use super::{critical_step, step_in_parts};
 
-/// Share of the critical step that is taken.
-const SHARE: f32 = 0.9;
-/// Most steps between two looks at the critical step.
-const STEPS_BETWEEN_LOOKS: u32 = 50;
 /// By which share the critical step may fall between two looks.
 const FALL: f32 = 0.03;
 /// By which share per step a step grows after it had to shrink. Slowly: steps that change in time with the motion feed energy into it
@@ -58,17 +55,17 @@ pub const fn vectors_for_pace(nodes: usize) -> usize {
 }
 
 impl Pace {
+    /// Share of the critical step that is taken.
+    pub const SHARE: f32 = 0.9;
+    /// Most steps between two looks at the critical step.
+    pub const STEPS_BETWEEN_LOOKS: u32 = 50;
+
     /// Steps of [`Pace::SHARE`] of a critical step at first.
     #[must_use]
     pub const fn new(critical: CriticalStep) -> Self {
         let CriticalStep { seconds, .. } = critical;
-        Self { shortest: SHORTEST * seconds, longest: SHARE * seconds, critical: seconds, steps: 1 }
+        Self { shortest: SHORTEST * seconds, longest: Self::SHARE * seconds, critical: seconds, steps: 1 }
     }
-
-    /// Share of the critical step that is taken.
-    pub const SHARE: f32 = SHARE;
-    /// Most steps between two looks at the critical step.
-    pub const STEPS_BETWEEN_LOOKS: u32 = STEPS_BETWEEN_LOOKS;
 
     /// The longest step at present, s.
     #[must_use]
@@ -128,16 +125,10 @@ impl Pace {
         // Look more often while the critical step falls fast.
         let fall = (1.0 - now / self.critical).max(0.0);
         let steps = (FALL / fall * self.steps as f32) as u32;
-        self.steps = steps.min(2 * self.steps).clamp(1, STEPS_BETWEEN_LOOKS);
-        self.longest = (self.longest * (1.0 + GROWTH * count as f32)).min(SHARE * now);
+        self.steps = steps.min(2 * self.steps).clamp(1, Self::STEPS_BETWEEN_LOOKS);
+        self.longest = (self.longest * (1.0 + GROWTH * count as f32)).min(Self::SHARE * now);
         self.critical = now;
         refused.map_or(Approach::Taken { count, seconds }, Approach::Refused)
-    }
-}
-
-fn copy(to: &mut [NodeVector], from: &[NodeVector]) {
-    for (to, from) in to.iter_mut().zip(from) {
-        *to = *from;
     }
 }
 

@@ -74,6 +74,18 @@ static inline void move_end(supple_scene *scene, supple_loads *loads, float x, f
     CHECK(supple_set_motions(loads, scene, motions, MOTIONS, NULL) == SUPPLE_OK);
 }
 
+/* The checksum of a saved state. */
+static inline uint32_t crc32_of(const unsigned char *bytes, size_t count) {
+    uint32_t sum = ~0u;
+    for (size_t at = 0; at < count; at++) {
+        sum ^= bytes[at];
+        for (int bit = 0; bit < 8; bit++) {
+            sum = sum >> 1 ^ (sum & 1 ? 0xedb88320u : 0u);
+        }
+    }
+    return ~sum;
+}
+
 /* A whole file at a multiple of 64 bytes; `bytes` receives its length. */
 static inline const void *file(const char *path, void *room, size_t most, size_t *bytes) {
     FILE *from = fopen(path, "rb");

@@ -391,17 +391,6 @@ static supple_status set_step(void) {
     return supple_set_step(scene, state, one_in(60) ? NULL : &config, wanted());
 }
 
-static uint32_t crc32_of(const unsigned char *bytes, size_t count) {
-    uint32_t sum = ~0u;
-    for (size_t at = 0; at < count; at++) {
-        sum ^= bytes[at];
-        for (int bit = 0; bit < 8; bit++) {
-            sum = sum >> 1 ^ (sum & 1 ? 0xedb88320u : 0u);
-        }
-    }
-    return ~sum;
-}
-
 /* Where a saved state, damaged and its checksum put right, may come from. */
 static supple_status save_and_restore(void) {
     supple_state *state = object(STATE, 1);

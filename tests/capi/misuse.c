@@ -71,17 +71,6 @@ static void note(supple_status status) { seen[(unsigned char)(status + 128)] = 1
         }                                                                                                              \
     } while (0)
 
-static uint32_t crc32_of(const unsigned char *bytes, size_t count) {
-    uint32_t sum = ~0u;
-    for (size_t at = 0; at < count; at++) {
-        sum ^= bytes[at];
-        for (int bit = 0; bit < 8; bit++) {
-            sum = sum >> 1 ^ (sum & 1 ? 0xedb88320u : 0u);
-        }
-    }
-    return ~sum;
-}
-
 /* Where the energy balance and the vectors are in it. */
 enum { BALANCE = 48, FRONT = 96 };
 

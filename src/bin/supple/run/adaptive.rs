@@ -34,8 +34,10 @@ impl AdaptiveRun {
     ) -> Result<Self, Problem> {
         let method = on_grid(method, grid(setup, scene, method)?);
         let points = &setup.body.local;
-        let tolerance =
-            setup.time.tolerance.unwrap_or_else(|| TOLERANCE.min(SHARE_OF_SIZE * diagonal(points)));
+        let tolerance = setup
+            .time
+            .tolerance
+            .unwrap_or_else(|| TOLERANCE.min(SHARE_OF_SIZE * setup.body.diagonal() as f32));
         let request = Request { tolerance, longest };
         let adaptive = Adaptive::prepare_in_vec(method, scene, points, state.view(), request)
             .map_err(|error| Problem(format!("{}: {error}", setup.body.name)))?;
@@ -65,13 +67,4 @@ impl AdaptiveRun {
         (*shortest, *longest) = (shortest.min(model.seconds()), longest.max(model.seconds()));
         outcome.guard.get_or_insert_default().enter(status, model.estimate(), state.time());
     }
-}
-
-/// Of the box around points, m.
-fn diagonal(points: &[[f32; 3]]) -> f32 {
-    let side = |axis: usize| {
-        let values = || points.iter().map(|point| point[axis]);
-        values().fold(f32::NEG_INFINITY, f32::max) - values().fold(f32::INFINITY, f32::min)
-    };
-    (0..3).map(|axis| side(axis).powi(2)).sum::<f32>().sqrt()
 }

@@ -98,11 +98,6 @@ impl Automatic {
     }
 }
 
-/// The least number of equal steps, each at most `longest` (s), that make up a span (s).
-pub(crate) fn whole_steps(span: f64, longest: f64) -> f64 {
-    (span / longest).ceil().max(1.0)
-}
-
 /// Takes so many exact steps, or until one diverges.
 fn take<M: ElementMaterial>(
     motion: &Motion<'_, M>,

@@ -8,7 +8,7 @@ use supple::step::{CriticalStep, Step};
 use supple::tled::{self, Pace};
 
 use super::adaptive::AdaptiveRun;
-use super::exact::{Automatic, ExactSteps, Motion, whole_steps};
+use super::exact::{Automatic, ExactSteps, Motion};
 use super::large::{PreparedStep, grid, on_grid, prepare};
 use super::learned::LearnedRun;
 use super::outcome::Outcome;
@@ -172,6 +172,11 @@ fn fitted(seconds: f32, end: f64, frames: u32) -> f32 {
     // `seconds` may have been rounded down.
     let count = whole_steps(interval, longest * (1.0 + f64::from(f32::EPSILON)));
     ((interval / count) as f32).min(seconds)
+}
+
+/// The least number of equal steps, each at most `longest` (s), that make up a span (s).
+fn whole_steps(span: f64, longest: f64) -> f64 {
+    (span / longest).ceil().max(1.0)
 }
 
 /// The bound of the critical step at the state, or a problem: there is none for a state that is not finite.
