@@ -275,12 +275,12 @@ impl AdaptiveView<'_, '_> {
             };
             match status {
                 Ok(status) => worst = worse(worst, status),
-                Err(refused) => return (refused, taken),
+                Err(last) => return (worse(worst, last), taken),
             }
         }
     }
 
-    /// Takes exact steps until the next look at the critical step. The worst status, or that of a refusal.
+    /// Takes exact steps until the next look at the critical step. The worst status, or that with which the span ends early.
     fn exact_steps<M: ElementMaterial>(
         &mut self,
         left: f64,
@@ -319,6 +319,8 @@ impl AdaptiveView<'_, '_> {
         let answer =
             pace.approach(left, longest.damping(), scene, loads, state.reborrow(), kept, threads, enter);
         match answer {
+            // The rest of the span is no step.
+            Approach::TooShort => Err(worst),
             Approach::Taken { .. } => {
                 if control.ends_probe() {
                     let loads = loads.of_step(&state, longest.seconds(), 1);
@@ -335,7 +337,7 @@ impl AdaptiveView<'_, '_> {
     }
 
     /// Takes steps of one length beyond the critical step to the end of the span, or until another length is better. The worst status,
-    /// or that of a refusal by which nothing can be done.
+    /// or that with which the span ends early.
     fn large_steps<M: ElementMaterial>(
         &mut self,
         left: f64,
@@ -346,10 +348,13 @@ impl AdaptiveView<'_, '_> {
         taken: &mut Taken,
     ) -> Result<Status, Status> {
         let mismatch = Status::Mismatch { nodes: scene.node_count(), room: 0 };
-        let count = libm::ceil(left / f64::from(self.chooser.seconds()) * (1.0 - ROUNDING)).max(1.0);
-        let seconds = (left / count) as f32;
+        let length = self.chooser.seconds();
+        let count = libm::ceil(left / f64::from(length) * (1.0 - ROUNDING)).max(1.0);
+        // No longer than was prepared, though the span is by a rounding.
+        let seconds = ((left / count) as f32).min(length);
         if self.first.set_seconds(seconds).is_err() {
-            return Err(mismatch);
+            // The rest of the span is no step.
+            return Err(Status::Ok);
         }
         let (count, mut worst) = (count as u32, Status::Ok);
         for done in 0..count {

@@ -19,6 +19,8 @@ const FALL: f32 = 0.03;
 const GROWTH: f32 = 0.002;
 /// Share of the first critical step below which a step is not halved any further.
 const SHORTEST: f32 = 1e-4;
+/// The same in seconds: [`Step::unchecked`] takes no shorter ones, and a span is cut in steps of half of it or more.
+const LEAST: f32 = 4e-18;
 
 /// How long exact steps may be at present.
 #[derive(Clone, Copy, Debug)]
@@ -35,13 +37,13 @@ pub struct Pace {
 /// What became of some steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Approach {
-    /// So many were taken, of this length, s.
+    /// Some were taken.
     Taken {
-        /// Steps.
-        count: u32,
         /// Their length, s.
         seconds: f32,
     },
+    /// None was taken: the span is shorter than any step.
+    TooShort,
     /// They were too long: the state is as before.
     Undone,
     /// The step of this length (s) is refused, and a shorter one is of no use.
@@ -64,7 +66,12 @@ impl Pace {
     #[must_use]
     pub const fn new(critical: CriticalStep) -> Self {
         let CriticalStep { seconds, .. } = critical;
-        Self { shortest: SHORTEST * seconds, longest: Self::SHARE * seconds, critical: seconds, steps: 1 }
+        Self {
+            shortest: (SHORTEST * seconds).max(LEAST),
+            longest: Self::SHARE * seconds,
+            critical: seconds,
+            steps: 1,
+        }
     }
 
     /// The longest step at present, s.
@@ -94,7 +101,7 @@ impl Pace {
     ) -> Approach {
         let whole = whole_steps(left, f64::from(self.longest));
         let Ok(step) = Step::unchecked((left / whole) as f32, damping) else {
-            return Approach::Taken { count: 0, seconds: 0.0 };
+            return Approach::TooShort;
         };
         let seconds = step.seconds();
         let nodes = scene.node_count();
@@ -126,9 +133,11 @@ impl Pace {
         let fall = (1.0 - now / self.critical).max(0.0);
         let steps = (FALL / fall * self.steps as f32) as u32;
         self.steps = steps.min(2 * self.steps).clamp(1, Self::STEPS_BETWEEN_LOOKS);
-        self.longest = (self.longest * (1.0 + GROWTH * count as f32)).min(Self::SHARE * now);
+        // No shorter than is of use: a state without a critical step is refused by the step itself.
+        self.longest =
+            (self.longest * (1.0 + GROWTH * count as f32)).min(Self::SHARE * now).max(self.shortest);
         self.critical = now;
-        refused.map_or(Approach::Taken { count, seconds }, Approach::Refused)
+        refused.map_or(Approach::Taken { seconds }, Approach::Refused)
     }
 }
 

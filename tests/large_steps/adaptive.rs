@@ -6,7 +6,7 @@ use supple::inertia::{Cells, Method};
 use supple::loads::{Loads, NodalForce};
 use supple::material::{Exponential, Tissue};
 use supple::scene::VecScene;
-use supple::state::{NodeVector, VecState};
+use supple::state::{NodeVector, Progress, StateView, VecState};
 use supple::step::{Status, Step};
 use supple::tled;
 
@@ -185,8 +185,45 @@ fn a_span_that_is_none_moves_nothing() {
     let mut state = rest_of(&scene);
     let mut adaptive = adaptive(&body, &scene, &mut state, 1e-4, DAMPING);
     let mut loads = Loads::new(&scene, [1.0, 0.0, 0.0], &[], &[]).unwrap();
-    for seconds in [0.0, -1.0, f32::NAN, f32::NEG_INFINITY] {
+    for seconds in [0.0, -1.0, 1e-20, f32::MIN_POSITIVE, f32::NAN, f32::NEG_INFINITY] {
         let (status, taken) = adaptive.advance(seconds, scene.view(), &mut loads, state.view());
         assert_eq!((status, taken, state.steps()), (Status::Ok, Taken::default(), 0), "{seconds}");
+    }
+}
+
+/// A host's frames are not of the length of the longest step to the last bit.
+#[test]
+fn frames_that_are_longer_by_a_rounding_are_followed() {
+    let (body, scene) = bar();
+    let mut state = rest_of(&scene);
+    let mut adaptive = adaptive(&body, &scene, &mut state, 5e-3, DAMPING);
+    let mut loads = Loads::new(&scene, [0.1, 0.0, 0.0], &[], &[]).unwrap();
+    let mut last = Taken::default();
+    for frame in 0..60 {
+        let longer = FRAME * (1.0 + (frame % 8) as f32 * f32::EPSILON);
+        let (status, taken) = adaptive.advance(longer, scene.view(), &mut loads, state.view());
+        assert_eq!(status, Status::Ok, "frame {frame}");
+        last = taken;
+    }
+    let expected = Taken { exact: 0, large: 1, changes: 0 };
+    assert_eq!((last, adaptive.model().seconds()), (expected, FRAME), "the longest step is not in use");
+}
+
+/// A state that is no state is refused at every call, in a time that is bounded.
+#[test]
+fn a_state_without_a_critical_step_is_refused() {
+    let (body, scene) = bar();
+    let mut state = rest_of(&scene);
+    let mut adaptive = adaptive(&body, &scene, &mut state, 1e-4, DAMPING);
+    let mut loads = Loads::new(&scene, [1.0, 0.0, 0.0], &[], &[]).unwrap();
+    let nodes = scene.view().node_count();
+    let [mut displacement, mut increment, mut force] = [f32::NAN, 0.0, 0.0]
+        .map(|component| vec![bytemuck::cast::<[f32; 4], NodeVector>([component; 4]); nodes]);
+    let mut progress = Progress::START;
+    let mut lost = StateView::new(&mut displacement, &mut increment, &mut force, &mut [], &mut progress);
+    for _ in 0..3 {
+        let (status, taken) = adaptive.advance(FRAME, scene.view(), &mut loads, lost.reborrow());
+        assert!(matches!(status, Status::Diverged(_)) && taken == Taken::default(), "{status:?} {taken:?}");
+        assert_eq!(lost.steps(), 0);
     }
 }

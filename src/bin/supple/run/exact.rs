@@ -88,7 +88,9 @@ impl Automatic {
             let enter = |status, _: &Loads<'_>, state: &StateView<'_>| outcome.enter(status, state);
             match self.pace.approach(left, damping, scene, &mut loads, view, kept, &CallingThread, enter) {
                 Approach::Undone => (outcome.limits, outcome.divergence) = (before, None),
-                Approach::Taken { seconds, .. } => {
+                // The rest is no step.
+                Approach::TooShort => return,
+                Approach::Taken { seconds } => {
                     let (shortest, longest) = &mut outcome.steps;
                     (*shortest, *longest) = (shortest.min(seconds), longest.max(seconds));
                 }
