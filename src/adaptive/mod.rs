@@ -16,7 +16,7 @@ use core::ops::Add;
 
 use crate::element::ElementMaterial;
 use crate::guard::{self, Allowed, Estimate, GuardView, Watch, judged};
-use crate::inertia::{InertiaError, LargeModel, Method, Report, carry, vectors_for as vectors_for_method};
+use crate::inertia::{InertiaError, LargeModel, Method, Report, vectors_for as vectors_for_method};
 use crate::loads::{Loads, LoadsOverTime};
 use crate::material::Material;
 use crate::scene::SceneView;
@@ -364,6 +364,9 @@ impl AdaptiveView<'_, '_> {
             };
             let status =
                 self.first.with_storage(first).step_in_parts(scene, &loads, state.reborrow(), threads);
+            if matches!(status, Status::Mismatch { .. }) {
+                return Err(status);
+            }
             if !status.is_taken() {
                 // The length of the second run's steps can change only where both runs are at the same time.
                 self.watch.compare_next();
@@ -377,7 +380,7 @@ impl AdaptiveView<'_, '_> {
             if !status.is_taken() {
                 control.refused(estimate);
                 self.change(scene, None, state, threads, taken);
-                return if matches!(status, Status::Mismatch { .. }) { Err(status) } else { Ok(worst) };
+                return Ok(worst);
             }
             taken.large += 1;
             control.wait(seconds);
@@ -395,7 +398,7 @@ impl AdaptiveView<'_, '_> {
         &mut self,
         scene: SceneView<'_, M>,
         loads: Option<&Loads<'_>>,
-        state: StateView<'_>,
+        mut state: StateView<'_>,
         threads: &impl Threads,
         taken: &mut Taken,
     ) {
@@ -408,7 +411,9 @@ impl AdaptiveView<'_, '_> {
             Some(loads) => {
                 let _ = large.with_storage(parts.first).shorten(seconds, scene, loads, state, threads);
             }
-            None => carry(seconds, state),
+            // Without acceleration: the load has acted for no time yet.
+            None if seconds < state.last_step() => state.respan(seconds),
+            None => {}
         }
         let Ok(step) = Step::unchecked(seconds, longest.damping()) else { return };
         if chooser.control.halvings().is_none() {

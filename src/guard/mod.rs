@@ -21,7 +21,7 @@ pub(crate) use estimate::{exceeds, judged};
 
 use crate::copy::copy;
 use crate::element::ElementMaterial;
-use crate::inertia::{Cells, InertiaError, LargeModel, Method, carry, vectors_for as vectors_for_method};
+use crate::inertia::{Cells, InertiaError, LargeModel, Method, vectors_for as vectors_for_method};
 use crate::loads::Loads;
 use crate::material::{Element, Material};
 use crate::scene::SceneView;
@@ -211,8 +211,8 @@ impl GuardView<'_> {
             (Some((second, of_second)), Some(loads)) => {
                 let _ = large.with_storage(of_second).shorten(seconds, scene, loads, second, threads);
             }
-            (Some((second, _)), None) => carry(seconds, second),
-            (None, _) => {}
+            (Some((mut second, _)), None) if seconds < second.last_step() => second.respan(seconds),
+            _ => {}
         }
         large.change_step(step);
         (watch.longest, watch.interval) = (seconds, seconds);

@@ -117,7 +117,6 @@ pub(crate) use lattice::size_of;
 pub use lattice::{Grid, MAX_FUNCTIONS, MAX_POINTS};
 pub use method::{Cells, Method, vectors_for, vectors_for_lattice};
 pub use report::Report;
-pub(crate) use shorten::carry;
 
 use core::fmt;
 

@@ -17,21 +17,6 @@ use crate::simd::NodeVector;
 use crate::state::StateView;
 use crate::step::{Status, Step, StepMethod, Threads, Trial};
 
-/// What share of the last step a shorter one of `seconds` is. None for longer ones, for a state at rest, and for lengths that are none.
-fn share_of(seconds: f32, state: &StateView<'_>) -> Option<f32> {
-    let share = seconds / state.dt;
-    (share > 0.0 && share < 1.0).then_some(share)
-}
-
-/// The same without acceleration, where a step was refused: its forces are those of a load that has acted for no time yet.
-pub(crate) fn carry(seconds: f32, state: StateView<'_>) {
-    let Some(share) = share_of(seconds, &state) else { return };
-    for NodeVector(last) in state.increment.iter_mut() {
-        *last = last.map(|component| share * component);
-    }
-    state.progress.dt = seconds;
-}
-
 impl LargeView<'_, '_> {
     /// To be called between the last long step and the first shorter one of any method, of `seconds`. Moves no node, and costs a step. A
     /// state whose last step was shorter stays as it is.
@@ -48,8 +33,12 @@ impl LargeView<'_, '_> {
             Err(mismatch) => return mismatch,
         };
         let nodes = model.nodes;
-        let Some(share) = share_of(seconds, &state) else { return Status::Ok };
+        // Nothing to do for a state at rest, and for lengths that are none.
+        let share = seconds / state.dt;
         let Ok(step) = Step::unchecked(state.dt, model.step.damping()) else { return Status::Ok };
+        if !(share > 0.0 && share < 1.0) {
+            return Status::Ok;
+        }
         let mut trial = match Trial::begin(scene, loads, state, nodes) {
             Ok(trial) => trial,
             Err(refused) => return refused,
