@@ -1207,7 +1207,7 @@ supple_status supple_save(const supple_state *state, void *to, size_t bytes);
 /**
  * Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the saved one
  * would have, to the bit. Forces are zero until the next step. A saved state with a time, a displacement or an increment that is not
- * finite is refused: SUPPLE_E_NOT_FINITE. A supple_large has to be prepared again, and a
+ * finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE. A supple_large has to be prepared again, and a
  * supple_learned needs a new lead-in; for the same bits with these, copy their objects with memcpy as well.
  */
 supple_status supple_restore(supple_state *state,

@@ -231,7 +231,8 @@ impl<'a> Loads<'a> {
 #[inline]
 #[must_use]
 pub fn ramp_factor(time: f64, ramp: f32) -> f32 {
-    if time < f64::from(ramp) { (time / f64::from(ramp)) as f32 } else { 1.0 }
+    // Before the start, where a state of the host's may be, a ramp has not begun.
+    if ramp > 0.0 && time < f64::from(ramp) { (time / f64::from(ramp)).max(0.0) as f32 } else { 1.0 }
 }
 
 /// Nodal forces of a uniform traction (Pa) on boundary triangles at rest: a third of traction times area

@@ -102,7 +102,7 @@ pub unsafe extern "C" fn supple_save(
 
 /// Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the saved one
 /// would have, to the bit. Forces are zero until the next step. A saved state with a time, a displacement or an increment that is not
-/// finite is refused: SUPPLE_E_NOT_FINITE. A supple_large has to be prepared again, and a
+/// finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE. A supple_large has to be prepared again, and a
 /// supple_learned needs a new lead-in; for the same bits with these, copy their objects with memcpy as well.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_restore(
@@ -163,7 +163,8 @@ fn check_finite(front: &Front, rest: &[u8]) -> Answer<()> {
         |vector: &[[u8; 4]]| vector.iter().take(3).all(|&bytes| f32::from_le_bytes(bytes).is_finite());
     let vectors = components.chunks(4).all(three);
     let length = front.last_step.is_finite() && front.last_step >= 0.0;
-    if vectors && length && front.time.is_finite() { Ok(()) } else { Err(SUPPLE_E_NOT_FINITE.into()) }
+    let time = front.time.is_finite() && front.time >= 0.0;
+    if vectors && length && time { Ok(()) } else { Err(SUPPLE_E_NOT_FINITE.into()) }
 }
 
 fn checksum(front: &Front, rest: &[u8]) -> u32 {

@@ -16,6 +16,16 @@ use crate::{each_law, reference, support};
 
 const DT: f32 = 1e-4;
 
+/// Whatever time a host's state has, a ramp is a share, and the smallest one is no lever.
+#[test]
+fn ramps_have_not_begun_before_the_start() {
+    for (time, ramp, factor) in
+        [(-0.01, 1e-40, 0.0), (-0.01, 0.2, 0.0), (0.0, 0.2, 0.0), (-0.01, 0.0, 1.0), (0.1, 0.2, 0.5)]
+    {
+        assert_eq!(ramp_factor(time, ramp), factor, "{time} {ramp}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
