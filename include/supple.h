@@ -439,6 +439,11 @@ typedef struct supple_learned supple_learned;
 typedef struct supple_loads supple_loads;
 
 /**
+ * The reaction of some supports. It may be copied with memcpy together with its state.
+ */
+typedef struct supple_reaction supple_reaction;
+
+/**
  * What is simulated: element tables, masses, supports. After supple_scene_init nothing changes it: any
  * number of threads may use one scene at the same time.
  */
@@ -971,6 +976,25 @@ typedef struct {
     supple_estimate estimate;
 } supple_adaptive_report;
 
+/**
+ * The force by which supports act on the tissue, the mean since the last call of supple_reaction_follow, N.
+ */
+typedef struct {
+    /**
+     * 1 if there is a force; 0 at the first call and after a reset or a restore: the other fields mean nothing.
+     */
+    uint32_t known;
+    /**
+     * 1 if the steps resolve it: `spread` is at most a quarter of it. 0: do not use it.
+     */
+    uint32_t resolved;
+    float newton[3];
+    /**
+     * How far the force at the supports alone is from it.
+     */
+    float spread;
+} supple_reaction_force;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -1416,6 +1440,38 @@ supple_status supple_adaptive_advance(const supple_scene *scene,
                                       const supple_threads *threads,
                                       supple_report *report,
                                       supple_adaptive_report *taken);
+
+/**
+ * Bytes of memory that a supple_reaction needs for a scene of so many nodes; 0 if there is no such size.
+ */
+size_t supple_reaction_size(uint32_t nodes);
+
+/**
+ * Prepares the reaction of some supports in `memory` of at least supple_reaction_size bytes, aligned to SUPPLE_ALIGN. It takes as long
+ * as some hundred steps.
+ *
+ * @param supports numbers of nodes that the scene holds, an instrument's for example.
+ * @param count how many, at least 1.
+ * @param damping of the steps, 1/s.
+ * @param error may be NULL.
+ */
+supple_status supple_reaction_init(void *memory,
+                                   size_t bytes,
+                                   const supple_scene *scene,
+                                   const uint32_t *supports,
+                                   size_t count,
+                                   float damping,
+                                   supple_reaction **reaction,
+                                   supple_error *error);
+
+/**
+ * Writes the mean force by which the supports have acted since the last call. To be called before the first step and after each
+ * frame's steps, of any kind.
+ */
+supple_status supple_reaction_follow(const supple_scene *scene,
+                                     supple_state *state,
+                                     supple_reaction *reaction,
+                                     supple_reaction_force *force);
 
 #ifdef __cplusplus
 }  // extern "C"

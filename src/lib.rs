@@ -115,6 +115,7 @@
 //! | [`step`] | the protocol of every step: begin, compute, energy balance, accept or refuse; threads |
 //! | [`tled`] | the exact step and the critical step |
 //! | [`guard`] | may a step be believed: a second run that estimates its error |
+//! | [`reaction`] | the force by which supports act on the tissue, also in long steps |
 //! | [`adaptive`] | steps that choose their length so that their error stays below a tolerance |
 //! | [`inertia`] | steps beyond the critical one: mass-scaled, multilevel, damped |
 //! | [`mlp`] | dense layers: the forward pass, the weight file |
@@ -160,6 +161,7 @@ pub mod material;
 pub mod mesh;
 pub mod mlp;
 mod padding;
+pub mod reaction;
 pub mod scene;
 pub mod simd;
 pub mod state;

@@ -40,5 +40,7 @@ mod guard;
 
 mod adaptive;
 
+mod reaction;
+
 #[cfg(test)]
 mod memory_tests;

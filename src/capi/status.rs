@@ -9,6 +9,7 @@ use crate::learned::LearnedError;
 use crate::loads::LoadError;
 use crate::mesh::MeshError;
 use crate::mlp::WeightError;
+use crate::reaction::ReactionError;
 use crate::scene::BuildError;
 use crate::step::StepError;
 
@@ -277,6 +278,21 @@ impl From<LoadError> for supple_error {
             }
             LoadError::Ramp { index, value, .. } => is(SUPPLE_E_NEGATIVE).at(index).value(value.into(), 0.0),
             LoadError::NotHeld { index, node, axis } => is(SUPPLE_E_NOT_HELD).at(index).node(node).axis(axis),
+        }
+    }
+}
+
+impl From<ReactionError> for supple_error {
+    fn from(error: ReactionError) -> Self {
+        let is = Self::from;
+        match error {
+            ReactionError::Capacity { needed, capacity } => short(capacity, needed),
+            ReactionError::Empty => is(SUPPLE_E_NOT_HELD),
+            ReactionError::Node { index, node, nodes } => {
+                is(SUPPLE_E_INDEX).at(index).node(node).value(node.into(), nodes as f64)
+            }
+            ReactionError::NotHeld { index, node } => is(SUPPLE_E_NOT_HELD).at(index).node(node),
+            ReactionError::Damping { damping } => is(SUPPLE_E_NEGATIVE).value(damping.into(), 0.0),
         }
     }
 }

@@ -81,7 +81,12 @@ int main(void) {
     for (int frame = 0; frame < 25; frame++) {
         CHECK(supple_adaptive_advance(scene, loads, state, adaptive, 0.01f, NULL, NULL, NULL) >= 0);
     }
+    const uint32_t end = NODES - 1;
+    supple_reaction *reaction;
+    supple_reaction_force force;
+    CHECK(supple_reaction_init(guard_memory, sizeof guard_memory, scene, &end, 1, 20.0f, &reaction, NULL) == SUPPLE_OK);
+    CHECK(supple_reaction_follow(scene, state, reaction, &force) == SUPPLE_OK);
     CHECK(asked == 0);
-    printf("heap: a scene, exact, learned, damped and adaptive steps, a guard: never asked\n");
+    printf("heap: a scene, exact, learned, damped and adaptive steps, a guard, a reaction: never asked\n");
     return 0;
 }

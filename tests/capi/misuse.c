@@ -564,6 +564,37 @@ static void adaptive_steps(void) {
            1e3 * (double)taken.estimate.mean);
 }
 
+/* The force of the far end, which an exact step moves. */
+static void reactions(void) {
+    supple_reaction *none = NULL, *reaction = NULL;
+    supple_reaction_force force;
+    const uint32_t held[2] = {0, NODES - 1}, beyond = NODES, inside = NODES / 2;
+    const size_t bytes = supple_reaction_size(NODES);
+    CHECK(bytes > 16 * NODES && bytes <= sizeof spare);
+    DONE(supple_state_reset(state));
+    REFUSED(SUPPLE_E_SHORT, supple_reaction_init(spare, bytes - 1, scene, held, 2, 20.0f, &none, &error));
+    CHECK(error.limit == (double)bytes);
+    REFUSED(SUPPLE_E_NULL, supple_reaction_init(spare, sizeof spare, scene, NULL, 2, 20.0f, &none, &error));
+    REFUSED(SUPPLE_E_NOT_HELD, supple_reaction_init(spare, sizeof spare, scene, held, 0, 20.0f, &none, &error));
+    REFUSED(SUPPLE_E_NOT_HELD, supple_reaction_init(spare, sizeof spare, scene, &inside, 1, 20.0f, &none, &error));
+    CHECK(error.index == 0 && error.node == NODES / 2);
+    REFUSED(SUPPLE_E_INDEX, supple_reaction_init(spare, sizeof spare, scene, &beyond, 1, 20.0f, &none, &error));
+    REFUSED(SUPPLE_E_NEGATIVE, supple_reaction_init(spare, sizeof spare, scene, held, 2, NAN, &none, &error));
+    DONE(supple_reaction_init(spare, sizeof spare, scene, held + 1, 1, 20.0f, &reaction, &error));
+    REFUSED(SUPPLE_E_NULL, supple_reaction_follow(scene, state, NULL, &force));
+    REFUSED(SUPPLE_E_NULL, supple_reaction_follow(scene, state, reaction, NULL));
+    REFUSED(SUPPLE_E_MISMATCH, supple_reaction_follow(small_scene, small_state, reaction, &force));
+    DONE(supple_reaction_follow(scene, state, reaction, &force));
+    CHECK(force.known == 0);
+    const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), 3e-5f, 20.0f};
+    DONE(supple_set_step(scene, state, &step, NULL));
+    move_end(scene, loads, 1e-4f, 0.0f, 0.01f);
+    CHECK(supple_step(scene, loads, state, 400, NULL, NULL) >= 0);
+    DONE(supple_reaction_follow(scene, state, reaction, &force));
+    CHECK(force.known == 1 && force.newton[0] > 0.0f && force.spread >= 0.0f);
+    printf("reaction: %.2f mN, spread %.2f mN\n", 1e3 * (double)force.newton[0], 1e3 * (double)force.spread);
+}
+
 int main(int argc, char **argv) {
     (void)argv;
     watched = argc == 1;
@@ -593,6 +624,7 @@ int main(int argc, char **argv) {
     divergence();
     guards();
     adaptive_steps();
+    reactions();
     DONE(supple_state_reset(state));
     REFUSED(SUPPLE_E_ELEMENT, supple_step(other_element(config), NULL, state, 1, NULL, NULL));
 

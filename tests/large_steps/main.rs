@@ -13,6 +13,7 @@ mod adaptive;
 mod damper;
 mod guard;
 mod pulled;
+mod reaction;
 mod refused;
 mod switching;
 mod turning;
