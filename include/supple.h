@@ -981,7 +981,7 @@ typedef struct {
  */
 typedef struct {
     /**
-     * 1 if there is a force; 0 at the first call and after a reset or a restore: the other fields mean nothing.
+     * 1 if there is a force; 0 at the first call, after a reset or a restore, and where it is no finite number: the other fields mean nothing.
      */
     uint32_t known;
     /**

@@ -101,6 +101,10 @@ pub struct Force {
 }
 
 impl Force {
+    fn is_finite(&self) -> bool {
+        self.newton.iter().all(|component| component.is_finite()) && self.spread.is_finite()
+    }
+
     /// Whether the steps resolve the force: the spread is at most a quarter of it.
     #[must_use]
     pub fn is_resolved(&self) -> bool {
@@ -215,7 +219,7 @@ impl ReactionModel {
         }
         let now = Sample { time, steps, sums: sums(scene, state, storage) };
         let before = self.last.replace(now).filter(|last| last.steps < steps && last.time < time);
-        self.force = before.map(|before| self.between(&before, &now));
+        self.force = before.map(|before| self.between(&before, &now)).filter(Force::is_finite);
         self.force
     }
 
@@ -303,7 +307,7 @@ impl<S: AsMut<[NodeVector]> + AsRef<[NodeVector]>> Reaction<S> {
     }
 
     /// To be called after each frame's steps, of any kind, with the state that they left: the mean force since the last call. None at the
-    /// first call, after a reset or a restore to an earlier time, and for another scene; call it before the first step for a force after it. Costs a pass over the nodes.
+    /// first call, after a reset or a restore to an earlier time, for another scene, and where it is no finite number; call it before the first step for a force after it. Costs a pass over the nodes.
     pub fn follow<M: Material>(&mut self, scene: SceneView<'_, M>, state: &StateView<'_>) -> Option<Force> {
         self.model.follow(scene, state, self.storage.as_ref())
     }

@@ -16,7 +16,7 @@ use supple_status::*;
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_reaction_force {
-    /// 1 if there is a force; 0 at the first call and after a reset or a restore: the other fields mean nothing.
+    /// 1 if there is a force; 0 at the first call, after a reset or a restore, and where it is no finite number: the other fields mean nothing.
     pub known: u32,
     /// 1 if the steps resolve it: `spread` is at most a quarter of it. 0: do not use it.
     pub resolved: u32,

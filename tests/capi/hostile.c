@@ -72,7 +72,7 @@ static void *end_of(const arena *in, size_t bytes) {
 }
 
 /* Objects of all kinds: what a call is told to be at an address may be of any kind. */
-enum { SCENE, STATE, LOADS, LEARNED, LARGE, GUARD, KINDS };
+enum { SCENE, STATE, LOADS, LEARNED, LARGE, GUARD, REACTION, KINDS };
 enum { EACH = 3, SLOTS = KINDS * EACH };
 static struct {
     arena in;
@@ -321,6 +321,19 @@ static supple_status make_guard(void) {
     return supple_guard_init(at, bytes, scene, state, p, &config, one_in(60) ? NULL : &made, wanted());
 }
 
+static supple_status make_reaction(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    uint32_t *nodes = end_of(&of_saved, 4 * sizeof *nodes);
+    for (int n = 0; n < 4; n++) {
+        nodes[n] = number((uint32_t)(below(2) ? n : NODES - 1 - n));
+    }
+    size_t bytes;
+    supple_reaction *made = NULL;
+    void *at = room(REACTION, supple_reaction_size(NODES), &bytes);
+    return supple_reaction_init(at, bytes, scene, one_in(60) ? NULL : nodes, below(5), one_in(5) ? wild(20.0f) : 20.0f,
+                                one_in(60) ? NULL : &made, wanted());
+}
+
 static supple_status set_loads(void) {
     static supple_force forces[FORCES + 2];
     static supple_motion motions[MOTIONS + 2];
@@ -502,6 +515,16 @@ static supple_status follow(void) {
     return status;
 }
 
+static supple_status feel(void) {
+    supple_reaction_force force;
+    memset(&force, 0xff, sizeof force);
+    const supple_status status = supple_reaction_follow(object(SCENE, 0), object(STATE, 1), object(REACTION, 1), one_in(60) ? NULL : &force);
+    if (status == SUPPLE_OK && (force.known > 1 || !isfinite(force.newton[0] + force.newton[1] + force.newton[2]) || !(force.spread >= 0.0f))) {
+        fail("a force that is no number is called good", status);
+    }
+    return status;
+}
+
 static supple_status other(void) {
     supple_learned_facts facts;
     supple_scene_facts of_scene;
@@ -534,9 +557,9 @@ static void one_call(void) {
     } all[] = {{"a scene", make_scene, 6}, {"a state", make_state, 4}, {"loads", make_loads, 3}, {"a learned step", make_learned, 3},
                {"steps beyond the critical one", make_large, 6}, {"a guard", make_guard, 2}, {"set loads", set_loads, 20}, {"read", read_state, 8},
                {"set a step", set_step, 8}, {"save and restore", save_and_restore, 6}, {"steps", step, 50}, {"follow", follow, 8},
-               {"other", other, 4}};
+               {"a reaction", make_reaction, 3}, {"feel", feel, 8}, {"other", other, 4}};
     int at = 0;
-    for (int draw = (int)below(128); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
+    for (int draw = (int)below(139); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
         draw -= all[at].often;
     }
     doing = all[at].name;
@@ -585,7 +608,7 @@ int main(int argc, char **argv) {
     const unsigned long most = strtoul(amount, NULL, 10);
     random_state = argc > 2 ? strtoul(argv[2], NULL, 10) : 1;
     (void)bar_config();
-    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20};
+    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20, 1 << 12};
     for (int slot = 0; slot < SLOTS; slot++) {
         slots[slot].in = arena_of(sizes_of[slot / EACH]);
         slots[slot].at = end_of(&slots[slot].in, 64), slots[slot].bytes = 64;
