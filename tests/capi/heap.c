@@ -83,9 +83,9 @@ int main(void) {
     }
     const uint32_t end = NODES - 1;
     supple_reaction *reaction;
-    supple_reaction_force force;
+    supple_reaction_force felt;
     CHECK(supple_reaction_init(guard_memory, sizeof guard_memory, scene, &end, 1, 20.0f, &reaction, NULL) == SUPPLE_OK);
-    CHECK(supple_reaction_follow(scene, state, reaction, &force) == SUPPLE_OK);
+    CHECK(supple_reaction_follow(scene, state, reaction, &felt) == SUPPLE_OK);
     CHECK(asked == 0);
     printf("heap: a scene, exact, learned, damped and adaptive steps, a guard, a reaction: never asked\n");
     return 0;

@@ -398,7 +398,7 @@ static void divergence(void) {
 
     /* One that is no number. */
     const float nan = NAN;
-    const double no_time = INFINITY, before = -0.01;
+    const double no_time = INFINITY, too_early = -0.01;
     forge(FRONT + 16 * (NODES / 2), &nan, sizeof nan);
     REFUSED(SUPPLE_E_NOT_FINITE, supple_restore(state, saved, sizeof saved));
     forge(28, &nan, sizeof nan);
@@ -408,7 +408,7 @@ static void divergence(void) {
     forge(32, &no_time, sizeof no_time);
     REFUSED(SUPPLE_E_NOT_FINITE, supple_restore(state, saved, sizeof saved));
     /* Or a time before the start, when ramps have not begun. */
-    forge(32, &before, sizeof before);
+    forge(32, &too_early, sizeof too_early);
     REFUSED(SUPPLE_E_NOT_FINITE, supple_restore(state, saved, sizeof saved));
 
     /* One that is so large that nothing can be bounded. */
