@@ -18,10 +18,14 @@
 
 use core::fmt;
 
+use glam::{DVec3, Vec3, Vec4};
+
+use crate::element::Axes;
 use crate::material::Material;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::StateView;
+use crate::step::is_damping;
 
 /// Most passes over the mesh that compute the weights, and the largest change of a weight after which none follows.
 const MOST_PASSES: u32 = 512;
@@ -102,24 +106,23 @@ pub struct Force {
 
 impl Force {
     fn is_finite(&self) -> bool {
-        self.newton.iter().all(|component| component.is_finite()) && self.spread.is_finite()
+        Vec3::from(self.newton).is_finite() && self.spread.is_finite()
     }
 
     /// Whether the steps resolve the force: the spread is at most a quarter of it.
     #[must_use]
     pub fn is_resolved(&self) -> bool {
-        let [x, y, z] = self.newton;
-        self.spread <= LARGEST_SPREAD * libm::sqrtf(x * x + y * y + z * z)
+        self.spread <= LARGEST_SPREAD * Vec3::from(self.newton).length()
     }
 }
 
-/// Sums over the nodes: with all weights, and over the supports alone.
+/// Sums over the nodes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     /// `sum w m v`, N s.
-    momentum: [[f64; 3]; 2],
+    momentum: DVec3,
     /// `sum w f`, N.
-    force: [[f64; 3]; 2],
+    force: DVec3,
 }
 
 /// What is known from a call.
@@ -127,13 +130,15 @@ struct Sums {
 struct Sample {
     time: f64,
     steps: u64,
-    sums: Sums,
+    weighted: Sums,
+    /// Over the supports alone.
+    alone: Sums,
 }
 
 /// A reaction without its storage; it may be moved in memory.
 #[derive(Clone, Debug)]
 pub struct ReactionModel {
-    nodes: usize,
+    pub(crate) nodes: usize,
     damping: f32,
     last: Option<Sample>,
     force: Option<Force>,
@@ -145,7 +150,7 @@ struct Row {
     weight: f32,
     /// 1 for the supports in question, 0 for free nodes, -1 for all other supports.
     kind: f32,
-    /// Sum of the weights of the neighbours, and their number.
+    /// Sum of the weights of the neighbours in all elements, and their number.
     sum: f32,
     count: f32,
 }
@@ -165,8 +170,8 @@ impl Row {
 }
 
 impl ReactionModel {
-    /// The reaction of these supports of a scene, for steps with this damping (1/s). It takes as long as some hundred steps. `storage` of [`vectors_for`]
-    /// vectors is overwritten.
+    /// The reaction of these supports of a scene, for steps with this damping (1/s). It takes as long as some hundred steps. `storage`
+    /// of [`vectors_for`] vectors is overwritten.
     pub fn prepare<M: Material>(
         scene: SceneView<'_, M>,
         supports: &[u32],
@@ -176,11 +181,11 @@ impl ReactionModel {
         let nodes = scene.node_count();
         let (needed, capacity) = (vectors_for(nodes), storage.len());
         let rows = storage.get_mut(..needed).ok_or(ReactionError::Capacity { needed, capacity })?;
-        if !(damping.is_finite() && damping >= 0.0) {
+        if !is_damping(damping) {
             return Err(ReactionError::Damping { damping });
         }
         for (row, inertia) in rows.iter_mut().zip(scene.inertia) {
-            let kind = if inertia.inverse.contains(&0.0) { OTHER } else { FREE };
+            let kind = if inertia.held() == Axes::NONE { FREE } else { OTHER };
             Row { weight: 0.0, kind, sum: 0.0, count: 0.0 }.write(row);
         }
         if supports.is_empty() {
@@ -191,6 +196,13 @@ impl ReactionModel {
                 Some(row) if row.0[1] != FREE => row.0 = [1.0, ASKED, 0.0, 0.0],
                 Some(_) => return Err(ReactionError::NotHeld { index, node }),
                 None => return Err(ReactionError::Node { index, node, nodes }),
+            }
+        }
+        for (tile, lane) in scene.places() {
+            for corner in 0..4 {
+                if let Some(NodeVector([_, _, _, count])) = rows.get_mut(tile.node(corner, lane)) {
+                    *count += 3.0;
+                }
             }
         }
         for _ in 0..MOST_PASSES {
@@ -217,7 +229,8 @@ impl ReactionModel {
         if self.last.is_some_and(|last| last.steps == steps && last.time == time) {
             return self.force;
         }
-        let now = Sample { time, steps, sums: sums(scene, state, storage) };
+        let (weighted, alone) = sums(scene, state, storage);
+        let now = Sample { time, steps, weighted, alone };
         let before = self.last.replace(now).filter(|last| last.steps < steps && last.time < time);
         self.force = before.map(|before| self.between(&before, &now)).filter(Force::is_finite);
         self.force
@@ -228,16 +241,14 @@ impl ReactionModel {
         let count = (now.steps - before.steps) as f64;
         // Forces are those at the start of a step. Those in the middle of the time are between those of the last steps of both calls.
         let share = if before.steps == 0 { 1.0 } else { (count + 1.0) / (2.0 * count) };
-        let of = |kind: usize, axis: usize| {
-            let [[p0, p1], [f0, f1]] =
-                [[before.sums.momentum, now.sums.momentum], [before.sums.force, now.sums.force]]
-                    .map(|[before, now]| [before[kind % 2][axis % 3], now[kind % 2][axis % 3]]);
-            let damped = 0.5 * f64::from(self.damping) * (p0 + p1);
-            (p1 - p0) / seconds + damped - (f0 + share * (f1 - f0))
+        let of = |before: &Sums, now: &Sums| {
+            let damped = 0.5 * f64::from(self.damping) * (before.momentum + now.momentum);
+            let force = before.force + share * (now.force - before.force);
+            (now.momentum - before.momentum) / seconds + damped - force
         };
-        let newton = [0, 1, 2].map(|axis| of(0, axis));
-        let square: f64 = [0, 1, 2].iter().map(|&axis| newton[axis] - of(1, axis)).map(|d| d * d).sum();
-        Force { newton: newton.map(|component| component as f32), spread: libm::sqrt(square) as f32 }
+        let newton = of(&before.weighted, &now.weighted);
+        let spread = newton.distance(of(&before.alone, &now.alone));
+        Force { newton: newton.as_vec3().to_array(), spread: spread as f32 }
     }
 }
 
@@ -248,9 +259,8 @@ fn spread_weights<M>(scene: SceneView<'_, M>, rows: &mut [NodeVector]) -> f32 {
         let weights = nodes.map(|node| rows.get(node).map_or(0.0, |row| row.0[0]));
         let sum: f32 = weights.iter().sum();
         for (node, weight) in nodes.into_iter().zip(weights) {
-            if let Some(NodeVector([_, _, of_neighbours, count])) = rows.get_mut(node) {
+            if let Some(NodeVector([_, _, of_neighbours, _])) = rows.get_mut(node) {
                 *of_neighbours += sum - weight;
-                *count += 3.0;
             }
         }
     }
@@ -259,32 +269,34 @@ fn spread_weights<M>(scene: SceneView<'_, M>, rows: &mut [NodeVector]) -> f32 {
         let Row { weight, kind, sum, count } = Row::of(row);
         let new = if kind == FREE && count > 0.0 { sum / count } else { weight };
         largest = largest.max((new - weight).abs());
-        Row { weight: new, kind, sum: 0.0, count: 0.0 }.write(row);
+        Row { weight: new, kind, sum: 0.0, count }.write(row);
     }
     largest
 }
 
-fn sums<M>(scene: SceneView<'_, M>, state: &StateView<'_>, rows: &[NodeVector]) -> Sums {
+/// Sums with all weights, and over the supports alone.
+fn sums<M>(scene: SceneView<'_, M>, state: &StateView<'_>, rows: &[NodeVector]) -> (Sums, Sums) {
     let seconds = f64::from(state.last_step());
     let per_second = if seconds > 0.0 { 1.0 / seconds } else { 0.0 };
-    let mut sums = Sums::default();
+    let (mut weighted, mut alone) = (Sums::default(), Sums::default());
     let vectors = state.increment.iter().zip(&*state.force);
     for ((row, inertia), (increment, force)) in rows.iter().zip(scene.inertia).zip(vectors) {
         let Row { weight, kind, .. } = Row::of(row);
         if weight == 0.0 {
             continue;
         }
-        let (weight, alone) = (f64::from(weight), if kind == ASKED { 1.0 } else { 0.0 });
-        let mass = f64::from(inertia.mass) * per_second;
-        for axis in 0..3 {
-            let (momentum, force) = (mass * f64::from(increment.0[axis]), f64::from(force.0[axis]));
-            for (kind, weight) in [weight, alone].into_iter().enumerate() {
-                sums.momentum[kind][axis] += weight * momentum;
-                sums.force[kind][axis] += weight * force;
-            }
+        let [increment, force] = [increment, force].map(|vector| Vec4::from(vector.0).truncate().as_dvec3());
+        let momentum = f64::from(inertia.mass) * per_second * increment;
+        let add = |sums: &mut Sums, weight: f64| {
+            sums.momentum += weight * momentum;
+            sums.force += weight * force;
+        };
+        add(&mut weighted, f64::from(weight));
+        if kind == ASKED {
+            add(&mut alone, 1.0);
         }
     }
-    sums
+    (weighted, alone)
 }
 
 /// The reaction of supports with storage `S` of the caller.
@@ -306,8 +318,9 @@ impl<S: AsMut<[NodeVector]> + AsRef<[NodeVector]>> Reaction<S> {
         Ok(Self { model, storage })
     }
 
-    /// To be called after each frame's steps, of any kind, with the state that they left: the mean force since the last call. None at the
-    /// first call, after a reset or a restore to an earlier time, for another scene, and where it is no finite number; call it before the first step for a force after it. Costs a pass over the nodes.
+    /// To be called after each frame's steps, of any kind, with the state that they left: the mean force since the last call. None at
+    /// the first call, after a reset or a restore to an earlier time, for a scene of another size, and where it is no finite number.
+    /// Call it before the first step for a force after it. It costs a pass over the nodes.
     pub fn follow<M: Material>(&mut self, scene: SceneView<'_, M>, state: &StateView<'_>) -> Option<Force> {
         self.model.follow(scene, state, self.storage.as_ref())
     }

@@ -29,7 +29,6 @@ pub struct supple_reaction_force {
 #[repr(C, align(64))]
 pub struct supple_reaction {
     head: Head,
-    nodes: u32,
     model: ReactionModel,
 }
 
@@ -75,7 +74,7 @@ pub unsafe extern "C" fn supple_reaction_init(
         let place = Place::new(memory, bytes, layout(nodes))?;
         let storage = storage(place.arrays::<supple_reaction>(), vectors_for(nodes));
         let model = with_scene!(any, scene => ReactionModel::prepare(scene, supports, damping, storage)?);
-        reaction.write(place.put(|head| supple_reaction { head, nodes: nodes as u32, model }));
+        reaction.write(place.put(|head| supple_reaction { head, model }));
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
@@ -94,9 +93,9 @@ pub unsafe extern "C" fn supple_reaction_follow(
     // SAFETY: what the header asks of the caller.
     let follow = || unsafe {
         let (any, place) = (carved(scene)?, place_for(force)?);
-        let (supple_reaction { nodes, model, .. }, arrays) = memory::open(reaction)?;
-        any.fits(*nodes)?;
-        let storage = storage(arrays, vectors_for(*nodes as usize));
+        let (supple_reaction { model, .. }, arrays) = memory::open(reaction)?;
+        any.fits(model.nodes as u32)?;
+        let storage = storage(arrays, vectors_for(any.node_count()));
         let state = opened_of(&any, state)?;
         let force = with_scene!(any, scene => model.follow(scene, &state, storage));
         place.write(match force {

@@ -70,6 +70,11 @@ impl fmt::Display for StepError {
 
 impl core::error::Error for StepError {}
 
+/// Whether this can be a damping, 1/s.
+pub(crate) const fn is_damping(damping: f32) -> bool {
+    damping.is_finite() && damping >= 0.0
+}
+
 impl Step {
     /// A step of `dt` seconds with mass-proportional damping (1/s), refused above the critical step.
     pub fn new(dt: f32, damping: f32, critical: CriticalStep) -> Result<Self, StepError> {
@@ -86,7 +91,7 @@ impl Step {
         if !(dt.is_finite() && dt > 1e-18) {
             return Err(StepError::Step { seconds: dt });
         }
-        if !(damping.is_finite() && damping >= 0.0) {
+        if !is_damping(damping) {
             return Err(StepError::Damping { damping });
         }
         Ok(Self::after(dt, dt, damping))

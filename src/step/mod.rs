@@ -12,6 +12,7 @@ pub(crate) mod threads;
 pub(crate) use crate::element::Extremes;
 pub use crate::energy_balance::EnergyBalance;
 pub(crate) use energy_sums::{Sums, Totals};
+pub(crate) use length::is_damping;
 pub use length::{CriticalStep, Step, StepError};
 #[cfg(feature = "lab")]
 pub(crate) use parts::external_forces;
