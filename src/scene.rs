@@ -8,11 +8,11 @@
 mod build_error;
 mod owned;
 
-use core::ops::Deref;
+use core::ops::{Deref, Range};
 
 use crate::element::{
     ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, PatchBuilder,
-    PatchRow, Patches, VolumeRows, element_fields, patch_energies, volume_energy_difference,
+    PatchRow, Patches, VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
 };
 use crate::material::{Element, Law, Laws, Material, Moduli, releasable_energy};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
@@ -450,17 +450,46 @@ impl<'a, M: Material> SceneView<'a, M> {
 
     /// Strain energy under the given displacements (m), J, with the nodes' volumes where the material needs them.
     pub(crate) fn strain_energy(self, displacement: &[NodeVector], volumes: &[NodeVector]) -> f64 {
-        let (laws, volumes) = (self.material.laws(), self.volume_rows(volumes));
-        if M::ELEMENT.is_nodal_strain() {
-            return patch_energies(&laws, self.patches, self.places(), displacement);
-        }
-        let energies = self.places().map(|(tile, lane)| {
-            let law = laws.of(tile.element(lane));
-            let fields = element_fields(&law, tile, lane, displacement);
-            if M::ELEMENT.is_nodal_pressure() {
-                fields.energy + volume_energy_difference(&law, tile, lane, fields.volume_ratio, volumes)
-            } else {
-                fields.energy
+        self.strain_energy_at(0..self.energy_places(), displacement, volumes)
+    }
+
+    /// The places at which there is strain energy: of elements, and of patches around nodes.
+    pub(crate) fn energy_places(&self) -> usize {
+        TILE * self.energy_tiles()
+    }
+
+    fn energy_tiles(&self) -> usize {
+        self.tiles.len() + if M::ELEMENT.is_nodal_strain() { self.patches.tiles().len() } else { 0 }
+    }
+
+    /// Strain energy at some of the places, J. Those that follow each other are in tiles that follow each other, so that
+    /// few of them lie all over the body.
+    pub(crate) fn strain_energy_at(
+        self,
+        places: Range<usize>,
+        displacement: &[NodeVector],
+        volumes: &[NodeVector],
+    ) -> f64 {
+        let laws = self.material.laws();
+        let volumes = M::ELEMENT.is_nodal_pressure().then(|| self.volume_rows(volumes));
+        let tiles = self.energy_tiles().max(1);
+        let energies = places.map(|place| {
+            let (at, lane) = (place % tiles, place / tiles % TILE);
+            if let Some(tile) = self.tiles.get(at) {
+                let law = laws.of(tile.element(lane));
+                return if tile.volume::<f32>(lane) <= 0.0 {
+                    0.0
+                } else if M::ELEMENT.is_nodal_strain() {
+                    stabilising_energy(&law, tile, lane, displacement)
+                } else {
+                    element_energy(&law, tile, lane, displacement, volumes)
+                };
+            }
+            match self.patches.tiles().get(at - self.tiles.len()) {
+                Some(tile) if tile.volume(lane) > 0.0 => {
+                    patch_energy(&laws.of(tile.element(lane)), self.patches, tile, lane, displacement)
+                }
+                _ => 0.0,
             }
         });
         energies.sum()

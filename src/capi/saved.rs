@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable, bytes_of, must_cast_slice};
 
 use crate::copy::copy;
 use crate::state::{NodeVector, Progress};
-use crate::step::{EnergyBalance, Step};
+use crate::step::{EnergyBalance, EnergyCycle, Step};
 
 use super::memory::{self, array, place_for};
 use super::state::{supple_state, vectors};
@@ -16,7 +16,7 @@ use super::vectors::overlap;
 use supple_status::*;
 
 const MAGIC: [u8; 8] = *b"SUPPLE-M";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Before displacements and increments, four floats each.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -34,7 +34,8 @@ struct Front {
     step_damping: f32,
     time: f64,
     steps: u64,
-    energy_balance: [f64; 6],
+    energy_balance: [f64; 7],
+    energy_cycle: [f64; 4],
 }
 
 /// Of the front's bytes those that the checksum covers begin here.
@@ -71,7 +72,7 @@ pub unsafe extern "C" fn supple_save(
             return Err(supple_error::from(SUPPLE_E_OVERLAP));
         }
         let progress = &object.progress;
-        let EnergyBalance { start, work, dissipated, kinetic, uncertainty, peak } =
+        let EnergyBalance { start, work, dissipated, corrected, kinetic, uncertainty, peak, cycle } =
             *progress.energy_balance();
         let step = object.step().ok();
         let mut front = Front {
@@ -84,7 +85,8 @@ pub unsafe extern "C" fn supple_save(
             step_damping: step.map_or(0.0, |step| step.damping()),
             time: progress.time(),
             steps: progress.steps(),
-            energy_balance: [start, work, dissipated, kinetic, uncertainty, peak],
+            energy_balance: [start, work, dissipated, corrected, kinetic, uncertainty, peak],
+            energy_cycle: [cycle.next.into(), cycle.strain, cycle.kinetic, cycle.work],
         };
         let to = slice::from_raw_parts_mut(to, needed);
         let [displacements, increments, _] = vectors(state)?;
@@ -134,9 +136,12 @@ pub unsafe extern "C" fn supple_restore(
         }
         check_finite(&front, rest)?;
         let (object, mut arrays) = memory::open(state)?;
-        let Front { time, steps, last_step, step_seconds, step_damping, energy_balance, .. } = front;
-        let [start, work, dissipated, kinetic, uncertainty, peak] = energy_balance;
-        let energy_balance = EnergyBalance { start, work, dissipated, kinetic, uncertainty, peak };
+        let Front { time, steps, last_step, step_seconds, step_damping, .. } = front;
+        let [start, work, dissipated, corrected, kinetic, uncertainty, peak] = front.energy_balance;
+        let [next, strain, largest, of_cycle] = front.energy_cycle;
+        let cycle = EnergyCycle { next: next as u32, strain, kinetic: largest, work: of_cycle };
+        let energy_balance =
+            EnergyBalance { start, work, dissipated, corrected, kinetic, uncertainty, peak, cycle };
         object.progress = Progress::resumed(time, steps, last_step, energy_balance);
         object.set_step(Step::unchecked(step_seconds, step_damping).ok());
         let mut vectors = |bytes: &[u8]| {

@@ -4,8 +4,8 @@
 use glam::{DMat3, DVec3};
 
 use super::patch_forces::STABILISATION;
-use super::{ElementTile, Patches, VolumeRows};
-use crate::material::{Invariants, Law, Laws, Potential, energy_density, response};
+use super::{ElementTile, PatchTile, Patches, VolumeRows};
+use crate::material::{Invariants, Law, Potential, energy_density, response};
 use crate::simd::NodeVector;
 
 /// State of one element.
@@ -46,6 +46,29 @@ pub(crate) fn invariants(h: DMat3) -> (f64, f64, f64) {
     (2.0 * trace + square, trace + minors + h.determinant(), square)
 }
 
+/// Displacements of nodes, m.
+fn displacements(vectors: &[NodeVector]) -> impl Fn(usize) -> DVec3 {
+    |node| DVec3::from_array(vectors.get(node).copied().unwrap_or_default().to_array().map(f64::from))
+}
+
+/// Strain energy of an element's own deformation, J, from its invariants.
+fn own_energy<L: Law>(law: &L, tile: &ElementTile, lane: usize, (i, j): (f64, f64)) -> f64 {
+    energy_density(law, i, j) * f64::from(tile.volume::<f32>(lane))
+}
+
+/// Strain energy of an element, J, with the volumes of its nodes if it has nodal pressure.
+pub(crate) fn element_energy<L: Law>(
+    law: &L,
+    tile: &ElementTile,
+    lane: usize,
+    displacement: &[NodeVector],
+    volumes: Option<VolumeRows<'_>>,
+) -> f64 {
+    let (i, j, _) = invariants(gradient_of(tile, lane, displacements(displacement)));
+    let of_nodes = volumes.map_or(0.0, |volumes| volume_energy_difference(law, tile, lane, j, volumes));
+    own_energy(law, tile, lane, (i, j)) + of_nodes
+}
+
 /// Fields of the element at place `lane` of a tile, under the given displacements (m).
 pub(crate) fn element_fields<L: Law>(
     law: &L,
@@ -53,14 +76,10 @@ pub(crate) fn element_fields<L: Law>(
     lane: usize,
     displacement: &[NodeVector],
 ) -> ElementFields {
-    let at = |node: usize| {
-        let [x, y, z] = displacement.get(node).copied().unwrap_or_default().to_array();
-        DVec3::new(f64::from(x), f64::from(y), f64::from(z))
-    };
-    let h = gradient_of(tile, lane, at);
+    let h = gradient_of(tile, lane, displacements(displacement));
     let f = DMat3::IDENTITY + h;
     let (i, j, _) = invariants(h);
-    let energy = energy_density(law, i, j) * f64::from(tile.volume::<f32>(lane));
+    let energy = own_energy(law, tile, lane, (i, j));
 
     // The deviator of P F^T needs only p1 F F^T: cof(F) F^T = J I.
     let wide = L::widen::<f32>(|_| *law);
@@ -94,14 +113,14 @@ pub(crate) fn pressure_at<L: Law>(
 }
 
 /// What the energy (J) of an element changes by when its energy of volume is that of its nodes ([`super::pressure`]).
-pub(crate) fn volume_energy_difference<L: Law>(
+fn volume_energy_difference<L: Law>(
     law: &L,
     tile: &ElementTile,
     lane: usize,
-    volume_ratio: f64,
+    own_change: f64,
     volumes: VolumeRows<'_>,
 ) -> f64 {
-    let own = law.energy(0.0, volume_ratio - 1.0);
+    let own = law.energy(0.0, own_change);
     let corners = (0..4).map(|corner| {
         let change = volumes.change(tile.node(corner, lane), tile.slot(corner, lane));
         change.map_or(0.0, |change| law.energy(0.0, f64::from(change)) - own)
@@ -114,28 +133,26 @@ pub(crate) fn stabilising_modulus<L: Law>(law: &L) -> f64 {
     2.0 * f64::from(STABILISATION) * f64::from(L::widen::<f32>(|_| *law).distortion_slope(0.0))
 }
 
-/// Strain energy of tetrahedra with nodal strain, J ([`super::patch_forces`]), of the elements at `places`.
-pub(crate) fn patch_energies<'a, L: Law>(
-    laws: &Laws<'_, L>,
+/// What a patch adds to the strain energy of tetrahedra with nodal strain, J ([`super::patch_forces`]).
+pub(crate) fn patch_energy<L: Law>(
+    law: &L,
     patches: Patches<'_>,
-    places: impl Iterator<Item = (&'a ElementTile, usize)>,
+    tile: &PatchTile,
+    lane: usize,
     displacement: &[NodeVector],
 ) -> f64 {
-    let at = |node: usize| {
-        let [x, y, z] = displacement.get(node).copied().unwrap_or_default().to_array();
-        DVec3::new(f64::from(x), f64::from(y), f64::from(z))
-    };
-    let stabilising = |law: &L| 0.5 * stabilising_modulus(law);
-    let mut energy = 0.0;
-    for (tile, lane) in patches.places() {
-        let law = laws.of(tile.element(lane));
-        let h = tile.gradient(patches.neighbours_of(tile), lane, at);
-        let (i, j, square) = invariants(h);
-        energy += tile.volume(lane) * (energy_density(&law, i, j) - stabilising(&law) * square);
-    }
-    for (tile, lane) in places {
-        let (_, _, square) = invariants(gradient_of(tile, lane, at));
-        energy += f64::from(tile.volume::<f32>(lane)) * stabilising(&laws.of(tile.element(lane))) * square;
-    }
-    energy
+    let h = tile.gradient(patches.neighbours_of(tile), lane, displacements(displacement));
+    let (i, j, square) = invariants(h);
+    tile.volume(lane) * (energy_density(law, i, j) - 0.5 * stabilising_modulus(law) * square)
+}
+
+/// What an element adds to it, J.
+pub(crate) fn stabilising_energy<L: Law>(
+    law: &L,
+    tile: &ElementTile,
+    lane: usize,
+    displacement: &[NodeVector],
+) -> f64 {
+    let (_, _, square) = invariants(gradient_of(tile, lane, displacements(displacement)));
+    f64::from(tile.volume::<f32>(lane)) * 0.5 * stabilising_modulus(law) * square
 }

@@ -45,7 +45,7 @@ pub(crate) use tile::MOST_ELEMENTS;
 
 pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
 pub(crate) use fields::stabilising_modulus;
-pub(crate) use fields::{element_fields, patch_energies, volume_energy_difference};
+pub(crate) use fields::{element_energy, element_fields, patch_energy, stabilising_energy};
 #[cfg(feature = "std")]
 pub(crate) use fields::{invariants, pressure_at};
 pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};

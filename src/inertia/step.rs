@@ -140,6 +140,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
         [x, y, z, 0.0]
     }
 
+    fn added_inertia(&self) -> f32 {
+        self.model.refresh.added.mean()
+    }
+
     fn refuse(&mut self) {
         self.storage.tables.take_back(self.rough_written);
     }

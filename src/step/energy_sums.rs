@@ -209,7 +209,7 @@ impl Entry {
 
     /// The balance after the step, or why the step cannot be believed.
     pub(crate) fn entered(&self, balance: EnergyBalance, step: &Step) -> Result<EnergyBalance, Cause> {
-        if !self.finite {
+        if !(self.finite && self.work.is_finite() && self.jump.is_finite()) {
             return Err(Cause::NotFinite);
         }
         let dissipated = 2.0 * f64::from(step.damping()) * self.kinetic * f64::from(step.span());

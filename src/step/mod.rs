@@ -10,7 +10,7 @@ mod status;
 pub(crate) mod threads;
 
 pub(crate) use crate::element::Extremes;
-pub use crate::energy_balance::EnergyBalance;
+pub use crate::energy_balance::{EnergyBalance, EnergyCycle};
 pub(crate) use energy_sums::{Sums, Totals};
 pub(crate) use length::is_damping;
 pub use length::{CriticalStep, Step, StepError};
@@ -61,6 +61,14 @@ pub(crate) trait StepMethod<M> {
         increment: &NodeVector,
         force: &NodeVector,
     ) -> [f32; 4];
+
+    /// The steps in which the strain energy of all elements is computed once: of a long step it may take more time.
+    const ENERGY_CYCLE: usize = 256;
+
+    /// Inertia that the method has added, as a multiple of the mass.
+    fn added_inertia(&self) -> f32 {
+        0.0
+    }
 
     /// Takes back what the method has noted for itself: the step is refused.
     fn refuse(&mut self) {}
@@ -121,7 +129,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
                 return Status::Diverged(Divergence { time: self.progress.time, node, cause });
             }
         };
-        (self.progress.energy_balance, self.progress.extremes) = (balance, extremes);
+        self.progress.energy_balance = self.measured(balance, method);
+        self.progress.extremes = extremes;
         method.advance(&mut self);
         self.progress.dt = step.seconds();
         self.progress.time += f64::from(step.seconds());
@@ -150,6 +159,16 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             .with_forces(loads, scene.inertia, increment, force, progress.time, next)
             .with_motions(loads, displacement, increment, force, progress.time, step)
             .entered(balance, step)
+    }
+
+    /// The balance after this step's part of the measurement of the energy.
+    fn measured<C: StepMethod<M>>(&self, balance: EnergyBalance, method: &C) -> EnergyBalance {
+        let Self { scene, displacement, volume, .. } = self;
+        let (all, first) = (scene.energy_places(), balance.cycle.next as usize);
+        let next = (first + all.div_ceil(C::ENERGY_CYCLE)).min(all);
+        let strain = scene.strain_energy_at(first..next, displacement, volume);
+        let next = if next < all { Some(next as u32) } else { None };
+        balance.measured(strain, next, method.added_inertia().into(), scene.releasable_energy())
     }
 
     /// The node that a refused step names: the first whose next increment is not finite, or else the one with

@@ -64,6 +64,8 @@ struct Exact<'a, T> {
 }
 
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
+    const ENERGY_CYCLE: usize = 2048;
+
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let Trial { scene, loads, displacement, increment, force, volume, progress } = trial;
         let (inertia, step) = (scene.inertia, self.step);

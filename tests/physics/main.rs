@@ -11,6 +11,7 @@ mod alarms;
 mod divergence;
 mod elements;
 mod loads;
+mod measured_energy;
 mod nodal_elements;
 mod nodal_pressure;
 mod nodal_strain;
