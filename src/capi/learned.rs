@@ -78,7 +78,7 @@ pub struct supple_learned_facts {
     pub exact_seconds: f32,
     /// Multiplications with additions of one node's prediction.
     pub multiply_adds: u64,
-    /// Whether the exact step has taken over for good.
+    /// How often exact steps have taken the place of learned ones since the object was prepared or reset.
     pub fell_back: u32,
     /// Elements of the training, SUPPLE_LINEAR and so on; in a scene of others the network's error is not known.
     pub element: u32,
@@ -133,7 +133,7 @@ unsafe fn storage<'a>(mut arrays: Arrays, nodes: u32, fallback: bool) -> &'a mut
     unsafe { arrays.change(vectors_for(nodes as usize, fallback)) }
 }
 
-/// For a motion from rest: frames as at the start, no lead-in yet, the exact step has not taken over.
+/// For a motion from rest: frames as at the start, no lead-in yet, nothing has been undone.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_learned_reset(learned: *mut supple_learned) -> supple_status {
     // SAFETY: what the header asks of the caller.
@@ -165,7 +165,7 @@ pub unsafe extern "C" fn supple_learned_describe(
             tissue: supple_tissue { constants: recipe.law.values(), density: recipe.density },
             exact_seconds: recipe.exact_step,
             multiply_adds: network.multiply_adds() as u64,
-            fell_back: object.model.fell_back().is_some().into(),
+            fell_back: object.model.fallbacks(),
             element: recipe.element.code(),
         });
         Ok(SUPPLE_OK)
@@ -223,10 +223,10 @@ impl<'a> Call<'a> {
         answer(&status)
     }
 
-    /// One learned step; or exact ones, if it was undone or these have taken over.
+    /// One learned step; or exact ones, if it was undone or these are next.
     fn step(&mut self, left: u64) -> Answer<supple_status> {
-        let Self { any, loads, model, storage, state, exact, ratio, threads, report } = self;
-        if model.fell_back().is_none() {
+        let Self { any, loads, model, storage, state, exact, threads, report, .. } = self;
+        if !model.is_exact_next() {
             let mut learned = model.with_storage(storage);
             let loads = loads.of_next_step(state.displacements(), left);
             let seconds = exact.seconds();
@@ -240,8 +240,7 @@ impl<'a> Call<'a> {
                 return Ok(if outside > MUCH_OUTSIDE { worse(remark, SUPPLE_OUTSIDE) } else { remark });
             }
         }
-        let status = exact_steps((any, exact, threads), *ratio, left, state, loads, report);
-        answer(&status).map(|_| SUPPLE_FELL_BACK)
+        self.lead(left).map(|_| SUPPLE_FELL_BACK)
     }
 
     /// Takes `count` steps of the network's, or as many as can be believed.
@@ -302,9 +301,10 @@ pub unsafe extern "C" fn supple_learned_lead(
     unsafe { reported(report, lead) }
 }
 
-/// Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. Stops at the first
-/// that is not to be believed: without fallback that one is not taken, displacements and time are as before it, velocities may be
-/// those of the network's own step, and a new lead-in is needed.
+/// Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. With fallback a step
+/// that is not to be believed is undone, and exact steps take its place and that of the next seven, where it happens again of more, before
+/// the network is tried again: SUPPLE_FELL_BACK. Without fallback the call stops at the first such step: it is not taken, displacements and
+/// time are as before it, velocities may be those of the network's own step, and a new lead-in is needed.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.
@@ -322,11 +322,28 @@ pub unsafe extern "C" fn supple_learned_step(
     // SAFETY: what the header asks of the caller.
     let step = |report: &mut supple_report| unsafe {
         let call = Call::of(scene, loads, state, learned, threads, report)?;
-        if call.model.fell_back().is_none() && !call.model.is_led(&call.state) {
+        if !call.model.is_exact_next() && !call.model.is_led(&call.state) {
             return Err(SUPPLE_E_NOT_LED.into());
         }
         call.each(count.into(), Call::step)
     };
     // SAFETY: as above.
     unsafe { reported(report, step) }
+}
+
+/// To be called whenever a supple_guard calls learned steps inexact (SUPPLE_INEXACT): with fallback exact steps take the place of the
+/// next eight, where it happens again of more, before the network is tried again. Without fallback nothing changes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_learned_fall_back(
+    learned: *mut supple_learned,
+    state: *const supple_state,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let fall_back = || unsafe {
+        let time = memory::read(state)?.progress.time();
+        let (supple_learned { model, .. }, _) = memory::open(learned)?;
+        model.fall_back(time, Status::Ok);
+        Ok(SUPPLE_OK)
+    };
+    status_of(fall_back())
 }

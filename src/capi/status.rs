@@ -31,7 +31,7 @@ pub enum supple_status {
     SUPPLE_LIMITED = 1,
     /// Learned steps were taken, with more than one percent of the vertices outside what training has seen.
     SUPPLE_OUTSIDE = 2,
-    /// A learned step was not to be believed and was undone; the exact step has taken over for good.
+    /// Exact steps have taken the place of learned ones that were not to be believed. The network is tried again in later steps.
     SUPPLE_FELL_BACK = 3,
     /// A supple_guard estimates that the error is more than is allowed.
     SUPPLE_INEXACT = 4,

@@ -13,7 +13,9 @@
 //! The network knows nothing of energy. What it does is entered in the same energy balance as every other step
 //! ([`crate::step::EnergyBalance`]): with several times more kinetic energy than loads and supports have ever given the step is
 //! refused. With fallback a step that has more kinetic energy than the balance explains at all is undone, and exact steps take
-//! over for good.
+//! its place for some intervals, while the frames follow as in the lead-in. Then the network is tried again. Each fallback lasts twice as
+//! long as the last one, up to [`LONGEST_WAIT`] intervals, until there have been many more learned steps than that without one. An
+//! attempt that is undone after exact steps leaves their motion as it was, to the bit.
 
 pub mod frame;
 mod predict;
@@ -57,6 +59,13 @@ impl Vertex {
 
 /// Most exact steps in one of the network's: with more a call would not end in any time that matters.
 const MOST_EXACT_STEPS: u32 = 65_536;
+
+/// Of the network's intervals those that exact steps take at the first fallback and at most.
+pub const FIRST_WAIT: u32 = 8;
+/// See [`FIRST_WAIT`].
+pub const LONGEST_WAIT: u32 = 1024;
+/// Learned steps over the intervals of the next fallback after which that is as short as the first.
+const CALM: u32 = 8;
 
 /// Vectors in the storage of a [`Vertex`].
 const VERTEX_VECTORS: usize = size_of::<Vertex>() / size_of::<NodeVector>();
@@ -135,13 +144,58 @@ pub struct LearnedReport {
     pub outside: f32,
 }
 
-/// When and why exact steps have taken over for good.
+/// When and why exact steps took the place of learned ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fallback {
     /// Start of the step that was undone, s.
     pub time: f64,
     /// What became of it.
     pub status: Status,
+}
+
+/// Who moves the state next, with fallback.
+#[derive(Clone, Copy, Debug)]
+struct Turns {
+    /// The latest fallback.
+    latest: Option<Fallback>,
+    /// How many there were.
+    count: u32,
+    /// Intervals that exact steps have yet to take.
+    exact: u32,
+    /// Those after the next fallback.
+    wait: u32,
+    /// Learned steps since the latest fallback.
+    learned: u32,
+}
+
+impl Turns {
+    const NEW: Self = Self { latest: None, count: 0, exact: 0, wait: FIRST_WAIT, learned: 0 };
+
+    /// The latest step may not be believed, be it a learned one or an exact one that followed another.
+    fn fall_back(&mut self, time: f64, status: Status) {
+        if self.count > 0 && self.learned == 0 {
+            // The same fallback goes on.
+            self.exact = self.exact.max(1);
+        } else {
+            self.undo(time, status);
+        }
+    }
+
+    /// A learned step is undone.
+    fn undo(&mut self, time: f64, status: Status) {
+        self.latest = Some(Fallback { time, status });
+        self.count = self.count.saturating_add(1);
+        (self.exact, self.learned) = (self.wait, 0);
+        self.wait = (2 * self.wait).min(LONGEST_WAIT);
+    }
+
+    /// A learned step has been taken.
+    fn enter_learned(&mut self) {
+        self.learned = self.learned.saturating_add(1);
+        if self.learned >= CALM * self.wait {
+            self.wait = FIRST_WAIT;
+        }
+    }
 }
 
 /// A learned step apart from its storage: position independent, and the same for every scene.
@@ -151,7 +205,7 @@ pub struct LearnedModel<'w> {
     step: Step,
     /// Whether an unexplained step is undone.
     undoes: bool,
-    fell_back: Option<Fallback>,
+    turns: Turns,
     /// The state when a lead-in or a learned step ended last.
     led: Option<Moment>,
     report: LearnedReport,
@@ -168,7 +222,7 @@ impl<'w> LearnedModel<'w> {
                 network,
                 step,
                 undoes: fallback,
-                fell_back: None,
+                turns: Turns::NEW,
                 led: None,
                 report: LearnedReport::default(),
             }),
@@ -194,10 +248,30 @@ impl<'w> LearnedModel<'w> {
         &self.report
     }
 
-    /// Whether exact steps have taken over for good.
+    /// The latest step that was undone.
     #[must_use]
     pub const fn fell_back(&self) -> Option<&Fallback> {
-        self.fell_back.as_ref()
+        self.turns.latest.as_ref()
+    }
+
+    /// How often exact steps have taken the place of learned ones.
+    #[must_use]
+    pub const fn fallbacks(&self) -> u32 {
+        self.turns.count
+    }
+
+    /// Whether exact steps take the next of the network's intervals.
+    #[must_use]
+    pub const fn is_exact_next(&self) -> bool {
+        self.turns.exact > 0
+    }
+
+    /// Exact steps take the next interval, and after a learned step as many as after one that is undone, because of what the host knows of
+    /// the latest step: a [`crate::guard`] that calls it inexact. Without fallback nothing changes.
+    pub fn fall_back(&mut self, time: f64, status: Status) {
+        if self.undoes {
+            self.turns.fall_back(time, status);
+        }
     }
 
     /// Whether the latest steps of a state were a lead-in or learned ones.
@@ -281,6 +355,11 @@ impl<'w, S: AsMut<[NodeVector]>> LearnedStep<'w, S> {
         self.view().step(scene, loads, state, exact, &CallingThread)
     }
 
+    /// See [`LearnedModel::fall_back`].
+    pub fn fall_back(&mut self, time: f64, status: Status) {
+        self.model.fall_back(time, status);
+    }
+
     /// The learned step, whatever its storage.
     pub fn view(&mut self) -> LearnedView<'_, 'w> {
         self.model.with_storage(self.storage.as_mut())
@@ -303,7 +382,7 @@ impl LearnedView<'_, '_> {
     pub fn reset(&mut self) {
         self.storage.fill(NodeVector::ZERO);
         vertices(self.storage, usize::MAX).fill(Vertex::NEW);
-        (self.model.fell_back, self.model.led) = (None, None);
+        (self.model.turns, self.model.led) = (Turns::NEW, None);
     }
 
     /// The lead-in: exact steps of `exact` for as many of the network's as `seconds` have, while the frames follow. Gives the
@@ -331,7 +410,8 @@ impl LearnedView<'_, '_> {
         Ok(worst)
     }
 
-    /// One interval of the lead-in: `exact` takes exact steps that last as long as one of the network's, while the frames follow.
+    /// One interval of the lead-in, or in place of a learned step that was [`Undone`]: `exact` takes exact steps that last as long as one of
+    /// the network's, while the frames follow.
     pub fn lead_interval<S: AsState>(
         &mut self,
         state: &mut S,
@@ -354,11 +434,12 @@ impl LearnedView<'_, '_> {
             vertex.frame.follow(vertex.next.to_array());
         }
         self.model.led = Some(after.moment());
+        self.model.turns.exact = self.model.turns.exact.saturating_sub(1);
         status
     }
 
-    /// Takes one learned step, or as many exact ones if it was undone or exact steps have taken over. Every learned step does the
-    /// same work.
+    /// Takes one learned step, or as many exact ones if it was undone or exact steps are next. Every learned step does the same
+    /// work, so the most that a call can take is that and an interval of exact steps.
     pub fn step<M: ElementMaterial>(
         &mut self,
         scene: SceneView<'_, M>,
@@ -370,15 +451,15 @@ impl LearnedView<'_, '_> {
         let count = self.model.exact_steps(exact)?;
         match self.try_step(scene, loads, &mut state, exact.seconds(), threads)? {
             Ok(status) => Ok(status),
-            Err(Undone) => Ok(exact_steps(count, |_| {
-                tled::step_in_parts(scene, loads, state.reborrow(), exact, threads)
+            Err(Undone) => Ok(self.lead_interval(&mut state, |state| {
+                exact_steps(count, |_| tled::step_in_parts(scene, loads, state.reborrow(), exact, threads))
             })),
         }
     }
 
-    /// Takes one learned step, if exact ones have not taken over; if energy does not explain it, and with fallback, it is undone. The
-    /// last increment of the state then spans `exact` seconds, and the caller takes exact steps. Without fallback a first step that
-    /// diverges leaves displacements and time as before it, and increments that span the network's step.
+    /// Takes one learned step, if exact ones are not next; if energy does not explain it, and with fallback, it is undone. The
+    /// last increment of the state then spans `exact` seconds, and the caller takes exact steps in [`LearnedView::lead_interval`]. Without
+    /// fallback a first step that diverges leaves displacements and time as before it, and increments that span the network's step.
     pub fn try_step<M: ElementMaterial>(
         &mut self,
         scene: SceneView<'_, M>,
@@ -387,7 +468,7 @@ impl LearnedView<'_, '_> {
         exact: f32,
         threads: &impl Threads,
     ) -> Result<Result<Status, Undone>, LearnedError> {
-        if self.model.fell_back.is_some() {
+        if self.model.is_exact_next() {
             return Ok(Err(Undone));
         }
         let nodes = scene.node_count();
@@ -396,13 +477,14 @@ impl LearnedView<'_, '_> {
         if let Err(refused) = Trial::check(scene, loads, state, room) {
             return Ok(Ok(refused));
         }
-        self.take_over(state)?;
-        let Self { model, storage } = self;
         let before = *state.progress;
-        let (vertex_vectors, saved) = storage.split_at_mut(storage.len().min(VERTEX_VECTORS * nodes));
-        if model.undoes {
+        let (_, saved) = self.storage.split_at_mut(self.storage.len().min(VERTEX_VECTORS * nodes));
+        if self.model.undoes {
             save(state, saved);
         }
+        self.take_over(state)?;
+        let Self { model, storage } = self;
+        let (vertex_vectors, saved) = storage.split_at_mut(storage.len().min(VERTEX_VECTORS * nodes));
         // What a refused step has predicted the network cannot go on from.
         model.led = None;
         let status = match Trial::begin(scene, loads, state.reborrow(), room) {
@@ -414,14 +496,17 @@ impl LearnedView<'_, '_> {
             }
         };
         if model.undoes && status.is_unexplained() {
-            model.fell_back = Some(Fallback { time: before.time, status });
+            model.turns.undo(before.time, status);
             *state.progress = before;
             restore(state, saved);
-            state.respan(exact);
+            if state.dt != exact {
+                state.respan(exact);
+            }
             return Ok(Err(Undone));
         }
         if status.is_taken() {
             model.led = Some(state.moment());
+            model.turns.enter_learned();
         }
         Ok(Ok(status))
     }

@@ -297,10 +297,18 @@ fn learned_section(choice: &LearnedChoice, trace: &LearnedTrace) -> Report {
     let fell_back = trace.fell_back.as_ref();
     section.add(
         "fell back",
-        fell_back.map(|(time, why)| format!("to the exact step at {time:.3} s; the learned one {why}")),
+        fell_back.map(|(time, why)| {
+            format!(
+                "to exact steps {} times, for {:.3} s; first at {time:.3} s: the learned step {why}",
+                trace.fallbacks,
+                trace.exact_seconds()
+            )
+        }),
         json!({
             "fell_back_at_s": fell_back.map(|(time, _)| time),
             "fell_back_because": fell_back.map(|(_, why)| why),
+            "fallbacks": trace.fallbacks,
+            "fell_back_for_s": trace.exact_seconds(),
         }),
     );
     section

@@ -21,8 +21,10 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome) -> Vec<String> {
     if let Some(trace) = &outcome.learned {
         warnings.extend(outside_training(trace));
         if let Some((time, why)) = &trace.fell_back {
-            warnings
-                .push(format!("from {time:.3} s on the exact step moved the scene: the learned one {why}"));
+            warnings.push(format!(
+                "exact steps moved the scene for {:.3} s, first at {time:.3} s, as the learned step {why}",
+                trace.exact_seconds()
+            ));
         }
     }
     if outcome.limits.steps > 0 {

@@ -1,6 +1,6 @@
 //! Learned steps of a scene. Time goes in intervals of the network's step `D`: first those of the lead-in, in each of which the exact
-//! step of `[time]` takes as many steps as it needs, then one learned step each. With fallback the first one that energy does not
-//! explain is undone, and the exact step takes over for good.
+//! step of `[time]` takes as many steps as it needs, then one learned step each. With fallback exact steps take the place of those
+//! that energy does not explain, or whose error is too large by the guard's estimate.
 
 use std::time::Instant;
 
@@ -40,7 +40,7 @@ impl<'a> LearnedRun<'a> {
 
     /// The length of fixed exact steps (s), while they move the scene.
     pub(crate) fn fixed_exact_seconds(&self) -> Option<f32> {
-        let is_exact = self.interval < self.lead_in || self.trace.fell_back.is_some();
+        let is_exact = self.interval < self.lead_in || self.step.model().is_exact_next();
         match &self.exact {
             ExactSteps::Fixed(step) if is_exact => Some(step.seconds()),
             _ => None,
@@ -57,11 +57,12 @@ impl<'a> LearnedRun<'a> {
         self.interval += 1;
         let seconds = self.trace.seconds;
         if self.interval <= self.lead_in {
-            self.lead_in(motion, state, outcome);
+            self.exact_interval(motion, state, outcome);
             return Ok(());
         }
-        if self.trace.fell_back.is_some() {
-            self.exact.advance(motion, state, outcome, seconds);
+        if self.step.model().is_exact_next() {
+            self.trace.exact_intervals += 1;
+            self.exact_interval(motion, state, outcome);
             return Ok(());
         }
         self.trace.from.get_or_insert(state.time());
@@ -81,18 +82,25 @@ impl<'a> LearnedRun<'a> {
                 outcome.enter(status, &state.view());
             }
             Err(Undone) => {
-                if let Some(fallback) = self.step.model().fell_back() {
-                    self.trace.enter_fallback(fallback.time, fallback.status);
-                }
+                self.trace.enter_fallback(self.step.model());
+                self.trace.exact_intervals += 1;
                 outcome.computed += 1;
-                self.exact.advance(motion, state, outcome, seconds);
+                self.exact_interval(motion, state, outcome);
             }
         }
         Ok(())
     }
 
-    /// An interval of the lead-in.
-    fn lead_in<M: ElementMaterial>(
+    /// Exact steps are next, because the guard calls the latest interval inexact. Nothing changes without fallback.
+    pub(crate) fn fall_back(&mut self, time: f64, status: Status) {
+        if self.interval > self.lead_in {
+            self.step.fall_back(time, status);
+            self.trace.enter_fallback(self.step.model());
+        }
+    }
+
+    /// Exact steps while the frames follow.
+    fn exact_interval<M: ElementMaterial>(
         &mut self,
         motion: &Motion<'_, M>,
         state: &mut VecState,

@@ -66,6 +66,9 @@ pub(crate) fn run<M: ElementMaterial>(
                     let status = guard.follow(Status::Ok, scene, &loads, &state.view());
                     let trace = outcome.guard.get_or_insert_default();
                     trace.enter(status, guard.estimate(), state.time());
+                    if let (Mover::Learned(learned), Status::Inexact { .. }) = (&mut mover, status) {
+                        learned.fall_back(state.time(), status);
+                    }
                 }
                 if taken % u64::from(Pace::STEPS_BETWEEN_LOOKS) == 0 {
                     tick(state.time());

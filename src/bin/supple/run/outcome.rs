@@ -5,7 +5,7 @@ use std::time::Duration;
 use supple::adaptive::Taken;
 use supple::guard::Estimate;
 use supple::inertia::{Grid, LargeModel, Method, Report};
-use supple::learned::LearnedReport;
+use supple::learned::{Fallback, LearnedModel, LearnedReport};
 use supple::material::J_FLOOR;
 use supple::state::StateView;
 use supple::step::{CriticalStep, Divergence, Status};
@@ -186,8 +186,11 @@ pub(crate) struct LearnedTrace {
     clipped: f64,
     outside: f64,
     pub(crate) most: LearnedReport,
-    /// When (s) and why the exact step took over again.
+    /// When (s) and why exact steps first took the place of learned ones.
     pub(crate) fell_back: Option<(f64, String)>,
+    /// How often they did, and intervals that they took.
+    pub(crate) fallbacks: u32,
+    pub(crate) exact_intervals: u64,
 }
 
 impl LearnedTrace {
@@ -202,6 +205,8 @@ impl LearnedTrace {
             outside: 0.0,
             most: LearnedReport::default(),
             fell_back: None,
+            fallbacks: 0,
+            exact_intervals: 0,
         }
     }
 
@@ -215,16 +220,28 @@ impl LearnedTrace {
         self.most.outside = self.most.outside.max(report.outside);
     }
 
-    /// Takes down a step that was undone.
-    pub(crate) fn enter_fallback(&mut self, time: f64, status: Status) {
-        let why = match status {
+    /// Takes down that exact steps are next.
+    pub(crate) fn enter_fallback(&mut self, model: &LearnedModel<'_>) {
+        self.fallbacks = model.fallbacks();
+        let Some(Fallback { time, status }) = model.fell_back().filter(|_| self.fell_back.is_none()) else {
+            return;
+        };
+        let why = match *status {
             Status::Diverged(divergence) => divergence.to_string(),
             Status::Limited { energy_excess, .. } => {
                 format!("exceeded what loads and supports ever gave by {:.1} %", 100.0 * energy_excess)
             }
+            Status::Inexact { error, allowed } => {
+                format!("may be {:.2} mm off, {:.2} mm are allowed", 1e3 * error, 1e3 * allowed)
+            }
             other => format!("{other:?}"),
         };
-        self.fell_back = Some((time, why));
+        self.fell_back = Some((*time, why));
+    }
+
+    /// How long exact steps have moved the scene after the lead-in, s.
+    pub(crate) fn exact_seconds(&self) -> f64 {
+        self.exact_intervals as f64 * f64::from(self.seconds)
     }
 
     pub(crate) fn us_per_step(&self) -> f64 {
