@@ -209,7 +209,7 @@ enum supple_status
      */
     SUPPLE_OUTSIDE = 2,
     /**
-     * A learned step was not to be believed and was undone; the exact step has taken over for good.
+     * Exact steps have taken the place of learned ones that were not to be believed. The network is tried again in later steps.
      */
     SUPPLE_FELL_BACK = 3,
     /**
@@ -402,6 +402,15 @@ enum supple_status
      * ever gave (limit, J).
      */
     SUPPLE_E_DIVERGED_ENERGY = -91,
+    /**
+     * The step was not taken: force `index` (value, N) would move `node` in it through the tissue around it (limit: its size, m).
+     */
+    SUPPLE_E_DIVERGED_FORCE = -92,
+    /**
+     * The step was not taken: supports moved `node` by too much in the step before (value, m) for the tissue around it (limit: its size,
+     * m).
+     */
+    SUPPLE_E_DIVERGED_MOTION = -93,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -845,7 +854,7 @@ typedef struct {
      */
     uint64_t multiply_adds;
     /**
-     * Whether the exact step has taken over for good.
+     * How often exact steps have taken the place of learned ones since the object was prepared or reset.
      */
     uint32_t fell_back;
     /**
@@ -1128,6 +1137,13 @@ supple_status supple_state_init(void *memory,
 supple_status supple_state_reset(supple_state *state);
 
 /**
+ * Stops all motion: nodes and time stay as they are, velocities are zero, and the energy balance begins with the strain energy. To go on
+ * after SUPPLE_E_DIVERGED_ENERGY from a state that was not saved before. A supple_learned needs a new lead-in.
+ */
+supple_status supple_state_stop(const supple_scene *scene,
+                                supple_state *state);
+
+/**
  * Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as
  * long as some six steps, with nodal pressure some twenty, with nodal strain some thirty; tissue that is deformed is stiffer, so ask
  * again from time to time.
@@ -1258,7 +1274,7 @@ supple_status supple_learned_init(void *memory,
                                   supple_error *error);
 
 /**
- * For a motion from rest: frames as at the start, no lead-in yet, the exact step has not taken over.
+ * For a motion from rest: frames as at the start, no lead-in yet, nothing has been undone.
  */
 supple_status supple_learned_reset(supple_learned *learned);
 
@@ -1285,9 +1301,10 @@ supple_status supple_learned_lead(const supple_scene *scene,
                                   supple_report *report);
 
 /**
- * Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. Stops at the first
- * that is not to be believed: without fallback that one is not taken, displacements and time are as before it, velocities may be
- * those of the network's own step, and a new lead-in is needed.
+ * Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. With fallback a step
+ * that is not to be believed is undone, and exact steps take its place and that of the next seven, where it happens again of more, before
+ * the network is tried again: SUPPLE_FELL_BACK. Without fallback the call stops at the first such step: it is not taken, displacements and
+ * time are as before it, velocities may be those of the network's own step, and a new lead-in is needed.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
@@ -1300,6 +1317,13 @@ supple_status supple_learned_step(const supple_scene *scene,
                                   uint32_t count,
                                   const supple_threads *threads,
                                   supple_report *report);
+
+/**
+ * To be called whenever a supple_guard calls learned steps inexact (SUPPLE_INEXACT): with fallback exact steps take the place of the
+ * next eight, where it happens again of more, before the network is tried again. Without fallback nothing changes.
+ */
+supple_status supple_learned_fall_back(supple_learned *learned,
+                                       const supple_state *state);
 
 /**
  * Writes how many bytes of memory a supple_large needs for a scene; it depends on the lattice. For cells that you give

@@ -96,6 +96,8 @@ enum class [[nodiscard]] status : std::int32_t {
 
     e_diverged = SUPPLE_E_DIVERGED,
     e_diverged_energy = SUPPLE_E_DIVERGED_ENERGY,
+    e_diverged_force = SUPPLE_E_DIVERGED_FORCE,
+    e_diverged_motion = SUPPLE_E_DIVERGED_MOTION,
 };
 
 // For all elements of a scene; each with its constants in the order of tissue::constants. tools/header.sh writes this list.
@@ -498,6 +500,9 @@ public:
 
     // Back to rest at time zero; the step stays.
     status reset() const noexcept { return detail::of(supple_state_reset(raw_)); }
+
+    // Stops all motion: to go on from a state with more energy than loads and supports gave.
+    status stop(const scene &of) const noexcept { return detail::of(supple_state_stop(of.raw(), raw_)); }
 
     // Bound on the stable step at these displacements, s; takes as long as some steps.
     [[nodiscard]] result<supple::critical_step> critical_step(scene of) const noexcept {

@@ -11,7 +11,7 @@ use super::memory::{
     self, Arrays, Head, Layout, Object, Place, magic, one, place_for, place_if_wanted, same_abi,
 };
 use super::scene::{AnyScene, carved, supple_scene, with_scene};
-use super::status::{Answer, status_of, supple_error, supple_status};
+use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
 use supple_status::*;
 
 /// What moves. One thread at a time. It may be copied with memcpy, to any memory aligned to SUPPLE_ALIGN, and the copy goes on as
@@ -113,6 +113,23 @@ pub unsafe extern "C" fn supple_state_reset(state: *mut supple_state) -> supple_
         Ok(SUPPLE_OK)
     };
     status_of(reset())
+}
+
+/// Stops all motion: nodes and time stay as they are, velocities are zero, and the energy balance begins with the strain energy. To go on
+/// after SUPPLE_E_DIVERGED_ENERGY from a state that was not saved before. A supple_learned needs a new lead-in.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_state_stop(
+    scene: *const supple_scene,
+    state: *mut supple_state,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let stop = || unsafe {
+        let any = carved(scene)?;
+        let mut state = opened_of(&any, state)?;
+        let has_room = with_scene!(any, scene => tled::stop(&scene, &mut state));
+        if has_room { Ok(SUPPLE_OK) } else { Err(mismatch(state.capacity(), any.node_count())) }
+    };
+    status_of(stop())
 }
 
 /// Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as

@@ -138,6 +138,11 @@ pub enum supple_status {
     /// The step was not taken: the kinetic energy (value, J), most of it at `node`, is several times what loads and supports
     /// ever gave (limit, J).
     SUPPLE_E_DIVERGED_ENERGY = -91,
+    /// The step was not taken: force `index` (value, N) would move `node` in it through the tissue around it (limit: its size, m).
+    SUPPLE_E_DIVERGED_FORCE = -92,
+    /// The step was not taken: supports moved `node` by too much in the step before (value, m) for the tissue around it (limit: its size,
+    /// m).
+    SUPPLE_E_DIVERGED_MOTION = -93,
 }
 
 use supple_status::*;
@@ -390,7 +395,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         0 => c"done",
         1 => c"steps were taken, but are not exact",
         2 => c"learned steps were taken, with inputs outside what training has seen",
-        3 => c"a learned step was not to be believed: the exact step has taken over",
+        3 => c"exact steps have taken the place of learned ones that were not to be believed",
         4 => c"the error is estimated to be more than is allowed",
         -1 => c"a pointer is NULL",
         -2 => c"a pointer is not aligned",
@@ -438,6 +443,8 @@ fn text(status: i32) -> Option<&'static CStr> {
         -80 => c"this processor does not have these instructions",
         -90 => c"diverged: a displacement would not be a finite number",
         -91 => c"diverged: more kinetic energy than loads and supports can have given",
+        -92 => c"the step was not taken: a force would move its node through the tissue around it",
+        -93 => c"the step was not taken: supports moved a node too far in one step",
         _ => return None,
     })
 }

@@ -131,6 +131,13 @@ pub(super) fn answer(status: &Status) -> Answer<supple_status> {
             Cause::Energy { kinetic, available } => {
                 supple_error::from(SUPPLE_E_DIVERGED_ENERGY).node(node).value(kinetic, available)
             }
+            Cause::Force { index, newton, size } => supple_error::from(SUPPLE_E_DIVERGED_FORCE)
+                .at(index)
+                .node(node)
+                .value(newton.into(), size.into()),
+            Cause::Motion { metre, size } => {
+                supple_error::from(SUPPLE_E_DIVERGED_MOTION).node(node).value(metre.into(), size.into())
+            }
         }),
         Status::Mismatch { nodes, room } => Err(mismatch(room, nodes)),
     }

@@ -3,6 +3,7 @@
 //! refuse it with the node at which it went wrong. A step that is refused leaves the state as it was, and what a method
 //! keeps of it: the next step is the same, to the bit, as if there had been none.
 
+mod cause;
 mod energy_sums;
 mod length;
 mod parts;
@@ -11,13 +12,14 @@ pub(crate) mod threads;
 
 pub(crate) use crate::element::Extremes;
 pub use crate::energy_balance::{EnergyBalance, EnergyCycle};
+pub use cause::Cause;
 pub(crate) use energy_sums::{Sums, Totals};
 pub(crate) use length::is_damping;
 pub use length::{CriticalStep, Step, StepError};
 #[cfg(feature = "lab")]
 pub(crate) use parts::external_forces;
 pub(crate) use parts::{Forcing, internal_forces, move_in_parts, nodal_volumes};
-pub use status::{Cause, Divergence, Status};
+pub use status::{Divergence, Status};
 #[cfg(feature = "parallel")]
 pub use threads::Rayon;
 pub use threads::{CallingThread, MOST_PARTS, Threads};
@@ -124,7 +126,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         let balance = match self.balance(step, method, &totals) {
             Ok(balance) => balance,
             Err(cause) => {
-                let node = self.culprit(step, method);
+                let (node, cause) = self.blamed(step, method, cause);
                 method.refuse();
                 return Status::Diverged(Divergence { time: self.progress.time, node, cause });
             }

@@ -1,8 +1,6 @@
 //! What became of a step: taken, taken but not exact, or refused, with the node at which it went wrong.
 
-use core::fmt;
-
-use super::EnergyBalance;
+use super::{Cause, EnergyBalance};
 use crate::element::Extremes;
 use crate::material::J_FLOOR;
 
@@ -53,33 +51,6 @@ pub struct Divergence {
     pub node: u32,
     /// What was wrong.
     pub cause: Cause,
-}
-
-/// What was wrong with a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Cause {
-    /// A displacement would not be a finite number.
-    NotFinite,
-    /// There is several times more kinetic energy than loads and supports can have given.
-    Energy {
-        /// Kinetic energy, J.
-        kinetic: f64,
-        /// The most that was ever in the energy balance, J.
-        available: f64,
-    },
-}
-
-impl fmt::Display for Divergence {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "diverged at {:.6} s, first at node {}: ", self.time, self.node)?;
-        match self.cause {
-            Cause::NotFinite => write!(f, "its displacement is no longer a finite number"),
-            Cause::Energy { kinetic, available } => write!(
-                f,
-                "kinetic energy {kinetic:.3e} J, but loads and supports never gave more than {available:.3e} J"
-            ),
-        }
-    }
 }
 
 impl Status {

@@ -33,8 +33,8 @@ use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::{
-    self, CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial, move_in_parts,
-    nodal_volumes,
+    self, CallingThread, Computed, EnergyBalance, Forcing, Status, Step, StepMethod, Threads, Totals, Trial,
+    move_in_parts, nodal_volumes,
 };
 use central_differences::{Advance, EnergySums, next_increment};
 
@@ -149,6 +149,19 @@ pub fn start(
     let Some(strain) = strain_energy_of(scene, state.reborrow()) else { return false };
     state.progress.dt = step.seconds();
     state.progress.energy_balance.start = kinetic + strain + scene.releasable_energy();
+    true
+}
+
+/// Stops all motion: displacements and time stay, velocities are zero, and the energy balance begins with the strain energy. To go on from
+/// a state that no step can be taken from, because it has more energy than loads and supports gave. Returns whether the state has room
+/// for the scene.
+#[must_use = "a state without room for the scene goes on moving"]
+pub fn stop(scene: &impl AsScene, state: &mut impl AsState) -> bool {
+    let (scene, mut state) = (scene.as_scene(), state.as_state());
+    let Some(strain) = strain_energy_of(scene, state.reborrow()) else { return false };
+    state.increment.fill(NodeVector::ZERO);
+    let start = strain + scene.releasable_energy();
+    state.progress.energy_balance = EnergyBalance { start, peak: start, ..EnergyBalance::NEW };
     true
 }
 

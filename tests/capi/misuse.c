@@ -264,6 +264,7 @@ static void states(void) {
     REFUSED(SUPPLE_E_NULL, supple_copy_positions(state, NULL, out, 3 * NODES));
     REFUSED(SUPPLE_E_NULL, supple_state_time(NULL, NULL, NULL));
     REFUSED(SUPPLE_E_NULL, supple_state_reset(NULL));
+    REFUSED(SUPPLE_E_NULL, supple_state_stop(scene, NULL));
 }
 
 static void bytes_of_states(void) {
@@ -383,7 +384,8 @@ static void divergence(void) {
     const uint64_t before = hash(vectors.first, vectors.stride * vectors.count);
     const supple_status burst = supple_step(scene, loads, state, 3, NULL, &report);
     note(burst);
-    CHECK(burst == SUPPLE_E_DIVERGED && report.steps == 0 && report.node < NODES);
+    CHECK(burst == SUPPLE_E_DIVERGED_FORCE && report.steps == 0 && report.node == NODES / 2);
+    CHECK(report.error.index == 0 && report.error.limit > 1e-4 && report.error.limit < 1e-1);
     CHECK(hash(vectors.first, vectors.stride * vectors.count) == before);
     DONE(supple_set_forces(loads, NULL, 0, NULL));
 
@@ -395,6 +397,27 @@ static void divergence(void) {
     const supple_status kick = supple_step(scene, NULL, state, 3, NULL, &report);
     note(kick);
     CHECK(kick == SUPPLE_E_DIVERGED_ENERGY && report.node == NODES / 2 && report.steps == 0);
+    /* Stopped, the state can go on. */
+    DONE(supple_state_stop(scene, state));
+    DONE(supple_step(scene, NULL, state, 3, NULL, &report));
+
+    /* Faster than numbers can tell. */
+    const float fastest[3] = {1e30f, 0.0f, 0.0f};
+    forge(FRONT + 16 * NODES + 16 * (NODES / 2), fastest, sizeof fastest);
+    DONE(supple_restore(state, saved, sizeof saved));
+    const supple_status flight = supple_step(scene, NULL, state, 3, NULL, &report);
+    note(flight);
+    CHECK(flight == SUPPLE_E_DIVERGED && report.node == NODES / 2 && report.steps == 0);
+
+    /* An instrument that jumps to and fro. */
+    DONE(supple_state_reset(state));
+    supple_status jump = SUPPLE_OK;
+    for (int n = 0; n < 100 && jump >= SUPPLE_OK; n++) {
+        move_end(scene, loads, n % 2 ? -0.3f : 0.3f, 0.0f, 0.0f);
+        jump = supple_step(scene, loads, state, 1, NULL, &report);
+    }
+    note(jump);
+    CHECK(jump == SUPPLE_E_DIVERGED_MOTION && report.node >= NODES - LAYER && report.error.value > report.error.limit);
 
     /* One that is no number. */
     const float nan = NAN;

@@ -1,0 +1,127 @@
+//! Why a step was refused. A load that by itself moves a node through the tissue around it in one step, a force far too large (often in
+//! another unit) or a support that jumps, is named; otherwise what the step would have left: no number, or energy that nothing gave.
+
+use core::fmt;
+
+use crate::element::ElementMaterial;
+use crate::loads::ramp_factor;
+
+use super::{Divergence, Step, StepMethod, Trial};
+
+/// What was wrong with a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Cause {
+    /// A displacement would not be a finite number.
+    NotFinite,
+    /// There is several times more kinetic energy than loads and supports can have given.
+    Energy {
+        /// Kinetic energy, J.
+        kinetic: f64,
+        /// The most that was in the energy balance, J.
+        available: f64,
+    },
+    /// A force moves the node through the tissue around it in this step.
+    Force {
+        /// Its place in the list of forces.
+        index: usize,
+        /// Its size, N.
+        newton: f32,
+        /// Size of the node's own tissue: the edge of a cube of its volume, m.
+        size: f32,
+    },
+    /// Supports moved the node through most of the tissue around it in a step.
+    Motion {
+        /// How far, m.
+        metre: f32,
+        /// As above, m.
+        size: f32,
+    },
+}
+
+/// Share of a node's own tissue by which a support may move it in a step before that is a cause.
+const MOST_OF_SIZE: f32 = 0.5;
+
+impl fmt::Display for Divergence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { time, node, cause } = self;
+        match cause {
+            Cause::NotFinite => write!(
+                f,
+                "diverged at {time:.6} s, first at node {node}: its displacement is no longer a finite number"
+            ),
+            Cause::Energy { kinetic, available } => write!(
+                f,
+                "diverged at {time:.6} s, first at node {node}: kinetic energy {kinetic:.3e} J, but loads and supports never gave \
+                 more than {available:.3e} J"
+            ),
+            Cause::Force { index, newton, size } => write!(
+                f,
+                "diverged at {time:.6} s at node {node}: force {index}, of {newton:.3e} N, moves it in one step through its tissue, \
+                 which is {:.3} mm across",
+                1e3 * size
+            ),
+            Cause::Motion { metre, size } => write!(
+                f,
+                "diverged at {time:.6} s at node {node}: supports moved it by {:.3} mm in one step, its tissue is {:.3} mm across; \
+                 with a ramp they take time",
+                1e3 * metre,
+                1e3 * size
+            ),
+        }
+    }
+}
+
+/// Length of a vector, which may be infinite.
+fn length(vector: [f32; 3]) -> f64 {
+    libm::sqrt(vector.into_iter().map(|component| f64::from(component) * f64::from(component)).sum())
+}
+
+impl<M: ElementMaterial> Trial<'_, M> {
+    /// The node and the load that are to blame for a refused step, or the node and cause that the step itself tells.
+    pub(super) fn blamed(&self, step: &Step, method: &impl StepMethod<M>, cause: Cause) -> (u32, Cause) {
+        let load = self.jumping_support().or_else(|| self.excessive_force(step, method.added_inertia()));
+        load.unwrap_or_else(|| (self.culprit(step, method), cause))
+    }
+
+    /// Edge of a cube of the node's own tissue, m.
+    fn size_at(&self, node: usize) -> f32 {
+        let density = self.scene.material.tissue(0).map_or(f32::INFINITY, |tissue| tissue.density);
+        libm::cbrtf(self.scene.node_mass(node) / density)
+    }
+
+    /// The node that supports moved farthest in the step before, if that is a cause.
+    fn jumping_support(&self) -> Option<(u32, Cause)> {
+        let mut most = (MOST_OF_SIZE, None);
+        for (node, (inertia, increment)) in self.scene.inertia.iter().zip(&*self.increment).enumerate() {
+            let [x, y, z] = inertia.inverse;
+            let [dx, dy, dz] = increment.to_array();
+            let held = |inverse: f32, way: f32| if inverse > 0.0 { 0.0 } else { way };
+            let metre = length([held(x, dx), held(y, dy), held(z, dz)]) as f32;
+            if metre > 0.0 {
+                let size = self.size_at(node);
+                if metre / size > most.0 {
+                    most = (metre / size, Some((node as u32, Cause::Motion { metre, size })));
+                }
+            }
+        }
+        most.1
+    }
+
+    /// The force that by itself would move its node farthest in this step, measured by the node's tissue, if that is a cause.
+    fn excessive_force(&self, step: &Step, added: f32) -> Option<(u32, Cause)> {
+        let mut most = (1.0, None);
+        let seconds = f64::from(step.seconds());
+        for (index, load) in self.loads.forces().iter().enumerate() {
+            let node = load.node as usize;
+            let mass = f64::from((1.0 + added) * self.scene.node_mass(node));
+            let newton = f64::from(ramp_factor(self.progress.time, load.ramp)) * length(load.newton);
+            let size = self.size_at(node);
+            let share = newton * seconds * seconds / (mass * f64::from(size));
+            if share > most.0 {
+                most = (share, Some((load.node, Cause::Force { index, newton: newton as f32, size })));
+            }
+        }
+        most.1
+    }
+}
