@@ -160,6 +160,7 @@ pub fn stop(scene: &impl AsScene, state: &mut impl AsState) -> bool {
     let (scene, mut state) = (scene.as_scene(), state.as_state());
     let Some(strain) = strain_energy_of(scene, state.reborrow()) else { return false };
     state.increment.fill(NodeVector::ZERO);
+    state.progress.dt = 0.0;
     let start = strain + scene.releasable_energy();
     state.progress.energy_balance = EnergyBalance { start, peak: start, ..EnergyBalance::NEW };
     true
