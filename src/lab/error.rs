@@ -25,7 +25,7 @@ pub enum LabError {
         /// The names there are, separated by commas.
         known: String,
     },
-    /// A mesh inside the program could not be read.
+    /// A mesh could not be read.
     Mesh(ReadError),
     /// A scene could not be built.
     Build(BuildError),

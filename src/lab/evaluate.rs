@@ -29,7 +29,7 @@ pub struct Plan {
 
 impl Plan {
     /// A plan from names, of scenes also of the groups `ramped` and `moving`; an empty list stands for all there are, of methods
-    /// all but [`Method::SLOW`]. The scene of the sweep is run at [`sweep::MULTIPLES`] too. Without a name it is `reversed`, if
+    /// all but [`Method::SLOW`] and [`Method::HARD`]. The scene of the sweep is run at [`sweep::MULTIPLES`] too. Without a name it is `reversed`, if
     /// that is among the scenes.
     pub fn new(
         scenes: &[String],
@@ -42,7 +42,10 @@ impl Plan {
             names = scenes::names().collect();
         }
         let methods: Vec<Method> = match methods {
-            [] => Method::ALL.into_iter().filter(|method| !Method::SLOW.contains(method)).collect(),
+            [] => Method::ALL
+                .into_iter()
+                .filter(|method| !Method::SLOW.contains(method) && !Method::HARD.contains(method))
+                .collect(),
             names => names.iter().map(|name| Method::named(name)).collect::<Result<_, _>>()?,
         };
         let multiples = if multiples.is_empty() { &MULTIPLES } else { multiples };

@@ -78,7 +78,7 @@ pub(super) fn prepare<'a, M: Material>(
         tangents: Vec::with_capacity(elements.len()),
         matrix: Matrix::of(scene.node_count(), &elements),
     };
-    Box::new(move |state, loads| Ok((body.step(loads, state), StepReport::default())))
+    Box::new(move |state, loads, _| Ok((body.step(loads, state), StepReport::default())))
 }
 
 /// Computes the tangents of all elements from the displacements (m) of the nodes. Of all that follows only this needs the law, so only

@@ -7,7 +7,7 @@ use std::string::{String, ToString};
 use std::vec;
 use std::vec::Vec;
 
-use super::networks::{self, Size};
+use super::networks::{self, Family};
 use super::scenes::SceneSpec;
 use super::timing::Timing;
 use super::{DT, LabError, implicit};
@@ -42,10 +42,23 @@ pub enum Method {
     BackwardEuler,
     /// The implicit midpoint rule, to compare with.
     ImplicitMidpoint,
+    /// Mass-scaled, multilevel or damped steps that the host makes half as long and as long again, in turn at every snapshot.
+    Switching(Large),
     /// The learned step with a network of the crate, after a lead-in of [`BURN_IN`].
-    Learned(Size),
+    Learned(Family),
     /// The same with a network of the user's.
     LearnedWith(NetworkFile),
+}
+
+/// Methods whose step may change while they run.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum Large {
+    /// See [`Method::MassScaled`].
+    MassScaled,
+    /// See [`Method::Multilevel`].
+    Multilevel,
+    /// See [`Method::Damped`].
+    Damped,
 }
 
 /// A network of the user's at its own step.
@@ -71,10 +84,10 @@ impl NetworkFile {
 /// Length of the lead-in, s (Meister et al. 2018, section 3).
 pub const BURN_IN: f64 = 0.3;
 
-/// Moves a state on by one step under loads; what else it needs, it owns. Gives the status and what the step tells about itself.
-/// After [`Status::Diverged`] it is not called again.
+/// Moves a state on by one step under loads, of so many seconds ([`Method::parts`]); what else it needs, it owns. Gives the status and
+/// what the step tells about itself. After [`Status::Diverged`] it is not called again.
 pub type Advance<'a> =
-    Box<dyn FnMut(&mut VecState, &Loads<'_>) -> Result<(Status, StepReport), LabError> + 'a>;
+    Box<dyn FnMut(&mut VecState, &Loads<'_>, f32) -> Result<(Status, StepReport), LabError> + 'a>;
 
 /// What a step tells about itself, if its method has it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -85,7 +98,7 @@ pub struct StepReport {
 
 impl Method {
     /// All methods that need no file of the user's, in the order of the tables.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 15] = [
         Self::Tled,
         Self::Hold,
         Self::TledLargeStep,
@@ -94,12 +107,26 @@ impl Method {
         Self::Damped,
         Self::BackwardEuler,
         Self::ImplicitMidpoint,
-        Self::Learned(Size::Compact),
-        Self::Learned(Size::Paper),
+        Self::Learned(Family::Compact),
+        Self::Learned(Family::Paper),
+        Self::Learned(Family::CompactInt8),
+        Self::Learned(Family::OtherStep),
+        Self::Switching(Large::MassScaled),
+        Self::Switching(Large::Multilevel),
+        Self::Switching(Large::Damped),
     ];
 
     /// Those that take more than ten minutes over all scenes.
-    pub const SLOW: [Self; 3] = [Self::BackwardEuler, Self::ImplicitMidpoint, Self::Learned(Size::Paper)];
+    pub const SLOW: [Self; 3] = [Self::BackwardEuler, Self::ImplicitMidpoint, Self::Learned(Family::Paper)];
+
+    /// Those that are for hard cases.
+    pub const HARD: [Self; 5] = [
+        Self::Learned(Family::CompactInt8),
+        Self::Learned(Family::OtherStep),
+        Self::Switching(Large::MassScaled),
+        Self::Switching(Large::Multilevel),
+        Self::Switching(Large::Damped),
+    ];
 
     /// Its name in tables.
     #[must_use]
@@ -113,8 +140,13 @@ impl Method {
             Self::Damped => "best",
             Self::BackwardEuler => "backward-euler",
             Self::ImplicitMidpoint => "implicit-midpoint",
-            Self::Learned(Size::Compact) => "compact-f32",
-            Self::Learned(Size::Paper) => "paper-f32",
+            Self::Learned(Family::Compact) => "compact-f32",
+            Self::Learned(Family::Paper) => "paper-f32",
+            Self::Learned(Family::CompactInt8) => "compact-int8",
+            Self::Learned(Family::OtherStep) => "compact-other-step",
+            Self::Switching(Large::MassScaled) => "mass-scaled-switching",
+            Self::Switching(Large::Multilevel) => "multilevel-switching",
+            Self::Switching(Large::Damped) => "best-switching",
             Self::DampedWith(file) | Self::LearnedWith(file) => file.name,
         }
     }
@@ -148,9 +180,19 @@ impl Method {
         match self {
             Self::Learned(_) | Self::LearnedWith(_) if timing.step != DT => Vec::new(),
             Self::Tled | Self::Hold => vec![1],
-            Self::Learned(size) => those(&|multiple| networks::learned(size, multiple).is_some()),
+            Self::Learned(family) => those(&|multiple| networks::learned(family, multiple).is_some()),
             Self::LearnedWith(file) => vec![file.multiple],
             _ => those(&|multiple| multiple > 1),
+        }
+    }
+
+    /// Parts of equal length into which its steps up to a snapshot are cut: one, and two before every second snapshot for those that
+    /// switch.
+    #[must_use]
+    pub const fn parts(self, snapshot: usize) -> u32 {
+        match self {
+            Self::Switching(_) => 1 + (snapshot % 2) as u32,
+            _ => 1,
         }
     }
 
@@ -175,7 +217,14 @@ impl Method {
         let large = |method, state: &mut VecState| {
             let step = Step::unchecked(dt, damping)?;
             let mut large = LargeStep::prepare_in_vec(method, scene, &spec.points, state.view(), step)?;
-            let advance: Advance<'a> = Box::new(move |state, loads| {
+            let mut length = dt;
+            let advance: Advance<'a> = Box::new(move |state, loads, seconds| {
+                if seconds != length {
+                    // Moves no node, and does nothing before longer steps.
+                    let _ = large.shorten(seconds, scene, loads, state.view());
+                    large.change_step(Step::unchecked(seconds, damping)?);
+                    length = seconds;
+                }
                 let status = large.step(scene, loads, state.view());
                 Ok((status, StepReport::default()))
             });
@@ -183,7 +232,7 @@ impl Method {
         };
         let exact = |count: u32| {
             let step = Step::unchecked(dt / count as f32, damping)?;
-            let advance: Advance<'a> = Box::new(move |state, loads| {
+            let advance: Advance<'a> = Box::new(move |state, loads, _| {
                 Ok((exact_steps(count, scene, loads, &mut state.view(), &step), StepReport::default()))
             });
             Ok(advance)
@@ -192,12 +241,16 @@ impl Method {
             Ok::<_, LabError>(inertia::Method::Damped(Damper::new(Network::parse(bytes)?)?, Cells::Suggested))
         };
         match self {
-            Self::Hold => Ok(Box::new(|_, _| Ok((Status::Ok, StepReport::default())))),
+            Self::Hold => Ok(Box::new(|_, _, _| Ok((Status::Ok, StepReport::default())))),
             Self::Tled => exact(spec.timing.refinement),
             Self::TledLargeStep => exact(1),
-            Self::MassScaled => large(inertia::Method::MassScaled, state),
-            Self::Multilevel => large(inertia::Method::Multilevel(Cells::Suggested), state),
-            Self::Damped => large(damped(networks::damper())?, state),
+            Self::MassScaled | Self::Switching(Large::MassScaled) => {
+                large(inertia::Method::MassScaled, state)
+            }
+            Self::Multilevel | Self::Switching(Large::Multilevel) => {
+                large(inertia::Method::Multilevel(Cells::Suggested), state)
+            }
+            Self::Damped | Self::Switching(Large::Damped) => large(damped(networks::damper())?, state),
             Self::DampedWith(file) => large(damped(file.bytes)?, state),
             Self::BackwardEuler => {
                 Ok(implicit::prepare(implicit::Rule::BackwardEuler, scene, state, dt, damping))
@@ -205,9 +258,9 @@ impl Method {
             Self::ImplicitMidpoint => {
                 Ok(implicit::prepare(implicit::Rule::Midpoint, scene, state, dt, damping))
             }
-            Self::Learned(size) => {
+            Self::Learned(family) => {
                 let multiple = (dt / DT).round() as u32;
-                let bytes = networks::learned(size, multiple).ok_or(LabError::NoNetwork { multiple })?;
+                let bytes = networks::learned(family, multiple).ok_or(LabError::NoNetwork { multiple })?;
                 learned(scene, bytes, exact_steps_in(dt, &spec.timing), damping)
             }
             Self::LearnedWith(file) => learned(scene, file.bytes, exact_steps_in(dt, &spec.timing), damping),
@@ -253,7 +306,7 @@ fn learned<'a, M: ElementMaterial>(
     let mut learned = LearnedStep::new(network, false, storage)?;
     let exact = Step::unchecked(recipe.step / count as f32, damping)?;
     let trained = Step::unchecked(recipe.step / count as f32, recipe.damping)?;
-    Ok(Box::new(move |state, loads| {
+    Ok(Box::new(move |state, loads, _| {
         let mut state = state.view();
         if state.time() + 0.5 * f64::from(DT) < BURN_IN {
             let lead = |state: &mut StateView<'_>| exact_steps(count, scene, loads, state, &exact);
@@ -278,7 +331,8 @@ mod tests {
         assert_eq!(
             said,
             "method \"euler\" is not known; there are tled, hold, tled-large-step, mass-scaled, multilevel, best, \
-             backward-euler, implicit-midpoint, compact-f32, paper-f32"
+             backward-euler, implicit-midpoint, compact-f32, paper-f32, compact-int8, compact-other-step, \
+             mass-scaled-switching, multilevel-switching, best-switching"
         );
     }
 }

@@ -151,17 +151,19 @@ impl MaterialWork for Run<'_> {
 
         let mut errors = Errors::default();
         let (mut frames, mut estimate) = (Vec::new(), None);
-        let (mut taken, mut limited, mut spent) = (0_u32, 0_u32, Duration::ZERO);
+        let (mut taken, mut limited, mut spent) = (0.0, 0.0, Duration::ZERO);
         let (mut clips, mut predictions) = (0.0, 0_u32);
         let mut loads = spec.loads(&scene)?;
-        for _ in 0..spec.intervals {
+        for snapshot in 0..spec.intervals {
             let mut ok = true;
+            let parts = method.parts(snapshot);
+            let (seconds, part) = (dt / parts as f32, 1.0 / f64::from(parts));
             // A lead-in is not timed.
             let timed = state.time() + 0.5 * f64::from(spec.timing.step) >= method.lead_in();
             let start = Instant::now();
-            for _ in 0..spec.timing.interval / multiple {
-                let loads = loads.of_step(state.time(), f64::from(dt));
-                let (mut status, report) = advance(&mut state, &loads)?;
+            for _ in 0..parts * spec.timing.interval / multiple {
+                let loads = loads.of_step(state.time(), f64::from(seconds));
+                let (mut status, report) = advance(&mut state, &loads, seconds)?;
                 if let Some(guard) = &mut guard {
                     status = guard.follow(status, scene.view(), &loads, &state.view());
                     estimate = guard.estimate().map(|estimate| [estimate.mean, estimate.largest]);
@@ -172,14 +174,14 @@ impl MaterialWork for Run<'_> {
                 }
                 match status {
                     Status::Ok => {}
-                    Status::Limited { .. } | Status::Inexact { .. } => limited += 1,
+                    Status::Limited { .. } | Status::Inexact { .. } => limited += part,
                     Status::Diverged(divergence) => {
                         return Ok((End::Diverged(divergence.time), frames));
                     }
                     Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
                 }
                 ok &= status == Status::Ok;
-                taken += u32::from(timed);
+                taken += if timed { part } else { 0.0 };
             }
             if timed {
                 spent += start.elapsed();
@@ -189,14 +191,10 @@ impl MaterialWork for Run<'_> {
             frames.push(Frame { mean: errors.mean(), max: errors.max, estimate, ok });
         }
         // The lead-in may last to the end.
-        let taken = f64::from(taken.max(1));
+        let taken = f64::max(taken, 1.0);
         let figures = Figures {
             errors,
-            clip_share: if predictions > 0 {
-                clips / f64::from(predictions)
-            } else {
-                f64::from(limited) / taken
-            },
+            clip_share: if predictions > 0 { clips / f64::from(predictions) } else { limited / taken },
             us_per_step: 1e6 * spent.as_secs_f64() / taken,
         };
         Ok((End::Reached(figures), frames))

@@ -296,7 +296,7 @@ fn pull(newton: f32, ramp: f32) -> Vec<NodalForce> {
 const CYLINDER: &[u8] = include_bytes!("../../meshes/cylinder.msh");
 pub(super) const LOBE: &[u8] = include_bytes!("../../meshes/lobe.msh");
 /// The held end of a mesh, as a share of its length: more than a layer of elements.
-const HELD: f32 = 0.12;
+pub(super) const HELD: f32 = 0.12;
 
 /// A mesh that leans over under a body force across its length.
 fn leaning(name: &'static str, file: &[u8]) -> Result<SceneSpec, LabError> {
@@ -361,16 +361,20 @@ pub(super) fn held_at_its_end(
     file: &[u8],
 ) -> Result<(SceneSpec, Vec<[u32; 3]>), LabError> {
     let TetMesh { points, tets, triangles, .. } = parse_msh(Path::new(name), file)?;
-    let points: Vec<_> = points.into_iter().map(|point| point.map(|component| component as f32)).collect();
+    let points = points.into_iter().map(|point| point.map(|component| component as f32)).collect();
+    Ok((SceneSpec { law: AnyLaw::Exponential(MESH_LAW), ..held(name, points, tets) }, triangles))
+}
+
+/// A body held at the low end of its longest axis.
+pub(super) fn held(name: &'static str, points: Vec<[f32; 3]>, tets: Vec<[u32; 4]>) -> SceneSpec {
     let (axis, low, high) = longest(&points);
     let held = (0..).zip(&points).filter(|(_, point)| point[axis] < low + HELD * (high - low));
     let supports = held.map(|(node, _)| Support::fixed(node)).collect();
-    let law = AnyLaw::Exponential(MESH_LAW);
-    Ok((SceneSpec { points, tets, supports, law, ..bar(name, Vec::new()) }, triangles))
+    SceneSpec { points, tets, supports, ..bar(name, Vec::new()) }
 }
 
 /// The axis along which the points reach farthest, with their least and largest coordinates on it.
-fn longest(points: &[[f32; 3]]) -> (usize, f32, f32) {
+pub(super) fn longest(points: &[[f32; 3]]) -> (usize, f32, f32) {
     let reach = |axis: usize| {
         let values = points.iter().map(|point| point[axis]);
         values.fold((axis, f32::INFINITY, f32::NEG_INFINITY), |(_, low, high), value| {
@@ -382,7 +386,7 @@ fn longest(points: &[[f32; 3]]) -> (usize, f32, f32) {
 }
 
 /// Lumped masses, kg: a quarter of each element's to each of its nodes.
-fn node_masses(scene: &SceneSpec) -> Vec<f32> {
+pub(super) fn node_masses(scene: &SceneSpec) -> Vec<f32> {
     let mut masses = vec![0.0; scene.points.len()];
     for tet in &scene.tets {
         let corners = tet.map(|node| {

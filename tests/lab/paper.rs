@@ -3,7 +3,7 @@
 #![cfg(all(feature = "lab", feature = "slow-tests"))]
 
 use supple::lab::method::Method;
-use supple::lab::networks::Size;
+use supple::lab::networks::Family;
 use supple::lab::run::{End, run};
 use supple::lab::scenes;
 use supple::lab::truth;
@@ -16,7 +16,7 @@ fn the_exact_formula_fails_on_torsion_where_the_network_does_not() {
     for multiple in [10, 20, 50, 100] {
         let exact = run(&scene, &truth, Method::TledLargeStep, multiple).unwrap();
         let End::Diverged(time) = exact.end else { panic!("the exact formula is stable at {multiple}") };
-        let learned = run(&scene, &truth, Method::Learned(Size::Compact), multiple).unwrap();
+        let learned = run(&scene, &truth, Method::Learned(Family::Compact), multiple).unwrap();
         let Some(figures) = learned.figures() else { panic!("the network diverged at {multiple}") };
         println!(
             "{multiple} times the paper's step, {:.2} times the least exact limit: the exact formula diverges at {time:.3} s; \

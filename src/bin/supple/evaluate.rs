@@ -20,7 +20,8 @@ pub(crate) struct Asked {
     /// Scene, or `ramped` or `moving` for a group of them, all 34 unless given; may be repeated
     #[arg(long = "scene", value_name = "NAME")]
     scenes: Vec<String>,
-    /// Method, unless given all but paper-f32, backward-euler and implicit-midpoint, which take far longer; may be repeated
+    /// Method, unless given all but paper-f32, backward-euler and implicit-midpoint, which take far longer, and those that are for hard
+    /// cases; may be repeated
     #[arg(long = "method", value_name = "NAME")]
     methods: Vec<String>,
     /// Step as a multiple of the scene's, 1 10 20 50 100 unless given; may be repeated
@@ -43,6 +44,13 @@ pub(crate) struct Asked {
     /// the laboratory's, all of them unless given
     #[arg(long, conflicts_with_all = ["physics", "multiples", "element", "weights", "sweep"])]
     hard: bool,
+    /// Mesh to judge as a hard case, with the scenes that are named: held at one end of its longest axis, under its own weight and a
+    /// pull at the other end
+    #[arg(long, value_name = "FILE", requires = "hard")]
+    mesh: Option<PathBuf>,
+    /// Factor to metres of that mesh; 0.001 for one in millimetres
+    #[arg(long, value_name = "S", default_value_t = 1.0, requires = "mesh")]
+    scale: f64,
     /// Judge adaptive steps of this tolerance (mm) over the hard cases instead, against fixed steps of the methods, damped ones unless
     /// given: tolerance.csv; may be repeated
     #[arg(long = "tolerance", value_name = "MM", conflicts_with_all = ["physics", "hard", "multiples", "element", "weights", "sweep"])]
@@ -91,8 +99,14 @@ fn evaluate_physics(Asked { out, scenes, .. }: &Asked) -> Result<End, Problem> {
     Ok(End::Reached)
 }
 
-fn evaluate_hard(Asked { out, scenes, methods, random, every, .. }: &Asked) -> Result<End, Problem> {
-    let plan = hard::Plan::new(scenes, methods, *random, *every).map_err(Problem::of)?;
+fn evaluate_hard(
+    Asked { out, scenes, mesh, scale, methods, random, every, .. }: &Asked,
+) -> Result<End, Problem> {
+    if !(scale.is_finite() && *scale > 0.0) {
+        return Err(Problem(format!("--scale {scale}: it must be a positive number")));
+    }
+    let mesh = mesh.as_deref().map(|path| (path, *scale));
+    let plan = hard::Plan::new(scenes, mesh, methods, *random, *every).map_err(Problem::of)?;
     let judged = hard::evaluate(&plan, out, |words| message!("{words}")).map_err(Problem::of)?;
     print(hard::report::text(&judged));
     output!("\nresults  {}", out.join("hard.csv").display());
@@ -106,7 +120,7 @@ fn evaluate_tolerances(
         return Err(Problem(format!("--tolerance {wrong}: it must be a positive number of mm")));
     }
     let methods = if methods.is_empty() { &[Method::Damped.name().to_owned()] } else { &**methods };
-    let plan = hard::Plan::new(scenes, methods, *random, *every).map_err(Problem::of)?;
+    let plan = hard::Plan::new(scenes, None, methods, *random, *every).map_err(Problem::of)?;
     let rows =
         tolerance::evaluate(&plan, tolerances, out, |words| message!("{words}")).map_err(Problem::of)?;
     print(tolerance::text(&rows));

@@ -1,15 +1,21 @@
-//! Scenes that are made to break a step. SI units.
+//! Scenes that are made to break a step, and one of a mesh of the user's. SI units.
 
+use std::path::Path;
 use std::string::ToString;
 use std::vec::Vec;
 
 use super::super::LabError;
 use super::super::course::Course;
 use super::super::moving::{critical_step, free_bar, hold, neo_hookean, nodes_where};
-use super::super::scenes::{self, LOBE, RigidVelocity, SceneSpec, SecondTissue, bar, held_at_its_end};
-use super::timing_of;
+use super::super::scenes::{
+    self, HELD, LOBE, RigidVelocity, SceneSpec, SecondTissue, bar, held, held_at_its_end, longest,
+    node_masses,
+};
+use super::{TRAINED_DAMPING, timing_of};
+use crate::io::{TetMesh, read_mesh};
 use crate::loads::{Motion, NodalForce};
 use crate::material::{Element, NeoHookean, Tissue};
+use crate::mesh::Bar;
 use crate::scene::{Axes, Support};
 
 /// A scene and its duration, s.
@@ -18,7 +24,7 @@ type Case = (SceneSpec, f32);
 /// Makes a case.
 type Make = fn() -> Result<Case, LabError>;
 
-const CASES: [(&str, Make); 17] = [
+const CASES: [(&str, Make); 23] = [
     ("sudden-load", sudden_load),
     ("reversal", reversal),
     ("release-stretched", release),
@@ -35,7 +41,13 @@ const CASES: [(&str, Make); 17] = [
     ("one-cell-thick", || bending([1, 1, 12], 50.0)),
     ("densities-1-1000", || two_tissues(1.0, 1_000.0)),
     ("moduli-1-1000", || two_tissues(1_000.0, 1.0)),
-    ("paper-bar-gravity", paper_bar_gravity),
+    ("paper-bar-gravity", || paper_bar_gravity(Bar::PAPER.cells)),
+    ("paper-bar-coarse", || paper_bar_gravity([4, 4, 8])),
+    ("paper-bar-fine", || paper_bar_gravity([16, 16, 34])),
+    ("paper-bar-other-material", other_material),
+    ("million-steps", million_steps),
+    ("fades-to-nothing", fades_to_nothing),
+    ("metres-for-millimetres", metres_for_millimetres),
 ];
 
 /// The names of these cases, and of the laboratory's scenes.
@@ -55,6 +67,25 @@ pub fn named(name: &str) -> Result<SceneSpec, LabError> {
     let (mut spec, seconds) = make()?;
     spec.name = name;
     (spec.timing, spec.intervals) = timing_of(critical_step(&spec)?, seconds);
+    Ok(spec)
+}
+
+/// A mesh in a file, in metres after `scale`: soft tissue, held at the low end of its longest axis, that sinks under its own weight
+/// and is pulled aside at the other end by a tenth of it.
+pub fn of_mesh(path: &Path, scale: f64) -> Result<SceneSpec, LabError> {
+    const G: f32 = 9.81;
+    let TetMesh { points, tets, .. } = read_mesh(path)?;
+    let points = points.into_iter().map(|point| point.map(|component| (scale * component) as f32)).collect();
+    let mut spec = held("mesh", points, tets);
+    (spec.law, spec.element) = (neo_hookean(1_500.0, 50.0), Element::NodalPressure);
+    let (axis, low, high) = longest(&spec.points);
+    spec.gravity[(axis + 1) % 3] = -G;
+    let nodes = nodes_where(&spec, |point| point[axis] > high - HELD * (high - low));
+    let mass: f32 = node_masses(&spec).iter().sum();
+    let mut newton = [0.0; 3];
+    newton[(axis + 2) % 3] = 0.1 * G * mass / nodes.len() as f32;
+    spec.forces = nodes.into_iter().map(|node| NodalForce { node, newton, ramp: 0.2 }).collect();
+    (spec.timing, spec.intervals) = timing_of(critical_step(&spec)?, 0.6);
     Ok(spec)
 }
 
@@ -182,8 +213,55 @@ fn two_tissues(stiffer: f32, denser: f32) -> Result<Case, LabError> {
     Ok((spec, 0.4))
 }
 
-fn paper_bar_gravity() -> Result<Case, LabError> {
+/// The body and tissue of the networks' training, on their mesh or another one.
+fn paper_bar_gravity(cells: [u32; 3]) -> Result<Case, LabError> {
     let mut spec = bar("", Vec::new());
+    let shape = Bar { cells, ..Bar::PAPER };
+    (spec.points, spec.tets) = (shape.points().collect(), shape.tets().collect());
+    hold(&mut spec, |[_, _, z]| z == 0.0);
     spec.gravity = [9.81, 0.0, 0.0];
     Ok((spec, 0.6))
+}
+
+/// The same bar of tissue that is 50 times as stiff and does not stiffen.
+fn other_material() -> Result<Case, LabError> {
+    let (mut spec, seconds) = paper_bar_gravity(Bar::PAPER.cells)?;
+    spec.law = neo_hookean(1_500.0, 50.0);
+    Ok((spec, seconds))
+}
+
+/// A small bar that an instrument shakes ten times a second, for a million exact steps.
+fn million_steps() -> Result<Case, LabError> {
+    let mut spec =
+        free_bar([0.004, 0.004, 0.012], [2, 2, 6], neo_hookean(0.5 * SHEAR, 50.0), TRAINED_DAMPING);
+    spec.element = Element::NodalPressure;
+    hold(&mut spec, |[_, _, z]| z == 0.0);
+    let nodes = nodes_where(&spec, |[_, _, z]| z > 0.0119);
+    let newton = [0.002 / nodes.len() as f32, 0.0, 0.0];
+    spec.forces = nodes.into_iter().map(|node| NodalForce { node, newton, ramp: 0.0 }).collect();
+    spec.course = Course::Alternating(0.1);
+    let seconds = 0.95e6 * critical_step(&spec)?;
+    Ok((spec, seconds))
+}
+
+/// A cube that is let go and comes to rest: what it still moves by falls below the smallest normal number.
+fn fades_to_nothing() -> Result<Case, LabError> {
+    const SIDE: f32 = 0.02;
+    let mut spec = free_bar([SIDE; 3], [4, 4, 4], neo_hookean(0.5 * SHEAR, 50.0), 300.0);
+    spec.element = Element::NodalPressure;
+    hold(&mut spec, |[_, _, z]| z == 0.0);
+    let nodes = nodes_where(&spec, |[_, _, z]| z == SIDE);
+    let newton = [0.4 / nodes.len() as f32, 0.0, 0.0];
+    spec.forces = nodes.into_iter().map(|node| NodalForce { node, newton, ramp: 0.0 }).collect();
+    spec.course = Course::Released(0.1);
+    Ok((spec, 2.0))
+}
+
+/// A bar 20 m wide and 100 m long, under gravity.
+fn metres_for_millimetres() -> Result<Case, LabError> {
+    let mut spec = free_bar(SIZE.map(|edge| 1e3 * edge), [4, 4, 12], neo_hookean(0.5 * SHEAR, 50.0), 5.0);
+    spec.element = Element::NodalPressure;
+    hold(&mut spec, |[_, _, z]| z == 0.0);
+    spec.gravity = [9.81, 0.0, 0.0];
+    Ok((spec, 60.0))
 }

@@ -1,4 +1,5 @@
-//! Hard cases: is a run ever wrong without a word? Scenes made to break a step, and random ones, at 10 to 100 times the critical step.
+//! Hard cases: is a run ever wrong without a word? Scenes made to break a step, and random ones, at 10 to 100 times the critical step,
+//! and by exact steps at the critical one and beyond.
 //! A snapshot is wrong if the mean error of the nodes exceeds a millimetre and a fifth of the motion so far; it is silently wrong if
 //! every step since the snapshot before was [`crate::step::Status::Ok`].
 //!
@@ -19,8 +20,8 @@ use std::path::Path;
 use std::string::String;
 use std::vec::Vec;
 
-use super::method::Method;
-use super::networks::{self, Size};
+use super::method::{Large, Method};
+use super::networks::{self, Family};
 use super::run;
 use super::scenes::SceneSpec;
 use super::threads::in_parallel;
@@ -32,6 +33,9 @@ use verdict::Judged;
 
 /// Steps over the critical step of a body at rest.
 pub const TIMES_CRITICAL: [u32; 4] = [10, 20, 50, 100];
+
+/// The same of exact steps, which have no guard in `supple simulate` either.
+const TIMES_CRITICAL_EXACT: [f64; 3] = [0.9, 1.0, 1.2];
 
 /// Damping of the motions that the networks of the crate learned, 1/s.
 const TRAINED_DAMPING: f32 = 20.0;
@@ -50,21 +54,37 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan from names of cases and methods: all there are if there are none; so many random scenes, and guards with `every`.
-    pub fn new(cases: &[String], methods: &[String], random: u32, every: u32) -> Result<Self, LabError> {
+    /// A plan from names of cases and methods, and a mesh of the user's with its factor to metres: all cases if there are neither names
+    /// nor a mesh, all methods if there are none; so many random scenes, and guards with `every`.
+    pub fn new(
+        cases: &[String],
+        mesh: Option<(&Path, f64)>,
+        methods: &[String],
+        random: u32,
+        every: u32,
+    ) -> Result<Self, LabError> {
         let methods = match methods {
             [] => Vec::from([
                 Method::MassScaled,
                 Method::Multilevel,
                 Method::Damped,
-                Method::Learned(Size::Compact),
+                Method::Learned(Family::Compact),
+                Method::Learned(Family::CompactInt8),
+                Method::Learned(Family::OtherStep),
+                Method::TledLargeStep,
+                Method::Switching(Large::MassScaled),
+                Method::Switching(Large::Multilevel),
+                Method::Switching(Large::Damped),
             ]),
             names => names.iter().map(|name| Method::named(name)).collect::<Result<_, _>>()?,
         };
-        let cases = match cases {
-            [] => cases::names().map(cases::named).collect::<Result<_, _>>()?,
+        let mut cases = match cases {
+            [] if mesh.is_none() => cases::names().map(cases::named).collect::<Result<Vec<_>, _>>()?,
             names => names.iter().map(|name| cases::named(name)).collect::<Result<_, _>>()?,
         };
+        if let Some((path, scale)) = mesh {
+            cases.push(cases::of_mesh(path, scale)?);
+        }
         Ok(Self { cases, random, methods, every })
     }
 
@@ -144,25 +164,14 @@ fn random_scene(number: u32, folder: &Path) -> Result<Option<(SceneSpec, Truth)>
 fn runs(spec: &SceneSpec, truth: &Truth, plan: &Plan, say: &impl Fn(&str)) -> Result<Vec<Judged>, LabError> {
     let mut judged = Vec::new();
     for &method in &plan.methods {
-        let multiples: Vec<u32> = match method {
-            Method::Learned(_) => networks::multiples()
-                .filter(|_| spec.damping == TRAINED_DAMPING)
-                .map(|multiple| multiple as f32 * DT / spec.timing.step)
-                .filter(|multiple| (multiple - multiple.round()).abs() < 1e-3)
-                .map(|multiple| multiple.round() as u32)
-                .collect(),
-            Method::Tled => Vec::from([1]),
-            _ => TIMES_CRITICAL
-                .map(|times| multiple_near(&spec.timing, truth.limit_at_rest as f32, times))
-                .to_vec(),
-        };
-        let every = match method {
-            Method::Tled => None,
-            Method::Learned(_) | Method::LearnedWith(_) => Some(EVERY_LEARNED),
-            _ => Some(plan.every),
-        };
-        for multiple in multiples {
-            let row = match run::run_guarded(spec, truth, method, multiple, every) {
+        for (timing, multiple) in steps(spec, truth, method) {
+            let spec = SceneSpec { timing, ..spec.clone() };
+            let every = match method {
+                Method::Tled | Method::TledLargeStep => None,
+                Method::Learned(_) | Method::LearnedWith(_) => Some(EVERY_LEARNED),
+                _ => Some(plan.every),
+            };
+            let row = match run::run_guarded(&spec, truth, method, multiple, every) {
                 // Refused before it has begun: not wrong.
                 Err(LabError::Inertia(error)) => {
                     say(&format!("{}: {} refuses: {error}", spec.name, method.name()));
@@ -174,6 +183,32 @@ fn runs(spec: &SceneSpec, truth: &Truth, plan: &Plan, say: &impl Fn(&str)) -> Re
         }
     }
     Ok(judged)
+}
+
+/// The steps of a method on a scene: multiples of how its time is counted, with the same snapshots.
+fn steps(spec: &SceneSpec, truth: &Truth, method: Method) -> Vec<(Timing, u32)> {
+    let timing = spec.timing;
+    match method {
+        Method::Learned(_) => networks::multiples()
+            .filter(|_| spec.damping == TRAINED_DAMPING)
+            .map(|multiple| multiple as f32 * DT / timing.step)
+            .filter(|multiple| (multiple - multiple.round()).abs() < 1e-3)
+            .map(|multiple| (timing, multiple.round() as u32))
+            .collect(),
+        Method::Tled => Vec::from([(timing, 1)]),
+        Method::TledLargeStep => {
+            TIMES_CRITICAL_EXACT.map(|times| (cut(&timing, times * truth.limit_at_rest), 1)).to_vec()
+        }
+        _ => TIMES_CRITICAL
+            .map(|times| (timing, multiple_near(&timing, truth.limit_at_rest as f32, times)))
+            .to_vec(),
+    }
+}
+
+/// The same snapshots with steps as near to so many seconds as divide the time between two.
+fn cut(timing: &Timing, seconds: f64) -> Timing {
+    let interval = (timing.interval_seconds() / seconds).round().max(1.0);
+    Timing { step: (timing.interval_seconds() / interval) as f32, interval: interval as u32, refinement: 1 }
 }
 
 #[cfg(test)]

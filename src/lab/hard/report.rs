@@ -15,7 +15,7 @@ use crate::io::write_atomically;
 /// Writes the files into a folder.
 pub(super) fn write(judged: &[Judged], out: &Path) -> Result<(), LabError> {
     let heads = "case,method,step_s,times_critical,motion_mm,worst_error_mm,estimate_mm,verdict,silent_snapshots,wrong_from_s,\
-                 status,us_per_simulated_second";
+                 told_from_s,status,us_per_simulated_second";
     write_atomically(&out.join("hard.csv"), |file| {
         writeln!(file, "{heads}")?;
         judged.iter().try_for_each(|run| writeln!(file, "{}", csv(run)))
@@ -64,7 +64,7 @@ const fn name(verdict: Verdict) -> &'static str {
 fn csv(run: &Judged) -> String {
     let (row, worst) = (&run.row, run.worst());
     format!(
-        "{},{},{:.4e},{:.1},{:.4},{},{},{},{},{},{},{}",
+        "{},{},{:.4e},{:.1},{:.4},{},{},{},{},{},{},{},{}",
         row.scene,
         row.method.name(),
         row.step,
@@ -75,6 +75,7 @@ fn csv(run: &Judged) -> String {
         name(run.verdict()),
         run.silent(),
         optional(run.wrong_from()),
+        optional(run.told_from()),
         row.end,
         optional(row.figures().map(|figures| figures.us_per_step / row.step)),
     )
@@ -155,7 +156,8 @@ pub fn text(judged: &[Judged]) -> String {
     text
 }
 
-/// Estimate over true error at the worst snapshot of each run, with logarithmic axes.
+/// Estimate over true error at the worst snapshot of each run, with logarithmic axes. What is beyond them stands at the edge, and what
+/// is silent on top.
 fn draw(judged: &[Judged]) -> String {
     const SIZE: f64 = 560.0;
     const MARGIN: f64 = 70.0;
@@ -168,16 +170,22 @@ fn draw(judged: &[Judged]) -> String {
          font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"{SIZE}\" height=\"{SIZE}\" fill=\"white\"/>\n\
          <text x=\"{MARGIN}\" y=\"26\" font-size=\"16\">Hard cases: estimate over true error</text>\n\
          <text x=\"{MARGIN}\" y=\"46\" fill=\"#d55e00\">\u{25cf} silently wrong</text>\n\
-         <text x=\"200\" y=\"46\" fill=\"#0072b2\">\u{25cf} right, or told</text>\n"
+         <text x=\"180\" y=\"46\" fill=\"#0072b2\">\u{25cf} right, or told</text>\n\
+         <text x=\"292\" y=\"46\" fill=\"#555\">below the line the estimate is too low</text>\n"
     );
     for decade in DECADES {
         let at = 10.0_f64.powi(decade);
+        let label = match decade {
+            decade if decade == *DECADES.start() => format!("\u{2264}{at}"),
+            decade if decade == *DECADES.end() => format!("\u{2265}{at}"),
+            _ => format!("{at}"),
+        };
         line(&mut svg, (x(at), y(1e-3)), (x(at), y(1e3)), "#ddd");
         line(&mut svg, (x(1e-3), y(at)), (x(1e3), y(at)), "#ddd");
         put(
             &mut svg,
             format_args!(
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{at}</text>",
+                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
                 x(at),
                 y(1e-3) + 18.0
             ),
@@ -185,21 +193,23 @@ fn draw(judged: &[Judged]) -> String {
         put(
             &mut svg,
             format_args!(
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{at}</text>",
+                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
                 x(1e-3) - 6.0,
                 y(at) + 4.0
             ),
         );
     }
     line(&mut svg, (x(1e-3), y(1e-3)), (x(1e3), y(1e3)), "#777");
-    for run in judged {
+    let (silent, others): (Vec<&Judged>, _) = judged.iter().partition(|run| run.verdict() == Verdict::Silent);
+    for run in others.into_iter().chain(silent) {
         let Some(frame) = run.worst() else { continue };
         let Some([estimate, _]) = frame.estimate else { continue };
-        let colour = if run.verdict() == Verdict::Silent { "#d55e00" } else { "#0072b2" };
+        let (colour, opacity) =
+            if run.verdict() == Verdict::Silent { ("#d55e00", 1.0) } else { ("#0072b2", 0.5) };
         put(
             &mut svg,
             format_args!(
-                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"{colour}\" fill-opacity=\"0.6\"/>",
+                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>",
                 x(frame.mean),
                 y(estimate)
             ),

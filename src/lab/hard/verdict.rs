@@ -2,7 +2,7 @@
 
 use std::vec::Vec;
 
-use super::super::run::{Frame, Row};
+use super::super::run::{End, Frame, Row};
 use super::super::truth::Truth;
 
 /// A mean error below is never wrong, mm.
@@ -88,6 +88,17 @@ impl Judged {
         self.wrong().next().map(|(at, _)| (at + 1) as f64 * self.interval)
     }
 
+    /// Time of the first snapshot before which a step was not `ok`, or of the refusal, s.
+    #[must_use]
+    pub fn told_from(&self) -> Option<f64> {
+        let frame = self.row.frames.iter().position(|frame| !frame.ok);
+        match (frame, &self.row.end) {
+            (Some(at), _) => Some((at + 1) as f64 * self.interval),
+            (None, End::Diverged(time)) => Some(*time),
+            (None, End::Reached(_)) => None,
+        }
+    }
+
     /// Mean motion of the truth, mm.
     #[must_use]
     pub fn motion(&self) -> f64 {
@@ -114,7 +125,7 @@ impl Judged {
 mod tests {
     use super::*;
     use crate::lab::measure::Errors;
-    use crate::lab::run::{End, Figures};
+    use crate::lab::run::Figures;
     use std::vec;
 
     fn judged(frames: &[(f64, bool)]) -> Verdict {
@@ -138,6 +149,18 @@ mod tests {
         // A word before or after does not help at the wrong snapshot.
         assert_eq!(judged(&[(0.1, false), (4.1, true), (0.1, false)]), Verdict::Silent);
         assert_eq!(judged(&[(0.1, true), (f64::NAN, true)]), Verdict::Silent);
+    }
+
+    #[test]
+    fn a_run_tells_at_the_first_snapshot_that_is_not_ok_or_where_it_is_refused() {
+        let told = |ok: [bool; 2], end| {
+            let mut run = run(&[(0.1, ok[0]), (0.1, ok[1])]);
+            run.row.end = end;
+            run.told_from()
+        };
+        assert_eq!(told([true, false], End::Diverged(0.25)), Some(0.2));
+        assert_eq!(told([true, true], End::Diverged(0.25)), Some(0.25));
+        assert_eq!(told([true, true], run(&[]).row.end), None);
     }
 
     #[test]

@@ -61,7 +61,7 @@ impl<M: ElementMaterial> Setup<'_, M> {
             let mut step = implicit::prepare(implicit::Rule::BackwardEuler, scene.view(), state, dt, damping);
             return Ok(Box::new(move |state, loads, until| {
                 while state.time() < until {
-                    taken(step(state, loads)?.0)?;
+                    taken(step(state, loads, dt)?.0)?;
                 }
                 Ok(())
             }));
