@@ -18,6 +18,18 @@ fn what_does_not_exist_is_named_with_what_does() {
 }
 
 #[test]
+fn a_mesh_that_cannot_be_judged_is_named() {
+    let desk = Desk::new();
+    for (scale, sentence) in [("0", "--scale 0: it must be a positive number"), ("1", "none.msh: ")] {
+        let said =
+            desk.supple(&["evaluate", "--hard", "--mesh", "none.msh", "--scale", scale, "--out", "out"]);
+        assert_eq!(said.code, 2);
+        assert!(said.err.starts_with(&format!("error: {sentence}")), "{}", said.err);
+        assert!(!desk.path("out").exists());
+    }
+}
+
+#[test]
 fn physics_of_a_case_is_a_table_with_orders_of_convergence() {
     let desk = Desk::new();
     let said = desk.supple(&["evaluate", "--physics", "--scene", "torsion", "--out", "out"]);

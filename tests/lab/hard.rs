@@ -1,6 +1,10 @@
 //! Hard cases and random scenes.
 
-use supple::lab::hard::{cases, random};
+use std::path::Path;
+
+use supple::lab::hard::verdict::{Judged, Verdict};
+use supple::lab::hard::{Plan, cases, evaluate, random};
+use supple::lab::method::{Large, Method};
 
 #[test]
 fn every_case_has_its_name_and_can_be_built() {
@@ -21,4 +25,54 @@ fn a_number_gives_one_scene_and_scenes_can_be_built() {
         assert!(spec.points.len() > 20 && spec.timing.interval >= 100, "{number}");
     }
     assert_ne!(random::scene(0, 0).unwrap().points, random::scene(0, 1).unwrap().points);
+}
+
+#[test]
+fn a_mesh_of_the_users_is_scaled_and_pulled_by_a_tenth_of_its_weight() {
+    let lobe = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/lobe.msh"));
+    let pull = |scale| {
+        let spec = cases::of_mesh(lobe, scale).unwrap();
+        let held = spec.supports.len();
+        assert!(held > 10 && held < spec.points.len() / 4, "{held} nodes are held");
+        spec.forces.iter().map(|force| force.newton.iter().sum::<f32>()).sum::<f32>()
+    };
+    // The lobe has 288.6 ml.
+    assert!((pull(1.0) / (0.1 * 9.81 * 0.2886) - 1.0).abs() < 1e-3);
+    assert!((pull(0.5) / pull(1.0) - 0.125).abs() < 1e-5);
+}
+
+#[test]
+fn long_cases_are_judged_only_if_they_are_named() {
+    let names = |named: &[&str], mesh| {
+        let named: Vec<String> = named.iter().map(ToString::to_string).collect();
+        let plan = Plan::new(&named, mesh, &[], 0, 3).unwrap();
+        plan.cases.iter().map(|case| case.name).collect::<Vec<_>>()
+    };
+    let lobe = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/lobe.msh"));
+    let all = names(&[], None);
+    assert!(all.contains(&"fades-to-nothing") && cases::LONG.iter().all(|long| !all.contains(long)));
+    assert_eq!(names(&["million-steps"], None), ["million-steps"]);
+    assert_eq!(names(&[], Some((lobe, 1.0))), ["mesh"]);
+    assert_eq!(names(&["coarse"], Some((lobe, 1.0))), ["coarse", "mesh"]);
+}
+
+#[test]
+fn exact_steps_beyond_the_critical_one_tell_and_switching_steps_follow() {
+    let folder = tempfile::tempdir().unwrap();
+    let methods = [Method::TledLargeStep, Method::Damped, Method::Switching(Large::Damped)];
+    let plan =
+        Plan { cases: vec![cases::named("coarse").unwrap()], random: 0, methods: methods.to_vec(), every: 3 };
+    let judged = evaluate(&plan, folder.path(), |_| ()).unwrap();
+    let of = |method| judged.iter().filter(move |run: &&Judged| run.row.method == method).collect::<Vec<_>>();
+
+    let [below, _, beyond] = of(Method::TledLargeStep)[..] else { panic!() };
+    assert_eq!((below.verdict(), below.told_from()), (Verdict::Right, None));
+    assert_eq!(beyond.verdict(), Verdict::Told);
+    assert!(beyond.row.step_over_limit_rest > 1.1 && beyond.told_from().is_some(), "{:?}", beyond.row);
+
+    // At the shortest of the steps.
+    let error = |method| of(method)[0].worst().unwrap().mean;
+    let [fixed, switching] = [Method::Damped, Method::Switching(Large::Damped)].map(error);
+    let motion = of(Method::Damped)[0].motion();
+    assert!(switching != fixed && switching < 0.1 * motion, "{switching}, {fixed} of {motion} mm");
 }

@@ -41,7 +41,7 @@ pub(crate) struct Asked {
     #[arg(long, conflicts_with_all = ["methods", "multiples", "element", "weights", "sweep"])]
     physics: bool,
     /// Judge whether runs are ever wrong without a word instead: hard.csv, hard-frames.csv and a picture; a scene is a hard case or one of
-    /// the laboratory's, all of them unless given
+    /// the laboratory's, all of them unless given but paper-bar-fine and million-steps, which take minutes
     #[arg(long, conflicts_with_all = ["physics", "multiples", "element", "weights", "sweep"])]
     hard: bool,
     /// Mesh to judge as a hard case, with the scenes that are named: held at one end of its longest axis, under its own weight and a

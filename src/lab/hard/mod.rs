@@ -54,8 +54,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan from names of cases and methods, and a mesh of the user's with its factor to metres: all cases if there are neither names
-    /// nor a mesh, all methods if there are none; so many random scenes, and guards with `every`.
+    /// A plan from names of cases and methods, and a mesh of the user's with its factor to metres; so many random scenes, and guards with
+    /// `every`. All cases but [`cases::LONG`] if there are neither names nor a mesh, and all methods if there are none.
     pub fn new(
         cases: &[String],
         mesh: Option<(&Path, f64)>,
@@ -79,7 +79,10 @@ impl Plan {
             names => names.iter().map(|name| Method::named(name)).collect::<Result<_, _>>()?,
         };
         let mut cases = match cases {
-            [] if mesh.is_none() => cases::names().map(cases::named).collect::<Result<Vec<_>, _>>()?,
+            [] if mesh.is_none() => cases::names()
+                .filter(|name| !cases::LONG.contains(name))
+                .map(cases::named)
+                .collect::<Result<Vec<_>, _>>()?,
             names => names.iter().map(|name| cases::named(name)).collect::<Result<_, _>>()?,
         };
         if let Some((path, scale)) = mesh {
@@ -214,6 +217,19 @@ fn cut(timing: &Timing, seconds: f64) -> Timing {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn exact_steps_keep_the_snapshots_and_are_near_the_wanted_ones() {
+        for critical in [2e-6, 9e-5, 5e-3] {
+            let (timing, _) = timing_of(critical as f32, 0.4);
+            for times in TIMES_CRITICAL_EXACT {
+                let cut = cut(&timing, times * critical);
+                assert!((cut.interval_seconds() / timing.interval_seconds() - 1.0).abs() < 1e-6);
+                let ratio = f64::from(cut.step) / critical / times;
+                assert!((0.99..1.01).contains(&ratio), "{critical}: {ratio}");
+            }
+        }
+    }
 
     #[test]
     fn steps_divide_the_snapshots_and_are_near_the_wanted_ones() {

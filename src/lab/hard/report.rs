@@ -99,7 +99,7 @@ pub fn text(judged: &[Judged]) -> String {
         "wrong: more than 1 mm and a fifth of the motion so far (mean over the nodes) at a snapshot\n\
          silent: all steps before it were ok; error over estimate: share of the snapshots above 1 and above 2, and the median\n\
          doubted: share of the snapshots within 0.25 mm or a twentieth of the motion that were not ok\n\n\
-         method        x critical   runs  right   told  silent  doubted   above 1  above 2  median\n",
+         method                x critical   runs  right   told  silent  doubted   above 1  above 2  median\n",
     );
     let bands = [(0.0, 14.0), (14.0, 32.0), (32.0, 71.0), (71.0, f64::INFINITY)];
     for method in methods(judged) {
@@ -125,7 +125,7 @@ pub fn text(judged: &[Judged]) -> String {
             let steps =
                 runs.iter().map(|run| run.row.step_over_limit_rest.ln()).sum::<f64>() / runs.len() as f64;
             text += &format!(
-                "{:<13} {:>10.1} {:>6} {:>6} {:>6} {:>7} {:>6.1} %",
+                "{:<21} {:>10.1} {:>6} {:>6} {:>6} {:>7} {:>6.1} %",
                 method.name(),
                 steps.exp(),
                 runs.len(),
@@ -143,21 +143,20 @@ pub fn text(judged: &[Judged]) -> String {
     let silent: Vec<&Judged> = judged.iter().filter(|run| run.verdict() == Verdict::Silent).collect();
     text += &format!("\n{} of {} runs are silently wrong\n", silent.len(), judged.len());
     for run in silent {
-        let worst = run.worst().map_or(f64::NAN, |frame| frame.mean);
+        let Some((frame, time, motion)) = run.worst_silent() else { continue };
         text += &format!(
-            "  {:<24} {:<12} {:>6.1}x  off by {worst:.2} of {:.2} mm, from {:.2} s\n",
+            "  {:<24} {:<21} {:>6.1}x  off by {:.2} of {motion:.2} mm at {time:.2} s\n",
             run.row.scene,
             run.row.method.name(),
             run.row.step_over_limit_rest,
-            run.motion(),
-            run.wrong_from().unwrap_or(f64::NAN)
+            frame.mean,
         );
     }
     text
 }
 
-/// Estimate over true error at the worst snapshot of each run, with logarithmic axes. What is beyond them stands at the edge, and what
-/// is silent on top.
+/// Estimate over true error at the worst snapshot of each run, of a silent run at the worst that is silent, with logarithmic axes. What
+/// is beyond them stands at the edge, and what is silent on top.
 fn draw(judged: &[Judged]) -> String {
     const SIZE: f64 = 560.0;
     const MARGIN: f64 = 70.0;
@@ -170,8 +169,8 @@ fn draw(judged: &[Judged]) -> String {
          font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"{SIZE}\" height=\"{SIZE}\" fill=\"white\"/>\n\
          <text x=\"{MARGIN}\" y=\"26\" font-size=\"16\">Hard cases: estimate over true error</text>\n\
          <text x=\"{MARGIN}\" y=\"46\" fill=\"#d55e00\">\u{25cf} silently wrong</text>\n\
-         <text x=\"180\" y=\"46\" fill=\"#0072b2\">\u{25cf} right, or told</text>\n\
-         <text x=\"292\" y=\"46\" fill=\"#555\">below the line the estimate is too low</text>\n"
+         <text x=\"194\" y=\"46\" fill=\"#0072b2\">\u{25cf} right, or told</text>\n\
+         <text x=\"312\" y=\"46\" fill=\"#555\">below the line: estimate too low</text>\n"
     );
     for decade in DECADES {
         let at = 10.0_f64.powi(decade);
@@ -202,10 +201,12 @@ fn draw(judged: &[Judged]) -> String {
     line(&mut svg, (x(1e-3), y(1e-3)), (x(1e3), y(1e3)), "#777");
     let (silent, others): (Vec<&Judged>, _) = judged.iter().partition(|run| run.verdict() == Verdict::Silent);
     for run in others.into_iter().chain(silent) {
-        let Some(frame) = run.worst() else { continue };
+        let (frame, colour, opacity) = match run.worst_silent() {
+            Some((frame, ..)) => (Some(frame), "#d55e00", 1.0),
+            None => (run.worst(), "#0072b2", 0.5),
+        };
+        let Some(frame) = frame else { continue };
         let Some([estimate, _]) = frame.estimate else { continue };
-        let (colour, opacity) =
-            if run.verdict() == Verdict::Silent { ("#d55e00", 1.0) } else { ("#0072b2", 0.5) };
         put(
             &mut svg,
             format_args!(

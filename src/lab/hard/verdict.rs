@@ -76,6 +76,14 @@ impl Judged {
         self.wrong().filter(|(_, frame)| frame.ok).count()
     }
 
+    /// Of the snapshots that are wrong without a word the one with the largest mean error, with its time (s) and the motion so far (mm).
+    #[must_use]
+    pub fn worst_silent(&self) -> Option<(&Frame, f64, f64)> {
+        let silent = self.wrong().filter(|(_, frame)| frame.ok);
+        let (at, frame) = silent.max_by(|(_, a), (_, b)| a.mean.total_cmp(&b.mean))?;
+        Some((frame, (at + 1) as f64 * self.interval, self.motion.get(at).copied().unwrap_or_default()))
+    }
+
     /// The snapshot with the largest mean error.
     #[must_use]
     pub fn worst(&self) -> Option<&Frame> {
@@ -149,6 +157,14 @@ mod tests {
         // A word before or after does not help at the wrong snapshot.
         assert_eq!(judged(&[(0.1, false), (4.1, true), (0.1, false)]), Verdict::Silent);
         assert_eq!(judged(&[(0.1, true), (f64::NAN, true)]), Verdict::Silent);
+    }
+
+    #[test]
+    fn the_worst_silent_snapshot_is_wrong_and_ok() {
+        let run = run(&[(1.1, true), (9.0, false), (4.1, true)]);
+        let (frame, time, motion) = run.worst_silent().unwrap();
+        assert_eq!((frame.mean, motion), (4.1, 20.0));
+        assert!((time - 0.3).abs() < 1e-12);
     }
 
     #[test]
