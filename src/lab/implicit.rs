@@ -453,7 +453,7 @@ mod tests {
             let mut state = VecState::at_rest(scene.node_count());
             let mut advance = prepare(rule, scene.view(), &state, dt, 0.0);
             for _ in 0..steps {
-                assert_eq!(advance(&mut state, &loads).unwrap().0, Status::Ok);
+                assert_eq!(advance(&mut state, &loads, dt).unwrap().0, Status::Ok);
             }
             let time = f64::from(steps) * f64::from(dt);
             let expected = -0.5 * 9.81 * time * (time + beyond * f64::from(dt));
@@ -501,7 +501,7 @@ mod tests {
                 let mut state = stretched(dt);
                 let mut advance = prepare(rule, scene.view(), &state, dt, 0.0);
                 for _ in 0..count {
-                    assert_eq!(advance(&mut state, &loads).unwrap().0, Status::Ok);
+                    assert_eq!(advance(&mut state, &loads, dt).unwrap().0, Status::Ok);
                 }
                 let pairs = shape(&state).into_iter().zip(shape(&exact));
                 pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>().sqrt()
