@@ -198,24 +198,25 @@ fn draw(judged: &[Judged]) -> String {
             ),
         );
     }
-    line(&mut svg, (x(1e-3), y(1e-3)), (x(1e3), y(1e3)), "#777");
     let (silent, others): (Vec<&Judged>, _) = judged.iter().partition(|run| run.verdict() == Verdict::Silent);
     for run in others.into_iter().chain(silent) {
-        let (frame, colour, opacity) = match run.worst_silent() {
-            Some((frame, ..)) => (Some(frame), "#d55e00", 1.0),
-            None => (run.worst(), "#0072b2", 0.5),
+        let (frame, colour, radius, opacity) = match run.worst_silent() {
+            Some((frame, ..)) => (Some(frame), "#d55e00", 3.0, 1.0),
+            None => (run.worst(), "#0072b2", 2.0, 0.35),
         };
         let Some(frame) = frame else { continue };
         let Some([estimate, _]) = frame.estimate else { continue };
         put(
             &mut svg,
             format_args!(
-                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"3\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>",
+                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{radius}\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>",
                 x(frame.mean),
                 y(estimate)
             ),
         );
     }
+    // Above the runs, which may be thousands.
+    line(&mut svg, (x(1e-3), y(1e-3)), (x(1e3), y(1e3)), "#000");
     put(
         &mut svg,
         format_args!(
