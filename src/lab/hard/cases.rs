@@ -240,7 +240,7 @@ fn million_steps() -> Result<Case, LabError> {
     spec.element = Element::NodalPressure;
     hold(&mut spec, |[_, _, z]| z == 0.0);
     let nodes = nodes_where(&spec, |[_, _, z]| z > 0.0119);
-    let newton = [0.005 / nodes.len() as f32, 0.0, 0.0];
+    let newton = [0.002 / nodes.len() as f32, 0.0, 0.0];
     spec.forces = nodes.into_iter().map(|node| NodalForce { node, newton, ramp: 0.0 }).collect();
     spec.course = Course::Alternating(0.1);
     let seconds = 0.95e6 * critical_step(&spec)?;
