@@ -141,7 +141,7 @@
 /**
  * Bytes before the arrays of a state.
  */
-#define SUPPLE_STATE_FRONT 128
+#define SUPPLE_STATE_FRONT 192
 
 /**
  * Most parts of a step.
@@ -806,8 +806,8 @@ typedef struct {
      */
     uint32_t abi;
     /**
-     * 1: a learned step that diverges, or has more kinetic energy than loads and supports explain, is undone and the exact
-     * step takes over for good. 0: the caller decides by status and report. 1 needs memory for two vectors a node more.
+     * 1: a learned step that diverges, or has more kinetic energy than loads and supports explain, is undone and exact
+     * steps take its place and that of some more, before the network is tried again. 0: the caller decides by status and report. 1 needs memory for two vectors a node more.
      */
     uint32_t fallback;
     /**

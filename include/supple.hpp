@@ -2,7 +2,7 @@
 #define SUPPLE_HPP
 
 // supple for C++17: the functions of supple.h with types, and nothing else. Nothing is allocated, nothing throws,
-// nothing is virtual. Objects live in memory of the host; scene, loads, state, learned and large only point to
+// nothing is virtual. Objects live in memory of the host; scene, loads, state and the kinds of steps only point to
 // them: copy them like pointers, there is nothing to release, but the memory must stay as long as they are used.
 // Units are SI: m, kg, s, N, Pa, J. What a call does in detail stands in supple.h.
 
@@ -31,6 +31,9 @@ using threads = supple_threads;
 using report = supple_report;
 using scene_facts = supple_scene_facts;
 using learned_facts = supple_learned_facts;
+using estimate = supple_estimate;
+using adaptive_report = supple_adaptive_report;
+using reaction_force = supple_reaction_force;
 // Where and with which value something went wrong; `describe` makes a sentence of it.
 using error = supple_error;
 
@@ -224,7 +227,7 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_weights_shape): case of(s::e_not_led): case of(s::e_step_ratio): case of(s::e_damping):
     case of(s::e_lattice): case of(s::e_too_stiff): case of(s::e_not_saved): case of(s::e_saved_version):
     case of(s::e_saved_checksum): case of(s::e_level): case of(s::e_diverged):
-    case of(s::e_diverged_energy): return true;
+    case of(s::e_diverged_energy): case of(s::e_diverged_force): case of(s::e_diverged_motion): return true;
     }
     return false;
 }
@@ -266,6 +269,8 @@ constexpr meaning meaning_of(status code) noexcept {
     case status::e_weights_content: return {"layer", "", true, false};
     case status::e_damping: return {"entry", " 1/s", true, true};
     case status::e_diverged_energy: return {"entry", " J", true, true};
+    case status::e_diverged_force: return {"force", "", true, true};
+    case status::e_diverged_motion: return {"entry", " m", true, true};
     default: return {"entry", "", false, false};
     }
 }
@@ -592,7 +597,7 @@ public:
     }
 
     // Prepares them in memory of at least `size` bytes. The weights are not copied: they must stay. With fallback
-    // the exact step takes over for good where a learned one is not to be believed.
+    // exact steps take the place of learned ones that are not to be believed, until the network is.
     static result<learned> make(memory place, scene of, bytes weights, bool fallback) noexcept {
         result<learned> made{status::ok, detail::nothing(status::ok), {}};
         auto config = detail::config<supple_learned_config>();
@@ -627,6 +632,9 @@ public:
         return detail::of(supple_learned_step(of.raw(), acting.raw(), moved.raw(), raw_, count, on, out));
     }
 
+    // To be called whenever a guard calls learned steps inexact: the next ones are exact, if prepared with fallback.
+    status fall_back(state moved) const noexcept { return detail::of(supple_learned_fall_back(raw_, moved.raw())); }
+
 private:
     supple_learned *raw_ = nullptr;
 };
@@ -640,6 +648,34 @@ struct large_steps {
     bytes weights = {};                      // of a damper, for method::damped; not copied: they must stay
 };
 
+namespace detail {
+
+inline supple_large_config config_of(const large_steps &steps) noexcept {
+    auto made = config<supple_large_config>();
+    made.method = static_cast<std::uint32_t>(steps.method);
+    made.seconds = steps.seconds;
+    made.damping = steps.damping;
+    for (std::size_t axis = 0; axis < 3; axis++) made.cells[axis] = steps.cells[axis];
+    made.weights = steps.weights.data();
+    made.weights_bytes = steps.weights.size();
+    return made;
+}
+
+// The library takes the number of points on trust; here it is known.
+template <class T> bool has_points(scene body, span<const float> points, result<T> &answer) noexcept {
+    const auto facts = body.describe();
+    answer.status = facts.status;
+    answer.error = facts.error;
+    if (facts && points.size() / 3 < facts.value.nodes) {
+        answer.status = status::e_short;
+        answer.error =
+            nothing(answer.status, static_cast<double>(points.size()), 3.0 * facts.value.nodes);
+    }
+    return bool(answer);
+}
+
+} // namespace detail
+
 // Steps beyond the critical one. One thread at a time.
 class large {
 public:
@@ -650,8 +686,8 @@ public:
     // Bytes of memory that they need. `points` are those of the scene, m.
     static result<std::size_t> size(scene of, span<const float> points, const large_steps &steps) noexcept {
         result<std::size_t> bytes{status::ok, detail::nothing(status::ok), 0};
-        if (!has_points(of, points, bytes)) return bytes;
-        const auto config = config_of(steps);
+        if (!detail::has_points(of, points, bytes)) return bytes;
+        const auto config = detail::config_of(steps);
         bytes.status =
             detail::of(supple_large_size(of.raw(), points.data(), &config, &bytes.value, &bytes.error));
         return bytes;
@@ -661,8 +697,8 @@ public:
     static result<large> make(memory place, scene of, state moved, span<const float> points,
                               const large_steps &steps) noexcept {
         result<large> made{status::ok, detail::nothing(status::ok), {}};
-        if (!has_points(of, points, made)) return made;
-        const auto config = config_of(steps);
+        if (!detail::has_points(of, points, made)) return made;
+        const auto config = detail::config_of(steps);
         made.status = detail::of(supple_large_init(place.data(), place.size(), of.raw(), moved.raw(),
                                                    points.data(), &config, &made.value.raw_, &made.error));
         return made;
@@ -675,31 +711,123 @@ public:
     }
 
 private:
-    static supple_large_config config_of(const large_steps &steps) noexcept {
-        auto config = detail::config<supple_large_config>();
-        config.method = static_cast<std::uint32_t>(steps.method);
+    supple_large *raw_ = nullptr;
+};
+
+// Which steps a guard follows, and what error it allows.
+struct guarded_steps {
+    float seconds = 0.0f;    // length of a step, s
+    float damping = 0.0f;    // proportional to mass, 1/s
+    std::uint32_t every = 3; // how many times as long the second run's steps are; 1 for learned steps
+    float tolerance = 0.0f;  // mean error of the nodes, m; 0: a fifth of the motion, where that is much
+};
+
+// Estimates the error of steps of any kind with a second run. One thread at a time.
+class guard {
+public:
+    constexpr guard() noexcept = default;
+    constexpr explicit guard(supple_guard *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_guard *raw() const noexcept { return raw_; }
+
+    // Bytes of memory that it needs. `points` are those of the scene, m.
+    static result<std::size_t> size(scene of, span<const float> points) noexcept {
+        result<std::size_t> bytes{status::ok, detail::nothing(status::ok), 0};
+        if (!detail::has_points(of, points, bytes)) return bytes;
+        bytes.status = detail::of(supple_guard_size(of.raw(), points.data(), &bytes.value, &bytes.error));
+        return bytes;
+    }
+
+    // Prepares it from the state as it is, in memory of at least `size` bytes; takes as long as some steps.
+    static result<guard> make(memory place, scene of, state moved, span<const float> points,
+                              const guarded_steps &steps) noexcept {
+        result<guard> made{status::ok, detail::nothing(status::ok), {}};
+        if (!detail::has_points(of, points, made)) return made;
+        auto config = detail::config<supple_guard_config>();
         config.seconds = steps.seconds;
         config.damping = steps.damping;
-        for (std::size_t axis = 0; axis < 3; axis++) config.cells[axis] = steps.cells[axis];
-        config.weights = steps.weights.data();
-        config.weights_bytes = steps.weights.size();
-        return config;
+        config.every = steps.every;
+        config.tolerance = steps.tolerance;
+        made.status = detail::of(supple_guard_init(place.data(), place.size(), of.raw(), moved.raw(), points.data(),
+                                                   &config, &made.value.raw_, &made.error));
+        return made;
     }
 
-    // The library takes the number of points on trust; here it is known.
-    template <class T> static bool has_points(scene of, span<const float> points, result<T> &answer) noexcept {
-        const auto facts = of.describe();
-        answer.status = facts.status;
-        answer.error = facts.error;
-        if (facts && points.size() / 3 < facts.value.nodes) {
-            answer.status = status::e_short;
-            answer.error = detail::nothing(answer.status, static_cast<double>(points.size()),
-                                           3.0 * facts.value.nodes);
-        }
-        return bool(answer);
+    // After each call that moves the state, with the same loads: `inexact` if the error is more than is allowed.
+    status follow(scene of, loads acting, state moved, estimate *out = nullptr,
+                  const threads *on = nullptr) const noexcept {
+        return detail::of(supple_guard_follow(of.raw(), acting.raw(), moved.raw(), raw_, on, out));
     }
 
-    supple_large *raw_ = nullptr;
+private:
+    supple_guard *raw_ = nullptr;
+};
+
+// Steps that become as long as a tolerance allows. One thread at a time.
+class adaptive {
+public:
+    constexpr adaptive() noexcept = default;
+    constexpr explicit adaptive(supple_adaptive *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_adaptive *raw() const noexcept { return raw_; }
+
+    // Bytes of memory that they need. `points` are those of the scene, m.
+    static result<std::size_t> size(scene of, span<const float> points, const large_steps &longest) noexcept {
+        result<std::size_t> bytes{status::ok, detail::nothing(status::ok), 0};
+        if (!detail::has_points(of, points, bytes)) return bytes;
+        const auto config = detail::config_of(longest);
+        bytes.status =
+            detail::of(supple_adaptive_size(of.raw(), points.data(), &config, &bytes.value, &bytes.error));
+        return bytes;
+    }
+
+    // Prepares them from the state as it is, in memory of at least `size` bytes; takes as long as some steps. The
+    // longest step is usually a frame; the tolerance is the mean error of the nodes that you accept, m.
+    static result<adaptive> make(memory place, scene of, state moved, span<const float> points,
+                                 const large_steps &longest, float tolerance) noexcept {
+        result<adaptive> made{status::ok, detail::nothing(status::ok), {}};
+        if (!detail::has_points(of, points, made)) return made;
+        const auto config = detail::config_of(longest);
+        made.status = detail::of(supple_adaptive_init(place.data(), place.size(), of.raw(), moved.raw(), points.data(),
+                                                      &config, tolerance, &made.value.raw_, &made.error));
+        return made;
+    }
+
+    // Moves on by so many seconds, usually a frame, and ends there exactly.
+    status advance(scene of, loads acting, state moved, float seconds, report *out = nullptr,
+                   adaptive_report *taken = nullptr, const threads *on = nullptr) const noexcept {
+        return detail::of(
+            supple_adaptive_advance(of.raw(), acting.raw(), moved.raw(), raw_, seconds, on, out, taken));
+    }
+
+private:
+    supple_adaptive *raw_ = nullptr;
+};
+
+// The force by which supports act on the tissue, right for steps of any kind. One thread at a time.
+class reaction {
+public:
+    constexpr reaction() noexcept = default;
+    constexpr explicit reaction(supple_reaction *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_reaction *raw() const noexcept { return raw_; }
+
+    // Bytes of memory that it needs.
+    [[nodiscard]] static std::size_t size(std::uint32_t nodes) noexcept { return supple_reaction_size(nodes); }
+
+    // Prepares it for some of the nodes that the scene holds, in memory of at least `size` bytes; takes as long as
+    // some hundred steps. Damping of the steps, 1/s.
+    static result<reaction> make(memory place, scene of, span<const std::uint32_t> nodes, float damping) noexcept {
+        result<reaction> made{status::ok, detail::nothing(status::ok), {}};
+        made.status = detail::of(supple_reaction_init(place.data(), place.size(), of.raw(), nodes.data(), nodes.size(),
+                                                      damping, &made.value.raw_, &made.error));
+        return made;
+    }
+
+    // Before the first step and after those of each frame: the mean force since the last call, N.
+    status follow(scene of, state moved, reaction_force &out) const noexcept {
+        return detail::of(supple_reaction_follow(of.raw(), moved.raw(), raw_, &out));
+    }
+
+private:
+    supple_reaction *raw_ = nullptr;
 };
 
 } // namespace supple

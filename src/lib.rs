@@ -73,8 +73,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! **Learned steps** ([`learned`]), after a lead-in of exact ones, which take over for good if energy does not explain what the
-//! network does:
+//! **Learned steps** ([`learned`]), after a lead-in of exact ones, which take their place for a while if energy does not explain
+//! what the network does:
 //!
 #![cfg_attr(feature = "std", doc = "```")]
 #![cfg_attr(not(feature = "std"), doc = "```ignore")]

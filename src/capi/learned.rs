@@ -31,8 +31,8 @@ pub struct supple_learned_config {
     pub struct_size: u32,
     /// SUPPLE_ABI.
     pub abi: u32,
-    /// 1: a learned step that diverges, or has more kinetic energy than loads and supports explain, is undone and the exact
-    /// step takes over for good. 0: the caller decides by status and report. 1 needs memory for two vectors a node more.
+    /// 1: a learned step that diverges, or has more kinetic energy than loads and supports explain, is undone and exact
+    /// steps take its place and that of some more, before the network is tried again. 0: the caller decides by status and report. 1 needs memory for two vectors a node more.
     pub fallback: u32,
     /// 0.
     pub reserved: u32,

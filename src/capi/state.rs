@@ -30,11 +30,11 @@ pub struct supple_state {
 // SAFETY: `repr(C)`, begins with a head.
 unsafe impl Object for supple_state {
     const MAGIC: [u8; 8] = magic(b'M');
-    const FRONT: usize = 128;
+    const FRONT: usize = 192;
 }
 
 /// Bytes before the arrays of a state.
-pub const SUPPLE_STATE_FRONT: usize = 128;
+pub const SUPPLE_STATE_FRONT: usize = 192;
 const _: () = assert!(SUPPLE_STATE_FRONT == <supple_state as Object>::FRONT);
 
 /// The step, and how motion is damped.

@@ -239,6 +239,7 @@ impl<'a> Patches<'a> {
     }
 
     /// Every patch, as its place.
+    #[cfg(feature = "std")]
     pub(crate) fn places(self) -> impl Iterator<Item = (&'a PatchTile, usize)> {
         let places = self.tiles.iter().flat_map(|tile| (0..TILE).map(move |lane| (tile, lane)));
         places.filter(|(tile, lane)| tile.volumes[*lane] > 0.0)

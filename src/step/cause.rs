@@ -84,10 +84,29 @@ impl<M: ElementMaterial> Trial<'_, M> {
         load.unwrap_or_else(|| (self.culprit(step, method), cause))
     }
 
+    /// The force that the step to be taken must not be taken with: one moves its node through the tissue around it, which then turns
+    /// inside out before its stress can answer.
+    pub(crate) fn tearing_force(&self, step: &Step, method: &impl StepMethod<M>) -> Option<(u32, Cause)> {
+        let tears = |node: usize| {
+            let (inertia, increment) = (self.scene.inertia.get(node)?, self.increment.get(node)?);
+            let next = method.next_increment(node, inertia, increment, self.force.get(node)?);
+            let change = [0, 1, 2].map(|axis| next[axis] - increment.0[axis]);
+            let square: f32 = change.into_iter().map(|change| change * change).sum();
+            let volume = inertia.mass / self.density();
+            // Without a root, as this is for every force in every step.
+            Some(square * square * square > volume * volume)
+        };
+        let torn = self.loads.forces().iter().any(|load| tears(load.node as usize) == Some(true));
+        if torn { self.excessive_force(step, method.added_inertia()) } else { None }
+    }
+
+    fn density(&self) -> f32 {
+        self.scene.material.tissue(0).map_or(f32::INFINITY, |tissue| tissue.density)
+    }
+
     /// Edge of a cube of the node's own tissue, m.
     fn size_at(&self, node: usize) -> f32 {
-        let density = self.scene.material.tissue(0).map_or(f32::INFINITY, |tissue| tissue.density);
-        libm::cbrtf(self.scene.node_mass(node) / density)
+        libm::cbrtf(self.scene.node_mass(node) / self.density())
     }
 
     /// The node that supports moved farthest in the step before, if that is a cause.

@@ -72,6 +72,11 @@ pub(crate) trait StepMethod<M> {
         0.0
     }
 
+    /// The node and the load that this step must not be taken with.
+    fn refused_load(&self, _trial: &Trial<'_, M>) -> Option<(u32, Cause)> {
+        None
+    }
+
     /// Takes back what the method has noted for itself: the step is refused.
     fn refuse(&mut self) {}
 
@@ -123,10 +128,12 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     /// Takes the step, or refuses it.
     pub(crate) fn take(mut self, step: &Step, method: &mut impl StepMethod<M>) -> Status {
         let Computed { totals, extremes } = method.compute(&mut self);
-        let balance = match self.balance(step, method, &totals) {
+        let balance = self.balance(step, method, &totals);
+        let balance = balance.map_err(|cause| self.blamed(step, method, cause));
+        let balance = balance.and_then(|balance| method.refused_load(&self).map_or(Ok(balance), Err));
+        let balance = match balance {
             Ok(balance) => balance,
-            Err(cause) => {
-                let (node, cause) = self.blamed(step, method, cause);
+            Err((node, cause)) => {
                 method.refuse();
                 return Status::Diverged(Divergence { time: self.progress.time, node, cause });
             }

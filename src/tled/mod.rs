@@ -33,8 +33,8 @@ use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::{
-    self, CallingThread, Computed, EnergyBalance, Forcing, Status, Step, StepMethod, Threads, Totals, Trial,
-    move_in_parts, nodal_volumes,
+    self, CallingThread, Cause, Computed, EnergyBalance, Forcing, Status, Step, StepMethod, Threads, Totals,
+    Trial, move_in_parts, nodal_volumes,
 };
 use central_differences::{Advance, EnergySums, next_increment};
 
@@ -87,6 +87,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
         force: &NodeVector,
     ) -> [f32; 4] {
         next_increment(inertia, increment, force, self.step)
+    }
+
+    fn refused_load(&self, trial: &Trial<'_, M>) -> Option<(u32, Cause)> {
+        trial.tearing_force(self.step, self)
     }
 
     fn advance(&mut self, trial: &mut Trial<'_, M>) {

@@ -11,7 +11,7 @@ SUPPLE_MEMORY(guard_memory, 4 << 20);
 SUPPLE_MEMORY(adaptive_memory, 8 << 20);
 SUPPLE_MEMORY(weights, 40000);
 SUPPLE_MEMORY(damper, 4000);
-static unsigned char saved[32 * NODES + 128];
+static unsigned char saved[32 * NODES + 256];
 
 static unsigned long asked;
 void *__real_malloc(size_t bytes);

@@ -46,9 +46,12 @@ alignas(supple::align) unsigned char other_memory[supple::state::size(4)];
 alignas(supple::align) unsigned char learned_memory[supple::learned::size(4, true)];
 alignas(supple::align) unsigned char large_memory[SUPPLE_LARGE_SIZE(4, 1, SUPPLE_MASS_SCALED, 0, 0, 0)];
 
+alignas(supple::align) unsigned char guard_memory[1 << 17], adaptive_memory[1 << 18], reaction_memory[1 << 14];
+
 const float points[] = {0, 0, 0, 0.01f, 0, 0, 0, 0.01f, 0, 0, 0, 0.01f};
 const std::uint32_t tetrahedra[] = {0, 1, 2, 3}, turned[] = {0, 2, 1, 3}, outside[] = {0, 1, 2, 9};
 const supple::support supports[] = {{0, 7, 0}, {1, 7, 0}, {2, 3, 1}};
+const std::uint32_t supports_followed[] = {0, 1};
 const supple::tissue tissue = {{500, 25000}, 1000};
 
 supple::body tetrahedron() {
@@ -154,7 +157,65 @@ void learned(supple::scene scene, supple::loads loads, supple::state state, cons
     supple::report report;
     EXPECT(is_done(made.value.lead(scene, loads, state, 10.0 * facts.value.seconds, &report)) && report.steps == 20);
     EXPECT(is_done(made.value.step(scene, loads, state, 5, &report)));
+    EXPECT(is_done(made.value.fall_back(state)) && made.value.describe().value.fell_back == 1);
     EXPECT(is_done(made.value.reset()));
+    EXPECT(is_done(state.reset()));
+}
+
+void judged(supple::scene scene, supple::loads loads, supple::state state) {
+    const auto exact = 0.5f * state.critical_step(scene).value.seconds;
+    EXPECT(is_done(state.set_step(scene, exact, 20)));
+    supple::guarded_steps guarded;
+    guarded.seconds = exact;
+    guarded.damping = 20;
+    const auto bytes = supple::guard::size(scene, points);
+    EXPECT(bytes && bytes.value <= sizeof guard_memory);
+    EXPECT_SENTENCE(supple::guard::size(scene, {points, 9}).error, "fewer bytes or floats than needed: 9, against 12");
+    const auto guard = supple::guard::make(guard_memory, scene, state, points, guarded);
+    const auto reaction = supple::reaction::make(reaction_memory, scene, {supports_followed, 2}, 20);
+    EXPECT(guard && reaction && supple::reaction::size(4) <= sizeof reaction_memory);
+    supple::estimate estimate{};
+    supple::reaction_force force{};
+    EXPECT(is_done(reaction.value.follow(scene, state, force)) && force.known == 0);
+    for (int frame = 0; frame < 30; frame++) {
+        EXPECT(is_done(state.step(scene, loads, 3)));
+        EXPECT(is_done(guard.value.follow(scene, loads, state, &estimate)));
+    }
+    EXPECT(estimate.known == 1 && estimate.mean > 0.0f && estimate.allowed > 0.0f);
+    EXPECT(is_done(reaction.value.follow(scene, state, force)) && force.known == 1);
+    EXPECT(is_done(state.reset()));
+}
+
+void adaptive(supple::scene scene, supple::loads loads, supple::state state) {
+    supple::large_steps longest;
+    longest.method = supple::method::mass_scaled;
+    longest.seconds = 0.01f;
+    const auto bytes = supple::adaptive::size(scene, points, longest);
+    EXPECT(bytes && bytes.value <= sizeof adaptive_memory);
+    const auto made = supple::adaptive::make(adaptive_memory, scene, state, points, longest, 1e-4f);
+    EXPECT(made);
+    supple::report report;
+    supple::adaptive_report taken{};
+    EXPECT(is_done(made.value.advance(scene, loads, state, 0.01f, &report, &taken)));
+    EXPECT(taken.exact > 0 && report.time > 0.0099 && report.time < 0.0101);
+    EXPECT(!supple::adaptive::make(adaptive_memory, scene, state, points, longest, -1.0f));
+    EXPECT(is_done(state.reset()));
+}
+
+// A force that is far too large, a support that jumps, and a state that has to be stopped.
+void refused(supple::scene scene, supple::loads loads, supple::state state) {
+    EXPECT(is_done(state.set_step(scene, 0.5f * state.critical_step(scene).value.seconds, 20)));
+    supple::report report;
+    const supple::force huge[] = {{3, {0.001f, 0, 0}, 0}, {3, {0, 0, 1e6f}, 0}};
+    EXPECT(is_done(loads.set_forces(huge)));
+    EXPECT(state.step(scene, loads, 1, &report) == status::e_diverged_force);
+    EXPECT(report.error.index == 1 && report.error.node == 3 && report.error.value == 1e6);
+    EXPECT(is_done(loads.set_forces({huge, 1})));
+    EXPECT(is_done(state.step(scene, loads, 10)));
+    EXPECT(is_done(state.stop(scene)));
+    std::vector<float> velocities(12, 1.0f);
+    EXPECT(is_done(state.copy_velocities(velocities)) && velocities == std::vector<float>(12, 0.0f));
+    EXPECT(is_done(state.step(scene, loads, 10)));
 }
 
 } // namespace
@@ -177,6 +238,9 @@ int main(int count, char **words) {
     moving(scene.value, loads.value, state.value);
     large(scene.value, loads.value, state.value);
     learned(scene.value, loads.value, state.value, words[1]);
+    judged(scene.value, loads.value, state.value);
+    adaptive(scene.value, loads.value, state.value);
+    refused(scene.value, loads.value, state.value);
     std::puts(wrong ? "wrapper: not as expected" : "wrapper: as expected");
     return wrong;
 }
