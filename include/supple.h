@@ -184,6 +184,61 @@
 #define SUPPLE_LARGE_FRONT 43008
 
 /**
+ * The body's box has a diagonal of `value` m: are its points in metres?
+ */
+#define SUPPLE_REMARK_SIZE 1
+
+/**
+ * The body has a mass of `value` kg.
+ */
+#define SUPPLE_REMARK_MASS 2
+
+/**
+ * Tissue `index` has a density of `value` kg/m^3, not about 1000.
+ */
+#define SUPPLE_REMARK_DENSITY 3
+
+/**
+ * Tissue `index` has a Young's modulus of `value` Pa at rest, not 1e3 to 1e5.
+ */
+#define SUPPLE_REMARK_STIFFNESS 4
+
+/**
+ * Tissue `index` has a Poisson's ratio of `value` at rest, not 0.3 to 0.4999: are its constants in the right order?
+ */
+#define SUPPLE_REMARK_POISSON_RATIO 5
+
+/**
+ * Gravity is `value` m/s^2, not 9.81.
+ */
+#define SUPPLE_REMARK_GRAVITY 6
+
+/**
+ * Forces add up to `value` N, the body would be crushed by `limit` N.
+ */
+#define SUPPLE_REMARK_FORCES 7
+
+/**
+ * Motion `index` goes `value` m, farther than the body is large (`limit`, m).
+ */
+#define SUPPLE_REMARK_WAY 8
+
+/**
+ * Motion `index` has a speed of `value` m/s along its ramp, above that of shear waves in the softest tissue (`limit`, m/s).
+ */
+#define SUPPLE_REMARK_SPEED 9
+
+/**
+ * Supports are of nodes far from each other: are they counted from one? The first node is 0.
+ */
+#define SUPPLE_REMARK_COUNTED_FROM_ONE 10
+
+/**
+ * The network learned from another law, other constants or density, or other elements: its error here is not known.
+ */
+#define SUPPLE_REMARK_OTHER_TISSUE 11
+
+/**
  * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not done, and
  * nothing has changed, except that memory handed to a function that prepares an object may hold none afterwards, that forces
  * are those of the step that was refused, or zero after a critical step, and what supple_learned_step says of a refused one.
@@ -272,6 +327,10 @@ enum supple_status
      * The state was prepared for a scene of other elements (value: its own, limit: the scene's).
      */
     SUPPLE_E_ELEMENT = -14,
+    /**
+     * The points are not those that element `index` of the scene was built from.
+     */
+    SUPPLE_E_POINTS = -15,
     /**
      * The mesh has no nodes or no elements.
      */
@@ -1004,6 +1063,22 @@ typedef struct {
     float spread;
 } supple_reaction_force;
 
+/**
+ * What does not look right. Numbers that have no meaning are 0, an index SUPPLE_NONE.
+ */
+typedef struct {
+    /**
+     * SUPPLE_REMARK_SIZE and so on.
+     */
+    uint32_t kind;
+    /**
+     * Entry of the list that it is about.
+     */
+    uint32_t index;
+    double value;
+    double limit;
+} supple_remark;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -1496,6 +1571,30 @@ supple_status supple_reaction_follow(const supple_scene *scene,
                                      supple_state *state,
                                      supple_reaction *reaction,
                                      supple_reaction_force *force);
+
+/**
+ * Writes what in a scene looks as if a unit or a number was mistaken; it can be simulated all the same. To be called once, before the
+ * first step. It takes as long as some steps.
+ *
+ * @param points the points that the scene was built from, three coordinates each.
+ * @param loads NULL: nothing is said of loads.
+ * @param learned NULL: nothing is said of a network.
+ * @param remarks receives the first of them; may be NULL if `room` is 0.
+ * @param room in `remarks`.
+ * @param count how many there are, which may be more than there is room for.
+ */
+supple_status supple_remarks(const supple_scene *scene,
+                             const float *points,
+                             supple_loads *loads,
+                             const supple_learned *learned,
+                             supple_remark *remarks,
+                             uint32_t room,
+                             uint32_t *count);
+
+/**
+ * What a remark means, a few English words for people; "?" for a number that is none.
+ */
+const char *supple_remark_text(uint32_t kind);
 
 #ifdef __cplusplus
 }  // extern "C"

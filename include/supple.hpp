@@ -34,6 +34,8 @@ using learned_facts = supple_learned_facts;
 using estimate = supple_estimate;
 using adaptive_report = supple_adaptive_report;
 using reaction_force = supple_reaction_force;
+// What looks as if a unit or a number was mistaken; `text` says what it means.
+using remark = supple_remark;
 // Where and with which value something went wrong; `describe` makes a sentence of it.
 using error = supple_error;
 
@@ -59,6 +61,7 @@ enum class [[nodiscard]] status : std::int32_t {
     e_negative = SUPPLE_E_NEGATIVE,
     e_overlap = SUPPLE_E_OVERLAP,
     e_element = SUPPLE_E_ELEMENT,
+    e_points = SUPPLE_E_POINTS,
 
     e_mesh_empty = SUPPLE_E_MESH_EMPTY,
     e_mesh_repeated_node = SUPPLE_E_MESH_REPEATED_NODE,
@@ -217,7 +220,7 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_null): case of(s::e_misaligned): case of(s::e_short): case of(s::e_abi): case of(s::e_not_initialised):
     case of(s::e_kind): case of(s::e_choice): case of(s::e_mismatch): case of(s::e_capacity):
     case of(s::e_index): case of(s::e_not_finite): case of(s::e_negative): case of(s::e_overlap):
-    case of(s::e_element):
+    case of(s::e_element): case of(s::e_points):
     case of(s::e_mesh_empty): case of(s::e_mesh_repeated_node): case of(s::e_mesh_degenerate):
     case of(s::e_mesh_inverted): case of(s::e_mesh_unused_node): case of(s::e_constant):
     case of(s::e_density): case of(s::e_tissue): case of(s::e_nothing_moves): case of(s::e_law):
@@ -256,6 +259,7 @@ constexpr meaning meaning_of(status code) noexcept {
     case status::e_mesh_inverted: return {"element", " m^3", true, false};
     case status::e_constant: return {"element", "", true, false};
     case status::e_density: return {"element", " kg/m^3", true, false};
+    case status::e_points:
     case status::e_mesh_repeated_node:
     case status::e_tissue: return {"element", "", false, false};
     case status::e_law: return {"entry", "", true, false};
@@ -829,6 +833,24 @@ public:
 private:
     supple_reaction *raw_ = nullptr;
 };
+
+// What in a scene looks as if a unit or a number was mistaken, before the first step. Gives how many remarks there are;
+// those that there is no room for are not written.
+inline result<std::size_t> remarks(scene of, span<const float> points, span<remark> out, loads acting = {},
+                                   learned network = {}) noexcept {
+    result<std::size_t> count{status::ok, detail::nothing(status::ok), 0};
+    if (!detail::has_points(of, points, count)) return count;
+    std::uint32_t told = 0;
+    const auto room = static_cast<std::uint32_t>(out.size() < none ? out.size() : none);
+    count.status = detail::of(
+        supple_remarks(of.raw(), points.data(), acting.raw(), network.raw(), out.data(), room, &told));
+    count.error = detail::nothing(count.status);
+    count.value = told;
+    return count;
+}
+
+// What a remark means, without its numbers.
+[[nodiscard]] inline const char *text(const remark &what) noexcept { return supple_remark_text(what.kind); }
 
 } // namespace supple
 

@@ -112,6 +112,7 @@
 //! | [`scene`] | what is simulated, computed once: element tables, masses, supports |
 //! | [`state`] | what moves: displacements and their last increment |
 //! | [`loads`] | what acts on it, set when the host likes: forces, traction, gravity, prescribed motion |
+//! | [`plausibility`] | does a scene look as if a unit was mistaken |
 //! | [`step`] | the protocol of every step: begin, compute, energy balance, accept or refuse; threads |
 //! | [`tled`] | the exact step and the critical step |
 //! | [`guard`] | may a step be believed: a second run that estimates its error |
@@ -128,8 +129,9 @@
 //! # Promises
 //!
 //! The core, which is what no feature gives, is `no_std`, never allocates, and does not panic on any input
-//! through its public API. Memory is the caller's; too little is an error. A step does the same work every
-//! time and says what became of it ([`step::Status`]); one that cannot be believed is not taken. The same
+//! through its public API. Memory is the caller's; too little is an error. An exact or learned step does the same
+//! work every time, one beyond the critical step at most a bounded amount: it renews its bounds the sooner, the faster tissue deforms. A step says
+//! what became of it ([`step::Status`]); one that cannot be believed is not taken. The same
 //! input gives the same bits from run to run and for any number of threads; with the feature `deterministic`, which fuses no
 //! multiplications and additions, on every processor. What a scene does not use costs it nothing: no exponential is linked into a
 //! neo-Hookean scene, elements whose four nodes are fixed are left out.
@@ -161,6 +163,7 @@ pub mod material;
 pub mod mesh;
 pub mod mlp;
 mod padding;
+pub mod plausibility;
 pub mod reaction;
 pub mod scene;
 pub mod simd;

@@ -49,7 +49,7 @@ pub struct supple_learned_config {
 pub struct supple_learned {
     head: Head,
     nodes: u32,
-    model: LearnedModel<'static>,
+    pub(super) model: LearnedModel<'static>,
 }
 
 // SAFETY: `repr(C)`, begins with a head.

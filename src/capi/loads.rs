@@ -232,6 +232,19 @@ impl<'a> CallLoads<'a> {
         }
     }
 
+    pub(super) const fn gravity(&self) -> [f32; 3] {
+        self.gravity
+    }
+
+    pub(super) const fn forces(&self) -> &'a [NodalForce] {
+        self.forces
+    }
+
+    /// As they are asked for.
+    pub(super) const fn motions(&self) -> &'a [Motion] {
+        self.asked
+    }
+
     /// Loads of the next of the `left` steps that the call still takes: motions without a ramp go evenly over all of them.
     pub(super) fn of_next_step(&mut self, displacements: &[NodeVector], left: u64) -> Loads<'_> {
         for (now, asked) in self.now.iter_mut().zip(self.asked).filter(|(_, asked)| asked.ramp == 0.0) {

@@ -42,5 +42,7 @@ mod adaptive;
 
 mod reaction;
 
+mod remarks;
+
 #[cfg(test)]
 mod memory_tests;

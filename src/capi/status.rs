@@ -64,6 +64,8 @@ pub enum supple_status {
     SUPPLE_E_OVERLAP = -13,
     /// The state was prepared for a scene of other elements (value: its own, limit: the scene's).
     SUPPLE_E_ELEMENT = -14,
+    /// The points are not those that element `index` of the scene was built from.
+    SUPPLE_E_POINTS = -15,
 
     /// The mesh has no nodes or no elements.
     SUPPLE_E_MESH_EMPTY = -20,
@@ -377,6 +379,7 @@ impl From<InertiaError> for supple_error {
                 is(SUPPLE_E_LATTICE)
             }
             InertiaError::Points { points, nodes } => mismatch(points, nodes),
+            InertiaError::OtherPoints { element } => Self::from(SUPPLE_E_POINTS).at(element),
             InertiaError::Step { seconds, most } => is(SUPPLE_E_STEP).value(seconds.into(), most.into()),
             InertiaError::NotFinite { node } => is(SUPPLE_E_TOO_STIFF).node(node),
         }
@@ -411,6 +414,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -12 => c"a number is negative or not finite",
         -13 => c"an array that is written overlaps the object that is read",
         -14 => c"the state was prepared for a scene of other elements",
+        -15 => c"points that the scene was not built from",
         -20 => c"the mesh has no elements",
         -21 => c"an element names a node twice",
         -22 => c"an element is flat",

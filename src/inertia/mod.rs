@@ -189,6 +189,11 @@ pub enum InertiaError {
         /// Nodes of the scene.
         nodes: usize,
     },
+    /// The points are not those that the scene was built from.
+    OtherPoints {
+        /// An element of the mesh that has other edges.
+        element: usize,
+    },
     /// A step that is longer than the one that was prepared, or not a positive number.
     Step {
         /// The step, s.
@@ -222,6 +227,9 @@ impl fmt::Display for InertiaError {
             ),
             Self::Points { points, nodes } => {
                 write!(f, "{points} points for a scene of {nodes} nodes")
+            }
+            Self::OtherPoints { element } => {
+                write!(f, "the scene was not built from these points: element {element} has other edges")
             }
             Self::Step { seconds, most } => {
                 write!(

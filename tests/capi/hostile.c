@@ -72,7 +72,7 @@ static void *end_of(const arena *in, size_t bytes) {
 }
 
 /* Objects of all kinds: what a call is told to be at an address may be of any kind. */
-enum { SCENE, STATE, LOADS, LEARNED, LARGE, GUARD, REACTION, KINDS };
+enum { SCENE, STATE, LOADS, LEARNED, LARGE, GUARD, REACTION, ADAPTIVE, KINDS };
 enum { EACH = 3, SLOTS = KINDS * EACH };
 static struct {
     arena in;
@@ -321,6 +321,24 @@ static supple_status make_guard(void) {
     return supple_guard_init(at, bytes, scene, state, p, &config, one_in(60) ? NULL : &made, wanted());
 }
 
+static supple_status make_adaptive(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    supple_state *state = object(STATE, 1);
+    const int is_damped = one_in(2);
+    const supple_large_config config = {number(sizeof config), number(SUPPLE_ABI), number(is_damped ? SUPPLE_DAMPED : below(2)),
+                                        one_in(5) ? wild(1e-2f) : 5e-3f, one_in(5) ? wild(20.0f) : 20.0f, {0, 0, 0},
+                                        is_damped ? end_of(&of_damper, (damper_bytes + 63) / 64 * 64) : NULL, is_damped ? damper_bytes : 0};
+    const float *p = points_for(nodes_of(scene));
+    size_t needed = 64, bytes;
+    const supple_status sized = supple_adaptive_size(scene, p, &config, one_in(60) ? NULL : &needed, wanted());
+    if (sized < 0) {
+        return sized;
+    }
+    supple_adaptive *made = NULL;
+    void *at = room(ADAPTIVE, needed, &bytes);
+    return supple_adaptive_init(at, bytes, scene, state, p, &config, one_in(5) ? wild(1e-3f) : 1e-4f, one_in(60) ? NULL : &made, wanted());
+}
+
 static supple_status make_reaction(void) {
     const supple_scene *scene = object(SCENE, 0);
     uint32_t *nodes = end_of(&of_saved, 4 * sizeof *nodes);
@@ -515,6 +533,40 @@ static supple_status follow(void) {
     return status;
 }
 
+/* Never long: that many exact steps take their time. */
+static supple_status advance(void) {
+    const float drawn = one_in(10) ? wild(5e-3f) : 5e-3f;
+    supple_adaptive_report taken;
+    memset(&taken, 0xff, sizeof taken);
+    memset(&report, 0xa5, sizeof report);
+    supple_threads room;
+    const supple_status status =
+        supple_adaptive_advance(object(SCENE, 0), one_in(8) ? NULL : object(LOADS, 1), object(STATE, 1), object(ADAPTIVE, 1),
+                                drawn > 0.01f && isfinite(drawn) ? 0.01f : drawn, threads(&room), &report, &taken);
+    if (!isfinite(report.time) || report.error.status != (status < 0 ? status : SUPPLE_OK)) {
+        fail("a report that does not fit", status);
+    }
+    if (status == SUPPLE_OK && !(taken.estimate.known == 0 || taken.estimate.mean <= taken.estimate.allowed)) {
+        fail("an estimate that is no number, or too large, is called good", status);
+    }
+    return status;
+}
+
+static supple_status remark(void) {
+    const supple_scene *scene = object(SCENE, 0);
+    supple_remark *remarks = end_of(&of_out, 4 * sizeof *remarks);
+    uint32_t count = 77;
+    const supple_status status =
+        supple_remarks(scene, points_for(nodes_of(scene)), one_in(8) ? NULL : object(LOADS, 1), one_in(8) ? NULL : object(LEARNED, 0),
+                       one_in(60) ? NULL : remarks, below(5), one_in(60) ? NULL : &count);
+    for (uint32_t n = 0; status >= 0 && n < count && n < 4; n++) {
+        if (supple_remark_text(remarks[n].kind)[0] == '\0') {
+            fail("a remark without words", status);
+        }
+    }
+    return status;
+}
+
 static supple_status feel(void) {
     supple_reaction_force force;
     memset(&force, 0xff, sizeof force);
@@ -528,7 +580,9 @@ static supple_status feel(void) {
 static supple_status other(void) {
     supple_learned_facts facts;
     supple_scene_facts of_scene;
-    switch (below(4)) {
+    switch (below(6)) {
+        case 4: return supple_state_stop(object(SCENE, 0), object(STATE, 1));
+        case 5: return supple_learned_fall_back(object(LEARNED, 1), object(STATE, 0));
         case 0: return supple_scene_describe(object(SCENE, 0), one_in(20) ? NULL : &of_scene);
         case 1: return supple_learned_describe(object(LEARNED, 0), one_in(20) ? NULL : &facts);
         case 2: return one_in(5) ? supple_state_reset(object(STATE, 1)) : SUPPLE_OK;
@@ -538,11 +592,11 @@ static supple_status other(void) {
 
 /* Sound objects, one of each kind, with a law, an element, a method and a threading of their own. */
 static void begin_anew(void) {
-    static supple_status (*const makers[])(void) = {make_scene, make_state, set_step, make_loads, make_learned, make_large, make_guard};
+    static supple_status (*const makers[])(void) = {make_scene, make_state, set_step, make_loads, make_learned, make_large, make_guard, make_adaptive};
     is_calm = 1, doing = "sound objects";
     for (size_t n = 0; n < sizeof makers / sizeof *makers; n++) {
         const supple_status status = makers[n]();
-        if (status < 0 && makers[n] != make_large && makers[n] != make_guard && makers[n] != set_step) {
+        if (status < 0 && makers[n] != make_large && makers[n] != make_guard && makers[n] != make_adaptive && makers[n] != set_step) {
             fail("refused", status);
         }
     }
@@ -557,9 +611,10 @@ static void one_call(void) {
     } all[] = {{"a scene", make_scene, 6}, {"a state", make_state, 4}, {"loads", make_loads, 3}, {"a learned step", make_learned, 3},
                {"steps beyond the critical one", make_large, 6}, {"a guard", make_guard, 2}, {"set loads", set_loads, 20}, {"read", read_state, 8},
                {"set a step", set_step, 8}, {"save and restore", save_and_restore, 6}, {"steps", step, 50}, {"follow", follow, 8},
-               {"a reaction", make_reaction, 3}, {"feel", feel, 8}, {"other", other, 4}};
+               {"a reaction", make_reaction, 3}, {"feel", feel, 8}, {"other", other, 6}, {"adaptive steps", make_adaptive, 2},
+               {"advance", advance, 8}, {"remarks", remark, 4}};
     int at = 0;
-    for (int draw = (int)below(139); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
+    for (int draw = (int)below(155); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
         draw -= all[at].often;
     }
     doing = all[at].name;
@@ -587,7 +642,7 @@ static void one_call(void) {
         const int slot = STATE * EACH + n;
         const uint64_t now = state_hash((supple_state *)(void *)slots[slot].at, &finite);
         /* Steps are taken one after the other, and a report may not have been asked for: those may have moved it. */
-        const int may_move = all[at].call == step || all[at].call == make_state || status >= 0;
+        const int may_move = all[at].call == step || all[at].call == advance || all[at].call == make_state || status >= 0;
         if (!(may_move && slots[slot].written) && now != states[n]) {
             fail("a state has moved", status);
         }
@@ -608,7 +663,7 @@ int main(int argc, char **argv) {
     const unsigned long most = strtoul(amount, NULL, 10);
     random_state = argc > 2 ? strtoul(argv[2], NULL, 10) : 1;
     (void)bar_config();
-    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20, 1 << 12};
+    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20, 1 << 12, 1 << 20};
     for (int slot = 0; slot < SLOTS; slot++) {
         slots[slot].in = arena_of(sizes_of[slot / EACH]);
         slots[slot].at = end_of(&slots[slot].in, 64), slots[slot].bytes = 64;

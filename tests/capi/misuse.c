@@ -618,6 +618,67 @@ static void reactions(void) {
     printf("reaction: %.2f mN, spread %.2f mN\n", 1e3 * (double)force.newton[0], 1e3 * (double)force.spread);
 }
 
+/* Scenes that look as if a unit or a number was mistaken. */
+static void remarks(supple_scene_config config) {
+    SUPPLE_MEMORY(memory, sizeof scene_memory);
+    static float millimetres[NODES][3];
+    supple_remark told[4] = {{0, 0, 0, 0}};
+    uint32_t count = 9;
+    supple_scene *odd = NULL;
+    DONE(supple_set_motions(loads, scene, NULL, 0, NULL));
+    DONE(supple_set_forces(loads, NULL, 0, NULL));
+    const float earth[3] = {0.0f, 0.0f, -9.81f}, in_millimetres[3] = {0.0f, 0.0f, -9810.0f}, none[3] = {0.0f, 0.0f, 0.0f};
+    DONE(supple_set_gravity(loads, earth));
+    DONE(supple_remarks(scene, points[0], loads, NULL, told, 4, &count));
+    CHECK(count == 0);
+    REFUSED(SUPPLE_E_NULL, supple_remarks(scene, points[0], loads, NULL, NULL, 4, &count));
+    REFUSED(SUPPLE_E_NULL, supple_remarks(scene, NULL, loads, NULL, told, 4, &count));
+    REFUSED(SUPPLE_E_NULL, supple_remarks(scene, points[0], loads, NULL, told, 4, NULL));
+
+    DONE(supple_set_gravity(loads, in_millimetres));
+    const supple_force huge = {NODES / 2, {0.0f, 5e3f, 0.0f}, 1.0f};
+    DONE(supple_set_forces(loads, &huge, 1, NULL));
+    const supple_motion far[2] = {{NODES - 1, 1, {2.0f, 0, 0}, 0.0f}, {NODES - 2, 1, {0.005f, 0, 0}, 1e-4f}};
+    DONE(supple_set_motions(loads, scene, far, 2, NULL));
+    DONE(supple_remarks(scene, points[0], loads, NULL, told, 4, &count));
+    CHECK(count == 4 && told[0].kind == SUPPLE_REMARK_GRAVITY && told[0].value == 9810.0);
+    CHECK(told[1].kind == SUPPLE_REMARK_FORCES && told[1].value == 5e3 && told[1].limit < 5e3);
+    CHECK(told[2].kind == SUPPLE_REMARK_WAY && told[2].index == 0 && told[2].value == 2.0);
+    CHECK(told[3].kind == SUPPLE_REMARK_SPEED && told[3].index == 1 && fabs(told[3].value - 50.0) < 1e-3 && told[3].limit < 50.0);
+    DONE(supple_remarks(scene, points[0], loads, NULL, NULL, 0, &count));
+    CHECK(count == 4);
+    DONE(supple_set_gravity(loads, none));
+    DONE(supple_set_forces(loads, NULL, 0, NULL));
+    DONE(supple_set_motions(loads, scene, NULL, 0, NULL));
+
+    /* Millimetres; then g/cm^3 and constants in the wrong order; and a network of another tissue. */
+    for (uint32_t n = 0; n < NODES; n++) {
+        for (int axis = 0; axis < 3; axis++) {
+            millimetres[n][axis] = 1000.0f * points[n][axis];
+        }
+    }
+    supple_scene_config changed = config;
+    changed.points = millimetres[0];
+    DONE(supple_scene_init(memory, sizeof memory, &changed, &odd, &error));
+    DONE(supple_remarks(odd, millimetres[0], NULL, NULL, told, 4, &count));
+    CHECK(count == 2 && told[0].kind == SUPPLE_REMARK_SIZE && told[0].value > 10.0 && told[1].kind == SUPPLE_REMARK_MASS);
+    REFUSED(SUPPLE_E_POINTS, supple_guard_init(spare, sizeof spare, scene, state, millimetres[0],
+            &(supple_guard_config){SUPPLE_CONFIG(supple_guard_config), 1e-3f, 20.0f, 3, 0.0f}, &(supple_guard *){NULL}, &error));
+    CHECK(error.index < TETS);
+
+    supple_tissue other = *config.tissue;
+    other.density = 1.06f, other.constants[0] = config.tissue->constants[2], other.constants[2] = config.tissue->constants[0];
+    changed = config, changed.tissue = &other;
+    DONE(supple_scene_init(memory, sizeof memory, &changed, &odd, &error));
+    DONE(supple_remarks(odd, points[0], NULL, learned, told, 4, &count));
+    CHECK(count == 3 && told[0].kind == SUPPLE_REMARK_DENSITY && told[0].index == 0);
+    CHECK(told[1].kind == SUPPLE_REMARK_POISSON_RATIO && told[1].value < 0.0 && told[2].kind == SUPPLE_REMARK_OTHER_TISSUE);
+    for (uint32_t kind = SUPPLE_REMARK_SIZE; kind <= SUPPLE_REMARK_OTHER_TISSUE; kind++) {
+        CHECK(strlen(supple_remark_text(kind)) > 10);
+    }
+    CHECK(strcmp(supple_remark_text(0), "?") == 0);
+}
+
 int main(int argc, char **argv) {
     (void)argv;
     watched = argc == 1;
@@ -648,6 +709,7 @@ int main(int argc, char **argv) {
     guards();
     adaptive_steps();
     reactions();
+    remarks(config);
     DONE(supple_state_reset(state));
     REFUSED(SUPPLE_E_ELEMENT, supple_step(other_element(config), NULL, state, 1, NULL, NULL));
 

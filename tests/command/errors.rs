@@ -151,7 +151,12 @@ fn a_wrong_unit_is_remarked_upon_with_the_place_and_the_right_one() {
     let cases = [
         (
             whole.replace("[0.02, 0.02, 0.05]", "[20.0, 20.0, 50.0]"),
-            "line 2: the body is 57.4456 m across; is scale right? (0.001 turns millimetres into metres)",
+            "line 2: the body is 57.4456 m across; are its points in metres? (1 mm is 0.001 m); scale = 0.001 under [mesh] turns \
+             millimetres into metres",
+        ),
+        (
+            whole.replace("[0.02, 0.02, 0.05]", "[20.0, 20.0, 50.0]"),
+            "line 2: the body has a mass of 2.000e7 kg; are its points in metres? (1 mm is 0.001 m)",
         ),
         (
             whole.replace("density = 1000.0", "density = 1.06"),
@@ -160,6 +165,14 @@ fn a_wrong_unit_is_remarked_upon_with_the_place_and_the_right_one() {
         (
             whole.replace("c = 500.0", "c = 0.5").replace("d = 15000.0", "d = 15.0"),
             "line 6: Young's modulus of the tissue is 2.967e0 Pa; soft tissue has 1e3 to 1e5 (1 kPa is 1000 Pa)",
+        ),
+        (
+            whole.replace("c = 500.0", "c = 15000.0").replace("d = 15000.0", "d = 500.0"),
+            "line 6: Poisson's ratio of the tissue is -0.86",
+        ),
+        (
+            with(&format!("{}newton = [0.0, 20.0, 0.0]\nramp = 100.0\n", end.replace("move", "force"))),
+            "forces add up to 1.800e2 N, the body would be crushed by",
         ),
         (
             format!("gravity = [0.0, 0.0, -9810.0]\n{whole}"),

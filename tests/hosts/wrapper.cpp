@@ -202,6 +202,23 @@ void adaptive(supple::scene scene, supple::loads loads, supple::state state) {
     EXPECT(is_done(state.reset()));
 }
 
+// A mesh in millimetres, whose points are not those of another scene.
+void remarked(supple::scene scene, supple::loads loads, supple::state state) {
+    supple::remark remarks[8];
+    const auto count = supple::remarks(scene, points, remarks, loads);
+    EXPECT(count && count.value == 0);
+    std::vector<float> millimetres(points, points + 12);
+    for (float &metre : millimetres) metre *= 1000;
+    supple::body body = tetrahedron();
+    body.points = millimetres;
+    alignas(supple::align) static unsigned char memory[sizeof scene_memory];
+    const auto large = supple::scene::make(memory, body);
+    EXPECT(supple::remarks(large.value, millimetres, remarks, loads) && remarks[0].kind == SUPPLE_REMARK_SIZE);
+    EXPECT(std::strstr(supple::text(remarks[0]), "metres"));
+    EXPECT_SENTENCE(supple::guard::make(guard_memory, scene, state, millimetres, {1e-4f, 0, 1, 0}).error,
+                    "points that the scene was not built from: element 0");
+}
+
 // A force that is far too large, a support that jumps, and a state that has to be stopped.
 void refused(supple::scene scene, supple::loads loads, supple::state state) {
     EXPECT(is_done(state.set_step(scene, 0.5f * state.critical_step(scene).value.seconds, 20)));
@@ -240,6 +257,7 @@ int main(int count, char **words) {
     learned(scene.value, loads.value, state.value, words[1]);
     judged(scene.value, loads.value, state.value);
     adaptive(scene.value, loads.value, state.value);
+    remarked(scene.value, loads.value, state.value);
     refused(scene.value, loads.value, state.value);
     std::puts(wrong ? "wrapper: not as expected" : "wrapper: as expected");
     return wrong;

@@ -70,6 +70,11 @@ impl Body {
         (0..3).map(|axis| (high[axis] - low[axis]).powi(2)).sum::<f64>().sqrt()
     }
 
+    /// Of each element, m^3, whichever way it is turned.
+    pub(crate) fn volumes(&self) -> impl Iterator<Item = f64> {
+        self.mesh.tets.iter().map(|tet| volume(tet.map(|node| self.mesh.points[node as usize])).abs())
+    }
+
     /// Triangles that belong to one element only.
     pub(crate) fn boundary(&self) -> Vec<[u32; 3]> {
         const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];

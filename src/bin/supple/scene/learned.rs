@@ -6,12 +6,13 @@ use supple::lab::method::BURN_IN;
 use supple::learned::{self, LearnedModel, LearnedStep};
 use supple::material::Element;
 use supple::mlp::{Network, WeightBytes};
+use supple::plausibility::same;
 use supple::state::NodeVector;
 use toml::Spanned;
 
 use super::file::{LearnedTable, SceneFile};
 use super::timing::{Timing, method_name};
-use super::tissues::{Tissues, same};
+use super::tissues::Tissues;
 use crate::problem::Problem;
 use crate::weight_file::{self, describe_tissue};
 

@@ -55,7 +55,7 @@ impl Setup {
         };
         let (supports, forces, motions) = read_loads(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
-        let mut warnings = plausible::warnings(file, &body, &tissues, gravity);
+        let mut warnings = plausible::warnings(file, &body, &tissues, gravity, &supports, &forces);
         let element = read_element(file, learned.as_ref())?;
         let of_the_network = learned.as_ref().filter(|_| scene.mesh.get_ref().element.is_none());
         warnings.extend(locking(&file.place(&scene.mesh), of_the_network, element, &tissues));

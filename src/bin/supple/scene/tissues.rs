@@ -7,6 +7,7 @@ use serde::de::DeserializeOwned;
 use supple::element::{ElementLaw, LawWork, MaterialWork, with_element, with_law};
 use supple::material::{AnyLaw, Element, Moduli, Regions, Tissue};
 use supple::mlp::Recipe;
+use supple::plausibility::same;
 use toml::Spanned;
 
 use super::body::Body;
@@ -58,9 +59,16 @@ impl Tissues {
         self.tissues.iter().map(|tissue| tissue.law.moduli())
     }
 
-    /// Of each tissue, kg/m^3.
-    pub(crate) fn densities(&self) -> impl Iterator<Item = f32> {
-        self.tissues.iter().map(|tissue| tissue.density)
+    /// Density, kg/m^3, and moduli of each tissue, that of `[material]` first.
+    pub(crate) fn of_regions(&self) -> impl Iterator<Item = (f32, Moduli)> {
+        self.tissues.iter().map(|tissue| (tissue.density, tissue.law.moduli()))
+    }
+
+    /// The mass of a body of these tissues, kg.
+    pub(crate) fn mass(&self, body: &Body) -> f64 {
+        let densities =
+            self.of_element.iter().map(|&index| f64::from(self.tissues[usize::from(index)].density));
+        body.volumes().zip(densities).map(|(volume, density)| volume * density).sum()
     }
 
     /// Whether all of it is the tissue that a network learned from.
@@ -114,11 +122,6 @@ impl<W: MaterialWork> LawWork for WithLaw<'_, W> {
         let tissues: Vec<_> = tissues.iter().map(of_law).collect();
         with_element(element, Regions { tissues: &tissues, of_element }, work)
     }
-}
-
-/// Whether two values differ by no more than by how a person may write them.
-pub(crate) fn same(a: f32, b: f32) -> bool {
-    (a - b).abs() <= 1e-6 * a.abs().max(b.abs())
 }
 
 fn read_law(file: &SceneFile, at: &Spanned<String>) -> Result<AnyLaw, Problem> {
