@@ -987,7 +987,7 @@ typedef struct {
     uint32_t every;
     /**
      * Mean error of the nodes that is allowed, m; 0: a fifth of the mean motion so far, where that is more than a millimetre and a
-     * hundredth of the size of the body.
+     * hundredth of the size of the body, of a body that has moved by less than its error more than a tenth of that.
      */
     float tolerance;
 } supple_guard_config;

@@ -138,7 +138,9 @@ struct Sample {
 /// A reaction without its storage; it may be moved in memory.
 #[derive(Clone, Debug)]
 pub struct ReactionModel {
-    pub(crate) nodes: usize,
+    nodes: usize,
+    /// The checksum of the scene.
+    scene: u32,
     damping: f32,
     last: Option<Sample>,
     force: Option<Force>,
@@ -210,7 +212,12 @@ impl ReactionModel {
                 break;
             }
         }
-        Ok(Self { nodes, damping, last: None, force: None })
+        Ok(Self { nodes, scene: scene.checksum(), damping, last: None, force: None })
+    }
+
+    /// Whether it was prepared for this scene.
+    pub(crate) fn is_of<M>(&self, scene: SceneView<'_, M>) -> bool {
+        self.nodes == scene.node_count() && self.scene == scene.checksum()
     }
 
     /// See [`Reaction::follow`].
@@ -220,9 +227,7 @@ impl ReactionModel {
         state: &StateView<'_>,
         storage: &[NodeVector],
     ) -> Option<Force> {
-        let fits =
-            scene.node_count() == self.nodes && state.capacity() >= self.nodes && storage.len() >= self.nodes;
-        if !fits {
+        if !self.is_of(scene) || state.capacity() < self.nodes || storage.len() < self.nodes {
             return None;
         }
         let (time, steps) = (state.time(), state.steps());
@@ -319,7 +324,7 @@ impl<S: AsMut<[NodeVector]> + AsRef<[NodeVector]>> Reaction<S> {
     }
 
     /// To be called after each frame's steps, of any kind, with the state that they left: the mean force since the last call. None at
-    /// the first call, after a reset or a restore to an earlier time, for a scene of another size, and where it is no finite number.
+    /// the first call, after a reset or a restore to an earlier time, for a scene that it was not prepared for, and where it is no finite number.
     /// Call it before the first step for a force after it. It costs a pass over the nodes.
     pub fn follow<M: Material>(&mut self, scene: SceneView<'_, M>, state: &StateView<'_>) -> Option<Force> {
         self.model.follow(scene, state, self.storage.as_ref())

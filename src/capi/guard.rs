@@ -36,7 +36,7 @@ pub struct supple_guard_config {
     /// choice, the steps of a frame another; 1 for learned steps.
     pub every: u32,
     /// Mean error of the nodes that is allowed, m; 0: a fifth of the mean motion so far, where that is more than a millimetre and a
-    /// hundredth of the size of the body.
+    /// hundredth of the size of the body, of a body that has moved by less than its error more than a tenth of that.
     pub tolerance: f32,
 }
 

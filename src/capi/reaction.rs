@@ -94,7 +94,9 @@ pub unsafe extern "C" fn supple_reaction_follow(
     let follow = || unsafe {
         let (any, place) = (carved(scene)?, place_for(force)?);
         let (supple_reaction { model, .. }, arrays) = memory::open(reaction)?;
-        any.fits(model.nodes as u32)?;
+        if !with_scene!(any, scene => model.is_of(scene)) {
+            return Err(SUPPLE_E_MISMATCH.into());
+        }
         let storage = storage(arrays, vectors_for(any.node_count()));
         let state = opened_of(&any, state)?;
         let force = with_scene!(any, scene => model.follow(scene, &state, storage));

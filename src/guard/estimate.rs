@@ -15,6 +15,8 @@ const SHARE_OF_MOTION: f32 = 0.2;
 const SHARE_OF_SIZE: f32 = 0.01;
 /// The same in metres at most: what matters in guidance.
 const LEAST: f32 = 0.001;
+/// Part of that where the estimate exceeds the motion of the run: both runs may hold a body still that moves.
+const LEAST_OF_STILL: f32 = 0.1;
 
 /// In the first steps from rest no two runs differ much. So at the first comparisons, one a step, the error may be as large as the
 /// motion.
@@ -23,7 +25,8 @@ const FIRST_COMPARISONS: u32 = 3;
 /// The error that a run may have before its steps are called inexact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Allowed {
-    /// A fifth of the mean motion of the nodes so far; errors below a millimetre and a hundredth of the body's size do not count.
+    /// A fifth of the mean motion of the nodes so far; errors below a millimetre and a hundredth of the body's size do not count, of a
+    /// body that has moved by less than its error those below a tenth of that.
     #[default]
     ShareOfMotion,
     /// A mean error of the nodes of this many metres.
@@ -136,12 +139,15 @@ impl Envelope {
 
     pub(super) fn estimate(&self) -> Option<Estimate> {
         let Comparison { mean, largest, node, .. } = self.held?;
+        let [mean, largest] = [(mean, self.growth[0]), (largest, self.growth[1])]
+            .map(|(held, growth)| finite(ESTIMATE * (held + growth * self.waited)));
         let allowed = match self.allowed {
+            Allowed::ShareOfMotion if mean > self.motion => {
+                (LEAST_OF_STILL * self.least).max(SHARE_OF_MOTION * self.motion)
+            }
             Allowed::ShareOfMotion => self.least.max(SHARE_OF_MOTION * self.motion),
             Allowed::Metres(metres) => metres,
         };
-        let [mean, largest] = [(mean, self.growth[0]), (largest, self.growth[1])]
-            .map(|(held, growth)| finite(ESTIMATE * (held + growth * self.waited)));
         Some(Estimate { mean, largest, node, allowed })
     }
 
@@ -212,6 +218,17 @@ mod tests {
         envelope.allowed = Allowed::default();
         envelope.add(&distance(f32::NAN), 0.01);
         assert!(matches!(envelope.judge(Status::Ok), Status::Inexact { .. }));
+    }
+
+    /// Both runs move by a tenth of a millimetre, and differ by as much: what the body does is not known. Of one that has moved by more
+    /// the same error does not count.
+    #[test]
+    fn an_error_above_the_whole_motion_counts_below_a_millimetre() {
+        let (mut still, mut moved) = (later(), later());
+        still.add(&Comparison { motion: 1e-4, ..distance(1e-4) }, 1e-3);
+        moved.add(&Comparison { motion: 3e-4, ..distance(1e-4) }, 1e-3);
+        assert!(matches!(still.judge(Status::Ok), Status::Inexact { .. }));
+        assert_eq!(moved.judge(Status::Ok), Status::Ok);
     }
 
     /// Above what is allowed, which is a share of a finite motion.

@@ -607,6 +607,12 @@ static void reactions(void) {
     REFUSED(SUPPLE_E_NULL, supple_reaction_follow(scene, state, NULL, &force));
     REFUSED(SUPPLE_E_NULL, supple_reaction_follow(scene, state, reaction, NULL));
     REFUSED(SUPPLE_E_MISMATCH, supple_reaction_follow(small_scene, small_state, reaction, &force));
+    SUPPLE_MEMORY(memory, sizeof scene_memory);
+    supple_scene_config fewer = bar_config();
+    supple_scene *other = NULL;
+    fewer.elements--;
+    DONE(supple_scene_init(memory, sizeof memory, &fewer, &other, &error));
+    REFUSED(SUPPLE_E_MISMATCH, supple_reaction_follow(other, state, reaction, &force));
     DONE(supple_reaction_follow(scene, state, reaction, &force));
     CHECK(force.known == 0);
     const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), 3e-5f, 20.0f};
