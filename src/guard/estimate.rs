@@ -130,10 +130,14 @@ impl Envelope {
         self.waited = seconds;
     }
 
-    /// Nothing could be compared: the error may be as large as the motion.
+    /// Nothing could be compared: the error may be as large as the motion, and is more than is allowed.
     pub(super) fn lose(&mut self, seconds: f32) {
         let before = self.held.unwrap_or_default();
-        let mean = before.mean.max(self.motion);
+        let unknown = match self.allowed {
+            Allowed::ShareOfMotion => self.least,
+            Allowed::Metres(metres) => metres,
+        };
+        let mean = before.mean.max(self.motion).max(unknown);
         self.add(&Comparison { mean, largest: before.largest.max(mean), ..before }, seconds);
     }
 
@@ -218,6 +222,15 @@ mod tests {
         envelope.allowed = Allowed::default();
         envelope.add(&distance(f32::NAN), 0.01);
         assert!(matches!(envelope.judge(Status::Ok), Status::Inexact { .. }));
+    }
+
+    #[test]
+    fn where_nothing_can_be_compared_a_body_at_rest_is_doubted_as_well() {
+        for allowed in [Allowed::ShareOfMotion, Allowed::Metres(0.002)] {
+            let mut envelope = Envelope { allowed, ..later() };
+            envelope.lose(1e-3);
+            assert!(matches!(envelope.judge(Status::Ok), Status::Inexact { .. }));
+        }
     }
 
     /// Both runs move by a tenth of a millimetre, and differ by as much: what the body does is not known. Of one that has moved by more
