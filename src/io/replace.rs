@@ -76,8 +76,9 @@ fn remove_abandoned(path: &Path, name: &OsStr) {
         let rest = found.as_encoded_bytes().strip_prefix(prefix.as_encoded_bytes());
         let number = rest.and_then(|rest| rest.strip_suffix(b".tmp")).unwrap_or_default();
         if !number.is_empty() && number.iter().all(|byte| byte.is_ascii_digit() || *byte == b'-') {
-            let file = File::options().write(true).open(entry.path());
-            if file.is_ok_and(|file| file.try_lock().is_ok()) {
+            // Locked until it is removed: whoever has just created it finds it locked, or gone.
+            let Ok(file) = File::options().write(true).open(entry.path()) else { continue };
+            if file.try_lock().is_ok() {
                 let _ = fs::remove_file(entry.path());
             }
         }
