@@ -216,7 +216,7 @@ impl ReactionModel {
     }
 
     /// Whether it was prepared for this scene.
-    pub(crate) fn is_of<M>(&self, scene: SceneView<'_, M>) -> bool {
+    pub(crate) fn is_for<M>(&self, scene: SceneView<'_, M>) -> bool {
         self.nodes == scene.node_count() && self.scene == scene.checksum()
     }
 
@@ -227,7 +227,7 @@ impl ReactionModel {
         state: &StateView<'_>,
         storage: &[NodeVector],
     ) -> Option<Force> {
-        if !self.is_of(scene) || state.capacity() < self.nodes || storage.len() < self.nodes {
+        if !self.is_for(scene) || state.capacity() < self.nodes || storage.len() < self.nodes {
             return None;
         }
         let (time, steps) = (state.time(), state.steps());
@@ -324,8 +324,8 @@ impl<S: AsMut<[NodeVector]> + AsRef<[NodeVector]>> Reaction<S> {
     }
 
     /// To be called after each frame's steps, of any kind, with the state that they left: the mean force since the last call. None at
-    /// the first call, after a reset or a restore to an earlier time, for a scene that it was not prepared for, and where it is no finite number.
-    /// Call it before the first step for a force after it. It costs a pass over the nodes.
+    /// the first call, after a reset or a restore to an earlier time, for a scene that it was not prepared for, and where it is
+    /// no finite number. Call it before the first step for a force after it. It costs a pass over the nodes.
     pub fn follow<M: Material>(&mut self, scene: SceneView<'_, M>, state: &StateView<'_>) -> Option<Force> {
         self.model.follow(scene, state, self.storage.as_ref())
     }

@@ -94,7 +94,7 @@ pub unsafe extern "C" fn supple_reaction_follow(
     let follow = || unsafe {
         let (any, place) = (carved(scene)?, place_for(force)?);
         let (supple_reaction { model, .. }, arrays) = memory::open(reaction)?;
-        if !with_scene!(any, scene => model.is_of(scene)) {
+        if !with_scene!(any, scene => model.is_for(scene)) {
             return Err(SUPPLE_E_MISMATCH.into());
         }
         let storage = storage(arrays, vectors_for(any.node_count()));

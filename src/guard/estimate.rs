@@ -133,11 +133,7 @@ impl Envelope {
     /// Nothing could be compared: the error may be as large as the motion, and is more than is allowed.
     pub(super) fn lose(&mut self, seconds: f32) {
         let before = self.held.unwrap_or_default();
-        let unknown = match self.allowed {
-            Allowed::ShareOfMotion => self.least,
-            Allowed::Metres(metres) => metres,
-        };
-        let mean = before.mean.max(self.motion).max(unknown);
+        let mean = before.mean.max(self.motion).max(self.allowed(0.0));
         self.add(&Comparison { mean, largest: before.largest.max(mean), ..before }, seconds);
     }
 
@@ -145,14 +141,18 @@ impl Envelope {
         let Comparison { mean, largest, node, .. } = self.held?;
         let [mean, largest] = [(mean, self.growth[0]), (largest, self.growth[1])]
             .map(|(held, growth)| finite(ESTIMATE * (held + growth * self.waited)));
-        let allowed = match self.allowed {
-            Allowed::ShareOfMotion if mean > self.motion => {
-                (LEAST_OF_STILL * self.least).max(SHARE_OF_MOTION * self.motion)
+        Some(Estimate { mean, largest, node, allowed: self.allowed(mean) })
+    }
+
+    /// What is allowed where this mean error is estimated, m.
+    fn allowed(&self, mean: f32) -> f32 {
+        match self.allowed {
+            Allowed::ShareOfMotion => {
+                let least = if mean > self.motion { LEAST_OF_STILL * self.least } else { self.least };
+                least.max(SHARE_OF_MOTION * self.motion)
             }
-            Allowed::ShareOfMotion => self.least.max(SHARE_OF_MOTION * self.motion),
             Allowed::Metres(metres) => metres,
-        };
-        Some(Estimate { mean, largest, node, allowed })
+        }
     }
 
     /// The status of a step that was taken.
