@@ -18,6 +18,7 @@
 //! attempt that is undone after exact steps leaves their motion as it was, to the bit.
 
 pub mod frame;
+mod method;
 mod predict;
 
 #[cfg(feature = "train")]
@@ -25,23 +26,21 @@ pub(crate) use predict::VertexInput;
 pub use predict::{FEATURES, PREDICTED};
 
 use core::fmt;
-use core::ops::Range;
 
 use bytemuck::{Pod, Zeroable, must_cast_slice_mut};
 use glam::Vec4;
 
-use crate::element::{ElementMaterial, NoVisitor, NodeInertia};
+use crate::copy::copy;
+use crate::element::ElementMaterial;
 use crate::loads::Loads;
 use crate::mlp::Network;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::{AsState, Moment, Progress, StateView};
-use crate::step::{
-    CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial, move_in_parts,
-};
+use crate::step::{CallingThread, Status, Step, Threads, Trial};
 use crate::tled;
 use frame::Frame;
-use predict::{Counts, Predict};
+use method::Learned;
 
 /// What the learned step keeps for each vertex: its frame, and its next increment while a step is computed.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -553,53 +552,12 @@ fn exact_steps(count: u32, mut step: impl FnMut(u32) -> Status) -> Status {
 /// Copies what a learned step changes.
 fn save(state: &StateView<'_>, saved: &mut [NodeVector]) {
     let (displacement, increment) = saved.split_at_mut(saved.len() / 2);
-    displacement.iter_mut().zip(&*state.displacement).for_each(|(copy, vector)| *copy = *vector);
-    increment.iter_mut().zip(&*state.increment).for_each(|(copy, vector)| *copy = *vector);
+    copy(displacement, state.displacement);
+    copy(increment, state.increment);
 }
 
 fn restore(state: &mut StateView<'_>, saved: &[NodeVector]) {
     let (displacement, increment) = saved.split_at(saved.len() / 2);
-    state.displacement.iter_mut().zip(displacement).for_each(|(vector, copy)| *vector = *copy);
-    state.increment.iter_mut().zip(increment).for_each(|(vector, copy)| *vector = *copy);
-}
-
-struct Learned<'a, 'w, T> {
-    network: &'a Network<'w>,
-    step: &'a Step,
-    report: &'a mut LearnedReport,
-    vertices: &'a mut [Vertex],
-    threads: &'a T,
-}
-
-impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
-    fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
-        let Trial { scene, loads, displacement, increment, force, volume, progress } = trial;
-        let (network, step, inertia) = (self.network, self.step, scene.inertia);
-        let forcing = Forcing { scene: *scene, visitor: NoVisitor, displacement, loads, progress };
-        let predict = |nodes: Range<usize>, force: &[NodeVector], vertices: &mut [Vertex]| {
-            let inertia = inertia.get(nodes.clone()).unwrap_or_default();
-            let displacement = displacement.get(nodes.clone()).unwrap_or_default();
-            let increment = increment.get(nodes).unwrap_or_default();
-            Predict { network, step, inertia, displacement, increment, force, vertices }.dispatched()
-        };
-        let (results, extremes) = forcing.in_parts(volume, force, self.vertices, self.threads, predict);
-        *self.report = Counts::of_all(results.iter().map(|(_, counts)| counts)).report();
-        Computed { totals: Totals::of_all(results.iter().map(|(totals, _)| totals)), extremes }
-    }
-
-    fn next_increment(&self, node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector) -> [f32; 4] {
-        self.vertices.get(node).map_or([0.0; 4], |vertex| vertex.next.0)
-    }
-
-    fn advance(&mut self, trial: &mut Trial<'_, M>) {
-        let Trial { scene, displacement, increment, .. } = trial;
-        let (partitions, vertices) = (scene.elements().partitions, &*self.vertices);
-        move_in_parts(partitions, displacement, increment, self.threads, |nodes, displacement, increment| {
-            let vertices = vertices.get(nodes).unwrap_or_default();
-            for ((displacement, increment), vertex) in displacement.iter_mut().zip(increment).zip(vertices) {
-                *increment = vertex.next;
-                displacement.0 = (Vec4::from(displacement.0) + Vec4::from(vertex.next.0)).to_array();
-            }
-        });
-    }
+    copy(state.displacement, displacement);
+    copy(state.increment, increment);
 }

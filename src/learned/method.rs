@@ -1,0 +1,55 @@
+//! The learned step as a method of the protocol of [`crate::step`]: forces, then the network's next increment of each vertex (m), with what the
+//! energy balance needs.
+
+use core::ops::Range;
+
+use glam::Vec4;
+
+use super::predict::{Counts, Predict};
+use super::{LearnedReport, Vertex};
+use crate::element::{ElementMaterial, NoVisitor, NodeInertia};
+use crate::mlp::Network;
+use crate::simd::NodeVector;
+use crate::step::{Computed, Forcing, Step, StepMethod, Threads, Totals, Trial, move_in_parts};
+
+/// A learned step that is being computed.
+pub(super) struct Learned<'a, 'w, T> {
+    pub(super) network: &'a Network<'w>,
+    pub(super) step: &'a Step,
+    pub(super) report: &'a mut LearnedReport,
+    pub(super) vertices: &'a mut [Vertex],
+    pub(super) threads: &'a T,
+}
+
+impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
+    fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
+        let Trial { scene, loads, displacement, increment, force, volume, progress } = trial;
+        let (network, step, inertia) = (self.network, self.step, scene.inertia);
+        let forcing = Forcing { scene: *scene, visitor: NoVisitor, displacement, loads, progress };
+        let predict = |nodes: Range<usize>, force: &[NodeVector], vertices: &mut [Vertex]| {
+            let inertia = inertia.get(nodes.clone()).unwrap_or_default();
+            let displacement = displacement.get(nodes.clone()).unwrap_or_default();
+            let increment = increment.get(nodes).unwrap_or_default();
+            Predict { network, step, inertia, displacement, increment, force, vertices }.dispatched()
+        };
+        let (results, extremes) = forcing.in_parts(volume, force, self.vertices, self.threads, predict);
+        *self.report = Counts::of_all(results.iter().map(|(_, counts)| counts)).report();
+        Computed { totals: Totals::of_all(results.iter().map(|(totals, _)| totals)), extremes }
+    }
+
+    fn next_increment(&self, node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector) -> [f32; 4] {
+        self.vertices.get(node).map_or([0.0; 4], |vertex| vertex.next.0)
+    }
+
+    fn advance(&mut self, trial: &mut Trial<'_, M>) {
+        let Trial { scene, displacement, increment, .. } = trial;
+        let (partitions, vertices) = (scene.elements().partitions, &*self.vertices);
+        move_in_parts(partitions, displacement, increment, self.threads, |nodes, displacement, increment| {
+            let vertices = vertices.get(nodes).unwrap_or_default();
+            for ((displacement, increment), vertex) in displacement.iter_mut().zip(increment).zip(vertices) {
+                *increment = vertex.next;
+                displacement.0 = (Vec4::from(displacement.0) + Vec4::from(vertex.next.0)).to_array();
+            }
+        });
+    }
+}
