@@ -112,6 +112,7 @@
 //! | [`scene`] | what is simulated, computed once: element tables, masses, supports |
 //! | [`state`] | what moves: displacements and their last increment |
 //! | [`loads`] | what acts on it, set when the host likes: forces, traction, gravity, prescribed motion |
+//! | [`contact`] | rigid instruments that touch the tissue, and what they feel |
 //! | [`plausibility`] | does a scene look as if a unit was mistaken |
 //! | [`step`] | the protocol of every step: begin, compute, energy balance, accept or refuse; threads |
 //! | [`tled`] | the exact step and the critical step |
@@ -151,6 +152,7 @@ extern crate std;
 pub mod adaptive;
 #[cfg(feature = "capi-neo-hookean")]
 mod capi;
+pub mod contact;
 mod copy;
 pub mod element;
 mod energy_balance;

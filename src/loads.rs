@@ -7,6 +7,7 @@ use core::fmt;
 
 use glam::Vec3;
 
+use crate::contact::Contact;
 use crate::element::Axes;
 use crate::padding;
 use crate::scene::AsScene;
@@ -127,6 +128,7 @@ pub struct Loads<'a> {
     gravity: [f32; 3],
     forces: &'a [NodalForce],
     motions: &'a [Motion],
+    contact: Option<&'a Contact<'a>>,
     /// Nodes of the scene they were checked against.
     nodes: Option<usize>,
 }
@@ -145,7 +147,7 @@ impl LoadsOverTime for Loads<'_> {
 
 impl<'a> Loads<'a> {
     /// No load; supports stand still.
-    pub const NONE: Self = Self { gravity: [0.0; 3], forces: &[], motions: &[], nodes: None };
+    pub const NONE: Self = Self { gravity: [0.0; 3], forces: &[], motions: &[], contact: None, nodes: None };
 
     /// Checks loads against the scene they will act on. Nodes may be listed more than once: forces add
     /// up, of several motions of an axis the last one holds.
@@ -164,7 +166,7 @@ impl<'a> Loads<'a> {
         for (index, motion) in motions.iter().enumerate() {
             motion.check(index, nodes, scene.movable(motion.node as usize))?;
         }
-        Ok(Self { gravity, forces, motions, nodes: Some(nodes) })
+        Ok(Self { gravity, forces, motions, contact: None, nodes: Some(nodes) })
     }
 
     /// Loads that the caller has checked against a scene of so many nodes. Of those that have not been, nodes that do not exist and
@@ -175,7 +177,17 @@ impl<'a> Loads<'a> {
         motions: &'a [Motion],
         nodes: usize,
     ) -> Self {
-        Self { gravity, forces, motions, nodes: Some(nodes) }
+        Self { gravity, forces, motions, contact: None, nodes: Some(nodes) }
+    }
+
+    /// The same loads and instruments that touch the tissue.
+    #[must_use]
+    pub const fn touched_by(self, contact: &'a Contact<'a>) -> Self {
+        Self { contact: Some(contact), ..self }
+    }
+
+    pub(crate) const fn contact(&self) -> Option<&'a Contact<'a>> {
+        self.contact
     }
 
     pub(crate) const fn nodes(&self) -> Option<usize> {

@@ -7,6 +7,7 @@
 
 use core::ops::Deref;
 
+use crate::contact::Touch;
 use crate::element::Extremes;
 use crate::energy_balance::EnergyBalance;
 use crate::material::{Element, Material};
@@ -95,6 +96,8 @@ pub struct StateView<'a> {
     /// Of scenes with nodal pressure or strain ([`crate::element`]), empty for others.
     pub(crate) volume: &'a mut [NodeVector],
     pub(crate) progress: &'a mut Progress,
+    /// What the instruments feel in the latest step.
+    pub(crate) touches: &'a mut [Touch],
 }
 
 impl Deref for StateView<'_> {
@@ -116,7 +119,14 @@ impl<'a> StateView<'a> {
         volume: &'a mut [NodeVector],
         progress: &'a mut Progress,
     ) -> Self {
-        Self { displacement, increment, force, volume, progress }
+        Self { displacement, increment, force, volume, progress, touches: &mut [] }
+    }
+
+    /// The same state, whose steps write to `touches` what each instrument feels ([`crate::contact`]): in the latest step, taken or
+    /// refused. Of instruments beyond its length nothing is written.
+    #[must_use]
+    pub fn feeling(self, touches: &'a mut [Touch]) -> Self {
+        Self { touches, ..self }
     }
 
     /// The same state for a shorter time.
@@ -127,6 +137,7 @@ impl<'a> StateView<'a> {
             force: self.force,
             volume: self.volume,
             progress: self.progress,
+            touches: self.touches,
         }
     }
 
@@ -220,7 +231,7 @@ impl<S: StateVectors> State<S> {
     /// The state.
     pub fn view(&mut self) -> StateView<'_> {
         let [displacement, increment, force, volume] = self.vectors.vectors_mut();
-        StateView { displacement, increment, force, volume, progress: &mut self.progress }
+        StateView::new(displacement, increment, force, volume, &mut self.progress)
     }
 
     /// Displacement of each node, m.

@@ -229,7 +229,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         if lattice.functions() == 0 {
             return None;
         }
-        let Trial { scene, loads, displacement, increment, force, volume, progress } = trial;
+        let Trial { scene, loads, displacement, increment, force, volume, progress, .. } = trial;
         let supports = MovingSupports {
             scene: *scene,
             lattice,

@@ -30,6 +30,17 @@ pub enum Cause {
         /// Size of the node's own tissue: the edge of a cube of its volume, m.
         size: f32,
     },
+    /// An instrument moves farther in this step than it is thick, or is so far inside the body that it throws the node.
+    Instrument {
+        /// Its place in the list of instruments.
+        index: usize,
+        /// How far it moves, or the node is inside it, m.
+        metre: f32,
+        /// The most that it may, m.
+        most: f32,
+    },
+    /// The loads have instruments, which these steps cannot meet. Exact steps can.
+    NoContact,
     /// Supports moved the node through most of the tissue around it in a step.
     Motion {
         /// How far, m.
@@ -60,6 +71,17 @@ impl fmt::Display for Divergence {
                 "diverged at {time:.6} s at node {node}: force {index}, of {newton:.3e} N, moves it in one step through its tissue, \
                  which is {:.3} mm across",
                 1e3 * size
+            ),
+            Cause::Instrument { index, metre, most } => write!(
+                f,
+                "diverged at {time:.6} s at node {node}: instrument {index} moves by {:.3} mm in one step, or is as far inside the body; \
+                 at most {:.3} mm are possible: start outside and move slower",
+                1e3 * metre,
+                1e3 * most
+            ),
+            Cause::NoContact => write!(
+                f,
+                "stopped at {time:.6} s: the loads have instruments, which only exact steps can meet"
             ),
             Cause::Motion { metre, size } => write!(
                 f,
@@ -105,7 +127,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
     }
 
     /// Edge of a cube of the node's own tissue, m.
-    fn size_at(&self, node: usize) -> f32 {
+    pub(super) fn size_at(&self, node: usize) -> f32 {
         libm::cbrtf(self.scene.node_mass(node) / self.density())
     }
 

@@ -107,6 +107,27 @@ impl Totals {
         self.work += f64::from(joule);
     }
 
+    /// Replaces what a node contributes by what it does with another force and next increment.
+    pub(crate) fn change(
+        &mut self,
+        step: &Step,
+        inertia: &NodeInertia,
+        increment: &NodeVector,
+        forces: [&NodeVector; 2],
+        next: [&[f32; 4]; 2],
+    ) {
+        for (sign, (force, next)) in [-1.0, 1.0].into_iter().zip(forces.into_iter().zip(next)) {
+            for (axis, inverse) in inertia.inverse.into_iter().enumerate() {
+                let mut sums = Sums::new(step, |value| value);
+                let free = if inverse > 0.0 { 1.0 } else { 0.0 };
+                sums.add(inertia.mass, free, increment.0[axis], force.0[axis], next[axis]);
+                self.kinetic += sign * f64::from(sums.kinetic);
+                self.momentum[axis] += sign * f64::from(sums.momentum);
+                self.prescribed += sign * f64::from(sums.prescribed);
+            }
+        }
+    }
+
     /// Adds vectorised sums of nodes, one for each axis.
     pub(crate) fn add_vectors<R: Real>(&mut self, sums: &[Sums<R>; 3]) {
         for (sums, momentum) in sums.iter().zip(&mut self.momentum) {

@@ -4,6 +4,7 @@
 //! keeps of it: the next step is the same, to the bit, as if there had been none.
 
 mod cause;
+mod contact;
 mod energy_sums;
 mod length;
 mod parts;
@@ -24,6 +25,7 @@ pub use status::{Divergence, Status};
 pub use threads::Rayon;
 pub use threads::{CallingThread, MOST_PARTS, Threads};
 
+use crate::contact::Touch;
 use crate::element::{ElementMaterial, NodeInertia};
 use crate::loads::Loads;
 use crate::scene::SceneView;
@@ -42,6 +44,10 @@ pub(crate) struct Trial<'a, M> {
     /// Rows of [`crate::element::NodalVolumes`] for materials with nodal pressure, empty for others.
     pub(crate) volume: &'a mut [NodeVector],
     pub(crate) progress: &'a mut Progress,
+    /// What the instruments feel, as far as the host wants to know.
+    pub(crate) touches: &'a mut [Touch],
+    /// The node and the instrument that the step must not be taken with.
+    pub(crate) refused: Option<(u32, Cause)>,
 }
 
 /// The result of [`StepMethod::compute`]: sums over nodes and extremes over elements.
@@ -66,6 +72,9 @@ pub(crate) trait StepMethod<M> {
 
     /// The steps in which the strain energy of all elements is computed once: of a long step it may take more time.
     const ENERGY_CYCLE: usize = 256;
+
+    /// Whether instruments can touch the tissue in these steps.
+    const MEETS_INSTRUMENTS: bool = false;
 
     /// Inertia that the method has added, as a multiple of the mass.
     fn added_inertia(&self) -> f32 {
@@ -99,7 +108,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     ) -> Result<Self, Status> {
         Self::check(scene, loads, &state, room)?;
         let nodes = scene.node_count();
-        let StateView { displacement, increment, force, volume, progress } = state;
+        let StateView { displacement, increment, force, volume, progress, touches } = state;
         Ok(Self {
             scene,
             loads,
@@ -108,6 +117,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             force: force.get_mut(..nodes).unwrap_or_default(),
             volume: volume.get_mut(..nodes).unwrap_or_default(),
             progress,
+            touches,
+            refused: None,
         })
     }
 
@@ -126,10 +137,18 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     }
 
     /// Takes the step, or refuses it.
-    pub(crate) fn take(mut self, step: &Step, method: &mut impl StepMethod<M>) -> Status {
+    pub(crate) fn take<C: StepMethod<M>>(mut self, step: &Step, method: &mut C) -> Status {
+        if !C::MEETS_INSTRUMENTS && self.loads.contact().is_some() {
+            let time = self.progress.time;
+            return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoContact });
+        }
         let Computed { totals, extremes } = method.compute(&mut self);
-        let balance = self.balance(step, method, &totals);
-        let balance = balance.map_err(|cause| self.blamed(step, method, cause));
+        let balance = match self.refused {
+            Some(refused) => Err(refused),
+            None => self
+                .balance(step, method, &totals)
+                .map_err(|cause| self.blamed(step, method, cause)),
+        };
         let balance = balance.and_then(|balance| method.refused_load(&self).map_or(Ok(balance), Err));
         let balance = match balance {
             Ok(balance) => balance,

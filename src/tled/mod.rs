@@ -65,9 +65,10 @@ struct Exact<'a, T> {
 
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
     const ENERGY_CYCLE: usize = 2048;
+    const MEETS_INSTRUMENTS: bool = true;
 
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
-        let Trial { scene, loads, displacement, increment, force, volume, progress } = trial;
+        let Trial { scene, loads, displacement, increment, force, volume, progress, .. } = &mut *trial;
         let (inertia, step) = (scene.inertia, self.step);
         let forcing = Forcing { scene: *scene, visitor: NoVisitor, displacement, loads, progress };
         let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
@@ -76,7 +77,9 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
             EnergySums { step, inertia, increment, force }.total()
         };
         let (totals, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, totals_of);
-        Computed { totals: Totals::of_all(&totals), extremes }
+        let mut totals = Totals::of_all(&totals);
+        trial.meet_instruments(step, self, &mut totals);
+        Computed { totals, extremes }
     }
 
     fn next_increment(

@@ -1,0 +1,61 @@
+//! A rigid instrument: shape, friction, and where it moves.
+
+use super::pose::{Placement, Pose};
+use super::shape::Shape;
+use super::ContactError;
+
+/// A rigid instrument that moves on a line, and turns evenly, from one pose to another. A host sets both poses and their times
+/// for each frame; before and after these times the instrument stands still.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instrument {
+    /// What it looks like.
+    pub shape: Shape,
+    /// Coulomb's coefficient of friction, zero or more.
+    pub friction: f32,
+    /// Where it starts.
+    pub from: Pose,
+    /// Where it ends.
+    pub to: Pose,
+    /// Times of both, s.
+    pub times: [f64; 2],
+}
+
+impl Instrument {
+    /// An instrument that stands still, without friction.
+    #[must_use]
+    pub const fn resting(shape: Shape, pose: Pose) -> Self {
+        Self { shape, friction: 0.0, from: pose, to: pose, times: [0.0; 2] }
+    }
+
+    /// Moves on, from where it will be at the time `from` (s), to `pose` at the time `to`.
+    pub fn move_to(&mut self, pose: Pose, from: f64, to: f64) {
+        let Placement { position, rotation } = self.placement(from);
+        self.from = Pose { position: position.to_array(), rotation: rotation.to_array() };
+        (self.to, self.times) = (pose, [from, to]);
+    }
+
+    pub(super) fn check(&self, instrument: usize) -> Result<(), ContactError> {
+        let bad = |what, value| Err(ContactError::Instrument { instrument, what, value });
+        if let Some((what, value)) = self.shape.refused_size() {
+            return bad(what, value);
+        }
+        if !(self.friction.is_finite() && self.friction >= 0.0) {
+            return bad("friction", self.friction);
+        }
+        if let Some(&time) = self.times.iter().find(|time| !time.is_finite()) {
+            return bad("time", time as f32);
+        }
+        if [self.from, self.to].iter().all(Pose::is_valid) {
+            Ok(())
+        } else {
+            Err(ContactError::Pose { instrument })
+        }
+    }
+
+    /// Where it is at `time`, s.
+    pub(super) fn placement(&self, time: f64) -> Placement {
+        let [start, end] = self.times;
+        let share = if time >= end { 1.0 } else { ((time - start) / (end - start)).max(0.0) };
+        Placement::between(&self.from, &self.to, share as f32)
+    }
+}

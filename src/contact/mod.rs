@@ -1,0 +1,194 @@
+//! Rigid instruments that touch the tissue: where they are, and what they feel. A node that a step would put into an instrument is
+//! put onto its surface instead, its speed into the instrument is removed, and its slip is reduced as far as Coulomb's friction can.
+//! With the gap `g` (m, negative inside), the outward normal `n` there, and the slip `s` of the node along the surface in a step:
+//!
+//! ```text
+//! p = c (-g n - r s),   c = m / (dt h / (1 + k)),   r = min(1, mu |g| / |s|)
+//! ```
+//! The push `p` (N) is the force that takes the node there in this very step ([`crate::tled`]), so there is no stiffness to be tuned,
+//! the critical step is that without an instrument, and the sum of the pushes is the force on the instrument. A node that nothing
+//! presses is free in the next step. NiftySim's contact is of this kind (Johnsen et al. 2015).
+//!
+//! Work: each step each node of the surface against each instrument. Nodes that supports hold along all axes are passed through.
+//! A node that touches several instruments is moved by one after the other. Damping of a few 1/s is what ends the rattling of light
+//! nodes on hard surfaces.
+
+mod instrument;
+mod pose;
+mod shape;
+mod surface;
+
+pub use instrument::Instrument;
+pub(crate) use pose::Placement;
+pub use pose::Pose;
+pub use shape::Shape;
+#[cfg(any(feature = "std", test))]
+pub use surface::boundary;
+pub use surface::{Surface, SurfaceNode};
+
+use core::fmt;
+
+use glam::Vec3;
+
+/// Instruments and the surface that they can touch, checked.
+#[derive(Clone, Copy, Debug)]
+pub struct Contact<'a> {
+    surface: Surface<'a>,
+    instruments: &'a [Instrument],
+}
+
+impl<'a> Contact<'a> {
+    /// Checks the instruments.
+    pub fn new(surface: Surface<'a>, instruments: &'a [Instrument]) -> Result<Self, ContactError> {
+        for (index, instrument) in instruments.iter().enumerate() {
+            instrument.check(index)?;
+        }
+        Ok(Self { surface, instruments })
+    }
+
+    /// The nodes that can be touched.
+    #[must_use]
+    pub const fn surface(&self) -> Surface<'a> {
+        self.surface
+    }
+
+    /// The instruments.
+    #[must_use]
+    pub const fn instruments(&self) -> &'a [Instrument] {
+        self.instruments
+    }
+}
+
+/// What an instrument feels in a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct Touch {
+    /// Force of the tissue on the instrument, N.
+    pub force: [f32; 3],
+    /// Moment of the same about the position of the instrument at the end of the step, N m.
+    pub moment: [f32; 3],
+    /// Nodes that it pushes.
+    pub contacts: u32,
+    /// How far the deepest node would have been inside without the instrument, m.
+    pub depth: f32,
+    /// Work that it does on the tissue, J.
+    pub work: f32,
+    /// What friction takes of the work of the instrument, J.
+    pub friction_loss: f32,
+}
+
+impl Touch {
+    pub(crate) const NONE: Self =
+        Self { force: [0.0; 3], moment: [0.0; 3], contacts: 0, depth: 0.0, work: 0.0, friction_loss: 0.0 };
+
+    /// Adds the push (N) on a node at `arm` (m) from the instrument's position, with how far it and the instrument there move, m.
+    pub(crate) fn add(&mut self, push: Vec3, arm: Vec3, depth: f32, [node, instrument]: [Vec3; 2]) {
+        self.force = (Vec3::from_array(self.force) - push).to_array();
+        self.moment = (Vec3::from_array(self.moment) - arm.cross(push)).to_array();
+        self.contacts += 1;
+        self.depth = self.depth.max(depth);
+        self.work += push.dot(node);
+        self.friction_loss += push.dot(instrument - node);
+    }
+}
+
+/// An instrument in a step: placed where it starts and where it ends.
+pub(crate) struct Placed<'a> {
+    pub(crate) instrument: &'a Instrument,
+    pub(crate) start: Placement,
+    pub(crate) end: Placement,
+}
+
+/// A node in the way of an instrument.
+pub(crate) struct Meeting {
+    /// Distance at the end of the step, m, below zero.
+    pub(crate) gap: f32,
+    pub(crate) normal: Vec3,
+    /// The position from the instrument's, m.
+    pub(crate) arm: Vec3,
+    /// How far the instrument moves there in the step, m.
+    pub(crate) carried: Vec3,
+}
+
+impl<'a> Placed<'a> {
+    pub(crate) fn new(instrument: &'a Instrument, times: [f64; 2]) -> Self {
+        let [start, end] = times.map(|time| instrument.placement(time));
+        Self { instrument, start, end }
+    }
+
+    /// The distance that it moves, and the farthest that it may, m, if that is too far.
+    pub(crate) fn too_fast(&self) -> Option<[f32; 2]> {
+        let metre = self.start.position.distance(self.end.position);
+        let most = self.instrument.shape.thickness();
+        (metre > most).then_some([metre, most])
+    }
+
+    /// The meeting with a node that would be at `point` (m) at the end of the step.
+    pub(crate) fn meet(&self, point: Vec3) -> Option<Meeting> {
+        let (gap, normal) = self.instrument.shape.nearest(self.end.in_shape(point));
+        if gap.is_nan() || gap >= 0.0 {
+            return None;
+        }
+        let normal = self.end.turned(normal);
+        let touched = point - gap * normal;
+        let carried = touched - self.end.carried(touched, &self.start);
+        Some(Meeting { gap, normal, arm: touched - self.end.position, carried })
+    }
+}
+
+/// Why a surface or an instrument was refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ContactError {
+    /// A node of the surface that the scene does not have.
+    Node {
+        /// Its place in the surface.
+        place: usize,
+        /// The node.
+        node: u32,
+        /// Nodes of the scene.
+        nodes: usize,
+    },
+    /// A position at rest that is not a number.
+    Point {
+        /// Its place in the surface.
+        place: usize,
+        /// The node.
+        node: u32,
+    },
+    /// A size, friction or time that cannot be one.
+    Instrument {
+        /// Its place in the list.
+        instrument: usize,
+        /// "radius", "length", "friction" or "time".
+        what: &'static str,
+        /// The value.
+        value: f32,
+    },
+    /// A pose with a position that is not a number, or a rotation without a length.
+    Pose {
+        /// Its place in the list.
+        instrument: usize,
+    },
+}
+
+impl fmt::Display for ContactError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Node { place, node, nodes } => {
+                write!(f, "entry {place} of the surface: node {node} does not exist, the scene has {nodes} nodes")
+            }
+            Self::Point { place, node } => {
+                write!(f, "entry {place} of the surface: the position of node {node} is not a number")
+            }
+            Self::Instrument { instrument, what, value } => {
+                write!(f, "instrument {instrument}: a {what} of {value} cannot be")
+            }
+            Self::Pose { instrument } => {
+                write!(f, "instrument {instrument}: its pose is not one: three numbers and a rotation that is not zero")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ContactError {}

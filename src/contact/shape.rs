@@ -1,0 +1,63 @@
+//! Shapes of rigid instruments, as the distance from a point to their surface (m, negative inside) and the normal there.
+
+use glam::Vec3;
+
+/// The shape of an instrument, in its own axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Shape {
+    /// All that is below `z = 0`: a table, a plate that is larger than the body.
+    Plane,
+    /// A ball around the centre.
+    Sphere {
+        /// m.
+        radius: f32,
+    },
+    /// A cylinder along `z` with round ends: a needle's shaft, an endoscope, a finger.
+    Capsule {
+        /// m.
+        radius: f32,
+        /// Of the cylinder between the centres of the ends, m.
+        length: f32,
+    },
+}
+
+impl Shape {
+    /// The first size that is not one.
+    pub(super) fn refused_size(&self) -> Option<(&'static str, f32)> {
+        let positive = |name, value: f32| (!(value.is_finite() && value > 0.0)).then_some((name, value));
+        match *self {
+            Self::Plane => None,
+            Self::Sphere { radius } => positive("radius", radius),
+            Self::Capsule { radius, length } => {
+                positive("radius", radius).or_else(|| positive("length", length))
+            }
+        }
+    }
+
+    /// How far it may move in one step, m: farther, and tissue could be on its other side.
+    pub(super) fn thickness(&self) -> f32 {
+        match *self {
+            Self::Plane => f32::INFINITY,
+            Self::Sphere { radius } | Self::Capsule { radius, .. } => radius,
+        }
+    }
+
+    /// Distance of a point, m, and the outward normal of the surface that is nearest to it.
+    pub(super) fn nearest(&self, point: Vec3) -> (f32, Vec3) {
+        match *self {
+            Self::Plane => (point.z, Vec3::Z),
+            Self::Sphere { radius } => around(point, radius),
+            Self::Capsule { radius, length } => {
+                let half = 0.5 * length;
+                around(point - Vec3::Z * point.z.max(-half).min(half), radius)
+            }
+        }
+    }
+}
+
+/// Distance and normal of a ball around the origin; at its centre any normal is right.
+fn around(point: Vec3, radius: f32) -> (f32, Vec3) {
+    let length = point.length();
+    (length - radius, if length > 0.0 { point / length } else { Vec3::X })
+}

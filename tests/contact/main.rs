@@ -1,0 +1,6 @@
+//! Instruments that touch tissue, in exact steps: against closed forms, conservation of momentum, and instruments that nobody sane
+//! would move like this.
+
+mod closed_forms;
+mod scene;
+mod touching;
