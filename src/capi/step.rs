@@ -127,7 +127,9 @@ pub(super) fn answer(status: &Status) -> Answer<supple_status> {
         Status::Limited { .. } => Ok(SUPPLE_LIMITED),
         Status::Inexact { .. } => Ok(SUPPLE_INEXACT),
         Status::Diverged(Divergence { node, cause, .. }) => Err(match cause {
-            Cause::NotFinite | Cause::Instrument { .. } | Cause::NoContact => supple_error::from(SUPPLE_E_DIVERGED).node(node),
+            Cause::NotFinite | Cause::Instrument { .. } | Cause::NoContact => {
+                supple_error::from(SUPPLE_E_DIVERGED).node(node)
+            }
             Cause::Energy { kinetic, available } => {
                 supple_error::from(SUPPLE_E_DIVERGED_ENERGY).node(node).value(kinetic, available)
             }

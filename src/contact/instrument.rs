@@ -1,8 +1,8 @@
 //! A rigid instrument: shape, friction, and where it moves.
 
+use super::ContactError;
 use super::pose::{Placement, Pose};
 use super::shape::Shape;
-use super::ContactError;
 
 /// A rigid instrument that moves on a line, and turns evenly, from one pose to another. A host sets both poses and their times
 /// for each frame; before and after these times the instrument stands still.

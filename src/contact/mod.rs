@@ -9,6 +9,37 @@
 //! the critical step is that without an instrument, and the sum of the pushes is the force on the instrument. A node that nothing
 //! presses is free in the next step. NiftySim's contact is of this kind (Johnsen et al. 2015).
 //!
+//! A finger presses a bar from the side, leaves, and says how hard it pressed:
+//!
+#![cfg_attr(feature = "std", doc = "```")]
+#![cfg_attr(not(feature = "std"), doc = "```ignore")]
+#![doc = include_str!("../doc_common.txt")]
+//! use supple::contact::{Contact, Instrument, Pose, Shape, Surface, Touch, boundary};
+//!
+//! let nodes = boundary(&mesh);
+//! let surface = Surface::new(&nodes, scene.node_count())?;
+//! let step = Step::new(0.9 * critical.seconds, 20.0, critical)?;
+//! let mut finger = Instrument::resting(Shape::Sphere { radius: 0.01 }, Pose::at([-0.011, 0.01, 0.09]));
+//! finger.friction = 0.3;
+//! let (mut touches, mut most) = ([Touch::default()], 0.0f32);
+//! for frame in 0..18 {
+//!     let (now, end) = (state.time(), f64::from(frame + 1) / 60.0);
+//!     let depth = 0.01 - (0.01 - 0.001 * frame as f32).abs(); // m
+//!     finger.move_to(Pose::at([-0.011 + depth, 0.01, 0.09]), now, end);
+//!     let instruments = [finger];
+//!     let contact = Contact::new(surface, &instruments)?;
+//!     let loads = Loads::NONE.touched_by(&contact);
+//!     while state.time() < end {
+//!         let status = tled::step(&scene, &loads, &mut state.view().feeling(&mut touches), &step);
+//!         assert_eq!(status, Status::Ok);
+//!     }
+//!     most = most.max(-touches[0].force[0]);
+//! }
+//! println!("at most {:.1} mN", 1e3 * most);
+//! # assert!(most > 1e-3, "{most}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Work: each step each node of the surface against each instrument. Nodes that supports hold along all axes are passed through.
 //! A node that touches several instruments is moved by one after the other. Damping of a few 1/s is what ends the rattling of light
 //! nodes on hard surfaces.
@@ -176,7 +207,10 @@ impl fmt::Display for ContactError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Node { place, node, nodes } => {
-                write!(f, "entry {place} of the surface: node {node} does not exist, the scene has {nodes} nodes")
+                write!(
+                    f,
+                    "entry {place} of the surface: node {node} does not exist, the scene has {nodes} nodes"
+                )
             }
             Self::Point { place, node } => {
                 write!(f, "entry {place} of the surface: the position of node {node} is not a number")
@@ -185,7 +219,10 @@ impl fmt::Display for ContactError {
                 write!(f, "instrument {instrument}: a {what} of {value} cannot be")
             }
             Self::Pose { instrument } => {
-                write!(f, "instrument {instrument}: its pose is not one: three numbers and a rotation that is not zero")
+                write!(
+                    f,
+                    "instrument {instrument}: its pose is not one: three numbers and a rotation that is not zero"
+                )
             }
         }
     }

@@ -64,7 +64,11 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
     }
 
-    fn placed<'c>(&self, contact: &Contact<'c>, step: &Step) -> impl Iterator<Item = Placed<'c>> + use<'c, M> {
+    fn placed<'c>(
+        &self,
+        contact: &Contact<'c>,
+        step: &Step,
+    ) -> impl Iterator<Item = Placed<'c>> + use<'c, M> {
         let start = self.progress.time;
         let times = [start, start + f64::from(step.seconds())];
         contact.instruments().iter().map(move |instrument| Placed::new(instrument, times))

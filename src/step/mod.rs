@@ -145,9 +145,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         let Computed { totals, extremes } = method.compute(&mut self);
         let balance = match self.refused {
             Some(refused) => Err(refused),
-            None => self
-                .balance(step, method, &totals)
-                .map_err(|cause| self.blamed(step, method, cause)),
+            None => self.balance(step, method, &totals).map_err(|cause| self.blamed(step, method, cause)),
         };
         let balance = balance.and_then(|balance| method.refused_load(&self).map_or(Ok(balance), Err));
         let balance = match balance {

@@ -1,4 +1,4 @@
-//! Blocks of tissue and the instruments that touch them.
+//! Bodies of tissue and the instruments that touch them.
 
 use supple::contact::{Contact, Instrument, Surface, SurfaceNode, Touch, boundary};
 use supple::loads::Loads;
@@ -9,24 +9,28 @@ use supple::state::{AsState, NodeVector, Progress, StateView};
 use supple::step::{Status, Step};
 use supple::tled;
 
-pub type Law = NodalStrain<Tissue<NeoHookean>>;
+pub(crate) type Law = NodalStrain<Tissue<NeoHookean>>;
 
-pub const TISSUE: Law = NodalStrain(Tissue { law: NeoHookean { c: 1000.0, d: 10_000.0 }, density: 1000.0 });
+pub(crate) const TISSUE: Law =
+    NodalStrain(Tissue { law: NeoHookean { c: 1000.0, d: 10_000.0 }, density: 1000.0 });
 
 /// A body with its state, and the nodes that can be touched.
-pub struct Body {
-    pub points: Vec<[f32; 3]>,
-    pub scene: VecScene<Law>,
-    pub surface: Vec<SurfaceNode>,
-    pub step: Step,
+pub(crate) struct Body {
+    pub(crate) points: Vec<[f32; 3]>,
+    pub(crate) scene: VecScene<Law>,
+    pub(crate) surface: Vec<SurfaceNode>,
+    pub(crate) step: Step,
     vectors: [Vec<NodeVector>; 4],
     progress: Progress,
 }
 
 impl Body {
-    pub fn new(bar: Bar, supports: &[Support], damping: f32) -> Self {
-        let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());
-        let mesh = Mesh::new(&points, &tets, Winding::Normalised).unwrap();
+    pub(crate) fn new(bar: Bar, supports: &[Support], damping: f32) -> Self {
+        Self::of(bar.points().collect(), &bar.tets().collect::<Vec<_>>(), supports, damping)
+    }
+
+    pub(crate) fn of(points: Vec<[f32; 3]>, tets: &[[u32; 4]], supports: &[Support], damping: f32) -> Self {
+        let mesh = Mesh::new(&points, tets, Winding::Normalised).unwrap();
         let scene = VecScene::build(TISSUE, &mesh, supports).unwrap();
         let surface = boundary(&mesh);
         let zeros = || vec![NodeVector::ZERO; points.len()];
@@ -41,25 +45,35 @@ impl Body {
         Self { points, scene, surface, step, vectors, progress }
     }
 
-    pub fn state<'a>(&'a mut self, touches: &'a mut [Touch]) -> StateView<'a> {
+    pub(crate) fn state<'a>(&'a mut self, touches: &'a mut [Touch]) -> StateView<'a> {
         let [displacement, increment, force, volume] = &mut self.vectors;
         StateView::new(displacement, increment, force, volume, &mut self.progress).feeling(touches)
     }
 
-    pub fn time(&self) -> f64 {
+    pub(crate) fn time(&self) -> f64 {
         self.progress.time()
     }
 
-    pub fn displacement(&self, node: usize) -> [f32; 3] {
+    pub(crate) fn displacement(&self, node: usize) -> [f32; 3] {
         self.vectors[0][node].to_array()
     }
 
-    pub fn bits(&self) -> Vec<[u32; 4]> {
-        self.vectors.iter().flatten().map(|vector| vector.to_array()).map(|[x, y, z]| [x, y, z, 0.0].map(f32::to_bits)).collect()
+    pub(crate) fn bits(&self) -> Vec<[u32; 4]> {
+        self.vectors
+            .iter()
+            .flatten()
+            .map(|vector| vector.to_array())
+            .map(|[x, y, z]| [x, y, z, 0.0].map(f32::to_bits))
+            .collect()
     }
 
     /// One step under gravity (m/s^2), with what the instruments feel.
-    pub fn step(&mut self, gravity: [f32; 3], instruments: &[Instrument], touches: &mut [Touch]) -> Status {
+    pub(crate) fn step(
+        &mut self,
+        gravity: [f32; 3],
+        instruments: &[Instrument],
+        touches: &mut [Touch],
+    ) -> Status {
         let surface = self.surface.clone();
         let contact = Contact::new(Surface::new(&surface, self.points.len()).unwrap(), instruments).unwrap();
         let [displacement, increment, force, volume] = &mut self.vectors;
@@ -70,7 +84,7 @@ impl Body {
     }
 
     /// Momentum of all nodes, kg m/s, and the mass, kg.
-    pub fn momentum(&self) -> ([f64; 3], f64) {
+    pub(crate) fn momentum(&self) -> ([f64; 3], f64) {
         let (mut sum, mut all) = ([0.0; 3], 0.0);
         for (node, increment) in self.vectors[1].iter().enumerate() {
             let mass = f64::from(self.scene.view().node_mass(node));

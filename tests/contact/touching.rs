@@ -20,8 +20,7 @@ fn fixed_end() -> Vec<Support> {
 #[test]
 fn the_impulse_of_an_instrument_is_the_change_of_momentum() {
     let mut body = Body::new(BAR, &[], 0.0);
-    let mut sphere =
-        Instrument::resting(Shape::Sphere { radius: 0.008 }, Pose::at([-0.009, 0.009, 0.031]));
+    let mut sphere = Instrument::resting(Shape::Sphere { radius: 0.008 }, Pose::at([-0.009, 0.009, 0.031]));
     sphere.friction = 0.4;
     sphere.move_to(Pose::at([-0.001, 0.012, 0.033]), 0.0, 0.04);
     let (mut touch, mut impulse, mut pushed) = ([Touch::default()], [0.0f64; 3], 0);
@@ -47,8 +46,7 @@ fn the_impulse_of_an_instrument_is_the_change_of_momentum() {
 #[test]
 fn tissue_is_free_when_the_instrument_leaves() {
     let mut body = Body::new(BAR, &fixed_end(), 60.0);
-    let mut sphere =
-        Instrument::resting(Shape::Sphere { radius: 0.01 }, Pose::at([-0.0101, 0.01, 0.04]));
+    let mut sphere = Instrument::resting(Shape::Sphere { radius: 0.01 }, Pose::at([-0.0101, 0.01, 0.04]));
     sphere.friction = 0.3;
     let (mut touch, mut most) = ([Touch::default()], 0.0f32);
     sphere.move_to(Pose::at([-0.006, 0.01, 0.04]), 0.0, 0.1);
@@ -56,12 +54,12 @@ fn tissue_is_free_when_the_instrument_leaves() {
         assert!(body.step([0.0; 3], &[sphere], &mut touch).is_taken());
         most = most.max(-touch[0].force[0]);
     }
-    let pressed = body.displacement(BAR.node(0, 1, 6))[0];
+    let pressed = body.displacement(BAR.node(0, 1, 6) as usize)[0];
     sphere.move_to(Pose::at([-0.02, 0.01, 0.04]), 0.15, 0.2);
     while body.time() < 0.6 {
         assert!(body.step([0.0; 3], &[sphere], &mut touch).is_taken());
     }
-    let left = body.displacement(BAR.node(0, 1, 6))[0];
+    let left = body.displacement(BAR.node(0, 1, 6) as usize)[0];
     println!("pressed {:.3} mm with {:.1} mN, then {:.4} mm", 1e3 * pressed, 1e3 * most, 1e3 * left);
     assert!(pressed > 2e-3 && most > 1e-3);
     assert_eq!(touch[0], Touch::default());
@@ -77,7 +75,7 @@ fn an_instrument_far_away_changes_nothing() {
         let _ = with.step([0.0, -9.81, 0.0], &[far], &mut [Touch::default()]);
         let _ = without.step([0.0, -9.81, 0.0], &[], &mut []);
     }
-    assert!(with.displacement(BAR.node(1, 1, 6))[1] < -1e-5);
+    assert!(with.displacement(BAR.node(1, 1, 6) as usize)[1] < -1e-5);
     assert_eq!(with.bits(), without.bits());
 }
 
@@ -110,12 +108,13 @@ fn steps_beyond_the_critical_one_refuse_instruments() {
     let contact = Contact::new(Surface::new(&surface, points.len()).unwrap(), &table).unwrap();
     let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &[], &[]).unwrap().touched_by(&contact);
     let mut scaled =
-        LargeStep::prepare_in_vec(Method::MassScaled, scene.view(), &points, body.state(&mut []), step).unwrap();
+        LargeStep::prepare_in_vec(Method::MassScaled, scene.view(), &points, body.state(&mut []), step)
+            .unwrap();
     let status = scaled.step(scene.view(), &loads, body.state(&mut []));
     let Status::Diverged(divergence) = status else { panic!("{status:?}") };
     println!("{divergence}");
     assert_eq!(divergence.cause, Cause::NoContact);
-    assert_eq!(body.displacement(BAR.node(1, 1, 6)), [0.0; 3]);
+    assert_eq!(body.displacement(BAR.node(1, 1, 6) as usize), [0.0; 3]);
 }
 
 /// Instruments anywhere, of any size and speed: a step is taken with finite numbers, or refused.
@@ -141,7 +140,8 @@ fn no_pose_makes_a_step_wrong_and_calls_it_right() {
         instrument.friction = 2.0 * random();
         // Up to 3 km/s.
         let way = 3000.0 * random().powi(8) * body.step.seconds();
-        let end = [place[0] + way * direction[0], place[1] + way * direction[1], place[2] + way * direction[2]];
+        let end =
+            [place[0] + way * direction[0], place[1] + way * direction[1], place[2] + way * direction[2]];
         let now = body.time();
         instrument.move_to(Pose::along(end, direction), now, now + f64::from(body.step.seconds()));
         let mut touch = [Touch::default()];
