@@ -6,6 +6,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Mutex;
 
+use supple::contact::{Contact, Instrument, Pose, Shape, Surface, SurfaceNode, Touch};
 use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedError, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
@@ -111,13 +112,29 @@ fn building_and_stepping_in_statics_allocates_nothing() {
     let motions = [Motion { node: NODES as u32 - 1, axes: Axes::Z, metre: [0.0, 0.0, 1e-3], ramp: 0.01 }];
     let loads = Loads::new(scene, [0.0, 0.0, -9.81], &forces, &motions).unwrap();
     assert!(tled::start(scene, state, &step, |_| ([0.0; 3], [0.0; 3])));
-    let mut taken = 0;
+    let (mut taken, mut pressed) = (0, 0);
     for _ in 0..200 {
         taken += u32::from(tled::step(scene, &loads, state, &step) == Status::Ok);
     }
     let energy = tled::strain_energy(scene, state).expect("room");
     let volume: f64 = scene.view().element_fields(state.displacements()).map(|f| f.volume_ratio).sum();
     assert!(tled::critical_step(scene, state).is_some());
+    state.reset();
+
+    // A plate presses the far end.
+    let far = SurfaceNode { rest: points[NODES - 5], node: NODES as u32 - 5 };
+    let above = |height: f32| Pose::along([0.0, 0.0, far.rest[2] + height], [0.0, 0.0, -1.0]);
+    let mut plate = [Instrument::resting(Shape::Plane, above(0.0))];
+    plate[0].move_to(above(-1e-4), 0.0, 100.0 * f64::from(step.seconds()));
+    let nodes = [far];
+    let contact = Contact::new(Surface::new(&nodes, NODES).unwrap(), &plate).unwrap();
+    let mut touches = [Touch::default()];
+    for _ in 0..100 {
+        let mut state = state.view().feeling(&mut touches);
+        let loads = Loads::NONE.touched_by(&contact);
+        pressed +=
+            u32::from(tled::step(scene, &loads, &mut state, &step).is_taken() && touches[0].contacts > 0);
+    }
     state.reset();
 
     // Refusals as well.
@@ -128,6 +145,7 @@ fn building_and_stepping_in_statics_allocates_nothing() {
     assert!(scene.build(&mesh, &[Support::fixed(10_000)]).is_err());
 
     assert_eq!(allocations(), before);
+    assert!(pressed > 50, "{pressed}");
     println!("200 steps, strain energy {energy:.3e} J, no allocation");
     assert!(taken == 200 && energy > 0.0 && diverged && (volume / TETS as f64 - 1.0).abs() < 0.1);
 }

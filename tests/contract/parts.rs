@@ -3,6 +3,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use supple::contact::{Contact, Instrument, Pose, Shape, Surface, SurfaceNode, Touch};
 use supple::inertia::{Cells, Damper, LargeStep, Method};
 use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::{Loads, Motion};
@@ -79,7 +80,7 @@ fn wave([x, y, z]: [f32; 3]) -> [f32; 3] {
     [0.02 * (40.0 * z).sin() * y, 0.05 * z * x, 0.3 * x * z]
 }
 
-/// Bits of the state after 30 exact steps under gravity, forces and a moved node.
+/// Bits of the state after 30 exact steps under gravity, forces and a moved node, on a rough table, with what the table feels.
 fn exact(body: &Body, threads: &impl Threads) -> Vec<u64> {
     let far = body.farthest(2);
     let mut supports = held(body);
@@ -87,13 +88,21 @@ fn exact(body: &Body, threads: &impl Threads) -> Vec<u64> {
     let scene = body.scene(tissue(EXP), &supports);
     let forces = corner_torsion(body, 0.2, 0.0);
     let motions = [Motion { node: far, axes: Axes::XYZ, metre: [1e-3, 0.0, 2e-3], ramp: 1e-3 }];
-    let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &forces, &motions).unwrap();
+    let surface: Vec<_> = (0..).zip(&body.points).map(|(node, &rest)| SurfaceNode { rest, node }).collect();
+    let table = Instrument::resting(Shape::Plane, Pose::along([0.0; 3], [0.0, 1.0, 0.0]));
+    let table = [Instrument { friction: 0.3, ..table }];
+    let contact = Contact::new(Surface::new(&surface, surface.len()).unwrap(), &table).unwrap();
+    let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &forces, &motions).unwrap().touched_by(&contact);
     let mut state = rest_of(&scene);
     let step = Step::unchecked(DT, 20.0).unwrap();
+    let mut touches = [Touch::default()];
     for _ in 0..30 {
-        taken(tled::step_in_parts(scene.view(), &loads, state.view(), &step, threads));
+        taken(tled::step_in_parts(scene.view(), &loads, state.view().feeling(&mut touches), &step, threads));
     }
     let mut all = bits(&state);
+    let [touch] = touches;
+    assert!(touch.contacts > 100, "{touch:?}");
+    all.extend(touch.force.iter().chain(&touch.moment).map(|component| u64::from(component.to_bits())));
     all.push(state.energy_balance().kinetic.to_bits());
     all
 }
