@@ -98,6 +98,8 @@ pub struct StateView<'a> {
     pub(crate) progress: &'a mut Progress,
     /// What the instruments feel in the latest step.
     pub(crate) touches: &'a mut [Touch],
+    /// Pushes of the instruments on the nodes of the surface, and room for the next.
+    pub(crate) pushes: &'a mut [NodeVector],
 }
 
 impl Deref for StateView<'_> {
@@ -119,7 +121,7 @@ impl<'a> StateView<'a> {
         volume: &'a mut [NodeVector],
         progress: &'a mut Progress,
     ) -> Self {
-        Self { displacement, increment, force, volume, progress, touches: &mut [] }
+        Self { displacement, increment, force, volume, progress, touches: &mut [], pushes: &mut [] }
     }
 
     /// The same state, whose steps write to `touches` what each instrument feels ([`crate::contact`]): in the latest step, taken or
@@ -127,6 +129,13 @@ impl<'a> StateView<'a> {
     #[must_use]
     pub fn feeling(self, touches: &'a mut [Touch]) -> Self {
         Self { touches, ..self }
+    }
+
+    /// The same state with the pushes of instruments on the nodes of the surface, which mass-scaled, multilevel and damped steps go on
+    /// from: [`vectors_to_push`](crate::contact::vectors_to_push) vectors that belong to the state. Zeros: nothing touches yet.
+    #[must_use]
+    pub fn pushing(self, pushes: &'a mut [NodeVector]) -> Self {
+        Self { pushes, ..self }
     }
 
     /// The same state for a shorter time.
@@ -138,6 +147,7 @@ impl<'a> StateView<'a> {
             volume: self.volume,
             progress: self.progress,
             touches: self.touches,
+            pushes: self.pushes,
         }
     }
 

@@ -40,18 +40,23 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! Mass-scaled, multilevel and damped steps solve for the pushes on all nodes together, as these move each other (`pushes.rs`), from those
+//! of the step before.
+//!
 //! Work: each step each node of the surface against each instrument. Nodes that supports hold along all axes are passed through.
-//! A node that touches several instruments is moved by one after the other. Damping of a few 1/s is what ends the rattling of light
+//! A node that touches several instruments is moved by one after the other, in long steps by the nearest one. Damping of a few 1/s is what ends the rattling of light
 //! nodes on hard surfaces.
 
 mod instrument;
 mod pose;
+mod pushes;
 mod shape;
 mod surface;
 
 pub use instrument::Instrument;
 pub(crate) use pose::Placement;
 pub use pose::Pose;
+pub(crate) use pushes::{Compliance, TouchedNode, solve};
 pub use shape::Shape;
 #[cfg(any(feature = "std", test))]
 pub use surface::boundary;
@@ -89,6 +94,15 @@ impl<'a> Contact<'a> {
         self.instruments
     }
 }
+
+/// Vectors that mass-scaled, multilevel and damped steps need for a surface of so many nodes, for pushes that they keep
+/// ([`StateView::pushing`](crate::state::StateView::pushing)).
+#[must_use]
+pub const fn vectors_to_push(nodes: usize) -> usize {
+    nodes.saturating_mul(1 + VECTORS_OF_TOUCHED)
+}
+
+pub(crate) const VECTORS_OF_TOUCHED: usize = size_of::<TouchedNode>() / 16;
 
 /// What an instrument feels in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -154,16 +168,25 @@ impl<'a> Placed<'a> {
         (metre > most).then_some([metre, most])
     }
 
-    /// The meeting with a node that would be at `point` (m) at the end of the step.
-    pub(crate) fn meet(&self, point: Vec3) -> Option<Meeting> {
+    /// A point (m) from the position at the end of the step.
+    pub(crate) fn arm(&self, point: Vec3) -> Vec3 {
+        point - self.end.position
+    }
+
+    /// How far the instrument moves at a point (m) of it at the end of the step.
+    pub(crate) fn carried(&self, point: Vec3) -> Vec3 {
+        point - self.end.carried(point, &self.start)
+    }
+
+    /// The meeting with a node that would be inside, or less than `margin` (m) away, at `point` (m) at the end of the step.
+    pub(crate) fn meet(&self, point: Vec3, margin: f32) -> Option<Meeting> {
         let (gap, normal) = self.instrument.shape.nearest(self.end.in_shape(point));
-        if gap.is_nan() || gap >= 0.0 {
+        if gap.is_nan() || gap >= margin {
             return None;
         }
         let normal = self.end.turned(normal);
         let touched = point - gap * normal;
-        let carried = touched - self.end.carried(touched, &self.start);
-        Some(Meeting { gap, normal, arm: touched - self.end.position, carried })
+        Some(Meeting { gap, normal, arm: self.arm(touched), carried: self.carried(touched) })
     }
 }
 

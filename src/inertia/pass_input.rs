@@ -25,6 +25,11 @@ pub(super) struct ResidualFactors {
 }
 
 impl ResidualFactors {
+    /// The factor of forces, s^2.
+    pub(super) const fn square(&self) -> f32 {
+        self.square
+    }
+
     /// Those of a step with the inertia of one that may be longer. Inertia contains `1 + k` times the mass: in a shorter step, with a
     /// smaller `k`, the residual is larger by the ratio of both.
     pub(super) fn new(step: &Step, scaling: &Scaling, is_first: bool) -> Self {

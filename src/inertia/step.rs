@@ -22,7 +22,7 @@ use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS, rank_of};
 use super::matrices::{Matrices, of_axes};
 use super::motion_pass::{LatticeMotion, PassTotals, RoughDamping, rotation_table};
 use super::nodal_sums;
-use super::node::half_damping;
+use super::node::{Scaling, half_damping};
 use super::parts::NodeParts;
 use super::pass_input::{PassInput, ResidualFactors};
 use super::refresh::{Refresh, RefreshInput};
@@ -88,8 +88,8 @@ impl<'a, 'w> LargeView<'a, 'w> {
 /// A step that is being computed, with its results.
 pub(super) struct InertiaStep<'a, 'w, T> {
     threads: &'a T,
-    step: &'a Step,
-    model: &'a mut LargeModel<'w>,
+    pub(super) step: &'a Step,
+    pub(super) model: &'a mut LargeModel<'w>,
     pub(super) storage: Storage<'a>,
     held_back: HeldBack,
     rough: RoughMotion,
@@ -99,6 +99,8 @@ pub(super) struct InertiaStep<'a, 'w, T> {
     damping: f32,
     /// Change of the lattice's shape by the last increment.
     change: f32,
+    /// The shares of `S^-1` and `G^-1` in this step, if the lattice is in use.
+    pub(super) response: Option<[f32; 2]>,
 }
 
 impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
@@ -119,6 +121,7 @@ impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
             coarse_share: 1.0,
             damping: 0.0,
             change: 0.0,
+            response: None,
         }
     }
 }
@@ -130,9 +133,14 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
         let forcing = Forcing { scene: *scene, visitor: ScalarBound, displacement, loads, progress };
         let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
         self.model.refresh.update_frames(displacement, progress.steps);
+        trial.add_pushes_before();
         let moved = self.move_lattice(trial);
-        Computed { totals: self.move_nodes(trial, moved), extremes }
+        let mut totals = self.move_nodes(trial, moved);
+        self.meet_instruments(trial, &mut totals);
+        Computed { totals, extremes }
     }
+
+    const MEETS_WITH_PUSHES: bool = true;
 
     fn next_increment(&self, node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector) -> [f32; 4] {
         let Storage { tables, places, .. } = &self.storage;
@@ -269,6 +277,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         self.damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, half_damping(step)));
         // Where bounds have grown beyond their margin they are out of date whatever the lattice does.
         self.change = if growth <= COARSE_GROWTH { change } else { f32::INFINITY };
+        self.response = refresh.lattice_in_use.then_some([share, motion.least_share]);
         self.coarse_share = if refresh.lattice_in_use { share } else { 0.0 };
         Some(MovedLattice {
             has_smooth: smooth.is_some(),
@@ -339,8 +348,8 @@ fn inner(a: &CoarseVectors, b: &CoarseVectors) -> f32 {
 }
 
 /// The motion of the lattice in a step.
-struct CoarseMotion<'a> {
-    lattice: &'a Lattice,
+pub(super) struct CoarseMotion<'a> {
+    pub(super) lattice: &'a Lattice,
     refresh: &'a Refresh,
     /// A damped step uses the second-order operator instead of `S^-1` (`damper.rs`).
     second_order: bool,
@@ -366,6 +375,36 @@ struct MotionResult {
     change: f32,
     /// Work of the supports on the lattice, times `D^2`: kg m^2.
     work: f32,
+}
+
+impl<'a> CoarseMotion<'a> {
+    /// For the response to forces only.
+    pub(super) const fn responding(
+        lattice: &'a Lattice,
+        refresh: &'a Refresh,
+        scaling: &Scaling,
+        least_share: f32,
+    ) -> Self {
+        let (smooth, supports, k) = (None, None, scaling.k);
+        let (second_order, allowed, largest_strain) = (false, 1.0, LARGEST_STRAIN);
+        Self { lattice, refresh, second_order, k, least_share, smooth, supports, allowed, largest_strain }
+    }
+
+    /// `share S^-1 g - least G^-1 g`.
+    pub(super) fn response(
+        &self,
+        matrices: &Matrices<'_>,
+        residual: &CoarseVectors,
+        share: f32,
+    ) -> CoarseVectors {
+        let (forces, mut answer) = (self.in_frames(residual), [0.0; _]);
+        self.times(matrices.coarse_inverse, &forces, &mut answer);
+        let mut moved = self.in_world(&answer);
+        for (moved, fine) in moved.iter_mut().zip(&self.fine(matrices, &forces)) {
+            moved.0 = (share * Vec4::from(moved.0) - self.least_share * Vec4::from(fine.0)).to_array();
+        }
+        moved
+    }
 }
 
 impl CoarseMotion<'_> {

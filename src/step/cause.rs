@@ -39,7 +39,8 @@ pub enum Cause {
         /// The most that it may, m.
         most: f32,
     },
-    /// The loads have instruments, which these steps cannot meet. Exact steps can.
+    /// The loads have instruments, which learned steps cannot meet, and others beyond the critical one only with room for pushes
+    /// ([`StateView::pushing`](crate::state::StateView::pushing)).
     NoContact,
     /// Supports moved the node through most of the tissue around it in a step.
     Motion {
@@ -81,7 +82,7 @@ impl fmt::Display for Divergence {
             ),
             Cause::NoContact => write!(
                 f,
-                "stopped at {time:.6} s: the loads have instruments, which only exact steps can meet"
+                "stopped at {time:.6} s: the loads have instruments, which this step cannot meet, or has no room for their pushes"
             ),
             Cause::Motion { metre, size } => write!(
                 f,
@@ -127,7 +128,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
     }
 
     /// Edge of a cube of the node's own tissue, m.
-    pub(super) fn size_at(&self, node: usize) -> f32 {
+    pub(crate) fn size_at(&self, node: usize) -> f32 {
         libm::cbrtf(self.scene.node_mass(node) / self.density())
     }
 

@@ -46,6 +46,9 @@ pub(crate) struct Trial<'a, M> {
     pub(crate) progress: &'a mut Progress,
     /// What the instruments feel, as far as the host wants to know.
     pub(crate) touches: &'a mut [Touch],
+    /// Pushes of the instruments, see [`StateView`], and how many nodes touch one in this step.
+    pub(crate) pushes: &'a mut [NodeVector],
+    pub(crate) touched: usize,
     /// The node and the instrument that the step must not be taken with.
     pub(crate) refused: Option<(u32, Cause)>,
 }
@@ -75,6 +78,9 @@ pub(crate) trait StepMethod<M> {
 
     /// Whether instruments can touch the tissue in these steps.
     const MEETS_INSTRUMENTS: bool = false;
+
+    /// Whether they can if the state has room for pushes.
+    const MEETS_WITH_PUSHES: bool = false;
 
     /// Inertia that the method has added, as a multiple of the mass.
     fn added_inertia(&self) -> f32 {
@@ -108,7 +114,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     ) -> Result<Self, Status> {
         Self::check(scene, loads, &state, room)?;
         let nodes = scene.node_count();
-        let StateView { displacement, increment, force, volume, progress, touches } = state;
+        let StateView { displacement, increment, force, volume, progress, touches, pushes } = state;
         Ok(Self {
             scene,
             loads,
@@ -118,6 +124,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             volume: volume.get_mut(..nodes).unwrap_or_default(),
             progress,
             touches,
+            pushes,
+            touched: 0,
             refused: None,
         })
     }
@@ -138,7 +146,10 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
 
     /// Takes the step, or refuses it.
     pub(crate) fn take<C: StepMethod<M>>(mut self, step: &Step, method: &mut C) -> Status {
-        if !C::MEETS_INSTRUMENTS && self.loads.contact().is_some() {
+        if !C::MEETS_INSTRUMENTS
+            && self.loads.contact().is_some()
+            && !(C::MEETS_WITH_PUSHES && self.has_room_for_pushes())
+        {
             let time = self.progress.time;
             return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoContact });
         }
@@ -158,6 +169,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         self.progress.energy_balance = self.measured(balance, method);
         self.progress.extremes = extremes;
         method.advance(&mut self);
+        self.accept_pushes();
         self.progress.dt = step.seconds();
         self.progress.time += f64::from(step.seconds());
         self.progress.steps += 1;

@@ -2,5 +2,6 @@
 //! would move like this.
 
 mod closed_forms;
+mod long_steps;
 mod scene;
 mod touching;

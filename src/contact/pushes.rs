@@ -1,0 +1,128 @@
+//! Pushes of instruments on many nodes that move each other, as in steps with a lattice. With the compliance `B` (m/N, symmetric and
+//! positive), the pushes `p` (N), and where the nodes would be relative to the instruments without a change of them, `r` (m):
+//!
+//! ```text
+//! minimise 1/2 dp^T B dp + r^T dp    with  p_n >= 0,  |p_t| <= mu p_n
+//! ```
+//! by accelerated projected gradients (Mazhar et al. 2015) from the pushes of the step before, a fixed number of times. Each node has a
+//! scale, the inverse root of its own compliance, so that light and heavy nodes converge alike. The cone of friction is taken at the
+//! present `p_n`, so that a node that slips is not lifted.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// Iterations, and those that estimate the largest eigenvalue before.
+const ITERATIONS: usize = 8;
+const POWER_ITERATIONS: usize = 3;
+/// The estimate is from below.
+const SAFETY: f32 = 1.15;
+
+/// A node that may touch an instrument in this step.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct TouchedNode {
+    /// Force of the instrument, N.
+    pub(crate) push: [f32; 3],
+    /// Its place in the surface.
+    pub(crate) place: u32,
+    pub(crate) normal: [f32; 3],
+    /// Distance without a change of the pushes, m.
+    pub(crate) gap: f32,
+    /// Position relative to where it should be: distance along the normal, slip across, m.
+    pub(crate) relative: [f32; 3],
+    /// Square root of an inverse compliance, (N/m)^(1/2).
+    pub(crate) scale: f32,
+    /// The vector that the compliance is applied to, N; later the motion, m.
+    pub(crate) vector: [f32; 3],
+    pub(crate) instrument: u32,
+    /// The scaled push of the iteration, and that with momentum.
+    pub(crate) last: [f32; 3],
+    pub(crate) friction: f32,
+    pub(crate) ahead: [f32; 3],
+    pub(crate) node: u32,
+    /// The push of the step before, N.
+    pub(crate) before: [f32; 3],
+    pub(crate) spare: f32,
+}
+
+/// How nodes move by pushes.
+pub(crate) trait Compliance {
+    /// Replaces the vector of each node (N) by its motion (m).
+    fn apply(&mut self, nodes: &mut [TouchedNode]);
+}
+
+impl TouchedNode {
+    /// The nearest push that an instrument can exert, N.
+    fn projected(&self, push: Vec3) -> Vec3 {
+        let normal = Vec3::from_array(self.normal);
+        let pressing = push.dot(normal);
+        if pressing.is_nan() || pressing <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let along = push - pressing * normal;
+        let (length, most) = (along.length(), self.friction * pressing);
+        pressing * normal + if length > most { along * (most / length) } else { along }
+    }
+}
+
+/// Solves for the pushes.
+pub(crate) fn solve(nodes: &mut [TouchedNode], compliance: &mut impl Compliance) {
+    let mut largest = 0.0;
+    for node in &mut *nodes {
+        node.last = Vec3::from_array(node.normal).to_array();
+    }
+    for _ in 0..POWER_ITERATIONS {
+        let mut square = 0.0;
+        for node in &mut *nodes {
+            square += Vec3::from_array(node.last).length_squared();
+            node.vector = (Vec3::from_array(node.last) * node.scale).to_array();
+        }
+        compliance.apply(nodes);
+        let mut image = 0.0;
+        for node in &mut *nodes {
+            let moved = Vec3::from_array(node.vector) * node.scale;
+            image += moved.length_squared();
+            node.last = moved.to_array();
+        }
+        let growth = libm::sqrtf(image / square);
+        if !growth.is_finite() || growth <= 0.0 {
+            return;
+        }
+        largest = growth.max(largest);
+        let inverse = 1.0 / libm::sqrtf(image);
+        for node in &mut *nodes {
+            node.last = (Vec3::from_array(node.last) * inverse).to_array();
+        }
+    }
+    let rate = 1.0 / (SAFETY * largest);
+    for node in &mut *nodes {
+        node.ahead = node.push;
+    }
+    let mut theta = 1.0f32;
+    for _ in 0..ITERATIONS {
+        for node in &mut *nodes {
+            node.vector = (Vec3::from_array(node.ahead) - Vec3::from_array(node.before)).to_array();
+        }
+        compliance.apply(nodes);
+        let next = 0.5 * theta * (libm::sqrtf(theta * theta + 4.0) - theta);
+        let momentum = theta * (1.0 - theta) / (theta * theta + next);
+        let mut uphill = 0.0;
+        for node in &mut *nodes {
+            let slope = Vec3::from_array(node.vector) + Vec3::from_array(node.relative);
+            let ahead = Vec3::from_array(node.ahead);
+            let push = node.projected(ahead - slope * (rate * node.scale * node.scale));
+            let change = push - Vec3::from_array(node.push);
+            uphill += slope.dot(change);
+            node.push = push.to_array();
+            node.ahead = (push + momentum * change).to_array();
+        }
+        // Momentum that leads uphill begins anew (O'Donoghue & Candes 2015).
+        theta = next;
+        if uphill > 0.0 {
+            theta = 1.0;
+            for node in &mut *nodes {
+                node.ahead = node.push;
+            }
+        }
+    }
+}

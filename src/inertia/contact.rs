@@ -1,0 +1,172 @@
+//! Instruments in mass-scaled, multilevel and damped steps. A push on a node moves it by its own inertia, and all nodes by the
+//! lattice's: `B = D^2 (M^-1 + W (S^-1 - G^-1) W^T)` with the inertia and the shares of this step (`super`). The pushes of the step before
+//! act as forces from the start, so a push that stays the same moves the lattice as any other force does; what remains to be found is
+//! their change ([`crate::contact::solve`]). The pushes are forces on the tissue and contain no inertia that the step adds.
+
+use glam::Vec3;
+
+use super::cells::prolong;
+use super::large_step::Storage;
+use super::lattice::LatticeNode;
+use super::lattice::{CoarseVectors, MAX_FUNCTIONS, node_place, rank_of};
+use super::matrices::Matrices;
+use super::motion_pass::{RotationTable, rotation_table};
+use super::node_tables::NodeTables;
+use super::pass_input::ResidualFactors;
+use super::step::{CoarseMotion, InertiaStep};
+use crate::contact::{Compliance, TouchedNode, solve};
+use crate::element::{ElementMaterial, NodeInertia};
+use crate::padding;
+use crate::simd::NodeVector;
+use crate::step::{Totals, Trial};
+
+/// `B` of a step.
+struct StepCompliance<'a, 'm> {
+    tables: &'a NodeTables<'m>,
+    places: &'a [LatticeNode],
+    inertia: &'a [NodeInertia],
+    rotations: &'a RotationTable,
+    /// `D^2` for forces, s^2.
+    square: f32,
+    lattice: Option<(CoarseMotion<'a>, &'a Matrices<'m>, f32)>,
+}
+
+impl StepCompliance<'_, '_> {
+    /// Ones along the free axes of a node.
+    fn free(&self, node: usize) -> Vec3 {
+        self.inertia.get(node).map_or(Vec3::ZERO, |inertia| inertia.free().truncate())
+    }
+
+    /// The motion of a node by its own inertia, m.
+    fn own(&self, node: usize, force: Vec3) -> Vec3 {
+        let (rank, free) = (rank_of(self.places, node), self.free(node));
+        let row = |table: &[NodeVector]| row(table, rank);
+        let frame = padding::frame_of(row(self.tables.next_increment)[3]);
+        let rotation = self.rotations[frame.min(MAX_FUNCTIONS)].map(|[x, y, z, _]| Vec3::new(x, y, z));
+        let [x, y, z] = rotation;
+        let residual = free * force * self.square;
+        let turned = x * residual.x + y * residual.y + z * residual.z;
+        let [xx, yy, zz, _] = row(self.tables.inverse_diagonal);
+        let [xy, yz, zx, share] = row(self.tables.inverse_off_diagonal);
+        let moved = Vec3::new(
+            turned.dot(Vec3::new(xx, xy, zx)),
+            turned.dot(Vec3::new(xy, yy, yz)),
+            turned.dot(Vec3::new(zx, yz, zz)),
+        );
+        free * share * Vec3::new(x.dot(moved), y.dot(moved), z.dot(moved))
+    }
+
+    /// The motion of the lattice by the vectors of the nodes. None without one.
+    fn coarse(&self, nodes: &[TouchedNode]) -> Option<CoarseVectors> {
+        let (motion, matrices, share) = self.lattice.as_ref()?;
+        let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+        for touched in nodes {
+            let node = touched.node as usize;
+            let residual = self.free(node) * Vec3::from_array(touched.vector) * self.square;
+            let Some(place) = node_place(self.places, node) else { continue };
+            for (function, weight) in motion.lattice.weights(place) {
+                if let Some(NodeVector([x, y, z, _])) = sums.get_mut(function) {
+                    *x += weight * residual.x;
+                    *y += weight * residual.y;
+                    *z += weight * residual.z;
+                }
+            }
+        }
+        Some(motion.response(matrices, &sums, *share))
+    }
+
+    /// The lattice's motion at a node, m.
+    fn at(&self, node: usize, moved: &CoarseVectors) -> Vec3 {
+        let (Some((motion, ..)), Some(place)) = (&self.lattice, node_place(self.places, node)) else {
+            return Vec3::ZERO;
+        };
+        let mut at = Vec3::ZERO;
+        for (function, weight) in
+            motion.lattice.weights(place).into_iter().filter(|each| each.0 < MAX_FUNCTIONS)
+        {
+            let vector = moved.get(function).copied().unwrap_or_default().to_array();
+            at += weight * Vec3::from_array(vector);
+        }
+        self.free(node) * at
+    }
+}
+
+impl Compliance for StepCompliance<'_, '_> {
+    fn apply(&mut self, nodes: &mut [TouchedNode]) {
+        let moved = self.coarse(nodes);
+        for touched in nodes {
+            let node = touched.node as usize;
+            let mut motion = self.own(node, Vec3::from_array(touched.vector));
+            if let Some(moved) = &moved {
+                motion += self.at(node, moved);
+            }
+            touched.vector = motion.to_array();
+        }
+    }
+}
+
+impl<T> InertiaStep<'_, '_, T> {
+    /// Finds the pushes of this step, and what they change: forces, next increments and the sums over the nodes.
+    #[inline(never)]
+    pub(super) fn meet_instruments<M: ElementMaterial>(
+        &mut self,
+        trial: &mut Trial<'_, M>,
+        totals: &mut Totals,
+    ) {
+        let Some(contact) = trial.loads.contact() else { return };
+        let Self { step, model, storage: Storage { tables, places, matrices, .. }, response, .. } = self;
+        trial.find_touched(contact, step, |node| row(tables.next_increment, rank_of(places, node)));
+        let inertia = trial.scene.inertia;
+        let rotations = &rotation_table(&model.refresh.frames.of_bounds, model.refresh.frames.functions());
+        let square = ResidualFactors::new(step, &model.scaling, trial.progress.steps == 0).square();
+        let lattice = response.map(|[share, least]| {
+            (
+                CoarseMotion::responding(&model.lattice, &model.refresh, &model.scaling, least),
+                &*matrices,
+                share,
+            )
+        });
+        let mut compliance = StepCompliance { tables, places, inertia, rotations, square, lattice };
+        let touched = trial.touched_nodes();
+        for each in &mut *touched {
+            each.vector = each.normal;
+            let one = core::slice::from_mut(each);
+            compliance.apply(one);
+            let own = Vec3::from_array(each.vector).length();
+            each.scale = if own > 0.0 { 1.0 / libm::sqrtf(own) } else { 0.0 };
+        }
+        solve(touched, &mut compliance);
+        for each in &mut *touched {
+            each.vector = (Vec3::from_array(each.push) - Vec3::from_array(each.before)).to_array();
+        }
+        let moved = compliance.coarse(touched);
+        for each in &mut *touched {
+            each.last = compliance.own(each.node as usize, Vec3::from_array(each.vector)).to_array();
+        }
+        if let Some(moved) = moved.filter(|_| !touched.is_empty()) {
+            prolong(&moved, &model.lattice, matrices.cells);
+            for place in &**places {
+                let (Some(next), Some(cell)) = (
+                    tables.next_increment.get_mut(rank_of(places, place.node())),
+                    matrices.cells.get(place.cell()),
+                ) else {
+                    continue;
+                };
+                let moved = cell.at::<f32>(place.within());
+                trial.move_next(place.node(), step, moved, [0.0; 3], &mut next.0, totals);
+            }
+        }
+        for at in 0..trial.touched {
+            let Some(&each) = trial.touched_nodes().get(at) else { continue };
+            let node = each.node as usize;
+            if let Some(next) = tables.next_increment.get_mut(rank_of(places, node)) {
+                trial.move_next(node, step, each.last, each.vector, &mut next.0, totals);
+            }
+        }
+        trial.report_touches(contact, step, totals, |node| row(tables.next_increment, rank_of(places, node)));
+    }
+}
+
+fn row(table: &[NodeVector], rank: usize) -> [f32; 4] {
+    table.get(rank).copied().unwrap_or_default().0
+}
