@@ -136,7 +136,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
         trial.add_pushes_before();
         let moved = self.move_lattice(trial);
         let mut totals = self.move_nodes(trial, moved);
-        self.meet_instruments(trial, &mut totals);
+        // Without instruments not even its stack is used.
+        if trial.loads.contact().is_some() {
+            self.meet_instruments(trial, &mut totals);
+        }
         Computed { totals, extremes }
     }
 
