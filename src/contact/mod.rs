@@ -54,7 +54,6 @@ mod shape;
 mod surface;
 
 pub use instrument::Instrument;
-pub(crate) use pose::Placement;
 pub use pose::Pose;
 pub(crate) use pushes::{Compliance, TouchedNode, solve};
 pub use shape::Shape;
@@ -65,6 +64,9 @@ pub use surface::{Surface, SurfaceNode};
 use core::fmt;
 
 use glam::Vec3;
+
+use crate::simd::NodeVector;
+use pose::Placement;
 
 /// Instruments and the surface that they can touch, checked.
 #[derive(Clone, Copy, Debug)]
@@ -102,7 +104,7 @@ pub const fn vectors_to_push(nodes: usize) -> usize {
     nodes.saturating_mul(1 + VECTORS_OF_TOUCHED)
 }
 
-pub(crate) const VECTORS_OF_TOUCHED: usize = size_of::<TouchedNode>() / 16;
+pub(crate) const VECTORS_OF_TOUCHED: usize = size_of::<TouchedNode>() / size_of::<NodeVector>();
 
 /// What an instrument feels in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -123,9 +125,6 @@ pub struct Touch {
 }
 
 impl Touch {
-    pub(crate) const NONE: Self =
-        Self { force: [0.0; 3], moment: [0.0; 3], contacts: 0, depth: 0.0, work: 0.0, friction_loss: 0.0 };
-
     /// Adds the push (N) on a node at `arm` (m) from the instrument's position, with how far it and the instrument there move, m.
     pub(crate) fn add(&mut self, push: Vec3, arm: Vec3, depth: f32, [node, instrument]: [Vec3; 2]) {
         self.force = (Vec3::from_array(self.force) - push).to_array();
@@ -140,13 +139,13 @@ impl Touch {
 /// An instrument in a step: placed where it starts and where it ends.
 pub(crate) struct Placed<'a> {
     pub(crate) instrument: &'a Instrument,
-    pub(crate) start: Placement,
-    pub(crate) end: Placement,
+    start: Placement,
+    end: Placement,
 }
 
-/// A node in the way of an instrument.
+/// A node in the way of an instrument, or near it.
 pub(crate) struct Meeting {
-    /// Distance at the end of the step, m, below zero.
+    /// Distance at the end of the step, m, below zero inside.
     pub(crate) gap: f32,
     pub(crate) normal: Vec3,
     /// The position from the instrument's, m.

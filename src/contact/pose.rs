@@ -36,7 +36,7 @@ impl Pose {
 
 /// A pose as the step uses it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Placement {
+pub(super) struct Placement {
     pub(super) position: Vec3,
     pub(super) rotation: Quat,
 }

@@ -42,6 +42,7 @@ pub(crate) struct TouchedNode {
     pub(crate) node: u32,
     /// The push of the step before, N.
     pub(crate) before: [f32; 3],
+    /// Fills the vector.
     pub(crate) spare: f32,
 }
 

@@ -116,6 +116,10 @@ impl<T> InertiaStep<'_, '_, T> {
         let Some(contact) = trial.loads.contact() else { return };
         let Self { step, model, storage: Storage { tables, places, matrices, .. }, response, .. } = self;
         trial.find_touched(contact, step, |node| row(tables.next_increment, rank_of(places, node)));
+        if trial.touched == 0 {
+            trial.report_touches(contact, step, totals, |_| [0.0; 4]);
+            return;
+        }
         let inertia = trial.scene.inertia;
         let rotations = &rotation_table(&model.refresh.frames.of_bounds, model.refresh.frames.functions());
         let square = ResidualFactors::new(step, &model.scaling, trial.progress.steps == 0).square();
@@ -143,7 +147,7 @@ impl<T> InertiaStep<'_, '_, T> {
         for each in &mut *touched {
             each.last = compliance.own(each.node as usize, Vec3::from_array(each.vector)).to_array();
         }
-        if let Some(moved) = moved.filter(|_| !touched.is_empty()) {
+        if let Some(moved) = moved {
             prolong(&moved, &model.lattice, matrices.cells);
             for place in &**places {
                 let (Some(next), Some(cell)) = (

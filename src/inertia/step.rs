@@ -143,8 +143,6 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
         Computed { totals, extremes }
     }
 
-    const MEETS_WITH_PUSHES: bool = true;
-
     fn next_increment(&self, node: usize, _: &NodeInertia, _: &NodeVector, _: &NodeVector) -> [f32; 4] {
         let Storage { tables, places, .. } = &self.storage;
         let [x, y, z, _] = tables.next_increment.get(rank_of(places, node)).copied().unwrap_or_default().0;
@@ -153,6 +151,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
 
     fn added_inertia(&self) -> f32 {
         self.model.refresh.added.mean()
+    }
+
+    fn meets_instruments(&self, trial: &Trial<'_, M>) -> bool {
+        trial.has_room_for_pushes()
     }
 
     fn refuse(&mut self) {

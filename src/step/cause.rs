@@ -51,8 +51,8 @@ pub enum Cause {
     },
 }
 
-/// Share of a node's own tissue by which a support may move it in a step before that is a cause.
-const MOST_OF_SIZE: f32 = 0.5;
+/// Share of a node's own tissue by which a support or an instrument may move it in a step before that is a cause.
+pub(super) const MOST_OF_SIZE: f32 = 0.5;
 
 impl fmt::Display for Divergence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -128,7 +128,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
     }
 
     /// Edge of a cube of the node's own tissue, m.
-    pub(crate) fn size_at(&self, node: usize) -> f32 {
+    pub(super) fn size_at(&self, node: usize) -> f32 {
         libm::cbrtf(self.scene.node_mass(node) / self.density())
     }
 

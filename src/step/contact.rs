@@ -4,13 +4,11 @@
 use bytemuck::must_cast_slice_mut;
 use glam::Vec3;
 
+use super::cause::MOST_OF_SIZE;
 use super::{Cause, Step, StepMethod, Totals, Trial};
 use crate::contact::{Contact, Meeting, Placed, Touch, TouchedNode, VECTORS_OF_TOUCHED, vectors_to_push};
 use crate::element::{ElementMaterial, NodeInertia};
 use crate::simd::NodeVector;
-
-/// Share of a node's own tissue by which an instrument may move it in a step.
-pub(crate) const MOST_OF_SIZE: f32 = 0.5;
 
 /// A node in the way of an instrument, with all that moves it.
 struct Met {
@@ -27,21 +25,16 @@ impl<M: ElementMaterial> Trial<'_, M> {
     /// refused if an instrument is too fast, or so far inside the body that it would throw a node.
     pub(crate) fn meet_instruments(&mut self, step: &Step, method: &impl StepMethod<M>, totals: &mut Totals) {
         let Some(contact) = self.loads.contact() else { return };
-        self.touches.fill(Touch::NONE);
+        self.touches.fill(Touch::default());
+        if self.refuses_speed(contact, step) {
+            return;
+        }
         for (index, placed) in self.placed(contact, step).enumerate() {
-            let mut touch = Touch::NONE;
-            let refusal = |[metre, most]: [f32; 2]| Cause::Instrument { index, metre, most };
-            if let Some(lengths) = placed.too_fast() {
-                let node = contact.surface().nodes().first().map_or(0, |entry| entry.node);
-                self.refused.get_or_insert((node, refusal(lengths)));
-                return;
-            }
+            let mut touch = Touch::default();
             let friction = placed.instrument.friction;
             for entry in contact.surface().nodes() {
                 let Some(met) = self.met(entry.node as usize, entry.rest, &placed, method) else { continue };
-                let (metre, most) = (-met.meeting.gap, MOST_OF_SIZE * self.size_at(met.node));
-                if metre > most {
-                    self.refused.get_or_insert((entry.node, refusal([metre, most])));
+                if self.refuses_depth(index, entry.node, -met.meeting.gap) {
                     return;
                 }
                 let push = met.push(step, friction);
@@ -54,8 +47,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 }
                 let next = method.next_increment(met.node, &met.inertia, &met.increment, &force);
                 totals.change(step, &met.inertia, &met.increment, [&met.force, &force], [&met.next, &next]);
-                let ways = [next, met.increment.0].map(|[x, y, z, _]| Vec3::new(x, y, z));
-                let way = 0.5 * (ways[0] + ways[1]);
+                let way = mean(next, met.increment.0);
                 totals.add_work(push.dot(way));
                 touch.add(push, met.meeting.arm, -met.meeting.gap, [way, met.meeting.carried]);
             }
@@ -66,7 +58,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
     }
 
     /// Whether the state has room for pushes.
-    pub(super) fn has_room_for_pushes(&self) -> bool {
+    pub(crate) fn has_room_for_pushes(&self) -> bool {
         let nodes = self.loads.contact().map_or(0, |contact| contact.surface().nodes().len());
         self.pushes.len() >= vectors_to_push(nodes)
     }
@@ -110,6 +102,9 @@ impl<M: ElementMaterial> Trial<'_, M> {
             farthest = farthest.max(x.abs()).max(y.abs()).max(z.abs());
         }
         self.touched = 0;
+        if self.refuses_speed(contact, step) {
+            return;
+        }
         for (place, entry) in surface.iter().enumerate() {
             let node = entry.node as usize;
             let (Some(displacement), Some(inertia)) =
@@ -120,9 +115,8 @@ impl<M: ElementMaterial> Trial<'_, M> {
             if inertia.inverse.iter().all(|&inverse| inverse <= 0.0) {
                 continue;
             }
-            let (displacement, next) = (displacement.0, next(node));
-            let point = [0, 1, 2].map(|axis| entry.rest[axis] + (displacement[axis] + next[axis]));
-            let [x, y, z, _] = next;
+            let next = next(node);
+            let point = predicted(entry.rest, displacement, next);
             let before = self.split_pushes().0.get(place).copied().unwrap_or_default().to_array();
             let mut found = TouchedNode {
                 place: place as u32,
@@ -133,12 +127,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             };
             let mut nearest: Option<(usize, Meeting)> = None;
             for (index, placed) in self.placed(contact, step).enumerate() {
-                if let Some(lengths) = placed.too_fast() {
-                    let [metre, most] = lengths;
-                    self.refused.get_or_insert((entry.node, Cause::Instrument { index, metre, most }));
-                    return;
-                }
-                let meeting = placed.meet(Vec3::from_array(point), 2.0 * farthest);
+                let meeting = placed.meet(point, 2.0 * farthest);
                 if let Some(meeting) = meeting.filter(|m| nearest.as_ref().is_none_or(|(_, n)| m.gap < n.gap))
                 {
                     found.friction = placed.instrument.friction;
@@ -147,12 +136,11 @@ impl<M: ElementMaterial> Trial<'_, M> {
             }
             match nearest {
                 Some((index, meeting)) => {
-                    let (metre, most) = (-meeting.gap, MOST_OF_SIZE * self.size_at(node));
-                    if metre > most {
-                        self.refused.get_or_insert((entry.node, Cause::Instrument { index, metre, most }));
+                    if self.refuses_depth(index, entry.node, -meeting.gap) {
+                        self.touched = 0;
                         return;
                     }
-                    let slip = Vec3::new(x, y, z) - meeting.carried;
+                    let slip = axes(next) - meeting.carried;
                     let across = slip - slip.dot(meeting.normal) * meeting.normal;
                     found.relative = (meeting.gap * meeting.normal + across).to_array();
                     (found.normal, found.gap) = (meeting.normal.to_array(), meeting.gap);
@@ -204,7 +192,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         totals: &mut Totals,
         next: impl Fn(usize) -> [f32; 4],
     ) {
-        self.touches.fill(Touch::NONE);
+        self.touches.fill(Touch::default());
         for at in 0..self.touched {
             let Some(&each) = self.touched_nodes().get(at) else { continue };
             let (index, node, push) =
@@ -212,17 +200,13 @@ impl<M: ElementMaterial> Trial<'_, M> {
             if push == Vec3::ZERO {
                 continue;
             }
-            let ways = [next(node), self.increment.get(node).copied().unwrap_or_default().0];
-            let [way, last] = ways.map(|[x, y, z, _]| Vec3::new(x, y, z));
-            let way = 0.5 * (way + last);
+            let way = mean(next(node), self.increment.get(node).copied().unwrap_or_default().0);
             totals.add_work(push.dot(way));
             let Some(placed) = self.placed(contact, step).nth(index) else { continue };
             let rest =
                 contact.surface().nodes().get(each.place as usize).map_or([0.0; 3], |entry| entry.rest);
-            let here = self.displacement.get(node).copied().unwrap_or_default().to_array();
-            let point = Vec3::from_array(rest)
-                + (Vec3::from_array(here)
-                    + Vec3::from_array(next(node).first_chunk().copied().unwrap_or_default()));
+            let here = self.displacement.get(node).copied().unwrap_or_default();
+            let point = predicted(rest, &here, next(node));
             if let Some(touch) = self.touches.get_mut(index) {
                 touch.add(push, placed.arm(point), -each.gap, [way, placed.carried(point)]);
             }
@@ -242,7 +226,28 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
     }
 
-    pub(crate) fn placed<'c>(
+    /// Refuses the step if an instrument moves too far in it.
+    fn refuses_speed(&mut self, contact: &Contact<'_>, step: &Step) -> bool {
+        for (index, placed) in self.placed(contact, step).enumerate() {
+            if let Some([metre, most]) = placed.too_fast() {
+                let node = contact.surface().nodes().first().map_or(0, |entry| entry.node);
+                self.refused.get_or_insert((node, Cause::Instrument { index, metre, most }));
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Refuses the step if a node is so far inside an instrument (m) that it would be thrown.
+    fn refuses_depth(&mut self, index: usize, node: u32, metre: f32) -> bool {
+        let most = MOST_OF_SIZE * self.size_at(node as usize);
+        if metre > most {
+            self.refused.get_or_insert((node, Cause::Instrument { index, metre, most }));
+        }
+        metre > most
+    }
+
+    fn placed<'c>(
         &self,
         contact: &Contact<'c>,
         step: &Step,
@@ -262,9 +267,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let inertia = *self.scene.inertia.get(node)?;
         let [increment, force] = [*self.increment.get(node)?, *self.force.get(node)?];
         let next = method.next_increment(node, &inertia, &increment, &force);
-        let displacement = self.displacement.get(node)?.0;
-        let point = [0, 1, 2].map(|axis| rest[axis] + (displacement[axis] + next[axis]));
-        let meeting = placed.meet(Vec3::from_array(point), 0.0)?;
+        let meeting = placed.meet(predicted(rest, self.displacement.get(node)?, next), 0.0)?;
         let is_free = inertia.inverse.iter().any(|&inverse| inverse > 0.0);
         is_free.then_some(Met { node, inertia, increment, force, next, meeting })
     }
@@ -282,11 +285,24 @@ impl Met {
             return Vec3::ZERO;
         }
         let out = -meeting.gap / square;
-        let [x, y, z, _] = *next;
-        let slip = free * (Vec3::new(x, y, z) - meeting.carried);
+        let slip = free * (axes(*next) - meeting.carried);
         let slip = slip - normal * (slip.dot(normal) / square);
         let (length, most) = (slip.length(), friction * out * libm::sqrtf(square));
         let held = if length > most { most / length } else { 1.0 };
         (out * normal - held * slip) * (inertia.mass / step.push())
     }
+}
+
+fn axes([x, y, z, _]: [f32; 4]) -> Vec3 {
+    Vec3::new(x, y, z)
+}
+
+/// The mean of the increments before and after, m: what pushes do work along.
+fn mean(next: [f32; 4], last: [f32; 4]) -> Vec3 {
+    0.5 * (axes(next) + axes(last))
+}
+
+/// Where a node will be at the end of the step, m.
+fn predicted(rest: [f32; 3], displacement: &NodeVector, next: [f32; 4]) -> Vec3 {
+    Vec3::from_array(rest) + (axes(displacement.0) + axes(next))
 }

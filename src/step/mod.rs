@@ -76,12 +76,6 @@ pub(crate) trait StepMethod<M> {
     /// The steps in which the strain energy of all elements is computed once: of a long step it may take more time.
     const ENERGY_CYCLE: usize = 256;
 
-    /// Whether instruments can touch the tissue in these steps.
-    const MEETS_INSTRUMENTS: bool = false;
-
-    /// Whether they can if the state has room for pushes.
-    const MEETS_WITH_PUSHES: bool = false;
-
     /// Inertia that the method has added, as a multiple of the mass.
     fn added_inertia(&self) -> f32 {
         0.0
@@ -90,6 +84,11 @@ pub(crate) trait StepMethod<M> {
     /// The node and the load that this step must not be taken with.
     fn refused_load(&self, _trial: &Trial<'_, M>) -> Option<(u32, Cause)> {
         None
+    }
+
+    /// Whether instruments can touch the tissue in this step.
+    fn meets_instruments(&self, _trial: &Trial<'_, M>) -> bool {
+        false
     }
 
     /// Takes back what the method has noted for itself: the step is refused.
@@ -145,11 +144,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     }
 
     /// Takes the step, or refuses it.
-    pub(crate) fn take<C: StepMethod<M>>(mut self, step: &Step, method: &mut C) -> Status {
-        if !C::MEETS_INSTRUMENTS
-            && self.loads.contact().is_some()
-            && !(C::MEETS_WITH_PUSHES && self.has_room_for_pushes())
-        {
+    pub(crate) fn take(mut self, step: &Step, method: &mut impl StepMethod<M>) -> Status {
+        if self.loads.contact().is_some() && !method.meets_instruments(&self) {
             let time = self.progress.time;
             return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoContact });
         }

@@ -65,7 +65,6 @@ struct Exact<'a, T> {
 
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
     const ENERGY_CYCLE: usize = 2048;
-    const MEETS_INSTRUMENTS: bool = true;
 
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let Trial { scene, loads, displacement, increment, force, volume, progress, .. } = &mut *trial;
@@ -90,6 +89,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
         force: &NodeVector,
     ) -> [f32; 4] {
         next_increment(inertia, increment, force, self.step)
+    }
+
+    fn meets_instruments(&self, _: &Trial<'_, M>) -> bool {
+        true
     }
 
     fn refused_load(&self, trial: &Trial<'_, M>) -> Option<(u32, Cause)> {

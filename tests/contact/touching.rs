@@ -26,7 +26,6 @@ fn the_impulse_of_an_instrument_is_the_change_of_momentum() {
     let (mut touch, mut impulse, mut pushed) = ([Touch::default()], [0.0f64; 3], 0);
     while body.time() < 0.06 {
         assert!(body.step([0.0; 3], &[sphere], &mut touch).is_taken());
-        // In the first step a force acts for the whole step: central differences start at half a step before.
         for (sum, force) in impulse.iter_mut().zip(touch[0].force) {
             *sum -= f64::from(force) * f64::from(body.step.seconds());
         }
