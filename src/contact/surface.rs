@@ -42,20 +42,13 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// The nodes of the boundary of a mesh: those of faces that belong to one element only, in increasing order.
+/// The nodes of the boundary of a mesh ([`crate::mesh::boundary`]), in increasing order.
 #[cfg(any(feature = "std", test))]
 #[must_use]
 pub fn boundary(mesh: &crate::mesh::Mesh<'_>) -> std::vec::Vec<SurfaceNode> {
-    let mut faces = std::collections::BTreeMap::new();
-    for tet in mesh.tets() {
-        for [a, b, c] in [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]] {
-            let mut face = [tet[a], tet[b], tet[c]];
-            face.sort_unstable();
-            *faces.entry(face).or_insert(0) += 1;
-        }
-    }
-    let outer = faces.into_iter().filter(|&(_, count)| count == 1).flat_map(|(face, _)| face);
-    let nodes: std::collections::BTreeSet<u32> = outer.collect();
+    let mut nodes = crate::mesh::boundary(mesh.tets()).into_flattened();
+    nodes.sort_unstable();
+    nodes.dedup();
     let entry = |node| mesh.points().get(node as usize).map(|&rest| SurfaceNode { rest, node });
     nodes.into_iter().filter_map(entry).collect()
 }

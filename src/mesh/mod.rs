@@ -1,10 +1,14 @@
 //! A checked tetrahedral mesh, borrowed from the caller, and the structured bar of the paper. Coordinates are float32,
 //! in metres; they are accurate only if the origin is near the body.
 
+#[cfg(any(feature = "std", test))]
+mod boundary;
 pub(crate) mod partition;
 mod renumbering;
 pub(crate) mod strips;
 
+#[cfg(any(feature = "std", test))]
+pub use boundary::boundary;
 pub use renumbering::renumber;
 
 use core::fmt;

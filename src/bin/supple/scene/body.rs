@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use supple::io::{self, TetMesh};
-use supple::mesh::{Bar, Mesh, MeshError, Winding};
+use supple::mesh::{Bar, Mesh, MeshError, Winding, boundary};
 use toml::Spanned;
 
 use super::file::{MeshTable, SceneFile};
@@ -77,27 +77,7 @@ impl Body {
 
     /// Triangles that belong to one element only.
     pub(crate) fn boundary(&self) -> Vec<[u32; 3]> {
-        const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
-        let mut faces: Vec<([u32; 3], [u32; 3])> = self
-            .mesh
-            .tets
-            .iter()
-            .flat_map(|tet| {
-                FACES.map(|face| {
-                    let face = face.map(|corner| tet[corner]);
-                    let mut key = face;
-                    key.sort_unstable();
-                    (key, face)
-                })
-            })
-            .collect();
-        faces.sort_unstable();
-        let single = |index: usize| {
-            let key = faces[index].0;
-            (index == 0 || faces[index - 1].0 != key)
-                && faces.get(index + 1).is_none_or(|following| following.0 != key)
-        };
-        (0..faces.len()).filter(|&index| single(index)).map(|index| faces[index].1).collect()
+        boundary(self.mesh.tets.iter().copied())
     }
 }
 
