@@ -6,6 +6,7 @@
 use glam::Vec3;
 
 use super::cells::prolong;
+use super::coarse_motion::CoarseSpace;
 use super::large_step::Storage;
 use super::lattice::LatticeNode;
 use super::lattice::{CoarseVectors, MAX_FUNCTIONS, node_place, rank_of};
@@ -13,7 +14,7 @@ use super::matrices::Matrices;
 use super::motion_pass::{RotationTable, rotation_table};
 use super::node_tables::NodeTables;
 use super::pass_input::ResidualFactors;
-use super::step::{CoarseMotion, InertiaStep};
+use super::step::InertiaStep;
 use crate::contact::{Compliance, TouchedNode, solve};
 use crate::element::{ElementMaterial, NodeInertia};
 use crate::padding;
@@ -28,7 +29,8 @@ struct StepCompliance<'a, 'm> {
     rotations: &'a RotationTable,
     /// `D^2` for forces, s^2.
     square: f32,
-    lattice: Option<(CoarseMotion<'a>, &'a Matrices<'m>, f32)>,
+    /// The lattice, its matrices and the shares of `S^-1` and `G^-1`, if it is in use.
+    lattice: Option<(CoarseSpace<'a>, &'a Matrices<'m>, [f32; 2])>,
 }
 
 impl StepCompliance<'_, '_> {
@@ -58,13 +60,13 @@ impl StepCompliance<'_, '_> {
 
     /// The motion of the lattice by the vectors of the nodes. None without one.
     fn coarse(&self, nodes: &[TouchedNode]) -> Option<CoarseVectors> {
-        let (motion, matrices, share) = self.lattice.as_ref()?;
+        let (space, matrices, shares) = self.lattice.as_ref()?;
         let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
         for touched in nodes {
             let node = touched.node as usize;
             let residual = self.free(node) * Vec3::from_array(touched.vector) * self.square;
             let Some(place) = node_place(self.places, node) else { continue };
-            for (function, weight) in motion.lattice.weights(place) {
+            for (function, weight) in space.lattice.weights(place) {
                 if let Some(NodeVector([x, y, z, _])) = sums.get_mut(function) {
                     *x += weight * residual.x;
                     *y += weight * residual.y;
@@ -72,17 +74,17 @@ impl StepCompliance<'_, '_> {
                 }
             }
         }
-        Some(motion.response(matrices, &sums, *share))
+        Some(space.response(matrices, &sums, *shares))
     }
 
     /// The lattice's motion at a node, m.
     fn at(&self, node: usize, moved: &CoarseVectors) -> Vec3 {
-        let (Some((motion, ..)), Some(place)) = (&self.lattice, node_place(self.places, node)) else {
+        let (Some((space, ..)), Some(place)) = (&self.lattice, node_place(self.places, node)) else {
             return Vec3::ZERO;
         };
         let mut at = Vec3::ZERO;
         for (function, weight) in
-            motion.lattice.weights(place).into_iter().filter(|each| each.0 < MAX_FUNCTIONS)
+            space.lattice.weights(place).into_iter().filter(|each| each.0 < MAX_FUNCTIONS)
         {
             let vector = moved.get(function).copied().unwrap_or_default().to_array();
             at += weight * Vec3::from_array(vector);
@@ -123,13 +125,8 @@ impl<T> InertiaStep<'_, '_, T> {
         let inertia = trial.scene.inertia;
         let rotations = &rotation_table(&model.refresh.frames.of_bounds, model.refresh.frames.functions());
         let square = ResidualFactors::new(step, &model.scaling, trial.progress.steps == 0).square();
-        let lattice = response.map(|[share, least]| {
-            (
-                CoarseMotion::responding(&model.lattice, &model.refresh, &model.scaling, least),
-                &*matrices,
-                share,
-            )
-        });
+        let space = CoarseSpace { lattice: &model.lattice, refresh: &model.refresh };
+        let lattice = response.map(|shares| (space, &*matrices, shares));
         let mut compliance = StepCompliance { tables, places, inertia, rotations, square, lattice };
         let touched = trial.touched_nodes();
         for each in &mut *touched {

@@ -84,6 +84,7 @@ mod assembly;
 #[cfg(test)]
 mod assembly_tests;
 mod cells;
+mod coarse_motion;
 mod contact;
 mod damper;
 mod dense;
