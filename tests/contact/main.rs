@@ -1,6 +1,9 @@
 //! Instruments that touch tissue, in exact steps: against closed forms, conservation of momentum, and instruments that nobody sane
 //! would move like this.
 
+#[path = "../support/networks.rs"]
+mod networks;
+
 mod closed_forms;
 mod long_steps;
 mod scene;

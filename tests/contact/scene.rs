@@ -96,3 +96,10 @@ impl Body {
         (sum, all)
     }
 }
+
+/// Size of a vector, and its distance from another as a share of it.
+pub(crate) fn compared(vector: [f64; 3], other: [f64; 3]) -> (f64, f64) {
+    let length = |vector: [f64; 3]| vector.iter().map(|component| component * component).sum::<f64>().sqrt();
+    let size = length(vector);
+    (size, length([0, 1, 2].map(|axis| vector[axis] - other[axis])) / size)
+}
