@@ -131,8 +131,8 @@ impl<'a> StateView<'a> {
         Self { touches, ..self }
     }
 
-    /// The same state with the pushes of instruments on the nodes of the surface, which mass-scaled, multilevel and damped steps go on
-    /// from: [`vectors_to_push`](crate::contact::vectors_to_push) vectors that belong to the state. Zeros: nothing touches yet.
+    /// The same state with [`vectors_to_push`](crate::contact::vectors_to_push) vectors that belong to it, for what instruments do:
+    /// multilevel and damped steps need them, exact ones are faster with them. Zeros: nothing touches yet.
     #[must_use]
     pub fn pushing(self, pushes: &'a mut [NodeVector]) -> Self {
         Self { pushes, ..self }

@@ -4,6 +4,9 @@ use super::ContactError;
 use super::pose::{Placement, Pose};
 use super::shape::Shape;
 
+/// The most instruments that can touch a body at once.
+pub const MOST_INSTRUMENTS: usize = 8;
+
 /// A rigid instrument that moves on a line, and turns evenly, from one pose to another. A host sets both poses and their times
 /// for each frame; before and after these times the instrument stands still.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -40,20 +40,24 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Mass-scaled, multilevel and damped steps solve for the pushes on all nodes together, as these move each other (`pushes.rs`), from those
-//! of the step before.
+//! Multilevel and damped steps solve for the pushes on all nodes together, as these move each other (`pushes.rs`), from those
+//! of the step before. Mass-scaled and learned steps refuse instruments: what they push would be inertia that is not there.
 //!
-//! Work: each step each node of the surface against each instrument. Nodes that supports hold along all axes are passed through.
-//! A node that touches several instruments is moved by one after the other, in long steps by the nearest one. Damping of a few 1/s is what ends the rattling of light
-//! nodes on hard surfaces.
+//! Work: at most each node of the surface against each instrument in each step. A state with room for pushes
+//! ([`StateView::pushing`](crate::state::StateView::pushing)) knows how near each node was, and looks only at those that instruments can
+//! reach (`clearance.rs`). Nodes that supports hold along all axes are passed through. A node that touches several instruments is moved by
+//! one after the other, in long steps by the nearest one. Damping of a few 1/s is what ends the rattling of light nodes on hard surfaces.
 
+mod clearance;
 mod instrument;
 mod pose;
 mod pushes;
 mod shape;
 mod surface;
 
-pub use instrument::Instrument;
+pub use clearance::vectors_to_push;
+pub(crate) use clearance::{ContactMemory, largest_component};
+pub use instrument::{Instrument, MOST_INSTRUMENTS};
 pub use pose::Pose;
 pub(crate) use pushes::{Compliance, TouchedNode, solve};
 pub use shape::Shape;
@@ -78,6 +82,9 @@ pub struct Contact<'a> {
 impl<'a> Contact<'a> {
     /// Checks the instruments.
     pub fn new(surface: Surface<'a>, instruments: &'a [Instrument]) -> Result<Self, ContactError> {
+        if instruments.len() > MOST_INSTRUMENTS {
+            return Err(ContactError::Instruments { instruments: instruments.len() });
+        }
         for (index, instrument) in instruments.iter().enumerate() {
             instrument.check(index)?;
         }
@@ -95,13 +102,16 @@ impl<'a> Contact<'a> {
     pub const fn instruments(&self) -> &'a [Instrument] {
         self.instruments
     }
-}
 
-/// Vectors that mass-scaled, multilevel and damped steps need for a surface of so many nodes, for pushes that they keep
-/// ([`StateView::pushing`](crate::state::StateView::pushing)).
-#[must_use]
-pub const fn vectors_to_push(nodes: usize) -> usize {
-    nodes.saturating_mul(1 + VECTORS_OF_TOUCHED)
+    /// The instruments as they go in a step of so many seconds from `time` on.
+    pub(crate) fn placed(&self, time: f64, seconds: f32) -> heapless::Vec<Placed<'a>, MOST_INSTRUMENTS> {
+        let times = [time, time + f64::from(seconds)];
+        self.instruments
+            .iter()
+            .map(|instrument| Placed::new(instrument, times))
+            .take(MOST_INSTRUMENTS)
+            .collect()
+    }
 }
 
 pub(crate) const VECTORS_OF_TOUCHED: usize = size_of::<TouchedNode>() / size_of::<NodeVector>();
@@ -160,9 +170,14 @@ impl<'a> Placed<'a> {
         Self { instrument, start, end }
     }
 
+    /// How far its centre moves, m.
+    pub(crate) fn way(&self) -> f32 {
+        self.start.position.distance(self.end.position)
+    }
+
     /// The distance that it moves, and the farthest that it may, m, if that is too far.
     pub(crate) fn too_fast(&self) -> Option<[f32; 2]> {
-        let metre = self.start.position.distance(self.end.position);
+        let metre = self.way();
         let most = self.instrument.shape.thickness();
         (metre > most).then_some([metre, most])
     }
@@ -177,10 +192,10 @@ impl<'a> Placed<'a> {
         point - self.end.carried(point, &self.start)
     }
 
-    /// The meeting with a node that would be inside, or less than `margin` (m) away, at `point` (m) at the end of the step.
-    pub(crate) fn meet(&self, point: Vec3, margin: f32) -> Option<Meeting> {
+    /// The meeting with a node that will be at `point` (m) at the end of the step. None if that is not a number.
+    pub(crate) fn meet(&self, point: Vec3) -> Option<Meeting> {
         let (gap, normal) = self.instrument.shape.nearest(self.end.in_shape(point));
-        if gap.is_nan() || gap >= margin {
+        if gap.is_nan() {
             return None;
         }
         let normal = self.end.turned(normal);
@@ -209,6 +224,11 @@ pub enum ContactError {
         /// The node.
         node: u32,
     },
+    /// More instruments than [`MOST_INSTRUMENTS`].
+    Instruments {
+        /// How many.
+        instruments: usize,
+    },
     /// A size, friction or time that cannot be one.
     Instrument {
         /// Its place in the list.
@@ -236,6 +256,9 @@ impl fmt::Display for ContactError {
             }
             Self::Point { place, node } => {
                 write!(f, "entry {place} of the surface: the position of node {node} is not a number")
+            }
+            Self::Instruments { instruments } => {
+                write!(f, "{instruments} instruments: at most {MOST_INSTRUMENTS} can touch a body at once")
             }
             Self::Instrument { instrument, what, value } => {
                 write!(f, "instrument {instrument}: a {what} of {value} cannot be")

@@ -49,7 +49,9 @@ impl Placement {
         let b = if a.dot(b) < 0.0 { -b } else { b };
         // Exact at both ends, where a difference would round.
         let position = start * (1.0 - share) + end * share;
-        Self { position, rotation: (a * (1.0 - share) + b * share).normalize() }
+        // Without rounding where it does not turn.
+        let rotation = if a == b { a } else { (a * (1.0 - share) + b * share).normalize() };
+        Self { position, rotation }
     }
 
     /// A point of the scene in the axes of the shape.

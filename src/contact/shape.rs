@@ -43,6 +43,24 @@ impl Shape {
         }
     }
 
+    /// The largest distance of a point of it from its centre, m.
+    pub(super) fn extent(&self) -> f32 {
+        match *self {
+            Self::Plane => f32::INFINITY,
+            Self::Sphere { radius } => radius,
+            Self::Capsule { radius, length } => radius + 0.5 * length,
+        }
+    }
+
+    /// A number that tells it from other shapes and sizes.
+    pub(super) fn number(&self) -> u32 {
+        match *self {
+            Self::Plane => 1,
+            Self::Sphere { radius } => radius.to_bits(),
+            Self::Capsule { radius, length } => radius.to_bits().rotate_left(7) ^ length.to_bits() ^ 2,
+        }
+    }
+
     /// Distance of a point, m, and the outward normal of the surface that is nearest to it.
     pub(super) fn nearest(&self, point: Vec3) -> (f32, Vec3) {
         match *self {

@@ -4,7 +4,9 @@
 use glam::Vec4;
 
 use super::cells::{prolong, restrict};
-use super::dense::{Row, apply, apply_by_axis, apply_to_two, from_components, stride, to_components};
+use super::dense::{
+    Row, apply, apply_by_axis, apply_functions, apply_to_two, from_components, stride, to_components,
+};
 use super::frames::{Rotation, rotate};
 use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
 use super::matrices::{Matrices, of_axes};
@@ -33,20 +35,26 @@ pub(super) struct CoarseSpace<'a> {
 }
 
 impl CoarseSpace<'_> {
-    /// `share S^-1 g - least G^-1 g`: the motion by further forces, of which `residual` are the sums.
+    /// `share S^-1 g - least G^-1 g`: the motion by further forces, of which `residual` are the sums, zero but for these functions.
     pub(super) fn response(
         &self,
         matrices: &Matrices<'_>,
         residual: &CoarseVectors,
+        functions: &[u8],
         [share, least]: [f32; 2],
     ) -> CoarseVectors {
-        let (forces, mut answer) = (self.in_frames(residual), [0.0; _]);
-        self.times(matrices.coarse_inverse, &forces, &mut answer);
-        let mut moved = self.in_world(&answer);
-        for (moved, fine) in moved.iter_mut().zip(&self.fine(matrices, &forces)) {
-            moved.0 = (share * Vec4::from(moved.0) - least * Vec4::from(fine.0)).to_array();
+        let (forces, mut answer, mut fine) = (self.in_frames(residual), [0.0; _], [0.0; _]);
+        let stride = stride(self.lattice.functions());
+        apply_functions(matrices.coarse_inverse, stride, functions, &forces, &mut answer);
+        if self.refresh.fine_in_use {
+            apply_functions(matrices.fine_inverse, stride, functions, &forces, &mut fine);
+        } else {
+            bound_product(matrices, &forces, &mut fine);
         }
-        moved
+        for (answer, fine) in answer.iter_mut().zip(fine) {
+            *answer = share * *answer - least * fine;
+        }
+        self.in_world(&answer)
     }
 
     /// Components in the frames of the bounds.
@@ -65,10 +73,7 @@ impl CoarseSpace<'_> {
             self.times(matrices.fine_inverse, forces, &mut moved);
             return self.in_world(&moved);
         }
-        let vectors = moved.as_chunks_mut::<3>().0.iter_mut().zip(forces.as_chunks::<3>().0);
-        for ((moved, force), inverse) in vectors.zip(&*matrices.bound_inverse) {
-            *moved = nodal_sums::times(inverse, *force);
-        }
+        bound_product(matrices, forces, &mut moved);
         self.in_world(&moved)
     }
 
@@ -87,6 +92,14 @@ impl CoarseSpace<'_> {
         from_components(self.used(components), &mut vectors);
         rotate(&mut vectors, self.refresh.frames.of_functions(), Rotation::in_world);
         vectors
+    }
+}
+
+/// The product with the inverse of the bound of `G`.
+fn bound_product(matrices: &Matrices<'_>, forces: &Row, moved: &mut Row) {
+    let vectors = moved.as_chunks_mut::<3>().0.iter_mut().zip(forces.as_chunks::<3>().0);
+    for ((moved, force), inverse) in vectors.zip(&*matrices.bound_inverse) {
+        *moved = nodal_sums::times(inverse, *force);
     }
 }
 

@@ -10,16 +10,18 @@ use super::coarse_motion::CoarseSpace;
 use super::large_step::Storage;
 use super::lattice::LatticeNode;
 use super::lattice::{CoarseVectors, MAX_FUNCTIONS, node_place, rank_of};
+use super::local_response::{ListedFunctions, LocalResponse, MOST_LISTED};
 use super::matrices::Matrices;
 use super::motion_pass::{RotationTable, rotation_table};
 use super::node_tables::NodeTables;
-use super::pass_input::ResidualFactors;
+use super::parts::NodeParts;
+use super::pass_input::{PassInput, ResidualFactors};
 use super::step::InertiaStep;
 use crate::contact::{Compliance, TouchedNode, solve};
 use crate::element::{ElementMaterial, NodeInertia};
 use crate::padding;
 use crate::simd::NodeVector;
-use crate::step::{Totals, Trial};
+use crate::step::{Threads, Totals, Trial};
 
 /// `B` of a step.
 struct StepCompliance<'a, 'm> {
@@ -31,6 +33,9 @@ struct StepCompliance<'a, 'm> {
     square: f32,
     /// The lattice, its matrices and the shares of `S^-1` and `G^-1`, if it is in use.
     lattice: Option<(CoarseSpace<'a>, &'a Matrices<'m>, [f32; 2])>,
+    /// The functions that move the nodes, and the answer of the lattice between them, if they are few.
+    listed: ListedFunctions,
+    local: Option<LocalResponse<'a>>,
 }
 
 impl StepCompliance<'_, '_> {
@@ -58,56 +63,73 @@ impl StepCompliance<'_, '_> {
         free * share * Vec3::new(x.dot(moved), y.dot(moved), z.dot(moved))
     }
 
-    /// The motion of the lattice by the vectors of the nodes. None without one.
-    fn coarse(&self, nodes: &[TouchedNode]) -> Option<CoarseVectors> {
-        let (space, matrices, shares) = self.lattice.as_ref()?;
-        let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+    /// Sums over the nodes of their vectors (N), for each function: kg m.
+    fn add_sums(&self, nodes: &[TouchedNode], mut sum: impl FnMut(usize, Vec3)) {
+        let Some((space, ..)) = &self.lattice else { return };
         for touched in nodes {
             let node = touched.node as usize;
             let residual = self.free(node) * Vec3::from_array(touched.vector) * self.square;
             let Some(place) = node_place(self.places, node) else { continue };
             for (function, weight) in space.lattice.weights(place) {
-                if let Some(NodeVector([x, y, z, _])) = sums.get_mut(function) {
-                    *x += weight * residual.x;
-                    *y += weight * residual.y;
-                    *z += weight * residual.z;
-                }
+                sum(function, weight * residual);
             }
         }
-        Some(space.response(matrices, &sums, *shares))
     }
 
-    /// The lattice's motion at a node, m.
-    fn at(&self, node: usize, moved: &CoarseVectors) -> Vec3 {
+    /// The motion of the lattice by the vectors of the nodes. None without one.
+    fn coarse(&self, nodes: &[TouchedNode]) -> Option<CoarseVectors> {
+        let (space, matrices, shares) = self.lattice.as_ref()?;
+        let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+        self.add_sums(nodes, |function, residual| {
+            if let Some(NodeVector([x, y, z, _])) = sums.get_mut(function) {
+                (*x, *y, *z) = (*x + residual.x, *y + residual.y, *z + residual.z);
+            }
+        });
+        Some(space.response(matrices, &sums, self.listed.functions(), *shares))
+    }
+
+    /// The lattice's motion at a node, m, from that of its functions.
+    fn at(&self, node: usize, moved: impl Fn(usize) -> Vec3) -> Vec3 {
         let (Some((space, ..)), Some(place)) = (&self.lattice, node_place(self.places, node)) else {
             return Vec3::ZERO;
         };
-        let mut at = Vec3::ZERO;
-        for (function, weight) in
-            space.lattice.weights(place).into_iter().filter(|each| each.0 < MAX_FUNCTIONS)
-        {
-            let vector = moved.get(function).copied().unwrap_or_default().to_array();
-            at += weight * Vec3::from_array(vector);
+        let weights = space.lattice.weights(place).into_iter().filter(|each| each.0 < MAX_FUNCTIONS);
+        self.free(node) * weights.map(|(function, weight)| weight * moved(function)).sum::<Vec3>()
+    }
+
+    /// Replaces the vectors of the nodes (N) by their motions by their own inertia and that of the lattice.
+    fn replace(&self, nodes: &mut [TouchedNode], moved: impl Fn(usize) -> Vec3) {
+        for touched in nodes {
+            let node = touched.node as usize;
+            let own = self.own(node, Vec3::from_array(touched.vector));
+            touched.vector = (own + self.at(node, &moved)).to_array();
         }
-        self.free(node) * at
     }
 }
 
 impl Compliance for StepCompliance<'_, '_> {
     fn apply(&mut self, nodes: &mut [TouchedNode]) {
-        let moved = self.coarse(nodes);
-        for touched in nodes {
-            let node = touched.node as usize;
-            let mut motion = self.own(node, Vec3::from_array(touched.vector));
-            if let Some(moved) = &moved {
-                motion += self.at(node, moved);
+        let Some((space, ..)) = &self.lattice else { return self.replace(nodes, |_| Vec3::ZERO) };
+        let Some(local) = &self.local else {
+            let moved = self.coarse(nodes).unwrap_or([NodeVector::ZERO; _]);
+            return self.replace(nodes, |function| {
+                moved.get(function).copied().unwrap_or_default().to_array().into()
+            });
+        };
+        let mut sums = [Vec3::ZERO; MOST_LISTED];
+        self.add_sums(nodes, |function, residual| {
+            if let Some(sum) = self.listed.place(function).and_then(|place| sums.get_mut(place)) {
+                *sum += residual;
             }
-            touched.vector = motion.to_array();
-        }
+        });
+        local.answer(&mut sums, &self.listed, space);
+        self.replace(nodes, |function| {
+            self.listed.place(function).and_then(|place| sums.get(place)).copied().unwrap_or_default()
+        });
     }
 }
 
-impl<T> InertiaStep<'_, '_, T> {
+impl<T: Threads> InertiaStep<'_, '_, T> {
     /// Finds the pushes of this step, and what they change: forces, next increments and the sums over the nodes.
     #[inline(never)]
     pub(super) fn meet_instruments<M: ElementMaterial>(
@@ -116,8 +138,10 @@ impl<T> InertiaStep<'_, '_, T> {
         totals: &mut Totals,
     ) {
         let Some(contact) = trial.loads.contact() else { return };
-        let Self { step, model, storage: Storage { tables, places, matrices, .. }, response, .. } = self;
-        trial.find_touched(contact, step, |node| row(tables.next_increment, rank_of(places, node)));
+        let Self {
+            threads, step, model, storage: Storage { tables, places, matrices, .. }, response, ..
+        } = self;
+        trial.find_touched(contact, step, tables.next_increment, |node| rank_of(places, node));
         if trial.touched == 0 {
             trial.report_touches(contact, step, totals, |_| [0.0; 4]);
             return;
@@ -127,8 +151,13 @@ impl<T> InertiaStep<'_, '_, T> {
         let square = ResidualFactors::new(step, &model.scaling, trial.progress.steps == 0).square();
         let space = CoarseSpace { lattice: &model.lattice, refresh: &model.refresh };
         let lattice = response.map(|shares| (space, &*matrices, shares));
-        let mut compliance = StepCompliance { tables, places, inertia, rotations, square, lattice };
-        let touched = trial.touched_nodes();
+        let (touched, room) = trial.touched_nodes();
+        let listed = ListedFunctions::of(touched, places, &model.lattice);
+        let local = lattice.as_ref().and_then(|(space, matrices, shares)| {
+            LocalResponse::gathered(room, &listed, space, matrices, *shares)
+        });
+        let mut compliance =
+            StepCompliance { tables, places, inertia, rotations, square, lattice, listed, local };
         for each in &mut *touched {
             each.vector = each.normal;
             let one = core::slice::from_mut(each);
@@ -142,28 +171,20 @@ impl<T> InertiaStep<'_, '_, T> {
         }
         let moved = compliance.coarse(touched);
         for each in &mut *touched {
-            each.last = compliance.own(each.node as usize, Vec3::from_array(each.vector)).to_array();
+            each.vector = compliance.own(each.node as usize, Vec3::from_array(each.vector)).to_array();
         }
-        if let Some(moved) = moved {
-            prolong(&moved, &model.lattice, matrices.cells);
-            for place in &**places {
-                let (Some(next), Some(cell)) = (
-                    tables.next_increment.get_mut(rank_of(places, place.node())),
-                    matrices.cells.get(place.cell()),
-                ) else {
-                    continue;
-                };
-                let moved = cell.at::<f32>(place.within());
-                trial.move_next(place.node(), step, moved, [0.0; 3], &mut next.0, totals);
+        for each in &*touched {
+            if let Some(next) = tables.next_increment.get_mut(rank_of(places, each.node as usize)) {
+                next.0.iter_mut().zip(each.vector).for_each(|(next, moved)| *next += moved);
             }
         }
-        for at in 0..trial.touched {
-            let Some(&each) = trial.touched_nodes().get(at) else { continue };
-            let node = each.node as usize;
-            if let Some(next) = tables.next_increment.get_mut(rank_of(places, node)) {
-                trial.move_next(node, step, each.last, each.vector, &mut next.0, totals);
-            }
-        }
+        prolong(&moved.unwrap_or([NodeVector::ZERO; _]), &model.lattice, matrices.cells);
+        trial.add_changes_of_pushes();
+        let residual = ResidualFactors::new(step, &model.scaling, trial.progress.steps == 0);
+        let Trial { scene, increment, force, .. } = trial;
+        let input = PassInput { step, scaling: &model.scaling, residual, inertia, increment, places };
+        let parts = NodeParts { partitions: scene.elements().partitions, threads: *threads };
+        totals.replace_sums(&parts.add_motion(input, matrices.cells, force, tables.next_increment));
         trial.report_touches(contact, step, totals, |node| row(tables.next_increment, rank_of(places, node)));
     }
 }

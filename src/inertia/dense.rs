@@ -364,6 +364,44 @@ fn write_axes([x, y, z]: [&AxisRow; 3], row: &mut Row) {
     }
 }
 
+/// Adds to `out` the product with a vector that is zero but for some functions.
+#[inline(never)]
+pub(super) fn apply_functions(matrix: &[f32], stride: usize, functions: &[u8], x: &Row, out: &mut Row) {
+    dispatch(ApplyFunctions { matrix, stride, functions, x, out });
+}
+
+struct ApplyFunctions<'a> {
+    matrix: &'a [f32],
+    stride: usize,
+    functions: &'a [u8],
+    x: &'a Row,
+    out: &'a mut Row,
+}
+
+impl Kernel for ApplyFunctions<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: Real>(self) {
+        for &function in self.functions {
+            for index in (3 * usize::from(function)..).take(3) {
+                let row = self.matrix.get(index * self.stride..(index + 1) * self.stride).unwrap_or_default();
+                let x = R::splat(self.x.get(index).copied().unwrap_or(0.0));
+                let columns = self.out.as_chunks_mut::<WIDTH>().0.iter_mut().zip(row.as_chunks::<WIDTH>().0);
+                for (out, row) in columns {
+                    for first in (0..WIDTH).step_by(R::COUNT) {
+                        let value = R::from_fn(|lane| row[(first + lane) % WIDTH]);
+                        let sum = x.fused(value, R::from_fn(|lane| out[(first + lane) % WIDTH]));
+                        for lane in 0..R::COUNT {
+                            out[(first + lane) % WIDTH] = sum.lane(lane);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// Most vectors of [`WIDTH`] columns; these have at least eight values.
 const VECTORS: usize = 2;
 

@@ -80,6 +80,7 @@
 //! Accuracy: motion that neither has its true inertia nor is carried by the lattice is too slow. [`Report`] says how
 //! much inertia was added, and where; a [`crate::guard`] estimates the error. Memory: see [`vectors_for`].
 
+mod added_motion;
 mod assembly;
 #[cfg(test)]
 mod assembly_tests;
@@ -93,6 +94,7 @@ mod frames;
 mod inversion;
 mod large_step;
 mod lattice;
+mod local_response;
 mod matrices;
 mod method;
 mod motion_pass;
@@ -117,6 +119,7 @@ pub use damper::{Damper, DamperError};
 pub use large_step::{LargeModel, LargeStep, LargeView};
 pub(crate) use lattice::size_of;
 pub use lattice::{Grid, MAX_FUNCTIONS, MAX_POINTS};
+pub(crate) use local_response::LOCAL_FLOATS;
 pub use method::{Cells, Method, vectors_for, vectors_for_lattice};
 pub use report::Report;
 

@@ -144,7 +144,7 @@ pub(super) struct PassTotals {
 
 /// Sums for each axis, vectorised over nodes.
 #[derive(Clone, Copy)]
-struct AxisSums<R> {
+pub(super) struct AxisSums<R> {
     sums: [Sums<R>; 3],
     /// In the order of [`RoughMotion::add`].
     rough: [R; 4],
@@ -152,13 +152,13 @@ struct AxisSums<R> {
 
 impl<R: Real> AxisSums<R> {
     #[inline(always)]
-    fn new(input: &PassInput<'_>) -> Self {
+    pub(super) fn new(input: &PassInput<'_>) -> Self {
         Self { sums: [Sums::new(input.step, R::splat); 3], rough: [R::splat(0.0); 4] }
     }
 
     /// Adds nodes with their next increments.
     #[inline(always)]
-    fn add(&mut self, nodes: &NodeValues<R>, next: [R; 4]) {
+    pub(super) fn add(&mut self, nodes: &NodeValues<R>, next: [R; 4]) {
         for axis in 0..3 {
             let (free, increment, force, next) =
                 (nodes.free[axis], nodes.increment[axis], nodes.force[axis], next[axis]);
@@ -167,7 +167,11 @@ impl<R: Real> AxisSums<R> {
     }
 
     #[inline(always)]
-    fn total(sums: &[Self; VECTORS_PER_TILE], rest: &AxisSums<f32>, held_back: HeldBack) -> PassTotals {
+    pub(super) fn total(
+        sums: &[Self; VECTORS_PER_TILE],
+        rest: &AxisSums<f32>,
+        held_back: HeldBack,
+    ) -> PassTotals {
         let (mut totals, mut rough) = (Totals::NONE, RoughMotion::NONE);
         for row in 0..TILE {
             let (sums, lane) = sums_of_row::<R, _>(sums, row);

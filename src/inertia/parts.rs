@@ -5,6 +5,7 @@
 use core::array::from_fn;
 use core::ops::Range;
 
+use super::added_motion::AddedMotion;
 use super::cells::{CellPolynomial, CellSlots};
 use super::damper::RoughMotion;
 use super::lattice::LatticeNode;
@@ -167,6 +168,32 @@ impl<T: Threads> NodeParts<'_, T> {
             }
         });
         PassTotals::of_all(results.get(all.all()).unwrap_or_default())
+    }
+
+    /// Adds a motion of the lattice to the next increments. Gives the sums of all nodes.
+    pub(super) fn add_motion(
+        &self,
+        input: PassInput<'_>,
+        cells: &[CellPolynomial],
+        force: &[NodeVector],
+        mut next: &mut [NodeVector],
+    ) -> Totals {
+        let mut results = [Totals::NONE; MAX_PARTITIONS];
+        let (all, count, mut rest) = (self.partitions, self.count(), &mut results[..]);
+        let mut parts: [_; MOST_PARTS] = from_fn(|part| {
+            let partitions = all.part(part, count);
+            let next = take(&mut next, all.nodes(&partitions).len());
+            (take(&mut rest, partitions.len()), next, partitions)
+        });
+        self.threads.each(parts.get_mut(..count).unwrap_or_default(), |(results, next, partitions)| {
+            let mut next = &mut **next;
+            for (partition, result) in partitions.clone().zip(&mut **results) {
+                let ranks = all.nodes(&(partition..partition + 1));
+                let next = take(&mut next, ranks.len());
+                *result = AddedMotion { input, cells, ranks, force, next }.dispatched();
+            }
+        });
+        Totals::of_all(results.get(all.all()).unwrap_or_default())
     }
 
     /// Moves the nodes by their next increments.

@@ -85,7 +85,7 @@ impl<'a, 'w> LargeView<'a, 'w> {
 
 /// A step that is being computed, with its results.
 pub(super) struct InertiaStep<'a, 'w, T> {
-    threads: &'a T,
+    pub(super) threads: &'a T,
     pub(super) step: &'a Step,
     pub(super) model: &'a mut LargeModel<'w>,
     pub(super) storage: Storage<'a>,
@@ -152,7 +152,8 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     }
 
     fn meets_instruments(&self, trial: &Trial<'_, M>) -> bool {
-        trial.has_room_for_pushes()
+        // In mass-scaled steps an instrument would push inertia that is not there.
+        self.model.lattice.functions() > 0 && trial.has_room_for_pushes()
     }
 
     fn refuse(&mut self) {

@@ -39,7 +39,7 @@ pub enum Cause {
         /// The most that it may, m.
         most: f32,
     },
-    /// The loads have instruments, which learned steps cannot meet, and others beyond the critical one only with room for pushes
+    /// The loads have instruments, which mass-scaled and learned steps cannot meet, multilevel and damped ones only with room for pushes
     /// ([`StateView::pushing`](crate::state::StateView::pushing)).
     NoContact,
     /// Supports moved the node through most of the tissue around it in a step.

@@ -1,16 +1,22 @@
 //! Instruments in a step ([`crate::contact`]): the pushes on the nodes that would be inside one, and what these change in the sums
 //! over the nodes.
 
-use bytemuck::must_cast_slice_mut;
 use glam::Vec3;
 
 use super::cause::MOST_OF_SIZE;
 use super::{Cause, Step, StepMethod, Totals, Trial};
-use crate::contact::{Contact, Meeting, Placed, Touch, TouchedNode, VECTORS_OF_TOUCHED, vectors_to_push};
+use crate::contact::{
+    Contact, ContactMemory, MOST_INSTRUMENTS, Meeting, Placed, Touch, TouchedNode, largest_component,
+    vectors_to_push,
+};
 use crate::element::{ElementMaterial, NodeInertia};
 use crate::simd::NodeVector;
 
-/// A node in the way of an instrument, with all that moves it.
+/// Nodes that an instrument may touch within a step are those nearer than so many times the farthest motion of a node and of an
+/// instrument.
+const NEAR: f32 = 2.0;
+
+/// A node with all that moves it, and its way to an instrument.
 struct Met {
     node: usize,
     inertia: NodeInertia,
@@ -26,116 +32,155 @@ impl<M: ElementMaterial> Trial<'_, M> {
     pub(crate) fn meet_instruments(&mut self, step: &Step, method: &impl StepMethod<M>, totals: &mut Totals) {
         let Some(contact) = self.loads.contact() else { return };
         self.touches.fill(Touch::default());
-        if self.refuses_speed(contact, step) {
+        let placed = &*contact.placed(self.progress.time, step.seconds());
+        if self.refuses_speed(contact, placed) {
             return;
         }
-        for (index, placed) in self.placed(contact, step).enumerate() {
-            let mut touch = Touch::default();
-            let friction = placed.instrument.friction;
-            for entry in contact.surface().nodes() {
-                let Some(met) = self.met(entry.node as usize, entry.rest, &placed, method) else { continue };
-                if self.refuses_depth(index, entry.node, -met.meeting.gap) {
-                    return;
+        let Self { pushes, progress, .. } = self;
+        let surface = contact.surface().nodes();
+        let farthest = totals.farthest;
+        let limit = ContactMemory::split(pushes, surface.len())
+            .map(|mut memory| memory.begin(progress, placed, farthest, 0.0));
+        let mut touches = [Touch::default(); MOST_INSTRUMENTS];
+        let mut from = 0;
+        while let Some(place) = self.next_in_reach(surface.len(), from, limit) {
+            from = place + 1;
+            let Some(entry) = surface.get(place) else { break };
+            let mut distance = f32::INFINITY;
+            for ((index, placed), touch) in placed.iter().enumerate().zip(&mut touches) {
+                let Some(met) = self.met(entry.node as usize, entry.rest, placed, method) else { continue };
+                distance = distance.min(met.meeting.gap - axes(met.next).length());
+                if met.meeting.gap < 0.0 && met.is_free() {
+                    if self.refuses_depth(index, entry.node, -met.meeting.gap) {
+                        return;
+                    }
+                    self.push(&met, step, (method, placed.instrument.friction), totals, touch);
                 }
-                let push = met.push(step, friction);
-                let mut force = met.force;
-                for (sum, push) in force.0.iter_mut().zip(push.to_array()) {
-                    *sum += push;
-                }
-                if let Some(place) = self.force.get_mut(met.node) {
-                    *place = force;
-                }
-                let next = method.next_increment(met.node, &met.inertia, &met.increment, &force);
-                totals.change(step, &met.inertia, &met.increment, [&met.force, &force], [&met.next, &next]);
-                let way = mean(next, met.increment.0);
-                totals.add_work(push.dot(way));
-                touch.add(push, met.meeting.arm, -met.meeting.gap, [way, met.meeting.carried]);
             }
-            if let Some(place) = self.touches.get_mut(index) {
-                *place = touch;
+            if let Some(mut memory) = self.memory() {
+                memory.note(place, distance);
             }
         }
+        for (to, touch) in self.touches.iter_mut().zip(touches) {
+            *to = touch;
+        }
+    }
+
+    /// Pushes a node out of the way.
+    fn push(
+        &mut self,
+        met: &Met,
+        step: &Step,
+        (method, friction): (&impl StepMethod<M>, f32),
+        totals: &mut Totals,
+        touch: &mut Touch,
+    ) {
+        let push = met.push(step, friction);
+        let mut force = met.force;
+        for (sum, push) in force.0.iter_mut().zip(push.to_array()) {
+            *sum += push;
+        }
+        if let Some(place) = self.force.get_mut(met.node) {
+            *place = force;
+        }
+        let next = method.next_increment(met.node, &met.inertia, &met.increment, &force);
+        totals.change(step, &met.inertia, &met.increment, [&met.force, &force], [&met.next, &next]);
+        let way = mean(next, met.increment.0);
+        totals.add_work(push.dot(way));
+        touch.add(push, met.meeting.arm, -met.meeting.gap, [way, met.meeting.carried]);
     }
 
     /// Whether the state has room for pushes.
     pub(crate) fn has_room_for_pushes(&self) -> bool {
-        let nodes = self.loads.contact().map_or(0, |contact| contact.surface().nodes().len());
-        self.pushes.len() >= vectors_to_push(nodes)
+        self.pushes.len() >= vectors_to_push(self.surface_len())
     }
 
-    /// The pushes of the step before on the nodes of the surface, and room for the nodes that touch.
-    fn split_pushes(&mut self) -> (&mut [NodeVector], &mut [TouchedNode]) {
-        let nodes = self.loads.contact().map_or(0, |contact| contact.surface().nodes().len());
-        let Some((before, rest)) = self.pushes.split_at_mut_checked(nodes) else { return Default::default() };
-        let touched: &mut [TouchedNode] = must_cast_slice_mut(rest.as_chunks_mut::<VECTORS_OF_TOUCHED>().0);
-        (before, touched)
+    fn surface_len(&self) -> usize {
+        self.loads.contact().map_or(0, |contact| contact.surface().nodes().len())
     }
 
-    /// The nodes that may touch in this step.
-    pub(crate) fn touched_nodes(&mut self) -> &mut [TouchedNode] {
+    /// What the state keeps for instruments, if it has the room.
+    fn memory(&mut self) -> Option<ContactMemory<'_>> {
+        let nodes = self.surface_len();
+        ContactMemory::split(self.pushes, nodes)
+    }
+
+    /// The next node of the surface that instruments may reach: any, where the state keeps nothing.
+    fn next_in_reach(&mut self, nodes: usize, from: usize, limit: Option<f32>) -> Option<usize> {
+        match (self.memory(), limit) {
+            (Some(memory), Some(limit)) => memory.next_in_reach(from, limit),
+            _ => (from < nodes).then_some(from),
+        }
+    }
+
+    /// The nodes that may touch in this step, and room for the answer of a lattice.
+    pub(crate) fn touched_nodes(&mut self) -> (&mut [TouchedNode], &mut [f32]) {
         let count = self.touched;
-        self.split_pushes().1.get_mut(..count).unwrap_or_default()
+        match self.memory() {
+            Some(memory) => (memory.touched.get_mut(..count).unwrap_or_default(), memory.local),
+            None => Default::default(),
+        }
     }
 
     /// Adds the pushes of the step before to the forces.
     pub(crate) fn add_pushes_before(&mut self) {
         let Some(contact) = self.loads.contact() else { return };
         let Self { pushes, force, .. } = self;
-        for (entry, push) in contact.surface().nodes().iter().zip(&**pushes) {
-            if let Some(NodeVector([x, y, z, _])) = force.get_mut(entry.node as usize) {
+        let surface = contact.surface().nodes();
+        let Some(memory) = ContactMemory::split(pushes, surface.len()) else { return };
+        for (place, push) in memory.pushed() {
+            if let Some(NodeVector([x, y, z, _])) =
+                surface.get(place).and_then(|entry| force.get_mut(entry.node as usize))
+            {
                 (*x, *y, *z) = (*x + push.0[0], *y + push.0[1], *z + push.0[2]);
             }
         }
     }
 
-    /// Lists the nodes that are in the way of an instrument, near it, or were pushed in the step before.
+    /// Lists the nodes that are in the way of an instrument, near it, or were pushed in the step before. `row` is the place of a node
+    /// in the next increments.
     pub(crate) fn find_touched(
         &mut self,
         contact: &Contact<'_>,
         step: &Step,
-        next: impl Fn(usize) -> [f32; 4],
+        next: &[NodeVector],
+        row: impl Fn(usize) -> usize,
     ) {
-        let surface = contact.surface().nodes();
-        let mut farthest = 0.0f32;
-        for entry in surface {
-            let [x, y, z, _] = next(entry.node as usize);
-            farthest = farthest.max(x.abs()).max(y.abs()).max(z.abs());
-        }
         self.touched = 0;
-        if self.refuses_speed(contact, step) {
+        let placed = &*contact.placed(self.progress.time, step.seconds());
+        if self.refuses_speed(contact, placed) {
             return;
         }
-        for (place, entry) in surface.iter().enumerate() {
+        let farthest = [&*self.increment, next].map(largest_component);
+        let way = placed.iter().fold(0.0, |most: f32, placed| most.max(placed.way()));
+        let margin = NEAR * (farthest[1] + way);
+        let surface = contact.surface().nodes();
+        let Self { pushes, progress, .. } = self;
+        let Some(mut memory) = ContactMemory::split(pushes, surface.len()) else { return };
+        let limit = memory.begin(progress, placed, farthest, margin);
+        let mut from = 0;
+        while let Some(place) = self.next_in_reach(surface.len(), from, Some(limit)) {
+            from = place + 1;
+            let Some(entry) = surface.get(place) else { break };
             let node = entry.node as usize;
-            let (Some(displacement), Some(inertia)) =
-                (self.displacement.get(node), self.scene.inertia.get(node))
-            else {
-                continue;
-            };
-            if inertia.inverse.iter().all(|&inverse| inverse <= 0.0) {
-                continue;
-            }
-            let next = next(node);
-            let point = predicted(entry.rest, displacement, next);
-            let before = self.split_pushes().0.get(place).copied().unwrap_or_default().to_array();
-            let mut found = TouchedNode {
-                place: place as u32,
-                node: entry.node,
-                push: before,
-                before,
-                ..TouchedNode::default()
-            };
+            let next = next.get(row(node)).copied().unwrap_or_default().0;
+            let Some(mut found) = self.found(place, entry.node) else { continue };
+            let point = predicted(entry.rest, self.displacement.get(node).unwrap_or(&NodeVector::ZERO), next);
             let mut nearest: Option<(usize, Meeting)> = None;
-            for (index, placed) in self.placed(contact, step).enumerate() {
-                let meeting = placed.meet(point, 2.0 * farthest);
-                if let Some(meeting) = meeting.filter(|m| nearest.as_ref().is_none_or(|(_, n)| m.gap < n.gap))
+            for (index, placed) in placed.iter().enumerate() {
+                if let Some(meeting) = placed.meet(point)
+                    && nearest.as_ref().is_none_or(|(_, nearest)| meeting.gap < nearest.gap)
                 {
                     found.friction = placed.instrument.friction;
                     nearest = Some((index, meeting));
                 }
             }
+            let distance = nearest.as_ref().map_or(f32::INFINITY, |(_, nearest)| nearest.gap);
+            if let Some(mut memory) = self.memory() {
+                memory.note(place, distance - axes(next).length());
+            }
             match nearest {
-                Some((index, meeting)) => {
+                Some((index, meeting)) if meeting.gap < margin || found.before != [0.0; 3] => {
                     if self.refuses_depth(index, entry.node, -meeting.gap) {
                         self.touched = 0;
                         return;
@@ -146,42 +191,43 @@ impl<M: ElementMaterial> Trial<'_, M> {
                     (found.normal, found.gap) = (meeting.normal.to_array(), meeting.gap);
                     found.instrument = index as u32;
                 }
-                None if before == [0.0; 3] => continue,
-                // Far from all: no push.
-                None => {
-                    let normal = Vec3::from_array(before).normalize_or(Vec3::Z).to_array();
+                _ if found.before == [0.0; 3] => continue,
+                // All instruments are gone: no push.
+                _ => {
+                    let normal = Vec3::from_array(found.before).normalize_or(Vec3::Z).to_array();
                     (found.normal, found.relative, found.gap) = (normal, normal, 1.0);
                 }
             }
             let at = self.touched;
-            if let Some(room) = self.split_pushes().1.get_mut(at) {
+            if let Some(room) = self.memory().and_then(|memory| memory.touched.get_mut(at)) {
                 *room = found;
                 self.touched += 1;
             }
         }
     }
 
-    /// Changes the next increment of a node (m) and the force on it (N), with their sums.
-    pub(crate) fn move_next(
-        &mut self,
-        node: usize,
-        step: &Step,
-        moved: [f32; 3],
-        push: [f32; 3],
-        next: &mut [f32; 4],
-        totals: &mut Totals,
-    ) {
-        let (Some(inertia), Some(increment), Some(force)) =
-            (self.scene.inertia.get(node), self.increment.get(node), self.force.get_mut(node))
-        else {
-            return;
-        };
-        let (next_before, force_before) = (*next, *force);
-        for axis in 0..3 {
-            next[axis] += if inertia.inverse[axis] > 0.0 { moved[axis] } else { 0.0 };
-            force.0[axis] += push[axis];
+    /// A node of the surface with its push of the step before. None where supports hold it.
+    fn found(&mut self, place: usize, node: u32) -> Option<TouchedNode> {
+        let inertia = self.scene.inertia.get(node as usize)?;
+        if inertia.inverse.iter().all(|&inverse| inverse <= 0.0) {
+            return None;
         }
-        totals.change(step, inertia, increment, [&force_before, force], [&next_before, next]);
+        let before = self.memory()?.before.get(place).copied().unwrap_or_default().to_array();
+        Some(TouchedNode { place: place as u32, node, push: before, before, ..TouchedNode::default() })
+    }
+
+    /// Adds the changes of the pushes (N) to the forces.
+    pub(crate) fn add_changes_of_pushes(&mut self) {
+        let (nodes, count) = (self.surface_len(), self.touched);
+        let Self { pushes, force, .. } = self;
+        let Some(memory) = ContactMemory::split(pushes, nodes) else { return };
+        for each in memory.touched.iter().take(count) {
+            if let Some(force) = force.get_mut(each.node as usize) {
+                for axis in 0..3 {
+                    force.0[axis] += each.push[axis] - each.before[axis];
+                }
+            }
+        }
     }
 
     /// Tells the instruments what they feel, and the energy balance what they do.
@@ -193,8 +239,9 @@ impl<M: ElementMaterial> Trial<'_, M> {
         next: impl Fn(usize) -> [f32; 4],
     ) {
         self.touches.fill(Touch::default());
+        let placed = &*contact.placed(self.progress.time, step.seconds());
         for at in 0..self.touched {
-            let Some(&each) = self.touched_nodes().get(at) else { continue };
+            let Some(&each) = self.touched_nodes().0.get(at) else { continue };
             let (index, node, push) =
                 (each.instrument as usize, each.node as usize, Vec3::from_array(each.push));
             if push == Vec3::ZERO {
@@ -202,7 +249,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             }
             let way = mean(next(node), self.increment.get(node).copied().unwrap_or_default().0);
             totals.add_work(push.dot(way));
-            let Some(placed) = self.placed(contact, step).nth(index) else { continue };
+            let Some(placed) = placed.get(index) else { continue };
             let rest =
                 contact.surface().nodes().get(each.place as usize).map_or([0.0; 3], |entry| entry.rest);
             let here = self.displacement.get(node).copied().unwrap_or_default();
@@ -213,22 +260,21 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
     }
 
-    /// Keeps the pushes: the step is accepted.
+    /// Keeps the pushes: the step is accepted, and the progress that of its end.
     pub(super) fn accept_pushes(&mut self) {
-        let count = self.touched;
-        let (before, touched) = self.split_pushes();
-        before.fill(NodeVector::ZERO);
-        for each in touched.iter().take(count) {
-            if let Some(place) = before.get_mut(each.place as usize) {
-                let [x, y, z] = each.push;
-                place.0 = [x, y, z, 0.0];
-            }
+        let (touched, nodes) = (self.touched, self.surface_len());
+        let Self { pushes, progress, loads, .. } = self;
+        if loads.contact().is_some()
+            && let Some(mut memory) = ContactMemory::split(pushes, nodes)
+        {
+            memory.accept(touched);
+            memory.set_moment(progress);
         }
     }
 
     /// Refuses the step if an instrument moves too far in it.
-    fn refuses_speed(&mut self, contact: &Contact<'_>, step: &Step) -> bool {
-        for (index, placed) in self.placed(contact, step).enumerate() {
+    fn refuses_speed(&mut self, contact: &Contact<'_>, placed: &[Placed<'_>]) -> bool {
+        for (index, placed) in placed.iter().enumerate() {
             if let Some([metre, most]) = placed.too_fast() {
                 let node = contact.surface().nodes().first().map_or(0, |entry| entry.node);
                 self.refused.get_or_insert((node, Cause::Instrument { index, metre, most }));
@@ -247,16 +293,6 @@ impl<M: ElementMaterial> Trial<'_, M> {
         metre > most
     }
 
-    fn placed<'c>(
-        &self,
-        contact: &Contact<'c>,
-        step: &Step,
-    ) -> impl Iterator<Item = Placed<'c>> + use<'c, M> {
-        let start = self.progress.time;
-        let times = [start, start + f64::from(step.seconds())];
-        contact.instruments().iter().map(move |instrument| Placed::new(instrument, times))
-    }
-
     fn met(
         &self,
         node: usize,
@@ -267,13 +303,17 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let inertia = *self.scene.inertia.get(node)?;
         let [increment, force] = [*self.increment.get(node)?, *self.force.get(node)?];
         let next = method.next_increment(node, &inertia, &increment, &force);
-        let meeting = placed.meet(predicted(rest, self.displacement.get(node)?, next), 0.0)?;
-        let is_free = inertia.inverse.iter().any(|&inverse| inverse > 0.0);
-        is_free.then_some(Met { node, inertia, increment, force, next, meeting })
+        let meeting = placed.meet(predicted(rest, self.displacement.get(node)?, next))?;
+        Some(Met { node, inertia, increment, force, next, meeting })
     }
 }
 
 impl Met {
+    /// Whether it can move at all.
+    fn is_free(&self) -> bool {
+        self.inertia.inverse.iter().any(|&inverse| inverse > 0.0)
+    }
+
     /// The push, N, along free axes.
     fn push(&self, step: &Step, friction: f32) -> Vec3 {
         let Self { inertia, next, meeting, .. } = self;

@@ -83,10 +83,13 @@ pub(crate) struct Totals {
     prescribed: f64,
     /// Other work of supports, J.
     work: f64,
+    /// The largest components of the last and of the next increments, m: for steps with instruments.
+    pub(crate) farthest: [f32; 2],
 }
 
 impl Totals {
-    pub(crate) const NONE: Self = Self { kinetic: 0.0, momentum: [0.0; 3], prescribed: 0.0, work: 0.0 };
+    pub(crate) const NONE: Self =
+        Self { kinetic: 0.0, momentum: [0.0; 3], prescribed: 0.0, work: 0.0, farthest: [0.0; 2] };
 
     /// Adds the totals of all partitions.
     pub(crate) fn of_all<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Self {
@@ -95,6 +98,9 @@ impl Totals {
             all.kinetic += part.kinetic;
             all.prescribed += part.prescribed;
             all.work += part.work;
+            for (most, farthest) in all.farthest.iter_mut().zip(part.farthest) {
+                *most = farthest.max(*most);
+            }
             for (sum, momentum) in all.momentum.iter_mut().zip(part.momentum) {
                 *sum += momentum;
             }
@@ -105,6 +111,11 @@ impl Totals {
     /// Adds work that supports do on free nodes directly, J.
     pub(crate) fn add_work(&mut self, joule: f32) {
         self.work += f64::from(joule);
+    }
+
+    /// Replaces the sums over the nodes; the work stays.
+    pub(crate) fn replace_sums(&mut self, sums: &Self) {
+        *self = Self { work: self.work, ..*sums };
     }
 
     /// Replaces what a node contributes by what it does with another force and next increment.

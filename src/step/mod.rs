@@ -165,10 +165,10 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         self.progress.energy_balance = self.measured(balance, method);
         self.progress.extremes = extremes;
         method.advance(&mut self);
-        self.accept_pushes();
         self.progress.dt = step.seconds();
         self.progress.time += f64::from(step.seconds());
         self.progress.steps += 1;
+        self.accept_pushes();
         self.follow_motions();
         let limited = method.finish(&mut self);
         Status::of_taken(&extremes, &self.progress.energy_balance, limited)

@@ -80,7 +80,7 @@ impl<R: Real> Exact<R> {
     }
 }
 
-/// Sums over the nodes of an exact step.
+/// Sums over the nodes of an exact step, and the farthest that one moves if there are instruments.
 pub(super) struct EnergySums<'a> {
     pub(super) step: &'a Step,
     pub(super) inertia: &'a [NodeInertia],
@@ -91,20 +91,23 @@ pub(super) struct EnergySums<'a> {
 impl EnergySums<'_> {
     /// Compiled with this crate, as it is not generic.
     #[inline(never)]
-    pub(super) fn total(self) -> Totals {
-        dispatch(self)
+    pub(super) fn total(self, instruments: bool) -> Totals {
+        if instruments { dispatch(TotalsKernel::<true>(self)) } else { dispatch(TotalsKernel::<false>(self)) }
     }
 }
 
-impl Kernel for EnergySums<'_> {
+struct TotalsKernel<'a, const INSTRUMENTS: bool>(EnergySums<'a>);
+
+impl<const INSTRUMENTS: bool> Kernel for TotalsKernel<'_, INSTRUMENTS> {
     type Output = Totals;
 
     #[inline(always)]
     fn run<R: Real>(self) -> Totals {
-        let Self { step, inertia, increment, force } = self;
+        let EnergySums { step, inertia, increment, force } = self.0;
         let exact = Exact::<R>::new(step);
         // Sixteen sums whatever the width, so that their bits are the same.
         let mut sums = [Sums::<R>::new(step, R::splat); 4];
+        let mut farthest = [R::splat(0.0); 2];
         for first in (0..inertia.len()).step_by(4) {
             let (inertia, increment, force) =
                 (four(inertia, first), four(increment, first), four(force, first));
@@ -112,12 +115,22 @@ impl Kernel for EnergySums<'_> {
                 let inverse = axes::<R>() * vector_of::<R>(&inertia, from);
                 let mass = R::from_fn(|lane| inertia[((from + lane) | 3) % FOUR]);
                 let (increment, force) = (vector_of::<R>(&increment, from), vector_of::<R>(&force, from));
-                sums.add(mass, inverse.positive(), increment, force, exact.next(inverse, increment, force));
+                let next = exact.next(inverse, increment, force);
+                sums.add(mass, inverse.positive(), increment, force, next);
+                if INSTRUMENTS {
+                    for (most, moved) in farthest.iter_mut().zip([increment, next]) {
+                        *most = (axes::<R>() * moved).abs().max(*most);
+                    }
+                }
             }
         }
         let mut totals = Totals::default();
         for (sums, from) in sums.iter().zip((0..FOUR).step_by(R::COUNT)) {
             totals.add_interleaved(sums, from);
+        }
+        if INSTRUMENTS {
+            totals.farthest =
+                farthest.map(|most| (0..R::COUNT).fold(0.0, |all, lane| most.lane(lane).max(all)));
         }
         totals
     }

@@ -73,7 +73,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
         let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let increment = increment.get(nodes).unwrap_or_default();
-            EnergySums { step, inertia, increment, force }.total()
+            EnergySums { step, inertia, increment, force }.total(loads.contact().is_some())
         };
         let (totals, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, totals_of);
         let mut totals = Totals::of_all(&totals);

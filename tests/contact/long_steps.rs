@@ -1,9 +1,10 @@
-//! Instruments in mass-scaled and multilevel steps, against exact steps at a quarter of the critical one.
+//! Instruments in multilevel and damped steps, against exact steps at a quarter of the critical one.
 
 use supple::contact::{Contact, Instrument, Pose, Shape, Surface, Touch, vectors_to_push};
-use supple::inertia::{Cells, LargeStep, Method};
+use supple::inertia::{Cells, Damper, LargeStep, Method};
 use supple::loads::Loads;
 use supple::mesh::Bar;
+use supple::mlp::Network;
 use supple::scene::Support;
 use supple::state::NodeVector;
 use supple::step::{Status, Step};
@@ -55,18 +56,25 @@ impl Run {
 
 const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [4, 4, 8] };
 
-fn methods() -> [(&'static str, Method<'static>); 2] {
-    [("mass-scaled", Method::MassScaled), ("multilevel", Method::Multilevel(Cells::Given([1, 1, 2])))]
+fn multilevel() -> Method<'static> {
+    Method::Multilevel(Cells::Given([1, 1, 2]))
+}
+
+fn damped() -> Method<'static> {
+    #[repr(C, align(64))]
+    struct Flash<B: ?Sized>(B);
+    static DAMPER: &Flash<[u8]> = &Flash(*include_bytes!("../../weights/damper.weights"));
+    let network = Network::parse(&DAMPER.0).unwrap();
+    Method::Damped(Damper::new(network).unwrap(), Cells::Given([1, 1, 2]))
 }
 
 /// A free body that is hit and dragged: the impulse of the instrument is the change of its momentum, whatever inertia is added, up to
-/// the share of a force that multilevel steps give to rough motion twice in fast motion. With mass scaling inertia has momentum too.
+/// the share of a force that multilevel steps give to rough motion twice in fast motion.
 #[test]
 fn the_impulse_of_an_instrument_is_the_change_of_momentum_in_multilevel_steps() {
     let critical = Body::new(BAR, &[], 0.0).step.seconds();
     for multiple in [0.5, 4.0, 10.0] {
-        let [_, (_, multilevel)] = methods();
-        let mut run = Run::new(Body::new(BAR, &[], 0.0), Some(multilevel), multiple * critical, 0.0);
+        let mut run = Run::new(Body::new(BAR, &[], 0.0), Some(multilevel()), multiple * critical, 0.0);
         let mut sphere =
             Instrument::resting(Shape::Sphere { radius: 0.008 }, Pose::at([-0.0085, 0.009, 0.031]));
         sphere.friction = 0.4;
@@ -102,57 +110,95 @@ fn the_impulse_of_an_instrument_is_the_change_of_momentum_in_multilevel_steps() 
     }
 }
 
-/// Press, hold, slide and retract at 20 mm/s: mean force and penetration against exact steps.
-#[test]
-fn pressing_sliding_and_retracting_give_the_forces_of_exact_steps() {
+/// Press by 3 mm, hold, slide by 2 mm and retract.
+fn path(speed: f64) -> [(f64, [f32; 3]); 5] {
+    let [press, hold, slide] = [0.003 / speed, 0.1, 0.002 / speed];
+    let ends = [0.0, press, press + hold, press + hold + slide, 2.0 * press + hold + slide];
+    let [out, inside] = [-0.0101, -0.0071];
+    let at = [
+        [out, 0.01, 0.03],
+        [inside, 0.01, 0.03],
+        [inside, 0.01, 0.03],
+        [inside, 0.01, 0.032],
+        [out, 0.01, 0.032],
+    ];
+    [0, 1, 2, 3, 4].map(|part| (ends[part], at[part]))
+}
+
+/// Means of the force over the parts of the path, N, the deepest node, m, and the nodes that still touch at the end.
+fn course(method: Option<Method<'static>>, seconds: f32, speed: f64) -> (Vec<[f64; 3]>, f32, u32) {
     const DAMPING: f32 = 20.0;
     let fixed: Vec<_> = (0..25).map(Support::fixed).collect();
-    let critical = Body::new(BAR, &fixed, DAMPING).step.seconds();
-    let path = [
-        (0.0, [-0.0101, 0.01, 0.03]),
-        (0.15, [-0.0071, 0.01, 0.03]),
-        (0.25, [-0.0071, 0.01, 0.03]),
-        (0.35, [-0.0071, 0.01, 0.032]),
-        (0.5, [-0.0101, 0.01, 0.032]),
-    ];
-    // Means over the four parts of the path, N.
-    let forces_of = |method: Option<Method<'static>>, seconds: f32| {
-        let mut run = Run::new(Body::new(BAR, &fixed, DAMPING), method, seconds, DAMPING);
-        let mut sphere = Instrument::resting(Shape::Sphere { radius: 0.01 }, Pose::at(path[0].1));
-        sphere.friction = 0.3;
-        let mut means = Vec::new();
-        for (from, to) in path.iter().zip(&path[1..]) {
-            sphere.move_to(Pose::at(to.1), from.0, to.0);
-            let (mut sum, mut steps) = ([0.0f64; 3], 0);
-            while run.body.time() < to.0 {
-                let status = run.step(sphere);
-                assert!(status.is_taken(), "{status:?}");
-                for (sum, force) in sum.iter_mut().zip(run.touch[0].force) {
-                    *sum += f64::from(force);
-                }
-                steps += 1;
+    let mut run = Run::new(Body::new(BAR, &fixed, DAMPING), method, seconds, DAMPING);
+    let path = path(speed);
+    let mut sphere = Instrument::resting(Shape::Sphere { radius: 0.01 }, Pose::at(path[0].1));
+    sphere.friction = 0.3;
+    let (mut means, mut deepest) = (Vec::new(), 0.0f32);
+    for (from, to) in path.iter().zip(&path[1..]) {
+        sphere.move_to(Pose::at(to.1), from.0, to.0);
+        let (mut sum, mut steps) = ([0.0f64; 3], 0);
+        while run.body.time() < to.0 {
+            let status = run.step(sphere);
+            assert!(status.is_taken(), "{status:?}");
+            for (sum, force) in sum.iter_mut().zip(run.touch[0].force) {
+                *sum += f64::from(force);
             }
-            means.push(sum.map(|sum| sum / f64::from(steps)));
+            steps += 1;
+            let share = (((run.body.time() - from.0) / (to.0 - from.0)) as f32).min(1.0);
+            let centre = [0, 1, 2].map(|axis| from.1[axis] + share * (to.1[axis] - from.1[axis]));
+            for entry in &run.body.surface {
+                let moved = run.body.displacement(entry.node as usize);
+                let way: f32 =
+                    (0..3).map(|axis| (entry.rest[axis] + moved[axis] - centre[axis]).powi(2)).sum();
+                deepest = deepest.max(0.01 - way.sqrt());
+            }
         }
-        (means, run.touch[0].contacts)
-    };
-    let (exact, left) = forces_of(None, 0.25 * critical);
-    assert!(exact[1][0] < -1e-3 && left == 0);
-    println!("exact: {exact:?}");
-    for (name, method) in methods() {
-        for multiple in [0.9, 4.0, 10.0] {
-            let (means, left) = forces_of(Some(method.clone()), multiple * critical);
-            let difference: f64 = means
-                .iter()
-                .zip(&exact)
-                .map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt())
-                .sum();
-            let all: f64 = exact.iter().map(|b| b.iter().map(|f| f * f).sum::<f64>().sqrt()).sum();
-            println!("{name} at {multiple}: {:.1} %: {means:?}", 100.0 * difference / all);
-            // Mass-scaled steps are slow themselves: their bodies do not follow the exact motion.
-            if name == "multilevel" || multiple < 1.0 {
-                assert!(difference < 0.1 * all && left == 0, "{left} still touch");
-            }
+        means.push(sum.map(|sum| sum / f64::from(steps)));
+    }
+    (means, deepest, run.touch[0].contacts)
+}
+
+fn length(vector: [f64; 3]) -> f64 {
+    vector.iter().map(|component| component * component).sum::<f64>().sqrt()
+}
+
+/// Mean forces and penetration at three speeds, against exact steps at a quarter of the critical one.
+#[test]
+fn pressing_sliding_and_retracting_give_the_forces_of_exact_steps() {
+    const EDGE: f32 = 0.005;
+    let fixed: Vec<_> = (0..25).map(Support::fixed).collect();
+    let critical = Body::new(BAR, &fixed, 20.0).step.seconds();
+    // Beyond 20 mm/s steps so long do not resolve how the bar swings.
+    for (speed, most, most_inside) in [(0.005, 0.025, 0.002), (0.02, 0.11, 0.002), (0.08, 0.45, 0.02)] {
+        let (exact, _, left) = course(None, 0.25 * critical, speed);
+        println!("{:.0} mm/s, exact: {exact:.4?}", 1e3 * speed);
+        assert!(exact[1][0] < -1e-3 && left == 0);
+        let all: f64 = exact.iter().map(|force| length(*force)).sum();
+        let cases = [
+            (None, 0.9),
+            (Some(multilevel()), 4.0),
+            (Some(multilevel()), 10.0),
+            (Some(damped()), 10.0),
+            (Some(damped()), 20.0),
+        ];
+        for (method, multiple) in cases {
+            let name = match &method {
+                None => "exact",
+                Some(Method::Multilevel(_)) => "multilevel",
+                Some(_) => "damped",
+            };
+            let method_is_exact = method.is_none();
+            let (means, deepest, left) = course(method, multiple * critical, speed);
+            let parts =
+                means.iter().zip(&exact).map(|(a, b)| length([0, 1, 2].map(|axis| a[axis] - b[axis])));
+            let share = parts.sum::<f64>() / all;
+            println!(
+                "  {name} at {multiple}: force off by {:.1} %, {:.2} % of an edge inside: {means:.4?}",
+                100.0 * share,
+                100.0 * deepest / EDGE
+            );
+            assert!(left == 0, "{left} still touch");
+            assert!(share < if method_is_exact { 0.05 } else { most } && deepest < most_inside * EDGE);
         }
     }
 }

@@ -4,6 +4,7 @@
 #[path = "../support/networks.rs"]
 mod networks;
 
+mod clearance;
 mod closed_forms;
 mod long_steps;
 mod scene;

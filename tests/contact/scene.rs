@@ -20,6 +20,8 @@ pub(crate) struct Body {
     pub(crate) scene: VecScene<Law>,
     pub(crate) surface: Vec<SurfaceNode>,
     pub(crate) step: Step,
+    /// What the state keeps for instruments, if anything.
+    pub(crate) pushes: Vec<NodeVector>,
     vectors: [Vec<NodeVector>; 4],
     progress: Progress,
 }
@@ -42,7 +44,7 @@ impl Body {
             tled::critical_step(&scene, &mut state).unwrap()
         };
         let step = Step::new(0.9 * critical.seconds, damping, critical).unwrap();
-        Self { points, scene, surface, step, vectors, progress }
+        Self { points, scene, surface, step, pushes: Vec::new(), vectors, progress }
     }
 
     pub(crate) fn state<'a>(&'a mut self, touches: &'a mut [Touch]) -> StateView<'a> {
@@ -77,8 +79,8 @@ impl Body {
         let surface = self.surface.clone();
         let contact = Contact::new(Surface::new(&surface, self.points.len()).unwrap(), instruments).unwrap();
         let [displacement, increment, force, volume] = &mut self.vectors;
-        let mut state =
-            StateView::new(displacement, increment, force, volume, &mut self.progress).feeling(touches);
+        let state = StateView::new(displacement, increment, force, volume, &mut self.progress);
+        let mut state = state.feeling(touches).pushing(&mut self.pushes);
         let loads = Loads::new(&self.scene, gravity, &[], &[]).unwrap().touched_by(&contact);
         tled::step(&self.scene, &loads, &mut state.as_state(), &self.step)
     }

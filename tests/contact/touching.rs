@@ -1,10 +1,13 @@
 //! Momentum, release, refusal, and instruments in random places.
 
-use supple::contact::{Contact, ContactError, Instrument, Pose, Shape, Surface, SurfaceNode, Touch};
+use supple::contact::{
+    Contact, ContactError, Instrument, Pose, Shape, Surface, SurfaceNode, Touch, vectors_to_push,
+};
 use supple::inertia::{LargeStep, Method};
 use supple::loads::Loads;
 use supple::mesh::Bar;
 use supple::scene::Support;
+use supple::state::NodeVector;
 use supple::step::{Cause, Status};
 
 use super::networks::uniform;
@@ -109,7 +112,9 @@ fn steps_beyond_the_critical_one_refuse_instruments() {
     let mut scaled =
         LargeStep::prepare_in_vec(Method::MassScaled, scene.view(), &points, body.state(&mut []), step)
             .unwrap();
-    let status = scaled.step(scene.view(), &loads, body.state(&mut []));
+    // Even with room for pushes.
+    let mut pushes = vec![NodeVector::ZERO; vectors_to_push(surface.len())];
+    let status = scaled.step(scene.view(), &loads, body.state(&mut []).pushing(&mut pushes));
     let Status::Diverged(divergence) = status else { panic!("{status:?}") };
     println!("{divergence}");
     assert_eq!(divergence.cause, Cause::NoContact);
