@@ -10,9 +10,9 @@ pub const MOST_INSTRUMENTS: usize = 8;
 /// A rigid instrument that moves on a line, and turns evenly, from one pose to another. A host sets both poses and their times
 /// for each frame; before and after these times the instrument stands still.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Instrument {
+pub struct Instrument<'a> {
     /// What it looks like.
-    pub shape: Shape,
+    pub shape: Shape<'a>,
     /// Coulomb's coefficient of friction, zero or more.
     pub friction: f32,
     /// Where it starts.
@@ -23,10 +23,10 @@ pub struct Instrument {
     pub times: [f64; 2],
 }
 
-impl Instrument {
+impl<'a> Instrument<'a> {
     /// An instrument that stands still, without friction.
     #[must_use]
-    pub const fn resting(shape: Shape, pose: Pose) -> Self {
+    pub const fn resting(shape: Shape<'a>, pose: Pose) -> Self {
         Self { shape, friction: 0.0, from: pose, to: pose, times: [0.0; 2] }
     }
 

@@ -49,6 +49,9 @@
 //! one after the other, in long steps by the nearest one. Damping of a few 1/s is what ends the rattling of light nodes on hard surfaces.
 
 mod clearance;
+mod field;
+#[cfg(feature = "field")]
+mod field_of_surface;
 mod instrument;
 mod pose;
 mod pushes;
@@ -57,6 +60,9 @@ mod surface;
 
 pub use clearance::vectors_to_push;
 pub(crate) use clearance::{ContactMemory, largest_component};
+pub use field::{Field, FieldError};
+#[cfg(feature = "field")]
+pub use field_of_surface::SurfaceField;
 pub use instrument::{Instrument, MOST_INSTRUMENTS};
 pub use pose::Pose;
 pub(crate) use pushes::{Compliance, TouchedNode, solve};
@@ -76,12 +82,12 @@ use pose::Placement;
 #[derive(Clone, Copy, Debug)]
 pub struct Contact<'a> {
     surface: Surface<'a>,
-    instruments: &'a [Instrument],
+    instruments: &'a [Instrument<'a>],
 }
 
 impl<'a> Contact<'a> {
     /// Checks the instruments.
-    pub fn new(surface: Surface<'a>, instruments: &'a [Instrument]) -> Result<Self, ContactError> {
+    pub fn new(surface: Surface<'a>, instruments: &'a [Instrument<'a>]) -> Result<Self, ContactError> {
         if instruments.len() > MOST_INSTRUMENTS {
             return Err(ContactError::Instruments { instruments: instruments.len() });
         }
@@ -99,7 +105,7 @@ impl<'a> Contact<'a> {
 
     /// The instruments.
     #[must_use]
-    pub const fn instruments(&self) -> &'a [Instrument] {
+    pub const fn instruments(&self) -> &'a [Instrument<'a>] {
         self.instruments
     }
 
@@ -148,7 +154,7 @@ impl Touch {
 
 /// An instrument in a step: placed where it starts and where it ends.
 pub(crate) struct Placed<'a> {
-    pub(crate) instrument: &'a Instrument,
+    pub(crate) instrument: &'a Instrument<'a>,
     start: Placement,
     end: Placement,
 }
@@ -165,9 +171,14 @@ pub(crate) struct Meeting {
 }
 
 impl<'a> Placed<'a> {
-    pub(crate) fn new(instrument: &'a Instrument, times: [f64; 2]) -> Self {
+    pub(crate) fn new(instrument: &'a Instrument<'a>, times: [f64; 2]) -> Self {
         let [start, end] = times.map(|time| instrument.placement(time));
         Self { instrument, start, end }
+    }
+
+    /// A distance (m) that the point of a meeting has at the least.
+    pub(crate) fn least_distance(&self, meeting: &Meeting) -> f32 {
+        meeting.gap - self.instrument.shape.uncertainty()
     }
 
     /// How far its centre moves, m.

@@ -2,10 +2,12 @@
 
 use glam::Vec3;
 
+use super::field::Field;
+
 /// The shape of an instrument, in its own axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Shape {
+pub enum Shape<'a> {
     /// All that is below `z = 0`: a table, a plate that is larger than the body.
     Plane,
     /// A ball around the centre.
@@ -20,14 +22,16 @@ pub enum Shape {
         /// Of the cylinder between the centres of the ends, m.
         length: f32,
     },
+    /// Any form.
+    Field(Field<'a>),
 }
 
-impl Shape {
+impl Shape<'_> {
     /// The first size that is not one.
     pub(super) fn refused_size(&self) -> Option<(&'static str, f32)> {
         let positive = |name, value: f32| (!(value.is_finite() && value > 0.0)).then_some((name, value));
         match *self {
-            Self::Plane => None,
+            Self::Plane | Self::Field(_) => None,
             Self::Sphere { radius } => positive("radius", radius),
             Self::Capsule { radius, length } => {
                 positive("radius", radius).or_else(|| positive("length", length))
@@ -40,6 +44,7 @@ impl Shape {
         match *self {
             Self::Plane => f32::INFINITY,
             Self::Sphere { radius } | Self::Capsule { radius, .. } => radius,
+            Self::Field(field) => field.deepest(),
         }
     }
 
@@ -49,7 +54,13 @@ impl Shape {
             Self::Plane => f32::INFINITY,
             Self::Sphere { radius } => radius,
             Self::Capsule { radius, length } => radius + 0.5 * length,
+            Self::Field(field) => field.extent(),
         }
+    }
+
+    /// How much nearer than its distance tells a point may be, m: the error of interpolation between the points of a grid.
+    pub(super) fn uncertainty(&self) -> f32 {
+        if let Self::Field(field) = self { 2.0 * field.spacing() } else { 0.0 }
     }
 
     /// A number that tells it from other shapes and sizes.
@@ -58,6 +69,7 @@ impl Shape {
             Self::Plane => 1,
             Self::Sphere { radius } => radius.to_bits(),
             Self::Capsule { radius, length } => radius.to_bits().rotate_left(7) ^ length.to_bits() ^ 2,
+            Self::Field(field) => field.number(),
         }
     }
 
@@ -70,6 +82,7 @@ impl Shape {
                 let half = 0.5 * length;
                 around(point - Vec3::Z * point.z.max(-half).min(half), radius)
             }
+            Self::Field(field) => field.nearest(point),
         }
     }
 }

@@ -49,7 +49,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             let mut distance = f32::INFINITY;
             for ((index, placed), touch) in placed.iter().enumerate().zip(&mut touches) {
                 let Some(met) = self.met(entry.node as usize, entry.rest, placed, method) else { continue };
-                distance = distance.min(met.meeting.gap - axes(met.next).length());
+                distance = distance.min(placed.least_distance(&met.meeting) - axes(met.next).length());
                 if met.meeting.gap < 0.0 && met.is_free() {
                     if self.refuses_depth(index, entry.node, -met.meeting.gap) {
                         return;
@@ -166,16 +166,15 @@ impl<M: ElementMaterial> Trial<'_, M> {
             let next = next.get(row(node)).copied().unwrap_or_default().0;
             let Some(mut found) = self.found(place, entry.node) else { continue };
             let point = predicted(entry.rest, self.displacement.get(node).unwrap_or(&NodeVector::ZERO), next);
-            let mut nearest: Option<(usize, Meeting)> = None;
+            let (mut nearest, mut distance): (Option<(usize, Meeting)>, f32) = (None, f32::INFINITY);
             for (index, placed) in placed.iter().enumerate() {
-                if let Some(meeting) = placed.meet(point)
-                    && nearest.as_ref().is_none_or(|(_, nearest)| meeting.gap < nearest.gap)
-                {
+                let Some(meeting) = placed.meet(point) else { continue };
+                distance = distance.min(placed.least_distance(&meeting));
+                if nearest.as_ref().is_none_or(|(_, nearest)| meeting.gap < nearest.gap) {
                     found.friction = placed.instrument.friction;
                     nearest = Some((index, meeting));
                 }
             }
-            let distance = nearest.as_ref().map_or(f32::INFINITY, |(_, nearest)| nearest.gap);
             if let Some(mut memory) = self.memory() {
                 memory.note(place, distance - axes(next).length());
             }

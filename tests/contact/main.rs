@@ -6,6 +6,7 @@ mod networks;
 
 mod clearance;
 mod closed_forms;
+mod fields;
 mod long_steps;
 mod scene;
 mod touching;
