@@ -30,7 +30,7 @@ const SPEED: f32 = 0.02;
 const STEPS: usize = 64;
 const PAIRS: usize = 41;
 
-fn sphere(top: [f32; 3], depth: f32) -> Instrument {
+fn sphere(top: [f32; 3], depth: f32) -> Instrument<'static> {
     let at = |height: f32| Pose::at([top[0], top[1], top[2] + RADIUS + height]);
     let mut sphere = Instrument::resting(Shape::Sphere { radius: RADIUS }, at(0.0005));
     sphere.friction = 0.3;
@@ -58,7 +58,7 @@ fn measure<M: ElementMaterial>(
     let step = Step::unchecked(multiple * critical.seconds, DAMPING).expect("a step");
     let bytes = WeightBytes::of(include_bytes!("../weights/damper.weights"));
     let (scene, surface) = (&scene, &*surface);
-    let run = |instruments: &[Instrument], with: bool| -> Box<dyn FnMut() -> (u32, f64) + '_> {
+    let run = |instruments: &[Instrument<'static>], with: bool| -> Box<dyn FnMut() -> (u32, f64) + '_> {
         let instruments: Vec<_> = instruments.to_vec();
         let mut state = VecState::at_rest(points.len());
         let mut pushes = vec![NodeVector::ZERO; vectors_to_push(surface.len())];

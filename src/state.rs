@@ -7,7 +7,7 @@
 
 use core::ops::Deref;
 
-use crate::contact::Touch;
+use crate::contact::{ContactPoint, Touch};
 use crate::element::Extremes;
 use crate::energy_balance::EnergyBalance;
 use crate::material::{Element, Material};
@@ -98,6 +98,8 @@ pub struct StateView<'a> {
     pub(crate) progress: &'a mut Progress,
     /// What the instruments feel in the latest step.
     pub(crate) touches: &'a mut [Touch],
+    /// Where they push.
+    pub(crate) points: &'a mut [ContactPoint],
     /// Pushes of the instruments on the nodes of the surface, and room for the next.
     pub(crate) pushes: &'a mut [NodeVector],
 }
@@ -121,7 +123,16 @@ impl<'a> StateView<'a> {
         volume: &'a mut [NodeVector],
         progress: &'a mut Progress,
     ) -> Self {
-        Self { displacement, increment, force, volume, progress, touches: &mut [], pushes: &mut [] }
+        Self {
+            displacement,
+            increment,
+            force,
+            volume,
+            progress,
+            touches: &mut [],
+            points: &mut [],
+            pushes: &mut [],
+        }
     }
 
     /// The same state, whose steps write to `touches` what each instrument feels ([`crate::contact`]): in the latest step, taken or
@@ -129,6 +140,13 @@ impl<'a> StateView<'a> {
     #[must_use]
     pub fn feeling(self, touches: &'a mut [Touch]) -> Self {
         Self { touches, ..self }
+    }
+
+    /// The same state, whose steps write to `points` where instruments push: as many as the touches have contacts in sum, or as there is
+    /// room for; the rest is zero.
+    #[must_use]
+    pub fn listing(self, points: &'a mut [ContactPoint]) -> Self {
+        Self { points, ..self }
     }
 
     /// The same state with [`vectors_to_push`](crate::contact::vectors_to_push) vectors that belong to it, for what instruments do:
@@ -147,6 +165,7 @@ impl<'a> StateView<'a> {
             volume: self.volume,
             progress: self.progress,
             touches: self.touches,
+            points: self.points,
             pushes: self.pushes,
         }
     }

@@ -52,7 +52,9 @@ mod clearance;
 mod field;
 #[cfg(feature = "field")]
 mod field_of_surface;
+mod grip;
 mod instrument;
+mod local_force;
 mod pose;
 mod pushes;
 mod shape;
@@ -63,9 +65,11 @@ pub(crate) use clearance::{ContactMemory, largest_component};
 pub use field::{Field, FieldError};
 #[cfg(feature = "field")]
 pub use field_of_surface::SurfaceField;
+pub use grip::Grip;
 pub use instrument::{Instrument, MOST_INSTRUMENTS};
+pub use local_force::LocalForce;
 pub use pose::Pose;
-pub(crate) use pushes::{Compliance, TouchedNode, solve};
+pub(crate) use pushes::{Compliance, HELD, TouchedNode, directions, solve};
 pub use shape::Shape;
 #[cfg(any(feature = "std", test))]
 pub use surface::boundary;
@@ -83,6 +87,7 @@ use pose::Placement;
 pub struct Contact<'a> {
     surface: Surface<'a>,
     instruments: &'a [Instrument<'a>],
+    grips: &'a [Grip],
 }
 
 impl<'a> Contact<'a> {
@@ -94,7 +99,35 @@ impl<'a> Contact<'a> {
         for (index, instrument) in instruments.iter().enumerate() {
             instrument.check(index)?;
         }
-        Ok(Self { surface, instruments })
+        Ok(Self { surface, instruments, grips: &[] })
+    }
+
+    /// The same with nodes that instruments hold, in increasing order of their places in the surface ([`Instrument::grips`]).
+    pub fn gripping(self, grips: &'a [Grip]) -> Result<Self, ContactError> {
+        let (mut least, nodes) = (0, self.surface.nodes().len());
+        for (index, grip) in grips.iter().enumerate() {
+            let place = grip.place as usize;
+            let is_sound = place >= least
+                && place < nodes
+                && (grip.instrument as usize) < self.instruments.len()
+                && grip.point.iter().all(|component| component.is_finite());
+            if !is_sound {
+                return Err(ContactError::Grip { index, grip: *grip });
+            }
+            least = place + 1;
+        }
+        Ok(Self { grips, ..self })
+    }
+
+    /// The nodes that instruments hold.
+    #[must_use]
+    pub const fn grips(&self) -> &'a [Grip] {
+        self.grips
+    }
+
+    /// Whether an instrument holds the node at this place of the surface.
+    pub(crate) fn is_gripped(&self, place: usize) -> bool {
+        !self.grips.is_empty() && self.grips.binary_search_by_key(&place, |grip| grip.place as usize).is_ok()
     }
 
     /// The nodes that can be touched.
@@ -152,6 +185,24 @@ impl Touch {
     }
 }
 
+/// Where an instrument pushes a node in a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct ContactPoint {
+    /// At the end of the step, m.
+    pub position: [f32; 3],
+    /// Outward normal of the instrument there; zero where it holds the node.
+    pub normal: [f32; 3],
+    /// Force of the instrument on the node, N.
+    pub force: [f32; 3],
+    /// How far the node would have been inside without the instrument, m.
+    pub depth: f32,
+    /// The node.
+    pub node: u32,
+    /// The instrument's place in the list.
+    pub instrument: u32,
+}
+
 /// An instrument in a step: placed where it starts and where it ends.
 pub(crate) struct Placed<'a> {
     pub(crate) instrument: &'a Instrument<'a>,
@@ -164,6 +215,8 @@ pub(crate) struct Meeting {
     /// Distance at the end of the step, m, below zero inside.
     pub(crate) gap: f32,
     pub(crate) normal: Vec3,
+    /// On the surface of the instrument, m.
+    pub(crate) point: Vec3,
     /// The position from the instrument's, m.
     pub(crate) arm: Vec3,
     /// How far the instrument moves there in the step, m.
@@ -198,6 +251,11 @@ impl<'a> Placed<'a> {
         point - self.end.position
     }
 
+    /// A point in the axes of the instrument at the end of the step, m.
+    pub(crate) fn held(&self, point: [f32; 3]) -> Vec3 {
+        self.end.position + self.end.turned(Vec3::from_array(point))
+    }
+
     /// How far the instrument moves at a point (m) of it at the end of the step.
     pub(crate) fn carried(&self, point: Vec3) -> Vec3 {
         point - self.end.carried(point, &self.start)
@@ -210,8 +268,8 @@ impl<'a> Placed<'a> {
             return None;
         }
         let normal = self.end.turned(normal);
-        let touched = point - gap * normal;
-        Some(Meeting { gap, normal, arm: self.arm(touched), carried: self.carried(touched) })
+        let point = point - gap * normal;
+        Some(Meeting { gap, normal, point, arm: self.arm(point), carried: self.carried(point) })
     }
 }
 
@@ -249,6 +307,13 @@ pub enum ContactError {
         /// The value.
         value: f32,
     },
+    /// A grip of a node that the surface does not have, or that is not in order, of an instrument that there is not, or at no point.
+    Grip {
+        /// Its place in the list.
+        index: usize,
+        /// The grip.
+        grip: Grip,
+    },
     /// A pose with a position that is not a number, or a rotation without a length.
     Pose {
         /// Its place in the list.
@@ -274,6 +339,11 @@ impl fmt::Display for ContactError {
             Self::Instrument { instrument, what, value } => {
                 write!(f, "instrument {instrument}: a {what} of {value} cannot be")
             }
+            Self::Grip { index, grip: Grip { place, instrument, point } } => write!(
+                f,
+                "grip {index}, of entry {place} of the surface by instrument {instrument} at {point:?} m: both must exist, the point \
+                 must be one, and entries come in increasing order"
+            ),
             Self::Pose { instrument } => {
                 write!(
                     f,

@@ -12,10 +12,13 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// Iterations, and those that estimate the largest eigenvalue before.
-const ITERATIONS: usize = 8;
-const POWER_ITERATIONS: usize = 3;
+const ITERATIONS: usize = 14;
+const POWER_ITERATIONS: usize = 5;
 /// The estimate is from below.
 const SAFETY: f32 = 1.15;
+
+/// The friction of a node that an instrument holds: any push will do.
+pub(crate) const HELD: f32 = f32::INFINITY;
 
 /// A node that may touch an instrument in this step.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -55,6 +58,9 @@ pub(crate) trait Compliance {
 impl TouchedNode {
     /// The nearest push that an instrument can exert, N.
     fn projected(&self, push: Vec3) -> Vec3 {
+        if self.friction == HELD {
+            return push;
+        }
         let normal = Vec3::from_array(self.normal);
         let pressing = push.dot(normal);
         if pressing.is_nan() || pressing <= 0.0 {
@@ -66,11 +72,24 @@ impl TouchedNode {
     }
 }
 
+/// Directions that together span all: the normal, and two across.
+pub(crate) fn directions(normal: Vec3) -> [Vec3; 3] {
+    let (a, b) = normal.any_orthonormal_pair();
+    [normal, a, b]
+}
+
+/// A start of the power iteration that has some of every motion, those across the normals too.
+fn start(index: usize, normal: Vec3) -> Vec3 {
+    let [normal, a, b] = directions(normal);
+    let turn = index as f32;
+    normal + 0.7 * (libm::cosf(turn) * a + libm::sinf(turn) * b) + 0.3 * a
+}
+
 /// Solves for the pushes.
 pub(crate) fn solve(nodes: &mut [TouchedNode], compliance: &mut impl Compliance) {
     let mut largest = 0.0;
-    for node in &mut *nodes {
-        node.last = Vec3::from_array(node.normal).to_array();
+    for (index, node) in nodes.iter_mut().enumerate() {
+        node.last = start(index, Vec3::from_array(node.normal)).to_array();
     }
     for _ in 0..POWER_ITERATIONS {
         let mut square = 0.0;

@@ -17,7 +17,7 @@ use super::node_tables::NodeTables;
 use super::parts::NodeParts;
 use super::pass_input::{PassInput, ResidualFactors};
 use super::step::InertiaStep;
-use crate::contact::{Compliance, TouchedNode, solve};
+use crate::contact::{Compliance, TouchedNode, directions, solve};
 use crate::element::{ElementMaterial, NodeInertia};
 use crate::padding;
 use crate::simd::NodeVector;
@@ -159,10 +159,12 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let mut compliance =
             StepCompliance { tables, places, inertia, rotations, square, lattice, listed, local };
         for each in &mut *touched {
-            each.vector = each.normal;
-            let one = core::slice::from_mut(each);
-            compliance.apply(one);
-            let own = Vec3::from_array(each.vector).length();
+            let mut own = 0.0f32;
+            for direction in directions(Vec3::from_array(each.normal)) {
+                each.vector = direction.to_array();
+                compliance.apply(core::slice::from_mut(each));
+                own = own.max(Vec3::from_array(each.vector).length());
+            }
             each.scale = if own > 0.0 { 1.0 / libm::sqrtf(own) } else { 0.0 };
         }
         solve(touched, &mut compliance);

@@ -6,8 +6,8 @@ use glam::Vec3;
 use super::cause::MOST_OF_SIZE;
 use super::{Cause, Step, StepMethod, Totals, Trial};
 use crate::contact::{
-    Contact, ContactMemory, MOST_INSTRUMENTS, Meeting, Placed, Touch, TouchedNode, largest_component,
-    vectors_to_push,
+    Contact, ContactMemory, ContactPoint, Grip, HELD, MOST_INSTRUMENTS, Meeting, Placed, Touch, TouchedNode,
+    largest_component, vectors_to_push,
 };
 use crate::element::{ElementMaterial, NodeInertia};
 use crate::simd::NodeVector;
@@ -24,6 +24,8 @@ struct Met {
     force: NodeVector,
     next: [f32; 4],
     meeting: Meeting,
+    /// Where an instrument holds it, from where it would be, m.
+    way: Vec3,
 }
 
 impl<M: ElementMaterial> Trial<'_, M> {
@@ -31,7 +33,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
     /// refused if an instrument is too fast, or so far inside the body that it would throw a node.
     pub(crate) fn meet_instruments(&mut self, step: &Step, method: &impl StepMethod<M>, totals: &mut Totals) {
         let Some(contact) = self.loads.contact() else { return };
-        self.touches.fill(Touch::default());
+        self.clear_touches();
         let placed = &*contact.placed(self.progress.time, step.seconds());
         if self.refuses_speed(contact, placed) {
             return;
@@ -45,7 +47,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let mut from = 0;
         while let Some(place) = self.next_in_reach(surface.len(), from, limit) {
             from = place + 1;
-            let Some(entry) = surface.get(place) else { break };
+            let Some(entry) = surface.get(place).filter(|_| !contact.is_gripped(place)) else { continue };
             let mut distance = f32::INFINITY;
             for ((index, placed), touch) in placed.iter().enumerate().zip(&mut touches) {
                 let Some(met) = self.met(entry.node as usize, entry.rest, placed, method) else { continue };
@@ -54,28 +56,46 @@ impl<M: ElementMaterial> Trial<'_, M> {
                     if self.refuses_depth(index, entry.node, -met.meeting.gap) {
                         return;
                     }
-                    self.push(&met, step, (method, placed.instrument.friction), totals, touch);
+                    let push = met.push(step, placed.instrument.friction);
+                    self.push(&met, push, (step, index, method), totals, touch);
                 }
             }
             if let Some(mut memory) = self.memory() {
                 memory.note(place, distance);
             }
         }
+        for grip in contact.grips() {
+            let (place, index) = (grip.place as usize, grip.instrument as usize);
+            let (Some(entry), Some(placed), Some(touch)) =
+                (surface.get(place), placed.get(index), touches.get_mut(index))
+            else {
+                continue;
+            };
+            if let Some(mut memory) = self.memory() {
+                memory.note(place, f32::NEG_INFINITY);
+            }
+            let Some(met) = self.gripped(entry.node as usize, entry.rest, placed, (grip, method)) else {
+                continue;
+            };
+            if self.refuses_depth(index, entry.node, met.meeting.gap) {
+                return;
+            }
+            self.push(&met, met.hold(step), (step, index, method), totals, touch);
+        }
         for (to, touch) in self.touches.iter_mut().zip(touches) {
             *to = touch;
         }
     }
 
-    /// Pushes a node out of the way.
+    /// Pushes a node with a force, N.
     fn push(
         &mut self,
         met: &Met,
-        step: &Step,
-        (method, friction): (&impl StepMethod<M>, f32),
+        push: Vec3,
+        (step, instrument, method): (&Step, usize, &impl StepMethod<M>),
         totals: &mut Totals,
         touch: &mut Touch,
     ) {
-        let push = met.push(step, friction);
         let mut force = met.force;
         for (sum, push) in force.0.iter_mut().zip(push.to_array()) {
             *sum += push;
@@ -87,7 +107,25 @@ impl<M: ElementMaterial> Trial<'_, M> {
         totals.change(step, &met.inertia, &met.increment, [&met.force, &force], [&met.next, &next]);
         let way = mean(next, met.increment.0);
         totals.add_work(push.dot(way));
-        touch.add(push, met.meeting.arm, -met.meeting.gap, [way, met.meeting.carried]);
+        let depth = if met.meeting.normal == Vec3::ZERO { 0.0 } else { -met.meeting.gap };
+        touch.add(push, met.meeting.arm, depth, [way, met.meeting.carried]);
+        let position = met.meeting.point;
+        self.list(met.node as u32, instrument as u32, [position, met.meeting.normal, push], depth);
+    }
+
+    fn clear_touches(&mut self) {
+        self.touches.fill(Touch::default());
+        self.points.fill(ContactPoint::default());
+        self.listed = 0;
+    }
+
+    /// Tells the host where an instrument pushes: position, normal and force.
+    fn list(&mut self, node: u32, instrument: u32, [position, normal, force]: [Vec3; 3], depth: f32) {
+        if let Some(point) = self.points.get_mut(self.listed) {
+            let [position, normal, force] = [position, normal, force].map(|vector| vector.to_array());
+            *point = ContactPoint { position, normal, force, depth, node, instrument };
+            self.listed += 1;
+        }
     }
 
     /// Whether the state has room for pushes.
@@ -161,7 +199,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let mut from = 0;
         while let Some(place) = self.next_in_reach(surface.len(), from, Some(limit)) {
             from = place + 1;
-            let Some(entry) = surface.get(place) else { break };
+            let Some(entry) = surface.get(place).filter(|_| !contact.is_gripped(place)) else { continue };
             let node = entry.node as usize;
             let next = next.get(row(node)).copied().unwrap_or_default().0;
             let Some(mut found) = self.found(place, entry.node) else { continue };
@@ -197,11 +235,34 @@ impl<M: ElementMaterial> Trial<'_, M> {
                     (found.normal, found.relative, found.gap) = (normal, normal, 1.0);
                 }
             }
-            let at = self.touched;
-            if let Some(room) = self.memory().and_then(|memory| memory.touched.get_mut(at)) {
-                *room = found;
-                self.touched += 1;
+            self.add_touched(found);
+        }
+        for grip in contact.grips() {
+            let (place, index) = (grip.place as usize, grip.instrument as usize);
+            let (Some(entry), Some(placed)) = (surface.get(place), placed.get(index)) else { continue };
+            if let Some(mut memory) = self.memory() {
+                memory.note(place, f32::NEG_INFINITY);
             }
+            let Some(mut found) = self.found(place, entry.node) else { continue };
+            let node = entry.node as usize;
+            let next = next.get(row(node)).copied().unwrap_or_default().0;
+            let point = predicted(entry.rest, self.displacement.get(node).unwrap_or(&NodeVector::ZERO), next);
+            let relative = point - placed.held(grip.point);
+            if self.refuses_depth(index, entry.node, relative.length()) {
+                self.touched = 0;
+                return;
+            }
+            (found.normal, found.relative) = (Vec3::Z.to_array(), relative.to_array());
+            (found.friction, found.instrument) = (HELD, grip.instrument);
+            self.add_touched(found);
+        }
+    }
+
+    fn add_touched(&mut self, found: TouchedNode) {
+        let at = self.touched;
+        if let Some(room) = self.memory().and_then(|memory| memory.touched.get_mut(at)) {
+            *room = found;
+            self.touched += 1;
         }
     }
 
@@ -237,7 +298,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         totals: &mut Totals,
         next: impl Fn(usize) -> [f32; 4],
     ) {
-        self.touches.fill(Touch::default());
+        self.clear_touches();
         let placed = &*contact.placed(self.progress.time, step.seconds());
         for at in 0..self.touched {
             let Some(&each) = self.touched_nodes().0.get(at) else { continue };
@@ -256,6 +317,8 @@ impl<M: ElementMaterial> Trial<'_, M> {
             if let Some(touch) = self.touches.get_mut(index) {
                 touch.add(push, placed.arm(point), -each.gap, [way, placed.carried(point)]);
             }
+            let normal = if each.friction == HELD { Vec3::ZERO } else { Vec3::from_array(each.normal) };
+            self.list(each.node, each.instrument, [point, normal, push], -each.gap);
         }
     }
 
@@ -292,6 +355,23 @@ impl<M: ElementMaterial> Trial<'_, M> {
         metre > most
     }
 
+    /// A node with its way to where an instrument holds it.
+    fn gripped(
+        &self,
+        node: usize,
+        rest: [f32; 3],
+        placed: &Placed<'_>,
+        (grip, method): (&Grip, &impl StepMethod<M>),
+    ) -> Option<Met> {
+        let mut met = self.met(node, rest, placed, method)?;
+        let (held, point) =
+            (placed.held(grip.point), predicted(rest, self.displacement.get(node)?, met.next));
+        let (arm, carried) = (placed.arm(held), placed.carried(held));
+        met.meeting = Meeting { gap: point.distance(held), normal: Vec3::ZERO, arm, carried, point: held };
+        met.way = held - point;
+        Some(met)
+    }
+
     fn met(
         &self,
         node: usize,
@@ -303,7 +383,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let [increment, force] = [*self.increment.get(node)?, *self.force.get(node)?];
         let next = method.next_increment(node, &inertia, &increment, &force);
         let meeting = placed.meet(predicted(rest, self.displacement.get(node)?, next))?;
-        Some(Met { node, inertia, increment, force, next, meeting })
+        Some(Met { node, inertia, increment, force, next, meeting, way: Vec3::ZERO })
     }
 }
 
@@ -313,10 +393,20 @@ impl Met {
         self.inertia.inverse.iter().any(|&inverse| inverse > 0.0)
     }
 
+    /// The force that takes it where it is held, N, along free axes.
+    fn hold(&self, step: &Step) -> Vec3 {
+        self.free() * self.way * (self.inertia.mass / step.push())
+    }
+
+    /// Ones along free axes.
+    fn free(&self) -> Vec3 {
+        Vec3::from_array(self.inertia.inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 }))
+    }
+
     /// The push, N, along free axes.
     fn push(&self, step: &Step, friction: f32) -> Vec3 {
         let Self { inertia, next, meeting, .. } = self;
-        let free = Vec3::from_array(inertia.inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 }));
+        let free = self.free();
         // A node that supports guide along a plane or a line is moved within it.
         let normal = free * meeting.normal;
         let square = normal.length_squared();

@@ -25,7 +25,7 @@ pub use status::{Divergence, Status};
 pub use threads::Rayon;
 pub use threads::{CallingThread, MOST_PARTS, Threads};
 
-use crate::contact::Touch;
+use crate::contact::{ContactPoint, Touch};
 use crate::element::{ElementMaterial, NodeInertia};
 use crate::loads::Loads;
 use crate::scene::SceneView;
@@ -46,6 +46,9 @@ pub(crate) struct Trial<'a, M> {
     pub(crate) progress: &'a mut Progress,
     /// What the instruments feel, as far as the host wants to know.
     pub(crate) touches: &'a mut [Touch],
+    /// Where they push, and how many of these are written.
+    pub(crate) points: &'a mut [ContactPoint],
+    pub(crate) listed: usize,
     /// Pushes of the instruments, see [`StateView`], and how many nodes touch one in this step.
     pub(crate) pushes: &'a mut [NodeVector],
     pub(crate) touched: usize,
@@ -113,7 +116,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     ) -> Result<Self, Status> {
         Self::check(scene, loads, &state, room)?;
         let nodes = scene.node_count();
-        let StateView { displacement, increment, force, volume, progress, touches, pushes } = state;
+        let StateView { displacement, increment, force, volume, progress, touches, points, pushes } = state;
         Ok(Self {
             scene,
             loads,
@@ -123,6 +126,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             volume: volume.get_mut(..nodes).unwrap_or_default(),
             progress,
             touches,
+            points,
+            listed: 0,
             pushes,
             touched: 0,
             refused: None,

@@ -151,7 +151,7 @@ fn the_field_of_a_mesh_is_its_distance() {
     for (index, value) in made.values.iter().enumerate() {
         let at = [index % x, index / x % y, index / (x * y)];
         let way = [0, 1, 2].map(|axis| {
-            let half = 0.5 * bar.size[axis] as f32;
+            let half = 0.5 * bar.size[axis];
             (made.origin[axis] + made.spacing * at[axis] as f32 - half).abs() - half
         });
         let outside: f32 = way.iter().map(|way| way.max(0.0).powi(2)).sum();

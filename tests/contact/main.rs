@@ -7,6 +7,7 @@ mod networks;
 mod clearance;
 mod closed_forms;
 mod fields;
+mod grips;
 mod long_steps;
 mod scene;
 mod touching;
