@@ -7,7 +7,7 @@ use core::fmt;
 
 use glam::Vec3;
 
-use crate::contact::Contact;
+use crate::contact::{Contact, Surface, kept_pushes};
 use crate::element::Axes;
 use crate::padding;
 use crate::scene::AsScene;
@@ -129,6 +129,8 @@ pub struct Loads<'a> {
     forces: &'a [NodalForce],
     motions: &'a [Motion],
     contact: Option<&'a Contact<'a>>,
+    /// Pushes of instruments that another run has found, N.
+    given: Option<(Surface<'a>, &'a [NodeVector])>,
     /// Nodes of the scene they were checked against.
     nodes: Option<usize>,
 }
@@ -147,7 +149,8 @@ impl LoadsOverTime for Loads<'_> {
 
 impl<'a> Loads<'a> {
     /// No load; supports stand still.
-    pub const NONE: Self = Self { gravity: [0.0; 3], forces: &[], motions: &[], contact: None, nodes: None };
+    pub const NONE: Self =
+        Self { gravity: [0.0; 3], forces: &[], motions: &[], contact: None, given: None, nodes: None };
 
     /// Checks loads against the scene they will act on. Nodes may be listed more than once: forces add
     /// up, of several motions of an axis the last one holds.
@@ -166,7 +169,7 @@ impl<'a> Loads<'a> {
         for (index, motion) in motions.iter().enumerate() {
             motion.check(index, nodes, scene.movable(motion.node as usize))?;
         }
-        Ok(Self { gravity, forces, motions, contact: None, nodes: Some(nodes) })
+        Ok(Self { gravity, forces, motions, contact: None, given: None, nodes: Some(nodes) })
     }
 
     /// Loads that the caller has checked against a scene of so many nodes. Of those that have not been, nodes that do not exist and
@@ -177,13 +180,29 @@ impl<'a> Loads<'a> {
         motions: &'a [Motion],
         nodes: usize,
     ) -> Self {
-        Self { gravity, forces, motions, contact: None, nodes: Some(nodes) }
+        Self { gravity, forces, motions, contact: None, given: None, nodes: Some(nodes) }
     }
 
     /// The same loads and instruments that touch the tissue.
     #[must_use]
     pub const fn touched_by(self, contact: &'a Contact<'a>) -> Self {
         Self { contact: Some(contact), ..self }
+    }
+
+    /// Loads with the pushes that the instruments exert in the latest step of a state in place of the instruments, if it keeps them.
+    pub(crate) fn with_pushes_of<'b>(&self, state: &'b StateView<'_>) -> Loads<'b>
+    where
+        'a: 'b,
+    {
+        let given = self.contact.and_then(|contact| {
+            let surface = contact.surface();
+            Some((surface, kept_pushes(state.pushes, surface.nodes().len())?))
+        });
+        if given.is_none() { *self } else { Loads { contact: None, given, ..*self } }
+    }
+
+    pub(crate) const fn given_pushes(&self) -> Option<(Surface<'a>, &'a [NodeVector])> {
+        self.given
     }
 
     pub(crate) const fn contact(&self) -> Option<&'a Contact<'a>> {

@@ -8,6 +8,8 @@
 use core::ops::Deref;
 
 use crate::contact::{ContactPoint, Touch};
+#[cfg(any(feature = "std", test))]
+use crate::contact::{MOST_INSTRUMENTS, vectors_to_push};
 use crate::element::Extremes;
 use crate::energy_balance::EnergyBalance;
 use crate::material::{Element, Material};
@@ -135,8 +137,8 @@ impl<'a> StateView<'a> {
         }
     }
 
-    /// The same state, whose steps write to `touches` what each instrument feels ([`crate::contact`]): in the latest step, taken or
-    /// refused. Of instruments beyond its length nothing is written.
+    /// The same state, whose steps write to `touches` what each instrument feels ([`crate::contact`]) in the latest step: nothing if it
+    /// was refused. Of instruments beyond its length nothing is written.
     #[must_use]
     pub fn feeling(self, touches: &'a mut [Touch]) -> Self {
         Self { touches, ..self }
@@ -174,6 +176,12 @@ impl<'a> StateView<'a> {
     #[must_use]
     pub const fn displacements(&self) -> &[NodeVector] {
         self.displacement
+    }
+
+    /// What each instrument felt in the latest step, as far as the host wants to know.
+    #[must_use]
+    pub const fn touches(&self) -> &[Touch] {
+        self.touches
     }
 
     /// How many nodes the vectors hold.
@@ -237,8 +245,17 @@ impl AsState for StateView<'_> {
 pub trait StateVectors {
     /// Displacements, increments, forces; volumes of the nodes, or nothing.
     fn vectors(&self) -> [&[NodeVector]; 4];
-    /// The same, to be changed.
-    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 4];
+    /// The same, to be changed, and what is kept for instruments, if anything.
+    fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 4], InstrumentMemory<'_>);
+}
+
+/// What a state keeps for instruments ([`StateView::pushing`], [`StateView::feeling`]).
+#[derive(Debug, Default)]
+pub struct InstrumentMemory<'a> {
+    /// See [`StateView::pushing`].
+    pub pushes: &'a mut [NodeVector],
+    /// See [`StateView::feeling`].
+    pub touches: &'a mut [Touch],
 }
 
 /// A state that owns its vectors.
@@ -259,8 +276,11 @@ impl<S> Deref for State<S> {
 impl<S: StateVectors> State<S> {
     /// The state.
     pub fn view(&mut self) -> StateView<'_> {
-        let [displacement, increment, force, volume] = self.vectors.vectors_mut();
+        let ([displacement, increment, force, volume], InstrumentMemory { pushes, touches }) =
+            self.vectors.vectors_mut();
         StateView::new(displacement, increment, force, volume, &mut self.progress)
+            .pushing(pushes)
+            .feeling(touches)
     }
 
     /// Displacement of each node, m.
@@ -317,9 +337,9 @@ impl<const N: usize, const P: usize> StateVectors for FixedVectors<N, P> {
         [displacement, increment, force, &self.volumes]
     }
 
-    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 4] {
+    fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 4], InstrumentMemory<'_>) {
         let [displacement, increment, force] = &mut self.vectors;
-        [displacement, increment, force, &mut self.volumes]
+        ([displacement, increment, force, &mut self.volumes], InstrumentMemory::default())
     }
 }
 
@@ -345,16 +365,21 @@ impl<const N: usize, const P: usize> Default for FixedState<N, P> {
 /// Vectors of as many nodes as there are.
 #[cfg(any(feature = "std", test))]
 #[derive(Clone, Debug)]
-pub struct VecVectors([std::vec::Vec<NodeVector>; 4]);
+pub struct VecVectors {
+    vectors: [std::vec::Vec<NodeVector>; 4],
+    pushes: std::vec::Vec<NodeVector>,
+    touches: std::vec::Vec<Touch>,
+}
 
 #[cfg(any(feature = "std", test))]
 impl StateVectors for VecVectors {
     fn vectors(&self) -> [&[NodeVector]; 4] {
-        self.0.each_ref().map(std::vec::Vec::as_slice)
+        self.vectors.each_ref().map(std::vec::Vec::as_slice)
     }
 
-    fn vectors_mut(&mut self) -> [&mut [NodeVector]; 4] {
-        self.0.each_mut().map(std::vec::Vec::as_mut_slice)
+    fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 4], InstrumentMemory<'_>) {
+        let Self { vectors, pushes, touches } = self;
+        (vectors.each_mut().map(std::vec::Vec::as_mut_slice), InstrumentMemory { pushes, touches })
     }
 }
 
@@ -368,6 +393,21 @@ impl VecState {
     #[must_use]
     pub fn at_rest(nodes: usize) -> Self {
         let zero = || std::vec![NodeVector::ZERO; nodes];
-        Self { vectors: VecVectors([zero(), zero(), zero(), zero()]), progress: Progress::START }
+        let (vectors, pushes, touches) = ([zero(), zero(), zero(), zero()], std::vec![], std::vec![]);
+        Self { vectors: VecVectors { vectors, pushes, touches }, progress: Progress::START }
+    }
+
+    /// The same with room for what instruments do on a surface of so many nodes.
+    #[must_use]
+    pub fn meeting(mut self, surface_nodes: usize) -> Self {
+        self.vectors.pushes = std::vec![NodeVector::ZERO; vectors_to_push(surface_nodes)];
+        self.vectors.touches = std::vec![Touch::default(); MOST_INSTRUMENTS];
+        self
+    }
+
+    /// What each instrument felt in the latest step ([`StateView::feeling`]); nothing without room for it.
+    #[must_use]
+    pub fn touches(&self) -> &[Touch] {
+        &self.vectors.touches
     }
 }

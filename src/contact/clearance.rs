@@ -76,6 +76,12 @@ pub(crate) struct ContactMemory<'a> {
     pub(crate) local: &'a mut [f32],
 }
 
+/// The pushes (N) on the nodes of the surface in the latest step, from the vectors that a state keeps.
+pub(crate) fn kept_pushes(vectors: &[NodeVector], nodes: usize) -> Option<&[NodeVector]> {
+    let from = VECTORS_OF_HEAD + LOCAL_VECTORS + nodes.div_ceil(4);
+    vectors.get(from..from.checked_add(nodes)?)
+}
+
 impl<'a> ContactMemory<'a> {
     /// None if there is less than [`vectors_to_push`].
     pub(crate) fn split(vectors: &'a mut [NodeVector], nodes: usize) -> Option<Self> {
@@ -95,6 +101,18 @@ impl<'a> ContactMemory<'a> {
         })
     }
 
+    /// Forgets the pushes of another state: it was restored or reset, or has gone on without instruments.
+    pub(crate) fn forget_if_other(&mut self, progress: &Progress) {
+        if !self.follows(progress) {
+            self.before.fill(NodeVector::ZERO);
+        }
+    }
+
+    fn follows(&self, progress: &Progress) -> bool {
+        let head = &*self.head;
+        (head.steps, head.time, head.kinetic, head.last_step) == moment(progress)
+    }
+
     /// Begins a step in which the instruments go as `placed`, of a body whose nodes have moved by up to `last` along each axis in the
     /// step before and will move by up to `next`, m. Gives the limit of the thresholds for nodes that come nearer than `margin`.
     pub(crate) fn begin(
@@ -104,9 +122,9 @@ impl<'a> ContactMemory<'a> {
         [last, next]: [f32; 2],
         margin: f32,
     ) -> f32 {
-        let way = self.way(placed);
+        let (way, follows) = (self.way(placed), self.follows(progress));
+        self.forget_if_other(progress);
         let head = &mut *self.head;
-        let follows = (head.steps, head.time, head.kinetic, head.last_step) == moment(progress);
         let travelled = head.travelled + MOVED * f64::from(last) + way.map_or(0.0, f64::from);
         // Not a number, or infinite: begins anew as well.
         if follows && way.is_some() && travelled < MOST_TRAVELLED {

@@ -61,7 +61,7 @@ mod shape;
 mod surface;
 
 pub use clearance::vectors_to_push;
-pub(crate) use clearance::{ContactMemory, largest_component};
+pub(crate) use clearance::{ContactMemory, kept_pushes, largest_component};
 pub use field::{Field, FieldError};
 #[cfg(feature = "field")]
 pub use field_of_surface::SurfaceField;

@@ -19,6 +19,7 @@ pub struct SurfaceNode {
 #[derive(Clone, Copy, Debug)]
 pub struct Surface<'a> {
     nodes: &'a [SurfaceNode],
+    scene_nodes: usize,
 }
 
 impl<'a> Surface<'a> {
@@ -32,7 +33,12 @@ impl<'a> Surface<'a> {
                 return Err(ContactError::Point { place, node: entry.node });
             }
         }
-        Ok(Self { nodes })
+        Ok(Self { nodes, scene_nodes })
+    }
+
+    /// Nodes of the scene that it was checked against.
+    pub(crate) const fn scene_nodes(&self) -> usize {
+        self.scene_nodes
     }
 
     /// The nodes.

@@ -257,6 +257,8 @@ impl GuardView<'_> {
         }
         // At the start a load may begin within a step, of which the first run's first step knows nothing.
         let parts = if envelope.is_new() || gone > (1.0 + ROUNDING) * f64::from(*longest) { 2 } else { 1 };
+        // The instruments are the first run's: the second one has their forces.
+        let loads = &loads.with_pushes_of(state);
         let (gone, seconds) = (gone as f32, f32::min(gone as f32 / parts as f32, *longest));
         let mut followed = large.set_seconds(seconds).is_ok();
         for _ in 0..parts {

@@ -138,6 +138,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
         if trial.loads.contact().is_some() {
             self.meet_instruments(trial, &mut totals);
         }
+        let Storage { tables, places, .. } = &self.storage;
+        trial.add_work_of_given(&mut totals, |node| {
+            tables.next_increment.get(rank_of(places, node)).copied().unwrap_or_default().0
+        });
         Computed { totals, extremes }
     }
 

@@ -34,6 +34,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
     pub(crate) fn meet_instruments(&mut self, step: &Step, method: &impl StepMethod<M>, totals: &mut Totals) {
         let Some(contact) = self.loads.contact() else { return };
         self.clear_touches();
+        self.touched = 0;
         let placed = &*contact.placed(self.progress.time, step.seconds());
         if self.refuses_speed(contact, placed) {
             return;
@@ -48,7 +49,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         while let Some(place) = self.next_in_reach(surface.len(), from, limit) {
             from = place + 1;
             let Some(entry) = surface.get(place).filter(|_| !contact.is_gripped(place)) else { continue };
-            let mut distance = f32::INFINITY;
+            let (mut distance, mut pushes) = (f32::INFINITY, Vec3::ZERO);
             for ((index, placed), touch) in placed.iter().enumerate().zip(&mut touches) {
                 let Some(met) = self.met(entry.node as usize, entry.rest, placed, method) else { continue };
                 distance = distance.min(placed.least_distance(&met.meeting) - axes(met.next).length());
@@ -57,12 +58,11 @@ impl<M: ElementMaterial> Trial<'_, M> {
                         return;
                     }
                     let push = met.push(step, placed.instrument.friction);
+                    pushes += push;
                     self.push(&met, push, (step, index, method), totals, touch);
                 }
             }
-            if let Some(mut memory) = self.memory() {
-                memory.note(place, distance);
-            }
+            self.keep_push(place, entry.node, distance, pushes);
         }
         for grip in contact.grips() {
             let (place, index) = (grip.place as usize, grip.instrument as usize);
@@ -71,19 +71,35 @@ impl<M: ElementMaterial> Trial<'_, M> {
             else {
                 continue;
             };
-            if let Some(mut memory) = self.memory() {
-                memory.note(place, f32::NEG_INFINITY);
-            }
             let Some(met) = self.gripped(entry.node as usize, entry.rest, placed, (grip, method)) else {
                 continue;
             };
             if self.refuses_depth(index, entry.node, met.meeting.gap) {
                 return;
             }
-            self.push(&met, met.hold(step), (step, index, method), totals, touch);
+            let push = met.hold(step);
+            self.push(&met, push, (step, index, method), totals, touch);
+            self.keep_push(place, entry.node, f32::NEG_INFINITY, push);
         }
         for (to, touch) in self.touches.iter_mut().zip(touches) {
             *to = touch;
+        }
+    }
+
+    /// Notes how far a node is from all instruments (m), and its push (N) for the steps that follow.
+    fn keep_push(&mut self, place: usize, node: u32, distance: f32, push: Vec3) {
+        let Some(mut memory) = self.memory() else { return };
+        memory.note(place, distance);
+        let before = memory.before.get(place).copied().unwrap_or_default().to_array();
+        if push != Vec3::ZERO || before != [0.0; 3] {
+            let push = push.to_array();
+            self.add_touched(TouchedNode {
+                place: place as u32,
+                node,
+                push,
+                before,
+                ..TouchedNode::default()
+            });
         }
     }
 
@@ -113,7 +129,8 @@ impl<M: ElementMaterial> Trial<'_, M> {
         self.list(met.node as u32, instrument as u32, [position, met.meeting.normal, push], depth);
     }
 
-    fn clear_touches(&mut self) {
+    /// Nothing touches.
+    pub(super) fn clear_touches(&mut self) {
         self.touches.fill(Touch::default());
         self.points.fill(ContactPoint::default());
         self.listed = 0;
@@ -160,17 +177,36 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
     }
 
-    /// Adds the pushes of the step before to the forces.
+    /// Adds the pushes of the step before to the forces, or those of another run.
     pub(crate) fn add_pushes_before(&mut self) {
-        let Some(contact) = self.loads.contact() else { return };
-        let Self { pushes, force, .. } = self;
-        let surface = contact.surface().nodes();
-        let Some(memory) = ContactMemory::split(pushes, surface.len()) else { return };
-        for (place, push) in memory.pushed() {
-            if let Some(NodeVector([x, y, z, _])) =
-                surface.get(place).and_then(|entry| force.get_mut(entry.node as usize))
-            {
+        let Self { pushes, force, loads, progress, .. } = self;
+        let mut add = |node: u32, push: &NodeVector| {
+            if let Some(NodeVector([x, y, z, _])) = force.get_mut(node as usize) {
                 (*x, *y, *z) = (*x + push.0[0], *y + push.0[1], *z + push.0[2]);
+            }
+        };
+        if let Some((surface, pushes)) = loads.given_pushes() {
+            surface.nodes().iter().zip(pushes).for_each(|(entry, push)| add(entry.node, push));
+        }
+        let Some(contact) = loads.contact() else { return };
+        let surface = contact.surface().nodes();
+        let Some(mut memory) = ContactMemory::split(pushes, surface.len()) else { return };
+        memory.forget_if_other(progress);
+        for (place, push) in memory.pushed() {
+            if let Some(entry) = surface.get(place) {
+                add(entry.node, push);
+            }
+        }
+    }
+
+    /// Enters the work of the pushes of another run.
+    pub(crate) fn add_work_of_given(&self, totals: &mut Totals, next: impl Fn(usize) -> [f32; 4]) {
+        let Some((surface, pushes)) = self.loads.given_pushes() else { return };
+        for (entry, push) in surface.nodes().iter().zip(pushes) {
+            if *push != NodeVector::ZERO {
+                let node = entry.node as usize;
+                let last = self.increment.get(node).copied().unwrap_or_default().0;
+                totals.add_work(axes(push.0).dot(mean(next(node), last)));
             }
         }
     }

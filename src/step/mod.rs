@@ -142,7 +142,10 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         room: usize,
     ) -> Result<(), Status> {
         let (nodes, room) = (scene.node_count(), room.min(state.capacity_for::<M>()));
-        if nodes == 0 || room < nodes || loads.nodes().is_some_and(|checked| checked != nodes) {
+        let is_other = |checked| checked != nodes;
+        let surface = loads.contact().map(|contact| contact.surface().scene_nodes());
+        if nodes == 0 || room < nodes || loads.nodes().is_some_and(is_other) || surface.is_some_and(is_other)
+        {
             return Err(Status::Mismatch { nodes, room });
         }
         Ok(())
@@ -164,6 +167,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             Ok(balance) => balance,
             Err((node, cause)) => {
                 method.refuse();
+                self.clear_touches();
                 return Status::Diverged(Divergence { time: self.progress.time, node, cause });
             }
         };

@@ -7,9 +7,10 @@ use supple::mesh::Bar;
 use supple::mlp::Network;
 use supple::scene::Support;
 use supple::state::NodeVector;
-use supple::step::{Status, Step};
+use supple::step::{Cause, Status, Step};
 use supple::tled;
 
+use super::networks::uniform;
 use super::scene::{Body, compared};
 
 /// Who takes the steps.
@@ -200,5 +201,56 @@ fn pressing_sliding_and_retracting_give_the_forces_of_exact_steps() {
             assert!(left == 0, "{left} still touch");
             assert!(share < if method_is_exact { 0.05 } else { most } && deepest < most_inside * EDGE);
         }
+    }
+}
+
+/// Instruments anywhere, of any size and speed, in multilevel and damped steps: a step is taken with finite numbers, or refused.
+#[test]
+fn no_pose_makes_a_long_step_wrong_and_calls_it_right() {
+    let fixed: Vec<_> = (0..25).map(Support::fixed).collect();
+    let critical = Body::new(BAR, &fixed, 20.0).step.seconds();
+    // More of them on demand.
+    let asked = std::env::var("POSES").ok().and_then(|poses| poses.parse().ok());
+    let poses = asked.unwrap_or(if cfg!(feature = "slow-tests") { 20_000 } else { 1_000 });
+    for (method, multiple) in [(multilevel(), 4.0f32), (damped(), 20.0)] {
+        let mut run = Run::new(Body::new(BAR, &fixed, 20.0), Some(method), multiple * critical, 20.0);
+        let mut uniform = uniform(3);
+        let mut random = || 0.5 * (uniform() + 1.0);
+        let (mut taken, mut refused, mut touched) = (0, 0, 0);
+        for pose in 0..poses {
+            let place = [0.06, 0.06, 0.08].map(|size| size * (random() - 0.25));
+            let direction = [random() - 0.5, random() - 0.5, random() - 0.5];
+            let shape = match pose % 3 {
+                0 => Shape::Sphere { radius: 1e-4 + 0.02 * random() },
+                1 => Shape::Capsule { radius: 1e-4 + 0.01 * random(), length: 0.1 * random() + 1e-6 },
+                _ => Shape::Plane,
+            };
+            let mut instrument = Instrument::resting(shape, Pose::along(place, direction));
+            instrument.friction = 2.0 * random();
+            // Up to 3 km/s.
+            let way = 3000.0 * random().powi(8) * multiple * critical;
+            let end = [0, 1, 2].map(|axis| place[axis] + way * direction[axis]);
+            let now = run.body.time();
+            instrument.move_to(Pose::along(end, direction), now, now + f64::from(multiple * critical));
+            let status = run.step(instrument);
+            if status.is_taken() {
+                taken += 1;
+                touched += usize::from(run.touch[0].contacts > 0);
+                assert!(run.touch[0].force.iter().chain(&run.touch[0].moment).all(|part| part.is_finite()));
+            } else {
+                refused += 1;
+                if !matches!(status, Status::Diverged(d) if matches!(d.cause, Cause::Instrument { .. })) {
+                    run.body.state(&mut []).reset();
+                }
+            }
+            if pose % 100 == 0 {
+                let nodes = 0..run.body.points.len();
+                assert!(
+                    nodes.into_iter().all(|node| run.body.displacement(node).iter().all(|u| u.is_finite()))
+                );
+            }
+        }
+        println!("{multiple} times: {taken} taken, {touched} of them touched; {refused} refused");
+        assert!(touched > poses / 100 && refused > poses / 100);
     }
 }
