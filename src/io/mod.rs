@@ -22,7 +22,7 @@ use std::vec::Vec;
 use error::Fault;
 pub use error::ReadError;
 pub use replace::write_atomically;
-pub use write::{Frame, write_pvd, write_vtu};
+pub use write::{Frame, write_pvd, write_triangles, write_vtu};
 
 /// A tetrahedral mesh as its file has it; nothing is scaled, renumbered or turned.
 #[derive(Clone, Debug, Default, PartialEq)]

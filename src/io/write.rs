@@ -33,10 +33,6 @@ pub struct Frame<'a> {
 /// [`InvalidInput`](io::ErrorKind::InvalidInput), as is a tetrahedron that names a point beyond the last.
 pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
     let (n_points, n_tets) = (frame.points.len(), frame.tets.len());
-    if let Some(tet) = frame.tets.iter().position(|tet| tet.iter().any(|&p| p as usize >= n_points)) {
-        let corners = frame.tets.get(tet);
-        return Err(invalid(format!("tetrahedron {tet} names the points {corners:?} of {n_points}")));
-    }
     let mut arrays = Arrays { xml: String::new(), data: Vec::new() };
     arrays.open("PointData");
     for (name, values) in frame.point_vectors {
@@ -54,14 +50,35 @@ pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
         arrays.add(name, "Float32", 1, values.iter().map(|x| x.to_le_bytes()))?;
     }
     arrays.close("CellData");
+    write_cells(path, frame.points, ("tetrahedron", frame.tets, 10), arrays)
+}
+
+/// Writes triangles, as those of an instrument, as a `.vtu` file, as [`write_vtu`] does.
+pub fn write_triangles(path: &Path, points: &[[f64; 3]], triangles: &[[u32; 3]]) -> io::Result<()> {
+    write_cells(path, points, ("triangle", triangles, 5), Arrays { xml: String::new(), data: Vec::new() })
+}
+
+/// Writes cells of one VTK type with their fields.
+fn write_cells<const N: usize>(
+    path: &Path,
+    points: &[[f64; 3]],
+    (name, cells, kind): (&str, &[[u32; N]], u8),
+    mut arrays: Arrays,
+) -> io::Result<()> {
+    let (n_points, n_cells) = (points.len(), cells.len());
+    if let Some((index, corners)) =
+        cells.iter().enumerate().find(|(_, cell)| cell.iter().any(|&p| p as usize >= n_points))
+    {
+        return Err(invalid(format!("{name} {index} names the points {corners:?} of {n_points}")));
+    }
     arrays.open("Points");
-    arrays.add("Points", "Float64", 3, frame.points.as_flattened().iter().map(|x| x.to_le_bytes()))?;
+    arrays.add("Points", "Float64", 3, points.as_flattened().iter().map(|x| x.to_le_bytes()))?;
     arrays.close("Points");
     arrays.open("Cells");
-    let corners = frame.tets.as_flattened().iter().map(|&p| i64::from(p).to_le_bytes());
+    let corners = cells.as_flattened().iter().map(|&p| i64::from(p).to_le_bytes());
     arrays.add("connectivity", "Int64", 1, corners)?;
-    arrays.add("offsets", "Int64", 1, (1..=n_tets).map(|tet| (4 * tet as i64).to_le_bytes()))?;
-    arrays.add("types", "UInt8", 1, frame.tets.iter().map(|_| [10]))?;
+    arrays.add("offsets", "Int64", 1, (1..=n_cells).map(|cell| ((N * cell) as i64).to_le_bytes()))?;
+    arrays.add("types", "UInt8", 1, cells.iter().map(|_| [kind]))?;
     arrays.close("Cells");
 
     replace(path, false, |w| {
@@ -71,7 +88,7 @@ pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
         )?;
         writeln!(
             w,
-            "<UnstructuredGrid><Piece NumberOfPoints=\"{n_points}\" NumberOfCells=\"{n_tets}\">\n{}</Piece>",
+            "<UnstructuredGrid><Piece NumberOfPoints=\"{n_points}\" NumberOfCells=\"{n_cells}\">\n{}</Piece>",
             arrays.xml
         )?;
         w.write_all(b"</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_")?;
@@ -81,14 +98,17 @@ pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
 }
 
 /// Writes a `.pvd` file, as [`write_vtu`] does: the frames of a simulation as pairs of a time in s and the name of a `.vtu` file
-/// relative to the folder of the `.pvd` file.
+/// relative to the folder of the `.pvd` file. Files of one time that follow each other are shown together.
 pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> io::Result<()> {
     replace(path, false, |w| {
         w.write_all(
             b"<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n",
         )?;
+        let (mut part, mut before) = (0, f64::NAN);
         for (time, file) in frames {
-            writeln!(w, "<DataSet timestep=\"{time}\" part=\"0\" file=\"{}\"/>", escaped(file))?;
+            part = if *time == before { part + 1 } else { 0 };
+            before = *time;
+            writeln!(w, "<DataSet timestep=\"{time}\" part=\"{part}\" file=\"{}\"/>", escaped(file))?;
         }
         w.write_all(b"</Collection>\n</VTKFile>\n")
     })

@@ -3,6 +3,7 @@ mod errors;
 mod evaluate;
 mod inertia;
 mod inspect;
+mod instruments;
 mod interrupted;
 mod learned;
 mod screen;

@@ -10,6 +10,7 @@ mod added_mass;
 mod demo;
 mod element_name;
 mod evaluate;
+mod field;
 #[cfg(test)]
 mod hostile;
 mod inspect;
@@ -65,7 +66,7 @@ enum Command {
         #[arg(long, value_name = "MM")]
         accuracy: Option<f64>,
     },
-    /// A liver lobe under its own weight and a push, with a table and a picture
+    /// A liver lobe under its own weight that a ball presses, with a table and a picture
     Demo {
         /// Folder for frames and picture; results of an earlier demo are overwritten
         #[arg(long, default_value = "out/demo")]
@@ -76,6 +77,8 @@ enum Command {
     /// Train a network for the learned step; a training that was stopped goes on where it was
     #[cfg(feature = "train")]
     Train(train::Asked),
+    /// Make the signed distances of a closed surface, for an instrument of any form
+    Field(field::Asked),
     /// Convert weight files to and from safetensors
     #[command(subcommand)]
     Weights(convert::Conversion),
@@ -91,6 +94,7 @@ fn main() -> ExitCode {
         Command::Evaluate(asked) => evaluate::evaluate(&asked),
         #[cfg(feature = "train")]
         Command::Train(asked) => train::train(&asked),
+        Command::Field(asked) => field::make(&asked),
         Command::Weights(conversion) => convert::convert(&conversion),
     };
     match done {

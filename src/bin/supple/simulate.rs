@@ -63,7 +63,7 @@ impl MaterialWork for Simulation<'_> {
         let mut folder = Folder::create(out, force)?;
 
         let tick = |time: f64| progress.set_position((time * 1e3) as u64);
-        let mut frame = |state: &mut VecState| folder.add_frame(&setup.body, scene, state);
+        let mut frame = |state: &mut VecState| folder.add_frame(setup, scene, state);
         let outcome = run(setup, scene, &mut state, start, &tick, &mut frame)?;
         if outcome.divergence.is_some() {
             // The last state that may be believed.

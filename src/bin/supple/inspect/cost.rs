@@ -45,6 +45,9 @@ impl MaterialWork for Cost<'_> {
         }
         row("element", setup.element.name());
         row("mass", format!("{:.3} g", 1e3 * scene.mass()));
+        if !setup.tools.is_empty() {
+            row("instruments", &setup.tools);
+        }
         row("elements left out", setup.body.mesh.tets.len() - scene.element_count());
         let bound = critical(scene, &mut state)?;
         describe_limits(scene, &state, bound);

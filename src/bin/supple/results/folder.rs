@@ -5,17 +5,19 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use supple::element::ElementMaterial;
-use supple::io::{Frame, write_atomically, write_pvd, write_vtu};
+use supple::io::{Frame, write_atomically, write_pvd, write_triangles, write_vtu};
 use supple::scene::SceneView;
 use supple::state::VecState;
 use supple::tled;
 
+use super::instrument_mesh;
 use super::staging::Staging;
 use crate::problem::Problem;
 use crate::scene::body::Body;
+use crate::scene::setup::Setup;
 
 /// Results but frames, by the names of their files.
-const TABLES: [&str; 4] = ["frames.pvd", "final.csv", "summary.json", PICTURE];
+const TABLES: [&str; 5] = ["frames.pvd", "final.csv", "reactions.csv", "summary.json", PICTURE];
 /// The picture of a demo.
 pub(crate) const PICTURE: &str = "lobe.svg";
 
@@ -23,12 +25,13 @@ pub(crate) const PICTURE: &str = "lobe.svg";
 pub(crate) struct Folder {
     staging: Staging,
     frames: Vec<(f64, String)>,
+    count: usize,
 }
 
 impl Folder {
     /// Begins a folder; one that is there is left alone unless `force`, and until the new one is complete.
     pub(crate) fn create(path: &Path, force: bool) -> Result<Self, Problem> {
-        Ok(Self { staging: Staging::open(path, force, is_result)?, frames: vec![] })
+        Ok(Self { staging: Staging::open(path, force, is_result)?, frames: vec![], count: 0 })
     }
 
     /// Puts the complete folder into its place.
@@ -44,10 +47,11 @@ impl Folder {
     /// elements.
     pub(crate) fn add_frame<M: ElementMaterial>(
         &mut self,
-        body: &Body,
+        setup: &Setup,
         scene: SceneView<'_, M>,
         state: &mut VecState,
     ) -> Result<(), Problem> {
+        let body = &setup.body;
         let pressure = tled::nodal_pressures(&scene, state)
             .ok_or_else(|| Problem("the state does not have the nodes of the scene".into()))?;
         let displacement: Vec<_> = state.displacements().iter().map(|vector| vector.to_array()).collect();
@@ -59,7 +63,9 @@ impl Folder {
             von_mises[fields.element] = fields.von_mises as f32;
             volume_ratio[fields.element] = fields.volume_ratio as f32;
         }
-        let name = format!("frame_{:04}.vtu", self.frames.len());
+        let number = self.count;
+        self.count += 1;
+        let name = format!("frame_{number:04}.vtu");
         let frame = Frame {
             points: &body.mesh.points,
             tets: &body.mesh.tets,
@@ -69,6 +75,12 @@ impl Folder {
         };
         write_vtu(&self.path(&name), &frame).map_err(Problem::of)?;
         self.frames.push((state.time(), name));
+        if !setup.tools.is_empty() {
+            let (points, triangles) = instrument_mesh::of(&setup.tools, body, state.time());
+            let name = format!("instruments_{number:04}.vtu");
+            write_triangles(&self.path(&name), &points, &triangles).map_err(Problem::of)?;
+            self.frames.push((state.time(), name));
+        }
         // Always complete, so that a look while the simulation runs sees the frames there are.
         write_pvd(&self.path("frames.pvd"), &self.frames).map_err(Problem::of)
     }
@@ -95,6 +107,7 @@ fn is_result(name: &OsStr) -> bool {
     // `.NAME.PROCESS-COUNT.tmp`
     let temporary = name.strip_prefix('.').and_then(|rest| rest.strip_suffix(".tmp"));
     let name = temporary.and_then(|rest| rest.rsplit_once('.')).map_or(name, |(name, _)| name);
-    let number = name.strip_prefix("frame_").and_then(|rest| rest.strip_suffix(".vtu"));
+    let number = ["frame_", "instruments_"].into_iter().find_map(|prefix| name.strip_prefix(prefix));
+    let number = number.and_then(|rest| rest.strip_suffix(".vtu"));
     TABLES.contains(&name) || number.is_some_and(|number| number.parse::<u32>().is_ok())
 }

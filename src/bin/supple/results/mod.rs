@@ -3,6 +3,7 @@
 
 pub(crate) mod figures;
 pub(crate) mod folder;
+pub(crate) mod instrument_mesh;
 pub(crate) mod picture;
 pub(crate) mod report;
 mod staging;
@@ -39,6 +40,9 @@ pub(crate) fn conclude<M: ElementMaterial>(
     let warnings = warnings::of(setup, outcome);
     let report = report::of(setup, outcome, &figures, &warnings);
     folder.write_final(&setup.body, state)?;
+    if !outcome.reactions.is_empty() {
+        folder.write_text("reactions.csv", &outcome.reactions.table())?;
+    }
     folder.write_text("summary.json", &report.summary())?;
     Ok(Conclusion { figures, report, warnings })
 }

@@ -8,6 +8,7 @@ use supple::inertia::Grid;
 use super::figures::Figures;
 use crate::added_mass::describe_added;
 use crate::run::outcome::{AdaptiveTrace, GuardTrace, LargeTrace, LearnedTrace, Outcome};
+use crate::run::reactions::Reactions;
 use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
 
@@ -64,6 +65,7 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome, figures: &Figures, warnings: 
     report.add_section("adaptive", outcome.adaptive.as_ref().map(adaptive_section));
     add_estimate(&mut report, outcome.guard.as_ref());
     add_motion(&mut report, figures);
+    add_reactions(&mut report, &outcome.reactions);
     report
 }
 
@@ -188,6 +190,25 @@ fn add_motion(report: &mut Report, figures: &Figures) {
         "work": energy.work, "dissipated": energy.dissipated,
         "kinetic": energy.kinetic, "strain": figures.strain_energy,
     } }));
+}
+
+/// What the instruments felt.
+fn add_reactions(report: &mut Report, reactions: &Reactions) {
+    if reactions.is_empty() {
+        return;
+    }
+    let largest = reactions.largest();
+    let words = largest.iter().enumerate().map(|(instrument, (newton, time, contacts, _))| {
+        format!("{instrument}: {newton:.3e} N on {contacts} nodes at {time:.3} s")
+    });
+    let figures = largest.iter().map(|(newton, time, contacts, depth)| {
+        json!({ "largest_force_n": newton, "at_s": time, "contacts": contacts, "depth_m": decimal(*depth) })
+    });
+    report.add(
+        "instruments",
+        words.collect::<Vec<_>>().join(", "),
+        json!({ "instruments": figures.collect::<Vec<_>>() }),
+    );
 }
 
 /// Mass-scaled, multilevel or damped steps.

@@ -9,6 +9,9 @@ use supple::tled::{self, Approach, Pace, vectors_for_pace};
 
 use super::outcome::Outcome;
 
+/// Steps are single precision: their sum may miss a time by this share of the whole.
+pub(crate) const ROUNDING: f64 = 1e-7;
+
 /// What a scene moves under.
 #[derive(Clone, Copy)]
 pub(crate) struct Motion<'a, M> {
@@ -81,13 +84,17 @@ impl Automatic {
     ) {
         let Motion { scene, damping, mut loads, end, tick } = *motion;
         // A remainder of rounding is no step.
-        while target - state.time() > 1e-9 * end && outcome.divergence.is_none() {
+        while target - state.time() > ROUNDING * end && outcome.divergence.is_none() {
             tick(state.time());
             let left = target - state.time();
-            let (before, view, kept) = (outcome.limits, state.view(), &mut self.kept);
+            let (before, mark) = (outcome.limits, outcome.reactions.mark());
+            let (view, kept) = (state.view(), &mut self.kept);
             let enter = |status, _: &Loads<'_>, state: &StateView<'_>| outcome.enter(status, state);
             match self.pace.approach(left, damping, scene, &mut loads, view, kept, &CallingThread, enter) {
-                Approach::Undone => (outcome.limits, outcome.divergence) = (before, None),
+                Approach::Undone => {
+                    (outcome.limits, outcome.divergence) = (before, None);
+                    outcome.reactions.take_back(mark);
+                }
                 // The rest is no step.
                 Approach::TooShort => return,
                 Approach::Taken { seconds } => {

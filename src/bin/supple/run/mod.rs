@@ -5,6 +5,7 @@ pub(crate) mod exact;
 pub(crate) mod large;
 pub(crate) mod learned;
 pub(crate) mod outcome;
+pub(crate) mod reactions;
 pub(crate) mod start;
 
 use std::time::Instant;
@@ -17,8 +18,9 @@ use supple::tled::Pace;
 
 use crate::problem::Problem;
 use crate::scene::setup::Setup;
-use exact::{ExactSteps, Motion};
+use exact::{ExactSteps, Motion, ROUNDING};
 use outcome::{LargeTrace, Outcome};
+use reactions::Reactions;
 use start::{Mover, Start, critical};
 
 /// Runs to the end or to divergence. `frame` is called at rest and after each interval between frames, `tick` with the time (s) now
@@ -32,10 +34,11 @@ pub(crate) fn run<M: ElementMaterial>(
     frame: &mut dyn FnMut(&mut VecState) -> Result<(), Problem>,
 ) -> Result<Outcome, Problem> {
     let loads = setup.loads(&scene)?;
-    let time = &setup.time;
-    let motion = Motion { scene, loads, damping: setup.damping, end: time.end, tick };
+    let (time, tools) = (&setup.time, &setup.tools);
+    let rounding = 2.0 * ROUNDING * time.end;
     let Start { at_rest, step, mut mover, mut guard } = start;
     let mut outcome = Outcome::new(at_rest, step.seconds());
+    outcome.reactions = Reactions::new(tools.tools.len(), time);
     if let (Mover::Large(large), Some(method)) = (&mover, &time.method) {
         outcome.large = Some(LargeTrace::new(method, large.model()));
     }
@@ -56,11 +59,24 @@ pub(crate) fn run<M: ElementMaterial>(
         let share = index as f64 / frames as f64;
         let clock = Instant::now();
         if let Mover::Exact(ExactSteps::Automatic(automatic)) = &mut mover {
-            automatic.reach(&motion, state, &mut outcome, time.end * share);
+            let (target, mut from) = (time.end * share, state.time());
+            while from < target && outcome.divergence.is_none() {
+                let until = target.min(tools.next_turn(from + rounding));
+                let instruments = tools.at(from + rounding);
+                let contact = tools.contact(&instruments, scene.node_count())?;
+                let loads = if tools.is_empty() { loads } else { loads.touched_by(&contact) };
+                let motion = Motion { scene, loads, damping: setup.damping, end: time.end, tick };
+                automatic.reach(&motion, state, &mut outcome, until);
+                from = until;
+            }
         } else {
             let target = (total as f64 * share).round() as u64;
             while taken < target && outcome.divergence.is_none() {
                 taken += 1;
+                let instruments = tools.at(state.time() + rounding);
+                let contact = tools.contact(&instruments, scene.node_count())?;
+                let loads = if tools.is_empty() { loads } else { loads.touched_by(&contact) };
+                let motion = Motion { scene, loads, damping: setup.damping, end: time.end, tick };
                 mover.advance(&motion, state, &mut outcome, interval)?;
                 if let Some(guard) = guard.as_mut().filter(|_| outcome.divergence.is_none()) {
                     let status = guard.follow(Status::Ok, scene, &loads, &state.view());

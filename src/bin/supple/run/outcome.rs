@@ -10,6 +10,8 @@ use supple::material::J_FLOOR;
 use supple::state::StateView;
 use supple::step::{CriticalStep, Divergence, Status};
 
+use super::reactions::Reactions;
+
 /// Steps that are not exact: elements were beyond the range of their law, there was energy that the balance does not explain, or
 /// motion was held back.
 #[derive(Clone, Copy)]
@@ -58,6 +60,8 @@ pub(crate) struct Outcome {
     pub(crate) adaptive: Option<AdaptiveTrace>,
     /// With steps beyond the critical one.
     pub(crate) guard: Option<GuardTrace>,
+    /// With instruments.
+    pub(crate) reactions: Reactions,
 }
 
 impl Outcome {
@@ -76,12 +80,16 @@ impl Outcome {
             learned: None,
             adaptive: None,
             guard: None,
+            reactions: Reactions::NONE,
         }
     }
 
     /// Takes down what a step said that led to `state`.
     pub(crate) fn enter(&mut self, status: Status, state: &StateView<'_>) {
         self.computed += 1;
+        if status.is_taken() {
+            self.reactions.enter(state);
+        }
         match status {
             Status::Limited { least_volume_ratio, saturation, energy_excess } => {
                 let limits = &mut self.limits;

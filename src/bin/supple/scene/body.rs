@@ -14,6 +14,8 @@ pub(crate) struct Body {
     pub(crate) mesh: TetMesh,
     /// Coordinates less `centre`, which float32 holds better than the corner of a room.
     pub(crate) local: Vec<[f32; 3]>,
+    /// m.
+    pub(crate) centre: [f64; 3],
     pub(crate) winding: Winding,
     pub(crate) name: String,
 }
@@ -32,7 +34,7 @@ impl Body {
         let centre = [0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis]));
         let local = mesh.points.iter().map(|point| [0, 1, 2].map(|axis| (point[axis] - centre[axis]) as f32));
         let local = local.collect();
-        Self { mesh, local, winding, name }
+        Self { mesh, local, centre, winding, name }
     }
 
     fn bar(bar: Bar) -> Self {

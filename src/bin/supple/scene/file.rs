@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::{Spanned, Value};
 
+use super::instruments::InstrumentTable;
 use crate::problem::Problem;
 
 /// A scene file with its text, for line numbers.
@@ -33,6 +34,8 @@ pub(crate) struct SceneTable {
     pub(crate) motion: Vec<Spanned<MoveTable>>,
     #[serde(default)]
     pub(crate) traction: Vec<Spanned<TractionTable>>,
+    #[serde(default)]
+    pub(crate) instrument: Vec<Spanned<InstrumentTable>>,
     gravity: Option<Spanned<[f32; 3]>>,
     pub(crate) time: Spanned<TimeTable>,
     // The former name stays readable.
@@ -177,7 +180,9 @@ impl SceneFile {
         let force = scene.force.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let motion = scene.motion.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let traction = scene.traction.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
-        let mut given = scene.gravity.iter().chain(fix).chain(force).chain(motion).chain(traction);
+        let instrument = scene.instrument.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
+        let given = scene.gravity.iter().chain(fix).chain(force).chain(motion).chain(traction);
+        let mut given = given.chain(instrument);
         let first = given.next();
         if let Some(second) = given.next() {
             return Err(self.problem(second, "gravity is given twice"));

@@ -4,6 +4,7 @@
 
 pub(crate) mod body;
 pub(crate) mod file;
+pub(crate) mod instruments;
 pub(crate) mod learned;
 pub(crate) mod loads;
 mod plausible;

@@ -8,6 +8,7 @@ use supple::state::VecState;
 
 use super::body::{Body, read_body};
 use super::file::SceneFile;
+use super::instruments::Tools;
 use super::learned::LearnedChoice;
 use super::loads::read_loads;
 use super::plausible;
@@ -24,6 +25,7 @@ pub(crate) struct Setup {
     pub(crate) supports: Vec<Support>,
     pub(crate) forces: Vec<NodalForce>,
     pub(crate) motions: Vec<Motion>,
+    pub(crate) tools: Tools,
     pub(crate) gravity: [f32; 3],
     /// 1/s.
     pub(crate) damping: f32,
@@ -54,11 +56,13 @@ impl Setup {
             None => scene.damping.as_ref().map_or(0.0, |damping| *damping.get_ref()),
         };
         let (supports, forces, motions) = read_loads(file, &body)?;
+        let tools = Tools::read(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
         let mut warnings = plausible::warnings(file, &body, &tissues, gravity, &supports, &forces);
         let element = read_element(file, learned.as_ref())?;
         let of_the_network = learned.as_ref().filter(|_| scene.mesh.get_ref().element.is_none());
         warnings.extend(locking(&file.place(&scene.mesh), of_the_network, element, &tissues));
+        warnings.extend(tools.warnings(file, &body));
         if let Some(learned) = &learned {
             warnings.extend(learned.warning(&tissues, element)?);
         }
@@ -69,6 +73,7 @@ impl Setup {
             supports,
             forces,
             motions,
+            tools,
             gravity,
             damping,
             time,
@@ -86,6 +91,7 @@ impl Setup {
             supports: vec![],
             forces: vec![],
             motions: vec![],
+            tools: Tools::default(),
             gravity: [0.0; 3],
             damping: 0.0,
             time: Timing::of_demo(),
@@ -120,7 +126,8 @@ impl Setup {
 
     /// A state at rest.
     pub(crate) fn state(&self) -> VecState {
-        VecState::at_rest(self.body.local.len())
+        let state = VecState::at_rest(self.body.local.len());
+        if self.tools.is_empty() { state } else { state.meeting(self.tools.surface_nodes()) }
     }
 
     /// What acts on the scene.

@@ -1,0 +1,347 @@
+//! Instruments of a scene file: their shapes, and where they are over time.
+
+use std::path::PathBuf;
+
+use serde::Deserialize;
+use supple::contact::{
+    Contact, Instrument, MOST_INSTRUMENTS, Pose, Shape, Surface, SurfaceField, SurfaceNode,
+};
+use toml::Spanned;
+
+use super::body::Body;
+use super::file::SceneFile;
+use crate::field::read_surface;
+use crate::problem::Problem;
+
+/// An `[[instrument]]`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct InstrumentTable {
+    shape: Spanned<String>,
+    radius: Option<Spanned<f32>>,
+    length: Option<Spanned<f32>>,
+    file: Option<Spanned<PathBuf>>,
+    scale: Option<Spanned<f64>>,
+    spacing: Option<Spanned<f32>>,
+    friction: Option<Spanned<f32>>,
+    path: Option<Spanned<Vec<[f64; 4]>>>,
+    direction: Option<Spanned<[f32; 3]>>,
+    pub(super) gravity: Option<Spanned<[f32; 3]>>,
+}
+
+/// A shape that owns its field.
+pub(crate) enum OwnedShape {
+    Plane,
+    Sphere { radius: f32 },
+    Capsule { radius: f32, length: f32 },
+    Field(Box<OwnedField>),
+}
+
+/// A field with the surface that it was made from, m.
+pub(crate) struct OwnedField {
+    field: SurfaceField,
+    pub(crate) points: Vec<[f32; 3]>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+}
+
+/// An instrument with its path.
+pub(crate) struct Tool {
+    pub(crate) shape: OwnedShape,
+    friction: f32,
+    /// s, and m from the centre of the body.
+    path: Vec<(f64, [f32; 3])>,
+    direction: [f32; 3],
+}
+
+/// The instruments of a scene and what they can touch.
+#[derive(Default)]
+pub(crate) struct Tools {
+    pub(crate) tools: Vec<Tool>,
+    surface: Vec<SurfaceNode>,
+}
+
+impl Tools {
+    /// A ball on a path (s, and m in the body's coordinates), for the demo.
+    pub(crate) fn ball(body: &Body, radius: f32, friction: f32, path: &[(f64, [f64; 3])]) -> Self {
+        let local = |at: [f64; 3]| [0, 1, 2].map(|axis| (at[axis] - body.centre[axis]) as f32);
+        let path = path.iter().map(|&(time, at)| (time, local(at))).collect();
+        let tool = Tool { shape: OwnedShape::Sphere { radius }, friction, path, direction: [0.0, 0.0, 1.0] };
+        Self { tools: vec![tool], surface: surface_of(body) }
+    }
+
+    pub(crate) fn read(file: &SceneFile, body: &Body) -> Result<Self, Problem> {
+        let tables = &file.scene.instrument;
+        let Some(first) = tables.first() else { return Ok(Self::default()) };
+        if let Some(at) = tables.get(MOST_INSTRUMENTS) {
+            return Err(file.problem(at, format!("at most {MOST_INSTRUMENTS} instruments can touch a body")));
+        }
+        let method = file.scene.time.get_ref().method.as_ref();
+        if method.is_some_and(|method| method.get_ref() == "mass-scaled") || file.scene.learned.is_some() {
+            return Err(file.problem(
+                first,
+                "mass-scaled and learned steps cannot meet instruments; method = \"damped\" can",
+            ));
+        }
+        let tools = tables.iter().map(|at| Tool::read(file, at, body)).collect::<Result<_, _>>()?;
+        Ok(Self { tools, surface: surface_of(body) })
+    }
+
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.tools.is_empty()
+    }
+
+    /// Nodes that can be touched.
+    pub(crate) const fn surface_nodes(&self) -> usize {
+        self.surface.len()
+    }
+
+    /// The instruments on the parts of their paths that begin at `time` or before, s.
+    pub(crate) fn at(&self, time: f64) -> Vec<Instrument<'_>> {
+        self.tools.iter().map(|tool| tool.at(time)).collect()
+    }
+
+    /// The next time after `time` at which an instrument changes its way, s.
+    pub(crate) fn next_turn(&self, time: f64) -> f64 {
+        let turns = self.tools.iter().flat_map(|tool| &tool.path).map(|(turn, _)| *turn);
+        turns.filter(|turn| *turn > time).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The surface with these instruments.
+    pub(crate) fn contact<'a>(
+        &'a self,
+        instruments: &'a [Instrument<'a>],
+        nodes: usize,
+    ) -> Result<Contact<'a>, Problem> {
+        let surface = Surface::new(&self.surface, nodes).map_err(Problem::of)?;
+        Contact::new(surface, instruments).map_err(Problem::of)
+    }
+
+    /// Warnings of instruments that are thinner than the edges of the surface.
+    pub(crate) fn warnings(&self, file: &SceneFile, body: &Body) -> Vec<String> {
+        let length = |[a, b]: [u32; 2]| {
+            let [a, b] = [a, b].map(|node| body.local[node as usize]);
+            (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f32>().sqrt()
+        };
+        let triangles = if self.is_empty() { vec![] } else { body.boundary() };
+        let edges = triangles.iter().map(|&[a, b, _]| length([a, b]));
+        let mean = edges.sum::<f32>() / triangles.len().max(1) as f32;
+        let tools = self.tools.iter().zip(&file.scene.instrument);
+        let thin = tools.filter_map(|(tool, at)| match tool.shape {
+            OwnedShape::Sphere { radius } | OwnedShape::Capsule { radius, .. } if radius < mean => {
+                Some(format!(
+                    "{}: a radius of {:.2} mm is less than the mean edge of the surface, {:.2} mm: the instrument passes between \
+                     nodes",
+                    file.place(at),
+                    1e3 * radius,
+                    1e3 * mean
+                ))
+            }
+            _ => None,
+        });
+        thin.collect()
+    }
+}
+
+fn surface_of(body: &Body) -> Vec<SurfaceNode> {
+    let mut nodes = body.boundary().into_flattened();
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes.into_iter().map(|node| SurfaceNode { rest: body.local[node as usize], node }).collect()
+}
+
+impl Tool {
+    fn read(file: &SceneFile, at: &Spanned<InstrumentTable>, body: &Body) -> Result<Self, Problem> {
+        let table = at.get_ref();
+        let friction = positive(file, "friction", table.friction.as_ref(), 0.0)?.unwrap_or(0.0);
+        let direction = table.direction.as_ref().map_or([0.0, 0.0, 1.0], |direction| *direction.get_ref());
+        if let Some(at) = &table.direction
+            && !(direction.iter().all(|component| component.is_finite()) && direction != [0.0; 3])
+        {
+            return Err(file.problem(at, format!("direction is {direction:?}; it needs a length")));
+        }
+        let tool = Self {
+            shape: OwnedShape::read(file, at)?,
+            friction,
+            path: read_path(file, at, body)?,
+            direction,
+        };
+        // Whatever else the kernel refuses.
+        let instruments = [tool.at(0.0)];
+        let surface = Surface::new(&[], 0).map_err(Problem::of)?;
+        Contact::new(surface, &instruments).map_err(|error| file.problem(at, error))?;
+        Ok(tool)
+    }
+
+    fn pose(&self, position: [f32; 3]) -> Pose {
+        Pose::along(position, self.direction)
+    }
+
+    /// On the part of its path that begins at `time` or before, s.
+    fn at(&self, time: f64) -> Instrument<'_> {
+        let next = self.path.partition_point(|(turn, _)| *turn <= time).clamp(1, self.path.len().max(2) - 1);
+        let (from, to) = (self.path[next - 1], *self.path.get(next).unwrap_or(&self.path[next - 1]));
+        let mut instrument = Instrument::resting(self.shape.shape(), self.pose(from.1));
+        instrument.friction = self.friction;
+        (instrument.to, instrument.times) = (self.pose(to.1), [from.0, to.0]);
+        instrument
+    }
+
+    /// Its position at `time`, s, m from the centre of the body, and its rotation.
+    pub(crate) fn placed(&self, time: f64) -> ([f32; 3], [f32; 4]) {
+        let Instrument { from, to, times: [start, end], .. } = self.at(time);
+        let share = if time >= end { 1.0 } else { ((time - start) / (end - start)).max(0.0) } as f32;
+        let at = |axis: usize| from.position[axis] + share * (to.position[axis] - from.position[axis]);
+        ([0, 1, 2].map(at), from.rotation)
+    }
+}
+
+impl std::fmt::Display for Tools {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for (index, tool) in self.tools.iter().enumerate() {
+            let comma = if index > 0 { ", " } else { "" };
+            match &tool.shape {
+                OwnedShape::Plane => write!(f, "{comma}{index}: plane")?,
+                OwnedShape::Sphere { radius } => {
+                    write!(f, "{comma}{index}: sphere of {:.2} mm", 1e3 * radius)?
+                }
+                OwnedShape::Capsule { radius, length } => {
+                    write!(
+                        f,
+                        "{comma}{index}: capsule of {:.2} mm, {:.2} mm long",
+                        1e3 * radius,
+                        1e3 * length
+                    )?;
+                }
+                OwnedShape::Field(owned) => {
+                    let [x, y, z] = owned.field.size;
+                    write!(f, "{comma}{index}: field of {x} x {y} x {z} points")?;
+                }
+            }
+        }
+        write!(f, "; {} nodes can be touched", self.surface.len())
+    }
+}
+
+impl OwnedShape {
+    fn read(file: &SceneFile, at: &Spanned<InstrumentTable>) -> Result<Self, Problem> {
+        let table = at.get_ref();
+        let name = table.shape.get_ref().as_str();
+        let needed = |what: &str, value: Option<&Spanned<f32>>| {
+            positive(file, what, value, f32::MIN_POSITIVE)?
+                .ok_or_else(|| file.problem(at, format!("a {name} needs a {what}, m")))
+        };
+        let [radius, length] = [table.radius.as_ref(), table.length.as_ref()];
+        let surplus = match name {
+            "plane" => radius.or(length).map(|at| (at.span(), "a size")),
+            "sphere" | "field" => {
+                length.or(radius.filter(|_| name == "field")).map(|at| (at.span(), "that size"))
+            }
+            _ => None,
+        };
+        if let Some((span, what)) = surplus {
+            return Err(file.problem(&Spanned::new(span, ()), format!("a {name} has no use for {what}")));
+        }
+        match name {
+            "plane" => Ok(Self::Plane),
+            "sphere" => Ok(Self::Sphere { radius: needed("radius", radius)? }),
+            "capsule" => {
+                Ok(Self::Capsule { radius: needed("radius", radius)?, length: needed("length", length)? })
+            }
+            "field" => Ok(Self::Field(Box::new(OwnedField::read(file, at)?))),
+            other => Err(file.problem(
+                &table.shape,
+                format!(
+                    "shape \"{other}\" is not known; \"sphere\", \"capsule\", \"plane\" and \"field\" are"
+                ),
+            )),
+        }
+    }
+
+    fn shape(&self) -> Shape<'_> {
+        match self {
+            Self::Plane => Shape::Plane,
+            &Self::Sphere { radius } => Shape::Sphere { radius },
+            &Self::Capsule { radius, length } => Shape::Capsule { radius, length },
+            Self::Field(owned) => Shape::Field(owned.field.field().expect("checked when it was read")),
+        }
+    }
+}
+
+impl OwnedField {
+    /// Points of the grid along the diagonal of the surface's box.
+    const POINTS: f32 = 80.0;
+
+    fn read(file: &SceneFile, at: &Spanned<InstrumentTable>) -> Result<Self, Problem> {
+        let table = at.get_ref();
+        let Some(path) = &table.file else {
+            return Err(file.problem(at, "a field needs the file of a mesh"));
+        };
+        let scale = table.scale.as_ref().map_or(1.0, |scale| *scale.get_ref());
+        let (points, triangles) =
+            read_surface(&file.resolve(path.get_ref()), scale).map_err(|error| file.problem(path, error))?;
+        let spacing = positive(file, "spacing", table.spacing.as_ref(), f32::MIN_POSITIVE)?;
+        let spacing = spacing.unwrap_or_else(|| {
+            let of = |axis: usize| {
+                triangles.as_flattened().iter().map(move |&node| node as usize).map({
+                    let points = &points;
+                    move |node| points[node][axis]
+                })
+            };
+            let edge = |axis: usize| of(axis).fold(f32::MIN, f32::max) - of(axis).fold(f32::MAX, f32::min);
+            (0..3).map(|axis| edge(axis).powi(2)).sum::<f32>().sqrt() / Self::POINTS
+        });
+        let field =
+            SurfaceField::new(&points, &triangles, spacing).map_err(|error| file.problem(path, error))?;
+        field.field().map_err(|error| file.problem(path, format!("{error}; is the surface closed?")))?;
+        Ok(Self { field, points, triangles })
+    }
+}
+
+fn read_path(
+    file: &SceneFile,
+    at: &Spanned<InstrumentTable>,
+    body: &Body,
+) -> Result<Vec<(f64, [f32; 3])>, Problem> {
+    let table = at.get_ref();
+    let local = |[x, y, z]: [f64; 3]| {
+        let [a, b, c] = body.centre;
+        [(x - a) as f32, (y - b) as f32, (z - c) as f32]
+    };
+    let Some(path) = &table.path else {
+        return if table.shape.get_ref() == "field" {
+            // Where its file has it.
+            Ok(vec![(0.0, local([0.0; 3]))])
+        } else {
+            Err(file.problem(at, "an instrument needs a path = [[t, x, y, z], ...], s and m"))
+        };
+    };
+    let points = path.get_ref();
+    if points.is_empty() {
+        return Err(file.problem(path, "the path has no point"));
+    }
+    if let Some(point) = points.iter().find(|point| point.iter().any(|component| !component.is_finite())) {
+        return Err(file.problem(path, format!("the path holds {point:?}")));
+    }
+    if let Some((a, b)) = points.iter().zip(&points[1..]).find(|(a, b)| a[0] >= b[0]) {
+        return Err(
+            file.problem(path, format!("the path goes from {} s to {} s; times must increase", a[0], b[0]))
+        );
+    }
+    Ok(points.iter().map(|&[time, x, y, z]| (time, local([x, y, z]))).collect())
+}
+
+/// A number that is finite and not below `least`.
+fn positive(
+    file: &SceneFile,
+    what: &str,
+    value: Option<&Spanned<f32>>,
+    least: f32,
+) -> Result<Option<f32>, Problem> {
+    let Some(at) = value else { return Ok(None) };
+    let value = *at.get_ref();
+    if value.is_finite() && value >= least {
+        return Ok(Some(value));
+    }
+    let rule = if least > 0.0 { "positive" } else { "zero or more" };
+    Err(file.problem(at, format!("{what} is {value}, it must be {rule}")))
+}
