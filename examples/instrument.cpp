@@ -1,9 +1,9 @@
-// A host in C++ that shows tissue 60 times a second: a liver lobe hangs from its back, a small sphere presses its
-// dome 10 mm in, moves 4 mm sideways and out again, over and over. Each frame takes the same steps for 1/60 s; the
-// host reads the guard and the force that the sphere needs. All memory is there before the first frame.
+// A host in C++ that shows tissue 60 times a second: a liver lobe hangs from its back; a sphere comes from above, presses
+// its dome, slides 4 mm sideways with friction and leaves, over and over. Each frame takes the same steps for 1/60 s; the
+// host reads the status and the force on the sphere. All memory is there before the first frame.
 //
 //     c++ -std=c++17 -O2 -Iinclude examples/instrument.cpp -lsupple -o instrument
-//     ./instrument [--mesh FILE] [--method exact|damped|mass-scaled] [--weights FILE] [--frames N] [--out DIR]
+//     ./instrument [--mesh FILE] [--method exact|damped|multilevel] [--weights FILE] [--frames N] [--out DIR]
 //                  [--realtime] [--jitter N]
 //
 // Run from the repository it finds meshes/lobe.msh and weights/damper.weights itself. --out leaves frames for
@@ -19,6 +19,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -39,7 +41,8 @@ constexpr float BUDGET = 1000.0f * FRAME;         // ms
 constexpr supple::tissue LIVER = {{1500.0f, 8.023f, 40000.0f}, 1060.0f}; // a Pa, b, d Pa; density kg/m^3
 constexpr float DAMPING = 20.0f;                  // 1/s
 constexpr float BACK = 0.030f;                    // nodes behind this plane hang on the diaphragm, m
-constexpr float CONTACT = 0.012f, CAP = 0.004f;   // nodes touched: so near to the top, and so little below it, m
+constexpr float RADIUS = 0.010f, FRICTION = 0.3f; // of the sphere, m
+constexpr float ABOVE = 0.004f, DEPTH = 0.018f;   // how far above the dome it begins, and how far down it goes, m: the lobe sags by 10 mm
 constexpr unsigned LARGE_STEPS = 4;               // a frame: each some 20 critical steps
 // Of the critical step at rest. Tissue that is deformed is stiffer: on this path its limit falls to 0.53. To ask for it
 // again would take as long as some six steps in each frame.
@@ -78,8 +81,8 @@ options read_options(int count, char **words) {
         else if (word == "--jitter") chosen.jitter = number(1000);
         else throw std::runtime_error(word + ": no such option");
     }
-    if (chosen.method != "exact" && chosen.method != "damped" && chosen.method != "mass-scaled")
-        throw std::runtime_error("--method " + chosen.method + ": not exact, damped or mass-scaled");
+    if (chosen.method != "exact" && chosen.method != "damped" && chosen.method != "multilevel")
+        throw std::runtime_error("--method " + chosen.method + ": not exact, damped or multilevel");
     return chosen;
 }
 
@@ -105,11 +108,28 @@ void done(const char *what, supple::status status) {
 // From 0 to 1 with neither a jump nor a kink.
 double smooth(double share) { return 0.5 - 0.5 * std::cos(3.14159265358979 * std::clamp(share, 0.0, 1.0)); }
 
-// Where the sphere is after so many seconds, from where it first touches, m: in, sideways, out, a rest.
-std::array<float, 3> sphere(double seconds) {
+// How far the sphere has moved after so many seconds, m: down, sideways, up again, a rest.
+std::array<float, 3> way(double seconds) {
     const double now = std::fmod(seconds, 2.0), out = smooth((now - 1.0) / 0.5);
     const double in = smooth(now / 0.5) - out, aside = smooth((now - 0.5) / 0.5) - out;
-    return {float(0.004 * aside), float(0.002 * in), float(-0.010 * in)};
+    return {float(0.004 * aside), 0.0f, float(-DEPTH * in)};
+}
+
+// The nodes of the boundary: those of triangles that belong to one tetrahedron only.
+std::vector<std::uint32_t> boundary(const std::vector<std::uint32_t> &tetrahedra) {
+    std::map<std::array<std::uint32_t, 3>, int> faces;
+    for (std::size_t at = 0; at < tetrahedra.size(); at += 4)
+        for (std::size_t left_out = 0; left_out < 4; left_out++) {
+            std::array<std::uint32_t, 3> face = {};
+            for (std::size_t corner = 0, n = 0; corner < 4; corner++)
+                if (corner != left_out) face[n++] = tetrahedra[at + corner];
+            std::sort(face.begin(), face.end());
+            faces[face]++;
+        }
+    std::set<std::uint32_t> nodes;
+    for (const auto &[face, count] : faces)
+        if (count == 1) nodes.insert(face.begin(), face.end());
+    return {nodes.begin(), nodes.end()};
 }
 
 double milliseconds(clock_type::duration time) {
@@ -119,14 +139,14 @@ double milliseconds(clock_type::duration time) {
 // The body with all that moves it.
 struct host {
     gmsh::mesh mesh;
-    std::vector<std::uint32_t> touched; // nodes that the sphere moves
-    std::vector<supple::motion> motions;
-    std::vector<float> forces; // of the latest step, N
     std::vector<unsigned char> weights;
-    std::vector<line> scene_room, loads_room, state_room, large_room;
+    std::vector<line> scene_room, loads_room, state_room, contact_room, large_room;
     supple::scene scene;
     supple::loads loads;
     supple::state state;
+    supple::contact contact;
+    std::array<float, 3> start = {}; // of the sphere, m
+    double now = 0.0;                // s
     supple::large large; // not used by the exact step
     bool exact;
     unsigned steps = LARGE_STEPS; // a frame
@@ -138,23 +158,16 @@ struct host {
         std::uint32_t top = 0;
         for (std::uint32_t node = 1; node < nodes; node++) top = at(node)[2] > at(top)[2] ? node : top;
         std::vector<supple::support> supports;
-        for (std::uint32_t node = 0; node < nodes; node++) {
-            const float *here = at(node), *dome = at(top);
-            if (here[1] > BACK) supports.push_back({node, 7, 0});
-            else if (std::hypot(here[0] - dome[0], here[1] - dome[1], here[2] - dome[2]) < CONTACT &&
-                     here[2] > dome[2] - CAP) {
-                supports.push_back({node, 7, 1});
-                touched.push_back(node);
-                motions.push_back({node, 7, {0.0f, 0.0f, 0.0f}, 0.0f});
-            }
-        }
-        forces.resize(points.size());
+        for (std::uint32_t node = 0; node < nodes; node++)
+            if (at(node)[1] > BACK) supports.push_back({node, 7, 0});
+        start = {at(top)[0], at(top)[1], at(top)[2] + RADIUS + ABOVE};
 
         const auto elements = static_cast<std::uint32_t>(mesh.tetrahedra.size() / 4);
-        const auto moved = static_cast<std::uint32_t>(motions.size());
+        const std::vector<std::uint32_t> surface = boundary(mesh.tetrahedra);
         scene_room = room(supple::scene::size(nodes, elements));
-        loads_room = room(supple::loads::size(0, moved));
+        loads_room = room(supple::loads::size(0, 0));
         state_room = room(supple::state::size(nodes));
+        contact_room = room(supple::contact::size(static_cast<std::uint32_t>(surface.size())));
         supple::body body;
         body.law = supple::law::exponential;
         body.points = points;
@@ -162,8 +175,12 @@ struct host {
         body.supports = supports;
         body.tissues = {&LIVER, 1};
         scene = made("scene", supple::scene::make(scene_room, body));
-        loads = made("loads", supple::loads::make(loads_room, scene, 0, moved));
+        loads = made("loads", supple::loads::make(loads_room, scene, 0, 0));
         state = made("state", supple::state::make(state_room, scene));
+        contact = made("contact", supple::contact::make(contact_room, scene, points, surface));
+        const supple::instrument sphere[] = {supple::instrument::sphere(RADIUS, supple::pose_at(start), FRICTION)};
+        done("sphere", contact.set(sphere));
+        done("contact", loads.set_contact(contact));
         done("gravity", loads.set_gravity({0.0f, 0.0f, -9.81f}));
         if (exact) {
             const float longest = EXACT_SHARE * made("critical step", state.critical_step(scene)).seconds;
@@ -172,7 +189,7 @@ struct host {
             return;
         }
         supple::large_steps wanted;
-        wanted.method = supple::method::mass_scaled;
+        wanted.method = supple::method::multilevel;
         wanted.seconds = FRAME / LARGE_STEPS;
         wanted.damping = DAMPING;
         if (chosen.method == "damped") {
@@ -188,7 +205,8 @@ struct host {
     }
 
     std::size_t bytes() const {
-        return sizeof(line) * (scene_room.size() + loads_room.size() + state_room.size() + large_room.size());
+        return sizeof(line) * (scene_room.size() + loads_room.size() + state_room.size() + contact_room.size() +
+                               large_room.size());
     }
 
     supple::status step(unsigned count, supple::report &report) {
@@ -198,20 +216,19 @@ struct host {
 
     // One frame: the sphere goes evenly to where it is at the frame's end, the tissue follows.
     supple::status frame(double end, supple::report &report) {
-        const auto tip = sphere(end);
-        for (supple::motion &motion : motions) std::copy(tip.begin(), tip.end(), motion.metre);
-        done("motions", loads.set_motions(scene, motions));
+        const auto moved = way(end);
+        const auto pose = supple::pose_at({start[0] + moved[0], start[1] + moved[1], start[2] + moved[2]});
+        done("sphere", contact.move(0, pose, now, end));
         const supple::status status = step(steps, report);
-        done("forces", state.copy_forces(forces));
+        now = report.time;
         return status;
     }
 
-    // What the sphere pushes the tissue with, N: it holds up what the tissue does to its nodes.
-    std::array<double, 3> push() const {
-        std::array<double, 3> sum = {};
-        for (const std::uint32_t node : touched)
-            for (std::size_t axis = 0; axis < 3; axis++) sum[axis] -= double(forces[3 * node + axis]);
-        return sum;
+    // What the sphere feels, N.
+    supple::touch touch() const {
+        supple::touch felt{};
+        done("touch", contact.read(0, felt));
+        return felt;
     }
 };
 
@@ -264,10 +281,9 @@ void measure_jitter(host &host, long count) {
 void run(const options &chosen) {
     if (!supple::is_of_this_abi()) throw std::runtime_error("supple.h and the library are of different versions");
     host host(chosen);
-    std::printf("%zu nodes, %zu tetrahedra, %zu nodes touched, %s steps, %zu bytes for the library\n",
-                host.mesh.points.size() / 3, host.mesh.tetrahedra.size() / 4, host.touched.size(),
-                chosen.method.c_str(), host.bytes());
-    std::puts("second  mean ms  worst ms  steps  least volume  energy excess  push x, y, z N        guard");
+    std::printf("%zu nodes, %zu tetrahedra, %s steps, %zu bytes for the library\n", host.mesh.points.size() / 3,
+                host.mesh.tetrahedra.size() / 4, chosen.method.c_str(), host.bytes());
+    std::puts("second  mean ms  worst ms  steps  least volume  energy excess  most force on the sphere x, y, z N  nodes  status");
 
     const std::size_t floats = host.mesh.points.size();
     const long pictures = chosen.out.empty() ? 0 : chosen.frames / FRAMES_A_PICTURE;
@@ -275,6 +291,7 @@ void run(const options &chosen) {
     double sum = 0.0, worst = 0.0, worst_of_all = 0.0;
     long late = 0, steps = 0;
     float volume = 1.0f, excess = 0.0f;
+    supple::touch most{};
     supple::status remark = supple::status::ok;
     const auto start = clock_type::now();
     for (long frame = 1; frame <= chosen.frames; frame++) {
@@ -290,16 +307,20 @@ void run(const options &chosen) {
         sum += time, worst = std::max(worst, time), late += time > BUDGET, steps += report.steps;
         volume = std::min(volume, report.least_volume_ratio), excess = std::max(excess, report.energy_excess);
         remark = status == supple::status::ok ? remark : status;
+        const supple::touch felt = host.touch();
+        const auto size = [](const supple::touch &of) { return std::hypot(of.mean_force[0], of.mean_force[1], of.mean_force[2]); };
+        most = size(felt) > size(most) ? felt : most;
         if (frame % FRAMES_A_PICTURE == 0 && pictures > 0) {
             float *to = &kept[floats * std::size_t(frame / FRAMES_A_PICTURE - 1)];
             done("displacements", host.state.copy_displacements({to, floats}));
         }
         if (frame % RATE == 0 || frame == chosen.frames) {
             const long frames = frame % RATE == 0 ? RATE : frame % RATE;
-            const auto push = host.push();
-            std::printf("%6.2f  %7.2f  %8.2f  %5ld  %12.3f  %13.3g  %6.3f %6.3f %6.3f  %s\n",
+            std::printf("%6.2f  %7.2f  %8.2f  %5ld  %12.3f  %13.3g  %17.3f %8.3f %8.3f  %5lu  %s\n",
                         double(frame) / RATE, sum / double(frames), worst, steps, double(volume), double(excess),
-                        push[0], push[1], push[2], supple::text(remark));
+                        double(most.mean_force[0]), double(most.mean_force[1]), double(most.mean_force[2]),
+                        0ul + most.contacts, supple::text(remark));
+            most = {};
             worst_of_all = std::max(worst_of_all, worst);
             sum = worst = 0.0, steps = 0, volume = 1.0f, excess = 0.0f, remark = supple::status::ok;
         }

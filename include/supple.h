@@ -149,6 +149,28 @@
 #define SUPPLE_MOST_PARTS 8
 
 /**
+ * Shapes of an instrument: all below the plane z = 0 of its axes; a ball around its centre; a cylinder along z with round ends; the
+ * signed distances in a field's file, which `supple field` makes of a mesh.
+ */
+#define SUPPLE_PLANE 0
+
+#define SUPPLE_SPHERE 1
+
+#define SUPPLE_CAPSULE 2
+
+#define SUPPLE_FIELD 3
+
+/**
+ * Most instruments of a supple_contact.
+ */
+#define SUPPLE_MOST_INSTRUMENTS 8
+
+/**
+ * Most contact points that are kept of a step.
+ */
+#define SUPPLE_MOST_CONTACT_POINTS 64
+
+/**
  * Bytes before the arrays of a learned step.
  */
 #define SUPPLE_LEARNED_FRONT 2048
@@ -388,6 +410,14 @@ enum supple_status
      */
     SUPPLE_E_UNSTABLE = -33,
     /**
+     * Instrument `index` has a size, friction or time (value), or a pose, that cannot be.
+     */
+    SUPPLE_E_INSTRUMENT = -34,
+    /**
+     * The field of instrument `index` is none, damaged, or reaches the rim of its grid.
+     */
+    SUPPLE_E_FIELD = -35,
+    /**
      * Weights do not begin at a multiple of four bytes.
      */
     SUPPLE_E_WEIGHTS_MISALIGNED = -40,
@@ -470,6 +500,15 @@ enum supple_status
      * m).
      */
     SUPPLE_E_DIVERGED_MOTION = -93,
+    /**
+     * The step was not taken: instrument `index` would move farther in it, or is farther inside the body at a node, (value, m) than it
+     * may (limit): start outside, move slower.
+     */
+    SUPPLE_E_DIVERGED_INSTRUMENT = -94,
+    /**
+     * The step was not taken: mass-scaled and learned steps cannot meet instruments.
+     */
+    SUPPLE_E_NO_CONTACT = -95,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -483,6 +522,12 @@ typedef int32_t supple_status;
  * Steps that choose their length. One thread at a time. It may be copied with memcpy together with its state.
  */
 typedef struct supple_adaptive supple_adaptive;
+
+/**
+ * Instruments, the nodes that they can touch, and what a state keeps of them. It belongs to one state: save and restore both, or
+ * prepare it again. One thread at a time; a call that takes steps changes it.
+ */
+typedef struct supple_contact supple_contact;
 
 /**
  * A second run of a state. One thread at a time. It may be copied with memcpy together with its state.
@@ -851,6 +896,145 @@ typedef struct {
      */
     uint32_t count;
 } supple_vectors;
+
+/**
+ * Where an instrument is.
+ */
+typedef struct {
+    /**
+     * Its centre, m.
+     */
+    float position[3];
+    /**
+     * Quaternion x, y, z, w that turns its axes into those of the scene, of any length; all zero: not turned.
+     */
+    float rotation[4];
+} supple_pose;
+
+/**
+ * A rigid instrument.
+ */
+typedef struct {
+    /**
+     * SUPPLE_PLANE, SUPPLE_SPHERE, SUPPLE_CAPSULE or SUPPLE_FIELD.
+     */
+    uint32_t shape;
+    /**
+     * Of a sphere or capsule, m. At least the length of the surface's edges: an instrument passes between nodes.
+     */
+    float radius;
+    /**
+     * Of a capsule, between the centres of its ends, m.
+     */
+    float length;
+    /**
+     * Coulomb's coefficient of friction, zero or more.
+     */
+    float friction;
+    /**
+     * Where it is.
+     */
+    supple_pose pose;
+    /**
+     * Of a field: the bytes of its file, aligned to four, used where they are as long as the contact; else NULL.
+     */
+    const void *field;
+    /**
+     * How many.
+     */
+    size_t field_bytes;
+} supple_instrument;
+
+/**
+ * What an instrument feels.
+ */
+typedef struct {
+    /**
+     * Force of the tissue on the instrument in the latest step, N.
+     */
+    float force[3];
+    /**
+     * Moment of the same about its position, N m.
+     */
+    float moment[3];
+    /**
+     * Mean of the force over the steps of the latest call that took steps, N; of supple_adaptive_advance that of the latest step.
+     */
+    float mean_force[3];
+    /**
+     * Nodes that it pushes or holds.
+     */
+    uint32_t contacts;
+    /**
+     * How far the deepest node would have been inside without the instrument, m.
+     */
+    float depth;
+    /**
+     * Work that it did on the tissue in the latest step, J.
+     */
+    float work;
+    /**
+     * What friction took of the work of the instrument, J.
+     */
+    float friction_loss;
+} supple_touch;
+
+/**
+ * Where an instrument pushes a node.
+ */
+typedef struct {
+    /**
+     * m.
+     */
+    float position[3];
+    /**
+     * Outward normal of the instrument; zero where it holds the node.
+     */
+    float normal[3];
+    /**
+     * Force of the instrument on the node, N.
+     */
+    float force[3];
+    /**
+     * How far the node would have been inside without the instrument, m.
+     */
+    float depth;
+    /**
+     * From zero.
+     */
+    uint32_t node;
+    /**
+     * From zero.
+     */
+    uint32_t instrument;
+} supple_contact_point;
+
+/**
+ * The force on an instrument between two frames, for a haptic loop: supple_local_force_follow after each frame, supple_local_force_at
+ * as often as you like, on any thread, on a copy. Begin with all zero.
+ */
+typedef struct {
+    /**
+     * Of the instrument in the latest frame, m.
+     */
+    float position[3];
+    /**
+     * Force of the tissue on it there, N.
+     */
+    float force[3];
+    /**
+     * Change of the force with the position, N/m, symmetric: force = force + stiffness (position - position in the frame).
+     */
+    float stiffness[3][3];
+    /**
+     * How far the force that was predicted for the latest frame was off, N.
+     */
+    float error;
+    /**
+     * How far off it would have been to hold the force of the frame before, N.
+     */
+    float hold_error;
+} supple_local_force;
 
 /**
  * What a learned step needs.
@@ -1306,6 +1490,110 @@ supple_status supple_copy_velocities(const supple_state *state, float *out, size
 supple_status supple_copy_forces(const supple_state *state,
                                  float *out,
                                  size_t floats);
+
+/**
+ * Bytes of memory that a supple_contact needs for so many nodes that can be touched and so many that can be held at once.
+ */
+size_t supple_contact_size(uint32_t surface_nodes,
+                           uint32_t grips);
+
+/**
+ * Prepares a contact in `memory` of at least supple_contact_size bytes, aligned to SUPPLE_ALIGN: no instruments yet.
+ *
+ * @param points of all nodes of the scene at rest, m, three coordinates each.
+ * @param surface numbers of the nodes that can be touched, those of the boundary; NULL: the first `count` nodes, all of them with
+ * the scene's number.
+ * @param count how many.
+ * @param grips most nodes that instruments hold at once.
+ * @param error may be NULL; index is the place in `surface`.
+ */
+supple_status supple_contact_init(void *memory,
+                                  size_t bytes,
+                                  const supple_scene *scene,
+                                  const float *points,
+                                  const uint32_t *surface,
+                                  uint32_t count,
+                                  uint32_t grips,
+                                  supple_contact **contact,
+                                  supple_error *error);
+
+/**
+ * Replaces all instruments by `count` others, which stand still where they are; none with a count of zero. What was held is let go.
+ *
+ * @param error may be NULL; index is that of an instrument.
+ */
+supple_status supple_set_instruments(supple_contact *contact,
+                                     const supple_instrument *instruments,
+                                     uint32_t count,
+                                     supple_error *error);
+
+/**
+ * Lets an instrument move on a line, and turn evenly, from where it is at the time `from` (s) to `pose` at the time `to`, usually the
+ * times of the state now and at the end of the frame. Before and after it stands still.
+ *
+ * @param error may be NULL.
+ */
+supple_status supple_move_instrument(supple_contact *contact,
+                                     uint32_t instrument,
+                                     const supple_pose *pose,
+                                     double from,
+                                     double to,
+                                     supple_error *error);
+
+/**
+ * Lets an instrument hold the nodes of the surface that are nearer to it than `within` (m) now, where they are, as forceps do; those that
+ * it or another one holds already it leaves as they are. They move with it, whatever force that takes, until supple_let_go.
+ *
+ * @param held may be NULL; receives how many nodes it holds.
+ */
+supple_status supple_grasp(supple_contact *contact,
+                           supple_state *state,
+                           uint32_t instrument,
+                           float within,
+                           uint32_t *held);
+
+/**
+ * Lets go what an instrument holds.
+ */
+supple_status supple_let_go(supple_contact *contact, uint32_t instrument);
+
+/**
+ * Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned and mass-scaled
+ * steps refuse loads with instruments.
+ */
+supple_status supple_set_contact(supple_loads *loads,
+                                 supple_contact *contact);
+
+/**
+ * What an instrument felt in the latest steps.
+ */
+supple_status supple_read_touch(const supple_contact *contact,
+                                uint32_t instrument,
+                                supple_touch *touch);
+
+/**
+ * Writes where instruments push in the latest step: at most `room` points, and SUPPLE_MOST_CONTACT_POINTS.
+ *
+ * @param count receives how many were written.
+ */
+supple_status supple_contact_points(const supple_contact *contact,
+                                    supple_contact_point *points,
+                                    uint32_t room,
+                                    uint32_t *count);
+
+/**
+ * Takes the position (m) and the force (N) of a new frame, as of supple_read_touch.
+ */
+supple_status supple_local_force_follow(supple_local_force *model,
+                                        const float *position,
+                                        const float *force);
+
+/**
+ * Writes the force (N) at a position (m) before the next frame.
+ */
+supple_status supple_local_force_at(const supple_local_force *model,
+                                    const float *position,
+                                    float *force);
 
 /**
  * Bytes that a saved state of so many nodes has.

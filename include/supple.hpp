@@ -34,6 +34,10 @@ using learned_facts = supple_learned_facts;
 using estimate = supple_estimate;
 using adaptive_report = supple_adaptive_report;
 using reaction_force = supple_reaction_force;
+// Where an instrument is, what it feels, and where it pushes.
+using pose = supple_pose;
+using touch = supple_touch;
+using contact_point = supple_contact_point;
 // What looks as if a unit or a number was mistaken; `text` says what it means.
 using remark = supple_remark;
 // Where and with which value something went wrong; `describe` makes a sentence of it.
@@ -78,6 +82,8 @@ enum class [[nodiscard]] status : std::int32_t {
     e_no_step = SUPPLE_E_NO_STEP,
     e_step = SUPPLE_E_STEP,
     e_unstable = SUPPLE_E_UNSTABLE,
+    e_instrument = SUPPLE_E_INSTRUMENT,
+    e_field = SUPPLE_E_FIELD,
 
     e_weights_misaligned = SUPPLE_E_WEIGHTS_MISALIGNED,
     e_weights_short = SUPPLE_E_WEIGHTS_SHORT,
@@ -104,6 +110,8 @@ enum class [[nodiscard]] status : std::int32_t {
     e_diverged_energy = SUPPLE_E_DIVERGED_ENERGY,
     e_diverged_force = SUPPLE_E_DIVERGED_FORCE,
     e_diverged_motion = SUPPLE_E_DIVERGED_MOTION,
+    e_diverged_instrument = SUPPLE_E_DIVERGED_INSTRUMENT,
+    e_no_contact = SUPPLE_E_NO_CONTACT,
 };
 
 // For all elements of a scene; each with its constants in the order of tissue::constants. tools/header.sh writes this list.
@@ -230,7 +238,8 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_weights_shape): case of(s::e_not_led): case of(s::e_step_ratio): case of(s::e_damping):
     case of(s::e_lattice): case of(s::e_too_stiff): case of(s::e_not_saved): case of(s::e_saved_version):
     case of(s::e_saved_checksum): case of(s::e_level): case of(s::e_diverged):
-    case of(s::e_diverged_energy): case of(s::e_diverged_force): case of(s::e_diverged_motion): return true;
+    case of(s::e_diverged_energy): case of(s::e_diverged_force): case of(s::e_diverged_motion):
+    case of(s::e_instrument): case of(s::e_field): case of(s::e_diverged_instrument): case of(s::e_no_contact): return true;
     }
     return false;
 }
@@ -275,6 +284,9 @@ constexpr meaning meaning_of(status code) noexcept {
     case status::e_diverged_energy: return {"entry", " J", true, true};
     case status::e_diverged_force: return {"force", "", true, true};
     case status::e_diverged_motion: return {"entry", " m", true, true};
+    case status::e_diverged_instrument: return {"instrument", " m", true, true};
+    case status::e_instrument: return {"instrument", "", true, false};
+    case status::e_field: return {"instrument", "", false, false};
     default: return {"entry", "", false, false};
     }
 }
@@ -409,6 +421,8 @@ private:
     supple_scene *raw_ = nullptr;
 };
 
+class contact;
+
 // What acts on a scene. One thread at a time.
 class loads {
 public:
@@ -449,6 +463,9 @@ public:
         const auto count = static_cast<std::uint32_t>(all.size());
         return detail::of(supple_set_motions(raw_, of.raw(), all.data(), count, why));
     }
+
+    // Lets the instruments of a contact touch what these loads act on; a contact() ends that.
+    status set_contact(const contact &with) const noexcept;
 
 private:
     static status too_many(std::size_t count, error *why) noexcept {
@@ -804,6 +821,118 @@ public:
 
 private:
     supple_adaptive *raw_ = nullptr;
+};
+
+// A rigid instrument.
+struct instrument {
+    supple_instrument raw{};
+
+    // All below z = 0 of its axes; a ball; a cylinder along z with round ends (length between their centres); m.
+    static instrument plane(const pose &at, float friction = 0.0f) noexcept { return of(SUPPLE_PLANE, at, friction); }
+    static instrument sphere(float radius, const pose &at, float friction = 0.0f) noexcept {
+        return of(SUPPLE_SPHERE, at, friction, radius);
+    }
+    static instrument capsule(float radius, float length, const pose &at, float friction = 0.0f) noexcept {
+        return of(SUPPLE_CAPSULE, at, friction, radius, length);
+    }
+    // Any form, from the bytes of a field's file, which must stay.
+    static instrument field(bytes file, const pose &at, float friction = 0.0f) noexcept {
+        instrument made = of(SUPPLE_FIELD, at, friction);
+        made.raw.field = file.data(), made.raw.field_bytes = file.size();
+        return made;
+    }
+
+private:
+    static instrument of(std::uint32_t shape, const pose &at, float friction, float radius = 0.0f, float length = 0.0f) noexcept {
+        return {supple_instrument{shape, radius, length, friction, at, nullptr, 0}};
+    }
+};
+
+// Not turned.
+[[nodiscard]] inline pose pose_at(const std::array<float, 3> &position) noexcept {
+    return {{position[0], position[1], position[2]}, {0.0f, 0.0f, 0.0f, 1.0f}};
+}
+
+// Instruments, the nodes that they can touch, and what one state keeps of them. One thread at a time.
+class contact {
+public:
+    constexpr contact() noexcept = default;
+    constexpr explicit contact(supple_contact *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_contact *raw() const noexcept { return raw_; }
+
+    // Bytes of memory for so many nodes that can be touched, and so many that can be held at once.
+    [[nodiscard]] static std::size_t size(std::uint32_t surface, std::uint32_t grips = 0) noexcept {
+        return supple_contact_size(surface, grips);
+    }
+
+    // Prepares it, without instruments yet. `points` are those of the scene at rest, m, `surface` the nodes of its
+    // boundary; without any, all nodes can be touched.
+    static result<contact> make(memory place, scene of, span<const float> points, span<const std::uint32_t> surface,
+                                std::uint32_t grips = 0) noexcept {
+        result<contact> made{status::ok, detail::nothing(status::ok), {}};
+        if (!detail::has_points(of, points, made)) return made;
+        const std::size_t listed = surface.size() > 0 ? surface.size() : points.size() / 3;
+        const auto count = static_cast<std::uint32_t>(listed < none ? listed : none);
+        made.status = detail::of(supple_contact_init(place.data(), place.size(), of.raw(), points.data(),
+                                                     surface.size() > 0 ? surface.data() : nullptr, count, grips,
+                                                     &made.value.raw_, &made.error));
+        return made;
+    }
+
+    // Replaces all instruments, which stand still where they are.
+    status set(span<const instrument> all, error *why = nullptr) const noexcept {
+        static_assert(sizeof(instrument) == sizeof(supple_instrument));
+        const auto count = static_cast<std::uint32_t>(all.size() < none ? all.size() : none);
+        return detail::of(supple_set_instruments(raw_, all.size() ? &all.data()->raw : nullptr, count, why));
+    }
+
+    // Lets one move, from where it is at one time to a pose at another, s; usually those of a frame.
+    status move(std::uint32_t which, const pose &to, double from, double end, error *why = nullptr) const noexcept {
+        return detail::of(supple_move_instrument(raw_, which, &to, from, end, why));
+    }
+
+    // Lets one hold the nodes that are nearer to it than `within`, m; and lets them go.
+    status grasp(state moved, std::uint32_t which, float within, std::uint32_t *held = nullptr) const noexcept {
+        return detail::of(supple_grasp(raw_, moved.raw(), which, within, held));
+    }
+    status let_go(std::uint32_t which) const noexcept { return detail::of(supple_let_go(raw_, which)); }
+
+    // What one felt in the latest steps.
+    status read(std::uint32_t which, touch &out) const noexcept {
+        return detail::of(supple_read_touch(raw_, which, &out));
+    }
+
+    // Where they push in the latest step; gives how many points were written.
+    result<std::size_t> points(span<contact_point> out) const noexcept {
+        result<std::size_t> count{status::ok, detail::nothing(status::ok), 0};
+        std::uint32_t written = 0;
+        const auto room = static_cast<std::uint32_t>(out.size() < none ? out.size() : none);
+        count.status = detail::of(supple_contact_points(raw_, out.data(), room, &written));
+        count.error = detail::nothing(count.status);
+        count.value = written;
+        return count;
+    }
+
+private:
+    supple_contact *raw_ = nullptr;
+};
+
+inline status loads::set_contact(const contact &with) const noexcept {
+    return detail::of(supple_set_contact(raw_, with.raw()));
+}
+
+// The force on an instrument between two frames, for a haptic loop.
+struct local_force : supple_local_force {
+    local_force() noexcept : supple_local_force{} {}
+
+    // After each frame: position of the instrument, m, and the force on it, N.
+    status follow(const float *at, const float *newton) noexcept {
+        return detail::of(supple_local_force_follow(this, at, newton));
+    }
+    // The force at a position before the next frame.
+    status at(const float *where, std::array<float, 3> &newton) const noexcept {
+        return detail::of(supple_local_force_at(this, where, newton.data()));
+    }
 };
 
 // The force by which supports act on the tissue, right for steps of any kind. One thread at a time.

@@ -190,12 +190,13 @@ pub unsafe extern "C" fn supple_adaptive_advance(
         let storage = storage(arrays, *vectors);
         let threads = HostThreads::of(threads)?;
         let written = place_if_wanted(taken)?;
-        let mut state = opened_of(&any, state)?;
+        let mut state = loads.attached(opened_of(&any, state)?);
         let (status, Taken { exact, large, changes }) = with_scene!(any, scene => {
             let (first, second) = (&mut *first, &mut *second);
             let view = AdaptiveView { chooser: &mut *chooser, first, second, watch: &mut *watch, storage };
             view.advance(span.seconds(), scene, &mut loads, state.reborrow(), &threads)
         });
+        loads.enter(state.touches());
         report.enter(&status, &state);
         report.steps = exact + large;
         report.close(&state);

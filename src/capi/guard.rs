@@ -184,7 +184,7 @@ pub unsafe extern "C" fn supple_guard_follow(
         let storage = storage(arrays, *vectors);
         let threads = HostThreads::of(threads)?;
         let written = place_if_wanted(estimate)?;
-        let state = opened_of(&any, state)?;
+        let state = loads.attached(opened_of(&any, state)?);
         let loads = loads.of_next_step(state.displacements(), 1);
         let view = GuardView { second, watch: &mut *watch, storage };
         let status = with_scene!(any, scene => view.follow(Status::Ok, scene, &loads, &state, &threads));

@@ -233,7 +233,7 @@ pub unsafe extern "C" fn supple_large_step(
         any.fits(*nodes)?;
         let storage = storage(arrays, *vectors);
         let threads = HostThreads::of(threads)?;
-        let mut state = opened_of(&any, state)?;
+        let mut state = loads.attached(opened_of(&any, state)?);
         let count = count.into();
         let (mut held_back, mut lattice_share) = (0, 1.0);
         let status = with_scene!(any, scene => take_steps(count, count, &mut state, &mut loads, report, |loads, state| {

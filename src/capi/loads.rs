@@ -1,10 +1,13 @@
 //! What acts on a scene, for C: forces, motions and gravity, which the host changes between steps as it likes.
 
 use core::ffi::c_void;
+use core::ptr;
 
+use crate::contact::Touch;
 use crate::loads::{Loads, Motion, NodalForce};
-use crate::state::NodeVector;
+use crate::state::{NodeVector, StateView};
 
+use super::contact::{CallContact, supple_contact};
 use super::memory::{self, Head, Layout, Object, Place, array, magic, place_for};
 use super::scene::{AnyScene, axes_of, carved, check_choice, supple_scene, with_scene};
 use super::status::{Answer, status_of, supple_error, supple_status};
@@ -49,12 +52,23 @@ pub struct supple_loads {
     forces: u32,
     motions: u32,
     gravity: [f32; 3],
+    contact: *mut supple_contact,
 }
 
 // SAFETY: `repr(C)`, begins with a head.
 unsafe impl Object for supple_loads {
     const MAGIC: [u8; 8] = magic(b'L');
     const FRONT: usize = 64;
+}
+
+impl supple_loads {
+    pub(super) const fn nodes(&self) -> u32 {
+        self.nodes
+    }
+
+    pub(super) const fn set_contact(&mut self, contact: *mut supple_contact) {
+        self.contact = contact;
+    }
 }
 
 /// Bytes before the arrays of loads.
@@ -99,6 +113,7 @@ pub unsafe extern "C" fn supple_loads_init(
             forces: 0,
             motions: 0,
             gravity: [0.0; 3],
+            contact: ptr::null_mut(),
         }));
         Ok(SUPPLE_OK)
     };
@@ -208,6 +223,7 @@ pub(super) struct CallLoads<'a> {
     asked: &'a [Motion],
     now: &'a mut [Motion],
     nodes: usize,
+    contact: Option<CallContact<'a>>,
 }
 
 impl<'a> CallLoads<'a> {
@@ -218,7 +234,14 @@ impl<'a> CallLoads<'a> {
     pub(super) unsafe fn of(loads: *mut supple_loads, scene: &AnyScene<'_>) -> Answer<Self> {
         let nodes = scene.node_count();
         if loads.is_null() {
-            return Ok(Self { gravity: [0.0; 3], forces: &[], asked: &[], now: &mut [], nodes });
+            return Ok(Self {
+                gravity: [0.0; 3],
+                forces: &[],
+                asked: &[],
+                now: &mut [],
+                nodes,
+                contact: None,
+            });
         }
         // SAFETY: the caller's promise; entries up to the counts were written.
         unsafe {
@@ -228,7 +251,23 @@ impl<'a> CallLoads<'a> {
             let forces = arrays.change_first::<NodalForce>(object.forces as usize, force_room);
             let asked = arrays.change_first::<Motion>(object.motions as usize, motion_room);
             let now = arrays.change_first::<Motion>(object.motions as usize, motion_room);
-            Ok(Self { gravity: object.gravity, forces, asked, now, nodes })
+            let contact = CallContact::of(object.contact, nodes)?;
+            Ok(Self { gravity: object.gravity, forces, asked, now, nodes, contact })
+        }
+    }
+
+    /// The state with what it keeps for instruments.
+    pub(super) fn attached(&mut self, state: StateView<'a>) -> StateView<'a> {
+        match &mut self.contact {
+            Some(contact) => contact.attached(state),
+            None => state,
+        }
+    }
+
+    /// Enters what instruments felt in a step.
+    pub(super) fn enter(&mut self, touches: &[Touch]) {
+        if let Some(contact) = &mut self.contact {
+            contact.enter(touches);
         }
     }
 
@@ -253,6 +292,10 @@ impl<'a> CallLoads<'a> {
                 *metre = if left > 1 { from + (to - from) / left as f32 } else { to };
             }
         }
-        Loads::unchecked(self.gravity, self.forces, self.now, self.nodes)
+        let loads = Loads::unchecked(self.gravity, self.forces, self.now, self.nodes);
+        match &self.contact {
+            Some(contact) => loads.touched_by(&contact.contact),
+            None => loads,
+        }
     }
 }

@@ -13,6 +13,7 @@ use std::vec;
 use std::vec::Vec;
 
 use super::SUPPLE_ABI;
+use super::contact::*;
 use super::guard::*;
 use super::large::*;
 use super::learned::*;
@@ -199,6 +200,35 @@ fn host(element: u32, network: &[u8], damper: &[u8]) {
         let mut estimate = supple_estimate { known: 7, node: 0, mean: 0.0, largest: 0.0, allowed: 0.0 };
         assert!(supple_guard_follow(scene, loads, state, guard, &threads, &mut estimate) as i32 >= 0);
         assert_eq!(estimate.known, 1);
+
+        let mut memory = Memory::new(supple_contact_size(NODES, 16));
+        let (at, bytes, mut contact) = (memory.at(), memory.bytes(), null_mut());
+        let made = supple_contact_init(at, bytes, scene, points, null(), NODES, 16, &mut contact, null_mut());
+        assert_eq!(made, SUPPLE_OK);
+        let pose = supple_pose { position: [-0.0079, 0.01, 0.04 / 3.0], rotation: [0.0; 4] };
+        let ball = supple_instrument {
+            shape: SUPPLE_SPHERE,
+            radius: 0.008,
+            length: 0.0,
+            friction: 0.3,
+            pose,
+            field: null(),
+            field_bytes: 0,
+        };
+        assert_eq!(supple_set_instruments(contact, &ball, 1, null_mut()), SUPPLE_OK);
+        assert_eq!(supple_set_contact(loads, contact), SUPPLE_OK);
+        let mut held = 0;
+        assert_eq!(supple_grasp(contact, state, 0, 0.002, &mut held), SUPPLE_OK);
+        assert!(held > 0);
+        assert!(supple_step(scene, loads, state, 2, &threads, &mut report) as i32 >= 0);
+        assert_eq!(supple_let_go(contact, 0), SUPPLE_OK);
+        assert!(supple_step(scene, loads, state, 1, null(), &mut report) as i32 >= 0);
+        let mut touch = core::mem::MaybeUninit::uninit();
+        assert_eq!(supple_read_touch(contact, 0, touch.as_mut_ptr()), SUPPLE_OK);
+        let (mut point, mut count) = (core::mem::MaybeUninit::uninit(), 7);
+        assert_eq!(supple_contact_points(contact, point.as_mut_ptr(), 1, &mut count), SUPPLE_OK);
+        assert!(count <= 1);
+        assert_eq!(supple_set_contact(loads, null_mut()), SUPPLE_OK);
 
         let config = supple_learned_config {
             struct_size: size::<supple_learned_config>(),

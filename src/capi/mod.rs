@@ -30,6 +30,8 @@ mod step;
 
 mod vectors;
 
+mod contact;
+
 mod saved;
 
 mod learned;

@@ -96,6 +96,10 @@ pub enum supple_status {
     SUPPLE_E_STEP = -32,
     /// The step (value, s) is above the critical step (limit, s), which `node` sets.
     SUPPLE_E_UNSTABLE = -33,
+    /// Instrument `index` has a size, friction or time (value), or a pose, that cannot be.
+    SUPPLE_E_INSTRUMENT = -34,
+    /// The field of instrument `index` is none, damaged, or reaches the rim of its grid.
+    SUPPLE_E_FIELD = -35,
 
     /// Weights do not begin at a multiple of four bytes.
     SUPPLE_E_WEIGHTS_MISALIGNED = -40,
@@ -145,6 +149,11 @@ pub enum supple_status {
     /// The step was not taken: supports moved `node` by too much in the step before (value, m) for the tissue around it (limit: its size,
     /// m).
     SUPPLE_E_DIVERGED_MOTION = -93,
+    /// The step was not taken: instrument `index` would move farther in it, or is farther inside the body at a node, (value, m) than it
+    /// may (limit): start outside, move slower.
+    SUPPLE_E_DIVERGED_INSTRUMENT = -94,
+    /// The step was not taken: mass-scaled and learned steps cannot meet instruments.
+    SUPPLE_E_NO_CONTACT = -95,
 }
 
 use supple_status::*;
@@ -429,6 +438,8 @@ fn text(status: i32) -> Option<&'static CStr> {
         -31 => c"no step has been set",
         -32 => c"the step is not a finite positive number",
         -33 => c"the step is above the critical step",
+        -34 => c"an instrument with a size, friction, time or pose that cannot be",
+        -35 => c"the bytes of an instrument's field are none, or damaged",
         -40 => c"the weights are not at a multiple of four bytes",
         -41 => c"the weights are shorter than their file says",
         -42 => c"not a weight file",
@@ -449,6 +460,10 @@ fn text(status: i32) -> Option<&'static CStr> {
         -91 => c"diverged: more kinetic energy than loads and supports can have given",
         -92 => c"the step was not taken: a force would move its node through the tissue around it",
         -93 => c"the step was not taken: supports moved a node too far in one step",
+        -94 => {
+            c"the step was not taken: an instrument moves too far in one step, or is too far inside the body"
+        }
+        -95 => c"the step was not taken: this kind of step cannot meet instruments",
         _ => return None,
     })
 }

@@ -127,9 +127,12 @@ pub(super) fn answer(status: &Status) -> Answer<supple_status> {
         Status::Limited { .. } => Ok(SUPPLE_LIMITED),
         Status::Inexact { .. } => Ok(SUPPLE_INEXACT),
         Status::Diverged(Divergence { node, cause, .. }) => Err(match cause {
-            Cause::NotFinite | Cause::Instrument { .. } | Cause::NoContact => {
-                supple_error::from(SUPPLE_E_DIVERGED).node(node)
-            }
+            Cause::NotFinite => supple_error::from(SUPPLE_E_DIVERGED).node(node),
+            Cause::Instrument { index, metre, most } => supple_error::from(SUPPLE_E_DIVERGED_INSTRUMENT)
+                .at(index)
+                .node(node)
+                .value(metre.into(), most.into()),
+            Cause::NoContact => SUPPLE_E_NO_CONTACT.into(),
             Cause::Energy { kinetic, available } => {
                 supple_error::from(SUPPLE_E_DIVERGED_ENERGY).node(node).value(kinetic, available)
             }
@@ -172,7 +175,7 @@ pub unsafe extern "C" fn supple_step(
         any.fits(memory::read(state.cast_const())?.nodes)?;
         let step = (*state).step()?;
         let threads = HostThreads::of(threads)?;
-        let mut state = opened_of(&any, state)?;
+        let mut state = loads.attached(opened_of(&any, state)?);
         let count = count.into();
         let status = with_scene!(any, scene => take_steps(count, count, &mut state, &mut loads, report, |loads, state| {
             tled::step_in_parts(scene, loads, state, &step, &threads)
@@ -196,8 +199,8 @@ pub(super) fn take_steps(
 ) -> Status {
     let mut worst = Status::Ok;
     for done in 0..count {
-        let loads = loads.of_next_step(state.displacements(), left - done);
-        let status = step(&loads, state.reborrow());
+        let status = step(&loads.of_next_step(state.displacements(), left - done), state.reborrow());
+        loads.enter(state.touches());
         report.enter(&status, state);
         match status {
             Status::Ok => {}

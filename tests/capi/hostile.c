@@ -72,7 +72,7 @@ static void *end_of(const arena *in, size_t bytes) {
 }
 
 /* Objects of all kinds: what a call is told to be at an address may be of any kind. */
-enum { SCENE, STATE, LOADS, LEARNED, LARGE, GUARD, REACTION, ADAPTIVE, KINDS };
+enum { SCENE, STATE, LOADS, LEARNED, LARGE, GUARD, REACTION, ADAPTIVE, CONTACT, KINDS };
 enum { EACH = 3, SLOTS = KINDS * EACH };
 static struct {
     arena in;
@@ -470,7 +470,86 @@ static void same_as_without(const supple_scene *scene, supple_state *state, supp
     }
 }
 
+/* Steps change the contact of their loads, and what is grasped moves nothing. */
+static void contacts_may_change(void) {
+    for (int n = 0; n < EACH; n++) {
+        slots[CONTACT * EACH + n].written = 1;
+    }
+}
+
+static supple_status make_contact(void) {
+    static uint32_t surface[NODES];
+    size_t bytes;
+    for (uint32_t node = 0; node < NODES; node++) {
+        surface[node] = number(node);
+    }
+    const int is_list = one_in(2);
+    const uint32_t count = number(is_list ? 1 + below(NODES) : NODES), grips = number(8);
+    if (is_list && count > NODES) {
+        return supple_let_go(object(CONTACT, 1), 0);
+    }
+    const size_t needed = supple_contact_size(count < 4 * NODES ? count : NODES, grips < 99 ? grips : 8);
+    void *at = room(CONTACT, needed, &bytes);
+    float *scene_points = end_of(&of_points, sizeof points);
+    memcpy(scene_points, points, sizeof points);
+    supple_contact *made;
+    return supple_contact_init(at, bytes, object(SCENE, 0), one_in(60) ? NULL : scene_points, is_list ? surface : NULL, count, grips, &made, &error);
+}
+
+static supple_pose any_pose(void) {
+    supple_pose pose;
+    for (int n = 0; n < 3; n++) {
+        pose.position[n] = wild(0.03f);
+    }
+    for (int n = 0; n < 4; n++) {
+        pose.rotation[n] = one_in(3) ? 0.0f : wild(1.0f);
+    }
+    return pose;
+}
+
+/* Instruments anywhere, of any kind. */
+static supple_status touch(void) {
+    supple_contact *contact = object(CONTACT, 1);
+    const uint32_t which = number(below(3));
+    switch (below(8)) {
+        case 0: {
+            supple_instrument list[4];
+            for (int n = 0; n < 4; n++) {
+                list[n] = (supple_instrument){number(below(3)), 0.002f + fabsf(wild(0.01f)), fabsf(wild(0.02f)), fabsf(wild(0.5f)), any_pose(), NULL, 0};
+            }
+            return supple_set_instruments(contact, one_in(60) ? NULL : list, number(1 + below(4)) % 5, &error);
+        }
+        case 1: {
+            const supple_pose pose = any_pose();
+            const double from = fabs((double)wild(0.1f));
+            return supple_move_instrument(contact, which, one_in(60) ? NULL : &pose, from, from + fabs((double)wild(0.1f)), &error);
+        }
+        case 2: return supple_grasp(contact, object(STATE, 1), which, wild(0.004f), NULL);
+        case 3: return supple_let_go(contact, which);
+        case 4:
+        case 5: return supple_set_contact(object(LOADS, 1), one_in(4) ? NULL : contact);
+        case 6: {
+            supple_touch felt;
+            supple_contact_point list[8];
+            uint32_t count;
+            const supple_status status = supple_contact_points(contact, list, number(below(8)) % 9, &count);
+            for (uint32_t n = 0; status == SUPPLE_OK && n < count; n++) {
+                CHECK(isfinite(list[n].force[0] + list[n].position[1]));
+            }
+            return supple_read_touch(contact, which, &felt);
+        }
+        default: {
+            supple_local_force model = {{0}, {0}, {{0}}, 0, 0};
+            const float at[3] = {wild(0.01f), wild(0.01f), wild(0.01f)}, newton[3] = {wild(0.1f), wild(0.1f), wild(0.1f)};
+            float there[3];
+            const supple_status status = supple_local_force_follow(&model, at, newton);
+            return status < 0 ? status : supple_local_force_at(&model, at, there);
+        }
+    }
+}
+
 static supple_status step(void) {
+    contacts_may_change();
     const supple_scene *scene = object(SCENE, 0);
     supple_loads *loads = one_in(8) ? NULL : object(LOADS, 1);
     supple_state *state = object(STATE, 1);
@@ -522,6 +601,7 @@ static supple_status step(void) {
 }
 
 static supple_status follow(void) {
+    contacts_may_change();
     supple_estimate estimate;
     memset(&estimate, 0xff, sizeof estimate);
     supple_threads room;
@@ -535,6 +615,7 @@ static supple_status follow(void) {
 
 /* Never long: that many exact steps take their time. */
 static supple_status advance(void) {
+    contacts_may_change();
     const float drawn = one_in(10) ? wild(5e-3f) : 5e-3f;
     supple_adaptive_report taken;
     memset(&taken, 0xff, sizeof taken);
@@ -592,7 +673,7 @@ static supple_status other(void) {
 
 /* Sound objects, one of each kind, with a law, an element, a method and a threading of their own. */
 static void begin_anew(void) {
-    static supple_status (*const makers[])(void) = {make_scene, make_state, set_step, make_loads, make_learned, make_large, make_guard, make_adaptive};
+    static supple_status (*const makers[])(void) = {make_scene, make_state, set_step, make_loads, make_contact, make_learned, make_large, make_guard, make_adaptive};
     is_calm = 1, doing = "sound objects";
     for (size_t n = 0; n < sizeof makers / sizeof *makers; n++) {
         const supple_status status = makers[n]();
@@ -612,9 +693,9 @@ static void one_call(void) {
                {"steps beyond the critical one", make_large, 6}, {"a guard", make_guard, 2}, {"set loads", set_loads, 20}, {"read", read_state, 8},
                {"set a step", set_step, 8}, {"save and restore", save_and_restore, 6}, {"steps", step, 50}, {"follow", follow, 8},
                {"a reaction", make_reaction, 3}, {"feel", feel, 8}, {"other", other, 6}, {"adaptive steps", make_adaptive, 2},
-               {"advance", advance, 8}, {"remarks", remark, 4}};
+               {"advance", advance, 8}, {"remarks", remark, 4}, {"a contact", make_contact, 4}, {"touch", touch, 20}};
     int at = 0;
-    for (int draw = (int)below(155); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
+    for (int draw = (int)below(179); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
         draw -= all[at].often;
     }
     doing = all[at].name;
@@ -663,7 +744,7 @@ int main(int argc, char **argv) {
     const unsigned long most = strtoul(amount, NULL, 10);
     random_state = argc > 2 ? strtoul(argv[2], NULL, 10) : 1;
     (void)bar_config();
-    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20, 1 << 12, 1 << 20};
+    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20, 1 << 12, 1 << 20, 1 << 16};
     for (int slot = 0; slot < SLOTS; slot++) {
         slots[slot].in = arena_of(sizes_of[slot / EACH]);
         slots[slot].at = end_of(&slots[slot].in, 64), slots[slot].bytes = 64;

@@ -685,6 +685,145 @@ static void remarks(supple_scene_config config) {
     CHECK(strcmp(supple_remark_text(0), "?") == 0);
 }
 
+/* Instruments that touch, hold and let go; and all that is refused of them. */
+static void contacts(void) {
+    static _Alignas(SUPPLE_ALIGN) unsigned char memory[1 << 19], acts_memory[SUPPLE_LOADS_SIZE(1, 1)];
+    static const float no_number[3] = {0.0f, NAN, 0.0f}, none[3] = {0.0f, 0.0f, 0.0f};
+    static uint32_t surface[NODES];
+    const size_t bytes = supple_contact_size(NODES, 8);
+    supple_contact *contact, *made;
+    supple_loads *acts;
+    DONE(supple_state_reset(state));
+    DONE(supple_set_step(scene, state, &length, &error));
+    DONE(supple_loads_init(acts_memory, sizeof acts_memory, scene, 1, 1, &acts));
+    for (uint32_t node = 0; node < NODES; node++) {
+        surface[node] = node;
+    }
+    CHECK(bytes <= sizeof memory && supple_contact_size(UINT32_MAX, UINT32_MAX) >= bytes);
+    REFUSED(SUPPLE_E_NULL, supple_contact_init(NULL, bytes, scene, points[0], NULL, NODES, 8, &made, &error));
+    REFUSED(SUPPLE_E_NULL, supple_contact_init(memory, bytes, scene, NULL, NULL, NODES, 8, &made, &error));
+    REFUSED(SUPPLE_E_NULL, supple_contact_init(memory, bytes, scene, points[0], NULL, NODES, 8, NULL, &error));
+    REFUSED(SUPPLE_E_SHORT, supple_contact_init(memory, bytes - 64, scene, points[0], NULL, NODES, 8, &made, &error));
+    REFUSED(SUPPLE_E_INDEX, supple_contact_init(memory, sizeof memory, scene, points[0], NULL, NODES + 1, 8, &made, &error));
+    CHECK(error.index == NODES && error.limit == NODES);
+    surface[3] = NODES;
+    REFUSED(SUPPLE_E_INDEX, supple_contact_init(memory, bytes, scene, points[0], surface, NODES, 8, &made, &error));
+    CHECK(error.index == 3 && error.node == NODES);
+    surface[3] = 3;
+    DONE(supple_contact_init(memory, bytes, scene, points[0], surface, NODES, 8, &contact, &error));
+
+    const float middle[3] = {-0.0121f, 0.005f * Y, 0.005f * Z};
+    const supple_pose start = {{middle[0], middle[1], middle[2]}, {0, 0, 0, 0}};
+    const supple_instrument ball = {SUPPLE_SPHERE, 0.012f, 0.0f, 0.3f, start, NULL, 0};
+    supple_instrument list[9];
+    for (int n = 0; n < 9; n++) {
+        list[n] = ball;
+    }
+    REFUSED(SUPPLE_E_CAPACITY, supple_set_instruments(contact, list, 9, &error));
+    REFUSED(SUPPLE_E_NULL, supple_set_instruments(contact, NULL, 1, &error));
+    list[1].radius = -1.0f;
+    REFUSED(SUPPLE_E_INSTRUMENT, supple_set_instruments(contact, list, 2, &error));
+    CHECK(error.index == 1 && error.value == -1.0);
+    list[1].shape = 9;
+    REFUSED(SUPPLE_E_CHOICE, supple_set_instruments(contact, list, 2, &error));
+    list[1].shape = SUPPLE_FIELD;
+    REFUSED(SUPPLE_E_NULL, supple_set_instruments(contact, list, 2, &error));
+    list[1].field = weights, list[1].field_bytes = sizeof weights;
+    REFUSED(SUPPLE_E_FIELD, supple_set_instruments(contact, list, 2, &error));
+    CHECK(error.index == 1);
+    DONE(supple_set_instruments(contact, &ball, 1, &error));
+    supple_pose in = start;
+    in.position[0] += 0.002f;
+    REFUSED(SUPPLE_E_CAPACITY, supple_move_instrument(contact, 1, &in, 0.0, 0.02, &error));
+    REFUSED(SUPPLE_E_NULL, supple_move_instrument(contact, 0, NULL, 0.0, 0.02, &error));
+    REFUSED(SUPPLE_E_INSTRUMENT, supple_move_instrument(contact, 0, &in, 0.0, NAN, &error));
+    supple_pose nowhere = in;
+    nowhere.position[1] = NAN;
+    REFUSED(SUPPLE_E_INSTRUMENT, supple_move_instrument(contact, 0, &nowhere, 0.0, 0.02, &error));
+    REFUSED(SUPPLE_E_KIND, supple_set_contact(acts, (supple_contact *)(void *)state));
+    REFUSED(SUPPLE_E_MISMATCH, supple_set_contact(small_loads, contact));
+    REFUSED(SUPPLE_E_NULL, supple_set_contact(NULL, contact));
+    DONE(supple_set_contact(acts, contact));
+
+    /* It presses from the side, and the bar is pushed and pushes back; then it leaves. */
+    supple_touch touch;
+    supple_report report;
+    supple_contact_point list_of_points[SUPPLE_MOST_CONTACT_POINTS];
+    uint32_t count;
+    DONE(supple_move_instrument(contact, 0, &in, 0.0, 0.02, &error));
+    DONE(supple_step(scene, acts, state, 200, NULL, &report));
+    DONE(supple_read_touch(contact, 0, &touch));
+    CHECK(touch.contacts > 0 && touch.force[0] < 0.0f && touch.mean_force[0] < 0.0f);
+    DONE(supple_contact_points(contact, list_of_points, SUPPLE_MOST_CONTACT_POINTS, &count));
+    float sum = 0.0f;
+    for (uint32_t n = 0; n < count; n++) {
+        CHECK(list_of_points[n].instrument == 0 && list_of_points[n].node < NODES && list_of_points[n].normal[0] > 0.5f);
+        sum += list_of_points[n].force[0];
+    }
+    CHECK(count == touch.contacts && fabsf(sum + touch.force[0]) < 1e-5f * fabsf(sum));
+    REFUSED(SUPPLE_E_CAPACITY, supple_read_touch(contact, 1, &touch));
+    REFUSED(SUPPLE_E_NULL, supple_read_touch(contact, 0, NULL));
+    REFUSED(SUPPLE_E_NULL, supple_contact_points(contact, NULL, 4, &count));
+    REFUSED(SUPPLE_E_NULL, supple_contact_points(contact, list_of_points, 4, NULL));
+    supple_pose away = start;
+    away.position[0] -= 0.01f;
+    DONE(supple_move_instrument(contact, 0, &away, report.time, report.time + 0.01, &error));
+    DONE(supple_step(scene, acts, state, 400, NULL, &report));
+    DONE(supple_read_touch(contact, 0, &touch));
+    CHECK(touch.contacts == 0 && touch.force[0] == 0.0f);
+
+    /* It is thrown into the bar; and other steps cannot meet it. */
+    supple_pose inside = start;
+    inside.position[0] = 0.005f * X;
+    DONE(supple_move_instrument(contact, 0, &inside, report.time, report.time + 1e-4, &error));
+    CHECK(supple_step(scene, acts, state, 1, NULL, &report) == SUPPLE_E_DIVERGED_INSTRUMENT);
+    note(SUPPLE_E_DIVERGED_INSTRUMENT);
+    CHECK(report.error.index == 0 && report.error.value > report.error.limit && report.steps == 0);
+    supple_large *scaled;
+    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), SUPPLE_MASS_SCALED, 1e-3f, 20.0f, {0, 0, 0}, NULL, 0};
+    DONE(supple_large_init(large_memory, sizeof large_memory, scene, state, points[0], &config, &scaled, &error));
+    CHECK(supple_large_step(scene, acts, state, scaled, 1, NULL, &report) == SUPPLE_E_NO_CONTACT);
+    note(SUPPLE_E_NO_CONTACT);
+
+    /* It holds what is near, and lets go. */
+    uint32_t held;
+    DONE(supple_set_instruments(contact, &ball, 1, &error));
+    REFUSED(SUPPLE_E_CAPACITY, supple_grasp(contact, state, 0, 1.0f, &held));
+    REFUSED(SUPPLE_E_CAPACITY, supple_grasp(contact, state, 1, 0.001f, &held));
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_grasp(contact, state, 0, NAN, &held));
+    REFUSED(SUPPLE_E_MISMATCH, supple_grasp(contact, small_state, 0, 0.001f, &held));
+    DONE(supple_grasp(contact, state, 0, 0.003f, &held));
+    CHECK(held > 0 && held <= 8);
+    supple_pose out_there = start;
+    out_there.position[0] -= 0.002f;
+    double now;
+    uint64_t steps;
+    DONE(supple_state_time(state, &now, &steps));
+    DONE(supple_move_instrument(contact, 0, &out_there, now, now + 0.02, &error));
+    DONE(supple_step(scene, acts, state, 200, NULL, &report));
+    DONE(supple_read_touch(contact, 0, &touch));
+    CHECK(touch.contacts == held && touch.force[0] > 0.0f);
+    DONE(supple_let_go(contact, 0));
+    DONE(supple_step(scene, acts, state, 1, NULL, &report));
+    DONE(supple_read_touch(contact, 0, &touch));
+    /* It may still press, but not pull. */
+    CHECK(touch.contacts < held || touch.force[0] <= 0.0f);
+
+    supple_local_force model = {{0}, {0}, {{0}}, 0, 0};
+    const float here[3] = {0, 0, 0}, there[3] = {0.001f, 0, 0}, weak[3] = {-0.1f, 0, 0}, strong[3] = {-0.2f, 0, 0};
+    float between[3];
+    REFUSED(SUPPLE_E_NULL, supple_local_force_follow(NULL, here, weak));
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_local_force_follow(&model, no_number, weak));
+    DONE(supple_local_force_follow(&model, here, weak));
+    DONE(supple_local_force_follow(&model, there, strong));
+    const float further[3] = {0.0015f, 0, 0};
+    DONE(supple_local_force_at(&model, further, between));
+    CHECK(fabsf(between[0] + 0.25f) < 1e-5f);
+    REFUSED(SUPPLE_E_NULL, supple_local_force_at(&model, none, NULL));
+    DONE(supple_set_contact(acts, NULL));
+    DONE(supple_state_reset(state));
+}
+
 int main(int argc, char **argv) {
     (void)argv;
     watched = argc == 1;
@@ -715,6 +854,7 @@ int main(int argc, char **argv) {
     guards();
     adaptive_steps();
     reactions();
+    contacts();
     remarks(config);
     DONE(supple_state_reset(state));
     REFUSED(SUPPLE_E_ELEMENT, supple_step(other_element(config), NULL, state, 1, NULL, NULL));

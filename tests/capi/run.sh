@@ -110,10 +110,12 @@ python3 tools/mesh_to_c.py --bytes weights/compact-10.weights compact "$folder/c
 gcc -std=c11 "${warnings[@]}" -I"$folder" "$wrapped" examples/lobe.c tests/capi/no_heap.c "$static" -lm -o "$folder/lobe"
 "$folder/lobe"
 g++ -std=c++17 "${warnings[@]}" examples/instrument.cpp "$shared" -Wl,-rpath,"$prefix/lib" -o "$folder/instrument"
-for method in exact damped mass-scaled; do
+for method in exact damped multilevel; do
     "$folder/instrument" --method $method --frames 60 --out "$folder/$method"
 done
 "$folder/instrument" --jitter 10000 --frames 1
+g++ -std=c++17 "${warnings[@]}" examples/press.cpp "$static" -o "$folder/press"
+"$folder/press"
 
 # From Python; a machine without numpy gets its own.
 python=python3
@@ -128,3 +130,4 @@ fi
 for element in nodal-pressure nodal-strain; do
     "$python" examples/compare.py "$shared" "$command" $element
 done
+"$python" examples/press.py "$shared"

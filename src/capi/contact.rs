@@ -1,0 +1,613 @@
+//! Rigid instruments that touch the tissue, for C ([`crate::contact`]).
+
+use core::ffi::c_void;
+use core::mem::take;
+
+use crate::contact::{
+    Contact, ContactPoint, Field, Grip, Instrument, LocalForce, MOST_INSTRUMENTS, Pose, Shape, Surface,
+    SurfaceNode, Touch, vectors_to_push,
+};
+use crate::state::{NodeVector, StateView};
+
+use super::loads::supple_loads;
+use super::memory::{self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for};
+use super::scene::{carved, supple_scene};
+use super::state::{opened, supple_state};
+use super::status::{Answer, status_of, supple_error, supple_status};
+use supple_status::*;
+
+/// Shapes of an instrument: all below the plane z = 0 of its axes; a ball around its centre; a cylinder along z with round ends; the
+/// signed distances in a field's file, which `supple field` makes of a mesh.
+pub const SUPPLE_PLANE: u32 = 0;
+pub const SUPPLE_SPHERE: u32 = 1;
+pub const SUPPLE_CAPSULE: u32 = 2;
+pub const SUPPLE_FIELD: u32 = 3;
+
+/// Most instruments of a supple_contact.
+pub const SUPPLE_MOST_INSTRUMENTS: u32 = 8;
+const _: () = assert!(SUPPLE_MOST_INSTRUMENTS as usize == MOST_INSTRUMENTS);
+
+/// Most contact points that are kept of a step.
+pub const SUPPLE_MOST_CONTACT_POINTS: u32 = 64;
+const POINTS: usize = SUPPLE_MOST_CONTACT_POINTS as usize;
+
+/// Where an instrument is.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct supple_pose {
+    /// Its centre, m.
+    pub position: [f32; 3],
+    /// Quaternion x, y, z, w that turns its axes into those of the scene, of any length; all zero: not turned.
+    pub rotation: [f32; 4],
+}
+
+/// A rigid instrument.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct supple_instrument {
+    /// SUPPLE_PLANE, SUPPLE_SPHERE, SUPPLE_CAPSULE or SUPPLE_FIELD.
+    pub shape: u32,
+    /// Of a sphere or capsule, m. At least the length of the surface's edges: an instrument passes between nodes.
+    pub radius: f32,
+    /// Of a capsule, between the centres of its ends, m.
+    pub length: f32,
+    /// Coulomb's coefficient of friction, zero or more.
+    pub friction: f32,
+    /// Where it is.
+    pub pose: supple_pose,
+    /// Of a field: the bytes of its file, aligned to four, used where they are as long as the contact; else NULL.
+    pub field: *const c_void,
+    /// How many.
+    pub field_bytes: usize,
+}
+
+/// What an instrument feels.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct supple_touch {
+    /// Force of the tissue on the instrument in the latest step, N.
+    pub force: [f32; 3],
+    /// Moment of the same about its position, N m.
+    pub moment: [f32; 3],
+    /// Mean of the force over the steps of the latest call that took steps, N; of supple_adaptive_advance that of the latest step.
+    pub mean_force: [f32; 3],
+    /// Nodes that it pushes or holds.
+    pub contacts: u32,
+    /// How far the deepest node would have been inside without the instrument, m.
+    pub depth: f32,
+    /// Work that it did on the tissue in the latest step, J.
+    pub work: f32,
+    /// What friction took of the work of the instrument, J.
+    pub friction_loss: f32,
+}
+
+/// Where an instrument pushes a node.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct supple_contact_point {
+    /// m.
+    pub position: [f32; 3],
+    /// Outward normal of the instrument; zero where it holds the node.
+    pub normal: [f32; 3],
+    /// Force of the instrument on the node, N.
+    pub force: [f32; 3],
+    /// How far the node would have been inside without the instrument, m.
+    pub depth: f32,
+    /// From zero.
+    pub node: u32,
+    /// From zero.
+    pub instrument: u32,
+}
+
+/// The force on an instrument between two frames, for a haptic loop: supple_local_force_follow after each frame, supple_local_force_at
+/// as often as you like, on any thread, on a copy. Begin with all zero.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct supple_local_force {
+    /// Of the instrument in the latest frame, m.
+    pub position: [f32; 3],
+    /// Force of the tissue on it there, N.
+    pub force: [f32; 3],
+    /// Change of the force with the position, N/m, symmetric: force = force + stiffness (position - position in the frame).
+    pub stiffness: [[f32; 3]; 3],
+    /// How far the force that was predicted for the latest frame was off, N.
+    pub error: f32,
+    /// How far off it would have been to hold the force of the frame before, N.
+    pub hold_error: f32,
+}
+
+/// Instruments, the nodes that they can touch, and what a state keeps of them. It belongs to one state: save and restore both, or
+/// prepare it again. One thread at a time; a call that takes steps changes it.
+#[repr(C, align(64))]
+pub struct supple_contact {
+    head: Head,
+    /// Of the scene, and of those that can be touched.
+    nodes: u32,
+    surface: u32,
+    grip_room: u32,
+    grips: u32,
+    instruments: u32,
+    list: [Instrument<'static>; MOST_INSTRUMENTS],
+    touches: [Touch; MOST_INSTRUMENTS],
+    means: [[f32; 3]; MOST_INSTRUMENTS],
+    points: [ContactPoint; POINTS],
+}
+
+// SAFETY: `repr(C)`, begins with a head.
+unsafe impl Object for supple_contact {
+    const MAGIC: [u8; 8] = magic(b'T');
+    const FRONT: usize = size_of::<Self>();
+}
+
+fn layout(surface: usize, grips: usize) -> Layout {
+    Layout::of::<supple_contact>()
+        .and::<SurfaceNode>(surface)
+        .and::<Grip>(grips)
+        .and::<NodeVector>(vectors_to_push(surface))
+}
+
+/// The arrays of a contact.
+struct Parts<'a> {
+    surface: &'a mut [SurfaceNode],
+    grips: &'a mut [Grip],
+    pushes: &'a mut [NodeVector],
+}
+
+/// # Safety
+/// The arrays are those of a contact with so many nodes and so much room, and nobody else uses them.
+unsafe fn parts<'a>(mut arrays: Arrays, surface: u32, grips: u32) -> Parts<'a> {
+    // SAFETY: the caller's promise. Any bits are each of them.
+    unsafe {
+        Parts {
+            surface: arrays.change(surface as usize),
+            grips: arrays.change(grips as usize),
+            pushes: arrays.change(vectors_to_push(surface as usize)),
+        }
+    }
+}
+
+/// Bytes of memory that a supple_contact needs for so many nodes that can be touched and so many that can be held at once.
+#[unsafe(no_mangle)]
+pub extern "C" fn supple_contact_size(surface_nodes: u32, grips: u32) -> usize {
+    layout(surface_nodes as usize, grips as usize).bytes()
+}
+
+/// Prepares a contact in `memory` of at least supple_contact_size bytes, aligned to SUPPLE_ALIGN: no instruments yet.
+///
+/// @param points of all nodes of the scene at rest, m, three coordinates each.
+/// @param surface numbers of the nodes that can be touched, those of the boundary; NULL: the first `count` nodes, all of them with
+/// the scene's number.
+/// @param count how many.
+/// @param grips most nodes that instruments hold at once.
+/// @param error may be NULL; index is the place in `surface`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_contact_init(
+    memory: *mut c_void,
+    bytes: usize,
+    scene: *const supple_scene,
+    points: *const f32,
+    surface: *const u32,
+    count: u32,
+    grips: u32,
+    contact: *mut *mut supple_contact,
+    error: *mut supple_error,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let init = || unsafe {
+        let (any, contact) = (carved(scene)?, place_for(contact)?);
+        let nodes = any.node_count();
+        let points = array(points.cast::<[f32; 3]>(), nodes)?;
+        let given = if surface.is_null() { &[] } else { array(surface, count as usize)? };
+        let place = Place::new(memory, bytes, layout(count as usize, grips as usize))?;
+        let node_at = |index: usize| {
+            if surface.is_null() { index as u32 } else { given.get(index).copied().unwrap_or(u32::MAX) }
+        };
+        for index in 0..count as usize {
+            let node = node_at(index);
+            let Some(point) = points.get(node as usize) else {
+                let error = supple_error::from(SUPPLE_E_INDEX).at(index).node(node);
+                return Err(error.value(node.into(), nodes as f64));
+            };
+            if let Some(value) = point.iter().find(|component| !component.is_finite()) {
+                return Err(supple_error::from(SUPPLE_E_NOT_FINITE)
+                    .at(index)
+                    .node(node)
+                    .value((*value).into(), 0.0));
+            }
+        }
+        let Parts { surface: written, grips: held, pushes } =
+            parts(place.arrays::<supple_contact>(), count, grips);
+        for (index, entry) in written.iter_mut().enumerate() {
+            let node = node_at(index);
+            *entry = SurfaceNode { rest: points.get(node as usize).copied().unwrap_or_default(), node };
+        }
+        held.fill(Grip::default());
+        pushes.fill(NodeVector::ZERO);
+        contact.write(place.put(|head| supple_contact {
+            head,
+            nodes: nodes as u32,
+            surface: count,
+            grip_room: grips,
+            grips: 0,
+            instruments: 0,
+            list: [Instrument::resting(Shape::Plane, Pose::at([0.0; 3])); MOST_INSTRUMENTS],
+            touches: [Touch::default(); MOST_INSTRUMENTS],
+            means: [[0.0; 3]; MOST_INSTRUMENTS],
+            points: [ContactPoint::default(); POINTS],
+        }));
+        Ok(SUPPLE_OK)
+    };
+    // SAFETY: as above.
+    unsafe { memory::answered(init(), error) }
+}
+
+/// Replaces all instruments by `count` others, which stand still where they are; none with a count of zero. What was held is let go.
+///
+/// @param error may be NULL; index is that of an instrument.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_set_instruments(
+    contact: *mut supple_contact,
+    instruments: *const supple_instrument,
+    count: u32,
+    error: *mut supple_error,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let set = || unsafe {
+        let object = memory::change(contact)?;
+        let given = array(instruments, count as usize)?;
+        if count > SUPPLE_MOST_INSTRUMENTS {
+            let error = supple_error::from(SUPPLE_E_CAPACITY);
+            return Err(error.value(count.into(), SUPPLE_MOST_INSTRUMENTS.into()));
+        }
+        let mut list = object.list;
+        for (index, (place, instrument)) in list.iter_mut().zip(given).enumerate() {
+            *place = checked(instrument, index)?;
+        }
+        (object.list, object.instruments, object.grips) = (list, count, 0);
+        object.touches = [Touch::default(); MOST_INSTRUMENTS];
+        Ok(SUPPLE_OK)
+    };
+    // SAFETY: as above.
+    unsafe { memory::answered(set(), error) }
+}
+
+/// # Safety
+/// The bytes of a field stay.
+unsafe fn checked(given: &supple_instrument, index: usize) -> Answer<Instrument<'static>> {
+    let &supple_instrument { shape, radius, length, friction, pose, field, field_bytes } = given;
+    let shape = match shape {
+        SUPPLE_PLANE => Shape::Plane,
+        SUPPLE_SPHERE => Shape::Sphere { radius },
+        SUPPLE_CAPSULE => Shape::Capsule { radius, length },
+        SUPPLE_FIELD => {
+            // SAFETY: the caller's promise.
+            let bytes = unsafe { lasting_bytes(field, field_bytes)? };
+            Shape::Field(Field::parse(bytes).map_err(|_| supple_error::from(SUPPLE_E_FIELD).at(index))?)
+        }
+        other => return Err(supple_error::from(SUPPLE_E_CHOICE).at(index).value(other.into(), 0.0)),
+    };
+    let mut instrument = Instrument::resting(shape, pose_of(&pose));
+    instrument.friction = friction;
+    check(&instrument, index)?;
+    Ok(instrument)
+}
+
+fn check(instrument: &Instrument<'_>, index: usize) -> Answer<()> {
+    use crate::contact::ContactError;
+    let refused = |value: f32| supple_error::from(SUPPLE_E_INSTRUMENT).at(index).value(value.into(), 0.0);
+    Surface::new(&[], 0).and_then(|surface| Contact::new(surface, &[*instrument]).map(|_| ())).map_err(
+        |error| match error {
+            ContactError::Instrument { value, .. } => refused(value),
+            _ => refused(f32::NAN),
+        },
+    )
+}
+
+fn pose_of(pose: &supple_pose) -> Pose {
+    let &supple_pose { position, rotation } = pose;
+    if rotation == [0.0; 4] { Pose::at(position) } else { Pose { position, rotation } }
+}
+
+/// Lets an instrument move on a line, and turn evenly, from where it is at the time `from` (s) to `pose` at the time `to`, usually the
+/// times of the state now and at the end of the frame. Before and after it stands still.
+///
+/// @param error may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_move_instrument(
+    contact: *mut supple_contact,
+    instrument: u32,
+    pose: *const supple_pose,
+    from: f64,
+    to: f64,
+    error: *mut supple_error,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let set = || unsafe {
+        let (object, pose) = (memory::change(contact)?, one(pose)?);
+        let (index, count) = (instrument as usize, object.instruments);
+        let Some(place) = object.list.get_mut(..count as usize).and_then(|list| list.get_mut(index)) else {
+            return Err(supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), count.into()));
+        };
+        let mut moved = *place;
+        moved.move_to(pose_of(pose), from, to);
+        check(&moved, index)?;
+        *place = moved;
+        Ok(SUPPLE_OK)
+    };
+    // SAFETY: as above.
+    unsafe { memory::answered(set(), error) }
+}
+
+/// Lets an instrument hold the nodes of the surface that are nearer to it than `within` (m) now, where they are, as forceps do; those that
+/// it or another one holds already it leaves as they are. They move with it, whatever force that takes, until supple_let_go.
+///
+/// @param held may be NULL; receives how many nodes it holds.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_grasp(
+    contact: *mut supple_contact,
+    state: *mut supple_state,
+    instrument: u32,
+    within: f32,
+    held: *mut u32,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let grasp = || unsafe {
+        let held = memory::place_if_wanted(held)?;
+        let (object, arrays) = memory::open(contact)?;
+        let state = opened(state)?;
+        if state.capacity() != object.nodes as usize {
+            return Err(super::status::mismatch(state.capacity(), object.nodes as usize));
+        }
+        if !within.is_finite() {
+            return Err(supple_error::from(SUPPLE_E_NOT_FINITE).value(within.into(), 0.0));
+        }
+        let list = object.list.get(..object.instruments as usize).unwrap_or_default();
+        let Some(tool) = list.get(instrument as usize) else {
+            return Err(
+                supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), object.instruments.into())
+            );
+        };
+        let Parts { surface, grips, .. } = parts(arrays, object.surface, object.grip_room);
+        let surface =
+            Surface::new(surface, object.nodes as usize).map_err(|_| supple_error::from(SUPPLE_E_INDEX))?;
+        let near = || tool.grips(instrument, surface, state.displacements(), state.time(), within);
+        let old = object.grips as usize;
+        let is_held = |place: u32, grips: &[Grip], count: usize| {
+            grips.iter().take(count).any(|grip| grip.place == place)
+        };
+        let new = near().filter(|grip| !is_held(grip.place, grips, old)).count();
+        if old + new > grips.len() {
+            let error = supple_error::from(SUPPLE_E_CAPACITY);
+            return Err(error.value((old + new) as f64, grips.len() as f64));
+        }
+        for grip in near() {
+            if !is_held(grip.place, grips, object.grips as usize) {
+                insert(grips, &mut object.grips, grip);
+            }
+        }
+        let all = grips.iter().take(object.grips as usize);
+        if let Some(held) = held {
+            held.write(all.filter(|grip| grip.instrument == instrument).count() as u32);
+        }
+        Ok(SUPPLE_OK)
+    };
+    status_of(grasp())
+}
+
+/// Inserts a grip in the order of the places; there is room for it.
+fn insert(grips: &mut [Grip], count: &mut u32, grip: Grip) {
+    let mut at = *count as usize;
+    while let Some(before) = at.checked_sub(1).and_then(|before| grips.get(before)).copied()
+        && before.place > grip.place
+    {
+        if let Some(place) = grips.get_mut(at) {
+            *place = before;
+        }
+        at -= 1;
+    }
+    if let Some(place) = grips.get_mut(at) {
+        *place = grip;
+        *count += 1;
+    }
+}
+
+/// Lets go what an instrument holds.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_let_go(contact: *mut supple_contact, instrument: u32) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let let_go = || unsafe {
+        let (object, arrays) = memory::open(contact)?;
+        let Parts { grips, .. } = parts(arrays, object.surface, object.grip_room);
+        let mut end = 0;
+        for at in 0..object.grips as usize {
+            if let Some(grip) = grips.get(at).copied().filter(|grip| grip.instrument != instrument)
+                && let Some(place) = grips.get_mut(end)
+            {
+                *place = grip;
+                end += 1;
+            }
+        }
+        object.grips = end as u32;
+        Ok(SUPPLE_OK)
+    };
+    status_of(let_go())
+}
+
+/// Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned and mass-scaled
+/// steps refuse loads with instruments.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_set_contact(
+    loads: *mut supple_loads,
+    contact: *mut supple_contact,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let set = || unsafe {
+        let loads = memory::change(loads)?;
+        if !contact.is_null() {
+            let nodes = memory::read(contact.cast_const())?.nodes;
+            if nodes != loads.nodes() {
+                return Err(super::status::mismatch(nodes as usize, loads.nodes() as usize));
+            }
+        }
+        loads.set_contact(contact);
+        Ok(SUPPLE_OK)
+    };
+    status_of(set())
+}
+
+/// What an instrument felt in the latest steps.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_read_touch(
+    contact: *const supple_contact,
+    instrument: u32,
+    touch: *mut supple_touch,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let read = || unsafe {
+        let (object, place) = (memory::read(contact)?, place_for(touch)?);
+        let index = instrument as usize;
+        let touches = object.touches.get(..object.instruments as usize).unwrap_or_default();
+        let (Some(&touch), Some(&mean_force)) = (touches.get(index), object.means.get(index)) else {
+            return Err(
+                supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), object.instruments.into())
+            );
+        };
+        let Touch { force, moment, contacts, depth, work, friction_loss } = touch;
+        place.write(supple_touch { force, moment, mean_force, contacts, depth, work, friction_loss });
+        Ok(SUPPLE_OK)
+    };
+    status_of(read())
+}
+
+/// Writes where instruments push in the latest step: at most `room` points, and SUPPLE_MOST_CONTACT_POINTS.
+///
+/// @param count receives how many were written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_contact_points(
+    contact: *const supple_contact,
+    points: *mut supple_contact_point,
+    room: u32,
+    count: *mut u32,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let read = || unsafe {
+        let (object, count) = (memory::read(contact)?, place_for(count)?);
+        let all: u32 = object.touches.iter().map(|touch| touch.contacts).sum();
+        let written = (all.min(room) as usize).min(POINTS);
+        if written > 0 {
+            place_for(points)?;
+        }
+        for (index, point) in object.points.iter().take(written).enumerate() {
+            let &ContactPoint { position, normal, force, depth, node, instrument } = point;
+            points.add(index).write(supple_contact_point {
+                position,
+                normal,
+                force,
+                depth,
+                node,
+                instrument,
+            });
+        }
+        count.write(written as u32);
+        Ok(SUPPLE_OK)
+    };
+    status_of(read())
+}
+
+/// Takes the position (m) and the force (N) of a new frame, as of supple_read_touch.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_local_force_follow(
+    model: *mut supple_local_force,
+    position: *const f32,
+    force: *const f32,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let follow = || unsafe {
+        let [position, force] = [*one(position.cast::<[f32; 3]>())?, *one(force.cast::<[f32; 3]>())?];
+        if position.iter().chain(&force).any(|component| !component.is_finite()) {
+            return Err(SUPPLE_E_NOT_FINITE.into());
+        }
+        let place = place_for(model)?;
+        let mut local = local_force(&place.read());
+        local.follow(position, force);
+        let LocalForce { position, force, stiffness, error, hold_error } = local;
+        place.write(supple_local_force { position, force, stiffness, error, hold_error });
+        Ok(SUPPLE_OK)
+    };
+    status_of(follow())
+}
+
+/// Writes the force (N) at a position (m) before the next frame.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_local_force_at(
+    model: *const supple_local_force,
+    position: *const f32,
+    force: *mut f32,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let at = || unsafe {
+        let (model, position) = (one(model)?, one(position.cast::<[f32; 3]>())?);
+        place_for(force.cast::<[f32; 3]>())?.write(local_force(model).at(*position));
+        Ok(SUPPLE_OK)
+    };
+    status_of(at())
+}
+
+fn local_force(model: &supple_local_force) -> LocalForce {
+    let &supple_local_force { position, force, stiffness, error, hold_error } = model;
+    LocalForce { position, force, stiffness, error, hold_error }
+}
+
+/// The contact of one call that takes steps.
+pub(super) struct CallContact<'a> {
+    pub(super) contact: Contact<'a>,
+    /// What its state keeps, until it is attached.
+    pushes: &'a mut [NodeVector],
+    touches: &'a mut [Touch],
+    points: &'a mut [ContactPoint],
+    means: &'a mut [[f32; 3]],
+    steps: f32,
+}
+
+impl<'a> CallContact<'a> {
+    /// Of an object, or none.
+    ///
+    /// # Safety
+    /// As at [`memory::change`].
+    pub(super) unsafe fn of(contact: *mut supple_contact, nodes: usize) -> Answer<Option<Self>> {
+        if contact.is_null() {
+            return Ok(None);
+        }
+        // SAFETY: the caller's promise.
+        let (object, arrays) = unsafe { memory::open(contact)? };
+        let supple_contact { surface, grip_room, grips, instruments, list, touches, means, points, .. } =
+            object;
+        // SAFETY: as above.
+        let parts = unsafe { parts(arrays, *surface, *grip_room) };
+        let wrong = |_| supple_error::from(SUPPLE_E_MISMATCH);
+        let surface = Surface::new(parts.surface, nodes).map_err(wrong)?;
+        let list = list.get(..*instruments as usize).unwrap_or_default();
+        let grips = parts.grips.get(..*grips as usize).unwrap_or_default();
+        let contact =
+            Contact::new(surface, list).and_then(|contact| contact.gripping(grips)).map_err(wrong)?;
+        Ok(Some(Self { contact, pushes: parts.pushes, touches, points, means, steps: 0.0 }))
+    }
+
+    /// The state with what it keeps.
+    pub(super) fn attached(&mut self, state: StateView<'a>) -> StateView<'a> {
+        self.means.fill([0.0; 3]);
+        let (pushes, touches, points) =
+            (take(&mut self.pushes), take(&mut self.touches), take(&mut self.points));
+        state.pushing(pushes).feeling(touches).listing(points)
+    }
+
+    /// Enters the forces of a step in the means.
+    pub(super) fn enter(&mut self, touches: &[Touch]) {
+        self.steps += 1.0;
+        for (mean, touch) in self.means.iter_mut().zip(touches) {
+            for (mean, force) in mean.iter_mut().zip(touch.force) {
+                *mean += (force - *mean) / self.steps;
+            }
+        }
+    }
+}
