@@ -151,7 +151,7 @@ impl<'a> StateView<'a> {
         Self { points, ..self }
     }
 
-    /// The same state with [`vectors_to_push`](crate::contact::vectors_to_push) vectors that belong to it, for what instruments do:
+    /// The same state with [`crate::contact::vectors_to_push`] vectors that belong to it, for what instruments do:
     /// multilevel and damped steps need them, exact ones are faster with them. Zeros: nothing touches yet.
     #[must_use]
     pub fn pushing(self, pushes: &'a mut [NodeVector]) -> Self {

@@ -40,6 +40,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! A body of any form is a [`Field`] of signed distances. Nodes that an instrument grasps ([`Contact::gripping`]) move with it, whatever
+//! force that takes. [`LocalForce`] is the force between two frames, for a haptic loop.
+//!
 //! Multilevel and damped steps solve for the pushes on all nodes together, as these move each other (`pushes.rs`), from those
 //! of the step before. Mass-scaled and learned steps refuse instruments: what they push would be inertia that is not there.
 //!

@@ -159,12 +159,12 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let mut compliance =
             StepCompliance { tables, places, inertia, rotations, square, lattice, listed, local };
         for each in &mut *touched {
-            let mut own = 0.0f32;
-            for direction in directions(Vec3::from_array(each.normal)) {
-                each.vector = direction.to_array();
-                compliance.apply(core::slice::from_mut(each));
-                own = own.max(Vec3::from_array(each.vector).length());
-            }
+            let normal = Vec3::from_array(each.normal);
+            each.vector = normal.to_array();
+            compliance.apply(core::slice::from_mut(each));
+            // Across the normal its own motion will do: the scale only makes light and heavy nodes alike.
+            let across = directions(normal).map(|axis| compliance.own(each.node as usize, axis).length());
+            let own = across.into_iter().fold(Vec3::from_array(each.vector).length(), f32::max);
             each.scale = if own > 0.0 { 1.0 / libm::sqrtf(own) } else { 0.0 };
         }
         solve(touched, &mut compliance);
