@@ -32,6 +32,8 @@ mod vectors;
 
 mod contact;
 
+mod local_force;
+
 mod saved;
 
 mod learned;

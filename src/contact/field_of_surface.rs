@@ -29,8 +29,8 @@ const MOST_POINTS: f64 = 67_108_864.0;
 const RIM: f32 = 2.0;
 
 impl SurfaceField {
-    /// Computes the distances of a closed surface, its triangles counted so that their normals point outwards, on a grid of this spacing
-    /// (m) around it.
+    /// Computes the distances of a closed surface, whose triangles are all counted in the same direction, on a grid of this spacing (m)
+    /// around it.
     pub fn new(
         points: &[[f32; 3]],
         triangles: &[[u32; 3]],
@@ -52,8 +52,15 @@ impl SurfaceField {
                 "a spacing of {spacing} m makes {count:.2e} points, {MOST_POINTS:.2e} are possible"
             ));
         }
+        // Six times the volume: below zero if the normals point inwards.
+        let corner = |corner: u32| {
+            points.get(corner as usize).map_or(Vec3::ZERO, |&point| Vec3::from_array(point) - low)
+        };
+        let volume: f32 = triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c)))).sum();
+        let triangles: Vec<_> =
+            triangles.iter().map(|&[a, b, c]| if volume < 0.0 { [a, c, b] } else { [a, b, c] }).collect();
         let vertices = points.iter().map(|&point| point.into()).collect();
-        let mesh = TriMesh::with_flags(vertices, triangles.to_vec(), TriMeshFlags::ORIENTED)
+        let mesh = TriMesh::with_flags(vertices, triangles, TriMeshFlags::ORIENTED)
             .map_err(|error| error.to_string())?;
         let size = size.to_array().map(|points| points as u32);
         let mut values = Vec::with_capacity(count as usize);

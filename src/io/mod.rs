@@ -50,8 +50,36 @@ pub struct TetMesh {
 /// Points, lines and surface cells other than triangles are left out. A volume cell that is not a tetrahedron with
 /// four nodes is an error, as is a file without tetrahedra.
 pub fn read_mesh(path: &Path) -> Result<TetMesh, ReadError> {
+    let mesh = read_any(path)?;
+    if mesh.tets.is_empty() {
+        return Err(Fault::new("", "the file has no tetrahedra").in_file(path));
+    }
+    Ok(mesh)
+}
+
+/// The surface of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceMesh {
+    /// Coordinates in file units.
+    pub points: Vec<[f64; 3]>,
+    /// The points of each triangle, from 0.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Reads the surface of a body from the same files: the boundary of their tetrahedra, or else their triangles. A file
+/// without either is an error.
+pub fn read_surface(path: &Path) -> Result<SurfaceMesh, ReadError> {
+    let mesh = read_any(path)?;
+    let triangles = if mesh.tets.is_empty() { mesh.triangles } else { crate::mesh::boundary(mesh.tets) };
+    if triangles.is_empty() {
+        return Err(Fault::new("", "the file has neither tetrahedra nor triangles").in_file(path));
+    }
+    Ok(SurfaceMesh { points: mesh.points, triangles })
+}
+
+fn read_any(path: &Path) -> Result<TetMesh, ReadError> {
     let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
-    let mesh = match extension.as_str() {
+    match extension.as_str() {
         "vtk" => parse(path, vtk::read),
         "vtu" => parse(path, vtu::read),
         "msh" => parse(path, gmsh::read),
@@ -63,11 +91,7 @@ pub fn read_mesh(path: &Path) -> Result<TetMesh, ReadError> {
             parse(&file("ele"), |bytes| tetgen::read_elements(bytes, points, &index))
         }
         _ => Err(Fault::new("", "the extension is none of .vtk, .vtu, .msh, .node and .ele").in_file(path)),
-    }?;
-    if mesh.tets.is_empty() {
-        return Err(Fault::new("", "the file has no tetrahedra").in_file(path));
     }
-    Ok(mesh)
 }
 
 /// Reads a Gmsh `.msh` mesh from memory; `name` stands for the file in errors.

@@ -146,6 +146,8 @@ fn the_field_of_a_mesh_is_its_distance() {
     let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());
     let surface = supple::mesh::boundary(tets);
     let made = supple::contact::SurfaceField::new(&points, &surface, 0.0017).unwrap();
+    let turned: Vec<_> = surface.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    assert_eq!(supple::contact::SurfaceField::new(&points, &turned, 0.0017).unwrap().values, made.values);
     let field = made.field().unwrap();
     let (mut worst, [x, y, _]) = (0.0f32, made.size.map(|points| points as usize));
     for (index, value) in made.values.iter().enumerate() {

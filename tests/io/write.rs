@@ -4,7 +4,9 @@ use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
-use supple::io::{Frame, TetMesh, read_mesh, write_atomically, write_pvd, write_vtu};
+use supple::io::{
+    Frame, TetMesh, read_mesh, read_surface, write_atomically, write_pvd, write_triangles, write_vtu,
+};
 
 fn mesh() -> TetMesh {
     read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/vtk_raw.vtu")).unwrap()
@@ -106,6 +108,28 @@ fn a_series_lists_times_and_files() {
     let sets: Vec<_> = document.descendants().filter(|node| node.has_tag_name("DataSet")).collect();
     let values: Vec<_> = sets.iter().map(|set| (set.attribute("timestep"), set.attribute("file"))).collect();
     assert_eq!(values, [(Some("0"), Some("a.vtu")), (Some("0.02"), Some("b & c.vtu"))]);
+}
+
+#[test]
+fn triangles_come_back_and_files_of_one_time_are_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tool.vtu");
+    let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.5]];
+    write_triangles(&path, &points, &[[0, 1, 2], [0, 3, 1]]).unwrap();
+    assert!(read_mesh(&path).unwrap_err().to_string().contains("no tetrahedra"));
+    let read = read_surface(&path).unwrap();
+    assert_eq!((read.points, read.triangles), (points.to_vec(), vec![[0, 1, 2], [0, 3, 1]]));
+    let tets = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/vtk_raw.vtu");
+    assert!(!read_surface(&tets).unwrap().triangles.is_empty());
+    let error = write_triangles(&folder.path().join("bad.vtu"), &points, &[[0, 1, 4]]).unwrap_err();
+    println!("{error}");
+    assert_eq!(error.kind(), ErrorKind::InvalidInput);
+    let series = folder.path().join("series.pvd");
+    let file = |name: &str| name.to_string();
+    write_pvd(&series, &[(0.0, file("a")), (0.0, file("b")), (0.1, file("c"))]).unwrap();
+    let text = fs::read_to_string(&series).unwrap();
+    let parts: Vec<_> = text.split("part=\"").skip(1).map(|rest| &rest[..1]).collect();
+    assert_eq!(parts, ["0", "1", "0"]);
 }
 
 #[test]

@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use supple::contact::SurfaceField;
-use supple::io::{read_mesh, write_atomically};
-use supple::mesh::boundary;
+use supple::io::{self, SurfaceMesh, write_atomically};
 
 use crate::problem::{End, Problem};
 use crate::screen::output;
@@ -30,9 +29,8 @@ type Surface = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
 /// The surface of a mesh file.
 pub(crate) fn read_surface(path: &Path, scale: f64) -> Result<Surface, Problem> {
-    let mesh = read_mesh(path).map_err(Problem::of)?;
-    let points = mesh.points.iter().map(|point| point.map(|component| (component * scale) as f32));
-    let triangles = if mesh.tets.is_empty() { mesh.triangles } else { boundary(mesh.tets) };
+    let SurfaceMesh { points, triangles } = io::read_surface(path).map_err(Problem::of)?;
+    let points = points.iter().map(|point| point.map(|component| (component * scale) as f32));
     Ok((points.collect(), triangles))
 }
 

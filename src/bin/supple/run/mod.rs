@@ -18,7 +18,7 @@ use supple::tled::Pace;
 
 use crate::problem::Problem;
 use crate::scene::setup::Setup;
-use exact::{ExactSteps, Motion, ROUNDING};
+use exact::{Automatic, ExactSteps, Motion, ROUNDING};
 use outcome::{LargeTrace, Outcome};
 use reactions::Reactions;
 use start::{Mover, Start, critical};
@@ -59,16 +59,8 @@ pub(crate) fn run<M: ElementMaterial>(
         let share = index as f64 / frames as f64;
         let clock = Instant::now();
         if let Mover::Exact(ExactSteps::Automatic(automatic)) = &mut mover {
-            let (target, mut from) = (time.end * share, state.time());
-            while from < target && outcome.divergence.is_none() {
-                let until = target.min(tools.next_turn(from + rounding));
-                let instruments = tools.at(from + rounding);
-                let contact = tools.contact(&instruments, scene.node_count())?;
-                let loads = if tools.is_empty() { loads } else { loads.touched_by(&contact) };
-                let motion = Motion { scene, loads, damping: setup.damping, end: time.end, tick };
-                automatic.reach(&motion, state, &mut outcome, until);
-                from = until;
-            }
+            let motion = Motion { scene, loads, damping: setup.damping, end: time.end, tick };
+            reach(automatic, setup, motion, state, &mut outcome, time.end * share)?;
         } else {
             let target = (total as f64 * share).round() as u64;
             while taken < target && outcome.divergence.is_none() {
@@ -108,4 +100,26 @@ pub(crate) fn run<M: ElementMaterial>(
         outcome.learned = Some(learned.trace);
     }
     Ok(outcome)
+}
+
+/// Automatic steps to a time (s), along the parts of the instruments' paths.
+fn reach<M: ElementMaterial>(
+    automatic: &mut Automatic,
+    setup: &Setup,
+    motion: Motion<'_, M>,
+    state: &mut VecState,
+    outcome: &mut Outcome,
+    target: f64,
+) -> Result<(), Problem> {
+    let (tools, rounding) = (&setup.tools, 2.0 * ROUNDING * motion.end);
+    let mut from = state.time();
+    while from < target && outcome.divergence.is_none() {
+        let until = target.min(tools.next_turn(from + rounding));
+        let instruments = tools.at(from + rounding);
+        let contact = tools.contact(&instruments, motion.scene.node_count())?;
+        let loads = if tools.is_empty() { motion.loads } else { motion.loads.touched_by(&contact) };
+        automatic.reach(&Motion { loads, ..motion }, state, outcome, until);
+        from = until;
+    }
+    Ok(())
 }
