@@ -61,7 +61,7 @@ fn measure<M: ElementMaterial>(
     let run = |instruments: &[Instrument<'static>], with: bool| -> Box<dyn FnMut() -> (u32, f64) + '_> {
         let instruments: Vec<_> = instruments.to_vec();
         let mut state = VecState::at_rest(points.len());
-        let mut pushes = vec![NodeVector::ZERO; vectors_to_push(surface.len())];
+        let mut pushes = vec![NodeVector::ZERO; vectors_to_push(surface.len(), 0)];
         let mut touches = [Touch::default()];
         let bytes = bytes.clone();
         let mut large = damped.then(|| {

@@ -177,7 +177,7 @@ struct host {
         scene = made("scene", supple::scene::make(scene_room, body));
         loads = made("loads", supple::loads::make(loads_room, scene, 0, 0));
         state = made("state", supple::state::make(state_room, scene));
-        contact = made("contact", supple::contact::make(contact_room, scene, points, surface));
+        contact = made("contact", supple::contact::make(contact_room, scene, points, {surface}));
         const supple::instrument sphere[] = {supple::instrument::sphere(RADIUS, supple::pose_at(start), FRICTION)};
         done("sphere", contact.set(sphere));
         done("contact", loads.set_contact(contact));

@@ -38,7 +38,7 @@ int main(int count, char **words) {
     const auto scene = made(supple::scene::make(scene_room, body));
     const auto state = made(supple::state::make(state_room, scene));
     const auto loads = made(supple::loads::make(loads_room, scene, 0, 0));
-    const auto contact = made(supple::contact::make(contact_room, scene, mesh.points, {})); // any node may be touched
+    const auto contact = made(supple::contact::make(contact_room, scene, mesh.points)); // any node may be touched
     const auto place = [](float height) { return supple::pose_at({-0.010f, 0.004f, height}); };
     const supple::instrument tools[] = {supple::instrument::sphere(0.010f, place(0.073f), 0.3f)}; // m, friction
     done(contact.set(tools));

@@ -34,6 +34,10 @@ class Instrument(Structure):
     ]
 
 
+class Surface(Structure):
+    _fields_ = [("nodes", POINTER(c_uint32)), ("triangles", POINTER(c_uint32)), ("node_count", c_uint32), ("triangle_count", c_uint32)]
+
+
 class Touch(Structure):
     _fields_ = [
         *((name, c_float * 3) for name in ("force", "moment", "mean_force")), ("contacts", c_uint32),
@@ -63,10 +67,11 @@ def main(path):
     loads = library.made("supple_loads_init", library.size("supple_loads_size", 0, 0), scene, c_uint32(0), c_uint32(0))
     # The nodes of the boundary: on the faces of the box.
     faces = np.isclose(points, 0.0).any(axis=1) | np.isclose(points, SIZE.astype(np.float32)).any(axis=1)
-    surface = np.flatnonzero(faces).astype(np.uint32)
+    numbers = np.flatnonzero(faces).astype(np.uint32)
+    surface = Surface(numbers.ctypes.data_as(POINTER(c_uint32)), None, len(numbers), 0)
     contact = library.made(
-        "supple_contact_init", library.size("supple_contact_size", len(surface), 0), scene, at,
-        surface.ctypes.data_as(POINTER(c_uint32)), c_uint32(len(surface)), c_uint32(0), after=(None,),
+        "supple_contact_init", library.size("supple_contact_size", len(numbers), 0, 0), scene, at, byref(surface),
+        c_uint32(0), after=(None,),
     )
     ball = Instrument(SPHERE, RADIUS, 0.0, FRICTION, pose(0), None, 0)
     library.call("supple_set_instruments", contact, byref(ball), c_uint32(1), None)

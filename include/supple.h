@@ -898,6 +898,28 @@ typedef struct {
 } supple_vectors;
 
 /**
+ * What instruments can touch.
+ */
+typedef struct {
+    /**
+     * Numbers of the nodes, those of the boundary; NULL: the first `node_count` nodes, all of them with the scene's number.
+     */
+    const uint32_t *nodes;
+    /**
+     * Numbers of the three nodes of each triangle between these nodes, where an instrument is thinner than edges are long; else NULL.
+     */
+    const uint32_t *triangles;
+    /**
+     * How many.
+     */
+    uint32_t node_count;
+    /**
+     * How many.
+     */
+    uint32_t triangle_count;
+} supple_surface;
+
+/**
  * Where an instrument is.
  */
 typedef struct {
@@ -920,7 +942,7 @@ typedef struct {
      */
     uint32_t shape;
     /**
-     * Of a sphere or capsule, m. At least the length of the surface's edges: an instrument passes between nodes.
+     * Of a sphere or capsule, m. Below the length of the surface's edges the surface needs triangles: else it passes between nodes.
      */
     float radius;
     /**
@@ -962,11 +984,11 @@ typedef struct {
      */
     float mean_force[3];
     /**
-     * Nodes that it pushes or holds.
+     * Nodes that it pushes or holds, and triangles.
      */
     uint32_t contacts;
     /**
-     * How far the deepest node would have been inside without the instrument, m.
+     * How far the deepest one would have been inside without the instrument, m.
      */
     float depth;
     /**
@@ -980,7 +1002,7 @@ typedef struct {
 } supple_touch;
 
 /**
- * Where an instrument pushes a node.
+ * Where an instrument pushes a node or a triangle.
  */
 typedef struct {
     /**
@@ -992,15 +1014,15 @@ typedef struct {
      */
     float normal[3];
     /**
-     * Force of the instrument on the node, N.
+     * Force of the instrument on the tissue, N.
      */
     float force[3];
     /**
-     * How far the node would have been inside without the instrument, m.
+     * How far the point would have been inside without the instrument, m.
      */
     float depth;
     /**
-     * From zero.
+     * From zero; of a triangle the corner with most of the force.
      */
     uint32_t node;
     /**
@@ -1492,27 +1514,26 @@ supple_status supple_copy_forces(const supple_state *state,
                                  size_t floats);
 
 /**
- * Bytes of memory that a supple_contact needs for so many nodes that can be touched and so many that can be held at once.
+ * Bytes of memory that a supple_contact needs for a surface of so many nodes and triangles, of which so many nodes can be held at once.
  */
-size_t supple_contact_size(uint32_t surface_nodes,
+size_t supple_contact_size(uint32_t nodes,
+                           uint32_t triangles,
                            uint32_t grips);
 
 /**
  * Prepares a contact in `memory` of at least supple_contact_size bytes, aligned to SUPPLE_ALIGN: no instruments yet.
  *
  * @param points of all nodes of the scene at rest, m, three coordinates each.
- * @param surface numbers of the nodes that can be touched, those of the boundary; NULL: the first `count` nodes, all of them with
- * the scene's number.
- * @param count how many.
+ * @param surface what can be touched; it is copied.
  * @param grips most nodes that instruments hold at once.
- * @param error may be NULL; index is the place in `surface`.
+ * @param error may be NULL; index is the place in the nodes of `surface`, or that of a triangle with a corner that is not among these
+ * nodes, or twice the same.
  */
 supple_status supple_contact_init(void *memory,
                                   size_t bytes,
                                   const supple_scene *scene,
                                   const float *points,
-                                  const uint32_t *surface,
-                                  uint32_t count,
+                                  const supple_surface *surface,
                                   uint32_t grips,
                                   supple_contact **contact,
                                   supple_error *error);

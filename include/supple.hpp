@@ -853,29 +853,38 @@ private:
     return {{position[0], position[1], position[2]}, {0.0f, 0.0f, 0.0f, 1.0f}};
 }
 
-// Instruments, the nodes that they can touch, and what one state keeps of them. One thread at a time.
+// What instruments can touch. Without `nodes` all of the scene's; `triangles`, the numbers of their three nodes each, where an
+// instrument is thinner than edges are long.
+struct surface {
+    span<const std::uint32_t> nodes = {};
+    span<const std::uint32_t> triangles = {};
+};
+
+// Instruments, what they can touch, and what one state keeps of them. One thread at a time.
 class contact {
 public:
     constexpr contact() noexcept = default;
     constexpr explicit contact(supple_contact *raw) noexcept : raw_(raw) {}
     [[nodiscard]] constexpr supple_contact *raw() const noexcept { return raw_; }
 
-    // Bytes of memory for so many nodes that can be touched, and so many that can be held at once.
-    [[nodiscard]] static std::size_t size(std::uint32_t surface, std::uint32_t grips = 0) noexcept {
-        return supple_contact_size(surface, grips);
+    // Bytes of memory for so many nodes and triangles that can be touched, and so many nodes that can be held at once.
+    [[nodiscard]] static std::size_t size(std::uint32_t nodes, std::uint32_t triangles = 0,
+                                          std::uint32_t grips = 0) noexcept {
+        return supple_contact_size(nodes, triangles, grips);
     }
 
-    // Prepares it, without instruments yet. `points` are those of the scene at rest, m, `surface` the nodes of its
-    // boundary; without any, all nodes can be touched.
-    static result<contact> make(memory place, scene of, span<const float> points, span<const std::uint32_t> surface,
+    // Prepares it, without instruments yet. `points` are those of the scene at rest, m.
+    static result<contact> make(memory place, scene of, span<const float> points, const surface &touched = {},
                                 std::uint32_t grips = 0) noexcept {
         result<contact> made{status::ok, detail::nothing(status::ok), {}};
         if (!detail::has_points(of, points, made)) return made;
-        const std::size_t listed = surface.size() > 0 ? surface.size() : points.size() / 3;
-        const auto count = static_cast<std::uint32_t>(listed < none ? listed : none);
-        made.status = detail::of(supple_contact_init(place.data(), place.size(), of.raw(), points.data(),
-                                                     surface.size() > 0 ? surface.data() : nullptr, count, grips,
-                                                     &made.value.raw_, &made.error));
+        const auto number = [](std::size_t of) { return static_cast<std::uint32_t>(of < none ? of : none); };
+        const bool is_list = touched.nodes.size() > 0;
+        const supple_surface given = {is_list ? touched.nodes.data() : nullptr, touched.triangles.data(),
+                                      number(is_list ? touched.nodes.size() : points.size() / 3),
+                                      number(touched.triangles.size() / 3)};
+        made.status = detail::of(supple_contact_init(place.data(), place.size(), of.raw(), points.data(), &given,
+                                                     grips, &made.value.raw_, &made.error));
         return made;
     }
 

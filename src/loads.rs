@@ -196,7 +196,7 @@ impl<'a> Loads<'a> {
     {
         let given = self.contact.and_then(|contact| {
             let surface = contact.surface();
-            Some((surface, kept_pushes(state.pushes, surface.nodes().len())?))
+            Some((surface, kept_pushes(state.pushes, &surface)?))
         });
         if given.is_none() { *self } else { Loads { contact: None, given, ..*self } }
     }

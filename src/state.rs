@@ -9,7 +9,7 @@ use core::ops::Deref;
 
 use crate::contact::{ContactPoint, Touch};
 #[cfg(any(feature = "std", test))]
-use crate::contact::{MOST_INSTRUMENTS, vectors_to_push};
+use crate::contact::{MOST_INSTRUMENTS, Surface, vectors_to_push};
 use crate::element::Extremes;
 use crate::energy_balance::EnergyBalance;
 use crate::material::{Element, Material};
@@ -152,7 +152,7 @@ impl<'a> StateView<'a> {
     }
 
     /// The same state with [`crate::contact::vectors_to_push`] vectors that belong to it, for what instruments do:
-    /// multilevel and damped steps need them, exact ones are faster with them. Zeros: nothing touches yet.
+    /// multilevel and damped steps need them, exact ones for triangles, and are faster with them. Zeros: nothing touches yet.
     #[must_use]
     pub fn pushing(self, pushes: &'a mut [NodeVector]) -> Self {
         Self { pushes, ..self }
@@ -397,10 +397,11 @@ impl VecState {
         Self { vectors: VecVectors { vectors, pushes, touches }, progress: Progress::START }
     }
 
-    /// The same with room for what instruments do on a surface of so many nodes.
+    /// The same with room for what instruments do on a surface.
     #[must_use]
-    pub fn meeting(mut self, surface_nodes: usize) -> Self {
-        self.vectors.pushes = std::vec![NodeVector::ZERO; vectors_to_push(surface_nodes)];
+    pub fn meeting(mut self, surface: &Surface<'_>) -> Self {
+        let vectors = vectors_to_push(surface.nodes().len(), surface.triangles().len());
+        self.vectors.pushes = std::vec![NodeVector::ZERO; vectors];
         self.vectors.touches = std::vec![Touch::default(); MOST_INSTRUMENTS];
         self
     }

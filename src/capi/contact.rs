@@ -14,6 +14,7 @@ use super::memory::{self, Arrays, Head, Layout, Object, Place, array, lasting_by
 use super::scene::{carved, supple_scene};
 use super::state::{opened, supple_state};
 use super::status::{Answer, status_of, supple_error, supple_status};
+use super::surface::{Given, supple_surface};
 use supple_status::*;
 
 /// Shapes of an instrument: all below the plane z = 0 of its axes; a ball around its centre; a cylinder along z with round ends; the
@@ -47,7 +48,7 @@ pub struct supple_pose {
 pub struct supple_instrument {
     /// SUPPLE_PLANE, SUPPLE_SPHERE, SUPPLE_CAPSULE or SUPPLE_FIELD.
     pub shape: u32,
-    /// Of a sphere or capsule, m. At least the length of the surface's edges: an instrument passes between nodes.
+    /// Of a sphere or capsule, m. Below the length of the surface's edges the surface needs triangles: else it passes between nodes.
     pub radius: f32,
     /// Of a capsule, between the centres of its ends, m.
     pub length: f32,
@@ -71,9 +72,9 @@ pub struct supple_touch {
     pub moment: [f32; 3],
     /// Mean of the force over the steps of the latest call that took steps, N; of supple_adaptive_advance that of the latest step.
     pub mean_force: [f32; 3],
-    /// Nodes that it pushes or holds.
+    /// Nodes that it pushes or holds, and triangles.
     pub contacts: u32,
-    /// How far the deepest node would have been inside without the instrument, m.
+    /// How far the deepest one would have been inside without the instrument, m.
     pub depth: f32,
     /// Work that it did on the tissue in the latest step, J.
     pub work: f32,
@@ -81,7 +82,7 @@ pub struct supple_touch {
     pub friction_loss: f32,
 }
 
-/// Where an instrument pushes a node.
+/// Where an instrument pushes a node or a triangle.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_contact_point {
@@ -89,11 +90,11 @@ pub struct supple_contact_point {
     pub position: [f32; 3],
     /// Outward normal of the instrument; zero where it holds the node.
     pub normal: [f32; 3],
-    /// Force of the instrument on the node, N.
+    /// Force of the instrument on the tissue, N.
     pub force: [f32; 3],
-    /// How far the node would have been inside without the instrument, m.
+    /// How far the point would have been inside without the instrument, m.
     pub depth: f32,
-    /// From zero.
+    /// From zero; of a triangle the corner with most of the force.
     pub node: u32,
     /// From zero.
     pub instrument: u32,
@@ -107,6 +108,7 @@ pub struct supple_contact {
     /// Of the scene, and of those that can be touched.
     nodes: u32,
     surface: u32,
+    triangles: u32,
     grip_room: u32,
     grips: u32,
     instruments: u32,
@@ -122,55 +124,76 @@ unsafe impl Object for supple_contact {
     const FRONT: usize = size_of::<Self>();
 }
 
-fn layout(surface: usize, grips: usize) -> Layout {
-    Layout::of::<supple_contact>()
-        .and::<SurfaceNode>(surface)
-        .and::<Grip>(grips)
-        .and::<NodeVector>(vectors_to_push(surface))
+/// How much room the arrays of a contact have.
+#[derive(Clone, Copy)]
+struct Room {
+    nodes: u32,
+    triangles: u32,
+    grips: u32,
 }
 
-/// The arrays of a contact.
-struct Parts<'a> {
-    surface: &'a mut [SurfaceNode],
-    grips: &'a mut [Grip],
-    pushes: &'a mut [NodeVector],
-}
+impl Room {
+    const fn vectors(self) -> usize {
+        vectors_to_push(self.nodes as usize, self.triangles as usize)
+    }
 
-/// # Safety
-/// The arrays are those of a contact with so many nodes and so much room, and nobody else uses them.
-unsafe fn parts<'a>(mut arrays: Arrays, surface: u32, grips: u32) -> Parts<'a> {
-    // SAFETY: the caller's promise. Any bits are each of them.
-    unsafe {
-        Parts {
-            surface: arrays.change(surface as usize),
-            grips: arrays.change(grips as usize),
-            pushes: arrays.change(vectors_to_push(surface as usize)),
+    fn layout(self) -> Layout {
+        Layout::of::<supple_contact>()
+            .and::<SurfaceNode>(self.nodes as usize)
+            .and::<[u32; 3]>(self.triangles as usize)
+            .and::<Grip>(self.grips as usize)
+            .and::<NodeVector>(self.vectors())
+    }
+
+    /// # Safety
+    /// The arrays are those of a contact with so much room, and nobody else uses them.
+    unsafe fn parts<'a>(self, mut arrays: Arrays) -> Parts<'a> {
+        // SAFETY: the caller's promise. Any bits are each of them.
+        unsafe {
+            Parts {
+                nodes: arrays.change(self.nodes as usize),
+                triangles: arrays.change(self.triangles as usize),
+                grips: arrays.change(self.grips as usize),
+                pushes: arrays.change(self.vectors()),
+            }
         }
     }
 }
 
-/// Bytes of memory that a supple_contact needs for so many nodes that can be touched and so many that can be held at once.
+/// The arrays of a contact.
+struct Parts<'a> {
+    nodes: &'a mut [SurfaceNode],
+    triangles: &'a mut [[u32; 3]],
+    grips: &'a mut [Grip],
+    pushes: &'a mut [NodeVector],
+}
+
+impl supple_contact {
+    const fn room(&self) -> Room {
+        Room { nodes: self.surface, triangles: self.triangles, grips: self.grip_room }
+    }
+}
+
+/// Bytes of memory that a supple_contact needs for a surface of so many nodes and triangles, of which so many nodes can be held at once.
 #[unsafe(no_mangle)]
-pub extern "C" fn supple_contact_size(surface_nodes: u32, grips: u32) -> usize {
-    layout(surface_nodes as usize, grips as usize).bytes()
+pub extern "C" fn supple_contact_size(nodes: u32, triangles: u32, grips: u32) -> usize {
+    Room { nodes, triangles, grips }.layout().bytes()
 }
 
 /// Prepares a contact in `memory` of at least supple_contact_size bytes, aligned to SUPPLE_ALIGN: no instruments yet.
 ///
 /// @param points of all nodes of the scene at rest, m, three coordinates each.
-/// @param surface numbers of the nodes that can be touched, those of the boundary; NULL: the first `count` nodes, all of them with
-/// the scene's number.
-/// @param count how many.
+/// @param surface what can be touched; it is copied.
 /// @param grips most nodes that instruments hold at once.
-/// @param error may be NULL; index is the place in `surface`.
+/// @param error may be NULL; index is the place in the nodes of `surface`, or that of a triangle with a corner that is not among these
+/// nodes, or twice the same.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_contact_init(
     memory: *mut c_void,
     bytes: usize,
     scene: *const supple_scene,
     points: *const f32,
-    surface: *const u32,
-    count: u32,
+    surface: *const supple_surface,
     grips: u32,
     contact: *mut *mut supple_contact,
     error: *mut supple_error,
@@ -178,38 +201,25 @@ pub unsafe extern "C" fn supple_contact_init(
     // SAFETY: what the header asks of the caller.
     let init = || unsafe {
         let (any, contact) = (carved(scene)?, place_for(contact)?);
-        let nodes = any.node_count();
-        let points = array(points.cast::<[f32; 3]>(), nodes)?;
-        let given = if surface.is_null() { &[] } else { array(surface, count as usize)? };
-        let place = Place::new(memory, bytes, layout(count as usize, grips as usize))?;
-        let node_at = |index: usize| {
-            if surface.is_null() { index as u32 } else { given.get(index).copied().unwrap_or(u32::MAX) }
-        };
-        for index in 0..count as usize {
-            let node = node_at(index);
-            let Some(point) = points.get(node as usize) else {
-                let error = supple_error::from(SUPPLE_E_INDEX).at(index).node(node);
-                return Err(error.value(node.into(), nodes as f64));
-            };
-            if let Some(value) = point.iter().find(|component| !component.is_finite()) {
-                return Err(supple_error::from(SUPPLE_E_NOT_FINITE)
-                    .at(index)
-                    .node(node)
-                    .value((*value).into(), 0.0));
-            }
+        let (nodes, surface) = (any.node_count(), one(surface)?);
+        let given = Given::new(surface, array(points.cast(), nodes)?)?;
+        let room = Room { nodes: surface.node_count, triangles: surface.triangle_count, grips };
+        let place = Place::new(memory, bytes, room.layout())?;
+        given.check()?;
+        let parts = room.parts(place.arrays::<supple_contact>());
+        for (index, entry) in parts.nodes.iter_mut().enumerate() {
+            *entry = given.node(index)?;
         }
-        let Parts { surface: written, grips: held, pushes } =
-            parts(place.arrays::<supple_contact>(), count, grips);
-        for (index, entry) in written.iter_mut().enumerate() {
-            let node = node_at(index);
-            *entry = SurfaceNode { rest: points.get(node as usize).copied().unwrap_or_default(), node };
+        for (index, entry) in parts.triangles.iter_mut().enumerate() {
+            *entry = given.corners(index)?;
         }
-        held.fill(Grip::default());
-        pushes.fill(NodeVector::ZERO);
+        parts.grips.fill(Grip::default());
+        parts.pushes.fill(NodeVector::ZERO);
         contact.write(place.put(|head| supple_contact {
             head,
             nodes: nodes as u32,
-            surface: count,
+            surface: room.nodes,
+            triangles: room.triangles,
             grip_room: grips,
             grips: 0,
             instruments: 0,
@@ -350,9 +360,9 @@ pub unsafe extern "C" fn supple_grasp(
                 supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), object.instruments.into())
             );
         };
-        let Parts { surface, grips, .. } = parts(arrays, object.surface, object.grip_room);
+        let Parts { nodes, grips, .. } = object.room().parts(arrays);
         let surface =
-            Surface::new(surface, object.nodes as usize).map_err(|_| supple_error::from(SUPPLE_E_INDEX))?;
+            Surface::new(nodes, object.nodes as usize).map_err(|_| supple_error::from(SUPPLE_E_INDEX))?;
         let near = || tool.grips(instrument, surface, state.displacements(), state.time(), within);
         let old = object.grips as usize;
         let is_held = |place: u32, grips: &[Grip], count: usize| {
@@ -400,7 +410,7 @@ pub unsafe extern "C" fn supple_let_go(contact: *mut supple_contact, instrument:
     // SAFETY: what the header asks of the caller.
     let let_go = || unsafe {
         let (object, arrays) = memory::open(contact)?;
-        let Parts { grips, .. } = parts(arrays, object.surface, object.grip_room);
+        let Parts { grips, .. } = object.room().parts(arrays);
         let mut end = 0;
         for at in 0..object.grips as usize {
             if let Some(grip) = grips.get(at).copied().filter(|grip| grip.instrument != instrument)
@@ -519,12 +529,13 @@ impl<'a> CallContact<'a> {
         }
         // SAFETY: the caller's promise.
         let (object, arrays) = unsafe { memory::open(contact)? };
-        let supple_contact { surface, grip_room, grips, instruments, list, touches, means, points, .. } =
-            object;
         // SAFETY: as above.
-        let parts = unsafe { parts(arrays, *surface, *grip_room) };
+        let parts = unsafe { object.room().parts(arrays) };
+        let supple_contact { grips, instruments, list, touches, means, points, .. } = object;
         let wrong = |_| supple_error::from(SUPPLE_E_MISMATCH);
-        let surface = Surface::new(parts.surface, nodes).map_err(wrong)?;
+        let surface = Surface::new(parts.nodes, nodes)
+            .and_then(|surface| surface.with_triangles(parts.triangles))
+            .map_err(wrong)?;
         let list = list.get(..*instruments as usize).unwrap_or_default();
         let grips = parts.grips.get(..*grips as usize).unwrap_or_default();
         let contact =

@@ -23,6 +23,7 @@ use super::scene::*;
 use super::state::*;
 use super::status::*;
 use super::step::*;
+use super::surface::*;
 use super::vectors::*;
 use crate::mesh::Bar;
 use supple_status::*;
@@ -201,9 +202,16 @@ fn host(element: u32, network: &[u8], damper: &[u8]) {
         assert!(supple_guard_follow(scene, loads, state, guard, &threads, &mut estimate) as i32 >= 0);
         assert_eq!(estimate.known, 1);
 
-        let mut memory = Memory::new(supple_contact_size(NODES, 16));
+        let mut memory = Memory::new(supple_contact_size(NODES, 1, 16));
         let (at, bytes, mut contact) = (memory.at(), memory.bytes(), null_mut());
-        let made = supple_contact_init(at, bytes, scene, points, null(), NODES, 16, &mut contact, null_mut());
+        let corners = [0, 1, 2];
+        let surface = supple_surface {
+            nodes: null(),
+            triangles: corners.as_ptr(),
+            node_count: NODES,
+            triangle_count: 1,
+        };
+        let made = supple_contact_init(at, bytes, scene, points, &surface, 16, &mut contact, null_mut());
         assert_eq!(made, SUPPLE_OK);
         let pose = supple_pose { position: [-0.0079, 0.01, 0.04 / 3.0], rotation: [0.0; 4] };
         let ball = supple_instrument {

@@ -30,6 +30,8 @@ mod step;
 
 mod vectors;
 
+mod surface;
+
 mod contact;
 
 mod local_force;

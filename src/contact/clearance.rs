@@ -1,5 +1,5 @@
-//! Which nodes of the surface the instruments can reach in a step. A node that was found at a distance from all instruments is looked at
-//! again only when body and instruments together can have moved that far (m):
+//! Which nodes and triangles of the surface the instruments can reach in a step. One that was found at a distance from all instruments is
+//! looked at again only when body and instruments together can have moved that far (m):
 //!
 //! ```text
 //! looked at  if  threshold < travelled + farthest + margin,   threshold = travelled + distance - |next| when it was looked at
@@ -11,8 +11,8 @@ use bytemuck::{Pod, Zeroable, must_cast_slice_mut};
 use glam::Vec3;
 
 use super::instrument::MOST_INSTRUMENTS;
-use super::pushes::TouchedNode;
-use super::{Placed, VECTORS_OF_TOUCHED};
+use super::pushes::TouchedPoint;
+use super::{Placed, Surface, VECTORS_OF_TOUCHED};
 use crate::inertia::LOCAL_FLOATS;
 use crate::simd::{Kernel, NodeVector, Real, axes, dispatch};
 use crate::state::Progress;
@@ -54,50 +54,68 @@ const VECTORS_OF_HEAD: usize = size_of::<Head>() / size_of::<NodeVector>();
 
 const LOCAL_VECTORS: usize = LOCAL_FLOATS.div_ceil(4);
 
-/// Vectors that a state keeps for a surface of so many nodes that instruments can touch
+/// Vectors that a state keeps for a surface of so many nodes and triangles that instruments can touch
 /// ([`StateView::pushing`](crate::state::StateView::pushing)).
 #[must_use]
-pub const fn vectors_to_push(nodes: usize) -> usize {
-    nodes
+pub const fn vectors_to_push(nodes: usize, triangles: usize) -> usize {
+    let places = nodes.saturating_add(triangles);
+    places
         .saturating_mul(1 + VECTORS_OF_TOUCHED)
-        .saturating_add(nodes.div_ceil(4) + VECTORS_OF_HEAD + LOCAL_VECTORS)
+        .saturating_add(places.div_ceil(4) + VECTORS_OF_HEAD + LOCAL_VECTORS)
+        .saturating_add(sums_of_nodes(nodes, triangles))
+}
+
+/// Triangles share nodes: their pushes are summed.
+const fn sums_of_nodes(nodes: usize, triangles: usize) -> usize {
+    if triangles == 0 { 0 } else { nodes }
 }
 
 /// The parts of the vectors that a state keeps for instruments.
 pub(crate) struct ContactMemory<'a> {
     head: &'a mut Head,
-    /// For each node of the surface, m.
+    /// For each place of the surface, m.
     thresholds: &'a mut [f32],
-    /// Pushes of the step before on the nodes of the surface, N.
+    /// Pushes of the step before on the places of the surface, N, and the point of a triangle that was pushed.
     pub(crate) before: &'a mut [NodeVector],
-    /// Room for the nodes that touch in this step.
-    pub(crate) touched: &'a mut [TouchedNode],
-    /// Room for the answer of a lattice to their pushes.
-    pub(crate) local: &'a mut [f32],
+    pub(crate) room: SolverRoom<'a>,
 }
 
-/// The pushes (N) on the nodes of the surface in the latest step, from the vectors that a state keeps.
-pub(crate) fn kept_pushes(vectors: &[NodeVector], nodes: usize) -> Option<&[NodeVector]> {
-    let from = VECTORS_OF_HEAD + LOCAL_VECTORS + nodes.div_ceil(4);
-    vectors.get(from..from.checked_add(nodes)?)
+/// Room for what is solved for the pushes of a step.
+#[derive(Default)]
+pub(crate) struct SolverRoom<'a> {
+    /// Points that touch.
+    pub(crate) touched: &'a mut [TouchedPoint],
+    /// The answer of a lattice to their pushes.
+    pub(crate) local: &'a mut [f32],
+    /// A vector for each node of the surface; empty without triangles.
+    pub(crate) sums: &'a mut [NodeVector],
+}
+
+/// The pushes (N) on the places of the surface in the latest step, from the vectors that a state keeps.
+pub(crate) fn kept_pushes<'a>(vectors: &'a [NodeVector], surface: &Surface<'_>) -> Option<&'a [NodeVector]> {
+    let places = surface.places();
+    let from = VECTORS_OF_HEAD + LOCAL_VECTORS + places.div_ceil(4);
+    vectors.get(from..from.checked_add(places)?)
 }
 
 impl<'a> ContactMemory<'a> {
     /// None if there is less than [`vectors_to_push`].
-    pub(crate) fn split(vectors: &'a mut [NodeVector], nodes: usize) -> Option<Self> {
+    pub(crate) fn split(vectors: &'a mut [NodeVector], surface: &Surface<'_>) -> Option<Self> {
+        let (nodes, triangles) = (surface.nodes().len(), surface.triangles().len());
+        let places = surface.places();
         let (head, rest) = vectors.split_at_mut_checked(VECTORS_OF_HEAD)?;
         let heads: &mut [Head] = must_cast_slice_mut(head.as_chunks_mut::<VECTORS_OF_HEAD>().0);
         let (local, rest) = rest.split_at_mut_checked(LOCAL_VECTORS)?;
-        let (thresholds, rest) = rest.split_at_mut_checked(nodes.div_ceil(4))?;
+        let (thresholds, rest) = rest.split_at_mut_checked(places.div_ceil(4))?;
         let thresholds: &mut [f32] = must_cast_slice_mut(thresholds);
-        let (before, rest) = rest.split_at_mut_checked(nodes)?;
-        let touched: &mut [TouchedNode] = must_cast_slice_mut(rest.as_chunks_mut::<VECTORS_OF_TOUCHED>().0);
+        let (before, rest) = rest.split_at_mut_checked(places)?;
+        let (sums, rest) = rest.split_at_mut_checked(sums_of_nodes(nodes, triangles))?;
+        let touched: &mut [TouchedPoint] = must_cast_slice_mut(rest.as_chunks_mut::<VECTORS_OF_TOUCHED>().0);
         Some(Self {
             head: heads.first_mut()?,
-            thresholds: thresholds.get_mut(..nodes)?,
+            thresholds: thresholds.get_mut(..places)?,
             before,
-            touched: touched.get_mut(..nodes)?,
-            local: must_cast_slice_mut(local),
+            room: SolverRoom { touched: touched.get_mut(..places)?, local: must_cast_slice_mut(local), sums },
         })
     }
 
@@ -192,22 +210,22 @@ impl<'a> ContactMemory<'a> {
         })
     }
 
-    /// Notes how far a node was from all instruments at the least, m, at the start of the step.
+    /// Notes how far a node or triangle was from all instruments at the least, m, at the start of the step.
     pub(crate) fn note(&mut self, place: usize, distance: f32) {
         if let Some(threshold) = self.thresholds.get_mut(place) {
             *threshold = (self.head.travelled + f64::from(distance)) as f32;
         }
     }
 
-    /// Keeps the pushes of a step that is accepted; those nodes are looked at in the next one.
+    /// Keeps the pushes of a step that is accepted; those places are looked at in the next one.
     pub(crate) fn accept(&mut self, touched: usize) {
-        for each in self.touched.iter().take(touched) {
+        for each in self.room.touched.iter().take(touched) {
             let place = each.place as usize;
             if let (Some(before), Some(threshold)) =
                 (self.before.get_mut(place), self.thresholds.get_mut(place))
             {
                 let [x, y, z] = each.push;
-                before.0 = [x, y, z, 0.0];
+                before.0 = [x, y, z, each.point().packed()];
                 if each.push != [0.0; 3] {
                     *threshold = f32::NEG_INFINITY;
                 }

@@ -46,7 +46,11 @@
 //! Multilevel and damped steps solve for the pushes on all nodes together, as these move each other (`pushes.rs`), from those
 //! of the step before. Mass-scaled and learned steps refuse instruments: what they push would be inertia that is not there.
 //!
-//! Work: at most each node of the surface against each instrument in each step. A state with room for pushes
+//! An instrument that is thinner than edges are long meets triangles too ([`Surface::with_triangles`]): the push acts on the point of a
+//! triangle that is deepest inside, shared among its corners by the point's weights (`triangle.rs`).
+//!
+//! Work: at most each node and triangle of the surface against each instrument in each step, and eight sweeps over the triangles that
+//! touch. A state with room for pushes
 //! ([`StateView::pushing`](crate::state::StateView::pushing)) knows how near each node was, and looks only at those that instruments can
 //! reach (`clearance.rs`). Nodes that supports hold along all axes are passed through. A node that touches several instruments is moved by
 //! one after the other, in long steps by the nearest one. Damping of a few 1/s is what ends the rattling of light nodes on hard surfaces.
@@ -62,9 +66,10 @@ mod pose;
 mod pushes;
 mod shape;
 mod surface;
+mod triangle;
 
 pub use clearance::vectors_to_push;
-pub(crate) use clearance::{ContactMemory, kept_pushes, largest_component};
+pub(crate) use clearance::{ContactMemory, SolverRoom, kept_pushes, largest_component};
 pub use field::{Field, FieldError};
 #[cfg(feature = "field")]
 pub use field_of_surface::SurfaceField;
@@ -72,11 +77,12 @@ pub use grip::Grip;
 pub use instrument::{Instrument, MOST_INSTRUMENTS};
 pub use local_force::LocalForce;
 pub use pose::Pose;
-pub(crate) use pushes::{Compliance, HELD, TouchedNode, directions, solve};
+pub(crate) use pushes::{Compliance, HELD, TouchedPoint, directions, solve};
 pub use shape::Shape;
-#[cfg(any(feature = "std", test))]
-pub use surface::boundary;
 pub use surface::{Surface, SurfaceNode};
+#[cfg(any(feature = "std", test))]
+pub use surface::{boundary, boundary_triangles};
+pub(crate) use triangle::TrianglePoint;
 
 use core::fmt;
 
@@ -128,9 +134,10 @@ impl<'a> Contact<'a> {
         self.grips
     }
 
-    /// Whether an instrument holds the node at this place of the surface.
+    /// Whether an instrument holds the node, or a corner of the triangle, at this place of the surface.
     pub(crate) fn is_gripped(&self, place: usize) -> bool {
-        !self.grips.is_empty() && self.grips.binary_search_by_key(&place, |grip| grip.place as usize).is_ok()
+        let is_held = |place| self.grips.binary_search_by_key(&place, |grip| grip.place as usize).is_ok();
+        !self.grips.is_empty() && self.surface.corner_places(place).into_iter().any(is_held)
     }
 
     /// The nodes that can be touched.
@@ -156,7 +163,7 @@ impl<'a> Contact<'a> {
     }
 }
 
-pub(crate) const VECTORS_OF_TOUCHED: usize = size_of::<TouchedNode>() / size_of::<NodeVector>();
+pub(crate) const VECTORS_OF_TOUCHED: usize = size_of::<TouchedPoint>() / size_of::<NodeVector>();
 
 /// What an instrument feels in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -166,9 +173,9 @@ pub struct Touch {
     pub force: [f32; 3],
     /// Moment of the same about the position of the instrument at the end of the step, N m.
     pub moment: [f32; 3],
-    /// Nodes that it pushes.
+    /// Nodes that it pushes, and triangles.
     pub contacts: u32,
-    /// How far the deepest node would have been inside without the instrument, m.
+    /// How far the deepest one would have been inside without the instrument, m.
     pub depth: f32,
     /// Work that it does on the tissue, J.
     pub work: f32,
@@ -188,7 +195,7 @@ impl Touch {
     }
 }
 
-/// Where an instrument pushes a node in a step.
+/// Where an instrument pushes a node or a triangle in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct ContactPoint {
@@ -196,11 +203,11 @@ pub struct ContactPoint {
     pub position: [f32; 3],
     /// Outward normal of the instrument there; zero where it holds the node.
     pub normal: [f32; 3],
-    /// Force of the instrument on the node, N.
+    /// Force of the instrument on the tissue, N.
     pub force: [f32; 3],
-    /// How far the node would have been inside without the instrument, m.
+    /// How far the point would have been inside without the instrument, m.
     pub depth: f32,
-    /// The node.
+    /// The node; of a triangle the corner with most of the force.
     pub node: u32,
     /// The instrument's place in the list.
     pub instrument: u32,
@@ -226,10 +233,21 @@ pub(crate) struct Meeting {
     pub(crate) carried: Vec3,
 }
 
+impl Meeting {
+    /// Where a point that moves so far (m) in the step will be from where it should be: the gap along the normal, the slip across, m.
+    pub(crate) fn relative(&self, slip: Vec3) -> Vec3 {
+        self.gap * self.normal + (slip - slip.dot(self.normal) * self.normal)
+    }
+}
+
 impl<'a> Placed<'a> {
     pub(crate) fn new(instrument: &'a Instrument<'a>, times: [f64; 2]) -> Self {
         let [start, end] = times.map(|time| instrument.placement(time));
         Self { instrument, start, end }
+    }
+
+    pub(crate) fn is_plane(&self) -> bool {
+        self.instrument.shape == Shape::Plane
     }
 
     /// A distance (m) that the point of a meeting has at the least.
@@ -296,6 +314,15 @@ pub enum ContactError {
         /// The node.
         node: u32,
     },
+    /// A triangle with a corner that the surface does not have, or has twice.
+    Triangle {
+        /// Its place in the list.
+        triangle: usize,
+        /// The corner, as a place in the surface.
+        place: u32,
+        /// Nodes of the surface.
+        nodes: usize,
+    },
     /// More instruments than [`MOST_INSTRUMENTS`].
     Instruments {
         /// How many.
@@ -336,6 +363,10 @@ impl fmt::Display for ContactError {
             Self::Point { place, node } => {
                 write!(f, "entry {place} of the surface: the position of node {node} is not a number")
             }
+            Self::Triangle { triangle, place, nodes } => write!(
+                f,
+                "triangle {triangle} of the surface: its corner {place} comes twice or does not exist, the surface has {nodes} nodes"
+            ),
             Self::Instruments { instruments } => {
                 write!(f, "{instruments} instruments: at most {MOST_INSTRUMENTS} can touch a body at once")
             }

@@ -1,4 +1,4 @@
-//! Pushes of instruments on many nodes that move each other, as in steps with a lattice. With the compliance `B` (m/N, symmetric and
+//! Pushes of instruments on many nodes and points of triangles that move each other, as in steps with a lattice. With the compliance `B` (m/N, symmetric and
 //! positive), the pushes `p` (N), and where the nodes would be relative to the instruments without a change of them, `r` (m):
 //!
 //! ```text
@@ -11,6 +11,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
+use super::triangle::TrianglePoint;
+
 /// Iterations, and those that estimate the largest eigenvalue before.
 const ITERATIONS: usize = 14;
 const POWER_ITERATIONS: usize = 5;
@@ -22,10 +24,10 @@ const SETTLED: f32 = 1e-10;
 /// The friction of a node that an instrument holds: any push will do.
 pub(crate) const HELD: f32 = f32::INFINITY;
 
-/// A node that may touch an instrument in this step.
+/// A node, or a point of a triangle, that may touch an instrument in this step.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(crate) struct TouchedNode {
+pub(crate) struct TouchedPoint {
     /// Force of the instrument, N.
     pub(crate) push: [f32; 3],
     /// Its place in the surface.
@@ -40,26 +42,61 @@ pub(crate) struct TouchedNode {
     /// The vector that the compliance is applied to, N; later the motion, m.
     pub(crate) vector: [f32; 3],
     pub(crate) instrument: u32,
-    /// The scaled push of the iteration, and that with momentum.
-    pub(crate) last: [f32; 3],
-    pub(crate) friction: f32,
+    /// The push of the iteration with momentum.
     pub(crate) ahead: [f32; 3],
-    pub(crate) node: u32,
+    pub(crate) friction: f32,
     /// The push of the step before, N.
     pub(crate) before: [f32; 3],
-    /// Fills the vector.
-    pub(crate) spare: f32,
+    /// The corners of the triangle; the node three times.
+    pub(crate) nodes: [u32; 3],
+    /// Weights of the second and the third one.
+    pub(crate) weights: [f32; 2],
 }
 
 /// How nodes move by pushes.
 pub(crate) trait Compliance {
     /// Replaces the vector of each node (N) by its motion (m).
-    fn apply(&mut self, nodes: &mut [TouchedNode]);
+    fn apply(&mut self, nodes: &mut [TouchedPoint]);
 }
 
-impl TouchedNode {
+impl TouchedPoint {
+    /// The point of the triangle.
+    pub(crate) fn point(&self) -> TrianglePoint {
+        TrianglePoint::from_weights(self.weights)
+    }
+
+    pub(crate) fn set_point(&mut self, point: TrianglePoint) {
+        let [_, b, c] = point.weights();
+        self.weights = [b, c];
+    }
+
+    /// The weights of its corners.
+    pub(crate) fn shares(&self) -> [f32; 3] {
+        let [b, c] = self.weights;
+        [1.0 - b - c, b, c]
+    }
+
+    /// The nodes that a push moves, with their weights.
+    pub(crate) fn corners(&self) -> impl Iterator<Item = (usize, f32)> + use<> {
+        // Where only the first one has weight, the others are not even read.
+        let count = if self.weights == [0.0; 2] { 1 } else { 3 };
+        self.nodes.into_iter().zip(self.shares()).take(count).map(|(node, weight)| (node as usize, weight))
+    }
+
+    /// The corner that is nearest.
+    pub(crate) fn node(&self) -> u32 {
+        let ([x, y, z], [a, b, c]) = (self.nodes, self.shares());
+        if a >= b && a >= c {
+            x
+        } else if b >= c {
+            y
+        } else {
+            z
+        }
+    }
+
     /// The nearest push that an instrument can exert, N.
-    fn projected(&self, push: Vec3) -> Vec3 {
+    pub(crate) fn projected(&self, push: Vec3) -> Vec3 {
         if self.friction == HELD {
             return push;
         }
@@ -88,23 +125,23 @@ fn start(index: usize, normal: Vec3) -> Vec3 {
 }
 
 /// Solves for the pushes.
-pub(crate) fn solve(nodes: &mut [TouchedNode], compliance: &mut impl Compliance) {
+pub(crate) fn solve(nodes: &mut [TouchedPoint], compliance: &mut impl Compliance) {
     let mut largest = 0.0;
     for (index, node) in nodes.iter_mut().enumerate() {
-        node.last = start(index, Vec3::from_array(node.normal)).to_array();
+        node.ahead = start(index, Vec3::from_array(node.normal)).to_array();
     }
     for _ in 0..POWER_ITERATIONS {
         let mut square = 0.0;
         for node in &mut *nodes {
-            square += Vec3::from_array(node.last).length_squared();
-            node.vector = (Vec3::from_array(node.last) * node.scale).to_array();
+            square += Vec3::from_array(node.ahead).length_squared();
+            node.vector = (Vec3::from_array(node.ahead) * node.scale).to_array();
         }
         compliance.apply(nodes);
         let mut image = 0.0;
         for node in &mut *nodes {
             let moved = Vec3::from_array(node.vector) * node.scale;
             image += moved.length_squared();
-            node.last = moved.to_array();
+            node.ahead = moved.to_array();
         }
         let growth = libm::sqrtf(image / square);
         if !growth.is_finite() || growth <= 0.0 {
@@ -113,7 +150,7 @@ pub(crate) fn solve(nodes: &mut [TouchedNode], compliance: &mut impl Compliance)
         largest = growth.max(largest);
         let inverse = 1.0 / libm::sqrtf(image);
         for node in &mut *nodes {
-            node.last = (Vec3::from_array(node.last) * inverse).to_array();
+            node.ahead = (Vec3::from_array(node.ahead) * inverse).to_array();
         }
     }
     let rate = 1.0 / (SAFETY * largest);

@@ -40,7 +40,8 @@ impl Shape<'_> {
     }
 
     /// How far it may move in one step, m: farther, and tissue could be on its other side.
-    pub(super) fn thickness(&self) -> f32 {
+    #[must_use]
+    pub fn thickness(&self) -> f32 {
         match *self {
             Self::Plane => f32::INFINITY,
             Self::Sphere { radius } | Self::Capsule { radius, .. } => radius,

@@ -1,4 +1,5 @@
-//! The nodes that instruments can touch: those of the boundary, given once.
+//! What instruments can touch: nodes of the boundary, given once, and the triangles between them where an instrument is thinner than
+//! edges are long.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -14,15 +15,19 @@ pub struct SurfaceNode {
     pub node: u32,
 }
 
-/// The nodes that instruments can touch, checked. An instrument passes between nodes: spheres and capsules should have a radius
-/// of at least the length of the surface's edges.
+/// What instruments can touch, checked. Without triangles an instrument passes between nodes: spheres and capsules should then have a
+/// radius of at least the length of the surface's edges.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface<'a> {
     nodes: &'a [SurfaceNode],
+    triangles: &'a [[u32; 3]],
     scene_nodes: usize,
 }
 
 impl<'a> Surface<'a> {
+    /// Nothing.
+    pub(crate) const NONE: Self = Self { nodes: &[], triangles: &[], scene_nodes: 0 };
+
     /// Checks the nodes against a scene of so many.
     pub fn new(nodes: &'a [SurfaceNode], scene_nodes: usize) -> Result<Self, ContactError> {
         for (place, entry) in nodes.iter().enumerate() {
@@ -33,7 +38,22 @@ impl<'a> Surface<'a> {
                 return Err(ContactError::Point { place, node: entry.node });
             }
         }
-        Ok(Self { nodes, scene_nodes })
+        Ok(Self { nodes, triangles: &[], scene_nodes })
+    }
+
+    /// The same with triangles, as places of their corners in the list of nodes: instruments of any size but planes, which have no use for
+    /// them, are met between nodes too. Steps need room for pushes
+    /// ([`StateView::pushing`](crate::state::StateView::pushing)).
+    pub fn with_triangles(self, triangles: &'a [[u32; 3]]) -> Result<Self, ContactError> {
+        for (triangle, corners) in triangles.iter().enumerate() {
+            let [a, b, c] = *corners;
+            let nodes = self.nodes.len();
+            let place = corners.iter().copied().find(|&place| place as usize >= nodes);
+            if let Some(place) = place.or((a == b || b == c || c == a).then_some(a)) {
+                return Err(ContactError::Triangle { triangle, place, nodes });
+            }
+        }
+        Ok(Self { triangles, ..self })
     }
 
     /// Nodes of the scene that it was checked against.
@@ -46,6 +66,29 @@ impl<'a> Surface<'a> {
     pub const fn nodes(&self) -> &'a [SurfaceNode] {
         self.nodes
     }
+
+    /// The triangles.
+    #[must_use]
+    pub const fn triangles(&self) -> &'a [[u32; 3]] {
+        self.triangles
+    }
+
+    /// Its nodes and triangles: each node has a place, and after them each triangle.
+    pub(crate) const fn places(&self) -> usize {
+        self.nodes.len() + self.triangles.len()
+    }
+
+    /// The places of the corners of a triangle; of a node three times its own.
+    pub(crate) fn corner_places(&self, place: usize) -> [usize; 3] {
+        let triangle = place.checked_sub(self.nodes.len()).and_then(|triangle| self.triangles.get(triangle));
+        triangle.map_or([place; 3], |corners| corners.map(|corner| corner as usize))
+    }
+
+    /// The corners of a triangle; a node three times.
+    pub(crate) fn corners(&self, place: usize) -> Option<[SurfaceNode; 3]> {
+        let [a, b, c] = self.corner_places(place).map(|corner| self.nodes.get(corner).copied());
+        Some([a?, b?, c?])
+    }
 }
 
 /// The nodes of the boundary of a mesh ([`crate::mesh::boundary`]), in increasing order.
@@ -57,4 +100,14 @@ pub fn boundary(mesh: &crate::mesh::Mesh<'_>) -> std::vec::Vec<SurfaceNode> {
     nodes.dedup();
     let entry = |node| mesh.points().get(node as usize).map(|&rest| SurfaceNode { rest, node });
     nodes.into_iter().filter_map(entry).collect()
+}
+
+/// The triangles of the boundary of a mesh as places in the list of its nodes that [`boundary`] gives.
+#[cfg(any(feature = "std", test))]
+#[must_use]
+pub fn boundary_triangles(mesh: &crate::mesh::Mesh<'_>, nodes: &[SurfaceNode]) -> std::vec::Vec<[u32; 3]> {
+    let place =
+        |node: u32| nodes.binary_search_by_key(&node, |entry| entry.node).ok().map(|place| place as u32);
+    let places = |[a, b, c]: [u32; 3]| Some([place(a)?, place(b)?, place(c)?]);
+    crate::mesh::boundary(mesh.tets()).into_iter().filter_map(places).collect()
 }

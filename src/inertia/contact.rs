@@ -17,7 +17,7 @@ use super::node_tables::NodeTables;
 use super::parts::NodeParts;
 use super::pass_input::{PassInput, ResidualFactors};
 use super::step::InertiaStep;
-use crate::contact::{Compliance, TouchedNode, directions, solve};
+use crate::contact::{Compliance, SolverRoom, Surface, TouchedPoint, directions, solve};
 use crate::element::{ElementMaterial, NodeInertia};
 use crate::padding;
 use crate::simd::NodeVector;
@@ -25,7 +25,7 @@ use crate::step::{Threads, Totals, Trial};
 
 /// `B` of a step.
 struct StepCompliance<'a, 'm> {
-    tables: &'a NodeTables<'m>,
+    tables: &'a mut NodeTables<'m>,
     places: &'a [LatticeNode],
     inertia: &'a [NodeInertia],
     rotations: &'a RotationTable,
@@ -36,6 +36,9 @@ struct StepCompliance<'a, 'm> {
     /// The functions that move the nodes, and the answer of the lattice between them, if they are few.
     listed: ListedFunctions,
     local: Option<LocalResponse<'a>>,
+    surface: Surface<'a>,
+    /// Sums of the vectors for each node of the surface, where triangles share nodes; else empty.
+    sums: &'a mut [NodeVector],
 }
 
 impl StepCompliance<'_, '_> {
@@ -64,23 +67,24 @@ impl StepCompliance<'_, '_> {
     }
 
     /// Sums over the nodes of their vectors (N), for each function: kg m.
-    fn add_sums(&self, nodes: &[TouchedNode], mut sum: impl FnMut(usize, Vec3)) {
+    fn add_sums(&self, points: &[TouchedPoint], mut sum: impl FnMut(usize, Vec3)) {
         let Some((space, ..)) = &self.lattice else { return };
-        for touched in nodes {
-            let node = touched.node as usize;
-            let residual = self.free(node) * Vec3::from_array(touched.vector) * self.square;
-            let Some(place) = node_place(self.places, node) else { continue };
-            for (function, weight) in space.lattice.weights(place) {
-                sum(function, weight * residual);
+        for touched in points {
+            for (node, share) in touched.corners() {
+                let residual = self.free(node) * Vec3::from_array(touched.vector) * (share * self.square);
+                let Some(place) = node_place(self.places, node) else { continue };
+                for (function, weight) in space.lattice.weights(place) {
+                    sum(function, weight * residual);
+                }
             }
         }
     }
 
     /// The motion of the lattice by the vectors of the nodes. None without one.
-    fn coarse(&self, nodes: &[TouchedNode]) -> Option<CoarseVectors> {
+    fn coarse(&self, points: &[TouchedPoint]) -> Option<CoarseVectors> {
         let (space, matrices, shares) = self.lattice.as_ref()?;
         let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-        self.add_sums(nodes, |function, residual| {
+        self.add_sums(points, |function, residual| {
             if let Some(NodeVector([x, y, z, _])) = sums.get_mut(function) {
                 (*x, *y, *z) = (*x + residual.x, *y + residual.y, *z + residual.z);
             }
@@ -97,18 +101,48 @@ impl StepCompliance<'_, '_> {
         self.free(node) * weights.map(|(function, weight)| weight * moved(function)).sum::<Vec3>()
     }
 
-    /// Replaces the vectors of the nodes (N) by their motions by their own inertia and that of the lattice.
-    fn replace(&self, nodes: &mut [TouchedNode], moved: impl Fn(usize) -> Vec3) {
-        for touched in nodes {
-            let node = touched.node as usize;
-            let own = self.own(node, Vec3::from_array(touched.vector));
-            touched.vector = (own + self.at(node, &moved)).to_array();
+    /// Replaces the vectors of the points (N) by their motions by the inertia of their nodes and that of the lattice.
+    fn replace(&self, points: &mut [TouchedPoint], moved: impl Fn(usize) -> Vec3) {
+        for touched in points {
+            let vector = Vec3::from_array(touched.vector);
+            let places = self.surface.corner_places(touched.place as usize);
+            let motions = touched.corners().zip(places).map(|((node, share), place)| {
+                let force = self.sums.get(place).map_or(vector, |sum| sum.to_array().into());
+                share * (self.own(node, force) + self.at(node, &moved))
+            });
+            touched.vector = motions.sum::<Vec3>().to_array();
         }
+    }
+
+    /// Sums at each node the vectors of the points that it carries, N.
+    fn sum_at_nodes(&mut self, points: &[TouchedPoint]) {
+        if self.sums.is_empty() {
+            return;
+        }
+        for place in points.iter().flat_map(|each| self.surface.corner_places(each.place as usize)) {
+            if let Some(sum) = self.sums.get_mut(place) {
+                *sum = NodeVector::ZERO;
+            }
+        }
+        for touched in points {
+            let places = self.surface.corner_places(touched.place as usize);
+            for (place, share) in places.into_iter().zip(touched.shares()) {
+                if let Some(NodeVector(sum)) = self.sums.get_mut(place) {
+                    sum.iter_mut().zip(touched.vector).for_each(|(sum, vector)| *sum += share * vector);
+                }
+            }
+        }
+    }
+
+    /// The motion of a point by the inertia of its nodes, m.
+    fn own_of_point(&self, point: &TouchedPoint, force: Vec3) -> Vec3 {
+        point.corners().map(|(node, share)| share * self.own(node, share * force)).sum()
     }
 }
 
 impl Compliance for StepCompliance<'_, '_> {
-    fn apply(&mut self, nodes: &mut [TouchedNode]) {
+    fn apply(&mut self, nodes: &mut [TouchedPoint]) {
+        self.sum_at_nodes(nodes);
         let Some((space, ..)) = &self.lattice else { return self.replace(nodes, |_| Vec3::ZERO) };
         let Some(local) = &self.local else {
             let moved = self.coarse(nodes).unwrap_or([NodeVector::ZERO; _]);
@@ -151,19 +185,30 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let square = ResidualFactors::new(step, &model.scaling, trial.progress.steps == 0).square();
         let space = CoarseSpace { lattice: &model.lattice, refresh: &model.refresh };
         let lattice = response.map(|shares| (space, &*matrices, shares));
-        let (touched, room) = trial.touched_nodes();
+        let SolverRoom { touched, local: room, sums } = trial.solver_room();
         let listed = ListedFunctions::of(touched, places, &model.lattice);
         let local = lattice.as_ref().and_then(|(space, matrices, shares)| {
             LocalResponse::gathered(room, &listed, space, matrices, *shares)
         });
-        let mut compliance =
-            StepCompliance { tables, places, inertia, rotations, square, lattice, listed, local };
+        let surface = contact.surface();
+        let mut compliance = StepCompliance {
+            tables,
+            places,
+            inertia,
+            rotations,
+            square,
+            lattice,
+            listed,
+            local,
+            surface,
+            sums,
+        };
         for each in &mut *touched {
             let normal = Vec3::from_array(each.normal);
             each.vector = normal.to_array();
             compliance.apply(core::slice::from_mut(each));
             // Across the normal its own motion will do: the scale only makes light and heavy nodes alike.
-            let across = directions(normal).map(|axis| compliance.own(each.node as usize, axis).length());
+            let across = directions(normal).map(|axis| compliance.own_of_point(each, axis).length());
             let own = across.into_iter().fold(Vec3::from_array(each.vector).length(), f32::max);
             each.scale = if own > 0.0 { 1.0 / libm::sqrtf(own) } else { 0.0 };
         }
@@ -172,12 +217,11 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             each.vector = (Vec3::from_array(each.push) - Vec3::from_array(each.before)).to_array();
         }
         let moved = compliance.coarse(touched);
-        for each in &mut *touched {
-            each.vector = compliance.own(each.node as usize, Vec3::from_array(each.vector)).to_array();
-        }
-        for each in &*touched {
-            if let Some(next) = tables.next_increment.get_mut(rank_of(places, each.node as usize)) {
-                next.0.iter_mut().zip(each.vector).for_each(|(next, moved)| *next += moved);
+        for (each, (node, share)) in touched.iter().flat_map(|each| each.corners().map(move |at| (each, at)))
+        {
+            let change = compliance.own(node, share * Vec3::from_array(each.vector));
+            if let Some(next) = compliance.tables.next_increment.get_mut(rank_of(places, node)) {
+                next.0.iter_mut().zip(change.to_array()).for_each(|(next, moved)| *next += moved);
             }
         }
         prolong(&moved.unwrap_or([NodeVector::ZERO; _]), &model.lattice, matrices.cells);

@@ -9,7 +9,7 @@ use super::dense::{Row, apply, stride};
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS, node_place};
 use super::matrices::Matrices;
 use super::nodal_sums;
-use crate::contact::TouchedNode;
+use crate::contact::TouchedPoint;
 
 /// Functions of a patch of four cells.
 pub(super) const MOST_LISTED: usize = 18;
@@ -28,10 +28,10 @@ pub(super) struct ListedFunctions {
 const NOT_LISTED: u8 = u8::MAX;
 
 impl ListedFunctions {
-    pub(super) fn of(nodes: &[TouchedNode], places: &[LatticeNode], lattice: &Lattice) -> Self {
+    pub(super) fn of(points: &[TouchedPoint], places: &[LatticeNode], lattice: &Lattice) -> Self {
         let mut listed = Self { list: [0; MAX_FUNCTIONS], count: 0, places: [NOT_LISTED; MAX_FUNCTIONS + 1] };
-        for touched in nodes {
-            let Some(place) = node_place(places, touched.node as usize) else { continue };
+        for (node, _) in points.iter().flat_map(TouchedPoint::corners) {
+            let Some(place) = node_place(places, node) else { continue };
             for function in lattice.functions_of(place.cell()) {
                 if function < MAX_FUNCTIONS && listed.place(function).is_none() {
                     listed.places[function] = listed.count as u8;

@@ -131,7 +131,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
         let forcing = Forcing { scene: *scene, visitor: ScalarBound, displacement, loads, progress };
         let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
         self.model.refresh.update_frames(displacement, progress.steps);
-        trial.add_pushes_before();
+        trial.add_pushes_before(self.step);
         let moved = self.move_lattice(trial);
         let mut totals = self.move_nodes(trial, moved);
         // Without instruments not even its stack is used.

@@ -4,10 +4,11 @@
 use glam::Vec3;
 
 use super::cause::MOST_OF_SIZE;
+use super::triangles::{Candidate, Nearest, corners_of};
 use super::{Cause, Step, StepMethod, Totals, Trial};
 use crate::contact::{
-    Contact, ContactMemory, ContactPoint, Grip, HELD, MOST_INSTRUMENTS, Meeting, Placed, Touch, TouchedNode,
-    largest_component, vectors_to_push,
+    Contact, ContactMemory, ContactPoint, Grip, HELD, MOST_INSTRUMENTS, Meeting, Placed, SolverRoom, Surface,
+    Touch, TouchedPoint, TrianglePoint, largest_component, vectors_to_push,
 };
 use crate::element::{ElementMaterial, NodeInertia};
 use crate::simd::NodeVector;
@@ -21,7 +22,6 @@ struct Met {
     node: usize,
     inertia: NodeInertia,
     increment: NodeVector,
-    force: NodeVector,
     next: [f32; 4],
     meeting: Meeting,
     /// Where an instrument holds it, from where it would be, m.
@@ -42,14 +42,15 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let Self { pushes, progress, .. } = self;
         let surface = contact.surface().nodes();
         let farthest = totals.farthest;
-        let limit = ContactMemory::split(pushes, surface.len())
+        let limit = ContactMemory::split(pushes, &contact.surface())
             .map(|mut memory| memory.begin(progress, placed, farthest, 0.0));
         let mut touches = [Touch::default(); MOST_INSTRUMENTS];
-        let mut from = 0;
-        while let Some(place) = self.next_in_reach(surface.len(), from, limit) {
+        // How far pushes move a node at the most, m.
+        let (mut from, mut moved) = (0, 0.0f32);
+        while let Some(place) = self.next_in_reach(from, limit).filter(|&place| place < surface.len()) {
             from = place + 1;
             let Some(entry) = surface.get(place).filter(|_| !contact.is_gripped(place)) else { continue };
-            let (mut distance, mut pushes) = (f32::INFINITY, Vec3::ZERO);
+            let (mut distance, mut pushes, mut way) = (f32::INFINITY, Vec3::ZERO, 0.0);
             for ((index, placed), touch) in placed.iter().enumerate().zip(&mut touches) {
                 let Some(met) = self.met(entry.node as usize, entry.rest, placed, method) else { continue };
                 distance = distance.min(placed.least_distance(&met.meeting) - axes(met.next).length());
@@ -59,9 +60,10 @@ impl<M: ElementMaterial> Trial<'_, M> {
                     }
                     let push = met.push(step, placed.instrument.friction);
                     pushes += push;
-                    self.push(&met, push, (step, index, method), totals, touch);
+                    way += self.push(&met, push, (step, index, method), totals, touch);
                 }
             }
+            moved = moved.max(way);
             self.keep_push(place, entry.node, distance, pushes);
         }
         for grip in contact.grips() {
@@ -78,8 +80,12 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 return;
             }
             let push = met.hold(step);
-            self.push(&met, push, (step, index, method), totals, touch);
+            moved = moved.max(self.push(&met, push, (step, index, method), totals, touch));
             self.keep_push(place, entry.node, f32::NEG_INFINITY, push);
+        }
+        if !contact.surface().triangles().is_empty() {
+            let limit = limit.map(|limit| limit + moved);
+            self.meet_triangles(contact, (step, method), placed, (totals, &mut touches), limit);
         }
         for (to, touch) in self.touches.iter_mut().zip(touches) {
             *to = touch;
@@ -93,17 +99,17 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let before = memory.before.get(place).copied().unwrap_or_default().to_array();
         if push != Vec3::ZERO || before != [0.0; 3] {
             let push = push.to_array();
-            self.add_touched(TouchedNode {
+            self.add_touched(TouchedPoint {
                 place: place as u32,
-                node,
+                nodes: [node; 3],
                 push,
                 before,
-                ..TouchedNode::default()
+                ..TouchedPoint::default()
             });
         }
     }
 
-    /// Pushes a node with a force, N.
+    /// Pushes a node with a force, N. Gives how far that moves it, m.
     fn push(
         &mut self,
         met: &Met,
@@ -111,22 +117,34 @@ impl<M: ElementMaterial> Trial<'_, M> {
         (step, instrument, method): (&Step, usize, &impl StepMethod<M>),
         totals: &mut Totals,
         touch: &mut Touch,
-    ) {
-        let mut force = met.force;
-        for (sum, push) in force.0.iter_mut().zip(push.to_array()) {
-            *sum += push;
-        }
-        if let Some(place) = self.force.get_mut(met.node) {
-            *place = force;
-        }
-        let next = method.next_increment(met.node, &met.inertia, &met.increment, &force);
-        totals.change(step, &met.inertia, &met.increment, [&met.force, &force], [&met.next, &next]);
+    ) -> f32 {
+        let Some(next) = self.add_force(met.node, push, (step, method), totals) else { return 0.0 };
         let way = mean(next, met.increment.0);
         totals.add_work(push.dot(way));
         let depth = if met.meeting.normal == Vec3::ZERO { 0.0 } else { -met.meeting.gap };
         touch.add(push, met.meeting.arm, depth, [way, met.meeting.carried]);
         let position = met.meeting.point;
         self.list(met.node as u32, instrument as u32, [position, met.meeting.normal, push], depth);
+        axes(next).distance(axes(met.next))
+    }
+
+    /// Adds a force (N) to a node, and what it changes to the sums. Gives the next increment, m.
+    pub(super) fn add_force(
+        &mut self,
+        node: usize,
+        added: Vec3,
+        (step, method): (&Step, &impl StepMethod<M>),
+        totals: &mut Totals,
+    ) -> Option<[f32; 4]> {
+        let (inertia, increment) = (self.scene.inertia.get(node)?, self.increment.get(node)?);
+        let force = self.force.get_mut(node)?;
+        let before = *force;
+        for (sum, added) in force.0.iter_mut().zip(added.to_array()) {
+            *sum += added;
+        }
+        let nexts = [&before, &*force].map(|force| method.next_increment(node, inertia, increment, force));
+        totals.change(step, inertia, increment, [&before, &*force], [&nexts[0], &nexts[1]]);
+        Some(nexts[1])
     }
 
     /// Nothing touches.
@@ -147,72 +165,73 @@ impl<M: ElementMaterial> Trial<'_, M> {
 
     /// Whether the state has room for pushes.
     pub(crate) fn has_room_for_pushes(&self) -> bool {
-        self.pushes.len() >= vectors_to_push(self.surface_len())
+        let surface = self.surface();
+        self.pushes.len() >= vectors_to_push(surface.nodes().len(), surface.triangles().len())
     }
 
-    fn surface_len(&self) -> usize {
-        self.loads.contact().map_or(0, |contact| contact.surface().nodes().len())
+    /// What the instruments of the loads can touch.
+    pub(crate) fn surface(&self) -> Surface<'_> {
+        self.loads.contact().map_or(Surface::NONE, Contact::surface)
     }
 
     /// What the state keeps for instruments, if it has the room.
-    fn memory(&mut self) -> Option<ContactMemory<'_>> {
-        let nodes = self.surface_len();
-        ContactMemory::split(self.pushes, nodes)
+    pub(super) fn memory(&mut self) -> Option<ContactMemory<'_>> {
+        let surface = self.loads.contact()?.surface();
+        ContactMemory::split(self.pushes, &surface)
     }
 
-    /// The next node of the surface that instruments may reach: any, where the state keeps nothing.
-    fn next_in_reach(&mut self, nodes: usize, from: usize, limit: Option<f32>) -> Option<usize> {
+    /// The next place of the surface that instruments may reach: any, where the state keeps nothing.
+    pub(super) fn next_in_reach(&mut self, from: usize, limit: Option<f32>) -> Option<usize> {
+        let places = self.surface().places();
         match (self.memory(), limit) {
             (Some(memory), Some(limit)) => memory.next_in_reach(from, limit),
-            _ => (from < nodes).then_some(from),
+            _ => (from < places).then_some(from),
         }
     }
 
-    /// The nodes that may touch in this step, and room for the answer of a lattice.
-    pub(crate) fn touched_nodes(&mut self) -> (&mut [TouchedNode], &mut [f32]) {
+    /// The points that may touch in this step, and room to solve for their pushes.
+    pub(crate) fn solver_room(&mut self) -> SolverRoom<'_> {
         let count = self.touched;
-        match self.memory() {
-            Some(memory) => (memory.touched.get_mut(..count).unwrap_or_default(), memory.local),
-            None => Default::default(),
-        }
+        let room = self.memory().map(|memory| memory.room).unwrap_or_default();
+        SolverRoom { touched: room.touched.get_mut(..count).unwrap_or_default(), ..room }
     }
 
     /// Adds the pushes of the step before to the forces, or those of another run.
-    pub(crate) fn add_pushes_before(&mut self) {
+    pub(crate) fn add_pushes_before(&mut self, step: &Step) {
+        self.follow_triangles(step);
         let Self { pushes, force, loads, progress, .. } = self;
-        let mut add = |node: u32, push: &NodeVector| {
-            if let Some(NodeVector([x, y, z, _])) = force.get_mut(node as usize) {
-                (*x, *y, *z) = (*x + push.0[0], *y + push.0[1], *z + push.0[2]);
+        let mut add = |surface: &Surface<'_>, place: usize, push: &NodeVector| {
+            for (node, share) in corners_of(surface, place, push) {
+                if let Some(NodeVector([x, y, z, _])) = force.get_mut(node) {
+                    let [a, b, c, _] = push.0;
+                    (*x, *y, *z) = (*x + share * a, *y + share * b, *z + share * c);
+                }
             }
         };
         if let Some((surface, pushes)) = loads.given_pushes() {
-            surface.nodes().iter().zip(pushes).for_each(|(entry, push)| add(entry.node, push));
+            pushes.iter().enumerate().for_each(|(place, push)| add(&surface, place, push));
         }
-        let Some(contact) = loads.contact() else { return };
-        let surface = contact.surface().nodes();
-        let Some(mut memory) = ContactMemory::split(pushes, surface.len()) else { return };
+        let Some(surface) = loads.contact().map(Contact::surface) else { return };
+        let Some(mut memory) = ContactMemory::split(pushes, &surface) else { return };
         memory.forget_if_other(progress);
-        for (place, push) in memory.pushed() {
-            if let Some(entry) = surface.get(place) {
-                add(entry.node, push);
-            }
-        }
+        memory.pushed().for_each(|(place, push)| add(&surface, place, push));
     }
 
     /// Enters the work of the pushes of another run.
     pub(crate) fn add_work_of_given(&self, totals: &mut Totals, next: impl Fn(usize) -> [f32; 4]) {
         let Some((surface, pushes)) = self.loads.given_pushes() else { return };
-        for (entry, push) in surface.nodes().iter().zip(pushes) {
-            if *push != NodeVector::ZERO {
-                let node = entry.node as usize;
-                let last = self.increment.get(node).copied().unwrap_or_default().0;
-                totals.add_work(axes(push.0).dot(mean(next(node), last)));
+        for (place, push) in pushes.iter().enumerate() {
+            if axes(push.0) != Vec3::ZERO {
+                for (node, share) in corners_of(&surface, place, push) {
+                    let last = self.increment.get(node).copied().unwrap_or_default().0;
+                    totals.add_work(share * axes(push.0).dot(mean(next(node), last)));
+                }
             }
         }
     }
 
-    /// Lists the nodes that are in the way of an instrument, near it, or were pushed in the step before. `row` is the place of a node
-    /// in the next increments.
+    /// Lists the nodes and points of triangles that are in the way of an instrument, near it, or were pushed in the step before. `row` is the
+    /// place of a node in the next increments.
     pub(crate) fn find_touched(
         &mut self,
         contact: &Contact<'_>,
@@ -228,43 +247,38 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let farthest = [&*self.increment, next].map(largest_component);
         let way = placed.iter().fold(0.0, |most: f32, placed| most.max(placed.way()));
         let margin = NEAR * (farthest[1] + way);
-        let surface = contact.surface().nodes();
+        let surface = contact.surface();
         let Self { pushes, progress, .. } = self;
-        let Some(mut memory) = ContactMemory::split(pushes, surface.len()) else { return };
+        let Some(mut memory) = ContactMemory::split(pushes, &surface) else { return };
         let limit = memory.begin(progress, placed, farthest, margin);
+        let next = |node| next.get(row(node)).copied().unwrap_or_default().0;
         let mut from = 0;
-        while let Some(place) = self.next_in_reach(surface.len(), from, Some(limit)) {
+        while let Some(place) = self.next_in_reach(from, Some(limit)) {
             from = place + 1;
-            let Some(entry) = surface.get(place).filter(|_| !contact.is_gripped(place)) else { continue };
-            let node = entry.node as usize;
-            let next = next.get(row(node)).copied().unwrap_or_default().0;
-            let Some(mut found) = self.found(place, entry.node) else { continue };
-            let point = predicted(entry.rest, self.displacement.get(node).unwrap_or(&NodeVector::ZERO), next);
-            let (mut nearest, mut distance): (Option<(usize, Meeting)>, f32) = (None, f32::INFINITY);
-            for (index, placed) in placed.iter().enumerate() {
-                let Some(meeting) = placed.meet(point) else { continue };
-                distance = distance.min(placed.least_distance(&meeting));
-                if nearest.as_ref().is_none_or(|(_, nearest)| meeting.gap < nearest.gap) {
-                    found.friction = placed.instrument.friction;
-                    nearest = Some((index, meeting));
-                }
+            if contact.is_gripped(place) {
+                continue;
             }
+            let Some(mut found) = self.found(&surface, place) else { continue };
+            let candidate = self.candidate(&surface, &found, &next);
+            let pushed = found.before != [0.0; 3];
+            let Nearest { distance, met } = candidate.nearest(&found, placed, (margin, pushed));
             if let Some(mut memory) = self.memory() {
-                memory.note(place, distance - axes(next).length());
+                memory.note(place, distance - candidate.farthest());
             }
-            match nearest {
-                Some((index, meeting)) if meeting.gap < margin || found.before != [0.0; 3] => {
-                    if self.refuses_depth(index, entry.node, -meeting.gap) {
+            match met {
+                Some((index, point, meeting)) if meeting.gap < margin || pushed => {
+                    found.set_point(point);
+                    if self.refuses_depth(index, found.node(), -meeting.gap) {
                         self.touched = 0;
                         return;
                     }
-                    let slip = axes(next) - meeting.carried;
-                    let across = slip - slip.dot(meeting.normal) * meeting.normal;
-                    found.relative = (meeting.gap * meeting.normal + across).to_array();
+                    let slip = point.mean(candidate.next);
+                    found.relative = meeting.relative(slip - meeting.carried).to_array();
                     (found.normal, found.gap) = (meeting.normal.to_array(), meeting.gap);
+                    found.friction = placed.get(index).map_or(0.0, |placed| placed.instrument.friction);
                     found.instrument = index as u32;
                 }
-                _ if found.before == [0.0; 3] => continue,
+                _ if !pushed => continue,
                 // All instruments are gone: no push.
                 _ => {
                     let normal = Vec3::from_array(found.before).normalize_or(Vec3::Z).to_array();
@@ -275,16 +289,13 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
         for grip in contact.grips() {
             let (place, index) = (grip.place as usize, grip.instrument as usize);
-            let (Some(entry), Some(placed)) = (surface.get(place), placed.get(index)) else { continue };
+            let Some(placed) = placed.get(index) else { continue };
             if let Some(mut memory) = self.memory() {
                 memory.note(place, f32::NEG_INFINITY);
             }
-            let Some(mut found) = self.found(place, entry.node) else { continue };
-            let node = entry.node as usize;
-            let next = next.get(row(node)).copied().unwrap_or_default().0;
-            let point = predicted(entry.rest, self.displacement.get(node).unwrap_or(&NodeVector::ZERO), next);
-            let relative = point - placed.held(grip.point);
-            if self.refuses_depth(index, entry.node, relative.length()) {
+            let Some(mut found) = self.found(&surface, place) else { continue };
+            let relative = self.candidate(&surface, &found, &next).corners[0] - placed.held(grip.point);
+            if self.refuses_depth(index, found.node(), relative.length()) {
                 self.touched = 0;
                 return;
             }
@@ -294,33 +305,64 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
     }
 
-    fn add_touched(&mut self, found: TouchedNode) {
+    pub(super) fn add_touched(&mut self, found: TouchedPoint) {
         let at = self.touched;
-        if let Some(room) = self.memory().and_then(|memory| memory.touched.get_mut(at)) {
+        if let Some(room) = self.memory().and_then(|memory| memory.room.touched.get_mut(at)) {
             *room = found;
             self.touched += 1;
         }
     }
 
-    /// A node of the surface with its push of the step before. None where supports hold it.
-    fn found(&mut self, place: usize, node: u32) -> Option<TouchedNode> {
-        let inertia = self.scene.inertia.get(node as usize)?;
-        if inertia.inverse.iter().all(|&inverse| inverse <= 0.0) {
+    /// A place of the surface with its push of the step before. None where supports hold it.
+    pub(super) fn found(&mut self, surface: &Surface<'_>, place: usize) -> Option<TouchedPoint> {
+        let nodes = surface.corners(place)?.map(|corner| corner.node);
+        let is_held = |node: &u32| {
+            let inertia = self.scene.inertia.get(*node as usize);
+            inertia.is_none_or(|inertia| inertia.inverse.iter().all(|&inverse| inverse <= 0.0))
+        };
+        if nodes.iter().all(is_held) {
             return None;
         }
-        let before = self.memory()?.before.get(place).copied().unwrap_or_default().to_array();
-        Some(TouchedNode { place: place as u32, node, push: before, before, ..TouchedNode::default() })
+        let kept = self.memory()?.before.get(place).copied().unwrap_or_default();
+        let before = kept.to_array();
+        let mut found =
+            TouchedPoint { place: place as u32, nodes, push: before, before, ..TouchedPoint::default() };
+        if place >= surface.nodes().len() {
+            found.set_point(TrianglePoint::unpacked(kept.0[3]));
+        }
+        Some(found)
+    }
+
+    /// Where the corners of a place will be, and how they move, m.
+    pub(super) fn candidate(
+        &self,
+        surface: &Surface<'_>,
+        found: &TouchedPoint,
+        next: &impl Fn(usize) -> [f32; 4],
+    ) -> Candidate {
+        let place = found.place as usize;
+        let corners = surface.corners(place).unwrap_or_default();
+        let next = corners.map(|corner| next(corner.node as usize));
+        let here =
+            corners.map(|corner| self.displacement.get(corner.node as usize).copied().unwrap_or_default());
+        Candidate {
+            corners: [0, 1, 2].map(|corner| predicted(corners[corner].rest, &here[corner], next[corner])),
+            next: next.map(axes),
+            is_triangle: place >= surface.nodes().len(),
+        }
     }
 
     /// Adds the changes of the pushes (N) to the forces.
     pub(crate) fn add_changes_of_pushes(&mut self) {
-        let (nodes, count) = (self.surface_len(), self.touched);
-        let Self { pushes, force, .. } = self;
-        let Some(memory) = ContactMemory::split(pushes, nodes) else { return };
-        for each in memory.touched.iter().take(count) {
-            if let Some(force) = force.get_mut(each.node as usize) {
-                for axis in 0..3 {
-                    force.0[axis] += each.push[axis] - each.before[axis];
+        let Self { pushes, force, touched, loads, .. } = self;
+        let Some(surface) = loads.contact().map(Contact::surface) else { return };
+        let Some(memory) = ContactMemory::split(pushes, &surface) else { return };
+        for each in memory.room.touched.iter().take(*touched) {
+            for (node, share) in each.corners() {
+                if let Some(force) = force.get_mut(node) {
+                    for axis in 0..3 {
+                        force.0[axis] += share * (each.push[axis] - each.before[axis]);
+                    }
                 }
             }
         }
@@ -337,35 +379,41 @@ impl<M: ElementMaterial> Trial<'_, M> {
         self.clear_touches();
         let placed = &*contact.placed(self.progress.time, step.seconds());
         for at in 0..self.touched {
-            let Some(&each) = self.touched_nodes().0.get(at) else { continue };
-            let (index, node, push) =
-                (each.instrument as usize, each.node as usize, Vec3::from_array(each.push));
-            if push == Vec3::ZERO {
-                continue;
+            let Some(&each) = self.solver_room().touched.get(at) else { continue };
+            if each.push != [0.0; 3] {
+                let moved = self.moved_point(&each, &contact.surface(), &next);
+                let touch = self.touches.get_mut(each.instrument as usize);
+                each.report(moved, placed, touch, totals);
+                self.list_push(&each, moved);
             }
-            let way = mean(next(node), self.increment.get(node).copied().unwrap_or_default().0);
-            totals.add_work(push.dot(way));
-            let Some(placed) = placed.get(index) else { continue };
-            let rest =
-                contact.surface().nodes().get(each.place as usize).map_or([0.0; 3], |entry| entry.rest);
-            let here = self.displacement.get(node).copied().unwrap_or_default();
-            let point = predicted(rest, &here, next(node));
-            if let Some(touch) = self.touches.get_mut(index) {
-                touch.add(push, placed.arm(point), -each.gap, [way, placed.carried(point)]);
-            }
-            let normal = if each.friction == HELD { Vec3::ZERO } else { Vec3::from_array(each.normal) };
-            self.list(each.node, each.instrument, [point, normal, push], -each.gap);
         }
+    }
+
+    /// How far a point moves, as the mean of the increments before and after, and where it will be, m.
+    pub(super) fn moved_point(
+        &self,
+        each: &TouchedPoint,
+        surface: &Surface<'_>,
+        next: &impl Fn(usize) -> [f32; 4],
+    ) -> [Vec3; 2] {
+        let last = |node: usize| self.increment.get(node).copied().unwrap_or_default().0;
+        let way = each.corners().map(|(node, share)| share * mean(next(node), last(node))).sum();
+        [way, each.point().mean(self.candidate(surface, each, next).corners)]
+    }
+
+    /// Tells the host of a push.
+    pub(super) fn list_push(&mut self, each: &TouchedPoint, [_, point]: [Vec3; 2]) {
+        let normal = if each.friction == HELD { Vec3::ZERO } else { Vec3::from_array(each.normal) };
+        self.list(each.node(), each.instrument, [point, normal, Vec3::from_array(each.push)], -each.gap);
     }
 
     /// Keeps the pushes: the step is accepted, and the progress that of its end.
     pub(super) fn accept_pushes(&mut self) {
-        let (touched, nodes) = (self.touched, self.surface_len());
-        let Self { pushes, progress, loads, .. } = self;
-        if loads.contact().is_some()
-            && let Some(mut memory) = ContactMemory::split(pushes, nodes)
+        let Self { pushes, progress, loads, touched, .. } = self;
+        if let Some(contact) = loads.contact()
+            && let Some(mut memory) = ContactMemory::split(pushes, &contact.surface())
         {
-            memory.accept(touched);
+            memory.accept(*touched);
             memory.set_moment(progress);
         }
     }
@@ -383,7 +431,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
     }
 
     /// Refuses the step if a node is so far inside an instrument (m) that it would be thrown.
-    fn refuses_depth(&mut self, index: usize, node: u32, metre: f32) -> bool {
+    pub(super) fn refuses_depth(&mut self, index: usize, node: u32, metre: f32) -> bool {
         let most = MOST_OF_SIZE * self.size_at(node as usize);
         if metre > most {
             self.refused.get_or_insert((node, Cause::Instrument { index, metre, most }));
@@ -416,10 +464,27 @@ impl<M: ElementMaterial> Trial<'_, M> {
         method: &impl StepMethod<M>,
     ) -> Option<Met> {
         let inertia = *self.scene.inertia.get(node)?;
-        let [increment, force] = [*self.increment.get(node)?, *self.force.get(node)?];
-        let next = method.next_increment(node, &inertia, &increment, &force);
+        let increment = *self.increment.get(node)?;
+        let next = method.next_increment(node, &inertia, &increment, self.force.get(node)?);
         let meeting = placed.meet(predicted(rest, self.displacement.get(node)?, next))?;
-        Some(Met { node, inertia, increment, force, next, meeting, way: Vec3::ZERO })
+        Some(Met { node, inertia, increment, next, meeting, way: Vec3::ZERO })
+    }
+}
+
+impl TouchedPoint {
+    /// Tells the instrument, and the energy balance, of the push on a point that moves by `way` to `point`, m.
+    pub(super) fn report(
+        &self,
+        [way, point]: [Vec3; 2],
+        placed: &[Placed<'_>],
+        touch: Option<&mut Touch>,
+        totals: &mut Totals,
+    ) {
+        let push = Vec3::from_array(self.push);
+        totals.add_work(push.dot(way));
+        if let (Some(placed), Some(touch)) = (placed.get(self.instrument as usize), touch) {
+            touch.add(push, placed.arm(point), -self.gap, [way, placed.carried(point)]);
+        }
     }
 }
 
@@ -458,16 +523,16 @@ impl Met {
     }
 }
 
-fn axes([x, y, z, _]: [f32; 4]) -> Vec3 {
+pub(super) fn axes([x, y, z, _]: [f32; 4]) -> Vec3 {
     Vec3::new(x, y, z)
 }
 
 /// The mean of the increments before and after, m: what pushes do work along.
-fn mean(next: [f32; 4], last: [f32; 4]) -> Vec3 {
+pub(super) fn mean(next: [f32; 4], last: [f32; 4]) -> Vec3 {
     0.5 * (axes(next) + axes(last))
 }
 
 /// Where a node will be at the end of the step, m.
-fn predicted(rest: [f32; 3], displacement: &NodeVector, next: [f32; 4]) -> Vec3 {
+pub(super) fn predicted(rest: [f32; 3], displacement: &NodeVector, next: [f32; 4]) -> Vec3 {
     Vec3::from_array(rest) + (axes(displacement.0) + axes(next))
 }

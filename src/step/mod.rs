@@ -10,6 +10,7 @@ mod length;
 mod parts;
 mod status;
 pub(crate) mod threads;
+mod triangles;
 
 pub(crate) use crate::element::Extremes;
 pub use crate::energy_balance::{EnergyBalance, EnergyCycle};

@@ -91,8 +91,8 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
         next_increment(inertia, increment, force, self.step)
     }
 
-    fn meets_instruments(&self, _: &Trial<'_, M>) -> bool {
-        true
+    fn meets_instruments(&self, trial: &Trial<'_, M>) -> bool {
+        trial.surface().triangles().is_empty() || trial.has_room_for_pushes()
     }
 
     fn refused_load(&self, trial: &Trial<'_, M>) -> Option<(u32, Cause)> {

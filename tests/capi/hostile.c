@@ -478,22 +478,28 @@ static void contacts_may_change(void) {
 }
 
 static supple_status make_contact(void) {
-    static uint32_t surface[NODES];
+    static uint32_t numbers[NODES], corners[3 * 8];
     size_t bytes;
     for (uint32_t node = 0; node < NODES; node++) {
-        surface[node] = number(node);
+        numbers[node] = number(node);
     }
     const int is_list = one_in(2);
     const uint32_t count = number(is_list ? 1 + below(NODES) : NODES), grips = number(8);
     if (is_list && count > NODES) {
         return supple_let_go(object(CONTACT, 1), 0);
     }
-    const size_t needed = supple_contact_size(count < 4 * NODES ? count : NODES, grips < 99 ? grips : 8);
+    /* Corners among the nodes that there are, but for a few. */
+    const uint32_t triangles = count < 3 ? 0 : number(below(9)) % 9;
+    for (uint32_t n = 0; n < 3 * triangles; n++) {
+        corners[n] = number((n / 3 + n % 3) % (count < NODES ? count : NODES));
+    }
+    const size_t needed = supple_contact_size(count < 4 * NODES ? count : NODES, triangles, grips < 99 ? grips : 8);
+    const supple_surface surface = {is_list ? numbers : NULL, one_in(60) ? NULL : corners, count, triangles};
     void *at = room(CONTACT, needed, &bytes);
     float *scene_points = end_of(&of_points, sizeof points);
     memcpy(scene_points, points, sizeof points);
     supple_contact *made;
-    return supple_contact_init(at, bytes, object(SCENE, 0), one_in(60) ? NULL : scene_points, is_list ? surface : NULL, count, grips, &made, &error);
+    return supple_contact_init(at, bytes, object(SCENE, 0), one_in(60) ? NULL : scene_points, one_in(60) ? NULL : &surface, grips, &made, &error);
 }
 
 static supple_pose any_pose(void) {

@@ -689,28 +689,41 @@ static void remarks(supple_scene_config config) {
 static void contacts(void) {
     static _Alignas(SUPPLE_ALIGN) unsigned char memory[1 << 19], acts_memory[SUPPLE_LOADS_SIZE(1, 1)];
     static const float no_number[3] = {0.0f, NAN, 0.0f}, none[3] = {0.0f, 0.0f, 0.0f};
-    static uint32_t surface[NODES];
-    const size_t bytes = supple_contact_size(NODES, 8);
+    static uint32_t numbers[NODES], corners[6] = {0, 1, 2, 3, 2, 1};
+    supple_surface all = {NULL, NULL, NODES, 0}, listed = {numbers, corners, NODES, 2};
+    const size_t bytes = supple_contact_size(NODES, 2, 8);
     supple_contact *contact, *made;
     supple_loads *acts;
     DONE(supple_state_reset(state));
     DONE(supple_set_step(scene, state, &length, &error));
     DONE(supple_loads_init(acts_memory, sizeof acts_memory, scene, 1, 1, &acts));
     for (uint32_t node = 0; node < NODES; node++) {
-        surface[node] = node;
+        numbers[node] = node;
     }
-    CHECK(bytes <= sizeof memory && supple_contact_size(UINT32_MAX, UINT32_MAX) >= bytes);
-    REFUSED(SUPPLE_E_NULL, supple_contact_init(NULL, bytes, scene, points[0], NULL, NODES, 8, &made, &error));
-    REFUSED(SUPPLE_E_NULL, supple_contact_init(memory, bytes, scene, NULL, NULL, NODES, 8, &made, &error));
-    REFUSED(SUPPLE_E_NULL, supple_contact_init(memory, bytes, scene, points[0], NULL, NODES, 8, NULL, &error));
-    REFUSED(SUPPLE_E_SHORT, supple_contact_init(memory, bytes - 64, scene, points[0], NULL, NODES, 8, &made, &error));
-    REFUSED(SUPPLE_E_INDEX, supple_contact_init(memory, sizeof memory, scene, points[0], NULL, NODES + 1, 8, &made, &error));
+    CHECK(bytes <= sizeof memory && supple_contact_size(UINT32_MAX, UINT32_MAX, UINT32_MAX) >= bytes);
+    REFUSED(SUPPLE_E_NULL, supple_contact_init(NULL, bytes, scene, points[0], &all, 8, &made, &error));
+    REFUSED(SUPPLE_E_NULL, supple_contact_init(memory, bytes, scene, NULL, &all, 8, &made, &error));
+    REFUSED(SUPPLE_E_NULL, supple_contact_init(memory, bytes, scene, points[0], &all, 8, NULL, &error));
+    REFUSED(SUPPLE_E_SHORT, supple_contact_init(memory, bytes - 64, scene, points[0], &listed, 8, &made, &error));
+    all.node_count = NODES + 1;
+    REFUSED(SUPPLE_E_INDEX, supple_contact_init(memory, sizeof memory, scene, points[0], &all, 8, &made, &error));
     CHECK(error.index == NODES && error.limit == NODES);
-    surface[3] = NODES;
-    REFUSED(SUPPLE_E_INDEX, supple_contact_init(memory, bytes, scene, points[0], surface, NODES, 8, &made, &error));
+    numbers[3] = NODES;
+    REFUSED(SUPPLE_E_INDEX, supple_contact_init(memory, bytes, scene, points[0], &listed, 8, &made, &error));
     CHECK(error.index == 3 && error.node == NODES);
-    surface[3] = 3;
-    DONE(supple_contact_init(memory, bytes, scene, points[0], surface, NODES, 8, &contact, &error));
+    numbers[3] = 3;
+    corners[4] = NODES;
+    REFUSED(SUPPLE_E_INDEX, supple_contact_init(memory, bytes, scene, points[0], &listed, 8, &made, &error));
+    CHECK(error.index == 1 && error.node == NODES && error.limit == NODES);
+    corners[4] = corners[3];
+    REFUSED(SUPPLE_E_INDEX, supple_contact_init(memory, bytes, scene, points[0], &listed, 8, &made, &error));
+    CHECK(error.index == 1 && error.node == 3);
+    corners[4] = 2;
+    listed.triangles = NULL;
+    REFUSED(SUPPLE_E_NULL, supple_contact_init(memory, bytes, scene, points[0], &listed, 8, &made, &error));
+    listed.triangles = corners;
+    REFUSED(SUPPLE_E_NULL, supple_contact_init(memory, bytes, scene, points[0], NULL, 8, &made, &error));
+    DONE(supple_contact_init(memory, bytes, scene, points[0], &listed, 8, &contact, &error));
 
     const float middle[3] = {-0.0121f, 0.005f * Y, 0.005f * Z};
     const supple_pose start = {{middle[0], middle[1], middle[2]}, {0, 0, 0, 0}};

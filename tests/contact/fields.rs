@@ -75,7 +75,7 @@ fn a_body_rests_on_a_body_of_any_form() {
     let bodies = [false, true].map(|keeps| {
         let mut body = Body::new(bar, &[], 30.0);
         if keeps {
-            body.pushes = vec![NodeVector::ZERO; vectors_to_push(body.surface.len())];
+            body.pushes = vec![NodeVector::ZERO; vectors_to_push(body.surface.len(), 0)];
         }
         let pose = Pose::along([0.018, 0.011, -0.0095], [0.02, 0.01, 1.0]);
         let mut box_below = Instrument::resting(Shape::Field(field), pose);

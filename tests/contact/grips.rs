@@ -56,7 +56,7 @@ fn forceps_hold_lift_and_let_go() {
         let mut body = Body::new(BAR, &[], 30.0);
         let seconds = multiple * body.step.seconds() / 0.9;
         body.step = Step::unchecked(seconds, 30.0).unwrap();
-        let mut pushes = vec![NodeVector::ZERO; vectors_to_push(body.surface.len())];
+        let mut pushes = vec![NodeVector::ZERO; vectors_to_push(body.surface.len(), 0)];
         let (points, scene, length) = (body.points.clone(), body.scene.clone(), body.step);
         let mut large = (multiple > 1.0).then(|| {
             let method = Method::Multilevel(Cells::Given([1, 1, 2]));
@@ -149,7 +149,7 @@ fn the_force_between_frames_is_predicted() {
     for hertz in [0.25, 1.0, 4.0] {
         let fixed: Vec<_> = (0..16).map(Support::fixed).collect();
         let mut body = Body::new(BAR, &fixed, 40.0);
-        body.pushes = vec![NodeVector::ZERO; vectors_to_push(body.surface.len())];
+        body.pushes = vec![NodeVector::ZERO; vectors_to_push(body.surface.len(), 0)];
         let at = |time: f64| {
             let phase = 2.0 * std::f64::consts::PI * hertz * time;
             Pose::at([-0.0085 - 0.0015 * phase.cos() as f32, 0.01, 0.03 + 0.001 * (0.5 * phase).sin() as f32])

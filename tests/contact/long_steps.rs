@@ -20,15 +20,15 @@ enum Taker {
 }
 
 /// A body, its steps, and what the instruments do in them.
-struct Run {
-    body: Body,
+pub(crate) struct Run {
+    pub(crate) body: Body,
     taker: Taker,
     pushes: Vec<NodeVector>,
-    touch: [Touch; 1],
+    pub(crate) touch: [Touch; 1],
 }
 
 impl Run {
-    fn new(mut body: Body, method: Option<Method<'static>>, seconds: f32, damping: f32) -> Self {
+    pub(crate) fn new(mut body: Body, method: Option<Method<'static>>, seconds: f32, damping: f32) -> Self {
         let step = Step::unchecked(seconds, damping).unwrap();
         let (scene, points) = (body.scene.clone(), body.points.clone());
         let taker = match method {
@@ -37,15 +37,16 @@ impl Run {
                 LargeStep::prepare_in_vec(method, scene.view(), &points, body.state(&mut []), step).unwrap(),
             )),
         };
-        let pushes = vec![NodeVector::ZERO; vectors_to_push(body.surface.len())];
+        let pushes = vec![NodeVector::ZERO; vectors_to_push(body.surface.len(), body.triangles.len())];
         Self { body, taker, pushes, touch: [Touch::default()] }
     }
 
-    fn step(&mut self, instrument: Instrument) -> Status {
+    pub(crate) fn step(&mut self, instrument: Instrument) -> Status {
         let Self { body, taker, pushes, touch } = self;
-        let (surface, scene) = (body.surface.clone(), body.scene.clone());
+        let (surface, triangles, scene) = (body.surface.clone(), body.triangles.clone(), body.scene.clone());
         let instruments = [instrument];
-        let contact = Contact::new(Surface::new(&surface, body.points.len()).unwrap(), &instruments).unwrap();
+        let surface = Surface::new(&surface, body.points.len()).unwrap().with_triangles(&triangles).unwrap();
+        let contact = Contact::new(surface, &instruments).unwrap();
         let loads = Loads::NONE.touched_by(&contact);
         let mut state = body.state(touch).pushing(pushes);
         match taker {
@@ -55,13 +56,13 @@ impl Run {
     }
 }
 
-const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [4, 4, 8] };
+pub(crate) const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [4, 4, 8] };
 
-fn multilevel() -> Method<'static> {
+pub(crate) fn multilevel() -> Method<'static> {
     Method::Multilevel(Cells::Given([1, 1, 2]))
 }
 
-fn damped() -> Method<'static> {
+pub(crate) fn damped() -> Method<'static> {
     #[repr(C, align(64))]
     struct Flash<B: ?Sized>(B);
     static DAMPER: &Flash<[u8]> = &Flash(*include_bytes!("../../weights/damper.weights"));
@@ -159,7 +160,7 @@ fn course(method: Option<Method<'static>>, seconds: f32, speed: f64) -> (Vec<[f6
     (means, deepest, run.touch[0].contacts)
 }
 
-fn length(vector: [f64; 3]) -> f64 {
+pub(crate) fn length(vector: [f64; 3]) -> f64 {
     vector.iter().map(|component| component * component).sum::<f64>().sqrt()
 }
 
@@ -212,8 +213,11 @@ fn no_pose_makes_a_long_step_wrong_and_calls_it_right() {
     // More of them on demand.
     let asked = std::env::var("POSES").ok().and_then(|poses| poses.parse().ok());
     let poses = asked.unwrap_or(if cfg!(feature = "slow-tests") { 20_000 } else { 1_000 });
-    for (method, multiple) in [(multilevel(), 4.0f32), (damped(), 20.0)] {
-        let mut run = Run::new(Body::new(BAR, &fixed, 20.0), Some(method), multiple * critical, 20.0);
+    let body = || Body::new(BAR, &fixed, 20.0);
+    for (body, method, multiple) in
+        [(body(), multilevel(), 4.0f32), (body(), damped(), 20.0), (body().with_triangles(), damped(), 20.0)]
+    {
+        let mut run = Run::new(body, Some(method), multiple * critical, 20.0);
         let mut uniform = uniform(3);
         let mut random = || 0.5 * (uniform() + 1.0);
         let (mut taken, mut refused, mut touched) = (0, 0, 0);
@@ -250,7 +254,10 @@ fn no_pose_makes_a_long_step_wrong_and_calls_it_right() {
                 );
             }
         }
-        println!("{multiple} times: {taken} taken, {touched} of them touched; {refused} refused");
+        let triangles = run.body.triangles.len();
+        println!(
+            "{triangles} triangles, {multiple} times: {taken} taken, {touched} of them touched; {refused} refused"
+        );
         assert!(touched > poses / 100 && refused > poses / 100);
     }
 }

@@ -10,4 +10,5 @@ mod fields;
 mod grips;
 mod long_steps;
 mod scene;
+mod thin;
 mod touching;

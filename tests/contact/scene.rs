@@ -1,6 +1,8 @@
 //! Bodies of tissue and the instruments that touch them.
 
-use supple::contact::{Contact, Instrument, Surface, SurfaceNode, Touch, boundary};
+use supple::contact::{
+    Contact, Instrument, Surface, SurfaceNode, Touch, boundary, boundary_triangles, vectors_to_push,
+};
 use supple::loads::Loads;
 use supple::material::{NeoHookean, NodalStrain, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
@@ -19,6 +21,9 @@ pub(crate) struct Body {
     pub(crate) points: Vec<[f32; 3]>,
     pub(crate) scene: VecScene<Law>,
     pub(crate) surface: Vec<SurfaceNode>,
+    /// Those of the surface that instruments touch between nodes: none, unless asked for.
+    pub(crate) triangles: Vec<[u32; 3]>,
+    every_triangle: Vec<[u32; 3]>,
     pub(crate) step: Step,
     /// What the state keeps for instruments, if anything.
     pub(crate) pushes: Vec<NodeVector>,
@@ -35,6 +40,7 @@ impl Body {
         let mesh = Mesh::new(&points, tets, Winding::Normalised).unwrap();
         let scene = VecScene::build(TISSUE, &mesh, supports).unwrap();
         let surface = boundary(&mesh);
+        let every_triangle = boundary_triangles(&mesh, &surface);
         let zeros = || vec![NodeVector::ZERO; points.len()];
         let mut vectors = [zeros(), zeros(), zeros(), zeros()];
         let mut progress = Progress::START;
@@ -44,7 +50,24 @@ impl Body {
             tled::critical_step(&scene, &mut state).unwrap()
         };
         let step = Step::new(0.9 * critical.seconds, damping, critical).unwrap();
-        Self { points, scene, surface, step, pushes: Vec::new(), vectors, progress }
+        Self {
+            points,
+            scene,
+            surface,
+            triangles: Vec::new(),
+            every_triangle,
+            step,
+            pushes: Vec::new(),
+            vectors,
+            progress,
+        }
+    }
+
+    /// The same, touched between its nodes too.
+    pub(crate) fn with_triangles(mut self) -> Self {
+        self.triangles = core::mem::take(&mut self.every_triangle);
+        self.pushes = vec![NodeVector::ZERO; vectors_to_push(self.surface.len(), self.triangles.len())];
+        self
     }
 
     pub(crate) fn state<'a>(&'a mut self, touches: &'a mut [Touch]) -> StateView<'a> {
@@ -76,8 +99,9 @@ impl Body {
         instruments: &[Instrument],
         touches: &mut [Touch],
     ) -> Status {
-        let surface = self.surface.clone();
-        let contact = Contact::new(Surface::new(&surface, self.points.len()).unwrap(), instruments).unwrap();
+        let (surface, triangles) = (self.surface.clone(), self.triangles.clone());
+        let surface = Surface::new(&surface, self.points.len()).unwrap().with_triangles(&triangles).unwrap();
+        let contact = Contact::new(surface, instruments).unwrap();
         let [displacement, increment, force, volume] = &mut self.vectors;
         let state = StateView::new(displacement, increment, force, volume, &mut self.progress);
         let mut state = state.feeling(touches).pushing(&mut self.pushes);

@@ -113,7 +113,7 @@ fn steps_beyond_the_critical_one_refuse_instruments() {
         LargeStep::prepare_in_vec(Method::MassScaled, scene.view(), &points, body.state(&mut []), step)
             .unwrap();
     // Even with room for pushes.
-    let mut pushes = vec![NodeVector::ZERO; vectors_to_push(surface.len())];
+    let mut pushes = vec![NodeVector::ZERO; vectors_to_push(surface.len(), 0)];
     let status = scaled.step(scene.view(), &loads, body.state(&mut []).pushing(&mut pushes));
     let Status::Diverged(divergence) = status else { panic!("{status:?}") };
     println!("{divergence}");
@@ -124,7 +124,11 @@ fn steps_beyond_the_critical_one_refuse_instruments() {
 /// Instruments anywhere, of any size and speed: a step is taken with finite numbers, or refused.
 #[test]
 fn no_pose_makes_a_step_wrong_and_calls_it_right() {
-    let mut body = Body::new(BAR, &fixed_end(), 20.0);
+    any_poses(Body::new(BAR, &fixed_end(), 20.0));
+    any_poses(Body::new(BAR, &fixed_end(), 20.0).with_triangles());
+}
+
+fn any_poses(mut body: Body) {
     let mut uniform = uniform(1);
     let mut random = || 0.5 * (uniform() + 1.0);
     let (mut taken, mut refused, mut touched) = (0, 0, 0);
@@ -164,7 +168,10 @@ fn no_pose_makes_a_step_wrong_and_calls_it_right() {
             assert!((0..body.points.len()).all(|node| body.displacement(node).iter().all(|u| u.is_finite())));
         }
     }
-    println!("{taken} taken, {touched} of them touched; {refused} refused");
+    println!(
+        "{} triangles: {taken} taken, {touched} of them touched; {refused} refused",
+        body.triangles.len()
+    );
     assert!(touched > poses / 100 && refused > poses / 100);
 }
 
@@ -175,6 +182,11 @@ fn bad_values_are_named() {
     assert_eq!(error, ContactError::Node { place: 1, node: 9, nodes: 9 });
     println!("{error}");
     let surface = Surface::new(&nodes, 10).unwrap();
+    for (triangle, place) in [([0, 1, 2], 2), ([0, 1, 0], 0)] {
+        let error = surface.with_triangles(&[triangle]).unwrap_err();
+        assert_eq!(error, ContactError::Triangle { triangle: 0, place, nodes: 2 });
+        println!("{error}");
+    }
     let sphere = Instrument::resting(Shape::Sphere { radius: 0.01 }, Pose::at([0.0; 3]));
     let bad = [
         Instrument { shape: Shape::Sphere { radius: -1.0 }, ..sphere },

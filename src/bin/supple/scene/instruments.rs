@@ -57,7 +57,9 @@ pub(crate) struct Tool {
 #[derive(Default)]
 pub(crate) struct Tools {
     pub(crate) tools: Vec<Tool>,
-    surface: Vec<SurfaceNode>,
+    nodes: Vec<SurfaceNode>,
+    /// None unless an instrument is thinner than an edge is long.
+    triangles: Vec<[u32; 3]>,
 }
 
 impl Tools {
@@ -66,7 +68,28 @@ impl Tools {
         let local = |at: [f64; 3]| [0, 1, 2].map(|axis| (at[axis] - body.centre[axis]) as f32);
         let path = path.iter().map(|&(time, at)| (time, local(at))).collect();
         let tool = Tool { shape: OwnedShape::Sphere { radius }, friction, path, direction: [0.0, 0.0, 1.0] };
-        Self { tools: vec![tool], surface: surface_of(body) }
+        Self::new(vec![tool], body)
+    }
+
+    fn new(tools: Vec<Tool>, body: &Body) -> Self {
+        let mut triangles = body.boundary();
+        let mut nodes = triangles.as_flattened().to_vec();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let length = |[a, b]: [u32; 2]| {
+            let [a, b] = [a, b].map(|node| body.local[node as usize]);
+            (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f32>().sqrt()
+        };
+        let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let longest = edges.map(length).fold(0.0, f32::max);
+        if tools.iter().all(|tool| tool.shape.shape().thickness() >= longest) {
+            triangles.clear();
+        }
+        for corner in triangles.as_flattened_mut() {
+            *corner = nodes.partition_point(|node| node < corner) as u32;
+        }
+        let nodes = nodes.into_iter().map(|node| SurfaceNode { rest: body.local[node as usize], node });
+        Self { tools, nodes: nodes.collect(), triangles }
     }
 
     pub(crate) fn read(file: &SceneFile, body: &Body) -> Result<Self, Problem> {
@@ -83,16 +106,18 @@ impl Tools {
             ));
         }
         let tools = tables.iter().map(|at| Tool::read(file, at, body)).collect::<Result<_, _>>()?;
-        Ok(Self { tools, surface: surface_of(body) })
+        Ok(Self::new(tools, body))
     }
 
     pub(crate) const fn is_empty(&self) -> bool {
         self.tools.is_empty()
     }
 
-    /// Nodes that can be touched.
-    pub(crate) const fn surface_nodes(&self) -> usize {
-        self.surface.len()
+    /// What can be touched, on a body of so many nodes.
+    pub(crate) fn surface(&self, nodes: usize) -> Result<Surface<'_>, Problem> {
+        let surface =
+            Surface::new(&self.nodes, nodes).and_then(|surface| surface.with_triangles(&self.triangles));
+        surface.map_err(Problem::of)
     }
 
     /// The instruments on the parts of their paths that begin at `time` or before, s.
@@ -112,41 +137,8 @@ impl Tools {
         instruments: &'a [Instrument<'a>],
         nodes: usize,
     ) -> Result<Contact<'a>, Problem> {
-        let surface = Surface::new(&self.surface, nodes).map_err(Problem::of)?;
-        Contact::new(surface, instruments).map_err(Problem::of)
+        Contact::new(self.surface(nodes)?, instruments).map_err(Problem::of)
     }
-
-    /// Warnings of instruments that are thinner than the edges of the surface.
-    pub(crate) fn warnings(&self, file: &SceneFile, body: &Body) -> Vec<String> {
-        let length = |[a, b]: [u32; 2]| {
-            let [a, b] = [a, b].map(|node| body.local[node as usize]);
-            (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f32>().sqrt()
-        };
-        let triangles = if self.is_empty() { vec![] } else { body.boundary() };
-        let edges = triangles.iter().map(|&[a, b, _]| length([a, b]));
-        let mean = edges.sum::<f32>() / triangles.len().max(1) as f32;
-        let tools = self.tools.iter().zip(&file.scene.instrument);
-        let thin = tools.filter_map(|(tool, at)| match tool.shape {
-            OwnedShape::Sphere { radius } | OwnedShape::Capsule { radius, .. } if radius < mean => {
-                Some(format!(
-                    "{}: a radius of {:.2} mm is less than the mean edge of the surface, {:.2} mm: the instrument passes between \
-                     nodes",
-                    file.place(at),
-                    1e3 * radius,
-                    1e3 * mean
-                ))
-            }
-            _ => None,
-        });
-        thin.collect()
-    }
-}
-
-fn surface_of(body: &Body) -> Vec<SurfaceNode> {
-    let mut nodes = body.boundary().into_flattened();
-    nodes.sort_unstable();
-    nodes.dedup();
-    nodes.into_iter().map(|node| SurfaceNode { rest: body.local[node as usize], node }).collect()
 }
 
 impl Tool {
@@ -218,7 +210,11 @@ impl std::fmt::Display for Tools {
                 }
             }
         }
-        write!(f, "; {} nodes can be touched", self.surface.len())
+        write!(f, "; {} nodes", self.nodes.len())?;
+        if !self.triangles.is_empty() {
+            write!(f, " and {} triangles", self.triangles.len())?;
+        }
+        f.write_str(" can be touched")
     }
 }
 

@@ -62,7 +62,6 @@ impl Setup {
         let element = read_element(file, learned.as_ref())?;
         let of_the_network = learned.as_ref().filter(|_| scene.mesh.get_ref().element.is_none());
         warnings.extend(locking(&file.place(&scene.mesh), of_the_network, element, &tissues));
-        warnings.extend(tools.warnings(file, &body));
         if let Some(learned) = &learned {
             warnings.extend(learned.warning(&tissues, element)?);
         }
@@ -126,8 +125,12 @@ impl Setup {
 
     /// A state at rest.
     pub(crate) fn state(&self) -> VecState {
-        let state = VecState::at_rest(self.body.local.len());
-        if self.tools.is_empty() { state } else { state.meeting(self.tools.surface_nodes()) }
+        let nodes = self.body.local.len();
+        let state = VecState::at_rest(nodes);
+        match self.tools.surface(nodes) {
+            Ok(surface) if !self.tools.is_empty() => state.meeting(&surface),
+            _ => state,
+        }
     }
 
     /// What acts on the scene.

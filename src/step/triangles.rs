@@ -1,0 +1,241 @@
+//! Triangles of the surface in a step, which instruments touch at the point that is deepest in them: the push `p` there is a force
+//! `w_i p` on each corner, with the barycentric weights `w_i`, and the point moves by the mean of its corners. As triangles share nodes,
+//! exact steps find their pushes by projected Gauss-Seidel, a bounded number of sweeps over
+//!
+//! ```text
+//! p <- projection of  p - m r / c,   1/m = sum w_i^2 / m_i
+//! ```
+//! onto the pushes that friction allows, with the way `r` (m) that is left and `c` (s^2) as for a node. Long steps solve for them
+//! together with the nodes ([`crate::contact`]).
+
+use glam::Vec3;
+
+use super::contact::{axes, predicted};
+use super::{Step, StepMethod, Totals, Trial};
+use crate::contact::{
+    Contact, ContactMemory, MOST_INSTRUMENTS, Meeting, Placed, Surface, Touch, TouchedPoint, TrianglePoint,
+};
+use crate::element::ElementMaterial;
+use crate::simd::NodeVector;
+
+/// Sweeps over the triangles that touch.
+const SWEEPS: usize = 8;
+/// They end earlier where a sweep moves no point by more than this share of the deepest gap.
+const SETTLED: f32 = 1e-3;
+
+/// Where the corners of a triangle will be, and how far they move in the step, m; a node three times.
+pub(super) struct Candidate {
+    pub(super) corners: [Vec3; 3],
+    pub(super) next: [Vec3; 3],
+    pub(super) is_triangle: bool,
+}
+
+/// Which instrument a node or triangle is nearest to, with the point and its meeting, and a distance (m) that it has from all.
+pub(super) struct Nearest {
+    pub(super) distance: f32,
+    pub(super) met: Option<(usize, TrianglePoint, Meeting)>,
+}
+
+impl Candidate {
+    /// The farthest that a corner moves, m.
+    pub(super) fn farthest(&self) -> f32 {
+        self.next.iter().fold(0.0, |most: f32, next| most.max(next.length()))
+    }
+
+    /// The nearest instrument. A triangle is searched if it can be nearer than `margin` (m); one that was pushed keeps its point.
+    pub(super) fn nearest(
+        &self,
+        found: &TouchedPoint,
+        placed: &[Placed<'_>],
+        (margin, pushed): (f32, bool),
+    ) -> Nearest {
+        let [a, b, c] = self.corners;
+        let middle = if self.is_triangle { (a + b + c) / 3.0 } else { a };
+        let reach = if self.is_triangle {
+            self.corners.iter().fold(0.0, |most: f32, corner| most.max(corner.distance(middle)))
+        } else {
+            0.0
+        };
+        let mut nearest = Nearest { distance: f32::INFINITY, met: None };
+        for (index, placed) in placed.iter().enumerate() {
+            // A plane reaches the corners first.
+            if self.is_triangle && placed.is_plane() {
+                continue;
+            }
+            let Some(meeting) = placed.meet(middle) else { continue };
+            let distance = placed.least_distance(&meeting) - reach;
+            nearest.distance = nearest.distance.min(distance);
+            let (point, meeting) = if !self.is_triangle {
+                (TrianglePoint::CORNER, meeting)
+            } else if pushed {
+                let Some(meeting) = placed.meet(found.point().mean(self.corners)) else { continue };
+                (found.point(), meeting)
+            } else {
+                if distance > margin {
+                    continue;
+                }
+                // At a corner it is the node that is touched.
+                let met = placed.meet_triangle(self.corners).filter(|(point, _)| !point.is_corner());
+                let Some(met) = met else { continue };
+                met
+            };
+            if nearest.met.as_ref().is_none_or(|(_, _, nearest)| meeting.gap < nearest.gap) {
+                nearest.met = Some((index, point, meeting));
+            }
+        }
+        nearest
+    }
+}
+
+/// The nodes that carry a push on a place of the surface, with their shares.
+pub(super) fn corners_of(
+    surface: &Surface<'_>,
+    place: usize,
+    push: &NodeVector,
+) -> impl Iterator<Item = (usize, f32)> + use<> {
+    let nodes = surface.corners(place).unwrap_or_default().map(|corner| corner.node as usize);
+    let point = if place < surface.nodes().len() {
+        TrianglePoint::CORNER
+    } else {
+        TrianglePoint::unpacked(push.0[3])
+    };
+    let carries = |push: &NodeVector| axes(push.0) != Vec3::ZERO;
+    let count = if !carries(push) {
+        0
+    } else if point == TrianglePoint::CORNER {
+        1
+    } else {
+        3
+    };
+    nodes.into_iter().zip(point.weights()).take(count)
+}
+
+impl<M: ElementMaterial> Trial<'_, M> {
+    /// Finds anew at which point a triangle that was pushed in the step before is nearest to an instrument, if it goes on as it did.
+    pub(super) fn follow_triangles(&mut self, step: &Step) {
+        let Some(contact) = self.loads.contact().filter(|contact| !contact.surface().triangles().is_empty())
+        else {
+            return;
+        };
+        let (surface, placed) = (contact.surface(), &*contact.placed(self.progress.time, step.seconds()));
+        let Self { pushes, progress, displacement, increment, .. } = self;
+        let Some(mut memory) = ContactMemory::split(pushes, &surface) else { return };
+        memory.forget_if_other(progress);
+        let row = |vectors: &[NodeVector], node: u32| vectors.get(node as usize).copied().unwrap_or_default();
+        let after = |node: crate::contact::SurfaceNode| {
+            predicted(node.rest, &row(displacement, node.node), row(increment, node.node).0)
+        };
+        for place in surface.nodes().len()..surface.places() {
+            let Some(push) = memory.before.get_mut(place).filter(|push| axes(push.0) != Vec3::ZERO) else {
+                continue;
+            };
+            let Some(corners) = surface.corners(place).map(|corners| corners.map(after)) else { continue };
+            let met = placed.iter().filter(|placed| !placed.is_plane());
+            let nearest = met
+                .filter_map(|placed| placed.meet_triangle(corners))
+                .min_by(|(_, a), (_, b)| a.gap.total_cmp(&b.gap));
+            if let Some((point, _)) = nearest {
+                push.0[3] = point.packed();
+            }
+        }
+    }
+
+    /// Adds the pushes on triangles to the forces, for methods whose next increment of a node follows from its force and its mass alone,
+    /// once those on nodes are there.
+    pub(super) fn meet_triangles(
+        &mut self,
+        contact: &Contact<'_>,
+        (step, method): (&Step, &impl StepMethod<M>),
+        placed: &[Placed<'_>],
+        (totals, touches): (&mut Totals, &mut [Touch; MOST_INSTRUMENTS]),
+        limit: Option<f32>,
+    ) {
+        let (surface, first) = (contact.surface(), self.touched);
+        let mut from = surface.nodes().len();
+        while let Some(place) = self.next_in_reach(from, limit) {
+            from = place + 1;
+            if contact.is_gripped(place) {
+                continue;
+            }
+            let Some(mut found) = self.found(&surface, place) else { continue };
+            let candidate = self.candidate(&surface, &found, &|node| self.next_of(node, method));
+            let Nearest { distance, met } = candidate.nearest(&found, placed, (0.0, false));
+            if let Some(mut memory) = self.memory() {
+                memory.note(place, distance - candidate.farthest());
+            }
+            found.push = [0.0; 3];
+            if let Some((index, point, meeting)) = met.filter(|(.., meeting)| meeting.gap < 0.0) {
+                found.set_point(point);
+                if self.refuses_depth(index, found.node(), -meeting.gap) {
+                    return;
+                }
+                let moved = point.mean(candidate.next);
+                found.vector = (meeting.relative(moved - meeting.carried) - moved).to_array();
+                (found.normal, found.gap) = (meeting.normal.to_array(), meeting.gap);
+                found.friction = placed.get(index).map_or(0.0, |placed| placed.instrument.friction);
+                found.instrument = index as u32;
+                found.scale = self.mass_at(&found);
+            } else if found.before == [0.0; 3] {
+                continue;
+            }
+            self.add_touched(found);
+        }
+        for _ in 0..SWEEPS {
+            let mut most = [0.0f32; 2];
+            for at in first..self.touched {
+                let Some(mut each) = self.touched_at(at).filter(|each| each.scale > 0.0) else { continue };
+                let moved = self.moved(&each, method);
+                let way = Vec3::from_array(each.vector) + moved;
+                let push = Vec3::from_array(each.push) - way * (each.scale / step.push());
+                let change = each.projected(push) - Vec3::from_array(each.push);
+                for (node, share) in each.corners() {
+                    self.add_force(node, share * change, (step, method), totals);
+                }
+                each.push = (Vec3::from_array(each.push) + change).to_array();
+                if let Some(place) = self.solver_room().touched.get_mut(at) {
+                    *place = each;
+                }
+                most = [most[0].max(change.length() * step.push() / each.scale), most[1].max(-each.gap)];
+            }
+            if most[0] <= SETTLED * most[1] {
+                break;
+            }
+        }
+        for at in first..self.touched {
+            if let Some(each) = self.touched_at(at).filter(|each| each.push != [0.0; 3]) {
+                let moved = self.moved_point(&each, &surface, &|node| self.next_of(node, method));
+                each.report(moved, placed, touches.get_mut(each.instrument as usize), totals);
+                self.list_push(&each, moved);
+            }
+        }
+    }
+
+    fn touched_at(&mut self, at: usize) -> Option<TouchedPoint> {
+        self.solver_room().touched.get(at).copied()
+    }
+
+    /// The mass (kg) that a push on a point of a triangle moves, as far as supports let it.
+    fn mass_at(&self, found: &TouchedPoint) -> f32 {
+        let inverse = |(node, share): (usize, f32)| {
+            let inertia = self.scene.inertia.get(node)?;
+            let moves = inertia.inverse.iter().any(|&inverse| inverse > 0.0);
+            moves.then_some(share * share / inertia.mass)
+        };
+        let inverse: f32 = found.corners().filter_map(inverse).sum();
+        if inverse > 0.0 { 1.0 / inverse } else { 0.0 }
+    }
+
+    /// How far a point moves in the step, m.
+    fn moved(&self, each: &TouchedPoint, method: &impl StepMethod<M>) -> Vec3 {
+        each.corners().map(|(node, share)| share * axes(self.next_of(node, method))).sum()
+    }
+
+    /// The next increment of a node with the force of now, m.
+    fn next_of(&self, node: usize, method: &impl StepMethod<M>) -> [f32; 4] {
+        let of = || {
+            let (inertia, increment) = (self.scene.inertia.get(node)?, self.increment.get(node)?);
+            Some(method.next_increment(node, inertia, increment, self.force.get(node)?))
+        };
+        of().unwrap_or_default()
+    }
+}
