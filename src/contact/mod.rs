@@ -47,7 +47,7 @@
 //! of the step before. Mass-scaled and learned steps refuse instruments: what they push would be inertia that is not there.
 //!
 //! An instrument that is thinner than edges are long meets triangles too ([`Surface::with_triangles`]): the push acts on the point of a
-//! triangle that is deepest inside, shared among its corners by the point's weights (`triangle.rs`).
+//! triangle that is deepest inside, shared among its corners by the point's weights (`triangle.rs`, `src/step/triangles.rs`).
 //!
 //! Work: at most each node and triangle of the surface against each instrument in each step, and eight sweeps over the triangles that
 //! touch. A state with room for pushes

@@ -203,14 +203,19 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             surface,
             sums,
         };
+        // What the lattice adds is nearly the same at all points of an instrument, and the scale only makes light and heavy ones alike.
+        let (mut instrument, mut coarse) = (u32::MAX, 0.0);
         for each in &mut *touched {
-            let normal = Vec3::from_array(each.normal);
-            each.vector = normal.to_array();
-            compliance.apply(core::slice::from_mut(each));
-            // Across the normal its own motion will do: the scale only makes light and heavy nodes alike.
-            let across = directions(normal).map(|axis| compliance.own_of_point(each, axis).length());
-            let own = across.into_iter().fold(Vec3::from_array(each.vector).length(), f32::max);
-            each.scale = if own > 0.0 { 1.0 / libm::sqrtf(own) } else { 0.0 };
+            let [normal, a, b] = directions(Vec3::from_array(each.normal));
+            let own = compliance.own_of_point(each, normal);
+            if each.instrument != instrument {
+                each.vector = normal.to_array();
+                compliance.apply(core::slice::from_mut(each));
+                (instrument, coarse) = (each.instrument, (Vec3::from_array(each.vector) - own).length());
+            }
+            let across = [a, b].map(|axis| compliance.own_of_point(each, axis).length());
+            let most = across.into_iter().fold(own.length() + coarse, f32::max);
+            each.scale = if most > 0.0 { 1.0 / libm::sqrtf(most) } else { 0.0 };
         }
         solve(touched, &mut compliance);
         for each in &mut *touched {

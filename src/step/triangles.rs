@@ -49,41 +49,58 @@ impl Candidate {
         placed: &[Placed<'_>],
         (margin, pushed): (f32, bool),
     ) -> Nearest {
-        let [a, b, c] = self.corners;
-        let middle = if self.is_triangle { (a + b + c) / 3.0 } else { a };
-        let reach = if self.is_triangle {
-            self.corners.iter().fold(0.0, |most: f32, corner| most.max(corner.distance(middle)))
-        } else {
-            0.0
-        };
         let mut nearest = Nearest { distance: f32::INFINITY, met: None };
         for (index, placed) in placed.iter().enumerate() {
-            // A plane reaches the corners first.
-            if self.is_triangle && placed.is_plane() {
-                continue;
-            }
-            let Some(meeting) = placed.meet(middle) else { continue };
-            let distance = placed.least_distance(&meeting) - reach;
-            nearest.distance = nearest.distance.min(distance);
-            let (point, meeting) = if !self.is_triangle {
-                (TrianglePoint::CORNER, meeting)
-            } else if pushed {
-                let Some(meeting) = placed.meet(found.point().mean(self.corners)) else { continue };
-                (found.point(), meeting)
+            let (distance, met) = if self.is_triangle {
+                self.nearest_point(pushed.then(|| found.point()), placed, margin)
             } else {
-                if distance > margin {
-                    continue;
-                }
-                // At a corner it is the node that is touched.
-                let met = placed.meet_triangle(self.corners).filter(|(point, _)| !point.is_corner());
-                let Some(met) = met else { continue };
-                met
+                let Some(meeting) = placed.meet(self.corners[0]) else { continue };
+                (placed.least_distance(&meeting), Some((TrianglePoint::CORNER, meeting)))
             };
-            if nearest.met.as_ref().is_none_or(|(_, _, nearest)| meeting.gap < nearest.gap) {
+            nearest.distance = nearest.distance.min(distance);
+            if let Some((point, meeting)) = met
+                && nearest.met.as_ref().is_none_or(|(_, _, nearest)| meeting.gap < nearest.gap)
+            {
                 nearest.met = Some((index, point, meeting));
             }
         }
         nearest
+    }
+
+    /// A distance (m) that the triangle has from an instrument, and its nearest point if that may be nearer than `margin` (m), or the point
+    /// that was pushed.
+    fn nearest_point(
+        &self,
+        pushed: Option<TrianglePoint>,
+        placed: &Placed<'_>,
+        margin: f32,
+    ) -> (f32, Option<(TrianglePoint, Meeting)>) {
+        // A plane reaches the corners first.
+        if placed.is_plane() {
+            return (f32::INFINITY, None);
+        }
+        if let Some(point) = pushed {
+            return (
+                f32::NEG_INFINITY,
+                placed.meet(point.mean(self.corners)).map(|meeting| (point, meeting)),
+            );
+        }
+        let [a, b, c] = self.corners;
+        let middle = (a + b + c) / 3.0;
+        let reach = self.corners.iter().fold(0.0, |most: f32, corner| most.max(corner.distance(middle)));
+        let Some(meeting) = placed.meet(middle) else { return (f32::NEG_INFINITY, None) };
+        let distance = placed.least_distance(&meeting) - reach;
+        if distance > margin {
+            return (distance, None);
+        }
+        let Some((point, meeting)) = placed.meet_triangle(self.corners) else {
+            return (f32::NEG_INFINITY, None);
+        };
+        // The point is rounded: an edge is at most twice as long as the reach.
+        let distance =
+            if placed.finds_nearest() { distance.max(meeting.gap - reach / 64.0) } else { distance };
+        // At a corner it is the node that is touched.
+        (distance, Some((point, meeting)).filter(|(point, _)| !point.is_corner()))
     }
 }
 
@@ -125,7 +142,9 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let after = |node: crate::contact::SurfaceNode| {
             predicted(node.rest, &row(displacement, node.node), row(increment, node.node).0)
         };
-        for place in surface.nodes().len()..surface.places() {
+        let mut from = surface.nodes().len();
+        while let Some(place) = memory.next_in_reach(from, f32::MIN) {
+            from = place + 1;
             let Some(push) = memory.before.get_mut(place).filter(|push| axes(push.0) != Vec3::ZERO) else {
                 continue;
             };

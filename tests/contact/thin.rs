@@ -1,4 +1,4 @@
-//! Instruments that are thin beside the edges of the surface, which pass between its nodes and touch its triangles.
+//! Instruments that are thinner than the edges of the surface are long, which pass between its nodes and touch its triangles.
 
 use supple::contact::{Instrument, Pose, Shape, Touch};
 use supple::inertia::Method;
@@ -17,7 +17,7 @@ fn held() -> Vec<Support> {
     (0..25).map(Support::fixed).collect()
 }
 
-/// The needle with its tip at `tip`, along x, whose middle is beside the bar.
+/// The needle with its tip at `tip`, along x, with its middle outside the bar.
 fn at(tip: [f32; 3]) -> Pose {
     Pose::along([tip[0] - 0.0158, tip[1], tip[2]], [1.0, 0.0, 0.0])
 }
