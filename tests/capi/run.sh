@@ -117,17 +117,25 @@ done
 g++ -std=c++17 "${warnings[@]}" examples/press.cpp "$static" -o "$folder/press"
 "$folder/press"
 
-# From Python; a machine without numpy gets its own.
+# From Python; a machine without these packages gets its own.
 python=python3
-if ! python3 -c 'import numpy' 2>/dev/null; then
+if ! python3 -c 'import numpy, pyigtl' 2>/dev/null; then
     python3 -m venv "$folder/venv" 2>/dev/null || {
         apt-get update -qq && apt-get install -y -qq --no-install-recommends python3-venv
         python3 -m venv "$folder/venv"
     }
     python=$folder/venv/bin/python3
-    "$python" -m pip install --quiet numpy==2.4.6
+    "$python" -m pip install --quiet numpy==2.4.6 pyigtl==0.3.4
 fi
 for element in nodal-pressure nodal-strain; do
     "$python" examples/compare.py "$shared" "$command" $element
 done
 "$python" examples/press.py "$shared"
+
+# A client of another implementation of OpenIGTLink moves the ball.
+[ -e /usr/include/openigtlink ] || {
+    apt-get update -qq && apt-get install -y -qq --no-install-recommends libopenigtlink-dev
+}
+g++ -std=c++17 "${warnings[@]}" -isystem /usr/include/openigtlink examples/openigtlink.cpp "$static" -lOpenIGTLink -lpthread \
+    -o "$folder/openigtlink"
+"$python" tests/hosts/openigtlink_client.py "$folder/openigtlink"
