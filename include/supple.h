@@ -1580,7 +1580,7 @@ supple_status supple_let_go(supple_contact *contact, uint32_t instrument);
 
 /**
  * Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned and mass-scaled
- * steps refuse loads with instruments.
+ * steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
  */
 supple_status supple_set_contact(supple_loads *loads,
                                  supple_contact *contact);

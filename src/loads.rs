@@ -184,6 +184,7 @@ impl<'a> Loads<'a> {
     }
 
     /// The same loads and instruments that touch the tissue.
+    #[cfg(feature = "contact")]
     #[must_use]
     pub const fn touched_by(self, contact: &'a Contact<'a>) -> Self {
         Self { contact: Some(contact), ..self }
@@ -194,19 +195,21 @@ impl<'a> Loads<'a> {
     where
         'a: 'b,
     {
-        let given = self.contact.and_then(|contact| {
+        let given = self.contact().and_then(|contact| {
             let surface = contact.surface();
             Some((surface, kept_pushes(state.pushes, &surface)?))
         });
         if given.is_none() { *self } else { Loads { contact: None, given, ..*self } }
     }
 
+    // Without the feature all that these lead to is left out of the program.
+
     pub(crate) const fn given_pushes(&self) -> Option<(Surface<'a>, &'a [NodeVector])> {
-        self.given
+        if cfg!(feature = "contact") { self.given } else { None }
     }
 
     pub(crate) const fn contact(&self) -> Option<&'a Contact<'a>> {
-        self.contact
+        if cfg!(feature = "contact") { self.contact } else { None }
     }
 
     pub(crate) const fn nodes(&self) -> Option<usize> {

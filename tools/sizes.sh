@@ -28,7 +28,7 @@ thumb() {
     cp "$libraries/build/thumbv7em-none-eabihf/release/libsupple.a" "$libraries/thumb-$2-$1.a"
 }
 
-for features in capi capi-neo-hookean; do
+for features in capi capi-neo-hookean capi-neo-hookean,contact; do
     thumb $features 3
     thumb $features s
     tools/install.sh --prefix "$libraries/$features" --features $features >/dev/null
@@ -41,6 +41,7 @@ exact=(
     supple_set_{gravity,forces,motions,step} supple_critical_step supple_step
     supple_displacements supple_copy_{displacements,positions,velocities,forces}
 )
+contact=(supple_contact_{size,init,points} supple_set_{instruments,contact} supple_move_instrument supple_grasp supple_let_go supple_read_touch)
 learned=(supple_learned_{size,init,reset,describe,lead,step})
 
 # count LIBRARY FUNCTIONS...: code with its constants, data, zeroed data of a program that calls the functions. The host
@@ -75,9 +76,10 @@ row() {
 echo '| | Cortex-M4F: code and constants | data | the same for size: code and constants | data | x86-64: code and constants | data |'
 echo '|---|---:|---:|---:|---:|---:|---:|'
 row 'Exact steps, neo-Hookean' capi-neo-hookean "${exact[@]}"
-row 'Exact steps, all laws' capi "${exact[@]}"
+row 'Exact steps with instruments, neo-Hookean' capi-neo-hookean,contact "${exact[@]}" "${contact[@]}"
+row 'Exact steps, all laws and elements, instruments' capi "${exact[@]}" "${contact[@]}"
 row 'Exact and learned steps, neo-Hookean' capi-neo-hookean "${exact[@]}" "${learned[@]}"
-row 'Exact and learned steps, all laws' capi "${exact[@]}" "${learned[@]}"
-row 'Everything, all laws' capi "${all[@]}"
+row 'Exact and learned steps, all laws and elements' capi "${exact[@]}" "${learned[@]}"
+row 'Everything' capi "${all[@]}"
 echo
 echo "Learned steps need weights as well: $(stat -c %s weights/compact-10-i8.weights) bytes for a compact network in int8."

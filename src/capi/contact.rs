@@ -427,7 +427,7 @@ pub unsafe extern "C" fn supple_let_go(contact: *mut supple_contact, instrument:
 }
 
 /// Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned and mass-scaled
-/// steps refuse loads with instruments.
+/// steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_set_contact(
     loads: *mut supple_loads,
@@ -437,6 +437,9 @@ pub unsafe extern "C" fn supple_set_contact(
     let set = || unsafe {
         let loads = memory::change(loads)?;
         if !contact.is_null() {
+            if !cfg!(feature = "contact") {
+                return Err(SUPPLE_E_NO_CONTACT.into());
+            }
             let nodes = memory::read(contact.cast_const())?.nodes;
             if nodes != loads.nodes() {
                 return Err(super::status::mismatch(nodes as usize, loads.nodes() as usize));
@@ -509,6 +512,7 @@ pub unsafe extern "C" fn supple_contact_points(
 
 /// The contact of one call that takes steps.
 pub(super) struct CallContact<'a> {
+    #[cfg_attr(not(feature = "contact"), expect(dead_code))]
     pub(super) contact: Contact<'a>,
     /// What its state keeps, until it is attached.
     pushes: &'a mut [NodeVector],
@@ -524,7 +528,7 @@ impl<'a> CallContact<'a> {
     /// # Safety
     /// As at [`memory::change`].
     pub(super) unsafe fn of(contact: *mut supple_contact, nodes: usize) -> Answer<Option<Self>> {
-        if contact.is_null() {
+        if contact.is_null() || !cfg!(feature = "contact") {
             return Ok(None);
         }
         // SAFETY: the caller's promise.

@@ -294,8 +294,9 @@ impl<'a> CallLoads<'a> {
         }
         let loads = Loads::unchecked(self.gravity, self.forces, self.now, self.nodes);
         match &self.contact {
+            #[cfg(feature = "contact")]
             Some(contact) => loads.touched_by(&contact.contact),
-            None => loads,
+            _ => loads,
         }
     }
 }
