@@ -11,7 +11,10 @@ static ALLOCATOR: hostile::Counting = hostile::Counting;
 
 use core::ops::ControlFlow;
 
-use supple::mlp::Network;
+use supple::lab::scenes::{SceneSpec, named};
+use supple::lab::timing::Timing;
+use supple::material::Element;
+use supple::mlp::{Network, WeightBytes};
 use supple::train::TrainError;
 use supple::train::fit::{Fitted, fit, train};
 use supple::train::recipe::Recipe;
@@ -41,17 +44,18 @@ decay = "cosine"
 held_out = 0.2
 "#;
 
-fn samples() -> (Recipe, Samples) {
+fn samples() -> (Recipe, SceneSpec, Samples) {
     let recipe = Recipe::parse(RECIPE).unwrap();
-    let samples = Samples::collect(&recipe).unwrap();
-    (recipe, samples)
+    let scene = recipe.scene().unwrap();
+    let samples = Samples::collect(&recipe, &scene).unwrap();
+    (recipe, scene, samples)
 }
 
 #[test]
 fn a_training_that_was_stopped_goes_on_as_if_it_had_not_been() {
-    let (recipe, samples) = samples();
+    let (recipe, scene, samples) = samples();
     let mut losses = Vec::new();
-    let whole = fit(&recipe, RECIPE, &samples, None, &mut |at| {
+    let whole = fit(&recipe, RECIPE, &scene, &samples, None, &mut |at| {
         if at.done == at.samples {
             losses.push(at.loss);
         }
@@ -64,7 +68,7 @@ fn a_training_that_was_stopped_goes_on_as_if_it_had_not_been() {
     let folder = tempfile::tempdir().unwrap();
     for epochs in [1, 3] {
         // Killed in the middle of an epoch.
-        let stopped = fit(&recipe, RECIPE, &samples, Some(folder.path()), &mut |at| {
+        let stopped = fit(&recipe, RECIPE, &scene, &samples, Some(folder.path()), &mut |at| {
             if at.epoch == epochs && at.done > 2_000 {
                 ControlFlow::Break(())
             } else {
@@ -74,7 +78,7 @@ fn a_training_that_was_stopped_goes_on_as_if_it_had_not_been() {
         assert!(matches!(stopped, Err(TrainError::Stopped { epoch }) if epoch == epochs), "{stopped:?}");
     }
     let mut first = None;
-    let resumed = fit(&recipe, RECIPE, &samples, Some(folder.path()), &mut |at| {
+    let resumed = fit(&recipe, RECIPE, &scene, &samples, Some(folder.path()), &mut |at| {
         first = first.or(Some(at.epoch));
         ControlFlow::Continue(())
     })
@@ -83,9 +87,10 @@ fn a_training_that_was_stopped_goes_on_as_if_it_had_not_been() {
     assert!(whole.bytes == resumed.bytes, "other weights");
 
     let other = RECIPE.replace("seed = 3", "seed = 4");
-    let refused = fit(&Recipe::parse(&other).unwrap(), &other, &samples, Some(folder.path()), &mut |_| {
-        ControlFlow::Continue(())
-    });
+    let refused =
+        fit(&Recipe::parse(&other).unwrap(), &other, &scene, &samples, Some(folder.path()), &mut |_| {
+            ControlFlow::Continue(())
+        });
     let said = refused.unwrap_err().to_string();
     println!("{said}");
     assert!(said.ends_with("a checkpoint of another recipe; remove it to train anew"), "{said}");
@@ -106,12 +111,43 @@ fn weights_say_where_they_come_from() {
     }
 }
 
+/// A scene of a user's own, with steps of its own: the weights are for these, and for its tissue and tetrahedra.
+#[test]
+fn a_network_learns_from_any_scene_at_its_own_step() {
+    let text = RECIPE.replace("\"torsion\"", "\"organ.toml\"").replace("load = 0.02", "load = 0.5");
+    let recipe = Recipe::parse(&text).unwrap();
+    assert!(recipe.motion.is_file());
+    let bar = named("stretch").unwrap();
+    let timing = Timing { step: 5e-5, ..Timing::PAPER };
+    let own = SceneSpec { element: Element::NodalPressure, damping: 7.0, density: 1_100.0, timing, ..bar };
+    let scene = recipe.motion.of(own.clone());
+    assert_eq!(scene.forces[0].newton, own.forces[0].newton.map(|newton| 0.5 * newton));
+    let samples = Samples::collect(&recipe, &scene).unwrap();
+    assert_eq!(samples.inputs.len(), 20 * samples.vertices);
+    let Fitted { bytes, .. } =
+        fit(&recipe, &text, &scene, &samples, None, &mut |_| ControlFlow::Continue(())).unwrap();
+    let memory = WeightBytes::of(&bytes);
+    let network = Network::parse(memory.bytes()).unwrap();
+    let facts = network.recipe();
+    assert_eq!((facts.step, facts.exact_step, facts.damping, facts.density), (5e-4, 5e-5, 7.0, 1_100.0));
+    assert_eq!(facts.element, Element::NodalPressure);
+
+    // It has moved.
+    let mean = |values: &dyn Fn(usize) -> f32| {
+        (0..samples.inputs.len()).map(|row| f64::from(values(row)).abs()).sum::<f64>()
+            / samples.inputs.len() as f64
+    };
+    let (speed, acceleration) = (mean(&|row| samples.inputs[row][3]), mean(&|row| samples.targets[row][0]));
+    println!("mean speed {speed:.2e} m/s, mean acceleration along it {acceleration:.2e} m/s^2");
+    assert!(speed > 1e-4 && acceleration > 1e-3);
+}
+
 #[test]
 fn frames_are_spread_over_the_motion_at_every_step() {
     for multiple in [10, 20, 100] {
         let text = RECIPE.replace("multiple = 10", &format!("multiple = {multiple}"));
         let recipe = Recipe::parse(&text).unwrap();
-        let samples = Samples::collect(&recipe).unwrap();
+        let samples = Samples::collect(&recipe, &recipe.scene().unwrap()).unwrap();
         assert_eq!(samples.inputs.len(), 20 * samples.vertices);
         assert_eq!(samples.targets.len(), samples.inputs.len());
         // The speed is that of the motion: it grows with the load, which is on a ramp.
@@ -191,7 +227,8 @@ ease = 1.0
 [network]"#;
 
 fn collected(text: &str) -> Samples {
-    Samples::collect(&Recipe::parse(text).unwrap()).unwrap()
+    let recipe = Recipe::parse(text).unwrap();
+    Samples::collect(&recipe, &recipe.scene().unwrap()).unwrap()
 }
 
 #[test]

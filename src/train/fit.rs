@@ -21,9 +21,9 @@ use super::TrainError;
 use super::recipe::{Decay, Recipe};
 use super::samples::Samples;
 use crate::io::write_atomically;
+use crate::lab::LabError;
 use crate::lab::random_numbers::Random;
-use crate::lab::scenes;
-use crate::lab::{DT, LabError};
+use crate::lab::scenes::SceneSpec;
 use crate::learned::{FEATURES, PREDICTED};
 use crate::mlp::{self, Activation, Description, LayerDescription, Network, Range, WeightBytes};
 
@@ -104,8 +104,9 @@ pub fn train(
     mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Fitted, TrainError> {
     let recipe = Recipe::parse(text)?;
-    let samples = Samples::collect(&recipe)?;
-    fit(&recipe, text, &samples, checkpoints, &mut progress)
+    let spec = recipe.scene()?;
+    let samples = Samples::collect(&recipe, &spec)?;
+    fit(&recipe, text, &spec, &samples, checkpoints, &mut progress)
 }
 
 /// A share of the frames, evenly spread, is held out.
@@ -113,10 +114,11 @@ pub(super) fn is_held_out(frame: usize, share: f64) -> bool {
     ((frame + 1) as f64 * share).floor() > (frame as f64 * share).floor()
 }
 
-/// The same on samples that are there already.
+/// The same on samples of a scene that are there already.
 pub fn fit(
     recipe: &Recipe,
     text: &str,
+    spec: &SceneSpec,
     samples: &Samples,
     checkpoints: Option<&Path>,
     progress: &mut impl FnMut(&Progress) -> ControlFlow<()>,
@@ -158,7 +160,7 @@ pub fn fit(
         }
     }
 
-    let description = described(recipe, text, hash, &parts, inputs, targets)?;
+    let description = described(recipe, spec, text, hash, &parts, inputs, targets)?;
     let bytes = mlp::write(&description)?;
     let held_out = (!unseen.inputs.is_empty()).then(|| judged(&bytes, &unseen, &description.outputs));
     Ok(Fitted { bytes, held_out, samples: count, loss })
@@ -270,13 +272,13 @@ fn shuffled(count: usize, seed: u64) -> Vec<u32> {
 
 fn described<'a>(
     recipe: &Recipe,
+    spec: &SceneSpec,
     text: &'a str,
     recipe_hash: [u8; 32],
     parts: &Parts,
     inputs: Vec<Range>,
     outputs: Vec<Range>,
 ) -> Result<Description<'a>, TrainError> {
-    let spec = scenes::named(&recipe.motion.scene)?;
     let layers = |layers: &[Linear]| -> Vec<LayerDescription> {
         let last = layers.len() - 1;
         let each = layers.iter().enumerate();
@@ -298,10 +300,10 @@ fn described<'a>(
         second: layers(&parts.second),
         law: spec.law,
         density: spec.density,
-        element: recipe.motion.element,
+        element: spec.element,
         damping: spec.damping,
-        step: recipe.multiple as f32 * DT,
-        exact_step: DT,
+        step: recipe.multiple as f32 * spec.timing.step,
+        exact_step: spec.timing.step,
         force: recipe.network.force,
         recipe: text,
         recipe_hash,

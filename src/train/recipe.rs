@@ -2,11 +2,11 @@
 //!
 //! ```toml
 //! seed = 1
-//! multiple = 10            # step of the network over the exact one's 30 us
+//! multiple = 10            # step of the network over the exact one's: 30 us in the laboratory's scenes
 //!
 //! [motion]
-//! scene = "torsion"        # of the laboratory
-//! element = "linear"       # or "nodal-pressure", "nodal-strain"
+//! scene = "torsion"        # of the laboratory; the command takes a scene file too: "organ.toml", from the folder of the recipe
+//! element = "linear"       # or "nodal-pressure", "nodal-strain"; may be left out: the scene's
 //! load = 1.0               # times the scene's forces
 //! from = 0.3               # s
 //! to = 1.0
@@ -43,7 +43,8 @@ use std::vec::Vec;
 use serde::Deserialize;
 
 use super::TrainError;
-use crate::lab::scenes;
+use crate::lab::LabError;
+use crate::lab::scenes::{self, SceneSpec};
 use crate::material::Element;
 use crate::mlp::{ForceInput, MAX_LAYERS, MAX_WIDTH};
 
@@ -53,7 +54,7 @@ use crate::mlp::{ForceInput, MAX_LAYERS, MAX_WIDTH};
 pub struct Recipe {
     /// Of the weights at the start and of the order of the samples.
     pub seed: u64,
-    /// Step of the network over [`crate::lab::DT`].
+    /// Step of the network over that of the exact step, [`crate::lab::timing::Timing::step`] of the scene.
     pub multiple: u32,
     /// What is learned from.
     pub motion: Motion,
@@ -70,11 +71,11 @@ pub struct Recipe {
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {
-    /// One of [`scenes::RAMPED`].
+    /// One of [`scenes::RAMPED`], or a scene file, `NAME.toml`.
     pub scene: String,
-    /// Tetrahedra that it is made of.
+    /// Tetrahedra that it is made of, if not those of the scene.
     #[serde(default)]
-    pub element: Element,
+    pub element: Option<Element>,
     /// Times the scene's forces.
     pub load: f32,
     /// s.
@@ -160,7 +161,27 @@ pub enum Decay {
     Cosine,
 }
 
+impl Motion {
+    /// Whether the scene is that of a file.
+    #[must_use]
+    pub fn is_file(&self) -> bool {
+        self.scene.ends_with(".toml")
+    }
+
+    /// A scene of this name with the load and the tetrahedra that are asked for.
+    #[must_use]
+    pub fn of(&self, spec: SceneSpec) -> SceneSpec {
+        let element = self.element.unwrap_or(spec.element);
+        SceneSpec { element, ..spec.with_load(self.load) }
+    }
+}
+
 impl Recipe {
+    /// The laboratory's scene that it names.
+    pub fn scene(&self) -> Result<SceneSpec, LabError> {
+        Ok(self.motion.of(scenes::named(&self.motion.scene)?))
+    }
+
     /// Reads and checks a recipe.
     pub fn parse(text: &str) -> Result<Self, TrainError> {
         let recipe: Self = toml::from_str(text).map_err(|error| TrainError::Recipe(error.to_string()))?;
@@ -170,8 +191,8 @@ impl Recipe {
     fn checked(self) -> Result<Self, TrainError> {
         let refuse = |what, value: &dyn fmt::Display, must: &str| Err(TrainError::refused(what, value, must));
         let Self { multiple, motion, noise, network, training, .. } = &self;
-        if !scenes::RAMPED.contains(&motion.scene.as_str()) {
-            let must = format!("there are {}", scenes::RAMPED.join(", "));
+        if !scenes::RAMPED.contains(&motion.scene.as_str()) && !motion.is_file() {
+            let must = format!("there are {}, and scene files, NAME.toml", scenes::RAMPED.join(", "));
             return refuse("scene", &format!("{:?}", motion.scene), &must);
         }
         if !(1..=1_000).contains(multiple) {

@@ -17,10 +17,10 @@ use glam::{DVec3, Vec3A};
 use super::noise::{Moment, MovedCopy, SeenAs};
 use super::recipe::Recipe;
 use crate::element::{ElementMaterial, MaterialWork};
+use crate::lab::LabError;
 use crate::lab::random_numbers::Random;
-use crate::lab::scenes::{self, SceneSpec};
+use crate::lab::scenes::SceneSpec;
 use crate::lab::truth::exact_step;
-use crate::lab::{DT, LabError};
 use crate::learned::frame::Frame;
 use crate::learned::{FEATURES, PREDICTED};
 use crate::mlp::Range;
@@ -53,11 +53,9 @@ pub struct Rough {
 }
 
 impl Samples {
-    /// Simulates the recipe's motion and samples it.
-    pub fn collect(recipe: &Recipe) -> Result<Self, LabError> {
-        let mut spec = scenes::named(&recipe.motion.scene)?.with_load(recipe.motion.load);
-        spec.element = recipe.motion.element;
-        spec.with_material(Collect { spec: &spec, recipe })
+    /// Simulates the recipe's motion, that of `spec`, and samples it.
+    pub fn collect(recipe: &Recipe, spec: &SceneSpec) -> Result<Self, LabError> {
+        spec.with_material(Collect { spec, recipe })
     }
 
     /// Those of some frames.
@@ -151,8 +149,8 @@ struct Schedule {
 }
 
 impl Schedule {
-    fn of(recipe: &Recipe) -> Self {
-        let (motion, dt) = (&recipe.motion, f64::from(DT));
+    fn of(recipe: &Recipe, dt: f64) -> Self {
+        let motion = &recipe.motion;
         let every = u64::from(recipe.multiple);
         let span = motion.to - motion.from;
         let long = every as f64 * dt;
@@ -201,7 +199,8 @@ impl MaterialWork for Collect<'_> {
     fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
         let Self { spec, recipe } = self;
         let scene = spec.build(material)?;
-        let step = Step::unchecked(DT, spec.damping)?;
+        let (seconds, dt) = (spec.timing.step, f64::from(spec.timing.step));
+        let step = Step::unchecked(seconds, spec.damping)?;
         let nodes = spec.points.len();
         let mut state = VecState::at_rest(nodes);
         let (free, sampled) = free_and_sampled(spec);
@@ -209,9 +208,9 @@ impl MaterialWork for Collect<'_> {
         let masses: Vec<f32> = (0..nodes).map(|node| scene.view().node_mass(node)).collect();
         let seen_as = SeenAs { masses: &masses, force: recipe.network.force };
 
-        let schedule = Schedule::of(recipe);
+        let schedule = Schedule::of(recipe, dt);
         let Schedule { every, sequences: count, last, .. } = schedule;
-        let long = every as f64 * f64::from(DT);
+        let long = every as f64 * dt;
         let mut sequences: Vec<Sequence> =
             (0..count).map(|number| Sequence::new(number * every / count, nodes)).collect();
         let mut frame = 0;
@@ -227,7 +226,7 @@ impl MaterialWork for Collect<'_> {
                 sequences[at].add_shape(&place);
                 sequences[at].add_targets(&sampled, long, &mut samples);
             }
-            let loads = loads.of_step(state.time(), f64::from(DT));
+            let loads = loads.of_step(state.time(), dt);
             let keeps = recipe.noise.is_some() && !moments.is_empty() && schedule.is_due(frame, number);
             let before = keeps.then(|| state.clone());
             exact_step(spec, &scene, &loads, &mut state, &step)?;

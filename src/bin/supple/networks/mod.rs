@@ -2,6 +2,8 @@
 
 pub(crate) mod convert;
 #[cfg(feature = "train")]
+mod exemplar;
+#[cfg(feature = "train")]
 mod quantise;
 #[cfg(feature = "train")]
 pub(crate) mod train;

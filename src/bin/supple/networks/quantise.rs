@@ -9,6 +9,7 @@ use supple::train::int8::{Made, int8, usual_float_layers};
 use supple::train::recipe::Recipe;
 use supple::train::samples::Samples;
 
+use super::exemplar::learned_from;
 use crate::problem::{End, Problem};
 use crate::screen::{message, output};
 use crate::weight_file;
@@ -36,7 +37,8 @@ pub(crate) fn quantise(asked: &Asked) -> Result<End, Problem> {
         return Err(Problem::in_file(path, format!("--float {layer}, but there are {count} layers")));
     }
     message!("simulating the motion it learned from ...");
-    let samples = Samples::collect(&recipe).map_err(|error| Problem::in_file(path, error))?;
+    let scene = learned_from(&recipe, path)?;
+    let samples = Samples::collect(&recipe, &scene).map_err(|error| Problem::in_file(path, error))?;
     let float = if float.is_empty() { usual_float_layers(&network) } else { float.clone() };
     let made = int8(&network, &recipe, &samples, &float).map_err(|error| Problem::in_file(path, error))?;
     tell(&made, out)?;

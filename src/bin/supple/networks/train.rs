@@ -11,6 +11,7 @@ use supple::train::fit::{Fitted, Progress, fit};
 use supple::train::recipe::Recipe;
 use supple::train::samples::Samples;
 
+use super::exemplar::learned_from;
 use super::quantise::quantise_trained;
 use crate::problem::{End, Problem};
 use crate::screen::{message, output};
@@ -42,12 +43,13 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     let parsed = Recipe::parse(&text).map_err(|error| problem(&error))?;
     let folder = checkpoints(out);
     message!("simulating the motion to learn from ...");
-    let collected = Samples::collect(&parsed).map_err(|error| problem(&error))?;
+    let scene = learned_from(&parsed, recipe)?;
+    let collected = Samples::collect(&parsed, &scene).map_err(|error| problem(&error))?;
     let bar = ProgressBar::no_length();
     let style = ProgressStyle::with_template("{bar:30} {msg}").map_err(|error| problem(&error))?;
     bar.set_style(style);
     let mut told = None;
-    let fitted = fit(&parsed, &text, &collected, Some(&folder), &mut |at: &Progress| {
+    let fitted = fit(&parsed, &text, &scene, &collected, Some(&folder), &mut |at: &Progress| {
         bar.set_length((at.epochs * at.samples) as u64);
         bar.set_position((at.epoch * at.samples + at.done) as u64);
         bar.set_message(said(at));

@@ -54,6 +54,12 @@ impl Tissues {
         Ok(Self { tissues, of_element })
     }
 
+    /// The tissue, if there is only one.
+    #[cfg(feature = "train")]
+    pub(crate) fn only(&self) -> Option<Tissue<AnyLaw>> {
+        if let [only] = *self.tissues { Some(only) } else { None }
+    }
+
     /// Of each tissue, that of `[material]` first.
     pub(crate) fn moduli(&self) -> impl Iterator<Item = Moduli> {
         self.tissues.iter().map(|tissue| tissue.law.moduli())
