@@ -129,7 +129,10 @@ fn a_network_learns_from_any_scene_at_its_own_step() {
     let memory = WeightBytes::of(&bytes);
     let network = Network::parse(memory.bytes()).unwrap();
     let facts = network.recipe();
-    assert_eq!((facts.step, facts.exact_step, facts.damping, facts.density), (10.0 * 5e-5, 5e-5, 7.0, 1_100.0));
+    assert_eq!(
+        (facts.step, facts.exact_step, facts.damping, facts.density),
+        (10.0 * 5e-5, 5e-5, 7.0, 1_100.0)
+    );
     assert_eq!(facts.element, Element::NodalPressure);
 
     // It has moved.
