@@ -549,7 +549,6 @@ impl<'a> CallContact<'a> {
 
     /// The state with what it keeps.
     pub(super) fn attached(&mut self, state: StateView<'a>) -> StateView<'a> {
-        self.means.fill([0.0; 3]);
         let (pushes, touches, points) =
             (take(&mut self.pushes), take(&mut self.touches), take(&mut self.points));
         state.pushing(pushes).feeling(touches).listing(points)
@@ -557,6 +556,10 @@ impl<'a> CallContact<'a> {
 
     /// Enters the forces of a step in the means.
     pub(super) fn enter(&mut self, touches: &[Touch]) {
+        if self.steps == 0.0 {
+            // Not before: a guard's call takes none.
+            self.means.fill([0.0; 3]);
+        }
         self.steps += 1.0;
         for (mean, touch) in self.means.iter_mut().zip(touches) {
             for (mean, force) in mean.iter_mut().zip(touch.force) {

@@ -767,6 +767,14 @@ static void contacts(void) {
     DONE(supple_step(scene, acts, state, 200, NULL, &report));
     DONE(supple_read_touch(contact, 0, &touch));
     CHECK(touch.contacts > 0 && touch.force[0] < 0.0f && touch.mean_force[0] < 0.0f);
+    /* A guard that follows leaves what it felt. */
+    const supple_guard_config watch = {SUPPLE_CONFIG(supple_guard_config), length.seconds, 20.0f, 200, 0.0f};
+    supple_guard *guard;
+    supple_touch after;
+    DONE(supple_guard_init(spare, sizeof spare, scene, state, points[0], &watch, &guard, &error));
+    CHECK(supple_guard_follow(scene, acts, state, guard, NULL, NULL) >= 0);
+    DONE(supple_read_touch(contact, 0, &after));
+    CHECK(memcmp(&after, &touch, sizeof touch) == 0);
     DONE(supple_contact_points(contact, list_of_points, SUPPLE_MOST_CONTACT_POINTS, &count));
     float sum = 0.0f;
     for (uint32_t n = 0; n < count; n++) {
