@@ -1,0 +1,130 @@
+// The picture: the surface of the lobe coloured by displacement, the instrument, and an eye that the pointer turns. Drawn by three.js.
+// Metres, z is up.
+
+import * as THREE from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+
+/** Displacement at the end of the scale, m; more has the same colour. */
+export const SCALE = 0.02;
+/** From tissue that stands still to the end of the scale, sRGB, ever lighter. The style sheet has the same for the legend. */
+const COLOURS = ["#8a3f45", "#c9603f", "#f0a63c", "#fbe58a"].map((hex) => new THREE.Color(hex));
+const MIDDLE = new THREE.Vector3(0.01, -0.005, 0.03);
+const EYE = new THREE.Vector3(0.03, -0.24, 0.17);
+
+export class View {
+    /** @param {HTMLCanvasElement} canvas, @param {Float32Array} points at rest, @param {Uint32Array} triangles of the boundary */
+    constructor(canvas, points, triangles) {
+        this.canvas = canvas;
+        this.rest = points;
+        this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+        this.scene = new THREE.Scene();
+        this.camera = new THREE.PerspectiveCamera(38, 1, 0.01, 2);
+        this.camera.up.set(0, 0, 1);
+        this.camera.position.copy(MIDDLE).add(EYE);
+        this.controls = new OrbitControls(this.camera, canvas);
+        this.controls.target.copy(MIDDLE);
+        this.controls.minDistance = 0.1;
+        this.controls.maxDistance = 0.8;
+        this.controls.addEventListener("change", () => { this.stale = true; });
+        this.controls.update();
+        this.#fill(points, triangles);
+        this.raycaster = new THREE.Raycaster();
+        new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);
+        this.#resize();
+        this.show(points, null);
+    }
+
+    #fill(points, triangles) {
+        const geometry = new THREE.BufferGeometry();
+        this.positions = new THREE.BufferAttribute(points.slice(), 3).setUsage(THREE.DynamicDrawUsage);
+        this.colours = new THREE.BufferAttribute(new Float32Array(points.length), 3).setUsage(THREE.DynamicDrawUsage);
+        geometry.setAttribute("position", this.positions);
+        geometry.setAttribute("color", this.colours);
+        geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+        // Rays are tested against it; the body stays in it however it is pulled.
+        geometry.boundingSphere = new THREE.Sphere(MIDDLE.clone(), 1);
+        this.body = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.55 }));
+        this.body.frustumCulled = false;
+        this.ball = new THREE.Mesh(
+            new THREE.SphereGeometry(1, 32, 20),
+            new THREE.MeshStandardMaterial({ color: "#9fb4c8", metalness: 0.2, roughness: 0.35, transparent: true, opacity: 0.6 }));
+        this.ball.visible = false;
+        const light = new THREE.DirectionalLight("white", 2.2);
+        light.position.set(-0.3, -0.5, 0.8);
+        this.scene.add(this.body, this.ball, new THREE.HemisphereLight("white", "#77706a", 1.6), light);
+    }
+
+    #resize() {
+        const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+        this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+        this.renderer.setSize(width, height, false);
+        this.camera.aspect = width / height;
+        // The lobe is wider than high: in a narrow picture the eye sees a larger angle.
+        this.camera.fov = width < height * 1.3 ? 38 * Math.min(1.6, 1.3 * height / width) : 38;
+        this.camera.updateProjectionMatrix();
+        this.stale = true;
+    }
+
+    /** Takes the nodes and the instrument of a frame. Gives the largest displacement, m. */
+    show(positions, tool) {
+        this.positions.array.set(positions);
+        this.positions.needsUpdate = true;
+        let largest = 0;
+        const colour = new THREE.Color();
+        for (let place = 0; place < positions.length; place += 3) {
+            const moved = Math.hypot(
+                positions[place] - this.rest[place],
+                positions[place + 1] - this.rest[place + 1],
+                positions[place + 2] - this.rest[place + 2]);
+            largest = Math.max(largest, moved);
+            const share = Math.min(moved / SCALE, 1) * (COLOURS.length - 1);
+            const below = Math.min(Math.floor(share), COLOURS.length - 2);
+            colour.lerpColors(COLOURS[below], COLOURS[below + 1], share - below).toArray(this.colours.array, place);
+        }
+        this.colours.needsUpdate = true;
+        this.body.geometry.computeVertexNormals();
+        this.ball.visible = tool !== null;
+        if (tool) {
+            this.ball.position.fromArray(tool.position);
+            this.ball.scale.setScalar(tool.radius);
+        }
+        this.stale = true;
+        return largest;
+    }
+
+    /** Draws if anything has changed since the last time. */
+    draw() {
+        if (!this.stale) return false;
+        this.stale = false;
+        this.renderer.render(this.scene, this.camera);
+        return true;
+    }
+
+    /** Where a pointer meets the tissue, and along which direction the eye sees it; null if it does not. */
+    pick(event) {
+        this.#aim(event);
+        const [first] = this.raycaster.intersectObject(this.body);
+        return first ? { hit: first.point, direction: this.raycaster.ray.direction.clone() } : null;
+    }
+
+    /** Where a pointer meets the plane through `point` that faces the eye. */
+    inPlane(event, point) {
+        this.#aim(event);
+        const facing = this.camera.getWorldDirection(new THREE.Vector3());
+        const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(facing, point);
+        return this.raycaster.ray.intersectPlane(plane, new THREE.Vector3()) ?? point.clone();
+    }
+
+    #aim({ clientX, clientY }) {
+        const { left, top, width, height } = this.canvas.getBoundingClientRect();
+        const place = new THREE.Vector2((clientX - left) / width * 2 - 1, 1 - (clientY - top) / height * 2);
+        this.raycaster.setFromCamera(place, this.camera);
+    }
+
+    /** Where a point of the scene is in the page, in its pixels. */
+    pixel(point) {
+        const { left, top, width, height } = this.canvas.getBoundingClientRect();
+        const { x, y } = new THREE.Vector3(...point).project(this.camera);
+        return { x: left + (x + 1) / 2 * width, y: top + (1 - y) / 2 * height };
+    }
+}
