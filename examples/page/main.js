@@ -13,11 +13,14 @@ const send = (message) => worker.postMessage(message);
 const panel = new Panel(send);
 let view = null;
 let stopped = false;
-let asked = null; // when the frame was asked for that has not come yet, ms
-let due = 0; // when the next one is, ms
-const counts = { since: performance.now(), frames: 0, drawn: 0, simulated: 0, painting: 0 };
+let due = 0; // when the next frame is, ms
+const counts = { since: 0, drawn: 0, simulated: 0 };
 /** For tests and for the console. */
-const supple = { latest: null, pace: null, send, pixel: (point) => view.pixel(point) };
+const supple = {
+    latest: null, pace: null, send,
+    pixel: (point) => view.pixel(point),
+    paint: () => view.paint(),
+};
 window.supple = supple;
 
 const answers = {
@@ -31,17 +34,14 @@ const answers = {
         supple.rest = points;
         supple.startMilliseconds = milliseconds;
         requestAnimationFrame(tick);
+        ask();
     },
     frame({ frame }) {
-        asked = null;
         const largest = view.show(frame.positions, frame.tool);
         supple.latest = { ...frame, largest, number: (supple.latest?.number ?? 0) + 1 };
         panel.show(frame, largest);
-        counts.frames += 1;
         counts.simulated += frame.seconds ?? 0;
-        // Nothing goes on after it: every other refusal has taken the instrument away and left the body as it was.
-        const halted = Boolean(frame.refusal) && frame.steps === undefined;
-        if (halted) panel.say(`The kernel: ${frame.refusal.text}. The simulation stands still; reset it to go on.`, true);
+        ask();
     },
     failed({ text }) {
         stopped = true;
@@ -58,25 +58,27 @@ worker.addEventListener("message", ({ data }) => {
 });
 worker.addEventListener("error", ({ message }) => answers.failed({ text: message }));
 
+/** Asks for the next frame when it is due: not by what is painted, which may be slower. */
+function ask() {
+    if (stopped) return;
+    if (document.hidden) {
+        document.addEventListener("visibilitychange", ask, { once: true });
+        return;
+    }
+    const now = performance.now();
+    // What is missed by more than a few frames is not made up for.
+    due = Math.max(due + FRAME, now - 3 * FRAME);
+    setTimeout(() => send({ type: "frame" }), Math.max(0, due - now));
+}
+
 function tick(now) {
     if (stopped) return;
     requestAnimationFrame(tick);
-    // Half a screen's frame early rather than late, and never more than one frame behind.
-    if (asked === null && now >= due - FRAME / 4) {
-        due = Math.max(due + FRAME, now);
-        asked = now;
-        send({ type: "frame" });
-    }
-    const begin = performance.now();
-    if (view.draw()) {
-        counts.drawn += 1;
-        counts.painting += performance.now() - begin;
-    }
+    if (view.draw()) counts.drawn += 1;
     const seconds = (now - counts.since) / 1000;
     if (seconds >= 1) {
-        supple.pace = {
-            frames: counts.frames / seconds, realTime: counts.simulated / seconds, painting: counts.painting / Math.max(counts.drawn, 1) };
+        supple.pace = { pictures: counts.drawn / seconds, realTime: counts.simulated / seconds };
         panel.pace(supple.pace);
-        Object.assign(counts, { since: now, frames: 0, drawn: 0, simulated: 0, painting: 0 });
+        Object.assign(counts, { since: now, drawn: 0, simulated: 0 });
     }
 }

@@ -67,13 +67,14 @@ export class Panel {
             set("status", frame.name.replace("SUPPLE_", "").replace("E_", "").replaceAll("_", " ").toLowerCase());
             element("status").title = frame.text;
         }
-        if (frame.refusal) this.say(`The kernel: ${frame.refusal.text}.`);
+        if (frame.halted) this.say(`The kernel: ${frame.refusal.text}. The simulation stands still: reset it to go on.`, true);
+        else if (frame.refusal) this.say(`The kernel: ${frame.refusal.text}. The instrument was taken away.`);
     }
 
-    /** Frames a second, seconds simulated in a second, and the time of painting, ms. */
-    pace({ frames, realTime, painting }) {
-        element("pace").textContent = `${frames.toFixed(0)} frames/s, ${realTime.toFixed(2)} × real time`;
-        element("painting").textContent = `${painting.toFixed(1)} ms`;
+    /** Pictures a second, and seconds simulated in a second. */
+    pace({ pictures, realTime }) {
+        element("pictures").textContent = `${pictures.toFixed(0)} a second`;
+        element("pace").textContent = `${realTime.toFixed(2)} × real time`;
     }
 }
 

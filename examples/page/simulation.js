@@ -152,7 +152,7 @@ export class Simulation {
 
     /** Moves on by a frame; gives what the page shows of it. */
     frame() {
-        if (this.halted) return { ...this.#standing(), refusal: this.halted };
+        if (this.halted) return { ...this.#standing(), refusal: this.halted, halted: true };
         const { library, places } = this;
         const before = this.time();
         const unplaced = this.tool.move(before);
@@ -174,10 +174,11 @@ export class Simulation {
         }
         const worst = status < 0 ? status : Math.max(status, guarded);
         return {
-            ...this.#standing(), tool: status < 0 ? this.tool.describe() : tool,
+            ...this.#standing(),
+            tool: status < 0 ? this.tool.describe() : tool,
             name: library.name(worst), text: library.text(worst),
             steps: report.steps, milliseconds, seconds: this.time() - before,
-            estimate: this.#estimate(), refusal,
+            estimate: this.#estimate(), refusal, halted: this.halted !== null,
         };
     }
 

@@ -5,7 +5,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 /** Displacement at the end of the scale, m; more has the same colour. */
-export const SCALE = 0.02;
+const SCALE = 0.04;
 /** From tissue that stands still to the end of the scale, sRGB, ever lighter. The style sheet has the same for the legend. */
 const COLOURS = ["#8a3f45", "#c9603f", "#f0a63c", "#fbe58a"].map((hex) => new THREE.Color(hex));
 const MIDDLE = new THREE.Vector3(0.01, -0.005, 0.03);
@@ -18,7 +18,7 @@ export class View {
         this.rest = points;
         this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
         this.scene = new THREE.Scene();
-        this.camera = new THREE.PerspectiveCamera(38, 1, 0.01, 2);
+        this.camera = new THREE.PerspectiveCamera(33, 1, 0.01, 2);
         this.camera.up.set(0, 0, 1);
         this.camera.position.copy(MIDDLE).add(EYE);
         this.controls = new OrbitControls(this.camera, canvas);
@@ -60,7 +60,7 @@ export class View {
         this.renderer.setSize(width, height, false);
         this.camera.aspect = width / height;
         // The lobe is wider than high: in a narrow picture the eye sees a larger angle.
-        this.camera.fov = width < height * 1.3 ? 38 * Math.min(1.6, 1.3 * height / width) : 38;
+        this.camera.fov = width < 1.4 * height ? Math.min(60, 33 * 1.4 * height / width) : 33;
         this.camera.updateProjectionMatrix();
         this.stale = true;
     }
@@ -98,6 +98,16 @@ export class View {
         this.stale = false;
         this.renderer.render(this.scene, this.camera);
         return true;
+    }
+
+    /** Draws and waits until it is drawn; gives how long that took, ms. */
+    paint() {
+        const gl = this.renderer.getContext();
+        const begin = performance.now();
+        this.renderer.render(this.scene, this.camera);
+        // What is read back has been drawn.
+        gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+        return performance.now() - begin;
     }
 
     /** Where a pointer meets the tissue, and along which direction the eye sees it; null if it does not. */
