@@ -31,3 +31,8 @@ node examples/page/build.mjs "$library" out/page/index.html
 printf 'out/page/index.html  %s bytes\n%s  %s bytes, %s compressed\n' "$(stat -c %s out/page/index.html)" \
     "$library" "$(stat -c %s "$library")" "$(gzip -9 -c "$library" | wc -c)"
 [ "${1:-}" != --build ] || exit 0
+
+# Whatever has built the command, it is not changed here if it is there already.
+[ -x target/release/supple ] || cargo build --quiet --release
+SUPPLE_WASM=$library SUPPLE_COMMAND=target/release/supple node --test --test-reporter=spec tests/page/kernel.test.mjs
+SUPPLE_PAGE=$PWD/out/page/index.html node --test --test-reporter=spec tests/page/browser.test.mjs

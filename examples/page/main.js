@@ -24,15 +24,16 @@ const supple = {
 window.supple = supple;
 
 const answers = {
-    ready({ points, triangles, milliseconds }) {
-        view = new View(document.getElementById("canvas"), points, triangles);
+    ready({ lobe, milliseconds }) {
+        view = new View(document.getElementById("canvas"), lobe);
         listen(view, () => panel.kind(), (message) => {
             if (message.type === "begin") panel.say(null);
             send(message);
         });
         document.body.classList.add("ready");
-        supple.rest = points;
+        supple.rest = lobe.points;
         supple.startMilliseconds = milliseconds;
+        counts.since = performance.now();
         requestAnimationFrame(tick);
         ask();
     },

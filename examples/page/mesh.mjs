@@ -1,4 +1,4 @@
-// Tetrahedra and boundary triangles of a Gmsh 2.2 text file whose nodes are counted 1, 2, 3, ..., as those in meshes/ are. Metres.
+// Points, tetrahedra and boundary triangles of a Gmsh 2.2 text file whose nodes are counted 1, 2, 3, ..., as those in meshes/ are. Metres.
 // Read when the page is built.
 
 const TRIANGLE = 2;
@@ -29,5 +29,7 @@ export function readMesh(text, name) {
         points: Float32Array.from(nodes.flatMap((row) => row.slice(1))),
         tetrahedra: corners(TETRAHEDRON),
         triangles: corners(TRIANGLE),
+        // The group of each triangle: surfaces that meet at an edge.
+        groups: Uint32Array.from(elements.filter((row) => row[1] === TRIANGLE), (row) => row[3]),
     };
 }

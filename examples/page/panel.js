@@ -57,7 +57,7 @@ export class Panel {
         set("largest", millimetres(largest, 1));
         if (frame.steps > 0) {
             set("step", `${this.#mean("step", frame.milliseconds / frame.steps).toFixed(2)} ms`);
-            set("frame", `${frame.steps} steps, ${this.#mean("frame", frame.milliseconds).toFixed(1)} ms`);
+            set("frame", `${frame.steps} steps a frame: ${this.#mean("frame", frame.milliseconds).toFixed(1)} ms`);
         }
         const { estimate } = frame;
         set("estimate", estimate ? millimetres(estimate.mean) : "–");
@@ -80,7 +80,8 @@ export class Panel {
 
 function contacts(tool) {
     if (!tool) return "none";
-    return tool.held > 0 ? `holds ${tool.held} nodes` : `touches ${tool.contacts} nodes`;
+    if (tool.held > 0) return `holds ${tool.held} nodes`;
+    return tool.contacts > 0 ? `touches ${tool.contacts} nodes` : "touches nothing";
 }
 
 function guard({ method, name, estimate }) {

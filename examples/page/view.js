@@ -12,10 +12,10 @@ const MIDDLE = new THREE.Vector3(0.01, -0.005, 0.03);
 const EYE = new THREE.Vector3(0.03, -0.24, 0.17);
 
 export class View {
-    /** @param {HTMLCanvasElement} canvas, @param {Float32Array} points at rest, @param {Uint32Array} triangles of the boundary */
-    constructor(canvas, points, triangles) {
+    /** @param {HTMLCanvasElement} canvas, @param lobe its points at rest, triangles of its boundary, and their groups */
+    constructor(canvas, lobe) {
         this.canvas = canvas;
-        this.rest = points;
+        this.rest = lobe.points;
         this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
         this.scene = new THREE.Scene();
         this.camera = new THREE.PerspectiveCamera(33, 1, 0.01, 2);
@@ -27,20 +27,29 @@ export class View {
         this.controls.maxDistance = 0.8;
         this.controls.addEventListener("change", () => { this.stale = true; });
         this.controls.update();
-        this.#fill(points, triangles);
+        this.#fill(lobe);
         this.raycaster = new THREE.Raycaster();
         new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);
         this.#resize();
-        this.show(points, null);
+        this.show(lobe.points, null);
     }
 
-    #fill(points, triangles) {
+    #fill({ triangles, groups }) {
+        // Where groups meet in an edge, each has vertices of its own: light breaks there.
+        const places = new Map();
+        const corners = Array.from(triangles, (node, corner) => {
+            const key = `${node} ${groups[Math.floor(corner / 3)]}`;
+            if (!places.has(key)) places.set(key, { place: places.size, node });
+            return places.get(key).place;
+        });
+        this.vertices = Array.from(places.values(), ({ node }) => node);
         const geometry = new THREE.BufferGeometry();
-        this.positions = new THREE.BufferAttribute(points.slice(), 3).setUsage(THREE.DynamicDrawUsage);
-        this.colours = new THREE.BufferAttribute(new Float32Array(points.length), 3).setUsage(THREE.DynamicDrawUsage);
+        const attribute = () => new THREE.BufferAttribute(new Float32Array(3 * places.size), 3).setUsage(THREE.DynamicDrawUsage);
+        this.positions = attribute();
+        this.colours = attribute();
         geometry.setAttribute("position", this.positions);
         geometry.setAttribute("color", this.colours);
-        geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+        geometry.setIndex(corners);
         // Rays are tested against it; the body stays in it however it is pulled.
         geometry.boundingSphere = new THREE.Sphere(MIDDLE.clone(), 1);
         this.body = new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.55 }));
@@ -60,27 +69,26 @@ export class View {
         this.renderer.setSize(width, height, false);
         this.camera.aspect = width / height;
         // The lobe is wider than high: in a narrow picture the eye sees a larger angle.
-        this.camera.fov = width < 1.4 * height ? Math.min(60, 33 * 1.4 * height / width) : 33;
+        this.camera.fov = width < 1.15 * height ? Math.min(60, 33 * 1.15 * height / width) : 33;
         this.camera.updateProjectionMatrix();
         this.stale = true;
     }
 
-    /** Takes the nodes and the instrument of a frame. Gives the largest displacement, m. */
+    /** Takes the nodes and the instrument of a frame. Gives the largest displacement of the surface, m. */
     show(positions, tool) {
-        this.positions.array.set(positions);
-        this.positions.needsUpdate = true;
-        let largest = 0;
+        const { rest, vertices } = this;
         const colour = new THREE.Color();
-        for (let place = 0; place < positions.length; place += 3) {
-            const moved = Math.hypot(
-                positions[place] - this.rest[place],
-                positions[place + 1] - this.rest[place + 1],
-                positions[place + 2] - this.rest[place + 2]);
+        let largest = 0;
+        vertices.forEach((node, vertex) => {
+            const [x, y, z] = positions.subarray(3 * node, 3 * node + 3);
+            const moved = Math.hypot(x - rest[3 * node], y - rest[3 * node + 1], z - rest[3 * node + 2]);
             largest = Math.max(largest, moved);
             const share = Math.min(moved / SCALE, 1) * (COLOURS.length - 1);
             const below = Math.min(Math.floor(share), COLOURS.length - 2);
-            colour.lerpColors(COLOURS[below], COLOURS[below + 1], share - below).toArray(this.colours.array, place);
-        }
+            colour.lerpColors(COLOURS[below], COLOURS[below + 1], share - below).toArray(this.colours.array, 3 * vertex);
+            this.positions.setXYZ(vertex, x, y, z);
+        });
+        this.positions.needsUpdate = true;
         this.colours.needsUpdate = true;
         this.body.geometry.computeVertexNormals();
         this.ball.visible = tool !== null;

@@ -16,12 +16,11 @@ let refused = null;
 async function start() {
     const stream = new Blob([compressed]).stream().pipeThrough(new DecompressionStream("gzip"));
     const module = await WebAssembly.compile(await new Response(stream).arrayBuffer());
-    const points = Float32Array.from(mesh.points);
-    const triangles = Uint32Array.from(mesh.triangles);
+    const [tetrahedra, triangles, groups] = [mesh.tetrahedra, mesh.triangles, mesh.groups].map((numbers) => Uint32Array.from(numbers));
+    const lobe = { points: Float32Array.from(mesh.points), tetrahedra, triangles, groups };
     const begin = performance.now();
-    simulation = new Simulation(
-        new Library(module, header), { points, triangles, tetrahedra: Uint32Array.from(mesh.tetrahedra) }, damper);
-    postMessage({ type: "ready", points, triangles, milliseconds: performance.now() - begin });
+    simulation = new Simulation(new Library(module, header), lobe, damper);
+    postMessage({ type: "ready", lobe, milliseconds: performance.now() - begin });
 }
 
 const answers = {
