@@ -12,7 +12,7 @@ cd "$(dirname "$0")/.."
 
 missing=()
 command -v npm >/dev/null || missing+=(nodejs npm)
-command -v chromium >/dev/null || [ "${1:-}" = --build ] || missing+=(chromium)
+command -v chromium >/dev/null || [ "${1:-}" = --build ] || missing+=(chromium fonts-dejavu-core)
 if [ ${#missing[@]} -gt 0 ]; then
     apt-get update -qq && apt-get install -y -qq --no-install-recommends "${missing[@]}"
 fi

@@ -12,7 +12,7 @@ const TISSUE = { constants: [750, 40000, 0, 0], density: 1060 };
 const DAMPING = 20; // 1/s, proportional to mass
 const BACK = 0.03; // nodes behind y = 30 mm hang on the diaphragm
 const LONG = 4; // multilevel and damped steps a frame, and at least as many adaptive ones
-const MARGIN = 0.5; // exact steps, in critical steps at rest: deformed tissue is stiffer
+const MARGIN = 0.7; // exact steps, in critical steps at rest: deformed tissue is stiffer
 
 export class Simulation {
     /** @param {import("./library.js").Library} library, @param mesh of readMesh, @param {Uint8Array} damper its weights */

@@ -4,7 +4,7 @@
 import { FRAME } from "./simulation.js";
 
 const SPEED = 0.1; // m/s
-const REACH = 0.03; // m, how far from where it began the pointer leads it
+const REACH = 0.025; // m, how far from where it began the pointer leads it
 const DEPTH = 0.008; // m, how far the ball is pressed in
 const AWAY = 0.02; // m, how far it withdraws when it is let go
 const HOLD = 0.01; // m: forceps hold what is nearer to them

@@ -5,7 +5,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 /** Displacement at the end of the scale, m; more has the same colour. */
-const SCALE = 0.04;
+const SCALE = 0.03;
 /** From tissue that stands still to the end of the scale, sRGB, ever lighter. The style sheet has the same for the legend. */
 const COLOURS = ["#8a3f45", "#c9603f", "#f0a63c", "#fbe58a"].map((hex) => new THREE.Color(hex));
 const MIDDLE = new THREE.Vector3(0.01, -0.005, 0.03);
