@@ -4,9 +4,10 @@
 #
 #     tools/page.sh [--build]
 #
-# The page is out/page/index.html, screenshots of the tests lie next to it. --build only builds. What it needs comes from Debian (node,
-# chromium), from npm (pinned in examples/page/package-lock.json) and, for the compiler, from `tools/cross.sh --install`. Building takes
-# three minutes, nearly all for the kernel. For the comparison with the native kernel it builds the command.
+# The page is out/page/index.html; screenshots and figures of the tests come next to it. --build only builds. What it needs comes from
+# Debian (node, chromium), from npm (pinned in examples/page/package-lock.json) and, for the compiler, from `tools/cross.sh --install`.
+# Building takes two minutes, nearly all for the kernel, the tests take three and a half; for the comparison with the native kernel they
+# need the command, which is built as well.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -32,7 +33,6 @@ printf 'out/page/index.html  %s bytes\n%s  %s bytes, %s compressed\n' "$(stat -c
     "$library" "$(stat -c %s "$library")" "$(gzip -9 -c "$library" | wc -c)"
 [ "${1:-}" != --build ] || exit 0
 
-# Whatever has built the command, it is not changed here if it is there already.
-[ -x target/release/supple ] || cargo build --quiet --release
+cargo build --quiet --release
 SUPPLE_WASM=$library SUPPLE_COMMAND=target/release/supple node --test --test-reporter=spec tests/page/kernel.test.mjs
 SUPPLE_PAGE=$PWD/out/page/index.html node --test --test-reporter=spec tests/page/browser.test.mjs

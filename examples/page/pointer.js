@@ -1,4 +1,4 @@
-// Mouse, pen or finger: on the tissue it leads the instrument, anywhere else it turns the eye. One pointer leads at a time.
+// Mouse, pen or finger: on the tissue it leads the instrument, anywhere else it turns the camera. One pointer leads at a time.
 
 /**
  * @param {import("./view.js").View} view, @param {() => string} kind of the instrument, @param {(message: object) => void} send to the kernel
@@ -7,7 +7,7 @@ export function listen(view, kind, send) {
     const { canvas, controls } = view;
     let leading = null;
 
-    // In the capturing phase: before the controls that turn the eye hear of it.
+    // In the capturing phase: before the controls that turn the camera hear of it.
     canvas.addEventListener("pointerdown", (event) => {
         if (leading || event.button !== 0) return;
         const picked = view.pick(event);

@@ -1,4 +1,4 @@
-// The instrument: a ball that presses, or forceps that hold tissue and pull it. It begins outside the body on the line from the eye to
+// The instrument: a ball that presses, or forceps that hold tissue and pull it. It begins outside the body on the line from the camera to
 // the point that was touched, goes where the pointer leads it no faster than a hand would, and goes away when it is let go. Metres.
 
 import { FRAME } from "./simulation.js";
@@ -43,7 +43,7 @@ export class Tool {
     }
 
     /**
-     * An instrument of this kind for the point `hit` of the surface, which the eye sees along `direction` (of length 1).
+     * An instrument of this kind for the point `hit` of the surface, which the camera sees along `direction` (of length 1).
      * Gives what the library refused, or null.
      */
     begin(kind, hit, direction) {
@@ -93,7 +93,7 @@ export class Tool {
         this.target = plus(this.origin, way, length > REACH ? REACH / length : 1);
     }
 
-    /** Lets the tissue go, and withdraws towards the eye. */
+    /** Lets the tissue go, and withdraws towards the camera. */
     release() {
         if (this.kind === null || this.phase !== "led") return;
         this.library.call("supple_let_go", this.contact, 0);

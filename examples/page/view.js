@@ -1,4 +1,4 @@
-// The picture: the surface of the lobe coloured by displacement, the instrument, and an eye that the pointer turns. Drawn by three.js.
+// The picture: the surface of the lobe coloured by displacement, the instrument, and a camera that the pointer turns. Drawn by three.js.
 // Metres, z is up.
 
 import * as THREE from "three";
@@ -9,7 +9,7 @@ const SCALE = 0.03;
 /** From tissue that stands still to the end of the scale, sRGB, ever lighter. The style sheet has the same for the legend. */
 const COLOURS = ["#8a3f45", "#c9603f", "#f0a63c", "#fbe58a"].map((hex) => new THREE.Color(hex));
 const MIDDLE = new THREE.Vector3(0.01, -0.005, 0.03);
-const EYE = new THREE.Vector3(0.03, -0.24, 0.17);
+const CAMERA = new THREE.Vector3(0.03, -0.24, 0.17);
 
 export class View {
     /** @param {HTMLCanvasElement} canvas, @param lobe its points at rest, triangles of its boundary, and their groups */
@@ -20,7 +20,7 @@ export class View {
         this.scene = new THREE.Scene();
         this.camera = new THREE.PerspectiveCamera(33, 1, 0.01, 2);
         this.camera.up.set(0, 0, 1);
-        this.camera.position.copy(MIDDLE).add(EYE);
+        this.camera.position.copy(MIDDLE).add(CAMERA);
         this.controls = new OrbitControls(this.camera, canvas);
         this.controls.target.copy(MIDDLE);
         this.controls.minDistance = 0.1;
@@ -68,7 +68,7 @@ export class View {
         this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
         this.renderer.setSize(width, height, false);
         this.camera.aspect = width / height;
-        // The lobe is wider than high: in a narrow picture the eye sees a larger angle.
+        // The lobe is wider than high: in a narrow picture the camera sees a larger angle.
         this.camera.fov = width < 1.15 * height ? Math.min(60, 33 * 1.15 * height / width) : 33;
         this.camera.updateProjectionMatrix();
         this.stale = true;
@@ -118,14 +118,14 @@ export class View {
         return performance.now() - begin;
     }
 
-    /** Where a pointer meets the tissue, and along which direction the eye sees it; null if it does not. */
+    /** Where a pointer meets the tissue, and along which direction the camera sees it; null if it does not. */
     pick(event) {
         this.#aim(event);
         const [first] = this.raycaster.intersectObject(this.body);
         return first ? { hit: first.point, direction: this.raycaster.ray.direction.clone() } : null;
     }
 
-    /** Where a pointer meets the plane through `point` that faces the eye. */
+    /** Where a pointer meets the plane through `point` that faces the camera. */
     inPlane(event, point) {
         this.#aim(event);
         const facing = this.camera.getWorldDirection(new THREE.Vector3());
