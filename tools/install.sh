@@ -79,7 +79,7 @@ ln -sf "$soname" "$to/lib/libsupple.so"
 into lib/pkgconfig "$made/supple.pc"
 into lib/cmake/supple "$made/supple-config.cmake" "$made/supple-config-version.cmake"
 into share/supple/weights weights/*.weights
-into share/supple/examples examples/*
+into share/supple/examples examples/*.*
 into share/supple/meshes meshes/*.msh
 into share/supple/tools tools/mesh_to_c.py
 into share/supple/licences LICENSE-*

@@ -50,7 +50,7 @@ while read -r where files; do
     done
 done <"$folder/told"
 share=$prefix/share/supple
-for kind in weights/*.weights examples/* meshes/*.msh; do
+for kind in weights/*.weights examples/*.* meshes/*.msh; do
     cmp "$kind" "$share/$kind" || fail "$kind is not installed"
 done
 for licence in LICENSE-*; do

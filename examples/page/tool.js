@@ -1,0 +1,134 @@
+// The instrument: a ball that presses, or forceps that hold tissue and pull it. It begins outside the body on the line from the camera to
+// the point that was touched, goes where the pointer leads it no faster than a hand would, and goes away when it is let go. Metres.
+
+import { FRAME } from "./simulation.js";
+
+const SPEED = 0.1; // m/s
+const REACH = 0.025; // m, how far from where it began the pointer leads it
+const DEPTH = 0.008; // m, how far the ball is pressed in
+const AWAY = 0.02; // m, how far it withdraws when it is let go
+const HOLD = 0.01; // m: forceps hold what is nearer to them
+// m; `clearance`: between it and the tissue before it touches.
+const TOOLS = { press: { radius: 0.01, clearance: 0.001 }, pull: { radius: 0.004, clearance: 0.003 } };
+const FRICTION = 0.3;
+
+const plus = (a, b, factor = 1) => a.map((value, axis) => value + factor * b[axis]);
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+export class Tool {
+    /** @param {import("./simulation.js").Simulation} simulation, @param mesh with the triangles of its boundary */
+    constructor(simulation, mesh) {
+        const { library, places } = simulation;
+        this.simulation = simulation;
+        this.library = library;
+        this.surface = Uint32Array.from(new Set(mesh.triangles)).sort();
+        const count = this.surface.length;
+        const surface = library.write(library.space("supple_surface"), "supple_surface", {
+            nodes: library.copy(this.surface), node_count: count });
+        const bytes = library.functions.supple_contact_size(count, 0, count);
+        this.contact = simulation.object(
+            "supple_contact_init", bytes, simulation.scene, simulation.points, surface, count, places.made, places.error);
+        library.call("supple_set_contact", simulation.loads, this.contact);
+        this.places = {
+            instrument: library.space("supple_instrument"), pose: library.space("supple_pose"),
+            touch: library.space("supple_touch"), held: library.room(4) };
+        this.remove();
+    }
+
+    /** No instrument. */
+    remove() {
+        this.library.call("supple_set_instruments", this.contact, 0, 0, 0);
+        this.kind = null;
+        this.held = 0;
+    }
+
+    /**
+     * An instrument of this kind for the point `hit` of the surface, which the camera sees along `direction` (of length 1).
+     * Gives what the library refused, or null.
+     */
+    begin(kind, hit, direction) {
+        if (!TOOLS[kind]) throw new Error(`no instrument ${kind}`);
+        const { library, places } = this;
+        const { constants } = library.header;
+        const { radius, clearance } = TOOLS[kind];
+        this.remove();
+        const start = plus(hit, direction, -this.#clear(hit, direction, radius + clearance));
+        library.write(places.instrument, "supple_instrument", {
+            shape: constants.SUPPLE_SPHERE, radius, friction: FRICTION, pose: { position: start, rotation: [0, 0, 0, 0] } });
+        let status = library.functions.supple_set_instruments(this.contact, places.instrument, 1, this.simulation.places.error);
+        if (status >= 0 && kind === "pull") {
+            status = library.functions.supple_grasp(this.contact, this.simulation.state, 0, HOLD, places.held);
+            this.held = library.pointer(places.held);
+        }
+        if (status < 0) {
+            this.remove();
+            return { status, name: library.name(status), text: library.text(status) };
+        }
+        this.kind = kind;
+        this.phase = "led";
+        this.direction = direction;
+        this.position = start;
+        this.origin = kind === "press" ? plus(start, direction, DEPTH + clearance) : start;
+        this.target = this.origin;
+        return null;
+    }
+
+    /** How far back from `hit` a ball of this radius is clear of all nodes before it. */
+    #clear(hit, direction, radius) {
+        const positions = this.simulation.positions();
+        let back = radius;
+        for (const node of this.surface) {
+            const way = plus(Array.from(positions.subarray(3 * node, 3 * node + 3)), hit, -1);
+            const along = dot(way, direction);
+            const rest = along * along - dot(way, way) + radius * radius;
+            if (rest > 0) back = Math.max(back, Math.sqrt(rest) - along);
+        }
+        return back;
+    }
+
+    /** The pointer has moved by this vector since it touched. */
+    lead(way) {
+        if (this.kind === null || this.phase !== "led") return;
+        const length = Math.hypot(...way);
+        this.target = plus(this.origin, way, length > REACH ? REACH / length : 1);
+    }
+
+    /** Lets the tissue go, and withdraws towards the camera. */
+    release() {
+        if (this.kind === null || this.phase !== "led") return;
+        this.library.call("supple_let_go", this.contact, 0);
+        this.held = 0;
+        this.phase = "away";
+        this.target = plus(this.position, this.direction, -(this.kind === "press" ? DEPTH : 0) - AWAY);
+    }
+
+    /** Tells the library where the instrument will be at the end of the frame that begins at `now` (s). Gives what it refused, or null. */
+    move(now) {
+        if (this.kind === null) return null;
+        const { library, places } = this;
+        const way = plus(this.target, this.position, -1);
+        const length = Math.hypot(...way);
+        const most = SPEED * FRAME;
+        const position = length > most ? plus(this.position, way, most / length) : this.target;
+        library.write(places.pose, "supple_pose", { position, rotation: [0, 0, 0, 0] });
+        const status = library.functions.supple_move_instrument(
+            this.contact, 0, places.pose, now, now + FRAME, this.simulation.places.error);
+        if (status < 0) {
+            this.target = this.position;
+            return { status, name: library.name(status), text: library.text(status) };
+        }
+        this.position = position;
+        return null;
+    }
+
+    /** What the page shows of it: null without an instrument. Force of the tissue on it, N, the mean of the latest call's steps. */
+    describe() {
+        if (this.kind === null) return null;
+        const { library, places } = this;
+        library.call("supple_read_touch", this.contact, 0, places.touch);
+        const { mean_force: force, contacts, depth } = library.read(places.touch, "supple_touch");
+        return {
+            kind: this.kind, phase: this.phase, position: this.position, radius: TOOLS[this.kind].radius,
+            held: this.held, force: Math.hypot(...force), contacts, depth };
+    }
+}

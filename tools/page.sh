@@ -1,0 +1,38 @@
+#!/usr/bin/env bash
+# Builds the web page of examples/page, the kernel in WebAssembly with SIMD in it, as one file that any static server hands out and that
+# opens without one as well; then tests it in node and in headless Chromium.
+#
+#     tools/page.sh [--build]
+#
+# The page is out/page/index.html; screenshots and figures of the tests come next to it. --build only builds. What it needs comes from
+# Debian (node, chromium), from npm (pinned in examples/page/package-lock.json) and, for the compiler, from `tools/cross.sh --install`.
+# Building takes two minutes, nearly all for the kernel, the tests take three and a half; for the comparison with the native kernel they
+# need the command, which is built as well.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+missing=()
+command -v npm >/dev/null || missing+=(nodejs npm)
+command -v chromium >/dev/null || [ "${1:-}" = --build ] || missing+=(chromium fonts-dejavu-core)
+if [ ${#missing[@]} -gt 0 ]; then
+    apt-get update -qq && apt-get install -y -qq --no-install-recommends "${missing[@]}"
+fi
+tools/cross.sh --install
+npm ci --prefix examples/page --no-audit --no-fund --silent
+
+# The whole C library, as tools/install.sh builds it, but for a page.
+CARGO_PROFILE_RELEASE_LTO=fat CARGO_PROFILE_RELEASE_CODEGEN_UNITS=1 \
+    CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$(rustc --print sysroot)/lib/rustlib/x86_64-unknown-linux-gnu/bin/rust-lld \
+    CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_RUSTFLAGS="-C target-feature=+simd128 -C link-arg=--strip-all" \
+    target/cross/cargo rustc -p supple --quiet --release --target-dir target/page --target wasm32-unknown-unknown -Zbuild-std=core \
+    --lib --crate-type cdylib --features capi,panic-handler
+library=target/page/wasm32-unknown-unknown/release/supple.wasm
+mkdir -p out/page
+node examples/page/build.mjs "$library" out/page/index.html
+printf 'out/page/index.html  %s bytes\n%s  %s bytes, %s compressed\n' "$(stat -c %s out/page/index.html)" \
+    "$library" "$(stat -c %s "$library")" "$(gzip -9 -c "$library" | wc -c)"
+[ "${1:-}" != --build ] || exit 0
+
+cargo build --quiet --release
+SUPPLE_WASM=$library SUPPLE_COMMAND=target/release/supple node --test --test-reporter=spec tests/page/kernel.test.mjs
+SUPPLE_PAGE=$PWD/out/page/index.html node --test --test-reporter=spec tests/page/browser.test.mjs
