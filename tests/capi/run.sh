@@ -130,7 +130,6 @@ fi
 for element in nodal-pressure nodal-strain; do
     "$python" examples/compare.py "$shared" "$command" $element
 done
-"$python" examples/press.py "$shared"
 
 # A client of another implementation of OpenIGTLink moves the ball.
 [ -e /usr/include/openigtlink ] || {

@@ -1,0 +1,93 @@
+"""The C library (include/supple.h) that comes with the package: calls that turn refusals into exceptions, and memory for objects."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _interface, errors
+
+ffi: Any = _interface.ffi
+lib: Any = ffi.dlopen(str(pathlib.Path(__file__).with_name("libsupple.so")))
+NONE = 0xFFFFFFFF
+ALIGN = 64
+
+if lib.supple_abi() != lib.SUPPLE_ABI:
+    raise ImportError(f"libsupple.so has interface {lib.supple_abi()}, the package is for {lib.SUPPLE_ABI}")
+
+
+def words(status: int) -> str:
+    """What a status means."""
+    return str(ffi.string(lib.supple_status_text(status)), "ascii")
+
+
+def checked(status: int, error: Any = None, what: str = "") -> int:
+    """The status of a call, if it did what it was asked; else an exception with the kernel's words, the place and the value."""
+    if status < 0:
+        raise errors.made(status, words(status), error, what)
+    return status
+
+
+class Memory:
+    """Aligned bytes for an object of the library, which stays where it is as long as this does."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self._bytes = np.zeros(size + ALIGN, np.uint8)
+        start = -self._bytes.ctypes.data % ALIGN
+        self.view = self._bytes[start : start + size]
+        self.pointer = ffi.cast("void *", self.view.ctypes.data)
+
+
+def new_error() -> Any:
+    return ffi.new("supple_error *")
+
+
+def config(kind: str) -> Any:
+    """An empty configuration of this kind of the library's version."""
+    made = ffi.new(f"{kind} *")
+    made.struct_size, made.abi = ffi.sizeof(kind), lib.SUPPLE_ABI
+    return made
+
+
+def pointer(kind: str, array: NDArray[Any]) -> Any:
+    """The address of the first entry of an array, which must be kept by the caller."""
+    return ffi.cast(f"{kind} *", array.ctypes.data) if array.size else ffi.NULL
+
+
+def vectors(values: Any, what: str, count: int | None = None) -> NDArray[np.float32]:
+    """Finite float32 vectors of shape (n, 3) from anything like them; one vector stands for `count` of them."""
+    try:
+        array = np.asarray(values, np.float64)
+    except (TypeError, ValueError) as problem:
+        raise errors.InputError(f"{what}: not an array of numbers: {problem}") from None
+    if array.shape == (3,) and count is not None:
+        array = np.broadcast_to(array, (count, 3))
+    if array.ndim != 2 or array.shape[1] != 3 or (count is not None and len(array) != count):
+        wanted = "(n, 3)" if count is None else f"({count}, 3)"
+        raise errors.InputError(f"{what}: its shape is {array.shape}, it must be {wanted}")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(bad):
+        raise errors.InputError(f"{what}: row {bad[0]} is {array[bad[0]].tolist()}, not finite")
+    return np.ascontiguousarray(array, np.float32)
+
+
+def node_numbers(selection: Any, nodes: int, what: str) -> NDArray[np.uint32]:
+    """Numbers of nodes from numbers or from a mask over all nodes."""
+    array = np.asarray(selection)
+    if array.dtype == bool:
+        if array.shape != (nodes,):
+            raise errors.InputError(f"{what}: a mask of shape {array.shape}, there are {nodes} nodes")
+        array = np.flatnonzero(array)
+    array = np.atleast_1d(array)
+    if array.size == 0:
+        return np.zeros(0, np.uint32)
+    if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
+        raise errors.InputError(f"{what}: numbers of nodes or a mask are needed, not {array.dtype} of shape {array.shape}")
+    bad = np.flatnonzero((array < 0) | (array >= nodes))
+    if len(bad):
+        raise errors.InputError(f"{what}: entry {bad[0]} is node {array[bad[0]]}, there are {nodes} nodes")
+    return array.astype(np.uint32)

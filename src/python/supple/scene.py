@@ -1,0 +1,111 @@
+"""What is simulated: a mesh of one tissue with its supports. Built once, used by any number of simulations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _library as library
+from ._laws import LAWS
+from ._library import ffi, lib
+from .errors import InputError
+from .mesh import Mesh
+
+ELEMENTS = {"linear": 0, "nodal-pressure": 1, "nodal-strain": 2}
+
+
+def axes_of(axes: str, what: str) -> int:
+    """Bits of "xyz"."""
+    if not axes or any(axis not in "xyz" for axis in axes):
+        raise InputError(f"{what}: axes {axes!r}, they are of x, y and z")
+    return sum(1 << "xyz".index(axis) for axis in set(axes))
+
+
+class Material:
+    """A law with its constants (Pa) and a density (kg/m^3): `Material("neo-hookean", c=1034, d=10000, density=1060)`."""
+
+    def __init__(self, law: str, *, density: float, **constants: float) -> None:
+        if law not in LAWS:
+            raise InputError(f"law {law!r}: there are {', '.join(LAWS)}")
+        self.law, self.density = law, float(density)
+        self._number, names = LAWS[law]
+        if set(constants) != set(names):
+            raise InputError(f"constants of {law}: {', '.join(constants) or 'none'} are given, {', '.join(names)} are needed")
+        self.constants = {name: float(constants[name]) for name in names}
+
+    @classmethod
+    def from_moduli(cls, young: float, poisson: float, *, density: float) -> Material:
+        """The neo-Hookean law of Young's modulus (Pa) and Poisson's ratio at rest: c is half the shear modulus, d half the bulk modulus."""
+        if not -1.0 < poisson < 0.5:
+            raise InputError(f"Poisson's ratio {poisson}: it must be below 0.5")
+        return cls("neo-hookean", c=young / (4.0 * (1.0 + poisson)), d=young / (6.0 * (1.0 - 2.0 * poisson)), density=density)
+
+    def __repr__(self) -> str:
+        constants = ", ".join(f"{name}={value:g}" for name, value in self.constants.items())
+        return f"<supple.Material: {self.law}, {constants}, {self.density:g} kg/m^3>"
+
+
+class Scene:
+    """A mesh of one tissue.
+
+    Parameters
+    ----------
+    mesh, material
+    fixed : nodes that are held, as numbers or as a mask over all nodes
+    moved : nodes that will be held where `Simulation.set_motions` says
+    element : "nodal-pressure", "nodal-strain" (bends right on coarse meshes), or "linear" (locks in nearly incompressible tissue)
+    axes : along which the fixed nodes are held
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        material: Material,
+        *,
+        fixed: ArrayLike = (),
+        moved: ArrayLike = (),
+        element: str = "nodal-pressure",
+        axes: str = "xyz",
+    ) -> None:
+        if element not in ELEMENTS:
+            raise InputError(f"element {element!r}: there are {', '.join(ELEMENTS)}")
+        self.mesh, self.material, self.element = mesh, material, element
+        nodes, elements = len(mesh.points), len(mesh.tets)
+        self._supports = self._supports_of(fixed, moved, axes)
+        tissue = ffi.new("supple_tissue *", {"constants": list(material.constants.values()), "density": material.density})
+        made = library.config("supple_scene_config")
+        made.law, made.element, made.winding = material._number, ELEMENTS[element], lib.SUPPLE_WINDING_CHECKED
+        made.nodes, made.elements, made.supports, made.tissues = nodes, elements, len(self._supports), 1
+        made.points = library.pointer("float", mesh.points)
+        made.tetrahedra = library.pointer("uint32_t", mesh.tets)
+        made.support = ffi.cast("supple_support *", library.pointer("uint32_t", self._supports))
+        made.tissue = tissue
+        size = lib.supple_scene_size(nodes, elements, 1)
+        if element == "nodal-strain":
+            size += lib.supple_patches_size(nodes, elements, 1)
+        self._memory = library.Memory(size)
+        scene, error = ffi.new("supple_scene **"), library.new_error()
+        library.checked(lib.supple_scene_init(self._memory.pointer, size, made, scene, error), error, "the scene")
+        self._raw: Any = scene[0]
+
+    def _supports_of(self, fixed: ArrayLike, moved: ArrayLike, axes: str) -> NDArray[np.uint32]:
+        nodes = len(self.mesh.points)
+        held = np.unique(library.node_numbers(fixed, nodes, "fixed"))
+        free = np.unique(library.node_numbers(moved, nodes, "moved"))
+        both = np.intersect1d(held, free)
+        if len(both):
+            raise InputError(f"node {both[0]} is both fixed and moved")
+        rows = [(node, axes_of(axes, "fixed"), 0) for node in held] + [(node, 7, 1) for node in free]
+        return np.array(rows, np.uint32).reshape(-1, 3)
+
+    @property
+    def facts(self) -> dict[str, float]:
+        """Nodes, elements that move, bytes, floating-point operations of an exact step, mass (kg)."""
+        facts = ffi.new("supple_scene_facts *")
+        library.checked(lib.supple_scene_describe(self._raw, facts))
+        return {name: getattr(facts, name) for name in ("nodes", "elements", "bytes", "operations", "mass")}
+
+    def __repr__(self) -> str:
+        return f"<supple.Scene: {self.mesh!r}, {self.material!r}, {self.element}>"

@@ -1,0 +1,64 @@
+"""The examples as a user runs them: the notebook-like one, and the data set over processes, killed and started again."""
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+
+def test_a_ball_on_a_lobe_makes_its_picture(tmp_path):
+    said = subprocess.run(
+        [sys.executable, ROOT / "examples" / "press_lobe.py", ROOT / "meshes" / "lobe.msh", tmp_path],
+        check=True, capture_output=True, text=True,
+    ).stdout
+    print(said)
+    from matplotlib.image import imread
+
+    picture = imread(tmp_path / "press-lobe.png")
+    assert len(np.unique((255 * picture[..., :3]).astype(int).reshape(-1, 3), axis=0)) > 1000
+    assert (tmp_path / "pressed.vtu").stat().st_size > 100_000
+
+
+def organs(folder, count):
+    return [sys.executable, ROOT / "examples" / "random_organs.py", folder, "--organs", str(count), "--workers", "2"]
+
+
+def test_a_data_set_goes_on_where_it_was_killed(tmp_path):
+    first = subprocess.Popen(organs(tmp_path, 6), stdout=subprocess.PIPE, text=True)
+    while len(list(tmp_path.glob("organ-*.npz"))) < 2:
+        assert first.poll() is None
+        time.sleep(0.05)
+    first.kill()
+    first.wait()
+    time.sleep(1.0)  # its workers notice
+    there = {path.name: path.read_bytes() for path in tmp_path.glob("organ-*.npz")}
+    said = subprocess.run(organs(tmp_path, 6), check=True, capture_output=True, text=True).stdout
+    print(said)
+    assert f"{len(there)} of 6 organs are there" in said
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"organ-{n:05}.npz" for n in range(6)]
+    for name, data in there.items():
+        assert (tmp_path / name).read_bytes() == data
+    for path in tmp_path.iterdir():
+        data = np.load(path)
+        assert np.isfinite(data["acceleration"]).all() and np.linalg.norm(data["displacement"], axis=2).max() > 0.001
+        # Newton's law, which the kernel's own steps must keep: m a = f - damping m v, at free nodes, to what D smooths.
+        free = np.linalg.norm(data["displacement"], axis=2).max(axis=0) > 0.0
+        mass = data["mass"][:, None]
+        expected = (data["force"] / mass - 20.0 * data["velocity"])[:, free]
+        off = np.linalg.norm(data["acceleration"][:, free] - expected) / np.linalg.norm(expected)
+        print(f"{path.name}: {off:.3f} of the acceleration not explained")
+        assert off < 0.5
+    again = subprocess.run(organs(tmp_path, 6), check=True, capture_output=True, text=True).stdout
+    assert "6 of 6 organs are there" in again and "moved" not in again
+
+
+@pytest.mark.parametrize("seed", [3])
+def test_an_organ_is_the_same_again(seed):
+    sys.path.insert(0, str(ROOT / "examples"))
+    from random_organs import motion
+
+    one, two = motion(seed), motion(seed)
+    assert all(np.array_equal(one[name], two[name]) for name in one)

@@ -1,0 +1,147 @@
+"""The package itself: views without copies, errors that name place and value, files, threads, the ten lines of its docstring."""
+
+import gc
+import threading
+import time
+
+import meshio
+import numpy as np
+import pytest
+import supple
+from conftest import ROOT, bar
+
+
+def test_displacements_are_a_view_that_stays_sound(soft):
+    simulation = supple.Simulation(supple.Scene(bar(), soft), gravity=(0.0, 0.0, -9.81))
+    view = simulation.displacements
+    assert view.base is not None and view.dtype == np.float32 and not view.flags.writeable
+    with pytest.raises(ValueError):
+        view[0, 0] = 1.0
+    simulation.advance(0.01)
+    fallen = view[:, 2].mean()
+    assert fallen < -1e-4 and view is simulation.displacements
+    del simulation
+    gc.collect()
+    assert view[:, 2].mean() == fallen
+
+
+def test_the_ten_lines_of_the_docstring_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lobe.msh").write_bytes((ROOT / "meshes" / "lobe.msh").read_bytes())
+    lines = [line[4:] for line in supple.__doc__.splitlines() if line.startswith("    ")]
+    assert sum(bool(line.strip()) for line in lines) <= 10
+    exec("\n".join(lines), {})
+    for page in ("README.md", "docs/python.md"):
+        shown = (ROOT / page).read_text().split("```python\n")[1].split("```")[0]
+        assert [line for line in shown.splitlines() if line] == [line for line in lines if line], page
+    written = meshio.read("deformed.vtu")
+    moved = np.linalg.norm(written.point_data["displacement"], axis=1)
+    assert moved.max() > 0.005
+    rest = meshio.read("lobe.msh").points
+    assert written.points - written.point_data["displacement"] == pytest.approx(rest, abs=1e-6)
+
+
+def test_meshes_of_meshio_come_in(tmp_path):
+    mesh = bar()
+    cells = [("tetra", mesh.tets[:100].astype(int)), ("triangle", np.array([[0, 1, 2]])), ("tetra", mesh.tets[100:].astype(int))]
+    points = np.vstack([[[9.0, 9.0, 9.0]], mesh.points])
+    whole = meshio.Mesh(points, [(kind, data + 1) for kind, data in cells])
+    read = supple.Mesh.from_meshio(whole, scale=0.5)
+    assert (read.tets == mesh.tets).all() and read.points == pytest.approx(0.5 * mesh.points)
+    with pytest.raises(supple.InputError, match="no tetrahedra of four nodes, only triangle"):
+        supple.Mesh.from_meshio(meshio.Mesh(points, [("triangle", np.array([[0, 1, 2]]))]))
+
+
+def test_the_boundary_is_closed_and_outside(lobe):
+    triangles = lobe.boundary()
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, counts = np.unique(edges, axis=0, return_counts=True)
+    assert (counts == 2).all()
+    a, b, c = lobe.points.astype(float)[triangles].transpose(1, 0, 2)
+    assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0 == pytest.approx(lobe.volumes.sum(), rel=1e-5)
+
+
+REFUSED = [
+    (lambda mesh, soft: supple.Mesh(mesh.points, mesh.tets.astype(float)), "integers of shape"),
+    (lambda mesh, soft: supple.Mesh(mesh.points[:, :2], mesh.tets), r"points: its shape is \(144, 2\)"),
+    (lambda mesh, soft: supple.Mesh(mesh.points, mesh.tets + 100), "element .* has nodes .* there are 144 nodes"),
+    (lambda mesh, soft: supple.Mesh(np.where(mesh.points > 0.05, np.nan, mesh.points), mesh.tets), "points: row 7 .* not finite"),
+    (lambda mesh, soft: supple.Mesh(mesh.points, mesh.tets, scale=0.0), "scale 0.0"),
+    (lambda mesh, soft: supple.Scene(supple.Mesh(mesh.points, mesh.tets[:, [0, 2, 1, 3]]), soft), "negative volume: entry 0"),
+    (lambda mesh, soft: supple.Scene(mesh, soft, fixed=[0, 144]), "fixed: entry 1 is node 144, there are 144 nodes"),
+    (lambda mesh, soft: supple.Scene(mesh, soft, fixed=np.ones(7, bool)), r"a mask of shape \(7,\)"),
+    (lambda mesh, soft: supple.Scene(mesh, soft, fixed=[0], moved=[0]), "node 0 is both"),
+    (lambda mesh, soft: supple.Scene(mesh, soft, element="cubic"), "element 'cubic'"),
+    (lambda mesh, soft: supple.Scene(mesh, soft, fixed=[0], axes="xw"), "axes 'xw'"),
+    (lambda mesh, soft: supple.Scene(mesh, soft, fixed=range(144)), "the scene: "),
+    (lambda mesh, soft: supple.Material("neo-hookean", c=1.0, density=1.0), "c are given, c, d are needed"),
+    (lambda mesh, soft: supple.Material("rubber", density=1.0), "law 'rubber'"),
+    (lambda mesh, soft: supple.Scene(mesh, supple.Material("neo-hookean", c=-1.0, d=1.0, density=1.0)), "the scene: .* value -1"),
+    (lambda mesh, soft: supple.Material.from_moduli(1e3, 0.5, density=1.0), "Poisson's ratio 0.5"),
+]
+
+
+@pytest.mark.parametrize(("attempt", "words"), REFUSED)
+def test_what_cannot_be_is_refused_in_words(soft, attempt, words):
+    with pytest.raises(supple.InputError, match=words) as caught:
+        attempt(bar(), soft)
+    print(caught.value)
+
+
+def test_steps_are_refused_in_words(soft):
+    mesh = bar()
+    scene = supple.Scene(mesh, soft, fixed=mesh.points[:, 2] < 1e-6)
+    with pytest.raises(supple.UnstableStep, match="above the critical step: node") as caught:
+        supple.Simulation(scene, step=0.1).advance(0.1)
+    assert caught.value.limit is not None and 1e-5 < caught.value.limit < 1e-2 and caught.value.node is not None
+    with pytest.raises(supple.InputError, match="damped steps need a step, s: the critical one is"):
+        supple.Simulation(scene, "damped")
+    with pytest.raises(supple.InputError, match="adaptive steps need a tolerance"):
+        supple.Simulation(scene, "adaptive")
+    with pytest.raises(supple.InputError, match="method 'fast'"):
+        supple.Simulation(scene, "fast")
+    with pytest.raises(supple.InputError, match="nowhere.weights: cannot be read"):
+        supple.Simulation(scene, "learned", weights="nowhere.weights")
+    with pytest.raises(supple.InputError, match="pyproject|not a weight file"):
+        supple.Simulation(scene, "learned", weights=__file__)
+    simulation = supple.Simulation(scene)
+    for seconds in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(supple.InputError, match="advance by"):
+            simulation.advance(seconds)
+    with pytest.raises(supple.InputError, match=r"newton: its shape is \(2, 3\), it must be \(1, 3\)"):
+        simulation.set_forces([3], np.zeros((2, 3)))
+    with pytest.raises(supple.InputError, match="motions: .* node 5"):
+        simulation.set_motions([5], [0.001, 0.0, 0.0])
+    with pytest.raises(supple.InputError, match="no instruments"):
+        simulation.touch(0)
+
+
+def test_a_step_that_cannot_be_believed_is_not_taken(soft):
+    mesh = bar()
+    simulation = supple.Simulation(supple.Scene(mesh, soft, fixed=mesh.points[:, 2] < 1e-6), damping=20.0)
+    simulation.set_forces([140], [0.001, 0.0, 0.0])
+    simulation.advance(0.1)
+    before = simulation.displacements.copy()
+    simulation.set_forces([140], [1e6, 0.0, 0.0])
+    with pytest.raises(supple.Diverged, match="node 140") as caught:
+        simulation.advance(0.1)
+    print(caught.value)
+    assert np.isfinite(simulation.displacements).all() and abs(simulation.displacements - before).max() < 0.01
+    simulation.set_forces([140], [0.001, 0.0, 0.0])
+    assert simulation.advance(0.01).time > 0.1
+
+
+def test_steps_leave_other_threads_running(lobe, liver):
+    """Python goes on while the kernel steps; two simulations of one scene run at the same time."""
+    scene = supple.Scene(lobe, liver, fixed=lobe.points[:, 1] > 0.03)
+    simulations = [supple.Simulation(scene, step=1e-4, damping=20.0, gravity=(0.0, 0.0, -9.81)) for _ in range(2)]
+    threads = [threading.Thread(target=each.advance, args=(0.3,)) for each in simulations]
+    for thread in threads:
+        thread.start()
+    ticks = 0
+    while any(thread.is_alive() for thread in threads):
+        time.sleep(0.001)
+        ticks += 1
+    assert ticks > 20
+    first, second = (each.displacements for each in simulations)
+    assert (first == second).all() and abs(first).max() > 0.001
