@@ -15,7 +15,7 @@ use super::times::{Times, Walker};
 use super::{doubling, learned_cost};
 use crate::added_mass::describe_added;
 use crate::problem::Problem;
-use crate::run::large::{grid, on_grid};
+use crate::run::large::grid;
 use crate::run::start::{critical, first_step};
 use crate::scene::setup::Setup;
 use crate::scene::timing::{damper, method_name};
@@ -145,11 +145,11 @@ fn describe_beyond<M: ElementMaterial>(
 ) -> Result<Times, Problem> {
     output!("\nsteps beyond the limit");
     let lattice = lattice(setup, scene)?;
-    let methods = [
-        Method::MassScaled,
-        on_grid(&Method::Multilevel(Cells::Suggested), lattice),
-        on_grid(&Method::Damped(damper()?, Cells::Suggested), lattice),
-    ];
+    let cells = match &setup.time.method {
+        Some(Method::Multilevel(cells) | Method::Damped(_, cells)) => *cells,
+        _ => Cells::Suggested,
+    };
+    let methods = [Method::MassScaled, Method::Multilevel(cells), Method::Damped(damper()?, cells)];
     let kilobytes = |grid: Grid, damped: bool| {
         1e-3 * (vectors_for_lattice(scene.element(), scene.node_count(), scene.element_count(), grid, damped)
             * size_of::<NodeVector>()) as f64

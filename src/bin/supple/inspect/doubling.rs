@@ -13,7 +13,7 @@ use supple::step::{CriticalStep, Divergence, Status};
 
 use super::times::{Times, Walker};
 use crate::problem::Problem;
-use crate::run::large::{grid, on_grid};
+use crate::run::large::grid;
 use crate::scene::setup::Setup;
 use crate::scene::timing::method_name;
 use crate::screen::{output, row};
@@ -114,11 +114,12 @@ pub(crate) fn recommend<M: ElementMaterial>(
 /// The method that long steps of the scene would have, on its lattice.
 fn judged<M: ElementMaterial>(setup: &Setup, scene: SceneView<'_, M>) -> Result<Method<'static>, Problem> {
     if let Some(method) = &setup.time.method {
-        return Ok(on_grid(method, grid(setup, scene, method)?));
+        grid(setup, scene, method)?;
+        return Ok(method.clone());
     }
     let multilevel = Method::Multilevel(Cells::Suggested);
     let suggested = multilevel.grid(scene, &setup.body.local).map_err(Problem::of)?;
-    Ok(if suggested.functions == 0 { Method::MassScaled } else { on_grid(&multilevel, suggested) })
+    Ok(if suggested.functions == 0 { Method::MassScaled } else { multilevel })
 }
 
 /// Prints the errors that long steps will have at the worst moment of the whole scene. Step doubling at two lengths

@@ -8,7 +8,7 @@ use supple::state::{NodeVector, VecState};
 use supple::step::{Status, Step};
 
 use super::exact::Motion;
-use super::large::{grid, on_grid};
+use super::large::grid;
 use super::outcome::{AdaptiveTrace, Outcome};
 use crate::problem::Problem;
 use crate::scene::setup::Setup;
@@ -32,14 +32,14 @@ impl AdaptiveRun {
         state: &mut VecState,
         longest: Step,
     ) -> Result<Self, Problem> {
-        let method = on_grid(method, grid(setup, scene, method)?);
+        grid(setup, scene, method)?;
         let points = &setup.body.local;
         let tolerance = setup
             .time
             .tolerance
             .unwrap_or_else(|| TOLERANCE.min(SHARE_OF_SIZE * setup.body.diagonal() as f32));
         let request = Request { tolerance, longest };
-        let adaptive = Adaptive::prepare_in_vec(method, scene, points, state.view(), request)
+        let adaptive = Adaptive::prepare_in_vec(method.clone(), scene, points, state.view(), request)
             .map_err(|error| Problem(format!("{}: {error}", setup.body.name)))?;
         Ok(Self { adaptive })
     }

@@ -12,7 +12,8 @@ use crate::scene::setup::Setup;
 /// A prepared step on a host with a heap.
 pub(crate) type PreparedStep = LargeStep<'static, Vec<NodeVector>>;
 
-/// The lattice of a scene's method. A mesh too small for the lattice that its method wants is a problem.
+/// The lattice of a scene's method; steps may be prepared on a coarser one than is suggested ([`LargeStep::prepare_in_vec`]). A mesh too
+/// small for the lattice that its method wants is a problem.
 pub(crate) fn grid<M: ElementMaterial>(
     setup: &Setup,
     scene: SceneView<'_, M>,
@@ -33,16 +34,6 @@ pub(crate) fn grid<M: ElementMaterial>(
         )));
     }
     Ok(grid)
-}
-
-/// The same method with this lattice, which then need not be searched for again.
-pub(crate) fn on_grid(method: &Method<'static>, grid: Grid) -> Method<'static> {
-    let cells = if grid == Grid::default() { Cells::Suggested } else { Cells::Given(grid.cells) };
-    match method {
-        Method::MassScaled => Method::MassScaled,
-        Method::Multilevel(_) => Method::Multilevel(cells),
-        Method::Damped(damper, _) => Method::Damped(damper.clone(), cells),
-    }
 }
 
 /// A step of `seconds` by a method, from the state as it is.

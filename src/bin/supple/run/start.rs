@@ -9,7 +9,7 @@ use supple::tled::{self, Pace};
 
 use super::adaptive::AdaptiveRun;
 use super::exact::{Automatic, ExactSteps, Motion};
-use super::large::{PreparedStep, grid, on_grid, prepare};
+use super::large::{PreparedStep, grid, prepare};
 use super::learned::LearnedRun;
 use super::outcome::Outcome;
 use crate::problem::Problem;
@@ -96,8 +96,8 @@ impl<'a> Start<'a> {
                 Mover::Adaptive(Box::new(AdaptiveRun::new(method, setup, scene, state, step)?))
             }
             (Some(method), _) => {
-                let method = on_grid(method, grid(setup, scene, method)?);
-                Mover::Large(Box::new(prepare(&method, setup, scene, state, step)?))
+                grid(setup, scene, method)?;
+                Mover::Large(Box::new(prepare(method, setup, scene, state, step)?))
             }
             (None, Some(choice)) => {
                 Mover::Learned(Box::new(LearnedRun::new(choice, scene.node_count(), exact)?))
