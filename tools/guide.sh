@@ -2,13 +2,13 @@
 # Runs the commands of docs/guide.md (fences marked `sh guide`) one after the other, from nothing, and holds what comes of them
 # against what must be.
 #
-#     tools/guide.sh [PROFILE]
+#     tools/guide.sh [COMMAND]
 #
-# With a PROFILE cargo builds by it in place of `release`: `.ci/run` takes the one of the tests, whose burn is there already.
+# COMMAND is the built command, with training; without it the fences build it. `.ci/run` gives that of the tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-profile=${1:-release}
+command=${1:-}
 said=$(mktemp)
 trap 'rm "$said"' EXIT
 command -v python3 >/dev/null && python3 -c 'import ensurepip' 2>/dev/null || {
@@ -19,7 +19,7 @@ awk '/^```/ { inside = $0 == "```sh guide"; next } inside' docs/guide.md | while
     printf '$ %s\n' "$line"
     # One build with all features for all commands.
     line=${line/cargo run --release --features train/cargo run --release}
-    bash -euo pipefail -c "${line/cargo run --release/cargo run --quiet --profile $profile -p supple-cli --features train}" 2>&1
+    bash -euo pipefail -c "${line/cargo run --release --/${command:-cargo run --quiet --release --features train --}}" 2>&1
 done | tee "$said"
 
 # within WHAT LEAST VALUE MOST
@@ -37,7 +37,7 @@ within 'force on the ball, N' 0.05 "$(value '^instruments *0: \([0-9.e+-]*\) N.*
 within 'error of the learned run, % of not moving' 0 "$(value '.*node [0-9]*: \([0-9.]*\) % of not moving$')" 40
 # A network learns from exact steps without instruments, and says so.
 sed 's,^scene = .*,scene = "../../docs/scenes/organ-touched.toml",' docs/scenes/organ-network.toml >out/guide/refused.toml
-why=$(cargo run --quiet --profile "$profile" -p supple-cli --features train -- train out/guide/refused.toml --out out/guide/refused.weights 2>&1) &&
+why=$(${command:-cargo run --quiet --release --features train --} train out/guide/refused.toml --out out/guide/refused.weights 2>&1) &&
     { echo 'failed: a network was trained on a scene with an instrument' >&2; exit 1; }
 [[ $why == *organ-touched.toml*'the method is "auto"'* ]] || { echo "failed: it says: $why" >&2; exit 1; }
 for file in organ_mesh.h organ_weights.h; do

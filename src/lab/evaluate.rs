@@ -1,17 +1,15 @@
-//! An evaluation: methods over scenes at multiples of a scene's step, the table, and a sweep.
+//! An evaluation: methods over scenes at multiples of a scene's step, and of one of them at more: a sweep.
 
 use std::format;
 use std::path::Path;
 use std::string::String;
 use std::vec::Vec;
 
-use super::measure::Errors;
 use super::method::Method;
 use super::run::{self, Row};
 use super::scenes::{self, SceneSpec};
 use super::truth::{self, Truth};
-use super::{LabError, MULTIPLES, plot, sweep, table};
-use crate::io::write_atomically;
+use super::{LabError, MULTIPLES, sweep, table};
 
 /// The scene of the sweep unless another is asked for.
 const SWEPT: &str = "reversed";
@@ -75,9 +73,18 @@ fn unique<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
     seen
 }
 
-/// Carries the plan out: truths in `out/truth/`, rows in `out/results.csv`, the sweep in
-/// `out/sweep-SCENE.svg`; files of an earlier evaluation are replaced. `say` is given the progress in words.
-pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Vec<Row>, LabError> {
+/// What an evaluation came to.
+#[derive(Clone, Debug)]
+pub struct Evaluation {
+    /// The scenes with their exact motions.
+    pub scenes: Vec<(SceneSpec, Truth)>,
+    /// The runs, scene by scene.
+    pub rows: Vec<Row>,
+}
+
+/// Carries the plan out: truths in `out/truth/`, rows in `out/results.csv`; files of an earlier evaluation are replaced. `say` is given
+/// the progress in words.
+pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Evaluation, LabError> {
     super::create_folder(out)?;
     let (specs, multiples): (Vec<_>, Vec<_>) = plan.scenes.iter().cloned().unzip();
     let truths = truth::obtain(&specs, &out.join("truth"), |spec, truth| say(&about(spec, truth)))?;
@@ -89,22 +96,9 @@ pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Ve
                 rows.push(run::run(spec, truth, *method, multiple)?);
             }
         }
-        if plan.sweep.as_deref() == Some(spec.name) {
-            let curves = sweep::curves(&rows, spec.name);
-            if !curves.is_empty() {
-                let svg = plot::draw(
-                    spec.name,
-                    spec.timing.step,
-                    &curves,
-                    Errors::of_hold(truth)?.mean_over_time(),
-                );
-                let path = out.join(format!("sweep-{}.svg", spec.name));
-                write_atomically(&path, |file| file.write_all(svg.as_bytes()))?;
-            }
-        }
     }
     table::write_csv(&out.join("results.csv"), &rows)?;
-    Ok(rows)
+    Ok(Evaluation { scenes: specs.into_iter().zip(truths).collect(), rows })
 }
 
 fn about(spec: &SceneSpec, truth: &Truth) -> String {

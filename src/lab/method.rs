@@ -137,7 +137,7 @@ impl Method {
             Self::TledLargeStep => "tled-large-step",
             Self::MassScaled => "mass-scaled",
             Self::Multilevel => "multilevel",
-            Self::Damped => "best",
+            Self::Damped => "damped",
             Self::BackwardEuler => "backward-euler",
             Self::ImplicitMidpoint => "implicit-midpoint",
             Self::Learned(Family::Compact) => "compact-f32",
@@ -146,7 +146,7 @@ impl Method {
             Self::Learned(Family::OtherStep) => "compact-other-step",
             Self::Switching(Large::MassScaled) => "mass-scaled-switching",
             Self::Switching(Large::Multilevel) => "multilevel-switching",
-            Self::Switching(Large::Damped) => "best-switching",
+            Self::Switching(Large::Damped) => "damped-switching",
             Self::DampedWith(file) | Self::LearnedWith(file) => file.name,
         }
     }
@@ -330,9 +330,9 @@ mod tests {
         let said = Method::named("euler").unwrap_err().to_string();
         assert_eq!(
             said,
-            "method \"euler\" is not known; there are tled, hold, tled-large-step, mass-scaled, multilevel, best, \
+            "method \"euler\" is not known; there are tled, hold, tled-large-step, mass-scaled, multilevel, damped, \
              backward-euler, implicit-midpoint, compact-f32, paper-f32, compact-int8, compact-other-step, \
-             mass-scaled-switching, multilevel-switching, best-switching"
+             mass-scaled-switching, multilevel-switching, damped-switching"
         );
     }
 }

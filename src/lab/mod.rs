@@ -20,7 +20,7 @@
 //! | [`tolerance`] | does an adaptive step keep its tolerance, and what does it cost? |
 //! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
 //! | [`table`] | rows as CSV and as aligned text |
-//! | [`sweep`] | error over step on one scene, with fitted slopes; [`plot`] draws it |
+//! | [`sweep`] | error over step on one scene, with fitted slopes |
 
 pub mod course;
 pub mod equal_error;
@@ -33,7 +33,6 @@ pub mod method;
 pub mod moving;
 pub mod networks;
 pub mod physics;
-pub mod plot;
 pub(crate) mod random_numbers;
 pub mod run;
 pub mod scenes;

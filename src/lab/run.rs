@@ -35,6 +35,8 @@ pub struct Row {
     pub step_over_limit_trajectory: f64,
     /// What was known at each snapshot that was reached.
     pub frames: Vec<Frame>,
+    /// Displacement of each node at the last of them, m; empty if none was reached.
+    pub shape: Vec<[f32; 3]>,
     /// How it ended.
     pub end: End,
 }
@@ -107,7 +109,7 @@ pub fn run_guarded(
     every: Option<u32>,
 ) -> Result<Row, LabError> {
     spec.check_multiple(multiple)?;
-    let (end, frames) = spec.with_material(Run { spec, truth, method, multiple, every })?;
+    let Ended { end, frames, shape } = spec.with_material(Run { spec, truth, method, multiple, every })?;
     let hold = Errors::of_hold(truth)?;
     let step = f64::from(multiple) * f64::from(spec.timing.step);
     Ok(Row {
@@ -120,8 +122,16 @@ pub fn run_guarded(
         step_over_limit_rest: step / truth.limit_at_rest,
         step_over_limit_trajectory: step / truth.limit_least,
         frames,
+        shape,
         end,
     })
+}
+
+/// A run that came to its end.
+struct Ended {
+    end: End,
+    frames: Vec<Frame>,
+    shape: Vec<[f32; 3]>,
 }
 
 struct Run<'a> {
@@ -133,7 +143,7 @@ struct Run<'a> {
 }
 
 impl MaterialWork for Run<'_> {
-    type Output = Result<(End, Vec<Frame>), LabError>;
+    type Output = Result<Ended, LabError>;
 
     fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
         let Self { spec, truth, method, multiple, every } = self;
@@ -150,7 +160,7 @@ impl MaterialWork for Run<'_> {
         };
 
         let mut errors = Errors::default();
-        let (mut frames, mut estimate) = (Vec::new(), None);
+        let (mut frames, mut shape, mut estimate) = (Vec::new(), Vec::new(), None);
         let (mut taken, mut limited, mut spent) = (0.0, 0.0, Duration::ZERO);
         let (mut clips, mut predictions) = (0.0, 0_u32);
         let mut loads = spec.loads(&scene)?;
@@ -176,7 +186,7 @@ impl MaterialWork for Run<'_> {
                     Status::Ok => {}
                     Status::Limited { .. } | Status::Inexact { .. } => limited += part,
                     Status::Diverged(divergence) => {
-                        return Ok((End::Diverged(divergence.time), frames));
+                        return Ok(Ended { end: End::Diverged(divergence.time), frames, shape });
                     }
                     Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
                 }
@@ -189,6 +199,8 @@ impl MaterialWork for Run<'_> {
             errors.add_snapshot(truth, state.displacements())?;
             let estimate = estimate.map(|metres| metres.map(|metre| 1e3 * f64::from(metre)));
             frames.push(Frame { mean: errors.mean(), max: errors.max, estimate, ok });
+            shape.clear();
+            shape.extend(state.displacements().iter().map(|vector| vector.to_array()));
         }
         // The lead-in may last to the end.
         let taken = f64::max(taken, 1.0);
@@ -197,7 +209,7 @@ impl MaterialWork for Run<'_> {
             clip_share: if predictions > 0 { clips / f64::from(predictions) } else { limited / taken },
             us_per_step: 1e6 * spent.as_secs_f64() / taken,
         };
-        Ok((End::Reached(figures), frames))
+        Ok(Ended { end: End::Reached(figures), frames, shape })
     }
 }
 
@@ -215,6 +227,7 @@ impl Row {
             step_over_limit_rest: 1.5,
             step_over_limit_trajectory: 2.0,
             frames: Vec::new(),
+            shape: Vec::new(),
             end,
         }
     }

@@ -43,6 +43,9 @@ fn physics_of_a_case_is_a_table_with_orders_of_convergence() {
     // Two kinds of steps on three meshes and an order, for each of three elements.
     assert_eq!(csv.lines().count(), 1 + 3 * 7);
     assert_eq!(csv.matches("order of convergence").count(), 3);
+    let page = std::fs::read_to_string(desk.path("out/report.html")).unwrap();
+    assert!(page.contains("<dd>supple evaluate --physics --scene torsion --out out</dd>"));
+    assert!(page.contains("\"name\":\"torsion: torque\""));
 
     let said = desk.supple(&["evaluate", "--physics", "--scene", "lobe", "--out", "none"]);
     assert_eq!(said.code, 2);

@@ -1,6 +1,6 @@
-//! `supple inspect`: what a mesh or scene is like, faults included, and `supple demo`.
+//! `supple inspect`: what a mesh or scene is like, faults included.
 
-use super::{Desk, bar, names};
+use super::{Desk, bar};
 
 #[test]
 fn a_sound_mesh_is_described() {
@@ -48,25 +48,4 @@ fn a_scene_tells_its_limits_memory_and_cost() {
     for part in ["critical step", "exact limit", "memory", "operations per step", "time per step"] {
         assert!(said.out.contains(part), "{part}: {}", said.out);
     }
-}
-
-#[test]
-fn the_demo_leaves_a_table_a_picture_and_frames() {
-    let desk = Desk::new();
-    let said = desk.supple(&["demo"]);
-    println!("{}", said.out);
-    assert_eq!(said.code, 0, "{}", said.err);
-    for part in ["time per step", "real-time factor", "volume change", "maximum displacement", "instruments"]
-    {
-        assert!(said.out.contains(part), "{part}: {}", said.out);
-    }
-    let files = names(&desk.path("out/demo"));
-    // Frames, the instruments in each, frames.pvd, final.csv, reactions.csv, summary.json and the picture.
-    assert_eq!(files.len(), 2 * 31 + 5, "{files:?}");
-    assert!(files.contains(&"lobe.svg".into()) && files.contains(&"frames.pvd".into()));
-    let summary = std::fs::read_to_string(desk.path("out/demo/summary.json")).unwrap();
-    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
-    assert_eq!(summary["status"], "ok");
-    assert!(summary["volume_change_percent"].as_f64().unwrap().abs() < 1.0);
-    assert!(summary["instruments"][0]["largest_force_n"].as_f64().unwrap() > 0.1);
 }

@@ -1,4 +1,5 @@
 //! The command as a person uses it: scene files in, folders out, exit codes and sentences.
+mod demo;
 mod errors;
 mod evaluate;
 mod inertia;

@@ -113,7 +113,7 @@ fn results_are_complete_and_where_they_should_be() {
     let frames = (0..4).map(|frame| format!("frame_{frame:04}.vtu"));
     let mut expected = vec!["final.csv".to_string()];
     expected.extend(frames);
-    expected.extend(["frames.pvd".to_string(), "summary.json".to_string()]);
+    expected.extend(["frames.pvd", "report.html", "summary.json"].map(String::from));
     assert_eq!(names(&desk.path("out")), expected);
     let summary = desk.summary();
     assert_eq!(summary["status"], "ok");
@@ -145,8 +145,15 @@ fn an_existing_folder_is_left_alone_without_force() {
 
     let fewer = scene.replace("frames = 2", "frames = 1");
     assert_eq!(desk.simulate(&fewer, &["--force"]).code, 0);
-    let expected =
-        ["final.csv", "frame_0000.vtu", "frame_0001.vtu", "frames.pvd", "notes.txt", "summary.json"];
+    let expected = [
+        "final.csv",
+        "frame_0000.vtu",
+        "frame_0001.vtu",
+        "frames.pvd",
+        "notes.txt",
+        "report.html",
+        "summary.json",
+    ];
     assert_eq!(names(&desk.path("out")), expected);
 }
 

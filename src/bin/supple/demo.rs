@@ -1,29 +1,34 @@
-//! `supple demo`: a liver lobe hangs from its back, sags under its own weight, and a ball presses its dome and slides along it.
-//! The mesh is in the program, so the command needs no files.
+//! `supple demo`: a liver lobe that hangs from its back sags under its own weight, and an instrument moves it, by exact, damped and
+//! learned steps side by side. A ball presses its dome and slides along it; forceps grip its front edge and lift it. The learned step
+//! cannot meet the ball. The mesh is in the program, so the command needs no files.
 
 use std::path::Path;
 
-use indicatif::ProgressBar;
+use supple::inertia::{Cells, Method};
 use supple::io::parse_msh;
+use supple::lab::networks::{self, Family};
+use supple::loads::Motion;
 use supple::material::Exponential;
 use supple::mesh::Winding;
-use supple::scene::Support;
+use supple::scene::{Axes, Support};
 
 use crate::problem::{End, Problem};
-use crate::results::folder::PICTURE;
-use crate::results::instrument_mesh;
-use crate::results::picture::{self, Panel};
+use crate::report::demo::{Compared, Run, part, table};
+use crate::report::{self, simulation::shape};
+use crate::results::folder::Folder;
 use crate::scene::body::Body;
 use crate::scene::instruments::Tools;
+use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
-use crate::screen::output;
-use crate::simulate::{Simulated, Simulation};
+use crate::scene::timing::{StepChoice, damper};
+use crate::screen::{output, print};
+use crate::simulate::{Out, Simulated, Simulation, progress_bar};
 
 const LOBE: &[u8] = include_bytes!("../../../meshes/lobe.msh");
 /// Liver-like: shear modulus 1.5 kPa at rest, stiffening like the paper's law, nearly incompressible.
 const TISSUE: Exponential = Exponential { a: 1_500.0, b: 8.023, d: 40_000.0 };
 const DENSITY: f32 = 1_060.0;
-/// 1/s: the lobe rings, but not through the whole second.
+/// 1/s: the lobe rings, but not through the whole second. That of the crate's networks.
 const DAMPING: f32 = 20.0;
 /// Nodes behind this plane hang on the diaphragm, m.
 const BACK: f64 = 0.030;
@@ -32,69 +37,133 @@ const RADIUS: f32 = 0.010;
 const FRICTION: f32 = 0.3;
 const ABOVE: f64 = 0.002;
 const WAY: [(f64, [f64; 3]); 3] = [(0.0, [0.0; 3]), (0.6, [0.0, 0.0, -0.016]), (1.0, [0.006, 0.0, -0.016])];
+/// The forceps: within this distance of the foremost node they grip (m), and lift by so much (m) in so many seconds.
+const GRIP: f64 = 0.010;
+const LIFT: [f32; 3] = [0.0, -0.006, 0.020];
+const LIFTED_IN: f32 = 0.6;
+/// The damped step, over the critical one.
+const TIMES_CRITICAL: f32 = 10.0;
 
-pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
-    let setup = lobe()?;
-    output!(
-        "A liver lobe, held at its back, sags under its own weight; a ball presses its dome and slides along it.\n"
-    );
-    let progress = ProgressBar::hidden();
-    let simulation = Simulation { setup: &setup, out, force: true, unchecked: false, progress };
-    let simulated = setup.with_material(simulation)?;
-    simulated.folder.write_text(PICTURE, &draw(&setup, &simulated))?;
-    let Simulated { folder, outcome, conclusion, .. } = simulated;
-    folder.publish()?;
-    conclusion.print();
-    output!("\npicture  {}", out.join(PICTURE).display());
-    output!("frames   {} (opens in ParaView)", out.join("frames.pvd").display());
-    Ok(outcome.divergence.into())
+/// The instruments, by what they do.
+const BALL: &str = "a ball presses the dome and slides along it";
+const FORCEPS: &str = "forceps grip the front edge and lift it";
+
+/// What moves the lobe.
+#[derive(Clone, Copy)]
+enum Steps {
+    Exact,
+    Damped,
+    Learned,
 }
 
-/// The lobe with its supports and its push.
-fn lobe() -> Result<Setup, Problem> {
+pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
+    output!("A liver lobe, held at its back, sags under its own weight, and an instrument moves it.\n");
+    let mut folder = None;
+    let mut cases = vec![];
+    for instrument in [BALL, FORCEPS] {
+        let mut runs = vec![];
+        for steps in [Steps::Exact, Steps::Damped, Steps::Learned] {
+            // Frames for ParaView of the first run.
+            let out = folder.is_none().then_some(Out { path: out, force: true });
+            let (run, made) = run(lobe(instrument, steps)?, steps.name(), out)?;
+            folder = folder.or(made);
+            runs.push(run);
+        }
+        cases.push(Compared { instrument, runs });
+    }
+    print(table(&cases));
+    let folder = folder.ok_or_else(|| Problem("there are no frames".into()))?;
+    folder.write_text(report::FILE, &report::page("supple demo: a liver lobe", &[part(&cases)])?)?;
+    folder.publish()?;
+    output!("\nreport   {}", out.join(report::FILE).display());
+    output!("frames   {} (opens in ParaView)", out.join("frames.pvd").display());
+    let divergence = cases.iter().flat_map(|case| &case.runs).find_map(|run| run.outcome()?.divergence);
+    Ok(divergence.into())
+}
+
+impl Steps {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Damped => "damped",
+            Self::Learned => "learned",
+        }
+    }
+}
+
+/// A run, its results in a folder if any, and its shapes.
+fn run(setup: Setup, name: &'static str, out: Option<Out<'_>>) -> Result<(Run, Option<Folder>), Problem> {
+    let mut shapes = vec![];
+    let simulation = Simulation {
+        setup: &setup,
+        out,
+        unchecked: false,
+        progress: progress_bar(&setup, &format!("{name} steps  ")),
+        watch: &mut |state| shapes.push(shape(state)),
+    };
+    match setup.with_material(simulation) {
+        Ok(Simulated { folder, outcome, .. }) => {
+            Ok((Run { setup, name, done: Ok((outcome, shapes)) }, folder))
+        }
+        // What learned steps refuse is part of the comparison.
+        Err(why) if setup.learned.is_some() => Ok((Run { setup, name, done: Err(why.to_string()) }, None)),
+        Err(problem) => Err(problem),
+    }
+}
+
+/// The lobe with its supports, what moves it, and an instrument.
+fn lobe(instrument: &str, steps: Steps) -> Result<Setup, Problem> {
     let mesh = parse_msh(Path::new("lobe.msh"), LOBE).map_err(Problem::of)?;
     let body = Body::new(mesh, Winding::Checked, "liver lobe".into());
     let mut setup = Setup::of_body(body, TISSUE, DENSITY);
-    let points = &setup.body.mesh.points;
-    let top =
-        points.iter().copied().fold([0.0, 0.0, f64::NEG_INFINITY], |a, b| if b[2] > a[2] { b } else { a });
-    for (node, point) in (0u32..).zip(points) {
+    for (node, point) in (0u32..).zip(&setup.body.mesh.points) {
         if point[1] > BACK {
             setup.supports.push(Support::fixed(node));
         }
     }
-    let start = [top[0], top[1], top[2] + f64::from(RADIUS) + ABOVE];
-    let path = WAY.map(|(time, way)| (time, [0, 1, 2].map(|axis| start[axis] + way[axis])));
-    setup.tools = Tools::ball(&setup.body, RADIUS, FRICTION, &path);
     setup.gravity = [0.0, 0.0, -9.81];
     setup.damping = DAMPING;
+    if instrument == BALL {
+        press(&mut setup)
+    } else {
+        grip(&mut setup)
+    }
+    match steps {
+        Steps::Exact => {}
+        Steps::Damped => {
+            setup.time.method = Some(Method::Damped(damper()?, Cells::Suggested));
+            setup.time.step = StepChoice::Multiple(TIMES_CRITICAL);
+        }
+        Steps::Learned => {
+            let network = networks::learned(Family::CompactInt8, 50)
+                .ok_or_else(|| Problem("there is no network for fifty steps".into()))?;
+            setup.learned = Some(LearnedChoice::of_demo("compact-50-i8.weights", network));
+        }
+    }
     Ok(setup)
 }
 
-/// The lobe at rest and at the end, as SVG.
-fn draw(Setup { body, tools, .. }: &Setup, Simulated { state, conclusion, .. }: &Simulated) -> String {
-    let rest = &body.mesh.points;
-    let vectors: Vec<_> = state.displacements().iter().map(|vector| vector.to_array()).collect();
-    let moved = rest
-        .iter()
-        .zip(&vectors)
-        .map(|(point, vector)| [0, 1, 2].map(|axis| point[axis] + f64::from(vector[axis])));
-    let length = |vector: &[f32; 3]| vector.iter().map(|c| f64::from(c * c)).sum::<f64>().sqrt();
-    let lengths = vectors.iter().map(length);
-    // The ball as it is at either time, in the colour of what does not move.
-    let [(ball, corners), (ball_after, _)] =
-        [0.0, state.time()].map(|time| instrument_mesh::of(tools, body, time));
-    let first = rest.len() as u32;
-    let mut triangles = body.boundary();
-    triangles.extend(corners.into_iter().map(|corners| corners.map(|corner| first + corner)));
-    let none = vec![0.0; rest.len() + ball.len()];
-    let lengths: Vec<_> = lengths.chain(ball.iter().map(|_| 0.0)).collect();
-    let moved: Vec<_> = moved.chain(ball_after).collect();
-    let rest: Vec<_> = rest.iter().copied().chain(ball).collect();
-    let after = format!("after {:.1} s", state.time());
-    let panels = [
-        Panel { title: "at rest", positions: &rest, displacements: &none },
-        Panel { title: &after, positions: &moved, displacements: &lengths },
-    ];
-    picture::draw(&panels, &triangles, conclusion.figures.max_displacement)
+/// A ball from above the highest node.
+fn press(setup: &mut Setup) {
+    let start = |[x, y, z]: [f64; 3]| [x, y, z + f64::from(RADIUS) + ABOVE];
+    let start = start(extreme(setup, |point| point[2]));
+    let path = WAY.map(|(time, way)| (time, [0, 1, 2].map(|axis| start[axis] + way[axis])));
+    setup.tools = Tools::ball(&setup.body, RADIUS, FRICTION, &path);
+}
+
+/// Forceps at the foremost node: nodes that they grip move as they do.
+fn grip(setup: &mut Setup) {
+    let tip = extreme(setup, |point| -point[1]);
+    let apart = |point: &[f64; 3]| (0..3).map(|axis| (point[axis] - tip[axis]).powi(2)).sum::<f64>().sqrt();
+    let points = (0u32..).zip(&setup.body.mesh.points);
+    let nodes = points.filter(|(_, point)| apart(point) < GRIP).map(|(node, _)| node);
+    setup.motions =
+        nodes.map(|node| Motion { node, axes: Axes::XYZ, metre: LIFT, ramp: LIFTED_IN }).collect();
+    setup.supports.extend(setup.motions.iter().map(|motion| Support::moved(motion.node)));
+}
+
+/// The node at which a coordinate is largest.
+fn extreme(setup: &Setup, along: impl Fn(&[f64; 3]) -> f64) -> [f64; 3] {
+    let points = setup.body.mesh.points.iter().copied();
+    points.max_by(|a, b| along(a).total_cmp(&along(b))).unwrap_or_default()
 }

@@ -1,6 +1,6 @@
 //! `supple evaluate`: methods over scenes, judged against the exact step.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use supple::lab::evaluate::{self, Plan};
@@ -10,11 +10,13 @@ use supple::material::Element;
 
 use crate::element_name::element_named;
 use crate::problem::{End, Problem};
+use crate::report;
 use crate::screen::{message, output, print};
 
 #[derive(Args)]
 pub(crate) struct Asked {
-    /// Folder for results.csv, the sweep and the truths; results of an earlier evaluation are overwritten
+    /// Folder for results.csv, report.html and the truths; results of an earlier evaluation are overwritten, but parts of the report that
+    /// other commands of this kind have added stay
     #[arg(long)]
     out: PathBuf,
     /// Scene, or `ramped` or `moving` for a group of them, all 34 unless given; may be repeated
@@ -33,14 +35,14 @@ pub(crate) struct Asked {
     /// Weight file of a network to judge as well, a learned step's at its own step, a damper's at all; may be repeated
     #[arg(long, value_name = "FILE")]
     weights: Vec<PathBuf>,
-    /// Scene whose error is drawn over the step; reversed unless given, if that is among the scenes
+    /// Scene whose error the report draws over the step; reversed unless given, if that is among the scenes
     #[arg(long, value_name = "SCENE")]
     sweep: Option<String>,
-    /// Judge elements against nature, closed forms and published values instead: physics.csv, physics.md and pictures; a scene is one of
+    /// Judge elements against nature, closed forms and published values instead: physics.csv, physics.md, pictures and a part of report.html; a scene is one of
     /// silicone-beam, bending, cook, cylinder, torsion, punch, all of them unless given
     #[arg(long, conflicts_with_all = ["methods", "multiples", "element", "weights", "sweep"])]
     physics: bool,
-    /// Judge whether runs are ever wrong without a word instead: hard.csv, hard-frames.csv and a picture; a scene is a hard case or one of
+    /// Judge whether runs are ever wrong without a word instead: hard.csv, hard-frames.csv and a part of report.html; a scene is a hard case or one of
     /// the laboratory's, all of them unless given but paper-bar-fine and million-steps, which take minutes
     #[arg(long, conflicts_with_all = ["physics", "multiples", "element", "weights", "sweep"])]
     hard: bool,
@@ -81,13 +83,25 @@ pub(crate) fn evaluate(asked: &Asked) -> Result<End, Problem> {
     for path in weights {
         plan.methods.push(Method::with(path).map_err(Problem::of)?);
     }
-    let rows = evaluate::evaluate(&plan, out, |words| message!("{words}")).map_err(Problem::of)?;
-    print(table::text(&rows));
-    let judged = equal_error::text(&rows);
+    let evaluation = evaluate::evaluate(&plan, out, |words| message!("{words}")).map_err(Problem::of)?;
+    print(table::text(&evaluation.rows));
+    let judged = equal_error::text(&evaluation.rows);
     if !judged.is_empty() {
         print(format_args!("\n{judged}"));
     }
-    output!("\nresults  {}", out.join("results.csv").display());
+    finish(
+        out,
+        "results.csv",
+        report::methods::NAME,
+        &report::methods::part(&evaluation, plan.sweep.as_deref()),
+    )
+}
+
+/// Adds a part to the report, and says where results are.
+fn finish(out: &Path, results: &str, name: &str, part: &report::Part) -> Result<End, Problem> {
+    let report = report::add(out, name, part)?;
+    output!("\nresults  {}", out.join(results).display());
+    output!("report   {}", report.display());
     Ok(End::Reached)
 }
 
@@ -95,8 +109,7 @@ fn evaluate_physics(Asked { out, scenes, .. }: &Asked) -> Result<End, Problem> {
     let plan = physics::Plan::new(scenes).map_err(Problem::of)?;
     let rows = physics::evaluate(&plan, out, |words| message!("{words}")).map_err(Problem::of)?;
     print(physics::tables::tables(&rows));
-    output!("\nresults  {}", out.join("physics.csv").display());
-    Ok(End::Reached)
+    finish(out, "physics.csv", report::physics::NAME, &report::physics::part(&rows))
 }
 
 fn evaluate_hard(
@@ -109,8 +122,7 @@ fn evaluate_hard(
     let plan = hard::Plan::new(scenes, mesh, methods, *random, *every).map_err(Problem::of)?;
     let judged = hard::evaluate(&plan, out, |words| message!("{words}")).map_err(Problem::of)?;
     print(hard::report::text(&judged));
-    output!("\nresults  {}", out.join("hard.csv").display());
-    Ok(End::Reached)
+    finish(out, "hard.csv", report::hard::NAME, &report::hard::part(&judged))
 }
 
 fn evaluate_tolerances(

@@ -16,6 +16,7 @@ mod hostile;
 mod inspect;
 mod networks;
 mod problem;
+mod report;
 mod results;
 mod run;
 mod scene;
@@ -44,7 +45,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Simulate a scene: frames for ParaView, final.csv and summary.json
+    /// Simulate a scene: frames for ParaView, final.csv, summary.json and report.html
     Simulate {
         /// The scene, a TOML file
         scene: PathBuf,
@@ -66,13 +67,13 @@ enum Command {
         #[arg(long, value_name = "MM")]
         accuracy: Option<f64>,
     },
-    /// A liver lobe under its own weight that a ball presses, with a table and a picture
+    /// A liver lobe that an instrument moves, by exact, damped and learned steps side by side: a table and report.html
     Demo {
-        /// Folder for frames and picture; results of an earlier demo are overwritten
+        /// Folder for frames and report; results of an earlier demo are overwritten
         #[arg(long, default_value = "out/demo")]
         out: PathBuf,
     },
-    /// How far from the exact motion methods are, and what they cost: results.csv and a picture
+    /// How far from the exact motion methods are, and what they cost: results.csv and report.html
     Evaluate(evaluate::Asked),
     /// Train a network for the learned step; a training that was stopped goes on where it was
     #[cfg(feature = "train")]

@@ -7,6 +7,7 @@ use supple::element::{ElementMaterial, MaterialWork};
 use supple::state::VecState;
 
 use crate::problem::{End, Problem};
+use crate::report::{self, simulation};
 use crate::results::folder::Folder;
 use crate::results::{self, Conclusion};
 use crate::run::outcome::Outcome;
@@ -18,34 +19,56 @@ use crate::screen::row;
 
 pub(crate) fn simulate(path: &Path, out: &Path, force: bool, unchecked: bool) -> Result<End, Problem> {
     let setup = Setup::read(&SceneFile::read(path)?)?;
-    let progress = ProgressBar::new((setup.time.end * 1e3).ceil() as u64).with_style(progress_style());
-    let simulation = Simulation { setup: &setup, out, force, unchecked, progress };
-    let Simulated { folder, outcome, conclusion, .. } = setup.with_material(simulation)?;
-    folder.publish()?;
+    let simulation = Simulation {
+        setup: &setup,
+        out: Some(Out { path: out, force }),
+        unchecked,
+        progress: progress_bar(&setup, ""),
+        watch: &mut |_| {},
+    };
+    let Simulated { folder, state, outcome, conclusion } = setup.with_material(simulation)?;
+    if let Some(folder) = folder {
+        let part = simulation::part(&setup, &state, &outcome, &conclusion);
+        let title = format!("supple: {}", path.display());
+        folder.write_text(report::FILE, &report::page(&title, &[part])?)?;
+        folder.publish()?;
+    }
     conclusion.print();
     row("results", out.display());
+    row("report", out.join(report::FILE).display());
     Ok(outcome.divergence.into())
 }
 
-fn progress_style() -> ProgressStyle {
-    ProgressStyle::with_template("{bar:40} {pos} of {len} ms simulated, {elapsed} so far, {eta} to go")
-        .unwrap_or_else(|_| ProgressStyle::default_bar())
+/// A bar for a simulation, with what it is about.
+pub(crate) fn progress_bar(setup: &Setup, about: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template(
+        "{msg}{bar:40} {pos} of {len} ms simulated, {elapsed} so far, {eta} to go",
+    )
+    .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new((setup.time.end * 1e3).ceil() as u64).with_style(style).with_message(about.to_owned())
 }
 
-/// A simulation from rest, with its results in a folder that is not in its place yet.
+/// A simulation from rest, with its results in a folder that is not in its place yet, if any.
 pub(crate) struct Simulation<'a> {
     pub(crate) setup: &'a Setup,
-    pub(crate) out: &'a Path,
-    /// Whether results in a folder that is there are overwritten.
-    pub(crate) force: bool,
+    pub(crate) out: Option<Out<'a>>,
     /// Whether a step above the critical one is taken all the same.
     pub(crate) unchecked: bool,
     pub(crate) progress: ProgressBar,
+    /// Is shown the state at each frame.
+    pub(crate) watch: &'a mut dyn FnMut(&VecState),
+}
+
+/// Where results go.
+pub(crate) struct Out<'a> {
+    pub(crate) path: &'a Path,
+    /// Whether results in a folder that is there are overwritten.
+    pub(crate) force: bool,
 }
 
 /// What a simulation came to.
 pub(crate) struct Simulated {
-    pub(crate) folder: Folder,
+    pub(crate) folder: Option<Folder>,
     pub(crate) state: VecState,
     pub(crate) outcome: Outcome,
     pub(crate) conclusion: Conclusion,
@@ -55,22 +78,25 @@ impl MaterialWork for Simulation<'_> {
     type Output = Result<Simulated, Problem>;
 
     fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
-        let Self { setup, out, force, unchecked, progress } = self;
+        let Self { setup, out, unchecked, progress, watch } = self;
         let (scene, mut state) = setup.build(material)?;
         let scene = scene.view();
         // All that can be refused in the scene is refused before there is a folder.
         let start = Start::new(setup, scene, &mut state, unchecked)?;
-        let mut folder = Folder::create(out, force)?;
+        let mut folder = out.map(|Out { path, force }| Folder::create(path, force)).transpose()?;
 
         let tick = |time: f64| progress.set_position((time * 1e3) as u64);
-        let mut frame = |state: &mut VecState| folder.add_frame(setup, scene, state);
+        let mut frame = |state: &mut VecState| {
+            watch(state);
+            folder.as_mut().map_or(Ok(()), |folder| folder.add_frame(setup, scene, state))
+        };
         let outcome = run(setup, scene, &mut state, start, &tick, &mut frame)?;
         if outcome.divergence.is_some() {
             // The last state that may be believed.
             frame(&mut state)?;
         }
         progress.finish_and_clear();
-        let conclusion = results::conclude(&folder, setup, scene, &state, &outcome)?;
+        let conclusion = results::conclude(folder.as_ref(), setup, scene, &state, &outcome)?;
         Ok(Simulated { folder, state, outcome, conclusion })
     }
 }

@@ -8,7 +8,7 @@
 //! | [`cases`] | scenes that are made to break a step |
 //! | [`random`] | random bodies, materials, supports and loads |
 //! | [`verdict`] | what was wrong, what was told, and how far off the estimates are |
-//! | [`report`] | tables for people and programs, and the picture |
+//! | [`report`] | tables for people and programs |
 
 pub mod cases;
 pub mod random;
@@ -127,7 +127,7 @@ fn multiple_near(timing: &Timing, critical: f32, times: u32) -> u32 {
     divisors.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(1)
 }
 
-/// Carries the plan out on two threads: truths in `out/truth/`, tables and a picture in `out`. `say` is given the progress in words.
+/// Carries the plan out on two threads: truths in `out/truth/`, tables in `out`. `say` is given the progress in words.
 pub fn evaluate(plan: &Plan, out: &Path, say: impl Fn(&str) + Sync) -> Result<Vec<Judged>, LabError> {
     let judge = |index: usize| {
         let Some((spec, truth)) = plan.scene(index, out)? else { return Ok(Vec::new()) };

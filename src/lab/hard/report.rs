@@ -1,5 +1,4 @@
-//! Judged runs for people and programs: `hard.csv` with a row a run, `hard-frames.csv` with a row a snapshot, a table, and a picture of
-//! estimates over true errors. Lengths in mm.
+//! Judged runs for people and programs: `hard.csv` with a row a run, `hard-frames.csv` with a row a snapshot, a table. Lengths in mm.
 
 use std::format;
 use std::path::Path;
@@ -8,7 +7,6 @@ use std::vec::Vec;
 
 use super::super::LabError;
 use super::super::method::Method;
-use super::super::plot::{line, put};
 use super::verdict::{Judged, Verdict};
 use crate::io::write_atomically;
 
@@ -44,8 +42,6 @@ pub(super) fn write(judged: &[Judged], out: &Path) -> Result<(), LabError> {
         }
         Ok(())
     })?;
-    let svg = draw(judged);
-    write_atomically(&out.join("hard.svg"), |file| file.write_all(svg.as_bytes()))?;
     Ok(())
 }
 
@@ -153,85 +149,4 @@ pub fn text(judged: &[Judged]) -> String {
         );
     }
     text
-}
-
-/// Estimate over true error at the worst snapshot of each run, of a silent run at the worst that is silent, with logarithmic axes. What
-/// is beyond them stands at the edge, and what is silent on top.
-fn draw(judged: &[Judged]) -> String {
-    const SIZE: f64 = 560.0;
-    const MARGIN: f64 = 70.0;
-    const DECADES: core::ops::RangeInclusive<i32> = -3..=3;
-    let (low, high) = (f64::from(*DECADES.start()), f64::from(*DECADES.end()));
-    let along = |value: f64| (value.log10().clamp(low, high) - low) / (high - low) * (SIZE - 2.0 * MARGIN);
-    let (x, y) = (|value: f64| MARGIN + along(value), |value: f64| SIZE - MARGIN - along(value));
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{SIZE}\" height=\"{SIZE}\" viewBox=\"0 0 {SIZE} {SIZE}\" \
-         font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"{SIZE}\" height=\"{SIZE}\" fill=\"white\"/>\n\
-         <text x=\"{MARGIN}\" y=\"26\" font-size=\"16\">Hard cases: estimate over true error</text>\n\
-         <text x=\"{MARGIN}\" y=\"46\" fill=\"#d55e00\">\u{25cf} silently wrong</text>\n\
-         <text x=\"194\" y=\"46\" fill=\"#0072b2\">\u{25cf} right, or told</text>\n\
-         <text x=\"312\" y=\"46\" fill=\"#555\">below the line: estimate too low</text>\n"
-    );
-    for decade in DECADES {
-        let at = 10.0_f64.powi(decade);
-        let label = match decade {
-            decade if decade == *DECADES.start() => format!("\u{2264}{at}"),
-            decade if decade == *DECADES.end() => format!("\u{2265}{at}"),
-            _ => format!("{at}"),
-        };
-        line(&mut svg, (x(at), y(1e-3)), (x(at), y(1e3)), "#ddd");
-        line(&mut svg, (x(1e-3), y(at)), (x(1e3), y(at)), "#ddd");
-        put(
-            &mut svg,
-            format_args!(
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
-                x(at),
-                y(1e-3) + 18.0
-            ),
-        );
-        put(
-            &mut svg,
-            format_args!(
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
-                x(1e-3) - 6.0,
-                y(at) + 4.0
-            ),
-        );
-    }
-    let (silent, others): (Vec<&Judged>, _) = judged.iter().partition(|run| run.verdict() == Verdict::Silent);
-    for run in others.into_iter().chain(silent) {
-        let (frame, colour, radius, opacity) = match run.worst_silent() {
-            Some((frame, ..)) => (Some(frame), "#d55e00", 3.0, 1.0),
-            None => (run.worst(), "#0072b2", 2.0, 0.35),
-        };
-        let Some(frame) = frame else { continue };
-        let Some([estimate, _]) = frame.estimate else { continue };
-        put(
-            &mut svg,
-            format_args!(
-                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"{radius}\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>",
-                x(frame.mean),
-                y(estimate)
-            ),
-        );
-    }
-    // Above the runs, which may be thousands.
-    line(&mut svg, (x(1e-3), y(1e-3)), (x(1e3), y(1e3)), "#000");
-    put(
-        &mut svg,
-        format_args!(
-            "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">true mean error, mm</text>",
-            0.5 * SIZE,
-            SIZE - 20.0
-        ),
-    );
-    put(
-        &mut svg,
-        format_args!(
-            "<text transform=\"translate(18 {}) rotate(-90)\" text-anchor=\"middle\">estimate, mm</text>",
-            0.5 * SIZE
-        ),
-    );
-    svg += "</svg>\n";
-    svg
 }

@@ -10,7 +10,7 @@ use super::Row;
 use super::mesh::GRID;
 use super::silicone::DISTANCE;
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
-use crate::lab::plot::{COLOURS, line, put};
+use super::svg::{COLOURS, line, put};
 use crate::material::Element;
 
 const WIDTH: f64 = 860.0;

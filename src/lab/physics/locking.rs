@@ -10,7 +10,7 @@ use super::mesh::same;
 use super::recordings::MARKERS;
 use super::silicone::{self, Hung, LOADS, SIZE};
 use super::steps::EXACT;
-use crate::lab::plot::put;
+use super::svg::put;
 use crate::material::Element;
 
 /// Cells of the coarser and of the finer picture.

@@ -13,7 +13,7 @@
 //! | `steps`, `rest` | exact steps, damped ones and backward Euler; the shape at rest |
 //! | `pressure` | how much pressure oscillates from node to node |
 //! | [`report`], [`tables`] | rows as a file, and as the tables of the documentation |
-//! | `figure`, `locking` | pictures of error over computing time, and of the beam at rest |
+//! | `figure`, `locking`, `svg` | pictures of error over computing time, and of the beam at rest |
 
 mod bending;
 mod body;
@@ -29,6 +29,7 @@ pub mod report;
 mod rest;
 mod silicone;
 mod steps;
+mod svg;
 mod swing;
 pub mod tables;
 mod torsion;

@@ -13,13 +13,12 @@ use supple::tled;
 use super::instrument_mesh;
 use super::staging::Staging;
 use crate::problem::Problem;
+use crate::report;
 use crate::scene::body::Body;
 use crate::scene::setup::Setup;
 
 /// Results but frames, by the names of their files.
-const TABLES: [&str; 5] = ["frames.pvd", "final.csv", "reactions.csv", "summary.json", PICTURE];
-/// The picture of a demo.
-pub(crate) const PICTURE: &str = "lobe.svg";
+const TABLES: [&str; 5] = ["frames.pvd", "final.csv", "reactions.csv", "summary.json", report::FILE];
 
 /// The folder of a simulation's results.
 pub(crate) struct Folder {

@@ -1,12 +1,11 @@
-//! What a simulation leaves behind: frames for ParaView, `final.csv`, `summary.json`, and a table on the
+//! What a simulation leaves behind: frames for ParaView, `final.csv`, `summary.json`, `report.html`, and a table on the
 //! screen. People read millimetres and percent; files hold SI units unless their names say otherwise.
 
 pub(crate) mod figures;
 pub(crate) mod folder;
 pub(crate) mod instrument_mesh;
-pub(crate) mod picture;
-pub(crate) mod report;
 mod staging;
+pub(crate) mod summary;
 pub(crate) mod warnings;
 
 use supple::element::ElementMaterial;
@@ -19,18 +18,17 @@ use crate::scene::setup::Setup;
 use crate::screen::{message, print};
 use figures::Figures;
 use folder::Folder;
-use report::Report;
+use summary::Summary;
 
 /// What there is to tell of a simulation once its results are in their place.
 pub(crate) struct Conclusion {
-    pub(crate) figures: Figures,
-    report: Report,
-    warnings: Vec<String>,
+    pub(crate) summary: Summary,
+    pub(crate) warnings: Vec<String>,
 }
 
-/// Adds `final.csv` and `summary.json` to the folder.
+/// Tells what there is to tell, and adds `final.csv` and `summary.json` to the folder, if there is one.
 pub(crate) fn conclude<M: ElementMaterial>(
-    folder: &Folder,
+    folder: Option<&Folder>,
     setup: &Setup,
     scene: SceneView<'_, M>,
     state: &VecState,
@@ -38,19 +36,21 @@ pub(crate) fn conclude<M: ElementMaterial>(
 ) -> Result<Conclusion, Problem> {
     let figures = Figures::new(setup, scene, state, outcome);
     let warnings = warnings::of(setup, outcome);
-    let report = report::of(setup, outcome, &figures, &warnings);
-    folder.write_final(&setup.body, state)?;
-    if !outcome.reactions.is_empty() {
-        folder.write_text("reactions.csv", &outcome.reactions.table())?;
+    let summary = summary::of(setup, outcome, &figures, &warnings);
+    if let Some(folder) = folder {
+        folder.write_final(&setup.body, state)?;
+        if !outcome.reactions.is_empty() {
+            folder.write_text("reactions.csv", &outcome.reactions.table())?;
+        }
+        folder.write_text("summary.json", &summary.json())?;
     }
-    folder.write_text("summary.json", &report.summary())?;
-    Ok(Conclusion { figures, report, warnings })
+    Ok(Conclusion { summary, warnings })
 }
 
 impl Conclusion {
     /// Prints the table and the warnings.
     pub(crate) fn print(&self) {
-        print(self.report.table());
+        print(self.summary.table());
         for warning in &self.warnings {
             message!("warning: {warning}");
         }

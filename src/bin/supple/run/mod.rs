@@ -47,6 +47,7 @@ pub(crate) fn run<M: ElementMaterial>(
         outcome.steps.0 = outcome.steps.0.min(Pace::SHARE * at_rest.seconds);
         outcome.steps.1 = outcome.steps.0;
     }
+    outcome.enter_frame(state);
     frame(state)?;
     // Time goes in even intervals, each one step or one of a network, unless exact steps alone set their own pace.
     let interval = if let Mover::Learned(learned) = &mover { learned.seconds() } else { step.seconds() };
@@ -71,7 +72,9 @@ pub(crate) fn run<M: ElementMaterial>(
                 let motion = Motion { scene, loads, damping: setup.damping, end: time.end, tick };
                 mover.advance(&motion, state, &mut outcome, interval)?;
                 if let Some(guard) = guard.as_mut().filter(|_| outcome.divergence.is_none()) {
+                    let begun = Instant::now();
                     let status = guard.follow(Status::Ok, scene, &loads, &state.view());
+                    outcome.guarding += begun.elapsed();
                     let trace = outcome.guard.get_or_insert_default();
                     trace.enter(status, guard.estimate(), state.time());
                     if let (Mover::Learned(learned), Status::Inexact { .. }) = (&mut mover, status) {
@@ -94,6 +97,7 @@ pub(crate) fn run<M: ElementMaterial>(
         if mover.fixed_exact_seconds().is_some_and(|seconds| seconds > bound.seconds) {
             outcome.above_from.get_or_insert(state.time());
         }
+        outcome.enter_frame(state);
         frame(state)?;
     }
     if let Mover::Learned(learned) = mover {

@@ -7,7 +7,7 @@ use supple::guard::Estimate;
 use supple::inertia::{Grid, LargeModel, Method, Report};
 use supple::learned::{Fallback, LearnedModel, LearnedReport};
 use supple::material::J_FLOOR;
-use supple::state::StateView;
+use supple::state::{StateView, VecState};
 use supple::step::{CriticalStep, Divergence, Status};
 
 use super::reactions::Reactions;
@@ -37,6 +37,18 @@ impl Limits {
     };
 }
 
+/// What was known at a frame.
+#[derive(Clone, Copy)]
+pub(crate) struct FrameTrace {
+    /// s.
+    pub(crate) time: f64,
+    /// Mean and largest displacement of the nodes, m.
+    pub(crate) mean: f64,
+    pub(crate) largest: f64,
+    /// The error by the guard's estimate.
+    pub(crate) estimate: Option<Estimate>,
+}
+
 /// What became of a simulation.
 pub(crate) struct Outcome {
     pub(crate) at_rest: CriticalStep,
@@ -46,8 +58,10 @@ pub(crate) struct Outcome {
     pub(crate) steps: (f32, f32),
     /// Steps computed, those undone included.
     pub(crate) computed: u64,
-    /// Time spent in steps, looks at the critical step included.
+    /// Time spent in steps, looks at the critical step and the guard included.
     pub(crate) spent: Duration,
+    /// That of the guard.
+    pub(crate) guarding: Duration,
     pub(crate) limits: Limits,
     pub(crate) divergence: Option<Divergence>,
     /// The first frame at which a fixed step was above the bound, s.
@@ -62,6 +76,7 @@ pub(crate) struct Outcome {
     pub(crate) guard: Option<GuardTrace>,
     /// With instruments.
     pub(crate) reactions: Reactions,
+    pub(crate) frames: Vec<FrameTrace>,
 }
 
 impl Outcome {
@@ -73,6 +88,7 @@ impl Outcome {
             steps: (seconds, seconds),
             computed: 0,
             spent: Duration::ZERO,
+            guarding: Duration::ZERO,
             limits: Limits::NONE,
             divergence: None,
             above_from: None,
@@ -81,7 +97,34 @@ impl Outcome {
             adaptive: None,
             guard: None,
             reactions: Reactions::NONE,
+            frames: vec![],
         }
+    }
+
+    /// How it went, in a word: the worst there was.
+    pub(crate) fn status(&self) -> &'static str {
+        let fell_back = self.learned.as_ref().is_some_and(|trace| trace.fell_back.is_some());
+        let inexact = self.guard.is_some_and(|guard| guard.inexact > 0);
+        match (&self.divergence, self.limits.steps) {
+            (Some(_), _) => "diverged",
+            (None, _) if fell_back => "fell back",
+            (None, 1..) => "limited",
+            (None, 0) if inexact => "inexact",
+            (None, 0) => "ok",
+        }
+    }
+
+    /// Takes down a frame.
+    pub(crate) fn enter_frame(&mut self, state: &VecState) {
+        let squares = state.displacements().iter().map(|vector| {
+            vector.to_array().iter().map(|component| f64::from(*component).powi(2)).sum::<f64>()
+        });
+        let (sum, largest) = squares
+            .map(f64::sqrt)
+            .fold((0.0, 0.0_f64), |(sum, largest), length| (sum + length, largest.max(length)));
+        let mean = sum / state.displacements().len().max(1) as f64;
+        let estimate = self.guard.and_then(|guard| guard.latest);
+        self.frames.push(FrameTrace { time: state.time(), mean, largest, estimate });
     }
 
     /// Takes down what a step said that led to `state`.

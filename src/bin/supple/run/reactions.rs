@@ -88,14 +88,18 @@ impl Reactions {
 
     /// The largest mean force on each instrument, N, with its time, s, its contacts and depth, m.
     pub(crate) fn largest(&self) -> Vec<(f64, f64, u32, f32)> {
-        let length =
-            |force: [f64; 3]| force.iter().map(|component| component * component).sum::<f64>().sqrt();
         let of = |index: usize| {
             let rows = self.rows.iter().map(|(time, of)| (length(of[index].force), *time, of[index]));
             let most = rows.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default();
             (most.0, most.1, most.2.contacts, most.2.depth)
         };
         (0..self.current.len()).map(of).collect()
+    }
+
+    /// Of each instrument: times, s, and mean forces, N.
+    pub(crate) fn forces(&self) -> Vec<Vec<(f64, f64)>> {
+        let of = |index: usize| self.rows.iter().map(move |(time, of)| (*time, length(of[index].force)));
+        (0..self.current.len()).map(|index| of(index).collect()).collect()
     }
 
     /// `reactions.csv`.
@@ -112,4 +116,8 @@ impl Reactions {
         }
         text
     }
+}
+
+fn length(force: [f64; 3]) -> f64 {
+    force.iter().map(|component| component * component).sum::<f64>().sqrt()
 }

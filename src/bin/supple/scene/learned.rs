@@ -60,6 +60,12 @@ impl LearnedChoice {
         Ok(learned)
     }
 
+    /// A network of the crate with fallback, for the demo.
+    pub(crate) fn of_demo(name: &str, bytes: &[u8]) -> Self {
+        let memory = WeightBytes::of(bytes);
+        Self { path: name.into(), place: "demo".into(), memory, burn_in: BURN_IN, fallback: true }
+    }
+
     pub(crate) fn network(&self) -> Result<Network<'_>, Problem> {
         weight_file::parse(&self.path, &self.memory)
             .map_err(|problem| Problem(format!("{}: {problem}", self.place)))

@@ -82,7 +82,7 @@ impl Timing {
         Ok(timing)
     }
 
-    /// The exact step at its automatic length for one second.
+    /// The exact step at its automatic length, with frames at whole numbers of steps of the crate's networks.
     pub(crate) fn of_demo() -> Self {
         Self {
             method: None,
@@ -91,8 +91,8 @@ impl Timing {
             tolerance: None,
             step_at: "demo".into(),
             lattice_at: None,
-            end: 1.0,
-            frames: 30,
+            end: 1.02,
+            frames: 34,
         }
     }
 

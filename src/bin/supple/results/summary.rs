@@ -1,5 +1,4 @@
-//! The report of a simulation: one list of what there is to tell, each with a row of the table on the screen and its figures in
-//! `summary.json`.
+//! The summary of a simulation: one list of what there is to tell, each with a row of the table and its figures in `summary.json`.
 
 use serde_json::{Map, Value, json};
 use supple::adaptive::Taken;
@@ -13,12 +12,12 @@ use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
 
 #[derive(Default)]
-pub(crate) struct Report {
+pub(crate) struct Summary {
     rows: Vec<(&'static str, String)>,
     figures: Map<String, Value>,
 }
 
-impl Report {
+impl Summary {
     /// Adds a row of the table, if there are words for it, and its figures, a JSON object.
     fn add(&mut self, name: &'static str, words: impl Into<Option<String>>, figures: Value) {
         self.rows.extend(words.into().map(|words| (name, words)));
@@ -45,42 +44,38 @@ impl Report {
         self.rows.iter().map(|(name, words)| format!("{name:<21} {words}\n")).collect()
     }
 
+    /// The rows of the table.
+    pub(crate) fn rows(&self) -> &[(&'static str, String)] {
+        &self.rows
+    }
+
     /// `summary.json`.
-    pub(crate) fn summary(&self) -> String {
+    pub(crate) fn json(&self) -> String {
         format!("{:#}\n", Value::Object(self.figures.clone()))
     }
 }
 
 /// All there is to tell.
-pub(crate) fn of(setup: &Setup, outcome: &Outcome, figures: &Figures, warnings: &[String]) -> Report {
-    let mut report = Report::default();
-    add_ending(&mut report, outcome);
-    report.add_figures(json!({ "method": setup.method_name(), "warnings": warnings }));
-    add_scene(&mut report, setup, figures);
+pub(crate) fn of(setup: &Setup, outcome: &Outcome, figures: &Figures, warnings: &[String]) -> Summary {
+    let mut summary = Summary::default();
+    add_ending(&mut summary, outcome);
+    summary.add_figures(json!({ "method": setup.method_name(), "warnings": warnings }));
+    add_scene(&mut summary, setup, figures);
     let learned = setup.learned.as_ref().zip(outcome.learned.as_ref());
-    report.add_section("learned", learned.map(|(choice, trace)| learned_section(choice, trace)));
+    summary.add_section("learned", learned.map(|(choice, trace)| learned_section(choice, trace)));
     let large = outcome.large.as_ref();
-    report.add_section("inertia", large.map(|trace| large_section(setup.method_name(), trace, outcome)));
-    add_steps(&mut report, setup, outcome, figures);
-    report.add_section("adaptive", outcome.adaptive.as_ref().map(adaptive_section));
-    add_estimate(&mut report, outcome.guard.as_ref());
-    add_motion(&mut report, figures);
-    add_reactions(&mut report, &outcome.reactions);
-    report
+    summary.add_section("inertia", large.map(|trace| large_section(setup.method_name(), trace, outcome)));
+    add_steps(&mut summary, setup, outcome, figures);
+    summary.add_section("adaptive", outcome.adaptive.as_ref().map(adaptive_section));
+    add_estimate(&mut summary, outcome.guard.as_ref());
+    add_motion(&mut summary, figures);
+    add_reactions(&mut summary, &outcome.reactions);
+    summary
 }
 
-fn add_ending(report: &mut Report, outcome: &Outcome) {
-    let fell_back = outcome.learned.as_ref().is_some_and(|trace| trace.fell_back.is_some());
-    let inexact = outcome.guard.is_some_and(|guard| guard.inexact > 0);
-    let status = match (&outcome.divergence, outcome.limits.steps) {
-        (Some(_), _) => "diverged",
-        (None, _) if fell_back => "fell back",
-        (None, 1..) => "limited",
-        (None, 0) if inexact => "inexact",
-        (None, 0) => "ok",
-    };
-    report.add_figures(json!({
-        "status": status,
+fn add_ending(summary: &mut Summary, outcome: &Outcome) {
+    summary.add_figures(json!({
+        "status": outcome.status(),
         "divergence": outcome.divergence.map(|divergence| json!({
             "time_s": divergence.time, "node": divergence.node, "sentence": divergence.to_string(),
         })),
@@ -88,9 +83,9 @@ fn add_ending(report: &mut Report, outcome: &Outcome) {
     }));
 }
 
-fn add_scene(report: &mut Report, setup: &Setup, figures: &Figures) {
+fn add_scene(summary: &mut Summary, setup: &Setup, figures: &Figures) {
     let elements = setup.body.mesh.tets.len();
-    report.add(
+    summary.add(
         "mesh",
         format!(
             "{}: {} nodes, {elements} tetrahedra, {:.1} g",
@@ -107,15 +102,15 @@ fn add_scene(report: &mut Report, setup: &Setup, figures: &Figures) {
         }),
     );
     let material = setup.tissues.to_string();
-    report.add("material", material.clone(), json!({ "material": material }));
-    report.add_figures(json!({ "damping_per_s": decimal(setup.damping) }));
+    summary.add("material", material.clone(), json!({ "material": material }));
+    summary.add_figures(json!({ "damping_per_s": decimal(setup.damping) }));
 }
 
-fn add_steps(report: &mut Report, setup: &Setup, outcome: &Outcome, figures: &Figures) {
+fn add_steps(summary: &mut Summary, setup: &Setup, outcome: &Outcome, figures: &Figures) {
     let (shortest, longest) = outcome.steps;
     let range = if shortest == longest { String::new() } else { format!("{shortest:.3e} to ") };
     let (least, least_at) = outcome.least;
-    report.add(
+    summary.add(
         "step",
         format!(
             "{range}{longest:.3e} s; stable at rest {:.3e} s, least on the way {:.3e} s",
@@ -133,7 +128,7 @@ fn add_steps(report: &mut Report, setup: &Setup, outcome: &Outcome, figures: &Fi
         (undone @ 1.., None) => format!(", {undone} more undone"),
         _ => String::new(),
     };
-    report.add(
+    summary.add(
         "simulated",
         format!("{:.3} s in {} steps{undone}", figures.time, figures.steps),
         json!({
@@ -144,15 +139,15 @@ fn add_steps(report: &mut Report, setup: &Setup, outcome: &Outcome, figures: &Fi
         }),
     );
     let (us, factor) = (figures.us_per_step, figures.real_time_factor);
-    report.add("time per step", format!("{us:.1} us"), json!({ "us_per_step": us }));
+    summary.add("time per step", format!("{us:.1} us"), json!({ "us_per_step": us }));
     let words = format!("{factor:.3} (1 and more is real time)");
-    report.add("real-time factor", words, json!({ "real_time_factor": factor }));
+    summary.add("real-time factor", words, json!({ "real_time_factor": factor }));
 }
 
 /// The error that the guard estimates; nothing with exact steps, which have none.
-fn add_estimate(report: &mut Report, guard: Option<&GuardTrace>) {
+fn add_estimate(summary: &mut Summary, guard: Option<&GuardTrace>) {
     let latest = guard.and_then(|guard| guard.latest);
-    report.add(
+    summary.add(
         "error estimate",
         guard.zip(latest).map(|(guard, latest)| {
             format!(
@@ -172,28 +167,28 @@ fn add_estimate(report: &mut Report, guard: Option<&GuardTrace>) {
     );
 }
 
-fn add_motion(report: &mut Report, figures: &Figures) {
+fn add_motion(summary: &mut Summary, figures: &Figures) {
     let (percent, least) = (100.0 * figures.volume_change, figures.least_volume_ratio);
-    report.add(
+    summary.add(
         "volume change",
         format!("{percent:+.3} % (smallest element {least:.3} of its volume)"),
         json!({ "volume_change_percent": percent, "least_volume_ratio": least }),
     );
     let (mm, node) = (1e3 * figures.max_displacement, figures.max_node);
-    report.add(
+    summary.add(
         "maximum displacement",
         format!("{mm:.3} mm at node {node}"),
         json!({ "max_displacement_mm": mm, "max_displacement_node": node }),
     );
     let energy = &figures.energy;
-    report.add_figures(json!({ "energy_j": {
+    summary.add_figures(json!({ "energy_j": {
         "work": energy.work, "dissipated": energy.dissipated,
         "kinetic": energy.kinetic, "strain": figures.strain_energy,
     } }));
 }
 
 /// What the instruments felt.
-fn add_reactions(report: &mut Report, reactions: &Reactions) {
+fn add_reactions(summary: &mut Summary, reactions: &Reactions) {
     if reactions.is_empty() {
         return;
     }
@@ -204,7 +199,7 @@ fn add_reactions(report: &mut Report, reactions: &Reactions) {
     let figures = largest.iter().map(|(newton, time, contacts, depth)| {
         json!({ "largest_force_n": newton, "at_s": time, "contacts": contacts, "depth_m": decimal(*depth) })
     });
-    report.add(
+    summary.add(
         "instruments",
         words.collect::<Vec<_>>().join(", "),
         json!({ "instruments": figures.collect::<Vec<_>>() }),
@@ -212,8 +207,8 @@ fn add_reactions(report: &mut Report, reactions: &Reactions) {
 }
 
 /// Mass-scaled, multilevel or damped steps.
-fn large_section(method: &str, trace: &LargeTrace, outcome: &Outcome) -> Report {
-    let mut section = Report::default();
+fn large_section(method: &str, trace: &LargeTrace, outcome: &Outcome) -> Summary {
+    let mut section = Summary::default();
     let multiple = outcome.steps.1 / outcome.at_rest.seconds;
     section.add(
         "method",
@@ -264,8 +259,8 @@ fn large_section(method: &str, trace: &LargeTrace, outcome: &Outcome) -> Report 
 }
 
 /// Steps that choose their length.
-fn adaptive_section(AdaptiveTrace { tolerance, taken }: &AdaptiveTrace) -> Report {
-    let mut section = Report::default();
+fn adaptive_section(AdaptiveTrace { tolerance, taken }: &AdaptiveTrace) -> Summary {
+    let mut section = Summary::default();
     let millimetres = 1e3 * f64::from(*tolerance);
     section.add(
         "tolerance",
@@ -282,8 +277,8 @@ fn adaptive_section(AdaptiveTrace { tolerance, taken }: &AdaptiveTrace) -> Repor
 }
 
 /// Learned steps.
-fn learned_section(choice: &LearnedChoice, trace: &LearnedTrace) -> Report {
-    let mut section = Report::default();
+fn learned_section(choice: &LearnedChoice, trace: &LearnedTrace) -> Summary {
+    let mut section = Summary::default();
     let path = choice.path.display().to_string();
     section.add(
         "network",

@@ -1,0 +1,212 @@
+//! Steps side by side on one body: a table for the screen and the report, shapes at the end, error over time with its estimate.
+
+use plotly::common::DashType;
+
+use super::bodies::lengths;
+use super::made::Made;
+use super::plots::{self, COLOURS, Curve, GREY, short};
+use super::simulation::body;
+use super::{Figure, Panel, Part, Section, Table};
+use crate::run::outcome::Outcome;
+use crate::scene::setup::Setup;
+
+/// Displacement of each node, m.
+type Shape = Vec<[f32; 3]>;
+
+/// One instrument and what moved the body under it; the first run is the exact one.
+pub(crate) struct Compared {
+    pub(crate) instrument: &'static str,
+    pub(crate) runs: Vec<Run>,
+}
+
+pub(crate) struct Run {
+    pub(crate) setup: Setup,
+    pub(crate) name: &'static str,
+    /// Its outcome with a shape for each frame, or why there is none.
+    pub(crate) done: Result<(Outcome, Vec<Shape>), String>,
+}
+
+impl Run {
+    pub(crate) fn outcome(&self) -> Option<&Outcome> {
+        self.done.as_ref().ok().map(|(outcome, _)| outcome)
+    }
+
+    fn shapes(&self) -> &[Shape] {
+        self.done.as_ref().map_or(&[], |(_, shapes)| shapes)
+    }
+}
+
+/// Mean distance of the nodes between two shapes, mm.
+fn apart(a: &Shape, b: &Shape) -> f64 {
+    let pairs = a.iter().zip(b);
+    let distances = lengths(&pairs.map(|(a, b)| [0, 1, 2].map(|axis| a[axis] - b[axis])).collect::<Vec<_>>());
+    1e3 * distances.iter().sum::<f64>() / distances.len().max(1) as f64
+}
+
+/// Mean errors of the nodes at the frames of a run, mm.
+fn errors(exact: &[Shape], shapes: &[Shape]) -> Vec<f64> {
+    exact.iter().zip(shapes).map(|(exact, shape)| apart(exact, shape)).collect()
+}
+
+fn still(exact: &[Shape]) -> Vec<f64> {
+    exact.iter().map(|shape| 1e3 * lengths(shape).iter().sum::<f64>() / shape.len().max(1) as f64).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+const COLUMNS: usize = 8;
+
+const HEADS: [&str; COLUMNS] = [
+    "steps",
+    "length, ms",
+    "s for a simulated second",
+    "guard, s",
+    "real-time factor",
+    "error, mm",
+    "standing still, mm",
+    "status",
+];
+
+fn rows(case: &Compared) -> Vec<[String; COLUMNS]> {
+    let exact = case.runs.first().map_or(&[][..], Run::shapes);
+    let row = |(index, run): (usize, &Run)| {
+        let (outcome, shapes) = match &run.done {
+            Ok(done) => done,
+            Err(_) => {
+                let mut row = [""; COLUMNS].map(String::from);
+                (row[0], row[COLUMNS - 1]) = (run.name.into(), "refused".into());
+                return row;
+            }
+        };
+        let reached = outcome.frames.last().map_or(0.0, |frame| frame.time);
+        let [spent, guarding] = [outcome.spent, outcome.guarding].map(|spent| spent.as_secs_f64());
+        let error = if index == 0 { "reference".into() } else { short(mean(&errors(exact, shapes))) };
+        [
+            run.name.into(),
+            format!("{:.2}", 1e3 * outcome.steps.1),
+            short((spent - guarding) / reached.max(1e-9)),
+            if outcome.guard.is_some() { short(guarding / reached.max(1e-9)) } else { "none".into() },
+            short(reached / spent.max(1e-9)),
+            error,
+            short(mean(&still(exact))),
+            outcome.status().into(),
+        ]
+    };
+    case.runs.iter().enumerate().map(row).collect()
+}
+
+/// The table on the screen.
+pub(crate) fn table(cases: &[Compared]) -> String {
+    let rows: Vec<_> = cases.iter().map(rows).collect();
+    let mut widths = HEADS.map(str::len);
+    for row in rows.iter().flatten() {
+        for (width, cell) in widths.iter_mut().zip(row) {
+            *width = cell.len().max(*width);
+        }
+    }
+    let line = |cells: [&str; COLUMNS]| {
+        let cells = cells.iter().zip(widths).enumerate().map(|(column, (cell, width))| match column {
+            0 | 7 => format!("{cell:<width$}"),
+            _ => format!("{cell:>width$}"),
+        });
+        format!("{}\n", cells.collect::<Vec<_>>().join("  ").trim_end())
+    };
+    let mut text = line(HEADS);
+    for (case, rows) in cases.iter().zip(&rows) {
+        text += &format!("{}:\n", case.instrument);
+        text.extend(rows.iter().map(|row| line(row.each_ref().map(String::as_str))));
+        text.extend(notes(case).iter().map(|note| format!("  {note}\n")));
+    }
+    text
+}
+
+/// What a status alone does not tell.
+fn notes(case: &Compared) -> Vec<String> {
+    let note = |run: &Run| match &run.done {
+        Err(why) => Some(format!("{}: refused: {why}", run.name)),
+        Ok((outcome, _)) => {
+            let (time, why) = outcome.learned.as_ref()?.fell_back.as_ref()?;
+            Some(format!("{}: exact steps from {time:.3} s on, as the learned step {why}", run.name))
+        }
+    };
+    case.runs.iter().filter_map(note).collect()
+}
+
+pub(crate) fn part(cases: &[Compared]) -> Part {
+    Part { made: Made::by_this_command("none"), sections: cases.iter().map(section).collect() }
+}
+
+fn section(case: &Compared) -> Section {
+    let exact = case.runs.first().map_or(&[][..], Run::shapes);
+    let heads = HEADS.map(String::from).to_vec();
+    let rows = rows(case).into_iter().map(Vec::from).collect();
+    let ended: Vec<(&Run, &Shape, f64)> = case
+        .runs
+        .iter()
+        .filter_map(|run| Some((run, run.shapes().last()?, run.outcome()?.frames.last()?.time)))
+        .collect();
+    let most = exact.last().map_or(0.0, |shape| lengths(shape).into_iter().fold(1e-6, f64::max));
+    let bodies = ended.iter().map(|(run, shape, time)| {
+        Panel::new(format!("{} steps", run.name), &body(&run.setup, shape, &lengths(shape), *time, most))
+    });
+    let bodies = Figure::grid(
+        "The lobe at the end, coloured by displacement. Turn one and all turn.",
+        bodies.collect(),
+        ended.len(),
+        1e3 * most,
+        "displacement",
+    );
+    Section {
+        title: capitalised(case.instrument),
+        paragraphs: std::iter::once(
+            "Errors are distances to the exact steps, mean over nodes and time, next to that of a lobe that never moves. The length is that of the longest steps. The learned step \
+             follows a lead-in of 0.3 s of exact ones; its network comes with the crate and learned from a twisted bar, not from this lobe."
+                .into(),
+        )
+        .chain(notes(case))
+        .collect(),
+        tables: vec![Table { title: "steps side by side".into(), heads, rows }],
+        figures: vec![bodies, over_time(case, exact)],
+        ..Section::default()
+    }
+}
+
+fn over_time(case: &Compared, exact: &[Shape]) -> Figure {
+    let mut curves = vec![];
+    for (index, run) in case.runs.iter().enumerate().skip(1) {
+        let Some(outcome) = run.outcome() else { continue };
+        let colour = COLOURS[index % COLOURS.len()];
+        let times: Vec<f64> = outcome.frames.iter().map(|frame| frame.time).collect();
+        let errors = errors(exact, run.shapes());
+        curves.push(
+            Curve::new(format!("{}: error", run.name), times[..errors.len()].to_vec(), errors)
+                .coloured(colour),
+        );
+        let estimated = outcome.frames.iter().filter_map(|frame| Some((frame.time, frame.estimate?)));
+        let (at, estimates) =
+            estimated.map(|(time, estimate)| (time, 1e3 * f64::from(estimate.mean))).unzip();
+        curves.push(
+            Curve::new(format!("{}: estimate", run.name), at, estimates)
+                .coloured(colour)
+                .dashed(DashType::Dash),
+        );
+    }
+    let times = case
+        .runs
+        .first()
+        .and_then(Run::outcome)
+        .map_or(vec![], |outcome| outcome.frames.iter().map(|frame| frame.time).collect());
+    curves.push(Curve::new("standing still", times, still(exact)).coloured(GREY).dashed(DashType::Dot));
+    let plot = plots::over_time("mean over the nodes, mm", curves);
+    Figure::choice(
+        "Error against exact steps, and what the guard estimates of it while running, without exact steps.",
+        vec![Panel::new("error", &plot)],
+    )
+}
+
+fn capitalised(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
