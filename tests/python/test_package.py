@@ -30,10 +30,15 @@ def test_the_ten_lines_of_the_docstring_run(tmp_path, monkeypatch):
     (tmp_path / "lobe.msh").write_bytes((ROOT / "meshes" / "lobe.msh").read_bytes())
     lines = [line[4:] for line in supple.__doc__.splitlines() if line.startswith("    ")]
     assert sum(bool(line.strip()) for line in lines) <= 10
-    exec("\n".join(lines), {})
+    names = {}
+    exec("\n".join(lines), names)
     for page in ("README.md", "docs/python.md"):
         shown = (ROOT / page).read_text().split("```python\n")[1].split("```")[0]
         assert [line for line in shown.splitlines() if line] == [line for line in lines if line], page
+    picture = (ROOT / "docs/python.md").read_text().split("```python\n")[2].split("```")[0]
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    exec(picture, names)
+    assert (tmp_path / "deformed.png").stat().st_size > 10_000
     written = meshio.read("deformed.vtu")
     moved = np.linalg.norm(written.point_data["displacement"], axis=1)
     assert moved.max() > 0.005

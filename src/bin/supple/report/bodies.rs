@@ -9,7 +9,7 @@ use plotly::traces::mesh3d::Lighting;
 use plotly::{Layout, Mesh3D, Plot};
 
 /// Diagonal of a body in Plotly's units of length.
-const FILL: f64 = 2.0;
+const FILL: f64 = 2.4;
 /// Of what does not deform.
 const INSTRUMENT: &str = "#b8bec4";
 
@@ -75,7 +75,7 @@ impl Bodies {
     ) -> Box<Mesh3D<f64, f64, f64>> {
         let along = |axis: usize| numbers.iter().map(|&node| millimetres(positions[node][axis])).collect();
         let corner = |at: usize| Some(triangles.iter().map(|corners| corners[at]).collect());
-        let lighting = Lighting::new().ambient(0.65).diffuse(0.6).specular(0.05).roughness(0.9);
+        let lighting = Lighting::new().ambient(0.75).diffuse(0.5).specular(0.05).roughness(0.9);
         Mesh3D::new(along(0), along(1), along(2), corner(0), corner(1), corner(2))
             .flat_shading(true)
             .lighting(lighting)

@@ -124,14 +124,26 @@ pub(crate) fn table(cases: &[Compared]) -> String {
 
 /// What a status alone does not tell.
 fn notes(case: &Compared) -> Vec<String> {
-    let note = |run: &Run| match &run.done {
-        Err(why) => Some(format!("{}: refused: {why}", run.name)),
-        Ok((outcome, _)) => {
-            let (time, why) = outcome.learned.as_ref()?.fell_back.as_ref()?;
-            Some(format!("{}: exact steps from {time:.3} s on, as the learned step {why}", run.name))
-        }
+    let of_run = |run: &Run| {
+        let name = run.name;
+        let outcome = match &run.done {
+            Err(why) => return vec![format!("{name}: refused: {why}")],
+            Ok((outcome, _)) => outcome,
+        };
+        let fell_back = outcome.learned.as_ref().and_then(|trace| trace.fell_back.as_ref());
+        let fell_back = fell_back
+            .map(|(time, why)| format!("{name}: exact steps from {time:.3} s on, as the learned step {why}"));
+        let inexact = outcome.guard.and_then(|guard| Some((guard.inexact, guard.first?)));
+        let inexact = inexact.map(|(steps, (time, error, allowed))| {
+            let [error, allowed] = [error, allowed].map(|metres| 1e3 * f64::from(metres));
+            format!(
+                "{name}: inexact in {steps} of {} steps, first at {time:.3} s: the error was estimated at {error:.2} mm, {allowed:.2} mm are allowed",
+                outcome.computed
+            )
+        });
+        fell_back.into_iter().chain(inexact).collect()
     };
-    case.runs.iter().filter_map(note).collect()
+    case.runs.iter().flat_map(of_run).collect()
 }
 
 pub(crate) fn part(cases: &[Compared]) -> Part {

@@ -5,9 +5,9 @@ use plotly::common::{DashType, HoverInfo, Line, LineShape, Marker, MarkerSymbol,
 use plotly::layout::{Axis, AxisType, HoverMode, Legend};
 use plotly::{Layout, Plot, Scatter};
 
-/// Okabe and Ito's palette, which colour-blind people tell apart, with a grey in place of black.
+/// Okabe and Ito's palette, which colour-blind people tell apart, with brown in place of black.
 pub(crate) const COLOURS: [&str; 7] =
-    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a8f94"];
+    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#a0522d"];
 /// Of what is not a method: standing still, real time.
 pub(crate) const GREY: &str = "#8a8f94";
 
