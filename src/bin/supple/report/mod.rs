@@ -127,9 +127,9 @@ struct Page<'a> {
 }
 
 impl Page<'_> {
-    /// Whether a cell holds a figure, which stands to the right.
+    /// Whether a cell is a number, which stands to the right.
     fn is_number(cell: &str) -> bool {
-        cell.starts_with(|first: char| first.is_ascii_digit() || "+-\u{2212}".contains(first))
+        cell.parse::<f64>().is_ok() || cell == "-"
     }
 
     /// The figure as a script may hold it.

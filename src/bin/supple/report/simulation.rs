@@ -24,7 +24,7 @@ fn result(setup: &Setup, outcome: &Outcome, Conclusion { summary, warnings, .. }
         .map(|divergence| format!("The simulation {divergence}; the results end before that."));
     let warnings = warnings.iter().map(|warning| format!("Warning: {warning}"));
     Section {
-        title: format!("{}, {} steps: {}", setup.body.name, setup.method_name(), outcome.status()),
+        title: format!("{} steps: {}", setup.method_name(), outcome.status()),
         paragraphs: ending.into_iter().chain(warnings).collect(),
         tables: vec![Table { title: "results".into(), heads: vec![], rows: rows.collect() }],
         ..Section::default()
@@ -93,7 +93,7 @@ fn motion(Outcome { frames, .. }: &Outcome) -> Section {
         "Displacement of the nodes, and the error against exact steps as the guard estimates it by a second run with longer steps."
     };
     let title = if is_exact { "Motion over time" } else { "Motion and estimated error over time" };
-    let plot = plots::over_time("mm", curves);
+    let plot = if is_exact { plots::linear("time, s", "mm", curves) } else { plots::over_time("mm", curves) };
     Section {
         title: title.into(),
         figures: vec![Figure::choice(caption, vec![Panel::new("motion", &plot)])],
