@@ -15,7 +15,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import supple
 
-mesh = supple.Mesh.read(sys.argv[1] if len(sys.argv) > 1 else "meshes/lobe.msh")
+LOBE = pathlib.Path(__file__).parent.parent / "meshes" / "lobe.msh"
+mesh = supple.Mesh.read(sys.argv[1] if len(sys.argv) > 1 else LOBE)
 out = pathlib.Path(sys.argv[2] if len(sys.argv) > 2 else "out/press-lobe")
 out.mkdir(parents=True, exist_ok=True)
 liver = supple.Material("exponential", a=1500.0, b=8.023, d=40000.0, density=1060.0)

@@ -3,6 +3,7 @@
 import gc
 import threading
 import time
+import warnings
 
 import meshio
 import numpy as np
@@ -64,6 +65,26 @@ def test_the_boundary_is_closed_and_outside(lobe):
     assert (counts == 2).all()
     a, b, c = lobe.points.astype(float)[triangles].transpose(1, 0, 2)
     assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0 == pytest.approx(lobe.volumes.sum(), rel=1e-5)
+
+
+def test_slips_of_units_are_warned_of_at_the_first_step(lobe):
+    tissue = supple.Material.from_moduli(young=10_000.0, poisson=0.45, density=1060.0)
+    millimetres = supple.Mesh(1e3 * lobe.points, lobe.tets)
+    soft = supple.Material.from_moduli(young=3.0, poisson=0.45, density=1.06)
+    held = lobe.points[:, 1] > 0.03
+    for scene, words in [
+        (supple.Scene(millimetres, tissue, fixed=held), "unusual size of the body: are its points in metres"),
+        (supple.Scene(lobe, soft, fixed=held), "unusual density"),
+        (supple.Scene(lobe, soft, fixed=held), "unusual Young's modulus"),
+        (supple.Scene(lobe, tissue, fixed=lobe.points[:, 1] > 30.0), "no node is fixed"),
+    ]:
+        with pytest.warns(RuntimeWarning, match=words):
+            supple.Simulation(scene).advance(1e-5)
+    simulation = supple.Simulation(supple.Scene(lobe, tissue, fixed=held))
+    assert simulation.remarks() == []
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulation.advance(1e-3)
 
 
 REFUSED = [

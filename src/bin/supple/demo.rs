@@ -1,6 +1,6 @@
 //! `supple demo`: a liver lobe that hangs from its back sags under its own weight, and an instrument moves it, by exact, damped and
-//! learned steps side by side. A ball presses its dome and slides along it; forceps grip its front edge and lift it. The learned step
-//! cannot meet the ball. The mesh is in the program, so the command needs no files.
+//! learned steps side by side. A ball presses its dome and slides along it, which the learned step refuses; forceps grip its front edge
+//! and lift it: their nodes are moved supports. The mesh is in the program, so the command needs no files.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use supple::mesh::Winding;
 use supple::scene::{Axes, Support};
 
 use crate::problem::{End, Problem};
-use crate::report::demo::{Compared, Run, part, table};
+use crate::report::demo::{Compared, Run, about, part, table};
 use crate::report::{self, simulation::shape};
 use crate::results::folder::Folder;
 use crate::scene::body::Body;
@@ -72,6 +72,7 @@ pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
         cases.push(Compared { instrument, runs });
     }
     print(table(&cases));
+    output!("\n{}", about(&cases));
     let folder = folder.ok_or_else(|| Problem("there are no frames".into()))?;
     folder.write_text(report::FILE, &report::page("supple demo: a liver lobe", &[part(&cases)])?)?;
     folder.publish()?;
@@ -101,14 +102,11 @@ fn run(setup: Setup, name: &'static str, out: Option<Out<'_>>) -> Result<(Run, O
         progress: progress_bar(&setup, &format!("{name} steps  ")),
         watch: &mut |state| shapes.push(shape(state)),
     };
-    match setup.with_material(simulation) {
-        Ok(Simulated { folder, outcome, .. }) => {
-            Ok((Run { setup, name, done: Ok((outcome, shapes)) }, folder))
-        }
-        // What learned steps refuse is part of the comparison.
-        Err(why) if setup.learned.is_some() => Ok((Run { setup, name, done: Err(why.to_string()) }, None)),
-        Err(problem) => Err(problem),
-    }
+    let Simulated { folder, outcome, .. } = setup.with_material(simulation)?;
+    // What learned steps refuse is part of the comparison.
+    let refused = outcome.divergence.filter(|_| setup.learned.is_some());
+    let done = refused.map_or(Ok((outcome, shapes)), |refused| Err(refused.to_string()));
+    Ok((Run { setup, name, done }, folder))
 }
 
 /// The lobe with its supports, what moves it, and an instrument.

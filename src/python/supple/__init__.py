@@ -5,7 +5,7 @@ From a mesh to a deformed one, in ten lines:
     import supple
 
     mesh = supple.Mesh.read("lobe.msh")
-    material = supple.Material.from_moduli(young=3000.0, poisson=0.45, density=1060.0)
+    material = supple.Material.from_moduli(young=10_000.0, poisson=0.45, density=1060.0)
     scene = supple.Scene(mesh, material, fixed=mesh.points[:, 1] > 0.03)
     simulation = supple.Simulation(scene, damping=20.0, gravity=(0.0, 0.0, -9.81))
     report = simulation.advance(1.0)

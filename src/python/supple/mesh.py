@@ -64,14 +64,12 @@ class Mesh:
     @classmethod
     def read(cls, path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
         """A mesh from a file that meshio reads (.msh, .vtk, .vtu, ...)."""
-        import meshio
-
+        meshio = _meshio()
         return cls.from_meshio(meshio.read(path), scale)
 
     def write(self, path: str | os.PathLike[str], displacements: ArrayLike | None = None) -> None:
         """Writes the mesh, moved if there are displacements (m), with these as point data `displacement`."""
-        import meshio
-
+        meshio = _meshio()
         points, data = self.points.astype(np.float64), {}
         if displacements is not None:
             moved = np.array(displacements, np.float64)
@@ -94,3 +92,11 @@ class Mesh:
 
     def __repr__(self) -> str:
         return f"<supple.Mesh: {len(self.points)} nodes, {len(self.tets)} tetrahedra>"
+
+
+def _meshio() -> Any:
+    try:
+        import meshio
+    except ModuleNotFoundError:
+        raise ImportError("files of meshes need meshio: pip install meshio") from None
+    return meshio

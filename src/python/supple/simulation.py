@@ -6,6 +6,7 @@ import dataclasses
 import importlib.resources
 import os
 import pathlib
+import warnings
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,8 @@ class Report:
 
     `status` is "ok"; "limited" (steps were taken, but are not exact), "outside" (the network saw what its training had not),
     "fell back" (exact steps took the place of learned ones), "inexact" (the estimate of the error exceeds what is allowed).
-    `estimate`: mean error of the nodes (m) by the guard or the adaptive steps, None where there is none (yet).
+    It is the worst of all steps of the call. `estimate`: mean error of the nodes (m) after the last of them, by the guard or the
+    adaptive steps, None where there is none (yet); `allowed`: what the guard accepts there, a fifth of the motion so far or the tolerance.
     """
 
     status: str
@@ -113,6 +115,8 @@ class Simulation:
 
     @gravity.setter
     def gravity(self, value: ArrayLike) -> None:
+        if np.shape(value) != (3,):
+            raise InputError(f"gravity: {value!r}, it must be three numbers, m/s^2")
         self._gravity: NDArray[np.float32] = library.vectors([value], "gravity")[0]
         library.checked(lib.supple_set_gravity(self._loads, library.pointer("float", self._gravity)), what="gravity")
 
@@ -190,6 +194,28 @@ class Simulation:
             raise InputError("there are no instruments: set_instruments comes first")
         return self._contact
 
+    def remarks(self) -> list[str]:
+        """What looks as if a unit or a number was mistaken, in the kernel's words; the first step warns of it."""
+        found, count, room = ffi.new("supple_remark[]", 32), ffi.new("uint32_t *"), 32
+        learned = self._kernel if self.method == "learned" else ffi.NULL
+        library.checked(lib.supple_remarks(self.scene._raw, self._points(), self._loads, learned, found, room, count), what="remarks")
+        said = []
+        for remark in found[0 : min(count[0], room)]:
+            figures = [f"{value:.4g}" for value in (remark.value, remark.limit) if value != 0.0]
+            said.append(f"{str(ffi.string(lib.supple_remark_text(remark.kind)), 'ascii')} ({' against '.join(figures) or 'no figure'})")
+        if not len(self.scene._supports):
+            said.append("no node is fixed or moved: the body is free")
+        return said
+
+    def _warn_once(self) -> None:
+        if self._is_warned:
+            return
+        self._is_warned = True
+        for words in self.remarks():
+            warnings.warn(words, RuntimeWarning, stacklevel=4)
+
+    _is_warned = False
+
     # Steps.
 
     @property
@@ -204,6 +230,7 @@ class Simulation:
         refused: the state is then the last good one."""
         if not (np.isfinite(seconds) and seconds > 0.0):
             raise InputError(f"advance by {seconds} s: it must be a positive number")
+        self._warn_once()
         if self.method == "adaptive":
             return self._advance_adaptive(seconds)
         if self.method == "exact" and self._fixed_step is None:

@@ -1,17 +1,21 @@
 //! Surfaces of bodies as meshes that turn under the mouse: positions in mm, colours by a length at each node, in mm.
 
 use plotly::common::color::NamedColor;
-use plotly::common::{ColorScale, ColorScalePalette, HoverInfo};
+use plotly::common::{ColorScale, ColorScalePalette, HoverInfo, Marker, Mode};
 use plotly::layout::{
     AspectMode, AspectRatio, Axis, Camera, DragMode3D, Eye, LayoutScene, Projection, ProjectionType, Up,
 };
 use plotly::traces::mesh3d::Lighting;
-use plotly::{Layout, Mesh3D, Plot};
+use plotly::{Layout, Mesh3D, Plot, Scatter3D};
+
+use super::plots::short;
 
 /// Diagonal of a body in Plotly's units of length.
 const FILL: f64 = 2.4;
 /// Of what does not deform.
 const INSTRUMENT: &str = "#b8bec4";
+/// Of nodes that an instrument grips.
+const POINTS: &str = "#e0202a";
 
 /// Surfaces in one space.
 #[derive(Default)]
@@ -36,13 +40,16 @@ impl Bodies {
     pub(crate) fn add(&mut self, positions: &[[f64; 3]], triangles: &[[u32; 3]], lengths: &[f64], most: f64) {
         let (numbers, triangles) = surface(positions.len(), triangles);
         self.reach(positions, &numbers);
-        let lengths: Vec<_> = numbers.iter().map(|&node| millimetres(lengths[node])).collect();
-        let words = lengths.iter().map(|length| format!("{length} mm")).collect();
+        let lengths: Vec<_> = numbers.iter().map(|&node| 1e3 * lengths[node]).collect();
+        let words = lengths.iter().map(|length| format!("{} mm", short(*length))).collect();
+        // As fine as the colours.
+        let fineness = most.max(1e-6);
+        let lengths = lengths.iter().map(|length| (length / fineness).round() * fineness).collect();
         let trace = Self::trace(positions, &numbers, &triangles)
             .intensity(lengths)
             .color_scale(ColorScale::Palette(ColorScalePalette::Viridis))
             .c_min(0.0)
-            .c_max(1e3 * most.max(1e-6))
+            .c_max(1e3 * fineness)
             .show_scale(false)
             .hover_text_array(words)
             .hover_info(HoverInfo::Text);
@@ -56,6 +63,14 @@ impl Bodies {
         let trace =
             Self::trace(positions, &numbers, &triangles).color(INSTRUMENT).hover_info(HoverInfo::Skip);
         self.plot.add_trace(trace);
+    }
+
+    /// Adds nodes as points.
+    pub(crate) fn add_points(&mut self, positions: &[[f64; 3]]) {
+        let along = |axis: usize| positions.iter().map(|point| millimetres(point[axis])).collect::<Vec<_>>();
+        let marker = Marker::new().size(3).color(POINTS);
+        let trace = Scatter3D::new(along(0), along(1), along(2)).mode(Mode::Markers).marker(marker);
+        self.plot.add_trace(trace.hover_info(HoverInfo::Skip));
     }
 
     fn reach(&mut self, positions: &[[f64; 3]], numbers: &[usize]) {
@@ -164,7 +179,8 @@ mod tests {
         let plot: serde_json::Value = serde_json::from_str(&bodies.plot(View::Standing).to_json()).unwrap();
         let trace = &plot["data"][0];
         assert_eq!(trace["y"], serde_json::json!([0.0, 0.0, 20.0]));
-        assert_eq!(trace["intensity"], serde_json::json!([0.0, 1.0, 2.0]));
+        let [a, b, c] = [0, 1, 2].map(|node| trace["intensity"][node].as_f64().unwrap());
+        assert!(a == 0.0 && (b - 1.0).abs() < 1e-9 && (c - 2.0).abs() < 1e-9, "{trace}");
         assert_eq!(trace["cmax"], 2.0);
         assert_eq!(plot["layout"]["scene"]["camera"]["projection"]["type"], "orthographic");
     }

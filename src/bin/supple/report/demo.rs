@@ -122,6 +122,24 @@ pub(crate) fn table(cases: &[Compared]) -> String {
     text
 }
 
+/// How to read the table, and what it says of this body.
+pub(crate) fn about(cases: &[Compared]) -> String {
+    let fastest = |case: &Compared| {
+        let time = |run: &Run| run.outcome().map(|outcome| outcome.spent.as_secs_f64());
+        let exact = case.runs.first().and_then(time);
+        exact.is_some_and(|exact| case.runs.iter().skip(1).filter_map(time).all(|other| exact < 1.3 * other))
+    };
+    let mut text = String::from(
+        "Errors: distance to the exact steps, mean over nodes and time; standing still: that of a lobe that never moves. The guard, a second\n\
+         run, estimates the error meanwhile. Real-time factor: simulated over computing time with the guard; above 1 is faster than real time.",
+    );
+    if cases.iter().all(fastest) {
+        text += "\nThis lobe is soft and coarse: exact steps are fast enough, and longer ones with their guard gain little. They do where elements are\n\
+                 small or stiff and the motion is slow (docs/benchmarks.md).";
+    }
+    text
+}
+
 /// What a status alone does not tell.
 fn notes(case: &Compared) -> Vec<String> {
     let of_run = |run: &Run| {
@@ -137,7 +155,8 @@ fn notes(case: &Compared) -> Vec<String> {
         let inexact = inexact.map(|(steps, (time, error, allowed))| {
             let [error, allowed] = [error, allowed].map(|metres| 1e3 * f64::from(metres));
             format!(
-                "{name}: inexact in {steps} of {} steps, first at {time:.3} s: the error was estimated at {error:.2} mm, {allowed:.2} mm are allowed",
+                "{name}: inexact in {steps} of {} steps, first at {time:.3} s: the error was estimated at {error:.2} mm, above {allowed:.2} mm, a \
+                 fifth of the motion until then",
                 outcome.computed
             )
         });
@@ -146,8 +165,21 @@ fn notes(case: &Compared) -> Vec<String> {
     case.runs.iter().flat_map(of_run).collect()
 }
 
+/// What the words mean, for who has not read a page.
+const TERMS: [&str; 2] = [
+    "Exact steps (TLED) stay below the critical step. Damped ones are ten times as long as it: inertia is added where a step would be unstable, and given back to \
+             smooth motion. The learned step is a network that predicts accelerations over 1.5 ms, seven times the critical step; it follows a lead-in of 0.3 s of exact ones, comes \
+             with the crate, and learned from a twisted bar, not from this lobe.",
+    "Errors are distances to the exact steps, mean over nodes and time; next to them stands the error of a lobe that never moves. The guard is a second run with longer steps, which \
+             estimates the error while the simulation runs; a step is inexact where the estimate exceeds a fifth of the motion so far. The table has the longest step of each run.",
+];
+
 pub(crate) fn part(cases: &[Compared]) -> Part {
-    Part { made: Made::by_this_command("none"), sections: cases.iter().map(section).collect() }
+    let mut sections: Vec<_> = cases.iter().map(section).collect();
+    if let Some(first) = sections.first_mut() {
+        first.paragraphs.splice(0..0, TERMS.map(String::from));
+    }
+    Part { made: Made::by_this_command("none"), sections }
 }
 
 fn section(case: &Compared) -> Section {
@@ -164,7 +196,7 @@ fn section(case: &Compared) -> Section {
         Panel::new(format!("{} steps", run.name), &body(&run.setup, shape, &lengths(shape), *time, most))
     });
     let bodies = Figure::grid(
-        "The lobe at the end, coloured by displacement. Turn one and all turn.",
+        "The lobe at the end, coloured by displacement; red: nodes that forceps grip. Turn one and all turn.",
         bodies.collect(),
         ended.len(),
         1e3 * most,
@@ -172,17 +204,31 @@ fn section(case: &Compared) -> Section {
     );
     Section {
         title: capitalised(case.instrument),
-        paragraphs: std::iter::once(
-            "Errors are distances to the exact steps, mean over nodes and time, next to that of a lobe that never moves. The length is that of the longest steps. The learned step \
-             follows a lead-in of 0.3 s of exact ones; its network comes with the crate and learned from a twisted bar, not from this lobe."
-                .into(),
-        )
-        .chain(notes(case))
-        .collect(),
+        paragraphs: notes(case),
         tables: vec![Table { title: "steps side by side".into(), heads, rows }],
-        figures: vec![bodies, over_time(case, exact)],
+        figures: std::iter::once(bodies).chain(distances(&ended)).chain([over_time(case, exact)]).collect(),
         ..Section::default()
     }
+}
+
+/// Where longer steps are off at the end.
+fn distances(ended: &[(&Run, &Shape, f64)]) -> Option<Figure> {
+    let ((_, exact, _), others) = ended.split_first()?;
+    let off: Vec<Vec<f64>> = others
+        .iter()
+        .map(|(_, shape, _)| {
+            let pairs = shape.iter().zip(*exact);
+            lengths(&pairs.map(|(a, b)| [0, 1, 2].map(|axis| a[axis] - b[axis])).collect::<Vec<_>>())
+        })
+        .collect();
+    let most = off.iter().flatten().fold(1e-6, |a: f64, b| a.max(*b));
+    let panels = others.iter().zip(&off).map(|((run, shape, time), off)| {
+        Panel::new(format!("{} steps", run.name), &body(&run.setup, shape, off, *time, most))
+    });
+    let columns = ended.len();
+    let caption = "The same, coloured by the distance to the exact steps.";
+    (!others.is_empty())
+        .then(|| Figure::grid(caption, panels.collect(), columns, 1e3 * most, "distance to the exact steps"))
 }
 
 fn over_time(case: &Compared, exact: &[Shape]) -> Figure {

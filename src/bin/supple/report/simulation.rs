@@ -39,7 +39,12 @@ pub(crate) fn shape(state: &VecState) -> Vec<[f32; 3]> {
 /// A body of a scene with its instruments at a time (s), coloured up to `most` (m) by a length at each node.
 pub(crate) fn body(setup: &Setup, shape: &[[f32; 3]], lengths: &[f64], time: f64, most: f64) -> plotly::Plot {
     let mut bodies = Bodies::default();
-    bodies.add(&moved(&setup.body.mesh.points, shape), &setup.body.boundary(), lengths, most);
+    let positions = moved(&setup.body.mesh.points, shape);
+    bodies.add(&positions, &setup.body.boundary(), lengths, most);
+    let gripped: Vec<_> = setup.motions.iter().map(|motion| positions[motion.node as usize]).collect();
+    if !gripped.is_empty() {
+        bodies.add_points(&gripped);
+    }
     if !setup.tools.is_empty() {
         let (points, triangles) = instrument_mesh::of(&setup.tools, &setup.body, time);
         bodies.add_rigid(&points, &triangles);
@@ -58,7 +63,7 @@ fn shapes(setup: &Setup, state: &VecState) -> Section {
         panel("at rest".into(), &rest, 0.0),
         panel(format!("after {:.3} s", state.time()), &shape, state.time()),
     ];
-    let caption = "Coloured by displacement. Turn one and both turn.";
+    let caption = "Coloured by displacement; red: nodes with a prescribed motion. Turn one and both turn.";
     Section {
         title: "The body".into(),
         figures: vec![Figure::grid(caption, panels, 2, 1e3 * most, "displacement")],

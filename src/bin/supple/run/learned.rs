@@ -38,6 +38,11 @@ impl<'a> LearnedRun<'a> {
         self.trace.seconds
     }
 
+    /// Whether the latest interval was one of the lead-in, whose exact steps have no error.
+    pub(crate) const fn is_leading(&self) -> bool {
+        self.interval <= self.lead_in
+    }
+
     /// The length of fixed exact steps (s), while they move the scene.
     pub(crate) fn fixed_exact_seconds(&self) -> Option<f32> {
         let is_exact = self.interval < self.lead_in || self.step.model().is_exact_next();

@@ -60,10 +60,10 @@ impl LearnedChoice {
         Ok(learned)
     }
 
-    /// A network of the crate with fallback, for the demo.
+    /// A network of the crate, for the demo.
     pub(crate) fn of_demo(name: &str, bytes: &[u8]) -> Self {
         let memory = WeightBytes::of(bytes);
-        Self { path: name.into(), place: "demo".into(), memory, burn_in: BURN_IN, fallback: true }
+        Self { path: name.into(), place: "demo".into(), memory, burn_in: BURN_IN, fallback: false }
     }
 
     pub(crate) fn network(&self) -> Result<Network<'_>, Problem> {
