@@ -34,7 +34,8 @@ within 'volume over that of the voxels, %' 90 "$(value '^volume.*, \([0-9.]*\) %
 within 'E, kPa' 5.9 "$(value '.* E \([0-9.]*\) kPa, nu.*')" 6.1
 within 'motion of the exact run, mm' 5 "$(value '^maximum displacement *\([0-9.]*\) mm.*')" 40
 within 'force on the ball, N' 0.05 "$(value '^instruments *0: \([0-9.e+-]*\) N.*')" 1
-within 'error of the learned run, % of not moving' 0 "$(value '.*node [0-9]*: \([0-9.]*\) % of not moving$')" 40
+within 'error of the learned run over time, % of not moving' 0 "$(value '^over time: .*, \([0-9.]*\) % of not moving;.*')" 40
+within 'error of the learned run at its end, % of not moving' 0 "$(value '^at the end: .*: \([0-9.]*\) % of not moving$')" 40
 # A network learns from exact steps without instruments, and says so.
 sed 's,^scene = .*,scene = "../../docs/scenes/organ-touched.toml",' docs/scenes/organ-network.toml >out/guide/refused.toml
 why=$(${command:-cargo run --quiet --release --features train --} train out/guide/refused.toml --out out/guide/refused.weights 2>&1) &&

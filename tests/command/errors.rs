@@ -212,3 +212,16 @@ fn wrong_usage_has_code_2() {
     assert_eq!(said.code, 2);
     assert!(said.err.contains("none.toml: cannot be read"), "{}", said.err);
 }
+
+#[cfg(not(feature = "train"))]
+#[test]
+fn a_command_without_training_says_how_to_get_it() {
+    let desk = Desk::new();
+    let said = desk.supple(&["train", "recipe.toml", "--out", "organ.weights"]);
+    assert_eq!(said.code, 2);
+    assert!(
+        said.err.contains("built without training; build it with `cargo build --release --features train`"),
+        "{}",
+        said.err
+    );
+}

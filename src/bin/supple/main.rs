@@ -78,6 +78,13 @@ enum Command {
     /// Train a network for the learned step; a training that was stopped goes on where it was
     #[cfg(feature = "train")]
     Train(train::Asked),
+    /// Train a network for the learned step: this build cannot, the feature `train` adds it
+    #[cfg(not(feature = "train"))]
+    #[command(disable_help_flag = true)]
+    Train {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+        _arguments: Vec<String>,
+    },
     /// Make the signed distances of a closed surface, for an instrument of any form
     Field(field::Asked),
     /// Convert weight files to and from safetensors
@@ -95,6 +102,10 @@ fn main() -> ExitCode {
         Command::Evaluate(asked) => evaluate::evaluate(&asked),
         #[cfg(feature = "train")]
         Command::Train(asked) => train::train(&asked),
+        #[cfg(not(feature = "train"))]
+        Command::Train { .. } => Err(problem::Problem(
+            "train: this command was built without training; build it with `cargo build --release --features train`".into(),
+        )),
         Command::Field(asked) => field::make(&asked),
         Command::Weights(conversion) => convert::convert(&conversion),
     };

@@ -68,19 +68,23 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome, figures: &Figures, warnings: 
     add_steps(&mut summary, setup, outcome, figures);
     summary.add_section("adaptive", outcome.adaptive.as_ref().map(adaptive_section));
     add_estimate(&mut summary, outcome.guard.as_ref());
-    add_motion(&mut summary, figures);
+    add_motion(&mut summary, outcome, figures);
     add_reactions(&mut summary, &outcome.reactions);
     summary
 }
 
 fn add_ending(summary: &mut Summary, outcome: &Outcome) {
-    summary.add_figures(json!({
-        "status": outcome.status(),
-        "divergence": outcome.divergence.map(|divergence| json!({
-            "time_s": divergence.time, "node": divergence.node, "sentence": divergence.to_string(),
-        })),
-        "steps_limited": outcome.limits.steps,
-    }));
+    summary.add(
+        "status",
+        outcome.status().to_owned(),
+        json!({
+            "status": outcome.status(),
+            "divergence": outcome.divergence.map(|divergence| json!({
+                "time_s": divergence.time, "node": divergence.node, "sentence": divergence.to_string(),
+            })),
+            "steps_limited": outcome.limits.steps,
+        }),
+    );
 }
 
 fn add_scene(summary: &mut Summary, setup: &Setup, figures: &Figures) {
@@ -167,7 +171,7 @@ fn add_estimate(summary: &mut Summary, guard: Option<&GuardTrace>) {
     );
 }
 
-fn add_motion(summary: &mut Summary, figures: &Figures) {
+fn add_motion(summary: &mut Summary, outcome: &Outcome, figures: &Figures) {
     let (percent, least) = (100.0 * figures.volume_change, figures.least_volume_ratio);
     summary.add(
         "volume change",
@@ -175,10 +179,11 @@ fn add_motion(summary: &mut Summary, figures: &Figures) {
         json!({ "volume_change_percent": percent, "least_volume_ratio": least }),
     );
     let (mm, node) = (1e3 * figures.max_displacement, figures.max_node);
+    let largest = outcome.frames.iter().map(|frame| frame.largest).fold(figures.max_displacement, f64::max);
     summary.add(
         "maximum displacement",
-        format!("{mm:.3} mm at node {node}"),
-        json!({ "max_displacement_mm": mm, "max_displacement_node": node }),
+        format!("{mm:.3} mm at node {node} at the end, {:.3} mm on the way", 1e3 * largest),
+        json!({ "max_displacement_mm": mm, "max_displacement_node": node, "max_displacement_on_the_way_mm": 1e3 * largest }),
     );
     let energy = &figures.energy;
     summary.add_figures(json!({ "energy_j": {
@@ -290,7 +295,7 @@ fn learned_section(choice: &LearnedChoice, trace: &LearnedTrace) -> Summary {
     section.add(
         "learned steps",
         format!(
-            "{} from {:.3} s on, {us:.1} us each, {real_time:.3} times real time",
+            "{} from {:.3} s on, {us:.1} us each, {real_time:.3} times real time without the guard",
             trace.steps,
             trace.from.unwrap_or_default()
         ),

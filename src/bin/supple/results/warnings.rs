@@ -33,7 +33,7 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome) -> Vec<String> {
     if let Some((inexact, first)) = outcome.guard.and_then(|guard| Some((guard.inexact, guard.first?))) {
         let (time, error, allowed) = first;
         warnings.push(format!(
-            "after {inexact} steps, first at {time:.3} s, the error may be more than is allowed: {:.2} mm, allowed {:.2} mm; a \
+            "in {inexact} steps, first at {time:.3} s, the error may be more than is allowed: {:.2} mm, allowed {:.2} mm; a \
              shorter step has less",
             1e3 * error,
             1e3 * allowed
@@ -58,7 +58,10 @@ fn outside_training(trace: &LearnedTrace) -> Option<String> {
 fn not_exact(limits: &Limits) -> String {
     let mut causes = vec![];
     if limits.least_volume_ratio < J_FLOOR {
-        causes.push(format!("an element was squeezed to {:.3} of its volume", limits.least_volume_ratio));
+        causes.push(match limits.least_volume_ratio {
+            ratio if ratio > 0.0 => format!("an element was squeezed to {ratio:.3} of its volume"),
+            ratio => format!("an element was turned inside out, to {ratio:.3} of its volume"),
+        });
     }
     if limits.saturation > 1.0 {
         causes.push(format!("an exponent reached {:.2} times its cap", limits.saturation));
