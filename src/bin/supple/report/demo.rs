@@ -170,7 +170,7 @@ const TERMS: [&str; 2] = [
     "Exact steps (TLED) stay below the critical step. Damped ones are ten times as long as it: inertia is added where a step would be unstable, and given back to \
              smooth motion. The learned step is a network that predicts accelerations over 1.5 ms, seven times the critical step; it follows a lead-in of 0.3 s of exact ones, comes \
              with the crate, and learned from a twisted bar, not from this lobe.",
-    "Errors are distances to the exact steps, mean over nodes and time; next to them stands the error of a lobe that never moves. The guard is a second run with longer steps, which \
+    "Errors are distances to the exact steps, mean over nodes and time; next to them stands the error of a lobe that never moves. The guard is a second run, which \
              estimates the error while the simulation runs; a step is inexact where the estimate exceeds a fifth of the motion so far. The table has the longest step of each run.",
 ];
 

@@ -95,7 +95,7 @@ fn motion(Outcome { frames, .. }: &Outcome) -> Section {
     let caption = if is_exact {
         "Displacement of the nodes. These steps have no estimate of their error."
     } else {
-        "Displacement of the nodes, and the error against exact steps as the guard estimates it by a second run with longer steps."
+        "Displacement of the nodes, and the error against exact steps as the guard estimates it by a second run."
     };
     let title = if is_exact { "Motion over time" } else { "Motion and estimated error over time" };
     let plot = if is_exact { plots::linear("time, s", "mm", curves) } else { plots::over_time("mm", curves) };
