@@ -63,7 +63,8 @@ impl Plan {
     }
 }
 
-fn unique<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
+/// Each item once, in the order in which they come first.
+pub fn unique<T: PartialEq>(items: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut seen = Vec::new();
     for item in items {
         if !seen.contains(&item) {

@@ -49,8 +49,8 @@ async function show(plot) {
     await plot.page.waitForFunction((element) => element.dataset.drawn, { timeout: 30_000, polling: 50 }, plot.handle);
 }
 
-async function plots(page) {
-    const handles = await page.$$(".plot");
+async function plots(page, within = page) {
+    const handles = await within.$$(".plot");
     return handles.map((handle) => ({ page, handle, evaluate: (...rest) => handle.evaluate(...rest) }));
 }
 
@@ -99,8 +99,7 @@ for (const [index, file] of files.entries()) {
 
 test("bodies of a figure turn together under the mouse", async (context) => {
     const page = await open(context, files[0], WIDE, "light");
-    const grid = await page.$(".grid");
-    const cells = (await grid.$$(".plot")).map((handle) => ({ page, handle, evaluate: (...rest) => handle.evaluate(...rest) }));
+    const cells = await plots(page, await page.$(".grid"));
     for (const cell of cells) await show(cell);
     const eyes = () => Promise.all(cells.map((cell) => cell.evaluate((element) => element._fullLayout.scene._scene.getCamera().eye)));
     const before = await eyes();

@@ -6,7 +6,7 @@ use std::string::String;
 use std::vec::Vec;
 
 use super::super::LabError;
-use super::super::method::Method;
+use super::super::evaluate::unique;
 use super::verdict::{Judged, Verdict};
 use crate::io::write_atomically;
 
@@ -77,17 +77,6 @@ fn csv(run: &Judged) -> String {
     )
 }
 
-/// Methods in the order of their first run.
-fn methods(judged: &[Judged]) -> Vec<Method> {
-    let mut methods = Vec::new();
-    for run in judged {
-        if !methods.contains(&run.row.method) {
-            methods.push(run.row.method);
-        }
-    }
-    methods
-}
-
 /// A line for each method and step, then one for each silent run.
 #[must_use]
 pub fn text(judged: &[Judged]) -> String {
@@ -98,7 +87,7 @@ pub fn text(judged: &[Judged]) -> String {
          method                x critical   runs  right   told  silent  doubted   above 1  above 2  median\n",
     );
     let bands = [(0.0, 14.0), (14.0, 32.0), (32.0, 71.0), (71.0, f64::INFINITY)];
-    for method in methods(judged) {
+    for method in unique(judged.iter().map(|run| run.row.method)) {
         for (low, high) in bands {
             let runs: Vec<&Judged> = judged
                 .iter()

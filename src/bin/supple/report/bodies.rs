@@ -154,6 +154,17 @@ pub(crate) fn lengths(vectors: &[[f32; 3]]) -> Vec<f64> {
     vectors.iter().map(length).collect()
 }
 
+/// The distance of each node between two shapes.
+pub(crate) fn distances(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f64> {
+    let pairs = a.iter().zip(b);
+    lengths(&pairs.map(|(a, b)| [0, 1, 2].map(|axis| a[axis] - b[axis])).collect::<Vec<_>>())
+}
+
+/// The mean of lengths (m), mm.
+pub(crate) fn mean_millimetres(lengths: &[f64]) -> f64 {
+    1e3 * lengths.iter().sum::<f64>() / lengths.len().max(1) as f64
+}
+
 /// Points moved by displacements.
 pub(crate) fn moved<T: Copy + Into<f64>>(points: &[[T; 3]], displacements: &[[f32; 3]]) -> Vec<[f64; 3]> {
     let pairs = points.iter().zip(displacements);

@@ -2,7 +2,7 @@
 
 use plotly::common::DashType;
 
-use super::bodies::lengths;
+use super::bodies::{distances, lengths, mean_millimetres};
 use super::made::Made;
 use super::plots::{self, COLOURS, Curve, GREY, short};
 use super::simulation::body;
@@ -36,20 +36,13 @@ impl Run {
     }
 }
 
-/// Mean distance of the nodes between two shapes, mm.
-fn apart(a: &Shape, b: &Shape) -> f64 {
-    let pairs = a.iter().zip(b);
-    let distances = lengths(&pairs.map(|(a, b)| [0, 1, 2].map(|axis| a[axis] - b[axis])).collect::<Vec<_>>());
-    1e3 * distances.iter().sum::<f64>() / distances.len().max(1) as f64
-}
-
 /// Mean errors of the nodes at the frames of a run, mm.
 fn errors(exact: &[Shape], shapes: &[Shape]) -> Vec<f64> {
-    exact.iter().zip(shapes).map(|(exact, shape)| apart(exact, shape)).collect()
+    exact.iter().zip(shapes).map(|(exact, shape)| mean_millimetres(&distances(exact, shape))).collect()
 }
 
 fn still(exact: &[Shape]) -> Vec<f64> {
-    exact.iter().map(|shape| 1e3 * lengths(shape).iter().sum::<f64>() / shape.len().max(1) as f64).collect()
+    exact.iter().map(|shape| mean_millimetres(&lengths(shape))).collect()
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -206,21 +199,15 @@ fn section(case: &Compared) -> Section {
         title: capitalised(case.instrument),
         paragraphs: notes(case),
         tables: vec![Table { title: "steps side by side".into(), heads, rows }],
-        figures: std::iter::once(bodies).chain(distances(&ended)).chain([over_time(case, exact)]).collect(),
+        figures: std::iter::once(bodies).chain(where_off(&ended)).chain([over_time(case, exact)]).collect(),
         ..Section::default()
     }
 }
 
 /// Where longer steps are off at the end.
-fn distances(ended: &[(&Run, &Shape, f64)]) -> Option<Figure> {
+fn where_off(ended: &[(&Run, &Shape, f64)]) -> Option<Figure> {
     let ((_, exact, _), others) = ended.split_first()?;
-    let off: Vec<Vec<f64>> = others
-        .iter()
-        .map(|(_, shape, _)| {
-            let pairs = shape.iter().zip(*exact);
-            lengths(&pairs.map(|(a, b)| [0, 1, 2].map(|axis| a[axis] - b[axis])).collect::<Vec<_>>())
-        })
-        .collect();
+    let off: Vec<Vec<f64>> = others.iter().map(|(_, shape, _)| distances(exact, shape)).collect();
     let most = off.iter().flatten().fold(1e-6, |a: f64, b| a.max(*b));
     let panels = others.iter().zip(&off).map(|((run, shape, time), off)| {
         Panel::new(format!("{} steps", run.name), &body(&run.setup, shape, off, *time, most))

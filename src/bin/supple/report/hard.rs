@@ -1,9 +1,9 @@
 //! Hard cases: are runs ever wrong without a word, and do estimates of the error follow the true one?
 
 use plotly::common::{DashType, MarkerSymbol};
+use supple::lab::evaluate::unique;
 use supple::lab::hard::report;
 use supple::lab::hard::verdict::{Judged, Verdict};
-use supple::lab::method::Method;
 
 use super::made::Made;
 use super::plots::{self, COLOURS, Curve, GREY, short};
@@ -19,16 +19,6 @@ pub(crate) fn part(judged: &[Judged]) -> Part {
     let mut section = estimates(judged);
     section.listing = Some(report::text(judged));
     Part { made: Made::by_this_command(seeds), sections: vec![section, over_time(judged)] }
-}
-
-fn methods(judged: &[Judged]) -> Vec<Method> {
-    let mut methods = vec![];
-    for run in judged {
-        if !methods.contains(&run.row.method) {
-            methods.push(run.row.method);
-        }
-    }
-    methods
 }
 
 fn words(run: &Judged) -> String {
@@ -54,7 +44,7 @@ fn estimates(judged: &[Judged]) -> Section {
         let [estimate, _] = frame.estimate?;
         (frame.mean > 0.0 && estimate > 0.0).then_some((frame.mean, estimate))
     };
-    for (index, method) in methods(judged).into_iter().enumerate() {
+    for (index, method) in unique(judged.iter().map(|run| run.row.method)).into_iter().enumerate() {
         let of = judged.iter().filter(|run| run.row.method == method);
         let points: Vec<_> = of.filter_map(|run| Some((worst(run)?, run))).collect();
         let said = points.iter().map(|((error, estimate), run)| {

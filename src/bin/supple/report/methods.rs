@@ -2,7 +2,7 @@
 //! of the paper.
 
 use plotly::common::{DashType, MarkerSymbol};
-use supple::lab::evaluate::Evaluation;
+use supple::lab::evaluate::{Evaluation, unique};
 use supple::lab::method::Method;
 use supple::lab::networks::Family;
 use supple::lab::run::{End, Figures, Row};
@@ -12,7 +12,7 @@ use supple::lab::truth::Truth;
 use supple::lab::{DT, MULTIPLES};
 use supple::mesh::boundary;
 
-use super::bodies::{Bodies, View, lengths, moved};
+use super::bodies::{Bodies, View, distances, lengths, mean_millimetres, moved};
 use super::made::Made;
 use super::peers::{BAR, NETWORK_SECONDS, PEERS, PUBLISHED};
 use super::plots::{self, COLOURS, Curve, GREY, short};
@@ -22,13 +22,7 @@ pub(crate) const NAME: &str = "methods";
 
 /// Methods of the evaluation, in their order.
 fn methods(rows: &[Row]) -> Vec<Method> {
-    let mut methods = vec![];
-    for row in rows {
-        if !methods.contains(&row.method) {
-            methods.push(row.method);
-        }
-    }
-    methods
+    unique(rows.iter().map(|row| row.method))
 }
 
 /// The part of an evaluation; `swept` is the scene whose errors are drawn over the step.
@@ -244,11 +238,7 @@ fn over_time(evaluation: &Evaluation) -> Section {
     for (spec, truth) in &evaluation.scenes {
         let times: Vec<f64> =
             (1..=truth.snapshots.len()).map(|count| count as f64 * spec.timing.interval_seconds()).collect();
-        let still: Vec<f64> = truth
-            .snapshots
-            .iter()
-            .map(|shape| 1e3 * lengths(shape).iter().sum::<f64>() / shape.len() as f64)
-            .collect();
+        let still: Vec<f64> = truth.snapshots.iter().map(|shape| mean_millimetres(&lengths(shape))).collect();
         let rows: Vec<&Row> = evaluation
             .rows
             .iter()
@@ -339,11 +329,6 @@ fn find<'a>(
     (row.figures().is_some() && !row.shape.is_empty()).then_some((spec, truth, row))
 }
 
-fn difference(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f64> {
-    let pairs = a.iter().zip(b);
-    lengths(&pairs.map(|(a, b)| [0, 1, 2].map(|axis| a[axis] - b[axis])).collect::<Vec<_>>())
-}
-
 /// What a hundredth of the values exceeds, so that one node does not take the colours of all others.
 fn most_but_a_hundredth(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
@@ -364,7 +349,7 @@ fn paper_bars(evaluation: &Evaluation) -> Option<Section> {
         let runs = BAR_MULTIPLES.iter().flat_map(|multiple| {
             BARS.iter().filter_map(|scene| {
                 let (spec, truth, row) = find(evaluation, scene, method, *multiple)?;
-                Some((spec, row, difference(&row.shape, truth.snapshots.last()?)))
+                Some((spec, row, distances(&row.shape, truth.snapshots.last()?)))
             })
         });
         let runs: Vec<_> = runs.collect();
@@ -439,11 +424,10 @@ fn paper_bodies(evaluation: &Evaluation) -> Option<Section> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_front_has_no_point_that_another_beats() {
-        let row = |method| Row {
+    const fn row(end: End) -> Row {
+        Row {
             scene: "lobe",
-            method,
+            method: Method::Damped,
             multiple: 10,
             step: 3e-4,
             hold: 3.0,
@@ -452,9 +436,13 @@ mod tests {
             step_over_limit_trajectory: 2.0,
             frames: vec![],
             shape: vec![],
-            end: End::Diverged(0.0),
-        };
-        let row = row(Method::Damped);
+            end,
+        }
+    }
+
+    #[test]
+    fn a_front_has_no_point_that_another_beats() {
+        let row = row(End::Diverged(0.0));
         // Error and time.
         let points = [(1.0, 1.0), (0.5, 2.0), (0.7, 3.0), (0.1, 4.0), (0.1, 5.0), (2.0, 0.5)];
         let judged: Vec<_> = points.into_iter().map(|point| (&row, point)).collect();
@@ -468,19 +456,7 @@ mod tests {
     fn errors_are_written_as_the_paper_writes_them() {
         let errors = supple::lab::measure::Errors { means: vec![9.0, 0.017], sd: 0.014, max: 0.032 };
         let figures = Figures { errors, clip_share: 0.0, us_per_step: 1.0 };
-        let row = Row {
-            scene: "stretch",
-            method: Method::Damped,
-            multiple: 10,
-            step: 3e-4,
-            hold: 3.0,
-            hold_at_end: 3.5,
-            step_over_limit_rest: 1.5,
-            step_over_limit_trajectory: 2.0,
-            frames: vec![],
-            shape: vec![],
-            end: End::Reached(figures),
-        };
+        let row = row(End::Reached(figures));
         assert_eq!(spread(&row), "0.0170 \u{b1} 0.0140 (0.0320) mm");
     }
 }

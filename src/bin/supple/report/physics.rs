@@ -1,6 +1,7 @@
 //! Elements and steps against nature: errors over computing time, of a filmed beam, closed forms and published values.
 
 use plotly::common::{DashType, MarkerSymbol};
+use supple::lab::evaluate::unique;
 use supple::lab::physics::Row;
 
 use super::made::Made;
@@ -10,12 +11,7 @@ use super::{Figure, Panel, Part, Section, Table};
 pub(crate) const NAME: &str = "physics";
 
 pub(crate) fn part(rows: &[Row]) -> Part {
-    let mut names: Vec<(&str, &str)> = vec![];
-    for row in rows {
-        if !names.contains(&(row.case, &row.quantity)) {
-            names.push((row.case, &row.quantity));
-        }
-    }
+    let names = unique(rows.iter().map(|row| (row.case, &*row.quantity)));
     let panels = names.into_iter().filter_map(|(case, quantity)| {
         let of = rows.iter().filter(|row| row.case == case && row.quantity == quantity);
         panel(case, quantity, &of.collect::<Vec<_>>())

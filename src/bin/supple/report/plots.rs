@@ -2,7 +2,7 @@
 //! bytes.
 
 use plotly::common::{DashType, HoverInfo, Line, LineShape, Marker, MarkerSymbol, Mode, Title};
-use plotly::layout::{Axis, AxisType, HoverMode, Legend};
+use plotly::layout::{Axis, AxisType, HoverMode};
 use plotly::{Layout, Plot, Scatter};
 
 /// Okabe and Ito's palette, which colour-blind people tell apart, with brown in place of black.
@@ -114,7 +114,7 @@ fn plot(x: Axis, y: Axis, curves: Vec<Curve>) -> Plot {
     for curve in curves {
         plot.add_trace(curve.trace());
     }
-    plot.set_layout(Layout::new().x_axis(x).y_axis(y).legend(Legend::new()).hover_mode(HoverMode::Closest));
+    plot.set_layout(Layout::new().x_axis(x).y_axis(y).hover_mode(HoverMode::Closest));
     plot
 }
 

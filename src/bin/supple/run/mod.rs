@@ -75,8 +75,7 @@ pub(crate) fn run<M: ElementMaterial>(
                     let begun = Instant::now();
                     let status = guard.follow(Status::Ok, scene, &loads, &state.view());
                     outcome.guarding += begun.elapsed();
-                    let is_exact = matches!(&mover, Mover::Learned(learned) if learned.is_leading());
-                    let status = if is_exact { Status::Ok } else { status };
+                    let status = if mover.is_leading() { Status::Ok } else { status };
                     let trace = outcome.guard.get_or_insert_default();
                     trace.enter(status, guard.estimate(), state.time());
                     if let (Mover::Learned(learned), Status::Inexact { .. }) = (&mut mover, status) {

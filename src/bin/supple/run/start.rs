@@ -55,6 +55,11 @@ impl Mover<'_> {
         }
     }
 
+    /// Whether the latest interval was of exact steps that lead a network, which have no error.
+    pub(crate) fn is_leading(&self) -> bool {
+        matches!(self, Self::Learned(learned) if learned.is_leading())
+    }
+
     /// The length of fixed exact steps (s), while they move the scene.
     pub(crate) fn fixed_exact_seconds(&self) -> Option<f32> {
         match self {
