@@ -131,23 +131,23 @@ impl EnergyBalance {
     }
 
     /// The balance with `strain`, the strain energy of the elements up to place `next`, none if that was the last. Added inertia
-    /// has `added` times the kinetic energy of the masses; `releasable` is the energy that the material can release from rest.
-    pub(crate) fn measured(mut self, strain: f64, next: Option<u32>, added: f64, releasable: f64) -> Self {
+    /// has `added` times the kinetic energy of the masses; `rounding` is the energy of a strain that may be rounding.
+    pub(crate) fn measured(mut self, strain: f64, next: Option<u32>, added: f64, rounding: f64) -> Self {
         let cycle = &mut self.cycle;
         cycle.strain += strain;
         cycle.kinetic = cycle.kinetic.max((1.0 + added) * self.kinetic);
         match next {
             Some(next) => cycle.next = next,
-            None => self.conclude(releasable),
+            None => self.conclude(rounding),
         }
         self
     }
 
     /// Ends a cycle.
-    fn conclude(&mut self, releasable: f64) {
+    fn conclude(&mut self, rounding: f64) {
         let EnergyCycle { strain, kinetic, work, .. } = self.cycle;
         self.cycle = EnergyCycle::NEW;
-        let measured = (strain + releasable).max(0.0) + kinetic;
+        let measured = (strain + rounding).max(0.0) + kinetic;
         let most = MOST_OVER_MEASURED * measured + work;
         if most < self.allowed() {
             self.corrected += measured - self.balance();

@@ -264,9 +264,10 @@ pub fn of_body<M: ElementMaterial>(
 /// Of a network that a scene's learned steps use.
 #[must_use]
 pub fn of_network<M: ElementMaterial>(scene: SceneView<'_, M>, recipe: &Recipe<'_>) -> Option<Remark> {
-    let is_same_law = scene.element() == recipe.element && M::Law::NAME == recipe.law.name();
+    let is_same_law =
+        scene.element() == recipe.element && scene.material.laws().law().name() == recipe.law.name();
     let is_same = |Tissue { law, density }: Tissue<M::Law>| {
-        let mut constants = law.constants().into_iter().zip(recipe.law.values());
+        let mut constants = law.values().into_iter().zip(recipe.law.values());
         same(density, recipe.density) && constants.all(|(here, there)| same(here, there))
     };
     (!(is_same_law && tissues_of(scene.material).all(is_same))).then_some(Remark::OtherTissue)
@@ -279,11 +280,13 @@ pub fn same(a: f32, b: f32) -> bool {
 }
 
 fn tissues_of<M: Material>(material: &M) -> impl Iterator<Item = Tissue<M::Law>> {
-    let (one, several) = match material.laws() {
-        Laws::One(_) => (material.tissue(0), &[][..]),
-        Laws::Regions { tissues, .. } => (None, tissues),
+    let (one, law, several) = match material.laws() {
+        Laws::One(law) => (material.tissue(0), law, &[][..]),
+        Laws::Regions { law, tissues, .. } => (None, law, tissues),
     };
-    one.into_iter().chain(several.iter().copied())
+    let several =
+        several.iter().map(move |tissue| Tissue { law: law.with(tissue.law), density: tissue.density });
+    one.into_iter().chain(several)
 }
 
 /// The diagonal of the box around the points, m.

@@ -14,7 +14,7 @@ use crate::element::{
     ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, PatchBuilder,
     PatchRow, Patches, VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
 };
-use crate::material::{Element, Law, Laws, Material, Moduli, releasable_energy};
+use crate::material::{Element, Law, Laws, Material, Moduli};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
 use crate::mesh::strips::Numbered;
 use crate::mesh::{Mesh, MeshError, volume};
@@ -84,7 +84,7 @@ pub struct SceneFacts {
     partitions: Partitions,
     patch_rows: usize,
     mass: f64,
-    releasable_energy: f64,
+    rounding_energy: f64,
     checksum: u32,
     /// Whether a node's mass may be more than that of the tissue around it.
     has_point_masses: bool,
@@ -98,7 +98,7 @@ impl SceneFacts {
         partitions: Partitions::NONE,
         patch_rows: 0,
         mass: 0.0,
-        releasable_energy: 0.0,
+        rounding_energy: 0.0,
         checksum: 0,
         has_point_masses: false,
     };
@@ -114,7 +114,7 @@ impl SceneFacts {
         patches: &mut [PatchRow],
     ) -> Result<Self, BuildError> {
         let mut facts = Self::without_patches(material, mesh, supports, nodes, tiles)?;
-        if M::ELEMENT.is_nodal_strain() {
+        if material.element().is_nodal_strain() {
             facts.build_patches(material, tiles, patches)?;
         }
         Ok(facts)
@@ -157,7 +157,7 @@ impl SceneFacts {
         }
         nodes.fill(NodeInertia::EMPTY);
         mark_supports(nodes, supports)?;
-        if M::ELEMENT != Element::Linear {
+        if material.element() != Element::Linear {
             mark_neighbours(nodes, mesh);
         }
         let still = |tet: [u32; 4]| {
@@ -184,18 +184,18 @@ impl SceneFacts {
                 }
             });
         }
-        if M::ELEMENT.is_nodal_pressure() && material.laws().differ() {
+        if material.element().is_nodal_pressure() && material.laws().differ() {
             find_slots(material, mesh, nodes, tiles);
         }
-        let (mass, releasable_energy) = lump_masses(material, mesh, nodes)?;
-        let checksum = checksum(M::ELEMENT, nodes, tiles);
+        let (mass, rounding_energy) = lump_masses(material, mesh, nodes)?;
+        let checksum = checksum(material.element(), nodes, tiles);
         Ok(Self {
             node_count: nodes.len(),
             element_count,
             partitions,
             patch_rows: 0,
             mass,
-            releasable_energy,
+            rounding_energy,
             checksum,
             has_point_masses: false,
         })
@@ -241,8 +241,8 @@ impl SceneFacts {
     }
 
     /// Energy that the material can release from rest, J, almost zero for the isochoric laws.
-    pub(crate) const fn releasable_energy(&self) -> f64 {
-        self.releasable_energy
+    pub(crate) const fn rounding_energy(&self) -> f64 {
+        self.rounding_energy
     }
 }
 
@@ -305,14 +305,14 @@ fn find_slots(
 /// A strain whose energy proves nothing: rounding and the noise of a network may have put it there.
 const ROUNDED_STRAIN: f64 = 1e-4;
 
-/// Adds a quarter of each element's mass to each of its nodes, whose supports have been marked. Gives the mass (kg) and the energy
-/// that the material can release from rest, with that of a rounded strain (J).
+/// Adds a quarter of each element's mass to each of its nodes, whose supports have been marked. Gives the mass (kg) and the energy of
+/// a strain that is nothing but rounding (J).
 fn lump_masses(
     material: &impl Material,
     mesh: &Mesh<'_>,
     nodes: &mut [NodeInertia],
 ) -> Result<(f64, f64), BuildError> {
-    let (mut mass, mut releasable) = (0.0, 0.0);
+    let (mut mass, mut rounding) = (0.0, 0.0);
     nodes.iter_mut().for_each(NodeInertia::clear_mass);
     for (element, tet) in mesh.tets().enumerate() {
         let Some(tissue) = material.tissue(element) else {
@@ -327,8 +327,7 @@ fn lump_masses(
         let volume = volume(mesh.corners(tet));
         let share = 0.25 * volume * f64::from(tissue.density);
         mass += 4.0 * share;
-        let rounding = 0.5 * Moduli::of(&tissue.law).shear * ROUNDED_STRAIN * ROUNDED_STRAIN;
-        releasable += volume * (releasable_energy(&tissue.law) + rounding);
+        rounding += volume * (0.5 * Moduli::of(&tissue.law).shear * ROUNDED_STRAIN * ROUNDED_STRAIN);
         for node in tet {
             if let Some(inertia) = nodes.get_mut(node as usize) {
                 inertia.mass += share as f32;
@@ -341,7 +340,7 @@ fn lump_masses(
         }
         inertia.invert();
     }
-    Ok((mass, releasable))
+    Ok((mass, rounding))
 }
 
 /// A scene over memory of whichever kind.
@@ -418,8 +417,9 @@ impl<'a, M> SceneView<'a, M> {
 impl<'a, M: Material> SceneView<'a, M> {
     /// The tetrahedra that it is made of.
     #[must_use]
-    pub const fn element(&self) -> Element {
-        M::ELEMENT
+    #[inline(always)]
+    pub fn element(&self) -> Element {
+        self.material.element()
     }
 
     /// What internal forces are computed from.
@@ -459,7 +459,7 @@ impl<'a, M: Material> SceneView<'a, M> {
     }
 
     fn energy_tiles(&self) -> usize {
-        self.tiles.len() + if M::ELEMENT.is_nodal_strain() { self.patches.tiles().len() } else { 0 }
+        self.tiles.len() + if self.element().is_nodal_strain() { self.patches.tiles().len() } else { 0 }
     }
 
     /// Strain energy at some of the places, J. Those that follow each other are in tiles that follow each other, so that
@@ -471,7 +471,7 @@ impl<'a, M: Material> SceneView<'a, M> {
         volumes: &[NodeVector],
     ) -> f64 {
         let laws = self.material.laws();
-        let volumes = M::ELEMENT.is_nodal_pressure().then(|| self.volume_rows(volumes));
+        let volumes = self.element().is_nodal_pressure().then(|| self.volume_rows(volumes));
         let tiles = self.energy_tiles().max(1);
         let energies = places.map(|place| {
             let (at, lane) = (place % tiles, place / tiles % TILE);
@@ -479,7 +479,7 @@ impl<'a, M: Material> SceneView<'a, M> {
                 let law = laws.of(tile.element(lane));
                 return if tile.volume::<f32>(lane) <= 0.0 {
                     0.0
-                } else if M::ELEMENT.is_nodal_strain() {
+                } else if self.element().is_nodal_strain() {
                     stabilising_energy(&law, tile, lane, displacement)
                 } else {
                     element_energy(&law, tile, lane, displacement, volumes)

@@ -12,7 +12,7 @@ use crate::contact::{ContactPoint, Touch};
 use crate::contact::{MOST_INSTRUMENTS, Surface, vectors_to_push};
 use crate::element::Extremes;
 use crate::energy_balance::EnergyBalance;
-use crate::material::{Element, Material};
+use crate::material::Element;
 pub use crate::simd::NodeVector;
 
 /// How far a simulation has come, apart from its vectors.
@@ -191,8 +191,8 @@ impl<'a> StateView<'a> {
     }
 
     /// How many nodes of a scene of this material the vectors hold.
-    pub(crate) fn capacity_for<M: Material>(&self) -> usize {
-        let volumes = if M::ELEMENT == Element::Linear { usize::MAX } else { self.volume.len() };
+    pub(crate) fn capacity_for(&self, element: Element) -> usize {
+        let volumes = if element == Element::Linear { usize::MAX } else { self.volume.len() };
         self.capacity().min(volumes)
     }
 

@@ -14,8 +14,8 @@
 #     DIR/share/supple/tools       mesh_to_c.py, which puts meshes and networks into C programs
 #     DIR/share/supple/licences    MIT and Apache 2.0, to choose from
 #
-# --destdir is put before the prefix, to make packages. FEATURES (capi) are those of Cargo.toml: capi-nodal-pressure has only the
-# first of the laws and no nodal strain, capi-neo-hookean of that only linear tetrahedra; deterministic may be added after a comma.
+# --destdir is put before the prefix, to make packages. FEATURES (capi) are those of Cargo.toml: capi-neo-hookean has only the
+# first of the laws and no nodal strain; deterministic may be added after a comma.
 set -euo pipefail
 
 usage() {

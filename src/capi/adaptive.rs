@@ -15,7 +15,7 @@ use super::guard::{estimated, supple_estimate};
 use super::large::{LargeRequest, storage, supple_large_config};
 use super::loads::{CallLoads, supple_loads};
 use super::memory::{self, Head, Layout, Object, Place, magic, place_for, place_if_wanted};
-use super::scene::{AnyScene, carved, supple_scene, with_scene};
+use super::scene::{OpenScene, supple_scene};
 use super::state::{opened_of, supple_state};
 use super::status::{Answer, supple_error, supple_status};
 use super::step::{HostThreads, answer, reported, supple_report, supple_threads};
@@ -61,8 +61,8 @@ fn layout(vectors: usize) -> Layout {
 }
 
 /// Vectors of the storage.
-fn vectors_of(any: &AnyScene<'_>, request: &LargeRequest<'_>) -> Answer<usize> {
-    Ok(with_scene!(any, scene => vectors_with(request.vectors, scene, request.points)?))
+fn vectors_of(open: &OpenScene<'_>, request: &LargeRequest<'_>) -> Answer<usize> {
+    Ok(vectors_with(request.vectors, open.view(), request.points)?)
 }
 
 /// Writes how many bytes of memory a supple_adaptive needs for a scene; it depends on the lattice.
@@ -80,9 +80,9 @@ pub unsafe extern "C" fn supple_adaptive_size(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let size = || unsafe {
-        let (any, bytes) = (carved(scene)?, place_for(bytes)?);
-        let request = LargeRequest::of(&any, points, config)?;
-        bytes.write(layout(vectors_of(&any, &request)?).bytes());
+        let (open, bytes) = (OpenScene::of(scene)?, place_for(bytes)?);
+        let request = LargeRequest::of(&open, points, config)?;
+        bytes.write(layout(vectors_of(&open, &request)?).bytes());
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
@@ -110,25 +110,26 @@ pub unsafe extern "C" fn supple_adaptive_init(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller: weights stay as long as the object is used.
     let init = || unsafe {
-        let (any, adaptive) = (carved(scene)?, place_for(adaptive)?);
-        let mut state = opened_of(&any, state)?;
-        let request = LargeRequest::of(&any, points, config)?;
+        let (open, adaptive) = (OpenScene::of(scene)?, place_for(adaptive)?);
+        let mut state = opened_of(&open, state)?;
+        let request = LargeRequest::of(&open, points, config)?;
         if !(tolerance.is_finite() && tolerance > 0.0) {
             return Err(supple_error::from(SUPPLE_E_NEGATIVE).value(tolerance.into(), 0.0));
         }
         let longest = Step::unchecked(request.config.seconds, request.config.damping)?;
         let asked = Request { tolerance, longest };
         let method = request.method()?;
-        let vectors = vectors_of(&any, &request)?;
+        let vectors = vectors_of(&open, &request)?;
         let place = Place::new(memory, bytes, layout(vectors))?;
-        let nodes = any.node_count() as u32;
+        let nodes = open.node_count() as u32;
         let storage = storage(place.arrays::<supple_adaptive>(), vectors);
         let object = place.object::<supple_adaptive>();
         // Of 38 kB each: they are made where they stay, not on the stack.
         let [first, second] = [&raw mut (*object).first, &raw mut (*object).second]
             .map(|model| &mut *model.cast::<MaybeUninit<LargeModel<'static>>>());
         let points = request.points;
-        let (chooser, watch) = with_scene!(any, scene => {
+        let (chooser, watch) = {
+            let scene = open.view();
             let chooser = Chooser::new(&method, scene, points, state.reborrow(), asked)?;
             let Parts { first: of_first, second: of_second, .. } = chooser.checked(storage, scene, points)?;
             let step = chooser.shortest()?;
@@ -138,7 +139,7 @@ pub unsafe extern "C" fn supple_adaptive_init(
             };
             let ((), watch) = Watch::prepare(scene, points, state, step, 1, of_second, prepare)?;
             (chooser, chooser.allowing(watch))
-        });
+        };
         (&raw mut (*object).chooser).write(chooser);
         (&raw mut (*object).watch).write(watch);
         (&raw mut (*object).nodes).write(nodes);
@@ -179,23 +180,23 @@ pub unsafe extern "C" fn supple_adaptive_advance(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let advance = |report: &mut supple_report| unsafe {
-        let any = carved(scene)?;
-        let mut loads = CallLoads::of(loads, &any)?;
-        any.fits(memory::read(state.cast_const())?.nodes)?;
+        let open = OpenScene::of(scene)?;
+        let mut loads = CallLoads::of(loads, &open)?;
+        open.fits(memory::read(state.cast_const())?.nodes)?;
         let (supple_adaptive { nodes, vectors, chooser, watch, first, second, .. }, arrays) =
             memory::open(adaptive)?;
-        any.fits(*nodes)?;
+        open.fits(*nodes)?;
         // Also refuses what is no number.
         let span = Step::unchecked(seconds, 0.0)?;
         let storage = storage(arrays, *vectors);
         let threads = HostThreads::of(threads)?;
         let written = place_if_wanted(taken)?;
-        let mut state = loads.attached(opened_of(&any, state)?);
-        let (status, Taken { exact, large, changes }) = with_scene!(any, scene => {
+        let mut state = loads.attached(opened_of(&open, state)?);
+        let (status, Taken { exact, large, changes }) = {
             let (first, second) = (&mut *first, &mut *second);
             let view = AdaptiveView { chooser: &mut *chooser, first, second, watch: &mut *watch, storage };
-            view.advance(span.seconds(), scene, &mut loads, state.reborrow(), &threads)
-        });
+            view.advance(span.seconds(), open.view(), &mut loads, state.reborrow(), &threads)
+        };
         loads.enter(state.touches());
         report.enter(&status, &state);
         report.steps = exact + large;

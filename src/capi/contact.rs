@@ -11,7 +11,7 @@ use crate::state::{NodeVector, StateView};
 
 use super::loads::supple_loads;
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for};
-use super::scene::{carved, supple_scene};
+use super::scene::{OpenScene, supple_scene};
 use super::state::{opened, supple_state};
 use super::status::{Answer, status_of, supple_error, supple_status};
 use super::surface::{Given, supple_surface};
@@ -200,8 +200,8 @@ pub unsafe extern "C" fn supple_contact_init(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let init = || unsafe {
-        let (any, contact) = (carved(scene)?, place_for(contact)?);
-        let (nodes, surface) = (any.node_count(), one(surface)?);
+        let (open, contact) = (OpenScene::of(scene)?, place_for(contact)?);
+        let (nodes, surface) = (open.node_count(), one(surface)?);
         let given = Given::new(surface, array(points.cast(), nodes)?)?;
         let room = Room { nodes: surface.node_count, triangles: surface.triangle_count, grips };
         let place = Place::new(memory, bytes, room.layout())?;

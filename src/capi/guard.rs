@@ -14,7 +14,7 @@ use super::loads::{CallLoads, supple_loads};
 use super::memory::{
     self, Head, Layout, Object, Place, array, magic, one, place_for, place_if_wanted, same_abi,
 };
-use super::scene::{carved, supple_scene, with_scene};
+use super::scene::{OpenScene, supple_scene};
 use super::state::{opened_of, supple_state};
 use super::status::{Answer, status_of, supple_error, supple_status};
 use super::step::{HostThreads, answer, supple_threads};
@@ -90,9 +90,9 @@ pub unsafe extern "C" fn supple_guard_size(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let size = || unsafe {
-        let (any, bytes) = (carved(scene)?, place_for(bytes)?);
-        let points = array(points.cast::<[f32; 3]>(), any.node_count())?;
-        let vectors = with_scene!(any, scene => vectors_for(scene, points)?);
+        let (open, bytes) = (OpenScene::of(scene)?, place_for(bytes)?);
+        let points = array(points.cast::<[f32; 3]>(), open.node_count())?;
+        let vectors = vectors_for(open.view(), points)?;
         bytes.write(layout(vectors).bytes());
         Ok(SUPPLE_OK)
     };
@@ -118,26 +118,27 @@ pub unsafe extern "C" fn supple_guard_init(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let init = || unsafe {
-        let (any, guard) = (carved(scene)?, place_for(guard)?);
-        let state = opened_of(&any, state)?;
+        let (open, guard) = (OpenScene::of(scene)?, place_for(guard)?);
+        let state = opened_of(&open, state)?;
         let config = one(config)?;
         same_abi::<supple_guard_config>(config.struct_size, config.abi)?;
-        let points = array(points.cast::<[f32; 3]>(), any.node_count())?;
+        let points = array(points.cast::<[f32; 3]>(), open.node_count())?;
         let allowed = allowed(config.tolerance)?;
         let step = Step::unchecked(config.seconds, config.damping)?;
-        let vectors = with_scene!(any, scene => vectors_for(scene, points)?);
+        let vectors = vectors_for(open.view(), points)?;
         let place = Place::new(memory, bytes, layout(vectors))?;
-        let nodes = any.node_count() as u32;
+        let nodes = open.node_count() as u32;
         let storage = storage(place.arrays::<supple_guard>(), vectors);
         let object = place.object::<supple_guard>();
         // Of 38 kB: it is made where it stays, not on the stack.
         let second = &mut *(&raw mut (*object).second).cast::<MaybeUninit<_>>();
-        let mut watch = with_scene!(any, scene => {
+        let mut watch = {
             let prepare = |state: crate::state::StateView<'_>, step, storage: &mut [NodeVector]| {
-                LargeModel::prepare_in(second, SECOND_RUN, scene, points, state, step, storage).map(|_| ())
+                LargeModel::prepare_in(second, SECOND_RUN, open.view(), points, state, step, storage)
+                    .map(|_| ())
             };
-            Watch::prepare(scene, points, state, step, config.every, storage, prepare)?.1
-        });
+            Watch::prepare(open.view(), points, state, step, config.every, storage, prepare)?.1
+        };
         watch.allow(allowed);
         (&raw mut (*object).watch).write(watch);
         (&raw mut (*object).nodes).write(nodes);
@@ -176,18 +177,18 @@ pub unsafe extern "C" fn supple_guard_follow(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let follow = || unsafe {
-        let any = carved(scene)?;
-        let mut loads = CallLoads::of(loads, &any)?;
-        any.fits(memory::read(state.cast_const())?.nodes)?;
+        let open = OpenScene::of(scene)?;
+        let mut loads = CallLoads::of(loads, &open)?;
+        open.fits(memory::read(state.cast_const())?.nodes)?;
         let (supple_guard { nodes, vectors, watch, second, .. }, arrays) = memory::open(guard)?;
-        any.fits(*nodes)?;
+        open.fits(*nodes)?;
         let storage = storage(arrays, *vectors);
         let threads = HostThreads::of(threads)?;
         let written = place_if_wanted(estimate)?;
-        let state = loads.attached(opened_of(&any, state)?);
+        let state = loads.attached(opened_of(&open, state)?);
         let loads = loads.of_next_step(state.displacements(), 1);
         let view = GuardView { second, watch: &mut *watch, storage };
-        let status = with_scene!(any, scene => view.follow(Status::Ok, scene, &loads, &state, &threads));
+        let status = view.follow(Status::Ok, open.view(), &loads, &state, &threads);
         if let Some(place) = written {
             place.write(estimated(watch.estimate()));
         }

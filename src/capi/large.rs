@@ -13,7 +13,7 @@ use super::loads::{CallLoads, supple_loads};
 use super::memory::{
     self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for, same_abi,
 };
-use super::scene::{AnyScene, carved, check_choice, supple_scene, with_scene};
+use super::scene::{OpenScene, check_choice, supple_scene};
 use super::state::{opened_of, supple_state};
 use super::status::{Answer, supple_error, supple_status};
 use super::step::{HostThreads, answer, reported, supple_report, supple_threads, take_steps};
@@ -91,7 +91,7 @@ impl<'a> LargeRequest<'a> {
     /// # Safety
     /// As at [`supple_large_size`].
     pub(super) unsafe fn of(
-        any: &AnyScene<'_>,
+        open: &OpenScene<'_>,
         points: *const f32,
         config: *const supple_large_config,
     ) -> Answer<Self> {
@@ -100,15 +100,21 @@ impl<'a> LargeRequest<'a> {
             let config = one(config)?;
             same_abi::<supple_large_config>(config.struct_size, config.abi)?;
             check_choice(SUPPLE_NONE as usize, config.method, SUPPLE_DAMPED)?;
-            (config, array(points.cast::<[f32; 3]>(), any.node_count())?)
+            (config, array(points.cast::<[f32; 3]>(), open.node_count())?)
         };
         let cells = if config.cells == [0; 3] { Cells::Suggested } else { Cells::Given(config.cells) };
         let damped = config.method == SUPPLE_DAMPED;
         let grid = match config.method {
             SUPPLE_MASS_SCALED => Grid::default(),
-            _ => with_scene!(any, scene => cells.grid(scene, points)?),
+            _ => cells.grid(open.view(), points)?,
         };
-        let vectors = with_scene!(any, scene => vectors_for_lattice(scene.element(), scene.node_count(), scene.element_count(), grid, damped));
+        let vectors = vectors_for_lattice(
+            open.view().element(),
+            open.view().node_count(),
+            open.view().element_count(),
+            grid,
+            damped,
+        );
         Ok(Self { config, points, cells, vectors })
     }
 
@@ -150,8 +156,8 @@ pub unsafe extern "C" fn supple_large_size(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let size = || unsafe {
-        let (any, bytes) = (carved(scene)?, place_for(bytes)?);
-        bytes.write(layout(LargeRequest::of(&any, points, config)?.vectors).bytes());
+        let (open, bytes) = (OpenScene::of(scene)?, place_for(bytes)?);
+        bytes.write(layout(LargeRequest::of(&open, points, config)?.vectors).bytes());
         Ok(SUPPLE_OK)
     };
     // SAFETY: as above.
@@ -176,21 +182,21 @@ pub unsafe extern "C" fn supple_large_init(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller: weights stay as long as the object is used.
     let init = || unsafe {
-        let (any, large) = (carved(scene)?, place_for(large)?);
-        let state = opened_of(&any, state)?;
-        let request = LargeRequest::of(&any, points, config)?;
+        let (open, large) = (OpenScene::of(scene)?, place_for(large)?);
+        let state = opened_of(&open, state)?;
+        let request = LargeRequest::of(&open, points, config)?;
         let method = request.method()?;
         let step = Step::unchecked(request.config.seconds, request.config.damping)?;
         let LargeRequest { points, vectors, .. } = request;
         let place = Place::new(memory, bytes, layout(vectors))?;
-        let nodes = any.node_count() as u32;
+        let nodes = open.node_count() as u32;
         let storage = storage(place.arrays::<supple_large>(), vectors);
         let object = place.object::<supple_large>();
         // Of 38 kB: it is made where it stays, not on the stack.
         let model = &mut *(&raw mut (*object).model).cast::<MaybeUninit<_>>();
-        with_scene!(any, scene => {
-            LargeModel::prepare_in(model, method, scene, points, state, step, storage)?;
-        });
+        {
+            LargeModel::prepare_in(model, method, open.view(), points, state, step, storage)?;
+        };
         (&raw mut (*object).nodes).write(nodes);
         (&raw mut (*object).vectors).write(vectors);
         (&raw mut (*object).head).write(place.head::<supple_large>());
@@ -226,25 +232,25 @@ pub unsafe extern "C" fn supple_large_step(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let step = |report: &mut supple_report| unsafe {
-        let any = carved(scene)?;
-        let mut loads = CallLoads::of(loads, &any)?;
-        any.fits(memory::read(state.cast_const())?.nodes)?;
+        let open = OpenScene::of(scene)?;
+        let mut loads = CallLoads::of(loads, &open)?;
+        open.fits(memory::read(state.cast_const())?.nodes)?;
         let (supple_large { nodes, vectors, model, .. }, arrays) = memory::open(large)?;
-        any.fits(*nodes)?;
+        open.fits(*nodes)?;
         let storage = storage(arrays, *vectors);
         let threads = HostThreads::of(threads)?;
-        let mut state = loads.attached(opened_of(&any, state)?);
+        let mut state = loads.attached(opened_of(&open, state)?);
         let count = count.into();
         let (mut held_back, mut lattice_share) = (0, 1.0);
-        let status = with_scene!(any, scene => take_steps(count, count, &mut state, &mut loads, report, |loads, state| {
-            let status = model.with_storage(storage).step_in_parts(scene, loads, state, &threads);
+        let status = take_steps(count, count, &mut state, &mut loads, report, |loads, state| {
+            let status = model.with_storage(storage).step_in_parts(open.view(), loads, state, &threads);
             // What was refused has no report of its own.
             if status.is_taken() {
                 held_back = held_back.max(model.report().held_back);
                 lattice_share = f32::min(lattice_share, model.report().coarse_share);
             }
             status
-        }));
+        });
         report.close(&state);
         (report.held_back, report.added_mass) = (held_back, model.report().added_mean);
         report.lattice_share = lattice_share;

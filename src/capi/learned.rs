@@ -4,6 +4,7 @@
 use core::ffi::c_void;
 
 use crate::learned::{LearnedModel, LearnedReport, vectors_for};
+use crate::material::Law;
 use crate::mlp::Network;
 use crate::state::{NodeVector, StateView};
 use crate::step::{Status, Step};
@@ -14,7 +15,7 @@ use super::loads::{CallLoads, supple_loads};
 use super::memory::{
     self, Arrays, Head, Layout, Object, Place, lasting_bytes, magic, one, place_for, same_abi,
 };
-use super::scene::{AnyScene, carved, check_choice, supple_scene, supple_tissue, with_scene};
+use super::scene::{OpenScene, check_choice, supple_scene, supple_tissue};
 use super::state::{opened_of, supple_state};
 use super::status::{Answer, status_of, supple_error, supple_status};
 use super::step::{HostThreads, answer, reported, supple_report, supple_threads, take_steps, worse};
@@ -109,14 +110,14 @@ pub unsafe extern "C" fn supple_learned_init(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller: weights stay as long as the object is used.
     let init = || unsafe {
-        let (any, config, learned) = (carved(scene)?, one(config)?, place_for(learned)?);
+        let (open, config, learned) = (OpenScene::of(scene)?, one(config)?, place_for(learned)?);
         same_abi::<supple_learned_config>(config.struct_size, config.abi)?;
         check_choice(SUPPLE_NONE as usize, config.fallback, 1)?;
         check_choice(SUPPLE_NONE as usize, config.reserved, 0)?;
         let fallback = config.fallback == 1;
         let weights = lasting_bytes(config.weights, config.weights_bytes)?;
         let mut model = LearnedModel::new(Network::parse(weights)?, fallback)?;
-        let nodes = any.node_count() as u32;
+        let nodes = open.node_count() as u32;
         let place = Place::new(memory, bytes, layout(nodes, fallback))?;
         model.with_storage(storage(place.arrays::<supple_learned>(), nodes, fallback)).reset();
         learned.write(place.put(|head| supple_learned { head, nodes, model }));
@@ -160,7 +161,6 @@ pub unsafe extern "C" fn supple_learned_describe(
         facts.write(supple_learned_facts {
             seconds: recipe.step,
             damping: recipe.damping,
-            // The literal form of a law has the number of the law.
             law: recipe.law.code() / 2,
             tissue: supple_tissue { constants: recipe.law.values(), density: recipe.density },
             exact_seconds: recipe.exact_step,
@@ -175,7 +175,7 @@ pub unsafe extern "C" fn supple_learned_describe(
 
 /// What a call that takes learned steps, or a lead-in, works with.
 struct Call<'a> {
-    any: AnyScene<'a>,
+    open: OpenScene<'a>,
     loads: CallLoads<'a>,
     model: &'a mut LearnedModel<'static>,
     storage: &'a mut [NodeVector],
@@ -200,37 +200,37 @@ impl<'a> Call<'a> {
     ) -> Answer<Self> {
         // SAFETY: the caller's promise.
         unsafe {
-            let any = carved(scene)?;
-            let loads = CallLoads::of(loads, &any)?;
-            any.fits(memory::read(state.cast_const())?.nodes)?;
+            let open = OpenScene::of(scene)?;
+            let loads = CallLoads::of(loads, &open)?;
+            open.fits(memory::read(state.cast_const())?.nodes)?;
             let (supple_learned { nodes, model, .. }, arrays) = memory::open(learned)?;
-            any.fits(*nodes)?;
+            open.fits(*nodes)?;
             let threads = HostThreads::of(threads)?;
             let exact = (*state).step()?;
             let ratio = model.exact_steps(&exact)?;
             let storage = storage(arrays, *nodes, model.undoes());
-            let state = opened_of(&any, state)?;
-            Ok(Self { any, loads, model, storage, state, exact, ratio, threads, report })
+            let state = opened_of(&open, state)?;
+            Ok(Self { open, loads, model, storage, state, exact, ratio, threads, report })
         }
     }
 
     /// Exact steps while the frames follow, as long as one of the network's steps. Motions go evenly over all `left` of these.
     fn lead(&mut self, left: u64) -> Answer<supple_status> {
-        let Self { any, loads, model, storage, state, exact, ratio, threads, report } = self;
+        let Self { open, loads, model, storage, state, exact, ratio, threads, report } = self;
         let status = model.with_storage(storage).lead_interval(state, |state| {
-            exact_steps((any, exact, threads), *ratio, left, state, loads, report)
+            exact_steps((open, exact, threads), *ratio, left, state, loads, report)
         });
         answer(&status)
     }
 
     /// One learned step; or exact ones, if it was undone or these are next.
     fn step(&mut self, left: u64) -> Answer<supple_status> {
-        let Self { any, loads, model, storage, state, exact, threads, report, .. } = self;
+        let Self { open, loads, model, storage, state, exact, threads, report, .. } = self;
         if !model.is_exact_next() {
             let mut learned = model.with_storage(storage);
             let loads = loads.of_next_step(state.displacements(), left);
             let seconds = exact.seconds();
-            let tried = with_scene!(any, scene => learned.try_step(scene, &loads, state, seconds, threads))?;
+            let tried = learned.try_step(open.view(), &loads, state, seconds, threads)?;
             let LearnedReport { clipped, outside, .. } = *model.report();
             report.clipped = report.clipped.max(clipped);
             report.outside = report.outside.max(outside);
@@ -258,7 +258,7 @@ impl<'a> Call<'a> {
 
 /// Takes the exact steps of one of the network's. Motions go evenly over all `left` of the network's.
 fn exact_steps(
-    (any, exact, threads): (&AnyScene<'_>, &Step, &HostThreads),
+    (open, exact, threads): (&OpenScene<'_>, &Step, &HostThreads),
     ratio: u32,
     left: u64,
     state: &mut StateView<'_>,
@@ -266,9 +266,9 @@ fn exact_steps(
     report: &mut supple_report,
 ) -> Status {
     let (count, left) = (ratio.into(), left.saturating_mul(ratio.into()));
-    with_scene!(any, scene => take_steps(count, left, state, loads, report, |loads, state| {
-        tled::step_in_parts(scene, loads, state, exact, threads)
-    }))
+    take_steps(count, left, state, loads, report, |loads, state| {
+        tled::step_in_parts(open.view(), loads, state, exact, threads)
+    })
 }
 
 /// The lead-in: exact steps for `seconds` while the frames of the nodes follow, in the nearest whole number of the network's steps

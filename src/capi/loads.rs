@@ -9,7 +9,7 @@ use crate::state::{NodeVector, StateView};
 
 use super::contact::{CallContact, supple_contact};
 use super::memory::{self, Head, Layout, Object, Place, array, magic, place_for};
-use super::scene::{AnyScene, axes_of, carved, check_choice, supple_scene, with_scene};
+use super::scene::{OpenScene, axes_of, check_choice, supple_scene};
 use super::status::{Answer, status_of, supple_error, supple_status};
 use supple_status::*;
 
@@ -102,8 +102,8 @@ pub unsafe extern "C" fn supple_loads_init(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller, here and below.
     let init = || unsafe {
-        let (any, loads) = (carved(scene)?, place_for(loads)?);
-        let nodes = any.node_count() as u32;
+        let (open, loads) = (OpenScene::of(scene)?, place_for(loads)?);
+        let nodes = open.node_count() as u32;
         let place = Place::new(memory, bytes, layout(forces, motions))?;
         loads.write(place.put(|head| supple_loads {
             head,
@@ -180,9 +180,9 @@ pub unsafe extern "C" fn supple_set_motions(
     // SAFETY: what the header asks of the caller.
     let set = || unsafe {
         let (object, mut arrays) = memory::open(loads)?;
-        let any = carved(scene)?;
+        let open = OpenScene::of(scene)?;
         let given = array(motions, count as usize)?;
-        any.fits(object.nodes)?;
+        open.fits(object.nodes)?;
         room_for(count, object.motion_room)?;
         let motions = given.iter().map(|&supple_motion { node, axes, metre, ramp }| Motion {
             node,
@@ -192,7 +192,7 @@ pub unsafe extern "C" fn supple_set_motions(
         });
         for (index, (motion, given)) in motions.clone().zip(given).enumerate() {
             check_choice(index, given.axes, 7)?;
-            let movable = with_scene!(any, scene => scene.movable(motion.node as usize));
+            let movable = open.view().movable(motion.node as usize);
             motion.check(index, object.nodes as usize, movable)?;
         }
         arrays.change::<NodalForce>(object.force_room as usize);
@@ -231,7 +231,7 @@ impl<'a> CallLoads<'a> {
     ///
     /// # Safety
     /// As at [`memory::change`].
-    pub(super) unsafe fn of(loads: *mut supple_loads, scene: &AnyScene<'_>) -> Answer<Self> {
+    pub(super) unsafe fn of(loads: *mut supple_loads, scene: &OpenScene<'_>) -> Answer<Self> {
         let nodes = scene.node_count();
         if loads.is_null() {
             return Ok(Self {

@@ -7,7 +7,7 @@ use crate::state::NodeVector;
 
 use super::large::storage;
 use super::memory::{self, Head, Layout, Object, Place, array, magic, place_for};
-use super::scene::{carved, supple_scene, with_scene};
+use super::scene::{OpenScene, supple_scene};
 use super::state::{opened_of, supple_state};
 use super::status::{status_of, supple_error, supple_status};
 use supple_status::*;
@@ -68,12 +68,12 @@ pub unsafe extern "C" fn supple_reaction_init(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let init = || unsafe {
-        let (any, reaction) = (carved(scene)?, place_for(reaction)?);
+        let (open, reaction) = (OpenScene::of(scene)?, place_for(reaction)?);
         let supports = array(supports, count)?;
-        let nodes = any.node_count();
+        let nodes = open.node_count();
         let place = Place::new(memory, bytes, layout(nodes))?;
         let storage = storage(place.arrays::<supple_reaction>(), vectors_for(nodes));
-        let model = with_scene!(any, scene => ReactionModel::prepare(scene, supports, damping, storage)?);
+        let model = ReactionModel::prepare(open.view(), supports, damping, storage)?;
         reaction.write(place.put(|head| supple_reaction { head, model }));
         Ok(SUPPLE_OK)
     };
@@ -92,14 +92,14 @@ pub unsafe extern "C" fn supple_reaction_follow(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let follow = || unsafe {
-        let (any, place) = (carved(scene)?, place_for(force)?);
+        let (open, place) = (OpenScene::of(scene)?, place_for(force)?);
         let (supple_reaction { model, .. }, arrays) = memory::open(reaction)?;
-        if !with_scene!(any, scene => model.is_for(scene)) {
+        if !model.is_for(open.view()) {
             return Err(SUPPLE_E_MISMATCH.into());
         }
-        let storage = storage(arrays, vectors_for(any.node_count()));
-        let state = opened_of(&any, state)?;
-        let force = with_scene!(any, scene => model.follow(scene, &state, storage));
+        let storage = storage(arrays, vectors_for(open.node_count()));
+        let state = opened_of(&open, state)?;
+        let force = model.follow(open.view(), &state, storage);
         place.write(match force {
             Some(force) => supple_reaction_force {
                 known: 1,

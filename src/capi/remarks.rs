@@ -8,7 +8,7 @@ use super::SUPPLE_NONE;
 use super::learned::supple_learned;
 use super::loads::{CallLoads, supple_loads};
 use super::memory::{self, array, place_for};
-use super::scene::{carved, supple_scene, with_scene};
+use super::scene::{OpenScene, supple_scene};
 use super::status::{status_of, supple_status};
 use supple_status::*;
 
@@ -89,11 +89,11 @@ pub unsafe extern "C" fn supple_remarks(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let tell = || unsafe {
-        let (any, count) = (carved(scene)?, place_for(count)?);
-        let points = array(points.cast::<[f32; 3]>(), any.node_count())?;
+        let (open, count) = (OpenScene::of(scene)?, place_for(count)?);
+        let points = array(points.cast::<[f32; 3]>(), open.node_count())?;
         let recipe =
             if learned.is_null() { None } else { Some(memory::read(learned)?.model.network().recipe()) };
-        let loads = CallLoads::of(loads, &any)?;
+        let loads = CallLoads::of(loads, &open)?;
         let first = if room == 0 { remarks } else { place_for(remarks)? };
         let mut told = 0;
         let mut say = |index: usize, remark| {
@@ -102,7 +102,8 @@ pub unsafe extern "C" fn supple_remarks(
             }
             told = told.saturating_add(1);
         };
-        with_scene!(any, scene => {
+        {
+            let scene = open.view();
             plausibility::of_body(scene, points, &mut say);
             plausibility::of_gravity(loads.gravity()).into_iter().for_each(|remark| say(0, remark));
             let body = Proportions::of(scene, points);
@@ -112,7 +113,7 @@ pub unsafe extern "C" fn supple_remarks(
             }
             let network = recipe.and_then(|recipe| plausibility::of_network(scene, recipe));
             network.into_iter().for_each(|remark| say(0, remark));
-        });
+        };
         count.write(told);
         Ok(SUPPLE_OK)
     };

@@ -2,11 +2,8 @@
 
 use core::ffi::c_void;
 
-use crate::element::{ElementLaw, ElementTile, NodeInertia, PatchRow};
-use crate::material::{
-    AnyLaw, Element, Law, Laws, MAX_CONSTANTS, Material, NodalPressure, NodalStrain, Regions, Tissue,
-    for_each_law,
-};
+use crate::element::{ElementTile, NodeInertia, PatchRow};
+use crate::material::{Element, Tissue, Values};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::{Axes, SceneFacts, SceneView, Support, patch_rows_for, tiles_for};
 use crate::tled;
@@ -54,7 +51,7 @@ pub struct supple_tissue {
     /// At rest, kg/m^3; finite and positive.
     pub density: f32,
 }
-const _: () = assert!(size_of::<supple_tissue>() == size_of::<f32>() * (MAX_CONSTANTS + 1));
+const _: () = assert!(size_of::<supple_tissue>() == size_of::<Tissue<Values>>());
 
 /// What a scene is built from. Everything is copied; nothing needs to stay.
 #[repr(C)]
@@ -102,7 +99,7 @@ pub struct supple_scene {
     tissues: u32,
     element: Element,
     /// Which of the laws; its constants are those of the tissues.
-    law: AnyLaw,
+    law: SceneLaw,
     facts: SceneFacts,
 }
 
@@ -132,197 +129,120 @@ pub struct supple_scene_facts {
     pub mass: f64,
 }
 
-/// One tissue for all elements, or one of several for each.
-#[derive(Clone, Copy)]
-pub(super) struct Body<'a, L> {
-    tissues: &'a [Tissue<L>],
-    of_element: &'a [u16],
-}
+/// What scenes of this library are made of.
+#[cfg(feature = "capi")]
+mod contents {
+    use crate::material::Element;
+    pub(in crate::capi) use crate::material::{AnyLaw as SceneLaw, AnyMaterial as SceneMaterial};
 
-impl<L: Law> Body<'_, L> {
-    /// The tissue of all elements, if there is but one.
-    fn only(&self) -> Option<Tissue<L>> {
-        if self.of_element.is_empty() { self.tissues.first().copied() } else { None }
+    /// The elements that there are; the number of each is its place.
+    pub(super) const ELEMENTS: &[Element] = &Element::ALL;
+
+    /// The law of a number: the position in the list of laws.
+    pub(super) fn law_of(number: u32) -> Option<SceneLaw> {
+        SceneLaw::all().find(|law| number.checked_mul(2) == Some(law.code()))
     }
 }
 
-impl<L: Law> Material for Body<'_, L> {
-    type Law = L;
+/// What scenes of this library are made of: the first law of the list, without nodal strain.
+#[cfg(not(feature = "capi"))]
+mod contents {
+    pub(in crate::capi) use crate::material::NeoHookean as SceneLaw;
+    use crate::material::{AnyMaterial, Element, Laws, Material, Tissue, Values};
 
-    fn tissue(&self, element: usize) -> Option<Tissue<L>> {
-        let Self { tissues, of_element } = *self;
-        self.only().or_else(|| Regions { tissues, of_element }.tissue(element))
+    pub(super) const ELEMENTS: &[Element] = &[Element::Linear, Element::NodalPressure];
+
+    pub(super) fn law_of(number: u32) -> Option<SceneLaw> {
+        (number == 0).then(SceneLaw::default)
     }
 
-    fn laws(&self) -> Laws<'_, L> {
-        let Self { tissues, of_element } = *self;
-        match self.only() {
-            Some(tissue) => Laws::One(tissue.law),
-            None => Laws::Regions { tissues, of_element, beyond: L::default() },
+    #[derive(Clone, Copy)]
+    pub(in crate::capi) struct SceneMaterial<'a> {
+        pub(super) element: Element,
+        pub(super) law: SceneLaw,
+        pub(super) tissues: &'a [Tissue<Values>],
+        pub(super) of_element: &'a [u16],
+    }
+
+    impl<'a> SceneMaterial<'a> {
+        const fn any(&self) -> AnyMaterial<'a, SceneLaw> {
+            let Self { element, law, tissues, of_element } = *self;
+            AnyMaterial { element, law, tissues, of_element }
         }
     }
 
-    fn region(&self, element: usize) -> u16 {
-        self.of_element.get(element).copied().unwrap_or_default()
+    impl Material for SceneMaterial<'_> {
+        type Law = SceneLaw;
+
+        #[inline(always)]
+        fn element(&self) -> Element {
+            // Seen by the compiler, which then leaves nodal strain out.
+            if self.element as u32 == Element::NodalPressure as u32 {
+                Element::NodalPressure
+            } else {
+                Element::Linear
+            }
+        }
+
+        fn tissue(&self, element: usize) -> Option<Tissue<SceneLaw>> {
+            self.any().tissue(element)
+        }
+
+        fn laws(&self) -> Laws<'_, SceneLaw> {
+            self.any().laws_of_all()
+        }
+
+        fn region(&self, element: usize) -> u16 {
+            self.any().region(element)
+        }
     }
 }
+pub(super) use contents::SceneMaterial;
+use contents::{ELEMENTS, SceneLaw, law_of};
 
-/// A scene of one law in the memory of its object.
-pub(super) struct Carved<'a, L> {
-    element: Element,
-    /// With the wrappers of all elements: the outermost one counts.
-    body: NodalStrain<NodalPressure<Body<'a, L>>>,
+/// A scene in the memory of its object.
+pub(super) struct OpenScene<'a> {
+    material: SceneMaterial<'a>,
     nodes: &'a [NodeInertia],
     tiles: &'a [ElementTile],
     patches: &'a [PatchRow],
     facts: &'a SceneFacts,
 }
 
-impl<'a, L: ElementLaw> Carved<'a, L> {
-    const FITS: () = assert!(size_of::<Tissue<L>>() <= size_of::<supple_tissue>());
-
+impl<'a> OpenScene<'a> {
     /// # Safety
-    /// `object` is a scene of this law, which nobody writes.
-    unsafe fn of(object: *const supple_scene) -> Self {
-        let () = Self::FITS;
+    /// As at [`memory::read`]; nobody writes the scene.
+    pub(super) unsafe fn of(object: *const supple_scene) -> Answer<Self> {
         // SAFETY: the caller's promise; all arrays were written by `build`.
         unsafe {
-            let &supple_scene { nodes, elements, tissues, element, ref facts, .. } = &*object;
+            memory::is(object)?;
+            let &supple_scene { nodes, elements, tissues, element, law, ref facts, .. } = &*object;
             let mut arrays = Arrays::behind(object);
-            Self {
-                element,
+            Ok(Self {
                 nodes: arrays.read(nodes as usize),
                 tiles: arrays.read(tiles_for(elements as usize)),
-                body: NodalStrain(NodalPressure(Body {
+                material: SceneMaterial {
+                    element,
+                    law,
                     tissues: arrays.read(tissues as usize),
                     of_element: arrays.read(regions(elements, tissues)),
-                })),
+                },
                 patches: arrays.read(facts.patch_row_count()),
                 facts,
-            }
+            })
         }
+    }
+
+    pub(super) fn view(&self) -> SceneView<'_, SceneMaterial<'a>> {
+        SceneView::new(&self.material, self.nodes, self.tiles, self.patches, self.facts)
+    }
+
+    pub(super) const fn node_count(&self) -> usize {
+        self.facts.node_count()
     }
 
     pub(super) const fn element(&self) -> Element {
-        self.element
-    }
-
-    /// The scene, of linear elements.
-    pub(super) fn linear(&self) -> SceneView<'_, Body<'a, L>> {
-        self.view(&self.body.0.0)
-    }
-
-    /// The scene, of elements with nodal pressure.
-    #[cfg(feature = "capi-nodal-pressure")]
-    pub(super) fn nodal_pressure(&self) -> SceneView<'_, NodalPressure<Body<'a, L>>> {
-        self.view(&self.body.0)
-    }
-
-    /// The scene, of elements with nodal strain.
-    #[cfg(feature = "capi")]
-    pub(super) fn nodal_strain(&self) -> SceneView<'_, NodalStrain<NodalPressure<Body<'a, L>>>> {
-        self.view(&self.body)
-    }
-
-    fn view<'b, M>(&'b self, body: &'b M) -> SceneView<'b, M> {
-        SceneView::new(body, self.nodes, self.tiles, self.patches, self.facts)
-    }
-}
-
-macro_rules! any_scene {
-    ($first:ident: $first_law:ty, $($other:ident: $law:ty,)*) => {
-        /// A scene of whichever law this library has: the first of the list, or all with the feature `capi`.
-        pub(super) enum AnyScene<'a> {
-            $first(Carved<'a, $first_law>),
-            $(#[cfg(feature = "capi")] $other(Carved<'a, $law>),)*
-        }
-
-        impl AnyScene<'_> {
-            /// # Safety
-            /// `object` is a scene, which nobody writes.
-            unsafe fn of(object: *const supple_scene) -> Answer<Self> {
-                // SAFETY: the caller's promise; the arrays are of the law that the object names.
-                unsafe {
-                    match (*object).law {
-                        AnyLaw::$first(_) => Ok(Self::$first(Carved::of(object))),
-                        $(#[cfg(feature = "capi")] AnyLaw::$other(_) => Ok(Self::$other(Carved::of(object))),)*
-                        _ => Err(SUPPLE_E_LAW.into()),
-                    }
-                }
-            }
-        }
-
-        impl Parts<'_> {
-            /// Builds a scene of this law.
-            ///
-            /// # Safety
-            /// As at [`Parts::build_of`].
-            unsafe fn build(
-                &self,
-                law: AnyLaw,
-                element: Element,
-                patch_rows: usize,
-                arrays: Arrays,
-            ) -> Answer<SceneFacts> {
-                // SAFETY: the caller's promise.
-                unsafe {
-                    match law {
-                        AnyLaw::$first(_) => self.build_of::<$first_law>(element, patch_rows, arrays),
-                        $(
-                            #[cfg(feature = "capi")]
-                            AnyLaw::$other(_) => self.build_of::<$law>(element, patch_rows, arrays),
-                        )*
-                        _ => Err(SUPPLE_E_LAW.into()),
-                    }
-                }
-            }
-        }
-    };
-}
-for_each_law!(any_scene);
-
-/// Does the same with the view of a scene of whichever law.
-macro_rules! with_scene {
-    (@ of $carved:ident, $scene:ident => $work:expr) => {
-        match $carved.element() {
-            #[cfg(feature = "capi-nodal-pressure")]
-            $crate::material::Element::NodalPressure => {
-                let $scene = $carved.nodal_pressure();
-                $work
-            }
-            #[cfg(feature = "capi")]
-            $crate::material::Element::NodalStrain => {
-                let $scene = $carved.nodal_strain();
-                $work
-            }
-            _ => {
-                let $scene = $carved.linear();
-                $work
-            }
-        }
-    };
-    (@ $any:expr, $scene:ident => $work:expr; $first:ident: $first_law:ty, $($other:ident: $law:ty,)*) => {
-        match &$any {
-            $crate::capi::scene::AnyScene::$first(carved) => with_scene!(@ of carved, $scene => $work),
-            $(
-                #[cfg(feature = "capi")]
-                $crate::capi::scene::AnyScene::$other(carved) => with_scene!(@ of carved, $scene => $work),
-            )*
-        }
-    };
-    ($any:expr, $scene:ident => $work:expr) => {
-        $crate::material::for_each_law!(with_scene @ $any, $scene => $work;)
-    };
-}
-pub(super) use with_scene;
-
-impl AnyScene<'_> {
-    pub(super) fn node_count(&self) -> usize {
-        with_scene!(self, scene => scene.node_count())
-    }
-
-    pub(super) fn element(&self) -> Element {
-        with_scene!(self, scene => scene.element())
+        self.material.element
     }
 
     /// That something was made for the scene's number of nodes.
@@ -342,8 +262,7 @@ fn layout(nodes: u32, elements: u32, tissues: u32, patch_rows: usize) -> Layout 
     Layout::of::<supple_scene>()
         .and::<NodeInertia>(nodes as usize)
         .and::<ElementTile>(tiles_for(elements as usize))
-        // Enough for the tissues of any law.
-        .and::<supple_tissue>(tissues as usize)
+        .and::<Tissue<Values>>(tissues as usize)
         .and::<u16>(regions(elements, tissues))
         .and::<PatchRow>(patch_rows)
 }
@@ -404,13 +323,6 @@ pub unsafe extern "C" fn supple_scene_init(
     unsafe { memory::answered(init(), error) }
 }
 
-/// The elements that this library has; the number of each is its place.
-const ELEMENTS: &[Element] = match () {
-    () if cfg!(feature = "capi") => &Element::ALL,
-    () if cfg!(feature = "capi-nodal-pressure") => &[Element::Linear, Element::NodalPressure],
-    () => &[Element::Linear],
-};
-
 /// What a scene is built from, checked as far as it can be without building it.
 struct Parts<'a> {
     mesh: Mesh<'a>,
@@ -422,7 +334,7 @@ struct Parts<'a> {
 impl<'a> Parts<'a> {
     /// # Safety
     /// The arrays of the configuration are as the header says.
-    unsafe fn checked(config: &'a supple_scene_config) -> Answer<(AnyLaw, Element, Self)> {
+    unsafe fn checked(config: &'a supple_scene_config) -> Answer<(SceneLaw, Element, Self)> {
         same_abi::<supple_scene_config>(config.struct_size, config.abi)?;
         let &supple_scene_config { law: number, nodes, elements, tissues, .. } = config;
         let law = law_of(number).ok_or(supple_error::from(SUPPLE_E_LAW).value(number.into(), 0.0))?;
@@ -459,8 +371,9 @@ impl<'a> Parts<'a> {
 
     /// # Safety
     /// The arrays are those of a scene of these parts, and nobody else uses them.
-    unsafe fn build_of<L: ElementLaw>(
+    unsafe fn build(
         &self,
+        law: SceneLaw,
         element: Element,
         patch_rows: usize,
         mut arrays: Arrays,
@@ -471,13 +384,13 @@ impl<'a> Parts<'a> {
             (
                 arrays.change::<NodeInertia>(mesh.points().len()),
                 arrays.change::<ElementTile>(tiles_for(mesh.element_count())),
-                arrays.change::<Tissue<L>>(given.len()),
+                arrays.change::<Tissue<Values>>(given.len()),
                 arrays.change::<u16>(of_element.len()),
                 arrays.change::<PatchRow>(patch_rows),
             )
         };
         for (tissue, given) in tissues.iter_mut().zip(*given) {
-            *tissue = Tissue { law: L::from_constants(given.constants), density: given.density };
+            *tissue = Tissue { law: given.constants, density: given.density };
         }
         for (region, &given) in regions.iter_mut().zip(*of_element) {
             *region = given;
@@ -487,25 +400,9 @@ impl<'a> Parts<'a> {
             axes: axes_of(support.axes),
             moves: support.moves == 1,
         });
-        let body = Body { tissues, of_element: regions };
-        Ok(match element {
-            #[cfg(feature = "capi-nodal-pressure")]
-            Element::NodalPressure => {
-                SceneFacts::build(&NodalPressure(body), mesh, supports, nodes, tiles, patches)?
-            }
-            #[cfg(feature = "capi")]
-            Element::NodalStrain => {
-                SceneFacts::build(&NodalStrain(body), mesh, supports, nodes, tiles, patches)?
-            }
-            _ => SceneFacts::build(&body, mesh, supports, nodes, tiles, patches)?,
-        })
+        let material = SceneMaterial { element, law, tissues, of_element: regions };
+        Ok(SceneFacts::build(&material, mesh, supports, nodes, tiles, patches)?)
     }
-}
-
-/// The law of a number, if this library has it: the position in the list of laws.
-fn law_of(number: u32) -> Option<AnyLaw> {
-    let has_it = number == 0 || cfg!(feature = "capi");
-    AnyLaw::all().find(|law| has_it && number.checked_mul(2) == Some(law.code()))
 }
 
 /// That entry `index` of a list, or what is in none, is one of the choices up to `most`.
@@ -522,18 +419,6 @@ pub(super) fn axes_of(number: u32) -> Axes {
     axes.filter(|(axis, _)| number >> axis & 1 == 1).fold(Axes::NONE, |sum, (_, axis)| sum.union(axis))
 }
 
-/// The scene in an object.
-///
-/// # Safety
-/// As at [`memory::read`].
-pub(super) unsafe fn carved<'a>(object: *const supple_scene) -> Answer<AnyScene<'a>> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        memory::is(object)?;
-        AnyScene::of(object)
-    }
-}
-
 /// Writes sizes and costs of a scene.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_scene_describe(
@@ -542,14 +427,15 @@ pub unsafe extern "C" fn supple_scene_describe(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let describe = || unsafe {
-        let (any, bytes, facts) = (carved(scene)?, memory::bytes_of(scene), place_for(facts)?);
-        facts.write(with_scene!(any, scene => supple_scene_facts {
+        let (opened, bytes, facts) = (OpenScene::of(scene)?, memory::bytes_of(scene), place_for(facts)?);
+        let scene = opened.view();
+        facts.write(supple_scene_facts {
             nodes: scene.node_count() as u32,
             elements: scene.element_count() as u32,
             bytes: bytes as u64,
             operations: tled::operations(scene),
             mass: scene.mass(),
-        }));
+        });
         Ok(SUPPLE_OK)
     };
     status_of(describe())

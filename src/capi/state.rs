@@ -10,7 +10,7 @@ use crate::tled;
 use super::memory::{
     self, Arrays, Head, Layout, Object, Place, magic, one, place_for, place_if_wanted, same_abi,
 };
-use super::scene::{AnyScene, carved, supple_scene, with_scene};
+use super::scene::{OpenScene, supple_scene};
 use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
 use supple_status::*;
 
@@ -90,9 +90,9 @@ pub unsafe extern "C" fn supple_state_init(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let init = || unsafe {
-        let (any, state) = (carved(scene)?, place_for(state)?);
-        let nodes = any.node_count() as u32;
-        let element = any.element();
+        let (open, state) = (OpenScene::of(scene)?, place_for(state)?);
+        let nodes = open.node_count() as u32;
+        let element = open.element();
         let place = Place::new(memory, bytes, layout(nodes, element))?;
         let step = Step::unchecked(1.0, 0.0)?;
         let mut progress = Progress::START;
@@ -124,10 +124,10 @@ pub unsafe extern "C" fn supple_state_stop(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let stop = || unsafe {
-        let any = carved(scene)?;
-        let mut state = opened_of(&any, state)?;
-        let has_room = with_scene!(any, scene => tled::stop(&scene, &mut state));
-        if has_room { Ok(SUPPLE_OK) } else { Err(mismatch(state.capacity(), any.node_count())) }
+        let open = OpenScene::of(scene)?;
+        let mut state = opened_of(&open, state)?;
+        let has_room = tled::stop(&open.view(), &mut state);
+        if has_room { Ok(SUPPLE_OK) } else { Err(mismatch(state.capacity(), open.node_count())) }
     };
     status_of(stop())
 }
@@ -147,10 +147,10 @@ pub unsafe extern "C" fn supple_critical_step(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let find = || unsafe {
-        let any = carved(scene)?;
-        let mut state = opened_of(&any, state)?;
+        let open = OpenScene::of(scene)?;
+        let mut state = opened_of(&open, state)?;
         let (seconds, node) = (place_for(seconds)?, place_if_wanted(node)?);
-        let critical = critical_step(&any, &mut state)?;
+        let critical = critical_step(&open, &mut state)?;
         seconds.write(critical.seconds);
         if let Some(node) = node {
             node.write(critical.node);
@@ -160,8 +160,8 @@ pub unsafe extern "C" fn supple_critical_step(
     status_of(find())
 }
 
-fn critical_step(any: &AnyScene<'_>, state: &mut StateView<'_>) -> Answer<CriticalStep> {
-    let critical = with_scene!(any, scene => tled::critical_step(&scene, state));
+fn critical_step(open: &OpenScene<'_>, state: &mut StateView<'_>) -> Answer<CriticalStep> {
+    let critical = tled::critical_step(&open.view(), state);
     critical.ok_or(SUPPLE_E_TOO_STIFF.into())
 }
 
@@ -178,12 +178,12 @@ pub unsafe extern "C" fn supple_set_step(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let set = || unsafe {
-        let (any, config) = (carved(scene)?, *one(config)?);
+        let (open, config) = (OpenScene::of(scene)?, *one(config)?);
         same_abi::<supple_step_config>(config.struct_size, config.abi)?;
-        let mut view = opened_of(&any, state)?;
+        let mut view = opened_of(&open, state)?;
         // What is no step at all is told before anything is computed.
         Step::unchecked(config.seconds, config.damping)?;
-        let critical = critical_step(&any, &mut view)?;
+        let critical = critical_step(&open, &mut view)?;
         let step = Step::new(config.seconds, config.damping, critical)?;
         memory::change(state)?.set_step(Some(step));
         Ok(SUPPLE_OK)
@@ -258,13 +258,13 @@ pub(super) unsafe fn opened<'a>(object: *mut supple_state) -> Answer<StateView<'
 ///
 /// # Safety
 /// As at [`memory::change`].
-pub(super) unsafe fn opened_of<'a>(any: &AnyScene<'_>, object: *mut supple_state) -> Answer<StateView<'a>> {
+pub(super) unsafe fn opened_of<'a>(open: &OpenScene<'_>, object: *mut supple_state) -> Answer<StateView<'a>> {
     // SAFETY: the caller's promise.
     unsafe {
         let &supple_state { nodes, element, .. } = memory::read(object.cast_const())?;
-        any.fits(nodes)?;
-        if element != any.element() {
-            let (own, scene) = (f64::from(element.code()), f64::from(any.element().code()));
+        open.fits(nodes)?;
+        if element != open.element() {
+            let (own, scene) = (f64::from(element.code()), f64::from(open.element().code()));
             return Err(supple_error::from(SUPPLE_E_ELEMENT).value(own, scene));
         }
         opened(object)

@@ -12,7 +12,7 @@ use crate::tled;
 use super::SUPPLE_NONE;
 use super::loads::{CallLoads, supple_loads};
 use super::memory::{self, one, place_for};
-use super::scene::{carved, supple_scene, with_scene};
+use super::scene::{OpenScene, supple_scene};
 use super::state::{opened_of, supple_state};
 use super::status::{Answer, mismatch, supple_error, supple_status};
 use supple_status::*;
@@ -170,16 +170,16 @@ pub unsafe extern "C" fn supple_step(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let step = |report: &mut supple_report| unsafe {
-        let any = carved(scene)?;
-        let mut loads = CallLoads::of(loads, &any)?;
-        any.fits(memory::read(state.cast_const())?.nodes)?;
+        let open = OpenScene::of(scene)?;
+        let mut loads = CallLoads::of(loads, &open)?;
+        open.fits(memory::read(state.cast_const())?.nodes)?;
         let step = (*state).step()?;
         let threads = HostThreads::of(threads)?;
-        let mut state = loads.attached(opened_of(&any, state)?);
+        let mut state = loads.attached(opened_of(&open, state)?);
         let count = count.into();
-        let status = with_scene!(any, scene => take_steps(count, count, &mut state, &mut loads, report, |loads, state| {
-            tled::step_in_parts(scene, loads, state, &step, &threads)
-        }));
+        let status = take_steps(count, count, &mut state, &mut loads, report, |loads, state| {
+            tled::step_in_parts(open.view(), loads, state, &step, &threads)
+        });
         report.close(&state);
         answer(&status)
     };

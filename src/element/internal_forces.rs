@@ -26,8 +26,8 @@ pub(crate) struct Elements<'a, L> {
 
 /// Floating-point operations of [`add_forces`] for one element: displacement gradient 63, invariants 57, stress 63,
 /// nodal forces 65, sums 12, and those of the law.
-pub(crate) const fn operations<L: Law>() -> u32 {
-    63 + 57 + 63 + 65 + 12 + response_operations::<L>()
+pub(crate) fn operations<L: Law>(law: &L) -> u32 {
+    63 + 57 + 63 + 65 + 12 + response_operations(law)
 }
 
 /// Extreme states among the elements of a step: they tell how near it is to where laws are cut off to stay finite.
@@ -403,5 +403,24 @@ fn scatter<R: Real, const K: usize, const N: usize>(batch: &[ElementVector<'_, R
             // Elements with nodes of another thread's partitions.
             None => force.add_present(nodes, first, rows),
         }
+    }
+}
+
+impl<'a, L: Law, V, P> InternalForces<'a, L, V, P> {
+    pub(super) const fn laws(&self) -> &Laws<'a, L> {
+        &self.elements.laws
+    }
+
+    pub(super) fn of_law<K: Law>(self, law: K) -> InternalForces<'a, K, V, P> {
+        let Self {
+            elements: Elements { laws, tiles, partitions: all },
+            pressure,
+            partitions,
+            displacement,
+            force,
+            visitor,
+        } = self;
+        let elements = Elements { laws: laws.of_law(law), tiles, partitions: all };
+        InternalForces { elements, pressure, partitions, displacement, force, visitor }
     }
 }

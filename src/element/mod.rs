@@ -31,8 +31,6 @@ mod volume_check;
 pub use fields::ElementFields;
 pub use kernels::ElementLaw;
 pub(crate) use kernels::{ForcesVisitor, tile_bounds};
-#[cfg(any(feature = "std", test))]
-pub use kernels::{LawWork, MaterialWork, with_element, with_law};
 pub use node::{Axes, NodeInertia};
 pub use patch::{Neighbours, PatchLayout, PatchRow, PatchTile, Patches};
 pub(crate) use patch_bounds::PatchBounds;

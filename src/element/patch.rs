@@ -208,8 +208,8 @@ impl<'a> Patches<'a> {
 
     /// Floating-point operations of internal forces: 51 for a neighbour, and for a patch those of an element with other kinematics,
     /// places without a patch included.
-    pub(crate) fn operations<L: Law>(&self) -> u64 {
-        let of_patch = u64::from(operations::<L>()) - (63 + 65 + 12) + 9 + 18 + 6;
+    pub(crate) fn operations<L: Law>(&self, law: &L) -> u64 {
+        let of_patch = u64::from(operations(law)) - (63 + 65 + 12) + 9 + 18 + 6;
         TILE as u64 * (51 * self.neighbours.len() as u64 + of_patch * self.tiles.len() as u64)
     }
 

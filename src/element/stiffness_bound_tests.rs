@@ -11,7 +11,7 @@ use reference::{EXPONENT_CAP, J_MIN, Mat3, Random, Vec3};
 
 use super::deformation::Deformation;
 use super::stiffness_bound::{Bound, Coefficients, MatrixSums};
-use crate::material::{Exponential, Law, LawState, Literal, NeoHookean, Tissue};
+use crate::material::{Exponential, Law, LawState, NeoHookean, Tissue};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::VecScene;
 use crate::simd::{NodeVector, SCATTER_WIDTH, Scatter, ScatterBuffer};
@@ -190,7 +190,7 @@ fn step_size(law: &reference::Law, f: &Mat3) -> f64 {
     let length = contraction(f, f).sqrt();
     let [g, slope, _] = law.volume_factor(determinant(f));
     let exponent = match *law {
-        reference::Law::Exponential { b, .. } | reference::Law::ExponentialLiteral { b, .. } => b,
+        reference::Law::Exponential { b, .. } => b,
         _ => 0.0,
     };
     let rate = 2.0 * g * length + slope.abs() * length.powi(4);
@@ -202,11 +202,9 @@ fn at_a_kink(law: &reference::Law, f: &Mat3) -> bool {
     let j = determinant(f);
     let size = 4.0 * step_size(law, f);
     let of_j = size * (1.0 + contraction(f, f));
-    let near_floor = law.is_isochoric() && (j - J_MIN).abs() < of_j;
+    let near_floor = (j - J_MIN).abs() < of_j;
     let near_cap = match *law {
-        reference::Law::Exponential { b, .. } | reference::Law::ExponentialLiteral { b, .. } => {
-            (b * law.strain_measure(f) - EXPONENT_CAP).abs() < 0.01
-        }
+        reference::Law::Exponential { b, .. } => (b * law.strain_measure(f) - EXPONENT_CAP).abs() < 0.01,
         _ => false,
     };
     near_floor || near_cap
@@ -232,7 +230,7 @@ fn tetrahedron(random: &mut Random) -> Vec<[f32; 3]> {
 
 const CLASSES: [&str; 6] = ["small strain", "ordinary", "large", "crushed", "inverted", "any matrix"];
 
-const FORMS: [&str; 4] = ["neo-Hookean", "exponential", "neo-Hookean, literal", "exponential, literal"];
+const FORMS: [&str; 2] = ["neo-Hookean", "exponential"];
 
 /// A random `F` of a class.
 fn deformation(random: &mut Random, class: usize) -> Mat3 {
@@ -285,18 +283,14 @@ fn compare_random_law(random: &mut Random, points: &[[f32; 3]], f: &Mat3, form: 
     let (neo, exp) = (NeoHookean { c: a, d }, Exponential { a, b, d });
     let reference_law = match form {
         0 => reference::Law::NeoHookean { c: wide_a, d: wide_d },
-        1 => reference::Law::Exponential { a: wide_a, b: wide_b, d: wide_d },
-        2 => reference::Law::NeoHookeanLiteral { c: wide_a, d: wide_d },
-        _ => reference::Law::ExponentialLiteral { a: wide_a, b: wide_b, d: wide_d },
+        _ => reference::Law::Exponential { a: wide_a, b: wide_b, d: wide_d },
     };
     if at_a_kink(&reference_law, &f) {
         return None;
     }
     Some(match form {
         0 => compare(neo, &reference_law, points, h),
-        1 => compare(exp, &reference_law, points, h),
-        2 => compare(Literal(neo), &reference_law, points, h),
-        _ => compare(Literal(exp), &reference_law, points, h),
+        _ => compare(exp, &reference_law, points, h),
     })
 }
 

@@ -48,12 +48,13 @@ pub(crate) const SECOND_RUN: Method<'static> = Method::Multilevel(Cells::Suggest
 
 /// Vectors of storage that a guard needs on a scene with these `points` (m).
 pub fn vectors_for<M: Material>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<usize, InertiaError> {
-    Ok(vectors_of_state::<M>(scene.node_count()) + vectors_for_method(&SECOND_RUN, scene, points)?)
+    Ok(vectors_of_state(scene.element(), scene.node_count())
+        + vectors_for_method(&SECOND_RUN, scene, points)?)
 }
 
 /// Displacements, increments and forces; volumes for elements that have them.
-const fn vectors_of_state<M: Material>(nodes: usize) -> usize {
-    if matches!(M::ELEMENT, Element::Linear) { 3 * nodes } else { 4 * nodes }
+const fn vectors_of_state(element: Element, nodes: usize) -> usize {
+    if matches!(element, Element::Linear) { 3 * nodes } else { 4 * nodes }
 }
 
 /// A guard without its storage; it may be moved in memory.
@@ -128,7 +129,7 @@ impl Watch {
         let mut progress = Progress::START;
         let (needed, capacity) = (vectors_for(scene, points)?, storage.len());
         let Some((mut copied, of_second)) =
-            split::<M>(storage, nodes, &mut progress).filter(|_| capacity >= needed)
+            split(scene.element(), storage, nodes, &mut progress).filter(|_| capacity >= needed)
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
         };
@@ -207,7 +208,7 @@ impl GuardView<'_> {
     ) {
         let Self { second: large, watch, storage } = self;
         let seconds = step.seconds();
-        match (split::<M>(storage, watch.nodes, &mut watch.progress), loads) {
+        match (split(scene.element(), storage, watch.nodes, &mut watch.progress), loads) {
             (Some((second, of_second)), Some(loads)) => {
                 let _ = large.with_storage(of_second).shorten(seconds, scene, loads, second, threads);
             }
@@ -234,10 +235,10 @@ impl GuardView<'_> {
             return taken;
         }
         let mismatch = Status::Mismatch { nodes: scene.node_count(), room: nodes };
-        let Some((mut second, of_second)) = split::<M>(storage, nodes, progress) else {
+        let Some((mut second, of_second)) = split(scene.element(), storage, nodes, progress) else {
             return mismatch;
         };
-        if scene.node_count() != nodes || state.capacity_for::<M>() < nodes {
+        if scene.node_count() != nodes || state.capacity_for(scene.element()) < nodes {
             return mismatch;
         }
         let gone = state.time() - second.time();
@@ -285,7 +286,8 @@ impl GuardView<'_> {
 }
 
 /// The second run's state and the rest of the storage.
-fn split<'a, M: Material>(
+fn split<'a>(
+    element: Element,
     storage: &'a mut [NodeVector],
     nodes: usize,
     progress: &'a mut Progress,
@@ -293,7 +295,7 @@ fn split<'a, M: Material>(
     let (displacement, rest) = storage.split_at_mut_checked(nodes)?;
     let (increment, rest) = rest.split_at_mut_checked(nodes)?;
     let (force, rest) = rest.split_at_mut_checked(nodes)?;
-    let volumes = vectors_of_state::<M>(nodes) - 3 * nodes;
+    let volumes = vectors_of_state(element, nodes) - 3 * nodes;
     let (volume, rest) = rest.split_at_mut_checked(volumes)?;
     Some((StateView::new(displacement, increment, force, volume, progress), rest))
 }

@@ -161,7 +161,7 @@ impl<'w> LargeModel<'w> {
         Self {
             nodes,
             elements: scene.element_count(),
-            element: M::ELEMENT,
+            element: scene.element(),
             moved_elements: 0,
             scene: scene.checksum(),
             moment: Progress::START.moment(),
@@ -194,18 +194,18 @@ impl<'w> LargeModel<'w> {
             if capacity < needed { Err(InertiaError::Capacity { kind, needed, capacity }) } else { Ok(()) }
         };
         let (damped, capacity) = (self.method.damper().is_some(), storage.len());
-        let needed = vectors_for_lattice(M::ELEMENT, self.nodes, self.elements, grid, damped);
+        let needed = vectors_for_lattice(scene.element(), self.nodes, self.elements, grid, damped);
         check("vectors", needed, capacity)?;
-        check("nodes in the state", self.nodes, state.capacity_for::<M>())?;
+        check("nodes in the state", self.nodes, state.capacity_for(scene.element()))?;
         storage.fill(NodeVector::ZERO);
         let Some(Storage { mut tables, places, order, mut matrices }) =
-            Storage::split(storage, M::ELEMENT, [self.nodes, self.elements], &self.lattice, damped)
+            Storage::split(storage, scene.element(), [self.nodes, self.elements], &self.lattice, damped)
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
         };
         write_heights(scene, &mut tables);
         self.choose_frames(scene, points, &mut tables, places)?;
-        if !M::ELEMENT.is_nodal_strain() {
+        if !scene.element().is_nodal_strain() {
             self.moved_elements = sort_by_patch(order, scene, &self.lattice, places);
         }
         let StateView { displacement, increment, volume, progress, .. } = state;

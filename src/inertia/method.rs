@@ -86,7 +86,7 @@ pub fn vectors_for<M: Material>(
     points: &[[f32; 3]],
 ) -> Result<usize, InertiaError> {
     let (nodes, elements, grid) = (scene.node_count(), scene.element_count(), method.grid(scene, points)?);
-    Ok(vectors_for_lattice(M::ELEMENT, nodes, elements, grid, method.damper().is_some()))
+    Ok(vectors_for_lattice(scene.element(), nodes, elements, grid, method.damper().is_some()))
 }
 
 /// The same for this many nodes and elements and a known lattice.

@@ -182,7 +182,7 @@ impl Refresh {
         cells: usize,
     ) -> Self {
         let (nodes, tiles) = (scene.node_count(), scene.tiles.len());
-        let bounds = if M::ELEMENT.is_nodal_strain() {
+        let bounds = if scene.element().is_nodal_strain() {
             scene.patches.tiles().len() as i64 * patch_tile_cost(functions)
         } else {
             tiles.next_multiple_of(BATCH_TILES) as i64 * tile_cost(functions)
@@ -271,7 +271,7 @@ impl Refresh {
             write_mass(matrices.mass, lattice, input.places, input.scene.inertia);
             self.inversion.sound &= invert_axes(matrices.mass_inverse, matrices.mass, functions);
             self.inversion.sound &= invert_edges(matrices.edge_inverse, lattice);
-            if M::ELEMENT.is_nodal_strain() {
+            if input.scene.element().is_nodal_strain() {
                 write_stabilising(matrices.stabilising, matrices.next_coarse, &input);
             }
         }
@@ -313,7 +313,9 @@ impl Refresh {
             self.start_cycle(input, tables, matrices);
         }
         match self.stage {
-            Stage::Elements if M::ELEMENT.is_nodal_strain() => self.add_patches(input, tables, matrices, at),
+            Stage::Elements if input.scene.element().is_nodal_strain() => {
+                self.add_patches(input, tables, matrices, at)
+            }
             Stage::Elements => self.add_elements(input, tables, matrices, at),
             Stage::Nodes => self.add_nodes(input, tables, matrices, at),
             Stage::NodeCells => self.add_node_cell(input, matrices, at),
@@ -501,7 +503,8 @@ impl Refresh {
         let laws = input.scene.material.laws();
         let weight = if has_lattice { input.scaling.coarse_weight } else { 0.0 };
         let rotations = &rotations;
-        let tangents = tile_bounds::<M>(
+        let tangents = tile_bounds(
+            input.scene.element(),
             TileBounds { laws, pressure: OwnPressure, tile, displacement, sums, rotations, weight },
             input.volume,
         );

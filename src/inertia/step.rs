@@ -272,7 +272,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             smooth: smooth.as_ref(),
             supports: supports.as_ref(),
             allowed: progress.energy_balance.allowed_share(),
-            largest_strain: if M::ELEMENT.is_nodal_strain() {
+            largest_strain: if scene.element().is_nodal_strain() {
                 LARGEST_STRAIN_OF_PATCHES
             } else {
                 LARGEST_STRAIN

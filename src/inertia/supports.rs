@@ -55,7 +55,8 @@ impl<M: ElementMaterial> MovingSupports<'_, M> {
         increment: &mut [NodeVector],
         changes: &mut [NodeVector],
     ) -> Option<Pull> {
-        if loads.motions().is_empty() || (self.elements.is_empty() && !M::ELEMENT.is_nodal_strain()) {
+        if loads.motions().is_empty() || (self.elements.is_empty() && !self.scene.element().is_nodal_strain())
+        {
             return None;
         }
         for NodeVector([x, y, z, _]) in &mut *changes {
@@ -86,7 +87,7 @@ impl<M: ElementMaterial> MovingSupports<'_, M> {
             pull.energy += force.dot(changed(node));
             self.add_force(node, force, &mut pull.residual);
         };
-        if M::ELEMENT.is_nodal_strain() {
+        if self.scene.element().is_nodal_strain() {
             nodal_strain::resist(self.scene, self.weight, self.displacement, changed, add);
         } else {
             for places in self.elements.chunks(TILE) {
@@ -114,7 +115,8 @@ impl<M: ElementMaterial> MovingSupports<'_, M> {
         // No sums over the nodes.
         let sums = MatrixSums { diagonal: Scatter::new(&mut []), off_diagonal: Scatter::new(&mut []) };
         let rotations = &[Rotation::NONE.0; TILE];
-        tile_bounds::<M>(
+        tile_bounds(
+            scene.element(),
             TileBounds { laws, pressure: OwnPressure, tile, displacement, sums, rotations, weight },
             self.volume,
         )

@@ -11,10 +11,10 @@ use super::networks::{self, Family};
 use super::scenes::SceneSpec;
 use super::timing::Timing;
 use super::{DT, LabError, implicit};
-use crate::element::ElementMaterial;
 use crate::inertia::{self, Cells, Damper, LargeStep};
 use crate::learned::{self, LearnedStep};
 use crate::loads::Loads;
+use crate::material::VecMaterial;
 use crate::mlp::{Network, WeightBytes};
 use crate::scene::SceneView;
 use crate::state::{NodeVector, StateView, VecState};
@@ -206,10 +206,10 @@ impl Method {
     }
 
     /// What moves a state of a scene on by steps of `dt` (s), from `state`.
-    pub fn prepare<'a, M: ElementMaterial>(
+    pub fn prepare<'a>(
         self,
         spec: &SceneSpec,
-        scene: SceneView<'a, M>,
+        scene: SceneView<'a, VecMaterial>,
         state: &mut VecState,
         dt: f32,
     ) -> Result<Advance<'a>, LabError> {
@@ -269,9 +269,9 @@ impl Method {
 }
 
 /// Takes exact steps until one is refused. Says if one was limited.
-fn exact_steps<M: ElementMaterial>(
+fn exact_steps(
     count: u32,
-    scene: SceneView<'_, M>,
+    scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,
     state: &mut StateView<'_>,
     step: &Step,
@@ -294,8 +294,8 @@ fn exact_steps_in(dt: f32, timing: &Timing) -> u32 {
 
 /// The learned step after its lead-in of exact ones, `count` in each of the network's. The lead-in is damped as the scene is, learned steps as the training was:
 /// on a scene with other damping a network is as wrong as it is.
-fn learned<'a, M: ElementMaterial>(
-    scene: SceneView<'a, M>,
+fn learned<'a>(
+    scene: SceneView<'a, VecMaterial>,
     bytes: &'static [u8],
     count: u32,
     damping: f32,

@@ -8,7 +8,6 @@ use std::vec::Vec;
 use super::LabError;
 use super::scenes::{LOBE, RigidVelocity, SceneSpec, bar, held_at_its_end};
 use super::timing::Timing;
-use crate::element::{ElementMaterial, MaterialWork};
 use crate::loads::{Motion, NodalForce};
 use crate::material::{AnyLaw, Exponential, NeoHookean};
 use crate::mesh::Bar;
@@ -68,21 +67,9 @@ fn finished(name: &'static str, scene: Scene) -> Result<SceneSpec, LabError> {
 
 /// The bound of the critical step of a scene at rest, s.
 pub fn critical_step(spec: &SceneSpec) -> Result<f32, LabError> {
-    spec.with_material(CriticalStep { spec })
-}
-
-struct CriticalStep<'a> {
-    spec: &'a SceneSpec,
-}
-
-impl MaterialWork for CriticalStep<'_> {
-    type Output = Result<f32, LabError>;
-
-    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
-        let scene = self.spec.build(material)?;
-        let bound = tled::critical_step(&scene, &mut VecState::at_rest(scene.node_count()));
-        bound.map(|bound| bound.seconds).ok_or(LabError::NoCriticalStep { scene: self.spec.name })
-    }
+    let scene = spec.build()?;
+    let bound = tled::critical_step(&scene, &mut VecState::at_rest(scene.node_count()));
+    bound.map(|bound| bound.seconds).ok_or(LabError::NoCriticalStep { scene: spec.name })
 }
 
 /// Neo-Hookean tissue with half the shear modulus `c`, Pa.

@@ -10,7 +10,6 @@ use super::measure::Errors;
 use super::method::Method;
 use super::scenes::SceneSpec;
 use super::truth::Truth;
-use crate::element::{ElementMaterial, MaterialWork};
 use crate::guard::Guard;
 use crate::step::{Status, Step};
 
@@ -109,7 +108,7 @@ pub fn run_guarded(
     every: Option<u32>,
 ) -> Result<Row, LabError> {
     spec.check_multiple(multiple)?;
-    let Ended { end, frames, shape } = spec.with_material(Run { spec, truth, method, multiple, every })?;
+    let Ended { end, frames, shape } = run_to_end(spec, truth, method, multiple, every)?;
     let hold = Errors::of_hold(truth)?;
     let step = f64::from(multiple) * f64::from(spec.timing.step);
     Ok(Row {
@@ -134,83 +133,76 @@ struct Ended {
     shape: Vec<[f32; 3]>,
 }
 
-struct Run<'a> {
-    spec: &'a SceneSpec,
-    truth: &'a Truth,
+fn run_to_end(
+    spec: &SceneSpec,
+    truth: &Truth,
     method: Method,
     multiple: u32,
     every: Option<u32>,
-}
-
-impl MaterialWork for Run<'_> {
-    type Output = Result<Ended, LabError>;
-
-    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
-        let Self { spec, truth, method, multiple, every } = self;
-        let scene = spec.build(material)?;
-        let dt = multiple as f32 * spec.timing.step;
-        let mut state = spec.state(&scene, dt)?;
-        let mut advance = method.prepare(spec, scene.view(), &mut state, dt)?;
-        let mut guard = match every {
-            Some(every) => {
-                let step = Step::unchecked(dt, spec.damping)?;
-                Some(Guard::prepare_in_vec(scene.view(), &spec.points, state.view(), step, every)?)
-            }
-            None => None,
-        };
-
-        let mut errors = Errors::default();
-        let (mut frames, mut shape, mut estimate) = (Vec::new(), Vec::new(), None);
-        let (mut taken, mut limited, mut spent) = (0.0, 0.0, Duration::ZERO);
-        let (mut clips, mut predictions) = (0.0, 0_u32);
-        let mut loads = spec.loads(&scene)?;
-        for snapshot in 0..spec.intervals {
-            let mut ok = true;
-            let parts = method.parts(snapshot);
-            let (seconds, part) = (dt / parts as f32, 1.0 / f64::from(parts));
-            // A lead-in is not timed.
-            let timed = state.time() + 0.5 * f64::from(spec.timing.step) >= method.lead_in();
-            let start = Instant::now();
-            for _ in 0..parts * spec.timing.interval / multiple {
-                let loads = loads.of_step(state.time(), f64::from(seconds));
-                let (mut status, report) = advance(&mut state, &loads, seconds)?;
-                if let Some(guard) = &mut guard {
-                    status = guard.follow(status, scene.view(), &loads, &state.view());
-                    estimate = guard.estimate().map(|estimate| [estimate.mean, estimate.largest]);
-                }
-                if let Some(clipped) = report.clipped {
-                    clips += f64::from(clipped);
-                    predictions += 1;
-                }
-                match status {
-                    Status::Ok => {}
-                    Status::Limited { .. } | Status::Inexact { .. } => limited += part,
-                    Status::Diverged(divergence) => {
-                        return Ok(Ended { end: End::Diverged(divergence.time), frames, shape });
-                    }
-                    Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
-                }
-                ok &= status == Status::Ok;
-                taken += if timed { part } else { 0.0 };
-            }
-            if timed {
-                spent += start.elapsed();
-            }
-            errors.add_snapshot(truth, state.displacements())?;
-            let estimate = estimate.map(|metres| metres.map(|metre| 1e3 * f64::from(metre)));
-            frames.push(Frame { mean: errors.mean(), max: errors.max, estimate, ok });
-            shape.clear();
-            shape.extend(state.displacements().iter().map(|vector| vector.to_array()));
+) -> Result<Ended, LabError> {
+    let scene = spec.build()?;
+    let dt = multiple as f32 * spec.timing.step;
+    let mut state = spec.state(&scene, dt)?;
+    let mut advance = method.prepare(spec, scene.view(), &mut state, dt)?;
+    let mut guard = match every {
+        Some(every) => {
+            let step = Step::unchecked(dt, spec.damping)?;
+            Some(Guard::prepare_in_vec(scene.view(), &spec.points, state.view(), step, every)?)
         }
-        // The lead-in may last to the end.
-        let taken = f64::max(taken, 1.0);
-        let figures = Figures {
-            errors,
-            clip_share: if predictions > 0 { clips / f64::from(predictions) } else { limited / taken },
-            us_per_step: 1e6 * spent.as_secs_f64() / taken,
-        };
-        Ok(Ended { end: End::Reached(figures), frames, shape })
+        None => None,
+    };
+
+    let mut errors = Errors::default();
+    let (mut frames, mut shape, mut estimate) = (Vec::new(), Vec::new(), None);
+    let (mut taken, mut limited, mut spent) = (0.0, 0.0, Duration::ZERO);
+    let (mut clips, mut predictions) = (0.0, 0_u32);
+    let mut loads = spec.loads(&scene)?;
+    for snapshot in 0..spec.intervals {
+        let mut ok = true;
+        let parts = method.parts(snapshot);
+        let (seconds, part) = (dt / parts as f32, 1.0 / f64::from(parts));
+        // A lead-in is not timed.
+        let timed = state.time() + 0.5 * f64::from(spec.timing.step) >= method.lead_in();
+        let start = Instant::now();
+        for _ in 0..parts * spec.timing.interval / multiple {
+            let loads = loads.of_step(state.time(), f64::from(seconds));
+            let (mut status, report) = advance(&mut state, &loads, seconds)?;
+            if let Some(guard) = &mut guard {
+                status = guard.follow(status, scene.view(), &loads, &state.view());
+                estimate = guard.estimate().map(|estimate| [estimate.mean, estimate.largest]);
+            }
+            if let Some(clipped) = report.clipped {
+                clips += f64::from(clipped);
+                predictions += 1;
+            }
+            match status {
+                Status::Ok => {}
+                Status::Limited { .. } | Status::Inexact { .. } => limited += part,
+                Status::Diverged(divergence) => {
+                    return Ok(Ended { end: End::Diverged(divergence.time), frames, shape });
+                }
+                Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
+            }
+            ok &= status == Status::Ok;
+            taken += if timed { part } else { 0.0 };
+        }
+        if timed {
+            spent += start.elapsed();
+        }
+        errors.add_snapshot(truth, state.displacements())?;
+        let estimate = estimate.map(|metres| metres.map(|metre| 1e3 * f64::from(metre)));
+        frames.push(Frame { mean: errors.mean(), max: errors.max, estimate, ok });
+        shape.clear();
+        shape.extend(state.displacements().iter().map(|vector| vector.to_array()));
     }
+    // The lead-in may last to the end.
+    let taken = f64::max(taken, 1.0);
+    let figures = Figures {
+        errors,
+        clip_share: if predictions > 0 { clips / f64::from(predictions) } else { limited / taken },
+        us_per_step: 1e6 * spent.as_secs_f64() / taken,
+    };
+    Ok(Ended { end: End::Reached(figures), frames, shape })
 }
 
 #[cfg(test)]

@@ -12,10 +12,9 @@ use glam::Vec3;
 use super::course::{Course, CurrentLoads};
 use super::timing::Timing;
 use super::{LabError, moving};
-use crate::element::{ElementLaw, LawWork, MaterialWork, with_element, with_law};
 use crate::io::{TetMesh, parse_msh};
 use crate::loads::{Motion, NodalForce};
-use crate::material::{AnyLaw, Element, Exponential, Material, NeoHookean, Regions, Tissue};
+use crate::material::{AnyLaw, Element, Exponential, NeoHookean, Tissue, VecMaterial};
 use crate::mesh::{Bar, Mesh, Winding};
 use crate::scene::{AsScene, Axes, BuildError, Support, VecScene};
 use crate::state::VecState;
@@ -131,21 +130,6 @@ pub struct RigidVelocity {
     pub angular: [f32; 3],
 }
 
-/// Work with the material of a scene whose law is known.
-struct OfLaw<'a, W> {
-    spec: &'a SceneSpec,
-    work: W,
-}
-
-impl<W: MaterialWork> LawWork for OfLaw<'_, W> {
-    type Output = W::Output;
-
-    fn run<L: ElementLaw>(self, law: L) -> W::Output {
-        let Self { spec, work } = self;
-        with_element(spec.element, Tissue { law, density: spec.density }, work)
-    }
-}
-
 impl SceneSpec {
     /// The scene under `times` its forces.
     #[must_use]
@@ -170,23 +154,22 @@ impl SceneSpec {
         Err(LabError::Multiple { scene: self.name, multiple, interval: self.timing.interval })
     }
 
-    /// Does `work` with the material that the scene is made of.
-    pub fn with_material<W: MaterialWork>(&self, work: W) -> W::Output {
-        if let (AnyLaw::NeoHookean(law), Some(second)) = (self.law, &self.second) {
-            let tissues = [Tissue { law, density: self.density }, second.tissue];
-            return with_element(
-                self.element,
-                Regions { tissues: &tissues, of_element: &second.of_element },
-                work,
-            );
+    /// What the scene is made of.
+    #[must_use]
+    pub fn material(&self) -> VecMaterial {
+        let Self { element, law, density, second, .. } = self;
+        let mut material = VecMaterial::one(*element, *law, *density);
+        if let Some(SecondTissue { tissue, of_element }) = second {
+            material.tissues.push(tissue.values());
+            material.of_element.clone_from(of_element);
         }
-        with_law(self.law, OfLaw { spec: self, work })
+        material
     }
 
-    /// Builds the scene; `material` is that of [`SceneSpec::with_material`].
-    pub fn build<M: Material>(&self, material: M) -> Result<VecScene<M>, LabError> {
+    /// Builds the scene.
+    pub fn build(&self) -> Result<VecScene<VecMaterial>, LabError> {
         let mesh = Mesh::new(&self.points, &self.tets, Winding::Checked).map_err(BuildError::Mesh)?;
-        Ok(VecScene::build(material, &mesh, &self.supports)?)
+        Ok(VecScene::build(self.material(), &mesh, &self.supports)?)
     }
 
     /// The loads, checked against the scene.

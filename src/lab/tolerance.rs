@@ -17,7 +17,6 @@ use super::threads::in_parallel;
 use super::truth::Truth;
 use super::{LabError, networks};
 use crate::adaptive::{Adaptive, Request, Taken};
-use crate::element::{ElementMaterial, MaterialWork};
 use crate::inertia::{self, Cells, Damper};
 use crate::io::write_atomically;
 use crate::mlp::Network;
@@ -111,7 +110,7 @@ fn rows(spec: &SceneSpec, truth: &Truth, plan: &Scenes, tolerances: &[f64]) -> R
     tolerances
         .iter()
         .map(|&tolerance| {
-            let run = spec.with_material(AdaptiveRun { spec, truth, tolerance })?;
+            let run = run_adaptive(spec, truth, tolerance)?;
             let right = fixed.iter().filter(|fixed| fixed.error <= tolerance);
             let best = right.min_by(|a, b| a.time.total_cmp(&b.time));
             let best = best.map(|best| (best.method, best.times_critical, best.time));
@@ -130,62 +129,49 @@ fn entry(row: &run::Row) -> Option<Fixed> {
     })
 }
 
-struct AdaptiveRun<'a> {
-    spec: &'a SceneSpec,
-    truth: &'a Truth,
-    tolerance: f64,
-}
-
-impl MaterialWork for AdaptiveRun<'_> {
-    type Output = Result<Row, LabError>;
-
-    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
-        let Self { spec, truth, tolerance } = self;
-        let scene = spec.build(material)?;
-        let mut state = spec.state(&scene, spec.timing.step / spec.timing.refinement as f32)?;
-        let interval = spec.timing.interval_seconds();
-        let parts = (interval / (f64::from(LONGEST) * truth.limit_at_rest)).ceil().max(1.0);
-        let longest = Step::unchecked((interval / parts) as f32, spec.damping)?;
-        let request = Request { tolerance: (1e-3 * tolerance) as f32, longest };
-        let damper = Damper::new(Network::parse(networks::damper())?)?;
-        let method = inertia::Method::Damped(damper, Cells::Suggested);
-        let mut adaptive =
-            Adaptive::prepare_in_vec(method, scene.view(), &spec.points, state.view(), request)?;
-        let mut loads = spec.loads(&scene)?;
-        let mut errors = Errors::default();
-        let (mut taken, mut spent) = (Taken::default(), 0.0);
-        let (mut doubted, mut silent, mut refused) = (0, 0, false);
-        for _ in 0..spec.intervals {
-            let mut ok = true;
-            let start = Instant::now();
-            for _ in 0..parts as u32 {
-                let (status, more) =
-                    adaptive.advance(longest.seconds(), scene.view(), &mut loads, state.view());
-                taken = taken + more;
-                ok &= status == Status::Ok;
-                refused |= !status.is_taken();
-            }
-            spent += start.elapsed().as_secs_f64();
-            errors.add_snapshot(truth, state.displacements())?;
-            doubted += u32::from(!ok);
-            silent += u32::from(ok && errors.mean() > tolerance);
-            if refused {
-                break;
-            }
+fn run_adaptive(spec: &SceneSpec, truth: &Truth, tolerance: f64) -> Result<Row, LabError> {
+    let scene = spec.build()?;
+    let mut state = spec.state(&scene, spec.timing.step / spec.timing.refinement as f32)?;
+    let interval = spec.timing.interval_seconds();
+    let parts = (interval / (f64::from(LONGEST) * truth.limit_at_rest)).ceil().max(1.0);
+    let longest = Step::unchecked((interval / parts) as f32, spec.damping)?;
+    let request = Request { tolerance: (1e-3 * tolerance) as f32, longest };
+    let damper = Damper::new(Network::parse(networks::damper())?)?;
+    let method = inertia::Method::Damped(damper, Cells::Suggested);
+    let mut adaptive = Adaptive::prepare_in_vec(method, scene.view(), &spec.points, state.view(), request)?;
+    let mut loads = spec.loads(&scene)?;
+    let mut errors = Errors::default();
+    let (mut taken, mut spent) = (Taken::default(), 0.0);
+    let (mut doubted, mut silent, mut refused) = (0, 0, false);
+    for _ in 0..spec.intervals {
+        let mut ok = true;
+        let start = Instant::now();
+        for _ in 0..parts as u32 {
+            let (status, more) = adaptive.advance(longest.seconds(), scene.view(), &mut loads, state.view());
+            taken = taken + more;
+            ok &= status == Status::Ok;
+            refused |= !status.is_taken();
         }
-        let share = |count: u32| f64::from(count) / spec.intervals as f64;
-        Ok(Row {
-            scene: spec.name,
-            tolerance,
-            motion: 0.0,
-            error: if refused { f64::INFINITY } else { errors.largest_mean() },
-            doubted: share(doubted),
-            silent: share(silent),
-            time: 1e6 * spent / state.time(),
-            taken,
-            best: None,
-        })
+        spent += start.elapsed().as_secs_f64();
+        errors.add_snapshot(truth, state.displacements())?;
+        doubted += u32::from(!ok);
+        silent += u32::from(ok && errors.mean() > tolerance);
+        if refused {
+            break;
+        }
     }
+    let share = |count: u32| f64::from(count) / spec.intervals as f64;
+    Ok(Row {
+        scene: spec.name,
+        tolerance,
+        motion: 0.0,
+        error: if refused { f64::INFINITY } else { errors.largest_mean() },
+        doubted: share(doubted),
+        silent: share(silent),
+        time: 1e6 * spent / state.time(),
+        taken,
+        best: None,
+    })
 }
 
 fn csv(row: &Row) -> String {

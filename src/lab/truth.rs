@@ -14,7 +14,6 @@ use std::vec::Vec;
 use super::LabError;
 use super::scenes::SceneSpec;
 use super::threads::in_parallel;
-use crate::element::{ElementMaterial, MaterialWork};
 use crate::io::write_atomically;
 use crate::loads::Loads;
 use crate::scene::AsScene;
@@ -86,62 +85,52 @@ pub(super) fn obtain_one(scene: &SceneSpec, folder: &Path) -> Result<Truth, LabE
 
 /// Computes the truth of a scene.
 pub fn compute(scene: &SceneSpec) -> Result<Truth, LabError> {
-    scene.with_material(Compute { spec: scene, steps: scene.timing.interval * scene.timing.refinement })
+    of_steps(scene, scene.timing.interval * scene.timing.refinement)
 }
 
-struct Compute<'a> {
-    spec: &'a SceneSpec,
-    /// Steps in an interval.
-    steps: u32,
-}
-
-impl MaterialWork for Compute<'_> {
-    type Output = Result<Truth, LabError>;
-
-    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
-        let Self { spec, steps } = self;
-        let scene = spec.build(material)?;
-        let dt = spec.timing.step / spec.timing.refinement as f32;
-        let mut state = spec.state(&scene, dt)?;
-        let limit = |state: &VecState| {
-            tled::exact_critical_step(scene.view(), state.displacements())
-                .ok_or(LabError::NoCriticalStep { scene: spec.name })
-        };
-        let limit_at_rest = limit(&state)?;
-        let step = Step::unchecked(dt, spec.damping)?;
-        let mut truth = Truth {
-            snapshots: Vec::new(),
-            limit_at_rest,
-            limit_least: limit_at_rest,
-            limit_least_time: 0.0,
-            limited_steps: 0,
-        };
-        let mut least_bound = f32::INFINITY;
-        let mut loads = spec.loads(&scene)?;
-        for _ in 0..spec.intervals {
-            for count in 1..=steps {
-                let loads = loads.of_step(state.time(), f64::from(dt));
-                truth.limited_steps += u64::from(exact_step(spec, &scene, &loads, &mut state, &step)?);
-                let mut measure = count == steps;
-                if count % LOOK_STEPS == 0 {
-                    let bound = tled::critical_step(&scene, &mut state).map_or(0.0, |bound| bound.seconds);
-                    measure |= bound < (1.0 - FALL) * least_bound;
-                    if measure {
-                        least_bound = least_bound.min(bound);
-                    }
-                }
+/// With so many steps in an interval.
+fn of_steps(spec: &SceneSpec, steps: u32) -> Result<Truth, LabError> {
+    let scene = spec.build()?;
+    let dt = spec.timing.step / spec.timing.refinement as f32;
+    let mut state = spec.state(&scene, dt)?;
+    let limit = |state: &VecState| {
+        tled::exact_critical_step(scene.view(), state.displacements())
+            .ok_or(LabError::NoCriticalStep { scene: spec.name })
+    };
+    let limit_at_rest = limit(&state)?;
+    let step = Step::unchecked(dt, spec.damping)?;
+    let mut truth = Truth {
+        snapshots: Vec::new(),
+        limit_at_rest,
+        limit_least: limit_at_rest,
+        limit_least_time: 0.0,
+        limited_steps: 0,
+    };
+    let mut least_bound = f32::INFINITY;
+    let mut loads = spec.loads(&scene)?;
+    for _ in 0..spec.intervals {
+        for count in 1..=steps {
+            let loads = loads.of_step(state.time(), f64::from(dt));
+            truth.limited_steps += u64::from(exact_step(spec, &scene, &loads, &mut state, &step)?);
+            let mut measure = count == steps;
+            if count % LOOK_STEPS == 0 {
+                let bound = tled::critical_step(&scene, &mut state).map_or(0.0, |bound| bound.seconds);
+                measure |= bound < (1.0 - FALL) * least_bound;
                 if measure {
-                    let limit = limit(&state)?;
-                    if limit < truth.limit_least {
-                        (truth.limit_least, truth.limit_least_time) = (limit, state.time());
-                    }
+                    least_bound = least_bound.min(bound);
                 }
             }
-            let shape = state.displacements().iter().map(|vector| vector.to_array());
-            truth.snapshots.push(shape.collect());
+            if measure {
+                let limit = limit(&state)?;
+                if limit < truth.limit_least {
+                    (truth.limit_least, truth.limit_least_time) = (limit, state.time());
+                }
+            }
         }
-        Ok(truth)
+        let shape = state.displacements().iter().map(|vector| vector.to_array());
+        truth.snapshots.push(shape.collect());
     }
+    Ok(truth)
 }
 
 /// Takes an exact step. Gives whether it was limited.
@@ -186,7 +175,7 @@ pub fn key(scene: &SceneSpec) -> Result<u64, LabError> {
     /// Enough for all forces and laws to have an effect.
     const STEPS: u32 = 10;
     let brief = SceneSpec { intervals: 1, ..scene.clone() };
-    let start = brief.with_material(Compute { spec: &brief, steps: STEPS })?;
+    let start = of_steps(&brief, STEPS)?;
     let mut hash = Fnv::EMPTY.add(&encode(&start, 0));
     // Hashing does not fail.
     let _ = fmt::write(&mut hash, format_args!("{LOOK_STEPS} {FALL} {scene:?}"));

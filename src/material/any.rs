@@ -1,12 +1,15 @@
-//! A law that is known only when a file or a host has named it: the laws of the list (`for_each_law!`) and the paper's literal
-//! forms.
+//! A law that is known only when a file or a host has named it: one of the list (`for_each_law!`).
 
 use core::fmt;
 
-use super::{Constant, Exponential, Law, Literal, MAX_CONSTANTS, Moduli, NeoHookean};
+use super::{Constant, Law, Moduli, Potential, Values};
+use crate::simd::Real;
 
 macro_rules! any_law {
-    ($($variant:ident: $law:ty,)*) => {
+    ($first:ident: $first_law:ty, $($other:ident: $other_law:ty,)*) => {
+        any_law! { @ $first $first: $first_law, $($other: $other_law,)* }
+    };
+    (@ $first:ident $($variant:ident: $law:ty,)*) => {
         /// Any of the laws, with its constants.
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[non_exhaustive]
@@ -15,63 +18,30 @@ macro_rules! any_law {
                 #[doc = concat!("See [`", stringify!($variant), "`](super::", stringify!($variant), ").")]
                 $variant($law),
             )*
-            /// The neo-Hookean law as the paper prints it.
-            LiteralNeoHookean(Literal<NeoHookean>),
-            /// The exponential law as the paper prints it.
-            LiteralExponential(Literal<Exponential>),
         }
 
         /// Positions in the list.
         enum Position { $($variant,)* }
 
+        /// Constants of any of the laws. For one element at a time: loops over elements are compiled for each law.
+        #[doc(hidden)]
+        #[derive(Clone, Copy)]
+        pub enum AnyWide<R: Real> {
+            $($variant(<$law as Law>::Wide<R>),)*
+        }
+
         impl AnyLaw {
             /// Every law, its constants zero.
             pub fn all() -> impl Iterator<Item = Self> {
-                [
-                    $(Self::$variant(<$law>::default()),)*
-                    Self::LiteralNeoHookean(Literal::default()),
-                    Self::LiteralExponential(Literal::default()),
-                ]
-                .into_iter()
+                [$(Self::$variant(<$law>::default()),)*].into_iter()
             }
 
-            /// Its number in weight files: twice the position in the list of laws, one more for the literal form.
+            /// Its number in weight files: twice the position in the list of laws. The odd numbers were the laws as the paper prints
+            /// them.
             #[must_use]
             pub const fn code(&self) -> u32 {
                 match self {
                     $(Self::$variant(_) => 2 * Position::$variant as u32,)*
-                    Self::LiteralNeoHookean(_) => 2 * Position::NeoHookean as u32 + 1,
-                    Self::LiteralExponential(_) => 2 * Position::Exponential as u32 + 1,
-                }
-            }
-
-            /// Its name in scene files and weight files.
-            #[must_use]
-            pub const fn name(&self) -> &'static str {
-                match self {
-                    $(Self::$variant(_) => <$law>::NAME,)*
-                    Self::LiteralNeoHookean(_) => Literal::<NeoHookean>::NAME,
-                    Self::LiteralExponential(_) => Literal::<Exponential>::NAME,
-                }
-            }
-
-            /// Names and units of its constants.
-            #[must_use]
-            pub const fn constants(&self) -> &'static [Constant] {
-                match self {
-                    $(Self::$variant(_) => <$law>::CONSTANTS,)*
-                    Self::LiteralNeoHookean(_) => NeoHookean::CONSTANTS,
-                    Self::LiteralExponential(_) => Exponential::CONSTANTS,
-                }
-            }
-
-            /// Their values, zeros beyond [`AnyLaw::constants`].
-            #[must_use]
-            pub fn values(&self) -> [f32; MAX_CONSTANTS] {
-                match self {
-                    $(Self::$variant(law) => law.constants(),)*
-                    Self::LiteralNeoHookean(law) => law.constants(),
-                    Self::LiteralExponential(law) => law.constants(),
                 }
             }
 
@@ -80,18 +50,84 @@ macro_rules! any_law {
             pub fn moduli(&self) -> Moduli {
                 match self {
                     $(Self::$variant(law) => Moduli::of(law),)*
-                    Self::LiteralNeoHookean(law) => Moduli::of(law),
-                    Self::LiteralExponential(law) => Moduli::of(law),
+                }
+            }
+        }
+
+        impl Default for AnyLaw {
+            fn default() -> Self {
+                Self::$first(Default::default())
+            }
+        }
+
+        impl Law for AnyLaw {
+            type Wide<R: Real> = AnyWide<R>;
+
+            fn name(&self) -> &'static str {
+                match self {
+                    $(Self::$variant(law) => law.name(),)*
                 }
             }
 
-            /// The same law with other constants.
-            #[must_use]
-            pub fn with(&self, values: [f32; MAX_CONSTANTS]) -> Self {
+            fn constants(&self) -> &'static [Constant] {
                 match self {
-                    $(Self::$variant(_) => Self::$variant(<$law>::from_constants(values)),)*
-                    Self::LiteralNeoHookean(_) => Self::LiteralNeoHookean(Literal::from_constants(values)),
-                    Self::LiteralExponential(_) => Self::LiteralExponential(Literal::from_constants(values)),
+                    $(Self::$variant(law) => law.constants(),)*
+                }
+            }
+
+            fn operations(&self) -> u32 {
+                match self {
+                    $(Self::$variant(law) => law.operations(),)*
+                }
+            }
+
+            fn with(&self, values: Values) -> Self {
+                match self {
+                    $(Self::$variant(law) => Self::$variant(law.with(values)),)*
+                }
+            }
+
+            fn values(&self) -> Values {
+                match self {
+                    $(Self::$variant(law) => law.values(),)*
+                }
+            }
+
+            fn widen<R: Real>(at: impl Fn(usize) -> Self) -> AnyWide<R> {
+                match at(0) {
+                    $(Self::$variant(law) => AnyWide::$variant(<$law>::widen(|lane| law.with(at(lane).values()))),)*
+                }
+            }
+
+            fn energy(&self, x: f64, j: f64) -> f64 {
+                match self {
+                    $(Self::$variant(law) => law.energy(x, j),)*
+                }
+            }
+        }
+
+        impl<R: Real> Potential<R> for AnyWide<R> {
+            fn distortion_slope(&self, x: R) -> R {
+                match self {
+                    $(Self::$variant(law) => law.distortion_slope(x),)*
+                }
+            }
+
+            fn distortion_curvature(&self, x: R, slope: R) -> R {
+                match self {
+                    $(Self::$variant(law) => law.distortion_curvature(x, slope),)*
+                }
+            }
+
+            fn bulk_modulus(&self) -> R {
+                match self {
+                    $(Self::$variant(law) => law.bulk_modulus(),)*
+                }
+            }
+
+            fn saturation(&self, x: R) -> R {
+                match self {
+                    $(Self::$variant(law) => law.saturation(x),)*
                 }
             }
         }

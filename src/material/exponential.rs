@@ -4,7 +4,7 @@
 //! In float32 `exp` overflows at 88. The exponent is capped at [`EXPONENT_CAP`]; beyond it `W` goes on
 //! along its tangent, and the step says [`Limited`](crate::step::Status::Limited).
 
-use super::{Constant, Law, MAX_CONSTANTS, Potential};
+use super::{Constant, Law, Potential, Values};
 use crate::simd::Real;
 
 /// Largest exponent `b x` before the law is continued along its tangent.
@@ -51,21 +51,28 @@ impl<R: Real> Potential<R> for Exponential<R> {
 impl Law for Exponential {
     type Wide<R: Real> = Exponential<R>;
 
-    const NAME: &'static str = "exponential";
+    fn name(&self) -> &'static str {
+        "exponential"
+    }
 
-    const CONSTANTS: &'static [Constant] = &[
+    fn constants(&self) -> &'static [Constant] {
+        &[
         Constant { name: "a", unit: "Pa" },
         Constant { name: "b", unit: "" },
         Constant { name: "d", unit: "Pa" },
-    ];
+    ]
+    }
 
-    const OPERATIONS: u32 = 32;
+    fn operations(&self) -> u32 {
+        32
+    }
 
-    fn from_constants([a, b, d, _]: [f32; MAX_CONSTANTS]) -> Self {
+    #[inline(always)]
+    fn with(&self, [a, b, d, _]: Values) -> Self {
         Self { a, b, d }
     }
 
-    fn constants(&self) -> [f32; MAX_CONSTANTS] {
+    fn values(&self) -> Values {
         [self.a, self.b, self.d, 0.0]
     }
 

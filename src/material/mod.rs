@@ -1,7 +1,6 @@
 //! Hyperelastic laws. A law is two scalar functions: the energy of distortion `W(x)` and of volume
 //! `U(J)`, in Pa (J/m^3), with `x = I1bar - 3`, `I1bar = J^(-2/3) I1` (isochoric, stress-free at rest).
-//! The paper (Meister et al. 2018, section 2) prints `x = I1 - 3`, which leaves a residual stress at rest;
-//! [`Literal`] keeps that form for comparisons.
+//! The paper (Meister et al. 2018, section 2) prints `x = I1 - 3`, which leaves a residual stress at rest.
 //!
 //! The first Piola-Kirchhoff stress is `P = p1 (F - cof F) + s cof F`, with `p1 = 2 W' g`,
 //! `s = p1 + dPsi/dJ` and `g = J^(-2/3)`. `F - cof F` and `s` are both small at small strain and both are
@@ -42,20 +41,20 @@ pub(crate) use for_each_law;
 
 for_each_law! { @ modules [] }
 mod any;
-mod literal;
 mod moduli;
 mod response;
 mod tissue;
 
 pub use any::AnyLaw;
 pub use exponential::EXPONENT_CAP;
-pub use literal::Literal;
 pub use moduli::Moduli;
 #[cfg(feature = "std")]
 pub(crate) use response::VolumeFactor;
 pub use response::{Invariants, Response};
-pub(crate) use response::{LawState, energy_density, releasable_energy, response, response_operations};
-pub use tissue::{Element, Laws, Material, NodalPressure, NodalStrain, Regions, Tissue};
+pub(crate) use response::{LawState, energy_density, response, response_operations};
+#[cfg(feature = "std")]
+pub use tissue::VecMaterial;
+pub use tissue::{AnyMaterial, Element, Laws, Material, NodalPressure, NodalStrain, Regions, Tissue};
 
 use crate::simd::Real;
 
@@ -89,28 +88,29 @@ pub trait Potential<R: Real>: Copy {
     }
 }
 
+/// The constants of a law by themselves, in the order of [`Law::constants`]; the rest is zero.
+pub type Values = [f32; MAX_CONSTANTS];
+
 /// A hyperelastic law with its constants for one element.
 pub trait Law: Copy + Default + Send + Sync {
     /// The same law with a vector for each constant.
     type Wide<R: Real>: Potential<R>;
 
     /// Its name in scene files and weight files.
-    const NAME: &'static str;
+    fn name(&self) -> &'static str;
 
-    /// Its constants, in the order of [`Law::constants`]; each must be a finite positive number.
-    const CONSTANTS: &'static [Constant];
-
-    /// Whether the energy is a function of `I1bar` (true) or, as the paper prints it, of `I1` (false).
-    const ISOCHORIC: bool = true;
+    /// Its constants, in the order of [`Law::values`]; each must be a finite positive number.
+    fn constants(&self) -> &'static [Constant];
 
     /// Floating-point operations of `W'(x)` and `U'(J)` for one element.
-    const OPERATIONS: u32;
+    fn operations(&self) -> u32;
 
-    /// The law with these constants; those beyond [`Law::CONSTANTS`] are ignored.
-    fn from_constants(constants: [f32; MAX_CONSTANTS]) -> Self;
+    /// The same law with these constants; those beyond [`Law::constants`] are ignored.
+    #[must_use]
+    fn with(&self, values: Values) -> Self;
 
-    /// Its constants, zeros beyond [`Law::CONSTANTS`].
-    fn constants(&self) -> [f32; MAX_CONSTANTS];
+    /// The values of its constants.
+    fn values(&self) -> Values;
 
     /// Element `l` of the vector takes the constants of `at(l)`.
     fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Self::Wide<R>;
@@ -120,7 +120,7 @@ pub trait Law: Copy + Default + Send + Sync {
 
     /// The first constant that is not usable (not a finite positive number), by name and value.
     fn unusable_constant(&self) -> Option<(&'static str, f32)> {
-        let constants = Self::CONSTANTS.iter().zip(self.constants());
+        let constants = self.constants().iter().zip(self.values());
         let unusable = constants.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0));
         unusable.map(|(constant, value)| (constant.name, value))
     }

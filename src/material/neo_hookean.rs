@@ -1,7 +1,7 @@
 //! Neo-Hookean law `W(x) = c x`, `U(J) = d (J - 1)^2` (Meister et al. 2018, section 3; with `c = mu / 2`,
 //! `d = kappa / 2` the law of NiftySim and DJ-TLED). Constants in Pa.
 
-use super::{Constant, Law, MAX_CONSTANTS, Potential};
+use super::{Constant, Law, Potential, Values};
 use crate::simd::Real;
 
 /// Constants of the neo-Hookean law: half the shear modulus and half the bulk modulus, Pa.
@@ -31,18 +31,24 @@ impl<R: Real> Potential<R> for NeoHookean<R> {
 impl Law for NeoHookean {
     type Wide<R: Real> = NeoHookean<R>;
 
-    const NAME: &'static str = "neo-hookean";
+    fn name(&self) -> &'static str {
+        "neo-hookean"
+    }
 
-    const CONSTANTS: &'static [Constant] =
-        &[Constant { name: "c", unit: "Pa" }, Constant { name: "d", unit: "Pa" }];
+    fn constants(&self) -> &'static [Constant] {
+        &[Constant { name: "c", unit: "Pa" }, Constant { name: "d", unit: "Pa" }]
+    }
 
-    const OPERATIONS: u32 = 2;
+    fn operations(&self) -> u32 {
+        2
+    }
 
-    fn from_constants([c, d, ..]: [f32; MAX_CONSTANTS]) -> Self {
+    #[inline(always)]
+    fn with(&self, [c, d, ..]: Values) -> Self {
         Self { c, d }
     }
 
-    fn constants(&self) -> [f32; MAX_CONSTANTS] {
+    fn values(&self) -> Values {
         [self.c, self.d, 0.0, 0.0]
     }
 

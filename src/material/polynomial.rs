@@ -1,7 +1,7 @@
 //! Reduced polynomial law of second order `W(x) = c x + e x^2`, `U(J) = d (J - 1)^2` (Yeoh 1993 without its third term;
 //! neo-Hookean with stiffening). Constants in Pa.
 
-use super::{Constant, Law, MAX_CONSTANTS, Potential};
+use super::{Constant, Law, Potential, Values};
 use crate::simd::Real;
 
 /// Constants of the reduced polynomial law, Pa.
@@ -33,21 +33,28 @@ impl<R: Real> Potential<R> for Polynomial<R> {
 impl Law for Polynomial {
     type Wide<R: Real> = Polynomial<R>;
 
-    const NAME: &'static str = "polynomial";
+    fn name(&self) -> &'static str {
+        "polynomial"
+    }
 
-    const CONSTANTS: &'static [Constant] = &[
+    fn constants(&self) -> &'static [Constant] {
+        &[
         Constant { name: "c", unit: "Pa" },
         Constant { name: "e", unit: "Pa" },
         Constant { name: "d", unit: "Pa" },
-    ];
+    ]
+    }
 
-    const OPERATIONS: u32 = 5;
+    fn operations(&self) -> u32 {
+        5
+    }
 
-    fn from_constants([c, e, d, _]: [f32; MAX_CONSTANTS]) -> Self {
+    #[inline(always)]
+    fn with(&self, [c, e, d, _]: Values) -> Self {
         Self { c, e, d }
     }
 
-    fn constants(&self) -> [f32; MAX_CONSTANTS] {
+    fn values(&self) -> Values {
         [self.c, self.e, self.d, 0.0]
     }
 

@@ -75,14 +75,12 @@ impl<R: Real> VolumeFactor<R> {
 #[derive(Clone, Copy)]
 pub(crate) struct LawState<R> {
     pub(crate) at: Invariants<R>,
-    /// Of an isochoric law.
-    factor: Option<VolumeFactor<R>>,
+    factor: VolumeFactor<R>,
     /// `W'(x)`, Pa.
     pub(crate) slope: R,
     /// `U'` and `U''`, Pa: at the element's volume, or their mean over its nodes ([`super::NodalPressure`]).
     pub(crate) pressure: R,
     pub(crate) bulk: R,
-    x: R,
 }
 
 impl<R: Real> LawState<R> {
@@ -94,42 +92,36 @@ impl<R: Real> LawState<R> {
     /// With the pressure at another `J - 1` than the element's own.
     #[inline(always)]
     pub(crate) fn with_volume_change<L: Law>(law: &L::Wide<R>, at: Invariants<R>, change: R) -> Self {
-        let factor = if L::ISOCHORIC { Some(VolumeFactor::new(at)) } else { None };
-        let x = factor.map_or(at.i, |factor| factor.x);
+        let factor = VolumeFactor::new(at);
         let bulk = law.bulk_modulus();
-        Self { at, factor, slope: law.distortion_slope(x), pressure: bulk * change, bulk, x }
+        Self { at, factor, slope: law.distortion_slope(factor.x), pressure: bulk * change, bulk }
     }
 
     /// `W''(x)`, Pa; not negative.
     #[inline(always)]
     pub(crate) fn stiffening<L: Law>(&self, law: &L::Wide<R>) -> R {
-        law.distortion_curvature(self.x, self.slope).max(R::splat(0.0))
+        law.distortion_curvature(self.factor.x, self.slope).max(R::splat(0.0))
     }
 
-    /// `g`, `g'` and `g''`; 1, 0, 0 for a literal law.
+    /// `g`, `g'` and `g''`.
     #[inline(always)]
     pub(crate) fn volume_factor(&self) -> [R; 3] {
-        match &self.factor {
-            Some(factor) => [factor.g, factor.slope, factor.curvature()],
-            None => [R::splat(1.0), R::splat(0.0), R::splat(0.0)],
-        }
+        [self.factor.g, self.factor.slope, self.factor.curvature()]
     }
 
     /// The stress scalars.
     #[inline(always)]
     pub(crate) fn response<L: Law>(&self, law: &L::Wide<R>) -> Response<R> {
-        let two = R::splat(2.0);
+        let (two, factor) = (R::splat(2.0), &self.factor);
         let slope = two * self.slope;
-        let (p1, s) = match &self.factor {
-            Some(factor) => {
-                // g + g' I1 / 2 = J^(-5/3) (J - 1 - (I1 - 3 + 2 below) / 3): small at small strain
-                let bracket =
-                    factor.fifth * (factor.clamped - (self.at.i + two * factor.below) * R::splat(1.0 / 3.0));
-                (slope * factor.g, slope * bracket)
-            }
-            None => (slope, slope),
-        };
-        Response { p1, s: s + self.pressure, saturation: law.saturation(self.x) }
+        // g + g' I1 / 2 = J^(-5/3) (J - 1 - (I1 - 3 + 2 below) / 3): small at small strain
+        let bracket =
+            factor.fifth * (factor.clamped - (self.at.i + two * factor.below) * R::splat(1.0 / 3.0));
+        Response {
+            p1: slope * factor.g,
+            s: slope * bracket + self.pressure,
+            saturation: law.saturation(factor.x),
+        }
     }
 }
 
@@ -164,14 +156,8 @@ impl<R: Real> LawState<Pair<R>> {
     /// Each half by itself.
     #[inline(always)]
     pub(crate) fn split(&self) -> [LawState<R>; 2] {
-        let Self { at, factor, slope, pressure, bulk, x } = *self;
-        let [near, far] = match factor {
-            Some(factor) => {
-                let [near, far] = factor.split();
-                [Some(near), Some(far)]
-            }
-            None => [None, None],
-        };
+        let Self { at, factor, slope, pressure, bulk } = *self;
+        let [near, far] = factor.split();
         [
             LawState {
                 at: Invariants { i: at.i.0, j: at.j.0 },
@@ -179,7 +165,6 @@ impl<R: Real> LawState<Pair<R>> {
                 slope: slope.0,
                 pressure: pressure.0,
                 bulk: bulk.0,
-                x: x.0,
             },
             LawState {
                 at: Invariants { i: at.i.1, j: at.j.1 },
@@ -187,7 +172,6 @@ impl<R: Real> LawState<Pair<R>> {
                 slope: slope.1,
                 pressure: pressure.1,
                 bulk: bulk.1,
-                x: x.1,
             },
         ]
     }
@@ -200,16 +184,13 @@ pub(crate) fn response<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>) -> 
 }
 
 /// Floating-point operations of [`response`] for one element, those of the law included.
-pub(crate) const fn response_operations<L: Law>() -> u32 {
-    // Isochoric: 52 for `VolumeFactor::new`, 9 to combine.
-    L::OPERATIONS + if L::ISOCHORIC { 61 } else { 2 }
+pub(crate) fn response_operations<L: Law>(law: &L) -> u32 {
+    // 52 for `VolumeFactor::new`, 9 to combine.
+    law.operations() + 61
 }
 
 /// Energy density in float64, J/m^3, of a deformation with the given `I1 - 3` and `J - 1`.
 pub(crate) fn energy_density<L: Law>(law: &L, i: f64, j: f64) -> f64 {
-    if !L::ISOCHORIC {
-        return law.energy(i, j);
-    }
     let floor = f64::from(J_FLOOR);
     let volume = 1.0 + j;
     let clamped = if volume > floor { volume } else { floor };
@@ -218,25 +199,4 @@ pub(crate) fn energy_density<L: Law>(law: &L, i: f64, j: f64) -> f64 {
     let slope = -2.0 / 3.0 * (1.0 + below_one) / clamped;
     let x = (1.0 + below_one) * i + 3.0 * below_one + slope * (volume - clamped) * (i + 3.0);
     law.energy(x, j)
-}
-
-/// Largest energy density, J/m^3, that a law can release from rest: zero for a stress-free one. The
-/// literal forms can contract; `W` is convex in `x` and, at given `J`, `x >= 3 (J^(2/3) - 1)`, so the
-/// minimum over uniform contractions is found by bisection of its slope.
-pub(crate) fn releasable_energy<L: Law>(law: &L) -> f64 {
-    if L::ISOCHORIC {
-        return 0.0;
-    }
-    let at = |volume: f64| law.energy(3.0 * (libm::pow(volume, 2.0 / 3.0) - 1.0), volume - 1.0);
-    let (mut low, mut high) = (1e-3, 1.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if at(middle * (1.0 + 1e-7)) > at(middle) {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    let least = at(0.5 * (low + high));
-    if least < 0.0 { -least } else { 0.0 }
 }

@@ -1,10 +1,11 @@
 //! What the elements of a mesh are made of: one tissue for all, or one of several for each element.
 
-use super::Law;
+use super::{AnyLaw, Law, Values};
 use crate::simd::Real;
 
 /// A law with a density.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
 pub struct Tissue<L> {
     /// The hyperelastic law with its constants.
     pub law: L,
@@ -65,7 +66,10 @@ pub trait Material: Sync {
     type Law: Law;
 
     /// Which tetrahedra: with [`NodalPressure`] around a material those.
-    const ELEMENT: Element = Element::Linear;
+    #[inline(always)]
+    fn element(&self) -> Element {
+        Element::Linear
+    }
 
     /// The tissue of mesh element `element`, or nothing where the material names none.
     fn tissue(&self, element: usize) -> Option<Tissue<Self::Law>>;
@@ -88,7 +92,10 @@ pub struct NodalPressure<M>(pub M);
 impl<M: Material> Material for NodalPressure<M> {
     type Law = M::Law;
 
-    const ELEMENT: Element = Element::NodalPressure;
+    #[inline(always)]
+    fn element(&self) -> Element {
+        Element::NodalPressure
+    }
 
     fn tissue(&self, element: usize) -> Option<Tissue<M::Law>> {
         self.0.tissue(element)
@@ -113,7 +120,10 @@ pub struct NodalStrain<M>(pub M);
 impl<M: Material> Material for NodalStrain<M> {
     type Law = M::Law;
 
-    const ELEMENT: Element = Element::NodalStrain;
+    #[inline(always)]
+    fn element(&self) -> Element {
+        Element::NodalStrain
+    }
 
     fn tissue(&self, element: usize) -> Option<Tissue<M::Law>> {
         self.0.tissue(element)
@@ -135,16 +145,32 @@ pub enum Laws<'a, L> {
     One(L),
     /// By element.
     Regions {
-        /// The tissues.
-        tissues: &'a [Tissue<L>],
+        /// Which law; its own constants count where none are listed, and a scene with such elements cannot be built.
+        law: L,
+        /// The constants of the tissues.
+        tissues: &'a [Tissue<Values>],
         /// For each element of the mesh the index of its tissue.
         of_element: &'a [u16],
-        /// Of elements that the material does not name; a scene with such cannot be built.
-        beyond: L,
     },
 }
 
-impl<L: Law> Laws<'_, L> {
+impl<'a, L: Law> Laws<'a, L> {
+    /// Which law, with the constants of some tissue.
+    pub(crate) const fn law(&self) -> L {
+        match *self {
+            Self::One(law) | Self::Regions { law, .. } => law,
+        }
+    }
+
+    /// The same constants of the law that `L` turned out to be.
+    #[inline]
+    pub(crate) fn of_law<K: Law>(&self, law: K) -> Laws<'a, K> {
+        match *self {
+            Self::One(_) => Laws::One(law),
+            Self::Regions { tissues, of_element, .. } => Laws::Regions { law, tissues, of_element },
+        }
+    }
+
     /// Whether elements may be of different tissues.
     #[inline(always)]
     pub(crate) const fn differ(&self) -> bool {
@@ -157,9 +183,9 @@ impl<L: Law> Laws<'_, L> {
     pub fn of(&self, element: usize) -> L {
         match *self {
             Self::One(law) => law,
-            Self::Regions { tissues, of_element, beyond } => {
+            Self::Regions { law, tissues, of_element } => {
                 let tissue = of_element.get(element).and_then(|&index| tissues.get(usize::from(index)));
-                tissue.map_or(beyond, |tissue| tissue.law)
+                tissue.map_or(law, |tissue| law.with(tissue.law))
             }
         }
     }
@@ -171,6 +197,14 @@ impl<L: Law> Laws<'_, L> {
             Self::One(law) => L::widen(|_| law),
             Self::Regions { .. } => L::widen(|lane| self.of(element(lane))),
         }
+    }
+}
+
+impl<L: Law> Tissue<L> {
+    /// Without the name of the law: an entry of [`Regions`].
+    #[must_use]
+    pub fn values(&self) -> Tissue<Values> {
+        Tissue { law: self.law.values(), density: self.density }
     }
 }
 
@@ -186,29 +220,136 @@ impl<L: Law> Material for Tissue<L> {
     }
 }
 
-/// Several tissues in one mesh: element `e` is of tissue `tissues[of_element[e]]`. With as many tissues as
+/// Several tissues of one law in one mesh: element `e` is of tissue `tissues[of_element[e]]`. With as many tissues as
 /// elements each element has its own constants.
 #[derive(Clone, Copy, Debug)]
 pub struct Regions<'a, L> {
-    /// The tissues.
-    pub tissues: &'a [Tissue<L>],
+    /// Which law; its own constants are not used.
+    pub law: L,
+    /// The tissues: see [`Tissue::values`].
+    pub tissues: &'a [Tissue<Values>],
     /// For each element of the mesh the index of its tissue.
     pub of_element: &'a [u16],
 }
 
-impl<L: Law + Default> Material for Regions<'_, L> {
+impl<L: Law> Material for Regions<'_, L> {
     type Law = L;
 
     fn tissue(&self, element: usize) -> Option<Tissue<L>> {
         let index = usize::from(*self.of_element.get(element)?);
-        self.tissues.get(index).copied()
+        self.tissues.get(index).map(|&Tissue { law, density }| Tissue { law: self.law.with(law), density })
     }
 
     fn laws(&self) -> Laws<'_, L> {
-        Laws::Regions { tissues: self.tissues, of_element: self.of_element, beyond: L::default() }
+        let Self { law, tissues, of_element } = *self;
+        Laws::Regions { law, tissues, of_element }
     }
 
     fn region(&self, element: usize) -> u16 {
         self.of_element.get(element).copied().unwrap_or_default()
+    }
+}
+
+/// Tissues in tetrahedra, which are known only when the program runs, as is the law: because a file or a host has named them. All
+/// that steps are made of is compiled once for this; the loops over elements are those of each law.
+#[derive(Clone, Copy, Debug)]
+pub struct AnyMaterial<'a, L = AnyLaw> {
+    /// Which tetrahedra.
+    pub element: Element,
+    /// Which law all tissues have; its own constants are not used.
+    pub law: L,
+    /// One tissue for all elements, or several.
+    pub tissues: &'a [Tissue<Values>],
+    /// For each element of the mesh the index of its tissue; not read where there is only one.
+    pub of_element: &'a [u16],
+}
+
+impl<'a, L: Law> AnyMaterial<'a, L> {
+    const fn regions(&self) -> Regions<'a, L> {
+        let Self { law, tissues, of_element, .. } = *self;
+        Regions { law, tissues, of_element }
+    }
+
+    pub(crate) fn laws_of_all(&self) -> Laws<'a, L> {
+        let Self { law, tissues, of_element, .. } = *self;
+        match tissues {
+            [only] => Laws::One(law.with(only.law)),
+            _ => Laws::Regions { law, tissues, of_element },
+        }
+    }
+}
+
+impl<L: Law> Material for AnyMaterial<'_, L> {
+    type Law = L;
+
+    #[inline]
+    fn element(&self) -> Element {
+        self.element
+    }
+
+    fn tissue(&self, element: usize) -> Option<Tissue<L>> {
+        match self.tissues {
+            [Tissue { law, density }] => Some(Tissue { law: self.law.with(*law), density: *density }),
+            _ => self.regions().tissue(element),
+        }
+    }
+
+    fn laws(&self) -> Laws<'_, L> {
+        self.laws_of_all()
+    }
+
+    fn region(&self, element: usize) -> u16 {
+        if self.tissues.len() == 1 { 0 } else { self.regions().region(element) }
+    }
+}
+
+/// [`AnyMaterial`] that owns its tissues.
+#[cfg(feature = "std")]
+#[derive(Clone, Debug)]
+pub struct VecMaterial {
+    /// Which tetrahedra.
+    pub element: Element,
+    /// See [`AnyMaterial::law`].
+    pub law: AnyLaw,
+    /// See [`AnyMaterial::tissues`].
+    pub tissues: std::vec::Vec<Tissue<Values>>,
+    /// See [`AnyMaterial::of_element`].
+    pub of_element: std::vec::Vec<u16>,
+}
+
+#[cfg(feature = "std")]
+impl VecMaterial {
+    /// One tissue for all elements.
+    pub fn one(element: Element, law: impl Into<AnyLaw>, density: f32) -> Self {
+        let law = law.into();
+        let tissues = std::vec![Tissue { law, density }.values()];
+        Self { element, law, tissues, of_element: std::vec::Vec::new() }
+    }
+
+    fn view(&self) -> AnyMaterial<'_> {
+        let Self { element, law, tissues, of_element } = self;
+        AnyMaterial { element: *element, law: *law, tissues, of_element }
+    }
+}
+
+#[cfg(feature = "std")]
+impl Material for VecMaterial {
+    type Law = AnyLaw;
+
+    #[inline]
+    fn element(&self) -> Element {
+        self.element
+    }
+
+    fn tissue(&self, element: usize) -> Option<Tissue<AnyLaw>> {
+        self.view().tissue(element)
+    }
+
+    fn laws(&self) -> Laws<'_, AnyLaw> {
+        self.view().laws_of_all()
+    }
+
+    fn region(&self, element: usize) -> u16 {
+        self.view().region(element)
     }
 }

@@ -21,7 +21,7 @@ use super::{
     Activation, Description, ForceInput, Layer, LayerDescription, MAX_WIDTH, Network, Parameters, Range,
     WeightError, hexadecimal, write,
 };
-use crate::material::{AnyLaw, Element, MAX_CONSTANTS};
+use crate::material::{AnyLaw, Element, Law, MAX_CONSTANTS};
 
 /// The key of the metadata.
 const KEY: &str = "supple";

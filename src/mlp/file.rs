@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable, try_cast_slice};
 
 use super::layers::{LayerEntry, LongEntry, Place, checked_layer};
 use super::{Layer, MAX_INPUTS, MAX_LAYERS, MAX_OUTPUTS};
-use crate::material::{AnyLaw, Element, MAX_CONSTANTS};
+use crate::material::{AnyLaw, Element, Law, MAX_CONSTANTS};
 
 #[cfg(target_endian = "big")]
 compile_error!("weight files are little-endian and read in place");

@@ -10,7 +10,7 @@ use super::file::{ALIGNMENT, CHECKED, HEADER, Header, MAGIC, VERSION, VERSION_IN
 use super::int8::{GROUP, TILE_ROWS, WeightTile};
 use super::layers::{LayerEntry, LongEntry};
 use super::{Activation, ForceInput, Layer, Network, Parameters, Range, WeightError};
-use crate::material::{AnyLaw, Element};
+use crate::material::{AnyLaw, Element, Law};
 
 /// A layer of a network to be written.
 #[derive(Clone, Debug, PartialEq)]

@@ -136,7 +136,7 @@ impl<M: Material> VecScene<M> {
         let mut facts = SceneFacts::without_patches(&material, mesh, supports, &mut nodes, &mut tiles)?;
         tiles.truncate(facts.tile_count());
         let mut patches = std::vec::Vec::new();
-        if M::ELEMENT.is_nodal_strain() {
+        if material.element().is_nodal_strain() {
             let mut rows = patch_rows_for(nodes.len(), facts.element_count, tissue_count(&material));
             loop {
                 patches.resize(rows, PatchRow::EMPTY);

@@ -142,7 +142,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         state: &StateView<'_>,
         room: usize,
     ) -> Result<(), Status> {
-        let (nodes, room) = (scene.node_count(), room.min(state.capacity_for::<M>()));
+        let (nodes, room) = (scene.node_count(), room.min(state.capacity_for(scene.element())));
         let is_other = |checked| checked != nodes;
         let surface = loads.contact().map(|contact| contact.surface().scene_nodes());
         if nodes == 0 || room < nodes || loads.nodes().is_some_and(is_other) || surface.is_some_and(is_other)
@@ -194,7 +194,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         let Self { scene, loads, displacement, increment, force, progress, .. } = self;
         let mut balance = progress.energy_balance;
         if progress.steps == 0 {
-            balance.start = balance.start.max(scene.releasable_energy());
+            balance.start = balance.start.max(scene.rounding_energy());
         }
         let next = |node, inertia: &_, increment: &_, force: &_| {
             method.next_increment(node, inertia, increment, force)
@@ -212,7 +212,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         let next = (first + all.div_ceil(C::ENERGY_CYCLE)).min(all);
         let strain = scene.strain_energy_at(first..next, displacement, volume);
         let next = if next < all { Some(next as u32) } else { None };
-        balance.measured(strain, next, method.added_inertia().into(), scene.releasable_energy())
+        balance.measured(strain, next, method.added_inertia().into(), scene.rounding_energy())
     }
 
     /// The node that a refused step names: the first whose next increment is not finite, or else the one with

@@ -44,7 +44,7 @@ pub(crate) fn nodal_volumes<M: ElementMaterial>(
     mut volumes: &mut [NodeVector],
     threads: &impl Threads,
 ) {
-    if !M::ELEMENT.is_nodal_pressure() {
+    if !scene.element().is_nodal_pressure() {
         return;
     }
     let elements = scene.elements();
@@ -92,7 +92,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         let parts = parts.get_mut(..count).unwrap_or_default();
         threads.each(parts, |part| self.compute(part, volumes, &then));
         let mut extremes = parts.iter().fold(Extremes::none(), |sum, part| sum.merged_with(&part.extremes));
-        if M::ELEMENT.is_nodal_strain() {
+        if self.scene.element().is_nodal_strain() {
             let (tiles, displacement) = (self.scene.tiles, self.displacement);
             let check = VolumeCheck { tiles, displacement, steps: self.progress.steps };
             extremes.least_j = check.least_change().min(extremes.least_j);
@@ -133,12 +133,12 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     visitor: V,
 ) -> Extremes<f32> {
     let elements = scene.elements();
-    if M::ELEMENT.is_nodal_strain() {
+    if scene.element().is_nodal_strain() {
         let force = Scatter::from(elements.partitions.nodes(&partitions).start, force);
         let (laws, patches) = (elements.laws, scene.patches);
         let visitor = PhantomData;
         V::patch_forces(PatchForces { laws, patches, partitions, displacement, force, visitor })
-    } else if M::ELEMENT.is_nodal_pressure() {
+    } else if scene.element().is_nodal_pressure() {
         let pressure = MeanPressure::new(scene.volume_rows(volumes));
         let kernel =
             InternalForces::of_partitions(elements, pressure, partitions, displacement, force, visitor);

@@ -29,7 +29,7 @@ pub fn critical_step(scene: &impl AsScene, state: &mut impl AsState) -> Option<C
 
 fn critical<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -> Option<CriticalStep> {
     let count = scene.node_count();
-    if state.capacity_for::<M>() < count {
+    if state.capacity_for(scene.element()) < count {
         return None;
     }
     let StateView { displacement, increment, force, volume, .. } = state;
@@ -42,7 +42,7 @@ fn critical<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -
     sums.clear();
     let (laws, tiles, inertia) = (scene.material.laws(), scene.tiles, scene.inertia);
     let rate;
-    if M::ELEMENT.is_nodal_strain() {
+    if scene.element().is_nodal_strain() {
         let weights = volume.get_mut(..count)?;
         weights.fill(NodeVector([1.0, 0.0, 0.0, 0.0]));
         for _ in 0..BALANCING_SWEEPS {
@@ -54,7 +54,7 @@ fn critical<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -
         }
         M::Law::patch_bounds(PatchBounds { laws, patches: scene.patches, inertia, weights, sums: &mut sums });
         rate = Largest::of(&sums, inertia, |_, _| ());
-    } else if !M::ELEMENT.is_nodal_pressure() {
+    } else if !scene.element().is_nodal_pressure() {
         let pressure = OwnPressure;
         let kernel = CriticalBounds { laws, pressure, tiles, inertia, with_volume: true, sums: &mut sums };
         M::Law::critical_bounds(kernel);

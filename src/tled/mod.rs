@@ -114,11 +114,12 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
 /// Floating-point operations of the internal forces.
 #[must_use]
 pub fn element_operations<M: Material>(scene: SceneView<'_, M>) -> u64 {
-    if M::ELEMENT.is_nodal_strain() {
-        return scene.patches.operations::<M::Law>();
+    let law = scene.material.laws().law();
+    if scene.element().is_nodal_strain() {
+        return scene.patches.operations(&law);
     }
-    let nodal = if M::ELEMENT.is_nodal_pressure() { element::NODAL_PRESSURE_OPERATIONS } else { 0 };
-    scene.element_count() as u64 * u64::from(element::operations::<M::Law>() + nodal)
+    let nodal = if scene.element().is_nodal_pressure() { element::NODAL_PRESSURE_OPERATIONS } else { 0 };
+    scene.element_count() as u64 * u64::from(element::operations(&law) + nodal)
 }
 
 /// Floating-point operations of one step without loads, the same for every step.
@@ -158,7 +159,7 @@ pub fn start(
     }
     let Some(strain) = strain_energy_of(scene, state.reborrow()) else { return false };
     state.progress.dt = step.seconds();
-    state.progress.energy_balance.start = kinetic + strain + scene.releasable_energy();
+    state.progress.energy_balance.start = kinetic + strain + scene.rounding_energy();
     true
 }
 
@@ -171,7 +172,7 @@ pub fn stop(scene: &impl AsScene, state: &mut impl AsState) -> bool {
     let Some(strain) = strain_energy_of(scene, state.reborrow()) else { return false };
     state.increment.fill(NodeVector::ZERO);
     state.progress.dt = 0.0;
-    let start = strain + scene.releasable_energy();
+    let start = strain + scene.rounding_energy();
     state.progress.energy_balance = EnergyBalance { start, peak: start, ..EnergyBalance::NEW };
     true
 }
@@ -183,7 +184,7 @@ pub fn strain_energy(scene: &impl AsScene, state: &mut impl AsState) -> Option<f
 
 fn strain_energy_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -> Option<f64> {
     let nodes = scene.node_count();
-    if state.capacity_for::<M>() < nodes {
+    if state.capacity_for(scene.element()) < nodes {
         return None;
     }
     nodal_volumes(scene, state.displacement, state.volume, &CallingThread);
@@ -199,7 +200,7 @@ pub fn internal_forces(scene: &impl AsScene, state: &mut impl AsState) -> bool {
 
 fn internal_forces_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -> bool {
     let nodes = scene.node_count();
-    if state.capacity_for::<M>() < nodes {
+    if state.capacity_for(scene.element()) < nodes {
         return false;
     }
     let StateView { displacement, force, volume, .. } = state;

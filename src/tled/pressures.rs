@@ -22,13 +22,13 @@ pub fn nodal_pressures(scene: &impl AsScene, state: &mut impl AsState) -> Option
 
 fn nodal_pressures_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -> Option<Vec<f32>> {
     let nodes = scene.node_count();
-    if state.capacity_for::<M>() < nodes {
+    if state.capacity_for(scene.element()) < nodes {
         return None;
     }
     nodal_volumes(scene, state.displacement, state.volume, &CallingThread);
-    let volumes = M::ELEMENT.is_nodal_pressure().then(|| scene.volume_rows(state.volume));
+    let volumes = scene.element().is_nodal_pressure().then(|| scene.volume_rows(state.volume));
     let mut sums = vec![(0.0, 0.0); nodes];
-    if M::ELEMENT.is_nodal_strain() {
+    if scene.element().is_nodal_strain() {
         add_patches(scene, state.displacement, &mut sums);
         return Some(means(sums));
     }

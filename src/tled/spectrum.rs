@@ -25,13 +25,14 @@ pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &
     let displacement = displacement.get(..scene.node_count())?;
     let tangents: Vec<ElementTangent> =
         scene.places().map(|(tile, lane)| ElementTangent::of(scene, tile, lane, displacement)).collect();
-    let nodal = if M::ELEMENT.is_nodal_pressure() { Some(NodalTangent::new(scene, &tangents)) } else { None };
+    let nodal =
+        if scene.element().is_nodal_pressure() { Some(NodalTangent::new(scene, &tangents)) } else { None };
     let tangents = match &nodal {
         Some(nodal) => nodal.with_pressures(tangents),
         None => tangents,
     };
     let strain =
-        if M::ELEMENT.is_nodal_strain() { Some(PatchTangents::new(scene, displacement)) } else { None };
+        if scene.element().is_nodal_strain() { Some(PatchTangents::new(scene, displacement)) } else { None };
     let roots: Vec<DVec3> = scene
         .inertia
         .iter()

@@ -1,7 +1,7 @@
 //! An element's stress and tangent in float64, `P = p1 F + pJ C`, `dP = p1 dF + dp1 F + dpJ C + pJ dC` with the cofactor matrix
 //! `C` of the deformation gradient `F`: for tools and tests. SI units.
 
-#[cfg(any(feature = "lab", test))]
+#[cfg(any(feature = "std", test))]
 use core::array::from_fn;
 
 use glam::{DMat3, DVec3};
@@ -111,7 +111,7 @@ impl ElementTangent {
     }
 
     /// Forces with which the element acts on its nodes, N.
-    #[cfg(any(feature = "lab", test))]
+    #[cfg(any(feature = "std", test))]
     pub(crate) fn forces(&self) -> [DVec3; 4] {
         self.forces_of_stress(-self.at.stress())
     }
@@ -123,7 +123,7 @@ impl ElementTangent {
 
     /// The parts of `K`, N/m, by rows and columns of nodes. With `a = F g`, `c = C g`, `y = x_f a + x_c c` for the gradient `g` of each
     /// node: `p1 g_i.g_j + W'' y_i y_j^T + coupling (a_i c_j^T + c_i a_j^T) + bulk c_i c_j^T - pJ [F (g_i x g_j)]_x`, times the volume.
-    #[cfg(any(feature = "lab", test))]
+    #[cfg(any(feature = "std", test))]
     pub(crate) fn stiffness(&self) -> [[DMat3; 4]; 4] {
         let LawTangent { f, cofactor, p1, p_j, stiffening, coupling, bulk, x_f, x_c, .. } = self.at;
         let along_f = self.gradients.map(|gradient| f * gradient);
@@ -157,39 +157,26 @@ impl LawTangent {
         let slope = |x: f32| f64::from(wide.distortion_slope(x));
         let curvature = |x: f32| f64::from(wide.distortion_curvature(x, wide.distortion_slope(x)));
         let (bulk_modulus, change) = (f64::from(wide.bulk_modulus()), volume_ratio - 1.0);
-        let base = Self {
-            f,
-            cofactor,
-            p1: 2.0 * slope(at.i),
-            p_j: bulk_modulus * change,
-            stiffening: curvature(at.i),
-            coupling: 0.0,
-            bulk: bulk_modulus,
-            bulk_modulus,
-            change,
-            x_f: 2.0,
-            x_c: 0.0,
-        };
-        if !L::ISOCHORIC {
-            return base;
-        }
         let factor = VolumeFactor::new(at);
         let (g, slope_g, curvature_g) =
             (f64::from(factor.g), f64::from(factor.slope), f64::from(factor.curvature()));
         Self {
+            f,
+            cofactor,
             p1: 2.0 * slope(factor.x) * g,
             p_j: bulk_modulus * change + slope(factor.x) * slope_g * square,
             stiffening: curvature(factor.x),
             coupling: 2.0 * slope(factor.x) * slope_g,
             bulk: bulk_modulus + slope(factor.x) * curvature_g * square,
+            bulk_modulus,
+            change,
             x_f: 2.0 * g,
             x_c: slope_g * square,
-            ..base
         }
     }
 
     /// The first Piola-Kirchhoff stress, Pa.
-    #[cfg(any(feature = "lab", test))]
+    #[cfg(any(feature = "std", test))]
     fn stress(&self) -> DMat3 {
         self.f * self.p1 + self.cofactor * self.p_j
     }
@@ -221,7 +208,7 @@ fn inner3(a: DMat3, b: DMat3) -> f64 {
 }
 
 /// `[a]_x`, so that `[a]_x b` is the cross product of a and b.
-#[cfg(any(feature = "lab", test))]
+#[cfg(any(feature = "std", test))]
 fn cross_matrix(a: DVec3) -> DMat3 {
     DMat3::from_cols(DVec3::new(0.0, a.z, -a.y), DVec3::new(-a.z, 0.0, a.x), DVec3::new(a.y, -a.x, 0.0))
 }

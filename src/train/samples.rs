@@ -16,7 +16,6 @@ use glam::{DVec3, Vec3A};
 
 use super::noise::{Moment, MovedCopy, SeenAs};
 use super::recipe::Recipe;
-use crate::element::{ElementMaterial, MaterialWork};
 use crate::lab::LabError;
 use crate::lab::random_numbers::Random;
 use crate::lab::scenes::SceneSpec;
@@ -55,7 +54,7 @@ pub struct Rough {
 impl Samples {
     /// Simulates the recipe's motion, that of `spec`, and samples it.
     pub fn collect(recipe: &Recipe, spec: &SceneSpec) -> Result<Self, LabError> {
-        spec.with_material(Collect { spec, recipe })
+        collect(spec, recipe)
     }
 
     /// Those of some frames.
@@ -188,74 +187,64 @@ fn free_and_sampled(spec: &SceneSpec) -> (Vec<bool>, Vec<usize>) {
     (free, (0..nodes).filter(|&node| sampled[node]).collect())
 }
 
-struct Collect<'a> {
-    spec: &'a SceneSpec,
-    recipe: &'a Recipe,
-}
+fn collect(spec: &SceneSpec, recipe: &Recipe) -> Result<Samples, LabError> {
+    let scene = spec.build()?;
+    let (seconds, dt) = (spec.timing.step, f64::from(spec.timing.step));
+    let step = Step::unchecked(seconds, spec.damping)?;
+    let nodes = spec.points.len();
+    let mut state = VecState::at_rest(nodes);
+    let (free, sampled) = free_and_sampled(spec);
+    let mut random = Random(recipe.seed);
+    let masses: Vec<f32> = (0..nodes).map(|node| scene.view().node_mass(node)).collect();
+    let seen_as = SeenAs { masses: &masses, force: recipe.network.force };
 
-impl MaterialWork for Collect<'_> {
-    type Output = Result<Samples, LabError>;
-
-    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
-        let Self { spec, recipe } = self;
-        let scene = spec.build(material)?;
-        let (seconds, dt) = (spec.timing.step, f64::from(spec.timing.step));
-        let step = Step::unchecked(seconds, spec.damping)?;
-        let nodes = spec.points.len();
-        let mut state = VecState::at_rest(nodes);
-        let (free, sampled) = free_and_sampled(spec);
-        let mut random = Random(recipe.seed);
-        let masses: Vec<f32> = (0..nodes).map(|node| scene.view().node_mass(node)).collect();
-        let seen_as = SeenAs { masses: &masses, force: recipe.network.force };
-
-        let schedule = Schedule::of(recipe, dt);
-        let Schedule { every, sequences: count, last, .. } = schedule;
-        let long = every as f64 * dt;
-        let mut sequences: Vec<Sequence> =
-            (0..count).map(|number| Sequence::new(number * every / count, nodes)).collect();
-        let mut frame = 0;
-        let mut samples = Samples { vertices: sampled.len(), ..Samples::default() };
-        // Increments are exact; a displacement in float32 is rounded, and a second difference shows that.
-        let mut place = vec![DVec3::ZERO; nodes];
-        let mut loads = spec.loads(&scene)?;
-        for number in 0..=last {
-            // Displacements are those before the step; its forces, of the same moment, are known after it.
-            let moments: Vec<usize> =
-                (0..sequences.len()).filter(|&at| sequences[at].has_moment(number, every)).collect();
-            for &at in &moments {
-                sequences[at].add_shape(&place);
-                sequences[at].add_targets(&sampled, long, &mut samples);
-            }
-            let loads = loads.of_step(state.time(), dt);
-            let keeps = recipe.noise.is_some() && !moments.is_empty() && schedule.is_due(frame, number);
-            let before = keeps.then(|| state.clone());
-            exact_step(spec, &scene, &loads, &mut state, &step)?;
-            for &at in &moments {
-                if !schedule.is_due(frame, number) {
-                    continue;
-                }
-                // Forces are known even after a step that is refused.
-                let forces_of = |moved: &mut VecState| {
-                    let _ = tled::step(&scene, &loads, moved, &step);
-                };
-                let copies = before.iter().zip(&recipe.noise).flat_map(|(before, noise)| {
-                    let moment = sequences[at].moment(before, &free, long, seen_as);
-                    let copy = |_| moment.moved(noise, &sampled, &mut random, forces_of);
-                    (0..noise.copies).map(copy).collect::<Vec<_>>()
-                });
-                let copies = copies.collect();
-                sequences[at].sample(&sampled, long as f32, state.forces(), seen_as, copies);
-                frame += 1;
-            }
-            for (place, increment) in place.iter_mut().zip(state.view().increment.iter()) {
-                *place += Vec3A::from(increment.to_array()).as_dvec3();
-            }
+    let schedule = Schedule::of(recipe, dt);
+    let Schedule { every, sequences: count, last, .. } = schedule;
+    let long = every as f64 * dt;
+    let mut sequences: Vec<Sequence> =
+        (0..count).map(|number| Sequence::new(number * every / count, nodes)).collect();
+    let mut frame = 0;
+    let mut samples = Samples { vertices: sampled.len(), ..Samples::default() };
+    // Increments are exact; a displacement in float32 is rounded, and a second difference shows that.
+    let mut place = vec![DVec3::ZERO; nodes];
+    let mut loads = spec.loads(&scene)?;
+    for number in 0..=last {
+        // Displacements are those before the step; its forces, of the same moment, are known after it.
+        let moments: Vec<usize> =
+            (0..sequences.len()).filter(|&at| sequences[at].has_moment(number, every)).collect();
+        for &at in &moments {
+            sequences[at].add_shape(&place);
+            sequences[at].add_targets(&sampled, long, &mut samples);
         }
-        if recipe.motion.turned {
-            samples.turn_normals(&mut random);
+        let loads = loads.of_step(state.time(), dt);
+        let keeps = recipe.noise.is_some() && !moments.is_empty() && schedule.is_due(frame, number);
+        let before = keeps.then(|| state.clone());
+        exact_step(spec, &scene, &loads, &mut state, &step)?;
+        for &at in &moments {
+            if !schedule.is_due(frame, number) {
+                continue;
+            }
+            // Forces are known even after a step that is refused.
+            let forces_of = |moved: &mut VecState| {
+                let _ = tled::step(&scene, &loads, moved, &step);
+            };
+            let copies = before.iter().zip(&recipe.noise).flat_map(|(before, noise)| {
+                let moment = sequences[at].moment(before, &free, long, seen_as);
+                let copy = |_| moment.moved(noise, &sampled, &mut random, forces_of);
+                (0..noise.copies).map(copy).collect::<Vec<_>>()
+            });
+            let copies = copies.collect();
+            sequences[at].sample(&sampled, long as f32, state.forces(), seen_as, copies);
+            frame += 1;
         }
-        Ok(samples)
+        for (place, increment) in place.iter_mut().zip(state.view().increment.iter()) {
+            *place += Vec3A::from(increment.to_array()).as_dvec3();
+        }
     }
+    if recipe.motion.turned {
+        samples.turn_normals(&mut random);
+    }
+    Ok(samples)
 }
 
 /// Local frames that follow the motion each `D`.

@@ -16,7 +16,7 @@ use supple::tled;
 use crate::networks::{Memory, described, uniform};
 use crate::support::bodies::{corner_torsion, held};
 use crate::support::{
-    Body, EXP, Judged, bits, displaced, largest, largest_distance, rest_of, tissue, widened,
+    Body, EXP, bits, displaced, largest, largest_distance, reference_law, rest_of, tissue, widened,
 };
 use crate::{reference, support};
 
@@ -226,7 +226,7 @@ fn forces_are_those_of_the_reference_in_any_order_of_nodes() {
         let scene = body.scene(tissue(EXP), &held(&body));
         let displacements: Vec<_> = body.points.iter().map(|&x| wave(x)).collect();
         let expected =
-            reference::internal_force(&body.reference(), &EXP.reference(), &widened(&displacements));
+            reference::internal_force(&body.reference(), &reference_law(EXP), &widened(&displacements));
         let mut state = displaced(&scene, &displacements);
         let loads = Loads::new(&scene, [0.0; 3], &[], &[]).unwrap();
         let step = Step::unchecked(1e-6, 0.0).unwrap();

@@ -3,7 +3,7 @@
 
 use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
 use supple::loads::Loads;
-use supple::material::{Material, NeoHookean, NodalStrain, Regions, Tissue};
+use supple::material::{AnyLaw, Material, NeoHookean, NodalStrain, Tissue};
 use supple::scene::{BuildError, FixedScene, SceneFacts, SceneView, patch_rows_for, tiles_for};
 use supple::state::{AsState, FixedState, VecState};
 use supple::step::{CriticalStep, Status, Step};
@@ -12,10 +12,12 @@ use supple::tled;
 use crate::reference::nodal_pressure::Tissues;
 use crate::reference::nodal_strain::forces as exact_forces;
 use crate::support::bodies::{held, small_bar};
-use crate::support::{Body, Judged, NEO, forces, norm, norm_of_sum, rest_of, tissue, widened};
+use crate::support::{
+    Body, NEO, forces, norm, norm_of_sum, reference_law, regions, rest_of, tissue, widened,
+};
 
 /// Three tissues mixed at random, some of whose elements around a node share no face.
-fn three_tissues(body: &Body) -> ([Tissue<NeoHookean>; 3], Vec<u16>) {
+fn three_tissues(body: &Body) -> ([Tissue<AnyLaw>; 3], Vec<u16>) {
     let tissues = [300.0, 500.0, 800.0].map(|c| tissue(NeoHookean { c, d: 20_000.0 }));
     (
         tissues,
@@ -52,7 +54,8 @@ fn any_memory_gives_the_same_bits() {
     let body = small_bar();
     assert_eq!((body.points.len(), body.tets.len()), (96, 270));
     let (tissues, of_element) = three_tissues(&body);
-    let material = NodalStrain(Regions { tissues: &tissues, of_element: &of_element });
+    let values = tissues.map(|tissue| tissue.values());
+    let material = NodalStrain(regions(NEO, &values, &of_element));
     let on_heap = body.scene(material, &held(&body));
     let expected = moved(on_heap.view(), rest_of(&on_heap));
 
@@ -111,7 +114,8 @@ fn too_little_room_tells_how_much_is_enough() {
     };
     let most = bound(&body, 1);
     print("one tissue", rows_needed(&NodalStrain(tissues[0]), &body, most), most);
-    let regions = Regions { tissues: &tissues, of_element: &of_element };
+    let values = tissues.map(|tissue| tissue.values());
+    let regions = regions(NEO, &values, &of_element);
     let most = bound(&body, 3);
     print("three tissues", rows_needed(&NodalStrain(regions), &body, most), most);
     for body in [Body::slivers([0.04, 0.04, 0.04]), Body::lobe(), Body::cylinder()] {
@@ -137,7 +141,7 @@ fn a_node_with_many_neighbours_is_no_obstacle() {
     assert_eq!(scene.patch_row_count(), taken);
     let u: Vec<_> =
         body.points.iter().map(|[x, y, z]| [1e-2 * x * y, 5e-3 * z - 1e-2 * y * y, 1e-3 * x]).collect();
-    let tissues = Tissues { mesh: &body.reference(), laws: &[NEO.reference()], of_element: &[0; 200] };
+    let tissues = Tissues { mesh: &body.reference(), laws: &[reference_law(NEO)], of_element: &[0; 200] };
     let exact = exact_forces(&tissues, &widened(&u));
     let opposite: Vec<_> = exact.iter().map(|force| force.map(|component| -component)).collect();
     let error = norm_of_sum(&forces(&scene, &u), &opposite) / norm(&exact);

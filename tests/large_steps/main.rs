@@ -19,6 +19,7 @@ mod switching;
 mod turning;
 mod wild;
 
+use crate::support::{reference_law, regions};
 use reference::dense::{Matrix, cholesky, congruent, eigenvalues, symmetric_part, zeros};
 use reference::nodal_pressure::Tissues;
 use reference::nodal_strain;
@@ -26,15 +27,14 @@ use reference::{Random, tangent_product};
 use supple::element::ElementMaterial;
 use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::{Loads, NodalForce};
-use supple::material::{Exponential, NeoHookean, NodalStrain, Regions, Tissue};
+use supple::material::{AnyLaw, NeoHookean, NodalStrain, Tissue};
 use supple::scene::{Axes, Support, VecScene};
 use supple::state::{NodeVector, VecState};
 use supple::step::{Status, Step};
 use supple::tled;
 use support::bodies::{corner_torsion, held, small_bar, torsion};
 use support::{
-    Body, EXP, Judged, NEO, bound, displaced, largest, largest_distance, mean_distance, rest_of, tissue,
-    to_f64,
+    Body, EXP, NEO, bound, displaced, largest, largest_distance, mean_distance, rest_of, tissue, to_f64,
 };
 
 type VecLargeStep = LargeStep<'static, Vec<NodeVector>>;
@@ -188,7 +188,7 @@ fn stiffness(body: &Body, laws: &[NeoHookean], of_element: &[u16], free: &[(usiz
         let mut unit = rest.clone();
         unit[node][axis] = 1.0;
         for (law, part) in laws.iter().zip(&parts) {
-            let product = tangent_product(part, &law.reference(), &rest, &unit);
+            let product = tangent_product(part, &reference_law(*law), &rest, &unit);
             for (row, &(node, axis)) in free.iter().enumerate() {
                 k[row][column] += product[node][axis];
             }
@@ -217,7 +217,8 @@ fn the_operator_is_symmetric_positive_and_bounded() {
     let tissues = laws.map(tissue);
     let mut random = Random(5);
     let of_element: Vec<u16> = body.tets.iter().map(|_| (1.5 + 1.5 * random.next()) as u16).collect();
-    let material = Regions { tissues: &tissues, of_element: &of_element };
+    let values = tissues.map(|tissue| tissue.values());
+    let material = regions(laws[0], &values, &of_element);
     let scene = body.scene(material, &mixed_supports(&body));
     let k = stiffness(&body, &laws, &of_element, &free_axes(&scene));
     for kind in KINDS {
@@ -316,7 +317,7 @@ fn tangent_with_nodal_strain(
 ) -> (Matrix, Vec<reference::Vec3>) {
     /// m
     const DELTA: f64 = 1e-7;
-    let (mesh, laws) = (body.reference(), [law.reference()]);
+    let (mesh, laws) = (body.reference(), [reference_law(law)]);
     let of_element = vec![0; mesh.tets.len()];
     let tissues = Tissues { mesh: &mesh, laws: &laws, of_element: &of_element };
     let mut k = zeros(free.len());
@@ -399,7 +400,7 @@ fn the_operator_is_positive_and_bounded_with_nodal_strain() {
 
 /// A bar let go from a slight bend: kinetic and strain energy over those at the start, at every step.
 fn vibration<M: ElementMaterial>(
-    material: impl Fn(Tissue<NeoHookean>) -> M,
+    material: impl Fn(Tissue<AnyLaw>) -> M,
     kind: Kind,
     damping: f32,
 ) -> Vec<f64> {
@@ -429,7 +430,7 @@ fn free_vibration_keeps_its_energy_bounded_and_damping_takes_it() {
     vibrates("nodal strain", NodalStrain);
 }
 
-fn vibrates<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<NeoHookean>) -> M) {
+fn vibrates<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>) -> M) {
     for kind in KINDS {
         let free = vibration(&material, kind, 0.0);
         let most = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
@@ -462,7 +463,7 @@ fn sudden_torsion_does_not_diverge_and_is_followed() {
     is_followed("nodal strain", NodalStrain);
 }
 
-fn is_followed<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<Exponential>) -> M) {
+fn is_followed<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>) -> M) {
     let body = Body::bar([0.05, 0.05, 0.1], [4, 4, 8]);
     let scene = body.scene(material(tissue(EXP)), &held(&body));
     let forces = corner_torsion(&body, 0.02, 0.0);

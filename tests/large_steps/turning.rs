@@ -3,7 +3,7 @@
 
 use supple::element::ElementMaterial;
 use supple::loads::Loads;
-use supple::material::{NeoHookean, NodalStrain, Tissue};
+use supple::material::{AnyLaw, NeoHookean, NodalStrain, Tissue};
 use supple::scene::{Axes, Support, VecScene};
 use supple::state::VecState;
 use supple::step::{Status, Step};
@@ -86,7 +86,7 @@ fn a_free_body_that_moves_rigidly_keeps_its_momentum_in_a_large_step() {
     moves_rigidly("nodal strain", NodalStrain);
 }
 
-fn moves_rigidly<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<NeoHookean>) -> M) {
+fn moves_rigidly<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>) -> M) {
     let mut wrong = Vec::new();
     for (name, body) in [
         ("irregular bar", Body::irregular([0.02, 0.02, 0.06], [4, 4, 9])),
@@ -124,7 +124,7 @@ fn a_free_bar_keeps_its_momentum_for_half_a_second() {
     flies("nodal strain", NodalStrain, [14.0, 35.0]);
 }
 
-fn flies<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<NeoHookean>) -> M, multiples: [f32; 2]) {
+fn flies<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>) -> M, multiples: [f32; 2]) {
     let body = Body::bar([0.02, 0.02, 0.1], [4, 4, 20]);
     let scene = body.scene(material(tissue(SOFT)), &[]);
     for (kind, multiple) in
@@ -157,7 +157,7 @@ fn free_fall_is_a_parabola_from_the_first_step_on() {
     falls("nodal strain", NodalStrain);
 }
 
-fn falls<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<NeoHookean>) -> M) {
+fn falls<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>) -> M) {
     let body = Body::lobe();
     let scene = body.scene(material(tissue(SOFT)), &[]);
     let loads = Loads::new(&scene, [0.0, 0.0, -9.81], &[], &[]).unwrap();
@@ -213,7 +213,7 @@ impl Swing {
 
     fn errors<M: ElementMaterial>(
         &self,
-        (element, material): (&str, impl Fn(Tissue<NeoHookean>) -> M),
+        (element, material): (&str, impl Fn(Tissue<AnyLaw>) -> M),
         multiples: &[f32],
         ratio: f32,
     ) -> Vec<(Kind, f32, f64, u32)> {
@@ -268,7 +268,7 @@ fn follows(swing: &Swing) {
 fn follows_with<M: ElementMaterial>(
     swing: &Swing,
     element: &str,
-    material: impl Fn(Tissue<NeoHookean>) -> M,
+    material: impl Fn(Tissue<AnyLaw>) -> M,
     factor: f64,
 ) {
     let mut wrong = Vec::new();

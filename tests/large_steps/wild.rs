@@ -4,13 +4,13 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use supple::element::ElementMaterial;
 use supple::loads::{Loads, Motion, NodalForce};
-use supple::material::{NodalStrain, Tissue};
+use supple::material::{AnyLaw, Law, NodalStrain, Tissue};
 use supple::scene::{Axes, Support};
 use supple::step::Step;
 
 use crate::reference::Random;
 use crate::support::bodies::held;
-use crate::support::{Body, EXP, Judged, NEO, largest, rest_of, tissue, to_f64};
+use crate::support::{Body, EXP, NEO, largest, rest_of, tissue, to_f64};
 use crate::{GAIN, KINDS, Kind, limit};
 
 /// A bar of 2 x 2 x 4 cm whose layers grow along all axes and whose nodes are shaken as far as every element stays
@@ -113,10 +113,10 @@ fn drawn(random: &mut Random, body: &Body) -> Drawn {
 }
 
 /// Steps at a multiple of the limit; the largest displacement and the largest share of kinetic energy in its energy balance.
-fn survive<L: Judged, M: ElementMaterial>(
+fn survive<M: ElementMaterial>(
     body: &Body,
     drawn: &Drawn,
-    (law, material): (L, impl Fn(Tissue<L>) -> M),
+    (law, material): (AnyLaw, impl Fn(Tissue<AnyLaw>) -> M),
     kind: Kind,
     multiple: f32,
 ) -> Result<(f64, f64), String> {

@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde_json::{Value, json};
-use supple::material::AnyLaw;
+use supple::material::{AnyLaw, Law};
 use supple::mlp::{ExchangeError, ForceInput, Network, from_safetensors, to_safetensors, write};
 
 use crate::networks::{Memory, described, uniform};

@@ -3,7 +3,7 @@
 
 use supple::learned::{LearnedError, LearnedStep, vectors_for};
 use supple::loads::{Loads, NodalForce};
-use supple::material::{Exponential, Tissue};
+use supple::material::{AnyLaw, Tissue};
 use supple::mesh::{Mesh, Winding};
 use supple::mlp::{Description, ForceInput, Network, Range, write};
 use supple::scene::{Support, VecScene};
@@ -12,7 +12,7 @@ use supple::step::{Cause, Status, Step};
 
 use crate::networks::{Memory, described, predicted};
 use crate::support::bodies::{held, small_bar, torsion};
-use crate::support::{Body, EXP, Judged, largest_distance, rest_of, tissue, to_f64};
+use crate::support::{Body, EXP, largest_distance, reference_law, rest_of, tissue, to_f64};
 use crate::{reference, support};
 
 type Vec3 = [f64; 3];
@@ -110,7 +110,7 @@ fn network(seed: u32) -> Description<'static> {
     description
 }
 
-type Scene = VecScene<Tissue<Exponential>>;
+type Scene = VecScene<Tissue<AnyLaw>>;
 
 /// A learned step without fallback.
 fn learned_step<'w>(network: Network<'w>, nodes: usize) -> LearnedStep<'w, Vec<NodeVector>> {
@@ -182,7 +182,7 @@ fn ten_steps_are_those_of_the_paper_in_float64() {
         }
         let mut simple = Reference {
             mesh: body.reference(),
-            law: EXP.reference(),
+            law: reference_law(EXP),
             frames,
             u,
             du,

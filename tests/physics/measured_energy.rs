@@ -2,15 +2,16 @@
 
 use supple::element::ElementMaterial;
 use supple::loads::{Loads, Motion, NodalForce};
+use supple::material::Law;
 use supple::scene::{Axes, Support, VecScene};
 use supple::state::VecState;
 use supple::step::{Status, Step};
 use supple::tled;
 
 use crate::reference::Random;
+use crate::support;
 use crate::support::bodies::{far_end, held, small_bar, torsion};
-use crate::support::{Judged, NEO, bound, rest_of, tissue};
-use crate::{each_law, support};
+use crate::support::{NEO, bound, rest_of, tissue};
 
 /// A body with an end that can be moved, and stable steps.
 fn body_with_moved_end<M: ElementMaterial>(material: M) -> (VecScene<M>, Vec<u32>, Step) {
@@ -31,7 +32,6 @@ fn shifted(nodes: &[u32], metre: [f32; 3], ramp: f32) -> Vec<Motion> {
 fn energies(scene: &VecScene<impl ElementMaterial>, state: &mut VecState) -> (f64, f64) {
     let strain = tled::strain_energy(scene, state).expect("room");
     let balance = state.energy_balance();
-    // The literal laws can contract: that is their energy at the start.
     (balance.start + strain + balance.kinetic, balance.most())
 }
 
@@ -39,7 +39,7 @@ fn energies(scene: &VecScene<impl ElementMaterial>, state: &mut VecState) -> (f6
 #[test]
 fn a_trembling_hand_does_not_wear_the_balance_out() {
     let seconds = if cfg!(feature = "slow-tests") { 20.0 } else { 4.0 };
-    each_law!(law => {
+    for law in support::laws() {
         let (scene, end, step) = body_with_moved_end(tissue(law));
         let (mut state, mut random) = (rest_of(&scene), Random(3));
         let (mut early, mut late) = (f64::NAN, 0.0);
@@ -50,7 +50,11 @@ fn a_trembling_hand_does_not_wear_the_balance_out() {
             let motions = shifted(&end, metre, 0.0);
             let loads = Loads::new(&scene, [0.0; 3], &[], &motions).unwrap();
             while state.time() < f64::from(frame) / 60.0 {
-                assert!(tled::step(&scene, &loads, &mut state, &step).is_taken(), "{:?}", state.energy_balance());
+                assert!(
+                    tled::step(&scene, &loads, &mut state, &step).is_taken(),
+                    "{:?}",
+                    state.energy_balance()
+                );
             }
             let (has, most) = energies(&scene, &mut state);
             late = most / has;
@@ -63,13 +67,13 @@ fn a_trembling_hand_does_not_wear_the_balance_out() {
             law.name()
         );
         assert!(late < 5.0 * early);
-    });
+    }
 }
 
 /// An excess of the past is forgotten: the end is moved to and fro by 2 mm, then the body comes to rest.
 #[test]
 fn a_violent_moment_leaves_no_slack() {
-    each_law!(law => {
+    for law in support::laws() {
         let (scene, end, step) = body_with_moved_end(tissue(law));
         let mut state = rest_of(&scene);
         for (metre, seconds) in [(2e-3, 0.02), (-2e-3, 0.04), (0.0, 0.06), (1e-4, 3.0)] {
@@ -83,7 +87,7 @@ fn a_violent_moment_leaves_no_slack() {
         let (has, most) = energies(&scene, &mut state);
         println!("{}: {has:.2e} J, a step diverges at {most:.2e} J, peak {peak:.2e} J", law.name());
         assert!(most < 100.0 * has);
-    });
+    }
 }
 
 /// What a measurement finds is never less than the body's energy, nor half of it: a body that vibrates for long without damping keeps
@@ -91,7 +95,7 @@ fn a_violent_moment_leaves_no_slack() {
 #[test]
 fn a_vibrating_body_keeps_its_balance() {
     let body = small_bar();
-    each_law!(law => {
+    for law in support::laws() {
         let scene = body.scene(tissue(law), &held(&body));
         let step = Step::unchecked(0.3 * bound(&scene, &rest_of(&scene)).seconds, 0.0).unwrap();
         let mut state = rest_of(&scene);
@@ -104,7 +108,7 @@ fn a_vibrating_body_keeps_its_balance() {
         let balance = *state.energy_balance();
         println!("{}: {balance:?}", law.name());
         assert_eq!(balance.corrected, 0.0);
-    });
+    }
 }
 
 /// The work of a load that is no finite number is refused, not entered.

@@ -12,7 +12,7 @@ use crate::reference::nodal_pressure::Tissues;
 use crate::reference::tensor::{product, rotation};
 use crate::reference::{Law, Mat3, Random};
 use crate::support::bodies::{held, small_bar};
-use crate::support::{Body, Judged, bits, displaced, fixed, forces, norm, rest_of, widened};
+use crate::support::{Body, bits, displaced, fixed, forces, norm, reference_law, rest_of, widened};
 use crate::{reference, support};
 
 /// Of nodes in float64: displacements (m) or forces (N).
@@ -48,7 +48,7 @@ impl Definition {
     pub(crate) fn check_gradient(&self) {
         let body = Body::bar([0.02, 0.03, 0.04], [1, 2, 2]);
         let mesh = body.reference();
-        let laws = [support::EXP.reference(), support::NEO.reference()];
+        let laws = [reference_law(support::EXP), reference_law(support::NEO)];
         let of_element: Vec<usize> = (0..mesh.tets.len()).map(|element| element / 5 % 2).collect();
         let tissues = Tissues { mesh: &mesh, laws: &laws, of_element: &of_element };
         let u = widened(&noise(&body, 1e-3, 5));

@@ -3,16 +3,16 @@
 //!
 //! With `W'` the derivative at the deformation's `x`:
 //!
-//! | | isochoric | literal |
-//! |---|---|---|
-//! | stretch `F = diag(s, 1, 1)` | `x = (s^2 + 2) s^(-2/3) - 3` | `x = s^2 - 1` |
-//! | `P11 - 2 d (s - 1)` | `4/3 W' s^(-2/3) (s - 1/s)` | `2 W' s` |
-//! | `P22 - 2 d (s - 1) s` | `2/3 W' s^(-2/3) (1 - s^2)` | `2 W'` |
-//! | shear `F = I + q e1 (x) e2` | `x = q^2` | `x = q^2` |
-//! | `P12`, `P21` | `2 W' q`, `2 W' q (1 + q^2/3)` | `2 W' q`, `0` |
-//! | `P11 = P22 = P33` | `-2/3 W' q^2` | `2 W'` |
-//! | dilation `F = s I` | `x = 0` | `x = 3 (s^2 - 1)` |
-//! | `P11 - 2 d (s^3 - 1) s^2` | `0` | `2 W' s` |
+//! | | |
+//! |---|---|
+//! | stretch `F = diag(s, 1, 1)` | `x = (s^2 + 2) s^(-2/3) - 3` |
+//! | `P11 - 2 d (s - 1)` | `4/3 W' s^(-2/3) (s - 1/s)` |
+//! | `P22 - 2 d (s - 1) s` | `2/3 W' s^(-2/3) (1 - s^2)` |
+//! | shear `F = I + q e1 (x) e2` | `x = q^2` |
+//! | `P12`, `P21` | `2 W' q`, `2 W' q (1 + q^2/3)` |
+//! | `P11 = P22 = P33` | `-2/3 W' q^2` |
+//! | dilation `F = s I` | `x = 0` |
+//! | `P11 - 2 d (s^3 - 1) s^2` | `0` |
 
 use super::law::Law;
 use super::tensor::Mat3;
@@ -20,8 +20,8 @@ use super::tensor::Mat3;
 /// `W'(x)`.
 fn slope(law: &Law, x: f64) -> f64 {
     match *law {
-        Law::NeoHookean { c, .. } | Law::NeoHookeanLiteral { c, .. } => c,
-        Law::Exponential { a, b, .. } | Law::ExponentialLiteral { a, b, .. } => a / 2.0 * (b * x).exp(),
+        Law::NeoHookean { c, .. } => c,
+        Law::Exponential { a, b, .. } => a / 2.0 * (b * x).exp(),
         Law::Polynomial { c, e, .. } => c + 2.0 * e * x,
     }
 }
@@ -33,14 +33,9 @@ pub fn uniaxial_stretch(s: f64) -> Mat3 {
 
 /// `P` of [`uniaxial_stretch`].
 pub fn uniaxial_stretch_stress(law: &Law, s: f64) -> Mat3 {
-    let (along, across) = if law.is_isochoric() {
-        let g = 1.0 / (s * s).cbrt();
-        let w = slope(law, (s * s + 2.0) * g - 3.0);
-        (4.0 / 3.0 * w * g * (s - 1.0 / s), 2.0 / 3.0 * w * g * (1.0 - s * s))
-    } else {
-        let w = slope(law, s * s - 1.0);
-        (2.0 * w * s, 2.0 * w)
-    };
+    let g = 1.0 / (s * s).cbrt();
+    let w = slope(law, (s * s + 2.0) * g - 3.0);
+    let (along, across) = (4.0 / 3.0 * w * g * (s - 1.0 / s), 2.0 / 3.0 * w * g * (1.0 - s * s));
     let volume = 2.0 * law.d() * (s - 1.0);
     let (p11, p22) = (along + volume, across + volume * s);
     [[p11, 0.0, 0.0], [0.0, p22, 0.0], [0.0, 0.0, p22]]
@@ -54,11 +49,7 @@ pub fn simple_shear(q: f64) -> Mat3 {
 /// `P` of [`simple_shear`].
 pub fn simple_shear_stress(law: &Law, q: f64) -> Mat3 {
     let w = slope(law, q * q);
-    let (normal, p21) = if law.is_isochoric() {
-        (-2.0 / 3.0 * w * q * q, 2.0 * w * q * (1.0 + q * q / 3.0))
-    } else {
-        (2.0 * w, 0.0)
-    };
+    let (normal, p21) = (-2.0 / 3.0 * w * q * q, 2.0 * w * q * (1.0 + q * q / 3.0));
     [[normal, 2.0 * w * q, 0.0], [p21, normal, 0.0], [0.0, 0.0, normal]]
 }
 
@@ -69,7 +60,5 @@ pub fn dilation(s: f64) -> Mat3 {
 
 /// `P` of [`dilation`].
 pub fn dilation_stress(law: &Law, s: f64) -> Mat3 {
-    let shape = if law.is_isochoric() { 0.0 } else { 2.0 * slope(law, 3.0 * (s * s - 1.0)) * s };
-    let p = shape + 2.0 * law.d() * (s.powi(3) - 1.0) * s * s;
-    dilation(p)
+    dilation(2.0 * law.d() * (s.powi(3) - 1.0) * s * s)
 }

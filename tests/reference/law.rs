@@ -1,11 +1,7 @@
 //! Hyperelastic laws: stored energy per reference volume, first Piola-Kirchhoff stress and tangent.
 //!
-//! `Psi(F) = W(x) + d (J - 1)^2` in Pa, with `J = det F`, `I1 = F : F` and
-//!
-//! - isochoric form: `x = J^(-2/3) I1 - 3`, stress-free at rest;
-//! - literal form, as the paper prints it: `x = I1 - 3`, with the residual stress `2 W'(0)` at rest
-//!   (the misprinted volume term `d (J - 1)` is read as its square);
-//! - neo-Hookean `W = c x`; exponential `W = a / (2 b) (exp(b x) - 1)`; reduced polynomial `W = c x + e x^2`.
+//! `Psi(F) = W(x) + d (J - 1)^2` in Pa, with `J = det F`, `I1 = F : F` and `x = J^(-2/3) I1 - 3`:
+//! neo-Hookean `W = c x`; exponential `W = a / (2 b) (exp(b x) - 1)`; reduced polynomial `W = c x + e x^2`.
 //!
 //! Two conventions of the fast kernel are reproduced, both C1 (stress continuous, tangent with a jump):
 //! [`J_MIN`] and [`EXPONENT_CAP`].
@@ -28,36 +24,25 @@ pub enum Law {
     Exponential { a: f64, b: f64, d: f64 },
     /// `c (I1bar - 3) + e (I1bar - 3)^2 + d (J - 1)^2`.
     Polynomial { c: f64, e: f64, d: f64 },
-    /// `c (I1 - 3) + d (J - 1)^2`.
-    NeoHookeanLiteral { c: f64, d: f64 },
-    /// `a / (2 b) (exp(b (I1 - 3)) - 1) + d (J - 1)^2`.
-    ExponentialLiteral { a: f64, b: f64, d: f64 },
 }
 
 impl Law {
-    /// The paper's exponential law, its constants read as kPa, in isochoric form.
+    /// The paper's exponential law, its constants read as kPa.
     pub const PAPER: Law = Law::Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
 
     /// Volume modulus `d` of `d (J - 1)^2`.
     pub fn d(&self) -> f64 {
         match *self {
-            Law::NeoHookean { d, .. } | Law::NeoHookeanLiteral { d, .. } => d,
-            Law::Exponential { d, .. } | Law::ExponentialLiteral { d, .. } => d,
-            Law::Polynomial { d, .. } => d,
+            Law::NeoHookean { d, .. } | Law::Exponential { d, .. } | Law::Polynomial { d, .. } => d,
         }
-    }
-
-    /// Whether `x` is made of `I1bar` (true) or of `I1` (false).
-    pub fn is_isochoric(&self) -> bool {
-        matches!(self, Law::NeoHookean { .. } | Law::Exponential { .. } | Law::Polynomial { .. })
     }
 
     /// `W`, `W'` and `W''` at `x`.
     pub fn shape_response(&self, x: f64) -> [f64; 3] {
         match *self {
-            Law::NeoHookean { c, .. } | Law::NeoHookeanLiteral { c, .. } => [c * x, c, 0.0],
+            Law::NeoHookean { c, .. } => [c * x, c, 0.0],
             Law::Polynomial { c, e, .. } => [(c + e * x) * x, c + 2.0 * e * x, 2.0 * e],
-            Law::Exponential { a, b, .. } | Law::ExponentialLiteral { a, b, .. } => {
+            Law::Exponential { a, b, .. } => {
                 if b * x <= EXPONENT_CAP {
                     let e = (b * x).exp();
                     [a / (2.0 * b) * (e - 1.0), a / 2.0 * e, a * b / 2.0 * e]
@@ -72,9 +57,6 @@ impl Law {
 
     /// `g`, `g'` and `g''` at `J`: the factor of `I1` in `x`.
     pub fn volume_factor(&self, j: f64) -> [f64; 3] {
-        if !self.is_isochoric() {
-            return [1.0, 0.0, 0.0];
-        }
         let at = j.max(J_MIN);
         let g = at.powf(-2.0 / 3.0);
         let dg = -2.0 / 3.0 * g / at;

@@ -1,4 +1,4 @@
-//! What the tests of the physics share: bodies to simulate, the four laws with their float64 twins, and short
+//! What the tests of the physics share: bodies to simulate, the laws with their float64 twins, and short
 //! ways to build a scene, put it into a state and read its forces.
 //!
 //! Several test crates include it and none uses all of it, hence the `allow`.
@@ -8,9 +8,9 @@ pub mod bodies;
 
 pub use bodies::Body;
 
-use supple::element::{ElementLaw, ElementMaterial};
+use supple::element::ElementMaterial;
 use supple::loads::Loads;
-use supple::material::{Exponential, Literal, NeoHookean, Polynomial, Tissue};
+use supple::material::{AnyLaw, Exponential, NeoHookean, Polynomial, Regions, Tissue, Values};
 use supple::scene::{Support, VecScene};
 use supple::state::{NodeVector, VecState};
 use supple::step::{CriticalStep, Status, Step};
@@ -21,88 +21,38 @@ use crate::reference;
 /// kg/m^3.
 pub const DENSITY: f32 = 1000.0;
 /// Neo-Hookean tissue of shear modulus 1 kPa and bulk modulus 50 kPa.
-pub const NEO: NeoHookean = NeoHookean { c: 500.0, d: 25_000.0 };
+pub const NEO: AnyLaw = AnyLaw::NeoHookean(NeoHookean { c: 500.0, d: 25_000.0 });
 /// The paper's exponential law, its constants read as kPa.
-pub const EXP: Exponential = Exponential { a: 59.0, b: 8.023, d: 60_000.0 };
+pub const EXP: AnyLaw = AnyLaw::Exponential(Exponential { a: 59.0, b: 8.023, d: 60_000.0 });
 
 /// The neo-Hookean tissue, four times as stiff where `I1bar - 3` is one.
-pub const POLYNOMIAL: Polynomial = Polynomial { c: 500.0, e: 750.0, d: 25_000.0 };
+pub const POLYNOMIAL: AnyLaw = AnyLaw::Polynomial(Polynomial { c: 500.0, e: 750.0, d: 25_000.0 });
 
-/// Runs statements once for each law, the paper's two in both forms.
-#[macro_export]
-macro_rules! each_law {
-    ($law:ident => $body:block) => {{
-        {
-            let $law = $crate::support::NEO;
-            $body
-        }
-        {
-            let $law = supple::material::Literal($crate::support::NEO);
-            $body
-        }
-        {
-            let $law = $crate::support::EXP;
-            $body
-        }
-        {
-            let $law = supple::material::Literal($crate::support::EXP);
-            $body
-        }
-        {
-            let $law = $crate::support::POLYNOMIAL;
-            $body
-        }
-    }};
+/// Each law once.
+pub fn laws() -> [AnyLaw; 3] {
+    [NEO, EXP, POLYNOMIAL]
 }
 
-/// A law of the kernel that the reference knows as well.
-pub trait Judged: ElementLaw + 'static {
-    /// The same law in float64.
-    fn reference(&self) -> reference::Law;
-    /// For printing.
-    fn name(&self) -> &'static str {
-        match self.reference() {
-            reference::Law::NeoHookean { .. } => "neo-Hookean",
-            reference::Law::NeoHookeanLiteral { .. } => "neo-Hookean, literal",
-            reference::Law::Exponential { .. } => "exponential",
-            reference::Law::ExponentialLiteral { .. } => "exponential, literal",
-            reference::Law::Polynomial { .. } => "polynomial",
+/// Several tissues of one law in linear tetrahedra.
+pub fn regions<'a>(
+    law: impl Into<AnyLaw>,
+    tissues: &'a [Tissue<Values>],
+    of_element: &'a [u16],
+) -> Regions<'a, AnyLaw> {
+    Regions { law: law.into(), tissues, of_element }
+}
+
+/// The same law in float64.
+pub fn reference_law(law: impl Into<AnyLaw>) -> reference::Law {
+    match law.into() {
+        AnyLaw::NeoHookean(NeoHookean { c, d }) => reference::Law::NeoHookean { c: c.into(), d: d.into() },
+        AnyLaw::Exponential(Exponential { a, b, d }) => {
+            reference::Law::Exponential { a: a.into(), b: b.into(), d: d.into() }
         }
-    }
-}
-
-impl Judged for NeoHookean {
-    fn reference(&self) -> reference::Law {
-        let (c, d) = (f64::from(self.c), f64::from(self.d));
-        reference::Law::NeoHookean { c, d }
-    }
-}
-
-impl Judged for Literal<NeoHookean> {
-    fn reference(&self) -> reference::Law {
-        let (c, d) = (f64::from(self.0.c), f64::from(self.0.d));
-        reference::Law::NeoHookeanLiteral { c, d }
-    }
-}
-
-impl Judged for Exponential {
-    fn reference(&self) -> reference::Law {
-        let [a, b, d] = [self.a, self.b, self.d].map(f64::from);
-        reference::Law::Exponential { a, b, d }
-    }
-}
-
-impl Judged for Literal<Exponential> {
-    fn reference(&self) -> reference::Law {
-        let [a, b, d] = [self.0.a, self.0.b, self.0.d].map(f64::from);
-        reference::Law::ExponentialLiteral { a, b, d }
-    }
-}
-
-impl Judged for Polynomial {
-    fn reference(&self) -> reference::Law {
-        let [c, e, d] = [self.c, self.e, self.d].map(f64::from);
-        reference::Law::Polynomial { c, e, d }
+        AnyLaw::Polynomial(Polynomial { c, e, d }) => {
+            reference::Law::Polynomial { c: c.into(), e: e.into(), d: d.into() }
+        }
+        law => panic!("the reference does not know {law}"),
     }
 }
 
@@ -112,8 +62,8 @@ pub fn rest_of<M>(scene: &VecScene<M>) -> VecState {
 }
 
 /// One tissue of [`DENSITY`].
-pub fn tissue<L>(law: L) -> Tissue<L> {
-    Tissue { law, density: DENSITY }
+pub fn tissue(law: impl Into<AnyLaw>) -> Tissue<AnyLaw> {
+    Tissue { law: law.into(), density: DENSITY }
 }
 
 /// Supports that fix these nodes.

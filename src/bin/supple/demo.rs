@@ -102,7 +102,7 @@ fn run(setup: Setup, name: &'static str, out: Option<Out<'_>>) -> Result<(Run, O
         progress: progress_bar(&setup, &format!("{name} steps  ")),
         watch: &mut |state| shapes.push(shape(state)),
     };
-    let Simulated { folder, outcome, .. } = setup.with_material(simulation)?;
+    let Simulated { folder, outcome, .. } = simulation.run()?;
     // What learned steps refuse is part of the comparison.
     let refused = outcome.divergence.filter(|_| setup.learned.is_some());
     let done = refused.map_or(Ok((outcome, shapes)), |refused| Err(refused.to_string()));

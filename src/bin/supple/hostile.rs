@@ -5,7 +5,6 @@
 mod runs;
 
 use runs::{Changes, Run, measured};
-use supple::element::{ElementMaterial, MaterialWork};
 
 use crate::scene::file::SceneFile;
 use crate::scene::setup::Setup;
@@ -78,20 +77,13 @@ const WORDS: &[&[u8]] = &[
 
 /// Builds the scene, and asks for what acts on it.
 fn build(setup: &Setup) -> bool {
-    struct Built<'a>(&'a Setup);
-    impl MaterialWork for Built<'_> {
-        type Output = bool;
-        fn run<M: ElementMaterial>(self, material: M) -> bool {
-            match self.0.build(material) {
-                Ok((scene, _)) => self.0.loads(&scene).is_ok(),
-                Err(problem) => {
-                    assert!(problem.to_string().len() > 10, "{problem}");
-                    false
-                }
-            }
+    match setup.build() {
+        Ok((scene, _)) => setup.loads(&scene).is_ok(),
+        Err(problem) => {
+            assert!(problem.to_string().len() > 10, "{problem}");
+            false
         }
     }
-    setup.with_material(Built(setup))
 }
 
 #[test]

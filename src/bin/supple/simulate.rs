@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use supple::element::{ElementMaterial, MaterialWork};
 use supple::state::VecState;
 
 use crate::problem::{End, Problem};
@@ -26,7 +25,7 @@ pub(crate) fn simulate(path: &Path, out: &Path, force: bool, unchecked: bool) ->
         progress: progress_bar(&setup, ""),
         watch: &mut |_| {},
     };
-    let Simulated { folder, state, outcome, conclusion } = setup.with_material(simulation)?;
+    let Simulated { folder, state, outcome, conclusion } = simulation.run()?;
     if let Some(folder) = folder {
         let part = simulation::part(&setup, &state, &outcome, &conclusion);
         let title = format!("supple: {}", path.display());
@@ -74,12 +73,10 @@ pub(crate) struct Simulated {
     pub(crate) conclusion: Conclusion,
 }
 
-impl MaterialWork for Simulation<'_> {
-    type Output = Result<Simulated, Problem>;
-
-    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
+impl Simulation<'_> {
+    pub(crate) fn run(self) -> Result<Simulated, Problem> {
         let Self { setup, out, unchecked, progress, watch } = self;
-        let (scene, mut state) = setup.build(material)?;
+        let (scene, mut state) = setup.build()?;
         let scene = scene.view();
         // All that can be refused in the scene is refused before there is a folder.
         let start = Start::new(setup, scene, &mut state, unchecked)?;

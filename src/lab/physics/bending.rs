@@ -10,7 +10,6 @@ use super::mesh::{BodyMesh, same};
 use super::rest::mean_displacement;
 use super::steps::TO_REST;
 use super::{LabError, Row};
-use crate::element::ElementMaterial;
 use crate::loads::{Loads, NodalForce};
 use crate::material::Element;
 use crate::scene::Axes;
@@ -83,7 +82,7 @@ impl SceneWork for Run<'_> {
     /// Deflection, m.
     type Output = f64;
 
-    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(f64, Cost), LabError> {
+    fn run(self, setup: &Setup<'_>) -> Result<(f64, Cost), LabError> {
         let loads = Loads::new(setup.scene, [0.0; 3], self.forces, &[])?;
         let (state, cost) =
             setup.at_rest(&loads, self.omega, |state| mean_displacement(state, self.tip, 2))?;

@@ -9,9 +9,8 @@ use std::vec::Vec;
 use super::Row;
 use super::mesh::BodyMesh;
 use super::steps::Steps;
-use crate::element::{ElementMaterial, MaterialWork, with_element};
 use crate::lab::LabError;
-use crate::material::{Element, NeoHookean, Tissue};
+use crate::material::{Element, NeoHookean, VecMaterial};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::{Axes, BuildError, Support, VecScene};
 
@@ -50,10 +49,10 @@ pub(super) struct Body {
 }
 
 /// A body as a scene, and how it moves.
-pub(super) struct Setup<'a, M: ElementMaterial> {
+pub(super) struct Setup<'a> {
     /// The case, for errors.
     pub(super) case: &'static str,
-    pub(super) scene: &'a VecScene<M>,
+    pub(super) scene: &'a VecScene<VecMaterial>,
     /// m.
     pub(super) points: &'a [[f32; 3]],
     pub(super) steps: Steps,
@@ -62,7 +61,7 @@ pub(super) struct Setup<'a, M: ElementMaterial> {
 /// What is done with a scene of either element.
 pub(super) trait SceneWork {
     type Output;
-    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(Self::Output, Cost), LabError>;
+    fn run(self, setup: &Setup<'_>) -> Result<(Self::Output, Cost), LabError>;
 }
 
 /// How long was simulated (s), and how long that took.
@@ -86,8 +85,7 @@ impl Body {
         steps: Steps,
         work: W,
     ) -> (Option<W::Output>, Row) {
-        let tissue = Tissue { law: self.elastic.law(), density: self.density };
-        let found = with_element(element, tissue, OfBody { body: self, case, steps, work });
+        let found = self.run(case, element, steps, work);
         let row = Row {
             case,
             mesh: self.mesh.family,
@@ -114,27 +112,21 @@ impl Body {
             Err(error) => (None, Row { note: error.to_string(), ..row }),
         }
     }
-}
-
-/// Work with the scene of a body.
-struct OfBody<'a, W> {
-    body: &'a Body,
-    case: &'static str,
-    steps: Steps,
-    work: W,
-}
-
-impl<W: SceneWork> MaterialWork for OfBody<'_, W> {
-    type Output = Result<(W::Output, Cost), LabError>;
-
-    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
-        let Self { body: Body { mesh: BodyMesh { points, tets, .. }, supports, masses, .. }, .. } = self;
+    fn run<W: SceneWork>(
+        &self,
+        case: &'static str,
+        element: Element,
+        steps: Steps,
+        work: W,
+    ) -> Result<(W::Output, Cost), LabError> {
+        let BodyMesh { points, tets, .. } = &self.mesh;
         let mesh = Mesh::new(points, tets, Winding::Checked).map_err(BuildError::Mesh)?;
-        let mut scene = VecScene::build(material, &mesh, supports)?;
-        for &(node, kilogram) in masses {
+        let material = VecMaterial::one(element, self.elastic.law(), self.density);
+        let mut scene = VecScene::build(material, &mesh, &self.supports)?;
+        for &(node, kilogram) in &self.masses {
             scene.add_mass(node as usize, kilogram);
         }
-        self.work.run(&Setup { case: self.case, scene: &scene, points, steps: self.steps })
+        work.run(&Setup { case, scene: &scene, points, steps })
     }
 }
 
@@ -149,7 +141,7 @@ mod tests {
     impl SceneWork for Fails {
         type Output = f64;
 
-        fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(f64, Cost), LabError> {
+        fn run(self, setup: &Setup<'_>) -> Result<(f64, Cost), LabError> {
             Err(LabError::NotAtRest { case: setup.case, change: 0.01, kinetic: 1e-3 })
         }
     }

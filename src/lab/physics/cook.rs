@@ -18,7 +18,6 @@ use super::mesh::{BodyMesh, same};
 use super::rest::mean_displacement;
 use super::steps::{Steps, TO_REST};
 use super::{LabError, Row, pressure, report};
-use crate::element::ElementMaterial;
 use crate::loads::{Loads, NodalForce};
 use crate::material::Element;
 use crate::scene::Axes;
@@ -120,7 +119,7 @@ impl SceneWork for Run<'_> {
     /// Rises of the corner and of the side, m, and oscillation of the pressure.
     type Output = ([f64; 2], (f64, Option<f64>));
 
-    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(Self::Output, Cost), LabError> {
+    fn run(self, setup: &Setup<'_>) -> Result<(Self::Output, Cost), LabError> {
         let loads = Loads::new(setup.scene, [0.0; 3], self.forces, &[])?;
         let (state, cost) = setup.at_rest(&loads, OMEGA, |state| mean_displacement(state, self.corner, 1))?;
         let pressure = pressure::oscillation(self.body, self.element, state.displacements());

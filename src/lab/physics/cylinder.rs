@@ -8,7 +8,6 @@ use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
 use super::mesh::{BodyMesh, same};
 use super::steps::{EXACT, Steps, TO_REST};
 use super::{LabError, Row, report};
-use crate::element::ElementMaterial;
 use crate::loads::{Loads, NodalForce};
 use crate::material::Element;
 use crate::scene::Axes;
@@ -130,7 +129,7 @@ impl SceneWork for Run<'_> {
     /// Radial displacements, m.
     type Output = [f64; 2];
 
-    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<([f64; 2], Cost), LabError> {
+    fn run(self, setup: &Setup<'_>) -> Result<([f64; 2], Cost), LabError> {
         let loads = Loads::new(setup.scene, [0.0; 3], self.forces, &[])?;
         let (state, cost) = setup.at_rest(&loads, OMEGA, |state| self.radial(state, self.inner))?;
         Ok(([self.inner, self.outer].map(|nodes| self.radial(&state, nodes)), cost))

@@ -10,9 +10,9 @@ use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
 use super::mesh::{BodyMesh, same};
 use super::steps::TO_REST;
 use super::{LabError, Row, pressure};
-use crate::element::ElementMaterial;
 use crate::loads::{Loads, Motion};
 use crate::material::Element;
+use crate::material::VecMaterial;
 use crate::scene::{Axes, Support, VecScene};
 use crate::state::VecState;
 use crate::tled;
@@ -147,7 +147,7 @@ impl<'a> Run<'a> {
     }
 
     /// The force on the whole punch, N.
-    fn force<M: ElementMaterial>(&self, scene: &VecScene<M>, state: &mut VecState) -> f64 {
+    fn force(&self, scene: &VecScene<VecMaterial>, state: &mut VecState) -> f64 {
         if !tled::internal_forces(scene, state) {
             return f64::NAN;
         }
@@ -160,7 +160,7 @@ impl SceneWork for Run<'_> {
     /// Force, N, and oscillation of the pressure.
     type Output = (f64, (f64, Option<f64>));
 
-    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(Self::Output, Cost), LabError> {
+    fn run(self, setup: &Setup<'_>) -> Result<(Self::Output, Cost), LabError> {
         let loads = Loads::new(setup.scene, [0.0; 3], &[], &self.motions)?;
         let (mut state, cost) = setup.at_rest(&loads, OMEGA, |state| self.force(setup.scene, state))?;
         let pressure = pressure::oscillation(self.body, self.element, state.displacements());

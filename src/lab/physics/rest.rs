@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 
 use super::body::{Cost, Setup};
 use super::steps::Kind;
-use crate::element::ElementMaterial;
 use crate::lab::LabError;
 use crate::loads::Loads;
 use crate::state::VecState;
@@ -17,7 +16,7 @@ const MOST_WINDOWS: u32 = 120;
 /// Kinetic energy over the work of the loads, at most: rounding of displacements leaves 1e-5 where steps are short.
 const STILL: f64 = 3e-5;
 
-impl<M: ElementMaterial> Setup<'_, M> {
+impl Setup<'_> {
     /// Takes steps from rest until `quantity` rests; fails where it does not.
     pub(super) fn at_rest(
         &self,

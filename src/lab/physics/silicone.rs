@@ -13,7 +13,6 @@ use super::recordings::{DAMPING, GRAVITY, LEFT, LOAD, MARKERS, Measured, Recordi
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
 use super::swing::{Markers, Swing};
 use super::{LabError, Row};
-use crate::element::ElementMaterial;
 use crate::loads::Loads;
 use crate::material::Element;
 use crate::scene::{Axes, Support};
@@ -178,7 +177,7 @@ impl SceneWork for Run<'_> {
     /// The swing, and what the markers do; the cost is that of the swing.
     type Output = (Swing, [Measured; 3]);
 
-    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(Self::Output, Cost), LabError> {
+    fn run(self, setup: &Setup<'_>) -> Result<(Self::Output, Cost), LabError> {
         let loads = Loads::new(setup.scene, [0.0, 0.0, PULL], &[], &[])?;
         let mut state = VecState::at_rest(setup.scene.node_count());
         let markers = markers(&self.body.mesh);
@@ -200,7 +199,7 @@ struct LetGo<'a> {
 impl SceneWork for LetGo<'_> {
     type Output = Swing;
 
-    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(Swing, Cost), LabError> {
+    fn run(self, setup: &Setup<'_>) -> Result<(Swing, Cost), LabError> {
         let loads = Loads::new(setup.scene, [0.0, 0.0, PULL], &[], &[])?;
         let mut state = VecState::at_rest(setup.scene.node_count());
         Swing::of(setup, &loads, &mut state, &markers(&self.body.mesh), (self.load.seconds, self.damping))
@@ -215,7 +214,7 @@ pub(super) struct Hung<'a> {
 impl SceneWork for Hung<'_> {
     type Output = VecState;
 
-    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(VecState, Cost), LabError> {
+    fn run(self, setup: &Setup<'_>) -> Result<(VecState, Cost), LabError> {
         let loads = Loads::new(setup.scene, [0.0, 0.0, PULL], &[], &[])?;
         let markers = markers(&self.body.mesh);
         // Half a period of 0.23 s.

@@ -4,7 +4,6 @@
 use std::boxed::Box;
 
 use super::body::Setup;
-use crate::element::ElementMaterial;
 use crate::inertia::{self, Cells, Damper, LargeStep};
 use crate::lab::{LabError, implicit, networks};
 use crate::loads::Loads;
@@ -48,7 +47,7 @@ const SAFETY: f32 = 0.9;
 /// Takes steps until a time, s.
 pub(super) type Advance<'a> = Box<dyn FnMut(&mut VecState, &Loads<'_>, f64) -> Result<(), LabError> + 'a>;
 
-impl<M: ElementMaterial> Setup<'_, M> {
+impl Setup<'_> {
     /// What takes steps with `damping` (1/s) from a state, by the critical step there.
     pub(super) fn advance(&self, state: &mut VecState, damping: f32) -> Result<Advance<'_>, LabError> {
         let Self { case, scene, points, steps } = *self;

@@ -10,7 +10,6 @@ use glam::{DMat3, DVec3};
 use super::body::{Cost, Setup};
 use super::mesh::BodyMesh;
 use super::recordings::{Curve, LEFT, MARKERS, Measured};
-use crate::element::ElementMaterial;
 use crate::lab::LabError;
 use crate::loads::Loads;
 use crate::state::VecState;
@@ -62,8 +61,8 @@ pub(super) struct Swing(Vec<(f64, [f64; 3])>);
 
 impl Swing {
     /// Lets a body go and watches it for so many seconds with a damping (1/s).
-    pub(super) fn of<M: ElementMaterial>(
-        setup: &Setup<'_, M>,
+    pub(super) fn of(
+        setup: &Setup<'_>,
         loads: &Loads<'_>,
         state: &mut VecState,
         markers: &Markers,

@@ -9,9 +9,9 @@ use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
 use super::mesh::{BodyMesh, same};
 use super::steps::{EXACT, TO_REST};
 use super::{LabError, Row, report};
-use crate::element::ElementMaterial;
 use crate::loads::{Loads, Motion};
 use crate::material::Element;
+use crate::material::VecMaterial;
 use crate::scene::{Axes, Support, VecScene};
 use crate::state::VecState;
 use crate::tled;
@@ -78,7 +78,7 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// The torque that turns the end, N m.
-    fn torque<M: ElementMaterial>(&self, scene: &VecScene<M>, state: &mut VecState) -> f64 {
+    fn torque(&self, scene: &VecScene<VecMaterial>, state: &mut VecState) -> f64 {
         if !tled::internal_forces(scene, state) {
             return f64::NAN;
         }
@@ -95,7 +95,7 @@ impl SceneWork for Run<'_> {
     /// Torque, N m.
     type Output = f64;
 
-    fn run<M: ElementMaterial>(self, setup: &Setup<'_, M>) -> Result<(f64, Cost), LabError> {
+    fn run(self, setup: &Setup<'_>) -> Result<(f64, Cost), LabError> {
         let motion = |&node: &u32| {
             let [x, y, _] = self.mesh.point(node);
             let metre = [-ANGLE * y, ANGLE * x, 0.0].map(|x| x as f32);

@@ -6,7 +6,9 @@ use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
 use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{Element, Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue};
+use supple::material::{
+    Element, Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue, Values,
+};
 use supple::mesh::{self, Bar, Mesh, Winding};
 use supple::mlp::Network;
 use supple::scene::{AsScene, FixedScene, SceneFacts, SceneView, Support};
@@ -39,14 +41,18 @@ pub extern "C" fn build(
 /// Builds a scene of several tissues with nodal pressure, asks for its critical step and takes one.
 #[unsafe(no_mangle)]
 pub extern "C" fn nodal_pressure(
-    tissues: &'static [Tissue<NeoHookean>; 3],
+    tissues: &'static [Tissue<Values>; 3],
     of_element: &'static [u16; 300],
     points: &[[f32; 3]; 100],
     tets: &[[u32; 4]; 300],
     supports: &[Support; 9],
     state: &mut FixedState<100, 100>,
 ) -> f32 {
-    let mut scene = FixedScene::<_, 100, 20>::new(NodalPressure(Regions { tissues, of_element }));
+    let mut scene = FixedScene::<_, 100, 20>::new(NodalPressure(Regions {
+        law: NeoHookean::default(),
+        tissues,
+        of_element,
+    }));
     let Ok(mesh) = Mesh::new(points, tets, Winding::Normalised) else {
         return -1.0;
     };
@@ -59,7 +65,7 @@ pub extern "C" fn nodal_pressure(
 /// The same with nodal strain, in a scene of a fixed capacity and in memory of the host.
 #[unsafe(no_mangle)]
 pub extern "C" fn nodal_strain(
-    tissues: &'static [Tissue<NeoHookean>; 3],
+    tissues: &'static [Tissue<Values>; 3],
     of_element: &'static [u16; 300],
     points: &[[f32; 3]; 100],
     tets: &[[u32; 4]; 300],
@@ -67,7 +73,7 @@ pub extern "C" fn nodal_strain(
     state: &mut FixedState<100, 100>,
     rows: &mut [PatchRow; 200],
 ) -> f32 {
-    let material = NodalStrain(Regions { tissues, of_element });
+    let material = NodalStrain(Regions { law: NeoHookean::default(), tissues, of_element });
     let mut scene = FixedScene::<_, 100, 20, 200>::new(material);
     let Ok(mesh) = Mesh::new(points, tets, Winding::Normalised) else {
         return -1.0;

@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use supple::element::{ElementMaterial, ElementTile, MaterialWork, NodeInertia, PatchRow};
+use supple::element::{ElementTile, NodeInertia, PatchRow};
 use supple::inertia::{Cells, Grid, Method, vectors_for_lattice};
 use supple::loads::Loads;
-use supple::material::{Element, Moduli};
+use supple::material::{Element, Moduli, VecMaterial};
 use supple::scene::{SceneView, tiles_for};
 use supple::state::{NodeVector, VecState};
 use supple::step::{CriticalStep, Step};
@@ -24,54 +24,43 @@ use crate::screen::{output, row};
 /// Exact steps that are timed.
 const TIMED: u32 = 300;
 
-/// Critical step, memory and cost of a scene.
-pub(crate) struct Cost<'a> {
-    pub(crate) setup: &'a Setup,
-    /// Error that a recommended step may have, mm.
-    pub(crate) accuracy: Option<f64>,
-}
-
-impl MaterialWork for Cost<'_> {
-    type Output = Result<(), Problem>;
-
-    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
-        let setup = self.setup;
-        let (scene, mut state) = setup.build(material)?;
-        let scene = scene.view();
-        row("material", &setup.tissues);
-        for (tissue, moduli) in setup.tissues.moduli().enumerate() {
-            let name = if tissue == 0 { "moduli at rest".into() } else { format!("of region {tissue}") };
-            row(&name, describe_moduli(moduli));
-        }
-        row("element", setup.element.name());
-        row("mass", format!("{:.3} g", 1e3 * scene.mass()));
-        if !setup.tools.is_empty() {
-            row("instruments", &setup.tools);
-        }
-        row("elements left out", setup.body.mesh.tets.len() - scene.element_count());
-        let bound = critical(scene, &mut state)?;
-        describe_limits(scene, &state, bound);
-        let step = first_step(setup, bound, false);
-        let loads = setup.loads(&scene)?;
-        describe_memory(scene);
-        let seconds = describe_exact(setup, scene, &mut state, &loads, bound)?;
-        if setup.time.method.is_none() {
-            let wanted = step.as_ref().map_or(bound.seconds, |step| step.seconds());
-            row("real-time factor", real_time(wanted, seconds));
-        }
-        let times = describe_beyond(setup, scene, &loads, bound)?;
-        doubling::predict_errors(setup, scene, &loads, bound)?;
-        if let Some(learned) = &setup.learned {
-            learned_cost::describe(learned, setup, scene, &loads)?;
-        }
-        let step = step?;
-        if let Some(method) = &setup.time.method {
-            row("real-time factor", real_time(step.seconds(), times.of(method)));
-        }
-        match self.accuracy {
-            Some(accuracy) => doubling::recommend(setup, scene, &loads, bound, accuracy, &times),
-            None => Ok(()),
-        }
+/// Critical step, memory and cost of a scene; `accuracy` is the error that a recommended step may have, mm.
+pub(crate) fn describe(setup: &Setup, accuracy: Option<f64>) -> Result<(), Problem> {
+    let (scene, mut state) = setup.build()?;
+    let scene = scene.view();
+    row("material", &setup.tissues);
+    for (tissue, moduli) in setup.tissues.moduli().enumerate() {
+        let name = if tissue == 0 { "moduli at rest".into() } else { format!("of region {tissue}") };
+        row(&name, describe_moduli(moduli));
+    }
+    row("element", setup.element.name());
+    row("mass", format!("{:.3} g", 1e3 * scene.mass()));
+    if !setup.tools.is_empty() {
+        row("instruments", &setup.tools);
+    }
+    row("elements left out", setup.body.mesh.tets.len() - scene.element_count());
+    let bound = critical(scene, &mut state)?;
+    describe_limits(scene, &state, bound);
+    let step = first_step(setup, bound, false);
+    let loads = setup.loads(&scene)?;
+    describe_memory(scene);
+    let seconds = describe_exact(setup, scene, &mut state, &loads, bound)?;
+    if setup.time.method.is_none() {
+        let wanted = step.as_ref().map_or(bound.seconds, |step| step.seconds());
+        row("real-time factor", real_time(wanted, seconds));
+    }
+    let times = describe_beyond(setup, scene, &loads, bound)?;
+    doubling::predict_errors(setup, scene, &loads, bound)?;
+    if let Some(learned) = &setup.learned {
+        learned_cost::describe(learned, setup, scene, &loads)?;
+    }
+    let step = step?;
+    if let Some(method) = &setup.time.method {
+        row("real-time factor", real_time(step.seconds(), times.of(method)));
+    }
+    match accuracy {
+        Some(accuracy) => doubling::recommend(setup, scene, &loads, bound, accuracy, &times),
+        None => Ok(()),
     }
 }
 
@@ -91,7 +80,7 @@ fn real_time(step: f32, spent: f64) -> String {
 }
 
 /// Prints the critical step at rest, as a bound and as it is.
-fn describe_limits<M: ElementMaterial>(scene: SceneView<'_, M>, state: &VecState, bound: CriticalStep) {
+fn describe_limits(scene: SceneView<'_, VecMaterial>, state: &VecState, bound: CriticalStep) {
     row(
         "critical step",
         format!("{:.4e} s at rest, which node {} sets (a bound, safe)", bound.seconds, bound.node),
@@ -106,7 +95,7 @@ fn describe_limits<M: ElementMaterial>(scene: SceneView<'_, M>, state: &VecState
 }
 
 /// Prints the memory of scene and state.
-fn describe_memory<M: ElementMaterial>(scene: SceneView<'_, M>) {
+fn describe_memory(scene: SceneView<'_, VecMaterial>) {
     let vectors = if scene.element() == Element::Linear { 3 } else { 4 };
     let of_node = size_of::<NodeInertia>() + vectors * size_of::<NodeVector>();
     let tiles = tiles_for(scene.element_count()) * size_of::<ElementTile>()
@@ -115,9 +104,9 @@ fn describe_memory<M: ElementMaterial>(scene: SceneView<'_, M>) {
 }
 
 /// Prints what an exact step costs. Gives its time, s.
-fn describe_exact<M: ElementMaterial>(
+fn describe_exact(
     setup: &Setup,
-    scene: SceneView<'_, M>,
+    scene: SceneView<'_, VecMaterial>,
     state: &mut VecState,
     loads: &Loads<'_>,
     bound: CriticalStep,
@@ -137,9 +126,9 @@ fn describe_exact<M: ElementMaterial>(
 }
 
 /// Prints what steps beyond the critical one need and do at rest.
-fn describe_beyond<M: ElementMaterial>(
+fn describe_beyond(
     setup: &Setup,
-    scene: SceneView<'_, M>,
+    scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,
     bound: CriticalStep,
 ) -> Result<Times, Problem> {
@@ -193,7 +182,7 @@ fn describe_beyond<M: ElementMaterial>(
 }
 
 /// Prints the lattice that suits the scene, and the one that its file gives. Gives the one that it has.
-fn lattice<M: ElementMaterial>(setup: &Setup, scene: SceneView<'_, M>) -> Result<Grid, Problem> {
+fn lattice(setup: &Setup, scene: SceneView<'_, VecMaterial>) -> Result<Grid, Problem> {
     let suggestion = match &setup.time.method {
         Some(Method::Damped(damper, _)) => Method::Damped(damper.clone(), Cells::Suggested),
         _ => Method::Multilevel(Cells::Suggested),

@@ -5,9 +5,9 @@
 //! A body that hardly moves at any of the lengths passes as well, so the distance moved is printed too, and
 //! of a length that passes all shorter ones must pass as well.
 
-use supple::element::ElementMaterial;
 use supple::inertia::{Cells, Method};
 use supple::loads::Loads;
+use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::step::{CriticalStep, Divergence, Status};
 
@@ -49,9 +49,9 @@ enum Comparison {
 }
 
 /// Prints the table of errors, and the longest step that keeps `accuracy` (mm).
-pub(crate) fn recommend<M: ElementMaterial>(
+pub(crate) fn recommend(
     setup: &Setup,
-    scene: SceneView<'_, M>,
+    scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,
     bound: CriticalStep,
     accuracy: f64,
@@ -112,7 +112,7 @@ pub(crate) fn recommend<M: ElementMaterial>(
 }
 
 /// The method that long steps of the scene would have, on its lattice.
-fn judged<M: ElementMaterial>(setup: &Setup, scene: SceneView<'_, M>) -> Result<Method<'static>, Problem> {
+fn judged(setup: &Setup, scene: SceneView<'_, VecMaterial>) -> Result<Method<'static>, Problem> {
     if let Some(method) = &setup.time.method {
         grid(setup, scene, method)?;
         return Ok(method.clone());
@@ -124,9 +124,9 @@ fn judged<M: ElementMaterial>(setup: &Setup, scene: SceneView<'_, M>) -> Result<
 
 /// Prints the errors that long steps will have at the worst moment of the whole scene. Step doubling at two lengths
 /// gives the order of convergence `p`: `|u_2D - u_D| = (2^p - 1) E(D)`, and `E` goes with `D^p`.
-pub(crate) fn predict_errors<M: ElementMaterial>(
+pub(crate) fn predict_errors(
     setup: &Setup,
-    scene: SceneView<'_, M>,
+    scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,
     bound: CriticalStep,
 ) -> Result<(), Problem> {
@@ -160,9 +160,9 @@ pub(crate) fn predict_errors<M: ElementMaterial>(
 }
 
 /// One length of step compared with its half, from rest over `span` seconds.
-fn compare<M: ElementMaterial>(
+fn compare(
     setup: &Setup,
-    scene: SceneView<'_, M>,
+    scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,
     seconds: f32,
     span: f64,

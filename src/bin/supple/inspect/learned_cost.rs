@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use supple::element::ElementMaterial;
 use supple::learned::vectors_for;
 use supple::loads::Loads;
+use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::state::NodeVector;
 use supple::step::CallingThread;
@@ -19,10 +19,10 @@ use crate::weight_file::describe_step;
 const TIMED: u32 = 50;
 
 /// Prints memory and time of a learned step.
-pub(crate) fn describe<M: ElementMaterial>(
+pub(crate) fn describe(
     choice: &LearnedChoice,
     setup: &Setup,
-    scene: SceneView<'_, M>,
+    scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,
 ) -> Result<(), Problem> {
     let nodes = scene.node_count();

@@ -17,7 +17,6 @@ use crate::scene::file::SceneFile;
 use crate::scene::setup::Setup;
 use crate::screen::output;
 use crate::weight_file::is_weights;
-use cost::Cost;
 
 /// Looks at a file; `accuracy` (mm) asks for a step of a scene that keeps it.
 pub(crate) fn inspect(path: &Path, accuracy: Option<f64>) -> Result<(), Problem> {
@@ -32,7 +31,7 @@ pub(crate) fn inspect(path: &Path, accuracy: Option<f64>) -> Result<(), Problem>
         for warning in &setup.warnings {
             output!("warning: {warning}");
         }
-        return setup.with_material(Cost { setup: &setup, accuracy });
+        return cost::describe(&setup, accuracy);
     }
     let is_weights = is_weights(path);
     if accuracy.is_some() {

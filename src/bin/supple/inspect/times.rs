@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use supple::element::ElementMaterial;
 use supple::inertia::Method;
 use supple::loads::Loads;
+use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::state::VecState;
 use supple::step::{CriticalStep, Status, Step};
@@ -37,10 +37,10 @@ impl Times {
 
     /// Times exact, mass-scaled, multilevel and damped steps from rest, in turn, so that what else the machine does meets all of
     /// them.
-    pub(crate) fn measured<M: ElementMaterial>(
+    pub(crate) fn measured(
         methods: &[Method<'static>; 3],
         setup: &Setup,
-        scene: SceneView<'_, M>,
+        scene: SceneView<'_, VecMaterial>,
         loads: &Loads<'_>,
         bound: CriticalStep,
     ) -> Result<Self, Problem> {
@@ -81,10 +81,10 @@ pub(crate) struct Walker {
 
 impl Walker {
     /// At rest; steps take `seconds`.
-    pub(crate) fn new<M: ElementMaterial>(
+    pub(crate) fn new(
         method: &Method<'static>,
         setup: &Setup,
-        scene: SceneView<'_, M>,
+        scene: SceneView<'_, VecMaterial>,
         seconds: f32,
     ) -> Result<Self, Problem> {
         let step = Step::unchecked(seconds, setup.damping).map_err(Problem::of)?;
@@ -93,7 +93,7 @@ impl Walker {
         Ok(Self { state, step })
     }
 
-    pub(crate) fn step<M: ElementMaterial>(&mut self, scene: SceneView<'_, M>, loads: &Loads<'_>) -> Status {
+    pub(crate) fn step(&mut self, scene: SceneView<'_, VecMaterial>, loads: &Loads<'_>) -> Status {
         self.step.step(scene, loads, self.state.view())
     }
 }

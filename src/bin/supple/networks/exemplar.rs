@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use supple::element::{ElementMaterial, MaterialWork};
 use supple::lab::course::Course;
 use supple::lab::scenes::{RigidVelocity, SceneSpec};
 use supple::lab::timing::Timing;
@@ -48,8 +47,8 @@ fn spec_of(setup: &Setup) -> Result<SceneSpec, Problem> {
     let Some(tissue) = setup.tissues.only() else { return refused("there are regions") };
     let step = match setup.time.step {
         StepChoice::Seconds(seconds) => seconds,
-        StepChoice::Auto => SHARE * setup.with_material(AtRest(setup))?,
-        StepChoice::Multiple(multiple) => multiple * setup.with_material(AtRest(setup))?,
+        StepChoice::Auto => SHARE * critical_at_rest(setup)?,
+        StepChoice::Multiple(multiple) => multiple * critical_at_rest(setup)?,
     };
     let timing = Timing { step, interval: INTERVAL, refinement: 1 };
     Ok(SceneSpec {
@@ -73,14 +72,8 @@ fn spec_of(setup: &Setup) -> Result<SceneSpec, Problem> {
 }
 
 /// The critical step at rest, s.
-struct AtRest<'a>(&'a Setup);
-
-impl MaterialWork for AtRest<'_> {
-    type Output = Result<f32, Problem>;
-
-    fn run<M: ElementMaterial>(self, material: M) -> Self::Output {
-        let (scene, mut state) = self.0.build(material)?;
-        let critical = tled::critical_step(&scene, &mut state);
-        critical.map(|step| step.seconds).ok_or_else(|| Problem("no node can move".into()))
-    }
+fn critical_at_rest(setup: &Setup) -> Result<f32, Problem> {
+    let (scene, mut state) = setup.build()?;
+    let critical = tled::critical_step(&scene, &mut state);
+    critical.map(|step| step.seconds).ok_or_else(|| Problem("no node can move".into()))
 }

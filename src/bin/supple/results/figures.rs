@@ -1,6 +1,6 @@
 //! Figures of the state that a simulation ended in, SI units.
 
-use supple::element::ElementMaterial;
+use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::state::VecState;
 use supple::step::EnergyBalance;
@@ -33,9 +33,9 @@ pub(crate) struct Figures {
 }
 
 impl Figures {
-    pub(crate) fn new<M: ElementMaterial>(
+    pub(crate) fn new(
         setup: &Setup,
-        scene: SceneView<'_, M>,
+        scene: SceneView<'_, VecMaterial>,
         state: &VecState,
         outcome: &Outcome,
     ) -> Self {

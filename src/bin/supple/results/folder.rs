@@ -4,8 +4,8 @@ use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use supple::element::ElementMaterial;
 use supple::io::{Frame, write_atomically, write_pvd, write_triangles, write_vtu};
+use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::state::VecState;
 use supple::tled;
@@ -44,10 +44,10 @@ impl Folder {
 
     /// Adds a frame: displacement (m), velocity (m/s), pressure (Pa) of the nodes; von Mises stress (Pa), volume ratio J of the
     /// elements.
-    pub(crate) fn add_frame<M: ElementMaterial>(
+    pub(crate) fn add_frame(
         &mut self,
         setup: &Setup,
-        scene: SceneView<'_, M>,
+        scene: SceneView<'_, VecMaterial>,
         state: &mut VecState,
     ) -> Result<(), Problem> {
         let body = &setup.body;

@@ -8,7 +8,7 @@ mod staging;
 pub(crate) mod summary;
 pub(crate) mod warnings;
 
-use supple::element::ElementMaterial;
+use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::state::VecState;
 
@@ -27,10 +27,10 @@ pub(crate) struct Conclusion {
 }
 
 /// Tells what there is to tell, and adds `final.csv` and `summary.json` to the folder, if there is one.
-pub(crate) fn conclude<M: ElementMaterial>(
+pub(crate) fn conclude(
     folder: Option<&Folder>,
     setup: &Setup,
-    scene: SceneView<'_, M>,
+    scene: SceneView<'_, VecMaterial>,
     state: &VecState,
     outcome: &Outcome,
 ) -> Result<Conclusion, Problem> {

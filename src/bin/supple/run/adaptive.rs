@@ -1,8 +1,8 @@
 //! Steps that choose their length, so that their error stays below a tolerance.
 
 use supple::adaptive::{Adaptive, Request, Taken};
-use supple::element::ElementMaterial;
 use supple::inertia::Method;
+use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::state::{NodeVector, VecState};
 use supple::step::{Status, Step};
@@ -25,10 +25,10 @@ pub(crate) struct AdaptiveRun {
 
 impl AdaptiveRun {
     /// Steps of at most the length of `longest`.
-    pub(crate) fn new<M: ElementMaterial>(
+    pub(crate) fn new(
         method: &Method<'static>,
         setup: &Setup,
-        scene: SceneView<'_, M>,
+        scene: SceneView<'_, VecMaterial>,
         state: &mut VecState,
         longest: Step,
     ) -> Result<Self, Problem> {
@@ -45,9 +45,9 @@ impl AdaptiveRun {
     }
 
     /// Moves on by so many seconds, or until a step diverges.
-    pub(crate) fn advance<M: ElementMaterial>(
+    pub(crate) fn advance(
         &mut self,
-        motion: &Motion<'_, M>,
+        motion: &Motion<'_>,
         state: &mut VecState,
         outcome: &mut Outcome,
         seconds: f32,

@@ -1,7 +1,7 @@
 //! Exact steps, of one length or of an automatic one ([`Pace`]).
 
-use supple::element::ElementMaterial;
 use supple::loads::Loads;
+use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::state::{NodeVector, StateView, VecState};
 use supple::step::{CallingThread, CriticalStep, Step};
@@ -14,8 +14,8 @@ pub(crate) const ROUNDING: f64 = 1e-7;
 
 /// What a scene moves under.
 #[derive(Clone, Copy)]
-pub(crate) struct Motion<'a, M> {
-    pub(crate) scene: SceneView<'a, M>,
+pub(crate) struct Motion<'a> {
+    pub(crate) scene: SceneView<'a, VecMaterial>,
     pub(crate) loads: Loads<'a>,
     /// 1/s.
     pub(crate) damping: f32,
@@ -41,9 +41,9 @@ impl ExactSteps {
     }
 
     /// Moves on by `seconds`, a whole number of fixed steps, or until a step diverges.
-    pub(crate) fn advance<M: ElementMaterial>(
+    pub(crate) fn advance(
         &mut self,
-        motion: &Motion<'_, M>,
+        motion: &Motion<'_>,
         state: &mut VecState,
         outcome: &mut Outcome,
         seconds: f32,
@@ -75,9 +75,9 @@ impl Automatic {
     }
 
     /// Moves on to a time (s), or until a step diverges.
-    pub(crate) fn reach<M: ElementMaterial>(
+    pub(crate) fn reach(
         &mut self,
-        motion: &Motion<'_, M>,
+        motion: &Motion<'_>,
         state: &mut VecState,
         outcome: &mut Outcome,
         target: f64,
@@ -108,13 +108,7 @@ impl Automatic {
 }
 
 /// Takes so many exact steps, or until one diverges.
-fn take<M: ElementMaterial>(
-    motion: &Motion<'_, M>,
-    state: &mut VecState,
-    outcome: &mut Outcome,
-    step: &Step,
-    count: u32,
-) {
+fn take(motion: &Motion<'_>, state: &mut VecState, outcome: &mut Outcome, step: &Step, count: u32) {
     for _ in 0..count {
         if outcome.divergence.is_none() {
             let status = tled::step(&motion.scene, &motion.loads, state, step);

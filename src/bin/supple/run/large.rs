@@ -1,7 +1,7 @@
 //! Mass-scaled, multilevel and damped steps of a scene.
 
-use supple::element::ElementMaterial;
 use supple::inertia::{Cells, Grid, LargeStep, Method};
+use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::state::{NodeVector, VecState};
 use supple::step::Step;
@@ -14,9 +14,9 @@ pub(crate) type PreparedStep = LargeStep<'static, Vec<NodeVector>>;
 
 /// The lattice of a scene's method; steps may be prepared on a coarser one than is suggested ([`LargeStep::prepare_in_vec`]). A mesh too
 /// small for the lattice that its method wants is a problem.
-pub(crate) fn grid<M: ElementMaterial>(
+pub(crate) fn grid(
     setup: &Setup,
-    scene: SceneView<'_, M>,
+    scene: SceneView<'_, VecMaterial>,
     method: &Method<'_>,
 ) -> Result<Grid, Problem> {
     let grid = method.grid(scene, &setup.body.local).map_err(|error| {
@@ -37,10 +37,10 @@ pub(crate) fn grid<M: ElementMaterial>(
 }
 
 /// A step of `seconds` by a method, from the state as it is.
-pub(crate) fn prepare<M: ElementMaterial>(
+pub(crate) fn prepare(
     method: &Method<'static>,
     setup: &Setup,
-    scene: SceneView<'_, M>,
+    scene: SceneView<'_, VecMaterial>,
     state: &mut VecState,
     step: Step,
 ) -> Result<PreparedStep, Problem> {

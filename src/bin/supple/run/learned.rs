@@ -4,7 +4,6 @@
 
 use std::time::Instant;
 
-use supple::element::ElementMaterial;
 use supple::learned::{LearnedStep, Undone};
 use supple::state::{NodeVector, VecState};
 use supple::step::{CallingThread, Status};
@@ -53,9 +52,9 @@ impl<'a> LearnedRun<'a> {
     }
 
     /// Moves on by one interval, or until a step diverges.
-    pub(crate) fn advance<M: ElementMaterial>(
+    pub(crate) fn advance(
         &mut self,
-        motion: &Motion<'_, M>,
+        motion: &Motion<'_>,
         state: &mut VecState,
         outcome: &mut Outcome,
     ) -> Result<(), Problem> {
@@ -105,12 +104,7 @@ impl<'a> LearnedRun<'a> {
     }
 
     /// Exact steps while the frames follow.
-    fn exact_interval<M: ElementMaterial>(
-        &mut self,
-        motion: &Motion<'_, M>,
-        state: &mut VecState,
-        outcome: &mut Outcome,
-    ) {
+    fn exact_interval(&mut self, motion: &Motion<'_>, state: &mut VecState, outcome: &mut Outcome) {
         // A step that diverged is in the outcome, which ends the run.
         let _ = self.step.view().lead_interval(state, |state| {
             self.exact.advance(motion, state, outcome, self.trace.seconds);

@@ -10,7 +10,7 @@ pub(crate) mod start;
 
 use std::time::Instant;
 
-use supple::element::ElementMaterial;
+use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::state::VecState;
 use supple::step::Status;
@@ -25,9 +25,9 @@ use start::{Mover, Start, critical};
 
 /// Runs to the end or to divergence. `frame` is called at rest and after each interval between frames, `tick` with the time (s) now
 /// and then.
-pub(crate) fn run<M: ElementMaterial>(
+pub(crate) fn run(
     setup: &Setup,
-    scene: SceneView<'_, M>,
+    scene: SceneView<'_, VecMaterial>,
     state: &mut VecState,
     start: Start<'_>,
     tick: &dyn Fn(f64),
@@ -108,10 +108,10 @@ pub(crate) fn run<M: ElementMaterial>(
 }
 
 /// Automatic steps to a time (s), along the parts of the instruments' paths.
-fn reach<M: ElementMaterial>(
+fn reach(
     automatic: &mut Automatic,
     setup: &Setup,
-    motion: Motion<'_, M>,
+    motion: Motion<'_>,
     state: &mut VecState,
     outcome: &mut Outcome,
     target: f64,

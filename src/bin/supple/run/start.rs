@@ -1,7 +1,7 @@
 //! A simulation at rest: what moves the scene, and the length of its steps. All that can be refused is refused here.
 
-use supple::element::ElementMaterial;
 use supple::guard::{self, Allowed, Guard};
+use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::state::{NodeVector, VecState};
 use supple::step::{CriticalStep, Step};
@@ -27,9 +27,9 @@ pub(crate) enum Mover<'a> {
 
 impl Mover<'_> {
     /// Moves on by one interval: a step of `seconds`, or one of a network.
-    pub(crate) fn advance<M: ElementMaterial>(
+    pub(crate) fn advance(
         &mut self,
-        motion: &Motion<'_, M>,
+        motion: &Motion<'_>,
         state: &mut VecState,
         outcome: &mut Outcome,
         seconds: f32,
@@ -84,9 +84,9 @@ pub(crate) struct Start<'a> {
 }
 
 impl<'a> Start<'a> {
-    pub(crate) fn new<M: ElementMaterial>(
+    pub(crate) fn new(
         setup: &'a Setup,
-        scene: SceneView<'_, M>,
+        scene: SceneView<'_, VecMaterial>,
         state: &mut VecState,
         unchecked: bool,
     ) -> Result<Self, Problem> {
@@ -185,8 +185,8 @@ fn whole_steps(span: f64, longest: f64) -> f64 {
 }
 
 /// The bound of the critical step at the state, or a problem: there is none for a state that is not finite.
-pub(crate) fn critical<M: ElementMaterial>(
-    scene: SceneView<'_, M>,
+pub(crate) fn critical(
+    scene: SceneView<'_, VecMaterial>,
     state: &mut VecState,
 ) -> Result<CriticalStep, Problem> {
     tled::critical_step(&scene, state)

@@ -1,8 +1,7 @@
 //! A scene ready to be built: nodes in float32 around the body's centre, supports, loads, tissues, method.
 
-use supple::element::MaterialWork;
 use supple::loads::{Loads, Motion, NodalForce};
-use supple::material::{AnyLaw, Element, Material, Tissue};
+use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
 use supple::scene::{AsScene, BuildError, Support, VecScene};
 use supple::state::VecState;
 
@@ -99,11 +98,6 @@ impl Setup {
         }
     }
 
-    /// Does `work` with the material of the scene.
-    pub(crate) fn with_material<W: MaterialWork>(&self, work: W) -> W::Output {
-        self.tissues.with_material(self.element, work)
-    }
-
     /// What moves the scene, by name.
     pub(crate) const fn method_name(&self) -> &'static str {
         match &self.time {
@@ -114,12 +108,15 @@ impl Setup {
     }
 
     /// The kernel's scene, and a state at rest.
-    pub(crate) fn build<M: Material>(&self, material: M) -> Result<(VecScene<M>, VecState), Problem> {
+    pub(crate) fn build(&self) -> Result<(VecScene<VecMaterial>, VecState), Problem> {
         let mesh = self.body.checked()?;
-        let scene = VecScene::build(material, &mesh, &self.supports).map_err(|error| match error {
-            BuildError::Mesh(error) => self.body.mesh_problem(error),
-            error => Problem(format!("{}: {error}", self.body.name)),
-        })?;
+        let scene =
+            VecScene::build(self.tissues.material(self.element), &mesh, &self.supports).map_err(|error| {
+                match error {
+                    BuildError::Mesh(error) => self.body.mesh_problem(error),
+                    error => Problem(format!("{}: {error}", self.body.name)),
+                }
+            })?;
         Ok((scene, self.state()))
     }
 

@@ -4,8 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use serde::de::DeserializeOwned;
-use supple::element::{ElementLaw, LawWork, MaterialWork, with_element, with_law};
-use supple::material::{AnyLaw, Element, Moduli, Regions, Tissue};
+use supple::material::{AnyLaw, Element, Law, Moduli, Tissue, VecMaterial};
 use supple::mlp::Recipe;
 use supple::plausibility::same;
 use toml::Spanned;
@@ -88,9 +87,11 @@ impl Tissues {
         self.tissues.iter().all(same_tissue)
     }
 
-    /// Does `work` with the material in these tetrahedra.
-    pub(crate) fn with_material<W: MaterialWork>(&self, element: Element, work: W) -> W::Output {
-        with_law(self.tissues[0].law, WithLaw { tissues: self, element, work })
+    /// What a scene of these tissues in these tetrahedra is made of.
+    pub(crate) fn material(&self, element: Element) -> VecMaterial {
+        let law = self.tissues[0].law;
+        let tissues = self.tissues.iter().map(Tissue::values).collect();
+        VecMaterial { element, law, tissues, of_element: self.of_element.clone() }
     }
 }
 
@@ -103,30 +104,6 @@ impl fmt::Display for Tissues {
             1 => write!(f, ", 1 further region"),
             more => write!(f, ", {more} further regions"),
         }
-    }
-}
-
-/// Work with the material of tissues whose law is known.
-struct WithLaw<'a, W> {
-    tissues: &'a Tissues,
-    element: Element,
-    work: W,
-}
-
-impl<W: MaterialWork> LawWork for WithLaw<'_, W> {
-    type Output = W::Output;
-
-    fn run<L: ElementLaw>(self, _: L) -> W::Output {
-        let Self { tissues: Tissues { tissues, of_element }, element, work } = self;
-        let of_law = |&Tissue { law, density }: &Tissue<AnyLaw>| Tissue {
-            law: L::from_constants(law.values()),
-            density,
-        };
-        if let [only] = tissues.as_slice() {
-            return with_element(element, of_law(only), work);
-        }
-        let tissues: Vec<_> = tissues.iter().map(of_law).collect();
-        with_element(element, Regions { tissues: &tissues, of_element }, work)
     }
 }
 
