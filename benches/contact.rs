@@ -90,7 +90,7 @@ fn measure<M: ElementMaterial>(
             let mut loads = Loads::new(scene, [0.0; 3], &forces, &[]).expect("forces");
             let mut view = state.view();
             if !instruments.is_empty() {
-                loads = loads.touched_by(&contact);
+                loads = loads.touched_by(contact);
                 view = view.feeling(&mut touches).pushing(&mut pushes).listing(&mut list);
             }
             let status = match &mut large {

@@ -169,6 +169,7 @@ pub mod plausibility;
 pub mod reaction;
 pub mod scene;
 pub mod simd;
+pub mod simulation;
 pub mod state;
 pub mod step;
 pub mod tled;

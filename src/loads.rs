@@ -128,7 +128,7 @@ pub struct Loads<'a> {
     gravity: [f32; 3],
     forces: &'a [NodalForce],
     motions: &'a [Motion],
-    contact: Option<&'a Contact<'a>>,
+    contact: Option<Contact<'a>>,
     /// Pushes of instruments that another run has found, N.
     given: Option<(Surface<'a>, &'a [NodeVector])>,
     /// Nodes of the scene they were checked against.
@@ -144,6 +144,43 @@ pub trait LoadsOverTime {
 impl LoadsOverTime for Loads<'_> {
     fn of_step(&mut self, _: &StateView<'_>, _: f32, _: u32) -> Loads<'_> {
         *self
+    }
+}
+
+/// Loads of a call that moves a scene on: motions without a ramp go evenly over the whole call, from where their nodes are.
+#[derive(Debug)]
+pub struct LoadsOfCall<'a> {
+    /// With the motions as they are asked for.
+    loads: Loads<'a>,
+    now: &'a mut [Motion],
+}
+
+impl<'a> LoadsOfCall<'a> {
+    /// `now` is as long as the motions of `loads`, and is overwritten.
+    pub fn new(loads: Loads<'a>, now: &'a mut [Motion]) -> Self {
+        for (now, asked) in now.iter_mut().zip(loads.motions) {
+            *now = *asked;
+        }
+        Self { loads, now }
+    }
+
+    /// As they are asked for.
+    #[must_use]
+    pub const fn asked(&self) -> &Loads<'a> {
+        &self.loads
+    }
+}
+
+impl LoadsOverTime for LoadsOfCall<'_> {
+    fn of_step(&mut self, state: &StateView<'_>, _: f32, left: u32) -> Loads<'_> {
+        let moved = self.now.iter_mut().zip(self.loads.motions).filter(|(_, asked)| asked.ramp == 0.0);
+        for (now, asked) in moved {
+            let at = state.displacements().get(asked.node as usize).copied().unwrap_or_default().to_array();
+            for (metre, (from, to)) in now.metre.iter_mut().zip(at.into_iter().zip(asked.metre)) {
+                *metre = if left > 1 { from + (to - from) / left as f32 } else { to };
+            }
+        }
+        Loads { motions: self.now, ..self.loads }
     }
 }
 
@@ -186,7 +223,7 @@ impl<'a> Loads<'a> {
     /// The same loads and instruments that touch the tissue.
     #[cfg(feature = "contact")]
     #[must_use]
-    pub const fn touched_by(self, contact: &'a Contact<'a>) -> Self {
+    pub const fn touched_by(self, contact: Contact<'a>) -> Self {
         Self { contact: Some(contact), ..self }
     }
 
@@ -208,8 +245,8 @@ impl<'a> Loads<'a> {
         if cfg!(feature = "contact") { self.given } else { None }
     }
 
-    pub(crate) const fn contact(&self) -> Option<&'a Contact<'a>> {
-        if cfg!(feature = "contact") { self.contact } else { None }
+    pub(crate) const fn contact(&self) -> Option<&Contact<'a>> {
+        if cfg!(feature = "contact") { self.contact.as_ref() } else { None }
     }
 
     pub(crate) const fn nodes(&self) -> Option<usize> {

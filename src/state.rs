@@ -400,10 +400,15 @@ impl VecState {
     /// The same with room for what instruments do on a surface.
     #[must_use]
     pub fn meeting(mut self, surface: &Surface<'_>) -> Self {
+        self.make_room(surface);
+        self
+    }
+
+    /// See [`VecState::meeting`]: nothing touches yet.
+    pub fn make_room(&mut self, surface: &Surface<'_>) {
         let vectors = vectors_to_push(surface.nodes().len(), surface.triangles().len());
         self.vectors.pushes = std::vec![NodeVector::ZERO; vectors];
         self.vectors.touches = std::vec![Touch::default(); MOST_INSTRUMENTS];
-        self
     }
 
     /// What each instrument felt in the latest step ([`StateView::feeling`]); nothing without room for it.

@@ -274,8 +274,8 @@ impl AdaptiveView<'_, '_> {
                 self.large_steps(left, scene, loads, state, threads, &mut taken)
             };
             match status {
-                Ok(status) => worst = worse(worst, status),
-                Err(last) => return (worse(worst, last), taken),
+                Ok(status) => worst = worst.worse(status),
+                Err(last) => return (worst.worse(last), taken),
             }
         }
     }
@@ -306,7 +306,7 @@ impl AdaptiveView<'_, '_> {
             taken.exact += 1;
             control.wait(state.last_step());
             let [mean, _] = control.left_behind();
-            worst = worse(worst, judged(status, mean, tolerance));
+            worst = worst.worse(judged(status, mean, tolerance));
             if control.probes() {
                 let before = watch.comparisons();
                 let guard = GuardView { second: large, watch, storage: second };
@@ -384,7 +384,7 @@ impl AdaptiveView<'_, '_> {
             }
             taken.large += 1;
             control.wait(seconds);
-            worst = worse(worst, judged(status, estimate[0], self.chooser.request.tolerance));
+            worst = worst.worse(judged(status, estimate[0], self.chooser.request.tolerance));
             if self.watch.comparisons() > before && control.decide(estimate) {
                 self.change(scene, Some(&loads), state, threads, taken);
                 return Ok(worst);
@@ -432,15 +432,6 @@ impl AdaptiveView<'_, '_> {
     }
 }
 
-/// The worse of two statuses of steps that were taken.
-fn worse(before: Status, now: Status) -> Status {
-    match (before, now) {
-        (_, Status::Ok) => before,
-        (Status::Limited { .. }, Status::Inexact { .. }) => before,
-        _ => now,
-    }
-}
-
 /// Adaptive steps with storage `S` of the caller.
 #[derive(Clone, Debug)]
 pub struct Adaptive<'w, S> {
@@ -468,6 +459,11 @@ impl<'w, S: AsMut<[NodeVector]>> Adaptive<'w, S> {
         &self.model
     }
 
+    /// The steps, whatever their storage.
+    pub fn view(&mut self) -> AdaptiveView<'_, 'w> {
+        self.model.with_storage(self.storage.as_mut())
+    }
+
     /// Moves on by so many seconds, usually a frame, and ends there exactly. [`Status::Inexact`] if the estimate of the error exceeded
     /// the tolerance at any step. Where even exact steps are refused, the state is that of the last step that was taken.
     pub fn advance<M: ElementMaterial>(
@@ -477,8 +473,7 @@ impl<'w, S: AsMut<[NodeVector]>> Adaptive<'w, S> {
         loads: &mut impl LoadsOverTime,
         state: StateView<'_>,
     ) -> (Status, Taken) {
-        let view = self.model.with_storage(self.storage.as_mut());
-        view.advance(seconds, scene, loads, state, &CallingThread)
+        self.view().advance(seconds, scene, loads, state, &CallingThread)
     }
 }
 

@@ -7,7 +7,6 @@ use core::mem::MaybeUninit;
 use crate::adaptive::{AdaptiveView, Chooser, Parts, Request, Taken, vectors_with};
 use crate::guard::{SECOND_RUN, Watch};
 use crate::inertia::LargeModel;
-use crate::loads::{Loads, LoadsOverTime};
 use crate::state::{NodeVector, StateView};
 use crate::step::Step;
 
@@ -152,12 +151,6 @@ pub unsafe extern "C" fn supple_adaptive_init(
     unsafe { memory::answered(init(), error) }
 }
 
-impl LoadsOverTime for CallLoads<'_> {
-    fn of_step(&mut self, state: &StateView<'_>, _: f32, left: u32) -> Loads<'_> {
-        self.of_next_step(state.displacements(), left.into())
-    }
-}
-
 /// Moves on by `seconds`, usually a frame, and ends there exactly. SUPPLE_INEXACT if the estimate of the error exceeded the tolerance at
 /// any step: steps become shorter at once, down to exact ones, but an error that is there stays until the body has forgotten it. A
 /// step that is not to be believed is taken again with shorter ones; where exact ones are not either, the state is that before it, and
@@ -195,7 +188,7 @@ pub unsafe extern "C" fn supple_adaptive_advance(
         let (status, Taken { exact, large, changes }) = {
             let (first, second) = (&mut *first, &mut *second);
             let view = AdaptiveView { chooser: &mut *chooser, first, second, watch: &mut *watch, storage };
-            view.advance(span.seconds(), open.view(), &mut loads, state.reborrow(), &threads)
+            view.advance(span.seconds(), open.view(), &mut loads.of_call, state.reborrow(), &threads)
         };
         loads.enter(state.touches());
         report.enter(&status, &state);

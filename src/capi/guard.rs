@@ -186,7 +186,7 @@ pub unsafe extern "C" fn supple_guard_follow(
         let threads = HostThreads::of(threads)?;
         let written = place_if_wanted(estimate)?;
         let state = loads.attached(opened_of(&open, state)?);
-        let loads = loads.of_next_step(state.displacements(), 1);
+        let loads = loads.of_next_step(&state, 1);
         let view = GuardView { second, watch: &mut *watch, storage };
         let status = view.follow(Status::Ok, open.view(), &loads, &state, &threads);
         if let Some(place) = written {

@@ -228,7 +228,7 @@ impl<'a> Call<'a> {
         let Self { open, loads, model, storage, state, exact, threads, report, .. } = self;
         if !model.is_exact_next() {
             let mut learned = model.with_storage(storage);
-            let loads = loads.of_next_step(state.displacements(), left);
+            let loads = loads.of_next_step(state, left);
             let seconds = exact.seconds();
             let tried = learned.try_step(open.view(), &loads, state, seconds, threads)?;
             let LearnedReport { clipped, outside, .. } = *model.report();

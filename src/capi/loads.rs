@@ -4,8 +4,8 @@ use core::ffi::c_void;
 use core::ptr;
 
 use crate::contact::Touch;
-use crate::loads::{Loads, Motion, NodalForce};
-use crate::state::{NodeVector, StateView};
+use crate::loads::{Loads, LoadsOfCall, LoadsOverTime, Motion, NodalForce};
+use crate::state::StateView;
 
 use super::contact::{CallContact, supple_contact};
 use super::memory::{self, Head, Layout, Object, Place, array, magic, place_for};
@@ -196,10 +196,8 @@ pub unsafe extern "C" fn supple_set_motions(
             motion.check(index, object.nodes as usize, movable)?;
         }
         arrays.change::<NodalForce>(object.force_room as usize);
-        let asked = arrays.change::<Motion>(object.motion_room as usize);
-        let now = arrays.change::<Motion>(object.motion_room as usize);
-        for ((asked, now), motion) in asked.iter_mut().zip(now).zip(motions) {
-            (*asked, *now) = (motion, motion);
+        for (place, motion) in arrays.change::<Motion>(object.motion_room as usize).iter_mut().zip(motions) {
+            *place = motion;
         }
         object.motions = count;
         Ok(SUPPLE_OK)
@@ -217,12 +215,7 @@ fn room_for(count: u32, room: u32) -> Answer<()> {
 
 /// Loads of one call that takes steps.
 pub(super) struct CallLoads<'a> {
-    gravity: [f32; 3],
-    forces: &'a [NodalForce],
-    /// Motions as they are asked for, and where they are in the next step.
-    asked: &'a [Motion],
-    now: &'a mut [Motion],
-    nodes: usize,
+    pub(super) of_call: LoadsOfCall<'a>,
     contact: Option<CallContact<'a>>,
 }
 
@@ -234,14 +227,8 @@ impl<'a> CallLoads<'a> {
     pub(super) unsafe fn of(loads: *mut supple_loads, scene: &OpenScene<'_>) -> Answer<Self> {
         let nodes = scene.node_count();
         if loads.is_null() {
-            return Ok(Self {
-                gravity: [0.0; 3],
-                forces: &[],
-                asked: &[],
-                now: &mut [],
-                nodes,
-                contact: None,
-            });
+            let none = Loads::unchecked([0.0; 3], &[], &[], nodes);
+            return Ok(Self { of_call: LoadsOfCall::new(none, &mut []), contact: None });
         }
         // SAFETY: the caller's promise; entries up to the counts were written.
         unsafe {
@@ -252,7 +239,13 @@ impl<'a> CallLoads<'a> {
             let asked = arrays.change_first::<Motion>(object.motions as usize, motion_room);
             let now = arrays.change_first::<Motion>(object.motions as usize, motion_room);
             let contact = CallContact::of(object.contact, nodes)?;
-            Ok(Self { gravity: object.gravity, forces, asked, now, nodes, contact })
+            let loads = Loads::unchecked(object.gravity, forces, asked, nodes);
+            #[cfg(feature = "contact")]
+            let loads = match &contact {
+                Some(contact) => loads.touched_by(contact.contact),
+                None => loads,
+            };
+            Ok(Self { of_call: LoadsOfCall::new(loads, now), contact })
         }
     }
 
@@ -271,32 +264,8 @@ impl<'a> CallLoads<'a> {
         }
     }
 
-    pub(super) const fn gravity(&self) -> [f32; 3] {
-        self.gravity
-    }
-
-    pub(super) const fn forces(&self) -> &'a [NodalForce] {
-        self.forces
-    }
-
-    /// As they are asked for.
-    pub(super) const fn motions(&self) -> &'a [Motion] {
-        self.asked
-    }
-
-    /// Loads of the next of the `left` steps that the call still takes: motions without a ramp go evenly over all of them.
-    pub(super) fn of_next_step(&mut self, displacements: &[NodeVector], left: u64) -> Loads<'_> {
-        for (now, asked) in self.now.iter_mut().zip(self.asked).filter(|(_, asked)| asked.ramp == 0.0) {
-            let at = displacements.get(asked.node as usize).copied().unwrap_or_default().to_array();
-            for (metre, (from, to)) in now.metre.iter_mut().zip(at.into_iter().zip(asked.metre)) {
-                *metre = if left > 1 { from + (to - from) / left as f32 } else { to };
-            }
-        }
-        let loads = Loads::unchecked(self.gravity, self.forces, self.now, self.nodes);
-        match &self.contact {
-            #[cfg(feature = "contact")]
-            Some(contact) => loads.touched_by(&contact.contact),
-            _ => loads,
-        }
+    /// Loads of the next of the `left` steps that the call still takes.
+    pub(super) fn of_next_step(&mut self, state: &StateView<'_>, left: u64) -> Loads<'_> {
+        self.of_call.of_step(state, 0.0, left.min(u32::MAX.into()) as u32)
     }
 }

@@ -105,10 +105,12 @@ pub unsafe extern "C" fn supple_remarks(
         {
             let scene = open.view();
             plausibility::of_body(scene, points, &mut say);
-            plausibility::of_gravity(loads.gravity()).into_iter().for_each(|remark| say(0, remark));
+            plausibility::of_gravity(loads.of_call.asked().gravity())
+                .into_iter()
+                .for_each(|remark| say(0, remark));
             let body = Proportions::of(scene, points);
-            body.of_forces(loads.forces()).into_iter().for_each(|remark| say(0, remark));
-            for (index, motion) in loads.motions().iter().enumerate() {
+            body.of_forces(loads.of_call.asked().forces()).into_iter().for_each(|remark| say(0, remark));
+            for (index, motion) in loads.of_call.asked().motions().iter().enumerate() {
                 body.of_motion(motion).into_iter().for_each(|remark| say(index, remark));
             }
             let network = recipe.and_then(|recipe| plausibility::of_network(scene, recipe));

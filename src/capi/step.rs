@@ -199,7 +199,7 @@ pub(super) fn take_steps(
 ) -> Status {
     let mut worst = Status::Ok;
     for done in 0..count {
-        let status = step(&loads.of_next_step(state.displacements(), left - done), state.reborrow());
+        let status = step(&loads.of_next_step(state, left - done), state.reborrow());
         loads.enter(state.touches());
         report.enter(&status, state);
         match status {

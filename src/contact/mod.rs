@@ -28,7 +28,7 @@
 //!     finger.move_to(Pose::at([-0.011 + depth, 0.01, 0.09]), now, end);
 //!     let instruments = [finger];
 //!     let contact = Contact::new(surface, &instruments)?;
-//!     let loads = Loads::NONE.touched_by(&contact);
+//!     let loads = Loads::NONE.touched_by(contact);
 //!     while state.time() < end {
 //!         let status = tled::step(&scene, &loads, &mut state.view().feeling(&mut touches), &step);
 //!         assert_eq!(status, Status::Ok);

@@ -197,6 +197,11 @@ pub struct GuardView<'a> {
 }
 
 impl GuardView<'_> {
+    /// The same for a shorter time.
+    pub(crate) const fn reborrow(&mut self) -> GuardView<'_> {
+        GuardView { second: self.second, watch: self.watch, storage: self.storage }
+    }
+
     /// The second run's steps become so many seconds long, where it is at the time of the first; with the loads that acted until then,
     /// if they still do.
     pub(crate) fn change_step<M: ElementMaterial>(
@@ -341,6 +346,11 @@ impl<S: AsMut<[NodeVector]>> Guard<S> {
         self.model.estimate()
     }
 
+    /// The guard, whatever its storage.
+    pub fn view(&mut self) -> GuardView<'_> {
+        self.model.with_storage(self.storage.as_mut())
+    }
+
     /// To be called after each step of the first run, or after each few, with what it answered, the loads that it had and the state that
     /// it left. Every so often it moves the second run and compares. Gives that status, or [`Status::Inexact`] in place of [`Status::Ok`] if the estimate
     /// exceeds what is allowed. A state that has been restored or reset, or has gone on for longer
@@ -352,7 +362,7 @@ impl<S: AsMut<[NodeVector]>> Guard<S> {
         loads: &Loads<'_>,
         state: &StateView<'_>,
     ) -> Status {
-        self.model.with_storage(self.storage.as_mut()).follow(taken, scene, loads, state, &CallingThread)
+        self.view().follow(taken, scene, loads, state, &CallingThread)
     }
 }
 

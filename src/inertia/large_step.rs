@@ -293,6 +293,12 @@ impl<'w> LargeModel<'w> {
         &self.report
     }
 
+    /// The longest step that its inertia makes stable, s: that which it was prepared for.
+    #[must_use]
+    pub const fn longest(&self) -> f32 {
+        self.prepared.seconds()
+    }
+
     /// Length of the next steps, s: at most the one that it was prepared for, which is the longest that its inertia makes stable. A
     /// shorter step has the inertia of that one, so it is less accurate than one that was prepared for its own length. To be changed now
     /// and then: central differences whose step changes all the time gain energy (Skeel 1993).
@@ -387,6 +393,11 @@ impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
     ) -> Result<Self, InertiaError> {
         let model = LargeModel::prepare(method, scene, points, state, step, storage.as_mut())?;
         Ok(Self { model, storage })
+    }
+
+    /// The model and its storage, to be changed.
+    pub fn parts(&mut self) -> (&mut LargeModel<'w>, &mut [NodeVector]) {
+        (&mut self.model, self.storage.as_mut())
     }
 
     /// The model: report and sizes.

@@ -376,7 +376,18 @@ pub struct LearnedView<'a, 'w> {
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub struct Undone;
 
-impl LearnedView<'_, '_> {
+impl<'w> LearnedView<'_, 'w> {
+    /// What it is apart from its storage.
+    #[must_use]
+    pub const fn model(&self) -> &LearnedModel<'w> {
+        self.model
+    }
+
+    /// See [`LearnedModel::fall_back`].
+    pub fn fall_back(&mut self, time: f64, status: Status) {
+        self.model.fall_back(time, status);
+    }
+
     /// For a motion from rest: frames as at the start, no lead-in yet, exact steps have not taken over.
     pub fn reset(&mut self) {
         self.storage.fill(NodeVector::ZERO);

@@ -64,6 +64,15 @@ impl Status {
         Self::Ok
     }
 
+    /// The worse of this status and a later one: a refusal before all, and a later one before an earlier, but what is limited stays so.
+    pub fn worse(self, later: Self) -> Self {
+        match (self, later) {
+            (_, Self::Ok) => self,
+            (Self::Limited { .. }, Self::Inexact { .. }) => self,
+            _ => later,
+        }
+    }
+
     /// Whether the step was taken.
     #[must_use]
     pub const fn is_taken(&self) -> bool {

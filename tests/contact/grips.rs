@@ -38,7 +38,7 @@ fn step(
     let (instruments, mut touch) = ([forceps], [Touch::default()]);
     let surface = Surface::new(&surface, body.points.len()).unwrap();
     let contact = Contact::new(surface, &instruments).unwrap().gripping(grips).unwrap();
-    let loads = Loads::new(&scene, GRAVITY, &[], &[]).unwrap().touched_by(&contact);
+    let loads = Loads::new(&scene, GRAVITY, &[], &[]).unwrap().touched_by(contact);
     let mut state = body.state(&mut touch).pushing(pushes);
     let status = match large {
         None => tled::step(&scene, &loads, &mut state.as_state(), &step),
@@ -121,7 +121,7 @@ fn to_grasp_is_not_to_move() {
     let contact = Contact::new(surface, &instruments).unwrap().gripping(&grips).unwrap();
     let (scene, step) = (held.scene.clone(), held.step);
     for _ in 0..3 {
-        let loads = Loads::NONE.touched_by(&contact);
+        let loads = Loads::NONE.touched_by(contact);
         let _ = tled::step(&scene, &loads, &mut held.state(&mut []).as_state(), &step);
         let _ = tled::step(&scene, &Loads::NONE, &mut free.state(&mut []).as_state(), &step);
     }

@@ -47,7 +47,7 @@ impl Run {
         let instruments = [instrument];
         let surface = Surface::new(&surface, body.points.len()).unwrap().with_triangles(&triangles).unwrap();
         let contact = Contact::new(surface, &instruments).unwrap();
-        let loads = Loads::NONE.touched_by(&contact);
+        let loads = Loads::NONE.touched_by(contact);
         let mut state = body.state(touch).pushing(pushes);
         match taker {
             Taker::Exact(step) => tled::step(&scene, &loads, &mut state, step),

@@ -105,7 +105,7 @@ impl Body {
         let [displacement, increment, force, volume] = &mut self.vectors;
         let state = StateView::new(displacement, increment, force, volume, &mut self.progress);
         let mut state = state.feeling(touches).pushing(&mut self.pushes);
-        let loads = Loads::new(&self.scene, gravity, &[], &[]).unwrap().touched_by(&contact);
+        let loads = Loads::new(&self.scene, gravity, &[], &[]).unwrap().touched_by(contact);
         tled::step(&self.scene, &loads, &mut state.as_state(), &self.step)
     }
 

@@ -108,7 +108,7 @@ fn steps_beyond_the_critical_one_refuse_instruments() {
     let table = [Instrument::resting(Shape::Plane, Pose::at([0.0, 0.0, -1.0]))];
     let surface = body.surface.clone();
     let contact = Contact::new(Surface::new(&surface, points.len()).unwrap(), &table).unwrap();
-    let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &[], &[]).unwrap().touched_by(&contact);
+    let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &[], &[]).unwrap().touched_by(contact);
     let mut scaled =
         LargeStep::prepare_in_vec(Method::MassScaled, scene.view(), &points, body.state(&mut []), step)
             .unwrap();

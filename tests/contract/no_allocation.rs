@@ -131,7 +131,7 @@ fn building_and_stepping_in_statics_allocates_nothing() {
     let mut touches = [Touch::default()];
     for _ in 0..100 {
         let mut state = state.view().feeling(&mut touches);
-        let loads = Loads::NONE.touched_by(&contact);
+        let loads = Loads::NONE.touched_by(contact);
         pressed +=
             u32::from(tled::step(scene, &loads, &mut state, &step).is_taken() && touches[0].contacts > 0);
     }

@@ -92,7 +92,7 @@ fn exact(body: &Body, threads: &impl Threads) -> Vec<u64> {
     let table = Instrument::resting(Shape::Plane, Pose::along([0.0; 3], [0.0, 1.0, 0.0]));
     let table = [Instrument { friction: 0.3, ..table }];
     let contact = Contact::new(Surface::new(&surface, surface.len()).unwrap(), &table).unwrap();
-    let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &forces, &motions).unwrap().touched_by(&contact);
+    let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &forces, &motions).unwrap().touched_by(contact);
     let mut state = rest_of(&scene);
     let step = Step::unchecked(DT, 20.0).unwrap();
     let mut touches = [Touch::default()];

@@ -76,24 +76,24 @@ pub(crate) struct Simulated {
 impl Simulation<'_> {
     pub(crate) fn run(self) -> Result<Simulated, Problem> {
         let Self { setup, out, unchecked, progress, watch } = self;
-        let (scene, mut state) = setup.build()?;
-        let scene = scene.view();
         // All that can be refused in the scene is refused before there is a folder.
-        let start = Start::new(setup, scene, &mut state, unchecked)?;
+        let start = Start::new(setup, unchecked)?;
         let mut folder = out.map(|Out { path, force }| Folder::create(path, force)).transpose()?;
 
         let tick = |time: f64| progress.set_position((time * 1e3) as u64);
-        let mut frame = |state: &mut VecState| {
+        let mut frame = |simulation: &mut supple::simulation::Simulation<'_>| {
+            let (scene, state) = simulation.parts_mut();
             watch(state);
-            folder.as_mut().map_or(Ok(()), |folder| folder.add_frame(setup, scene, state))
+            folder.as_mut().map_or(Ok(()), |folder| folder.add_frame(setup, scene.view(), state))
         };
-        let outcome = run(setup, scene, &mut state, start, &tick, &mut frame)?;
+        let (mut simulation, outcome) = run(setup, start, &tick, &mut frame)?;
         if outcome.divergence.is_some() {
             // The last state that may be believed.
-            frame(&mut state)?;
+            frame(&mut simulation)?;
         }
         progress.finish_and_clear();
-        let conclusion = results::conclude(folder.as_ref(), setup, scene, &state, &outcome)?;
-        Ok(Simulated { folder, state, outcome, conclusion })
+        let scene = simulation.scene().view();
+        let conclusion = results::conclude(folder.as_ref(), setup, scene, simulation.state(), &outcome)?;
+        Ok(Simulated { folder, state: simulation.state().clone(), outcome, conclusion })
     }
 }

@@ -15,8 +15,7 @@ use super::times::{Times, Walker};
 use super::{doubling, learned_cost};
 use crate::added_mass::describe_added;
 use crate::problem::Problem;
-use crate::run::large::grid;
-use crate::run::start::{critical, first_step};
+use crate::run::start::{first_step, grid};
 use crate::scene::setup::Setup;
 use crate::scene::timing::{damper, method_name};
 use crate::screen::{output, row};
@@ -39,7 +38,8 @@ pub(crate) fn describe(setup: &Setup, accuracy: Option<f64>) -> Result<(), Probl
         row("instruments", &setup.tools);
     }
     row("elements left out", setup.body.mesh.tets.len() - scene.element_count());
-    let bound = critical(scene, &mut state)?;
+    let bound = tled::critical_step(&scene, &mut state)
+        .ok_or_else(|| Problem("the stiffness of some element is not a finite number".into()))?;
     describe_limits(scene, &state, bound);
     let step = first_step(setup, bound, false);
     let loads = setup.loads(&scene)?;

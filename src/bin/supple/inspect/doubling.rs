@@ -13,7 +13,7 @@ use supple::step::{CriticalStep, Divergence, Status};
 
 use super::times::{Times, Walker};
 use crate::problem::Problem;
-use crate::run::large::grid;
+use crate::run::start::grid;
 use crate::scene::setup::Setup;
 use crate::scene::timing::method_name;
 use crate::screen::{output, row};

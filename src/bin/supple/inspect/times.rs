@@ -2,16 +2,15 @@
 
 use std::time::Instant;
 
-use supple::inertia::Method;
+use supple::inertia::{LargeStep, Method};
 use supple::loads::Loads;
 use supple::material::VecMaterial;
 use supple::scene::SceneView;
-use supple::state::VecState;
+use supple::state::{NodeVector, VecState};
 use supple::step::{CriticalStep, Status, Step};
 use supple::tled;
 
 use crate::problem::Problem;
-use crate::run::large::{PreparedStep, prepare};
 use crate::scene::setup::Setup;
 
 /// Steps of each method that are timed, and the length of those beyond the critical step in multiples of it.
@@ -76,7 +75,7 @@ fn timed(step: impl FnOnce() -> Status) -> f64 {
 /// A scene on its way from rest, with one method and one length of step.
 pub(crate) struct Walker {
     pub(crate) state: VecState,
-    pub(crate) step: PreparedStep,
+    pub(crate) step: LargeStep<'static, Vec<NodeVector>>,
 }
 
 impl Walker {
@@ -89,7 +88,8 @@ impl Walker {
     ) -> Result<Self, Problem> {
         let step = Step::unchecked(seconds, setup.damping).map_err(Problem::of)?;
         let mut state = setup.state();
-        let step = prepare(method, setup, scene, &mut state, step)?;
+        let step = LargeStep::prepare_in_vec(method.clone(), scene, &setup.body.local, state.view(), step)
+            .map_err(|error| Problem(format!("{}: {error}", setup.body.name)))?;
         Ok(Self { state, step })
     }
 

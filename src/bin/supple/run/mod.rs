@@ -1,130 +1,233 @@
 //! A simulation from rest to its end: steps, frames at even intervals, what became of it.
 
-pub(crate) mod adaptive;
-pub(crate) mod exact;
-pub(crate) mod large;
-pub(crate) mod learned;
 pub(crate) mod outcome;
 pub(crate) mod reactions;
 pub(crate) mod start;
 
 use std::time::Instant;
 
-use supple::material::VecMaterial;
-use supple::scene::SceneView;
-use supple::state::VecState;
-use supple::step::Status;
+use supple::loads::Loads;
+use supple::simulation::{Event, Report, Simulation, Taken};
+use supple::step::{CallingThread, Status};
 use supple::tled::Pace;
 
 use crate::problem::Problem;
 use crate::scene::setup::Setup;
-use exact::{Automatic, ExactSteps, Motion, ROUNDING};
-use outcome::{LargeTrace, Outcome};
-use reactions::Reactions;
-use start::{Mover, Start, critical};
+use outcome::{AdaptiveTrace, LargeTrace, LearnedTrace, Outcome};
+use reactions::{Mark, Reactions};
+use start::Start;
+
+/// Steps are single precision: their sum may miss a time by this share of the whole.
+const ROUNDING: f64 = 1e-7;
 
 /// Runs to the end or to divergence. `frame` is called at rest and after each interval between frames, `tick` with the time (s) now
 /// and then.
-pub(crate) fn run(
-    setup: &Setup,
-    scene: SceneView<'_, VecMaterial>,
-    state: &mut VecState,
-    start: Start<'_>,
-    tick: &dyn Fn(f64),
-    frame: &mut dyn FnMut(&mut VecState) -> Result<(), Problem>,
-) -> Result<Outcome, Problem> {
-    let loads = setup.loads(&scene)?;
-    let (time, tools) = (&setup.time, &setup.tools);
-    let rounding = 2.0 * ROUNDING * time.end;
-    let Start { at_rest, step, mut mover, mut guard } = start;
+pub(crate) fn run<'a>(
+    setup: &'a Setup,
+    start: Start<'a>,
+    tick: &'a dyn Fn(f64),
+    frame: &mut dyn FnMut(&mut Simulation<'_>) -> Result<(), Problem>,
+) -> Result<(Simulation<'a>, Outcome), Problem> {
+    let Start { at_rest, step, simulation } = start;
+    let time = &setup.time;
     let mut outcome = Outcome::new(at_rest, step.seconds());
-    outcome.reactions = Reactions::new(tools.tools.len(), time);
-    if let (Mover::Large(large), Some(method)) = (&mover, &time.method) {
+    outcome.reactions = Reactions::new(setup.tools.tools.len(), time);
+    if let (Some(large), Some(method)) = (simulation.long_step(), &time.method) {
         outcome.large = Some(LargeTrace::new(method, large.model()));
     }
-    if let Mover::Adaptive(_) = &mover {
+    outcome.learned = simulation.learned_step().map(LearnedTrace::new);
+    if simulation.auto_step().is_some() {
         // They begin as exact ones.
         outcome.steps.0 = outcome.steps.0.min(Pace::SHARE * at_rest.seconds);
         outcome.steps.1 = outcome.steps.0;
     }
-    outcome.enter_frame(state);
-    frame(state)?;
     // Time goes in even intervals, each one step or one of a network, unless exact steps alone set their own pace.
-    let interval = if let Mover::Learned(learned) = &mover { learned.seconds() } else { step.seconds() };
-    let even = !matches!(mover, Mover::Exact(ExactSteps::Automatic(_)));
+    let interval = simulation.learned_step().map_or(step.seconds(), |learned| learned.seconds());
     let total = (time.end / f64::from(interval)).round().max(1.0) as u64;
-    let mut taken = 0;
+    let is_even = !(time.sets_own_pace() && setup.learned.is_none());
     // No two frames of one state.
-    let frames = if even { total.min(time.frames.into()) } else { time.frames.into() };
+    let frames = if is_even { total.min(time.frames.into()) } else { time.frames.into() };
+    let loads = setup.loads(simulation.scene())?;
+    let mut running = Running { setup, simulation, loads, outcome, tick, taken: 0 };
+    running.outcome.enter_frame(running.simulation.state());
+    frame(&mut running.simulation)?;
     for index in 1..=frames {
         let share = index as f64 / frames as f64;
         let clock = Instant::now();
-        if let Mover::Exact(ExactSteps::Automatic(automatic)) = &mut mover {
-            let motion = Motion { scene, loads, damping: setup.damping, end: time.end, tick };
-            reach(automatic, setup, motion, state, &mut outcome, time.end * share)?;
-        } else {
+        if is_even {
             let target = (total as f64 * share).round() as u64;
-            while taken < target && outcome.divergence.is_none() {
-                taken += 1;
-                let instruments = tools.at(state.time() + rounding);
-                let contact = tools.contact(&instruments, scene.node_count())?;
-                let loads = if tools.is_empty() { loads } else { loads.touched_by(&contact) };
-                let motion = Motion { scene, loads, damping: setup.damping, end: time.end, tick };
-                mover.advance(&motion, state, &mut outcome, interval)?;
-                if let Some(guard) = guard.as_mut().filter(|_| outcome.divergence.is_none()) {
-                    let begun = Instant::now();
-                    let status = guard.follow(Status::Ok, scene, &loads, &state.view());
-                    outcome.guarding += begun.elapsed();
-                    let status = if mover.is_leading() { Status::Ok } else { status };
-                    let trace = outcome.guard.get_or_insert_default();
-                    trace.enter(status, guard.estimate(), state.time());
-                    if let (Mover::Learned(learned), Status::Inexact { .. }) = (&mut mover, status) {
-                        learned.fall_back(state.time(), status);
-                    }
-                }
-                if taken % u64::from(Pace::STEPS_BETWEEN_LOOKS) == 0 {
-                    tick(state.time());
-                }
-            }
+            running.take_until(target, interval)?;
+        } else {
+            running.reach(time.end * share)?;
         }
-        outcome.spent += clock.elapsed();
-        if outcome.divergence.is_some() {
+        running.outcome.spent += clock.elapsed();
+        if running.outcome.divergence.is_some() {
             break;
         }
-        let bound = critical(scene, state)?;
-        if bound.seconds < outcome.least.0.seconds {
-            outcome.least = (bound, state.time());
-        }
-        if mover.fixed_exact_seconds().is_some_and(|seconds| seconds > bound.seconds) {
-            outcome.above_from.get_or_insert(state.time());
-        }
-        outcome.enter_frame(state);
-        frame(state)?;
+        running.look()?;
+        frame(&mut running.simulation)?;
     }
-    if let Mover::Learned(learned) = mover {
-        outcome.learned = Some(learned.trace);
-    }
-    Ok(outcome)
+    Ok((running.simulation, running.outcome))
 }
 
-/// Automatic steps to a time (s), along the parts of the instruments' paths.
-fn reach(
-    automatic: &mut Automatic,
-    setup: &Setup,
-    motion: Motion<'_>,
-    state: &mut VecState,
-    outcome: &mut Outcome,
-    target: f64,
-) -> Result<(), Problem> {
-    let (tools, rounding) = (&setup.tools, 2.0 * ROUNDING * motion.end);
-    let mut from = state.time();
-    while from < target && outcome.divergence.is_none() {
-        let until = target.min(tools.next_turn(from + rounding));
-        let instruments = tools.at(from + rounding);
-        let contact = tools.contact(&instruments, motion.scene.node_count())?;
-        let loads = if tools.is_empty() { motion.loads } else { motion.loads.touched_by(&contact) };
-        automatic.reach(&Motion { loads, ..motion }, state, outcome, until);
-        from = until;
+struct Running<'a> {
+    setup: &'a Setup,
+    simulation: Simulation<'a>,
+    /// Without instruments.
+    loads: Loads<'a>,
+    outcome: Outcome,
+    /// Is told the time now and then, s.
+    tick: &'a dyn Fn(f64),
+    /// Intervals of even length so far.
+    taken: u64,
+}
+
+impl Running<'_> {
+    /// Intervals of so many seconds, until there have been as many.
+    fn take_until(&mut self, target: u64, seconds: f32) -> Result<(), Problem> {
+        while self.taken < target && self.outcome.divergence.is_none() {
+            self.taken += 1;
+            let now = self.simulation.state().time();
+            self.advance(now + f64::from(seconds))?;
+            if self.taken.is_multiple_of(Pace::STEPS_BETWEEN_LOOKS.into()) {
+                (self.tick)(now);
+            }
+        }
+        Ok(())
     }
-    Ok(())
+
+    /// Exact steps of their own pace to a time (s), along the parts of the instruments' paths.
+    fn reach(&mut self, target: f64) -> Result<(), Problem> {
+        let mut from = self.simulation.state().time();
+        while from < target && self.outcome.divergence.is_none() {
+            let until = target.min(self.setup.tools.next_turn(from + self.rounding()));
+            self.advance_from(from, until)?;
+            from = until;
+        }
+        Ok(())
+    }
+
+    fn rounding(&self) -> f64 {
+        2.0 * ROUNDING * self.setup.time.end
+    }
+
+    fn advance(&mut self, until: f64) -> Result<(), Problem> {
+        self.advance_from(self.simulation.state().time(), until)
+    }
+
+    /// Moves on to a time (s) with the instruments on the parts of their paths that begin at `from` or before, s.
+    fn advance_from(&mut self, from: f64, until: f64) -> Result<(), Problem> {
+        let rounding = self.rounding();
+        let Self { setup, simulation, loads, outcome, tick, .. } = self;
+        let mut loads = *loads;
+        let instruments = setup.tools.at(from + rounding);
+        if !instruments.is_empty() {
+            let nodes = simulation.scene().node_count();
+            loads = loads.touched_by(setup.tools.contact(&instruments, nodes)?);
+        }
+        let mut watched =
+            Watched { mark: (outcome.limits, outcome.reactions.mark()), outcome, began: Instant::now() };
+        let mut watch = |event: Event<'_>| {
+            if let Event::Tried(time) = event {
+                tick(time);
+            }
+            watched.enter(event);
+        };
+        let advanced = simulation.advance_under(until, &mut loads, &CallingThread, &mut watch);
+        let report = advanced.map_err(Problem::of)?;
+        self.enter(&report);
+        Ok(())
+    }
+
+    /// Takes down what a call came to.
+    fn enter(&mut self, report: &Report) {
+        let Self { simulation, outcome, .. } = self;
+        let [shortest, longest] = report.seconds;
+        if longest > 0.0 {
+            outcome.steps = (outcome.steps.0.min(shortest), outcome.steps.1.max(longest));
+        }
+        if let (Some(trace), Some(large)) = (&mut outcome.large, simulation.long_step()) {
+            trace.enter(large.report());
+        }
+        if let (Some(trace), Some(model)) = (&mut outcome.learned, simulation.learned_step()) {
+            trace.enter_fallback(model);
+            trace.exact_intervals += u64::from(report.fell_back);
+        }
+        if let Some(adaptive) = simulation.auto_step() {
+            outcome.computed += u64::from(report.steps()).saturating_sub(1);
+            let trace =
+                outcome.adaptive.get_or_insert_with(|| AdaptiveTrace::new(adaptive.model().tolerance()));
+            trace.enter(report);
+        }
+    }
+
+    /// Looks at the critical step, and takes down a frame.
+    fn look(&mut self) -> Result<(), Problem> {
+        let bound = self.simulation.critical_step().map_err(Problem::of)?;
+        let Self { setup, simulation, outcome, .. } = self;
+        let time = simulation.state().time();
+        if bound.seconds < outcome.least.0.seconds {
+            outcome.least = (bound, time);
+        }
+        let is_exact = match (&setup.time.method, &setup.learned, simulation.learned_step()) {
+            (None, None, _) => true,
+            (_, Some(choice), Some(model)) => {
+                self.taken < model.intervals(choice.burn_in) || model.is_exact_next()
+            }
+            _ => false,
+        };
+        if is_exact
+            && !setup.time.sets_own_pace()
+            && simulation.settings().step.is_some_and(|step| step > bound.seconds)
+        {
+            outcome.above_from.get_or_insert(time);
+        }
+        outcome.enter_frame(simulation.state());
+        Ok(())
+    }
+}
+
+/// The outcome during a call.
+struct Watched<'a> {
+    outcome: &'a mut Outcome,
+    /// Before steps that may be taken back.
+    mark: (outcome::Limits, Mark),
+    /// When what is timed began.
+    began: Instant,
+}
+
+impl Watched<'_> {
+    fn enter(&mut self, event: Event<'_>) {
+        let outcome = &mut *self.outcome;
+        match event {
+            Event::Tried(_) => self.mark = (outcome.limits, outcome.reactions.mark()),
+            Event::TakenBack => {
+                (outcome.limits, outcome.divergence) = (self.mark.0, None);
+                outcome.reactions.take_back(&self.mark.1);
+            }
+            Event::Predicts(time) => {
+                self.began = Instant::now();
+                if let Some(trace) = &mut outcome.learned {
+                    trace.from.get_or_insert(time);
+                }
+            }
+            Event::Predicted(report) => {
+                outcome.computed += 1;
+                if let Some(trace) = &mut outcome.learned {
+                    trace.enter(&report, self.began.elapsed());
+                }
+            }
+            Event::Step(taken, status, state) => {
+                outcome.computed += u64::from(taken != Taken::Learned);
+                outcome.enter(status, state);
+                self.began = Instant::now();
+            }
+            Event::Judged(status, estimate, state) => {
+                outcome.guarding += self.began.elapsed();
+                // A refused step has no error.
+                let status = if status.is_taken() { status } else { Status::Ok };
+                outcome.guard.get_or_insert_default().enter(status, estimate, state.time());
+            }
+        }
+    }
 }

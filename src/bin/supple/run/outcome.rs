@@ -4,13 +4,15 @@ use std::time::Duration;
 
 use supple::adaptive::Taken;
 use supple::guard::Estimate;
-use supple::inertia::{Grid, LargeModel, Method, Report};
+use supple::inertia::{self, Grid, LargeModel, Method};
 use supple::learned::{Fallback, LearnedModel, LearnedReport};
 use supple::material::J_FLOOR;
+use supple::simulation::Report;
 use supple::state::{StateView, VecState};
 use supple::step::{CriticalStep, Divergence, Status};
 
 use super::reactions::Reactions;
+use crate::weight_file::describe_step;
 
 /// Steps that are not exact: elements were beyond the range of their law, there was energy that the balance does not explain, or
 /// motion was held back.
@@ -129,7 +131,6 @@ impl Outcome {
 
     /// Takes down what a step said that led to `state`.
     pub(crate) fn enter(&mut self, status: Status, state: &StateView<'_>) {
-        self.computed += 1;
         if status.is_taken() {
             self.reactions.enter(state);
         }
@@ -159,7 +160,7 @@ pub(crate) struct LargeTrace {
     pub(crate) grid: Grid,
     pub(crate) is_damped: bool,
     /// After the latest step.
-    pub(crate) report: Report,
+    pub(crate) report: inertia::Report,
     /// Steps in which nodes were held back, and the most nodes at once.
     pub(crate) steps_held_back: u64,
     pub(crate) most_held_back: u32,
@@ -182,7 +183,7 @@ impl LargeTrace {
     }
 
     /// Takes down the report of a step.
-    pub(crate) fn enter(&mut self, report: &Report) {
+    pub(crate) fn enter(&mut self, report: &inertia::Report) {
         self.report = *report;
         self.steps_held_back += u64::from(report.held_back > 0);
         self.most_held_back = self.most_held_back.max(report.held_back);
@@ -197,6 +198,17 @@ pub(crate) struct AdaptiveTrace {
     /// m.
     pub(crate) tolerance: f32,
     pub(crate) taken: Taken,
+}
+
+impl AdaptiveTrace {
+    pub(crate) fn new(tolerance: f32) -> Self {
+        Self { tolerance, taken: Taken::default() }
+    }
+
+    /// Takes down what a span took.
+    pub(crate) fn enter(&mut self, &Report { exact, long: large, changes, .. }: &Report) {
+        self.taken = self.taken + Taken { exact, large, changes };
+    }
 }
 
 /// What a guard said of the steps.
@@ -245,10 +257,10 @@ pub(crate) struct LearnedTrace {
 }
 
 impl LearnedTrace {
-    pub(crate) fn new(seconds: f32, described: String) -> Self {
+    pub(crate) fn new(model: &LearnedModel<'_>) -> Self {
         Self {
-            seconds,
-            described,
+            seconds: model.seconds(),
+            described: describe_step(model.network()),
             from: None,
             steps: 0,
             spent: Duration::ZERO,

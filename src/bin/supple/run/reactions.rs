@@ -77,8 +77,9 @@ impl Reactions {
     }
 
     /// Takes back the steps since the mark.
-    pub(crate) fn take_back(&mut self, mark: Mark) {
-        (self.next, self.current) = (mark.next, mark.current);
+    pub(crate) fn take_back(&mut self, mark: &Mark) {
+        self.next = mark.next;
+        self.current.clone_from(&mark.current);
         self.rows.truncate(mark.rows);
     }
 

@@ -1,131 +1,74 @@
 //! A simulation at rest: what moves the scene, and the length of its steps. All that can be refused is refused here.
 
-use supple::guard::{self, Allowed, Guard};
+use supple::inertia::{Cells, Grid, Method};
 use supple::material::VecMaterial;
 use supple::scene::SceneView;
-use supple::state::{NodeVector, VecState};
+use supple::simulation::{self, LONGEST_STEPS, Settings, Simulation};
 use supple::step::{CriticalStep, Step};
-use supple::tled::{self, Pace};
+use supple::tled::Pace;
 
-use super::adaptive::AdaptiveRun;
-use super::exact::{Automatic, ExactSteps, Motion};
-use super::large::{PreparedStep, grid, prepare};
-use super::learned::LearnedRun;
-use super::outcome::Outcome;
 use crate::problem::Problem;
 use crate::scene::setup::Setup;
 use crate::scene::timing::StepChoice;
-
-/// What moves a scene.
-pub(crate) enum Mover<'a> {
-    Exact(ExactSteps),
-    /// Mass-scaled, multilevel or damped steps.
-    Large(Box<PreparedStep>),
-    Learned(Box<LearnedRun<'a>>),
-    Adaptive(Box<AdaptiveRun>),
-}
-
-impl Mover<'_> {
-    /// Moves on by one interval: a step of `seconds`, or one of a network.
-    pub(crate) fn advance(
-        &mut self,
-        motion: &Motion<'_>,
-        state: &mut VecState,
-        outcome: &mut Outcome,
-        seconds: f32,
-    ) -> Result<(), Problem> {
-        match self {
-            Self::Exact(steps) => {
-                steps.advance(motion, state, outcome, seconds);
-                Ok(())
-            }
-            Self::Learned(learned) => learned.advance(motion, state, outcome),
-            Self::Adaptive(adaptive) => {
-                adaptive.advance(motion, state, outcome, seconds);
-                Ok(())
-            }
-            Self::Large(large) => {
-                let status = large.step(motion.scene, &motion.loads, state.view());
-                if let Some(trace) = &mut outcome.large {
-                    trace.enter(large.report());
-                }
-                outcome.enter(status, &state.view());
-                Ok(())
-            }
-        }
-    }
-
-    /// Whether the latest interval was of exact steps that lead a network, which have no error.
-    pub(crate) fn is_leading(&self) -> bool {
-        matches!(self, Self::Learned(learned) if learned.is_leading())
-    }
-
-    /// The length of fixed exact steps (s), while they move the scene.
-    pub(crate) fn fixed_exact_seconds(&self) -> Option<f32> {
-        match self {
-            Self::Exact(ExactSteps::Fixed(step)) => Some(step.seconds()),
-            Self::Learned(learned) => learned.fixed_exact_seconds(),
-            _ => None,
-        }
-    }
-}
-
-/// Longest adaptive step that is tried unless the scene file says otherwise, over the critical one.
-const LONGEST: f32 = 100.0;
 
 /// A simulation at rest.
 pub(crate) struct Start<'a> {
     pub(crate) at_rest: CriticalStep,
     /// The step that was asked for, with a network the exact one.
     pub(crate) step: Step,
-    pub(crate) mover: Mover<'a>,
-    /// Of steps beyond the critical one.
-    pub(crate) guard: Option<Guard<Vec<NodeVector>>>,
+    pub(crate) simulation: Simulation<'a>,
 }
 
 impl<'a> Start<'a> {
-    pub(crate) fn new(
-        setup: &'a Setup,
-        scene: SceneView<'_, VecMaterial>,
-        state: &mut VecState,
-        unchecked: bool,
-    ) -> Result<Self, Problem> {
-        let at_rest = critical(scene, state)?;
+    pub(crate) fn new(setup: &'a Setup, unchecked: bool) -> Result<Self, Problem> {
+        let mut simulation = setup.simulation()?;
+        let at_rest = simulation.critical_step().map_err(Problem::of)?;
         let step = first_step(setup, at_rest, unchecked)?;
-        let exact = match setup.time.step {
-            StepChoice::Auto => ExactSteps::Automatic(Automatic::at_rest(at_rest, scene.node_count())),
-            _ => ExactSteps::Fixed(step),
+        if let Some(method) = &setup.time.method {
+            grid(setup, simulation.scene().view(), method)?;
+        }
+        let method = match (&setup.time.method, &setup.learned) {
+            (Some(method), _) if setup.time.is_adaptive => simulation::Method::Auto(method.clone()),
+            (Some(method), _) => simulation::Method::Long(method.clone()),
+            (None, Some(choice)) => choice.method()?,
+            (None, None) => simulation::Method::Exact,
         };
-        let mover = match (&setup.time.method, &setup.learned) {
-            (Some(method), _) if setup.time.is_adaptive => {
-                Mover::Adaptive(Box::new(AdaptiveRun::new(method, setup, scene, state, step)?))
-            }
-            (Some(method), _) => {
-                grid(setup, scene, method)?;
-                Mover::Large(Box::new(prepare(method, setup, scene, state, step)?))
-            }
-            (None, Some(choice)) => {
-                Mover::Learned(Box::new(LearnedRun::new(choice, scene.node_count(), exact)?))
-            }
-            (None, None) => Mover::Exact(exact),
-        };
-        let guard = match &mover {
-            Mover::Exact(_) | Mover::Adaptive(_) => None,
-            Mover::Large(_) => Some((step.seconds(), guard::EVERY)),
-            Mover::Learned(learned) => Some((learned.seconds(), guard::EVERY_LEARNED)),
-        };
-        let guard = guard.map(|(seconds, every)| {
-            let step = Step::unchecked(seconds, setup.damping).map_err(Problem::of)?;
-            Guard::prepare_in_vec(scene, &setup.body.local, state.view(), step, every)
-                .map(|guard| match setup.time.tolerance {
-                    Some(metres) => guard.allowing(Allowed::Metres(metres)),
-                    None => guard,
-                })
-                .map_err(|error| Problem(format!("{}: {error}", setup.body.name)))
+        simulation.set(Settings {
+            method,
+            step: (!setup.time.sets_own_pace()).then_some(step.seconds()),
+            damping: setup.damping,
+            tolerance: setup.time.tolerance,
+            guard: true,
+            // The step has been checked.
+            unchecked: true,
         });
-        let guard = guard.transpose()?;
-        Ok(Self { at_rest, step, mover, guard })
+        simulation.prepare().map_err(|error| Problem(format!("{}: {error}", setup.body.name)))?;
+        Ok(Self { at_rest, step, simulation })
     }
+}
+
+/// The lattice of a scene's method; steps may be prepared on a coarser one than is suggested. A mesh too small for the lattice that its
+/// method wants is a problem.
+pub(crate) fn grid(
+    setup: &Setup,
+    scene: SceneView<'_, VecMaterial>,
+    method: &Method<'_>,
+) -> Result<Grid, Problem> {
+    let grid = method.grid(scene, &setup.body.local).map_err(|error| {
+        let place = setup.time.lattice_at.as_ref().unwrap_or(&setup.body.name);
+        Problem(format!("{place}: {error}"))
+    })?;
+    let suggested =
+        matches!(method, Method::Multilevel(Cells::Suggested) | Method::Damped(_, Cells::Suggested));
+    if suggested && grid.functions == 0 {
+        return Err(Problem(format!(
+            "{}: with {} elements the mesh is too small for a lattice to pay; give lattice = [1, 1, 1] under \
+             [time], or method = \"mass-scaled\"",
+            setup.body.name,
+            scene.element_count()
+        )));
+    }
+    Ok(grid)
 }
 
 /// The step that the scene file asks for. The exact step is refused above the critical one unless `unchecked`.
@@ -136,7 +79,7 @@ pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, unchecked: bool) 
         StepChoice::Seconds(seconds) => seconds,
         StepChoice::Multiple(multiple) => multiple * at_rest.seconds,
         StepChoice::Auto if time.is_adaptive => {
-            (LONGEST * at_rest.seconds).min((time.end / f64::from(time.frames)) as f32)
+            (LONGEST_STEPS * at_rest.seconds).min((time.end / f64::from(time.frames)) as f32)
         }
         StepChoice::Auto => Pace::SHARE * at_rest.seconds,
     };
@@ -182,13 +125,4 @@ fn fitted(seconds: f32, end: f64, frames: u32) -> f32 {
 /// The least number of equal steps, each at most `longest` (s), that make up a span (s).
 fn whole_steps(span: f64, longest: f64) -> f64 {
     (span / longest).ceil().max(1.0)
-}
-
-/// The bound of the critical step at the state, or a problem: there is none for a state that is not finite.
-pub(crate) fn critical(
-    scene: SceneView<'_, VecMaterial>,
-    state: &mut VecState,
-) -> Result<CriticalStep, Problem> {
-    tled::critical_step(&scene, state)
-        .ok_or_else(|| Problem("the stiffness of some element is not a finite number".into()))
 }

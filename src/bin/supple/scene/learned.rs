@@ -7,6 +7,7 @@ use supple::learned::{self, LearnedModel, LearnedStep};
 use supple::material::Element;
 use supple::mlp::{Network, WeightBytes};
 use supple::plausibility::same;
+use supple::simulation::Method;
 use supple::state::NodeVector;
 use toml::Spanned;
 
@@ -69,6 +70,11 @@ impl LearnedChoice {
     pub(crate) fn network(&self) -> Result<Network<'_>, Problem> {
         weight_file::parse(&self.path, &self.memory)
             .map_err(|problem| Problem(format!("{}: {problem}", self.place)))
+    }
+
+    /// How it moves a scene.
+    pub(crate) fn method(&self) -> Result<Method<'_>, Problem> {
+        Ok(Method::Learned { network: self.network()?, lead_in: self.burn_in, fallback: self.fallback })
     }
 
     /// The learned step of a scene of so many nodes.

@@ -3,6 +3,7 @@
 use supple::loads::{Loads, Motion, NodalForce};
 use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
 use supple::scene::{AsScene, BuildError, Support, VecScene};
+use supple::simulation::Simulation;
 use supple::state::VecState;
 
 use super::body::{Body, read_body};
@@ -118,6 +119,14 @@ impl Setup {
                 }
             })?;
         Ok((scene, self.state()))
+    }
+
+    /// A simulation at rest.
+    pub(crate) fn simulation(&self) -> Result<Simulation<'_>, Problem> {
+        let (scene, state) = self.build()?;
+        let mut simulation = Simulation::of_scene(scene, &self.body.local, &self.body.mesh.tets);
+        *simulation.state_mut() = state;
+        Ok(simulation)
     }
 
     /// A state at rest.

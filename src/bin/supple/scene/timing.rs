@@ -96,6 +96,11 @@ impl Timing {
         }
     }
 
+    /// Whether exact steps follow the critical step, or steps choose their length.
+    pub(crate) const fn sets_own_pace(&self) -> bool {
+        matches!(self.step, StepChoice::Auto) && !self.is_adaptive
+    }
+
     /// Refuses a step beyond the end.
     pub(crate) fn check_length(&self, seconds: f32) -> Result<(), Problem> {
         if f64::from(seconds) <= self.end {

@@ -1,0 +1,362 @@
+//! What moves a scene, over memory of whoever owns it: the loop of every host.
+
+use super::Report;
+use crate::adaptive::AdaptiveView;
+use crate::element::ElementMaterial;
+use crate::guard::{Estimate, GuardView};
+use crate::inertia::LargeModel;
+use crate::learned::{LearnedError, LearnedReport, LearnedView, Undone};
+use crate::loads::{Loads, LoadsOverTime};
+use crate::scene::SceneView;
+use crate::simd::NodeVector;
+use crate::state::StateView;
+use crate::step::{Status, Step, Threads};
+use crate::tled::{self, Approach, Pace};
+
+/// Share of a span that is no step but a rounding of single precision.
+const ROUNDING: f64 = 1e-6;
+
+/// What moves a scene, borrowed for a call.
+#[derive(Debug)]
+// They stand in memory of the caller for as long as a call.
+#[allow(clippy::large_enum_variant)]
+pub enum Mover<'a, 'w> {
+    /// Exact steps.
+    Exact(ExactSteps<'a>),
+    /// Steps beyond the critical one, with the storage in which they were prepared, and what estimates their error.
+    Long(&'a mut LargeModel<'w>, &'a mut [NodeVector], Option<GuardView<'a>>),
+    /// Steps that choose their length.
+    Auto(AdaptiveView<'a, 'w>),
+    /// Learned steps, the exact ones that lead them, and what estimates their error.
+    Learned(LearnedView<'a, 'w>, ExactSteps<'a>, &'a mut Lead, Option<GuardView<'a>>),
+}
+
+/// How exact steps are taken.
+#[derive(Debug)]
+pub enum ExactSteps<'a> {
+    /// Of at most this length.
+    Fixed(Step),
+    /// Of nine tenths of the critical step at the moment, with [`tled::vectors_for_pace`] vectors to undo steps.
+    Paced {
+        /// Their length at present.
+        pace: &'a mut Pace,
+        /// To undo them.
+        kept: &'a mut [NodeVector],
+        /// 1/s.
+        damping: f32,
+    },
+}
+
+/// How long exact steps lead before a network takes over. They lead again where the state was reset or restored.
+#[derive(Clone, Copy, Debug)]
+pub struct Lead {
+    /// Of the network's intervals, in all and still to come.
+    all: u64,
+    left: u64,
+}
+
+impl Lead {
+    /// Of so many of the network's intervals ([`crate::learned::LearnedModel::intervals`]).
+    #[must_use]
+    pub const fn new(intervals: u64) -> Self {
+        Self { all: intervals, left: intervals }
+    }
+}
+
+/// What a step was.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum Taken {
+    /// An exact one.
+    Exact,
+    /// One beyond the critical step.
+    Long,
+    /// A span of steps that choose their length.
+    Auto,
+    /// A network's.
+    Learned,
+}
+
+/// What happens in a call, for hosts that watch each step.
+#[derive(Debug)]
+pub enum Event<'a> {
+    /// Exact steps begin at this time (s) that may be taken back.
+    Tried(f64),
+    /// They are taken back.
+    TakenBack,
+    /// A network's step begins at this time, s.
+    Predicts(f64),
+    /// What it found; exact steps follow in its place if it was taken back.
+    Predicted(LearnedReport),
+    /// A step, or a refusal; the state is that after it.
+    Step(Taken, Status, &'a StateView<'a>),
+    /// What is known of the error after a step.
+    Judged(Status, Option<Estimate>, &'a StateView<'a>),
+}
+
+/// A call.
+struct Call<'c, L, T, W> {
+    loads: &'c mut L,
+    threads: &'c T,
+    watch: &'c mut W,
+    report: Report,
+}
+
+impl Mover<'_, '_> {
+    /// Moves on until the time `until` (s), or to a step that is refused: the state is then that before it, and the report has the
+    /// status. `watch` is shown each step.
+    pub fn advance<M: ElementMaterial>(
+        self,
+        until: f64,
+        scene: SceneView<'_, M>,
+        loads: &mut impl LoadsOverTime,
+        mut state: StateView<'_>,
+        threads: &impl Threads,
+        watch: &mut impl FnMut(Event<'_>),
+    ) -> Result<Report, LearnedError> {
+        let report = Report::new(state.time());
+        let mut call = Call { loads, threads, watch, report };
+        let span = until - state.time();
+        match self {
+            // A remainder of rounding is no step, and a span that is no number none either.
+            _ if !(span > 0.0) => {}
+            Self::Exact(mut exact) => {
+                call.exact_steps(&mut exact, span, 0.0, scene, &mut state);
+            }
+            Self::Long(model, storage, guard) => {
+                call.long_steps(model, storage, guard, span, scene, &mut state)
+            }
+            Self::Auto(adaptive) => call.auto_steps(adaptive, span, scene, &mut state),
+            Self::Learned(learned, exact, lead, guard) => {
+                call.learned_steps(learned, exact, lead, guard, span, scene, &mut state)?;
+            }
+        }
+        Ok(Report { time: state.time(), ..call.report })
+    }
+}
+
+/// How many steps of at most `longest` (s) make up a span (s), and their length: `longest` itself if it differs by a rounding only.
+fn equal_steps(span: f64, longest: f32) -> (u32, f32) {
+    let most = f64::from(longest);
+    let count = libm::ceil(span / most * (1.0 - ROUNDING)).clamp(1.0, f64::from(u32::MAX));
+    let length = span / count;
+    let is_longest = libm::fabs(length - most) <= ROUNDING * most;
+    (count as u32, if is_longest { longest } else { (length as f32).min(longest) })
+}
+
+impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
+    /// Takes exact steps for `span` seconds; the call goes on for `rest` seconds after them. Whether all were taken.
+    fn exact_steps<M: ElementMaterial>(
+        &mut self,
+        exact: &mut ExactSteps<'_>,
+        span: f64,
+        rest: f64,
+        scene: SceneView<'_, M>,
+        state: &mut StateView<'_>,
+    ) -> bool {
+        let Self { loads, threads, watch, report } = self;
+        let loads = &mut Longer { loads: &mut **loads, rest };
+        match exact {
+            ExactSteps::Fixed(step) => {
+                let (count, seconds) = equal_steps(span, step.seconds());
+                let Ok(step) = Step::unchecked(seconds, step.damping()) else { return true };
+                for done in 0..count {
+                    let loads = loads.of_step(state, seconds, count - done);
+                    let status = tled::step_in_parts(scene, &loads, state.reborrow(), &step, *threads);
+                    watch(Event::Step(Taken::Exact, status, state));
+                    report.enter(status);
+                    if !status.is_taken() {
+                        report.undone += 1;
+                        return false;
+                    }
+                    report.exact += 1;
+                    report.enter_length(seconds);
+                }
+                true
+            }
+            ExactSteps::Paced { pace, kept, damping } => {
+                let until = state.time() + span;
+                while until - state.time() > ROUNDING * span {
+                    watch(Event::Tried(state.time()));
+                    let (left, mut worst, mut taken) = (until - state.time(), Status::Ok, 0);
+                    let enter = |status: Status, _: &Loads<'_>, state: &StateView<'_>| {
+                        watch(Event::Step(Taken::Exact, status, state));
+                        worst = worst.worse(status);
+                        taken += 1;
+                    };
+                    let state = state.reborrow();
+                    match pace.approach(left, *damping, scene, loads, state, kept, *threads, enter) {
+                        Approach::Undone => {
+                            report.undone += taken;
+                            watch(Event::TakenBack);
+                        }
+                        // The rest is no step.
+                        Approach::TooShort => return true,
+                        Approach::Taken { seconds } => {
+                            report.enter(worst);
+                            report.exact += taken;
+                            report.enter_length(seconds);
+                        }
+                        Approach::Refused(status) => {
+                            report.enter(status);
+                            report.exact += taken.saturating_sub(1);
+                            report.undone += 1;
+                            return false;
+                        }
+                    }
+                }
+                true
+            }
+        }
+    }
+
+    fn long_steps<M: ElementMaterial>(
+        &mut self,
+        model: &mut LargeModel<'_>,
+        storage: &mut [NodeVector],
+        mut guard: Option<GuardView<'_>>,
+        span: f64,
+        scene: SceneView<'_, M>,
+        state: &mut StateView<'_>,
+    ) {
+        let (count, seconds) = equal_steps(span, model.longest());
+        if model.set_seconds(seconds).is_err() {
+            return;
+        }
+        for done in 0..count {
+            let loads = self.loads.of_step(state, seconds, count - done);
+            let status =
+                model.with_storage(storage).step_in_parts(scene, &loads, state.reborrow(), self.threads);
+            (self.watch)(Event::Step(Taken::Long, status, state));
+            self.report.enter(status);
+            if !status.is_taken() {
+                self.report.undone += 1;
+                return;
+            }
+            self.report.long += 1;
+            self.report.enter_length(seconds);
+            if let Some(guard) = &mut guard {
+                let status = guard.reborrow().follow(Status::Ok, scene, &loads, state, self.threads);
+                self.report.estimate = guard.watch.estimate();
+                (self.watch)(Event::Judged(status, self.report.estimate, state));
+                self.report.enter(status);
+            }
+        }
+    }
+
+    fn auto_steps<M: ElementMaterial>(
+        &mut self,
+        adaptive: AdaptiveView<'_, '_>,
+        span: f64,
+        scene: SceneView<'_, M>,
+        state: &mut StateView<'_>,
+    ) {
+        let AdaptiveView { chooser, first, second, watch, storage } = adaptive;
+        let view = AdaptiveView { chooser: &mut *chooser, first, second, watch: &mut *watch, storage };
+        let (status, taken) = view.advance(span as f32, scene, self.loads, state.reborrow(), self.threads);
+        let own = if matches!(status, Status::Inexact { .. }) { Status::Ok } else { status };
+        (self.watch)(Event::Step(Taken::Auto, own, state));
+        let report = &mut self.report;
+        report.estimate = chooser.estimate(watch);
+        (report.exact, report.long, report.changes) = (taken.exact, taken.large, taken.changes);
+        report.undone = u32::from(!status.is_taken());
+        report.enter_length(chooser.seconds());
+        (self.watch)(Event::Judged(status, report.estimate, state));
+        report.enter(status);
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn learned_steps<M: ElementMaterial>(
+        &mut self,
+        mut learned: LearnedView<'_, '_>,
+        mut exact: ExactSteps<'_>,
+        lead: &mut Lead,
+        mut guard: Option<GuardView<'_>>,
+        span: f64,
+        scene: SceneView<'_, M>,
+        state: &mut StateView<'_>,
+    ) -> Result<(), LearnedError> {
+        let seconds = learned.model().seconds();
+        let count = libm::round(span / f64::from(seconds)).clamp(0.0, f64::from(u32::MAX)) as u32;
+        for done in 0..count {
+            if lead.left < lead.all && state.last_step() > 0.0 && !learned.model().is_led(state) {
+                // The state was restored, or has moved without the network.
+                lead.left = lead.all;
+            }
+            let is_leading = lead.left > 0;
+            lead.left = lead.left.saturating_sub(1);
+            let mut exact_next = is_leading || learned.model().is_exact_next();
+            if !exact_next {
+                let loads = self.loads.of_step(state, seconds, count - done);
+                (self.watch)(Event::Predicts(state.time()));
+                let tried = learned.try_step(scene, &loads, state, exact.seconds(), self.threads)?;
+                (self.watch)(Event::Predicted(*learned.model().report()));
+                match tried {
+                    Ok(status) => {
+                        (self.watch)(Event::Step(Taken::Learned, status, state));
+                        self.report.enter(status);
+                        if !status.is_taken() {
+                            self.report.undone += 1;
+                            return Ok(());
+                        }
+                        self.report.learned += 1;
+                        self.report.enter_length(seconds);
+                    }
+                    Err(Undone) => {
+                        self.report.undone += 1;
+                        exact_next = true;
+                    }
+                }
+            }
+            if exact_next {
+                self.report.fell_back |= !is_leading;
+                let rest = f64::from(count - done - 1) * f64::from(seconds);
+                let mut taken = true;
+                // A step that was refused is in the report.
+                let _ = learned.lead_interval(state, |state| {
+                    taken = self.exact_steps(&mut exact, seconds.into(), rest, scene, state);
+                    if taken { Status::Ok } else { self.report.status }
+                });
+                if !taken {
+                    return Ok(());
+                }
+            }
+            if let Some(guard) = &mut guard {
+                // Moved supports are where they have come to.
+                let loads = self.loads.of_step(state, seconds, u32::MAX);
+                let status = guard.reborrow().follow(Status::Ok, scene, &loads, state, self.threads);
+                self.report.estimate = guard.watch.estimate();
+                // Exact steps that lead have no error.
+                let status = if is_leading { Status::Ok } else { status };
+                (self.watch)(Event::Judged(status, self.report.estimate, state));
+                self.report.enter(status);
+                if let Status::Inexact { .. } = status {
+                    learned.fall_back(state.time(), status);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl ExactSteps<'_> {
+    /// The length of the next steps, s.
+    fn seconds(&self) -> f32 {
+        match self {
+            Self::Fixed(step) => step.seconds(),
+            Self::Paced { pace, .. } => pace.seconds(),
+        }
+    }
+}
+
+/// The loads of a call that goes on for `rest` seconds after the span of these steps.
+struct Longer<'l, L> {
+    loads: &'l mut L,
+    rest: f64,
+}
+
+impl<L: LoadsOverTime> LoadsOverTime for Longer<'_, L> {
+    fn of_step(&mut self, state: &StateView<'_>, seconds: f32, left: u32) -> Loads<'_> {
+        let more = if self.rest > 0.0 { (self.rest / f64::from(seconds)) as u32 } else { 0 };
+        self.loads.of_step(state, seconds, left.saturating_add(more))
+    }
+}

@@ -1,0 +1,418 @@
+//! A simulation that owns what it needs, on a host with a heap.
+
+use core::fmt;
+use std::boxed::Box;
+use std::vec;
+use std::vec::Vec;
+
+use super::{
+    Event, ExactSteps, LONG_STEPS, LONGEST_STEPS, Lead, Method, Mover, Report, Settings, usual_tolerance,
+};
+use crate::adaptive::{Adaptive, Request};
+use crate::contact::{
+    Contact, ContactError, Instrument, Surface, SurfaceNode, Touch, boundary, boundary_triangles,
+};
+use crate::guard::{self, Allowed, Guard};
+use crate::inertia::{InertiaError, LargeStep};
+use crate::learned::{self, LearnedError, LearnedModel, LearnedStep};
+use crate::loads::{LoadError, Loads, LoadsOfCall, LoadsOverTime, Motion, NodalForce};
+use crate::material::VecMaterial;
+use crate::mesh::{Mesh, MeshError, Winding};
+use crate::scene::{BuildError, Support, VecScene};
+use crate::simd::NodeVector;
+use crate::state::VecState;
+use crate::step::{CallingThread, CriticalStep, Divergence, Status, Step, StepError, Threads};
+use crate::tled::{self, Pace, vectors_for_pace};
+
+/// A scene in motion. Loads and instruments are set between two calls of [`Simulation::advance`] as the host likes.
+#[derive(Debug)]
+pub struct Simulation<'w> {
+    /// Gravity, m/s^2.
+    pub gravity: [f32; 3],
+    /// Forces on nodes, N.
+    pub forces: Vec<NodalForce>,
+    /// Where moved supports go, m.
+    pub motions: Vec<Motion>,
+    /// Rigid bodies that touch the tissue, after [`Simulation::meeting`].
+    pub instruments: Vec<Instrument<'w>>,
+    points: Vec<[f32; 3]>,
+    tets: Vec<[u32; 4]>,
+    scene: VecScene<VecMaterial>,
+    state: VecState,
+    settings: Settings<'w>,
+    touchable: (Vec<SurfaceNode>, Vec<[u32; 3]>),
+    /// Room for where motions are in the next step.
+    now: Vec<Motion>,
+    /// None until the first call.
+    prepared: Option<Prepared<'w>>,
+    /// Where the last call should have ended, s.
+    until: f64,
+}
+
+/// Steps of a method with their storage.
+#[derive(Debug)]
+enum Prepared<'w> {
+    Exact(Exact),
+    Long(Box<LargeStep<'w, Vec<NodeVector>>>, Option<Box<Guard<Vec<NodeVector>>>>),
+    Auto(Box<Adaptive<'w, Vec<NodeVector>>>),
+    Learned(Box<LearnedStep<'w, Vec<NodeVector>>>, Exact, Lead, Option<Box<Guard<Vec<NodeVector>>>>),
+}
+
+#[derive(Debug)]
+enum Exact {
+    Fixed(Step),
+    Paced { pace: Pace, kept: Vec<NodeVector>, damping: f32 },
+}
+
+impl Exact {
+    fn steps(&mut self) -> ExactSteps<'_> {
+        match self {
+            Self::Fixed(step) => ExactSteps::Fixed(*step),
+            Self::Paced { pace, kept, damping } => ExactSteps::Paced { pace, kept, damping: *damping },
+        }
+    }
+}
+
+impl<'w> Simulation<'w> {
+    /// A scene at rest: points (m), tetrahedra with positive volumes, what they are made of, supports. Exact steps without damping move it
+    /// unless [`Simulation::with`] says otherwise.
+    pub fn new(
+        points: &[[f32; 3]],
+        tets: &[[u32; 4]],
+        material: VecMaterial,
+        supports: &[Support],
+    ) -> Result<Self, SimulationError> {
+        let mesh = Mesh::new(points, tets, Winding::Checked)?;
+        let scene = VecScene::build(material, &mesh, supports)?;
+        Ok(Self::of_scene(scene, points, tets))
+    }
+
+    /// The same of a scene that is built, whose points and tetrahedra these are.
+    #[must_use]
+    pub fn of_scene(scene: VecScene<VecMaterial>, points: &[[f32; 3]], tets: &[[u32; 4]]) -> Self {
+        Self {
+            gravity: [0.0; 3],
+            forces: vec![],
+            motions: vec![],
+            instruments: vec![],
+            points: points.to_vec(),
+            tets: tets.to_vec(),
+            state: VecState::at_rest(scene.node_count()),
+            scene,
+            settings: Settings::default(),
+            touchable: (vec![], vec![]),
+            now: vec![],
+            prepared: None,
+            until: 0.0,
+        }
+    }
+
+    /// With these settings. They may be set again at any time; the motion goes on as it is.
+    #[must_use]
+    pub fn with(mut self, settings: Settings<'w>) -> Self {
+        self.set(settings);
+        self
+    }
+
+    /// See [`Simulation::with`].
+    pub fn set(&mut self, settings: Settings<'w>) {
+        (self.settings, self.prepared) = (settings, None);
+    }
+
+    /// With a surface that instruments can touch: the nodes of the boundary, and the triangles between them, which instruments need that
+    /// are thinner than edges are long.
+    pub fn meeting(mut self, triangles: bool) -> Result<Self, SimulationError> {
+        let mesh = Mesh::new(&self.points, &self.tets, Winding::Normalised)?;
+        let nodes = boundary(&mesh);
+        let triangles = if triangles { boundary_triangles(&mesh, &nodes) } else { vec![] };
+        self.meet(nodes, triangles)?;
+        Ok(self)
+    }
+
+    /// The same with a surface of the caller's.
+    pub fn meet(&mut self, nodes: Vec<SurfaceNode>, triangles: Vec<[u32; 3]>) -> Result<(), SimulationError> {
+        self.touchable = (nodes, triangles);
+        let surface = surface(&self.touchable, self.scene.node_count())?;
+        self.state.make_room(&surface);
+        Ok(())
+    }
+
+    /// Moves on by so many seconds, usually a frame, under its loads and instruments. Where a step is refused the error says why, and the
+    /// state is that before it.
+    pub fn advance(&mut self, seconds: f64) -> Result<Report, SimulationError> {
+        self.advance_in_parts(seconds, &CallingThread)
+    }
+
+    /// The same, to the bit, on several threads of the host.
+    pub fn advance_in_parts(
+        &mut self,
+        seconds: f64,
+        threads: &impl Threads,
+    ) -> Result<Report, SimulationError> {
+        if !(seconds > 0.0 && seconds.is_finite()) {
+            return Err(SimulationError::Seconds(seconds));
+        }
+        self.prepare_once()?;
+        let Self { gravity, forces, motions, instruments, scene, state, touchable, now, until, .. } = self;
+        let mut loads = Loads::new(&*scene, *gravity, forces, motions)?;
+        if !instruments.is_empty() {
+            loads = loads.touched_by(Contact::new(surface(touchable, scene.node_count())?, instruments)?);
+        }
+        now.resize(motions.len(), Motion::default());
+        let mut loads = LoadsOfCall::new(loads, now);
+        // Calls follow each other without a drift by rounding, but for states that were restored.
+        let from = if (*until - state.time()).abs() <= 1e-3 * seconds { *until } else { state.time() };
+        *until = from + seconds;
+        let Some(prepared) = &mut self.prepared else { return Err(SimulationError::NotFinite) };
+        let mover = prepared.mover();
+        let report = mover.advance(*until, scene.view(), &mut loads, state.view(), threads, &mut |_| {})?;
+        match report.status {
+            Status::Diverged(divergence) => Err(SimulationError::Refused(divergence)),
+            _ => Ok(report),
+        }
+    }
+
+    /// Moves on until a time (s) under loads of the caller's in place of its own. `watch` is shown each step; what was refused is in the
+    /// report.
+    pub fn advance_under(
+        &mut self,
+        until: f64,
+        loads: &mut impl LoadsOverTime,
+        threads: &impl Threads,
+        watch: &mut impl FnMut(Event<'_>),
+    ) -> Result<Report, SimulationError> {
+        self.prepare_once()?;
+        let Self { scene, state, prepared, .. } = self;
+        let Some(prepared) = prepared else { return Err(SimulationError::NotFinite) };
+        Ok(prepared.mover().advance(until, scene.view(), loads, state.view(), threads, watch)?)
+    }
+
+    fn prepare_once(&mut self) -> Result<(), SimulationError> {
+        if self.prepared.is_none() { self.prepare() } else { Ok(()) }
+    }
+
+    /// Prepares the steps from the state as it is, which the first call of [`Simulation::advance`] does otherwise: what is wrong with the
+    /// settings is told.
+    pub fn prepare(&mut self) -> Result<(), SimulationError> {
+        let critical = self.critical_step()?;
+        let Self { scene, state, points, settings, .. } = self;
+        let Settings { step, damping, tolerance, unchecked, .. } = *settings;
+        let nodes = scene.node_count();
+        let exact = |damping: f32| match step {
+            Some(seconds) if unchecked => Ok(Exact::Fixed(Step::unchecked(seconds, damping)?)),
+            Some(seconds) => Ok(Exact::Fixed(Step::new(seconds, damping, critical)?)),
+            None => {
+                let kept = vec![NodeVector::ZERO; vectors_for_pace(nodes)];
+                // Refused here, not in the middle of a call.
+                Step::unchecked(Pace::SHARE * critical.seconds, damping)?;
+                Ok::<_, SimulationError>(Exact::Paced { pace: Pace::new(critical), kept, damping })
+            }
+        };
+        let guarded = |state: &mut VecState, seconds: f32, damping: f32, every: u32| {
+            let step = Step::unchecked(seconds, damping)?;
+            let guard = Guard::prepare_in_vec(scene.view(), points, state.view(), step, every)?;
+            Ok::<_, SimulationError>(Box::new(match tolerance {
+                Some(metres) => guard.allowing(Allowed::Metres(metres)),
+                None => guard,
+            }))
+        };
+        let prepared = match &settings.method {
+            Method::Exact => Prepared::Exact(exact(damping)?),
+            Method::Long(method) => {
+                let seconds = step.unwrap_or(LONG_STEPS * critical.seconds);
+                let step = Step::unchecked(seconds, damping)?;
+                let large =
+                    LargeStep::prepare_in_vec(method.clone(), scene.view(), points, state.view(), step)?;
+                let guard = settings.guard.then(|| guarded(state, seconds, damping, guard::EVERY));
+                Prepared::Long(Box::new(large), guard.transpose()?)
+            }
+            Method::Auto(method) => {
+                let seconds = step.unwrap_or(LONGEST_STEPS * critical.seconds);
+                let longest = Step::unchecked(seconds, damping)?;
+                let request =
+                    Request { tolerance: tolerance.unwrap_or_else(|| usual_tolerance(points)), longest };
+                let adaptive =
+                    Adaptive::prepare_in_vec(method.clone(), scene.view(), points, state.view(), request)?;
+                Prepared::Auto(Box::new(adaptive))
+            }
+            Method::Learned { network, lead_in, fallback } => {
+                let (seconds, damping) = (network.recipe().step, network.recipe().damping);
+                let storage = vec![NodeVector::ZERO; learned::vectors_for(nodes, *fallback)];
+                let learned = LearnedStep::new(network.clone(), *fallback, storage)?;
+                let lead = Lead::new(learned.model().intervals(*lead_in));
+                let guard = settings.guard.then(|| guarded(state, seconds, damping, guard::EVERY_LEARNED));
+                Prepared::Learned(Box::new(learned), exact(damping)?, lead, guard.transpose()?)
+            }
+        };
+        self.prepared = Some(prepared);
+        Ok(())
+    }
+
+    /// What it was told.
+    #[must_use]
+    pub const fn settings(&self) -> &Settings<'w> {
+        &self.settings
+    }
+
+    /// A bound of the longest stable exact step at the state as it is.
+    pub fn critical_step(&mut self) -> Result<CriticalStep, SimulationError> {
+        tled::critical_step(&self.scene, &mut self.state).ok_or(SimulationError::NotFinite)
+    }
+
+    /// What is simulated.
+    #[must_use]
+    pub const fn scene(&self) -> &VecScene<VecMaterial> {
+        &self.scene
+    }
+
+    /// What moves.
+    #[must_use]
+    pub const fn state(&self) -> &VecState {
+        &self.state
+    }
+
+    /// The same, to be changed: reset, restored, started elsewhere. Steps go on from there.
+    pub const fn state_mut(&mut self) -> &mut VecState {
+        &mut self.state
+    }
+
+    /// Both.
+    pub const fn parts_mut(&mut self) -> (&VecScene<VecMaterial>, &mut VecState) {
+        (&self.scene, &mut self.state)
+    }
+
+    /// Where the nodes are at rest, m.
+    #[must_use]
+    pub fn points(&self) -> &[[f32; 3]] {
+        &self.points
+    }
+
+    /// Displacement of each node, m.
+    #[must_use]
+    pub fn displacements(&self) -> &[NodeVector] {
+        self.state.displacements()
+    }
+
+    /// What each instrument felt in the latest step.
+    #[must_use]
+    pub fn touches(&self) -> &[Touch] {
+        self.state.touches()
+    }
+
+    /// The prepared steps of [`Method::Long`], for their lattice and reports.
+    #[must_use]
+    pub fn long_step(&self) -> Option<&LargeStep<'w, Vec<NodeVector>>> {
+        match &self.prepared {
+            Some(Prepared::Long(large, _)) => Some(large),
+            _ => None,
+        }
+    }
+
+    /// Those of [`Method::Auto`].
+    #[must_use]
+    pub fn auto_step(&self) -> Option<&Adaptive<'w, Vec<NodeVector>>> {
+        match &self.prepared {
+            Some(Prepared::Auto(adaptive)) => Some(adaptive),
+            _ => None,
+        }
+    }
+
+    /// What learned steps know of their fallbacks.
+    #[must_use]
+    pub fn learned_step(&self) -> Option<&LearnedModel<'w>> {
+        match &self.prepared {
+            Some(Prepared::Learned(learned, ..)) => Some(learned.model()),
+            _ => None,
+        }
+    }
+}
+
+impl<'w> Prepared<'w> {
+    fn mover(&mut self) -> Mover<'_, 'w> {
+        match self {
+            Self::Exact(exact) => Mover::Exact(exact.steps()),
+            Self::Long(large, guard) => {
+                let (model, storage) = large.parts();
+                Mover::Long(model, storage, guard.as_mut().map(|guard| guard.view()))
+            }
+            Self::Auto(adaptive) => Mover::Auto(adaptive.view()),
+            Self::Learned(learned, exact, lead, guard) => {
+                Mover::Learned(learned.view(), exact.steps(), lead, guard.as_mut().map(|guard| guard.view()))
+            }
+        }
+    }
+}
+
+fn surface<'a>(
+    (nodes, triangles): &'a (Vec<SurfaceNode>, Vec<[u32; 3]>),
+    scene_nodes: usize,
+) -> Result<Surface<'a>, ContactError> {
+    Surface::new(nodes, scene_nodes)?.with_triangles(triangles)
+}
+
+/// Why a simulation was refused, or a step of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SimulationError {
+    /// The mesh is not one.
+    Mesh(MeshError),
+    /// The scene cannot be built.
+    Build(BuildError),
+    /// A load cannot be.
+    Load(LoadError),
+    /// An instrument or a surface cannot be.
+    Contact(ContactError),
+    /// A length of step or a damping cannot be.
+    Step(StepError),
+    /// Steps beyond the critical one cannot be prepared.
+    Inertia(InertiaError),
+    /// A network cannot move the scene.
+    Learned(LearnedError),
+    /// The stiffness of some element is not a finite number.
+    NotFinite,
+    /// A span (s) that cannot be.
+    Seconds(f64),
+    /// A step was refused: the state is that before it.
+    Refused(Divergence),
+}
+
+impl fmt::Display for SimulationError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Mesh(error) => error.fmt(f),
+            Self::Build(error) => error.fmt(f),
+            Self::Load(error) => error.fmt(f),
+            Self::Contact(error) => error.fmt(f),
+            Self::Step(error) => error.fmt(f),
+            Self::Inertia(error) => error.fmt(f),
+            Self::Learned(error) => error.fmt(f),
+            Self::NotFinite => f.write_str("the stiffness of some element is not a finite number"),
+            Self::Seconds(seconds) => write!(f, "advance by {seconds} s: it must be a positive number"),
+            Self::Refused(divergence) => divergence.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for SimulationError {}
+
+macro_rules! from {
+    ($($variant:ident: $error:ty,)*) => {
+        $(
+            impl From<$error> for SimulationError {
+                fn from(error: $error) -> Self {
+                    Self::$variant(error)
+                }
+            }
+        )*
+    };
+}
+from! {
+    Mesh: MeshError,
+    Build: BuildError,
+    Load: LoadError,
+    Contact: ContactError,
+    Step: StepError,
+    Inertia: InertiaError,
+    Learned: LearnedError,
+    Refused: Divergence,
+}
