@@ -2,102 +2,79 @@
 //! mesh of an organ, its material, supports and loads, and calls one step function as often as it needs.
 //! SI units throughout (m, kg, s, N, Pa, J).
 //!
-//! # The three jobs
+//! # A scene in motion
 //!
-//! A soft bar, fixed at one end, bent by a force at the other. Common to the three:
+//! A soft bar, fixed at one end, bent by a force at the other, on a host with a heap (feature `std`):
 //!
 #![cfg_attr(feature = "std", doc = "```")]
 #![cfg_attr(not(feature = "std"), doc = "```ignore")]
-//! # use supple::loads::{Loads, NodalForce};
-//! # use supple::material::{NeoHookean, NodalPressure, Tissue};
-//! # use supple::mesh::{Bar, Mesh, Winding};
-//! # use supple::scene::{Support, VecScene};
-//! # use supple::state::VecState;
-//! # use supple::step::{Status, Step};
-//! # use supple::tled;
+//! use supple::loads::NodalForce;
+//! use supple::material::{Element, NeoHookean, VecMaterial};
+//! use supple::{mesh::Bar, scene::Support, simulation::Simulation};
+//!
 //! let bar = Bar { size: [0.02, 0.02, 0.1], cells: [2, 2, 10] };
-//! let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());
-//! let mesh = Mesh::new(&points, &tets, Winding::Checked)?;
-//! let tissue = NodalPressure(Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 });
+//! let tissue = VecMaterial::one(Element::NodalStrain, NeoHookean { c: 500.0, d: 25_000.0 }, 1000.0);
 //! let fixed: Vec<_> = (0..9).map(Support::fixed).collect();
-//! let scene = VecScene::build(tissue, &mesh, &fixed)?;
-//! let mut state = VecState::at_rest(scene.node_count());
-//! let force = [NodalForce { node: bar.node(1, 1, 10), newton: [0.01, 0.0, 0.0], ramp: 0.1 }];
-//! let loads = Loads::new(&scene, [0.0; 3], &force, &[])?;
-//! let critical = tled::critical_step(&scene, &mut state).ok_or("not a finite state")?;
-//! # let step = Step::new(0.9 * critical.seconds, 20.0, critical)?;
-//! # assert_eq!(tled::step(&scene, &loads, &mut state, &step), Status::Ok);
+//! let mut bent = Simulation::new(bar.points(), bar.tets(), tissue, &fixed)?;
+//! bent.forces = vec![NodalForce { node: bar.node(1, 1, 10), newton: [0.01, 0.0, 0.0], ramp: 0.1 }];
+//! let report = bent.advance(0.2)?;
+//! println!("{:?}: the tip moved {:.2} mm", report.status, 1e3 * bent.displacements()[94].to_array()[0]);
+//! # assert!(report.is_ok() && bent.displacements()[94].to_array()[0] > 0.003);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! **Exact steps** ([`tled`]), no longer than the critical step:
+//! These are exact steps ([`tled`]), no longer than the critical step. **Long steps** ([`inertia`]) are twenty times as long, and a
+//! guard estimates their error:
+//!
+#![cfg_attr(feature = "std", doc = "```")]
+#![cfg_attr(not(feature = "std"), doc = "```ignore")]
+#![doc = include_str!("doc_bar.txt")]
+//! use supple::inertia::{self, Cells};
+//! use supple::simulation::{Method, Settings};
+//!
+//! let method = Method::Long(inertia::Method::Multilevel(Cells::Given([1, 1, 4])));
+//! let mut bent = at_rest.with(Settings { method, damping: 20.0, ..Settings::default() });
+//! let report = bent.advance(0.2)?;
+//! if let Some(estimate) = report.estimate {
+//!     println!("off by at most about {:.3} mm on average", 1e3 * estimate.mean);
+//! }
+//! # assert!(report.estimate.is_some() && bent.displacements()[94].to_array()[0] > 0.003);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! With [`Method::Auto`](simulation::Method) their length is chosen for a tolerance. **Learned steps** ([`learned`]) follow a lead-in of
+//! exact ones, which take their place for a while if energy or the guard does not believe what the network does:
+//!
+#![cfg_attr(feature = "std", doc = "```")]
+#![cfg_attr(not(feature = "std"), doc = "```ignore")]
+#![doc = include_str!("doc_bar.txt")]
+//! use supple::mlp::{Network, WeightBytes};
+//! use supple::simulation::{Method, Settings};
+//!
+//! # let read = |_| include_bytes!("../weights/compact-10.weights");
+//! let bytes = WeightBytes::of(read("weights/compact-10.weights"));
+//! let method = Method::Learned { network: Network::parse(bytes.bytes())?, lead_in: 0.3, fallback: true };
+//! let mut bent = at_rest.with(Settings { method, ..Settings::default() });
+//! let report = bent.advance(0.5)?;
+//! println!("{} exact and {} learned steps, fell back: {}", report.exact, report.learned, report.fell_back);
+//! # assert!(report.learned > 0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Below it the parts can be used by themselves, typed, and without a heap: the scene is then a [`scene::FixedScene`], the state a
+//! [`state::FixedState`], what long and learned steps keep an array, all of which may be `static`, and [`simulation::Mover`] the loop. The
+//! same bar:
 //!
 #![cfg_attr(feature = "std", doc = "```")]
 #![cfg_attr(not(feature = "std"), doc = "```ignore")]
 #![doc = include_str!("doc_common.txt")]
 //! let step = Step::new(0.9 * critical.seconds, 20.0, critical)?;
 //! while state.time() < 0.2 {
-//!     let status = tled::step(&scene, &loads, &mut state, &step);
-//!     assert_eq!(status, Status::Ok);
-//! }
-//! println!("the tip moved {:.2} mm", 1e3 * state.displacements()[94].to_array()[0]);
-//! # assert!(state.displacements()[94].to_array()[0] > 0.003);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
-//!
-//! **Damped steps** ([`inertia`]), here twenty times as long:
-//!
-#![cfg_attr(feature = "std", doc = "```")]
-#![cfg_attr(not(feature = "std"), doc = "```ignore")]
-#![doc = include_str!("doc_common.txt")]
-//! use supple::guard::{EVERY, Guard};
-//! use supple::inertia::{Cells, Damper, LargeStep, Method};
-//!
-//! # #[repr(align(64))] struct Aligned<T: ?Sized>(T);
-//! # static WEIGHTS: &Aligned<[u8]> = &Aligned(*include_bytes!("../weights/damper.weights"));
-//! let damper = Damper::new(supple::mlp::Network::parse(&WEIGHTS.0)?)?; // weights/damper.weights
-//! let method = Method::Damped(damper, Cells::Given([1, 1, 4]));
-//! let step = Step::unchecked(20.0 * critical.seconds, 20.0)?;
-//! let mut damped = LargeStep::prepare_in_vec(method, scene.view(), &points, state.view(), step)?;
-//! // A second run, three times as long in each step, estimates the error.
-//! let mut guard = Guard::prepare_in_vec(scene.view(), &points, state.view(), step, EVERY)?;
-//! while state.time() < 0.2 {
-//!     let status = damped.step(scene.view(), &loads, state.view());
-//!     let status = guard.follow(status, scene.view(), &loads, &state.view());
-//!     assert!(status.is_taken(), "{status:?}");
-//! }
-//! if let Some(estimate) = guard.estimate() {
-//!     println!("off by at most about {:.3} mm on average", 1e3 * estimate.mean);
+//!     assert_eq!(tled::step(&scene, &loads, &mut state, &step), Status::Ok);
 //! }
 //! # assert!(state.displacements()[94].to_array()[0] > 0.003);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//!
-//! **Learned steps** ([`learned`]), after a lead-in of exact ones, which take their place for a while if energy does not explain
-//! what the network does:
-//!
-#![cfg_attr(feature = "std", doc = "```")]
-#![cfg_attr(not(feature = "std"), doc = "```ignore")]
-#![doc = include_str!("doc_common.txt")]
-//! use supple::learned::{LearnedStep, vectors_for};
-//!
-//! # #[repr(align(64))] struct Aligned<T: ?Sized>(T);
-//! # static WEIGHTS: &Aligned<[u8]> = &Aligned(*include_bytes!("../weights/compact-10.weights"));
-//! let network = supple::mlp::Network::parse(&WEIGHTS.0)?; // weights/compact-10.weights
-//! let exact = Step::new(network.recipe().step / 10.0, network.recipe().damping, critical)?;
-//! let storage = vec![supple::state::NodeVector::ZERO; vectors_for(scene.node_count(), true)];
-//! let mut learned = LearnedStep::new(network, true, storage)?;
-//! learned.lead(scene.view(), &loads, state.view(), (&exact, 0.3))?;
-//! while state.time() < 0.5 {
-//!     let status = learned.step(scene.view(), &loads, state.view(), &exact)?;
-//!     assert!(status.is_taken(), "{status:?}");
-//! }
-//! println!("fell back: {:?}", learned.model().fell_back());
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
-//!
-//! Without a heap the scene is a [`scene::FixedScene`], the state a [`state::FixedState`], and storage an array, all of which may
-//! be `static`.
 //!
 //! # Layers
 //!
@@ -122,6 +99,7 @@
 //! | [`inertia`] | steps beyond the critical one: mass-scaled, multilevel, damped |
 //! | [`mlp`] | dense layers: the forward pass, the weight file |
 //! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
+//! | [`simulation`] | one owner of all that: scene, state, loads, method, guard, fallback, pace |
 //!
 //! With the feature `io` meshes are read and fields written (`io`), with `lab` methods are judged against the
 //! exact step over scenes (`lab`), with `train` networks are trained (`train`), with `safetensors` they go to and from

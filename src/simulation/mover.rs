@@ -118,7 +118,7 @@ impl Mover<'_, '_> {
         let span = until - state.time();
         match self {
             // A remainder of rounding is no step, and a span that is no number none either.
-            _ if !(span > 0.0) => {}
+            _ if span.is_nan() || span <= 0.0 => {}
             Self::Exact(mut exact) => {
                 call.exact_steps(&mut exact, span, 0.0, scene, &mut state);
             }

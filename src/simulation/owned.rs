@@ -42,7 +42,7 @@ pub struct Simulation<'w> {
     settings: Settings<'w>,
     touchable: (Vec<SurfaceNode>, Vec<[u32; 3]>),
     /// Room for where motions are in the next step.
-    now: Vec<Motion>,
+    in_step: Vec<Motion>,
     /// None until the first call.
     prepared: Option<Prepared<'w>>,
     /// Where the last call should have ended, s.
@@ -77,31 +77,32 @@ impl<'w> Simulation<'w> {
     /// A scene at rest: points (m), tetrahedra with positive volumes, what they are made of, supports. Exact steps without damping move it
     /// unless [`Simulation::with`] says otherwise.
     pub fn new(
-        points: &[[f32; 3]],
-        tets: &[[u32; 4]],
+        points: impl IntoIterator<Item = [f32; 3]>,
+        tets: impl IntoIterator<Item = [u32; 4]>,
         material: VecMaterial,
         supports: &[Support],
     ) -> Result<Self, SimulationError> {
-        let mesh = Mesh::new(points, tets, Winding::Checked)?;
+        let (points, tets) = (Vec::from_iter(points), Vec::from_iter(tets));
+        let mesh = Mesh::new(&points, &tets, Winding::Checked)?;
         let scene = VecScene::build(material, &mesh, supports)?;
         Ok(Self::of_scene(scene, points, tets))
     }
 
     /// The same of a scene that is built, whose points and tetrahedra these are.
     #[must_use]
-    pub fn of_scene(scene: VecScene<VecMaterial>, points: &[[f32; 3]], tets: &[[u32; 4]]) -> Self {
+    pub fn of_scene(scene: VecScene<VecMaterial>, points: Vec<[f32; 3]>, tets: Vec<[u32; 4]>) -> Self {
         Self {
             gravity: [0.0; 3],
             forces: vec![],
             motions: vec![],
             instruments: vec![],
-            points: points.to_vec(),
-            tets: tets.to_vec(),
+            points,
+            tets,
             state: VecState::at_rest(scene.node_count()),
             scene,
             settings: Settings::default(),
             touchable: (vec![], vec![]),
-            now: vec![],
+            in_step: vec![],
             prepared: None,
             until: 0.0,
         }
@@ -153,19 +154,22 @@ impl<'w> Simulation<'w> {
             return Err(SimulationError::Seconds(seconds));
         }
         self.prepare_once()?;
-        let Self { gravity, forces, motions, instruments, scene, state, touchable, now, until, .. } = self;
+        let Self { gravity, forces, motions, instruments, scene, state, touchable, in_step, until, .. } =
+            self;
         let mut loads = Loads::new(&*scene, *gravity, forces, motions)?;
         if !instruments.is_empty() {
             loads = loads.touched_by(Contact::new(surface(touchable, scene.node_count())?, instruments)?);
         }
-        now.resize(motions.len(), Motion::default());
-        let mut loads = LoadsOfCall::new(loads, now);
-        // Calls follow each other without a drift by rounding, but for states that were restored.
-        let from = if (*until - state.time()).abs() <= 1e-3 * seconds { *until } else { state.time() };
-        *until = from + seconds;
+        in_step.resize(motions.len(), Motion::default());
+        let mut loads = LoadsOfCall::new(loads, in_step);
+        // Calls follow each other without a drift by rounding, but for states that were restored; and equal calls take equal steps.
+        let (now, missed) = (state.time(), (*until - state.time()).abs());
+        let from = if missed <= 1e-6 * seconds || missed > 1e-3 * seconds { now } else { *until };
+        *until = if missed > 1e-3 * seconds { now + seconds } else { *until + seconds };
+        let end = from + seconds;
         let Some(prepared) = &mut self.prepared else { return Err(SimulationError::NotFinite) };
         let mover = prepared.mover();
-        let report = mover.advance(*until, scene.view(), &mut loads, state.view(), threads, &mut |_| {})?;
+        let report = mover.advance(end, scene.view(), &mut loads, state.view(), threads, &mut |_| {})?;
         match report.status {
             Status::Diverged(divergence) => Err(SimulationError::Refused(divergence)),
             _ => Ok(report),
@@ -238,7 +242,7 @@ impl<'w> Simulation<'w> {
             Method::Learned { network, lead_in, fallback } => {
                 let (seconds, damping) = (network.recipe().step, network.recipe().damping);
                 let storage = vec![NodeVector::ZERO; learned::vectors_for(nodes, *fallback)];
-                let learned = LearnedStep::new(network.clone(), *fallback, storage)?;
+                let learned = LearnedStep::new(*network, *fallback, storage)?;
                 let lead = Lead::new(learned.model().intervals(*lead_in));
                 let guard = settings.guard.then(|| guarded(state, seconds, damping, guard::EVERY_LEARNED));
                 Prepared::Learned(Box::new(learned), exact(damping)?, lead, guard.transpose()?)

@@ -1,0 +1,300 @@
+//! One object for scene, state, loads, method, guard and pace (`supple::simulation`): the same bits as its parts put together by hand, calls
+//! that follow each other without a drift, refusals that leave nothing behind.
+
+use supple::adaptive::{Adaptive, Request};
+use supple::contact::{Instrument, Pose, Shape};
+use supple::guard::{self, Guard};
+use supple::inertia::{self, Cells, LargeStep};
+use supple::learned::{LearnedStep, vectors_for};
+use supple::loads::{LoadError, Loads, Motion, NodalForce};
+use supple::material::{Element, VecMaterial};
+use supple::mlp::{Network, WeightBytes};
+use supple::scene::{Axes, Support, VecScene};
+use supple::simulation::{Method, Report, Settings, Simulation, SimulationError};
+use supple::state::{NodeVector, VecState};
+use supple::step::{CriticalStep, Status, Step};
+use supple::tled;
+
+use crate::support::bodies::{far_end, held, small_bar, torsion};
+use crate::support::{Body, EXP, bits};
+
+const DAMPING: f32 = 20.0;
+const FRAME: f64 = 1.0 / 60.0;
+const LONG: inertia::Method<'static> = inertia::Method::Multilevel(Cells::Suggested);
+
+fn material(element: Element) -> VecMaterial {
+    VecMaterial::one(element, EXP, 1000.0)
+}
+
+fn twisted(body: &Body, settings: Settings<'static>) -> Simulation<'static> {
+    let material = material(Element::NodalPressure);
+    let mut simulation =
+        Simulation::new(body.points.clone(), body.tets.clone(), material, &held(body)).unwrap().with(settings);
+    simulation.forces = torsion(body, 2e-3, 0.05);
+    simulation
+}
+
+/// The parts of which the same simulation is made.
+struct Parts {
+    scene: VecScene<VecMaterial>,
+    state: VecState,
+    forces: Vec<NodalForce>,
+    critical: CriticalStep,
+}
+
+impl Parts {
+    fn of(body: &Body) -> Self {
+        let scene = VecScene::build(material(Element::NodalPressure), &body.mesh(), &held(body)).unwrap();
+        let mut state = VecState::at_rest(scene.node_count());
+        let critical = tled::critical_step(&scene, &mut state).unwrap();
+        Self { scene, state, forces: torsion(body, 2e-3, 0.05), critical }
+    }
+}
+
+/// The largest displacement, m: a frozen body must not pass.
+fn moved(state: &VecState) -> f32 {
+    let lengths =
+        state.displacements().iter().map(|u| u.to_array().iter().map(|x| x * x).sum::<f32>().sqrt());
+    lengths.fold(0.0, f32::max)
+}
+
+fn frames(simulation: &mut Simulation<'_>, count: usize) -> Vec<Report> {
+    (0..count).map(|_| simulation.advance(FRAME).unwrap()).collect()
+}
+
+#[test]
+fn exact_steps_of_a_length_are_those_of_the_layer_below() {
+    let body = small_bar();
+    let mut parts = Parts::of(&body);
+    let seconds = 0.8 * parts.critical.seconds;
+    let step = Some(seconds);
+    let mut simulation = twisted(&body, Settings { step, damping: DAMPING, ..Settings::default() });
+    let count = (FRAME / f64::from(seconds)).ceil();
+    let exact = Step::new((FRAME / count) as f32, DAMPING, parts.critical).unwrap();
+    let loads = Loads::new(&parts.scene, [0.0; 3], &parts.forces, &[]).unwrap();
+    for report in frames(&mut simulation, 12) {
+        for _ in 0..count as u32 {
+            assert_eq!(tled::step(&parts.scene, &loads, &mut parts.state, &exact), Status::Ok);
+        }
+        assert_eq!((report.status, report.exact), (Status::Ok, count as u32));
+    }
+    println!(
+        "{} steps of {:.1} us, moved {:.3} mm",
+        parts.state.steps(),
+        1e6 * exact.seconds(),
+        1e3 * moved(&parts.state)
+    );
+    assert!(moved(&parts.state) > 1e-4);
+    assert_eq!(bits(simulation.state()), bits(&parts.state));
+}
+
+#[test]
+fn exact_steps_follow_the_critical_step_and_frames_do_not_drift() {
+    let body = small_bar();
+    let mut simulation = twisted(&body, Settings { damping: DAMPING, ..Settings::default() });
+    let rest = simulation.critical_step().unwrap().seconds;
+    simulation.forces = torsion(&body, 40e-3, 0.1);
+    let reports = frames(&mut simulation, 60);
+    let least = reports.iter().map(|report| report.seconds[0]).fold(f32::INFINITY, f32::min);
+    let off = simulation.state().time() - 60.0 * FRAME;
+    println!(
+        "steps {:.3} of the critical one at rest and less, {off:.1e} s off after 60 frames",
+        least / rest
+    );
+    assert!(least < 0.85 * rest, "nothing stiffened: {least} of {rest}");
+    assert!(off.abs() < 2e-6 * FRAME);
+}
+
+#[test]
+fn long_steps_and_their_guard_are_those_of_the_layers_below() {
+    let body = small_bar();
+    let mut parts = Parts::of(&body);
+    let seconds = FRAME as f32 / 4.0;
+    let settings =
+        Settings { method: Method::Long(LONG), step: Some(seconds), damping: DAMPING, ..Settings::default() };
+    let mut simulation = twisted(&body, settings);
+    let step = Step::unchecked(seconds, DAMPING).unwrap();
+    let view = parts.scene.view();
+    let mut large = LargeStep::prepare_in_vec(LONG, view, &body.points, parts.state.view(), step).unwrap();
+    let mut guard =
+        Guard::prepare_in_vec(view, &body.points, parts.state.view(), step, guard::EVERY).unwrap();
+    let loads = Loads::new(&parts.scene, [0.0; 3], &parts.forces, &[]).unwrap();
+    for report in frames(&mut simulation, 12) {
+        let mut worst = Status::Ok;
+        for _ in 0..4 {
+            let status = large.step(view, &loads, parts.state.view());
+            worst = worst.worse(guard.follow(status, view, &loads, &parts.state.view()));
+        }
+        assert_eq!((report.status, report.long, report.estimate), (worst, 4, guard.estimate()));
+    }
+    println!(
+        "{:.1} critical steps long, moved {:.3} mm",
+        seconds / parts.critical.seconds,
+        1e3 * moved(&parts.state)
+    );
+    assert!(moved(&parts.state) > 1e-4 && simulation.advance(FRAME).unwrap().estimate.is_some());
+    assert_ne!(bits(simulation.state()), bits(&parts.state));
+}
+
+#[test]
+fn steps_that_choose_their_length_are_those_of_the_layer_below() {
+    let body = small_bar();
+    let mut parts = Parts::of(&body);
+    let longest = FRAME as f32;
+    let settings = Settings {
+        method: Method::Auto(LONG),
+        step: Some(longest),
+        damping: DAMPING,
+        tolerance: Some(1e-3),
+        ..Settings::default()
+    };
+    let mut simulation = twisted(&body, settings);
+    simulation.forces = torsion(&body, 1e-4, 0.2);
+    parts.forces.clone_from(&simulation.forces);
+    let request = Request { tolerance: 1e-3, longest: Step::unchecked(longest, DAMPING).unwrap() };
+    let (scene, state) = (&parts.scene, &mut parts.state);
+    let mut adaptive =
+        Adaptive::prepare_in_vec(LONG, scene.view(), &body.points, state.view(), request).unwrap();
+    let mut loads = Loads::new(scene, [0.0; 3], &parts.forces, &[]).unwrap();
+    let mut long = 0;
+    for report in frames(&mut simulation, 60) {
+        let (status, taken) = adaptive.advance(longest, scene.view(), &mut loads, state.view());
+        assert_eq!((report.status, report.exact, report.long), (status, taken.exact, taken.large));
+        long += taken.large;
+    }
+    println!("{long} long steps among {}, moved {:.3} mm", state.steps(), 1e3 * moved(state));
+    assert!(long > 0 && moved(state) > 1e-4);
+    assert_eq!(bits(simulation.state()), bits(state));
+}
+
+#[test]
+fn a_network_is_led_and_led_again_after_a_restore() {
+    let bytes = WeightBytes::of(include_bytes!("../../weights/compact-10.weights"));
+    let network = Network::parse(bytes.bytes()).unwrap();
+    let interval = network.recipe().step;
+    let body = Body::paper();
+    let fixed: Vec<_> = (0..81).map(Support::fixed).collect();
+    let at_rest = || Simulation::new(body.points.clone(), body.tets.clone(), material(Element::Linear), &fixed).unwrap();
+    let settings = |lead_in| Settings {
+        method: Method::Learned { network, lead_in, fallback: false },
+        guard: false,
+        ..Settings::default()
+    };
+    let mut simulation = at_rest().with(settings(10.0 * f64::from(interval)));
+    simulation.forces = torsion(&body, 1e-4, 0.01);
+    let led = simulation.advance(10.0 * f64::from(interval)).unwrap();
+    let learned = simulation.advance(5.0 * f64::from(interval)).unwrap();
+    println!(
+        "lead-in {} exact steps, then {} learned ones of {:.0} us",
+        led.exact,
+        learned.learned,
+        1e6 * interval
+    );
+    assert_eq!((led.learned, learned.exact, learned.learned), (0, 0, 5));
+    assert!(led.exact >= 10);
+
+    // By hand: the same lead-in with the same steps, then the network.
+    let scene = VecScene::build(material(Element::Linear), &body.mesh(), &fixed).unwrap();
+    let (mut state, forces) = (VecState::at_rest(scene.node_count()), torsion(&body, 1e-4, 0.01));
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+    let exact = Step::unchecked(interval / 10.0, network.recipe().damping).unwrap();
+    let storage = vec![NodeVector::ZERO; vectors_for(scene.node_count(), false)];
+    let mut by_hand = LearnedStep::new(network, false, storage).unwrap();
+    by_hand.lead(scene.view(), &loads, state.view(), (&exact, 10.0 * f64::from(interval))).unwrap();
+    for _ in 0..5 {
+        assert!(by_hand.step(scene.view(), &loads, state.view(), &exact).unwrap().is_taken());
+    }
+    let mut same =
+        at_rest().with(Settings { step: Some(interval / 10.0), ..settings(10.0 * f64::from(interval)) });
+    same.forces.clone_from(&forces);
+    same.advance(15.0 * f64::from(interval)).unwrap();
+    assert_eq!(bits(same.state()), bits(&state));
+
+    // A state from elsewhere is not led.
+    let mut pushed = at_rest();
+    pushed.forces.clone_from(&forces);
+    pushed.advance(0.01).unwrap();
+    *simulation.state_mut() = pushed.state().clone();
+    let again = simulation.advance(12.0 * f64::from(interval)).unwrap();
+    println!("after a restore {} exact and {} learned steps", again.exact, again.learned);
+    assert_eq!(again.learned, 2);
+}
+
+#[test]
+fn motions_without_a_ramp_go_evenly_over_a_call() {
+    let body = small_bar();
+    let end = far_end(&body);
+    let mut supports = held(&body);
+    supports.extend(end.iter().map(|&node| Support::moved(node)));
+    let mut simulation =
+        Simulation::new(body.points.clone(), body.tets.clone(), material(Element::NodalStrain), &supports).unwrap();
+    let mut speeds = vec![];
+    for frame in 1..=10 {
+        let metre = [0.0, 0.0, 1e-4 * frame as f32];
+        simulation.motions =
+            end.iter().map(|&node| Motion { node, axes: Axes::XYZ, metre, ramp: 0.0 }).collect();
+        simulation.advance(FRAME).unwrap();
+        let node = end[0] as usize;
+        assert!((simulation.displacements()[node].to_array()[2] - metre[2]).abs() < 1e-9);
+        speeds.push(simulation.state().velocity(node)[2]);
+    }
+    println!("speeds of the support at frames, m/s: {speeds:.4?}");
+    assert!(speeds.iter().all(|speed| (speed / 6e-3 - 1.0).abs() < 0.01));
+}
+
+#[test]
+fn a_ball_presses_and_feels_it() {
+    let body = small_bar();
+    let mut simulation =
+        Simulation::new(body.points.clone(), body.tets.clone(), material(Element::NodalPressure), &held(&body))
+            .unwrap()
+            .with(Settings { damping: DAMPING, ..Settings::default() })
+            .meeting(false)
+            .unwrap();
+    let [x, y, z] = body.points[body.farthest(2) as usize];
+    let ball = Instrument::resting(Shape::Sphere { radius: 0.01 }, Pose::at([x, y, z + 0.0101]));
+    simulation.instruments = vec![ball];
+    for frame in 0..10 {
+        let now = simulation.state().time();
+        let depth = 2e-4 * (frame + 1) as f32;
+        simulation.instruments[0].move_to(Pose::at([x, y, z + 0.0101 - depth]), now, now + FRAME);
+        simulation.advance(FRAME).unwrap();
+    }
+    let felt = simulation.touches()[0];
+    println!("{:.2} mN on {} nodes", 1e3 * felt.force[2], felt.contacts);
+    assert!(felt.force[2] > 1e-4 && felt.contacts > 0);
+}
+
+#[test]
+fn what_is_refused_is_told_and_leaves_the_motion_as_it_was() {
+    let body = small_bar();
+    let mut simulation = twisted(&body, Settings { damping: DAMPING, ..Settings::default() });
+    frames(&mut simulation, 3);
+    let before = bits(simulation.state());
+    let refused = |simulation: &mut Simulation<'static>, seconds: f64, words: &str| {
+        let error = simulation.advance(seconds).unwrap_err();
+        assert_eq!(error.to_string(), words);
+        error
+    };
+    for seconds in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        refused(&mut simulation, seconds, &format!("advance by {seconds} s: it must be a positive number"));
+    }
+    let good = simulation.forces.clone();
+    simulation.forces[0].node = 10_000;
+    let error = refused(&mut simulation, FRAME, "force 0: node 10000 does not exist, the scene has 96 nodes");
+    assert!(matches!(error, SimulationError::Load(LoadError::Node { index: 0, .. })));
+    simulation.forces.clone_from(&good);
+    simulation.forces[0].newton = [1e30, 0.0, 0.0];
+    let error = simulation.advance(FRAME).unwrap_err();
+    println!("{error}");
+    assert!(matches!(error, SimulationError::Refused(_)));
+    assert_eq!(bits(simulation.state()), before);
+    simulation.forces = good;
+    simulation.set(Settings { step: Some(1.0), damping: DAMPING, ..Settings::default() });
+    let error = simulation.advance(FRAME).unwrap_err().to_string();
+    println!("{error}");
+    assert!(error.contains("is above the stable"), "{error}");
+    simulation.set(Settings { damping: DAMPING, ..Settings::default() });
+    assert_eq!(bits(simulation.state()), before);
+    assert!(simulation.advance(FRAME).unwrap().is_ok());
+}
