@@ -1,14 +1,8 @@
 //! Surfaces of bodies as meshes that turn under the mouse: positions in mm, colours by a length at each node, in mm.
 
-use plotly::common::color::NamedColor;
-use plotly::common::{ColorScale, ColorScalePalette, HoverInfo, Marker, Mode};
-use plotly::layout::{
-    AspectMode, AspectRatio, Axis, Camera, DragMode3D, Eye, LayoutScene, Projection, ProjectionType, Up,
-};
-use plotly::traces::mesh3d::Lighting;
-use plotly::{Layout, Mesh3D, Plot, Scatter3D};
+use serde_json::{Value, json};
 
-use super::plots::short;
+use super::plots::{Plot, short};
 
 /// Diagonal of a body in Plotly's units of length.
 const FILL: f64 = 2.4;
@@ -17,10 +11,12 @@ const INSTRUMENT: &str = "#b8bec4";
 /// Of nodes that an instrument grips.
 const POINTS: &str = "#e0202a";
 
+const AXES: [&str; 3] = ["x", "y", "z"];
+
 /// Surfaces in one space.
 #[derive(Default)]
 pub(crate) struct Bodies {
-    plot: Plot,
+    traces: Vec<Value>,
     /// Corners of the box around all of them, m.
     corners: Option<[[f64; 3]; 2]>,
 }
@@ -35,100 +31,95 @@ pub(crate) enum View {
 }
 
 impl Bodies {
-    /// Adds a body: positions (m), triangles, and a length at each node (m) that its colour stands for, up to `most`. Nodes inside are
-    /// left out.
+    /// Adds a body: positions (m), triangles, and a length at each node (m) that its colour stands for, up to `most`.
+    /// Nodes inside are left out.
     pub(crate) fn add(&mut self, positions: &[[f64; 3]], triangles: &[[u32; 3]], lengths: &[f64], most: f64) {
-        let (numbers, triangles) = surface(positions.len(), triangles);
-        self.reach(positions, &numbers);
-        let lengths: Vec<_> = numbers.iter().map(|&node| 1e3 * lengths[node]).collect();
-        let words = lengths.iter().map(|length| format!("{} mm", short(*length))).collect();
+        let surface = surface(positions.len(), triangles);
+        let lengths = surface.0.iter().map(|&node| 1e3 * lengths[node]);
+        let words: Value = lengths.clone().map(|length| format!("{} mm", short(length))).collect();
         // As fine as the colours.
         let fineness = most.max(1e-6);
-        let lengths = lengths.iter().map(|length| (length / fineness).round() * fineness).collect();
-        let trace = Self::trace(positions, &numbers, &triangles)
-            .intensity(lengths)
-            .color_scale(ColorScale::Palette(ColorScalePalette::Viridis))
-            .c_min(0.0)
-            .c_max(1e3 * fineness)
-            .show_scale(false)
-            .hover_text_array(words)
-            .hover_info(HoverInfo::Text);
-        self.plot.add_trace(trace);
+        let lengths: Value = lengths.map(|length| (length / fineness).round() * fineness).collect();
+        let looks = json!({
+            "intensity": lengths,
+            "colorscale": "Viridis",
+            "cmin": 0.0,
+            "cmax": 1e3 * fineness,
+            "showscale": false,
+            "hovertext": words,
+            "hoverinfo": "text",
+        });
+        self.add_surface(positions, &surface, looks);
     }
 
     /// Adds what does not deform.
     pub(crate) fn add_rigid(&mut self, positions: &[[f64; 3]], triangles: &[[u32; 3]]) {
-        let (numbers, triangles) = surface(positions.len(), triangles);
-        self.reach(positions, &numbers);
-        let trace =
-            Self::trace(positions, &numbers, &triangles).color(INSTRUMENT).hover_info(HoverInfo::Skip);
-        self.plot.add_trace(trace);
+        let looks = json!({ "color": INSTRUMENT, "hoverinfo": "skip" });
+        self.add_surface(positions, &surface(positions.len(), triangles), looks);
     }
 
     /// Adds nodes as points.
     pub(crate) fn add_points(&mut self, positions: &[[f64; 3]]) {
-        let along = |axis: usize| positions.iter().map(|point| millimetres(point[axis])).collect::<Vec<_>>();
-        let marker = Marker::new().size(3).color(POINTS);
-        let trace = Scatter3D::new(along(0), along(1), along(2)).mode(Mode::Markers).marker(marker);
-        self.plot.add_trace(trace.hover_info(HoverInfo::Skip));
-    }
-
-    fn reach(&mut self, positions: &[[f64; 3]], numbers: &[usize]) {
-        let [low, high] = self.corners.get_or_insert([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]);
-        for &node in numbers {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(positions[node][axis]);
-                high[axis] = high[axis].max(positions[node][axis]);
-            }
+        let mut trace = json!({
+            "type": "scatter3d",
+            "mode": "markers",
+            "marker": { "size": 3, "color": POINTS },
+            "hoverinfo": "skip",
+        });
+        for (axis, name) in AXES.into_iter().enumerate() {
+            trace[name] = positions.iter().map(|point| millimetres(point[axis])).collect();
         }
+        self.traces.push(trace);
     }
 
-    fn trace(
-        positions: &[[f64; 3]],
-        numbers: &[usize],
-        triangles: &[[usize; 3]],
-    ) -> Box<Mesh3D<f64, f64, f64>> {
-        let along = |axis: usize| numbers.iter().map(|&node| millimetres(positions[node][axis])).collect();
-        let corner = |at: usize| Some(triangles.iter().map(|corners| corners[at]).collect());
-        let lighting = Lighting::new().ambient(0.75).diffuse(0.5).specular(0.05).roughness(0.9);
-        Mesh3D::new(along(0), along(1), along(2), corner(0), corner(1), corner(2))
-            .flat_shading(true)
-            .lighting(lighting)
+    /// Adds the places of a surface to a trace that says already what it looks like.
+    fn add_surface(&mut self, positions: &[[f64; 3]], (numbers, triangles): &Surface, mut trace: Value) {
+        trace["type"] = "mesh3d".into();
+        trace["flatshading"] = true.into();
+        trace["lighting"] = json!({ "ambient": 0.75, "diffuse": 0.5, "specular": 0.05, "roughness": 0.9 });
+        let [low, high] = self.corners.get_or_insert([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]);
+        for (axis, name) in AXES.into_iter().enumerate() {
+            let along = numbers.iter().map(|&node| positions[node][axis]);
+            low[axis] = along.clone().fold(low[axis], f64::min);
+            high[axis] = along.clone().fold(high[axis], f64::max);
+            trace[name] = along.map(millimetres).collect();
+        }
+        for (at, name) in ["i", "j", "k"].into_iter().enumerate() {
+            trace[name] = triangles.iter().map(|corners| corners[at]).collect();
+        }
+        self.traces.push(trace);
     }
 
     /// The plot.
     pub(crate) fn plot(self, view: View) -> Plot {
-        let hidden = || Axis::new().visible(false);
         let (eye, up) = match view {
             View::Standing => ([0.36, -1.0, 0.45], [0.0, 0.0, 1.0]),
             View::Lying => ([0.45, 1.0, 0.3], [1.0, 0.0, 0.0]),
         };
-        let camera = Camera::new()
-            .eye(Eye::from((eye[0], eye[1], eye[2])))
-            .up(Up::from((up[0], up[1], up[2])))
-            .projection(Projection::new().projection_type(ProjectionType::Orthographic));
         // As long as the panel is high, whichever way it is turned.
         let [low, high] = self.corners.unwrap_or_default();
         let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
         let diagonal = sides.iter().map(|side| side * side).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-        let [x, y, z] = sides.map(|side| FILL * side / diagonal);
-        let scene = LayoutScene::new()
-            .aspect_mode(AspectMode::Manual)
-            .aspect_ratio(AspectRatio::from((x, y, z)))
-            .camera(camera)
-            .drag_mode(DragMode3D::Orbit)
-            .background_color(NamedColor::Transparent)
-            .x_axis(hidden())
-            .y_axis(hidden())
-            .z_axis(hidden());
-        let mut plot = self.plot;
-        plot.set_layout(Layout::new().scene(scene).show_legend(false));
-        plot
+        let xyz = |[x, y, z]: [f64; 3]| json!({ "x": x, "y": y, "z": z });
+        let hidden = json!({ "visible": false });
+        let scene = json!({
+            "aspectmode": "manual",
+            "aspectratio": xyz(sides.map(|side| FILL * side / diagonal)),
+            "camera": { "eye": xyz(eye), "up": xyz(up), "projection": { "type": "orthographic" } },
+            "dragmode": "orbit",
+            "bgcolor": "transparent",
+            "xaxis": hidden,
+            "yaxis": hidden,
+            "zaxis": hidden,
+        });
+        Plot { data: self.traces, layout: json!({ "scene": scene, "showlegend": false }) }
     }
 }
 
 /// The nodes that triangles use, and the triangles with places in these.
-fn surface(nodes: usize, triangles: &[[u32; 3]]) -> (Vec<usize>, Vec<[usize; 3]>) {
+type Surface = (Vec<usize>, Vec<[usize; 3]>);
+
+fn surface(nodes: usize, triangles: &[[u32; 3]]) -> Surface {
     let mut places = vec![usize::MAX; nodes];
     let mut numbers = vec![];
     let mut place = |node: u32| {
@@ -187,12 +178,12 @@ mod tests {
         let mut bodies = Bodies::default();
         let points = [[0.0; 3], [0.01, 0.0, 0.0], [0.0, 0.02, 0.0]];
         bodies.add(&points, &[[0, 1, 2]], &[0.0, 0.001, 0.002], 0.002);
-        let plot: serde_json::Value = serde_json::from_str(&bodies.plot(View::Standing).to_json()).unwrap();
-        let trace = &plot["data"][0];
-        assert_eq!(trace["y"], serde_json::json!([0.0, 0.0, 20.0]));
+        let plot = bodies.plot(View::Standing);
+        let trace = &plot.data[0];
+        assert_eq!(trace["y"], json!([0.0, 0.0, 20.0]));
         let [a, b, c] = [0, 1, 2].map(|node| trace["intensity"][node].as_f64().unwrap());
         assert!(a == 0.0 && (b - 1.0).abs() < 1e-9 && (c - 2.0).abs() < 1e-9, "{trace}");
         assert_eq!(trace["cmax"], 2.0);
-        assert_eq!(plot["layout"]["scene"]["camera"]["projection"]["type"], "orthographic");
+        assert_eq!(plot.layout["scene"]["camera"]["projection"]["type"], "orthographic");
     }
 }

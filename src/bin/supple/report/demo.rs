@@ -1,10 +1,8 @@
 //! Steps side by side on one body: a table for the screen and the report, shapes at the end, error over time with its estimate.
 
-use plotly::common::DashType;
-
 use super::bodies::{distances, lengths, mean_millimetres};
 use super::made::Made;
-use super::plots::{self, COLOURS, Curve, GREY, short};
+use super::plots::{self, COLOURS, Curve, DashType, GREY, short};
 use super::simulation::body;
 use super::{Figure, Panel, Part, Section, Table};
 use crate::run::outcome::Outcome;
@@ -186,7 +184,7 @@ fn section(case: &Compared) -> Section {
         .collect();
     let most = exact.last().map_or(0.0, |shape| lengths(shape).into_iter().fold(1e-6, f64::max));
     let bodies = ended.iter().map(|(run, shape, time)| {
-        Panel::new(format!("{} steps", run.name), &body(&run.setup, shape, &lengths(shape), *time, most))
+        Panel::new(format!("{} steps", run.name), body(&run.setup, shape, &lengths(shape), *time, most))
     });
     let bodies = Figure::grid(
         "The lobe at the end, coloured by displacement; red: nodes that forceps grip. Turn one and all turn.",
@@ -210,7 +208,7 @@ fn where_off(ended: &[(&Run, &Shape, f64)]) -> Option<Figure> {
     let off: Vec<Vec<f64>> = others.iter().map(|(_, shape, _)| distances(exact, shape)).collect();
     let most = off.iter().flatten().fold(1e-6, |a: f64, b| a.max(*b));
     let panels = others.iter().zip(&off).map(|((run, shape, time), off)| {
-        Panel::new(format!("{} steps", run.name), &body(&run.setup, shape, off, *time, most))
+        Panel::new(format!("{} steps", run.name), body(&run.setup, shape, off, *time, most))
     });
     let columns = ended.len();
     let caption = "The same, coloured by the distance to the exact steps.";
@@ -247,7 +245,7 @@ fn over_time(case: &Compared, exact: &[Shape]) -> Figure {
     let plot = plots::over_time("mean over the nodes, mm", curves);
     Figure::choice(
         "Error against exact steps, and what the guard estimates of it while running, without exact steps.",
-        vec![Panel::new("error", &plot)],
+        vec![Panel::new("error", plot)],
     )
 }
 

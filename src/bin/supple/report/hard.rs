@@ -1,12 +1,11 @@
 //! Hard cases: are runs ever wrong without a word, and do estimates of the error follow the true one?
 
-use plotly::common::{DashType, MarkerSymbol};
 use supple::lab::evaluate::unique;
 use supple::lab::hard::report;
 use supple::lab::hard::verdict::{Judged, Verdict};
 
 use super::made::Made;
-use super::plots::{self, COLOURS, Curve, GREY, short};
+use super::plots::{self, COLOURS, Curve, DashType, GREY, MarkerSymbol, short};
 use super::{Figure, Panel, Part, Section};
 
 pub(crate) const NAME: &str = "hard";
@@ -54,7 +53,7 @@ fn estimates(judged: &[Judged]) -> Section {
         if points.is_empty() {
             continue;
         }
-        let symbol = [MarkerSymbol::Circle, MarkerSymbol::Square][index / COLOURS.len() % 2].clone();
+        let symbol = [MarkerSymbol::Circle, MarkerSymbol::Square][index / COLOURS.len() % 2];
         let curve = Curve::new(method.name(), x, y).coloured(COLOURS[index % COLOURS.len()]);
         curves.push(curve.points().marked(symbol).saying(said.collect()));
     }
@@ -71,7 +70,7 @@ fn estimates(judged: &[Judged]) -> Section {
     let caption = "A point is a run at its worst snapshot. Above the line the estimate is larger than the error, below it is too low.";
     Section {
         title: "Hard cases: is a run ever wrong without a word?".into(),
-        figures: vec![Figure::choice(caption, vec![Panel::new("estimates", &plot)])],
+        figures: vec![Figure::choice(caption, vec![Panel::new("estimates", plot)])],
         ..Section::default()
     }
 }
@@ -108,7 +107,7 @@ fn over_time(judged: &[Judged]) -> Section {
                 .marked(MarkerSymbol::CircleOpen),
             Curve::new("mean motion so far", times, run.motion.clone()).coloured(GREY).dashed(DashType::Dot),
         ];
-        Panel::new(words(run), &plots::over_time("mm", curves))
+        Panel::new(words(run), plots::over_time("mm", curves))
     });
     let caption = "The true mean error of the nodes and its estimate while running, next to the motion so far. A ring is a snapshot before which a step was not ok. \
                    Silent runs come first, then those with the largest errors, then some of all others.";

@@ -1,7 +1,6 @@
 //! Methods judged against the exact motion: speed against error with the Pareto front, error over step and over time, and the two figures
 //! of the paper.
 
-use plotly::common::{DashType, MarkerSymbol};
 use supple::lab::evaluate::{Evaluation, unique};
 use supple::lab::method::Method;
 use supple::lab::networks::Family;
@@ -15,7 +14,7 @@ use supple::mesh::boundary;
 use super::bodies::{Bodies, View, distances, lengths, mean_millimetres, moved};
 use super::made::Made;
 use super::peers::{BAR, NETWORK_SECONDS, PEERS, PUBLISHED};
-use super::plots::{self, COLOURS, Curve, GREY, short};
+use super::plots::{self, COLOURS, Curve, DashType, GREY, MarkerSymbol, Plot, short};
 use super::{Figure, Panel, Part, Section, Table};
 
 pub(crate) const NAME: &str = "methods";
@@ -54,7 +53,7 @@ fn speed(evaluation: &Evaluation) -> Section {
     let panels = evaluation.scenes.iter().map(|(spec, truth)| {
         let rows: Vec<&Row> = evaluation.rows.iter().filter(|row| row.scene == spec.name).collect();
         let name = format!("{} (moves by {:.0} mm)", spec.name, 1e3 * truth.most());
-        Panel::new(name, &speed_of(spec, &rows, &methods))
+        Panel::new(name, speed_of(spec, &rows, &methods))
     });
     let caption = "A point is one step of one method: its computing time on one core, and its mean error over nodes and time; to the lower left is \
                    better. Exact steps are the reference and have no error: they stand at the foot of the plot, at their time, and so do other programs' \
@@ -75,7 +74,7 @@ fn speed(evaluation: &Evaluation) -> Section {
 }
 
 /// The plot of one scene.
-fn speed_of(spec: &SceneSpec, rows: &[&Row], methods: &[Method]) -> plotly::Plot {
+fn speed_of(spec: &SceneSpec, rows: &[&Row], methods: &[Method]) -> Plot {
     let ended = rows.iter().filter_map(|row| Some((*row, point(row, row.figures()?))));
     let judged: Vec<(&Row, (f64, f64))> =
         ended.filter(|(row, (error, _))| !is_reference(row.method) && *error > 0.0).collect();
@@ -256,7 +255,7 @@ fn over_time(evaluation: &Evaluation) -> Section {
                     .coloured(colour(&methods, row.method))
             });
             let plot = plots::over_time("mean error of the nodes, mm", curves.chain([still]).collect());
-            panels.push(Panel::new(format!("{}, {multiple}x", spec.name), &plot));
+            panels.push(Panel::new(format!("{}, {multiple}x", spec.name), plot));
         }
     }
     let caption = "Mean error over the nodes at each snapshot, next to that of a body that never moves. A curve that ends early diverged. Estimates of the error while running \
@@ -301,7 +300,7 @@ fn over_step(evaluation: &Evaluation, scene: &str) -> Option<Section> {
     );
     Some(Section {
         title: "Error over step".into(),
-        figures: vec![Figure::choice(caption, vec![Panel::new(scene, &plot)])],
+        figures: vec![Figure::choice(caption, vec![Panel::new(scene, plot)])],
         ..Section::default()
     })
 }
@@ -361,10 +360,7 @@ fn paper_bars(evaluation: &Evaluation) -> Option<Section> {
             let mut bodies = Bodies::default();
             let positions = moved(&spec.points, &row.shape);
             bodies.add(&positions, &boundary(spec.tets.iter().copied()), distances, most);
-            Panel::new(
-                format!("{}, {}x: {}", row.scene, row.multiple, spread(row)),
-                &bodies.plot(View::Lying),
-            )
+            Panel::new(format!("{}, {}x: {}", row.scene, row.multiple, spread(row)), bodies.plot(View::Lying))
         });
         let columns = runs.len().min(BARS.len());
         let caption = format!(
@@ -402,7 +398,7 @@ fn paper_bodies(evaluation: &Evaluation) -> Option<Section> {
             let panel = |name: String, shape: &[[f32; 3]]| {
                 let mut bodies = Bodies::default();
                 bodies.add(&moved(&spec.points, shape), &triangles, &lengths(shape), most);
-                Panel::new(name, &bodies.plot(View::Standing))
+                Panel::new(name, bodies.plot(View::Standing))
             };
             let others = runs
                 .iter()
@@ -447,9 +443,8 @@ mod tests {
         let points = [(1.0, 1.0), (0.5, 2.0), (0.7, 3.0), (0.1, 4.0), (0.1, 5.0), (2.0, 0.5)];
         let judged: Vec<_> = points.into_iter().map(|point| (&row, point)).collect();
         let plot = plots::linear("s", "mm", vec![front(&judged).unwrap()]);
-        let plot: serde_json::Value = serde_json::from_str(&plot.to_json()).unwrap();
-        assert_eq!(plot["data"][0]["x"], serde_json::json!([0.5, 1.0, 2.0, 4.0]));
-        assert_eq!(plot["data"][0]["y"], serde_json::json!([2.0, 1.0, 0.5, 0.1]));
+        assert_eq!(plot.data[0]["x"], serde_json::json!([0.5, 1.0, 2.0, 4.0]));
+        assert_eq!(plot.data[0]["y"], serde_json::json!([2.0, 1.0, 0.5, 0.1]));
     }
 
     #[test]

@@ -1,8 +1,9 @@
-//! Reports: one HTML file each that holds its figures, its data and the library that draws them (Plotly), and works offline.
-//! A report has parts, one for each command that adds to it; a part says how it was made.
+//! Reports: one HTML file each that holds its figures, its data and the library that draws them (plotly.js), and works
+//! offline. A report has parts, one for each command that adds to it; a part says how it was made.
 //!
 //! | module | what it holds |
 //! |---|---|
+//! | `page` | parts as HTML, with `page.html`, `page.css`, `page.js` and the library in `plotly` |
 //! | `made` | command, version, machine |
 //! | `plots` | curves and points, with the names of their axes |
 //! | `bodies` | surfaces of bodies that turn under the mouse |
@@ -16,6 +17,7 @@ pub(crate) mod demo;
 pub(crate) mod hard;
 pub(crate) mod made;
 pub(crate) mod methods;
+mod page;
 pub(crate) mod peers;
 pub(crate) mod physics;
 pub(crate) mod plots;
@@ -24,14 +26,13 @@ pub(crate) mod simulation;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use askama::Template;
-use plotly::Plot;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use supple::io::write_atomically;
 
 use crate::problem::Problem;
 use made::Made;
+pub(crate) use page::page;
+use plots::Plot;
 
 /// The name of a report's file.
 pub(crate) const FILE: &str = "report.html";
@@ -60,13 +61,6 @@ pub(crate) struct Table {
     pub(crate) rows: Vec<Vec<String>>,
 }
 
-impl Table {
-    /// Whether it opens on demand.
-    fn is_long(&self) -> bool {
-        self.rows.len() > 20
-    }
-}
-
 /// Panels of which one is chosen, or all in a grid.
 #[derive(Deserialize, Serialize)]
 pub(crate) struct Figure {
@@ -87,13 +81,12 @@ pub(crate) struct Scale {
 #[derive(Deserialize, Serialize)]
 pub(crate) struct Panel {
     name: String,
-    /// Data and layout, as Plotly reads them.
-    plot: Value,
+    plot: Plot,
 }
 
 impl Panel {
-    pub(crate) fn new(name: impl Into<String>, plot: &Plot) -> Self {
-        Self { name: name.into(), plot: serde_json::from_str(&plot.to_json()).unwrap_or_default() }
+    pub(crate) fn new(name: impl Into<String>, plot: Plot) -> Self {
+        Self { name: name.into(), plot }
     }
 }
 
@@ -116,39 +109,8 @@ impl Figure {
     }
 }
 
-#[derive(Template)]
-#[template(path = "page.html")]
-struct Page<'a> {
-    title: &'a str,
-    parts: &'a [Part],
-    style: &'static str,
-    library: &'a str,
-    script: &'static str,
-}
-
-impl Page<'_> {
-    /// Whether a cell is a number, which stands to the right.
-    fn is_number(cell: &str) -> bool {
-        cell.parse::<f64>().is_ok() || cell == "-"
-    }
-
-    /// The figure as a script may hold it.
-    fn json(figure: &Figure) -> String {
-        serde_json::to_string(figure).unwrap_or_default().replace("</", "<\\/")
-    }
-}
-
-/// The page, complete.
-pub(crate) fn page(title: &str, parts: &[Part]) -> Result<String, Problem> {
-    // Formulas in labels, for which the crate adds MathJax behind Plotly, are not used.
-    let sources = Plot::offline_js_sources();
-    let library = sources.rsplit_once("<script").map_or("", |(library, _)| library);
-    let (style, script) = (include_str!("page.css"), include_str!("page.js"));
-    Page { title, parts, style, library, script }.render().map_err(Problem::of)
-}
-
-/// Adds a part, or puts it in the place of an earlier one of this name, to the report in a folder: parts are kept in `report/NAME.json`.
-/// Gives the path of the report.
+/// Adds a part, or puts it in the place of an earlier one of this name, to the report in a folder: parts are kept in
+/// `report/NAME.json`. Gives the path of the report.
 pub(crate) fn add(folder: &Path, name: &str, part: &Part) -> Result<PathBuf, Problem> {
     let parts = folder.join("report");
     fs::create_dir_all(&parts).map_err(|error| Problem::in_file(&parts, error))?;
@@ -178,33 +140,8 @@ mod tests {
     use super::*;
 
     fn part(title: &str) -> Part {
-        let table = Table {
-            title: "all".into(),
-            heads: vec!["method".into(), "mm".into()],
-            rows: vec![vec!["<b>".into(), "-0.5".into()], vec!["exact".into(), "diverged".into()]],
-        };
-        let curve = plots::Curve::new("</script>", vec![1.0, 2.0], vec![3.0, 4.0]);
-        let plot = plots::linear("time, s", "mm", vec![curve]);
-        let section = Section {
-            title: title.into(),
-            tables: vec![table],
-            figures: vec![Figure::choice("below", vec![Panel::new("one", &plot)])],
-            ..Section::default()
-        };
+        let section = Section { title: title.into(), ..Section::default() };
         Part { made: Made::now(&["simulate".into()], "none"), sections: vec![section] }
-    }
-
-    #[test]
-    fn a_page_holds_all_that_it_needs_and_escapes_words() {
-        let page = page("a & b", &[part("first")]).unwrap();
-        // The library itself is some megabytes.
-        assert!(page.len() > 3_000_000 && page.contains("plotly.js v"), "{}", page.len());
-        assert!(!page.contains("MathJax.js") && page.contains("<title>a &#38; b</title>"));
-        assert!(page.contains("<td>&#60;b&#62;</td><td class=\"number\">-0.5</td>"));
-        assert!(page.contains("<td>exact</td><td>diverged</td>"));
-        let data = page.split("<script type=\"application/json\">").nth(1).unwrap();
-        let figure: Figure = serde_json::from_str(data.split("</script>").next().unwrap()).unwrap();
-        assert_eq!(figure.panels[0].plot["data"][0]["name"], "</script>");
     }
 
     #[test]

@@ -1,11 +1,10 @@
 //! Elements and steps against nature: errors over computing time, of a filmed beam, closed forms and published values.
 
-use plotly::common::{DashType, MarkerSymbol};
 use supple::lab::evaluate::unique;
 use supple::lab::physics::Row;
 
 use super::made::Made;
-use super::plots::{self, COLOURS, Curve, short};
+use super::plots::{self, COLOURS, Curve, DashType, MarkerSymbol, short};
 use super::{Figure, Panel, Part, Section, Table};
 
 pub(crate) const NAME: &str = "physics";
@@ -77,11 +76,11 @@ fn panel(case: &str, quantity: &str, rows: &[&Row]) -> Option<Panel> {
     }
     let drawn = curves.into_iter().enumerate().map(|(index, Meshes { name, times, errors, words })| {
         let curve = Curve::new(name, times, errors).coloured(COLOURS[index % COLOURS.len()]).saying(words);
-        let dash = [DashType::Solid, DashType::Dash, DashType::Dot][index / COLOURS.len() % 3].clone();
+        let dash = [DashType::Solid, DashType::Dash, DashType::Dot][index / COLOURS.len() % 3];
         curve.dashed(dash).marked(MarkerSymbol::Circle)
     });
     let plot = plots::logarithms("computing time, s", &format!("error, {unit}"), drawn.collect());
-    Some(Panel::new(format!("{case}: {quantity}"), &plot))
+    Some(Panel::new(format!("{case}: {quantity}"), plot))
 }
 
 /// The finest mesh of each case, quantity and element with exact steps.
@@ -162,7 +161,7 @@ mod tests {
     fn errors_are_shares_of_what_should_be_and_the_finest_mesh_is_told() {
         let rows = [row(9.0, Some(10.0), 6), row(11.0, Some(10.0), 48)];
         let panel = panel("bending", "sag", &rows.iter().collect::<Vec<_>>()).unwrap();
-        let x = &panel.plot["data"][0];
+        let x = &panel.plot.data[0];
         assert_eq!((&x["x"], &x["y"]), (&serde_json::json!([2.0, 2.0]), &serde_json::json!([10.0, 10.0])));
         let table = finest(&rows);
         assert_eq!(table.rows.len(), 1);

@@ -1,9 +1,37 @@
-//! Plots of curves and points over two axes, linear or logarithmic. Numbers have five digits: what an eye can see, in a quarter of the
-//! bytes.
+//! Plots of curves and points over two axes, linear or logarithmic, as plotly.js reads them. Numbers have five digits:
+//! what an eye can see, in a quarter of the bytes.
 
-use plotly::common::{DashType, HoverInfo, Line, LineShape, Marker, MarkerSymbol, Mode, Title};
-use plotly::layout::{Axis, AxisType, HoverMode};
-use plotly::{Layout, Plot, Scatter};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+/// What plotly.js draws: its traces, and a layout, to which `page.js` adds colours and margins.
+#[derive(Deserialize, Serialize)]
+pub(crate) struct Plot {
+    pub(crate) data: Vec<Value>,
+    pub(crate) layout: Value,
+}
+
+/// plotly.js's names of lines.
+#[derive(Clone, Copy, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum DashType {
+    Solid,
+    Dash,
+    Dot,
+}
+
+/// plotly.js's names of marks.
+#[derive(Clone, Copy, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum MarkerSymbol {
+    Circle,
+    CircleOpen,
+    Square,
+    SquareOpen,
+    Diamond,
+    DiamondOpen,
+    X,
+}
 
 /// Okabe and Ito's palette, which colour-blind people tell apart, with brown in place of black.
 pub(crate) const COLOURS: [&str; 7] =
@@ -75,26 +103,29 @@ impl Curve {
         self
     }
 
-    fn trace(self) -> Box<Scatter<f64, f64>> {
-        let rounded = |values: Vec<f64>| values.into_iter().map(rounded).collect();
+    fn trace(self) -> Value {
+        let rounded = |values: Vec<f64>| values.into_iter().map(rounded).collect::<Value>();
         let mode = match (self.is_line, self.symbol.is_some()) {
-            (true, true) => Mode::LinesMarkers,
-            (false, _) => Mode::Markers,
-            (true, false) => Mode::Lines,
+            (true, true) => "lines+markers",
+            (false, _) => "markers",
+            (true, false) => "lines",
         };
-        let shape = if self.is_stairs { LineShape::Hv } else { LineShape::Linear };
-        let line = Line::new().color(self.colour.clone()).dash(self.dash).width(1.8).shape(shape);
-        let marker =
-            Marker::new().color(self.colour).size(8).symbol(self.symbol.unwrap_or(MarkerSymbol::Circle));
-        let trace = Scatter::new(rounded(self.x), rounded(self.y))
-            .name(self.name)
-            .mode(mode)
-            .line(line)
-            .marker(marker);
-        if self.words.is_empty() {
-            return trace;
+        let shape = if self.is_stairs { "hv" } else { "linear" };
+        let symbol = self.symbol.unwrap_or(MarkerSymbol::Circle);
+        let mut trace = json!({
+            "type": "scatter",
+            "name": self.name,
+            "mode": mode,
+            "x": rounded(self.x),
+            "y": rounded(self.y),
+            "line": { "color": self.colour, "dash": self.dash, "width": 1.8, "shape": shape },
+            "marker": { "color": self.colour, "size": 8, "symbol": symbol },
+        });
+        if !self.words.is_empty() {
+            trace["hovertext"] = self.words.into();
+            trace["hoverinfo"] = "text".into();
         }
-        trace.hover_text_array(self.words).hover_info(HoverInfo::Text)
+        trace
     }
 }
 
@@ -109,17 +140,13 @@ pub(crate) fn short(value: f64) -> String {
     format!("{value:.*}", (2.0 - digits).clamp(0.0, 6.0) as usize)
 }
 
-fn plot(x: Axis, y: Axis, curves: Vec<Curve>) -> Plot {
-    let mut plot = Plot::new();
-    for curve in curves {
-        plot.add_trace(curve.trace());
-    }
-    plot.set_layout(Layout::new().x_axis(x).y_axis(y).hover_mode(HoverMode::Closest));
-    plot
+fn plot(x: Value, y: Value, curves: Vec<Curve>) -> Plot {
+    let layout = json!({ "xaxis": x, "yaxis": y, "hovermode": "closest" });
+    Plot { data: curves.into_iter().map(Curve::trace).collect(), layout }
 }
 
-fn axis(title: &str) -> Axis {
-    Axis::new().title(Title::with_text(title))
+fn axis(title: &str) -> Value {
+    json!({ "title": { "text": title } })
 }
 
 /// With linear axes.
@@ -142,17 +169,42 @@ pub(crate) fn logarithms(x: &str, y: &str, curves: Vec<Curve>) -> Plot {
 }
 
 /// A logarithmic axis for values: marks at decades, if there are some.
-fn logarithmic<'a>(axis: Axis, values: impl Iterator<Item = &'a f64>) -> Axis {
+fn logarithmic<'a>(mut axis: Value, values: impl Iterator<Item = &'a f64>) -> Value {
     let (low, high) = values
         .filter(|value| **value > 0.0)
         .fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(*value), high.max(*value)));
-    let axis = axis.type_(AxisType::Log);
-    if high > 30.0 * low { axis.dtick(1.0) } else { axis }
+    axis["type"] = "log".into();
+    if high > 30.0 * low {
+        axis["dtick"] = 1.0.into();
+    }
+    axis
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_curve_is_a_trace_of_plotly() {
+        let curve = Curve::new("error", vec![1.0, 2.0], vec![0.123_456_789, f64::NAN]).dashed(DashType::Dot);
+        let bare = curve.clone().trace();
+        assert_eq!((&bare["type"], &bare["mode"]), (&json!("scatter"), &json!("lines")));
+        assert_eq!((&bare["y"], &bare["line"]["dash"]), (&json!([0.12346, null]), &json!("dot")));
+        let points = curve.points().marked(MarkerSymbol::DiamondOpen).saying(vec!["a".into(), "b".into()]);
+        let points = points.trace();
+        assert_eq!((&points["mode"], &points["hovertext"]), (&json!("markers"), &json!(["a", "b"])));
+        assert_eq!(points["marker"]["symbol"], "diamond-open");
+    }
+
+    #[test]
+    fn zeros_have_no_logarithm_and_marks_stand_at_decades_if_there_are_some() {
+        let axis_of = |y: Vec<f64>| {
+            let plot = over_time("mm", vec![Curve::new("error", vec![1.0, 2.0, 3.0], y)]);
+            (plot.data[0]["x"].clone(), plot.layout["yaxis"]["dtick"].clone())
+        };
+        assert_eq!(axis_of(vec![0.0, 1.0, 100.0]), (json!([2.0, 3.0]), json!(1.0)));
+        assert_eq!(axis_of(vec![1.0, 2.0, 3.0]), (json!([1.0, 2.0, 3.0]), json!(null)));
+    }
 
     #[test]
     fn numbers_are_short_and_right() {

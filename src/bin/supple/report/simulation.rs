@@ -1,11 +1,10 @@
 //! What one simulation tells: its table, the body at rest and at the end, motion and estimated error over time, forces on instruments.
 
-use plotly::common::DashType;
 use supple::state::VecState;
 
 use super::bodies::{Bodies, View, lengths, moved};
 use super::made::Made;
-use super::plots::{self, COLOURS, Curve, GREY};
+use super::plots::{self, COLOURS, Curve, DashType, GREY, Plot};
 use super::{Figure, Panel, Part, Section, Table};
 use crate::results::{Conclusion, instrument_mesh};
 use crate::run::outcome::Outcome;
@@ -37,7 +36,7 @@ pub(crate) fn shape(state: &VecState) -> Vec<[f32; 3]> {
 }
 
 /// A body of a scene with its instruments at a time (s), coloured up to `most` (m) by a length at each node.
-pub(crate) fn body(setup: &Setup, shape: &[[f32; 3]], lengths: &[f64], time: f64, most: f64) -> plotly::Plot {
+pub(crate) fn body(setup: &Setup, shape: &[[f32; 3]], lengths: &[f64], time: f64, most: f64) -> Plot {
     let mut bodies = Bodies::default();
     let positions = moved(&setup.body.mesh.points, shape);
     bodies.add(&positions, &setup.body.boundary(), lengths, most);
@@ -57,7 +56,7 @@ fn shapes(setup: &Setup, state: &VecState) -> Section {
     let shape = shape(state);
     let most = lengths(&shape).into_iter().fold(1e-6, f64::max);
     let panel = |name: String, shape: &[[f32; 3]], time: f64| {
-        Panel::new(name, &body(setup, shape, &lengths(shape), time, most))
+        Panel::new(name, body(setup, shape, &lengths(shape), time, most))
     };
     let panels = vec![
         panel("at rest".into(), &rest, 0.0),
@@ -101,7 +100,7 @@ fn motion(Outcome { frames, .. }: &Outcome) -> Section {
     let plot = if is_exact { plots::linear("time, s", "mm", curves) } else { plots::over_time("mm", curves) };
     Section {
         title: title.into(),
-        figures: vec![Figure::choice(caption, vec![Panel::new("motion", &plot)])],
+        figures: vec![Figure::choice(caption, vec![Panel::new("motion", plot)])],
         ..Section::default()
     }
 }
@@ -119,7 +118,7 @@ fn forces(outcome: &Outcome) -> Option<Section> {
     let caption = "Mean force of the tissue on each instrument over short intervals; components and contacts are in reactions.csv.";
     Some(Section {
         title: "Forces on instruments".into(),
-        figures: vec![Figure::choice(caption, vec![Panel::new("forces", &plot)])],
+        figures: vec![Figure::choice(caption, vec![Panel::new("forces", plot)])],
         ..Section::default()
     })
 }
