@@ -114,18 +114,22 @@ impl Int8<'_> {
         (from, steps): (&Words<R, COLUMNS>, Tile<R, COLUMNS>),
         to: &mut [Tile<R, COLUMNS>],
     ) {
-        let tiles = self.weights.chunks_exact(inputs.div_ceil(GROUP).max(1));
-        let tables =
+        let mut tables =
             self.starts.chunks_exact(N).zip(self.scales.chunks_exact(N)).zip(self.biases.chunks_exact(N));
-        let rows = tiles.flat_map(|tiles| (0..TILE_ROWS).step_by(N).map(move |first| (tiles, first)));
-        for (((tiles, first), ((starts, scales), biases)), to) in rows.zip(tables).zip(to.chunks_exact_mut(N))
-        {
-            let sums: [_; N] = sums::<R, COLUMNS, N>(tiles, starts, first, from);
-            for (((sums, &scale), &bias), to) in sums.iter().zip(scales).zip(biases).zip(to) {
-                for column in 0..COLUMNS {
-                    let scale = R::splat(scale) * steps[column];
-                    let value = sums[column].numbers() * scale + R::splat(bias);
-                    to[column] = value.max(R::splat(slope) * value);
+        let mut outputs = to.chunks_exact_mut(N);
+        // Nested loops, not a chain of iterators, whose closures the compiler may not inline.
+        for tiles in self.weights.chunks_exact(inputs.div_ceil(GROUP).max(1)) {
+            for first in (0..TILE_ROWS).step_by(N) {
+                let (Some(((starts, scales), biases)), Some(to)) = (tables.next(), outputs.next()) else {
+                    return;
+                };
+                let sums: [_; N] = sums::<R, COLUMNS, N>(tiles, starts, first, from);
+                for (((sums, &scale), &bias), to) in sums.iter().zip(scales).zip(biases).zip(to) {
+                    for column in 0..COLUMNS {
+                        let scale = R::splat(scale) * steps[column];
+                        let value = sums[column].numbers() * scale + R::splat(bias);
+                        to[column] = value.max(R::splat(slope) * value);
+                    }
                 }
             }
         }
