@@ -51,12 +51,9 @@
 #![cfg_attr(not(feature = "std"), doc = "```ignore")]
 #![doc = include_str!("doc_common.txt")]
 //! use supple::guard::{EVERY, Guard};
-//! use supple::inertia::{Cells, Damper, LargeStep, Method};
+//! use supple::inertia::{Cells, LargeStep, Method};
 //!
-//! # #[repr(align(64))] struct Aligned<T: ?Sized>(T);
-//! # static WEIGHTS: &Aligned<[u8]> = &Aligned(*include_bytes!("../weights/damper.weights"));
-//! let damper = Damper::new(supple::mlp::Network::parse(&WEIGHTS.0)?)?; // weights/damper.weights
-//! let method = Method::Damped(damper, Cells::Given([1, 1, 4]));
+//! let method = Method::damped(Cells::Given([1, 1, 4]));
 //! let step = Step::unchecked(20.0 * critical.seconds, 20.0)?;
 //! let mut damped = LargeStep::prepare_in_vec(method, scene.view(), &points, state.view(), step)?;
 //! // A second run, three times as long in each step, estimates the error.
@@ -119,7 +116,7 @@
 //! | [`guard`] | may a step be believed: a second run that estimates its error |
 //! | [`reaction`] | the force by which supports act on the tissue, also in long steps |
 //! | [`adaptive`] | steps that choose their length so that their error stays below a tolerance |
-//! | [`inertia`] | steps beyond the critical one: mass-scaled, multilevel, damped |
+//! | [`inertia`] | steps beyond the critical one: damped, and for comparisons mass-scaled and multilevel |
 //! | [`mlp`] | dense layers: the forward pass, the weight file |
 //! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
 //!
