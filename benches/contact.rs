@@ -16,11 +16,10 @@ use supple::contact::{
     vectors_to_push,
 };
 use supple::element::ElementMaterial;
-use supple::inertia::{Cells, Damper, LargeStep, Method};
+use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::{Loads, NodalForce};
 use supple::material::{Exponential, NodalPressure, NodalStrain, Tissue};
 use supple::mesh::{Mesh, Winding};
-use supple::mlp::{Network, WeightBytes};
 use supple::scene::{Support, VecScene};
 use supple::state::{NodeVector, VecState};
 use supple::step::Step;
@@ -70,7 +69,6 @@ fn measure<M: ElementMaterial>(
         tled::critical_step(&scene, &mut VecState::at_rest(points.len())).expect("a critical step");
     let multiple = if damped { MULTIPLE } else { 0.5 };
     let step = Step::unchecked(multiple * critical.seconds, DAMPING).expect("a step");
-    let bytes = WeightBytes::of(include_bytes!("../weights/damper.weights"));
     let (scene, surface, triangles) = (&scene, &*surface, &*triangles);
     let run = |acting: Acting| -> Box<dyn FnMut() -> (Vec<ContactPoint>, f64) + '_> {
         let Acting { instruments, has_triangles, forces } = acting;
@@ -78,10 +76,8 @@ fn measure<M: ElementMaterial>(
         let mut state = VecState::at_rest(points.len());
         let mut pushes = vec![NodeVector::ZERO; vectors_to_push(surface.len(), triangles.len())];
         let (mut touches, mut list) = ([Touch::default()], vec![ContactPoint::default(); 64]);
-        let bytes = bytes.clone();
         let mut large = damped.then(|| {
-            let network = Network::parse(Box::leak(Box::new(bytes)).bytes()).expect("weights");
-            let method = Method::Damped(Damper::new(network).expect("a damper"), Cells::Given([3, 3, 3]));
+            let method = Method::damped(Cells::Given([3, 3, 3]));
             LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step).expect("prepared")
         });
         Box::new(move || {

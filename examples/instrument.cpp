@@ -3,13 +3,11 @@
 // host reads the status and the force on the sphere. All memory is there before the first frame.
 //
 //     c++ -std=c++17 -O2 -Iinclude examples/instrument.cpp -lsupple -o instrument
-//     ./instrument [--mesh FILE] [--method exact|damped|multilevel] [--weights FILE] [--frames N] [--out DIR]
-//                  [--realtime] [--jitter N]
+//     ./instrument [--mesh FILE] [--method exact|damped] [--frames N] [--out DIR] [--realtime] [--jitter N]
 //
-// Run from the repository it finds meshes/lobe.msh and weights/damper.weights itself. --out leaves frames for
-// ParaView, ten a second. --realtime waits for the clock between frames. --jitter N then times N single steps, and after
-// each a fixed piece of work of the same length: what that varies by is the machine. A mesh of your own must be a
-// Gmsh 2.2 file in text (gmsh.hpp).
+// Run from the repository it finds meshes/lobe.msh itself. --out leaves frames for ParaView, ten a second. --realtime
+// waits for the clock between frames. --jitter N then times N single steps, and after each a fixed piece of work of the
+// same length: what that varies by is the machine. A mesh of your own must be a Gmsh 2.2 file in text (gmsh.hpp).
 #include <array>
 #include <algorithm>
 #include <chrono>
@@ -17,8 +15,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -50,7 +46,7 @@ constexpr float EXACT_SHARE = 0.5f;
 constexpr int FRAMES_A_PICTURE = 6;
 
 struct options {
-    std::string mesh = "meshes/lobe.msh", weights = "weights/damper.weights", method = "damped", out;
+    std::string mesh = "meshes/lobe.msh", method = "damped", out;
     long frames = 240, jitter = 0;
     bool realtime = false;
 };
@@ -74,15 +70,14 @@ options read_options(int count, char **words) {
             return whole;
         };
         if (word == "--mesh") chosen.mesh = value;
-        else if (word == "--weights") chosen.weights = value;
         else if (word == "--method") chosen.method = value;
         else if (word == "--out") chosen.out = value;
         else if (word == "--frames") chosen.frames = number(1);
         else if (word == "--jitter") chosen.jitter = number(1000);
         else throw std::runtime_error(word + ": no such option");
     }
-    if (chosen.method != "exact" && chosen.method != "damped" && chosen.method != "multilevel")
-        throw std::runtime_error("--method " + chosen.method + ": not exact, damped or multilevel");
+    if (chosen.method != "exact" && chosen.method != "damped")
+        throw std::runtime_error("--method " + chosen.method + ": not exact or damped");
     return chosen;
 }
 
@@ -139,7 +134,6 @@ double milliseconds(clock_type::duration time) {
 // The body with all that moves it.
 struct host {
     gmsh::mesh mesh;
-    std::vector<unsigned char> weights;
     std::vector<line> scene_room, loads_room, state_room, contact_room, large_room;
     supple::scene scene;
     supple::loads loads;
@@ -189,19 +183,10 @@ struct host {
             return;
         }
         supple::large_steps wanted;
-        wanted.method = supple::method::multilevel;
         wanted.seconds = FRAME / LARGE_STEPS;
         wanted.damping = DAMPING;
-        if (chosen.method == "damped") {
-            std::ifstream file(chosen.weights, std::ios::binary);
-            if (!file) throw std::runtime_error(chosen.weights + ": cannot be opened");
-            weights.assign(std::istreambuf_iterator<char>(file), {});
-            wanted.method = supple::method::damped;
-            wanted.weights = weights;
-        }
-        const char *method = chosen.method.c_str();
-        large_room = room(made(method, supple::large::size(scene, points, wanted)));
-        large = made(method, supple::large::make(large_room, scene, state, points, wanted));
+        large_room = room(made("damped", supple::large::size(scene, points, wanted)));
+        large = made("damped", supple::large::make(large_room, scene, state, points, wanted));
     }
 
     std::size_t bytes() const {

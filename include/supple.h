@@ -176,17 +176,18 @@
 #define SUPPLE_LEARNED_FRONT 2048
 
 /**
- * Inertia is raised where the step would be unstable.
+ * For comparisons with a common method: inertia is raised where the step would be unstable, which slows all motion down.
  */
 #define SUPPLE_MASS_SCALED 0
 
 /**
- * The same, and smooth motion keeps its true inertia through a coarse lattice.
+ * For comparisons: the lattice alone, without the damper. Rough motion, once excited, oscillates for long.
  */
 #define SUPPLE_MULTILEVEL 1
 
 /**
- * The same, and a small network damps what the lattice does not carry. From 20 times the critical step on the most exact.
+ * What steps beyond the critical one should be: inertia is raised where the step would be unstable, smooth motion keeps its
+ * true inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not carry.
  */
 #define SUPPLE_DAMPED 2
 
@@ -1141,7 +1142,7 @@ typedef struct {
      */
     uint32_t abi;
     /**
-     * SUPPLE_MASS_SCALED, SUPPLE_MULTILEVEL or SUPPLE_DAMPED.
+     * SUPPLE_DAMPED; SUPPLE_MASS_SCALED and SUPPLE_MULTILEVEL are for comparisons.
      */
     uint32_t method;
     /**
@@ -1158,12 +1159,12 @@ typedef struct {
      */
     uint32_t cells[3];
     /**
-     * For SUPPLE_DAMPED the weight file of a damper, at a multiple of 4 bytes. It is used where it is and must stay. NULL
-     * otherwise.
+     * NULL: the damper that is part of the library. Otherwise, for SUPPLE_DAMPED, the weight file of another one, at a multiple
+     * of 4 bytes. It is used where it is and must stay.
      */
     const void *weights;
     /**
-     * Its bytes.
+     * Its bytes; 0 with NULL.
      */
     size_t weights_bytes;
 } supple_large_config;

@@ -662,11 +662,11 @@ private:
 
 // What steps beyond the critical one need.
 struct large_steps {
-    supple::method method = method::multilevel;
+    supple::method method = method::damped;  // the others are for comparisons
     float seconds = 0.0f;                    // length of a step, s
     float damping = 0.0f;                    // proportional to mass, 1/s
     std::array<std::uint32_t, 3> cells = {}; // of the lattice along x, y, z; zeros: chosen for the scene
-    bytes weights = {};                      // of a damper, for method::damped; not copied: they must stay
+    bytes weights = {};                      // of another damper than the library's own; not copied: they must stay
 };
 
 namespace detail {

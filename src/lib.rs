@@ -32,7 +32,7 @@
 //! use supple::inertia::{self, Cells};
 //! use supple::simulation::{Method, Settings};
 //!
-//! let method = Method::Long(inertia::Method::Multilevel(Cells::Given([1, 1, 4])));
+//! let method = Method::Long(inertia::Method::damped(Cells::Given([1, 1, 4])));
 //! let mut bent = at_rest.with(Settings { method, damping: 20.0, ..Settings::default() });
 //! let report = bent.advance(0.2)?;
 //! if let Some(estimate) = report.estimate {

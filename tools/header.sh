@@ -38,7 +38,7 @@ done < <(sed -n '/^macro_rules! for_each_law/,/^}/s/^ *\([a-z_]*\) \(\w*\),$/\2 
 
 # All of src/capi as one file, in the order of mod.rs: nothing else is C's.
 mapfile -t files < <(sed -n 's/^mod \(\w*\);$/src\/capi\/\1.rs/p' src/capi/mod.rs)
-sed -e '/^\/\/!/d' -e '/^#!\[/d' -e '/^mod /d' src/capi/mod.rs "${files[@]}" >"$made/capi.rs"
+sed -e '/^\/\/!/d' -e '/^#!\[/d' -e '/^mod .*;$/d' src/capi/mod.rs "${files[@]}" >"$made/capi.rs"
 "$cbindgen" --quiet --config include/cbindgen.toml --output "$made/raw.h" "$made/capi.rs"
 sed -e "/^@laws@$/{r $made/laws.h" -e 'd}' "$made/raw.h" >"$made/supple.h"
 sed -e "/^enum class law /,/^};/{/^enum class law /{r $made/laws.hpp" -e 'b};/^};/!d}' include/supple.hpp >"$made/supple.hpp"

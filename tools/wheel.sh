@@ -24,7 +24,6 @@ needed=$(readelf -d "$library" | grep NEEDED) && { echo "the library needs more 
 # The package as it will be, without what earlier builds have left.
 cp -r src/python "$folder/package"
 cp "$library" "$folder/package/supple/libsupple.so"
-cp weights/damper.weights "$folder/package/supple"
 python3 -m venv "$folder/build"
 "$folder/build/bin/pip" install --quiet cffi==2.1.1 pcpp==1.30 setuptools==84.2.1 wheel==0.48.0 mypy==2.4.1 numpy==2.4.6
 "$folder/build/bin/python" "$folder/package/build_interface.py" include/supple.h

@@ -1,27 +1,20 @@
 //! Mass-scaled, multilevel and damped steps on the paper's bar.
 
 use supple::guard::Guard;
-use supple::inertia::{Cells, Damper, LargeStep, Method};
+use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::Loads;
 use supple::material::Exponential;
-use supple::mlp::Network;
 use supple::state::VecState;
 use supple::step::Step;
 
 use super::bar::{BarScene, DAMPING, DT, moved};
-
-/// A network as it would lie in flash.
-#[repr(C, align(64))]
-struct Flash<B: ?Sized>(B);
-static DAMPER: &Flash<[u8]> = &Flash(*include_bytes!("../../weights/damper.weights"));
 
 pub(crate) fn multilevel() -> Method<'static> {
     Method::Multilevel(Cells::Given([2, 2, 4]))
 }
 
 pub(crate) fn damped() -> Method<'static> {
-    let network = Network::parse(&DAMPER.0).expect("a weight file of the crate");
-    Method::Damped(Damper::new(network).expect("a damper"), Cells::Given([2, 2, 5]))
+    Method::damped(Cells::Given([2, 2, 5]))
 }
 
 /// Steps of a refresh cycle with a lattice, a multiple of those without one.

@@ -28,7 +28,7 @@ async function bundle(entry) {
     const { outputFiles: [{ text }] } = await build({
         entryPoints: [join(here, entry)], bundle: true, minify: true, write: false, format: "iife", target: "es2022", charset: "utf8",
         legalComments: "inline", plugins: [fromBuilt],
-        loader: { ".gz": "binary", ".weights": "binary" }, logLevel: "warning" });
+        loader: { ".gz": "binary" }, logLevel: "warning" });
     return text;
 }
 
@@ -40,7 +40,6 @@ try {
     });
     put("lobe.json", JSON.stringify(plain(mesh)));
     put("header.json", JSON.stringify(readHeader(read("../../include/supple.h", "utf8"))));
-    put("damper.weights", read("../../weights/damper.weights"));
     put("supple.wasm.gz", gzipSync(readFileSync(wasm), { level: 9 }));
     put("worker.txt", await bundle("worker.js"));
     const script = await bundle("main.js");

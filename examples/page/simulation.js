@@ -4,23 +4,22 @@
 import { Tool } from "./tool.js";
 
 export const FRAME = 1 / 60; // s
-export const METHODS = ["exact", "multilevel", "damped", "adaptive"];
+export const METHODS = ["exact", "damped", "adaptive"];
 export const TOLERANCE = { least: 0.05e-3, most: 5e-3, usual: 0.5e-3 }; // m, mean error of the nodes
 
 // Neo-Hookean and liver-like: half the shear modulus and half the bulk modulus (Pa); kg/m^3. It does not stiffen when it is pulled.
 const TISSUE = { constants: [750, 40000, 0, 0], density: 1060 };
 const DAMPING = 20; // 1/s, proportional to mass
 const BACK = 0.03; // nodes behind y = 30 mm hang on the diaphragm
-const LONG = 4; // multilevel and damped steps a frame, and at least as many adaptive ones
+const LONG = 4; // damped steps a frame, and at least as many adaptive ones
 const MARGIN = 0.7; // exact steps, in critical steps at rest: deformed tissue is stiffer
 
 export class Simulation {
-    /** @param {import("./library.js").Library} library, @param mesh of readMesh, @param {Uint8Array} damper its weights */
-    constructor(library, mesh, damper) {
+    /** @param {import("./library.js").Library} library, @param mesh of readMesh */
+    constructor(library, mesh) {
         this.library = library;
         this.nodes = mesh.points.length / 3;
         this.points = library.copy(mesh.points);
-        this.damper = { weights: library.copy(damper), weights_bytes: damper.byteLength };
         this.places = {
             made: library.room(8),
             error: library.space("supple_error"),
@@ -81,20 +80,17 @@ export class Simulation {
             library.call(name, scene, points, ...values, made, error);
             return library.pointer(made);
         };
-        const sizes = ["multilevel", "damped"].map((method) => size("supple_large_size", this.#config(method)));
-        this.methodBytes = Math.max(...sizes, size("supple_adaptive_size", this.#config("adaptive")));
+        const long = this.#config();
+        this.methodBytes = Math.max(size("supple_large_size", long), size("supple_adaptive_size", long));
         this.methodRoom = library.room(this.methodBytes);
         this.guardBytes = size("supple_guard_size");
         this.guardRoom = library.room(this.guardBytes);
     }
 
     /** Configuration of steps beyond the critical one. */
-    #config(method) {
-        const { constants } = this.library.header;
-        const kind = method === "multilevel"
-            ? { method: constants.SUPPLE_MULTILEVEL }
-            : { method: constants.SUPPLE_DAMPED, ...this.damper };
-        return this.library.write(this.places.long, "supple_large_config", { seconds: FRAME / LONG, damping: DAMPING, ...kind });
+    #config() {
+        const { SUPPLE_DAMPED: method } = this.library.header.constants;
+        return this.library.write(this.places.long, "supple_large_config", { method, seconds: FRAME / LONG, damping: DAMPING });
     }
 
     /** From now on these steps. `tolerance` (m) is that of adaptive steps, and what the guard of long ones allows. */
@@ -111,9 +107,9 @@ export class Simulation {
             library.write(places.step, "supple_step_config", { seconds: FRAME / this.exact, damping: DAMPING });
             status = functions.supple_set_step(this.scene, this.state, places.step, places.error);
         } else if (method === "adaptive") {
-            status = prepared("supple_adaptive_init", this.methodRoom, this.methodBytes, this.#config(method), tolerance);
+            status = prepared("supple_adaptive_init", this.methodRoom, this.methodBytes, this.#config(), tolerance);
         } else {
-            status = prepared("supple_large_init", this.methodRoom, this.methodBytes, this.#config(method));
+            status = prepared("supple_large_init", this.methodRoom, this.methodBytes, this.#config());
         }
         this.stepper = library.pointer(places.made);
         if (status >= 0 && this.#isGuarded()) {
@@ -126,7 +122,7 @@ export class Simulation {
     }
 
     #isGuarded() {
-        return this.method === "multilevel" || this.method === "damped";
+        return this.method === "damped";
     }
 
     /** The lobe at rest at time zero, without an instrument. */

@@ -1,7 +1,6 @@
-// The kernel in a thread of its own, so that the page answers the pointer while steps are computed. It has the library, the mesh and
-// the damper's weights in it. Messages in: begin, lead, release, method, reset, frame. Out: ready, frame, failed. SI units.
+// The kernel in a thread of its own, so that the page answers the pointer while steps are computed. It has the library and the
+// mesh in it. Messages in: begin, lead, release, method, reset, frame. Out: ready, frame, failed. SI units.
 
-import damper from "built:damper.weights";
 import header from "built:header.json";
 import mesh from "built:lobe.json";
 import compressed from "built:supple.wasm.gz";
@@ -19,7 +18,7 @@ async function start() {
     const [tetrahedra, triangles, groups] = [mesh.tetrahedra, mesh.triangles, mesh.groups].map((numbers) => Uint32Array.from(numbers));
     const lobe = { points: Float32Array.from(mesh.points), tetrahedra, triangles, groups };
     const begin = performance.now();
-    simulation = new Simulation(new Library(module, header), lobe, damper);
+    simulation = new Simulation(new Library(module, header), lobe);
     postMessage({ type: "ready", lobe, milliseconds: performance.now() - begin });
 }
 

@@ -1,4 +1,4 @@
-//! Steps beyond the critical one for C: mass-scaled, multilevel, damped.
+//! Steps beyond the critical one for C: damped, and for comparisons mass-scaled and multilevel.
 
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
@@ -19,11 +19,12 @@ use super::status::{Answer, supple_error, supple_status};
 use super::step::{HostThreads, answer, reported, supple_report, supple_threads, take_steps};
 use supple_status::*;
 
-/// Inertia is raised where the step would be unstable.
+/// For comparisons with a common method: inertia is raised where the step would be unstable, which slows all motion down.
 pub const SUPPLE_MASS_SCALED: u32 = 0;
-/// The same, and smooth motion keeps its true inertia through a coarse lattice.
+/// For comparisons: the lattice alone, without the damper. Rough motion, once excited, oscillates for long.
 pub const SUPPLE_MULTILEVEL: u32 = 1;
-/// The same, and a small network damps what the lattice does not carry. From 20 times the critical step on the most exact.
+/// What steps beyond the critical one should be: inertia is raised where the step would be unstable, smooth motion keeps its
+/// true inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not carry.
 pub const SUPPLE_DAMPED: u32 = 2;
 
 /// Points that a lattice may have.
@@ -41,7 +42,7 @@ pub struct supple_large_config {
     pub struct_size: u32,
     /// SUPPLE_ABI.
     pub abi: u32,
-    /// SUPPLE_MASS_SCALED, SUPPLE_MULTILEVEL or SUPPLE_DAMPED.
+    /// SUPPLE_DAMPED; SUPPLE_MASS_SCALED and SUPPLE_MULTILEVEL are for comparisons.
     pub method: u32,
     /// Length of a step, s.
     pub seconds: f32,
@@ -50,10 +51,10 @@ pub struct supple_large_config {
     pub damping: f32,
     /// Cells of the lattice along x, y, z; zeros: chosen for the scene. Not used by SUPPLE_MASS_SCALED.
     pub cells: [u32; 3],
-    /// For SUPPLE_DAMPED the weight file of a damper, at a multiple of 4 bytes. It is used where it is and must stay. NULL
-    /// otherwise.
+    /// NULL: the damper that is part of the library. Otherwise, for SUPPLE_DAMPED, the weight file of another one, at a multiple
+    /// of 4 bytes. It is used where it is and must stay.
     pub weights: *const c_void,
-    /// Its bytes.
+    /// Its bytes; 0 with NULL.
     pub weights_bytes: usize,
 }
 
@@ -128,6 +129,7 @@ impl<'a> LargeRequest<'a> {
         Ok(match config.method {
             SUPPLE_MASS_SCALED => Method::MassScaled,
             SUPPLE_MULTILEVEL => Method::Multilevel(cells),
+            _ if config.weights.is_null() && config.weights_bytes == 0 => Method::damped(cells),
             _ => {
                 // SAFETY: the caller's promise.
                 let weights = unsafe { lasting_bytes(config.weights, config.weights_bytes)? };

@@ -71,15 +71,31 @@ impl core::error::Error for DamperError {}
 /// A network that decides how much of the rough motion a step removes.
 #[derive(Clone, Debug)]
 pub struct Damper<'w> {
-    network: Network<'w>,
+    /// None would damp nothing, and never is: a test reads the built-in one.
+    network: Option<Network<'w>>,
+}
+
+/// At a multiple of 64 bytes, as the arrays of a weight file ask.
+#[repr(C, align(64))]
+struct Aligned<B: ?Sized>(B);
+
+/// Linked only where [`Damper::built_in`] is called.
+static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!("../../weights/damper.weights"));
+
+impl Damper<'static> {
+    /// The library's own network, `weights/damper.weights`. It checks 1.2 kB at each call.
+    #[must_use]
+    pub fn built_in() -> Self {
+        Self { network: Network::parse(&BUILT_IN.0).ok() }
+    }
 }
 
 impl<'w> Damper<'w> {
-    /// Checks that the network has the inputs and the output of a damper.
+    /// Another network, for instance a trained one. Checks that the network has the inputs and the output of a damper.
     pub fn new(network: Network<'w>) -> Result<Self, DamperError> {
         let (inputs, outputs) = (network.inputs().len(), network.outputs().len());
         if inputs == FEATURES && outputs == 1 {
-            Ok(Self { network })
+            Ok(Self { network: Some(network) })
         } else {
             Err(DamperError::Shape { inputs, outputs })
         }
@@ -87,11 +103,11 @@ impl<'w> Damper<'w> {
 
     /// Share `d` of the rough motion that is removed; `k` is `mu D / 2`.
     pub(super) fn share(&self, rough: &RoughMotion, k: f32) -> f32 {
-        let Some(features) = rough.features(k) else {
+        let (Some(network), Some(features)) = (&self.network, rough.features(k)) else {
             return 0.0;
         };
         let mut gain = [0.0];
-        self.network.predict(&features, &mut gain);
+        network.predict(&features, &mut gain);
         let share = gain[0] * (rough.change / rough.square);
         // Zero for NaN.
         if share > 0.0 { share.min(MOST) } else { 0.0 }
@@ -137,5 +153,17 @@ impl RoughMotion {
         let ln = |ratio: f32| libm::logf(ratio).clamp(-LARGEST_LOGARITHM, LARGEST_LOGARITHM);
         let cosine = both / (libm::sqrtf(square) * libm::sqrtf(change));
         Some([ln(change / square), ln(square / whole), cosine.clamp(-1.0, 1.0), ln(k)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_network_is_that_of_the_file() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/weights/damper.weights");
+        assert!(std::fs::read(path).unwrap() == BUILT_IN.0);
+        assert!(Damper::new(Damper::built_in().network.unwrap()).is_ok());
     }
 }

@@ -13,11 +13,12 @@ use super::{InertiaError, matrices, node_tables};
 // A network's tables stand where the method stands: there is no heap to put them on.
 #[allow(clippy::large_enum_variant)]
 pub enum Method<'w> {
-    /// Mass scaling: inertia is raised where the step would be unstable.
+    /// Mass scaling, for comparisons: inertia is raised where the step would be unstable.
     MassScaled,
-    /// Multilevel inertia: the same, and smooth motion keeps its true inertia through a coarse lattice.
+    /// Multilevel inertia, for comparisons: the same, and smooth motion keeps its true inertia through a coarse lattice.
     Multilevel(Cells),
-    /// The damped step: the same, and a small network damps rough motion, which the lattice cannot represent.
+    /// The damped step: the same, and a small network damps rough motion, which the lattice cannot represent. Mostly
+    /// [`Method::damped`]; with a [`Damper`] of a network of your own.
     Damped(Damper<'w>, Cells),
 }
 
@@ -32,6 +33,14 @@ pub enum Cells {
     Suggested,
     /// This many along x, y, z, at least one each.
     Given([u32; 3]),
+}
+
+impl Method<'static> {
+    /// The damped step with the library's own damper.
+    #[must_use]
+    pub fn damped(cells: Cells) -> Self {
+        Self::Damped(Damper::built_in(), cells)
+    }
 }
 
 impl<'w> Method<'w> {

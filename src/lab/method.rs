@@ -237,9 +237,6 @@ impl Method {
             });
             Ok(advance)
         };
-        let damped = |bytes| {
-            Ok::<_, LabError>(inertia::Method::Damped(Damper::new(Network::parse(bytes)?)?, Cells::Suggested))
-        };
         match self {
             Self::Hold => Ok(Box::new(|_, _, _| Ok((Status::Ok, StepReport::default())))),
             Self::Tled => exact(spec.timing.refinement),
@@ -250,8 +247,13 @@ impl Method {
             Self::Multilevel | Self::Switching(Large::Multilevel) => {
                 large(inertia::Method::Multilevel(Cells::Suggested), state)
             }
-            Self::Damped | Self::Switching(Large::Damped) => large(damped(networks::damper())?, state),
-            Self::DampedWith(file) => large(damped(file.bytes)?, state),
+            Self::Damped | Self::Switching(Large::Damped) => {
+                large(inertia::Method::damped(Cells::Suggested), state)
+            }
+            Self::DampedWith(file) => {
+                let damper = Damper::new(Network::parse(file.bytes)?)?;
+                large(inertia::Method::Damped(damper, Cells::Suggested), state)
+            }
             Self::BackwardEuler => {
                 Ok(implicit::prepare(implicit::Rule::BackwardEuler, scene, state, dt, damping))
             }

@@ -70,16 +70,9 @@ fn other_step(at: usize) -> Option<&'static [u8]> {
     files.get(at).map(WeightBytes::bytes)
 }
 
-/// The weight file of the damper.
-#[must_use]
-pub fn damper() -> &'static [u8] {
-    file!("damper.weights")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inertia::Damper;
     use crate::lab::DT;
     use crate::learned::{FEATURES, PREDICTED};
 
@@ -100,6 +93,5 @@ mod tests {
             }
             assert!(learned(family, 30).is_none());
         }
-        assert!(Damper::new(Network::parse(damper()).unwrap()).is_ok());
     }
 }

@@ -8,6 +8,7 @@ use std::string::String;
 use std::time::Instant;
 use std::vec::Vec;
 
+use super::LabError;
 use super::hard::{Plan as Scenes, TIMES_CRITICAL};
 use super::measure::Errors;
 use super::method::Method;
@@ -15,11 +16,9 @@ use super::run;
 use super::scenes::SceneSpec;
 use super::threads::in_parallel;
 use super::truth::Truth;
-use super::{LabError, networks};
 use crate::adaptive::{Adaptive, Request, Taken};
-use crate::inertia::{self, Cells, Damper};
+use crate::inertia::{self, Cells};
 use crate::io::write_atomically;
-use crate::mlp::Network;
 use crate::step::{Status, Step};
 
 /// The longest step that is tried, over the critical one.
@@ -136,8 +135,7 @@ fn run_adaptive(spec: &SceneSpec, truth: &Truth, tolerance: f64) -> Result<Row, 
     let parts = (interval / (f64::from(LONGEST) * truth.limit_at_rest)).ceil().max(1.0);
     let longest = Step::unchecked((interval / parts) as f32, spec.damping)?;
     let request = Request { tolerance: (1e-3 * tolerance) as f32, longest };
-    let damper = Damper::new(Network::parse(networks::damper())?)?;
-    let method = inertia::Method::Damped(damper, Cells::Suggested);
+    let method = inertia::Method::damped(Cells::Suggested);
     let mut adaptive = Adaptive::prepare_in_vec(method, scene.view(), &spec.points, state.view(), request)?;
     let mut loads = spec.loads(&scene)?;
     let mut errors = Errors::default();

@@ -10,7 +10,6 @@ SUPPLE_MEMORY(large_memory, 4 << 20);
 SUPPLE_MEMORY(guard_memory, 4 << 20);
 SUPPLE_MEMORY(adaptive_memory, 8 << 20);
 SUPPLE_MEMORY(weights, 40000);
-SUPPLE_MEMORY(damper, 4000);
 static unsigned char saved[32 * NODES + 256];
 
 static unsigned long asked;
@@ -34,9 +33,8 @@ int __wrap_posix_memalign(void **memory, size_t alignment, size_t bytes) {
 }
 
 int main(void) {
-    size_t of_weights, of_damper;
+    size_t of_weights;
     file("weights/compact-10-i8.weights", weights, sizeof weights, &of_weights);
-    file("weights/damper.weights", damper, sizeof damper, &of_damper);
     void *volatile counted = malloc(1);
     free(counted);
     CHECK(asked > 0);
@@ -44,7 +42,7 @@ int main(void) {
 
     const supple_scene_config config = bar_config();
     const supple_learned_config network = {SUPPLE_CONFIG(supple_learned_config), 1, 0, weights, of_weights};
-    const supple_large_config beyond = {SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {0, 0, 0}, damper, of_damper};
+    const supple_large_config beyond = {SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {0, 0, 0}, NULL, 0};
     const supple_force force = {NODES / 2, {0.01f, 0.0f, 0.0f}, 0.0f};
     const float gravity[3] = {0.0f, 0.0f, -9.81f};
     supple_scene *scene;

@@ -291,7 +291,7 @@ static supple_status make_large(void) {
             config.cells[axis] = number(1 + below(3));
         }
     }
-    if (method == SUPPLE_DAMPED || one_in(10)) {
+    if (one_in(3)) {
         config.weights = one_in(40) ? NULL : end_of(&of_damper, (damper_bytes + 63) / 64 * 64), config.weights_bytes = damper_bytes;
     }
     const float *p = points_for(nodes_of(scene));
@@ -324,10 +324,8 @@ static supple_status make_guard(void) {
 static supple_status make_adaptive(void) {
     const supple_scene *scene = object(SCENE, 0);
     supple_state *state = object(STATE, 1);
-    const int is_damped = one_in(2);
-    const supple_large_config config = {number(sizeof config), number(SUPPLE_ABI), number(is_damped ? SUPPLE_DAMPED : below(2)),
-                                        one_in(5) ? wild(1e-2f) : 5e-3f, one_in(5) ? wild(20.0f) : 20.0f, {0, 0, 0},
-                                        is_damped ? end_of(&of_damper, (damper_bytes + 63) / 64 * 64) : NULL, is_damped ? damper_bytes : 0};
+    const supple_large_config config = {number(sizeof config), number(SUPPLE_ABI), number(one_in(2) ? SUPPLE_DAMPED : below(2)),
+                                        one_in(5) ? wild(1e-2f) : 5e-3f, one_in(5) ? wild(20.0f) : 20.0f, {0, 0, 0}, NULL, 0};
     const float *p = points_for(nodes_of(scene));
     size_t needed = 64, bytes;
     const supple_status sized = supple_adaptive_size(scene, p, &config, one_in(60) ? NULL : &needed, wanted());

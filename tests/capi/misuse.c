@@ -346,7 +346,7 @@ static void networks(void) {
     DONE(supple_step(scene, loads, state, 1, NULL, NULL));
     REFUSED(SUPPLE_E_NOT_LED, supple_learned_step(scene, loads, state, learned, 1, NULL, NULL));
 
-    const supple_large_config calm = {SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {1, 1, 3}, damper, of_damper};
+    const supple_large_config calm = {SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {1, 1, 3}, NULL, 0};
     supple_large_config wrong = calm;
     supple_large *no_large = NULL;
     const supple_threads threads = {NULL, 2, NULL};
@@ -359,7 +359,7 @@ static void networks(void) {
     LARGE(SUPPLE_E_STEP, wrong.seconds = -1.0f);
     LARGE(SUPPLE_E_LATTICE, wrong.cells[0] = 5000);
     LARGE(SUPPLE_E_LATTICE, wrong.cells[0] = 0);
-    LARGE(SUPPLE_E_NULL, wrong.weights = NULL);
+    LARGE(SUPPLE_E_NULL, wrong.weights_bytes = of_damper);
     LARGE(SUPPLE_E_WEIGHTS_SHAPE, (wrong.weights = weights, wrong.weights_bytes = bytes));
     REFUSED(SUPPLE_E_SHORT, supple_large_init(spare, 50000, scene, state, points[0], &calm, &no_large, &error));
     REFUSED(SUPPLE_E_NULL, supple_large_init(spare, sizeof spare, scene, state, NULL, &calm, &no_large, &error));

@@ -13,7 +13,6 @@ SUPPLE_MEMORY(large_memory, 4 << 20);
 SUPPLE_MEMORY(guard_memory, 4 << 20);
 SUPPLE_MEMORY(adaptive_memory, 8 << 20);
 SUPPLE_MEMORY(weights, 40000);
-SUPPLE_MEMORY(damper, 4000);
 
 enum { PAINT = 0xA5 };
 static _Alignas(4096) unsigned char stack[1 << 20];
@@ -97,12 +96,11 @@ static size_t used_by(void (*call)(void)) {
 }
 
 int main(void) {
-    size_t of_weights, of_damper;
+    size_t of_weights;
     file("weights/compact-10.weights", weights, sizeof weights, &of_weights);
-    file("weights/damper.weights", damper, sizeof damper, &of_damper);
     scene_config = bar_config();
     network = (supple_learned_config){SUPPLE_CONFIG(supple_learned_config), 0, 0, weights, of_weights};
-    beyond = (supple_large_config){SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {0, 0, 0}, damper, of_damper};
+    beyond = (supple_large_config){SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {0, 0, 0}, NULL, 0};
     guarded = (supple_guard_config){SUPPLE_CONFIG(supple_guard_config), 1e-3f, 20.0f, 4, 0.0f};
     step = (supple_step_config){SUPPLE_CONFIG(supple_step_config), 3e-5f, 20.0f};
     static const struct {

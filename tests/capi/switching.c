@@ -9,7 +9,6 @@ SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(exact_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(large_memory, ROOM);
-SUPPLE_MEMORY(damper, 4000);
 static unsigned char saved[32 * NODES + 256];
 static float before[NODES][3], truth[NODES][3], moved[NODES][3];
 
@@ -28,10 +27,8 @@ static supple_state *fresh(void *memory) {
     return state;
 }
 
-static supple_large *prepared(supple_state *state, uint32_t method, size_t of_damper) {
-    const int damped = method == SUPPLE_DAMPED;
-    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), method, 1e-3f, 20.0f, {0, 0, 0},
-                                        damped ? damper : NULL, damped ? of_damper : 0};
+static supple_large *prepared(supple_state *state, uint32_t method) {
+    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), method, 1e-3f, 20.0f, {0, 0, 0}, NULL, 0};
     supple_large *large;
     CHECK(supple_large_init(large_memory, ROOM, scene, state, points[0], &config, &large, NULL) == SUPPLE_OK);
     return large;
@@ -68,9 +65,9 @@ static void take(supple_state *state, supple_large *large, int phase) {
     }
 }
 
-static void in_turn(uint32_t method, size_t of_damper) {
+static void in_turn(uint32_t method) {
     supple_state *state = fresh(state_memory), *exact = fresh(exact_memory);
-    supple_large *large = prepared(state, method, of_damper);
+    supple_large *large = prepared(state, method);
     printf("switching: %s", methods[method]);
     for (int phase = 0; phase < PHASES; phase++) {
         copied(exact, before);
@@ -81,7 +78,7 @@ static void in_turn(uint32_t method, size_t of_damper) {
             CHECK(supple_save(state, saved, sizeof saved) == SUPPLE_OK);
             take(state, large, phase + 1);
             CHECK(supple_restore(state, saved, sizeof saved) == SUPPLE_OK);
-            large = prepared(state, method, of_damper);
+            large = prepared(state, method);
         }
         copied(exact, truth);
         copied(state, moved);
@@ -102,8 +99,6 @@ static void in_turn(uint32_t method, size_t of_damper) {
 }
 
 int main(void) {
-    size_t of_damper;
-    file("weights/damper.weights", damper, sizeof damper, &of_damper);
     supple_scene_config config = bar_config();
     CHECK(supple_scene_init(scene_memory, sizeof scene_memory, &config, &scene, NULL) == SUPPLE_OK);
     const supple_tissue heavier = {{59.0f, 8.023f, 60000.0f}, 1100.0f};
@@ -113,7 +108,7 @@ int main(void) {
     CHECK(supple_loads_init(loads_memory, sizeof loads_memory, scene, FORCES, MOTIONS, &loads) == SUPPLE_OK);
     CHECK(supple_set_gravity(loads, gravity) == SUPPLE_OK);
     for (uint32_t method = SUPPLE_MASS_SCALED; method <= SUPPLE_DAMPED; method++) {
-        in_turn(method, of_damper);
+        in_turn(method);
     }
     return 0;
 }

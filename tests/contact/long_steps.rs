@@ -1,10 +1,9 @@
 //! Instruments in multilevel and damped steps, against exact steps at a quarter of the critical one.
 
 use supple::contact::{Contact, Instrument, Pose, Shape, Surface, Touch, vectors_to_push};
-use supple::inertia::{Cells, Damper, LargeStep, Method};
+use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::Loads;
 use supple::mesh::Bar;
-use supple::mlp::Network;
 use supple::scene::Support;
 use supple::state::NodeVector;
 use supple::step::{Cause, Status, Step};
@@ -63,11 +62,7 @@ pub(crate) fn multilevel() -> Method<'static> {
 }
 
 pub(crate) fn damped() -> Method<'static> {
-    #[repr(C, align(64))]
-    struct Flash<B: ?Sized>(B);
-    static DAMPER: &Flash<[u8]> = &Flash(*include_bytes!("../../weights/damper.weights"));
-    let network = Network::parse(&DAMPER.0).unwrap();
-    Method::Damped(Damper::new(network).unwrap(), Cells::Given([1, 1, 2]))
+    Method::damped(Cells::Given([1, 1, 2]))
 }
 
 /// A free body that is hit and dragged: the impulse of the instrument is the change of its momentum, whatever inertia is added, up to

@@ -7,7 +7,7 @@ use std::cell::Cell;
 use std::sync::Mutex;
 
 use supple::contact::{Contact, Instrument, Pose, Shape, Surface, SurfaceNode, Touch};
-use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
+use supple::inertia::{Cells, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedError, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{Element, Exponential, NeoHookean, NodalStrain, Tissue};
@@ -229,8 +229,6 @@ fn steps_beyond_the_limit_in_statics_allocate_nothing() {
     assert!(taken > 0 && added[0] > 1.0);
 }
 
-static DAMPER: &Flash<[u8]> = &Flash(*include_bytes!("../../weights/damper.weights"));
-
 #[test]
 fn a_damped_roll_out_in_statics_allocates_nothing() {
     let (points, tets) = mesh();
@@ -244,8 +242,7 @@ fn a_damped_roll_out_in_statics_allocates_nothing() {
     let step = Step::unchecked(20.0 * critical.seconds, 5.0).unwrap();
     let forces = [NodalForce { node: NODES as u32 - 3, newton: [1e-5, 0.0, 0.0], ramp: 0.0 }];
     let loads = Loads::new(&scene, [0.0, 0.0, -0.01], &forces, &[]).unwrap();
-    let damper = Damper::new(Network::parse(&DAMPER.0).unwrap()).unwrap();
-    let method = Method::Damped(damper, Cells::Given(LATTICE));
+    let method = Method::damped(Cells::Given(LATTICE));
     let mut damped =
         LargeStep::prepare(method, scene.view(), &points, state.view(), step, &mut storage[..]).unwrap();
     let mut most = 0.0_f32;

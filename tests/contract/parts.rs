@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use supple::contact::{Contact, Instrument, Pose, Shape, Surface, SurfaceNode, Touch};
-use supple::inertia::{Cells, Damper, LargeStep, Method};
+use supple::inertia::{Cells, LargeStep, Method};
 use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::{Loads, Motion};
 use supple::mlp::{ForceInput, Network, Range, write};
@@ -152,14 +152,10 @@ fn large(method: &str, body: &Body, threads: &impl Threads) -> Vec<u64> {
     let forces = corner_torsion(body, 0.2, 0.0);
     let motions = [Motion { node: far, axes: Axes::XYZ, metre: [1e-3, 0.0, 2e-3], ramp: 1e-2 }];
     let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &forces, &motions).unwrap();
-    let memory = Memory::of(include_bytes!("../../weights/damper.weights"));
     let method = match method {
         "mass-scaled" => Method::MassScaled,
         "multilevel" => Method::Multilevel(Cells::Suggested),
-        _ => {
-            let damper = Damper::new(Network::parse(memory.bytes()).unwrap()).unwrap();
-            Method::Damped(damper, Cells::Suggested)
-        }
+        _ => Method::damped(Cells::Suggested),
     };
     let mut state = rest_of(&scene);
     let step = Step::unchecked(20.0 * DT, 20.0).unwrap();

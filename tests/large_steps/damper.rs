@@ -8,7 +8,7 @@ use supple::step::{Status, Step};
 use supple::tled;
 
 use crate::support::bodies::{corner_torsion, held, small_bar};
-use crate::support::{Body, EXP, NEO, bound, mean_distance, rest_of, tissue, to_f64};
+use crate::support::{Body, EXP, NEO, bits, bound, mean_distance, rest_of, tissue, to_f64};
 use crate::{GAIN, Kind, networks};
 
 #[test]
@@ -45,6 +45,31 @@ fn without_output_it_is_the_undamped_step() {
     assert!(undamped != damped && most > 0.0);
 }
 
+/// Without a file the bits are those of a damped step with `weights/damper.weights`.
+#[test]
+fn the_built_in_damper_is_that_of_its_file() {
+    let body = small_bar();
+    let scene = body.scene(tissue(EXP), &held(&body));
+    let forces = corner_torsion(&body, 0.02, 0.02);
+    let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+    let step = Step::unchecked(20.0 * bound(&scene, &rest_of(&scene)).seconds, 5.0).unwrap();
+    let file = networks::Memory::of(include_bytes!("../../weights/damper.weights"));
+    let read = Damper::new(Network::parse(file.bytes()).unwrap()).unwrap();
+    let methods = [Method::damped(Cells::Suggested), Method::Damped(read, Cells::Suggested)];
+    let [built_in, of_file] = methods.map(|method| {
+        let mut state = rest_of(&scene);
+        let mut damped =
+            LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
+        let mut shares = 0.0;
+        for _ in 0..100 {
+            assert!(damped.step(scene.view(), &loads, state.view()).is_taken());
+            shares += damped.report().damping;
+        }
+        (bits(&state), shares)
+    });
+    assert!(built_in == of_file && built_in.1 > 0.0);
+}
+
 /// A free body that flies and spreads evenly: all of that is in the lattice, and stays.
 #[test]
 fn smooth_motion_is_left_alone() {
@@ -77,13 +102,11 @@ fn on_another_mesh_the_shipped_damper_does_no_harm() {
     let scene = body.scene(tissue(EXP), &held(&body));
     let forces = corner_torsion(&body, 0.02, 0.3);
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
-    let weights = networks::Memory::of(include_bytes!("../../weights/damper.weights"));
-    let damper = Damper::new(Network::parse(weights.bytes()).unwrap()).unwrap();
     let limit = 0.8 * bound(&scene, &rest_of(&scene)).seconds;
     let exact = Step::unchecked(limit, 20.0).unwrap();
     let long = Step::unchecked(10.0 * limit, 20.0).unwrap();
     let (mut truth, mut undamped, mut damped) = (rest_of(&scene), rest_of(&scene), rest_of(&scene));
-    let method = Method::Damped(damper, Cells::Suggested);
+    let method = Method::damped(Cells::Suggested);
     let cells = Cells::Given(method.grid(scene.view(), &body.points).unwrap().cells);
     let [mut multilevel, mut with_damper] =
         [(Method::Multilevel(cells), &mut undamped), (method, &mut damped)].map(|(method, state)| {

@@ -15,7 +15,7 @@ const puppeteer = createRequire(new URL("../../examples/page/package.json", impo
 const file = process.env.SUPPLE_PAGE;
 const nextToPage = (name) => join(dirname(file), name);
 const DOME = [-0.01, 0.004, 0.0605]; // a point of the tissue that the camera sees, m
-const METHODS = ["exact", "multilevel", "damped", "adaptive"];
+const METHODS = ["exact", "damped", "adaptive"];
 const WIDE = { width: 1280, height: 900 };
 const NARROW = { width: 400, height: 860, hasTouch: true, isMobile: true };
 let browser;
@@ -116,9 +116,7 @@ function movedAndCameBack({ held, free }) {
     assert.ok(held.moved > 0.001, `moved by ${held.moved} m only`);
     assert.ok(held.tool.force > 0.05 && held.tool.force < 50, `a force of ${held.tool.force} N`);
     assert.equal(free.tool.force, 0);
-    // Multilevel steps leave small rough motion, as tests/page/kernel.test.mjs says.
-    const tolerance = free.method === "multilevel" ? 0.002 : 0.0005;
-    assert.ok(free.moved < tolerance, `${free.moved} m from rest two seconds after it was let go`);
+    assert.ok(free.moved < 0.0005, `${free.moved} m from rest two seconds after it was let go`);
     assert.equal(held.refusal, null);
 }
 

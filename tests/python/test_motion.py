@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import supple
-from conftest import bar
+from conftest import ROOT, bar
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
@@ -87,6 +87,19 @@ def test_long_steps_follow_exact_ones(lobe, liver, method, options, most):
     print(f"{method}: {1e3 * error:.3f} of {1e3 * still:.3f} mm, estimate {1e3 * (report.estimate or 0.0):.3f} mm, {report.status}")
     assert error < most * still
     assert report.estimate is not None and report.estimate > 0.3 * error - 1e-6
+
+
+def test_the_damper_of_a_file_takes_the_place_of_the_own_one(lobe, liver):
+    """The same bits where the file is that of the library's own damper."""
+    scene = supple.Scene(lobe, liver, fixed=lobe.points[:, 1] > 0.03)
+    ends = []
+    for weights in (None, ROOT / "weights" / "damper.weights"):
+        simulation = supple.Simulation(scene, "damped", step=2e-3, damping=20.0, gravity=GRAVITY, weights=weights)
+        simulation.advance(0.1)
+        ends.append(simulation.displacements.copy())
+    assert np.array_equal(*ends)
+    with pytest.raises(supple.InputError, match="damped: "):
+        supple.Simulation(scene, "damped", step=2e-3, weights=ROOT / "weights" / "compact-10.weights")
 
 
 def test_a_ball_presses_and_leaves(lobe, liver):

@@ -20,7 +20,7 @@ use crate::scene::body::Body;
 use crate::scene::instruments::Tools;
 use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
-use crate::scene::timing::{StepChoice, damper};
+use crate::scene::timing::StepChoice;
 use crate::screen::{output, print};
 use crate::simulate::{Out, Simulated, Simulation, progress_bar};
 
@@ -129,7 +129,7 @@ fn lobe(instrument: &str, steps: Steps) -> Result<Setup, Problem> {
     match steps {
         Steps::Exact => {}
         Steps::Damped => {
-            setup.time.method = Some(Method::Damped(damper()?, Cells::Suggested));
+            setup.time.method = Some(Method::damped(Cells::Suggested));
             setup.time.step = StepChoice::Multiple(TIMES_CRITICAL);
         }
         Steps::Learned => {

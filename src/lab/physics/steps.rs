@@ -4,10 +4,9 @@
 use std::boxed::Box;
 
 use super::body::Setup;
-use crate::inertia::{self, Cells, Damper, LargeStep};
-use crate::lab::{LabError, implicit, networks};
+use crate::inertia::{self, Cells, LargeStep};
+use crate::lab::{LabError, implicit};
 use crate::loads::Loads;
-use crate::mlp::Network;
 use crate::state::VecState;
 use crate::step::{Status, Step};
 use crate::tled;
@@ -76,8 +75,7 @@ impl Setup<'_> {
             }));
         };
         let step = Step::unchecked(multiple * critical.seconds, damping)?;
-        let damper = Damper::new(Network::parse(networks::damper())?)?;
-        let method = inertia::Method::Damped(damper, Cells::Suggested);
+        let method = inertia::Method::damped(Cells::Suggested);
         let mut large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step)?;
         Ok(Box::new(move |state, loads, until| {
             while state.time() < until {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.resources
 import os
 import pathlib
 import warnings
@@ -54,12 +53,12 @@ class Simulation:
     Parameters
     ----------
     scene
-    method : "exact"; beyond the critical step "mass-scaled", "multilevel" or "damped"; "adaptive" chooses the length of its steps for a
-        tolerance; "learned"
-    step : s; of exact steps 0.9 of the critical one at the moment unless given; needed by mass-scaled, multilevel and damped ones
+    method : "exact"; "damped" beyond the critical step ("mass-scaled" and "multilevel" are for comparisons); "adaptive" chooses the
+        length of its steps for a tolerance; "learned"
+    step : s; of exact steps 0.9 of the critical one at the moment unless given; needed by those beyond it, unless adaptive
     damping : 1/s; learned steps take that of their training
     tolerance : mean error (m) that adaptive steps keep and the guard allows
-    weights : file of the network, for learned steps; damped and adaptive ones have one of their own
+    weights : file of the network, for learned steps; of another damper than the library's own, for damped and adaptive ones
     lead : seconds of exact steps before a network takes over
     guard : whether a second run estimates the error of long and learned steps
     instruments : how many nodes they can hold at once, and whether they touch triangles too, is said by `grips` and `triangles`
@@ -323,8 +322,8 @@ class Simulation:
             raise InputError(f"{self.method} steps need a step, s: the critical one is {self.critical_step:.4g} s")
         else:
             made.seconds = self._fixed_step
-        if self.method in ("damped", "adaptive"):
-            self._weights = _weights(weights or importlib.resources.files(__package__) / "damper.weights")
+        if weights is not None and self.method in ("damped", "adaptive"):
+            self._weights = _weights(weights)
             made.weights, made.weights_bytes = self._weights.pointer, self._weights.size
         kind = "adaptive" if self.method == "adaptive" else "large"
         more = (self.tolerance,) if kind == "adaptive" else ()
@@ -447,9 +446,9 @@ def _element(scene: Scene) -> int:
     return ELEMENTS[scene.element]
 
 
-def _weights(path: Any) -> library.Memory:
+def _weights(path: str | os.PathLike[str]) -> library.Memory:
     try:
-        data = pathlib.Path(path).read_bytes() if isinstance(path, (str, os.PathLike)) else path.read_bytes()
+        data = pathlib.Path(path).read_bytes()
     except OSError as problem:
         raise InputError(f"{path}: cannot be read: {problem.strerror}") from None
     memory = library.Memory(len(data))

@@ -3,7 +3,7 @@
 #![no_std]
 
 use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
-use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
+use supple::inertia::{Cells, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{
@@ -243,16 +243,9 @@ pub extern "C" fn damped(
     storage: &mut Storage,
     points: &[[f32; 3]; 100],
     loads: &Loads<'_>,
-    weights: &[u8; 10_000],
     seconds: f32,
 ) -> f32 {
-    let Ok(network) = Network::parse(weights) else {
-        return -4.0;
-    };
-    let Ok(damper) = Damper::new(network) else {
-        return -5.0;
-    };
-    large(Method::Damped(damper, Cells::Suggested), scene, state, storage, points, loads, seconds)
+    large(Method::damped(Cells::Suggested), scene, state, storage, points, loads, seconds)
 }
 
 /// A weight file, a prediction, a lead-in and a learned step with fallback.

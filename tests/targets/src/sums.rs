@@ -2,7 +2,7 @@
 //! computes, no standard library, which differs between systems.
 
 use super::body::{Body, DAMPING, SECONDS, TISSUE};
-use supple::inertia::{Cells, Damper, Grid, LargeStep, Method, vectors_for_lattice};
+use supple::inertia::{Cells, Grid, LargeStep, Method, vectors_for_lattice};
 use supple::loads::NodalForce;
 use supple::material::{Element, NodalPressure, NodalStrain};
 use supple::mesh::Bar;
@@ -43,7 +43,6 @@ struct Aligned<T: ?Sized>(T);
 static NETWORK: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/compact-10.weights"));
 static COMPACT_INT8: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/compact-10-i8.weights"));
 static INT8: &Aligned<[u8]> = &Aligned(*include_bytes!("../../data/golden-v3.weights"));
-static DAMPER: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../weights/damper.weights"));
 
 /// What is computed; with a number of nodes, on the long bar.
 pub const NAMES: [&str; 10] = [
@@ -123,8 +122,7 @@ fn of_state<const N: usize, const P: usize>(state: &FixedState<N, P>) -> u32 {
 fn damped() -> Option<u32> {
     let (scene, mut state) = (SMALL.scene()?, FixedState::<NODES>::new());
     let loads = SMALL.loads(&scene)?;
-    let damper = Damper::new(Network::parse(&DAMPER.0).ok()?).ok()?;
-    let method = Method::Damped(damper, Cells::Given(GRID.cells));
+    let method = Method::damped(Cells::Given(GRID.cells));
     let mut storage = [NodeVector::ZERO; vectors_for_lattice(Element::Linear, NODES, ELEMENTS, GRID, true)];
     let step = Step::unchecked(20.0 * SECONDS, DAMPING).ok()?;
     let mut damped =

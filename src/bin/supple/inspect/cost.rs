@@ -17,7 +17,7 @@ use crate::added_mass::describe_added;
 use crate::problem::Problem;
 use crate::run::start::{first_step, grid};
 use crate::scene::setup::Setup;
-use crate::scene::timing::{damper, method_name};
+use crate::scene::timing::method_name;
 use crate::screen::{output, row};
 
 /// Exact steps that are timed.
@@ -138,7 +138,7 @@ fn describe_beyond(
         Some(Method::Multilevel(cells) | Method::Damped(_, cells)) => *cells,
         _ => Cells::Suggested,
     };
-    let methods = [Method::MassScaled, Method::Multilevel(cells), Method::Damped(damper()?, cells)];
+    let methods = [Method::MassScaled, Method::Multilevel(cells), Method::damped(cells)];
     let kilobytes = |grid: Grid, damped: bool| {
         1e-3 * (vectors_for_lattice(scene.element(), scene.node_count(), scene.element_count(), grid, damped)
             * size_of::<NodeVector>()) as f64

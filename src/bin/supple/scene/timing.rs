@@ -1,8 +1,6 @@
 //! `[time]` of a scene file: the method, its step, the end, the frames.
 
-use supple::inertia::{Cells, Damper, Method};
-use supple::lab::networks;
-use supple::mlp::Network;
+use supple::inertia::{Cells, Method};
 use toml::Spanned;
 
 use super::file::{SceneFile, StepLength, TimeTable};
@@ -123,24 +121,17 @@ pub(crate) const fn method_name(method: Option<&Method<'_>>) -> &'static str {
     }
 }
 
-/// The crate's own damper.
-pub(crate) fn damper() -> Result<Damper<'static>, Problem> {
-    let network = Network::parse(networks::damper()).map_err(Problem::of)?;
-    Damper::new(network).map_err(Problem::of)
-}
-
 /// The method, and whether it is "auto".
 fn read_method(file: &SceneFile, time: &TimeTable) -> Result<(Option<Method<'static>>, bool), Problem> {
     let Some(at) = &time.method else {
         return Ok((None, false));
     };
-    let damped = || Ok(Method::Damped(damper()?, Cells::Suggested));
     let fixed = match at.get_ref().as_str() {
-        "auto" => return Ok((Some(damped()?), true)),
+        "auto" => return Ok((Some(Method::damped(Cells::Suggested)), true)),
         "tled" => None,
         "mass-scaled" => Some(Method::MassScaled),
         "multilevel" => Some(Method::Multilevel(Cells::Suggested)),
-        "damped" => Some(damped()?),
+        "damped" => Some(Method::damped(Cells::Suggested)),
         name => {
             return Err(file.problem(
                 at,
