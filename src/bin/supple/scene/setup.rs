@@ -124,7 +124,8 @@ impl Setup {
     /// A simulation at rest.
     pub(crate) fn simulation(&self) -> Result<Simulation<'_>, Problem> {
         let (scene, state) = self.build()?;
-        let mut simulation = Simulation::of_scene(scene, self.body.local.clone(), self.body.mesh.tets.clone());
+        let mut simulation =
+            Simulation::of_scene(scene, self.body.local.clone(), self.body.mesh.tets.clone());
         *simulation.state_mut() = state;
         Ok(simulation)
     }
