@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use crate::element::{Axes, ElementMaterial};
 use crate::loads::{Motion, NodalForce};
-use crate::material::{Law, Laws, Material, Moduli, Tissue};
+use crate::material::{AnyLaw, Law, Laws, Material, Moduli, Tissue};
 use crate::mlp::Recipe;
 use crate::scene::SceneView;
 
@@ -264,8 +264,8 @@ pub fn of_body<M: ElementMaterial>(
 /// Of a network that a scene's learned steps use.
 #[must_use]
 pub fn of_network<M: ElementMaterial>(scene: SceneView<'_, M>, recipe: &Recipe<'_>) -> Option<Remark> {
-    let is_same_law =
-        scene.element() == recipe.element && scene.material.laws().law().name() == recipe.law.name();
+    let law: AnyLaw = scene.material.laws().law().into();
+    let is_same_law = scene.element() == recipe.element && law.code() == recipe.law.code();
     let is_same = |Tissue { law, density }: Tissue<M::Law>| {
         let mut constants = law.values().into_iter().zip(recipe.law.values());
         same(density, recipe.density) && constants.all(|(here, there)| same(here, there))

@@ -46,7 +46,7 @@ macro_rules! for_each_kernel {
 macro_rules! declare {
     ($($(#[$doc:meta])* $name:ident($kernel:ty) -> $output:ty;)*) => {
         /// A law with its loops over elements.
-        pub trait ElementLaw: Law {
+        pub trait ElementLaw: Law + Into<AnyLaw> {
             $(
                 $(#[$doc])*
                 #[doc(hidden)]
