@@ -20,6 +20,7 @@
 //! | [`tolerance`] | does an adaptive step keep its tolerance, and what does it cost? |
 //! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
 //! | [`table`] | rows as CSV and as aligned text |
+//! | [`training`] | scenes to learn from; the search for a damper |
 //! | [`sweep`] | error over step on one scene, with fitted slopes |
 
 pub mod course;
@@ -33,7 +34,8 @@ pub mod method;
 pub mod moving;
 pub mod networks;
 pub mod physics;
-pub(crate) mod random_numbers;
+#[path = "../train/random_numbers.rs"]
+mod random_numbers;
 pub mod run;
 pub mod scenes;
 pub mod sweep;
@@ -41,6 +43,8 @@ pub mod table;
 mod threads;
 pub mod timing;
 pub mod tolerance;
+#[cfg(feature = "train")]
+pub mod training;
 pub mod truth;
 
 use std::path::Path;

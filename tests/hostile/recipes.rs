@@ -1,6 +1,7 @@
 //! Damaged recipes for training: a recipe is refused with a reason, or its numbers are in their ranges.
 
-use supple::train::{damper, recipe::Recipe};
+use supple::lab::training::damper;
+use supple::train::recipe::Recipe;
 
 use crate::hostile::{Changes, Run, measured};
 

@@ -1,12 +1,14 @@
-//! The scene whose motion a network learns from: one of the laboratory's, or a scene file's, with the steps of the exact motion.
+//! The scene whose motion a network learns from: one of the laboratory's, or a scene file's.
 
 use std::path::Path;
 
-use supple::lab::course::Course;
-use supple::lab::scenes::{RigidVelocity, SceneSpec};
-use supple::lab::timing::Timing;
+use supple::lab::training;
+use supple::loads::{LoadsOverTime, NodalForce};
+use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
+use supple::scene::{Support, VecScene};
 use supple::tled;
 use supple::train::recipe::Recipe;
+use supple::train::{TrainError, TrainingScene};
 
 use crate::problem::Problem;
 use crate::scene::file::SceneFile;
@@ -16,59 +18,56 @@ use crate::scene::timing::StepChoice;
 /// Share of the critical step at rest that exact steps take unless the file says otherwise: it falls while the body deforms, and the
 /// steps of one training are all alike.
 const SHARE: f32 = 0.5;
-/// Exact steps between snapshots, which training does not take.
-const INTERVAL: u32 = 1_000;
 
 /// The scene of a recipe, which is found in the folder of `file`.
-pub(super) fn learned_from(recipe: &Recipe, file: &Path) -> Result<SceneSpec, Problem> {
-    let problem = |error: &dyn std::fmt::Display| Problem::in_file(file, error);
-    if !recipe.motion.is_file() {
-        return recipe.scene().map_err(|error| problem(&error));
+pub(super) fn learned_from(recipe: &Recipe, file: &Path) -> Result<Box<dyn TrainingScene>, Problem> {
+    let motion = &recipe.motion;
+    if !motion.is_file() {
+        let scene = training::scene(recipe).map_err(|error| Problem::in_file(file, error))?;
+        return Ok(Box::new(scene));
     }
-    let path = file.parent().unwrap_or(Path::new("")).join(&recipe.motion.scene);
-    let scene = SceneFile::read(&path)?;
-    let setup = Setup::read(&scene)?;
+    let path = file.parent().unwrap_or(Path::new("")).join(&motion.scene);
+    let setup = Setup::read(&SceneFile::read(&path)?)?;
     for warning in &setup.warnings {
         crate::screen::message!("warning: {warning}");
     }
-    spec_of(&setup).map(|spec| recipe.motion.of(spec)).map_err(|error| Problem::in_file(&path, error))
+    let mut scene = FileScene::of(setup).map_err(|error| Problem::in_file(&path, error))?;
+    scene.setup.element = motion.element.unwrap_or(scene.setup.element);
+    for force in &mut scene.setup.forces {
+        force.newton = force.newton.map(|newton| motion.load * newton);
+    }
+    Ok(Box::new(scene))
 }
 
-fn spec_of(setup: &Setup) -> Result<SceneSpec, Problem> {
-    let refused = |what: &str| {
-        Err(Problem(format!("{what}: a network learns from exact steps of one tissue without instruments")))
-    };
-    if setup.method_name() != "tled" {
-        return refused(&format!("the method is {:?}", setup.method_name()));
+/// A scene of one tissue that exact steps of one length move.
+struct FileScene {
+    setup: Setup,
+    tissue: Tissue<AnyLaw>,
+    /// s.
+    step: f32,
+}
+
+impl FileScene {
+    fn of(setup: Setup) -> Result<Self, Problem> {
+        let refused = |what: &str| {
+            Err(Problem(format!(
+                "{what}: a network learns from exact steps of one tissue without instruments"
+            )))
+        };
+        if setup.method_name() != "tled" {
+            return refused(&format!("the method is {:?}", setup.method_name()));
+        }
+        if !setup.tools.is_empty() {
+            return refused("there is an instrument");
+        }
+        let Some(tissue) = setup.tissues.only() else { return refused("there are regions") };
+        let step = match setup.time.step {
+            StepChoice::Seconds(seconds) => seconds,
+            StepChoice::Auto => SHARE * critical_at_rest(&setup)?,
+            StepChoice::Multiple(multiple) => multiple * critical_at_rest(&setup)?,
+        };
+        Ok(Self { setup, tissue, step })
     }
-    if !setup.tools.is_empty() {
-        return refused("there is an instrument");
-    }
-    let Some(tissue) = setup.tissues.only() else { return refused("there are regions") };
-    let step = match setup.time.step {
-        StepChoice::Seconds(seconds) => seconds,
-        StepChoice::Auto => SHARE * critical_at_rest(setup)?,
-        StepChoice::Multiple(multiple) => multiple * critical_at_rest(setup)?,
-    };
-    let timing = Timing { step, interval: INTERVAL, refinement: 1 };
-    Ok(SceneSpec {
-        name: String::leak(setup.body.name.clone()),
-        points: setup.body.local.clone(),
-        tets: setup.body.checked()?.tets().collect(),
-        law: tissue.law,
-        element: setup.element,
-        density: tissue.density,
-        damping: setup.damping,
-        supports: setup.supports.clone(),
-        start: RigidVelocity::default(),
-        gravity: setup.gravity,
-        forces: setup.forces.clone(),
-        motions: setup.motions.clone(),
-        course: Course::Steady,
-        second: None,
-        timing,
-        intervals: (setup.time.end / timing.interval_seconds()).ceil() as usize,
-    })
 }
 
 /// The critical step at rest, s.
@@ -76,4 +75,45 @@ fn critical_at_rest(setup: &Setup) -> Result<f32, Problem> {
     let (scene, mut state) = setup.build()?;
     let critical = tled::critical_step(&scene, &mut state);
     critical.map(|step| step.seconds).ok_or_else(|| Problem("no node can move".into()))
+}
+
+impl TrainingScene for FileScene {
+    fn tissue(&self) -> Tissue<AnyLaw> {
+        self.tissue
+    }
+
+    fn element(&self) -> Element {
+        self.setup.element
+    }
+
+    fn damping(&self) -> f32 {
+        self.setup.damping
+    }
+
+    fn step(&self) -> f32 {
+        self.step
+    }
+
+    fn supports(&self) -> &[Support] {
+        &self.setup.supports
+    }
+
+    fn forces(&self) -> &[NodalForce] {
+        &self.setup.forces
+    }
+
+    fn build(&self) -> Result<VecScene<VecMaterial>, TrainError> {
+        let Tissue { law, density } = self.tissue;
+        let mesh = self.setup.body.checked().map_err(refused)?;
+        let material = VecMaterial::one(self.setup.element, law, density);
+        VecScene::build(material, &mesh, &self.setup.supports).map_err(refused)
+    }
+
+    fn loads(&self, scene: &VecScene<VecMaterial>) -> Result<Box<dyn LoadsOverTime + '_>, TrainError> {
+        Ok(Box::new(self.setup.loads(scene).map_err(refused)?))
+    }
+}
+
+fn refused(error: impl std::fmt::Display) -> TrainError {
+    TrainError::Scene(error.to_string())
 }

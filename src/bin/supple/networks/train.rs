@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use supple::train::damper;
+use supple::lab::training::damper;
 use supple::train::fit::{Fitted, Progress, fit};
 use supple::train::recipe::Recipe;
 use supple::train::samples::Samples;
@@ -44,12 +44,12 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     let folder = checkpoints(out);
     message!("simulating the motion to learn from ...");
     let scene = learned_from(&parsed, recipe)?;
-    let collected = Samples::collect(&parsed, &scene).map_err(|error| problem(&error))?;
+    let collected = Samples::collect(&parsed, &*scene).map_err(|error| problem(&error))?;
     let bar = ProgressBar::no_length();
     let style = ProgressStyle::with_template("{bar:30} {msg}").map_err(|error| problem(&error))?;
     bar.set_style(style);
     let mut told = None;
-    let fitted = fit(&parsed, &text, &scene, &collected, Some(&folder), &mut |at: &Progress| {
+    let fitted = fit(&parsed, &text, &*scene, &collected, Some(&folder), &mut |at: &Progress| {
         bar.set_length((at.epochs * at.samples) as u64);
         bar.set_position((at.epoch * at.samples + at.done) as u64);
         bar.set_message(said(at));

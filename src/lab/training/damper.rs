@@ -33,14 +33,14 @@ use cmaes::{CMAESOptions, DVector};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
-use super::TrainError;
-use crate::lab::method::{Method, NetworkFile};
-use crate::lab::run::run;
-use crate::lab::scenes::{self, SceneSpec};
-use crate::lab::timing::Timing;
-use crate::lab::truth::{self, Truth};
-use crate::lab::{DT, LabError};
+use super::super::method::{Method, NetworkFile};
+use super::super::run::run;
+use super::super::scenes::{self, SceneSpec};
+use super::super::timing::Timing;
+use super::super::truth::{self, Truth};
+use super::super::{DT, LabError};
 use crate::mlp::{self, Activation, Description, LayerDescription, MAX_WIDTH, Range};
+use crate::train::TrainError;
 
 /// Inputs of a damper.
 const INPUTS: usize = 4;
@@ -344,7 +344,7 @@ mod tests {
 
     #[test]
     fn the_search_starts_from_a_constant_gain() {
-        let recipe = Recipe::parse(include_str!("../../weights/damper.toml")).unwrap();
+        let recipe = Recipe::parse(include_str!("../../../weights/damper.toml")).unwrap();
         let spec = scenes::named("torsion").unwrap();
         let bytes = described(&recipe, "", &spec, &rule(recipe.damper.hidden)).unwrap();
         let bytes = crate::mlp::WeightBytes::of(&bytes);
