@@ -123,9 +123,9 @@
 //! | [`mlp`] | dense layers: the forward pass, the weight file |
 //! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
 //!
-//! With the feature `io` meshes are read and fields written (`io`), with `lab` methods are judged against the
-//! exact step over scenes (`lab`), with `train` networks are trained (`train`), with `safetensors` they go to and from
-//! PyTorch, with `capi` there are the functions of `include/supple.h`. The command `supple` is a package of its own.
+//! With the feature `io` meshes are read and fields written (`io`), with `train` networks are trained (`train`), with
+//! `safetensors` they go to and from PyTorch, with `capi` there are the functions of `include/supple.h`. Packages of their own are
+//! the command `supple` and the laboratory `supple-lab`, where methods are judged against the exact step over scenes.
 //!
 //! # Promises
 //!
@@ -175,8 +175,6 @@ pub mod tled;
 
 #[cfg(feature = "io")]
 pub mod io;
-#[cfg(feature = "lab")]
-pub mod lab;
 
 #[cfg(feature = "train")]
 pub mod train;

@@ -11,15 +11,15 @@ static ALLOCATOR: hostile::Counting = hostile::Counting;
 
 use core::ops::ControlFlow;
 
-use supple::lab::scenes::{SceneSpec, named};
-use supple::lab::timing::Timing;
-use supple::lab::training;
 use supple::material::Element;
 use supple::mlp::{Network, WeightBytes};
 use supple::train::TrainError;
 use supple::train::fit::{Fitted, fit};
 use supple::train::recipe::Recipe;
 use supple::train::samples::Samples;
+use supple_lab::scenes::{SceneSpec, named};
+use supple_lab::timing::Timing;
+use supple_lab::training;
 
 const RECIPE: &str = r#"
 seed = 3

@@ -7,21 +7,18 @@
 //! by Newton's method with halved steps; each linear system by conjugate gradients in float32 with the parts of the diagonal inverted
 //! (Nocedal & Wright 2006, algorithms 7.1 and 5.3). Backward Euler goes on from there, the midpoint rule to twice as far. SI units.
 
-use std::boxed::Box;
 use std::collections::BTreeMap;
-use std::vec;
-use std::vec::Vec;
 
 use glam::{DMat3, DVec3};
+use supple::loads::{Loads, ramp_factor};
+use supple::material::VecMaterial;
+use supple::scene::SceneView;
+use supple::simd::{Kernel, Real, dispatch};
+use supple::state::VecState;
+use supple::step::{Cause, Divergence, Status};
+use supple::tled::{ElementTangent, element_tangents};
 
 use super::method::{Advance, StepReport};
-use crate::loads::{Loads, ramp_factor};
-use crate::material::VecMaterial;
-use crate::scene::SceneView;
-use crate::simd::{Kernel, Real, dispatch};
-use crate::state::VecState;
-use crate::step::{Cause, Divergence, Status};
-use crate::tled::{ElementTangent, element_tangents};
 
 /// Which rule.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -437,14 +434,13 @@ impl Kernel for Solve<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::println;
 
     use super::*;
-    use crate::material::{Element, NeoHookean};
-    use crate::mesh::{Bar, Mesh, Winding};
-    use crate::scene::VecScene;
-    use crate::step::Step;
-    use crate::tled;
+    use supple::material::{Element, NeoHookean};
+    use supple::mesh::{Bar, Mesh, Winding};
+    use supple::scene::VecScene;
+    use supple::step::Step;
+    use supple::tled;
 
     fn scene_of(law: NeoHookean, bar: Bar) -> VecScene<VecMaterial> {
         let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());

@@ -2,11 +2,14 @@
 //! lengths that divide its snapshots; the best of these by hand is the fastest whose error, known from the truth, never exceeds the
 //! tolerance. Lengths in mm, times in microseconds for a simulated second.
 
-use std::format;
 use std::path::Path;
-use std::string::String;
 use std::time::Instant;
-use std::vec::Vec;
+
+use supple::adaptive::{Adaptive, Request, Taken};
+use supple::inertia::{self, Cells, Damper};
+use supple::io::write_atomically;
+use supple::mlp::Network;
+use supple::step::{Status, Step};
 
 use super::hard::{Plan as Scenes, TIMES_CRITICAL};
 use super::measure::Errors;
@@ -16,11 +19,6 @@ use super::scenes::SceneSpec;
 use super::threads::in_parallel;
 use super::truth::Truth;
 use super::{LabError, networks};
-use crate::adaptive::{Adaptive, Request, Taken};
-use crate::inertia::{self, Cells, Damper};
-use crate::io::write_atomically;
-use crate::mlp::Network;
-use crate::step::{Status, Step};
 
 /// The longest step that is tried, over the critical one.
 const LONGEST: u32 = TIMES_CRITICAL[TIMES_CRITICAL.len() - 1];

@@ -2,17 +2,15 @@
 //! Cowper's shear factor `k = 10 (1 + nu) / (12 + 11 nu)`. 80 x 10 x 10 mm, at nu 0.45 and 0.499. The held end may contract and
 //! expand in its plane, as beam theory assumes: only its axial motion is held, and the motion of its two middle lines across.
 
-use std::format;
-use std::vec::Vec;
+use supple::loads::{Loads, NodalForce};
+use supple::material::Element;
+use supple::scene::Axes;
 
 use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
 use super::mesh::{BodyMesh, same};
 use super::rest::mean_displacement;
 use super::steps::TO_REST;
 use super::{LabError, Row};
-use crate::loads::{Loads, NodalForce};
-use crate::material::Element;
-use crate::scene::Axes;
 
 pub(super) const NAME: &str = "bending";
 const LENGTH: f64 = 0.08;

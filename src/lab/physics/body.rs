@@ -2,17 +2,16 @@
 //! with an element and a way to take steps. `c = E / (4 (1 + nu))`, `d = E / (6 (1 - 2 nu))`: half the shear and half the bulk
 //! modulus, Pa. SI units.
 
-use std::string::{String, ToString};
 use std::time::Duration;
-use std::vec::Vec;
+
+use supple::material::{Element, NeoHookean, VecMaterial};
+use supple::mesh::{Mesh, Winding};
+use supple::scene::{Axes, BuildError, Support, VecScene};
 
 use super::Row;
 use super::mesh::BodyMesh;
 use super::steps::Steps;
-use crate::lab::LabError;
-use crate::material::{Element, NeoHookean, VecMaterial};
-use crate::mesh::{Mesh, Winding};
-use crate::scene::{Axes, BuildError, Support, VecScene};
+use crate::LabError;
 
 /// Young's modulus (Pa) and Poisson's ratio.
 #[derive(Clone, Copy)]

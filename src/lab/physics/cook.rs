@@ -11,16 +11,15 @@
 //! direction, and the rise of the corner itself is off by the load's shear strain times the cell there, an error of the order 1 that the graded grid
 //! shrinks as well, by cells that are smaller towards the loaded side and the lower side.
 
-use std::vec::Vec;
+use supple::loads::{Loads, NodalForce};
+use supple::material::Element;
+use supple::scene::Axes;
 
 use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
 use super::mesh::{BodyMesh, same};
 use super::rest::mean_displacement;
 use super::steps::{Steps, TO_REST};
 use super::{LabError, Row, pressure, report};
-use crate::loads::{Loads, NodalForce};
-use crate::material::Element;
-use crate::scene::Axes;
 
 pub(super) const NAME: &str = "cook";
 const ELASTIC: Elastic = Elastic { young: 240.565e6, poisson: 0.499 };

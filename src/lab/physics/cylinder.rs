@@ -2,16 +2,15 @@
 //! `u(r) = (1 + nu) / E  p a^2 / (b^2 - a^2) ((1 - 2 nu) r + b^2 / r)` at both radii. A quarter of it, nu 0.499, on grids and on
 //! irregular meshes by Gmsh, a layer thick. The pressure is a dead load on the flat triangles of the inner surface.
 
-use std::vec::Vec;
+use supple::loads::{Loads, NodalForce};
+use supple::material::Element;
+use supple::scene::Axes;
+use supple::state::VecState;
 
 use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
 use super::mesh::{BodyMesh, same};
 use super::steps::{EXACT, Steps, TO_REST};
 use super::{LabError, Row, report};
-use crate::loads::{Loads, NodalForce};
-use crate::material::Element;
-use crate::scene::Axes;
-use crate::state::VecState;
 
 pub(super) const NAME: &str = "cylinder";
 pub(super) const INNER: f64 = 0.01;

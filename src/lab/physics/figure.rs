@@ -2,16 +2,13 @@
 //! recordings, mm, over the computing time of a simulated second, s, on grids: SVG with logarithmic axes, a curve for each element and
 //! kind of steps, a point for each mesh.
 
-use std::format;
-use std::string::String;
-use std::vec::Vec;
+use supple::material::Element;
 
 use super::Row;
 use super::mesh::GRID;
 use super::silicone::DISTANCE;
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
 use super::svg::{COLOURS, line, put};
-use crate::material::Element;
 
 const WIDTH: f64 = 860.0;
 const HEIGHT: f64 = 500.0;

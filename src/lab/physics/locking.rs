@@ -1,9 +1,7 @@
 //! How an element locks, as a picture: the silicone beam at rest with 52 g hung from its end, from the side, with each element and with
 //! the markers as they were filmed. SVG, true to scale; colours say how far a place has sunk.
 
-use std::format;
-use std::string::String;
-use std::vec::Vec;
+use supple::material::Element;
 
 use super::LabError;
 use super::mesh::same;
@@ -11,7 +9,6 @@ use super::recordings::MARKERS;
 use super::silicone::{self, Hung, LOADS, SIZE};
 use super::steps::EXACT;
 use super::svg::put;
-use crate::material::Element;
 
 /// Cells of the coarser and of the finer picture.
 const CELLS: [[u32; 3]; 2] = [[6, 2, 2], [13, 4, 4]];

@@ -4,12 +4,12 @@
 
 use std::collections::HashMap;
 use std::path::Path;
-use std::vec::Vec;
 
-use crate::io::parse_msh;
-use crate::lab::LabError;
-use crate::loads::NodalForce;
-use crate::mesh::Bar;
+use supple::io::parse_msh;
+use supple::loads::NodalForce;
+use supple::mesh::Bar;
+
+use crate::LabError;
 
 /// Tetrahedra and their nodes.
 pub(super) struct BodyMesh {

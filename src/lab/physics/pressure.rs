@@ -4,15 +4,14 @@
 //! element, which its stress has, the mean of its four nodes'. Zero for a pressure that is the same everywhere.
 
 use std::collections::HashMap;
-use std::vec;
-use std::vec::Vec;
 
 use glam::DVec3;
+use supple::material::Element;
+use supple::simd::NodeVector;
 
 use super::Row;
 use super::body::Body;
-use crate::material::Element;
-use crate::simd::NodeVector;
+use crate::scenes::volume;
 
 pub(super) const ELEMENTS: &str = "pressure oscillation between elements over mean pressure";
 pub(super) const NODES: &str = "pressure oscillation between nodes over mean pressure";
@@ -57,10 +56,6 @@ pub(super) fn rows(oscillation: Option<(f64, Option<f64>)>, row: &Row) -> Vec<Ro
     let Some((elements, nodes)) = oscillation else { return Vec::new() };
     let nodes = nodes.map(|value| of(NODES, value));
     [of(ELEMENTS, elements)].into_iter().chain(nodes).collect()
-}
-
-fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {
-    (b - a).dot((c - a).cross(d - a)) / 6.0
 }
 
 fn along_edges(tets: &[[u32; 4]]) -> Vec<(usize, usize)> {

@@ -4,18 +4,17 @@
 //! linear at so small a strain, the force that is its own far field, `F0 / (1 - (F1 - F0) / F)`; and `F0` over it, less one, is the
 //! error of a body that ends there. nu 0.499.
 
-use std::vec::Vec;
+use supple::loads::{Loads, Motion};
+use supple::material::Element;
+use supple::material::VecMaterial;
+use supple::scene::{Axes, Support, VecScene};
+use supple::state::VecState;
+use supple::tled;
 
 use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
 use super::mesh::{BodyMesh, same};
 use super::steps::TO_REST;
 use super::{LabError, Row, pressure};
-use crate::loads::{Loads, Motion};
-use crate::material::Element;
-use crate::material::VecMaterial;
-use crate::scene::{Axes, Support, VecScene};
-use crate::state::VecState;
-use crate::tled;
 
 pub(super) const NAME: &str = "punch";
 const RADIUS: f64 = 0.01;

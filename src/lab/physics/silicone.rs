@@ -3,9 +3,10 @@
 //! first lowest point has come, and is then damped critically until it rests. The damping of the swing is fitted on the finest grid: its rows
 //! say how far the curves are from the recorded ones over the damping.
 
-use std::format;
-use std::string::String;
-use std::vec::Vec;
+use supple::loads::Loads;
+use supple::material::Element;
+use supple::scene::{Axes, Support};
+use supple::state::VecState;
 
 use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
 use super::mesh::{BodyMesh, GRID, same};
@@ -13,10 +14,6 @@ use super::recordings::{DAMPING, GRAVITY, LEFT, LOAD, MARKERS, Measured, Recordi
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
 use super::swing::{Markers, Swing};
 use super::{LabError, Row};
-use crate::loads::Loads;
-use crate::material::Element;
-use crate::scene::{Axes, Support};
-use crate::state::VecState;
 
 pub(super) const NAME: &str = "silicone-beam";
 /// The quantity of the picture.

@@ -1,16 +1,13 @@
 //! The rows of the physics cases as the tables of `docs/accuracy.md`, in Markdown: the beam with exact steps, the beam with other steps,
 //! its damping, the other cases, and how much pressure oscillates.
 
-use std::format;
-use std::string::String;
-use std::vec::Vec;
+use supple::material::Element;
 
 use super::mesh::GRID;
 use super::recordings::Recording;
 use super::report::ORDER;
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT, Steps, TO_REST};
 use super::{Row, cook, pressure, silicone};
-use crate::material::Element;
 
 /// All tables that the rows fill.
 #[must_use]
@@ -259,7 +256,6 @@ impl Rows<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::string::ToString;
 
     use super::*;
 

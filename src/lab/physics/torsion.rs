@@ -3,18 +3,17 @@
 //! any length. nu 0.499, which torsion hardly feels. The torque is that of the internal forces at rest: reactions of long steps hold
 //! inertia as well.
 
-use std::vec::Vec;
+use supple::loads::{Loads, Motion};
+use supple::material::Element;
+use supple::material::VecMaterial;
+use supple::scene::{Axes, Support, VecScene};
+use supple::state::VecState;
+use supple::tled;
 
 use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
 use super::mesh::{BodyMesh, same};
 use super::steps::{EXACT, TO_REST};
 use super::{LabError, Row, report};
-use crate::loads::{Loads, Motion};
-use crate::material::Element;
-use crate::material::VecMaterial;
-use crate::scene::{Axes, Support, VecScene};
-use crate::state::VecState;
-use crate::tled;
 
 pub(super) const NAME: &str = "torsion";
 const WIDTH: f64 = 0.02;

@@ -1,19 +1,16 @@
 //! Training on the laboratory's scenes (feature `train`): those that a network of the learned step learns from
-//! ([`crate::train`]), and in [`damper`] the search for the network that damps rough motion, by roll-outs.
+//! ([`supple::train`]), and in [`damper`] the search for the network that damps rough motion, by roll-outs.
 
 pub mod damper;
 
-use std::boxed::Box;
-use std::format;
-use std::string::ToString;
+use supple::loads::{LoadsOverTime, NodalForce};
+use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
+use supple::scene::{Support, VecScene};
+use supple::train::recipe::Recipe;
+use supple::train::{TrainError, TrainingScene};
 
 use super::LabError;
 use super::scenes::{self, SceneSpec};
-use crate::loads::{LoadsOverTime, NodalForce};
-use crate::material::{AnyLaw, Element, Tissue, VecMaterial};
-use crate::scene::{Support, VecScene};
-use crate::train::recipe::Recipe;
-use crate::train::{TrainError, TrainingScene};
 
 impl From<LabError> for TrainError {
     fn from(error: LabError) -> Self {

@@ -1,7 +1,6 @@
 //! `[time]` of a scene file: the method, its step, the end, the frames.
 
 use supple::inertia::{Cells, Damper, Method};
-use supple::lab::networks;
 use supple::mlp::Network;
 use toml::Spanned;
 
@@ -10,7 +9,7 @@ use crate::problem::Problem;
 
 /// A length of step as asked for.
 #[derive(Clone, Copy)]
-pub(crate) enum StepChoice {
+pub enum StepChoice {
     Seconds(f32),
     /// Times the bound of the critical step at rest.
     Multiple(f32),
@@ -19,10 +18,10 @@ pub(crate) enum StepChoice {
 }
 
 /// What `[time]` asks for.
-pub(crate) struct Timing {
+pub struct Timing {
     /// None is the exact step.
     pub(crate) method: Option<Method<'static>>,
-    pub(crate) step: StepChoice,
+    pub step: StepChoice,
     /// Whether steps choose their length, up to `step`.
     pub(crate) is_adaptive: bool,
     /// Mean error of the nodes that is accepted, m.
@@ -120,7 +119,11 @@ pub(crate) const fn method_name(method: Option<&Method<'_>>) -> &'static str {
 
 /// The crate's own damper.
 pub(crate) fn damper() -> Result<Damper<'static>, Problem> {
-    let network = Network::parse(networks::damper()).map_err(Problem::of)?;
+    /// At a multiple of 64 bytes, as its arrays ask.
+    #[repr(C, align(64))]
+    struct Aligned<B: ?Sized>(B);
+    static FILE: &Aligned<[u8]> = &Aligned(*include_bytes!("../../../../weights/damper.weights"));
+    let network = Network::parse(&FILE.0).map_err(Problem::of)?;
     Damper::new(network).map_err(Problem::of)
 }
 

@@ -1,4 +1,4 @@
-//! `supple train`: a network from a recipe, with its progress and its error on frames that it has not seen.
+//! `supple-lab train`: a network from a recipe, with its progress and its error on frames that it has not seen.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -6,16 +6,16 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use supple::lab::training::damper;
 use supple::train::fit::{Fitted, Progress, fit};
 use supple::train::recipe::Recipe;
 use supple::train::samples::Samples;
+use supple_cli::problem::{End, Problem};
+use supple_cli::screen::{message, output};
+use supple_cli::weight_file;
+use supple_lab::training::damper;
 
 use super::exemplar::learned_from;
 use super::quantise::quantise_trained;
-use crate::problem::{End, Problem};
-use crate::screen::{message, output};
-use crate::weight_file;
 
 #[derive(Args)]
 pub(crate) struct Asked {

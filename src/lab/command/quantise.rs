@@ -1,4 +1,4 @@
-//! `supple weights quantise`, and what `supple train` does after a training: a network's layers in int8, with the error that
+//! `supple-lab quantise`, and what `supple-lab train` does after a training: a network's layers in int8, with the error that
 //! each of them makes, and that of all of them.
 
 use std::path::{Path, PathBuf};
@@ -8,11 +8,11 @@ use supple::mlp::{Layer, Network, WeightBytes};
 use supple::train::int8::{Made, int8, usual_float_layers};
 use supple::train::recipe::Recipe;
 use supple::train::samples::Samples;
+use supple_cli::problem::{End, Problem};
+use supple_cli::screen::{message, output};
+use supple_cli::weight_file;
 
 use super::exemplar::learned_from;
-use crate::problem::{End, Problem};
-use crate::screen::{message, output};
-use crate::weight_file;
 
 #[derive(Args)]
 pub(crate) struct Asked {

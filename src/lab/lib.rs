@@ -1,6 +1,6 @@
 //! The laboratory: how far is a method from the truth, and what does it cost? Methods run over scenes at
 //! multiples of a step of the scene ([`timing::Timing`]), for the paper's bar [`DT`]; the truth is the exact step
-//! ([`crate::tled`]) at that step or a part of it on the same mesh.
+//! ([`supple::tled`]) at that step or a part of it on the same mesh.
 //! SI units inside, millimetres and microseconds in the tables for people.
 //!
 //! | module | what it holds |
@@ -20,7 +20,7 @@
 //! | [`tolerance`] | does an adaptive step keep its tolerance, and what does it cost? |
 //! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
 //! | [`table`] | rows as CSV and as aligned text |
-//! | [`training`] | scenes to learn from; the search for a damper |
+//! | `training` (feature `train`) | scenes to learn from; the search for a damper |
 //! | [`sweep`] | error over step on one scene, with fitted slopes |
 
 pub mod course;
@@ -48,7 +48,7 @@ pub mod training;
 pub mod truth;
 
 use std::path::Path;
-use std::{format, fs, io};
+use std::{fs, io};
 
 pub use error::LabError;
 

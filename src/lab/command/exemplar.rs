@@ -2,18 +2,18 @@
 
 use std::path::Path;
 
-use supple::lab::training;
 use supple::loads::{LoadsOverTime, NodalForce};
 use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
 use supple::scene::{Support, VecScene};
 use supple::tled;
 use supple::train::recipe::Recipe;
 use supple::train::{TrainError, TrainingScene};
-
-use crate::problem::Problem;
-use crate::scene::file::SceneFile;
-use crate::scene::setup::Setup;
-use crate::scene::timing::StepChoice;
+use supple_cli::problem::Problem;
+use supple_cli::scene::file::SceneFile;
+use supple_cli::scene::setup::Setup;
+use supple_cli::scene::timing::StepChoice;
+use supple_cli::screen::message;
+use supple_lab::training;
 
 /// Share of the critical step at rest that exact steps take unless the file says otherwise: it falls while the body deforms, and the
 /// steps of one training are all alike.
@@ -29,7 +29,7 @@ pub(super) fn learned_from(recipe: &Recipe, file: &Path) -> Result<Box<dyn Train
     let path = file.parent().unwrap_or(Path::new("")).join(&motion.scene);
     let setup = Setup::read(&SceneFile::read(&path)?)?;
     for warning in &setup.warnings {
-        crate::screen::message!("warning: {warning}");
+        message!("warning: {warning}");
     }
     let mut scene = FileScene::of(setup).map_err(|error| Problem::in_file(&path, error))?;
     scene.setup.element = motion.element.unwrap_or(scene.setup.element);
