@@ -192,7 +192,7 @@ fn curves(rows: &[Row]) -> Vec<Curve> {
         let point = (1e-6 * time, error, row.tetrahedra);
         match curves.iter_mut().find(|curve| curve.element == row.element && curve.method == row.method) {
             Some(curve) => curve.points.push(point),
-            None => curves.push(Curve { element: row.element, method: row.method, points: std::vec![point] }),
+            None => curves.push(Curve { element: row.element, method: row.method, points: vec![point] }),
         }
     }
     curves.sort_by_key(|curve| (curve.is_implicit(), curve.element.code()));

@@ -16,8 +16,10 @@ use crate::scenes::volume;
 pub(super) const ELEMENTS: &str = "pressure oscillation between elements over mean pressure";
 pub(super) const NODES: &str = "pressure oscillation between nodes over mean pressure";
 
-/// The oscillation from element to element, and with nodal pressure from node to node.
-pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVector]) -> (f64, Option<f64>) {
+/// From element to element, and with nodal pressure from node to node.
+pub(super) type Oscillation = (f64, Option<f64>);
+
+pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVector]) -> Oscillation {
     let tets = &body.mesh.tets;
     let volumes: Vec<(f64, f64)> = tets
         .iter()
@@ -51,7 +53,7 @@ pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVe
 }
 
 /// Its rows; none without a result.
-pub(super) fn rows(oscillation: Option<(f64, Option<f64>)>, row: &Row) -> Vec<Row> {
+pub(super) fn rows(oscillation: Option<Oscillation>, row: &Row) -> Vec<Row> {
     let of = |quantity: &str, value| Row { quantity: quantity.into(), value: Some(value), ..row.clone() };
     let Some((elements, nodes)) = oscillation else { return Vec::new() };
     let nodes = nodes.map(|value| of(NODES, value));

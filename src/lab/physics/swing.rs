@@ -67,7 +67,7 @@ impl Swing {
         markers: &Markers,
         (seconds, damping): (f64, f32),
     ) -> Result<(Self, Cost), LabError> {
-        let (mut samples, mut computing) = (std::vec![(0.0, [0.0; 3])], Duration::ZERO);
+        let (mut samples, mut computing) = (vec![(0.0, [0.0; 3])], Duration::ZERO);
         let mut advance = setup.advance(state, damping)?;
         while state.time() < seconds {
             let (until, start) = (state.time() + SAMPLE, Instant::now());

@@ -180,7 +180,7 @@ impl Rows<'_> {
             };
             match groups.iter_mut().find(same) {
                 Some(group) => group.push(row),
-                None => groups.push(std::vec![row]),
+                None => groups.push(vec![row]),
             }
         }
         groups
