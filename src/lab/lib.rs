@@ -11,6 +11,7 @@
 //! | [`truth`] | the exact motion of a scene, kept on disk |
 //! | [`method`] | what is compared: one match arm each |
 //! | [`implicit`] | backward Euler and the implicit midpoint rule, to compare with |
+//! | [`literal`] | the laws as the paper prints them, with stress at rest |
 //! | [`networks`] | the networks that come with the crate |
 //! | [`run`] | one method, one scene, one step: a row |
 //! | [`measure`] | errors of a motion against the truth |
@@ -29,6 +30,7 @@ mod error;
 pub mod evaluate;
 pub mod hard;
 pub mod implicit;
+pub mod literal;
 pub mod measure;
 pub mod method;
 pub mod moving;

@@ -8,6 +8,7 @@ use super::recordings::Recording;
 use super::report::ORDER;
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT, Steps, TO_REST};
 use super::{Row, cook, pressure, silicone};
+use crate::literal::PAPER;
 
 /// All tables that the rows fill.
 #[must_use]
@@ -15,7 +16,12 @@ pub fn tables(rows: &[Row]) -> String {
     let rows = Rows(rows);
     let tables =
         [rows.beam(), rows.other_steps(), rows.damping(), rows.cases(), rows.notes(), rows.pressure()];
-    tables.into_iter().flatten().collect::<Vec<_>>().join("\n")
+    let literal = format!(
+        "The paper's laws as printed, functions of `I1 - 3` and not of `I1bar - 3`, have a stress at rest: with its neo-Hookean constants a \
+         free body shrinks by {:.2} % of its volume. The library has no such law.\n",
+        100.0 * (1.0 - PAPER.volume_at_rest())
+    );
+    tables.into_iter().flatten().chain([literal]).collect::<Vec<_>>().join("\n")
 }
 
 struct Rows<'a>(&'a [Row]);
