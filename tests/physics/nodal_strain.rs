@@ -40,7 +40,7 @@ fn tissues_that_meet_have_strains_of_their_own() {
     let tissues = three.map(tissue);
     let values = tissues.map(|tissue| tissue.values());
     let scene = body.scene(NodalStrain(regions(tissues[0].law, &values, &of_element)), &[]);
-    DEFINITION.check_tissues(&three.map(|law| reference_law(law)), &of_element, &scene);
+    DEFINITION.check_tissues(&three.map(reference_law), &of_element, &scene);
 }
 
 /// Elements between fixed nodes are left out only where they count in no strain that can change.
