@@ -1,4 +1,4 @@
-"""MuJoCo's flexes on the filmed silicone beam of `supple evaluate --physics --scene silicone-beam`: error against nature and computing time, one thread.
+"""MuJoCo's flexes on the filmed silicone beam of `supple-lab physics --scene silicone-beam`: error against nature and computing time, one thread.
 
     python3.11 -m venv /tmp/mujoco && /tmp/mujoco/bin/pip install mujoco==4.0.0 numpy==2.4.6
     cargo build --release
@@ -278,7 +278,8 @@ class Point:
 def run_supple(program, folder, points):
     """Adds a run to supple's points. The recordings, as its file has them, and the share of a core that it had."""
     start, before = time.perf_counter(), os.times().children_user
-    subprocess.run([program, "evaluate", "--physics", "--scene", CASE, "--out", folder], check=True, capture_output=True)
+    laboratory = Path(program).with_name("supple-lab")
+    subprocess.run([laboratory, "physics", "--scene", CASE, "--out", folder], check=True, capture_output=True)
     share = min(1.0, (os.times().children_user - before) / (time.perf_counter() - start))
     found, references = {}, [{marker: [math.nan] * 4 for marker in MARKERS} for _ in RECORDINGS]
     with open(Path(folder, "physics.csv"), newline="") as file:
@@ -436,7 +437,7 @@ end = 1.0
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    arguments.add_argument("supple", help="the command, as cargo build --release makes it")
+    arguments.add_argument("supple", help="the command, as cargo build --release makes it, with supple-lab next to it")
     arguments.add_argument("--out", required=True, metavar="DIR")
     arguments.add_argument("--rounds", type=int, default=3, help="runs of each program in turn (3)")
     arguments = arguments.parse_args()

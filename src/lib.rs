@@ -101,9 +101,9 @@
 //! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
 //! | [`simulation`] | one owner of all that: scene, state, loads, method, guard, fallback, pace |
 //!
-//! With the feature `io` meshes are read and fields written (`io`), with `lab` methods are judged against the
-//! exact step over scenes (`lab`), with `train` networks are trained (`train`), with `safetensors` they go to and from
-//! PyTorch, with `capi` there are the functions of `include/supple.h`. The command `supple` is a package of its own.
+//! With the feature `io` meshes are read and fields written (`io`), with `train` networks are trained (`train`), with
+//! `safetensors` they go to and from PyTorch, with `capi` there are the functions of `include/supple.h`. Packages of their own are
+//! the command `supple` and the laboratory `supple-lab`, where methods are judged against the exact step over scenes.
 //!
 //! # Promises
 //!
@@ -154,8 +154,6 @@ pub mod tled;
 
 #[cfg(feature = "io")]
 pub mod io;
-#[cfg(feature = "lab")]
-pub mod lab;
 
 #[cfg(feature = "train")]
 pub mod train;

@@ -220,6 +220,16 @@ impl<'a> StateView<'a> {
         self.progress.dt = seconds;
     }
 
+    /// Puts the state where a method of the host's own has brought it at a time (s): `at` gives displacement and increment (m) of
+    /// each node, which spans `seconds`. Number of steps and energy balance stay as they are.
+    pub fn put(&mut self, time: f64, seconds: f32, at: impl Fn(usize) -> [[f32; 3]; 2]) {
+        let vectors = self.displacement.iter_mut().zip(self.increment.iter_mut());
+        for (node, (displacement, increment)) in vectors.enumerate() {
+            [displacement.0, increment.0] = at(node).map(|[x, y, z]| [x, y, z, 0.0]);
+        }
+        (self.progress.time, self.progress.dt) = (time, seconds);
+    }
+
     /// Back to rest at time zero.
     pub fn reset(&mut self) {
         for vectors in [&mut *self.displacement, &mut *self.increment, &mut *self.force] {

@@ -163,7 +163,9 @@ fn is_compiled(file: &str, named_by: &dyn Fn(&str, &str) -> Result<(), String>) 
         named_by(&format!("tests/{name}/main.rs"), &format!("mod {module};"))?;
     }
     let name = format!("name = \"{name}\"");
-    named_by("Cargo.toml", &name).or_else(|_| named_by("src/bin/supple/Cargo.toml", &name))
+    named_by("Cargo.toml", &name)
+        .or_else(|_| named_by("src/bin/supple/Cargo.toml", &name))
+        .or_else(|_| named_by("src/lab/Cargo.toml", &name))
 }
 
 #[test]

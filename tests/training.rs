@@ -11,14 +11,15 @@ static ALLOCATOR: hostile::Counting = hostile::Counting;
 
 use core::ops::ControlFlow;
 
-use supple::lab::scenes::{SceneSpec, named};
-use supple::lab::timing::Timing;
 use supple::material::Element;
 use supple::mlp::{Network, WeightBytes};
 use supple::train::TrainError;
-use supple::train::fit::{Fitted, fit, train};
+use supple::train::fit::{Fitted, fit};
 use supple::train::recipe::Recipe;
 use supple::train::samples::Samples;
+use supple_lab::scenes::{SceneSpec, named};
+use supple_lab::timing::Timing;
+use supple_lab::training;
 
 const RECIPE: &str = r#"
 seed = 3
@@ -46,7 +47,7 @@ held_out = 0.2
 
 fn samples() -> (Recipe, SceneSpec, Samples) {
     let recipe = Recipe::parse(RECIPE).unwrap();
-    let scene = recipe.scene().unwrap();
+    let scene = training::scene(&recipe).unwrap();
     let samples = Samples::collect(&recipe, &scene).unwrap();
     (recipe, scene, samples)
 }
@@ -98,7 +99,9 @@ fn a_training_that_was_stopped_goes_on_as_if_it_had_not_been() {
 
 #[test]
 fn weights_say_where_they_come_from() {
-    let Fitted { bytes, samples, .. } = train(RECIPE, None, |_| ControlFlow::Continue(())).unwrap();
+    let (recipe, scene, samples) = samples();
+    let fitted = fit(&recipe, RECIPE, &scene, &samples, None, &mut |_| ControlFlow::Continue(()));
+    let Fitted { bytes, samples, .. } = fitted.unwrap();
     let mut words = vec![0u32; bytes.len().div_ceil(4)];
     bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(&bytes);
     let network = Network::parse(bytemuck::cast_slice(&words)).unwrap();
@@ -120,8 +123,7 @@ fn a_network_learns_from_any_scene_at_its_own_step() {
     let bar = named("stretch").unwrap();
     let timing = Timing { step: 5e-5, ..Timing::PAPER };
     let own = SceneSpec { element: Element::NodalPressure, damping: 7.0, density: 1_100.0, timing, ..bar };
-    let scene = recipe.motion.of(own.clone());
-    assert_eq!(scene.forces[0].newton, own.forces[0].newton.map(|newton| 0.5 * newton));
+    let scene = own.with_load(recipe.motion.load);
     let samples = Samples::collect(&recipe, &scene).unwrap();
     assert_eq!(samples.inputs.len(), 20 * samples.vertices);
     let Fitted { bytes, .. } =
@@ -150,7 +152,7 @@ fn frames_are_spread_over_the_motion_at_every_step() {
     for multiple in [10, 20, 100] {
         let text = RECIPE.replace("multiple = 10", &format!("multiple = {multiple}"));
         let recipe = Recipe::parse(&text).unwrap();
-        let samples = Samples::collect(&recipe, &recipe.scene().unwrap()).unwrap();
+        let samples = Samples::collect(&recipe, &training::scene(&recipe).unwrap()).unwrap();
         assert_eq!(samples.inputs.len(), 20 * samples.vertices);
         assert_eq!(samples.targets.len(), samples.inputs.len());
         // The speed is that of the motion: it grows with the load, which is on a ramp.
@@ -201,7 +203,8 @@ fn force_over_mass_is_the_acceleration_and_what_damping_takes() {
 fn a_recipe_that_cannot_be_used_says_why() {
     let said = |from: &str, to: &str| {
         assert!(RECIPE.contains(from));
-        let said = Recipe::parse(&RECIPE.replace(from, to)).unwrap_err().to_string();
+        let recipe = Recipe::parse(&RECIPE.replace(from, to));
+        let said = recipe.and_then(|recipe| training::scene(&recipe)).unwrap_err().to_string();
         println!("{said}");
         said
     };
@@ -231,7 +234,7 @@ ease = 1.0
 
 fn collected(text: &str) -> Samples {
     let recipe = Recipe::parse(text).unwrap();
-    Samples::collect(&recipe, &recipe.scene().unwrap()).unwrap()
+    Samples::collect(&recipe, &training::scene(&recipe).unwrap()).unwrap()
 }
 
 #[test]
@@ -297,6 +300,10 @@ fn turned_normals_change_no_length() {
 #[test]
 fn a_motion_that_loads_every_vertex_leaves_nothing_to_learn() {
     let text = RECIPE.replace("torsion", "cylinder");
-    let said = train(&text, None, |_| ControlFlow::Continue(())).unwrap_err().to_string();
+    let recipe = Recipe::parse(&text).unwrap();
+    let scene = training::scene(&recipe).unwrap();
+    let samples = Samples::collect(&recipe, &scene).unwrap();
+    let fitted = fit(&recipe, &text, &scene, &samples, None, &mut |_| ControlFlow::Continue(()));
+    let said = fitted.unwrap_err().to_string();
     assert!(said.starts_with("scene = \"cylinder\": every vertex is held or loaded"), "{said}");
 }

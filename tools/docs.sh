@@ -40,16 +40,16 @@ exists() {
             done
             ;;
         cargo\ run*)
-            local arguments=${line#* -- } sub
+            local program=${line%% -- *} arguments=${line#* -- } sub
             sub=${arguments%% *}
             # Training would have to be built to be asked: its flags are names of fields.
-            if [[ $line == *"--features train"* ]]; then
+            if [[ $program == *"--features train"* ]]; then
                 for word in $(grep -oE -- ' --[a-z-]+' <<<"$arguments"); do
                     word=${word#--}
-                    grep -rqw "${word//-/_}" src/bin/supple || fail "$file" "$sub has no flag --$word"
+                    grep -rqw "${word//-/_}" src/lab/command || fail "$file" "$sub has no flag --$word"
                 done
             else
-                cargo run --quiet --release -- "$sub" --help >target/docs-help || fail "$file" "no command $sub"
+                ${program/run/run --quiet} -- "$sub" --help >target/docs-help || fail "$file" "no command $sub"
                 for word in $(grep -oE -- ' --[a-z-]+' <<<"$arguments"); do
                     case $sub in
                         weights) ;;

@@ -4,7 +4,8 @@
 #
 #     tools/guide.sh [COMMAND]
 #
-# COMMAND is the built command, with training; without it the fences build it. `.ci/run` gives that of the tests.
+# COMMAND is the built command, next to which COMMAND-lab stands, with training; without it the fences build both. `.ci/run` gives
+# those of the tests.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -17,9 +18,11 @@ command -v python3 >/dev/null && python3 -c 'import ensurepip' 2>/dev/null || {
 rm -rf out/guide
 awk '/^```/ { inside = $0 == "```sh guide"; next } inside' docs/guide.md | while read -r line; do
     printf '$ %s\n' "$line"
-    # One build with all features for all commands.
-    line=${line/cargo run --release --features train/cargo run --release}
-    bash -euo pipefail -c "${line/cargo run --release --/${command:-cargo run --quiet --release --features train --}}" 2>&1
+    if [ -n "$command" ]; then
+        line=${line/cargo run --release -p supple-lab --features train --/$command-lab}
+        line=${line/cargo run --release --/$command}
+    fi
+    bash -euo pipefail -c "$line" 2>&1
 done | tee "$said"
 
 # within WHAT LEAST VALUE MOST
@@ -38,7 +41,8 @@ within 'error of the learned run over time, % of not moving' 0 "$(value '^over t
 within 'error of the learned run at its end, % of not moving' 0 "$(value '^at the end: .*: \([0-9.]*\) % of not moving$')" 40
 # A network learns from exact steps without instruments, and says so.
 sed 's,^scene = .*,scene = "../../docs/scenes/organ-touched.toml",' docs/scenes/organ-network.toml >out/guide/refused.toml
-why=$(${command:-cargo run --quiet --release --features train --} train out/guide/refused.toml --out out/guide/refused.weights 2>&1) &&
+laboratory=${command:+$command-lab}
+why=$(${laboratory:-cargo run --quiet --release -p supple-lab --features train --} train out/guide/refused.toml --out out/guide/refused.weights 2>&1) &&
     { echo 'failed: a network was trained on a scene with an instrument' >&2; exit 1; }
 [[ $why == *organ-touched.toml*'the method is "auto"'* ]] || { echo "failed: it says: $why" >&2; exit 1; }
 for file in organ_mesh.h organ_weights.h; do

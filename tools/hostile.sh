@@ -12,8 +12,8 @@ cd "$(dirname "$0")/.."
 [ $# -ge 1 ] || { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 export SUPPLE_SECONDS=$1 SUPPLE_SEED=${2:-1}
 cargo test -p supple --features safetensors --test hostile -- --nocapture
-cargo test -p supple --features train --test training recipes -- --nocapture
-cargo test -p supple-cli --bin supple hostile -- --nocapture
+cargo test -p supple-lab --features train --test training recipes -- --nocapture
+cargo test -p supple-cli --lib hostile -- --nocapture
 
 # Once as it is installed, and once with every access of the library itself checked as well: the compiler's sanitizers are unstable.
 tools/install.sh --prefix target/hostile

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes meshes/physics/*.msh: irregular meshes by Gmsh of two bodies that `supple evaluate --physics` judges elements on.
+"""Makes meshes/physics/*.msh: irregular meshes by Gmsh of two bodies that `supple-lab physics` judges elements on.
 
 The silicone beam, 100 x 30 x 30 mm along x, y, z from the origin, with about as many tetrahedra as its grids have; and a quarter of
 a thick-walled cylinder about z, radii 10 and 20 mm, a layer thick. They are what Gmsh gives, with its own optimisation alone; nodes are

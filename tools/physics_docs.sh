@@ -7,7 +7,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 out=target/physics
-cargo run --quiet --release -- evaluate --physics --out "$out" >"$out.txt"
+cargo run --quiet --release -p supple-lab -- physics --out "$out" >"$out.txt"
 mkdir -p docs/pictures
 cp "$out/physics.svg" "$out/locking.svg" docs/pictures/
 awk -v tables="$out/physics.md" '

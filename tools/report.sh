@@ -3,7 +3,7 @@
 #
 #     tools/report.sh [COMMAND]
 #
-# COMMAND is the built command; without it it is built first. Reports and screenshots are in out/report. What the tests need comes from
+# COMMAND is the built command, next to which COMMAND-lab stands; without it they are built first. Reports and screenshots are in out/report. What the tests need comes from
 # Debian (node, chromium) and from npm (pinned in examples/page/package-lock.json).
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -22,11 +22,11 @@ rm -rf out/report
 mkdir -p out/report
 "$supple" demo --out out/report/demo
 "$supple" simulate docs/scenes/lobe-sphere.toml --out out/report/simulate
-lab=(evaluate --out out/report/lab)
-"$supple" "${lab[@]}" --scene reversed --scene cylinder --multiple 10 --multiple 20 \
-    --method tled --method hold --method multilevel --method damped --method compact-f32 2>/dev/null | tail -n 2
-"$supple" "${lab[@]}" --physics --scene torsion 2>/dev/null | tail -n 2
-"$supple" "${lab[@]}" --hard --scene slivers --scene release-stretched --random 4 --method damped --method compact-f32 2>/dev/null | tail -n 2
+lab() { "$supple-lab" "$@" --out out/report/lab 2>/dev/null | tail -n 2; }
+lab methods --scene reversed --scene cylinder --multiple 10 --multiple 20 \
+    --method tled --method hold --method multilevel --method damped --method compact-f32
+lab physics --scene torsion
+lab hard --scene slivers --scene release-stretched --random 4 --method damped --method compact-f32
 # Each part is there still after the others.
 for title in 'Speed against error' 'Error against nature' 'Hard cases'; do
     grep -q "<h2>$title" out/report/lab/report.html || { echo "failed: no part '$title'" >&2; exit 1; }

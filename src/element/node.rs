@@ -154,7 +154,7 @@ impl NodeInertia {
     }
 
     /// Adds a point mass, kg, to a node that is built.
-    #[cfg(feature = "lab")]
+    #[cfg(feature = "std")]
     pub(crate) fn add_mass(&mut self, kilogram: f32) {
         self.mass += kilogram;
         let inverse = 1.0 / self.mass;

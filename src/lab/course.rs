@@ -1,12 +1,11 @@
 //! How the loads of a scene vary over time on top of their ramps: a factor of all forces and prescribed motions.
 
-use std::vec::Vec;
+use supple::loads::{Loads, LoadsOverTime, Motion, NodalForce};
+use supple::scene::AsScene;
+use supple::state::StateView;
 
 use super::LabError;
 use super::scenes::SceneSpec;
-use crate::loads::{Loads, LoadsOverTime, Motion, NodalForce};
-use crate::scene::AsScene;
-use crate::state::StateView;
 
 /// The factor of the loads over time.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,10 +1,6 @@
 //! How much longer do implicit steps take for the same error? For each row of an explicit method the time that backward Euler or the
 //! implicit midpoint rule takes with the step at which its mean error over time is the same, over the row's time.
 
-use std::format;
-use std::string::String;
-use std::vec::Vec;
-
 use super::method::Method;
 use super::run::Row;
 
@@ -118,7 +114,6 @@ pub fn text(rows: &[Row]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::vec;
 
     #[test]
     fn times_between_two_steps_are_interpolated_and_beyond_them_kept() {

@@ -1,16 +1,14 @@
 //! Why the laboratory could not do what it was asked, in a sentence for the person who asked.
 
 use core::fmt;
-use std::string::{String, ToString};
-use std::vec::Vec;
 
-use crate::inertia::{DamperError, InertiaError};
-use crate::io::ReadError;
-use crate::learned::LearnedError;
-use crate::loads::LoadError;
-use crate::mlp::WeightError;
-use crate::scene::BuildError;
-use crate::step::{Divergence, StepError};
+use supple::inertia::{DamperError, InertiaError};
+use supple::io::ReadError;
+use supple::learned::LearnedError;
+use supple::loads::LoadError;
+use supple::mlp::WeightError;
+use supple::scene::BuildError;
+use supple::step::{Divergence, StepError};
 
 /// Why the laboratory could not do what it was asked.
 #[derive(Debug)]

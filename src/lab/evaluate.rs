@@ -1,9 +1,6 @@
 //! An evaluation: methods over scenes at multiples of a scene's step, and of one of them at more: a sweep.
 
-use std::format;
 use std::path::Path;
-use std::string::String;
-use std::vec::Vec;
 
 use super::method::Method;
 use super::run::{self, Row};

@@ -7,21 +7,18 @@
 //! by Newton's method with halved steps; each linear system by conjugate gradients in float32 with the parts of the diagonal inverted
 //! (Nocedal & Wright 2006, algorithms 7.1 and 5.3). Backward Euler goes on from there, the midpoint rule to twice as far. SI units.
 
-use std::boxed::Box;
-use std::vec;
-use std::vec::Vec;
+use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3};
+use supple::loads::{Loads, ramp_factor};
+use supple::material::VecMaterial;
+use supple::scene::SceneView;
+use supple::simd::{Kernel, Real, dispatch};
+use supple::state::VecState;
+use supple::step::{Cause, Divergence, Status};
+use supple::tled::{ElementTangent, element_tangents};
 
 use super::method::{Advance, StepReport};
-use crate::element::NodeInertia;
-use crate::loads::Loads;
-use crate::material::Material;
-use crate::scene::SceneView;
-use crate::simd::{Kernel, NodeVector, Real, dispatch};
-use crate::state::VecState;
-use crate::step::{Cause, Divergence, Status, external_forces};
-use crate::tled::tangent::ElementTangent;
 
 /// Which rule.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -45,51 +42,40 @@ const LEAST_SHARE: f64 = 1e-3;
 const ROUNDING: f64 = 1e-6;
 
 /// Steps from `state` by `dt` (s) with `damping` (1/s).
-pub(super) fn prepare<'a, M: Material>(
+pub(super) fn prepare<'a>(
     rule: Rule,
-    scene: SceneView<'a, M>,
+    scene: SceneView<'a, VecMaterial>,
     state: &VecState,
     dt: f32,
     damping: f32,
 ) -> Advance<'a> {
-    let laws = scene.material.laws();
-    let tangents =
-        Box::new(move |displacement: &dyn Fn(usize) -> DVec3, tangents: &mut Vec<ElementTangent>| {
-            tangents.clear();
-            tangents.extend(scene.places().map(|(tile, lane)| {
-                ElementTangent::new(&laws.of(tile.element(lane)), tile, lane, displacement)
-            }));
-        });
-    let elements: Vec<[usize; 4]> =
-        scene.places().map(|(tile, lane)| [0, 1, 2, 3].map(|corner| tile.node(corner, lane))).collect();
+    let tangents: Vec<ElementTangent> = element_tangents(scene, |_| [0.0; 3]).collect();
+    let elements: Vec<[usize; 4]> = tangents.iter().map(|tangent| tangent.nodes).collect();
     let vector = |values: [f32; 3]| DVec3::from_array(values.map(f64::from));
     let nodes = 0..scene.node_count();
     let mut body = Body {
         rule,
-        inertia: scene.inertia,
-        tangents_at: tangents,
+        scene,
         dt: f64::from(dt),
         damping: f64::from(damping),
         time: state.time(),
         masses: nodes.clone().map(|node| f64::from(scene.node_mass(node))).collect(),
-        free: scene.inertia.iter().map(|inertia| inertia.free().truncate().as_dvec3()).collect(),
+        free: nodes
+            .clone()
+            .map(|node| DVec3::from_array([0, 1, 2].map(|axis| f64::from(!scene.held(node).has(axis)))))
+            .collect(),
         displacement: state.displacements().iter().map(|u| vector(u.to_array())).collect(),
         velocity: nodes.map(|node| vector(state.velocity(node))).collect(),
-        tangents: Vec::with_capacity(elements.len()),
+        tangents,
         matrix: Matrix::of(scene.node_count(), &elements),
     };
     Box::new(move |state, loads, _| Ok((body.step(loads, state), StepReport::default())))
 }
 
-/// Computes the tangents of all elements from the displacements (m) of the nodes. Of all that follows only this needs the law, so only
-/// this is compiled for each.
-type TangentsAt<'a> = Box<dyn Fn(&dyn Fn(usize) -> DVec3, &mut Vec<ElementTangent>) + 'a>;
-
 /// A body in motion, in float64.
 struct Body<'a> {
     rule: Rule,
-    inertia: &'a [NodeInertia],
-    tangents_at: TangentsAt<'a>,
+    scene: SceneView<'a, VecMaterial>,
     dt: f64,
     damping: f64,
     time: f64,
@@ -110,15 +96,22 @@ impl Body<'_> {
             Rule::BackwardEuler => self.dt,
             Rule::Midpoint => 0.5 * self.dt,
         };
-        let mut external = vec![NodeVector::ZERO; self.free.len()];
-        external_forces(&mut external, 0, self.inertia, loads, self.time + h);
+        let external = self.external_forces(loads, self.time + h);
         let mut velocity = self.velocity.clone();
         // What supports add to the velocities of the step before.
         let mut added: Vec<DVec3> =
             self.velocity.iter().zip(&self.free).map(|(v, free)| *v * (*free - DVec3::ONE)).collect();
-        loads.each_prescribed(self.time + self.dt, &mut external, |node, axis, metre, _| {
+        // Of several motions of an axis the last one holds.
+        let mut prescribed = BTreeMap::new();
+        for motion in loads.motions() {
+            let factor = ramp_factor(self.time + self.dt, motion.ramp);
+            for axis in (0..3).filter(|&axis| motion.axes.has(axis)) {
+                prescribed.insert((motion.node as usize, axis), factor * motion.metre[axis]);
+            }
+        }
+        for ((node, axis), metre) in prescribed {
             added[node][axis] += (f64::from(metre) - self.displacement[node][axis]) / self.dt;
-        });
+        }
         if !self.solve(h, &external, &added, &mut velocity) {
             let node = velocity.iter().position(|v| !v.is_finite()).unwrap_or(0) as u32;
             return Status::Diverged(Divergence { time: self.time, node, cause: Cause::NotFinite });
@@ -131,21 +124,27 @@ impl Body<'_> {
             };
         }
         self.time += self.dt;
-        let view = state.view();
-        let narrow = |vector: DVec3| NodeVector(vector.as_vec3().extend(0.0).to_array());
-        for (to, from) in view.displacement.iter_mut().zip(&self.displacement) {
-            *to = narrow(*from);
-        }
-        // For what goes on from here.
-        for (to, from) in view.increment.iter_mut().zip(&self.velocity) {
-            *to = narrow(self.dt * *from);
-        }
-        (view.progress.time, view.progress.dt) = (self.time, self.dt as f32);
+        state.view().put(self.time, self.dt as f32, |node| {
+            [self.displacement[node], self.dt * self.velocity[node]].map(|vector| vector.as_vec3().to_array())
+        });
         Status::Ok
     }
 
+    /// Gravity and nodal forces, N.
+    fn external_forces(&self, loads: &Loads<'_>, time: f64) -> Vec<[f32; 3]> {
+        let weight = |node| loads.gravity().map(|component| component * self.scene.node_mass(node));
+        let mut forces: Vec<_> = (0..self.free.len()).map(weight).collect();
+        for load in loads.forces() {
+            let factor = ramp_factor(time, load.ramp);
+            for (sum, newton) in forces[load.node as usize].iter_mut().zip(load.newton) {
+                *sum += factor * newton;
+            }
+        }
+        forces
+    }
+
     /// Improves velocities until the momentum balance holds, with what supports add to them. Says whether it does.
-    fn solve(&mut self, h: f64, external: &[NodeVector], added: &[DVec3], velocity: &mut Vec<DVec3>) -> bool {
+    fn solve(&mut self, h: f64, external: &[[f32; 3]], added: &[DVec3], velocity: &mut Vec<DVec3>) -> bool {
         let Residual { mut left, scale } = self.residual(h, external, velocity);
         self.assemble(h);
         // Nodes near moved supports go with them, or their elements would be crushed.
@@ -187,19 +186,21 @@ impl Body<'_> {
     }
 
     /// What is left of the momentum balance, N s, along free axes. Keeps the elements' tangents.
-    fn residual(&mut self, h: f64, external: &[NodeVector], velocity: &[DVec3]) -> Residual {
+    fn residual(&mut self, h: f64, external: &[[f32; 3]], velocity: &[DVec3]) -> Residual {
         let inert = 1.0 + self.damping * h;
         let mut left: Vec<DVec3> = (0..velocity.len())
             .map(|node| {
-                let force = DVec3::from_array(external[node].to_array().map(f64::from));
+                let force = DVec3::from_array(external[node].map(f64::from));
                 self.masses[node] * (inert * velocity[node] - self.velocity[node]) - h * force
             })
             .collect();
         let mut scale = 0.0;
-        let at = |node: usize| self.displacement[node] + h * velocity[node];
-        (self.tangents_at)(&at, &mut self.tangents);
+        let at = |node: usize| (self.displacement[node] + h * velocity[node]).to_array();
+        self.tangents.clear();
+        self.tangents.extend(element_tangents(self.scene, at));
         for tangent in &self.tangents {
             for (node, force) in tangent.nodes.into_iter().zip(tangent.forces()) {
+                let force = DVec3::from_array(force);
                 left[node] -= h * force;
                 scale += h * h * force.length_squared();
             }
@@ -286,10 +287,10 @@ impl Matrix {
         }
     }
 
-    fn add(&mut self, element: usize, stiffness: &[[DMat3; 4]; 4], factor: f64) {
+    fn add(&mut self, element: usize, stiffness: &[[[[f64; 3]; 3]; 4]; 4], factor: f64) {
         for (places, row) in self.places[element].iter().zip(stiffness) {
             for (&place, part) in places.iter().zip(row) {
-                for (sum, column) in self.parts[place].iter_mut().zip(part.to_cols_array_2d()) {
+                for (sum, column) in self.parts[place].iter_mut().zip(part) {
                     for (sum, value) in sum.iter_mut().zip(column) {
                         *sum += (factor * value) as f32;
                     }
@@ -433,20 +434,25 @@ impl Kernel for Solve<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::println;
 
     use super::*;
-    use crate::material::NeoHookean;
-    use crate::mesh::Bar;
-    use crate::scene::test_scene::scene_of;
-    use crate::step::Step;
-    use crate::tled;
+    use supple::material::{Element, NeoHookean};
+    use supple::mesh::{Bar, Mesh, Winding};
+    use supple::scene::VecScene;
+    use supple::step::Step;
+    use supple::tled;
+
+    fn scene_of(law: NeoHookean, bar: Bar) -> VecScene<VecMaterial> {
+        let (points, tets): (Vec<_>, Vec<_>) = (bar.points().collect(), bar.tets().collect());
+        let mesh = Mesh::new(&points, &tets, Winding::Checked).unwrap();
+        VecScene::build(VecMaterial::one(Element::Linear, law, 1000.0), &mesh, &[]).unwrap()
+    }
 
     /// A free bar under gravity: backward Euler falls by half a step's velocity more, the midpoint rule exactly.
     #[test]
     fn free_fall_is_what_the_rules_say_it_is() {
         let bar = Bar { size: [0.02, 0.02, 0.04], cells: [2, 2, 4] };
-        let (_, scene) = scene_of(NeoHookean { c: 2_000.0, d: 100_000.0 }, bar);
+        let scene = scene_of(NeoHookean { c: 2_000.0, d: 100_000.0 }, bar);
         let loads = Loads::new(&scene, [0.0, 0.0, -9.81], &[], &[]).unwrap();
         for (rule, beyond) in [(Rule::BackwardEuler, 1.0), (Rule::Midpoint, 0.0)] {
             let (dt, steps) = (2e-3_f32, 50);
@@ -467,7 +473,7 @@ mod tests {
     /// A held bar under a sudden weight: both come to the exact motion as steps get shorter, by their orders.
     #[test]
     fn errors_fall_with_the_order_of_the_rule() {
-        let (_, scene) = scene_of(
+        let scene = scene_of(
             NeoHookean { c: 1_000.0, d: 10_000.0 },
             Bar { size: [0.02, 0.02, 0.06], cells: [2, 2, 5] },
         );

@@ -1,11 +1,10 @@
 //! Errors of a motion against the truth: distances between where a node is and where it ought to be, over all
 //! nodes (held ones too, as in the paper), in millimetres.
 
-use std::vec::Vec;
+use supple::state::NodeVector;
 
 use super::LabError;
 use super::truth::Truth;
-use crate::state::NodeVector;
 
 /// Errors of a motion, mm.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -64,7 +63,7 @@ impl Errors {
     pub fn of_hold(truth: &Truth) -> Result<Self, LabError> {
         let mut errors = Self::default();
         for shape in &truth.snapshots {
-            errors.add_snapshot(truth, &std::vec![NodeVector::ZERO; shape.len()])?;
+            errors.add_snapshot(truth, &vec![NodeVector::ZERO; shape.len()])?;
         }
         Ok(errors)
     }
@@ -77,8 +76,9 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use supple::state::VecState;
+
     use super::*;
-    use std::vec;
 
     /// Two nodes: one stands, one walks 3 mm and then 6 mm.
     fn truth() -> Truth {
@@ -95,9 +95,11 @@ mod tests {
     fn judged(last: [f32; 3]) -> Errors {
         let truth = truth();
         let mut errors = Errors::default();
-        errors.add_snapshot(&truth, &[NodeVector::ZERO, NodeVector([3e-3, 0.0, 0.0, 0.0])]).unwrap();
-        let [x, y, z] = last;
-        errors.add_snapshot(&truth, &[NodeVector::ZERO, NodeVector([x, y, z, 0.0])]).unwrap();
+        let mut state = VecState::at_rest(2);
+        for displacement in [[3e-3, 0.0, 0.0], last] {
+            state.view().put(0.0, 0.0, |node| [displacement.map(|metre| node as f32 * metre), [0.0; 3]]);
+            errors.add_snapshot(&truth, state.displacements()).unwrap();
+        }
         errors
     }
 

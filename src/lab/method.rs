@@ -1,25 +1,21 @@
 //! What is compared: ways to move a scene on by one step. A method is one arm in [`Method::prepare`].
 
-use std::boxed::Box;
-use std::format;
 use std::path::Path;
-use std::string::{String, ToString};
-use std::vec;
-use std::vec::Vec;
+
+use supple::inertia::{self, Cells, Damper, LargeStep};
+use supple::learned::{self, LearnedStep};
+use supple::loads::Loads;
+use supple::material::VecMaterial;
+use supple::mlp::{Network, WeightBytes};
+use supple::scene::SceneView;
+use supple::state::{NodeVector, StateView, VecState};
+use supple::step::{CallingThread, Status, Step};
+use supple::tled;
 
 use super::networks::{self, Family};
 use super::scenes::SceneSpec;
 use super::timing::Timing;
 use super::{DT, LabError, implicit};
-use crate::inertia::{self, Cells, Damper, LargeStep};
-use crate::learned::{self, LearnedStep};
-use crate::loads::Loads;
-use crate::material::VecMaterial;
-use crate::mlp::{Network, WeightBytes};
-use crate::scene::SceneView;
-use crate::state::{NodeVector, StateView, VecState};
-use crate::step::{CallingThread, Status, Step};
-use crate::tled;
 
 /// A way to move a scene.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]

@@ -3,17 +3,16 @@
 //!
 //! A multiple here is of nearly the critical step at rest, so that 20 means twenty times what the exact step can take.
 
-use std::vec::Vec;
+use supple::loads::{Motion, NodalForce};
+use supple::material::{AnyLaw, Exponential, NeoHookean};
+use supple::mesh::Bar;
+use supple::scene::{Axes, Support};
+use supple::state::VecState;
+use supple::tled;
 
 use super::LabError;
 use super::scenes::{LOBE, RigidVelocity, SceneSpec, bar, held_at_its_end};
 use super::timing::Timing;
-use crate::loads::{Motion, NodalForce};
-use crate::material::{AnyLaw, Exponential, NeoHookean};
-use crate::mesh::Bar;
-use crate::scene::{Axes, Support};
-use crate::state::VecState;
-use crate::tled;
 
 /// Makes a scene of tissue with this bulk over shear modulus.
 type Make = fn(f32) -> Result<Scene, LabError>;

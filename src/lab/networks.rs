@@ -2,9 +2,8 @@
 //! into their files.
 
 use std::sync::OnceLock;
-use std::vec::Vec;
 
-use crate::mlp::{Description, Network, WeightBytes, write};
+use supple::mlp::{Description, Network, WeightBytes, write};
 
 /// Weight files at multiples of 64 bytes, as their arrays ask.
 #[repr(C, align(64))]
@@ -73,8 +72,8 @@ fn other_step(at: usize) -> Option<&'static [u8]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::DT;
-    use crate::learned::{FEATURES, PREDICTED};
+    use crate::DT;
+    use supple::learned::{FEATURES, PREDICTED};
 
     #[test]
     fn every_file_is_a_network_of_its_kind_and_step() {

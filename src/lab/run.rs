@@ -3,15 +3,15 @@
 
 use core::fmt;
 use std::time::{Duration, Instant};
-use std::vec::Vec;
+
+use supple::guard::Guard;
+use supple::step::{Status, Step};
 
 use super::LabError;
 use super::measure::Errors;
 use super::method::Method;
 use super::scenes::SceneSpec;
 use super::truth::Truth;
-use crate::guard::Guard;
-use crate::step::{Status, Step};
 
 /// What a method did on a scene with a step.
 #[derive(Clone, Debug, PartialEq)]
@@ -177,11 +177,11 @@ fn run_to_end(
             }
             match status {
                 Status::Ok => {}
-                Status::Limited { .. } | Status::Inexact { .. } => limited += part,
                 Status::Diverged(divergence) => {
                     return Ok(Ended { end: End::Diverged(divergence.time), frames, shape });
                 }
                 Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
+                _ => limited += part,
             }
             ok &= status == Status::Ok;
             taken += if timed { part } else { 0.0 };

@@ -3,23 +3,20 @@
 //! The bar is the paper's ([`Bar::PAPER`]), held at z = 0 and loaded at its four corners at z = 100 mm.
 
 use std::path::Path;
-use std::string::ToString;
-use std::vec;
-use std::vec::Vec;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use supple::io::{TetMesh, parse_msh};
+use supple::loads::{Motion, NodalForce};
+use supple::material::{AnyLaw, Element, Exponential, NeoHookean, Tissue, VecMaterial};
+use supple::mesh::{Bar, Mesh, Winding};
+use supple::scene::{AsScene, Axes, BuildError, Support, VecScene};
+use supple::state::VecState;
+use supple::step::Step;
+use supple::tled;
 
 use super::course::{Course, CurrentLoads};
 use super::timing::Timing;
 use super::{LabError, moving};
-use crate::io::{TetMesh, parse_msh};
-use crate::loads::{Motion, NodalForce};
-use crate::material::{AnyLaw, Element, Exponential, NeoHookean, Tissue, VecMaterial};
-use crate::mesh::{Bar, Mesh, Winding};
-use crate::scene::{AsScene, Axes, BuildError, Support, VecScene};
-use crate::state::VecState;
-use crate::step::Step;
-use crate::tled;
 
 /// The names of all scenes of the tables, in their order. One more, `bent`, is for training.
 pub fn names() -> impl Iterator<Item = &'static str> {
@@ -368,15 +365,20 @@ pub(super) fn longest(points: &[[f32; 3]]) -> (usize, f32, f32) {
     farther(farther(reach(0), reach(1)), reach(2))
 }
 
+/// Signed volume of a tetrahedron, m^3.
+pub(crate) fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {
+    (b - a).dot((c - a).cross(d - a)) / 6.0
+}
+
 /// Lumped masses, kg: a quarter of each element's to each of its nodes.
 pub(super) fn node_masses(scene: &SceneSpec) -> Vec<f32> {
     let mut masses = vec![0.0; scene.points.len()];
     for tet in &scene.tets {
         let corners = tet.map(|node| {
             let [x, y, z] = scene.points.get(node as usize).copied().unwrap_or_default();
-            glam::DVec3::new(f64::from(x), f64::from(y), f64::from(z))
+            DVec3::new(f64::from(x), f64::from(y), f64::from(z))
         });
-        let share = 0.25 * crate::mesh::volume(corners) * f64::from(scene.density);
+        let share = 0.25 * volume(corners) * f64::from(scene.density);
         for node in tet {
             if let Some(mass) = masses.get_mut(*node as usize) {
                 *mass += share;

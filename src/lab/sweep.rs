@@ -1,8 +1,6 @@
 //! Error over step: on one scene, how fast does a method's error grow with its step, and where does it
 //! diverge?
 
-use std::vec::Vec;
-
 use super::method::Method;
 use super::run::{End, Row};
 use super::timing::Timing;
@@ -69,7 +67,6 @@ pub fn curves(rows: &[Row], scene: &str) -> Vec<Curve> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::vec;
 
     fn curve(points: Vec<(f64, f64)>) -> Curve {
         Curve { name: "a", points, diverged: vec![] }

@@ -1,16 +1,14 @@
 //! Rows for people and programs. Lengths in mm, times in microseconds; what a run that diverged did not
 //! measure is left empty.
 
-use std::format;
 use std::iter;
 use std::path::Path;
-use std::string::String;
-use std::vec::Vec;
+
+use supple::io::write_atomically;
 
 use super::LabError;
 use super::measure::Errors;
 use super::run::Row;
-use crate::io::write_atomically;
 
 /// A column: its head and what stands in it.
 type Column = (&'static str, fn(&Row) -> String);
@@ -108,9 +106,8 @@ pub fn text(rows: &[Row]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::method::Method;
-    use crate::lab::run::{End, Figures};
-    use std::vec;
+    use crate::method::Method;
+    use crate::run::{End, Figures};
 
     fn rows() -> [Row; 2] {
         let errors = Errors { means: vec![1.0, 2.0], sd: 0.5, max: 4.0 };

@@ -2,11 +2,13 @@
 //! lengths that divide its snapshots; the best of these by hand is the fastest whose error, known from the truth, never exceeds the
 //! tolerance. Lengths in mm, times in microseconds for a simulated second.
 
-use std::format;
 use std::path::Path;
-use std::string::String;
 use std::time::Instant;
-use std::vec::Vec;
+
+use supple::adaptive::{Adaptive, Request, Taken};
+use supple::inertia::{self, Cells};
+use supple::io::write_atomically;
+use supple::step::{Status, Step};
 
 use super::LabError;
 use super::hard::{Plan as Scenes, TIMES_CRITICAL};
@@ -16,10 +18,6 @@ use super::run;
 use super::scenes::SceneSpec;
 use super::threads::in_parallel;
 use super::truth::Truth;
-use crate::adaptive::{Adaptive, Request, Taken};
-use crate::inertia::{self, Cells};
-use crate::io::write_atomically;
-use crate::step::{Status, Step};
 
 /// The longest step that is tried, over the critical one.
 const LONGEST: u32 = TIMES_CRITICAL[TIMES_CRITICAL.len() - 1];

@@ -6,20 +6,19 @@
 //! disk is damaged, is computed again.
 
 use core::fmt;
-use std::format;
 use std::fs;
 use std::path::Path;
-use std::vec::Vec;
+
+use supple::io::write_atomically;
+use supple::loads::Loads;
+use supple::scene::AsScene;
+use supple::state::VecState;
+use supple::step::{Status, Step};
+use supple::tled;
 
 use super::LabError;
 use super::scenes::SceneSpec;
 use super::threads::in_parallel;
-use crate::io::write_atomically;
-use crate::loads::Loads;
-use crate::scene::AsScene;
-use crate::state::VecState;
-use crate::step::{Status, Step};
-use crate::tled;
 
 /// First bytes of a file, with the version of its format.
 const MAGIC: &[u8; 8] = b"suppleT1";
@@ -134,7 +133,7 @@ fn of_steps(spec: &SceneSpec, steps: u32) -> Result<Truth, LabError> {
 }
 
 /// Takes an exact step. Gives whether it was limited.
-pub(crate) fn exact_step(
+fn exact_step(
     spec: &SceneSpec,
     scene: &impl AsScene,
     loads: &Loads<'_>,
@@ -143,9 +142,9 @@ pub(crate) fn exact_step(
 ) -> Result<bool, LabError> {
     match tled::step(scene, loads, state, step) {
         Status::Ok => Ok(false),
-        Status::Limited { .. } | Status::Inexact { .. } => Ok(true),
         Status::Diverged(divergence) => Err(LabError::Diverged { scene: spec.name, divergence }),
         Status::Mismatch { nodes, room } => Err(LabError::Mismatch { nodes, room }),
+        _ => Ok(true),
     }
 }
 
@@ -221,7 +220,6 @@ fn decode(bytes: &[u8], expected: u64, (nodes, snapshots): (usize, usize)) -> Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::vec;
 
     fn example() -> Truth {
         Truth {

@@ -153,10 +153,10 @@ impl<M: Material> VecScene<M> {
     }
 }
 
-#[cfg(feature = "lab")]
+#[cfg(feature = "std")]
 impl<M> VecScene<M> {
     /// Adds a point mass (kg) to a node, which inertia, gravity and damping act on as on tissue.
-    pub(crate) fn add_mass(&mut self, node: usize, kilogram: f32) {
+    pub fn add_mass(&mut self, node: usize, kilogram: f32) {
         if let Some(inertia) = self.tables.nodes.get_mut(node) {
             inertia.add_mass(kilogram);
             self.facts.has_point_masses = true;

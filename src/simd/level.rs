@@ -33,11 +33,13 @@ pub enum Level {
 
 /// Work that is written once for vectors of any width. `run` must be `#[inline(always)]`, so that it is compiled with
 /// the instructions of the wrapper around it.
-pub(crate) trait Kernel {
+pub trait Kernel {
+    /// What it gives.
     type Output;
     /// Whether scalar code gives the same bits as vectors. Processors without vector instructions then run scalar code.
     #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
     const SCALAR: bool = false;
+    /// The work, with vectors of this kind.
     fn run<R: Real>(self) -> Self::Output;
     /// The same as scalar code. Kernels whose batches differ in size then say so here: vectors are not compiled with both.
     #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
@@ -133,7 +135,7 @@ pub(crate) type Baseline = Portable<8>;
 
 /// Runs the kernel with the instructions of the current level.
 #[inline(always)]
-pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code)]
     match Level::current() {

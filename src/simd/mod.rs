@@ -39,9 +39,7 @@ mod vectors;
 
 #[cfg(test)]
 pub(crate) use level::Baseline;
-pub use level::Level;
-pub use level::Part;
-pub(crate) use level::{Kernel, dispatch};
+pub use level::{Kernel, Level, Part, dispatch};
 pub(crate) use numbers::{NumberBuffer, ScatterNumbers};
 pub(crate) use pair::Pair;
 pub use vectors::NodeVector;

@@ -18,8 +18,6 @@ pub use cause::Cause;
 pub(crate) use energy_sums::{Sums, Totals};
 pub(crate) use length::is_damping;
 pub use length::{CriticalStep, Step, StepError};
-#[cfg(feature = "lab")]
-pub(crate) use parts::external_forces;
 pub(crate) use parts::{Forcing, internal_forces, move_in_parts, nodal_volumes};
 pub use status::{Divergence, Status};
 #[cfg(feature = "parallel")]

@@ -15,7 +15,7 @@ mod pressures;
 #[cfg(feature = "std")]
 mod spectrum;
 #[cfg(feature = "std")]
-pub(crate) mod tangent;
+mod tangent;
 
 pub use critical::critical_step;
 pub use pace::{Approach, Pace, vectors_for_pace};
@@ -23,6 +23,8 @@ pub use pace::{Approach, Pace, vectors_for_pace};
 pub use pressures::nodal_pressures;
 #[cfg(feature = "std")]
 pub use spectrum::exact_critical_step;
+#[cfg(feature = "std")]
+pub use tangent::{ElementTangent, element_tangents};
 
 use core::ops::Range;
 

@@ -1,7 +1,6 @@
 //! An element's stress and tangent in float64, `P = p1 F + pJ C`, `dP = p1 dF + dp1 F + dpJ C + pJ dC` with the cofactor matrix
 //! `C` of the deformation gradient `F`: for tools and tests. SI units.
 
-#[cfg(any(feature = "std", test))]
 use core::array::from_fn;
 
 use glam::{DMat3, DVec3};
@@ -12,8 +11,9 @@ use crate::scene::SceneView;
 use crate::simd::NodeVector;
 
 /// One element at given displacements: its stress and the derivative of it.
-pub(crate) struct ElementTangent {
-    pub(crate) nodes: [usize; 4],
+pub struct ElementTangent {
+    /// The element's nodes.
+    pub nodes: [usize; 4],
     gradients: [DVec3; 4],
     volume: f64,
     pub(super) at: LawTangent,
@@ -38,9 +38,20 @@ pub(super) struct LawTangent {
     x_c: f64,
 }
 
+/// The elements of a scene at displacements (m) of its nodes, in the order of its tables, each by itself: with nodal pressure and
+/// nodal strain its neighbours do not count.
+pub fn element_tangents<M: Material>(
+    scene: SceneView<'_, M>,
+    displacement: impl Fn(usize) -> [f64; 3],
+) -> impl Iterator<Item = ElementTangent> {
+    scene.laws_at_places().map(move |(tile, lane, law)| {
+        ElementTangent::new(&law, tile, lane, |node| DVec3::from_array(displacement(node)))
+    })
+}
+
 impl ElementTangent {
     /// Of the element in a lane of a tile, at the displacements (m) of all nodes.
-    pub(crate) fn of<M: Material>(
+    pub(super) fn of<M: Material>(
         scene: SceneView<'_, M>,
         tile: &ElementTile,
         lane: usize,
@@ -54,12 +65,7 @@ impl ElementTangent {
     }
 
     /// The same with displacements in float64.
-    pub(crate) fn new<L: Law>(
-        law: &L,
-        tile: &ElementTile,
-        lane: usize,
-        displacement: impl Fn(usize) -> DVec3,
-    ) -> Self {
+    fn new<L: Law>(law: &L, tile: &ElementTile, lane: usize, displacement: impl Fn(usize) -> DVec3) -> Self {
         let nodes = [0, 1, 2, 3].map(|corner| tile.node(corner, lane));
         let slopes = [0, 1, 2].map(|corner| {
             DVec3::from_array([0, 1, 2].map(|axis| f64::from(tile.gradient::<f32>(corner, axis, lane))))
@@ -111,20 +117,21 @@ impl ElementTangent {
     }
 
     /// Forces with which the element acts on its nodes, N.
-    #[cfg(any(feature = "std", test))]
-    pub(crate) fn forces(&self) -> [DVec3; 4] {
-        self.forces_of_stress(-self.at.stress())
+    #[must_use]
+    pub fn forces(&self) -> [[f64; 3]; 4] {
+        self.forces_of_stress(-self.at.stress()).map(|force| force.to_array())
     }
 
     /// `K v`, N, for displacements `v` (m) of its nodes.
-    pub(crate) fn product(&self, vector: [DVec3; 4]) -> [DVec3; 4] {
+    pub(super) fn product(&self, vector: [DVec3; 4]) -> [DVec3; 4] {
         self.forces_of_stress(self.at.stress_by(self.gradient_by(vector)))
     }
 
     /// The parts of `K`, N/m, by rows and columns of nodes. With `a = F g`, `c = C g`, `y = x_f a + x_c c` for the gradient `g` of each
     /// node: `p1 g_i.g_j + W'' y_i y_j^T + coupling (a_i c_j^T + c_i a_j^T) + bulk c_i c_j^T - pJ [F (g_i x g_j)]_x`, times the volume.
-    #[cfg(any(feature = "std", test))]
-    pub(crate) fn stiffness(&self) -> [[DMat3; 4]; 4] {
+    /// Each part is given as its columns.
+    #[must_use]
+    pub fn stiffness(&self) -> [[[[f64; 3]; 3]; 4]; 4] {
         let LawTangent { f, cofactor, p1, p_j, stiffening, coupling, bulk, x_f, x_c, .. } = self.at;
         let along_f = self.gradients.map(|gradient| f * gradient);
         let along_c = self.gradients.map(|gradient| cofactor * gradient);
@@ -139,7 +146,7 @@ impl ElementTangent {
                     + outer(a * coupling + c * bulk, d)
                     + outer(c * coupling, b)
                     - cross_matrix(turning);
-                sum * self.volume
+                (sum * self.volume).to_cols_array_2d()
             })
         })
     }
@@ -176,7 +183,6 @@ impl LawTangent {
     }
 
     /// The first Piola-Kirchhoff stress, Pa.
-    #[cfg(any(feature = "std", test))]
     fn stress(&self) -> DMat3 {
         self.f * self.p1 + self.cofactor * self.p_j
     }
@@ -208,7 +214,6 @@ fn inner3(a: DMat3, b: DMat3) -> f64 {
 }
 
 /// `[a]_x`, so that `[a]_x b` is the cross product of a and b.
-#[cfg(any(feature = "std", test))]
 fn cross_matrix(a: DVec3) -> DMat3 {
     DMat3::from_cols(DVec3::new(0.0, a.z, -a.y), DVec3::new(-a.z, 0.0, a.x), DVec3::new(a.y, -a.x, 0.0))
 }
@@ -244,10 +249,10 @@ mod tests {
             let tangent = at(0.0);
             // The law is evaluated in float32: a step much smaller would be lost in its rounding.
             let h = 2e-6;
-            let (after, before) = (at(h).forces(), at(-h).forces());
+            let [after, before] = [h, -h].map(|t| at(t).forces().map(DVec3::from_array));
             let directions = tangent.nodes.map(|node| wave(node, 1.1));
             let products = tangent.product(directions);
-            let parts = tangent.stiffness();
+            let parts = tangent.stiffness().map(|row| row.map(|part| DMat3::from_cols_array_2d(&part)));
             for i in 0..4 {
                 let numeric = (before[i] - after[i]) / (2.0 * h);
                 let by_parts: DVec3 = (0..4).map(|j| parts[i][j] * directions[j]).sum();

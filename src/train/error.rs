@@ -5,7 +5,6 @@ use std::format;
 use std::path::PathBuf;
 use std::string::String;
 
-use crate::lab::LabError;
 use crate::mlp::WeightError;
 
 /// Why a training could not be done.
@@ -14,8 +13,8 @@ use crate::mlp::WeightError;
 pub enum TrainError {
     /// The recipe is not usable; the text names the place and the value.
     Recipe(String),
-    /// The scene could not be simulated.
-    Lab(LabError),
+    /// The scene could not be simulated; the text says why.
+    Scene(String),
     /// The weights cannot be written as a file.
     Weights(WeightError),
     /// The network could not be quantised; the text says why.
@@ -24,6 +23,8 @@ pub enum TrainError {
     OtherRecipe(PathBuf),
     /// A checkpoint could not be read or written; the text says why.
     Checkpoint(PathBuf, String),
+    /// A file could not be written; the text names it.
+    Write(std::io::Error),
     /// It was asked to stop.
     Stopped {
         /// Epochs done before.
@@ -39,9 +40,9 @@ pub enum TrainError {
 impl fmt::Display for TrainError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Recipe(text) | Self::Quantise(text) => f.write_str(text),
-            Self::Lab(error) => error.fmt(f),
+            Self::Recipe(text) | Self::Scene(text) | Self::Quantise(text) => f.write_str(text),
             Self::Weights(error) => error.fmt(f),
+            Self::Write(error) => error.fmt(f),
             Self::OtherRecipe(path) => {
                 write!(f, "{}: a checkpoint of another recipe; remove it to train anew", path.display())
             }
@@ -57,15 +58,10 @@ impl fmt::Display for TrainError {
 impl core::error::Error for TrainError {}
 
 impl TrainError {
-    /// Of a recipe in which `what` has a `value` that it cannot have.
-    pub(super) fn refused(what: &str, value: impl fmt::Display, must: &str) -> Self {
+    /// Of a recipe in which `what` has a `value` that it cannot have; what it `must` be, in words.
+    #[must_use]
+    pub fn refused(what: &str, value: impl fmt::Display, must: &str) -> Self {
         Self::Recipe(format!("{what} = {value}: {must}"))
-    }
-}
-
-impl From<LabError> for TrainError {
-    fn from(error: LabError) -> Self {
-        Self::Lab(error)
     }
 }
 

@@ -17,14 +17,13 @@ use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use sha2::{Digest, Sha256};
 
-use super::TrainError;
+use super::random_numbers::Random;
 use super::recipe::{Decay, Recipe};
 use super::samples::Samples;
+use super::{TrainError, TrainingScene};
 use crate::io::write_atomically;
-use crate::lab::LabError;
-use crate::lab::random_numbers::Random;
-use crate::lab::scenes::SceneSpec;
 use crate::learned::{FEATURES, PREDICTED};
+use crate::material::Tissue;
 use crate::mlp::{self, Activation, Description, LayerDescription, Network, Range, WeightBytes};
 
 /// Both parts.
@@ -96,29 +95,17 @@ pub struct Fitted {
     pub loss: f64,
 }
 
-/// Trains on the motion of the recipe. With a folder for checkpoints the state is kept there after every epoch, and a
-/// training that was stopped goes on from it. `progress` may stop it.
-pub fn train(
-    text: &str,
-    checkpoints: Option<&Path>,
-    mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
-) -> Result<Fitted, TrainError> {
-    let recipe = Recipe::parse(text)?;
-    let spec = recipe.scene()?;
-    let samples = Samples::collect(&recipe, &spec)?;
-    fit(&recipe, text, &spec, &samples, checkpoints, &mut progress)
-}
-
 /// A share of the frames, evenly spread, is held out.
 pub(super) fn is_held_out(frame: usize, share: f64) -> bool {
     ((frame + 1) as f64 * share).floor() > (frame as f64 * share).floor()
 }
 
-/// The same on samples of a scene that are there already.
+/// Trains as the recipe, whose `text` goes into the weight file, says on the samples of a scene. With a folder for checkpoints the
+/// state is kept there after every epoch, and a training that was stopped goes on from it. `progress` may stop it.
 pub fn fit(
     recipe: &Recipe,
     text: &str,
-    spec: &SceneSpec,
+    scene: &dyn TrainingScene,
     samples: &Samples,
     checkpoints: Option<&Path>,
     progress: &mut impl FnMut(&Progress) -> ControlFlow<()>,
@@ -160,7 +147,7 @@ pub fn fit(
         }
     }
 
-    let description = described(recipe, spec, text, hash, &parts, inputs, targets)?;
+    let description = described(recipe, scene, text, hash, &parts, inputs, targets)?;
     let bytes = mlp::write(&description)?;
     let held_out = (!unseen.inputs.is_empty()).then(|| judged(&bytes, &unseen, &description.outputs));
     Ok(Fitted { bytes, held_out, samples: count, loss })
@@ -272,7 +259,7 @@ fn shuffled(count: usize, seed: u64) -> Vec<u32> {
 
 fn described<'a>(
     recipe: &Recipe,
-    spec: &SceneSpec,
+    scene: &dyn TrainingScene,
     text: &'a str,
     recipe_hash: [u8; 32],
     parts: &Parts,
@@ -293,17 +280,18 @@ fn described<'a>(
         })
         .collect()
     };
+    let Tissue { law, density } = scene.tissue();
     Ok(Description {
         inputs,
         outputs,
         first: layers(&parts.first),
         second: layers(&parts.second),
-        law: spec.law,
-        density: spec.density,
-        element: spec.element,
-        damping: spec.damping,
-        step: recipe.multiple as f32 * spec.timing.step,
-        exact_step: spec.timing.step,
+        law,
+        density,
+        element: scene.element(),
+        damping: scene.damping(),
+        step: recipe.multiple as f32 * scene.step(),
+        exact_step: scene.step(),
         force: recipe.network.force,
         recipe: text,
         recipe_hash,
@@ -388,7 +376,7 @@ impl Folder<'_> {
             synchronised.map_err(|error| problem(path, error.to_string()))?;
         }
         let hash = mlp::hexadecimal(self.hash);
-        write_atomically(&self.mark(), |file| writeln!(file, "{epoch} {hash}")).map_err(LabError::Write)?;
+        write_atomically(&self.mark(), |file| writeln!(file, "{epoch} {hash}")).map_err(TrainError::Write)?;
         // The files of the epoch before are of no more use.
         for old in epoch.checked_sub(1).map(|before| self.files(before)).into_iter().flatten() {
             let _ = std::fs::remove_file(old);

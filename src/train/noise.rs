@@ -18,8 +18,8 @@ use std::vec::Vec;
 
 use glam::DVec3;
 
+use super::random_numbers::Random;
 use super::recipe::Noise;
-use crate::lab::random_numbers::Random;
 use crate::learned::frame::Frame;
 use crate::learned::{FEATURES, VertexInput};
 use crate::mlp::ForceInput;

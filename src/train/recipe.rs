@@ -43,8 +43,6 @@ use std::vec::Vec;
 use serde::Deserialize;
 
 use super::TrainError;
-use crate::lab::LabError;
-use crate::lab::scenes::{self, SceneSpec};
 use crate::material::Element;
 use crate::mlp::{ForceInput, MAX_LAYERS, MAX_WIDTH};
 
@@ -54,7 +52,7 @@ use crate::mlp::{ForceInput, MAX_LAYERS, MAX_WIDTH};
 pub struct Recipe {
     /// Of the weights at the start and of the order of the samples.
     pub seed: u64,
-    /// Step of the network over that of the exact step, [`crate::lab::timing::Timing::step`] of the scene.
+    /// Step of the network over that of the exact step, [`super::TrainingScene::step`].
     pub multiple: u32,
     /// What is learned from.
     pub motion: Motion,
@@ -71,7 +69,7 @@ pub struct Recipe {
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {
-    /// One of [`scenes::RAMPED`], or a scene file, `NAME.toml`.
+    /// A name that whoever makes the scene knows, or a scene file, `NAME.toml`.
     pub scene: String,
     /// Tetrahedra that it is made of, if not those of the scene.
     #[serde(default)]
@@ -167,21 +165,9 @@ impl Motion {
     pub fn is_file(&self) -> bool {
         self.scene.ends_with(".toml")
     }
-
-    /// A scene of this name with the load and the tetrahedra that are asked for.
-    #[must_use]
-    pub fn of(&self, spec: SceneSpec) -> SceneSpec {
-        let element = self.element.unwrap_or(spec.element);
-        SceneSpec { element, ..spec.with_load(self.load) }
-    }
 }
 
 impl Recipe {
-    /// The laboratory's scene that it names.
-    pub fn scene(&self) -> Result<SceneSpec, LabError> {
-        Ok(self.motion.of(scenes::named(&self.motion.scene)?))
-    }
-
     /// Reads and checks a recipe.
     pub fn parse(text: &str) -> Result<Self, TrainError> {
         let recipe: Self = toml::from_str(text).map_err(|error| TrainError::Recipe(error.to_string()))?;
@@ -191,10 +177,6 @@ impl Recipe {
     fn checked(self) -> Result<Self, TrainError> {
         let refuse = |what, value: &dyn fmt::Display, must: &str| Err(TrainError::refused(what, value, must));
         let Self { multiple, motion, noise, network, training, .. } = &self;
-        if !scenes::RAMPED.contains(&motion.scene.as_str()) && !motion.is_file() {
-            let must = format!("there are {}, and scene files, NAME.toml", scenes::RAMPED.join(", "));
-            return refuse("scene", &format!("{:?}", motion.scene), &must);
-        }
         if !(1..=1_000).contains(multiple) {
             return refuse("multiple", multiple, "it must be from 1 to 1000");
         }

@@ -9,22 +9,22 @@
 //! motion once each `D`, as they do in a roll-out; where the paper's samples lie closer than `D`, several sequences of local
 //! frames are kept at the same time, each with its own start.
 
+use std::format;
+use std::string::ToString;
 use std::vec;
 use std::vec::Vec;
 
 use glam::{DVec3, Vec3A};
 
 use super::noise::{Moment, MovedCopy, SeenAs};
+use super::random_numbers::Random;
 use super::recipe::Recipe;
-use crate::lab::LabError;
-use crate::lab::random_numbers::Random;
-use crate::lab::scenes::SceneSpec;
-use crate::lab::truth::exact_step;
+use super::{TrainError, TrainingScene};
 use crate::learned::frame::Frame;
 use crate::learned::{FEATURES, PREDICTED};
 use crate::mlp::Range;
 use crate::state::{NodeVector, VecState};
-use crate::step::Step;
+use crate::step::{Status, Step};
 use crate::tled;
 
 /// What vertices saw and did, frame by frame.
@@ -52,9 +52,9 @@ pub struct Rough {
 }
 
 impl Samples {
-    /// Simulates the recipe's motion, that of `spec`, and samples it.
-    pub fn collect(recipe: &Recipe, spec: &SceneSpec) -> Result<Self, LabError> {
-        collect(spec, recipe)
+    /// Simulates the recipe's motion, that of `scene`, and samples it.
+    pub fn collect(recipe: &Recipe, scene: &dyn TrainingScene) -> Result<Self, TrainError> {
+        collect(scene, recipe)
     }
 
     /// Those of some frames.
@@ -171,8 +171,8 @@ impl Schedule {
     }
 }
 
-/// Vertices that may move, and of these the ones without a force on them.
-fn free_and_sampled(spec: &SceneSpec) -> (Vec<bool>, Vec<usize>) {
+/// Of so many vertices those that may move, and of these the ones without a force on them.
+fn free_and_sampled(exemplar: &dyn TrainingScene, nodes: usize) -> (Vec<bool>, Vec<usize>) {
     let without = |mut marks: Vec<bool>, nodes: &mut dyn Iterator<Item = u32>| {
         for node in nodes {
             if let Some(mark) = marks.get_mut(node as usize) {
@@ -181,19 +181,19 @@ fn free_and_sampled(spec: &SceneSpec) -> (Vec<bool>, Vec<usize>) {
         }
         marks
     };
-    let nodes = spec.points.len();
-    let free = without(vec![true; nodes], &mut spec.supports.iter().map(|support| support.node));
-    let sampled = without(free.clone(), &mut spec.forces.iter().map(|force| force.node));
+    let free = without(vec![true; nodes], &mut exemplar.supports().iter().map(|support| support.node));
+    let sampled = without(free.clone(), &mut exemplar.forces().iter().map(|force| force.node));
     (free, (0..nodes).filter(|&node| sampled[node]).collect())
 }
 
-fn collect(spec: &SceneSpec, recipe: &Recipe) -> Result<Samples, LabError> {
-    let scene = spec.build()?;
-    let (seconds, dt) = (spec.timing.step, f64::from(spec.timing.step));
-    let step = Step::unchecked(seconds, spec.damping)?;
-    let nodes = spec.points.len();
+fn collect(exemplar: &dyn TrainingScene, recipe: &Recipe) -> Result<Samples, TrainError> {
+    let scene = exemplar.build()?;
+    let (seconds, dt) = (exemplar.step(), f64::from(exemplar.step()));
+    let step = Step::unchecked(seconds, exemplar.damping());
+    let step = step.map_err(|error| TrainError::Scene(error.to_string()))?;
+    let nodes = scene.node_count();
     let mut state = VecState::at_rest(nodes);
-    let (free, sampled) = free_and_sampled(spec);
+    let (free, sampled) = free_and_sampled(exemplar, nodes);
     let mut random = Random(recipe.seed);
     let masses: Vec<f32> = (0..nodes).map(|node| scene.view().node_mass(node)).collect();
     let seen_as = SeenAs { masses: &masses, force: recipe.network.force };
@@ -207,7 +207,7 @@ fn collect(spec: &SceneSpec, recipe: &Recipe) -> Result<Samples, LabError> {
     let mut samples = Samples { vertices: sampled.len(), ..Samples::default() };
     // Increments are exact; a displacement in float32 is rounded, and a second difference shows that.
     let mut place = vec![DVec3::ZERO; nodes];
-    let mut loads = spec.loads(&scene)?;
+    let mut loads = exemplar.loads(&scene)?;
     for number in 0..=last {
         // Displacements are those before the step; its forces, of the same moment, are known after it.
         let moments: Vec<usize> =
@@ -216,10 +216,16 @@ fn collect(spec: &SceneSpec, recipe: &Recipe) -> Result<Samples, LabError> {
             sequences[at].add_shape(&place);
             sequences[at].add_targets(&sampled, long, &mut samples);
         }
-        let loads = loads.of_step(state.time(), dt);
+        let loads = loads.of_step(&state.view(), seconds, (last - number + 1) as u32);
         let keeps = recipe.noise.is_some() && !moments.is_empty() && schedule.is_due(frame, number);
         let before = keeps.then(|| state.clone());
-        exact_step(spec, &scene, &loads, &mut state, &step)?;
+        match tled::step(&scene, &loads, &mut state, &step) {
+            Status::Diverged(divergence) => {
+                return Err(TrainError::Scene(format!("the exact motion {divergence}")));
+            }
+            taken if taken.is_taken() => {}
+            _ => return Err(TrainError::Scene("its loads are those of another scene".to_string())),
+        }
         for &at in &moments {
             if !schedule.is_due(frame, number) {
                 continue;

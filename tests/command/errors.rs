@@ -213,15 +213,17 @@ fn wrong_usage_has_code_2() {
     assert!(said.err.contains("none.toml: cannot be read"), "{}", said.err);
 }
 
-#[cfg(not(feature = "train"))]
 #[test]
-fn a_command_without_training_says_how_to_get_it() {
+fn a_command_that_is_the_laboratorys_now_says_what_to_type() {
     let desk = Desk::new();
-    let said = desk.supple(&["train", "recipe.toml", "--out", "organ.weights"]);
-    assert_eq!(said.code, 2);
-    assert!(
-        said.err.contains("built without training; build it with `cargo build --release --features train`"),
-        "{}",
-        said.err
-    );
+    let package = "of the laboratory: cargo run --release -p supple-lab";
+    for (arguments, rest) in [
+        ("evaluate --physics --out out", " -- methods|physics|hard|tolerance --out DIR"),
+        ("train recipe.toml --out organ.weights", " --features train -- train RECIPE --out FILE"),
+        ("weights quantise a.weights --float 1", " --features train -- quantise FILE --out FILE"),
+    ] {
+        let said = desk.supple(&arguments.split(' ').collect::<Vec<_>>());
+        assert_eq!(said.code, 2, "{}", said.err);
+        assert!(said.err.ends_with(&format!("{package}{rest}\n")), "{}", said.err);
+    }
 }

@@ -1,7 +1,6 @@
 //! The command as a person uses it: scene files in, folders out, exit codes and sentences.
 mod demo;
 mod errors;
-mod evaluate;
 mod inertia;
 mod inspect;
 mod instruments;

@@ -1,6 +1,7 @@
 //! Damaged recipes for training: a recipe is refused with a reason, or its numbers are in their ranges.
 
-use supple::train::{damper, recipe::Recipe};
+use supple::train::recipe::Recipe;
+use supple_lab::training::damper;
 
 use crate::hostile::{Changes, Run, measured};
 
@@ -10,7 +11,7 @@ const ANY: u64 = 20_000;
 
 #[test]
 fn recipes() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("weights");
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../weights");
     let read = |name| std::fs::read(folder.join(name)).unwrap();
     let sound = ["compact-10.toml", "paper-10.toml", "damper.toml"].map(read);
     let words: &[&[u8]] = &[

@@ -1,8 +1,8 @@
 //! The shipped damper against the undamped multilevel step.
 
-use supple::lab::method::Method;
-use supple::lab::run::run;
-use supple::lab::{scenes, truth};
+use supple_lab::method::Method;
+use supple_lab::run::run;
+use supple_lab::{scenes, truth};
 
 /// The paper's bar stretched, which the search has not seen, at 50 and 100 times the paper's step.
 #[test]

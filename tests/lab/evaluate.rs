@@ -1,8 +1,8 @@
 //! An evaluation from plan to files.
 
-use supple::lab::evaluate::{self, Plan};
-use supple::lab::method::Method;
-use supple::lab::{MULTIPLES, sweep};
+use supple_lab::evaluate::{self, Plan};
+use supple_lab::method::Method;
+use supple_lab::{MULTIPLES, sweep};
 
 const HEAD: &str = "scene,method,multiple,mean_mm,sd_mm,max_mm,mean_over_time_mm,hold_mm,skill,clip_share,\
                     us_per_step,us_per_simulated_second,step_over_limit_rest,step_over_limit_trajectory,status,\

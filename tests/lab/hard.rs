@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use supple::lab::hard::verdict::{Judged, Verdict};
-use supple::lab::hard::{Plan, cases, evaluate, random};
-use supple::lab::method::{Large, Method};
+use supple_lab::hard::verdict::{Judged, Verdict};
+use supple_lab::hard::{Plan, cases, evaluate, random};
+use supple_lab::method::{Large, Method};
 
 #[test]
 fn every_case_has_its_name_and_can_be_built() {
@@ -29,7 +29,7 @@ fn a_number_gives_one_scene_and_scenes_can_be_built() {
 
 #[test]
 fn a_mesh_of_the_users_is_scaled_and_pulled_by_a_tenth_of_its_weight() {
-    let lobe = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/lobe.msh"));
+    let lobe = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../meshes/lobe.msh"));
     let pull = |scale| {
         let spec = cases::of_mesh(lobe, scale).unwrap();
         let held = spec.supports.len();
@@ -48,7 +48,7 @@ fn long_cases_are_judged_only_if_they_are_named() {
         let plan = Plan::new(&named, mesh, &[], 0, 3).unwrap();
         plan.cases.iter().map(|case| case.name).collect::<Vec<_>>()
     };
-    let lobe = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/lobe.msh"));
+    let lobe = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../meshes/lobe.msh"));
     let all = names(&[], None);
     assert!(all.contains(&"fades-to-nothing") && cases::LONG.iter().all(|long| !all.contains(long)));
     assert_eq!(names(&["million-steps"], None), ["million-steps"]);

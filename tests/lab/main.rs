@@ -1,5 +1,6 @@
 //! Methods judged against the exact step over the scenes of the laboratory.
 
+mod command;
 #[cfg(feature = "slow-tests")]
 mod damper;
 mod evaluate;

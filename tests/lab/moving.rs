@@ -1,8 +1,8 @@
 //! Bodies that move freely: long explicit steps against implicit rules at the same step.
 
-use supple::lab::method::Method;
-use supple::lab::run::run;
-use supple::lab::{scenes, truth};
+use supple_lab::method::Method;
+use supple_lab::run::run;
+use supple_lab::{scenes, truth};
 
 /// At 20 times the critical step. A body that stands still is off by 100 %.
 #[test]

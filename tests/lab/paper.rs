@@ -1,12 +1,11 @@
 //! The paper's claims (Meister et al. 2018, section 3) on the paper's bar: a network moves it with steps at which the exact
 //! formula is unstable. Slow: tens of thousands of steps of 6,528 tetrahedra.
-#![cfg(all(feature = "lab", feature = "slow-tests"))]
 
-use supple::lab::method::Method;
-use supple::lab::networks::Family;
-use supple::lab::run::{End, run};
-use supple::lab::scenes;
-use supple::lab::truth;
+use supple_lab::method::Method;
+use supple_lab::networks::Family;
+use supple_lab::run::{End, run};
+use supple_lab::scenes;
+use supple_lab::truth;
 
 /// Reversed torsion, which no network has seen, at ten times the paper's step and more.
 #[test]

@@ -1,8 +1,8 @@
 //! Elements against nature and theory, on the coarsest meshes.
 
-use supple::lab::physics::report::HEADS;
-use supple::lab::physics::{Plan, Row, evaluate};
 use supple::material::Element;
+use supple_lab::physics::report::HEADS;
+use supple_lab::physics::{Plan, Row, evaluate};
 
 /// Rows of a case on its coarsest meshes, and what the file holds.
 fn run(case: &str, meshes: usize) -> (Vec<Row>, String) {

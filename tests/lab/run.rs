@@ -2,12 +2,12 @@
 
 use std::fs;
 
-use supple::lab::LabError;
-use supple::lab::course::Course;
-use supple::lab::method::Method;
-use supple::lab::run::{End, run};
-use supple::lab::scenes::{self, SceneSpec};
-use supple::lab::truth::{self, Truth};
+use supple_lab::LabError;
+use supple_lab::course::Course;
+use supple_lab::method::Method;
+use supple_lab::run::{End, run};
+use supple_lab::scenes::{self, SceneSpec};
+use supple_lab::truth::{self, Truth};
 
 /// A tenth of a second of a light scene.
 fn short(name: &str) -> (SceneSpec, Truth) {

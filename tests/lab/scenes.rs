@@ -1,11 +1,11 @@
 //! The laboratory's scenes and how their loads vary.
 
-use supple::lab::course::Course;
-use supple::lab::{moving, scenes};
 use supple::loads::NodalForce;
 use supple::material::{AnyLaw, Exponential, NeoHookean, Tissue};
 use supple::mesh::{Mesh, Winding};
 use supple::scene::VecScene;
+use supple_lab::course::Course;
+use supple_lab::{moving, scenes};
 
 #[test]
 fn every_name_has_its_scene_and_others_are_refused_with_the_names() {

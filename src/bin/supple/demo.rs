@@ -6,7 +6,6 @@ use std::path::Path;
 
 use supple::inertia::{Cells, Method};
 use supple::io::parse_msh;
-use supple::lab::networks::{self, Family};
 use supple::loads::Motion;
 use supple::material::Exponential;
 use supple::mesh::Winding;
@@ -25,6 +24,8 @@ use crate::screen::{output, print};
 use crate::simulate::{Out, Simulated, Simulation, progress_bar};
 
 const LOBE: &[u8] = include_bytes!("../../../meshes/lobe.msh");
+/// For steps of 1.5 ms, with int8 layers.
+const NETWORK: &[u8] = include_bytes!("../../../weights/compact-50-i8.weights");
 /// Liver-like: shear modulus 1.5 kPa at rest, stiffening like the paper's law, nearly incompressible.
 const TISSUE: Exponential = Exponential { a: 1_500.0, b: 8.023, d: 40_000.0 };
 const DENSITY: f32 = 1_060.0;
@@ -133,9 +134,7 @@ fn lobe(instrument: &str, steps: Steps) -> Result<Setup, Problem> {
             setup.time.step = StepChoice::Multiple(TIMES_CRITICAL);
         }
         Steps::Learned => {
-            let network = networks::learned(Family::CompactInt8, 50)
-                .ok_or_else(|| Problem("there is no network for fifty steps".into()))?;
-            setup.learned = Some(LearnedChoice::of_demo("compact-50-i8.weights", network));
+            setup.learned = Some(LearnedChoice::of_demo("compact-50-i8.weights", NETWORK));
         }
     }
     Ok(setup)

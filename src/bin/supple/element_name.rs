@@ -2,7 +2,7 @@
 
 use supple::material::Element;
 
-pub(crate) fn element_named(name: &str) -> Result<Element, String> {
+pub fn element_named(name: &str) -> Result<Element, String> {
     Element::ALL.into_iter().find(|element| element.name() == name).ok_or_else(|| {
         let known = Element::ALL.map(|element| format!("\"{}\"", element.name())).join(", ");
         format!("element \"{name}\" is not known; {known} are")

@@ -7,16 +7,16 @@ use supple::step::Divergence;
 
 /// What is wrong with the input, in a sentence for the person who wrote it.
 #[derive(Debug)]
-pub(crate) struct Problem(pub(crate) String);
+pub struct Problem(pub String);
 
 impl Problem {
     /// What the library refused.
-    pub(crate) fn of(error: impl fmt::Display) -> Self {
+    pub fn of(error: impl fmt::Display) -> Self {
         Self(error.to_string())
     }
 
     /// The same, about a file.
-    pub(crate) fn in_file(path: &Path, error: impl fmt::Display) -> Self {
+    pub fn in_file(path: &Path, error: impl fmt::Display) -> Self {
         Self(format!("{}: {error}", path.display()))
     }
 }
@@ -28,7 +28,7 @@ impl fmt::Display for Problem {
 }
 
 /// How a command ended that had no problem, for the exit code.
-pub(crate) enum End {
+pub enum End {
     Reached,
     Diverged(Divergence),
 }

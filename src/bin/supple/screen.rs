@@ -9,12 +9,15 @@ use std::io::{self, ErrorKind, Write as _};
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
+use crate::problem::{End, Problem};
+
 /// The first failure of standard output.
 static FAILURE: OnceLock<io::Error> = OnceLock::new();
 /// 128 and the number of SIGPIPE, as shells have it.
 const NO_READER: u8 = 141;
 
 /// Prints a line on standard output.
+#[macro_export]
 macro_rules! output {
     ($($argument:tt)*) => {
         $crate::screen::print(format_args!("{}\n", format_args!($($argument)*)))
@@ -22,16 +25,17 @@ macro_rules! output {
 }
 
 /// Prints a line on standard error.
+#[macro_export]
 macro_rules! message {
     ($($argument:tt)*) => {
         $crate::screen::print_message(format_args!($($argument)*))
     };
 }
 
-pub(crate) use {message, output};
+pub use crate::{message, output};
 
 /// Prints text that ends its lines itself.
-pub(crate) fn print(text: impl Display) {
+pub fn print(text: impl Display) {
     if FAILURE.get().is_none()
         && let Err(error) = write!(io::stdout().lock(), "{text}")
     {
@@ -39,13 +43,28 @@ pub(crate) fn print(text: impl Display) {
     }
 }
 
-pub(crate) fn print_message(text: impl Display) {
+pub fn print_message(text: impl Display) {
     // There is no other place to complain.
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
+/// Tells how a command ended; gives its exit code.
+pub fn ended(done: Result<End, Problem>) -> ExitCode {
+    match done {
+        Ok(End::Reached) => exit_code(),
+        Ok(End::Diverged(divergence)) => {
+            message!("error: the simulation {divergence}; the results end before that");
+            ExitCode::from(3)
+        }
+        Err(problem) => {
+            message!("error: {problem}");
+            ExitCode::from(2)
+        }
+    }
+}
+
 /// The exit code of a command that did as asked.
-pub(crate) fn exit_code() -> ExitCode {
+fn exit_code() -> ExitCode {
     match FAILURE.get() {
         None => ExitCode::SUCCESS,
         Some(error) if error.kind() == ErrorKind::BrokenPipe => ExitCode::from(NO_READER),

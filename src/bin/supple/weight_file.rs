@@ -26,17 +26,17 @@ pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, Problem> {
 }
 
 /// A weight file in memory, not yet looked at.
-pub(crate) fn read(path: &Path) -> Result<WeightBytes, Problem> {
+pub fn read(path: &Path) -> Result<WeightBytes, Problem> {
     Ok(WeightBytes::of(&bytes(path)?))
 }
 
 /// The network of a weight file.
-pub(crate) fn parse<'w>(path: &Path, memory: &'w WeightBytes) -> Result<Network<'w>, Problem> {
+pub fn parse<'w>(path: &Path, memory: &'w WeightBytes) -> Result<Network<'w>, Problem> {
     Network::parse(memory.bytes()).map_err(|error| Problem::in_file(path, error))
 }
 
 /// Replaces a file by these bytes, or leaves it as it is.
-pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
     write_atomically(path, |file| file.write_all(bytes)).map_err(Problem::of)
 }
 

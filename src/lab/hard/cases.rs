@@ -1,8 +1,12 @@
 //! Scenes that are made to break a step, and one of a mesh of the user's. SI units.
 
 use std::path::Path;
-use std::string::ToString;
-use std::vec::Vec;
+
+use supple::io::{TetMesh, read_mesh};
+use supple::loads::{Motion, NodalForce};
+use supple::material::{Element, NeoHookean, Tissue};
+use supple::mesh::Bar;
+use supple::scene::{Axes, Support};
 
 use super::super::LabError;
 use super::super::course::Course;
@@ -12,11 +16,6 @@ use super::super::scenes::{
     node_masses,
 };
 use super::{TRAINED_DAMPING, timing_of};
-use crate::io::{TetMesh, read_mesh};
-use crate::loads::{Motion, NodalForce};
-use crate::material::{Element, NeoHookean, Tissue};
-use crate::mesh::Bar;
-use crate::scene::{Axes, Support};
 
 /// A scene and its duration, s.
 type Case = (SceneSpec, f32);

@@ -1,7 +1,7 @@
 //! Hard cases: is a run ever wrong without a word? Scenes made to break a step, and random ones, at 10 to 100 times the critical step,
 //! and by exact steps at the critical one and beyond.
 //! A snapshot is wrong if the mean error of the nodes exceeds a millimetre and a fifth of the motion so far; it is silently wrong if
-//! every step since the snapshot before was [`crate::step::Status::Ok`].
+//! every step since the snapshot before was [`supple::step::Status::Ok`].
 //!
 //! | module | what it holds |
 //! |---|---|
@@ -15,10 +15,9 @@ pub mod random;
 pub mod report;
 pub mod verdict;
 
-use std::format;
 use std::path::Path;
-use std::string::String;
-use std::vec::Vec;
+
+use supple::guard::EVERY_LEARNED;
 
 use super::method::{Large, Method};
 use super::networks::{self, Family};
@@ -28,7 +27,7 @@ use super::threads::in_parallel;
 use super::timing::Timing;
 use super::truth::{self, Truth};
 use super::{DT, LabError};
-use crate::guard::EVERY_LEARNED;
+
 use verdict::Judged;
 
 /// Steps over the critical step of a body at rest.

@@ -1,21 +1,17 @@
 //! Random scenes: bodies, materials, supports, loads and courses that nothing was tuned on. The same number gives the same scene.
 
-use std::format;
-use std::string::String;
-use std::vec::Vec;
-
 use glam::Vec3;
+use supple::loads::{Motion, NodalForce};
+use supple::material::{AnyLaw, Element, Exponential, NeoHookean, Tissue};
+use supple::mesh::Bar;
+use supple::scene::{Axes, Support};
 
 use super::super::LabError;
 use super::super::course::Course;
 use super::super::moving::critical_step;
 use super::super::random_numbers::Random;
-use super::super::scenes::{LOBE, RigidVelocity, SceneSpec, SecondTissue, bar, held_at_its_end};
+use super::super::scenes::{LOBE, RigidVelocity, SceneSpec, SecondTissue, bar, held_at_its_end, volume};
 use super::timing_of;
-use crate::loads::{Motion, NodalForce};
-use crate::material::{AnyLaw, Element, Exponential, NeoHookean, Tissue};
-use crate::mesh::{Bar, volume};
-use crate::scene::{Axes, Support};
 
 impl Random {
     /// From `low` to `high`.

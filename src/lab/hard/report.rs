@@ -1,14 +1,12 @@
 //! Judged runs for people and programs: `hard.csv` with a row a run, `hard-frames.csv` with a row a snapshot, a table. Lengths in mm.
 
-use std::format;
 use std::path::Path;
-use std::string::String;
-use std::vec::Vec;
+
+use supple::io::write_atomically;
 
 use super::super::LabError;
 use super::super::evaluate::unique;
 use super::verdict::{Judged, Verdict};
-use crate::io::write_atomically;
 
 /// Writes the files into a folder.
 pub(super) fn write(judged: &[Judged], out: &Path) -> Result<(), LabError> {

@@ -1,7 +1,5 @@
 //! What was wrong in a run, whether the run told, and how far off its estimates were.
 
-use std::vec::Vec;
-
 use super::super::run::{End, Frame, Row};
 use super::super::truth::Truth;
 
@@ -132,9 +130,8 @@ impl Judged {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::measure::Errors;
-    use crate::lab::run::Figures;
-    use std::vec;
+    use crate::measure::Errors;
+    use crate::run::Figures;
 
     fn judged(frames: &[(f64, bool)]) -> Verdict {
         run(frames).verdict()

@@ -2,17 +2,15 @@
 //! Cowper's shear factor `k = 10 (1 + nu) / (12 + 11 nu)`. 80 x 10 x 10 mm, at nu 0.45 and 0.499. The held end may contract and
 //! expand in its plane, as beam theory assumes: only its axial motion is held, and the motion of its two middle lines across.
 
-use std::format;
-use std::vec::Vec;
+use supple::loads::Loads;
+use supple::material::Element;
+use supple::scene::Axes;
 
-use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
+use super::body::{Body, Elastic, fixed};
 use super::mesh::{BodyMesh, same};
 use super::rest::mean_displacement;
 use super::steps::TO_REST;
 use super::{LabError, Row};
-use crate::loads::{Loads, NodalForce};
-use crate::material::Element;
-use crate::scene::Axes;
 
 pub(super) const NAME: &str = "bending";
 const LENGTH: f64 = 0.08;
@@ -42,8 +40,13 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
             let forces = body.mesh.traction(&tip, (2.0 / omega) as f32, |_| [0.0, 0.0, -pascal]);
             for element in Element::ALL {
                 for steps in TO_REST {
-                    let run = Run { forces: &forces, tip: &tip, omega };
-                    let (value, row) = body.measure(NAME, element, steps, run);
+                    // Deflection, m.
+                    let (value, row) = body.measure(NAME, element, steps, |setup| {
+                        let loads = Loads::new(setup.scene, [0.0; 3], &forces, &[])?;
+                        let (state, cost) =
+                            setup.at_rest(&loads, omega, |state| mean_displacement(state, &tip, 2))?;
+                        Ok((-mean_displacement(&state, &tip, 2), cost))
+                    });
                     rows.push(Row {
                         quantity: format!("tip deflection at nu {poisson}"),
                         unit: "mm",
@@ -70,22 +73,4 @@ fn body(cells: u32, elastic: Elastic) -> Body {
     ]
     .concat();
     Body { mesh, elastic, density: DENSITY as f32, supports, masses: Vec::new() }
-}
-
-struct Run<'a> {
-    forces: &'a [NodalForce],
-    tip: &'a [u32],
-    omega: f64,
-}
-
-impl SceneWork for Run<'_> {
-    /// Deflection, m.
-    type Output = f64;
-
-    fn run(self, setup: &Setup<'_>) -> Result<(f64, Cost), LabError> {
-        let loads = Loads::new(setup.scene, [0.0; 3], self.forces, &[])?;
-        let (state, cost) =
-            setup.at_rest(&loads, self.omega, |state| mean_displacement(state, self.tip, 2))?;
-        Ok((-mean_displacement(&state, self.tip, 2), cost))
-    }
 }

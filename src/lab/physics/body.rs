@@ -2,17 +2,16 @@
 //! with an element and a way to take steps. `c = E / (4 (1 + nu))`, `d = E / (6 (1 - 2 nu))`: half the shear and half the bulk
 //! modulus, Pa. SI units.
 
-use std::string::{String, ToString};
 use std::time::Duration;
-use std::vec::Vec;
+
+use supple::material::{Element, NeoHookean, VecMaterial};
+use supple::mesh::{Mesh, Winding};
+use supple::scene::{Axes, BuildError, Support, VecScene};
 
 use super::Row;
 use super::mesh::BodyMesh;
 use super::steps::Steps;
-use crate::lab::LabError;
-use crate::material::{Element, NeoHookean, VecMaterial};
-use crate::mesh::{Mesh, Winding};
-use crate::scene::{Axes, BuildError, Support, VecScene};
+use crate::LabError;
 
 /// Young's modulus (Pa) and Poisson's ratio.
 #[derive(Clone, Copy)]
@@ -58,12 +57,6 @@ pub(super) struct Setup<'a> {
     pub(super) steps: Steps,
 }
 
-/// What is done with a scene of either element.
-pub(super) trait SceneWork {
-    type Output;
-    fn run(self, setup: &Setup<'_>) -> Result<(Self::Output, Cost), LabError>;
-}
-
 /// How long was simulated (s), and how long that took.
 #[derive(Clone, Copy)]
 pub(super) struct Cost {
@@ -77,15 +70,16 @@ pub(super) fn fixed(nodes: Vec<u32>, axes: Axes) -> Vec<Support> {
 }
 
 impl Body {
-    /// Does the work; gives what it found and a row without quantity. If it finds nothing, the row says why.
-    pub(super) fn measure<W: SceneWork>(
+    /// Does the work on a scene of an element; gives what it found and a row without quantity. If it finds nothing, the row says why.
+    pub(super) fn measure<T>(
         &self,
         case: &'static str,
         element: Element,
         steps: Steps,
-        work: W,
-    ) -> (Option<W::Output>, Row) {
-        let found = self.run(case, element, steps, work);
+        work: impl FnOnce(&Setup<'_>) -> Result<(T, Cost), LabError>,
+    ) -> (Option<T>, Row) {
+        let BodyMesh { points, .. } = &self.mesh;
+        let found = self.build(element).and_then(|scene| work(&Setup { case, scene: &scene, points, steps }));
         let row = Row {
             case,
             mesh: self.mesh.family,
@@ -112,13 +106,8 @@ impl Body {
             Err(error) => (None, Row { note: error.to_string(), ..row }),
         }
     }
-    fn run<W: SceneWork>(
-        &self,
-        case: &'static str,
-        element: Element,
-        steps: Steps,
-        work: W,
-    ) -> Result<(W::Output, Cost), LabError> {
+
+    fn build(&self, element: Element) -> Result<VecScene<VecMaterial>, LabError> {
         let BodyMesh { points, tets, .. } = &self.mesh;
         let mesh = Mesh::new(points, tets, Winding::Checked).map_err(BuildError::Mesh)?;
         let material = VecMaterial::one(element, self.elastic.law(), self.density);
@@ -126,7 +115,7 @@ impl Body {
         for &(node, kilogram) in &self.masses {
             scene.add_mass(node as usize, kilogram);
         }
-        work.run(&Setup { case, scene: &scene, points, steps })
+        Ok(scene)
     }
 }
 
@@ -136,20 +125,12 @@ mod tests {
     use super::super::steps::EXACT;
     use super::*;
 
-    struct Fails;
-
-    impl SceneWork for Fails {
-        type Output = f64;
-
-        fn run(self, setup: &Setup<'_>) -> Result<(f64, Cost), LabError> {
-            Err(LabError::NotAtRest { case: setup.case, change: 0.01, kinetic: 1e-3 })
-        }
-    }
-
     #[test]
     fn a_run_that_fails_says_why_in_its_row() {
         let body = body(grid([2, 1, 1]), LOADS[0]);
-        let (value, row) = body.measure("beam", Element::NodalPressure, EXACT, Fails);
+        let (value, row) = body.measure::<f64>("beam", Element::NodalPressure, EXACT, |setup| {
+            Err(LabError::NotAtRest { case: setup.case, change: 0.01, kinetic: 1e-3 })
+        });
         assert_eq!(value, None);
         let note =
             "beam did not come to rest: it still changes by 1.0e-2, kinetic energy over work is 1.0e-3";

@@ -11,16 +11,15 @@
 //! direction, and the rise of the corner itself is off by the load's shear strain times the cell there, an error of the order 1 that the graded grid
 //! shrinks as well, by cells that are smaller towards the loaded side and the lower side.
 
-use std::vec::Vec;
+use supple::loads::Loads;
+use supple::material::Element;
+use supple::scene::Axes;
 
-use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
+use super::body::{Body, Elastic, fixed};
 use super::mesh::{BodyMesh, same};
 use super::rest::mean_displacement;
 use super::steps::{Steps, TO_REST};
 use super::{LabError, Row, pressure, report};
-use crate::loads::{Loads, NodalForce};
-use crate::material::Element;
-use crate::scene::Axes;
 
 pub(super) const NAME: &str = "cook";
 const ELASTIC: Elastic = Elastic { young: 240.565e6, poisson: 0.499 };
@@ -68,8 +67,20 @@ fn measured(body: &Body, element: Element, steps: Steps, rows: &mut Vec<Row>) ->
     let right = body.mesh.nodes(|[x, ..]| same(x, 0.048));
     let forces = body.mesh.traction(&right, (2.0 / OMEGA) as f32, |_| [0.0, TRACTION, 0.0]);
     let corner = body.mesh.nodes(|[x, y, _]| same(x, 0.048) && same(y, 0.06));
-    let run = Run { body, element, forces: &forces, corner: &corner };
-    let (found, row) = body.measure(NAME, element, steps, run);
+    // Rises of the corner and of the side, m, and oscillation of the pressure.
+    let (found, row) = body.measure(NAME, element, steps, |setup| {
+        let loads = Loads::new(setup.scene, [0.0; 3], &forces, &[])?;
+        let (state, cost) = setup.at_rest(&loads, OMEGA, |state| mean_displacement(state, &corner, 1))?;
+        let pressure = pressure::oscillation(body, element, state.displacements());
+        // The mean by the share of each node in the traction.
+        let (mut work, mut load) = (0.0, 0.0);
+        for force in &forces {
+            let newton = f64::from(force.newton[1]);
+            work += newton * f64::from(state.displacements()[force.node as usize].to_array()[1]);
+            load += newton;
+        }
+        Ok((([mean_displacement(&state, &corner, 1), work / load], pressure), cost))
+    });
     let (rises, oscillation) = found.unzip();
     let [corner, side] = [0, 1].map(|index| rises.map(|rises: [f64; 2]| 1e3 * rises[index]));
     rows.push(Row {
@@ -106,30 +117,4 @@ fn shrunk(s: f64, t: f64) -> (f64, f64) {
     let (s, t) = (1.0 - (1.0 - s).powf(TOWARDS_SIDES), t.powf(TOWARDS_SIDES));
     let scale = f64::max(s, 1.0 - t).powf(1.0 / SINGULARITY - 1.0);
     (scale * s, 1.0 - scale * (1.0 - t))
-}
-
-struct Run<'a> {
-    body: &'a Body,
-    element: Element,
-    forces: &'a [NodalForce],
-    corner: &'a [u32],
-}
-
-impl SceneWork for Run<'_> {
-    /// Rises of the corner and of the side, m, and oscillation of the pressure.
-    type Output = ([f64; 2], (f64, Option<f64>));
-
-    fn run(self, setup: &Setup<'_>) -> Result<(Self::Output, Cost), LabError> {
-        let loads = Loads::new(setup.scene, [0.0; 3], self.forces, &[])?;
-        let (state, cost) = setup.at_rest(&loads, OMEGA, |state| mean_displacement(state, self.corner, 1))?;
-        let pressure = pressure::oscillation(self.body, self.element, state.displacements());
-        // The mean by the share of each node in the traction.
-        let (mut work, mut load) = (0.0, 0.0);
-        for force in self.forces {
-            let newton = f64::from(force.newton[1]);
-            work += newton * f64::from(state.displacements()[force.node as usize].to_array()[1]);
-            load += newton;
-        }
-        Ok((([mean_displacement(&state, self.corner, 1), work / load], pressure), cost))
-    }
 }

@@ -2,16 +2,15 @@
 //! `u(r) = (1 + nu) / E  p a^2 / (b^2 - a^2) ((1 - 2 nu) r + b^2 / r)` at both radii. A quarter of it, nu 0.499, on grids and on
 //! irregular meshes by Gmsh, a layer thick. The pressure is a dead load on the flat triangles of the inner surface.
 
-use std::vec::Vec;
+use supple::loads::Loads;
+use supple::material::Element;
+use supple::scene::Axes;
+use supple::state::VecState;
 
-use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
+use super::body::{Body, Elastic, fixed};
 use super::mesh::{BodyMesh, same};
 use super::steps::{EXACT, Steps, TO_REST};
 use super::{LabError, Row, report};
-use crate::loads::{Loads, NodalForce};
-use crate::material::Element;
-use crate::scene::Axes;
-use crate::state::VecState;
 
 pub(super) const NAME: &str = "cylinder";
 pub(super) const INNER: f64 = 0.01;
@@ -57,11 +56,15 @@ fn measured(body: &Body, element: Element, steps: Steps, rows: &mut Vec<Row>) ->
     let [inner, outer] = [INNER, OUTER].map(|radius| body.mesh.nodes(|[x, y, _]| same(x.hypot(y), radius)));
     let pascal = PRESSURE * ELASTIC.young;
     let forces = body.mesh.traction(&inner, (2.0 / OMEGA) as f32, |normal| normal.map(|x| -pascal * x));
-    let run = Run { mesh: &body.mesh, forces: &forces, inner: &inner, outer: &outer };
-    let (found, row) = body.measure(NAME, element, steps, run);
+    // Radial displacements, m.
+    let (found, row) = body.measure(NAME, element, steps, |setup| {
+        let loads = Loads::new(setup.scene, [0.0; 3], &forces, &[])?;
+        let (state, cost) = setup.at_rest(&loads, OMEGA, |state| radial(&body.mesh, state, &inner))?;
+        Ok(([&inner, &outer].map(|nodes| radial(&body.mesh, &state, nodes)), cost))
+    });
     for (index, (radius, name)) in [(INNER, "inner"), (OUTER, "outer")].into_iter().enumerate() {
         rows.push(Row {
-            quantity: std::format!("radial displacement of the {name} surface"),
+            quantity: format!("radial displacement of the {name} surface"),
             unit: "mm",
             value: found.map(|values| 1e3 * values[index]),
             reference: Some(1e3 * exact(radius)),
@@ -103,35 +106,15 @@ fn body(mesh: BodyMesh) -> Body {
     Body { mesh, elastic: ELASTIC, density: 1000.0, supports, masses: Vec::new() }
 }
 
-struct Run<'a> {
-    mesh: &'a BodyMesh,
-    forces: &'a [NodalForce],
-    inner: &'a [u32],
-    outer: &'a [u32],
-}
-
-impl Run<'_> {
-    /// Mean radial displacement of nodes, m.
-    fn radial(&self, state: &VecState, nodes: &[u32]) -> f64 {
-        let sum: f64 = nodes
-            .iter()
-            .map(|&node| {
-                let [x, y, _] = self.mesh.point(node);
-                let [u, v, _] = state.displacements()[node as usize].to_array().map(f64::from);
-                (u * x + v * y) / x.hypot(y)
-            })
-            .sum();
-        sum / nodes.len() as f64
-    }
-}
-
-impl SceneWork for Run<'_> {
-    /// Radial displacements, m.
-    type Output = [f64; 2];
-
-    fn run(self, setup: &Setup<'_>) -> Result<([f64; 2], Cost), LabError> {
-        let loads = Loads::new(setup.scene, [0.0; 3], self.forces, &[])?;
-        let (state, cost) = setup.at_rest(&loads, OMEGA, |state| self.radial(state, self.inner))?;
-        Ok(([self.inner, self.outer].map(|nodes| self.radial(&state, nodes)), cost))
-    }
+/// Mean radial displacement of nodes, m.
+fn radial(mesh: &BodyMesh, state: &VecState, nodes: &[u32]) -> f64 {
+    let sum: f64 = nodes
+        .iter()
+        .map(|&node| {
+            let [x, y, _] = mesh.point(node);
+            let [u, v, _] = state.displacements()[node as usize].to_array().map(f64::from);
+            (u * x + v * y) / x.hypot(y)
+        })
+        .sum();
+    sum / nodes.len() as f64
 }

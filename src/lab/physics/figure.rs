@@ -2,16 +2,13 @@
 //! recordings, mm, over the computing time of a simulated second, s, on grids: SVG with logarithmic axes, a curve for each element and
 //! kind of steps, a point for each mesh.
 
-use std::format;
-use std::string::String;
-use std::vec::Vec;
+use supple::material::Element;
 
 use super::Row;
 use super::mesh::GRID;
 use super::silicone::DISTANCE;
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
 use super::svg::{COLOURS, line, put};
-use crate::material::Element;
 
 const WIDTH: f64 = 860.0;
 const HEIGHT: f64 = 500.0;
@@ -195,7 +192,7 @@ fn curves(rows: &[Row]) -> Vec<Curve> {
         let point = (1e-6 * time, error, row.tetrahedra);
         match curves.iter_mut().find(|curve| curve.element == row.element && curve.method == row.method) {
             Some(curve) => curve.points.push(point),
-            None => curves.push(Curve { element: row.element, method: row.method, points: std::vec![point] }),
+            None => curves.push(Curve { element: row.element, method: row.method, points: vec![point] }),
         }
     }
     curves.sort_by_key(|curve| (curve.is_implicit(), curve.element.code()));

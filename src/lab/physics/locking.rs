@@ -1,17 +1,14 @@
 //! How an element locks, as a picture: the silicone beam at rest with 52 g hung from its end, from the side, with each element and with
 //! the markers as they were filmed. SVG, true to scale; colours say how far a place has sunk.
 
-use std::format;
-use std::string::String;
-use std::vec::Vec;
+use supple::material::Element;
 
 use super::LabError;
 use super::mesh::same;
 use super::recordings::MARKERS;
-use super::silicone::{self, Hung, LOADS, SIZE};
+use super::silicone::{self, LOADS, SIZE};
 use super::steps::EXACT;
 use super::svg::put;
-use crate::material::Element;
 
 /// Cells of the coarser and of the finer picture.
 const CELLS: [[u32; 3]; 2] = [[6, 2, 2], [13, 4, 4]];
@@ -41,7 +38,7 @@ pub(super) fn draw(meshes: usize) -> Result<String, LabError> {
     let filmed: [f64; 3] = core::array::from_fn(|marker| 0.5 * (filmed[0][marker] + filmed[1][marker]));
     for (panel, element) in Element::ALL.into_iter().enumerate() {
         let body = silicone::body(silicone::grid(CELLS[usize::from(meshes > 1)]), load);
-        let (state, row) = body.measure(silicone::NAME, element, EXACT, Hung { body: &body });
+        let (state, row) = body.measure(silicone::NAME, element, EXACT, |setup| silicone::hung(setup, &body));
         let Some(state) = state else { continue };
         let markers = silicone::markers(&body.mesh);
         let (drops, along) = (markers.drops(&state), markers.moved(&state, 0));

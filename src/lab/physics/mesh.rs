@@ -4,12 +4,12 @@
 
 use std::collections::HashMap;
 use std::path::Path;
-use std::vec::Vec;
 
-use crate::io::parse_msh;
-use crate::lab::LabError;
-use crate::loads::NodalForce;
-use crate::mesh::Bar;
+use supple::io::parse_msh;
+use supple::loads::NodalForce;
+use supple::mesh::Bar;
+
+use crate::LabError;
 
 /// Tetrahedra and their nodes.
 pub(super) struct BodyMesh {
@@ -66,7 +66,7 @@ impl BodyMesh {
 
     /// The triangles of the surface with all corners among these nodes, corners in order seen from outside.
     pub(super) fn triangles(&self, nodes: &[u32]) -> Vec<[u32; 3]> {
-        let mut chosen = std::vec![false; self.points.len()];
+        let mut chosen = vec![false; self.points.len()];
         nodes.iter().for_each(|&node| chosen[node as usize] = true);
         let (mut triangles, mut shared) = (Vec::new(), HashMap::new());
         for tet in &self.tets {
@@ -90,7 +90,7 @@ impl BodyMesh {
         ramp: f32,
         pascal: impl Fn([f64; 3]) -> [f64; 3],
     ) -> Vec<NodalForce> {
-        let mut sums = std::vec![[0.0; 3]; self.points.len()];
+        let mut sums = vec![[0.0; 3]; self.points.len()];
         for triangle in self.triangles(nodes) {
             let [p, q, r] = triangle.map(|node| glam::DVec3::from_array(self.point(node)));
             let twice = (q - p).cross(r - p);

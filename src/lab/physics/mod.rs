@@ -35,12 +35,11 @@ pub mod tables;
 mod torsion;
 
 use std::path::Path;
-use std::string::{String, ToString};
-use std::vec::Vec;
+
+use supple::io::write_atomically;
+use supple::material::Element;
 
 use super::LabError;
-use crate::io::write_atomically;
-use crate::material::Element;
 
 /// One quantity of one run.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,21 +4,22 @@
 //! element, which its stress has, the mean of its four nodes'. Zero for a pressure that is the same everywhere.
 
 use std::collections::HashMap;
-use std::vec;
-use std::vec::Vec;
 
 use glam::DVec3;
+use supple::material::Element;
+use supple::simd::NodeVector;
 
 use super::Row;
 use super::body::Body;
-use crate::material::Element;
-use crate::simd::NodeVector;
+use crate::scenes::volume;
 
 pub(super) const ELEMENTS: &str = "pressure oscillation between elements over mean pressure";
 pub(super) const NODES: &str = "pressure oscillation between nodes over mean pressure";
 
-/// The oscillation from element to element, and with nodal pressure from node to node.
-pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVector]) -> (f64, Option<f64>) {
+/// From element to element, and with nodal pressure from node to node.
+pub(super) type Oscillation = (f64, Option<f64>);
+
+pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVector]) -> Oscillation {
     let tets = &body.mesh.tets;
     let volumes: Vec<(f64, f64)> = tets
         .iter()
@@ -52,15 +53,11 @@ pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVe
 }
 
 /// Its rows; none without a result.
-pub(super) fn rows(oscillation: Option<(f64, Option<f64>)>, row: &Row) -> Vec<Row> {
+pub(super) fn rows(oscillation: Option<Oscillation>, row: &Row) -> Vec<Row> {
     let of = |quantity: &str, value| Row { quantity: quantity.into(), value: Some(value), ..row.clone() };
     let Some((elements, nodes)) = oscillation else { return Vec::new() };
     let nodes = nodes.map(|value| of(NODES, value));
     [of(ELEMENTS, elements)].into_iter().chain(nodes).collect()
-}
-
-fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {
-    (b - a).dot((c - a).cross(d - a)) / 6.0
 }
 
 fn along_edges(tets: &[[u32; 4]]) -> Vec<(usize, usize)> {

@@ -4,18 +4,17 @@
 //! linear at so small a strain, the force that is its own far field, `F0 / (1 - (F1 - F0) / F)`; and `F0` over it, less one, is the
 //! error of a body that ends there. nu 0.499.
 
-use std::vec::Vec;
+use supple::loads::{Loads, Motion};
+use supple::material::Element;
+use supple::scene::{Axes, Support};
+use supple::state::VecState;
+use supple::tled;
 
-use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
+use super::body::{Body, Cost, Elastic, Setup, fixed};
 use super::mesh::{BodyMesh, same};
+use super::pressure::Oscillation;
 use super::steps::TO_REST;
 use super::{LabError, Row, pressure};
-use crate::loads::{Loads, Motion};
-use crate::material::Element;
-use crate::material::VecMaterial;
-use crate::scene::{Axes, Support, VecScene};
-use crate::state::VecState;
-use crate::tled;
 
 pub(super) const NAME: &str = "punch";
 const RADIUS: f64 = 0.01;
@@ -38,7 +37,9 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
         for element in Element::ALL {
             for steps in TO_REST {
                 let run = |share: f64| {
-                    body.measure(NAME, element, steps, Run::new(&body, element, share * reference))
+                    body.measure(NAME, element, steps, |setup| {
+                        pressed(setup, &body, element, share * reference)
+                    })
                 };
                 let ((standing, of_standing), (moved, of_moved)) = (run(0.0), run(1.0));
                 let oscillation = moved.map(|(_, oscillation)| oscillation);
@@ -125,45 +126,31 @@ fn boussinesq([x, y, z]: [f64; 3], force: f64) -> [f64; 3] {
     [share * x, share * y, -down]
 }
 
-struct Run<'a> {
-    body: &'a Body,
+/// The force on the whole punch, N, and oscillation of the pressure. Far surfaces move as those of a half-space under `far_force`.
+fn pressed(
+    setup: &Setup<'_>,
+    body: &Body,
     element: Element,
-    under: Vec<u32>,
-    motions: Vec<Motion>,
-}
-
-impl<'a> Run<'a> {
-    fn new(body: &'a Body, element: Element, far_force: f64) -> Self {
-        let ramp = (2.0 / OMEGA) as f32;
-        let under = body.mesh.nodes(is_under);
-        let pressed =
-            under.iter().map(|&node| Motion { node, axes: Axes::Z, metre: [0.0, 0.0, -DEPTH as f32], ramp });
-        let far = body.mesh.nodes(is_far).into_iter().map(|node| {
-            let metre = boussinesq(body.mesh.point(node), far_force).map(|x| x as f32);
-            Motion { node, axes: Axes::XYZ, metre, ramp }
-        });
-        let motions = pressed.chain(far).collect();
-        Self { body, element, under, motions }
-    }
-
-    /// The force on the whole punch, N.
-    fn force(&self, scene: &VecScene<VecMaterial>, state: &mut VecState) -> f64 {
-        if !tled::internal_forces(scene, state) {
+    far_force: f64,
+) -> Result<((f64, Oscillation), Cost), LabError> {
+    let ramp = (2.0 / OMEGA) as f32;
+    let under = body.mesh.nodes(is_under);
+    let pressed =
+        under.iter().map(|&node| Motion { node, axes: Axes::Z, metre: [0.0, 0.0, -DEPTH as f32], ramp });
+    let far = body.mesh.nodes(is_far).into_iter().map(|node| {
+        let metre = boussinesq(body.mesh.point(node), far_force).map(|x| x as f32);
+        Motion { node, axes: Axes::XYZ, metre, ramp }
+    });
+    let motions: Vec<Motion> = pressed.chain(far).collect();
+    let force = |state: &mut VecState| {
+        if !tled::internal_forces(setup.scene, state) {
             return f64::NAN;
         }
-        let forces = self.under.iter().map(|&node| f64::from(state.forces()[node as usize].to_array()[2]));
+        let forces = under.iter().map(|&node| f64::from(state.forces()[node as usize].to_array()[2]));
         4.0 * forces.sum::<f64>()
-    }
-}
-
-impl SceneWork for Run<'_> {
-    /// Force, N, and oscillation of the pressure.
-    type Output = (f64, (f64, Option<f64>));
-
-    fn run(self, setup: &Setup<'_>) -> Result<(Self::Output, Cost), LabError> {
-        let loads = Loads::new(setup.scene, [0.0; 3], &[], &self.motions)?;
-        let (mut state, cost) = setup.at_rest(&loads, OMEGA, |state| self.force(setup.scene, state))?;
-        let pressure = pressure::oscillation(self.body, self.element, state.displacements());
-        Ok(((self.force(setup.scene, &mut state), pressure), cost))
-    }
+    };
+    let loads = Loads::new(setup.scene, [0.0; 3], &[], &motions)?;
+    let (mut state, cost) = setup.at_rest(&loads, OMEGA, force)?;
+    let pressure = pressure::oscillation(body, element, state.displacements());
+    Ok(((force(&mut state), pressure), cost))
 }

@@ -1,13 +1,12 @@
 //! Rows of the physics cases as a file, and orders of convergence: the slope of the logarithm of the error over that of the width of a
 //! cell, of the finest three meshes. An error in the square of the width has the order 2.
 
-use std::format;
 use std::path::Path;
-use std::string::String;
+
+use supple::io::write_atomically;
 
 use super::Row;
-use crate::io::write_atomically;
-use crate::lab::LabError;
+use crate::LabError;
 
 /// Heads of the file.
 pub const HEADS: &str = "case,mesh,element,method,nodes,tetrahedra,quantity,unit,value,reference,source,error_percent,\

@@ -4,11 +4,12 @@
 
 use std::time::{Duration, Instant};
 
+use supple::loads::Loads;
+use supple::state::VecState;
+
 use super::body::{Cost, Setup};
 use super::steps::Kind;
-use crate::lab::LabError;
-use crate::loads::Loads;
-use crate::state::VecState;
+use crate::LabError;
 
 /// Rounding of float32 in a sum of forces is half of it.
 const TOLERANCE: f64 = 2e-4;

@@ -3,20 +3,17 @@
 //! first lowest point has come, and is then damped critically until it rests. The damping of the swing is fitted on the finest grid: its rows
 //! say how far the curves are from the recorded ones over the damping.
 
-use std::format;
-use std::string::String;
-use std::vec::Vec;
+use supple::loads::Loads;
+use supple::material::Element;
+use supple::scene::{Axes, Support};
+use supple::state::VecState;
 
-use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
+use super::body::{Body, Cost, Elastic, Setup, fixed};
 use super::mesh::{BodyMesh, GRID, same};
 use super::recordings::{DAMPING, GRAVITY, LEFT, LOAD, MARKERS, Measured, Recording};
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
 use super::swing::{Markers, Swing};
 use super::{LabError, Row};
-use crate::loads::Loads;
-use crate::material::Element;
-use crate::scene::{Axes, Support};
-use crate::state::VecState;
 
 pub(super) const NAME: &str = "silicone-beam";
 /// The quantity of the picture.
@@ -64,7 +61,8 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
                 let implicit = BACKWARD_EULER.into_iter().filter(|_| implicit);
                 let explicit = [EXACT, DAMPED_20, DAMPED_100].into_iter();
                 for steps in explicit.chain(implicit) {
-                    let (found, row) = body.measure(NAME, element, steps, Run { body: &body, load });
+                    let (found, row) =
+                        body.measure(NAME, element, steps, |setup| swing_and_rest(setup, &body, load));
                     compared(load, found, &Row { unit: "mm", source: SOURCE, ..row }, &mut rows);
                 }
             }
@@ -118,8 +116,10 @@ fn fit() -> Vec<Row> {
     for damping in DAMPINGS {
         let (mut squares, mut all) = (Vec::new(), None);
         for (load, body) in &bodies {
-            let swing = LetGo { body, load: *load, damping };
-            let (found, row) = body.measure(NAME, Element::NodalPressure, EXACT, swing);
+            let (found, row) = body.measure(NAME, Element::NodalPressure, EXACT, |setup| {
+                let (swing, _, cost) = let_go(setup, body, *load, damping)?;
+                Ok((swing, cost))
+            });
             for Recording { name, markers, left } in load.recordings {
                 let distance = found.as_ref().map(|swing| swing.best_offset(left).1);
                 squares.extend(distance.map(|distance| (distance / markers[LEFT].rest).powi(2)));
@@ -168,56 +168,39 @@ pub(super) fn markers(mesh: &BodyMesh) -> Markers {
     Markers::on(mesh, &mesh.nodes(|[x, ..]| same(x, SIZE[0])))
 }
 
-struct Run<'a> {
-    body: &'a Body,
+/// The swing, and what the markers do; the cost is that of the swing.
+fn swing_and_rest(
+    setup: &Setup<'_>,
+    body: &Body,
     load: Load,
+) -> Result<((Swing, [Measured; 3]), Cost), LabError> {
+    let (swing, mut state, cost) = let_go(setup, body, load, DAMPING)?;
+    let (markers, omega) = (markers(&body.mesh), core::f64::consts::PI / swing.half_period());
+    setup.settle(&mut state, &weight(setup)?, omega, |state| markers.drops(state)[LEFT])?;
+    let measured = swing.measured(markers.drops(&state));
+    Ok(((swing, measured), cost))
 }
 
-impl SceneWork for Run<'_> {
-    /// The swing, and what the markers do; the cost is that of the swing.
-    type Output = (Swing, [Measured; 3]);
-
-    fn run(self, setup: &Setup<'_>) -> Result<(Self::Output, Cost), LabError> {
-        let loads = Loads::new(setup.scene, [0.0, 0.0, PULL], &[], &[])?;
-        let mut state = VecState::at_rest(setup.scene.node_count());
-        let markers = markers(&self.body.mesh);
-        let (swing, cost) = Swing::of(setup, &loads, &mut state, &markers, (self.load.seconds, DAMPING))?;
-        let omega = core::f64::consts::PI / swing.half_period();
-        setup.settle(&mut state, &loads, omega, |state| markers.drops(state)[LEFT])?;
-        let measured = swing.measured(markers.drops(&state));
-        Ok(((swing, measured), cost))
-    }
-}
-
-/// The swing alone.
-struct LetGo<'a> {
-    body: &'a Body,
+/// The swing alone with a damping (1/s), and the state after it.
+fn let_go(
+    setup: &Setup<'_>,
+    body: &Body,
     load: Load,
     damping: f32,
-}
-
-impl SceneWork for LetGo<'_> {
-    type Output = Swing;
-
-    fn run(self, setup: &Setup<'_>) -> Result<(Swing, Cost), LabError> {
-        let loads = Loads::new(setup.scene, [0.0, 0.0, PULL], &[], &[])?;
-        let mut state = VecState::at_rest(setup.scene.node_count());
-        Swing::of(setup, &loads, &mut state, &markers(&self.body.mesh), (self.load.seconds, self.damping))
-    }
+) -> Result<(Swing, VecState, Cost), LabError> {
+    let mut state = VecState::at_rest(setup.scene.node_count());
+    let asked = (load.seconds, damping);
+    let (swing, cost) = Swing::of(setup, &weight(setup)?, &mut state, &markers(&body.mesh), asked)?;
+    Ok((swing, state, cost))
 }
 
 /// The shape at rest, without a swing.
-pub(super) struct Hung<'a> {
-    pub(super) body: &'a Body,
+pub(super) fn hung(setup: &Setup<'_>, body: &Body) -> Result<(VecState, Cost), LabError> {
+    let markers = markers(&body.mesh);
+    // Half a period of 0.23 s.
+    setup.at_rest(&weight(setup)?, 27.0, |state| markers.drops(state)[LEFT])
 }
 
-impl SceneWork for Hung<'_> {
-    type Output = VecState;
-
-    fn run(self, setup: &Setup<'_>) -> Result<(VecState, Cost), LabError> {
-        let loads = Loads::new(setup.scene, [0.0, 0.0, PULL], &[], &[])?;
-        let markers = markers(&self.body.mesh);
-        // Half a period of 0.23 s.
-        setup.at_rest(&loads, 27.0, |state| markers.drops(state)[LEFT])
-    }
+fn weight(setup: &Setup<'_>) -> Result<Loads<'static>, LabError> {
+    Ok(Loads::new(setup.scene, [0.0, 0.0, PULL], &[], &[])?)
 }

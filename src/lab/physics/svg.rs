@@ -1,7 +1,6 @@
 //! Elements of the pictures: lines and whatever else SVG has, one a line.
 
 use core::fmt::Write;
-use std::string::String;
 
 /// Okabe and Ito's palette, which colour-blind people tell apart.
 pub(super) const COLOURS: [&str; 7] =

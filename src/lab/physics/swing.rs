@@ -3,16 +3,15 @@
 //! theirs. Lengths in mm, times in s.
 
 use std::time::{Duration, Instant};
-use std::vec::Vec;
 
 use glam::{DMat3, DVec3};
+use supple::loads::Loads;
+use supple::state::VecState;
 
 use super::body::{Cost, Setup};
 use super::mesh::BodyMesh;
 use super::recordings::{Curve, LEFT, MARKERS, Measured};
-use crate::lab::LabError;
-use crate::loads::Loads;
-use crate::state::VecState;
+use crate::LabError;
 
 /// Time between samples, if steps are shorter.
 const SAMPLE: f64 = 1e-3;
@@ -68,7 +67,7 @@ impl Swing {
         markers: &Markers,
         (seconds, damping): (f64, f32),
     ) -> Result<(Self, Cost), LabError> {
-        let (mut samples, mut computing) = (std::vec![(0.0, [0.0; 3])], Duration::ZERO);
+        let (mut samples, mut computing) = (vec![(0.0, [0.0; 3])], Duration::ZERO);
         let mut advance = setup.advance(state, damping)?;
         while state.time() < seconds {
             let (until, start) = (state.time() + SAMPLE, Instant::now());

@@ -3,18 +3,16 @@
 //! any length. nu 0.499, which torsion hardly feels. The torque is that of the internal forces at rest: reactions of long steps hold
 //! inertia as well.
 
-use std::vec::Vec;
+use supple::loads::{Loads, Motion};
+use supple::material::Element;
+use supple::scene::{Axes, Support};
+use supple::state::VecState;
+use supple::tled;
 
-use super::body::{Body, Cost, Elastic, SceneWork, Setup, fixed};
+use super::body::{Body, Cost, Elastic, Setup, fixed};
 use super::mesh::{BodyMesh, same};
 use super::steps::{EXACT, TO_REST};
 use super::{LabError, Row, report};
-use crate::loads::{Loads, Motion};
-use crate::material::Element;
-use crate::material::VecMaterial;
-use crate::scene::{Axes, Support, VecScene};
-use crate::state::VecState;
-use crate::tled;
 
 pub(super) const NAME: &str = "torsion";
 const WIDTH: f64 = 0.02;
@@ -37,7 +35,8 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
             let body = body(cells);
             let end = body.mesh.nodes(|[.., z]| same(z, LENGTH));
             for steps in TO_REST {
-                let (value, row) = body.measure(NAME, element, steps, Run { mesh: &body.mesh, end: &end });
+                let (value, row) =
+                    body.measure(NAME, element, steps, |setup| torque(setup, &body.mesh, &end));
                 if let (Some(value), true) = (value, steps.kind == EXACT.kind) {
                     errors.push((row.clone(), f64::from(cells), value / reference - 1.0));
                 }
@@ -71,39 +70,26 @@ fn body(cells: u32) -> Body {
     Body { mesh, elastic: ELASTIC, density: 1000.0, supports, masses: Vec::new() }
 }
 
-struct Run<'a> {
-    mesh: &'a BodyMesh,
-    end: &'a [u32],
-}
-
-impl Run<'_> {
-    /// The torque that turns the end, N m.
-    fn torque(&self, scene: &VecScene<VecMaterial>, state: &mut VecState) -> f64 {
-        if !tled::internal_forces(scene, state) {
+/// The torque that turns the end, N m.
+fn torque(setup: &Setup<'_>, mesh: &BodyMesh, end: &[u32]) -> Result<(f64, Cost), LabError> {
+    let motion = |&node: &u32| {
+        let [x, y, _] = mesh.point(node);
+        let metre = [-ANGLE * y, ANGLE * x, 0.0].map(|x| x as f32);
+        Motion { node, axes: Axes::X.union(Axes::Y), metre, ramp: (2.0 / OMEGA) as f32 }
+    };
+    let torque = |state: &mut VecState| {
+        if !tled::internal_forces(setup.scene, state) {
             return f64::NAN;
         }
         let moment = |&node: &u32| {
-            let [x, y, _] = self.mesh.point(node);
+            let [x, y, _] = mesh.point(node);
             let [fx, fy, _] = state.forces()[node as usize].to_array().map(f64::from);
             x * fy - y * fx
         };
-        -self.end.iter().map(moment).sum::<f64>()
-    }
-}
-
-impl SceneWork for Run<'_> {
-    /// Torque, N m.
-    type Output = f64;
-
-    fn run(self, setup: &Setup<'_>) -> Result<(f64, Cost), LabError> {
-        let motion = |&node: &u32| {
-            let [x, y, _] = self.mesh.point(node);
-            let metre = [-ANGLE * y, ANGLE * x, 0.0].map(|x| x as f32);
-            Motion { node, axes: Axes::X.union(Axes::Y), metre, ramp: (2.0 / OMEGA) as f32 }
-        };
-        let motions: Vec<Motion> = self.end.iter().map(motion).collect();
-        let loads = Loads::new(setup.scene, [0.0; 3], &[], &motions)?;
-        let (mut state, cost) = setup.at_rest(&loads, OMEGA, |state| self.torque(setup.scene, state))?;
-        Ok((self.torque(setup.scene, &mut state), cost))
-    }
+        -end.iter().map(moment).sum::<f64>()
+    };
+    let motions: Vec<Motion> = end.iter().map(motion).collect();
+    let loads = Loads::new(setup.scene, [0.0; 3], &[], &motions)?;
+    let (mut state, cost) = setup.at_rest(&loads, OMEGA, torque)?;
+    Ok((torque(&mut state), cost))
 }

@@ -15,7 +15,7 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Surfaces in one space.
 #[derive(Default)]
-pub(crate) struct Bodies {
+pub struct Bodies {
     traces: Vec<Value>,
     /// Corners of the box around all of them, m.
     corners: Option<[[f64; 3]; 2]>,
@@ -23,7 +23,7 @@ pub(crate) struct Bodies {
 
 /// Where to look from: the direction that is up, and the side that the eye is on.
 #[derive(Clone, Copy)]
-pub(crate) enum View {
+pub enum View {
     /// z is up, and the eye is at the front (low y), somewhat above and to the right.
     Standing,
     /// z, the long axis of a bar, goes to the right.
@@ -33,7 +33,7 @@ pub(crate) enum View {
 impl Bodies {
     /// Adds a body: positions (m), triangles, and a length at each node (m) that its colour stands for, up to `most`.
     /// Nodes inside are left out.
-    pub(crate) fn add(&mut self, positions: &[[f64; 3]], triangles: &[[u32; 3]], lengths: &[f64], most: f64) {
+    pub fn add(&mut self, positions: &[[f64; 3]], triangles: &[[u32; 3]], lengths: &[f64], most: f64) {
         let surface = surface(positions.len(), triangles);
         let lengths = surface.0.iter().map(|&node| 1e3 * lengths[node]);
         let words: Value = lengths.clone().map(|length| format!("{} mm", short(length))).collect();
@@ -53,13 +53,13 @@ impl Bodies {
     }
 
     /// Adds what does not deform.
-    pub(crate) fn add_rigid(&mut self, positions: &[[f64; 3]], triangles: &[[u32; 3]]) {
+    pub fn add_rigid(&mut self, positions: &[[f64; 3]], triangles: &[[u32; 3]]) {
         let looks = json!({ "color": INSTRUMENT, "hoverinfo": "skip" });
         self.add_surface(positions, &surface(positions.len(), triangles), looks);
     }
 
     /// Adds nodes as points.
-    pub(crate) fn add_points(&mut self, positions: &[[f64; 3]]) {
+    pub fn add_points(&mut self, positions: &[[f64; 3]]) {
         let mut trace = json!({
             "type": "scatter3d",
             "mode": "markers",
@@ -91,7 +91,7 @@ impl Bodies {
     }
 
     /// The plot.
-    pub(crate) fn plot(self, view: View) -> Plot {
+    pub fn plot(self, view: View) -> Plot {
         let (eye, up) = match view {
             View::Standing => ([0.36, -1.0, 0.45], [0.0, 0.0, 1.0]),
             View::Lying => ([0.45, 1.0, 0.3], [1.0, 0.0, 0.0]),
@@ -140,24 +140,24 @@ fn millimetres(metres: f64) -> f64 {
 }
 
 /// The length of vectors.
-pub(crate) fn lengths(vectors: &[[f32; 3]]) -> Vec<f64> {
+pub fn lengths(vectors: &[[f32; 3]]) -> Vec<f64> {
     let length = |vector: &[f32; 3]| vector.iter().map(|c| f64::from(*c).powi(2)).sum::<f64>().sqrt();
     vectors.iter().map(length).collect()
 }
 
 /// The distance of each node between two shapes.
-pub(crate) fn distances(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f64> {
+pub fn distances(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f64> {
     let pairs = a.iter().zip(b);
     lengths(&pairs.map(|(a, b)| [0, 1, 2].map(|axis| a[axis] - b[axis])).collect::<Vec<_>>())
 }
 
 /// The mean of lengths (m), mm.
-pub(crate) fn mean_millimetres(lengths: &[f64]) -> f64 {
+pub fn mean_millimetres(lengths: &[f64]) -> f64 {
     1e3 * lengths.iter().sum::<f64>() / lengths.len().max(1) as f64
 }
 
 /// Points moved by displacements.
-pub(crate) fn moved<T: Copy + Into<f64>>(points: &[[T; 3]], displacements: &[[f32; 3]]) -> Vec<[f64; 3]> {
+pub fn moved<T: Copy + Into<f64>>(points: &[[T; 3]], displacements: &[[f32; 3]]) -> Vec<[f64; 3]> {
     let pairs = points.iter().zip(displacements);
     pairs.map(|(point, vector)| [0, 1, 2].map(|axis| point[axis].into() + f64::from(vector[axis]))).collect()
 }

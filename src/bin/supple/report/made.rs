@@ -1,27 +1,28 @@
 //! How a part of a report was made: the command that repeats it, the version, the machine, what random numbers begin with.
 
+use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use supple::simd::Level;
 
 #[derive(Deserialize, Serialize)]
-pub(crate) struct Made {
+pub struct Made {
     command: String,
     version: String,
     machine: String,
     seeds: String,
     /// Since 1970.
-    pub(crate) seconds: u64,
+    pub seconds: u64,
 }
 
 impl Made {
-    /// Now, by this command with its arguments; `seeds` in words.
-    pub(crate) fn now(arguments: &[String], seeds: &str) -> Self {
+    /// Now, by this program with its arguments; `seeds` in words.
+    pub fn now(words: &[String], seeds: &str) -> Self {
         let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-        let command = arguments.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ");
+        let command = words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ");
         Self {
-            command: format!("supple {command}"),
+            command,
             version: format!("supple {}", env!("CARGO_PKG_VERSION")),
             machine: machine(),
             seeds: seeds.into(),
@@ -30,14 +31,17 @@ impl Made {
     }
 
     /// By the command as it was started.
-    pub(crate) fn by_this_command(seeds: &str) -> Self {
-        let arguments: Vec<_> =
-            std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
-        Self::now(&arguments, seeds)
+    pub fn by_this_command(seeds: &str) -> Self {
+        let mut words: Vec<_> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+        // However it was found.
+        if let Some(program) = words.first_mut() {
+            *program = Path::new(program).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        }
+        Self::now(&words, seeds)
     }
 
     /// What to tell, by name.
-    pub(crate) fn lines(&self) -> [(&'static str, &str); 4] {
+    pub fn lines(&self) -> [(&'static str, &str); 4] {
         [
             ("repeat with", &self.command),
             ("version", &self.version),
@@ -77,7 +81,7 @@ mod tests {
 
     #[test]
     fn the_command_can_be_pasted_into_a_shell() {
-        let words = ["simulate", "my scene.toml", "--out", "it's", ""].map(String::from);
+        let words = ["supple", "simulate", "my scene.toml", "--out", "it's", ""].map(String::from);
         let made = Made::now(&words, "none");
         assert_eq!(made.lines()[0].1, r"supple simulate 'my scene.toml' --out 'it'\''s' ''");
     }

@@ -6,15 +6,15 @@ use serde_json::{Value, json};
 
 /// What plotly.js draws: its traces, and a layout, to which `page.js` adds colours and margins.
 #[derive(Deserialize, Serialize)]
-pub(crate) struct Plot {
-    pub(crate) data: Vec<Value>,
-    pub(crate) layout: Value,
+pub struct Plot {
+    pub data: Vec<Value>,
+    pub layout: Value,
 }
 
 /// plotly.js's names of lines.
 #[derive(Clone, Copy, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum DashType {
+pub enum DashType {
     Solid,
     Dash,
     Dot,
@@ -23,7 +23,7 @@ pub(crate) enum DashType {
 /// plotly.js's names of marks.
 #[derive(Clone, Copy, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum MarkerSymbol {
+pub enum MarkerSymbol {
     Circle,
     CircleOpen,
     Square,
@@ -34,14 +34,13 @@ pub(crate) enum MarkerSymbol {
 }
 
 /// Okabe and Ito's palette, which colour-blind people tell apart, with brown in place of black.
-pub(crate) const COLOURS: [&str; 7] =
-    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#a0522d"];
+pub const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#a0522d"];
 /// Of what is not a method: standing still, real time.
-pub(crate) const GREY: &str = "#8a8f94";
+pub const GREY: &str = "#8a8f94";
 
 /// Points of one kind, or a curve through them.
 #[derive(Clone)]
-pub(crate) struct Curve {
+pub struct Curve {
     name: String,
     x: Vec<f64>,
     y: Vec<f64>,
@@ -55,7 +54,7 @@ pub(crate) struct Curve {
 
 impl Curve {
     /// A line through points, in blue.
-    pub(crate) fn new(name: impl Into<String>, x: Vec<f64>, y: Vec<f64>) -> Self {
+    pub fn new(name: impl Into<String>, x: Vec<f64>, y: Vec<f64>) -> Self {
         Self {
             name: name.into(),
             x,
@@ -69,31 +68,31 @@ impl Curve {
         }
     }
 
-    pub(crate) fn coloured(self, colour: &str) -> Self {
+    pub fn coloured(self, colour: &str) -> Self {
         Self { colour: colour.into(), ..self }
     }
 
-    pub(crate) fn dashed(self, dash: DashType) -> Self {
+    pub fn dashed(self, dash: DashType) -> Self {
         Self { dash, ..self }
     }
 
     /// With a mark at each point.
-    pub(crate) fn marked(self, symbol: MarkerSymbol) -> Self {
+    pub fn marked(self, symbol: MarkerSymbol) -> Self {
         Self { symbol: Some(symbol), ..self }
     }
 
     /// Without the line.
-    pub(crate) fn points(self) -> Self {
+    pub fn points(self) -> Self {
         Self { is_line: false, ..self }
     }
 
     /// Each value holds to the next.
-    pub(crate) fn stairs(self) -> Self {
+    pub fn stairs(self) -> Self {
         Self { is_stairs: true, ..self }
     }
 
     /// With words at each point, under the mouse.
-    pub(crate) fn saying(self, words: Vec<String>) -> Self {
+    pub fn saying(self, words: Vec<String>) -> Self {
         Self { words, ..self }
     }
 
@@ -135,7 +134,7 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// A length or a time for people, three digits.
-pub(crate) fn short(value: f64) -> String {
+pub fn short(value: f64) -> String {
     let digits = if value == 0.0 { 0.0 } else { value.abs().log10().floor() };
     format!("{value:.*}", (2.0 - digits).clamp(0.0, 6.0) as usize)
 }
@@ -150,19 +149,19 @@ fn axis(title: &str) -> Value {
 }
 
 /// With linear axes.
-pub(crate) fn linear(x: &str, y: &str, curves: Vec<Curve>) -> Plot {
+pub fn linear(x: &str, y: &str, curves: Vec<Curve>) -> Plot {
     plot(axis(x), axis(y), curves)
 }
 
 /// Over time, with a logarithmic axis of values; zeros, which have no logarithm, are left out.
-pub(crate) fn over_time(y: &str, curves: Vec<Curve>) -> Plot {
+pub fn over_time(y: &str, curves: Vec<Curve>) -> Plot {
     let curves: Vec<_> = curves.into_iter().map(Curve::without_zeros).collect();
     let y = logarithmic(axis(y), curves.iter().flat_map(|curve| &curve.y));
     plot(axis("time, s"), y, curves)
 }
 
 /// With logarithmic axes.
-pub(crate) fn logarithms(x: &str, y: &str, curves: Vec<Curve>) -> Plot {
+pub fn logarithms(x: &str, y: &str, curves: Vec<Curve>) -> Plot {
     let x = logarithmic(axis(x), curves.iter().flat_map(|curve| &curve.x));
     let y = logarithmic(axis(y), curves.iter().flat_map(|curve| &curve.y));
     plot(x, y, curves)

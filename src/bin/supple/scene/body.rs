@@ -10,7 +10,7 @@ use super::file::{MeshTable, SceneFile};
 use crate::problem::Problem;
 
 /// A mesh in metres, and what the kernel sees of it.
-pub(crate) struct Body {
+pub struct Body {
     pub(crate) mesh: TetMesh,
     /// Coordinates less `centre`, which float32 holds better than the corner of a room.
     pub(crate) local: Vec<[f32; 3]>,
@@ -46,7 +46,7 @@ impl Body {
     }
 
     /// The checked mesh.
-    pub(crate) fn checked(&self) -> Result<Mesh<'_>, Problem> {
+    pub fn checked(&self) -> Result<Mesh<'_>, Problem> {
         Mesh::new(&self.local, &self.mesh.tets, self.winding).map_err(|error| self.mesh_problem(error))
     }
 

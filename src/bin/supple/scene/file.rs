@@ -12,7 +12,7 @@ use super::instruments::InstrumentTable;
 use crate::problem::Problem;
 
 /// A scene file with its text, for line numbers.
-pub(crate) struct SceneFile {
+pub struct SceneFile {
     path: PathBuf,
     text: String,
     pub(crate) scene: SceneTable,
@@ -143,7 +143,7 @@ pub(crate) enum StepLength {
 }
 
 impl SceneFile {
-    pub(crate) fn read(path: &Path) -> Result<Self, Problem> {
+    pub fn read(path: &Path) -> Result<Self, Problem> {
         let text = std::fs::read_to_string(path)
             .map_err(|error| Problem::in_file(path, format!("cannot be read: {error}")))?;
         let scene = toml::from_str(&text).map_err(|error: toml::de::Error| {

@@ -55,7 +55,7 @@ pub(crate) struct Tool {
 
 /// The instruments of a scene and what they can touch.
 #[derive(Default)]
-pub(crate) struct Tools {
+pub struct Tools {
     pub(crate) tools: Vec<Tool>,
     nodes: Vec<SurfaceNode>,
     /// None unless an instrument is thinner than an edge is long.
@@ -109,7 +109,7 @@ impl Tools {
         Ok(Self::new(tools, body))
     }
 
-    pub(crate) const fn is_empty(&self) -> bool {
+    pub const fn is_empty(&self) -> bool {
         self.tools.is_empty()
     }
 

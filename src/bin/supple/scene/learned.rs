@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use supple::lab::method::BURN_IN;
 use supple::learned::{self, LearnedModel, LearnedStep};
 use supple::material::Element;
 use supple::mlp::{Network, WeightBytes};
@@ -16,6 +15,9 @@ use super::timing::{Timing, method_name};
 use super::tissues::Tissues;
 use crate::problem::Problem;
 use crate::weight_file::{self, describe_tissue};
+
+/// Length of the lead-in unless the file says otherwise, s (Meister et al. 2018, section 3).
+const BURN_IN: f64 = 0.3;
 
 /// What `[learned]` asks for.
 pub(crate) struct LearnedChoice {

@@ -2,13 +2,13 @@
 //!
 //! `file` is what a person may write, `setup` what comes of it; in between each file reads one part.
 
-pub(crate) mod body;
-pub(crate) mod file;
-pub(crate) mod instruments;
+pub mod body;
+pub mod file;
+pub mod instruments;
 pub(crate) mod learned;
 pub(crate) mod loads;
 mod plausible;
 pub(crate) mod select;
-pub(crate) mod setup;
-pub(crate) mod timing;
-pub(crate) mod tissues;
+pub mod setup;
+pub mod timing;
+pub mod tissues;

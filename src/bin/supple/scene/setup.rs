@@ -18,25 +18,25 @@ use crate::element_name::element_named;
 use crate::problem::Problem;
 
 /// A scene ready to be built.
-pub(crate) struct Setup {
-    pub(crate) body: Body,
-    pub(crate) tissues: Tissues,
-    pub(crate) element: Element,
-    pub(crate) supports: Vec<Support>,
-    pub(crate) forces: Vec<NodalForce>,
+pub struct Setup {
+    pub body: Body,
+    pub tissues: Tissues,
+    pub element: Element,
+    pub supports: Vec<Support>,
+    pub forces: Vec<NodalForce>,
     pub(crate) motions: Vec<Motion>,
-    pub(crate) tools: Tools,
+    pub tools: Tools,
     pub(crate) gravity: [f32; 3],
     /// 1/s.
-    pub(crate) damping: f32,
-    pub(crate) time: Timing,
+    pub damping: f32,
+    pub time: Timing,
     /// The network that takes over from the exact step.
     pub(crate) learned: Option<LearnedChoice>,
-    pub(crate) warnings: Vec<String>,
+    pub warnings: Vec<String>,
 }
 
 impl Setup {
-    pub(crate) fn read(file: &SceneFile) -> Result<Self, Problem> {
+    pub fn read(file: &SceneFile) -> Result<Self, Problem> {
         let scene = &file.scene;
         let body = read_body(file, &scene.mesh)?;
         let gravity = file.gravity()?;
@@ -100,7 +100,7 @@ impl Setup {
     }
 
     /// What moves the scene, by name.
-    pub(crate) const fn method_name(&self) -> &'static str {
+    pub const fn method_name(&self) -> &'static str {
         match &self.time {
             _ if self.learned.is_some() => "learned",
             time if time.is_adaptive => "auto",
@@ -109,7 +109,7 @@ impl Setup {
     }
 
     /// The kernel's scene, and a state at rest.
-    pub(crate) fn build(&self) -> Result<(VecScene<VecMaterial>, VecState), Problem> {
+    pub fn build(&self) -> Result<(VecScene<VecMaterial>, VecState), Problem> {
         let mesh = self.body.checked()?;
         let scene =
             VecScene::build(self.tissues.material(self.element), &mesh, &self.supports).map_err(|error| {
@@ -141,7 +141,7 @@ impl Setup {
     }
 
     /// What acts on the scene.
-    pub(crate) fn loads(&self, scene: &impl AsScene) -> Result<Loads<'_>, Problem> {
+    pub fn loads(&self, scene: &impl AsScene) -> Result<Loads<'_>, Problem> {
         Loads::new(scene, self.gravity, &self.forces, &self.motions).map_err(Problem::of)
     }
 }

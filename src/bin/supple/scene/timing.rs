@@ -8,7 +8,7 @@ use crate::problem::Problem;
 
 /// A length of step as asked for.
 #[derive(Clone, Copy)]
-pub(crate) enum StepChoice {
+pub enum StepChoice {
     Seconds(f32),
     /// Times the bound of the critical step at rest.
     Multiple(f32),
@@ -17,10 +17,10 @@ pub(crate) enum StepChoice {
 }
 
 /// What `[time]` asks for.
-pub(crate) struct Timing {
+pub struct Timing {
     /// None is the exact step.
     pub(crate) method: Option<Method<'static>>,
-    pub(crate) step: StepChoice,
+    pub step: StepChoice,
     /// Whether steps choose their length, up to `step`.
     pub(crate) is_adaptive: bool,
     /// Mean error of the nodes that is accepted, m.

@@ -15,7 +15,7 @@ use super::select::inside;
 use crate::problem::Problem;
 
 /// Tissues of one law.
-pub(crate) struct Tissues {
+pub struct Tissues {
     /// That of `[material]`, then of each region.
     tissues: Vec<Tissue<AnyLaw>>,
     /// For each element the index of its tissue.
@@ -54,8 +54,7 @@ impl Tissues {
     }
 
     /// The tissue, if there is only one.
-    #[cfg(feature = "train")]
-    pub(crate) fn only(&self) -> Option<Tissue<AnyLaw>> {
+    pub fn only(&self) -> Option<Tissue<AnyLaw>> {
         if let [only] = *self.tissues { Some(only) } else { None }
     }
 

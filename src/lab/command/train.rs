@@ -1,4 +1,4 @@
-//! `supple train`: a network from a recipe, with its progress and its error on frames that it has not seen.
+//! `supple-lab train`: a network from a recipe, with its progress and its error on frames that it has not seen.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -6,16 +6,16 @@ use std::time::Duration;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use supple::train::damper;
 use supple::train::fit::{Fitted, Progress, fit};
 use supple::train::recipe::Recipe;
 use supple::train::samples::Samples;
+use supple_cli::problem::{End, Problem};
+use supple_cli::screen::{message, output};
+use supple_cli::weight_file;
+use supple_lab::training::damper;
 
 use super::exemplar::learned_from;
 use super::quantise::quantise_trained;
-use crate::problem::{End, Problem};
-use crate::screen::{message, output};
-use crate::weight_file;
 
 #[derive(Args)]
 pub(crate) struct Asked {
@@ -44,12 +44,12 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     let folder = checkpoints(out);
     message!("simulating the motion to learn from ...");
     let scene = learned_from(&parsed, recipe)?;
-    let collected = Samples::collect(&parsed, &scene).map_err(|error| problem(&error))?;
+    let collected = Samples::collect(&parsed, &*scene).map_err(|error| problem(&error))?;
     let bar = ProgressBar::no_length();
     let style = ProgressStyle::with_template("{bar:30} {msg}").map_err(|error| problem(&error))?;
     bar.set_style(style);
     let mut told = None;
-    let fitted = fit(&parsed, &text, &scene, &collected, Some(&folder), &mut |at: &Progress| {
+    let fitted = fit(&parsed, &text, &*scene, &collected, Some(&folder), &mut |at: &Progress| {
         bar.set_length((at.epochs * at.samples) as u64);
         bar.set_position((at.epoch * at.samples + at.done) as u64);
         bar.set_message(said(at));

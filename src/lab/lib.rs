@@ -1,6 +1,6 @@
 //! The laboratory: how far is a method from the truth, and what does it cost? Methods run over scenes at
 //! multiples of a step of the scene ([`timing::Timing`]), for the paper's bar [`DT`]; the truth is the exact step
-//! ([`crate::tled`]) at that step or a part of it on the same mesh.
+//! ([`supple::tled`]) at that step or a part of it on the same mesh.
 //! SI units inside, millimetres and microseconds in the tables for people.
 //!
 //! | module | what it holds |
@@ -11,6 +11,7 @@
 //! | [`truth`] | the exact motion of a scene, kept on disk |
 //! | [`method`] | what is compared: one match arm each |
 //! | [`implicit`] | backward Euler and the implicit midpoint rule, to compare with |
+//! | [`literal`] | the laws as the paper prints them, with stress at rest |
 //! | [`networks`] | the networks that come with the crate |
 //! | [`run`] | one method, one scene, one step: a row |
 //! | [`measure`] | errors of a motion against the truth |
@@ -20,6 +21,7 @@
 //! | [`tolerance`] | does an adaptive step keep its tolerance, and what does it cost? |
 //! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
 //! | [`table`] | rows as CSV and as aligned text |
+//! | `training` (feature `train`) | scenes to learn from; the search for a damper |
 //! | [`sweep`] | error over step on one scene, with fitted slopes |
 
 pub mod course;
@@ -28,12 +30,14 @@ mod error;
 pub mod evaluate;
 pub mod hard;
 pub mod implicit;
+pub mod literal;
 pub mod measure;
 pub mod method;
 pub mod moving;
 pub mod networks;
 pub mod physics;
-pub(crate) mod random_numbers;
+#[path = "../train/random_numbers.rs"]
+mod random_numbers;
 pub mod run;
 pub mod scenes;
 pub mod sweep;
@@ -41,10 +45,12 @@ pub mod table;
 mod threads;
 pub mod timing;
 pub mod tolerance;
+#[cfg(feature = "train")]
+pub mod training;
 pub mod truth;
 
 use std::path::Path;
-use std::{format, fs, io};
+use std::{fs, io};
 
 pub use error::LabError;
 

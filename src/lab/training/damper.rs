@@ -1,4 +1,4 @@
-//! The network of the damped step ([`crate::inertia::Damper`]), trained by random search (CMA-ES): weights are drawn around the
+//! The network of the damped step ([`supple::inertia::Damper`]), trained by random search (CMA-ES): weights are drawn around the
 //! best so far, each draw moves the recipe's scenes from rest to the end, and is judged by the exact motion. No gradient passes
 //! through the motion, and the whole roll-out is judged, not one step of it.
 //!
@@ -23,31 +23,27 @@
 
 use core::fmt;
 use core::ops::ControlFlow;
-use std::format;
-use std::string::{String, ToString};
 use std::time::{Duration, Instant};
-use std::vec;
-use std::vec::Vec;
 
 use cmaes::{CMAESOptions, DVector};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
+use supple::mlp::{self, Activation, Description, LayerDescription, MAX_WIDTH, Range};
+use supple::train::TrainError;
 
-use super::TrainError;
-use crate::lab::method::{Method, NetworkFile};
-use crate::lab::run::run;
-use crate::lab::scenes::{self, SceneSpec};
-use crate::lab::timing::Timing;
-use crate::lab::truth::{self, Truth};
-use crate::lab::{DT, LabError};
-use crate::mlp::{self, Activation, Description, LayerDescription, MAX_WIDTH, Range};
+use super::super::method::{Method, NetworkFile};
+use super::super::run::run;
+use super::super::scenes::{self, SceneSpec};
+use super::super::timing::Timing;
+use super::super::truth::{self, Truth};
+use super::super::{DT, LabError};
 
 /// Inputs of a damper.
 const INPUTS: usize = 4;
 /// What the search starts from, and the largest gain.
 const GAIN: f64 = 2.0;
 const MOST: f32 = 20.0;
-/// Where the hidden layer's knots lie at the start, for each input (see [`crate::inertia::Damper`]): changes of rough motion from
+/// Where the hidden layer's knots lie at the start, for each input (see [`supple::inertia::Damper`]): changes of rough motion from
 /// a hundredth of it to all of it in a step, rough motion from a thousandth to all of the body's, any cosine, `k` from a
 /// thousandth to a seventh.
 const KNOTS: [(f64, f64); INPUTS] = [(-9.0, 0.0), (-7.0, 0.0), (-1.0, 1.0), (-7.0, -2.0)];
@@ -340,14 +336,14 @@ fn described(recipe: &Recipe, text: &str, spec: &SceneSpec, weights: &[f64]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mlp::Network;
+    use supple::mlp::Network;
 
     #[test]
     fn the_search_starts_from_a_constant_gain() {
-        let recipe = Recipe::parse(include_str!("../../weights/damper.toml")).unwrap();
+        let recipe = Recipe::parse(include_str!("../../../weights/damper.toml")).unwrap();
         let spec = scenes::named("torsion").unwrap();
         let bytes = described(&recipe, "", &spec, &rule(recipe.damper.hidden)).unwrap();
-        let bytes = crate::mlp::WeightBytes::of(&bytes);
+        let bytes = supple::mlp::WeightBytes::of(&bytes);
         let network = Network::parse(bytes.bytes()).unwrap();
         for inputs in [[-9.0, -3.0, 0.5, 7.0], [0.0; 4], [1.0, -20.0, -1.0, 2.0]] {
             let mut gain = [0.0];

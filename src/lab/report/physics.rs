@@ -1,11 +1,10 @@
 //! Elements and steps against nature: errors over computing time, of a filmed beam, closed forms and published values.
 
-use supple::lab::evaluate::unique;
-use supple::lab::physics::Row;
-
-use super::made::Made;
-use super::plots::{self, COLOURS, Curve, DashType, MarkerSymbol, short};
-use super::{Figure, Panel, Part, Section, Table};
+use supple_cli::report::made::Made;
+use supple_cli::report::plots::{self, COLOURS, Curve, DashType, MarkerSymbol, short};
+use supple_cli::report::{Figure, Panel, Part, Section, Table};
+use supple_lab::evaluate::unique;
+use supple_lab::physics::Row;
 
 pub(crate) const NAME: &str = "physics";
 

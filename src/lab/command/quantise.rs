@@ -1,4 +1,4 @@
-//! `supple weights quantise`, and what `supple train` does after a training: a network's layers in int8, with the error that
+//! `supple-lab quantise`, and what `supple-lab train` does after a training: a network's layers in int8, with the error that
 //! each of them makes, and that of all of them.
 
 use std::path::{Path, PathBuf};
@@ -8,11 +8,11 @@ use supple::mlp::{Layer, Network, WeightBytes};
 use supple::train::int8::{Made, int8, usual_float_layers};
 use supple::train::recipe::Recipe;
 use supple::train::samples::Samples;
+use supple_cli::problem::{End, Problem};
+use supple_cli::screen::{message, output};
+use supple_cli::weight_file;
 
 use super::exemplar::learned_from;
-use crate::problem::{End, Problem};
-use crate::screen::{message, output};
-use crate::weight_file;
 
 #[derive(Args)]
 pub(crate) struct Asked {
@@ -38,7 +38,7 @@ pub(crate) fn quantise(asked: &Asked) -> Result<End, Problem> {
     }
     message!("simulating the motion it learned from ...");
     let scene = learned_from(&recipe, path)?;
-    let samples = Samples::collect(&recipe, &scene).map_err(|error| Problem::in_file(path, error))?;
+    let samples = Samples::collect(&recipe, &*scene).map_err(|error| Problem::in_file(path, error))?;
     let float = if float.is_empty() { usual_float_layers(&network) } else { float.clone() };
     let made = int8(&network, &recipe, &samples, &float).map_err(|error| Problem::in_file(path, error))?;
     tell(&made, out)?;

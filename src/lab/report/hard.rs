@@ -1,12 +1,11 @@
 //! Hard cases: are runs ever wrong without a word, and do estimates of the error follow the true one?
 
-use supple::lab::evaluate::unique;
-use supple::lab::hard::report;
-use supple::lab::hard::verdict::{Judged, Verdict};
-
-use super::made::Made;
-use super::plots::{self, COLOURS, Curve, DashType, GREY, MarkerSymbol, short};
-use super::{Figure, Panel, Part, Section};
+use supple_cli::report::made::Made;
+use supple_cli::report::plots::{self, COLOURS, Curve, DashType, GREY, MarkerSymbol, short};
+use supple_cli::report::{Figure, Panel, Part, Section};
+use supple_lab::evaluate::unique;
+use supple_lab::hard::report;
+use supple_lab::hard::verdict::{Judged, Verdict};
 
 pub(crate) const NAME: &str = "hard";
 

@@ -6,8 +6,7 @@ use std::path::PathBuf;
 use clap::Subcommand;
 use supple::mlp::{from_safetensors, to_safetensors};
 
-#[cfg(feature = "train")]
-use super::quantise;
+use crate::moved;
 use crate::problem::{End, Problem};
 use crate::screen::output;
 use crate::weight_file;
@@ -22,9 +21,9 @@ pub(crate) enum Conversion {
         #[arg(long)]
         out: PathBuf,
     },
-    /// A weight file with int8 layers from a float32 one, by the samples of its recipe
-    #[cfg(feature = "train")]
-    Quantise(quantise::Asked),
+    /// Moved to the laboratory
+    #[command(hide = true, disable_help_flag = true)]
+    Quantise(moved::Arguments),
     /// A weight file from safetensors with the tensors and metadata of an export
     Import {
         /// The safetensors file
@@ -37,8 +36,7 @@ pub(crate) enum Conversion {
 
 pub(crate) fn convert(conversion: &Conversion) -> Result<End, Problem> {
     let (from, out, written) = match conversion {
-        #[cfg(feature = "train")]
-        Conversion::Quantise(asked) => return quantise::quantise(asked),
+        Conversion::Quantise(_) => return moved::refuse("weights quantise", "quantise FILE --out FILE"),
         Conversion::Export { weights, out } => {
             let memory = weight_file::read(weights)?;
             (weights, out, to_safetensors(&weight_file::parse(weights, &memory)?))
