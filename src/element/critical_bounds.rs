@@ -375,17 +375,6 @@ fn cross_matrix<R: Real>(deformation: &Deformation<R>, a: Vector<R>) -> [[R; 3];
     matrix
 }
 
-impl<'a, 'b, L: Law, P> CriticalBounds<'a, 'b, L, P> {
-    pub(super) const fn laws(&self) -> &Laws<'a, L> {
-        &self.laws
-    }
-
-    pub(super) fn of_law<K: Law>(self, law: K) -> CriticalBounds<'a, 'b, K, P> {
-        let Self { laws, pressure, tiles, inertia, with_volume, sums } = self;
-        CriticalBounds { laws: laws.of_law(law), pressure, tiles, inertia, with_volume, sums }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::{vec, vec::Vec};

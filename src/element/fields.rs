@@ -82,7 +82,7 @@ pub(crate) fn element_fields<L: Law>(
     let energy = own_energy(law, tile, lane, (i, j));
 
     // The deviator of P F^T needs only p1 F F^T: cof(F) F^T = J I.
-    let wide = L::widen::<f32>(|_| *law);
+    let wide = law.splat::<f32>();
     let p1 = f64::from(response::<f32, L>(&wide, Invariants { i: i as f32, j: j as f32 }).p1);
     let b = f * f.transpose();
     let mean = (b.x_axis.x + b.y_axis.y + b.z_axis.z) / 3.0;
@@ -109,7 +109,7 @@ pub(crate) fn pressure_at<L: Law>(
     let own = (volume_ratio - 1.0) as f32;
     let change = volumes.and_then(|rows| rows.change(tile.node(corner, lane), tile.slot(corner, lane)));
     let change = change.unwrap_or(own);
-    -f64::from(L::widen::<f32>(|_| *law).bulk_modulus() * change)
+    -f64::from(law.splat::<f32>().bulk_modulus() * change)
 }
 
 /// What the energy (J) of an element changes by when its energy of volume is that of its nodes ([`super::pressure`]).
@@ -130,7 +130,7 @@ fn volume_energy_difference<L: Law>(
 
 /// Modulus of the stabilising energy of nodal strain, `s mu`, Pa, with the shear modulus `mu = 2 W'(0)` at rest.
 pub(crate) fn stabilising_modulus<L: Law>(law: &L) -> f64 {
-    2.0 * f64::from(STABILISATION) * f64::from(L::widen::<f32>(|_| *law).distortion_slope(0.0))
+    2.0 * f64::from(STABILISATION) * f64::from(law.splat::<f32>().distortion_slope(0.0))
 }
 
 /// What a patch adds to the strain energy of tetrahedra with nodal strain, J ([`super::patch_forces`]).

@@ -405,22 +405,3 @@ fn scatter<R: Real, const K: usize, const N: usize>(batch: &[ElementVector<'_, R
         }
     }
 }
-
-impl<'a, L: Law, V, P> InternalForces<'a, L, V, P> {
-    pub(super) const fn laws(&self) -> &Laws<'a, L> {
-        &self.elements.laws
-    }
-
-    pub(super) fn of_law<K: Law>(self, law: K) -> InternalForces<'a, K, V, P> {
-        let Self {
-            elements: Elements { laws, tiles, partitions: all },
-            pressure,
-            partitions,
-            displacement,
-            force,
-            visitor,
-        } = self;
-        let elements = Elements { laws: laws.of_law(law), tiles, partitions: all };
-        InternalForces { elements, pressure, partitions, displacement, force, visitor }
-    }
-}

@@ -1,6 +1,6 @@
-//! The loops over elements, compiled with this crate for each law of the list and each instruction-set level: nothing in them is
-//! generic, so that no other crate compiles them again. Each is linked only where it is used. Where the law is known only at run
-//! time ([`AnyLaw`]) a call looks once which it is.
+//! The loops over elements. For a law that is known only at run time ([`AnyLaw`]) they are compiled with this crate, once for each
+//! instruction-set level: each batch of elements looks which law it is. For one law of the list alone they are compiled where a typed
+//! program uses them, without the question. Either is linked only where it is used.
 
 use crate::material::{AnyLaw, Element, Law, for_each_law};
 use crate::simd::{NodeVector, dispatch};
@@ -57,11 +57,11 @@ macro_rules! declare {
 }
 for_each_kernel!(declare);
 
-macro_rules! compile {
-    ([$law:ty] $($(#[$doc:meta])* $name:ident($kernel:ty) -> $output:ty;)*) => {
+macro_rules! implement {
+    ([$law:ty, #[$inlining:meta]] $($(#[$doc:meta])* $name:ident($kernel:ty) -> $output:ty;)*) => {
         impl ElementLaw for $law {
             $(
-                #[inline(never)]
+                #[$inlining]
                 fn $name(kernel: $kernel) -> $output {
                     dispatch(kernel)
                 }
@@ -69,32 +69,11 @@ macro_rules! compile {
         }
     };
     ($($variant:ident: $law:ty,)*) => {
-        $(for_each_kernel! { compile [$law] })*
+        $(for_each_kernel! { implement [$law, #[inline]] })*
     };
 }
-for_each_law!(compile);
-
-/// Goes on with the loop of the law that it is.
-macro_rules! choose {
-    ($kernel:ident $name:ident {$($variant:ident: $law:ty,)*}) => {
-        match $kernel.laws().law() {
-            $(AnyLaw::$variant(law) => <$law>::$name($kernel.of_law(law)),)*
-        }
-    };
-    (among $laws:tt $($(#[$doc:meta])* $name:ident($kernel:ty) -> $output:ty;)*) => {
-        impl ElementLaw for AnyLaw {
-            $(
-                fn $name(kernel: $kernel) -> $output {
-                    choose! { kernel $name $laws }
-                }
-            )*
-        }
-    };
-    ($($list:tt)*) => {
-        for_each_kernel! { choose among {$($list)*} }
-    };
-}
-for_each_law!(choose);
+for_each_law!(implement);
+for_each_kernel! { implement [AnyLaw, #[inline(never)]] }
 
 /// [`ElementLaw::tile_bounds`] for elements, from the volumes of the nodes where these need them.
 pub(crate) fn tile_bounds<L: ElementLaw>(

@@ -266,14 +266,3 @@ impl<R: Real> Bound<R> {
         }
     }
 }
-
-impl<'a, 'b, L: Law> PatchBounds<'a, 'b, L> {
-    pub(super) const fn laws(&self) -> &Laws<'a, L> {
-        &self.laws
-    }
-
-    pub(super) fn of_law<K: Law>(self, law: K) -> PatchBounds<'a, 'b, K> {
-        let Self { laws, patches, inertia, weights, sums } = self;
-        PatchBounds { laws: laws.of_law(law), patches, inertia, weights, sums }
-    }
-}

@@ -173,14 +173,3 @@ fn scatter<R: Real, V: ElementVisitor, const PARTS: usize>(
         }
     }
 }
-
-impl<'a, L: Law, V> PatchForces<'a, L, V> {
-    pub(super) const fn laws(&self) -> &Laws<'a, L> {
-        &self.laws
-    }
-
-    pub(super) fn of_law<K: Law>(self, law: K) -> PatchForces<'a, K, V> {
-        let Self { laws, patches, partitions, displacement, force, visitor } = self;
-        PatchForces { laws: laws.of_law(law), patches, partitions, displacement, force, visitor }
-    }
-}

@@ -212,14 +212,3 @@ impl<R: Real> Shares<R> {
         ]
     }
 }
-
-impl<'a, L: Law> PatchTileBounds<'a, L> {
-    pub(super) const fn laws(&self) -> &Laws<'a, L> {
-        &self.laws
-    }
-
-    pub(super) fn of_law<K: Law>(self, law: K) -> PatchTileBounds<'a, K> {
-        let Self { laws, tile, neighbours, displacement, sums, rotations, weight } = self;
-        PatchTileBounds { laws: laws.of_law(law), tile, neighbours, displacement, sums, rotations, weight }
-    }
-}

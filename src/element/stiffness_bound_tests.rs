@@ -42,7 +42,7 @@ fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
     let scene = scene.view();
     let tile = &scene.tiles[0];
     let deformation = Deformation::<f32>::new(h);
-    let wide = L::widen::<f32>(|_| law);
+    let wide = law.splat::<f32>();
     let local = LawState::new::<L>(&wide, deformation.invariants);
     let bound = Bound::of(Coefficients::new::<L>(&wide, &local), tile, 0, &deformation);
     let (mut diagonal, mut off_diagonal) = ([NodeVector::ZERO; 4], [NodeVector::ZERO; 4]);

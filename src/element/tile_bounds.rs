@@ -161,14 +161,3 @@ impl TileTangents {
         }
     }
 }
-
-impl<'a, L: Law, P> TileBounds<'a, L, P> {
-    pub(super) const fn laws(&self) -> &Laws<'a, L> {
-        &self.laws
-    }
-
-    pub(super) fn of_law<K: Law>(self, law: K) -> TileBounds<'a, K, P> {
-        let Self { laws, pressure, tile, displacement, sums, rotations, weight } = self;
-        TileBounds { laws: laws.of_law(law), pressure, tile, displacement, sums, rotations, weight }
-    }
-}

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::{Constant, Law, Moduli, Potential, Values};
+use super::{Constant, Law, MAX_CONSTANTS, Moduli, Potential, Values};
 use crate::simd::Real;
 
 macro_rules! any_law {
@@ -21,13 +21,15 @@ macro_rules! any_law {
         }
 
         /// Positions in the list.
+        #[derive(Clone, Copy)]
         enum Position { $($variant,)* }
 
-        /// Constants of any of the laws. For one element at a time: loops over elements are compiled for each law.
+        /// Constants of any of the laws, scalars or vectors.
         #[doc(hidden)]
         #[derive(Clone, Copy)]
-        pub enum AnyWide<R: Real> {
-            $($variant(<$law as Law>::Wide<R>),)*
+        pub struct AnyWide<R> {
+            law: Position,
+            constants: [R; MAX_CONSTANTS],
         }
 
         impl AnyLaw {
@@ -81,22 +83,26 @@ macro_rules! any_law {
                 }
             }
 
+            #[inline(always)]
             fn with(&self, values: Values) -> Self {
                 match self {
                     $(Self::$variant(law) => Self::$variant(law.with(values)),)*
                 }
             }
 
+            #[inline(always)]
             fn values(&self) -> Values {
                 match self {
                     $(Self::$variant(law) => law.values(),)*
                 }
             }
 
-            fn widen<R: Real>(at: impl Fn(usize) -> Self) -> AnyWide<R> {
-                match at(0) {
-                    $(Self::$variant(law) => AnyWide::$variant(<$law>::widen(|lane| law.with(at(lane).values()))),)*
-                }
+            #[inline(always)]
+            fn widen<R: Real>(&self, constants: [R; MAX_CONSTANTS]) -> AnyWide<R> {
+                let law = match self {
+                    $(Self::$variant(_) => Position::$variant,)*
+                };
+                AnyWide { law, constants }
             }
 
             fn energy(&self, x: f64, j: f64) -> f64 {
@@ -107,27 +113,36 @@ macro_rules! any_law {
         }
 
         impl<R: Real> Potential<R> for AnyWide<R> {
+            #[inline(always)]
+            fn of(constants: [R; MAX_CONSTANTS]) -> Self {
+                Self { law: Position::$first, constants }
+            }
+
+            #[inline(always)]
             fn distortion_slope(&self, x: R) -> R {
-                match self {
-                    $(Self::$variant(law) => law.distortion_slope(x),)*
+                match self.law {
+                    $(Position::$variant => <$law as Law>::Wide::<R>::of(self.constants).distortion_slope(x),)*
                 }
             }
 
+            #[inline(always)]
             fn distortion_curvature(&self, x: R, slope: R) -> R {
-                match self {
-                    $(Self::$variant(law) => law.distortion_curvature(x, slope),)*
+                match self.law {
+                    $(Position::$variant => <$law as Law>::Wide::<R>::of(self.constants).distortion_curvature(x, slope),)*
                 }
             }
 
+            #[inline(always)]
             fn bulk_modulus(&self) -> R {
-                match self {
-                    $(Self::$variant(law) => law.bulk_modulus(),)*
+                match self.law {
+                    $(Position::$variant => <$law as Law>::Wide::<R>::of(self.constants).bulk_modulus(),)*
                 }
             }
 
+            #[inline(always)]
             fn saturation(&self, x: R) -> R {
-                match self {
-                    $(Self::$variant(law) => law.saturation(x),)*
+                match self.law {
+                    $(Position::$variant => <$law as Law>::Wide::<R>::of(self.constants).saturation(x),)*
                 }
             }
         }

@@ -4,7 +4,7 @@
 //! In float32 `exp` overflows at 88. The exponent is capped at [`EXPONENT_CAP`]; beyond it `W` goes on
 //! along its tangent, and the step says [`Limited`](crate::step::Status::Limited).
 
-use super::{Constant, Law, Potential, Values};
+use super::{Constant, Law, MAX_CONSTANTS, Potential, Values};
 use crate::simd::Real;
 
 /// Largest exponent `b x` before the law is continued along its tangent.
@@ -29,6 +29,10 @@ impl<R: Real> Exponential<R> {
 }
 
 impl<R: Real> Potential<R> for Exponential<R> {
+    #[inline(always)]
+    fn of([a, b, d, _]: [R; MAX_CONSTANTS]) -> Self {
+        Self { a, b, d }
+    }
     #[inline(always)]
     fn distortion_slope(&self, x: R) -> R {
         R::splat(0.5) * self.a * self.capped_exp(x)
@@ -68,21 +72,13 @@ impl Law for Exponential {
     }
 
     #[inline(always)]
-    fn with(&self, [a, b, d, _]: Values) -> Self {
-        Self { a, b, d }
-    }
-
-    fn values(&self) -> Values {
-        [self.a, self.b, self.d, 0.0]
+    fn with(&self, values: Values) -> Self {
+        Self::of(values)
     }
 
     #[inline(always)]
-    fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Exponential<R> {
-        Exponential {
-            a: R::from_fn(|lane| at(lane).a),
-            b: R::from_fn(|lane| at(lane).b),
-            d: R::from_fn(|lane| at(lane).d),
-        }
+    fn values(&self) -> Values {
+        [self.a, self.b, self.d, 0.0]
     }
 
     fn energy(&self, x: f64, j: f64) -> f64 {

@@ -75,6 +75,8 @@ pub struct Constant {
 
 /// A law whose constants are scalars or vectors, one number for each element.
 pub trait Potential<R: Real>: Copy {
+    /// With these constants, in the order of [`Law::constants`]; the rest is ignored.
+    fn of(constants: [R; MAX_CONSTANTS]) -> Self;
     /// `W'(x)`, Pa.
     fn distortion_slope(&self, x: R) -> R;
     /// `W''(x)`, Pa, given `slope = W'(x)`: the two usually share their costly part.
@@ -112,8 +114,17 @@ pub trait Law: Copy + Default + Send + Sync {
     /// The values of its constants.
     fn values(&self) -> Values;
 
-    /// Element `l` of the vector takes the constants of `at(l)`.
-    fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Self::Wide<R>;
+    /// The same law with vectors of these constants.
+    #[inline(always)]
+    fn widen<R: Real>(&self, constants: [R; MAX_CONSTANTS]) -> Self::Wide<R> {
+        Self::Wide::of(constants)
+    }
+
+    /// The same law for any number of elements alike.
+    #[inline(always)]
+    fn splat<R: Real>(&self) -> Self::Wide<R> {
+        self.widen(self.values().map(R::splat))
+    }
 
     /// `W(x) + U(1 + j)` in float64, J/m^3, zero at rest.
     fn energy(&self, x: f64, j: f64) -> f64;

@@ -16,7 +16,7 @@ impl Moduli {
     /// Of a law at rest.
     #[must_use]
     pub fn of<L: Law>(law: &L) -> Self {
-        let law = L::widen::<f32>(|_| *law);
+        let law = law.splat::<f32>();
         Self { shear: 2.0 * f64::from(law.distortion_slope(0.0)), bulk: f64::from(law.bulk_modulus()) }
     }
 

@@ -1,7 +1,7 @@
 //! Neo-Hookean law `W(x) = c x`, `U(J) = d (J - 1)^2` (Meister et al. 2018, section 3; with `c = mu / 2`,
 //! `d = kappa / 2` the law of NiftySim and DJ-TLED). Constants in Pa.
 
-use super::{Constant, Law, Potential, Values};
+use super::{Constant, Law, MAX_CONSTANTS, Potential, Values};
 use crate::simd::Real;
 
 /// Constants of the neo-Hookean law: half the shear modulus and half the bulk modulus, Pa.
@@ -14,6 +14,10 @@ pub struct NeoHookean<R = f32> {
 }
 
 impl<R: Real> Potential<R> for NeoHookean<R> {
+    #[inline(always)]
+    fn of([c, d, ..]: [R; MAX_CONSTANTS]) -> Self {
+        Self { c, d }
+    }
     #[inline(always)]
     fn distortion_slope(&self, _x: R) -> R {
         self.c
@@ -44,17 +48,13 @@ impl Law for NeoHookean {
     }
 
     #[inline(always)]
-    fn with(&self, [c, d, ..]: Values) -> Self {
-        Self { c, d }
-    }
-
-    fn values(&self) -> Values {
-        [self.c, self.d, 0.0, 0.0]
+    fn with(&self, values: Values) -> Self {
+        Self::of(values)
     }
 
     #[inline(always)]
-    fn widen<R: Real>(at: impl Fn(usize) -> Self) -> NeoHookean<R> {
-        NeoHookean { c: R::from_fn(|lane| at(lane).c), d: R::from_fn(|lane| at(lane).d) }
+    fn values(&self) -> Values {
+        [self.c, self.d, 0.0, 0.0]
     }
 
     fn energy(&self, x: f64, j: f64) -> f64 {

@@ -1,7 +1,7 @@
 //! Reduced polynomial law of second order `W(x) = c x + e x^2`, `U(J) = d (J - 1)^2` (Yeoh 1993 without its third term;
 //! neo-Hookean with stiffening). Constants in Pa.
 
-use super::{Constant, Law, Potential, Values};
+use super::{Constant, Law, MAX_CONSTANTS, Potential, Values};
 use crate::simd::Real;
 
 /// Constants of the reduced polynomial law, Pa.
@@ -16,6 +16,10 @@ pub struct Polynomial<R = f32> {
 }
 
 impl<R: Real> Potential<R> for Polynomial<R> {
+    #[inline(always)]
+    fn of([c, e, d, _]: [R; MAX_CONSTANTS]) -> Self {
+        Self { c, e, d }
+    }
     #[inline(always)]
     fn distortion_slope(&self, x: R) -> R {
         (self.e + self.e).fused(x, self.c)
@@ -50,21 +54,13 @@ impl Law for Polynomial {
     }
 
     #[inline(always)]
-    fn with(&self, [c, e, d, _]: Values) -> Self {
-        Self { c, e, d }
-    }
-
-    fn values(&self) -> Values {
-        [self.c, self.e, self.d, 0.0]
+    fn with(&self, values: Values) -> Self {
+        Self::of(values)
     }
 
     #[inline(always)]
-    fn widen<R: Real>(at: impl Fn(usize) -> Self) -> Polynomial<R> {
-        Polynomial {
-            c: R::from_fn(|lane| at(lane).c),
-            e: R::from_fn(|lane| at(lane).e),
-            d: R::from_fn(|lane| at(lane).d),
-        }
+    fn values(&self) -> Values {
+        [self.c, self.e, self.d, 0.0]
     }
 
     fn energy(&self, x: f64, j: f64) -> f64 {

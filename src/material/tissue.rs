@@ -1,7 +1,7 @@
 //! What the elements of a mesh are made of: one tissue for all, or one of several for each element.
 
 use super::{AnyLaw, Law, Values};
-use crate::simd::Real;
+use crate::simd::{Real, TILE};
 
 /// A law with a density.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -162,15 +162,6 @@ impl<'a, L: Law> Laws<'a, L> {
         }
     }
 
-    /// The same constants of the law that `L` turned out to be.
-    #[inline]
-    pub(crate) fn of_law<K: Law>(&self, law: K) -> Laws<'a, K> {
-        match *self {
-            Self::One(_) => Laws::One(law),
-            Self::Regions { tissues, of_element, .. } => Laws::Regions { law, tissues, of_element },
-        }
-    }
-
     /// Whether elements may be of different tissues.
     #[inline(always)]
     pub(crate) const fn differ(&self) -> bool {
@@ -194,8 +185,19 @@ impl<'a, L: Law> Laws<'a, L> {
     #[inline(always)]
     pub(crate) fn widen<R: Real>(&self, element: impl Fn(usize) -> usize) -> L::Wide<R> {
         match *self {
-            Self::One(law) => L::widen(|_| law),
-            Self::Regions { .. } => L::widen(|lane| self.of(element(lane))),
+            Self::One(law) => law.splat(),
+            Self::Regions { law, tissues, of_element } => {
+                // Each element is looked up once, not for each constant.
+                let mut rows = [law.values(); TILE];
+                for (lane, row) in rows.iter_mut().enumerate().take(R::COUNT) {
+                    let tissue =
+                        of_element.get(element(lane)).and_then(|&index| tissues.get(usize::from(index)));
+                    if let Some(tissue) = tissue {
+                        *row = tissue.law;
+                    }
+                }
+                law.widen(core::array::from_fn(|constant| R::from_fn(|lane| rows[lane % TILE][constant])))
+            }
         }
     }
 }

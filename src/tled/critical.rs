@@ -60,7 +60,7 @@ fn critical<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>) -
         M::Law::critical_bounds(kernel);
         rate = Largest::of(&sums, inertia, |_, _| ());
     } else if let Laws::One(law) = laws {
-        let bulk = <M::Law as Law>::widen::<f32>(|_| law).bulk_modulus();
+        let bulk = law.splat::<f32>().bulk_modulus();
         let mut volumes = NodalVolumeBounds { tiles, inertia, rows: &mut *volume };
         volumes.start();
         for _ in 0..BALANCING_SWEEPS {

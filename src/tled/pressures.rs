@@ -59,7 +59,7 @@ fn add_patches<M: ElementMaterial>(
     let laws = scene.material.laws();
     let at = |node: usize| DVec3::from_array(displacement[node].to_array().map(f64::from));
     for (tile, lane) in scene.patches.places() {
-        let law = M::Law::widen::<f32>(|_| laws.of(tile.element(lane)));
+        let law = laws.of(tile.element(lane)).splat::<f32>();
         let h = tile.gradient(scene.patches.neighbours_of(tile), lane, at);
         let pressure = -f64::from(law.bulk_modulus() * invariants(h).1 as f32);
         let (sum, weight) = &mut sums[tile.node(lane)];

@@ -202,7 +202,7 @@ impl LawTangent {
 }
 
 fn law_at<L: Law>(law: &L) -> L::Wide<f32> {
-    L::widen(|_| *law)
+    law.splat()
 }
 
 fn outer(a: DVec3, b: DVec3) -> DMat3 {
