@@ -1,14 +1,13 @@
-//! The field of a closed surface of triangles, with parry's distances: to the nearest triangle, with the sign of its pseudo-normal
-//! (Baerentzen and Aanaes 2005).
+//! The field of a closed surface of triangles: its signed distances on a grid.
 
-use std::string::ToString;
+use std::format;
+use std::string::String;
 use std::vec::Vec;
 
 use glam::Vec3;
-use parry3d::query::PointQuery;
-use parry3d::shape::{TriMesh, TriMeshFlags};
 
 use super::field::{Field, FieldError};
+use super::signed_distance::SignedDistance;
 
 /// Distances of a closed surface on a grid, as [`Field::new`] takes them.
 #[derive(Clone, Debug)]
@@ -29,48 +28,59 @@ const MOST_POINTS: f64 = 67_108_864.0;
 const RIM: f32 = 2.0;
 
 impl SurfaceField {
-    /// Computes the distances of a closed surface, whose triangles are all counted in the same direction, on a grid of this spacing (m)
-    /// around it.
-    pub fn new(
-        points: &[[f32; 3]],
-        triangles: &[[u32; 3]],
-        spacing: f32,
-    ) -> Result<Self, std::string::String> {
+    /// Computes the distances of a closed surface, whose triangles are all counted in the same direction, on a grid of
+    /// this spacing (m) around it.
+    pub fn new(points: &[[f32; 3]], triangles: &[[u32; 3]], spacing: f32) -> Result<Self, String> {
+        let mut corners = Vec::with_capacity(triangles.len());
+        for (triangle, places) in triangles.iter().enumerate() {
+            let at = places.map(|place| points.get(place as usize).copied().map(Vec3::from_array));
+            let [Some(a), Some(b), Some(c)] = at else {
+                return Err(format!(
+                    "triangle {triangle} has the corners {places:?} of {} points",
+                    points.len()
+                ));
+            };
+            if let Some(corner) = [a, b, c].iter().position(|corner| !corner.is_finite()) {
+                let place = places[corner];
+                return Err(format!("point {place} of triangle {triangle} is {:?}", points[place as usize]));
+            }
+            corners.push([a, b, c]);
+        }
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for &corner in triangles.as_flattened() {
-            let point = points.get(corner as usize).ok_or("a triangle has a corner that does not exist")?;
-            (low, high) = (low.min(Vec3::from_array(*point)), high.max(Vec3::from_array(*point)));
+        for &corner in corners.as_flattened() {
+            (low, high) = (low.min(corner), high.max(corner));
         }
-        if !(spacing > 0.0 && (high - low).is_finite()) {
-            return Err(std::format!("a spacing of {spacing} m for {} triangles cannot be", triangles.len()));
-        }
-        let origin = low - RIM * spacing;
         let size = ((high - low) / spacing).ceil() + 1.0 + 2.0 * RIM;
+        let origin = low - RIM * spacing;
+        let end = origin + spacing * size;
+        if !(spacing > 0.0 && (high - low).is_finite() && origin.is_finite() && end.is_finite()) {
+            return Err(format!("a spacing of {spacing} m for {} triangles cannot be", triangles.len()));
+        }
         let count: f64 = size.to_array().into_iter().map(f64::from).product();
         if count > MOST_POINTS {
-            return Err(std::format!(
+            return Err(format!(
                 "a spacing of {spacing} m makes {count:.2e} points, {MOST_POINTS:.2e} are possible"
             ));
         }
         // Six times the volume: below zero if the normals point inwards.
-        let corner = |corner: u32| {
-            points.get(corner as usize).map_or(Vec3::ZERO, |&point| Vec3::from_array(point) - low)
+        let volume = |&corners: &[Vec3; 3]| {
+            let [a, b, c] = corners.map(|corner| (corner - low).as_dvec3());
+            a.dot(b.cross(c))
         };
-        let volume: f32 = triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c)))).sum();
-        let triangles: Vec<_> =
-            triangles.iter().map(|&[a, b, c]| if volume < 0.0 { [a, c, b] } else { [a, b, c] }).collect();
-        let vertices = points.iter().map(|&point| point.into()).collect();
-        let mesh = TriMesh::with_flags(vertices, triangles, TriMeshFlags::ORIENTED)
-            .map_err(|error| error.to_string())?;
+        if corners.iter().map(volume).sum::<f64>() < 0.0 {
+            corners.iter_mut().for_each(|corners| corners.swap(1, 2));
+        }
+        let surface = SignedDistance::new(&corners, origin.abs().max(end.abs()).max_element())?;
         let size = size.to_array().map(|points| points as u32);
         let mut values = Vec::with_capacity(count as usize);
+        let mut nearest = 0;
         for k in 0..size[2] {
             for j in 0..size[1] {
                 for i in 0..size[0] {
                     let at = origin + spacing * Vec3::new(i as f32, j as f32, k as f32);
-                    let nearest = mesh.project_local_point(at.to_array().into(), false);
-                    let distance = at.distance(Vec3::from_array(nearest.point.into()));
-                    values.push(if nearest.is_inside { -distance } else { distance });
+                    let (distance, triangle) = surface.at(at, nearest);
+                    values.push(distance);
+                    nearest = triangle;
                 }
             }
         }

@@ -57,7 +57,7 @@
 
 mod clearance;
 mod field;
-#[cfg(feature = "field")]
+#[cfg(feature = "std")]
 mod field_of_surface;
 mod grip;
 mod instrument;
@@ -65,13 +65,15 @@ mod local_force;
 mod pose;
 mod pushes;
 mod shape;
+#[cfg(feature = "std")]
+mod signed_distance;
 mod surface;
 mod triangle;
 
 pub use clearance::vectors_to_push;
 pub(crate) use clearance::{ContactMemory, SolverRoom, kept_pushes, largest_component};
 pub use field::{Field, FieldError};
-#[cfg(feature = "field")]
+#[cfg(feature = "std")]
 pub use field_of_surface::SurfaceField;
 pub use grip::Grip;
 pub use instrument::{Instrument, MOST_INSTRUMENTS};

@@ -139,7 +139,6 @@ fn a_field_that_cannot_be_used_says_why() {
 }
 
 /// The field of a surface of triangles, against the closed form of a box.
-#[cfg(feature = "field")]
 #[test]
 fn the_field_of_a_mesh_is_its_distance() {
     let bar = Bar { size: [0.02, 0.03, 0.04], cells: [2, 3, 4] };

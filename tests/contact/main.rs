@@ -10,5 +10,6 @@ mod fields;
 mod grips;
 mod long_steps;
 mod scene;
+mod surface_fields;
 mod thin;
 mod touching;

@@ -206,7 +206,12 @@ fn a_network_is_led_and_led_again_after_a_restore() {
     let exact = Step::unchecked(interval / 10.0, network.recipe().damping).unwrap();
     let storage = vec![NodeVector::ZERO; vectors_for(scene.node_count(), false)];
     let mut by_hand = LearnedStep::new(network, false, storage).unwrap();
-    by_hand.lead(scene.view(), &loads, state.view(), (&exact, 10.0 * f64::from(interval))).unwrap();
+    assert!(
+        by_hand
+            .lead(scene.view(), &loads, state.view(), (&exact, 10.0 * f64::from(interval)))
+            .unwrap()
+            .is_taken()
+    );
     for _ in 0..5 {
         assert!(by_hand.step(scene.view(), &loads, state.view(), &exact).unwrap().is_taken());
     }
