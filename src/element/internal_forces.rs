@@ -311,7 +311,7 @@ fn respond<R: Real, L: Law>(
     };
     let change = Pair(first.change, second.change);
     let local = LawState::with_volume_change::<L>(&law, invariants, change);
-    let response = local.response::<L>(&law);
+    let response = local.response();
     (first.p1, first.s) = (response.p1.0, response.s.0);
     (second.p1, second.s) = (response.p1.1, response.s.1);
     extremes.least_j = invariants.j.min(extremes.least_j);

@@ -140,6 +140,13 @@ macro_rules! any_law {
             }
 
             #[inline(always)]
+            fn at(&self, x: R) -> [R; 3] {
+                match self.law {
+                    $(Position::$variant => <$law as Law>::Wide::<R>::of(self.constants).at(x),)*
+                }
+            }
+
+            #[inline(always)]
             fn saturation(&self, x: R) -> R {
                 match self.law {
                     $(Position::$variant => <$law as Law>::Wide::<R>::of(self.constants).saturation(x),)*

@@ -88,6 +88,12 @@ pub trait Potential<R: Real>: Copy {
     fn saturation(&self, _x: R) -> R {
         R::splat(0.0)
     }
+    /// `W'(x)`, the saturation and `k`, which loops over elements ask for together.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn at(&self, x: R) -> [R; 3] {
+        [self.distortion_slope(x), self.saturation(x), self.bulk_modulus()]
+    }
 }
 
 /// The constants of a law by themselves, in the order of [`Law::constants`]; the rest is zero.

@@ -78,6 +78,7 @@ pub(crate) struct LawState<R> {
     factor: VolumeFactor<R>,
     /// `W'(x)`, Pa.
     pub(crate) slope: R,
+    saturation: R,
     /// `U'` and `U''`, Pa: at the element's volume, or their mean over its nodes ([`super::NodalPressure`]).
     pub(crate) pressure: R,
     pub(crate) bulk: R,
@@ -93,8 +94,8 @@ impl<R: Real> LawState<R> {
     #[inline(always)]
     pub(crate) fn with_volume_change<L: Law>(law: &L::Wide<R>, at: Invariants<R>, change: R) -> Self {
         let factor = VolumeFactor::new(at);
-        let bulk = law.bulk_modulus();
-        Self { at, factor, slope: law.distortion_slope(factor.x), pressure: bulk * change, bulk }
+        let [slope, saturation, bulk] = law.at(factor.x);
+        Self { at, factor, slope, saturation, pressure: bulk * change, bulk }
     }
 
     /// `W''(x)`, Pa; not negative.
@@ -111,17 +112,13 @@ impl<R: Real> LawState<R> {
 
     /// The stress scalars.
     #[inline(always)]
-    pub(crate) fn response<L: Law>(&self, law: &L::Wide<R>) -> Response<R> {
+    pub(crate) fn response(&self) -> Response<R> {
         let (two, factor) = (R::splat(2.0), &self.factor);
         let slope = two * self.slope;
         // g + g' I1 / 2 = J^(-5/3) (J - 1 - (I1 - 3 + 2 below) / 3): small at small strain
         let bracket =
             factor.fifth * (factor.clamped - (self.at.i + two * factor.below) * R::splat(1.0 / 3.0));
-        Response {
-            p1: slope * factor.g,
-            s: slope * bracket + self.pressure,
-            saturation: law.saturation(factor.x),
-        }
+        Response { p1: slope * factor.g, s: slope * bracket + self.pressure, saturation: self.saturation }
     }
 }
 
@@ -156,13 +153,14 @@ impl<R: Real> LawState<Pair<R>> {
     /// Each half by itself.
     #[inline(always)]
     pub(crate) fn split(&self) -> [LawState<R>; 2] {
-        let Self { at, factor, slope, pressure, bulk } = *self;
+        let Self { at, factor, slope, saturation, pressure, bulk } = *self;
         let [near, far] = factor.split();
         [
             LawState {
                 at: Invariants { i: at.i.0, j: at.j.0 },
                 factor: near,
                 slope: slope.0,
+                saturation: saturation.0,
                 pressure: pressure.0,
                 bulk: bulk.0,
             },
@@ -170,6 +168,7 @@ impl<R: Real> LawState<Pair<R>> {
                 at: Invariants { i: at.i.1, j: at.j.1 },
                 factor: far,
                 slope: slope.1,
+                saturation: saturation.1,
                 pressure: pressure.1,
                 bulk: bulk.1,
             },
@@ -180,7 +179,7 @@ impl<R: Real> LawState<Pair<R>> {
 /// The stress scalars of law `L` at the given invariants.
 #[inline(always)]
 pub(crate) fn response<R: Real, L: Law>(law: &L::Wide<R>, at: Invariants<R>) -> Response<R> {
-    LawState::new::<L>(law, at).response::<L>(law)
+    LawState::new::<L>(law, at).response()
 }
 
 /// Floating-point operations of [`response`] for one element, those of the law included.
