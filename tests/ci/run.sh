@@ -128,6 +128,9 @@ build() {
 compiled() { grep -q "Compiling $1" "$made/said"; }
 build first
 compiled cfg-if || fail 'nothing was compiled'
+build first
+! compiled small || fail 'the package was compiled again'
+ok 'the same clone has everything compiled'
 cd "$made/two"
 sed -i s/first/other/ src/main.rs
 touch -d 2020-01-01 src/main.rs Cargo.*
@@ -135,8 +138,12 @@ build other
 ! compiled cfg-if || fail 'a dependency was compiled again'
 compiled small || fail 'the package was not compiled again'
 ok 'another clone has the dependencies compiled, and its own package anew, whatever its date'
-! find "$XDG_CACHE_HOME/supple-ci/build" | grep small || fail 'the above of the package is kept'
-ok 'nothing of the package is kept'
+cd "$made/one"
+.ci/kept open >"$made/said"
+! find "$XDG_CACHE_HOME/supple-ci/build" | grep small || fail 'the above of the package of another clone is kept'
+.ci/kept close
+ok 'nothing of the package of another clone is kept'
+cd "$made/two"
 library=$(find "$XDG_CACHE_HOME/supple-ci/build" -name 'libcfg_if*.rlib')
 truncate -s 100 "$library"
 build other
