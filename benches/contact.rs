@@ -1,6 +1,6 @@
-//! What a sphere costs a step of the liver lobe, exact and damped (20 times): far away, over the same step of the body at rest; and
-//! pressing, over that of the body that is pressed by the same forces as loads, since a deformed body costs a long step more. Then the
-//! same sphere with the triangles of the surface, which a thin instrument needs.
+//! What a sphere costs a step of the liver lobe, exact and damped (20 times): far away, over the same step of the body
+//! at rest; and pressing, over that of the body that is pressed by the same forces as loads, since a deformed body
+//! costs a long step more. Then the same sphere with the triangles of the surface, which a thin instrument needs.
 //!
 //! `cargo bench --features io --bench contact` prints ratios from runs in turn.
 
@@ -12,8 +12,7 @@ use std::path::Path;
 
 use common::pairs::{median, seconds};
 use supple::contact::{
-    Contact, ContactPoint, Instrument, Pose, Shape, Surface, Touch, boundary, boundary_triangles,
-    vectors_to_push,
+    Contact, ContactPoint, Instrument, Pose, Shape, Surface, Touch, boundary, boundary_triangles, vectors_to_push,
 };
 use supple::element::ElementMaterial;
 use supple::inertia::{Cells, LargeStep, Method};
@@ -50,23 +49,15 @@ struct Acting {
     forces: Vec<NodalForce>,
 }
 
-fn measure<M: ElementMaterial>(
-    name: &str,
-    material: M,
-    points: &[[f32; 3]],
-    tets: &[[u32; 4]],
-    damped: bool,
-) {
+fn measure<M: ElementMaterial>(name: &str, material: M, points: &[[f32; 3]], tets: &[[u32; 4]], damped: bool) {
     let mesh = Mesh::new(points, tets, Winding::Checked).expect("the lobe is sound");
-    let back: Vec<u32> =
-        (0u32..).zip(points).filter(|(_, point)| point[1] > 0.03).map(|(node, _)| node).collect();
+    let back: Vec<u32> = (0u32..).zip(points).filter(|(_, point)| point[1] > 0.03).map(|(node, _)| node).collect();
     let fixed: Vec<_> = back.iter().map(|&node| Support::fixed(node)).collect();
     let scene = VecScene::build(material, &mesh, &fixed).expect("the lobe can be built");
     let surface = boundary(&mesh);
     let triangles = boundary_triangles(&mesh, &surface);
     let top = surface.iter().max_by(|a, b| a.rest[2].total_cmp(&b.rest[2])).expect("a surface").rest;
-    let critical =
-        tled::critical_step(&scene, &mut VecState::at_rest(points.len())).expect("a critical step");
+    let critical = tled::critical_step(&scene, &mut VecState::at_rest(points.len())).expect("a critical step");
     let multiple = if damped { MULTIPLE } else { 0.5 };
     let step = Step::unchecked(multiple * critical.seconds, DAMPING).expect("a step");
     let (scene, surface, triangles) = (&scene, &*surface, &*triangles);
@@ -107,8 +98,7 @@ fn measure<M: ElementMaterial>(
     };
     let pressing = || Acting { instruments: sphere(top, DEPTH), ..Acting::default() };
     let contacts = settled(&mut run(pressing()));
-    let force =
-        |point: &ContactPoint| NodalForce { node: point.node, newton: point.force, ramp: DEPTH / SPEED };
+    let force = |point: &ContactPoint| NodalForce { node: point.node, newton: point.force, ramp: DEPTH / SPEED };
     let mut runs = [
         run(Acting::default()),
         run(Acting { instruments: sphere([0.0, 0.0, 1.0], 0.0), ..Acting::default() }),

@@ -1,7 +1,8 @@
 //! Time of the element forces alone, by law and by size, compared with the whole step.
 //!
 //! `cargo bench --bench forces` prints criterion's figures for the paper's bar, then for bars from 6.5 to 100 thousand
-//! tetrahedra medians of runs in turn, the share of the machine's peak as measured in between, and the share of the step.
+//! tetrahedra medians of runs in turn, the share of the machine's peak as measured in between, and the share of the
+//! step.
 
 mod common {
     #[allow(dead_code)] // This bench has bars, loads and supports of its own.

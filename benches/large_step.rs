@@ -54,8 +54,7 @@ fn main() {
     let mut longest_damped = scaled(&scene, &loads, &points, LONGEST, damped());
     let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, Method::MassScaled);
     let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, multilevel());
-    let mut with_guards =
-        EVERY.map(|every| guarded(&scene, &loads, &points, MULTIPLE, damped(), Some(every)));
+    let mut with_guards = EVERY.map(|every| guarded(&scene, &loads, &points, MULTIPLE, damped(), Some(every)));
     let mut damped = scaled(&scene, &loads, &points, MULTIPLE, damped());
 
     let mut group = criterion.benchmark_group("beyond the critical step");
@@ -86,8 +85,7 @@ fn main() {
             ratios.push(other / one);
         }
     }
-    let [mass_scaled_ratio, multilevel_ratio, longest_ratio, damped_ratio, longest_damped_ratio] =
-        ratios.map(median);
+    let [mass_scaled_ratio, multilevel_ratio, longest_ratio, damped_ratio, longest_damped_ratio] = ratios.map(median);
     let [most, most_damped] =
         [phases(&mut multilevel), phases(&mut damped)].map(|phases| phases.into_iter().fold(0.0, f64::max));
     println!(

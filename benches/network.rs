@@ -1,7 +1,8 @@
-//! Time of networks: their forward pass at the paper's bar's 1,458 vertices, and learned steps with them compared with the exact one.
+//! Time of networks: their forward pass at the paper's bar's 1,458 vertices, and learned steps with them compared with
+//! the exact one.
 //!
-//! `cargo bench --bench network` prints criterion's figures, then times from interleaved runs and shares of the machine's
-//! measured peak.
+//! `cargo bench --bench network` prints criterion's figures, then times from interleaved runs and shares of the
+//! machine's measured peak.
 
 mod common {
     pub(crate) mod bar;
@@ -89,12 +90,11 @@ fn steps(criterion: &mut Criterion) {
     let [paper, compact, compact_int8] = [PAPER, COMPACT, COMPACT_INT8].map(WeightBytes::of);
     let empty = nothing(&Network::parse(compact.bytes()).expect("a weight file of the crate"));
     let mut learned =
-        [("no network", &empty), ("compact", &compact), ("paper", &paper), ("compact int8", &compact_int8)]
-            .map(|(name, bytes)| {
+        [("no network", &empty), ("compact", &compact), ("paper", &paper), ("compact int8", &compact_int8)].map(
+            |(name, bytes)| {
                 let network = Network::parse(bytes.bytes()).expect("a weight file of the crate");
                 let storage = vec![NodeVector::ZERO; vectors_for(nodes, false)];
-                let mut learned =
-                    LearnedStep::new(network, false, storage).expect("a network of the learned step");
+                let mut learned = LearnedStep::new(network, false, storage).expect("a network of the learned step");
                 let mut state = VecState::at_rest(nodes);
                 let (scene, loads, exact) = (&scene, &loads, &exact_step);
                 let run = move || {
@@ -102,7 +102,8 @@ fn steps(criterion: &mut Criterion) {
                     bar::moved(status.expect("it goes on from rest"));
                 };
                 (name, run)
-            });
+            },
+        );
     let mut group = criterion.benchmark_group("learned step");
     group.throughput(Throughput::Elements(nodes as u64));
     group.bench_function("exact", |b| b.iter(&mut exact));

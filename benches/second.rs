@@ -1,4 +1,5 @@
-//! One simulated second of every method on the paper's bar: the exact step at the paper's length, the others at 20 times that.
+//! One simulated second of every method on the paper's bar: the exact step at the paper's length, the others at 20
+//! times that.
 //!
 //! `cargo bench --bench second` prints the seconds each took and how many times faster than the exact step it was, from
 //! runs in turn. It has no criterion group: one run takes seconds.
@@ -73,8 +74,7 @@ fn main() {
         ("paper's network, int8", Box::new(learned(paper_int8))),
     ];
     let mut exact_state = state.clone();
-    let mut exact =
-        || (0..steps).for_each(|_| bar::moved(tled::step(&scene, &loads, &mut exact_state, &step)));
+    let mut exact = || (0..steps).for_each(|_| bar::moved(tled::step(&scene, &loads, &mut exact_state, &step)));
 
     let mut times = Vec::new();
     let mut results = vec![(Vec::new(), Vec::new()); others.len()];

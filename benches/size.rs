@@ -1,8 +1,8 @@
 //! Time of an exact step from 6.5 thousand tetrahedra to a million, on one thread and on two, and with nodes in order,
 //! shuffled, and renumbered ([`supple::mesh::renumber`]); and of a multilevel step on one thread and on two.
 //!
-//! `cargo bench --bench size --features parallel` prints medians, and the least time in brackets, of runs in turn. It has no
-//! criterion group: a body of that size takes seconds to prepare.
+//! `cargo bench --bench size --features parallel` prints medians, and the least time in brackets, of runs in turn. It
+//! has no criterion group: a body of that size takes seconds to prepare.
 
 mod common {
     #[allow(dead_code)] // This bench has loads and supports of its own.
@@ -97,7 +97,8 @@ fn both(times: &[f64], unit: f64) -> String {
     format!("{:.1} ({:.1})", median(times.to_vec()) * unit, least * unit)
 }
 
-/// Times of a multilevel step at [`MULTIPLE`] times the critical step, on one thread and on two, compared with an exact one.
+/// Times of a multilevel step at [`MULTIPLE`] times the critical step, on one thread and on two, compared with an exact
+/// one.
 fn multilevel(pool: &rayon::ThreadPool) {
     let Body { points, tets } = Body::in_order(MULTILEVEL_SIZE);
     let Bent { scene, mut state, step } = Bent::new(bar::EXPONENTIAL, &points, &tets);
@@ -160,11 +161,7 @@ fn main() {
             }
         });
         let [in_order, shuffled, renumbered, two] = times.map(|times| both(&times, unit));
-        println!(
-            "{} | {in_order} | {shuffled} | {renumbered} | {two} | {:.2}",
-            body.tets.len(),
-            median(ratios)
-        );
+        println!("{} | {in_order} | {shuffled} | {renumbered} | {two} | {:.2}", body.tets.len(), median(ratios));
     }
     multilevel(&pool);
 }

@@ -1,5 +1,5 @@
-//! Time of an exact step on the paper's bar, compared with the same step in plain scalar code, and of other elements compared with
-//! linear ones.
+//! Time of an exact step on the paper's bar, compared with the same step in plain scalar code, and of other elements
+//! compared with linear ones.
 //!
 //! `cargo bench --bench step` prints criterion's figures, then ratios from interleaved pairs of runs (the
 //! machine's speed drifts; the ratio does not) and the share of the machine's measured peak.
@@ -91,8 +91,7 @@ fn compare<L: ElementLaw>(criterion: &mut Criterion, name: &str, law: L, plain_l
     });
     group.finish();
 
-    let (ratio, plain_s, ours_s) =
-        pairs(|| (0..50).for_each(|_| plain.step(DT, DAMPING, 1.0)), || ours.run(50), 50);
+    let (ratio, plain_s, ours_s) = pairs(|| (0..50).for_each(|_| plain.step(DT, DAMPING, 1.0)), || ours.run(50), 50);
     let before = Level::current();
     assert!(Level::force(Level::Portable), "every processor has it");
     let (portable_ratio, _, portable_s) =

@@ -112,7 +112,8 @@
 #define SUPPLE_WINDING_NORMALISED 1
 
 /**
- * Linear tetrahedra. They lock, that is bend too little, where tissue hardly changes its volume (Poisson's ratio above 0.45).
+ * Linear tetrahedra. They lock, that is bend too little, where tissue hardly changes its volume (Poisson's ratio above
+ * 0.45).
  */
 #define SUPPLE_LINEAR 0
 
@@ -122,9 +123,9 @@
 #define SUPPLE_NODAL_PRESSURE 1
 
 /**
- * Tetrahedra with stabilised nodal strain, which bend well on coarse meshes and take less time than linear ones, but more memory:
- * supple_patches_size. Under strains above a half elements at sharp edges may turn inside out, which the status tells within 16
- * steps. Only in a library with all laws.
+ * Tetrahedra with stabilised nodal strain, which bend well on coarse meshes and take less time than linear ones, but
+ * more memory: supple_patches_size. Under strains above a half elements at sharp edges may turn inside out, which the
+ * status tells within 16 steps. Only in a library with all laws.
  */
 #define SUPPLE_NODAL_STRAIN 2
 
@@ -149,8 +150,8 @@
 #define SUPPLE_MOST_PARTS 8
 
 /**
- * Shapes of an instrument: all below the plane z = 0 of its axes; a ball around its centre; a cylinder along z with round ends; the
- * signed distances in a field's file, which `supple field` makes of a mesh.
+ * Shapes of an instrument: all below the plane z = 0 of its axes; a ball around its centre; a cylinder along z with
+ * round ends; the signed distances in a field's file, which `supple field` makes of a mesh.
  */
 #define SUPPLE_PLANE 0
 
@@ -176,7 +177,8 @@
 #define SUPPLE_LEARNED_FRONT 2048
 
 /**
- * For comparisons with a common method: inertia is raised where the step would be unstable, which slows all motion down.
+ * For comparisons with a common method: inertia is raised where the step would be unstable, which slows all motion
+ * down.
  */
 #define SUPPLE_MASS_SCALED 0
 
@@ -186,8 +188,9 @@
 #define SUPPLE_MULTILEVEL 1
 
 /**
- * What steps beyond the critical one should be: inertia is raised where the step would be unstable, smooth motion keeps its
- * true inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not carry.
+ * What steps beyond the critical one should be: inertia is raised where the step would be unstable, smooth motion
+ * keeps its true inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not
+ * carry.
  */
 #define SUPPLE_DAMPED 2
 
@@ -247,7 +250,8 @@
 #define SUPPLE_REMARK_WAY 8
 
 /**
- * Motion `index` has a speed of `value` m/s along its ramp, above that of shear waves in the softest tissue (`limit`, m/s).
+ * Motion `index` has a speed of `value` m/s along its ramp, above that of shear waves in the softest tissue (`limit`,
+ * m/s).
  */
 #define SUPPLE_REMARK_SPEED 9
 
@@ -262,10 +266,10 @@
 #define SUPPLE_REMARK_OTHER_TISSUE 11
 
 /**
- * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not done, and
- * nothing has changed, except that memory handed to a function that prepares an object may hold none afterwards, that forces
- * are those of the step that was refused, or zero after a critical step, and what supple_learned_step says of a refused one.
- * Numbers are never given another meaning.
+ * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not
+ * done, and nothing has changed, except that memory handed to a function that prepares an object may hold none
+ * afterwards, that forces are those of the step that was refused, or zero after a critical step, and what
+ * supple_learned_step says of a refused one. Numbers are never given another meaning.
  */
 enum supple_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -277,9 +281,9 @@ enum supple_status
      */
     SUPPLE_OK = 0,
     /**
-     * Steps were taken, but are not exact: elements are beyond the range of their law, there is more kinetic energy than
-     * loads and supports explain, or a step of a supple_large held much of the motion back. The report tells the first two, also
-     * where a larger remark hides them.
+     * Steps were taken, but are not exact: elements are beyond the range of their law, there is more kinetic energy
+     * than loads and supports explain, or a step of a supple_large held much of the motion back. The report tells the
+     * first two, also where a larger remark hides them.
      */
     SUPPLE_LIMITED = 1,
     /**
@@ -287,7 +291,8 @@ enum supple_status
      */
     SUPPLE_OUTSIDE = 2,
     /**
-     * Exact steps have taken the place of learned ones that were not to be believed. The network is tried again in later steps.
+     * Exact steps have taken the place of learned ones that were not to be believed. The network is tried again in
+     * later steps.
      */
     SUPPLE_FELL_BACK = 3,
     /**
@@ -331,7 +336,8 @@ enum supple_status
      */
     SUPPLE_E_CAPACITY = -9,
     /**
-     * Entry `index` of a list (elements, supports, forces, motions) names a node that is not there (node; limit: nodes).
+     * Entry `index` of a list (elements, supports, forces, motions) names a node that is not there (node; limit:
+     * nodes).
      */
     SUPPLE_E_INDEX = -10,
     /**
@@ -488,22 +494,23 @@ enum supple_status
      */
     SUPPLE_E_DIVERGED = -90,
     /**
-     * The step was not taken: the kinetic energy (value, J), most of it at `node`, is several times what loads and supports
-     * ever gave (limit, J).
+     * The step was not taken: the kinetic energy (value, J), most of it at `node`, is several times what loads and
+     * supports ever gave (limit, J).
      */
     SUPPLE_E_DIVERGED_ENERGY = -91,
     /**
-     * The step was not taken: force `index` (value, N) would move `node` in it through the tissue around it (limit: its size, m).
+     * The step was not taken: force `index` (value, N) would move `node` in it through the tissue around it (limit:
+     * its size, m).
      */
     SUPPLE_E_DIVERGED_FORCE = -92,
     /**
-     * The step was not taken: supports moved `node` by too much in the step before (value, m) for the tissue around it (limit: its size,
-     * m).
+     * The step was not taken: supports moved `node` by too much in the step before (value, m) for the tissue around it
+     * (limit: its size, m).
      */
     SUPPLE_E_DIVERGED_MOTION = -93,
     /**
-     * The step was not taken: instrument `index` would move farther in it, or is farther inside the body at a node, (value, m) than it
-     * may (limit): start outside, move slower.
+     * The step was not taken: instrument `index` would move farther in it, or is farther inside the body at a node,
+     * (value, m) than it may (limit): start outside, move slower.
      */
     SUPPLE_E_DIVERGED_INSTRUMENT = -94,
     /**
@@ -525,8 +532,8 @@ typedef int32_t supple_status;
 typedef struct supple_adaptive supple_adaptive;
 
 /**
- * Instruments, the nodes that they can touch, and what a state keeps of them. It belongs to one state: save and restore both, or
- * prepare it again. One thread at a time; a call that takes steps changes it.
+ * Instruments, the nodes that they can touch, and what a state keeps of them. It belongs to one state: save and
+ * restore both, or prepare it again. One thread at a time; a call that takes steps changes it.
  */
 typedef struct supple_contact supple_contact;
 
@@ -536,14 +543,14 @@ typedef struct supple_contact supple_contact;
 typedef struct supple_guard supple_guard;
 
 /**
- * Inertia for steps of one length, computed anew a little in each step. One thread at a time. It may be copied with memcpy
- * together with its state.
+ * Inertia for steps of one length, computed anew a little in each step. One thread at a time. It may be copied with
+ * memcpy together with its state.
  */
 typedef struct supple_large supple_large;
 
 /**
- * A network, and what it keeps for each node of one state. One thread at a time. It may be copied with memcpy; copies use the
- * same weights.
+ * A network, and what it keeps for each node of one state. One thread at a time. It may be copied with memcpy; copies
+ * use the same weights.
  */
 typedef struct supple_learned supple_learned;
 
@@ -564,8 +571,8 @@ typedef struct supple_reaction supple_reaction;
 typedef struct supple_scene supple_scene;
 
 /**
- * What moves. One thread at a time. It may be copied with memcpy, to any memory aligned to SUPPLE_ALIGN, and the copy goes on as
- * the original would, to the bit.
+ * What moves. One thread at a time. It may be copied with memcpy, to any memory aligned to SUPPLE_ALIGN, and the copy
+ * goes on as the original would, to the bit.
  */
 typedef struct supple_state supple_state;
 
@@ -789,16 +796,16 @@ typedef struct {
 } supple_step_config;
 
 /**
- * Computes part `part` of what `work` stands for. It may be called from any thread, once for each part; a second call for the
- * same part does nothing.
+ * Computes part `part` of what `work` stands for. It may be called from any thread, once for each part; a second call
+ * for the same part does nothing.
  */
 typedef void (*supple_part)(const void *work, uint32_t part);
 
 /**
- * Threads of the host. A step calls `each` two to four times: it shall call `part(work, p)` for every `p` below `parts`, on
- * whichever threads, at the same time or not, and return when all those calls have. Parts share nothing, and the result does not
- * depend on where they run, to the bit. What `each` leaves out is computed when it has returned. It must return: no exception and
- * no longjmp may leave it.
+ * Threads of the host. A step calls `each` two to four times: it shall call `part(work, p)` for every `p` below
+ * `parts`, on whichever threads, at the same time or not, and return when all those calls have. Parts share nothing,
+ * and the result does not depend on where they run, to the bit. What `each` leaves out is computed when it has
+ * returned. It must return: no exception and no longjmp may leave it.
  */
 typedef struct {
     /**
@@ -820,8 +827,8 @@ typedef struct {
  */
 typedef struct {
     /**
-     * Simulated time at the end, s; of a step that was not taken, at its start; zero, and all else as if there had been no step,
-     * if the call was refused before its first.
+     * Simulated time at the end, s; of a step that was not taken, at its start; zero, and all else as if there had
+     * been no step, if the call was refused before its first.
      */
     double time;
     /**
@@ -841,8 +848,8 @@ typedef struct {
      */
     uint32_t node;
     /**
-     * Smallest volume of an element over its volume at rest, at the start of any of the steps: below 0.1 the law went on along
-     * its tangent.
+     * Smallest volume of an element over its volume at rest, at the start of any of the steps: below 0.1 the law went
+     * on along its tangent.
      */
     float least_volume_ratio;
     /**
@@ -850,7 +857,8 @@ typedef struct {
      */
     float saturation;
     /**
-     * Kinetic energy beyond the energy balance, as a share of the most that was ever in it; above 0 it is remarked upon.
+     * Kinetic energy beyond the energy balance, as a share of the most that was ever in it; above 0 it is remarked
+     * upon.
      */
     float energy_excess;
     /**
@@ -870,8 +878,8 @@ typedef struct {
      */
     uint32_t held_back;
     /**
-     * Multilevel and damped steps: the least share of the lattice's motion that was used in a step; below 0.5 it is remarked
-     * upon.
+     * Multilevel and damped steps: the least share of the lattice's motion that was used in a step; below 0.5 it is
+     * remarked upon.
      */
     float lattice_share;
     /**
@@ -903,11 +911,13 @@ typedef struct {
  */
 typedef struct {
     /**
-     * Numbers of the nodes, those of the boundary; NULL: the first `node_count` nodes, all of them with the scene's number.
+     * Numbers of the nodes, those of the boundary; NULL: the first `node_count` nodes, all of them with the scene's
+     * number.
      */
     const uint32_t *nodes;
     /**
-     * Numbers of the three nodes of each triangle between these nodes, where an instrument is thinner than edges are long; else NULL.
+     * Numbers of the three nodes of each triangle between these nodes, where an instrument is thinner than edges are
+     * long; else NULL.
      */
     const uint32_t *triangles;
     /**
@@ -943,7 +953,8 @@ typedef struct {
      */
     uint32_t shape;
     /**
-     * Of a sphere or capsule, m. Below the length of the surface's edges the surface needs triangles: else it passes between nodes.
+     * Of a sphere or capsule, m. Below the length of the surface's edges the surface needs triangles: else it passes
+     * between nodes.
      */
     float radius;
     /**
@@ -981,7 +992,8 @@ typedef struct {
      */
     float moment[3];
     /**
-     * Mean of the force over the steps of the latest call that took steps, N; of supple_adaptive_advance that of the latest step.
+     * Mean of the force over the steps of the latest call that took steps, N; of supple_adaptive_advance that of the
+     * latest step.
      */
     float mean_force[3];
     /**
@@ -1033,8 +1045,8 @@ typedef struct {
 } supple_contact_point;
 
 /**
- * The force on an instrument between two frames, for a haptic loop: supple_local_force_follow after each frame, supple_local_force_at
- * as often as you like, on any thread, on a copy. Begin with all zero.
+ * The force on an instrument between two frames, for a haptic loop: supple_local_force_follow after each frame,
+ * supple_local_force_at as often as you like, on any thread, on a copy. Begin with all zero.
  */
 typedef struct {
     /**
@@ -1046,7 +1058,8 @@ typedef struct {
      */
     float force[3];
     /**
-     * Change of the force with the position, N/m, symmetric: force = force + stiffness (position - position in the frame).
+     * Change of the force with the position, N/m, symmetric: force = force + stiffness (position - position in the
+     * frame).
      */
     float stiffness[3][3];
     /**
@@ -1073,7 +1086,8 @@ typedef struct {
     uint32_t abi;
     /**
      * 1: a learned step that diverges, or has more kinetic energy than loads and supports explain, is undone and exact
-     * steps take its place and that of some more, before the network is tried again. 0: the caller decides by status and report. 1 needs memory for two vectors a node more.
+     * steps take its place and that of some more, before the network is tried again. 0: the caller decides by status
+     * and report. 1 needs memory for two vectors a node more.
      */
     uint32_t fallback;
     /**
@@ -1081,8 +1095,8 @@ typedef struct {
      */
     uint32_t reserved;
     /**
-     * A weight file, at a multiple of 4 bytes, better of 64. It is used where it is, without a copy: it must stay, unchanged, as
-     * long as the object is used.
+     * A weight file, at a multiple of 4 bytes, better of 64. It is used where it is, without a copy: it must stay,
+     * unchanged, as long as the object is used.
      */
     const void *weights;
     /**
@@ -1150,8 +1164,8 @@ typedef struct {
      */
     float seconds;
     /**
-     * Damping proportional to mass, 1/s, zero or more. That of supple_step_config is not used here: give the same value twice if
-     * both kinds of steps move a state.
+     * Damping proportional to mass, 1/s, zero or more. That of supple_step_config is not used here: give the same
+     * value twice if both kinds of steps move a state.
      */
     float damping;
     /**
@@ -1159,8 +1173,8 @@ typedef struct {
      */
     uint32_t cells[3];
     /**
-     * NULL: the damper that is part of the library. Otherwise, for SUPPLE_DAMPED, the weight file of another one, at a multiple
-     * of 4 bytes. It is used where it is and must stay.
+     * NULL: the damper that is part of the library. Otherwise, for SUPPLE_DAMPED, the weight file of another one, at a
+     * multiple of 4 bytes. It is used where it is and must stay.
      */
     const void *weights;
     /**
@@ -1187,14 +1201,15 @@ typedef struct {
     float seconds;
     float damping;
     /**
-     * How many times as long the second run's steps are, at least 1 and at least the number of steps between two calls of
-     * supple_guard_follow. More costs less time, about a multilevel step in so many, and calls more right steps inexact. 3 is a good
-     * choice, the steps of a frame another; 1 for learned steps.
+     * How many times as long the second run's steps are, at least 1 and at least the number of steps between two calls
+     * of supple_guard_follow. More costs less time, about a multilevel step in so many, and calls more right steps
+     * inexact. 3 is a good choice, the steps of a frame another; 1 for learned steps.
      */
     uint32_t every;
     /**
-     * Mean error of the nodes that is allowed, m; 0: a fifth of the mean motion so far, where that is more than a millimetre and a
-     * hundredth of the size of the body, of a body that has moved by less than its error more than a tenth of that.
+     * Mean error of the nodes that is allowed, m; 0: a fifth of the mean motion so far, where that is more than a
+     * millimetre and a hundredth of the size of the body, of a body that has moved by less than its error more than a
+     * tenth of that.
      */
     float tolerance;
 } supple_guard_config;
@@ -1256,7 +1271,8 @@ typedef struct {
  */
 typedef struct {
     /**
-     * 1 if there is a force; 0 at the first call, after a reset or a restore, and where it is no finite number: the other fields mean nothing.
+     * 1 if there is a force; 0 at the first call, after a reset or a restore, and where it is no finite number: the
+     * other fields mean nothing.
      */
     uint32_t known;
     /**
@@ -1317,27 +1333,27 @@ const char *supple_version(void);
 const char *supple_status_text(int32_t status);
 
 /**
- * Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant. With
- * SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more.
+ * Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant.
+ * With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more.
  */
 size_t supple_scene_size(uint32_t nodes,
                          uint32_t elements,
                          uint32_t tissues);
 
 /**
- * Bytes of memory that a scene with SUPPLE_NODAL_STRAIN needs more than supple_scene_size: enough to build it from any mesh whose
- * elements of a tissue around a node are joined by faces, with at most 48 neighbours of a node. For others supple_scene_init
- * returns SUPPLE_E_SHORT, and the error's limit is enough. The scene takes about half of these bytes: supple_scene_describe tells.
- * SUPPLE_PATCHES_SIZE is the same as a constant.
+ * Bytes of memory that a scene with SUPPLE_NODAL_STRAIN needs more than supple_scene_size: enough to build it from any
+ * mesh whose elements of a tissue around a node are joined by faces, with at most 48 neighbours of a node. For others
+ * supple_scene_init returns SUPPLE_E_SHORT, and the error's limit is enough. The scene takes about half of these
+ * bytes: supple_scene_describe tells. SUPPLE_PATCHES_SIZE is the same as a constant.
  */
 size_t supple_patches_size(uint32_t nodes,
                            uint32_t elements,
                            uint32_t tissues);
 
 /**
- * Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size, aligned to
- * SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning of that memory. What it takes of it is told by
- * supple_scene_describe; the rest is free for other use.
+ * Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size,
+ * aligned to SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning of that memory. What it takes of it is
+ * told by supple_scene_describe; the rest is free for other use.
  *
  * @param error may be NULL; index is that of an element, a support or a node as the status says.
  */
@@ -1353,7 +1369,8 @@ supple_status supple_scene_init(void *memory,
 supple_status supple_scene_describe(const supple_scene *scene, supple_scene_facts *facts);
 
 /**
- * Bytes of memory that loads need with room for so many forces and motions. SUPPLE_LOADS_SIZE is the same as a constant.
+ * Bytes of memory that loads need with room for so many forces and motions. SUPPLE_LOADS_SIZE is the same as a
+ * constant.
  */
 size_t supple_loads_size(uint32_t forces,
                          uint32_t motions);
@@ -1385,7 +1402,8 @@ supple_status supple_set_forces(supple_loads *loads,
                                 supple_error *error);
 
 /**
- * Replaces all motions by `count` others, which are copied; none with a count of zero: moved nodes then stay where they are.
+ * Replaces all motions by `count` others, which are copied; none with a count of zero: moved nodes then stay where
+ * they are.
  *
  * @param error may be NULL; index is that of a motion.
  */
@@ -1396,8 +1414,8 @@ supple_status supple_set_motions(supple_loads *loads,
                                  supple_error *error);
 
 /**
- * Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is the same
- * as a constant.
+ * Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is
+ * the same as a constant.
  *
  * @param element of the scene: SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
  */
@@ -1419,16 +1437,17 @@ supple_status supple_state_init(void *memory,
 supple_status supple_state_reset(supple_state *state);
 
 /**
- * Stops all motion: nodes and time stay as they are, velocities are zero, and the energy balance begins with the strain energy. To go on
- * after SUPPLE_E_DIVERGED_ENERGY from a state that was not saved before. A supple_learned needs a new lead-in.
+ * Stops all motion: nodes and time stay as they are, velocities are zero, and the energy balance begins with the
+ * strain energy. To go on after SUPPLE_E_DIVERGED_ENERGY from a state that was not saved before. A supple_learned
+ * needs a new lead-in.
  */
 supple_status supple_state_stop(const supple_scene *scene,
                                 supple_state *state);
 
 /**
- * Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as
- * long as some six steps, with nodal pressure some twenty, with nodal strain some thirty; tissue that is deformed is stiffer, so ask
- * again from time to time.
+ * Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as long as
+ * some six steps, with nodal pressure some twenty, with nodal strain some thirty; tissue that is deformed is stiffer,
+ * so ask again from time to time.
  *
  * @param seconds receives the step, s.
  * @param node may be NULL; receives the node that sets it.
@@ -1455,8 +1474,8 @@ supple_status supple_set_step(const supple_scene *scene,
 supple_status supple_state_time(const supple_state *state, double *seconds, uint64_t *steps);
 
 /**
- * Takes `count` exact steps. Stops at the first that is not to be believed: that one is not taken, the state is as before it,
- * and the status tells.
+ * Takes `count` exact steps. Stops at the first that is not to be believed: that one is not taken, the state is as
+ * before it, and the status tells.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
@@ -1470,8 +1489,8 @@ supple_status supple_step(const supple_scene *scene,
                           supple_report *report);
 
 /**
- * Tells where the displacements of a state are, m. They stay there for as long as the state does; read them between calls that
- * change it.
+ * Tells where the displacements of a state are, m. They stay there for as long as the state does; read them between
+ * calls that change it.
  */
 supple_status supple_displacements(const supple_state *state,
                                    supple_vectors *vectors);
@@ -1502,11 +1521,11 @@ supple_status supple_copy_positions(const supple_state *state,
 supple_status supple_copy_velocities(const supple_state *state, float *out, size_t floats);
 
 /**
- * Copies the total force on each node at the start of the latest step, also of one that was refused, N: that of the loads with
- * that of the tissue. At held nodes it is what presses on the support, and so what a hand that holds the instrument feels, apart
- * from the inertia of a moved one; the support presses back with the opposite. Not so after steps of a supple_large: raised inertia
- * delays the tissue, and the force is that of a shape that lags behind. Zero after supple_critical_step or supple_set_step, also where these
- * refuse what they computed, until the next step.
+ * Copies the total force on each node at the start of the latest step, also of one that was refused, N: that of the
+ * loads with that of the tissue. At held nodes it is what presses on the support, and so what a hand that holds the
+ * instrument feels, apart from the inertia of a moved one; the support presses back with the opposite. Not so after
+ * steps of a supple_large: raised inertia delays the tissue, and the force is that of a shape that lags behind. Zero
+ * after supple_critical_step or supple_set_step, also where these refuse what they computed, until the next step.
  *
  * @param floats room in `out`: three times the nodes at least.
  */
@@ -1515,7 +1534,8 @@ supple_status supple_copy_forces(const supple_state *state,
                                  size_t floats);
 
 /**
- * Bytes of memory that a supple_contact needs for a surface of so many nodes and triangles, of which so many nodes can be held at once.
+ * Bytes of memory that a supple_contact needs for a surface of so many nodes and triangles, of which so many nodes can
+ * be held at once.
  */
 size_t supple_contact_size(uint32_t nodes,
                            uint32_t triangles,
@@ -1527,8 +1547,8 @@ size_t supple_contact_size(uint32_t nodes,
  * @param points of all nodes of the scene at rest, m, three coordinates each.
  * @param surface what can be touched; it is copied.
  * @param grips most nodes that instruments hold at once.
- * @param error may be NULL; index is the place in the nodes of `surface`, or that of a triangle with a corner that is not among these
- * nodes, or twice the same.
+ * @param error may be NULL; index is the place in the nodes of `surface`, or that of a triangle with a corner that is
+ * not among these nodes, or twice the same.
  */
 supple_status supple_contact_init(void *memory,
                                   size_t bytes,
@@ -1540,7 +1560,8 @@ supple_status supple_contact_init(void *memory,
                                   supple_error *error);
 
 /**
- * Replaces all instruments by `count` others, which stand still where they are; none with a count of zero. What was held is let go.
+ * Replaces all instruments by `count` others, which stand still where they are; none with a count of zero. What was
+ * held is let go.
  *
  * @param error may be NULL; index is that of an instrument.
  */
@@ -1550,8 +1571,8 @@ supple_status supple_set_instruments(supple_contact *contact,
                                      supple_error *error);
 
 /**
- * Lets an instrument move on a line, and turn evenly, from where it is at the time `from` (s) to `pose` at the time `to`, usually the
- * times of the state now and at the end of the frame. Before and after it stands still.
+ * Lets an instrument move on a line, and turn evenly, from where it is at the time `from` (s) to `pose` at the time
+ * `to`, usually the times of the state now and at the end of the frame. Before and after it stands still.
  *
  * @param error may be NULL.
  */
@@ -1563,8 +1584,9 @@ supple_status supple_move_instrument(supple_contact *contact,
                                      supple_error *error);
 
 /**
- * Lets an instrument hold the nodes of the surface that are nearer to it than `within` (m) now, where they are, as forceps do; those that
- * it or another one holds already it leaves as they are. They move with it, whatever force that takes, until supple_let_go.
+ * Lets an instrument hold the nodes of the surface that are nearer to it than `within` (m) now, where they are, as
+ * forceps do; those that it or another one holds already it leaves as they are. They move with it, whatever force that
+ * takes, until supple_let_go.
  *
  * @param held may be NULL; receives how many nodes it holds.
  */
@@ -1580,8 +1602,8 @@ supple_status supple_grasp(supple_contact *contact,
 supple_status supple_let_go(supple_contact *contact, uint32_t instrument);
 
 /**
- * Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned and mass-scaled
- * steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
+ * Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned
+ * and mass-scaled steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
  */
 supple_status supple_set_contact(supple_loads *loads,
                                  supple_contact *contact);
@@ -1630,18 +1652,19 @@ size_t supple_saved_size(uint32_t nodes);
 supple_status supple_save(const supple_state *state, void *to, size_t bytes);
 
 /**
- * Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the saved one
- * would have, to the bit. Forces are zero until the next step. A saved state with a time, a displacement or an increment that is not
- * finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE. A supple_large has to be prepared again, and a
- * supple_learned needs a new lead-in; for the same bits with these, copy their objects with memcpy as well.
+ * Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the
+ * saved one would have, to the bit. Forces are zero until the next step. A saved state with a time, a displacement or
+ * an increment that is not finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE. A supple_large
+ * has to be prepared again, and a supple_learned needs a new lead-in; for the same bits with these, copy their objects
+ * with memcpy as well.
  */
 supple_status supple_restore(supple_state *state,
                              const void *from,
                              size_t bytes);
 
 /**
- * Bytes of memory that learned steps of so many nodes need, with fallback (1) or without (0). SUPPLE_LEARNED_SIZE is the
- * same as a constant.
+ * Bytes of memory that learned steps of so many nodes need, with fallback (1) or without (0). SUPPLE_LEARNED_SIZE is
+ * the same as a constant.
  */
 size_t supple_learned_size(uint32_t nodes,
                            uint32_t fallback);
@@ -1669,9 +1692,10 @@ supple_status supple_learned_reset(supple_learned *learned);
 supple_status supple_learned_describe(const supple_learned *learned, supple_learned_facts *facts);
 
 /**
- * The lead-in: exact steps for `seconds` while the frames of the nodes follow, in the nearest whole number of the network's steps
- * (seconds of supple_learned_facts), which may be none. The network can take over at the end of it. In the paper it lasts 0.3 s
- * from rest. Motions go evenly over all of it. Seconds that are negative or not finite: SUPPLE_E_NEGATIVE.
+ * The lead-in: exact steps for `seconds` while the frames of the nodes follow, in the nearest whole number of the
+ * network's steps (seconds of supple_learned_facts), which may be none. The network can take over at the end of it. In
+ * the paper it lasts 0.3 s from rest. Motions go evenly over all of it. Seconds that are negative or not finite:
+ * SUPPLE_E_NEGATIVE.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
@@ -1686,10 +1710,11 @@ supple_status supple_learned_lead(const supple_scene *scene,
                                   supple_report *report);
 
 /**
- * Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. With fallback a step
- * that is not to be believed is undone, and exact steps take its place and that of the next seven, where it happens again of more, before
- * the network is tried again: SUPPLE_FELL_BACK. Without fallback the call stops at the first such step: it is not taken, displacements and
- * time are as before it, velocities may be those of the network's own step, and a new lead-in is needed.
+ * Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. With
+ * fallback a step that is not to be believed is undone, and exact steps take its place and that of the next seven,
+ * where it happens again of more, before the network is tried again: SUPPLE_FELL_BACK. Without fallback the call stops
+ * at the first such step: it is not taken, displacements and time are as before it, velocities may be those of the
+ * network's own step, and a new lead-in is needed.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
@@ -1704,8 +1729,9 @@ supple_status supple_learned_step(const supple_scene *scene,
                                   supple_report *report);
 
 /**
- * To be called whenever a supple_guard calls learned steps inexact (SUPPLE_INEXACT): with fallback exact steps take the place of the
- * next eight, where it happens again of more, before the network is tried again. Without fallback nothing changes.
+ * To be called whenever a supple_guard calls learned steps inexact (SUPPLE_INEXACT): with fallback exact steps take
+ * the place of the next eight, where it happens again of more, before the network is tried again. Without fallback
+ * nothing changes.
  */
 supple_status supple_learned_fall_back(supple_learned *learned,
                                        const supple_state *state);
@@ -1724,8 +1750,8 @@ supple_status supple_large_size(const supple_scene *scene,
                                 supple_error *error);
 
 /**
- * Prepares steps beyond the critical one, from the state as it is, in `memory` of at least supple_large_size bytes, aligned to
- * SUPPLE_ALIGN. It takes as long as some steps.
+ * Prepares steps beyond the critical one, from the state as it is, in `memory` of at least supple_large_size bytes,
+ * aligned to SUPPLE_ALIGN. It takes as long as some steps.
  *
  * @param points the points that the scene was built from, three coordinates each.
  * @param error may be NULL.
@@ -1740,8 +1766,8 @@ supple_status supple_large_init(void *memory,
                                 supple_error *error);
 
 /**
- * Takes `count` steps of the prepared method and length. Stops at the first that is not to be believed: that one is not taken,
- * the state is as before it, and the status tells. They need no supple_set_step.
+ * Takes `count` steps of the prepared method and length. Stops at the first that is not to be believed: that one is
+ * not taken, the state is as before it, and the status tells. They need no supple_set_step.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone. What a cycle assembles and inverts runs on that one in any case.
@@ -1767,8 +1793,8 @@ supple_status supple_guard_size(const supple_scene *scene,
                                 supple_error *error);
 
 /**
- * Prepares a guard, from the state as it is, in `memory` of at least supple_guard_size bytes, aligned to SUPPLE_ALIGN. It takes as
- * long as some steps.
+ * Prepares a guard, from the state as it is, in `memory` of at least supple_guard_size bytes, aligned to SUPPLE_ALIGN.
+ * It takes as long as some steps.
  *
  * @param points the points that the scene was built from, three coordinates each.
  * @param error may be NULL.
@@ -1783,9 +1809,9 @@ supple_status supple_guard_init(void *memory,
                                 supple_error *error);
 
 /**
- * To be called after each call that moves the state, with the same loads, at the latest after `every` steps of the configuration.
- * Now and then it moves the second run and compares. SUPPLE_INEXACT if the estimate exceeds what is allowed. A state that was reset or
- * restored begins a new second run.
+ * To be called after each call that moves the state, with the same loads, at the latest after `every` steps of the
+ * configuration. Now and then it moves the second run and compares. SUPPLE_INEXACT if the estimate exceeds what is
+ * allowed. A state that was reset or restored begins a new second run.
  *
  * @param loads as of the steps; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
@@ -1812,8 +1838,8 @@ supple_status supple_adaptive_size(const supple_scene *scene,
                                    supple_error *error);
 
 /**
- * Prepares adaptive steps, from the state as it is, in `memory` of at least supple_adaptive_size bytes, aligned to SUPPLE_ALIGN. It
- * takes as long as some steps. They begin as exact steps.
+ * Prepares adaptive steps, from the state as it is, in `memory` of at least supple_adaptive_size bytes, aligned to
+ * SUPPLE_ALIGN. It takes as long as some steps. They begin as exact steps.
  *
  * @param points the points that the scene was built from, three coordinates each.
  * @param config of the steps beyond the critical one; its `seconds` are those of the longest step, usually a frame.
@@ -1831,10 +1857,10 @@ supple_status supple_adaptive_init(void *memory,
                                    supple_error *error);
 
 /**
- * Moves on by `seconds`, usually a frame, and ends there exactly. SUPPLE_INEXACT if the estimate of the error exceeded the tolerance at
- * any step: steps become shorter at once, down to exact ones, but an error that is there stays until the body has forgotten it. A
- * step that is not to be believed is taken again with shorter ones; where exact ones are not either, the state is that before it, and
- * the status tells.
+ * Moves on by `seconds`, usually a frame, and ends there exactly. SUPPLE_INEXACT if the estimate of the error exceeded
+ * the tolerance at any step: steps become shorter at once, down to exact ones, but an error that is there stays until
+ * the body has forgotten it. A step that is not to be believed is taken again with shorter ones; where exact ones are
+ * not either, the state is that before it, and the status tells.
  *
  * @param loads what acts; NULL: nothing, supports stand still. Motions without a ramp go evenly over the call.
  * @param threads NULL: the calling thread alone.
@@ -1856,8 +1882,8 @@ supple_status supple_adaptive_advance(const supple_scene *scene,
 size_t supple_reaction_size(uint32_t nodes);
 
 /**
- * Prepares the reaction of some supports in `memory` of at least supple_reaction_size bytes, aligned to SUPPLE_ALIGN. It takes as long
- * as some hundred steps.
+ * Prepares the reaction of some supports in `memory` of at least supple_reaction_size bytes, aligned to SUPPLE_ALIGN.
+ * It takes as long as some hundred steps.
  *
  * @param supports numbers of nodes that the scene holds, an instrument's for example.
  * @param count how many, at least 1.
@@ -1874,8 +1900,8 @@ supple_status supple_reaction_init(void *memory,
                                    supple_error *error);
 
 /**
- * Writes the mean force by which the supports have acted since the last call. To be called before the first step and after each
- * frame's steps, of any kind.
+ * Writes the mean force by which the supports have acted since the last call. To be called before the first step and
+ * after each frame's steps, of any kind.
  */
 supple_status supple_reaction_follow(const supple_scene *scene,
                                      supple_state *state,
@@ -1883,8 +1909,8 @@ supple_status supple_reaction_follow(const supple_scene *scene,
                                      supple_reaction_force *force);
 
 /**
- * Writes what in a scene looks as if a unit or a number was mistaken; it can be simulated all the same. To be called once, before the
- * first step. It takes as long as some steps.
+ * Writes what in a scene looks as if a unit or a number was mistaken; it can be simulated all the same. To be called
+ * once, before the first step. It takes as long as some steps.
  *
  * @param points the points that the scene was built from, three coordinates each.
  * @param loads NULL: nothing is said of loads.

@@ -11,15 +11,17 @@
 //! steps. Hence two limits: beyond the balance the step is called inexact, beyond four times
 //! the most that it ever was the step has diverged.
 //!
-//! A balance that is only added to says less and less: its uncertainty grows, a violent moment leaves a slack that a quiet
-//! body never needs, and what networks and added inertia take from the motion is not entered. So the energy is measured as
-//! well, in cycles: each step computes the strain energy of a few elements. What the body can have at the end of a cycle is at most
+//! A balance that is only added to says less and less: its uncertainty grows, a violent moment leaves a slack that a
+//! quiet body never needs, and what networks and added inertia take from the motion is not entered. So the energy is
+//! measured as well, in cycles: each step computes the strain energy of a few elements. What the body can have at the
+//! end of a cycle is at most
 //!
 //! ```text
 //! 2 (U + T) + A        U: strain energy, each element once;  T: the largest kinetic energy;  A: absolute work in the cycle
 //! ```
-//! Energy changes its form and its place during a cycle. For a motion in one mode `U + T` is never less than its energy, because `T`
-//! is the largest; 2 is a safeguard for others. Where the balance allows more than that, it is set to what was measured.
+//! Energy changes its form and its place during a cycle. For a motion in one mode `U + T` is never less than its
+//! energy, because `T` is the largest; 2 is a safeguard for others. Where the balance allows more than that, it is set
+//! to what was measured.
 
 /// Energy balance of a state, J.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,8 +132,9 @@ impl EnergyBalance {
         Self { peak: if balance > self.peak { balance } else { self.peak }, ..entered }
     }
 
-    /// The balance with `strain`, the strain energy of the elements up to place `next`, none if that was the last. Added inertia
-    /// has `added` times the kinetic energy of the masses; `rounding` is the energy of a strain that may be rounding.
+    /// The balance with `strain`, the strain energy of the elements up to place `next`, none if that was the last.
+    /// Added inertia has `added` times the kinetic energy of the masses; `rounding` is the energy of a strain that may
+    /// be rounding.
     pub(crate) fn measured(mut self, strain: f64, next: Option<u32>, added: f64, rounding: f64) -> Self {
         let cycle = &mut self.cycle;
         cycle.strain += strain;

@@ -137,7 +137,8 @@ pub struct Loads<'a> {
 
 /// Loads of each step of a span of time, for prescribed motions that go on within it.
 pub trait LoadsOverTime {
-    /// Loads of the next step of `seconds`, from this state; so many steps are left to the end of the span, this one included.
+    /// Loads of the next step of `seconds`, from this state; so many steps are left to the end of the span, this one
+    /// included.
     fn of_step(&mut self, state: &StateView<'_>, seconds: f32, left: u32) -> Loads<'_>;
 }
 
@@ -147,7 +148,8 @@ impl LoadsOverTime for Loads<'_> {
     }
 }
 
-/// Loads of a call that moves a scene on: motions without a ramp go evenly over the whole call, from where their nodes are.
+/// Loads of a call that moves a scene on: motions without a ramp go evenly over the whole call, from where their nodes
+/// are.
 #[derive(Debug)]
 pub struct LoadsOfCall<'a> {
     /// With the motions as they are asked for.
@@ -209,14 +211,9 @@ impl<'a> Loads<'a> {
         Ok(Self { gravity, forces, motions, contact: None, given: None, nodes: Some(nodes) })
     }
 
-    /// Loads that the caller has checked against a scene of so many nodes. Of those that have not been, nodes that do not exist and
-    /// axes that are not held are ignored, and values that are not finite make a step diverge.
-    pub const fn unchecked(
-        gravity: [f32; 3],
-        forces: &'a [NodalForce],
-        motions: &'a [Motion],
-        nodes: usize,
-    ) -> Self {
+    /// Loads that the caller has checked against a scene of so many nodes. Of those that have not been, nodes that do
+    /// not exist and axes that are not held are ignored, and values that are not finite make a step diverge.
+    pub const fn unchecked(gravity: [f32; 3], forces: &'a [NodalForce], motions: &'a [Motion], nodes: usize) -> Self {
         Self { gravity, forces, motions, contact: None, given: None, nodes: Some(nodes) }
     }
 
@@ -227,7 +224,8 @@ impl<'a> Loads<'a> {
         Self { contact: Some(contact), ..self }
     }
 
-    /// Loads with the pushes that the instruments exert in the latest step of a state in place of the instruments, if it keeps them.
+    /// Loads with the pushes that the instruments exert in the latest step of a state in place of the instruments, if
+    /// it keeps them.
     pub(crate) fn with_pushes_of<'b>(&self, state: &'b StateView<'_>) -> Loads<'b>
     where
         'a: 'b,
@@ -271,9 +269,9 @@ impl<'a> Loads<'a> {
         self.motions
     }
 
-    /// Calls `prescribe` with each node and axis that a motion moves, the position there at `time` (s), m, and the node's vector. Of
-    /// several motions of an axis the last one holds: they come last first, and the axes that are done are marked in the padding
-    /// of the vectors ([`crate::padding`]).
+    /// Calls `prescribe` with each node and axis that a motion moves, the position there at `time` (s), m, and the
+    /// node's vector. Of several motions of an axis the last one holds: they come last first, and the axes that are
+    /// done are marked in the padding of the vectors ([`crate::padding`]).
     pub(crate) fn each_prescribed(
         &self,
         time: f64,
@@ -325,12 +323,7 @@ pub fn traction<'a>(
         triangle.into_iter().map(move |node| {
             let Some(share) = share else {
                 let missing = triangle.into_iter().find(|&node| node as usize >= nodes);
-                return Err(LoadError::Node {
-                    kind: "triangle",
-                    index,
-                    node: missing.unwrap_or(node),
-                    nodes,
-                });
+                return Err(LoadError::Node { kind: "triangle", index, node: missing.unwrap_or(node), nodes });
             };
             let newton = pascal.map(|component| component * share);
             check("traction", index, node, nodes, &newton, ramp)?;

@@ -1,4 +1,5 @@
-//! Data kept in spare bits of nodal vectors, so that a pass over the nodes reads one vector less. Everything of that kind:
+//! Data kept in spare bits of nodal vectors, so that a pass over the nodes reads one vector less. Everything of that
+//! kind:
 //!
 //! | where | what | written by | read by |
 //! |---|---|---|---|

@@ -1,7 +1,8 @@
-//! Does a scene look as if a unit or a number was mistaken? What no tissue and no instrument has is simulated all the same, but remarked
-//! upon before the first step: size (m), mass (kg), density (kg/m^3), Young's modulus (Pa), Poisson's ratio, gravity (m/s^2),
-//! forces (N), prescribed motions (m and m/s, the latter against `sqrt(mu / rho)`, the speed of shear waves at rest in the softest
-//! tissue), supports counted from one, and a network that learned another tissue.
+//! Does a scene look as if a unit or a number was mistaken? What no tissue and no instrument has is simulated all the
+//! same, but remarked upon before the first step: size (m), mass (kg), density (kg/m^3), Young's modulus (Pa),
+//! Poisson's ratio, gravity (m/s^2), forces (N), prescribed motions (m and m/s, the latter against `sqrt(mu / rho)`,
+//! the speed of shear waves at rest in the softest tissue), supports counted from one, and a network that learned
+//! another tissue.
 
 use core::fmt;
 use core::ops::RangeInclusive;
@@ -224,12 +225,10 @@ pub fn of_gravity(gravity: [f32; 3]) -> Option<Remark> {
     (size > MOST_GRAVITY).then_some(Remark::Gravity(size))
 }
 
-/// Of which nodes are held: whether they have fewer than half as many faces in common as those with numbers one less would have.
+/// Of which nodes are held: whether they have fewer than half as many faces in common as those with numbers one less
+/// would have.
 #[must_use]
-pub fn of_supports(
-    elements: impl Iterator<Item = [usize; 4]>,
-    is_held: impl Fn(usize) -> bool,
-) -> Option<Remark> {
+pub fn of_supports(elements: impl Iterator<Item = [usize; 4]>, is_held: impl Fn(usize) -> bool) -> Option<Remark> {
     let faces = |nodes: [bool; 4]| match nodes.into_iter().filter(|&held| held).count() {
         3 => 1,
         4 => 4,
@@ -244,13 +243,9 @@ pub fn of_supports(
     is_likely.then_some(Remark::CountedFromOne)
 }
 
-/// Calls `say` with all remarks about the body of a scene that was built from these points, m: with the number of the tissue that
-/// one is about, zero for others.
-pub fn of_body<M: ElementMaterial>(
-    scene: SceneView<'_, M>,
-    points: &[[f32; 3]],
-    mut say: impl FnMut(usize, Remark),
-) {
+/// Calls `say` with all remarks about the body of a scene that was built from these points, m: with the number of the
+/// tissue that one is about, zero for others.
+pub fn of_body<M: ElementMaterial>(scene: SceneView<'_, M>, points: &[[f32; 3]], mut say: impl FnMut(usize, Remark)) {
     let of_all = of_size(diagonal(points)).into_iter().chain(of_mass(scene.mass()));
     of_all.for_each(|remark| say(0, remark));
     for (index, Tissue { law, density }) in tissues_of(scene.material).enumerate() {
@@ -284,8 +279,7 @@ fn tissues_of<M: Material>(material: &M) -> impl Iterator<Item = Tissue<M::Law>>
         Laws::One(law) => (material.tissue(0), law, &[][..]),
         Laws::Regions { law, tissues, .. } => (None, law, tissues),
     };
-    let several =
-        several.iter().map(move |tissue| Tissue { law: law.with(tissue.law), density: tissue.density });
+    let several = several.iter().map(move |tissue| Tissue { law: law.with(tissue.law), density: tissue.density });
     one.into_iter().chain(several)
 }
 
@@ -339,7 +333,8 @@ mod tests {
         assert!(matches!(remarks(&points, kilopascal)[..], [Remark::Stiffness(young)] if young < 3.0));
     }
 
-    /// A bar whose nodes have random numbers, as those of a mesher: its end is held, or the nodes after those of the end.
+    /// A bar whose nodes have random numbers, as those of a mesher: its end is held, or the nodes after those of the
+    /// end.
     #[test]
     fn supports_counted_from_one_are_noticed() {
         let points: Vec<_> = BAR.points().collect();
@@ -350,8 +345,7 @@ mod tests {
             numbers.swap(last, (random >> 33) as usize % (last + 1));
         }
         let elements: Vec<_> = BAR.tets().map(|tet| tet.map(|node| numbers[node as usize])).collect();
-        let is_at_end =
-            |number: usize| points.iter().zip(&numbers).any(|(point, &of)| of == number && point[2] == 0.0);
+        let is_at_end = |number: usize| points.iter().zip(&numbers).any(|(point, &of)| of == number && point[2] == 0.0);
         let said = |is_held: &dyn Fn(usize) -> bool| of_supports(elements.iter().copied(), is_held);
         assert_eq!(said(&is_at_end), None);
         assert_eq!(said(&|number| number > 0 && is_at_end(number - 1)), Some(Remark::CountedFromOne));
@@ -360,8 +354,7 @@ mod tests {
 
     #[test]
     fn loads_are_measured_against_the_body() {
-        let body =
-            Proportions::of_tissues(0.1, 1e-4, [(1000.0, Moduli { shear: 1e3, bulk: 3e4 })].into_iter());
+        let body = Proportions::of_tissues(0.1, 1e-4, [(1000.0, Moduli { shear: 1e3, bulk: 3e4 })].into_iter());
         let motion = |metre, ramp| Motion { node: 0, axes: Axes::XYZ, metre: [0.0, metre, 0.0], ramp };
         assert_eq!(body.of_motion(&motion(0.02, 0.1)), None);
         assert!(matches!(body.of_motion(&motion(0.2, 1.0)), Some(Remark::Way { .. })));
@@ -371,10 +364,7 @@ mod tests {
         assert!(matches!(body.of_jump(&motion(0.02, 0.0)), Some(Remark::Jump(_))));
         let force = |newton| NodalForce { node: 0, newton: [newton, 0.0, 0.0], ramp: 0.0 };
         assert_eq!(body.of_forces(&[force(1.0), force(-1.0)]), None);
-        assert!(matches!(
-            body.of_forces(&[force(10.0), force(-10.0)]),
-            Some(Remark::Forces { newton: 20.0, .. })
-        ));
+        assert!(matches!(body.of_forces(&[force(10.0), force(-10.0)]), Some(Remark::Forces { newton: 20.0, .. })));
         assert_eq!(
             (of_gravity([0.0, 0.0, -9.81]), of_gravity([0.0, 0.0, -9810.0])),
             (None, Some(Remark::Gravity(9810.0)))

@@ -1,20 +1,20 @@
 //! The force (N) by which some supports, an instrument for example, act on the tissue.
 //!
-//! At a held node the tissue pulls with its internal force, and that is what exact steps say. After steps beyond the critical one it is
-//! not: raised inertia holds the nodes around a support back, so that the elements there are strained too much. But the
-//! balance of momentum holds for every set of nodes. With weights `w` that are 1 at the supports in question, 0 at all others
-//! and anything between, the supports' force is
+//! At a held node the tissue pulls with its internal force, and that is what exact steps say. After steps beyond the
+//! critical one it is not: raised inertia holds the nodes around a support back, so that the elements there are
+//! strained too much. But the balance of momentum holds for every set of nodes. With weights `w` that are 1 at the
+//! supports in question, 0 at all others and anything between, the supports' force is
 //!
 //! ```text
 //! R = sum_i w_i (m_i a_i + mu m_i v_i - f_i)          f_i: loads and internal forces
 //! ```
-//! where free nodes add nothing in exact motion. In long steps they add the force that their raised inertia takes, so that only the error of
-//! smooth motion is left. Were `w` the displacements of tissue in equilibrium when the supports move by one, small errors of other
-//! displacements would not change the sum, as there `K w = 0`. Here `w` is harmonic on the graph of the mesh, which is close to it and
-//! needs neither law nor solver.
+//! where free nodes add nothing in exact motion. In long steps they add the force that their raised inertia takes, so
+//! that only the error of smooth motion is left. Were `w` the displacements of tissue in equilibrium when the supports
+//! move by one, small errors of other displacements would not change the sum, as there `K w = 0`. Here `w` is harmonic
+//! on the graph of the mesh, which is close to it and needs neither law nor solver.
 //!
-//! `a` is the change of momentum since the last call, so the answer is the mean force over that time. Its difference from the same sum over
-//! the supports alone tells how far the step is from resolving the force ([`Force::spread`]).
+//! `a` is the change of momentum since the last call, so the answer is the mean force over that time. Its difference
+//! from the same sum over the supports alone tells how far the step is from resolving the force ([`Force::spread`]).
 
 use core::fmt;
 
@@ -172,8 +172,8 @@ impl Row {
 }
 
 impl ReactionModel {
-    /// The reaction of these supports of a scene, for steps with this damping (1/s). It takes as long as some hundred steps. `storage`
-    /// of [`vectors_for`] vectors is overwritten.
+    /// The reaction of these supports of a scene, for steps with this damping (1/s). It takes as long as some hundred
+    /// steps. `storage` of [`vectors_for`] vectors is overwritten.
     pub fn prepare<M: Material>(
         scene: SceneView<'_, M>,
         supports: &[u32],
@@ -244,7 +244,8 @@ impl ReactionModel {
     fn between(&self, before: &Sample, now: &Sample) -> Force {
         let seconds = now.time - before.time;
         let count = (now.steps - before.steps) as f64;
-        // Forces are those at the start of a step. Those in the middle of the time are between those of the last steps of both calls.
+        // Forces are those at the start of a step. Those in the middle of the time are between those of the last steps
+        // of both calls.
         let share = if before.steps == 0 { 1.0 } else { (count + 1.0) / (2.0 * count) };
         let of = |before: &Sums, now: &Sums| {
             let damped = 0.5 * f64::from(self.damping) * (before.momentum + now.momentum);
@@ -257,7 +258,8 @@ impl ReactionModel {
     }
 }
 
-/// Gives each free node the mean of its neighbours in all its elements: a weight never leaves 0 to 1. Gives the largest change.
+/// Gives each free node the mean of its neighbours in all its elements: a weight never leaves 0 to 1. Gives the largest
+/// change.
 fn spread_weights<M>(scene: SceneView<'_, M>, rows: &mut [NodeVector]) -> f32 {
     for (tile, lane) in scene.places() {
         let nodes = [0, 1, 2, 3].map(|corner| tile.node(corner, lane));
@@ -323,9 +325,10 @@ impl<S: AsMut<[NodeVector]> + AsRef<[NodeVector]>> Reaction<S> {
         Ok(Self { model, storage })
     }
 
-    /// To be called after each frame's steps, of any kind, with the state that they left: the mean force since the last call. None at
-    /// the first call, after a reset or a restore to an earlier time, for a scene that it was not prepared for, and where it is
-    /// no finite number. Call it before the first step for a force after it. It costs a pass over the nodes.
+    /// To be called after each frame's steps, of any kind, with the state that they left: the mean force since the last
+    /// call. None at the first call, after a reset or a restore to an earlier time, for a scene that it was not
+    /// prepared for, and where it is no finite number. Call it before the first step for a force after it. It costs a
+    /// pass over the nodes.
     pub fn follow<M: Material>(&mut self, scene: SceneView<'_, M>, state: &StateView<'_>) -> Option<Force> {
         self.model.follow(scene, state, self.storage.as_ref())
     }

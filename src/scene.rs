@@ -1,9 +1,9 @@
-//! What is simulated, computed once from a mesh: the tables of its elements ([`ElementTile`]), lumped masses (kg; a quarter of
-//! `rho V` of each element to each of its nodes) and which axes of which nodes are held.
+//! What is simulated, computed once from a mesh: the tables of its elements ([`ElementTile`]), lumped masses (kg; a
+//! quarter of `rho V` of each element to each of its nodes) and which axes of which nodes are held.
 //!
-//! A [`SceneView`] borrows all that, and every step works on one. Who owns the memory chooses: [`VecScene`] on a host with a heap
-//! (feature `std`), [`FixedScene`] for a fixed capacity, which may be a `static`, or memory of any kind through
-//! [`SceneFacts::build`].
+//! A [`SceneView`] borrows all that, and every step works on one. Who owns the memory chooses: [`VecScene`] on a host
+//! with a heap (feature `std`), [`FixedScene`] for a fixed capacity, which may be a `static`, or memory of any kind
+//! through [`SceneFacts::build`].
 
 mod build_error;
 mod owned;
@@ -11,8 +11,8 @@ mod owned;
 use core::ops::{Deref, Range};
 
 use crate::element::{
-    ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, PatchBuilder,
-    PatchRow, Patches, VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
+    ElementFields, ElementMaterial, ElementTile, Elements, MOST_ELEMENTS, NodeInertia, PatchBuilder, PatchRow, Patches,
+    VolumeRows, element_energy, element_fields, patch_energy, stabilising_energy,
 };
 use crate::material::{Element, Law, Laws, Material, Moduli};
 use crate::mesh::partition::{PartitionLayout, Partitions, most_tiles};
@@ -103,8 +103,9 @@ impl SceneFacts {
         has_point_masses: false,
     };
 
-    /// Builds a scene in memory of the caller, `nodes`, `tiles` ([`tiles_for`]) and for nodal strain `patches` ([`patch_rows_for`];
-    /// none otherwise), from a mesh, what it is made of, and its supports; a node may be listed more than once. Allocates nothing.
+    /// Builds a scene in memory of the caller, `nodes`, `tiles` ([`tiles_for`]) and for nodal strain `patches`
+    /// ([`patch_rows_for`]; none otherwise), from a mesh, what it is made of, and its supports; a node may be listed
+    /// more than once. Allocates nothing.
     pub fn build<M: Material>(
         material: &M,
         mesh: &Mesh<'_>,
@@ -135,8 +136,7 @@ impl SceneFacts {
             region: |element| material.region(element),
         };
         let built = builder.build(rows);
-        self.patch_rows =
-            built.map_err(|needed| BuildError::PatchCapacity { needed, capacity: rows.len() })?;
+        self.patch_rows = built.map_err(|needed| BuildError::PatchCapacity { needed, capacity: rows.len() })?;
         Ok(())
     }
 
@@ -160,9 +160,8 @@ impl SceneFacts {
         if material.element() != Element::Linear {
             mark_neighbours(nodes, mesh);
         }
-        let still = |tet: [u32; 4]| {
-            tet.iter().all(|&node| nodes.get(node as usize).is_some_and(NodeInertia::is_left_out))
-        };
+        let still =
+            |tet: [u32; 4]| tet.iter().all(|&node| nodes.get(node as usize).is_some_and(NodeInertia::is_left_out));
         let elements = mesh.tets().enumerate().filter(|&(_, nodes)| !still(nodes));
         let elements = elements.map(|(element, nodes)| Numbered { element, nodes });
         let mut layout = PartitionLayout::of(nodes.len(), elements.clone());
@@ -246,10 +245,7 @@ impl SceneFacts {
     }
 }
 
-fn mark_supports(
-    nodes: &mut [NodeInertia],
-    supports: impl Iterator<Item = Support>,
-) -> Result<(), BuildError> {
+fn mark_supports(nodes: &mut [NodeInertia], supports: impl Iterator<Item = Support>) -> Result<(), BuildError> {
     let count = nodes.len();
     for (index, support) in supports.enumerate() {
         let Some(inertia) = nodes.get_mut(support.node as usize) else {
@@ -260,8 +256,8 @@ fn mark_supports(
     Ok(())
 }
 
-/// Marks the nodes of all elements that can move. With nodal pressure or strain an element between fixed nodes is left out only if it has none of
-/// these: it counts in the volume around them.
+/// Marks the nodes of all elements that can move. With nodal pressure or strain an element between fixed nodes is left
+/// out only if it has none of these: it counts in the volume around them.
 fn mark_neighbours(nodes: &mut [NodeInertia], mesh: &Mesh<'_>) {
     for tet in mesh.tets() {
         let fixed = |&node: &u32| nodes.get(node as usize).is_some_and(NodeInertia::is_marked_fixed);
@@ -277,12 +273,7 @@ fn mark_neighbours(nodes: &mut [NodeInertia], mesh: &Mesh<'_>) {
 }
 
 /// Finds for each corner of each element which of the tissues at that node it is of ([`ElementTile::slot`]).
-fn find_slots(
-    material: &impl Material,
-    mesh: &Mesh<'_>,
-    nodes: &mut [NodeInertia],
-    tiles: &mut [ElementTile],
-) {
+fn find_slots(material: &impl Material, mesh: &Mesh<'_>, nodes: &mut [NodeInertia], tiles: &mut [ElementTile]) {
     nodes.iter_mut().for_each(NodeInertia::clear_regions);
     for (element, tet) in mesh.tets().enumerate() {
         for node in tet {
@@ -294,9 +285,8 @@ fn find_slots(
     for tile in tiles {
         for lane in 0..TILE {
             let region = material.region(tile.element(lane));
-            let slots = [0, 1, 2, 3].map(|corner| {
-                nodes.get(tile.node(corner, lane)).map_or(0, |inertia| inertia.slot_of_region(region))
-            });
+            let slots = [0, 1, 2, 3]
+                .map(|corner| nodes.get(tile.node(corner, lane)).map_or(0, |inertia| inertia.slot_of_region(region)));
             tile.set_slots(lane, slots);
         }
     }
@@ -305,13 +295,9 @@ fn find_slots(
 /// A strain whose energy proves nothing: rounding and the noise of a network may have put it there.
 const ROUNDED_STRAIN: f64 = 1e-4;
 
-/// Adds a quarter of each element's mass to each of its nodes, whose supports have been marked. Gives the mass (kg) and the energy of
-/// a strain that is nothing but rounding (J).
-fn lump_masses(
-    material: &impl Material,
-    mesh: &Mesh<'_>,
-    nodes: &mut [NodeInertia],
-) -> Result<(f64, f64), BuildError> {
+/// Adds a quarter of each element's mass to each of its nodes, whose supports have been marked. Gives the mass (kg) and
+/// the energy of a strain that is nothing but rounding (J).
+fn lump_masses(material: &impl Material, mesh: &Mesh<'_>, nodes: &mut [NodeInertia]) -> Result<(f64, f64), BuildError> {
     let (mut mass, mut rounding) = (0.0, 0.0);
     nodes.iter_mut().for_each(NodeInertia::clear_mass);
     for (element, tet) in mesh.tets().enumerate() {
@@ -428,13 +414,9 @@ impl<'a, M: Material> SceneView<'a, M> {
     }
 
     /// Fields of every element, in the order of the tables, under the given displacements (m).
-    pub fn element_fields(
-        self,
-        displacement: &'a [NodeVector],
-    ) -> impl Iterator<Item = ElementFields> + use<'a, M> {
+    pub fn element_fields(self, displacement: &'a [NodeVector]) -> impl Iterator<Item = ElementFields> + use<'a, M> {
         let laws = self.material.laws();
-        self.places()
-            .map(move |(tile, lane)| element_fields(&laws.of(tile.element(lane)), tile, lane, displacement))
+        self.places().map(move |(tile, lane)| element_fields(&laws.of(tile.element(lane)), tile, lane, displacement))
     }
 
     /// Every element, as its place in the tables with its law.
@@ -462,8 +444,8 @@ impl<'a, M: Material> SceneView<'a, M> {
         self.tiles.len() + if self.element().is_nodal_strain() { self.patches.tiles().len() } else { 0 }
     }
 
-    /// Strain energy at some of the places, J. Those that follow each other are in tiles that follow each other, so that
-    /// few of them lie all over the body.
+    /// Strain energy at some of the places, J. Those that follow each other are in tiles that follow each other, so
+    /// that few of them lie all over the body.
     pub(crate) fn strain_energy_at(
         self,
         places: Range<usize>,

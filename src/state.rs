@@ -1,5 +1,5 @@
-//! What moves: the displacement of each node (m), its last increment (m), and the total force (N) that the
-//! latest step saw. A [`StateView`] borrows it, and every step works on one; [`VecState`] owns it on a host with a heap (feature
+//! What moves: the displacement of each node (m), its last increment (m), and the total force (N) that the latest step
+//! saw. A [`StateView`] borrows it, and every step works on one; [`VecState`] owns it on a host with a heap (feature
 //! `std`), [`FixedState`] without.
 //!
 //! The increment `u_n - u_(n-1)` is kept instead of `u_(n-1)`: in float32 the rounding of
@@ -75,14 +75,15 @@ impl Progress {
         &self.energy_balance
     }
 
-    /// Smallest volume of an element over its volume at rest, at the start of the latest step that was taken; 1 before the first.
+    /// Smallest volume of an element over its volume at rest, at the start of the latest step that was taken; 1 before
+    /// the first.
     #[must_use]
     pub const fn least_volume_ratio(&self) -> f32 {
         1.0 + self.extremes.least_j
     }
 
-    /// Largest exponent over its cap, at the start of the latest step that was taken: above 1 the exponential law went on along
-    /// its tangent. Zero for laws without.
+    /// Largest exponent over its cap, at the start of the latest step that was taken: above 1 the exponential law went
+    /// on along its tangent. Zero for laws without.
     #[must_use]
     pub const fn saturation(&self) -> f32 {
         self.extremes.saturation
@@ -115,9 +116,9 @@ impl Deref for StateView<'_> {
 }
 
 impl<'a> StateView<'a> {
-    /// A state over the given vectors as they are: zeros mean at rest. `volume` is as long as the others for scenes with
-    /// [`NodalPressure`](crate::material::NodalPressure) or [`NodalStrain`](crate::material::NodalStrain), and may be empty for
-    /// linear tetrahedra.
+    /// A state over the given vectors as they are: zeros mean at rest. `volume` is as long as the others for scenes
+    /// with [`NodalPressure`](crate::material::NodalPressure) or [`NodalStrain`](crate::material::NodalStrain), and may
+    /// be empty for linear tetrahedra.
     pub const fn new(
         displacement: &'a mut [NodeVector],
         increment: &'a mut [NodeVector],
@@ -125,34 +126,26 @@ impl<'a> StateView<'a> {
         volume: &'a mut [NodeVector],
         progress: &'a mut Progress,
     ) -> Self {
-        Self {
-            displacement,
-            increment,
-            force,
-            volume,
-            progress,
-            touches: &mut [],
-            points: &mut [],
-            pushes: &mut [],
-        }
+        Self { displacement, increment, force, volume, progress, touches: &mut [], points: &mut [], pushes: &mut [] }
     }
 
-    /// The same state, whose steps write to `touches` what each instrument feels ([`crate::contact`]) in the latest step: nothing if it
-    /// was refused. Of instruments beyond its length nothing is written.
+    /// The same state, whose steps write to `touches` what each instrument feels ([`crate::contact`]) in the latest
+    /// step: nothing if it was refused. Of instruments beyond its length nothing is written.
     #[must_use]
     pub fn feeling(self, touches: &'a mut [Touch]) -> Self {
         Self { touches, ..self }
     }
 
-    /// The same state, whose steps write to `points` where instruments push: as many as the touches have contacts in sum, or as there is
-    /// room for; the rest is zero.
+    /// The same state, whose steps write to `points` where instruments push: as many as the touches have contacts in
+    /// sum, or as there is room for; the rest is zero.
     #[must_use]
     pub fn listing(self, points: &'a mut [ContactPoint]) -> Self {
         Self { points, ..self }
     }
 
     /// The same state with [`crate::contact::vectors_to_push`] vectors that belong to it, for what instruments do:
-    /// multilevel and damped steps need them, exact ones for triangles, and are faster with them. Zeros: nothing touches yet.
+    /// multilevel and damped steps need them, exact ones for triangles, and are faster with them. Zeros: nothing
+    /// touches yet.
     #[must_use]
     pub fn pushing(self, pushes: &'a mut [NodeVector]) -> Self {
         Self { pushes, ..self }
@@ -220,8 +213,8 @@ impl<'a> StateView<'a> {
         self.progress.dt = seconds;
     }
 
-    /// Puts the state where a method of the host's own has brought it at a time (s): `at` gives displacement and increment (m) of
-    /// each node, which spans `seconds`. Number of steps and energy balance stay as they are.
+    /// Puts the state where a method of the host's own has brought it at a time (s): `at` gives displacement and
+    /// increment (m) of each node, which spans `seconds`. Number of steps and energy balance stay as they are.
     pub fn put(&mut self, time: f64, seconds: f32, at: impl Fn(usize) -> [[f32; 3]; 2]) {
         let vectors = self.displacement.iter_mut().zip(self.increment.iter_mut());
         for (node, (displacement, increment)) in vectors.enumerate() {
@@ -288,9 +281,7 @@ impl<S: StateVectors> State<S> {
     pub fn view(&mut self) -> StateView<'_> {
         let ([displacement, increment, force, volume], InstrumentMemory { pushes, touches }) =
             self.vectors.vectors_mut();
-        StateView::new(displacement, increment, force, volume, &mut self.progress)
-            .pushing(pushes)
-            .feeling(touches)
+        StateView::new(displacement, increment, force, volume, &mut self.progress).pushing(pushes).feeling(touches)
     }
 
     /// Displacement of each node, m.
@@ -353,8 +344,8 @@ impl<const N: usize, const P: usize> StateVectors for FixedVectors<N, P> {
     }
 }
 
-/// A state with room for `N` nodes, which may be a `static`; of scenes with [`NodalPressure`](crate::material::NodalPressure) if `P`
-/// is `N`, of others if it is zero.
+/// A state with room for `N` nodes, which may be a `static`; of scenes with
+/// [`NodalPressure`](crate::material::NodalPressure) if `P` is `N`, of others if it is zero.
 pub type FixedState<const N: usize, const P: usize = 0> = State<FixedVectors<N, P>>;
 
 impl<const N: usize, const P: usize> FixedState<N, P> {

@@ -1,5 +1,5 @@
-//! Every requirement of `tests/REQUIREMENTS.md` names tests that exist and that are run, or says why it has none. Prints how many
-//! there are of each.
+//! Every requirement of `tests/REQUIREMENTS.md` names tests that exist and that are run, or says why it has none.
+//! Prints how many there are of each.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -16,7 +16,8 @@ struct Counts {
     open: Vec<String>,
 }
 
-/// Counts what the tables of a page hold. Every table of the page is one of requirements; an error is a line for each fault.
+/// Counts what the tables of a page hold. Every table of the page is one of requirements; an error is a line for each
+/// fault.
 fn check(page: &str, read: Read<'_>) -> Result<Counts, Vec<String>> {
     let (mut counts, mut faults) = (Counts::default(), Vec::new());
     let (mut identifiers, mut tests) = (HashSet::new(), HashSet::new());
@@ -56,10 +57,7 @@ fn check(page: &str, read: Read<'_>) -> Result<Counts, Vec<String>> {
                 } else {
                     for test in named.split(',').map(str::trim) {
                         let quoted = test.strip_prefix('`').and_then(|test| test.strip_suffix('`'));
-                        match quoted
-                            .ok_or("it is not between backticks".into())
-                            .and_then(|test| exists(test, read))
-                        {
+                        match quoted.ok_or("it is not between backticks".into()).and_then(|test| exists(test, read)) {
                             Ok(()) => _ = tests.insert(test),
                             Err(why) => fault(format!("{id} names {test}: {why}")),
                         }
@@ -108,9 +106,7 @@ fn exists(test: &str, read: Read<'_>) -> Result<(), String> {
     if let Some(program) = file.strip_prefix("tests/capi/").and_then(|file| file.strip_suffix(".c")) {
         if let Some(name) = function {
             let (head, call) = (format!("static void {name}("), format!("    {name}("));
-            if !text.lines().any(|line| line.starts_with(&head))
-                || !text.lines().any(|line| line.starts_with(&call))
-            {
+            if !text.lines().any(|line| line.starts_with(&head)) || !text.lines().any(|line| line.starts_with(&call)) {
                 return Err("there is no such function, or it is not called".into());
             }
         }
@@ -220,10 +216,7 @@ fn every_fault_of_a_table_is_told_with_its_line() {
         (page("| A-1 | it bends |"), "line 5: not a row of three cells"),
         (page("| A-1 | it bends | `src/sums.rs::adds` | more |"), "line 5: not a row of three cells"),
         (page("| A-1 | it bends | `src/sums.rs::adds`"), "line 5: not a row of three cells"),
-        (
-            page(" | A1 | it bends | `src/sums.rs::adds` |"),
-            "line 5: not an identifier such as STEP-1: \"A1\"",
-        ),
+        (page(" | A1 | it bends | `src/sums.rs::adds` |"), "line 5: not an identifier such as STEP-1: \"A1\""),
         (page("| a-1 | it bends | `src/sums.rs::adds` |"), "not an identifier"),
         (page("| A-+1 | it bends | `src/sums.rs::adds` |"), "not an identifier"),
         (sound.into(), "line 1: not the head of a table of requirements"),

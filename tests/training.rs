@@ -70,11 +70,7 @@ fn a_training_that_was_stopped_goes_on_as_if_it_had_not_been() {
     for epochs in [1, 3] {
         // Killed in the middle of an epoch.
         let stopped = fit(&recipe, RECIPE, &scene, &samples, Some(folder.path()), &mut |at| {
-            if at.epoch == epochs && at.done > 2_000 {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
+            if at.epoch == epochs && at.done > 2_000 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         assert!(matches!(stopped, Err(TrainError::Stopped { epoch }) if epoch == epochs), "{stopped:?}");
     }
@@ -88,10 +84,9 @@ fn a_training_that_was_stopped_goes_on_as_if_it_had_not_been() {
     assert!(whole.bytes == resumed.bytes, "other weights");
 
     let other = RECIPE.replace("seed = 3", "seed = 4");
-    let refused =
-        fit(&Recipe::parse(&other).unwrap(), &other, &scene, &samples, Some(folder.path()), &mut |_| {
-            ControlFlow::Continue(())
-        });
+    let refused = fit(&Recipe::parse(&other).unwrap(), &other, &scene, &samples, Some(folder.path()), &mut |_| {
+        ControlFlow::Continue(())
+    });
     let said = refused.unwrap_err().to_string();
     println!("{said}");
     assert!(said.ends_with("a checkpoint of another recipe; remove it to train anew"), "{said}");
@@ -126,21 +121,16 @@ fn a_network_learns_from_any_scene_at_its_own_step() {
     let scene = own.with_load(recipe.motion.load);
     let samples = Samples::collect(&recipe, &scene).unwrap();
     assert_eq!(samples.inputs.len(), 20 * samples.vertices);
-    let Fitted { bytes, .. } =
-        fit(&recipe, &text, &scene, &samples, None, &mut |_| ControlFlow::Continue(())).unwrap();
+    let Fitted { bytes, .. } = fit(&recipe, &text, &scene, &samples, None, &mut |_| ControlFlow::Continue(())).unwrap();
     let memory = WeightBytes::of(&bytes);
     let network = Network::parse(memory.bytes()).unwrap();
     let facts = network.recipe();
-    assert_eq!(
-        (facts.step, facts.exact_step, facts.damping, facts.density),
-        (10.0 * 5e-5, 5e-5, 7.0, 1_100.0)
-    );
+    assert_eq!((facts.step, facts.exact_step, facts.damping, facts.density), (10.0 * 5e-5, 5e-5, 7.0, 1_100.0));
     assert_eq!(facts.element, Element::NodalPressure);
 
     // It has moved.
     let mean = |values: &dyn Fn(usize) -> f32| {
-        (0..samples.inputs.len()).map(|row| f64::from(values(row)).abs()).sum::<f64>()
-            / samples.inputs.len() as f64
+        (0..samples.inputs.len()).map(|row| f64::from(values(row)).abs()).sum::<f64>() / samples.inputs.len() as f64
     };
     let (speed, acceleration) = (mean(&|row| samples.inputs[row][3]), mean(&|row| samples.targets[row][0]));
     println!("mean speed {speed:.2e} m/s, mean acceleration along it {acceleration:.2e} m/s^2");
@@ -191,12 +181,7 @@ fn force_over_mass_is_the_acceleration_and_what_damping_takes() {
     println!("masses {least:.2e} to {most:.2e} kg; {:.3} of the acceleration unexplained", (off / of).sqrt());
     assert!(most / least > 3.0);
     assert!((off / of).sqrt() < 0.1);
-    assert!(
-        Recipe::parse(&text.replace("per-mass", "pound"))
-            .unwrap_err()
-            .to_string()
-            .contains("unknown variant")
-    );
+    assert!(Recipe::parse(&text.replace("per-mass", "pound")).unwrap_err().to_string().contains("unknown variant"));
 }
 
 #[test]
@@ -210,10 +195,7 @@ fn a_recipe_that_cannot_be_used_says_why() {
     };
     assert!(said("\"torsion\"", "\"torsoin\"").starts_with("scene = \"torsoin\": there are torsion,"));
     assert_eq!(said("multiple = 10", "multiple = 0"), "multiple = 0: it must be from 1 to 1000");
-    assert_eq!(
-        said("to = 0.06", "to = 0.02"),
-        "from = 0.03 to 0.02: they must rise, from zero to ten seconds"
-    );
+    assert_eq!(said("to = 0.06", "to = 0.02"), "from = 0.03 to 0.02: they must rise, from zero to ten seconds");
     assert_eq!(said("load = 0.02", "load = 0.0"), "load = 0: it must be a number other than zero");
     assert_eq!(said("[12, 8]", "[12, 300]"), "a width = 300: it must be from 1 to 256");
     assert_eq!(said("rate = 0.003", "rate = 3.0"), "rate = 3: it must be between 0 and 1");
@@ -268,14 +250,10 @@ fn rough_motion_leads_back_to_the_exact_one() {
     let force = |rows: &[[f32; 7]]| rows.iter().map(|row| f64::from(row[4]).abs()).sum::<f64>();
     assert!(force(&rough.inputs) > 10.0 * force(&smooth.inputs));
     let taken = (1.5f64.powi(2) + 0.5f64.powi(2)).sqrt() * 1e-6 / (long * long);
-    assert!(
-        rough.weights.iter().all(|&weight| (f64::from(weight) * (1.0 + taken * taken) - 1.0).abs() < 1e-4)
-    );
+    assert!(rough.weights.iter().all(|&weight| (f64::from(weight) * (1.0 + taken * taken) - 1.0).abs() < 1e-4));
     assert!(rough == collected(&text).rough, "the same recipe, other noise");
 
-    for (from, to) in
-        [("copies = 2", "copies = 0"), ("most = 1e-6", "most = 1e-7"), ("ease = 1.0", "ease = 0.0")]
-    {
+    for (from, to) in [("copies = 2", "copies = 0"), ("most = 1e-6", "most = 1e-7"), ("ease = 1.0", "ease = 0.0")] {
         let said = Recipe::parse(&text.replace(from, to)).unwrap_err().to_string();
         assert!(said.starts_with("noise = "), "{said}");
     }
@@ -289,9 +267,7 @@ fn turned_normals_change_no_length() {
     let across = |[a, b]: [f32; 2]| a.hypot(b);
     for (a, b) in smooth.inputs.iter().zip(&turned.inputs) {
         assert_eq!((a[0], a[3], a[4]), (b[0], b[3], b[4]));
-        for (a, b) in
-            [(a[1], a[2]), (a[5], a[6])].map(|(x, y)| [x, y]).into_iter().zip([[b[1], b[2]], [b[5], b[6]]])
-        {
+        for (a, b) in [(a[1], a[2]), (a[5], a[6])].map(|(x, y)| [x, y]).into_iter().zip([[b[1], b[2]], [b[5], b[6]]]) {
             assert!((across(a) - across(b)).abs() <= 1e-5 * across(a));
         }
     }

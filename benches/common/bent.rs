@@ -1,5 +1,5 @@
-//! A bent body that swings: in a body at rest the front of the first wave is so weak that floats are denormal, which is ten
-//! times as slow.
+//! A bent body that swings: in a body at rest the front of the first wave is so weak that floats are denormal, which is
+//! ten times as slow.
 
 use supple::element::ElementLaw;
 use supple::scene::Support;

@@ -62,8 +62,8 @@ pub(crate) fn baseline(rounds: usize) -> f64 {
     most(rounds, (2 * SUMS * 4 * ROUNDS) as f64, || sums::<4>(|a, b, c| a * b + c))
 }
 
-/// GFLOP/s of one core with its widest instructions, the best of so many rounds of 40 us. A machine that others use changes
-/// its speed: shares of the peak are taken of one that was measured just before.
+/// GFLOP/s of one core with its widest instructions, the best of so many rounds of 40 us. A machine that others use
+/// changes its speed: shares of the peak are taken of one that was measured just before.
 pub(crate) fn widest(rounds: usize) -> f64 {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx512f") {

@@ -1,5 +1,5 @@
-//! The plain scalar code that a person writes first: tetrahedron by tetrahedron, float32, `F = I + grad u`, `F^-T` by its
-//! cofactors over `J`, `powf` and `exp` of the standard library. The measure of every faster path.
+//! The plain scalar code that a person writes first: tetrahedron by tetrahedron, float32, `F = I + grad u`, `F^-T` by
+//! its cofactors over `J`, `powf` and `exp` of the standard library. The measure of every faster path.
 
 use supple::mesh::Mesh;
 
@@ -41,13 +41,7 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
 
 impl Plain {
     /// Density in kg/m^3, nodal loads in N.
-    pub(crate) fn new(
-        mesh: &Mesh<'_>,
-        law: Law,
-        density: f32,
-        fixed: &[u32],
-        loads: &[(u32, [f32; 3])],
-    ) -> Self {
+    pub(crate) fn new(mesh: &Mesh<'_>, law: Law, density: f32, fixed: &[u32], loads: &[(u32, [f32; 3])]) -> Self {
         let points = mesh.points();
         let mut mass = vec![0.0; points.len()];
         let elements = mesh

@@ -42,8 +42,8 @@ pub(crate) fn guarded<'a>(
 ) -> impl FnMut() + use<'a> {
     let mut state = VecState::at_rest(points.len());
     let step = Step::unchecked(multiple * DT, DAMPING).expect("a positive step");
-    let mut large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step)
-        .expect("the bar can be prepared");
+    let mut large =
+        LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step).expect("the bar can be prepared");
     assert!(CYCLE.is_multiple_of(large.model().cycle()), "the steps below are no whole cycles");
     let mut guard = every.map(|every| {
         Guard::prepare_in_vec(scene.view(), points, state.view(), step, every).expect("a guard of the bar")

@@ -1,6 +1,7 @@
-//! When does a step change its length? Lengths are numbered by how often the longest one is halved; exact steps are the last. An
-//! error that one length makes grows about as its power 1.5 (measured: between 1 and 2), so an estimate above the tolerance says by how
-//! many halvings the step is too long, and one far below it that the next longer step would do.
+//! When does a step change its length? Lengths are numbered by how often the longest one is halved; exact steps are the
+//! last. An error that one length makes grows about as its power 1.5 (measured: between 1 and 2), so an estimate above
+//! the tolerance says by how many halvings the step is too long, and one far below it that the next longer step would
+//! do.
 
 use crate::guard::{ESTIMATE, exceeds};
 
@@ -16,7 +17,8 @@ const SETTLE: f32 = 0.1;
 const GROWTH: f32 = 1.25;
 /// By which factor it must have fallen for the shortened step to be kept for as long again.
 const FALL: f32 = 0.9;
-/// Least time in which a body forgets half of an error, s; that of the guard's envelope. A vibration needs `2 ln 2 / mu`.
+/// Least time in which a body forgets half of an error, s; that of the guard's envelope. A vibration needs `2 ln 2 /
+/// mu`.
 const HALF_LIFE: f32 = 0.2;
 /// Least and most time between two probes, least length of a probe, s, and its least number of comparisons.
 const REST: [f32; 2] = [0.05, 1.6];
@@ -132,8 +134,8 @@ impl Control {
         }
     }
 
-    /// Decides upon the end of a probe. Gives whether steps beyond the critical one follow. An error that a body forgets by half in
-    /// [`HALF_LIFE`] grows for about so long.
+    /// Decides upon the end of a probe. Gives whether steps beyond the critical one follow. An error that a body
+    /// forgets by half in [`HALF_LIFE`] grows for about so long.
     pub(super) fn ends_probe(&mut self) -> bool {
         if !self.probes() || self.comparisons < PROBE_COMPARISONS || self.seconds < PROBE {
             return false;
@@ -153,8 +155,8 @@ impl Control {
         self.changed();
     }
 
-    /// Decides after a comparison with steps beyond the critical one, which gave these estimates of the mean and the largest error
-    /// (m). Gives whether the length is to change.
+    /// Decides after a comparison with steps beyond the critical one, which gave these estimates of the mean and the
+    /// largest error (m). Gives whether the length is to change.
     pub(super) fn decide(&mut self, [mean, largest]: [f32; 2]) -> bool {
         self.comparisons += 1;
         let share = mean / self.tolerance;
@@ -174,10 +176,7 @@ impl Control {
             self.shorten(halvings, [mean, largest]);
             return true;
         }
-        self.comparisons >= COMPARISONS
-            && self.seconds >= WAIT
-            && share * libm::exp2f(ORDER) <= AIM
-            && self.lengthen()
+        self.comparisons >= COMPARISONS && self.seconds >= WAIT && share * libm::exp2f(ORDER) <= AIM && self.lengthen()
     }
 
     /// Doubles the length. Gives whether it could.
@@ -231,10 +230,7 @@ mod tests {
 
     #[test]
     fn lengths_are_halved_down_to_the_least() {
-        assert_eq!(
-            [0.1, 1.0, 1.9, 2.0, 17.0, f32::NAN, f32::INFINITY].map(lengths),
-            [1, 1, 1, 2, 5, 1, MOST]
-        );
+        assert_eq!([0.1, 1.0, 1.9, 2.0, 17.0, f32::NAN, f32::INFINITY].map(lengths), [1, 1, 1, 2, 5, 1, MOST]);
     }
 
     #[test]

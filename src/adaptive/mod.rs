@@ -1,14 +1,15 @@
-//! The adaptive step: the host says which mean error of the nodes it accepts (m), and the step chooses its length while it runs, as
-//! long as possible and as short as needed, down to the exact step.
+//! The adaptive step: the host says which mean error of the nodes it accepts (m), and the step chooses its length while
+//! it runs, as long as possible and as short as needed, down to the exact step.
 //!
 //! Its lengths are the longest one that the host allows, usually a frame's time, and halves of it down to six times the
-//! critical step; below, there are exact steps. A [`crate::guard`] estimates the error; its second run takes the steps of the next
-//! longer length, so that it also knows what that length would do. `control.rs` decides after each comparison. A change of length
-//! computes all inertia anew in the next step and changes neither displacements nor velocities.
+//! critical step; below, there are exact steps. A [`crate::guard`] estimates the error; its second run takes the steps
+//! of the next longer length, so that it also knows what that length would do. `control.rs` decides after each
+//! comparison. A change of length computes all inertia anew in the next step and changes neither displacements nor
+//! velocities.
 //!
-//! What a span of time costs is bounded: it is never cut in more steps than exact ones need, and between two comparisons the length
-//! changes once at most. No step makes an error undone that is there already: where the estimate exceeds the tolerance the status is
-//! [`Status::Inexact`], until the body has forgotten the error.
+//! What a span of time costs is bounded: it is never cut in more steps than exact ones need, and between two
+//! comparisons the length changes once at most. No step makes an error undone that is there already: where the estimate
+//! exceeds the tolerance the status is [`Status::Inexact`], until the body has forgotten the error.
 
 mod control;
 
@@ -80,8 +81,8 @@ pub struct AdaptiveModel<'w> {
 }
 
 impl<'w> AdaptiveModel<'w> {
-    /// Adaptive steps of this method from the present state, for a scene with these `points` (m) at rest. They begin as exact ones.
-    /// `storage` of [`vectors_for`] vectors is overwritten.
+    /// Adaptive steps of this method from the present state, for a scene with these `points` (m) at rest. They begin as
+    /// exact ones. `storage` of [`vectors_for`] vectors is overwritten.
     pub fn prepare<M: ElementMaterial>(
         method: Method<'w>,
         scene: SceneView<'_, M>,
@@ -94,10 +95,9 @@ impl<'w> AdaptiveModel<'w> {
         let Parts { first, second, .. } = chooser.checked(storage, scene, points)?;
         let step = chooser.shortest()?;
         let of_first = LargeModel::prepare(method, scene, points, state.reborrow(), step, first)?;
-        let (of_second, watch) =
-            Watch::prepare(scene, points, state, step, 1, second, |state, step, storage| {
-                LargeModel::prepare(guard::SECOND_RUN, scene, points, state, step, storage)
-            })?;
+        let (of_second, watch) = Watch::prepare(scene, points, state, step, 1, second, |state, step, storage| {
+            LargeModel::prepare(guard::SECOND_RUN, scene, points, state, step, storage)
+        })?;
         Ok(Self { first: of_first, second: of_second, watch: chooser.allowing(watch), chooser })
     }
 
@@ -184,8 +184,7 @@ impl Chooser {
     /// The step after so many halvings.
     fn step_of(&self, halvings: u32) -> Result<Step, InertiaError> {
         let (longest, seconds) = (self.request.longest, self.seconds_of(halvings));
-        Step::unchecked(seconds, longest.damping())
-            .map_err(|_| InertiaError::Step { seconds, most: longest.seconds() })
+        Step::unchecked(seconds, longest.damping()).map_err(|_| InertiaError::Step { seconds, most: longest.seconds() })
     }
 
     pub(crate) fn seconds(&self) -> f32 {
@@ -280,7 +279,8 @@ impl AdaptiveView<'_, '_> {
         }
     }
 
-    /// Takes exact steps until the next look at the critical step. The worst status, or that with which the span ends early.
+    /// Takes exact steps until the next look at the critical step. The worst status, or that with which the span ends
+    /// early.
     fn exact_steps<M: ElementMaterial>(
         &mut self,
         left: f64,
@@ -316,8 +316,7 @@ impl AdaptiveView<'_, '_> {
                 }
             }
         };
-        let answer =
-            pace.approach(left, longest.damping(), scene, loads, state.reborrow(), kept, threads, enter);
+        let answer = pace.approach(left, longest.damping(), scene, loads, state.reborrow(), kept, threads, enter);
         match answer {
             // The rest of the span is no step.
             Approach::TooShort => Err(worst),
@@ -336,8 +335,8 @@ impl AdaptiveView<'_, '_> {
         }
     }
 
-    /// Takes steps of one length beyond the critical step to the end of the span, or until another length is better. The worst status,
-    /// or that with which the span ends early.
+    /// Takes steps of one length beyond the critical step to the end of the span, or until another length is better.
+    /// The worst status, or that with which the span ends early.
     fn large_steps<M: ElementMaterial>(
         &mut self,
         left: f64,
@@ -362,8 +361,7 @@ impl AdaptiveView<'_, '_> {
             let Some(Parts { first, second, .. }) = self.chooser.parts(self.storage) else {
                 return Err(mismatch);
             };
-            let status =
-                self.first.with_storage(first).step_in_parts(scene, &loads, state.reborrow(), threads);
+            let status = self.first.with_storage(first).step_in_parts(scene, &loads, state.reborrow(), threads);
             if matches!(status, Status::Mismatch { .. }) {
                 return Err(status);
             }
@@ -374,8 +372,7 @@ impl AdaptiveView<'_, '_> {
             let before = self.watch.comparisons();
             let guard = GuardView { second: self.second, watch: self.watch, storage: second };
             let _ = guard.follow(Status::Ok, scene, &loads, &state, threads);
-            let estimate =
-                self.watch.estimate().map_or([0.0; 2], |estimate| [estimate.mean, estimate.largest]);
+            let estimate = self.watch.estimate().map_or([0.0; 2], |estimate| [estimate.mean, estimate.largest]);
             let control = &mut self.chooser.control;
             if !status.is_taken() {
                 control.refused(estimate);
@@ -464,8 +461,9 @@ impl<'w, S: AsMut<[NodeVector]>> Adaptive<'w, S> {
         self.model.with_storage(self.storage.as_mut())
     }
 
-    /// Moves on by so many seconds, usually a frame, and ends there exactly. [`Status::Inexact`] if the estimate of the error exceeded
-    /// the tolerance at any step. Where even exact steps are refused, the state is that of the last step that was taken.
+    /// Moves on by so many seconds, usually a frame, and ends there exactly. [`Status::Inexact`] if the estimate of the
+    /// error exceeded the tolerance at any step. Where even exact steps are refused, the state is that of the last step
+    /// that was taken.
     pub fn advance<M: ElementMaterial>(
         &mut self,
         seconds: f32,

@@ -1,5 +1,5 @@
-//! Adaptive steps for C: they choose their length so that their error stays below a tolerance ([`crate::adaptive`]). Lengths in m, times
-//! in s.
+//! Adaptive steps for C: they choose their length so that their error stays below a tolerance ([`crate::adaptive`]).
+//! Lengths in m, times in s.
 
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
@@ -88,8 +88,8 @@ pub unsafe extern "C" fn supple_adaptive_size(
     unsafe { memory::answered(size(), error) }
 }
 
-/// Prepares adaptive steps, from the state as it is, in `memory` of at least supple_adaptive_size bytes, aligned to SUPPLE_ALIGN. It
-/// takes as long as some steps. They begin as exact steps.
+/// Prepares adaptive steps, from the state as it is, in `memory` of at least supple_adaptive_size bytes, aligned to
+/// SUPPLE_ALIGN. It takes as long as some steps. They begin as exact steps.
 ///
 /// @param points the points that the scene was built from, three coordinates each.
 /// @param config of the steps beyond the critical one; its `seconds` are those of the longest step, usually a frame.
@@ -151,10 +151,10 @@ pub unsafe extern "C" fn supple_adaptive_init(
     unsafe { memory::answered(init(), error) }
 }
 
-/// Moves on by `seconds`, usually a frame, and ends there exactly. SUPPLE_INEXACT if the estimate of the error exceeded the tolerance at
-/// any step: steps become shorter at once, down to exact ones, but an error that is there stays until the body has forgotten it. A
-/// step that is not to be believed is taken again with shorter ones; where exact ones are not either, the state is that before it, and
-/// the status tells.
+/// Moves on by `seconds`, usually a frame, and ends there exactly. SUPPLE_INEXACT if the estimate of the error exceeded
+/// the tolerance at any step: steps become shorter at once, down to exact ones, but an error that is there stays until
+/// the body has forgotten it. A step that is not to be believed is taken again with shorter ones; where exact ones are
+/// not either, the state is that before it, and the status tells.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still. Motions without a ramp go evenly over the call.
 /// @param threads NULL: the calling thread alone.
@@ -176,8 +176,7 @@ pub unsafe extern "C" fn supple_adaptive_advance(
         let open = OpenScene::of(scene)?;
         let mut loads = CallLoads::of(loads, &open)?;
         open.fits(memory::read(state.cast_const())?.nodes)?;
-        let (supple_adaptive { nodes, vectors, chooser, watch, first, second, .. }, arrays) =
-            memory::open(adaptive)?;
+        let (supple_adaptive { nodes, vectors, chooser, watch, first, second, .. }, arrays) = memory::open(adaptive)?;
         open.fits(*nodes)?;
         // Also refuses what is no number.
         let span = Step::unchecked(seconds, 0.0)?;

@@ -4,8 +4,8 @@ use core::ffi::c_void;
 use core::mem::take;
 
 use crate::contact::{
-    Contact, ContactPoint, Field, Grip, Instrument, MOST_INSTRUMENTS, Pose, Shape, Surface, SurfaceNode,
-    Touch, vectors_to_push,
+    Contact, ContactPoint, Field, Grip, Instrument, MOST_INSTRUMENTS, Pose, Shape, Surface, SurfaceNode, Touch,
+    vectors_to_push,
 };
 use crate::state::{NodeVector, StateView};
 
@@ -17,8 +17,8 @@ use super::status::{Answer, status_of, supple_error, supple_status};
 use super::surface::{Given, supple_surface};
 use supple_status::*;
 
-/// Shapes of an instrument: all below the plane z = 0 of its axes; a ball around its centre; a cylinder along z with round ends; the
-/// signed distances in a field's file, which `supple field` makes of a mesh.
+/// Shapes of an instrument: all below the plane z = 0 of its axes; a ball around its centre; a cylinder along z with
+/// round ends; the signed distances in a field's file, which `supple field` makes of a mesh.
 pub const SUPPLE_PLANE: u32 = 0;
 pub const SUPPLE_SPHERE: u32 = 1;
 pub const SUPPLE_CAPSULE: u32 = 2;
@@ -48,7 +48,8 @@ pub struct supple_pose {
 pub struct supple_instrument {
     /// SUPPLE_PLANE, SUPPLE_SPHERE, SUPPLE_CAPSULE or SUPPLE_FIELD.
     pub shape: u32,
-    /// Of a sphere or capsule, m. Below the length of the surface's edges the surface needs triangles: else it passes between nodes.
+    /// Of a sphere or capsule, m. Below the length of the surface's edges the surface needs triangles: else it passes
+    /// between nodes.
     pub radius: f32,
     /// Of a capsule, between the centres of its ends, m.
     pub length: f32,
@@ -70,7 +71,8 @@ pub struct supple_touch {
     pub force: [f32; 3],
     /// Moment of the same about its position, N m.
     pub moment: [f32; 3],
-    /// Mean of the force over the steps of the latest call that took steps, N; of supple_adaptive_advance that of the latest step.
+    /// Mean of the force over the steps of the latest call that took steps, N; of supple_adaptive_advance that of the
+    /// latest step.
     pub mean_force: [f32; 3],
     /// Nodes that it pushes or holds, and triangles.
     pub contacts: u32,
@@ -100,8 +102,8 @@ pub struct supple_contact_point {
     pub instrument: u32,
 }
 
-/// Instruments, the nodes that they can touch, and what a state keeps of them. It belongs to one state: save and restore both, or
-/// prepare it again. One thread at a time; a call that takes steps changes it.
+/// Instruments, the nodes that they can touch, and what a state keeps of them. It belongs to one state: save and
+/// restore both, or prepare it again. One thread at a time; a call that takes steps changes it.
 #[repr(C, align(64))]
 pub struct supple_contact {
     head: Head,
@@ -174,7 +176,8 @@ impl supple_contact {
     }
 }
 
-/// Bytes of memory that a supple_contact needs for a surface of so many nodes and triangles, of which so many nodes can be held at once.
+/// Bytes of memory that a supple_contact needs for a surface of so many nodes and triangles, of which so many nodes can
+/// be held at once.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_contact_size(nodes: u32, triangles: u32, grips: u32) -> usize {
     Room { nodes, triangles, grips }.layout().bytes()
@@ -185,8 +188,8 @@ pub extern "C" fn supple_contact_size(nodes: u32, triangles: u32, grips: u32) ->
 /// @param points of all nodes of the scene at rest, m, three coordinates each.
 /// @param surface what can be touched; it is copied.
 /// @param grips most nodes that instruments hold at once.
-/// @param error may be NULL; index is the place in the nodes of `surface`, or that of a triangle with a corner that is not among these
-/// nodes, or twice the same.
+/// @param error may be NULL; index is the place in the nodes of `surface`, or that of a triangle with a corner that is
+/// not among these nodes, or twice the same.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_contact_init(
     memory: *mut c_void,
@@ -234,7 +237,8 @@ pub unsafe extern "C" fn supple_contact_init(
     unsafe { memory::answered(init(), error) }
 }
 
-/// Replaces all instruments by `count` others, which stand still where they are; none with a count of zero. What was held is let go.
+/// Replaces all instruments by `count` others, which stand still where they are; none with a count of zero. What was
+/// held is let go.
 ///
 /// @param error may be NULL; index is that of an instrument.
 #[unsafe(no_mangle)]
@@ -288,12 +292,12 @@ unsafe fn checked(given: &supple_instrument, index: usize) -> Answer<Instrument<
 fn check(instrument: &Instrument<'_>, index: usize) -> Answer<()> {
     use crate::contact::ContactError;
     let refused = |value: f32| supple_error::from(SUPPLE_E_INSTRUMENT).at(index).value(value.into(), 0.0);
-    Surface::new(&[], 0).and_then(|surface| Contact::new(surface, &[*instrument]).map(|_| ())).map_err(
-        |error| match error {
+    Surface::new(&[], 0).and_then(|surface| Contact::new(surface, &[*instrument]).map(|_| ())).map_err(|error| {
+        match error {
             ContactError::Instrument { value, .. } => refused(value),
             _ => refused(f32::NAN),
-        },
-    )
+        }
+    })
 }
 
 fn pose_of(pose: &supple_pose) -> Pose {
@@ -301,8 +305,8 @@ fn pose_of(pose: &supple_pose) -> Pose {
     if rotation == [0.0; 4] { Pose::at(position) } else { Pose { position, rotation } }
 }
 
-/// Lets an instrument move on a line, and turn evenly, from where it is at the time `from` (s) to `pose` at the time `to`, usually the
-/// times of the state now and at the end of the frame. Before and after it stands still.
+/// Lets an instrument move on a line, and turn evenly, from where it is at the time `from` (s) to `pose` at the time
+/// `to`, usually the times of the state now and at the end of the frame. Before and after it stands still.
 ///
 /// @param error may be NULL.
 #[unsafe(no_mangle)]
@@ -331,8 +335,9 @@ pub unsafe extern "C" fn supple_move_instrument(
     unsafe { memory::answered(set(), error) }
 }
 
-/// Lets an instrument hold the nodes of the surface that are nearer to it than `within` (m) now, where they are, as forceps do; those that
-/// it or another one holds already it leaves as they are. They move with it, whatever force that takes, until supple_let_go.
+/// Lets an instrument hold the nodes of the surface that are nearer to it than `within` (m) now, where they are, as
+/// forceps do; those that it or another one holds already it leaves as they are. They move with it, whatever force that
+/// takes, until supple_let_go.
 ///
 /// @param held may be NULL; receives how many nodes it holds.
 #[unsafe(no_mangle)]
@@ -356,18 +361,14 @@ pub unsafe extern "C" fn supple_grasp(
         }
         let list = object.list.get(..object.instruments as usize).unwrap_or_default();
         let Some(tool) = list.get(instrument as usize) else {
-            return Err(
-                supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), object.instruments.into())
-            );
+            return Err(supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), object.instruments.into()));
         };
         let Parts { nodes, grips, .. } = object.room().parts(arrays);
-        let surface =
-            Surface::new(nodes, object.nodes as usize).map_err(|_| supple_error::from(SUPPLE_E_INDEX))?;
+        let surface = Surface::new(nodes, object.nodes as usize).map_err(|_| supple_error::from(SUPPLE_E_INDEX))?;
         let near = || tool.grips(instrument, surface, state.displacements(), state.time(), within);
         let old = object.grips as usize;
-        let is_held = |place: u32, grips: &[Grip], count: usize| {
-            grips.iter().take(count).any(|grip| grip.place == place)
-        };
+        let is_held =
+            |place: u32, grips: &[Grip], count: usize| grips.iter().take(count).any(|grip| grip.place == place);
         let new = near().filter(|grip| !is_held(grip.place, grips, old)).count();
         if old + new > grips.len() {
             let error = supple_error::from(SUPPLE_E_CAPACITY);
@@ -426,13 +427,10 @@ pub unsafe extern "C" fn supple_let_go(contact: *mut supple_contact, instrument:
     status_of(let_go())
 }
 
-/// Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned and mass-scaled
-/// steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
+/// Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned
+/// and mass-scaled steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn supple_set_contact(
-    loads: *mut supple_loads,
-    contact: *mut supple_contact,
-) -> supple_status {
+pub unsafe extern "C" fn supple_set_contact(loads: *mut supple_loads, contact: *mut supple_contact) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let set = || unsafe {
         let loads = memory::change(loads)?;
@@ -464,9 +462,7 @@ pub unsafe extern "C" fn supple_read_touch(
         let index = instrument as usize;
         let touches = object.touches.get(..object.instruments as usize).unwrap_or_default();
         let (Some(&touch), Some(&mean_force)) = (touches.get(index), object.means.get(index)) else {
-            return Err(
-                supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), object.instruments.into())
-            );
+            return Err(supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), object.instruments.into()));
         };
         let Touch { force, moment, contacts, depth, work, friction_loss } = touch;
         place.write(supple_touch { force, moment, mean_force, contacts, depth, work, friction_loss });
@@ -495,14 +491,7 @@ pub unsafe extern "C" fn supple_contact_points(
         }
         for (index, point) in object.points.iter().take(written).enumerate() {
             let &ContactPoint { position, normal, force, depth, node, instrument } = point;
-            points.add(index).write(supple_contact_point {
-                position,
-                normal,
-                force,
-                depth,
-                node,
-                instrument,
-            });
+            points.add(index).write(supple_contact_point { position, normal, force, depth, node, instrument });
         }
         count.write(written as u32);
         Ok(SUPPLE_OK)
@@ -542,15 +531,13 @@ impl<'a> CallContact<'a> {
             .map_err(wrong)?;
         let list = list.get(..*instruments as usize).unwrap_or_default();
         let grips = parts.grips.get(..*grips as usize).unwrap_or_default();
-        let contact =
-            Contact::new(surface, list).and_then(|contact| contact.gripping(grips)).map_err(wrong)?;
+        let contact = Contact::new(surface, list).and_then(|contact| contact.gripping(grips)).map_err(wrong)?;
         Ok(Some(Self { contact, pushes: parts.pushes, touches, points, means, steps: 0.0 }))
     }
 
     /// The state with what it keeps.
     pub(super) fn attached(&mut self, state: StateView<'a>) -> StateView<'a> {
-        let (pushes, touches, points) =
-            (take(&mut self.pushes), take(&mut self.touches), take(&mut self.points));
+        let (pushes, touches, points) = (take(&mut self.pushes), take(&mut self.touches), take(&mut self.points));
         state.pushing(pushes).feeling(touches).listing(points)
     }
 

@@ -1,4 +1,5 @@
-//! Guards for C: a second run with longer steps that estimates the error of a state ([`crate::guard`]). Lengths in m, times in s.
+//! Guards for C: a second run with longer steps that estimates the error of a state ([`crate::guard`]). Lengths in m,
+//! times in s.
 
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
@@ -11,9 +12,7 @@ use crate::step::{Status, Step};
 use super::SUPPLE_NONE;
 use super::large::storage;
 use super::loads::{CallLoads, supple_loads};
-use super::memory::{
-    self, Head, Layout, Object, Place, array, magic, one, place_for, place_if_wanted, same_abi,
-};
+use super::memory::{self, Head, Layout, Object, Place, array, magic, one, place_for, place_if_wanted, same_abi};
 use super::scene::{OpenScene, supple_scene};
 use super::state::{opened_of, supple_state};
 use super::status::{Answer, status_of, supple_error, supple_status};
@@ -31,12 +30,13 @@ pub struct supple_guard_config {
     /// Length of the steps that are guarded, s, and their damping, 1/s.
     pub seconds: f32,
     pub damping: f32,
-    /// How many times as long the second run's steps are, at least 1 and at least the number of steps between two calls of
-    /// supple_guard_follow. More costs less time, about a multilevel step in so many, and calls more right steps inexact. 3 is a good
-    /// choice, the steps of a frame another; 1 for learned steps.
+    /// How many times as long the second run's steps are, at least 1 and at least the number of steps between two calls
+    /// of supple_guard_follow. More costs less time, about a multilevel step in so many, and calls more right steps
+    /// inexact. 3 is a good choice, the steps of a frame another; 1 for learned steps.
     pub every: u32,
-    /// Mean error of the nodes that is allowed, m; 0: a fifth of the mean motion so far, where that is more than a millimetre and a
-    /// hundredth of the size of the body, of a body that has moved by less than its error more than a tenth of that.
+    /// Mean error of the nodes that is allowed, m; 0: a fifth of the mean motion so far, where that is more than a
+    /// millimetre and a hundredth of the size of the body, of a body that has moved by less than its error more than a
+    /// tenth of that.
     pub tolerance: f32,
 }
 
@@ -100,8 +100,8 @@ pub unsafe extern "C" fn supple_guard_size(
     unsafe { memory::answered(size(), error) }
 }
 
-/// Prepares a guard, from the state as it is, in `memory` of at least supple_guard_size bytes, aligned to SUPPLE_ALIGN. It takes as
-/// long as some steps.
+/// Prepares a guard, from the state as it is, in `memory` of at least supple_guard_size bytes, aligned to SUPPLE_ALIGN.
+/// It takes as long as some steps.
 ///
 /// @param points the points that the scene was built from, three coordinates each.
 /// @param error may be NULL.
@@ -134,8 +134,7 @@ pub unsafe extern "C" fn supple_guard_init(
         let second = &mut *(&raw mut (*object).second).cast::<MaybeUninit<_>>();
         let mut watch = {
             let prepare = |state: crate::state::StateView<'_>, step, storage: &mut [NodeVector]| {
-                LargeModel::prepare_in(second, SECOND_RUN, open.view(), points, state, step, storage)
-                    .map(|_| ())
+                LargeModel::prepare_in(second, SECOND_RUN, open.view(), points, state, step, storage).map(|_| ())
             };
             Watch::prepare(open.view(), points, state, step, config.every, storage, prepare)?.1
         };
@@ -159,9 +158,9 @@ fn allowed(tolerance: f32) -> Answer<Allowed> {
     }
 }
 
-/// To be called after each call that moves the state, with the same loads, at the latest after `every` steps of the configuration.
-/// Now and then it moves the second run and compares. SUPPLE_INEXACT if the estimate exceeds what is allowed. A state that was reset or
-/// restored begins a new second run.
+/// To be called after each call that moves the state, with the same loads, at the latest after `every` steps of the
+/// configuration. Now and then it moves the second run and compares. SUPPLE_INEXACT if the estimate exceeds what is
+/// allowed. A state that was reset or restored begins a new second run.
 ///
 /// @param loads as of the steps; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.
@@ -199,9 +198,7 @@ pub unsafe extern "C" fn supple_guard_follow(
 
 pub(super) const fn estimated(estimate: Option<Estimate>) -> supple_estimate {
     match estimate {
-        Some(Estimate { mean, largest, node, allowed }) => {
-            supple_estimate { known: 1, node, mean, largest, allowed }
-        }
+        Some(Estimate { mean, largest, node, allowed }) => supple_estimate { known: 1, node, mean, largest, allowed },
         None => supple_estimate { known: 0, node: SUPPLE_NONE, mean: 0.0, largest: 0.0, allowed: 0.0 },
     }
 }

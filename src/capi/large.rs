@@ -10,21 +10,21 @@ use crate::step::Step;
 
 use super::SUPPLE_NONE;
 use super::loads::{CallLoads, supple_loads};
-use super::memory::{
-    self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for, same_abi,
-};
+use super::memory::{self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for, same_abi};
 use super::scene::{OpenScene, check_choice, supple_scene};
 use super::state::{opened_of, supple_state};
 use super::status::{Answer, supple_error, supple_status};
 use super::step::{HostThreads, answer, reported, supple_report, supple_threads, take_steps};
 use supple_status::*;
 
-/// For comparisons with a common method: inertia is raised where the step would be unstable, which slows all motion down.
+/// For comparisons with a common method: inertia is raised where the step would be unstable, which slows all motion
+/// down.
 pub const SUPPLE_MASS_SCALED: u32 = 0;
 /// For comparisons: the lattice alone, without the damper. Rough motion, once excited, oscillates for long.
 pub const SUPPLE_MULTILEVEL: u32 = 1;
-/// What steps beyond the critical one should be: inertia is raised where the step would be unstable, smooth motion keeps its
-/// true inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not carry.
+/// What steps beyond the critical one should be: inertia is raised where the step would be unstable, smooth motion
+/// keeps its true inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not
+/// carry.
 pub const SUPPLE_DAMPED: u32 = 2;
 
 /// Points that a lattice may have.
@@ -46,20 +46,20 @@ pub struct supple_large_config {
     pub method: u32,
     /// Length of a step, s.
     pub seconds: f32,
-    /// Damping proportional to mass, 1/s, zero or more. That of supple_step_config is not used here: give the same value twice if
-    /// both kinds of steps move a state.
+    /// Damping proportional to mass, 1/s, zero or more. That of supple_step_config is not used here: give the same
+    /// value twice if both kinds of steps move a state.
     pub damping: f32,
     /// Cells of the lattice along x, y, z; zeros: chosen for the scene. Not used by SUPPLE_MASS_SCALED.
     pub cells: [u32; 3],
-    /// NULL: the damper that is part of the library. Otherwise, for SUPPLE_DAMPED, the weight file of another one, at a multiple
-    /// of 4 bytes. It is used where it is and must stay.
+    /// NULL: the damper that is part of the library. Otherwise, for SUPPLE_DAMPED, the weight file of another one, at a
+    /// multiple of 4 bytes. It is used where it is and must stay.
     pub weights: *const c_void,
     /// Its bytes; 0 with NULL.
     pub weights_bytes: usize,
 }
 
-/// Inertia for steps of one length, computed anew a little in each step. One thread at a time. It may be copied with memcpy
-/// together with its state.
+/// Inertia for steps of one length, computed anew a little in each step. One thread at a time. It may be copied with
+/// memcpy together with its state.
 #[repr(C, align(64))]
 pub struct supple_large {
     head: Head,
@@ -166,8 +166,8 @@ pub unsafe extern "C" fn supple_large_size(
     unsafe { memory::answered(size(), error) }
 }
 
-/// Prepares steps beyond the critical one, from the state as it is, in `memory` of at least supple_large_size bytes, aligned to
-/// SUPPLE_ALIGN. It takes as long as some steps.
+/// Prepares steps beyond the critical one, from the state as it is, in `memory` of at least supple_large_size bytes,
+/// aligned to SUPPLE_ALIGN. It takes as long as some steps.
 ///
 /// @param points the points that the scene was built from, three coordinates each.
 /// @param error may be NULL.
@@ -216,8 +216,8 @@ pub(super) unsafe fn storage<'a>(mut arrays: Arrays, vectors: usize) -> &'a mut 
     unsafe { arrays.change(vectors) }
 }
 
-/// Takes `count` steps of the prepared method and length. Stops at the first that is not to be believed: that one is not taken,
-/// the state is as before it, and the status tells. They need no supple_set_step.
+/// Takes `count` steps of the prepared method and length. Stops at the first that is not to be believed: that one is
+/// not taken, the state is as before it, and the status tells. They need no supple_set_step.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone. What a cycle assembles and inverts runs on that one in any case.

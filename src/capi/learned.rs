@@ -1,5 +1,5 @@
-//! The learned step for C: a network moves the state after a lead-in of exact steps, and with fallback a step that energy does
-//! not explain is undone ([`crate::learned`]). Times in s.
+//! The learned step for C: a network moves the state after a lead-in of exact steps, and with fallback a step that
+//! energy does not explain is undone ([`crate::learned`]). Times in s.
 
 use core::ffi::c_void;
 
@@ -12,9 +12,7 @@ use crate::tled;
 
 use super::SUPPLE_NONE;
 use super::loads::{CallLoads, supple_loads};
-use super::memory::{
-    self, Arrays, Head, Layout, Object, Place, lasting_bytes, magic, one, place_for, same_abi,
-};
+use super::memory::{self, Arrays, Head, Layout, Object, Place, lasting_bytes, magic, one, place_for, same_abi};
 use super::scene::{OpenScene, check_choice, supple_scene, supple_tissue};
 use super::state::{opened_of, supple_state};
 use super::status::{Answer, status_of, supple_error, supple_status};
@@ -33,19 +31,20 @@ pub struct supple_learned_config {
     /// SUPPLE_ABI.
     pub abi: u32,
     /// 1: a learned step that diverges, or has more kinetic energy than loads and supports explain, is undone and exact
-    /// steps take its place and that of some more, before the network is tried again. 0: the caller decides by status and report. 1 needs memory for two vectors a node more.
+    /// steps take its place and that of some more, before the network is tried again. 0: the caller decides by status
+    /// and report. 1 needs memory for two vectors a node more.
     pub fallback: u32,
     /// 0.
     pub reserved: u32,
-    /// A weight file, at a multiple of 4 bytes, better of 64. It is used where it is, without a copy: it must stay, unchanged, as
-    /// long as the object is used.
+    /// A weight file, at a multiple of 4 bytes, better of 64. It is used where it is, without a copy: it must stay,
+    /// unchanged, as long as the object is used.
     pub weights: *const c_void,
     /// Its bytes; what lies behind the file is ignored.
     pub weights_bytes: usize,
 }
 
-/// A network, and what it keeps for each node of one state. One thread at a time. It may be copied with memcpy; copies use the
-/// same weights.
+/// A network, and what it keeps for each node of one state. One thread at a time. It may be copied with memcpy; copies
+/// use the same weights.
 #[repr(C, align(64))]
 pub struct supple_learned {
     head: Head,
@@ -89,8 +88,8 @@ fn layout(nodes: u32, fallback: bool) -> Layout {
     Layout::of::<supple_learned>().and::<NodeVector>(vectors_for(nodes as usize, fallback))
 }
 
-/// Bytes of memory that learned steps of so many nodes need, with fallback (1) or without (0). SUPPLE_LEARNED_SIZE is the
-/// same as a constant.
+/// Bytes of memory that learned steps of so many nodes need, with fallback (1) or without (0). SUPPLE_LEARNED_SIZE is
+/// the same as a constant.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_learned_size(nodes: u32, fallback: u32) -> usize {
     layout(nodes, fallback != 0).bytes()
@@ -214,12 +213,13 @@ impl<'a> Call<'a> {
         }
     }
 
-    /// Exact steps while the frames follow, as long as one of the network's steps. Motions go evenly over all `left` of these.
+    /// Exact steps while the frames follow, as long as one of the network's steps. Motions go evenly over all `left` of
+    /// these.
     fn lead(&mut self, left: u64) -> Answer<supple_status> {
         let Self { open, loads, model, storage, state, exact, ratio, threads, report } = self;
-        let status = model.with_storage(storage).lead_interval(state, |state| {
-            exact_steps((open, exact, threads), *ratio, left, state, loads, report)
-        });
+        let status = model
+            .with_storage(storage)
+            .lead_interval(state, |state| exact_steps((open, exact, threads), *ratio, left, state, loads, report));
         answer(&status)
     }
 
@@ -249,8 +249,7 @@ impl<'a> Call<'a> {
         count: u64,
         mut step: impl FnMut(&mut Self, u64) -> Answer<supple_status>,
     ) -> Answer<supple_status> {
-        let answer =
-            (0..count).try_fold(SUPPLE_OK, |worst, done| Ok(worse(worst, step(&mut self, count - done)?)));
+        let answer = (0..count).try_fold(SUPPLE_OK, |worst, done| Ok(worse(worst, step(&mut self, count - done)?)));
         self.report.close(&self.state);
         answer
     }
@@ -271,9 +270,10 @@ fn exact_steps(
     })
 }
 
-/// The lead-in: exact steps for `seconds` while the frames of the nodes follow, in the nearest whole number of the network's steps
-/// (seconds of supple_learned_facts), which may be none. The network can take over at the end of it. In the paper it lasts 0.3 s
-/// from rest. Motions go evenly over all of it. Seconds that are negative or not finite: SUPPLE_E_NEGATIVE.
+/// The lead-in: exact steps for `seconds` while the frames of the nodes follow, in the nearest whole number of the
+/// network's steps (seconds of supple_learned_facts), which may be none. The network can take over at the end of it. In
+/// the paper it lasts 0.3 s from rest. Motions go evenly over all of it. Seconds that are negative or not finite:
+/// SUPPLE_E_NEGATIVE.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.
@@ -301,10 +301,11 @@ pub unsafe extern "C" fn supple_learned_lead(
     unsafe { reported(report, lead) }
 }
 
-/// Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. With fallback a step
-/// that is not to be believed is undone, and exact steps take its place and that of the next seven, where it happens again of more, before
-/// the network is tried again: SUPPLE_FELL_BACK. Without fallback the call stops at the first such step: it is not taken, displacements and
-/// time are as before it, velocities may be those of the network's own step, and a new lead-in is needed.
+/// Takes `count` learned steps after supple_learned_lead, or after other learned steps, of the same state. With
+/// fallback a step that is not to be believed is undone, and exact steps take its place and that of the next seven,
+/// where it happens again of more, before the network is tried again: SUPPLE_FELL_BACK. Without fallback the call stops
+/// at the first such step: it is not taken, displacements and time are as before it, velocities may be those of the
+/// network's own step, and a new lead-in is needed.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.
@@ -331,8 +332,9 @@ pub unsafe extern "C" fn supple_learned_step(
     unsafe { reported(report, step) }
 }
 
-/// To be called whenever a supple_guard calls learned steps inexact (SUPPLE_INEXACT): with fallback exact steps take the place of the
-/// next eight, where it happens again of more, before the network is tried again. Without fallback nothing changes.
+/// To be called whenever a supple_guard calls learned steps inexact (SUPPLE_INEXACT): with fallback exact steps take
+/// the place of the next eight, where it happens again of more, before the network is tried again. Without fallback
+/// nothing changes.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_learned_fall_back(
     learned: *mut supple_learned,

@@ -83,7 +83,8 @@ fn layout(forces: u32, motions: u32) -> Layout {
         .and::<Motion>(motions as usize)
 }
 
-/// Bytes of memory that loads need with room for so many forces and motions. SUPPLE_LOADS_SIZE is the same as a constant.
+/// Bytes of memory that loads need with room for so many forces and motions. SUPPLE_LOADS_SIZE is the same as a
+/// constant.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_loads_size(forces: u32, motions: u32) -> usize {
     layout(forces, motions).bytes()
@@ -151,8 +152,7 @@ pub unsafe extern "C" fn supple_set_forces(
         let (object, mut arrays) = memory::open(loads)?;
         let given = array(forces, count as usize)?;
         room_for(count, object.force_room)?;
-        let forces =
-            given.iter().map(|&supple_force { node, newton, ramp }| NodalForce { node, newton, ramp });
+        let forces = given.iter().map(|&supple_force { node, newton, ramp }| NodalForce { node, newton, ramp });
         for (index, force) in forces.clone().enumerate() {
             force.check(index, object.nodes as usize)?;
         }
@@ -166,7 +166,8 @@ pub unsafe extern "C" fn supple_set_forces(
     unsafe { memory::answered(set(), error) }
 }
 
-/// Replaces all motions by `count` others, which are copied; none with a count of zero: moved nodes then stay where they are.
+/// Replaces all motions by `count` others, which are copied; none with a count of zero: moved nodes then stay where
+/// they are.
 ///
 /// @param error may be NULL; index is that of a motion.
 #[unsafe(no_mangle)]

@@ -6,8 +6,8 @@ use super::memory::{one, place_for};
 use super::status::{status_of, supple_status};
 use supple_status::*;
 
-/// The force on an instrument between two frames, for a haptic loop: supple_local_force_follow after each frame, supple_local_force_at
-/// as often as you like, on any thread, on a copy. Begin with all zero.
+/// The force on an instrument between two frames, for a haptic loop: supple_local_force_follow after each frame,
+/// supple_local_force_at as often as you like, on any thread, on a copy. Begin with all zero.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_local_force {
@@ -15,7 +15,8 @@ pub struct supple_local_force {
     pub position: [f32; 3],
     /// Force of the tissue on it there, N.
     pub force: [f32; 3],
-    /// Change of the force with the position, N/m, symmetric: force = force + stiffness (position - position in the frame).
+    /// Change of the force with the position, N/m, symmetric: force = force + stiffness (position - position in the
+    /// frame).
     pub stiffness: [[f32; 3]; 3],
     /// How far the force that was predicted for the latest frame was off, N.
     pub error: f32,

@@ -1,5 +1,5 @@
-//! Pointers from C, checked: NULL, alignment, size, and what the memory holds. All objects begin with a [`Head`]; their arrays
-//! stand behind, each at a multiple of [`SUPPLE_ALIGN`] bytes from the beginning.
+//! Pointers from C, checked: NULL, alignment, size, and what the memory holds. All objects begin with a [`Head`]; their
+//! arrays stand behind, each at a multiple of [`SUPPLE_ALIGN`] bytes from the beginning.
 
 use core::ffi::c_void;
 use core::{ptr, slice};
@@ -29,9 +29,7 @@ pub(super) unsafe trait Object: Sized {
     const FRONT: usize;
     /// A mistake here does not compile.
     const FITS: () = assert!(
-        size_of::<Self>() <= Self::FRONT
-            && Self::FRONT % SUPPLE_ALIGN == 0
-            && align_of::<Self>() <= SUPPLE_ALIGN
+        size_of::<Self>() <= Self::FRONT && Self::FRONT % SUPPLE_ALIGN == 0 && align_of::<Self>() <= SUPPLE_ALIGN
     );
 }
 
@@ -325,8 +323,7 @@ pub(super) unsafe fn place_if_wanted<T>(at: *mut T) -> Answer<Option<*mut T>> {
 
 /// That a configuration is of this version.
 pub(super) fn same_abi<T>(struct_size: u32, abi: u32) -> Answer<()> {
-    let wrong =
-        |value: u32, limit: u32| Err(supple_error::from(SUPPLE_E_ABI).value(value.into(), limit.into()));
+    let wrong = |value: u32, limit: u32| Err(supple_error::from(SUPPLE_E_ABI).value(value.into(), limit.into()));
     if abi != SUPPLE_ABI {
         return wrong(abi, SUPPLE_ABI);
     }

@@ -1,5 +1,5 @@
-//! A host in memory that is exactly as large as it must be: every kind of object, and every function that reads or writes through
-//! pointers. For Miri, which checks each access, its alignment and what else may use that memory:
+//! A host in memory that is exactly as large as it must be: every kind of object, and every function that reads or
+//! writes through pointers. For Miri, which checks each access, its alignment and what else may use that memory:
 //!
 //! ```sh
 //! cargo +nightly miri test -p supple --lib --features capi,std,libm/force-soft-floats capi::
@@ -141,10 +141,7 @@ fn host(element: u32, network: &[u8]) {
         };
         assert_eq!(supple_set_step(scene, state, &step, null_mut()), SUPPLE_OK);
         assert!(supple_step(scene, loads, state, 2, &threads, &mut report) as i32 >= 0);
-        assert_eq!(
-            supple_step(state.cast_const().cast(), loads, state, 2, null(), null_mut()),
-            SUPPLE_E_KIND
-        );
+        assert_eq!(supple_step(state.cast_const().cast(), loads, state, 2, null(), null_mut()), SUPPLE_E_KIND);
 
         // Out, and back from an odd address.
         let mut vectors = supple_vectors { first: null(), stride: 0, count: 0 };
@@ -176,8 +173,7 @@ fn host(element: u32, network: &[u8]) {
             let (mut needed, mut large) = (0, null_mut());
             assert_eq!(supple_large_size(scene, points, &config, &mut needed, null_mut()), SUPPLE_OK);
             let mut memory = Memory::new(needed);
-            let made =
-                supple_large_init(memory.at(), needed, scene, state, points, &config, &mut large, null_mut());
+            let made = supple_large_init(memory.at(), needed, scene, state, points, &config, &mut large, null_mut());
             assert_eq!(made, SUPPLE_OK);
             assert!(supple_large_step(scene, loads, state, large, 2, &threads, &mut report) as i32 >= 0);
         }
@@ -193,8 +189,7 @@ fn host(element: u32, network: &[u8]) {
         let (mut needed, mut guard) = (0, null_mut());
         assert_eq!(supple_guard_size(scene, points, &mut needed, null_mut()), SUPPLE_OK);
         let mut memory = Memory::new(needed);
-        let made =
-            supple_guard_init(memory.at(), needed, scene, state, points, &config, &mut guard, null_mut());
+        let made = supple_guard_init(memory.at(), needed, scene, state, points, &config, &mut guard, null_mut());
         assert_eq!(made, SUPPLE_OK);
         assert!(supple_step(scene, loads, state, 1, null(), null_mut()) as i32 >= 0);
         let mut estimate = supple_estimate { known: 7, node: 0, mean: 0.0, largest: 0.0, allowed: 0.0 };
@@ -204,12 +199,8 @@ fn host(element: u32, network: &[u8]) {
         let mut memory = Memory::new(supple_contact_size(NODES, 1, 16));
         let (at, bytes, mut contact) = (memory.at(), memory.bytes(), null_mut());
         let corners = [0, 1, 2];
-        let surface = supple_surface {
-            nodes: null(),
-            triangles: corners.as_ptr(),
-            node_count: NODES,
-            triangle_count: 1,
-        };
+        let surface =
+            supple_surface { nodes: null(), triangles: corners.as_ptr(), node_count: NODES, triangle_count: 1 };
         let made = supple_contact_init(at, bytes, scene, points, &surface, 16, &mut contact, null_mut());
         assert_eq!(made, SUPPLE_OK);
         let pose = supple_pose { position: [-0.0079, 0.01, 0.04 / 3.0], rotation: [0.0; 4] };

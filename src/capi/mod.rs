@@ -1,7 +1,7 @@
-//! The C API: `include/supple.h`, which `tools/header.sh` makes from these files. Every object lives in memory of the host, begins
-//! with what it is and how large, and holds no pointer into itself. A function checks all that it is given before it changes
-//! anything; what is wrong comes back as a status, with place and value in a `supple_error`. What is computed is computed by the
-//! functions that Rust hosts call as well. SI units.
+//! The C API: `include/supple.h`, which `tools/header.sh` makes from these files. Every object lives in memory of the
+//! host, begins with what it is and how large, and holds no pointer into itself. A function checks all that it is given
+//! before it changes anything; what is wrong comes back as a status, with place and value in a `supple_error`. What is
+//! computed is computed by the functions that Rust hosts call as well. SI units.
 //!
 //! Types and functions have the names that C sees. Their docs are the header's: written for a reader of C.
 #![allow(non_camel_case_types, unreachable_pub, unsafe_code)]

@@ -16,7 +16,8 @@ use supple_status::*;
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_reaction_force {
-    /// 1 if there is a force; 0 at the first call, after a reset or a restore, and where it is no finite number: the other fields mean nothing.
+    /// 1 if there is a force; 0 at the first call, after a reset or a restore, and where it is no finite number: the
+    /// other fields mean nothing.
     pub known: u32,
     /// 1 if the steps resolve it: `spread` is at most a quarter of it. 0: do not use it.
     pub resolved: u32,
@@ -48,8 +49,8 @@ pub extern "C" fn supple_reaction_size(nodes: u32) -> usize {
     layout(nodes as usize).bytes()
 }
 
-/// Prepares the reaction of some supports in `memory` of at least supple_reaction_size bytes, aligned to SUPPLE_ALIGN. It takes as long
-/// as some hundred steps.
+/// Prepares the reaction of some supports in `memory` of at least supple_reaction_size bytes, aligned to SUPPLE_ALIGN.
+/// It takes as long as some hundred steps.
 ///
 /// @param supports numbers of nodes that the scene holds, an instrument's for example.
 /// @param count how many, at least 1.
@@ -81,8 +82,8 @@ pub unsafe extern "C" fn supple_reaction_init(
     unsafe { memory::answered(init(), error) }
 }
 
-/// Writes the mean force by which the supports have acted since the last call. To be called before the first step and after each
-/// frame's steps, of any kind.
+/// Writes the mean force by which the supports have acted since the last call. To be called before the first step and
+/// after each frame's steps, of any kind.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_reaction_follow(
     scene: *const supple_scene,

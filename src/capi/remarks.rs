@@ -28,7 +28,8 @@ pub const SUPPLE_REMARK_GRAVITY: u32 = 6;
 pub const SUPPLE_REMARK_FORCES: u32 = 7;
 /// Motion `index` goes `value` m, farther than the body is large (`limit`, m).
 pub const SUPPLE_REMARK_WAY: u32 = 8;
-/// Motion `index` has a speed of `value` m/s along its ramp, above that of shear waves in the softest tissue (`limit`, m/s).
+/// Motion `index` has a speed of `value` m/s along its ramp, above that of shear waves in the softest tissue (`limit`,
+/// m/s).
 pub const SUPPLE_REMARK_SPEED: u32 = 9;
 /// Supports are of nodes far from each other: are they counted from one? The first node is 0.
 pub const SUPPLE_REMARK_COUNTED_FROM_ONE: u32 = 10;
@@ -68,8 +69,8 @@ impl supple_remark {
     }
 }
 
-/// Writes what in a scene looks as if a unit or a number was mistaken; it can be simulated all the same. To be called once, before the
-/// first step. It takes as long as some steps.
+/// Writes what in a scene looks as if a unit or a number was mistaken; it can be simulated all the same. To be called
+/// once, before the first step. It takes as long as some steps.
 ///
 /// @param points the points that the scene was built from, three coordinates each.
 /// @param loads NULL: nothing is said of loads.
@@ -91,8 +92,7 @@ pub unsafe extern "C" fn supple_remarks(
     let tell = || unsafe {
         let (open, count) = (OpenScene::of(scene)?, place_for(count)?);
         let points = array(points.cast::<[f32; 3]>(), open.node_count())?;
-        let recipe =
-            if learned.is_null() { None } else { Some(memory::read(learned)?.model.network().recipe()) };
+        let recipe = if learned.is_null() { None } else { Some(memory::read(learned)?.model.network().recipe()) };
         let loads = CallLoads::of(loads, &open)?;
         let first = if room == 0 { remarks } else { place_for(remarks)? };
         let mut told = 0;
@@ -105,9 +105,7 @@ pub unsafe extern "C" fn supple_remarks(
         {
             let scene = open.view();
             plausibility::of_body(scene, points, &mut say);
-            plausibility::of_gravity(loads.of_call.asked().gravity())
-                .into_iter()
-                .for_each(|remark| say(0, remark));
+            plausibility::of_gravity(loads.of_call.asked().gravity()).into_iter().for_each(|remark| say(0, remark));
             let body = Proportions::of(scene, points);
             body.of_forces(loads.of_call.asked().forces()).into_iter().for_each(|remark| say(0, remark));
             for (index, motion) in loads.of_call.asked().motions().iter().enumerate() {
@@ -130,9 +128,7 @@ pub extern "C" fn supple_remark_text(kind: u32) -> *const c_char {
         SUPPLE_REMARK_MASS => c"an unusual mass of the body: are its points in metres?",
         SUPPLE_REMARK_DENSITY => c"an unusual density: tissue has about 1000 kg/m^3",
         SUPPLE_REMARK_STIFFNESS => c"an unusual Young's modulus: soft tissue has 1e3 to 1e5 Pa",
-        SUPPLE_REMARK_POISSON_RATIO => {
-            c"an unusual Poisson's ratio: are the constants of the law in the right order?"
-        }
+        SUPPLE_REMARK_POISSON_RATIO => c"an unusual Poisson's ratio: are the constants of the law in the right order?",
         SUPPLE_REMARK_GRAVITY => c"an unusual gravity: that of the earth is 9.81 m/s^2",
         SUPPLE_REMARK_FORCES => c"forces that would crush the body: are they in newtons?",
         SUPPLE_REMARK_WAY => c"a motion farther than the body is large: is it in metres?",
@@ -140,9 +136,7 @@ pub extern "C" fn supple_remark_text(kind: u32) -> *const c_char {
         SUPPLE_REMARK_COUNTED_FROM_ONE => {
             c"supports of nodes far from each other: are nodes counted from one? The first is 0"
         }
-        SUPPLE_REMARK_OTHER_TISSUE => {
-            c"a network that learned from other tissue: its error here is not known"
-        }
+        SUPPLE_REMARK_OTHER_TISSUE => c"a network that learned from other tissue: its error here is not known",
         _ => c"?",
     };
     text.as_ptr()

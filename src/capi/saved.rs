@@ -45,21 +45,14 @@ const FRONT: usize = size_of::<Front>();
 /// Bytes that a saved state of so many nodes has.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_saved_size(nodes: u32) -> usize {
-    (nodes as usize)
-        .checked_mul(2 * size_of::<NodeVector>())
-        .and_then(|bytes| bytes.checked_add(FRONT))
-        .unwrap_or(0)
+    (nodes as usize).checked_mul(2 * size_of::<NodeVector>()).and_then(|bytes| bytes.checked_add(FRONT)).unwrap_or(0)
 }
 
 /// Saves a state with its step to `to`, at any address.
 ///
 /// @param bytes room there: supple_saved_size at least.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn supple_save(
-    state: *const supple_state,
-    to: *mut c_void,
-    bytes: usize,
-) -> supple_status {
+pub unsafe extern "C" fn supple_save(state: *const supple_state, to: *mut c_void, bytes: usize) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let save = || unsafe {
         let object = memory::read(state)?;
@@ -102,16 +95,13 @@ pub unsafe extern "C" fn supple_save(
     status_of(save())
 }
 
-/// Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the saved one
-/// would have, to the bit. Forces are zero until the next step. A saved state with a time, a displacement or an increment that is not
-/// finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE. A supple_large has to be prepared again, and a
-/// supple_learned needs a new lead-in; for the same bits with these, copy their objects with memcpy as well.
+/// Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the
+/// saved one would have, to the bit. Forces are zero until the next step. A saved state with a time, a displacement or
+/// an increment that is not finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE. A supple_large
+/// has to be prepared again, and a supple_learned needs a new lead-in; for the same bits with these, copy their objects
+/// with memcpy as well.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn supple_restore(
-    state: *mut supple_state,
-    from: *const c_void,
-    bytes: usize,
-) -> supple_status {
+pub unsafe extern "C" fn supple_restore(state: *mut supple_state, from: *const c_void, bytes: usize) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let restore = || unsafe {
         let nodes = memory::change(state)?.nodes;
@@ -122,9 +112,7 @@ pub unsafe extern "C" fn supple_restore(
             return Err(SUPPLE_E_NOT_SAVED.into());
         }
         if front.version != VERSION {
-            return Err(
-                supple_error::from(SUPPLE_E_SAVED_VERSION).value(front.version.into(), VERSION.into())
-            );
+            return Err(supple_error::from(SUPPLE_E_SAVED_VERSION).value(front.version.into(), VERSION.into()));
         }
         if front.nodes != nodes {
             return Err(mismatch(front.nodes as usize, nodes as usize));
@@ -140,8 +128,7 @@ pub unsafe extern "C" fn supple_restore(
         let [start, work, dissipated, corrected, kinetic, uncertainty, peak] = front.energy_balance;
         let [next, strain, largest, of_cycle] = front.energy_cycle;
         let cycle = EnergyCycle { next: next as u32, strain, kinetic: largest, work: of_cycle };
-        let energy_balance =
-            EnergyBalance { start, work, dissipated, corrected, kinetic, uncertainty, peak, cycle };
+        let energy_balance = EnergyBalance { start, work, dissipated, corrected, kinetic, uncertainty, peak, cycle };
         object.progress = Progress::resumed(time, steps, last_step, energy_balance);
         object.set_step(Step::unchecked(step_seconds, step_damping).ok());
         let mut vectors = |bytes: &[u8]| {
@@ -164,8 +151,7 @@ pub unsafe extern "C" fn supple_restore(
 fn check_finite(front: &Front, rest: &[u8]) -> Answer<()> {
     let (components, _) = rest.as_chunks::<4>();
     // The fourth of each vector is padding.
-    let three =
-        |vector: &[[u8; 4]]| vector.iter().take(3).all(|&bytes| f32::from_le_bytes(bytes).is_finite());
+    let three = |vector: &[[u8; 4]]| vector.iter().take(3).all(|&bytes| f32::from_le_bytes(bytes).is_finite());
     let vectors = components.chunks(4).all(three);
     let length = front.last_step.is_finite() && front.last_step >= 0.0;
     let time = front.time.is_finite() && front.time >= 0.0;

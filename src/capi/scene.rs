@@ -18,13 +18,14 @@ pub const SUPPLE_WINDING_CHECKED: u32 = 0;
 /// Elements are turned where needed.
 pub const SUPPLE_WINDING_NORMALISED: u32 = 1;
 
-/// Linear tetrahedra. They lock, that is bend too little, where tissue hardly changes its volume (Poisson's ratio above 0.45).
+/// Linear tetrahedra. They lock, that is bend too little, where tissue hardly changes its volume (Poisson's ratio above
+/// 0.45).
 pub const SUPPLE_LINEAR: u32 = 0;
 /// Tetrahedra with average nodal pressure, which do not lock. Take these unless you compare with others' linear ones.
 pub const SUPPLE_NODAL_PRESSURE: u32 = 1;
-/// Tetrahedra with stabilised nodal strain, which bend well on coarse meshes and take less time than linear ones, but more memory:
-/// supple_patches_size. Under strains above a half elements at sharp edges may turn inside out, which the status tells within 16
-/// steps. Only in a library with all laws.
+/// Tetrahedra with stabilised nodal strain, which bend well on coarse meshes and take less time than linear ones, but
+/// more memory: supple_patches_size. Under strains above a half elements at sharp edges may turn inside out, which the
+/// status tells within 16 steps. Only in a library with all laws.
 pub const SUPPLE_NODAL_STRAIN: u32 = 2;
 const _: () = assert!(SUPPLE_LINEAR == Element::Linear.code());
 const _: () = assert!(SUPPLE_NODAL_PRESSURE == Element::NodalPressure.code());
@@ -177,11 +178,7 @@ mod contents {
         #[inline(always)]
         fn element(&self) -> Element {
             // Seen by the compiler, which then leaves nodal strain out.
-            if self.element as u32 == Element::NodalPressure as u32 {
-                Element::NodalPressure
-            } else {
-                Element::Linear
-            }
+            if self.element as u32 == Element::NodalPressure as u32 { Element::NodalPressure } else { Element::Linear }
         }
 
         fn tissue(&self, element: usize) -> Option<Tissue<SceneLaw>> {
@@ -267,26 +264,26 @@ fn layout(nodes: u32, elements: u32, tissues: u32, patch_rows: usize) -> Layout 
         .and::<PatchRow>(patch_rows)
 }
 
-/// Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant. With
-/// SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more.
+/// Bytes of memory that a scene needs; zero if there can be no such scene. SUPPLE_SCENE_SIZE is the same as a constant.
+/// With SUPPLE_NODAL_STRAIN it needs supple_patches_size bytes more.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_scene_size(nodes: u32, elements: u32, tissues: u32) -> usize {
     layout(nodes, elements, tissues, 0).bytes()
 }
 
-/// Bytes of memory that a scene with SUPPLE_NODAL_STRAIN needs more than supple_scene_size: enough to build it from any mesh whose
-/// elements of a tissue around a node are joined by faces, with at most 48 neighbours of a node. For others supple_scene_init
-/// returns SUPPLE_E_SHORT, and the error's limit is enough. The scene takes about half of these bytes: supple_scene_describe tells.
-/// SUPPLE_PATCHES_SIZE is the same as a constant.
+/// Bytes of memory that a scene with SUPPLE_NODAL_STRAIN needs more than supple_scene_size: enough to build it from any
+/// mesh whose elements of a tissue around a node are joined by faces, with at most 48 neighbours of a node. For others
+/// supple_scene_init returns SUPPLE_E_SHORT, and the error's limit is enough. The scene takes about half of these
+/// bytes: supple_scene_describe tells. SUPPLE_PATCHES_SIZE is the same as a constant.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_patches_size(nodes: u32, elements: u32, tissues: u32) -> usize {
     let rows = patch_rows_for(nodes as usize, elements as usize, tissues as usize);
     rows.checked_mul(size_of::<PatchRow>()).unwrap_or(0)
 }
 
-/// Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size, aligned to
-/// SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning of that memory. What it takes of it is told by
-/// supple_scene_describe; the rest is free for other use.
+/// Builds a scene in `memory` of at least supple_scene_size bytes, with SUPPLE_NODAL_STRAIN and supple_patches_size,
+/// aligned to SUPPLE_ALIGN. On success `*scene` is the scene, at the beginning of that memory. What it takes of it is
+/// told by supple_scene_describe; the rest is free for other use.
 ///
 /// @param error may be NULL; index is that of an element, a support or a node as the status says.
 #[unsafe(no_mangle)]
@@ -344,8 +341,7 @@ impl<'a> Parts<'a> {
         let most = ELEMENTS.len().saturating_sub(1) as u32;
         check_choice(SUPPLE_NONE as usize, config.element, most)?;
         let element = element.unwrap_or_default();
-        let winding =
-            if config.winding == SUPPLE_WINDING_CHECKED { Winding::Checked } else { Winding::Normalised };
+        let winding = if config.winding == SUPPLE_WINDING_CHECKED { Winding::Checked } else { Winding::Normalised };
         if nodes == 0 || elements == 0 {
             return Err(SUPPLE_E_MESH_EMPTY.into());
         }

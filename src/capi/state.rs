@@ -7,15 +7,13 @@ use crate::state::{NodeVector, Progress, StateView};
 use crate::step::{CriticalStep, Step};
 use crate::tled;
 
-use super::memory::{
-    self, Arrays, Head, Layout, Object, Place, magic, one, place_for, place_if_wanted, same_abi,
-};
+use super::memory::{self, Arrays, Head, Layout, Object, Place, magic, one, place_for, place_if_wanted, same_abi};
 use super::scene::{OpenScene, supple_scene};
 use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
 use supple_status::*;
 
-/// What moves. One thread at a time. It may be copied with memcpy, to any memory aligned to SUPPLE_ALIGN, and the copy goes on as
-/// the original would, to the bit.
+/// What moves. One thread at a time. It may be copied with memcpy, to any memory aligned to SUPPLE_ALIGN, and the copy
+/// goes on as the original would, to the bit.
 #[repr(C, align(64))]
 pub struct supple_state {
     head: Head,
@@ -70,8 +68,8 @@ fn layout(nodes: u32, element: Element) -> Layout {
         .and::<NodeVector>(volumes)
 }
 
-/// Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is the same
-/// as a constant.
+/// Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is
+/// the same as a constant.
 ///
 /// @param element of the scene: SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
 #[unsafe(no_mangle)]
@@ -115,13 +113,11 @@ pub unsafe extern "C" fn supple_state_reset(state: *mut supple_state) -> supple_
     status_of(reset())
 }
 
-/// Stops all motion: nodes and time stay as they are, velocities are zero, and the energy balance begins with the strain energy. To go on
-/// after SUPPLE_E_DIVERGED_ENERGY from a state that was not saved before. A supple_learned needs a new lead-in.
+/// Stops all motion: nodes and time stay as they are, velocities are zero, and the energy balance begins with the
+/// strain energy. To go on after SUPPLE_E_DIVERGED_ENERGY from a state that was not saved before. A supple_learned
+/// needs a new lead-in.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn supple_state_stop(
-    scene: *const supple_scene,
-    state: *mut supple_state,
-) -> supple_status {
+pub unsafe extern "C" fn supple_state_stop(scene: *const supple_scene, state: *mut supple_state) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let stop = || unsafe {
         let open = OpenScene::of(scene)?;
@@ -132,9 +128,9 @@ pub unsafe extern "C" fn supple_state_stop(
     status_of(stop())
 }
 
-/// Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as
-/// long as some six steps, with nodal pressure some twenty, with nodal strain some thirty; tissue that is deformed is stiffer, so ask
-/// again from time to time.
+/// Writes a bound on the stable step at the state's displacements, s: never above the exact limit. It takes as long as
+/// some six steps, with nodal pressure some twenty, with nodal strain some thirty; tissue that is deformed is stiffer,
+/// so ask again from time to time.
 ///
 /// @param seconds receives the step, s.
 /// @param node may be NULL; receives the node that sets it.
@@ -228,12 +224,7 @@ impl supple_state {
 
 /// # Safety
 /// The arrays are those of a state of so many nodes, and nobody else uses them.
-unsafe fn view<'a>(
-    mut arrays: Arrays,
-    nodes: u32,
-    element: Element,
-    progress: &'a mut Progress,
-) -> StateView<'a> {
+unsafe fn view<'a>(mut arrays: Arrays, nodes: u32, element: Element, progress: &'a mut Progress) -> StateView<'a> {
     // SAFETY: the caller's promise. Any bits are vectors.
     let [displacements, increments, forces] = [(); 3].map(|()| unsafe { arrays.change(nodes as usize) });
     // SAFETY: as above.

@@ -1,5 +1,5 @@
-//! What became of a call: a number that is never given another meaning, a sentence for it, and where and with which value it
-//! happened.
+//! What became of a call: a number that is never given another meaning, a sentence for it, and where and with which
+//! value it happened.
 
 use core::ffi::{CStr, c_char};
 
@@ -15,23 +15,24 @@ use crate::step::StepError;
 
 use super::SUPPLE_NONE;
 
-/// What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not done, and
-/// nothing has changed, except that memory handed to a function that prepares an object may hold none afterwards, that forces
-/// are those of the step that was refused, or zero after a critical step, and what supple_learned_step says of a refused one.
-/// Numbers are never given another meaning.
+/// What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not
+/// done, and nothing has changed, except that memory handed to a function that prepares an object may hold none
+/// afterwards, that forces are those of the step that was refused, or zero after a critical step, and what
+/// supple_learned_step says of a refused one. Numbers are never given another meaning.
 #[repr(i32)]
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[must_use]
 pub enum supple_status {
     /// Done.
     SUPPLE_OK = 0,
-    /// Steps were taken, but are not exact: elements are beyond the range of their law, there is more kinetic energy than
-    /// loads and supports explain, or a step of a supple_large held much of the motion back. The report tells the first two, also
-    /// where a larger remark hides them.
+    /// Steps were taken, but are not exact: elements are beyond the range of their law, there is more kinetic energy
+    /// than loads and supports explain, or a step of a supple_large held much of the motion back. The report tells the
+    /// first two, also where a larger remark hides them.
     SUPPLE_LIMITED = 1,
     /// Learned steps were taken, with more than one percent of the vertices outside what training has seen.
     SUPPLE_OUTSIDE = 2,
-    /// Exact steps have taken the place of learned ones that were not to be believed. The network is tried again in later steps.
+    /// Exact steps have taken the place of learned ones that were not to be believed. The network is tried again in
+    /// later steps.
     SUPPLE_FELL_BACK = 3,
     /// A supple_guard estimates that the error is more than is allowed.
     SUPPLE_INEXACT = 4,
@@ -54,7 +55,8 @@ pub enum supple_status {
     SUPPLE_E_MISMATCH = -8,
     /// More (value) than there is room for (limit).
     SUPPLE_E_CAPACITY = -9,
-    /// Entry `index` of a list (elements, supports, forces, motions) names a node that is not there (node; limit: nodes).
+    /// Entry `index` of a list (elements, supports, forces, motions) names a node that is not there (node; limit:
+    /// nodes).
     SUPPLE_E_INDEX = -10,
     /// Entry or node `index` has a number (value) that is NaN or infinite.
     SUPPLE_E_NOT_FINITE = -11,
@@ -141,16 +143,17 @@ pub enum supple_status {
 
     /// The step was not taken: a displacement, first of `node`, would not be a finite number.
     SUPPLE_E_DIVERGED = -90,
-    /// The step was not taken: the kinetic energy (value, J), most of it at `node`, is several times what loads and supports
-    /// ever gave (limit, J).
+    /// The step was not taken: the kinetic energy (value, J), most of it at `node`, is several times what loads and
+    /// supports ever gave (limit, J).
     SUPPLE_E_DIVERGED_ENERGY = -91,
-    /// The step was not taken: force `index` (value, N) would move `node` in it through the tissue around it (limit: its size, m).
+    /// The step was not taken: force `index` (value, N) would move `node` in it through the tissue around it (limit:
+    /// its size, m).
     SUPPLE_E_DIVERGED_FORCE = -92,
-    /// The step was not taken: supports moved `node` by too much in the step before (value, m) for the tissue around it (limit: its size,
-    /// m).
+    /// The step was not taken: supports moved `node` by too much in the step before (value, m) for the tissue around it
+    /// (limit: its size, m).
     SUPPLE_E_DIVERGED_MOTION = -93,
-    /// The step was not taken: instrument `index` would move farther in it, or is farther inside the body at a node, (value, m) than it
-    /// may (limit): start outside, move slower.
+    /// The step was not taken: instrument `index` would move farther in it, or is farther inside the body at a node,
+    /// (value, m) than it may (limit): start outside, move slower.
     SUPPLE_E_DIVERGED_INSTRUMENT = -94,
     /// The step was not taken: mass-scaled and learned steps cannot meet instruments.
     SUPPLE_E_NO_CONTACT = -95,
@@ -185,14 +188,8 @@ impl From<supple_status> for supple_error {
 }
 
 impl supple_error {
-    pub(super) const NONE: Self = Self {
-        status: SUPPLE_OK,
-        index: SUPPLE_NONE,
-        node: SUPPLE_NONE,
-        axis: SUPPLE_NONE,
-        value: 0.0,
-        limit: 0.0,
-    };
+    pub(super) const NONE: Self =
+        Self { status: SUPPLE_OK, index: SUPPLE_NONE, node: SUPPLE_NONE, axis: SUPPLE_NONE, value: 0.0, limit: 0.0 };
 
     pub(super) fn value(self, value: f64, limit: f64) -> Self {
         Self { value, limit, ..self }
@@ -234,18 +231,14 @@ impl From<MeshError> for supple_error {
             MeshError::IndexOutOfRange { element, node, nodes } => {
                 is(SUPPLE_E_INDEX).at(element).node(node).value(node.into(), nodes as f64)
             }
-            MeshError::RepeatedNode { element, node } => {
-                is(SUPPLE_E_MESH_REPEATED_NODE).at(element).node(node)
-            }
+            MeshError::RepeatedNode { element, node } => is(SUPPLE_E_MESH_REPEATED_NODE).at(element).node(node),
             MeshError::NotFinite { node, axis, value } => {
                 is(SUPPLE_E_NOT_FINITE).at(node).node(node as u32).axis(axis).value(value.into(), 0.0)
             }
             MeshError::Degenerate { element, volume, .. } => {
                 is(SUPPLE_E_MESH_DEGENERATE).at(element).value(volume, 0.0)
             }
-            MeshError::Inverted { element, volume } => {
-                is(SUPPLE_E_MESH_INVERTED).at(element).value(volume, 0.0)
-            }
+            MeshError::Inverted { element, volume } => is(SUPPLE_E_MESH_INVERTED).at(element).value(volume, 0.0),
             MeshError::Table { places, nodes } => mismatch(places, nodes),
             MeshError::UnusedNode { node } => is(SUPPLE_E_MESH_UNUSED_NODE).node(node as u32),
         }
@@ -255,8 +248,7 @@ impl From<MeshError> for supple_error {
 impl From<BuildError> for supple_error {
     fn from(error: BuildError) -> Self {
         let is = Self::from;
-        let room =
-            |needed: usize, capacity: usize| is(SUPPLE_E_CAPACITY).value(needed as f64, capacity as f64);
+        let room = |needed: usize, capacity: usize| is(SUPPLE_E_CAPACITY).value(needed as f64, capacity as f64);
         match error {
             BuildError::Mesh(error) => error.into(),
             BuildError::NodeCapacity { needed, capacity } | BuildError::TileCapacity { needed, capacity } => {
@@ -267,12 +259,8 @@ impl From<BuildError> for supple_error {
                 is(SUPPLE_E_INDEX).at(support).node(node).value(node.into(), nodes as f64)
             }
             BuildError::NoTissue { element } => is(SUPPLE_E_TISSUE).at(element),
-            BuildError::Constant { element, value, .. } => {
-                is(SUPPLE_E_CONSTANT).at(element).value(value.into(), 0.0)
-            }
-            BuildError::Density { element, value } => {
-                is(SUPPLE_E_DENSITY).at(element).value(value.into(), 0.0)
-            }
+            BuildError::Constant { element, value, .. } => is(SUPPLE_E_CONSTANT).at(element).value(value.into(), 0.0),
+            BuildError::Density { element, value } => is(SUPPLE_E_DENSITY).at(element).value(value.into(), 0.0),
             BuildError::PatchCapacity { needed, capacity } => {
                 let bytes = |rows: usize| rows.saturating_mul(size_of::<PatchRow>());
                 short(bytes(capacity), bytes(needed))
@@ -289,9 +277,7 @@ impl From<LoadError> for supple_error {
             LoadError::Node { index, node, nodes, .. } => {
                 is(SUPPLE_E_INDEX).at(index).node(node).value(node.into(), nodes as f64)
             }
-            LoadError::NotFinite { index, value, .. } => {
-                is(SUPPLE_E_NOT_FINITE).at(index).value(value.into(), 0.0)
-            }
+            LoadError::NotFinite { index, value, .. } => is(SUPPLE_E_NOT_FINITE).at(index).value(value.into(), 0.0),
             LoadError::Ramp { index, value, .. } => is(SUPPLE_E_NEGATIVE).at(index).value(value.into(), 0.0),
             LoadError::NotHeld { index, node, axis } => is(SUPPLE_E_NOT_HELD).at(index).node(node).axis(axis),
         }
@@ -329,18 +315,13 @@ impl From<StepError> for supple_error {
 impl From<WeightError> for supple_error {
     fn from(error: WeightError) -> Self {
         let is = Self::from;
-        let content =
-            |layer: u32, value: f64| is(SUPPLE_E_WEIGHTS_CONTENT).at(layer as usize).value(value, 0.0);
+        let content = |layer: u32, value: f64| is(SUPPLE_E_WEIGHTS_CONTENT).at(layer as usize).value(value, 0.0);
         match error {
             WeightError::Misaligned => is(SUPPLE_E_WEIGHTS_MISALIGNED),
-            WeightError::Short { needed, bytes } => {
-                is(SUPPLE_E_WEIGHTS_SHORT).value(bytes as f64, needed as f64)
-            }
+            WeightError::Short { needed, bytes } => is(SUPPLE_E_WEIGHTS_SHORT).value(bytes as f64, needed as f64),
             WeightError::NotWeights => is(SUPPLE_E_NOT_WEIGHTS),
             WeightError::Version { version } => is(SUPPLE_E_WEIGHTS_VERSION).value(version.into(), 0.0),
-            WeightError::Checksum { stated, found } => {
-                is(SUPPLE_E_WEIGHTS_CHECKSUM).value(found.into(), stated.into())
-            }
+            WeightError::Checksum { stated, found } => is(SUPPLE_E_WEIGHTS_CHECKSUM).value(found.into(), stated.into()),
             WeightError::Header { value, .. } => is(SUPPLE_E_WEIGHTS_CONTENT).value(value.into(), 0.0),
             WeightError::Range { index, range, .. } => content(index, range.scale.into()),
             WeightError::Layer { layer, value, .. } => content(layer, value.into()),
@@ -358,15 +339,9 @@ impl From<LearnedError> for supple_error {
     fn from(error: LearnedError) -> Self {
         let is = Self::from;
         match error {
-            LearnedError::Shape { inputs, outputs } => {
-                is(SUPPLE_E_WEIGHTS_SHAPE).value(inputs as f64, outputs as f64)
-            }
-            LearnedError::Damping { exact, trained } => {
-                is(SUPPLE_E_DAMPING).value(exact.into(), trained.into())
-            }
-            LearnedError::StepRatio { exact, learned } => {
-                is(SUPPLE_E_STEP_RATIO).value(learned.into(), exact.into())
-            }
+            LearnedError::Shape { inputs, outputs } => is(SUPPLE_E_WEIGHTS_SHAPE).value(inputs as f64, outputs as f64),
+            LearnedError::Damping { exact, trained } => is(SUPPLE_E_DAMPING).value(exact.into(), trained.into()),
+            LearnedError::StepRatio { exact, learned } => is(SUPPLE_E_STEP_RATIO).value(learned.into(), exact.into()),
             LearnedError::NotLed { .. } => is(SUPPLE_E_NOT_LED),
         }
     }
@@ -460,9 +435,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -91 => c"diverged: more kinetic energy than loads and supports can have given",
         -92 => c"the step was not taken: a force would move its node through the tissue around it",
         -93 => c"the step was not taken: supports moved a node too far in one step",
-        -94 => {
-            c"the step was not taken: an instrument moves too far in one step, or is too far inside the body"
-        }
+        -94 => c"the step was not taken: an instrument moves too far in one step, or is too far inside the body",
         -95 => c"the step was not taken: this kind of step cannot meet instruments",
         _ => return None,
     })

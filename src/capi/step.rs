@@ -21,14 +21,14 @@ use supple_status::*;
 pub const SUPPLE_MOST_PARTS: u32 = 8;
 const _: () = assert!(SUPPLE_MOST_PARTS as usize == MOST_PARTS);
 
-/// Computes part `part` of what `work` stands for. It may be called from any thread, once for each part; a second call for the
-/// same part does nothing.
+/// Computes part `part` of what `work` stands for. It may be called from any thread, once for each part; a second call
+/// for the same part does nothing.
 pub type supple_part = unsafe extern "C" fn(work: *const c_void, part: u32);
 
-/// Threads of the host. A step calls `each` two to four times: it shall call `part(work, p)` for every `p` below `parts`, on
-/// whichever threads, at the same time or not, and return when all those calls have. Parts share nothing, and the result does not
-/// depend on where they run, to the bit. What `each` leaves out is computed when it has returned. It must return: no exception and
-/// no longjmp may leave it.
+/// Threads of the host. A step calls `each` two to four times: it shall call `part(work, p)` for every `p` below
+/// `parts`, on whichever threads, at the same time or not, and return when all those calls have. Parts share nothing,
+/// and the result does not depend on where they run, to the bit. What `each` leaves out is computed when it has
+/// returned. It must return: no exception and no longjmp may leave it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_threads {
@@ -37,17 +37,15 @@ pub struct supple_threads {
     /// Parts that a step shall be cut into; there will be SUPPLE_MOST_PARTS at most, and fewer if the scene is small.
     pub parts: u32,
     /// See above.
-    pub each: Option<
-        unsafe extern "C" fn(context: *mut c_void, part: supple_part, work: *const c_void, parts: u32),
-    >,
+    pub each: Option<unsafe extern "C" fn(context: *mut c_void, part: supple_part, work: *const c_void, parts: u32)>,
 }
 
 /// What became of the steps of a call, and what stopped it. Every call that takes steps writes all of it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_report {
-    /// Simulated time at the end, s; of a step that was not taken, at its start; zero, and all else as if there had been no step,
-    /// if the call was refused before its first.
+    /// Simulated time at the end, s; of a step that was not taken, at its start; zero, and all else as if there had
+    /// been no step, if the call was refused before its first.
     pub time: f64,
     /// Kinetic energy at the latest step, J.
     pub kinetic: f64,
@@ -57,12 +55,13 @@ pub struct supple_report {
     pub steps: u32,
     /// The node at which a step diverged, else SUPPLE_NONE.
     pub node: u32,
-    /// Smallest volume of an element over its volume at rest, at the start of any of the steps: below 0.1 the law went on along
-    /// its tangent.
+    /// Smallest volume of an element over its volume at rest, at the start of any of the steps: below 0.1 the law went
+    /// on along its tangent.
     pub least_volume_ratio: f32,
     /// Largest exponent over its cap, of the exponential law: above 1 the law went on along its tangent.
     pub saturation: f32,
-    /// Kinetic energy beyond the energy balance, as a share of the most that was ever in it; above 0 it is remarked upon.
+    /// Kinetic energy beyond the energy balance, as a share of the most that was ever in it; above 0 it is remarked
+    /// upon.
     pub energy_excess: f32,
     /// Learned steps: the largest share of the free vertices whose prediction was clipped.
     pub clipped: f32,
@@ -72,8 +71,8 @@ pub struct supple_report {
     pub added_mass: f32,
     /// Steps of a supple_large: most nodes that were held back in a step.
     pub held_back: u32,
-    /// Multilevel and damped steps: the least share of the lattice's motion that was used in a step; below 0.5 it is remarked
-    /// upon.
+    /// Multilevel and damped steps: the least share of the lattice's motion that was used in a step; below 0.5 it is
+    /// remarked upon.
     pub lattice_share: f32,
     /// What stopped the call, with place and value; status SUPPLE_OK if nothing did.
     pub error: supple_error,
@@ -128,18 +127,16 @@ pub(super) fn answer(status: &Status) -> Answer<supple_status> {
         Status::Inexact { .. } => Ok(SUPPLE_INEXACT),
         Status::Diverged(Divergence { node, cause, .. }) => Err(match cause {
             Cause::NotFinite => supple_error::from(SUPPLE_E_DIVERGED).node(node),
-            Cause::Instrument { index, metre, most } => supple_error::from(SUPPLE_E_DIVERGED_INSTRUMENT)
-                .at(index)
-                .node(node)
-                .value(metre.into(), most.into()),
+            Cause::Instrument { index, metre, most } => {
+                supple_error::from(SUPPLE_E_DIVERGED_INSTRUMENT).at(index).node(node).value(metre.into(), most.into())
+            }
             Cause::NoContact => SUPPLE_E_NO_CONTACT.into(),
             Cause::Energy { kinetic, available } => {
                 supple_error::from(SUPPLE_E_DIVERGED_ENERGY).node(node).value(kinetic, available)
             }
-            Cause::Force { index, newton, size } => supple_error::from(SUPPLE_E_DIVERGED_FORCE)
-                .at(index)
-                .node(node)
-                .value(newton.into(), size.into()),
+            Cause::Force { index, newton, size } => {
+                supple_error::from(SUPPLE_E_DIVERGED_FORCE).at(index).node(node).value(newton.into(), size.into())
+            }
             Cause::Motion { metre, size } => {
                 supple_error::from(SUPPLE_E_DIVERGED_MOTION).node(node).value(metre.into(), size.into())
             }
@@ -153,8 +150,8 @@ pub(super) fn worse(a: supple_status, b: supple_status) -> supple_status {
     if (b as i32) > a as i32 { b } else { a }
 }
 
-/// Takes `count` exact steps. Stops at the first that is not to be believed: that one is not taken, the state is as before it,
-/// and the status tells.
+/// Takes `count` exact steps. Stops at the first that is not to be believed: that one is not taken, the state is as
+/// before it, and the status tells.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.
@@ -187,8 +184,8 @@ pub unsafe extern "C" fn supple_step(
     unsafe { reported(report, step) }
 }
 
-/// Takes `count` steps, or until one is refused; motions go evenly over all `left` that the call still takes. Gives the worst
-/// status.
+/// Takes `count` steps, or until one is refused; motions go evenly over all `left` that the call still takes. Gives the
+/// worst status.
 pub(super) fn take_steps(
     count: u64,
     left: u64,

@@ -1,5 +1,5 @@
-//! What instruments can touch, as a C host gives it: numbers of nodes and of the corners of triangles, checked and turned into the
-//! entries of a [`crate::contact::Surface`].
+//! What instruments can touch, as a C host gives it: numbers of nodes and of the corners of triangles, checked and
+//! turned into the entries of a [`crate::contact::Surface`].
 
 use crate::contact::SurfaceNode;
 
@@ -10,9 +10,11 @@ use super::status::{Answer, supple_error, supple_status::*};
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_surface {
-    /// Numbers of the nodes, those of the boundary; NULL: the first `node_count` nodes, all of them with the scene's number.
+    /// Numbers of the nodes, those of the boundary; NULL: the first `node_count` nodes, all of them with the scene's
+    /// number.
     pub nodes: *const u32,
-    /// Numbers of the three nodes of each triangle between these nodes, where an instrument is thinner than edges are long; else NULL.
+    /// Numbers of the three nodes of each triangle between these nodes, where an instrument is thinner than edges are
+    /// long; else NULL.
     pub triangles: *const u32,
     /// How many.
     pub node_count: u32,

@@ -21,8 +21,8 @@ pub struct supple_vectors {
     pub count: u32,
 }
 
-/// Tells where the displacements of a state are, m. They stay there for as long as the state does; read them between calls that
-/// change it.
+/// Tells where the displacements of a state are, m. They stay there for as long as the state does; read them between
+/// calls that change it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_displacements(
     state: *const supple_state,
@@ -101,19 +101,15 @@ pub unsafe extern "C" fn supple_copy_velocities(
     status_of(copy())
 }
 
-/// Copies the total force on each node at the start of the latest step, also of one that was refused, N: that of the loads with
-/// that of the tissue. At held nodes it is what presses on the support, and so what a hand that holds the instrument feels, apart
-/// from the inertia of a moved one; the support presses back with the opposite. Not so after steps of a supple_large: raised inertia
-/// delays the tissue, and the force is that of a shape that lags behind. Zero after supple_critical_step or supple_set_step, also where these
-/// refuse what they computed, until the next step.
+/// Copies the total force on each node at the start of the latest step, also of one that was refused, N: that of the
+/// loads with that of the tissue. At held nodes it is what presses on the support, and so what a hand that holds the
+/// instrument feels, apart from the inertia of a moved one; the support presses back with the opposite. Not so after
+/// steps of a supple_large: raised inertia delays the tissue, and the force is that of a shape that lags behind. Zero
+/// after supple_critical_step or supple_set_step, also where these refuse what they computed, until the next step.
 ///
 /// @param floats room in `out`: three times the nodes at least.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn supple_copy_forces(
-    state: *const supple_state,
-    out: *mut f32,
-    floats: usize,
-) -> supple_status {
+pub unsafe extern "C" fn supple_copy_forces(state: *const supple_state, out: *mut f32, floats: usize) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let copy = || unsafe {
         let [_, _, forces] = vectors(state)?;

@@ -1,11 +1,11 @@
-//! Which nodes and triangles of the surface the instruments can reach in a step. One that was found at a distance from all instruments is
-//! looked at again only when body and instruments together can have moved that far (m):
+//! Which nodes and triangles of the surface the instruments can reach in a step. One that was found at a distance from
+//! all instruments is looked at again only when body and instruments together can have moved that far (m):
 //!
 //! ```text
 //! looked at  if  threshold < travelled + farthest + margin,   threshold = travelled + distance - |next| when it was looked at
 //! ```
-//! `travelled` sums, over the steps, the most that a node and that an instrument moved; `farthest` is the most that a node moves in this
-//! step. The result is the same as that of looking at all of them.
+//! `travelled` sums, over the steps, the most that a node and that an instrument moved; `farthest` is the most that a
+//! node moves in this step. The result is the same as that of looking at all of them.
 
 use bytemuck::{Pod, Zeroable, must_cast_slice_mut};
 use glam::Vec3;
@@ -17,8 +17,8 @@ use crate::inertia::LOCAL_FLOATS;
 use crate::simd::{Kernel, NodeVector, Real, axes, dispatch};
 use crate::state::Progress;
 
-/// An increment that is rounded to the grid of the displacements is at most doubled; a vector is at most so much longer than its
-/// largest component.
+/// An increment that is rounded to the grid of the displacements is at most doubled; a vector is at most so much longer
+/// than its largest component.
 const LENGTH: f64 = 1.733;
 const MOVED: f64 = 2.0 * LENGTH;
 /// Where `travelled` begins anew, m: floats below it are exact to 0.06 um, which `SLACK` covers.
@@ -131,8 +131,9 @@ impl<'a> ContactMemory<'a> {
         (head.steps, head.time, head.kinetic, head.last_step) == moment(progress)
     }
 
-    /// Begins a step in which the instruments go as `placed`, of a body whose nodes have moved by up to `last` along each axis in the
-    /// step before and will move by up to `next`, m. Gives the limit of the thresholds for nodes that come nearer than `margin`.
+    /// Begins a step in which the instruments go as `placed`, of a body whose nodes have moved by up to `last` along
+    /// each axis in the step before and will move by up to `next`, m. Gives the limit of the thresholds for nodes that
+    /// come nearer than `margin`.
     pub(crate) fn begin(
         &mut self,
         progress: &Progress,
@@ -155,7 +156,8 @@ impl<'a> ContactMemory<'a> {
         (self.head.travelled + LENGTH * f64::from(next) + f64::from(margin) + SLACK) as f32
     }
 
-    /// The most that a point of an instrument has moved since the last step, m, and notes where they are. None if they are others.
+    /// The most that a point of an instrument has moved since the last step, m, and notes where they are. None if they
+    /// are others.
     fn way(&mut self, placed: &[Placed<'_>]) -> Option<f32> {
         let same = self.head.instruments as usize == placed.len();
         self.head.instruments = placed.len() as u32;
@@ -221,9 +223,7 @@ impl<'a> ContactMemory<'a> {
     pub(crate) fn accept(&mut self, touched: usize) {
         for each in self.room.touched.iter().take(touched) {
             let place = each.place as usize;
-            if let (Some(before), Some(threshold)) =
-                (self.before.get_mut(place), self.thresholds.get_mut(place))
-            {
+            if let (Some(before), Some(threshold)) = (self.before.get_mut(place), self.thresholds.get_mut(place)) {
                 let [x, y, z] = each.push;
                 before.0 = [x, y, z, each.point().packed()];
                 if each.push != [0.0; 3] {
@@ -247,7 +247,8 @@ impl Placed<'_> {
         }
     }
 
-    /// The most that a point of the instrument has moved since it was seen, m. None if it was another one, or has no bound.
+    /// The most that a point of the instrument has moved since it was seen, m. None if it was another one, or has no
+    /// bound.
     fn way_from(&self, seen: &Seen) -> Option<f32> {
         let now = self.seen();
         let moved = Vec3::from_array(now.position).distance(Vec3::from_array(seen.position));
@@ -284,10 +285,7 @@ impl Kernel for Largest<'_> {
                 *most = (axes::<R>() * components).abs().max(*most);
             }
         }
-        let rest = rest
-            .iter()
-            .flat_map(|vector| vector.to_array())
-            .fold(0.0, |most: f32, each| most.max(each.abs()));
+        let rest = rest.iter().flat_map(|vector| vector.to_array()).fold(0.0, |most: f32, each| most.max(each.abs()));
         most.iter().fold(rest, |all, most| (0..R::COUNT).fold(all, |all, lane| all.max(most.lane(lane))))
     }
 }

@@ -1,5 +1,6 @@
-//! A rigid body of any form as signed distances on a grid: an instrument, or ribs and tables that tissue rests on. Between the points of
-//! the grid the distance (m, negative inside) and the slopes that give the normal are trilinear. Edges and details finer than the spacing are rounded.
+//! A rigid body of any form as signed distances on a grid: an instrument, or ribs and tables that tissue rests on.
+//! Between the points of the grid the distance (m, negative inside) and the slopes that give the normal are trilinear.
+//! Edges and details finer than the spacing are rounded.
 
 use core::fmt;
 
@@ -75,14 +76,9 @@ const MAGIC: [u8; 8] = *b"supfield";
 const VERSION: u32 = 1;
 
 impl<'a> Field<'a> {
-    /// Checks distances (m) at `size` points that are `spacing` (m) apart, from `origin` (m, in the axes of the shape) on; x runs fastest.
-    /// Far from the surface values may be nearer to zero than the distance, never farther.
-    pub fn new(
-        values: &'a [f32],
-        size: [u32; 3],
-        origin: [f32; 3],
-        spacing: f32,
-    ) -> Result<Self, FieldError> {
+    /// Checks distances (m) at `size` points that are `spacing` (m) apart, from `origin` (m, in the axes of the shape)
+    /// on; x runs fastest. Far from the surface values may be nearer to zero than the distance, never farther.
+    pub fn new(values: &'a [f32], size: [u32; 3], origin: [f32; 3], spacing: f32) -> Result<Self, FieldError> {
         let points = size.iter().map(|&points| u64::from(points)).try_fold(1u64, u64::checked_mul);
         if size.iter().any(|&points| points < 2) || points != Some(values.len() as u64) {
             return Err(FieldError::Size { size, values: values.len() });
@@ -114,8 +110,7 @@ impl<'a> Field<'a> {
     /// The field in the bytes of a file, which are used where they are: aligned to four bytes.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, FieldError> {
         let wrong = |what| FieldError::Bytes { what };
-        let (head, values) =
-            bytes.split_at_checked(size_of::<Head>()).ok_or(wrong("they are too few for a field"))?;
+        let (head, values) = bytes.split_at_checked(size_of::<Head>()).ok_or(wrong("they are too few for a field"))?;
         let head: Head = bytemuck::pod_read_unaligned(head);
         if head.magic != MAGIC {
             return Err(wrong("they are not those of a field"));
@@ -123,8 +118,7 @@ impl<'a> Field<'a> {
         if head.version.to_le() != VERSION || cfg!(target_endian = "big") {
             return Err(wrong("their version is not known"));
         }
-        let values =
-            bytemuck::try_cast_slice(values).map_err(|_| wrong("they are not aligned to four bytes"))?;
+        let values = bytemuck::try_cast_slice(values).map_err(|_| wrong("they are not aligned to four bytes"))?;
         let field = Self::new(values, head.size, head.origin, head.spacing)?;
         if field.checksum == head.checksum { Ok(field) } else { Err(wrong("their checksum does not match")) }
     }
@@ -172,8 +166,7 @@ impl<'a> Field<'a> {
 
     /// Tells it from other fields.
     pub(super) fn number(&self) -> u32 {
-        let place =
-            self.origin.map(f32::to_bits).into_iter().chain([self.spacing.to_bits()]).chain(self.size);
+        let place = self.origin.map(f32::to_bits).into_iter().chain([self.spacing.to_bits()]).chain(self.size);
         place.fold(self.checksum, |sum, each| sum.rotate_left(5) ^ each)
     }
 
@@ -246,10 +239,7 @@ impl fmt::Display for FieldError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Size { size: [x, y, z], values } => {
-                write!(
-                    f,
-                    "a field of {x} x {y} x {z} points, at least two along each axis, with {values} values"
-                )
+                write!(f, "a field of {x} x {y} x {z} points, at least two along each axis, with {values} values")
             }
             Self::Place { spacing, origin } => {
                 write!(f, "a field with a spacing of {spacing} m from {origin:?} m on cannot be")

@@ -35,10 +35,7 @@ impl SurfaceField {
         for (triangle, places) in triangles.iter().enumerate() {
             let at = places.map(|place| points.get(place as usize).copied().map(Vec3::from_array));
             let [Some(a), Some(b), Some(c)] = at else {
-                return Err(format!(
-                    "triangle {triangle} has the corners {places:?} of {} points",
-                    points.len()
-                ));
+                return Err(format!("triangle {triangle} has the corners {places:?} of {} points", points.len()));
             };
             if let Some(corner) = [a, b, c].iter().position(|corner| !corner.is_finite()) {
                 let place = places[corner];
@@ -58,9 +55,7 @@ impl SurfaceField {
         }
         let count: f64 = size.to_array().into_iter().map(f64::from).product();
         if count > MOST_POINTS {
-            return Err(format!(
-                "a spacing of {spacing} m makes {count:.2e} points, {MOST_POINTS:.2e} are possible"
-            ));
+            return Err(format!("a spacing of {spacing} m makes {count:.2e} points, {MOST_POINTS:.2e} are possible"));
         }
         // Six times the volume: below zero if the normals point inwards.
         let volume = |&corners: &[Vec3; 3]| {

@@ -1,5 +1,5 @@
-//! Nodes that an instrument holds, as forceps do: from the step in which they are listed they move with it, whatever force that takes, and
-//! in the step after they are no longer listed they are free.
+//! Nodes that an instrument holds, as forceps do: from the step in which they are listed they move with it, whatever
+//! force that takes, and in the step after they are no longer listed they are free.
 
 use super::instrument::Instrument;
 use super::surface::Surface;
@@ -18,8 +18,9 @@ pub struct Grip {
 }
 
 impl Instrument<'_> {
-    /// The nodes of the surface that are nearer than `within` (m) to the instrument at `time` (s): to be held where they are. `index` is
-    /// the place of the instrument in the list, `displacements` are those of the scene. In increasing order.
+    /// The nodes of the surface that are nearer than `within` (m) to the instrument at `time` (s): to be held where
+    /// they are. `index` is the place of the instrument in the list, `displacements` are those of the scene. In
+    /// increasing order.
     pub fn grips<'s>(
         &'s self,
         index: u32,

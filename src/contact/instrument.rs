@@ -7,8 +7,8 @@ use super::shape::Shape;
 /// The most instruments that can touch a body at once.
 pub const MOST_INSTRUMENTS: usize = 8;
 
-/// A rigid instrument that moves on a line, and turns evenly, from one pose to another. A host sets both poses and their times
-/// for each frame; before and after these times the instrument stands still.
+/// A rigid instrument that moves on a line, and turns evenly, from one pose to another. A host sets both poses and
+/// their times for each frame; before and after these times the instrument stands still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instrument<'a> {
     /// What it looks like.
@@ -48,11 +48,7 @@ impl<'a> Instrument<'a> {
         if let Some(&time) = self.times.iter().find(|time| !time.is_finite()) {
             return bad("time", time as f32);
         }
-        if [self.from, self.to].iter().all(Pose::is_valid) {
-            Ok(())
-        } else {
-            Err(ContactError::Pose { instrument })
-        }
+        if [self.from, self.to].iter().all(Pose::is_valid) { Ok(()) } else { Err(ContactError::Pose { instrument }) }
     }
 
     /// Where it is at `time`, s.

@@ -1,11 +1,12 @@
-//! The force on an instrument between two frames, for a host's haptic loop: `f(x) = f0 + K (x - x0)` with the position `x0` and the force
-//! `f0` of the latest frame, and a stiffness `K` that follows the frames by symmetric secant updates (Powell 1970):
+//! The force on an instrument between two frames, for a host's haptic loop: `f(x) = f0 + K (x - x0)` with the position
+//! `x0` and the force `f0` of the latest frame, and a stiffness `K` that follows the frames by symmetric secant updates
+//! (Powell 1970):
 //!
 //! ```text
 //! r = df - K dx,   K <- K + (r dx^T + dx r^T) / dx^2 - (r dx) dx dx^T / dx^4
 //! ```
-//! It keeps no more than it has seen: along directions in which the instrument has not moved yet, `K` is zero. Each frame tells how far the
-//! prediction was off.
+//! It keeps no more than it has seen: along directions in which the instrument has not moved yet, `K` is zero. Each
+//! frame tells how far the prediction was off.
 
 use glam::{Mat3, Vec3};
 
@@ -33,7 +34,8 @@ impl LocalForce {
     pub const NEW: Self =
         Self { position: [0.0; 3], force: [0.0; 3], stiffness: [[0.0; 3]; 3], error: 0.0, hold_error: 0.0 };
 
-    /// Takes the position (m) and the force (N) of a new frame ([`Touch::force`](super::Touch::force)). Without a force all is forgotten.
+    /// Takes the position (m) and the force (N) of a new frame ([`Touch::force`](super::Touch::force)). Without a force
+    /// all is forgotten.
     pub fn follow(&mut self, position: [f32; 3], force: [f32; 3]) {
         let (here, now) = (Vec3::from_array(position), Vec3::from_array(force));
         let before = Vec3::from_array(self.force);

@@ -1,13 +1,15 @@
-//! Rigid instruments that touch the tissue: where they are, and what they feel. A node that a step would put into an instrument is
-//! put onto its surface instead, its speed into the instrument is removed, and its slip is reduced as far as Coulomb's friction can.
-//! With the gap `g` (m, negative inside), the outward normal `n` there, and the slip `s` of the node along the surface in a step:
+//! Rigid instruments that touch the tissue: where they are, and what they feel. A node that a step would put into an
+//! instrument is put onto its surface instead, its speed into the instrument is removed, and its slip is reduced as far
+//! as Coulomb's friction can. With the gap `g` (m, negative inside), the outward normal `n` there, and the slip `s` of
+//! the node along the surface in a step:
 //!
 //! ```text
 //! p = c (-g n - r s),   c = m / (dt h / (1 + k)),   r = min(1, mu |g| / |s|)
 //! ```
-//! The push `p` (N) is the force that takes the node there in this very step ([`crate::tled`]), so there is no stiffness to be tuned,
-//! the critical step is that without an instrument, and the sum of the pushes is the force on the instrument. A node that nothing
-//! presses is free in the next step. NiftySim's contact is of this kind (Johnsen et al. 2015).
+//! The push `p` (N) is the force that takes the node there in this very step ([`crate::tled`]), so there is no
+//! stiffness to be tuned, the critical step is that without an instrument, and the sum of the pushes is the force on
+//! the instrument. A node that nothing presses is free in the next step. NiftySim's contact is of this kind (Johnsen et
+//! al. 2015).
 //!
 //! A finger presses a bar from the side, leaves, and says how hard it pressed:
 //!
@@ -113,7 +115,8 @@ impl<'a> Contact<'a> {
         Ok(Self { surface, instruments, grips: &[] })
     }
 
-    /// The same with nodes that instruments hold, in increasing order of their places in the surface ([`Instrument::grips`]).
+    /// The same with nodes that instruments hold, in increasing order of their places in the surface
+    /// ([`Instrument::grips`]).
     pub fn gripping(self, grips: &'a [Grip]) -> Result<Self, ContactError> {
         let (mut least, nodes) = (0, self.surface.nodes().len());
         for (index, grip) in grips.iter().enumerate() {
@@ -157,11 +160,7 @@ impl<'a> Contact<'a> {
     /// The instruments as they go in a step of so many seconds from `time` on.
     pub(crate) fn placed(&self, time: f64, seconds: f32) -> heapless::Vec<Placed<'a>, MOST_INSTRUMENTS> {
         let times = [time, time + f64::from(seconds)];
-        self.instruments
-            .iter()
-            .map(|instrument| Placed::new(instrument, times))
-            .take(MOST_INSTRUMENTS)
-            .collect()
+        self.instruments.iter().map(|instrument| Placed::new(instrument, times)).take(MOST_INSTRUMENTS).collect()
     }
 }
 
@@ -186,7 +185,8 @@ pub struct Touch {
 }
 
 impl Touch {
-    /// Adds the push (N) on a node at `arm` (m) from the instrument's position, with how far it and the instrument there move, m.
+    /// Adds the push (N) on a node at `arm` (m) from the instrument's position, with how far it and the instrument
+    /// there move, m.
     pub(crate) fn add(&mut self, push: Vec3, arm: Vec3, depth: f32, [node, instrument]: [Vec3; 2]) {
         self.force = (Vec3::from_array(self.force) - push).to_array();
         self.moment = (Vec3::from_array(self.moment) - arm.cross(push)).to_array();
@@ -236,7 +236,8 @@ pub(crate) struct Meeting {
 }
 
 impl Meeting {
-    /// Where a point that moves so far (m) in the step will be from where it should be: the gap along the normal, the slip across, m.
+    /// Where a point that moves so far (m) in the step will be from where it should be: the gap along the normal, the
+    /// slip across, m.
     pub(crate) fn relative(&self, slip: Vec3) -> Vec3 {
         self.gap * self.normal + (slip - slip.dot(self.normal) * self.normal)
     }
@@ -339,7 +340,8 @@ pub enum ContactError {
         /// The value.
         value: f32,
     },
-    /// A grip of a node that the surface does not have, or that is not in order, of an instrument that there is not, or at no point.
+    /// A grip of a node that the surface does not have, or that is not in order, of an instrument that there is not, or
+    /// at no point.
     Grip {
         /// Its place in the list.
         index: usize,
@@ -357,10 +359,7 @@ impl fmt::Display for ContactError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Node { place, node, nodes } => {
-                write!(
-                    f,
-                    "entry {place} of the surface: node {node} does not exist, the scene has {nodes} nodes"
-                )
+                write!(f, "entry {place} of the surface: node {node} does not exist, the scene has {nodes} nodes")
             }
             Self::Point { place, node } => {
                 write!(f, "entry {place} of the surface: the position of node {node} is not a number")
@@ -381,10 +380,7 @@ impl fmt::Display for ContactError {
                  must be one, and entries come in increasing order"
             ),
             Self::Pose { instrument } => {
-                write!(
-                    f,
-                    "instrument {instrument}: its pose is not one: three numbers and a rotation that is not zero"
-                )
+                write!(f, "instrument {instrument}: its pose is not one: three numbers and a rotation that is not zero")
             }
         }
     }

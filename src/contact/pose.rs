@@ -7,7 +7,8 @@ use glam::{Quat, Vec3};
 pub struct Pose {
     /// Of its centre, m.
     pub position: [f32; 3],
-    /// Unit quaternion `x, y, z, w`: it turns the axes of the shape into those of the scene. Any length but zero will do.
+    /// Unit quaternion `x, y, z, w`: it turns the axes of the shape into those of the scene. Any length but zero will
+    /// do.
     pub rotation: [f32; 4],
 }
 

@@ -1,12 +1,13 @@
-//! Pushes of instruments on many nodes and points of triangles that move each other, as in steps with a lattice. With the compliance `B` (m/N, symmetric and
-//! positive), the pushes `p` (N), and where the nodes would be relative to the instruments without a change of them, `r` (m):
+//! Pushes of instruments on many nodes and points of triangles that move each other, as in steps with a lattice. With
+//! the compliance `B` (m/N, symmetric and positive), the pushes `p` (N), and where the nodes would be relative to the
+//! instruments without a change of them, `r` (m):
 //!
 //! ```text
 //! minimise 1/2 dp^T B dp + r^T dp    with  p_n >= 0,  |p_t| <= mu p_n
 //! ```
-//! by accelerated projected gradients (Mazhar et al. 2015) from the pushes of the step before, a bounded number of times. Each node has a
-//! scale, the inverse root of its own compliance, so that light and heavy nodes converge alike. The cone of friction is taken at the
-//! present `p_n`, so that a node that slips is not lifted.
+//! by accelerated projected gradients (Mazhar et al. 2015) from the pushes of the step before, a bounded number of
+//! times. Each node has a scale, the inverse root of its own compliance, so that light and heavy nodes converge alike.
+//! The cone of friction is taken at the present `p_n`, so that a node that slips is not lifted.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;

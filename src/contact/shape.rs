@@ -1,4 +1,5 @@
-//! Shapes of rigid instruments, as the distance from a point to their surface (m, negative inside) and the normal there.
+//! Shapes of rigid instruments, as the distance from a point to their surface (m, negative inside) and the normal
+//! there.
 
 use glam::Vec3;
 
@@ -33,9 +34,7 @@ impl Shape<'_> {
         match *self {
             Self::Plane | Self::Field(_) => None,
             Self::Sphere { radius } => positive("radius", radius),
-            Self::Capsule { radius, length } => {
-                positive("radius", radius).or_else(|| positive("length", length))
-            }
+            Self::Capsule { radius, length } => positive("radius", radius).or_else(|| positive("length", length)),
         }
     }
 
@@ -59,7 +58,8 @@ impl Shape<'_> {
         }
     }
 
-    /// How much nearer than its distance tells a point may be, m: the error of interpolation between the points of a grid.
+    /// How much nearer than its distance tells a point may be, m: the error of interpolation between the points of a
+    /// grid.
     pub(super) fn uncertainty(&self) -> f32 {
         if let Self::Field(field) = self { 2.0 * field.spacing() } else { 0.0 }
     }

@@ -1,5 +1,5 @@
-//! What instruments can touch: nodes of the boundary, given once, and the triangles between them where an instrument is thinner than
-//! edges are long.
+//! What instruments can touch: nodes of the boundary, given once, and the triangles between them where an instrument is
+//! thinner than edges are long.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -15,8 +15,8 @@ pub struct SurfaceNode {
     pub node: u32,
 }
 
-/// What instruments can touch, checked. Without triangles an instrument passes between nodes: spheres and capsules should then have a
-/// radius of at least the length of the surface's edges.
+/// What instruments can touch, checked. Without triangles an instrument passes between nodes: spheres and capsules
+/// should then have a radius of at least the length of the surface's edges.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface<'a> {
     nodes: &'a [SurfaceNode],
@@ -41,8 +41,8 @@ impl<'a> Surface<'a> {
         Ok(Self { nodes, triangles: &[], scene_nodes })
     }
 
-    /// The same with triangles, as places of their corners in the list of nodes: instruments of any size but planes, which have no use for
-    /// them, are met between nodes too. Steps need room for pushes
+    /// The same with triangles, as places of their corners in the list of nodes: instruments of any size but planes,
+    /// which have no use for them, are met between nodes too. Steps need room for pushes
     /// ([`StateView::pushing`](crate::state::StateView::pushing)).
     pub fn with_triangles(self, triangles: &'a [[u32; 3]]) -> Result<Self, ContactError> {
         for (triangle, corners) in triangles.iter().enumerate() {
@@ -106,8 +106,7 @@ pub fn boundary(mesh: &crate::mesh::Mesh<'_>) -> std::vec::Vec<SurfaceNode> {
 #[cfg(any(feature = "std", test))]
 #[must_use]
 pub fn boundary_triangles(mesh: &crate::mesh::Mesh<'_>, nodes: &[SurfaceNode]) -> std::vec::Vec<[u32; 3]> {
-    let place =
-        |node: u32| nodes.binary_search_by_key(&node, |entry| entry.node).ok().map(|place| place as u32);
+    let place = |node: u32| nodes.binary_search_by_key(&node, |entry| entry.node).ok().map(|place| place as u32);
     let places = |[a, b, c]: [u32; 3]| Some([place(a)?, place(b)?, place(c)?]);
     crate::mesh::boundary(mesh.tets()).into_iter().filter_map(places).collect()
 }

@@ -1,7 +1,8 @@
-//! Where a triangle of the surface is nearest to an instrument, or deepest inside it: the least signed distance over the triangle. For
-//! spheres and capsules in closed form (Ericson 2005, 5.1.5 and 5.1.9): the nearest point to the centre, or to the ends of the axis, or on
-//! an edge. For fields by a pattern search in barycentric coordinates (Hooke & Jeeves 1961) with steps of 1/4 to 1/256 of an edge, at most
-//! 337 distances: it may miss a dent that is smaller than a triangle.
+//! Where a triangle of the surface is nearest to an instrument, or deepest inside it: the least signed distance over
+//! the triangle. For spheres and capsules in closed form (Ericson 2005, 5.1.5 and 5.1.9): the nearest point to the
+//! centre, or to the ends of the axis, or on an edge. For fields by a pattern search in barycentric coordinates (Hooke
+//! & Jeeves 1961) with steps of 1/4 to 1/256 of an edge, at most 337 distances: it may miss a dent that is smaller than
+//! a triangle.
 
 use glam::Vec3;
 
@@ -90,19 +91,16 @@ impl TrianglePoint {
 }
 
 impl Placed<'_> {
-    /// The point of a triangle that will be nearest to the instrument at the end of the step, and its meeting, from where its corners will be,
-    /// m. None if that is not a number.
+    /// The point of a triangle that will be nearest to the instrument at the end of the step, and its meeting, from
+    /// where its corners will be, m. None if that is not a number.
     pub(crate) fn meet_triangle(&self, corners: [Vec3; 3]) -> Option<(TrianglePoint, Meeting)> {
         let in_shape = corners.map(|corner| self.end.in_shape(corner));
         let point = match self.instrument.shape {
             Shape::Sphere { .. } => TrianglePoint::rounded(nearest_to_point(Vec3::ZERO, in_shape)),
-            Shape::Capsule { length, .. } => TrianglePoint::rounded(nearest_to_segment(
-                [-0.5, 0.5].map(|end| end * length * Vec3::Z),
-                in_shape,
-            )),
-            shape @ (Shape::Field(_) | Shape::Plane) => {
-                searched(|point| shape.nearest(point.mean(in_shape)).0)
+            Shape::Capsule { length, .. } => {
+                TrianglePoint::rounded(nearest_to_segment([-0.5, 0.5].map(|end| end * length * Vec3::Z), in_shape))
             }
+            shape @ (Shape::Field(_) | Shape::Plane) => searched(|point| shape.nearest(point.mean(in_shape)).0),
         };
         Some((point, self.meet(point.mean(corners))?))
     }
@@ -244,8 +242,8 @@ mod tests {
         }
     }
 
-    /// Against the least distance on a fine grid of points, for spheres and for capsules that lie across, along and on end; in closed form and
-    /// by the search.
+    /// Against the least distance on a fine grid of points, for spheres and for capsules that lie across, along and on
+    /// end; in closed form and by the search.
     #[test]
     fn the_nearest_point_is_as_near_as_the_best_of_a_fine_grid() {
         let mut seed = 1u32;
@@ -293,10 +291,8 @@ mod tests {
         for corners in [[at; 3], [at, 2.0 * at, 3.0 * at], [at, at, -at], [-at, at, at]] {
             for shape in [Shape::Sphere { radius: 0.001 }, Shape::Capsule { radius: 0.001, length: 0.01 }] {
                 let instrument = Instrument::resting(shape, Pose::at([0.0; 3]));
-                let (point, met) =
-                    Placed::new(&instrument, [0.0, 0.0]).meet_triangle(corners).expect("numbers");
-                let least =
-                    corners.map(|corner| shape.nearest(corner).0).into_iter().fold(f32::INFINITY, f32::min);
+                let (point, met) = Placed::new(&instrument, [0.0, 0.0]).meet_triangle(corners).expect("numbers");
+                let least = corners.map(|corner| shape.nearest(corner).0).into_iter().fold(f32::INFINITY, f32::min);
                 assert!(met.gap <= least + 1e-6, "{point:?}, {} m, {least} m", met.gap);
             }
         }

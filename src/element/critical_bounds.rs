@@ -16,11 +16,11 @@
 //! `|K_ab| = sqrt(p1^2 (ga.gb)^2 + pJ^2 |F (ga x gb)|^2)`, rounded up by at most 8 %. The other parts keep the
 //! directions of `C ga`: compared with row sums of norms (Gershgorin) the step is up to `sqrt 3` times as large.
 //!
-//! With nodal pressure ([`super::pressure`]) the energy of volume is `sum_a V_a U(J_a)`. As `J_a` is a mean of the `J_e`, with weights
-//! `V_e / 4`, the square of its variation is at most the mean of theirs (Cauchy-Schwarz):
-//! `sum_a V_a U''(J_a) (dJ_a)^2 <= sum_e V_e (sum_{a in e} U''(J_a) / 4) (C:dF)^2`. So the terms above hold with the means of `U'` and
-//! `U''` over the nodes of an element. Where all elements are of one tissue, [`super::nodal_volume_bounds`] bounds the energy of
-//! volume closer.
+//! With nodal pressure ([`super::pressure`]) the energy of volume is `sum_a V_a U(J_a)`. As `J_a` is a mean of the
+//! `J_e`, with weights `V_e / 4`, the square of its variation is at most the mean of theirs (Cauchy-Schwarz): `sum_a
+//! V_a U''(J_a) (dJ_a)^2 <= sum_e V_e (sum_{a in e} U''(J_a) / 4) (C:dF)^2`. So the terms above hold with the means of
+//! `U'` and `U''` over the nodes of an element. Where all elements are of one tissue, [`super::nodal_volume_bounds`]
+//! bounds the energy of volume closer.
 //!
 //! No term is left out, so the bound holds for any state, inverted elements included.
 
@@ -134,9 +134,9 @@ impl<L: Law, P: Pressure> Kernel for CriticalBounds<'_, '_, L, P> {
     }
 }
 
-/// Shape function gradients at the corners for a bound of `M^-1/2 K M^-1/2`: multiplied by the square root of volume over nodal
-/// mass, m^(1/2) kg^(-1/2); and the square root of the volume. This stays in the range of float32, and gives a closer bound where
-/// light nodes have heavy neighbours. Nodes that are held along all axes have an infinite mass.
+/// Shape function gradients at the corners for a bound of `M^-1/2 K M^-1/2`: multiplied by the square root of volume
+/// over nodal mass, m^(1/2) kg^(-1/2); and the square root of the volume. This stays in the range of float32, and gives
+/// a closer bound where light nodes have heavy neighbours. Nodes that are held along all axes have an infinite mass.
 #[inline(always)]
 pub(super) fn mass_weighted_gradients<R: Real>(
     tile: &ElementTile,
@@ -395,31 +395,18 @@ mod tests {
             let mut displacement: Vec<_> = points.iter().map(bent).collect();
             let mut first = vec![NodeVector::ZERO; points.len()];
             let mut second = first.clone();
-            let mut sums = NodeMatrices {
-                xx_yy_zz_xy: &mut first,
-                yz_in_padding: &mut second,
-                zx_in_padding: &mut displacement,
-            };
+            let mut sums =
+                NodeMatrices { xx_yy_zz_xy: &mut first, yz_in_padding: &mut second, zx_in_padding: &mut displacement };
             let scene = scene.view();
             let (laws, tiles, inertia) = (scene.material.laws(), scene.tiles, scene.inertia);
-            let kernel = CriticalBounds {
-                laws,
-                pressure: OwnPressure,
-                tiles,
-                inertia,
-                with_volume: true,
-                sums: &mut sums,
-            };
+            let kernel =
+                CriticalBounds { laws, pressure: OwnPressure, tiles, inertia, with_volume: true, sums: &mut sums };
             if scalar {
                 kernel.run_scalar()
             } else {
                 kernel.run::<Baseline>()
             }
-            [first, second, displacement]
-                .concat()
-                .into_iter()
-                .map(|vector| vector.0.map(f32::to_bits))
-                .collect()
+            [first, second, displacement].concat().into_iter().map(|vector| vector.0.map(f32::to_bits)).collect()
         });
         let [vectorised, scalar]: [Vec<[u32; 4]>; 2] = results;
         assert!(scalar == vectorised && scalar.iter().any(|sums| sums[0] != 0));

@@ -62,11 +62,7 @@ impl<R: Real> Deformation<R> {
 
     /// From the displacements of the corners.
     #[inline(always)]
-    pub(super) fn of_displacements(
-        tile: &ElementTile,
-        first: usize,
-        [origin, a, b, c]: [Vector<R>; 4],
-    ) -> Self {
+    pub(super) fn of_displacements(tile: &ElementTile, first: usize, [origin, a, b, c]: [Vector<R>; 4]) -> Self {
         let mut h = [[R::splat(0.0); 3]; 3];
         for (corner, displacement) in [a, b, c].into_iter().enumerate() {
             for j in 0..3 {

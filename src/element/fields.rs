@@ -26,8 +26,7 @@ pub struct ElementFields {
 fn gradient_of(tile: &ElementTile, lane: usize, at: impl Fn(usize) -> DVec3) -> DMat3 {
     let mut h = DMat3::ZERO;
     for corner in 0..3 {
-        let gradient =
-            DVec3::from_array([0, 1, 2].map(|axis| f64::from(tile.gradient_of(corner, axis, lane))));
+        let gradient = DVec3::from_array([0, 1, 2].map(|axis| f64::from(tile.gradient_of(corner, axis, lane))));
         let along = at(tile.node(corner + 1, lane)) - at(tile.node(0, lane));
         h += DMat3::from_cols(along * gradient.x, along * gradient.y, along * gradient.z);
     }
@@ -39,8 +38,7 @@ pub(crate) fn invariants(h: DMat3) -> (f64, f64, f64) {
     let trace = h.x_axis.x + h.y_axis.y + h.z_axis.z;
     let square = h.x_axis.length_squared() + h.y_axis.length_squared() + h.z_axis.length_squared();
     // Sum of the principal minors of H, so that J - 1 keeps its digits at small strain.
-    let minors = h.x_axis.x * h.y_axis.y - h.x_axis.y * h.y_axis.x + h.y_axis.y * h.z_axis.z
-        - h.y_axis.z * h.z_axis.y
+    let minors = h.x_axis.x * h.y_axis.y - h.x_axis.y * h.y_axis.x + h.y_axis.y * h.z_axis.z - h.y_axis.z * h.z_axis.y
         + h.x_axis.x * h.z_axis.z
         - h.x_axis.z * h.z_axis.x;
     (2.0 * trace + square, trace + minors + h.determinant(), square)
@@ -87,16 +85,15 @@ pub(crate) fn element_fields<L: Law>(
     let b = f * f.transpose();
     let mean = (b.x_axis.x + b.y_axis.y + b.z_axis.z) / 3.0;
     let deviator = b - DMat3::from_diagonal(DVec3::splat(mean));
-    let square = deviator.x_axis.length_squared()
-        + deviator.y_axis.length_squared()
-        + deviator.z_axis.length_squared();
+    let square = deviator.x_axis.length_squared() + deviator.y_axis.length_squared() + deviator.z_axis.length_squared();
     let volume_ratio = 1.0 + j;
     let von_mises = if volume_ratio > 0.0 { p1 / volume_ratio * libm::sqrt(1.5 * square) } else { f64::NAN };
     ElementFields { element: tile.element(lane), volume_ratio, von_mises, energy }
 }
 
-/// Pressure at a corner of an element, Pa, positive where tissue is compressed: `-U'` at the volume ratio that its energy of
-/// volume is taken at, the node's with nodal pressure ([`super::pressure`]) and the element's own in linear tetrahedra.
+/// Pressure at a corner of an element, Pa, positive where tissue is compressed: `-U'` at the volume ratio that its
+/// energy of volume is taken at, the node's with nodal pressure ([`super::pressure`]) and the element's own in linear
+/// tetrahedra.
 #[cfg(feature = "std")]
 pub(crate) fn pressure_at<L: Law>(
     law: &L,
@@ -147,12 +144,7 @@ pub(crate) fn patch_energy<L: Law>(
 }
 
 /// What an element adds to it, J.
-pub(crate) fn stabilising_energy<L: Law>(
-    law: &L,
-    tile: &ElementTile,
-    lane: usize,
-    displacement: &[NodeVector],
-) -> f64 {
+pub(crate) fn stabilising_energy<L: Law>(law: &L, tile: &ElementTile, lane: usize, displacement: &[NodeVector]) -> f64 {
     let (_, _, square) = invariants(gradient_of(tile, lane, displacements(displacement)));
     f64::from(tile.volume::<f32>(lane)) * 0.5 * stabilising_modulus(law) * square
 }

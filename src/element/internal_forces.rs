@@ -8,8 +8,7 @@ use crate::material::{Invariants, Law, LawState, Laws, response_operations};
 use crate::mesh::partition::Partitions;
 use crate::mesh::strips::{CORNERS, LONGEST};
 use crate::simd::{
-    Gather, Kernel, NodeVector, Pair, Part, Real, SCATTER_WIDTH, Scatter, ScatterBuffer, TILE, TileNodes,
-    dot, unrolled,
+    Gather, Kernel, NodeVector, Pair, Part, Real, SCATTER_WIDTH, Scatter, ScatterBuffer, TILE, TileNodes, dot, unrolled,
 };
 
 use super::ElementTile;
@@ -62,7 +61,8 @@ impl Extremes<f32> {
 
 /// A further computation from the deformation of an element, in the same pass as its forces.
 pub(crate) trait ElementVisitor {
-    /// Whether patches with nodal strain add the scalar stiffness bound to the fourth component of the forces of their nodes.
+    /// Whether patches with nodal strain add the scalar stiffness bound to the fourth component of the forces of their
+    /// nodes.
     const BOUNDS_PATCHES: bool = false;
 
     /// Called for each vector of elements, those from place `first` of the tile on. Its result is added to the fourth
@@ -128,11 +128,7 @@ impl<L: Law, V: ElementVisitor, P: Pressure> Kernel for InternalForces<'_, L, V,
 
     #[inline(always)]
     fn run<R: Real>(self) -> Extremes<f32> {
-        if R::COUNT > 8 {
-            in_batches::<R, L, P, WIDE_BATCH>(self)
-        } else {
-            in_batches::<R, L, P, BATCH>(self)
-        }
+        if R::COUNT > 8 { in_batches::<R, L, P, WIDE_BATCH>(self) } else { in_batches::<R, L, P, BATCH>(self) }
     }
 
     #[inline(always)]
@@ -349,12 +345,7 @@ fn nodal_forces<R: Real>(elements: &ElementVector<'_, R>) -> [[R; 4]; 4] {
         forces[0][axis] = -(forces[1][axis] + forces[2][axis] + forces[3][axis]);
     }
     let ([a, b, c, d], fourth) = (forces, elements.fourth);
-    [
-        [a[0], a[1], a[2], fourth],
-        [b[0], b[1], b[2], fourth],
-        [c[0], c[1], c[2], fourth],
-        [d[0], d[1], d[2], fourth],
-    ]
+    [[a[0], a[1], a[2], fourth], [b[0], b[1], b[2], fourth], [c[0], c[1], c[2], fourth], [d[0], d[1], d[2], fourth]]
 }
 
 /// The third pass: adds the forces of some strips to their nodes.

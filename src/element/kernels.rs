@@ -1,16 +1,17 @@
-//! The loops over elements. For a law that is known only at run time ([`AnyLaw`]) they are compiled with this crate, once for each
-//! instruction-set level: each batch of elements looks which law it is. For one law of the list alone they are compiled where a typed
-//! program uses them, without the question. Either is linked only where it is used.
+//! The loops over elements. For a law that is known only at run time ([`AnyLaw`]) they are compiled with this crate,
+//! once for each instruction-set level: each batch of elements looks which law it is. For one law of the list alone
+//! they are compiled where a typed program uses them, without the question. Either is linked only where it is used.
 
 use crate::material::{AnyLaw, Element, Law, for_each_law};
 use crate::simd::{NodeVector, dispatch};
 
 use super::{
-    CriticalBounds, Extremes, InternalForces, MeanPressure, NoVisitor, PatchBounds, PatchForces,
-    PatchTileBounds, ScalarBound, TileBounds, TileTangents,
+    CriticalBounds, Extremes, InternalForces, MeanPressure, NoVisitor, PatchBounds, PatchForces, PatchTileBounds,
+    ScalarBound, TileBounds, TileTangents,
 };
 
-/// The list of loops: `for_each_kernel!(each first..)` calls `each!` with `first..` and then with their names, arguments and results.
+/// The list of loops: `for_each_kernel!(each first..)` calls `each!` with `first..` and then with their names,
+/// arguments and results.
 macro_rules! for_each_kernel {
     ($each:ident $($first:tt)*) => {
         $each! {

@@ -1,8 +1,9 @@
-//! Tetrahedra with linear displacements (T4): stress and pressure from each element's own deformation, with the pressure of the volumes
-//! around its nodes ([`crate::material::NodalPressure`]), or all from the mean strain around nodes ([`crate::material::NodalStrain`]).
-//! Their tables, deformation, internal forces, bounds of their tangent stiffness, and what they tell about themselves. Loops over
-//! elements are written once, for any law and any instruction-set level ([`crate::simd`]); they are compiled for each law of the list
-//! (`kernels.rs`), and linked only where a scene uses that law. What in them does not depend on the law is compiled once for each level
+//! Tetrahedra with linear displacements (T4): stress and pressure from each element's own deformation, with the
+//! pressure of the volumes around its nodes ([`crate::material::NodalPressure`]), or all from the mean strain around
+//! nodes ([`crate::material::NodalStrain`]). Their tables, deformation, internal forces, bounds of their tangent
+//! stiffness, and what they tell about themselves. Loops over elements are written once, for any law and any
+//! instruction-set level ([`crate::simd`]); they are compiled for each law of the list (`kernels.rs`), and linked only
+//! where a scene uses that law. What in them does not depend on the law is compiled once for each level
 //! ([`crate::simd::Part`]).
 
 mod critical_bounds;

@@ -1,5 +1,6 @@
-//! Volume ratios of the nodes, the first of two passes over tetrahedra with average nodal pressure ([`super::pressure`]): each
-//! element adds its volume (m^3) and its change to its nodes, whose quarters cancel in the ratios.
+//! Volume ratios of the nodes, the first of two passes over tetrahedra with average nodal pressure
+//! ([`super::pressure`]): each element adds its volume (m^3) and its change to its nodes, whose quarters cancel in the
+//! ratios.
 
 use core::ops::Range;
 
@@ -8,20 +9,20 @@ use bytemuck::must_cast_slice_mut;
 use crate::mesh::partition::Partitions;
 use crate::mesh::strips::{CORNERS, LONGEST};
 use crate::simd::{
-    Gather, Kernel, NodeVector, NumberBuffer, Real, Scatter, ScatterBuffer, ScatterNumbers, TILE, TileNodes,
-    dispatch, unrolled,
+    Gather, Kernel, NodeVector, NumberBuffer, Real, Scatter, ScatterBuffer, ScatterNumbers, TILE, TileNodes, dispatch,
+    unrolled,
 };
 
 use super::deformation::{Deformation, Matrix, Vector};
 use super::internal_forces::nodes_of;
 use super::{ElementTile, NodeInertia};
 
-/// Floating-point operations that nodal pressure adds for one element: displacement gradient 63, volume ratio 29, share of a node 2,
-/// sums 4; mean over the nodes 4.
+/// Floating-point operations that nodal pressure adds for one element: displacement gradient 63, volume ratio 29, share
+/// of a node 2, sums 4; mean over the nodes 4.
 pub(crate) const NODAL_PRESSURE_OPERATIONS: u32 = 63 + 29 + 2 + 4 + 4;
 
-/// The rows of all nodes. In a body of one tissue: the displacement (m), so that forces read one row a node, and `J - 1`. With
-/// several: `J - 1` in the first tissue of the node and in the second.
+/// The rows of all nodes. In a body of one tissue: the displacement (m), so that forces read one row a node, and `J -
+/// 1`. With several: `J - 1` in the first tissue of the node and in the second.
 #[derive(Clone, Copy)]
 pub(crate) struct VolumeRows<'a> {
     pub(crate) rows: &'a [NodeVector],
@@ -46,7 +47,8 @@ pub(crate) struct NodalVolumes<'a> {
     pub(crate) all: &'a Partitions,
     pub(crate) partitions: Range<usize>,
     pub(crate) several_tissues: bool,
-    /// The density of all elements, kg/m^3, if they are of one tissue and a node's mass is that of the tissue around it.
+    /// The density of all elements, kg/m^3, if they are of one tissue and a node's mass is that of the tissue around
+    /// it.
     pub(crate) density: Option<f32>,
     pub(crate) inertia: &'a [NodeInertia],
     pub(crate) displacement: &'a [NodeVector],
@@ -88,11 +90,7 @@ fn from_changes<R: Real>(kernel: NodalVolumes<'_>, density: f32) {
     // The sums are in the first quarter of the rows, so that they stay in the cache.
     let sums = components.get_mut(..count).unwrap_or_default();
     sums.fill(0.0);
-    add_partitions::<R, _>(
-        (tiles, all, partitions),
-        displacement,
-        Changes(ScatterNumbers::from(nodes.start, sums)),
-    );
+    add_partitions::<R, _>((tiles, all, partitions), displacement, Changes(ScatterNumbers::from(nodes.start, sums)));
     // The last rows first: each is written over sums of later nodes.
     for first in (0..count).step_by(TILE).rev() {
         let (mut changes, mut masses) = ([0.0; TILE], [1.0; TILE]);
@@ -127,11 +125,7 @@ fn from_changes_and_volumes<R: Real>(kernel: NodalVolumes<'_>) {
     let NodalVolumes { tiles, all, partitions, several_tissues, displacement, rows, .. } = kernel;
     let nodes = all.nodes(&partitions);
     rows.fill(NodeVector::ZERO);
-    add_partitions::<R, _>(
-        (tiles, all, partitions),
-        displacement,
-        ChangesAndVolumes(Scatter::from(nodes.start, rows)),
-    );
+    add_partitions::<R, _>((tiles, all, partitions), displacement, ChangesAndVolumes(Scatter::from(nodes.start, rows)));
     for (row, moved) in rows.iter_mut().zip(displacement.get(nodes).unwrap_or_default()) {
         let [change, volume, other_change, other_volume] = row.0;
         let ratio = |change: f32, volume: f32| if volume > 0.0 { change / volume } else { 0.0 };
@@ -295,12 +289,7 @@ impl Sums for Changes<'_> {
     }
 
     #[inline(always)]
-    fn scatter_present<R: Real, const N: usize>(
-        &mut self,
-        nodes: [&[u32; TILE]; N],
-        first: usize,
-        shares: [R; N],
-    ) {
+    fn scatter_present<R: Real, const N: usize>(&mut self, nodes: [&[u32; TILE]; N], first: usize, shares: [R; N]) {
         self.0.add_present(nodes, first, shares);
     }
 }

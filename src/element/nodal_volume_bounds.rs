@@ -1,15 +1,15 @@
-//! Bound of the stiffness against changes of the nodes' volumes, in 1/s^2 (mass-weighted), for the critical step of tetrahedra with
-//! nodal pressure of one tissue. It takes the place of the volume term of [`super::critical_bounds`], which bounds the nodes' volumes
-//! by those of the elements and loses what their mean softens.
+//! Bound of the stiffness against changes of the nodes' volumes, in 1/s^2 (mass-weighted), for the critical step of
+//! tetrahedra with nodal pressure of one tissue. It takes the place of the volume term of [`super::critical_bounds`],
+//! which bounds the nodes' volumes by those of the elements and loses what their mean softens.
 //!
 //! ```text
 //! V_a dJ_a = sum_b w_ab . v_b,   w_ab = sum_{e with a, b} V_e / 4 C_e g_b       C = cof F, g_b the gradient at b
 //! (V_a dJ_a)^2 <= S_a sum_b (w_ab . v_b)^2 / (|w_ab| x_b),   S_a = sum_b |w_ab| x_b       Cauchy-Schwarz, any x_b > 0
 //! k sum_a V_a (dJ_a)^2 <= sum_b v_b . D_b v_b,   D_b = sum_a k_a w_ab w_ab^T / (|w_ab| x_b),   k_a = k S_a / V_a
 //! ```
-//! `w_aa` is summed over the elements first: inside a tissue it is zero, as a node alone does not change the volume around it. The
-//! others are taken element by element, which is again Cauchy-Schwarz. Weights `x_b` that are smaller where `D_b` is small balance the
-//! nodes and make the bound closer; [`crate::tled::critical_step`] chooses them.
+//! `w_aa` is summed over the elements first: inside a tissue it is zero, as a node alone does not change the volume
+//! around it. The others are taken element by element, which is again Cauchy-Schwarz. Weights `x_b` that are smaller
+//! where `D_b` is small balance the nodes and make the bound closer; [`crate::tled::critical_step`] chooses them.
 
 use crate::simd::{Gather, Kernel, NodeVector, Real, Scatter, ScatterBuffer, TILE, dispatch};
 

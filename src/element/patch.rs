@@ -1,11 +1,12 @@
-//! Patches: each node with the elements around it, of one tissue. The displacement gradient of a patch is the mean over its elements,
+//! Patches: each node with the elements around it, of one tissue. The displacement gradient of a patch is the mean over
+//! its elements,
 //!
 //! ```text
 //! H_a = (1 / V_a) sum_b (u_b - u_a) c_ab^T,   c_ab = sum_{e with a, b} V_e / 4 g_b,   V_a = sum_e V_e / 4
 //! ```
-//! with the gradients `g_b` (1/m) of the shape functions (Dohrmann et al. 2000, "Node-based uniform strain elements"). Tables of
-//! [`TILE`] patches as a structure of arrays, and one of their neighbours after the other, in rows of equal size, which
-//! [`super::patch_builder`] fills.
+//! with the gradients `g_b` (1/m) of the shape functions (Dohrmann et al. 2000, "Node-based uniform strain elements").
+//! Tables of [`TILE`] patches as a structure of arrays, and one of their neighbours after the other, in rows of equal
+//! size, which [`super::patch_builder`] fills.
 
 use core::ops::Range;
 
@@ -59,12 +60,7 @@ impl PatchTile {
     };
 
     /// `H_a` of the patch at place `lane` in float64, from its neighbours and the displacements of nodes.
-    pub(crate) fn gradient(
-        &self,
-        neighbours: &[Neighbours],
-        lane: usize,
-        at: impl Fn(usize) -> DVec3,
-    ) -> DMat3 {
+    pub(crate) fn gradient(&self, neighbours: &[Neighbours], lane: usize, at: impl Fn(usize) -> DVec3) -> DMat3 {
         let mut sum = DMat3::ZERO;
         let own = at(self.nodes[lane % TILE] as usize);
         for neighbour in neighbours {
@@ -75,7 +71,8 @@ impl PatchTile {
         sum * f64::from(self.inverse_volumes[lane % TILE])
     }
 
-    /// The nodes of the patch at place `lane` with `c_ab / V_a` (1/m), its own node last, and then with their `k_ab` (m), zero for it.
+    /// The nodes of the patch at place `lane` with `c_ab / V_a` (1/m), its own node last, and then with their `k_ab`
+    /// (m), zero for it.
     pub(crate) fn gradients<'a>(
         &'a self,
         neighbours: &'a [Neighbours],
@@ -98,12 +95,7 @@ impl PatchTile {
 
     /// Calls `with` with the patch's own node and its neighbours and their `c_ab`, m^2.
     #[cfg(feature = "std")]
-    pub(crate) fn each_gradient(
-        &self,
-        neighbours: &[Neighbours],
-        lane: usize,
-        mut with: impl FnMut(usize, DVec3),
-    ) {
+    pub(crate) fn each_gradient(&self, neighbours: &[Neighbours], lane: usize, mut with: impl FnMut(usize, DVec3)) {
         let mut own = DVec3::ZERO;
         for neighbour in neighbours {
             let gradient = DVec3::from_array(neighbour.gradients.map(|row| f64::from(row[lane % TILE])));
@@ -160,8 +152,8 @@ impl Neighbours {
     }
 }
 
-/// How many tiles of patches and rows of neighbours there are, and where the patches of each partition are: first those with all
-/// neighbours in it, then those with some in later ones.
+/// How many tiles of patches and rows of neighbours there are, and where the patches of each partition are: first those
+/// with all neighbours in it, then those with some in later ones.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct PatchLayout {
@@ -176,13 +168,8 @@ pub struct PatchLayout {
 
 impl PatchLayout {
     /// Of a scene without patches.
-    pub const NONE: Self = Self {
-        ends: [0; 2 * MAX_PARTITIONS],
-        reach: [0; MAX_PARTITIONS],
-        tiles: 0,
-        neighbours: 0,
-        padding: [0; 24],
-    };
+    pub const NONE: Self =
+        Self { ends: [0; 2 * MAX_PARTITIONS], reach: [0; MAX_PARTITIONS], tiles: 0, neighbours: 0, padding: [0; 24] };
 }
 
 /// The patches of a scene, none for elements that need none.
@@ -206,8 +193,8 @@ impl<'a> Patches<'a> {
         Self { tiles: must_cast_slice(tiles), neighbours: must_cast_slice(neighbours), layout }
     }
 
-    /// Floating-point operations of internal forces: 51 for a neighbour, and for a patch those of an element with other kinematics,
-    /// places without a patch included.
+    /// Floating-point operations of internal forces: 51 for a neighbour, and for a patch those of an element with other
+    /// kinematics, places without a patch included.
     pub(crate) fn operations<L: Law>(&self, law: &L) -> u64 {
         let of_patch = u64::from(operations(law)) - (63 + 65 + 12) + 9 + 18 + 6;
         TILE as u64 * (51 * self.neighbours.len() as u64 + of_patch * self.tiles.len() as u64)
@@ -225,8 +212,7 @@ impl<'a> Patches<'a> {
         let earlier = (0..partitions.start).filter(move |&partition| {
             self.layout.reach.get(partition).is_some_and(|&reach| usize::from(reach) >= partitions.start)
         });
-        let groups =
-            earlier.map(|partition| 2 * partition + 1).chain(2 * partitions.start..2 * partitions.end);
+        let groups = earlier.map(|partition| 2 * partition + 1).chain(2 * partitions.start..2 * partitions.end);
         let start = move |group: usize| {
             group.checked_sub(1).and_then(|last| self.layout.ends.get(last)).map_or(0, |&end| end as usize)
         };

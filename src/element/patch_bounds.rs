@@ -1,12 +1,12 @@
-//! Bound of the stiffness of tetrahedra with nodal strain ([`super::patch_forces`]) by a matrix for each node, in 1/s^2, for the
-//! critical step: that of [`super::critical_bounds`] with patches in the place of elements,
+//! Bound of the stiffness of tetrahedra with nodal strain ([`super::patch_forces`]) by a matrix for each node, in
+//! 1/s^2, for the critical step: that of [`super::critical_bounds`] with patches in the place of elements,
 //!
 //! ```text
 //! V_a d2Psi(F_a)[dF_a, dF_a] <= sum_b v_b . D_b v_b,   dF_a = sum_b v_b (c_ab / V_a)^T,   c_aa = -sum_b c_ab
 //! ```
-//! by Cauchy-Schwarz over the node and its neighbours, with weights of the nodes as in [`super::NodalVolumeBounds`]. Of the stabilising
-//! energy the part `-s mu |dF_a|^2` lowers the isotropic term; the other one is a graph Laplacian, whose rows are bounded by their
-//! absolute values.
+//! by Cauchy-Schwarz over the node and its neighbours, with weights of the nodes as in [`super::NodalVolumeBounds`]. Of
+//! the stabilising energy the part `-s mu |dF_a|^2` lowers the isotropic term; the other one is a graph Laplacian,
+//! whose rows are bounded by their absolute values.
 
 use crate::material::{Law, LawState, Laws};
 use crate::simd::{Gather, Kernel, NodeVector, Part, Real, ScatterBuffer, TILE, TileNodes, dot};
@@ -156,15 +156,7 @@ impl<R: Real> Bound<R> {
     #[inline(always)]
     fn none() -> Self {
         let zero = R::splat(0.0);
-        let terms = Terms {
-            p1: zero,
-            p_j: zero,
-            stiffening: zero,
-            volume: zero,
-            coupling: zero,
-            x_f: zero,
-            x_c: zero,
-        };
+        let terms = Terms { p1: zero, p_j: zero, stiffening: zero, volume: zero, coupling: zero, x_f: zero, x_c: zero };
         Self {
             deformation: Deformation::new([[zero; 3]; 3]),
             terms,

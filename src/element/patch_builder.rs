@@ -1,6 +1,6 @@
-//! Builds the tables of patches ([`super::patch`]) in rows that the caller lends, without a heap: their first rows become the tables,
-//! their last ones hold lists meanwhile. Time goes with `e log k` for `e` elements, `k` of them around a node. Sums are taken in
-//! float64 in the order of the element tables, gradients in 1/m, volumes in m^3.
+//! Builds the tables of patches ([`super::patch`]) in rows that the caller lends, without a heap: their first rows
+//! become the tables, their last ones hold lists meanwhile. Time goes with `e log k` for `e` elements, `k` of them
+//! around a node. Sums are taken in float64 in the order of the element tables, gradients in 1/m, volumes in m^3.
 
 use bytemuck::{must_cast_mut, must_cast_slice_mut};
 
@@ -13,16 +13,18 @@ use crate::simd::TILE;
 /// Most neighbours of a node that [`patch_rows_for`] counts on.
 const USUAL_NEIGHBOURS: usize = 48;
 
-/// Rows of patches ([`PatchRow`], 320 bytes each) that are enough for a body of nodal strain with so many nodes, elements and tissues
-/// where the elements of a tissue around a node are joined by faces, and no node has more than 48 neighbours. Meshes of organs take
-/// half of it; a scene tells how many it takes, and how many it needs where these are too few.
+/// Rows of patches ([`PatchRow`], 320 bytes each) that are enough for a body of nodal strain with so many nodes,
+/// elements and tissues where the elements of a tissue around a node are joined by faces, and no node has more than 48
+/// neighbours. Meshes of organs take half of it; a scene tells how many it takes, and how many it needs where these are
+/// too few.
 #[must_use]
 pub const fn patch_rows_for(nodes: usize, elements: usize, tissues: usize) -> usize {
     let corners = elements.saturating_mul(4);
     let patches = least(nodes.saturating_mul(tissues), corners);
     let groups = most_groups(elements);
-    // k elements that are joined by faces have k + 2 nodes around their common one at most. Of each tile the patch with the most
-    // neighbours counts. Those of the tile before have as many or more, but the first tile of a group has none before.
+    // k elements that are joined by faces have k + 2 nodes around their common one at most. Of each tile the patch with
+    // the most neighbours counts. Those of the tile before have as many or more, but the first tile of a group has none
+    // before.
     let neighbours = patches.saturating_mul(2).saturating_add(corners).div_ceil(TILE);
     let tables = 1 + patches / TILE + groups + neighbours + groups * least(USUAL_NEIGHBOURS, nodes);
     tables + Lists { nodes, corners, patches, around_node: 2 * USUAL_NEIGHBOURS }.rows()
@@ -115,9 +117,9 @@ impl Corner<'_> {
 }
 
 impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
-    /// Fills `rows` with the patches of all nodes, one for each tissue of a node, and gives how many rows these take. Else how many
-    /// rows are enough: exactly as many as are needed, if there was room to count them; what [`patch_rows_for`] tells, if there was not
-    /// even room for the nodes.
+    /// Fills `rows` with the patches of all nodes, one for each tissue of a node, and gives how many rows these take.
+    /// Else how many rows are enough: exactly as many as are needed, if there was room to count them; what
+    /// [`patch_rows_for`] tells, if there was not even room for the nodes.
     pub(crate) fn build(&self, rows: &mut [PatchRow]) -> Result<usize, usize> {
         let mut free = &mut *rows;
         let Some(ends) = take_halves(&mut free, self.nodes) else {
@@ -179,8 +181,8 @@ impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
         1 + lists.patches / TILE + groups + neighbours
     }
 
-    /// Counts the corners of each node, and gives where the corners of each one begin in a list of all, and how many a node has at
-    /// most.
+    /// Counts the corners of each node, and gives where the corners of each one begin in a list of all, and how many a
+    /// node has at most.
     fn count_corners(&self, starts: &mut [u32]) -> usize {
         starts.fill(0);
         for (_, corner) in self.corners() {
@@ -249,8 +251,8 @@ impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
         })
     }
 
-    /// For each element of a patch and each of its other nodes that node, and where it was found; by nodes, then in the order of the
-    /// elements.
+    /// For each element of a patch and each of its other nodes that node, and where it was found; by nodes, then in the
+    /// order of the elements.
     fn pairs<'b>(&self, patch: &[u32], pairs: &'b mut [u64]) -> &'b [u64] {
         let mut count = 0;
         for (index, &number) in patch.iter().enumerate() {
@@ -267,8 +269,8 @@ impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
         pairs
     }
 
-    /// Fills `order` with a number for each patch, from the first to the last in the tables: those of a group together, and in it
-    /// those with as many neighbours.
+    /// Fills `order` with a number for each patch, from the first to the last in the tables: those of a group together,
+    /// and in it those with as many neighbours.
     fn sort_patches(&self, around: &[u32], order: &mut [u64], pairs: &mut [u64]) {
         for (key, (first, patch)) in order.iter_mut().zip(self.patches(around)) {
             let own = patch.first().and_then(|&number| self.corner(number)).map_or(0, |own| own.node());
@@ -315,13 +317,7 @@ impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
         layout
     }
 
-    fn write_tile(
-        &self,
-        around: &[u32],
-        members: &[u64],
-        pairs: &mut [u64],
-        rows: &mut [Neighbours],
-    ) -> PatchTile {
+    fn write_tile(&self, around: &[u32], members: &[u64], pairs: &mut [u64], rows: &mut [Neighbours]) -> PatchTile {
         let mut tile = PatchTile::EMPTY;
         for lane in 0..TILE {
             // Places without a patch name the first one's node and element.
@@ -355,8 +351,7 @@ impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
             while let Some(pair) = pairs.next_if(|&&other| other >> 32 == node) {
                 let (index, other) = ((*pair as u32 / 4) as usize, (pair % 4) as usize);
                 let Some(own) = patch.get(index).and_then(|&number| self.corner(number)) else { continue };
-                let (volume, of_own, of_other) =
-                    (own.volume(), own.gradient(own.corner), own.gradient(other));
+                let (volume, of_own, of_other) = (own.volume(), own.gradient(own.corner), own.gradient(other));
                 for axis in 0..3 {
                     gradient[axis] += 0.25 * volume * of_other[axis];
                     coupling -= volume * of_other[axis] * of_own[axis];
@@ -375,7 +370,8 @@ impl<F: Fn(usize) -> u16> PatchBuilder<'_, F> {
 const BITS: u32 = 26;
 const MASK: u64 = (1 << BITS) - 1;
 
-/// The number by which patches are sorted: by groups, those with many neighbours first, in the order of their nodes and tissues.
+/// The number by which patches are sorted: by groups, those with many neighbours first, in the order of their nodes and
+/// tissues.
 fn key_of(group: usize, neighbours: usize, first: usize) -> u64 {
     (group as u64) << (2 * BITS) | ((MASK - neighbours as u64) & MASK) << BITS | first as u64 & MASK
 }

@@ -1,12 +1,13 @@
 //! Internal forces (N) of tetrahedra with stabilised nodal strain: all energy is taken at the patches of the nodes
-//! ([`super::patch`]), and what their mean does not see is held by a quadratic energy with the share `s` of the shear modulus at rest,
+//! ([`super::patch`]), and what their mean does not see is held by a quadratic energy with the share `s` of the shear
+//! modulus at rest,
 //!
 //! ```text
 //! E = sum_a V_a Psi(F_a) + s mu / 2 (sum_e V_e |H_e|^2 - sum_a V_a |H_a|^2),   F_a = I + H_a
 //! ```
-//! whose bracket is the sum over the patches of the variance of `H_e` (Puso & Solberg 2006 stabilise in the same way, with another
-//! energy). With `P_a = dPsi/dF(F_a) - s mu H_a` a patch gives its neighbour `b` the force `-P_a c_ab`, and its own node the opposite
-//! and `s mu sum_b k_ab (u_b - u_a)`, `k_ab = -sum_e V_e g_a . g_b`.
+//! whose bracket is the sum over the patches of the variance of `H_e` (Puso & Solberg 2006 stabilise in the same way,
+//! with another energy). With `P_a = dPsi/dF(F_a) - s mu H_a` a patch gives its neighbour `b` the force `-P_a c_ab`,
+//! and its own node the opposite and `s mu sum_b k_ab (u_b - u_a)`, `k_ab = -sum_e V_e g_a . g_b`.
 
 use core::marker::PhantomData;
 use core::ops::Range;
@@ -21,8 +22,8 @@ use super::patch_deformation::{GradientLengths, gradient};
 use super::stiffness_bound::{Bound, Coefficients};
 use super::tile::vector_at;
 
-/// Share of the shear modulus at rest in the stabilising energy. Less follows bending on coarse meshes more closely and is too soft on
-/// fine ones; below 0.2 rough motion is hardly held.
+/// Share of the shear modulus at rest in the stabilising energy. Less follows bending on coarse meshes more closely and
+/// is too soft on fine ones; below 0.2 rough motion is hardly held.
 pub(crate) const STABILISATION: f32 = 0.4;
 
 /// The kernel that adds internal forces to the nodes of some partitions, and what the visitor asks for.
@@ -53,9 +54,7 @@ impl<L: Law, V: ElementVisitor> Kernel for PatchForces<'_, L, V> {
 }
 
 #[inline(always)]
-fn add_all<R: Real, L: Law, V: ElementVisitor, const PARTS: usize>(
-    kernel: PatchForces<'_, L, V>,
-) -> Extremes<f32> {
+fn add_all<R: Real, L: Law, V: ElementVisitor, const PARTS: usize>(kernel: PatchForces<'_, L, V>) -> Extremes<f32> {
     let PatchForces { laws, patches, partitions, displacement, mut force, .. } = kernel;
     let displacement = Gather::new(displacement);
     let mut extremes = Extremes::<R>::none();
@@ -63,8 +62,7 @@ fn add_all<R: Real, L: Law, V: ElementVisitor, const PARTS: usize>(
         let neighbours = patches.neighbours_of(tile);
         let mut stresses = [Stress::<R>::zero(); PARTS];
         for (part, stress) in stresses.iter_mut().enumerate() {
-            *stress =
-                stress_of::<R, L, V>(&laws, tile, neighbours, part * R::COUNT, displacement, &mut extremes);
+            *stress = stress_of::<R, L, V>(&laws, tile, neighbours, part * R::COUNT, displacement, &mut extremes);
         }
         scatter::<R, V, PARTS>(tile, neighbours, stresses, &mut force);
     }
@@ -84,7 +82,8 @@ struct Stress<R> {
     p: Matrix<R>,
     /// Stabilising force on the own node, N.
     own: Vector<R>,
-    /// Stiffness bound of a neighbour over the length of its `c_ab`, N/m^3, and that of the own node, N/m; zero if nobody asks.
+    /// Stiffness bound of a neighbour over the length of its `c_ab`, N/m^3, and that of the own node, N/m; zero if
+    /// nobody asks.
     scalar: R,
     own_scalar: R,
 }
@@ -132,7 +131,8 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor>(
     Stress { scalar, own_scalar: scalar.fused(lengths.own, modulus * lengths.couplings), ..stress }
 }
 
-/// Adds the forces of a tile, neighbour by neighbour, those of the patches in the order of their places whatever the width of a vector.
+/// Adds the forces of a tile, neighbour by neighbour, those of the patches in the order of their places whatever the
+/// width of a vector.
 #[inline(always)]
 fn scatter<R: Real, V: ElementVisitor, const PARTS: usize>(
     tile: &PatchTile,

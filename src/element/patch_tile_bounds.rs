@@ -1,12 +1,12 @@
-//! Stiffness bounds of one tile of patches with nodal strain, as [`super::tile_bounds`] has them of elements: matrices `D_b` of the
-//! nodes (N/m), in the frames of the patches' own nodes, and what a coarse stiffness needs to know of each patch. With
-//! `dF_a = sum_b v_b (c_ab / V_a)^T` the bound of [`super::stiffness_bound`] gives, by Cauchy-Schwarz,
+//! Stiffness bounds of one tile of patches with nodal strain, as [`super::tile_bounds`] has them of elements: matrices
+//! `D_b` of the nodes (N/m), in the frames of the patches' own nodes, and what a coarse stiffness needs to know of each
+//! patch. With `dF_a = sum_b v_b (c_ab / V_a)^T` the bound of [`super::stiffness_bound`] gives, by Cauchy-Schwarz,
 //!
 //! ```text
 //! D_b = (iso |c_ab| sum_d |c_ad| I + volume (sum_d |C c_ad|) (C c_ab)(C c_ab)^T / |C c_ab|) / V_a
 //! ```
-//! and the own node gets `s mu sum_b (k_ab + |k_ab|) I` from the stabilising energy, the sum of the absolute values of its row. That
-//! energy is not in the tangents, as it does not change with the state.
+//! and the own node gets `s mu sum_b (k_ab + |k_ab|) I` from the stabilising energy, the sum of the absolute values of
+//! its row. That energy is not in the tangents, as it does not change with the state.
 
 use crate::material::{Law, LawState, Laws};
 use crate::simd::{Gather, Kernel, Part, Real, ScatterBuffer, TILE, dot};
@@ -56,7 +56,8 @@ struct Shares<R> {
     modulus: R,
     /// `C` in the frames.
     cofactor: Matrix<R>,
-    /// Factors of `|c_ab|` and of the outer product of `C c_ab` over its length, and of `|c_ab|` in the scalar bound, N/m^3.
+    /// Factors of `|c_ab|` and of the outer product of `C c_ab` over its length, and of `|c_ab|` in the scalar bound,
+    /// N/m^3.
     isotropic: R,
     volume: R,
     scalar: R,
@@ -111,7 +112,8 @@ impl<R: Real, const PARTS: usize> Part for AddBounds<'_, '_, R, PARTS> {
     }
 }
 
-/// Adds the matrices of a neighbour of each patch, or of its own node, in the order of the places whatever the width of a vector.
+/// Adds the matrices of a neighbour of each patch, or of its own node, in the order of the places whatever the width of
+/// a vector.
 #[inline(always)]
 fn add<R: Real, const PARTS: usize>(
     sums: &mut MatrixSums<'_>,
@@ -195,7 +197,8 @@ impl<R: Real> Shares<R> {
         (image, dot(image, image).root())
     }
 
-    /// What the node with this gradient gets, with more along all axes: diagonal and scalar bound, and the other entries.
+    /// What the node with this gradient gets, with more along all axes: diagonal and scalar bound, and the other
+    /// entries.
     #[inline(always)]
     fn matrix(&self, gradient: Vector<R>, more: R) -> [[R; 4]; 2] {
         let length = dot(gradient, gradient).root();
@@ -206,9 +209,6 @@ impl<R: Real> Shares<R> {
         let (wx, wy, wz) = (self.volume * x, self.volume * y, self.volume * z);
         let (x, y, z) = (inverse * x, inverse * y, inverse * z);
         let scalar = self.scalar.fused(length, more);
-        [
-            [isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, scalar],
-            [wx * y, wy * z, wz * x, R::splat(0.0)],
-        ]
+        [[isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, scalar], [wx * y, wy * z, wz * x, R::splat(0.0)]]
     }
 }

@@ -1,13 +1,13 @@
-//! Where the pressure `dU/dJ` (Pa) of an element comes from: its own volume in linear tetrahedra, or the mean over its four nodes
-//! ([`crate::material::NodalPressure`]). Around a node `a` the volume ratio is `J_a = sum_e (V_e / 4) J_e / V_a` with
-//! `V_a = sum_e V_e / 4` (Bonet & Burton 1998). The energy of volume is `sum_a V_a U(J_a)`, so that
+//! Where the pressure `dU/dJ` (Pa) of an element comes from: its own volume in linear tetrahedra, or the mean over its
+//! four nodes ([`crate::material::NodalPressure`]). Around a node `a` the volume ratio is `J_a = sum_e (V_e / 4) J_e /
+//! V_a` with `V_a = sum_e V_e / 4` (Bonet & Burton 1998). The energy of volume is `sum_a V_a U(J_a)`, so that
 //!
 //! ```text
 //! dPsi/du = sum_e V_e p_e C_e : dF_e/du,   p_e = sum_{a in e} U'(J_a) / 4,   C = cof F
 //! ```
-//! which is the stress of the linear element with `p_e` in place of `U'(J_e)`. As `U'` is linear in `J` in all laws, that is its
-//! pressure at the mean volume ratio of its nodes. Where tissues meet, a node has a volume ratio for each of the first two; elements of a
-//! third one keep their own there.
+//! which is the stress of the linear element with `p_e` in place of `U'(J_e)`. As `U'` is linear in `J` in all laws,
+//! that is its pressure at the mean volume ratio of its nodes. Where tissues meet, a node has a volume ratio for each
+//! of the first two; elements of a third one keep their own there.
 
 use core::marker::PhantomData;
 
@@ -26,12 +26,7 @@ pub(crate) trait Pressure: Copy {
     /// Rows in which displacements are read as well, if any.
     fn displacement(&self) -> Option<Gather<'_>>;
     /// Reads a node of each element ([`Gather::read_nodes`]).
-    fn read<R: Real, const N: usize>(
-        &self,
-        nodes: &TileNodes<'_, N>,
-        corner: usize,
-        first: usize,
-    ) -> Self::Volumes<R>;
+    fn read<R: Real, const N: usize>(&self, nodes: &TileNodes<'_, N>, corner: usize, first: usize) -> Self::Volumes<R>;
     /// The same with the fourth component of the displacement known.
     fn read_with<R: Real, const N: usize>(
         &self,
@@ -40,13 +35,15 @@ pub(crate) trait Pressure: Copy {
         corner: usize,
         first: usize,
     ) -> Self::Volumes<R>;
-    /// `J - 1` at which the elements from place `first` of a tile on take their pressure, from their corners and their own.
+    /// `J - 1` at which the elements from place `first` of a tile on take their pressure, from their corners and their
+    /// own.
     fn change<R: Real>(&self, tile: &ElementTile, first: usize, corners: [Self::Volumes<R>; 4], own: R) -> R;
     /// Number of nodes that can be read.
     fn count(&self) -> usize;
 }
 
-/// Reads the deformation of the elements from place `first` of a tile on, and `J - 1` at which they take their pressure.
+/// Reads the deformation of the elements from place `first` of a tile on, and `J - 1` at which they take their
+/// pressure.
 pub(super) struct ReadTile<'a, R, P> {
     tile: &'a ElementTile,
     first: usize,
@@ -163,8 +160,7 @@ impl Pressure for MeanPressure<'_> {
                 // 0, 1 or 2: positive minus a half is of the first tissue, and so on.
                 let slot = R::from_fn(|lane| f32::from(tile.slot(corner, first + lane)));
                 let half = R::splat(0.5);
-                changes[corner] =
-                    (half - slot).choose(one, (slot - (half + R::splat(1.0))).choose(own, other));
+                changes[corner] = (half - slot).choose(one, (slot - (half + R::splat(1.0))).choose(own, other));
             }
         }
         R::splat(0.25) * ((changes[0] + changes[1]) + (changes[2] + changes[3]))

@@ -27,9 +27,10 @@
 //! ```text
 //! d^2 (tau_i + tau_j - 4 pJ J) + w^2 (tau_i + tau_j) + 2 (tau_j - tau_i) d w      d = D_ij, w = Omega_ij
 //! ```
-//! and `2 |d w| <= d^2 + w^2` gives `(t - 2 pJ J) |D|^2 + max(t, 0) |Omega|^2 + pJ J (tr D)^2`. A rotation of an element
-//! without tension costs nothing. The other terms have `c = J tr D` and `e = (b - J I):D`, and are split as above. At
-//! rest this is exactly linear elasticity. In a crushed element `F^-1` is too large: there the first bound is used.
+//! and `2 |d w| <= d^2 + w^2` gives `(t - 2 pJ J) |D|^2 + max(t, 0) |Omega|^2 + pJ J (tr D)^2`. A rotation of an
+//! element without tension costs nothing. The other terms have `c = J tr D` and `e = (b - J I):D`, and are split as
+//! above. At rest this is exactly linear elasticity. In a crushed element `F^-1` is too large: there the first bound is
+//! used.
 //!
 //! **Matrices of the nodes.** With `dF = sum_a v_a (x) ga` and `c = sum_a (C ga).va`, and by Cauchy-Schwarz with the
 //! weights `|C ga|`, the element's tangent is bounded by a matrix that couples no two nodes. It has one 3 x 3 submatrix
@@ -94,8 +95,7 @@ impl<R: Real> Coefficients<R> {
         let four = R::splat(4.0);
         let at = local.at;
         let i1 = at.i + R::splat(3.0);
-        let (slope, stiffening, [g, dg, ddg]) =
-            (local.slope, local.stiffening::<L>(law), local.volume_factor());
+        let (slope, stiffening, [g, dg, ddg]) = (local.slope, local.stiffening::<L>(law), local.volume_factor());
         let (x_f, x_c) = (g + g, dg * i1);
         let along = x_f + x_c;
         let bulk = local.bulk;
@@ -212,8 +212,8 @@ impl<R: Real> Bound<R> {
         Self { iso, volume, scalar: scalar_bound(&coefficients, at, scale_of(tile, first)), coefficients }
     }
 
-    /// Of patches with nodal strain, whose stabilising energy has this `modulus` (Pa). As there are fewer of them than elements, the
-    /// scalar bound is a close one: `scale (iso + volume |C|^2)`, with `scale` in m.
+    /// Of patches with nodal strain, whose stabilising energy has this `modulus` (Pa). As there are fewer of them than
+    /// elements, the scalar bound is a close one: `scale (iso + volume |C|^2)`, with `scale` in m.
     #[inline(always)]
     pub(super) fn of_patches(
         coefficients: Coefficients<R>,
@@ -228,9 +228,9 @@ impl<R: Real> Bound<R> {
         Self { iso, volume, scalar: scale * volume.fused(cofactor, iso), coefficients }
     }
 
-    /// The bound that rotations do not feel; only for elements that are not crushed. With `modulus`, that of the stabilising energy of
-    /// patches (Pa), `stress` may be negative, as far as that energy resists rotations itself: in the principal axes it has
-    /// `modulus (b_i + b_j) w^2`.
+    /// The bound that rotations do not feel; only for elements that are not crushed. With `modulus`, that of the
+    /// stabilising energy of patches (Pa), `stress` may be negative, as far as that energy resists rotations itself: in
+    /// the principal axes it has `modulus (b_i + b_j) w^2`.
     #[inline(always)]
     pub(super) fn spatial(&self, deformation: &Deformation<R>, modulus: Option<R>) -> SpatialBound<R> {
         let (zero, one) = (R::splat(0.0), R::splat(1.0));
@@ -244,9 +244,7 @@ impl<R: Real> Bound<R> {
             + difference.yy * difference.yy
             + difference.zz * difference.zz
             + R::splat(2.0)
-                * (difference.xy * difference.xy
-                    + difference.yz * difference.yz
-                    + difference.zx * difference.zx);
+                * (difference.xy * difference.xy + difference.yz * difference.yz + difference.zx * difference.zx);
         let mixed = ce.abs() * square.root() * volume_ratio;
         let least = match modulus {
             Some(modulus) => {

@@ -37,8 +37,7 @@ struct Sample {
 fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
     let tets = [[0, 1, 2, 3]];
     let tissue = Tissue { law, density: 1000.0 };
-    let scene =
-        VecScene::build(tissue, &Mesh::new(points, &tets, Winding::Normalised).unwrap(), &[]).unwrap();
+    let scene = VecScene::build(tissue, &Mesh::new(points, &tets, Winding::Normalised).unwrap(), &[]).unwrap();
     let scene = scene.view();
     let tile = &scene.tiles[0];
     let deformation = Deformation::<f32>::new(h);
@@ -46,8 +45,7 @@ fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
     let local = LawState::new::<L>(&wide, deformation.invariants);
     let bound = Bound::of(Coefficients::new::<L>(&wide, &local), tile, 0, &deformation);
     let (mut diagonal, mut off_diagonal) = ([NodeVector::ZERO; 4], [NodeVector::ZERO; 4]);
-    let mut sums =
-        MatrixSums { diagonal: Scatter::new(&mut diagonal), off_diagonal: Scatter::new(&mut off_diagonal) };
+    let mut sums = MatrixSums { diagonal: Scatter::new(&mut diagonal), off_diagonal: Scatter::new(&mut off_diagonal) };
     let rows = [0, 1, 2].map(|i| [0, 1, 2].map(|j| deformation.cofactor(i, j)));
     // The other places of the tile have no volume.
     let mut buffer = [ScatterBuffer::NONE; 2];
@@ -97,9 +95,7 @@ fn tangent(law: &reference::Law, sample: &Sample, f: &Mat3, size: f64) -> Matrix
         let length = gradient.iter().map(|x| x * x).sum::<f64>().sqrt();
         for axis in 0..3 {
             let at = |times: f64| {
-                let moved = from_fn(|i, j| {
-                    f[i][j] + if i == axis { times * size * gradient[j] / length } else { 0.0 }
-                });
+                let moved = from_fn(|i, j| f[i][j] + if i == axis { times * size * gradient[j] / length } else { 0.0 });
                 forces(law, sample, &moved)
             };
             let (far_back, back, on, far_on) = (at(-2.0), at(-1.0), at(1.0), at(2.0));
@@ -143,12 +139,7 @@ struct Comparison {
     analytic: f64,
 }
 
-fn compare<L: Law>(
-    law: L,
-    reference_law: &reference::Law,
-    points: &[[f32; 3]],
-    h: [[f32; 3]; 3],
-) -> Comparison {
+fn compare<L: Law>(law: L, reference_law: &reference::Law, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Comparison {
     let sample = sample(law, points, h);
     let f = from_fn(|i, j| f64::from(h[i][j]) + if i == j { 1.0 } else { 0.0 });
     let size = step_size(reference_law, &f);
@@ -237,10 +228,8 @@ fn deformation(random: &mut Random, class: usize) -> Mat3 {
     loop {
         let mut stretched = |low: f64, high: f64| {
             let stretch = random.vector().map(|x| 0.5 * (low + high) + 0.5 * (high - low) * x);
-            let (q, r) = (
-                rotation(random.vector(), 3.0 * random.next()),
-                rotation(random.vector(), 3.0 * random.next()),
-            );
+            let (q, r) =
+                (rotation(random.vector(), 3.0 * random.next()), rotation(random.vector(), 3.0 * random.next()));
             let diagonal = from_fn(|i, j| if i == j { stretch[i] } else { 0.0 });
             product(&q, &product(&diagonal, &r))
         };

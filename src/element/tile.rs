@@ -28,8 +28,8 @@ pub struct ElementTile {
     gradients: [[[f32; TILE]; 3]; 3],
     /// Rest volumes, m^3.
     volumes: [f32; TILE],
-    /// Index of each element in the mesh; in the upper eight bits, two for each corner, which of the tissues at that node it is
-    /// of ([`ElementTile::slot`]).
+    /// Index of each element in the mesh; in the upper eight bits, two for each corner, which of the tissues at that
+    /// node it is of ([`ElementTile::slot`]).
     elements: [u32; TILE],
     /// Largest eigenvalue of `sum_a ga ga^T` over the four shape function gradients, 1/m^2.
     gradient_eigenvalues: [f32; TILE],

@@ -1,5 +1,5 @@
-//! Stiffness bounds of one tile of elements, in the frames of their first nodes: the matrices `D_a` go to the sums of the
-//! nodes (N/m), what a coarse stiffness needs to know of each element comes back.
+//! Stiffness bounds of one tile of elements, in the frames of their first nodes: the matrices `D_a` go to the sums of
+//! the nodes (N/m), what a coarse stiffness needs to know of each element comes back.
 
 use crate::material::{Law, LawState, Laws};
 use crate::simd::{Gather, Kernel, NodeVector, Part, Real, ScatterBuffer, TILE, write_rows};
@@ -37,8 +37,8 @@ impl<'a, L: Law> TileBounds<'a, L> {
 pub struct TileTangents {
     /// Columns of the matrix that takes a material gradient to its image: of `F^-T`, or of `C` in a crushed element.
     pub(crate) columns: [[[f32; 4]; TILE]; 3],
-    /// Factors with `weight V` (kg m^2): of the product of the gradients, of the outer product of the images, of that of
-    /// the images exchanged; and one if the first is a product of images, zero if one of material gradients.
+    /// Factors with `weight V` (kg m^2): of the product of the gradients, of the outer product of the images, of that
+    /// of the images exchanged; and one if the first is a product of images, zero if one of material gradients.
     pub(crate) factors: [[f32; 4]; TILE],
 }
 
@@ -61,8 +61,7 @@ impl<L: Law, P: Pressure> Kernel for TileBounds<'_, L, P> {
         let mut buffer = [ScatterBuffer::NONE; 2];
         for first in (0..TILE).step_by(R::COUNT) {
             // By reference: a copy would take a kilobyte of stack.
-            let (deformation, change) =
-                &R::run_part(ReadTile::<R, P>::new(tile, first, displacement, pressure));
+            let (deformation, change) = &R::run_part(ReadTile::<R, P>::new(tile, first, displacement, pressure));
             let law = laws.widen(|lane| tile.element(first + lane));
             let local = LawState::with_volume_change::<L>(&law, deformation.invariants, *change);
             R::run_part(AddBounds {
@@ -130,8 +129,8 @@ pub(super) fn cofactor_in_frames<R: Real>(
 }
 
 impl TileTangents {
-    /// Writes the tangents from place `first` on, with `weight` (kg m^2 / Pa) as a factor, from their bounds and `cofactor`, `C` in the
-    /// frames. For `modulus` see [`Bound::spatial`].
+    /// Writes the tangents from place `first` on, with `weight` (kg m^2 / Pa) as a factor, from their bounds and
+    /// `cofactor`, `C` in the frames. For `modulus` see [`Bound::spatial`].
     #[inline(always)]
     pub(super) fn write<R: Real>(
         &mut self,

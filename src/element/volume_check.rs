@@ -1,6 +1,6 @@
-//! The least volume ratio `J` of elements in a scene with nodal strain. Its forces know only the mean deformation around nodes, in
-//! which an element that is turned inside out can hide. A step looks at one tile of elements in [`CHECK_CYCLE`], so that every
-//! element is seen in so many steps, at a cost that is the same in each.
+//! The least volume ratio `J` of elements in a scene with nodal strain. Its forces know only the mean deformation
+//! around nodes, in which an element that is turned inside out can hide. A step looks at one tile of elements in
+//! [`CHECK_CYCLE`], so that every element is seen in so many steps, at a cost that is the same in each.
 
 use crate::simd::{Gather, Kernel, NodeVector, Real, TILE, dispatch};
 

@@ -1,6 +1,6 @@
-//! From distances to one estimate a frame: an envelope. A distance passes through zero where one run overtakes the other, an error does
-//! not; so the estimate follows a larger distance at once, and forgets it by half in a fifth of a second. Between two comparisons it
-//! goes on growing as it grew between the two before.
+//! From distances to one estimate a frame: an envelope. A distance passes through zero where one run overtakes the
+//! other, an error does not; so the estimate follows a larger distance at once, and forgets it by half in a fifth of a
+//! second. Between two comparisons it goes on growing as it grew between the two before.
 
 use super::ESTIMATE;
 use super::compare::{Comparison, finite};
@@ -9,8 +9,8 @@ use crate::step::Status;
 
 /// Time in which a held estimate falls by half, s.
 const HALF_LIFE: f32 = 0.2;
-/// Share of the motion so far that an error may have unless the caller says otherwise, and share of the size of the body below which
-/// it does not count.
+/// Share of the motion so far that an error may have unless the caller says otherwise, and share of the size of the
+/// body below which it does not count.
 const SHARE_OF_MOTION: f32 = 0.2;
 const SHARE_OF_SIZE: f32 = 0.01;
 /// The same in metres at most: what matters in guidance.
@@ -18,15 +18,15 @@ const LEAST: f32 = 0.001;
 /// Part of that where the estimate exceeds the motion of the run: both runs may hold a body still that moves.
 const LEAST_OF_STILL: f32 = 0.1;
 
-/// In the first steps from rest no two runs differ much. So at the first comparisons, one a step, the error may be as large as the
-/// motion.
+/// In the first steps from rest no two runs differ much. So at the first comparisons, one a step, the error may be as
+/// large as the motion.
 const FIRST_COMPARISONS: u32 = 3;
 
 /// The error that a run may have before its steps are called inexact.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Allowed {
-    /// A fifth of the mean motion of the nodes so far; errors below a millimetre and a hundredth of the body's size do not count, of a
-    /// body that has moved by less than its error those below a tenth of that.
+    /// A fifth of the mean motion of the nodes so far; errors below a millimetre and a hundredth of the body's size do
+    /// not count, of a body that has moved by less than its error those below a tenth of that.
     #[default]
     ShareOfMotion,
     /// A mean error of the nodes of this many metres.
@@ -233,8 +233,8 @@ mod tests {
         }
     }
 
-    /// Both runs move by a tenth of a millimetre, and differ by as much: what the body does is not known. Of one that has moved by more
-    /// the same error does not count.
+    /// Both runs move by a tenth of a millimetre, and differ by as much: what the body does is not known. Of one that
+    /// has moved by more the same error does not count.
     #[test]
     fn an_error_above_the_whole_motion_counts_below_a_millimetre() {
         let (mut still, mut moved) = (later(), later());

@@ -1,17 +1,19 @@
-//! May a step be believed? A *second run* moves the same body by multilevel steps that are several times as long as those of the first
-//! run, under the same loads. The distance between the two runs estimates the error of the first: the second is the less accurate one,
-//! so the distance is mostly an error of its own. That holds on bodies, materials and loads that nobody has tuned anything on, and for
-//! every method: exact steps above their critical one, mass-scaled, multilevel, damped and learned ones. A frozen body shows, because the
-//! second run's lattice has the true inertia of smooth motion.
+//! May a step be believed? A *second run* moves the same body by multilevel steps that are several times as long as
+//! those of the first run, under the same loads. The distance between the two runs estimates the error of the first:
+//! the second is the less accurate one, so the distance is mostly an error of its own. That holds on bodies, materials
+//! and loads that nobody has tuned anything on, and for every method: exact steps above their critical one,
+//! mass-scaled, multilevel, damped and learned ones. A frozen body shows, because the second run's lattice has the true
+//! inertia of smooth motion.
 //!
-//! Step doubling (Hairer, Norsett & Wanner 1993, II.4) takes the difference as the leading term of an error of known order. Here it is
-//! taken as it is, times [`ESTIMATE`]: the order lies between one and four, depending on what motion the step resolves, and
-//! extrapolation with a measured order was less certain than none. How often the truth is larger: `docs/accuracy.md`.
+//! Step doubling (Hairer, Norsett & Wanner 1993, II.4) takes the difference as the leading term of an error of known
+//! order. Here it is taken as it is, times [`ESTIMATE`]: the order lies between one and four, depending on what motion
+//! the step resolves, and extrapolation with a measured order was less certain than none. How often the truth is
+//! larger: `docs/accuracy.md`.
 //!
-//! Comparisons take place at each of the first three steps, where the second run takes two steps in one of the first, after two steps
-//! more, after three more, and so on up to what the caller says ([`EVERY`]). A guard costs a multilevel step in each comparison, and
-//! memory for a second state and the second run's inertia ([`vectors_for`]). A scene without a guard pays nothing, and knows nothing of
-//! its error.
+//! Comparisons take place at each of the first three steps, where the second run takes two steps in one of the first,
+//! after two steps more, after three more, and so on up to what the caller says ([`EVERY`]). A guard costs a multilevel
+//! step in each comparison, and memory for a second state and the second run's inertia ([`vectors_for`]). A scene
+//! without a guard pays nothing, and knows nothing of its error.
 
 mod compare;
 mod estimate;
@@ -31,10 +33,11 @@ use crate::step::{CallingThread, Status, Step, Threads};
 use compare::compare;
 use estimate::Envelope;
 
-/// Steps of the first run in one of the second, where nothing speaks for another number. With more, a guard costs less and calls more
-/// right steps inexact.
+/// Steps of the first run in one of the second, where nothing speaks for another number. With more, a guard costs less
+/// and calls more right steps inexact.
 pub const EVERY: u32 = 3;
-/// The same for learned steps: their error does not grow with their length, and they take far more time than a multilevel step.
+/// The same for learned steps: their error does not grow with their length, and they take far more time than a
+/// multilevel step.
 pub const EVERY_LEARNED: u32 = 1;
 /// The estimate over the distance of the two runs.
 pub const ESTIMATE: f32 = 2.0;
@@ -48,8 +51,7 @@ pub(crate) const SECOND_RUN: Method<'static> = Method::Multilevel(Cells::Suggest
 
 /// Vectors of storage that a guard needs on a scene with these `points` (m).
 pub fn vectors_for<M: Material>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<usize, InertiaError> {
-    Ok(vectors_of_state(scene.element(), scene.node_count())
-        + vectors_for_method(&SECOND_RUN, scene, points)?)
+    Ok(vectors_of_state(scene.element(), scene.node_count()) + vectors_for_method(&SECOND_RUN, scene, points)?)
 }
 
 /// Displacements, increments and forces; volumes for elements that have them.
@@ -79,9 +81,9 @@ pub(crate) struct Watch {
 }
 
 impl GuardModel {
-    /// A guard for steps of `step`, from the present state, for a scene with these `points` (m) at rest; the second run's steps are
-    /// `every` times as long, or fewer where that is longer than single precision allows. `storage` of [`vectors_for`] vectors is
-    /// overwritten.
+    /// A guard for steps of `step`, from the present state, for a scene with these `points` (m) at rest; the second
+    /// run's steps are `every` times as long, or fewer where that is longer than single precision allows. `storage` of
+    /// [`vectors_for`] vectors is overwritten.
     pub fn prepare<M: ElementMaterial>(
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
@@ -90,10 +92,9 @@ impl GuardModel {
         every: u32,
         storage: &mut [NodeVector],
     ) -> Result<Self, InertiaError> {
-        let (second, watch) =
-            Watch::prepare(scene, points, state, step, every, storage, |state, step, storage| {
-                LargeModel::prepare(SECOND_RUN, scene, points, state, step, storage)
-            })?;
+        let (second, watch) = Watch::prepare(scene, points, state, step, every, storage, |state, step, storage| {
+            LargeModel::prepare(SECOND_RUN, scene, points, state, step, storage)
+        })?;
         Ok(Self { second, watch })
     }
 
@@ -137,8 +138,8 @@ impl Watch {
         let mut every = every.max(1);
         let (second, longest) = loop {
             let seconds = every as f32 * step.seconds();
-            let longest = Step::unchecked(seconds, step.damping())
-                .map_err(|_| InertiaError::Step { seconds, most: f32::MAX })?;
+            let longest =
+                Step::unchecked(seconds, step.damping()).map_err(|_| InertiaError::Step { seconds, most: f32::MAX })?;
             match second(state.reborrow(), longest, of_second) {
                 Ok(second) => break (second, longest),
                 // The step is too long for single precision.
@@ -202,8 +203,8 @@ impl GuardView<'_> {
         GuardView { second: self.second, watch: self.watch, storage: self.storage }
     }
 
-    /// The second run's steps become so many seconds long, where it is at the time of the first; with the loads that acted until then,
-    /// if they still do.
+    /// The second run's steps become so many seconds long, where it is at the time of the first; with the loads that
+    /// acted until then, if they still do.
     pub(crate) fn change_step<M: ElementMaterial>(
         self,
         step: Step,
@@ -351,10 +352,10 @@ impl<S: AsMut<[NodeVector]>> Guard<S> {
         self.model.with_storage(self.storage.as_mut())
     }
 
-    /// To be called after each step of the first run, or after each few, with what it answered, the loads that it had and the state that
-    /// it left. Every so often it moves the second run and compares. Gives that status, or [`Status::Inexact`] in place of [`Status::Ok`] if the estimate
-    /// exceeds what is allowed. A state that has been restored or reset, or has gone on for longer
-    /// than a step of the second run, begins a new second run.
+    /// To be called after each step of the first run, or after each few, with what it answered, the loads that it had
+    /// and the state that it left. Every so often it moves the second run and compares. Gives that status, or
+    /// [`Status::Inexact`] in place of [`Status::Ok`] if the estimate exceeds what is allowed. A state that has been
+    /// restored or reset, or has gone on for longer than a step of the second run, begins a new second run.
     pub fn follow<M: ElementMaterial>(
         &mut self,
         taken: Status,

@@ -1,5 +1,5 @@
-//! The pass over the nodes that adds a further motion of the lattice, that by the pushes of instruments (`contact.rs`), to the next
-//! increments, vectorised. Gives the sums of all nodes for the energy balance anew.
+//! The pass over the nodes that adds a further motion of the lattice, that by the pushes of instruments (`contact.rs`),
+//! to the next increments, vectorised. Gives the sums of all nodes for the energy balance anew.
 
 use core::ops::Range;
 

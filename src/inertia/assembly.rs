@@ -4,9 +4,9 @@
 //! Kc = sum_e V [ (shear / 2 + stress) p_c . p_d I + volume p_c p_d^T + shear / 2 p_d p_c^T ],   p = F^-T grad phi
 //! ```
 //! with the gradients of the interpolated functions, `grad phi_c = sum_a w_c(a) ga`, so that `Kc` is exactly `W^T K W`
-//! for the elements' bounds (with nodal strain those of the patches, `ga = c_ab / V_a`), and zero for rotations of tissue
-//! without tension. In crushed elements the terms are `iso grad phi_c . grad phi_d I + volume (C grad phi_c)(C grad phi_d)^T`.
-//! At a node that is held along some axes a function has a different gradient for each axis.
+//! for the elements' bounds (with nodal strain those of the patches, `ga = c_ab / V_a`), and zero for rotations of
+//! tissue without tension. In crushed elements the terms are `iso grad phi_c . grad phi_d I + volume (C grad phi_c)(C
+//! grad phi_d)^T`. At a node that is held along some axes a function has a different gradient for each axis.
 //!
 //! Most elements lie in a patch of at most two cells along each axis, with 8, 12, 18 or 27 functions. Elements of a
 //! batch that share a patch are added together: first products over the patch's functions, then one addition to the
@@ -20,7 +20,8 @@ use super::patches::{Patch, locate};
 use crate::element::{ElementTile, NodeInertia, TileTangents};
 use crate::simd::{Kernel, Real, TILE, dispatch, write_rows};
 
-/// The bound of the tangent of an element or of a patch with nodal strain, with `s_c D^2 / 4` as a factor: see [`TileTangents`].
+/// The bound of the tangent of an element or of a patch with nodal strain, with `s_c D^2 / 4` as a factor: see
+/// [`TileTangents`].
 #[derive(Clone, Copy)]
 pub(super) struct Tangent {
     pub(super) columns: [[f32; 4]; 3],
@@ -96,8 +97,8 @@ impl ElementTangent {
     }
 }
 
-/// The product of a tangent with displacements of nodes: calls `add` with each node and its force, with the factor. `corners` are
-/// nodes with their gradients.
+/// The product of a tangent with displacements of nodes: calls `add` with each node and its force, with the factor.
+/// `corners` are nodes with their gradients.
 pub(super) fn forces(
     tangent: &Tangent,
     corners: impl Iterator<Item = (usize, [f32; 3])> + Clone,
@@ -147,7 +148,8 @@ pub(super) fn add_four(row: &mut [f32], column: usize, values: Vec4) {
 /// Where an element lies in its patch.
 #[derive(Clone, Copy, Default)]
 struct Located {
-    /// The position of each node in its cell, 0 to 1 or outside. The fourth component is one if the node is free, else zero.
+    /// The position of each node in its cell, 0 to 1 or outside. The fourth component is one if the node is free, else
+    /// zero.
     within: [[f32; 4]; 4],
     /// The cell of each node, from the lowest one of the patch. In bytes, because a batch is on the stack.
     cells: [[u8; 3]; 4],
@@ -309,8 +311,7 @@ impl Assembly<'_> {
         scratch: &mut Scratch<R>,
     ) {
         let Scratch { derivatives, scaled } = scratch;
-        let (Some(derivatives), Some(scaled)) =
-            (derivatives.get_mut(..group.len()), scaled.get_mut(..group.len()))
+        let (Some(derivatives), Some(scaled)) = (derivatives.get_mut(..group.len()), scaled.get_mut(..group.len()))
         else {
             return;
         };
@@ -360,12 +361,7 @@ impl Assembly<'_> {
 
 /// The derivatives of the patch's functions in an element.
 #[inline(always)]
-fn derive<R: Real>(
-    element: &ElementTangent,
-    located: &Located,
-    slots: &PatchSlots,
-    derivatives: &mut Derivatives,
-) {
+fn derive<R: Real>(element: &ElementTangent, located: &Located, slots: &PatchSlots, derivatives: &mut Derivatives) {
     let [cx, cy, cz] = element.tangent.columns.map(Vec4::from);
     let images = element.gradients.map(|[x, y, z]| (cx * x + cy * y + cz * z).to_array());
     let mut weights = [[[0.0; 3]; 3]; 4];

@@ -26,8 +26,7 @@ fn random() -> impl FnMut() -> f32 {
 /// An irregular bar, one end held, one node held along one axis.
 fn scene() -> (Lattice, Vec<LatticeNode>, Vec<NodeInertia>) {
     let mut random = random();
-    let points: Vec<[f32; 3]> =
-        BAR.points().map(|point| point.map(|along| along + 0.004 * random())).collect();
+    let points: Vec<[f32; 3]> = BAR.points().map(|point| point.map(|along| along + 0.004 * random())).collect();
     let mut inertia: Vec<_> = points.iter().map(|_| NodeInertia { inverse: [1e3; 3], mass: 1e-3 }).collect();
     inertia[..30].fill(NodeInertia { inverse: [0.0; 3], mass: 1e-3 });
     inertia[100].inverse[1] = 0.0;
@@ -72,15 +71,13 @@ fn stiffness_from_patches_is_that_from_single_elements() {
             column
         });
         let nodes = tet.map(|node| node as usize);
-        let factors =
-            [1.0 + random(), 20.0 + random(), 5.0 + random(), if random() > 0.0 { 1.0 } else { 0.0 }];
+        let factors = [1.0 + random(), 20.0 + random(), 5.0 + random(), if random() > 0.0 { 1.0 } else { 0.0 }];
         let tangent = Tangent { columns, factors };
         let element = ElementTangent { nodes, gradients, tangent };
         let matrix = &mut direct;
         let mut assembly = Assembly { lattice: &lattice, nodes: &places, inertia: &inertia, matrix, stride };
         assembly.add_element(&element, &mut NO_SLOTS.clone());
-        let cells = locate(&lattice, &places, &inertia, &element.nodes)
-            .map(|(patch, _)| patch.cells.iter().product());
+        let cells = locate(&lattice, &places, &inertia, &element.nodes).map(|(patch, _)| patch.cells.iter().product());
         counts[cells.map_or(3, |cells: u8| cells.ilog2().min(2) as usize)] += 1;
         elements.push(element);
     }
@@ -90,9 +87,7 @@ fn stiffness_from_patches_is_that_from_single_elements() {
     }
     let worst = worst(&by_patches, &direct, stride);
     let [one, two, more, single] = counts;
-    println!(
-        "{one} elements in one cell, {two} in two, {more} in more, {single} single: relative error {worst:.1e}"
-    );
+    println!("{one} elements in one cell, {two} in two, {more} in more, {single} single: relative error {worst:.1e}");
     assert!(one > 100 && two > 100 && more > 100 && single > 10);
     assert!(worst < 2e-6);
 }
@@ -107,14 +102,8 @@ fn bounds_of_the_functions_inertia_are_above_the_projected_inertia() {
         .iter()
         .map(|place| {
             let [a, b, c] = [random(), random(), random()];
-            let matrix = Symmetric {
-                xx: 0.1 + a * a,
-                yy: 0.1 + b * b,
-                zz: 0.1 + c * c,
-                xy: a * b,
-                yz: b * c,
-                zx: c * a,
-            };
+            let matrix =
+                Symmetric { xx: 0.1 + a * a, yy: 0.1 + b * b, zz: 0.1 + c * c, xy: a * b, yz: b * c, zx: c * a };
             add_inertia(&mut sums, &lattice, place, &matrix);
             matrix
         })
@@ -193,8 +182,7 @@ fn projected_inertia_from_sums_of_the_cells_is_that_from_single_nodes() {
         let [xx, yy, zz, xy, yz, zx] = [3.0, 3.0, 3.0, 0.0, 0.0, 0.0].map(|mean: f32| mean + random());
         sums[place.cell()].add_node::<Baseline>(place, &Symmetric { xx, yy, zz, xy, yz, zx });
         let rows = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]];
-        let kept =
-            || lattice.weights(place).into_iter().filter(|(function, _)| *function < lattice.functions());
+        let kept = || lattice.weights(place).into_iter().filter(|(function, _)| *function < lattice.functions());
         for (c, by) in kept() {
             for (d, with) in kept() {
                 for (i, entries) in rows.iter().enumerate() {

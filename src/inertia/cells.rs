@@ -43,8 +43,8 @@ impl<R: Real> NodesInCells<'_, R> {
     }
 }
 
-/// The sums of the cells of some consecutive nodes. The first cell may have nodes before these too, which another thread may be
-/// adding, so its sum is separate.
+/// The sums of the cells of some consecutive nodes. The first cell may have nodes before these too, which another
+/// thread may be adding, so its sum is separate.
 pub(super) struct CellSlots<'a> {
     pub(super) first: usize,
     pub(super) head: &'a mut CellPolynomial,
@@ -133,13 +133,7 @@ impl<R: Real> CellAccumulator<R> {
 
     /// Adds `W^T v` of a vector of nodes, the one with index `vector` in its tile.
     #[inline(always)]
-    pub(super) fn add(
-        &mut self,
-        cells: &mut CellSlots<'_>,
-        nodes: &NodesInCells<'_, R>,
-        vector: usize,
-        v: [R; 3],
-    ) {
+    pub(super) fn add(&mut self, cells: &mut CellSlots<'_>, nodes: &NodesInCells<'_, R>, vector: usize, v: [R; 3]) {
         let of = monomials(nodes.position);
         let [mut cell, last] = nodes.ends;
         if cell == last {
@@ -193,9 +187,7 @@ impl<R: Real> CellAccumulator<R> {
                     sum += Vec4::from(row);
                 }
             }
-            if let Some(place) =
-                cell.0[monomial / 2].get_mut(4 * (monomial % 2)..).and_then(<[f32]>::first_chunk_mut)
-            {
+            if let Some(place) = cell.0[monomial / 2].get_mut(4 * (monomial % 2)..).and_then(<[f32]>::first_chunk_mut) {
                 *place = (Vec4::from(*place) + sum).to_array();
             }
         }
@@ -226,8 +218,7 @@ pub(super) fn restrict(cells: &[CellPolynomial], lattice: &Lattice) -> CoarseVec
         let [a, b, c, d, e, f, g, h] = cell.vectors();
         let (a, c, e, g) = (a - b, c - d, e - f, g - h);
         let (a, b, e, f) = (a - c, b - d, e - g, f - h);
-        for (vector, function) in
-            [a - e, b - f, c - g, d - h, e, f, g, h].into_iter().zip(lattice.functions_of(index))
+        for (vector, function) in [a - e, b - f, c - g, d - h, e, f, g, h].into_iter().zip(lattice.functions_of(index))
         {
             if let Some(sum) = sums.get_mut(function) {
                 sum.0 = (Vec4::from(sum.0) + vector).to_array();

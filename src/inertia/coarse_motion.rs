@@ -1,12 +1,10 @@
-//! The motion of the lattice in a step, from the cells' sums of the residual (kg m) and the matrices in use ([`super`]); and its answer to
-//! further forces, as those of instruments (`contact.rs`).
+//! The motion of the lattice in a step, from the cells' sums of the residual (kg m) and the matrices in use
+//! ([`super`]); and its answer to further forces, as those of instruments (`contact.rs`).
 
 use glam::Vec4;
 
 use super::cells::{prolong, restrict};
-use super::dense::{
-    Row, apply, apply_by_axis, apply_functions, apply_to_two, from_components, stride, to_components,
-};
+use super::dense::{Row, apply, apply_by_axis, apply_functions, apply_to_two, from_components, stride, to_components};
 use super::frames::{Rotation, rotate};
 use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
 use super::matrices::{Matrices, of_axes};
@@ -16,8 +14,9 @@ use super::supports::Pull;
 use super::transport::turned_part;
 use crate::simd::NodeVector;
 
-/// Share of the strain rates that a step removes where only this share of the lattice's motion is used. There inertia is
-/// about to grow by the inverse of the share; what is left has no more energy with the new inertia than it had before.
+/// Share of the strain rates that a step removes where only this share of the lattice's motion is used. There inertia
+/// is about to grow by the inverse of the share; what is left has no more energy with the new inertia than it had
+/// before.
 pub(super) fn removed_share(share: f32) -> f32 {
     1.0 - libm::sqrtf(share)
 }
@@ -35,7 +34,8 @@ pub(super) struct CoarseSpace<'a> {
 }
 
 impl CoarseSpace<'_> {
-    /// `share S^-1 g - least G^-1 g`: the motion by further forces, of which `residual` are the sums, zero but for these functions.
+    /// `share S^-1 g - least G^-1 g`: the motion by further forces, of which `residual` are the sums, zero but for
+    /// these functions.
     pub(super) fn response(
         &self,
         matrices: &Matrices<'_>,
@@ -133,14 +133,14 @@ pub(super) struct MotionResult {
 }
 
 impl CoarseMotion<'_> {
-    /// Turns the cells' sums of the residual `r` into the lattice's motion and what the nodes' own inertia would give to
-    /// it, `G^-1 g` with `g = W^T r`. The motion is
+    /// Turns the cells' sums of the residual `r` into the lattice's motion and what the nodes' own inertia would give
+    /// to it, `G^-1 g` with `g = W^T r`. The motion is
     ///
     /// ```text
     /// share S^-1 (g - M w) + p + w - (removed T + drag T^2) c - least G^-1 g     M = (1 + k) Mc,  T = S^-1 A = 1 - S^-1 M
     /// ```
-    /// with the rotation `w` of the velocities (`transport.rs`), and `p = -S^-1 A_s d` from the supports. Reduces the share
-    /// if the forces of one step would strain a cell by more than `largest_strain`.
+    /// with the rotation `w` of the velocities (`transport.rs`), and `p = -S^-1 A_s d` from the supports. Reduces the
+    /// share if the forces of one step would strain a cell by more than `largest_strain`.
     pub(super) fn compute(&self, matrices: &mut Matrices<'_>, mut share: f32) -> MotionResult {
         let CoarseSpace { lattice, refresh } = self.space;
         let mut forces = self.forces(matrices);
@@ -212,13 +212,7 @@ impl CoarseMotion<'_> {
 
     /// Adds `p`, as far as bounds have not grown beyond their margin. Gives its share of `-S^-1 A_s d`.
     #[inline(never)]
-    fn add_pulled(
-        &self,
-        matrices: &Matrices<'_>,
-        pull: &Pull,
-        mut share: f32,
-        motion: &mut CoarseVectors,
-    ) -> f32 {
+    fn add_pulled(&self, matrices: &Matrices<'_>, pull: &Pull, mut share: f32, motion: &mut CoarseVectors) -> f32 {
         let mut answer = [0.0; _];
         self.space.times(matrices.coarse_inverse, &self.space.in_frames(&pull.residual), &mut answer);
         let answer = self.space.in_world(&answer);

@@ -1,7 +1,8 @@
-//! Instruments in mass-scaled, multilevel and damped steps. A push on a node moves it by its own inertia, and all nodes by the
-//! lattice's: `B = D^2 (M^-1 + W (S^-1 - G^-1) W^T)` with the inertia and the shares of this step (`super`). The pushes of the step before
-//! act as forces from the start, so a push that stays the same moves the lattice as any other force does; what remains to be found is
-//! their change ([`crate::contact::solve`]). The pushes are forces on the tissue and contain no inertia that the step adds.
+//! Instruments in mass-scaled, multilevel and damped steps. A push on a node moves it by its own inertia, and all nodes
+//! by the lattice's: `B = D^2 (M^-1 + W (S^-1 - G^-1) W^T)` with the inertia and the shares of this step (`super`). The
+//! pushes of the step before act as forces from the start, so a push that stays the same moves the lattice as any other
+//! force does; what remains to be found is their change ([`crate::contact::solve`]). The pushes are forces on the
+//! tissue and contain no inertia that the step adds.
 
 use glam::Vec3;
 
@@ -146,9 +147,7 @@ impl Compliance for StepCompliance<'_, '_> {
         let Some((space, ..)) = &self.lattice else { return self.replace(nodes, |_| Vec3::ZERO) };
         let Some(local) = &self.local else {
             let moved = self.coarse(nodes).unwrap_or([NodeVector::ZERO; _]);
-            return self.replace(nodes, |function| {
-                moved.get(function).copied().unwrap_or_default().to_array().into()
-            });
+            return self.replace(nodes, |function| moved.get(function).copied().unwrap_or_default().to_array().into());
         };
         let mut sums = [Vec3::ZERO; MOST_LISTED];
         self.add_sums(nodes, |function, residual| {
@@ -166,15 +165,9 @@ impl Compliance for StepCompliance<'_, '_> {
 impl<T: Threads> InertiaStep<'_, '_, T> {
     /// Finds the pushes of this step, and what they change: forces, next increments and the sums over the nodes.
     #[inline(never)]
-    pub(super) fn meet_instruments<M: ElementMaterial>(
-        &mut self,
-        trial: &mut Trial<'_, M>,
-        totals: &mut Totals,
-    ) {
+    pub(super) fn meet_instruments<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>, totals: &mut Totals) {
         let Some(contact) = trial.loads.contact() else { return };
-        let Self {
-            threads, step, model, storage: Storage { tables, places, matrices, .. }, response, ..
-        } = self;
+        let Self { threads, step, model, storage: Storage { tables, places, matrices, .. }, response, .. } = self;
         trial.find_touched(contact, step, tables.next_increment, |node| rank_of(places, node));
         if trial.touched == 0 {
             trial.report_touches(contact, step, totals, |_| [0.0; 4]);
@@ -187,23 +180,14 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let lattice = response.map(|shares| (space, &*matrices, shares));
         let SolverRoom { touched, local: room, sums } = trial.solver_room();
         let listed = ListedFunctions::of(touched, places, &model.lattice);
-        let local = lattice.as_ref().and_then(|(space, matrices, shares)| {
-            LocalResponse::gathered(room, &listed, space, matrices, *shares)
-        });
+        let local = lattice
+            .as_ref()
+            .and_then(|(space, matrices, shares)| LocalResponse::gathered(room, &listed, space, matrices, *shares));
         let surface = contact.surface();
-        let mut compliance = StepCompliance {
-            tables,
-            places,
-            inertia,
-            rotations,
-            square,
-            lattice,
-            listed,
-            local,
-            surface,
-            sums,
-        };
-        // What the lattice adds is nearly the same at all points of an instrument, and the scale only makes light and heavy ones alike.
+        let mut compliance =
+            StepCompliance { tables, places, inertia, rotations, square, lattice, listed, local, surface, sums };
+        // What the lattice adds is nearly the same at all points of an instrument, and the scale only makes light and
+        // heavy ones alike.
         let (mut instrument, mut coarse) = (u32::MAX, 0.0);
         for each in &mut *touched {
             let [normal, a, b] = directions(Vec3::from_array(each.normal));
@@ -222,8 +206,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             each.vector = (Vec3::from_array(each.push) - Vec3::from_array(each.before)).to_array();
         }
         let moved = compliance.coarse(touched);
-        for (each, (node, share)) in touched.iter().flat_map(|each| each.corners().map(move |at| (each, at)))
-        {
+        for (each, (node, share)) in touched.iter().flat_map(|each| each.corners().map(move |at| (each, at))) {
             let change = compliance.own(node, share * Vec3::from_array(each.vector));
             if let Some(next) = compliance.tables.next_increment.get_mut(rank_of(places, node)) {
                 next.0.iter_mut().zip(change.to_array()).for_each(|(next, moved)| *next += moved);

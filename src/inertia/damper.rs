@@ -16,8 +16,8 @@
 //!
 //! `y` has no momentum in common with the lattice, so to remove a part of it takes true kinetic energy but no momentum
 //! from the body. The energy of the step, `c^T S c + y^T M y` with `y` orthogonal to the lattice in `M`, need not fall
-//! where the added inertia differs much between nodes. So [`MOST`] is small: with 0.2 and a gain of 20 some meshes whose
-//! elements differ in volume by a factor of a thousand diverged. With `d = 0` this is the stable step.
+//! where the added inertia differs much between nodes. So [`MOST`] is small: with 0.2 and a gain of 20 some meshes
+//! whose elements differ in volume by a factor of a thousand diverged. With `d = 0` this is the stable step.
 //!
 //! **Second order.** Without rough motion the remaining error comes from the inertia added to the lattice. With
 //! `S = M + A` and `T = S^-1 A` the true inverse is `M^-1 = (1 + T + T^2 + ...) S^-1`; a damped step uses
@@ -57,10 +57,7 @@ impl fmt::Display for DamperError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Shape { inputs, outputs } => {
-                write!(
-                    f,
-                    "a network of {inputs} inputs and {outputs} outputs; a damper needs {FEATURES} and 1"
-                )
+                write!(f, "a network of {inputs} inputs and {outputs} outputs; a damper needs {FEATURES} and 1")
             }
         }
     }

@@ -85,7 +85,8 @@ struct Sweep<'a> {
 /// The pivots' rows in some columns: in their own ones a matrix with padded rows.
 type Panel = [[f32; WIDTH]; PIVOTS];
 
-/// `L d L^T` of the pivots' symmetric matrix: `L` without the ones on the diagonal, `L^-1`, and the inverses of the `d`.
+/// `L d L^T` of the pivots' symmetric matrix: `L` without the ones on the diagonal, `L^-1`, and the inverses of the
+/// `d`.
 struct Factors {
     lower: Panel,
     inverse: Panel,
@@ -257,11 +258,7 @@ impl Kernel for Sweep<'_> {
         for (index, row) in after.chunks_exact(length).enumerate().take(rows_after) {
             let (index, values) = (next + index, row.iter().skip(first));
             if let Some(panel) = panels.get_mut(index / WIDTH) {
-                panel
-                    .iter_mut()
-                    .zip(values)
-                    .take(count)
-                    .for_each(|(line, &value)| line[index % WIDTH] = value);
+                panel.iter_mut().zip(values).take(count).for_each(|(line, &value)| line[index % WIDTH] = value);
             }
         }
         let used = size.div_ceil(WIDTH);

@@ -1,5 +1,6 @@
-//! Tangents that are added to the matrix directly: those of elements in no patch of cells, of crushed elements, and of patches of
-//! nodal strain. First the derivatives of each function that is not zero at the nodes, then the products of all pairs of them.
+//! Tangents that are added to the matrix directly: those of elements in no patch of cells, of crushed elements, and of
+//! patches of nodal strain. First the derivatives of each function that is not zero at the nodes, then the products of
+//! all pairs of them.
 
 use glam::Vec4;
 
@@ -26,8 +27,8 @@ struct Touched<const T: usize> {
     functions: u128,
 }
 
-/// The same in ascending order of the functions, because only submatrices on and below the diagonal are kept; and what the products of
-/// a tangent are of.
+/// The same in ascending order of the functions, because only submatrices on and below the diagonal are kept; and what
+/// the products of a tangent are of.
 struct Factors<const T: usize> {
     functions: [usize; T],
     images: [Vec4; T],
@@ -71,7 +72,8 @@ impl Assembly<'_> {
         self.add_pairs(&factors, tangent);
     }
 
-    /// Adds the functions that nodes touch, with what the gradients at the nodes give them; their places are in `slots` then.
+    /// Adds the functions that nodes touch, with what the gradients at the nodes give them; their places are in `slots`
+    /// then.
     #[inline(always)]
     fn touch<const T: usize>(
         &self,

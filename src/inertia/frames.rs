@@ -90,8 +90,7 @@ impl Frames {
         let frames = self.nodes.iter().zip(turns).take(self.functions);
         let starts = self.in_use.iter().zip(&self.under_way);
         let rotations = self.of_bounds.iter_mut().zip(&mut self.of_cycle);
-        for (((nodes, (latest, turn)), (in_use, under_way)), (of_bounds, of_cycle)) in
-            frames.zip(starts).zip(rotations)
+        for (((nodes, (latest, turn)), (in_use, under_way)), (of_bounds, of_cycle)) in frames.zip(starts).zip(rotations)
         {
             // A collapsed tetrahedron has no frame: the last one is kept.
             let previous = *latest;
@@ -189,11 +188,7 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
 fn unit(a: [f32; 3]) -> Option<[f32; 3]> {
     let length = libm::sqrtf(dot(a, a));
     let inverse = 1.0 / length;
-    if length > 1e-6 && length.is_finite() {
-        Some([a[0] * inverse, a[1] * inverse, a[2] * inverse])
-    } else {
-        None
-    }
+    if length > 1e-6 && length.is_finite() { Some([a[0] * inverse, a[1] * inverse, a[2] * inverse]) } else { None }
 }
 
 impl FrameNodes {
@@ -228,8 +223,7 @@ fn choose(function: usize, lattice: &Lattice, points: &[[f32; 3]]) -> FrameNodes
     let nodes_of_function = || {
         points.iter().enumerate().filter_map(|(node, &point)| {
             let place = lattice.place(point);
-            let (_, weight) =
-                lattice.weights(&place).into_iter().find(|&(f, weight)| f == function && weight > 0.0)?;
+            let (_, weight) = lattice.weights(&place).into_iter().find(|&(f, weight)| f == function && weight > 0.0)?;
             Some((node as u32, point, weight))
         })
     };

@@ -1,6 +1,6 @@
-//! The inversion in place of a matrix of the lattice (kg), in pieces that steps share among them: the sweeps of [`super::dense`], then
-//! one row after the other is mirrored. The inverse is sound if it takes the image of a known vector back to it, and no inertia is out
-//! of proportion to its mass.
+//! The inversion in place of a matrix of the lattice (kg), in pieces that steps share among them: the sweeps of
+//! [`super::dense`], then one row after the other is mirrored. The inverse is sound if it takes the image of a known
+//! vector back to it, and no inertia is out of proportion to its mass.
 
 use super::dense::{PIVOTS, Row, apply, apply_lower, mirror, row_length, stride, sweep, sweeps};
 use super::matrices::of_axes;
@@ -45,13 +45,7 @@ impl Inversion {
     }
 
     /// A part of an inversion: a step of it, later one row. Gives its cost, and whether it was the last one.
-    pub(super) fn advance(
-        &mut self,
-        matrix: &mut [f32],
-        mass: &[f32],
-        functions: usize,
-        at: usize,
-    ) -> (i64, bool) {
+    pub(super) fn advance(&mut self, matrix: &mut [f32], mass: &[f32], functions: usize, at: usize) -> (i64, bool) {
         let (size, stride) = (3 * functions, stride(functions));
         if at == 0 {
             self.start(matrix, mass, functions);
@@ -101,7 +95,8 @@ fn probe(size: usize) -> &'static [f32] {
     PROBE.get(..size).unwrap_or_default()
 }
 
-/// Cost of a step of an inversion: a multiplication and an addition for each entry of the lower triangle and each pivot.
+/// Cost of a step of an inversion: a multiplication and an addition for each entry of the lower triangle and each
+/// pivot.
 const fn sweep_cost(functions: usize) -> i64 {
     (PIVOTS * 3 * functions * stride(functions)) as i64
 }

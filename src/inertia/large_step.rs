@@ -23,8 +23,7 @@ use super::node_tables::{NodeTables, read_matrices};
 use super::patches::sort_by_patch;
 use super::refresh::{Refresh, RefreshInput};
 use super::{
-    COARSE, CYCLE, CYCLE_STEPS, FINE, FINE_WITHOUT_LATTICE, InertiaError, LATTICE_CYCLE_STEPS, Report,
-    node_tables,
+    COARSE, CYCLE, CYCLE_STEPS, FINE, FINE_WITHOUT_LATTICE, InertiaError, LATTICE_CYCLE_STEPS, Report, node_tables,
 };
 
 /// A prepared step without its storage; it may be moved in memory.
@@ -59,7 +58,8 @@ pub struct LargeModel<'w> {
 pub(super) struct Storage<'a> {
     pub(super) tables: NodeTables<'a>,
     pub(super) places: &'a mut [LatticeNode],
-    /// The elements in the order of their patches of cells (`assembly.rs`); empty without a lattice, and with nodal strain.
+    /// The elements in the order of their patches of cells (`assembly.rs`); empty without a lattice, and with nodal
+    /// strain.
     pub(super) order: &'a mut [u32],
     pub(super) matrices: Matrices<'a>,
 }
@@ -123,7 +123,8 @@ impl<'w> LargeModel<'w> {
         Ok(model)
     }
 
-    /// The first cycle, with coarser lattices as long as single precision cannot invert the matrices of a suggested one.
+    /// The first cycle, with coarser lattices as long as single precision cannot invert the matrices of a suggested
+    /// one.
     fn first_cycles<M: ElementMaterial>(
         &mut self,
         mut grid: Grid,
@@ -134,9 +135,7 @@ impl<'w> LargeModel<'w> {
     ) -> Result<(), InertiaError> {
         loop {
             let answer = self.first_cycle(grid, scene, points, state.reborrow(), storage);
-            if !matches!(answer, Err(InertiaError::Singular { .. }))
-                || self.method.cells() != Some(Cells::Suggested)
-            {
+            if !matches!(answer, Err(InertiaError::Singular { .. })) || self.method.cells() != Some(Cells::Suggested) {
                 return answer;
             }
             let coarser = largest_grid(scene, points, grid.functions);
@@ -227,8 +226,7 @@ impl<'w> LargeModel<'w> {
         self.report = self.refresh.added.report(0, 1.0);
         let unbounded = (0..nodes).find(|&node| {
             let at = Contiguous(rank_of(places, node));
-            let (inverse, [scalar, _]) =
-                read_matrices::<f32>(at, tables.inverse_diagonal, tables.inverse_off_diagonal);
+            let (inverse, [scalar, _]) = read_matrices::<f32>(at, tables.inverse_diagonal, tables.inverse_off_diagonal);
             !(inverse.trace().is_finite() && scalar.is_finite())
         });
         match unbounded {
@@ -240,8 +238,8 @@ impl<'w> LargeModel<'w> {
         }
     }
 
-    /// Chooses the frames and those of the nodes, and writes the places of the nodes, sorted by cell, if there is a lattice. Not
-    /// inlined: the first cycle does without its stack.
+    /// Chooses the frames and those of the nodes, and writes the places of the nodes, sorted by cell, if there is a
+    /// lattice. Not inlined: the first cycle does without its stack.
     #[inline(never)]
     fn choose_frames<M>(
         &mut self,
@@ -273,8 +271,7 @@ impl<'w> LargeModel<'w> {
         }
         sort_by_cell(places);
         for rank in 0..scene.node_count() {
-            let [height, frame, ..] =
-                tables.sum_diagonal.get(node_at(places, rank)).copied().unwrap_or_default().0;
+            let [height, frame, ..] = tables.sum_diagonal.get(node_at(places, rank)).copied().unwrap_or_default().0;
             tables.set_node(rank, height, frame as usize);
         }
         Ok(())
@@ -282,9 +279,7 @@ impl<'w> LargeModel<'w> {
 
     /// Whether it was prepared for this scene.
     pub(super) fn is_for<M>(&self, scene: SceneView<'_, M>) -> bool {
-        self.nodes == scene.node_count()
-            && self.elements == scene.element_count()
-            && self.scene == scene.checksum()
+        self.nodes == scene.node_count() && self.elements == scene.element_count() && self.scene == scene.checksum()
     }
 
     /// Report of the latest step, or of the preparation.
@@ -299,9 +294,10 @@ impl<'w> LargeModel<'w> {
         self.prepared.seconds()
     }
 
-    /// Length of the next steps, s: at most the one that it was prepared for, which is the longest that its inertia makes stable. A
-    /// shorter step has the inertia of that one, so it is less accurate than one that was prepared for its own length. To be changed now
-    /// and then: central differences whose step changes all the time gain energy (Skeel 1993).
+    /// Length of the next steps, s: at most the one that it was prepared for, which is the longest that its inertia
+    /// makes stable. A shorter step has the inertia of that one, so it is less accurate than one that was prepared for
+    /// its own length. To be changed now and then: central differences whose step changes all the time gain energy
+    /// (Skeel 1993).
     pub fn set_seconds(&mut self, seconds: f32) -> Result<(), InertiaError> {
         let most = self.prepared.seconds();
         match Step::unchecked(seconds, self.prepared.damping()) {
@@ -313,9 +309,9 @@ impl<'w> LargeModel<'w> {
         }
     }
 
-    /// Goes over to steps of another length, longer or shorter. The next step computes all inertia anew, which takes as long as a
-    /// cycle of steps. With steps so long that single precision cannot invert the lattice's matrices the steps are those of mass
-    /// scaling, with a [`Report::coarse_share`] of zero, and [`Status::Limited`].
+    /// Goes over to steps of another length, longer or shorter. The next step computes all inertia anew, which takes as
+    /// long as a cycle of steps. With steps so long that single precision cannot invert the lattice's matrices the
+    /// steps are those of mass scaling, with a [`Report::coarse_share`] of zero, and [`Status::Limited`].
     pub fn change_step(&mut self, step: Step) {
         let has_lattice = self.lattice.functions() > 0;
         (self.step, self.prepared) = (step, step);
@@ -335,8 +331,8 @@ impl<'w> LargeModel<'w> {
         Grid { cells: self.lattice.cells(), functions: self.lattice.functions() }
     }
 
-    /// Largest number of steps of a cycle, in which all bounds and inertia are renewed: 256 with a lattice, and sooner while
-    /// the tissue deforms fast; without one those of 0.04 s, but at least 4 and at most 64.
+    /// Largest number of steps of a cycle, in which all bounds and inertia are renewed: 256 with a lattice, and sooner
+    /// while the tissue deforms fast; without one those of 0.04 s, but at least 4 and at most 64.
     #[must_use]
     pub const fn cycle(&self) -> u32 {
         self.refresh.steps()
@@ -431,10 +427,11 @@ impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
         self.model.with_storage(self.storage.as_mut()).shorten(seconds, scene, loads, state, &CallingThread)
     }
 
-    /// Takes one step of the length for which it was prepared, or that was set since ([`LargeModel::set_seconds`]). Every call does the same work: one force evaluation and
-    /// that of the lattice; more while the tissue deforms fast, and for the elements at supports that change their speed,
-    /// at most a whole cycle. In a state that another step has moved, that was reset or restored, the first step computes
-    /// all inertia anew. `Mismatch` with room for no node if it was prepared for another scene.
+    /// Takes one step of the length for which it was prepared, or that was set since ([`LargeModel::set_seconds`]).
+    /// Every call does the same work: one force evaluation and that of the lattice; more while the tissue deforms fast,
+    /// and for the elements at supports that change their speed, at most a whole cycle. In a state that another step
+    /// has moved, that was reset or restored, the first step computes all inertia anew. `Mismatch` with room for no
+    /// node if it was prepared for another scene.
     pub fn step<M: ElementMaterial>(
         &mut self,
         scene: SceneView<'_, M>,
@@ -493,10 +490,7 @@ fn has_edges_of(tile: &ElementTile, lane: usize, points: &[[f32; 3]]) -> bool {
     // Slivers come near it by rounding.
     const MOST: f64 = 0.05;
     let at = |corner| {
-        points
-            .get(tile.node(corner, lane))
-            .map(|point| DVec3::from_array(point.map(f64::from)))
-            .unwrap_or_default()
+        points.get(tile.node(corner, lane)).map(|point| DVec3::from_array(point.map(f64::from))).unwrap_or_default()
     };
     let origin = at(0);
     let mut sum = DMat3::IDENTITY * -1.0;

@@ -190,11 +190,7 @@ impl Lattice {
     }
 
     /// A lattice of these cells on the box around the points (m).
-    pub(super) fn new(
-        cells: [u32; 3],
-        points: &[[f32; 3]],
-        inertia: &[NodeInertia],
-    ) -> Result<Self, InertiaError> {
+    pub(super) fn new(cells: [u32; 3], points: &[[f32; 3]], inertia: &[NodeInertia]) -> Result<Self, InertiaError> {
         let mut lattice = Self::NONE;
         lattice.set(cells, points, inertia)?;
         Ok(lattice)
@@ -238,14 +234,10 @@ impl Lattice {
         let largest = masses.iter().fold(0.0, |most, mass| f32::max(most, mass.free));
         let mut full = false;
         self.for_each_point(|lattice, point| {
-            let (Some(function), Some(mass)) = (lattice.function_of_point.get_mut(point), masses.get(point))
-            else {
+            let (Some(function), Some(mass)) = (lattice.function_of_point.get_mut(point), masses.get(point)) else {
                 return;
             };
-            if *function != EMPTY
-                && mass.free > 0.0
-                && (mass.free > LEAST_MASS * largest || mass.held <= mass.free)
-            {
+            if *function != EMPTY && mass.free > 0.0 && (mass.free > LEAST_MASS * largest || mass.held <= mass.free) {
                 full |= lattice.functions == MAX_FUNCTIONS;
                 *function = lattice.functions.min(MAX_FUNCTIONS - 1) as u8;
                 lattice.functions += 1;
@@ -268,8 +260,8 @@ impl Lattice {
         }
     }
 
-    /// Calls `visit` with each point, layer by layer along the longest axis: so the functions of an element have numbers
-    /// close to each other, and the matrices narrow bands.
+    /// Calls `visit` with each point, layer by layer along the longest axis: so the functions of an element have
+    /// numbers close to each other, and the matrices narrow bands.
     fn for_each_point(&mut self, mut visit: impl FnMut(&mut Self, usize)) {
         let counts = self.cells.map(|count| count as usize + 1);
         let strides = [1, counts[0], counts[0] * counts[1]];
@@ -321,8 +313,8 @@ impl Lattice {
         self.corner_points(cell).into_iter().all(|point| of(point) != EMPTY)
     }
 
-    /// The place of a point (m): in its cell, or outside the nearest cell without empty corners. So the functions add up
-    /// to one wherever no support holds them, and reproduce linear fields.
+    /// The place of a point (m): in its cell, or outside the nearest cell without empty corners. So the functions add
+    /// up to one wherever no support holds them, and reproduce linear fields.
     pub(super) fn place(&self, point: [f32; 3]) -> LatticeNode {
         let mut position = [0.0; 3];
         let mut indices = [0; 3];
@@ -467,15 +459,14 @@ impl Lattice {
         libm::sqrtf(largest)
     }
 
-    /// Calls `visit` with the functions at the ends of each edge, [`MAX_FUNCTIONS`] at a held end, and the edge's inverse
-    /// length squared, 1/m^2. Edges to empty points and between held ones are left out.
+    /// Calls `visit` with the functions at the ends of each edge, [`MAX_FUNCTIONS`] at a held end, and the edge's
+    /// inverse length squared, 1/m^2. Edges to empty points and between held ones are left out.
     #[inline(always)]
     pub(super) fn for_each_edge(&self, mut visit: impl FnMut(usize, usize, f32)) {
         let [nx, ny, nz] = self.cells.map(|count| count as usize + 1);
         let mut weights = [0.0; 3];
         for axis in 0..3 {
-            let per_metre =
-                if self.size[axis] > 0.0 { self.cells[axis] as f32 / self.size[axis] } else { 0.0 };
+            let per_metre = if self.size[axis] > 0.0 { self.cells[axis] as f32 / self.size[axis] } else { 0.0 };
             weights[axis] = per_metre * per_metre;
         }
         let of = |point: usize| self.function_of_point.get(point).copied().unwrap_or(EMPTY);
@@ -483,8 +474,7 @@ impl Lattice {
         for (k, j) in (0..nz).flat_map(|k| (0..ny).map(move |j| (k, j))) {
             for i in 0..nx {
                 let next = [(1, i + 1 < nx), (nx, j + 1 < ny), (nx * ny, k + 1 < nz)];
-                for ((stride, _), weight) in next.into_iter().zip(weights).filter(|((_, inside), _)| *inside)
-                {
+                for ((stride, _), weight) in next.into_iter().zip(weights).filter(|((_, inside), _)| *inside) {
                     let (a, b) = (of(point), of(point + stride));
                     if a != EMPTY && b != EMPTY && (a != HELD || b != HELD) {
                         visit(usize::from(a), usize::from(b), weight);

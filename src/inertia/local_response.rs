@@ -1,6 +1,6 @@
-//! How the lattice answers forces on few nodes, as those that an instrument touches: `share S^-1 - least G^-1` ([`super`]) between the few
-//! functions that move these nodes, gathered once a step, so that the many products of [`crate::contact::solve`] do not run over the
-//! whole lattice. In the frames of the bounds; 1/kg.
+//! How the lattice answers forces on few nodes, as those that an instrument touches: `share S^-1 - least G^-1`
+//! ([`super`]) between the few functions that move these nodes, gathered once a step, so that the many products of
+//! [`crate::contact::solve`] do not run over the whole lattice. In the frames of the bounds; 1/kg.
 
 use glam::Vec3;
 
@@ -105,12 +105,7 @@ impl<'a> LocalResponse<'a> {
     }
 
     /// Replaces the sums of the listed functions (kg m) by their motions (m), both in the world.
-    pub(super) fn answer(
-        &self,
-        sums: &mut [Vec3; MOST_LISTED],
-        listed: &ListedFunctions,
-        space: &CoarseSpace<'_>,
-    ) {
+    pub(super) fn answer(&self, sums: &mut [Vec3; MOST_LISTED], listed: &ListedFunctions, space: &CoarseSpace<'_>) {
         let rotations = space.refresh.frames.of_functions();
         let rotation = |function: &u8| rotations.get(usize::from(*function));
         let (mut x, mut out): ([f32; 3 * MOST_LISTED], Row) = ([0.0; _], [0.0; _]);

@@ -22,11 +22,12 @@ pub(super) struct Matrices<'a> {
     /// The inverse of the bound of `G` in use, and the next bound, for each function.
     pub(super) bound_inverse: &'a mut [FunctionInertia],
     pub(super) next_bound: &'a mut [FunctionInertia],
-    /// `Mc` and its inverse, one after the other for each axis, with one unknown a function. They are constant, as is the
-    /// following.
+    /// `Mc` and its inverse, one after the other for each axis, with one unknown a function. They are constant, as is
+    /// the following.
     pub(super) mass: &'a mut [f32],
     pub(super) mass_inverse: &'a mut [f32],
-    /// The stiffness of the stabilising energy of nodal strain, with the factor `s_c D^2 / 4`; laid out as `Mc`, empty for others.
+    /// The stiffness of the stabilising energy of nodal strain, with the factor `s_c D^2 / 4`; laid out as `Mc`, empty
+    /// for others.
     pub(super) stabilising: &'a mut [f32],
     /// See [`super::transport`].
     pub(super) edge_inverse: &'a mut [f32],
@@ -81,8 +82,7 @@ impl<'a> Matrices<'a> {
         let (sums, rest) = rest.split_at_mut_checked(SUM_FLOATS * count)?;
         let sums = must_cast_slice_mut(sums.as_chunks_mut::<SUM_FLOATS>().0);
         let inertia = rest.get_mut(..2 * INERTIA_FLOATS * lattice.functions())?;
-        let inertia: &mut [FunctionInertia] =
-            must_cast_slice_mut(inertia.as_chunks_mut::<INERTIA_FLOATS>().0);
+        let inertia: &mut [FunctionInertia] = must_cast_slice_mut(inertia.as_chunks_mut::<INERTIA_FLOATS>().0);
         let (bound_inverse, next_bound) = inertia.split_at_mut_checked(lattice.functions())?;
         Some(Self {
             coarse_inverse,

@@ -15,7 +15,8 @@ use super::{InertiaError, matrices, node_tables};
 pub enum Method<'w> {
     /// Mass scaling, for comparisons: inertia is raised where the step would be unstable.
     MassScaled,
-    /// Multilevel inertia, for comparisons: the same, and smooth motion keeps its true inertia through a coarse lattice.
+    /// Multilevel inertia, for comparisons: the same, and smooth motion keeps its true inertia through a coarse
+    /// lattice.
     Multilevel(Cells),
     /// The damped step: the same, and a small network damps rough motion, which the lattice cannot represent. Mostly
     /// [`Method::damped`]; with a [`Damper`] of a network of your own.
@@ -27,8 +28,8 @@ pub enum Method<'w> {
 pub enum Cells {
     /// The largest near-cubic lattice whose points are at least 1.5 times as far apart as the nodes, and whose matrices
     /// cost little to renew: with `n` unknowns, three for each function, `n^3` is at most 4000 times the number of
-    /// elements. At least four nodes for each function, two where no lattice has four. A step takes a coarser one where single
-    /// precision cannot invert the matrices of this one. No lattice if the mesh is too small for one cell.
+    /// elements. At least four nodes for each function, two where no lattice has four. A step takes a coarser one where
+    /// single precision cannot invert the matrices of this one. No lattice if the mesh is too small for one cell.
     #[default]
     Suggested,
     /// This many along x, y, z, at least one each.
@@ -59,11 +60,7 @@ impl<'w> Method<'w> {
     }
 
     /// The lattice of the method on a scene with these `points` (m).
-    pub fn grid<M: Material>(
-        &self,
-        scene: SceneView<'_, M>,
-        points: &[[f32; 3]],
-    ) -> Result<Grid, InertiaError> {
+    pub fn grid<M: Material>(&self, scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<Grid, InertiaError> {
         match self {
             Self::MassScaled => Ok(Grid::default()),
             Self::Multilevel(cells) | Self::Damped(_, cells) => cells.grid(scene, points),
@@ -73,11 +70,7 @@ impl<'w> Method<'w> {
 
 impl Cells {
     /// The lattice on a scene with these `points` (m).
-    pub fn grid<M: Material>(
-        self,
-        scene: SceneView<'_, M>,
-        points: &[[f32; 3]],
-    ) -> Result<Grid, InertiaError> {
+    pub fn grid<M: Material>(self, scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<Grid, InertiaError> {
         match self {
             Self::Suggested => Ok(largest_grid(scene, points, usize::MAX)),
             Self::Given(cells) => {
@@ -100,13 +93,7 @@ pub fn vectors_for<M: Material>(
 
 /// The same for this many nodes and elements and a known lattice.
 #[must_use]
-pub const fn vectors_for_lattice(
-    element: Element,
-    nodes: usize,
-    elements: usize,
-    grid: Grid,
-    damped: bool,
-) -> usize {
+pub const fn vectors_for_lattice(element: Element, nodes: usize, elements: usize, grid: Grid, damped: bool) -> usize {
     let tables = node_tables::vectors_for(nodes, damped);
     if grid.functions == 0 {
         return tables;
@@ -168,8 +155,7 @@ fn grid_below<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], below: usize) -> 
         let unknowns = 3 * functions as u64;
         if functions > best.functions
             && functions < below
-            && unknowns * unknowns * unknowns
-                <= (MULTIPLY_ADDS * scene.element_count() as u64).max(FEW_MULTIPLY_ADDS)
+            && unknowns * unknowns * unknowns <= (MULTIPLY_ADDS * scene.element_count() as u64).max(FEW_MULTIPLY_ADDS)
         {
             best = Grid { cells, functions };
         }

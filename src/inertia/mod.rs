@@ -14,19 +14,18 @@
 //! du+ = du + M^-1 r + W (S^-1 (g + A w - A_s d) - G^-1 g - drag T^2 c)     M = N + reserve m     (node.rs)
 //! S   = (1 + k) Mc + A,  A = s_c D^2 / 4 Kc,  T = S^-1 A,  G >= W^T M W              (assembly.rs, nodal_sums.rs)
 //! ```
-//! `N >= s D^2 / 4 sum_e D_a`, with the bounds `D_a` of the elements' stiffness, and `Kc` from a bound that rotations do
-//! not feel (`src/element/stiffness_bound.rs`). `G^-1 g` removes what the nodes' own inertia gives to the lattice's
+//! `N >= s D^2 / 4 sum_e D_a`, with the bounds `D_a` of the elements' stiffness, and `Kc` from a bound that rotations
+//! do not feel (`src/element/stiffness_bound.rs`). `G^-1 g` removes what the nodes' own inertia gives to the lattice's
 //! motion, which has its inertia in `S`. The operator is symmetric, and positive because `W G^-1 W^T <= M^-1`. In slow
 //! motion `G = W^T M W`. In fast motion a bound of it with one 3 x 3 matrix for each function is cheaper to renew, and
-//! leaves a share of about mass over inertia. The functions `W` reproduce linear fields
-//! wherever no support holds them, so translations and rotations of the shape at rest are the lattice's alone, and as
-//! `A` is zero for them their momentum is conserved. `w` is the change of velocity that rotation alone brings
-//! (`transport.rs`). `A_s d` couples supports whose increments change by `d` (`supports.rs`). In the first step
-//! `D^2` is halved: a force that acts from the start on has acted for half a step.
-//! `c` is the lattice's part of `du`. `T` is zero for rigid motion and small for motion that the step resolves, so the
-//! drag takes neither momentum nor slow motion. It is there because `S` changes with the state while velocities are
-//! kept, which would feed deformation that the step cannot resolve; so it follows the rate at which the shape changes,
-//! up to 0.27.
+//! leaves a share of about mass over inertia. The functions `W` reproduce linear fields wherever no support holds them,
+//! so translations and rotations of the shape at rest are the lattice's alone, and as `A` is zero for them their
+//! momentum is conserved. `w` is the change of velocity that rotation alone brings (`transport.rs`). `A_s d` couples
+//! supports whose increments change by `d` (`supports.rs`). In the first step `D^2` is halved: a force that acts from
+//! the start on has acted for half a step. `c` is the lattice's part of `du`. `T` is zero for rigid motion and small
+//! for motion that the step resolves, so the drag takes neither momentum nor slow motion. It is there because `S`
+//! changes with the state while velocities are kept, which would feed deformation that the step cannot resolve; so it
+//! follows the rate at which the shape changes, up to 0.27.
 //!
 //! # Why it is stable
 //!
@@ -40,11 +39,11 @@
 //! The first term because `K <= sum_e D_a <= 4 / (s D^2) N`, the second because `W^T K W <= Kc`. Both come from bounds
 //! of each element's tangent, for any mesh, support, material and state. With `s` = 1.8 and `s_c` = 2.8 the bracket is
 //! 0.913. This margin allows the stiffness of a node to grow by 5 % and that of the lattice's motion by 17 % during a
-//! cycle. Drag on the last increment lowers the limit: with a share `d` of rough motion and `drag` of the lattice's,
-//! `K <= 4 / D^2 B^-1` becomes `K <= (4 B^-1 - 2 C) / D^2`, and with `2 a b <= e a^2 + b^2 / e` for the two parts of a
-//! motion it holds if `(1 + e) / s_c <= 1 - drag / 2` and `(1 + 1 / e) / s <= 1 - d / 2`. With `drag` at most 0.27 that allows
-//! `d` = 0.107; the damper removes at most 0.1. Both at once leave no margin for growth during a cycle. But a step has much drag
-//! where it renews all bounds, or where inertia is a thousand times the mass.
+//! cycle. Drag on the last increment lowers the limit: with a share `d` of rough motion and `drag` of the lattice's, `K
+//! <= 4 / D^2 B^-1` becomes `K <= (4 B^-1 - 2 C) / D^2`, and with `2 a b <= e a^2 + b^2 / e` for the two parts of a
+//! motion it holds if `(1 + e) / s_c <= 1 - drag / 2` and `(1 + 1 / e) / s <= 1 - d / 2`. With `drag` at most 0.27 that
+//! allows `d` = 0.107; the damper removes at most 0.1. Both at once leave no margin for growth during a cycle. But a
+//! step has much drag where it renews all bounds, or where inertia is a thousand times the mass.
 //!
 //! Between refreshes the bounds are out of date. Four measures compensate for that:
 //! - Bounds have directions, and tissue rotates. So bounds are kept in frames that rotate with the tissue
@@ -62,10 +61,10 @@
 //!   that cannot have come from the loads, which the energy balance shows. Neither takes momentum.
 //!
 //! Where nodes use only a share of their inverse inertia, `G^-1` is multiplied by the least share, which keeps the
-//! operator positive. Between refreshes this is a safeguard and no proof: a change of a bound's directions other than the
-//! rotation of its frame is covered by the margin only. Without a lattice the nodes have the whole bracket: with `s` = 1.1
-//! it is 0.91, and 0.955 where the stiffness of a node has grown by 5 %. A cycle takes at most 256 steps, without a lattice at most
-//! 64 and 0.04 s, short compared with the motions of hands and breathing.
+//! operator positive. Between refreshes this is a safeguard and no proof: a change of a bound's directions other than
+//! the rotation of its frame is covered by the margin only. Without a lattice the nodes have the whole bracket: with
+//! `s` = 1.1 it is 0.91, and 0.955 where the stiffness of a node has grown by 5 %. A cycle takes at most 256 steps,
+//! without a lattice at most 64 and 0.04 s, short compared with the motions of hands and breathing.
 //!
 //! A linear bound does not cover a step that is large compared with the range of the law. So the forces of one step may
 //! move a node, relative to the lattice, by at most a fiftieth of the least height of its elements
@@ -141,8 +140,8 @@ const LARGEST_MOVE: f32 = 0.02;
 const LARGEST_STRAIN: f32 = 0.1;
 /// The same with nodal strain, whose critical step is half as long again: strains of a step grow with its square.
 const LARGEST_STRAIN_OF_PATCHES: f32 = 0.2;
-/// Share of the last increment's unresolved deformation of the lattice that a step removes where a step renews all bounds, and the
-/// largest share.
+/// Share of the last increment's unresolved deformation of the lattice that a step removes where a step renews all
+/// bounds, and the largest share.
 const DRAG_AT_WHOLE_CYCLES: f32 = 0.02;
 const LARGEST_DRAG: f32 = 0.27;
 /// The same for each multiple of the mass that is added, which grows with the square of the step.
@@ -237,10 +236,7 @@ impl fmt::Display for InertiaError {
                 write!(f, "the scene was not built from these points: element {element} has other edges")
             }
             Self::Step { seconds, most } => {
-                write!(
-                    f,
-                    "a step of {seconds:e} s: it must be above zero and at most the prepared {most:e} s"
-                )
+                write!(f, "a step of {seconds:e} s: it must be above zero and at most the prepared {most:e} s")
             }
             Self::NotFinite { node } => write!(f, "node {node}: its stiffness is not a finite number"),
         }

@@ -1,7 +1,7 @@
-//! The pass over the nodes that computes the next increments, vectorised: by the nodes' own inertia, as far as their share of it
-//! allows, and by the lattice's motion. It damps rough motion. Gives sums for the energy balance and the damper, and
-//! over the nodes that were held back. With a lattice it takes the nodes in the order of the cells, so that the coefficients of a cell
-//! stay in registers.
+//! The pass over the nodes that computes the next increments, vectorised: by the nodes' own inertia, as far as their
+//! share of it allows, and by the lattice's motion. It damps rough motion. Gives sums for the energy balance and the
+//! damper, and over the nodes that were held back. With a lattice it takes the nodes in the order of the cells, so that
+//! the coefficients of a cell stay in registers.
 
 use core::ops::Range;
 
@@ -167,11 +167,7 @@ impl<R: Real> AxisSums<R> {
     }
 
     #[inline(always)]
-    pub(super) fn total(
-        sums: &[Self; VECTORS_PER_TILE],
-        rest: &AxisSums<f32>,
-        held_back: HeldBack,
-    ) -> PassTotals {
+    pub(super) fn total(sums: &[Self; VECTORS_PER_TILE], rest: &AxisSums<f32>, held_back: HeldBack) -> PassTotals {
         let (mut totals, mut rough) = (Totals::NONE, RoughMotion::NONE);
         for row in 0..TILE {
             let (sums, lane) = sums_of_row::<R, _>(sums, row);
@@ -231,18 +227,11 @@ impl MotionPass<'_> {
             let Some(place) = input.places.get(rank) else {
                 continue;
             };
-            let at = |cells: &[CellPolynomial]| {
-                cells.get(place.cell()).map_or([0.0; 3], |cell| cell.at(place.within()))
-            };
+            let at =
+                |cells: &[CellPolynomial]| cells.get(place.cell()).map_or([0.0; 3], |cell| cell.at(place.within()));
             let smooth = lattice.damped.as_ref().map_or([0.0; 3], |damped| at(damped.smooth));
             let motion = MotionAt { coarse: at(lattice.cells), fine: at(lattice.fine), smooth };
-            self.nodes(
-                Contiguous(rank - start),
-                Contiguous(place.node()),
-                Some(motion),
-                &mut rest,
-                &mut rest_held,
-            );
+            self.nodes(Contiguous(rank - start), Contiguous(place.node()), Some(motion), &mut rest, &mut rest_held);
         }
         AxisSums::total(&sums, &rest, HeldSums::total(&held, &rest_held))
     }
@@ -257,13 +246,7 @@ impl MotionPass<'_> {
             for vector in 0..TILE / R::COUNT {
                 let node = first + vector * R::COUNT;
                 let index = vector % VECTORS_PER_TILE;
-                self.nodes(
-                    Contiguous(node - start),
-                    Contiguous(node),
-                    None,
-                    &mut sums[index],
-                    &mut held[index],
-                );
+                self.nodes(Contiguous(node - start), Contiguous(node), None, &mut sums[index], &mut held[index]);
             }
         }
         let (mut rest, mut rest_held) = (AxisSums::new(&self.input), HeldSums::new());
@@ -288,8 +271,7 @@ impl MotionPass<'_> {
         let OwnMotion { own, height, share, keep } =
             self.own_motion(at, &nodes, motion.as_ref().map(|motion| motion.fine));
         held.add(share);
-        let keep =
-            if self.lattice.as_ref().is_some_and(|lattice| lattice.in_use) { R::splat(1.0) } else { keep };
+        let keep = if self.lattice.as_ref().is_some_and(|lattice| lattice.in_use) { R::splat(1.0) } else { keep };
         let carry = keep * R::splat(self.input.step.carry());
         let mut next = [height; 4];
         for axis in 0..3 {
@@ -335,12 +317,7 @@ impl MotionPass<'_> {
 
     /// `fine` is the smooth part of that motion.
     #[inline(always)]
-    fn own_motion<R: Real>(
-        &mut self,
-        at: Contiguous,
-        nodes: &NodeValues<R>,
-        fine: Option<[R; 3]>,
-    ) -> OwnMotion<R> {
+    fn own_motion<R: Real>(&mut self, at: Contiguous, nodes: &NodeValues<R>, fine: Option<[R; 3]>) -> OwnMotion<R> {
         let MotionTables { inverse_diagonal, inverse_off_diagonal, sum_off_diagonal, next_increment, .. } =
             &mut self.tables;
         let [rx, ry, rz] = self.input.residual(nodes);
@@ -363,8 +340,7 @@ impl MotionPass<'_> {
         let turned = [xx * bx + xy * by + zx * bz, xy * bx + yy * by + yz * bz, zx * bx + yz * by + zz * bz];
         let mut own = [R::splat(0.0); 3];
         for row in 0..3 {
-            own[row] =
-                rotation[row][0] * turned[0] + rotation[row][1] * turned[1] + rotation[row][2] * turned[2];
+            own[row] = rotation[row][0] * turned[0] + rotation[row][1] * turned[1] + rotation[row][2] * turned[2];
         }
         // What the node would do relative to the lattice.
         let mut square = R::splat(0.0);

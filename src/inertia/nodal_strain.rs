@@ -1,6 +1,6 @@
-//! What mass-scaled, multilevel and damped steps need of tetrahedra with nodal strain ([`crate::element`], `patch_forces.rs`): the
-//! patches of nodes take the place of elements in bounds and in the coarse stiffness. The stabilising energy is quadratic in the
-//! displacements, so its part of the coarse stiffness,
+//! What mass-scaled, multilevel and damped steps need of tetrahedra with nodal strain ([`crate::element`],
+//! `patch_forces.rs`): the patches of nodes take the place of elements in bounds and in the coarse stiffness. The
+//! stabilising energy is quadratic in the displacements, so its part of the coarse stiffness,
 //!
 //! ```text
 //! s_c D^2 / 4 s mu sum_e V_e grad phi_c . grad phi_d I        kg
@@ -22,12 +22,9 @@ use crate::element::{
 use crate::scene::SceneView;
 use crate::simd::{Gather, NodeVector, Scatter, TILE};
 
-/// Writes the coarse stiffness of the stabilising energy, of one matrix for each axis, in `to`; `matrix` is for use meanwhile.
-pub(super) fn write_stabilising<M: ElementMaterial>(
-    to: &mut [f32],
-    matrix: &mut [f32],
-    input: &RefreshInput<'_, M>,
-) {
+/// Writes the coarse stiffness of the stabilising energy, of one matrix for each axis, in `to`; `matrix` is for use
+/// meanwhile.
+pub(super) fn write_stabilising<M: ElementMaterial>(to: &mut [f32], matrix: &mut [f32], input: &RefreshInput<'_, M>) {
     let functions = input.lattice.functions();
     let (stride, length, mut slots) = (stride(functions), row_length(functions), NO_SLOTS);
     matrix.fill(0.0);
@@ -81,8 +78,8 @@ pub(super) fn add_tile<M: ElementMaterial>(
     tangents
 }
 
-/// Calls `add` with the nodes of patches with a changed node and the forces by which these patches resist a change of the
-/// displacements (m), with the factor `weight` (s^2). `changed` gives the change of a node.
+/// Calls `add` with the nodes of patches with a changed node and the forces by which these patches resist a change of
+/// the displacements (m), with the factor `weight` (s^2). `changed` gives the change of a node.
 pub(super) fn resist<M: ElementMaterial>(
     scene: SceneView<'_, M>,
     weight: f32,
@@ -94,8 +91,7 @@ pub(super) fn resist<M: ElementMaterial>(
     for tile in patches.tiles() {
         let neighbours = patches.neighbours_of(tile);
         let is_changed = |lane: usize| {
-            tile.volume(lane) > 0.0
-                && tile.gradients(neighbours, lane).any(|(node, ..)| changed(node) != Vec4::ZERO)
+            tile.volume(lane) > 0.0 && tile.gradients(neighbours, lane).any(|(node, ..)| changed(node) != Vec4::ZERO)
         };
         if !(0..TILE).any(is_changed) {
             continue;

@@ -21,12 +21,7 @@ pub(super) type FunctionInertia = [[f32; 4]; 2];
 
 /// Adds the inertia of a node, kg, with zero rows at held axes, to the functions that move it.
 #[inline(always)]
-pub(super) fn add_inertia(
-    sums: &mut [FunctionInertia],
-    lattice: &Lattice,
-    place: &LatticeNode,
-    inertia: &Symmetric,
-) {
+pub(super) fn add_inertia(sums: &mut [FunctionInertia], lattice: &Lattice, place: &LatticeNode, inertia: &Symmetric) {
     let weights = lattice.weights(place);
     let mut total = 0.0;
     for (function, weight) in weights {
@@ -64,12 +59,7 @@ pub(super) fn times(inertia: &FunctionInertia, vector: [f32; 3]) -> [f32; 3] {
 
 /// Computes `Mc`: for each axis a matrix of one unknown for each function, one after the other, in rows of
 /// [`row_length`].
-pub(super) fn write_mass(
-    matrices: &mut [f32],
-    lattice: &Lattice,
-    places: &[LatticeNode],
-    inertia: &[NodeInertia],
-) {
+pub(super) fn write_mass(matrices: &mut [f32], lattice: &Lattice, places: &[LatticeNode], inertia: &[NodeInertia]) {
     matrices.fill(0.0);
     let (size, functions) = (matrices.len() / 3, lattice.functions());
     let length = row_length(functions);
@@ -97,7 +87,8 @@ pub(super) fn write_mass(
     }
 }
 
-/// Gives an axis along which all nodes of a function are held, and no force acts, the mass that [`write_mass`] has there.
+/// Gives an axis along which all nodes of a function are held, and no force acts, the mass that [`write_mass`] has
+/// there.
 pub(super) fn fill_held_axes(inertia: &mut [f32], mass: &[f32], functions: usize) {
     let (stride, length) = (stride(functions), row_length(functions));
     for (axis, mass) in of_axes(mass).into_iter().enumerate() {
@@ -110,7 +101,8 @@ pub(super) fn fill_held_axes(inertia: &mut [f32], mass: &[f32], functions: usize
     }
 }
 
-/// Adds `factor Mc` to the lower triangle of a matrix with three unknowns for each function, in rows of `stride` entries.
+/// Adds `factor Mc` to the lower triangle of a matrix with three unknowns for each function, in rows of `stride`
+/// entries.
 pub(super) fn add_mass(matrix: &mut [f32], stride: usize, masses: &[f32], functions: usize, factor: f32) {
     let (size, length) = (masses.len() / 3, row_length(functions));
     for (axis, mass) in masses.chunks_exact(size.max(1)).enumerate() {

@@ -67,12 +67,7 @@ pub(super) fn inverse_on_free<R: Real>(mut matrix: Symmetric<R>, free: [R; 3]) -
 
 /// The inertia from the summed bounds (N/m) of the nodes' elements; `free` is positive along free axes.
 #[inline(always)]
-pub(super) fn new_inertia<R: Real>(
-    free: [R; 3],
-    mass: R,
-    stiffness: Symmetric<R>,
-    scaling: &Scaling,
-) -> NewInertia<R> {
+pub(super) fn new_inertia<R: Real>(free: [R; 3], mass: R, stiffness: Symmetric<R>, scaling: &Scaling) -> NewInertia<R> {
     let (zero, one) = (R::splat(0.0), R::splat(1.0));
     let needed = stiffness.scaled(R::splat(scaling.weight)).on_free(free);
     let largest = needed.largest_eigenvalue();

@@ -66,8 +66,8 @@ impl Kernel for NodeBatch<'_, '_> {
 }
 
 impl NodeBatch<'_, '_> {
-    /// Computes the next inertia of the nodes in these rows, with these ranks, of which `left` are not repeated. `W` is the
-    /// widest vector of the level.
+    /// Computes the next inertia of the nodes in these rows, with these ranks, of which `left` are not repeated. `W` is
+    /// the widest vector of the level.
     #[inline(always)]
     fn refresh<R: Real, W: Real>(&mut self, rows: Indexed, ranks: Indexed, left: usize) {
         const { assert!(R::COUNT == NODE_BATCH) };

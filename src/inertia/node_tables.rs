@@ -1,9 +1,9 @@
-//! Tables over the nodes in the caller's storage: five vectors of four floats for each node, seven for a damped step. Those that a
-//! step reads are in the order of the cells, in which it takes the nodes ([`super::lattice::rank_of`]); the sums over elements
-//! are in the order of the nodes.
+//! Tables over the nodes in the caller's storage: five vectors of four floats for each node, seven for a damped step.
+//! Those that a step reads are in the order of the cells, in which it takes the nodes ([`super::lattice::rank_of`]);
+//! the sums over elements are in the order of the nodes.
 //!
-//! A step changes shares and rough motion before it is known whether it will be taken, and keeps what they were for the case that
-//! it is not ([`NodeTables::take_back`]).
+//! A step changes shares and rough motion before it is known whether it will be taken, and keeps what they were for the
+//! case that it is not ([`NodeTables::take_back`]).
 
 use bytemuck::{must_cast_slice, must_cast_slice_mut};
 
@@ -23,8 +23,9 @@ pub(super) struct NodeTables<'a> {
     pub(super) inverse_diagonal: &'a mut [NodeVector],
     /// `xy, yz, zx` of the inverse inertia, and the share of it that the node may use (below one if it is held back).
     pub(super) inverse_off_diagonal: &'a mut [NodeVector],
-    /// Sums of the elements' bounds (N/m), later the next inverse inertia; the same layout, in the order of the nodes. There is no
-    /// sum of shares: while a step is computed its place has the shares before it, in the order of the cells.
+    /// Sums of the elements' bounds (N/m), later the next inverse inertia; the same layout, in the order of the nodes.
+    /// There is no sum of shares: while a step is computed its place has the shares before it, in the order of the
+    /// cells.
     pub(super) sum_diagonal: &'a mut [NodeVector],
     pub(super) sum_off_diagonal: &'a mut [NodeVector],
     /// The next increment of each node, m. The fourth component is the least height of its elements, m, with the frame
@@ -84,8 +85,7 @@ impl<'a> NodeTables<'a> {
 
     /// Puts the next inverses into use. The shares are kept; in the first cycle they are set to one.
     pub(super) fn put_in_use(&mut self, places: &[LatticeNode], first: bool) {
-        let next_of =
-            |sums: &[NodeVector], rank| sums.get(node_at(places, rank)).copied().unwrap_or_default();
+        let next_of = |sums: &[NodeVector], rank| sums.get(node_at(places, rank)).copied().unwrap_or_default();
         for (rank, inverse) in self.inverse_diagonal.iter_mut().enumerate() {
             *inverse = next_of(self.sum_diagonal, rank);
         }

@@ -1,6 +1,7 @@
-//! The passes over the nodes of a step (`restriction_pass.rs`, `motion_pass.rs`) in parts, one for each thread of the host
-//! (`src/step/threads.rs`). Sums are taken for each partition of the scene (`src/mesh/partition.rs`), which has as many ranks as nodes.
-//! They are added in the order of the partitions, so the bits do not depend on the number of threads.
+//! The passes over the nodes of a step (`restriction_pass.rs`, `motion_pass.rs`) in parts, one for each thread of the
+//! host (`src/step/threads.rs`). Sums are taken for each partition of the scene (`src/mesh/partition.rs`), which has as
+//! many ranks as nodes. They are added in the order of the partitions, so the bits do not depend on the number of
+//! threads.
 
 use core::array::from_fn;
 use core::ops::Range;
@@ -9,9 +10,7 @@ use super::added_motion::AddedMotion;
 use super::cells::{CellPolynomial, CellSlots};
 use super::damper::RoughMotion;
 use super::lattice::LatticeNode;
-use super::motion_pass::{
-    LatticeMotion, MotionPass, MotionTables, PassTotals, RotationTable, apply_increments,
-};
+use super::motion_pass::{LatticeMotion, MotionPass, MotionTables, PassTotals, RotationTable, apply_increments};
 use super::node_tables::NodeTables;
 use super::pass_input::PassInput;
 use super::report::HeldBack;
@@ -96,8 +95,7 @@ impl<T: Threads> NodeParts<'_, T> {
                 let residual = CellSlots { first, head: residual, from, rest: &mut *part.residual };
                 let momentum = CellSlots { first, head: momentum, from, rest: &mut *part.momentum };
                 result.extremes =
-                    RestrictionPass { input, ranks, force, inverse_diagonal, residual, momentum }
-                        .dispatched();
+                    RestrictionPass { input, ranks, force, inverse_diagonal, residual, momentum }.dispatched();
             }
         });
         let mut extremes = RestrictionExtremes::none();
@@ -204,15 +202,9 @@ impl<T: Threads> NodeParts<'_, T> {
         displacement: &mut [NodeVector],
         increment: &mut [NodeVector],
     ) {
-        move_in_parts(
-            self.partitions,
-            displacement,
-            increment,
-            self.threads,
-            |nodes, displacement, increment| {
-                apply_increments(nodes.start, places, next, displacement, increment);
-            },
-        );
+        move_in_parts(self.partitions, displacement, increment, self.threads, |nodes, displacement, increment| {
+            apply_increments(nodes.start, places, next, displacement, increment);
+        });
     }
 
     fn count(&self) -> usize {
@@ -231,8 +223,7 @@ impl PassTotals {
 
     /// The totals of all partitions.
     fn of_all(partitions: &[Self]) -> Self {
-        let mut all =
-            Self { totals: Totals::of_all(partitions.iter().map(|each| &each.totals)), ..Self::NONE };
+        let mut all = Self { totals: Totals::of_all(partitions.iter().map(|each| &each.totals)), ..Self::NONE };
         for each in partitions {
             all.rough.merge(&each.rough);
             all.held_back.merge(&each.held_back);

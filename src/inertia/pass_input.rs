@@ -1,5 +1,5 @@
-//! What the passes over the nodes of a step read: values of a vector of nodes, their residual and momentum. With a lattice the nodes
-//! are taken in the order of its cells, else in that of the scene.
+//! What the passes over the nodes of a step read: values of a vector of nodes, their residual and momentum. With a
+//! lattice the nodes are taken in the order of its cells, else in that of the scene.
 
 use bytemuck::must_cast_slice;
 
@@ -17,8 +17,8 @@ const LONGEST_SPAN: f32 = 1.25;
 /// Factors of the residual of a node, `D^2 f - 2 k m du`.
 #[derive(Clone, Copy)]
 pub(super) struct ResidualFactors {
-    /// `D (h + D) / 2` after a step of `h`, s^2: a force acts from the middle of the last step to that of the next one. In the first step
-    /// it has acted from the start on.
+    /// `D (h + D) / 2` after a step of `h`, s^2: a force acts from the middle of the last step to that of the next one.
+    /// In the first step it has acted from the start on.
     square: f32,
     /// `2 k`, times the ratio of the step to the last one.
     loss: f32,
@@ -30,8 +30,8 @@ impl ResidualFactors {
         self.square
     }
 
-    /// Those of a step with the inertia of one that may be longer. Inertia contains `1 + k` times the mass: in a shorter step, with a
-    /// smaller `k`, the residual is larger by the ratio of both.
+    /// Those of a step with the inertia of one that may be longer. Inertia contains `1 + k` times the mass: in a
+    /// shorter step, with a smaller `k`, the residual is larger by the ratio of both.
     pub(super) fn new(step: &Step, scaling: &Scaling, is_first: bool) -> Self {
         let k = half_damping(step);
         let ratio = (1.0 + scaling.k) / (1.0 + k);
@@ -86,10 +86,7 @@ impl PassInput<'_> {
             *row = padding::to_index(nodes.lane(lane));
         }
         let ends = [places.first()?.cell(), places.last()?.cell()];
-        Some((
-            Indexed::below::<R>(rows, self.places.len())?,
-            NodesInCells { position: [x, y, z], ends, places },
-        ))
+        Some((Indexed::below::<R>(rows, self.places.len())?, NodesInCells { position: [x, y, z], ends, places }))
     }
 
     /// `D^2 f - 2 k m du`, kg m.
@@ -98,11 +95,7 @@ impl PassInput<'_> {
         let &NodeValues { free, mass, force: [fx, fy, fz], increment: [vx, vy, vz], .. } = nodes;
         let ResidualFactors { square, loss } = self.residual;
         let (square, loss) = (R::splat(square), R::splat(loss) * mass);
-        [
-            free[0] * (square * fx - loss * vx),
-            free[1] * (square * fy - loss * vy),
-            free[2] * (square * fz - loss * vz),
-        ]
+        [free[0] * (square * fx - loss * vx), free[1] * (square * fy - loss * vy), free[2] * (square * fz - loss * vz)]
     }
 
     /// The inverse of the growth of the bound, with the mass added to both, because growth below the mass is harmless.

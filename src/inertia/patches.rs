@@ -1,5 +1,5 @@
-//! Patches of the lattice, and the elements sorted by them. Most elements lie in a patch of at most two cells along each
-//! axis; the elements of a patch share its functions, so the assembly adds them together (`assembly.rs`).
+//! Patches of the lattice, and the elements sorted by them. Most elements lie in a patch of at most two cells along
+//! each axis; the elements of a patch share its functions, so the assembly adds them together (`assembly.rs`).
 
 use glam::Vec4;
 
@@ -68,9 +68,9 @@ pub(super) fn locate(
     Some((patch, positions.map(|[cell, within]| [cell - low, within])))
 }
 
-/// Sorts the elements by their patches, those in no patch first, and before all others those that touch a node that motions may
-/// move. Gives the number of these. The list has the places of all elements: `TILE` times the index of a tile plus that in the
-/// tile.
+/// Sorts the elements by their patches, those in no patch first, and before all others those that touch a node that
+/// motions may move. Gives the number of these. The list has the places of all elements: `TILE` times the index of a
+/// tile plus that in the tile.
 pub(super) fn sort_by_patch<M>(
     order: &mut [u32],
     scene: SceneView<'_, M>,

@@ -1,5 +1,5 @@
-//! The inertia `G = W^T M W` of the nodes projected to a lattice (kg), `G = sum_a w_c w_d (N_a + reserve m I)`. Sums over
-//! nodes are first made for each cell, where all functions are known, and then added to the matrix.
+//! The inertia `G = W^T M W` of the nodes projected to a lattice (kg), `G = sum_a w_c w_d (N_a + reserve m I)`. Sums
+//! over nodes are first made for each cell, where all functions are known, and then added to the matrix.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -1,6 +1,6 @@
-//! The refresh of bounds, nodal inertia (kg) and coarse inertia, distributed over the steps of a cycle. A cycle has up to
-//! five stages. A step does a part of its work that grows with the rate of deformation, at most all of it. The refresh only
-//! uses states after accepted steps.
+//! The refresh of bounds, nodal inertia (kg) and coarse inertia, distributed over the steps of a cycle. A cycle has up
+//! to five stages. A step does a part of its work that grows with the rate of deformation, at most all of it. The
+//! refresh only uses states after accepted steps.
 //!
 //! ```text
 //! elements   D_a (bound) and S = (1 + k) Mc + s_c D^2 / 4 Kc
@@ -28,9 +28,7 @@ use super::report::AddedInertiaSums;
 use super::transport::invert_edges;
 use super::{DRAG_AT_WHOLE_CYCLES, DRAG_OF_ADDED, LARGEST_DRAG};
 use crate::copy::copy;
-use crate::element::{
-    ElementMaterial, ElementTile, MatrixSums, OwnPressure, TileBounds, TileTangents, tile_bounds,
-};
+use crate::element::{ElementMaterial, ElementTile, MatrixSums, OwnPressure, TileBounds, TileTangents, tile_bounds};
 use crate::scene::SceneView;
 use crate::simd::{Gather, NodeVector, Scatter, TILE};
 
@@ -77,8 +75,8 @@ pub(super) struct Refresh {
     pub(super) fine_in_use: bool,
 }
 
-/// Measured costs of a tile, of a tile without a lattice, of both with patches of nodal strain, of a cell and of a node.
-/// The unit is the time of a floating-point operation of a pivot.
+/// Measured costs of a tile, of a tile without a lattice, of both with patches of nodal strain, of a cell and of a
+/// node. The unit is the time of a floating-point operation of a pivot.
 const TILE_COST: i64 = 47_000;
 const TILE_UNCOUPLED_COST: i64 = 18_000;
 const PATCH_TILE_COST: i64 = 600_000;
@@ -125,8 +123,8 @@ impl Stiffness {
         }
     }
 
-    /// How much sooner bounds are out of date than with equal stiffness of volume and shear. A change `e` of shape gives
-    /// motion without change of volume a share `e^2` of the stiffness of volume.
+    /// How much sooner bounds are out of date than with equal stiffness of volume and shear. A change `e` of shape
+    /// gives motion without change of volume a share `e^2` of the stiffness of volume.
     fn sensitivity(&self) -> f32 {
         libm::sqrtf(1.0 + self.volume / self.shear.max(f32::MIN_POSITIVE))
     }
@@ -175,12 +173,7 @@ impl Refresh {
     };
 
     /// Cycles of `steps` steps for a scene, and a lattice with this many functions and cells.
-    pub(super) fn new<M: ElementMaterial>(
-        steps: u32,
-        scene: SceneView<'_, M>,
-        functions: usize,
-        cells: usize,
-    ) -> Self {
+    pub(super) fn new<M: ElementMaterial>(steps: u32, scene: SceneView<'_, M>, functions: usize, cells: usize) -> Self {
         let (nodes, tiles) = (scene.node_count(), scene.tiles.len());
         let bounds = if scene.element().is_nodal_strain() {
             scene.patches.tiles().len() as i64 * patch_tile_cost(functions)
@@ -202,8 +195,8 @@ impl Refresh {
         self.steps
     }
 
-    /// The share of the last increment's unresolved deformation of the lattice that a step removes. Deformation is fed by `S`
-    /// changing while velocities are kept, so the share follows the rate of that change.
+    /// The share of the last increment's unresolved deformation of the lattice that a step removes. Deformation is fed
+    /// by `S` changing while velocities are kept, so the share follows the rate of that change.
     pub(super) fn drag(&self) -> f32 {
         (DRAG_OF_ADDED * self.added.mean()).max(DRAG_AT_WHOLE_CYCLES * self.pace).min(LARGEST_DRAG)
     }
@@ -313,9 +306,7 @@ impl Refresh {
             self.start_cycle(input, tables, matrices);
         }
         match self.stage {
-            Stage::Elements if input.scene.element().is_nodal_strain() => {
-                self.add_patches(input, tables, matrices, at)
-            }
+            Stage::Elements if input.scene.element().is_nodal_strain() => self.add_patches(input, tables, matrices, at),
             Stage::Elements => self.add_elements(input, tables, matrices, at),
             Stage::Nodes => self.add_nodes(input, tables, matrices, at),
             Stage::NodeCells => self.add_node_cell(input, matrices, at),
@@ -426,12 +417,7 @@ impl Refresh {
     }
 
     /// The sums over nodes of cell `at`, added to the next `G`.
-    fn add_node_cell<M>(
-        &mut self,
-        input: &RefreshInput<'_, M>,
-        matrices: &mut Matrices<'_>,
-        at: usize,
-    ) -> i64 {
+    fn add_node_cell<M>(&mut self, input: &RefreshInput<'_, M>, matrices: &mut Matrices<'_>, at: usize) -> i64 {
         let lattice = input.lattice;
         if let Some(sums) = matrices.sums.get_mut(at) {
             add_cell(matrices.next_fine, stride(lattice.functions()), lattice.functions_of(at), sums);
@@ -447,8 +433,7 @@ impl Refresh {
         if at == 0 {
             fill_held_axes(matrices.next_fine, matrices.mass, input.lattice.functions());
         }
-        let (cost, ended) =
-            self.inversion.advance(matrices.next_fine, matrices.mass, input.lattice.functions(), at);
+        let (cost, ended) = self.inversion.advance(matrices.next_fine, matrices.mass, input.lattice.functions(), at);
         if ended {
             self.enter(Stage::InvertCoarse);
         }
@@ -463,8 +448,7 @@ impl Refresh {
         matrices: &mut Matrices<'_>,
         at: usize,
     ) -> i64 {
-        let (cost, ended) =
-            self.inversion.advance(matrices.next_coarse, matrices.mass, input.lattice.functions(), at);
+        let (cost, ended) = self.inversion.advance(matrices.next_coarse, matrices.mass, input.lattice.functions(), at);
         if ended {
             self.end(input.places, tables, matrices);
         }
@@ -530,8 +514,7 @@ impl Refresh {
         let inertia = scene.inertia;
         let places = if lattice.functions() > 0 { *places } else { &[] };
         let moving = (!self.lattice_in_use && !self.first_cycle).then_some((&mut **increment, &self.frames));
-        NodeBatch { inertia, moving, lattice, places, scaling, added, tables, bounds, sums, first }
-            .dispatched();
+        NodeBatch { inertia, moving, lattice, places, scaling, added, tables, bounds, sums, first }.dispatched();
     }
 
     /// Puts the matrices of the cycle into use, and prepares the next cycle.

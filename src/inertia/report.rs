@@ -20,14 +20,8 @@ pub struct Report {
 }
 
 impl Report {
-    pub(super) const NONE: Self = Self {
-        added_mean: 0.0,
-        added_largest: 0.0,
-        added_node: 0,
-        held_back: 0,
-        coarse_share: 1.0,
-        damping: 0.0,
-    };
+    pub(super) const NONE: Self =
+        Self { added_mean: 0.0, added_largest: 0.0, added_node: 0, held_back: 0, coarse_share: 1.0, damping: 0.0 };
 }
 
 /// Sums over the nodes that a step holds back.

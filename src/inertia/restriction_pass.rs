@@ -1,5 +1,6 @@
-//! The pass over the nodes before the lattice's motion is computed, vectorised: residual and momentum of each node, added to the sums of
-//! the cells. It takes the nodes in the order of the cells, so that the sums of a cell stay in registers.
+//! The pass over the nodes before the lattice's motion is computed, vectorised: residual and momentum of each node,
+//! added to the sums of the cells. It takes the nodes in the order of the cells, so that the sums of a cell stay in
+//! registers.
 
 use core::ops::Range;
 
@@ -46,10 +47,7 @@ impl<R: Real> RestrictionExtremes<R> {
 
     #[inline(always)]
     fn lane(&self, lane: usize) -> RestrictionExtremes<f32> {
-        RestrictionExtremes {
-            inverse_growth: self.inverse_growth.lane(lane),
-            increment: self.increment.lane(lane),
-        }
+        RestrictionExtremes { inverse_growth: self.inverse_growth.lane(lane), increment: self.increment.lane(lane) }
     }
 }
 

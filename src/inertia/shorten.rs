@@ -1,7 +1,7 @@
-//! From steps beyond the critical one to shorter ones. Increments span the time from `t - D` to `t`, velocities are those of its middle:
-//! a shorter step would have to add the force of half a long step at once, and where inertia was added the force of true inertia tears
-//! the mesh. So the last increment `du` is replaced by that of a step of `r D` which ends at `t`, with the acceleration `(du+ - du) / D^2`
-//! that the long step gives:
+//! From steps beyond the critical one to shorter ones. Increments span the time from `t - D` to `t`, velocities are
+//! those of its middle: a shorter step would have to add the force of half a long step at once, and where inertia was
+//! added the force of true inertia tears the mesh. So the last increment `du` is replaced by that of a step of `r D`
+//! which ends at `t`, with the acceleration `(du+ - du) / D^2` that the long step gives:
 //!
 //! ```text
 //! du' = r (du + du+) / 2 - r^2 (du+ - du) / 2
@@ -18,8 +18,8 @@ use crate::state::StateView;
 use crate::step::{Status, Step, StepMethod, Threads, Trial};
 
 impl LargeView<'_, '_> {
-    /// To be called between the last long step and the first shorter one of any method, of `seconds`. Moves no node, and costs a step. A
-    /// state whose last step was shorter stays as it is.
+    /// To be called between the last long step and the first shorter one of any method, of `seconds`. Moves no node,
+    /// and costs a step. A state whose last step was shorter stays as it is.
     pub fn shorten<M: ElementMaterial>(
         self,
         seconds: f32,
@@ -59,8 +59,7 @@ impl LargeView<'_, '_> {
         // What acts now has acted since the middle of the last step.
         for load in loads.forces() {
             let node = load.node as usize;
-            let (Some(NodeVector(last)), Some(inertia)) = (increment.get(node), scene.inertia.get(node))
-            else {
+            let (Some(NodeVector(last)), Some(inertia)) = (increment.get(node), scene.inertia.get(node)) else {
                 continue;
             };
             let (next, factor) = (next(node), ramp_factor(progress.time, load.ramp));

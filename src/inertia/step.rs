@@ -9,9 +9,7 @@ use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::StateView;
-use crate::step::{
-    CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial, nodal_volumes,
-};
+use crate::step::{CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial, nodal_volumes};
 
 use super::cells::{prolong, restrict};
 use super::coarse_motion::{CoarseMotion, CoarseSpace, MotionResult, removed_share};
@@ -36,17 +34,12 @@ const LEAST_COARSE_SHARE: f32 = 0.8;
 
 impl LargeView<'_, '_> {
     /// See [`super::LargeStep::step`].
-    pub fn step<M: ElementMaterial>(
-        self,
-        scene: SceneView<'_, M>,
-        loads: &Loads<'_>,
-        state: StateView<'_>,
-    ) -> Status {
+    pub fn step<M: ElementMaterial>(self, scene: SceneView<'_, M>, loads: &Loads<'_>, state: StateView<'_>) -> Status {
         self.step_in_parts(scene, loads, state, &CallingThread)
     }
 
-    /// The same step, to the bit, on several threads of the host: the work on elements and nodes, not the inversions and the
-    /// assembly of a cycle.
+    /// The same step, to the bit, on several threads of the host: the work on elements and nodes, not the inversions
+    /// and the assembly of a cycle.
     pub fn step_in_parts<M: ElementMaterial>(
         self,
         scene: SceneView<'_, M>,
@@ -102,12 +95,7 @@ pub(super) struct InertiaStep<'a, 'w, T> {
 }
 
 impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
-    pub(super) fn new(
-        step: &'a Step,
-        model: &'a mut LargeModel<'w>,
-        storage: Storage<'a>,
-        threads: &'a T,
-    ) -> Self {
+    pub(super) fn new(step: &'a Step, model: &'a mut LargeModel<'w>, storage: Storage<'a>, threads: &'a T) -> Self {
         Self {
             threads,
             step,
@@ -169,25 +157,17 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
         model.rough = self.rough;
         let Trial { scene, displacement, increment, .. } = trial;
         let Storage { tables, places, .. } = &self.storage;
-        node_parts(scene, self.threads).apply_increments(
-            places,
-            tables.next_increment,
-            displacement,
-            increment,
-        );
+        node_parts(scene, self.threads).apply_increments(places, tables.next_increment, displacement, increment);
     }
 
     #[inline(never)]
     fn finish(&mut self, trial: &mut Trial<'_, M>) -> bool {
-        let Self {
-            model, storage: Storage { tables, places, order, matrices }, held_back, coarse_share, ..
-        } = self;
+        let Self { model, storage: Storage { tables, places, order, matrices }, held_back, coarse_share, .. } = self;
         let LargeModel { lattice, refresh, scaling, report, nodes, least_share, moment, .. } = &mut **model;
         *least_share = held_back.least;
         let Trial { scene, displacement, increment, volume, progress, .. } = trial;
         *moment = progress.moment();
-        let input =
-            RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
+        let input = RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
         refresh.advance(progress.steps, self.change, input, tables, matrices);
         *report = refresh.added.report(held_back.nodes, *coarse_share);
         report.damping = self.damping;
@@ -211,12 +191,12 @@ struct MovedLattice {
 
 // Not inlined, like `finish`: the stack of one is free in the others.
 impl<T: Threads> InertiaStep<'_, '_, T> {
-    /// Computes all inertia anew if another step has moved the state, or it was reset or restored, or if the length of steps was changed.
+    /// Computes all inertia anew if another step has moved the state, or it was reset or restored, or if the length of
+    /// steps was changed.
     #[inline(never)]
     fn renew_if_stale<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) {
         let Self { model, storage: Storage { tables, places, order, matrices }, .. } = self;
-        let LargeModel { lattice, refresh, scaling, rough, least_share, moment, is_for_other_step, .. } =
-            &mut **model;
+        let LargeModel { lattice, refresh, scaling, rough, least_share, moment, is_for_other_step, .. } = &mut **model;
         let Trial { scene, displacement, increment, volume, progress, .. } = trial;
         let follows = *moment == progress.moment();
         if follows && !*is_for_other_step {
@@ -224,8 +204,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         }
         *is_for_other_step = false;
         nodal_volumes(*scene, displacement, volume, &CallingThread);
-        let input =
-            RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
+        let input = RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
         if follows {
             refresh.restart(input, tables, matrices);
             return;
@@ -240,8 +219,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
     #[inline(never)]
     fn move_lattice<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) -> Option<MovedLattice> {
         let Self { step, model, storage: Storage { tables, places, order, matrices }, .. } = self;
-        let LargeModel { lattice, refresh, scaling, rough, method, moved_elements, least_share, .. } =
-            &mut **model;
+        let LargeModel { lattice, refresh, scaling, rough, method, moved_elements, least_share, .. } = &mut **model;
         if lattice.functions() == 0 {
             return None;
         }
@@ -259,8 +237,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let residual = ResidualFactors::new(step, scaling, progress.steps == 0);
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
-        let extremes =
-            node_parts(scene, self.threads).restrict(input, force, tables.inverse_diagonal, cells, momentum);
+        let extremes = node_parts(scene, self.threads).restrict(input, force, tables.inverse_diagonal, cells, momentum);
         let growth = 1.0 / extremes.inverse_growth;
         let share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
         let smooth = smooth_motion(matrices, lattice, extremes.increment).filter(|_| refresh.lattice_in_use);
@@ -272,11 +249,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             smooth: smooth.as_ref(),
             supports: supports.as_ref(),
             allowed: progress.energy_balance.allowed_share(),
-            largest_strain: if scene.element().is_nodal_strain() {
-                LARGEST_STRAIN_OF_PATCHES
-            } else {
-                LARGEST_STRAIN
-            },
+            largest_strain: if scene.element().is_nodal_strain() { LARGEST_STRAIN_OF_PATCHES } else { LARGEST_STRAIN },
         };
         let MotionResult { share, change, work } = motion.compute(matrices, share);
         // Without a lattice in use there is no distinction of smooth and rough motion.
@@ -295,11 +268,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
 
     /// Computes the next increments of the nodes.
     #[inline(never)]
-    fn move_nodes<M: ElementMaterial>(
-        &mut self,
-        trial: &mut Trial<'_, M>,
-        moved: Option<MovedLattice>,
-    ) -> Totals {
+    fn move_nodes<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>, moved: Option<MovedLattice>) -> Totals {
         let Self { step, model, storage: Storage { tables, places, matrices, .. }, .. } = self;
         let LargeModel { refresh, scaling, method, .. } = &**model;
         let Trial { scene, increment, force, progress, .. } = trial;
@@ -327,9 +296,9 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
 /// may lie outside the body.
 const LARGEST_SMOOTH: f32 = 10.0;
 
-/// The lattice's part `c = Mc^-1 W^T m du` of the increments. Turns the cells' sums of momentum into the smooth part of the
-/// increments, of which `largest` is the largest component, `W` times that. To remove a share of the rest changes no momentum of the
-/// lattice, so neither that of the body. None if the result is not plausible.
+/// The lattice's part `c = Mc^-1 W^T m du` of the increments. Turns the cells' sums of momentum into the smooth part of
+/// the increments, of which `largest` is the largest component, `W` times that. To remove a share of the rest changes
+/// no momentum of the lattice, so neither that of the body. None if the result is not plausible.
 fn smooth_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, largest: f32) -> Option<CoarseVectors> {
     let mut motion = restrict(matrices.smooth_cells, lattice);
     let mut components = to_components(&motion);

@@ -1,11 +1,12 @@
-//! Supports whose speed changes, coupled to the motion of the lattice. A step solves `S c + A_s d = g` for the lattice, where `d`
-//! (m) is the change of the supports' increments and `A_s = s_c D^2 / 4 W^T K_s` (kg) the stiffness between the lattice's functions
-//! and the supports, with the bound `K` of `assembly.rs`. Without the second term a support that starts leaves the body behind until
-//! its elements are stretched by a whole step's motion; with it the lattice follows as far as `A` resists the strain.
-//! Supports that stand still or keep their speed add nothing.
+//! Supports whose speed changes, coupled to the motion of the lattice. A step solves `S c + A_s d = g` for the lattice,
+//! where `d` (m) is the change of the supports' increments and `A_s = s_c D^2 / 4 W^T K_s` (kg) the stiffness between
+//! the lattice's functions and the supports, with the bound `K` of `assembly.rs`. Without the second term a support
+//! that starts leaves the body behind until its elements are stretched by a whole step's motion; with it the lattice
+//! follows as far as `A` resists the strain. Supports that stand still or keep their speed add nothing.
 //!
-//! The bound of elements and supports together is positive, so `S^-1 A_s d` gets at most the energy `d K_ss d` of supports that move
-//! alone. Where it would get more, `S` is from before tissue at the supports has stiffened, and the motion is scaled down.
+//! The bound of elements and supports together is positive, so `S^-1 A_s d` gets at most the energy `d K_ss d` of
+//! supports that move alone. Where it would get more, `S` is from before tissue at the supports has stiffened, and the
+//! motion is scaled down.
 
 use glam::Vec4;
 
@@ -55,34 +56,26 @@ impl<M: ElementMaterial> MovingSupports<'_, M> {
         increment: &mut [NodeVector],
         changes: &mut [NodeVector],
     ) -> Option<Pull> {
-        if loads.motions().is_empty() || (self.elements.is_empty() && !self.scene.element().is_nodal_strain())
-        {
+        if loads.motions().is_empty() || (self.elements.is_empty() && !self.scene.element().is_nodal_strain()) {
             return None;
         }
         for NodeVector([x, y, z, _]) in &mut *changes {
             (*x, *y, *z) = (0.0, 0.0, 0.0);
         }
         let mut moves = false;
-        loads.each_prescribed(
-            time + f64::from(step.seconds()),
-            increment,
-            |node, axis, position, increment| {
-                if let (Some(change), Some(displacement)) =
-                    (changes.get_mut(node), self.displacement.get(node))
-                {
-                    let next = position - displacement.0[axis % 4];
-                    change.0[axis % 3] = next - step.carry() * increment[axis % 4];
-                    moves |= change.0[axis % 3] != 0.0;
-                }
-            },
-        );
+        loads.each_prescribed(time + f64::from(step.seconds()), increment, |node, axis, position, increment| {
+            if let (Some(change), Some(displacement)) = (changes.get_mut(node), self.displacement.get(node)) {
+                let next = position - displacement.0[axis % 4];
+                change.0[axis % 3] = next - step.carry() * increment[axis % 4];
+                moves |= change.0[axis % 3] != 0.0;
+            }
+        });
         if !moves {
             return None;
         }
         let mut pull = Pull { residual: [NodeVector::ZERO; MAX_FUNCTIONS + 1], energy: 0.0 };
-        let changed = |node: usize| {
-            changes.get(node).map_or(Vec4::ZERO, |&NodeVector([x, y, z, _])| Vec4::new(x, y, z, 0.0))
-        };
+        let changed =
+            |node: usize| changes.get(node).map_or(Vec4::ZERO, |&NodeVector([x, y, z, _])| Vec4::new(x, y, z, 0.0));
         let mut add = |node, force: Vec4| {
             pull.energy += force.dot(changed(node));
             self.add_force(node, force, &mut pull.residual);

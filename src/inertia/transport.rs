@@ -7,8 +7,8 @@
 //! S (c+ - c - w) = g - M w,   w_b - w_a = (R - 1) (c_b - c_a) for each edge of the lattice, by least squares
 //! ```
 //! with the lattice's part `c` of the last increment (m) and the rotation `R` of the tissue in that step. For a rigid
-//! rotation `c + w` is the exact next increment. `A` is zero for translations and rotations, so `w` changes no momentum.
-//! Every edge counts with the square of its inverse length; the least squares are a constant matrix.
+//! rotation `c + w` is the exact next increment. `A` is zero for translations and rotations, so `w` changes no
+//! momentum. Every edge counts with the square of its inverse length; the least squares are a constant matrix.
 
 use glam::{Mat3, Vec3, Vec4};
 
@@ -43,12 +43,7 @@ pub(super) fn invert_edges(matrix: &mut [f32], lattice: &Lattice) -> bool {
 }
 
 /// `w` from the lattice's part `c` of the last increment, m.
-pub(super) fn turned_part(
-    c: &CoarseVectors,
-    lattice: &Lattice,
-    frames: &Frames,
-    inverse: &[f32],
-) -> CoarseVectors {
+pub(super) fn turned_part(c: &CoarseVectors, lattice: &Lattice, frames: &Frames, inverse: &[f32]) -> CoarseVectors {
     let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
     let at = |function: usize| c.get(function).map_or(Vec3::ZERO, |c| Vec4::from(c.0).truncate());
     lattice.for_each_edge(|a, b, weight| {

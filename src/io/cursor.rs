@@ -71,9 +71,7 @@ impl<'a> Cursor<'a> {
     pub(super) fn word(&mut self, what: impl Display) -> Result<&'a [u8], Fault> {
         match self.token() {
             Some(token) => Ok(token),
-            None if self.rest().is_empty() => {
-                Err(self.fault(format_args!("the file ends where {what} is expected")))
-            }
+            None if self.rest().is_empty() => Err(self.fault(format_args!("the file ends where {what} is expected"))),
             None => Err(self.fault(format_args!("the line ends where {what} is expected"))),
         }
     }

@@ -67,7 +67,8 @@ impl Fault {
     }
 }
 
-/// The beginning of a text without characters that a terminal obeys: names of a file may be in it, of any length and content.
+/// The beginning of a text without characters that a terminal obeys: names of a file may be in it, of any length and
+/// content.
 fn on_a_line(text: &str) -> String {
     const LONGEST: usize = 400;
     let mut line: String = text.chars().take(LONGEST).map(|c| if c.is_control() { ' ' } else { c }).collect();

@@ -101,9 +101,7 @@ impl Gmsh {
                     return expect(cursor, "$EndElements");
                 }
                 (b"$Nodes" | b"$Elements", _) => {
-                    return Err(
-                        cursor.fault(format_args!("{} without $MeshFormat before it", quoted(section)))
-                    );
+                    return Err(cursor.fault(format_args!("{} without $MeshFormat before it", quoted(section))));
                 }
                 (other, _) if other.starts_with(b"$") => skip_section(cursor, other)?,
                 (other, None) => {
@@ -126,8 +124,7 @@ impl Gmsh {
             _ if version == b"2" || version.starts_with(b"2.") => Version::Two,
             _ => {
                 let version = quoted(version);
-                let reason =
-                    format_args!("version {version} cannot be read; save the mesh as version 4.1 or 2.2");
+                let reason = format_args!("version {version} cannot be read; save the mesh as version 4.1 or 2.2");
                 return Err(cursor.fault(reason));
             }
         });
@@ -242,8 +239,7 @@ impl Gmsh {
                     for _ in 0..if dimension == 0 { 3 } else { 6 } {
                         cursor.real(encoding, format_args!("the bounds of entity {tag}"))?;
                     }
-                    let tags =
-                        cursor.size(encoding, format_args!("the number of physical tags of entity {tag}"))?;
+                    let tags = cursor.size(encoding, format_args!("the number of physical tags of entity {tag}"))?;
                     let mut physical = 0;
                     for i in 0..tags {
                         let value = cursor.int(encoding, format_args!("a physical tag of entity {tag}"))?;
@@ -252,8 +248,7 @@ impl Gmsh {
                         }
                     }
                     if dimension > 0 {
-                        let sides =
-                            cursor.size(encoding, format_args!("the number of sides of entity {tag}"))?;
+                        let sides = cursor.size(encoding, format_args!("the number of sides of entity {tag}"))?;
                         for _ in 0..sides {
                             cursor.int(encoding, format_args!("a side of entity {tag}"))?;
                         }
@@ -285,9 +280,8 @@ impl Gmsh {
             })?;
             let mut tags = Vec::new();
             for _ in 0..block {
-                let tag = cursor.record(encoding, |cursor| {
-                    Ok(cursor.size(encoding, "the number of a node")?.cast_signed())
-                })?;
+                let tag = cursor
+                    .record(encoding, |cursor| Ok(cursor.size(encoding, "the number of a node")?.cast_signed()))?;
                 index.add(tag, cursor)?;
                 tags.push(tag);
             }
@@ -334,21 +328,13 @@ impl Gmsh {
             }
         }
         if n != listed {
-            return Err(
-                cursor.fault(format_args!("{n} elements are announced, but the blocks list {listed}"))
-            );
+            return Err(cursor.fault(format_args!("{n} elements are announced, but the blocks list {listed}")));
         }
         Ok(())
     }
 
     /// The nodes of an element, which close its record.
-    fn read_element(
-        &mut self,
-        cursor: &mut Cursor<'_>,
-        number: i64,
-        kind: i32,
-        tags: Tags,
-    ) -> Result<(), Fault> {
+    fn read_element(&mut self, cursor: &mut Cursor<'_>, number: i64, kind: i32, tags: Tags) -> Result<(), Fault> {
         let Some(index) = &self.index else {
             return Err(cursor.fault("elements come before the nodes"));
         };
@@ -362,9 +348,8 @@ impl Gmsh {
             }
         };
         let nodes = node_count(kind).map_err(|name| {
-            let reason = format!(
-                "element {number} is a {name} (Gmsh type {kind}); only tetrahedra with four nodes can be read"
-            );
+            let reason =
+                format!("element {number} is a {name} (Gmsh type {kind}); only tetrahedra with four nodes can be read");
             cursor.fault(reason)
         })?;
         match kind {
@@ -440,11 +425,7 @@ fn count(cursor: &mut Cursor<'_>, what: &str) -> Result<u64, Fault> {
     Ok(n)
 }
 
-fn read_sizes<const N: usize>(
-    cursor: &mut Cursor<'_>,
-    encoding: Encoding,
-    what: &str,
-) -> Result<[u64; N], Fault> {
+fn read_sizes<const N: usize>(cursor: &mut Cursor<'_>, encoding: Encoding, what: &str) -> Result<[u64; N], Fault> {
     cursor.record(encoding, |cursor| {
         let mut sizes = [0; N];
         for size in &mut sizes {

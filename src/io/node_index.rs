@@ -31,9 +31,8 @@ impl NodeIndex {
             let tag = read(cursor)?;
             *corner = *self.0.get(&tag).ok_or_else(|| {
                 let n = self.0.len();
-                cursor.fault(format_args!(
-                    "element {element} names node {tag}, which is not one of the file's {n} nodes"
-                ))
+                cursor
+                    .fault(format_args!("element {element} names node {tag}, which is not one of the file's {n} nodes"))
             })?;
         }
         Ok(corners)

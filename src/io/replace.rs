@@ -1,8 +1,8 @@
-//! Files that are replaced as a whole: written under a temporary name in the same folder, then renamed, so that a process that is
-//! killed, or a full disk, leaves the old file or the new one.
+//! Files that are replaced as a whole: written under a temporary name in the same folder, then renamed, so that a
+//! process that is killed, or a full disk, leaves the old file or the new one.
 //!
-//! The temporary file of `NAME` is `.NAME.PROCESS-COUNT.tmp`. It is locked while it is written; what a killed process left behind
-//! is not, and goes when a file of that name is written again.
+//! The temporary file of `NAME` is `.NAME.PROCESS-COUNT.tmp`. It is locked while it is written; what a killed process
+//! left behind is not, and goes when a file of that name is written again.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 use std::ffi::{OsStr, OsString};
@@ -14,25 +14,23 @@ use std::path::{Path, PathBuf};
 use super::write::invalid;
 
 /// Writes a file so that no reader ever sees half of it: under a temporary name in the same folder, then renamed. If
-/// `write` or the file system fails, the temporary file is removed and a file of that name stays as it was. If the process is
-/// killed, the file stays as it was, and the next call for it removes the temporary one. The bytes are on the disk before they
-/// have the file's name, so that a power cut leaves no empty file.
+/// `write` or the file system fails, the temporary file is removed and a file of that name stays as it was. If the
+/// process is killed, the file stays as it was, and the next call for it removes the temporary one. The bytes are on
+/// the disk before they have the file's name, so that a power cut leaves no empty file.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
     replace(path, true, write)
 }
 
-/// The same, on the disk (`synchronise`) or not yet: the files of a series are synchronised together, which takes a fortieth of the
-/// time.
+/// The same, on the disk (`synchronise`) or not yet: the files of a series are synchronised together, which takes a
+/// fortieth of the time.
 pub(super) fn replace(
     path: &Path,
     synchronise: bool,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
-    let name =
-        path.file_name().ok_or_else(|| invalid(format!("{} is not the name of a file", path.display())))?;
-    let named = |error: io::Error| {
-        io::Error::new(error.kind(), format!("{}: cannot be written: {error}", path.display()))
-    };
+    let name = path.file_name().ok_or_else(|| invalid(format!("{} is not the name of a file", path.display())))?;
+    let named =
+        |error: io::Error| io::Error::new(error.kind(), format!("{}: cannot be written: {error}", path.display()));
     remove_abandoned(path, name);
     let (file, temporary) = create_temporary(path, name).map_err(named)?;
     // Open, and so locked, until it has its name.

@@ -29,8 +29,7 @@ fn expect_end(cursor: &mut Cursor<'_>, n: u64, what: &str) -> Result<(), Fault> 
         None => Ok(()),
         Some(extra) => {
             let extra = quoted(extra);
-            Err(cursor
-                .fault(format_args!("{extra} where the file should end after the announced {n} {what}")))
+            Err(cursor.fault(format_args!("{extra} where the file should end after the announced {n} {what}")))
         }
     }
 }
@@ -64,11 +63,7 @@ pub(super) fn read_nodes(bytes: &[u8]) -> Result<(Vec<[f64; 3]>, NodeIndex), Fau
 
 /// The mesh of an `.ele` file on the points of its `.node` file. Regions are the last attribute of the tetrahedra,
 /// if each is a whole number.
-pub(super) fn read_elements(
-    bytes: &[u8],
-    points: Vec<[f64; 3]>,
-    index: &NodeIndex,
-) -> Result<TetMesh, Fault> {
+pub(super) fn read_elements(bytes: &[u8], points: Vec<[f64; 3]>, index: &NodeIndex) -> Result<TetMesh, Fault> {
     let bytes = without_comments(bytes);
     let mut cursor = Cursor::new(&bytes, 1);
     let (n, corners, attributes) = cursor.record(Encoding::Text, |cursor| {
@@ -77,8 +72,7 @@ pub(super) fn read_elements(
         Ok((n, corners, cursor.number::<u64>("the number of attributes")?))
     })?;
     if corners != 4 {
-        let reason =
-            format_args!("the tetrahedra have {corners} nodes; only those with four nodes can be read");
+        let reason = format_args!("the tetrahedra have {corners} nodes; only those with four nodes can be read");
         return Err(cursor.fault(reason));
     }
     let mut mesh = TetMesh { points, ..TetMesh::default() };

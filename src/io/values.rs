@@ -47,9 +47,7 @@ impl Values {
     pub(super) fn into_points(self) -> Vec<[f64; 3]> {
         match self {
             Self::Real(values) => values.as_chunks().0.to_vec(),
-            Self::Whole(values) => {
-                values.as_chunks().0.iter().map(|p: &[i64; 3]| p.map(|x| x as f64)).collect()
-            }
+            Self::Whole(values) => values.as_chunks().0.iter().map(|p: &[i64; 3]| p.map(|x| x as f64)).collect(),
         }
     }
 

@@ -38,8 +38,7 @@ fn read_version(cursor: &mut Cursor<'_>) -> Result<u32, Fault> {
     }
     cursor.skip(MAGIC.len());
     let version = cursor.word("the version")?;
-    let major =
-        version.split(|&b| b == b'.').next().and_then(|major| core::str::from_utf8(major).ok()?.parse().ok());
+    let major = version.split(|&b| b == b'.').next().and_then(|major| core::str::from_utf8(major).ok()?.parse().ok());
     let known = major.filter(|major| (1..=5).contains(major));
     let fault = || cursor.fault(format_args!("version {} is unknown; 1 to 5 can be read", quoted(version)));
     let major = known.ok_or_else(fault)?;
@@ -72,10 +71,8 @@ impl<'a> Legacy<'a> {
                 b"DATASET" => {
                     let kind = self.cursor.word("the kind of data set")?;
                     if !kind.eq_ignore_ascii_case(b"UNSTRUCTURED_GRID") {
-                        let reason = format_args!(
-                            "the data set is {}; only UNSTRUCTURED_GRID can be read",
-                            quoted(kind)
-                        );
+                        let reason =
+                            format_args!("the data set is {}; only UNSTRUCTURED_GRID can be read", quoted(kind));
                         return Err(self.cursor.fault(reason));
                     }
                 }
@@ -112,12 +109,9 @@ impl<'a> Legacy<'a> {
         let mut rest = entries.as_slice();
         while let Some((&count, tail)) = rest.split_first() {
             let cell = ends.len();
-            let Some((nodes, tail)) =
-                usize::try_from(count).ok().and_then(|count| tail.split_at_checked(count))
-            else {
+            let Some((nodes, tail)) = usize::try_from(count).ok().and_then(|count| tail.split_at_checked(count)) else {
                 let left = tail.len();
-                let reason =
-                    format!("cell {cell} claims {count} points, but {left} entries are left in CELLS");
+                let reason = format!("cell {cell} claims {count} points, but {left} entries are left in CELLS");
                 return Err(Fault::new(place, reason));
             };
             connectivity.extend_from_slice(nodes);
@@ -125,10 +119,7 @@ impl<'a> Legacy<'a> {
             rest = tail;
         }
         if ends.len() != n {
-            return Err(Fault::new(
-                place,
-                format_args!("CELLS announces {n} cells, but lists {}", ends.len()),
-            ));
+            return Err(Fault::new(place, format_args!("CELLS announces {n} cells, but lists {}", ends.len())));
         }
         self.cells = Some((ends, connectivity, place));
         Ok(())
@@ -205,9 +196,7 @@ impl<'a> Legacy<'a> {
             _ if line.is_empty() => 1,
             Some(Ok(components)) => components,
             _ => {
-                return Err(self
-                    .cursor
-                    .fault(format_args!("{} is not a number of components", quoted(line))));
+                return Err(self.cursor.fault(format_args!("{} is not a number of components", quoted(line))));
             }
         };
         let table = self.cursor.rest().get(..12).unwrap_or_default();

@@ -55,13 +55,12 @@ impl Cells {
         let mut start = 0;
         for (cell, (&kind, &end)) in self.types.iter().zip(&self.ends).enumerate() {
             let nodes = usize::try_from(start).ok().zip(usize::try_from(end).ok());
-            let nodes =
-                nodes.and_then(|(start, end)| self.connectivity.get(start..end)).ok_or_else(|| {
-                    format!(
-                        "cell {cell} has the entries {start} to {end} of the connectivity, which has {}",
-                        self.connectivity.len()
-                    )
-                })?;
+            let nodes = nodes.and_then(|(start, end)| self.connectivity.get(start..end)).ok_or_else(|| {
+                format!(
+                    "cell {cell} has the entries {start} to {end} of the connectivity, which has {}",
+                    self.connectivity.len()
+                )
+            })?;
             start = end;
             match kind {
                 TETRAHEDRON => {

@@ -22,8 +22,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<TetMesh, Fault> {
     let (head, appended) = split_appended(bytes);
     let text = core::str::from_utf8(&head)
         .map_err(|error| Fault::new(format!("byte {}", error.valid_up_to()), "the text is not UTF-8"))?;
-    let document =
-        Document::parse(text).map_err(|error| Fault::new(format!("line {}", error.pos().row), error))?;
+    let document = Document::parse(text).map_err(|error| Fault::new(format!("line {}", error.pos().row), error))?;
     let file = Vtu::open(&document, appended)?;
     let mut mesh = TetMesh::default();
     for piece in file.child(document.root_element(), "UnstructuredGrid")?.children() {
@@ -57,8 +56,8 @@ struct Vtu<'d> {
     layout: Layout<'d>,
     appended: &'d [u8],
     appended_raw: bool,
-    /// Bytes that arrays may still have from the appended ones. Without a limit many small elements that name the same array would
-    /// take memory without end.
+    /// Bytes that arrays may still have from the appended ones. Without a limit many small elements that name the same
+    /// array would take memory without end.
     appended_left: Cell<u64>,
 }
 
@@ -67,10 +66,7 @@ impl<'d> Vtu<'d> {
         let root = document.root_element();
         let fault = |reason: String| Fault::new(place(document, root), reason);
         if !root.has_tag_name("VTKFile") {
-            return Err(fault(format!(
-                "the element <{}> where <VTKFile> is expected",
-                root.tag_name().name()
-            )));
+            return Err(fault(format!("the element <{}> where <VTKFile> is expected", root.tag_name().name())));
         }
         let version = root.attribute("version").unwrap_or("0.1");
         if !["0.", "1.", "2."].iter().any(|known| version.starts_with(known)) {
@@ -133,8 +129,9 @@ impl<'d> Vtu<'d> {
         let ends = self.cell_array(node, "offsets", n_cells)?;
         let entries = match ends.last() {
             None => 0,
-            Some(&end) => usize::try_from(end)
-                .map_err(|_| self.fault(node, format_args!("the last of the offsets is {end}")))?,
+            Some(&end) => {
+                usize::try_from(end).map_err(|_| self.fault(node, format_args!("the last of the offsets is {end}")))?
+            }
         };
         let connectivity = self.cell_array(node, "connectivity", entries)?;
         let regions = self.read_regions(piece, n_cells)?;
@@ -201,10 +198,7 @@ impl<'d> Vtu<'d> {
                 let offset = self.count(node, "offset")?;
                 let data = self.appended.get(offset..).ok_or_else(|| {
                     let length = self.appended.len();
-                    self.fault(
-                        node,
-                        format_args!("the offset {offset} is beyond the {length} appended bytes"),
-                    )
+                    self.fault(node, format_args!("the offset {offset} is beyond the {length} appended bytes"))
                 })?;
                 self.share(size).map_err(|reason| self.fault(node, reason))?;
                 if self.appended_raw { Source::Raw(data) } else { Source::Base64(Base64::new(data)) }

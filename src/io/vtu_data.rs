@@ -53,8 +53,7 @@ impl<'a> Base64<'a> {
             let mut quad = [0; 4];
             for place in &mut quad {
                 let text = self.text.trim_ascii_start();
-                let end =
-                    || format!("{n} bytes are expected, but the base64 text ends after {}", taken.len());
+                let end = || format!("{n} bytes are expected, but the base64 text ends after {}", taken.len());
                 let (&first, rest) = text.split_first().ok_or_else(end)?;
                 (*place, self.text) = (first, rest);
             }
@@ -99,9 +98,9 @@ impl Layout<'_> {
                 source.take(expected)
             }
             Some("vtkZLibDataCompressor") => self.read_zlib(source, expected),
-            Some(other) => Err(format!(
-                "compressed with {other:?}, which cannot be read; save with zlib or uncompressed"
-            )),
+            Some(other) => {
+                Err(format!("compressed with {other:?}, which cannot be read; save with zlib or uncompressed"))
+            }
         }
     }
 

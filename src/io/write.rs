@@ -28,9 +28,9 @@ pub struct Frame<'a> {
     pub cell_scalars: &'a [(&'a str, &'a [f32])],
 }
 
-/// Writes one frame as a `.vtu` file, atomically as [`write_atomically`](super::write_atomically) does, but for power cuts: who has
-/// written a series may synchronise its files. A field whose length does not fit the mesh is an error of the kind
-/// [`InvalidInput`](io::ErrorKind::InvalidInput), as is a tetrahedron that names a point beyond the last.
+/// Writes one frame as a `.vtu` file, atomically as [`write_atomically`](super::write_atomically) does, but for power
+/// cuts: who has written a series may synchronise its files. A field whose length does not fit the mesh is an error of
+/// the kind [`InvalidInput`](io::ErrorKind::InvalidInput), as is a tetrahedron that names a point beyond the last.
 pub fn write_vtu(path: &Path, frame: &Frame<'_>) -> io::Result<()> {
     let (n_points, n_tets) = (frame.points.len(), frame.tets.len());
     let mut arrays = Arrays { xml: String::new(), data: Vec::new() };
@@ -97,13 +97,11 @@ fn write_cells<const N: usize>(
     })
 }
 
-/// Writes a `.pvd` file, as [`write_vtu`] does: the frames of a simulation as pairs of a time in s and the name of a `.vtu` file
-/// relative to the folder of the `.pvd` file. Files of one time that follow each other are shown together.
+/// Writes a `.pvd` file, as [`write_vtu`] does: the frames of a simulation as pairs of a time in s and the name of a
+/// `.vtu` file relative to the folder of the `.pvd` file. Files of one time that follow each other are shown together.
 pub fn write_pvd(path: &Path, frames: &[(f64, String)]) -> io::Result<()> {
     replace(path, false, |w| {
-        w.write_all(
-            b"<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n",
-        )?;
+        w.write_all(b"<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n")?;
         let (mut part, mut before) = (0, f64::NAN);
         for (time, file) in frames {
             part = if *time == before { part + 1 } else { 0 };
@@ -146,8 +144,7 @@ impl Arrays {
         );
         let bytes: Vec<u8> = values.flatten().collect();
         let blocks: Vec<Vec<u8>> = bytes.chunks(BLOCK).map(compressed).collect::<io::Result<_>>()?;
-        for count in [blocks.len(), BLOCK, bytes.len() % BLOCK].into_iter().chain(blocks.iter().map(Vec::len))
-        {
+        for count in [blocks.len(), BLOCK, bytes.len() % BLOCK].into_iter().chain(blocks.iter().map(Vec::len)) {
             self.data.extend((count as u64).to_le_bytes());
         }
         self.data.extend(blocks.into_iter().flatten());

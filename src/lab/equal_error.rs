@@ -1,5 +1,6 @@
-//! How much longer do implicit steps take for the same error? For each row of an explicit method the time that backward Euler or the
-//! implicit midpoint rule takes with the step at which its mean error over time is the same, over the row's time.
+//! How much longer do implicit steps take for the same error? For each row of an explicit method the time that backward
+//! Euler or the implicit midpoint rule takes with the step at which its mean error over time is the same, over the
+//! row's time.
 
 use super::method::Method;
 use super::run::Row;
@@ -54,8 +55,8 @@ impl Point {
     }
 }
 
-/// The time at an error between those of two points of a curve, on logarithmic axes; at errors beyond the curve that of its end, so that the
-/// ratio to it is too low rather than too high.
+/// The time at an error between those of two points of a curve, on logarithmic axes; at errors beyond the curve that of
+/// its end, so that the ratio to it is too low rather than too high.
 fn time_at(curve: &[Point], error: f64) -> Option<f64> {
     let within = curve.windows(2).find_map(|pair| match pair {
         [a, b] if a.error < error && error <= b.error => {

@@ -110,15 +110,10 @@ impl fmt::Display for LabError {
             Self::Multiple { scene, multiple, interval: steps } => {
                 let known = (1..=*steps).filter(|multiple| steps.is_multiple_of(*multiple));
                 let known: Vec<String> = known.map(|multiple| multiple.to_string()).collect();
-                write!(
-                    f,
-                    "multiple {multiple} misses the snapshots of {scene}; there are {}",
-                    known.join(", ")
-                )
+                write!(f, "multiple {multiple} misses the snapshots of {scene}; there are {}", known.join(", "))
             }
             Self::NoNetwork { multiple } => {
-                let known: Vec<String> =
-                    super::networks::multiples().map(|multiple| multiple.to_string()).collect();
+                let known: Vec<String> = super::networks::multiples().map(|multiple| multiple.to_string()).collect();
                 write!(f, "there is no network for multiple {multiple}; there are {}", known.join(", "))
             }
             Self::Weights(error) => error.fmt(f),

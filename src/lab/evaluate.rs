@@ -23,9 +23,9 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan from names, of scenes also of the groups `ramped` and `moving`; an empty list stands for all there are, of methods
-    /// all but [`Method::SLOW`] and [`Method::HARD`]. The scene of the sweep is run at [`sweep::MULTIPLES`] too. Without a name it is `reversed`, if
-    /// that is among the scenes.
+    /// A plan from names, of scenes also of the groups `ramped` and `moving`; an empty list stands for all there are,
+    /// of methods all but [`Method::SLOW`] and [`Method::HARD`]. The scene of the sweep is run at [`sweep::MULTIPLES`]
+    /// too. Without a name it is `reversed`, if that is among the scenes.
     pub fn new(
         scenes: &[String],
         methods: &[String],
@@ -80,8 +80,8 @@ pub struct Evaluation {
     pub rows: Vec<Row>,
 }
 
-/// Carries the plan out: truths in `out/truth/`, rows in `out/results.csv`; files of an earlier evaluation are replaced. `say` is given
-/// the progress in words.
+/// Carries the plan out: truths in `out/truth/`, rows in `out/results.csv`; files of an earlier evaluation are
+/// replaced. `say` is given the progress in words.
 pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Evaluation, LabError> {
     super::create_folder(out)?;
     let (specs, multiples): (Vec<_>, Vec<_>) = plan.scenes.iter().cloned().unzip();

@@ -1,11 +1,12 @@
-//! Backward Euler and the implicit midpoint rule, to compare explicit steps with what most packages do. With `h` the step or half
-//! of it, velocities `w` at the end of `h` solve
+//! Backward Euler and the implicit midpoint rule, to compare explicit steps with what most packages do. With `h` the
+//! step or half of it, velocities `w` at the end of `h` solve
 //!
 //! ```text
 //! M ((1 + mu h) w - v) = h (F(t + h) + f(u + h w))
 //! ```
-//! by Newton's method with halved steps; each linear system by conjugate gradients in float32 with the parts of the diagonal inverted
-//! (Nocedal & Wright 2006, algorithms 7.1 and 5.3). Backward Euler goes on from there, the midpoint rule to twice as far. SI units.
+//! by Newton's method with halved steps; each linear system by conjugate gradients in float32 with the parts of the
+//! diagonal inverted (Nocedal & Wright 2006, algorithms 7.1 and 5.3). Backward Euler goes on from there, the midpoint
+//! rule to twice as far. SI units.
 
 use std::collections::BTreeMap;
 
@@ -29,8 +30,8 @@ pub enum Rule {
     Midpoint,
 }
 
-/// Newton's method ends when what is left of the momentum is this share of that at its start: with ten times as much it adds to the
-/// error of the midpoint rule.
+/// Newton's method ends when what is left of the momentum is this share of that at its start: with ten times as much it
+/// adds to the error of the midpoint rule.
 const NEWTON_TOLERANCE: f64 = 1e-4;
 const MOST_NEWTON_STEPS: u32 = 40;
 /// Conjugate gradients end at this share of the right side: Newton's method converges all the same, and sooner in time.
@@ -267,10 +268,7 @@ impl Matrix {
         };
         Self {
             diagonal: (0..node_count).map(|node| place(node, node)).collect(),
-            places: elements
-                .iter()
-                .map(|nodes| nodes.map(|row| nodes.map(|column| place(row, column))))
-                .collect(),
+            places: elements.iter().map(|nodes| nodes.map(|row| nodes.map(|column| place(row, column)))).collect(),
             parts: vec![Part::default(); columns.len()],
             starts,
             columns,
@@ -351,7 +349,8 @@ fn narrow(vectors: Vec<[f32; 4]>) -> Vec<DVec3> {
     vectors.into_iter().map(|[x, y, z, _]| DVec3::new(x.into(), y.into(), z.into())).collect()
 }
 
-/// Conjugate gradients with the inverted parts of the diagonal. Ends where the matrix is not positive along its direction.
+/// Conjugate gradients with the inverted parts of the diagonal. Ends where the matrix is not positive along its
+/// direction.
 struct Solve<'a> {
     matrix: &'a Matrix,
     free: Vec<[f32; 4]>,
@@ -473,10 +472,8 @@ mod tests {
     /// A held bar under a sudden weight: both come to the exact motion as steps get shorter, by their orders.
     #[test]
     fn errors_fall_with_the_order_of_the_rule() {
-        let scene = scene_of(
-            NeoHookean { c: 1_000.0, d: 10_000.0 },
-            Bar { size: [0.02, 0.02, 0.06], cells: [2, 2, 5] },
-        );
+        let scene =
+            scene_of(NeoHookean { c: 1_000.0, d: 10_000.0 }, Bar { size: [0.02, 0.02, 0.06], cells: [2, 2, 5] });
         let loads = Loads::new(&scene, [0.0; 3], &[], &[]).unwrap();
         // Stretched along z and let go.
         let stretched = |dt: f32| {
@@ -489,19 +486,13 @@ mod tests {
             state
         };
         let seconds = 0.02;
-        let shape =
-            |state: &VecState| state.displacements().iter().map(|u| u.to_array()[2]).collect::<Vec<f32>>();
+        let shape = |state: &VecState| state.displacements().iter().map(|u| u.to_array()[2]).collect::<Vec<f32>>();
         let fine = seconds / 4_000.0;
         let mut exact = stretched(fine);
         for _ in 0..4_000 {
-            assert_eq!(
-                tled::step(&scene, &loads, &mut exact, &Step::unchecked(fine, 0.0).unwrap()),
-                Status::Ok
-            );
+            assert_eq!(tled::step(&scene, &loads, &mut exact, &Step::unchecked(fine, 0.0).unwrap()), Status::Ok);
         }
-        for (rule, order, counts) in
-            [(Rule::BackwardEuler, 1.0, [800, 1_600]), (Rule::Midpoint, 2.0, [100, 200])]
-        {
+        for (rule, order, counts) in [(Rule::BackwardEuler, 1.0, [800, 1_600]), (Rule::Midpoint, 2.0, [100, 200])] {
             let errors = counts.map(|count| {
                 let dt = seconds / count as f32;
                 let mut state = stretched(dt);

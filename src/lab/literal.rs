@@ -1,6 +1,7 @@
-//! The laws as the paper prints them (Meister et al. 2018, section 2): functions of `I1 - 3`, where those of the library are of
-//! `I1bar - 3`. `W = W(I1 - 3) + d (J - 1)^2`, `P = 2 W' F + 2 d (J - 1) cof F`, in float64. At rest they have a residual stress `2 W'(0)`,
-//! so a free body shrinks until its volume resists. The paper's `d (J - 1)` is a misprint: no state would be in equilibrium. Pa.
+//! The laws as the paper prints them (Meister et al. 2018, section 2): functions of `I1 - 3`, where those of the
+//! library are of `I1bar - 3`. `W = W(I1 - 3) + d (J - 1)^2`, `P = 2 W' F + 2 d (J - 1) cof F`, in float64. At rest
+//! they have a residual stress `2 W'(0)`, so a free body shrinks until its volume resists. The paper's `d (J - 1)` is a
+//! misprint: no state would be in equilibrium. Pa.
 
 use glam::{DMat3, DVec3};
 use supple::material::{Exponential, NeoHookean};
@@ -24,9 +25,7 @@ impl LiteralLaw {
         let (x, change) = (invariant(f) - 3.0, f.determinant() - 1.0);
         match self {
             Self::NeoHookean(NeoHookean { c, d }) => c * x + d * change * change,
-            Self::Exponential(Exponential { a, b, d }) => {
-                0.5 * a / b * (b * x).exp_m1() + d * change * change
-            }
+            Self::Exponential(Exponential { a, b, d }) => 0.5 * a / b * (b * x).exp_m1() + d * change * change,
         }
     }
 
@@ -65,8 +64,7 @@ fn invariant(f: DMat3) -> f64 {
 mod tests {
     use super::*;
 
-    const LAWS: [LiteralLaw; 2] =
-        [PAPER, LiteralLaw::Exponential(Exponential { a: 59.0, b: 8.023, d: 60_000.0 })];
+    const LAWS: [LiteralLaw; 2] = [PAPER, LiteralLaw::Exponential(Exponential { a: 59.0, b: 8.023, d: 60_000.0 })];
 
     #[test]
     fn stress_is_the_derivative_of_the_energy() {
@@ -80,10 +78,7 @@ mod tests {
                     law.energy(DMat3::from_cols_array(&entries))
                 };
                 let numeric = (moved(1e-6) - moved(-1e-6)) / 2e-6;
-                assert!(
-                    (numeric - stress).abs() < 1e-4 * stress.abs().max(1.0),
-                    "{law:?}: {numeric} {stress}"
-                );
+                assert!((numeric - stress).abs() < 1e-4 * stress.abs().max(1.0), "{law:?}: {numeric} {stress}");
             }
         }
     }

@@ -1,5 +1,5 @@
-//! The command `supple-lab`: judge methods against the exact step, elements against nature, guards against hard cases, and train
-//! networks. Exit codes are those of `supple`.
+//! The command `supple-lab`: judge methods against the exact step, elements against nature, guards against hard cases,
+//! and train networks. Exit codes are those of `supple`.
 
 // Where nobody reads they panic; `supple_cli::screen` has what prints.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
@@ -28,7 +28,8 @@ struct Arguments {
 enum Command {
     /// How far from the exact motion methods are, and what they cost: results.csv and report.html
     Methods(methods::Asked),
-    /// Elements against nature, closed forms and published values: physics.csv, physics.md, pictures and a part of report.html
+    /// Elements against nature, closed forms and published values: physics.csv, physics.md, pictures and a part of
+    /// report.html
     Physics(physics::Asked),
     /// Whether runs are ever wrong without a word: hard.csv, hard-frames.csv and a part of report.html
     Hard(hard::Asked),

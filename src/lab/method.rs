@@ -20,7 +20,8 @@ use super::{DT, LabError, implicit};
 /// A way to move a scene.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Method {
-    /// The exact steps of the truth, for their time: as many as a step of the scene has ([`super::timing::Timing::refinement`]).
+    /// The exact steps of the truth, for their time: as many as a step of the scene has
+    /// ([`super::timing::Timing::refinement`]).
     Tled,
     /// Nothing moves: what a method has to beat.
     Hold,
@@ -38,7 +39,8 @@ pub enum Method {
     BackwardEuler,
     /// The implicit midpoint rule, to compare with.
     ImplicitMidpoint,
-    /// Mass-scaled, multilevel or damped steps that the host makes half as long and as long again, in turn at every snapshot.
+    /// Mass-scaled, multilevel or damped steps that the host makes half as long and as long again, in turn at every
+    /// snapshot.
     Switching(Large),
     /// The learned step with a network of the crate, after a lead-in of [`BURN_IN`].
     Learned(Family),
@@ -80,10 +82,9 @@ impl NetworkFile {
 /// Length of the lead-in, s (Meister et al. 2018, section 3).
 pub const BURN_IN: f64 = 0.3;
 
-/// Moves a state on by one step under loads, of so many seconds ([`Method::parts`]); what else it needs, it owns. Gives the status and
-/// what the step tells about itself. After [`Status::Diverged`] it is not called again.
-pub type Advance<'a> =
-    Box<dyn FnMut(&mut VecState, &Loads<'_>, f32) -> Result<(Status, StepReport), LabError> + 'a>;
+/// Moves a state on by one step under loads, of so many seconds ([`Method::parts`]); what else it needs, it owns. Gives
+/// the status and what the step tells about itself. After [`Status::Diverged`] it is not called again.
+pub type Advance<'a> = Box<dyn FnMut(&mut VecState, &Loads<'_>, f32) -> Result<(Status, StepReport), LabError> + 'a>;
 
 /// What a step tells about itself, if its method has it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -166,13 +167,12 @@ impl Method {
         Ok(if damps { Self::DampedWith(file) } else { Self::LearnedWith(file) })
     }
 
-    /// At which multiples of a scene's step it is run if asked for `multiples`. At 1 the long step is the exact one, and what
-    /// holds still does so at any step; networks of the learned step are for multiples of the paper's.
+    /// At which multiples of a scene's step it is run if asked for `multiples`. At 1 the long step is the exact one,
+    /// and what holds still does so at any step; networks of the learned step are for multiples of the paper's.
     #[must_use]
     pub fn multiples(self, timing: &Timing, multiples: &[u32]) -> Vec<u32> {
-        let those = |wanted: &dyn Fn(u32) -> bool| {
-            multiples.iter().copied().filter(|&multiple| wanted(multiple)).collect()
-        };
+        let those =
+            |wanted: &dyn Fn(u32) -> bool| multiples.iter().copied().filter(|&multiple| wanted(multiple)).collect();
         match self {
             Self::Learned(_) | Self::LearnedWith(_) if timing.step != DT => Vec::new(),
             Self::Tled | Self::Hold => vec![1],
@@ -182,8 +182,8 @@ impl Method {
         }
     }
 
-    /// Parts of equal length into which its steps up to a snapshot are cut: one, and two before every second snapshot for those that
-    /// switch.
+    /// Parts of equal length into which its steps up to a snapshot are cut: one, and two before every second snapshot
+    /// for those that switch.
     #[must_use]
     pub const fn parts(self, snapshot: usize) -> u32 {
         match self {
@@ -237,25 +237,17 @@ impl Method {
             Self::Hold => Ok(Box::new(|_, _, _| Ok((Status::Ok, StepReport::default())))),
             Self::Tled => exact(spec.timing.refinement),
             Self::TledLargeStep => exact(1),
-            Self::MassScaled | Self::Switching(Large::MassScaled) => {
-                large(inertia::Method::MassScaled, state)
-            }
+            Self::MassScaled | Self::Switching(Large::MassScaled) => large(inertia::Method::MassScaled, state),
             Self::Multilevel | Self::Switching(Large::Multilevel) => {
                 large(inertia::Method::Multilevel(Cells::Suggested), state)
             }
-            Self::Damped | Self::Switching(Large::Damped) => {
-                large(inertia::Method::damped(Cells::Suggested), state)
-            }
+            Self::Damped | Self::Switching(Large::Damped) => large(inertia::Method::damped(Cells::Suggested), state),
             Self::DampedWith(file) => {
                 let damper = Damper::new(Network::parse(file.bytes)?)?;
                 large(inertia::Method::Damped(damper, Cells::Suggested), state)
             }
-            Self::BackwardEuler => {
-                Ok(implicit::prepare(implicit::Rule::BackwardEuler, scene, state, dt, damping))
-            }
-            Self::ImplicitMidpoint => {
-                Ok(implicit::prepare(implicit::Rule::Midpoint, scene, state, dt, damping))
-            }
+            Self::BackwardEuler => Ok(implicit::prepare(implicit::Rule::BackwardEuler, scene, state, dt, damping)),
+            Self::ImplicitMidpoint => Ok(implicit::prepare(implicit::Rule::Midpoint, scene, state, dt, damping)),
             Self::Learned(family) => {
                 let multiple = (dt / DT).round() as u32;
                 let bytes = networks::learned(family, multiple).ok_or(LabError::NoNetwork { multiple })?;
@@ -290,8 +282,8 @@ fn exact_steps_in(dt: f32, timing: &Timing) -> u32 {
     (dt * timing.refinement as f32 / timing.step - 0.01).ceil().max(1.0) as u32
 }
 
-/// The learned step after its lead-in of exact ones, `count` in each of the network's. The lead-in is damped as the scene is, learned steps as the training was:
-/// on a scene with other damping a network is as wrong as it is.
+/// The learned step after its lead-in of exact ones, `count` in each of the network's. The lead-in is damped as the
+/// scene is, learned steps as the training was: on a scene with other damping a network is as wrong as it is.
 fn learned<'a>(
     scene: SceneView<'a, VecMaterial>,
     bytes: &'static [u8],

@@ -1,5 +1,5 @@
-//! Scenes of the laboratory that fall, turn, swing and sag: bodies that no slow ramp holds near equilibrium. Each comes in three
-//! tissues, whose bulk modulus is 10, 50 and 1000 times the shear modulus. SI units.
+//! Scenes of the laboratory that fall, turn, swing and sag: bodies that no slow ramp holds near equilibrium. Each comes
+//! in three tissues, whose bulk modulus is 10, 50 and 1000 times the shear modulus. SI units.
 //!
 //! A multiple here is of nearly the critical step at rest, so that 20 means twenty times what the exact step can take.
 
@@ -124,8 +124,8 @@ fn whip(ratio: f32) -> Result<Scene, LabError> {
     Ok(Scene { spec, seconds: 0.5, refinement: 2 })
 }
 
-/// The paper's bar under its law and with its bulk modulus, stretched by half its length in 0.04 s and held there: it becomes a
-/// hundred times as stiff, so that the truth takes shorter steps.
+/// The paper's bar under its law and with its bulk modulus, stretched by half its length in 0.04 s and held there: it
+/// becomes a hundred times as stiff, so that the truth takes shorter steps.
 fn fast_pull(ratio: f32) -> Result<Scene, LabError> {
     const D: f32 = 60_000.0;
     let Bar { cells: [nx, ny, nz], .. } = Bar::PAPER;
@@ -155,9 +155,7 @@ fn couple(ratio: f32) -> Result<Scene, LabError> {
     let mut spec = free_bar([SIDE; 3], [6, 6, 6], neo_hookean(2_000.0, ratio), 0.0);
     spec.forces = [(0.0, -NEWTON), (SIDE, NEWTON)]
         .into_iter()
-        .flat_map(|(face, newton)| {
-            nodes_where(&spec, |[x, ..]| x == face).into_iter().map(move |node| (node, newton))
-        })
+        .flat_map(|(face, newton)| nodes_where(&spec, |[x, ..]| x == face).into_iter().map(move |node| (node, newton)))
         .map(|(node, newton)| NodalForce { node, newton: [0.0, newton, 0.0], ramp: 0.0 })
         .collect();
     Ok(Scene { spec, seconds: 0.3, refinement: 2 })

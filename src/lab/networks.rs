@@ -1,5 +1,5 @@
-//! The networks that come with the crate (`weights/`), where they can be read in place, and what they are with another step written
-//! into their files.
+//! The networks that come with the crate (`weights/`), where they can be read in place, and what they are with another
+//! step written into their files.
 
 use std::sync::OnceLock;
 
@@ -25,8 +25,8 @@ pub enum Family {
     Compact,
     /// The same with int8 layers.
     CompactInt8,
-    /// Each compact network at the step of the next shorter one, the shortest at the longest step: what a step that was not that
-    /// of the training does.
+    /// Each compact network at the step of the next shorter one, the shortest at the longest step: what a step that was
+    /// not that of the training does.
     OtherStep,
 }
 

@@ -212,9 +212,7 @@ pub fn named(name: &str) -> Result<SceneSpec, LabError> {
         }),
         "cylinder" => leaning("cylinder", CYLINDER),
         "lobe" => leaning("lobe", LOBE),
-        "sudden-torsion" => {
-            Ok(SceneSpec { damping: LIGHT_DAMPING, ..bar("sudden-torsion", twist(GENTLE, 0.0)) })
-        }
+        "sudden-torsion" => Ok(SceneSpec { damping: LIGHT_DAMPING, ..bar("sudden-torsion", twist(GENTLE, 0.0)) }),
         // Held for a hundredth of a second after the ramp, so that it is let go at a snapshot.
         "release" => {
             let course = Course::Released((INTERVALS / 2) as f64 * Timing::PAPER.interval_seconds());
@@ -263,8 +261,7 @@ fn corners() -> [(u32, [f32; 2]); 4] {
 /// `newton` at each corner, at a right angle to the axis and to the radius; positive turns x to y.
 fn twist(newton: f32, ramp: f32) -> Vec<NodalForce> {
     let along = newton * core::f32::consts::FRAC_1_SQRT_2;
-    let force =
-        |(node, [x, y]): (u32, [f32; 2])| NodalForce { node, newton: [-y * along, x * along, 0.0], ramp };
+    let force = |(node, [x, y]): (u32, [f32; 2])| NodalForce { node, newton: [-y * along, x * along, 0.0], ramp };
     corners().map(force).to_vec()
 }
 
@@ -294,8 +291,8 @@ fn leaning(name: &'static str, file: &[u8]) -> Result<SceneSpec, LabError> {
     Ok(scene)
 }
 
-/// The bar, ten times as stiff, leaning over under a body force, held at two layers of nodes, which end between layers of a
-/// lattice. For training: it is in no table.
+/// The bar, ten times as stiff, leaning over under a body force, held at two layers of nodes, which end between layers
+/// of a lattice. For training: it is in no table.
 fn bent() -> SceneSpec {
     /// m/s^2.
     const ACCELERATION: f32 = 0.6;
@@ -303,9 +300,8 @@ fn bent() -> SceneSpec {
     let [nx, ny, _] = Bar::PAPER.cells;
     scene.supports = (0..Bar::PAPER.node(nx, ny, 1) + 1).map(Support::fixed).collect();
     let forces = (0..).zip(node_masses(&scene));
-    scene.forces = forces
-        .map(|(node, mass)| NodalForce { node, newton: [ACCELERATION * mass, 0.0, 0.0], ramp: RAMP })
-        .collect();
+    scene.forces =
+        forces.map(|(node, mass)| NodalForce { node, newton: [ACCELERATION * mass, 0.0, 0.0], ramp: RAMP }).collect();
     scene
 }
 
@@ -336,10 +332,7 @@ fn pushed_lobe() -> Result<SceneSpec, LabError> {
 }
 
 /// A mesh held at the low end of its longest axis, and the triangles of its surface.
-pub(super) fn held_at_its_end(
-    name: &'static str,
-    file: &[u8],
-) -> Result<(SceneSpec, Vec<[u32; 3]>), LabError> {
+pub(super) fn held_at_its_end(name: &'static str, file: &[u8]) -> Result<(SceneSpec, Vec<[u32; 3]>), LabError> {
     let TetMesh { points, tets, triangles, .. } = parse_msh(Path::new(name), file)?;
     let points = points.into_iter().map(|point| point.map(|component| component as f32)).collect();
     Ok((SceneSpec { law: AnyLaw::Exponential(MESH_LAW), ..held(name, points, tets) }, triangles))

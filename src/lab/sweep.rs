@@ -41,8 +41,7 @@ impl Curve {
 /// have none.
 #[must_use]
 pub fn curves(rows: &[Row], scene: &str) -> Vec<Curve> {
-    let stepped =
-        Method::ALL.into_iter().filter(|method| !method.multiples(&Timing::PAPER, &[2]).contains(&1));
+    let stepped = Method::ALL.into_iter().filter(|method| !method.multiples(&Timing::PAPER, &[2]).contains(&1));
     let curve = |method: Method| {
         let mut curve = Curve { name: method.name(), points: Vec::new(), diverged: Vec::new() };
         for row in rows {

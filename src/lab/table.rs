@@ -42,9 +42,7 @@ const TEXT_COLUMNS: [Column; 9] = [
     ("max mm", |row| short(error(row, |errors| errors.max))),
     ("over time mm", |row| short(error(row, Errors::mean_over_time))),
     ("skill", |row| short(skill(row))),
-    ("us/step", |row| {
-        row.figures().map_or_else(|| "-".into(), |figures| format!("{:.1}", figures.us_per_step))
-    }),
+    ("us/step", |row| row.figures().map_or_else(|| "-".into(), |figures| format!("{:.1}", figures.us_per_step))),
     ("status", |row| format!("{}", row.end)),
 ];
 
@@ -127,8 +125,7 @@ mod tests {
         let known = "lobe,tled-large-step,10,2.000000,0.500000,4.000000,1.500000,3.000000,0.500000,0.250000,\
                      150.000,500000.000,1.500000,2.000000,limited,3.500000";
         assert_eq!(lines[1], known);
-        let unknown =
-            "lobe,tled-large-step,10,,,,,3.000000,,,,,1.500000,2.000000,diverged at 0.013 s,3.500000";
+        let unknown = "lobe,tled-large-step,10,,,,,3.000000,,,,,1.500000,2.000000,diverged at 0.013 s,3.500000";
         assert_eq!(lines[2], unknown);
     }
 

@@ -8,8 +8,8 @@ use super::LabError;
 
 const THREADS: usize = 2;
 
-/// The results of `count` pieces of work in their order, or the first failure, after which no piece is begun. `tick` is called on this
-/// thread with each that is ready.
+/// The results of `count` pieces of work in their order, or the first failure, after which no piece is begun. `tick` is
+/// called on this thread with each that is ready.
 pub(super) fn in_parallel<T: Send>(
     count: usize,
     work: impl Fn(usize) -> Result<T, LabError> + Sync,

@@ -1,4 +1,5 @@
-//! How time is counted in a scene: the step that multiples are of, the steps between two snapshots, the exact steps of the truth.
+//! How time is counted in a scene: the step that multiples are of, the steps between two snapshots, the exact steps of
+//! the truth.
 
 use super::{DT, INTERVAL_STEPS};
 
@@ -17,16 +18,13 @@ impl Timing {
     /// The paper's step, which is short compared with the limit of stability of most bodies.
     pub const PAPER: Self = Self { step: DT, interval: INTERVAL_STEPS, refinement: 1 };
 
-    /// `seconds` in a whole number of intervals of 200 steps, each step as long as possible up to `longest` (s). Also gives the
-    /// intervals.
+    /// `seconds` in a whole number of intervals of 200 steps, each step as long as possible up to `longest` (s). Also
+    /// gives the intervals.
     #[must_use]
     pub fn of_longest(longest: f32, seconds: f32, refinement: u32) -> (Self, usize) {
         const INTERVAL: u32 = 200;
         let intervals = (seconds / (INTERVAL as f32 * longest)).ceil().max(1.0);
-        (
-            Self { step: seconds / (intervals * INTERVAL as f32), interval: INTERVAL, refinement },
-            intervals as usize,
-        )
+        (Self { step: seconds / (intervals * INTERVAL as f32), interval: INTERVAL, refinement }, intervals as usize)
     }
 
     /// Time between two snapshots, s.

@@ -1,6 +1,6 @@
-//! Does an adaptive step keep its tolerance, and what does it cost? Each scene is run with a tolerance, and by fixed steps of all
-//! lengths that divide its snapshots; the best of these by hand is the fastest whose error, known from the truth, never exceeds the
-//! tolerance. Lengths in mm, times in microseconds for a simulated second.
+//! Does an adaptive step keep its tolerance, and what does it cost? Each scene is run with a tolerance, and by fixed
+//! steps of all lengths that divide its snapshots; the best of these by hand is the fastest whose error, known from the
+//! truth, never exceeds the tolerance. Lengths in mm, times in microseconds for a simulated second.
 
 use std::path::Path;
 use std::time::Instant;
@@ -33,7 +33,8 @@ pub struct Row {
     pub motion: f64,
     /// The largest mean error of the nodes at a snapshot, mm; infinite if a step was refused.
     pub error: f64,
-    /// Shares of the snapshots with a status other than `ok` before them, and with an error above the tolerance without one.
+    /// Shares of the snapshots with a status other than `ok` before them, and with an error above the tolerance without
+    /// one.
     pub doubted: f64,
     /// See [`Row::doubted`].
     pub silent: f64,
@@ -53,7 +54,8 @@ struct Fixed {
     time: f64,
 }
 
-/// Carries the plan's scenes out on two threads, for each tolerance (mm); its methods are the fixed steps. Writes `tolerance.csv`.
+/// Carries the plan's scenes out on two threads, for each tolerance (mm); its methods are the fixed steps. Writes
+/// `tolerance.csv`.
 pub fn evaluate(
     plan: &Scenes,
     tolerances: &[f64],

@@ -2,8 +2,8 @@
 //! limit of stability, at rest and the least along the motion. SI units.
 //!
 //! Truths are kept on disk, one file a scene, little endian: `suppleT1`, key of the scene, counts, limits,
-//! displacements, and an FNV-1a checksum of all that. A file that does not match, because scene or kernel have changed or the
-//! disk is damaged, is computed again.
+//! displacements, and an FNV-1a checksum of all that. A file that does not match, because scene or kernel have changed
+//! or the disk is damaged, is computed again.
 
 use core::fmt;
 use std::fs;
@@ -25,8 +25,8 @@ const MAGIC: &[u8; 8] = b"suppleT1";
 /// Magic, key, nodes, snapshots, three limits, limited steps.
 const HEADER: usize = 64;
 
-/// The exact limit is computed at rest and at every snapshot; in between wherever the bound of [`tled::critical_step`], computed
-/// every `LOOK_STEPS` steps, has fallen by the share `FALL` below its least so far.
+/// The exact limit is computed at rest and at every snapshot; in between wherever the bound of [`tled::critical_step`],
+/// computed every `LOOK_STEPS` steps, has fallen by the share `FALL` below its least so far.
 const LOOK_STEPS: u32 = 10;
 const FALL: f32 = 0.02;
 
@@ -63,11 +63,7 @@ pub fn obtain(
     mut tick: impl FnMut(&SceneSpec, &Truth),
 ) -> Result<Vec<Truth>, LabError> {
     super::create_folder(folder)?;
-    in_parallel(
-        scenes.len(),
-        |index| obtain_one(&scenes[index], folder),
-        |index, truth| tick(&scenes[index], truth),
-    )
+    in_parallel(scenes.len(), |index| obtain_one(&scenes[index], folder), |index, truth| tick(&scenes[index], truth))
 }
 
 pub(super) fn obtain_one(scene: &SceneSpec, folder: &Path) -> Result<Truth, LabError> {
@@ -169,7 +165,8 @@ impl fmt::Write for Fnv {
     }
 }
 
-/// A hash of all that the truth depends on: the scene as text, which has all digits of a float32, and the kernel's first steps.
+/// A hash of all that the truth depends on: the scene as text, which has all digits of a float32, and the kernel's
+/// first steps.
 pub fn key(scene: &SceneSpec) -> Result<u64, LabError> {
     /// Enough for all forces and laws to have an effect.
     const STEPS: u32 = 10;
@@ -199,8 +196,7 @@ fn encode(truth: &Truth, key: u64) -> Vec<u8> {
 /// The truth in `bytes`, if they hold one of a scene with this key, number of nodes and of snapshots.
 fn decode(bytes: &[u8], expected: u64, (nodes, snapshots): (usize, usize)) -> Option<Truth> {
     let size = nodes.checked_mul(snapshots)?.checked_mul(12)?.checked_add(HEADER)?;
-    let (content, sum) =
-        bytes.split_last_chunk::<8>().map(|(content, sum)| (content, u64::from_le_bytes(*sum)))?;
+    let (content, sum) = bytes.split_last_chunk::<8>().map(|(content, sum)| (content, u64::from_le_bytes(*sum)))?;
     if content.len() != size || Fnv::EMPTY.add(content).0 != sum {
         return None;
     }

@@ -7,8 +7,8 @@
 //! ```text
 //! n' = n - 2 (n.s) / (s.s) s
 //! ```
-//! which needs neither angle nor trigonometry. At exact reversal `s` is zero: the frame turns by pi about its normal, which
-//! stays. At zero speed there is no tangent: the frame stays. Frames start as the world's axes.
+//! which needs neither angle nor trigonometry. At exact reversal `s` is zero: the frame turns by pi about its normal,
+//! which stays. At zero speed there is no tangent: the frame stays. Frames start as the world's axes.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -154,17 +154,9 @@ mod tests {
     /// Largest difference from an orthonormal, right-handed frame.
     fn off(frame: &Frame) -> f32 {
         let [t, n, b] = axes(frame);
-        [
-            t.length() - 1.0,
-            n.length() - 1.0,
-            b.length() - 1.0,
-            t.dot(n),
-            n.dot(b),
-            b.dot(t),
-            t.cross(n).dot(b) - 1.0,
-        ]
-        .into_iter()
-        .fold(0.0, |worst, value| worst.max(value.abs()))
+        [t.length() - 1.0, n.length() - 1.0, b.length() - 1.0, t.dot(n), n.dot(b), b.dot(t), t.cross(n).dot(b) - 1.0]
+            .into_iter()
+            .fold(0.0, |worst, value| worst.max(value.abs()))
     }
 
     fn random(state: &mut u64) -> f32 {

@@ -1,5 +1,5 @@
-//! The learned step as a method of the protocol of [`crate::step`]: forces, then the network's next increment of each vertex (m), with what the
-//! energy balance needs.
+//! The learned step as a method of the protocol of [`crate::step`]: forces, then the network's next increment of each
+//! vertex (m), with what the energy balance needs.
 
 use core::ops::Range;
 

@@ -1,5 +1,5 @@
-//! The learned step (Meister et al. 2018, section 2): a network predicts each vertex's acceleration for a step `D` that is
-//! 10 to 100 times longer than the exact one may be.
+//! The learned step (Meister et al. 2018, section 2): a network predicts each vertex's acceleration for a step `D` that
+//! is 10 to 100 times longer than the exact one may be.
 //!
 //! ```text
 //! v = (u(t) - u(t-D)) / D,  f = f_e - K u                 the vertex's state, in its local frame (frame.rs)
@@ -7,15 +7,16 @@
 //! u(t+D) - u(t) = u(t) - u(t-D) + D^2 a                   increments: 2 u - u(t-D) would round away the motion
 //! ```
 //! Velocity and acceleration are differences over `D`, so exact steps have to come first: in the lead-in
-//! ([`LearnedStep::lead`], 0.3 s in the paper) the frames follow their motion over each `D`, and the first learned step goes on
-//! from there. A state that has not moved yet needs no lead-in.
+//! ([`LearnedStep::lead`], 0.3 s in the paper) the frames follow their motion over each `D`, and the first learned step
+//! goes on from there. A state that has not moved yet needs no lead-in.
 //!
 //! The network knows nothing of energy. What it does is entered in the same energy balance as every other step
-//! ([`crate::step::EnergyBalance`]): with several times more kinetic energy than loads and supports have ever given the step is
-//! refused. With fallback a step that has more kinetic energy than the balance explains at all is undone, and exact steps take
-//! its place for some intervals, while the frames follow as in the lead-in. Then the network is tried again. Each fallback lasts twice as
-//! long as the last one, up to [`LONGEST_WAIT`] intervals, until there have been many more learned steps than that without one. An
-//! attempt that is undone after exact steps leaves their motion as it was, to the bit.
+//! ([`crate::step::EnergyBalance`]): with several times more kinetic energy than loads and supports have ever given the
+//! step is refused. With fallback a step that has more kinetic energy than the balance explains at all is undone, and
+//! exact steps take its place for some intervals, while the frames follow as in the lead-in. Then the network is tried
+//! again. Each fallback lasts twice as long as the last one, up to [`LONGEST_WAIT`] intervals, until there have been
+//! many more learned steps than that without one. An attempt that is undone after exact steps leaves their motion as it
+//! was, to the bit.
 
 pub mod frame;
 mod method;
@@ -265,8 +266,9 @@ impl<'w> LearnedModel<'w> {
         self.turns.exact > 0
     }
 
-    /// Exact steps take the next interval, and after a learned step as many as after one that is undone, because of what the host knows of
-    /// the latest step: a [`crate::guard`] that calls it inexact. Without fallback nothing changes.
+    /// Exact steps take the next interval, and after a learned step as many as after one that is undone, because of
+    /// what the host knows of the latest step: a [`crate::guard`] that calls it inexact. Without fallback nothing
+    /// changes.
     pub fn fall_back(&mut self, time: f64, status: Status) {
         if self.undoes {
             self.turns.fall_back(time, status);
@@ -395,8 +397,8 @@ impl<'w> LearnedView<'_, 'w> {
         (self.model.turns, self.model.led) = (Turns::NEW, None);
     }
 
-    /// The lead-in: exact steps of `exact` for as many of the network's as `seconds` have, while the frames follow. Gives the
-    /// worst status, or the first of a step that was refused.
+    /// The lead-in: exact steps of `exact` for as many of the network's as `seconds` have, while the frames follow.
+    /// Gives the worst status, or the first of a step that was refused.
     pub fn lead<M: ElementMaterial>(
         &mut self,
         scene: SceneView<'_, M>,
@@ -420,13 +422,9 @@ impl<'w> LearnedView<'_, 'w> {
         Ok(worst)
     }
 
-    /// One interval of the lead-in, or in place of a learned step that was [`Undone`]: `exact` takes exact steps that last as long as one of
-    /// the network's, while the frames follow.
-    pub fn lead_interval<S: AsState>(
-        &mut self,
-        state: &mut S,
-        exact: impl FnOnce(&mut S) -> Status,
-    ) -> Status {
+    /// One interval of the lead-in, or in place of a learned step that was [`Undone`]: `exact` takes exact steps that
+    /// last as long as one of the network's, while the frames follow.
+    pub fn lead_interval<S: AsState>(&mut self, state: &mut S, exact: impl FnOnce(&mut S) -> Status) -> Status {
         self.model.led = None;
         let before = state.as_state();
         let vertices = vertices(self.storage, before.displacement.len());
@@ -448,8 +446,8 @@ impl<'w> LearnedView<'_, 'w> {
         status
     }
 
-    /// Takes one learned step, or as many exact ones if it was undone or exact steps are next. Every learned step does the same
-    /// work, so the most that a call can take is that and an interval of exact steps.
+    /// Takes one learned step, or as many exact ones if it was undone or exact steps are next. Every learned step does
+    /// the same work, so the most that a call can take is that and an interval of exact steps.
     pub fn step<M: ElementMaterial>(
         &mut self,
         scene: SceneView<'_, M>,
@@ -467,9 +465,10 @@ impl<'w> LearnedView<'_, 'w> {
         }
     }
 
-    /// Takes one learned step, if exact ones are not next; if energy does not explain it, and with fallback, it is undone. The
-    /// last increment of the state then spans `exact` seconds, and the caller takes exact steps in [`LearnedView::lead_interval`]. Without
-    /// fallback a first step that diverges leaves displacements and time as before it, and increments that span the network's step.
+    /// Takes one learned step, if exact ones are not next; if energy does not explain it, and with fallback, it is
+    /// undone. The last increment of the state then spans `exact` seconds, and the caller takes exact steps in
+    /// [`LearnedView::lead_interval`]. Without fallback a first step that diverges leaves displacements and time as
+    /// before it, and increments that span the network's step.
     pub fn try_step<M: ElementMaterial>(
         &mut self,
         scene: SceneView<'_, M>,

@@ -1,5 +1,5 @@
-//! A prediction, vectorised over the vertices: frames, features, network, clipping, next increments (m), and what they enter in the
-//! energy balance.
+//! A prediction, vectorised over the vertices: frames, features, network, clipping, next increments (m), and what they
+//! enter in the energy balance.
 
 use crate::element::NodeInertia;
 use crate::mlp::{ForceInput, MAX_INPUTS, Network, Scratch};
@@ -113,14 +113,7 @@ impl<R: Real> Moving<R> {
     #[inline(always)]
     fn empty() -> Self {
         let (zero, none) = (R::splat(0.0), [R::splat(0.0); 3]);
-        Self {
-            axes: Axes::of(|_| Frame::WORLD),
-            free: none,
-            mass: zero,
-            increment: none,
-            force: none,
-            outside: zero,
-        }
+        Self { axes: Axes::of(|_| Frame::WORLD), free: none, mass: zero, increment: none, force: none, outside: zero }
     }
 }
 
@@ -150,12 +143,8 @@ impl Predict<'_, '_> {
     fn tiles<R: Real, const COLUMNS: usize>(mut self) -> (Totals, Counts) {
         let mut scratch = Scratch::<R, COLUMNS>::new();
         let zero = R::splat(0.0);
-        let mut sums = PredictionSums {
-            balance: [Sums::new(self.step, R::splat); 3],
-            free: zero,
-            clipped: zero,
-            outside: zero,
-        };
+        let mut sums =
+            PredictionSums { balance: [Sums::new(self.step, R::splat); 3], free: zero, clipped: zero, outside: zero };
         for first in (0..self.inertia.len()).step_by(COLUMNS * R::COUNT) {
             let mut inputs = [[zero; COLUMNS]; MAX_INPUTS];
             // Loops and functions, no closures over vectors: those may stay calls.
@@ -179,8 +168,7 @@ impl Predict<'_, '_> {
         let mut totals = Totals::default();
         totals.add_vectors(&sums.balance);
         let total = |counts: R| (0..R::COUNT).map(|lane| counts.lane(lane)).sum::<f32>();
-        let counts =
-            Counts { free: total(sums.free), clipped: total(sums.clipped), outside: total(sums.outside) };
+        let counts = Counts { free: total(sums.free), clipped: total(sums.clipped), outside: total(sums.outside) };
         (totals, counts)
     }
 
@@ -188,14 +176,12 @@ impl Predict<'_, '_> {
     #[inline(always)]
     fn see<R: Real>(&self, first: usize) -> (Moving<R>, [R; FEATURES]) {
         let [ix, iy, iz, mass] = R::from_rows(|lane| {
-            let NodeInertia { inverse: [x, y, z], mass } =
-                self.inertia.get(first + lane).copied().unwrap_or_default();
+            let NodeInertia { inverse: [x, y, z], mass } = self.inertia.get(first + lane).copied().unwrap_or_default();
             [x, y, z, mass]
         });
         let displacement = vectors::<R>(self.displacement, first);
         let (increment, force) = (vectors::<R>(self.increment, first), vectors::<R>(self.force, first));
-        let mut axes =
-            Axes::of(|lane| self.vertices.get(first + lane).map_or(Frame::WORLD, |vertex| vertex.frame));
+        let mut axes = Axes::of(|lane| self.vertices.get(first + lane).map_or(Frame::WORLD, |vertex| vertex.frame));
         axes.follow(increment);
         let speed = dot(increment, increment).root().divide(R::splat(self.step.seconds()));
         let seen = VertexInput { displacement, speed, force, mass };
@@ -206,14 +192,7 @@ impl Predict<'_, '_> {
         }
         let outside = R::splat(1.0) - inside;
         (
-            Moving {
-                axes,
-                free: [ix.positive(), iy.positive(), iz.positive()],
-                mass,
-                increment,
-                force,
-                outside,
-            },
+            Moving { axes, free: [ix.positive(), iy.positive(), iz.positive()], mass, increment, force, outside },
             features,
         )
     }
@@ -248,8 +227,7 @@ impl Predict<'_, '_> {
             }
         });
         let any = free[0].max(free[1]).max(free[2]);
-        let all =
-            same(clipped[0], unclipped[0]) * same(clipped[1], unclipped[1]) * same(clipped[2], unclipped[2]);
+        let all = same(clipped[0], unclipped[0]) * same(clipped[1], unclipped[1]) * same(clipped[2], unclipped[2]);
         sums.free = sums.free + any;
         sums.clipped = sums.clipped + any * (R::splat(1.0) - all);
         sums.outside = sums.outside + any * outside;

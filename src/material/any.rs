@@ -38,8 +38,8 @@ macro_rules! any_law {
                 [$(Self::$variant(<$law>::default()),)*].into_iter()
             }
 
-            /// Its number in weight files: twice the position in the list of laws. The odd numbers were the laws as the paper prints
-            /// them.
+            /// Its number in weight files: twice the position in the list of laws. The odd numbers were the laws as the
+            /// paper prints them.
             #[must_use]
             pub const fn code(&self) -> u32 {
                 match self {

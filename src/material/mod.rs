@@ -10,11 +10,13 @@
 //! Every function is finite for every `F`: below [`J_FLOOR`] the factor `g` goes on along its tangent,
 //! so an inverted element is pushed back with a force that is still minus the gradient of the energy.
 //!
-//! A new law is one short file with a [`Potential`] and a [`Law`] (`neo_hookean.rs` is the example) and one line in the list of
-//! laws below; scene files, weight files, the C API, the laboratory and the kernels of [`crate::element`] read that list.
+//! A new law is one short file with a [`Potential`] and a [`Law`] (`neo_hookean.rs` is the example) and one line in the
+//! list of laws below; scene files, weight files, the C API, the laboratory and the kernels of [`crate::element`] read
+//! that list.
 
-/// The list of laws, a file and a type each. The position in the list is the law's number in C and in weight files: a line never
-/// moves. `for_each_law!(each first..)` calls `each!` with `first..`, then with the variant of [`AnyLaw`] and the type of each law.
+/// The list of laws, a file and a type each. The position in the list is the law's number in C and in weight files: a
+/// line never moves. `for_each_law!(each first..)` calls `each!` with `first..`, then with the variant of [`AnyLaw`]
+/// and the type of each law.
 macro_rules! for_each_law {
     (@ $use:ident [$($given:tt)*]) => {
         $crate::material::for_each_law! {

@@ -1,5 +1,5 @@
-//! Elastic moduli at rest, Pa: what the constants of a law mean at small strain. With `W` and `U` of the module's head the shear
-//! modulus is `mu = 2 W'(0)` and the bulk modulus `K = U''(1)`.
+//! Elastic moduli at rest, Pa: what the constants of a law mean at small strain. With `W` and `U` of the module's head
+//! the shear modulus is `mu = 2 W'(0)` and the bulk modulus `K = U''(1)`.
 
 use super::{Law, Potential};
 
@@ -40,7 +40,8 @@ mod tests {
     use super::*;
     use crate::material::{Exponential, NeoHookean};
 
-    /// A bar of the silicone of a real beam: E 263,824 Pa, nu 0.499. `W = c x` and `U = d j^2`, so that `mu = 2 c`, `K = 2 d`.
+    /// A bar of the silicone of a real beam: E 263,824 Pa, nu 0.499. `W = c x` and `U = d j^2`, so that `mu = 2 c`, `K
+    /// = 2 d`.
     #[test]
     fn constants_of_silicone_give_its_measured_moduli() {
         let (young, nu) = (263_824.0, 0.499);

@@ -1,5 +1,5 @@
-//! The stress of a law from its two scalar functions, and its energy: `P = p1 (F - cof F) + s cof F`, with `p1 = 2 W' g`,
-//! `s = p1 + dPsi/dJ` and `g = J^(-2/3)`, continued along its tangent below [`J_FLOOR`]. Pa.
+//! The stress of a law from its two scalar functions, and its energy: `P = p1 (F - cof F) + s cof F`, with `p1 = 2 W'
+//! g`, `s = p1 + dPsi/dJ` and `g = J^(-2/3)`, continued along its tangent below [`J_FLOOR`]. Pa.
 
 use super::{J_FLOOR, Law, Potential};
 use crate::simd::{Pair, Real};
@@ -116,8 +116,7 @@ impl<R: Real> LawState<R> {
         let (two, factor) = (R::splat(2.0), &self.factor);
         let slope = two * self.slope;
         // g + g' I1 / 2 = J^(-5/3) (J - 1 - (I1 - 3 + 2 below) / 3): small at small strain
-        let bracket =
-            factor.fifth * (factor.clamped - (self.at.i + two * factor.below) * R::splat(1.0 / 3.0));
+        let bracket = factor.fifth * (factor.clamped - (self.at.i + two * factor.below) * R::splat(1.0 / 3.0));
         Response { p1: slope * factor.g, s: slope * bracket + self.pressure, saturation: self.saturation }
     }
 }

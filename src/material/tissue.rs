@@ -21,8 +21,8 @@ pub struct Tissue<L> {
     serde(rename_all = "kebab-case")
 )]
 pub enum Element {
-    /// Linear tetrahedra, each with the pressure of its own volume. They lock, that is bend too little, where tissue hardly
-    /// changes its volume (a Poisson's ratio above 0.45 or so).
+    /// Linear tetrahedra, each with the pressure of its own volume. They lock, that is bend too little, where tissue
+    /// hardly changes its volume (a Poisson's ratio above 0.45 or so).
     #[default]
     Linear,
     /// The same with the mean of the nodes' pressures: see [`NodalPressure`].
@@ -77,15 +77,15 @@ pub trait Material: Sync {
     /// The constants of all elements.
     fn laws(&self) -> Laws<'_, Self::Law>;
 
-    /// Index of the tissue of mesh element `element`. With [`NodalPressure`] the volume around a node is averaged over the
-    /// elements of one index, so that no pressure is smeared across where tissues meet.
+    /// Index of the tissue of mesh element `element`. With [`NodalPressure`] the volume around a node is averaged over
+    /// the elements of one index, so that no pressure is smeared across where tissues meet.
     fn region(&self, _element: usize) -> u16 {
         0
     }
 }
 
-/// The same material in tetrahedra with average nodal pressure (Bonet & Burton 1998; for TLED with several tissues Joldes,
-/// Wittek & Miller 2009), which do not lock where tissue hardly changes its volume: see [`crate::element`].
+/// The same material in tetrahedra with average nodal pressure (Bonet & Burton 1998; for TLED with several tissues
+/// Joldes, Wittek & Miller 2009), which do not lock where tissue hardly changes its volume: see [`crate::element`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodalPressure<M>(pub M);
 
@@ -110,10 +110,10 @@ impl<M: Material> Material for NodalPressure<M> {
     }
 }
 
-/// The same material in tetrahedra with stabilised nodal strain, which bend as they should on coarse meshes: all energy is taken at the
-/// nodes, from the mean displacement gradient of the elements of one tissue around them, and a quadratic energy holds what the mean
-/// does not see (Dohrmann et al. 2000; Puso & Solberg 2006). Under strains above a half elements at sharp edges may
-/// turn inside out, and laws that stiffen much are too soft there.
+/// The same material in tetrahedra with stabilised nodal strain, which bend as they should on coarse meshes: all energy
+/// is taken at the nodes, from the mean displacement gradient of the elements of one tissue around them, and a
+/// quadratic energy holds what the mean does not see (Dohrmann et al. 2000; Puso & Solberg 2006). Under strains above a
+/// half elements at sharp edges may turn inside out, and laws that stiffen much are too soft there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodalStrain<M>(pub M);
 
@@ -190,8 +190,7 @@ impl<'a, L: Law> Laws<'a, L> {
                 // Each element is looked up once, not for each constant.
                 let mut rows = [law.values(); TILE];
                 for (lane, row) in rows.iter_mut().enumerate().take(R::COUNT) {
-                    let tissue =
-                        of_element.get(element(lane)).and_then(|&index| tissues.get(usize::from(index)));
+                    let tissue = of_element.get(element(lane)).and_then(|&index| tissues.get(usize::from(index)));
                     if let Some(tissue) = tissue {
                         *row = tissue.law;
                     }
@@ -252,8 +251,8 @@ impl<L: Law> Material for Regions<'_, L> {
     }
 }
 
-/// Tissues in tetrahedra, which are known only when the program runs, as is the law: because a file or a host has named them. All
-/// that steps are made of is compiled once for this; the loops over elements are those of each law.
+/// Tissues in tetrahedra, which are known only when the program runs, as is the law: because a file or a host has named
+/// them. All that steps are made of is compiled once for this; the loops over elements are those of each law.
 #[derive(Clone, Copy, Debug)]
 pub struct AnyMaterial<'a, L = AnyLaw> {
     /// Which tetrahedra.

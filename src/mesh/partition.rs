@@ -64,13 +64,8 @@ pub(crate) struct Partitions {
 }
 
 impl Partitions {
-    pub(crate) const NONE: Self = Self {
-        count: 0,
-        size: NODE_MULTIPLE,
-        nodes: 0,
-        ends: [0; KINDS * MAX_PARTITIONS],
-        reach: [0; MAX_PARTITIONS],
-    };
+    pub(crate) const NONE: Self =
+        Self { count: 0, size: NODE_MULTIPLE, nodes: 0, ends: [0; KINDS * MAX_PARTITIONS], reach: [0; MAX_PARTITIONS] };
 
     /// All elements in strips; the elements of a strip belong to the same group.
     pub(crate) fn strips(&self, elements: impl Iterator<Item = Numbered>) -> impl Iterator<Item = Strip> {

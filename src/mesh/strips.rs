@@ -67,8 +67,7 @@ impl Strip {
             }
         }
         let third = permuted([node_not_in(second, third)?, q, a, c], third)?;
-        let (first, second) =
-            (Numbered { nodes: [p, a, b, c], ..first }, Numbered { nodes: [q, a, c, b], ..second });
+        let (first, second) = (Numbered { nodes: [p, a, b, c], ..first }, Numbered { nodes: [q, a, c, b], ..second });
         Some(Self { elements: [first, second, third], length: 3 })
     }
 }

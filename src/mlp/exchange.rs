@@ -1,9 +1,10 @@
 //! Networks to and from safetensors, the files of PyTorch (`weights/FORMAT.md`, with the code that loads one there).
 //!
-//! Weights and biases are tensors of float32, named as a module with two lists of linear layers names them: `first.0.weight`
-//! (outputs x inputs), `first.0.bias` (outputs), ..., `second.0.weight`, ... All else that a weight file holds is a JSON
-//! object under the key `supple` of the metadata. It is one key because the order of several would change from run to run.
-//! Floats are written so that they come back to the bit: a file of [`super::write`] is the same after there and back.
+//! Weights and biases are tensors of float32, named as a module with two lists of linear layers names them:
+//! `first.0.weight` (outputs x inputs), `first.0.bias` (outputs), ..., `second.0.weight`, ... All else that a weight
+//! file holds is a JSON object under the key `supple` of the metadata. It is one key because the order of several would
+//! change from run to run. Floats are written so that they come back to the bit: a file of [`super::write`] is the same
+//! after there and back.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -18,8 +19,8 @@ use serde_json::value::RawValue;
 
 use super::file::VERSION;
 use super::{
-    Activation, Description, ForceInput, Layer, LayerDescription, MAX_WIDTH, Network, Parameters, Range,
-    WeightError, hexadecimal, write,
+    Activation, Description, ForceInput, Layer, LayerDescription, MAX_WIDTH, Network, Parameters, Range, WeightError,
+    hexadecimal, write,
 };
 use crate::material::{AnyLaw, Element, Law, MAX_CONSTANTS};
 

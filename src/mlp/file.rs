@@ -1,5 +1,5 @@
-//! Weight files (`weights/FORMAT.md`, versions 1 and 3): little-endian, checksummed, read where they are. Nothing of a file is
-//! believed before its checksum and every field have been checked.
+//! Weight files (`weights/FORMAT.md`, versions 1 and 3): little-endian, checksummed, read where they are. Nothing of a
+//! file is believed before its checksum and every field have been checked.
 
 use core::fmt;
 
@@ -72,8 +72,8 @@ pub struct Range {
     serde(rename_all = "kebab-case")
 )]
 pub enum ForceInput {
-    /// In N, as in the paper. A vertex at the surface, where less mass is lumped, moves more under the same force than one
-    /// inside, and the network cannot tell which it has before it.
+    /// In N, as in the paper. A vertex at the surface, where less mass is lumped, moves more under the same force than
+    /// one inside, and the network cannot tell which it has before it.
     #[default]
     Newton,
     /// Over the vertex's lumped mass, m/s^2.
@@ -212,10 +212,7 @@ impl fmt::Display for WeightError {
             Self::Short { needed, bytes } => write!(f, "{bytes} bytes, a weight file needs {needed}"),
             Self::NotWeights => write!(f, "it does not begin with SUPPLE-W: not a weight file"),
             Self::Version { version } => {
-                write!(
-                    f,
-                    "version {version} of the weight format; this library reads {VERSION} and {VERSION_INT8}"
-                )
+                write!(f, "version {version} of the weight format; this library reads {VERSION} and {VERSION_INT8}")
             }
             Self::Checksum { stated, found } => {
                 write!(f, "checksum {found:08x} of the weights, the file says {stated:08x}: it is damaged")
@@ -264,11 +261,7 @@ pub struct Network<'w> {
 }
 
 /// `size_of::<T>() * count` bytes from `*at` on, which moves behind them.
-pub(super) fn take<'w, T: Pod>(
-    bytes: &'w [u8],
-    at: &mut usize,
-    count: usize,
-) -> Result<&'w [T], WeightError> {
+pub(super) fn take<'w, T: Pod>(bytes: &'w [u8], at: &mut usize, count: usize) -> Result<&'w [T], WeightError> {
     let end = size_of::<T>().checked_mul(count).and_then(|size| size.checked_add(*at)).unwrap_or(usize::MAX);
     let slice = bytes.get(*at..end).ok_or(WeightError::Short { needed: end, bytes: bytes.len() })?;
     *at = end;
@@ -427,12 +420,10 @@ fn recipe<'w>(header: &Header, bytes: &'w [u8]) -> Result<Recipe<'w>, WeightErro
         code => return Err(WeightError::Header { field: "the unit of force", value: code as f32 }),
     };
     let element = Element::ALL.into_iter().find(|element| element.code() == header.element);
-    let element =
-        element.ok_or(WeightError::Header { field: "the element", value: header.element as f32 })?;
+    let element = element.ok_or(WeightError::Header { field: "the element", value: header.element as f32 })?;
     let (at, length) = (header.recipe, header.recipe_length);
     let end = (at as usize).checked_add(length as usize);
-    let text =
-        end.and_then(|end| bytes.get(at as usize..end)).and_then(|text| core::str::from_utf8(text).ok());
+    let text = end.and_then(|end| bytes.get(at as usize..end)).and_then(|text| core::str::from_utf8(text).ok());
     Ok(Recipe {
         law: law.with(header.constants),
         density: positive("the density", header.density)?,

@@ -1,11 +1,11 @@
-//! The forward pass, scalar for one vertex and vectorised over many. Sums are taken in the order of the inputs, so the result of a
-//! vertex does not depend on the others.
+//! The forward pass, scalar for one vertex and vectorised over many. Sums are taken in the order of the inputs, so the
+//! result of a vertex does not depend on the others.
 //!
-//! Vertices pass in tiles of one or two vectors, and each weight is repeated over a vector. Four outputs at a time have their
-//! sums in registers, so that each loaded vector serves four multiplications and additions.
+//! Vertices pass in tiles of one or two vectors, and each weight is repeated over a vector. Four outputs at a time have
+//! their sums in registers, so that each loaded vector serves four multiplications and additions.
 //!
-//! A network with layers in int8 ([`super::int8`]) fuses no multiplication with an addition, so that it gives the same bits on
-//! every processor.
+//! A network with layers in int8 ([`super::int8`]) fuses no multiplication with an addition, so that it gives the same
+//! bits on every processor.
 
 use super::int8::Words;
 use super::{Layer, MAX_INPUTS, MAX_OUTPUTS, MAX_WIDTH, Network, Parameters};
@@ -45,11 +45,8 @@ fn plus<R: Real, const COLUMNS: usize, const FUSED: bool>(
     // Not a closure, which the compiler may not inline.
     let mut out = sums;
     for column in 0..COLUMNS {
-        out[column] = if FUSED {
-            weight.fused(values[column], sums[column])
-        } else {
-            weight * values[column] + sums[column]
-        };
+        out[column] =
+            if FUSED { weight.fused(values[column], sums[column]) } else { weight * values[column] + sums[column] };
     }
     out
 }
@@ -164,8 +161,8 @@ impl Network<'_> {
         [clipped, sums]
     }
 
-    /// Outputs, in their units and clipped, of one vertex. Inputs that are not given count as zero. The same bits on every
-    /// processor.
+    /// Outputs, in their units and clipped, of one vertex. Inputs that are not given count as zero. The same bits on
+    /// every processor.
     pub fn predict(&self, inputs: &[f32], outputs: &mut [f32]) {
         let mut padded = [[0.0]; MAX_INPUTS];
         for (padded, input) in padded.iter_mut().zip(inputs) {
@@ -178,8 +175,9 @@ impl Network<'_> {
     }
 
     /// The same for many vertices: rows of as many inputs as the network has, and of as many outputs. Rows that are not
-    /// whole, or have no counterpart, are left out. In float32 it agrees with [`Network::predict`] to rounding, and gives the same
-    /// bits on every processor with the feature `deterministic`; with layers in int8 it gives the bits of [`Network::predict`].
+    /// whole, or have no counterpart, are left out. In float32 it agrees with [`Network::predict`] to rounding, and
+    /// gives the same bits on every processor with the feature `deterministic`; with layers in int8 it gives the bits
+    /// of [`Network::predict`].
     pub fn predict_rows(&self, inputs: &[f32], outputs: &mut [f32]) {
         dispatch(Rows { network: self, inputs, outputs });
     }
@@ -208,8 +206,7 @@ impl Rows<'_> {
         let Self { network, inputs, outputs } = self;
         let (wide, high) = (network.inputs.len().max(1), network.outputs.len().max(1));
         let count = (inputs.len() / wide).min(outputs.len() / high);
-        let (Some(inputs), Some(outputs)) = (inputs.get(..count * wide), outputs.get_mut(..count * high))
-        else {
+        let (Some(inputs), Some(outputs)) = (inputs.get(..count * wide), outputs.get_mut(..count * high)) else {
             return;
         };
         let vertices = COLUMNS * R::COUNT;
@@ -219,8 +216,7 @@ impl Rows<'_> {
             for (input, values) in values.iter_mut().enumerate().take(wide) {
                 for (column, value) in values.iter_mut().enumerate() {
                     let first = column * R::COUNT;
-                    *value =
-                        R::from_fn(|lane| inputs.get((first + lane) * wide + input).copied().unwrap_or(0.0));
+                    *value = R::from_fn(|lane| inputs.get((first + lane) * wide + input).copied().unwrap_or(0.0));
                 }
             }
             let [clipped, _] = network.forward(&values, &mut scratch);

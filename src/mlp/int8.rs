@@ -1,5 +1,5 @@
-//! Layers in int8. The inputs of each vertex are quantised to `u8` with a step of its own, just wide enough for the largest; sums
-//! are taken in `i32` and requantised to `f32`:
+//! Layers in int8. The inputs of each vertex are quantised to `u8` with a step of its own, just wide enough for the
+//! largest; sums are taken in `i32` and requantised to `f32`:
 //!
 //! ```text
 //! m = max(max_i x_i, -min_i x_i (255 - zero) / zero)        of this vertex, and at least 2^-100
@@ -7,11 +7,11 @@
 //! S_o = sum_i w_oi (q_i - zero)                             in i32, exact
 //! y_o = act(S_o (scale_o m / (255 - zero)) + b_o)
 //! ```
-//! So nothing is ever cut off. With one step for all vertices, from the range of the training, roll-outs left that range, and 16
-//! bits lost as much as 8.
+//! So nothing is ever cut off. With one step for all vertices, from the range of the training, roll-outs left that
+//! range, and 16 bits lost as much as 8.
 //!
-//! Vertices are vectorised as in the float32 layers: a weight is repeated over a vector of vertices, so nothing is transposed
-//! between layers of either kind.
+//! Vertices are vectorised as in the float32 layers: a weight is repeated over a vector of vertices, so nothing is
+//! transposed between layers of either kind.
 
 use super::forward::Tile;
 use super::{Activation, MAX_WIDTH};
@@ -34,7 +34,8 @@ pub struct Int8<'w> {
     pub zero: u8,
     /// Tile after tile of the inputs for each [`TILE_ROWS`] outputs, zeros where there is no input or output.
     pub weights: &'w [WeightTile],
-    /// Where sums start: `-zero` times the sum of the weights, one an output, and zeros up to a multiple of [`TILE_ROWS`].
+    /// Where sums start: `-zero` times the sum of the weights, one an output, and zeros up to a multiple of
+    /// [`TILE_ROWS`].
     pub starts: &'w [i32],
     /// Of each output's weights, and zeros as well.
     pub scales: &'w [f32],
@@ -114,8 +115,7 @@ impl Int8<'_> {
         (from, steps): (&Words<R, COLUMNS>, Tile<R, COLUMNS>),
         to: &mut [Tile<R, COLUMNS>],
     ) {
-        let mut tables =
-            self.starts.chunks_exact(N).zip(self.scales.chunks_exact(N)).zip(self.biases.chunks_exact(N));
+        let mut tables = self.starts.chunks_exact(N).zip(self.scales.chunks_exact(N)).zip(self.biases.chunks_exact(N));
         let mut outputs = to.chunks_exact_mut(N);
         // Nested loops, not iterators, whose closures the compiler may not inline.
         for tiles in self.weights.chunks_exact(inputs.div_ceil(GROUP).max(1)) {

@@ -69,9 +69,7 @@ impl<'w> Arrays<'w> {
         let values: &[f32] = self.array(field, offset, count)?;
         match values.iter().position(|value| !value.is_finite()) {
             None => Ok(values),
-            Some(index) => {
-                Err(WeightError::NotFinite { layer: self.layer, at: byte_of::<f32>(offset, index) })
-            }
+            Some(index) => Err(WeightError::NotFinite { layer: self.layer, at: byte_of::<f32>(offset, index) }),
         }
     }
 
@@ -82,8 +80,7 @@ impl<'w> Arrays<'w> {
         let Some(zero) = u8::try_from(long.zero).ok().filter(|zero| (1..u8::MAX).contains(zero)) else {
             return self.wrong("the activation for zero", long.zero);
         };
-        let weights: &[WeightTile] =
-            self.array("the offset of the weights", start, groups * (padded / TILE_ROWS))?;
+        let weights: &[WeightTile] = self.array("the offset of the weights", start, groups * (padded / TILE_ROWS))?;
         let starts: &[i32] = self.array("the offset of the sums' starts", long.starts, padded)?;
         let scales = self.finite("the offset of the scales", long.scales, padded)?;
         let floats = self.finite("the offset of the biases", biases, padded)?;
@@ -129,11 +126,7 @@ const fn byte_of<T>(offset: u32, index: usize) -> u32 {
 }
 
 /// The layer that an entry describes.
-pub(super) fn checked_layer<'w>(
-    bytes: &'w [u8],
-    long: &LongEntry,
-    place: Place,
-) -> Result<Layer<'w>, WeightError> {
+pub(super) fn checked_layer<'w>(bytes: &'w [u8], long: &LongEntry, place: Place) -> Result<Layer<'w>, WeightError> {
     let entry = &long.entry;
     let arrays = Arrays { bytes, layer: place.layer };
     let (inputs, outputs) = (entry.inputs as usize, entry.outputs as usize);

@@ -24,9 +24,7 @@ pub use file::{ForceInput, MAGIC, Network, Range, Recipe, WeightError};
 pub(crate) use forward::Scratch;
 pub use int8::{GROUP, Int8, TILE_ROWS, WeightTile};
 #[cfg(feature = "std")]
-pub use write::{
-    Description, Int8Description, LayerDescription, WeightBytes, hexadecimal, write, write_int8,
-};
+pub use write::{Description, Int8Description, LayerDescription, WeightBytes, hexadecimal, write, write_int8};
 
 /// Widest layer.
 pub const MAX_WIDTH: usize = 256;

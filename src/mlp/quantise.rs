@@ -1,15 +1,15 @@
-//! Post-training quantisation of float32 networks to int8 (Jacob et al. 2018, Nagel et al. 2021), calibrated by samples of their
-//! inputs.
+//! Post-training quantisation of float32 networks to int8 (Jacob et al. 2018, Nagel et al. 2021), calibrated by samples
+//! of their inputs.
 //!
 //! The samples pass through both networks, layer by layer. Weights are rounded with a scale for each output,
 //!
 //! ```text
 //! w_oi = round(W_oi / scale_o),   scale_o = max_i |W_oi| / 127
 //! ```
-//! and biases are corrected by the mean error that this makes (bias correction). The last layer of a part, if it stays in float32,
-//! is fitted anew to the float32 network's predictions, by least squares. A sample whose prediction is `y`, in standard deviations,
-//! has the weight `1 / (1 + y^2)`: a relative error for fast and rough motion, without which roll-outs ring, an absolute one for
-//! slow motion.
+//! and biases are corrected by the mean error that this makes (bias correction). The last layer of a part, if it stays
+//! in float32, is fitted anew to the float32 network's predictions, by least squares. A sample whose prediction is `y`,
+//! in standard deviations, has the weight `1 / (1 + y^2)`: a relative error for fast and rough motion, without which
+//! roll-outs ring, an absolute one for slow motion.
 
 use core::fmt;
 use std::vec;
@@ -70,8 +70,9 @@ pub struct Quantised<'w> {
     pub description: Description<'w>,
     /// Its layers in int8.
     pub layers: Vec<Option<Int8Description>>,
-    /// Root mean square error of each layer's activations over their standard deviation, over the weighted samples. Exact are
-    /// those of the float32 network; the last layer of the second part has to correct the error of the first as well.
+    /// Root mean square error of each layer's activations over their standard deviation, over the weighted samples.
+    /// Exact are those of the float32 network; the last layer of the second part has to correct the error of the first
+    /// as well.
     pub errors: Vec<f64>,
 }
 
@@ -85,13 +86,9 @@ struct Activations {
     rounded: Vec<f64>,
 }
 
-/// Quantises by samples, rows of the network's inputs in their units. The layers of `float`, counted through both parts, stay in
-/// float32.
-pub fn quantise<'w>(
-    network: &Network<'w>,
-    samples: &[f32],
-    float: &[usize],
-) -> Result<Quantised<'w>, QuantiseError> {
+/// Quantises by samples, rows of the network's inputs in their units. The layers of `float`, counted through both
+/// parts, stay in float32.
+pub fn quantise<'w>(network: &Network<'w>, samples: &[f32], float: &[usize]) -> Result<Quantised<'w>, QuantiseError> {
     let (first, second) = network.layers();
     if let Some(layer) = first.iter().chain(second).position(Layer::is_int8) {
         return Err(QuantiseError::Int8 { layer });
@@ -116,8 +113,7 @@ pub fn quantise<'w>(
         row.iter().zip(network.inputs()).map(|(x, range)| f64::from(x / range.scale)).collect()
     };
     let scaled: Vec<f64> = rows.chunks_exact(wide).flat_map(scaled).collect();
-    let mut quantised =
-        Quantised { description: Description::of(network), layers: Vec::new(), errors: Vec::new() };
+    let mut quantised = Quantised { description: Description::of(network), layers: Vec::new(), errors: Vec::new() };
     let start = Activations { width: wide, exact: scaled.clone(), rounded: scaled.clone() };
     let one = part(first, start, None, (float, &counts), &mut quantised)?;
     if !second.is_empty() {
@@ -151,8 +147,7 @@ fn part<'w>(
         let mut wanted = dense(weights, biases, &flow.exact, flow.width);
         let last = at + 1 == layers.len() && layer.activation == Activation::Linear;
         if let (true, Some(before)) = (last, before) {
-            for (wanted, (exact, rounded)) in wanted.iter_mut().zip(before.exact.iter().zip(&before.rounded))
-            {
+            for (wanted, (exact, rounded)) in wanted.iter_mut().zip(before.exact.iter().zip(&before.rounded)) {
                 *wanted += exact - rounded;
             }
         }
@@ -164,8 +159,7 @@ fn part<'w>(
             None => dense(weights, biases, &flow.rounded, flow.width),
         };
         if let Some(described) = described {
-            let left: Vec<f64> =
-                wanted.iter().zip(&rounded).map(|(wanted, rounded)| wanted - rounded).collect();
+            let left: Vec<f64> = wanted.iter().zip(&rounded).map(|(wanted, rounded)| wanted - rounded).collect();
             if int8.is_some() {
                 for (output, bias) in described.biases.iter_mut().enumerate() {
                     let off = mean(left.iter().skip(output).step_by(layer.outputs).copied(), counts);
@@ -222,17 +216,15 @@ fn int8_dense(int8: &Int8Description, biases: &[f32], (words, steps): &Words, wi
 
 /// Weighted by `counts`.
 fn mean(values: impl Iterator<Item = f64>, counts: &[f64]) -> f64 {
-    let weighted =
-        values.zip(counts).fold((0.0, 0.0), |(sum, all), (value, count)| (sum + count * value, all + count));
+    let weighted = values.zip(counts).fold((0.0, 0.0), |(sum, all), (value, count)| (sum + count * value, all + count));
     weighted.0 / weighted.1.max(f64::MIN_POSITIVE)
 }
 
 /// See [`Quantised::errors`].
 fn error(flow: &Activations, counts: &[f64]) -> f64 {
     let squares = |channel: usize| {
-        let column = |values: &'_ [f64]| -> Vec<f64> {
-            values.iter().skip(channel).step_by(flow.width).copied().collect()
-        };
+        let column =
+            |values: &'_ [f64]| -> Vec<f64> { values.iter().skip(channel).step_by(flow.width).copied().collect() };
         let (exact, rounded) = (column(&flow.exact), column(&flow.rounded));
         let centre = mean(exact.iter().copied(), counts);
         let off = exact.iter().zip(&rounded).map(|(a, b)| (a - b).powi(2));
@@ -246,20 +238,15 @@ fn error(flow: &Activations, counts: &[f64]) -> f64 {
 type Words = (Vec<u8>, Vec<f64>);
 
 /// A layer in int8, and the quantised activations before it.
-fn quantised_layer(
-    layer: &Layer<'_>,
-    weights: &[f32],
-    samples: &[f64],
-    counts: &[f64],
-) -> (Int8Description, Words) {
+fn quantised_layer(layer: &Layer<'_>, weights: &[f32], samples: &[f64], counts: &[f64]) -> (Int8Description, Words) {
     let rows = || samples.chunks_exact(layer.inputs);
     // The zero with the shortest steps.
     let mean_square = |&zero: &u8| mean(rows().map(|row| step(row, zero).powi(2)), counts);
     let zero = ZEROS.into_iter().min_by(|a, b| mean_square(a).total_cmp(&mean_square(b))).unwrap_or(128);
     let steps: Vec<f64> = rows().map(|row| step(row, zero)).collect();
-    let words = rows().zip(&steps).flat_map(|(row, step)| {
-        row.iter().map(move |x| (x / step + f64::from(zero)).round_ties_even() as u8)
-    });
+    let words = rows()
+        .zip(&steps)
+        .flat_map(|(row, step)| row.iter().map(move |x| (x / step + f64::from(zero)).round_ties_even() as u8));
     let words = words.collect();
     let (mut rounded, mut scales) = (Vec::with_capacity(weights.len()), Vec::with_capacity(layer.outputs));
     for row in weights.chunks_exact(layer.inputs) {

@@ -153,8 +153,7 @@ impl Image {
         let (inputs, outputs) = (layer.inputs, layer.biases.len());
         let mut long = LongEntry::default();
         if let Some(int8) = int8 {
-            let sums =
-                int8.weights.chunks(inputs.max(1)).map(|row| row.iter().map(|&w| i32::from(w)).sum::<i32>());
+            let sums = int8.weights.chunks(inputs.max(1)).map(|row| row.iter().map(|&w| i32::from(w)).sum::<i32>());
             let starts: Vec<i32> = sums.map(|sum| -i32::from(int8.zero) * sum).collect();
             long.entry.precision = 1;
             long.zero = int8.zero.into();
@@ -201,12 +200,9 @@ pub fn write(description: &Description<'_>) -> Result<Vec<u8>, WeightError> {
     write_int8(description, &[])
 }
 
-/// The same with some layers in int8: layer `n`, counted through both parts, has the weights of `int8[n]`, where there are any,
-/// instead of the description's. Version 3 if there is one.
-pub fn write_int8(
-    description: &Description<'_>,
-    int8: &[Option<Int8Description>],
-) -> Result<Vec<u8>, WeightError> {
+/// The same with some layers in int8: layer `n`, counted through both parts, has the weights of `int8[n]`, where there
+/// are any, instead of the description's. Version 3 if there is one.
+pub fn write_int8(description: &Description<'_>, int8: &[Option<Int8Description>]) -> Result<Vec<u8>, WeightError> {
     let Description { inputs, outputs, first, second, law, .. } = description;
     let layers: Vec<_> = first.iter().chain(second).collect();
     let version = if int8.iter().any(Option::is_some) { VERSION_INT8 } else { VERSION };
@@ -242,8 +238,7 @@ pub fn write_int8(
         element: description.element.code(),
         reserved: [0; 120],
     };
-    let place =
-        |bytes: &mut Vec<u8>, at: usize, part: &[u8]| bytes[at..at + part.len()].copy_from_slice(part);
+    let place = |bytes: &mut Vec<u8>, at: usize, part: &[u8]| bytes[at..at + part.len()].copy_from_slice(part);
     place(&mut bytes, HEADER, bytemuck::cast_slice(inputs));
     place(&mut bytes, HEADER + size_of::<Range>() * inputs.len(), bytemuck::cast_slice(outputs));
     place(&mut bytes, HEADER + tables, &entries);

@@ -1,4 +1,5 @@
-//! What can be wrong with a mesh, its supports, its material or the memory that a scene is built in, with place and value.
+//! What can be wrong with a mesh, its supports, its material or the memory that a scene is built in, with place and
+//! value.
 
 use core::fmt;
 
@@ -66,8 +67,9 @@ pub enum BuildError {
     NothingMoves,
     /// More rows of patches, for tetrahedra with nodal strain, than the scene has room for.
     PatchCapacity {
-        /// Rows that are enough ([`PatchRow`](crate::element::PatchRow)): exactly as many as are needed, if there was room to count them; what
-        /// [`patch_rows_for`](super::patch_rows_for) tells, if there was not even room for the nodes.
+        /// Rows that are enough ([`PatchRow`](crate::element::PatchRow)): exactly as many as are needed, if there was
+        /// room to count them; what [`patch_rows_for`](super::patch_rows_for) tells, if there was not even room for the
+        /// nodes.
         needed: usize,
         /// Room.
         capacity: usize,
@@ -87,10 +89,9 @@ impl fmt::Display for BuildError {
             Self::NodeCapacity { needed, capacity } => {
                 write!(f, "the mesh has {needed} nodes, the scene has room for {capacity}")
             }
-            Self::TileCapacity { needed, capacity } => write!(
-                f,
-                "the mesh needs {needed} tiles of {TILE} elements, the scene has room for {capacity}"
-            ),
+            Self::TileCapacity { needed, capacity } => {
+                write!(f, "the mesh needs {needed} tiles of {TILE} elements, the scene has room for {capacity}")
+            }
             Self::ElementCount { elements, most } => {
                 write!(f, "the mesh has {elements} elements, a scene can have {most}")
             }
@@ -99,19 +100,13 @@ impl fmt::Display for BuildError {
             }
             Self::NoTissue { element } => write!(f, "element {element}: the material names no tissue"),
             Self::Constant { element, name, value } => {
-                write!(
-                    f,
-                    "element {element}: constant {name} is {value}, it must be a finite positive number"
-                )
+                write!(f, "element {element}: constant {name} is {value}, it must be a finite positive number")
             }
             Self::Density { element, value } => {
                 write!(f, "element {element}: density is {value} kg/m^3, it must be a finite positive number")
             }
             Self::PatchCapacity { needed, capacity } => {
-                write!(
-                    f,
-                    "{needed} rows of patches are enough for nodal strain, the scene has room for {capacity}"
-                )
+                write!(f, "{needed} rows of patches are enough for nodal strain, the scene has room for {capacity}")
             }
             Self::NothingMoves => write!(f, "all nodes of all elements are fixed, so nothing can move"),
         }

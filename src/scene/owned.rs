@@ -70,18 +70,15 @@ impl<const N: usize, const T: usize, const P: usize> SceneTables for FixedTables
     }
 }
 
-/// A scene of at most `N` nodes and `T` tiles of elements ([`tiles_for`](super::tiles_for)), with nodal strain of at most `P` rows of patches
-/// ([`patch_rows_for`](super::patch_rows_for)), which may be a `static`.
+/// A scene of at most `N` nodes and `T` tiles of elements ([`tiles_for`](super::tiles_for)), with nodal strain of at
+/// most `P` rows of patches ([`patch_rows_for`](super::patch_rows_for)), which may be a `static`.
 pub type FixedScene<M, const N: usize, const T: usize, const P: usize = 0> = Scene<M, FixedTables<N, T, P>>;
 
 impl<M, const N: usize, const T: usize, const P: usize> FixedScene<M, N, T, P> {
     /// An empty scene.
     pub const fn new(material: M) -> Self {
-        let tables = FixedTables {
-            nodes: heapless::Vec::new(),
-            tiles: heapless::Vec::new(),
-            patches: [PatchRow::EMPTY; P],
-        };
+        let tables =
+            FixedTables { nodes: heapless::Vec::new(), tiles: heapless::Vec::new(), patches: [PatchRow::EMPTY; P] };
         Self { material, tables, facts: SceneFacts::EMPTY }
     }
 }

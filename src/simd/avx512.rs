@@ -8,12 +8,11 @@
 #[cfg(not(feature = "deterministic"))]
 use core::arch::x86_64::_mm512_fmadd_ps;
 use core::arch::x86_64::{
-    __m512, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_epi32, _mm512_add_ps, _mm512_castps_si512,
-    _mm512_castsi512_ps, _mm512_cmp_ps_mask, _mm512_cmpge_epu32_mask, _mm512_cvtepi32_ps, _mm512_div_ps,
-    _mm512_mask_blend_ps, _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_min_ps, _mm512_mul_ps,
-    _mm512_set1_epi32, _mm512_set1_ps, _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_slli_epi32,
-    _mm512_sqrt_ps, _mm512_srli_epi32, _mm512_sub_epi32, _mm512_sub_ps, _mm512_unpackhi_ps,
-    _mm512_unpacklo_ps, _mm512_xor_ps,
+    __m512, _CMP_GT_OQ, _mm512_abs_ps, _mm512_add_epi32, _mm512_add_ps, _mm512_castps_si512, _mm512_castsi512_ps,
+    _mm512_cmp_ps_mask, _mm512_cmpge_epu32_mask, _mm512_cvtepi32_ps, _mm512_div_ps, _mm512_mask_blend_ps,
+    _mm512_maskz_mov_ps, _mm512_max_ps, _mm512_min_ps, _mm512_mul_ps, _mm512_set1_epi32, _mm512_set1_ps,
+    _mm512_setzero_ps, _mm512_shuffle_ps, _mm512_slli_epi32, _mm512_sqrt_ps, _mm512_srli_epi32, _mm512_sub_epi32,
+    _mm512_sub_ps, _mm512_unpackhi_ps, _mm512_unpacklo_ps, _mm512_xor_ps,
 };
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -77,9 +76,7 @@ impl Real for Avx512 {
     #[inline(always)]
     fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {
         // Rows 0, 4, 8 and 12 in the four quarters of a register, and so on; then all quarters are transposed at once.
-        let four = |lane: usize| {
-            Self(bytemuck::must_cast([row(lane), row(lane + 4), row(lane + 8), row(lane + 12)]))
-        };
+        let four = |lane: usize| Self(bytemuck::must_cast([row(lane), row(lane + 4), row(lane + 8), row(lane + 12)]));
         transpose([four(0), four(1), four(2), four(3)])
     }
     #[inline(always)]

@@ -42,10 +42,8 @@ impl<R: Real, const L: usize> Whole<R> for Packed<L> {
         let Self(mut sums) = self;
         let [a, b, c, d] = weights.map(i32::from);
         for (sum, bytes) in sums.iter_mut().zip(bytes.0) {
-            let products = (bytes & 255) * a
-                + (bytes >> 8 & 255) * b
-                + (bytes >> 16 & 255) * c
-                + (bytes >> 24 & 255) * d;
+            let products =
+                (bytes & 255) * a + (bytes >> 8 & 255) * b + (bytes >> 16 & 255) * c + (bytes >> 24 & 255) * d;
             *sum = sum.wrapping_add(products);
         }
         Self(sums)

@@ -39,8 +39,7 @@ impl Whole<Avx2> for Bytes32 {
             let odd = _mm256_srli_epi16::<8>(bytes.0);
             let even_weights = _mm256_srai_epi16::<8>(_mm256_slli_epi16::<8>(weights));
             let odd_weights = _mm256_srai_epi16::<8>(weights);
-            let products =
-                _mm256_add_epi32(_mm256_madd_epi16(even, even_weights), _mm256_madd_epi16(odd, odd_weights));
+            let products = _mm256_add_epi32(_mm256_madd_epi16(even, even_weights), _mm256_madd_epi16(odd, odd_weights));
             Self(_mm256_add_epi32(self.0, products))
         }
     }

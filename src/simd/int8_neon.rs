@@ -30,9 +30,8 @@ impl Whole<Neon> for Bytes16 {
     }
     #[inline(always)]
     fn dot(self, bytes: Self, [a, b, c, d]: [i8; 4]) -> Self {
-        let weights = |[low, high]: [i8; 2]| -> int16x8_t {
-            bytemuck::must_cast([[i16::from(low), i16::from(high)]; 4])
-        };
+        let weights =
+            |[low, high]: [i8; 2]| -> int16x8_t { bytemuck::must_cast([[i16::from(low), i16::from(high)]; 4]) };
         // SAFETY: as above.
         unsafe {
             let bytes = vreinterpretq_u16_s32(bytes.0);
@@ -52,8 +51,7 @@ impl Whole<Neon> for Bytes16 {
         // SAFETY: as above.
         unsafe {
             let low = vorrq_u32(low_byte(a), vshlq_n_u32::<8>(low_byte(b)));
-            let high =
-                vorrq_u32(vshlq_n_u32::<16>(low_byte(c)), vshlq_n_u32::<24>(vreinterpretq_u32_f32(d.0)));
+            let high = vorrq_u32(vshlq_n_u32::<16>(low_byte(c)), vshlq_n_u32::<24>(vreinterpretq_u32_f32(d.0)));
             Self(vreinterpretq_s32_u32(vorrq_u32(low, high)))
         }
     }

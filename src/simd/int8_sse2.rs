@@ -30,8 +30,7 @@ impl Whole<Sse2> for Bytes16 {
     }
     #[inline(always)]
     fn dot(self, bytes: Self, [a, b, c, d]: [i8; 4]) -> Self {
-        let weights =
-            |[low, high]: [i8; 2]| -> __m128i { bytemuck::must_cast([[i16::from(low), i16::from(high)]; 4]) };
+        let weights = |[low, high]: [i8; 2]| -> __m128i { bytemuck::must_cast([[i16::from(low), i16::from(high)]; 4]) };
         // SAFETY: as above.
         unsafe {
             let even = _mm_and_si128(bytes.0, _mm_set1_epi16(255));
@@ -50,8 +49,7 @@ impl Whole<Sse2> for Bytes16 {
         // SAFETY: as above.
         unsafe {
             let low = _mm_or_si128(low_byte(a), _mm_slli_epi32::<8>(low_byte(b)));
-            let high =
-                _mm_or_si128(_mm_slli_epi32::<16>(low_byte(c)), _mm_slli_epi32::<24>(_mm_castps_si128(d.0)));
+            let high = _mm_or_si128(_mm_slli_epi32::<16>(low_byte(c)), _mm_slli_epi32::<24>(_mm_castps_si128(d.0)));
             Self(_mm_or_si128(low, high))
         }
     }

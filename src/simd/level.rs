@@ -41,7 +41,8 @@ pub trait Kernel {
     const SCALAR: bool = false;
     /// The work, with vectors of this kind.
     fn run<R: Real>(self) -> Self::Output;
-    /// The same as scalar code. Kernels whose batches differ in size then say so here: vectors are not compiled with both.
+    /// The same as scalar code. Kernels whose batches differ in size then say so here: vectors are not compiled with
+    /// both.
     #[cfg_attr(target_arch = "x86_64", allow(dead_code))]
     #[inline(always)]
     fn run_scalar(self) -> Self::Output
@@ -52,8 +53,8 @@ pub trait Kernel {
     }
 }
 
-/// A part of a kernel that is the same for several kernels, as for all laws: a function of its own ([`Real::run_part`]),
-/// so that it is compiled once for each level. `run` must be `#[inline(always)]`.
+/// A part of a kernel that is the same for several kernels, as for all laws: a function of its own
+/// ([`Real::run_part`]), so that it is compiled once for each level. `run` must be `#[inline(always)]`.
 pub trait Part {
     /// What it gives.
     type Output;
@@ -65,14 +66,13 @@ pub trait Part {
 const LEVELS: [Level; 5] = [Level::Avx512, Level::Avx2, Level::Neon, Level::Simd128, Level::Portable];
 
 /// The level that every processor of the target has.
-const BASELINE: Level =
-    if cfg!(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")) {
-        Level::Neon
-    } else if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
-        Level::Simd128
-    } else {
-        Level::Portable
-    };
+const BASELINE: Level = if cfg!(all(target_arch = "aarch64", target_feature = "neon", target_endian = "little")) {
+    Level::Neon
+} else if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
+    Level::Simd128
+} else {
+    Level::Portable
+};
 
 /// Place of the current level in [`LEVELS`], counted from one; zero before the processor was asked.
 static DETECTED: AtomicU8 = AtomicU8::new(0);

@@ -49,8 +49,7 @@ impl Kernel for Operations {
                 let x = |lane: usize| VALUES[(lane + offset) % VALUES.len()];
                 let y = |lane: usize| VALUES[(lane + offset + shift) % VALUES.len()];
                 // Positive and normal values.
-                let z =
-                    |lane: usize| 1e-30 * 1e4f32.powi((lane + shift) as i32 % 15) * (1.0 + 0.1 * lane as f32);
+                let z = |lane: usize| 1e-30 * 1e4f32.powi((lane + shift) as i32 % 15) * (1.0 + 0.1 * lane as f32);
                 let (a, b, c) = (R::from_fn(x), R::from_fn(y), R::from_fn(z));
                 same("+", a + b, &|l| x(l) + y(l));
                 same("-", a - b, &|l| x(l) - y(l));
@@ -90,11 +89,7 @@ impl Kernel for Operations {
                 let mut back = [[0.0; 4]; 16];
                 R::to_consecutive_rows(columns, &mut back[..R::COUNT]);
                 for row in 0..R::COUNT {
-                    assert_eq!(
-                        columns.map(|column| column.lane(R::lane_of_row(row))),
-                        tile[row],
-                        "row {row}"
-                    );
+                    assert_eq!(columns.map(|column| column.lane(R::lane_of_row(row))), tile[row], "row {row}");
                     assert_eq!(back[row], tile[row], "row {row} back");
                 }
             }
@@ -126,25 +121,18 @@ impl Kernel for Integers {
         for round in 0..2_000 {
             // Bytes are the lowest ones of floats.
             let mut bytes = [[0u32; 16]; 4];
-            bytes
-                .as_flattened_mut()
-                .fill_with(|| if round % 5 == 0 { 255 * (random() % 2) } else { random() % 256 });
-            let words = R::Whole::low_bytes(
-                bytes.map(|bytes| R::from_fn(|lane| f32::from_bits(0x4b40_0000 | bytes[lane]))),
-            );
+            bytes.as_flattened_mut().fill_with(|| if round % 5 == 0 { 255 * (random() % 2) } else { random() % 256 });
+            let words =
+                R::Whole::low_bytes(bytes.map(|bytes| R::from_fn(|lane| f32::from_bits(0x4b40_0000 | bytes[lane]))));
             let biases = [(); 4].map(|()| (random() << 8 ^ random()) as i32 >> (random() % 28 + 1));
             let weights = [[(); 4]; 4].map(|four| {
-                four.map(
-                    |()| if round % 7 == 0 { [-128, 127][random() as usize % 2] } else { random() as i8 },
-                )
+                four.map(|()| if round % 7 == 0 { [-128, 127][random() as usize % 2] } else { random() as i8 })
             });
             let sums = [0, 1, 2, 3].map(|output| R::Whole::splat(biases[output]).dot(words, weights[output]));
             for lane in 0..R::COUNT {
                 for output in 0..4 {
-                    let products = bytes
-                        .iter()
-                        .zip(weights[output])
-                        .map(|(bytes, weight)| bytes[lane] as i32 * i32::from(weight));
+                    let products =
+                        bytes.iter().zip(weights[output]).map(|(bytes, weight)| bytes[lane] as i32 * i32::from(weight));
                     let sum = biases[output] + products.sum::<i32>();
                     assert_eq!(sums[output].numbers().lane(lane), sum as f32, "sum {output} in lane {lane}");
                     checked += 1;

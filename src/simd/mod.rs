@@ -45,8 +45,7 @@ pub(crate) use pair::Pair;
 pub use vectors::NodeVector;
 use vectors::transpose;
 pub(crate) use vectors::{
-    Contiguous, Gather, Indexed, Rows, SCATTER_WIDTH, Scatter, ScatterBuffer, TileNodes, axes, dot,
-    write_rows,
+    Contiguous, Gather, Indexed, Rows, SCATTER_WIDTH, Scatter, ScatterBuffer, TileNodes, axes, dot, write_rows,
 };
 
 use core::ops::{Add, Mul, Neg, Sub};
@@ -73,9 +72,7 @@ pub(crate) use unrolled;
 pub const TILE: usize = 16;
 
 /// A vector of one or more float32 values. The place of a value in the vector is called its lane.
-pub trait Real:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
-{
+pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self> {
     /// Values in the vector: one, or a multiple of four.
     const COUNT: usize;
     /// Whether the processor has enough registers for four by two sums and the values that are added to them.

@@ -95,9 +95,7 @@ impl Real for Neon {
     #[inline(always)]
     fn positive(self) -> Self {
         // SAFETY: as above.
-        Self(unsafe {
-            vreinterpretq_f32_u32(vandq_u32(vcgtzq_f32(self.0), vreinterpretq_u32_f32(vdupq_n_f32(1.0))))
-        })
+        Self(unsafe { vreinterpretq_f32_u32(vandq_u32(vcgtzq_f32(self.0), vreinterpretq_u32_f32(vdupq_n_f32(1.0)))) })
     }
     #[inline(always)]
     fn abs(self) -> Self {

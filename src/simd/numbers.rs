@@ -26,15 +26,12 @@ impl<'a> ScatterNumbers<'a> {
 
     /// The nodes of a tile, if all of them have a number here.
     #[inline(always)]
-    pub(crate) fn checked<'b, R: Real, const N: usize>(
-        &self,
-        rows: [&'b [u32; TILE]; N],
-    ) -> Option<TileNodes<'b, N>> {
+    pub(crate) fn checked<'b, R: Real, const N: usize>(&self, rows: [&'b [u32; TILE]; N]) -> Option<TileNodes<'b, N>> {
         TileNodes::in_range::<R>(rows, self.first, self.numbers.len())
     }
 
-    /// Adds for each corner the value in lane `l` to the number of the node in place `first + l`; nothing if the nodes have not
-    /// been checked by [`ScatterNumbers::checked`]. Scalar code has to call this for all places in order.
+    /// Adds for each corner the value in lane `l` to the number of the node in place `first + l`; nothing if the nodes
+    /// have not been checked by [`ScatterNumbers::checked`]. Scalar code has to call this for all places in order.
     #[inline(always)]
     pub(crate) fn add_corners<R: Real, const N: usize>(
         &mut self,
@@ -61,7 +58,8 @@ impl<'a> ScatterNumbers<'a> {
             for (corner, value) in values.iter().enumerate() {
                 for lane in start..R::COUNT.min(start + SCATTER_WIDTH) {
                     #[allow(unsafe_code)]
-                    // SAFETY: all nodes are in the range of `nodes.count` from `self.first` on, and each of these has a number.
+                    // SAFETY: all nodes are in the range of `nodes.count` from `self.first` on, and each of these has a
+                    // number.
                     let number = unsafe { &mut *numbers.wrapping_add(nodes.at(corner, first + lane)) };
                     *number += value.lane(lane);
                 }
@@ -70,12 +68,7 @@ impl<'a> ScatterNumbers<'a> {
     }
 
     /// Adds the buffered values to the nodes in places from `first` on, those that have a number here.
-    fn add_buffered<const N: usize>(
-        &mut self,
-        nodes: &TileNodes<'_, N>,
-        first: usize,
-        buffer: &NumberBuffer<N>,
-    ) {
+    fn add_buffered<const N: usize>(&mut self, nodes: &TileNodes<'_, N>, first: usize, buffer: &NumberBuffer<N>) {
         for (corner, buffered) in buffer.0.iter().enumerate() {
             for (lane, value) in (first..).zip(buffered) {
                 if let Some(number) = self.numbers.get_mut(nodes.at(corner, lane).wrapping_sub(self.first)) {

@@ -4,9 +4,9 @@
 //! Nothing is fused here: WebAssembly has no fused instruction whose result is the same on every processor.
 
 use core::arch::wasm32::{
-    f32x4_abs, f32x4_add, f32x4_convert_i32x4, f32x4_div, f32x4_gt, f32x4_mul, f32x4_neg, f32x4_pmax,
-    f32x4_pmin, f32x4_splat, f32x4_sqrt, f32x4_sub, i32x4_shuffle, i64x2_shuffle, u32x4_add, u32x4_shl,
-    u32x4_shr, u32x4_splat, u32x4_sub, v128, v128_and, v128_bitselect,
+    f32x4_abs, f32x4_add, f32x4_convert_i32x4, f32x4_div, f32x4_gt, f32x4_mul, f32x4_neg, f32x4_pmax, f32x4_pmin,
+    f32x4_splat, f32x4_sqrt, f32x4_sub, i32x4_shuffle, i64x2_shuffle, u32x4_add, u32x4_shl, u32x4_shr, u32x4_splat,
+    u32x4_sub, v128, v128_and, v128_bitselect,
 };
 use core::ops::{Add, Mul, Neg, Sub};
 

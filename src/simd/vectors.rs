@@ -281,10 +281,7 @@ impl<'a> Scatter<'a> {
 
     /// The nodes of a tile, if all of them have a vector here.
     #[inline(always)]
-    pub(crate) fn checked<'b, R: Real, const N: usize>(
-        &self,
-        rows: [&'b [u32; TILE]; N],
-    ) -> Option<TileNodes<'b, N>> {
+    pub(crate) fn checked<'b, R: Real, const N: usize>(&self, rows: [&'b [u32; TILE]; N]) -> Option<TileNodes<'b, N>> {
         TileNodes::in_range::<R>(rows, self.first, self.vectors.len())
     }
 
@@ -324,12 +321,7 @@ impl<'a> Scatter<'a> {
     }
 
     /// Adds the buffered values to the nodes in places from `first` on, those that have a vector here.
-    fn add_buffered<const N: usize>(
-        &mut self,
-        nodes: &TileNodes<'_, N>,
-        first: usize,
-        buffer: &ScatterBuffer<N>,
-    ) {
+    fn add_buffered<const N: usize>(&mut self, nodes: &TileNodes<'_, N>, first: usize, buffer: &ScatterBuffer<N>) {
         for (corner, buffered) in buffer.0.iter().enumerate() {
             for (lane, row) in (first..).zip(buffered) {
                 let node = nodes.at(corner, lane);

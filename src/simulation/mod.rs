@@ -1,8 +1,9 @@
-//! A scene that moves on by a frame at a time: one object for the method, its steps, the critical step that is renewed on the way, the
-//! guard, and the fallback of learned steps.
+//! A scene that moves on by a frame at a time: one object for the method, its steps, the critical step that is renewed
+//! on the way, the guard, and the fallback of learned steps.
 //!
-//! [`Simulation`] owns all of it on a host with a heap. A [`Mover`] is the same loop over memory of the caller, which a host without
-//! a heap and the C API use; it needs nothing that the modules below do not have, and every host takes its steps through it.
+//! [`Simulation`] owns all of it on a host with a heap. A [`Mover`] is the same loop over memory of the caller, which a
+//! host without a heap and the C API use; it needs nothing that the modules below do not have, and every host takes its
+//! steps through it.
 //!
 //! | method | what a call of `advance` takes |
 //! |---|---|
@@ -11,8 +12,8 @@
 //! | [`Method::Auto`] | exact and long steps whose length keeps the error below a tolerance |
 //! | [`Method::Learned`] | a lead-in of exact steps, then a network's, with exact ones wherever energy or the guard does not believe it |
 //!
-//! All but learned steps end where the call says, to a millionth of its span; these end at the nearest of the network's steps. Prescribed motions without a
-//! ramp go evenly over the call.
+//! All but learned steps end where the call says, to a millionth of its span; these end at the nearest of the network's
+//! steps. Prescribed motions without a ramp go evenly over the call.
 
 mod mover;
 #[cfg(feature = "std")]
@@ -55,14 +56,14 @@ pub enum Method<'w> {
 pub struct Settings<'w> {
     /// How the scene is moved.
     pub method: Method<'w>,
-    /// Length of the steps, s: of long ones at most so much, 20 times the critical step unless given; of exact ones, a network's included,
-    /// at most so much in place of nine tenths of the critical step at the moment; of steps that choose their length the longest,
-    /// a hundred critical steps unless given.
+    /// Length of the steps, s: of long ones at most so much, 20 times the critical step unless given; of exact ones, a
+    /// network's included, at most so much in place of nine tenths of the critical step at the moment; of steps that
+    /// choose their length the longest, a hundred critical steps unless given.
     pub step: Option<f32>,
     /// Damping in proportion to mass, 1/s. A network has that of its training.
     pub damping: f32,
-    /// Mean error of the nodes that is accepted, m: what steps that choose their length keep, half a millimetre or less in bodies below 10 cm unless given, and
-    /// what a guard calls inexact.
+    /// Mean error of the nodes that is accepted, m: what steps that choose their length keep, half a millimetre or less
+    /// in bodies below 10 cm unless given, and what a guard calls inexact.
     pub tolerance: Option<f32>,
     /// Whether a guard estimates the error of long and of learned steps.
     pub guard: bool,
@@ -73,14 +74,7 @@ pub struct Settings<'w> {
 impl Default for Settings<'_> {
     /// Exact steps without damping.
     fn default() -> Self {
-        Self {
-            method: Method::Exact,
-            step: None,
-            damping: 0.0,
-            tolerance: None,
-            guard: true,
-            unchecked: false,
-        }
+        Self { method: Method::Exact, step: None, damping: 0.0, tolerance: None, guard: true, unchecked: false }
     }
 }
 
@@ -89,8 +83,8 @@ pub const LONG_STEPS: f32 = 20.0;
 /// The longest steps of [`Method::Auto`] over the critical step unless a length is given.
 pub const LONGEST_STEPS: f32 = 100.0;
 
-/// Mean error of the nodes (m) that [`Method::Auto`] accepts in a body with these points at rest (m) unless the host says otherwise: half a
-/// millimetre, in bodies below 10 cm 0.005 of the diagonal of their box.
+/// Mean error of the nodes (m) that [`Method::Auto`] accepts in a body with these points at rest (m) unless the host
+/// says otherwise: half a millimetre, in bodies below 10 cm 0.005 of the diagonal of their box.
 #[must_use]
 pub fn usual_tolerance(points: &[[f32; 3]]) -> f32 {
     let square: f32 = inertia::size_of(points).iter().map(|side| side * side).sum();

@@ -102,8 +102,8 @@ struct Call<'c, L, T, W> {
 }
 
 impl Mover<'_, '_> {
-    /// Moves on until the time `until` (s), or to a step that is refused: the state is then that before it, and the report has the
-    /// status. `watch` is shown each step.
+    /// Moves on until the time `until` (s), or to a step that is refused: the state is then that before it, and the
+    /// report has the status. `watch` is shown each step.
     pub fn advance<M: ElementMaterial>(
         self,
         until: f64,
@@ -122,9 +122,7 @@ impl Mover<'_, '_> {
             Self::Exact(mut exact) => {
                 call.exact_steps(&mut exact, span, 0.0, scene, &mut state);
             }
-            Self::Long(model, storage, guard) => {
-                call.long_steps(model, storage, guard, span, scene, &mut state)
-            }
+            Self::Long(model, storage, guard) => call.long_steps(model, storage, guard, span, scene, &mut state),
             Self::Auto(adaptive) => call.auto_steps(adaptive, span, scene, &mut state),
             Self::Learned(learned, exact, lead, guard) => {
                 call.learned_steps(learned, exact, lead, guard, span, scene, &mut state)?;
@@ -134,7 +132,8 @@ impl Mover<'_, '_> {
     }
 }
 
-/// How many steps of at most `longest` (s) make up a span (s), and their length: `longest` itself if it differs by a rounding only.
+/// How many steps of at most `longest` (s) make up a span (s), and their length: `longest` itself if it differs by a
+/// rounding only.
 fn equal_steps(span: f64, longest: f32) -> (u32, f32) {
     let most = f64::from(longest);
     let count = libm::ceil(span / most * (1.0 - ROUNDING)).clamp(1.0, f64::from(u32::MAX));
@@ -224,8 +223,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         }
         for done in 0..count {
             let loads = self.loads.of_step(state, seconds, count - done);
-            let status =
-                model.with_storage(storage).step_in_parts(scene, &loads, state.reborrow(), self.threads);
+            let status = model.with_storage(storage).step_in_parts(scene, &loads, state.reborrow(), self.threads);
             (self.watch)(Event::Step(Taken::Long, status, state));
             self.report.enter(status);
             if !status.is_taken() {

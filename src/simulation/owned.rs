@@ -5,13 +5,9 @@ use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
 
-use super::{
-    Event, ExactSteps, LONG_STEPS, LONGEST_STEPS, Lead, Method, Mover, Report, Settings, usual_tolerance,
-};
+use super::{Event, ExactSteps, LONG_STEPS, LONGEST_STEPS, Lead, Method, Mover, Report, Settings, usual_tolerance};
 use crate::adaptive::{Adaptive, Request};
-use crate::contact::{
-    Contact, ContactError, Instrument, Surface, SurfaceNode, Touch, boundary, boundary_triangles,
-};
+use crate::contact::{Contact, ContactError, Instrument, Surface, SurfaceNode, Touch, boundary, boundary_triangles};
 use crate::guard::{self, Allowed, Guard};
 use crate::inertia::{InertiaError, LargeStep};
 use crate::learned::{self, LearnedError, LearnedModel, LearnedStep};
@@ -74,8 +70,8 @@ impl Exact {
 }
 
 impl<'w> Simulation<'w> {
-    /// A scene at rest: points (m), tetrahedra with positive volumes, what they are made of, supports. Exact steps without damping move it
-    /// unless [`Simulation::with`] says otherwise.
+    /// A scene at rest: points (m), tetrahedra with positive volumes, what they are made of, supports. Exact steps
+    /// without damping move it unless [`Simulation::with`] says otherwise.
     pub fn new(
         points: impl IntoIterator<Item = [f32; 3]>,
         tets: impl IntoIterator<Item = [u32; 4]>,
@@ -120,8 +116,8 @@ impl<'w> Simulation<'w> {
         (self.settings, self.prepared) = (settings, None);
     }
 
-    /// With a surface that instruments can touch: the nodes of the boundary, and the triangles between them, which instruments need that
-    /// are thinner than edges are long.
+    /// With a surface that instruments can touch: the nodes of the boundary, and the triangles between them, which
+    /// instruments need that are thinner than edges are long.
     pub fn meeting(mut self, triangles: bool) -> Result<Self, SimulationError> {
         let mesh = Mesh::new(&self.points, &self.tets, Winding::Normalised)?;
         let nodes = boundary(&mesh);
@@ -138,31 +134,27 @@ impl<'w> Simulation<'w> {
         Ok(())
     }
 
-    /// Moves on by so many seconds, usually a frame, under its loads and instruments. Where a step is refused the error says why, and the
-    /// state is that before it.
+    /// Moves on by so many seconds, usually a frame, under its loads and instruments. Where a step is refused the error
+    /// says why, and the state is that before it.
     pub fn advance(&mut self, seconds: f64) -> Result<Report, SimulationError> {
         self.advance_in_parts(seconds, &CallingThread)
     }
 
     /// The same, to the bit, on several threads of the host.
-    pub fn advance_in_parts(
-        &mut self,
-        seconds: f64,
-        threads: &impl Threads,
-    ) -> Result<Report, SimulationError> {
+    pub fn advance_in_parts(&mut self, seconds: f64, threads: &impl Threads) -> Result<Report, SimulationError> {
         if !(seconds > 0.0 && seconds.is_finite()) {
             return Err(SimulationError::Seconds(seconds));
         }
         self.prepare_once()?;
-        let Self { gravity, forces, motions, instruments, scene, state, touchable, in_step, until, .. } =
-            self;
+        let Self { gravity, forces, motions, instruments, scene, state, touchable, in_step, until, .. } = self;
         let mut loads = Loads::new(&*scene, *gravity, forces, motions)?;
         if !instruments.is_empty() {
             loads = loads.touched_by(Contact::new(surface(touchable, scene.node_count())?, instruments)?);
         }
         in_step.resize(motions.len(), Motion::default());
         let mut loads = LoadsOfCall::new(loads, in_step);
-        // Calls follow each other without a drift by rounding, but for states that were restored; and equal calls take equal steps.
+        // Calls follow each other without a drift by rounding, but for states that were restored; and equal calls take
+        // equal steps.
         let (now, missed) = (state.time(), (*until - state.time()).abs());
         let from = if missed <= 1e-6 * seconds || missed > 1e-3 * seconds { now } else { *until };
         *until = if missed > 1e-3 * seconds { now + seconds } else { *until + seconds };
@@ -176,8 +168,8 @@ impl<'w> Simulation<'w> {
         }
     }
 
-    /// Moves on until a time (s) under loads of the caller's in place of its own. `watch` is shown each step; what was refused is in the
-    /// report.
+    /// Moves on until a time (s) under loads of the caller's in place of its own. `watch` is shown each step; what was
+    /// refused is in the report.
     pub fn advance_under(
         &mut self,
         until: f64,
@@ -195,8 +187,8 @@ impl<'w> Simulation<'w> {
         if self.prepared.is_none() { self.prepare() } else { Ok(()) }
     }
 
-    /// Prepares the steps from the state as it is, which the first call of [`Simulation::advance`] does otherwise: what is wrong with the
-    /// settings is told.
+    /// Prepares the steps from the state as it is, which the first call of [`Simulation::advance`] does otherwise: what
+    /// is wrong with the settings is told.
     pub fn prepare(&mut self) -> Result<(), SimulationError> {
         let critical = self.critical_step()?;
         let Self { scene, state, points, settings, .. } = self;
@@ -225,18 +217,15 @@ impl<'w> Simulation<'w> {
             Method::Long(method) => {
                 let seconds = step.unwrap_or(LONG_STEPS * critical.seconds);
                 let step = Step::unchecked(seconds, damping)?;
-                let large =
-                    LargeStep::prepare_in_vec(method.clone(), scene.view(), points, state.view(), step)?;
+                let large = LargeStep::prepare_in_vec(method.clone(), scene.view(), points, state.view(), step)?;
                 let guard = settings.guard.then(|| guarded(state, seconds, damping, guard::EVERY));
                 Prepared::Long(Box::new(large), guard.transpose()?)
             }
             Method::Auto(method) => {
                 let seconds = step.unwrap_or(LONGEST_STEPS * critical.seconds);
                 let longest = Step::unchecked(seconds, damping)?;
-                let request =
-                    Request { tolerance: tolerance.unwrap_or_else(|| usual_tolerance(points)), longest };
-                let adaptive =
-                    Adaptive::prepare_in_vec(method.clone(), scene.view(), points, state.view(), request)?;
+                let request = Request { tolerance: tolerance.unwrap_or_else(|| usual_tolerance(points)), longest };
+                let adaptive = Adaptive::prepare_in_vec(method.clone(), scene.view(), points, state.view(), request)?;
                 Prepared::Auto(Box::new(adaptive))
             }
             Method::Learned { network, lead_in, fallback } => {

@@ -1,5 +1,6 @@
-//! Why a step was refused. A load that by itself moves a node through the tissue around it in one step, a force far too large (often in
-//! another unit) or a support that jumps, is named; otherwise what the step would have left: no number, or energy that nothing gave.
+//! Why a step was refused. A load that by itself moves a node through the tissue around it in one step, a force far too
+//! large (often in another unit) or a support that jumps, is named; otherwise what the step would have left: no number,
+//! or energy that nothing gave.
 
 use core::fmt;
 
@@ -39,8 +40,8 @@ pub enum Cause {
         /// The most that it may, m.
         most: f32,
     },
-    /// The loads have instruments, which mass-scaled and learned steps cannot meet, multilevel and damped ones only with room for pushes
-    /// ([`StateView::pushing`](crate::state::StateView::pushing)).
+    /// The loads have instruments, which mass-scaled and learned steps cannot meet, multilevel and damped ones only
+    /// with room for pushes ([`StateView::pushing`](crate::state::StateView::pushing)).
     NoContact,
     /// Supports moved the node through most of the tissue around it in a step.
     Motion {
@@ -107,8 +108,8 @@ impl<M: ElementMaterial> Trial<'_, M> {
         load.unwrap_or_else(|| (self.culprit(step, method), cause))
     }
 
-    /// The force that the step to be taken must not be taken with: one moves its node through the tissue around it, which then turns
-    /// inside out before its stress can answer.
+    /// The force that the step to be taken must not be taken with: one moves its node through the tissue around it,
+    /// which then turns inside out before its stress can answer.
     pub(crate) fn tearing_force(&self, step: &Step, method: &impl StepMethod<M>) -> Option<(u32, Cause)> {
         let tears = |node: usize| {
             let (inertia, increment) = (self.scene.inertia.get(node)?, self.increment.get(node)?);
@@ -150,7 +151,8 @@ impl<M: ElementMaterial> Trial<'_, M> {
         most.1
     }
 
-    /// The force that by itself would move its node farthest in this step, measured by the node's tissue, if that is a cause.
+    /// The force that by itself would move its node farthest in this step, measured by the node's tissue, if that is a
+    /// cause.
     fn excessive_force(&self, step: &Step, added: f32) -> Option<(u32, Cause)> {
         let mut most = (1.0, None);
         let seconds = f64::from(step.seconds());

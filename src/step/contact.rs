@@ -1,5 +1,5 @@
-//! Instruments in a step ([`crate::contact`]): the pushes on the nodes that would be inside one, and what these change in the sums
-//! over the nodes.
+//! Instruments in a step ([`crate::contact`]): the pushes on the nodes that would be inside one, and what these change
+//! in the sums over the nodes.
 
 use glam::Vec3;
 
@@ -7,14 +7,14 @@ use super::cause::MOST_OF_SIZE;
 use super::triangles::{Candidate, Nearest, corners_of};
 use super::{Cause, Step, StepMethod, Totals, Trial};
 use crate::contact::{
-    Contact, ContactMemory, ContactPoint, Grip, HELD, MOST_INSTRUMENTS, Meeting, Placed, SolverRoom, Surface,
-    Touch, TouchedPoint, TrianglePoint, largest_component, vectors_to_push,
+    Contact, ContactMemory, ContactPoint, Grip, HELD, MOST_INSTRUMENTS, Meeting, Placed, SolverRoom, Surface, Touch,
+    TouchedPoint, TrianglePoint, largest_component, vectors_to_push,
 };
 use crate::element::{ElementMaterial, NodeInertia};
 use crate::simd::NodeVector;
 
-/// Nodes that an instrument may touch within a step are those nearer than so many times the farthest motion of a node and of an
-/// instrument.
+/// Nodes that an instrument may touch within a step are those nearer than so many times the farthest motion of a node
+/// and of an instrument.
 const NEAR: f32 = 2.0;
 
 /// A node with all that moves it, and its way to an instrument.
@@ -29,8 +29,8 @@ struct Met {
 }
 
 impl<M: ElementMaterial> Trial<'_, M> {
-    /// Adds the pushes to the forces, for methods whose next increment of a node follows from its force and its mass alone. The step is
-    /// refused if an instrument is too fast, or so far inside the body that it would throw a node.
+    /// Adds the pushes to the forces, for methods whose next increment of a node follows from its force and its mass
+    /// alone. The step is refused if an instrument is too fast, or so far inside the body that it would throw a node.
     pub(crate) fn meet_instruments(&mut self, step: &Step, method: &impl StepMethod<M>, totals: &mut Totals) {
         let Some(contact) = self.loads.contact() else { return };
         self.clear_touches();
@@ -230,8 +230,8 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
     }
 
-    /// Lists the nodes and points of triangles that are in the way of an instrument, near it, or were pushed in the step before. `row` is the
-    /// place of a node in the next increments.
+    /// Lists the nodes and points of triangles that are in the way of an instrument, near it, or were pushed in the
+    /// step before. `row` is the place of a node in the next increments.
     pub(crate) fn find_touched(
         &mut self,
         contact: &Contact<'_>,
@@ -325,8 +325,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         }
         let kept = self.memory()?.before.get(place).copied().unwrap_or_default();
         let before = kept.to_array();
-        let mut found =
-            TouchedPoint { place: place as u32, nodes, push: before, before, ..TouchedPoint::default() };
+        let mut found = TouchedPoint { place: place as u32, nodes, push: before, before, ..TouchedPoint::default() };
         if place >= surface.nodes().len() {
             found.set_point(TrianglePoint::unpacked(kept.0[3]));
         }
@@ -343,8 +342,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let place = found.place as usize;
         let corners = surface.corners(place).unwrap_or_default();
         let next = corners.map(|corner| next(corner.node as usize));
-        let here =
-            corners.map(|corner| self.displacement.get(corner.node as usize).copied().unwrap_or_default());
+        let here = corners.map(|corner| self.displacement.get(corner.node as usize).copied().unwrap_or_default());
         Candidate {
             corners: [0, 1, 2].map(|corner| predicted(corners[corner].rest, &here[corner], next[corner])),
             next: next.map(axes),
@@ -448,21 +446,14 @@ impl<M: ElementMaterial> Trial<'_, M> {
         (grip, method): (&Grip, &impl StepMethod<M>),
     ) -> Option<Met> {
         let mut met = self.met(node, rest, placed, method)?;
-        let (held, point) =
-            (placed.held(grip.point), predicted(rest, self.displacement.get(node)?, met.next));
+        let (held, point) = (placed.held(grip.point), predicted(rest, self.displacement.get(node)?, met.next));
         let (arm, carried) = (placed.arm(held), placed.carried(held));
         met.meeting = Meeting { gap: point.distance(held), normal: Vec3::ZERO, arm, carried, point: held };
         met.way = held - point;
         Some(met)
     }
 
-    fn met(
-        &self,
-        node: usize,
-        rest: [f32; 3],
-        placed: &Placed<'_>,
-        method: &impl StepMethod<M>,
-    ) -> Option<Met> {
+    fn met(&self, node: usize, rest: [f32; 3], placed: &Placed<'_>, method: &impl StepMethod<M>) -> Option<Met> {
         let inertia = *self.scene.inertia.get(node)?;
         let increment = *self.increment.get(node)?;
         let next = method.next_increment(node, &inertia, &increment, self.force.get(node)?);

@@ -1,5 +1,5 @@
-//! What a step enters in the energy balance ([`crate::energy_balance`]), J: kinetic energy of the mean of the increments before and
-//! after `t_n`, and the work of loads and supports along it, from sums over the nodes.
+//! What a step enters in the energy balance ([`crate::energy_balance`]), J: kinetic energy of the mean of the
+//! increments before and after `t_n`, and the work of loads and supports along it, from sums over the nodes.
 
 use core::ops::{Add, Mul, Sub};
 

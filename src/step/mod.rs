@@ -1,7 +1,7 @@
-//! The protocol that every step follows, exact or not (`StepMethod`): begin (borrow the state, check that everything fits),
-//! compute forces and next increments, enter them in the energy balance, and only then accept the step and move the state, or
-//! refuse it with the node at which it went wrong. A step that is refused leaves the state as it was, and what a method
-//! keeps of it: the next step is the same, to the bit, as if there had been none.
+//! The protocol that every step follows, exact or not (`StepMethod`): begin (borrow the state, check that everything
+//! fits), compute forces and next increments, enter them in the energy balance, and only then accept the step and move
+//! the state, or refuse it with the node at which it went wrong. A step that is refused leaves the state as it was, and
+//! what a method keeps of it: the next step is the same, to the bit, as if there had been none.
 
 mod cause;
 mod contact;
@@ -143,8 +143,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         let (nodes, room) = (scene.node_count(), room.min(state.capacity_for(scene.element())));
         let is_other = |checked| checked != nodes;
         let surface = loads.contact().map(|contact| contact.surface().scene_nodes());
-        if nodes == 0 || room < nodes || loads.nodes().is_some_and(is_other) || surface.is_some_and(is_other)
-        {
+        if nodes == 0 || room < nodes || loads.nodes().is_some_and(is_other) || surface.is_some_and(is_other) {
             return Err(Status::Mismatch { nodes, room });
         }
         Ok(())
@@ -183,20 +182,13 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     }
 
     /// The energy balance after the step, or why the step cannot be believed.
-    fn balance(
-        &mut self,
-        step: &Step,
-        method: &impl StepMethod<M>,
-        totals: &Totals,
-    ) -> Result<EnergyBalance, Cause> {
+    fn balance(&mut self, step: &Step, method: &impl StepMethod<M>, totals: &Totals) -> Result<EnergyBalance, Cause> {
         let Self { scene, loads, displacement, increment, force, progress, .. } = self;
         let mut balance = progress.energy_balance;
         if progress.steps == 0 {
             balance.start = balance.start.max(scene.rounding_energy());
         }
-        let next = |node, inertia: &_, increment: &_, force: &_| {
-            method.next_increment(node, inertia, increment, force)
-        };
+        let next = |node, inertia: &_, increment: &_, force: &_| method.next_increment(node, inertia, increment, force);
         Entry::of_totals(totals, loads, step)
             .with_forces(loads, scene.inertia, increment, force, progress.time, next)
             .with_motions(loads, displacement, increment, force, progress.time, step)

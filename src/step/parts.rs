@@ -1,13 +1,13 @@
-//! The work of a step in parts that share nothing, one for each thread ([`crate::mesh::partition`], [`Threads`]): first the
-//! total force on each node (N) and the sums over the nodes; when all parts have these, the moves of the nodes.
+//! The work of a step in parts that share nothing, one for each thread ([`crate::mesh::partition`], [`Threads`]): first
+//! the total force on each node (N) and the sums over the nodes; when all parts have these, the moves of the nodes.
 
 use core::array::from_fn;
 use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::element::{
-    ElementMaterial, Extremes, ForcesVisitor, InternalForces, MeanPressure, NodalVolumes, NodeInertia,
-    OwnPressure, PatchForces, VolumeCheck,
+    ElementMaterial, Extremes, ForcesVisitor, InternalForces, MeanPressure, NodalVolumes, NodeInertia, OwnPressure,
+    PatchForces, VolumeCheck,
 };
 use crate::loads::{Loads, ramp_factor};
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
@@ -60,14 +60,13 @@ pub(crate) fn nodal_volumes<M: ElementMaterial>(
     });
     threads.each(parts.get_mut(..count).unwrap_or_default(), |(mine, rows)| {
         let partitions = mine.clone();
-        NodalVolumes { tiles, all, partitions, several_tissues, density, inertia, displacement, rows }
-            .compute();
+        NodalVolumes { tiles, all, partitions, several_tissues, density, inertia, displacement, rows }.compute();
     });
 }
 
 impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
-    /// Total forces, with the nodes' [`nodal_volumes`] where the material needs them, and for each partition the result of `then` from its nodes, their forces and their entries of `extra`, an array
-    /// that the step keeps for the nodes.
+    /// Total forces, with the nodes' [`nodal_volumes`] where the material needs them, and for each partition the result
+    /// of `then` from its nodes, their forces and their entries of `extra`, an array that the step keeps for the nodes.
     pub(crate) fn in_parts<T: Send, F: Copy + Default + Send>(
         &self,
         volumes: &mut [NodeVector],
@@ -112,8 +111,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         let nodes = all.nodes(partitions);
         let inertia = self.scene.inertia.get(nodes.clone()).unwrap_or_default();
         external_forces(force, nodes.start, inertia, self.loads, self.progress.time);
-        *extremes =
-            internal_forces(self.scene, partitions.clone(), self.displacement, volumes, force, self.visitor);
+        *extremes = internal_forces(self.scene, partitions.clone(), self.displacement, volumes, force, self.visitor);
         let (mut force, mut extra) = (&mut **force, &mut **extra);
         for (partition, result) in partitions.clone().zip(&mut **results) {
             let nodes = all.nodes(&(partition..partition + 1));
@@ -123,7 +121,8 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
     }
 }
 
-/// Adds internal forces to those of the nodes in `partitions`, from the [`nodal_volumes`] where the material needs them.
+/// Adds internal forces to those of the nodes in `partitions`, from the [`nodal_volumes`] where the material needs
+/// them.
 pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     scene: SceneView<'_, M>,
     partitions: Range<usize>,
@@ -140,12 +139,10 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
         V::patch_forces(PatchForces { laws, patches, partitions, displacement, force, visitor })
     } else if scene.element().is_nodal_pressure() {
         let pressure = MeanPressure::new(scene.volume_rows(volumes));
-        let kernel =
-            InternalForces::of_partitions(elements, pressure, partitions, displacement, force, visitor);
+        let kernel = InternalForces::of_partitions(elements, pressure, partitions, displacement, force, visitor);
         V::nodal_pressure_forces(kernel)
     } else {
-        let kernel =
-            InternalForces::of_partitions(elements, OwnPressure, partitions, displacement, force, visitor);
+        let kernel = InternalForces::of_partitions(elements, OwnPressure, partitions, displacement, force, visitor);
         V::forces(kernel)
     }
 }
@@ -229,16 +226,8 @@ mod tests {
                 let mine = elements.partitions.part(part, elements.partitions.parts(parts));
                 let count = elements.partitions.nodes(&mine).len();
                 let (mut one, mut eight) = (vec![NodeVector::ZERO; count], vec![NodeVector::ZERO; count]);
-                let of = |force| {
-                    InternalForces::of_partitions(
-                        elements,
-                        OwnPressure,
-                        mine.clone(),
-                        &bent,
-                        force,
-                        NoVisitor,
-                    )
-                };
+                let of =
+                    |force| InternalForces::of_partitions(elements, OwnPressure, mine.clone(), &bent, force, NoVisitor);
                 let (by_one, by_eight) = (of(&mut one).run_scalar(), of(&mut eight).run::<Baseline>());
                 assert!(eight.iter().any(|force| force.0[2] != 0.0));
                 assert_eq!(bits(&one), bits(&eight), "part {part} of {parts}");

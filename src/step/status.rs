@@ -12,9 +12,9 @@ pub enum Status {
     /// The step was taken.
     Ok,
     /// The step was taken, but is not exact: some elements are beyond the range of their law (squeezed below
-    /// [`J_FLOOR`](crate::material::J_FLOOR) or stretched beyond the exponent cap, where the law goes on along its tangent), or there
-    /// is more kinetic energy than the energy balance explains ([`EnergyBalance`]). For a step with scaled inertia
-    /// also: much of the motion was held back ([`crate::inertia::Report`]).
+    /// [`J_FLOOR`](crate::material::J_FLOOR) or stretched beyond the exponent cap, where the law goes on along its
+    /// tangent), or there is more kinetic energy than the energy balance explains ([`EnergyBalance`]). For a step with
+    /// scaled inertia also: much of the motion was held back ([`crate::inertia::Report`]).
     Limited {
         /// Smallest volume ratio of an element.
         least_volume_ratio: f32,
@@ -64,7 +64,8 @@ impl Status {
         Self::Ok
     }
 
-    /// The worse of this status and a later one: a refusal before all, and a later one before an earlier, but what is limited stays so.
+    /// The worse of this status and a later one: a refusal before all, and a later one before an earlier, but what is
+    /// limited stays so.
     pub fn worse(self, later: Self) -> Self {
         match (self, later) {
             (_, Self::Ok) => self,

@@ -1,5 +1,5 @@
-//! Who computes a step. Threads belong to the host: a step is cut into parts that share nothing ([`crate::mesh::partition`]), and a host
-//! with threads says where they run. The bits do not depend on it.
+//! Who computes a step. Threads belong to the host: a step is cut into parts that share nothing
+//! ([`crate::mesh::partition`]), and a host with threads says where they run. The bits do not depend on it.
 
 pub use crate::mesh::partition::MOST_PARTS;
 
@@ -8,7 +8,8 @@ pub trait Threads {
     /// Parts that a step shall be cut into. There will be [`MOST_PARTS`] at most, and fewer if the scene is small.
     fn parts(&self) -> usize;
 
-    /// Calls `work` with each of the parts once, in any order or at the same time, and returns when all calls have returned.
+    /// Calls `work` with each of the parts once, in any order or at the same time, and returns when all calls have
+    /// returned.
     fn each<T: Send>(&self, parts: &mut [T], work: impl Fn(&mut T) + Sync);
 }
 

@@ -1,12 +1,13 @@
-//! Triangles of the surface in a step, which instruments touch at the point that is deepest in them: the push `p` there is a force
-//! `w_i p` on each corner, with the barycentric weights `w_i`, and the point moves by the mean of its corners. As triangles share nodes,
-//! exact steps find their pushes by projected Gauss-Seidel, a bounded number of sweeps over
+//! Triangles of the surface in a step, which instruments touch at the point that is deepest in them: the push `p` there
+//! is a force `w_i p` on each corner, with the barycentric weights `w_i`, and the point moves by the mean of its
+//! corners. As triangles share nodes, exact steps find their pushes by projected Gauss-Seidel, a bounded number of
+//! sweeps over
 //!
 //! ```text
 //! p <- projection of  p - m r / c,   1/m = sum w_i^2 / m_i
 //! ```
-//! onto the pushes that friction allows, with the way `r` (m) that is left and `c` (s^2) as for a node. Long steps solve for them
-//! together with the nodes ([`crate::contact`]).
+//! onto the pushes that friction allows, with the way `r` (m) that is left and `c` (s^2) as for a node. Long steps
+//! solve for them together with the nodes ([`crate::contact`]).
 
 use glam::Vec3;
 
@@ -30,7 +31,8 @@ pub(super) struct Candidate {
     pub(super) is_triangle: bool,
 }
 
-/// Which instrument a node or triangle is nearest to, with the point and its meeting, and a distance (m) that it has from all.
+/// Which instrument a node or triangle is nearest to, with the point and its meeting, and a distance (m) that it has
+/// from all.
 pub(super) struct Nearest {
     pub(super) distance: f32,
     pub(super) met: Option<(usize, TrianglePoint, Meeting)>,
@@ -42,7 +44,8 @@ impl Candidate {
         self.next.iter().fold(0.0, |most: f32, next| most.max(next.length()))
     }
 
-    /// The nearest instrument. A triangle is searched if it can be nearer than `margin` (m); one that was pushed keeps its point.
+    /// The nearest instrument. A triangle is searched if it can be nearer than `margin` (m); one that was pushed keeps
+    /// its point.
     pub(super) fn nearest(
         &self,
         found: &TouchedPoint,
@@ -67,8 +70,8 @@ impl Candidate {
         nearest
     }
 
-    /// A distance (m) that the triangle has from an instrument, and its nearest point if that may be nearer than `margin` (m), or the point
-    /// that was pushed.
+    /// A distance (m) that the triangle has from an instrument, and its nearest point if that may be nearer than
+    /// `margin` (m), or the point that was pushed.
     fn nearest_point(
         &self,
         pushed: Option<TrianglePoint>,
@@ -80,10 +83,7 @@ impl Candidate {
             return (f32::INFINITY, None);
         }
         if let Some(point) = pushed {
-            return (
-                f32::NEG_INFINITY,
-                placed.meet(point.mean(self.corners)).map(|meeting| (point, meeting)),
-            );
+            return (f32::NEG_INFINITY, placed.meet(point.mean(self.corners)).map(|meeting| (point, meeting)));
         }
         let [a, b, c] = self.corners;
         let middle = (a + b + c) / 3.0;
@@ -97,8 +97,7 @@ impl Candidate {
             return (f32::NEG_INFINITY, None);
         };
         // The point is rounded: an edge is at most twice as long as the reach.
-        let distance =
-            if placed.finds_nearest() { distance.max(meeting.gap - reach / 64.0) } else { distance };
+        let distance = if placed.finds_nearest() { distance.max(meeting.gap - reach / 64.0) } else { distance };
         // At a corner it is the node that is touched.
         (distance, Some((point, meeting)).filter(|(point, _)| !point.is_corner()))
     }
@@ -111,11 +110,7 @@ pub(super) fn corners_of(
     push: &NodeVector,
 ) -> impl Iterator<Item = (usize, f32)> + use<> {
     let nodes = surface.corners(place).unwrap_or_default().map(|corner| corner.node as usize);
-    let point = if place < surface.nodes().len() {
-        TrianglePoint::CORNER
-    } else {
-        TrianglePoint::unpacked(push.0[3])
-    };
+    let point = if place < surface.nodes().len() { TrianglePoint::CORNER } else { TrianglePoint::unpacked(push.0[3]) };
     let carries = |push: &NodeVector| axes(push.0) != Vec3::ZERO;
     let count = if !carries(push) {
         0
@@ -128,10 +123,10 @@ pub(super) fn corners_of(
 }
 
 impl<M: ElementMaterial> Trial<'_, M> {
-    /// Finds anew at which point a triangle that was pushed in the step before is nearest to an instrument, if it goes on as it did.
+    /// Finds anew at which point a triangle that was pushed in the step before is nearest to an instrument, if it goes
+    /// on as it did.
     pub(super) fn follow_triangles(&mut self, step: &Step) {
-        let Some(contact) = self.loads.contact().filter(|contact| !contact.surface().triangles().is_empty())
-        else {
+        let Some(contact) = self.loads.contact().filter(|contact| !contact.surface().triangles().is_empty()) else {
             return;
         };
         let (surface, placed) = (contact.surface(), &*contact.placed(self.progress.time, step.seconds()));
@@ -150,17 +145,16 @@ impl<M: ElementMaterial> Trial<'_, M> {
             };
             let Some(corners) = surface.corners(place).map(|corners| corners.map(after)) else { continue };
             let met = placed.iter().filter(|placed| !placed.is_plane());
-            let nearest = met
-                .filter_map(|placed| placed.meet_triangle(corners))
-                .min_by(|(_, a), (_, b)| a.gap.total_cmp(&b.gap));
+            let nearest =
+                met.filter_map(|placed| placed.meet_triangle(corners)).min_by(|(_, a), (_, b)| a.gap.total_cmp(&b.gap));
             if let Some((point, _)) = nearest {
                 push.0[3] = point.packed();
             }
         }
     }
 
-    /// Adds the pushes on triangles to the forces, for methods whose next increment of a node follows from its force and its mass alone,
-    /// once those on nodes are there.
+    /// Adds the pushes on triangles to the forces, for methods whose next increment of a node follows from its force
+    /// and its mass alone, once those on nodes are there.
     pub(super) fn meet_triangles(
         &mut self,
         contact: &Contact<'_>,

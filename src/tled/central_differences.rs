@@ -1,4 +1,5 @@
-//! Central differences for the nodes, vectorised: the next increments, what they enter in the energy balance, the moves.
+//! Central differences for the nodes, vectorised: the next increments, what they enter in the energy balance, the
+//! moves.
 
 use bytemuck::{Pod, must_cast_slice, must_cast_slice_mut};
 
@@ -109,8 +110,7 @@ impl<const INSTRUMENTS: bool> Kernel for TotalsKernel<'_, INSTRUMENTS> {
         let mut sums = [Sums::<R>::new(step, R::splat); 4];
         let mut farthest = [R::splat(0.0); 2];
         for first in (0..inertia.len()).step_by(4) {
-            let (inertia, increment, force) =
-                (four(inertia, first), four(increment, first), four(force, first));
+            let (inertia, increment, force) = (four(inertia, first), four(increment, first), four(force, first));
             for (sums, from) in sums.iter_mut().zip((0..FOUR).step_by(R::COUNT)) {
                 let inverse = axes::<R>() * vector_of::<R>(&inertia, from);
                 let mass = R::from_fn(|lane| inertia[((from + lane) | 3) % FOUR]);
@@ -129,8 +129,7 @@ impl<const INSTRUMENTS: bool> Kernel for TotalsKernel<'_, INSTRUMENTS> {
             totals.add_interleaved(sums, from);
         }
         if INSTRUMENTS {
-            totals.farthest =
-                farthest.map(|most| (0..R::COUNT).fold(0.0, |all, lane| most.lane(lane).max(all)));
+            totals.farthest = farthest.map(|most| (0..R::COUNT).fold(0.0, |all, lane| most.lane(lane).max(all)));
         }
         totals
     }

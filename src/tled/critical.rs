@@ -16,13 +16,14 @@ use crate::step::{CallingThread, CriticalStep, nodal_volumes};
 /// Relative rounding of the sums; the bound is lowered by it.
 const ROUNDING: f32 = 1e-5;
 
-/// Times that weights of the nodes are chosen: with nodal pressure the step on bars is 1.12 times the linear element's with none, 1.22
-/// with one, 1.26 with two, 1.29 with three.
+/// Times that weights of the nodes are chosen: with nodal pressure the step on bars is 1.12 times the linear element's
+/// with none, 1.22 with one, 1.26 with two, 1.29 with three.
 const BALANCING_SWEEPS: usize = 3;
 
-/// A bound on the stable step at the state's displacement (at rest for a fresh one), never above the
-/// exact limit. It takes as long as some six steps, with nodal pressure some twenty, with nodal strain some thirty, and may be called between any two steps. The state's forces and
-/// volumes and the padding of its vectors serve as scratch. Nothing if the state is too small for the scene or not finite.
+/// A bound on the stable step at the state's displacement (at rest for a fresh one), never above the exact limit. It
+/// takes as long as some six steps, with nodal pressure some twenty, with nodal strain some thirty, and may be called
+/// between any two steps. The state's forces and volumes and the padding of its vectors serve as scratch. Nothing if
+/// the state is too small for the scene or not finite.
 pub fn critical_step(scene: &impl AsScene, state: &mut impl AsState) -> Option<CriticalStep> {
     critical(scene.as_scene(), state.as_state())
 }

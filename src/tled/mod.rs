@@ -35,8 +35,8 @@ use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::{
-    self, CallingThread, Cause, Computed, EnergyBalance, Forcing, Status, Step, StepMethod, Threads, Totals,
-    Trial, move_in_parts, nodal_volumes,
+    self, CallingThread, Cause, Computed, EnergyBalance, Forcing, Status, Step, StepMethod, Threads, Totals, Trial,
+    move_in_parts, nodal_volumes,
 };
 use central_differences::{Advance, EnergySums, next_increment};
 
@@ -83,13 +83,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
         Computed { totals, extremes }
     }
 
-    fn next_increment(
-        &self,
-        _: usize,
-        inertia: &NodeInertia,
-        increment: &NodeVector,
-        force: &NodeVector,
-    ) -> [f32; 4] {
+    fn next_increment(&self, _: usize, inertia: &NodeInertia, increment: &NodeVector, force: &NodeVector) -> [f32; 4] {
         next_increment(inertia, increment, force, self.step)
     }
 
@@ -165,9 +159,9 @@ pub fn start(
     true
 }
 
-/// Stops all motion: displacements and time stay, velocities are zero, and the energy balance begins with the strain energy. To go on from
-/// a state that no step can be taken from, because it has more energy than loads and supports gave. Returns whether the state has room
-/// for the scene.
+/// Stops all motion: displacements and time stay, velocities are zero, and the energy balance begins with the strain
+/// energy. To go on from a state that no step can be taken from, because it has more energy than loads and supports
+/// gave. Returns whether the state has room for the scene.
 #[must_use = "a state without room for the scene goes on moving"]
 pub fn stop(scene: &impl AsScene, state: &mut impl AsState) -> bool {
     let (scene, mut state) = (scene.as_scene(), state.as_state());
@@ -179,7 +173,8 @@ pub fn stop(scene: &impl AsScene, state: &mut impl AsState) -> bool {
     true
 }
 
-/// Strain energy of the scene at the state's displacements, J, zero at rest. Nothing if the state has no room for the scene.
+/// Strain energy of the scene at the state's displacements, J, zero at rest. Nothing if the state has no room for the
+/// scene.
 pub fn strain_energy(scene: &impl AsScene, state: &mut impl AsState) -> Option<f64> {
     strain_energy_of(scene.as_scene(), state.as_state())
 }
@@ -193,8 +188,8 @@ fn strain_energy_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateVie
     Some(scene.strain_energy(state.displacement, state.volume))
 }
 
-/// Forces with which the elements act on the nodes at the state's displacements, N ([`crate::state::State::forces`], until the next
-/// step). Returns whether the state has room for the scene.
+/// Forces with which the elements act on the nodes at the state's displacements, N ([`crate::state::State::forces`],
+/// until the next step). Returns whether the state has room for the scene.
 #[must_use = "a state without room for the scene has no forces"]
 pub fn internal_forces(scene: &impl AsScene, state: &mut impl AsState) -> bool {
     internal_forces_of(scene.as_scene(), state.as_state())

@@ -1,6 +1,6 @@
-//! Exact steps whose length follows the critical step, which falls as tissue stiffens. It is asked for anew every few steps, and steps
-//! after which it turns out to be shorter than they were are undone and taken again in halves: a sudden load on one node may stiffen its
-//! elements tenfold in one step.
+//! Exact steps whose length follows the critical step, which falls as tissue stiffens. It is asked for anew every few
+//! steps, and steps after which it turns out to be shorter than they were are undone and taken again in halves: a
+//! sudden load on one node may stiffen its elements tenfold in one step.
 
 use crate::copy::copy;
 use crate::element::ElementMaterial;
@@ -14,8 +14,8 @@ use super::{critical_step, step_in_parts};
 
 /// By which share the critical step may fall between two looks.
 const FALL: f32 = 0.03;
-/// By which share per step a step grows after it had to shrink. Slowly: steps that change in time with the motion feed energy into it
-/// (Skeel 1993, "Variable step size destabilizes the Stoermer/leapfrog/Verlet method").
+/// By which share per step a step grows after it had to shrink. Slowly: steps that change in time with the motion feed
+/// energy into it (Skeel 1993, "Variable step size destabilizes the Stoermer/leapfrog/Verlet method").
 const GROWTH: f32 = 0.002;
 /// Share of the first critical step below which a step is not halved any further.
 const SHORTEST: f32 = 1e-4;
@@ -66,12 +66,7 @@ impl Pace {
     #[must_use]
     pub const fn new(critical: CriticalStep) -> Self {
         let CriticalStep { seconds, .. } = critical;
-        Self {
-            shortest: (SHORTEST * seconds).max(LEAST),
-            longest: Self::SHARE * seconds,
-            critical: seconds,
-            steps: 1,
-        }
+        Self { shortest: (SHORTEST * seconds).max(LEAST), longest: Self::SHARE * seconds, critical: seconds, steps: 1 }
     }
 
     /// The longest step at present, s.
@@ -85,8 +80,8 @@ impl Pace {
         self.steps = 1;
     }
 
-    /// Takes steps until the next look at the critical step, of a length of which whole numbers make up `left` seconds, and no more of them than that.
-    /// `enter` is called after each step. `kept` are [`vectors_for_pace`] vectors.
+    /// Takes steps until the next look at the critical step, of a length of which whole numbers make up `left` seconds,
+    /// and no more of them than that. `enter` is called after each step. `kept` are [`vectors_for_pace`] vectors.
     #[allow(clippy::too_many_arguments)]
     pub fn approach<M: ElementMaterial>(
         &mut self,
@@ -134,8 +129,7 @@ impl Pace {
         let steps = (FALL / fall * self.steps as f32) as u32;
         self.steps = steps.min(2 * self.steps).clamp(1, Self::STEPS_BETWEEN_LOOKS);
         // No shorter than is of use: a state without a critical step is refused by the step itself.
-        self.longest =
-            (self.longest * (1.0 + GROWTH * count as f32)).min(Self::SHARE * now).max(self.shortest);
+        self.longest = (self.longest * (1.0 + GROWTH * count as f32)).min(Self::SHARE * now).max(self.shortest);
         self.critical = now;
         refused.map_or(Approach::Taken { seconds }, Approach::Refused)
     }

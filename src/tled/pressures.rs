@@ -1,5 +1,5 @@
-//! Pressures at nodes, Pa, for display: `-U'(J)` of the law (Bonet & Burton 1998), which is minus the mean Cauchy stress, as the
-//! other part of the energy is isochoric.
+//! Pressures at nodes, Pa, for display: `-U'(J)` of the law (Bonet & Burton 1998), which is minus the mean Cauchy
+//! stress, as the other part of the energy is isochoric.
 
 use std::vec;
 use std::vec::Vec;
@@ -13,9 +13,10 @@ use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::{CallingThread, nodal_volumes};
 
-/// Pressure at every node of the scene, Pa, positive where tissue is compressed: the mean over the elements around it, weighted
-/// by their volumes at rest. With nodal pressure that is the node's own but where tissues meet; in linear tetrahedra it hides
-/// how far apart the elements' pressures are. Zero at nodes without elements. Nothing if the state is too small.
+/// Pressure at every node of the scene, Pa, positive where tissue is compressed: the mean over the elements around it,
+/// weighted by their volumes at rest. With nodal pressure that is the node's own but where tissues meet; in linear
+/// tetrahedra it hides how far apart the elements' pressures are. Zero at nodes without elements. Nothing if the state
+/// is too small.
 pub fn nodal_pressures(scene: &impl AsScene, state: &mut impl AsState) -> Option<Vec<f32>> {
     nodal_pressures_of(scene.as_scene(), state.as_state())
 }
@@ -51,11 +52,7 @@ fn means(sums: Vec<(f64, f64)>) -> Vec<f32> {
 }
 
 /// Adds pressures and volumes of the patches of nodal strain to their nodes.
-fn add_patches<M: ElementMaterial>(
-    scene: SceneView<'_, M>,
-    displacement: &[NodeVector],
-    sums: &mut [(f64, f64)],
-) {
+fn add_patches<M: ElementMaterial>(scene: SceneView<'_, M>, displacement: &[NodeVector], sums: &mut [(f64, f64)]) {
     let laws = scene.material.laws();
     let at = |node: usize| DVec3::from_array(displacement[node].to_array().map(f64::from));
     for (tile, lane) in scene.patches.places() {

@@ -25,14 +25,12 @@ pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &
     let displacement = displacement.get(..scene.node_count())?;
     let tangents: Vec<ElementTangent> =
         scene.places().map(|(tile, lane)| ElementTangent::of(scene, tile, lane, displacement)).collect();
-    let nodal =
-        if scene.element().is_nodal_pressure() { Some(NodalTangent::new(scene, &tangents)) } else { None };
+    let nodal = if scene.element().is_nodal_pressure() { Some(NodalTangent::new(scene, &tangents)) } else { None };
     let tangents = match &nodal {
         Some(nodal) => nodal.with_pressures(tangents),
         None => tangents,
     };
-    let strain =
-        if scene.element().is_nodal_strain() { Some(PatchTangents::new(scene, displacement)) } else { None };
+    let strain = if scene.element().is_nodal_strain() { Some(PatchTangents::new(scene, displacement)) } else { None };
     let roots: Vec<DVec3> = scene
         .inertia
         .iter()
@@ -61,8 +59,8 @@ pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &
     Some(if largest > 0.0 { 2.0 / largest.sqrt() } else { f64::INFINITY })
 }
 
-/// What nodal pressure adds to the tangents of the elements: `k sum_a V_a (dJ_a)^2` ([`crate::element`]). Where an element keeps
-/// its own volume it has an entry of its own.
+/// What nodal pressure adds to the tangents of the elements: `k sum_a V_a (dJ_a)^2` ([`crate::element`]). Where an
+/// element keeps its own volume it has an entry of its own.
 struct NodalTangent {
     /// For each element the entries of its corners.
     entries: Vec<[usize; 4]>,

@@ -1,5 +1,5 @@
-//! An element's stress and tangent in float64, `P = p1 F + pJ C`, `dP = p1 dF + dp1 F + dpJ C + pJ dC` with the cofactor matrix
-//! `C` of the deformation gradient `F`: for tools and tests. SI units.
+//! An element's stress and tangent in float64, `P = p1 F + pJ C`, `dP = p1 dF + dp1 F + dpJ C + pJ dC` with the
+//! cofactor matrix `C` of the deformation gradient `F`: for tools and tests. SI units.
 
 use core::array::from_fn;
 
@@ -38,8 +38,8 @@ pub(super) struct LawTangent {
     x_c: f64,
 }
 
-/// The elements of a scene at displacements (m) of its nodes, in the order of its tables, each by itself: with nodal pressure and
-/// nodal strain its neighbours do not count.
+/// The elements of a scene at displacements (m) of its nodes, in the order of its tables, each by itself: with nodal
+/// pressure and nodal strain its neighbours do not count.
 pub fn element_tangents<M: Material>(
     scene: SceneView<'_, M>,
     displacement: impl Fn(usize) -> [f64; 3],
@@ -67,9 +67,8 @@ impl ElementTangent {
     /// The same with displacements in float64.
     fn new<L: Law>(law: &L, tile: &ElementTile, lane: usize, displacement: impl Fn(usize) -> DVec3) -> Self {
         let nodes = [0, 1, 2, 3].map(|corner| tile.node(corner, lane));
-        let slopes = [0, 1, 2].map(|corner| {
-            DVec3::from_array([0, 1, 2].map(|axis| f64::from(tile.gradient::<f32>(corner, axis, lane))))
-        });
+        let slopes = [0, 1, 2]
+            .map(|corner| DVec3::from_array([0, 1, 2].map(|axis| f64::from(tile.gradient::<f32>(corner, axis, lane)))));
         let gradients = [-(slopes[0] + slopes[1] + slopes[2]), slopes[0], slopes[1], slopes[2]];
         let mut h = DMat3::ZERO;
         for (&node, gradient) in nodes.iter().zip(gradients) {
@@ -93,11 +92,7 @@ impl ElementTangent {
 
     /// Change of `J` with displacements `v` (m) of its nodes.
     pub(super) fn change_by(&self, vector: [DVec3; 4]) -> f64 {
-        self.gradients
-            .iter()
-            .zip(vector)
-            .map(|(gradient, vector)| (self.at.cofactor * *gradient).dot(vector))
-            .sum()
+        self.gradients.iter().zip(vector).map(|(gradient, vector)| (self.at.cofactor * *gradient).dot(vector)).sum()
     }
 
     /// Forces (N) on its nodes, with minus sign, from a change of the `J` at which the pressure is taken.
@@ -127,9 +122,9 @@ impl ElementTangent {
         self.forces_of_stress(self.at.stress_by(self.gradient_by(vector)))
     }
 
-    /// The parts of `K`, N/m, by rows and columns of nodes. With `a = F g`, `c = C g`, `y = x_f a + x_c c` for the gradient `g` of each
-    /// node: `p1 g_i.g_j + W'' y_i y_j^T + coupling (a_i c_j^T + c_i a_j^T) + bulk c_i c_j^T - pJ [F (g_i x g_j)]_x`, times the volume.
-    /// Each part is given as its columns.
+    /// The parts of `K`, N/m, by rows and columns of nodes. With `a = F g`, `c = C g`, `y = x_f a + x_c c` for the
+    /// gradient `g` of each node: `p1 g_i.g_j + W'' y_i y_j^T + coupling (a_i c_j^T + c_i a_j^T) + bulk c_i c_j^T - pJ
+    /// [F (g_i x g_j)]_x`, times the volume. Each part is given as its columns.
     #[must_use]
     pub fn stiffness(&self) -> [[[[f64; 3]; 3]; 4]; 4] {
         let LawTangent { f, cofactor, p1, p_j, stiffening, coupling, bulk, x_f, x_c, .. } = self.at;
@@ -165,8 +160,7 @@ impl LawTangent {
         let curvature = |x: f32| f64::from(wide.distortion_curvature(x, wide.distortion_slope(x)));
         let (bulk_modulus, change) = (f64::from(wide.bulk_modulus()), volume_ratio - 1.0);
         let factor = VolumeFactor::new(at);
-        let (g, slope_g, curvature_g) =
-            (f64::from(factor.g), f64::from(factor.slope), f64::from(factor.curvature()));
+        let (g, slope_g, curvature_g) = (f64::from(factor.g), f64::from(factor.slope), f64::from(factor.curvature()));
         Self {
             f,
             cofactor,
@@ -243,9 +237,8 @@ mod tests {
         let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
         for (tile, lane) in scene.view().places() {
             let law = scene.view().material.laws().of(tile.element(lane));
-            let at = |t: f64| {
-                ElementTangent::new(&law, tile, lane, |node| 2e-3 * wave(node, 0.3) + t * wave(node, 1.1))
-            };
+            let at =
+                |t: f64| ElementTangent::new(&law, tile, lane, |node| 2e-3 * wave(node, 0.3) + t * wave(node, 1.1));
             let tangent = at(0.0);
             // The law is evaluated in float32: a step much smaller would be lost in its rounding.
             let h = 2e-6;
@@ -256,8 +249,7 @@ mod tests {
             for i in 0..4 {
                 let numeric = (before[i] - after[i]) / (2.0 * h);
                 let by_parts: DVec3 = (0..4).map(|j| parts[i][j] * directions[j]).sum();
-                worst =
-                    worst.max((products[i] - numeric).length()).max((by_parts - products[i]).length() * 1e6);
+                worst = worst.max((products[i] - numeric).length()).max((by_parts - products[i]).length() * 1e6);
                 largest = largest.max(products[i].length());
             }
         }

@@ -36,8 +36,7 @@ struct Parts {
 impl Parts {
     fn new(recipe: &Recipe, device: &Device) -> Self {
         let part = |inputs: usize, hidden: &[usize]| -> Vec<Linear> {
-            let widths: Vec<usize> =
-                [inputs].into_iter().chain(hidden.iter().copied()).chain([PREDICTED]).collect();
+            let widths: Vec<usize> = [inputs].into_iter().chain(hidden.iter().copied()).chain([PREDICTED]).collect();
             widths.windows(2).map(|pair| LinearConfig::new(pair[0], pair[1]).init(device)).collect()
         };
         Self {
@@ -49,8 +48,7 @@ impl Parts {
     /// The first part's prediction, and the sum with the correction.
     fn forward(&self, x: Tensor<2>, slope: f64) -> (Tensor<2>, Tensor<2>) {
         let predicted = run(&self.first, x.clone(), slope);
-        let corrected =
-            predicted.clone() + run(&self.second, Tensor::cat(std::vec![x, predicted.clone()], 1), slope);
+        let corrected = predicted.clone() + run(&self.second, Tensor::cat(std::vec![x, predicted.clone()], 1), slope);
         (predicted, corrected)
     }
 }
@@ -100,8 +98,9 @@ pub(super) fn is_held_out(frame: usize, share: f64) -> bool {
     ((frame + 1) as f64 * share).floor() > (frame as f64 * share).floor()
 }
 
-/// Trains as the recipe, whose `text` goes into the weight file, says on the samples of a scene. With a folder for checkpoints the
-/// state is kept there after every epoch, and a training that was stopped goes on from it. `progress` may stop it.
+/// Trains as the recipe, whose `text` goes into the weight file, says on the samples of a scene. With a folder for
+/// checkpoints the state is kept there after every epoch, and a training that was stopped goes on from it. `progress`
+/// may stop it.
 pub fn fit(
     recipe: &Recipe,
     text: &str,
@@ -205,8 +204,7 @@ impl Training<'_> {
         };
         let (mut sum, mut done, mut loss) = (0.0, 0, f64::NAN);
         for batch in order.chunks(training.batch) {
-            let (input, target) =
-                (gathered(&rows.inputs, batch, device), gathered(&rows.targets, batch, device));
+            let (input, target) = (gathered(&rows.inputs, batch, device), gathered(&rows.targets, batch, device));
             let (predicted, corrected) = parts.forward(input, f64::from(network.slope));
             let weight = gathered(&rows.weights, batch, device);
             let squares = (predicted - target.clone()).square() + (corrected - target).square();
@@ -346,17 +344,10 @@ impl Folder<'_> {
             return Err(TrainError::OtherRecipe(self.path.to_path_buf()));
         }
         let epoch = epoch.and_then(|epoch| epoch.parse().ok());
-        epoch
-            .map(Some)
-            .ok_or_else(|| TrainError::Checkpoint(self.mark(), format!("cannot be read: {text:?}")))
+        epoch.map(Some).ok_or_else(|| TrainError::Checkpoint(self.mark(), format!("cannot be read: {text:?}")))
     }
 
-    fn load(
-        &self,
-        epoch: usize,
-        parts: Parts,
-        adam: ModuleOptimizer,
-    ) -> Result<(Parts, ModuleOptimizer), TrainError> {
+    fn load(&self, epoch: usize, parts: Parts, adam: ModuleOptimizer) -> Result<(Parts, ModuleOptimizer), TrainError> {
         let [weights, state] = self.files(epoch);
         let problem = |path: &Path, text: String| TrainError::Checkpoint(path.to_path_buf(), text);
         let parts = parts.try_load_file(&weights).map_err(|error| problem(&weights, error.to_string()))?;

@@ -1,5 +1,5 @@
-//! A trained network in int8, calibrated by the samples it was trained on, those of rough motion too, without which roll-outs at
-//! long steps ring, and judged on frames it has not seen.
+//! A trained network in int8, calibrated by the samples it was trained on, those of rough motion too, without which
+//! roll-outs at long steps ring, and judged on frames it has not seen.
 
 use std::format;
 use std::vec::Vec;
@@ -39,13 +39,9 @@ pub fn usual_float_layers(network: &Network<'_>) -> Vec<usize> {
     float
 }
 
-/// Quantises a network that was trained by this recipe on these samples. Without frames held out, it is judged by those of the training.
-pub fn int8(
-    network: &Network<'_>,
-    recipe: &Recipe,
-    samples: &Samples,
-    float: &[usize],
-) -> Result<Made, TrainError> {
+/// Quantises a network that was trained by this recipe on these samples. Without frames held out, it is judged by those
+/// of the training.
+pub fn int8(network: &Network<'_>, recipe: &Recipe, samples: &Samples, float: &[usize]) -> Result<Made, TrainError> {
     let share = recipe.training.held_out;
     let seen = samples.of_frames(|frame| !is_held_out(frame, share));
     let mut unseen = samples.of_frames(|frame| is_held_out(frame, share));
@@ -53,8 +49,7 @@ pub fn int8(
         unseen = seen.clone();
     }
     let inputs = [seen.inputs.as_flattened(), seen.rough.inputs.as_flattened()].concat();
-    let quantised =
-        quantise(network, &inputs, float).map_err(|error| TrainError::Quantise(format!("{error}")))?;
+    let quantised = quantise(network, &inputs, float).map_err(|error| TrainError::Quantise(format!("{error}")))?;
     let bytes = mlp::write_int8(&quantised.description, &quantised.layers)?;
     let description = Description::of(network);
     let judge = |bytes: &[u8]| judged(bytes, &unseen, &description.outputs);

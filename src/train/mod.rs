@@ -1,5 +1,5 @@
-//! Training of the learned step (feature `train`): a data set from the exact step, two losses, Adam (Meister et al. 2018,
-//! section 2), and a weight file.
+//! Training of the learned step (feature `train`): a data set from the exact step, two losses, Adam (Meister et al.
+//! 2018, section 2), and a weight file.
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -1,18 +1,18 @@
-//! Rough motion for training (as in learned simulators, Sanchez-Gonzalez et al. 2020). The exact motion is smooth: from it
-//! alone a network learns the gain `1/m` of force, with which steps beyond the explicit limit ring, and nothing of how
-//! rough motion ends. So the free vertices of a frame are displaced at random, now by `e` and a step ago by `e'`, the forces are
-//! those of the displaced body, and the target returns to the exact motion:
+//! Rough motion for training (as in learned simulators, Sanchez-Gonzalez et al. 2020). The exact motion is smooth: from
+//! it alone a network learns the gain `1/m` of force, with which steps beyond the explicit limit ring, and nothing of
+//! how rough motion ends. So the free vertices of a frame are displaced at random, now by `e` and a step ago by `e'`,
+//! the forces are those of the displaced body, and the target returns to the exact motion:
 //!
 //! ```text
 //! at t: u + e, |u - u(t-D) + c| / D, f_e - K (u + e);   target (u(t+D) - 2 u + u(t-D) - back e - c) / D^2
 //! c = before (e - e')
 //! ```
-//! The least-squares answer to a white `e` is a gain of force near `trace K / trace K^2 / D^2`, which is below the limit
-//! of stability, `4 / D^2` over the largest eigenvalue of `K`; small forces, those of smooth motion, keep theirs. With a `c`
-//! the network sees that force opposes velocity, as it does in ringing, and damps it.
+//! The least-squares answer to a white `e` is a gain of force near `trace K / trace K^2 / D^2`, which is below the
+//! limit of stability, `4 / D^2` over the largest eigenvalue of `K`; small forces, those of smooth motion, keep theirs.
+//! With a `c` the network sees that force opposes velocity, as it does in ringing, and damps it.
 //!
-//! One vertex cannot tell `e`, so a loss as large as what is taken back remains; the more is taken back, the less an error weighs
-//! ([`super::recipe::Noise::ease`]).
+//! One vertex cannot tell `e`, so a loss as large as what is taken back remains; the more is taken back, the less an
+//! error weighs ([`super::recipe::Noise::ease`]).
 
 use std::vec::Vec;
 

@@ -1,13 +1,14 @@
-//! The data set: what the exact step does over each `D`, as each vertex sees it in its frame (Meister et al. 2018, section 2).
+//! The data set: what the exact step does over each `D`, as each vertex sees it in its frame (Meister et al. 2018,
+//! section 2).
 //!
 //! ```text
 //! at t: u(t), |u(t) - u(t-D)| / D, f_e - K u;   target (u(t+D) - 2 u(t) + u(t-D)) / D^2
 //! ```
 //! Copies of each frame in rough motion may be added, see [`super::noise`].
 //!
-//! Vertices that are held or loaded are left out, as in the paper: boundary conditions make them jump. Local frames follow the
-//! motion once each `D`, as they do in a roll-out; where the paper's samples lie closer than `D`, several sequences of local
-//! frames are kept at the same time, each with its own start.
+//! Vertices that are held or loaded are left out, as in the paper: boundary conditions make them jump. Local frames
+//! follow the motion once each `D`, as they do in a roll-out; where the paper's samples lie closer than `D`, several
+//! sequences of local frames are kept at the same time, each with its own start.
 
 use std::format;
 use std::string::ToString;
@@ -165,9 +166,7 @@ impl Schedule {
 
     /// Whether the frame is to be sampled at the moment before this step. Moments are those nearest to equal intervals.
     fn is_due(&self, frame: usize, step: u64) -> bool {
-        step >= self.first
-            && frame < self.frames
-            && (step - self.first) as f64 >= (frame as f64 - 0.5) * self.spacing
+        step >= self.first && frame < self.frames && (step - self.first) as f64 >= (frame as f64 - 0.5) * self.spacing
     }
 }
 
@@ -201,8 +200,7 @@ fn collect(exemplar: &dyn TrainingScene, recipe: &Recipe) -> Result<Samples, Tra
     let schedule = Schedule::of(recipe, dt);
     let Schedule { every, sequences: count, last, .. } = schedule;
     let long = every as f64 * dt;
-    let mut sequences: Vec<Sequence> =
-        (0..count).map(|number| Sequence::new(number * every / count, nodes)).collect();
+    let mut sequences: Vec<Sequence> = (0..count).map(|number| Sequence::new(number * every / count, nodes)).collect();
     let mut frame = 0;
     let mut samples = Samples { vertices: sampled.len(), ..Samples::default() };
     // Increments are exact; a displacement in float32 is rounded, and a second difference shows that.
@@ -210,8 +208,7 @@ fn collect(exemplar: &dyn TrainingScene, recipe: &Recipe) -> Result<Samples, Tra
     let mut loads = exemplar.loads(&scene)?;
     for number in 0..=last {
         // Displacements are those before the step; its forces, of the same moment, are known after it.
-        let moments: Vec<usize> =
-            (0..sequences.len()).filter(|&at| sequences[at].has_moment(number, every)).collect();
+        let moments: Vec<usize> = (0..sequences.len()).filter(|&at| sequences[at].has_moment(number, every)).collect();
         for &at in &moments {
             sequences[at].add_shape(&place);
             sequences[at].add_targets(&sampled, long, &mut samples);
@@ -277,14 +274,7 @@ impl Sequence {
     fn new(start: u64, nodes: usize) -> Self {
         let still = || vec![DVec3::ZERO; nodes];
         let shapes = [still(), still(), still()];
-        Self {
-            start,
-            frames: vec![Frame::WORLD; nodes],
-            increments: still(),
-            shapes,
-            pending: None,
-            moments: 0,
-        }
+        Self { start, frames: vec![Frame::WORLD; nodes], increments: still(), shapes, pending: None, moments: 0 }
     }
 
     fn has_moment(&self, number: u64, every: u64) -> bool {
@@ -323,13 +313,7 @@ impl Sequence {
         }
     }
 
-    fn moment<'a>(
-        &'a self,
-        state: &'a VecState,
-        free: &'a [bool],
-        long: f64,
-        seen_as: SeenAs<'a>,
-    ) -> Moment<'a> {
+    fn moment<'a>(&'a self, state: &'a VecState, free: &'a [bool], long: f64, seen_as: SeenAs<'a>) -> Moment<'a> {
         let Self { frames, increments, .. } = self;
         Moment { state, frames, increments, free, long, seen_as }
     }

@@ -28,8 +28,7 @@ fn the_demo_compares_steps_and_leaves_a_report_and_frames() {
     }
     // The learned step cannot meet the ball and says so; forceps it can follow, in steps far above the critical one.
     assert!(learned[0].is_empty(), "{learned:?}");
-    let refusal =
-        "learned: refused: stopped at 0.300000 s: the loads have instruments, which this step cannot meet";
+    let refusal = "learned: refused: stopped at 0.300000 s: the loads have instruments, which this step cannot meet";
     assert!(said.out.contains(refusal), "{}", said.out);
     let [length, _, _, _, error, still] = learned[1][..] else { panic!("{learned:?}") };
     assert!(length == 1.5 && error > 0.0 && error < 0.1 * still, "{learned:?}");

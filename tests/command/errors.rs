@@ -26,14 +26,8 @@ fn bad_scenes_are_refused_in_words() {
         (instead("cells = [2, 2, 5]", "cells = [2, 0, 5]"), "line 5: cells are [2, 0, 5]"),
         (instead("size = [0.02, 0.02, 0.05]", "size = [0.02, -0.02, 0.05]"), "line 4: size holds -0.02 m"),
         (instead("shape = \"bar\"\nsize", "shape = \"bar\"\nscale = 0.0\nsize"), "line 4: scale is 0"),
-        (
-            instead("shape = \"bar\"\nsize = [0.02, 0.02, 0.05]\ncells = [2, 2, 5]", "file = \"no.vtk\""),
-            "no.vtk",
-        ),
-        (
-            instead("shape = \"bar\"\nsize = [0.02, 0.02, 0.05]\ncells = [2, 2, 5]", "file = \"mesh.obj\""),
-            "mesh.obj",
-        ),
+        (instead("shape = \"bar\"\nsize = [0.02, 0.02, 0.05]\ncells = [2, 2, 5]", "file = \"no.vtk\""), "no.vtk"),
+        (instead("shape = \"bar\"\nsize = [0.02, 0.02, 0.05]\ncells = [2, 2, 5]", "file = \"mesh.obj\""), "mesh.obj"),
         (instead("shape = \"bar\"", "winding = \"left\"\nshape = \"bar\""), "winding \"left\" is not known"),
         (instead("neo-hookean", "hooke"), "law \"hooke\" is not known"),
         (instead("c = 500.0\n", ""), "line 6: the law neo-hookean needs c"),
@@ -109,18 +103,9 @@ fn bad_meshes_are_refused_in_words() {
         ),
         (gmsh(corners, "1 4 1 1 4 1 2 3 3\n"), "element 0: node 2 appears twice"),
         (gmsh(corners, "1 4 1 1 4 1 2 3 9\n"), "9"),
-        (
-            gmsh(&corners.replace("4 0 0 0.01", "4 0.01 0.01 0"), "1 4 1 1 4 1 2 3 4\n"),
-            "element 0: degenerate",
-        ),
-        (
-            gmsh(&corners.replace("4 0 0 0.01", "4 nan 0 0.01"), "1 4 1 1 4 1 2 3 4\n"),
-            "node 3: coordinate x is NaN",
-        ),
-        (
-            gmsh(&format!("{corners}5 1 1 1\n"), "1 4 1 1 4 1 2 3 4\n"),
-            "node 4 belongs to no element; remove it",
-        ),
+        (gmsh(&corners.replace("4 0 0 0.01", "4 0.01 0.01 0"), "1 4 1 1 4 1 2 3 4\n"), "element 0: degenerate"),
+        (gmsh(&corners.replace("4 0 0 0.01", "4 nan 0 0.01"), "1 4 1 1 4 1 2 3 4\n"), "node 3: coordinate x is NaN"),
+        (gmsh(&format!("{corners}5 1 1 1\n"), "1 4 1 1 4 1 2 3 4\n"), "node 4 belongs to no element; remove it"),
         (gmsh(corners, ""), "no tetrahedra"),
         ("nonsense\n".into(), "mesh.msh"),
     ];

@@ -1,4 +1,5 @@
-//! Steps beyond the critical one: `method`, `step = "20x"` and `lattice` under `[time]`, and what `inspect` says of them.
+//! Steps beyond the critical one: `method`, `step = "20x"` and `lattice` under `[time]`, and what `inspect` says of
+//! them.
 
 use super::{Desk, bar};
 
@@ -55,18 +56,9 @@ fn long_steps_reach_where_short_ones_do_and_say_what_they_did() {
             assert_eq!(inertia[name].is_null(), !lattice, "{name}");
         }
         let damped = inertia["rough_motion_damped_largest"].as_f64();
-        assert_eq!(
-            damped.is_some_and(|share| share > 0.0 && share <= 0.5),
-            method == "damped",
-            "{inertia:#}"
-        );
+        assert_eq!(damped.is_some_and(|share| share > 0.0 && share <= 0.5), method == "damped", "{inertia:#}");
         assert_eq!(said.out.contains("taken away in a step"), method == "damped", "{}", said.out);
-        assert_eq!(
-            said.out.contains("coarse motion") && said.out.contains("lattice "),
-            lattice,
-            "{}",
-            said.out
-        );
+        assert_eq!(said.out.contains("coarse motion") && said.out.contains("lattice "), lattice, "{}", said.out);
         println!("{method}: {:.3} mm, the exact step {exact:.3} mm", far(&desk));
         if lattice {
             assert!((far(&desk) / exact - 1.0).abs() < 0.1, "{} {exact}", far(&desk));
@@ -83,8 +75,8 @@ fn a_step_may_be_left_to_the_tolerance() {
     let (exact, exact_steps) = (desk.last(), desk.summary()["steps"].as_u64().unwrap());
     let mut steps = vec![exact_steps];
     for (asked, millimetres) in [("tolerance = 0.0001\n", 0.1), ("", 0.287), ("tolerance = 0.002\n", 2.0)] {
-        let said = desk
-            .simulate(&leaning(&format!("method = \"auto\"\nend = 1.5\nframes = 60\n{asked}")), &["--force"]);
+        let said =
+            desk.simulate(&leaning(&format!("method = \"auto\"\nend = 1.5\nframes = 60\n{asked}")), &["--force"]);
         assert_eq!(said.code, 0, "{}", said.err);
         let summary = desk.summary();
         let adaptive = &summary["adaptive"];
@@ -97,16 +89,9 @@ fn a_step_may_be_left_to_the_tolerance() {
         println!("{asked}{error:.4} mm of {:.1} off, {adaptive}", far(&desk));
         assert!(far(&desk) > 5.0 && error < figure("tolerance_mm"), "{error} {adaptive}");
         assert!((figure("tolerance_mm") - millimetres).abs() < 1e-3, "{adaptive}");
-        assert_eq!(
-            (&summary["method"], summary["time_s"].as_f64().map(f64::round)),
-            (&"auto".into(), Some(2.0))
-        );
+        assert_eq!((&summary["method"], summary["time_s"].as_f64().map(f64::round)), (&"auto".into(), Some(2.0)));
         assert!(figure("steps_beyond_critical") > 0.0 && figure("changes") > 0.0, "{adaptive}");
-        assert!(
-            said.out.contains(" beyond the critical step, ") && said.out.contains("tolerance "),
-            "{}",
-            said.out
-        );
+        assert!(said.out.contains(" beyond the critical step, ") && said.out.contains("tolerance "), "{}", said.out);
         steps.push(summary["steps"].as_u64().unwrap());
     }
     assert!(steps.is_sorted_by(|a, b| a >= b) && steps[3] < exact_steps / 4, "{steps:?}");
@@ -149,26 +134,17 @@ fn what_does_not_go_together_is_refused_in_words() {
     let cases = [
         ("method = \"fast\"\nstep = 0.001\nend = 1.0\n", "line 15: method \"fast\" is not known; \"tled\", "),
         ("step = \"auto\"\nmethod = \"multilevel\"\nend = 1.0\n", "line 15: step \"auto\" stays below the "),
-        (
-            "step = \"auto\"\nmethod = \"mass-scaled\"\nend = 1.0\n",
-            "method \"mass-scaled\" is there to exceed",
-        ),
+        ("step = \"auto\"\nmethod = \"mass-scaled\"\nend = 1.0\n", "method \"mass-scaled\" is there to exceed"),
         (
             "end = 1.0\ntolerance = 0.0005\n",
             "line 16: tolerance is given, but exact steps have no error to be tolerated; method = \"auto\"",
         ),
-        (
-            "method = \"auto\"\nend = 1.0\ntolerance = -1.0\n",
-            "line 17: tolerance is -1 m, it must be a positive",
-        ),
+        ("method = \"auto\"\nend = 1.0\ntolerance = -1.0\n", "line 17: tolerance is -1 m, it must be a positive"),
         (
             "method = \"damped\"\nend = 1.0\n",
             "line 14: step is missing: method \"damped\" needs seconds, or a multiple of the critical step",
         ),
-        (
-            "end = 1.0\nstep = \"x\"\n",
-            "line 16: step \"x\" is not known; give seconds, \"auto\", or a multiple",
-        ),
+        ("end = 1.0\nstep = \"x\"\n", "line 16: step \"x\" is not known; give seconds, \"auto\", or a multiple"),
         ("end = 1.0\nstep = \"-20x\"\n", "line 16: step is \"-20x\", it must be a positive multiple"),
         ("end = 1.0\nstep = \"nanx\"\n", "line 16: step is \"nanx\""),
         ("end = 0.1\nstep = \"5000x\"\nmethod = \"multilevel\"\n", "line 16: the step of 2.9"),
@@ -202,8 +178,10 @@ fn what_does_not_go_together_is_refused_in_words() {
         assert!(said.err.contains(fragment), "\"{fragment}\" is not in: {}", said.err);
         assert!(!desk.path("out").exists(), "a refused scene left a folder behind");
     }
-    let tiny = bar("[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[time]\nstep = \"20x\"\nmethod = \"multilevel\"\nend = 1.0\n")
-        .replace("cells = [2, 2, 5]", "cells = [1, 1, 2]");
+    let tiny = bar(
+        "[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[time]\nstep = \"20x\"\nmethod = \"multilevel\"\nend = 1.0\n",
+    )
+    .replace("cells = [2, 2, 5]", "cells = [1, 1, 2]");
     let said = desk.simulate(&tiny, &[]);
     print!("{}", said.err);
     assert!(said.err.contains("bar: with 12 elements the mesh is too small for a lattice"), "{}", said.err);
@@ -244,11 +222,7 @@ fn inspect_tells_what_steps_beyond_the_limit_cost() {
 
     let said = desk.supple(&["inspect", "scene.toml", "--accuracy", "1e-9"]);
     assert_eq!(said.code, 0, "{}", said.err);
-    assert!(
-        said.out.contains("method = \"tled\": none of these multilevel steps stays below"),
-        "{}",
-        said.out
-    );
+    assert!(said.out.contains("method = \"tled\": none of these multilevel steps stays below"), "{}", said.out);
 }
 
 #[test]
@@ -260,9 +234,5 @@ fn accuracy_is_for_scenes_and_a_positive_number() {
     let lobe = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../meshes/lobe.msh");
     let said = desk.supple(&["inspect", lobe, "--accuracy", "0.1"]);
     assert_eq!(said.code, 2);
-    assert!(
-        said.err.contains("--accuracy recommends a step for a scene (.toml), this is a mesh"),
-        "{}",
-        said.err
-    );
+    assert!(said.err.contains("--accuracy recommends a step for a scene (.toml), this is a mesh"), "{}", said.err);
 }

@@ -38,10 +38,7 @@ fn every_kind_of_fault_is_counted_and_its_first_case_named() {
 #[test]
 fn a_scene_tells_its_limits_memory_and_cost() {
     let desk = Desk::new();
-    desk.write(
-        "scene.toml",
-        &bar("[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[time]\nstep = 1e-4\nend = 0.1\n"),
-    );
+    desk.write("scene.toml", &bar("[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[time]\nstep = 1e-4\nend = 0.1\n"));
     let said = desk.supple(&["inspect", "scene.toml"]);
     println!("{}", said.out);
     assert_eq!(said.code, 0, "{}", said.err);

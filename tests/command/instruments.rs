@@ -14,19 +14,17 @@ fn reactions(desk: &Desk, instrument: f64) -> Vec<[f64; 7]> {
     lines.map(row).filter(|row| row[1] == instrument).collect()
 }
 
-/// A bar without supports falls onto a table, which carries its weight, whatever steps are taken; a ball that comes down onto it adds its
-/// force to that of the table, and leaves.
+/// A bar without supports falls onto a table, which carries its weight, whatever steps are taken; a ball that comes
+/// down onto it adds its force to that of the table, and leaves.
 #[test]
 fn a_table_carries_what_lies_on_it_and_what_presses_it() {
     const TABLE: &str = "[[instrument]]\nshape = \"plane\"\nfriction = 0.5\npath = [[0.0, 0.0, 0.0, -0.0002]]\n\
         [[instrument]]\nshape = \"sphere\"\nradius = 0.012\npath = [[0.3, 0.01, 0.01, 0.065], [0.4, 0.01, 0.01, 0.056], [0.7, 0.01, \
         0.01, 0.056], [0.8, 0.01, 0.01, 0.08]]\ngravity = [0.0, 0.0, -9.81]\n";
     let weight = 0.02 * 0.02 * 0.05 * 1000.0 * 9.81;
-    for time in [
-        "",
-        "method = \"damped\"\nstep = \"10x\"\nlattice = [1, 1, 2]\n",
-        "method = \"auto\"\nlattice = [1, 1, 2]\n",
-    ] {
+    for time in
+        ["", "method = \"damped\"\nstep = \"10x\"\nlattice = [1, 1, 2]\n", "method = \"auto\"\nlattice = [1, 1, 2]\n"]
+    {
         let desk = Desk::new();
         let said = desk.simulate(&bar(&format!("{TABLE}[time]\nend = 1.0\nframes = 4\n{time}")), &[]);
         println!("{}", said.out);
@@ -40,12 +38,7 @@ fn a_table_carries_what_lies_on_it_and_what_presses_it() {
         let [carried, pressed] = [mean(&table, 0.55, 0.7), mean(&ball, 0.55, 0.7)];
         println!("carries {alone:?} N of {weight:.4} N; {carried:.4} N when pressed with {pressed:.4} N");
         // The bar still swings at the first.
-        assert!(
-            alone
-                .into_iter()
-                .zip([0.1, 0.02])
-                .all(|(carried, most)| (carried + weight).abs() < most * weight)
-        );
+        assert!(alone.into_iter().zip([0.1, 0.02]).all(|(carried, most)| (carried + weight).abs() < most * weight));
         assert!(pressed > 0.02 * weight && (carried + weight + pressed).abs() < 0.03 * weight);
         assert_eq!(ball.last().unwrap()[2..], [0.0; 5]);
         let largest = &desk.summary()["instruments"][1]["largest_force_n"];
@@ -72,10 +65,7 @@ fn instruments_that_cannot_be_are_refused_with_their_line() {
         (sphere.replace("0.1]]", "nan]]"), "line 14: the path holds [0.0, 0.0, 0.0, NaN]"),
         (sphere.replace("path = [[0.0, 0.0, 0.0, 0.1]]\n", ""), "line 11: an instrument needs a path"),
         (format!("{sphere}friction = -1.0\n"), "line 15: friction is -1, it must be zero or more"),
-        (
-            format!("{sphere}direction = [0.0, 0.0, 0.0]\n"),
-            "line 15: direction is [0.0, 0.0, 0.0]; it needs a length",
-        ),
+        (format!("{sphere}direction = [0.0, 0.0, 0.0]\n"), "line 15: direction is [0.0, 0.0, 0.0]; it needs a length"),
         (format!("{sphere}length = 0.1\n"), "line 15: a sphere has no use for that size"),
         ("shape = \"field\"\n".into(), "line 11: a field needs the file of a mesh"),
         ("shape = \"field\"\nfile = \"none.msh\"\n".into(), "line 13: none.msh"),
@@ -96,9 +86,7 @@ fn instruments_that_cannot_be_are_refused_with_their_line() {
     }
     let desk = Desk::new();
     let said = desk.simulate(
-        &bar(&format!(
-            "[[instrument]]\n{sphere}[time]\nend = 0.1\nmethod = \"mass-scaled\"\nstep = \"5x\"\n"
-        )),
+        &bar(&format!("[[instrument]]\n{sphere}[time]\nend = 0.1\nmethod = \"mass-scaled\"\nstep = \"5x\"\n")),
         &[],
     );
     print!("{}", said.err);

@@ -1,4 +1,5 @@
-//! Results are old or new, whatever happens to the process that makes them: killed, without room on the disk, or not alone.
+//! Results are old or new, whatever happens to the process that makes them: killed, without room on the disk, or not
+//! alone.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,8 +20,7 @@ fn scenes(desk: &Desk) {
         desk.write(name, &scene.replace("cells = [2, 2, 5]", "cells = [4, 4, 10]"));
     }
     // Runs until it is killed.
-    let rest =
-        "[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[time]\nstep = \"auto\"\nend = 1e4\nframes = 1000000\n";
+    let rest = "[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[time]\nstep = \"auto\"\nend = 1e4\nframes = 1000000\n";
     desk.write("endless.toml", &bar(rest));
 }
 
@@ -35,7 +35,8 @@ fn complete(desk: &Desk, scene: &str, out: &str) {
     assert_eq!(said.code, 0, "{}", said.err);
 }
 
-/// The files of a folder of results; of summary and report, which has the time of day, what does not change from run to run.
+/// The files of a folder of results; of summary and report, which has the time of day, what does not change from run to
+/// run.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let content = |name: String| {
         let mut bytes = fs::read(folder.join(&name)).unwrap();
@@ -146,11 +147,7 @@ fn a_second_run_into_the_same_folder_is_refused() {
     let said = desk.supple(&["simulate", "a.toml", "--out", "out", "--force"]);
     print!("{}", said.err);
     assert_eq!(said.code, 2);
-    assert!(
-        said.err.starts_with("error: out: another run writes there and holds .out.run/lock"),
-        "{}",
-        said.err
-    );
+    assert!(said.err.starts_with("error: out: another run writes there and holds .out.run/lock"), "{}", said.err);
     assert!(contents(&desk.path("out")) == a);
     complete(&desk, "a.toml", "other");
     // A process that was killed holds nothing.
@@ -160,10 +157,8 @@ fn a_second_run_into_the_same_folder_is_refused() {
     assert!(!desk.path(".out.run").exists());
     // Begun at the same time: one at least ends well, and the folder is one of theirs.
     let mut both = ["a.toml", "b.toml"].map(|scene| (scene, begin(&desk, scene, "out")));
-    let well: Vec<_> = both
-        .iter_mut()
-        .filter_map(|(scene, child)| child.wait().unwrap().success().then_some(*scene))
-        .collect();
+    let well: Vec<_> =
+        both.iter_mut().filter_map(|(scene, child)| child.wait().unwrap().success().then_some(*scene)).collect();
     let found = contents(&desk.path("out"));
     assert!(!well.is_empty());
     assert!(well.iter().any(|scene| (found == a) == (*scene == "a.toml")), "{well:?}");
@@ -200,8 +195,8 @@ fn a_link_stays_and_its_folder_is_replaced() {
     assert_eq!(names(&desk.path("there")).len(), 25);
 }
 
-/// Runs the command with files of at most 512 or 1,024 bytes (the shells differ) times `size`; one that grows beyond cannot be written,
-/// as if the disk were full.
+/// Runs the command with files of at most 512 or 1,024 bytes (the shells differ) times `size`; one that grows beyond
+/// cannot be written, as if the disk were full.
 #[cfg(target_os = "linux")]
 fn with_little_room(desk: &Desk, size: u32, arguments: &str) -> Said {
     let line = format!("trap '' XFSZ; ulimit -f {size}; exec {SUPPLE} {arguments}");
@@ -231,8 +226,5 @@ fn a_full_disk_leaves_the_old_results_and_is_named() {
     let words = "error: a.safetensors: cannot be written: File too large (os error 27)\n";
     assert_eq!((said.code, said.err.as_str()), (2, words));
     assert_eq!(fs::read(desk.path("a.safetensors")).unwrap(), b"old");
-    assert_eq!(
-        names(&desk.path("")),
-        ["a.safetensors", "a.toml", "a.weights", "b.toml", "endless.toml", "out"]
-    );
+    assert_eq!(names(&desk.path("")), ["a.safetensors", "a.toml", "a.weights", "b.toml", "endless.toml", "out"]);
 }

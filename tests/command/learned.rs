@@ -14,12 +14,7 @@ fn stopping() -> Description<'static> {
     Description {
         inputs: vec![range(10.0); 7],
         outputs: vec![range(1e3); 3],
-        first: vec![LayerDescription {
-            inputs: 7,
-            activation: Activation::Linear,
-            weights,
-            biases: vec![0.0; 3],
-        }],
+        first: vec![LayerDescription { inputs: 7, activation: Activation::Linear, weights, biases: vec![0.0; 3] }],
         second: vec![],
         law: NeoHookean { c: 500.0, d: 15_000.0 }.into(),
         element: Element::NodalPressure,
@@ -72,7 +67,8 @@ fn a_network_takes_over_after_the_exact_step_and_says_what_it_did() {
         let said = desk.simulate(&leaning(&time, "burn_in = 0.1\n"), &["--force"]);
         println!("{}{}", said.out, said.err);
         assert_eq!(said.code, 0, "{}", said.err);
-        // A network that stops the bar in its swing is wrong, and that is the only remark: the tissue is that of the training.
+        // A network that stops the bar in its swing is wrong, and that is the only remark: the tissue is that of the
+        // training.
         assert_eq!(said.err.lines().count(), 1, "{}", said.err);
         assert!(said.err.contains("the error may be more than is allowed: "), "{}", said.err);
         let summary = desk.summary();
@@ -247,14 +243,8 @@ fn what_does_not_go_together_is_refused_in_words() {
             "line 15: method is \"multilevel\", but with [learned] the exact step leads",
         ),
         (leaning(auto, "burn_in = -0.1\n"), "line 18: burn_in is -0.1 s, it must be zero or more"),
-        (
-            leaning(auto, "burn_in = 0.4\n"),
-            "line 18: the exact step leads for 0.4 s (burn_in), so a learned step of",
-        ),
-        (
-            leaning("step = \"auto\"\nend = 0.2\n", ""),
-            "line 17: the exact step leads for 0.3 s (burn_in), so",
-        ),
+        (leaning(auto, "burn_in = 0.4\n"), "line 18: the exact step leads for 0.4 s (burn_in), so a learned step of"),
+        (leaning("step = \"auto\"\nend = 0.2\n", ""), "line 17: the exact step leads for 0.3 s (burn_in), so"),
         (leaning(auto, "fallback = 1\n"), "line 18: invalid type"),
         (leaning(auto, "burn = 1\n"), "line 18: unknown field `burn`"),
         (leaning(auto, "").replace("weights = \"a.weights\"", ""), "line 16: missing field `weights`"),
@@ -299,13 +289,9 @@ fn inspect_tells_what_a_learned_step_costs() {
     let said = desk.supple(&["inspect", "scene.toml"]);
     println!("{}", said.out);
     assert_eq!(said.code, 0, "{}", said.err);
-    for part in [
-        "learned step",
-        "a.weights",
-        "5.000e-3 s, 10.0 times",
-        "21 multiply-adds per vertex",
-        "times real time",
-    ] {
+    for part in
+        ["learned step", "a.weights", "5.000e-3 s, 10.0 times", "21 multiply-adds per vertex", "times real time"]
+    {
         assert!(said.out.contains(part), "{part}: {}", said.out);
     }
 }

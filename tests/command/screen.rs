@@ -1,10 +1,10 @@
-//! What is printed has no reader, or no room: the command ends quietly, or says so, and its files are there all the same.
+//! What is printed has no reader, or no room: the command ends quietly, or says so, and its files are there all the
+//! same.
 
 use super::networks::described;
 use super::{Desk, SUPPLE, Said, bar};
 
-const SCENE: &str =
-    "[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[time]\nstep = \"auto\"\nend = 0.001\nframes = 2\n";
+const SCENE: &str = "[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[time]\nstep = \"auto\"\nend = 0.001\nframes = 2\n";
 
 /// Runs the command with nobody at the other end of its standard output.
 fn without_reader(desk: &Desk, arguments: &[&str]) -> Said {

@@ -54,8 +54,7 @@ fn a_scene_with_every_key_equals_the_kernel_called_directly() {
     assert_eq!(said.code, 0, "{}", said.err);
 
     let shape = Bar { size: [0.02, 0.02, 0.05], cells: [2, 2, 5] };
-    let points: Vec<[f64; 3]> =
-        shape.points().map(|p| p.map(|c| (f64::from(c) * 1e9).round() / 1e9)).collect();
+    let points: Vec<[f64; 3]> = shape.points().map(|p| p.map(|c| (f64::from(c) * 1e9).round() / 1e9)).collect();
     // The command moves the body to its centre.
     let local: Vec<[f32; 3]> =
         points.iter().map(|p| [(p[0] - 0.01) as f32, (p[1] - 0.01) as f32, (p[2] - 0.025) as f32]).collect();
@@ -88,9 +87,7 @@ fn a_scene_with_every_key_equals_the_kernel_called_directly() {
     let rows = desk.last();
     assert_eq!(rows.len(), points.len());
     let mut apart = 0.0f64;
-    for ((node, row), (point, vector)) in
-        rows.iter().enumerate().zip(points.iter().zip(state.displacements()))
-    {
+    for ((node, row), (point, vector)) in rows.iter().enumerate().zip(points.iter().zip(state.displacements())) {
         assert_eq!((row[0] as usize, &row[1..4]), (node, &point[..]));
         for axis in 0..3 {
             apart = apart.max((row[4 + axis] - f64::from(vector.to_array()[axis])).abs());
@@ -131,9 +128,7 @@ fn results_are_complete_and_where_they_should_be() {
 #[test]
 fn an_existing_folder_is_left_alone_without_force() {
     let desk = Desk::new();
-    let scene = bar(
-        "[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[time]\nstep = \"auto\"\nend = 0.001\nframes = 2\n",
-    );
+    let scene = bar("[[fix]]\nplane = { axis = \"z\", at = 0.0 }\n[time]\nstep = \"auto\"\nend = 0.001\nframes = 2\n");
     assert_eq!(desk.simulate(&scene, &[]).code, 0);
     std::fs::write(desk.path("out/notes.txt"), "mine").unwrap();
     let before = std::fs::read(desk.path("out/summary.json")).unwrap();
@@ -145,15 +140,8 @@ fn an_existing_folder_is_left_alone_without_force() {
 
     let fewer = scene.replace("frames = 2", "frames = 1");
     assert_eq!(desk.simulate(&fewer, &["--force"]).code, 0);
-    let expected = [
-        "final.csv",
-        "frame_0000.vtu",
-        "frame_0001.vtu",
-        "frames.pvd",
-        "notes.txt",
-        "report.html",
-        "summary.json",
-    ];
+    let expected =
+        ["final.csv", "frame_0000.vtu", "frame_0001.vtu", "frames.pvd", "notes.txt", "report.html", "summary.json"];
     assert_eq!(names(&desk.path("out")), expected);
 }
 
@@ -201,8 +189,7 @@ fn an_automatic_step_follows_the_critical_one_and_agrees_with_a_short_step() {
     let auto = desk.last();
     assert_eq!(desk.simulate(&scene("2e-5"), &["--force"]).code, 0);
     let fixed = desk.last();
-    let apart =
-        auto.iter().flatten().zip(fixed.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let apart = auto.iter().flatten().zip(fixed.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     let moved = desk.summary()["max_displacement_mm"].as_f64().unwrap();
     println!("auto {shortest:.2e} to {longest:.2e} s; {:.4} mm from 2e-5 s, of {moved:.2} mm", apart * 1e3);
     assert!(apart * 1e3 < 0.02 * moved);
@@ -223,12 +210,9 @@ fn regions_have_their_own_constants() {
         desk.last()[49][6]
     };
     let soft = reach("");
-    let half = reach(
-        "[[region]]\nbox = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 0.025] }\nc = 5000.0\nd = 150000.0\n",
-    );
-    let stiff = reach(
-        "[[region]]\nbox = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }\nc = 5000.0\nd = 150000.0\n",
-    );
+    let half =
+        reach("[[region]]\nbox = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 0.025] }\nc = 5000.0\nd = 150000.0\n");
+    let stiff = reach("[[region]]\nbox = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }\nc = 5000.0\nd = 150000.0\n");
     println!(
         "stretch of a soft, half stiff and stiff bar: {:.3}, {:.3}, {:.3} mm",
         1e3 * soft,

@@ -11,8 +11,8 @@ use super::scene::Body;
 
 const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [5, 5, 10] };
 
-/// Instruments that wander, turn, jump, change and are exchanged, on a body that swings, with steps that are refused, of other lengths, or
-/// taken without instruments: the same bits.
+/// Instruments that wander, turn, jump, change and are exchanged, on a body that swings, with steps that are refused,
+/// of other lengths, or taken without instruments: the same bits.
 #[test]
 fn a_state_that_keeps_clearances_takes_the_same_steps_to_the_bit() {
     let fixed: Vec<_> = (0..36).map(Support::fixed).collect();
@@ -55,8 +55,7 @@ fn same_steps(mut all: Body, mut few: Body) {
         match round % 10 {
             3 => instruments.reverse(),
             6 => {
-                let step =
-                    Step::unchecked(all.step.seconds() * if round % 20 == 6 { 0.7 } else { 1.0 / 0.7 }, 2.0);
+                let step = Step::unchecked(all.step.seconds() * if round % 20 == 6 { 0.7 } else { 1.0 / 0.7 }, 2.0);
                 (all.step, few.step) = (step.unwrap(), step.unwrap());
             }
             _ => {}

@@ -13,9 +13,9 @@ fn eased(share: f64) -> f32 {
     (s * s * (3.0 - 2.0 * s)) as f32
 }
 
-/// A cube on a smooth table, free to spread, under a plane: uniaxial compression of a neo-Hookean body, whose lateral stretch is
-/// the root of an equation in one unknown. The reference is solved here in float64 from the law's energy alone,
-/// `c (I1 J^(-2/3) - 3) + d (J - 1)^2`.
+/// A cube on a smooth table, free to spread, under a plane: uniaxial compression of a neo-Hookean body, whose lateral
+/// stretch is the root of an equation in one unknown. The reference is solved here in float64 from the law's energy
+/// alone, `c (I1 J^(-2/3) - 3) + d (J - 1)^2`.
 #[test]
 fn a_plane_presses_with_the_force_of_uniaxial_compression() {
     const BAR: Bar = Bar { size: [0.02, 0.02, 0.02], cells: [4, 4, 4] };
@@ -56,8 +56,8 @@ fn a_plane_presses_with_the_force_of_uniaxial_compression() {
     assert_eq!(touch[0].contacts, 25);
 }
 
-/// Coulomb on a slope: gravity is turned instead of the table. A slab whose slope is 2 % below the angle of friction comes to
-/// rest; one that is above slides with `g (sin a - mu cos a)`.
+/// Coulomb on a slope: gravity is turned instead of the table. A slab whose slope is 2 % below the angle of friction
+/// comes to rest; one that is above slides with `g (sin a - mu cos a)`.
 #[test]
 fn a_slab_on_a_slope_sticks_below_the_angle_of_friction_and_slides_above() {
     const BAR: Bar = Bar { size: [0.03, 0.03, 0.01], cells: [3, 3, 1] };
@@ -78,19 +78,15 @@ fn a_slab_on_a_slope_sticks_below_the_angle_of_friction_and_slides_above() {
         let speed = momentum[0] / mass;
         // What damping leaves of the acceleration is the final speed.
         let expected = f64::from(9.81 * (sin - FRICTION * cos) / DAMPING).max(0.0);
-        println!(
-            "slope at {share} of the angle: {:.3} mm/s, expected {:.3} mm/s",
-            1e3 * speed,
-            1e3 * expected
-        );
+        println!("slope at {share} of the angle: {:.3} mm/s, expected {:.3} mm/s", 1e3 * speed, 1e3 * expected);
         let scale = f64::from(9.81 * sin / DAMPING);
         assert!((speed - expected).abs() < 0.02 * scale, "{speed} {expected}");
         assert_eq!(slides, speed > 1e-4);
     }
 }
 
-/// Hertz 1882: a rigid sphere of 10 mm, 0.5 mm deep, in a half-space: `F = 4/3 E / (1 - nu^2) sqrt(R) d^1.5`. A quarter of a cube
-/// of 80 mm, with symmetry at two sides; cells are finer near the contact.
+/// Hertz 1882: a rigid sphere of 10 mm, 0.5 mm deep, in a half-space: `F = 4/3 E / (1 - nu^2) sqrt(R) d^1.5`. A quarter
+/// of a cube of 80 mm, with symmetry at two sides; cells are finer near the contact.
 #[test]
 fn a_sphere_presses_with_the_force_of_hertz() {
     const R: f32 = 0.01;
@@ -104,15 +100,13 @@ fn a_sphere_presses_with_the_force_of_hertz() {
     let mut errors = Vec::new();
     for cells in [8, 12, 16] {
         let bar = Bar { size: [1.0; 3], cells: [cells; 3] };
-        let points: Vec<_> =
-            bar.points().map(|[x, y, z]| [graded(x), graded(y), WIDTH - graded(1.0 - z)]).collect();
+        let points: Vec<_> = bar.points().map(|[x, y, z]| [graded(x), graded(y), WIDTH - graded(1.0 - z)]).collect();
         let supports: Vec<_> = points
             .iter()
             .zip(0..)
             .filter_map(|(&[x, y, z], node)| {
                 let held = [(x == 0.0, Axes::X), (y == 0.0, Axes::Y), (z == 0.0, Axes::XYZ)];
-                let axes =
-                    held.into_iter().filter(|held| held.0).fold(Axes::NONE, |all, held| all.union(held.1));
+                let axes = held.into_iter().filter(|held| held.0).fold(Axes::NONE, |all, held| all.union(held.1));
                 (axes != Axes::NONE).then_some(Support { node, axes, moves: false })
             })
             .collect();

@@ -66,7 +66,8 @@ fn a_sphere_on_a_grid_presses_like_a_sphere() {
     }
 }
 
-/// A free body comes to rest on a box, which carries its weight; a state that keeps clearances moves to the bit like one without.
+/// A free body comes to rest on a box, which carries its weight; a state that keeps clearances moves to the bit like
+/// one without.
 #[test]
 fn a_body_rests_on_a_body_of_any_form() {
     let bar = Bar { size: [0.04, 0.02, 0.02], cells: [6, 3, 3] };
@@ -121,8 +122,7 @@ fn a_field_that_cannot_be_used_says_why() {
         (Field::new(&values, size, origin, f32::NAN), "spacing"),
         (Field::new(&other, size, origin, SPACING), "value 7"),
         (
-            Field::new(&values, size, origin, SPACING)
-                .and_then(|_| Field::new(&outside, size, origin, SPACING)),
+            Field::new(&values, size, origin, SPACING).and_then(|_| Field::new(&outside, size, origin, SPACING)),
             "inside",
         ),
         (Field::parse(&bytes[..20]), "few"),

@@ -48,8 +48,8 @@ fn step(
     touch[0]
 }
 
-/// A free bar is lifted by its top, turned, carried and let go, in exact and in multilevel steps: what is held follows exactly, the
-/// forceps carry the weight, and a body that was let go falls like a stone.
+/// A free bar is lifted by its top, turned, carried and let go, in exact and in multilevel steps: what is held follows
+/// exactly, the forceps carry the weight, and a body that was let go falls like a stone.
 #[test]
 fn forceps_hold_lift_and_let_go() {
     for multiple in [0.9f32, 10.0] {
@@ -125,8 +125,7 @@ fn to_grasp_is_not_to_move() {
         let _ = tled::step(&scene, &loads, &mut held.state(&mut []).as_state(), &step);
         let _ = tled::step(&scene, &Loads::NONE, &mut free.state(&mut []).as_state(), &step);
     }
-    let still =
-        (0..held.points.len()).flat_map(|node| held.displacement(node)).fold(0.0f32, |a, b| a.max(b.abs()));
+    let still = (0..held.points.len()).flat_map(|node| held.displacement(node)).fold(0.0f32, |a, b| a.max(b.abs()));
     println!("{} nodes held move by at most {still:.1e} m", grips.len());
     assert!(still < 1e-9);
     let bad = [
@@ -141,8 +140,8 @@ fn to_grasp_is_not_to_move() {
     assert!(Contact::new(surface, &instruments).unwrap().gripping(&[grips[1], grips[0]]).is_err());
 }
 
-/// A ball that presses and slides back and forth, 60 frames a second: the force that the model of the frame before predicts for the next
-/// one, against holding the last force.
+/// A ball that presses and slides back and forth, 60 frames a second: the force that the model of the frame before
+/// predicts for the next one, against holding the last force.
 #[test]
 fn the_force_between_frames_is_predicted() {
     const FRAME: f64 = 1.0 / 60.0;

@@ -65,15 +65,14 @@ pub(crate) fn damped() -> Method<'static> {
     Method::damped(Cells::Given([1, 1, 2]))
 }
 
-/// A free body that is hit and dragged: the impulse of the instrument is the change of its momentum, whatever inertia is added, up to
-/// the share of a force that multilevel steps give to rough motion twice in fast motion.
+/// A free body that is hit and dragged: the impulse of the instrument is the change of its momentum, whatever inertia
+/// is added, up to the share of a force that multilevel steps give to rough motion twice in fast motion.
 #[test]
 fn the_impulse_of_an_instrument_is_the_change_of_momentum_in_multilevel_steps() {
     let critical = Body::new(BAR, &[], 0.0).step.seconds();
     for multiple in [0.5, 4.0, 10.0] {
         let mut run = Run::new(Body::new(BAR, &[], 0.0), Some(multilevel()), multiple * critical, 0.0);
-        let mut sphere =
-            Instrument::resting(Shape::Sphere { radius: 0.008 }, Pose::at([-0.0085, 0.009, 0.031]));
+        let mut sphere = Instrument::resting(Shape::Sphere { radius: 0.008 }, Pose::at([-0.0085, 0.009, 0.031]));
         sphere.friction = 0.4;
         sphere.move_to(Pose::at([-0.001, 0.012, 0.033]), 0.0, 0.1);
         let (mut impulse, mut pushed, mut first) = ([0.0f64; 3], 0, true);
@@ -98,10 +97,7 @@ fn the_impulse_of_an_instrument_is_the_change_of_momentum_in_multilevel_steps() 
         let scale = f64::from(run.body.step.seconds() / (multiple * critical));
         let momentum = mean.map(|sum| sum * scale / after);
         let (size, error) = compared(momentum, impulse);
-        println!(
-            "{multiple} times: momentum {momentum:?}, impulse {impulse:?}, off by {:.1e}; {pushed} steps",
-            error
-        );
+        println!("{multiple} times: momentum {momentum:?}, impulse {impulse:?}, off by {:.1e}; {pushed} steps", error);
         assert!(pushed > 5 && size > 1e-5);
         assert!(error < if multiple < 1.0 { 1e-4 } else { 0.02 });
     }
@@ -112,13 +108,7 @@ fn path(speed: f64) -> [(f64, [f32; 3]); 5] {
     let [press, hold, slide] = [0.003 / speed, 0.1, 0.002 / speed];
     let ends = [0.0, press, press + hold, press + hold + slide, 2.0 * press + hold + slide];
     let [out, inside] = [-0.0101, -0.0071];
-    let at = [
-        [out, 0.01, 0.03],
-        [inside, 0.01, 0.03],
-        [inside, 0.01, 0.03],
-        [inside, 0.01, 0.032],
-        [out, 0.01, 0.032],
-    ];
+    let at = [[out, 0.01, 0.03], [inside, 0.01, 0.03], [inside, 0.01, 0.03], [inside, 0.01, 0.032], [out, 0.01, 0.032]];
     [0, 1, 2, 3, 4].map(|part| (ends[part], at[part]))
 }
 
@@ -145,8 +135,7 @@ fn course(method: Option<Method<'static>>, seconds: f32, speed: f64) -> (Vec<[f6
             let centre = [0, 1, 2].map(|axis| from.1[axis] + share * (to.1[axis] - from.1[axis]));
             for entry in &run.body.surface {
                 let moved = run.body.displacement(entry.node as usize);
-                let way: f32 =
-                    (0..3).map(|axis| (entry.rest[axis] + moved[axis] - centre[axis]).powi(2)).sum();
+                let way: f32 = (0..3).map(|axis| (entry.rest[axis] + moved[axis] - centre[axis]).powi(2)).sum();
                 deepest = deepest.max(0.01 - way.sqrt());
             }
         }
@@ -186,8 +175,7 @@ fn pressing_sliding_and_retracting_give_the_forces_of_exact_steps() {
             };
             let method_is_exact = method.is_none();
             let (means, deepest, left) = course(method, multiple * critical, speed);
-            let parts =
-                means.iter().zip(&exact).map(|(a, b)| length([0, 1, 2].map(|axis| a[axis] - b[axis])));
+            let parts = means.iter().zip(&exact).map(|(a, b)| length([0, 1, 2].map(|axis| a[axis] - b[axis])));
             let share = parts.sum::<f64>() / all;
             println!(
                 "  {name} at {multiple}: force off by {:.1} %, {:.2} % of an edge inside: {means:.4?}",
@@ -200,7 +188,8 @@ fn pressing_sliding_and_retracting_give_the_forces_of_exact_steps() {
     }
 }
 
-/// Instruments anywhere, of any size and speed, in multilevel and damped steps: a step is taken with finite numbers, or refused.
+/// Instruments anywhere, of any size and speed, in multilevel and damped steps: a step is taken with finite numbers, or
+/// refused.
 #[test]
 fn no_pose_makes_a_long_step_wrong_and_calls_it_right() {
     let fixed: Vec<_> = (0..25).map(Support::fixed).collect();
@@ -244,9 +233,7 @@ fn no_pose_makes_a_long_step_wrong_and_calls_it_right() {
             }
             if pose % 100 == 0 {
                 let nodes = 0..run.body.points.len();
-                assert!(
-                    nodes.into_iter().all(|node| run.body.displacement(node).iter().all(|u| u.is_finite()))
-                );
+                assert!(nodes.into_iter().all(|node| run.body.displacement(node).iter().all(|u| u.is_finite())));
             }
         }
         let triangles = run.body.triangles.len();

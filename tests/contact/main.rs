@@ -1,5 +1,5 @@
-//! Instruments that touch tissue: against closed forms, conservation of momentum, exact steps, and instruments that nobody sane would move
-//! like this.
+//! Instruments that touch tissue: against closed forms, conservation of momentum, exact steps, and instruments that
+//! nobody sane would move like this.
 
 #[path = "../support/networks.rs"]
 mod networks;

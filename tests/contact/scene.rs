@@ -13,8 +13,7 @@ use supple::tled;
 
 pub(crate) type Law = NodalStrain<Tissue<NeoHookean>>;
 
-pub(crate) const TISSUE: Law =
-    NodalStrain(Tissue { law: NeoHookean { c: 1000.0, d: 10_000.0 }, density: 1000.0 });
+pub(crate) const TISSUE: Law = NodalStrain(Tissue { law: NeoHookean { c: 1000.0, d: 10_000.0 }, density: 1000.0 });
 
 /// A body with its state, and the nodes that can be touched.
 pub(crate) struct Body {
@@ -93,12 +92,7 @@ impl Body {
     }
 
     /// One step under gravity (m/s^2), with what the instruments feel.
-    pub(crate) fn step(
-        &mut self,
-        gravity: [f32; 3],
-        instruments: &[Instrument],
-        touches: &mut [Touch],
-    ) -> Status {
+    pub(crate) fn step(&mut self, gravity: [f32; 3], instruments: &[Instrument], touches: &mut [Touch]) -> Status {
         let (surface, triangles) = (self.surface.clone(), self.triangles.clone());
         let surface = Surface::new(&surface, self.points.len()).unwrap().with_triangles(&triangles).unwrap();
         let contact = Contact::new(surface, instruments).unwrap();

@@ -16,8 +16,7 @@ fn round(rings: u32, radius: impl Fn(f32, f32) -> f32) -> Surface {
         let direction = Vec3::new(down.sin() * turn.cos(), down.sin() * turn.sin(), down.cos());
         radius(down, turn) * direction
     };
-    let mut points: Vec<_> =
-        (1..=rings).flat_map(|ring| (0..around).map(move |step| at(ring, step))).collect();
+    let mut points: Vec<_> = (1..=rings).flat_map(|ring| (0..around).map(move |step| at(ring, step))).collect();
     points.extend([at(0, 0), at(rings + 1, 0)]);
     let node = |ring: u32, step: u32| ring * around + step % around;
     let [top, bottom] = [rings * around, rings * around + 1];
@@ -182,9 +181,7 @@ fn surfaces_that_cannot_be_used_say_why() {
     }
     // Without one side it has no inside, which the field says when it is checked; no step of it panics.
     let side = |(_, triangles): &mut Surface| triangles.truncate(triangles.len() / 2);
-    let odd = |(_, triangles): &mut Surface| {
-        triangles.iter_mut().step_by(2).for_each(|triangle| triangle.swap(0, 1))
-    };
+    let odd = |(_, triangles): &mut Surface| triangles.iter_mut().step_by(2).for_each(|triangle| triangle.swap(0, 1));
     for surface in [changed(&side), changed(&odd)] {
         println!("{:?}", made(&surface, 0.002).unwrap().field().map(|field| field.deepest()));
     }

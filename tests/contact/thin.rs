@@ -1,4 +1,5 @@
-//! Instruments that are thinner than the edges of the surface are long, which pass between its nodes and touch its triangles.
+//! Instruments that are thinner than the edges of the surface are long, which pass between its nodes and touch its
+//! triangles.
 
 use supple::contact::{Instrument, Pose, Shape, Touch};
 use supple::inertia::Method;
@@ -102,8 +103,7 @@ fn a_needle_presses_and_slides_between_the_nodes() {
         ];
         for (name, method, multiple, most) in cases {
             let (means, inside) = course(method, multiple * critical, speed);
-            let parts =
-                means.iter().zip(&exact).map(|(a, b)| length([0, 1, 2].map(|axis| a[axis] - b[axis])));
+            let parts = means.iter().zip(&exact).map(|(a, b)| length([0, 1, 2].map(|axis| a[axis] - b[axis])));
             let share = parts.sum::<f64>() / all;
             println!(
                 "  {name} at {multiple}: force off by {:.1} %, {:.2} % of an edge inside: {means:.4?}",
@@ -152,17 +152,14 @@ fn the_impulse_of_a_needle_is_the_change_of_momentum() {
     assert!(pushed > 20 && size > 1e-5 && error < 1e-4);
 }
 
-/// A ball of the size of an edge on a coarse surface: where triangles are touched, too, it sinks in no farther than into a fine one.
+/// A ball of the size of an edge on a coarse surface: where triangles are touched, too, it sinks in no farther than
+/// into a fine one.
 #[test]
 fn triangles_bring_the_force_of_a_coarse_surface_nearer_to_that_of_a_fine_one() {
     let force = |cells: [u32; 3], triangles: bool| {
         let bar = Bar { size: [0.02, 0.02, 0.02], cells };
-        let fixed: Vec<_> = bar
-            .points()
-            .zip(0..)
-            .filter(|(point, _)| point[2] == 0.0)
-            .map(|(_, node)| Support::fixed(node))
-            .collect();
+        let fixed: Vec<_> =
+            bar.points().zip(0..).filter(|(point, _)| point[2] == 0.0).map(|(_, node)| Support::fixed(node)).collect();
         let body = Body::new(bar, &fixed, 60.0);
         let mut body = if triangles { body.with_triangles() } else { body };
         let at = |depth: f32| Pose::at([0.0085, 0.0115, 0.025 - depth]);

@@ -1,8 +1,6 @@
 //! Momentum, release, refusal, and instruments in random places.
 
-use supple::contact::{
-    Contact, ContactError, Instrument, Pose, Shape, Surface, SurfaceNode, Touch, vectors_to_push,
-};
+use supple::contact::{Contact, ContactError, Instrument, Pose, Shape, Surface, SurfaceNode, Touch, vectors_to_push};
 use supple::inertia::{LargeStep, Method};
 use supple::loads::Loads;
 use supple::mesh::Bar;
@@ -19,8 +17,8 @@ fn fixed_end() -> Vec<Support> {
     (0..16).map(Support::fixed).collect()
 }
 
-/// A free body that is hit by a sphere, dragged along it with friction, and left: the impulse of the instrument is the change of its
-/// momentum. The body has no damping and no support.
+/// A free body that is hit by a sphere, dragged along it with friction, and left: the impulse of the instrument is the
+/// change of its momentum. The body has no damping and no support.
 #[test]
 fn the_impulse_of_an_instrument_is_the_change_of_momentum() {
     let mut body = Body::new(BAR, &[], 0.0);
@@ -110,8 +108,7 @@ fn steps_beyond_the_critical_one_refuse_instruments() {
     let contact = Contact::new(Surface::new(&surface, points.len()).unwrap(), &table).unwrap();
     let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &[], &[]).unwrap().touched_by(contact);
     let mut scaled =
-        LargeStep::prepare_in_vec(Method::MassScaled, scene.view(), &points, body.state(&mut []), step)
-            .unwrap();
+        LargeStep::prepare_in_vec(Method::MassScaled, scene.view(), &points, body.state(&mut []), step).unwrap();
     // Even with room for pushes.
     let mut pushes = vec![NodeVector::ZERO; vectors_to_push(surface.len(), 0)];
     let status = scaled.step(scene.view(), &loads, body.state(&mut []).pushing(&mut pushes));
@@ -147,8 +144,7 @@ fn any_poses(mut body: Body) {
         instrument.friction = 2.0 * random();
         // Up to 3 km/s.
         let way = 3000.0 * random().powi(8) * body.step.seconds();
-        let end =
-            [place[0] + way * direction[0], place[1] + way * direction[1], place[2] + way * direction[2]];
+        let end = [place[0] + way * direction[0], place[1] + way * direction[1], place[2] + way * direction[2]];
         let now = body.time();
         instrument.move_to(Pose::along(end, direction), now, now + f64::from(body.step.seconds()));
         let mut touch = [Touch::default()];
@@ -168,10 +164,7 @@ fn any_poses(mut body: Body) {
             assert!((0..body.points.len()).all(|node| body.displacement(node).iter().all(|u| u.is_finite())));
         }
     }
-    println!(
-        "{} triangles: {taken} taken, {touched} of them touched; {refused} refused",
-        body.triangles.len()
-    );
+    println!("{} triangles: {taken} taken, {touched} of them touched; {refused} refused", body.triangles.len());
     assert!(touched > poses / 100 && refused > poses / 100);
 }
 

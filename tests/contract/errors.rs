@@ -50,12 +50,7 @@ fn mesh_errors_say_what_is_wrong_and_where() {
             MeshError::IndexOutOfRange { element: 0, node: u32::MAX, nodes: 5 },
             "element 0: node 4294967295 does not exist, the mesh has 5 nodes",
         ),
-        (
-            &POINTS,
-            &[[0, 1, 1, 3]],
-            MeshError::RepeatedNode { element: 0, node: 1 },
-            "element 0: node 1 appears twice",
-        ),
+        (&POINTS, &[[0, 1, 1, 3]], MeshError::RepeatedNode { element: 0, node: 1 }, "element 0: node 1 appears twice"),
         (
             &with(3, [0.0, f32::INFINITY, 0.0]),
             &TETS,
@@ -137,11 +132,7 @@ fn build_errors_say_what_is_wrong_and_leave_the_scene_empty() {
         ),
         (
             refused(
-                FixedScene::new(Regions {
-                    law: TISSUE.law,
-                    tissues: &[TISSUE.values()],
-                    of_element: &[0, 1],
-                }),
+                FixedScene::new(Regions { law: TISSUE.law, tissues: &[TISSUE.values()], of_element: &[0, 1] }),
                 &good(),
                 &[],
             ),
@@ -200,23 +191,16 @@ fn load_errors_say_which_load_is_wrong() {
     let motion = Motion { node: 1, axes: Axes::X, metre: [1e-3, 0.0, 0.0], ramp: 0.0 };
     let forces = |bad| Loads::new(&scene, [0.0; 3], &[force, bad], &[]).unwrap_err();
     let motions = |bad| Loads::new(&scene, [0.0; 3], &[], &[motion, bad]).unwrap_err();
-    let tractions = |triangle, pascal, ramp| {
-        traction(&POINTS, &[[0, 1, 2], triangle], pascal, ramp).find_map(Result::err).unwrap()
-    };
+    let tractions =
+        |triangle, pascal, ramp| traction(&POINTS, &[[0, 1, 2], triangle], pascal, ramp).find_map(Result::err).unwrap();
     let cases: [(LoadError, &str); 12] = [
         (forces(NodalForce { node: 5, ..force }), "force 1: node 5 does not exist, the scene has 5 nodes"),
         (forces(NodalForce { newton: [0.0, f32::NAN, 0.0], ..force }), "force 1: a component is NaN"),
         (forces(NodalForce { ramp: -0.5, ..force }), "force 1: the ramp is -0.5 s, it must be zero or more"),
-        (
-            forces(NodalForce { ramp: f32::INFINITY, ..force }),
-            "force 1: the ramp is inf s, it must be zero or more",
-        ),
+        (forces(NodalForce { ramp: f32::INFINITY, ..force }), "force 1: the ramp is inf s, it must be zero or more"),
         (motions(Motion { node: 9, ..motion }), "motion 1: node 9 does not exist, the scene has 5 nodes"),
         (motions(Motion { metre: [f32::NEG_INFINITY, 0.0, 0.0], ..motion }), "motion 1: a component is -inf"),
-        (
-            motions(Motion { ramp: f32::NAN, ..motion }),
-            "motion 1: the ramp is NaN s, it must be zero or more",
-        ),
+        (motions(Motion { ramp: f32::NAN, ..motion }), "motion 1: the ramp is NaN s, it must be zero or more"),
         (
             motions(Motion { axes: Axes::X.union(Axes::Z), ..motion }),
             "motion 1: node 1 has no support that moves along z",

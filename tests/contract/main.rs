@@ -1,5 +1,5 @@
-//! What the core promises whatever it is given: no allocation, errors that name place and value, the same bits for any number of
-//! threads, and that one object takes the steps that its parts take.
+//! What the core promises whatever it is given: no allocation, errors that name place and value, the same bits for any
+//! number of threads, and that one object takes the steps that its parts take.
 
 #[path = "../support/networks.rs"]
 mod networks;

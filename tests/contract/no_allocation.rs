@@ -54,8 +54,7 @@ const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [2, 2, 4] };
 const NODES: usize = BAR.node_count();
 const TETS: usize = BAR.element_count();
 const TILES: usize = tiles_for(TETS);
-const TISSUE: Tissue<Exponential> =
-    Tissue { law: Exponential { a: 59.0, b: 8.023, d: 60_000.0 }, density: 1000.0 };
+const TISSUE: Tissue<Exponential> = Tissue { law: Exponential { a: 59.0, b: 8.023, d: 60_000.0 }, density: 1000.0 };
 
 static SCENE: Mutex<FixedScene<Tissue<Exponential>, NODES, TILES>> = Mutex::new(FixedScene::new(TISSUE));
 static STATE: Mutex<FixedState<NODES>> = Mutex::new(FixedState::new());
@@ -132,8 +131,7 @@ fn building_and_stepping_in_statics_allocates_nothing() {
     for _ in 0..100 {
         let mut state = state.view().feeling(&mut touches);
         let loads = Loads::NONE.touched_by(contact);
-        pressed +=
-            u32::from(tled::step(scene, &loads, &mut state, &step).is_taken() && touches[0].contacts > 0);
+        pressed += u32::from(tled::step(scene, &loads, &mut state, &step).is_taken() && touches[0].contacts > 0);
     }
     state.reset();
 
@@ -223,9 +221,7 @@ fn steps_beyond_the_limit_in_statics_allocate_nothing() {
     assert!(LargeStep::prepare(multilevel, scene.view(), other_points, state.view(), step, storage).is_err());
 
     assert_eq!(allocations(), before);
-    println!(
-        "200 steps at 20 times the limit, {taken} of them exact, no allocation; inertia added {added:.1?}"
-    );
+    println!("200 steps at 20 times the limit, {taken} of them exact, no allocation; inertia added {added:.1?}");
     assert!(taken > 0 && added[0] > 1.0);
 }
 
@@ -243,8 +239,7 @@ fn a_damped_roll_out_in_statics_allocates_nothing() {
     let forces = [NodalForce { node: NODES as u32 - 3, newton: [1e-5, 0.0, 0.0], ramp: 0.0 }];
     let loads = Loads::new(&scene, [0.0, 0.0, -0.01], &forces, &[]).unwrap();
     let method = Method::damped(Cells::Given(LATTICE));
-    let mut damped =
-        LargeStep::prepare(method, scene.view(), &points, state.view(), step, &mut storage[..]).unwrap();
+    let mut damped = LargeStep::prepare(method, scene.view(), &points, state.view(), step, &mut storage[..]).unwrap();
     let mut most = 0.0_f32;
     for _ in 0..100 {
         assert!(damped.step(scene.view(), &loads, state.view()).is_taken());

@@ -1,5 +1,5 @@
-//! A step in parts, wherever and in whatever order they run, gives the bits of the step in one; and the parts compute the forces of
-//! every element once.
+//! A step in parts, wherever and in whatever order they run, gives the bits of the step in one; and the parts compute
+//! the forces of every element once.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -15,9 +15,7 @@ use supple::tled;
 
 use crate::networks::{Memory, described, uniform};
 use crate::support::bodies::{corner_torsion, held};
-use crate::support::{
-    Body, EXP, bits, displaced, largest, largest_distance, reference_law, rest_of, tissue, widened,
-};
+use crate::support::{Body, EXP, bits, displaced, largest, largest_distance, reference_law, rest_of, tissue, widened};
 use crate::{reference, support};
 
 const DT: f32 = 2e-5;
@@ -70,8 +68,7 @@ fn shuffled() -> Body {
     }
     let mut order: Vec<u32> = (0..body.tets.len() as u32).collect();
     shuffle(&mut order);
-    body.tets =
-        order.iter().map(|&tet| body.tets[tet as usize].map(|node| new_nodes[node as usize])).collect();
+    body.tets = order.iter().map(|&tet| body.tets[tet as usize].map(|node| new_nodes[node as usize])).collect();
     body.points = points;
     body
 }
@@ -80,7 +77,8 @@ fn wave([x, y, z]: [f32; 3]) -> [f32; 3] {
     [0.02 * (40.0 * z).sin() * y, 0.05 * z * x, 0.3 * x * z]
 }
 
-/// Bits of the state after 30 exact steps under gravity, forces and a moved node, on a rough table, with what the table feels.
+/// Bits of the state after 30 exact steps under gravity, forces and a moved node, on a rough table, with what the table
+/// feels.
 fn exact(body: &Body, threads: &impl Threads) -> Vec<u64> {
     let far = body.farthest(2);
     let mut supports = held(body);
@@ -159,8 +157,7 @@ fn large(method: &str, body: &Body, threads: &impl Threads) -> Vec<u64> {
     };
     let mut state = rest_of(&scene);
     let step = Step::unchecked(20.0 * DT, 20.0).unwrap();
-    let mut large =
-        LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
+    let mut large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
     for _ in 0..30 {
         taken(large.step_in_parts(scene.view(), &loads, state.view(), threads));
     }
@@ -221,8 +218,7 @@ fn forces_are_those_of_the_reference_in_any_order_of_nodes() {
     for (name, body) in [("in order", body()), ("shuffled", shuffled())] {
         let scene = body.scene(tissue(EXP), &held(&body));
         let displacements: Vec<_> = body.points.iter().map(|&x| wave(x)).collect();
-        let expected =
-            reference::internal_force(&body.reference(), &reference_law(EXP), &widened(&displacements));
+        let expected = reference::internal_force(&body.reference(), &reference_law(EXP), &widened(&displacements));
         let mut state = displaced(&scene, &displacements);
         let loads = Loads::new(&scene, [0.0; 3], &[], &[]).unwrap();
         let step = Step::unchecked(1e-6, 0.0).unwrap();

@@ -1,5 +1,5 @@
-//! Memory for the patches of tetrahedra with nodal strain: of a fixed capacity, of the caller, on the heap the same bits; too little is
-//! told with what is enough.
+//! Memory for the patches of tetrahedra with nodal strain: of a fixed capacity, of the caller, on the heap the same
+//! bits; too little is told with what is enough.
 
 use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
 use supple::loads::Loads;
@@ -12,24 +12,16 @@ use supple::tled;
 use crate::reference::nodal_pressure::Tissues;
 use crate::reference::nodal_strain::forces as exact_forces;
 use crate::support::bodies::{held, small_bar};
-use crate::support::{
-    Body, NEO, forces, norm, norm_of_sum, reference_law, regions, rest_of, tissue, widened,
-};
+use crate::support::{Body, NEO, forces, norm, norm_of_sum, reference_law, regions, rest_of, tissue, widened};
 
 /// Three tissues mixed at random, some of whose elements around a node share no face.
 fn three_tissues(body: &Body) -> ([Tissue<AnyLaw>; 3], Vec<u16>) {
     let tissues = [300.0, 500.0, 800.0].map(|c| tissue(NeoHookean { c, d: 20_000.0 }));
-    (
-        tissues,
-        (0..body.tets.len() as u32).map(|element| (element.wrapping_mul(2_654_435_761) % 3) as u16).collect(),
-    )
+    (tissues, (0..body.tets.len() as u32).map(|element| (element.wrapping_mul(2_654_435_761) % 3) as u16).collect())
 }
 
 /// Energy, critical step and bits of displacements after some steps.
-fn moved<M: ElementMaterial>(
-    scene: SceneView<'_, M>,
-    mut state: impl AsState,
-) -> (f64, CriticalStep, Vec<[u32; 3]>) {
+fn moved<M: ElementMaterial>(scene: SceneView<'_, M>, mut state: impl AsState) -> (f64, CriticalStep, Vec<[u32; 3]>) {
     let loads = Loads::new(&scene, [1.0, 0.0, -9.81], &[], &[]).unwrap();
     let critical = tled::critical_step(&scene, &mut state).unwrap();
     let step = Step::new(0.5 * critical.seconds, 5.0, critical).unwrap();
@@ -38,12 +30,7 @@ fn moved<M: ElementMaterial>(
     }
     let energy = tled::strain_energy(&scene, &mut state).expect("room");
     let state = state.as_state();
-    let moved = state
-        .displacements()
-        .iter()
-        .take(scene.node_count())
-        .map(|u| u.to_array().map(f32::to_bits))
-        .collect();
+    let moved = state.displacements().iter().take(scene.node_count()).map(|u| u.to_array().map(f32::to_bits)).collect();
     (energy, critical, moved)
 }
 
@@ -67,8 +54,7 @@ fn any_memory_gives_the_same_bits() {
     let (mut nodes, mut tiles) = ([NodeInertia::EMPTY; 100], [ElementTile::EMPTY; 20]);
     let mut rows = [PatchRow::EMPTY; ROWS];
     let supports = held(&body).into_iter();
-    let facts =
-        SceneFacts::build(&material, &body.mesh(), supports, &mut nodes, &mut tiles, &mut rows).unwrap();
+    let facts = SceneFacts::build(&material, &body.mesh(), supports, &mut nodes, &mut tiles, &mut rows).unwrap();
     let view = SceneView::new(&material, &nodes, &tiles, &rows, &facts);
     assert!(moved(view, VecState::at_rest(96)) == expected);
     // Those who have no patches have no memory for them.
@@ -82,8 +68,8 @@ fn built<M: Material>(material: &M, body: &Body, rows: usize) -> Result<SceneFac
     SceneFacts::build(material, &body.mesh(), [].into_iter(), &mut nodes, &mut tiles, &mut rows)
 }
 
-/// Rows that are needed, and rows that are then in use. With fewer the error tells of enough, from some capacity on exactly; `most`
-/// rows are enough where not even nodes can be counted.
+/// Rows that are needed, and rows that are then in use. With fewer the error tells of enough, from some capacity on
+/// exactly; `most` rows are enough where not even nodes can be counted.
 fn rows_needed<M: Material>(material: &M, body: &Body, most: usize) -> (usize, usize) {
     let mut last = 0;
     for capacity in 0.. {
@@ -139,8 +125,7 @@ fn a_node_with_many_neighbours_is_no_obstacle() {
     assert!(taken > 600 && needed > usual);
     let scene = body.scene(NodalStrain(tissue(NEO)), &[]);
     assert_eq!(scene.patch_row_count(), taken);
-    let u: Vec<_> =
-        body.points.iter().map(|[x, y, z]| [1e-2 * x * y, 5e-3 * z - 1e-2 * y * y, 1e-3 * x]).collect();
+    let u: Vec<_> = body.points.iter().map(|[x, y, z]| [1e-2 * x * y, 5e-3 * z - 1e-2 * y * y, 1e-3 * x]).collect();
     let tissues = Tissues { mesh: &body.reference(), laws: &[reference_law(NEO)], of_element: &[0; 200] };
     let exact = exact_forces(&tissues, &widened(&u));
     let opposite: Vec<_> = exact.iter().map(|force| force.map(|component| -component)).collect();

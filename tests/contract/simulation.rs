@@ -1,5 +1,5 @@
-//! One object for scene, state, loads, method, guard and pace (`supple::simulation`): the same bits as its parts put together by hand, calls
-//! that follow each other without a drift, refusals that leave nothing behind.
+//! One object for scene, state, loads, method, guard and pace (`supple::simulation`): the same bits as its parts put
+//! together by hand, calls that follow each other without a drift, refusals that leave nothing behind.
 
 use supple::adaptive::{Adaptive, Request};
 use supple::contact::{Instrument, Pose, Shape};
@@ -28,9 +28,8 @@ fn material(element: Element) -> VecMaterial {
 
 fn twisted(body: &Body, settings: Settings<'static>) -> Simulation<'static> {
     let material = material(Element::NodalPressure);
-    let mut simulation = Simulation::new(body.points.clone(), body.tets.clone(), material, &held(body))
-        .unwrap()
-        .with(settings);
+    let mut simulation =
+        Simulation::new(body.points.clone(), body.tets.clone(), material, &held(body)).unwrap().with(settings);
     simulation.forces = torsion(body, 2e-3, 0.05);
     simulation
 }
@@ -54,8 +53,7 @@ impl Parts {
 
 /// The largest displacement, m: a frozen body must not pass.
 fn moved(state: &VecState) -> f32 {
-    let lengths =
-        state.displacements().iter().map(|u| u.to_array().iter().map(|x| x * x).sum::<f32>().sqrt());
+    let lengths = state.displacements().iter().map(|u| u.to_array().iter().map(|x| x * x).sum::<f32>().sqrt());
     lengths.fold(0.0, f32::max)
 }
 
@@ -98,10 +96,7 @@ fn exact_steps_follow_the_critical_step_and_frames_do_not_drift() {
     let reports = frames(&mut simulation, 60);
     let least = reports.iter().map(|report| report.seconds[0]).fold(f32::INFINITY, f32::min);
     let off = simulation.state().time() - 60.0 * FRAME;
-    println!(
-        "steps {:.3} of the critical one at rest and less, {off:.1e} s off after 60 frames",
-        least / rest
-    );
+    println!("steps {:.3} of the critical one at rest and less, {off:.1e} s off after 60 frames", least / rest);
     assert!(least < 0.85 * rest, "nothing stiffened: {least} of {rest}");
     assert!(off.abs() < 2e-6 * FRAME);
 }
@@ -117,8 +112,7 @@ fn long_steps_and_their_guard_are_those_of_the_layers_below() {
     let step = Step::unchecked(seconds, DAMPING).unwrap();
     let view = parts.scene.view();
     let mut large = LargeStep::prepare_in_vec(LONG, view, &body.points, parts.state.view(), step).unwrap();
-    let mut guard =
-        Guard::prepare_in_vec(view, &body.points, parts.state.view(), step, guard::EVERY).unwrap();
+    let mut guard = Guard::prepare_in_vec(view, &body.points, parts.state.view(), step, guard::EVERY).unwrap();
     let loads = Loads::new(&parts.scene, [0.0; 3], &parts.forces, &[]).unwrap();
     for report in frames(&mut simulation, 12) {
         let mut worst = Status::Ok;
@@ -128,11 +122,7 @@ fn long_steps_and_their_guard_are_those_of_the_layers_below() {
         }
         assert_eq!((report.status, report.long, report.estimate), (worst, 4, guard.estimate()));
     }
-    println!(
-        "{:.1} critical steps long, moved {:.3} mm",
-        seconds / parts.critical.seconds,
-        1e3 * moved(&parts.state)
-    );
+    println!("{:.1} critical steps long, moved {:.3} mm", seconds / parts.critical.seconds, 1e3 * moved(&parts.state));
     assert!(moved(&parts.state) > 1e-4 && simulation.advance(FRAME).unwrap().estimate.is_some());
     assert_ne!(bits(simulation.state()), bits(&parts.state));
 }
@@ -154,8 +144,7 @@ fn steps_that_choose_their_length_are_those_of_the_layer_below() {
     parts.forces.clone_from(&simulation.forces);
     let request = Request { tolerance: 1e-3, longest: Step::unchecked(longest, DAMPING).unwrap() };
     let (scene, state) = (&parts.scene, &mut parts.state);
-    let mut adaptive =
-        Adaptive::prepare_in_vec(LONG, scene.view(), &body.points, state.view(), request).unwrap();
+    let mut adaptive = Adaptive::prepare_in_vec(LONG, scene.view(), &body.points, state.view(), request).unwrap();
     let mut loads = Loads::new(scene, [0.0; 3], &parts.forces, &[]).unwrap();
     let mut long = 0;
     for (frame, report) in (1..).zip(frames(&mut simulation, 60)) {
@@ -178,9 +167,8 @@ fn a_network_is_led_and_led_again_after_a_restore() {
     let interval = network.recipe().step;
     let body = Body::paper();
     let fixed: Vec<_> = (0..81).map(Support::fixed).collect();
-    let at_rest = || {
-        Simulation::new(body.points.clone(), body.tets.clone(), material(Element::Linear), &fixed).unwrap()
-    };
+    let at_rest =
+        || Simulation::new(body.points.clone(), body.tets.clone(), material(Element::Linear), &fixed).unwrap();
     let settings = |lead_in| Settings {
         method: Method::Learned { network, lead_in, fallback: false },
         guard: false,
@@ -190,12 +178,7 @@ fn a_network_is_led_and_led_again_after_a_restore() {
     simulation.forces = torsion(&body, 1e-4, 0.01);
     let led = simulation.advance(10.0 * f64::from(interval)).unwrap();
     let learned = simulation.advance(5.0 * f64::from(interval)).unwrap();
-    println!(
-        "lead-in {} exact steps, then {} learned ones of {:.0} us",
-        led.exact,
-        learned.learned,
-        1e6 * interval
-    );
+    println!("lead-in {} exact steps, then {} learned ones of {:.0} us", led.exact, learned.learned, 1e6 * interval);
     assert_eq!((led.learned, learned.exact, learned.learned), (0, 0, 5));
     assert!(led.exact >= 10);
 
@@ -206,17 +189,11 @@ fn a_network_is_led_and_led_again_after_a_restore() {
     let exact = Step::unchecked(interval / 10.0, network.recipe().damping).unwrap();
     let storage = vec![NodeVector::ZERO; vectors_for(scene.node_count(), false)];
     let mut by_hand = LearnedStep::new(network, false, storage).unwrap();
-    assert!(
-        by_hand
-            .lead(scene.view(), &loads, state.view(), (&exact, 10.0 * f64::from(interval)))
-            .unwrap()
-            .is_taken()
-    );
+    assert!(by_hand.lead(scene.view(), &loads, state.view(), (&exact, 10.0 * f64::from(interval))).unwrap().is_taken());
     for _ in 0..5 {
         assert!(by_hand.step(scene.view(), &loads, state.view(), &exact).unwrap().is_taken());
     }
-    let mut same =
-        at_rest().with(Settings { step: Some(interval / 10.0), ..settings(10.0 * f64::from(interval)) });
+    let mut same = at_rest().with(Settings { step: Some(interval / 10.0), ..settings(10.0 * f64::from(interval)) });
     same.forces.clone_from(&forces);
     same.advance(15.0 * f64::from(interval)).unwrap();
     assert_eq!(bits(same.state()), bits(&state));
@@ -238,13 +215,11 @@ fn motions_without_a_ramp_go_evenly_over_a_call() {
     let mut supports = held(&body);
     supports.extend(end.iter().map(|&node| Support::moved(node)));
     let mut simulation =
-        Simulation::new(body.points.clone(), body.tets.clone(), material(Element::NodalStrain), &supports)
-            .unwrap();
+        Simulation::new(body.points.clone(), body.tets.clone(), material(Element::NodalStrain), &supports).unwrap();
     let mut speeds = vec![];
     for frame in 1..=10 {
         let metre = [0.0, 0.0, 1e-4 * frame as f32];
-        simulation.motions =
-            end.iter().map(|&node| Motion { node, axes: Axes::XYZ, metre, ramp: 0.0 }).collect();
+        simulation.motions = end.iter().map(|&node| Motion { node, axes: Axes::XYZ, metre, ramp: 0.0 }).collect();
         simulation.advance(FRAME).unwrap();
         let node = end[0] as usize;
         assert!((simulation.displacements()[node].to_array()[2] - metre[2]).abs() < 1e-9);
@@ -257,16 +232,12 @@ fn motions_without_a_ramp_go_evenly_over_a_call() {
 #[test]
 fn a_ball_presses_and_feels_it() {
     let body = small_bar();
-    let mut simulation = Simulation::new(
-        body.points.clone(),
-        body.tets.clone(),
-        material(Element::NodalPressure),
-        &held(&body),
-    )
-    .unwrap()
-    .with(Settings { damping: DAMPING, ..Settings::default() })
-    .meeting(false)
-    .unwrap();
+    let mut simulation =
+        Simulation::new(body.points.clone(), body.tets.clone(), material(Element::NodalPressure), &held(&body))
+            .unwrap()
+            .with(Settings { damping: DAMPING, ..Settings::default() })
+            .meeting(false)
+            .unwrap();
     let [x, y, z] = body.points[body.farthest(2) as usize];
     let ball = Instrument::resting(Shape::Sphere { radius: 0.01 }, Pose::at([x, y, z + 0.0101]));
     simulation.instruments = vec![ball];

@@ -1,7 +1,7 @@
-//! Hostile input: files that are damaged on purpose, and calls as no sound host makes them. Nothing panics, hangs or takes more
-//! memory than a multiple of the input; what is refused says why and changes nothing; what is called good is finite. How long runs are
-//! made: `docs/architecture.md`. Recipes are tried with the training (`recipes.rs`), the command's own files
-//! in `src/bin/supple/hostile.rs`, the C API in `tests/capi/hostile.c`.
+//! Hostile input: files that are damaged on purpose, and calls as no sound host makes them. Nothing panics, hangs or
+//! takes more memory than a multiple of the input; what is refused says why and changes nothing; what is called good is
+//! finite. How long runs are made: `docs/architecture.md`. Recipes are tried with the training (`recipes.rs`), the
+//! command's own files in `src/bin/supple/hostile.rs`, the C API in `tests/capi/hostile.c`.
 
 #[path = "../support/hostile.rs"]
 mod hostile;

@@ -1,5 +1,5 @@
-//! Damaged mesh files of every format. Reading takes at most [`BYTES`] bytes of memory for each byte of the file, of a compressed one
-//! for each byte of what it holds. What is read is in range, and the kernel takes it or says why not.
+//! Damaged mesh files of every format. Reading takes at most [`BYTES`] bytes of memory for each byte of the file, of a
+//! compressed one for each byte of what it holds. What is read is in range, and the kernel takes it or says why not.
 
 use std::fs;
 use std::path::Path;
@@ -17,8 +17,8 @@ use crate::data;
 use crate::hostile::{Changes, Run, measured};
 use crate::support::{NEO, tissue};
 
-/// Bytes of memory for a byte of a file: an XML element of three characters becomes a node of 72 bytes in a vector that grows; of a
-/// list of numbers two characters become eight bytes, and again eight.
+/// Bytes of memory for a byte of a file: an XML element of three characters becomes a node of 72 bytes in a vector that
+/// grows; of a list of numbers two characters become eight bytes, and again eight.
 const BYTES: u64 = 128;
 /// Bytes of memory for any file: names, messages, buffers.
 const ANY: u64 = 20_000;
@@ -45,11 +45,7 @@ fn tries(target: &'static str, name: &str, sound: &[Vec<u8>], words: &[&[u8]]) {
                 let nodes = mesh.points.len();
                 assert!(!mesh.tets.is_empty());
                 assert!(
-                    mesh.tets
-                        .iter()
-                        .flatten()
-                        .chain(mesh.triangles.iter().flatten())
-                        .all(|&n| (n as usize) < nodes)
+                    mesh.tets.iter().flatten().chain(mesh.triangles.iter().flatten()).all(|&n| (n as usize) < nodes)
                 );
                 assert!(mesh.regions.is_empty() || mesh.regions.len() == mesh.tets.len());
                 simulate(&mesh.points, &mesh.tets);
@@ -148,9 +144,8 @@ fn msh() {
 
 #[test]
 fn tetgen() {
-    let pair = |name: &str| {
-        [data(&[&format!("{name}.node")]), data(&[&format!("{name}.ele")])].concat().join(&b"---\n"[..])
-    };
+    let pair =
+        |name: &str| [data(&[&format!("{name}.node")]), data(&[&format!("{name}.ele")])].concat().join(&b"---\n"[..]);
     let sound = [pair("tetgen.1"), pair("meshio_tetgen_bare")];
     tries("tetgen", "a.ele", &sound, &[b"#", b"---\n"]);
 }

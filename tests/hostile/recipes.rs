@@ -34,9 +34,7 @@ fn recipes() {
             assert!(error.to_string().len() > 4, "{error:?}");
         }
         if let Ok(recipe) = &recipe {
-            assert!(
-                recipe.motion.frames > 0 && recipe.motion.to.is_finite() && recipe.training.rate.is_finite()
-            );
+            assert!(recipe.motion.frames > 0 && recipe.motion.to.is_finite() && recipe.training.rate.is_finite());
         }
         recipe.is_ok() || damper.is_ok()
     });

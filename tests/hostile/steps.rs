@@ -1,5 +1,5 @@
-//! Calls of steps with loads of any size. A step that is refused leaves no trace: all that follows is the same, to the bit, as if the
-//! call had not been. What is taken is finite, and so is the estimate of a guard that calls a step good.
+//! Calls of steps with loads of any size. A step that is refused leaves no trace: all that follows is the same, to the
+//! bit, as if the call had not been. What is taken is finite, and so is the estimate of a guard that calls a step good.
 
 use supple::element::ElementMaterial;
 use supple::guard::Guard;
@@ -68,16 +68,13 @@ fn supports(body: &Body) -> Vec<Support> {
 /// Loads of any size, and seldom none.
 fn drawn(dice: &mut Dice, nodes: usize) -> ([f32; 3], Vec<NodalForce>, Vec<Motion>) {
     let is_wild = dice.one_in(3);
-    let mut number =
-        |usual| if is_wild { dice.wild(usual) } else { usual * (2.0 * dice.share() as f32 - 1.0) };
+    let mut number = |usual| if is_wild { dice.wild(usual) } else { usual * (2.0 * dice.share() as f32 - 1.0) };
     let gravity = [(); 3].map(|()| number(10.0));
     let forces: Vec<_> = (0..3)
         .map(|_| NodalForce { node: 0, newton: [(); 3].map(|()| number(0.02)), ramp: number(0.01).abs() })
         .collect();
-    let motion =
-        Motion { node: 91, axes: Axes::XYZ, metre: [(); 3].map(|()| number(0.002)), ramp: number(0.1).abs() };
-    let forces =
-        forces.into_iter().map(|force| NodalForce { node: dice.below(nodes) as u32, ..force }).collect();
+    let motion = Motion { node: 91, axes: Axes::XYZ, metre: [(); 3].map(|()| number(0.002)), ramp: number(0.1).abs() };
+    let forces = forces.into_iter().map(|force| NodalForce { node: dice.below(nodes) as u32, ..force }).collect();
     (gravity, forces, if dice.one_in(2) { vec![motion] } else { vec![] })
 }
 
@@ -94,9 +91,8 @@ fn sequence<M: ElementMaterial>(dice: &mut Dice, body: &Body, material: M, kind:
         2 => Some(Method::Multilevel(Cells::Suggested)),
         _ => Some(Method::Damped(networks::damper(20.0), Cells::Suggested)),
     };
-    let large = method.map(|method| {
-        LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap()
-    });
+    let large =
+        method.map(|method| LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap());
     let mut guard = Guard::prepare_in_vec(scene.view(), &body.points, state.view(), step, 3).unwrap();
     let seen = Moved { state, large };
     let mut pair = Pair { scene: &scene, step, unseen: seen.clone(), seen };
@@ -116,10 +112,7 @@ fn sequence<M: ElementMaterial>(dice: &mut Dice, body: &Body, material: M, kind:
             let judged = guard.follow(status, scene.view(), &loads, &pair.seen.state.view());
             assert_eq!(judged.is_taken(), status.is_taken());
             if let Some(estimate) = guard.estimate() {
-                assert!(
-                    estimate.mean.is_finite() && estimate.allowed.is_finite(),
-                    "{judged:?}, {estimate:?}"
-                );
+                assert!(estimate.mean.is_finite() && estimate.allowed.is_finite(), "{judged:?}, {estimate:?}");
             }
         }
     }

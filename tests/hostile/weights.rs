@@ -1,5 +1,5 @@
-//! Damaged weight files, in float32 and int8, and damaged exports of PyTorch. Reading a weight file takes no memory. A network that is
-//! accepted gives finite numbers in its ranges, and steps that it moves are finite or refused.
+//! Damaged weight files, in float32 and int8, and damaged exports of PyTorch. Reading a weight file takes no memory. A
+//! network that is accepted gives finite numbers in its ranges, and steps that it moves are finite or refused.
 
 use supple::inertia::{Cells, Damper, LargeStep, Method};
 use supple::learned::{LearnedStep, vectors_for};
@@ -22,9 +22,7 @@ const ANY: u64 = 20_000;
 /// Small networks of every kind.
 fn sound() -> Vec<Vec<u8>> {
     let mut sound = data(&["v1.weights", "v3.weights"]);
-    for (seed, [first, second]) in
-        [[&[7, 8, 3][..], &[10, 4, 3][..]], [&[7, 33, 3], &[]]].into_iter().enumerate()
-    {
+    for (seed, [first, second]) in [[&[7, 8, 3][..], &[10, 4, 3][..]], [&[7, 33, 3], &[]]].into_iter().enumerate() {
         let description = networks::described(first, second, seed as u32);
         sound.push(supple::mlp::write(&description).unwrap());
         let int8 = networks::int8(&description, |_| true, 5);
@@ -66,8 +64,7 @@ fn weight_files() {
     let critical = tled::critical_step(&scene, &mut rest).unwrap();
     let push = [NodalForce { node: 94, newton: [0.01, 0.0, 0.0], ramp: 0.0 }];
     let loads = Loads::new(&scene, [0.0; 3], &push, &[]).unwrap();
-    let finite =
-        |state: &VecState| state.displacements().iter().all(|u| u.to_array().iter().all(|x| x.is_finite()));
+    let finite = |state: &VecState| state.displacements().iter().all(|u| u.to_array().iter().all(|x| x.is_finite()));
     let storage = vec![NodeVector::ZERO; vectors_for(body.points.len(), true)];
     Run::new("weights", 4_000).each(|dice| {
         let mut bytes = changes.input(dice);
@@ -104,8 +101,7 @@ fn weight_files() {
         {
             let step = Step::unchecked(20.0 * critical.seconds, 20.0).unwrap();
             let method = Method::Damped(damper, Cells::Given([1, 1, 2]));
-            let mut large =
-                LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
+            let mut large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
             for _ in 0..5 {
                 let status = large.step(scene.view(), &loads, state.view());
                 assert!(!status.is_taken() || finite(&state), "{status:?}");

@@ -35,8 +35,7 @@ const VTK5: &str = "# vtk DataFile Version 5.1\ntitle\nASCII\nDATASET UNSTRUCTUR
                     0 1 0\n0 0 1\nCELLS 2 4\nOFFSETS vtktypeint64\n0 4\nCONNECTIVITY vtktypeint64\n0 1 2 3\n\
                     CELL_TYPES 1\n10\n";
 
-const MSH1: &str =
-    "$NOD\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n7 0 0 1\n$ENDNOD\n$ELM\n1\n1 4 5 6 4 1 2 3 7\n$ENDELM\n";
+const MSH1: &str = "$NOD\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n7 0 0 1\n$ENDNOD\n$ELM\n1\n1 4 5 6 4 1 2 3 7\n$ENDELM\n";
 
 const MSH2: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n7 0 0 1\n$EndNodes\n\
                     $Elements\n1\n40 4 2 5 6 1 2 3 7\n$EndElements\n";
@@ -69,19 +68,10 @@ fn the_files_that_are_broken_below_are_sound() {
         ("a.msh", MSH4, vec![5]),
         ("a.ele", TETGEN, vec![8]),
     ] {
-        let expected =
-            TetMesh { points: points.clone(), tets: vec![[0, 1, 2, 3]], triangles: vec![], regions };
-        assert_eq!(
-            read(name, content.as_bytes()).unwrap_or_else(|error| panic!("{error}")),
-            expected,
-            "{content}"
-        );
+        let expected = TetMesh { points: points.clone(), tets: vec![[0, 1, 2, 3]], triangles: vec![], regions };
+        assert_eq!(read(name, content.as_bytes()).unwrap_or_else(|error| panic!("{error}")), expected, "{content}");
         let windows = content.replace('\n', "\r\n").replace("---\r\n", "---\n");
-        assert_eq!(
-            read(name, windows.as_bytes()).unwrap_or_else(|error| panic!("{error}")),
-            expected,
-            "{content}"
-        );
+        assert_eq!(read(name, windows.as_bytes()).unwrap_or_else(|error| panic!("{error}")), expected, "{content}");
     }
 }
 
@@ -89,10 +79,7 @@ fn the_files_that_are_broken_below_are_sound() {
 fn unusual_but_allowed() {
     let expected = read("a.vtk", VTK.as_bytes()).unwrap();
     // Text may go on in the line of its keyword, metadata may follow any array.
-    let line = VTK
-        .replace("double\n", "double ")
-        .replace("1 5\n", "1 5 ")
-        .replace("CELL_TYPES 1\n", "CELL_TYPES 1 ");
+    let line = VTK.replace("double\n", "double ").replace("1 5\n", "1 5 ").replace("CELL_TYPES 1\n", "CELL_TYPES 1 ");
     assert_eq!(read("a.vtk", line.as_bytes()).unwrap(), expected);
     let metadata = VTK5.replace("CONN", "METADATA\nINFORMATION 0\n\nCONN");
     assert_eq!(read("a.vtk", metadata.as_bytes()).unwrap(), expected);
@@ -126,10 +113,7 @@ fn names_in_messages_are_cut_and_cannot_control_a_terminal() {
     let cells = VTU.replace("<Cells>", "<Cel--->").replace("--->", &format!("{}>", "-".repeat(10_000)));
     for (file, content) in [("a.vtk", [VTK, &arrays].concat()), ("a.vtu", cells)] {
         let error = read(file, content.as_bytes()).unwrap_err().to_string();
-        assert!(
-            error.len() < 600 && error.ends_with("...") && !error.contains(char::is_control),
-            "{error:?}"
-        );
+        assert!(error.len() < 600 && error.ends_with("...") && !error.contains(char::is_control), "{error:?}");
     }
 }
 
@@ -138,10 +122,8 @@ fn as_many_compressed_bytes_as_can_be_counted_are_missing() {
     let zlib = VTU.replace("type=\"Unstr", "compressor=\"vtkZLibDataCompressor\" type=\"Unstr");
     let points = zlib.replace("NumberOfPoints=\"4\"", &format!("NumberOfPoints=\"{}\"", u64::MAX / 3));
     // One block, of an empty text.
-    let empty = points.replace(
-        "format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1",
-        "format=\"binary\">AQAAAAAAAAAAAAAACAAAAA==eJwDAAAAAAE=",
-    );
+    let empty = points
+        .replace("format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1", "format=\"binary\">AQAAAAAAAAAAAAAACAAAAA==eJwDAAAAAAE=");
     let bytes = empty.replace("Float64", "UInt8");
     assert_refused("bad.vtu", bytes.as_bytes(), "the array has 0 bytes instead of 18446744073709551615");
 }
@@ -305,11 +287,7 @@ fn binary_arrays_of_xml_files() {
     let binary = |text: &str| VTU.replace(points, &format!("format=\"binary\">{text}<"));
     assert_refused("a.vtu", binary("AA!A").as_bytes(), "line 3, <DataArray>: \"AA!A\" is not base64");
     assert_refused("a.vtu", binary("").as_bytes(), "4 bytes are expected, but the base64 text ends after 0");
-    assert_refused(
-        "a.vtu",
-        binary("YAAAAAAA").as_bytes(),
-        "96 bytes are expected, but the base64 text ends after",
-    );
+    assert_refused("a.vtu", binary("YAAAAAAA").as_bytes(), "96 bytes are expected, but the base64 text ends after");
     assert_refused("a.vtu", binary("/////w==").as_bytes(), "the array has 4294967295 bytes instead of 96");
     assert_refused("a.vtu", VTU.replace(points, "format=\"hex\"><").as_bytes(), "the format \"hex\"");
     let appended = VTU.replace(points, "format=\"appended\" offset=\"7\"><");
@@ -325,11 +303,7 @@ fn binary_arrays_of_xml_files() {
         zlib(&(STANDARD.encode(counts) + &STANDARD.encode(data)))
     };
     assert_refused("a.vtu", header([1, 96, 0, 5], b"12345").as_bytes(), "block 0 is not zlib data");
-    assert_refused(
-        "a.vtu",
-        header([1, 96, 0, 4_000_000_000], b"").as_bytes(),
-        "4000000000 bytes are expected",
-    );
+    assert_refused("a.vtu", header([1, 96, 0, 4_000_000_000], b"").as_bytes(), "4000000000 bytes are expected");
     assert_refused("a.vtu", header([u32::MAX, 96, 0, 0], b"").as_bytes(), "4 bytes are expected");
     assert_refused("a.vtu", header([0, 96, 0, 0], b"").as_bytes(), "the array has 0 bytes instead of 96");
     // A megabyte of zeros in a thousand bytes: unpacked no further than the array is long.
@@ -340,11 +314,7 @@ fn binary_arrays_of_xml_files() {
         encoder.finish().unwrap()
     };
     let size = bomb.len() as u32;
-    assert_refused(
-        "a.vtu",
-        header([1, 1 << 20, 0, size], &bomb).as_bytes(),
-        "97 bytes or more instead of 1048576",
-    );
+    assert_refused("a.vtu", header([1, 1 << 20, 0, size], &bomb).as_bytes(), "97 bytes or more instead of 1048576");
 }
 
 #[test]

@@ -121,11 +121,7 @@ fn nothing_is_renumbered() {
     let expected = reference();
     for name in ["vtk_5.1_ascii_f32.vtk", "vtk_raw.vtu", "meshio_2.2_ascii.msh", "big_4.1_binary.msh"] {
         let mesh = read(name);
-        assert_eq!(
-            (mesh.points, mesh.triangles),
-            (expected.points.clone(), expected.triangles.clone()),
-            "{name}"
-        );
+        assert_eq!((mesh.points, mesh.triangles), (expected.points.clone(), expected.triangles.clone()), "{name}");
     }
     assert_eq!(read("vtk_raw.vtu"), expected);
 }

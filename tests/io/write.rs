@@ -4,19 +4,15 @@ use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
-use supple::io::{
-    Frame, TetMesh, read_mesh, read_surface, write_atomically, write_pvd, write_triangles, write_vtu,
-};
+use supple::io::{Frame, TetMesh, read_mesh, read_surface, write_atomically, write_pvd, write_triangles, write_vtu};
 
 fn mesh() -> TetMesh {
     read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/vtk_raw.vtu")).unwrap()
 }
 
 fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
+    let mut names: Vec<_> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
     names.sort();
     names
 }
@@ -26,8 +22,7 @@ fn field(bytes: &[u8], name: &str) -> Vec<f32> {
     let find = |text: &str| bytes.windows(text.len()).position(|window| window == text.as_bytes());
     let start = find(&format!("Name=\"{name}\"")).unwrap();
     let element = std::str::from_utf8(&bytes[start..start + 120]).unwrap();
-    let offset: usize =
-        element.split("offset=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap();
+    let offset: usize = element.split("offset=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap();
     let block = &bytes[find("\n_").unwrap() + 2 + offset..];
     let count = |i: usize| u64::from_le_bytes(block[8 * i..8 * i + 8].try_into().unwrap()) as usize;
     assert_eq!(count(0), 1, "one block");
@@ -69,8 +64,7 @@ fn arrays_of_several_blocks() {
     let tets: Vec<[u32; 4]> = (0..100_000).map(|i| [i % 50_000, (i * 7) % 50_000, 3, i / 2]).collect();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("large.vtu");
-    let frame =
-        Frame { points: &points, tets: &tets, point_vectors: &[], point_scalars: &[], cell_scalars: &[] };
+    let frame = Frame { points: &points, tets: &tets, point_vectors: &[], point_scalars: &[], cell_scalars: &[] };
     write_vtu(&path, &frame).unwrap();
     let back = read_mesh(&path).unwrap();
     assert_eq!((back.points, back.tets), (points, tets));

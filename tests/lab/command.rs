@@ -83,8 +83,7 @@ fn a_command_without_training_says_how_to_get_it() {
     for command in ["train", "quantise"] {
         let (code, _, err) = lab(&folder, &[command, "file", "--out", "organ.weights"]);
         assert_eq!(code, Some(2));
-        let words =
-            "built without training; build it with `cargo build --release -p supple-lab --features train`";
+        let words = "built without training; build it with `cargo build --release -p supple-lab --features train`";
         assert!(err.contains(words), "{err}");
     }
 }

@@ -60,8 +60,7 @@ fn long_cases_are_judged_only_if_they_are_named() {
 fn exact_steps_beyond_the_critical_one_tell_and_switching_steps_follow() {
     let folder = tempfile::tempdir().unwrap();
     let methods = [Method::TledLargeStep, Method::Damped, Method::Switching(Large::Damped)];
-    let plan =
-        Plan { cases: vec![cases::named("coarse").unwrap()], random: 0, methods: methods.to_vec(), every: 3 };
+    let plan = Plan { cases: vec![cases::named("coarse").unwrap()], random: 0, methods: methods.to_vec(), every: 3 };
     let judged = evaluate(&plan, folder.path(), |_| ()).unwrap();
     let of = |method| judged.iter().filter(move |run: &&Judged| run.row.method == method).collect::<Vec<_>>();
 

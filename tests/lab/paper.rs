@@ -1,5 +1,5 @@
-//! The paper's claims (Meister et al. 2018, section 3) on the paper's bar: a network moves it with steps at which the exact
-//! formula is unstable. Slow: tens of thousands of steps of 6,528 tetrahedra.
+//! The paper's claims (Meister et al. 2018, section 3) on the paper's bar: a network moves it with steps at which the
+//! exact formula is unstable. Slow: tens of thousands of steps of 6,528 tetrahedra.
 
 use supple_lab::method::Method;
 use supple_lab::networks::Family;

@@ -15,9 +15,7 @@ fn run(case: &str, meshes: usize) -> (Vec<Row>, String) {
 
 /// The error (%) of a quantity on the finest of the meshes of a family.
 fn error(rows: &[Row], (mesh, element, method): (&str, Element, &str), quantity: &str) -> f64 {
-    let of = |row: &&Row| {
-        (row.mesh, row.element, row.method) == (mesh, element, method) && row.quantity == quantity
-    };
+    let of = |row: &&Row| (row.mesh, row.element, row.method) == (mesh, element, method) && row.quantity == quantity;
     rows.iter().rev().find(of).unwrap().error_percent().unwrap()
 }
 
@@ -29,17 +27,14 @@ fn a_cylinder_under_pressure_grows_as_lame_says_with_nodal_pressure_only() {
             let quantity = format!("radial displacement of the {surface} surface");
             let [linear, pressure, strain] =
                 Element::ALL.map(|element| error(&rows, (mesh, element, "exact"), &quantity));
-            println!(
-                "{mesh}, {quantity}: linear {linear:.2} %, nodal pressure {pressure:.2}, strain {strain:.2} %"
-            );
+            println!("{mesh}, {quantity}: linear {linear:.2} %, nodal pressure {pressure:.2}, strain {strain:.2} %");
             assert!(pressure.abs() < 2.0 && strain.abs() < 2.0 && linear < -15.0);
         }
     }
     // No node moves along the axis; damped steps reach the same shape across it.
     let quantity = "radial displacement of the inner surface";
     for element in Element::ALL {
-        let [exact, damped] =
-            ["exact", "damped 20x"].map(|method| error(&rows, ("grid", element, method), quantity));
+        let [exact, damped] = ["exact", "damped 20x"].map(|method| error(&rows, ("grid", element, method), quantity));
         assert!((damped - exact).abs() < 0.1, "{}: {exact} and {damped} %", element.name());
     }
     assert_eq!(csv.lines().next(), Some(HEADS));
@@ -52,8 +47,7 @@ fn a_cylinder_under_pressure_grows_as_lame_says_with_nodal_pressure_only() {
 fn torsion_converges_with_every_element_and_either_step() {
     let (rows, _) = run("torsion", 2);
     for element in Element::ALL {
-        let [exact, damped] =
-            ["exact", "damped 20x"].map(|method| error(&rows, ("grid", element, method), "torque"));
+        let [exact, damped] = ["exact", "damped 20x"].map(|method| error(&rows, ("grid", element, method), "torque"));
         println!("{}: torque {exact:+.2} %, with damped steps {damped:+.2} %", element.name());
         assert!(exact > 0.0 && exact < 12.0 && (damped - exact).abs() < 0.5);
     }
@@ -71,15 +65,14 @@ fn a_graded_grid_brings_cooks_membrane_nearer() {
     }
 }
 
-/// 144 tetrahedra bend by two thirds of what the real beam does with nodal strain, by half of it with nodal pressure, by an eighth with
-/// linear tetrahedra.
+/// 144 tetrahedra bend by two thirds of what the real beam does with nodal strain, by half of it with nodal pressure,
+/// by an eighth with linear tetrahedra.
 #[test]
 fn the_silicone_beam_bends_more_with_nodal_pressure() {
     let (rows, _) = run("silicone-beam", 1);
     for (load, rest) in [("gravity-a", [-88.0, -52.0, -36.0]), ("load-52g-a", [-90.0, -54.0, -38.0])] {
-        let exact = |element, quantity: &str| {
-            error(&rows, ("grid", element, "exact"), &format!("{load} left: {quantity}"))
-        };
+        let exact =
+            |element, quantity: &str| error(&rows, ("grid", element, "exact"), &format!("{load} left: {quantity}"));
         for (element, expected) in Element::ALL.into_iter().zip(rest) {
             let error = exact(element, "drop at rest");
             println!("{load}, {}: drop at rest {error:+.1} %", element.name());
@@ -94,8 +87,5 @@ fn the_silicone_beam_bends_more_with_nodal_pressure() {
     // The steps of most packages end at the shape of the element that they are made of.
     let rest = |method| error(&rows, ("grid", Element::Linear, method), "gravity-a left: drop at rest");
     assert!((rest("backward Euler 5 ms") - rest("exact")).abs() < 0.5);
-    assert!(
-        rows.iter()
-            .all(|row| row.note.is_empty() && row.us_per_simulated_second.is_some_and(|time| time > 0.0))
-    );
+    assert!(rows.iter().all(|row| row.note.is_empty() && row.us_per_simulated_second.is_some_and(|time| time > 0.0)));
 }

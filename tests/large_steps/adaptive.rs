@@ -1,5 +1,5 @@
-//! Adaptive steps (`supple::adaptive`): the length is chosen so that the error stays below a tolerance, and a change of it changes
-//! neither displacements nor velocities.
+//! Adaptive steps (`supple::adaptive`): the length is chosen so that the error stays below a tolerance, and a change of
+//! it changes neither displacements nor velocities.
 
 use supple::adaptive::{Adaptive, Request, Taken};
 use supple::inertia::{Cells, Method};
@@ -46,12 +46,7 @@ struct Judged {
     silent: usize,
 }
 
-fn judged(
-    frames: usize,
-    tolerance: f32,
-    mut forces: impl FnMut(f64) -> Vec<NodalForce>,
-    gravity: [f32; 3],
-) -> Judged {
+fn judged(frames: usize, tolerance: f32, mut forces: impl FnMut(f64) -> Vec<NodalForce>, gravity: [f32; 3]) -> Judged {
     let (body, scene) = bar();
     let (mut truth, mut state) = (rest_of(&scene), rest_of(&scene));
     let limit = bound(&scene, &truth).seconds;
@@ -59,8 +54,7 @@ fn judged(
     let exact = Step::unchecked(FRAME / count as f32, DAMPING).unwrap();
     let mut adaptive = adaptive(&body, &scene, &mut state, tolerance, DAMPING);
     let exact_steps = frames as u32 * (FRAME / (0.9 * limit)).ceil() as u32;
-    let mut judged =
-        Judged { error: 0.0, motion: 0.0, taken: Taken::default(), exact_steps, told: 0, silent: 0 };
+    let mut judged = Judged { error: 0.0, motion: 0.0, taken: Taken::default(), exact_steps, told: 0, silent: 0 };
     for frame in 0..frames {
         let forces = forces(state.time());
         let mut loads = Loads::new(&scene, gravity, &forces, &[]).unwrap();
@@ -120,8 +114,8 @@ fn sudden_loads_shorten_the_steps() {
     assert!(silent == 0 && error < 5.0 * f64::from(tolerance));
 }
 
-/// Free fall over a metre, whose velocity any slip at a change of length would leave wrong for good: `g t^2 / 2`, and half a step's more that the
-/// exact step takes at the start, at all lengths.
+/// Free fall over a metre, whose velocity any slip at a change of length would leave wrong for good: `g t^2 / 2`, and
+/// half a step's more that the exact step takes at the start, at all lengths.
 #[test]
 fn changes_of_length_keep_the_velocity() {
     let body = Body::irregular([0.03, 0.02, 0.04], [4, 3, 5]);
@@ -145,8 +139,8 @@ fn changes_of_length_keep_the_velocity() {
     assert!((fallen - expected).abs() < 1e-3 * expected);
 }
 
-/// From long steps to exact ones while a sudden twist spreads: with the increment of a long step as it is, the forces of half a long
-/// step act at once on what has only its own inertia, and set the mesh ringing.
+/// From long steps to exact ones while a sudden twist spreads: with the increment of a long step as it is, the forces
+/// of half a long step act at once on what has only its own inertia, and set the mesh ringing.
 #[test]
 fn a_shortened_increment_does_not_make_the_mesh_ring() {
     let (body, scene) = bar();
@@ -171,10 +165,7 @@ fn a_shortened_increment_does_not_make_the_mesh_ring() {
             }
             state.energy_balance().kinetic / truth.energy_balance().kinetic
         });
-        println!(
-            "{kind:?}: {:.2} times the kinetic energy as it is, {:.2} shortened",
-            ringing[0], ringing[1]
-        );
+        println!("{kind:?}: {:.2} times the kinetic energy as it is, {:.2} shortened", ringing[0], ringing[1]);
         assert!(ringing[1] < 0.5 * ringing[0] && (0.2..2.0).contains(&ringing[1]));
     }
 }
@@ -217,8 +208,8 @@ fn a_state_without_a_critical_step_is_refused() {
     let mut adaptive = adaptive(&body, &scene, &mut state, 1e-4, DAMPING);
     let mut loads = Loads::new(&scene, [1.0, 0.0, 0.0], &[], &[]).unwrap();
     let nodes = scene.view().node_count();
-    let [mut displacement, mut increment, mut force] = [f32::NAN, 0.0, 0.0]
-        .map(|component| vec![bytemuck::cast::<[f32; 4], NodeVector>([component; 4]); nodes]);
+    let [mut displacement, mut increment, mut force] =
+        [f32::NAN, 0.0, 0.0].map(|component| vec![bytemuck::cast::<[f32; 4], NodeVector>([component; 4]); nodes]);
     let mut progress = Progress::START;
     let mut lost = StateView::new(&mut displacement, &mut increment, &mut force, &mut [], &mut progress);
     for _ in 0..3 {

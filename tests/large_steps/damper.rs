@@ -58,8 +58,7 @@ fn the_built_in_damper_is_that_of_its_file() {
     let methods = [Method::damped(Cells::Suggested), Method::Damped(read, Cells::Suggested)];
     let [built_in, of_file] = methods.map(|method| {
         let mut state = rest_of(&scene);
-        let mut damped =
-            LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
+        let mut damped = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
         let mut shares = 0.0;
         for _ in 0..100 {
             assert!(damped.step(scene.view(), &loads, state.view()).is_taken());
@@ -94,8 +93,8 @@ fn smooth_motion_is_left_alone() {
     assert!(worst < 1e-3);
 }
 
-/// A bar of a coarser mesh than the damper was made for, twisted, at eight times the critical step: there most of the error is
-/// the lattice's.
+/// A bar of a coarser mesh than the damper was made for, twisted, at eight times the critical step: there most of the
+/// error is the lattice's.
 #[test]
 fn on_another_mesh_the_shipped_damper_does_no_harm() {
     let body = Body::bar([0.05, 0.05, 0.1], [6, 6, 12]);
@@ -112,9 +111,7 @@ fn on_another_mesh_the_shipped_damper_does_no_harm() {
         [(Method::Multilevel(cells), &mut undamped), (method, &mut damped)].map(|(method, state)| {
             LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), long).unwrap()
         });
-    let mean = |a: &VecState, b: &VecState| {
-        1e3 * mean_distance(&to_f64(a.displacements()), &to_f64(b.displacements()))
-    };
+    let mean = |a: &VecState, b: &VecState| 1e3 * mean_distance(&to_f64(a.displacements()), &to_f64(b.displacements()));
     let (mut errors, mut hold, mut count) = ([0.0; 2], 0.0, 0.0);
     while truth.time() < 0.6 {
         for _ in 0..10 {

@@ -1,4 +1,5 @@
-//! Guards (`supple::guard`): a second run with longer steps estimates the error, and says when a step is not to be believed.
+//! Guards (`supple::guard`): a second run with longer steps estimates the error, and says when a step is not to be
+//! believed.
 
 use supple::guard::{Allowed, EVERY, Guard};
 use supple::inertia::{Cells, InertiaError, LargeStep, Method};
@@ -26,13 +27,7 @@ fn bar() -> (Body, Scene) {
     (body, scene)
 }
 
-fn prepared(
-    body: &Body,
-    scene: &Scene,
-    state: &mut VecState,
-    seconds: f32,
-    lattice: bool,
-) -> (VecLargeStep, VecGuard) {
+fn prepared(body: &Body, scene: &Scene, state: &mut VecState, seconds: f32, lattice: bool) -> (VecLargeStep, VecGuard) {
     let method = if lattice { Method::Multilevel(Cells::Suggested) } else { Method::MassScaled };
     let step = Step::unchecked(seconds, DAMPING).unwrap();
     let large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
@@ -94,8 +89,7 @@ fn the_estimate_covers_the_error_and_grows_with_the_step() {
     for (name, gravity, forces, lattice, multiples) in cases {
         let mut before = 0.0;
         for &multiple in multiples {
-            let Judged { estimate, error, motion, above, inexact } =
-                judged(gravity, forces, multiple, lattice);
+            let Judged { estimate, error, motion, above, inexact } = judged(gravity, forces, multiple, lattice);
             println!(
                 "{name}, lattice {lattice} at {multiple}: {estimate:.4} mm estimated, {error:.4} mm true of \
                  {motion:.2}, {above} of {SNAPSHOTS} snapshots above, {inexact} inexact"
@@ -143,8 +137,7 @@ fn a_tolerance_in_metres_takes_the_place_of_the_share() {
     let mut inexact = 0;
     for _ in 0..50 {
         let status = large.step(scene.view(), &loads, state.view());
-        if let Status::Inexact { error, allowed } = guard.follow(status, scene.view(), &loads, &state.view())
-        {
+        if let Status::Inexact { error, allowed } = guard.follow(status, scene.view(), &loads, &state.view()) {
             assert!(error > allowed && allowed == 1e-7);
             inexact += 1;
         }
@@ -185,8 +178,7 @@ fn memory_that_is_too_small_is_told_with_what_is_needed() {
     let needed = supple::guard::vectors_for(scene.view(), &body.points).unwrap();
     let mut storage = vec![supple::state::NodeVector::ZERO; needed - 1];
     let mut state = rest_of(&scene);
-    let refused =
-        Guard::prepare(scene.view(), &body.points, state.view(), step, EVERY, storage.as_mut_slice()).err();
+    let refused = Guard::prepare(scene.view(), &body.points, state.view(), step, EVERY, storage.as_mut_slice()).err();
     let capacity = needed - 1;
     assert_eq!(refused, Some(InertiaError::Capacity { kind: "vectors", needed, capacity }));
 }
@@ -200,8 +192,7 @@ fn a_step_may_be_shorter_than_the_one_that_was_prepared() {
     let longest = 1e-3_f32;
     let step = Step::unchecked(longest, DAMPING).unwrap();
     let method = Method::Multilevel(Cells::Suggested);
-    let mut large =
-        LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
+    let mut large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
     let mut count = 0_u32;
     while state.time() < 0.4 {
         let seconds = longest * [1.0, 0.3, 0.5, 0.8][count as usize / 100 % 4];

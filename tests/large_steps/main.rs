@@ -33,9 +33,7 @@ use supple::state::{NodeVector, VecState};
 use supple::step::{Status, Step};
 use supple::tled;
 use support::bodies::{corner_torsion, held, small_bar, torsion};
-use support::{
-    Body, EXP, NEO, bound, displaced, largest, largest_distance, mean_distance, rest_of, tissue, to_f64,
-};
+use support::{Body, EXP, NEO, bound, displaced, largest, largest_distance, mean_distance, rest_of, tissue, to_f64};
 
 type VecLargeStep = LargeStep<'static, Vec<NodeVector>>;
 
@@ -68,8 +66,7 @@ impl Kind {
         };
         let grid = method.grid(scene.view(), &body.points).unwrap();
         assert!(grid.functions > 0 || self == Self::MassScaled, "no lattice for this scene");
-        let large =
-            LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
+        let large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
         assert_eq!(large.model().grid(), grid);
         large
     }
@@ -103,17 +100,13 @@ fn apart(kind: Kind, damping: f32, share: f32, time: f32) -> (f64, f64) {
     (most, moved)
 }
 
-/// Where no node needs inertia mass scaling is the exact step. A third of the critical step: the bound that inertia is made from
-/// is coarser than that on the critical step, and the bar stiffens.
+/// Where no node needs inertia mass scaling is the exact step. A third of the critical step: the bound that inertia is
+/// made from is coarser than that on the critical step, and the bar stiffens.
 #[test]
 fn mass_scaling_below_the_limit_is_the_exact_step() {
     for damping in [0.0, 20.0] {
         let (most, moved) = apart(Kind::MassScaled, damping, 0.3, 0.1);
-        println!(
-            "damping {damping}: {:.1e} of {:.2} mm apart from the exact step",
-            most / moved,
-            1e3 * moved
-        );
+        println!("damping {damping}: {:.1e} of {:.2} mm apart from the exact step", most / moved, 1e3 * moved);
         assert!(moved > 1e-3 && most < 1e-4 * moved);
     }
 }
@@ -202,9 +195,7 @@ fn mixed_supports(body: &Body) -> Vec<Support> {
     let mut supports: Vec<_> = (body.nodes_where(|x| x[2] == 0.0).into_iter())
         .map(|node| Support { node, axes: Axes::Z, moves: false })
         .collect();
-    supports.extend(
-        body.nodes_where(|[x, y, z]| x == 0.0 && y == 0.0 && z == 0.0).into_iter().map(Support::fixed),
-    );
+    supports.extend(body.nodes_where(|[x, y, z]| x == 0.0 && y == 0.0 && z == 0.0).into_iter().map(Support::fixed));
     let node = body.farthest(2);
     supports.push(Support { node, axes: Axes::X.union(Axes::Y), moves: true });
     supports
@@ -270,9 +261,7 @@ fn the_operator_stays_bounded_while_the_body_turns() {
     let step = Step::unchecked(20.0 * limit(&scene), 0.0).unwrap();
     let square = f64::from(step.seconds()).powi(2);
     let mut wrong = Vec::new();
-    for (kind, degrees) in
-        KINDS.into_iter().flat_map(|kind| [0.0, 2.0, 5.0, 10.0, 20.0, 45.0].map(|d| (kind, d)))
-    {
+    for (kind, degrees) in KINDS.into_iter().flat_map(|kind| [0.0, 2.0, 5.0, 10.0, 20.0, 45.0].map(|d| (kind, d))) {
         let r = reference::tensor::rotation([1.0, 2.0, 3.0], f64::to_radians(degrees));
         let large = kind.prepared(&body, &scene, &mut rest_of(&scene), step, 0.0);
         let state = displaced(&scene, &body.affine(&r, [0.0; 3]));
@@ -308,7 +297,8 @@ fn the_operator_stays_bounded_while_the_body_turns() {
     assert!(wrong.is_empty(), "unstable: {wrong:?}");
 }
 
-/// The tangent of a body with nodal strain in a state, N/m, from differences of the reference's forces, and these forces.
+/// The tangent of a body with nodal strain in a state, N/m, from differences of the reference's forces, and these
+/// forces.
 fn tangent_with_nodal_strain(
     body: &Body,
     law: NeoHookean,
@@ -334,8 +324,8 @@ fn tangent_with_nodal_strain(
     (k, nodal_strain::forces(&tissues, u))
 }
 
-/// With nodal strain, in equilibrium at rest and strained by a third, with shaken nodes. The operator is what a force changes in the
-/// first step.
+/// With nodal strain, in equilibrium at rest and strained by a third, with shaken nodes. The operator is what a force
+/// changes in the first step.
 #[test]
 fn the_operator_is_positive_and_bounded_with_nodal_strain() {
     let body = Body::irregular([0.02, 0.02, 0.04], [2, 2, 4]);
@@ -352,15 +342,11 @@ fn the_operator_is_positive_and_bounded_with_nodal_strain() {
         let scene = body.scene(NodalStrain(tissue(law)), &supports);
         let free = free_axes(&scene);
         let mut random = Random(9);
-        let shaken =
-            body.affine(&f, [0.0; 3]).into_iter().map(|u| u.map(|x| x + (2e-4 * random.next()) as f32));
+        let shaken = body.affine(&f, [0.0; 3]).into_iter().map(|u| u.map(|x| x + (2e-4 * random.next()) as f32));
         let state = displaced(&scene, &shaken.collect::<Vec<_>>());
         let (k, inner) = tangent_with_nodal_strain(&body, law, &to_f64(state.displacements()), &free);
-        let balance = (0u32..).zip(&inner).map(|(node, force)| NodalForce {
-            node,
-            newton: force.map(|x| -x as f32),
-            ramp: 0.0,
-        });
+        let balance =
+            (0u32..).zip(&inner).map(|(node, force)| NodalForce { node, newton: force.map(|x| -x as f32), ramp: 0.0 });
         let balance: Vec<_> = balance.collect();
         let step = Step::unchecked(20.0 * limit(&scene), 0.0).unwrap();
         let square = f64::from(step.seconds()).powi(2);
@@ -373,8 +359,7 @@ fn the_operator_is_positive_and_bounded_with_nodal_strain() {
                 let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
                 let (mut state, mut large) = (start.clone(), large.clone());
                 assert!(large.step(scene.view(), &loads, state.view()).is_taken());
-                let moved =
-                    |&(node, axis): &(usize, usize)| f64::from(state.velocity(node)[axis] * step.seconds());
+                let moved = |&(node, axis): &(usize, usize)| f64::from(state.velocity(node)[axis] * step.seconds());
                 free.iter().map(moved).collect()
             };
             let still = first_step(0, 0, 0.0);
@@ -399,11 +384,7 @@ fn the_operator_is_positive_and_bounded_with_nodal_strain() {
 // Energy.
 
 /// A bar let go from a slight bend: kinetic and strain energy over those at the start, at every step.
-fn vibration<M: ElementMaterial>(
-    material: impl Fn(Tissue<AnyLaw>) -> M,
-    kind: Kind,
-    damping: f32,
-) -> Vec<f64> {
+fn vibration<M: ElementMaterial>(material: impl Fn(Tissue<AnyLaw>) -> M, kind: Kind, damping: f32) -> Vec<f64> {
     let body = small_bar();
     let scene = body.scene(material(tissue(NEO)), &held(&body));
     let step = Step::unchecked(20.0 * limit(&scene), damping).unwrap();

@@ -24,8 +24,7 @@ impl Pulled {
         const LENGTH: f32 = 0.1;
         let body = Body::bar([0.02, 0.02, LENGTH], [3, 3, 12]);
         let end = body.nodes_where(|[_, _, z]| z == LENGTH);
-        let motions: Vec<_> =
-            end.into_iter().map(|node| Motion { node, axes: Axes::XYZ, metre, ramp }).collect();
+        let motions: Vec<_> = end.into_iter().map(|node| Motion { node, axes: Axes::XYZ, metre, ramp }).collect();
         let mut supports: Vec<_> = motions.iter().map(|motion| Support::moved(motion.node)).collect();
         if held {
             supports.extend(body.nodes_where(|[_, _, z]| z == 0.0).into_iter().map(Support::fixed));
@@ -101,8 +100,7 @@ fn follows<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>) 
         let law = NeoHookean { c: 20_000.0, d: 20_000.0 * ratio };
         let pulled = Pulled::new(law, [0.0, 0.0, 0.05], RAMP, true);
         let limit = limit(&pulled.body.scene(material(tissue(law)), &pulled.supports));
-        for (kind, multiple) in
-            [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|k| [10.0, 20.0].map(|m| (k, m)))
+        for (kind, multiple) in [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|k| [10.0, 20.0].map(|m| (k, m)))
         {
             let ramp = (RAMP / (multiple * limit)) as u32;
             let figures = pulled.compare(material, (kind, multiple), 20.0, &[ramp / 2, ramp, 2 * ramp]);

@@ -1,5 +1,5 @@
-//! The force by which supports act on the tissue (`supple::reaction`), judged against the weight of a body, against exact steps, and
-//! against the force at the supports alone, which long steps get wrong.
+//! The force by which supports act on the tissue (`supple::reaction`), judged against the weight of a body, against
+//! exact steps, and against the force at the supports alone, which long steps get wrong.
 
 use supple::element::ElementMaterial;
 use supple::loads::{Loads, Motion};
@@ -58,8 +58,7 @@ impl Pushed {
         let surface = body.surface_nodes();
         let held = body.nodes_where(|[x, ..]| x < low + 0.15 * (high - low));
         let near = |point: [f32; 3]| norm([0, 1, 2].map(|axis| point[axis] - tip[axis])) < WIDTH;
-        let instrument: Vec<_> =
-            body.nodes_where(near).into_iter().filter(|&node| surface[node as usize]).collect();
+        let instrument: Vec<_> = body.nodes_where(near).into_iter().filter(|&node| surface[node as usize]).collect();
         assert!(instrument.len() > 3);
         let mut supports: Vec<_> = held.into_iter().map(Support::fixed).collect();
         supports.extend(instrument.iter().copied().map(Support::moved));
@@ -71,8 +70,8 @@ impl Pushed {
         self.instrument.iter().map(motion).collect()
     }
 
-    /// The forces of each frame, and those at the supports alone at its end, while the instrument moves along z as `hand` says at
-    /// each time (s), m. Exact steps without a `kind`.
+    /// The forces of each frame, and those at the supports alone at its end, while the instrument moves along z as
+    /// `hand` says at each time (s), m. Exact steps without a `kind`.
     fn follow<M: ElementMaterial>(
         &self,
         scene: &VecScene<M>,
@@ -100,11 +99,7 @@ impl Pushed {
             }
             forces.push(reaction.follow(scene.view(), &state.view()).unwrap());
             let at = |axis: usize| {
-                -self
-                    .instrument
-                    .iter()
-                    .map(|&node| state.forces()[node as usize].to_array()[axis])
-                    .sum::<f32>()
+                -self.instrument.iter().map(|&node| state.forces()[node as usize].to_array()[axis]).sum::<f32>()
             };
             alone.push([at(0), at(1), at(2)]);
         }
@@ -128,8 +123,8 @@ fn exact_steps<M: ElementMaterial>(scene: &VecScene<M>) -> u32 {
     (FRAME / (0.8 * limit(scene))).ceil() as u32
 }
 
-/// Forces of multilevel and damped steps off the exact ones, over these, at the speeds of hands: with all weights, and at the supports
-/// alone.
+/// Forces of multilevel and damped steps off the exact ones, over these, at the speeds of hands: with all weights, and
+/// at the supports alone.
 fn errors(hand: impl Fn(f64) -> Box<dyn Fn(f64) -> f64>, mut judge: impl FnMut(u32, f32, f32)) {
     let pushed = Pushed::new();
     let law = NeoHookean { c: 1_500.0, d: 15_000.0 };
@@ -142,9 +137,8 @@ fn errors(hand: impl Fn(f64) -> Box<dyn Fn(f64) -> f64>, mut judge: impl FnMut(u
         println!("{} mm/s: at most {:.1} mN, spread {:.2} mN", 1e3 * speed, 1e3 * size, 1e3 * spread);
         assert!(size > 5e-3 && spread < 0.15 * size);
         let exact = newtons(&exact);
-        for (kind, per_frame) in [Kind::Multilevel, Kind::Damped]
-            .into_iter()
-            .flat_map(|kind| [8, 4, 2, 1].map(|count| (kind, count)))
+        for (kind, per_frame) in
+            [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|kind| [8, 4, 2, 1].map(|count| (kind, count)))
         {
             let (forces, alone) = pushed.follow(&scene, Some(kind), per_frame, hand(speed));
             // Forces are known for the start of a step: half of one before the middle of the frame.
@@ -196,10 +190,7 @@ fn forces_that_steps_do_not_resolve_are_told() {
             wrong += u32::from(error > 0.5 * size);
             silent += u32::from(error > 0.5 * size && force.is_resolved());
         }
-        println!(
-            "{kind:?}, {per_frame} steps a frame: {wrong} of {} frames wrong, {silent} untold",
-            forces.len()
-        );
+        println!("{kind:?}, {per_frame} steps a frame: {wrong} of {} frames wrong, {silent} untold", forces.len());
         assert!(wrong >= 10 && silent <= wrong / 10);
     }
 }

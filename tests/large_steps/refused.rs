@@ -1,8 +1,6 @@
 //! What cannot be prepared or stepped is said, and nothing moves.
 
-use supple::inertia::{
-    Cells, Grid, InertiaError, LargeModel, LargeStep, Method, vectors_for, vectors_for_lattice,
-};
+use supple::inertia::{Cells, Grid, InertiaError, LargeModel, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::loads::{Loads, Motion, NodalForce};
 use supple::material::{AnyLaw, Element, Tissue};
 use supple::scene::{Axes, Support, VecScene};
@@ -67,10 +65,7 @@ fn what_cannot_be_prepared_is_said_and_no_step_is_taken() {
         let error = refused(given(cells), 100_000, nothing);
         assert_eq!(error, InertiaError::Cells { cells });
         let [x, y, z] = cells;
-        said(
-            error,
-            &format!("a lattice of {x} x {y} x {z} cells: each must be at least 1, with at most 1024 points"),
-        );
+        said(error, &format!("a lattice of {x} x {y} x {z} cells: each must be at least 1, with at most 1024 points"));
     }
     let error = refused(given([9, 9, 9]), 100_000, nothing);
     said(error, "a lattice of 9 x 9 x 9 cells has more than 128 functions");
@@ -97,8 +92,7 @@ fn an_inertia_serves_only_what_it_was_prepared_for() {
     let mut state = rest_of(&scene);
     let mut storage = [NodeVector::ZERO; 480];
     let (method, points) = (Method::MassScaled, &body.points);
-    let mut model =
-        LargeModel::prepare(method, scene.view(), points, state.view(), step, &mut storage).unwrap();
+    let mut model = LargeModel::prepare(method, scene.view(), points, state.view(), step, &mut storage).unwrap();
     let other_storage = model.with_storage(&mut storage[..479]);
     let status = other_storage.step(scene.view(), &Loads::NONE, state.view());
     assert!(matches!(status, Status::Mismatch { nodes: 96, .. }), "{status:?}");
@@ -118,8 +112,8 @@ fn an_inertia_serves_only_what_it_was_prepared_for() {
     assert_eq!(large.step(scene.view(), &Loads::NONE, state.view()), Status::Ok);
 }
 
-/// A host hands over an absurd force, once. What it moves is held back, or the step is refused; afterwards the node follows
-/// its forces again, and the energy balance is that of the body.
+/// A host hands over an absurd force, once. What it moves is held back, or the step is refused; afterwards the node
+/// follows its forces again, and the energy balance is that of the body.
 #[test]
 fn a_node_that_a_wild_force_held_back_is_let_go() {
     let body = small_bar();

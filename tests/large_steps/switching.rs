@@ -1,5 +1,5 @@
-//! Steps of one method after steps of another, and states that were reset or replaced: nothing is refused, and inertia of
-//! another state is not used.
+//! Steps of one method after steps of another, and states that were reset or replaced: nothing is refused, and inertia
+//! of another state is not used.
 
 use supple::inertia::{LargeStep, Method};
 use supple::loads::Loads;
@@ -11,8 +11,8 @@ use crate::support::bodies::{held, small_bar, torsion};
 use crate::support::{Body, NEO, largest_distance, mean_distance, rest_of, tissue, to_f64};
 use crate::{KINDS, Kind, limit};
 
-/// 40 long steps, 200 exact ones, 40 long ones: the exact motion is followed as well as by long steps alone. Mass scaling,
-/// which lags behind, swings back in the exact steps; there only nothing is refused.
+/// 40 long steps, 200 exact ones, 40 long ones: the exact motion is followed as well as by long steps alone. Mass
+/// scaling, which lags behind, swings back in the exact steps; there only nothing is refused.
 #[test]
 fn long_and_exact_steps_may_follow_each_other() {
     let body = small_bar();
@@ -110,9 +110,7 @@ fn inertia_of_another_state_with_as_many_steps_is_computed_anew() {
         }
         let apart = largest_distance(&to_f64(first.displacements()), &to_f64(other.displacements()));
         let added = [stale, fresh.report().added_mean, large.report().added_mean];
-        println!(
-            "{kind:?}: added inertia {added:.0?} of the bent, the own and the renewed state, {apart:.1e} m apart"
-        );
+        println!("{kind:?}: added inertia {added:.0?} of the bent, the own and the renewed state, {apart:.1e} m apart");
         assert!(apart < 1e-8 && (added[2] / added[1] - 1.0).abs() < 1e-3, "{added:?}");
     }
 }

@@ -1,5 +1,5 @@
-//! Bodies that fall, turn and swing: free bodies keep their momentum, and multilevel and damped steps follow the exact one. Judged by
-//! conservation laws, by the parabola of free fall, and by the exact step at a small part of its limit.
+//! Bodies that fall, turn and swing: free bodies keep their momentum, and multilevel and damped steps follow the exact
+//! one. Judged by conservation laws, by the parabola of free fall, and by the exact step at a small part of its limit.
 
 use supple::element::ElementMaterial;
 use supple::loads::Loads;
@@ -40,8 +40,7 @@ impl<M: ElementMaterial> Moving<'_, M> {
         let (mut linear, mut angular) = ([0.0; 3], [0.0; 3]);
         for (node, u) in self.state.displacements().iter().enumerate() {
             let (u, v) = (u.to_array(), self.state.velocity(node).map(f64::from));
-            let before =
-                [0, 1, 2].map(|i| f64::from(self.body.points[node][i]) + f64::from(u[i]) - dt * v[i]);
+            let before = [0, 1, 2].map(|i| f64::from(self.body.points[node][i]) + f64::from(u[i]) - dt * v[i]);
             let momentum = v.map(|v| self.mass(node) * v);
             let turned = cross(before, momentum);
             for axis in 0..3 {
@@ -94,8 +93,7 @@ fn moves_rigidly<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<Any
         ("cylinder", Body::cylinder()),
     ] {
         let scene = body.scene(material(tissue(SOFT)), &[]);
-        for (kind, multiple) in
-            [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|k| [20.0, 50.0].map(|m| (k, m)))
+        for (kind, multiple) in [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|k| [20.0, 50.0].map(|m| (k, m)))
         {
             let step = Step::unchecked(multiple * limit(&scene), 0.0).unwrap();
             let dt = f64::from(step.seconds());
@@ -127,9 +125,7 @@ fn a_free_bar_keeps_its_momentum_for_half_a_second() {
 fn flies<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>) -> M, multiples: [f32; 2]) {
     let body = Body::bar([0.02, 0.02, 0.1], [4, 4, 20]);
     let scene = body.scene(material(tissue(SOFT)), &[]);
-    for (kind, multiple) in
-        [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|k| multiples.map(|m| (k, m)))
-    {
+    for (kind, multiple) in [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|k| multiples.map(|m| (k, m))) {
         let step = Step::unchecked(multiple * limit(&scene), 0.0).unwrap();
         let dt = f64::from(step.seconds());
         // About the origin, which is an edge of the bar: its centre moves as well.
@@ -161,9 +157,7 @@ fn falls<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>) ->
     let body = Body::lobe();
     let scene = body.scene(material(tissue(SOFT)), &[]);
     let loads = Loads::new(&scene, [0.0, 0.0, -9.81], &[], &[]).unwrap();
-    for (kind, multiple) in
-        [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|k| [20.0, 100.0].map(|m| (k, m)))
-    {
+    for (kind, multiple) in [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|k| [20.0, 100.0].map(|m| (k, m))) {
         let step = Step::unchecked(multiple * limit(&scene), 0.0).unwrap();
         let mut state = rest_of(&scene);
         let mut large = kind.prepared(&body, &scene, &mut state, step, 0.0);
@@ -172,14 +166,10 @@ fn falls<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>) ->
             assert_eq!(large.step(scene.view(), &loads, state.view()), Status::Ok);
             let fallen = 0.5 * 9.81 * state.time().powi(2);
             let nodes = state.displacements().iter().map(|u| u.to_array().map(f64::from));
-            last = nodes.map(|[x, y, z]| length([x, y, z + fallen])).sum::<f64>()
-                / scene.node_count() as f64
-                / fallen;
+            last = nodes.map(|[x, y, z]| length([x, y, z + fallen])).sum::<f64>() / scene.node_count() as f64 / fallen;
             worst = worst.max(last);
         }
-        println!(
-            "{element}, {kind:?} at {multiple}: off by at most {worst:.1e} of the way fallen, at last {last:.1e}"
-        );
+        println!("{element}, {kind:?} at {multiple}: off by at most {worst:.1e} of the way fallen, at last {last:.1e}");
         assert!(worst < 5e-3 && last < 1e-3);
     }
 }
@@ -265,12 +255,7 @@ fn follows(swing: &Swing) {
     follows_with(swing, "nodal strain", NodalStrain, 1.25);
 }
 
-fn follows_with<M: ElementMaterial>(
-    swing: &Swing,
-    element: &str,
-    material: impl Fn(Tissue<AnyLaw>) -> M,
-    factor: f64,
-) {
+fn follows_with<M: ElementMaterial>(swing: &Swing, element: &str, material: impl Fn(Tissue<AnyLaw>) -> M, factor: f64) {
     let mut wrong = Vec::new();
     for ratio in [10.0, 50.0, 1000.0] {
         let multiples = ALLOWED.map(|(multiple, _)| multiple);

@@ -94,12 +94,7 @@ fn drawn(random: &mut Random, body: &Body) -> Drawn {
     for _ in 0..3 {
         let (node, ramp) = (pick(random), (0.2 * random.next()).max(0.02) as f32);
         supports.push(Support::moved(node));
-        motions.push(Motion {
-            node,
-            axes: Axes::XYZ,
-            metre: random.vector().map(|x| (3e-3 * x) as f32),
-            ramp,
-        });
+        motions.push(Motion { node, axes: Axes::XYZ, metre: random.vector().map(|x| (3e-3 * x) as f32), ramp });
     }
     let strength = 10.0_f64.powf(-2.5 + random.next());
     let forces = (0..12).map(|_| {
@@ -112,7 +107,8 @@ fn drawn(random: &mut Random, body: &Body) -> Drawn {
     Drawn { supports, forces, motions, gravity, damping }
 }
 
-/// Steps at a multiple of the limit; the largest displacement and the largest share of kinetic energy in its energy balance.
+/// Steps at a multiple of the limit; the largest displacement and the largest share of kinetic energy in its energy
+/// balance.
 fn survive<M: ElementMaterial>(
     body: &Body,
     drawn: &Drawn,
@@ -134,9 +130,7 @@ fn survive<M: ElementMaterial>(
             return Err(format!("{} {kind:?} at {multiple}, step {taken}: {status:?}", law.name()));
         }
         let largest = largest(&to_f64(state.displacements()));
-        if !largest.is_finite()
-            || state.displacements().iter().any(|u| u.to_array().iter().any(|x| x.is_nan()))
-        {
+        if !largest.is_finite() || state.displacements().iter().any(|u| u.to_array().iter().any(|x| x.is_nan())) {
             return Err(format!("{} {kind:?} at {multiple}, step {taken}: not finite", law.name()));
         }
         moved = moved.max(largest);
@@ -184,8 +178,8 @@ proptest! {
     }
 }
 
-/// A case of the test above: an element was crushed while the lattice's inertia was a cycle old, and damping took away thousands
-/// of metres of smooth motion that did not exist.
+/// A case of the test above: an element was crushed while the lattice's inertia was a cycle old, and damping took away
+/// thousands of metres of smooth motion that did not exist.
 #[test]
 fn smooth_motion_is_none_where_the_lattice_cannot_tell() {
     let mut random = Random(2_280_812_162_470_855_614);

@@ -1,5 +1,5 @@
-//! Weight files to and from safetensors: there and back nothing changes, PyTorch computes what we compute, and whatever a
-//! file lacks or has too much of is refused by its name.
+//! Weight files to and from safetensors: there and back nothing changes, PyTorch computes what we compute, and whatever
+//! a file lacks or has too much of is refused by its name.
 
 use proptest::prelude::*;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
@@ -135,9 +135,10 @@ impl Editable {
     }
 
     fn bytes(&self, about: Option<String>) -> Vec<u8> {
-        let views = self.tensors.iter().map(|(name, dtype, shape, data)| {
-            (name.clone(), TensorView::new(*dtype, shape.clone(), data).unwrap())
-        });
+        let views = self
+            .tensors
+            .iter()
+            .map(|(name, dtype, shape, data)| (name.clone(), TensorView::new(*dtype, shape.clone(), data).unwrap()));
         serialize(views, about.map(|about| [("supple".to_string(), about)].into_iter().collect())).unwrap()
     }
 
@@ -181,10 +182,7 @@ fn tensors_that_do_not_fit_are_named() {
             |file| file.filled("second.1.weight", &[4, 5], 0.0),
             "tensor second.1.weight has the shape [4, 5], it must be [3, 5]",
         ),
-        (
-            |file| file.filled("first.1.bias", &[3, 1], 0.0),
-            "tensor first.1.bias has the shape [3, 1], it must be [3]",
-        ),
+        (|file| file.filled("first.1.bias", &[3, 1], 0.0), "tensor first.1.bias has the shape [3, 1], it must be [3]"),
         (|file| file.filled("first.1.weight", &[3, 9], f32::NAN), "tensor first.1.weight: number 0 is NaN"),
     ];
     for (change, said) in cases {
@@ -200,9 +198,7 @@ fn keys_that_do_not_fit_are_named() {
     let remove = |about: &mut Value, key: &str| {
         about.as_object_mut().unwrap().remove(key);
     };
-    for key in
-        ["version", "inputs", "outputs", "slopes", "law", "constants", "density", "damping", "step", "recipe"]
-    {
+    for key in ["version", "inputs", "outputs", "slopes", "law", "constants", "density", "damping", "step", "recipe"] {
         let mut file = Editable::new();
         remove(&mut file.about, key);
         assert_eq!(file.refused(), format!("metadata key {key}: missing"));
@@ -211,20 +207,11 @@ fn keys_that_do_not_fit_are_named() {
         (|about| about["version"] = json!(2), "metadata key version: it is 2, an export has 1"),
         (|about| about["version"] = json!("1"), "metadata key version: \"1\" is not usable: invalid type"),
         (|about| about["extra"] = json!(1), "metadata key extra: not known"),
-        (
-            |about| about["density"] = json!("heavy"),
-            "metadata key density: \"heavy\" is not usable: invalid type",
-        ),
+        (|about| about["density"] = json!("heavy"), "metadata key density: \"heavy\" is not usable: invalid type"),
         (|about| about["density"] = json!(-3), "the density is -3"),
         (|about| about["damping"] = json!(null), "metadata key damping: null is not usable: "),
-        (
-            |about| about["law"] = json!("hooke"),
-            "metadata key law: \"hooke\" is not known; neo-hookean, exponential",
-        ),
-        (
-            |about| about["force"] = json!("pound"),
-            "metadata key force: \"pound\" is not usable: unknown variant",
-        ),
+        (|about| about["law"] = json!("hooke"), "metadata key law: \"hooke\" is not known; neo-hookean, exponential"),
+        (|about| about["force"] = json!("pound"), "metadata key force: \"pound\" is not usable: unknown variant"),
         (|about| about["law"] = json!("neo-hookean"), "metadata key constants.c: missing"),
         (|about| about["constants"]["c"] = json!(1.0), "metadata key constants.c: not known"),
         (|about| about["constants"]["a"] = json!(0.0), "a is 0"),
@@ -240,10 +227,7 @@ fn keys_that_do_not_fit_are_named() {
             "metadata key slopes: layer 0 of second has 1.5, it must be from 0 to 1",
         ),
         (|about| about["slopes"]["third"] = json!([]), "metadata key slopes.third: not known"),
-        (
-            |about| about["slopes"]["first"] = json!([]),
-            "tensor first.0.bias belongs to no layer of the metadata",
-        ),
+        (|about| about["slopes"]["first"] = json!([]), "tensor first.0.bias belongs to no layer of the metadata"),
         (
             |about| about["recipe_sha256"] = json!("0707"),
             "metadata key recipe_sha256: \"0707\" is not 64 hexadecimal digits",

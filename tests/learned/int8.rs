@@ -1,5 +1,5 @@
-//! int8 layers: every instruction-set level gives the bits of the plain loops here, and these are as near to what a file means
-//! in float64 as rounding allows.
+//! int8 layers: every instruction-set level gives the bits of the plain loops here, and these are as near to what a
+//! file means in float64 as rounding allows.
 
 use proptest::prelude::*;
 use supple::mlp::quantise::quantise;
@@ -87,10 +87,8 @@ fn compare(description: &Description<'_>, int8: &[Option<Int8Description>], rows
     let network = Network::parse(memory.bytes()).unwrap();
     let (wide, high) = (description.inputs.len(), description.outputs.len());
     let mut random = uniform(seed);
-    let inputs: Vec<f32> =
-        (0..rows * wide).map(|at| 3.0 * description.inputs[at % wide].scale * random()).collect();
-    let wanted: Vec<f32> =
-        inputs.chunks(wide).flat_map(|inputs| predicted(description, int8, inputs)).collect();
+    let inputs: Vec<f32> = (0..rows * wide).map(|at| 3.0 * description.inputs[at % wide].scale * random()).collect();
+    let wanted: Vec<f32> = inputs.chunks(wide).flat_map(|inputs| predicted(description, int8, inputs)).collect();
     let _guard = level_guard();
     let before = Level::current();
     for level in levels() {
@@ -153,8 +151,7 @@ fn odd_inputs_give_the_same_bits_everywhere() {
     let network = Network::parse(memory.bytes()).unwrap();
     let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -0.0, 1e-45, 3e38];
     let mut random = uniform(3);
-    let inputs: Vec<f32> =
-        (0..7 * 60).map(|at| if random() > 0.6 { odd[at % 7] } else { random() }).collect();
+    let inputs: Vec<f32> = (0..7 * 60).map(|at| if random() > 0.6 { odd[at % 7] } else { random() }).collect();
     let _guard = level_guard();
     let mut results = Vec::new();
     for level in levels() {
@@ -219,9 +216,7 @@ fn meant(layer: &Layer<'_>, x: &[Meant]) -> Vec<Meant> {
     };
     // Half a step, of the longest that there may be, is all that an input is off; and rounding of a few operations.
     let (up, down) = (f64::from(255 - int8.zero), f64::from(int8.zero));
-    let step = x
-        .iter()
-        .fold(0.0, |step: f64, x| step.max((x.value + x.within) / up).max((x.within - x.value) / down));
+    let step = x.iter().fold(0.0, |step: f64, x| step.max((x.value + x.within) / up).max((x.within - x.value) / down));
     let rounded: Vec<Meant> =
         x.iter().map(|x| Meant { within: x.within + (0.5 + 255.0 * 8.0 * UNIT) * step, ..*x }).collect();
     let groups = layer.inputs.div_ceil(4);
@@ -258,8 +253,8 @@ fn predicted_as_meant(network: &Network<'_>, inputs: &[f32]) -> Vec<Meant> {
     outputs.collect()
 }
 
-/// Only the rounding of activations separates an int8 network from what its weights mean: half a step of each, and at most what
-/// the layers after it make of that.
+/// Only the rounding of activations separates an int8 network from what its weights mean: half a step of each, and at
+/// most what the layers after it make of that.
 #[test]
 fn networks_are_what_their_weights_mean_within_rounding() {
     // Which layers are int8, and how small the bound must be to say something, over the outputs' spread.
@@ -281,19 +276,14 @@ fn networks_are_what_their_weights_mean_within_rounding() {
             let network = Network::parse(memory.bytes()).unwrap();
             let mut random = uniform(seed ^ 9);
             for _ in 0..50 {
-                let inputs: Vec<_> =
-                    description.inputs.iter().map(|range| 2.0 * range.scale * random()).collect();
+                let inputs: Vec<_> = description.inputs.iter().map(|range| 2.0 * range.scale * random()).collect();
                 let mut outputs = [0.0; 3];
                 network.predict(&inputs, &mut outputs);
                 let meant = predicted_as_meant(&network, &inputs);
                 for ((output, meant), range) in outputs.into_iter().zip(meant).zip(network.outputs()) {
                     let scale = f64::from(range.scale);
                     let apart = (f64::from(output) - meant.value).abs();
-                    assert!(
-                        apart <= meant.within,
-                        "{first:?} {which:b}: {output} is {apart} from {}",
-                        meant.value
-                    );
+                    assert!(apart <= meant.within, "{first:?} {which:b}: {output} is {apart} from {}", meant.value);
                     farthest = f64::max(farthest, apart / scale);
                     bound = f64::max(bound, meant.within / scale);
                     used = f64::max(used, apart / meant.within);
@@ -301,9 +291,7 @@ fn networks_are_what_their_weights_mean_within_rounding() {
                 }
             }
         }
-        println!(
-            "{first:?} {second:?} {which:b}: {farthest:.4} apart, within {bound:.4} ({used:.2}), of {spread:.2}"
-        );
+        println!("{first:?} {second:?} {which:b}: {farthest:.4} apart, within {bound:.4} ({used:.2}), of {spread:.2}");
         assert!(bound <= telling * spread && used > 0.0);
     }
 }
@@ -340,8 +328,8 @@ fn lost(description: &Description<'_>, scale: f32) -> f64 {
     (off / of).sqrt()
 }
 
-/// Far beyond the samples, as in a roll-out that rings, the error is the same share: nothing is cut off. Neither is what hardly
-/// moves.
+/// Far beyond the samples, as in a roll-out that rings, the error is the same share: nothing is cut off. Neither is
+/// what hardly moves.
 #[test]
 fn quantised_networks_are_exact_in_proportion() {
     let mut description = described(&[7, 64, 64, 3], &[10, 32, 32, 3], 8);

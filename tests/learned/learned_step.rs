@@ -1,5 +1,5 @@
-//! The learned step against the paper's formulas written down in float64, whatever the network predicts; and what it says
-//! when it must not or cannot be taken.
+//! The learned step against the paper's formulas written down in float64, whatever the network predicts; and what it
+//! says when it must not or cannot be taken.
 
 use supple::learned::{LearnedError, LearnedStep, vectors_for};
 use supple::loads::{Loads, NodalForce};
@@ -171,8 +171,7 @@ fn ten_steps_are_those_of_the_paper_in_float64() {
         let mut frames = vec![Frame([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]); nodes];
         let mut state = after_lead_in(&scene, &loads, &mut learned, |state| {
             let before = std::mem::replace(&mut u, to_f64(state.displacements()));
-            du =
-                u.iter().zip(&before).map(|(u, before)| reference::tensor::difference(*u, *before)).collect();
+            du = u.iter().zip(&before).map(|(u, before)| reference::tensor::difference(*u, *before)).collect();
             frames.iter_mut().zip(&du).for_each(|(frame, du)| frame.follow(*du));
         });
 
@@ -200,11 +199,7 @@ fn ten_steps_are_those_of_the_paper_in_float64() {
         }
         let moved = largest_distance(&simple.u, &start);
         let off = largest_distance(&to_f64(state.displacements()), &simple.u) / moved;
-        println!(
-            "moved by {:.3} mm, off by {off:.1e} of that; {:.0} % clipped",
-            1e3 * moved,
-            100.0 * clipped
-        );
+        println!("moved by {:.3} mm, off by {off:.1e} of that; {:.0} % clipped", 1e3 * moved, 100.0 * clipped);
         worst = worst.max(off);
     }
     assert!(worst < 1e-5);
@@ -228,8 +223,7 @@ fn an_exact_step_goes_on_from_a_learned_one_at_the_same_velocity() {
     let fastest = velocities.iter().flatten().fold(0.0f32, |most, v| most.max(v.abs()));
     let largest_change = |state: &VecState| {
         let both = nodes.clone().map(|node| state.velocity(node)).zip(&velocities);
-        both.flat_map(|(now, then)| [0, 1, 2].map(|axis| (now[axis] - then[axis]).abs()))
-            .fold(0.0f32, f32::max)
+        both.flat_map(|(now, then)| [0, 1, 2].map(|axis| (now[axis] - then[axis]).abs())).fold(0.0f32, f32::max)
     };
     state.view().respan(DT);
     assert!(largest_change(&state) < 1e-6 * fastest);
@@ -335,8 +329,9 @@ fn a_later_step_that_diverges_changes_nothing() {
     panic!("a network that knows nothing did not diverge");
 }
 
-/// With fallback the same step is undone. Exact steps take its place, and the network is tried again, ever less often; the motion is that
-/// of exact steps to the bit, but for how the first one spans the mean velocity of the lead-in's last interval.
+/// With fallback the same step is undone. Exact steps take its place, and the network is tried again, ever less often;
+/// the motion is that of exact steps to the bit, but for how the first one spans the mean velocity of the lead-in's
+/// last interval.
 #[test]
 fn a_step_that_energy_does_not_explain_is_undone_and_exact_steps_take_its_place() {
     let (body, scene, forces) = twisted();
@@ -403,8 +398,8 @@ fn the_network_goes_on_from_exact_steps_without_a_jump() {
         (to_f64(state.displacements()), exact_intervals, fastest)
     };
     let (alone, none, fastest_alone) = run(&[]);
-    // While exact steps move the state the guard may still call it inexact: the same fallback lasts longer. The next one is as short as
-    // the first, after nearly 300 learned steps.
+    // While exact steps move the state the guard may still call it inexact: the same fallback lasts longer. The next
+    // one is as short as the first, after nearly 300 learned steps.
     let (mixed, exact_intervals, fastest) = run(&[100, 107, 108, 400]);
     let mut truth = rest_of(&scene);
     support::run(&scene, &loads, &mut truth, &exact, (300 + 700) * MULTIPLE);

@@ -26,8 +26,8 @@ fn off(description: &Description<'_>, network: &Network<'_>, inputs: &[f32]) -> 
     apart(description, inputs, &outputs)
 }
 
-/// Many vertices at once, at every level: each agrees with float64, its bits do not depend on its neighbours, and an incomplete row
-/// is left as it is.
+/// Many vertices at once, at every level: each agrees with float64, its bits do not depend on its neighbours, and an
+/// incomplete row is left as it is.
 #[test]
 fn rows_agree_with_float64_and_do_not_see_their_neighbours() {
     let _guard = level_guard();
@@ -39,8 +39,7 @@ fn rows_agree_with_float64_and_do_not_see_their_neighbours() {
         let memory = Memory::of(&write(&description).unwrap());
         let network = Network::parse(memory.bytes()).unwrap();
         let mut random = uniform(6);
-        let inputs: Vec<f32> =
-            (0..45 * 7 + 3).map(|at| 2.0 * description.inputs[at % 7].scale * random()).collect();
+        let inputs: Vec<f32> = (0..45 * 7 + 3).map(|at| 2.0 * description.inputs[at % 7].scale * random()).collect();
         let mut outputs = vec![-1e9; 46 * 3];
         network.predict_rows(&inputs, &mut outputs);
         let worst = (0..45)
@@ -66,8 +65,7 @@ fn the_papers_network_agrees_with_float64() {
     let mut random = uniform(5);
     let worst = (0..200)
         .map(|_| {
-            let inputs: Vec<f32> =
-                description.inputs.iter().map(|range| 2.0 * range.scale * random()).collect();
+            let inputs: Vec<f32> = description.inputs.iter().map(|range| 2.0 * range.scale * random()).collect();
             off(&description, &network, &inputs)
         })
         .fold(0.0, f64::max);
@@ -107,9 +105,7 @@ fn what_is_written_is_read_back_without_a_copy() {
     assert_eq!(network.outputs(), description.outputs);
     let (first, second) = network.layers();
     assert_eq!((first.len(), second.len()), (2, 2));
-    for (layer, described) in
-        first.iter().chain(second).zip(description.first.iter().chain(&description.second))
-    {
+    for (layer, described) in first.iter().chain(second).zip(description.first.iter().chain(&description.second)) {
         let Parameters::Float { weights, biases } = layer.parameters else { panic!("not float32") };
         assert_eq!(weights, described.weights);
         assert_eq!(biases, described.biases);

@@ -10,9 +10,7 @@ use supple::step::{Status, Step};
 use supple::tled;
 
 use crate::support::bodies::{corner_torsion, held, small_bar};
-use crate::support::{
-    Body, DENSITY, bound, largest, largest_distance, reference_law, rest_of, tissue, to_f64,
-};
+use crate::support::{Body, DENSITY, bound, largest, largest_distance, reference_law, rest_of, tissue, to_f64};
 use crate::{reference, support};
 
 /// The bar, its torsion of `newton` per corner and direction with a ramp of 1 s, damping of 20/s, steps of 3e-5 s.
@@ -65,10 +63,10 @@ fn the_papers_torsion_agrees_with_float64_neo_hookean() {
     assert!(torsion_error(support::NEO, 0.1) <= 2e-5);
 }
 
-/// Which energy: with `b` the mean of the increments before and after `t_n` (the kinetic energy of the energy_balance is that
-/// of `b / dt`), central differences keep `1/2 m (b/dt)^2 + U - dt^2/8 f M^-1 f` constant where forces are linear. The
-/// last term is what `1/2 m v^2` of half a step is less than that of its middle; without it the sum swings by
-/// `(omega dt)^2 / 4` of the energy of each mode. Steps are a tenth of the bound, as 3e-5 s is for the paper's bar.
+/// Which energy: with `b` the mean of the increments before and after `t_n` (the kinetic energy of the energy_balance
+/// is that of `b / dt`), central differences keep `1/2 m (b/dt)^2 + U - dt^2/8 f M^-1 f` constant where forces are
+/// linear. The last term is what `1/2 m v^2` of half a step is less than that of its middle; without it the sum swings
+/// by `(omega dt)^2 / 4` of the energy of each mode. Steps are a tenth of the bound, as 3e-5 s is for the paper's bar.
 fn lag<M: ElementMaterial>(scene: &VecScene<M>, state: &VecState, step: &Step) -> f64 {
     let forces = state.forces().iter().enumerate();
     let squares = forces.map(|(node, force)| {

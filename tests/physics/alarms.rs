@@ -46,8 +46,7 @@ fn attempt<M: ElementMaterial>(
 ) -> Outcome {
     let (mut limited, mut inexact, mut excess) = (0, 0, f64::NEG_INFINITY);
     // Beyond the cap of the exponent there is no bound.
-    let critical =
-        |state: &mut VecState| tled::critical_step(scene, state).map_or(0.0, |critical| critical.seconds);
+    let critical = |state: &mut VecState| tled::critical_step(scene, state).map_or(0.0, |critical| critical.seconds);
     for n in 0..count {
         if n % 8 == 0 && step.seconds() > 0.5 * critical(&mut state) {
             return Outcome::TooLong;
@@ -73,9 +72,8 @@ fn attempt<M: ElementMaterial>(
             _ => {}
         }
         let energy_balance = state.energy_balance();
-        excess = excess.max(
-            (energy_balance.kinetic - energy_balance.balance()) / energy_balance.peak.max(f64::MIN_POSITIVE),
-        );
+        excess = excess
+            .max((energy_balance.kinetic - energy_balance.balance()) / energy_balance.peak.max(f64::MIN_POSITIVE));
     }
     Outcome::Done { limited, inexact, excess }
 }
@@ -212,8 +210,7 @@ fn motions_that_jump_and_reverse() {
         let there_and_back = |n: u64| if (n / 500).is_multiple_of(2) { 3.0 } else { -3.0 };
         let mut watch = |how: &str, damping: f32, motions: &dyn Fn(u64, f64) -> Vec<Motion>| {
             let name = format!("{}, {how}", law.name());
-            alarms
-                .watch(&name, &scene, &|_| rest_of(&scene), (damping, LONG), &|n, t| (vec![], motions(n, t)));
+            alarms.watch(&name, &scene, &|_| rest_of(&scene), (damping, LONG), &|n, t| (vec![], motions(n, t)));
         };
         watch("reversed every 500 steps", 5.0, &|n, _| motions(there_and_back(n), 0.0));
         watch("taken away and given back", 5.0, &|n, _| {
@@ -283,10 +280,7 @@ fn a_force_that_pumps() {
             let status = tled::step(&scene, &loads, &mut state, &step);
             assert!(!matches!(status, Status::Diverged(_)), "{}, step {n}: {status:?}", law.name());
             if n % 100 == 0 {
-                assert!(
-                    bound(&scene, &state).seconds >= 2.0 * step.seconds(),
-                    "too violent a scene for this test"
-                );
+                assert!(bound(&scene, &state).seconds >= 2.0 * step.seconds(), "too violent a scene for this test");
             }
         }
         println!("{}, pumped for {count} steps: {:.2e} J", law.name(), state.energy_balance().balance());
@@ -331,11 +325,7 @@ fn sudden_gravity() {
                 let mut state = rest_of(&scene);
                 for n in 0..5_000 {
                     let status = tled::step(&scene, &loads, &mut state, &step);
-                    assert!(
-                        !matches!(status, Status::Diverged(_)),
-                        "{}, {how}, step {n}: {status:?}",
-                        law.name()
-                    );
+                    assert!(!matches!(status, Status::Diverged(_)), "{}, {how}, step {n}: {status:?}", law.name());
                 }
             }
         }
@@ -393,7 +383,5 @@ fn sudden_torsion_of_the_papers_bar() {
             shortest = shortest.min(bound(&scene, &state).seconds);
         }
     }
-    println!(
-        "sudden torsion of the paper's bar: {limited} steps limited, least critical step {shortest:.2e} s"
-    );
+    println!("sudden torsion of the paper's bar: {limited} steps limited, least critical step {shortest:.2e} s");
 }

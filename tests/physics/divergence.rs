@@ -23,10 +23,7 @@ fn until_diverged<M: ElementMaterial>(
     for _ in 0..2_000 {
         let before = bits(state);
         if let Status::Diverged(divergence) = tled::step(scene, loads, state, step) {
-            assert!(
-                bits(state) == before,
-                "{divergence}: displacement, velocity, time or energy balance changed"
-            );
+            assert!(bits(state) == before, "{divergence}: displacement, velocity, time or energy balance changed");
             return divergence;
         }
     }
@@ -119,8 +116,8 @@ fn divergence_in_the_first_step_leaves_the_state_fresh() {
     }
 }
 
-/// A tenth above the limit, also where the energy balance is large from a violent past, and where it is uncertain because
-/// supports move on and on.
+/// A tenth above the limit, also where the energy balance is large from a violent past, and where it is uncertain
+/// because supports move on and on.
 #[test]
 fn divergence_is_reported_whatever_was_before() {
     let body = small_bar();
@@ -179,9 +176,7 @@ fn the_load_that_is_to_blame_is_named() {
     let divergence = until_diverged(&scene, &loads, &mut rest_of(&scene), &step);
     println!("{divergence}");
     assert!(end.contains(&divergence.node));
-    assert!(
-        matches!(divergence.cause, Cause::Motion { metre, size } if metre == 0.03 && (1e-3..5e-3).contains(&size))
-    );
+    assert!(matches!(divergence.cause, Cause::Motion { metre, size } if metre == 0.03 && (1e-3..5e-3).contains(&size)));
 
     // Millinewtons where newtons are meant.
     let scene = body.scene(tissue(support::EXP), &held(&body));
@@ -196,7 +191,8 @@ fn the_load_that_is_to_blame_is_named() {
     assert!(matches!(divergence.cause, Cause::Force { index: 2, newton: 50.0, .. }));
 }
 
-/// A state that has got more energy than loads gave, by steps that were too long, goes on to rest from where it was stopped.
+/// A state that has got more energy than loads gave, by steps that were too long, goes on to rest from where it was
+/// stopped.
 #[test]
 fn a_state_that_has_diverged_goes_on_once_it_is_stopped() {
     let body = small_bar();

@@ -80,8 +80,7 @@ fn a_falling_body_reaches_its_terminal_velocity() {
     support::run(&scene, &loads, &mut state, &step, 5_000);
     let exact = -9.81 / 100.0;
     let speed = |node: usize| f64::from(state.velocity(node)[2]);
-    let momentum: f64 =
-        (0..body.points.len()).map(|node| f64::from(scene.view().node_mass(node)) * speed(node)).sum();
+    let momentum: f64 = (0..body.points.len()).map(|node| f64::from(scene.view().node_mass(node)) * speed(node)).sum();
     let mean = (momentum / scene.mass() / exact - 1.0).abs();
     let worst = (0..body.points.len()).map(|node| (speed(node) / exact - 1.0).abs()).fold(0.0, f64::max);
     // Nodes tremble: the last place of a displacement of 5 cm is a force.
@@ -159,10 +158,9 @@ fn traction_adds_up_to_pressure_times_area() {
         assert!((total / (f64::from(pascal) * area) - 1.0).abs() < 1e-5);
     }
     // A third of one triangle to each corner.
-    let one: Vec<_> =
-        traction(&[[0.0; 3], [0.02, 0.0, 0.0], [0.0, 0.03, 0.0]], &[[0, 1, 2]], [0.0, 0.0, 1e3], 0.0)
-            .map(Result::unwrap)
-            .collect();
+    let one: Vec<_> = traction(&[[0.0; 3], [0.02, 0.0, 0.0], [0.0, 0.03, 0.0]], &[[0, 1, 2]], [0.0, 0.0, 1e3], 0.0)
+        .map(Result::unwrap)
+        .collect();
     assert!(one.iter().all(|force| (force.newton[2] - 0.1).abs() < 1e-7));
 }
 
@@ -199,8 +197,8 @@ fn prescribed_positions_hold_at_the_end_of_each_step() {
     assert_eq!([x, z], [2e-3, -3e-3]);
 }
 
-/// What the last one overrides leaves no trace, neither in velocities nor in the energy balance, whose uncertainty grows with
-/// jumps of supports and blinds it. With the exact and the mass-scaled step.
+/// What the last one overrides leaves no trace, neither in velocities nor in the energy balance, whose uncertainty
+/// grows with jumps of supports and blinds it. With the exact and the mass-scaled step.
 #[test]
 fn of_several_motions_of_an_axis_the_last_one_alone_counts() {
     let body = small_bar();
@@ -224,8 +222,7 @@ fn of_several_motions_of_an_axis_the_last_one_alone_counts() {
             if is_scaled {
                 let step = Step::unchecked(2e-3, 5.0).unwrap();
                 let (method, points) = (Method::MassScaled, &body.points);
-                let mut scaled =
-                    LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step).unwrap();
+                let mut scaled = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step).unwrap();
                 for _ in 0..200 {
                     assert!(scaled.step(scene.view(), &loads, state.view()).is_taken());
                 }
@@ -254,11 +251,7 @@ fn partly_held_nodes_slide() {
     let planes = [Axes::X, Axes::Y, Axes::Z].into_iter().enumerate();
     let mut supports: Vec<Support> = planes
         .flat_map(|(axis, axes)| {
-            body.nodes_where(move |x| x[axis] == 0.0).into_iter().map(move |node| Support {
-                node,
-                axes,
-                moves: false,
-            })
+            body.nodes_where(move |x| x[axis] == 0.0).into_iter().map(move |node| Support { node, axes, moves: false })
         })
         .collect();
     let end = far_end(&body);
@@ -274,8 +267,7 @@ fn partly_held_nodes_slide() {
     let u = to_f64(state.displacements());
     let corner = body.nodes_where(|x| x == [0.02, 0.02, 0.04])[0] as usize;
     let strain = [u[corner][0] / 0.02, u[corner][1] / 0.02, 0.2];
-    let exact: Vec<_> =
-        widened(&body.points).iter().map(|x| [0, 1, 2].map(|axis| strain[axis] * x[axis])).collect();
+    let exact: Vec<_> = widened(&body.points).iter().map(|x| [0, 1, 2].map(|axis| strain[axis] * x[axis])).collect();
     let error = largest_distance(&u, &exact) / 8e-3;
     println!("sliding: strains {:.5} {:.5} 0.2, off a line by {error:.1e}", strain[0], strain[1]);
     assert!(error < 1e-4 && strain[0] < -0.08 && (strain[0] / strain[1] - 1.0).abs() < 1e-4);
@@ -353,9 +345,8 @@ fn dropping_elements_changes_no_bit_of_a_mesh_without_them() {
     let moving = body.tets.iter().filter(|tet| !cannot_move(tet)).count();
     // The same elements without the others, and their nodes, renumbered.
     let mut remaining = Body { tets: body.tets[..moving].to_vec(), ..body.clone() };
-    let used: Vec<bool> = (0..remaining.points.len() as u32)
-        .map(|node| remaining.tets.iter().any(|tet| tet.contains(&node)))
-        .collect();
+    let used: Vec<bool> =
+        (0..remaining.points.len() as u32).map(|node| remaining.tets.iter().any(|tet| tet.contains(&node))).collect();
     remaining.points.retain({
         let mut node = 0;
         move |_| {
@@ -365,8 +356,7 @@ fn dropping_elements_changes_no_bit_of_a_mesh_without_them() {
     });
     let renumbered: Vec<u32> = {
         let mut count = 0;
-        let used =
-            (0..body.points.len() as u32).map(|node| body.tets[..moving].iter().any(|t| t.contains(&node)));
+        let used = (0..body.points.len() as u32).map(|node| body.tets[..moving].iter().any(|t| t.contains(&node)));
         used.map(|used| {
             count += u32::from(used);
             count.wrapping_sub(1)
@@ -408,8 +398,7 @@ fn everything_at_once_agrees_with_the_reference() {
     let (prescribed, pulled) = end.split_at(end.len() / 2);
     let bottom = body.nodes_where(|x| x[2] == 0.0);
     for law in support::laws() {
-        let moved =
-            prescribed.iter().map(|&node| Support { node, axes: Axes::X.union(Axes::Y), moves: true });
+        let moved = prescribed.iter().map(|&node| Support { node, axes: Axes::X.union(Axes::Y), moves: true });
         let supports: Vec<_> = fixed(&bottom).into_iter().chain(moved).collect();
         let scene = body.scene(tissue(law), &supports);
         let motions: Vec<_> = prescribed

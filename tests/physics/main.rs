@@ -1,4 +1,5 @@
-//! The exact step against closed forms, theory and the float64 reference, which is itself tested against its definitions.
+//! The exact step against closed forms, theory and the float64 reference, which is itself tested against its
+//! definitions.
 
 #[path = "../reference/mod.rs"]
 mod reference;

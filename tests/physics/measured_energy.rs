@@ -1,4 +1,5 @@
-//! The energy balance does not wear out: after a long session, or a violent moment, it allows little more energy than the body has.
+//! The energy balance does not wear out: after a long session, or a violent moment, it allows little more energy than
+//! the body has.
 
 use supple::element::ElementMaterial;
 use supple::loads::{Loads, Motion, NodalForce};
@@ -50,11 +51,7 @@ fn a_trembling_hand_does_not_wear_the_balance_out() {
             let motions = shifted(&end, metre, 0.0);
             let loads = Loads::new(&scene, [0.0; 3], &[], &motions).unwrap();
             while state.time() < f64::from(frame) / 60.0 {
-                assert!(
-                    tled::step(&scene, &loads, &mut state, &step).is_taken(),
-                    "{:?}",
-                    state.energy_balance()
-                );
+                assert!(tled::step(&scene, &loads, &mut state, &step).is_taken(), "{:?}", state.energy_balance());
             }
             let (has, most) = energies(&scene, &mut state);
             late = most / has;
@@ -90,8 +87,8 @@ fn a_violent_moment_leaves_no_slack() {
     }
 }
 
-/// What a measurement finds is never less than the body's energy, nor half of it: a body that vibrates for long without damping keeps
-/// its balance.
+/// What a measurement finds is never less than the body's energy, nor half of it: a body that vibrates for long without
+/// damping keeps its balance.
 #[test]
 fn a_vibrating_body_keeps_its_balance() {
     let body = small_bar();

@@ -1,5 +1,6 @@
-//! What the elements with nodal pressure and with nodal strain are both held to: their definition in float64, patch test, rigid motion,
-//! the exact critical step as the limit of stability, drift of the energy, and the same bits from any number of parts.
+//! What the elements with nodal pressure and with nodal strain are both held to: their definition in float64, patch
+//! test, rigid motion, the exact critical step as the limit of stability, drift of the energy, and the same bits from
+//! any number of parts.
 
 use supple::element::ElementMaterial;
 use supple::loads::Loads;
@@ -38,8 +39,7 @@ fn inverted(body: &Body, u: &[[f32; 3]]) -> usize {
 
 /// The norm over some nodes.
 pub(crate) fn norm_where(forces: &[[f64; 3]], wanted: impl Fn(usize) -> bool) -> f64 {
-    let of_these: Vec<_> =
-        forces.iter().enumerate().filter(|(node, _)| wanted(*node)).map(|(_, f)| *f).collect();
+    let of_these: Vec<_> = forces.iter().enumerate().filter(|(node, _)| wanted(*node)).map(|(_, f)| *f).collect();
     norm(&of_these)
 }
 
@@ -79,14 +79,15 @@ impl Definition {
     ) -> f64 {
         let exact = (self.forces)(tissues, &widened(u));
         let off: Vec<_> = (forces(scene, u).iter().zip(&exact))
-            // The kernel has external less internal forces on the nodes, the definition those of the elements on the nodes.
+            // The kernel has external less internal forces on the nodes, the definition those of the elements on the
+            // nodes.
             .map(|(of_kernel, exact)| [0, 1, 2].map(|axis| of_kernel[axis] - exact[axis]))
             .collect();
         norm_where(&off, &wanted) / norm_where(&exact, &wanted)
     }
 
-    /// Forces and energy of the kernel are those of the definition from rounding to inverted elements, and not those of the linear
-    /// element. `small_bar`, one tissue.
+    /// Forces and energy of the kernel are those of the definition from rounding to inverted elements, and not those of
+    /// the linear element. `small_bar`, one tissue.
     pub(crate) fn check_forces<M: ElementMaterial, L: ElementMaterial>(
         &self,
         (name, law): (&str, Law),
@@ -113,12 +114,7 @@ impl Definition {
     }
 
     /// Forces of several tissues in `small_bar`, of which each has means of its own at every node.
-    pub(crate) fn check_tissues<M: ElementMaterial>(
-        &self,
-        laws: &[Law],
-        of_element: &[u16],
-        scene: &VecScene<M>,
-    ) {
+    pub(crate) fn check_tissues<M: ElementMaterial>(&self, laws: &[Law], of_element: &[u16], scene: &VecScene<M>) {
         let body = small_bar();
         let mesh = body.reference();
         let wide: Vec<usize> = of_element.iter().map(|&tissue| tissue.into()).collect();
@@ -128,7 +124,8 @@ impl Definition {
         assert!(error < 1e-5);
     }
 
-    /// Elements between the fixed nodes of [`mostly_held`] are left out only where they count in no mean that can change.
+    /// Elements between the fixed nodes of [`mostly_held`] are left out only where they count in no mean that can
+    /// change.
     pub(crate) fn check_left_out<M: ElementMaterial>(&self, law: Law, scene: &VecScene<M>) {
         let (body, supports) = mostly_held();
         let mesh = body.reference();
@@ -164,11 +161,7 @@ pub(crate) fn homogeneous() -> [Vec<[f32; 3]>; 2] {
 }
 
 /// A homogeneous deformation of [`irregular`] gives inner nodes no force. Gives the forces, N.
-pub(crate) fn check_patch<M: ElementMaterial>(
-    name: &str,
-    scene: &VecScene<M>,
-    u: &[[f32; 3]],
-) -> Vec<[f64; 3]> {
+pub(crate) fn check_patch<M: ElementMaterial>(name: &str, scene: &VecScene<M>, u: &[[f32; 3]]) -> Vec<[f64; 3]> {
     let on_surface = irregular().surface_nodes();
     let forces = forces(scene, u);
     let ratio = norm_where(&forces, |node| !on_surface[node]) / norm_where(&forces, |node| on_surface[node]);
@@ -177,7 +170,8 @@ pub(crate) fn check_patch<M: ElementMaterial>(
     forces
 }
 
-/// A rigid motion of [`irregular`] gives no forces compared with those of a deformation, for a law without stress at rest.
+/// A rigid motion of [`irregular`] gives no forces compared with those of a deformation, for a law without stress at
+/// rest.
 pub(crate) fn check_rigid<M: ElementMaterial>(name: &str, scene: &VecScene<M>, of_deformation: &[[f64; 3]]) {
     let moved = irregular().affine(&rotation([0.3, -1.0, 0.8], 1.5), [0.02, -0.01, 0.03]);
     let ratio = norm(&forces(scene, &moved)) / norm(of_deformation);
@@ -203,8 +197,8 @@ pub(crate) fn of_bounds() -> [(&'static str, Body); 5] {
     ]
 }
 
-/// The bound of the critical step is never above the exact one, in a body at rest and in random states, and not below its `least` share
-/// (a function of the noise).
+/// The bound of the critical step is never above the exact one, in a body at rest and in random states, and not below
+/// its `least` share (a function of the noise).
 pub(crate) fn check_bounds<M: ElementMaterial>(
     (name, body): (&str, &Body),
     scene: &VecScene<M>,
@@ -226,8 +220,7 @@ pub(crate) fn check_limit_of_stability<M: ElementMaterial>(scene: &VecScene<M>) 
     let stable_at = |share: f64| {
         let step = Step::unchecked((share * exact) as f32, 0.0).unwrap();
         let mut state = rest_of(scene);
-        let kick =
-            |node: usize| ([0.0; 3], if node.is_multiple_of(3) { [1e-5, -1e-5, 2e-5] } else { [0.0; 3] });
+        let kick = |node: usize| ([0.0; 3], if node.is_multiple_of(3) { [1e-5, -1e-5, 2e-5] } else { [0.0; 3] });
         assert!(tled::start(scene, &mut state, &step, kick));
         (0..20_000).all(|_| tled::step(scene, &Loads::NONE, &mut state, &step) == Status::Ok)
     };

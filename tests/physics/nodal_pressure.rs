@@ -1,16 +1,14 @@
-//! Tetrahedra with average nodal pressure against their definition in float64, and pressures that are not smeared across tissues.
+//! Tetrahedra with average nodal pressure against their definition in float64, and pressures that are not smeared
+//! across tissues.
 
 use supple::material::{Exponential, Law, NeoHookean, NodalPressure};
 use supple::tled;
 
 use crate::nodal_elements::{self, Definition, noise, norm_where};
 use crate::support::bodies::{held, small_bar};
-use crate::support::{
-    self, Body, displaced, forces, largest_distance, norm, reference_law, regions, rest_of, tissue,
-};
+use crate::support::{self, Body, displaced, forces, largest_distance, norm, reference_law, regions, rest_of, tissue};
 
-const DEFINITION: Definition =
-    Definition { energy: |body, u| body.energy(u), forces: |body, u| body.forces(u) };
+const DEFINITION: Definition = Definition { energy: |body, u| body.energy(u), forces: |body, u| body.forces(u) };
 
 #[test]
 fn the_force_of_the_definition_is_minus_the_gradient_of_its_energy() {
@@ -64,7 +62,8 @@ fn tissues_that_meet_have_pressures_of_their_own() {
     assert!(only(true) > 0.0 && only(false) == 0.0);
 }
 
-/// A third tissue where two meet already keeps the volumes of its own elements there: its forces are the gradient of its energy.
+/// A third tissue where two meet already keeps the volumes of its own elements there: its forces are the gradient of
+/// its energy.
 #[test]
 fn a_third_tissue_at_a_node_has_an_energy() {
     let body = small_bar();
@@ -79,9 +78,8 @@ fn a_third_tissue_at_a_node_has_an_energy() {
         tled::strain_energy(&scene, &mut displaced(&scene, &u)).expect("room")
     };
     let numeric = (at(-0.02) - at(0.02)) / 0.04;
-    let work: f64 = (forces(&scene, &u).iter().zip(&change))
-        .flat_map(|(f, v)| [0, 1, 2].map(|i| f[i] * f64::from(v[i])))
-        .sum();
+    let work: f64 =
+        (forces(&scene, &u).iter().zip(&change)).flat_map(|(f, v)| [0, 1, 2].map(|i| f[i] * f64::from(v[i]))).sum();
     println!("three tissues: work {work:.6e}, change of energy {numeric:.6e} J");
     assert!((work / numeric - 1.0).abs() < 1e-3);
 }
@@ -112,9 +110,9 @@ fn a_homogeneous_deformation_leaves_inner_nodes_without_force() {
     }
 }
 
-/// The exact critical step is that of the tangent, which is the derivative of the forces; the bound is never above it. In a body at rest
-/// that hardly changes its volume it is 1.29 times the linear element's (`4 x 4 x 13` cells, nu 0.499; eigenvalues of the assembled
-/// matrices with SciPy: 1.285).
+/// The exact critical step is that of the tangent, which is the derivative of the forces; the bound is never above it.
+/// In a body at rest that hardly changes its volume it is 1.29 times the linear element's (`4 x 4 x 13` cells, nu
+/// 0.499; eigenvalues of the assembled matrices with SciPy: 1.285).
 #[test]
 fn the_bound_of_the_critical_step_is_below_the_exact_one() {
     for (name, body) in &nodal_elements::of_bounds() {
@@ -128,15 +126,12 @@ fn the_bound_of_the_critical_step_is_below_the_exact_one() {
             }
             let linear = body.scene(tissue(law), &[]);
             let (rest, linear_rest) = (rest_of(&scene), rest_of(&linear));
-            let of_bounds =
-                support::bound(&scene, &rest).seconds / support::bound(&linear, &linear_rest).seconds;
+            let of_bounds = support::bound(&scene, &rest).seconds / support::bound(&linear, &linear_rest).seconds;
             println!("{name}: bound of the critical step {of_bounds:.3} of the linear element's");
             assert!(of_bounds > 1.2);
             if *name == "beam" {
-                let exact = tled::exact_critical_step(scene.view(), rest.displacements())
-                    .expect("it settles")
-                    / tled::exact_critical_step(linear.view(), linear_rest.displacements())
-                        .expect("it settles");
+                let exact = tled::exact_critical_step(scene.view(), rest.displacements()).expect("it settles")
+                    / tled::exact_critical_step(linear.view(), linear_rest.displacements()).expect("it settles");
                 println!("beam: exact critical step {exact:.3} of the linear element's");
                 assert!((exact - 1.285).abs() < 2e-3);
             }

@@ -1,4 +1,5 @@
-//! Tetrahedra with stabilised nodal strain against their definition in float64, and the elements in it that turn inside out.
+//! Tetrahedra with stabilised nodal strain against their definition in float64, and the elements in it that turn inside
+//! out.
 
 use supple::loads::Loads;
 use supple::material::{Exponential, Law, NeoHookean, NodalStrain};
@@ -56,8 +57,7 @@ fn a_homogeneous_deformation_leaves_inner_nodes_without_force() {
     let body = nodal_elements::irregular();
     for law in support::laws() {
         let scene = body.scene(NodalStrain(tissue(law)), &[]);
-        let forces =
-            nodal_elements::homogeneous().map(|u| nodal_elements::check_patch(law.name(), &scene, &u));
+        let forces = nodal_elements::homogeneous().map(|u| nodal_elements::check_patch(law.name(), &scene, &u));
         nodal_elements::check_rigid(law.name(), &scene, &forces[0]);
     }
 }
@@ -70,8 +70,8 @@ fn the_bound_of_the_critical_step_is_below_the_exact_one() {
             let scene = body.scene(NodalStrain(tissue(law)), &[]);
             nodal_elements::check_bounds((&format!("{name}, d {}", law.d), body), &scene, |_| 0.45);
             let linear = body.scene(tissue(law), &[]);
-            let ratio = support::bound(&scene, &rest_of(&scene)).seconds
-                / support::bound(&linear, &rest_of(&linear)).seconds;
+            let ratio =
+                support::bound(&scene, &rest_of(&scene)).seconds / support::bound(&linear, &rest_of(&linear)).seconds;
             println!("{name}, d {}: bound at rest {ratio:.3} of the linear element's", law.d);
             assert!(*name != "beam" || law.d < 1e6 || ratio > 1.2);
         }
@@ -102,8 +102,8 @@ fn any_number_of_parts_gives_the_same_bits() {
     assert!(nodal_elements::same_bits_in_parts(&one) != nodal_elements::same_bits_in_parts(&two));
 }
 
-/// The mean strain around nodes hardly changes where a node inside the body is pushed through its neighbours; the elements there do.
-/// Each element is looked at once in 16 steps.
+/// The mean strain around nodes hardly changes where a node inside the body is pushed through its neighbours; the
+/// elements there do. Each element is looked at once in 16 steps.
 #[test]
 fn elements_that_are_turned_inside_out_are_told() {
     let body = Body::bar([0.04; 3], [4; 3]);

@@ -8,9 +8,7 @@ use supple::scene::FixedScene;
 
 use crate::reference::tensor::{IDENTITY, determinant, from_fn, product, rotation};
 use crate::reference::{Mat3, Random, internal_force};
-use crate::support::{
-    Body, forces, largest_distance, norm, norm_of_sum, reference_law, tissue, to_f32, widened,
-};
+use crate::support::{Body, forces, largest_distance, norm, norm_of_sum, reference_law, tissue, to_f32, widened};
 use crate::{reference, support};
 
 /// The bar of the paper in size, irregular, about its middle.
@@ -49,8 +47,7 @@ fn a_homogeneous_deformation_leaves_inner_nodes_without_force() {
             let (surface, inner): (Vec<_>, Vec<_>) =
                 forces.iter().zip(&on_surface).partition(|(_, on_surface)| **on_surface);
             assert!(inner.len() > 50);
-            let norm_of =
-                |part: Vec<(&[f64; 3], &bool)>| norm(&part.iter().map(|(f, _)| **f).collect::<Vec<_>>());
+            let norm_of = |part: Vec<(&[f64; 3], &bool)>| norm(&part.iter().map(|(f, _)| **f).collect::<Vec<_>>());
             let ratio = norm_of(inner) / norm_of(surface);
             println!("{}, {name}: inner over surface force {ratio:.1e}", law.name());
             assert!(ratio < 1e-5);
@@ -67,10 +64,7 @@ fn rotation_over_stretch(name: &str, body: &Body, law: AnyLaw) -> f64 {
     let scale = norm(&forces(&scene, &stretched));
     let ratio = norm(&forces(&scene, &rotated)) / scale;
     let floor = norm(&internal_force(&body.reference(), &reference_law(law), &widened(&rotated))) / scale;
-    println!(
-        "{name}, {}: rotation over stretch {ratio:.1e}; {floor:.1e} is the rounding of u to float32",
-        law.name()
-    );
+    println!("{name}, {}: rotation over stretch {ratio:.1e}; {floor:.1e} is the rounding of u to float32", law.name());
     ratio
 }
 
@@ -81,10 +75,8 @@ fn a_rigid_motion_gives_no_force() {
         (*x, *y, *z) = (*x - 0.025, *y - 0.025, *z - 0.05);
     }
     for (name, body) in [("irregular bar", irregular()), ("paper's bar", fine)] {
-        let ratios = [
-            rotation_over_stretch(name, &body, support::NEO),
-            rotation_over_stretch(name, &body, support::EXP),
-        ];
+        let ratios =
+            [rotation_over_stretch(name, &body, support::NEO), rotation_over_stretch(name, &body, support::EXP)];
         assert!(ratios.iter().all(|ratio| *ratio < 1e-5), "{ratios:?}");
     }
 }

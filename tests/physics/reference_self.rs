@@ -6,17 +6,12 @@ use std::time::Instant;
 use crate::reference;
 use crate::reference::tensor::{IDENTITY, from_fn, max_abs, rotation};
 use crate::reference::{Law, Mat3, Mesh, Motion, NodalForce, Random, Simulation, Vec3};
-use crate::reference::{
-    closed_form, critical_step, deformations, internal_force, strain_energy, tangent_product,
-};
+use crate::reference::{closed_form, critical_step, deformations, internal_force, strain_energy, tangent_product};
 
 const DENSITY: f64 = 1000.0;
 
-const LAWS: [Law; 3] = [
-    Law::NeoHookean { c: 500.0, d: 25_000.0 },
-    Law::PAPER,
-    Law::Polynomial { c: 500.0, e: 750.0, d: 25_000.0 },
-];
+const LAWS: [Law; 3] =
+    [Law::NeoHookean { c: 500.0, d: 25_000.0 }, Law::PAPER, Law::Polynomial { c: 500.0, e: 750.0, d: 25_000.0 }];
 
 /// Largest relative error per kind of deformation.
 fn worst_per_kind(figure: &str, error: impl Fn(&Law, &Mat3) -> f64) -> f64 {
@@ -139,9 +134,8 @@ fn force_is_the_gradient_of_the_energy() {
         points: vec![[0.0, 0.0, 0.0], [0.011, 0.001, 0.0], [0.002, 0.009, -0.001], [0.001, 0.003, 0.012]],
         tets: vec![[0, 1, 2, 3]],
     };
-    let worst = worst_per_kind("f_int against dE/du, one element", |law, f| {
-        force_error(&tet, law, &tet.affine(f), 1e-8)
-    });
+    let worst =
+        worst_per_kind("f_int against dE/du, one element", |law, f| force_error(&tet, law, &tet.affine(f), 1e-8));
     assert!(worst < 1e-7, "{worst:e}");
 
     let bar = Mesh::bar([0.02, 0.02, 0.04], [2, 2, 4]);
@@ -161,12 +155,10 @@ fn tangent_product_is_the_derivative_of_the_force() {
     for law in LAWS {
         let u: Vec<Vec3> = mesh.points.iter().map(|_| random.vector().map(|x| 1e-3 * x)).collect();
         let v: Vec<Vec3> = mesh.points.iter().map(|_| random.vector()).collect();
-        let shifted = |h: f64| -> Vec<Vec3> {
-            u.iter().zip(&v).map(|(u, v)| std::array::from_fn(|i| u[i] + h * v[i])).collect()
-        };
+        let shifted =
+            |h: f64| -> Vec<Vec3> { u.iter().zip(&v).map(|(u, v)| std::array::from_fn(|i| u[i] + h * v[i])).collect() };
         let h = 1e-8;
-        let (plus, minus) =
-            (internal_force(&mesh, &law, &shifted(h)), internal_force(&mesh, &law, &shifted(-h)));
+        let (plus, minus) = (internal_force(&mesh, &law, &shifted(h)), internal_force(&mesh, &law, &shifted(-h)));
         let exact = tangent_product(&mesh, &law, &u, &v);
         let largest = exact.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
         let error = (exact.iter().flatten().zip(plus.iter().flatten().zip(minus.iter().flatten())))
@@ -290,9 +282,7 @@ fn energy_is_conserved() {
     for law in LAWS {
         for mu in [0.0, 20.0] {
             let (coarse, fine) = (imbalance(law, mu, 1e-4), imbalance(law, mu, 5e-5));
-            println!(
-                "energy imbalance in 0.2 s, mu = {mu}: {coarse:.1e} at 1e-4 s, {fine:.1e} at 5e-5 s, {law:?}"
-            );
+            println!("energy imbalance in 0.2 s, mu = {mu}: {coarse:.1e} at 1e-4 s, {fine:.1e} at 5e-5 s, {law:?}");
             assert!(fine < 1e-2 && fine < 0.35 * coarse, "{fine:e}");
         }
     }
@@ -390,8 +380,7 @@ fn critical_step_is_the_limit_of_stability() {
     // Stretched by half with its whole surface held: in equilibrium, and stiffer.
     let cube = Mesh::bar([0.02; 3], [4; 3]);
     let inside = |x: f64| x > 1e-9 && x < 0.02 - 1e-9;
-    let surface_held: Vec<[bool; 3]> =
-        cube.points.iter().map(|x| [!x.iter().all(|x| inside(*x)); 3]).collect();
+    let surface_held: Vec<[bool; 3]> = cube.points.iter().map(|x| [!x.iter().all(|x| inside(*x)); 3]).collect();
     let stretched = cube.affine(&closed_form::uniaxial_stretch(1.5));
     let rest = vec![[0.0; 3]; bar.points.len()];
 
@@ -412,8 +401,7 @@ fn critical_step_of_one_element_matches_its_dilation_mode() {
     // 6 d 3 / (4 r) and m = rho V / 4 give omega^2 = 18 d / (rho r^2); d outweighs the shear modes.
     let r = 0.01;
     let a = r / 3.0_f64.sqrt();
-    let mesh =
-        Mesh { points: vec![[a, a, a], [a, -a, -a], [-a, a, -a], [-a, -a, a]], tets: vec![[0, 2, 1, 3]] };
+    let mesh = Mesh { points: vec![[a, a, a], [a, -a, -a], [-a, a, -a], [-a, -a, a]], tets: vec![[0, 2, 1, 3]] };
     assert!(mesh.volumes()[0] > 0.0);
     let exact = 2.0 / (18.0 * 60_000.0 / (DENSITY * r * r)).sqrt();
     let computed = critical_step(&mesh, &Law::PAPER, DENSITY, &[[0.0; 3]; 4], &[[false; 3]; 4]);

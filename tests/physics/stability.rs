@@ -36,9 +36,8 @@ fn supports(body: &Body) -> Vec<(&'static str, Vec<Support>)> {
         body.nodes_where(|x| x[axis] < low + 0.05 * (high - low))
     };
     let sliding = [Axes::X, Axes::Y, Axes::Z].into_iter().enumerate();
-    let sliding = sliding.flat_map(|(axis, axes)| {
-        near(axis).into_iter().map(move |node| Support { node, axes, moves: false })
-    });
+    let sliding =
+        sliding.flat_map(|(axis, axes)| near(axis).into_iter().map(move |node| Support { node, axes, moves: false }));
     vec![("free", vec![]), ("end held", fixed(&near(2))), ("sliding", sliding.collect())]
 }
 
@@ -60,11 +59,9 @@ fn states(body: &Body) -> Vec<(&'static str, Vec<[f32; 3]>)> {
     let twisted = body.points.iter().map(|point| {
         let angle = f64::from((point[2] - low) / (high - low)) * std::f64::consts::FRAC_PI_2;
         let [x, y, _] = point.map(f64::from);
-        [(angle.cos() - 1.0) * x - angle.sin() * y, angle.sin() * x + (angle.cos() - 1.0) * y, 0.0]
-            .map(|u| u as f32)
+        [(angle.cos() - 1.0) * x - angle.sin() * y, angle.sin() * x + (angle.cos() - 1.0) * y, 0.0].map(|u| u as f32)
     });
-    let general: Mat3 =
-        product(&rotation([1.0, 2.0, -1.0], 1.0), &[[0.7, 0.4, 0.0], [0.0, 1.2, 0.1], [0.0, 0.0, 1.1]]);
+    let general: Mat3 = product(&rotation([1.0, 2.0, -1.0], 1.0), &[[0.7, 0.4, 0.0], [0.0, 1.2, 0.1], [0.0, 0.0, 1.1]]);
     let stretch = [[0.8, 0.0, 0.0], [0.0, 0.8, 0.0], [0.0, 0.0, 1.5]];
     vec![
         ("rest", vec![[0.0; 3]; body.points.len()]),
@@ -230,35 +227,23 @@ fn the_exact_limit_is_that_of_the_reference() {
         for (_, supports) in supports(body) {
             let held: Vec<[bool; 3]> = {
                 let scene = body.scene(tissue(support::NEO), &supports);
-                (0..body.points.len())
-                    .map(|node| [0, 1, 2].map(|axis| scene.view().held(node).has(axis)))
-                    .collect()
+                (0..body.points.len()).map(|node| [0, 1, 2].map(|axis| scene.view().held(node).has(axis))).collect()
             };
             for law in support::laws() {
                 for (state, u) in states(body) {
                     let scene = body.scene(tissue(law), &supports);
                     let computed =
-                        tled::exact_critical_step(scene.view(), displaced(&scene, &u).displacements())
-                            .unwrap();
+                        tled::exact_critical_step(scene.view(), displaced(&scene, &u).displacements()).unwrap();
                     let density = f64::from(support::DENSITY);
-                    let exact = reference::critical_step(
-                        &body.reference(),
-                        &reference_law(law),
-                        density,
-                        &widened(&u),
-                        &held,
-                    );
+                    let exact =
+                        reference::critical_step(&body.reference(), &reference_law(law), density, &widened(&u), &held);
                     if beyond_cap(body, law, &u) {
                         // The kernel lets the stiffness of the exponential go on there, the reference drops it.
                         assert!(computed <= exact * (1.0 + 1e-4));
                         continue;
                     }
                     let error = (computed / exact - 1.0).abs();
-                    assert!(
-                        error < 1e-4,
-                        "{name}, {}, {state}: {computed:e}, reference {exact:e}",
-                        law.name()
-                    );
+                    assert!(error < 1e-4, "{name}, {}, {state}: {computed:e}, reference {exact:e}", law.name());
                     worst = worst.max(error);
                 }
             }

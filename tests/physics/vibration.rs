@@ -92,10 +92,7 @@ fn waves_run_along_a_thin_bar_at_their_speed() {
         * f64::from(length)
         * frequency(&scene, start, |state| f64::from(state.displacements()[tip].to_array()[2]), 5);
     let exact = (YOUNG / f64::from(DENSITY)).sqrt();
-    println!(
-        "wave speed {measured:.4} m/s, theory {exact:.4} m/s: {:+.2} %",
-        100.0 * (measured / exact - 1.0)
-    );
+    println!("wave speed {measured:.4} m/s, theory {exact:.4} m/s: {:+.2} %", 100.0 * (measured / exact - 1.0));
     assert!((measured / exact - 1.0).abs() < 0.03);
 }
 
@@ -168,8 +165,7 @@ fn order_in_time(law: AnyLaw) {
     let exact = {
         let steps = 2048 * 16;
         let dt = f64::from(end) / f64::from(steps);
-        let mut simulation =
-            reference::Simulation::new(body.reference(), reference_law(law), f64::from(DENSITY), dt);
+        let mut simulation = reference::Simulation::new(body.reference(), reference_law(law), f64::from(DENSITY), dt);
         simulation.fix(&body.nodes_where(|x| x[2] == 0.0).iter().map(|&n| n as usize).collect::<Vec<_>>());
         simulation.forces = forces
             .iter()

@@ -29,9 +29,7 @@ fn product(elements: &[Element], tangents: &[Mat9], v: &[Vec3]) -> Vec<Vec3> {
     let mut force = vec![[0.0; 3]; v.len()];
     for (element, tangent) in elements.iter().zip(tangents) {
         let df = element.displacement_gradient(v);
-        let dp = from_fn(|i, j| {
-            (0..9).map(|column| tangent[3 * i + j][column] * df[column / 3][column % 3]).sum()
-        });
+        let dp = from_fn(|i, j| (0..9).map(|column| tangent[3 * i + j][column] * df[column / 3][column % 3]).sum());
         for (node, gradient) in element.nodes.iter().zip(element.gradients) {
             let f = apply(&dp, gradient);
             for axis in 0..3 {
@@ -49,9 +47,8 @@ pub fn critical_step(mesh: &Mesh, law: &Law, density: f64, u: &[Vec3], fixed: &[
     let tangents = tangents(&elements, law, u);
     let mass = mesh.lumped_mass(density);
     // M^-1/2, zero on the fixed degrees of freedom.
-    let scale: Vec<Vec3> = (mass.iter().zip(fixed))
-        .map(|(m, held)| held.map(|h| if h { 0.0 } else { 1.0 / m.sqrt() }))
-        .collect();
+    let scale: Vec<Vec3> =
+        (mass.iter().zip(fixed)).map(|(m, held)| held.map(|h| if h { 0.0 } else { 1.0 / m.sqrt() })).collect();
     let scaled = |v: &[Vec3]| -> Vec<Vec3> {
         v.iter().zip(&scale).map(|(v, s)| std::array::from_fn(|axis| v[axis] * s[axis])).collect()
     };

@@ -56,8 +56,7 @@ pub fn transformed(l: &Matrix, a: &Matrix) -> Matrix {
         }
         x
     };
-    let transposed =
-        |a: &Matrix| -> Matrix { (0..n).map(|i| a.iter().map(|row| row[i]).collect()).collect() };
+    let transposed = |a: &Matrix| -> Matrix { (0..n).map(|i| a.iter().map(|row| row[i]).collect()).collect() };
     solved(&transposed(&solved(a)))
 }
 

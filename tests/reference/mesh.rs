@@ -50,8 +50,7 @@ impl Mesh {
             for j in 0..=ny {
                 for i in 0..=nx {
                     let n = [i, j, k];
-                    mesh.points
-                        .push(std::array::from_fn(|axis| size[axis] * n[axis] as f64 / cells[axis] as f64));
+                    mesh.points.push(std::array::from_fn(|axis| size[axis] * n[axis] as f64 / cells[axis] as f64));
                 }
             }
         }

@@ -1,5 +1,6 @@
-//! Tetrahedra with average nodal pressure in float64, from their definition: energy `sum_e V_e W(F_e) + sum_a V_a U(J_a)` with
-//! `J_a = sum_e (V_e / 4) J_e / V_a`, the sums for each tissue by itself (Bonet & Burton 1998; Joldes, Wittek & Miller 2009).
+//! Tetrahedra with average nodal pressure in float64, from their definition: energy `sum_e V_e W(F_e) + sum_a V_a
+//! U(J_a)` with `J_a = sum_e (V_e / 4) J_e / V_a`, the sums for each tissue by itself (Bonet & Burton 1998; Joldes,
+//! Wittek & Miller 2009).
 
 use super::tensor::{Mat3, Vec3, apply, cross, determinant, from_fn};
 use super::{Law, Mesh};

@@ -1,6 +1,6 @@
-//! Tetrahedra with stabilised nodal strain in float64, from their definition: energy `sum_a V_a W(F_a) + s mu / 2 sum_a sum_{e with a}
-//! (V_e / 4) |F_e - F_a|^2` with `F_a = sum_e (V_e / 4) F_e / V_a`, the sums for each tissue by itself, `s` 0.4 and `mu` the shear
-//! modulus at rest (Dohrmann et al. 2000; Puso & Solberg 2006).
+//! Tetrahedra with stabilised nodal strain in float64, from their definition: energy `sum_a V_a W(F_a) + s mu / 2 sum_a
+//! sum_{e with a} (V_e / 4) |F_e - F_a|^2` with `F_a = sum_e (V_e / 4) F_e / V_a`, the sums for each tissue by itself,
+//! `s` 0.4 and `mu` the shear modulus at rest (Dohrmann et al. 2000; Puso & Solberg 2006).
 
 use super::nodal_pressure::Tissues;
 use super::tensor::{IDENTITY, Mat3, Vec3, apply, determinant, from_fn};
@@ -63,7 +63,8 @@ pub fn forces(body: &Tissues<'_>, u: &[Vec3]) -> Vec<Vec3> {
     for (e, (tet, element)) in body.mesh.tets.iter().zip(body.mesh.elements()).enumerate() {
         let tissue = body.of_element[e];
         let stabilising = modulus(body, tissue);
-        // Each of its nodes has a quarter of the element's volume. The derivative of the mean in the stabilising energy is zero.
+        // Each of its nodes has a quarter of the element's volume. The derivative of the mean in the stabilising energy
+        // is zero.
         let stresses = tet.map(|node| {
             let (mean, _) = means[node][tissue];
             let p = body.laws[tissue].first_piola(&mean);

@@ -223,9 +223,8 @@ impl Simulation {
 
     /// The energy balance at the last half step.
     pub fn energy(&self) -> Energy {
-        let halfway: Vec<Vec3> = (self.u.iter().zip(&self.du))
-            .map(|(u, du)| std::array::from_fn(|axis| u[axis] - 0.5 * du[axis]))
-            .collect();
+        let halfway: Vec<Vec3> =
+            (self.u.iter().zip(&self.du)).map(|(u, du)| std::array::from_fn(|axis| u[axis] - 0.5 * du[axis])).collect();
         Energy {
             kinetic: self.kinetic_energy(),
             strain: strain_energy(&self.mesh, &self.law, &halfway),

@@ -1,14 +1,12 @@
-//! With the feature `deterministic` the same input gives the same bits at every instruction-set level: sums are
-//! taken in a fixed order, and nothing is fused. Without it levels differ by rounding, and two runs at one level by nothing.
+//! With the feature `deterministic` the same input gives the same bits at every instruction-set level: sums are taken
+//! in a fixed order, and nothing is fused. Without it levels differ by rounding, and two runs at one level by nothing.
 //! Networks with int8 layers give the same bits either way.
 
 use supple::element::ElementMaterial;
 use supple::guard::{EVERY, Guard};
 use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::{Loads, NodalForce};
-use supple::material::{
-    Element, Exponential, Material, NeoHookean, NodalPressure, NodalStrain, Polynomial, Tissue,
-};
+use supple::material::{Element, Exponential, Material, NeoHookean, NodalPressure, NodalStrain, Polynomial, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::mlp::{Network, write, write_int8};
 use supple::scene::{Support, VecScene};
@@ -84,8 +82,7 @@ fn apart((_, a): &Bits, (_, b): &Bits) -> f32 {
 fn compare<M: ElementMaterial + Copy>(name: &str, material: M) {
     // The exact step, and methods whose refresh cycles have passed a dozen times.
     let multilevel = Method::Multilevel(Cells::Given([1, 1, 3]));
-    let methods =
-        [("exact", None), ("mass-scaled", Some(Method::MassScaled)), ("multilevel", Some(multilevel))];
+    let methods = [("exact", None), ("mass-scaled", Some(Method::MassScaled)), ("multilevel", Some(multilevel))];
     let of_element = if material.element() == Element::NodalStrain { 1 } else { 3 };
     for (of, method) in methods.into_iter().take(of_element) {
         let portable = run(material, Level::Portable, method.clone());
@@ -154,8 +151,7 @@ fn networks_with_int8_layers_are_the_same_bits() {
         let memory = Memory::of(&write_int8(&description, &layers).unwrap());
         let network = Network::parse(memory.bytes()).unwrap();
         let mut random = uniform(8);
-        let inputs: Vec<f32> =
-            (0..7 * 50).map(|at| 2.0 * description.inputs[at % 7].scale * random()).collect();
+        let inputs: Vec<f32> = (0..7 * 50).map(|at| 2.0 * description.inputs[at % 7].scale * random()).collect();
         let mut scalar = vec![0.0f32; 3 * 50];
         for (inputs, outputs) in inputs.chunks(7).zip(scalar.chunks_mut(3)) {
             network.predict(inputs, outputs);

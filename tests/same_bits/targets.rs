@@ -1,5 +1,6 @@
-//! The checksums of the computations in `tests/targets` on this processor, at each instruction-set level that it has, against the
-//! kept ones. `tools/cross.sh` holds other processors to the same file, with an emulator or in a browser's engine.
+//! The checksums of the computations in `tests/targets` on this processor, at each instruction-set level that it has,
+//! against the kept ones. `tools/cross.sh` holds other processors to the same file, with an emulator or in a browser's
+//! engine.
 
 use crate::level_guard;
 use crate::sums::{Level, NAMES, checksum, rounding};

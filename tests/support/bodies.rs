@@ -64,17 +64,15 @@ impl Body {
     pub fn slivers(size: [f32; 3]) -> Self {
         let bar = Bar { size, cells: [4, 4, 6] };
         let mut body = Self::bar(size, bar.cells);
-        for (i, j, k) in [1, 3]
-            .into_iter()
-            .flat_map(|i| [1, 3].into_iter().flat_map(move |j| [1, 3, 5].map(move |k| (i, j, k))))
+        for (i, j, k) in
+            [1, 3].into_iter().flat_map(|i| [1, 3].into_iter().flat_map(move |j| [1, 3, 5].map(move |k| (i, j, k))))
         {
             let node = bar.node(i, j, k);
             let around: Vec<_> = body.tets.iter().filter(|tet| tet.contains(&node)).collect();
             let tet = around[(5 * i + 3 * j + k) as usize % around.len()];
             let face: Vec<_> = tet.iter().filter(|&&other| other != node).collect();
             for axis in 0..3 {
-                let middle: f32 =
-                    face.iter().map(|&&other| body.points[other as usize][axis]).sum::<f32>() / 3.0;
+                let middle: f32 = face.iter().map(|&&other| body.points[other as usize][axis]).sum::<f32>() / 3.0;
                 let at = &mut body.points[node as usize][axis];
                 *at = middle + 1e-3 * (*at - middle);
             }

@@ -1,8 +1,8 @@
 //! Hostile input: many inputs made from sound ones by random changes, each tried within limits of time and memory.
 //!
-//! A run is determined by its seed: try `n` of a run is the same whatever the number of tries. `SUPPLE_SECONDS=600` goes on for ten
-//! minutes instead of the number of tries of an ordinary test, `SUPPLE_SEED=2` makes other tries, `SUPPLE_TRY=17` makes only that
-//! one. A failure names the seed and the try.
+//! A run is determined by its seed: try `n` of a run is the same whatever the number of tries. `SUPPLE_SECONDS=600`
+//! goes on for ten minutes instead of the number of tries of an ordinary test, `SUPPLE_SEED=2` makes other tries,
+//! `SUPPLE_TRY=17` makes only that one. A failure names the seed and the try.
 // The command, whose own printing does not panic, has it in its unit tests.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 #![allow(dead_code, unreachable_pub, unsafe_code)] // A global allocator is an unsafe trait.
@@ -145,8 +145,8 @@ impl Run {
         }
     }
 
-    /// Makes the tries. `one` makes one from its random numbers, panics if a promise is broken, and tells whether the input was
-    /// accepted.
+    /// Makes the tries. `one` makes one from its random numbers, panics if a promise is broken, and tells whether the
+    /// input was accepted.
     pub fn each(mut self, mut one: impl FnMut(&mut Dice) -> bool) {
         let mut number = self.only.unwrap_or(0);
         loop {
@@ -337,7 +337,6 @@ fn number_near(bytes: &[u8], at: usize) -> Option<Range<usize>> {
 
 fn line_at(bytes: &[u8], at: usize) -> Range<usize> {
     let start = bytes[..at.min(bytes.len())].iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
-    let end =
-        bytes[start..].iter().position(|&byte| byte == b'\n').map_or(bytes.len(), |end| start + end + 1);
+    let end = bytes[start..].iter().position(|&byte| byte == b'\n').map_or(bytes.len(), |end| start + end + 1);
     start..end
 }

@@ -98,13 +98,7 @@ pub fn forces<M: ElementMaterial>(scene: &VecScene<M>, u: &[[f32; 3]]) -> Vec<[f
 }
 
 /// Takes steps; one that is not `Ok` fails the test.
-pub fn run<M: ElementMaterial>(
-    scene: &VecScene<M>,
-    loads: &Loads<'_>,
-    state: &mut VecState,
-    step: &Step,
-    count: u64,
-) {
+pub fn run<M: ElementMaterial>(scene: &VecScene<M>, loads: &Loads<'_>, state: &mut VecState, step: &Step, count: u64) {
     for _ in 0..count {
         assert_eq!(tled::step(scene, loads, state, step), Status::Ok);
     }

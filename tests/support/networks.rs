@@ -53,12 +53,7 @@ pub fn uniform(seed: u32) -> impl FnMut() -> f32 {
     }
 }
 
-fn layer(
-    inputs: usize,
-    outputs: usize,
-    activation: Activation,
-    random: &mut impl FnMut() -> f32,
-) -> LayerDescription {
+fn layer(inputs: usize, outputs: usize, activation: Activation, random: &mut impl FnMut() -> f32) -> LayerDescription {
     let scale = (3.0 / inputs as f32).sqrt();
     LayerDescription {
         inputs,
@@ -72,8 +67,7 @@ fn part(widths: &[usize], random: &mut impl FnMut() -> f32) -> Vec<LayerDescript
     let last = widths.len() - 2;
     (0..=last)
         .map(|at| {
-            let activation =
-                if at == last { Activation::Linear } else { Activation::LeakyRelu { slope: 0.01 } };
+            let activation = if at == last { Activation::Linear } else { Activation::LeakyRelu { slope: 0.01 } };
             layer(widths[at], widths[at + 1], activation, random)
         })
         .collect()
@@ -139,12 +133,8 @@ pub fn damper(gain: f32) -> Damper<'static> {
 /// A network whose one output is always `value`.
 pub fn constant(inputs: usize, value: f32) -> Memory {
     let range = Range { scale: 1.0, least: -100.0, most: 100.0 };
-    let output = LayerDescription {
-        inputs,
-        activation: Activation::Linear,
-        weights: vec![0.0; inputs],
-        biases: vec![value],
-    };
+    let output =
+        LayerDescription { inputs, activation: Activation::Linear, weights: vec![0.0; inputs], biases: vec![value] };
     let network = Description {
         inputs: vec![range; inputs],
         outputs: vec![range],
@@ -156,11 +146,7 @@ pub fn constant(inputs: usize, value: f32) -> Memory {
 }
 
 /// Random int8 weights for the layers that `wanted` names, with any zero.
-pub fn int8(
-    description: &Description<'_>,
-    wanted: impl Fn(usize) -> bool,
-    seed: u32,
-) -> Vec<Option<Int8Description>> {
+pub fn int8(description: &Description<'_>, wanted: impl Fn(usize) -> bool, seed: u32) -> Vec<Option<Int8Description>> {
     let mut random = uniform(seed);
     let layers = description.first.iter().chain(&description.second).enumerate();
     let described = |(at, layer): (usize, &LayerDescription)| {

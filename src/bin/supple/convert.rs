@@ -1,5 +1,5 @@
-//! `supple weights`: weight files to and from safetensors. What a conversion reads is checked in full before anything is
-//! written.
+//! `supple weights`: weight files to and from safetensors. What a conversion reads is checked in full before anything
+//! is written.
 
 use std::path::PathBuf;
 

@@ -1,6 +1,7 @@
-//! `supple demo`: a liver lobe that hangs from its back sags under its own weight, and an instrument moves it, by exact, damped and
-//! learned steps side by side. A ball presses its dome and slides along it, which the learned step refuses; forceps grip its front edge
-//! and lift it: their nodes are moved supports. The mesh is in the program, so the command needs no files.
+//! `supple demo`: a liver lobe that hangs from its back sags under its own weight, and an instrument moves it, by
+//! exact, damped and learned steps side by side. A ball presses its dome and slides along it, which the learned step
+//! refuses; forceps grip its front edge and lift it: their nodes are moved supports. The mesh is in the program, so the
+//! command needs no files.
 
 use std::path::Path;
 
@@ -154,8 +155,7 @@ fn grip(setup: &mut Setup) {
     let apart = |point: &[f64; 3]| (0..3).map(|axis| (point[axis] - tip[axis]).powi(2)).sum::<f64>().sqrt();
     let points = (0u32..).zip(&setup.body.mesh.points);
     let nodes = points.filter(|(_, point)| apart(point) < GRIP).map(|(node, _)| node);
-    setup.motions =
-        nodes.map(|node| Motion { node, axes: Axes::XYZ, metre: LIFT, ramp: LIFTED_IN }).collect();
+    setup.motions = nodes.map(|node| Motion { node, axes: Axes::XYZ, metre: LIFT, ramp: LIFTED_IN }).collect();
     setup.supports.extend(setup.motions.iter().map(|motion| Support::moved(motion.node)));
 }
 

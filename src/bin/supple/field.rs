@@ -1,4 +1,5 @@
-//! `supple field`: the signed distances of a closed surface as a file, for instruments of hosts (`SUPPLE_FIELD`, `Field::parse`).
+//! `supple field`: the signed distances of a closed surface as a file, for instruments of hosts (`SUPPLE_FIELD`,
+//! `Field::parse`).
 
 use std::path::{Path, PathBuf};
 
@@ -46,11 +47,6 @@ pub(crate) fn make(asked: &Asked) -> Result<End, Problem> {
     let bytes = field.to_bytes();
     write_atomically(out, |file| file.write_all(&bytes)).map_err(Problem::of)?;
     let [x, y, z] = field.size();
-    output!(
-        "{} ({} bytes): {x} x {y} x {z} points, {:.2} mm deep",
-        out.display(),
-        bytes.len(),
-        1e3 * field.deepest()
-    );
+    output!("{} ({} bytes): {x} x {y} x {z} points, {:.2} mm deep", out.display(), bytes.len(), 1e3 * field.deepest());
     Ok(End::Reached)
 }

@@ -1,5 +1,5 @@
-//! Damaged scene files: each is refused with its file, a line where there is one, and a reason, or is ready to be built. Memory grows with
-//! the file and the bar that it asks for, whose tetrahedra are counted as bytes of input.
+//! Damaged scene files: each is refused with its file, a line where there is one, and a reason, or is ready to be
+//! built. Memory grows with the file and the bar that it asks for, whose tetrahedra are counted as bytes of input.
 
 #[path = "../../../tests/support/hostile.rs"]
 mod runs;
@@ -101,10 +101,7 @@ fn scene_files() {
         assert!(memory <= BYTES * bytes.len() as u64 + ANY, "{memory} bytes for {}", bytes.len());
         let told = |problem: &crate::problem::Problem| {
             let text = problem.to_string();
-            assert!(
-                text.contains("scene.toml") && text.len() > folder.path().to_str().unwrap().len() + 20,
-                "{text:?}"
-            );
+            assert!(text.contains("scene.toml") && text.len() > folder.path().to_str().unwrap().len() + 20, "{text:?}");
         };
         let file = match read {
             Ok(file) => file,

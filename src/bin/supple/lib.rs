@@ -1,8 +1,9 @@
-//! The command `supple`: simulate a scene, inspect a mesh, a scene or a network, show what the kernel does. A library, so that the
-//! laboratory (`supple-lab`) reads the same scene files, prints on the same screen and adds to the same kind of report.
+//! The command `supple`: simulate a scene, inspect a mesh, a scene or a network, show what the kernel does. A library,
+//! so that the laboratory (`supple-lab`) reads the same scene files, prints on the same screen and adds to the same
+//! kind of report.
 //!
-//! Exit codes: 0 as asked, 2 the input is not usable or the results cannot be written, 3 the simulation diverged, 141 as asked
-//! but nobody read what was printed.
+//! Exit codes: 0 as asked, 2 the input is not usable or the results cannot be written, 3 the simulation diverged, 141
+//! as asked but nobody read what was printed.
 
 // Where nobody reads they panic; `screen` has what prints.
 #![deny(clippy::print_stdout, clippy::print_stderr)]
@@ -89,9 +90,7 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     screen::ended(match Arguments::parse().command {
-        Command::Simulate { scene, out, force, unchecked } => {
-            simulate::simulate(&scene, &out, force, unchecked)
-        }
+        Command::Simulate { scene, out, force, unchecked } => simulate::simulate(&scene, &out, force, unchecked),
         Command::Inspect { file, accuracy } => inspect::inspect(&file, accuracy).map(|()| End::Reached),
         Command::Demo { out } => demo::demo(&out),
         Command::Field(asked) => field::make(&asked),

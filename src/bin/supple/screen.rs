@@ -1,8 +1,9 @@
 //! What commands print: results on standard output, progress and warnings on standard error.
 //!
-//! `println!` panics where nobody reads it any more (`supple inspect FILE | head`) or the disk is full. Here the first failure of
-//! standard output is kept for the end and no more is written to it: files, warnings and the exit code do not depend on who reads
-//! the table. Without a reader the command says nothing of it and ends with the code of the signal that ends other programs then.
+//! `println!` panics where nobody reads it any more (`supple inspect FILE | head`) or the disk is full. Here the first
+//! failure of standard output is kept for the end and no more is written to it: files, warnings and the exit code do
+//! not depend on who reads the table. Without a reader the command says nothing of it and ends with the code of the
+//! signal that ends other programs then.
 
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write as _};

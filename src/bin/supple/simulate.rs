@@ -40,10 +40,9 @@ pub(crate) fn simulate(path: &Path, out: &Path, force: bool, unchecked: bool) ->
 
 /// A bar for a simulation, with what it is about.
 pub(crate) fn progress_bar(setup: &Setup, about: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template(
-        "{msg}{bar:40} {pos} of {len} ms simulated, {elapsed} so far, {eta} to go",
-    )
-    .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style =
+        ProgressStyle::with_template("{msg}{bar:40} {pos} of {len} ms simulated, {elapsed} so far, {eta} to go")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new((setup.time.end * 1e3).ceil() as u64).with_style(style).with_message(about.to_owned())
 }
 

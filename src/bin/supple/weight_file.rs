@@ -16,8 +16,7 @@ pub(crate) fn is_weights(path: &Path) -> bool {
         File::open(path)?.read_exact(&mut start)?;
         Ok(start == MAGIC)
     };
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("weights"))
-        || begins().unwrap_or(false)
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("weights")) || begins().unwrap_or(false)
 }
 
 /// The bytes of any file.
@@ -44,10 +43,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
 pub(crate) fn describe_step(network: &Network<'_>) -> String {
     let recipe = network.recipe();
     let multiple = recipe.step / recipe.exact_step;
-    format!(
-        "{:.3e} s, {multiple:.1} times the exact step it learned from ({:.3e} s)",
-        recipe.step, recipe.exact_step
-    )
+    format!("{:.3e} s, {multiple:.1} times the exact step it learned from ({:.3e} s)", recipe.step, recipe.exact_step)
 }
 
 /// The tissue of a network's training.

@@ -15,8 +15,8 @@ use supple_cli::scene::timing::StepChoice;
 use supple_cli::screen::message;
 use supple_lab::training;
 
-/// Share of the critical step at rest that exact steps take unless the file says otherwise: it falls while the body deforms, and the
-/// steps of one training are all alike.
+/// Share of the critical step at rest that exact steps take unless the file says otherwise: it falls while the body
+/// deforms, and the steps of one training are all alike.
 const SHARE: f32 = 0.5;
 
 /// The scene of a recipe, which is found in the folder of `file`.
@@ -50,9 +50,7 @@ struct FileScene {
 impl FileScene {
     fn of(setup: Setup) -> Result<Self, Problem> {
         let refused = |what: &str| {
-            Err(Problem(format!(
-                "{what}: a network learns from exact steps of one tissue without instruments"
-            )))
+            Err(Problem(format!("{what}: a network learns from exact steps of one tissue without instruments")))
         };
         if setup.method_name() != "tled" {
             return refused(&format!("the method is {:?}", setup.method_name()));

@@ -15,15 +15,15 @@ pub(crate) struct Asked {
     /// Folder for hard.csv, hard-frames.csv, report.html and the truths
     #[arg(long)]
     out: PathBuf,
-    /// Hard case or scene of the laboratory, all of them unless given but paper-bar-fine and million-steps, which take minutes; may be
-    /// repeated
+    /// Hard case or scene of the laboratory, all of them unless given but paper-bar-fine and million-steps, which take
+    /// minutes; may be repeated
     #[arg(long = "scene", value_name = "NAME")]
     scenes: Vec<String>,
     /// Method, all that are for hard cases unless given; may be repeated
     #[arg(long = "method", value_name = "NAME")]
     methods: Vec<String>,
-    /// Mesh to judge as a hard case, with the scenes that are named: held at one end of its longest axis, under its own weight and a
-    /// pull at the other end
+    /// Mesh to judge as a hard case, with the scenes that are named: held at one end of its longest axis, under its own
+    /// weight and a pull at the other end
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Factor to metres of that mesh; 0.001 for one in millimetres

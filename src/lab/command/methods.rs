@@ -16,15 +16,15 @@ use crate::report::methods;
 
 #[derive(Args)]
 pub(crate) struct Asked {
-    /// Folder for results.csv, report.html and the truths; results of an earlier evaluation are overwritten, but parts of the report that
-    /// other commands of this kind have added stay
+    /// Folder for results.csv, report.html and the truths; results of an earlier evaluation are overwritten, but parts
+    /// of the report that other commands of this kind have added stay
     #[arg(long)]
     out: PathBuf,
     /// Scene, or `ramped` or `moving` for a group of them, all 34 unless given; may be repeated
     #[arg(long = "scene", value_name = "NAME")]
     scenes: Vec<String>,
-    /// Method, unless given all but paper-f32, backward-euler and implicit-midpoint, which take far longer, and those that are for hard
-    /// cases; may be repeated
+    /// Method, unless given all but paper-f32, backward-euler and implicit-midpoint, which take far longer, and those
+    /// that are for hard cases; may be repeated
     #[arg(long = "method", value_name = "NAME")]
     methods: Vec<String>,
     /// Step as a multiple of the scene's, 1 10 20 50 100 unless given; may be repeated

@@ -1,5 +1,5 @@
-//! `supple-lab quantise`, and what `supple-lab train` does after a training: a network's layers in int8, with the error that
-//! each of them makes, and that of all of them.
+//! `supple-lab quantise`, and what `supple-lab train` does after a training: a network's layers in int8, with the error
+//! that each of them makes, and that of all of them.
 
 use std::path::{Path, PathBuf};
 
@@ -21,7 +21,8 @@ pub(crate) struct Asked {
     /// The weight file to write; one that is there is replaced
     #[arg(long)]
     out: PathBuf,
-    /// Layer that stays in float32, counted from 0 through both parts; may be repeated; the first and last of each part unless given
+    /// Layer that stays in float32, counted from 0 through both parts; may be repeated; the first and last of each part
+    /// unless given
     #[arg(long = "float", value_name = "LAYER")]
     float: Vec<usize>,
 }
@@ -46,12 +47,7 @@ pub(crate) fn quantise(asked: &Asked) -> Result<End, Problem> {
 }
 
 /// The same of a network that has just been trained on these samples: `NAME-i8.weights` next to `NAME.weights`.
-pub(crate) fn quantise_trained(
-    path: &Path,
-    bytes: &[u8],
-    recipe: &Recipe,
-    samples: &Samples,
-) -> Result<(), Problem> {
+pub(crate) fn quantise_trained(path: &Path, bytes: &[u8], recipe: &Recipe, samples: &Samples) -> Result<(), Problem> {
     let mut name = path.file_stem().unwrap_or_default().to_os_string();
     name.push("-i8.weights");
     let memory = WeightBytes::of(bytes);
@@ -66,18 +62,14 @@ fn tell(made: &Made, out: &Path) -> Result<(), Problem> {
     let memory = WeightBytes::of(&made.bytes);
     let network = Network::parse(memory.bytes()).map_err(Problem::of)?;
     let Made { bytes, held_out, float, layers: errors } = made;
-    output!(
-        "\nprecision               error held out, of the standard deviation along tangent, normal, binormal"
-    );
+    output!("\nprecision               error held out, of the standard deviation along tangent, normal, binormal");
     for (name, [t, n, b]) in [("float32", float), ("int8", held_out)] {
         output!("{name:<22}  {t:.4} {n:.4} {b:.4}");
     }
     let (first, second) = network.layers();
     let layers: Vec<(String, &Layer<'_>)> = [("first", first), ("second", second)]
         .into_iter()
-        .flat_map(|(part, layers)| {
-            layers.iter().enumerate().map(move |(at, layer)| (format!("{part} {at}"), layer))
-        })
+        .flat_map(|(part, layers)| layers.iter().enumerate().map(move |(at, layer)| (format!("{part} {at}"), layer)))
         .collect();
     output!("\nlayer     precision  multiply-adds   error of what it hands on, of its standard deviation");
     for ((name, layer), error) in layers.iter().zip(errors) {

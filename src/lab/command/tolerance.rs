@@ -14,8 +14,8 @@ pub(crate) struct Asked {
     /// Folder for tolerance.csv and the truths
     #[arg(long)]
     out: PathBuf,
-    /// Hard case or scene of the laboratory, all of them unless given but paper-bar-fine and million-steps, which take minutes; may be
-    /// repeated
+    /// Hard case or scene of the laboratory, all of them unless given but paper-bar-fine and million-steps, which take
+    /// minutes; may be repeated
     #[arg(long = "scene", value_name = "NAME")]
     scenes: Vec<String>,
     /// Method of the fixed steps, damped ones unless given; may be repeated

@@ -66,9 +66,7 @@ pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     output!("samples     {samples}");
     output!("loss        {loss:.4} of the variance, both losses together");
     if let Some([t, n, b]) = held_out {
-        output!(
-            "held out    error {t:.3}, {n:.3}, {b:.3} of the standard deviation along tangent, normal, binormal"
-        );
+        output!("held out    error {t:.3}, {n:.3}, {b:.3} of the standard deviation along tangent, normal, binormal");
     }
     output!("weights     {} ({} bytes)", out.display(), bytes.len());
     quantise_trained(out, &bytes, &parsed, &collected)?;
@@ -98,12 +96,8 @@ fn train_damper(text: &str, recipe: &Path, out: &Path) -> Result<End, Problem> {
     weight_file::write(out, &trained.bytes)?;
     output!("mean error over nodes and time, mm");
     output!("scene            load  step  multilevel  undamped      rule   network");
-    for damper::Judged { scene, load, multiple, errors: [multilevel, undamped, rule, network] } in
-        &trained.judged
-    {
-        output!(
-            "{scene:14} {load:6} {multiple:4}x {multilevel:11.4} {undamped:9.4} {rule:9.4} {network:9.4}"
-        );
+    for damper::Judged { scene, load, multiple, errors: [multilevel, undamped, rule, network] } in &trained.judged {
+        output!("{scene:14} {load:6} {multiple:4}x {multilevel:11.4} {undamped:9.4} {rule:9.4} {network:9.4}");
     }
     output!("weights     {} ({} bytes)", out.display(), trained.bytes.len());
     Ok(End::Reached)

@@ -12,8 +12,7 @@ use super::super::LabError;
 use super::super::course::Course;
 use super::super::moving::{critical_step, free_bar, hold, neo_hookean, nodes_where};
 use super::super::scenes::{
-    self, HELD, LOBE, RigidVelocity, SceneSpec, SecondTissue, bar, held, held_at_its_end, longest,
-    node_masses,
+    self, HELD, LOBE, RigidVelocity, SceneSpec, SecondTissue, bar, held, held_at_its_end, longest, node_masses,
 };
 use super::{TRAINED_DAMPING, timing_of};
 
@@ -72,8 +71,8 @@ pub fn named(name: &str) -> Result<SceneSpec, LabError> {
     Ok(spec)
 }
 
-/// A mesh in a file, in metres after `scale`: soft tissue, held at the low end of its longest axis, that sinks under its own weight
-/// and is pulled aside at the other end by a tenth of it.
+/// A mesh in a file, in metres after `scale`: soft tissue, held at the low end of its longest axis, that sinks under
+/// its own weight and is pulled aside at the other end by a tenth of it.
 pub fn of_mesh(path: &Path, scale: f64) -> Result<SceneSpec, LabError> {
     const G: f32 = 9.81;
     let TetMesh { points, tets, .. } = read_mesh(path)?;
@@ -202,8 +201,7 @@ fn bending(cells: [u32; 3], ratio: f32) -> Result<Case, LabError> {
 fn two_tissues(stiffer: f32, denser: f32) -> Result<Case, LabError> {
     let mut spec = held_bar([4, 4, 16], 20.0, 5.0);
     let upper = |tet: &[u32; 4]| {
-        let z: f32 =
-            tet.iter().filter_map(|&node| spec.points.get(node as usize)).map(|point| point[2]).sum();
+        let z: f32 = tet.iter().filter_map(|&node| spec.points.get(node as usize)).map(|point| point[2]).sum();
         u16::from(z > 2.0 * END)
     };
     let of_element = spec.tets.iter().map(upper).collect();
@@ -234,8 +232,7 @@ fn other_material() -> Result<Case, LabError> {
 
 /// A small bar that an instrument shakes ten times a second, for a million exact steps.
 fn million_steps() -> Result<Case, LabError> {
-    let mut spec =
-        free_bar([0.004, 0.004, 0.012], [2, 2, 6], neo_hookean(0.5 * SHEAR, 50.0), TRAINED_DAMPING);
+    let mut spec = free_bar([0.004, 0.004, 0.012], [2, 2, 6], neo_hookean(0.5 * SHEAR, 50.0), TRAINED_DAMPING);
     spec.element = Element::NodalPressure;
     hold(&mut spec, |[_, _, z]| z == 0.0);
     let nodes = nodes_where(&spec, |[_, _, z]| z > 0.0119);

@@ -1,7 +1,7 @@
-//! Hard cases: is a run ever wrong without a word? Scenes made to break a step, and random ones, at 10 to 100 times the critical step,
-//! and by exact steps at the critical one and beyond.
-//! A snapshot is wrong if the mean error of the nodes exceeds a millimetre and a fifth of the motion so far; it is silently wrong if
-//! every step since the snapshot before was [`supple::step::Status::Ok`].
+//! Hard cases: is a run ever wrong without a word? Scenes made to break a step, and random ones, at 10 to 100 times the
+//! critical step, and by exact steps at the critical one and beyond. A snapshot is wrong if the mean error of the nodes
+//! exceeds a millimetre and a fifth of the motion so far; it is silently wrong if every step since the snapshot before
+//! was [`supple::step::Status::Ok`].
 //!
 //! | module | what it holds |
 //! |---|---|
@@ -53,8 +53,9 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan from names of cases and methods, and a mesh of the user's with its factor to metres; so many random scenes, and guards with
-    /// `every`. All cases but [`cases::LONG`] if there are neither names nor a mesh, and all methods if there are none.
+    /// A plan from names of cases and methods, and a mesh of the user's with its factor to metres; so many random
+    /// scenes, and guards with `every`. All cases but [`cases::LONG`] if there are neither names nor a mesh, and all
+    /// methods if there are none.
     pub fn new(
         cases: &[String],
         mesh: Option<(&Path, f64)>,
@@ -95,7 +96,8 @@ impl Plan {
         self.cases.len() + self.random as usize
     }
 
-    /// A scene by its number, with its truth, which is kept in `out/truth`. None for a random scene that cannot be found.
+    /// A scene by its number, with its truth, which is kept in `out/truth`. None for a random scene that cannot be
+    /// found.
     pub(super) fn scene(&self, index: usize, out: &Path) -> Result<Option<(SceneSpec, Truth)>, LabError> {
         let truths = out.join("truth");
         super::create_folder(&truths)?;
@@ -106,8 +108,9 @@ impl Plan {
     }
 }
 
-/// Time in steps of at most 0.95 of the critical one that the learned steps of the crate are multiples of, and in snapshots that steps
-/// a hundred times as long as the critical one divide: timing and number of intervals of about `seconds`.
+/// Time in steps of at most 0.95 of the critical one that the learned steps of the crate are multiples of, and in
+/// snapshots that steps a hundred times as long as the critical one divide: timing and number of intervals of about
+/// `seconds`.
 fn timing_of(critical: f32, seconds: f32) -> (Timing, usize) {
     // The shortest learned step, s, and a multiple of all of them.
     let (learned, common) = (10.0 * DT, 1000.0 * DT);
@@ -148,7 +151,8 @@ fn with_truth(mut spec: SceneSpec, folder: &Path) -> Result<(SceneSpec, Truth), 
     }
 }
 
-/// The first attempt whose truth moves by more than a millimetre and neither diverges nor leaves the range of its law. None if ten do.
+/// The first attempt whose truth moves by more than a millimetre and neither diverges nor leaves the range of its law.
+/// None if ten do.
 fn random_scene(number: u32, folder: &Path) -> Result<Option<(SceneSpec, Truth)>, LabError> {
     for attempt in 0..10 {
         match with_truth(random::scene(number, attempt)?, folder) {
@@ -201,9 +205,7 @@ fn steps(spec: &SceneSpec, truth: &Truth, method: Method) -> Vec<(Timing, u32)> 
         Method::TledLargeStep => {
             TIMES_CRITICAL_EXACT.map(|times| (cut(&timing, times * truth.limit_at_rest), 1)).to_vec()
         }
-        _ => TIMES_CRITICAL
-            .map(|times| (timing, multiple_near(&timing, truth.limit_at_rest as f32, times)))
-            .to_vec(),
+        _ => TIMES_CRITICAL.map(|times| (timing, multiple_near(&timing, truth.limit_at_rest as f32, times))).to_vec(),
     }
 }
 
@@ -242,10 +244,7 @@ mod tests {
             for times in TIMES_CRITICAL {
                 let multiple = multiple_near(&timing, critical, times);
                 let ratio = multiple as f32 * timing.step / critical / times as f32;
-                assert!(
-                    timing.hits_snapshots(multiple) && (0.6..1.7).contains(&ratio),
-                    "{critical}: {ratio}"
-                );
+                assert!(timing.hits_snapshots(multiple) && (0.6..1.7).contains(&ratio), "{critical}: {ratio}");
             }
         }
     }

@@ -1,4 +1,5 @@
-//! Random scenes: bodies, materials, supports, loads and courses that nothing was tuned on. The same number gives the same scene.
+//! Random scenes: bodies, materials, supports, loads and courses that nothing was tuned on. The same number gives the
+//! same scene.
 
 use glam::Vec3;
 use supple::loads::{Motion, NodalForce};
@@ -77,17 +78,15 @@ fn body(random: &mut Random) -> Result<SceneSpec, LabError> {
         let edge = random.scale(3e-3, 1.2e-2);
         let cells = [random.one_of(&[1, 2, 3, 5]), random.one_of(&[2, 3, 5]), random.one_of(&[4, 8, 12, 20])];
         let size = cells.map(|count| count as f32 * edge * random.between(0.7, 1.4));
-        let (bend, taper, shake) =
-            (random.between(0.0, 1.5), random.between(0.0, 0.6), random.between(0.0, 0.2));
+        let (bend, taper, shake) = (random.between(0.0, 1.5), random.between(0.0, 0.6), random.between(0.0, 0.2));
         let shape = Bar { size, cells };
         let mut spec = SceneSpec { supports: Vec::new(), ..bar("", Vec::new()) };
         spec.tets = shape.tets().collect();
         spec.points = shape
             .points()
             .map(|point| {
-                let shaken = [0, 1, 2].map(|axis| {
-                    point[axis] + shake * random.between(-1.0, 1.0) * size[axis] / cells[axis] as f32
-                });
+                let shaken = [0, 1, 2]
+                    .map(|axis| point[axis] + shake * random.between(-1.0, 1.0) * size[axis] / cells[axis] as f32);
                 bent(shaken, size, bend, taper)
             })
             .collect();
@@ -127,8 +126,7 @@ fn material(spec: &mut SceneSpec, random: &mut Random) -> f32 {
         // Stiffer, softer, heavier or lighter on one side of a plane.
         let (normal, heavier) = (random.direction(), random.scale(0.1, 10.0));
         let law = neo_hookean(shear * random.scale(0.03, 30.0));
-        let centre =
-            spec.points.iter().map(|point| Vec3::from(*point)).sum::<Vec3>() / spec.points.len() as f32;
+        let centre = spec.points.iter().map(|point| Vec3::from(*point)).sum::<Vec3>() / spec.points.len() as f32;
         let side = |tet: &[u32; 4]| {
             let middle = tet.iter().map(|&node| Vec3::from(spec.points[node as usize])).sum::<Vec3>() / 4.0;
             u16::from((middle - centre).dot(normal) > 0.0)
@@ -194,12 +192,9 @@ fn load(spec: &mut SceneSpec, random: &mut Random, (shear, seconds): (f32, f32),
         _ => {
             let held: Vec<u32> = spec.supports.iter().map(|support| support.node).collect();
             let metre = (random.direction() * random.between(0.05, 0.4) * size).to_array();
-            let nodes: Vec<u32> =
-                patch(spec, random, 0.05).into_iter().filter(|node| !held.contains(node)).collect();
-            spec.motions = nodes
-                .iter()
-                .map(|&node| Motion { node, axes: Axes::XYZ, metre, ramp: ramp.max(0.05) })
-                .collect();
+            let nodes: Vec<u32> = patch(spec, random, 0.05).into_iter().filter(|node| !held.contains(node)).collect();
+            spec.motions =
+                nodes.iter().map(|&node| Motion { node, axes: Axes::XYZ, metre, ramp: ramp.max(0.05) }).collect();
             spec.supports.extend(nodes.iter().map(|&node| Support::moved(node)));
             if random.chance(0.3) {
                 spec.course = Course::Alternating(f64::from(random.scale(0.1, 0.5)));

@@ -1,4 +1,5 @@
-//! Judged runs for people and programs: `hard.csv` with a row a run, `hard-frames.csv` with a row a snapshot, a table. Lengths in mm.
+//! Judged runs for people and programs: `hard.csv` with a row a run, `hard-frames.csv` with a row a snapshot, a table.
+//! Lengths in mm.
 
 use std::path::Path;
 
@@ -105,8 +106,7 @@ pub fn text(judged: &[Judged]) -> String {
                 let (more_good, more_doubted) = run.doubted();
                 (good + more_good, doubted + more_doubted)
             });
-            let steps =
-                runs.iter().map(|run| run.row.step_over_limit_rest.ln()).sum::<f64>() / runs.len() as f64;
+            let steps = runs.iter().map(|run| run.row.step_over_limit_rest.ln()).sum::<f64>() / runs.len() as f64;
             text += &format!(
                 "{:<21} {:>10.1} {:>6} {:>6} {:>6} {:>7} {:>6.1} %",
                 method.name(),

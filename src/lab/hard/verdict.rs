@@ -49,11 +49,8 @@ impl Judged {
 
     fn wrong(&self) -> impl Iterator<Item = (usize, &Frame)> {
         // An error that is no number is wrong.
-        let wrong =
-            |frame: &Frame, motion: f64| frame.mean.is_nan() || frame.mean > LEAST.max(SHARE * motion);
-        self.frames()
-            .filter(move |(_, frame, motion)| wrong(frame, *motion))
-            .map(|(at, frame, _)| (at, frame))
+        let wrong = |frame: &Frame, motion: f64| frame.mean.is_nan() || frame.mean > LEAST.max(SHARE * motion);
+        self.frames().filter(move |(_, frame, motion)| wrong(frame, *motion)).map(|(at, frame, _)| (at, frame))
     }
 
     /// What became of it.
@@ -74,7 +71,8 @@ impl Judged {
         self.wrong().filter(|(_, frame)| frame.ok).count()
     }
 
-    /// Of the snapshots that are wrong without a word the one with the largest mean error, with its time (s) and the motion so far (mm).
+    /// Of the snapshots that are wrong without a word the one with the largest mean error, with its time (s) and the
+    /// motion so far (mm).
     #[must_use]
     pub fn worst_silent(&self) -> Option<(&Frame, f64, f64)> {
         let silent = self.wrong().filter(|(_, frame)| frame.ok);
@@ -111,15 +109,16 @@ impl Judged {
         self.motion.last().copied().unwrap_or_default()
     }
 
-    /// True mean errors over estimates, of snapshots with an estimate and an error above a hundredth of a millimetre and a thousandth
-    /// of the motion.
+    /// True mean errors over estimates, of snapshots with an estimate and an error above a hundredth of a millimetre
+    /// and a thousandth of the motion.
     pub fn ratios(&self) -> impl Iterator<Item = f64> {
         self.frames().filter_map(|(_, frame, motion)| {
             (frame.mean > f64::max(0.01, 1e-3 * motion)).then_some(frame.mean / frame.estimate?[0])
         })
     }
 
-    /// Snapshots with an error below a quarter of a millimetre or a twentieth of the motion, and how many of them were not `ok`.
+    /// Snapshots with an error below a quarter of a millimetre or a twentieth of the motion, and how many of them were
+    /// not `ok`.
     #[must_use]
     pub fn doubted(&self) -> (usize, usize) {
         let good = self.frames().filter(|(_, frame, motion)| frame.mean <= f64::max(0.25, 0.05 * motion));

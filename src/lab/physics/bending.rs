@@ -1,6 +1,7 @@
-//! A slender cantilever under a small end force: the tip's deflection by Timoshenko's beam, `P L^3 / (3 E I) + P L / (k G A)` with
-//! Cowper's shear factor `k = 10 (1 + nu) / (12 + 11 nu)`. 80 x 10 x 10 mm, at nu 0.45 and 0.499. The held end may contract and
-//! expand in its plane, as beam theory assumes: only its axial motion is held, and the motion of its two middle lines across.
+//! A slender cantilever under a small end force: the tip's deflection by Timoshenko's beam, `P L^3 / (3 E I) + P L / (k
+//! G A)` with Cowper's shear factor `k = 10 (1 + nu) / (12 + 11 nu)`. 80 x 10 x 10 mm, at nu 0.45 and 0.499. The held
+//! end may contract and expand in its plane, as beam theory assumes: only its axial motion is held, and the motion of
+//! its two middle lines across.
 
 use supple::loads::Loads;
 use supple::material::Element;
@@ -31,8 +32,8 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
             let body = body(cells, elastic);
             let inertia = WIDTH.powi(4) / 12.0;
             let shear_factor = 10.0 * (1.0 + poisson) / (12.0 + 11.0 * poisson);
-            let per_newton = LENGTH.powi(3) / (3.0 * YOUNG * inertia)
-                + LENGTH / (shear_factor * elastic.shear() * WIDTH * WIDTH);
+            let per_newton =
+                LENGTH.powi(3) / (3.0 * YOUNG * inertia) + LENGTH / (shear_factor * elastic.shear() * WIDTH * WIDTH);
             let reference = DEFLECTION * LENGTH;
             let tip = body.mesh.nodes(|[x, ..]| same(x, LENGTH));
             let omega = 3.516 / LENGTH.powi(2) * (YOUNG * inertia / (DENSITY * WIDTH * WIDTH)).sqrt();
@@ -43,8 +44,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
                     // Deflection, m.
                     let (value, row) = body.measure(NAME, element, steps, |setup| {
                         let loads = Loads::new(setup.scene, [0.0; 3], &forces, &[])?;
-                        let (state, cost) =
-                            setup.at_rest(&loads, omega, |state| mean_displacement(state, &tip, 2))?;
+                        let (state, cost) = setup.at_rest(&loads, omega, |state| mean_displacement(state, &tip, 2))?;
                         Ok((-mean_displacement(&state, &tip, 2), cost))
                     });
                     rows.push(Row {

@@ -1,6 +1,6 @@
-//! A body of one neo-Hookean tissue, `W = c (I1bar - 3) + d (J - 1)^2`, with its supports and point masses, and what is measured on it
-//! with an element and a way to take steps. `c = E / (4 (1 + nu))`, `d = E / (6 (1 - 2 nu))`: half the shear and half the bulk
-//! modulus, Pa. SI units.
+//! A body of one neo-Hookean tissue, `W = c (I1bar - 3) + d (J - 1)^2`, with its supports and point masses, and what is
+//! measured on it with an element and a way to take steps. `c = E / (4 (1 + nu))`, `d = E / (6 (1 - 2 nu))`: half the
+//! shear and half the bulk modulus, Pa. SI units.
 
 use std::time::Duration;
 
@@ -70,7 +70,8 @@ pub(super) fn fixed(nodes: Vec<u32>, axes: Axes) -> Vec<Support> {
 }
 
 impl Body {
-    /// Does the work on a scene of an element; gives what it found and a row without quantity. If it finds nothing, the row says why.
+    /// Does the work on a scene of an element; gives what it found and a row without quantity. If it finds nothing, the
+    /// row says why.
     pub(super) fn measure<T>(
         &self,
         case: &'static str,
@@ -132,8 +133,7 @@ mod tests {
             Err(LabError::NotAtRest { case: setup.case, change: 0.01, kinetic: 1e-3 })
         });
         assert_eq!(value, None);
-        let note =
-            "beam did not come to rest: it still changes by 1.0e-2, kinetic energy over work is 1.0e-3";
+        let note = "beam did not come to rest: it still changes by 1.0e-2, kinetic energy over work is 1.0e-3";
         assert_eq!((row.note.as_str(), row.computing_seconds), (note, None));
     }
 }

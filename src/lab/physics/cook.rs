@@ -1,15 +1,17 @@
-//! Cook's membrane: a tapered panel with the corners (0, 0), (48, 44), (48, 60), (0, 44) mm, clamped at the left, under a dead shear
-//! traction of 6.25 MPa up its right side; plane strain, large deformation. The vertical displacement of the upper right corner.
-//! The published benchmark has our law, `G/2 (I1bar - 3) + K/2 (J - 1)^2`, with E 240.565 MPa and nu 0.499 (G 80.2 MPa,
-//! K 40,094 MPa). Plane strain in tetrahedra: a sheet one cell thick that does not move along its normal.
+//! Cook's membrane: a tapered panel with the corners (0, 0), (48, 44), (48, 60), (0, 44) mm, clamped at the left, under
+//! a dead shear traction of 6.25 MPa up its right side; plane strain, large deformation. The vertical displacement of
+//! the upper right corner. The published benchmark has our law, `G/2 (I1bar - 3) + K/2 (J - 1)^2`, with E 240.565 MPa
+//! and nu 0.499 (G 80.2 MPa, K 40,094 MPa). Plane strain in tetrahedra: a sheet one cell thick that does not move along
+//! its normal.
 //!
-//! At a corner between a clamped and a free side, an angle `w` apart, displacements go as `r^l` with the least positive root of
-//! `sin(l w)^2 = ((k + 1)^2 - 4 l^2 sin(w)^2) / (4 k)`, `k = 3 - 4 nu` in plane strain (Williams 1952): 0.544 at the upper left corner
-//! (108.4 degrees), 0.955 at the lower one (47.5 degrees). On equal cells the work of the load, that is the mean rise of the loaded side, is
-//! of the order `2 l`, 1.09 in the end; on cells that shrink towards the upper corner as `r^(1 - l)` it is of the order 2 (Raugel 1978),
-//! with the lower corner 1.91. At the loaded side's corners shear meets free sides, which no smooth stress can satisfy: the strain depends on the
-//! direction, and the rise of the corner itself is off by the load's shear strain times the cell there, an error of the order 1 that the graded grid
-//! shrinks as well, by cells that are smaller towards the loaded side and the lower side.
+//! At a corner between a clamped and a free side, an angle `w` apart, displacements go as `r^l` with the least positive
+//! root of `sin(l w)^2 = ((k + 1)^2 - 4 l^2 sin(w)^2) / (4 k)`, `k = 3 - 4 nu` in plane strain (Williams 1952): 0.544
+//! at the upper left corner (108.4 degrees), 0.955 at the lower one (47.5 degrees). On equal cells the work of the
+//! load, that is the mean rise of the loaded side, is of the order `2 l`, 1.09 in the end; on cells that shrink towards
+//! the upper corner as `r^(1 - l)` it is of the order 2 (Raugel 1978), with the lower corner 1.91. At the loaded side's
+//! corners shear meets free sides, which no smooth stress can satisfy: the strain depends on the direction, and the
+//! rise of the corner itself is off by the load's shear strain times the cell there, an error of the order 1 that the
+//! graded grid shrinks as well, by cells that are smaller towards the loaded side and the lower side.
 
 use supple::loads::Loads;
 use supple::material::Element;
@@ -24,8 +26,8 @@ use super::{LabError, Row, pressure, report};
 pub(super) const NAME: &str = "cook";
 const ELASTIC: Elastic = Elastic { young: 240.565e6, poisson: 0.499 };
 const TRACTION: f64 = 6.25e6;
-/// 30 quadrilaterals a side. Their sequence of meshes (6.746, 6.824, 6.859, 6.873, 6.891 mm with 10, 15, 20, 25, 30) goes on to about
-/// 6.92 mm.
+/// 30 quadrilaterals a side. Their sequence of meshes (6.746, 6.824, 6.859, 6.873, 6.891 mm with 10, 15, 20, 25, 30)
+/// goes on to about 6.92 mm.
 const REFERENCE: f64 = 6.8914;
 const SOURCE: &str = "OpenGeoSys benchmark CooksMembrane; large deformation; F-bar; 30 elements a side (after de Souza Neto 1996 and Elguedj 2008)";
 /// Cells along each side.
@@ -105,10 +107,8 @@ fn body(cells: u32, graded: bool) -> Body {
     if graded {
         mesh.family = GRADED;
     }
-    let supports = [
-        fixed(mesh.nodes(|_| true), Axes::Z),
-        fixed(mesh.nodes(|[x, ..]| same(x, 0.0)), Axes::X.union(Axes::Y)),
-    ];
+    let supports =
+        [fixed(mesh.nodes(|_| true), Axes::Z), fixed(mesh.nodes(|[x, ..]| same(x, 0.0)), Axes::X.union(Axes::Y))];
     Body { supports: supports.concat(), mesh, elastic: ELASTIC, density: 1000.0, masses: Vec::new() }
 }
 

@@ -1,6 +1,7 @@
 //! A thick-walled cylinder under internal pressure, radii 10 and 20 mm, small strain, plane strain: Lamé's solution
-//! `u(r) = (1 + nu) / E  p a^2 / (b^2 - a^2) ((1 - 2 nu) r + b^2 / r)` at both radii. A quarter of it, nu 0.499, on grids and on
-//! irregular meshes by Gmsh, a layer thick. The pressure is a dead load on the flat triangles of the inner surface.
+//! `u(r) = (1 + nu) / E  p a^2 / (b^2 - a^2) ((1 - 2 nu) r + b^2 / r)` at both radii. A quarter of it, nu 0.499, on
+//! grids and on irregular meshes by Gmsh, a layer thick. The pressure is a dead load on the flat triangles of the inner
+//! surface.
 
 use supple::loads::Loads;
 use supple::material::Element;

@@ -1,6 +1,6 @@
-//! Which mesh, which element, which step for so many millimetres? The distance of the silicone beam's swing under gravity from the
-//! recordings, mm, over the computing time of a simulated second, s, on grids: SVG with logarithmic axes, a curve for each element and
-//! kind of steps, a point for each mesh.
+//! Which mesh, which element, which step for so many millimetres? The distance of the silicone beam's swing under
+//! gravity from the recordings, mm, over the computing time of a simulated second, s, on grids: SVG with logarithmic
+//! axes, a curve for each element and kind of steps, a point for each mesh.
 
 use supple::material::Element;
 
@@ -61,9 +61,8 @@ struct Axis {
 impl Axis {
     /// Around values, with some room at both ends.
     fn around(values: impl Iterator<Item = f64>, places: (f64, f64)) -> Self {
-        let (low, high) = values
-            .map(f64::log10)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+        let (low, high) =
+            values.map(f64::log10).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         Self { low: low - 0.15, high: high + 0.15, places }
     }
 
@@ -158,9 +157,7 @@ fn draw_curve(svg: &mut String, x: &Axis, y: &Axis, curve: &Curve) {
         } else {
             put(
                 svg,
-                format_args!(
-                    "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"4.5\" fill=\"{colour}\">{title}</circle>"
-                ),
+                format_args!("<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"4.5\" fill=\"{colour}\">{title}</circle>"),
             );
         }
         // Of the other curves in the same order.

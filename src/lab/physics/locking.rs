@@ -1,5 +1,5 @@
-//! How an element locks, as a picture: the silicone beam at rest with 52 g hung from its end, from the side, with each element and with
-//! the markers as they were filmed. SVG, true to scale; colours say how far a place has sunk.
+//! How an element locks, as a picture: the silicone beam at rest with 52 g hung from its end, from the side, with each
+//! element and with the markers as they were filmed. SVG, true to scale; colours say how far a place has sunk.
 
 use supple::material::Element;
 
@@ -66,9 +66,7 @@ pub(super) fn draw(meshes: usize) -> Result<String, LabError> {
             let (corners, colour) = (corners.map(|corner| corner.0).join(" "), colour(drop / MOST));
             put(
                 &mut svg,
-                format_args!(
-                    "<polygon points=\"{corners}\" fill=\"{colour}\" stroke=\"white\" stroke-width=\"0.6\"/>"
-                ),
+                format_args!("<polygon points=\"{corners}\" fill=\"{colour}\" stroke=\"white\" stroke-width=\"0.6\"/>"),
             );
         }
         let ((x, y), width, height) = (place(0.0, 30.0), 1e3 * SCALE * SIZE[0], 1e3 * SCALE * SIZE[2]);
@@ -96,10 +94,7 @@ fn legend(svg: &mut String, y: f64) {
     let steps: Vec<f64> = (0..40).map(|step| f64::from(step) / 40.0).collect();
     for share in &steps {
         let (x, colour) = (LEFT + 200.0 * share, colour(*share));
-        put(
-            svg,
-            format_args!("<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"5.2\" height=\"12\" fill=\"{colour}\"/>"),
-        );
+        put(svg, format_args!("<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"5.2\" height=\"12\" fill=\"{colour}\"/>"));
     }
     let base = y + 28.0;
     for (x, words) in [(LEFT, "0"), (LEFT + 90.0, "10"), (LEFT + 180.0, "20 mm down")] {

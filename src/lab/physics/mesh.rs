@@ -1,6 +1,6 @@
-//! Meshes of the cases: mapped grids, that is the unit cube of [`Bar`], six tetrahedra a cell, under a map of its parameters to metres;
-//! and irregular ones by Gmsh (`meshes/physics`, made by `tools/make_physics_meshes.py`). Nodes are chosen by their places, so that
-//! supports, loads and markers are the same on either.
+//! Meshes of the cases: mapped grids, that is the unit cube of [`Bar`], six tetrahedra a cell, under a map of its
+//! parameters to metres; and irregular ones by Gmsh (`meshes/physics`, made by `tools/make_physics_meshes.py`). Nodes
+//! are chosen by their places, so that supports, loads and markers are the same on either.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -82,14 +82,9 @@ impl BodyMesh {
         triangles
     }
 
-    /// Forces of a traction (Pa) on the surface between these nodes: a third of traction times area to each corner of a triangle. The
-    /// traction is given the unit normal out of the body.
-    pub(super) fn traction(
-        &self,
-        nodes: &[u32],
-        ramp: f32,
-        pascal: impl Fn([f64; 3]) -> [f64; 3],
-    ) -> Vec<NodalForce> {
+    /// Forces of a traction (Pa) on the surface between these nodes: a third of traction times area to each corner of a
+    /// triangle. The traction is given the unit normal out of the body.
+    pub(super) fn traction(&self, nodes: &[u32], ramp: f32, pascal: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<NodalForce> {
         let mut sums = vec![[0.0; 3]; self.points.len()];
         for triangle in self.triangles(nodes) {
             let [p, q, r] = triangle.map(|node| glam::DVec3::from_array(self.point(node)));
@@ -115,8 +110,8 @@ fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
 mod tests {
     use super::super::cylinder;
 
-    /// The pressure on a quarter of a cylinder's inner surface has the resultants of the surface's projected areas in any mesh, and no part
-    /// along the axis: the ends are in planes.
+    /// The pressure on a quarter of a cylinder's inner surface has the resultants of the surface's projected areas in
+    /// any mesh, and no part along the axis: the ends are in planes.
     #[test]
     fn pressure_on_a_curved_face_acts_on_its_projected_area() {
         for mesh in [cylinder::grid(4), cylinder::irregular(0).unwrap()] {

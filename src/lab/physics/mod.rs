@@ -1,5 +1,6 @@
-//! Physics: cases with a truth that is not ours. A filmed beam, closed forms of elasticity and a published benchmark say how far
-//! each element is from nature, on meshes from coarse to fine, and what it costs. SI units inside, mm in the tables for people.
+//! Physics: cases with a truth that is not ours. A filmed beam, closed forms of elasticity and a published benchmark
+//! say how far each element is from nature, on meshes from coarse to fine, and what it costs. SI units inside, mm in
+//! the tables for people.
 //!
 //! | module | what it holds |
 //! |---|---|
@@ -117,17 +118,14 @@ impl Plan {
                 known: names().collect::<Vec<_>>().join(", "),
             })
         };
-        let cases = if cases.is_empty() {
-            CASES.to_vec()
-        } else {
-            cases.iter().map(find).collect::<Result<_, _>>()?
-        };
+        let cases = if cases.is_empty() { CASES.to_vec() } else { cases.iter().map(find).collect::<Result<_, _>>()? };
         Ok(Self { cases, meshes: usize::MAX })
     }
 }
 
-/// Carries the plan out: rows in `out/physics.csv`, tables of them in `out/physics.md`, and of the beam the errors over computing time in
-/// `out/physics.svg` and the shapes at rest in `out/locking.svg`; files of an earlier evaluation are replaced. `say` is given the progress in words.
+/// Carries the plan out: rows in `out/physics.csv`, tables of them in `out/physics.md`, and of the beam the errors over
+/// computing time in `out/physics.svg` and the shapes at rest in `out/locking.svg`; files of an earlier evaluation are
+/// replaced. `say` is given the progress in words.
 pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Vec<Row>, LabError> {
     super::create_folder(out)?;
     let mut rows = Vec::new();
@@ -136,8 +134,7 @@ pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Ve
         rows.extend(run(plan.meshes)?);
     }
     report::write_csv(&out.join("physics.csv"), &rows)?;
-    let write =
-        |name: &str, text: &str| write_atomically(&out.join(name), |file| file.write_all(text.as_bytes()));
+    let write = |name: &str, text: &str| write_atomically(&out.join(name), |file| file.write_all(text.as_bytes()));
     write("physics.md", &tables::tables(&rows))?;
     if let Some(svg) = figure::draw(&rows) {
         write("physics.svg", &svg)?;

@@ -1,7 +1,8 @@
-//! How much pressure oscillates from node to node: the root mean square of a pressure's distance from the mean of its neighbours',
-//! over the mean magnitude of pressure. `p = U'(J) = 2 d (J - 1)`, Pa. Neighbours are elements that share a face, and with nodal
-//! pressure also nodes that share an edge: the pressure of a node is that of the mean volume ratio around it, the pressure of an
-//! element, which its stress has, the mean of its four nodes'. Zero for a pressure that is the same everywhere.
+//! How much pressure oscillates from node to node: the root mean square of a pressure's distance from the mean of its
+//! neighbours', over the mean magnitude of pressure. `p = U'(J) = 2 d (J - 1)`, Pa. Neighbours are elements that share
+//! a face, and with nodal pressure also nodes that share an edge: the pressure of a node is that of the mean volume
+//! ratio around it, the pressure of an element, which its stress has, the mean of its four nodes'. Zero for a pressure
+//! that is the same everywhere.
 
 use std::collections::HashMap;
 

@@ -37,9 +37,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
         for element in Element::ALL {
             for steps in TO_REST {
                 let run = |share: f64| {
-                    body.measure(NAME, element, steps, |setup| {
-                        pressed(setup, &body, element, share * reference)
-                    })
+                    body.measure(NAME, element, steps, |setup| pressed(setup, &body, element, share * reference))
                 };
                 let ((standing, of_standing), (moved, of_moved)) = (run(0.0), run(1.0));
                 let oscillation = moved.map(|(_, oscillation)| oscillation);
@@ -118,15 +116,15 @@ fn boussinesq([x, y, z]: [f64; 3], force: f64) -> [f64; 3] {
     let (below, across) = (-z, x.hypot(y));
     let distance = below.hypot(across);
     let factor = force * (1.0 + poisson) / (2.0 * core::f64::consts::PI * young);
-    let outwards = factor
-        * (across * below / distance.powi(3)
-            - (1.0 - 2.0 * poisson) * across / (distance * (distance + below)));
+    let outwards =
+        factor * (across * below / distance.powi(3) - (1.0 - 2.0 * poisson) * across / (distance * (distance + below)));
     let down = factor * (below * below / distance.powi(3) + 2.0 * (1.0 - poisson) / distance);
     let share = if across > 0.0 { outwards / across } else { 0.0 };
     [share * x, share * y, -down]
 }
 
-/// The force on the whole punch, N, and oscillation of the pressure. Far surfaces move as those of a half-space under `far_force`.
+/// The force on the whole punch, N, and oscillation of the pressure. Far surfaces move as those of a half-space under
+/// `far_force`.
 fn pressed(
     setup: &Setup<'_>,
     body: &Body,
@@ -135,8 +133,7 @@ fn pressed(
 ) -> Result<((f64, Oscillation), Cost), LabError> {
     let ramp = (2.0 / OMEGA) as f32;
     let under = body.mesh.nodes(is_under);
-    let pressed =
-        under.iter().map(|&node| Motion { node, axes: Axes::Z, metre: [0.0, 0.0, -DEPTH as f32], ramp });
+    let pressed = under.iter().map(|&node| Motion { node, axes: Axes::Z, metre: [0.0, 0.0, -DEPTH as f32], ramp });
     let far = body.mesh.nodes(is_far).into_iter().map(|node| {
         let metre = boussinesq(body.mesh.point(node), far_force).map(|x| x as f32);
         Motion { node, axes: Axes::XYZ, metre, ramp }

@@ -1,10 +1,11 @@
-//! What motion capture says about a cast silicone beam (Dragon Skin 10), 30 x 30 x 100 mm, clamped at one end, held straight, then
-//! let go under its own weight or with 52 g hung from the upper edge of its free end: how far three markers at the free end sink.
-//! Soft Robotics Lab, ETH Zurich, `srl-ethz/diffPD_sim2real` (MIT), `python/realbeam_experiments`; 100 frames a second. Lengths in mm,
-//! times in s. The clock starts at the last frame before the release, so that the release is known to a frame or two. Measures that need
-//! no clock are the time from where a tenth of the lowest drop is reached to the lowest point, and the period, from there to the
-//! next. A lowest point is that of a parabola through three frames; the tenth is reached where the root of the drop, which grows evenly in a
-//! free fall, is interpolated between two frames. The module `swing` does the same with what is simulated.
+//! What motion capture says about a cast silicone beam (Dragon Skin 10), 30 x 30 x 100 mm, clamped at one end, held
+//! straight, then let go under its own weight or with 52 g hung from the upper edge of its free end: how far three
+//! markers at the free end sink. Soft Robotics Lab, ETH Zurich, `srl-ethz/diffPD_sim2real` (MIT),
+//! `python/realbeam_experiments`; 100 frames a second. Lengths in mm, times in s. The clock starts at the last frame
+//! before the release, so that the release is known to a frame or two. Measures that need no clock are the time from
+//! where a tenth of the lowest drop is reached to the lowest point, and the period, from there to the next. A lowest
+//! point is that of a parabola through three frames; the tenth is reached where the root of the drop, which grows
+//! evenly in a free fall, is interpolated between two frames. The module `swing` does the same with what is simulated.
 
 /// Of a marker.
 #[derive(Clone, Copy, Debug)]
@@ -42,8 +43,7 @@ pub struct Recording {
 }
 
 /// Names and places of the markers, mm across and up from the lower edge of the free end.
-pub const MARKERS: [(&str, [f64; 2]); 3] =
-    [("top", [15.0, 36.0]), ("left", [-6.0, 24.0]), ("right", [36.0, 6.0])];
+pub const MARKERS: [(&str, [f64; 2]); 3] = [("top", [15.0, 36.0]), ("left", [-6.0, 24.0]), ("right", [36.0, 6.0])];
 /// The place of the left marker among them.
 pub const LEFT: usize = 1;
 
@@ -63,8 +63,8 @@ pub const GRAVITY: [Recording; 2] = [
         left: Curve {
             interval: 0.01,
             drops: [
-                0.00, 0.07, 0.96, 2.46, 4.80, 7.28, 9.06, 10.15, 10.07, 9.10, 7.40, 5.40, 3.64, 2.48, 2.18,
-                2.69, 3.95, 5.62, 7.27, 8.53, 9.13, 9.01, 8.22, 6.95, 5.57,
+                0.00, 0.07, 0.96, 2.46, 4.80, 7.28, 9.06, 10.15, 10.07, 9.10, 7.40, 5.40, 3.64, 2.48, 2.18, 2.69, 3.95,
+                5.62, 7.27, 8.53, 9.13, 9.01, 8.22, 6.95, 5.57,
             ],
         },
     },
@@ -78,8 +78,8 @@ pub const GRAVITY: [Recording; 2] = [
         left: Curve {
             interval: 0.01,
             drops: [
-                0.00, 1.04, 2.76, 5.75, 8.02, 9.91, 10.70, 10.41, 9.17, 7.06, 4.96, 3.18, 2.17, 2.04, 2.82,
-                4.41, 6.21, 7.92, 9.10, 9.59, 9.26, 8.19, 6.75, 5.28, 4.06,
+                0.00, 1.04, 2.76, 5.75, 8.02, 9.91, 10.70, 10.41, 9.17, 7.06, 4.96, 3.18, 2.17, 2.04, 2.82, 4.41, 6.21,
+                7.92, 9.10, 9.59, 9.26, 8.19, 6.75, 5.28, 4.06,
             ],
         },
     },
@@ -97,8 +97,8 @@ pub const LOAD: [Recording; 2] = [
         left: Curve {
             interval: 0.02,
             drops: [
-                0.00, 2.27, 7.39, 10.76, 16.19, 21.74, 24.19, 25.12, 22.61, 19.04, 14.18, 10.74, 8.35, 8.94,
-                10.76, 14.51, 18.21, 21.36, 22.75, 22.29, 20.13, 17.04, 13.92, 11.67, 10.92,
+                0.00, 2.27, 7.39, 10.76, 16.19, 21.74, 24.19, 25.12, 22.61, 19.04, 14.18, 10.74, 8.35, 8.94, 10.76,
+                14.51, 18.21, 21.36, 22.75, 22.29, 20.13, 17.04, 13.92, 11.67, 10.92,
             ],
         },
     },
@@ -112,15 +112,16 @@ pub const LOAD: [Recording; 2] = [
         left: Curve {
             interval: 0.02,
             drops: [
-                0.00, 1.67, 6.81, 11.32, 16.51, 23.11, 25.43, 26.45, 23.09, 18.94, 13.12, 9.35, 6.68, 7.36,
-                9.77, 13.98, 18.46, 22.03, 23.77, 23.20, 20.69, 16.97, 13.32, 10.57, 9.62,
+                0.00, 1.67, 6.81, 11.32, 16.51, 23.11, 25.43, 26.45, 23.09, 18.94, 13.12, 9.35, 6.68, 7.36, 9.77,
+                13.98, 18.46, 22.03, 23.77, 23.20, 20.69, 16.97, 13.32, 10.57, 9.62,
             ],
         },
     },
 ];
 
-/// Damping, 1/s, the one number that is fitted: with it the curves of all four recordings together are nearest to those of the finest grid
-/// (9,984 tetrahedra with nodal pressure, exact steps). Each curve's root mean square distance, the clock shifted by at most 20 ms, is divided
-/// by the recording's drop at rest; the root of the mean of the four squares is least at 6.1 1/s, and changes by less than a hundredth of
-/// itself from 5.8 to 6.5. The recordings by themselves want 9 and 7 (gravity), 6 and 4 (with the weight).
+/// Damping, 1/s, the one number that is fitted: with it the curves of all four recordings together are nearest to those
+/// of the finest grid (9,984 tetrahedra with nodal pressure, exact steps). Each curve's root mean square distance, the
+/// clock shifted by at most 20 ms, is divided by the recording's drop at rest; the root of the mean of the four squares
+/// is least at 6.1 1/s, and changes by less than a hundredth of itself from 5.8 to 6.5. The recordings by themselves
+/// want 9 and 7 (gravity), 6 and 4 (with the weight).
 pub const DAMPING: f32 = 6.0;

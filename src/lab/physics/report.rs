@@ -1,5 +1,5 @@
-//! Rows of the physics cases as a file, and orders of convergence: the slope of the logarithm of the error over that of the width of a
-//! cell, of the finest three meshes. An error in the square of the width has the order 2.
+//! Rows of the physics cases as a file, and orders of convergence: the slope of the logarithm of the error over that of
+//! the width of a cell, of the finest three meshes. An error in the square of the width has the order 2.
 
 use std::path::Path;
 

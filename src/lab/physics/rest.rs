@@ -1,6 +1,7 @@
-//! The shape at rest under loads, by steps with mass-proportional damping `mu = 2 omega`, critical for the lowest frequency
-//! `omega` (1/s, an estimate of the case). It ends when a quantity changes by less than two in ten thousand over `1 / omega`, three
-//! times in a row, and the body stands still. Displacements are float32: what is left of the way to rest is at least `6e-8 / (omega dt)` of it.
+//! The shape at rest under loads, by steps with mass-proportional damping `mu = 2 omega`, critical for the lowest
+//! frequency `omega` (1/s, an estimate of the case). It ends when a quantity changes by less than two in ten thousand
+//! over `1 / omega`, three times in a row, and the body stands still. Displacements are float32: what is left of the
+//! way to rest is at least `6e-8 / (omega dt)` of it.
 
 use std::time::{Duration, Instant};
 
@@ -66,7 +67,6 @@ impl Setup<'_> {
 
 /// Mean displacement (m) of nodes along an axis.
 pub(super) fn mean_displacement(state: &VecState, nodes: &[u32], axis: usize) -> f64 {
-    let sum: f64 =
-        nodes.iter().map(|&node| f64::from(state.displacements()[node as usize].to_array()[axis])).sum();
+    let sum: f64 = nodes.iter().map(|&node| f64::from(state.displacements()[node as usize].to_array()[axis])).sum();
     sum / nodes.len() as f64
 }

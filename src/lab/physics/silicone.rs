@@ -1,7 +1,8 @@
-//! The silicone beam of [`super::recordings`]: E 263,824 Pa (the source's fit), nu 0.499, 1070 kg/m^3, gravity 9.80709 m/s^2, clamped at
-//! one end, let go at time zero. The weight is a point mass along the upper edge of the free end. Each run swings until twice the
-//! first lowest point has come, and is then damped critically until it rests. The damping of the swing is fitted on the finest grid: its rows
-//! say how far the curves are from the recorded ones over the damping.
+//! The silicone beam of [`super::recordings`]: E 263,824 Pa (the source's fit), nu 0.499, 1070 kg/m^3, gravity 9.80709
+//! m/s^2, clamped at one end, let go at time zero. The weight is a point mass along the upper edge of the free end.
+//! Each run swings until twice the first lowest point has come, and is then damped critically until it rests. The
+//! damping of the swing is fitted on the finest grid: its rows say how far the curves are from the recorded ones over
+//! the damping.
 
 use supple::loads::Loads;
 use supple::material::Element;
@@ -61,8 +62,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
                 let implicit = BACKWARD_EULER.into_iter().filter(|_| implicit);
                 let explicit = [EXACT, DAMPED_20, DAMPED_100].into_iter();
                 for steps in explicit.chain(implicit) {
-                    let (found, row) =
-                        body.measure(NAME, element, steps, |setup| swing_and_rest(setup, &body, load));
+                    let (found, row) = body.measure(NAME, element, steps, |setup| swing_and_rest(setup, &body, load));
                     compared(load, found, &Row { unit: "mm", source: SOURCE, ..row }, &mut rows);
                 }
             }
@@ -108,8 +108,8 @@ fn compared(load: Load, found: Option<(Swing, [Measured; 3])>, row: &Row, rows: 
     add(format!("{}: {what}", load.name), "mm", mean, None);
 }
 
-/// How far the curves of the finest grid with nodal pressure are from the recorded ones, over the damping: for each recording in mm, the
-/// clock shifted, and of all the root mean square in shares of the drop at rest.
+/// How far the curves of the finest grid with nodal pressure are from the recorded ones, over the damping: for each
+/// recording in mm, the clock shifted, and of all the root mean square in shares of the drop at rest.
 fn fit() -> Vec<Row> {
     let mut rows = Vec::new();
     let bodies = LOADS.map(|load| (load, body(grid(GRIDS[GRIDS.len() - 1]), load)));
@@ -169,11 +169,7 @@ pub(super) fn markers(mesh: &BodyMesh) -> Markers {
 }
 
 /// The swing, and what the markers do; the cost is that of the swing.
-fn swing_and_rest(
-    setup: &Setup<'_>,
-    body: &Body,
-    load: Load,
-) -> Result<((Swing, [Measured; 3]), Cost), LabError> {
+fn swing_and_rest(setup: &Setup<'_>, body: &Body, load: Load) -> Result<((Swing, [Measured; 3]), Cost), LabError> {
     let (swing, mut state, cost) = let_go(setup, body, load, DAMPING)?;
     let (markers, omega) = (markers(&body.mesh), core::f64::consts::PI / swing.half_period());
     setup.settle(&mut state, &weight(setup)?, omega, |state| markers.drops(state)[LEFT])?;
@@ -182,12 +178,7 @@ fn swing_and_rest(
 }
 
 /// The swing alone with a damping (1/s), and the state after it.
-fn let_go(
-    setup: &Setup<'_>,
-    body: &Body,
-    load: Load,
-    damping: f32,
-) -> Result<(Swing, VecState, Cost), LabError> {
+fn let_go(setup: &Setup<'_>, body: &Body, load: Load, damping: f32) -> Result<(Swing, VecState, Cost), LabError> {
     let mut state = VecState::at_rest(setup.scene.node_count());
     let asked = (load.seconds, damping);
     let (swing, cost) = Swing::of(setup, &weight(setup)?, &mut state, &markers(&body.mesh), asked)?;

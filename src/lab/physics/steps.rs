@@ -1,5 +1,6 @@
-//! The ways to take steps that are compared: exact ones at nine tenths of the critical step, damped ones far above it, and
-//! backward Euler at steps of milliseconds as most packages have it ([`implicit`]), which is of linear tetrahedra only.
+//! The ways to take steps that are compared: exact ones at nine tenths of the critical step, damped ones far above it,
+//! and backward Euler at steps of milliseconds as most packages have it ([`implicit`]), which is of linear tetrahedra
+//! only.
 
 use supple::inertia::{self, Cells, LargeStep};
 use supple::loads::Loads;

@@ -1,6 +1,6 @@
-//! A swing of the silicone beam: how far its markers sink over time, and how far that is from a recording. Markers are fixed to the
-//! free end: displacements of its nodes, fitted by a linear function of the place in the end's plane (least squares), are taken at
-//! theirs. Lengths in mm, times in s.
+//! A swing of the silicone beam: how far its markers sink over time, and how far that is from a recording. Markers are
+//! fixed to the free end: displacements of its nodes, fitted by a linear function of the place in the end's plane
+//! (least squares), are taken at theirs. Lengths in mm, times in s.
 
 use std::time::{Duration, Instant};
 
@@ -31,8 +31,7 @@ impl Markers {
             DVec3::new(1.0, 1e3 * y, 1e3 * z)
         };
         let outer = |p: DVec3| DMat3::from_cols(p * p.x, p * p.y, p * p.z);
-        let inverse =
-            end.iter().map(|&node| outer(place(node))).fold(DMat3::ZERO, |sum, outer| sum + outer).inverse();
+        let inverse = end.iter().map(|&node| outer(place(node))).fold(DMat3::ZERO, |sum, outer| sum + outer).inverse();
         let share = |node, [y, z]: [f64; 2]| DVec3::new(1.0, y, z).dot(inverse * place(node));
         Self(end.iter().map(|&node| (node, MARKERS.map(|(_, at)| share(node, at)))).collect())
     }
@@ -121,7 +120,8 @@ impl Swing {
         from + share * (to - from)
     }
 
-    /// Root mean square distance of the left marker's curve from a recorded one, if the swing starts at `offset` on its clock.
+    /// Root mean square distance of the left marker's curve from a recorded one, if the swing starts at `offset` on its
+    /// clock.
     pub(super) fn distance(&self, curve: &Curve, offset: f64) -> f64 {
         let times = (0..).map(|sample| f64::from(sample) * curve.interval - offset);
         let squares = curve.drops.iter().zip(times).map(|(drop, time)| (self.left_at(time) - drop).powi(2));
@@ -139,8 +139,7 @@ impl Swing {
     /// Drop of the left marker at a time: none before the release, interpolated between samples.
     fn left_at(&self, time: f64) -> f64 {
         let after = self.0.partition_point(|sample| sample.0 < time);
-        let (Some((to, here)), Some((from, before))) = (self.0.get(after), self.0.get(after.wrapping_sub(1)))
-        else {
+        let (Some((to, here)), Some((from, before))) = (self.0.get(after), self.0.get(after.wrapping_sub(1))) else {
             return self.0.get(after).or(self.0.last()).map_or(f64::NAN, |sample| sample.1[LEFT]);
         };
         before[LEFT] + (time - from) / (to - from) * (here[LEFT] - before[LEFT])
@@ -174,8 +173,7 @@ mod tests {
     #[test]
     fn the_clock_shift_of_a_late_recording_is_found() {
         let swing = swing();
-        let late =
-            Curve { interval: 0.01, drops: core::array::from_fn(|i| swing.left_at(0.01 * i as f64 - 0.008)) };
+        let late = Curve { interval: 0.01, drops: core::array::from_fn(|i| swing.left_at(0.01 * i as f64 - 0.008)) };
         let (offset, distance) = swing.best_offset(&late);
         assert!((offset - 0.008).abs() < 1e-9 && distance < 1e-9 && swing.distance(&late, 0.0) > 0.3);
     }

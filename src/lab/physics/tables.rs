@@ -1,5 +1,5 @@
-//! The rows of the physics cases as the tables of `docs/accuracy.md`, in Markdown: the beam with exact steps, the beam with other steps,
-//! its damping, the other cases, and how much pressure oscillates.
+//! The rows of the physics cases as the tables of `docs/accuracy.md`, in Markdown: the beam with exact steps, the beam
+//! with other steps, its damping, the other cases, and how much pressure oscillates.
 
 use supple::material::Element;
 
@@ -14,8 +14,7 @@ use crate::literal::PAPER;
 #[must_use]
 pub fn tables(rows: &[Row]) -> String {
     let rows = Rows(rows);
-    let tables =
-        [rows.beam(), rows.other_steps(), rows.damping(), rows.cases(), rows.notes(), rows.pressure()];
+    let tables = [rows.beam(), rows.other_steps(), rows.damping(), rows.cases(), rows.notes(), rows.pressure()];
     let literal = format!(
         "The paper's laws as printed, functions of `I1 - 3` and not of `I1bar - 3`, have a stress at rest: with its neo-Hookean constants a \
          free body shrinks by {:.2} % of its volume. The library has no such law.\n",
@@ -76,7 +75,8 @@ impl Rows<'_> {
         join(recordings.iter().map(|recording| find(recording.name)?.value.map(short)))
     }
 
-    /// Rest, lowest point, time from a tenth to it, period: what it is and by how many per cent that is off. The shifted curves.
+    /// Rest, lowest point, time from a tenth to it, period: what it is and by how many per cent that is off. The
+    /// shifted curves.
     fn marker(&self, at: Key, recordings: &[Recording; 2]) -> String {
         let value = |quantity: &str| {
             let name = format!("{} left: {quantity}", recordings[0].name);
@@ -143,12 +143,7 @@ impl Rows<'_> {
             let at = key(row);
             let figures = self.marker(at, gravity.recordings);
             let seconds = self.seconds(at, gravity.recordings).unwrap_or_else(|| row.note.clone());
-            format!(
-                "| {} | {} | {} | {figures} | {seconds} |",
-                row.element.name(),
-                row.method,
-                row.tetrahedra
-            )
+            format!("| {} | {} | {} | {figures} | {seconds} |", row.element.name(), row.method, row.tetrahedra)
         };
         let mut shown: Vec<&Row> = self.of_case(silicone::NAME).filter(wanted).collect();
         let kinds = [DAMPED_20, DAMPED_100].into_iter().chain(BACKWARD_EULER);
@@ -170,8 +165,7 @@ impl Rows<'_> {
             let each = each.collect::<Vec<String>>().join(" | ");
             Some(format!("| {damping} | {each} | {} |", all.value.map(short)?))
         });
-        let heads =
-            format!("| damping, 1/s | {}, mm | all over drop at rest, % |", recordings.join(", mm | "));
+        let heads = format!("| damping, 1/s | {}, mm | all over drop at rest, % |", recordings.join(", mm | "));
         table("Curves of the finest grid with nodal pressure, over the damping", &heads, lines.collect())
     }
 
@@ -201,15 +195,13 @@ impl Rows<'_> {
             let first = group[0];
             let of = |steps: Steps| group.iter().filter(move |row| row.method == steps.name);
             let value = |row: &Row| Some(format!("{} {}", short(row.value?), row.unit));
-            let errors =
-                TO_REST.map(|steps| join(of(steps).map(|row| percent(row).or(value(row))))).join(" | ");
+            let errors = TO_REST.map(|steps| join(of(steps).map(|row| percent(row).or(value(row))))).join(" | ");
             let seconds = |steps| of(steps).next_back().and_then(|row| row.computing_seconds).map(short);
             let order = self.of_case(first.case).find(|row| {
                 (row.mesh, row.element) == (first.mesh, first.element)
                     && row.quantity.strip_prefix(ORDER) == Some(&format!("; {}", first.quantity))
             });
-            let order =
-                order.map(|row| row.value.map_or_else(|| "none yet".into(), |order| format!("{order:.2}")));
+            let order = order.map(|row| row.value.map_or_else(|| "none yet".into(), |order| format!("{order:.2}")));
             format!(
                 "| {}: {} | {} | {} | {errors} | {} | {} |",
                 first.case,
@@ -268,9 +260,6 @@ mod tests {
     #[test]
     fn figures_have_three_digits() {
         let figures = [0.0, 0.012_34, 0.5, 1.234, 12.34, 123.4, 1234.0].map(short);
-        assert_eq!(
-            figures,
-            ["0.00", "0.0123", "0.500", "1.23", "12.3", "123", "1234"].map(|x| x.to_string())
-        );
+        assert_eq!(figures, ["0.00", "0.0123", "0.500", "1.23", "12.3", "123", "1234"].map(|x| x.to_string()));
     }
 }

@@ -1,7 +1,7 @@
-//! A square bar of 20 mm twisted by a small angle: the torque `0.140577 G a^4 theta / L` of Saint-Venant (Timoshenko & Goodier,
-//! section 109). Both ends turn as prescribed in their planes and are free to warp along the axis, so the closed form holds for a bar of
-//! any length. nu 0.499, which torsion hardly feels. The torque is that of the internal forces at rest: reactions of long steps hold
-//! inertia as well.
+//! A square bar of 20 mm twisted by a small angle: the torque `0.140577 G a^4 theta / L` of Saint-Venant (Timoshenko &
+//! Goodier, section 109). Both ends turn as prescribed in their planes and are free to warp along the axis, so the
+//! closed form holds for a bar of any length. nu 0.499, which torsion hardly feels. The torque is that of the internal
+//! forces at rest: reactions of long steps hold inertia as well.
 
 use supple::loads::{Loads, Motion};
 use supple::material::Element;
@@ -35,8 +35,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
             let body = body(cells);
             let end = body.mesh.nodes(|[.., z]| same(z, LENGTH));
             for steps in TO_REST {
-                let (value, row) =
-                    body.measure(NAME, element, steps, |setup| torque(setup, &body.mesh, &end));
+                let (value, row) = body.measure(NAME, element, steps, |setup| torque(setup, &body.mesh, &end));
                 if let (Some(value), true) = (value, steps.kind == EXACT.kind) {
                     errors.push((row.clone(), f64::from(cells), value / reference - 1.0));
                 }

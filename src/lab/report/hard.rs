@@ -26,12 +26,7 @@ fn words(run: &Judged) -> String {
         Verdict::Told => "wrong, and told",
         Verdict::Silent => "silently wrong",
     };
-    format!(
-        "{}, {}, {:.0}x the critical step: {said}",
-        row.scene,
-        row.method.name(),
-        row.step_over_limit_rest
-    )
+    format!("{}, {}, {:.0}x the critical step: {said}", row.scene, row.method.name(), row.step_over_limit_rest)
 }
 
 /// Estimate over true error at the worst snapshot of each run.
@@ -94,8 +89,7 @@ fn over_time(judged: &[Judged]) -> Section {
         let error = frames.iter().map(|frame| frame.mean).collect();
         let (at, estimate): (Vec<_>, Vec<_>) =
             times.iter().zip(frames).filter_map(|(time, frame)| Some((*time, frame.estimate?[0]))).unzip();
-        let told =
-            times.iter().zip(frames).filter(|(_, frame)| !frame.ok).map(|(time, frame)| (*time, frame.mean));
+        let told = times.iter().zip(frames).filter(|(_, frame)| !frame.ok).map(|(time, frame)| (*time, frame.mean));
         let (told_at, told): (Vec<_>, Vec<_>) = told.unzip();
         let curves = vec![
             Curve::new("true mean error", reached, error).coloured(COLOURS[1]),

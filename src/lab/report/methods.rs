@@ -1,5 +1,5 @@
-//! Methods judged against the exact motion: speed against error with the Pareto front, error over step and over time, and the two figures
-//! of the paper.
+//! Methods judged against the exact motion: speed against error with the Pareto front, error over step and over time,
+//! and the two figures of the paper.
 
 use supple::mesh::boundary;
 use supple_cli::report::bodies::{Bodies, View, distances, lengths, mean_millimetres, moved};
@@ -105,17 +105,12 @@ fn speed_of(spec: &SceneSpec, rows: &[&Row], methods: &[Method]) -> Plot {
         curves.push(curve.marked(MarkerSymbol::Circle).saying(words.collect()));
     }
     curves.extend(front(&judged));
-    let exact =
-        rows.iter().find(|row| row.method == Method::Tled).and_then(|row| Some(point(row, row.figures()?)));
+    let exact = rows.iter().find(|row| row.method == Method::Tled).and_then(|row| Some(point(row, row.figures()?)));
     let times = judged.iter().map(|(_, (_, time))| *time).chain(exact.map(|(_, time)| time));
-    let (mut low, mut high) =
-        times.fold((1.0_f64, 1.0_f64), |(low, high), time| (low.min(time), high.max(time)));
+    let (mut low, mut high) = times.fold((1.0_f64, 1.0_f64), |(low, high), time| (low.min(time), high.max(time)));
     if let Some((_, time)) = exact {
-        let curve =
-            Curve::new("exact (reference)", vec![time], vec![foot]).points().marked(MarkerSymbol::Diamond);
-        curves.push(
-            curve.coloured(GREY).saying(vec![format!("exact steps: {} s a simulated second", short(time))]),
-        );
+        let curve = Curve::new("exact (reference)", vec![time], vec![foot]).points().marked(MarkerSymbol::Diamond);
+        curves.push(curve.coloured(GREY).saying(vec![format!("exact steps: {} s a simulated second", short(time))]));
         if (spec.points.len(), spec.tets.len()) == BAR {
             let peers = peers(time, foot);
             high = high.max(2.0 * NETWORK_SECONDS / f64::from(10.0 * DT));
@@ -182,11 +177,8 @@ fn summary(evaluation: &Evaluation, methods: &[Method]) -> Table {
     let mut rows = vec![];
     for &method in methods.iter().filter(|method| !is_reference(**method)) {
         for multiple in MULTIPLES {
-            let of: Vec<&Row> = evaluation
-                .rows
-                .iter()
-                .filter(|row| (row.method, row.multiple) == (method, multiple))
-                .collect();
+            let of: Vec<&Row> =
+                evaluation.rows.iter().filter(|row| (row.method, row.multiple) == (method, multiple)).collect();
             if of.is_empty() {
                 continue;
             }
@@ -219,11 +211,7 @@ fn summary(evaluation: &Evaluation, methods: &[Method]) -> Table {
         "median computing time of a simulated second, s",
         "diverged",
     ];
-    Table {
-        title: "methods and their steps over all scenes".into(),
-        heads: heads.map(String::from).to_vec(),
-        rows,
-    }
+    Table { title: "methods and their steps over all scenes".into(), heads: heads.map(String::from).to_vec(), rows }
 }
 
 fn middle(mut values: Vec<f64>) -> Option<f64> {
@@ -243,12 +231,9 @@ fn over_time(evaluation: &Evaluation) -> Section {
             .iter()
             .filter(|row| row.scene == spec.name && !is_reference(row.method) && !row.frames.is_empty())
             .collect();
-        for multiple in
-            MULTIPLES.into_iter().filter(|multiple| rows.iter().any(|row| row.multiple == *multiple))
-        {
-            let still = Curve::new("standing still", times.clone(), still.clone())
-                .coloured(GREY)
-                .dashed(DashType::Dash);
+        for multiple in MULTIPLES.into_iter().filter(|multiple| rows.iter().any(|row| row.multiple == *multiple)) {
+            let still =
+                Curve::new("standing still", times.clone(), still.clone()).coloured(GREY).dashed(DashType::Dash);
             let curves = rows.iter().filter(|row| row.multiple == multiple).map(|row| {
                 let errors = row.frames.iter().map(|frame| frame.mean).collect();
                 Curve::new(row.method.name(), times[..row.frames.len()].to_vec(), errors)
@@ -260,11 +245,7 @@ fn over_time(evaluation: &Evaluation) -> Section {
     }
     let caption = "Mean error over the nodes at each snapshot, next to that of a body that never moves. A curve that ends early diverged. Estimates of the error while running \
                    are in the part on hard cases.";
-    Section {
-        title: "Error over time".into(),
-        figures: vec![Figure::choice(caption, panels)],
-        ..Section::default()
-    }
+    Section { title: "Error over time".into(), figures: vec![Figure::choice(caption, panels)], ..Section::default() }
 }
 
 fn over_step(evaluation: &Evaluation, scene: &str) -> Option<Section> {
@@ -290,8 +271,7 @@ fn over_step(evaluation: &Evaluation, scene: &str) -> Option<Section> {
     if drawn.is_empty() {
         return None;
     }
-    let still =
-        Curve::new("standing still", vec![1.0, 250.0], vec![hold; 2]).coloured(GREY).dashed(DashType::Dash);
+    let still = Curve::new("standing still", vec![1.0, 250.0], vec![hold; 2]).coloured(GREY).dashed(DashType::Dash);
     drawn.push(still);
     let plot = plots::logarithms("step, multiples of the scene's", "mean error, mm", drawn);
     let caption = format!(
@@ -321,10 +301,8 @@ fn find<'a>(
     multiple: u32,
 ) -> Option<(&'a SceneSpec, &'a Truth, &'a Row)> {
     let (spec, truth) = evaluation.scenes.iter().find(|(spec, _)| spec.name == scene)?;
-    let row = evaluation
-        .rows
-        .iter()
-        .find(|row| row.scene == scene && row.method == method && row.multiple == multiple)?;
+    let row =
+        evaluation.rows.iter().find(|row| row.scene == scene && row.method == method && row.multiple == multiple)?;
     (row.figures().is_some() && !row.shape.is_empty()).then_some((spec, truth, row))
 }
 
@@ -368,13 +346,7 @@ fn paper_bars(evaluation: &Evaluation) -> Option<Section> {
              over the nodes. A hundredth of the nodes may be above the scale. Turn one bar and all turn.",
             method.name()
         );
-        figures.push(Figure::grid(
-            caption,
-            panels.collect(),
-            columns,
-            1e3 * most,
-            "distance to the exact motion",
-        ));
+        figures.push(Figure::grid(caption, panels.collect(), columns, 1e3 * most, "distance to the exact motion"));
     }
     let title = "The paper's bar: four motions at 10 and 20 times its step".into();
     (!figures.is_empty()).then(|| Section { title, figures, ..Section::default() })
@@ -385,11 +357,9 @@ fn paper_bodies(evaluation: &Evaluation) -> Option<Section> {
     let mut figures = vec![];
     for method in SHOWN {
         for scene in BODIES {
-            let runs =
-                BODY_MULTIPLES.iter().filter_map(|multiple| find(evaluation, scene, method, *multiple));
+            let runs = BODY_MULTIPLES.iter().filter_map(|multiple| find(evaluation, scene, method, *multiple));
             let runs: Vec<_> = runs.collect();
-            let Some((spec, exact)) =
-                runs.first().and_then(|(spec, truth, _)| Some((spec, truth.snapshots.last()?)))
+            let Some((spec, exact)) = runs.first().and_then(|(spec, truth, _)| Some((spec, truth.snapshots.last()?)))
             else {
                 continue;
             };
@@ -400,9 +370,8 @@ fn paper_bodies(evaluation: &Evaluation) -> Option<Section> {
                 bodies.add(&moved(&spec.points, shape), &triangles, &lengths(shape), most);
                 Panel::new(name, bodies.plot(View::Standing))
             };
-            let others = runs
-                .iter()
-                .map(|(_, _, row)| panel(format!("{}x: {}", row.multiple, spread(row)), &row.shape));
+            let others =
+                runs.iter().map(|(_, _, row)| panel(format!("{}x: {}", row.multiple, spread(row)), &row.shape));
             let panels: Vec<_> = std::iter::once(panel("exact".into(), exact)).chain(others).collect();
             let columns = panels.len();
             let caption = format!(

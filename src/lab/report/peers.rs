@@ -1,6 +1,7 @@
-//! What others report: exact steps of other programs, and errors of the paper's networks. Times of other programs were measured next to
-//! plain scalar code of ours, in one run on one core of an AMD Zen 4, for the paper's bar (6,528 tetrahedra, neo-Hookean) at the paper's step;
-//! so was the ratio of that code to the exact step (`cargo bench --bench step`), and both together carry them over to this machine.
+//! What others report: exact steps of other programs, and errors of the paper's networks. Times of other programs were
+//! measured next to plain scalar code of ours, in one run on one core of an AMD Zen 4, for the paper's bar (6,528
+//! tetrahedra, neo-Hookean) at the paper's step; so was the ratio of that code to the exact step (`cargo bench --bench
+//! step`), and both together carry them over to this machine.
 
 /// Another program's exact step.
 pub(crate) struct Peer {
@@ -28,11 +29,12 @@ pub(crate) const PEERS: [Peer; 6] = [
     Peer { name: "PyBullet deformable", over_plain: 1032.0 / 412.0 },
 ];
 
-/// A network of the paper: its step over the paper's, and its published mean error at 1.0 s over the bar, mm (Meister et al. 2018,
-/// section 3).
+/// A network of the paper: its step over the paper's, and its published mean error at 1.0 s over the bar, mm (Meister
+/// et al. 2018, section 3).
 pub(crate) const PUBLISHED: [(u32, f64); 2] = [(10, 0.017), (20, 2.10)];
 
-/// Time of the paper's network for the bar's vertices in ONNX Runtime 1.31 on one core of that machine, s: the paper has no times.
+/// Time of the paper's network for the bar's vertices in ONNX Runtime 1.31 on one core of that machine, s: the paper
+/// has no times.
 pub(crate) const NETWORK_SECONDS: f64 = 3453e-6;
 
 /// Nodes and tetrahedra of the bar.

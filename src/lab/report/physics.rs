@@ -96,22 +96,11 @@ fn finest(rows: &[Row]) -> Table {
             None => lines.push(row),
         }
     }
-    let heads = [
-        "case",
-        "quantity",
-        "element",
-        "steps",
-        "mesh",
-        "tetrahedra",
-        "value",
-        "should be",
-        "error, %",
-        "source",
-    ];
+    let heads =
+        ["case", "quantity", "element", "steps", "mesh", "tetrahedra", "value", "should be", "error, %", "source"];
     let cells = |row: &&Row| {
-        let number = |value: Option<f64>| {
-            value.map_or_else(|| "-".into(), |value| format!("{} {}", short(value), row.unit))
-        };
+        let number =
+            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{} {}", short(value), row.unit));
         vec![
             row.case.into(),
             row.quantity.clone(),

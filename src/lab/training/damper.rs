@@ -1,6 +1,6 @@
-//! The network of the damped step ([`supple::inertia::Damper`]), trained by random search (CMA-ES): weights are drawn around the
-//! best so far, each draw moves the recipe's scenes from rest to the end, and is judged by the exact motion. No gradient passes
-//! through the motion, and the whole roll-out is judged, not one step of it.
+//! The network of the damped step ([`supple::inertia::Damper`]), trained by random search (CMA-ES): weights are drawn
+//! around the best so far, each draw moves the recipe's scenes from rest to the end, and is judged by the exact motion.
+//! No gradient passes through the motion, and the whole roll-out is judged, not one step of it.
 //!
 //! ```toml
 //! seed = 1
@@ -18,8 +18,8 @@
 //! population = 10
 //! spread = 0.3             # of the first draws, in units of each weight's own scale
 //! ```
-//! What is minimised is the mean over motions and steps of `ln (error / error without damping)`, errors being means over nodes and
-//! time. The search starts from the rule of a constant gain.
+//! What is minimised is the mean over motions and steps of `ln (error / error without damping)`, errors being means
+//! over nodes and time. The search starts from the rule of a constant gain.
 
 use core::fmt;
 use core::ops::ControlFlow;
@@ -43,9 +43,9 @@ const INPUTS: usize = 4;
 /// What the search starts from, and the largest gain.
 const GAIN: f64 = 2.0;
 const MOST: f32 = 20.0;
-/// Where the hidden layer's knots lie at the start, for each input (see [`supple::inertia::Damper`]): changes of rough motion from
-/// a hundredth of it to all of it in a step, rough motion from a thousandth to all of the body's, any cosine, `k` from a
-/// thousandth to a seventh.
+/// Where the hidden layer's knots lie at the start, for each input (see [`supple::inertia::Damper`]): changes of rough
+/// motion from a hundredth of it to all of it in a step, rough motion from a thousandth to all of the body's, any
+/// cosine, `k` from a thousandth to a seventh.
 const KNOTS: [(f64, f64); INPUTS] = [(-9.0, 0.0), (-7.0, 0.0), (-1.0, 1.0), (-7.0, -2.0)];
 
 /// A recipe as the module documents it.
@@ -110,9 +110,7 @@ impl Recipe {
             if !(load.is_finite() && *load != 0.0) {
                 return refuse("load", load, "it must be a number other than zero");
             }
-            if let Some(multiple) =
-                multiples.iter().find(|multiple| !Timing::PAPER.hits_snapshots(**multiple))
-            {
+            if let Some(multiple) = multiples.iter().find(|multiple| !Timing::PAPER.hits_snapshots(**multiple)) {
                 return refuse("multiples", multiple, "the laboratory's snapshots must fall on steps");
             }
         }
@@ -179,10 +177,7 @@ impl Trial<'_> {
 }
 
 /// Searches as the recipe says. `progress` may stop it.
-pub fn train(
-    text: &str,
-    mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
-) -> Result<Fitted, TrainError> {
+pub fn train(text: &str, mut progress: impl FnMut(&Progress) -> ControlFlow<()>) -> Result<Fitted, TrainError> {
     let recipe = Recipe::parse(text)?;
     let mut scenes = Vec::new();
     for motion in &recipe.motion {
@@ -221,12 +216,7 @@ pub fn train(
         for (error, method) in errors.iter_mut().zip(methods) {
             *error = trial.error(method)?;
         }
-        judged.push(Judged {
-            scene: trial.spec.name.to_string(),
-            load: trial.load,
-            multiple: trial.multiple,
-            errors,
-        });
+        judged.push(Judged { scene: trial.spec.name.to_string(), load: trial.load, multiple: trial.multiple, errors });
     }
     Ok(Fitted { bytes, judged })
 }
@@ -240,12 +230,7 @@ fn search(
 ) -> Result<Vec<f64>, TrainError> {
     let scales = scales(recipe.damper.hidden);
     let weights = |draw: &DVector<f64>| -> Vec<f64> {
-        start
-            .iter()
-            .zip(&scales)
-            .zip(draw.iter())
-            .map(|((start, scale), draw)| start + scale * draw)
-            .collect()
+        start.iter().zip(&scales).zip(draw.iter()).map(|((start, scale), draw)| start + scale * draw).collect()
     };
     let Search { generations, population, spread } = recipe.search;
     let mut search = CMAESOptions::new(vec![0.0; start.len()], spread)
@@ -277,8 +262,8 @@ fn damped(bytes: Vec<u8>) -> Result<Method, TrainError> {
     Ok(Method::DampedWith(NetworkFile::leaked("damper", &bytes)?))
 }
 
-/// A gain of [`GAIN`] whatever the inputs: rows of the hidden layer, its biases, the output's weights, its bias. Each row of the
-/// hidden layer is a ramp of one input from a knot on, so that a small change of any weight has an effect.
+/// A gain of [`GAIN`] whatever the inputs: rows of the hidden layer, its biases, the output's weights, its bias. Each
+/// row of the hidden layer is a ramp of one input from a knot on, so that a small change of any weight has an effect.
 fn rule(hidden: usize) -> Vec<f64> {
     let mut weights = vec![0.0; (INPUTS + 2) * hidden + 1];
     for unit in 0..hidden {

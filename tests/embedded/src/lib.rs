@@ -6,9 +6,7 @@ use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
 use supple::inertia::{Cells, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{
-    Element, Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue, Values,
-};
+use supple::material::{Element, Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue, Values};
 use supple::mesh::{self, Bar, Mesh, Winding};
 use supple::mlp::Network;
 use supple::scene::{AsScene, FixedScene, SceneFacts, SceneView, Support};
@@ -48,11 +46,8 @@ pub extern "C" fn nodal_pressure(
     supports: &[Support; 9],
     state: &mut FixedState<100, 100>,
 ) -> f32 {
-    let mut scene = FixedScene::<_, 100, 20>::new(NodalPressure(Regions {
-        law: NeoHookean::default(),
-        tissues,
-        of_element,
-    }));
+    let mut scene =
+        FixedScene::<_, 100, 20>::new(NodalPressure(Regions { law: NeoHookean::default(), tissues, of_element }));
     let Ok(mesh) = Mesh::new(points, tets, Winding::Normalised) else {
         return -1.0;
     };
@@ -90,10 +85,7 @@ pub extern "C" fn nodal_strain(
     at_critical_step(&scene, state) + at_critical_step(&lent, state)
 }
 
-fn at_critical_step<M: ElementMaterial>(
-    scene: &impl AsScene<Material = M>,
-    state: &mut FixedState<100, 100>,
-) -> f32 {
+fn at_critical_step<M: ElementMaterial>(scene: &impl AsScene<Material = M>, state: &mut FixedState<100, 100>) -> f32 {
     let Some(critical) = tled::critical_step(scene, state) else {
         return -3.0;
     };
@@ -139,8 +131,7 @@ pub extern "C" fn step(
     let Ok(step) = Step::unchecked(seconds, 1.0) else {
         return -2;
     };
-    let started =
-        tled::start(scene, state, &step, |node| (start.get(node).copied().unwrap_or_default(), [0.0; 3]));
+    let started = tled::start(scene, state, &step, |node| (start.get(node).copied().unwrap_or_default(), [0.0; 3]));
     if !started {
         return -3;
     }

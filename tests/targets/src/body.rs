@@ -1,5 +1,5 @@
-//! A bar that stands on its lower end under gravity and a force at a corner, with exact steps in any tetrahedra and with learned ones.
-//! The compiler knows its size, so that nothing needs a heap.
+//! A bar that stands on its lower end under gravity and a force at a corner, with exact steps in any tetrahedra and
+//! with learned ones. The compiler knows its size, so that nothing needs a heap.
 
 use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::{Loads, NodalForce};
@@ -88,8 +88,8 @@ impl<const NODES: usize, const ELEMENTS: usize, const TILES: usize> Body<NODES, 
         Some(())
     }
 
-    /// After `exact` exact steps, a lead-in of one learned step and `steps` learned ones; `then` is called after each of these.
-    /// Which step is refused has to be the same as well; in the first half none may be.
+    /// After `exact` exact steps, a lead-in of one learned step and `steps` learned ones; `then` is called after each
+    /// of these. Which step is refused has to be the same as well; in the first half none may be.
     pub(crate) fn learned(
         &self,
         network: &[u8],

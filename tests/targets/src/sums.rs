@@ -1,5 +1,5 @@
-//! What a processor computes with each kind of step, as a checksum of the bits: on small bars, the same everywhere. Only the core
-//! computes, no standard library, which differs between systems.
+//! What a processor computes with each kind of step, as a checksum of the bits: on small bars, the same everywhere.
+//! Only the core computes, no standard library, which differs between systems.
 
 use super::body::{Body, DAMPING, SECONDS, TISSUE};
 use supple::inertia::{Cells, Grid, LargeStep, Method, vectors_for_lattice};
@@ -90,7 +90,8 @@ pub fn long_exact(steps: u32, then: impl FnMut()) -> Option<u32> {
     LONG.exact(steps, then).as_ref().map(of_state)
 }
 
-/// The checksum of the long bar after exact steps and learned ones with int8 layers; `then` is called after each learned step.
+/// The checksum of the long bar after exact steps and learned ones with int8 layers; `then` is called after each
+/// learned step.
 pub fn long_learned(exact: u32, steps: u32, then: impl FnMut()) -> Option<u32> {
     LONG.learned(&COMPACT_INT8.0, exact, steps, then).map(|state| of_state(&state) ^ state.steps() as u32)
 }
@@ -126,8 +127,7 @@ fn damped() -> Option<u32> {
     let mut storage = [NodeVector::ZERO; vectors_for_lattice(Element::Linear, NODES, ELEMENTS, GRID, true)];
     let step = Step::unchecked(20.0 * SECONDS, DAMPING).ok()?;
     let mut damped =
-        LargeStep::prepare(method, scene.view(), &SMALL.points(), state.view(), step, &mut storage[..])
-            .ok()?;
+        LargeStep::prepare(method, scene.view(), &SMALL.points(), state.view(), step, &mut storage[..]).ok()?;
     for _ in 0..300 {
         if !damped.step(scene.view(), &loads, state.view()).is_taken() {
             return None;

@@ -81,10 +81,7 @@ fn real_time(step: f32, spent: f64) -> String {
 
 /// Prints the critical step at rest, as a bound and as it is.
 fn describe_limits(scene: SceneView<'_, VecMaterial>, state: &VecState, bound: CriticalStep) {
-    row(
-        "critical step",
-        format!("{:.4e} s at rest, which node {} sets (a bound, safe)", bound.seconds, bound.node),
-    );
+    row("critical step", format!("{:.4e} s at rest, which node {} sets (a bound, safe)", bound.seconds, bound.node));
     match tled::exact_critical_step(scene, state.displacements()) {
         Some(exact) => row(
             "exact limit",
@@ -98,8 +95,8 @@ fn describe_limits(scene: SceneView<'_, VecMaterial>, state: &VecState, bound: C
 fn describe_memory(scene: SceneView<'_, VecMaterial>) {
     let vectors = if scene.element() == Element::Linear { 3 } else { 4 };
     let of_node = size_of::<NodeInertia>() + vectors * size_of::<NodeVector>();
-    let tiles = tiles_for(scene.element_count()) * size_of::<ElementTile>()
-        + scene.patch_row_count() * size_of::<PatchRow>();
+    let tiles =
+        tiles_for(scene.element_count()) * size_of::<ElementTile>() + scene.patch_row_count() * size_of::<PatchRow>();
     row("memory", format!("{:.1} kB", (scene.node_count() * of_node + tiles) as f64 * 1e-3));
 }
 
@@ -157,12 +154,7 @@ fn describe_beyond(
         let (seconds, exact) = (times.of(method), times.exact);
         row(
             &format!("{} step", method_name(Some(method))),
-            format!(
-                "{:.1} us, {:.2} times an exact one's {:.1} us",
-                1e6 * seconds,
-                seconds / exact,
-                1e6 * exact
-            ),
+            format!("{:.1} us, {:.2} times an exact one's {:.1} us", 1e6 * seconds, seconds / exact, 1e6 * exact),
         );
     }
     let [mass_scaled, multilevel, damped] = &methods;

@@ -24,8 +24,8 @@ const MULTIPLES: [f32; 6] = [50.0, 40.0, 30.0, 20.0, 10.0, 5.0];
 const SHARE: f64 = 0.1;
 const LEAST: f64 = 0.2;
 
-/// Multiples whose errors are predicted, and the longest of the two pilots that do it, in the order in which they are tried: a pilot
-/// may diverge or be longer than the scene.
+/// Multiples whose errors are predicted, and the longest of the two pilots that do it, in the order in which they are
+/// tried: a pilot may diverge or be longer than the scene.
 const PREDICTED: [f64; 4] = [10.0, 20.0, 50.0, 100.0];
 const PILOTS: [f64; 3] = [100.0, 50.0, 25.0];
 /// Orders of convergence that are believed.
@@ -61,14 +61,7 @@ pub(crate) fn recommend(
     let name = method_name(Some(&method));
     let span = (SHARE * setup.time.end).max(LEAST).min(setup.time.end);
     output!("\n{name} steps, their error estimated by two of half their length, over the first {span:.3} s");
-    output!(
-        "{:<21} {:>12} {:>14} {:>14} {:>17}",
-        "step",
-        "seconds",
-        "estimate, mm",
-        "moved, mm",
-        "real-time factor"
-    );
+    output!("{:<21} {:>12} {:>14} {:>14} {:>17}", "step", "seconds", "estimate, mm", "moved, mm", "real-time factor");
     let mut longest = None;
     let mut unbroken = true;
     let mut rows = vec![];
@@ -99,14 +92,9 @@ pub(crate) fn recommend(
     match longest {
         Some((multiple, error)) => row(
             "recommended",
-            format!(
-                "method = \"{name}\", step = \"{multiple}x\" (about {error:.3} mm off, {accuracy} mm allowed)"
-            ),
+            format!("method = \"{name}\", step = \"{multiple}x\" (about {error:.3} mm off, {accuracy} mm allowed)"),
         ),
-        None => row(
-            "recommended",
-            format!("method = \"tled\": none of these {name} steps stays below {accuracy} mm"),
-        ),
+        None => row("recommended", format!("method = \"tled\": none of these {name} steps stays below {accuracy} mm")),
     }
     Ok(())
 }
@@ -133,9 +121,8 @@ pub(crate) fn predict_errors(
     let method = judged(setup, scene)?;
     let name = method_name(Some(&method));
     for longest in PILOTS {
-        let pilot = |multiple: f64| {
-            compare(setup, scene, loads, multiple as f32 * bound.seconds, setup.time.end, &method)
-        };
+        let pilot =
+            |multiple: f64| compare(setup, scene, loads, multiple as f32 * bound.seconds, setup.time.end, &method);
         let Comparison::Distance(long) = pilot(longest)? else { continue };
         let Comparison::Distance(short) = pilot(0.5 * longest)? else { continue };
         let order = (long.error / short.error).log2();
@@ -143,16 +130,10 @@ pub(crate) fn predict_errors(
         let order = if order.is_finite() { order.clamp(ORDERS.0, ORDERS.1) } else { ORDERS.0 };
         let shortest = 0.25 * longest;
         let error = short.error / (order.exp2() - 1.0);
-        let words = PREDICTED
-            .map(|multiple| format!("{:.3} mm at {multiple}x", error * (multiple / shortest).powf(order)));
+        let words =
+            PREDICTED.map(|multiple| format!("{:.3} mm at {multiple}x", error * (multiple / shortest).powf(order)));
         row("expected error", format!("{}, {name}", words.join(", ")));
-        row(
-            "",
-            format!(
-                "from pilots at {longest} to {shortest}x that moved {:.3} mm; order {order:.1}",
-                short.moved
-            ),
-        );
+        row("", format!("from pilots at {longest} to {shortest}x that moved {:.3} mm; order {order:.1}", short.moved));
         return Ok(());
     }
     row("expected error", format!("not foretold: {name} pilots diverge or are longer than the scene"));

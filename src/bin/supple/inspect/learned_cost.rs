@@ -42,10 +42,7 @@ pub(crate) fn describe(
     let seconds = spent.as_secs_f64() / f64::from(TIMED);
     let network = learned.model().network();
     output!("\nlearned step");
-    row(
-        "network",
-        format!("{}, {} multiply-adds per vertex", choice.path.display(), network.multiply_adds()),
-    );
+    row("network", format!("{}, {} multiply-adds per vertex", choice.path.display(), network.multiply_adds()));
     row("step", describe_step(network));
     row(
         "memory",

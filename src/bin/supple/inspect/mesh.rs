@@ -1,4 +1,5 @@
-//! What a mesh is like. One with faults is looked at in full: every kind of fault is counted and its first element or node named.
+//! What a mesh is like. One with faults is looked at in full: every kind of fault is counted and its first element or
+//! node named.
 
 use supple::io::TetMesh;
 use supple::mesh::{DEGENERATE, Winding};
@@ -49,11 +50,7 @@ fn describe_elements(mesh: &TetMesh) {
     row("edges", format!("{:.3} to {:.3} mm", 1e3 * shortest, 1e3 * longest));
     row(
         "radius ratio",
-        format!(
-            "least {:.3}, median {:.3} (1 is a regular tetrahedron)",
-            ratios[0],
-            ratios[ratios.len() / 2]
-        ),
+        format!("least {:.3}, median {:.3} (1 is a regular tetrahedron)", ratios[0], ratios[ratios.len() / 2]),
     );
 }
 

@@ -114,15 +114,12 @@ fn layer_row(name: &str, layer: &Layer<'_>) -> String {
     };
     let (precision, bytes) = match parameters {
         Parameters::Float { weights, biases } => ("float32", size_of_val(*weights) + size_of_val(*biases)),
-        Parameters::Int8(Int8 { weights, starts, scales, biases, .. }) => (
-            "int8",
-            size_of_val(*weights) + size_of_val(*starts) + size_of_val(*scales) + size_of_val(*biases),
-        ),
+        Parameters::Int8(Int8 { weights, starts, scales, biases, .. }) => {
+            ("int8", size_of_val(*weights) + size_of_val(*starts) + size_of_val(*scales) + size_of_val(*biases))
+        }
     };
     let multiply_adds = layer.multiply_adds();
-    format!(
-        "{name:<21} {inputs:>7} {outputs:>8}  {activation:<16} {precision:<9} {multiply_adds:>14} {bytes:>9}"
-    )
+    format!("{name:<21} {inputs:>7} {outputs:>8}  {activation:<16} {precision:<9} {multiply_adds:>14} {bytes:>9}")
 }
 
 /// Prints a table of ranges; what has no name in `quantities` has a number and no unit.
@@ -131,11 +128,6 @@ fn ranges(kind: &str, what: &str, ranges: &[Range], quantities: &[Quantity]) {
     for (index, Range { scale, least, most }) in ranges.iter().enumerate() {
         let number = format!("{kind} {index}");
         let (name, unit, factor) = quantities.get(index).copied().unwrap_or((&number, "", 1.0));
-        output!(
-            "{name:<24} {unit:<6} {:>11.4}  {:.4} to {:.4}",
-            factor * scale,
-            factor * least,
-            factor * most
-        );
+        output!("{name:<24} {unit:<6} {:>11.4}  {:.4} to {:.4}", factor * scale, factor * least, factor * most);
     }
 }

@@ -34,8 +34,8 @@ impl Times {
         }
     }
 
-    /// Times exact, mass-scaled, multilevel and damped steps from rest, in turn, so that what else the machine does meets all of
-    /// them.
+    /// Times exact, mass-scaled, multilevel and damped steps from rest, in turn, so that what else the machine does
+    /// meets all of them.
     pub(crate) fn measured(
         methods: &[Method<'static>; 3],
         setup: &Setup,

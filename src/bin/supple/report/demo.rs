@@ -1,4 +1,5 @@
-//! Steps side by side on one body: a table for the screen and the report, shapes at the end, error over time with its estimate.
+//! Steps side by side on one body: a table for the screen and the report, shapes at the end, error over time with its
+//! estimate.
 
 use super::bodies::{distances, lengths, mean_millimetres};
 use super::made::Made;
@@ -140,8 +141,8 @@ fn notes(case: &Compared) -> Vec<String> {
             Ok((outcome, _)) => outcome,
         };
         let fell_back = outcome.learned.as_ref().and_then(|trace| trace.fell_back.as_ref());
-        let fell_back = fell_back
-            .map(|(time, why)| format!("{name}: exact steps from {time:.3} s on, as the learned step {why}"));
+        let fell_back =
+            fell_back.map(|(time, why)| format!("{name}: exact steps from {time:.3} s on, as the learned step {why}"));
         let inexact = outcome.guard.and_then(|guard| Some((guard.inexact, guard.first?)));
         let inexact = inexact.map(|(steps, (time, error, allowed))| {
             let [error, allowed] = [error, allowed].map(|metres| 1e3 * f64::from(metres));
@@ -223,18 +224,12 @@ fn over_time(case: &Compared, exact: &[Shape]) -> Figure {
         let colour = COLOURS[index % COLOURS.len()];
         let times: Vec<f64> = outcome.frames.iter().map(|frame| frame.time).collect();
         let errors = errors(exact, run.shapes());
-        curves.push(
-            Curve::new(format!("{}: error", run.name), times[..errors.len()].to_vec(), errors)
-                .coloured(colour),
-        );
+        curves
+            .push(Curve::new(format!("{}: error", run.name), times[..errors.len()].to_vec(), errors).coloured(colour));
         let estimated = outcome.frames.iter().filter_map(|frame| Some((frame.time, frame.estimate?)));
-        let (at, estimates) =
-            estimated.map(|(time, estimate)| (time, 1e3 * f64::from(estimate.mean))).unzip();
-        curves.push(
-            Curve::new(format!("{}: estimate", run.name), at, estimates)
-                .coloured(colour)
-                .dashed(DashType::Dash),
-        );
+        let (at, estimates) = estimated.map(|(time, estimate)| (time, 1e3 * f64::from(estimate.mean))).unzip();
+        curves
+            .push(Curve::new(format!("{}: estimate", run.name), at, estimates).coloured(colour).dashed(DashType::Dash));
     }
     let times = case
         .runs

@@ -1,4 +1,5 @@
-//! How a part of a report was made: the command that repeats it, the version, the machine, what random numbers begin with.
+//! How a part of a report was made: the command that repeats it, the version, the machine, what random numbers begin
+//! with.
 
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};

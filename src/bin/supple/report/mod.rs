@@ -131,9 +131,8 @@ mod tests {
     #[test]
     fn parts_of_earlier_commands_stay_and_the_same_is_replaced() {
         let folder = tempfile::tempdir().unwrap();
-        let has = |title: &str| {
-            fs::read_to_string(folder.path().join(FILE)).unwrap().contains(&format!("<h2>{title}</h2>"))
-        };
+        let has =
+            |title: &str| fs::read_to_string(folder.path().join(FILE)).unwrap().contains(&format!("<h2>{title}</h2>"));
         let names = ["methods", "hard"];
         for (name, title) in [("hard", "hard"), ("methods", "old"), ("methods", "new")] {
             add(folder.path(), &names, name, &part(title)).unwrap();

@@ -126,8 +126,7 @@ mod tests {
     #[test]
     fn numbers_of_tables_stand_to_the_right_and_long_tables_are_closed() {
         let row = vec!["<b>".into(), "-0.5".into(), "-".into(), "diverged".into()];
-        let cells =
-            "<td>&lt;b&gt;</td><td class=\"number\">-0.5</td><td class=\"number\">-</td><td>diverged</td>";
+        let cells = "<td>&lt;b&gt;</td><td class=\"number\">-0.5</td><td class=\"number\">-</td><td>diverged</td>";
         for (rows, opened) in [(OPEN, "<details open>"), (OPEN + 1, "<details>")] {
             let table = Table { title: "all".into(), heads: vec![], rows: vec![row.clone(); rows] };
             let page = page_of(Section { tables: vec![table], ..Section::default() });

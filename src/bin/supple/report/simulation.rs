@@ -1,4 +1,5 @@
-//! What one simulation tells: its table, the body at rest and at the end, motion and estimated error over time, forces on instruments.
+//! What one simulation tells: its table, the body at rest and at the end, motion and estimated error over time, forces
+//! on instruments.
 
 use supple::state::VecState;
 
@@ -18,9 +19,8 @@ pub(crate) fn part(setup: &Setup, state: &VecState, outcome: &Outcome, conclusio
 
 fn result(setup: &Setup, outcome: &Outcome, Conclusion { summary, warnings, .. }: &Conclusion) -> Section {
     let rows = summary.rows().iter().map(|(name, words)| vec![(*name).into(), words.clone()]);
-    let ending = outcome
-        .divergence
-        .map(|divergence| format!("The simulation {divergence}; the results end before that."));
+    let ending =
+        outcome.divergence.map(|divergence| format!("The simulation {divergence}; the results end before that."));
     let warnings = warnings.iter().map(|warning| format!("Warning: {warning}"));
     Section {
         title: format!("{} steps: {}", setup.method_name(), outcome.status()),
@@ -55,13 +55,10 @@ fn shapes(setup: &Setup, state: &VecState) -> Section {
     let rest = vec![[0.0; 3]; setup.body.mesh.points.len()];
     let shape = shape(state);
     let most = lengths(&shape).into_iter().fold(1e-6, f64::max);
-    let panel = |name: String, shape: &[[f32; 3]], time: f64| {
-        Panel::new(name, body(setup, shape, &lengths(shape), time, most))
-    };
-    let panels = vec![
-        panel("at rest".into(), &rest, 0.0),
-        panel(format!("after {:.3} s", state.time()), &shape, state.time()),
-    ];
+    let panel =
+        |name: String, shape: &[[f32; 3]], time: f64| Panel::new(name, body(setup, shape, &lengths(shape), time, most));
+    let panels =
+        vec![panel("at rest".into(), &rest, 0.0), panel(format!("after {:.3} s", state.time()), &shape, state.time())];
     let caption = "Coloured by displacement; red: nodes with a prescribed motion. Turn one and both turn.";
     Section {
         title: "The body".into(),
@@ -76,8 +73,7 @@ fn motion(Outcome { frames, .. }: &Outcome) -> Section {
         Curve::new(name, times.clone(), metres.into_iter().map(|metre| 1e3 * metre).collect())
     };
     let mut curves = vec![
-        curve("largest displacement", frames.iter().map(|frame| frame.largest).collect())
-            .coloured(COLOURS[0]),
+        curve("largest displacement", frames.iter().map(|frame| frame.largest).collect()).coloured(COLOURS[0]),
         curve("mean displacement", frames.iter().map(|frame| frame.mean).collect()).coloured(GREY),
     ];
     let estimated = frames.iter().filter_map(|frame| Some((frame.time, frame.estimate?)));

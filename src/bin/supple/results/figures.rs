@@ -33,16 +33,10 @@ pub(crate) struct Figures {
 }
 
 impl Figures {
-    pub(crate) fn new(
-        setup: &Setup,
-        scene: SceneView<'_, VecMaterial>,
-        state: &VecState,
-        outcome: &Outcome,
-    ) -> Self {
+    pub(crate) fn new(setup: &Setup, scene: SceneView<'_, VecMaterial>, state: &VecState, outcome: &Outcome) -> Self {
         let displacements = state.displacements();
         let ratios = scene.element_fields(displacements).map(|fields| fields.volume_ratio);
-        let length =
-            |node: usize| displacements[node].to_array().iter().map(|c| f64::from(c * c)).sum::<f64>().sqrt();
+        let length = |node: usize| displacements[node].to_array().iter().map(|c| f64::from(c * c)).sum::<f64>().sqrt();
         let furthest = (0..displacements.len()).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
         let spent = outcome.spent.as_secs_f64().max(1e-9);
         Self {

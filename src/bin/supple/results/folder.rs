@@ -42,8 +42,8 @@ impl Folder {
         self.staging.folder().join(name)
     }
 
-    /// Adds a frame: displacement (m), velocity (m/s), pressure (Pa) of the nodes; von Mises stress (Pa), volume ratio J of the
-    /// elements.
+    /// Adds a frame: displacement (m), velocity (m/s), pressure (Pa) of the nodes; von Mises stress (Pa), volume ratio
+    /// J of the elements.
     pub(crate) fn add_frame(
         &mut self,
         setup: &Setup,

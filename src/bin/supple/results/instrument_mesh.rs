@@ -49,11 +49,7 @@ fn round(radius: f32, length: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
         let shift = if is_upper { 0.5 } else { -0.5 } * length;
         for part in 0..AROUND {
             let (sin, cos) = (TAU * part as f32 / AROUND as f32).sin_cos();
-            points.push([
-                radius * polar.sin() * cos,
-                radius * polar.sin() * sin,
-                radius * polar.cos() + shift,
-            ]);
+            points.push([radius * polar.sin() * cos, radius * polar.sin() * sin, radius * polar.cos() + shift]);
             if ring <= ALONG {
                 let next = (part + 1) % AROUND;
                 let [a, b] = [part, next].map(|part| AROUND * ring + part);
@@ -68,9 +64,8 @@ fn round(radius: f32, length: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
 /// A vector turned by a unit quaternion `x, y, z, w`.
 fn turned([x, y, z, w]: [f32; 4], v: [f32; 3]) -> [f32; 3] {
     let axis = [x, y, z];
-    let cross = |a: [f32; 3], b: [f32; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
+    let cross =
+        |a: [f32; 3], b: [f32; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let once = cross(axis, v);
     let twice = cross(axis, once);
     [0, 1, 2].map(|axis| v[axis] + 2.0 * (w * once[axis] + twice[axis]))

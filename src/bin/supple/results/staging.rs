@@ -1,9 +1,11 @@
-//! A folder of results that is replaced as a whole. The new one is made in `.NAME.run/new`, next to the folder `NAME`, and takes its
-//! place when it is complete: a process that is killed, or a full disk, leaves the old folder or the new one. The next process
-//! removes what a killed one left. Files in the old folder that are nobody's results move into the new one.
+//! A folder of results that is replaced as a whole. The new one is made in `.NAME.run/new`, next to the folder `NAME`,
+//! and takes its place when it is complete: a process that is killed, or a full disk, leaves the old folder or the new
+//! one. The next process removes what a killed one left. Files in the old folder that are nobody's results move into
+//! the new one.
 //!
-//! The places are exchanged in one operation where the system and the file system have one (Linux and macOS; not NFS). Elsewhere the
-//! old folder is renamed first; if the process is killed just then, there is no folder until the next one puts the old back.
+//! The places are exchanged in one operation where the system and the file system have one (Linux and macOS; not NFS).
+//! Elsewhere the old folder is renamed first; if the process is killed just then, there is no folder until the next one
+//! puts the old back.
 //!
 //! `.NAME.run/lock` is locked all the while, so that two processes do not write into one folder.
 
@@ -41,9 +43,9 @@ impl Staging {
         // A link stays, and what it points to is replaced.
         let place = if path.is_symlink() { fs::canonicalize(path) } else { Ok(path.to_path_buf()) };
         let place = place.map_err(|error| cannot_make(path, &error))?;
-        let name = place.file_name().ok_or_else(|| {
-            Problem::in_file(path, "is not the name of a folder; results replace one as a whole")
-        })?;
+        let name = place
+            .file_name()
+            .ok_or_else(|| Problem::in_file(path, "is not the name of a folder; results replace one as a whole"))?;
         let mut hidden = OsString::from(".");
         hidden.push(name);
         hidden.push(".run");
@@ -52,17 +54,11 @@ impl Staging {
             fs::create_dir_all(parent).map_err(|error| cannot_make(parent, &error))?;
         }
         if is_mount_point(&place) {
-            return Err(Problem::in_file(
-                path,
-                "is a mount point, which cannot be replaced; name a folder in it",
-            ));
+            return Err(Problem::in_file(path, "is a mount point, which cannot be replaced; name a folder in it"));
         }
         let lock = lock(&hidden).map_err(|error| cannot_make(&hidden, &error))?;
         let lock = lock.ok_or_else(|| {
-            Problem::in_file(
-                path,
-                format!("another run writes there and holds {}", lock_of(&hidden).display()),
-            )
+            Problem::in_file(path, format!("another run writes there and holds {}", lock_of(&hidden).display()))
         })?;
         let staging = Self { place, hidden, is_result, force, complete: false, _lock: lock };
         staging.recover()?;
@@ -100,7 +96,8 @@ impl Staging {
         self.recover()
     }
 
-    /// Waits until the files are on the disk: otherwise a power cut might leave the new folder in its place with files that are empty.
+    /// Waits until the files are on the disk: otherwise a power cut might leave the new folder in its place with files
+    /// that are empty.
     fn synchronise(&self) -> Result<(), Problem> {
         let folder = self.folder();
         for entry in fs::read_dir(&folder).map_err(|error| cannot_read(&folder, &error))? {
@@ -156,11 +153,8 @@ impl Staging {
                 continue;
             }
             let (from, to) = (folder.join(&name), self.place.join(&name));
-            let moved =
-                if to.exists() { Err(ErrorKind::AlreadyExists.into()) } else { fs::rename(&from, &to) };
-            moved.map_err(|error| {
-                Problem::in_file(&from, format!("cannot be moved to {}: {error}", to.display()))
-            })?;
+            let moved = if to.exists() { Err(ErrorKind::AlreadyExists.into()) } else { fs::rename(&from, &to) };
+            moved.map_err(|error| Problem::in_file(&from, format!("cannot be moved to {}: {error}", to.display())))?;
         }
         Ok(())
     }

@@ -1,4 +1,5 @@
-//! The summary of a simulation: one list of what there is to tell, each with a row of the table and its figures in `summary.json`.
+//! The summary of a simulation: one list of what there is to tell, each with a row of the table and its figures in
+//! `summary.json`.
 
 use serde_json::{Map, Value, json};
 use supple::adaptive::Taken;
@@ -91,12 +92,7 @@ fn add_scene(summary: &mut Summary, setup: &Setup, figures: &Figures) {
     let elements = setup.body.mesh.tets.len();
     summary.add(
         "mesh",
-        format!(
-            "{}: {} nodes, {elements} tetrahedra, {:.1} g",
-            setup.body.name,
-            figures.nodes,
-            1e3 * figures.mass
-        ),
+        format!("{}: {} nodes, {elements} tetrahedra, {:.1} g", setup.body.name, figures.nodes, 1e3 * figures.mass),
         json!({
             "mesh": setup.body.name,
             "nodes": figures.nodes,

@@ -67,16 +67,11 @@ fn not_exact(limits: &Limits) -> String {
         causes.push(format!("an exponent reached {:.2} times its cap", limits.saturation));
     }
     if limits.energy_excess > 0.0 {
-        causes.push(format!(
-            "kinetic energy exceeded the energy balance by {:.0} %",
-            100.0 * limits.energy_excess
-        ));
+        causes.push(format!("kinetic energy exceeded the energy balance by {:.0} %", 100.0 * limits.energy_excess));
     }
     if limits.held_back > 0 {
-        causes.push(format!(
-            "in {} much of the motion was held back, which a shorter step does less",
-            limits.held_back
-        ));
+        causes
+            .push(format!("in {} much of the motion was held back, which a shorter step does less", limits.held_back));
     }
     format!(
         "{} steps, the first at {:.3} s, were taken but are not exact: {}",

@@ -20,8 +20,8 @@ use start::Start;
 /// Steps are single precision: their sum may miss a time by this share of the whole.
 const ROUNDING: f64 = 1e-7;
 
-/// Runs to the end or to divergence. `frame` is called at rest and after each interval between frames, `tick` with the time (s) now
-/// and then.
+/// Runs to the end or to divergence. `frame` is called at rest and after each interval between frames, `tick` with the
+/// time (s) now and then.
 pub(crate) fn run<'a>(
     setup: &'a Setup,
     start: Start<'a>,
@@ -125,8 +125,7 @@ impl Running<'_> {
             let nodes = simulation.scene().node_count();
             loads = loads.touched_by(setup.tools.contact(&instruments, nodes)?);
         }
-        let mut watched =
-            Watched { mark: (outcome.limits, outcome.reactions.mark()), outcome, began: Instant::now() };
+        let mut watched = Watched { mark: (outcome.limits, outcome.reactions.mark()), outcome, began: Instant::now() };
         let mut watch = |event: Event<'_>| {
             if let Event::Tried(time) = event {
                 tick(time);
@@ -155,8 +154,7 @@ impl Running<'_> {
         }
         if let Some(adaptive) = simulation.auto_step() {
             outcome.computed += u64::from(report.steps()).saturating_sub(1);
-            let trace =
-                outcome.adaptive.get_or_insert_with(|| AdaptiveTrace::new(adaptive.model().tolerance()));
+            let trace = outcome.adaptive.get_or_insert_with(|| AdaptiveTrace::new(adaptive.model().tolerance()));
             trace.enter(report);
         }
     }
@@ -171,9 +169,7 @@ impl Running<'_> {
         }
         let is_exact = match (&setup.time.method, &setup.learned, simulation.learned_step()) {
             (None, None, _) => true,
-            (_, Some(choice), Some(model)) => {
-                self.taken < model.intervals(choice.burn_in) || model.is_exact_next()
-            }
+            (_, Some(choice), Some(model)) => self.taken < model.intervals(choice.burn_in) || model.is_exact_next(),
             _ => false,
         };
         if is_exact

@@ -14,8 +14,8 @@ use supple::step::{CriticalStep, Divergence, Status};
 use super::reactions::Reactions;
 use crate::weight_file::describe_step;
 
-/// Steps that are not exact: elements were beyond the range of their law, there was energy that the balance does not explain, or
-/// motion was held back.
+/// Steps that are not exact: elements were beyond the range of their law, there was energy that the balance does not
+/// explain, or motion was held back.
 #[derive(Clone, Copy)]
 pub(crate) struct Limits {
     pub(crate) steps: u64,
@@ -29,14 +29,8 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
-    const NONE: Self = Self {
-        steps: 0,
-        first_time: 0.0,
-        least_volume_ratio: 1.0,
-        saturation: 0.0,
-        energy_excess: 0.0,
-        held_back: 0,
-    };
+    const NONE: Self =
+        Self { steps: 0, first_time: 0.0, least_volume_ratio: 1.0, saturation: 0.0, energy_excess: 0.0, held_back: 0 };
 }
 
 /// What was known at a frame.
@@ -118,12 +112,12 @@ impl Outcome {
 
     /// Takes down a frame.
     pub(crate) fn enter_frame(&mut self, state: &VecState) {
-        let squares = state.displacements().iter().map(|vector| {
-            vector.to_array().iter().map(|component| f64::from(*component).powi(2)).sum::<f64>()
-        });
-        let (sum, largest) = squares
-            .map(f64::sqrt)
-            .fold((0.0, 0.0_f64), |(sum, largest), length| (sum + length, largest.max(length)));
+        let squares = state
+            .displacements()
+            .iter()
+            .map(|vector| vector.to_array().iter().map(|component| f64::from(*component).powi(2)).sum::<f64>());
+        let (sum, largest) =
+            squares.map(f64::sqrt).fold((0.0, 0.0_f64), |(sum, largest), length| (sum + length, largest.max(length)));
         let mean = sum / state.displacements().len().max(1) as f64;
         let estimate = self.guard.and_then(|guard| guard.latest);
         self.frames.push(FrameTrace { time: state.time(), mean, largest, estimate });
@@ -218,7 +212,8 @@ pub(crate) struct GuardTrace {
     pub(crate) latest: Option<Estimate>,
     /// The largest of the mean error, m.
     pub(crate) most: f32,
-    /// Steps whose estimate exceeded what is allowed, the time of the first, s, and its estimate and what was allowed, m.
+    /// Steps whose estimate exceeded what is allowed, the time of the first, s, and its estimate and what was allowed,
+    /// m.
     pub(crate) inexact: u64,
     pub(crate) first: Option<(f64, f32, f32)>,
 }

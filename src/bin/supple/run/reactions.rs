@@ -107,12 +107,9 @@ impl Reactions {
     pub(crate) fn table(&self) -> String {
         let mut text = String::from("time_s,instrument,fx,fy,fz,contacts,depth_m\n");
         for (time, intervals) in &self.rows {
-            for (instrument, Interval { force: [x, y, z], contacts, depth, .. }) in
-                intervals.iter().enumerate()
-            {
+            for (instrument, Interval { force: [x, y, z], contacts, depth, .. }) in intervals.iter().enumerate() {
                 // Writing to a string does not fail.
-                let _ =
-                    writeln!(text, "{time:.6},{instrument},{x:.6e},{y:.6e},{z:.6e},{contacts},{depth:.6e}");
+                let _ = writeln!(text, "{time:.6},{instrument},{x:.6e},{y:.6e},{z:.6e},{contacts},{depth:.6e}");
             }
         }
         text

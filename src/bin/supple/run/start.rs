@@ -47,19 +47,14 @@ impl<'a> Start<'a> {
     }
 }
 
-/// The lattice of a scene's method; steps may be prepared on a coarser one than is suggested. A mesh too small for the lattice that its
-/// method wants is a problem.
-pub(crate) fn grid(
-    setup: &Setup,
-    scene: SceneView<'_, VecMaterial>,
-    method: &Method<'_>,
-) -> Result<Grid, Problem> {
+/// The lattice of a scene's method; steps may be prepared on a coarser one than is suggested. A mesh too small for the
+/// lattice that its method wants is a problem.
+pub(crate) fn grid(setup: &Setup, scene: SceneView<'_, VecMaterial>, method: &Method<'_>) -> Result<Grid, Problem> {
     let grid = method.grid(scene, &setup.body.local).map_err(|error| {
         let place = setup.time.lattice_at.as_ref().unwrap_or(&setup.body.name);
         Problem(format!("{place}: {error}"))
     })?;
-    let suggested =
-        matches!(method, Method::Multilevel(Cells::Suggested) | Method::Damped(_, Cells::Suggested));
+    let suggested = matches!(method, Method::Multilevel(Cells::Suggested) | Method::Damped(_, Cells::Suggested));
     if suggested && grid.functions == 0 {
         return Err(Problem(format!(
             "{}: with {} elements the mesh is too small for a lattice to pay; give lattice = [1, 1, 1] under \
@@ -111,8 +106,8 @@ pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, unchecked: bool) 
     Step::unchecked(fitted(seconds, time.end, time.frames), setup.damping).map_err(Problem::of)
 }
 
-/// The longest step, at most `seconds`, of which whole numbers reach the frames and the end (s) but for rounding; only the
-/// end, if there are more frames than steps.
+/// The longest step, at most `seconds`, of which whole numbers reach the frames and the end (s) but for rounding; only
+/// the end, if there are more frames than steps.
 fn fitted(seconds: f32, end: f64, frames: u32) -> f32 {
     let longest = f64::from(seconds);
     let between_frames = end / f64::from(frames);

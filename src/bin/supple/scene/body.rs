@@ -53,8 +53,7 @@ impl Body {
     pub(crate) fn mesh_problem(&self, error: MeshError) -> Problem {
         let advice = match error {
             MeshError::Inverted { .. } => {
-                let volumes =
-                    self.mesh.tets.iter().map(|tet| volume(tet.map(|n| self.mesh.points[n as usize])));
+                let volumes = self.mesh.tets.iter().map(|tet| volume(tet.map(|n| self.mesh.points[n as usize])));
                 let negative = volumes.filter(|volume| *volume < 0.0).count();
                 format!(
                     "; {negative} of {} elements have negative volume; winding = \"normalise\" under [mesh] turns them",
@@ -87,9 +86,7 @@ impl Body {
 pub(crate) fn volume([a, b, c, d]: [[f64; 3]; 4]) -> f64 {
     let edge = |p: [f64; 3]| [p[0] - a[0], p[1] - a[1], p[2] - a[2]];
     let (u, v, w) = (edge(b), edge(c), edge(d));
-    (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0])
-        + u[2] * (v[0] * w[1] - v[1] * w[0]))
-        / 6.0
+    (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6.0
 }
 
 /// Least and largest coordinates.
@@ -110,10 +107,9 @@ pub(crate) fn read_body(file: &SceneFile, at: &Spanned<MeshTable>) -> Result<Bod
         None | Some((_, "checked")) => Winding::Checked,
         Some((_, "normalise")) => Winding::Normalised,
         Some((at, other)) => {
-            return Err(file.problem(
-                at,
-                format!("winding \"{other}\" is not known; \"checked\" and \"normalise\" are"),
-            ));
+            return Err(
+                file.problem(at, format!("winding \"{other}\" is not known; \"checked\" and \"normalise\" are"))
+            );
         }
     };
     let scale = table.scale.as_ref().map_or(1.0, |scale| *scale.get_ref());
@@ -133,20 +129,15 @@ pub(crate) fn read_body(file: &SceneFile, at: &Spanned<MeshTable>) -> Result<Bod
             let (Some(size), Some(cells)) = (&table.size, &table.cells) else {
                 return Err(file.problem(shape, "a bar needs size = [x, y, z] in m and cells = [x, y, z]"));
             };
-            let bar = Bar {
-                size: size.get_ref().map(|edge| (f64::from(edge) * scale) as f32),
-                cells: *cells.get_ref(),
-            };
+            let bar =
+                Bar { size: size.get_ref().map(|edge| (f64::from(edge) * scale) as f32), cells: *cells.get_ref() };
             if let Some(edge) = bar.size.iter().find(|edge| !(edge.is_finite() && **edge > 0.0)) {
                 return Err(file.problem(size, format!("size holds {edge} m, edges must be positive")));
             }
             if bar.cells.contains(&0) || bar.element_count() > 100_000_000 {
                 return Err(file.problem(
                     cells,
-                    format!(
-                        "cells are {:?}: at least 1 along each axis, and at most 1e8 tetrahedra",
-                        bar.cells
-                    ),
+                    format!("cells are {:?}: at least 1 along each axis, and at most 1e8 tetrahedra", bar.cells),
                 ));
             }
             Ok(Body::bar(bar))

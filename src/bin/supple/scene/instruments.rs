@@ -3,9 +3,7 @@
 use std::path::PathBuf;
 
 use serde::Deserialize;
-use supple::contact::{
-    Contact, Instrument, MOST_INSTRUMENTS, Pose, Shape, Surface, SurfaceField, SurfaceNode,
-};
+use supple::contact::{Contact, Instrument, MOST_INSTRUMENTS, Pose, Shape, Surface, SurfaceField, SurfaceNode};
 use toml::Spanned;
 
 use super::body::Body;
@@ -100,10 +98,9 @@ impl Tools {
         }
         let method = file.scene.time.get_ref().method.as_ref();
         if method.is_some_and(|method| method.get_ref() == "mass-scaled") || file.scene.learned.is_some() {
-            return Err(file.problem(
-                first,
-                "mass-scaled and learned steps cannot meet instruments; method = \"damped\" can",
-            ));
+            return Err(
+                file.problem(first, "mass-scaled and learned steps cannot meet instruments; method = \"damped\" can")
+            );
         }
         let tools = tables.iter().map(|at| Tool::read(file, at, body)).collect::<Result<_, _>>()?;
         Ok(Self::new(tools, body))
@@ -115,8 +112,7 @@ impl Tools {
 
     /// What can be touched, on a body of so many nodes.
     pub(crate) fn surface(&self, nodes: usize) -> Result<Surface<'_>, Problem> {
-        let surface =
-            Surface::new(&self.nodes, nodes).and_then(|surface| surface.with_triangles(&self.triangles));
+        let surface = Surface::new(&self.nodes, nodes).and_then(|surface| surface.with_triangles(&self.triangles));
         surface.map_err(Problem::of)
     }
 
@@ -151,12 +147,7 @@ impl Tool {
         {
             return Err(file.problem(at, format!("direction is {direction:?}; it needs a length")));
         }
-        let tool = Self {
-            shape: OwnedShape::read(file, at)?,
-            friction,
-            path: read_path(file, at, body)?,
-            direction,
-        };
+        let tool = Self { shape: OwnedShape::read(file, at)?, friction, path: read_path(file, at, body)?, direction };
         // Whatever else the kernel refuses.
         let instruments = [tool.at(0.0)];
         let surface = Surface::new(&[], 0).map_err(Problem::of)?;
@@ -193,16 +184,9 @@ impl std::fmt::Display for Tools {
             let comma = if index > 0 { ", " } else { "" };
             match &tool.shape {
                 OwnedShape::Plane => write!(f, "{comma}{index}: plane")?,
-                OwnedShape::Sphere { radius } => {
-                    write!(f, "{comma}{index}: sphere of {:.2} mm", 1e3 * radius)?
-                }
+                OwnedShape::Sphere { radius } => write!(f, "{comma}{index}: sphere of {:.2} mm", 1e3 * radius)?,
                 OwnedShape::Capsule { radius, length } => {
-                    write!(
-                        f,
-                        "{comma}{index}: capsule of {:.2} mm, {:.2} mm long",
-                        1e3 * radius,
-                        1e3 * length
-                    )?;
+                    write!(f, "{comma}{index}: capsule of {:.2} mm, {:.2} mm long", 1e3 * radius, 1e3 * length)?;
                 }
                 OwnedShape::Field(owned) => {
                     let [x, y, z] = owned.field.size;
@@ -229,9 +213,7 @@ impl OwnedShape {
         let [radius, length] = [table.radius.as_ref(), table.length.as_ref()];
         let surplus = match name {
             "plane" => radius.or(length).map(|at| (at.span(), "a size")),
-            "sphere" | "field" => {
-                length.or(radius.filter(|_| name == "field")).map(|at| (at.span(), "that size"))
-            }
+            "sphere" | "field" => length.or(radius.filter(|_| name == "field")).map(|at| (at.span(), "that size")),
             _ => None,
         };
         if let Some((span, what)) = surplus {
@@ -240,15 +222,11 @@ impl OwnedShape {
         match name {
             "plane" => Ok(Self::Plane),
             "sphere" => Ok(Self::Sphere { radius: needed("radius", radius)? }),
-            "capsule" => {
-                Ok(Self::Capsule { radius: needed("radius", radius)?, length: needed("length", length)? })
-            }
+            "capsule" => Ok(Self::Capsule { radius: needed("radius", radius)?, length: needed("length", length)? }),
             "field" => Ok(Self::Field(Box::new(OwnedField::read(file, at)?))),
             other => Err(file.problem(
                 &table.shape,
-                format!(
-                    "shape \"{other}\" is not known; \"sphere\", \"capsule\", \"plane\" and \"field\" are"
-                ),
+                format!("shape \"{other}\" is not known; \"sphere\", \"capsule\", \"plane\" and \"field\" are"),
             )),
         }
     }
@@ -286,18 +264,13 @@ impl OwnedField {
             let edge = |axis: usize| of(axis).fold(f32::MIN, f32::max) - of(axis).fold(f32::MAX, f32::min);
             (0..3).map(|axis| edge(axis).powi(2)).sum::<f32>().sqrt() / Self::POINTS
         });
-        let field =
-            SurfaceField::new(&points, &triangles, spacing).map_err(|error| file.problem(path, error))?;
+        let field = SurfaceField::new(&points, &triangles, spacing).map_err(|error| file.problem(path, error))?;
         field.field().map_err(|error| file.problem(path, format!("{error}; is the surface closed?")))?;
         Ok(Self { field, points, triangles })
     }
 }
 
-fn read_path(
-    file: &SceneFile,
-    at: &Spanned<InstrumentTable>,
-    body: &Body,
-) -> Result<Vec<(f64, [f32; 3])>, Problem> {
+fn read_path(file: &SceneFile, at: &Spanned<InstrumentTable>, body: &Body) -> Result<Vec<(f64, [f32; 3])>, Problem> {
     let table = at.get_ref();
     let local = |[x, y, z]: [f64; 3]| {
         let [a, b, c] = body.centre;
@@ -319,20 +292,13 @@ fn read_path(
         return Err(file.problem(path, format!("the path holds {point:?}")));
     }
     if let Some((a, b)) = points.iter().zip(&points[1..]).find(|(a, b)| a[0] >= b[0]) {
-        return Err(
-            file.problem(path, format!("the path goes from {} s to {} s; times must increase", a[0], b[0]))
-        );
+        return Err(file.problem(path, format!("the path goes from {} s to {} s; times must increase", a[0], b[0])));
     }
     Ok(points.iter().map(|&[time, x, y, z]| (time, local([x, y, z]))).collect())
 }
 
 /// A number that is finite and not below `least`.
-fn positive(
-    file: &SceneFile,
-    what: &str,
-    value: Option<&Spanned<f32>>,
-    least: f32,
-) -> Result<Option<f32>, Problem> {
+fn positive(file: &SceneFile, what: &str, value: Option<&Spanned<f32>>, least: f32) -> Result<Option<f32>, Problem> {
     let Some(at) = value else { return Ok(None) };
     let value = *at.get_ref();
     if value.is_finite() && value >= least {

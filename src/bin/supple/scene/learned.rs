@@ -70,8 +70,7 @@ impl LearnedChoice {
     }
 
     pub(crate) fn network(&self) -> Result<Network<'_>, Problem> {
-        weight_file::parse(&self.path, &self.memory)
-            .map_err(|problem| Problem(format!("{}: {problem}", self.place)))
+        weight_file::parse(&self.path, &self.memory).map_err(|problem| Problem(format!("{}: {problem}", self.place)))
     }
 
     /// How it moves a scene.
@@ -80,11 +79,7 @@ impl LearnedChoice {
     }
 
     /// The learned step of a scene of so many nodes.
-    pub(crate) fn step(
-        &self,
-        nodes: usize,
-        fallback: bool,
-    ) -> Result<LearnedStep<'_, Vec<NodeVector>>, Problem> {
+    pub(crate) fn step(&self, nodes: usize, fallback: bool) -> Result<LearnedStep<'_, Vec<NodeVector>>, Problem> {
         let storage = vec![NodeVector::ZERO; learned::vectors_for(nodes, fallback)];
         LearnedStep::new(self.network()?, fallback, storage).map_err(|error| self.problem(error))
     }

@@ -42,16 +42,12 @@ pub(crate) fn read_loads(file: &SceneFile, body: &Body) -> Result<Lists, Problem
         for node in select(file, at, &at.get_ref().selection(), body)? {
             selected[node as usize] = true;
         }
-        let triangles: Vec<_> = boundary
-            .iter()
-            .filter(|triangle| triangle.iter().all(|&node| selected[node as usize]))
-            .copied()
-            .collect();
+        let triangles: Vec<_> =
+            boundary.iter().filter(|triangle| triangle.iter().all(|&node| selected[node as usize])).copied().collect();
         if triangles.is_empty() {
-            return Err(file.problem(
-                at,
-                "this traction selects nodes, but no boundary triangle with all three of its nodes",
-            ));
+            return Err(
+                file.problem(at, "this traction selects nodes, but no boundary triangle with all three of its nodes")
+            );
         }
         for force in traction(&body.local, &triangles, pascal, ramp) {
             forces.push(force.map_err(|error| file.problem(at, error))?);

@@ -1,4 +1,5 @@
-//! From a scene file to what the kernel wants. Everything that can be wrong with a scene is told here, before any time passes.
+//! From a scene file to what the kernel wants. Everything that can be wrong with a scene is told here, before any time
+//! passes.
 //!
 //! `file` is what a person may write, `setup` what comes of it; in between each file reads one part.
 

@@ -1,5 +1,5 @@
-//! Remarks of [`supple::plausibility`] on a scene file, with the place of what looks as if a unit was mistaken. The scene is computed all
-//! the same.
+//! Remarks of [`supple::plausibility`] on a scene file, with the place of what looks as if a unit was mistaken. The
+//! scene is computed all the same.
 
 use supple::element::Axes;
 use supple::loads::{Motion, NodalForce};
@@ -24,10 +24,9 @@ pub(crate) fn warnings(
     let proportions = Proportions::of_tissues(body.diagonal(), body.volumes().sum(), tissues.of_regions());
     let of_mesh = of_size(proportions.diagonal).into_iter().chain(of_mass(tissues.mass(body)));
     let of_mesh = of_mesh.map(|remark| match remark {
-        Remark::Size(_) => file.problem(
-            &scene.mesh,
-            format!("{remark}; scale = 0.001 under [mesh] turns millimetres into metres"),
-        ),
+        Remark::Size(_) => {
+            file.problem(&scene.mesh, format!("{remark}; scale = 0.001 under [mesh] turns millimetres into metres"))
+        }
         _ => file.problem(&scene.mesh, remark),
     });
     let of_tissues = tissues.of_regions().flat_map(|(density, moduli)| of_tissue(density, &moduli));

@@ -40,10 +40,9 @@ pub(crate) fn select<T>(
     if chosen.is_empty() {
         let (low, high) = extent(points);
         let mm = |point: [f64; 3]| point.map(|component| (component * 1e6).round() * 1e-3);
-        return Err(file.problem(
-            at,
-            format!("this selects no node; the mesh reaches from {:?} to {:?} mm", mm(low), mm(high)),
-        ));
+        return Err(
+            file.problem(at, format!("this selects no node; the mesh reaches from {:?} to {:?} mm", mm(low), mm(high)))
+        );
     }
     Ok(chosen)
 }
@@ -70,9 +69,8 @@ pub(crate) fn inside<T>(
             (point[axis] - plane.at).abs() <= tolerance
         });
         let in_box = bounds.is_none_or(|bounds| {
-            (0..3).all(|axis| {
-                point[axis] >= bounds.min[axis] - tolerance && point[axis] <= bounds.max[axis] + tolerance
-            })
+            (0..3)
+                .all(|axis| point[axis] >= bounds.min[axis] - tolerance && point[axis] <= bounds.max[axis] + tolerance)
         });
         on_plane && in_box
     })

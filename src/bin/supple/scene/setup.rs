@@ -65,20 +65,7 @@ impl Setup {
         if let Some(learned) = &learned {
             warnings.extend(learned.warning(&tissues, element)?);
         }
-        Ok(Self {
-            body,
-            tissues,
-            element,
-            supports,
-            forces,
-            motions,
-            tools,
-            gravity,
-            damping,
-            time,
-            learned,
-            warnings,
-        })
+        Ok(Self { body, tissues, element, supports, forces, motions, tools, gravity, damping, time, learned, warnings })
     }
 
     /// The lobe of `supple demo`, which has no scene file.
@@ -112,20 +99,19 @@ impl Setup {
     pub fn build(&self) -> Result<(VecScene<VecMaterial>, VecState), Problem> {
         let mesh = self.body.checked()?;
         let scene =
-            VecScene::build(self.tissues.material(self.element), &mesh, &self.supports).map_err(|error| {
-                match error {
+            VecScene::build(self.tissues.material(self.element), &mesh, &self.supports).map_err(
+                |error| match error {
                     BuildError::Mesh(error) => self.body.mesh_problem(error),
                     error => Problem(format!("{}: {error}", self.body.name)),
-                }
-            })?;
+                },
+            )?;
         Ok((scene, self.state()))
     }
 
     /// A simulation at rest.
     pub(crate) fn simulation(&self) -> Result<Simulation<'_>, Problem> {
         let (scene, state) = self.build()?;
-        let mut simulation =
-            Simulation::of_scene(scene, self.body.local.clone(), self.body.mesh.tets.clone());
+        let mut simulation = Simulation::of_scene(scene, self.body.local.clone(), self.body.mesh.tets.clone());
         *simulation.state_mut() = state;
         Ok(simulation)
     }
@@ -146,13 +132,9 @@ impl Setup {
     }
 }
 
-/// A warning if linear tetrahedra, the scene file's or those that a network learned from, bend too little in one of the tissues.
-fn locking(
-    place: &str,
-    network: Option<&LearnedChoice>,
-    element: Element,
-    tissues: &Tissues,
-) -> Option<String> {
+/// A warning if linear tetrahedra, the scene file's or those that a network learned from, bend too little in one of the
+/// tissues.
+fn locking(place: &str, network: Option<&LearnedChoice>, element: Element, tissues: &Tissues) -> Option<String> {
     /// Above it a bar of 4 x 4 cells bends less than 0.6 times as far as it should.
     const MOST_POISSON_RATIO: f64 = 0.45;
     let ratio = tissues.moduli().map(|moduli| moduli.poisson_ratio()).fold(f64::NEG_INFINITY, f64::max);
@@ -171,7 +153,8 @@ fn locking(
     ))
 }
 
-/// The tetrahedra that `[mesh]` asks for; without a word those that a network learned from, or the ones that do not lock.
+/// The tetrahedra that `[mesh]` asks for; without a word those that a network learned from, or the ones that do not
+/// lock.
 fn read_element(file: &SceneFile, learned: Option<&LearnedChoice>) -> Result<Element, Problem> {
     let Some(at) = &file.scene.mesh.get_ref().element else {
         return learned.map_or(Ok(Element::NodalPressure), LearnedChoice::element);

@@ -104,10 +104,7 @@ impl Timing {
         if f64::from(seconds) <= self.end {
             return Ok(());
         }
-        Err(Problem(format!(
-            "{}: the step of {seconds} s is longer than the end, {} s",
-            self.step_at, self.end
-        )))
+        Err(Problem(format!("{}: the step of {seconds} s is longer than the end, {} s", self.step_at, self.end)))
     }
 }
 
@@ -144,11 +141,7 @@ fn read_method(file: &SceneFile, time: &TimeTable) -> Result<(Option<Method<'sta
     Ok((fixed, false))
 }
 
-fn read_tolerance(
-    file: &SceneFile,
-    time: &TimeTable,
-    method: Option<&Method<'_>>,
-) -> Result<Option<f32>, Problem> {
+fn read_tolerance(file: &SceneFile, time: &TimeTable, method: Option<&Method<'_>>) -> Result<Option<f32>, Problem> {
     let Some(at) = &time.tolerance else { return Ok(None) };
     let tolerance = *at.get_ref();
     if !(tolerance.is_finite() && tolerance > 0.0) {
@@ -163,11 +156,7 @@ fn read_tolerance(
     Ok(Some(tolerance))
 }
 
-fn read_step(
-    file: &SceneFile,
-    at: &Spanned<StepLength>,
-    method: Option<&Method<'_>>,
-) -> Result<StepChoice, Problem> {
+fn read_step(file: &SceneFile, at: &Spanned<StepLength>, method: Option<&Method<'_>>) -> Result<StepChoice, Problem> {
     let positive = |value: f32| value.is_finite() && value > 0.0;
     match at.get_ref() {
         StepLength::Seconds(seconds) if positive(*seconds) => Ok(StepChoice::Seconds(*seconds)),

@@ -32,8 +32,7 @@ impl Tissues {
         let material = Table::new(file, &file.scene.material, &["law", "density"])?;
         let law = read_law(file, &material.required("law")?)?;
         let density = material.required("density")?;
-        let base =
-            Tissue { law: material.constants(law, true)?, density: positive(file, "density", &density)? };
+        let base = Tissue { law: material.constants(law, true)?, density: positive(file, "density", &density)? };
         let mut tissues = vec![base];
         let mut of_element = vec![0; body.mesh.tets.len()];
         for at in &file.scene.region {
@@ -70,8 +69,7 @@ impl Tissues {
 
     /// The mass of a body of these tissues, kg.
     pub(crate) fn mass(&self, body: &Body) -> f64 {
-        let densities =
-            self.of_element.iter().map(|&index| f64::from(self.tissues[usize::from(index)].density));
+        let densities = self.of_element.iter().map(|&index| f64::from(self.tissues[usize::from(index)].density));
         body.volumes().zip(densities).map(|(volume, density)| volume * density).sum()
     }
 
@@ -130,15 +128,12 @@ impl<'a> Table<'a> {
     /// A key that is neither one of `keys` nor a constant of some law is a problem.
     fn new(file: &'a SceneFile, at: &'a Spanned<TissueTable>, keys: &[&str]) -> Result<Self, Problem> {
         let names = constant_names();
-        let mut unknown = at
-            .get_ref()
-            .iter()
-            .filter(|(key, _)| !keys.contains(&key.as_str()) && !names.contains(key.as_str()));
+        let mut unknown =
+            at.get_ref().iter().filter(|(key, _)| !keys.contains(&key.as_str()) && !names.contains(key.as_str()));
         match unknown.next() {
             Some((key, value)) => {
                 let known: Vec<_> = keys.iter().chain(&names).map(|key| format!("`{key}`")).collect();
-                Err(file
-                    .problem(value, format!("unknown field `{key}`, expected one of {}", known.join(", "))))
+                Err(file.problem(value, format!("unknown field `{key}`, expected one of {}", known.join(", "))))
             }
             None => Ok(Self { file, at }),
         }

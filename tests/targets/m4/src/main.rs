@@ -1,5 +1,6 @@
-//! Prints the checksums of a Cortex-M4F, as `targets` does on processors with an operating system, and how many instructions
-//! the steps of its scene of 208 nodes take. Both go to the emulator's console, and so does the exit status.
+//! Prints the checksums of a Cortex-M4F, as `targets` does on processors with an operating system, and how many
+//! instructions the steps of its scene of 208 nodes take. Both go to the emulator's console, and so does the exit
+//! status.
 #![no_std]
 #![no_main]
 
