@@ -77,7 +77,7 @@ fn main() -> ExitCode {
         eprintln!("this processor lacks AVX2, for which the counts are kept");
         return ExitCode::FAILURE;
     }
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [name, times] = arguments.as_slice() else {
         println!(
             "exponential neo-hookean nodal-pressure nodal-strain mass-scaled multilevel damped compact int8 learned"

@@ -121,13 +121,6 @@ fn exists(test: &str, read: Read<'_>) -> Result<(), String> {
     if file.ends_with(".cpp") {
         return named_by("tests/capi/run.sh", &format!("{file} "));
     }
-    if file == ".ci/run" {
-        let name = function.ok_or("it names no function")?;
-        if !text.lines().any(|line| line == format!("{name}() {{")) {
-            return Err("there is no such function".into());
-        }
-        return named_by(file, &format!("step {name}"));
-    }
     if file.ends_with(".sh") && function.is_none() {
         return named_by(".ci/run", file);
     }
@@ -193,7 +186,7 @@ fn small(file: &str) -> Option<String> {
         "tests/capi/heap.c" => "static void steps(void) {\nstatic void idle(void) {\n    steps();\n",
         "tests/capi/run.sh" => "for test in sizes heap threads; do\n# stack \n",
         "tests/capi/stack.c" => "",
-        ".ci/run" => "embedded() {\nspare() {\n    step embedded\n    step tools/cross.sh\n",
+        ".ci/run" => "    check cross -- tools/cross.sh\n",
         "tools/cross.sh" | "tools/sizes.sh" | "README.md" => "",
         _ => return None,
     };
@@ -208,10 +201,10 @@ fn page(rows: &str) -> String {
 fn a_sound_table_is_counted() {
     let rows = "| STEP-1 | it bends | `tests/physics/bars.rs::bends`, `src/sums.rs::adds` |\n\
                 | STEP-2 | it bends again | `tests/physics/bars.rs::bends`, `tests/capi/heap.c` |\n\
-                | HOST-1 | it is small | `.ci/run::embedded`, `tools/cross.sh`, `tests/capi/heap.c::steps` |\n\
+                | HOST-1 | it is small | `tools/cross.sh`, `tests/capi/heap.c::steps` |\n\
                 | HOST-2 | it is fast | open: nobody measures it |";
     let open = vec!["HOST-2: nobody measures it".to_string()];
-    assert_eq!(check(&page(rows), &small), Ok(Counts { requirements: 4, tests: 6, open }));
+    assert_eq!(check(&page(rows), &small), Ok(Counts { requirements: 4, tests: 5, open }));
 }
 
 #[test]
@@ -247,8 +240,6 @@ fn every_fault_of_a_table_is_told_with_its_line() {
         (page(&names("`tests/capi/heap.c::frees`")), "there is no such function, or it is not called"),
         (page(&names("`tests/capi/heap.c::idle`")), "there is no such function, or it is not called"),
         (page(&names("`tests/capi/stack.c`")), "tests/capi/run.sh does not run it"),
-        (page(&names("`.ci/run::spare`")), ".ci/run does not run it"),
-        (page(&names("`.ci/run::none`")), "there is no such function"),
         (page(&names("`tools/sizes.sh`")), ".ci/run does not run it"),
         (page(&names("`README.md`")), "neither a Rust test"),
     ];

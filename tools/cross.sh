@@ -3,17 +3,16 @@
 # microcontroller (Cortex-M4F), runs it in emulators and in node, and compares the checksums with those of
 # tests/targets/checksums.txt, to which the test `targets` holds this processor.
 #
-#     tools/cross.sh [--install]
+#     tools/cross.sh [--install | --version]
 #
-# The tests of the registers run on the emulated Arm processor as well. All of it takes 4 minutes of
-# processor time. A compiler with those targets comes from Debian 12's packages into target/cross (--install does only
-# that): about 260 MB to fetch and 1.5 GB in all. Nothing is installed into the system, except node and QEMU where there is none.
+# The tests of the registers run on the emulated Arm processor as well. A compiler with those targets comes from Debian 12's packages
+# into the user's cache folder, with links from target/cross (--install does only that): about 260 MB to fetch and 1.5 GB in all.
+# Nothing is installed into the system, except node and QEMU where there is none. --version tells the compiler's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 folder=$PWD/target/cross
 mkdir -p "$folder"
-root=$folder/root
 
 step() { printf '\n== %s\n' "$*"; "$@"; }
 
@@ -26,10 +25,19 @@ packages=(
     qemu-user-static
 )
 
+# One folder for each list of packages, which appears as a whole or not at all.
+compilers=${XDG_CACHE_HOME:-~/.cache}/supple-ci/cross
+compiler=$compilers/$(sha256sum <<<"${packages[*]}" | cut -c 1-16)
+root=$compiler/root
+
 install() {
+    local new=$compilers/new
+    find "$compilers" -mindepth 1 -maxdepth 1 -type d -mtime +30 -exec rm -r {} +
+    rm -rf "$new"
+    mkdir "$new"
     # A state of apt's own: the system's knows no packages for Arm, and shall not.
-    local apt=$folder/apt
-    mkdir -p "$apt"/state/lists/partial "$apt"/cache/archives/partial "$folder/debs" "$root"
+    local apt=$new/apt
+    mkdir -p "$apt"/state/lists/partial "$apt"/cache/archives/partial "$new/debs" "$new/root"
     touch "$apt/state/status"
     local options=(
         -qq -o APT::Architecture=amd64 -o APT::Architectures::=amd64 -o APT::Architectures::=arm64
@@ -37,19 +45,26 @@ install() {
         -o APT::Sandbox::User=root
     )
     apt-get "${options[@]}" update
-    (cd "$folder/debs" && apt-get "${options[@]}" download "${packages[@]}")
-    for package in "$folder"/debs/*.deb; do
-        dpkg -x "$package" "$root"
+    (cd "$new/debs" && apt-get "${options[@]}" download "${packages[@]}")
+    for package in "$new"/debs/*.deb; do
+        dpkg -x "$package" "$new/root"
     done
-    rm -r "$folder/debs"
+    rm -r "$new/debs" "$apt"
     printf '#!/bin/sh\nLD_LIBRARY_PATH=%s exec %s "$@"\n' "$root/usr/lib/x86_64-linux-gnu:$root/usr/lib" \
-        "$root/usr/bin/rustc" >"$folder/rustc"
+        "$root/usr/bin/rustc" >"$new/rustc"
     # cargo with it, which builds the parts of the standard library that it has only as source.
-    printf '#!/bin/sh\nRUSTC=%s RUSTC_BOOTSTRAP=1 LD_LIBRARY_PATH=%s exec cargo "$@"\n' "$folder/rustc" \
-        "$root/usr/lib/x86_64-linux-gnu" >"$folder/cargo"
-    chmod +x "$folder/rustc" "$folder/cargo"
-    touch "$folder/installed"
+    printf '#!/bin/sh\nRUSTC=%s RUSTC_BOOTSTRAP=1 LD_LIBRARY_PATH=%s exec cargo "$@"\n' "$compiler/rustc" \
+        "$root/usr/lib/x86_64-linux-gnu" >"$new/cargo"
+    chmod +x "$new/rustc" "$new/cargo"
+    sync -f "$new"
+    mv -T "$new" "$compiler"
 }
+version() { "$compiler/rustc" --version 2>/dev/null; }
+
+if [ "${1:-}" = --version ]; then
+    version || echo "no compiler for other processors"
+    exit
+fi
 
 missing=()
 command -v node >/dev/null || missing+=(nodejs)
@@ -57,7 +72,12 @@ command -v qemu-system-arm >/dev/null || missing+=(qemu-system-arm)
 if [ ${#missing[@]} -gt 0 ]; then
     apt-get update -qq && apt-get install -y -qq --no-install-recommends "${missing[@]}"
 fi
-[ -e "$folder/installed" ] || step install
+mkdir -p "$compilers"
+exec 8>"$compilers/lock"
+flock 8
+version >/dev/null || step install
+flock -u 8
+ln -sfn "$root" "$compiler/rustc" "$compiler/cargo" "$folder"
 [ "${1:-}" != --install ] || exit 0
 
 # rustup's compiler brings a linker for WebAssembly and microcontrollers.
@@ -101,11 +121,4 @@ step compare " unfused " timeout 10m qemu-system-arm -machine mps2-an386 -cpu co
     -semihosting-config enable=on,target=native -kernel "$here/thumbv7em-none-eabihf/release/m4"
 echo "the same bits as on other processors with the same rounding"
 
-# As fast to compile as tests can be that are emulated: their dependencies do nothing that takes time.
-export CARGO_PROFILE_TEST_OPT_LEVEL=1
-plain=(--config 'profile.test.package."*".opt-level=0')
-for package in glam libm bytemuck; do
-    plain+=(--config "profile.test.package.$package.opt-level=1")
-done
-tests=("${plain[@]}" -p supple --quiet --features std --target-dir "$here" --target aarch64-unknown-linux-gnu)
-step "$folder/cargo" test "${tests[@]}" --lib -- simd::
+step "$folder/cargo" test "${targets[@]}" --target aarch64-unknown-linux-gnu --test simd

@@ -4,15 +4,17 @@
 #
 #     tools/header.sh [--verify]
 #
-# Takes the cbindgen that the variable CBINDGEN names, or builds its own into target/tools.
+# Takes the cbindgen that the variable CBINDGEN names, or builds its own into the user's cache folder.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 # Other versions make other headers. Nobody waits for a fast one.
 version=0.29.4
-cbindgen=${CBINDGEN:-target/tools/bin/cbindgen}
-if ! [ -x "$cbindgen" ]; then
-    cargo install cbindgen --quiet --version "$version" --locked --root target/tools --config profile.release.opt-level=0 \
+own=${XDG_CACHE_HOME:-~/.cache}/supple-ci/tools
+cbindgen=${CBINDGEN:-$own/bin/cbindgen}
+if [ -z "${CBINDGEN:-}" ] && [ "$("$cbindgen" --version 2>/dev/null)" != "cbindgen $version" ]; then
+    env -u CARGO_BUILD_BUILD_DIR -u CARGO_TARGET_DIR \
+        cargo install cbindgen --quiet --force --version "$version" --locked --root "$own" --config profile.release.opt-level=0 \
         --config profile.release.codegen-units=16 --config profile.release.lto=false
 fi
 if [ "$("$cbindgen" --version)" != "cbindgen $version" ]; then

@@ -10,8 +10,9 @@ if ! command -v valgrind >/dev/null; then
     apt-get update -qq && apt-get install -y -qq --no-install-recommends valgrind
 fi
 kept=benches/instructions.txt
-program=$(cargo bench -p supple --quiet --no-run --bench instructions --features std --message-format json |
-    sed -n 's/.*"executable":"\([^"]*instructions-[^"]*\)".*/\1/p' | tail -1)
+# With the command, whose library it shares.
+cargo build --quiet --release --workspace
+program=${CARGO_TARGET_DIR:-target}/release/instructions
 
 # Instructions of a whole run; valgrind tells what it does not know and ends with the status of the program.
 count() {

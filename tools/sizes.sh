@@ -9,7 +9,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 folder=$(realpath "${1:-target/cross}")
-if ! [ -e "$folder/installed" ]; then
+if ! [ -e "$folder/cargo" ]; then
     echo "$folder holds no compiler: tools/cross.sh puts one there" >&2
     exit 1
 fi

@@ -11,7 +11,7 @@ found=0
 # word PATTERN INSTEAD [RIGHT]
 word() {
     local lines
-    lines=$(git grep -nwiE -e "$1" -- . ':!CHANGELOG.md' ':!tools/words.sh' ':!*.lock' ':!tests/data' ':!LICENSE*' || true)
+    lines=$(git grep -InwiE -e "$1" -- . ':!CHANGELOG.md' ':!tools/words.sh' ':!*.lock' ':!tests/data' ':!LICENSE*' || true)
     if [ -n "${3:-}" ]; then lines=$(grep -vE -e "$3" <<<"$lines" || true); fi
     if [ -n "$lines" ]; then
         printf 'say "%s":\n%s\n' "$2" "$lines" >&2

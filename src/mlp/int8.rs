@@ -117,7 +117,7 @@ impl Int8<'_> {
         let mut tables =
             self.starts.chunks_exact(N).zip(self.scales.chunks_exact(N)).zip(self.biases.chunks_exact(N));
         let mut outputs = to.chunks_exact_mut(N);
-        // Nested loops, not a chain of iterators, whose closures the compiler may not inline.
+        // Nested loops, not iterators, whose closures the compiler may not inline.
         for tiles in self.weights.chunks_exact(inputs.div_ceil(GROUP).max(1)) {
             for first in (0..TILE_ROWS).step_by(N) {
                 let (Some(((starts, scales), biases)), Some(to)) = (tables.next(), outputs.next()) else {
