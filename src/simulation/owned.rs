@@ -41,8 +41,9 @@ pub struct Simulation<'w> {
     in_step: Vec<Motion>,
     /// None until the first call.
     prepared: Option<Prepared<'w>>,
-    /// Where the last call should have ended, s.
+    /// Where the last call should have ended, and where it did, s.
     until: f64,
+    ended: f64,
 }
 
 /// Steps of a method with their storage.
@@ -101,6 +102,7 @@ impl<'w> Simulation<'w> {
             in_step: vec![],
             prepared: None,
             until: 0.0,
+            ended: 0.0,
         }
     }
 
@@ -146,22 +148,22 @@ impl<'w> Simulation<'w> {
             return Err(SimulationError::Seconds(seconds));
         }
         self.prepare_once()?;
-        let Self { gravity, forces, motions, instruments, scene, state, touchable, in_step, until, .. } = self;
+        let Self { gravity, forces, motions, instruments, scene, state, touchable, in_step, until, ended, .. } = self;
         let mut loads = Loads::new(&*scene, *gravity, forces, motions)?;
         if !instruments.is_empty() {
             loads = loads.touched_by(Contact::new(surface(touchable, scene.node_count())?, instruments)?);
         }
         in_step.resize(motions.len(), Motion::default());
         let mut loads = LoadsOfCall::new(loads, in_step);
-        // Calls follow each other without a drift by rounding, but for states that were restored; and equal calls take
-        // equal steps.
-        let (now, missed) = (state.time(), (*until - state.time()).abs());
-        let from = if missed <= 1e-6 * seconds || missed > 1e-3 * seconds { now } else { *until };
-        *until = if missed > 1e-3 * seconds { now + seconds } else { *until + seconds };
-        let end = from + seconds;
+        // Calls follow each other without a drift, but for states that were restored; and equal calls take equal steps.
+        let now = state.time();
+        let due = if now == *ended { *until } else { now };
+        *until = due + seconds;
+        let end = if (due - now).abs() <= 1e-6 * seconds { now + seconds } else { *until };
         let Some(prepared) = &mut self.prepared else { return Err(SimulationError::NotFinite) };
         let mover = prepared.mover();
         let report = mover.advance(end, scene.view(), &mut loads, state.view(), threads, &mut |_| {})?;
+        *ended = state.time();
         match report.status {
             Status::Diverged(divergence) => Err(SimulationError::Refused(divergence)),
             _ => Ok(report),

@@ -208,6 +208,29 @@ fn a_network_is_led_and_led_again_after_a_restore() {
     assert_eq!(again.learned, 2);
 }
 
+/// A frame is no whole number of a network's steps.
+#[test]
+fn a_networks_steps_stay_with_the_frames() {
+    let bytes = WeightBytes::of(include_bytes!("../../weights/compact-10.weights"));
+    let network = Network::parse(bytes.bytes()).unwrap();
+    let interval = f64::from(network.recipe().step);
+    let body = Body::paper();
+    let fixed: Vec<_> = (0..81).map(Support::fixed).collect();
+    let method = Method::Learned { network, lead_in: 0.1, fallback: true };
+    let settings = Settings { method, guard: false, ..Settings::default() };
+    let mut simulation = Simulation::new(body.points.clone(), body.tets.clone(), material(Element::Linear), &fixed)
+        .unwrap()
+        .with(settings);
+    simulation.forces = torsion(&body, 1e-4, 0.1);
+    let most = (1..=12).map(|frame| {
+        simulation.advance(FRAME).unwrap();
+        (simulation.state().time() - f64::from(frame) * FRAME).abs()
+    });
+    let most = most.fold(0.0, f64::max);
+    println!("at most {:.2} of a network's step of {:.2} ms from the frames", most / interval, 1e3 * interval);
+    assert!(most <= 0.51 * interval && most > 0.01 * interval);
+}
+
 #[test]
 fn motions_without_a_ramp_go_evenly_over_a_call() {
     let body = small_bar();
