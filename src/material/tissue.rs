@@ -187,15 +187,15 @@ impl<'a, L: Law> Laws<'a, L> {
         match *self {
             Self::One(law) => law.splat(),
             Self::Regions { law, tissues, of_element } => {
-                // Each element is looked up once, not for each constant.
-                let mut rows = [law.values(); TILE];
+                // Each element is looked up once, not for each constant. Vectors come in pairs.
+                let mut rows = [law.values(); 2 * TILE];
                 for (lane, row) in rows.iter_mut().enumerate().take(R::COUNT) {
                     let tissue = of_element.get(element(lane)).and_then(|&index| tissues.get(usize::from(index)));
                     if let Some(tissue) = tissue {
                         *row = tissue.law;
                     }
                 }
-                law.widen(core::array::from_fn(|constant| R::from_fn(|lane| rows[lane % TILE][constant])))
+                law.widen(core::array::from_fn(|constant| R::from_fn(|lane| rows[lane % rows.len()][constant])))
             }
         }
     }
