@@ -87,7 +87,8 @@ mod tests {
 
     /// A page of one part with these sections.
     fn page_of(section: Section) -> String {
-        page("a & b", &[Part { made: Made::now(&["supple".into(), "<x>".into()], "none"), sections: vec![section] }]).unwrap()
+        page("a & b", &[Part { made: Made::now(&["supple".into(), "<x>".into()], "none"), sections: vec![section] }])
+            .unwrap()
     }
 
     #[test]
