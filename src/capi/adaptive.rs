@@ -127,20 +127,17 @@ pub unsafe extern "C" fn supple_adaptive_init(
         let [first, second] = [&raw mut (*object).first, &raw mut (*object).second]
             .map(|model| &mut *model.cast::<MaybeUninit<LargeModel<'static>>>());
         let points = request.points;
-        let (chooser, watch) = {
-            let scene = open.view();
-            let chooser = Chooser::new(&method, scene, points, state.reborrow(), asked)?;
-            let Parts { first: of_first, second: of_second, .. } = chooser.checked(storage, scene, points)?;
-            let step = chooser.shortest()?;
-            LargeModel::prepare_in(first, method, scene, points, state.reborrow(), step, of_first)?;
-            let prepare = |state: StateView<'_>, step, storage: &mut [NodeVector]| {
-                LargeModel::prepare_in(second, SECOND_RUN, scene, points, state, step, storage).map(|_| ())
-            };
-            let ((), watch) = Watch::prepare(scene, points, state, step, 1, of_second, prepare)?;
-            (chooser, chooser.allowing(watch))
+        let scene = open.view();
+        let chooser = Chooser::new(&method, scene, points, state.reborrow(), asked)?;
+        let Parts { first: of_first, second: of_second, .. } = chooser.checked(storage, scene, points)?;
+        let step = chooser.shortest()?;
+        LargeModel::prepare_in(first, method, scene, points, state.reborrow(), step, of_first)?;
+        let prepare = |state: StateView<'_>, step, storage: &mut [NodeVector]| {
+            LargeModel::prepare_in(second, SECOND_RUN, scene, points, state, step, storage).map(|_| ())
         };
+        let ((), watch) = Watch::prepare(scene, points, state, step, 1, of_second, prepare)?;
         (&raw mut (*object).chooser).write(chooser);
-        (&raw mut (*object).watch).write(watch);
+        (&raw mut (*object).watch).write(chooser.allowing(watch));
         (&raw mut (*object).nodes).write(nodes);
         (&raw mut (*object).vectors).write(vectors);
         (&raw mut (*object).head).write(place.head::<supple_adaptive>());
@@ -184,11 +181,9 @@ pub unsafe extern "C" fn supple_adaptive_advance(
         let threads = HostThreads::of(threads)?;
         let written = place_if_wanted(taken)?;
         let mut state = loads.attached(opened_of(&open, state)?);
-        let (status, Taken { exact, large, changes }) = {
-            let (first, second) = (&mut *first, &mut *second);
-            let view = AdaptiveView { chooser: &mut *chooser, first, second, watch: &mut *watch, storage };
-            view.advance(span.seconds(), open.view(), &mut loads.of_call, state.reborrow(), &threads)
-        };
+        let view = AdaptiveView { chooser: &mut *chooser, first, second, watch: &mut *watch, storage };
+        let (status, Taken { exact, large, changes }) =
+            view.advance(span.seconds(), open.view(), &mut loads.of_call, state.reborrow(), &threads);
         loads.enter(state.touches());
         report.enter(&status, &state);
         report.steps = exact + large;

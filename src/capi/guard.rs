@@ -132,12 +132,10 @@ pub unsafe extern "C" fn supple_guard_init(
         let object = place.object::<supple_guard>();
         // Of 38 kB: it is made where it stays, not on the stack.
         let second = &mut *(&raw mut (*object).second).cast::<MaybeUninit<_>>();
-        let mut watch = {
-            let prepare = |state: crate::state::StateView<'_>, step, storage: &mut [NodeVector]| {
-                LargeModel::prepare_in(second, SECOND_RUN, open.view(), points, state, step, storage).map(|_| ())
-            };
-            Watch::prepare(open.view(), points, state, step, config.every, storage, prepare)?.1
+        let prepare = |state: crate::state::StateView<'_>, step, storage: &mut [NodeVector]| {
+            LargeModel::prepare_in(second, SECOND_RUN, open.view(), points, state, step, storage).map(|_| ())
         };
+        let ((), mut watch) = Watch::prepare(open.view(), points, state, step, config.every, storage, prepare)?;
         watch.allow(allowed);
         (&raw mut (*object).watch).write(watch);
         (&raw mut (*object).nodes).write(nodes);

@@ -196,9 +196,7 @@ pub unsafe extern "C" fn supple_large_init(
         let object = place.object::<supple_large>();
         // Of 38 kB: it is made where it stays, not on the stack.
         let model = &mut *(&raw mut (*object).model).cast::<MaybeUninit<_>>();
-        {
-            LargeModel::prepare_in(model, method, open.view(), points, state, step, storage)?;
-        };
+        LargeModel::prepare_in(model, method, open.view(), points, state, step, storage)?;
         (&raw mut (*object).nodes).write(nodes);
         (&raw mut (*object).vectors).write(vectors);
         (&raw mut (*object).head).write(place.head::<supple_large>());

@@ -102,18 +102,16 @@ pub unsafe extern "C" fn supple_remarks(
             }
             told = told.saturating_add(1);
         };
-        {
-            let scene = open.view();
-            plausibility::of_body(scene, points, &mut say);
-            plausibility::of_gravity(loads.of_call.asked().gravity()).into_iter().for_each(|remark| say(0, remark));
-            let body = Proportions::of(scene, points);
-            body.of_forces(loads.of_call.asked().forces()).into_iter().for_each(|remark| say(0, remark));
-            for (index, motion) in loads.of_call.asked().motions().iter().enumerate() {
-                body.of_motion(motion).into_iter().for_each(|remark| say(index, remark));
-            }
-            let network = recipe.and_then(|recipe| plausibility::of_network(scene, recipe));
-            network.into_iter().for_each(|remark| say(0, remark));
-        };
+        let (scene, asked) = (open.view(), loads.of_call.asked());
+        plausibility::of_body(scene, points, &mut say);
+        plausibility::of_gravity(asked.gravity()).into_iter().for_each(|remark| say(0, remark));
+        let body = Proportions::of(scene, points);
+        body.of_forces(asked.forces()).into_iter().for_each(|remark| say(0, remark));
+        for (index, motion) in asked.motions().iter().enumerate() {
+            body.of_motion(motion).into_iter().for_each(|remark| say(index, remark));
+        }
+        let network = recipe.and_then(|recipe| plausibility::of_network(scene, recipe));
+        network.into_iter().for_each(|remark| say(0, remark));
         count.write(told);
         Ok(SUPPLE_OK)
     };
