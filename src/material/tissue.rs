@@ -154,6 +154,12 @@ pub enum Laws<'a, L> {
     },
 }
 
+/// The tissue of mesh element `element`, if there is one.
+#[inline(always)]
+fn tissue_of<'a>(tissues: &'a [Tissue<Values>], of_element: &[u16], element: usize) -> Option<&'a Tissue<Values>> {
+    tissues.get(usize::from(*of_element.get(element)?))
+}
+
 impl<'a, L: Law> Laws<'a, L> {
     /// Which law, with the constants of some tissue.
     pub(crate) const fn law(&self) -> L {
@@ -175,8 +181,7 @@ impl<'a, L: Law> Laws<'a, L> {
         match *self {
             Self::One(law) => law,
             Self::Regions { law, tissues, of_element } => {
-                let tissue = of_element.get(element).and_then(|&index| tissues.get(usize::from(index)));
-                tissue.map_or(law, |tissue| law.with(tissue.law))
+                tissue_of(tissues, of_element, element).map_or(law, |tissue| law.with(tissue.law))
             }
         }
     }
@@ -190,8 +195,7 @@ impl<'a, L: Law> Laws<'a, L> {
                 // Each element is looked up once, not for each constant. Vectors come in pairs.
                 let mut rows = [law.values(); 2 * TILE];
                 for (lane, row) in rows.iter_mut().enumerate().take(R::COUNT) {
-                    let tissue = of_element.get(element(lane)).and_then(|&index| tissues.get(usize::from(index)));
-                    if let Some(tissue) = tissue {
+                    if let Some(tissue) = tissue_of(tissues, of_element, element(lane)) {
                         *row = tissue.law;
                     }
                 }
@@ -237,8 +241,8 @@ impl<L: Law> Material for Regions<'_, L> {
     type Law = L;
 
     fn tissue(&self, element: usize) -> Option<Tissue<L>> {
-        let index = usize::from(*self.of_element.get(element)?);
-        self.tissues.get(index).map(|&Tissue { law, density }| Tissue { law: self.law.with(law), density })
+        let &Tissue { law, density } = tissue_of(self.tissues, self.of_element, element)?;
+        Some(Tissue { law: self.law.with(law), density })
     }
 
     fn laws(&self) -> Laws<'_, L> {
