@@ -7,7 +7,7 @@ use std::vec::Vec;
 use glam::Vec3;
 
 use super::field::{Field, FieldError};
-use super::signed_distance::SignedDistance;
+use super::signed_distance::{SignedDistance, bounds};
 
 /// Distances of a closed surface on a grid, as [`Field::new`] takes them.
 #[derive(Clone, Debug)]
@@ -43,10 +43,7 @@ impl SurfaceField {
             }
             corners.push([a, b, c]);
         }
-        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        for &corner in corners.as_flattened() {
-            (low, high) = (low.min(corner), high.max(corner));
-        }
+        let [low, high] = bounds(&corners);
         let size = ((high - low) / spacing).ceil() + 1.0 + 2.0 * RIM;
         let origin = low - RIM * spacing;
         let end = origin + spacing * size;

@@ -132,7 +132,8 @@ fn first_triangle(leaf: usize, triangles: usize, depth: u32) -> usize {
     ((leaf as u64 * triangles as u64) >> depth) as usize
 }
 
-fn bounds(triangles: &[[Vec3; 3]]) -> [Vec3; 2] {
+/// Least and greatest coordinates.
+pub(super) fn bounds(triangles: &[[Vec3; 3]]) -> [Vec3; 2] {
     let low = triangles.as_flattened().iter().fold(Vec3::INFINITY, |low, &corner| low.min(corner));
     let high = triangles.as_flattened().iter().fold(Vec3::NEG_INFINITY, |high, &corner| high.max(corner));
     [low, high]
