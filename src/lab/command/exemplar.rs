@@ -101,10 +101,8 @@ impl TrainingScene for FileScene {
     }
 
     fn build(&self) -> Result<VecScene<VecMaterial>, TrainError> {
-        let Tissue { law, density } = self.tissue;
-        let mesh = self.setup.body.checked().map_err(refused)?;
-        let material = VecMaterial::one(self.setup.element, law, density);
-        VecScene::build(material, &mesh, &self.setup.supports).map_err(refused)
+        let (scene, _) = self.setup.build().map_err(refused)?;
+        Ok(scene)
     }
 
     fn loads(&self, scene: &VecScene<VecMaterial>) -> Result<Box<dyn LoadsOverTime + '_>, TrainError> {
