@@ -3,9 +3,7 @@
 #include <supple.h>
 enum { X = 2, Y = 2, Z = 10, LAYER = (X + 1) * (Y + 1), NODES = LAYER * (Z + 1), CELLS = X * Y * Z, TIP = NODES - 5 };
 static float points[NODES][3]; static uint32_t tets[6 * CELLS][4]; static supple_support held[LAYER];
-SUPPLE_MEMORY(scene_memory, SUPPLE_SCENE_SIZE(NODES, 6 * CELLS, 1));
-SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, SUPPLE_NODAL_PRESSURE));
-SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(1, 0));
+SUPPLE_MEMORY(memory, 64 << 10); /* supple_sim_size tells how much is enough */
 #define TRY(call) if ((status = (call)) < 0) return printf("%s: %s\n", #call, supple_status_text(status)), 1
 int main(void) {
     for (uint32_t n = 0; n < NODES; n++) { /* a grid, x fastest, m */
@@ -24,16 +22,15 @@ int main(void) {
     const supple_scene_config body = {SUPPLE_CONFIG(supple_scene_config), .law = SUPPLE_NEO_HOOKEAN, .nodes = NODES,
         .elements = 6 * CELLS, .supports = LAYER, .tissues = 1, .points = points[0], .tetrahedra = tets[0],
         .support = held, .tissue = &tissue, .element = SUPPLE_NODAL_PRESSURE};
-    const supple_step_config length = {SUPPLE_CONFIG(supple_step_config), .seconds = 2e-4f, .damping = 20.0f};
     const supple_force push = {.node = TIP, .newton = {0.01f, 0.0f, 0.0f}, .ramp = 0.1f}; /* N, s */
-    supple_scene *scene; supple_state *state; supple_loads *loads; supple_vectors moved; supple_status status;
-    TRY(supple_scene_init(scene_memory, sizeof scene_memory, &body, &scene, NULL));
-    TRY(supple_state_init(state_memory, sizeof state_memory, scene, &state));
-    TRY(supple_loads_init(loads_memory, sizeof loads_memory, scene, 1, 0, &loads));
-    TRY(supple_set_forces(loads, &push, 1, NULL));
-    TRY(supple_set_step(scene, state, &length, NULL));
-    TRY(supple_step(scene, loads, state, 1000, NULL, NULL));
-    TRY(supple_displacements(state, &moved));
+    supple_settings settings; supple_sim *bar; supple_sim_objects of; supple_vectors moved; supple_status status;
+    TRY(supple_default_settings(&settings));
+    settings.seconds = 2e-4f, settings.damping = 20.0f, settings.forces = 1; /* s, 1/s, room for one force */
+    TRY(supple_sim_setup(memory, sizeof memory, &body, &settings, &bar, NULL));
+    TRY(supple_sim_describe(bar, &of));
+    TRY(supple_set_forces(of.loads, &push, 1, NULL));
+    TRY(supple_sim_advance(bar, 0.2, NULL, NULL));
+    TRY(supple_displacements(of.state, &moved));
     const float *u = moved.first + moved.stride / sizeof(float) * TIP;
     return printf("the tip moved by %.9g %.9g %.9g m\n", u[0], u[1], u[2]) < 0;
 }

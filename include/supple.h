@@ -12,6 +12,10 @@
  * the memory to the function that prepares the object, use the pointer it gives back. Nothing is allocated,
  * nothing needs to be released. Units are SI: m, kg, s, N, Pa, J. Nodes and elements count from zero.
  *
+ * Most hosts need a supple_sim: supple_default_settings, supple_sim_setup, then supple_sim_advance once a frame. Loads,
+ * instruments and displacements are set and read through the objects that supple_sim_describe tells. A host that wants
+ * each step in its own hand, or memory of a constant size, prepares these objects by itself.
+ *
  * Every function checks its pointers and values before it changes anything and tells by its status. A
  * pointer to an object must be NULL or lead to memory that belongs to the host; what it finds there tells
  * whether it is such an object.
@@ -208,6 +212,26 @@
  * Bytes before the arrays of a supple_large.
  */
 #define SUPPLE_LARGE_FRONT 43008
+
+/**
+ * Exact steps of nine tenths of the critical step, which is looked at again while tissue stiffens.
+ */
+#define SUPPLE_STEPS_EXACT 0
+
+/**
+ * Equal damped steps beyond the critical one, and a guard that estimates their error.
+ */
+#define SUPPLE_STEPS_DAMPED 1
+
+/**
+ * Exact and damped steps whose length keeps the error below a tolerance.
+ */
+#define SUPPLE_STEPS_AUTO 2
+
+/**
+ * A lead-in of exact steps, then those of a network, with exact ones wherever energy or the guard does not believe it.
+ */
+#define SUPPLE_STEPS_LEARNED 3
 
 /**
  * The body's box has a diagonal of `value` m: are its points in metres?
@@ -569,6 +593,12 @@ typedef struct supple_reaction supple_reaction;
  * number of threads may use one scene at the same time.
  */
 typedef struct supple_scene supple_scene;
+
+/**
+ * A scene in motion with all that it needs. One thread at a time. A copy by memcpy, to memory that is aligned to
+ * SUPPLE_ALIGN, goes on as the original would, to the bit.
+ */
+typedef struct supple_sim supple_sim;
 
 /**
  * What moves. One thread at a time. It may be copied with memcpy, to any memory aligned to SUPPLE_ALIGN, and the copy
@@ -1287,6 +1317,141 @@ typedef struct {
 } supple_reaction_force;
 
 /**
+ * How a scene is moved, and what there shall be room for. supple_default_settings fills it.
+ */
+typedef struct {
+    /**
+     * sizeof(supple_settings).
+     */
+    uint32_t struct_size;
+    /**
+     * SUPPLE_ABI.
+     */
+    uint32_t abi;
+    /**
+     * SUPPLE_STEPS_EXACT and so on.
+     */
+    uint32_t steps;
+    /**
+     * Length of the steps, s; 0: chosen. Of damped steps at most so much, 20 critical steps unless given; of exact
+     * ones, a network's included, at most so much in place of nine tenths of the critical step at the moment; of
+     * SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
+     */
+    float seconds;
+    /**
+     * Damping proportional to mass, 1/s, zero or more. A network has that of its training.
+     */
+    float damping;
+    /**
+     * Mean error of the nodes that you accept, m; 0: chosen. What SUPPLE_STEPS_AUTO keeps, half a millimetre or less in
+     * bodies below 10 cm unless given, and what a guard calls inexact, a fifth of the motion unless given.
+     */
+    float tolerance;
+    /**
+     * 1: a guard estimates the error of damped and of learned steps. 0: nothing does.
+     */
+    uint32_t guard;
+    /**
+     * 1: exact steps take the place of learned ones that are not to be believed. 0: the call stops there.
+     */
+    uint32_t fallback;
+    /**
+     * Seconds of exact steps before a network takes over.
+     */
+    double lead_in;
+    /**
+     * Cells of the lattice of damped steps along x, y, z; zeros: chosen for the scene.
+     */
+    uint32_t cells[3];
+    /**
+     * Most forces on nodes that the loads will have.
+     */
+    uint32_t forces;
+    /**
+     * Most motions.
+     */
+    uint32_t motions;
+    /**
+     * Most nodes that instruments hold at once.
+     */
+    uint32_t grips;
+    /**
+     * What instruments can touch; no nodes: there are none. Copied.
+     */
+    supple_surface surface;
+    /**
+     * Of learned steps the weight file, at a multiple of 4 bytes, better of 64; of others NULL, or that of another
+     * damper than the library's own. It is used where it is and must stay.
+     */
+    const void *weights;
+    /**
+     * Its bytes; 0 with NULL.
+     */
+    size_t weights_bytes;
+} supple_settings;
+
+/**
+ * The objects of a simulation, for all functions that take them.
+ */
+typedef struct {
+    /**
+     * What is simulated.
+     */
+    const supple_scene *scene;
+    /**
+     * What moves: to be read, saved, reset, restored.
+     */
+    supple_state *state;
+    /**
+     * What acts: gravity, forces and motions are set there, between two calls as you like.
+     */
+    supple_loads *loads;
+    /**
+     * The instruments; NULL without a surface.
+     */
+    supple_contact *contact;
+    /**
+     * Of the memory that was handed to supple_sim_setup so many bytes are in use: fewer than supple_sim_size.
+     */
+    size_t bytes;
+} supple_sim_objects;
+
+/**
+ * What a call of supple_sim_advance came to.
+ */
+typedef struct {
+    /**
+     * As of all calls that take steps; its steps are those taken, of all kinds.
+     */
+    supple_report call;
+    /**
+     * Exact steps taken.
+     */
+    uint32_t exact;
+    /**
+     * Damped ones.
+     */
+    uint32_t damped;
+    /**
+     * Those of a network.
+     */
+    uint32_t learned;
+    /**
+     * Steps that were computed and not taken, or taken back.
+     */
+    uint32_t undone;
+    /**
+     * The shortest and the longest step taken, s.
+     */
+    float shortest;
+    float longest;
+    /**
+     * The estimate of the error at the end, by the guard or by SUPPLE_STEPS_AUTO.
+     */
+    supple_estimate estimate;
+} supple_sim_report;
+
+/**
  * What does not look right. Numbers that have no meaning are 0, an index SUPPLE_NONE.
  */
 typedef struct {
@@ -1907,6 +2072,66 @@ supple_status supple_reaction_follow(const supple_scene *scene,
                                      supple_state *state,
                                      supple_reaction *reaction,
                                      supple_reaction_force *force);
+
+/**
+ * Writes settings for exact steps without damping, a guard and a fallback for other steps that are chosen, and no room
+ * for forces, motions and instruments.
+ */
+supple_status supple_default_settings(supple_settings *settings);
+
+/**
+ * Writes how many bytes of memory are enough for a simulation. supple_sim_objects tells how many it takes.
+ *
+ * @param body what it will be built from; of it the numbers of nodes, elements and tissues and the element are looked
+ * at.
+ * @param error may be NULL.
+ */
+supple_status supple_sim_size(const supple_scene_config *body,
+                              const supple_settings *settings,
+                              size_t *bytes,
+                              supple_error *error);
+
+/**
+ * Builds a scene, at rest, with loads, instruments and steps, in `memory` of at least supple_sim_size bytes, aligned to
+ * SUPPLE_ALIGN. It takes as long as some steps. What is given is copied, but for the weights.
+ *
+ * @param error may be NULL.
+ */
+supple_status supple_sim_setup(void *memory,
+                               size_t bytes,
+                               const supple_scene_config *body,
+                               const supple_settings *settings,
+                               supple_sim **sim,
+                               supple_error *error);
+
+/**
+ * Other steps from now on, in the same memory; the motion goes on as it is. To be called as well after the state was
+ * reset, restored, or moved by other functions. What there is room for stays as it was at supple_sim_setup. Where the
+ * scene itself refuses the steps (SUPPLE_E_LATTICE, SUPPLE_E_TOO_STIFF) there are none until the next call.
+ *
+ * @param error may be NULL; SUPPLE_E_SHORT: the memory is enough for the former steps only.
+ */
+supple_status supple_sim_set(supple_sim *sim,
+                             const supple_settings *settings,
+                             supple_error *error);
+
+/**
+ * Writes where the objects of a simulation are. They stay there as long as it does.
+ */
+supple_status supple_sim_describe(supple_sim *sim, supple_sim_objects *objects);
+
+/**
+ * Moves on by `seconds`, usually a frame, under the loads and instruments, and ends there to a millionth of it; learned
+ * steps end at the nearest of the network's. Motions without a ramp go evenly over the call. Where a step is refused
+ * the status says why, and the state is that before it.
+ *
+ * @param threads NULL: the calling thread alone.
+ * @param report may be NULL; is written whatever the status.
+ */
+supple_status supple_sim_advance(supple_sim *sim,
+                                 double seconds,
+                                 const supple_threads *threads,
+                                 supple_sim_report *report);
 
 /**
  * Writes what in a scene looks as if a unit or a number was mistaken; it can be simulated all the same. To be called

@@ -33,6 +33,7 @@ using scene_facts = supple_scene_facts;
 using learned_facts = supple_learned_facts;
 using estimate = supple_estimate;
 using adaptive_report = supple_adaptive_report;
+using sim_report = supple_sim_report;
 using reaction_force = supple_reaction_force;
 // Where an instrument is, what it feels, and where it pushes.
 using pose = supple_pose;
@@ -42,6 +43,12 @@ using contact_point = supple_contact_point;
 using remark = supple_remark;
 // Where and with which value something went wrong; `describe` makes a sentence of it.
 using error = supple_error;
+
+// Memory in pieces that are aligned for objects: std::vector<line> of so many `lines`.
+struct alignas(align) line {
+    unsigned char bytes[align];
+};
+[[nodiscard]] constexpr std::size_t lines(std::size_t bytes) noexcept { return (bytes + align - 1) / align; }
 
 // What became of a call: zero is done, positive done with a remark, negative not done. See supple_status.
 enum class [[nodiscard]] status : std::int32_t {
@@ -359,6 +366,41 @@ struct body {
     span<const std::uint16_t> tissue_of_element; // with one tissue: empty
 };
 
+namespace detail {
+
+template <class T> bool config_of(const body &from, supple_scene_config &config, result<T> &answer) noexcept {
+    const auto refuse = [&](status code, std::size_t value, std::size_t limit) {
+        answer.status = code;
+        answer.error = nothing(code, static_cast<double>(value), static_cast<double>(limit));
+        return false;
+    };
+    const std::size_t elements = from.tetrahedra.size() / 4;
+    for (const std::size_t count : {from.points.size(), from.tetrahedra.size(), from.supports.size()})
+        if (count > UINT32_MAX) return refuse(status::e_capacity, count, UINT32_MAX);
+    if (from.tissues.size() > UINT16_MAX) return refuse(status::e_capacity, from.tissues.size(), UINT16_MAX);
+    if (from.points.size() % 3 != 0)
+        return refuse(status::e_short, from.points.size(), from.points.size() / 3 * 3 + 3);
+    if (from.tetrahedra.size() % 4 != 0) return refuse(status::e_short, from.tetrahedra.size(), elements * 4 + 4);
+    if (from.tissues.size() > 1 && from.tissue_of_element.size() < elements)
+        return refuse(status::e_short, from.tissue_of_element.size(), elements);
+    config = detail::config<supple_scene_config>();
+    config.law = static_cast<std::uint32_t>(from.law);
+    config.winding = static_cast<std::uint32_t>(from.winding);
+    config.element = static_cast<std::uint32_t>(from.element);
+    config.nodes = static_cast<std::uint32_t>(from.points.size() / 3);
+    config.elements = static_cast<std::uint32_t>(elements);
+    config.supports = static_cast<std::uint32_t>(from.supports.size());
+    config.tissues = static_cast<std::uint32_t>(from.tissues.size());
+    config.points = from.points.data();
+    config.tetrahedra = from.tetrahedra.data();
+    config.support = from.supports.data();
+    config.tissue = from.tissues.data();
+    config.tissue_of_element = from.tissues.size() > 1 ? from.tissue_of_element.data() : nullptr;
+    return true;
+}
+
+} // namespace detail
+
 // What is simulated. Any number of threads may use one at the same time.
 class scene {
 public:
@@ -376,34 +418,8 @@ public:
     // Builds one in memory of at least `size` bytes.
     static result<scene> make(memory place, const body &from) noexcept {
         result<scene> made{status::ok, detail::nothing(status::ok), {}};
-        const auto refuse = [&](status code, std::size_t value, std::size_t limit) {
-            made.status = code;
-            made.error = detail::nothing(code, static_cast<double>(value), static_cast<double>(limit));
-            return made;
-        };
-        const std::size_t elements = from.tetrahedra.size() / 4;
-        for (const std::size_t count : {from.points.size(), from.tetrahedra.size(), from.supports.size()})
-            if (count > UINT32_MAX) return refuse(status::e_capacity, count, UINT32_MAX);
-        if (from.tissues.size() > UINT16_MAX) return refuse(status::e_capacity, from.tissues.size(), UINT16_MAX);
-        if (from.points.size() % 3 != 0)
-            return refuse(status::e_short, from.points.size(), from.points.size() / 3 * 3 + 3);
-        if (from.tetrahedra.size() % 4 != 0)
-            return refuse(status::e_short, from.tetrahedra.size(), elements * 4 + 4);
-        if (from.tissues.size() > 1 && from.tissue_of_element.size() < elements)
-            return refuse(status::e_short, from.tissue_of_element.size(), elements);
-        auto config = detail::config<supple_scene_config>();
-        config.law = static_cast<std::uint32_t>(from.law);
-        config.winding = static_cast<std::uint32_t>(from.winding);
-        config.element = static_cast<std::uint32_t>(from.element);
-        config.nodes = static_cast<std::uint32_t>(from.points.size() / 3);
-        config.elements = static_cast<std::uint32_t>(elements);
-        config.supports = static_cast<std::uint32_t>(from.supports.size());
-        config.tissues = static_cast<std::uint32_t>(from.tissues.size());
-        config.points = from.points.data();
-        config.tetrahedra = from.tetrahedra.data();
-        config.support = from.supports.data();
-        config.tissue = from.tissues.data();
-        config.tissue_of_element = from.tissues.size() > 1 ? from.tissue_of_element.data() : nullptr;
+        supple_scene_config config;
+        if (!detail::config_of(from, config, made)) return made;
         made.status =
             detail::of(supple_scene_init(place.data(), place.size(), &config, &made.value.raw_, &made.error));
         return made;
@@ -860,6 +876,17 @@ struct surface {
     span<const std::uint32_t> triangles = {};
 };
 
+namespace detail {
+
+inline supple_surface surface_of(const surface &touched, std::size_t nodes) noexcept {
+    const auto number = [](std::size_t of) { return static_cast<std::uint32_t>(of < none ? of : none); };
+    const bool is_list = touched.nodes.size() > 0;
+    return {is_list ? touched.nodes.data() : nullptr, touched.triangles.data(),
+            number(is_list ? touched.nodes.size() : nodes), number(touched.triangles.size() / 3)};
+}
+
+} // namespace detail
+
 // Instruments, what they can touch, and what one state keeps of them. One thread at a time.
 class contact {
 public:
@@ -878,11 +905,7 @@ public:
                                 std::uint32_t grips = 0) noexcept {
         result<contact> made{status::ok, detail::nothing(status::ok), {}};
         if (!detail::has_points(of, points, made)) return made;
-        const auto number = [](std::size_t of) { return static_cast<std::uint32_t>(of < none ? of : none); };
-        const bool is_list = touched.nodes.size() > 0;
-        const supple_surface given = {is_list ? touched.nodes.data() : nullptr, touched.triangles.data(),
-                                      number(is_list ? touched.nodes.size() : points.size() / 3),
-                                      number(touched.triangles.size() / 3)};
+        const supple_surface given = detail::surface_of(touched, points.size() / 3);
         made.status = detail::of(supple_contact_init(place.data(), place.size(), of.raw(), points.data(), &given,
                                                      grips, &made.value.raw_, &made.error));
         return made;
@@ -970,6 +993,85 @@ public:
 
 private:
     supple_reaction *raw_ = nullptr;
+};
+
+// What moves a simulation. exact: steps below the critical one. damped: steps beyond it, and a guard. automatic: exact and damped ones
+// as long as a tolerance allows. learned: a network's.
+enum class steps : std::uint32_t {
+    exact = SUPPLE_STEPS_EXACT,
+    damped = SUPPLE_STEPS_DAMPED,
+    automatic = SUPPLE_STEPS_AUTO,
+    learned = SUPPLE_STEPS_LEARNED
+};
+
+// How a scene is moved, and what there shall be room for: exact steps, unless something else is chosen.
+struct settings : supple_settings {
+    settings() noexcept : supple_settings{} { (void)supple_default_settings(this); }
+    // Damping proportional to mass, 1/s.
+    explicit settings(supple::steps by, float damping_of_mass = 0.0f) noexcept : settings() {
+        supple_settings::steps = static_cast<std::uint32_t>(by);
+        damping = damping_of_mass;
+    }
+    // What instruments can touch; it must stay until the simulation has been set up. Without a list the first `nodes`.
+    settings &touchable(std::size_t nodes, const supple::surface &touched = {}, std::uint32_t grips_at_once = 0) noexcept {
+        supple_settings::surface = detail::surface_of(touched, nodes);
+        grips = grips_at_once;
+        return *this;
+    }
+};
+
+// A scene in motion with all that it needs, in one memory. One thread at a time; memcpy makes a copy.
+class simulation {
+public:
+    constexpr simulation() noexcept = default;
+    constexpr explicit simulation(supple_sim *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_sim *raw() const noexcept { return raw_; }
+
+    // Bytes of memory that are enough.
+    static result<std::size_t> size(const body &from, const settings &how = {}) noexcept {
+        result<std::size_t> bytes{status::ok, detail::nothing(status::ok), 0};
+        supple_scene_config config;
+        if (!detail::config_of(from, config, bytes)) return bytes;
+        bytes.status = detail::of(supple_sim_size(&config, &how, &bytes.value, &bytes.error));
+        return bytes;
+    }
+
+    // Builds a scene at rest, in memory of at least `size` bytes; takes as long as some steps.
+    static result<simulation> make(memory place, const body &from, const settings &how = {}) noexcept {
+        result<simulation> made{status::ok, detail::nothing(status::ok), {}};
+        supple_scene_config config;
+        if (!detail::config_of(from, config, made)) return made;
+        made.status =
+            detail::of(supple_sim_setup(place.data(), place.size(), &config, &how, &made.value.raw_, &made.error));
+        return made;
+    }
+
+    // Other steps; also after the state was reset or restored.
+    status set(const settings &how, error *why = nullptr) const noexcept {
+        return detail::of(supple_sim_set(raw_, &how, why));
+    }
+
+    // Moves on by so many seconds, usually a frame.
+    status advance(double seconds, sim_report *out = nullptr, const threads *on = nullptr) const noexcept {
+        return detail::of(supple_sim_advance(raw_, seconds, on, out));
+    }
+
+    // Its objects; of none if it is no simulation.
+    [[nodiscard]] supple::scene scene() const noexcept { return supple::scene(const_cast<supple_scene *>(objects().scene)); }
+    [[nodiscard]] supple::state state() const noexcept { return supple::state(objects().state); }
+    [[nodiscard]] supple::loads loads() const noexcept { return supple::loads(objects().loads); }
+    [[nodiscard]] supple::contact contact() const noexcept { return supple::contact(objects().contact); }
+    // Bytes of its memory that are in use.
+    [[nodiscard]] std::size_t bytes() const noexcept { return objects().bytes; }
+
+private:
+    supple_sim_objects objects() const noexcept {
+        supple_sim_objects found{};
+        (void)supple_sim_describe(raw_, &found);
+        return found;
+    }
+
+    supple_sim *raw_ = nullptr;
 };
 
 // What in a scene looks as if a unit or a number was mistaken, before the first step. Gives how many remarks there are;

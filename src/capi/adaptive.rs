@@ -55,7 +55,7 @@ unsafe impl Object for supple_adaptive {
     const FRONT: usize = 86016;
 }
 
-fn layout(vectors: usize) -> Layout {
+pub(super) fn layout(vectors: usize) -> Layout {
     Layout::of::<supple_adaptive>().and::<NodeVector>(vectors)
 }
 
@@ -148,6 +148,18 @@ pub unsafe extern "C" fn supple_adaptive_init(
     unsafe { memory::answered(init(), error) }
 }
 
+/// The steps in an object, with their storage.
+///
+/// # Safety
+/// As at [`memory::change`].
+pub(super) unsafe fn opened<'a>(object: *mut supple_adaptive) -> Answer<AdaptiveView<'a, 'static>> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (supple_adaptive { vectors, chooser, watch, first, second, .. }, arrays) = memory::open(object)?;
+        Ok(AdaptiveView { chooser, first, second, watch, storage: storage(arrays, *vectors) })
+    }
+}
+
 /// Moves on by `seconds`, usually a frame, and ends there exactly. SUPPLE_INEXACT if the estimate of the error exceeded
 /// the tolerance at any step: steps become shorter at once, down to exact ones, but an error that is there stays until
 /// the body has forgotten it. A step that is not to be believed is taken again with shorter ones; where exact ones are
@@ -173,11 +185,10 @@ pub unsafe extern "C" fn supple_adaptive_advance(
         let open = OpenScene::of(scene)?;
         let mut loads = CallLoads::of(loads, &open)?;
         open.fits(memory::read(state.cast_const())?.nodes)?;
-        let (supple_adaptive { nodes, vectors, chooser, watch, first, second, .. }, arrays) = memory::open(adaptive)?;
-        open.fits(*nodes)?;
+        open.fits(memory::read(adaptive.cast_const())?.nodes)?;
+        let AdaptiveView { chooser, first, second, watch, storage } = opened(adaptive)?;
         // Also refuses what is no number.
         let span = Step::unchecked(seconds, 0.0)?;
-        let storage = storage(arrays, *vectors);
         let threads = HostThreads::of(threads)?;
         let written = place_if_wanted(taken)?;
         let mut state = loads.attached(opened_of(&open, state)?);

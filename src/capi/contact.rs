@@ -507,7 +507,14 @@ pub(super) struct CallContact<'a> {
     pushes: &'a mut [NodeVector],
     touches: &'a mut [Touch],
     points: &'a mut [ContactPoint],
-    means: &'a mut [[f32; 3]],
+    means: &'a mut [[f32; 3]; MOST_INSTRUMENTS],
+    steps: f32,
+}
+
+/// What instruments felt so far in a call: means of the forces (N) over so many steps.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Felt {
+    means: [[f32; 3]; MOST_INSTRUMENTS],
     steps: f32,
 }
 
@@ -535,10 +542,24 @@ impl<'a> CallContact<'a> {
         Ok(Some(Self { contact, pushes: parts.pushes, touches, points, means, steps: 0.0 }))
     }
 
+    #[cfg(feature = "contact")]
+    pub(super) fn has_instruments(&self) -> bool {
+        !self.contact.instruments().is_empty()
+    }
+
     /// The state with what it keeps.
     pub(super) fn attached(&mut self, state: StateView<'a>) -> StateView<'a> {
         let (pushes, touches, points) = (take(&mut self.pushes), take(&mut self.touches), take(&mut self.points));
         state.pushing(pushes).feeling(touches).listing(points)
+    }
+
+    pub(super) fn felt(&self) -> Felt {
+        Felt { means: *self.means, steps: self.steps }
+    }
+
+    /// Steps are taken back.
+    pub(super) fn take_back(&mut self, felt: &Felt) {
+        (*self.means, self.steps) = (felt.means, felt.steps);
     }
 
     /// Enters the forces of a step in the means.

@@ -73,7 +73,7 @@ unsafe impl Object for supple_guard {
     const FRONT: usize = 43008;
 }
 
-fn layout(vectors: usize) -> Layout {
+pub(super) fn layout(vectors: usize) -> Layout {
     Layout::of::<supple_guard>().and::<NodeVector>(vectors)
 }
 
@@ -148,6 +148,18 @@ pub unsafe extern "C" fn supple_guard_init(
     unsafe { memory::answered(init(), error) }
 }
 
+/// The guard in an object, with its storage.
+///
+/// # Safety
+/// As at [`memory::change`].
+pub(super) unsafe fn opened<'a>(object: *mut supple_guard) -> Answer<GuardView<'a>> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (supple_guard { vectors, watch, second, .. }, arrays) = memory::open(object)?;
+        Ok(GuardView { second, watch, storage: storage(arrays, *vectors) })
+    }
+}
+
 fn allowed(tolerance: f32) -> Answer<Allowed> {
     match tolerance {
         0.0 => Ok(Allowed::ShareOfMotion),
@@ -177,17 +189,15 @@ pub unsafe extern "C" fn supple_guard_follow(
         let open = OpenScene::of(scene)?;
         let mut loads = CallLoads::of(loads, &open)?;
         open.fits(memory::read(state.cast_const())?.nodes)?;
-        let (supple_guard { nodes, vectors, watch, second, .. }, arrays) = memory::open(guard)?;
-        open.fits(*nodes)?;
-        let storage = storage(arrays, *vectors);
+        open.fits(memory::read(guard.cast_const())?.nodes)?;
+        let mut view = opened(guard)?;
         let threads = HostThreads::of(threads)?;
         let written = place_if_wanted(estimate)?;
         let state = loads.attached(opened_of(&open, state)?);
         let loads = loads.of_next_step(&state, 1);
-        let view = GuardView { second, watch: &mut *watch, storage };
-        let status = view.follow(Status::Ok, open.view(), &loads, &state, &threads);
+        let status = view.reborrow().follow(Status::Ok, open.view(), &loads, &state, &threads);
         if let Some(place) = written {
-            place.write(estimated(watch.estimate()));
+            place.write(estimated(view.watch.estimate()));
         }
         answer(&status)
     };

@@ -139,7 +139,7 @@ impl<'a> LargeRequest<'a> {
     }
 }
 
-fn layout(vectors: usize) -> Layout {
+pub(super) fn layout(vectors: usize) -> Layout {
     Layout::of::<supple_large>().and::<NodeVector>(vectors)
 }
 
@@ -207,6 +207,20 @@ pub unsafe extern "C" fn supple_large_init(
     unsafe { memory::answered(init(), error) }
 }
 
+/// The steps in an object, with their storage.
+///
+/// # Safety
+/// As at [`memory::change`].
+pub(super) unsafe fn opened<'a>(
+    object: *mut supple_large,
+) -> Answer<(&'a mut LargeModel<'static>, &'a mut [NodeVector])> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (supple_large { vectors, model, .. }, arrays) = memory::open(object)?;
+        Ok((model, storage(arrays, *vectors)))
+    }
+}
+
 /// # Safety
 /// The arrays are those of an object with so many vectors, and nobody else uses them.
 pub(super) unsafe fn storage<'a>(mut arrays: Arrays, vectors: usize) -> &'a mut [NodeVector] {
@@ -235,9 +249,8 @@ pub unsafe extern "C" fn supple_large_step(
         let open = OpenScene::of(scene)?;
         let mut loads = CallLoads::of(loads, &open)?;
         open.fits(memory::read(state.cast_const())?.nodes)?;
-        let (supple_large { nodes, vectors, model, .. }, arrays) = memory::open(large)?;
-        open.fits(*nodes)?;
-        let storage = storage(arrays, *vectors);
+        open.fits(memory::read(large.cast_const())?.nodes)?;
+        let (model, storage) = opened(large)?;
         let threads = HostThreads::of(threads)?;
         let mut state = loads.attached(opened_of(&open, state)?);
         let count = count.into();

@@ -3,7 +3,7 @@
 
 use core::ffi::c_void;
 
-use crate::learned::{LearnedModel, LearnedReport, vectors_for};
+use crate::learned::{LearnedModel, LearnedReport, LearnedView, vectors_for};
 use crate::material::Law;
 use crate::mlp::Network;
 use crate::state::{NodeVector, StateView};
@@ -20,7 +20,7 @@ use super::step::{HostThreads, answer, reported, supple_report, supple_threads, 
 use supple_status::*;
 
 /// Share of the vertices outside what training has seen beyond which a step is remarked upon.
-const MUCH_OUTSIDE: f32 = 0.01;
+pub(super) const MUCH_OUTSIDE: f32 = 0.01;
 
 /// What a learned step needs.
 #[repr(C)]
@@ -133,14 +133,25 @@ unsafe fn storage<'a>(mut arrays: Arrays, nodes: u32, fallback: bool) -> &'a mut
     unsafe { arrays.change(vectors_for(nodes as usize, fallback)) }
 }
 
+/// The steps in an object, with their storage.
+///
+/// # Safety
+/// As at [`memory::change`].
+pub(super) unsafe fn opened<'a>(object: *mut supple_learned) -> Answer<LearnedView<'a, 'static>> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (supple_learned { nodes, model, .. }, arrays) = memory::open(object)?;
+        let fallback = model.undoes();
+        Ok(model.with_storage(storage(arrays, *nodes, fallback)))
+    }
+}
+
 /// For a motion from rest: frames as at the start, no lead-in yet, nothing has been undone.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_learned_reset(learned: *mut supple_learned) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let reset = || unsafe {
-        let (supple_learned { nodes, model, .. }, arrays) = memory::open(learned)?;
-        let fallback = model.undoes();
-        model.with_storage(storage(arrays, *nodes, fallback)).reset();
+        opened(learned)?.reset();
         Ok(SUPPLE_OK)
     };
     status_of(reset())

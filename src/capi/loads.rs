@@ -66,6 +66,10 @@ impl supple_loads {
         self.nodes
     }
 
+    pub(super) const fn contact(&self) -> *mut supple_contact {
+        self.contact
+    }
+
     pub(super) const fn set_contact(&mut self, contact: *mut supple_contact) {
         self.contact = contact;
     }
@@ -217,7 +221,7 @@ fn room_for(count: u32, room: u32) -> Answer<()> {
 /// Loads of one call that takes steps.
 pub(super) struct CallLoads<'a> {
     pub(super) of_call: LoadsOfCall<'a>,
-    contact: Option<CallContact<'a>>,
+    pub(super) contact: Option<CallContact<'a>>,
 }
 
 impl<'a> CallLoads<'a> {
@@ -243,8 +247,8 @@ impl<'a> CallLoads<'a> {
             let loads = Loads::unchecked(object.gravity, forces, asked, nodes);
             #[cfg(feature = "contact")]
             let loads = match &contact {
-                Some(contact) => loads.touched_by(contact.contact),
-                None => loads,
+                Some(contact) if contact.has_instruments() => loads.touched_by(contact.contact),
+                _ => loads,
             };
             Ok(Self { of_call: LoadsOfCall::new(loads, now), contact })
         }

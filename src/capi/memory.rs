@@ -19,6 +19,13 @@ pub(super) struct Head {
     bytes: usize,
 }
 
+impl Head {
+    /// Of an object that has more bytes than its own arrays need.
+    pub(super) const fn of_bytes(self, bytes: usize) -> Self {
+        Self { bytes, ..self }
+    }
+}
+
 /// An object at the beginning of its memory.
 ///
 /// # Safety

@@ -48,6 +48,8 @@ mod adaptive;
 
 mod reaction;
 
+mod simulation;
+
 mod remarks;
 
 #[cfg(test)]

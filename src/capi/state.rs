@@ -156,7 +156,7 @@ pub unsafe extern "C" fn supple_critical_step(
     status_of(find())
 }
 
-fn critical_step(open: &OpenScene<'_>, state: &mut StateView<'_>) -> Answer<CriticalStep> {
+pub(super) fn critical_step(open: &OpenScene<'_>, state: &mut StateView<'_>) -> Answer<CriticalStep> {
     let critical = tled::critical_step(&open.view(), state);
     critical.ok_or(SUPPLE_E_TOO_STIFF.into())
 }

@@ -208,15 +208,32 @@ pub(super) fn take_steps(
     worst
 }
 
+/// A report of a call that takes steps.
+pub(super) trait Reported {
+    /// Of a call that took none.
+    const NOTHING: Self;
+
+    /// What stopped the call.
+    fn error(&mut self) -> &mut supple_error;
+}
+
+impl Reported for supple_report {
+    const NOTHING: Self = Self::NOTHING;
+
+    fn error(&mut self) -> &mut supple_error {
+        &mut self.error
+    }
+}
+
 /// Does `work`, and writes its report, with what stopped it, to `report`, if that is not NULL.
 ///
 /// # Safety
 /// If not NULL, `report` leads to memory for one.
-pub(super) unsafe fn reported(
-    report: *mut supple_report,
-    work: impl FnOnce(&mut supple_report) -> Answer<supple_status>,
+pub(super) unsafe fn reported<R: Reported>(
+    report: *mut R,
+    work: impl FnOnce(&mut R) -> Answer<supple_status>,
 ) -> supple_status {
-    let mut written = supple_report::NOTHING;
+    let mut written = R::NOTHING;
     if report.is_null() {
         return work(&mut written).unwrap_or_else(|error| error.status);
     }
@@ -226,7 +243,7 @@ pub(super) unsafe fn reported(
         Err(error) => return error.status,
     };
     let answer = work(&mut written);
-    written.error = answer.err().unwrap_or(supple_error::NONE);
+    *written.error() = answer.err().unwrap_or(supple_error::NONE);
     // SAFETY: aligned, and there.
     unsafe { report.write(written) };
     answer.unwrap_or_else(|error| error.status)

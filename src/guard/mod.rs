@@ -23,7 +23,7 @@ pub(crate) use estimate::{exceeds, judged};
 
 use crate::copy::copy;
 use crate::element::ElementMaterial;
-use crate::inertia::{Cells, InertiaError, LargeModel, Method, vectors_for as vectors_for_method};
+use crate::inertia::{self, Cells, InertiaError, LargeModel, Method, vectors_for as vectors_for_method};
 use crate::loads::Loads;
 use crate::material::{Element, Material};
 use crate::scene::SceneView;
@@ -52,6 +52,16 @@ pub(crate) const SECOND_RUN: Method<'static> = Method::Multilevel(Cells::Suggest
 /// Vectors of storage that a guard needs on a scene with these `points` (m).
 pub fn vectors_for<M: Material>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<usize, InertiaError> {
     Ok(vectors_of_state(scene.element(), scene.node_count()) + vectors_for_method(&SECOND_RUN, scene, points)?)
+}
+
+/// No fewer than a guard needs on any scene of so many nodes and elements.
+pub(crate) fn vectors_at_most(element: Element, nodes: usize, elements: usize) -> usize {
+    vectors_of_state(element, nodes).saturating_add(inertia::vectors_at_most(
+        element,
+        nodes,
+        elements,
+        Cells::Suggested,
+    ))
 }
 
 /// Displacements, increments and forces; volumes for elements that have them.

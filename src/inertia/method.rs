@@ -105,6 +105,30 @@ pub const fn vectors_for_lattice(element: Element, nodes: usize, elements: usize
     tables.saturating_add(lists).saturating_add(floats.div_ceil(FLOATS))
 }
 
+/// No fewer than the damped step needs with these cells on any scene of so many nodes and elements.
+#[must_use]
+pub(crate) fn vectors_at_most(element: Element, nodes: usize, elements: usize, cells: Cells) -> usize {
+    let grid = match cells {
+        Cells::Given(cells) => {
+            let points =
+                cells.map(|count| (count as usize).saturating_add(1)).into_iter().fold(1, usize::saturating_mul);
+            Grid { cells, functions: points.min(lattice::MAX_FUNCTIONS) }
+        }
+        Cells::Suggested => {
+            let [_, few] = NODES_PER_FUNCTION;
+            let unknowns = libm::cbrt(most_multiply_adds(elements) as f64) as usize + 1;
+            let functions = lattice::MAX_FUNCTIONS.min(nodes / few + 1).min(unknowns / 3);
+            Grid { cells: [lattice::MAX_POINTS as u32, 1, 1], functions }
+        }
+    };
+    vectors_for_lattice(element, nodes, elements, grid, true)
+}
+
+/// Limit of the third power of the number of unknowns of a suggested lattice.
+fn most_multiply_adds(elements: usize) -> u64 {
+    (MULTIPLY_ADDS * elements as u64).max(FEW_MULTIPLY_ADDS)
+}
+
 /// Floats of a vector.
 const FLOATS: usize = size_of::<NodeVector>() / size_of::<f32>();
 
@@ -155,7 +179,7 @@ fn grid_below<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], below: usize) -> 
         let unknowns = 3 * functions as u64;
         if functions > best.functions
             && functions < below
-            && unknowns * unknowns * unknowns <= (MULTIPLY_ADDS * scene.element_count() as u64).max(FEW_MULTIPLY_ADDS)
+            && unknowns * unknowns * unknowns <= most_multiply_adds(scene.element_count())
         {
             best = Grid { cells, functions };
         }

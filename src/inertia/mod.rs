@@ -119,6 +119,7 @@ pub use large_step::{LargeModel, LargeStep, LargeView};
 pub(crate) use lattice::size_of;
 pub use lattice::{Grid, MAX_FUNCTIONS, MAX_POINTS};
 pub(crate) use local_response::LOCAL_FLOATS;
+pub(crate) use method::vectors_at_most;
 pub use method::{Cells, Method, vectors_for, vectors_for_lattice};
 pub use report::Report;
 

@@ -15,11 +15,13 @@
 //! All but learned steps end where the call says, to a millionth of its span; these end at the nearest of the network's
 //! steps. Prescribed motions without a ramp go evenly over the call.
 
+mod clock;
 mod mover;
 #[cfg(feature = "std")]
 mod owned;
 mod report;
 
+pub(crate) use clock::Clock;
 pub use mover::{Event, ExactSteps, Lead, Mover, Taken};
 #[cfg(feature = "std")]
 pub use owned::{Simulation, SimulationError};

@@ -4,7 +4,7 @@ use super::Report;
 use crate::adaptive::AdaptiveView;
 use crate::element::ElementMaterial;
 use crate::guard::{Estimate, GuardView};
-use crate::inertia::LargeModel;
+use crate::inertia::{self, LargeModel};
 use crate::learned::{LearnedError, LearnedReport, LearnedView, Undone};
 use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::SceneView;
@@ -87,6 +87,8 @@ pub enum Event<'a> {
     Predicts(f64),
     /// What it found; exact steps follow in its place if it was taken back.
     Predicted(LearnedReport),
+    /// What the step beyond the critical one that follows did to inertia.
+    Raised(inertia::Report),
     /// A step, or a refusal; the state is that after it.
     Step(Taken, Status, &'a StateView<'a>),
     /// What is known of the error after a step.
@@ -224,6 +226,9 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         for done in 0..count {
             let loads = self.loads.of_step(state, seconds, count - done);
             let status = model.with_storage(storage).step_in_parts(scene, &loads, state.reborrow(), self.threads);
+            if status.is_taken() {
+                (self.watch)(Event::Raised(*model.report()));
+            }
             (self.watch)(Event::Step(Taken::Long, status, state));
             self.report.enter(status);
             if !status.is_taken() {
@@ -354,7 +359,8 @@ struct Longer<'l, L> {
 
 impl<L: LoadsOverTime> LoadsOverTime for Longer<'_, L> {
     fn of_step(&mut self, state: &StateView<'_>, seconds: f32, left: u32) -> Loads<'_> {
-        let more = if self.rest > 0.0 { (self.rest / f64::from(seconds)) as u32 } else { 0 };
+        // Not one step less for a rounding.
+        let more = if self.rest > 0.0 { libm::round(self.rest / f64::from(seconds)) as u32 } else { 0 };
         self.loads.of_step(state, seconds, left.saturating_add(more))
     }
 }

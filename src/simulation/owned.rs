@@ -5,7 +5,9 @@ use std::boxed::Box;
 use std::vec;
 use std::vec::Vec;
 
-use super::{Event, ExactSteps, LONG_STEPS, LONGEST_STEPS, Lead, Method, Mover, Report, Settings, usual_tolerance};
+use super::{
+    Clock, Event, ExactSteps, LONG_STEPS, LONGEST_STEPS, Lead, Method, Mover, Report, Settings, usual_tolerance,
+};
 use crate::adaptive::{Adaptive, Request};
 use crate::contact::{Contact, ContactError, Instrument, Surface, SurfaceNode, Touch, boundary, boundary_triangles};
 use crate::guard::{self, Allowed, Guard};
@@ -41,9 +43,7 @@ pub struct Simulation<'w> {
     in_step: Vec<Motion>,
     /// None until the first call.
     prepared: Option<Prepared<'w>>,
-    /// Where the last call should have ended, and where it did, s.
-    until: f64,
-    ended: f64,
+    clock: Clock,
 }
 
 /// Steps of a method with their storage.
@@ -101,8 +101,7 @@ impl<'w> Simulation<'w> {
             touchable: (vec![], vec![]),
             in_step: vec![],
             prepared: None,
-            until: 0.0,
-            ended: 0.0,
+            clock: Clock::default(),
         }
     }
 
@@ -148,22 +147,18 @@ impl<'w> Simulation<'w> {
             return Err(SimulationError::Seconds(seconds));
         }
         self.prepare_once()?;
-        let Self { gravity, forces, motions, instruments, scene, state, touchable, in_step, until, ended, .. } = self;
+        let Self { gravity, forces, motions, instruments, scene, state, touchable, in_step, clock, .. } = self;
         let mut loads = Loads::new(&*scene, *gravity, forces, motions)?;
         if !instruments.is_empty() {
             loads = loads.touched_by(Contact::new(surface(touchable, scene.node_count())?, instruments)?);
         }
         in_step.resize(motions.len(), Motion::default());
         let mut loads = LoadsOfCall::new(loads, in_step);
-        // Calls follow each other without a drift, but for states that were restored; and equal calls take equal steps.
-        let now = state.time();
-        let due = if now == *ended { *until } else { now };
-        *until = due + seconds;
-        let end = if (due - now).abs() <= 1e-6 * seconds { now + seconds } else { *until };
+        let end = clock.end_of_call(state.time(), seconds);
         let Some(prepared) = &mut self.prepared else { return Err(SimulationError::NotFinite) };
         let mover = prepared.mover();
         let report = mover.advance(end, scene.view(), &mut loads, state.view(), threads, &mut |_| {})?;
-        *ended = state.time();
+        clock.ended(state.time());
         match report.status {
             Status::Diverged(divergence) => Err(SimulationError::Refused(divergence)),
             _ => Ok(report),

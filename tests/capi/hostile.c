@@ -72,7 +72,7 @@ static void *end_of(const arena *in, size_t bytes) {
 }
 
 /* Objects of all kinds: what a call is told to be at an address may be of any kind. */
-enum { SCENE, STATE, LOADS, LEARNED, LARGE, GUARD, REACTION, ADAPTIVE, CONTACT, KINDS };
+enum { SCENE, STATE, LOADS, LEARNED, LARGE, GUARD, REACTION, ADAPTIVE, CONTACT, SIM, KINDS };
 enum { EACH = 3, SLOTS = KINDS * EACH };
 static struct {
     arena in;
@@ -167,7 +167,7 @@ static supple_error *wanted(void) {
 }
 
 /* The bar in a configuration with a few changes. */
-static supple_status make_scene(void) {
+static supple_scene_config changed_bar(void) {
     static const float constants[3][3] = {{500.0f, 25000.0f, 0.0f}, {59.0f, 8.023f, 60000.0f}, {500.0f, 750.0f, 25000.0f}};
     const int is_small = one_in(5);
     const uint32_t nodes = is_small ? 4 : NODES, elements = is_small ? 1 : TETS;
@@ -222,6 +222,11 @@ static supple_status make_scene(void) {
         const void **pointer = pointers[below(5)];
         *pointer = one_in(2) || *pointer == NULL ? NULL : (const void *)((const char *)*pointer - 1);
     }
+    return config;
+}
+
+static supple_status make_scene(void) {
+    const supple_scene_config config = changed_bar();
     size_t needed = supple_scene_size(config.nodes, config.elements, config.tissues), bytes;
     needed += config.element == SUPPLE_NODAL_STRAIN ? supple_patches_size(config.nodes, config.elements, config.tissues) : 0;
     supple_scene *made = NULL;
@@ -637,6 +642,75 @@ static supple_status advance(void) {
     return status;
 }
 
+/* Lattices are small, or the bytes of all simulations would take most of the time to compare. */
+static supple_settings some_settings(void) {
+    supple_settings made;
+    CHECK(supple_default_settings(&made) == SUPPLE_OK);
+    made.struct_size = number(made.struct_size), made.abi = number(made.abi), made.steps = number(below(4));
+    made.seconds = one_in(2) ? 0.0f : one_in(5) ? wild(1e-3f) : 1e-4f, made.damping = one_in(5) ? wild(20.0f) : 20.0f;
+    made.tolerance = one_in(2) ? 0.0f : one_in(5) ? wild(1e-3f) : 1e-3f;
+    made.guard = number(below(2)), made.fallback = number(below(2)), made.lead_in = (double)(one_in(20) ? wild(0.01f) : 0.0f);
+    for (int axis = 0; axis < 3; axis++) made.cells[axis] = number(1 + below(2));
+    if (made.cells[0] * made.cells[1] * made.cells[2] > 8) made.cells[below(3)] = 0;
+    made.forces = one_in(60) ? 0 : FORCES, made.motions = one_in(60) ? 0 : MOTIONS, made.grips = below(3);
+    made.surface.node_count = one_in(2) ? 0 : one_in(20) ? number(NODES) : 4;
+    if (one_in(made.steps == SUPPLE_STEPS_LEARNED ? 1 : 20)) {
+        made.weights = one_in(40) ? NULL : end_of(&of_weights, (weights_bytes + 63) / 64 * 64), made.weights_bytes = weights_bytes;
+    }
+    return made;
+}
+
+static supple_status make_sim(void) {
+    const supple_scene_config config = changed_bar();
+    const supple_settings settings = some_settings();
+    size_t needed = 64, bytes;
+    const supple_status sized = supple_sim_size(&config, &settings, one_in(60) ? NULL : &needed, wanted());
+    if (sized < 0) return sized;
+    supple_sim *made = NULL;
+    void *at = room(SIM, needed, &bytes);
+    const supple_status status = supple_sim_setup(at, bytes, &config, &settings, one_in(60) ? NULL : &made, wanted());
+    if (status == SUPPLE_E_SHORT && bytes >= needed) fail("a size that is not enough", status);
+    return status;
+}
+
+/* What a host does with a simulation. */
+static supple_status use_sim(void) {
+    supple_sim *sim = object(SIM, 1);
+    supple_sim_objects objects;
+    if (one_in(20) || supple_sim_describe(sim, &objects) != SUPPLE_OK) return supple_sim_describe(sim, one_in(2) ? NULL : &objects);
+    if (one_in(6)) {
+        const supple_settings settings = some_settings();
+        return supple_sim_set(sim, one_in(60) ? NULL : &settings, wanted());
+    }
+    if (one_in(8)) {
+        const float gravity[3] = {wild(10.0f), wild(10.0f), wild(10.0f)};
+        return supple_set_gravity(objects.loads, gravity);
+    }
+    if (one_in(12)) return supple_state_reset(objects.state);
+    if (objects.contact != NULL && one_in(4)) {
+        const supple_instrument ball = {number(SUPPLE_SPHERE), wild(0.01f), 0.0f, 0.3f, {{wild(0.05f), wild(0.05f), 0.03f}, {0, 0, 0, 1}}, NULL, 0};
+        return supple_set_instruments(objects.contact, &ball, below(2), wanted());
+    }
+    const float drawn = one_in(10) ? wild(5e-3f) : 5e-3f;
+    supple_sim_report told;
+    memset(&told, 0xa5, sizeof told);
+    supple_threads room;
+    const supple_status status = supple_sim_advance(sim, drawn > 0.01f && isfinite(drawn) ? 0.01 : (double)drawn, threads(&room), &told);
+    if (!isfinite(told.call.time) || told.call.error.status != (status < 0 ? status : SUPPLE_OK)) {
+        fail("a report that does not fit", status);
+    }
+    if (status == SUPPLE_OK && !(told.estimate.known == 0 || told.estimate.mean <= told.estimate.allowed)) {
+        fail("an estimate that is no number, or too large, is called good", status);
+    }
+    return status;
+}
+
+/* The state of a simulation, if it is one. */
+static uint64_t sim_hash(int slot, int *finite) {
+    supple_sim_objects objects;
+    return supple_sim_describe((supple_sim *)(void *)slots[slot].at, &objects) == SUPPLE_OK ? state_hash(objects.state, finite) : 0;
+}
+
 static supple_status remark(void) {
     const supple_scene *scene = object(SCENE, 0);
     supple_remark *remarks = end_of(&of_out, 4 * sizeof *remarks);
@@ -677,11 +751,11 @@ static supple_status other(void) {
 
 /* Sound objects, one of each kind, with a law, an element, a method and a threading of their own. */
 static void begin_anew(void) {
-    static supple_status (*const makers[])(void) = {make_scene, make_state, set_step, make_loads, make_contact, make_learned, make_large, make_guard, make_adaptive};
+    static supple_status (*const makers[])(void) = {make_scene, make_state, set_step, make_loads, make_contact, make_learned, make_large, make_guard, make_adaptive, make_sim};
     is_calm = 1, doing = "sound objects";
     for (size_t n = 0; n < sizeof makers / sizeof *makers; n++) {
         const supple_status status = makers[n]();
-        if (status < 0 && makers[n] != make_large && makers[n] != make_guard && makers[n] != make_adaptive && makers[n] != set_step) {
+        if (status < 0 && makers[n] != make_large && makers[n] != make_guard && makers[n] != make_adaptive && makers[n] != make_sim && makers[n] != set_step) {
             fail("refused", status);
         }
     }
@@ -697,13 +771,14 @@ static void one_call(void) {
                {"steps beyond the critical one", make_large, 6}, {"a guard", make_guard, 2}, {"set loads", set_loads, 20}, {"read", read_state, 8},
                {"set a step", set_step, 8}, {"save and restore", save_and_restore, 6}, {"steps", step, 50}, {"follow", follow, 8},
                {"a reaction", make_reaction, 3}, {"feel", feel, 8}, {"other", other, 6}, {"adaptive steps", make_adaptive, 2},
-               {"advance", advance, 8}, {"remarks", remark, 4}, {"a contact", make_contact, 4}, {"touch", touch, 20}};
+               {"advance", advance, 8}, {"remarks", remark, 4}, {"a contact", make_contact, 4}, {"touch", touch, 20},
+               {"a simulation", make_sim, 4}, {"use of a simulation", use_sim, 30}};
     int at = 0;
-    for (int draw = (int)below(179); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
+    for (int draw = (int)below(213); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
         draw -= all[at].often;
     }
     doing = all[at].name;
-    uint64_t states[EACH];
+    uint64_t states[EACH], sims[EACH];
     int finite = 1;
     for (int slot = 0; slot < SLOTS; slot++) {
         slots[slot].written = 0;
@@ -711,6 +786,7 @@ static void one_call(void) {
     }
     for (int n = 0; n < EACH; n++) {
         states[n] = state_hash((supple_state *)(void *)slots[STATE * EACH + n].at, &finite);
+        sims[n] = sim_hash(SIM * EACH + n, &finite);
     }
     report.steps = 0, error.status = SUPPLE_OK;
     const supple_status status = all[at].call();
@@ -731,6 +807,10 @@ static void one_call(void) {
         if (!(may_move && slots[slot].written) && now != states[n]) {
             fail("a state has moved", status);
         }
+        const int is_used = all[at].call == use_sim || all[at].call == make_sim;
+        if (sim_hash(SIM * EACH + n, &finite) != sims[n] && !(is_used && slots[SIM * EACH + n].written)) {
+            fail("the state of a simulation has moved", status);
+        }
     }
     if (!finite) {
         fail("a displacement is not finite", status);
@@ -748,7 +828,7 @@ int main(int argc, char **argv) {
     const unsigned long most = strtoul(amount, NULL, 10);
     random_state = argc > 2 ? strtoul(argv[2], NULL, 10) : 1;
     (void)bar_config();
-    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20, 1 << 12, 1 << 20, 1 << 16};
+    static const size_t sizes_of[KINDS] = {4 << 17, 1 << 14, 1 << 13, 1 << 14, 1 << 20, 1 << 20, 1 << 12, 1 << 20, 1 << 16, 1 << 20};
     for (int slot = 0; slot < SLOTS; slot++) {
         slots[slot].in = arena_of(sizes_of[slot / EACH]);
         slots[slot].at = end_of(&slots[slot].in, 64), slots[slot].bytes = 64;

@@ -36,7 +36,7 @@ find_python() {
 programs() {
     cargo build --quiet --release
     local test options element
-    for test in misuse sizes copies switching heap threads stack; do
+    for test in misuse sizes copies simulation switching heap threads stack; do
         options=(-pthread)
         [ $test != heap ] || options=("$wrapped")
         for element in SUPPLE_NODAL_PRESSURE SUPPLE_LINEAR; do
@@ -44,7 +44,7 @@ programs() {
             "$folder/$test"
         done
     done
-    for test in sizes copies switching heap threads stack strain; do
+    for test in sizes copies simulation switching heap threads stack strain; do
         options=(-pthread)
         [ $test != heap ] || options=("$wrapped")
         gcc -std=c11 "${warnings[@]}" "${options[@]}" -DELEMENT=SUPPLE_NODAL_STRAIN tests/capi/$test.c "$static" -o "$folder/$test-strain"
@@ -62,10 +62,11 @@ programs() {
         echo "the README's C has the above lines, examples/bar.c has not" >&2
         exit 1
     fi
-    gcc -std=c11 "${warnings[@]}" -Wl,--gc-sections examples/bar.c "$static" -o "$folder/bar"
-    # The text of its recipe is in the damper that the library has built in; a program that takes exact steps has neither.
+    gcc -std=c11 "${warnings[@]}" examples/bar.c "$static" -o "$folder/bar"
+    # The text of its recipe is in the damper that the library has built in; a program that takes exact steps itself has neither.
+    gcc -std=c11 "${warnings[@]}" -pthread -Wl,--gc-sections tests/capi/threads.c "$static" -o "$folder/threads-alone"
     grep -q "damps rough motion" "$static" || { echo "the library has no damper" >&2; exit 1; }
-    if grep "damps rough motion" "$folder/bar"; then
+    if grep "damps rough motion" "$folder/threads-alone"; then
         echo "exact steps link the damper" >&2
         exit 1
     fi
@@ -126,15 +127,15 @@ SCENE
 
 memory() {
     local test options element
-    for test in misuse copies heap strain threads; do
+    for test in misuse copies simulation heap strain threads; do
         options=(-pthread)
         [ $test != heap ] || options=("$wrapped")
         gcc -std=c11 "${warnings[@]}" "${options[@]}" -DSMALL tests/capi/$test.c "$static" -o "$folder/$test-small"
     done
-    for test in misuse copies heap strain; do
+    for test in misuse copies simulation heap strain; do
         valgrind --quiet --error-exitcode=9 --leak-check=full "$folder/$test-small" under-valgrind >"$folder/said"
     done
-    echo "valgrind: no error in misuse, copies, heap, strain"
+    echo "valgrind: no error in misuse, copies, simulation, heap, strain"
     valgrind --quiet --error-exitcode=9 --tool=helgrind "$folder/threads-small" >"$folder/said"
     echo "helgrind: no race in threads"
 
@@ -142,12 +143,12 @@ memory() {
     # has no sanitizers in a stable compiler, so within the library it is valgrind, and memory that must not be touched around every object
     # of the random calls.
     sanitized=(-fsanitize=address,undefined -fno-sanitize-recover=all)
-    for test in misuse copies strain hostile; do
+    for test in misuse copies simulation strain hostile; do
         element=()
         [ $test != strain ] || element=(-DELEMENT=SUPPLE_NODAL_STRAIN)
         gcc -std=c11 "${warnings[@]}" -O1 "${sanitized[@]}" -DSMALL "${element[@]}" tests/capi/$test.c "$static" -lm -o "$folder/$test-sanitized"
     done
-    for test in misuse copies strain; do
+    for test in misuse copies simulation strain; do
         "$folder/$test-sanitized" >"$folder/said"
     done
     echo "sanitizers: no error in misuse, copies, strain"

@@ -12,6 +12,7 @@ SUPPLE_MEMORY(learned_memory, SUPPLE_LEARNED_SIZE(NODES, 0));
 SUPPLE_MEMORY(large_memory, 4 << 20);
 SUPPLE_MEMORY(guard_memory, 4 << 20);
 SUPPLE_MEMORY(adaptive_memory, 8 << 20);
+SUPPLE_MEMORY(sim_memory, 24 << 20);
 SUPPLE_MEMORY(weights, 40000);
 
 enum { PAINT = 0xA5 };
@@ -29,6 +30,7 @@ static supple_learned *learned;
 static supple_large *large;
 static supple_guard *guard;
 static supple_adaptive *adaptive;
+static supple_sim *sim;
 
 static void nothing(void) {}
 static void init_scene(void) {
@@ -76,6 +78,18 @@ static void advance(void) {
     }
 }
 
+static void sim_setup(void) {
+    supple_settings settings;
+    CHECK(supple_default_settings(&settings) == SUPPLE_OK);
+    settings.steps = SUPPLE_STEPS_DAMPED, settings.damping = 20.0f, settings.seconds = 1e-3f;
+    CHECK(supple_sim_setup(sim_memory, sizeof sim_memory, &scene_config, &settings, &sim, NULL) == SUPPLE_OK);
+}
+static void sim_advance(void) {
+    for (int n = 0; n < 25; n++) {
+        CHECK(supple_sim_advance(sim, 0.01, NULL, NULL) >= 0);
+    }
+}
+
 static void *run(void *call) {
     (*(void (**)(void))call)();
     return NULL;
@@ -114,6 +128,7 @@ int main(void) {
         {"learned_step", learn, 140},   {"large_init", init_large, 36},    {"large_step", step_large, 40},
         {"guard_init", init_guard, 36},    {"guard_follow", follow, 40},
         {"adaptive_init", init_adaptive, 36}, {"adaptive_advance", advance, 42},
+        {"sim_setup", sim_setup, 36}, {"sim_advance", sim_advance, 42},
     };
     const size_t count = sizeof calls / sizeof *calls;
     const uint32_t levels[2] = {supple_level(), SUPPLE_LEVEL_PORTABLE};
