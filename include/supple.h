@@ -1411,6 +1411,10 @@ typedef struct {
      */
     supple_contact *contact;
     /**
+     * The network of SUPPLE_STEPS_LEARNED, to be described or remarked upon; else NULL.
+     */
+    const supple_learned *learned;
+    /**
      * Of the memory that was handed to supple_sim_setup so many bytes are in use: fewer than supple_sim_size.
      */
     size_t bytes;
@@ -2080,7 +2084,7 @@ supple_status supple_reaction_follow(const supple_scene *scene,
 supple_status supple_default_settings(supple_settings *settings);
 
 /**
- * Writes how many bytes of memory are enough for a simulation. supple_sim_objects tells how many it takes.
+ * Writes how many bytes of memory are enough for a simulation. supple_sim_describe tells how many it takes.
  *
  * @param body what it will be built from; of it the numbers of nodes, elements and tissues and the element are looked
  * at.

@@ -151,6 +151,8 @@ pub struct supple_sim_objects {
     pub loads: *mut supple_loads,
     /// The instruments; NULL without a surface.
     pub contact: *mut supple_contact,
+    /// The network of SUPPLE_STEPS_LEARNED, to be described or remarked upon; else NULL.
+    pub learned: *const supple_learned,
     /// Of the memory that was handed to supple_sim_setup so many bytes are in use: fewer than supple_sim_size.
     pub bytes: usize,
 }
@@ -222,7 +224,7 @@ pub unsafe extern "C" fn supple_default_settings(settings: *mut supple_settings)
     status_of(fill())
 }
 
-/// Writes how many bytes of memory are enough for a simulation. supple_sim_objects tells how many it takes.
+/// Writes how many bytes of memory are enough for a simulation. supple_sim_describe tells how many it takes.
 ///
 /// @param body what it will be built from; of it the numbers of nodes, elements and tissues and the element are looked
 /// at.
@@ -565,12 +567,17 @@ unsafe fn objects_of(sim: *mut supple_sim) -> Answer<supple_sim_objects> {
     unsafe {
         memory::is(sim.cast_const())?;
         let at = |place: usize| sim.cast::<u8>().add(place);
-        let &supple_sim { scene, state, loads, contact, end, address, .. } = &*sim;
+        let &supple_sim { scene, state, loads, contact, end, address, ref mover, .. } = &*sim;
+        let learned = match mover {
+            Steps::Learned { steps, .. } => at(*steps).cast::<supple_learned>().cast_const(),
+            _ => ptr::null(),
+        };
         let objects = supple_sim_objects {
             scene: at(scene).cast::<supple_scene>().cast_const(),
             state: at(state).cast(),
             loads: at(loads).cast(),
             contact: if contact > 0 { at(contact).cast() } else { ptr::null_mut() },
+            learned,
             bytes: end,
         };
         if address != sim.addr() {

@@ -67,10 +67,10 @@ def test_moved_nodes_follow(soft):
 @pytest.mark.parametrize(
     ("method", "options", "most"),
     [
-        ("mass-scaled", {"step": 6e-4}, 0.2),
-        ("multilevel", {"step": 2e-3}, 0.03),
         ("damped", {"step": 2e-3}, 0.01),
-        ("adaptive", {"tolerance": 5e-4}, 0.03),
+        ("damped", {}, 0.03),
+        ("auto", {"tolerance": 5e-4}, 0.03),
+        ("auto", {}, 0.03),
     ],
 )
 def test_long_steps_follow_exact_ones(lobe, liver, method, options, most):
@@ -86,6 +86,7 @@ def test_long_steps_follow_exact_ones(lobe, liver, method, options, most):
     error = mean_error(simulation, exact.displacements)
     print(f"{method}: {1e3 * error:.3f} of {1e3 * still:.3f} mm, estimate {1e3 * (report.estimate or 0.0):.3f} mm, {report.status}")
     assert error < most * still
+    assert report.steps == report.exact + report.damped > 0 and (report.damped > 0 or method == "auto")
     assert report.estimate is not None and report.estimate > 0.3 * error - 1e-6
 
 
@@ -165,9 +166,8 @@ def test_a_network_moves_the_bar_of_its_training():
     for method, options in [("exact", {"damping": 20.0}), ("learned", {"weights": ROOT / "weights" / "compact-10-i8.weights"})]:
         simulation = supple.Simulation(scene, method, **options)
         simulation.set_forces(corner, [0.1, 0.0, 0.0], ramp=1.0)
-        if method == "learned":
-            simulation.lead()
-        simulation.advance(0.8 - simulation.time)
+        report = simulation.advance(0.8)
+        assert report.learned > 0 or method == "exact"
         runs.append(simulation.displacements.copy())
     exact, learned = runs
     still = np.linalg.norm(exact, axis=1).mean()

@@ -120,10 +120,10 @@ def test_steps_are_refused_in_words(soft):
     with pytest.raises(supple.UnstableStep, match="above the critical step: node") as caught:
         supple.Simulation(scene, step=0.1).advance(0.1)
     assert caught.value.limit is not None and 1e-5 < caught.value.limit < 1e-2 and caught.value.node is not None
-    with pytest.raises(supple.InputError, match="damped steps need a step, s: the critical one is"):
-        supple.Simulation(scene, "damped")
-    with pytest.raises(supple.InputError, match="adaptive steps need a tolerance"):
-        supple.Simulation(scene, "adaptive")
+    with pytest.raises(supple.InputError, match="step -0.001: it must be a positive number"):
+        supple.Simulation(scene, "damped", step=-0.001)
+    with pytest.raises(supple.InputError, match="tolerance nan: it must be a positive number"):
+        supple.Simulation(scene, "auto", tolerance=np.nan)
     with pytest.raises(supple.InputError, match="method 'fast'"):
         supple.Simulation(scene, "fast")
     with pytest.raises(supple.InputError, match="nowhere.weights: cannot be read"):
@@ -134,6 +134,11 @@ def test_steps_are_refused_in_words(soft):
     for seconds in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(supple.InputError, match="advance by"):
             simulation.advance(seconds)
+    with pytest.raises(supple.InputError, match="take: exact steps without a length"):
+        simulation.take(3)
+    for count in (0, -5, 1.5):
+        with pytest.raises(supple.InputError, match=f"take {count} steps: it must be a whole number, at least 1"):
+            supple.Simulation(scene, step=1e-4).take(count)
     with pytest.raises(supple.InputError, match=r"newton: its shape is \(2, 3\), it must be \(1, 3\)"):
         simulation.set_forces([3], np.zeros((2, 3)))
     with pytest.raises(supple.InputError, match="motions: .* node 5"):

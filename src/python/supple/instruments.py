@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _library as library
 from ._library import ffi, lib
 from .errors import InputError
+from .mesh import Mesh
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,8 +84,8 @@ def _pose(position: ArrayLike, rotation: ArrayLike) -> Any:
 class Contact:
     """The instruments of one simulation; used through `Simulation`."""
 
-    def __init__(self, scene: Any, triangles: bool, grips: int) -> None:
-        points, boundary = scene.mesh.points, scene.mesh.boundary()
+    def __init__(self, mesh: Mesh, scene: Any, triangles: bool, grips: int) -> None:
+        points, boundary = mesh.points, mesh.boundary()
         nodes = np.unique(boundary).astype(np.uint32)
         corners = np.ascontiguousarray(boundary if triangles else boundary[:0])
         surface = ffi.new("supple_surface *")
@@ -94,7 +95,7 @@ class Contact:
         self.memory = library.Memory(size)
         made, error = ffi.new("supple_contact **"), library.new_error()
         status = lib.supple_contact_init(
-            self.memory.pointer, size, scene._raw, library.pointer("float", points), surface, grips, made, error
+            self.memory.pointer, size, scene, library.pointer("float", points), surface, grips, made, error
         )
         library.checked(status, error, "instruments")
         self.raw, self.list = made[0], list[Instrument]()

@@ -1,8 +1,6 @@
-"""What is simulated: a mesh of one tissue with its supports. Built once, used by any number of simulations."""
+"""What is simulated: a mesh of one tissue with its supports. Checked once, used by any number of simulations."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -82,13 +80,17 @@ class Scene:
         made.tetrahedra = library.pointer("uint32_t", mesh.tets)
         made.support = ffi.cast("supple_support *", library.pointer("uint32_t", self._supports))
         made.tissue = tissue
+        self._config, self._tissue = made, tissue
+        # Each simulation builds its own; this one says what is wrong with it, and what it takes.
         size = lib.supple_scene_size(nodes, elements, 1)
         if element == "nodal-strain":
             size += lib.supple_patches_size(nodes, elements, 1)
-        self._memory = library.Memory(size)
+        memory = library.Memory(size)
         scene, error = ffi.new("supple_scene **"), library.new_error()
-        library.checked(lib.supple_scene_init(self._memory.pointer, size, made, scene, error), error, "the scene")
-        self._raw: Any = scene[0]
+        library.checked(lib.supple_scene_init(memory.pointer, size, made, scene, error), error, "the scene")
+        facts = ffi.new("supple_scene_facts *")
+        library.checked(lib.supple_scene_describe(scene[0], facts))
+        self._facts = {name: getattr(facts, name) for name in ("nodes", "elements", "bytes", "operations", "mass")}
 
     def _supports_of(self, fixed: ArrayLike, moved: ArrayLike, axes: str) -> NDArray[np.uint32]:
         nodes = len(self.mesh.points)
@@ -103,9 +105,7 @@ class Scene:
     @property
     def facts(self) -> dict[str, float]:
         """Nodes, elements that move, bytes, floating-point operations of an exact step, mass (kg)."""
-        facts = ffi.new("supple_scene_facts *")
-        library.checked(lib.supple_scene_describe(self._raw, facts))
-        return {name: getattr(facts, name) for name in ("nodes", "elements", "bytes", "operations", "mass")}
+        return dict(self._facts)
 
     def __repr__(self) -> str:
         return f"<supple.Scene: {self.mesh!r}, {self.material!r}, {self.element}>"
