@@ -1583,6 +1583,13 @@ supple_status supple_set_motions(supple_loads *loads,
                                  supple_error *error);
 
 /**
+ * Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned
+ * and mass-scaled steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
+ */
+supple_status supple_set_contact(supple_loads *loads,
+                                 supple_contact *contact);
+
+/**
  * Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is
  * the same as a constant.
  *
@@ -1769,13 +1776,6 @@ supple_status supple_grasp(supple_contact *contact,
  * Lets go what an instrument holds.
  */
 supple_status supple_let_go(supple_contact *contact, uint32_t instrument);
-
-/**
- * Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned
- * and mass-scaled steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
- */
-supple_status supple_set_contact(supple_loads *loads,
-                                 supple_contact *contact);
 
 /**
  * What an instrument felt in the latest steps.

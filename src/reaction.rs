@@ -148,7 +148,7 @@ pub struct ReactionModel {
 
 /// One row of the storage.
 #[derive(Clone, Copy)]
-struct Row {
+struct Weight {
     weight: f32,
     /// 1 for the supports in question, 0 for free nodes, -1 for all other supports.
     kind: f32,
@@ -161,7 +161,7 @@ const ASKED: f32 = 1.0;
 const FREE: f32 = 0.0;
 const OTHER: f32 = -1.0;
 
-impl Row {
+impl Weight {
     const fn of(&NodeVector([weight, kind, sum, count]): &NodeVector) -> Self {
         Self { weight, kind, sum, count }
     }
@@ -188,7 +188,7 @@ impl ReactionModel {
         }
         for (row, inertia) in rows.iter_mut().zip(scene.inertia) {
             let kind = if inertia.held() == Axes::NONE { FREE } else { OTHER };
-            Row { weight: 0.0, kind, sum: 0.0, count: 0.0 }.write(row);
+            Weight { weight: 0.0, kind, sum: 0.0, count: 0.0 }.write(row);
         }
         if supports.is_empty() {
             return Err(ReactionError::Empty);
@@ -273,10 +273,10 @@ fn spread_weights<M>(scene: SceneView<'_, M>, rows: &mut [NodeVector]) -> f32 {
     }
     let mut largest = 0.0f32;
     for row in rows {
-        let Row { weight, kind, sum, count } = Row::of(row);
+        let Weight { weight, kind, sum, count } = Weight::of(row);
         let new = if kind == FREE && count > 0.0 { sum / count } else { weight };
         largest = largest.max((new - weight).abs());
-        Row { weight: new, kind, sum: 0.0, count }.write(row);
+        Weight { weight: new, kind, sum: 0.0, count }.write(row);
     }
     largest
 }
@@ -288,7 +288,7 @@ fn sums<M>(scene: SceneView<'_, M>, state: &StateView<'_>, rows: &[NodeVector]) 
     let (mut weighted, mut alone) = (Sums::default(), Sums::default());
     let vectors = state.increment.iter().zip(&*state.force);
     for ((row, inertia), (increment, force)) in rows.iter().zip(scene.inertia).zip(vectors) {
-        let Row { weight, kind, .. } = Row::of(row);
+        let Weight { weight, kind, .. } = Weight::of(row);
         if weight == 0.0 {
             continue;
         }
@@ -335,7 +335,7 @@ impl<S: AsMut<[NodeVector]> + AsRef<[NodeVector]>> Reaction<S> {
 
     /// The weights of the nodes, from 0 to 1.
     pub fn weights(&self) -> impl Iterator<Item = f32> {
-        self.storage.as_ref().iter().take(self.model.nodes).map(|row| Row::of(row).weight)
+        self.storage.as_ref().iter().take(self.model.nodes).map(|row| Weight::of(row).weight)
     }
 }
 

@@ -16,19 +16,10 @@ const plus = (a, b, factor = 1) => a.map((value, axis) => value + factor * b[axi
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 export class Tool {
-    /** @param {import("./simulation.js").Simulation} simulation, @param mesh with the triangles of its boundary */
-    constructor(simulation, mesh) {
-        const { library, places } = simulation;
-        this.simulation = simulation;
-        this.library = library;
-        this.surface = Uint32Array.from(new Set(mesh.triangles)).sort();
-        const count = this.surface.length;
-        const surface = library.write(library.space("supple_surface"), "supple_surface", {
-            nodes: library.copy(this.surface), node_count: count });
-        const bytes = library.functions.supple_contact_size(count, 0, count);
-        this.contact = simulation.object(
-            "supple_contact_init", bytes, simulation.scene, simulation.points, surface, count, places.made, places.error);
-        library.call("supple_set_contact", simulation.loads, this.contact);
+    /** @param {import("./simulation.js").Simulation} simulation, @param surface numbers of the nodes that it can touch */
+    constructor(simulation, surface) {
+        const { library, contact } = simulation;
+        Object.assign(this, { simulation, library, contact, surface });
         this.places = {
             instrument: library.space("supple_instrument"), pose: library.space("supple_pose"),
             touch: library.space("supple_touch"), held: library.room(4) };

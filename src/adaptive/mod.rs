@@ -92,7 +92,7 @@ impl<'w> AdaptiveModel<'w> {
         storage: &mut [NodeVector],
     ) -> Result<Self, InertiaError> {
         let chooser = Chooser::new(&method, scene, points, state.reborrow(), request)?;
-        let Parts { first, second, .. } = chooser.checked(storage, scene, points)?;
+        let StorageParts { first, second, .. } = chooser.checked(storage, scene, points)?;
         let step = chooser.shortest()?;
         let of_first = LargeModel::prepare(method, scene, points, state.reborrow(), step, first)?;
         let (of_second, watch) = Watch::prepare(scene, points, state, step, 1, second, |state, step, storage| {
@@ -157,16 +157,16 @@ impl Chooser {
         storage: &'a mut [NodeVector],
         scene: SceneView<'_, M>,
         points: &[[f32; 3]],
-    ) -> Result<Parts<'a>, InertiaError> {
+    ) -> Result<StorageParts<'a>, InertiaError> {
         let (needed, capacity) = (vectors_with(self.vectors, scene, points)?, storage.len());
         let error = InertiaError::Capacity { kind: "vectors", needed, capacity };
         if capacity < needed { Err(error) } else { self.parts(storage).ok_or(error) }
     }
 
-    fn parts<'a>(&self, storage: &'a mut [NodeVector]) -> Option<Parts<'a>> {
+    fn parts<'a>(&self, storage: &'a mut [NodeVector]) -> Option<StorageParts<'a>> {
         let (kept, rest) = storage.split_at_mut_checked(vectors_for_pace(self.nodes))?;
         let (first, second) = rest.split_at_mut_checked(self.vectors)?;
-        Some(Parts { kept, first, second })
+        Some(StorageParts { kept, first, second })
     }
 
     /// The shortest step beyond the critical one.
@@ -206,8 +206,8 @@ impl Chooser {
     }
 }
 
-/// Parts of the storage.
-pub(crate) struct Parts<'a> {
+/// StorageParts of the storage.
+pub(crate) struct StorageParts<'a> {
     /// To undo exact steps.
     pub(crate) kept: &'a mut [NodeVector],
     /// Of both runs.
@@ -292,7 +292,7 @@ impl AdaptiveView<'_, '_> {
     ) -> Result<Status, Status> {
         let mismatch = Status::Mismatch { nodes: scene.node_count(), room: 0 };
         let Self { chooser, second: large, watch, storage, .. } = self;
-        let Some(Parts { kept, second, .. }) = chooser.parts(storage) else { return Err(mismatch) };
+        let Some(StorageParts { kept, second, .. }) = chooser.parts(storage) else { return Err(mismatch) };
         let Request { tolerance, longest } = chooser.request;
         let Chooser { control, pace, .. } = &mut **chooser;
         if control.begins_probe() {
@@ -358,7 +358,7 @@ impl AdaptiveView<'_, '_> {
         let (count, mut worst) = (count as u32, Status::Ok);
         for done in 0..count {
             let loads = loads.of_step(&state, seconds, count - done);
-            let Some(Parts { first, second, .. }) = self.chooser.parts(self.storage) else {
+            let Some(StorageParts { first, second, .. }) = self.chooser.parts(self.storage) else {
                 return Err(mismatch);
             };
             let status = self.first.with_storage(first).step_in_parts(scene, &loads, state.reborrow(), threads);

@@ -4,7 +4,7 @@
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
 
-use crate::adaptive::{AdaptiveView, Chooser, Parts, Request, Taken, vectors_with};
+use crate::adaptive::{AdaptiveView, Chooser, Request, StorageParts, Taken, vectors_with};
 use crate::guard::{SECOND_RUN, Watch};
 use crate::inertia::LargeModel;
 use crate::state::{NodeVector, StateView};
@@ -129,7 +129,7 @@ pub unsafe extern "C" fn supple_adaptive_init(
         let points = request.points;
         let scene = open.view();
         let chooser = Chooser::new(&method, scene, points, state.reborrow(), asked)?;
-        let Parts { first: of_first, second: of_second, .. } = chooser.checked(storage, scene, points)?;
+        let StorageParts { first: of_first, second: of_second, .. } = chooser.checked(storage, scene, points)?;
         let step = chooser.shortest()?;
         LargeModel::prepare_in(first, method, scene, points, state.reborrow(), step, of_first)?;
         let prepare = |state: StateView<'_>, step, storage: &mut [NodeVector]| {

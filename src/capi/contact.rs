@@ -9,7 +9,6 @@ use crate::contact::{
 };
 use crate::state::{NodeVector, StateView};
 
-use super::loads::supple_loads;
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for};
 use super::scene::{OpenScene, supple_scene};
 use super::state::{opened, supple_state};
@@ -149,10 +148,10 @@ impl Room {
 
     /// # Safety
     /// The arrays are those of a contact with so much room, and nobody else uses them.
-    unsafe fn parts<'a>(self, mut arrays: Arrays) -> Parts<'a> {
+    unsafe fn parts<'a>(self, mut arrays: Arrays) -> ContactArrays<'a> {
         // SAFETY: the caller's promise. Any bits are each of them.
         unsafe {
-            Parts {
+            ContactArrays {
                 nodes: arrays.change(self.nodes as usize),
                 triangles: arrays.change(self.triangles as usize),
                 grips: arrays.change(self.grips as usize),
@@ -163,7 +162,7 @@ impl Room {
 }
 
 /// The arrays of a contact.
-struct Parts<'a> {
+struct ContactArrays<'a> {
     nodes: &'a mut [SurfaceNode],
     triangles: &'a mut [[u32; 3]],
     grips: &'a mut [Grip],
@@ -171,6 +170,10 @@ struct Parts<'a> {
 }
 
 impl supple_contact {
+    pub(super) const fn nodes(&self) -> u32 {
+        self.nodes
+    }
+
     const fn room(&self) -> Room {
         Room { nodes: self.surface, triangles: self.triangles, grips: self.grip_room }
     }
@@ -363,7 +366,7 @@ pub unsafe extern "C" fn supple_grasp(
         let Some(tool) = list.get(instrument as usize) else {
             return Err(supple_error::from(SUPPLE_E_CAPACITY).value(instrument.into(), object.instruments.into()));
         };
-        let Parts { nodes, grips, .. } = object.room().parts(arrays);
+        let ContactArrays { nodes, grips, .. } = object.room().parts(arrays);
         let surface = Surface::new(nodes, object.nodes as usize).map_err(|_| supple_error::from(SUPPLE_E_INDEX))?;
         let near = || tool.grips(instrument, surface, state.displacements(), state.time(), within);
         let old = object.grips as usize;
@@ -411,7 +414,7 @@ pub unsafe extern "C" fn supple_let_go(contact: *mut supple_contact, instrument:
     // SAFETY: what the header asks of the caller.
     let let_go = || unsafe {
         let (object, arrays) = memory::open(contact)?;
-        let Parts { grips, .. } = object.room().parts(arrays);
+        let ContactArrays { grips, .. } = object.room().parts(arrays);
         let mut end = 0;
         for at in 0..object.grips as usize {
             if let Some(grip) = grips.get(at).copied().filter(|grip| grip.instrument != instrument)
@@ -425,28 +428,6 @@ pub unsafe extern "C" fn supple_let_go(contact: *mut supple_contact, instrument:
         Ok(SUPPLE_OK)
     };
     status_of(let_go())
-}
-
-/// Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned
-/// and mass-scaled steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn supple_set_contact(loads: *mut supple_loads, contact: *mut supple_contact) -> supple_status {
-    // SAFETY: what the header asks of the caller.
-    let set = || unsafe {
-        let loads = memory::change(loads)?;
-        if !contact.is_null() {
-            if !cfg!(feature = "contact") {
-                return Err(SUPPLE_E_NO_CONTACT.into());
-            }
-            let nodes = memory::read(contact.cast_const())?.nodes;
-            if nodes != loads.nodes() {
-                return Err(super::status::mismatch(nodes as usize, loads.nodes() as usize));
-            }
-        }
-        loads.set_contact(contact);
-        Ok(SUPPLE_OK)
-    };
-    status_of(set())
 }
 
 /// What an instrument felt in the latest steps.

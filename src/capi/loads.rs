@@ -10,7 +10,7 @@ use crate::state::StateView;
 use super::contact::{CallContact, supple_contact};
 use super::memory::{self, Head, Layout, Object, Place, array, magic, place_for};
 use super::scene::{OpenScene, axes_of, check_choice, supple_scene};
-use super::status::{Answer, status_of, supple_error, supple_status};
+use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
 use supple_status::*;
 
 /// A force on one node. Forces on the same node add up.
@@ -209,6 +209,28 @@ pub unsafe extern "C" fn supple_set_motions(
     };
     // SAFETY: as above.
     unsafe { memory::answered(set(), error) }
+}
+
+/// Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned
+/// and mass-scaled steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_set_contact(loads: *mut supple_loads, contact: *mut supple_contact) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let set = || unsafe {
+        let loads = memory::change(loads)?;
+        if !contact.is_null() {
+            if !cfg!(feature = "contact") {
+                return Err(SUPPLE_E_NO_CONTACT.into());
+            }
+            let nodes = memory::read(contact.cast_const())?.nodes();
+            if nodes != loads.nodes() {
+                return Err(mismatch(nodes as usize, loads.nodes() as usize));
+            }
+        }
+        loads.set_contact(contact);
+        Ok(SUPPLE_OK)
+    };
+    status_of(set())
 }
 
 fn room_for(count: u32, room: u32) -> Answer<()> {

@@ -297,7 +297,7 @@ pub unsafe extern "C" fn supple_scene_init(
     // SAFETY: what the header asks of the caller.
     let init = || unsafe {
         let (config, scene) = (one(config)?, place_for(scene)?);
-        let (law, element, parts) = Parts::checked(config)?;
+        let (law, element, parts) = CheckedBody::checked(config)?;
         let &supple_scene_config { nodes, elements, tissues, .. } = config;
         let without_patches = layout(nodes, elements, tissues, 0).bytes();
         let room = match bytes.min(isize::MAX as usize).checked_sub(without_patches) {
@@ -321,14 +321,14 @@ pub unsafe extern "C" fn supple_scene_init(
 }
 
 /// What a scene is built from, checked as far as it can be without building it.
-struct Parts<'a> {
+struct CheckedBody<'a> {
     mesh: Mesh<'a>,
     supports: &'a [supple_support],
     tissues: &'a [supple_tissue],
     of_element: &'a [u16],
 }
 
-impl<'a> Parts<'a> {
+impl<'a> CheckedBody<'a> {
     /// # Safety
     /// The arrays of the configuration are as the header says.
     unsafe fn checked(config: &'a supple_scene_config) -> Answer<(SceneLaw, Element, Self)> {

@@ -17,13 +17,13 @@ use crate::tled::{Pace, vectors_for_pace};
 
 use super::SUPPLE_NONE;
 use super::adaptive::{self, supple_adaptive, supple_adaptive_init, supple_adaptive_size};
-use super::contact::{CallContact, Felt, supple_contact, supple_contact_init, supple_contact_size, supple_set_contact};
+use super::contact::{CallContact, Felt, supple_contact, supple_contact_init, supple_contact_size};
 use super::guard::{self, supple_estimate, supple_guard, supple_guard_config, supple_guard_init, supple_guard_size};
 use super::large::{self, SUPPLE_DAMPED, supple_large, supple_large_config, supple_large_init, supple_large_size};
 use super::learned::{
     self, MUCH_OUTSIDE, supple_learned, supple_learned_config, supple_learned_init, supple_learned_size,
 };
-use super::loads::{CallLoads, supple_loads, supple_loads_init, supple_loads_size};
+use super::loads::{CallLoads, supple_loads, supple_loads_init, supple_loads_size, supple_set_contact};
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for, same_abi};
 use super::scene::{
     OpenScene, check_choice, supple_patches_size, supple_scene, supple_scene_config, supple_scene_init,

@@ -55,7 +55,8 @@ pub fn vectors_for<M: Material>(scene: SceneView<'_, M>, points: &[[f32; 3]]) ->
 }
 
 /// No fewer than a guard needs on any scene of so many nodes and elements.
-pub(crate) fn vectors_at_most(element: Element, nodes: usize, elements: usize) -> usize {
+#[must_use]
+pub fn vectors_at_most(element: Element, nodes: usize, elements: usize) -> usize {
     vectors_of_state(element, nodes).saturating_add(inertia::vectors_at_most(
         element,
         nodes,

@@ -8,15 +8,15 @@
 //! tissue without tension. In crushed elements the terms are `iso grad phi_c . grad phi_d I + volume (C grad phi_c)(C
 //! grad phi_d)^T`. At a node that is held along some axes a function has a different gradient for each axis.
 //!
-//! Most elements lie in a patch of at most two cells along each axis, with 8, 12, 18 or 27 functions. Elements of a
-//! batch that share a patch are added together: first products over the patch's functions, then one addition to the
+//! Most elements lie in a box of at most two cells along each axis, with 8, 12, 18 or 27 functions. Elements of a
+//! batch that share a box are added together: first products over the box's functions, then one addition to the
 //! matrix for each pair of functions. The others are added to the matrix directly (direct_assembly.rs).
 
 use glam::Vec4;
 
+use super::cell_boxes::{CellBox, locate};
 use super::direct_assembly::{NO_SLOTS, TOUCHED};
 use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS};
-use super::patches::{Patch, locate};
 use crate::element::{ElementTile, NodeInertia, TileTangents};
 use crate::simd::{Kernel, Real, TILE, dispatch, write_rows};
 
@@ -145,21 +145,21 @@ pub(super) fn add_four(row: &mut [f32], column: usize, values: Vec4) {
     }
 }
 
-/// Where an element lies in its patch.
+/// Where an element lies in its box.
 #[derive(Clone, Copy, Default)]
 struct Located {
     /// The position of each node in its cell, 0 to 1 or outside. The fourth component is one if the node is free, else
     /// zero.
     within: [[f32; 4]; 4],
-    /// The cell of each node, from the lowest one of the patch. In bytes, because a batch is on the stack.
+    /// The cell of each node, from the lowest one of the box. In bytes, because a batch is on the stack.
     cells: [[u8; 3]; 4],
 }
 
 /// Elements whose products are summed before they are added to the matrix.
 const GROUP: usize = 8;
-/// Most functions of a patch, rounded up to whole vectors.
+/// Most functions of a box, rounded up to whole vectors.
 const SLOTS: usize = 2 * TILE;
-/// The three derivatives of each function of a patch along the spatial axes.
+/// The three derivatives of each function of a box along the spatial axes.
 type Derivatives = [[f32; SLOTS]; 3];
 /// Those of one vector of functions, with four factors: that of the inner product, that of the outer one, that of the
 /// exchanged one, and the sum of the latter two.
@@ -200,7 +200,7 @@ impl Kernel for Batch<'_, '_> {
     fn run<R: Real>(self) {
         let Self { mut assembly, elements } = self;
         let mut located = [Located::default(); BATCH];
-        // The patch and, in the last byte, the index of each element; zero if it lies in no patch. Elements of a patch
+        // The box and, in the last byte, the index of each element; zero if it lies in no box. Elements of a box
         // follow each other.
         let mut keys = [0u64; BATCH];
         let mut slots = NO_SLOTS;
@@ -209,19 +209,19 @@ impl Kernel for Batch<'_, '_> {
             match locate(assembly.lattice, assembly.nodes, assembly.inertia, &element.nodes)
                 .filter(|_| element.tangent.is_spatial())
             {
-                Some((patch, nodes)) => {
+                Some((cells, nodes)) => {
                     for corner in 0..4 {
                         let [cell, within] = nodes[corner];
                         let [x, y, z, _] = cell.to_array();
                         located[index].cells[corner] = [x as u8, y as u8, z as u8];
                         located[index].within[corner] = within.to_array();
                     }
-                    keys[index] = patch.key() << 8 | index as u64;
+                    keys[index] = cells.key() << 8 | index as u64;
                 }
                 _ => assembly.add_directly::<TOUCHED>(element.corners(), &element.tangent, &mut slots),
             }
         }
-        // Vectors of eight, because most patches have 8 or 12 functions.
+        // Vectors of eight, because most boxes have 8 or 12 functions.
         let mut scratch = Scratch::<R::Width8>::new();
         let mut rest: &[u64] = &keys;
         while let Some(&key) = rest.first() {
@@ -233,21 +233,21 @@ impl Kernel for Batch<'_, '_> {
             let first = (key & 0xff) as usize;
             let (group, located) = (elements.get(first..first + group.len()), located.get(first..));
             if let Some((group, located)) = group.zip(located).filter(|_| key != 0) {
-                let slots = PatchSlots::new(Patch::of_key(key >> 8), assembly.lattice);
+                let slots = BoxSlots::new(CellBox::of_key(key >> 8), assembly.lattice);
                 assembly.add_group(group, located, &slots, &mut scratch);
             }
         }
     }
 }
 
-/// Weights along an axis of the layers of functions of a patch for a node in cell `cell` of it, at `within`.
+/// Weights along an axis of the layers of functions of a box for a node in cell `cell` of it, at `within`.
 #[inline(always)]
 fn layer_weights(cell: u8, within: f32) -> [f32; 3] {
     let (near, far) = (1.0 - within, within);
     match cell {
         0 => [near, far, 0.0],
         1 => [0.0, near, far],
-        // On the upper border of the patch.
+        // On the upper border of the box.
         _ => [0.0, 0.0, near],
     }
 }
@@ -269,26 +269,26 @@ fn write_slots<R: Real>(slots: &mut [f32; SLOTS], first: usize, values: R) {
     }
 }
 
-/// The functions of a patch, in ascending order.
-struct PatchSlots {
+/// The functions of a box, in ascending order.
+struct BoxSlots {
     count: usize,
     /// For each axis and each of its at most three layers of functions: one in the slots of that layer, else zero.
     layers: [[[f32; SLOTS]; 3]; 3],
     functions: [usize; SLOTS],
 }
 
-impl PatchSlots {
+impl BoxSlots {
     #[inline(always)]
-    fn new(patch: Patch, lattice: &Lattice) -> Self {
+    fn new(cells: CellBox, lattice: &Lattice) -> Self {
         let mut slots = Self { count: 0, layers: [[[0.0; SLOTS]; 3]; 3], functions: [MAX_FUNCTIONS; SLOTS] };
         let [inner, middle, outer] = lattice.axes();
         let mut offset = [0u8; 3];
-        for k in 0..=patch.cells[outer % 3] {
-            for j in 0..=patch.cells[middle % 3] {
-                for i in 0..=patch.cells[inner % 3] {
+        for k in 0..=cells.cells[outer % 3] {
+            for j in 0..=cells.cells[middle % 3] {
+                for i in 0..=cells.cells[inner % 3] {
                     (offset[inner % 3], offset[middle % 3], offset[outer % 3]) = (i, j, k);
                     let slot = slots.count % SLOTS;
-                    slots.functions[slot] = lattice.function_at(patch.low, offset);
+                    slots.functions[slot] = lattice.function_at(cells.low, offset);
                     for axis in 0..3 {
                         slots.layers[axis][usize::from(offset[axis]) % 3][slot] = 1.0;
                     }
@@ -301,13 +301,13 @@ impl PatchSlots {
 }
 
 impl Assembly<'_> {
-    /// Adds the tangents of elements of one patch, at most [`GROUP`].
+    /// Adds the tangents of elements of one box, at most [`GROUP`].
     #[inline(always)]
     fn add_group<R: Real>(
         &mut self,
         group: &[ElementTangent],
         located: &[Located],
-        slots: &PatchSlots,
+        slots: &BoxSlots,
         scratch: &mut Scratch<R>,
     ) {
         let Scratch { derivatives, scaled } = scratch;
@@ -330,7 +330,7 @@ impl Assembly<'_> {
 
     /// Adds products of the function in slot `row` with those of the slots from `first` on, up to itself.
     #[inline(always)]
-    fn add_products<R: Real>(&mut self, sums: &[[R; 3]; 3], row: usize, first: usize, slots: &PatchSlots) {
+    fn add_products<R: Real>(&mut self, sums: &[[R; 3]; 3], row: usize, first: usize, slots: &BoxSlots) {
         let function = slots.functions[row % SLOTS];
         let rows = self.matrix.get_mut(3 * function * self.stride..).unwrap_or_default();
         let Some((row_x, rows)) = rows.split_at_mut_checked(self.stride) else {
@@ -359,9 +359,9 @@ impl Assembly<'_> {
     }
 }
 
-/// The derivatives of the patch's functions in an element.
+/// The derivatives of the box's functions in an element.
 #[inline(always)]
-fn derive<R: Real>(element: &ElementTangent, located: &Located, slots: &PatchSlots, derivatives: &mut Derivatives) {
+fn derive<R: Real>(element: &ElementTangent, located: &Located, slots: &BoxSlots, derivatives: &mut Derivatives) {
     let [cx, cy, cz] = element.tangent.columns.map(Vec4::from);
     let images = element.gradients.map(|[x, y, z]| (cx * x + cy * y + cz * z).to_array());
     let mut weights = [[[0.0; 3]; 3]; 4];

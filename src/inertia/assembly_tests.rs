@@ -1,11 +1,11 @@
 //! The lattice's matrices, compared with direct sums.
 
 use super::assembly::{Assembly, BATCH, ElementTangent, Tangent};
+use super::cell_boxes::locate;
 use super::dense::{row_length, stride};
 use super::direct_assembly::NO_SLOTS;
 use super::lattice::{Lattice, LatticeNode, sort_by_cell};
 use super::nodal_sums::{FunctionInertia, add_inertia, add_mass, times, write_mass};
-use super::patches::locate;
 use super::projected_inertia::{CellSums, add_cell};
 use crate::element::NodeInertia;
 use crate::element::symmetric::Symmetric;
@@ -49,11 +49,11 @@ fn worst(a: &[f32], b: &[f32], stride: usize) -> f32 {
 }
 
 #[test]
-fn stiffness_from_patches_is_that_from_single_elements() {
+fn stiffness_from_boxes_is_that_from_single_elements() {
     let (lattice, places, inertia) = scene();
     let stride = stride(lattice.functions());
     let empty = vec![0.0; 3 * lattice.functions() * stride];
-    let (mut by_patches, mut direct) = (empty.clone(), empty);
+    let (mut by_boxes, mut direct) = (empty.clone(), empty);
     let mut elements = Vec::new();
     let mut random = random();
     let mut counts = [0; 4];
@@ -77,15 +77,15 @@ fn stiffness_from_patches_is_that_from_single_elements() {
         let matrix = &mut direct;
         let mut assembly = Assembly { lattice: &lattice, nodes: &places, inertia: &inertia, matrix, stride };
         assembly.add_element(&element, &mut NO_SLOTS.clone());
-        let cells = locate(&lattice, &places, &inertia, &element.nodes).map(|(patch, _)| patch.cells.iter().product());
+        let cells = locate(&lattice, &places, &inertia, &element.nodes).map(|(cells, _)| cells.cells.iter().product());
         counts[cells.map_or(3, |cells: u8| cells.ilog2().min(2) as usize)] += 1;
         elements.push(element);
     }
     for batch in elements.chunks(BATCH) {
-        let matrix = &mut by_patches;
+        let matrix = &mut by_boxes;
         Assembly { lattice: &lattice, nodes: &places, inertia: &inertia, matrix, stride }.add(batch);
     }
-    let worst = worst(&by_patches, &direct, stride);
+    let worst = worst(&by_boxes, &direct, stride);
     let [one, two, more, single] = counts;
     println!("{one} elements in one cell, {two} in two, {more} in more, {single} single: relative error {worst:.1e}");
     assert!(one > 100 && two > 100 && more > 100 && single > 10);

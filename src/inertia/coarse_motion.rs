@@ -176,7 +176,7 @@ impl CoarseMotion<'_> {
             next.0 = (Vec4::from(next.0) + Vec4::from(last.0)).to_array();
         }
         let strain = lattice.largest_strain(&solution, refresh.frames.since_rest());
-        let change = strain + lattice.largest_bending(&refresh.frames);
+        let change = strain + lattice.largest_bending(|function| refresh.frames.in_latest_step(function));
         let work = match (self.supports, pulled) {
             (Some(pull), Some(share)) => self.work(pull, share, &solution),
             _ => 0.0,

@@ -1,4 +1,4 @@
-//! Tangents that are added to the matrix directly: those of elements in no patch of cells, of crushed elements, and of
+//! Tangents that are added to the matrix directly: those of elements in no box of cells, of crushed elements, and of
 //! patches of nodal strain. First the derivatives of each function that is not zero at the nodes, then the products of
 //! all pairs of them.
 

@@ -14,13 +14,13 @@ use crate::simd::{Contiguous, NodeVector};
 use crate::state::{Moment, Progress, StateView};
 use crate::step::{CallingThread, Status, Step, Threads, nodal_volumes};
 
+use super::cell_boxes::sort_by_box;
 use super::damper::RoughMotion;
 use super::lattice::{Grid, Lattice, LatticeNode, node_at, rank_of, sort_by_cell};
 use super::matrices::Matrices;
 use super::method::{Cells, Method, largest_grid, vectors_for_lattice, vectors_of_order, vectors_of_places};
 use super::node::{Scaling, half_damping};
 use super::node_tables::{NodeTables, read_matrices};
-use super::patches::sort_by_patch;
 use super::refresh::{Refresh, RefreshInput};
 use super::{
     COARSE, CYCLE, CYCLE_STEPS, FINE, FINE_WITHOUT_LATTICE, InertiaError, LATTICE_CYCLE_STEPS, Report, node_tables,
@@ -58,7 +58,7 @@ pub struct LargeModel<'w> {
 pub(super) struct Storage<'a> {
     pub(super) tables: NodeTables<'a>,
     pub(super) places: &'a mut [LatticeNode],
-    /// The elements in the order of their patches of cells (`assembly.rs`); empty without a lattice, and with nodal
+    /// The elements in the order of their boxes of cells (`assembly.rs`); empty without a lattice, and with nodal
     /// strain.
     pub(super) order: &'a mut [u32],
     pub(super) matrices: Matrices<'a>,
@@ -205,7 +205,7 @@ impl<'w> LargeModel<'w> {
         write_heights(scene, &mut tables);
         self.choose_frames(scene, points, &mut tables, places)?;
         if !scene.element().is_nodal_strain() {
-            self.moved_elements = sort_by_patch(order, scene, &self.lattice, places);
+            self.moved_elements = sort_by_box(order, scene, &self.lattice, places);
         }
         let StateView { displacement, increment, volume, progress, .. } = state;
         self.moment = progress.moment();

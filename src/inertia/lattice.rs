@@ -7,10 +7,9 @@ use core::{array, fmt};
 
 use bytemuck::{Pod, Zeroable};
 
-use glam::Vec4;
+use glam::{Mat3, Vec4};
 
 use super::InertiaError;
-use super::frames::{Frames, Matrix};
 use crate::element::NodeInertia;
 use crate::padding;
 use crate::simd::NodeVector;
@@ -401,7 +400,7 @@ impl Lattice {
 
     /// Largest strain of a cell for vectors of the functions (m), with the rotation of each function since rest. A
     /// translation or a rotation is none.
-    pub(super) fn largest_strain(&self, vectors: &CoarseVectors, rotations: &[Matrix]) -> f32 {
+    pub(super) fn largest_strain(&self, vectors: &CoarseVectors, rotations: &[[[f32; 3]; 3]]) -> f32 {
         let mut largest = 0.0;
         let mut per_metre = [0.0; 3];
         for axis in 0..3 {
@@ -446,12 +445,12 @@ impl Lattice {
         libm::sqrtf(largest)
     }
 
-    /// Largest rotation of neighbouring functions relative to each other in the latest step, rad.
-    pub(super) fn largest_bending(&self, frames: &Frames) -> f32 {
+    /// Largest rotation of neighbouring functions relative to each other, rad, with that of each function.
+    pub(super) fn largest_bending(&self, rotation: impl Fn(usize) -> Mat3) -> f32 {
         let mut largest = 0.0;
         self.for_each_edge(|a, b, _| {
             if a < MAX_FUNCTIONS && b < MAX_FUNCTIONS {
-                let difference = frames.in_latest_step(a) - frames.in_latest_step(b);
+                let difference = rotation(a) - rotation(b);
                 let square = difference.to_cols_array().iter().map(|entry| entry * entry).sum::<f32>();
                 largest = f32::max(largest, 0.5 * square);
             }

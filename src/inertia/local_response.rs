@@ -11,7 +11,7 @@ use super::matrices::Matrices;
 use super::nodal_sums;
 use crate::contact::TouchedPoint;
 
-/// Functions of a patch of four cells.
+/// Functions of a box of four cells.
 pub(super) const MOST_LISTED: usize = 18;
 const STRIDE: usize = stride(MOST_LISTED);
 

@@ -107,7 +107,7 @@ pub const fn vectors_for_lattice(element: Element, nodes: usize, elements: usize
 
 /// No fewer than the damped step needs with these cells on any scene of so many nodes and elements.
 #[must_use]
-pub(crate) fn vectors_at_most(element: Element, nodes: usize, elements: usize, cells: Cells) -> usize {
+pub fn vectors_at_most(element: Element, nodes: usize, elements: usize, cells: Cells) -> usize {
     let grid = match cells {
         Cells::Given(cells) => {
             let points =

@@ -83,6 +83,7 @@ mod added_motion;
 mod assembly;
 #[cfg(test)]
 mod assembly_tests;
+mod cell_boxes;
 mod cells;
 mod coarse_motion;
 mod contact;
@@ -104,7 +105,6 @@ mod node_refresh;
 mod node_tables;
 mod parts;
 mod pass_input;
-mod patches;
 mod projected_inertia;
 mod refresh;
 mod report;
@@ -119,8 +119,7 @@ pub use large_step::{LargeModel, LargeStep, LargeView};
 pub(crate) use lattice::size_of;
 pub use lattice::{Grid, MAX_FUNCTIONS, MAX_POINTS};
 pub(crate) use local_response::LOCAL_FLOATS;
-pub(crate) use method::vectors_at_most;
-pub use method::{Cells, Method, vectors_for, vectors_for_lattice};
+pub use method::{Cells, Method, vectors_at_most, vectors_for, vectors_for_lattice};
 pub use report::Report;
 
 use core::fmt;

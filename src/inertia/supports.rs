@@ -134,10 +134,10 @@ mod tests {
     use super::*;
     use crate::element::Axes;
     use crate::inertia::assembly::Assembly;
+    use crate::inertia::cell_boxes::sort_by_box;
     use crate::inertia::dense::to_components;
     use crate::inertia::dense::{apply_lower, stride};
     use crate::inertia::lattice::sort_by_cell;
-    use crate::inertia::patches::sort_by_patch;
     use crate::loads::Motion;
     use crate::material::{NeoHookean, Tissue};
     use crate::mesh::{Bar, Mesh, Winding};
@@ -162,7 +162,7 @@ mod tests {
         let mut places: Vec<_> = points.iter().map(|&point| lattice.place(point)).collect();
         sort_by_cell(&mut places);
         let mut order = vec![0; tets.len()];
-        let touching = sort_by_patch(&mut order, scene, &lattice, &places);
+        let touching = sort_by_box(&mut order, scene, &lattice, &places);
         let expected = tets.iter().filter(|tet| tet.iter().any(|node| moved.contains(node))).count();
         assert_eq!(touching, expected);
 

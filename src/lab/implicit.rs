@@ -54,7 +54,7 @@ pub(super) fn prepare<'a>(
     let elements: Vec<[usize; 4]> = tangents.iter().map(|tangent| tangent.nodes).collect();
     let vector = |values: [f32; 3]| DVec3::from_array(values.map(f64::from));
     let nodes = 0..scene.node_count();
-    let mut body = Body {
+    let mut body = ImplicitMotion {
         rule,
         scene,
         dt: f64::from(dt),
@@ -74,7 +74,7 @@ pub(super) fn prepare<'a>(
 }
 
 /// A body in motion, in float64.
-struct Body<'a> {
+struct ImplicitMotion<'a> {
     rule: Rule,
     scene: SceneView<'a, VecMaterial>,
     dt: f64,
@@ -90,7 +90,7 @@ struct Body<'a> {
     matrix: Matrix,
 }
 
-impl Body<'_> {
+impl ImplicitMotion<'_> {
     /// Takes a step and gives it to `state`.
     fn step(&mut self, loads: &Loads<'_>, state: &mut VecState) -> Status {
         let h = match self.rule {
@@ -233,14 +233,14 @@ fn norm(vectors: &[DVec3]) -> f64 {
 }
 
 /// Three columns of four numbers, the fourth zero.
-type Part = [[f32; 4]; 3];
+type NodeBlock = [[f32; 4]; 3];
 
 /// A sparse matrix of parts of 3 x 3, by rows of nodes.
 struct Matrix {
     /// Where each node's row starts, and the end of the last.
     starts: Vec<usize>,
     columns: Vec<u32>,
-    parts: Vec<Part>,
+    parts: Vec<NodeBlock>,
     /// The place of each node's own part.
     diagonal: Vec<usize>,
     /// Places of the parts of each element, by rows and columns of its nodes.
@@ -269,7 +269,7 @@ impl Matrix {
         Self {
             diagonal: (0..node_count).map(|node| place(node, node)).collect(),
             places: elements.iter().map(|nodes| nodes.map(|row| nodes.map(|column| place(row, column)))).collect(),
-            parts: vec![Part::default(); columns.len()],
+            parts: vec![NodeBlock::default(); columns.len()],
             starts,
             columns,
         }
@@ -277,7 +277,7 @@ impl Matrix {
 
     /// Begins with `mass` on the diagonal.
     fn start(&mut self, mass: impl Fn(usize) -> f64) {
-        self.parts.fill(Part::default());
+        self.parts.fill(NodeBlock::default());
         for (node, &place) in self.diagonal.iter().enumerate() {
             for axis in 0..3 {
                 self.parts[place][axis][axis] = mass(node) as f32;
@@ -327,7 +327,7 @@ impl Matrix {
     }
 
     /// The inverse of a node's own part along free axes.
-    fn inverse_of_diagonal(&self, node: usize, free: &[f32; 4]) -> Part {
+    fn inverse_of_diagonal(&self, node: usize, free: &[f32; 4]) -> NodeBlock {
         let mut part = self.parts[self.diagonal[node]];
         for (i, column) in part.iter_mut().enumerate() {
             for j in 0..3 {
@@ -354,12 +354,12 @@ fn narrow(vectors: Vec<[f32; 4]>) -> Vec<DVec3> {
 struct Solve<'a> {
     matrix: &'a Matrix,
     free: Vec<[f32; 4]>,
-    inverse: Vec<Part>,
+    inverse: Vec<NodeBlock>,
     right: Vec<[f32; 4]>,
 }
 
 #[inline(always)]
-fn times(part: &Part, vector: &[f32; 4], sum: &mut [f32; 4]) {
+fn times(part: &NodeBlock, vector: &[f32; 4], sum: &mut [f32; 4]) {
     for (column, value) in part.iter().zip(vector) {
         for (sum, entry) in sum.iter_mut().zip(column) {
             *sum += entry * value;

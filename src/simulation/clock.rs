@@ -2,7 +2,7 @@
 
 /// Calls follow each other without a drift, but for states that were restored; and equal calls take equal steps.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Clock {
+pub struct Clock {
     /// Where the last call should have ended, and where it did, s.
     until: f64,
     ended: f64,
@@ -10,14 +10,14 @@ pub(crate) struct Clock {
 
 impl Clock {
     /// When a call ends that begins `now` and goes on for so many `seconds`, s.
-    pub(crate) fn end_of_call(&mut self, now: f64, seconds: f64) -> f64 {
+    pub fn end_of_call(&mut self, now: f64, seconds: f64) -> f64 {
         let due = if now == self.ended { self.until } else { now };
         self.until = due + seconds;
         if libm::fabs(due - now) <= 1e-6 * seconds { now + seconds } else { self.until }
     }
 
     /// The call has ended at this time, s.
-    pub(crate) const fn ended(&mut self, time: f64) {
+    pub const fn ended(&mut self, time: f64) {
         self.ended = time;
     }
 }

@@ -21,7 +21,7 @@ mod mover;
 mod owned;
 mod report;
 
-pub(crate) use clock::Clock;
+pub use clock::Clock;
 pub use mover::{Event, ExactSteps, Lead, Mover, Taken};
 #[cfg(feature = "std")]
 pub use owned::{Simulation, SimulationError};

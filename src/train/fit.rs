@@ -28,12 +28,12 @@ use crate::mlp::{self, Activation, Description, LayerDescription, Network, Range
 
 /// Both parts.
 #[derive(Module, Debug)]
-struct Parts {
+struct Layers {
     first: Vec<Linear>,
     second: Vec<Linear>,
 }
 
-impl Parts {
+impl Layers {
     fn new(recipe: &Recipe, device: &Device) -> Self {
         let part = |inputs: usize, hidden: &[usize]| -> Vec<Linear> {
             let widths: Vec<usize> = [inputs].into_iter().chain(hidden.iter().copied()).chain([PREDICTED]).collect();
@@ -121,7 +121,7 @@ pub fn fit(
     let (inputs, targets) = seen.ranges();
     let device = Device::default().autodiff();
     device.seed(recipe.seed);
-    let mut parts = Parts::new(recipe, &device);
+    let mut parts = Layers::new(recipe, &device);
     let mut adam = AdamConfig::new().init();
     let mut first = 0;
     let folder = checkpoints.map(|path| Folder { path, hash: &hash });
@@ -132,7 +132,7 @@ pub fn fit(
         first = epoch;
     }
 
-    let rows = Rows::of(&seen, &inputs, &targets);
+    let rows = ScaledSamples::of(&seen, &inputs, &targets);
     let count = rows.inputs.len();
     let mut training = Training { recipe, rows, device, start: Instant::now(), taken: 0 };
     let mut loss = f64::NAN;
@@ -153,13 +153,13 @@ pub fn fit(
 }
 
 /// Samples over their scales, the smooth ones first, and the weight of each in the loss.
-struct Rows {
+struct ScaledSamples {
     inputs: Vec<[f32; FEATURES]>,
     targets: Vec<[f32; PREDICTED]>,
     weights: Vec<[f32; 1]>,
 }
 
-impl Rows {
+impl ScaledSamples {
     fn of(samples: &Samples, inputs: &[Range], targets: &[Range]) -> Self {
         let mut rows = Self {
             inputs: scaled(&samples.inputs, inputs),
@@ -176,7 +176,7 @@ impl Rows {
 /// What the epochs of a training share.
 struct Training<'a> {
     recipe: &'a Recipe,
-    rows: Rows,
+    rows: ScaledSamples,
     device: Device,
     start: Instant,
     /// Samples since the start.
@@ -188,10 +188,10 @@ impl Training<'_> {
     fn epoch(
         &mut self,
         epoch: usize,
-        mut parts: Parts,
+        mut parts: Layers,
         adam: &mut ModuleOptimizer,
         progress: &mut impl FnMut(&Progress) -> ControlFlow<()>,
-    ) -> Result<(Parts, f64), TrainError> {
+    ) -> Result<(Layers, f64), TrainError> {
         let Self { recipe: Recipe { training, network, seed, .. }, rows, device, start, taken } = self;
         let count = rows.inputs.len();
         let order = shuffled(count, seed.wrapping_add(epoch as u64));
@@ -234,7 +234,7 @@ impl Training<'_> {
     }
 }
 
-/// Rows over the scales.
+/// ScaledSamples over the scales.
 fn scaled<const N: usize>(rows: &[[f32; N]], ranges: &[Range]) -> Vec<[f32; N]> {
     let over = |row: &[f32; N]| core::array::from_fn(|column| row[column] / ranges[column].scale);
     rows.iter().map(over).collect()
@@ -260,7 +260,7 @@ fn described<'a>(
     scene: &dyn TrainingScene,
     text: &'a str,
     recipe_hash: [u8; 32],
-    parts: &Parts,
+    parts: &Layers,
     inputs: Vec<Range>,
     outputs: Vec<Range>,
 ) -> Result<Description<'a>, TrainError> {
@@ -347,7 +347,12 @@ impl Folder<'_> {
         epoch.map(Some).ok_or_else(|| TrainError::Checkpoint(self.mark(), format!("cannot be read: {text:?}")))
     }
 
-    fn load(&self, epoch: usize, parts: Parts, adam: ModuleOptimizer) -> Result<(Parts, ModuleOptimizer), TrainError> {
+    fn load(
+        &self,
+        epoch: usize,
+        parts: Layers,
+        adam: ModuleOptimizer,
+    ) -> Result<(Layers, ModuleOptimizer), TrainError> {
         let [weights, state] = self.files(epoch);
         let problem = |path: &Path, text: String| TrainError::Checkpoint(path.to_path_buf(), text);
         let parts = parts.try_load_file(&weights).map_err(|error| problem(&weights, error.to_string()))?;
@@ -355,7 +360,7 @@ impl Folder<'_> {
         Ok((parts, adam))
     }
 
-    fn save(&self, epoch: usize, parts: &Parts, adam: &ModuleOptimizer) -> Result<(), TrainError> {
+    fn save(&self, epoch: usize, parts: &Layers, adam: &ModuleOptimizer) -> Result<(), TrainError> {
         let problem = |path: &Path, text: String| TrainError::Checkpoint(path.to_path_buf(), text);
         std::fs::create_dir_all(self.path).map_err(|error| problem(self.path, error.to_string()))?;
         let [weights, state] = self.files(epoch);

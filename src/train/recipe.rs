@@ -55,7 +55,7 @@ pub struct Recipe {
     /// Step of the network over that of the exact step, [`super::TrainingScene::step`].
     pub multiple: u32,
     /// What is learned from.
-    pub motion: Motion,
+    pub motion: MotionRecipe,
     /// Rough motion to learn from as well.
     #[serde(default)]
     pub noise: Option<Noise>,
@@ -68,7 +68,7 @@ pub struct Recipe {
 /// What is learned from.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
-pub struct Motion {
+pub struct MotionRecipe {
     /// A name that whoever makes the scene knows, or a scene file, `NAME.toml`.
     pub scene: String,
     /// Tetrahedra that it is made of, if not those of the scene.
@@ -159,7 +159,7 @@ pub enum Decay {
     Cosine,
 }
 
-impl Motion {
+impl MotionRecipe {
     /// Whether the scene is that of a file.
     #[must_use]
     pub fn is_file(&self) -> bool {

@@ -15,7 +15,7 @@ const puppeteer = createRequire(new URL("../../examples/page/package.json", impo
 const file = process.env.SUPPLE_PAGE;
 const nextToPage = (name) => join(dirname(file), name);
 const DOME = [-0.01, 0.004, 0.0605]; // a point of the tissue that the camera sees, m
-const METHODS = ["exact", "damped", "adaptive"];
+const METHODS = ["exact", "damped", "auto"];
 const WIDE = { width: 1280, height: 900 };
 const NARROW = { width: 400, height: 860, hasTouch: true, isMobile: true };
 let browser;
@@ -245,7 +245,7 @@ test("what the kernel refuses is said in its words, and a reset helps", async (c
     assert.match(await text(page, "message"), /^The kernel: .*instrument/);
     movedAndCameBack(await drag(page, "mouse", [20, -60]));
     assert.equal(await text(page, "message"), "");
-    await page.evaluate(() => window.supple.send({ type: "method", method: "adaptive", tolerance: NaN }));
+    await page.evaluate(() => window.supple.send({ type: "method", method: "auto", tolerance: NaN }));
     await page.waitForFunction(() => window.supple.latest.halted);
     assert.match(await text(page, "message"), /^The kernel: .*stands still: reset it/);
     assert.ok(await page.$eval("#reset", (button) => button.classList.contains("asked")));

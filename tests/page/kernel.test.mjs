@@ -188,7 +188,7 @@ test("an instrument that cannot be is refused in the library's words", () => {
     assert.equal(refused.name, "SUPPLE_E_INSTRUMENT");
     assert.equal(refused.text, library(simulation, "SUPPLE_E_INSTRUMENT"));
     assert.equal(simulation.frame().refusal, null);
-    simulation.setMethod("adaptive", NaN);
+    simulation.setMethod("auto", NaN);
     assert.ok(simulation.frame().halted);
     simulation.setMethod("damped", 0.001);
     movedAndCameBack(play(simulation, "press", [0, 0, 0]));

@@ -14,13 +14,13 @@ pub(crate) mod train;
 use std::path::Path;
 
 use supple_cli::problem::{End, Problem};
-use supple_cli::report::{self, Part};
+use supple_cli::report::{self, ReportPart};
 use supple_cli::screen::output;
 
 use crate::report::NAMES;
 
 /// Adds a part to the report, and says where results are.
-fn finish(out: &Path, results: &str, name: &str, part: &Part) -> Result<End, Problem> {
+fn finish(out: &Path, results: &str, name: &str, part: &ReportPart) -> Result<End, Problem> {
     let report = report::add(out, &NAMES, name, part)?;
     output!("\nresults  {}", out.join(results).display());
     output!("report   {}", report.display());

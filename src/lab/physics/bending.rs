@@ -7,9 +7,9 @@ use supple::loads::Loads;
 use supple::material::Element;
 use supple::scene::Axes;
 
-use super::body::{Body, Elastic, fixed};
 use super::mesh::{BodyMesh, same};
 use super::rest::mean_displacement;
+use super::specimen::{Elastic, Specimen, fixed};
 use super::steps::TO_REST;
 use super::{LabError, Row};
 
@@ -62,7 +62,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
     Ok(rows)
 }
 
-fn body(cells: u32, elastic: Elastic) -> Body {
+fn body(cells: u32, elastic: Elastic) -> Specimen {
     let map = |[x, y, z]: [f64; 3]| [LENGTH * x, WIDTH * y, WIDTH * z];
     let mesh = BodyMesh::grid([8 * cells, cells, cells], map);
     let middle = 0.5 * WIDTH;
@@ -72,5 +72,5 @@ fn body(cells: u32, elastic: Elastic) -> Body {
         fixed(mesh.nodes(|[x, _, z]| same(x, 0.0) && same(z, middle)), Axes::Z),
     ]
     .concat();
-    Body { mesh, elastic, density: DENSITY as f32, supports, masses: Vec::new() }
+    Specimen { mesh, elastic, density: DENSITY as f32, supports, masses: Vec::new() }
 }

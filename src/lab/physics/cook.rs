@@ -17,9 +17,9 @@ use supple::loads::Loads;
 use supple::material::Element;
 use supple::scene::Axes;
 
-use super::body::{Body, Elastic, fixed};
 use super::mesh::{BodyMesh, same};
 use super::rest::mean_displacement;
+use super::specimen::{Elastic, Specimen, fixed};
 use super::steps::{Steps, TO_REST};
 use super::{LabError, Row, pressure, report};
 
@@ -65,7 +65,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
 }
 
 /// Adds the rows of a run. Gives the rises of the corner and of the side, m, and a row without quantity.
-fn measured(body: &Body, element: Element, steps: Steps, rows: &mut Vec<Row>) -> (Option<[f64; 2]>, Row) {
+fn measured(body: &Specimen, element: Element, steps: Steps, rows: &mut Vec<Row>) -> (Option<[f64; 2]>, Row) {
     let right = body.mesh.nodes(|[x, ..]| same(x, 0.048));
     let forces = body.mesh.traction(&right, (2.0 / OMEGA) as f32, |_| [0.0, TRACTION, 0.0]);
     let corner = body.mesh.nodes(|[x, y, _]| same(x, 0.048) && same(y, 0.06));
@@ -98,7 +98,7 @@ fn measured(body: &Body, element: Element, steps: Steps, rows: &mut Vec<Row>) ->
     (rises, row)
 }
 
-fn body(cells: u32, graded: bool) -> Body {
+fn body(cells: u32, graded: bool) -> Specimen {
     let thickness = 0.044 / f64::from(cells);
     let mut mesh = BodyMesh::grid([cells, cells, 1], |[s, t, z]| {
         let (s, t) = if graded { shrunk(s, t) } else { (s, t) };
@@ -109,7 +109,7 @@ fn body(cells: u32, graded: bool) -> Body {
     }
     let supports =
         [fixed(mesh.nodes(|_| true), Axes::Z), fixed(mesh.nodes(|[x, ..]| same(x, 0.0)), Axes::X.union(Axes::Y))];
-    Body { supports: supports.concat(), mesh, elastic: ELASTIC, density: 1000.0, masses: Vec::new() }
+    Specimen { supports: supports.concat(), mesh, elastic: ELASTIC, density: 1000.0, masses: Vec::new() }
 }
 
 /// Parameters of the graded grid: cells shrink towards the sides `s` = 1 and `t` = 0, and squares around the corner (0, 1) towards it.

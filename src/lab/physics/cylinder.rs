@@ -8,8 +8,8 @@ use supple::material::Element;
 use supple::scene::Axes;
 use supple::state::VecState;
 
-use super::body::{Body, Elastic, fixed};
 use super::mesh::{BodyMesh, same};
+use super::specimen::{Elastic, Specimen, fixed};
 use super::steps::{EXACT, Steps, TO_REST};
 use super::{LabError, Row, report};
 
@@ -32,7 +32,7 @@ const OMEGA: f64 = 500.0;
 const SOURCE: &str = "Lame; plane strain";
 
 pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
-    let grids: Vec<Body> = CELLS.into_iter().take(meshes).map(|cells| body(grid(cells))).collect();
+    let grids: Vec<Specimen> = CELLS.into_iter().take(meshes).map(|cells| body(grid(cells))).collect();
     let irregular = (0..FILES.len()).take(meshes).map(|index| Ok(body(irregular(index)?)));
     let mut rows = Vec::new();
     for bodies in [grids, irregular.collect::<Result<_, LabError>>()?] {
@@ -53,7 +53,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
 }
 
 /// Adds the rows of a run. Gives the radial displacements, m, and a row without quantity.
-fn measured(body: &Body, element: Element, steps: Steps, rows: &mut Vec<Row>) -> (Option<[f64; 2]>, Row) {
+fn measured(body: &Specimen, element: Element, steps: Steps, rows: &mut Vec<Row>) -> (Option<[f64; 2]>, Row) {
     let [inner, outer] = [INNER, OUTER].map(|radius| body.mesh.nodes(|[x, y, _]| same(x.hypot(y), radius)));
     let pascal = PRESSURE * ELASTIC.young;
     let forces = body.mesh.traction(&inner, (2.0 / OMEGA) as f32, |normal| normal.map(|x| -pascal * x));
@@ -96,7 +96,7 @@ pub(super) fn irregular(index: usize) -> Result<BodyMesh, LabError> {
     BodyMesh::gmsh(name, bytes)
 }
 
-fn body(mesh: BodyMesh) -> Body {
+fn body(mesh: BodyMesh) -> Specimen {
     let thickness = mesh.points.iter().map(|point| f64::from(point[2])).fold(0.0, f64::max);
     let supports = [
         fixed(mesh.nodes(|[.., z]| same(z, 0.0) || same(z, thickness)), Axes::Z),
@@ -104,7 +104,7 @@ fn body(mesh: BodyMesh) -> Body {
         fixed(mesh.nodes(|[x, ..]| same(x, 0.0)), Axes::X),
     ]
     .concat();
-    Body { mesh, elastic: ELASTIC, density: 1000.0, supports, masses: Vec::new() }
+    Specimen { mesh, elastic: ELASTIC, density: 1000.0, supports, masses: Vec::new() }
 }
 
 /// Mean radial displacement of nodes, m.

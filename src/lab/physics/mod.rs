@@ -17,7 +17,6 @@
 //! | `figure`, `locking`, `svg` | pictures of error over computing time, and of the beam at rest |
 
 mod bending;
-mod body;
 mod cook;
 mod cylinder;
 mod figure;
@@ -29,6 +28,7 @@ pub mod recordings;
 pub mod report;
 mod rest;
 mod silicone;
+mod specimen;
 mod steps;
 mod svg;
 mod swing;

@@ -11,7 +11,7 @@ use supple::material::Element;
 use supple::simd::NodeVector;
 
 use super::Row;
-use super::body::Body;
+use super::specimen::Specimen;
 use crate::scenes::volume;
 
 pub(super) const ELEMENTS: &str = "pressure oscillation between elements over mean pressure";
@@ -20,7 +20,7 @@ pub(super) const NODES: &str = "pressure oscillation between nodes over mean pre
 /// From element to element, and with nodal pressure from node to node.
 pub(super) type Oscillation = (f64, Option<f64>);
 
-pub(super) fn oscillation(body: &Body, element: Element, displacements: &[NodeVector]) -> Oscillation {
+pub(super) fn oscillation(body: &Specimen, element: Element, displacements: &[NodeVector]) -> Oscillation {
     let tets = &body.mesh.tets;
     let volumes: Vec<(f64, f64)> = tets
         .iter()

@@ -10,9 +10,9 @@ use supple::scene::{Axes, Support};
 use supple::state::VecState;
 use supple::tled;
 
-use super::body::{Body, Cost, Elastic, Setup, fixed};
 use super::mesh::{BodyMesh, same};
 use super::pressure::Oscillation;
+use super::specimen::{Cost, Elastic, Setup, Specimen, fixed};
 use super::steps::TO_REST;
 use super::{LabError, Row, pressure};
 
@@ -79,7 +79,7 @@ fn distance(parameter: f64) -> f64 {
     RADIUS * (1.0 + 2.0 * ((GROWTH * outside).exp() - 1.0) / GROWTH)
 }
 
-fn body(cells: u32) -> Body {
+fn body(cells: u32) -> Specimen {
     // Squares around the corner become quarters of circles.
     let map = |[s, t, z]: [f64; 3]| {
         let (radius, below) = (distance(s.max(t)), -distance(1.0 - z));
@@ -99,7 +99,7 @@ fn body(cells: u32) -> Body {
         moved(Axes::XYZ, mesh.nodes(is_far)),
         moved(Axes::Z, mesh.nodes(is_under)),
     ];
-    Body { supports: supports.concat(), mesh, elastic: ELASTIC, density: 1000.0, masses: Vec::new() }
+    Specimen { supports: supports.concat(), mesh, elastic: ELASTIC, density: 1000.0, masses: Vec::new() }
 }
 
 fn is_far([x, y, z]: [f64; 3]) -> bool {
@@ -127,7 +127,7 @@ fn boussinesq([x, y, z]: [f64; 3], force: f64) -> [f64; 3] {
 /// `far_force`.
 fn pressed(
     setup: &Setup<'_>,
-    body: &Body,
+    body: &Specimen,
     element: Element,
     far_force: f64,
 ) -> Result<((f64, Oscillation), Cost), LabError> {

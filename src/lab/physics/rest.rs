@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use supple::loads::Loads;
 use supple::state::VecState;
 
-use super::body::{Cost, Setup};
+use super::specimen::{Cost, Setup};
 use super::steps::Kind;
 use crate::LabError;
 

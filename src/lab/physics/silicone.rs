@@ -9,9 +9,9 @@ use supple::material::Element;
 use supple::scene::{Axes, Support};
 use supple::state::VecState;
 
-use super::body::{Body, Cost, Elastic, Setup, fixed};
 use super::mesh::{BodyMesh, GRID, same};
 use super::recordings::{DAMPING, GRAVITY, LEFT, LOAD, MARKERS, Measured, Recording};
+use super::specimen::{Cost, Elastic, Setup, Specimen, fixed};
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
 use super::swing::{Markers, Swing};
 use super::{LabError, Row};
@@ -149,7 +149,7 @@ pub(super) fn grid(cells: [u32; 3]) -> BodyMesh {
     BodyMesh::grid(cells, |at| core::array::from_fn(|axis| at[axis] * SIZE[axis]))
 }
 
-pub(super) fn body(mesh: BodyMesh, load: Load) -> Body {
+pub(super) fn body(mesh: BodyMesh, load: Load) -> Specimen {
     let supports: Vec<Support> = fixed(mesh.nodes(|[x, ..]| same(x, 0.0)), Axes::XYZ);
     // Each node of the edge has half of the way to its neighbours.
     let mut edge = mesh.nodes(|[x, _, z]| same(x, SIZE[0]) && same(z, SIZE[2]));
@@ -161,7 +161,7 @@ pub(super) fn body(mesh: BodyMesh, load: Load) -> Body {
         masses[index].1 += half as f32;
         masses[index + 1].1 += half as f32;
     }
-    Body { mesh, elastic: Elastic { young: 263_824.0, poisson: 0.499 }, density: 1070.0, supports, masses }
+    Specimen { mesh, elastic: Elastic { young: 263_824.0, poisson: 0.499 }, density: 1070.0, supports, masses }
 }
 
 pub(super) fn markers(mesh: &BodyMesh) -> Markers {
@@ -169,7 +169,7 @@ pub(super) fn markers(mesh: &BodyMesh) -> Markers {
 }
 
 /// The swing, and what the markers do; the cost is that of the swing.
-fn swing_and_rest(setup: &Setup<'_>, body: &Body, load: Load) -> Result<((Swing, [Measured; 3]), Cost), LabError> {
+fn swing_and_rest(setup: &Setup<'_>, body: &Specimen, load: Load) -> Result<((Swing, [Measured; 3]), Cost), LabError> {
     let (swing, mut state, cost) = let_go(setup, body, load, DAMPING)?;
     let (markers, omega) = (markers(&body.mesh), core::f64::consts::PI / swing.half_period());
     setup.settle(&mut state, &weight(setup)?, omega, |state| markers.drops(state)[LEFT])?;
@@ -178,7 +178,7 @@ fn swing_and_rest(setup: &Setup<'_>, body: &Body, load: Load) -> Result<((Swing,
 }
 
 /// The swing alone with a damping (1/s), and the state after it.
-fn let_go(setup: &Setup<'_>, body: &Body, load: Load, damping: f32) -> Result<(Swing, VecState, Cost), LabError> {
+fn let_go(setup: &Setup<'_>, body: &Specimen, load: Load, damping: f32) -> Result<(Swing, VecState, Cost), LabError> {
     let mut state = VecState::at_rest(setup.scene.node_count());
     let asked = (load.seconds, damping);
     let (swing, cost) = Swing::of(setup, &weight(setup)?, &mut state, &markers(&body.mesh), asked)?;
@@ -186,7 +186,7 @@ fn let_go(setup: &Setup<'_>, body: &Body, load: Load, damping: f32) -> Result<(S
 }
 
 /// The shape at rest, without a swing.
-pub(super) fn hung(setup: &Setup<'_>, body: &Body) -> Result<(VecState, Cost), LabError> {
+pub(super) fn hung(setup: &Setup<'_>, body: &Specimen) -> Result<(VecState, Cost), LabError> {
     let markers = markers(&body.mesh);
     // Half a period of 0.23 s.
     setup.at_rest(&weight(setup)?, 27.0, |state| markers.drops(state)[LEFT])

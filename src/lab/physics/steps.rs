@@ -8,7 +8,7 @@ use supple::state::VecState;
 use supple::step::{Status, Step};
 use supple::tled;
 
-use super::body::Setup;
+use super::specimen::Setup;
 use crate::{LabError, implicit};
 
 /// A way to take steps.

@@ -8,9 +8,9 @@ use glam::{DMat3, DVec3};
 use supple::loads::Loads;
 use supple::state::VecState;
 
-use super::body::{Cost, Setup};
 use super::mesh::BodyMesh;
 use super::recordings::{Curve, LEFT, MARKERS, Measured};
+use super::specimen::{Cost, Setup};
 use crate::LabError;
 
 /// Time between samples, if steps are shorter.

@@ -9,8 +9,8 @@ use supple::scene::{Axes, Support};
 use supple::state::VecState;
 use supple::tled;
 
-use super::body::{Body, Cost, Elastic, Setup, fixed};
 use super::mesh::{BodyMesh, same};
+use super::specimen::{Cost, Elastic, Setup, Specimen, fixed};
 use super::steps::{EXACT, TO_REST};
 use super::{LabError, Row, report};
 
@@ -54,7 +54,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
     Ok(rows)
 }
 
-fn body(cells: u32) -> Body {
+fn body(cells: u32) -> Specimen {
     let map = |[x, y, z]: [f64; 3]| [WIDTH * (x - 0.5), WIDTH * (y - 0.5), LENGTH * z];
     let mesh = BodyMesh::grid([cells, cells, cells / 2], map);
     let in_plane = Axes::X.union(Axes::Y);
@@ -66,7 +66,7 @@ fn body(cells: u32) -> Body {
         fixed(mesh.nodes(|point| point.into_iter().all(|x| same(x, 0.0))), Axes::Z),
     ]
     .concat();
-    Body { mesh, elastic: ELASTIC, density: 1000.0, supports, masses: Vec::new() }
+    Specimen { mesh, elastic: ELASTIC, density: 1000.0, supports, masses: Vec::new() }
 }
 
 /// The torque that turns the end, N m.

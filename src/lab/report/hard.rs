@@ -2,7 +2,7 @@
 
 use supple_cli::report::made::Made;
 use supple_cli::report::plots::{self, COLOURS, Curve, DashType, GREY, MarkerSymbol, short};
-use supple_cli::report::{Figure, Panel, Part, Section};
+use supple_cli::report::{Figure, Panel, ReportPart, Section};
 use supple_lab::evaluate::unique;
 use supple_lab::hard::report;
 use supple_lab::hard::verdict::{Judged, Verdict};
@@ -12,11 +12,11 @@ pub(crate) const NAME: &str = "hard";
 /// Runs whose errors are drawn over time: the worst that are silent, then the worst others.
 const DRAWN: usize = 60;
 
-pub(crate) fn part(judged: &[Judged]) -> Part {
+pub(crate) fn part(judged: &[Judged]) -> ReportPart {
     let seeds = "random scene N is made from the number N alone";
     let mut section = estimates(judged);
     section.listing = Some(report::text(judged));
-    Part { made: Made::by_this_command(seeds), sections: vec![section, over_time(judged)] }
+    ReportPart { made: Made::by_this_command(seeds), sections: vec![section, over_time(judged)] }
 }
 
 fn words(run: &Judged) -> String {

@@ -5,7 +5,7 @@ use supple::mesh::boundary;
 use supple_cli::report::bodies::{Bodies, View, distances, lengths, mean_millimetres, moved};
 use supple_cli::report::made::Made;
 use supple_cli::report::plots::{self, COLOURS, Curve, DashType, GREY, MarkerSymbol, Plot, short};
-use supple_cli::report::{Figure, Panel, Part, Section, Table};
+use supple_cli::report::{Figure, Panel, ReportPart, Section, Table};
 use supple_lab::evaluate::{Evaluation, unique};
 use supple_lab::method::Method;
 use supple_lab::networks::Family;
@@ -25,13 +25,13 @@ fn methods(rows: &[Row]) -> Vec<Method> {
 }
 
 /// The part of an evaluation; `swept` is the scene whose errors are drawn over the step.
-pub(crate) fn part(evaluation: &Evaluation, swept: Option<&str>) -> Part {
+pub(crate) fn part(evaluation: &Evaluation, swept: Option<&str>) -> ReportPart {
     let mut sections = vec![speed(evaluation), over_time(evaluation)];
     sections.extend(swept.and_then(|scene| over_step(evaluation, scene)));
     sections.extend(paper_bars(evaluation));
     sections.extend(paper_bodies(evaluation));
     let seeds = "none: the runs of a scene are the same each time, but for their computing times";
-    Part { made: Made::by_this_command(seeds), sections }
+    ReportPart { made: Made::by_this_command(seeds), sections }
 }
 
 fn colour(methods: &[Method], method: Method) -> &'static str {

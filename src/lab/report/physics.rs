@@ -2,13 +2,13 @@
 
 use supple_cli::report::made::Made;
 use supple_cli::report::plots::{self, COLOURS, Curve, DashType, MarkerSymbol, short};
-use supple_cli::report::{Figure, Panel, Part, Section, Table};
+use supple_cli::report::{Figure, Panel, ReportPart, Section, Table};
 use supple_lab::evaluate::unique;
 use supple_lab::physics::Row;
 
 pub(crate) const NAME: &str = "physics";
 
-pub(crate) fn part(rows: &[Row]) -> Part {
+pub(crate) fn part(rows: &[Row]) -> ReportPart {
     let names = unique(rows.iter().map(|row| (row.case, &*row.quantity)));
     let panels = names.into_iter().filter_map(|(case, quantity)| {
         let of = rows.iter().filter(|row| row.case == case && row.quantity == quantity);
@@ -26,7 +26,7 @@ pub(crate) fn part(rows: &[Row]) -> Part {
         figures: vec![Figure::choice(caption, panels.collect())],
         ..Section::default()
     };
-    Part { made: Made::by_this_command("none"), sections: vec![section] }
+    ReportPart { made: Made::by_this_command("none"), sections: vec![section] }
 }
 
 /// Error, its unit, computing time.

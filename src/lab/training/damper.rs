@@ -57,7 +57,7 @@ pub struct Recipe {
     /// What is searched.
     pub damper: Shape,
     /// What it is judged on.
-    pub motion: Vec<Motion>,
+    pub motion: Vec<TrialMotion>,
     /// How.
     pub search: Search,
 }
@@ -73,7 +73,7 @@ pub struct Shape {
 /// What it is judged on.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
-pub struct Motion {
+pub struct TrialMotion {
     /// A scene of the laboratory.
     pub scene: String,
     /// Times its forces.
@@ -106,7 +106,7 @@ impl Recipe {
         if motion.is_empty() {
             return Err(TrainError::Recipe("no [[motion]]: at least one is needed to judge by".to_string()));
         }
-        for Motion { load, multiples, .. } in motion {
+        for TrialMotion { load, multiples, .. } in motion {
             if !(load.is_finite() && *load != 0.0) {
                 return refuse("load", load, "it must be a number other than zero");
             }

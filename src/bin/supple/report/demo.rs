@@ -5,7 +5,7 @@ use super::bodies::{distances, lengths, mean_millimetres};
 use super::made::Made;
 use super::plots::{self, COLOURS, Curve, DashType, GREY, short};
 use super::simulation::body;
-use super::{Figure, Panel, Part, Section, Table};
+use super::{Figure, Panel, ReportPart, Section, Table};
 use crate::run::outcome::Outcome;
 use crate::scene::setup::Setup;
 
@@ -166,12 +166,12 @@ const TERMS: [&str; 2] = [
              estimates the error while the simulation runs; a step is inexact where the estimate exceeds a fifth of the motion so far. The table has the longest step of each run.",
 ];
 
-pub(crate) fn part(cases: &[Compared]) -> Part {
+pub(crate) fn part(cases: &[Compared]) -> ReportPart {
     let mut sections: Vec<_> = cases.iter().map(section).collect();
     if let Some(first) = sections.first_mut() {
         first.paragraphs.splice(0..0, TERMS.map(String::from));
     }
-    Part { made: Made::by_this_command("none"), sections }
+    ReportPart { made: Made::by_this_command("none"), sections }
 }
 
 fn section(case: &Compared) -> Section {

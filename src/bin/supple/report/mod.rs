@@ -32,7 +32,7 @@ pub(crate) const FILE: &str = "report.html";
 
 /// What one command adds to a report.
 #[derive(Deserialize, Serialize)]
-pub struct Part {
+pub struct ReportPart {
     pub made: Made,
     pub sections: Vec<Section>,
 }
@@ -98,7 +98,7 @@ impl Figure {
 
 /// Adds a part, or puts it in the place of an earlier one of this name, to the report in a folder: parts are kept in
 /// `report/NAME.json`, and those of `names` are shown in this order. Gives the path of the report.
-pub fn add(folder: &Path, names: &[&str], name: &str, part: &Part) -> Result<PathBuf, Problem> {
+pub fn add(folder: &Path, names: &[&str], name: &str, part: &ReportPart) -> Result<PathBuf, Problem> {
     let parts = folder.join("report");
     fs::create_dir_all(&parts).map_err(|error| Problem::in_file(&parts, error))?;
     let text = serde_json::to_string(part).map_err(Problem::of)?;
@@ -123,9 +123,9 @@ fn write(path: &Path, text: &str) -> Result<(), Problem> {
 mod tests {
     use super::*;
 
-    fn part(title: &str) -> Part {
+    fn part(title: &str) -> ReportPart {
         let section = Section { title: title.into(), ..Section::default() };
-        Part { made: Made::now(&["simulate".into()], "none"), sections: vec![section] }
+        ReportPart { made: Made::now(&["simulate".into()], "none"), sections: vec![section] }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! `page.js` draws with plotly.js. `page.html` is a format string: the compiler checks that each name in braces has a
 //! value.
 
-use super::{Figure, Part, Section, Table};
+use super::{Figure, ReportPart, Section, Table};
 use crate::problem::Problem;
 
 const LIBRARY: &str = include_str!("plotly/plotly-gl3d.min.js");
@@ -11,7 +11,7 @@ const LIBRARY: &str = include_str!("plotly/plotly-gl3d.min.js");
 const OPEN: usize = 20;
 
 /// The page, complete.
-pub(crate) fn page(title: &str, parts: &[Part]) -> Result<String, Problem> {
+pub(crate) fn page(title: &str, parts: &[ReportPart]) -> Result<String, Problem> {
     let parts = parts.iter().map(part).collect::<Result<String, _>>().map_err(Problem::of)?;
     Ok(format!(
         include_str!("page.html"),
@@ -23,7 +23,7 @@ pub(crate) fn page(title: &str, parts: &[Part]) -> Result<String, Problem> {
     ))
 }
 
-fn part(Part { made, sections }: &Part) -> serde_json::Result<String> {
+fn part(ReportPart { made, sections }: &ReportPart) -> serde_json::Result<String> {
     let line = |(name, words)| format!("<dt>{name}</dt><dd>{}</dd>\n", escaped(words));
     let lines = made.lines().map(line).concat();
     let sections = sections.iter().map(section).collect::<Result<String, _>>()?;
@@ -87,8 +87,11 @@ mod tests {
 
     /// A page of one part with these sections.
     fn page_of(section: Section) -> String {
-        page("a & b", &[Part { made: Made::now(&["supple".into(), "<x>".into()], "none"), sections: vec![section] }])
-            .unwrap()
+        page(
+            "a & b",
+            &[ReportPart { made: Made::now(&["supple".into(), "<x>".into()], "none"), sections: vec![section] }],
+        )
+        .unwrap()
     }
 
     #[test]

@@ -6,15 +6,15 @@ use supple::state::VecState;
 use super::bodies::{Bodies, View, lengths, moved};
 use super::made::Made;
 use super::plots::{self, COLOURS, Curve, DashType, GREY, Plot};
-use super::{Figure, Panel, Part, Section, Table};
+use super::{Figure, Panel, ReportPart, Section, Table};
 use crate::results::{Conclusion, instrument_mesh};
 use crate::run::outcome::Outcome;
 use crate::scene::setup::Setup;
 
-pub(crate) fn part(setup: &Setup, state: &VecState, outcome: &Outcome, conclusion: &Conclusion) -> Part {
+pub(crate) fn part(setup: &Setup, state: &VecState, outcome: &Outcome, conclusion: &Conclusion) -> ReportPart {
     let mut sections = vec![result(setup, outcome, conclusion), shapes(setup, state), motion(outcome)];
     sections.extend(forces(outcome));
-    Part { made: Made::by_this_command("none"), sections }
+    ReportPart { made: Made::by_this_command("none"), sections }
 }
 
 fn result(setup: &Setup, outcome: &Outcome, Conclusion { summary, warnings, .. }: &Conclusion) -> Section {

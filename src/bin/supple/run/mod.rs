@@ -145,9 +145,6 @@ impl Running<'_> {
         if longest > 0.0 {
             outcome.steps = (outcome.steps.0.min(shortest), outcome.steps.1.max(longest));
         }
-        if let (Some(trace), Some(large)) = (&mut outcome.large, simulation.long_step()) {
-            trace.enter(large.report());
-        }
         if let (Some(trace), Some(model)) = (&mut outcome.learned, simulation.learned_step()) {
             trace.enter_fallback(model);
             trace.exact_intervals += u64::from(report.fell_back);
@@ -211,6 +208,11 @@ impl Watched<'_> {
                 outcome.computed += 1;
                 if let Some(trace) = &mut outcome.learned {
                     trace.enter(&report, self.began.elapsed());
+                }
+            }
+            Event::Raised(report) => {
+                if let Some(trace) = &mut outcome.large {
+                    trace.enter(&report);
                 }
             }
             Event::Step(taken, status, state) => {

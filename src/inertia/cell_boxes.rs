@@ -1,5 +1,5 @@
-//! Patches of the lattice, and the elements sorted by them. Most elements lie in a patch of at most two cells along
-//! each axis; the elements of a patch share its functions, so the assembly adds them together (`assembly.rs`).
+//! Boxes of the lattice, and the elements sorted by them. Most elements lie in a box of at most two cells along
+//! each axis; the elements of a box share its functions, so the assembly adds them together (`assembly.rs`).
 
 use glam::Vec4;
 
@@ -9,17 +9,17 @@ use crate::heap_sort::sort;
 use crate::scene::SceneView;
 use crate::simd::TILE;
 
-/// A patch of one or two cells along each axis.
+/// A box of one or two cells along each axis.
 #[derive(Clone, Copy, Default, Eq, PartialEq)]
-pub(super) struct Patch {
+pub(super) struct CellBox {
     /// Indices of its lowest cell along the axes.
     pub(super) low: [u8; 3],
     /// Cells along the axes, at least one.
     pub(super) cells: [u8; 3],
 }
 
-impl Patch {
-    /// An integer for each patch, at least one.
+impl CellBox {
+    /// An integer for each box, at least one.
     #[inline(always)]
     pub(super) fn key(&self) -> u64 {
         let ([i, j, k], [x, y, z]) = (self.low, self.cells);
@@ -33,14 +33,14 @@ impl Patch {
     }
 }
 
-/// The patch of an element and the positions of its nodes in it, if each of its nodes is free or held along all axes.
+/// The box of an element and the positions of its nodes in it, if each of its nodes is free or held along all axes.
 #[inline(always)]
 pub(super) fn locate(
     lattice: &Lattice,
     places: &[LatticeNode],
     inertia: &[NodeInertia],
     nodes: &[usize; 4],
-) -> Option<(Patch, [[Vec4; 2]; 4])> {
+) -> Option<(CellBox, [[Vec4; 2]; 4])> {
     let (mut low, mut high) = (Vec4::splat(f32::MAX), Vec4::ZERO);
     let mut positions = [[Vec4::ZERO; 2]; 4];
     for (&node, position) in nodes.iter().zip(&mut positions) {
@@ -64,14 +64,14 @@ pub(super) fn locate(
         return None;
     }
     let indices = |vector: Vec4| vector.truncate().to_array().map(|along| along as u8);
-    let patch = Patch { low: indices(low), cells: indices(span + Vec4::ONE) };
-    Some((patch, positions.map(|[cell, within]| [cell - low, within])))
+    let cells = CellBox { low: indices(low), cells: indices(span + Vec4::ONE) };
+    Some((cells, positions.map(|[cell, within]| [cell - low, within])))
 }
 
-/// Sorts the elements by their patches, those in no patch first, and before all others those that touch a node that
+/// Sorts the elements by their boxes, those in no box first, and before all others those that touch a node that
 /// motions may move. Gives the number of these. The list has the places of all elements: `TILE` times the index of a
 /// tile plus that in the tile.
-pub(super) fn sort_by_patch<M>(
+pub(super) fn sort_by_box<M>(
     order: &mut [u32],
     scene: SceneView<'_, M>,
     lattice: &Lattice,
@@ -85,8 +85,8 @@ pub(super) fn sort_by_patch<M>(
     let touches = |nodes: &[usize; 4]| nodes.iter().any(|&node| scene.movable(node) != Axes::NONE);
     sort(order, |place| {
         let nodes_of = nodes_of(place);
-        let patch = nodes_of.and_then(|nodes_of| locate(lattice, nodes, scene.inertia, &nodes_of));
-        (!nodes_of.as_ref().is_some_and(touches), patch.map_or(0, |(patch, _)| patch.key()), place)
+        let cells = nodes_of.and_then(|nodes_of| locate(lattice, nodes, scene.inertia, &nodes_of));
+        (!nodes_of.as_ref().is_some_and(touches), cells.map_or(0, |(cells, _)| cells.key()), place)
     });
     order.iter().take_while(|&&place| nodes_of(place).as_ref().is_some_and(touches)).count()
 }

@@ -37,7 +37,7 @@ impl Elastic {
 }
 
 /// A body.
-pub(super) struct Body {
+pub(super) struct Specimen {
     pub(super) mesh: BodyMesh,
     pub(super) elastic: Elastic,
     /// kg/m^3.
@@ -69,7 +69,7 @@ pub(super) fn fixed(nodes: Vec<u32>, axes: Axes) -> Vec<Support> {
     nodes.into_iter().map(|node| Support { node, axes, moves: false }).collect()
 }
 
-impl Body {
+impl Specimen {
     /// Does the work on a scene of an element; gives what it found and a row without quantity. If it finds nothing, the
     /// row says why.
     pub(super) fn measure<T>(
