@@ -1,15 +1,15 @@
-//! Data kept in spare bits of nodal vectors, so that a pass over the nodes reads one vector less. Everything of that
-//! kind:
+//! Data kept in spare bits of nodal vectors, where an array of its own would be memory that every host has to provide
+//! and a pass over the nodes would have to read. Everything of that kind, and the bytes a node that it saves:
 //!
-//! | where | what | written by | read by |
-//! |---|---|---|---|
-//! | sign of a zero inverse mass | the axis is held, but motions may move it | [`crate::element`], when a scene is built | [`crate::loads`] |
-//! | fourth component of an increment or force | axes whose motion has been prescribed, as bits | [`crate::loads`] | the same, which clears it |
-//! | fourth component of increment and displacement | entries `yz`, `zx` of a node's stiffness bound | [`crate::tled::critical_step`] | the same, which clears them |
-//! | fourth component of a force | scalar stiffness bound of the node, N/m | element loops with a bound | [`crate::inertia`], which clears it |
-//! | fourth component of a sum of bounds `xy, yz, zx` | share of its inverse inertia that a node could use before the step | [`crate::inertia`], while a step is computed | the same, if the step is refused |
-//! | last eight bits of a height | number of the frame that a node turns with | [`crate::inertia`], when it is prepared | its passes |
-//! | fourth component of a lattice position | number of the node | the same | the same |
+//! | where | what | written by | read by | saves |
+//! |---|---|---|---|---|
+//! | sign of a zero inverse mass | the axis is held, but motions may move it | [`crate::element`], when a scene is built | [`crate::loads`] | 1: the other 16 are full |
+//! | fourth component of an increment or force | axes whose motion has been prescribed, as bits | [`crate::loads`] | the same, which clears it | 1, or a search through all motions for each |
+//! | fourth component of increment and displacement | entries `yz`, `zx` of a node's stiffness bound | [`crate::tled::critical_step`] | the same, which clears them | 8 of every state, for a call now and then |
+//! | fourth component of a force | scalar stiffness bound of the node, N/m | element loops with a bound | [`crate::inertia`], which clears it | 4, and a second scatter of the element loops |
+//! | fourth component of a sum of bounds `xy, yz, zx` | share of its inverse inertia that a node could use before the step | [`crate::inertia`], while a step is computed | the same, if the step is refused | 4 of 104 |
+//! | last eight bits of a height | number of the frame that a node turns with | [`crate::inertia`], when it is prepared | its passes | 1 of 104 |
+//! | fourth component of a lattice position | number of the node | the same | the same | 4 of 104 |
 
 use crate::simd::NodeVector;
 
