@@ -5,7 +5,7 @@
 use supple::inertia::{self, Cells, LargeStep};
 use supple::loads::Loads;
 use supple::state::VecState;
-use supple::step::{Status, Step};
+use supple::step::Step;
 use supple::tled;
 
 use super::body::Setup;
@@ -50,11 +50,7 @@ impl Setup<'_> {
     /// What takes steps with `damping` (1/s) from a state, by the critical step there.
     pub(super) fn advance(&self, state: &mut VecState, damping: f32) -> Result<Advance<'_>, LabError> {
         let Self { case, scene, points, steps } = *self;
-        let taken = move |status| match status {
-            Status::Diverged(divergence) => Err(LabError::Diverged { scene: case, divergence }),
-            Status::Mismatch { nodes, room } => Err(LabError::Mismatch { nodes, room }),
-            _ => Ok(()),
-        };
+        let taken = move |status| LabError::if_refused(case, status);
         if let Kind::BackwardEuler(dt) = steps.kind {
             let mut step = implicit::prepare(implicit::Rule::BackwardEuler, scene.view(), state, dt, damping);
             return Ok(Box::new(move |state, loads, until| {
