@@ -8,7 +8,7 @@ use supple::learned::LearnedError;
 use supple::loads::LoadError;
 use supple::mlp::WeightError;
 use supple::scene::BuildError;
-use supple::step::{Divergence, StepError};
+use supple::step::{Divergence, Status, StepError};
 
 /// Why the laboratory could not do what it was asked.
 #[derive(Debug)]
@@ -85,6 +85,17 @@ pub enum LabError {
     Damper(DamperError),
     /// A file could not be written; the text names it.
     Write(std::io::Error),
+}
+
+impl LabError {
+    /// Fails if a step of a scene was refused.
+    pub(super) const fn if_refused(scene: &'static str, status: Status) -> Result<(), Self> {
+        match status {
+            Status::Diverged(divergence) => Err(Self::Diverged { scene, divergence }),
+            Status::Mismatch { nodes, room } => Err(Self::Mismatch { nodes, room }),
+            _ => Ok(()),
+        }
+    }
 }
 
 impl fmt::Display for LabError {

@@ -19,7 +19,7 @@ use supple::state::VecState;
 use supple::step::{Cause, Divergence, Status};
 use supple::tled::{ElementTangent, element_tangents};
 
-use super::method::{Advance, StepReport};
+use super::method::Prepared;
 
 /// Which rule.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -49,7 +49,7 @@ pub(super) fn prepare<'a>(
     state: &VecState,
     dt: f32,
     damping: f32,
-) -> Advance<'a> {
+) -> Prepared<'a> {
     let tangents: Vec<ElementTangent> = element_tangents(scene, |_| [0.0; 3]).collect();
     let elements: Vec<[usize; 4]> = tangents.iter().map(|tangent| tangent.nodes).collect();
     let vector = |values: [f32; 3]| DVec3::from_array(values.map(f64::from));
@@ -70,7 +70,7 @@ pub(super) fn prepare<'a>(
         tangents,
         matrix: Matrix::of(scene.node_count(), &elements),
     };
-    Box::new(move |state, loads, _| Ok((body.step(loads, state), StepReport::default())))
+    Prepared::Own(Box::new(move |state, loads| body.step(loads, state)))
 }
 
 /// A body in motion, in float64.
@@ -456,9 +456,9 @@ mod tests {
         for (rule, beyond) in [(Rule::BackwardEuler, 1.0), (Rule::Midpoint, 0.0)] {
             let (dt, steps) = (2e-3_f32, 50);
             let mut state = VecState::at_rest(scene.node_count());
-            let mut advance = prepare(rule, scene.view(), &state, dt, 0.0);
+            let mut prepared = prepare(rule, scene.view(), &state, dt, 0.0);
             for _ in 0..steps {
-                assert_eq!(advance(&mut state, &loads, dt).unwrap().0, Status::Ok);
+                assert_eq!(prepared.advance(dt, scene.view(), &loads, &mut state).unwrap().0, Status::Ok);
             }
             let time = f64::from(steps) * f64::from(dt);
             let expected = -0.5 * 9.81 * time * (time + beyond * f64::from(dt));
@@ -496,9 +496,9 @@ mod tests {
             let errors = counts.map(|count| {
                 let dt = seconds / count as f32;
                 let mut state = stretched(dt);
-                let mut advance = prepare(rule, scene.view(), &state, dt, 0.0);
+                let mut prepared = prepare(rule, scene.view(), &state, dt, 0.0);
                 for _ in 0..count {
-                    assert_eq!(advance(&mut state, &loads, dt).unwrap().0, Status::Ok);
+                    assert_eq!(prepared.advance(dt, scene.view(), &loads, &mut state).unwrap().0, Status::Ok);
                 }
                 let pairs = shape(&state).into_iter().zip(shape(&exact));
                 pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>().sqrt()

@@ -8,9 +8,9 @@ use supple::loads::Loads;
 use supple::material::VecMaterial;
 use supple::mlp::{Network, WeightBytes};
 use supple::scene::SceneView;
-use supple::state::{NodeVector, StateView, VecState};
+use supple::simulation::{ExactSteps, Lead, Mover};
+use supple::state::{NodeVector, VecState};
 use supple::step::{CallingThread, Status, Step};
-use supple::tled;
 
 use super::networks::{self, Family};
 use super::scenes::SceneSpec;
@@ -82,15 +82,55 @@ impl NetworkFile {
 /// Length of the lead-in, s (Meister et al. 2018, section 3).
 pub const BURN_IN: f64 = 0.3;
 
-/// Moves a state on by one step under loads, of so many seconds ([`Method::parts`]); what else it needs, it owns. Gives
-/// the status and what the step tells about itself. After [`Status::Diverged`] it is not called again.
-pub type Advance<'a> = Box<dyn FnMut(&mut VecState, &Loads<'_>, f32) -> Result<(Status, StepReport), LabError> + 'a>;
+/// A step of the laboratory's own.
+pub type OwnStep<'a> = Box<dyn FnMut(&mut VecState, &Loads<'_>) -> Status + 'a>;
 
-/// What a step tells about itself, if its method has it.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StepReport {
-    /// Share of the vertices whose prediction was clipped.
-    pub clipped: Option<f32>,
+/// What moves a state on, prepared.
+pub enum Prepared<'a> {
+    /// Exact steps of this length.
+    Exact(Step),
+    /// Steps beyond the critical one, and their damping, 1/s.
+    Long(Box<LargeStep<'static, Vec<NodeVector>>>, f32),
+    /// A network's steps, and the exact ones of its lead-in.
+    Learned(Box<LearnedStep<'static, Vec<NodeVector>>>, Step, Lead),
+    /// Neither of these.
+    Own(OwnStep<'a>),
+}
+
+impl Prepared<'_> {
+    /// Moves on by `seconds` ([`Method::parts`]) under loads. Gives the status, and of a network's step the share of the
+    /// vertices whose prediction was clipped. After [`Status::Diverged`] it is not called again.
+    pub fn advance(
+        &mut self,
+        seconds: f32,
+        scene: SceneView<'_, VecMaterial>,
+        loads: &Loads<'_>,
+        state: &mut VecState,
+    ) -> Result<(Status, Option<f32>), LabError> {
+        let mover = match self {
+            Self::Exact(step) => Mover::Exact(ExactSteps::Fixed(*step)),
+            Self::Long(large, damping) => {
+                if seconds != large.model().longest() {
+                    // Moves no node, and does nothing before longer steps.
+                    let _ = large.shorten(seconds, scene, loads, state.view());
+                    large.change_step(Step::unchecked(seconds, *damping)?);
+                }
+                let (model, storage) = large.parts();
+                Mover::Long(model, storage, None)
+            }
+            Self::Learned(learned, exact, lead) => {
+                Mover::Learned(learned.view(), ExactSteps::Fixed(*exact), lead, None)
+            }
+            Self::Own(step) => return Ok((step(state, loads), None)),
+        };
+        let until = state.time() + f64::from(seconds);
+        let report = mover.advance(until, scene, &mut { *loads }, state.view(), &CallingThread, &mut |_| {})?;
+        let clipped = match self {
+            Self::Learned(learned, ..) if report.learned > 0 => Some(learned.model().report().clipped),
+            _ => None,
+        };
+        Ok((report.status, clipped))
+    }
 }
 
 impl Method {
@@ -208,104 +248,48 @@ impl Method {
         scene: SceneView<'a, VecMaterial>,
         state: &mut VecState,
         dt: f32,
-    ) -> Result<Advance<'a>, LabError> {
+    ) -> Result<Prepared<'a>, LabError> {
         let damping = spec.damping;
-        let large = |method, state: &mut VecState| {
+        let exact = |count: u32| Ok(Prepared::Exact(Step::unchecked(dt / count as f32, damping)?));
+        let long = |method, state: &mut VecState| {
             let step = Step::unchecked(dt, damping)?;
-            let mut large = LargeStep::prepare_in_vec(method, scene, &spec.points, state.view(), step)?;
-            let mut length = dt;
-            let advance: Advance<'a> = Box::new(move |state, loads, seconds| {
-                if seconds != length {
-                    // Moves no node, and does nothing before longer steps.
-                    let _ = large.shorten(seconds, scene, loads, state.view());
-                    large.change_step(Step::unchecked(seconds, damping)?);
-                    length = seconds;
-                }
-                let status = large.step(scene, loads, state.view());
-                Ok((status, StepReport::default()))
-            });
-            Ok(advance)
+            let large = LargeStep::prepare_in_vec(method, scene, &spec.points, state.view(), step)?;
+            Ok(Prepared::Long(Box::new(large), damping))
         };
-        let exact = |count: u32| {
-            let step = Step::unchecked(dt / count as f32, damping)?;
-            let advance: Advance<'a> = Box::new(move |state, loads, _| {
-                Ok((exact_steps(count, scene, loads, &mut state.view(), &step), StepReport::default()))
-            });
-            Ok(advance)
+        // The lead-in is damped as the scene is, learned steps as the training was: on a scene with other damping a
+        // network is as wrong as it is.
+        let learned = |bytes| {
+            let network = Network::parse(bytes)?;
+            let storage = vec![NodeVector::ZERO; learned::vectors_for(scene.node_count(), false)];
+            let learned = LearnedStep::new(network, false, storage)?;
+            let Timing { step, refinement, .. } = spec.timing;
+            let count = (dt * refinement as f32 / step - 0.01).ceil().max(1.0);
+            let exact = Step::unchecked(learned.model().seconds() / count, damping)?;
+            let lead = Lead::new(learned.model().intervals(BURN_IN));
+            Ok(Prepared::Learned(Box::new(learned), exact, lead))
         };
         match self {
-            Self::Hold => Ok(Box::new(|_, _, _| Ok((Status::Ok, StepReport::default())))),
+            Self::Hold => Ok(Prepared::Own(Box::new(|_, _| Status::Ok))),
             Self::Tled => exact(spec.timing.refinement),
             Self::TledLargeStep => exact(1),
-            Self::MassScaled | Self::Switching(Large::MassScaled) => large(inertia::Method::MassScaled, state),
+            Self::MassScaled | Self::Switching(Large::MassScaled) => long(inertia::Method::MassScaled, state),
             Self::Multilevel | Self::Switching(Large::Multilevel) => {
-                large(inertia::Method::Multilevel(Cells::Suggested), state)
+                long(inertia::Method::Multilevel(Cells::Suggested), state)
             }
-            Self::Damped | Self::Switching(Large::Damped) => large(inertia::Method::damped(Cells::Suggested), state),
+            Self::Damped | Self::Switching(Large::Damped) => long(inertia::Method::damped(Cells::Suggested), state),
             Self::DampedWith(file) => {
                 let damper = Damper::new(Network::parse(file.bytes)?)?;
-                large(inertia::Method::Damped(damper, Cells::Suggested), state)
+                long(inertia::Method::Damped(damper, Cells::Suggested), state)
             }
             Self::BackwardEuler => Ok(implicit::prepare(implicit::Rule::BackwardEuler, scene, state, dt, damping)),
             Self::ImplicitMidpoint => Ok(implicit::prepare(implicit::Rule::Midpoint, scene, state, dt, damping)),
             Self::Learned(family) => {
                 let multiple = (dt / DT).round() as u32;
-                let bytes = networks::learned(family, multiple).ok_or(LabError::NoNetwork { multiple })?;
-                learned(scene, bytes, exact_steps_in(dt, &spec.timing), damping)
+                learned(networks::learned(family, multiple).ok_or(LabError::NoNetwork { multiple })?)
             }
-            Self::LearnedWith(file) => learned(scene, file.bytes, exact_steps_in(dt, &spec.timing), damping),
+            Self::LearnedWith(file) => learned(file.bytes),
         }
     }
-}
-
-/// Takes exact steps until one is refused. Says if one was limited.
-fn exact_steps(
-    count: u32,
-    scene: SceneView<'_, VecMaterial>,
-    loads: &Loads<'_>,
-    state: &mut StateView<'_>,
-    step: &Step,
-) -> Status {
-    let mut worst = Status::Ok;
-    for _ in 0..count {
-        match tled::step(&scene, loads, state, step) {
-            Status::Ok => {}
-            limited @ Status::Limited { .. } => worst = limited,
-            refused => return refused,
-        }
-    }
-    worst
-}
-
-/// Exact steps of a scene in a step of `dt` (s).
-fn exact_steps_in(dt: f32, timing: &Timing) -> u32 {
-    (dt * timing.refinement as f32 / timing.step - 0.01).ceil().max(1.0) as u32
-}
-
-/// The learned step after its lead-in of exact ones, `count` in each of the network's. The lead-in is damped as the
-/// scene is, learned steps as the training was: on a scene with other damping a network is as wrong as it is.
-fn learned<'a>(
-    scene: SceneView<'a, VecMaterial>,
-    bytes: &'static [u8],
-    count: u32,
-    damping: f32,
-) -> Result<Advance<'a>, LabError> {
-    let network = Network::parse(bytes)?;
-    let recipe = *network.recipe();
-    let storage = vec![NodeVector::ZERO; learned::vectors_for(scene.node_count(), false)];
-    let mut learned = LearnedStep::new(network, false, storage)?;
-    let exact = Step::unchecked(recipe.step / count as f32, damping)?;
-    let trained = Step::unchecked(recipe.step / count as f32, recipe.damping)?;
-    Ok(Box::new(move |state, loads, _| {
-        let mut state = state.view();
-        if state.time() + 0.5 * f64::from(DT) < BURN_IN {
-            let lead = |state: &mut StateView<'_>| exact_steps(count, scene, loads, state, &exact);
-            let status = learned.view().lead_interval(&mut state, lead);
-            return Ok((status, StepReport::default()));
-        }
-        let status = learned.view().step(scene, loads, state, &trained, &CallingThread)?;
-        Ok((status, StepReport { clipped: Some(learned.model().report().clipped) }))
-    }))
 }
 
 #[cfg(test)]

@@ -10,8 +10,6 @@ use std::fs;
 use std::path::Path;
 
 use supple::io::write_atomically;
-use supple::loads::Loads;
-use supple::scene::AsScene;
 use supple::state::VecState;
 use supple::step::{Status, Step};
 use supple::tled;
@@ -106,7 +104,9 @@ fn of_steps(spec: &SceneSpec, steps: u32) -> Result<Truth, LabError> {
     for _ in 0..spec.intervals {
         for count in 1..=steps {
             let loads = loads.of_step(state.time(), f64::from(dt));
-            truth.limited_steps += u64::from(exact_step(spec, &scene, &loads, &mut state, &step)?);
+            let status = tled::step(&scene, &loads, &mut state, &step);
+            LabError::if_refused(spec.name, status)?;
+            truth.limited_steps += u64::from(status != Status::Ok);
             let mut measure = count == steps;
             if count % LOOK_STEPS == 0 {
                 let bound = tled::critical_step(&scene, &mut state).map_or(0.0, |bound| bound.seconds);
@@ -126,22 +126,6 @@ fn of_steps(spec: &SceneSpec, steps: u32) -> Result<Truth, LabError> {
         truth.snapshots.push(shape.collect());
     }
     Ok(truth)
-}
-
-/// Takes an exact step. Gives whether it was limited.
-fn exact_step(
-    spec: &SceneSpec,
-    scene: &impl AsScene,
-    loads: &Loads<'_>,
-    state: &mut VecState,
-    step: &Step,
-) -> Result<bool, LabError> {
-    match tled::step(scene, loads, state, step) {
-        Status::Ok => Ok(false),
-        Status::Diverged(divergence) => Err(LabError::Diverged { scene: spec.name, divergence }),
-        Status::Mismatch { nodes, room } => Err(LabError::Mismatch { nodes, room }),
-        _ => Ok(true),
-    }
 }
 
 /// FNV-1a, 64 bits (Fowler, Noll, Vo): against accidents, not against forgery.

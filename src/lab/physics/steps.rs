@@ -5,11 +5,13 @@
 use supple::inertia::{self, Cells, LargeStep};
 use supple::loads::Loads;
 use supple::state::VecState;
-use supple::step::{Status, Step};
+use supple::step::Step;
 use supple::tled;
 
 use super::specimen::Setup;
-use crate::{LabError, implicit};
+use crate::LabError;
+use crate::implicit::{self, Rule};
+use crate::method::Prepared;
 
 /// A way to take steps.
 #[derive(Clone, Copy)]
@@ -50,36 +52,26 @@ impl Setup<'_> {
     /// What takes steps with `damping` (1/s) from a state, by the critical step there.
     pub(super) fn advance(&self, state: &mut VecState, damping: f32) -> Result<Advance<'_>, LabError> {
         let Self { case, scene, points, steps } = *self;
-        let taken = move |status| match status {
-            Status::Diverged(divergence) => Err(LabError::Diverged { scene: case, divergence }),
-            Status::Mismatch { nodes, room } => Err(LabError::Mismatch { nodes, room }),
-            _ => Ok(()),
-        };
-        if let Kind::BackwardEuler(dt) = steps.kind {
-            let mut step = implicit::prepare(implicit::Rule::BackwardEuler, scene.view(), state, dt, damping);
-            return Ok(Box::new(move |state, loads, until| {
-                while state.time() < until {
-                    taken(step(state, loads, dt)?.0)?;
-                }
-                Ok(())
-            }));
-        }
         let critical = tled::critical_step(scene, state).ok_or(LabError::NoCriticalStep { scene: case })?;
-        let Kind::Damped(multiple) = steps.kind else {
-            let step = Step::unchecked(SAFETY * critical.seconds, damping)?;
-            return Ok(Box::new(move |state, loads, until| {
-                while state.time() < until {
-                    taken(tled::step(scene, loads, state, &step))?;
-                }
-                Ok(())
-            }));
+        let seconds = match steps.kind {
+            Kind::Exact => SAFETY * critical.seconds,
+            Kind::Damped(multiple) => multiple * critical.seconds,
+            Kind::BackwardEuler(seconds) => seconds,
         };
-        let step = Step::unchecked(multiple * critical.seconds, damping)?;
-        let method = inertia::Method::damped(Cells::Suggested);
-        let mut large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step)?;
+        let step = Step::unchecked(seconds, damping)?;
+        let mut prepared = match steps.kind {
+            Kind::Exact => Prepared::Exact(step),
+            Kind::Damped(_) => {
+                let method = inertia::Method::damped(Cells::Suggested);
+                let large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step)?;
+                Prepared::Long(Box::new(large), damping)
+            }
+            Kind::BackwardEuler(_) => implicit::prepare(Rule::BackwardEuler, scene.view(), state, seconds, damping),
+        };
         Ok(Box::new(move |state, loads, until| {
             while state.time() < until {
-                taken(large.step(scene.view(), loads, state.view()))?;
+                let (status, _) = prepared.advance(seconds, scene.view(), loads, state)?;
+                LabError::if_refused(case, status)?;
             }
             Ok(())
         }))
