@@ -213,6 +213,7 @@ impl Watched<'_> {
                     trace.enter(&report, self.began.elapsed());
                 }
             }
+            Event::Raised(_) => {}
             Event::Step(taken, status, state) => {
                 outcome.computed += u64::from(taken != Taken::Learned);
                 outcome.enter(status, state);
