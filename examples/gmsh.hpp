@@ -1,11 +1,16 @@
 // Reads what the examples need of a Gmsh mesh, in version 2.2 as text: nodes, and tetrahedra (elements of type 4); others
-// are left out. Nodes must have the numbers 1, 2, 3 and so on. Not read: versions 1 and 4.1 and anything binary, which the command
-// supple reads; Gmsh turns them into this one with `gmsh IN.msh -save -format msh22 -o OUT.msh`.
+// are left out. Finds the boundary of these. Nodes must have the numbers 1, 2, 3 and so on. Not read: versions 1 and 4.1 and
+// anything binary, which the command supple reads; Gmsh turns them into this one with
+// `gmsh IN.msh -save -format msh22 -o OUT.msh`.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
+#include <map>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -60,6 +65,32 @@ inline mesh read(const std::string &path) {
     }
     if (read.points.empty() || read.tetrahedra.empty()) throw problem("no nodes or no tetrahedra up to here");
     return read;
+}
+
+using triangle = std::array<std::uint32_t, 3>;
+
+// The triangles of the boundary, which belong to one tetrahedron only, with their outsides outside.
+inline std::vector<triangle> boundary(const std::vector<std::uint32_t> &tetrahedra) {
+    static constexpr std::size_t faces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+    std::map<triangle, std::vector<triangle>> found; // by their nodes in order
+    for (std::size_t at = 0; at < tetrahedra.size(); at += 4)
+        for (const auto &face : faces) {
+            const triangle corners = {tetrahedra[at + face[0]], tetrahedra[at + face[1]], tetrahedra[at + face[2]]};
+            triangle sorted = corners;
+            std::sort(sorted.begin(), sorted.end());
+            found[sorted].push_back(corners);
+        }
+    std::vector<triangle> outer;
+    for (const auto &[sorted, same] : found)
+        if (same.size() == 1) outer.push_back(same[0]);
+    return outer;
+}
+
+// The nodes of triangles, in order.
+inline std::vector<std::uint32_t> nodes_of(const std::vector<triangle> &triangles) {
+    std::set<std::uint32_t> nodes;
+    for (const triangle &corners : triangles) nodes.insert(corners.begin(), corners.end());
+    return {nodes.begin(), nodes.end()};
 }
 
 } // namespace gmsh

@@ -1,6 +1,6 @@
 // A host in C++ that shows tissue 60 times a second: a liver lobe hangs from its back; a sphere comes from above, presses
-// its dome, slides 4 mm sideways with friction and leaves, over and over. Each frame takes the same steps for 1/60 s; the
-// host reads the status and the force on the sphere. All memory is there before the first frame.
+// its dome, slides 4 mm sideways with friction and leaves, over and over. Each frame moves on by 1/60 s; the host reads the
+// status, with what a guard says of damped steps, and the force on the sphere. All memory is there before the first frame.
 //
 //     c++ -std=c++17 -O2 -Iinclude examples/instrument.cpp -lsupple -o instrument
 //     ./instrument [--mesh FILE] [--method exact|damped] [--frames N] [--out DIR] [--realtime] [--jitter N]
@@ -16,7 +16,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -40,10 +39,8 @@ constexpr float BACK = 0.030f;                    // nodes behind this plane han
 constexpr float RADIUS = 0.010f, FRICTION = 0.3f; // of the sphere, m
 constexpr float ABOVE = 0.004f, DEPTH = 0.018f;   // how far above the dome it begins, and how far down it goes, m: the lobe sags by 10 mm
 constexpr unsigned LARGE_STEPS = 4;               // a frame: each some 20 critical steps
-// Of the critical step at rest. Tissue that is deformed is stiffer: on this path its limit falls to 0.53. To ask for it
-// again would take as long as some six steps in each frame.
-constexpr float EXACT_SHARE = 0.5f;
 constexpr int FRAMES_A_PICTURE = 6;
+const std::map<std::string, supple::steps> STEPS = {{"exact", supple::steps::exact}, {"damped", supple::steps::damped}};
 
 struct options {
     std::string mesh = "meshes/lobe.msh", method = "damped", out;
@@ -76,17 +73,9 @@ options read_options(int count, char **words) {
         else if (word == "--jitter") chosen.jitter = number(1000);
         else throw std::runtime_error(word + ": no such option");
     }
-    if (chosen.method != "exact" && chosen.method != "damped")
+    if (STEPS.count(chosen.method) == 0)
         throw std::runtime_error("--method " + chosen.method + ": not exact or damped");
     return chosen;
-}
-
-// Memory for an object of the library, from the heap.
-struct alignas(supple::align) line {
-    unsigned char bytes[supple::align];
-};
-std::vector<line> room(std::size_t bytes) {
-    return std::vector<line>((bytes + sizeof(line) - 1) / sizeof(line));
 }
 
 // What was made; the end of the program if it was not.
@@ -110,23 +99,6 @@ std::array<float, 3> way(double seconds) {
     return {float(0.004 * aside), 0.0f, float(-DEPTH * in)};
 }
 
-// The nodes of the boundary: those of triangles that belong to one tetrahedron only.
-std::vector<std::uint32_t> boundary(const std::vector<std::uint32_t> &tetrahedra) {
-    std::map<std::array<std::uint32_t, 3>, int> faces;
-    for (std::size_t at = 0; at < tetrahedra.size(); at += 4)
-        for (std::size_t left_out = 0; left_out < 4; left_out++) {
-            std::array<std::uint32_t, 3> face = {};
-            for (std::size_t corner = 0, n = 0; corner < 4; corner++)
-                if (corner != left_out) face[n++] = tetrahedra[at + corner];
-            std::sort(face.begin(), face.end());
-            faces[face]++;
-        }
-    std::set<std::uint32_t> nodes;
-    for (const auto &[face, count] : faces)
-        if (count == 1) nodes.insert(face.begin(), face.end());
-    return {nodes.begin(), nodes.end()};
-}
-
 double milliseconds(clock_type::duration time) {
     return std::chrono::duration<double, std::milli>(time).count();
 }
@@ -134,85 +106,48 @@ double milliseconds(clock_type::duration time) {
 // The body with all that moves it.
 struct host {
     gmsh::mesh mesh;
-    std::vector<line> scene_room, loads_room, state_room, contact_room, large_room;
-    supple::scene scene;
-    supple::loads loads;
-    supple::state state;
-    supple::contact contact;
+    std::vector<supple::line> memory; // of the simulation
+    supple::settings settings;
+    supple::simulation lobe;
     std::array<float, 3> start = {}; // of the sphere, m
-    double now = 0.0;                // s
-    supple::large large; // not used by the exact step
-    bool exact;
-    unsigned steps = LARGE_STEPS; // a frame
 
-    explicit host(const options &chosen) : mesh(gmsh::read(chosen.mesh)), exact(chosen.method == "exact") {
-        const std::vector<float> &points = mesh.points;
-        const auto nodes = static_cast<std::uint32_t>(points.size() / 3);
-        const auto at = [&](std::uint32_t node) { return &points[3 * node]; };
-        std::uint32_t top = 0;
-        for (std::uint32_t node = 1; node < nodes; node++) top = at(node)[2] > at(top)[2] ? node : top;
+    explicit host(const options &chosen) : mesh(gmsh::read(chosen.mesh)), settings(STEPS.at(chosen.method), DAMPING) {
+        const std::size_t nodes = mesh.points.size() / 3;
+        const auto at = [&](std::size_t node) { return &mesh.points[3 * node]; };
+        std::size_t top = 0;
         std::vector<supple::support> supports;
-        for (std::uint32_t node = 0; node < nodes; node++)
-            if (at(node)[1] > BACK) supports.push_back({node, 7, 0});
+        for (std::size_t node = 0; node < nodes; node++) {
+            top = at(node)[2] > at(top)[2] ? node : top;
+            if (at(node)[1] > BACK) supports.push_back({std::uint32_t(node), 7, 0});
+        }
         start = {at(top)[0], at(top)[1], at(top)[2] + RADIUS + ABOVE};
 
-        const auto elements = static_cast<std::uint32_t>(mesh.tetrahedra.size() / 4);
-        const std::vector<std::uint32_t> surface = boundary(mesh.tetrahedra);
-        scene_room = room(supple::scene::size(nodes, elements));
-        loads_room = room(supple::loads::size(0, 0));
-        state_room = room(supple::state::size(nodes));
-        contact_room = room(supple::contact::size(static_cast<std::uint32_t>(surface.size())));
+        const std::vector<std::uint32_t> surface = gmsh::nodes_of(gmsh::boundary(mesh.tetrahedra));
+        settings.touchable(nodes, {surface});
+        if (chosen.method == "damped") settings.seconds = FRAME / LARGE_STEPS;
         supple::body body;
-        body.law = supple::law::exponential;
-        body.points = points;
-        body.tetrahedra = mesh.tetrahedra;
-        body.supports = supports;
-        body.tissues = {&LIVER, 1};
-        scene = made("scene", supple::scene::make(scene_room, body));
-        loads = made("loads", supple::loads::make(loads_room, scene, 0, 0));
-        state = made("state", supple::state::make(state_room, scene));
-        contact = made("contact", supple::contact::make(contact_room, scene, points, {surface}));
+        body.law = supple::law::exponential, body.points = mesh.points, body.tetrahedra = mesh.tetrahedra;
+        body.supports = supports, body.tissues = {&LIVER, 1};
+        memory.resize(supple::lines(made("size", supple::simulation::size(body, settings))));
+        lobe = made("lobe", supple::simulation::make(memory, body, settings));
         const supple::instrument sphere[] = {supple::instrument::sphere(RADIUS, supple::pose_at(start), FRICTION)};
-        done("sphere", contact.set(sphere));
-        done("contact", loads.set_contact(contact));
-        done("gravity", loads.set_gravity({0.0f, 0.0f, -9.81f}));
-        if (exact) {
-            const float longest = EXACT_SHARE * made("critical step", state.critical_step(scene)).seconds;
-            steps = static_cast<unsigned>(std::ceil(FRAME / longest));
-            done("step", state.set_step(scene, FRAME / float(steps), DAMPING));
-            return;
-        }
-        supple::large_steps wanted;
-        wanted.seconds = FRAME / LARGE_STEPS;
-        wanted.damping = DAMPING;
-        large_room = room(made("damped", supple::large::size(scene, points, wanted)));
-        large = made("damped", supple::large::make(large_room, scene, state, points, wanted));
-    }
-
-    std::size_t bytes() const {
-        return sizeof(line) * (scene_room.size() + loads_room.size() + state_room.size() + contact_room.size() +
-                               large_room.size());
-    }
-
-    supple::status step(unsigned count, supple::report &report) {
-        if (exact) return state.step(scene, loads, count, &report);
-        return large.step(scene, loads, state, count, &report);
+        done("sphere", lobe.contact().set(sphere));
+        done("gravity", lobe.loads().set_gravity({0.0f, 0.0f, -9.81f}));
     }
 
     // One frame: the sphere goes evenly to where it is at the frame's end, the tissue follows.
-    supple::status frame(double end, supple::report &report) {
+    supple::status frame(long number, supple::sim_report &report) {
+        const double begin = double(number - 1) / RATE, end = double(number) / RATE;
         const auto moved = way(end);
         const auto pose = supple::pose_at({start[0] + moved[0], start[1] + moved[1], start[2] + moved[2]});
-        done("sphere", contact.move(0, pose, now, end));
-        const supple::status status = step(steps, report);
-        now = report.time;
-        return status;
+        done("sphere", lobe.contact().move(0, pose, begin, end));
+        return lobe.advance(1.0 / RATE, &report);
     }
 
     // What the sphere feels, N.
     supple::touch touch() const {
         supple::touch felt{};
-        done("touch", contact.read(0, felt));
+        done("touch", lobe.contact().read(0, felt));
         return felt;
     }
 };
@@ -237,23 +172,27 @@ double additions(long count) {
     return sum;
 }
 
-// Single steps, each followed by as much fixed work.
-void measure_jitter(host &host, long count) {
+// Single steps of the kind that the frames had, each followed by as much fixed work.
+void measure_jitter(host &host, const supple::sim_report &frames, long count) {
+    // Without a guard, and of one length without looks at the critical step: half of it, as tissue may stiffen meanwhile.
+    supple::settings settings = host.settings;
+    settings.guard = 0;
+    settings.seconds = frames.exact > 0 ? 0.5f * frames.shortest : frames.shortest;
+    done("steps", host.lobe.set(settings));
+    const auto step = [&] { done("step", host.lobe.advance(double(settings.seconds))); };
     const auto microseconds = [](clock_type::time_point since) { return 1000.0 * milliseconds(clock_type::now() - since); };
     jitter steps, work;
     steps.times.resize(std::size_t(count)), work.times.resize(std::size_t(count));
-    supple::report report;
     auto start = clock_type::now();
-    for (int warm = 0; warm < 1000; warm++) done("step", host.step(1, report));
-    const double step = microseconds(start) / 1000.0;
+    for (int warm = 0; warm < 1000; warm++) step();
+    const double of_step = microseconds(start) / 1000.0;
     start = clock_type::now();
     volatile double sum = additions(1000000);
-    const long as_long = long(1e6 * step / microseconds(start));
+    const long as_long = long(1e6 * of_step / microseconds(start));
     for (std::size_t at = 0; at < steps.times.size(); at++) {
         start = clock_type::now();
-        const supple::status status = host.step(1, report);
+        step();
         steps.times[at] = microseconds(start);
-        done("step", status);
         start = clock_type::now();
         sum = additions(as_long);
         work.times[at] = microseconds(start);
@@ -267,7 +206,7 @@ void run(const options &chosen) {
     if (!supple::is_of_this_abi()) throw std::runtime_error("supple.h and the library are of different versions");
     host host(chosen);
     std::printf("%zu nodes, %zu tetrahedra, %s steps, %zu bytes for the library\n", host.mesh.points.size() / 3,
-                host.mesh.tetrahedra.size() / 4, chosen.method.c_str(), host.bytes());
+                host.mesh.tetrahedra.size() / 4, chosen.method.c_str(), host.lobe.bytes());
     std::puts("second  mean ms  worst ms  steps  least volume  energy excess  most force on the sphere x, y, z N  nodes  status");
 
     const std::size_t floats = host.mesh.points.size();
@@ -278,26 +217,26 @@ void run(const options &chosen) {
     float volume = 1.0f, excess = 0.0f;
     supple::touch most{};
     supple::status remark = supple::status::ok;
+    supple::sim_report report{};
     const auto start = clock_type::now();
     for (long frame = 1; frame <= chosen.frames; frame++) {
         const auto before = clock_type::now();
-        supple::report report{};
-        const supple::status status = host.frame(double(frame) / RATE, report);
+        const supple::status status = host.frame(frame, report);
         const double time = milliseconds(clock_type::now() - before);
         if (!supple::is_done(status)) {
-            std::printf("frame %ld, %.4f s, node %lu: %s\n", frame, report.time, 0ul + report.node,
-                        supple::text(status));
+            char why[200];
+            std::printf("frame %ld, %.4f s: %s\n", frame, report.call.time, supple::describe(report.call.error, why));
             throw std::runtime_error("the motion was stopped");
         }
-        sum += time, worst = std::max(worst, time), late += time > BUDGET, steps += report.steps;
-        volume = std::min(volume, report.least_volume_ratio), excess = std::max(excess, report.energy_excess);
+        sum += time, worst = std::max(worst, time), late += time > BUDGET, steps += report.call.steps;
+        volume = std::min(volume, report.call.least_volume_ratio), excess = std::max(excess, report.call.energy_excess);
         remark = status == supple::status::ok ? remark : status;
         const supple::touch felt = host.touch();
         const auto size = [](const supple::touch &of) { return std::hypot(of.mean_force[0], of.mean_force[1], of.mean_force[2]); };
         most = size(felt) > size(most) ? felt : most;
         if (frame % FRAMES_A_PICTURE == 0 && pictures > 0) {
             float *to = &kept[floats * std::size_t(frame / FRAMES_A_PICTURE - 1)];
-            done("displacements", host.state.copy_displacements({to, floats}));
+            done("displacements", host.lobe.state().copy_displacements({to, floats}));
         }
         if (frame % RATE == 0 || frame == chosen.frames) {
             const long frames = frame % RATE == 0 ? RATE : frame % RATE;
@@ -327,7 +266,7 @@ void run(const options &chosen) {
         vtu::write_list(chosen.out + "/frames.pvd", list);
         std::printf("%ld frames in %s/frames.pvd\n", pictures, chosen.out.c_str());
     }
-    if (chosen.jitter > 0) measure_jitter(host, chosen.jitter);
+    if (chosen.jitter > 0) measure_jitter(host, report, chosen.jitter);
 }
 
 } // namespace

@@ -11,13 +11,11 @@
 //     c++ -std=c++17 -O2 -Iinclude -isystem /usr/include/openigtlink examples/openigtlink.cpp -lsupple -lOpenIGTLink -lpthread -o openigtlink
 //     ./openigtlink [--port 18944] [--mesh meshes/lobe.msh]
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -37,13 +35,8 @@
 
 namespace {
 
-constexpr float RADIUS = 0.010f, FRICTION = 0.3f, DAMPING = 20.0f, FRAME = 1.0f / 60.0f; // m, 1/s, s
-constexpr float MILLI = 0.001f;
-
-struct alignas(supple::align) line {
-    unsigned char bytes[supple::align];
-};
-std::vector<line> room(std::size_t bytes) { return std::vector<line>(bytes / supple::align + 1); }
+constexpr float RADIUS = 0.010f, FRICTION = 0.3f, DAMPING = 20.0f, MILLI = 0.001f; // m, 1/s
+constexpr double FRAME = 1.0 / 60.0; // s
 
 void done(supple::status status) {
     if (!supple::is_done(status)) throw std::runtime_error(supple::text(status));
@@ -54,71 +47,45 @@ template <class T> T made(const supple::result<T> &result) {
     return result.value;
 }
 
-// The triangles that belong to one tetrahedron only, with their outsides outside.
-std::vector<std::array<std::uint32_t, 3>> boundary(const std::vector<std::uint32_t> &tetrahedra) {
-    static constexpr int faces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-    std::map<std::array<std::uint32_t, 3>, std::optional<std::array<std::uint32_t, 3>>> found;
-    for (std::size_t at = 0; at < tetrahedra.size(); at += 4)
-        for (const auto &face : faces) {
-            const std::array<std::uint32_t, 3> corners = {tetrahedra[at + face[0]], tetrahedra[at + face[1]], tetrahedra[at + face[2]]};
-            auto sorted = corners;
-            std::sort(sorted.begin(), sorted.end());
-            const auto [entry, is_new] = found.emplace(sorted, corners);
-            if (!is_new) entry->second.reset();
-        }
-    std::vector<std::array<std::uint32_t, 3>> outer;
-    for (const auto &[sorted, corners] : found)
-        if (corners) outer.push_back(*corners);
-    return outer;
-}
-
 // The lobe, the ball, and the memory of both.
 class tissue {
 public:
-    explicit tissue(const std::string &path) : mesh_(gmsh::read(path)), triangles_(boundary(mesh_.tetrahedra)) {
-        const auto nodes = std::uint32_t(mesh_.points.size() / 3), elements = std::uint32_t(mesh_.tetrahedra.size() / 4);
+    explicit tissue(const std::string &path)
+        : mesh_(gmsh::read(path)), triangles_(gmsh::boundary(mesh_.tetrahedra)), surface_(gmsh::nodes_of(triangles_)),
+          moved_(mesh_.points.size()) {
+        const std::size_t nodes = mesh_.points.size() / 3;
         std::vector<supple::support> supports; // the back hangs on the diaphragm
-        for (std::uint32_t node = 0; node < nodes; node++)
-            if (mesh_.points[3 * node + 1] > 0.030f) supports.push_back({node, 7, 0});
+        for (std::size_t node = 0; node < nodes; node++)
+            if (mesh_.points[3 * node + 1] > 0.030f) supports.push_back({std::uint32_t(node), 7, 0});
         const supple::tissue liver = {{1500.0f, 8.023f, 40000.0f}, 1060.0f}; // a Pa, b, d Pa; kg/m^3
         supple::body body;
         body.law = supple::law::exponential, body.points = mesh_.points, body.tetrahedra = mesh_.tetrahedra;
         body.supports = supports, body.tissues = {&liver, 1};
-        for (const auto &triangle : triangles_)
-            for (const std::uint32_t node : triangle) place_.emplace(node, 0);
-        for (auto &[node, place] : place_) place = std::uint32_t(surface_.size()), surface_.push_back(node);
-
-        memory_ = {room(supple::scene::size(nodes, elements)), room(supple::state::size(nodes)), room(supple::loads::size(0, 0)),
-                   room(supple::contact::size(std::uint32_t(surface_.size())))};
-        scene_ = made(supple::scene::make(memory_[SCENE], body));
-        state_ = made(supple::state::make(memory_[STATE], scene_));
-        loads_ = made(supple::loads::make(memory_[LOADS], scene_, 0, 0));
-        contact_ = made(supple::contact::make(memory_[CONTACT], scene_, mesh_.points, {surface_}));
-        done(loads_.set_contact(contact_));
-        steps_ = unsigned(2.0f * FRAME / made(state_.critical_step(scene_)).seconds) + 1;
-        done(state_.set_step(scene_, FRAME / float(steps_), DAMPING));
-        moved_.resize(mesh_.points.size());
-        kept_ = {memory_[STATE], memory_[CONTACT]};
+        auto how = supple::settings(supple::steps::exact, DAMPING).touchable(nodes, {surface_});
+        memory_.resize(supple::lines(made(supple::simulation::size(body, how))));
+        lobe_ = made(supple::simulation::make(memory_, body, how));
+        // Steps of one length, which leaves room for tissue that stiffens: those that are chosen become ever shorter where a pose jumps
+        // into the body, and crush what is in its way; these are refused at once.
+        how.seconds = 0.5f * made(lobe_.state().critical_step(lobe_.scene())).seconds;
+        done(lobe_.set(how));
     }
 
     // One frame towards a pose; without one the ball is not there yet. What the ball feels, in words.
     std::string frame(const std::optional<supple::pose> &to) {
-        std::copy(memory_[STATE].begin(), memory_[STATE].end(), kept_[0].begin());
-        std::copy(memory_[CONTACT].begin(), memory_[CONTACT].end(), kept_[1].begin());
-        if (to && is_there_) done(contact_.move(0, *to, now_, now_ + double(FRAME)));
+        kept_.assign(memory_.begin(), memory_.begin() + std::ptrdiff_t(supple::lines(lobe_.bytes())));
+        if (to && is_there_) done(lobe_.contact().move(0, *to, now_, now_ + FRAME));
         else if (to) put(*to);
-        supple::report report{};
-        const supple::status status = state_.step(scene_, loads_, steps_, &report);
+        supple::sim_report report{};
+        const supple::status status = lobe_.advance(FRAME, &report);
         if (!supple::is_done(status)) {
             // Steps of the frame may have been taken before one was refused.
-            std::copy(kept_[0].begin(), kept_[0].end(), memory_[STATE].begin());
-            std::copy(kept_[1].begin(), kept_[1].end(), memory_[CONTACT].begin());
+            std::copy(kept_.begin(), kept_.end(), memory_.begin());
             return std::string("0 0 0 N, 0 nodes, ") + supple::text(status);
         }
-        now_ = report.time;
+        now_ = report.call.time;
         is_there_ |= to.has_value();
         supple::touch felt{};
-        if (is_there_) done(contact_.read(0, felt));
+        if (is_there_) done(lobe_.contact().read(0, felt));
         char words[200];
         std::snprintf(words, sizeof words, "%.6f %.6f %.6f N, %u nodes, %s", double(felt.mean_force[0]), double(felt.mean_force[1]),
                       double(felt.mean_force[2]), felt.contacts, supple::text(status));
@@ -127,16 +94,17 @@ public:
 
     // The surface as it is, mm.
     igtl::PolyDataMessage::Pointer surface() {
-        done(state_.copy_displacements(moved_));
+        done(lobe_.state().copy_positions(mesh_.points, moved_));
         auto points = igtl::PolyDataPointArray::New();
         for (const std::uint32_t node : surface_) {
-            const float *rest = &mesh_.points[3 * node], *way = &moved_[3 * node];
-            points->AddPoint((rest[0] + way[0]) / MILLI, (rest[1] + way[1]) / MILLI, (rest[2] + way[2]) / MILLI);
+            const float *at = &moved_[3 * node];
+            points->AddPoint(at[0] / MILLI, at[1] / MILLI, at[2] / MILLI);
         }
         auto polygons = igtl::PolyDataCellArray::New();
-        for (const auto &triangle : triangles_) {
+        for (const gmsh::triangle &triangle : triangles_) {
             igtlUint32 corners[3];
-            for (int corner = 0; corner < 3; corner++) corners[corner] = place_.at(triangle[std::size_t(corner)]);
+            for (std::size_t corner = 0; corner < 3; corner++)
+                corners[corner] = igtlUint32(std::lower_bound(surface_.begin(), surface_.end(), triangle[corner]) - surface_.begin());
             polygons->AddCell(3, corners);
         }
         auto message = igtl::PolyDataMessage::New();
@@ -147,26 +115,18 @@ public:
     }
 
 private:
-    enum { SCENE, STATE, LOADS, CONTACT };
-
     void put(const supple::pose &at) {
         const supple::instrument ball[] = {supple::instrument::sphere(RADIUS, at, FRICTION)};
-        done(contact_.set(ball));
+        done(lobe_.contact().set(ball));
     }
 
     gmsh::mesh mesh_;
-    std::vector<std::array<std::uint32_t, 3>> triangles_;
-    std::map<std::uint32_t, std::uint32_t> place_; // of a node in the surface
+    std::vector<gmsh::triangle> triangles_;
     std::vector<std::uint32_t> surface_;
-    std::array<std::vector<line>, 4> memory_;
-    std::array<std::vector<line>, 2> kept_; // state and contact before the frame: they hold no pointers into themselves
-    std::vector<float> moved_;
-    supple::scene scene_;
-    supple::state state_;
-    supple::loads loads_;
-    supple::contact contact_;
+    std::vector<float> moved_; // positions of all nodes, m
+    std::vector<supple::line> memory_, kept_; // of the simulation; what of it was in use before the frame
+    supple::simulation lobe_;
     bool is_there_ = false; // the ball
-    unsigned steps_ = 0;
     double now_ = 0.0; // s
 };
 
@@ -243,9 +203,9 @@ void serve(igtl::Socket::Pointer socket, const std::string &mesh) {
         reaction->SetDeviceName("Reaction");
         reaction->SetString(lobe.frame(poses.latest()).c_str());
         const double spent = std::chrono::duration<double, std::milli>(clock_type::now() - start).count();
-        worst = std::max(worst, spent), late += spent > 1000.0 * double(FRAME);
+        worst = std::max(worst, spent), late += spent > 1000.0 * FRAME;
         if (!send(socket, lobe.surface().GetPointer()) || !send(socket, reaction.GetPointer())) break;
-        next += std::chrono::microseconds(std::lround(1e6 * double(FRAME)));
+        next += std::chrono::microseconds(std::lround(1e6 * FRAME));
         std::this_thread::sleep_until(next);
     }
     std::printf("%ld frames, the worst of %.1f ms, %ld too late\n", frames, worst, late);

@@ -1018,6 +1018,12 @@ struct settings : supple_settings {
         grips = grips_at_once;
         return *this;
     }
+    // The file of a network: of learned steps, or of another damper than the library's own; not copied: it must stay.
+    settings &use_weights(supple::bytes file) noexcept {
+        weights = file.data();
+        weights_bytes = file.size();
+        return *this;
+    }
 };
 
 // A scene in motion with all that it needs, in one memory. One thread at a time; memcpy makes a copy.
@@ -1026,6 +1032,9 @@ public:
     constexpr simulation() noexcept = default;
     constexpr explicit simulation(supple_sim *raw) noexcept : raw_(raw) {}
     [[nodiscard]] constexpr supple_sim *raw() const noexcept { return raw_; }
+
+    // The copy that memcpy has put there.
+    [[nodiscard]] static simulation copy_in(memory place) noexcept { return simulation(static_cast<supple_sim *>(place.data())); }
 
     // Bytes of memory that are enough.
     static result<std::size_t> size(const body &from, const settings &how = {}) noexcept {
@@ -1061,6 +1070,8 @@ public:
     [[nodiscard]] supple::state state() const noexcept { return supple::state(objects().state); }
     [[nodiscard]] supple::loads loads() const noexcept { return supple::loads(objects().loads); }
     [[nodiscard]] supple::contact contact() const noexcept { return supple::contact(objects().contact); }
+    // The network of learned steps, for its describe() and for remarks(); of other steps none.
+    [[nodiscard]] supple::learned learned() const noexcept { return supple::learned(const_cast<supple_learned *>(objects().learned)); }
     // Bytes of its memory that are in use.
     [[nodiscard]] std::size_t bytes() const noexcept { return objects().bytes; }
 

@@ -5,6 +5,7 @@ use core::ffi::c_void;
 use core::mem::take;
 use core::ptr;
 
+use crate::copy::copy;
 use crate::guard::{EVERY, EVERY_LEARNED, vectors_at_most as guard_vectors};
 use crate::inertia::{Cells, vectors_at_most};
 use crate::learned::LearnedReport;
@@ -513,7 +514,7 @@ unsafe fn build(
         let given = array(body.points.cast::<[f32; 3]>(), nodes as usize)?;
         let front = layout(nodes);
         let place = Place::new(memory, bytes, front)?;
-        place.arrays::<supple_sim>().change::<[f32; 3]>(given.len()).copy_from_slice(given);
+        copy(place.arrays::<supple_sim>().change::<[f32; 3]>(given.len()), given);
         let start = place.object::<supple_sim>().cast::<u8>();
         let points = given.as_ptr().cast::<f32>();
         let mut room = Room { start, used: front.bytes(), bytes };

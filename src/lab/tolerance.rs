@@ -24,7 +24,7 @@ const LONGEST: u32 = TIMES_CRITICAL[TIMES_CRITICAL.len() - 1];
 
 /// What a scene gave with a tolerance.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct ToleranceRow {
     /// The scene.
     pub scene: &'static str,
     /// The mean error of the nodes that was accepted, mm.
@@ -61,7 +61,7 @@ pub fn evaluate(
     tolerances: &[f64],
     out: &Path,
     say: impl Fn(&str) + Sync,
-) -> Result<Vec<Row>, LabError> {
+) -> Result<Vec<ToleranceRow>, LabError> {
     let judge = |index: usize| {
         let Some((spec, truth)) = plan.scene(index, out)? else { return Ok(Vec::new()) };
         say(&format!("{}: moves by {:.1} mm", spec.name, 1e3 * truth.most()));
@@ -74,12 +74,12 @@ pub fn evaluate(
             "case,tolerance_mm,motion_mm,worst_error_mm,doubted,silent,us_per_simulated_second,exact_steps,large_steps,changes,\
              best_fixed,best_times_critical,best_us_per_simulated_second"
         )?;
-        rows.iter().try_for_each(|row: &Row| writeln!(file, "{}", csv(row)))
+        rows.iter().try_for_each(|row: &ToleranceRow| writeln!(file, "{}", csv(row)))
     })?;
     Ok(rows)
 }
 
-fn rows(spec: &SceneSpec, truth: &Truth, plan: &Scenes, tolerances: &[f64]) -> Result<Vec<Row>, LabError> {
+fn rows(spec: &SceneSpec, truth: &Truth, plan: &Scenes, tolerances: &[f64]) -> Result<Vec<ToleranceRow>, LabError> {
     let mut fixed = Vec::new();
     let limit = truth.limit_at_rest as f32;
     let exact = run::run(spec, truth, Method::Tled, 1)?;
@@ -113,12 +113,12 @@ fn rows(spec: &SceneSpec, truth: &Truth, plan: &Scenes, tolerances: &[f64]) -> R
             let right = fixed.iter().filter(|fixed| fixed.error <= tolerance);
             let best = right.min_by(|a, b| a.time.total_cmp(&b.time));
             let best = best.map(|best| (best.method, best.times_critical, best.time));
-            Ok(Row { scene: spec.name, tolerance, motion, best, ..run })
+            Ok(ToleranceRow { scene: spec.name, tolerance, motion, best, ..run })
         })
         .collect()
 }
 
-fn entry(row: &run::Row) -> Option<Fixed> {
+fn entry(row: &run::ToleranceRow) -> Option<Fixed> {
     let figures = row.figures()?;
     Some(Fixed {
         method: row.method.name(),
@@ -128,7 +128,7 @@ fn entry(row: &run::Row) -> Option<Fixed> {
     })
 }
 
-fn run_adaptive(spec: &SceneSpec, truth: &Truth, tolerance: f64) -> Result<Row, LabError> {
+fn run_adaptive(spec: &SceneSpec, truth: &Truth, tolerance: f64) -> Result<ToleranceRow, LabError> {
     let scene = spec.build()?;
     let mut state = spec.state(&scene, spec.timing.step / spec.timing.refinement as f32)?;
     let interval = spec.timing.interval_seconds();
@@ -159,7 +159,7 @@ fn run_adaptive(spec: &SceneSpec, truth: &Truth, tolerance: f64) -> Result<Row, 
         }
     }
     let share = |count: u32| f64::from(count) / spec.intervals as f64;
-    Ok(Row {
+    Ok(ToleranceRow {
         scene: spec.name,
         tolerance,
         motion: 0.0,
@@ -172,7 +172,7 @@ fn run_adaptive(spec: &SceneSpec, truth: &Truth, tolerance: f64) -> Result<Row, 
     })
 }
 
-fn csv(row: &Row) -> String {
+fn csv(row: &ToleranceRow) -> String {
     let (name, times, time) = row.best.unwrap_or(("", f64::NAN, f64::NAN));
     format!(
         "{},{},{:.4},{:.5},{:.3},{:.3},{:.1},{},{},{},{name},{times:.1},{time:.1}",
@@ -191,7 +191,7 @@ fn csv(row: &Row) -> String {
 
 /// A line for each tolerance.
 #[must_use]
-pub fn text(rows: &[Row]) -> String {
+pub fn text(rows: &[ToleranceRow]) -> String {
     let mut tolerances: Vec<f64> = rows.iter().map(|row| row.tolerance).collect();
     tolerances.sort_by(f64::total_cmp);
     tolerances.dedup();
@@ -212,7 +212,7 @@ pub fn text(rows: &[Row]) -> String {
             let index = (share * values.len().saturating_sub(1) as f64).round() as usize;
             values.get(index).copied().unwrap_or(f64::NAN)
         };
-        let mean = |value: fn(&Row) -> f64| 100.0 * rows().map(value).sum::<f64>() / errors.len() as f64;
+        let mean = |value: fn(&ToleranceRow) -> f64| 100.0 * rows().map(value).sum::<f64>() / errors.len() as f64;
         let above = errors.iter().filter(|error| **error > 1.0).count();
         text += &format!(
             "{tolerance:12.2} {:6} {:9.2} {:7.2} {:7.1} {above:6} {:9.2} {:7.2} {:7.2} % {:6.1} %\n",

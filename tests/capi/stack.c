@@ -128,7 +128,7 @@ int main(void) {
         {"learned_step", learn, 140},   {"large_init", init_large, 36},    {"large_step", step_large, 40},
         {"guard_init", init_guard, 36},    {"guard_follow", follow, 40},
         {"adaptive_init", init_adaptive, 36}, {"adaptive_advance", advance, 42},
-        {"sim_setup", sim_setup, 36}, {"sim_advance", sim_advance, 42},
+        {"sim_setup", sim_setup, 38}, {"sim_advance", sim_advance, 42},
     };
     const size_t count = sizeof calls / sizeof *calls;
     const uint32_t levels[2] = {supple_level(), SUPPLE_LEVEL_PORTABLE};

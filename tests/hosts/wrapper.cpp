@@ -18,6 +18,9 @@ static_assert(!std::is_convertible_v<const std::vector<float> &, supple::span<fl
 static_assert(!std::is_convertible_v<const std::vector<float> &, supple::memory>);
 static_assert(std::is_convertible_v<const std::vector<float> &, supple::bytes>);
 static_assert(supple::scene::size(4, 1) % supple::align == 0);
+static_assert(sizeof(supple::line) == supple::align && alignof(supple::line) == supple::align);
+static_assert(supple::lines(0) == 0 && supple::lines(1) == 1 && supple::lines(128) == 2 && supple::lines(129) == 3);
+static_assert(std::is_trivially_copyable_v<supple::simulation> && sizeof(supple::simulation) == sizeof(void *));
 static_assert(supple::scene::size(4, 1, 1, supple::element::nodal_strain) ==
               supple::scene::size(4, 1) + SUPPLE_PATCHES_SIZE(4, 1, 1));
 
@@ -235,6 +238,76 @@ void refused(supple::scene scene, supple::loads loads, supple::state state) {
     EXPECT(is_done(state.step(scene, loads, 10)));
 }
 
+// All of it in one memory: what is refused, a ball that presses, a copy that goes on, and other steps.
+void simulated(const char *path) {
+    const auto build = [](const supple::settings &how, supple::memory place) {
+        return supple::simulation::make(place, tetrahedron(), how);
+    };
+    const auto exact = supple::settings(supple::steps::exact, 20).touchable(4, {}, 2);
+    EXPECT(exact.damping == 20 && exact.grips == 2 && supple::settings().guard == 1 && supple::settings().surface.node_count == 0);
+    auto damped = supple::settings(supple::steps::damped, 20).touchable(4, {{&tetrahedra[1], 3}});
+    damped.seconds = 0.01f;
+    EXPECT(damped.surface.nodes == &tetrahedra[1] && damped.surface.node_count == 3 && damped.surface.triangle_count == 0);
+    const auto few = supple::simulation::size(tetrahedron(), exact), bytes = supple::simulation::size(tetrahedron(), damped);
+    EXPECT(few && bytes && bytes.value > few.value);
+    supple::body body = tetrahedron();
+    body.points = {points, 11};
+    EXPECT_SENTENCE(supple::simulation::size(body).error, "fewer bytes or floats than needed: 11, against 12");
+    auto wrong = exact;
+    wrong.tolerance = -1;
+    EXPECT_SENTENCE(supple::simulation::size(tetrahedron(), wrong).error, "a number is negative or not finite: -1");
+    std::vector<supple::line> memory(supple::lines(bytes.value)), copy(memory.size());
+    const auto tight = build(exact, {memory.data(), 640});
+    EXPECT(tight.status == status::e_short && tight.error.value == 640 && tight.error.limit == double(few.value));
+    EXPECT(build(supple::settings().touchable(5), memory).error.limit == 4);
+    (wrong = exact).seconds = 1;
+    EXPECT(build(wrong, memory).status == status::e_unstable);
+    EXPECT(supple::simulation().advance(0.01) == status::e_null && !supple::simulation().state().now() && supple::simulation().bytes() == 0);
+
+    const auto made = build(exact, {memory.data(), few.value});
+    const supple::simulation sim = made.value;
+    EXPECT(made && sim.bytes() <= few.value && sim.scene().describe().value.nodes == 4);
+    const auto at = [](float height) { return supple::pose_at({0.001f, 0.001f, height}); };
+    const supple::instrument ball[] = {supple::instrument::sphere(0.004f, at(0.0145f))};
+    EXPECT(is_done(sim.contact().set(ball)) && is_done(sim.loads().set_gravity({0, 0, -9.81f})));
+    supple::sim_report report;
+    const auto press = [&](supple::simulation of, float from) {
+        const double now = of.state().now().value.seconds;
+        EXPECT(is_done(of.contact().move(0, at(from - 0.001f), now, now + 0.01)));
+        EXPECT(is_done(of.advance(0.01, &report)) && report.exact == report.call.steps && report.exact > 0);
+        supple::touch felt;
+        EXPECT(is_done(of.contact().read(0, felt)));
+        return felt.mean_force[2];
+    };
+    EXPECT(press(sim, 0.0145f) > 0);
+    EXPECT(report.call.time > 0.0099 && report.call.time < 0.0101 && report.shortest > 0 && report.shortest <= report.longest);
+    std::memcpy(copy.data(), memory.data(), sim.bytes());
+    const auto copied = supple::simulation::copy_in(copy);
+    const float force = press(sim, 0.0135f), same = press(copied, 0.0135f);
+    EXPECT(force == same && copied.contact().raw() != sim.contact().raw());
+    EXPECT(sim.advance(-1, &report) == status::e_negative);
+    EXPECT_SENTENCE(report.call.error, "a number is negative or not finite: -1");
+    supple::error error;
+    EXPECT(sim.set(damped, &error) == status::e_short && error.value == double(few.value) && error.limit > error.value);
+    EXPECT(press(sim, 0.0125f) > 0);
+
+    const auto longer = build(damped, memory);
+    EXPECT(longer && is_done(longer.value.loads().set_gravity({0, 0, -9.81f})));
+    for (int frame = 0; frame < 30; frame++) EXPECT(is_done(longer.value.advance(0.02, &report)) && report.damped == 2);
+    EXPECT(report.estimate.known == 1 && report.longest == 0.01f && is_done(longer.value.set(exact)));
+
+    std::ifstream file(path, std::ios::binary);
+    const std::vector<char> weights(std::istreambuf_iterator<char>(file), {});
+    auto network = supple::settings(supple::steps::learned).use_weights(weights);
+    network.lead_in = 0.05;
+    std::vector<supple::line> room(supple::lines(supple::simulation::size(tetrahedron(), network).value));
+    const auto led = build(network, room);
+    EXPECT(led && led.value.learned().describe().value.seconds > 0 && longer.value.learned().raw() == nullptr);
+    EXPECT(led.value.contact().raw() == nullptr && is_done(led.value.loads().set_gravity({0, 0, -1})));
+    EXPECT(is_done(led.value.advance(0.1, &report)) && report.exact > 0 && report.learned > 0);
+    EXPECT(build(supple::settings(supple::steps::learned).use_weights({weights.data(), 8}), room).status == status::e_weights_short);
+}
+
 } // namespace
 
 int main(int count, char **words) {
@@ -259,6 +332,7 @@ int main(int count, char **words) {
     adaptive(scene.value, loads.value, state.value);
     remarked(scene.value, loads.value, state.value);
     refused(scene.value, loads.value, state.value);
+    simulated(words[1]);
     std::puts(wrong ? "wrapper: not as expected" : "wrapper: as expected");
     return wrong;
 }

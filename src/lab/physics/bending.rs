@@ -11,7 +11,7 @@ use super::mesh::{BodyMesh, same};
 use super::rest::mean_displacement;
 use super::specimen::{Elastic, Specimen, fixed};
 use super::steps::TO_REST;
-use super::{LabError, Row};
+use super::{LabError, PhysicsRow};
 
 pub(super) const NAME: &str = "bending";
 const LENGTH: f64 = 0.08;
@@ -24,7 +24,7 @@ const YOUNG: f64 = 1e5;
 const MESHES: [u32; 3] = [2, 4, 6];
 const SOURCE: &str = "Timoshenko beam with the shear factor of Cowper 1966";
 
-pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
+pub(super) fn rows(meshes: usize) -> Result<Vec<PhysicsRow>, LabError> {
     let mut rows = Vec::new();
     for poisson in [0.45, 0.499] {
         for cells in MESHES.into_iter().take(meshes) {
@@ -47,7 +47,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
                         let (state, cost) = setup.at_rest(&loads, omega, |state| mean_displacement(state, &tip, 2))?;
                         Ok((-mean_displacement(&state, &tip, 2), cost))
                     });
-                    rows.push(Row {
+                    rows.push(PhysicsRow {
                         quantity: format!("tip deflection at nu {poisson}"),
                         unit: "mm",
                         value: value.map(|value| 1e3 * value),

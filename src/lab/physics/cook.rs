@@ -21,7 +21,7 @@ use super::mesh::{BodyMesh, same};
 use super::rest::mean_displacement;
 use super::specimen::{Elastic, Specimen, fixed};
 use super::steps::{Steps, TO_REST};
-use super::{LabError, Row, pressure, report};
+use super::{LabError, PhysicsRow, pressure, report};
 
 pub(super) const NAME: &str = "cook";
 const ELASTIC: Elastic = Elastic { young: 240.565e6, poisson: 0.499 };
@@ -43,7 +43,7 @@ const CORNER: &str = "rise of the corner";
 /// Lowest frequency, 1/s: of a clamped bar of the panel's mean height.
 const OMEGA: f64 = 6e3;
 
-pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
+pub(super) fn rows(meshes: usize) -> Result<Vec<PhysicsRow>, LabError> {
     let mut rows = Vec::new();
     for graded in [false, true] {
         for element in Element::ALL {
@@ -65,7 +65,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
 }
 
 /// Adds the rows of a run. Gives the rises of the corner and of the side, m, and a row without quantity.
-fn measured(body: &Specimen, element: Element, steps: Steps, rows: &mut Vec<Row>) -> (Option<[f64; 2]>, Row) {
+fn measured(body: &Specimen, element: Element, steps: Steps, rows: &mut Vec<PhysicsRow>) -> (Option<[f64; 2]>, PhysicsRow) {
     let right = body.mesh.nodes(|[x, ..]| same(x, 0.048));
     let forces = body.mesh.traction(&right, (2.0 / OMEGA) as f32, |_| [0.0, TRACTION, 0.0]);
     let corner = body.mesh.nodes(|[x, y, _]| same(x, 0.048) && same(y, 0.06));
@@ -85,7 +85,7 @@ fn measured(body: &Specimen, element: Element, steps: Steps, rows: &mut Vec<Row>
     });
     let (rises, oscillation) = found.unzip();
     let [corner, side] = [0, 1].map(|index| rises.map(|rises: [f64; 2]| 1e3 * rises[index]));
-    rows.push(Row {
+    rows.push(PhysicsRow {
         quantity: CORNER.into(),
         unit: "mm",
         value: corner,
@@ -93,7 +93,7 @@ fn measured(body: &Specimen, element: Element, steps: Steps, rows: &mut Vec<Row>
         source: SOURCE,
         ..row.clone()
     });
-    rows.push(Row { quantity: SIDE.into(), unit: "mm", value: side, ..row.clone() });
+    rows.push(PhysicsRow { quantity: SIDE.into(), unit: "mm", value: side, ..row.clone() });
     rows.extend(pressure::rows(oscillation, &row));
     (rises, row)
 }

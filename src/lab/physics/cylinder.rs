@@ -11,7 +11,7 @@ use supple::state::VecState;
 use super::mesh::{BodyMesh, same};
 use super::specimen::{Elastic, Specimen, fixed};
 use super::steps::{EXACT, Steps, TO_REST};
-use super::{LabError, Row, report};
+use super::{LabError, PhysicsRow, report};
 
 pub(super) const NAME: &str = "cylinder";
 pub(super) const INNER: f64 = 0.01;
@@ -31,7 +31,7 @@ const FILES: [(&str, &[u8]); 3] = [
 const OMEGA: f64 = 500.0;
 const SOURCE: &str = "Lame; plane strain";
 
-pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
+pub(super) fn rows(meshes: usize) -> Result<Vec<PhysicsRow>, LabError> {
     let grids: Vec<Specimen> = CELLS.into_iter().take(meshes).map(|cells| body(grid(cells))).collect();
     let irregular = (0..FILES.len()).take(meshes).map(|index| Ok(body(irregular(index)?)));
     let mut rows = Vec::new();
@@ -53,7 +53,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
 }
 
 /// Adds the rows of a run. Gives the radial displacements, m, and a row without quantity.
-fn measured(body: &Specimen, element: Element, steps: Steps, rows: &mut Vec<Row>) -> (Option<[f64; 2]>, Row) {
+fn measured(body: &Specimen, element: Element, steps: Steps, rows: &mut Vec<PhysicsRow>) -> (Option<[f64; 2]>, PhysicsRow) {
     let [inner, outer] = [INNER, OUTER].map(|radius| body.mesh.nodes(|[x, y, _]| same(x.hypot(y), radius)));
     let pascal = PRESSURE * ELASTIC.young;
     let forces = body.mesh.traction(&inner, (2.0 / OMEGA) as f32, |normal| normal.map(|x| -pascal * x));
@@ -64,7 +64,7 @@ fn measured(body: &Specimen, element: Element, steps: Steps, rows: &mut Vec<Row>
         Ok(([&inner, &outer].map(|nodes| radial(&body.mesh, &state, nodes)), cost))
     });
     for (index, (radius, name)) in [(INNER, "inner"), (OUTER, "outer")].into_iter().enumerate() {
-        rows.push(Row {
+        rows.push(PhysicsRow {
             quantity: format!("radial displacement of the {name} surface"),
             unit: "mm",
             value: found.map(|values| 1e3 * values[index]),

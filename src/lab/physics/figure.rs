@@ -4,7 +4,7 @@
 
 use supple::material::Element;
 
-use super::Row;
+use super::PhysicsRow;
 use super::mesh::GRID;
 use super::silicone::DISTANCE;
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
@@ -80,7 +80,7 @@ impl Axis {
 }
 
 /// The picture, if there are runs of the beam.
-pub(super) fn draw(rows: &[Row]) -> Option<String> {
+pub(super) fn draw(rows: &[PhysicsRow]) -> Option<String> {
     let curves = curves(rows);
     let all = || curves.iter().flat_map(|curve| &curve.points);
     all().next()?;
@@ -182,7 +182,7 @@ fn legend(svg: &mut String, curves: &[Curve]) {
     }
 }
 
-fn curves(rows: &[Row]) -> Vec<Curve> {
+fn curves(rows: &[PhysicsRow]) -> Vec<Curve> {
     let mut curves: Vec<Curve> = Vec::new();
     for row in rows.iter().filter(|row| row.quantity == DISTANCE && row.mesh == GRID) {
         let (Some(error), Some(time)) = (row.value, row.us_per_simulated_second) else { continue };

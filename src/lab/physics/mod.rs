@@ -44,7 +44,7 @@ use super::LabError;
 
 /// One quantity of one run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct PhysicsRow {
     /// The case.
     pub case: &'static str,
     /// What made the mesh: a grid, a graded grid or Gmsh.
@@ -75,7 +75,7 @@ pub struct Row {
     pub note: String,
 }
 
-impl Row {
+impl PhysicsRow {
     /// Value over reference, less one, in per cent.
     #[must_use]
     pub fn error_percent(&self) -> Option<f64> {
@@ -84,7 +84,7 @@ impl Row {
 }
 
 /// A case: its name and what runs it on so many of its meshes, the coarsest first.
-type Case = (&'static str, fn(usize) -> Result<Vec<Row>, LabError>);
+type Case = (&'static str, fn(usize) -> Result<Vec<PhysicsRow>, LabError>);
 
 const CASES: [Case; 6] = [
     (silicone::NAME, silicone::rows),
@@ -126,7 +126,7 @@ impl Plan {
 /// Carries the plan out: rows in `out/physics.csv`, tables of them in `out/physics.md`, and of the beam the errors over
 /// computing time in `out/physics.svg` and the shapes at rest in `out/locking.svg`; files of an earlier evaluation are
 /// replaced. `say` is given the progress in words.
-pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Vec<Row>, LabError> {
+pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Vec<PhysicsRow>, LabError> {
     super::create_folder(out)?;
     let mut rows = Vec::new();
     for (name, run) in &plan.cases {

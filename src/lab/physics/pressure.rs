@@ -10,7 +10,7 @@ use glam::DVec3;
 use supple::material::Element;
 use supple::simd::NodeVector;
 
-use super::Row;
+use super::PhysicsRow;
 use super::specimen::Specimen;
 use crate::scenes::volume;
 
@@ -54,8 +54,8 @@ pub(super) fn oscillation(body: &Specimen, element: Element, displacements: &[No
 }
 
 /// Its rows; none without a result.
-pub(super) fn rows(oscillation: Option<Oscillation>, row: &Row) -> Vec<Row> {
-    let of = |quantity: &str, value| Row { quantity: quantity.into(), value: Some(value), ..row.clone() };
+pub(super) fn rows(oscillation: Option<Oscillation>, row: &PhysicsRow) -> Vec<PhysicsRow> {
+    let of = |quantity: &str, value| PhysicsRow { quantity: quantity.into(), value: Some(value), ..row.clone() };
     let Some((elements, nodes)) = oscillation else { return Vec::new() };
     let nodes = nodes.map(|value| of(NODES, value));
     [of(ELEMENTS, elements)].into_iter().chain(nodes).collect()

@@ -14,7 +14,7 @@ use super::mesh::{BodyMesh, same};
 use super::pressure::Oscillation;
 use super::specimen::{Cost, Elastic, Setup, Specimen, fixed};
 use super::steps::TO_REST;
-use super::{LabError, Row, pressure};
+use super::{LabError, PhysicsRow, pressure};
 
 pub(super) const NAME: &str = "punch";
 const RADIUS: f64 = 0.01;
@@ -28,7 +28,7 @@ const MESHES: [u32; 3] = [2, 3, 4];
 const OMEGA: f64 = 50.0;
 const SOURCE: &str = "Sneddon 1965; half-space; no friction";
 
-pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
+pub(super) fn rows(meshes: usize) -> Result<Vec<PhysicsRow>, LabError> {
     let mut rows = Vec::new();
     let Elastic { young, poisson } = ELASTIC;
     let reference = 2.0 * RADIUS * young * DEPTH / (1.0 - poisson * poisson);
@@ -47,8 +47,8 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
                 });
                 let computing = of_standing.computing_seconds.zip(of_moved.computing_seconds);
                 let note = if standing.is_none() { of_standing.note } else { of_moved.note.clone() };
-                let row = Row { computing_seconds: computing.map(|(a, b)| a + b), note, ..of_moved };
-                rows.push(Row {
+                let row = PhysicsRow { computing_seconds: computing.map(|(a, b)| a + b), note, ..of_moved };
+                rows.push(PhysicsRow {
                     quantity: "force".into(),
                     unit: "N",
                     value: forces.map(|(force, _)| force),
@@ -56,7 +56,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
                     source: SOURCE,
                     ..row.clone()
                 });
-                rows.push(Row {
+                rows.push(PhysicsRow {
                     quantity: "error if the body ended at its far surfaces".into(),
                     unit: "%",
                     value: forces.map(|(_, error)| error),

@@ -14,7 +14,7 @@ use super::recordings::{DAMPING, GRAVITY, LEFT, LOAD, MARKERS, Measured, Recordi
 use super::specimen::{Cost, Elastic, Setup, Specimen, fixed};
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
 use super::swing::{Markers, Swing};
-use super::{LabError, Row};
+use super::{LabError, PhysicsRow};
 
 pub(super) const NAME: &str = "silicone-beam";
 /// The quantity of the picture.
@@ -50,7 +50,7 @@ pub(super) const LOADS: [Load; 2] = [
 ];
 
 /// On `meshes` grids and one irregular mesh less.
-pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
+pub(super) fn rows(meshes: usize) -> Result<Vec<PhysicsRow>, LabError> {
     let mut rows = Vec::new();
     for load in LOADS {
         let grids = GRIDS.into_iter().take(meshes).map(|cells| Ok(grid(cells)));
@@ -63,7 +63,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
                 let explicit = [EXACT, DAMPED_20, DAMPED_100].into_iter();
                 for steps in explicit.chain(implicit) {
                     let (found, row) = body.measure(NAME, element, steps, |setup| swing_and_rest(setup, &body, load));
-                    compared(load, found, &Row { unit: "mm", source: SOURCE, ..row }, &mut rows);
+                    compared(load, found, &PhysicsRow { unit: "mm", source: SOURCE, ..row }, &mut rows);
                 }
             }
         }
@@ -75,11 +75,11 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
 }
 
 /// Rows of one run against both recordings.
-fn compared(load: Load, found: Option<(Swing, [Measured; 3])>, row: &Row, rows: &mut Vec<Row>) {
+fn compared(load: Load, found: Option<(Swing, [Measured; 3])>, row: &PhysicsRow, rows: &mut Vec<PhysicsRow>) {
     let mut add = |quantity: String, unit, value: Option<f64>, reference| {
         // A body that does not swing has no period.
         let value = value.filter(|value| value.is_finite());
-        rows.push(Row { quantity, unit, value, reference, ..row.clone() });
+        rows.push(PhysicsRow { quantity, unit, value, reference, ..row.clone() });
     };
     let mut distances = Vec::new();
     for Recording { name, markers, left } in load.recordings {
@@ -110,7 +110,7 @@ fn compared(load: Load, found: Option<(Swing, [Measured; 3])>, row: &Row, rows: 
 
 /// How far the curves of the finest grid with nodal pressure are from the recorded ones, over the damping: for each
 /// recording in mm, the clock shifted, and of all the root mean square in shares of the drop at rest.
-fn fit() -> Vec<Row> {
+fn fit() -> Vec<PhysicsRow> {
     let mut rows = Vec::new();
     let bodies = LOADS.map(|load| (load, body(grid(GRIDS[GRIDS.len() - 1]), load)));
     for damping in DAMPINGS {
@@ -123,7 +123,7 @@ fn fit() -> Vec<Row> {
             for Recording { name, markers, left } in load.recordings {
                 let distance = found.as_ref().map(|swing| swing.best_offset(left).1);
                 squares.extend(distance.map(|distance| (distance / markers[LEFT].rest).powi(2)));
-                rows.push(Row {
+                rows.push(PhysicsRow {
                     quantity: format!("{name} left: rms distance over time; damping {damping} 1/s"),
                     unit: "mm",
                     value: distance,
@@ -134,7 +134,7 @@ fn fit() -> Vec<Row> {
             all = Some(row);
         }
         let misfit = 100.0 * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-        rows.extend(all.map(|row| Row {
+        rows.extend(all.map(|row| PhysicsRow {
             quantity: format!("all recordings: rms distance over drop at rest; damping {damping} 1/s"),
             unit: "%",
             value: Some(misfit),

@@ -8,7 +8,7 @@ use supple::material::{Element, NeoHookean, VecMaterial};
 use supple::mesh::{Mesh, Winding};
 use supple::scene::{Axes, BuildError, Support, VecScene};
 
-use super::Row;
+use super::PhysicsRow;
 use super::mesh::BodyMesh;
 use super::steps::Steps;
 use crate::LabError;
@@ -78,10 +78,10 @@ impl Specimen {
         element: Element,
         steps: Steps,
         work: impl FnOnce(&Setup<'_>) -> Result<(T, Cost), LabError>,
-    ) -> (Option<T>, Row) {
+    ) -> (Option<T>, PhysicsRow) {
         let BodyMesh { points, .. } = &self.mesh;
         let found = self.build(element).and_then(|scene| work(&Setup { case, scene: &scene, points, steps }));
-        let row = Row {
+        let row = PhysicsRow {
             case,
             mesh: self.mesh.family,
             element,
@@ -101,10 +101,10 @@ impl Specimen {
             Ok((output, Cost { simulated, computing })) => {
                 let seconds = computing.as_secs_f64();
                 let us_per_simulated_second = Some(1e6 * seconds / simulated);
-                (Some(output), Row { us_per_simulated_second, computing_seconds: Some(seconds), ..row })
+                (Some(output), PhysicsRow { us_per_simulated_second, computing_seconds: Some(seconds), ..row })
             }
-            Err(LabError::Diverged { divergence, .. }) => (None, Row { note: divergence.to_string(), ..row }),
-            Err(error) => (None, Row { note: error.to_string(), ..row }),
+            Err(LabError::Diverged { divergence, .. }) => (None, PhysicsRow { note: divergence.to_string(), ..row }),
+            Err(error) => (None, PhysicsRow { note: error.to_string(), ..row }),
         }
     }
 

@@ -7,12 +7,12 @@ use super::mesh::GRID;
 use super::recordings::Recording;
 use super::report::ORDER;
 use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT, Steps, TO_REST};
-use super::{Row, cook, pressure, silicone};
+use super::{PhysicsRow, cook, pressure, silicone};
 use crate::literal::PAPER;
 
 /// All tables that the rows fill.
 #[must_use]
-pub fn tables(rows: &[Row]) -> String {
+pub fn tables(rows: &[PhysicsRow]) -> String {
     let rows = Rows(rows);
     let tables = [rows.beam(), rows.other_steps(), rows.damping(), rows.cases(), rows.notes(), rows.pressure()];
     let literal = format!(
@@ -23,12 +23,12 @@ pub fn tables(rows: &[Row]) -> String {
     tables.into_iter().flatten().chain([literal]).collect::<Vec<_>>().join("\n")
 }
 
-struct Rows<'a>(&'a [Row]);
+struct Rows<'a>(&'a [PhysicsRow]);
 
 /// Mesh, element, method and tetrahedra of a run.
 type Key = (&'static str, Element, &'static str, usize);
 
-fn key(row: &Row) -> Key {
+fn key(row: &PhysicsRow) -> Key {
     (row.mesh, row.element, row.method, row.tetrahedra)
 }
 
@@ -48,18 +48,18 @@ fn short(value: f64) -> String {
     format!("{value:.*}", (2.0 - digits).clamp(0.0, 4.0) as usize)
 }
 
-fn percent(row: &Row) -> Option<String> {
+fn percent(row: &PhysicsRow) -> Option<String> {
     let error = row.error_percent()?;
     let digits = if error.abs() < 9.95 { 1 } else { 0 };
     Some(format!("{error:+.digits$}"))
 }
 
 impl Rows<'_> {
-    fn of_case(&self, case: &'static str) -> impl Iterator<Item = &Row> {
+    fn of_case(&self, case: &'static str) -> impl Iterator<Item = &PhysicsRow> {
         self.0.iter().filter(move |row| row.case == case)
     }
 
-    fn find(&self, case: &'static str, at: Key, quantity: &str) -> Option<&Row> {
+    fn find(&self, case: &'static str, at: Key, quantity: &str) -> Option<&PhysicsRow> {
         self.of_case(case).find(|row| key(row) == at && row.quantity == quantity)
     }
 
@@ -112,8 +112,8 @@ impl Rows<'_> {
                 pair(a.since_tenth, b.since_tenth)
             );
             let rest = format!("{} left: drop at rest", load.recordings[0].name);
-            let exact = |row: &&Row| row.method == EXACT.name && row.quantity == rest;
-            let line = |row: &Row| {
+            let exact = |row: &&PhysicsRow| row.method == EXACT.name && row.quantity == rest;
+            let line = |row: &PhysicsRow| {
                 let (mesh, element, _, count) = key(row);
                 let seconds = [EXACT, DAMPED_20, DAMPED_100]
                     .map(|steps| self.seconds((mesh, element, steps.name, count), load.recordings));
@@ -134,20 +134,20 @@ impl Rows<'_> {
     fn other_steps(&self) -> Option<String> {
         let [gravity, _] = silicone::LOADS;
         let rest = format!("{} left: drop at rest", gravity.recordings[0].name);
-        let wanted = |row: &&Row| {
+        let wanted = |row: &&PhysicsRow| {
             let damped = row.method == DAMPED_20.name || row.method == DAMPED_100.name;
             let shown = row.method != EXACT.name && damped == (row.element != Element::Linear);
             row.mesh == GRID && row.quantity == rest && shown
         };
-        let line = |row: &Row| {
+        let line = |row: &PhysicsRow| {
             let at = key(row);
             let figures = self.marker(at, gravity.recordings);
             let seconds = self.seconds(at, gravity.recordings).unwrap_or_else(|| row.note.clone());
             format!("| {} | {} | {} | {figures} | {seconds} |", row.element.name(), row.method, row.tetrahedra)
         };
-        let mut shown: Vec<&Row> = self.of_case(silicone::NAME).filter(wanted).collect();
+        let mut shown: Vec<&PhysicsRow> = self.of_case(silicone::NAME).filter(wanted).collect();
         let kinds = [DAMPED_20, DAMPED_100].into_iter().chain(BACKWARD_EULER);
-        let place = |row: &Row| kinds.clone().position(|steps| steps.name == row.method);
+        let place = |row: &PhysicsRow| kinds.clone().position(|steps| steps.name == row.method);
         shown.sort_by_key(|row| (row.element.code(), place(row)));
         let heads = "| element | steps | tetrahedra | at rest, mm | error, % | lowest point, mm | error, % | \
                      from a tenth to there, s | error, % | period error, % | curve, mm | s/s |";
@@ -170,10 +170,10 @@ impl Rows<'_> {
     }
 
     /// Runs of one quantity of a case on meshes from coarse to fine, for each mesh and element.
-    fn groups(&self, wanted: impl Fn(&Row) -> bool) -> Vec<Vec<&Row>> {
-        let mut groups: Vec<Vec<&Row>> = Vec::new();
+    fn groups(&self, wanted: impl Fn(&PhysicsRow) -> bool) -> Vec<Vec<&PhysicsRow>> {
+        let mut groups: Vec<Vec<&PhysicsRow>> = Vec::new();
         for row in self.0.iter().filter(|row| row.case != silicone::NAME && wanted(row)) {
-            let same = |group: &&mut Vec<&Row>| {
+            let same = |group: &&mut Vec<&PhysicsRow>| {
                 let first = group[0];
                 (first.case, first.mesh, first.element) == (row.case, row.mesh, row.element)
                     && first.quantity == row.quantity
@@ -187,14 +187,14 @@ impl Rows<'_> {
     }
 
     fn cases(&self) -> Option<String> {
-        let wanted = |row: &Row| {
+        let wanted = |row: &PhysicsRow| {
             let other = row.quantity.contains("outer") || row.quantity.starts_with(ORDER);
             !other && (row.reference.is_some() || row.quantity == cook::SIDE)
         };
-        let line = |group: Vec<&Row>| {
+        let line = |group: Vec<&PhysicsRow>| {
             let first = group[0];
             let of = |steps: Steps| group.iter().filter(move |row| row.method == steps.name);
-            let value = |row: &Row| Some(format!("{} {}", short(row.value?), row.unit));
+            let value = |row: &PhysicsRow| Some(format!("{} {}", short(row.value?), row.unit));
             let errors = TO_REST.map(|steps| join(of(steps).map(|row| percent(row).or(value(row))))).join(" | ");
             let seconds = |steps| of(steps).next_back().and_then(|row| row.computing_seconds).map(short);
             let order = self.of_case(first.case).find(|row| {
@@ -220,15 +220,15 @@ impl Rows<'_> {
 
     /// Why runs have no value: of each case, mesh, element and kind of steps the first reason.
     fn notes(&self) -> Option<String> {
-        let mut firsts: Vec<&Row> = Vec::new();
-        let kind = |row: &Row| (row.case, row.mesh, row.element, row.method);
+        let mut firsts: Vec<&PhysicsRow> = Vec::new();
+        let kind = |row: &PhysicsRow| (row.case, row.mesh, row.element, row.method);
         for row in self.0.iter().filter(|row| !row.note.is_empty() && !row.quantity.starts_with(ORDER)) {
             if !firsts.iter().any(|first| kind(first) == kind(row)) {
                 firsts.push(row);
             }
         }
-        let line = |row: &&Row| {
-            let Row { case, mesh, method, tetrahedra, note, .. } = row;
+        let line = |row: &&PhysicsRow| {
+            let PhysicsRow { case, mesh, method, tetrahedra, note, .. } = row;
             format!("| {case} | {mesh} | {} | {method} | {tetrahedra} | {note} |", row.element.name())
         };
         let heads = "| case | mesh | element | steps | tetrahedra | first reason |";
@@ -236,8 +236,8 @@ impl Rows<'_> {
     }
 
     fn pressure(&self) -> Option<String> {
-        let wanted = |row: &Row| row.quantity == pressure::ELEMENTS && row.method == EXACT.name;
-        let line = |group: Vec<&Row>| {
+        let wanted = |row: &PhysicsRow| row.quantity == pressure::ELEMENTS && row.method == EXACT.name;
+        let line = |group: Vec<&PhysicsRow>| {
             let first = group[0];
             let between_nodes = group.iter().map(|row| {
                 let nodes = self.find(row.case, key(row), pressure::NODES);

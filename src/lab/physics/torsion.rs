@@ -12,7 +12,7 @@ use supple::tled;
 use super::mesh::{BodyMesh, same};
 use super::specimen::{Cost, Elastic, Setup, Specimen, fixed};
 use super::steps::{EXACT, TO_REST};
-use super::{LabError, Row, report};
+use super::{LabError, PhysicsRow, report};
 
 pub(super) const NAME: &str = "torsion";
 const WIDTH: f64 = 0.02;
@@ -26,7 +26,7 @@ const MESHES: [u32; 3] = [4, 8, 16];
 const OMEGA: f64 = 800.0;
 const SOURCE: &str = "Saint-Venant; torsion constant 0.1406 a^4";
 
-pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
+pub(super) fn rows(meshes: usize) -> Result<Vec<PhysicsRow>, LabError> {
     let mut rows = Vec::new();
     let reference = CONSTANT * ELASTIC.shear() * WIDTH.powi(4) * ANGLE / LENGTH;
     for element in Element::ALL {
@@ -39,7 +39,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<Row>, LabError> {
                 if let (Some(value), true) = (value, steps.kind == EXACT.kind) {
                     errors.push((row.clone(), f64::from(cells), value / reference - 1.0));
                 }
-                rows.push(Row {
+                rows.push(PhysicsRow {
                     quantity: "torque".into(),
                     unit: "N m",
                     value,

@@ -4,11 +4,11 @@ use supple_cli::report::made::Made;
 use supple_cli::report::plots::{self, COLOURS, Curve, DashType, MarkerSymbol, short};
 use supple_cli::report::{Figure, Panel, ReportPart, Section, Table};
 use supple_lab::evaluate::unique;
-use supple_lab::physics::Row;
+use supple_lab::physics::PhysicsRow;
 
 pub(crate) const NAME: &str = "physics";
 
-pub(crate) fn part(rows: &[Row]) -> ReportPart {
+pub(crate) fn part(rows: &[PhysicsRow]) -> ReportPart {
     let names = unique(rows.iter().map(|row| (row.case, &*row.quantity)));
     let panels = names.into_iter().filter_map(|(case, quantity)| {
         let of = rows.iter().filter(|row| row.case == case && row.quantity == quantity);
@@ -30,7 +30,7 @@ pub(crate) fn part(rows: &[Row]) -> ReportPart {
 }
 
 /// Error, its unit, computing time.
-fn error(row: &Row) -> Option<(f64, &'static str, f64)> {
+fn error(row: &PhysicsRow) -> Option<(f64, &'static str, f64)> {
     let time = row.us_per_simulated_second.map(|time| 1e-6 * time).or(row.computing_seconds)?;
     // A distance to what was measured is an error by itself.
     let (error, unit) = match row.error_percent() {
@@ -50,7 +50,7 @@ struct Meshes {
     words: Vec<String>,
 }
 
-fn panel(case: &str, quantity: &str, rows: &[&Row]) -> Option<Panel> {
+fn panel(case: &str, quantity: &str, rows: &[&PhysicsRow]) -> Option<Panel> {
     let mut curves: Vec<Meshes> = vec![];
     let mut unit = "";
     for row in rows {
@@ -83,10 +83,10 @@ fn panel(case: &str, quantity: &str, rows: &[&Row]) -> Option<Panel> {
 }
 
 /// The finest mesh of each case, quantity and element with exact steps.
-fn finest(rows: &[Row]) -> Table {
-    let mut lines: Vec<&Row> = vec![];
+fn finest(rows: &[PhysicsRow]) -> Table {
+    let mut lines: Vec<&PhysicsRow> = vec![];
     for row in rows.iter().filter(|row| row.error_percent().is_some() && row.computing_seconds.is_some()) {
-        let same = |other: &&mut &Row| {
+        let same = |other: &&mut &PhysicsRow| {
             (other.case, &other.quantity, other.element, other.method, other.mesh)
                 == (row.case, &row.quantity, row.element, row.method, row.mesh)
         };
@@ -98,7 +98,7 @@ fn finest(rows: &[Row]) -> Table {
     }
     let heads =
         ["case", "quantity", "element", "steps", "mesh", "tetrahedra", "value", "should be", "error, %", "source"];
-    let cells = |row: &&Row| {
+    let cells = |row: &&PhysicsRow| {
         let number =
             |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{} {}", short(value), row.unit));
         vec![
@@ -126,8 +126,8 @@ mod tests {
     use super::*;
     use supple::material::Element;
 
-    fn row(value: f64, reference: Option<f64>, tetrahedra: usize) -> Row {
-        Row {
+    fn row(value: f64, reference: Option<f64>, tetrahedra: usize) -> PhysicsRow {
+        PhysicsRow {
             case: "bending",
             mesh: "grid",
             element: Element::Linear,
