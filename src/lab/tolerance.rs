@@ -118,7 +118,7 @@ fn rows(spec: &SceneSpec, truth: &Truth, plan: &Scenes, tolerances: &[f64]) -> R
         .collect()
 }
 
-fn entry(row: &run::ToleranceRow) -> Option<Fixed> {
+fn entry(row: &run::Row) -> Option<Fixed> {
     let figures = row.figures()?;
     Some(Fixed {
         method: row.method.name(),

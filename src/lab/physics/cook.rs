@@ -65,7 +65,12 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<PhysicsRow>, LabError> {
 }
 
 /// Adds the rows of a run. Gives the rises of the corner and of the side, m, and a row without quantity.
-fn measured(body: &Specimen, element: Element, steps: Steps, rows: &mut Vec<PhysicsRow>) -> (Option<[f64; 2]>, PhysicsRow) {
+fn measured(
+    body: &Specimen,
+    element: Element,
+    steps: Steps,
+    rows: &mut Vec<PhysicsRow>,
+) -> (Option<[f64; 2]>, PhysicsRow) {
     let right = body.mesh.nodes(|[x, ..]| same(x, 0.048));
     let forces = body.mesh.traction(&right, (2.0 / OMEGA) as f32, |_| [0.0, TRACTION, 0.0]);
     let corner = body.mesh.nodes(|[x, y, _]| same(x, 0.048) && same(y, 0.06));

@@ -53,7 +53,12 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<PhysicsRow>, LabError> {
 }
 
 /// Adds the rows of a run. Gives the radial displacements, m, and a row without quantity.
-fn measured(body: &Specimen, element: Element, steps: Steps, rows: &mut Vec<PhysicsRow>) -> (Option<[f64; 2]>, PhysicsRow) {
+fn measured(
+    body: &Specimen,
+    element: Element,
+    steps: Steps,
+    rows: &mut Vec<PhysicsRow>,
+) -> (Option<[f64; 2]>, PhysicsRow) {
     let [inner, outer] = [INNER, OUTER].map(|radius| body.mesh.nodes(|[x, y, _]| same(x.hypot(y), radius)));
     let pascal = PRESSURE * ELASTIC.young;
     let forces = body.mesh.traction(&inner, (2.0 / OMEGA) as f32, |normal| normal.map(|x| -pascal * x));
