@@ -2,10 +2,10 @@
 
 use supple::material::Element;
 use supple_lab::physics::report::HEADS;
-use supple_lab::physics::{Plan, Row, evaluate};
+use supple_lab::physics::{PhysicsRow, Plan, evaluate};
 
 /// Rows of a case on its coarsest meshes, and what the file holds.
-fn run(case: &str, meshes: usize) -> (Vec<Row>, String) {
+fn run(case: &str, meshes: usize) -> (Vec<PhysicsRow>, String) {
     let mut plan = Plan::new(&[case.to_string()]).unwrap();
     plan.meshes = meshes;
     let folder = tempfile::tempdir().unwrap();
@@ -14,8 +14,9 @@ fn run(case: &str, meshes: usize) -> (Vec<Row>, String) {
 }
 
 /// The error (%) of a quantity on the finest of the meshes of a family.
-fn error(rows: &[Row], (mesh, element, method): (&str, Element, &str), quantity: &str) -> f64 {
-    let of = |row: &&Row| (row.mesh, row.element, row.method) == (mesh, element, method) && row.quantity == quantity;
+fn error(rows: &[PhysicsRow], (mesh, element, method): (&str, Element, &str), quantity: &str) -> f64 {
+    let of =
+        |row: &&PhysicsRow| (row.mesh, row.element, row.method) == (mesh, element, method) && row.quantity == quantity;
     rows.iter().rev().find(of).unwrap().error_percent().unwrap()
 }
 
