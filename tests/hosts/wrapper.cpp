@@ -262,7 +262,8 @@ void simulated(const char *path) {
     EXPECT(build(supple::settings().touchable(5), memory).error.limit == 4);
     (wrong = exact).seconds = 1;
     EXPECT(build(wrong, memory).status == status::e_unstable);
-    EXPECT(supple::simulation().advance(0.01) == status::e_null && !supple::simulation().state().now() && supple::simulation().bytes() == 0);
+    const supple::simulation none;
+    EXPECT(none.advance(0.01) == status::e_null && !none.state().now() && none.bytes() == 0);
 
     const auto made = build(exact, {memory.data(), few.value});
     const supple::simulation sim = made.value;
