@@ -4,7 +4,7 @@
 use supple::adaptive::{Adaptive, Request, Taken};
 use supple::inertia::{Cells, Method};
 use supple::loads::{Loads, NodalForce};
-use supple::material::{AnyLaw, Tissue};
+use supple::material::VecMaterial;
 use supple::scene::VecScene;
 use supple::state::{NodeVector, Progress, StateView, VecState};
 use supple::step::{Status, Step};
@@ -14,7 +14,7 @@ use crate::support::bodies::{held, torsion};
 use crate::support::{Body, EXP, bound, mean_distance, rest_of, tissue, to_f64};
 use crate::{KINDS, support};
 
-type Scene = VecScene<Tissue<AnyLaw>>;
+type Scene = VecScene<VecMaterial>;
 type VecAdaptive = Adaptive<'static, Vec<NodeVector>>;
 
 const DAMPING: f32 = 20.0;

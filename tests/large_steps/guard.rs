@@ -4,7 +4,7 @@
 use supple::guard::{Allowed, EVERY, Guard};
 use supple::inertia::{Cells, InertiaError, LargeStep, Method};
 use supple::loads::{Loads, NodalForce};
-use supple::material::{AnyLaw, Tissue};
+use supple::material::VecMaterial;
 use supple::scene::VecScene;
 use supple::state::VecState;
 use supple::step::{Status, Step};
@@ -13,7 +13,7 @@ use crate::support::bodies::{held, torsion};
 use crate::support::{Body, EXP, bound, mean_distance, rest_of, tissue, to_f64};
 use crate::{VecLargeStep, support};
 
-type Scene = VecScene<Tissue<AnyLaw>>;
+type Scene = VecScene<VecMaterial>;
 type VecGuard = Guard<Vec<supple::state::NodeVector>>;
 
 const DAMPING: f32 = 20.0;

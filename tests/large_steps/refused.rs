@@ -2,7 +2,7 @@
 
 use supple::inertia::{Cells, Grid, InertiaError, LargeModel, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::loads::{Loads, Motion, NodalForce};
-use supple::material::{AnyLaw, Element, Tissue};
+use supple::material::{Element, Tissue, VecMaterial};
 use supple::scene::{Axes, Support, VecScene};
 use supple::state::{NodeVector, VecState};
 use supple::step::{Status, Step};
@@ -19,7 +19,7 @@ fn given(cells: [u32; 3]) -> Method<'static> {
 fn refused(
     method: Method<'static>,
     vectors: usize,
-    spoil: impl Fn(&VecScene<Tissue<AnyLaw>>, &mut Vec<[f32; 3]>, &mut VecState),
+    spoil: impl Fn(&VecScene<VecMaterial>, &mut Vec<[f32; 3]>, &mut VecState),
 ) -> InertiaError {
     let body = small_bar();
     let scene = body.scene(tissue(NEO), &held(&body));

@@ -3,7 +3,7 @@
 
 use supple::learned::{LearnedError, LearnedStep, vectors_for};
 use supple::loads::{Loads, NodalForce};
-use supple::material::{AnyLaw, Tissue};
+use supple::material::VecMaterial;
 use supple::mesh::{Mesh, Winding};
 use supple::mlp::{Description, ForceInput, Network, Range, write};
 use supple::scene::{Support, VecScene};
@@ -110,7 +110,7 @@ fn network(seed: u32) -> Description<'static> {
     description
 }
 
-type Scene = VecScene<Tissue<AnyLaw>>;
+type Scene = VecScene<VecMaterial>;
 
 /// A learned step without fallback.
 fn learned_step<'w>(network: Network<'w>, nodes: usize) -> LearnedStep<'w, Vec<NodeVector>> {

@@ -3,7 +3,7 @@
 
 use supple::element::ElementMaterial;
 use supple::loads::{Loads, Motion, NodalForce};
-use supple::material::Law;
+use supple::material::{AnyLaw, Law, Material, VecMaterial};
 use supple::scene::{Axes, Support, VecScene};
 use supple::state::VecState;
 use supple::step::{Status, Step};
@@ -15,7 +15,7 @@ use crate::support::bodies::{far_end, held, small_bar, torsion};
 use crate::support::{NEO, bound, rest_of, tissue};
 
 /// A body with an end that can be moved, and stable steps.
-fn body_with_moved_end<M: ElementMaterial>(material: M) -> (VecScene<M>, Vec<u32>, Step) {
+fn body_with_moved_end(material: impl Material<Law: Into<AnyLaw>>) -> (VecScene<VecMaterial>, Vec<u32>, Step) {
     let body = small_bar();
     let end = far_end(&body);
     let moved = end.iter().copied().map(Support::moved);

@@ -4,7 +4,7 @@
 
 use proptest::prelude::*;
 use supple::loads::{Loads, NodalForce};
-use supple::material::{AnyLaw, Law, NeoHookean, Tissue};
+use supple::material::{AnyLaw, Law, NeoHookean, VecMaterial};
 use supple::scene::{Axes, Support, VecScene};
 use supple::state::VecState;
 use supple::step::{Cause, Divergence, Status, Step, StepError};
@@ -277,7 +277,7 @@ fn a_step_above_the_bound_is_refused_with_its_values() {
 }
 
 /// A state at rest with a random velocity of 1 mm/s on every free axis.
-fn stirred(scene: &VecScene<Tissue<AnyLaw>>, step: &Step) -> VecState {
+fn stirred(scene: &VecScene<VecMaterial>, step: &Step) -> VecState {
     let mut state = rest_of(scene);
     let random = std::cell::RefCell::new(Random(31));
     let at = |_| ([0.0; 3], random.borrow_mut().vector().map(|x| (1e-3 * x) as f32));

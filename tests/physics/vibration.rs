@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 
 use supple::loads::Loads;
-use supple::material::{AnyLaw, Law, NeoHookean, Tissue};
+use supple::material::{AnyLaw, Law, NeoHookean, VecMaterial};
 use supple::scene::VecScene;
 use supple::state::VecState;
 use supple::step::Step;
@@ -22,7 +22,7 @@ const YOUNG: f64 = 9.0 * BULK * SHEAR / (3.0 * BULK + SHEAR);
 
 /// Frequency (1/s) of a free oscillation: from the first to the last of `crossings` zeros of what `measure` sees.
 fn frequency(
-    scene: &VecScene<Tissue<AnyLaw>>,
+    scene: &VecScene<VecMaterial>,
     start: impl Fn(usize) -> [f32; 3],
     measure: impl Fn(&VecState) -> f64,
     crossings: usize,

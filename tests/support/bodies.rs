@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use supple::loads::NodalForce;
-use supple::material::Material;
+use supple::material::{AnyLaw, Material, VecMaterial};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::scene::{Support, VecScene};
 
@@ -125,9 +125,9 @@ impl Body {
         }
     }
 
-    /// A scene of this body.
-    pub fn scene<M: Material>(&self, material: M, supports: &[Support]) -> VecScene<M> {
-        VecScene::build(material, &self.mesh(), supports).unwrap()
+    /// A scene of this body. Of whatever type the material is, the steps are compiled once.
+    pub fn scene<M: Material<Law: Into<AnyLaw>>>(&self, material: M, supports: &[Support]) -> VecScene<VecMaterial> {
+        VecScene::build(super::at_run_time(&material), &self.mesh(), supports).unwrap()
     }
 
     /// Nodes whose position at rest satisfies the condition.

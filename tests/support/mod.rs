@@ -10,7 +10,9 @@ pub use bodies::Body;
 
 use supple::element::ElementMaterial;
 use supple::loads::Loads;
-use supple::material::{AnyLaw, Exponential, NeoHookean, Polynomial, Regions, Tissue, Values};
+use supple::material::{
+    AnyLaw, Exponential, Laws, Material, NeoHookean, Polynomial, Regions, Tissue, Values, VecMaterial,
+};
 use supple::scene::{Support, VecScene};
 use supple::state::{NodeVector, VecState};
 use supple::step::{CriticalStep, Status, Step};
@@ -64,6 +66,17 @@ pub fn rest_of<M>(scene: &VecScene<M>) -> VecState {
 /// One tissue of [`DENSITY`].
 pub fn tissue(law: impl Into<AnyLaw>) -> Tissue<AnyLaw> {
     Tissue { law: law.into(), density: DENSITY }
+}
+
+/// The same material, with law and element chosen at run time.
+pub fn at_run_time<M: Material<Law: Into<AnyLaw>>>(material: &M) -> VecMaterial {
+    let element = material.element();
+    match material.laws() {
+        Laws::One(law) => VecMaterial::one(element, law, material.tissue(0).expect("a tissue").density),
+        Laws::Regions { law, tissues, of_element } => {
+            VecMaterial { element, law: law.into(), tissues: tissues.to_vec(), of_element: of_element.to_vec() }
+        }
+    }
 }
 
 /// Supports that fix these nodes.
