@@ -4,21 +4,21 @@ use supple::contact::{
     Contact, Instrument, Surface, SurfaceNode, Touch, boundary, boundary_triangles, vectors_to_push,
 };
 use supple::loads::Loads;
-use supple::material::{NeoHookean, NodalStrain, Tissue};
+use supple::material::{Element, NeoHookean, VecMaterial};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::scene::{Support, VecScene};
 use supple::state::{AsState, NodeVector, Progress, StateView};
 use supple::step::{Status, Step};
 use supple::tled;
 
-pub(crate) type Law = NodalStrain<Tissue<NeoHookean>>;
-
-pub(crate) const TISSUE: Law = NodalStrain(Tissue { law: NeoHookean { c: 1000.0, d: 10_000.0 }, density: 1000.0 });
+fn tissue() -> VecMaterial {
+    VecMaterial::one(Element::NodalStrain, NeoHookean { c: 1000.0, d: 10_000.0 }, 1000.0)
+}
 
 /// A body with its state, and the nodes that can be touched.
 pub(crate) struct Body {
     pub(crate) points: Vec<[f32; 3]>,
-    pub(crate) scene: VecScene<Law>,
+    pub(crate) scene: VecScene<VecMaterial>,
     pub(crate) surface: Vec<SurfaceNode>,
     /// Those of the surface that instruments touch between nodes: none, unless asked for.
     pub(crate) triangles: Vec<[u32; 3]>,
@@ -37,7 +37,7 @@ impl Body {
 
     pub(crate) fn of(points: Vec<[f32; 3]>, tets: &[[u32; 4]], supports: &[Support], damping: f32) -> Self {
         let mesh = Mesh::new(&points, tets, Winding::Normalised).unwrap();
-        let scene = VecScene::build(TISSUE, &mesh, supports).unwrap();
+        let scene = VecScene::build(tissue(), &mesh, supports).unwrap();
         let surface = boundary(&mesh);
         let every_triangle = boundary_triangles(&mesh, &surface);
         let zeros = || vec![NodeVector::ZERO; points.len()];

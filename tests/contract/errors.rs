@@ -2,7 +2,7 @@
 //! empty and the state where it was.
 
 use supple::loads::{LoadError, Loads, Motion, NodalForce, traction};
-use supple::material::{Exponential, Material, NeoHookean, NodalStrain, Regions, Tissue};
+use supple::material::{AnyLaw, Exponential, Material, NeoHookean, NodalStrain, Regions, Tissue};
 use supple::mesh::{Mesh, MeshError, Winding};
 use supple::scene::{Axes, BuildError, FixedScene, Support, patch_rows_for};
 use supple::state::FixedState;
@@ -12,9 +12,10 @@ use supple::tled;
 const POINTS: [[f32; 3]; 5] =
     [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01], [0.01, 0.01, 0.01]];
 const TETS: [[u32; 4]; 2] = [[0, 1, 2, 3], [1, 2, 3, 4]];
-const TISSUE: Tissue<NeoHookean> = Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 };
+const TISSUE: Tissue<AnyLaw> =
+    Tissue { law: AnyLaw::NeoHookean(NeoHookean { c: 500.0, d: 25_000.0 }), density: 1000.0 };
 
-type SmallScene = FixedScene<Tissue<NeoHookean>, 5, 1>;
+type SmallScene = FixedScene<Tissue<AnyLaw>, 5, 1>;
 
 fn good() -> Mesh<'static> {
     Mesh::new(&POINTS, &TETS, Winding::Checked).unwrap()
@@ -159,7 +160,7 @@ fn build_errors_say_what_is_wrong_and_leave_the_scene_empty() {
 #[test]
 fn constants_that_are_not_finite_and_positive_are_refused_by_name() {
     for value in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        let soft = |c, d| Tissue { law: NeoHookean { c, d }, ..TISSUE };
+        let soft = |c, d| Tissue { law: NeoHookean { c, d }, density: 1000.0 };
         let stiff = |a, b, d| Tissue { law: Exponential { a, b, d }, density: 1000.0 };
         let refusals = [
             ("c", refused(FixedScene::new(soft(value, 1.0)), &good(), &[])),
