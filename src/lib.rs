@@ -15,11 +15,12 @@
 //! let bar = Bar { size: [0.02, 0.02, 0.1], cells: [2, 2, 10] };
 //! let tissue = VecMaterial::one(Element::NodalStrain, NeoHookean { c: 500.0, d: 25_000.0 }, 1000.0);
 //! let fixed: Vec<_> = (0..9).map(Support::fixed).collect();
+//! let tip = bar.node(1, 1, 10);
 //! let mut bent = Simulation::new(bar.points(), bar.tets(), tissue, &fixed)?;
-//! bent.forces = vec![NodalForce { node: bar.node(1, 1, 10), newton: [0.01, 0.0, 0.0], ramp: 0.1 }];
+//! bent.forces = vec![NodalForce { node: tip, newton: [0.01, 0.0, 0.0], ramp: 0.1 }];
 //! let report = bent.advance(0.2)?;
-//! println!("{:?}: the tip moved {:.2} mm", report.status, 1e3 * bent.displacements()[94].to_array()[0]);
-//! # assert!(report.is_ok() && bent.displacements()[94].to_array()[0] > 0.003);
+//! println!("{:?}: the tip moved {:.2} mm", report.status, 1e3 * bent.displacements()[tip as usize].to_array()[0]);
+//! # assert!(report.is_ok() && bent.displacements()[tip as usize].to_array()[0] > 0.003);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -78,26 +79,27 @@
 //!
 //! # Layers
 //!
-//! Data flows one way; nothing below knows what is above.
+//! A module uses only those that stand before it in this table. The exceptions: [`contact`] has the moment of a state
+//! (`state::Progress`) and the size of a response of [`inertia`]; documentation points anywhere.
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`simd`] | one generic body for every instruction set |
 //! | [`mesh`] | a checked tetrahedral mesh, borrowed from the caller; renumbering, strips, partitions |
 //! | [`material`] | hyperelastic laws: two scalar functions of the invariants each |
-//! | [`element`] | linear tetrahedra: deformation, internal forces, stiffness bounds |
+//! | [`element`] | tetrahedra (linear, nodal pressure, nodal strain): deformation, internal forces, stiffness bounds |
 //! | [`scene`] | what is simulated, computed once: element tables, masses, supports |
-//! | [`state`] | what moves: displacements and their last increment |
-//! | [`loads`] | what acts on it, set when the host likes: forces, traction, gravity, prescribed motion |
 //! | [`contact`] | rigid instruments that touch the tissue, and what they feel |
+//! | [`state`] | what moves: displacements and their last increment |
+//! | [`loads`] | what acts on it, set when the host likes: forces, traction, gravity, prescribed motion, instruments |
+//! | [`mlp`] | dense layers: the forward pass, the weight file |
 //! | [`plausibility`] | does a scene look as if a unit was mistaken |
 //! | [`step`] | the protocol of every step: begin, compute, energy balance, accept or refuse; threads |
 //! | [`tled`] | the exact step and the critical step |
-//! | [`guard`] | may a step be believed: a second run that estimates its error |
 //! | [`reaction`] | the force by which supports act on the tissue, also in long steps |
-//! | [`adaptive`] | steps that choose their length so that their error stays below a tolerance |
 //! | [`inertia`] | steps beyond the critical one: mass-scaled, multilevel, damped |
-//! | [`mlp`] | dense layers: the forward pass, the weight file |
+//! | [`guard`] | may a step be believed: a second run that estimates its error |
+//! | [`adaptive`] | steps that choose their length so that their error stays below a tolerance |
 //! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
 //! | [`simulation`] | one owner of all that: scene, state, loads, method, guard, fallback, pace |
 //!
