@@ -320,7 +320,7 @@ enum supple_status
      */
     SUPPLE_FELL_BACK = 3,
     /**
-     * A supple_guard estimates that the error is more than is allowed.
+     * A guard, automatic steps or supple_sim_advance estimate that the error is more than is allowed.
      */
     SUPPLE_INEXACT = 4,
     /**
@@ -369,7 +369,8 @@ enum supple_status
      */
     SUPPLE_E_NOT_FINITE = -11,
     /**
-     * Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s); or a lead-in (s).
+     * Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s); or a lead-in (s); or a
+     * tolerance (m); or a span of supple_sim_advance (s), which must be above zero.
      */
     SUPPLE_E_NEGATIVE = -12,
     /**
@@ -429,7 +430,7 @@ enum supple_status
      */
     SUPPLE_E_NOT_HELD = -30,
     /**
-     * No step has been set: supple_set_step comes first.
+     * No step has been set: supple_set_step comes first; of a supple_sim: supple_sim_set was refused, call it again.
      */
     SUPPLE_E_NO_STEP = -31,
     /**
@@ -1607,8 +1608,8 @@ supple_status supple_state_init(void *memory,
                                 supple_state **state);
 
 /**
- * Puts a state back to rest at time zero. Its step stays. A supple_large has to be prepared again, a
- * supple_learned reset, with a new lead-in.
+ * Puts a state back to rest at time zero. Its step stays. The first step of a supple_large computes its inertia anew;
+ * a supple_learned needs supple_learned_reset and a new lead-in.
  */
 supple_status supple_state_reset(supple_state *state);
 
@@ -1823,9 +1824,9 @@ supple_status supple_save(const supple_state *state, void *to, size_t bytes);
 /**
  * Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the
  * saved one would have, to the bit. Forces are zero until the next step. A saved state with a time, a displacement or
- * an increment that is not finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE. A supple_large
- * has to be prepared again, and a supple_learned needs a new lead-in; for the same bits with these, copy their objects
- * with memcpy as well.
+ * an increment that is not finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE. The first
+ * step of a supple_large computes its inertia anew, and a supple_learned needs a new lead-in; for the same bits with
+ * these, copy their objects with memcpy as well.
  */
 supple_status supple_restore(supple_state *state,
                              const void *from,
@@ -2109,9 +2110,10 @@ supple_status supple_sim_setup(void *memory,
                                supple_error *error);
 
 /**
- * Other steps from now on, in the same memory; the motion goes on as it is. To be called as well after the state was
- * reset, restored, or moved by other functions. What there is room for stays as it was at supple_sim_setup. Where the
- * scene itself refuses the steps (SUPPLE_E_LATTICE, SUPPLE_E_TOO_STIFF) there are none until the next call.
+ * Other steps from now on, in the same memory; the motion goes on as it is. To be called as well where lengths are
+ * chosen, so that they fit a state that was reset, restored, or moved by other functions. What there is room for stays
+ * as it was at supple_sim_setup. Where the scene itself refuses the steps (SUPPLE_E_LATTICE, SUPPLE_E_TOO_STIFF) there
+ * are none until the next call.
  *
  * @param error may be NULL; SUPPLE_E_SHORT: the memory is enough for the former steps only.
  */

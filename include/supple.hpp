@@ -129,7 +129,7 @@ enum class law : std::uint32_t {
 };
 
 // linear: tetrahedra that lock, that is bend too little, where tissue hardly changes its volume. nodal_pressure: these do not.
-// nodal_strain: these bend well on coarse meshes as well, but take no steps of a supple::large, and need more memory.
+// nodal_strain: these bend well on coarse meshes as well, and need more memory.
 enum class element : std::uint32_t {
     linear = SUPPLE_LINEAR,
     nodal_pressure = SUPPLE_NODAL_PRESSURE,
@@ -1055,7 +1055,7 @@ public:
         return made;
     }
 
-    // Other steps; also after the state was reset or restored.
+    // Other steps; also where lengths are chosen, after the state was reset or restored.
     status set(const settings &how, error *why = nullptr) const noexcept {
         return detail::of(supple_sim_set(raw_, &how, why));
     }

@@ -101,8 +101,8 @@ pub unsafe extern "C" fn supple_state_init(
     status_of(init())
 }
 
-/// Puts a state back to rest at time zero. Its step stays. A supple_large has to be prepared again, a
-/// supple_learned reset, with a new lead-in.
+/// Puts a state back to rest at time zero. Its step stays. The first step of a supple_large computes its inertia anew;
+/// a supple_learned needs supple_learned_reset and a new lead-in.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_state_reset(state: *mut supple_state) -> supple_status {
     // SAFETY: what the header asks of the caller.

@@ -34,7 +34,7 @@ pub enum supple_status {
     /// Exact steps have taken the place of learned ones that were not to be believed. The network is tried again in
     /// later steps.
     SUPPLE_FELL_BACK = 3,
-    /// A supple_guard estimates that the error is more than is allowed.
+    /// A guard, automatic steps or supple_sim_advance estimate that the error is more than is allowed.
     SUPPLE_INEXACT = 4,
 
     /// A pointer that must not be NULL is.
@@ -60,7 +60,8 @@ pub enum supple_status {
     SUPPLE_E_INDEX = -10,
     /// Entry or node `index` has a number (value) that is NaN or infinite.
     SUPPLE_E_NOT_FINITE = -11,
-    /// Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s); or a lead-in (s).
+    /// Entry `index` has a ramp (value, s) that is negative or not finite; or a damping (1/s); or a lead-in (s); or a
+    /// tolerance (m); or a span of supple_sim_advance (s), which must be above zero.
     SUPPLE_E_NEGATIVE = -12,
     /// An array that is written overlaps the object that is read.
     SUPPLE_E_OVERLAP = -13,
@@ -92,7 +93,7 @@ pub enum supple_status {
 
     /// Motion `index` moves `node` along an axis on which no support that moves holds it.
     SUPPLE_E_NOT_HELD = -30,
-    /// No step has been set: supple_set_step comes first.
+    /// No step has been set: supple_set_step comes first; of a supple_sim: supple_sim_set was refused, call it again.
     SUPPLE_E_NO_STEP = -31,
     /// The step (value, s) is not a finite positive number.
     SUPPLE_E_STEP = -32,
