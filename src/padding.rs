@@ -1,5 +1,6 @@
-//! Data kept in spare bits of nodal vectors, where an array of its own would be memory that every host has to provide
-//! and a pass over the nodes would have to read. Everything of that kind, and the bytes a node that it saves:
+//! Data kept in spare bits of nodal vectors and of tables, where an array of its own would be memory that every host
+//! has to provide and a pass over the nodes would have to read. Everything of that kind, and the bytes a node that it
+//! saves:
 //!
 //! | where | what | written by | read by | saves |
 //! |---|---|---|---|---|
@@ -7,6 +8,9 @@
 //! | fourth component of an increment or force | axes whose motion has been prescribed, as bits | [`crate::loads`] | the same, which clears it | 1, or a search through all motions for each |
 //! | fourth component of increment and displacement | entries `yz`, `zx` of a node's stiffness bound | [`crate::tled::critical_step`] | the same, which clears them | 8 of every state, for a call now and then |
 //! | fourth component of a force | scalar stiffness bound of the node, N/m | element loops with a bound | [`crate::inertia`], which clears it | 4, and a second scatter of the element loops |
+//! | fourth component of a volume row, in a body of one tissue | `J - 1` of the node, next to its displacement, also between steps | [`crate::element`], in each step with nodal pressure | the element loops | 4, and a second read of each node |
+//! | upper eight bits of an element's index | which of the tissues of each corner's node it is of, two bits each | [`crate::scene`], when it is built | [`crate::element`] | 1 of 64 an element |
+//! | inverse mass and mass, while a scene is built | marks of held axes; the two lowest tissues of the node | [`crate::element`] | the same, which writes masses over them | 5, while it is built |
 //! | fourth component of a sum of bounds `xy, yz, zx` | share of its inverse inertia that a node could use before the step | [`crate::inertia`], while a step is computed | the same, if the step is refused | 4 of 104 |
 //! | last eight bits of a height | number of the frame that a node turns with | [`crate::inertia`], when it is prepared | its passes | 1 of 104 |
 //! | fourth component of a lattice position | number of the node | the same | the same | 4 of 104 |

@@ -183,7 +183,7 @@ impl<'a> StateView<'a> {
         self.displacement.len().min(self.increment.len()).min(self.force.len())
     }
 
-    /// How many nodes of a scene of this material the vectors hold.
+    /// How many nodes of a scene of these elements the vectors hold.
     pub(crate) fn capacity_for(&self, element: Element) -> usize {
         let volumes = if element == Element::Linear { usize::MAX } else { self.volume.len() };
         self.capacity().min(volumes)
@@ -345,7 +345,8 @@ impl<const N: usize, const P: usize> StateVectors for FixedVectors<N, P> {
 }
 
 /// A state with room for `N` nodes, which may be a `static`; of scenes with
-/// [`NodalPressure`](crate::material::NodalPressure) if `P` is `N`, of others if it is zero.
+/// [`NodalPressure`](crate::material::NodalPressure) or [`NodalStrain`](crate::material::NodalStrain) if `P` is `N`, with
+/// linear tetrahedra if it is zero.
 pub type FixedState<const N: usize, const P: usize = 0> = State<FixedVectors<N, P>>;
 
 impl<const N: usize, const P: usize> FixedState<N, P> {

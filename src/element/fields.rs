@@ -8,7 +8,8 @@ use super::{ElementTile, PatchTile, Patches, VolumeRows};
 use crate::material::{Invariants, Law, Potential, energy_density, response};
 use crate::simd::NodeVector;
 
-/// State of one element.
+/// State of one element, of its own deformation: also with nodal strain, whose forces follow from the means around the
+/// nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ElementFields {
     /// The mesh's number of the element.

@@ -6,7 +6,8 @@ use bytemuck::{Pod, Zeroable};
 
 use super::{Real, TILE};
 
-/// A vector of one node, padded to four components; between steps the fourth is zero.
+/// A vector of one node, padded to four components. Between steps the fourth is zero, but of volumes, which keep `J - 1`
+/// there in a body of one tissue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct NodeVector(pub(crate) [f32; 4]);

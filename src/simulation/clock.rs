@@ -1,6 +1,6 @@
 //! When calls of `advance` should end.
 
-/// Calls follow each other without a drift, but for states that were restored; and equal calls take equal steps.
+/// Calls follow each other without a drift, unless the state was restored in between; and equal calls take equal steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Clock {
     /// Where the last call should have ended, and where it did, s.
@@ -13,6 +13,8 @@ impl Clock {
     pub fn end_of_call(&mut self, now: f64, seconds: f64) -> f64 {
         let due = if now == self.ended { self.until } else { now };
         self.until = due + seconds;
+        // Both are the same but for a rounding: this one makes the span `seconds` to the bit, and so equal calls' steps
+        // equal. Where the last call ended elsewhere it is made up for.
         if libm::fabs(due - now) <= 1e-6 * seconds { now + seconds } else { self.until }
     }
 

@@ -119,7 +119,7 @@ impl Mover<'_, '_> {
         let mut call = Call { loads, threads, watch, report };
         let span = until - state.time();
         match self {
-            // A remainder of rounding is no step, and a span that is no number none either.
+            // The last call may have ended here or beyond; a span that is no number is none either.
             _ if span.is_nan() || span <= 0.0 => {}
             Self::Exact(mut exact) => {
                 call.exact_steps(&mut exact, span, 0.0, scene, &mut state);
@@ -159,6 +159,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         match exact {
             ExactSteps::Fixed(step) => {
                 let (count, seconds) = equal_steps(span, step.seconds());
+                // Only a span of 1e-18 s or less: that is no step.
                 let Ok(step) = Step::unchecked(seconds, step.damping()) else { return true };
                 for done in 0..count {
                     let loads = loads.of_step(state, seconds, count - done);
@@ -220,6 +221,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         state: &mut StateView<'_>,
     ) {
         let (count, seconds) = equal_steps(span, model.longest());
+        // Only a span of 1e-18 s or less: that is no step.
         if model.set_seconds(seconds).is_err() {
             return;
         }

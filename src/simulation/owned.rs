@@ -155,6 +155,7 @@ impl<'w> Simulation<'w> {
         in_step.resize(motions.len(), Motion::default());
         let mut loads = LoadsOfCall::new(loads, in_step);
         let end = clock.end_of_call(state.time(), seconds);
+        // Not reached: prepared above; there is no panic in its place.
         let Some(prepared) = &mut self.prepared else { return Err(SimulationError::NotFinite) };
         let mover = prepared.mover();
         let report = mover.advance(end, scene.view(), &mut loads, state.view(), threads, &mut |_| {})?;
@@ -165,8 +166,9 @@ impl<'w> Simulation<'w> {
         }
     }
 
-    /// Moves on until a time (s) under loads of the caller's in place of its own. `watch` is shown each step; what was
-    /// refused is in the report.
+    /// Moves on under loads of the caller's in place of its own; `watch` is shown each step. Other than with
+    /// [`Simulation::advance`], `until` is a time (s) and not a span, what earlier calls lack or have too much is not
+    /// made up for, a time that is not ahead takes no step, and a step that is refused is in the report, not an error.
     pub fn advance_under(
         &mut self,
         until: f64,
@@ -176,6 +178,7 @@ impl<'w> Simulation<'w> {
     ) -> Result<Report, SimulationError> {
         self.prepare_once()?;
         let Self { scene, state, prepared, .. } = self;
+        // Not reached: prepared above; there is no panic in its place.
         let Some(prepared) = prepared else { return Err(SimulationError::NotFinite) };
         Ok(prepared.mover().advance(until, scene.view(), loads, state.view(), threads, watch)?)
     }
@@ -261,7 +264,9 @@ impl<'w> Simulation<'w> {
         &self.state
     }
 
-    /// The same, to be changed: reset, restored, started elsewhere. Steps go on from there.
+    /// The same, to be changed: reset, restored, started elsewhere. Steps go on from there, a network's after a new
+    /// lead-in. Lengths that are chosen at [`Simulation::prepare`], those of long steps and the longest of
+    /// [`Method::Auto`], stay as they are.
     pub const fn state_mut(&mut self) -> &mut VecState {
         &mut self.state
     }

@@ -116,7 +116,7 @@ impl Step {
         self.damping
     }
 
-    /// What an increment over `h` seconds would be had it spanned this step, over what it is.
+    /// This step, after a last increment that spans `h` seconds; the force acts over the whole step.
     pub(crate) fn carried_from(self, h: f32) -> Self {
         if h > 0.0 { Self { carry: self.dt / h, ..self } } else { self }
     }

@@ -40,7 +40,8 @@ pub(crate) struct Trial<'a, M> {
     pub(crate) displacement: &'a mut [NodeVector],
     pub(crate) increment: &'a mut [NodeVector],
     pub(crate) force: &'a mut [NodeVector],
-    /// Rows of [`crate::element::NodalVolumes`] for materials with nodal pressure, empty for others.
+    /// Rows of [`crate::element::NodalVolumes`] for materials with nodal pressure; with nodal strain only
+    /// [`crate::tled::critical_step`] uses them, with linear tetrahedra nothing does.
     pub(crate) volume: &'a mut [NodeVector],
     pub(crate) progress: &'a mut Progress,
     /// What the instruments feel, as far as the host wants to know.
@@ -63,7 +64,8 @@ pub(crate) struct Computed {
 
 /// A way to compute the next increments.
 pub(crate) trait StepMethod<M> {
-    /// Computes the total forces and the next increments.
+    /// Computes the total forces, and what [`StepMethod::next_increment`] gives the next increments from. Where
+    /// instruments touch their pushes are among the forces.
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed;
 
     /// The next increment of a node, m, from its number, inertia, last increment and total force.

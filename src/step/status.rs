@@ -64,8 +64,8 @@ impl Status {
         Self::Ok
     }
 
-    /// The worse of this status and a later one: a refusal before all, and a later one before an earlier, but what is
-    /// limited stays so.
+    /// The status of two steps, this one and a `later`: the later, unless that is `Ok`, or `Inexact` after `Limited`. A
+    /// refusal ends a call, so that it is the last there.
     pub fn worse(self, later: Self) -> Self {
         match (self, later) {
             (_, Self::Ok) => self,

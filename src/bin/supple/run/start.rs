@@ -96,7 +96,7 @@ pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, unchecked: bool) 
         };
         Problem(format!("{}: {error}{advice}", time.step_at))
     })?;
-    if matches!(time.step, StepChoice::Auto) && !time.is_adaptive {
+    if time.sets_own_pace() {
         return Ok(step);
     }
     time.check_length(seconds)?;

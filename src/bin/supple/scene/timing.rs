@@ -94,7 +94,7 @@ impl Timing {
         }
     }
 
-    /// Whether exact steps follow the critical step, or steps choose their length.
+    /// Whether exact steps follow the critical step. Adaptive steps do not count.
     pub(crate) const fn sets_own_pace(&self) -> bool {
         matches!(self.step, StepChoice::Auto) && !self.is_adaptive
     }
