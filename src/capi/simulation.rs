@@ -780,7 +780,7 @@ impl Watched<'_, '_> {
     fn enter(&mut self, event: &Event<'_>) {
         let call = &mut self.call;
         match *event {
-            Event::Tried(_) => {
+            Event::Tries(_) => {
                 let felt = self.contact.as_ref().map_or_else(Felt::default, CallContact::felt);
                 self.mark = Some((*call, felt));
             }

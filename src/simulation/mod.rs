@@ -22,7 +22,7 @@ mod owned;
 mod report;
 
 pub use clock::Clock;
-pub use mover::{Event, ExactSteps, Lead, Mover, Taken};
+pub use mover::{Event, ExactSteps, Lead, Mover, StepKind};
 #[cfg(feature = "std")]
 pub use owned::{Simulation, SimulationError};
 pub use report::Report;

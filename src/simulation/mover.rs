@@ -65,7 +65,7 @@ impl Lead {
 
 /// What a step was.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub enum Taken {
+pub enum StepKind {
     /// An exact one.
     Exact,
     /// One beyond the critical step.
@@ -80,7 +80,7 @@ pub enum Taken {
 #[derive(Debug)]
 pub enum Event<'a> {
     /// Exact steps begin at this time (s) that may be taken back.
-    Tried(f64),
+    Tries(f64),
     /// They are taken back.
     TakenBack,
     /// A network's step begins at this time, s.
@@ -90,7 +90,7 @@ pub enum Event<'a> {
     /// What the step beyond the critical one that follows did to inertia.
     Raised(inertia::Report),
     /// A step, or a refusal; the state is that after it.
-    Step(Taken, Status, &'a StateView<'a>),
+    Step(StepKind, Status, &'a StateView<'a>),
     /// What is known of the error after a step.
     Judged(Status, Option<Estimate>, &'a StateView<'a>),
 }
@@ -164,7 +164,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
                 for done in 0..count {
                     let loads = loads.of_step(state, seconds, count - done);
                     let status = tled::step_in_parts(scene, &loads, state.reborrow(), &step, *threads);
-                    watch(Event::Step(Taken::Exact, status, state));
+                    watch(Event::Step(StepKind::Exact, status, state));
                     report.enter(status);
                     if !status.is_taken() {
                         report.undone += 1;
@@ -178,10 +178,10 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
             ExactSteps::Paced { pace, kept, damping } => {
                 let until = state.time() + span;
                 while until - state.time() > ROUNDING * span {
-                    watch(Event::Tried(state.time()));
+                    watch(Event::Tries(state.time()));
                     let (left, mut worst, mut taken) = (until - state.time(), Status::Ok, 0);
                     let enter = |status: Status, _: &Loads<'_>, state: &StateView<'_>| {
-                        watch(Event::Step(Taken::Exact, status, state));
+                        watch(Event::Step(StepKind::Exact, status, state));
                         worst = worst.worse(status);
                         taken += 1;
                     };
@@ -231,7 +231,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
             if status.is_taken() {
                 (self.watch)(Event::Raised(*model.report()));
             }
-            (self.watch)(Event::Step(Taken::Long, status, state));
+            (self.watch)(Event::Step(StepKind::Long, status, state));
             self.report.enter(status);
             if !status.is_taken() {
                 self.report.undone += 1;
@@ -259,7 +259,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         let view = AdaptiveView { chooser: &mut *chooser, first, second, watch: &mut *watch, storage };
         let (status, taken) = view.advance(span as f32, scene, self.loads, state.reborrow(), self.threads);
         let own = if matches!(status, Status::Inexact { .. }) { Status::Ok } else { status };
-        (self.watch)(Event::Step(Taken::Auto, own, state));
+        (self.watch)(Event::Step(StepKind::Auto, own, state));
         let report = &mut self.report;
         report.estimate = chooser.estimate(watch);
         (report.exact, report.long, report.changes) = (taken.exact, taken.large, taken.changes);
@@ -297,7 +297,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
                 (self.watch)(Event::Predicted(*learned.model().report()));
                 match tried {
                     Ok(status) => {
-                        (self.watch)(Event::Step(Taken::Learned, status, state));
+                        (self.watch)(Event::Step(StepKind::Learned, status, state));
                         self.report.enter(status);
                         if !status.is_taken() {
                             self.report.undone += 1;

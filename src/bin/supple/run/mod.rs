@@ -7,7 +7,7 @@ pub(crate) mod start;
 use std::time::Instant;
 
 use supple::loads::Loads;
-use supple::simulation::{Event, Report, Simulation, Taken};
+use supple::simulation::{Event, Report, Simulation, StepKind};
 use supple::step::{CallingThread, Status};
 use supple::tled::Pace;
 
@@ -127,7 +127,7 @@ impl Running<'_> {
         }
         let mut watched = Watched { mark: (outcome.limits, outcome.reactions.mark()), outcome, began: Instant::now() };
         let mut watch = |event: Event<'_>| {
-            if let Event::Tried(time) = event {
+            if let Event::Tries(time) = event {
                 tick(time);
             }
             watched.enter(event);
@@ -193,7 +193,7 @@ impl Watched<'_> {
     fn enter(&mut self, event: Event<'_>) {
         let outcome = &mut *self.outcome;
         match event {
-            Event::Tried(_) => self.mark = (outcome.limits, outcome.reactions.mark()),
+            Event::Tries(_) => self.mark = (outcome.limits, outcome.reactions.mark()),
             Event::TakenBack => {
                 (outcome.limits, outcome.divergence) = (self.mark.0, None);
                 outcome.reactions.take_back(&self.mark.1);
@@ -216,7 +216,7 @@ impl Watched<'_> {
                 }
             }
             Event::Step(taken, status, state) => {
-                outcome.computed += u64::from(taken != Taken::Learned);
+                outcome.computed += u64::from(taken != StepKind::Learned);
                 outcome.enter(status, state);
                 self.began = Instant::now();
             }
