@@ -22,7 +22,7 @@ use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
 use crate::scene::timing::StepChoice;
 use crate::screen::{output, print};
-use crate::simulate::{Out, Simulated, Simulation, progress_bar};
+use crate::simulate::{Job, Out, Simulated, progress_bar};
 
 const LOBE: &[u8] = include_bytes!("../../../meshes/lobe.msh");
 /// For steps of 1.5 ms, with int8 layers.
@@ -97,14 +97,14 @@ impl Steps {
 /// A run, its results in a folder if any, and its shapes.
 fn run(setup: Setup, name: &'static str, out: Option<Out<'_>>) -> Result<(Run, Option<Folder>), Problem> {
     let mut shapes = vec![];
-    let simulation = Simulation {
+    let job = Job {
         setup: &setup,
         out,
         unchecked: false,
         progress: progress_bar(&setup, &format!("{name} steps  ")),
         watch: &mut |state| shapes.push(shape(state)),
     };
-    let Simulated { folder, outcome, .. } = simulation.run()?;
+    let Simulated { folder, outcome, .. } = job.run()?;
     // What learned steps refuse is part of the comparison.
     let refused = outcome.divergence.filter(|_| setup.learned.is_some());
     let done = refused.map_or(Ok((outcome, shapes)), |refused| Err(refused.to_string()));

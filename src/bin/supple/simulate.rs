@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use supple::simulation::Simulation;
 use supple::state::VecState;
 
 use crate::problem::{End, Problem};
@@ -18,14 +19,14 @@ use crate::screen::row;
 
 pub(crate) fn simulate(path: &Path, out: &Path, force: bool, unchecked: bool) -> Result<End, Problem> {
     let setup = Setup::read(&SceneFile::read(path)?)?;
-    let simulation = Simulation {
+    let job = Job {
         setup: &setup,
         out: Some(Out { path: out, force }),
         unchecked,
         progress: progress_bar(&setup, ""),
         watch: &mut |_| {},
     };
-    let Simulated { folder, state, outcome, conclusion } = simulation.run()?;
+    let Simulated { folder, state, outcome, conclusion } = job.run()?;
     if let Some(folder) = folder {
         let part = simulation::part(&setup, &state, &outcome, &conclusion);
         let title = format!("supple: {}", path.display());
@@ -47,7 +48,7 @@ pub(crate) fn progress_bar(setup: &Setup, about: &str) -> ProgressBar {
 }
 
 /// A simulation from rest, with its results in a folder that is not in its place yet, if any.
-pub(crate) struct Simulation<'a> {
+pub(crate) struct Job<'a> {
     pub(crate) setup: &'a Setup,
     pub(crate) out: Option<Out<'a>>,
     /// Whether a step above the critical one is taken all the same.
@@ -72,7 +73,7 @@ pub(crate) struct Simulated {
     pub(crate) conclusion: Conclusion,
 }
 
-impl Simulation<'_> {
+impl Job<'_> {
     pub(crate) fn run(self) -> Result<Simulated, Problem> {
         let Self { setup, out, unchecked, progress, watch } = self;
         // All that can be refused in the scene is refused before there is a folder.
@@ -80,7 +81,7 @@ impl Simulation<'_> {
         let mut folder = out.map(|Out { path, force }| Folder::create(path, force)).transpose()?;
 
         let tick = |time: f64| progress.set_position((time * 1e3) as u64);
-        let mut frame = |simulation: &mut supple::simulation::Simulation<'_>| {
+        let mut frame = |simulation: &mut Simulation<'_>| {
             let (scene, state) = simulation.parts_mut();
             watch(state);
             folder.as_mut().map_or(Ok(()), |folder| folder.add_frame(setup, scene.view(), state))
