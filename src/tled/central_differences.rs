@@ -15,10 +15,10 @@ pub(crate) fn next_increment(
     force: &NodeVector,
     step: &Step,
 ) -> [f32; 4] {
-    let exact = Exact::<f32>::new(step);
+    let coefficients = Coefficients::<f32>::new(step);
     let mut next = [0.0; 4];
     for (axis, inverse) in inertia.inverse.into_iter().enumerate() {
-        next[axis] = exact.next(inverse, increment.0[axis], force.0[axis]);
+        next[axis] = coefficients.next(inverse, increment.0[axis], force.0[axis]);
     }
     next
 }
@@ -61,13 +61,13 @@ fn vector_of<R: Real>(components: &[f32; FOUR], from: usize) -> R {
 }
 
 /// The coefficients of the exact step, vectorised.
-struct Exact<R> {
+struct Coefficients<R> {
     keep: R,
     carry: R,
     push: R,
 }
 
-impl<R: Real> Exact<R> {
+impl<R: Real> Coefficients<R> {
     #[inline(always)]
     fn new(step: &Step) -> Self {
         Self { keep: R::splat(step.keep()), carry: R::splat(step.carry()), push: R::splat(step.push()) }
@@ -82,14 +82,14 @@ impl<R: Real> Exact<R> {
 }
 
 /// Sums over the nodes of an exact step, and the farthest that one moves if there are instruments.
-pub(super) struct EnergySums<'a> {
+pub(super) struct EnergyInput<'a> {
     pub(super) step: &'a Step,
     pub(super) inertia: &'a [NodeInertia],
     pub(super) increment: &'a [NodeVector],
     pub(super) force: &'a [NodeVector],
 }
 
-impl EnergySums<'_> {
+impl EnergyInput<'_> {
     /// Compiled with this crate, as it is not generic.
     #[inline(never)]
     pub(super) fn total(self, instruments: bool) -> Totals {
@@ -97,15 +97,15 @@ impl EnergySums<'_> {
     }
 }
 
-struct TotalsKernel<'a, const INSTRUMENTS: bool>(EnergySums<'a>);
+struct TotalsKernel<'a, const INSTRUMENTS: bool>(EnergyInput<'a>);
 
 impl<const INSTRUMENTS: bool> Kernel for TotalsKernel<'_, INSTRUMENTS> {
     type Output = Totals;
 
     #[inline(always)]
     fn run<R: Real>(self) -> Totals {
-        let EnergySums { step, inertia, increment, force } = self.0;
-        let exact = Exact::<R>::new(step);
+        let EnergyInput { step, inertia, increment, force } = self.0;
+        let coefficients = Coefficients::<R>::new(step);
         // Sixteen sums whatever the width, so that their bits are the same.
         let mut sums = [Sums::<R>::new(step, R::splat); 4];
         let mut farthest = [R::splat(0.0); 2];
@@ -115,7 +115,7 @@ impl<const INSTRUMENTS: bool> Kernel for TotalsKernel<'_, INSTRUMENTS> {
                 let inverse = axes::<R>() * vector_of::<R>(&inertia, from);
                 let mass = R::from_fn(|lane| inertia[((from + lane) | 3) % FOUR]);
                 let (increment, force) = (vector_of::<R>(&increment, from), vector_of::<R>(&force, from));
-                let next = exact.next(inverse, increment, force);
+                let next = coefficients.next(inverse, increment, force);
                 sums.add(mass, inverse.positive(), increment, force, next);
                 if INSTRUMENTS {
                     for (most, moved) in farthest.iter_mut().zip([increment, next]) {
@@ -158,14 +158,14 @@ impl Kernel for Advance<'_> {
     #[inline(always)]
     fn run<R: Real>(self) {
         let Self { step, inertia, displacement, increment, force } = self;
-        let exact = Exact::<R>::new(step);
+        let coefficients = Coefficients::<R>::new(step);
         let moving = displacement.chunks_mut(4).zip(increment.chunks_mut(4));
         for ((displacement, increment), first) in moving.zip((0..inertia.len()).step_by(4)) {
             let (inertia, force) = (four(inertia, first), four(force, first));
             let (mut at, mut moved) = (four(displacement, 0), four(increment, 0));
             for from in (0..FOUR).step_by(R::COUNT) {
                 let inverse = axes::<R>() * vector_of::<R>(&inertia, from);
-                let next = exact.next(inverse, vector_of(&moved, from), vector_of(&force, from));
+                let next = coefficients.next(inverse, vector_of(&moved, from), vector_of(&force, from));
                 let here = vector_of::<R>(&at, from) + next;
                 for lane in 0..R::COUNT {
                     moved[(from + lane) % FOUR] = next.lane(lane);

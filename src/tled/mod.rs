@@ -38,7 +38,7 @@ use crate::step::{
     self, CallingThread, Cause, Computed, EnergyBalance, Forcing, Status, Step, StepMethod, Threads, Totals, Trial,
     move_in_parts, nodal_volumes,
 };
-use central_differences::{Advance, EnergySums, next_increment};
+use central_differences::{Advance, EnergyInput, next_increment};
 
 /// Takes one step. Every call does the same work for the same scene and loads.
 pub fn step(scene: &impl AsScene, loads: &Loads<'_>, state: &mut impl AsState, step: &Step) -> Status {
@@ -75,7 +75,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
         let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let increment = increment.get(nodes).unwrap_or_default();
-            EnergySums { step, inertia, increment, force }.total(loads.contact().is_some())
+            EnergyInput { step, inertia, increment, force }.total(loads.contact().is_some())
         };
         let (totals, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, totals_of);
         let mut totals = Totals::of_all(&totals);
