@@ -183,7 +183,7 @@ impl SceneFacts {
                 }
             });
         }
-        if material.element().is_nodal_pressure() && material.laws().differ() {
+        if material.element().is_nodal_pressure() && material.laws().has_several_tissues() {
             find_slots(material, mesh, nodes, tiles);
         }
         let (mass, rounding_energy) = lump_masses(material, mesh, nodes)?;
@@ -427,7 +427,7 @@ impl<'a, M: Material> SceneView<'a, M> {
 
     /// The volumes of the nodes in rows of [`crate::element::NodalVolumes`].
     pub(crate) fn volume_rows(self, rows: &[NodeVector]) -> VolumeRows<'_> {
-        VolumeRows { rows, several_tissues: self.material.laws().differ() }
+        VolumeRows { rows, several_tissues: self.material.laws().has_several_tissues() }
     }
 
     /// Strain energy under the given displacements (m), J, with the nodes' volumes where the material needs them.

@@ -79,7 +79,7 @@ impl Progress {
     /// the first.
     #[must_use]
     pub const fn least_volume_ratio(&self) -> f32 {
-        1.0 + self.extremes.least_j
+        1.0 + self.extremes.least_change
     }
 
     /// Largest exponent over its cap, at the start of the latest step that was taken: above 1 the exponential law went

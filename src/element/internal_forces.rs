@@ -33,7 +33,7 @@ pub(crate) fn operations<L: Law>(law: &L) -> u32 {
 #[derive(Clone, Copy, Debug)]
 pub struct Extremes<R> {
     /// Smallest `J - 1`.
-    pub(crate) least_j: R,
+    pub(crate) least_change: R,
     /// Largest saturation of the law.
     pub(crate) saturation: R,
 }
@@ -41,13 +41,13 @@ pub struct Extremes<R> {
 impl<R: Real> Extremes<R> {
     /// The extremes of an empty set of elements.
     pub(crate) fn none() -> Self {
-        Self { least_j: R::splat(f32::INFINITY), saturation: R::splat(f32::NEG_INFINITY) }
+        Self { least_change: R::splat(f32::INFINITY), saturation: R::splat(f32::NEG_INFINITY) }
     }
 
     /// The extremes of both, over all values of the vectors in `other`.
     pub(crate) fn merged_with<O: Real>(mut self, other: &Extremes<O>) -> Self {
         for lane in 0..O::COUNT {
-            self.least_j = self.least_j.min(R::splat(other.least_j.lane(lane)));
+            self.least_change = self.least_change.min(R::splat(other.least_change.lane(lane)));
             self.saturation = self.saturation.max(R::splat(other.saturation.lane(lane)));
         }
         self
@@ -56,7 +56,7 @@ impl<R: Real> Extremes<R> {
 
 impl Extremes<f32> {
     /// The extremes of a body at rest.
-    pub(crate) const REST: Self = Self { least_j: 0.0, saturation: 0.0 };
+    pub(crate) const REST: Self = Self { least_change: 0.0, saturation: 0.0 };
 }
 
 /// A further computation from the deformation of an element, in the same pass as its forces.
@@ -310,7 +310,7 @@ fn respond<R: Real, L: Law>(
     let response = local.response();
     (first.p1, first.s) = (response.p1.0, response.s.0);
     (second.p1, second.s) = (response.p1.1, response.s.1);
-    extremes.least_j = invariants.j.min(extremes.least_j);
+    extremes.least_change = invariants.j.min(extremes.least_change);
     extremes.saturation = response.saturation.max(extremes.saturation);
     local.split()
 }

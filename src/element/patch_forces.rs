@@ -110,7 +110,7 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor>(
     let law = laws.widen(|lane| tile.element(first + lane));
     let local = LawState::new::<L>(&law, deformation.invariants);
     let response = local.response();
-    extremes.least_j = deformation.invariants.j.min(extremes.least_j);
+    extremes.least_change = deformation.invariants.j.min(extremes.least_change);
     extremes.saturation = response.saturation.max(extremes.saturation);
     let modulus = modulus_of::<R, L>(&law);
     let mut p = deformation.stress(response.p1, response.s);

@@ -28,7 +28,7 @@ impl<'a, L: Law> TileBounds<'a, L> {
     /// With the pressures that follow from the volumes of the nodes.
     pub(crate) fn with_nodal_volumes(self, rows: &'a [NodeVector]) -> TileBounds<'a, L, MeanPressure<'a>> {
         let Self { laws, tile, displacement, sums, rotations, weight, .. } = self;
-        let pressure = MeanPressure::new(VolumeRows { rows, several_tissues: laws.differ() });
+        let pressure = MeanPressure::new(VolumeRows { rows, several_tissues: laws.has_several_tissues() });
         TileBounds { laws, pressure, tile, displacement, sums, rotations, weight }
     }
 }

@@ -74,7 +74,7 @@ pub trait Material: Sync {
     /// The tissue of mesh element `element`, or nothing where the material names none.
     fn tissue(&self, element: usize) -> Option<Tissue<Self::Law>>;
 
-    /// The constants of all elements.
+    /// The law, with the constants of each element.
     fn laws(&self) -> Laws<'_, Self::Law>;
 
     /// Index of the tissue of mesh element `element`. With [`NodalPressure`] the volume around a node is averaged over
@@ -170,7 +170,7 @@ impl<'a, L: Law> Laws<'a, L> {
 
     /// Whether elements may be of different tissues.
     #[inline(always)]
-    pub(crate) const fn differ(&self) -> bool {
+    pub(crate) const fn has_several_tissues(&self) -> bool {
         matches!(self, Self::Regions { .. })
     }
 

@@ -56,7 +56,7 @@ pub struct Divergence {
 impl Status {
     /// Of a step that was taken, from its extremes; `limited` if it held back much of the motion.
     pub(crate) fn of_taken(extremes: &Extremes<f32>, energy_balance: &EnergyBalance, limited: bool) -> Self {
-        let least_volume_ratio = 1.0 + extremes.least_j;
+        let least_volume_ratio = 1.0 + extremes.least_change;
         let (saturation, energy_excess) = (extremes.saturation, energy_balance.excess() as f32);
         if limited || least_volume_ratio < J_FLOOR || saturation > 1.0 || energy_excess > 0.0 {
             return Self::Limited { least_volume_ratio, saturation, energy_excess };
