@@ -25,7 +25,7 @@
 //! No term is left out, so the bound holds for any state, inverted elements included.
 
 use crate::material::{Law, LawState, Laws};
-use crate::simd::{Gather, Kernel, NodeVector, Part, Real, Scatter, ScatterBuffer, TILE, TileNodes, dot};
+use crate::simd::{Gather, Kernel, NodeVector, Piece, Real, Scatter, ScatterBuffer, TILE, TileNodes, dot};
 
 use super::deformation::{Deformation, Vector};
 use super::pressure::{OwnPressure, Pressure, ReadTile};
@@ -120,7 +120,7 @@ impl<L: Law, P: Pressure> Kernel for CriticalBounds<'_, '_, L, P> {
                 let displacement = Gather::new(self.sums.zx_in_padding);
                 let read = ReadTile::<R, P>::new(tile, first, displacement, self.pressure);
                 // By reference: a copy would take a kilobyte of stack.
-                let (deformation, change) = &R::run_part(read);
+                let (deformation, change) = &R::run_piece(read);
                 let law = self.laws.widen(|lane| tile.element(first + lane));
                 let mut local = LawState::with_volume_change::<L>(&law, deformation.invariants, *change);
                 if !self.with_volume {
@@ -128,7 +128,7 @@ impl<L: Law, P: Pressure> Kernel for CriticalBounds<'_, '_, L, P> {
                 }
                 let terms = &Terms::new::<L>(&law, &local, deformation);
                 let (sums, buffers) = (&mut *self.sums, &mut buffers);
-                R::run_part(AddBounds { tile, first, deformation, terms, inertia, sums, buffers });
+                R::run_piece(AddBounds { tile, first, deformation, terms, inertia, sums, buffers });
             }
         }
     }
@@ -171,7 +171,7 @@ struct AddBounds<'a, 'b, R> {
     buffers: &'a mut [ScatterBuffer<4>; 3],
 }
 
-impl<R: Real> Part for AddBounds<'_, '_, R> {
+impl<R: Real> Piece for AddBounds<'_, '_, R> {
     type Output = ();
 
     #[inline(always)]

@@ -8,7 +8,8 @@ use crate::material::{Invariants, Law, LawState, Laws, response_operations};
 use crate::mesh::partition::Partitions;
 use crate::mesh::strips::{CORNERS, LONGEST};
 use crate::simd::{
-    Gather, Kernel, NodeVector, Pair, Part, Real, SCATTER_WIDTH, Scatter, ScatterBuffer, TILE, TileNodes, dot, unrolled,
+    Gather, Kernel, NodeVector, Pair, Piece, Real, SCATTER_WIDTH, Scatter, ScatterBuffer, TILE, TileNodes, dot,
+    unrolled,
 };
 
 use super::ElementTile;
@@ -211,7 +212,7 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
     for start in (0..strip_count).step_by(most) {
         let strips = start..strip_count.min(start + most);
         let count = length * strips.len();
-        R::run_part(Deform { tiles, length, strips, displacement, pressure, batch: &mut batch });
+        R::run_piece(Deform { tiles, length, strips, displacement, pressure, batch: &mut batch });
         // If the count is odd, the second vector of the last pair is an old one; its result is not used.
         for (index, pair) in batch.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
             let locals = respond::<R, L>(laws, pair, extremes);
@@ -220,7 +221,7 @@ pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
             }
         }
         let batch = batch.get(..count).unwrap_or_default();
-        R::run_part(AddForces { batch, length, force: force.reborrow() });
+        R::run_piece(AddForces { batch, length, force: force.reborrow() });
     }
 }
 
@@ -245,7 +246,7 @@ struct Deform<'a, 'b, R: Real, P: Pressure> {
     batch: &'b mut [ElementVector<'a, R>],
 }
 
-impl<R: Real, P: Pressure> Part for Deform<'_, '_, R, P> {
+impl<R: Real, P: Pressure> Piece for Deform<'_, '_, R, P> {
     type Output = ();
 
     #[inline(always)]
@@ -356,7 +357,7 @@ struct AddForces<'a, 'b, R> {
     force: Scatter<'a>,
 }
 
-impl<R: Real> Part for AddForces<'_, '_, R> {
+impl<R: Real> Piece for AddForces<'_, '_, R> {
     type Output = ();
 
     #[inline(always)]

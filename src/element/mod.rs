@@ -4,7 +4,7 @@
 //! stiffness, and what they tell about themselves. Loops over elements are written once, for any law and any
 //! instruction-set level ([`crate::simd`]); they are compiled for each law of the list (`kernels.rs`), and linked only
 //! where a scene uses that law. What in them does not depend on the law is compiled once for each level
-//! ([`crate::simd::Part`]).
+//! ([`crate::simd::Piece`]).
 
 mod critical_bounds;
 mod deformation;

@@ -9,7 +9,7 @@
 //! whose rows are bounded by their absolute values.
 
 use crate::material::{Law, LawState, Laws};
-use crate::simd::{Gather, Kernel, NodeVector, Part, Real, ScatterBuffer, TILE, TileNodes, dot};
+use crate::simd::{Gather, Kernel, NodeVector, Piece, Real, ScatterBuffer, TILE, TileNodes, dot};
 
 use super::NodeInertia;
 use super::critical_bounds::{Image, NodeMatrices, Terms};
@@ -75,7 +75,7 @@ fn add_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchBounds<'_, '_, L>) 
         let mut bounds = [Bound::<R>::none(); PARTS];
         let displacement = Gather::new(sums.zx_in_padding);
         let mut deformations = [Deformation::new([[R::splat(0.0); 3]; 3]); PARTS];
-        R::run_part(PatchDeformations { tile, neighbours, displacement, deformations: &mut deformations });
+        R::run_piece(PatchDeformations { tile, neighbours, displacement, deformations: &mut deformations });
         // A loop, because the compiler may leave closures over vectors as function calls.
         for (part, (bound, deformation)) in bounds.iter_mut().zip(&deformations).enumerate() {
             let law = laws.widen(|lane| tile.element(part * R::COUNT + lane));
@@ -85,7 +85,7 @@ fn add_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchBounds<'_, '_, L>) 
             bound.modulus = modulus_of::<R, L>(&law);
         }
         let (bounds, sums) = (&mut bounds, &mut *sums);
-        R::run_part(AddBounds { tile, neighbours, inertia, weights, bounds, sums });
+        R::run_piece(AddBounds { tile, neighbours, inertia, weights, bounds, sums });
     }
 }
 
@@ -99,7 +99,7 @@ struct AddBounds<'a, 'b, R, const PARTS: usize> {
     sums: &'a mut NodeMatrices<'b>,
 }
 
-impl<R: Real, const PARTS: usize> Part for AddBounds<'_, '_, R, PARTS> {
+impl<R: Real, const PARTS: usize> Piece for AddBounds<'_, '_, R, PARTS> {
     type Output = ();
 
     #[inline(always)]

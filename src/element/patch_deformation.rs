@@ -1,6 +1,6 @@
 //! Mean displacement gradients of patches ([`super::patch`]), and the lengths of the gradients `c_ab` of their nodes.
 
-use crate::simd::{Gather, Part, Real, TileNodes, dot};
+use crate::simd::{Gather, Piece, Real, TileNodes, dot};
 
 use super::deformation::{Deformation, Matrix, Vector};
 use super::patch::{Neighbours, PatchTile};
@@ -45,7 +45,7 @@ pub(super) struct PatchDeformations<'a, R, const PARTS: usize> {
     pub(super) deformations: &'a mut [Deformation<R>; PARTS],
 }
 
-impl<R: Real, const PARTS: usize> Part for PatchDeformations<'_, R, PARTS> {
+impl<R: Real, const PARTS: usize> Piece for PatchDeformations<'_, R, PARTS> {
     type Output = ();
 
     #[inline(always)]

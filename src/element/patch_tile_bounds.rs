@@ -9,7 +9,7 @@
 //! its row. That energy is not in the tangents, as it does not change with the state.
 
 use crate::material::{Law, LawState, Laws};
-use crate::simd::{Gather, Kernel, Part, Real, ScatterBuffer, TILE, dot};
+use crate::simd::{Gather, Kernel, Piece, Real, ScatterBuffer, TILE, dot};
 
 use super::deformation::{Deformation, Matrix, Vector};
 use super::patch::{Neighbours, PatchTile};
@@ -72,7 +72,7 @@ fn bound_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchTileBounds<'_, L>
     let mut tangents = TileTangents::NONE;
     let mut shares = [Shares::<R>::none(); PARTS];
     let mut deformations = [Deformation::new([[R::splat(0.0); 3]; 3]); PARTS];
-    R::run_part(PatchDeformations { tile, neighbours, displacement, deformations: &mut deformations });
+    R::run_piece(PatchDeformations { tile, neighbours, displacement, deformations: &mut deformations });
     for (part, (shares, deformation)) in shares.iter_mut().zip(&deformations).enumerate() {
         let law = laws.widen(|lane| tile.element(part * R::COUNT + lane));
         let local = LawState::new::<L>(&law, deformation.invariants);
@@ -81,7 +81,7 @@ fn bound_all<R: Real, L: Law, const PARTS: usize>(kernel: PatchTileBounds<'_, L>
         shares.modulus = modulus_of::<R, L>(&law);
     }
     let (shares, tangents_out) = (&mut shares, &mut tangents);
-    R::run_part(AddBounds { tile, neighbours, rotations, weight, shares, sums, tangents: tangents_out });
+    R::run_piece(AddBounds { tile, neighbours, rotations, weight, shares, sums, tangents: tangents_out });
     tangents
 }
 
@@ -96,7 +96,7 @@ struct AddBounds<'a, 'b, R, const PARTS: usize> {
     tangents: &'a mut TileTangents,
 }
 
-impl<R: Real, const PARTS: usize> Part for AddBounds<'_, '_, R, PARTS> {
+impl<R: Real, const PARTS: usize> Piece for AddBounds<'_, '_, R, PARTS> {
     type Output = ();
 
     #[inline(always)]

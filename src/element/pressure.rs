@@ -11,7 +11,7 @@
 
 use core::marker::PhantomData;
 
-use crate::simd::{Gather, Part, Real, TileNodes};
+use crate::simd::{Gather, Piece, Real, TileNodes};
 
 use super::deformation::Deformation;
 use super::{ElementTile, VolumeRows};
@@ -59,7 +59,7 @@ impl<'a, R: Real, P: Pressure> ReadTile<'a, R, P> {
     }
 }
 
-impl<R: Real, P: Pressure> Part for ReadTile<'_, R, P> {
+impl<R: Real, P: Pressure> Piece for ReadTile<'_, R, P> {
     type Output = (Deformation<R>, R);
 
     #[inline(always)]

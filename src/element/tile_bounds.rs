@@ -2,7 +2,7 @@
 //! the nodes (N/m), what a coarse stiffness needs to know of each element comes back.
 
 use crate::material::{Law, LawState, Laws};
-use crate::simd::{Gather, Kernel, NodeVector, Part, Real, ScatterBuffer, TILE, write_rows};
+use crate::simd::{Gather, Kernel, NodeVector, Piece, Real, ScatterBuffer, TILE, write_rows};
 
 use super::deformation::{Deformation, Matrix};
 use super::pressure::{MeanPressure, OwnPressure, Pressure, ReadTile};
@@ -61,10 +61,10 @@ impl<L: Law, P: Pressure> Kernel for TileBounds<'_, L, P> {
         let mut buffer = [ScatterBuffer::NONE; 2];
         for first in (0..TILE).step_by(R::COUNT) {
             // By reference: a copy would take a kilobyte of stack.
-            let (deformation, change) = &R::run_part(ReadTile::<R, P>::new(tile, first, displacement, pressure));
+            let (deformation, change) = &R::run_piece(ReadTile::<R, P>::new(tile, first, displacement, pressure));
             let law = laws.widen(|lane| tile.element(first + lane));
             let local = LawState::with_volume_change::<L>(&law, deformation.invariants, *change);
-            R::run_part(AddBounds {
+            R::run_piece(AddBounds {
                 tile,
                 first,
                 deformation,
@@ -93,7 +93,7 @@ struct AddBounds<'a, 'b, R> {
     tangents: &'a mut TileTangents,
 }
 
-impl<R: Real> Part for AddBounds<'_, '_, R> {
+impl<R: Real> Piece for AddBounds<'_, '_, R> {
     type Output = ();
 
     #[inline(always)]

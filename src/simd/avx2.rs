@@ -19,7 +19,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 use super::functions::Bits;
 use super::int8_avx2::Bytes32;
 use super::register::{memory, same_methods};
-use super::{Part, Real, TILE};
+use super::{Piece, Real, TILE};
 
 /// Width8 float32 values in one register.
 #[derive(Clone, Copy)]
@@ -63,14 +63,14 @@ impl Real for Avx2 {
     same_methods!();
 
     #[inline(always)]
-    fn run_part<P: Part>(part: P) -> P::Output {
+    fn run_piece<P: Piece>(piece: P) -> P::Output {
         #[target_feature(enable = "avx2,fma")]
         #[inline(never)]
-        fn with_instructions<P: Part>(part: P) -> P::Output {
-            part.run()
+        fn with_instructions<P: Piece>(piece: P) -> P::Output {
+            piece.run()
         }
         // SAFETY: the processor has these instructions, see the module.
-        unsafe { with_instructions(part) }
+        unsafe { with_instructions(piece) }
     }
     #[inline(always)]
     fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {

@@ -20,7 +20,7 @@ use super::avx2::Avx2;
 use super::functions::Bits;
 use super::int8_avx512::Bytes64;
 use super::register::{memory, same_methods};
-use super::{Part, Real, TILE, unrolled};
+use super::{Piece, Real, TILE, unrolled};
 
 /// Sixteen float32 values in one register.
 #[derive(Clone, Copy)]
@@ -64,14 +64,14 @@ impl Real for Avx512 {
     same_methods!();
 
     #[inline(always)]
-    fn run_part<P: Part>(part: P) -> P::Output {
+    fn run_piece<P: Piece>(piece: P) -> P::Output {
         #[target_feature(enable = "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl,avx512vnni")]
         #[inline(never)]
-        fn with_instructions<P: Part>(part: P) -> P::Output {
-            part.run()
+        fn with_instructions<P: Piece>(piece: P) -> P::Output {
+            piece.run()
         }
         // SAFETY: the processor has these instructions, see the module.
-        unsafe { with_instructions(part) }
+        unsafe { with_instructions(piece) }
     }
     #[inline(always)]
     fn from_rows(row: impl Fn(usize) -> [f32; 4]) -> [Self; 4] {

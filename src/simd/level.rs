@@ -53,9 +53,9 @@ pub trait Kernel {
     }
 }
 
-/// A part of a kernel that is the same for several kernels, as for all laws: a function of its own
-/// ([`Real::run_part`]), so that it is compiled once for each level. `run` must be `#[inline(always)]`.
-pub trait Part {
+/// A piece of a kernel that is the same for several kernels, as for all laws: a function of its own
+/// ([`Real::run_piece`]), so that it is compiled once for each level. `run` must be `#[inline(always)]`.
+pub trait Piece {
     /// What it gives.
     type Output;
     /// Does it.

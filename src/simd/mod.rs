@@ -39,7 +39,7 @@ mod vectors;
 
 #[cfg(test)]
 pub(crate) use level::Baseline;
-pub use level::{Kernel, Level, Part, dispatch};
+pub use level::{Kernel, Level, Piece, dispatch};
 pub(crate) use numbers::{NumberBuffer, ScatterNumbers};
 pub(crate) use pair::Pair;
 pub use vectors::NodeVector;
@@ -83,8 +83,8 @@ pub trait Real: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Se
     /// A vector of as many integers of 32 bits.
     type Whole: Whole<Self>;
 
-    /// Runs a part as a function of its own, compiled with the instructions of the level to which the vector belongs.
-    fn run_part<P: Part>(part: P) -> P::Output;
+    /// Runs a piece as a function of its own, compiled with the instructions of the level to which the vector belongs.
+    fn run_piece<P: Piece>(piece: P) -> P::Output;
 
     /// The vector whose value in each `lane` is `at(lane)`.
     fn from_fn(at: impl Fn(usize) -> f32) -> Self;
@@ -219,8 +219,8 @@ impl Real for f32 {
     type Whole = Packed<1>;
 
     #[inline(never)]
-    fn run_part<P: Part>(part: P) -> P::Output {
-        part.run()
+    fn run_piece<P: Piece>(piece: P) -> P::Output {
+        piece.run()
     }
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {
@@ -259,8 +259,8 @@ impl<const L: usize> Real for Portable<L> {
     type Whole = Packed<L>;
 
     #[inline(never)]
-    fn run_part<P: Part>(part: P) -> P::Output {
-        part.run()
+    fn run_piece<P: Piece>(piece: P) -> P::Output {
+        piece.run()
     }
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {

@@ -18,7 +18,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 use super::functions::Bits;
 use super::int8_neon::Bytes16;
 use super::register::{four_rows, memory, same_methods};
-use super::{Pair, Part, Real};
+use super::{Pair, Piece, Real};
 
 /// Four float32 values in one register.
 #[derive(Clone, Copy)]
@@ -63,8 +63,8 @@ impl Real for Neon {
     four_rows!();
 
     #[inline(never)]
-    fn run_part<P: Part>(part: P) -> P::Output {
-        part.run()
+    fn run_piece<P: Piece>(piece: P) -> P::Output {
+        piece.run()
     }
     #[cfg(not(feature = "deterministic"))]
     #[inline(always)]

@@ -7,7 +7,7 @@
 use core::ops::{Add, Mul, Neg, Sub};
 
 use super::int8::Whole;
-use super::{Part, Real, TILE};
+use super::{Piece, Real, TILE};
 
 /// The values of the first vector, then those of the second.
 #[derive(Clone, Copy, Debug)]
@@ -54,8 +54,8 @@ impl<R: Real> Real for Pair<R> {
     type Whole = Pair<R::Whole>;
 
     #[inline(always)]
-    fn run_part<P: Part>(part: P) -> P::Output {
-        R::run_part(part)
+    fn run_piece<P: Piece>(piece: P) -> P::Output {
+        R::run_piece(piece)
     }
     #[inline(always)]
     fn from_fn(at: impl Fn(usize) -> f32) -> Self {

@@ -13,7 +13,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 use super::functions::Bits;
 use super::int8_simd128::Bytes16;
 use super::register::{four_rows, memory, same_methods};
-use super::{Pair, Part, Real};
+use super::{Pair, Piece, Real};
 
 /// Four float32 values in one vector.
 #[derive(Clone, Copy)]
@@ -55,8 +55,8 @@ impl Real for Simd128 {
     four_rows!();
 
     #[inline(never)]
-    fn run_part<P: Part>(part: P) -> P::Output {
-        part.run()
+    fn run_piece<P: Piece>(piece: P) -> P::Output {
+        piece.run()
     }
     #[inline(always)]
     fn choose(self, yes: Self, no: Self) -> Self {

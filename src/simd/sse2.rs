@@ -15,7 +15,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 use super::functions::Bits;
 use super::int8_sse2::Bytes16;
 use super::register::{four_rows, memory, same_methods};
-use super::{Pair, Part, Real};
+use super::{Pair, Piece, Real};
 
 /// Four float32 values in one register.
 #[derive(Clone, Copy)]
@@ -59,8 +59,8 @@ impl Real for Sse2 {
     four_rows!();
 
     #[inline(never)]
-    fn run_part<P: Part>(part: P) -> P::Output {
-        part.run()
+    fn run_piece<P: Piece>(piece: P) -> P::Output {
+        piece.run()
     }
     #[inline(always)]
     fn choose(self, yes: Self, no: Self) -> Self {
