@@ -99,13 +99,13 @@ pub struct supple_sim {
     loads: usize,
     contact: usize,
     /// Where the steps are.
-    steps: usize,
+    place_of_steps: usize,
     /// The end of all.
     end: usize,
     /// The address that the contact of the loads was set at.
     address: usize,
     clock: Clock,
-    mover: Steps,
+    prepared: Prepared,
 }
 
 // SAFETY: `repr(C)`, begins with a head.
@@ -116,7 +116,7 @@ unsafe impl Object for supple_sim {
 
 /// What moves a simulation, with places of objects in its memory.
 #[derive(Clone, Copy)]
-enum Steps {
+enum Prepared {
     /// They were refused.
     None,
     Exact(Exact),
@@ -136,8 +136,12 @@ enum Steps {
 #[derive(Clone, Copy)]
 enum Exact {
     Fixed(Step),
-    /// With the place of its vectors.
-    Paced(Pace, f32, usize),
+    Paced {
+        pace: Pace,
+        damping: f32,
+        /// Where its vectors are.
+        kept: usize,
+    },
 }
 
 /// The objects of a simulation, for all functions that take them.
@@ -339,10 +343,10 @@ pub unsafe extern "C" fn supple_sim_advance(
         let threads = HostThreads::of(threads)?;
         let mut state = loads.attached(opened_of(&open, objects.state)?);
         let CallLoads { of_call, contact } = &mut loads;
-        let supple_sim { clock, mover, .. } = &mut *sim;
+        let supple_sim { clock, prepared, .. } = &mut *sim;
         let until = clock.end_of_call(state.time(), seconds);
         let mut watched = Watched { call: supple_report::NOTHING, contact, mark: None };
-        let mover = mover.of(sim)?;
+        let mover = prepared.mover(sim)?;
         let taken = mover.advance(until, open.view(), of_call, state.reborrow(), &threads, &mut |event| {
             watched.enter(&event);
         });
@@ -536,8 +540,8 @@ unsafe fn build(
                 refused => return Err(refused.into()),
             }
         }
-        let (steps, end, address) = (room.used, room.used, start.addr());
-        let (clock, mover) = (Clock::default(), Steps::None);
+        let (place_of_steps, end, address) = (room.used, room.used, start.addr());
+        let (clock, prepared) = (Clock::default(), Prepared::None);
         let sim = place.put(|head| supple_sim {
             head: head.of_bytes(bytes),
             nodes,
@@ -545,11 +549,11 @@ unsafe fn build(
             state,
             loads,
             contact,
-            steps,
+            place_of_steps,
             end,
             address,
             clock,
-            mover,
+            prepared,
         });
         if let Err(error) = prepare(sim, settings) {
             // From now on the memory holds none.
@@ -569,9 +573,9 @@ unsafe fn objects_of(sim: *mut supple_sim) -> Answer<supple_sim_objects> {
     unsafe {
         memory::is(sim.cast_const())?;
         let at = |place: usize| sim.cast::<u8>().add(place);
-        let &supple_sim { scene, state, loads, contact, end, address, ref mover, .. } = &*sim;
-        let learned = match mover {
-            Steps::Learned { steps, .. } => at(*steps).cast::<supple_learned>().cast_const(),
+        let &supple_sim { scene, state, loads, contact, end, address, ref prepared, .. } = &*sim;
+        let learned = match prepared {
+            Prepared::Learned { steps, .. } => at(*steps).cast::<supple_learned>().cast_const(),
             _ => ptr::null(),
         };
         let objects = supple_sim_objects {
@@ -606,14 +610,14 @@ unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -> Answer<()
         let open = OpenScene::of(scene)?;
         let critical = critical_step(&open, &mut opened_of(&open, state)?)?;
         let needed = needed(settings, critical, scene, points)?;
-        let (steps, bytes) = ((*sim).steps, memory::bytes_of(sim.cast_const()));
+        let (steps, bytes) = ((*sim).place_of_steps, memory::bytes_of(sim.cast_const()));
         if bytes.saturating_sub(steps) < needed {
             return Err(short(bytes, steps + needed));
         }
         let mut room = Room { start: sim.cast(), used: steps, bytes };
-        (*sim).mover = Steps::None;
+        (*sim).prepared = Prepared::None;
         let made = made(settings, critical, &mut room, (scene, state), points)?;
-        ((*sim).mover, (*sim).end) = (made, room.used);
+        ((*sim).prepared, (*sim).end) = (made, room.used);
         Ok(())
     }
 }
@@ -682,7 +686,7 @@ unsafe fn made(
     room: &mut Room,
     (scene, state): (*const supple_scene, *mut supple_state),
     points: &[[f32; 3]],
-) -> Answer<Steps> {
+) -> Answer<Prepared> {
     let seconds = seconds_of(settings, critical);
     let first = points.as_ptr().cast::<f32>();
     // SAFETY: the caller's promise.
@@ -690,7 +694,10 @@ unsafe fn made(
         let large = settings.large(seconds);
         let exact = |room: &mut Room, damping| match settings.given_seconds() {
             Some(seconds) => Ok::<_, supple_error>(Exact::Fixed(Step::new(seconds, damping, critical)?)),
-            None => Ok(Exact::Paced(Pace::new(critical), damping, room.vectors(vectors_for_pace(points.len()))?)),
+            None => {
+                let kept = room.vectors(vectors_for_pace(points.len()))?;
+                Ok(Exact::Paced { pace: Pace::new(critical), damping, kept })
+            }
         };
         let guarded = |room: &mut Room, seconds, damping, every| {
             if !settings.is_guarded() {
@@ -703,8 +710,8 @@ unsafe fn made(
             })
         };
         Ok(match settings.steps {
-            SUPPLE_STEPS_EXACT => Steps::Exact(exact(room, settings.damping)?),
-            SUPPLE_STEPS_DAMPED => Steps::Damped {
+            SUPPLE_STEPS_EXACT => Prepared::Exact(exact(room, settings.damping)?),
+            SUPPLE_STEPS_DAMPED => Prepared::Damped {
                 steps: room.take::<supple_large>(|memory, bytes, made, error| {
                     supple_large_init(memory, bytes, scene, state, first, &raw const large, made, error)
                 })?,
@@ -713,7 +720,7 @@ unsafe fn made(
             SUPPLE_STEPS_AUTO => {
                 let given = settings.tolerance;
                 let tolerance = if given > 0.0 { given } else { usual_tolerance(points) };
-                Steps::Auto(room.take::<supple_adaptive>(|memory, bytes, made, error| {
+                Prepared::Auto(room.take::<supple_adaptive>(|memory, bytes, made, error| {
                     supple_adaptive_init(memory, bytes, scene, state, first, &raw const large, tolerance, made, error)
                 })?)
             }
@@ -726,27 +733,27 @@ unsafe fn made(
                 let (seconds, damping) = (network.model().seconds(), network.model().network().recipe().damping);
                 let lead = Lead::new(network.model().intervals(settings.lead_in));
                 let exact = exact(room, damping)?;
-                Steps::Learned { steps, exact, lead, guard: guarded(room, seconds, damping, EVERY_LEARNED)? }
+                Prepared::Learned { steps, exact, lead, guard: guarded(room, seconds, damping, EVERY_LEARNED)? }
             }
         })
     }
 }
 
-impl Steps {
+impl Prepared {
     /// The same, ready to move.
     ///
     /// # Safety
     /// They are those of this simulation, and nobody else uses its steps.
-    unsafe fn of<'a>(&'a mut self, sim: *mut supple_sim) -> Answer<Mover<'a, 'static>> {
+    unsafe fn mover<'a>(&'a mut self, sim: *mut supple_sim) -> Answer<Mover<'a, 'static>> {
         // SAFETY: the caller's promise; objects lie where they were put.
         unsafe {
             let nodes = (*sim).nodes;
             let at = |place: usize| sim.cast::<u8>().add(place);
             let exact = |exact: &'a mut Exact| match exact {
                 Exact::Fixed(step) => ExactSteps::Fixed(*step),
-                Exact::Paced(pace, damping, place) => {
+                Exact::Paced { pace, damping, kept } => {
                     let count = vectors_for_pace(nodes as usize);
-                    let kept = core::slice::from_raw_parts_mut(at(*place).cast::<NodeVector>(), count);
+                    let kept = core::slice::from_raw_parts_mut(at(*kept).cast::<NodeVector>(), count);
                     ExactSteps::Paced { pace, kept, damping: *damping }
                 }
             };
