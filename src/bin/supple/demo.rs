@@ -17,7 +17,7 @@ use crate::report::demo::{Compared, Run, about, part, table};
 use crate::report::{self, simulation::shape};
 use crate::results::folder::Folder;
 use crate::scene::body::Body;
-use crate::scene::instruments::Tools;
+use crate::scene::instruments::SceneInstruments;
 use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
 use crate::scene::timing::StepChoice;
@@ -146,7 +146,7 @@ fn press(setup: &mut Setup) {
     let start = |[x, y, z]: [f64; 3]| [x, y, z + f64::from(RADIUS) + ABOVE];
     let start = start(extreme(setup, |point| point[2]));
     let path = WAY.map(|(time, way)| (time, [0, 1, 2].map(|axis| start[axis] + way[axis])));
-    setup.tools = Tools::ball(&setup.body, RADIUS, FRICTION, &path);
+    setup.instruments = SceneInstruments::ball(&setup.body, RADIUS, FRICTION, &path);
 }
 
 /// Forceps at the foremost node: nodes that they grip move as they do.

@@ -55,7 +55,7 @@ impl FileScene {
         if setup.method_name() != "tled" {
             return refused(&format!("the method is {:?}", setup.method_name()));
         }
-        if !setup.tools.is_empty() {
+        if !setup.instruments.is_empty() {
             return refused("there is an instrument");
         }
         let Some(tissue) = setup.tissues.only() else { return refused("there are regions") };

@@ -34,8 +34,8 @@ pub(crate) fn describe(setup: &Setup, accuracy: Option<f64>) -> Result<(), Probl
     }
     row("element", setup.element.name());
     row("mass", format!("{:.3} g", 1e3 * scene.mass()));
-    if !setup.tools.is_empty() {
-        row("instruments", &setup.tools);
+    if !setup.instruments.is_empty() {
+        row("instruments", &setup.instruments);
     }
     row("elements left out", setup.body.mesh.tets.len() - scene.element_count());
     let bound = tled::critical_step(&scene, &mut state)

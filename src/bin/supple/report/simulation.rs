@@ -44,8 +44,8 @@ pub(crate) fn body(setup: &Setup, shape: &[[f32; 3]], lengths: &[f64], time: f64
     if !gripped.is_empty() {
         bodies.add_points(&gripped);
     }
-    if !setup.tools.is_empty() {
-        let (points, triangles) = instrument_mesh::of(&setup.tools, &setup.body, time);
+    if !setup.instruments.is_empty() {
+        let (points, triangles) = instrument_mesh::of(&setup.instruments, &setup.body, time);
         bodies.add_rigid(&points, &triangles);
     }
     bodies.plot(View::Standing)

@@ -74,8 +74,8 @@ impl Folder {
         };
         write_vtu(&self.path(&name), &frame).map_err(Problem::of)?;
         self.frames.push((state.time(), name));
-        if !setup.tools.is_empty() {
-            let (points, triangles) = instrument_mesh::of(&setup.tools, body, state.time());
+        if !setup.instruments.is_empty() {
+            let (points, triangles) = instrument_mesh::of(&setup.instruments, body, state.time());
             let name = format!("instruments_{number:04}.vtu");
             write_triangles(&self.path(&name), &points, &triangles).map_err(Problem::of)?;
             self.frames.push((state.time(), name));

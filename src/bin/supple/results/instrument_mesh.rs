@@ -1,7 +1,7 @@
 //! The surfaces of a scene's instruments at a time, as triangles for ParaView.
 
 use crate::scene::body::Body;
-use crate::scene::instruments::{OwnedShape, Tool, Tools};
+use crate::scene::instruments::{MovedInstrument, OwnedShape, SceneInstruments};
 
 /// Parts of a ring and of half a meridian.
 const AROUND: u32 = 32;
@@ -10,11 +10,11 @@ const ALONG: u32 = 16;
 type Triangles = (Vec<[f64; 3]>, Vec<[u32; 3]>);
 
 /// All instruments at `time`, s, m in the scene's coordinates.
-pub(crate) fn of(tools: &Tools, body: &Body, time: f64) -> Triangles {
+pub(crate) fn of(instruments: &SceneInstruments, body: &Body, time: f64) -> Triangles {
     let (mut points, mut triangles) = (vec![], vec![]);
-    for tool in &tools.tools {
-        let (own, corners) = surface(tool, body.diagonal() as f32);
-        let (position, rotation) = tool.placed(time);
+    for instrument in &instruments.all {
+        let (own, corners) = surface(instrument, body.diagonal() as f32);
+        let (position, rotation) = instrument.placed(time);
         let first = points.len() as u32;
         points.extend(own.into_iter().map(|point| {
             let turned = turned(rotation, point);
@@ -26,8 +26,8 @@ pub(crate) fn of(tools: &Tools, body: &Body, time: f64) -> Triangles {
 }
 
 /// The surface in the axes of the instrument; of a plane a square of twice `size`.
-fn surface(tool: &Tool, size: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
-    match &tool.shape {
+fn surface(instrument: &MovedInstrument, size: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+    match &instrument.shape {
         OwnedShape::Plane => {
             let corners = [[-size, -size, 0.0], [size, -size, 0.0], [size, size, 0.0], [-size, size, 0.0]];
             (corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]])

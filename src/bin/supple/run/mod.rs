@@ -31,7 +31,7 @@ pub(crate) fn run<'a>(
     let Start { at_rest, step, simulation } = start;
     let time = &setup.time;
     let mut outcome = Outcome::new(at_rest, step.seconds());
-    outcome.reactions = Reactions::new(setup.tools.tools.len(), time);
+    outcome.reactions = Reactions::new(setup.instruments.all.len(), time);
     if let (Some(large), Some(method)) = (simulation.long_step(), &time.method) {
         outcome.large = Some(LargeTrace::new(method, large.model()));
     }
@@ -100,7 +100,7 @@ impl Running<'_> {
     fn reach(&mut self, target: f64) -> Result<(), Problem> {
         let mut from = self.simulation.state().time();
         while from < target && self.outcome.divergence.is_none() {
-            let until = target.min(self.setup.tools.next_turn(from + self.rounding()));
+            let until = target.min(self.setup.instruments.next_turn(from + self.rounding()));
             self.advance_from(from, until)?;
             from = until;
         }
@@ -120,10 +120,10 @@ impl Running<'_> {
         let rounding = self.rounding();
         let Self { setup, simulation, loads, outcome, tick, .. } = self;
         let mut loads = *loads;
-        let instruments = setup.tools.at(from + rounding);
+        let instruments = setup.instruments.at(from + rounding);
         if !instruments.is_empty() {
             let nodes = simulation.scene().node_count();
-            loads = loads.touched_by(setup.tools.contact(&instruments, nodes)?);
+            loads = loads.touched_by(setup.instruments.contact(&instruments, nodes)?);
         }
         let mut watched = Watched { mark: (outcome.limits, outcome.reactions.mark()), outcome, began: Instant::now() };
         let mut watch = |event: Event<'_>| {

@@ -43,7 +43,7 @@ pub(crate) struct OwnedField {
 }
 
 /// An instrument with its path.
-pub(crate) struct Tool {
+pub(crate) struct MovedInstrument {
     pub(crate) shape: OwnedShape,
     friction: f32,
     /// s, and m from the centre of the body.
@@ -53,23 +53,24 @@ pub(crate) struct Tool {
 
 /// The instruments of a scene and what they can touch.
 #[derive(Default)]
-pub struct Tools {
-    pub(crate) tools: Vec<Tool>,
+pub struct SceneInstruments {
+    pub(crate) all: Vec<MovedInstrument>,
     nodes: Vec<SurfaceNode>,
     /// None unless an instrument is thinner than an edge is long.
     triangles: Vec<[u32; 3]>,
 }
 
-impl Tools {
+impl SceneInstruments {
     /// A ball on a path (s, and m in the body's coordinates), for the demo.
     pub(crate) fn ball(body: &Body, radius: f32, friction: f32, path: &[(f64, [f64; 3])]) -> Self {
         let local = |at: [f64; 3]| [0, 1, 2].map(|axis| (at[axis] - body.centre[axis]) as f32);
         let path = path.iter().map(|&(time, at)| (time, local(at))).collect();
-        let tool = Tool { shape: OwnedShape::Sphere { radius }, friction, path, direction: [0.0, 0.0, 1.0] };
-        Self::new(vec![tool], body)
+        let instrument =
+            MovedInstrument { shape: OwnedShape::Sphere { radius }, friction, path, direction: [0.0, 0.0, 1.0] };
+        Self::new(vec![instrument], body)
     }
 
-    fn new(tools: Vec<Tool>, body: &Body) -> Self {
+    fn new(all: Vec<MovedInstrument>, body: &Body) -> Self {
         let mut triangles = body.boundary();
         let mut nodes = triangles.as_flattened().to_vec();
         nodes.sort_unstable();
@@ -80,14 +81,14 @@ impl Tools {
         };
         let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
         let longest = edges.map(length).fold(0.0, f32::max);
-        if tools.iter().all(|tool| tool.shape.shape().thickness() >= longest) {
+        if all.iter().all(|instrument| instrument.shape.shape().thickness() >= longest) {
             triangles.clear();
         }
         for corner in triangles.as_flattened_mut() {
             *corner = nodes.partition_point(|node| node < corner) as u32;
         }
         let nodes = nodes.into_iter().map(|node| SurfaceNode { rest: body.local[node as usize], node });
-        Self { tools, nodes: nodes.collect(), triangles }
+        Self { all, nodes: nodes.collect(), triangles }
     }
 
     pub(crate) fn read(file: &SceneFile, body: &Body) -> Result<Self, Problem> {
@@ -102,12 +103,12 @@ impl Tools {
                 file.problem(first, "mass-scaled and learned steps cannot meet instruments; method = \"damped\" can")
             );
         }
-        let tools = tables.iter().map(|at| Tool::read(file, at, body)).collect::<Result<_, _>>()?;
-        Ok(Self::new(tools, body))
+        let all = tables.iter().map(|at| MovedInstrument::read(file, at, body)).collect::<Result<_, _>>()?;
+        Ok(Self::new(all, body))
     }
 
     pub const fn is_empty(&self) -> bool {
-        self.tools.is_empty()
+        self.all.is_empty()
     }
 
     /// What can be touched, on a body of so many nodes.
@@ -118,12 +119,12 @@ impl Tools {
 
     /// The instruments on the parts of their paths that begin at `time` or before, s.
     pub(crate) fn at(&self, time: f64) -> Vec<Instrument<'_>> {
-        self.tools.iter().map(|tool| tool.at(time)).collect()
+        self.all.iter().map(|instrument| instrument.at(time)).collect()
     }
 
     /// The next time after `time` at which an instrument changes its way, s.
     pub(crate) fn next_turn(&self, time: f64) -> f64 {
-        let turns = self.tools.iter().flat_map(|tool| &tool.path).map(|(turn, _)| *turn);
+        let turns = self.all.iter().flat_map(|instrument| &instrument.path).map(|(turn, _)| *turn);
         turns.filter(|turn| *turn > time).fold(f64::INFINITY, f64::min)
     }
 
@@ -137,7 +138,7 @@ impl Tools {
     }
 }
 
-impl Tool {
+impl MovedInstrument {
     fn read(file: &SceneFile, at: &Spanned<InstrumentTable>, body: &Body) -> Result<Self, Problem> {
         let table = at.get_ref();
         let friction = positive(file, "friction", table.friction.as_ref(), 0.0)?.unwrap_or(0.0);
@@ -147,12 +148,13 @@ impl Tool {
         {
             return Err(file.problem(at, format!("direction is {direction:?}; it needs a length")));
         }
-        let tool = Self { shape: OwnedShape::read(file, at)?, friction, path: read_path(file, at, body)?, direction };
+        let instrument =
+            Self { shape: OwnedShape::read(file, at)?, friction, path: read_path(file, at, body)?, direction };
         // Whatever else the kernel refuses.
-        let instruments = [tool.at(0.0)];
+        let instruments = [instrument.at(0.0)];
         let surface = Surface::new(&[], 0).map_err(Problem::of)?;
         Contact::new(surface, &instruments).map_err(|error| file.problem(at, error))?;
-        Ok(tool)
+        Ok(instrument)
     }
 
     fn pose(&self, position: [f32; 3]) -> Pose {
@@ -178,11 +180,11 @@ impl Tool {
     }
 }
 
-impl std::fmt::Display for Tools {
+impl std::fmt::Display for SceneInstruments {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        for (index, tool) in self.tools.iter().enumerate() {
+        for (index, instrument) in self.all.iter().enumerate() {
             let comma = if index > 0 { ", " } else { "" };
-            match &tool.shape {
+            match &instrument.shape {
                 OwnedShape::Plane => write!(f, "{comma}{index}: plane")?,
                 OwnedShape::Sphere { radius } => write!(f, "{comma}{index}: sphere of {:.2} mm", 1e3 * radius)?,
                 OwnedShape::Capsule { radius, length } => {

@@ -8,7 +8,7 @@ use supple::state::VecState;
 
 use super::body::{Body, read_body};
 use super::file::SceneFile;
-use super::instruments::Tools;
+use super::instruments::SceneInstruments;
 use super::learned::LearnedChoice;
 use super::loads::read_loads;
 use super::plausible;
@@ -25,7 +25,7 @@ pub struct Setup {
     pub supports: Vec<Support>,
     pub forces: Vec<NodalForce>,
     pub(crate) motions: Vec<Motion>,
-    pub tools: Tools,
+    pub instruments: SceneInstruments,
     pub(crate) gravity: [f32; 3],
     /// 1/s.
     pub damping: f32,
@@ -56,7 +56,7 @@ impl Setup {
             None => scene.damping.as_ref().map_or(0.0, |damping| *damping.get_ref()),
         };
         let (supports, forces, motions) = read_loads(file, &body)?;
-        let tools = Tools::read(file, &body)?;
+        let instruments = SceneInstruments::read(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
         let mut warnings = plausible::warnings(file, &body, &tissues, gravity, &supports, &forces);
         let element = read_element(file, learned.as_ref())?;
@@ -65,7 +65,20 @@ impl Setup {
         if let Some(learned) = &learned {
             warnings.extend(learned.warning(&tissues, element)?);
         }
-        Ok(Self { body, tissues, element, supports, forces, motions, tools, gravity, damping, time, learned, warnings })
+        Ok(Self {
+            body,
+            tissues,
+            element,
+            supports,
+            forces,
+            motions,
+            instruments,
+            gravity,
+            damping,
+            time,
+            learned,
+            warnings,
+        })
     }
 
     /// The lobe of `supple demo`, which has no scene file.
@@ -77,7 +90,7 @@ impl Setup {
             supports: vec![],
             forces: vec![],
             motions: vec![],
-            tools: Tools::default(),
+            instruments: SceneInstruments::default(),
             gravity: [0.0; 3],
             damping: 0.0,
             time: Timing::of_demo(),
@@ -120,8 +133,8 @@ impl Setup {
     pub(crate) fn state(&self) -> VecState {
         let nodes = self.body.local.len();
         let state = VecState::at_rest(nodes);
-        match self.tools.surface(nodes) {
-            Ok(surface) if !self.tools.is_empty() => state.meeting(&surface),
+        match self.instruments.surface(nodes) {
+            Ok(surface) if !self.instruments.is_empty() => state.meeting(&surface),
             _ => state,
         }
     }
