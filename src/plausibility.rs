@@ -279,7 +279,7 @@ fn tissues_of<M: Material>(material: &M) -> impl Iterator<Item = Tissue<M::Law>>
         Laws::One(law) => (material.tissue(0), law, &[][..]),
         Laws::Regions { law, tissues, .. } => (None, law, tissues),
     };
-    let several = several.iter().map(move |tissue| Tissue { law: law.with(tissue.law), density: tissue.density });
+    let several = several.iter().map(move |tissue| Tissue { law: law.with(tissue.constants), density: tissue.density });
     one.into_iter().chain(several)
 }
 

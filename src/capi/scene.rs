@@ -3,7 +3,7 @@
 use core::ffi::c_void;
 
 use crate::element::{ElementTile, NodeInertia, PatchRow};
-use crate::material::{Element, Tissue, Values};
+use crate::material::{Element, TissueValues};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::{Axes, SceneFacts, SceneView, Support, patch_rows_for, tiles_for};
 use crate::tled;
@@ -52,7 +52,7 @@ pub struct supple_tissue {
     /// At rest, kg/m^3; finite and positive.
     pub density: f32,
 }
-const _: () = assert!(size_of::<supple_tissue>() == size_of::<Tissue<Values>>());
+const _: () = assert!(size_of::<supple_tissue>() == size_of::<TissueValues>());
 
 /// What a scene is built from. Everything is copied; nothing needs to stay.
 #[repr(C)]
@@ -149,7 +149,7 @@ mod contents {
 #[cfg(not(feature = "capi"))]
 mod contents {
     pub(in crate::capi) use crate::material::NeoHookean as SceneLaw;
-    use crate::material::{AnyMaterial, Element, Laws, Material, Tissue, Values};
+    use crate::material::{AnyMaterial, Element, Laws, Material, Tissue, TissueValues};
 
     pub(super) const ELEMENTS: &[Element] = &[Element::Linear, Element::NodalPressure];
 
@@ -161,7 +161,7 @@ mod contents {
     pub(in crate::capi) struct SceneMaterial<'a> {
         pub(super) element: Element,
         pub(super) law: SceneLaw,
-        pub(super) tissues: &'a [Tissue<Values>],
+        pub(super) tissues: &'a [TissueValues],
         pub(super) of_element: &'a [u16],
     }
 
@@ -259,7 +259,7 @@ fn layout(nodes: u32, elements: u32, tissues: u32, patch_rows: usize) -> Layout 
     Layout::of::<supple_scene>()
         .and::<NodeInertia>(nodes as usize)
         .and::<ElementTile>(tiles_for(elements as usize))
-        .and::<Tissue<Values>>(tissues as usize)
+        .and::<TissueValues>(tissues as usize)
         .and::<u16>(regions(elements, tissues))
         .and::<PatchRow>(patch_rows)
 }
@@ -380,13 +380,13 @@ impl<'a> CheckedBody<'a> {
             (
                 arrays.change::<NodeInertia>(mesh.points().len()),
                 arrays.change::<ElementTile>(tiles_for(mesh.element_count())),
-                arrays.change::<Tissue<Values>>(given.len()),
+                arrays.change::<TissueValues>(given.len()),
                 arrays.change::<u16>(of_element.len()),
                 arrays.change::<PatchRow>(patch_rows),
             )
         };
         for (tissue, given) in tissues.iter_mut().zip(*given) {
-            *tissue = Tissue { law: given.constants, density: given.density };
+            *tissue = TissueValues { constants: given.constants, density: given.density };
         }
         for (region, &given) in regions.iter_mut().zip(*of_element) {
             *region = given;

@@ -56,7 +56,7 @@ pub use response::{Invariants, Response};
 pub(crate) use response::{LawState, energy_density, response, response_operations};
 #[cfg(feature = "std")]
 pub use tissue::VecMaterial;
-pub use tissue::{AnyMaterial, Element, Laws, Material, NodalPressure, NodalStrain, Regions, Tissue};
+pub use tissue::{AnyMaterial, Element, Laws, Material, NodalPressure, NodalStrain, Regions, Tissue, TissueValues};
 
 use crate::simd::Real;
 

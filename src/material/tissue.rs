@@ -13,6 +13,16 @@ pub struct Tissue<L> {
     pub density: f32,
 }
 
+/// The numbers of a [`Tissue`], whose law is known from elsewhere: an entry of [`Regions`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct TissueValues {
+    /// Constants of the law ([`Law::values`]).
+    pub constants: Values,
+    /// Density at rest, kg/m^3.
+    pub density: f32,
+}
+
 /// Which tetrahedra a scene is made of.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 #[cfg_attr(
@@ -148,7 +158,7 @@ pub enum Laws<'a, L> {
         /// Which law; its own constants count where none are listed, and a scene with such elements cannot be built.
         law: L,
         /// The constants of the tissues.
-        tissues: &'a [Tissue<Values>],
+        tissues: &'a [TissueValues],
         /// For each element of the mesh the index of its tissue.
         of_element: &'a [u16],
     },
@@ -156,7 +166,7 @@ pub enum Laws<'a, L> {
 
 /// The tissue of mesh element `element`, if there is one.
 #[inline(always)]
-fn tissue_of<'a>(tissues: &'a [Tissue<Values>], of_element: &[u16], element: usize) -> Option<&'a Tissue<Values>> {
+fn tissue_of<'a>(tissues: &'a [TissueValues], of_element: &[u16], element: usize) -> Option<&'a TissueValues> {
     tissues.get(usize::from(*of_element.get(element)?))
 }
 
@@ -181,7 +191,7 @@ impl<'a, L: Law> Laws<'a, L> {
         match *self {
             Self::One(law) => law,
             Self::Regions { law, tissues, of_element } => {
-                tissue_of(tissues, of_element, element).map_or(law, |tissue| law.with(tissue.law))
+                tissue_of(tissues, of_element, element).map_or(law, |tissue| law.with(tissue.constants))
             }
         }
     }
@@ -196,7 +206,7 @@ impl<'a, L: Law> Laws<'a, L> {
                 let mut rows = [law.values(); 2 * TILE];
                 for (lane, row) in rows.iter_mut().enumerate().take(R::COUNT) {
                     if let Some(tissue) = tissue_of(tissues, of_element, element(lane)) {
-                        *row = tissue.law;
+                        *row = tissue.constants;
                     }
                 }
                 law.widen(core::array::from_fn(|constant| R::from_fn(|lane| rows[lane % rows.len()][constant])))
@@ -206,10 +216,10 @@ impl<'a, L: Law> Laws<'a, L> {
 }
 
 impl<L: Law> Tissue<L> {
-    /// Without the name of the law: an entry of [`Regions`].
+    /// Without the law itself: an entry of [`Regions`].
     #[must_use]
-    pub fn values(&self) -> Tissue<Values> {
-        Tissue { law: self.law.values(), density: self.density }
+    pub fn values(&self) -> TissueValues {
+        TissueValues { constants: self.law.values(), density: self.density }
     }
 }
 
@@ -232,7 +242,7 @@ pub struct Regions<'a, L> {
     /// Which law; its own constants are not used.
     pub law: L,
     /// The tissues: see [`Tissue::values`].
-    pub tissues: &'a [Tissue<Values>],
+    pub tissues: &'a [TissueValues],
     /// For each element of the mesh the index of its tissue.
     pub of_element: &'a [u16],
 }
@@ -241,8 +251,8 @@ impl<L: Law> Material for Regions<'_, L> {
     type Law = L;
 
     fn tissue(&self, element: usize) -> Option<Tissue<L>> {
-        let &Tissue { law, density } = tissue_of(self.tissues, self.of_element, element)?;
-        Some(Tissue { law: self.law.with(law), density })
+        let &TissueValues { constants, density } = tissue_of(self.tissues, self.of_element, element)?;
+        Some(Tissue { law: self.law.with(constants), density })
     }
 
     fn laws(&self) -> Laws<'_, L> {
@@ -264,7 +274,7 @@ pub struct AnyMaterial<'a, L = AnyLaw> {
     /// Which law all tissues have; its own constants are not used.
     pub law: L,
     /// One tissue for all elements, or several.
-    pub tissues: &'a [Tissue<Values>],
+    pub tissues: &'a [TissueValues],
     /// For each element of the mesh the index of its tissue; not read where there is only one.
     pub of_element: &'a [u16],
 }
@@ -278,7 +288,7 @@ impl<'a, L: Law> AnyMaterial<'a, L> {
     pub(crate) fn laws_of_all(&self) -> Laws<'a, L> {
         let Self { law, tissues, of_element, .. } = *self;
         match tissues {
-            [only] => Laws::One(law.with(only.law)),
+            [only] => Laws::One(law.with(only.constants)),
             _ => Laws::Regions { law, tissues, of_element },
         }
     }
@@ -294,7 +304,7 @@ impl<L: Law> Material for AnyMaterial<'_, L> {
 
     fn tissue(&self, element: usize) -> Option<Tissue<L>> {
         match self.tissues {
-            [Tissue { law, density }] => Some(Tissue { law: self.law.with(*law), density: *density }),
+            &[TissueValues { constants, density }] => Some(Tissue { law: self.law.with(constants), density }),
             _ => self.regions().tissue(element),
         }
     }
@@ -317,7 +327,7 @@ pub struct VecMaterial {
     /// See [`AnyMaterial::law`].
     pub law: AnyLaw,
     /// See [`AnyMaterial::tissues`].
-    pub tissues: std::vec::Vec<Tissue<Values>>,
+    pub tissues: std::vec::Vec<TissueValues>,
     /// See [`AnyMaterial::of_element`].
     pub of_element: std::vec::Vec<u16>,
 }

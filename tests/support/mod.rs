@@ -11,7 +11,7 @@ pub use bodies::Body;
 use supple::element::ElementMaterial;
 use supple::loads::Loads;
 use supple::material::{
-    AnyLaw, Exponential, Laws, Material, NeoHookean, Polynomial, Regions, Tissue, Values, VecMaterial,
+    AnyLaw, Exponential, Laws, Material, NeoHookean, Polynomial, Regions, Tissue, TissueValues, VecMaterial,
 };
 use supple::scene::{Support, VecScene};
 use supple::state::{NodeVector, VecState};
@@ -36,11 +36,7 @@ pub fn laws() -> [AnyLaw; 3] {
 }
 
 /// Several tissues of one law in linear tetrahedra.
-pub fn regions<'a>(
-    law: impl Into<AnyLaw>,
-    tissues: &'a [Tissue<Values>],
-    of_element: &'a [u16],
-) -> Regions<'a, AnyLaw> {
+pub fn regions<'a>(law: impl Into<AnyLaw>, tissues: &'a [TissueValues], of_element: &'a [u16]) -> Regions<'a, AnyLaw> {
     Regions { law: law.into(), tissues, of_element }
 }
 

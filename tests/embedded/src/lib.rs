@@ -6,7 +6,7 @@ use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
 use supple::inertia::{Cells, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{Element, Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue, Values};
+use supple::material::{Element, Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue, TissueValues};
 use supple::mesh::{self, Bar, Mesh, Winding};
 use supple::mlp::Network;
 use supple::scene::{AsScene, FixedScene, SceneFacts, SceneView, Support};
@@ -39,7 +39,7 @@ pub extern "C" fn build(
 /// Builds a scene of several tissues with nodal pressure, asks for its critical step and takes one.
 #[unsafe(no_mangle)]
 pub extern "C" fn nodal_pressure(
-    tissues: &'static [Tissue<Values>; 3],
+    tissues: &'static [TissueValues; 3],
     of_element: &'static [u16; 300],
     points: &[[f32; 3]; 100],
     tets: &[[u32; 4]; 300],
@@ -60,7 +60,7 @@ pub extern "C" fn nodal_pressure(
 /// The same with nodal strain, in a scene of a fixed capacity and in memory of the host.
 #[unsafe(no_mangle)]
 pub extern "C" fn nodal_strain(
-    tissues: &'static [Tissue<Values>; 3],
+    tissues: &'static [TissueValues; 3],
     of_element: &'static [u16; 300],
     points: &[[f32; 3]; 100],
     tets: &[[u32; 4]; 300],
