@@ -189,18 +189,6 @@ impl<'a> StateView<'a> {
         self.capacity().min(volumes)
     }
 
-    /// Makes the last increment span `seconds`: `before` are the displacements of that long ago. A step of that length
-    /// goes on from here. Nodes beyond `before` are left as they are.
-    pub fn span(&mut self, before: &[NodeVector], seconds: f32) {
-        let vectors = self.displacement.iter().zip(self.increment.iter_mut());
-        for ((displacement, increment), before) in vectors.zip(before) {
-            for axis in 0..3 {
-                increment.0[axis] = displacement.0[axis] - before.0[axis];
-            }
-        }
-        self.progress.dt = seconds;
-    }
-
     /// Makes the last increment span `seconds` at the velocity that it has. A step much shorter than the last goes on
     /// smoothly from here: it would count half the last step's acceleration into its own otherwise.
     pub fn respan(&mut self, seconds: f32) {

@@ -1,4 +1,4 @@
-//! What an element tells about itself, in float64: volume ratio, von Mises stress (Pa), strain energy (J).
+//! What an element tells about itself, in float64: volume ratio, von Mises stress (Pa); and its strain energy (J).
 //! For display and for the energy balance, not for the step.
 
 use glam::{DMat3, DVec3};
@@ -18,9 +18,6 @@ pub struct ElementFields {
     pub volume_ratio: f64,
     /// Von Mises stress of the Cauchy stress `P F^T / J`, Pa; NaN for an element without positive volume.
     pub von_mises: f64,
-    /// Strain energy of its own deformation, J. With nodal strain the body's energy is that of its nodes
-    /// ([`crate::tled::strain_energy`]).
-    pub energy: f64,
 }
 
 /// The displacement gradient of the element at place `lane` of a tile, from the displacements of nodes.
@@ -50,11 +47,6 @@ fn displacements(vectors: &[NodeVector]) -> impl Fn(usize) -> DVec3 {
     |node| DVec3::from_array(vectors.get(node).copied().unwrap_or_default().to_array().map(f64::from))
 }
 
-/// Strain energy of an element's own deformation, J, from its invariants.
-fn own_energy<L: Law>(law: &L, tile: &ElementTile, lane: usize, (i, j): (f64, f64)) -> f64 {
-    energy_density(law, i, j) * f64::from(tile.volume::<f32>(lane))
-}
-
 /// Strain energy of an element, J, with the volumes of its nodes if it has nodal pressure.
 pub(crate) fn element_energy<L: Law>(
     law: &L,
@@ -65,7 +57,7 @@ pub(crate) fn element_energy<L: Law>(
 ) -> f64 {
     let (i, j, _) = invariants(gradient_of(tile, lane, displacements(displacement)));
     let of_nodes = volumes.map_or(0.0, |volumes| volume_energy_difference(law, tile, lane, j, volumes));
-    own_energy(law, tile, lane, (i, j)) + of_nodes
+    energy_density(law, i, j) * f64::from(tile.volume::<f32>(lane)) + of_nodes
 }
 
 /// Fields of the element at place `lane` of a tile, under the given displacements (m).
@@ -78,7 +70,6 @@ pub(crate) fn element_fields<L: Law>(
     let h = gradient_of(tile, lane, displacements(displacement));
     let f = DMat3::IDENTITY + h;
     let (i, j, _) = invariants(h);
-    let energy = own_energy(law, tile, lane, (i, j));
 
     // The deviator of P F^T needs only p1 F F^T: cof(F) F^T = J I.
     let wide = law.splat::<f32>();
@@ -89,7 +80,7 @@ pub(crate) fn element_fields<L: Law>(
     let square = deviator.x_axis.length_squared() + deviator.y_axis.length_squared() + deviator.z_axis.length_squared();
     let volume_ratio = 1.0 + j;
     let von_mises = if volume_ratio > 0.0 { p1 / volume_ratio * libm::sqrt(1.5 * square) } else { f64::NAN };
-    ElementFields { element: tile.element(lane), volume_ratio, von_mises, energy }
+    ElementFields { element: tile.element(lane), volume_ratio, von_mises }
 }
 
 /// Pressure at a corner of an element, Pa, positive where tissue is compressed: `-U'` at the volume ratio that its
