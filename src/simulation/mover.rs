@@ -283,9 +283,15 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         let seconds = learned.model().seconds();
         let count = libm::round(span / f64::from(seconds)).clamp(0.0, f64::from(u32::MAX)) as u32;
         for done in 0..count {
-            if lead.left < lead.all && state.last_step() > 0.0 && !learned.model().is_led(state) {
-                // The state was restored, or has moved without the network.
-                lead.left = lead.all;
+            if !learned.model().is_led(state) {
+                if state.last_step() == 0.0 {
+                    // From rest, also after a reset: the frames have followed nothing yet.
+                    learned.reset();
+                    lead.left = lead.all;
+                } else if lead.left < lead.all {
+                    // The state was restored, or has moved without the network.
+                    lead.left = lead.all;
+                }
             }
             let is_leading = lead.left > 0;
             lead.left = lead.left.saturating_sub(1);

@@ -149,6 +149,14 @@ static void is_what_a_host_would_do(uint32_t steps, const char *name) {
     CHECK(motion > 5e-4);
     printf("simulation: %s, %u steps for %.0f ms, moved %.2f mm on average, as by hand; %zu bytes\n", name, taken, 1e3 * FRAME * FRAMES,
            1e3 * motion, objects.bytes);
+
+    /* After a reset exact steps lead a network again. */
+    if (learned) {
+        CHECK(supple_state_reset(objects.state) == SUPPLE_OK);
+        pull(objects.scene, objects.loads, 0);
+        CHECK(supple_sim_advance(sim, FRAME, NULL, &report) >= 0);
+        CHECK(report.learned == 0 && report.exact > 0);
+    }
 }
 
 /* Frames in which the ball goes into the side of the bar. */

@@ -161,7 +161,7 @@ fn steps_that_choose_their_length_are_those_of_the_layer_below() {
 }
 
 #[test]
-fn a_network_is_led_and_led_again_after_a_restore() {
+fn a_network_is_led_and_led_again_after_a_restore_or_a_reset() {
     let bytes = WeightBytes::of(include_bytes!("../../weights/compact-10.weights"));
     let network = Network::parse(bytes.bytes()).unwrap();
     let interval = network.recipe().step;
@@ -206,6 +206,14 @@ fn a_network_is_led_and_led_again_after_a_restore() {
     let again = simulation.advance(12.0 * f64::from(interval)).unwrap();
     println!("after a restore {} exact and {} learned steps", again.exact, again.learned);
     assert_eq!(again.learned, 2);
+
+    // After a reset all is as at the start, the frames too.
+    same.state_mut().reset();
+    let again = same.advance(12.0 * f64::from(interval)).unwrap();
+    println!("after a reset {} exact and {} learned steps", again.exact, again.learned);
+    assert_eq!((again.exact, again.learned), (100, 2));
+    same.advance(3.0 * f64::from(interval)).unwrap();
+    assert_eq!(bits(same.state()), bits(&state));
 }
 
 /// A frame is no whole number of a network's steps.
