@@ -52,6 +52,7 @@ fn bad_scenes_are_refused_in_words() {
         (with("[[move]]\nnodes = [50]\nmetre = [0.0, nan, 0.0]\n"), "line 15: metre holds NaN"),
         (with("[[traction]]\nnodes = [50, 51]\npascal = [0.0, 0.0, 1.0]\n"), "no boundary triangle"),
         (with("[[region]]\ntags = [3]\nc = 1.0\n"), "this region selects no element"),
+        (with("[[region]]\nc = 1.0\n"), "line 13: give exactly one of tags, plane and box"),
         (
             with("[[region]]\nplane = { axis = \"z\", at = 0.0 }\nb = 1.0\n"),
             "line 15: the law neo-hookean has no constant b",

@@ -32,7 +32,7 @@ pub(crate) fn select<T>(
             nodes.get_ref().iter().copied().filter(first).collect()
         }
         Selection { nodes: None, .. } => {
-            let inside = inside(file, at, selection, body)?;
+            let inside = inside(file, at, selection, "nodes", body)?;
             (0..points.len() as u32).filter(|&node| inside(points[node as usize])).collect()
         }
         _ => return Err(file.problem(at, "give exactly one of nodes, plane and box")),
@@ -47,16 +47,17 @@ pub(crate) fn select<T>(
     Ok(chosen)
 }
 
-/// Whether a point is on the plane or in the box of a selection.
+/// Whether a point is on the plane or in the box of a selection, which may have `other` instead of these.
 pub(crate) fn inside<T>(
     file: &SceneFile,
     at: &Spanned<T>,
     selection: &Selection<'_>,
+    other: &str,
     body: &Body,
 ) -> Result<impl Fn([f64; 3]) -> bool + use<T>, Problem> {
     let (plane, bounds) = (selection.plane, selection.bounds);
     if plane.is_some() == bounds.is_some() {
-        return Err(file.problem(at, "give exactly one of nodes, plane and box"));
+        return Err(file.problem(at, format!("give exactly one of {other}, plane and box")));
     }
     let tolerance = ON_PLANE * body.diagonal();
     Ok(move |point: [f64; 3]| {

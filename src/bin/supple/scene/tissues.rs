@@ -186,7 +186,7 @@ impl<'a> Table<'a> {
             let tagged = body.mesh.regions.iter().enumerate();
             tagged.filter(|(_, tag)| tags.get_ref().contains(tag)).map(|(element, _)| element).collect()
         } else {
-            let inside = inside(file, at, &Selection { nodes: None, plane, bounds }, body)?;
+            let inside = inside(file, at, &Selection { nodes: None, plane, bounds }, "tags", body)?;
             let middle = |tet: [u32; 4]| {
                 let corners = tet.map(|node| body.mesh.points[node as usize]);
                 [0, 1, 2].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<f64>() / 4.0)
