@@ -18,7 +18,7 @@ use crate::problem::Problem;
 pub struct Tissues {
     /// That of `[material]`, then of each region.
     tissues: Vec<Tissue<AnyLaw>>,
-    /// For each element the index of its tissue.
+    /// For each element the index of its tissue; empty if all are of one.
     of_element: Vec<u16>,
 }
 
@@ -69,8 +69,9 @@ impl Tissues {
 
     /// The mass of a body of these tissues, kg.
     pub(crate) fn mass(&self, body: &Body) -> f64 {
-        let densities = self.of_element.iter().map(|&index| f64::from(self.tissues[usize::from(index)].density));
-        body.volumes().zip(densities).map(|(volume, density)| volume * density).sum()
+        let index = |element: usize| self.of_element.get(element).map_or(0, |&index| usize::from(index));
+        let density = |element: usize| f64::from(self.tissues[index(element)].density);
+        body.volumes().enumerate().map(|(element, volume)| volume * density(element)).sum()
     }
 
     /// Whether all of it is the tissue that a network learned from.
