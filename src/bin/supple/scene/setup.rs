@@ -110,32 +110,37 @@ impl Setup {
 
     /// The kernel's scene, and a state at rest.
     pub fn build(&self) -> Result<(VecScene<VecMaterial>, VecState), Problem> {
+        Ok((self.scene()?, self.state()))
+    }
+
+    fn scene(&self) -> Result<VecScene<VecMaterial>, Problem> {
         let mesh = self.body.checked()?;
-        let scene =
-            VecScene::build(self.tissues.material(self.element), &mesh, &self.supports).map_err(
-                |error| match error {
-                    BuildError::Mesh(error) => self.body.mesh_problem(error),
-                    error => Problem(format!("{}: {error}", self.body.name)),
-                },
-            )?;
-        Ok((scene, self.state()))
+        VecScene::build(self.tissues.material(self.element), &mesh, &self.supports).map_err(|error| match error {
+            BuildError::Mesh(error) => self.body.mesh_problem(error),
+            error => Problem(format!("{}: {error}", self.body.name)),
+        })
     }
 
     /// A simulation at rest.
     pub(crate) fn simulation(&self) -> Result<Simulation<'_>, Problem> {
-        let (scene, state) = self.build()?;
+        let scene = self.scene()?;
         let mut simulation = Simulation::of_scene(scene, self.body.local.clone(), self.body.mesh.tets.clone());
-        *simulation.state_mut() = state;
+        self.make_room(simulation.state_mut());
         Ok(simulation)
     }
 
     /// A state at rest.
     pub(crate) fn state(&self) -> VecState {
-        let nodes = self.body.local.len();
-        let state = VecState::at_rest(nodes);
-        match self.instruments.surface(nodes) {
-            Ok(surface) if !self.instruments.is_empty() => state.meeting(&surface),
-            _ => state,
+        let mut state = VecState::at_rest(self.body.local.len());
+        self.make_room(&mut state);
+        state
+    }
+
+    /// For what the instruments do, if there are any.
+    fn make_room(&self, state: &mut VecState) {
+        match self.instruments.surface(self.body.local.len()) {
+            Ok(surface) if !self.instruments.is_empty() => state.make_room(&surface),
+            _ => {}
         }
     }
 
