@@ -35,6 +35,8 @@ word 'insists?' 'unchecked'
 word 'large steps?' 'mass-scaled, multilevel and damped steps' '^docs/GLOSSARY.md:[0-9]+:\*\*Long step'
 # Its former name in scene files is still read.
 word 'surrogates?' 'learned step' '^src/bin/supple/.*alias = "surrogate"|^tests/command/'
+# As above.
+word 'burn[_-]in' 'lead-in' '^docs/GLOSSARY.md|^src/bin/supple/.*alias = "burn_in"|^tests/command/'
 word 'the C face' 'the C API'
 word 'rooms' 'modules'
 

@@ -42,7 +42,7 @@ pub enum Method {
     /// Mass-scaled, multilevel or damped steps that the host makes half as long and as long again, in turn at every
     /// snapshot.
     Switching(Large),
-    /// The learned step with a network of the crate, after a lead-in of [`BURN_IN`].
+    /// The learned step with a network of the crate, after a lead-in of [`LEAD_IN`].
     Learned(Family),
     /// The same with a network of the user's.
     LearnedWith(NetworkFile),
@@ -80,7 +80,7 @@ impl NetworkFile {
 }
 
 /// Length of the lead-in, s (Meister et al. 2018, section 3).
-pub const BURN_IN: f64 = 0.3;
+pub const LEAD_IN: f64 = 0.3;
 
 /// A step of the laboratory's own.
 pub type OwnStep<'a> = Box<dyn FnMut(&mut VecState, &Loads<'_>) -> Status + 'a>;
@@ -236,7 +236,7 @@ impl Method {
     #[must_use]
     pub const fn lead_in(self) -> f64 {
         match self {
-            Self::Learned(_) | Self::LearnedWith(_) => BURN_IN,
+            Self::Learned(_) | Self::LearnedWith(_) => LEAD_IN,
             _ => 0.0,
         }
     }
@@ -265,7 +265,7 @@ impl Method {
             let Timing { step, refinement, .. } = spec.timing;
             let count = (dt * refinement as f32 / step - 0.01).ceil().max(1.0);
             let exact = Step::unchecked(learned.model().seconds() / count, damping)?;
-            let lead = Lead::new(learned.model().intervals(BURN_IN));
+            let lead = Lead::new(learned.model().intervals(LEAD_IN));
             Ok(Prepared::Learned(Box::new(learned), exact, lead))
         };
         match self {

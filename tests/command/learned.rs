@@ -56,7 +56,7 @@ fn a_network_takes_over_after_the_exact_step_and_says_what_it_did() {
     let desk = Desk::new();
     desk.network("a.weights", &stopping());
     // Where the bar has come to a stop.
-    assert_eq!(desk.simulate(&leaning("step = \"auto\"\nend = 0.3\n", "burn_in = 0.1\n"), &[]).code, 0);
+    assert_eq!(desk.simulate(&leaning("step = \"auto\"\nend = 0.3\n", "lead_in = 0.1\n"), &[]).code, 0);
     let stopped = far(&desk);
     assert_eq!(desk.simulate(&without_network("step = \"auto\"\nend = 0.4\n"), &["--force"]).code, 0);
     assert!(desk.summary()["learned"].is_null());
@@ -64,7 +64,7 @@ fn a_network_takes_over_after_the_exact_step_and_says_what_it_did() {
 
     for step in ["\"auto\"", "5e-4"] {
         let time = format!("step = {step}\nend = 0.4\nframes = 4\n");
-        let said = desk.simulate(&leaning(&time, "burn_in = 0.1\n"), &["--force"]);
+        let said = desk.simulate(&leaning(&time, "lead_in = 0.1\n"), &["--force"]);
         println!("{}{}", said.out, said.err);
         assert_eq!(said.code, 0, "{}", said.err);
         // A network that stops the bar in its swing is wrong, and that is the only remark: the tissue is that of the
@@ -111,7 +111,7 @@ fn the_first_learned_step_goes_on_from_the_last_interval_of_the_lead_in() {
         desk.last()
     };
     let (before, after) = (end(0.045, ""), end(0.05, ""));
-    let learned = end(0.06, "burn_in = 0.05\n");
+    let learned = end(0.06, "lead_in = 0.05\n");
     for ((before, after), learned) in before.iter().zip(&after).zip(&learned) {
         for axis in 4..7 {
             let expected = after[axis] + 2.0 * (after[axis] - before[axis]);
@@ -128,7 +128,7 @@ fn shares_that_were_clipped_and_outside_are_told() {
         (range.least, range.most) = (-1e-9, 1e-9);
     }
     desk.network("a.weights", &network);
-    let said = desk.simulate(&leaning("step = \"auto\"\nend = 0.2\n", "burn_in = 0.1\n"), &[]);
+    let said = desk.simulate(&leaning("step = \"auto\"\nend = 0.2\n", "lead_in = 0.1\n"), &[]);
     println!("{}{}", said.out, said.err);
     assert_eq!(said.code, 0, "{}", said.err);
     let network = &desk.summary()["learned"];
@@ -144,7 +144,7 @@ fn a_network_that_cannot_be_believed_ends_the_run_or_gives_way_to_the_exact_step
     let desk = Desk::new();
     desk.network("a.weights", &accelerating(900.0));
     let time = "step = \"auto\"\nend = 0.4\nframes = 4\n";
-    let said = desk.simulate(&leaning(time, "burn_in = 0.1\n"), &[]);
+    let said = desk.simulate(&leaning(time, "lead_in = 0.1\n"), &[]);
     print!("{}", said.err);
     assert_eq!(said.code, 3);
     assert!(said.err.contains("loads and supports never gave more"), "{}", said.err);
@@ -154,7 +154,7 @@ fn a_network_that_cannot_be_believed_ends_the_run_or_gives_way_to_the_exact_step
     let exact = far(&desk);
     for (push, latest, why) in [(900.0, 0.101, "diverged at 0.1"), (3.0, 0.2, "exceeded what loads")] {
         desk.network("a.weights", &accelerating(push));
-        let said = desk.simulate(&leaning(time, "burn_in = 0.1\nfallback = true\n"), &["--force"]);
+        let said = desk.simulate(&leaning(time, "lead_in = 0.1\nfallback = true\n"), &["--force"]);
         print!("{}{}", said.out, said.err);
         assert_eq!(said.code, 0, "{}", said.err);
         let summary = desk.summary();
@@ -177,7 +177,7 @@ fn a_network_that_cannot_be_believed_ends_the_run_or_gives_way_to_the_exact_step
 fn a_tissue_that_the_network_does_not_know_is_remarked_upon() {
     let desk = Desk::new();
     desk.network("a.weights", &stopping());
-    let scene = leaning("step = \"auto\"\nend = 0.2\n", "burn_in = 0.1\n");
+    let scene = leaning("step = \"auto\"\nend = 0.2\n", "lead_in = 0.1\n");
     for (known, other) in [("c = 500.0", "c = 600.0"), ("density = 1000.0", "density = 1100.0")] {
         let said = desk.simulate(&scene.replace(known, other), &["--force"]);
         print!("{}", said.err);
@@ -199,7 +199,7 @@ fn tetrahedra_that_bend_too_little_are_remarked_upon() {
     let desk = Desk::new();
     desk.network("a.weights", &Description { element: Element::Linear, ..stopping() });
     let time = "step = \"auto\"\nend = 0.2\n";
-    let locking = leaning(time, "burn_in = 0.1\n");
+    let locking = leaning(time, "lead_in = 0.1\n");
     let named = without_network(time).replace("[mesh]\n", "[mesh]\nelement = \"linear\"\n");
     for (scene, fragment) in [
         (&locking, "line 17: a.weights learned from linear tetrahedra, which bend too little in tissue"),
@@ -242,9 +242,9 @@ fn what_does_not_go_together_is_refused_in_words() {
             leaning("step = \"20x\"\nmethod = \"multilevel\"\nend = 0.4\n", ""),
             "line 15: method is \"multilevel\", but with [learned] the exact step leads",
         ),
-        (leaning(auto, "burn_in = -0.1\n"), "line 18: burn_in is -0.1 s, it must be zero or more"),
-        (leaning(auto, "burn_in = 0.4\n"), "line 18: the exact step leads for 0.4 s (burn_in), so a learned step of"),
-        (leaning("step = \"auto\"\nend = 0.2\n", ""), "line 17: the exact step leads for 0.3 s (burn_in), so"),
+        (leaning(auto, "lead_in = -0.1\n"), "line 18: lead_in is -0.1 s, it must be zero or more"),
+        (leaning(auto, "lead_in = 0.4\n"), "line 18: the exact step leads for 0.4 s (lead_in), so a learned step of"),
+        (leaning("step = \"auto\"\nend = 0.2\n", ""), "line 17: the exact step leads for 0.3 s (lead_in), so"),
         (leaning(auto, "fallback = 1\n"), "line 18: invalid type"),
         (leaning(auto, "burn = 1\n"), "line 18: unknown field `burn`"),
         (leaning(auto, "").replace("weights = \"a.weights\"", ""), "line 16: missing field `weights`"),
@@ -266,11 +266,11 @@ fn what_does_not_go_together_is_refused_in_words() {
 }
 
 #[test]
-fn the_table_may_have_its_former_name() {
+fn table_and_key_may_have_their_former_names() {
     let desk = Desk::new();
     desk.network("a.weights", &stopping());
-    let scene = leaning("step = 5e-4\nend = 0.02\n", "burn_in = 0.01\n");
-    let former = scene.replace("[learned]", "[surrogate]");
+    let scene = leaning("step = 5e-4\nend = 0.02\n", "lead_in = 0.01\n");
+    let former = scene.replace("[learned]", "[surrogate]").replace("lead_in", "burn_in");
     let (now, said) = (desk.simulate(&scene, &[]), desk.simulate(&former, &["--force"]));
     println!("{}", said.err);
     assert_eq!((said.code, said.err), (0, now.err));

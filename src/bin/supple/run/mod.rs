@@ -166,7 +166,7 @@ impl Running<'_> {
         }
         let is_exact = match (&setup.time.method, &setup.learned, simulation.learned_step()) {
             (None, None, _) => true,
-            (_, Some(choice), Some(model)) => self.taken < model.intervals(choice.burn_in) || model.is_exact_next(),
+            (_, Some(choice), Some(model)) => self.taken < model.intervals(choice.lead_in) || model.is_exact_next(),
             _ => false,
         };
         if is_exact

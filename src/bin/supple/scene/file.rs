@@ -131,7 +131,9 @@ pub(crate) struct TimeTable {
 #[serde(deny_unknown_fields)]
 pub(crate) struct LearnedTable {
     pub(crate) weights: Spanned<PathBuf>,
-    pub(crate) burn_in: Option<Spanned<f64>>,
+    // The former name stays readable.
+    #[serde(alias = "burn_in")]
+    pub(crate) lead_in: Option<Spanned<f64>>,
     pub(crate) fallback: Option<bool>,
 }
 

@@ -17,7 +17,7 @@ use crate::problem::Problem;
 use crate::weight_file::{self, describe_tissue};
 
 /// Length of the lead-in unless the file says otherwise, s (Meister et al. 2018, section 3).
-const BURN_IN: f64 = 0.3;
+const LEAD_IN: f64 = 0.3;
 
 /// What `[learned]` asks for.
 pub(crate) struct LearnedChoice {
@@ -26,7 +26,7 @@ pub(crate) struct LearnedChoice {
     place: String,
     pub(crate) memory: WeightBytes,
     /// Length of the lead-in, s.
-    pub(crate) burn_in: f64,
+    pub(crate) lead_in: f64,
     pub(crate) fallback: bool,
 }
 
@@ -35,8 +35,8 @@ impl LearnedChoice {
         let path = file.resolve(table.weights.get_ref());
         let place = file.place(&table.weights);
         let memory = weight_file::read(&path).map_err(|problem| file.problem(&table.weights, problem))?;
-        let burn_in = table.burn_in.as_ref().map_or(BURN_IN, |seconds| *seconds.get_ref());
-        let learned = Self { path, place, memory, burn_in, fallback: table.fallback.unwrap_or(false) };
+        let lead_in = table.lead_in.as_ref().map_or(LEAD_IN, |seconds| *seconds.get_ref());
+        let learned = Self { path, place, memory, lead_in, fallback: table.fallback.unwrap_or(false) };
         let model = LearnedModel::new(learned.network()?, learned.fallback);
         let step = f64::from(model.map_err(|error| learned.problem(error))?.seconds());
         if let (Some(at), Some(method)) = (&file.scene.time.get_ref().method, &time.method) {
@@ -49,13 +49,13 @@ impl LearnedChoice {
                 ),
             ));
         }
-        let at = table.burn_in.as_ref().map_or_else(|| learned.place.clone(), |at| file.place(at));
-        if !(burn_in.is_finite() && burn_in >= 0.0) {
-            return Err(Problem(format!("{at}: burn_in is {burn_in} s, it must be zero or more")));
+        let at = table.lead_in.as_ref().map_or_else(|| learned.place.clone(), |at| file.place(at));
+        if !(lead_in.is_finite() && lead_in >= 0.0) {
+            return Err(Problem(format!("{at}: lead_in is {lead_in} s, it must be zero or more")));
         }
-        if (burn_in + step) * (1.0 - 1e-6) > time.end {
+        if (lead_in + step) * (1.0 - 1e-6) > time.end {
             return Err(Problem(format!(
-                "{at}: the exact step leads for {burn_in} s (burn_in), so a learned step of {step:.3e} s does not fit \
+                "{at}: the exact step leads for {lead_in} s (lead_in), so a learned step of {step:.3e} s does not fit \
                  before the end, {} s",
                 time.end
             )));
@@ -66,7 +66,7 @@ impl LearnedChoice {
     /// A network of the crate, for the demo.
     pub(crate) fn of_demo(name: &str, bytes: &[u8]) -> Self {
         let memory = WeightBytes::of(bytes);
-        Self { path: name.into(), place: "demo".into(), memory, burn_in: BURN_IN, fallback: false }
+        Self { path: name.into(), place: "demo".into(), memory, lead_in: LEAD_IN, fallback: false }
     }
 
     pub(crate) fn network(&self) -> Result<Network<'_>, Problem> {
@@ -75,7 +75,7 @@ impl LearnedChoice {
 
     /// How it moves a scene.
     pub(crate) fn method(&self) -> Result<Method<'_>, Problem> {
-        Ok(Method::Learned { network: self.network()?, lead_in: self.burn_in, fallback: self.fallback })
+        Ok(Method::Learned { network: self.network()?, lead_in: self.lead_in, fallback: self.fallback })
     }
 
     /// The learned step of a scene of so many nodes.
