@@ -44,7 +44,7 @@ gravity = [0.0, 0.0, -9.81]
 step = 1e-4
 end = 0.03
 frames = 3
-method = "tled"
+method = "exact"
 "#;
 
 #[test]

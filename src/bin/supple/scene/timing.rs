@@ -125,7 +125,7 @@ fn read_method(file: &SceneFile, time: &TimeTable) -> Result<(Option<Method<'sta
     };
     let fixed = match at.get_ref().as_str() {
         "auto" => return Ok((Some(Method::damped(Cells::Suggested)), true)),
-        "tled" => None,
+        "tled" | "exact" => None,
         "mass-scaled" => Some(Method::MassScaled),
         "multilevel" => Some(Method::Multilevel(Cells::Suggested)),
         "damped" => Some(Method::damped(Cells::Suggested)),
