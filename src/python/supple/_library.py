@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pathlib
 from typing import Any
 
@@ -12,11 +13,11 @@ from . import _interface, errors
 
 ffi: Any = _interface.ffi
 lib: Any = ffi.dlopen(str(pathlib.Path(__file__).with_name("libsupple.so")))
-NONE = 0xFFFFFFFF
-ALIGN = 64
 
 if lib.supple_abi() != lib.SUPPLE_ABI:
     raise ImportError(f"libsupple.so has interface {lib.supple_abi()}, the package is for {lib.SUPPLE_ABI}")
+# Statuses of steps that were refused.
+_DIVERGED = range(lib.SUPPLE_E_NO_CONTACT, lib.SUPPLE_E_DIVERGED + 1)
 
 
 def words(status: int) -> str:
@@ -27,8 +28,33 @@ def words(status: int) -> str:
 def checked(status: int, error: Any = None, what: str = "") -> int:
     """The status of a call, if it did what it was asked; else an exception with the kernel's words, the place and the value."""
     if status < 0:
-        raise errors.made(status, words(status), error, what)
+        raise _refusal(status, words(status), error, what)
     return status
+
+
+def _refusal(status: int, words: str, error: Any, what: str) -> errors.Error:
+    """The exception of a negative status; `error` is a supple_error, or None."""
+    found: dict[str, Any] = {}
+    parts: list[str] = []
+    if error is not None:
+        for name in ("index", "node", "axis"):
+            if getattr(error, name) != lib.SUPPLE_NONE:
+                found[name] = int(getattr(error, name))
+        if "index" in found:
+            parts.append(f"entry {found['index']}")
+        if "node" in found:
+            parts.append(f"node {found['node']}")
+        if "axis" in found:
+            parts.append(f"axis {'xyz'[found['axis'] % 3]}")
+        if not math.isnan(error.value) and (error.value != 0.0 or error.limit != 0.0):
+            found["value"] = float(error.value)
+            parts.append(f"value {error.value:.6g}")
+            if not math.isnan(error.limit) and error.limit != 0.0:
+                found["limit"] = float(error.limit)
+                parts.append(f"against {error.limit:.6g}")
+    sentence = ": ".join(part for part in (what, words, ", ".join(parts)) if part)
+    kind = errors.UnstableStep if status == lib.SUPPLE_E_UNSTABLE else errors.Diverged if status in _DIVERGED else errors.InputError
+    return kind(sentence, status, **found)
 
 
 class Memory:
@@ -36,8 +62,8 @@ class Memory:
 
     def __init__(self, size: int) -> None:
         self.size = size
-        self._bytes = np.zeros(size + ALIGN, np.uint8)
-        start = -self._bytes.ctypes.data % ALIGN
+        self._bytes = np.zeros(size + lib.SUPPLE_ALIGN, np.uint8)
+        start = -self._bytes.ctypes.data % lib.SUPPLE_ALIGN
         self.view = self._bytes[start : start + size]
         self.pointer = ffi.cast("void *", self.view.ctypes.data)
 

@@ -11,7 +11,7 @@ from ._library import ffi, lib
 from .errors import InputError
 from .mesh import Mesh
 
-ELEMENTS = {"linear": 0, "nodal-pressure": 1, "nodal-strain": 2}
+ELEMENTS = {"linear": lib.SUPPLE_LINEAR, "nodal-pressure": lib.SUPPLE_NODAL_PRESSURE, "nodal-strain": lib.SUPPLE_NODAL_STRAIN}
 
 
 def axes_of(axes: str, what: str) -> int:
@@ -99,7 +99,7 @@ class Scene:
         both = np.intersect1d(held, free)
         if len(both):
             raise InputError(f"node {both[0]} is both fixed and moved")
-        rows = [(node, axes_of(axes, "fixed"), 0) for node in held] + [(node, 7, 1) for node in free]
+        rows = [(node, axes_of(axes, "fixed"), 0) for node in held] + [(node, axes_of("xyz", "moved"), 1) for node in free]
         return np.array(rows, np.uint32).reshape(-1, 3)
 
     @property

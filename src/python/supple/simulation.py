@@ -17,8 +17,20 @@ from .errors import InputError
 from .instruments import Contact, Instrument, Touch
 from .scene import Scene, axes_of
 
-METHODS = ("exact", "damped", "auto", "learned")
-_WORDS = {0: "ok", 1: "limited", 2: "outside", 3: "fell back", 4: "inexact"}
+_STEPS = {
+    "exact": lib.SUPPLE_STEPS_EXACT,
+    "damped": lib.SUPPLE_STEPS_DAMPED,
+    "auto": lib.SUPPLE_STEPS_AUTO,
+    "learned": lib.SUPPLE_STEPS_LEARNED,
+}
+METHODS = tuple(_STEPS)
+_WORDS = {
+    lib.SUPPLE_OK: "ok",
+    lib.SUPPLE_LIMITED: "limited",
+    lib.SUPPLE_OUTSIDE: "outside",
+    lib.SUPPLE_FELL_BACK: "fell back",
+    lib.SUPPLE_INEXACT: "inexact",
+}
 # As supple_force and supple_motion.
 _FORCE = np.dtype([("node", np.uint32), ("newton", np.float32, 3), ("ramp", np.float32)])
 _MOTION = np.dtype([("node", np.uint32), ("axes", np.uint32), ("metre", np.float32, 3), ("ramp", np.float32)])
@@ -67,7 +79,7 @@ class Simulation:
     tolerance : mean error (m) that automatic steps keep, half a millimetre or less in bodies below 10 cm unless given, and that the
         guard allows, a fifth of the motion unless given
     weights : file of the network, for learned steps; of another damper than the library's own, for damped and automatic ones
-    lead : seconds of exact steps before a network takes over
+    lead_in : seconds of exact steps before a network takes over
     guard : whether a second run estimates the error of damped and learned steps
     """
 
@@ -80,7 +92,7 @@ class Simulation:
         damping: float = 0.0,
         tolerance: float | None = None,
         weights: str | os.PathLike[str] | None = None,
-        lead: float = 0.3,
+        lead_in: float = 0.3,
         guard: bool = True,
         gravity: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
@@ -92,7 +104,7 @@ class Simulation:
         nodes = len(scene.mesh.points)
         settings = self._settings = ffi.new("supple_settings *")
         library.checked(lib.supple_default_settings(settings))
-        settings.steps, settings.guard, settings.lead_in = METHODS.index(method), int(guard), lead
+        settings.steps, settings.guard, settings.lead_in = _STEPS[method], int(guard), lead_in
         settings.damping, settings.forces, settings.motions = damping, nodes, nodes
         for name, value in (("seconds", step), ("tolerance", tolerance)):
             if value is not None:
