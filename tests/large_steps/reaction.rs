@@ -123,7 +123,7 @@ fn exact_steps<M: ElementMaterial>(scene: &VecScene<M>) -> u32 {
     (FRAME / (0.8 * limit(scene))).ceil() as u32
 }
 
-/// Forces of multilevel and damped steps off the exact ones, over these, at the speeds of hands: with all weights, and
+/// Forces of damped steps off the exact ones, over these, at the speeds of hands: with all weights, and
 /// at the supports alone.
 fn errors(hand: impl Fn(f64) -> Box<dyn Fn(f64) -> f64>, mut judge: impl FnMut(u32, f32, f32)) {
     let pushed = Pushed::new();
@@ -137,17 +137,15 @@ fn errors(hand: impl Fn(f64) -> Box<dyn Fn(f64) -> f64>, mut judge: impl FnMut(u
         println!("{} mm/s: at most {:.1} mN, spread {:.2} mN", 1e3 * speed, 1e3 * size, 1e3 * spread);
         assert!(size > 5e-3 && spread < 0.15 * size);
         let exact = newtons(&exact);
-        for (kind, per_frame) in
-            [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|kind| [8, 4, 2, 1].map(|count| (kind, count)))
-        {
-            let (forces, alone) = pushed.follow(&scene, Some(kind), per_frame, hand(speed));
+        for per_frame in [8, 4, 2, 1] {
+            let (forces, alone) = pushed.follow(&scene, Some(Kind::Damped), per_frame, hand(speed));
             // Forces are known for the start of a step: half of one before the middle of the frame.
             let half = 0.5 / per_frame as f32;
             let error = relative(&newtons(&forces), &moved_in_time(&exact, -half));
             let without = relative(&alone, &moved_in_time(&exact, 0.5 - 2.0 * half));
             let told = forces.iter().filter(|force| !force.is_resolved()).count();
             println!(
-                "  {kind:?} at {:.1}: off by {:.0} %, at the supports alone by {:.0} %; {told} of {} not resolved",
+                "  at {:.1}: off by {:.0} %, at the supports alone by {:.0} %; {told} of {} not resolved",
                 FRAME / per_frame as f32 / limit(&scene),
                 100.0 * error,
                 100.0 * without,
