@@ -148,6 +148,12 @@ impl LoadsOverTime for Loads<'_> {
     }
 }
 
+impl<L: LoadsOverTime + ?Sized> LoadsOverTime for &mut L {
+    fn of_step(&mut self, state: &StateView<'_>, seconds: f32, left: u32) -> Loads<'_> {
+        (**self).of_step(state, seconds, left)
+    }
+}
+
 /// Loads of a call that moves a scene on: motions without a ramp go evenly over the whole call, from where their nodes
 /// are.
 #[derive(Debug)]

@@ -172,15 +172,15 @@ impl<'w> Simulation<'w> {
     pub fn advance_under(
         &mut self,
         until: f64,
-        loads: &mut impl LoadsOverTime,
-        threads: &impl Threads,
-        watch: &mut impl FnMut(Event<'_>),
+        mut loads: &mut dyn LoadsOverTime,
+        watch: &mut dyn FnMut(Event<'_>),
     ) -> Result<Report, SimulationError> {
         self.prepare_once()?;
         let Self { scene, state, prepared, .. } = self;
         // Not reached: prepared above; there is no panic in its place.
         let Some(prepared) = prepared else { return Err(SimulationError::NotFinite) };
-        Ok(prepared.mover().advance(until, scene.view(), loads, state.view(), threads, watch)?)
+        let mover = prepared.mover();
+        Ok(mover.advance(until, scene.view(), &mut loads, state.view(), &CallingThread, &mut |event| watch(event))?)
     }
 
     fn prepare_once(&mut self) -> Result<(), SimulationError> {

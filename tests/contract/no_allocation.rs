@@ -54,9 +54,10 @@ const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [2, 2, 4] };
 const NODES: usize = BAR.node_count();
 const TETS: usize = BAR.element_count();
 const TILES: usize = tiles_for(TETS);
-const TISSUE: Tissue<Exponential> = Tissue { law: Exponential { a: 59.0, b: 8.023, d: 60_000.0 }, density: 1000.0 };
+const TISSUE: Tissue<AnyLaw> =
+    Tissue { law: AnyLaw::Exponential(Exponential { a: 59.0, b: 8.023, d: 60_000.0 }), density: 1000.0 };
 
-static SCENE: Mutex<FixedScene<Tissue<Exponential>, NODES, TILES>> = Mutex::new(FixedScene::new(TISSUE));
+static SCENE: Mutex<FixedScene<Tissue<AnyLaw>, NODES, TILES>> = Mutex::new(FixedScene::new(TISSUE));
 static STATE: Mutex<FixedState<NODES>> = Mutex::new(FixedState::new());
 
 /// Points and elements in arrays.
@@ -150,7 +151,7 @@ fn building_and_stepping_in_statics_allocates_nothing() {
 
 const ROWS: usize = patch_rows_for(NODES, TETS, 1);
 static PATCHES: Mutex<FixedScene<NodalStrain<Tissue<AnyLaw>>, NODES, TILES, ROWS>> =
-    Mutex::new(FixedScene::new(NodalStrain(Tissue { law: AnyLaw::Exponential(TISSUE.law), density: TISSUE.density })));
+    Mutex::new(FixedScene::new(NodalStrain(TISSUE)));
 
 #[test]
 fn nodal_strain_in_a_static_allocates_nothing() {

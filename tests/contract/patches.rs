@@ -4,7 +4,7 @@
 use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
 use supple::loads::Loads;
 use supple::material::{AnyLaw, Material, NeoHookean, NodalStrain, Tissue};
-use supple::scene::{BuildError, FixedScene, SceneFacts, SceneView, patch_rows_for, tiles_for};
+use supple::scene::{BuildError, FixedScene, SceneFacts, SceneView, VecScene, patch_rows_for, tiles_for};
 use supple::state::{AsState, FixedState, VecState};
 use supple::step::{CriticalStep, Status, Step};
 use supple::tled;
@@ -59,6 +59,16 @@ fn any_memory_gives_the_same_bits() {
     assert!(moved(view, VecState::at_rest(96)) == expected);
     // Those who have no patches have no memory for them.
     assert_eq!(size_of::<FixedScene<(), 100, 20, ROWS>>() - size_of::<FixedScene<(), 100, 20>>(), 320 * ROWS);
+}
+
+/// A program that knows its law when it is compiled moves its scene as one that chooses it at run time does.
+#[test]
+fn a_typed_law_gives_the_same_bits() {
+    let body = small_bar();
+    let typed = Tissue { law: NeoHookean { c: 500.0, d: 25_000.0 }, density: 1000.0 };
+    let scene = VecScene::build(typed, &body.mesh(), &held(&body)).unwrap();
+    let chosen = body.scene(typed, &held(&body));
+    assert!(moved(scene.view(), rest_of(&scene)) == moved(chosen.view(), rest_of(&chosen)));
 }
 
 fn built<M: Material>(material: &M, body: &Body, rows: usize) -> Result<SceneFacts, BuildError> {

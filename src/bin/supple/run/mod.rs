@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use supple::loads::Loads;
 use supple::simulation::{Event, Report, Simulation, StepKind};
-use supple::step::{CallingThread, Status};
+use supple::step::Status;
 use supple::tled::Pace;
 
 use crate::problem::Problem;
@@ -132,7 +132,7 @@ impl Running<'_> {
             }
             watched.enter(event);
         };
-        let advanced = simulation.advance_under(until, &mut loads, &CallingThread, &mut watch);
+        let advanced = simulation.advance_under(until, &mut loads, &mut watch);
         let report = advanced.map_err(Problem::of)?;
         self.enter(&report);
         Ok(())
