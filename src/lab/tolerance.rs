@@ -36,7 +36,7 @@ pub struct ToleranceRow {
     /// Shares of the snapshots with a status other than `ok` before them, and with an error above the tolerance without
     /// one.
     pub doubted: f64,
-    /// See [`Row::doubted`].
+    /// See [`ToleranceRow::doubted`].
     pub silent: f64,
     /// Of the adaptive step, us.
     pub time: f64,
