@@ -1,5 +1,7 @@
 """Motions held against what is not ours: free fall, momentum, uniaxial compression, and the other methods."""
 
+import concurrent.futures
+
 import numpy as np
 import pytest
 import supple
@@ -139,6 +141,50 @@ def test_forceps_hold_and_let_go(soft):
     simulation.move(0, [0.014, 0.01, 0.2], within=0.2)
     simulation.advance(1.0)
     assert np.linalg.norm(simulation.displacements, axis=1).max() < 0.1 * held
+
+
+def test_refused_instruments_leave_those_that_there_are(lobe, liver):
+    """Also in memory that the refused ones would have taken."""
+    scene = supple.Scene(lobe, liver, fixed=lobe.points[:, 1] > 0.03)
+    top = lobe.points[lobe.points[:, 2].argmax()].astype(float)
+    forces = []
+    for refused in (False, True):
+        simulation = supple.Simulation(scene, damping=30.0)
+        simulation.set_instruments([supple.Instrument.sphere(0.01, top + [0.0, 0.0, 0.011])])
+        if refused:
+            with pytest.raises(supple.InputError, match="instruments: .* value -1"):
+                simulation.set_instruments([supple.Instrument.sphere(-1.0, top)], grips=10)
+        simulation.move(0, top + [0.0, 0.0, 0.007], within=0.1)
+        simulation.advance(0.1)
+        forces.append(simulation.touch(0).mean_force)
+    assert forces[0][2] > 0.02 and (forces[0] == forces[1]).all()
+
+
+@pytest.mark.parametrize("element", ["nodal-pressure", "nodal-strain"])
+def test_a_call_of_any_length_follows_the_critical_step(element):
+    """A cube of 10 kPa sags under gravity: one call of a second comes to where frames of a sixtieth come."""
+    mesh = supple.Mesh.box((0.06, 0.06, 0.06), (6, 6, 6))
+    scene = supple.Scene(mesh, supple.Material.from_moduli(10e3, 0.45, density=1060), fixed=mesh.points[:, 0] < 1e-6, element=element)
+    ends = []
+    for frames in (1, 60):
+        simulation = supple.Simulation(scene, damping=20.0, gravity=GRAVITY)
+        for _ in range(frames):
+            simulation.advance(1.0 / frames)
+        ends.append(simulation.displacements.copy())
+    sag = np.linalg.norm(ends[1], axis=1).mean()
+    assert sag > 1e-3 and np.linalg.norm(ends[0] - ends[1], axis=1).mean() < 0.01 * sag
+
+
+def test_two_threads_take_turns(lobe, liver):
+    scene = supple.Scene(lobe, liver, fixed=lobe.points[:, 1] > 0.03)
+    once = supple.Simulation(scene, step=1e-4, damping=20.0, gravity=GRAVITY)
+    for _ in range(40):
+        once.take(10)
+    both = supple.Simulation(scene, step=1e-4, damping=20.0, gravity=GRAVITY)
+    with concurrent.futures.ThreadPoolExecutor(2) as threads:
+        for done in [threads.submit(both.take, 10) for _ in range(40)]:
+            assert done.result().steps == 10
+    assert both.time == pytest.approx(0.04) and np.array_equal(both.displacements, once.displacements)
 
 
 def test_a_saved_state_goes_on_to_the_bit(lobe, liver):

@@ -145,6 +145,34 @@ def test_steps_are_refused_in_words(soft):
         simulation.set_motions([5], [0.001, 0.0, 0.0])
     with pytest.raises(supple.InputError, match="no instruments"):
         simulation.touch(0)
+    simulation.set_instruments([supple.Instrument.sphere(0.004, [0.01, 0.01, 0.08])])
+    for index in (-1, 1):
+        with pytest.raises(supple.InputError, match=f"instrument {index}: there are 1, counted from 0"):
+            simulation.move(index, [0.0, 0.0, 0.1], within=0.1)
+    # What was refused is not asked for again.
+    simulation.set_motions([], np.zeros((0, 3)))
+    simulation.set_forces([3], [1e-4, 0.0, 0.0])
+    assert simulation.advance(1e-3).ok
+
+
+def test_a_mesh_that_meshio_gives_up_on_is_refused(tmp_path):
+    """Of Gmsh 1 files meshio ends the process."""
+    path = tmp_path / "old.msh"
+    path.write_text("$NOD\n1\n1 0 0 0\n$ENDNOD\n$ELM\n0\n$ENDELM\n")
+    with pytest.raises(supple.InputError, match="old.msh: meshio cannot read it"):
+        supple.Mesh.read(path)
+
+
+def test_forces_on_320_nodes_take_less_than_50_us(lobe, liver):
+    simulation = supple.Simulation(supple.Scene(lobe, liver, fixed=lobe.points[:, 1] > 0.03))
+    nodes, newton = np.arange(320), np.full((320, 3), 1e-5)
+    times = []
+    for _ in range(200):
+        start = time.perf_counter()
+        simulation.set_forces(nodes, newton)
+        times.append(time.perf_counter() - start)
+    print(f"{1e6 * min(times):.1f} us")
+    assert min(times) < 50e-6
 
 
 def test_a_step_that_cannot_be_believed_is_not_taken(soft):

@@ -65,7 +65,11 @@ class Mesh:
     def read(cls, path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
         """A mesh from a file that meshio reads (.msh, .vtk, .vtu, ...)."""
         meshio = _meshio()
-        return cls.from_meshio(meshio.read(path), scale)
+        try:
+            return cls.from_meshio(meshio.read(path), scale)
+        # For some files meshio ends the process.
+        except (SystemExit, meshio.ReadError) as problem:
+            raise InputError(f"{path}: meshio cannot read it: {problem}") from None
 
     def write(self, path: str | os.PathLike[str], displacements: ArrayLike | None = None) -> None:
         """Writes the mesh, moved if there are displacements (m), with these as point data `displacement`."""

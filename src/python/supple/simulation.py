@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
 import pathlib
+import threading
 import warnings
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +37,23 @@ _WORDS = {
 # As supple_force and supple_motion.
 _FORCE = np.dtype([("node", np.uint32), ("newton", np.float32, 3), ("ramp", np.float32)])
 _MOTION = np.dtype([("node", np.uint32), ("axes", np.uint32), ("metre", np.float32, 3), ("ramp", np.float32)])
+
+
+_Given = ParamSpec("_Given")
+_Result = TypeVar("_Result")
+
+
+def _one_at_a_time(
+    method: Callable[Concatenate[Simulation, _Given], _Result],
+) -> Callable[Concatenate[Simulation, _Given], _Result]:
+    """Other threads wait while one is in the kernel, which takes one at a time and lets the interpreter go on."""
+
+    @functools.wraps(method)
+    def in_turn(self: Simulation, /, *given: _Given.args, **named: _Given.kwargs) -> _Result:
+        with self._lock:
+            return method(self, *given, **named)
+
+    return in_turn
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,6 +143,7 @@ class Simulation:
         library.checked(lib.supple_sim_describe(self._sim, objects))
         self._raw_scene, self._state, self._loads, self._network = objects.scene, objects.state, objects.loads, objects.learned
         self._contact: Contact | None = None
+        self._lock = threading.RLock()
         self._vectors = self._view_of_displacements()
         self.gravity = gravity
 
@@ -134,12 +155,14 @@ class Simulation:
         return self._gravity.copy()
 
     @gravity.setter
+    @_one_at_a_time
     def gravity(self, value: ArrayLike) -> None:
         if np.shape(value) != (3,):
             raise InputError(f"gravity: {value!r}, it must be three numbers, m/s^2")
         self._gravity: NDArray[np.float32] = library.vectors([value], "gravity")[0]
         library.checked(lib.supple_set_gravity(self._loads, library.pointer("float", self._gravity)), what="gravity")
 
+    @_one_at_a_time
     def set_forces(self, nodes: ArrayLike, newton: ArrayLike, ramp: float = 0.0) -> None:
         """Replaces all forces: on each of these nodes a force (N), one for all or a row for each, which rises evenly over `ramp` s."""
         numbers = library.node_numbers(nodes, len(self.scene.mesh.points), "forces")
@@ -148,6 +171,7 @@ class Simulation:
         error = library.new_error()
         library.checked(lib.supple_set_forces(self._loads, library.pointer("supple_force", rows), len(rows), error), error, "forces")
 
+    @_one_at_a_time
     def set_motions(self, nodes: ArrayLike, metre: ArrayLike, axes: str = "xyz", ramp: float = 0.0) -> None:
         """Replaces all motions: moved nodes of the scene go to these displacements (m) along `axes`, evenly over `ramp` s, or over the next
         call of `advance` without one."""
@@ -160,37 +184,48 @@ class Simulation:
 
     # Instruments.
 
+    @_one_at_a_time
     def set_instruments(self, instruments: list[Instrument], *, triangles: bool = False, grips: int = 0) -> None:
         """Replaces all instruments, at most eight, which stand still where they are. `triangles` of the surface are needed by those that are
         thinner than its edges are long; `grips` is how many nodes they can hold at once."""
-        if self._contact is None or triangles or grips:
-            self._contact = Contact(self.scene.mesh, self._raw_scene, triangles, grips)
-        self._contact.put(instruments)
-        library.checked(lib.supple_set_contact(self._loads, self._contact.raw if instruments else ffi.NULL))
+        contact = self._contact
+        if contact is None or triangles or grips:
+            contact = Contact(self.scene.mesh, self._raw_scene, triangles, grips)
+        # Refused ones leave the loads with the instruments that they have.
+        contact.put(instruments)
+        library.checked(lib.supple_set_contact(self._loads, contact.raw if instruments else ffi.NULL))
+        self._contact = contact
 
+    @_one_at_a_time
     def move(self, instrument: int, position: ArrayLike, rotation: ArrayLike | None = None, *, within: float) -> None:
         """Lets an instrument go on a line, and turn evenly, to a pose in the next `within` seconds."""
-        self._touching().move(instrument, position, rotation, self.time, self.time + within)
+        self._touching(instrument).move(instrument, position, rotation, self.time, self.time + within)
 
+    @_one_at_a_time
     def touch(self, instrument: int) -> Touch:
         """What an instrument felt in the latest call of `advance`."""
-        return self._touching().touch(instrument)
+        return self._touching(instrument).touch(instrument)
 
+    @_one_at_a_time
     def grasp(self, instrument: int, within: float) -> int:
         """Lets an instrument hold the nodes of the surface that are nearer than `within` (m), until `let_go`. Gives how many it holds."""
         held = ffi.new("uint32_t *")
-        status = lib.supple_grasp(self._touching().raw, self._state, instrument, within, held)
+        status = lib.supple_grasp(self._touching(instrument).raw, self._state, instrument, within, held)
         library.checked(status, what=f"instrument {instrument}")
         return int(held[0])
 
+    @_one_at_a_time
     def let_go(self, instrument: int) -> None:
-        library.checked(lib.supple_let_go(self._touching().raw, instrument), what=f"instrument {instrument}")
+        library.checked(lib.supple_let_go(self._touching(instrument).raw, instrument), what=f"instrument {instrument}")
 
-    def _touching(self) -> Contact:
+    def _touching(self, instrument: int) -> Contact:
         if self._contact is None:
             raise InputError("there are no instruments: set_instruments comes first")
+        if not 0 <= instrument < len(self._contact.list):
+            raise InputError(f"instrument {instrument}: there are {len(self._contact.list)}, counted from 0")
         return self._contact
 
+    @_one_at_a_time
     def remarks(self) -> list[str]:
         """What looks as if a unit or a number was mistaken, in the kernel's words; the first step warns of it."""
         found, count, room = ffi.new("supple_remark[]", 32), ffi.new("uint32_t *"), 32
@@ -217,12 +252,14 @@ class Simulation:
     # Steps.
 
     @property
+    @_one_at_a_time
     def critical_step(self) -> float:
         """The longest exact step (s) at the present displacements: a bound, safe."""
         seconds = ffi.new("float *")
         library.checked(lib.supple_critical_step(self._raw_scene, self._state, seconds, ffi.NULL))
         return float(seconds[0])
 
+    @_one_at_a_time
     def advance(self, seconds: float) -> Report:
         """Moves on by so many seconds; learned steps end at the nearest of the network's. Raises `Diverged` where a step is refused: the
         state is then the last good one."""
@@ -246,6 +283,7 @@ class Simulation:
             float(estimate.allowed) if estimate.known else None,
         )
 
+    @_one_at_a_time
     def take(self, count: int) -> Report:
         """Takes so many exact or damped steps of the length that was given."""
         if self._step is None or self.method not in ("exact", "damped"):
@@ -292,11 +330,13 @@ class Simulation:
         """On the nodes in the latest step, loads less what the elements resist, N: a copy."""
         return self._copied(lib.supple_copy_forces)
 
+    @_one_at_a_time
     def _copied(self, copy: Any) -> NDArray[np.float32]:
         out = np.empty((len(self.scene.mesh.points), 3), np.float32)
         library.checked(copy(self._state, library.pointer("float", out), out.size))
         return out
 
+    @_one_at_a_time
     def save(self) -> bytes:
         """The state as bytes, for `restore`."""
         size = lib.supple_saved_size(len(self.scene.mesh.points))
@@ -304,12 +344,14 @@ class Simulation:
         library.checked(lib.supple_save(self._state, library.pointer("uint8_t", to), size))
         return to.tobytes()
 
+    @_one_at_a_time
     def restore(self, saved: bytes) -> None:
         """Puts the state back; steps go on from there, a network's after a lead-in."""
         data = np.frombuffer(saved, np.uint8)
         library.checked(lib.supple_restore(self._state, library.pointer("uint8_t", data), len(data)), what="restore")
         self._prepare_again()
 
+    @_one_at_a_time
     def reset(self) -> None:
         """Back to rest, at time zero."""
         library.checked(lib.supple_state_reset(self._state))
