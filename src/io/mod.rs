@@ -4,6 +4,7 @@
 
 mod cursor;
 mod error;
+mod file;
 mod gmsh;
 mod node_index;
 mod replace;
@@ -21,6 +22,7 @@ use std::vec::Vec;
 
 use error::Fault;
 pub use error::ReadError;
+pub use file::{read_file, read_text};
 pub use replace::write_atomically;
 pub use write::{Frame, write_pvd, write_triangles, write_vtu};
 
@@ -100,6 +102,6 @@ pub fn parse_msh(name: &Path, bytes: &[u8]) -> Result<TetMesh, ReadError> {
 }
 
 fn parse<T>(path: &Path, parse: impl FnOnce(&[u8]) -> Result<T, Fault>) -> Result<T, ReadError> {
-    let bytes = std::fs::read(path).map_err(|source| ReadError::Unreadable { path: path.into(), source })?;
+    let bytes = read_file(path).map_err(|source| ReadError::Unreadable { path: path.into(), source })?;
     parse(&bytes).map_err(|fault| fault.in_file(path))
 }

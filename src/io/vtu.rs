@@ -56,9 +56,9 @@ struct Vtu<'d> {
     layout: Layout<'d>,
     appended: &'d [u8],
     appended_raw: bool,
-    /// Bytes that arrays may still have from the appended ones. Without a limit many small elements that name the same
-    /// array would take memory without end.
-    appended_left: Cell<u64>,
+    /// Bytes that binary arrays may still have. Without a limit a few compressed ones, or many small elements that name
+    /// the same array, would take memory without end.
+    left: Cell<u64>,
 }
 
 impl<'d> Vtu<'d> {
@@ -96,8 +96,8 @@ impl<'d> Vtu<'d> {
             Some(other) => return Err(fault(format!("the encoding {other:?} is neither base64 nor raw"))),
         };
         let layout = Layout { order, wide, compressor };
-        let appended_left = Cell::new(layout.most(appended.len() as u64));
-        Ok(Self { document, layout, appended, appended_raw, appended_left })
+        let left = Cell::new(layout.most((document.input_text().len() + appended.len()) as u64));
+        Ok(Self { document, layout, appended, appended_raw, left })
     }
 
     fn fault(&self, node: Node<'_, '_>, reason: impl Display) -> Fault {
@@ -193,7 +193,13 @@ impl<'d> Vtu<'d> {
                     _ => values.map_err(|fault| self.fault(node, fault.reason)),
                 };
             }
-            "binary" => Source::Base64(Base64::new(bytes)),
+            "binary" => {
+                // Plain ones are no longer than their text.
+                if self.layout.compressor.is_some() {
+                    self.share(size).map_err(|reason| self.fault(node, reason))?;
+                }
+                Source::Base64(Base64::new(bytes))
+            }
             "appended" => {
                 let offset = self.count(node, "offset")?;
                 let data = self.appended.get(offset..).ok_or_else(|| {
@@ -212,11 +218,10 @@ impl<'d> Vtu<'d> {
         read_values(&mut Cursor::new(&bytes, 1), n, scalar, self.layout.order, "the array")
     }
 
-    /// Takes the bytes of an array from those that all appended arrays may have together.
+    /// Takes the bytes of an array from those that all may have together.
     fn share(&self, size: Option<usize>) -> Result<(), &'static str> {
-        let left = size.and_then(|size| self.appended_left.get().checked_sub(size as u64));
-        self.appended_left
-            .set(left.ok_or("the arrays so far have more bytes together than the appended data can hold")?);
+        let left = size.and_then(|size| self.left.get().checked_sub(size as u64));
+        self.left.set(left.ok_or("the arrays so far have more bytes together than a file of this size can hold")?);
         Ok(())
     }
 }

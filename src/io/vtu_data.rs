@@ -76,13 +76,15 @@ pub(super) struct Layout<'a> {
     pub(super) compressor: Option<&'a str>,
 }
 
-/// zlib makes at most so many bytes of one (Gailly & Adler, zlib technical details).
-const ZLIB: u64 = 1032;
+/// Bytes that a mesh may make of one that is stored with zlib, and of any file. zlib could make 1,032 of one (Gailly &
+/// Adler, zlib technical details); coordinates and numbers of nodes are two to ten.
+const UNPACKED: u64 = 50;
+const UNPACKED_OF_ANY: u64 = 1 << 20;
 
 impl Layout<'_> {
     /// The most bytes that arrays can have that are stored in so many.
     pub(super) fn most(self, bytes: u64) -> u64 {
-        if self.compressor.is_some() { bytes.saturating_mul(ZLIB) } else { bytes }
+        if self.compressor.is_some() { bytes.saturating_mul(UNPACKED).saturating_add(UNPACKED_OF_ANY) } else { bytes }
     }
 
     /// The values of an array that must have `expected` bytes.

@@ -200,7 +200,7 @@ impl Method {
     /// With the network of a weight file: a damped step, or the learned step.
     pub fn with(path: &Path) -> Result<Self, LabError> {
         let problem = |error: &dyn core::fmt::Display| LabError::File(format!("{}: {error}", path.display()));
-        let bytes = std::fs::read(path).map_err(|error| problem(&error))?;
+        let bytes = supple::io::read_file(path).map_err(|error| problem(&error))?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let file = NetworkFile::leaked(String::leak(name), &bytes).map_err(|error| problem(&error))?;
         let damps = Damper::new(Network::parse(file.bytes)?).is_ok();

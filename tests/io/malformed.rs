@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use supple::io::{ReadError, TetMesh, read_mesh};
+use supple::io::{ReadError, TetMesh, read_mesh, read_text};
 
 /// Reads `content` from a file of this name; with `.ele`, `content` is the `.node` file, `---`, and the `.ele` file.
 fn read(name: &str, content: &[u8]) -> Result<TetMesh, ReadError> {
@@ -70,6 +70,8 @@ fn the_files_that_are_broken_below_are_sound() {
     ] {
         let expected = TetMesh { points: points.clone(), tets: vec![[0, 1, 2, 3]], triangles: vec![], regions };
         assert_eq!(read(name, content.as_bytes()).unwrap_or_else(|error| panic!("{error}")), expected, "{content}");
+        let marked = format!("\u{feff}{}", content.replace("---\n", "---\n\u{feff}"));
+        assert_eq!(read(name, marked.as_bytes()).unwrap_or_else(|error| panic!("{error}")), expected, "{content}");
         let windows = content.replace('\n', "\r\n").replace("---\r\n", "---\n");
         assert_eq!(read(name, windows.as_bytes()).unwrap_or_else(|error| panic!("{error}")), expected, "{content}");
     }
@@ -125,7 +127,7 @@ fn as_many_compressed_bytes_as_can_be_counted_are_missing() {
     let empty = points
         .replace("format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1", "format=\"binary\">AQAAAAAAAAAAAAAACAAAAA==eJwDAAAAAAE=");
     let bytes = empty.replace("Float64", "UInt8");
-    assert_refused("bad.vtu", bytes.as_bytes(), "the array has 0 bytes instead of 18446744073709551615");
+    assert_refused("bad.vtu", bytes.as_bytes(), "more bytes together than a file of this size can hold");
 }
 
 /// In `sound`, the first text of a change is replaced by the second; the message must contain the third.
@@ -409,4 +411,43 @@ fn damaged_files() {
     }
     println!("{files} files: {read_well} damaged ones read, {refused} refused");
     assert!(files >= 40 && refused > read_well / 4);
+}
+
+/// A third of a gigabyte of zeros in some 450 kB: refused before it is unpacked.
+#[test]
+fn a_small_file_does_not_unpack_without_end() {
+    use base64::{Engine, engine::general_purpose::STANDARD};
+    use std::io::Write;
+    const BLOCK: usize = 1 << 20;
+    let blocks = 320_u32;
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
+    encoder.write_all(&vec![0; BLOCK]).unwrap();
+    let block = encoder.finish().unwrap();
+    let sizes = [blocks, BLOCK as u32, 0].into_iter().chain((0..blocks).map(|_| block.len() as u32));
+    let header: Vec<u8> = sizes.flat_map(u32::to_le_bytes).collect();
+    let data = STANDARD.encode(header) + &STANDARD.encode(block.repeat(blocks as usize));
+    let points = blocks as usize * BLOCK / 12;
+    let content = format!(
+        "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" compressor=\"vtkZLibDataCompressor\"><UnstructuredGrid>\n\
+         <Piece NumberOfPoints=\"{points}\" NumberOfCells=\"1\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" \
+         format=\"binary\">{data}</DataArray></Points></Piece></UnstructuredGrid></VTKFile>"
+    );
+    println!("{} bytes", content.len());
+    let start = Instant::now();
+    assert_refused("a.vtu", content.as_bytes(), "more bytes together than a file of this size can hold");
+    assert!(start.elapsed() < Duration::from_secs(1));
+}
+
+#[test]
+#[cfg(unix)]
+fn devices_and_folders_are_no_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("endless.msh");
+    std::os::unix::fs::symlink("/dev/zero", &path).unwrap();
+    let text = folder.path().join("scene.toml");
+    fs::write(&text, "\u{feff}damping = 20.0\n").unwrap();
+    assert_eq!(read_text(&text).unwrap(), "damping = 20.0\n");
+    assert!(read_text(&path).is_err() && read_text(folder.path()).is_err());
+    let error = read_mesh(&path).unwrap_err().to_string();
+    assert!(error.contains("endless.msh: cannot be read: it is a folder, a device or a pipe, not a file"), "{error}");
 }

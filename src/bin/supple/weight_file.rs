@@ -21,7 +21,7 @@ pub(crate) fn is_weights(path: &Path) -> bool {
 
 /// The bytes of any file.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, Problem> {
-    std::fs::read(path).map_err(|error| Problem::in_file(path, format!("cannot be read: {error}")))
+    supple::io::read_file(path).map_err(|error| Problem::in_file(path, format!("cannot be read: {error}")))
 }
 
 /// A weight file in memory, not yet looked at.

@@ -36,7 +36,7 @@ fn checkpoints(out: &Path) -> PathBuf {
 pub(crate) fn train(asked: &Asked) -> Result<End, Problem> {
     let Asked { recipe, out } = asked;
     let problem = |error: &dyn std::fmt::Display| Problem::in_file(recipe, error);
-    let text = std::fs::read_to_string(recipe).map_err(|error| problem(&error))?;
+    let text = supple::io::read_text(recipe).map_err(|error| problem(&error))?;
     if is_damper(&text) {
         return train_damper(&text, recipe, out);
     }

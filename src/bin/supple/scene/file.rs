@@ -146,8 +146,8 @@ pub(crate) enum StepLength {
 
 impl SceneFile {
     pub fn read(path: &Path) -> Result<Self, Problem> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| Problem::in_file(path, format!("cannot be read: {error}")))?;
+        let text =
+            supple::io::read_text(path).map_err(|error| Problem::in_file(path, format!("cannot be read: {error}")))?;
         let scene = toml::from_str(&text).map_err(|error: toml::de::Error| {
             let line = error.span().map(|span| format!(", line {}", line_of(&text, span.start)));
             Problem(format!("{}{}: {}", path.display(), line.unwrap_or_default(), error.message()))

@@ -16,6 +16,9 @@ pub enum StepChoice {
     Auto,
 }
 
+/// Of each frame some files are written.
+const MOST_FRAMES: u32 = 100_000;
+
 /// What `[time]` asks for.
 pub struct Timing {
     /// None is the exact step.
@@ -70,6 +73,9 @@ impl Timing {
         let frames = time.frames.as_ref().map_or(1, |frames| *frames.get_ref());
         if let (0, Some(at)) = (frames, &time.frames) {
             return Err(file.problem(at, "frames is 0; the last state is always written, so give 1 or more"));
+        }
+        if let (true, Some(at)) = (frames > MOST_FRAMES, &time.frames) {
+            return Err(file.problem(at, format!("frames is {frames}; at most {MOST_FRAMES} are written")));
         }
         let lattice_at = time.lattice.as_ref().map(|at| file.place(at));
         let step_at = time.step.as_ref().map_or_else(|| file.place(&file.scene.time), |at| file.place(at));
