@@ -74,7 +74,7 @@ fn bad_scenes_are_refused_in_words() {
         (instead("end = 0.001", "end = 0.001\nframes = 0"), "frames is 0"),
         (
             instead("end = 0.001", "end = 0.001\nframes = 4000000000"),
-            "frames is 4000000000; at most 100000 are written",
+            "frames is 4000000000; at most 1000000 are written",
         ),
         (
             bar(&format!("[[fix]]\nbox = {{ min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }}\n{TIME}")),

@@ -17,7 +17,7 @@ pub enum StepChoice {
 }
 
 /// Of each frame some files are written.
-const MOST_FRAMES: u32 = 100_000;
+const MOST_FRAMES: u32 = 1_000_000;
 
 /// What `[time]` asks for.
 pub struct Timing {
