@@ -103,5 +103,6 @@ pub fn parse_msh(name: &Path, bytes: &[u8]) -> Result<TetMesh, ReadError> {
 
 fn parse<T>(path: &Path, parse: impl FnOnce(&[u8]) -> Result<T, Fault>) -> Result<T, ReadError> {
     let bytes = read_file(path).map_err(|source| ReadError::Unreadable { path: path.into(), source })?;
-    parse(&bytes).map_err(|fault| fault.in_file(path))
+    // All formats begin with text.
+    parse(file::without_mark(&bytes)).map_err(|fault| fault.in_file(path))
 }

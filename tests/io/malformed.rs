@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use supple::io::{ReadError, TetMesh, read_mesh, read_text};
+use supple::io::{ReadError, TetMesh, read_file, read_mesh, read_text};
 
 /// Reads `content` from a file of this name; with `.ele`, `content` is the `.node` file, `---`, and the `.ele` file.
 fn read(name: &str, content: &[u8]) -> Result<TetMesh, ReadError> {
@@ -447,6 +447,8 @@ fn devices_and_folders_are_no_files() {
     let text = folder.path().join("scene.toml");
     fs::write(&text, "\u{feff}damping = 20.0\n").unwrap();
     assert_eq!(read_text(&text).unwrap(), "damping = 20.0\n");
+    // What may be binary stays as it is.
+    assert_eq!(read_file(&text).unwrap(), fs::read(&text).unwrap());
     assert!(read_text(&path).is_err() && read_text(folder.path()).is_err());
     let error = read_mesh(&path).unwrap_err().to_string();
     assert!(error.contains("endless.msh: cannot be read: it is a folder, a device or a pipe, not a file"), "{error}");
