@@ -60,7 +60,7 @@ pub(super) fn layout(vectors: usize) -> Layout {
 }
 
 /// Vectors of the storage.
-fn vectors_of(open: &OpenScene<'_>, request: &LargeRequest<'_>) -> Answer<usize> {
+pub(super) fn vectors_of(open: &OpenScene<'_>, request: &LargeRequest<'_>) -> Answer<usize> {
     Ok(vectors_with(request.vectors, open.view(), request.points)?)
 }
 

@@ -6,7 +6,7 @@ use core::mem::take;
 use core::ptr;
 
 use crate::copy::copy;
-use crate::guard::{EVERY, EVERY_LEARNED, vectors_at_most as guard_vectors};
+use crate::guard::{EVERY, EVERY_LEARNED, vectors_at_most as guard_vectors, vectors_for};
 use crate::inertia::{Cells, vectors_at_most};
 use crate::learned::LearnedReport;
 use crate::material::Element;
@@ -17,10 +17,10 @@ use crate::step::{CriticalStep, Step};
 use crate::tled::{Pace, vectors_for_pace};
 
 use super::SUPPLE_NONE;
-use super::adaptive::{self, supple_adaptive, supple_adaptive_init, supple_adaptive_size};
+use super::adaptive::{self, supple_adaptive, supple_adaptive_init};
 use super::contact::{CallContact, Felt, supple_contact, supple_contact_init, supple_contact_size};
-use super::guard::{self, supple_estimate, supple_guard, supple_guard_config, supple_guard_init, supple_guard_size};
-use super::large::{self, SUPPLE_DAMPED, supple_large, supple_large_config, supple_large_init, supple_large_size};
+use super::guard::{self, supple_estimate, supple_guard, supple_guard_config, supple_guard_init};
+use super::large::{self, LargeRequest, SUPPLE_DAMPED, supple_large, supple_large_config, supple_large_init};
 use super::learned::{
     self, MUCH_OUTSIDE, supple_learned, supple_learned_config, supple_learned_init, supple_learned_size,
 };
@@ -243,9 +243,7 @@ pub unsafe extern "C" fn supple_sim_size(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let size = || unsafe {
-        let (body, settings, bytes) = (one(body)?, one(settings)?, place_for(bytes)?);
-        settings.check()?;
-        same_abi::<supple_scene_config>(body.struct_size, body.abi)?;
+        let ((body, settings), bytes) = (given(body, settings)?, place_for(bytes)?);
         bytes.write(size_of_all(body, settings));
         Ok(SUPPLE_OK)
     };
@@ -268,9 +266,7 @@ pub unsafe extern "C" fn supple_sim_setup(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller: weights stay as long as the object is used.
     let setup = || unsafe {
-        let (body, settings, sim) = (one(body)?, one(settings)?, place_for(sim)?);
-        settings.check()?;
-        same_abi::<supple_scene_config>(body.struct_size, body.abi)?;
+        let ((body, settings), sim) = (given(body, settings)?, place_for(sim)?);
         let made = build(memory, bytes, body, settings).map_err(|error| match error.status {
             // So far of one of its objects alone.
             SUPPLE_E_SHORT => short(bytes, size_of_all(body, settings)),
@@ -299,7 +295,6 @@ pub unsafe extern "C" fn supple_sim_set(
     let set = || unsafe {
         let settings = one(settings)?;
         settings.check()?;
-        memory::is(sim.cast_const())?;
         prepare(sim, settings)?;
         Ok(SUPPLE_OK)
     };
@@ -395,10 +390,6 @@ impl supple_settings {
         self.guard == 1 && matches!(self.steps, SUPPLE_STEPS_DAMPED | SUPPLE_STEPS_LEARNED)
     }
 
-    const fn is_damped(&self) -> bool {
-        matches!(self.steps, SUPPLE_STEPS_DAMPED | SUPPLE_STEPS_AUTO)
-    }
-
     /// Of damped steps whose longest has so many seconds.
     fn large(&self, seconds: f32) -> supple_large_config {
         supple_large_config {
@@ -420,10 +411,25 @@ impl supple_settings {
     }
 }
 
+/// What a simulation is made from, checked as far as it can be without a scene.
+///
+/// # Safety
+/// If not NULL, both lead to such a structure.
+unsafe fn given<'a>(
+    body: *const supple_scene_config,
+    settings: *const supple_settings,
+) -> Answer<(&'a supple_scene_config, &'a supple_settings)> {
+    // SAFETY: the caller's promise.
+    let (body, settings) = unsafe { (one(body)?, one(settings)?) };
+    settings.check()?;
+    same_abi::<supple_scene_config>(body.struct_size, body.abi)?;
+    Ok((body, settings))
+}
+
 /// Never less than what the objects take.
 fn size_of_all(body: &supple_scene_config, settings: &supple_settings) -> usize {
     let &supple_scene_config { nodes, elements, tissues, .. } = body;
-    let element = Element::ALL.into_iter().find(|known| known.code() == body.element).unwrap_or_default();
+    let element = Element::of_code(body.element).unwrap_or_default();
     let patches = if element.is_nodal_strain() { supple_patches_size(nodes, elements, tissues) } else { 0 };
     let surface = &settings.surface;
     let contact = match surface.node_count {
@@ -601,7 +607,7 @@ unsafe fn objects_of(sim: *mut supple_sim) -> Answer<supple_sim_objects> {
 /// Prepares the steps.
 ///
 /// # Safety
-/// As at [`supple_sim_set`]; `sim` is one.
+/// As at [`supple_sim_set`].
 unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -> Answer<()> {
     // SAFETY: the caller's promise.
     unsafe {
@@ -609,7 +615,7 @@ unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -> Answer<()
         let points = Arrays::behind(sim.cast_const()).read::<[f32; 3]>((*sim).nodes as usize);
         let open = OpenScene::of(scene)?;
         let critical = critical_step(&open, &mut opened_of(&open, state)?)?;
-        let needed = needed(settings, critical, scene, points)?;
+        let needed = needed(settings, critical, &open, points)?;
         let (steps, bytes) = ((*sim).place_of_steps, memory::bytes_of(sim.cast_const()));
         if bytes.saturating_sub(steps) < needed {
             return Err(short(bytes, steps + needed));
@@ -635,21 +641,20 @@ fn seconds_of(settings: &supple_settings, critical: CriticalStep) -> f32 {
 unsafe fn needed(
     settings: &supple_settings,
     critical: CriticalStep,
-    scene: *const supple_scene,
+    open: &OpenScene<'_>,
     points: &[[f32; 3]],
 ) -> Answer<usize> {
-    let (points, nodes) = (points.as_ptr().cast::<f32>(), points.len());
-    let size = |ask: &dyn Fn(*mut usize, *mut supple_error) -> supple_status| {
-        let (mut bytes, mut error) = (0, supple_error::NONE);
-        if (ask(&raw mut bytes, &raw mut error) as i32) < 0 { Err(error) } else { Ok(bytes) }
-    };
+    let nodes = points.len();
     // SAFETY: the caller's promise.
     unsafe {
         let large = settings.large(seconds_of(settings, critical));
-        if settings.is_damped() && !settings.weights.is_null() {
-            let request = large::LargeRequest::of(&OpenScene::of(scene)?, points, &raw const large)?;
-            request.method()?;
-        }
+        let damped = || {
+            let request = LargeRequest::of(open, points.as_ptr().cast(), &raw const large)?;
+            if !settings.weights.is_null() {
+                request.method()?;
+            }
+            Ok::<_, supple_error>(request)
+        };
         let pace = vectors_for_pace(nodes) * size_of::<NodeVector>();
         let exact = |damping| match settings.given_seconds() {
             Some(seconds) => Step::new(seconds, damping, critical).map(|_| 0),
@@ -657,19 +662,15 @@ unsafe fn needed(
         };
         let steps = match settings.steps {
             SUPPLE_STEPS_EXACT => exact(settings.damping)?,
-            SUPPLE_STEPS_DAMPED => {
-                size(&|bytes, error| supple_large_size(scene, points, &raw const large, bytes, error))?
-            }
-            SUPPLE_STEPS_AUTO => {
-                size(&|bytes, error| supple_adaptive_size(scene, points, &raw const large, bytes, error))?
-            }
+            SUPPLE_STEPS_DAMPED => large::layout(damped()?.vectors).bytes(),
+            SUPPLE_STEPS_AUTO => adaptive::layout(adaptive::vectors_of(open, &damped()?)?).bytes(),
             _ => {
                 let network = Network::parse(lasting_bytes(settings.weights, settings.weights_bytes)?)?;
                 supple_learned_size(nodes as u32, settings.fallback) + exact(network.recipe().damping)?
             }
         };
         let guard = match settings.is_guarded() {
-            true => size(&|bytes, error| supple_guard_size(scene, points, bytes, error))?,
+            true => guard::layout(vectors_for(open.view(), points)?).bytes(),
             false => 0,
         };
         Ok(steps.next_multiple_of(memory::SUPPLE_ALIGN) + guard)

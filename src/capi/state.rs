@@ -74,8 +74,7 @@ fn layout(nodes: u32, element: Element) -> Layout {
 /// @param element of the scene: SUPPLE_LINEAR, SUPPLE_NODAL_PRESSURE or SUPPLE_NODAL_STRAIN.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_state_size(nodes: u32, element: u32) -> usize {
-    let element = Element::ALL.into_iter().find(|known| known.code() == element);
-    element.map_or(0, |element| layout(nodes, element).bytes())
+    Element::of_code(element).map_or(0, |element| layout(nodes, element).bytes())
 }
 
 /// Prepares the state of a scene, at rest, in `memory` of at least supple_state_size bytes, aligned to SUPPLE_ALIGN.

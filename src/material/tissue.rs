@@ -45,6 +45,12 @@ impl Element {
     /// Every element.
     pub const ALL: [Self; 3] = [Self::Linear, Self::NodalPressure, Self::NodalStrain];
 
+    /// The element of a [`Element::code`].
+    #[must_use]
+    pub fn of_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|element| element.code() == code)
+    }
+
     /// Its name in scene files, recipes and results.
     #[must_use]
     pub const fn name(self) -> &'static str {

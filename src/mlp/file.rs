@@ -419,7 +419,7 @@ fn recipe<'w>(header: &Header, bytes: &'w [u8]) -> Result<Recipe<'w>, WeightErro
         1 => ForceInput::PerMass,
         code => return Err(WeightError::Header { field: "the unit of force", value: code as f32 }),
     };
-    let element = Element::ALL.into_iter().find(|element| element.code() == header.element);
+    let element = Element::of_code(header.element);
     let element = element.ok_or(WeightError::Header { field: "the element", value: header.element as f32 })?;
     let (at, length) = (header.recipe, header.recipe_length);
     let end = (at as usize).checked_add(length as usize);
