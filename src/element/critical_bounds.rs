@@ -85,6 +85,12 @@ impl NodeMatrices<'_> {
         Scatter::new(self.zx_in_padding).add_corners(nodes, first, sixth, sixth_buffer);
     }
 
+    /// The sum of the diagonal of the node's matrix, 1/s^2: no eigenvalue is larger.
+    pub(crate) fn trace(&self, node: usize) -> f32 {
+        let [xx, yy, zz, _] = self.xx_yy_zz_xy.get(node).copied().unwrap_or_default().0;
+        xx + yy + zz
+    }
+
     /// A close upper bound of the largest eigenvalue of the node's matrix on its free axes, 1/s^2.
     pub(crate) fn largest_eigenvalue(&self, node: usize, inverse: [f32; 3]) -> f32 {
         let read = |vectors: &[NodeVector]| vectors.get(node).copied().unwrap_or_default().0;
