@@ -1335,8 +1335,8 @@ typedef struct {
     uint32_t steps;
     /**
      * Length of the steps, s; 0: chosen. Of damped steps at most so much, 20 critical steps unless given; of exact
-     * ones, a network's included, at most so much in place of nine tenths of the critical step at the moment; of
-     * SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
+     * ones, a network's included, at most so much, nine tenths of the critical step unless given, and shorter where the
+     * critical step falls; of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
      */
     float seconds;
     /**

@@ -56,8 +56,8 @@ pub struct supple_settings {
     /// SUPPLE_STEPS_EXACT and so on.
     pub steps: u32,
     /// Length of the steps, s; 0: chosen. Of damped steps at most so much, 20 critical steps unless given; of exact
-    /// ones, a network's included, at most so much in place of nine tenths of the critical step at the moment; of
-    /// SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
+    /// ones, a network's included, at most so much, nine tenths of the critical step unless given, and shorter where the
+    /// critical step falls; of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
     pub seconds: f32,
     /// Damping proportional to mass, 1/s, zero or more. A network has that of its training.
     pub damping: f32,
@@ -134,14 +134,11 @@ enum Prepared {
 }
 
 #[derive(Clone, Copy)]
-enum Exact {
-    Fixed(Step),
-    Paced {
-        pace: Pace,
-        damping: f32,
-        /// Where its vectors are.
-        kept: usize,
-    },
+struct Exact {
+    pace: Pace,
+    damping: f32,
+    /// Where its vectors are.
+    kept: usize,
 }
 
 /// The objects of a simulation, for all functions that take them.
@@ -656,10 +653,7 @@ unsafe fn needed(
             Ok::<_, supple_error>(request)
         };
         let pace = vectors_for_pace(nodes) * size_of::<NodeVector>();
-        let exact = |damping| match settings.given_seconds() {
-            Some(seconds) => Step::new(seconds, damping, critical).map(|_| 0),
-            None => Step::unchecked(Pace::SHARE * critical.seconds, damping).map(|_| pace),
-        };
+        let exact = |damping| Pace::of(settings.given_seconds(), damping, critical).map(|_| pace);
         let steps = match settings.steps {
             SUPPLE_STEPS_EXACT => exact(settings.damping)?,
             SUPPLE_STEPS_DAMPED => large::layout(damped()?.vectors).bytes(),
@@ -693,12 +687,9 @@ unsafe fn made(
     // SAFETY: the caller's promise.
     unsafe {
         let large = settings.large(seconds);
-        let exact = |room: &mut Room, damping| match settings.given_seconds() {
-            Some(seconds) => Ok::<_, supple_error>(Exact::Fixed(Step::new(seconds, damping, critical)?)),
-            None => {
-                let kept = room.vectors(vectors_for_pace(points.len()))?;
-                Ok(Exact::Paced { pace: Pace::new(critical), damping, kept })
-            }
+        let exact = |room: &mut Room, damping| {
+            let pace = Pace::of(settings.given_seconds(), damping, critical)?;
+            Ok::<_, supple_error>(Exact { pace, damping, kept: room.vectors(vectors_for_pace(points.len()))? })
         };
         let guarded = |room: &mut Room, seconds, damping, every| {
             if !settings.is_guarded() {
@@ -750,13 +741,10 @@ impl Prepared {
         unsafe {
             let nodes = (*sim).nodes;
             let at = |place: usize| sim.cast::<u8>().add(place);
-            let exact = |exact: &'a mut Exact| match exact {
-                Exact::Fixed(step) => ExactSteps::Fixed(*step),
-                Exact::Paced { pace, damping, kept } => {
-                    let count = vectors_for_pace(nodes as usize);
-                    let kept = core::slice::from_raw_parts_mut(at(*kept).cast::<NodeVector>(), count);
-                    ExactSteps::Paced { pace, kept, damping: *damping }
-                }
+            let exact = |Exact { pace, damping, kept }: &'a mut Exact| {
+                let count = vectors_for_pace(nodes as usize);
+                let kept = core::slice::from_raw_parts_mut(at(*kept).cast::<NodeVector>(), count);
+                ExactSteps::Paced { pace, kept, damping: *damping }
             };
             let guarded = |place: usize| if place > 0 { guard::opened(at(place).cast()).map(Some) } else { Ok(None) };
             Ok(match self {

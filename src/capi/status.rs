@@ -436,7 +436,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -91 => c"diverged: more kinetic energy than loads and supports can have given",
         -92 => c"the step was not taken: a force would move its node through the tissue around it",
         -93 => c"the step was not taken: supports moved a node too far in one step",
-        -94 => c"the step was not taken: an instrument moves too far in one step, or is too far inside the body",
+        -94 => c"the step was not taken: an instrument moves too far in one step, or is too far inside the body: slower, shorter steps, or start outside",
         -95 => c"the step was not taken: this kind of step cannot meet instruments",
         _ => return None,
     })

@@ -241,6 +241,11 @@ impl Meeting {
     pub(crate) fn relative(&self, slip: Vec3) -> Vec3 {
         self.gap * self.normal + (slip - slip.dot(self.normal) * self.normal)
     }
+
+    /// How far a point that moves by `way` (m) comes nearer to the instrument in the step, m.
+    pub(crate) fn approach(&self, way: Vec3) -> f32 {
+        (self.carried - way).dot(self.normal).max(0.0)
+    }
 }
 
 impl<'a> Placed<'a> {
@@ -263,11 +268,10 @@ impl<'a> Placed<'a> {
         self.start.position.distance(self.end.position)
     }
 
-    /// The distance that it moves, and the farthest that it may, m, if that is too far.
-    pub(crate) fn too_fast(&self) -> Option<[f32; 2]> {
-        let metre = self.way();
-        let most = self.instrument.shape.thickness();
-        (metre > most).then_some([metre, most])
+    /// The farthest that it and the tissue may come nearer to each other in a step, m: farther, and tissue could be on
+    /// its other side.
+    pub(crate) fn thickness(&self) -> f32 {
+        self.instrument.shape.thickness()
     }
 
     /// A point (m) from the position at the end of the step.

@@ -59,8 +59,8 @@ pub struct Settings<'w> {
     /// How the scene is moved.
     pub method: Method<'w>,
     /// Length of the steps, s: of long ones at most so much, 20 times the critical step unless given; of exact ones, a
-    /// network's included, at most so much in place of nine tenths of the critical step at the moment; of steps that
-    /// choose their length the longest, a hundred critical steps unless given.
+    /// network's included, at most so much, nine tenths of the critical step unless given, and shorter where the
+    /// critical step falls; of steps that choose their length the longest, a hundred critical steps unless given.
     pub step: Option<f32>,
     /// Damping in proportion to mass, 1/s. A network has that of its training.
     pub damping: f32,

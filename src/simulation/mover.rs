@@ -10,11 +10,13 @@ use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::StateView;
-use crate::step::{Status, Step, Threads};
+use crate::step::{Cause, Divergence, Status, Step, Threads, equal_steps};
 use crate::tled::{self, Approach, Pace};
 
 /// Share of a span that is no step but a rounding of single precision.
 const ROUNDING: f64 = 1e-6;
+/// How often a long step is halved that tissue or an instrument is too fast for.
+const MOST_HALVINGS: u32 = 3;
 
 /// What moves a scene, borrowed for a call.
 #[derive(Debug)]
@@ -134,16 +136,6 @@ impl Mover<'_, '_> {
     }
 }
 
-/// How many steps of at most `longest` (s) make up a span (s), and their length: `longest` itself if it differs by a
-/// rounding only.
-fn equal_steps(span: f64, longest: f32) -> (u32, f32) {
-    let most = f64::from(longest);
-    let count = libm::ceil(span / most * (1.0 - ROUNDING)).clamp(1.0, f64::from(u32::MAX));
-    let length = span / count;
-    let is_longest = libm::fabs(length - most) <= ROUNDING * most;
-    (count as u32, if is_longest { longest } else { (length as f32).min(longest) })
-}
-
 impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
     /// Takes exact steps for `span` seconds; the call goes on for `rest` seconds after them. Whether all were taken.
     fn exact_steps<M: ElementMaterial>(
@@ -220,14 +212,23 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         scene: SceneView<'_, M>,
         state: &mut StateView<'_>,
     ) {
-        let (count, seconds) = equal_steps(span, model.longest());
-        // Only a span of 1e-18 s or less: that is no step.
-        if model.set_seconds(seconds).is_err() {
-            return;
-        }
-        for done in 0..count {
-            let loads = self.loads.of_step(state, seconds, count - done);
+        let until = state.time() + span;
+        let mut longest = model.longest();
+        let shortest = longest / (1 << MOST_HALVINGS) as f32;
+        let (mut left, mut seconds) = equal_steps(span, longest);
+        while left > 0 {
+            // Only a span of 1e-18 s or less: that is no step.
+            if model.set_seconds(seconds).is_err() {
+                return;
+            }
+            let loads = self.loads.of_step(state, seconds, left);
             let status = model.with_storage(storage).step_in_parts(scene, &loads, state.reborrow(), self.threads);
+            if is_too_far(status) && longest > shortest {
+                self.report.undone += 1;
+                longest *= 0.5;
+                (left, seconds) = equal_steps(until - state.time(), longest);
+                continue;
+            }
             if status.is_taken() {
                 (self.watch)(Event::Raised(*model.report()));
             }
@@ -237,6 +238,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
                 self.report.undone += 1;
                 return;
             }
+            left -= 1;
             self.report.long += 1;
             self.report.enter_length(seconds);
             if let Some(guard) = &mut guard {
@@ -357,6 +359,11 @@ impl ExactSteps<'_> {
             Self::Paced { pace, .. } => pace.seconds(),
         }
     }
+}
+
+/// Whether a step was refused because tissue and an instrument come too near in it: in a shorter one they may not.
+fn is_too_far(status: Status) -> bool {
+    matches!(status, Status::Diverged(Divergence { cause: Cause::Instrument { .. }, .. }))
 }
 
 /// The loads of a call that goes on for `rest` seconds after the span of these steps.

@@ -196,12 +196,11 @@ impl<'w> Simulation<'w> {
         let nodes = scene.node_count();
         let exact = |damping: f32| match step {
             Some(seconds) if unchecked => Ok(Exact::Fixed(Step::unchecked(seconds, damping)?)),
-            Some(seconds) => Ok(Exact::Fixed(Step::new(seconds, damping, critical)?)),
-            None => {
-                let kept = vec![NodeVector::ZERO; vectors_for_pace(nodes)];
+            _ => {
                 // Refused here, not in the middle of a call.
-                Step::unchecked(Pace::SHARE * critical.seconds, damping)?;
-                Ok::<_, SimulationError>(Exact::Paced { pace: Pace::new(critical), kept, damping })
+                let pace = Pace::of(step, damping, critical)?;
+                let kept = vec![NodeVector::ZERO; vectors_for_pace(nodes)];
+                Ok::<_, SimulationError>(Exact::Paced { pace, kept, damping })
             }
         };
         let guarded = |state: &mut VecState, seconds: f32, damping: f32, every: u32| {

@@ -77,9 +77,10 @@ impl fmt::Display for Divergence {
             Cause::Instrument { index, metre, most } => write!(
                 f,
                 "diverged at {time:.6} s at node {node}: instrument {index} moves by {:.3} mm in one step, or is as far inside the body; \
-                 at most {:.3} mm are possible: start outside and move slower",
+                 at most {:.3} mm are possible: start outside, move slower or take steps of {:.0} % of their length",
                 1e3 * metre,
-                1e3 * most
+                1e3 * most,
+                100.0 * most / metre
             ),
             Cause::NoContact => write!(
                 f,

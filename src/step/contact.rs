@@ -55,7 +55,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 let Some(met) = self.met(entry.node as usize, entry.rest, placed, method) else { continue };
                 distance = distance.min(placed.least_distance(&met.meeting) - axes(met.next).length());
                 if met.meeting.gap < 0.0 && met.is_free() {
-                    if self.refuses_depth(index, entry.node, -met.meeting.gap) {
+                    if self.refuses_depth((index, placed), entry.node, &met.meeting, axes(met.next)) {
                         return;
                     }
                     let push = met.push(step, placed.instrument.friction);
@@ -76,7 +76,9 @@ impl<M: ElementMaterial> Trial<'_, M> {
             let Some(met) = self.gripped(entry.node as usize, entry.rest, placed, (grip, method)) else {
                 continue;
             };
-            if self.refuses_depth(index, entry.node, met.meeting.gap) {
+            // Where it was is where the instrument held it, or the grip is of another place.
+            let carried = met.meeting.carried;
+            if self.refuses_grip(index, entry.node, [met.way + axes(met.next) - carried, carried]) {
                 return;
             }
             let push = met.hold(step);
@@ -268,11 +270,12 @@ impl<M: ElementMaterial> Trial<'_, M> {
             match met {
                 Some((index, point, meeting)) if meeting.gap < margin || pushed => {
                     found.set_point(point);
-                    if self.refuses_depth(index, found.node(), -meeting.gap) {
+                    let slip = point.mean(candidate.next);
+                    let at = placed.get(index).map(|placed| (index, placed));
+                    if at.is_some_and(|at| self.refuses_depth(at, found.node(), &meeting, slip)) {
                         self.touched = 0;
                         return;
                     }
-                    let slip = point.mean(candidate.next);
                     found.relative = meeting.relative(slip - meeting.carried).to_array();
                     (found.normal, found.gap) = (meeting.normal.to_array(), meeting.gap);
                     found.friction = placed.get(index).map_or(0.0, |placed| placed.instrument.friction);
@@ -294,8 +297,10 @@ impl<M: ElementMaterial> Trial<'_, M> {
                 memory.note(place, f32::NEG_INFINITY);
             }
             let Some(mut found) = self.found(&surface, place) else { continue };
-            let relative = self.candidate(&surface, &found, &next).corners[0] - placed.held(grip.point);
-            if self.refuses_depth(index, found.node(), relative.length()) {
+            let (candidate, held) = (self.candidate(&surface, &found, &next), placed.held(grip.point));
+            let relative = candidate.corners[0] - held;
+            let carried = placed.carried(held);
+            if self.refuses_grip(index, found.node(), [relative - candidate.next[0] + carried, carried]) {
                 self.touched = 0;
                 return;
             }
@@ -419,7 +424,8 @@ impl<M: ElementMaterial> Trial<'_, M> {
     /// Refuses the step if an instrument moves too far in it.
     fn refuses_speed(&mut self, contact: &Contact<'_>, placed: &[Placed<'_>]) -> bool {
         for (index, placed) in placed.iter().enumerate() {
-            if let Some([metre, most]) = placed.too_fast() {
+            let [metre, most] = [placed.way(), placed.thickness()];
+            if metre > most {
                 let node = contact.surface().nodes().first().map_or(0, |entry| entry.node);
                 self.refused.get_or_insert((node, Cause::Instrument { index, metre, most }));
                 return true;
@@ -428,8 +434,36 @@ impl<M: ElementMaterial> Trial<'_, M> {
         false
     }
 
-    /// Refuses the step if a node is so far inside an instrument (m) that it would be thrown.
-    pub(super) fn refuses_depth(&mut self, index: usize, node: u32, metre: f32) -> bool {
+    /// Refuses the step if a point that moves by `way` (m) was so far inside an instrument before it that it would be
+    /// thrown, or comes so much nearer in the step that it would be pushed through the tissue around it, or be on the
+    /// other side of the instrument.
+    pub(super) fn refuses_depth(
+        &mut self,
+        (index, placed): (usize, &Placed<'_>),
+        node: u32,
+        meeting: &Meeting,
+        way: Vec3,
+    ) -> bool {
+        let approach = meeting.approach(way);
+        let most = placed.thickness().min(self.size_at(node as usize));
+        if approach > most {
+            self.refused.get_or_insert((node, Cause::Instrument { index, metre: approach, most }));
+        }
+        approach > most || self.refuses_distance(index, node, -meeting.gap - approach)
+    }
+
+    /// Refuses the step if a node was so far from where an instrument held it that it would be thrown, or is carried
+    /// through the tissue around it, m.
+    fn refuses_grip(&mut self, index: usize, node: u32, [before, carried]: [Vec3; 2]) -> bool {
+        let (metre, most) = (carried.length(), self.size_at(node as usize));
+        if metre > most {
+            self.refused.get_or_insert((node, Cause::Instrument { index, metre, most }));
+        }
+        metre > most || self.refuses_distance(index, node, before.length())
+    }
+
+    /// Refuses the step if a node is so far (m) from where an instrument has it that it would be thrown.
+    fn refuses_distance(&mut self, index: usize, node: u32, metre: f32) -> bool {
         let most = MOST_OF_SIZE * self.size_at(node as usize);
         if metre > most {
             self.refused.get_or_insert((node, Cause::Instrument { index, metre, most }));

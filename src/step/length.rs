@@ -70,6 +70,19 @@ impl fmt::Display for StepError {
 
 impl core::error::Error for StepError {}
 
+/// Share of a span that is no step but a rounding of single precision.
+const ROUNDING: f64 = 1e-6;
+
+/// How many steps of at most `longest` (s) make up a span (s), and their length: `longest` itself if it differs by a
+/// rounding only.
+pub(crate) fn equal_steps(span: f64, longest: f32) -> (u32, f32) {
+    let most = f64::from(longest);
+    let count = libm::ceil(span / most * (1.0 - ROUNDING)).clamp(1.0, f64::from(u32::MAX));
+    let length = span / count;
+    let is_longest = libm::fabs(length - most) <= ROUNDING * most;
+    (count as u32, if is_longest { longest } else { (length as f32).min(longest) })
+}
+
 /// Whether this can be a damping, 1/s.
 pub(crate) const fn is_damping(damping: f32) -> bool {
     damping.is_finite() && damping >= 0.0

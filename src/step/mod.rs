@@ -16,8 +16,8 @@ pub(crate) use crate::element::Extremes;
 pub use crate::energy_balance::{EnergyBalance, EnergyCycle};
 pub use cause::Cause;
 pub(crate) use energy_sums::{Sums, Totals};
-pub(crate) use length::is_damping;
 pub use length::{CriticalStep, Step, StepError};
+pub(crate) use length::{equal_steps, is_damping};
 pub(crate) use parts::{Forcing, internal_forces, move_in_parts, nodal_volumes};
 pub use status::{Divergence, Status};
 #[cfg(feature = "parallel")]

@@ -179,10 +179,11 @@ impl<M: ElementMaterial> Trial<'_, M> {
             found.push = [0.0; 3];
             if let Some((index, point, meeting)) = met.filter(|(.., meeting)| meeting.gap < 0.0) {
                 found.set_point(point);
-                if self.refuses_depth(index, found.node(), -meeting.gap) {
+                let moved = point.mean(candidate.next);
+                let at = placed.get(index).map(|placed| (index, placed));
+                if at.is_some_and(|at| self.refuses_depth(at, found.node(), &meeting, moved)) {
                     return;
                 }
-                let moved = point.mean(candidate.next);
                 found.vector = (meeting.relative(moved - meeting.carried) - moved).to_array();
                 (found.normal, found.gap) = (meeting.normal.to_array(), meeting.gap);
                 found.friction = placed.get(index).map_or(0.0, |placed| placed.instrument.friction);

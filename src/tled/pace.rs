@@ -9,8 +9,8 @@ use crate::element::{ElementMaterial, Extremes};
 use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::state::StateView;
-use crate::step::{CriticalStep, Status, Step, Threads};
+use crate::state::{Moment, StateView};
+use crate::step::{CriticalStep, Status, Step, StepError, Threads, equal_steps};
 
 use super::critical::{Weights, critical};
 use super::step_in_parts;
@@ -22,6 +22,8 @@ const STALE: f32 = 0.05;
 /// Relative fall of the least volume ratio, or rise of the saturation, after which the critical step is looked at at
 /// once.
 const SQUEEZE: f32 = 0.1;
+/// Relative difference of lengths that is none.
+const ROUNDING: f32 = 1e-6;
 /// By which share per step a step grows after it had to shrink. Slowly: steps that change in time with the motion feed
 /// energy into it (Skeel 1993, "Variable step size destabilizes the Stoermer/leapfrog/Verlet method").
 const GROWTH: f32 = 0.002;
@@ -36,10 +38,18 @@ pub struct Pace {
     shortest: f32,
     /// The step may be this long, s.
     longest: f32,
+    /// It never is longer than this, s, nor than this share of the critical step.
+    most: f32,
+    share: f32,
     /// The critical step at the last look, s.
     critical: f32,
-    /// Steps to the next look.
+    /// Steps from the last look to the next, and those of them that earlier calls have taken.
     steps: u32,
+    taken: u32,
+    /// The state that the last steps have left, where their span was to end, s, and their length, s.
+    moment: Option<Moment>,
+    end: f64,
+    length: f32,
     /// The critical step for which the weights of its bound were chosen, s; zero before the first look.
     weighed: f32,
     /// The least volume ratio less one and the largest saturation between the last two looks.
@@ -81,11 +91,26 @@ impl Pace {
         Self {
             shortest: (SHORTEST * seconds).max(LEAST),
             longest: Self::SHARE * seconds,
+            most: f32::INFINITY,
+            share: Self::SHARE,
             critical: seconds,
             steps: 1,
+            taken: 0,
+            moment: None,
+            end: 0.0,
+            length: 0.0,
             weighed: 0.0,
             extremes: Extremes::REST,
         }
+    }
+
+    /// The same, or steps of so many seconds where they are given, shorter ones where the critical step falls. Refused
+    /// if they are above it, and with a damping (1/s) that cannot be one.
+    pub fn of(seconds: Option<f32>, damping: f32, critical: CriticalStep) -> Result<Self, StepError> {
+        let pace = Self::new(critical);
+        let Some(seconds) = seconds else { return Step::unchecked(pace.longest, damping).map(|_| pace) };
+        let share = Self::SHARE.max(seconds / critical.seconds);
+        Step::new(seconds, damping, critical).map(|_| Self { longest: seconds, most: seconds, share, ..pace })
     }
 
     /// The longest step at present, s.
@@ -96,7 +121,7 @@ impl Pace {
 
     /// The critical step is to be looked at after the next step: other steps have moved the state.
     pub const fn look_soon(&mut self) {
-        self.steps = 1;
+        (self.steps, self.taken) = (1, 0);
     }
 
     /// Takes steps until the next look at the critical step, of a length of which whole numbers make up `left` seconds,
@@ -113,21 +138,23 @@ impl Pace {
         threads: &impl Threads,
         mut enter: impl FnMut(Status, &Loads<'_>, &StateView<'_>),
     ) -> Approach {
-        let whole = whole_steps(left, f64::from(self.longest));
-        let Ok(step) = Step::unchecked((left / whole) as f32, damping) else {
+        let (whole, seconds) = self.steps_to(state.time() + left, left);
+        let Ok(step) = Step::unchecked(seconds, damping) else {
             return Approach::TooShort;
         };
-        let seconds = step.seconds();
+        if self.moment != Some(state.moment()) {
+            self.look_soon();
+        }
         let nodes = scene.node_count();
         let (displacement, kept) = kept.split_at_mut(nodes.min(kept.len()));
         let (increment, weights) = kept.split_at_mut(nodes.min(kept.len()));
         copy(displacement, state.displacement);
         copy(increment, state.increment);
         let progress = *state.progress;
-        let count = whole.min(f64::from(self.steps)) as u32;
+        let count = whole.min(self.steps.saturating_sub(self.taken));
         let (mut refused, mut taken, mut extremes) = (None, 0, Extremes::none());
         while taken < count {
-            let of_step = loads.of_step(&state, seconds, (whole as u32).saturating_sub(taken));
+            let of_step = loads.of_step(&state, seconds, whole.saturating_sub(taken));
             let status = step_in_parts(scene, &of_step, state.reborrow(), &step, threads);
             enter(status, &of_step, &state);
             if !status.is_taken() {
@@ -140,23 +167,42 @@ impl Pace {
                 break;
             }
         }
+        self.taken += taken;
+        if refused.is_none() && self.taken < self.steps && !is_squeezed(&extremes, &self.extremes) {
+            // The call ends, and steps go on in the next.
+            self.moment = Some(state.moment());
+            return Approach::Taken { seconds };
+        }
         let now = self.look(scene, state.reborrow(), must_cast_slice_mut(weights));
         let outrun = refused.is_some() || seconds > now;
         if outrun && seconds > self.shortest {
             copy(state.displacement, displacement);
             copy(state.increment, increment);
             *state.progress = progress;
-            (self.longest, self.steps) = (0.5 * seconds, 1);
+            self.longest = 0.5 * seconds;
+            self.look_soon();
+            self.moment = Some(state.moment());
             return Approach::Undone;
         }
         // Look more often while the critical step falls fast.
         let fall = (1.0 - now / self.critical).max(0.0);
-        let steps = (FALL / fall * taken.max(1) as f32) as u32;
+        let steps = (FALL / fall * self.taken.max(1) as f32) as u32;
         self.steps = steps.min(2 * self.steps).clamp(1, Self::STEPS_BETWEEN_LOOKS);
         // No shorter than is of use: a state without a critical step is refused by the step itself.
-        self.longest = (self.longest * (1.0 + GROWTH * taken as f32)).min(Self::SHARE * now).max(self.shortest);
-        (self.critical, self.extremes) = (now, extremes);
+        let grown = self.longest * (1.0 + GROWTH * self.taken as f32);
+        self.longest = grown.min(self.share * now).min(self.most).max(self.shortest);
+        (self.critical, self.extremes, self.taken) = (now, extremes, 0);
+        self.moment = Some(state.moment());
         refused.map_or(Approach::Taken { seconds }, Approach::Refused)
+    }
+
+    /// How many steps make up `left` seconds until `end` (s), and their length: that of the steps before if these were to
+    /// end there too, without a new rounding.
+    fn steps_to(&mut self, end: f64, left: f64) -> (u32, f32) {
+        let (whole, seconds) = equal_steps(left, self.longest);
+        let goes_on = (end - self.end).abs() < 0.5 * left && (seconds / self.length - 1.0).abs() < ROUNDING;
+        (self.end, self.length) = (end, if goes_on { self.length } else { seconds });
+        (whole, self.length)
     }
 
     /// The critical step at the state (s), zero if there is none. `weights` are those of the last look.
@@ -185,9 +231,4 @@ impl Pace {
 fn is_squeezed(now: &Extremes<f32>, before: &Extremes<f32>) -> bool {
     1.0 + now.least_change < (1.0 - SQUEEZE) * (1.0 + before.least_change)
         || now.saturation > before.saturation + SQUEEZE
-}
-
-/// The least number of equal steps, each at most `longest` (s), that make up a span (s).
-fn whole_steps(span: f64, longest: f64) -> f64 {
-    libm::ceil(span / longest).max(1.0)
 }

@@ -8,6 +8,7 @@ mod clearance;
 mod closed_forms;
 mod fields;
 mod grips;
+mod hand_speed;
 mod long_steps;
 mod scene;
 mod surface_fields;

@@ -93,8 +93,8 @@ class Simulation:
     ----------
     scene
     method : "exact"; "damped" beyond the critical step; "auto", exact and damped steps whose length keeps a tolerance; "learned"
-    step : s; of exact steps, those around a network's included, 0.9 of the critical one at the moment unless given; of damped ones 20
-        times the critical one; of automatic ones the longest
+    step : s; of exact steps, those around a network's included, 0.9 of the critical one unless given, and shorter where that falls; of
+        damped ones 20 times the critical one; of automatic ones the longest
     damping : 1/s; learned steps take that of their training
     tolerance : mean error (m) that automatic steps keep, half a millimetre or less in bodies below 10 cm unless given, and that the
         guard allows, a fifth of the motion unless given
