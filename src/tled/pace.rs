@@ -72,10 +72,11 @@ pub enum Approach {
     Refused(Status),
 }
 
-/// Vectors of storage for a state of so many nodes, to undo steps and to look at the critical step.
+/// Vectors of storage for a state of so many nodes, to undo steps, to look at the critical step, and to keep the forces of the
+/// latest step meanwhile.
 #[must_use]
 pub const fn vectors_for_pace(nodes: usize) -> usize {
-    2 * nodes + nodes.div_ceil(4)
+    3 * nodes + nodes.div_ceil(4)
 }
 
 impl Pace {
@@ -147,7 +148,8 @@ impl Pace {
         }
         let nodes = scene.node_count();
         let (displacement, kept) = kept.split_at_mut(nodes.min(kept.len()));
-        let (increment, weights) = kept.split_at_mut(nodes.min(kept.len()));
+        let (increment, kept) = kept.split_at_mut(nodes.min(kept.len()));
+        let (force, weights) = kept.split_at_mut(nodes.min(kept.len()));
         copy(displacement, state.displacement);
         copy(increment, state.increment);
         let progress = *state.progress;
@@ -173,7 +175,10 @@ impl Pace {
             self.moment = Some(state.moment());
             return Approach::Taken { seconds };
         }
+        copy(force, state.force);
         let now = self.look(scene, state.reborrow(), must_cast_slice_mut(weights));
+        // The look has used them as scratch.
+        copy(state.force, force);
         let outrun = refused.is_some() || seconds > now;
         if outrun && seconds > self.shortest {
             copy(state.displacement, displacement);

@@ -99,6 +99,11 @@ fn exact_steps_follow_the_critical_step_and_frames_do_not_drift() {
     println!("steps {:.3} of the critical one at rest and less, {off:.1e} s off after 60 frames", least / rest);
     assert!(least < 0.85 * rest, "nothing stiffened: {least} of {rest}");
     assert!(off.abs() < 2e-6 * FRAME);
+    // Looks at the critical step leave the forces of the latest step: what the held end takes.
+    let taken = simulation.state().forces().iter().zip(&body.points).filter(|(_, point)| point[2] == 0.0);
+    let largest = taken.map(|(force, _)| force.to_array()[0].abs()).fold(0.0, f32::max);
+    println!("a held node takes up to {:.3} mN", 1e3 * largest);
+    assert!(largest > 1e-4, "{largest}");
 }
 
 #[test]
