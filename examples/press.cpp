@@ -24,11 +24,13 @@ int main(int count, char **words) {
     supple::body body;
     body.points = mesh.points, body.tetrahedra = mesh.tetrahedra, body.supports = supports;
     body.law = supple::law::exponential, body.tissues = {&liver, 1};
-    const auto how = supple::settings(supple::steps::exact, 20.0f).touchable(mesh.points.size() / 3); // damping, 1/s; all nodes
-    std::vector<supple::line> room(supple::lines(made(supple::simulation::size(body, how))));
-    const auto lobe = made(supple::simulation::make(room, body, how));
     const auto at = [](float height) { return supple::pose_at({-0.010f, 0.004f, height}); };
     const supple::instrument tools[] = {supple::instrument::sphere(0.010f, at(0.073f), 0.3f)}; // m, friction
+    auto how = supple::settings(supple::steps::exact, 20.0f); // damping, 1/s
+    std::vector<std::uint32_t> faces(3 * mesh.tetrahedra.size());
+    done(how.touchable_by(tools, body, faces)); // all nodes, and triangles where the ball is thinner than edges are long
+    std::vector<supple::line> room(supple::lines(made(supple::simulation::size(body, how))));
+    const auto lobe = made(supple::simulation::make(room, body, how));
     done(lobe.contact().set(tools));
     for (int frame = 0; frame < 60; frame++) {
         const float down = 0.010f * float(frame < 30 ? frame : 60 - frame) / 30.0f; // m

@@ -290,6 +290,12 @@
 #define SUPPLE_REMARK_OTHER_TISSUE 11
 
 /**
+ * Instrument `index` is `value` m thick, and edges of the surface are longer: it passes between the nodes, or feels too
+ * little. Give supple_surface its triangles.
+ */
+#define SUPPLE_REMARK_THIN 12
+
+/**
  * What became of a call. Zero: done. Positive: done, with a remark, the largest if there are several. Negative: not
  * done, and nothing has changed, except that memory handed to a function that prepares an object may hold none
  * afterwards, that forces are those of the step that was refused, or zero after a critical step, and what
@@ -938,30 +944,6 @@ typedef struct {
 } supple_vectors;
 
 /**
- * What instruments can touch.
- */
-typedef struct {
-    /**
-     * Numbers of the nodes, those of the boundary; NULL: the first `node_count` nodes, all of them with the scene's
-     * number.
-     */
-    const uint32_t *nodes;
-    /**
-     * Numbers of the three nodes of each triangle between these nodes, where an instrument is thinner than edges are
-     * long; else NULL.
-     */
-    const uint32_t *triangles;
-    /**
-     * How many.
-     */
-    uint32_t node_count;
-    /**
-     * How many.
-     */
-    uint32_t triangle_count;
-} supple_surface;
-
-/**
  * Where an instrument is.
  */
 typedef struct {
@@ -1009,6 +991,30 @@ typedef struct {
      */
     size_t field_bytes;
 } supple_instrument;
+
+/**
+ * What instruments can touch.
+ */
+typedef struct {
+    /**
+     * Numbers of the nodes, those of the boundary; NULL: the first `node_count` nodes, all of them with the scene's
+     * number.
+     */
+    const uint32_t *nodes;
+    /**
+     * Numbers of the three nodes of each triangle between these nodes, where an instrument is thinner than edges are
+     * long (supple_needs_triangles); else NULL.
+     */
+    const uint32_t *triangles;
+    /**
+     * How many.
+     */
+    uint32_t node_count;
+    /**
+     * How many.
+     */
+    uint32_t triangle_count;
+} supple_surface;
 
 /**
  * What an instrument feels.
@@ -1591,6 +1597,27 @@ supple_status supple_set_contact(supple_loads *loads,
                                  supple_contact *contact);
 
 /**
+ * Writes the forces of a uniform traction on triangles of the boundary at rest, three for each, for supple_set_forces
+ * among others: a third of traction times area to each corner. Their direction stays while the body moves.
+ *
+ * @param points of all `nodes` of the scene at rest, m, three coordinates each.
+ * @param triangles three nodes of each of `count` triangles, as of supple_boundary.
+ * @param pascal three components, Pa.
+ * @param ramp seconds from the start of the simulation over which the forces grow to their full size, zero or more.
+ * @param forces room for `room` of them, three times `count` at least.
+ * @param error may be NULL; index is that of a triangle.
+ */
+supple_status supple_traction(const float *points,
+                              uint32_t nodes,
+                              const uint32_t *triangles,
+                              uint32_t count,
+                              const float *pascal,
+                              float ramp,
+                              supple_force *forces,
+                              size_t room,
+                              supple_error *error);
+
+/**
  * Bytes of memory that the state of so many nodes needs; zero for an element that there is not. SUPPLE_STATE_SIZE is
  * the same as a constant.
  *
@@ -1709,6 +1736,37 @@ supple_status supple_copy_velocities(const supple_state *state, float *out, size
 supple_status supple_copy_forces(const supple_state *state,
                                  float *out,
                                  size_t floats);
+
+/**
+ * Writes the triangles of the boundary of a mesh, which belong to one element only, seen from outside: three nodes each.
+ *
+ * @param tetrahedra four nodes of each element, from zero.
+ * @param triangles room for `room` of them; four for each element are needed while they are found.
+ * @param count receives how many at the beginning are of the boundary.
+ */
+supple_status supple_boundary(const uint32_t *tetrahedra,
+                              uint32_t elements,
+                              uint32_t *triangles,
+                              size_t room,
+                              uint32_t *count);
+
+/**
+ * Writes whether one of these instruments passes between the nodes of a surface, since it is not as thick as the longest
+ * edge of its triangles is long: `*needed` is 1 if supple_surface has to have these triangles, else 0. A sphere and a
+ * capsule are as thick as their radius, a field as its deepest point is deep.
+ *
+ * @param points of all `nodes` of the scene at rest, m, three coordinates each.
+ * @param triangles `count` triangles of the boundary, as of supple_boundary.
+ * @param error may be NULL; index is that of an instrument.
+ */
+supple_status supple_needs_triangles(const float *points,
+                                     uint32_t nodes,
+                                     const uint32_t *triangles,
+                                     uint32_t count,
+                                     const supple_instrument *instruments,
+                                     uint32_t instrument_count,
+                                     uint32_t *needed,
+                                     supple_error *error);
 
 /**
  * Bytes of memory that a supple_contact needs for a surface of so many nodes and triangles, of which so many nodes can
@@ -2144,7 +2202,7 @@ supple_status supple_sim_advance(supple_sim *sim,
  * once, before the first step. It takes as long as some steps.
  *
  * @param points the points that the scene was built from, three coordinates each.
- * @param loads NULL: nothing is said of loads.
+ * @param loads NULL: nothing is said of loads, and of instruments that touch what they act on.
  * @param learned NULL: nothing is said of a network.
  * @param remarks receives the first of them; may be NULL if `room` is 0.
  * @param room in `remarks`.

@@ -869,8 +869,32 @@ private:
     return {{position[0], position[1], position[2]}, {0.0f, 0.0f, 0.0f, 1.0f}};
 }
 
+// The triangles of the boundary of a mesh, seen from outside: three numbers each at the beginning of `out`, which has room for twelve
+// an element. Gives how many triangles they are.
+inline result<std::size_t> boundary(span<const std::uint32_t> tetrahedra, span<std::uint32_t> out) noexcept {
+    result<std::size_t> count{status::ok, detail::nothing(status::ok), 0};
+    const std::size_t elements = tetrahedra.size() / 4;
+    std::uint32_t found = 0;
+    count.status = elements < none ? detail::of(supple_boundary(tetrahedra.data(), static_cast<std::uint32_t>(elements), out.data(),
+                                                                out.size() / 3, &found))
+                                   : status::e_capacity;
+    count.error = detail::nothing(count.status);
+    count.value = found;
+    return count;
+}
+
+// The forces of a uniform traction, Pa, on triangles of the boundary of a body of these points, for loads::set_forces: three for each.
+inline result<std::size_t> traction(span<const float> points, span<const std::uint32_t> triangles, const std::array<float, 3> &pascal,
+                                    float ramp, span<force> out) noexcept {
+    result<std::size_t> count{status::ok, detail::nothing(status::ok), triangles.size() / 3 * 3};
+    const auto number = [](std::size_t of) { return static_cast<std::uint32_t>(of / 3 < none ? of / 3 : none); };
+    count.status = detail::of(supple_traction(points.data(), number(points.size()), triangles.data(), number(triangles.size()),
+                                              pascal.data(), ramp, out.data(), out.size(), &count.error));
+    return count;
+}
+
 // What instruments can touch. Without `nodes` all of the scene's; `triangles`, the numbers of their three nodes each, where an
-// instrument is thinner than edges are long.
+// instrument is thinner than edges are long: settings::touchable_by finds out.
 struct surface {
     span<const std::uint32_t> nodes = {};
     span<const std::uint32_t> triangles = {};
@@ -1017,6 +1041,22 @@ struct settings : supple_settings {
         supple_settings::surface = detail::surface_of(touched, nodes);
         grips = grips_at_once;
         return *this;
+    }
+    // What these instruments can touch: all nodes of a body, and its boundary's triangles if one of them is thinner than edges are long.
+    // `room`, twelve numbers an element, must stay until the simulation has been set up.
+    status touchable_by(span<const instrument> tools, const body &from, span<std::uint32_t> room, std::uint32_t grips_at_once = 0,
+                        error *why = nullptr) noexcept {
+        const auto found = boundary(from.tetrahedra, room);
+        if (why) *why = found.error;
+        if (!found) return found.status;
+        const std::size_t nodes = from.points.size() / 3;
+        std::uint32_t needed = 0;
+        const auto count = static_cast<std::uint32_t>(tools.size() < none ? tools.size() : none);
+        const status told = detail::of(supple_needs_triangles(
+            from.points.data(), static_cast<std::uint32_t>(nodes < none ? nodes : none), room.data(),
+            static_cast<std::uint32_t>(found.value), tools.size() ? &tools.data()->raw : nullptr, count, &needed, why));
+        touchable(nodes, {{}, {room.data(), needed ? 3 * found.value : 0}}, grips_at_once);
+        return told;
     }
     // The file of a network: of learned steps, or of another damper than the library's own; not copied: it must stay.
     settings &use_weights(supple::bytes file) noexcept {

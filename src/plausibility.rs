@@ -1,17 +1,19 @@
 //! Does a scene look as if a unit or a number was mistaken? What no tissue and no instrument has is simulated all the
 //! same, but remarked upon before the first step: size (m), mass (kg), density (kg/m^3), Young's modulus (Pa),
 //! Poisson's ratio, gravity (m/s^2), forces (N), prescribed motions (m and m/s, the latter against `sqrt(mu / rho)`,
-//! the speed of shear waves at rest in the softest tissue), supports counted from one, and a network that learned
-//! another tissue.
+//! the speed of shear waves at rest in the softest tissue), supports counted from one, a network that learned
+//! another tissue, and instruments that pass between the nodes that they can touch.
 
 use core::fmt;
 use core::ops::RangeInclusive;
 
 use glam::DVec3;
 
-use crate::element::{Axes, ElementMaterial};
+use crate::contact::{Contact, passes_between};
+use crate::element::{Axes, ElementMaterial, ElementTile};
 use crate::loads::{Motion, NodalForce};
 use crate::material::{AnyLaw, Law, Laws, Material, Moduli, Tissue};
+use crate::mesh::faces;
 use crate::mlp::Recipe;
 use crate::scene::SceneView;
 
@@ -77,6 +79,8 @@ pub enum Remark {
     CountedFromOne,
     /// A network that learned another law, other constants or density, or other tetrahedra.
     OtherTissue,
+    /// An instrument of this thickness, m, that can touch nodes only, where the surface has longer edges.
+    Thin(f32),
 }
 
 impl fmt::Display for Remark {
@@ -123,6 +127,11 @@ impl fmt::Display for Remark {
             }
             Self::OtherTissue => f.write_str(
                 "the network learned from another law, other constants or other tetrahedra: its error here is not known",
+            ),
+            Self::Thin(thickness) => write!(
+                f,
+                "an instrument is {:.2} mm thick, and edges of the surface are longer: it needs the surface's triangles",
+                1e3 * thickness
             ),
         }
     }
@@ -266,6 +275,29 @@ pub fn of_network<M: ElementMaterial>(scene: SceneView<'_, M>, recipe: &Recipe<'
         same(density, recipe.density) && constants.all(|(here, there)| same(here, there))
     };
     (!(is_same_law && tissues_of(scene.material).all(is_same))).then_some(Remark::OtherTissue)
+}
+
+/// Calls `say` with a remark and the number of each instrument that passes between the nodes that it can touch, of a scene
+/// that was built from these points, m.
+pub fn of_contact<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    points: &[[f32; 3]],
+    contact: &Contact<'_>,
+    mut say: impl FnMut(usize, Remark),
+) {
+    if !contact.surface().triangles().is_empty() {
+        return;
+    }
+    // Behind a face that is held elements may have been left out.
+    let is_held = |face: &[u32; 3]| face.iter().all(|&node| scene.held(node as usize) == Axes::XYZ);
+    let nodes = |(tile, lane): (&ElementTile, usize)| [0, 1, 2, 3].map(|corner| tile.node(corner, lane) as u32);
+    for (index, instrument) in contact.instruments().iter().enumerate() {
+        let thickness = instrument.shape.thickness();
+        let faces = scene.places().flat_map(|place| faces(nodes(place))).filter(|face| !is_held(face));
+        if thickness.is_finite() && passes_between(points, faces, thickness) {
+            say(index, Remark::Thin(thickness));
+        }
+    }
 }
 
 /// Whether two values differ by no more than by how a person may write them.

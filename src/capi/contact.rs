@@ -273,7 +273,7 @@ pub unsafe extern "C" fn supple_set_instruments(
 
 /// # Safety
 /// The bytes of a field stay.
-unsafe fn checked(given: &supple_instrument, index: usize) -> Answer<Instrument<'static>> {
+pub(super) unsafe fn checked(given: &supple_instrument, index: usize) -> Answer<Instrument<'static>> {
     let &supple_instrument { shape, radius, length, friction, pose, field, field_bytes } = given;
     let shape = match shape {
         SUPPLE_PLANE => Shape::Plane,

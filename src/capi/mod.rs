@@ -24,6 +24,8 @@ mod scene;
 
 mod loads;
 
+mod traction;
+
 mod state;
 
 mod step;

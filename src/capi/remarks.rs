@@ -35,6 +35,9 @@ pub const SUPPLE_REMARK_SPEED: u32 = 9;
 pub const SUPPLE_REMARK_COUNTED_FROM_ONE: u32 = 10;
 /// The network learned from another law, other constants or density, or other elements: its error here is not known.
 pub const SUPPLE_REMARK_OTHER_TISSUE: u32 = 11;
+/// Instrument `index` is `value` m thick, and edges of the surface are longer: it passes between the nodes, or feels too
+/// little. Give supple_surface its triangles.
+pub const SUPPLE_REMARK_THIN: u32 = 12;
 
 /// What does not look right. Numbers that have no meaning are 0, an index SUPPLE_NONE.
 #[repr(C)]
@@ -64,6 +67,7 @@ impl supple_remark {
             Remark::Speed { speed, waves, .. } => (SUPPLE_REMARK_SPEED, index, speed, waves),
             Remark::CountedFromOne => (SUPPLE_REMARK_COUNTED_FROM_ONE, SUPPLE_NONE, 0.0, 0.0),
             Remark::OtherTissue => (SUPPLE_REMARK_OTHER_TISSUE, SUPPLE_NONE, 0.0, 0.0),
+            Remark::Thin(thickness) => (SUPPLE_REMARK_THIN, index, thickness as f64, 0.0),
         };
         Self { kind, index, value, limit }
     }
@@ -73,7 +77,7 @@ impl supple_remark {
 /// once, before the first step. It takes as long as some steps.
 ///
 /// @param points the points that the scene was built from, three coordinates each.
-/// @param loads NULL: nothing is said of loads.
+/// @param loads NULL: nothing is said of loads, and of instruments that touch what they act on.
 /// @param learned NULL: nothing is said of a network.
 /// @param remarks receives the first of them; may be NULL if `room` is 0.
 /// @param room in `remarks`.
@@ -110,6 +114,10 @@ pub unsafe extern "C" fn supple_remarks(
         for (index, motion) in asked.motions().iter().enumerate() {
             body.of_motion(motion).into_iter().for_each(|remark| say(index, remark));
         }
+        #[cfg(feature = "contact")]
+        if let Some(touching) = &loads.contact {
+            plausibility::of_contact(scene, points, &touching.contact, &mut say);
+        }
         let network = recipe.and_then(|recipe| plausibility::of_network(scene, recipe));
         network.into_iter().for_each(|remark| say(0, remark));
         count.write(told);
@@ -135,6 +143,9 @@ pub extern "C" fn supple_remark_text(kind: u32) -> *const c_char {
             c"supports of nodes far from each other: are nodes counted from one? The first is 0"
         }
         SUPPLE_REMARK_OTHER_TISSUE => c"a network that learned from other tissue: its error here is not known",
+        SUPPLE_REMARK_THIN => {
+            c"an instrument thinner than edges of the surface are long: it needs the surface's triangles"
+        }
         _ => c"?",
     };
     text.as_ptr()

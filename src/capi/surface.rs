@@ -1,10 +1,15 @@
 //! What instruments can touch, as a C host gives it: numbers of nodes and of the corners of triangles, checked and
-//! turned into the entries of a [`crate::contact::Surface`].
+//! turned into the entries of a [`crate::contact::Surface`]; and how a host finds them: the boundary of its mesh, and
+//! whether an instrument needs triangles.
 
-use crate::contact::SurfaceNode;
+use crate::contact::{SurfaceNode, passes_between};
+use crate::mesh::{boundary_in, faces};
 
-use super::memory::array;
-use super::status::{Answer, supple_error, supple_status::*};
+use super::contact::{checked, supple_instrument};
+use super::memory::{self, array, place_for};
+use super::status::{Answer, short, status_of, supple_error, supple_status};
+use super::vectors::overlap;
+use supple_status::*;
 
 /// What instruments can touch.
 #[repr(C)]
@@ -14,7 +19,7 @@ pub struct supple_surface {
     /// number.
     pub nodes: *const u32,
     /// Numbers of the three nodes of each triangle between these nodes, where an instrument is thinner than edges are
-    /// long; else NULL.
+    /// long (supple_needs_triangles); else NULL.
     pub triangles: *const u32,
     /// How many.
     pub node_count: u32,
@@ -26,6 +31,7 @@ pub struct supple_surface {
 pub(super) struct Given<'a> {
     points: &'a [[f32; 3]],
     numbers: Option<&'a [u32]>,
+    is_sorted: bool,
     node_count: u32,
     triangles: &'a [[u32; 3]],
 }
@@ -39,7 +45,8 @@ impl<'a> Given<'a> {
         unsafe {
             let numbers = if nodes.is_null() { None } else { Some(array(nodes, node_count as usize)?) };
             let triangles = array(triangles.cast(), triangle_count as usize)?;
-            Ok(Self { points, numbers, node_count, triangles })
+            let is_sorted = numbers.is_some_and(|list| list.windows(2).all(|pair| pair.first() < pair.last()));
+            Ok(Self { points, numbers, is_sorted, node_count, triangles })
         }
     }
 
@@ -74,10 +81,81 @@ impl<'a> Given<'a> {
         let place = |node: u32| {
             let place = match self.numbers {
                 None => (node < self.node_count).then_some(node),
+                Some(list) if self.is_sorted => list.binary_search(&node).ok().map(|place| place as u32),
                 Some(list) => list.iter().position(|&number| number == node).map(|place| place as u32),
             };
             place.ok_or_else(|| refused(node))
         };
         Ok([place(a)?, place(b)?, place(c)?])
     }
+}
+
+/// Writes the triangles of the boundary of a mesh, which belong to one element only, seen from outside: three nodes each.
+///
+/// @param tetrahedra four nodes of each element, from zero.
+/// @param triangles room for `room` of them; four for each element are needed while they are found.
+/// @param count receives how many at the beginning are of the boundary.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_boundary(
+    tetrahedra: *const u32,
+    elements: u32,
+    triangles: *mut u32,
+    room: usize,
+    count: *mut u32,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let find = || unsafe {
+        let tetrahedra = array(tetrahedra.cast::<[u32; 4]>(), elements as usize)?;
+        let (triangles, count) = (place_for(triangles.cast::<[u32; 3]>())?, place_for(count)?);
+        let needed = 4 * tetrahedra.len();
+        if room < needed {
+            return Err(short(room, needed));
+        }
+        let all = tetrahedra.iter().flat_map(|&nodes| faces(nodes));
+        let (from, to) = (tetrahedra.as_ptr().cast(), triangles.cast());
+        if overlap(from, size_of_val(tetrahedra), to, needed.saturating_mul(12)) {
+            return Err(SUPPLE_E_OVERLAP.into());
+        }
+        for (place, face) in all.enumerate() {
+            triangles.add(place).write(face);
+        }
+        let found = boundary_in(core::slice::from_raw_parts_mut(triangles, needed));
+        count.write(found as u32);
+        Ok(SUPPLE_OK)
+    };
+    status_of(find())
+}
+
+/// Writes whether one of these instruments passes between the nodes of a surface, since it is not as thick as the longest
+/// edge of its triangles is long: `*needed` is 1 if supple_surface has to have these triangles, else 0. A sphere and a
+/// capsule are as thick as their radius, a field as its deepest point is deep.
+///
+/// @param points of all `nodes` of the scene at rest, m, three coordinates each.
+/// @param triangles `count` triangles of the boundary, as of supple_boundary.
+/// @param error may be NULL; index is that of an instrument.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_needs_triangles(
+    points: *const f32,
+    nodes: u32,
+    triangles: *const u32,
+    count: u32,
+    instruments: *const supple_instrument,
+    instrument_count: u32,
+    needed: *mut u32,
+    error: *mut supple_error,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    let tell = || unsafe {
+        let points = array(points.cast::<[f32; 3]>(), nodes as usize)?;
+        let triangles = array(triangles.cast::<[u32; 3]>(), count as usize)?;
+        let (instruments, needed) = (array(instruments, instrument_count as usize)?, place_for(needed)?);
+        let mut thinnest = f32::INFINITY;
+        for (index, instrument) in instruments.iter().enumerate() {
+            thinnest = thinnest.min(checked(instrument, index)?.shape.thickness());
+        }
+        needed.write(passes_between(points, triangles.iter().copied(), thinnest).into());
+        Ok(SUPPLE_OK)
+    };
+    // SAFETY: as above.
+    unsafe { memory::answered(tell(), error) }
 }

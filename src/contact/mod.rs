@@ -83,7 +83,7 @@ pub use local_force::LocalForce;
 pub use pose::Pose;
 pub(crate) use pushes::{Compliance, HELD, TouchedPoint, directions, solve};
 pub use shape::Shape;
-pub use surface::{Surface, SurfaceNode};
+pub use surface::{Surface, SurfaceNode, passes_between};
 #[cfg(any(feature = "std", test))]
 pub use surface::{boundary, boundary_triangles};
 pub(crate) use triangle::TrianglePoint;

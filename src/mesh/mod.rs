@@ -1,7 +1,7 @@
 //! A checked tetrahedral mesh, borrowed from the caller, and the structured bar of the paper. Coordinates are float32,
 //! in metres; they are accurate only if the origin is near the body.
 
-#[cfg(any(feature = "std", test))]
+#[cfg_attr(not(feature = "capi-neo-hookean"), allow(dead_code))]
 mod boundary;
 pub(crate) mod partition;
 mod renumbering;
@@ -9,6 +9,9 @@ pub(crate) mod strips;
 
 #[cfg(any(feature = "std", test))]
 pub use boundary::boundary;
+#[cfg(feature = "capi-neo-hookean")]
+pub(crate) use boundary::boundary_in;
+pub(crate) use boundary::faces;
 pub use renumbering::renumber;
 
 use core::fmt;

@@ -81,7 +81,7 @@ static struct {
     uint64_t before;
     int written;
 } slots[SLOTS];
-static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_damper, of_out, of_saved, copies[4];
+static arena of_points, of_tets, of_supports, of_tissues, of_regions, of_weights, of_damper, of_out, of_faces, of_saved, copies[4];
 static size_t weights_bytes, damper_bytes;
 static const char *doing;
 static supple_report report;
@@ -726,6 +726,40 @@ static supple_status remark(void) {
     return status;
 }
 
+/* The boundary of a damaged mesh, what may touch it, and a traction on it. */
+static supple_status surfaces(void) {
+    const uint32_t elements = one_in(3) ? 1 + below(TETS) : TETS, right = 1 + below(FORCES);
+    uint32_t *t = end_of(&of_tets, 16 * (size_t)elements), *faces = end_of(&of_faces, 48 * (size_t)elements), count = 0, needed = 2;
+    float *p = end_of(&of_points, sizeof points);
+    memcpy(t, tets, 16 * (size_t)elements), memcpy(p, points, sizeof points);
+    for (uint32_t n = below(4); n > 0; n--) {
+        t[below(4 * elements)] = number(below(NODES)), p[below(3 * NODES)] = wild(0.05f);
+    }
+    const size_t there = one_in(20) ? below(4 * elements) : 4 * (size_t)elements;
+    supple_status status = supple_boundary(one_in(60) ? NULL : t, elements, one_in(60) ? NULL : faces, there, one_in(60) ? NULL : &count);
+    if (status < 0) {
+        return status;
+    }
+    if (count == 0 || count > 4 * elements) {
+        fail("a mesh without a boundary", status);
+    }
+    const supple_instrument tool = {number(below(4)), wild(0.02f), wild(0.02f), wild(1.0f), any_pose(), NULL, 0};
+    status = supple_needs_triangles(p, NODES, faces, count, &tool, one_in(9) ? 0 : 1, one_in(60) ? NULL : &needed, wanted());
+    if (status >= 0 && needed > 1) {
+        fail("neither needed nor not", status);
+    }
+    supple_force *forces = end_of(&of_out, 3 * FORCES * sizeof *forces);
+    const float pascal[3] = {wild(100.0f), wild(100.0f), wild(100.0f)};
+    const size_t room = one_in(20) ? below(3 * FORCES) : 3 * FORCES;
+    status = supple_traction(p, NODES, faces, count < right ? count : right, pascal, one_in(9) ? wild(0.1f) : 0.0f, one_in(60) ? NULL : forces, room, wanted());
+    for (uint32_t n = 0; status >= 0 && n < 3 * (count < right ? count : right); n++) {
+        if (forces[n].node >= NODES || !isfinite(forces[n].newton[0] + forces[n].newton[1] + forces[n].newton[2])) {
+            fail("a traction that is no force", status);
+        }
+    }
+    return status;
+}
+
 static supple_status feel(void) {
     supple_reaction_force force;
     memset(&force, 0xff, sizeof force);
@@ -772,9 +806,9 @@ static void one_call(void) {
                {"set a step", set_step, 8}, {"save and restore", save_and_restore, 6}, {"steps", step, 50}, {"follow", follow, 8},
                {"a reaction", make_reaction, 3}, {"feel", feel, 8}, {"other", other, 6}, {"adaptive steps", make_adaptive, 2},
                {"advance", advance, 8}, {"remarks", remark, 4}, {"a contact", make_contact, 4}, {"touch", touch, 20},
-               {"a simulation", make_sim, 4}, {"use of a simulation", use_sim, 30}};
+               {"a simulation", make_sim, 4}, {"use of a simulation", use_sim, 30}, {"surfaces", surfaces, 6}};
     int at = 0;
-    for (int draw = (int)below(213); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
+    for (int draw = (int)below(219); draw >= all[at].often && at + 1 < (int)(sizeof all / sizeof *all); at++) {
         draw -= all[at].often;
     }
     doing = all[at].name;
@@ -835,7 +869,7 @@ int main(int argc, char **argv) {
     }
     of_points = arena_of(sizeof points), of_tets = arena_of(sizeof tets), of_supports = arena_of(sizeof supports);
     of_tissues = arena_of(2 * sizeof(supple_tissue)), of_regions = arena_of(2 * TETS);
-    of_weights = arena_of(1 << 16), of_damper = arena_of(1 << 13), of_out = arena_of(1 << 13), of_saved = arena_of(1 << 13);
+    of_weights = arena_of(1 << 16), of_damper = arena_of(1 << 13), of_out = arena_of(1 << 13), of_faces = arena_of(48 * TETS), of_saved = arena_of(1 << 13);
     copies[0] = arena_of(sizes_of[STATE]), copies[1] = arena_of(sizes_of[LARGE]);
     file("weights/compact-10.weights", of_weights.start, of_weights.room, &weights_bytes);
     memmove(end_of(&of_weights, (weights_bytes + 63) / 64 * 64), of_weights.start, weights_bytes);

@@ -679,10 +679,61 @@ static void remarks(supple_scene_config config) {
     DONE(supple_remarks(odd, points[0], NULL, learned, told, 4, &count));
     CHECK(count == 3 && told[0].kind == SUPPLE_REMARK_DENSITY && told[0].index == 0);
     CHECK(told[1].kind == SUPPLE_REMARK_POISSON_RATIO && told[1].value < 0.0 && told[2].kind == SUPPLE_REMARK_OTHER_TISSUE);
-    for (uint32_t kind = SUPPLE_REMARK_SIZE; kind <= SUPPLE_REMARK_OTHER_TISSUE; kind++) {
+    for (uint32_t kind = SUPPLE_REMARK_SIZE; kind <= SUPPLE_REMARK_THIN; kind++) {
         CHECK(strlen(supple_remark_text(kind)) > 10);
     }
     CHECK(strcmp(supple_remark_text(0), "?") == 0);
+}
+
+/* The boundary, what may touch it, and what pulls at it. */
+static void surfaces(void) {
+    static uint32_t faces[4 * TETS][3];
+    static supple_force pull[3 * 4 * TETS];
+    uint32_t count = 0, needed = 9;
+    REFUSED(SUPPLE_E_NULL, supple_boundary(NULL, TETS, faces[0], 4 * TETS, &count));
+    REFUSED(SUPPLE_E_NULL, supple_boundary(tets[0], TETS, NULL, 4 * TETS, &count));
+    REFUSED(SUPPLE_E_NULL, supple_boundary(tets[0], TETS, faces[0], 4 * TETS, NULL));
+    REFUSED(SUPPLE_E_SHORT, supple_boundary(tets[0], TETS, faces[0], 4 * TETS - 1, &count));
+    REFUSED(SUPPLE_E_OVERLAP, supple_boundary(tets[0], TETS, tets[TETS - 1], 4 * TETS, &count));
+    DONE(supple_boundary(tets[0], TETS, faces[0], 4 * TETS, &count));
+    CHECK(count == 4 * (X * Y + Y * Z + Z * X));
+
+    /* Edges of the surface are the diagonals of cells of 10 mm at most, 14.1 mm; those inside are longer. */
+    supple_instrument tools[2] = {{SUPPLE_PLANE, 0.0f, 0.0f, 0.0f, {{0, 0, 0}, {0, 0, 0, 0}}, NULL, 0},
+                                  {SUPPLE_SPHERE, 0.0143f, 0.0f, 0.0f, {{0, 0, 0}, {0, 0, 0, 0}}, NULL, 0}};
+    DONE(supple_needs_triangles(points[0], NODES, faces[0], count, tools, 2, &needed, &error));
+    CHECK(needed == 0);
+    tools[1].radius = 0.014f;
+    DONE(supple_needs_triangles(points[0], NODES, faces[0], count, tools, 2, &needed, &error));
+    CHECK(needed == 1);
+    tools[1].radius = NAN;
+    REFUSED(SUPPLE_E_INSTRUMENT, supple_needs_triangles(points[0], NODES, faces[0], count, tools, 2, &needed, &error));
+    CHECK(error.index == 1 && isnan(error.value));
+    REFUSED(SUPPLE_E_NULL, supple_needs_triangles(points[0], NODES, faces[0], count, tools, 1, NULL, &error));
+    REFUSED(SUPPLE_E_NULL, supple_needs_triangles(NULL, NODES, faces[0], count, tools, 1, &needed, &error));
+
+    /* On a closed surface a traction is pressure times its area. */
+    const float pascal[3] = {0.0f, -50.0f, 0.0f}, wrong[3] = {0.0f, NAN, 0.0f};
+    REFUSED(SUPPLE_E_SHORT, supple_traction(points[0], NODES, faces[0], count, pascal, 0.0f, pull, 3 * count - 1, &error));
+    CHECK(error.limit == 3.0 * count);
+    REFUSED(SUPPLE_E_NULL, supple_traction(points[0], NODES, faces[0], count, NULL, 0.0f, pull, 3 * count, &error));
+    REFUSED(SUPPLE_E_NULL, supple_traction(points[0], NODES, faces[0], count, pascal, 0.0f, NULL, 3 * count, &error));
+    REFUSED(SUPPLE_E_NEGATIVE, supple_traction(points[0], NODES, faces[0], count, pascal, -1.0f, pull, 3 * count, &error));
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_traction(points[0], NODES, faces[0], count, wrong, 0.0f, pull, 3 * count, &error));
+    CHECK(error.index == 0);
+    const uint32_t last = faces[1][2];
+    faces[1][2] = NODES;
+    REFUSED(SUPPLE_E_INDEX, supple_traction(points[0], NODES, faces[0], count, pascal, 0.0f, pull, 3 * count, &error));
+    CHECK(error.index == 1 && error.node == NODES && error.limit == NODES);
+    faces[1][2] = last;
+    DONE(supple_traction(points[0], NODES, faces[0], count, pascal, 0.5f, pull, 3 * count, &error));
+    double sum = 0.0;
+    for (uint32_t n = 0; n < 3 * count; n++) {
+        sum += (double)pull[n].newton[1];
+        CHECK(pull[n].ramp == 0.5f && pull[n].node < NODES);
+    }
+    CHECK(fabs(sum / (-50.0 * 2e-4 * (X * Y + Y * Z + Z * X)) - 1.0) < 1e-4);
+    printf("surfaces: %u triangles, a traction of %.4f N\n", (unsigned)count, sum);
 }
 
 /* Instruments that touch, hold and let go; and all that is refused of them. */
@@ -875,6 +926,7 @@ int main(int argc, char **argv) {
     guards();
     adaptive_steps();
     reactions();
+    surfaces();
     contacts();
     remarks(config);
     DONE(supple_state_reset(state));

@@ -309,6 +309,82 @@ void simulated(const char *path) {
     EXPECT(build(supple::settings(supple::steps::learned).use_weights({weights.data(), 8}), room).status == status::e_weights_short);
 }
 
+// A ball as large as an edge is long presses the top of a cube of cells of 10 mm, between its nodes: the mean upward force of the last
+// frame, with what the helper lets it touch, with nodes alone, and with triangles.
+void thin() {
+    constexpr std::uint32_t n = 4, side = n + 1;
+    std::vector<float> at;
+    std::vector<std::uint32_t> tets;
+    std::vector<supple::support> held;
+    for (std::uint32_t node = 0; node < side * side * side; node++) {
+        for (const std::uint32_t cell : {node % side, node / side % side, node / side / side}) at.push_back(0.01f * float(cell));
+        if (node < side * side) held.push_back({node, 7, 0});
+    }
+    const std::uint32_t step[] = {1, side, side * side};
+    for (std::uint32_t cell = 0; cell < n * n * n; cell++) {
+        const std::uint32_t a = cell % n + side * (cell / n % n) + side * side * (cell / n / n);
+        for (const auto &[first, second] : {std::pair{0, 1}, {1, 2}, {2, 0}, {1, 0}, {2, 1}, {0, 2}}) {
+            const bool even = (first + 1) % 3 == second;
+            const std::uint32_t b = a + step[first], c = b + step[second];
+            tets.insert(tets.end(), {a, even ? b : c, even ? c : b, a + 1 + side + side * side});
+        }
+    }
+    supple::body cube = tetrahedron();
+    cube.points = at, cube.tetrahedra = tets, cube.supports = held;
+    std::vector<std::uint32_t> faces(3 * tets.size());
+    const auto found = supple::boundary(tets, faces);
+    EXPECT(found && found.value == 6 * 2 * n * n);
+    EXPECT(supple::boundary(tets, {faces.data(), 12}).status == status::e_short);
+
+    const auto place = [](float height) { return supple::pose_at({0.0167f, 0.0133f, height}); };
+    const supple::instrument ball[] = {supple::instrument::sphere(0.01f, place(0.0501f))}, large[] = {supple::instrument::sphere(0.02f, place(0.0601f))};
+    const auto force = [&](const supple::settings &how) {
+        std::vector<supple::line> memory(supple::lines(supple::simulation::size(cube, how).value));
+        const auto made = supple::simulation::make(memory, cube, how);
+        EXPECT(made && is_done(made.value.contact().set(ball)));
+        supple::touch felt{};
+        for (int frame = 0; frame < 20; frame++) {
+            EXPECT(is_done(made.value.contact().move(0, place(0.0501f - 1e-4f * float(frame + 1)), 0.01 * frame, 0.01 * (frame + 1))));
+            EXPECT(is_done(made.value.advance(0.01)) && is_done(made.value.contact().read(0, felt)));
+        }
+        supple::remark remarks[8];
+        const auto count = supple::remarks(made.value.scene(), at, remarks, made.value.loads());
+        const bool told = count && count.value > 0 && remarks[count.value - 1].kind == SUPPLE_REMARK_THIN;
+        EXPECT(told == (how.surface.triangle_count == 0));
+        if (told) EXPECT(remarks[count.value - 1].value == double(0.01f) && remarks[count.value - 1].index == 0);
+        return double(felt.mean_force[2]);
+    };
+    supple::settings by_itself(supple::steps::exact, 20.0f), alone = by_itself, given = by_itself;
+    supple::error why;
+    EXPECT(is_done(by_itself.touchable_by(large, cube, faces)) && by_itself.surface.triangle_count == 0);
+    EXPECT(by_itself.touchable_by(ball, cube, {faces.data(), 12}, 0, &why) == status::e_short);
+    const supple::instrument none[] = {supple::instrument::sphere(-1, place(0))};
+    EXPECT(by_itself.touchable_by(none, cube, faces, 0, &why) == status::e_instrument && why.value == -1);
+    EXPECT(is_done(by_itself.touchable_by(ball, cube, faces, 0, &why)));
+    EXPECT(is_done(why.status == SUPPLE_OK ? status::ok : status::e_null));
+    alone.touchable(at.size() / 3), given.touchable(at.size() / 3, {{}, {faces.data(), 3 * found.value}});
+    const double helped = force(by_itself), nodes = force(alone), triangles = force(given);
+    std::printf("wrapper: a ball as large as an edge feels %.1f mN, with nodes alone %.1f mN\n", 1e3 * helped, 1e3 * nodes);
+    EXPECT(helped == triangles && helped > 0 && nodes < 0.5 * helped);
+
+    // A traction on one side adds up to pressure times area.
+    std::vector<supple::force> forces(found.value * 3);
+    std::vector<std::uint32_t> top;
+    for (std::size_t face = 0; face < found.value; face++) {
+        bool above = true;
+        for (int corner = 0; corner < 3; corner++) above = above && at[3 * faces[3 * face + std::size_t(corner)] + 2] > 0.039f;
+        if (above) top.insert(top.end(), &faces[3 * face], &faces[3 * face] + 3);
+    }
+    const auto pressed = supple::traction(at, top, {0, 0, -100}, 0.1f, forces);
+    float sum = 0;
+    for (std::size_t each = 0; each < pressed.value; each++) sum += forces[each].newton[2];
+    EXPECT(pressed && pressed.value == 3 * 2 * n * n && sum < -0.1599f && sum > -0.1601f && forces[0].ramp == 0.1f);
+    EXPECT(supple::traction(at, top, {0, 0, -100}, -1, forces).status == status::e_negative);
+    EXPECT(supple::traction(at, top, {0, 0, -100}, 0, {forces.data(), 2}).status == status::e_short);
+    top[4] = 999;
+    EXPECT_SENTENCE(supple::traction(at, top, {0, 0, -100}, 0, forces).error, "a node that does not exist: entry 1, node 999, against 125");
+}
+
 } // namespace
 
 int main(int count, char **words) {
@@ -334,6 +410,7 @@ int main(int count, char **words) {
     remarked(scene.value, loads.value, state.value);
     refused(scene.value, loads.value, state.value);
     simulated(words[1]);
+    thin();
     std::puts(wrong ? "wrapper: not as expected" : "wrapper: as expected");
     return wrong;
 }

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use serde::Deserialize;
-use supple::contact::{Contact, Instrument, MOST_INSTRUMENTS, Pose, Shape, Surface, SurfaceField, SurfaceNode};
+use supple::contact::{
+    Contact, Instrument, MOST_INSTRUMENTS, Pose, Shape, Surface, SurfaceField, SurfaceNode, passes_between,
+};
 use toml::Spanned;
 
 use super::body::Body;
@@ -75,13 +77,8 @@ impl SceneInstruments {
         let mut nodes = triangles.as_flattened().to_vec();
         nodes.sort_unstable();
         nodes.dedup();
-        let length = |[a, b]: [u32; 2]| {
-            let [a, b] = [a, b].map(|node| body.local[node as usize]);
-            (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f32>().sqrt()
-        };
-        let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-        let longest = edges.map(length).fold(0.0, f32::max);
-        if all.iter().all(|instrument| instrument.shape.shape().thickness() >= longest) {
+        let thinnest = all.iter().map(|instrument| instrument.shape.shape().thickness()).fold(f32::INFINITY, f32::min);
+        if !passes_between(&body.local, triangles.iter().copied(), thinnest) {
             triangles.clear();
         }
         for corner in triangles.as_flattened_mut() {
