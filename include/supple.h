@@ -391,6 +391,12 @@ enum supple_status
      * The points are not those that element `index` of the scene was built from.
      */
     SUPPLE_E_POINTS = -15,
+#if defined(SUPPLE_IO)
+    /**
+     * There is no mesh in the file, for the reason that the words tell.
+     */
+    SUPPLE_E_FILE = -16,
+#endif
     /**
      * The mesh has no nodes or no elements.
      */
@@ -1478,6 +1484,27 @@ typedef struct {
     double limit;
 } supple_remark;
 
+#if defined(SUPPLE_IO)
+/**
+ * How large the mesh of a file is. A host defines SUPPLE_IO, and has a library with the feature io, to use this and the
+ * two functions that take it.
+ */
+typedef struct {
+    /**
+     * Nodes, also those of no element.
+     */
+    uint32_t nodes;
+    /**
+     * Tetrahedra.
+     */
+    uint32_t elements;
+    /**
+     * 1 if the file tells of what region each tetrahedron is; else 0.
+     */
+    uint32_t has_regions;
+} supple_mesh_size;
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -1691,6 +1718,19 @@ supple_status supple_step(const supple_scene *scene,
                           uint32_t count,
                           const supple_threads *threads,
                           supple_report *report);
+
+#if defined(SUPPLE_PARALLEL)
+/**
+ * Writes threads for all functions that take them: those of a pool, one for each processor and SUPPLE_MOST_PARTS at most,
+ * which the library starts at the first step that needs them, and which stay as long as the process does. A process that
+ * is forked has none of them: fork before. A host defines SUPPLE_PARALLEL, and has a library with the feature
+ * parallel, to use it.
+ *
+ * @param parts that a step shall be cut into, 1 to SUPPLE_MOST_PARTS.
+ */
+supple_status supple_own_threads(uint32_t parts,
+                                 supple_threads *threads);
+#endif
 
 /**
  * Tells where the displacements of a state are, m. They stay there for as long as the state does; read them between
@@ -2220,6 +2260,40 @@ supple_status supple_remarks(const supple_scene *scene,
  * What a remark means, a few English words for people; "?" for a number that is none.
  */
 const char *supple_remark_text(uint32_t kind);
+
+#if defined(SUPPLE_IO)
+/**
+ * Writes how large the mesh of a file is. The extension tells the format: .vtk, .vtu, .msh (Gmsh 1, 2.x and 4.1), .node
+ * or .ele (TetGen). It reads the whole file, on the heap, and releases what it took. What is wrong with the file,
+ * SUPPLE_E_FILE, stands in `words`: a sentence with the file, the place in it and the value.
+ *
+ * @param path in UTF-8.
+ * @param words receives the sentence, cut to `room` bytes, or nothing; NULL if `room` is 0.
+ */
+supple_status supple_measure_mesh(const char *path,
+                                  supple_mesh_size *size,
+                                  char *words,
+                                  size_t room);
+#endif
+
+#if defined(SUPPLE_IO)
+/**
+ * Writes the mesh of a file of a known size. Nothing is scaled, renumbered or turned.
+ *
+ * @param size as of supple_measure_mesh. A file that has changed since is refused.
+ * @param points receives three coordinates of each node, in the unit of the file.
+ * @param tetrahedra receives four nodes of each element, from zero.
+ * @param regions receives the region of each element, if the file has regions; else it may be NULL.
+ * @param words as of supple_measure_mesh.
+ */
+supple_status supple_read_mesh(const char *path,
+                               const supple_mesh_size *size,
+                               double *points,
+                               uint32_t *tetrahedra,
+                               int32_t *regions,
+                               char *words,
+                               size_t room);
+#endif
 
 #ifdef __cplusplus
 }  // extern "C"

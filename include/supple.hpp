@@ -73,6 +73,9 @@ enum class [[nodiscard]] status : std::int32_t {
     e_overlap = SUPPLE_E_OVERLAP,
     e_element = SUPPLE_E_ELEMENT,
     e_points = SUPPLE_E_POINTS,
+#ifdef SUPPLE_IO
+    e_file = SUPPLE_E_FILE,
+#endif
 
     e_mesh_empty = SUPPLE_E_MESH_EMPTY,
     e_mesh_repeated_node = SUPPLE_E_MESH_REPEATED_NODE,
@@ -236,6 +239,9 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_kind): case of(s::e_choice): case of(s::e_mismatch): case of(s::e_capacity):
     case of(s::e_index): case of(s::e_not_finite): case of(s::e_negative): case of(s::e_overlap):
     case of(s::e_element): case of(s::e_points):
+#ifdef SUPPLE_IO
+    case of(s::e_file):
+#endif
     case of(s::e_mesh_empty): case of(s::e_mesh_repeated_node): case of(s::e_mesh_degenerate):
     case of(s::e_mesh_inverted): case of(s::e_mesh_unused_node): case of(s::e_constant):
     case of(s::e_density): case of(s::e_tissue): case of(s::e_nothing_moves): case of(s::e_law):

@@ -15,7 +15,8 @@
 #     DIR/share/supple/licences    MIT and Apache 2.0, to choose from
 #
 # --destdir is put before the prefix, to make packages. FEATURES (capi) are those of Cargo.toml: capi-neo-hookean has only the
-# first of the laws and no nodal strain; deterministic may be added after a comma.
+# first of the laws and no nodal strain; deterministic may be added after a comma, and so may io (meshes out of files) and parallel (threads
+# of the library's own): with one of these it needs the system's C library, and the static one more of it than a host may have linked.
 set -euo pipefail
 
 usage() {
@@ -70,7 +71,10 @@ into include include/supple.h include/supple.hpp
 into lib "$built/libsupple.a" "$built/libsupple.so"
 # Rust's own fmod, sqrt and the like would take the place of the host's, and ask for a function that only Rust programs
 # have. The core needs none of them.
-ar t "$to/lib/libsupple.a" | grep -v '^supple\.' | sort -u | xargs ar d "$to/lib/libsupple.a"
+case ,$features, in
+    *,io,* | *,parallel,*) ;;
+    *) ar t "$to/lib/libsupple.a" | grep -v '^supple\.' | sort -u | xargs ar d "$to/lib/libsupple.a" ;;
+esac
 strip --strip-debug "$to/lib/libsupple.a"
 mv "$to/lib/libsupple.so" "$to/lib/$shared"
 chmod 755 "$to/lib/$shared"

@@ -65,7 +65,7 @@ shared=$prefix/lib/libsupple.so
 static=$prefix/lib/libsupple.a
 
 # What the header declares, and nothing else.
-grep -o '\bsupple_[a-z_]*(' include/supple.h | tr -d '(' | sort -u >"$folder/declared"
+gcc -E -P include/supple.h | grep -o '\bsupple_[a-z_]*(' | tr -d '(' | sort -u >"$folder/declared"
 nm -D --defined-only "$shared" | awk '{ print $3 }' | sort >"$folder/exported"
 diff "$folder/declared" "$folder/exported" || fail "the shared library exports (>) what the header does not declare (<)"
 ok "the shared library exports the $(wc -l <"$folder/declared") functions of the header and nothing else"

@@ -35,7 +35,7 @@ for features in capi capi-neo-hookean capi-neo-hookean,contact; do
     cp "$libraries/$features/lib/libsupple.a" "$libraries/x86-64-$features.a"
 done
 
-mapfile -t all < <(grep -o '\bsupple_[a-z_]*(' include/supple.h | tr -d '(' | sort -u)
+mapfile -t all < <(gcc -E -P include/supple.h | grep -o '\bsupple_[a-z_]*(' | tr -d '(' | sort -u)
 exact=(
     supple_scene_{init,size} supple_state_{init,size,time,reset} supple_loads_{init,size}
     supple_set_{gravity,forces,motions,step} supple_critical_step supple_step

@@ -30,6 +30,8 @@ mod state;
 
 mod step;
 
+mod pool;
+
 mod vectors;
 
 mod surface;
@@ -53,6 +55,8 @@ mod reaction;
 mod simulation;
 
 mod remarks;
+
+mod mesh_file;
 
 #[cfg(test)]
 mod memory_tests;

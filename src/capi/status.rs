@@ -69,6 +69,9 @@ pub enum supple_status {
     SUPPLE_E_ELEMENT = -14,
     /// The points are not those that element `index` of the scene was built from.
     SUPPLE_E_POINTS = -15,
+    /// There is no mesh in the file, for the reason that the words tell.
+    #[cfg(feature = "io")]
+    SUPPLE_E_FILE = -16,
 
     /// The mesh has no nodes or no elements.
     SUPPLE_E_MESH_EMPTY = -20,
@@ -400,6 +403,8 @@ fn text(status: i32) -> Option<&'static CStr> {
         -13 => c"an array that is written overlaps the object that is read",
         -14 => c"the state was prepared for a scene of other elements",
         -15 => c"points that the scene was not built from",
+        #[cfg(feature = "io")]
+        -16 => c"there is no mesh in the file",
         -20 => c"the mesh has no elements",
         -21 => c"an element names a node twice",
         -22 => c"an element is flat",
