@@ -3,8 +3,9 @@
 #
 #     tools/wheel.sh [LIBRARY]
 #
-# LIBRARY: a libsupple.so that is there already; else one is built. The wheel is in target/wheel. Its library needs nothing of the system and
-# chooses its instructions itself, and nothing in the wheel is compiled for a Python: one wheel for every Python 3 on x86-64 Linux.
+# LIBRARY: a libsupple.so with the features io and parallel that is there already; else one is built. The wheel is in target/wheel. Its
+# library chooses its instructions itself and needs no more than glibc, of the version that the name of the wheel tells (that of the
+# machine that built it, at most 2.34); nothing in the wheel is compiled for a Python: one wheel for every Python 3 on such an x86-64 Linux.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -16,10 +17,15 @@ python3 -c 'import ensurepip' 2>/dev/null || {
     apt-get update -qq && apt-get install -y -qq --no-install-recommends python3-venv
 }
 if [ -z "$library" ]; then
-    tools/install.sh --prefix "$folder/installed" >/dev/null
+    tools/install.sh --prefix "$folder/installed" --features capi,io,parallel >/dev/null
     library=$folder/installed/lib/libsupple.so
 fi
-needed=$(readelf -d "$library" | grep NEEDED) && { echo "the library needs more than the wheel has: $needed" >&2; exit 1; }
+if readelf -dW "$library" | grep NEEDED | grep -vE '\[(libc\.so\.6|libgcc_s\.so\.1|ld-linux-x86-64\.so\.2)\]'; then
+    echo "the library needs more than every Linux with glibc has" >&2
+    exit 1
+fi
+# Weak symbols may be missing.
+glibc=$(readelf -VW "$library" | sed -n 's/.*Name: GLIBC_\([0-9.]*\) *Flags: none.*/\1/p' | sort -V | tail -1)
 
 # The package as it will be, without what earlier builds have left.
 cp -r src/python "$folder/package"
@@ -29,7 +35,7 @@ python3 -m venv "$folder/build"
 "$folder/build/bin/python" "$folder/package/build_interface.py" include/supple.h
 "$folder/build/bin/mypy" --strict --no-error-summary --cache-dir "$folder/mypy" --config-file "$folder/package/pyproject.toml" "$folder/package/supple"
 "$folder/build/bin/pip" wheel --quiet --no-deps --no-build-isolation --wheel-dir "$folder" "$folder/package"
-"$folder/build/bin/python" -m wheel tags --remove --python-tag py3 --abi-tag none --platform-tag manylinux2014_x86_64 \
+"$folder/build/bin/python" -m wheel tags --remove --python-tag py3 --abi-tag none --platform-tag "manylinux_${glibc//./_}_x86_64" \
     "$folder"/supple-*.whl >/dev/null
 ls -l "$folder"/supple-*.whl
 

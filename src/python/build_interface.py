@@ -19,7 +19,8 @@ def declarations(header: str) -> str:
     """The header as cffi reads it: preprocessed, and its plain numbers as constants."""
     preprocessor = pcpp.Preprocessor()
     preprocessor.line_directive = None
-    preprocessor.define("__STDC_VERSION__ 201112L")
+    for name in ("__STDC_VERSION__ 201112L", "SUPPLE_IO 1", "SUPPLE_PARALLEL 1"):
+        preprocessor.define(name)
     preprocessor.parse(re.sub(r"^#include.*$", "", header, flags=re.M))
     text = io.StringIO()
     preprocessor.write(text)

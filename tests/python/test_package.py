@@ -155,14 +155,6 @@ def test_steps_are_refused_in_words(soft):
     assert simulation.advance(1e-3).ok
 
 
-def test_a_mesh_that_meshio_gives_up_on_is_refused(tmp_path):
-    """Of Gmsh 1 files meshio ends the process."""
-    path = tmp_path / "old.msh"
-    path.write_text("$NOD\n1\n1 0 0 0\n$ENDNOD\n$ELM\n0\n$ENDELM\n")
-    with pytest.raises(supple.InputError, match="old.msh: meshio cannot read it"):
-        supple.Mesh.read(path)
-
-
 def test_forces_on_320_nodes_take_less_than_50_us(lobe, liver):
     simulation = supple.Simulation(supple.Scene(lobe, liver, fixed=lobe.points[:, 1] > 0.03))
     nodes, newton = np.arange(320), np.full((320, 3), 1e-5)

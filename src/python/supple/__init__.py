@@ -15,14 +15,15 @@ From a mesh to a deformed one, in ten lines:
 
 from ._library import lib as _lib
 from .errors import Diverged, Error, InputError, UnstableStep
-from .instruments import Instrument, Touch
+from .instruments import Instrument, LocalForce, Touch
 from .mesh import Mesh
+from .reactions import Reaction, ReactionForce
 from .scene import Material, Scene
 from .simulation import METHODS, Report, Simulation
 
 __all__ = [
-    "METHODS", "Diverged", "Error", "InputError", "Instrument", "Material", "Mesh", "Report", "Scene", "Simulation", "Touch",
-    "UnstableStep", "level", "version",
+    "METHODS", "Diverged", "Error", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Reaction", "ReactionForce", "Report",
+    "Scene", "Simulation", "Touch", "UnstableStep", "level", "version",
 ]
 
 

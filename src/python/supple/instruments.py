@@ -1,4 +1,4 @@
-"""Rigid instruments that touch the tissue, and what they feel."""
+"""Rigid instruments that touch the tissue, what they feel, and the force on them between two frames."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from . import _library as library
 from ._library import ffi, lib
 from .errors import InputError
-from .mesh import Mesh
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,10 +62,10 @@ class Touch:
     depth: float
 
 
-def _three(position: ArrayLike) -> tuple[float, float, float]:
-    array = np.asarray(position, np.float64)
+def _three(vector: ArrayLike, unit: str = "m") -> tuple[float, float, float]:
+    array = np.asarray(vector, np.float64)
     if array.shape != (3,) or not np.isfinite(array).all():
-        raise InputError(f"position {position!r}: three finite numbers are needed, m")
+        raise InputError(f"{'position' if unit == 'm' else 'force'} {vector!r}: three finite numbers are needed, {unit}")
     return float(array[0]), float(array[1]), float(array[2])
 
 
@@ -81,13 +80,68 @@ def _pose(position: ArrayLike, rotation: ArrayLike) -> Any:
     return ffi.new("supple_pose *", {"position": _three(position), "rotation": _four(rotation)})
 
 
+# As supple_contact_point.
+POINT = np.dtype(
+    [("position", np.float32, 3), ("normal", np.float32, 3), ("force", np.float32, 3), ("depth", np.float32)]
+    + [("node", np.uint32), ("instrument", np.uint32)]
+)
+
+
+class LocalForce:
+    """The force on an instrument between two frames, for a haptic loop: a stiffness that `follow` learns from each frame. `at` may be
+    called from any thread, as often as you like."""
+
+    def __init__(self) -> None:
+        self._model = ffi.new("supple_local_force *")
+
+    def follow(self, position: ArrayLike, force: ArrayLike) -> None:
+        """After a frame: where the instrument is (m), and the force on it (N), such as `Touch.force`."""
+        # Those that ask meanwhile have the former one.
+        model = ffi.new("supple_local_force *", self._model[0])
+        at, newton = (ffi.new("float[3]", _three(each, "m" if each is position else "N")) for each in (position, force))
+        library.checked(lib.supple_local_force_follow(model, at, newton), what="the local force")
+        self._model = model
+
+    def at(self, position: ArrayLike) -> NDArray[np.float32]:
+        """The force (N) at a position (m) before the next frame."""
+        force = np.empty(3, np.float32)
+        status = lib.supple_local_force_at(self._model, ffi.new("float[3]", _three(position)), library.pointer("float", force))
+        library.checked(status, what="the local force")
+        return force
+
+    @property
+    def stiffness(self) -> NDArray[np.float32]:
+        """Change of the force with the position, N/m, symmetric, of shape (3, 3)."""
+        return np.array([list(row) for row in self._model.stiffness], np.float32)
+
+    @property
+    def errors(self) -> tuple[float, float]:
+        """By how much the force that was predicted for the latest frame was off, and holding that of the frame before, N."""
+        return float(self._model.error), float(self._model.hold_error)
+
+
+class Rows:
+    """Instruments as the library takes them, with the memory of their fields."""
+
+    def __init__(self, instruments: list[Instrument]) -> None:
+        self.list, self.fields = list(instruments), list[NDArray[np.uint8]]()
+        self.raw = ffi.new("supple_instrument[]", max(len(instruments), 1))
+        for row, each in zip(self.raw, instruments):
+            row.shape, row.radius, row.length, row.friction = each.shape, each.radius, each.length, each.friction
+            row.pose = _pose(each.position, each.rotation)[0]
+            if each.distances is not None:
+                memory = library.Memory(len(each.distances))
+                memory.view[:] = np.frombuffer(each.distances, np.uint8)
+                self.fields.append(memory.view)
+                row.field, row.field_bytes = memory.pointer, len(each.distances)
+
+
 class Contact:
     """The instruments of one simulation; used through `Simulation`."""
 
-    def __init__(self, mesh: Mesh, scene: Any, triangles: bool, grips: int) -> None:
-        points, boundary = mesh.points, mesh.boundary()
-        nodes = np.unique(boundary).astype(np.uint32)
-        corners = np.ascontiguousarray(boundary if triangles else boundary[:0])
+    def __init__(self, points: NDArray[np.float32], boundary: NDArray[np.uint32], scene: Any, triangles: bool, grips: int) -> None:
+        self.triangles, self.grips = triangles, grips
+        nodes, corners = np.unique(boundary).astype(np.uint32), boundary if triangles else boundary[:0]
         surface = ffi.new("supple_surface *")
         surface.nodes, surface.node_count = library.pointer("uint32_t", nodes), len(nodes)
         surface.triangles, surface.triangle_count = library.pointer("uint32_t", corners), len(corners)
@@ -98,22 +152,23 @@ class Contact:
             self.memory.pointer, size, scene, library.pointer("float", points), surface, grips, made, error
         )
         library.checked(status, error, "instruments")
-        self.raw, self.list = made[0], list[Instrument]()
+        self.raw = made[0]
+        self._rows = Rows([])
 
-    def put(self, instruments: list[Instrument]) -> None:
-        rows = ffi.new("supple_instrument[]", max(len(instruments), 1))
-        fields: list[NDArray[np.uint8]] = []
-        for row, each in zip(rows, instruments):
-            row.shape, row.radius, row.length, row.friction = each.shape, each.radius, each.length, each.friction
-            row.pose = _pose(each.position, each.rotation)[0]
-            if each.distances is not None:
-                memory = library.Memory(len(each.distances))
-                memory.view[:] = np.frombuffer(each.distances, np.uint8)
-                fields.append(memory.view)
-                row.field, row.field_bytes = memory.pointer, len(each.distances)
+    @property
+    def list(self) -> list[Instrument]:
+        return self._rows.list
+
+    def put(self, rows: Rows) -> None:
         error = library.new_error()
-        library.checked(lib.supple_set_instruments(self.raw, rows, len(instruments), error), error, "instruments")
-        self.list, self._fields = list(instruments), fields
+        library.checked(lib.supple_set_instruments(self.raw, rows.raw, len(rows.list), error), error, "instruments")
+        self._rows = rows
+
+    def points(self) -> NDArray[np.void]:
+        found, count = np.zeros(lib.SUPPLE_MOST_CONTACT_POINTS, POINT), ffi.new("uint32_t *")
+        status = lib.supple_contact_points(self.raw, library.pointer("supple_contact_point", found), len(found), count)
+        library.checked(status, what="contact points")
+        return found[: count[0]]
 
     def move(self, index: int, position: ArrayLike, rotation: ArrayLike | None, start: float, end: float) -> None:
         error = library.new_error()
@@ -127,3 +182,12 @@ class Contact:
         library.checked(lib.supple_read_touch(self.raw, index, felt), what=f"instrument {index}")
         force, mean, moment = (np.array(list(each)) for each in (felt.force, felt.mean_force, felt.moment))
         return Touch(force, mean, moment, int(felt.contacts), float(felt.depth))
+
+
+def need_triangles(instruments: Rows, points: NDArray[np.float32], boundary: NDArray[np.uint32]) -> bool:
+    """Whether one of them is thinner than edges of the boundary are long."""
+    needed, error = ffi.new("uint32_t *"), library.new_error()
+    surface = library.pointer("float", points), len(points), library.pointer("uint32_t", boundary), len(boundary)
+    status = lib.supple_needs_triangles(*surface, instruments.raw, len(instruments.list), needed, error)
+    library.checked(status, error, "instruments")
+    return bool(needed[0])

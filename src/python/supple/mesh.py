@@ -1,27 +1,32 @@
-"""Tetrahedral meshes, from arrays or from files that meshio reads, and their boundaries."""
+"""Tetrahedral meshes, from arrays or from files, and their boundaries."""
 
 from __future__ import annotations
 
 import os
-from typing import Any
+import pathlib
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _library as library
+from ._library import ffi, lib
 from .errors import InputError
 
-# The corners of the face opposite to each corner, seen from outside.
-_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+# What the kernel reads itself, as the command does; meshio reads other formats.
+_OWN = (".vtk", ".vtu", ".msh", ".node", ".ele")
+_Result = TypeVar("_Result")
 
 
 class Mesh:
-    """Points (m) of shape (n, 3) and the four nodes of each tetrahedron, of shape (m, 4), from zero.
+    """Points (m) of shape (n, 3), the four nodes of each tetrahedron, of shape (m, 4), from zero, and of what region each tetrahedron
+    is, integers of shape (m,), or None.
 
     `scale` makes metres of the points: 0.001 for a mesh in millimetres.
     """
 
-    def __init__(self, points: ArrayLike, tets: ArrayLike, scale: float = 1.0) -> None:
+    def __init__(self, points: ArrayLike, tets: ArrayLike, scale: float = 1.0, regions: ArrayLike | None = None) -> None:
         if not (np.isfinite(scale) and scale > 0.0):
             raise InputError(f"scale {scale}: it must be a positive number")
         self.points: NDArray[np.float32] = library.vectors(np.asarray(points, np.float64) * scale, "points")
@@ -32,6 +37,7 @@ class Mesh:
         if len(bad):
             raise InputError(f"tets: element {bad[0]} has nodes {array[bad[0]].tolist()}, there are {len(self.points)} nodes")
         self.tets: NDArray[np.uint32] = np.ascontiguousarray(array, np.uint32)
+        self.regions = None if regions is None else _regions(regions, len(self.tets))
 
     @classmethod
     def box(cls, size: ArrayLike, cells: ArrayLike) -> Mesh:
@@ -57,35 +63,36 @@ class Mesh:
         if not parts:
             kinds = sorted({part.type for part in mesh.cells})
             raise InputError(f"the mesh has no tetrahedra of four nodes, only {', '.join(kinds) or 'points'}")
-        tets = np.concatenate(parts)
-        used, tets = np.unique(tets, return_inverse=True)
-        return cls(np.asarray(mesh.points)[used], tets.reshape(-1, 4), scale)
+        return cls._of_used(np.asarray(mesh.points), np.concatenate(parts), None, scale)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], scale: float = 1.0) -> Mesh:
-        """A mesh from a file that meshio reads (.msh, .vtk, .vtu, ...)."""
-        meshio = _meshio()
-        try:
-            return cls.from_meshio(meshio.read(path), scale)
-        # For some files meshio ends the process.
-        except (SystemExit, meshio.ReadError) as problem:
-            raise InputError(f"{path}: meshio cannot read it: {problem}") from None
+        """A mesh from a file, without the points that belong to no tetrahedron: .vtk, .vtu, .msh (Gmsh 1, 2.x, 4.1), .node or .ele
+        (TetGen), with their regions; others by meshio, if it is installed."""
+        if pathlib.Path(path).suffix.lower() in _OWN:
+            return cls._of_used(*_read(path), scale=scale)
+        return cls.from_meshio(_by_meshio(path, "read", lambda meshio: meshio.read(path)), scale)
+
+    @classmethod
+    def _of_used(cls, points: NDArray[Any], tets: NDArray[Any], regions: NDArray[Any] | None, scale: float) -> Mesh:
+        used, tets = np.unique(tets, return_inverse=True)
+        return cls(points[used], tets.reshape(-1, 4), scale, regions)
 
     def write(self, path: str | os.PathLike[str], displacements: ArrayLike | None = None) -> None:
-        """Writes the mesh, moved if there are displacements (m), with these as point data `displacement`."""
-        meshio = _meshio()
+        """Writes the mesh, moved if there are displacements (m), with these as point data `displacement`, in any format of meshio."""
         points, data = self.points.astype(np.float64), {}
         if displacements is not None:
             moved = np.array(displacements, np.float64)
             points, data = points + moved, {"displacement": moved}
-        meshio.write(path, meshio.Mesh(points, [("tetra", self.tets.astype(np.int64))], point_data=data))
+        cells = [("tetra", self.tets.astype(np.int64))]
+        _by_meshio(path, "write", lambda meshio: meshio.write(path, meshio.Mesh(points, cells, point_data=data)))
 
     def boundary(self) -> NDArray[np.uint32]:
         """The triangles that belong to one tetrahedron only, of shape (k, 3), seen from outside."""
-        faces = self.tets[:, _FACES].reshape(-1, 3)
-        _, first, counts = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-        outer: NDArray[np.uint32] = faces[np.sort(first[counts == 1])]
-        return outer
+        faces, count = np.empty((4 * len(self.tets), 3), np.uint32), ffi.new("uint32_t *")
+        tets, triangles = (library.pointer("uint32_t", array) for array in (self.tets, faces))
+        library.checked(lib.supple_boundary(tets, len(self.tets), triangles, len(faces), count), what="the boundary")
+        return faces[: count[0]].copy()
 
     @property
     def volumes(self) -> NDArray[np.float64]:
@@ -98,9 +105,39 @@ class Mesh:
         return f"<supple.Mesh: {len(self.points)} nodes, {len(self.tets)} tetrahedra>"
 
 
-def _meshio() -> Any:
+def _regions(regions: ArrayLike, elements: int) -> NDArray[np.int32]:
+    array = np.asarray(regions)
+    if array.shape != (elements,) or not np.issubdtype(array.dtype, np.integer):
+        raise InputError(f"regions: {array.dtype} of shape {array.shape}, they must be integers of shape ({elements},)")
+    return array.astype(np.int32)
+
+
+def _read(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArray[np.uint32], NDArray[np.int32] | None]:
+    """Points, tetrahedra and regions by the kernel's readers, with their words."""
+    name, size, words = os.fsencode(path), ffi.new("supple_mesh_size *"), ffi.new("char[]", 4096)
+    call = (words, len(words))
+
+    def checked(status: int) -> None:
+        if status < 0:
+            said = str(ffi.string(words), "utf-8") or library.words(status)
+            raise InputError(said, status)
+
+    checked(lib.supple_measure_mesh(name, size, *call))
+    points, tets = np.empty((size.nodes, 3)), np.empty((size.elements, 4), np.uint32)
+    regions = np.empty(size.elements, np.int32) if size.has_regions else None
+    arrays = library.pointer("double", points), library.pointer("uint32_t", tets)
+    room = ffi.NULL if regions is None else library.pointer("int32_t", regions)
+    checked(lib.supple_read_mesh(name, size, *arrays, room, *call))
+    return points, tets, regions
+
+
+def _by_meshio(path: str | os.PathLike[str], what: str, do: Callable[[Any], _Result]) -> _Result:
+    """What meshio makes of a file. Where it fails it raises whatever comes, and may end the process."""
     try:
         import meshio
     except ModuleNotFoundError:
-        raise ImportError("files of meshes need meshio: pip install meshio") from None
-    return meshio
+        raise ImportError(f"{path}: for files of its format meshio is needed: pip install meshio") from None
+    try:
+        return do(meshio)
+    except (SystemExit, Exception) as problem:
+        raise InputError(f"{path}: meshio cannot {what} it: {problem}") from None

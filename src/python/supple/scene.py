@@ -1,6 +1,9 @@
-"""What is simulated: a mesh of one tissue with its supports. Checked once, used by any number of simulations."""
+"""What is simulated: a mesh of one tissue or several, with its supports. Checked once, used by any number of simulations."""
 
 from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +14,8 @@ from ._library import ffi, lib
 from .errors import InputError
 from .mesh import Mesh
 
+# As supple_tissue.
+_TISSUE = np.dtype([("constants", np.float32, 4), ("density", np.float32)])
 ELEMENTS = {"linear": lib.SUPPLE_LINEAR, "nodal-pressure": lib.SUPPLE_NODAL_PRESSURE, "nodal-strain": lib.SUPPLE_NODAL_STRAIN}
 
 
@@ -46,11 +51,12 @@ class Material:
 
 
 class Scene:
-    """A mesh of one tissue.
+    """A mesh of one tissue, or of several of the same law.
 
     Parameters
     ----------
-    mesh, material
+    mesh
+    material : of all of it; or of each region of the mesh by its number: `{1: liver, 7: vessel}`
     fixed : nodes that are held, as numbers or as a mask over all nodes
     moved : nodes that will be held where `Simulation.set_motions` says
     element : "nodal-pressure", "nodal-strain" (bends right on coarse meshes), or "linear" (locks in nearly incompressible tissue)
@@ -60,7 +66,7 @@ class Scene:
     def __init__(
         self,
         mesh: Mesh,
-        material: Material,
+        material: Material | Mapping[int, Material],
         *,
         fixed: ArrayLike = (),
         moved: ArrayLike = (),
@@ -72,25 +78,53 @@ class Scene:
         self.mesh, self.material, self.element = mesh, material, element
         nodes, elements = len(mesh.points), len(mesh.tets)
         self._supports = self._supports_of(fixed, moved, axes)
-        tissue = ffi.new("supple_tissue *", {"constants": list(material.constants.values()), "density": material.density})
+        law, self._tissues, self._tissue_of_element = self._tissues_of(material)
+        tissues = len(self._tissues)
         made = library.config("supple_scene_config")
-        made.law, made.element, made.winding = material._number, ELEMENTS[element], lib.SUPPLE_WINDING_CHECKED
-        made.nodes, made.elements, made.supports, made.tissues = nodes, elements, len(self._supports), 1
+        made.law, made.element, made.winding = law, ELEMENTS[element], lib.SUPPLE_WINDING_CHECKED
+        made.nodes, made.elements, made.supports, made.tissues = nodes, elements, len(self._supports), tissues
         made.points = library.pointer("float", mesh.points)
         made.tetrahedra = library.pointer("uint32_t", mesh.tets)
         made.support = ffi.cast("supple_support *", library.pointer("uint32_t", self._supports))
-        made.tissue = tissue
-        self._config, self._tissue = made, tissue
+        made.tissue = library.pointer("supple_tissue", self._tissues)
+        if tissues > 1:
+            made.tissue_of_element = library.pointer("uint16_t", self._tissue_of_element)
+        self._config = made
         # Each simulation builds its own; this one says what is wrong with it, and what it takes.
-        size = lib.supple_scene_size(nodes, elements, 1)
+        size = lib.supple_scene_size(nodes, elements, tissues)
         if element == "nodal-strain":
-            size += lib.supple_patches_size(nodes, elements, 1)
+            size += lib.supple_patches_size(nodes, elements, tissues)
         memory = library.Memory(size)
         scene, error = ffi.new("supple_scene **"), library.new_error()
         library.checked(lib.supple_scene_init(memory.pointer, size, made, scene, error), error, "the scene")
         facts = ffi.new("supple_scene_facts *")
         library.checked(lib.supple_scene_describe(scene[0], facts))
         self._facts = {name: getattr(facts, name) for name in ("nodes", "elements", "bytes", "operations", "mass")}
+
+    def _tissues_of(self, material: Material | Mapping[int, Material]) -> tuple[int, NDArray[np.void], NDArray[np.uint16]]:
+        """The law, the tissues, and of which each element is."""
+        regions, of_element = self.mesh.regions, np.zeros(len(self.mesh.tets), np.uint16)
+        if isinstance(material, Material):
+            materials = [material]
+        else:
+            if regions is None or not material:
+                raise InputError(f"materials of regions: {'the mesh has no regions' if regions is None else 'there are none'}")
+            known = np.array(sorted(material), np.int64)
+            bad = np.flatnonzero(~np.isin(regions, known))
+            if len(bad):
+                raise InputError(f"materials of regions: element {bad[0]} is of region {regions[bad[0]]}, there are {known.tolist()}")
+            materials = [material[number] for number in known.tolist()]
+            of_element = np.searchsorted(known, regions).astype(np.uint16)
+            if len({each.law for each in materials}) != 1:
+                raise InputError(f"materials of regions: all must be of one law, not {', '.join(each.law for each in materials)}")
+        rows = np.zeros(len(materials), _TISSUE)
+        for row, each in zip(rows, materials):
+            row["constants"][: len(each.constants)], row["density"] = list(each.constants.values()), each.density
+        return materials[0]._number, rows, of_element
+
+    @functools.cached_property
+    def _boundary(self) -> NDArray[np.uint32]:
+        return self.mesh.boundary()
 
     def _supports_of(self, fixed: ArrayLike, moved: ArrayLike, axes: str) -> NDArray[np.uint32]:
         nodes = len(self.mesh.points)

@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _library as library
+from ._laws import LAWS
 from ._library import ffi, lib
 from .errors import InputError
-from .instruments import Contact, Instrument, Touch
-from .scene import Scene, axes_of
+from .instruments import POINT, Contact, Instrument, Rows, Touch, need_triangles
+from .reactions import Reaction
+from .scene import ELEMENTS, Scene, axes_of
 
 _STEPS = {
     "exact": lib.SUPPLE_STEPS_EXACT,
@@ -33,6 +35,15 @@ _WORDS = {
     lib.SUPPLE_OUTSIDE: "outside",
     lib.SUPPLE_FELL_BACK: "fell back",
     lib.SUPPLE_INEXACT: "inexact",
+}
+# What the index of a remark stands for.
+_PLACES = {
+    lib.SUPPLE_REMARK_DENSITY: "tissue",
+    lib.SUPPLE_REMARK_STIFFNESS: "tissue",
+    lib.SUPPLE_REMARK_POISSON_RATIO: "tissue",
+    lib.SUPPLE_REMARK_WAY: "motion",
+    lib.SUPPLE_REMARK_SPEED: "motion",
+    lib.SUPPLE_REMARK_THIN: "instrument",
 }
 # As supple_force and supple_motion.
 _FORCE = np.dtype([("node", np.uint32), ("newton", np.float32, 3), ("ramp", np.float32)])
@@ -63,7 +74,12 @@ class Report:
     `status` is "ok"; "limited" (steps were taken, but are not exact), "outside" (the network saw what its training had not),
     "fell back" (exact steps took the place of learned ones), "inexact" (the estimate of the error exceeds what is allowed).
     It is the worst of all steps of the call. `estimate`: mean error of the nodes (m) after the last of them, by the guard or the
-    automatic steps, None where there is none (yet); `allowed`: what the guard accepts there, a fifth of the motion so far or the tolerance. `exact`, `damped`, `learned` count the steps taken, `undone` those computed and not taken, or taken back.
+    automatic steps, None where there is none (yet); `largest_estimate`: that of the worst node, `worst_node`; `allowed`: what the guard
+    accepts for the mean, a fifth of the motion so far or the tolerance. `exact`, `damped`, `learned` count the steps taken, `undone` those
+    computed and not taken, or taken back; `shortest` and `longest` are their lengths (s). What "limited" is about:
+    `least_volume_ratio` below 0.1, `saturation` of the exponential law above 1, `energy_excess` above 0 (kinetic energy beyond the balance,
+    a share), `held_back` nodes, `lattice_share` below 0.5. `available_energy`: the most that loads and supports ever gave (J).
+    `added_mass`: of damped steps, mean inertia added, in masses of the node. `clipped`, `outside`: of learned steps, shares of the vertices.
     """
 
     status: str
@@ -76,6 +92,18 @@ class Report:
     kinetic_energy: float
     estimate: float | None
     allowed: float | None
+    largest_estimate: float | None
+    worst_node: int | None
+    shortest: float
+    longest: float
+    available_energy: float
+    saturation: float
+    energy_excess: float
+    held_back: int
+    lattice_share: float
+    added_mass: float
+    clipped: float
+    outside: float
 
     @property
     def steps(self) -> int:
@@ -101,6 +129,10 @@ class Simulation:
     weights : file of the network, for learned steps; of another damper than the library's own, for damped and automatic ones
     lead_in : seconds of exact steps before a network takes over
     guard : whether a second run estimates the error of damped and learned steps
+    fallback : whether exact steps take the place of learned ones that are not to be believed; else `advance` raises there
+    cells : of the lattice of damped steps along x, y, z; chosen for the scene unless given
+    threads : 1 to 8 that compute a step, with the same bits. They are the kernel's own, one set for all
+        simulations: a process that forks does so before
     """
 
     def __init__(
@@ -114,6 +146,9 @@ class Simulation:
         weights: str | os.PathLike[str] | None = None,
         lead_in: float = 0.3,
         guard: bool = True,
+        fallback: bool = True,
+        cells: tuple[int, int, int] | None = None,
+        threads: int = 1,
         gravity: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
         if method not in METHODS:
@@ -125,7 +160,10 @@ class Simulation:
         settings = self._settings = ffi.new("supple_settings *")
         library.checked(lib.supple_default_settings(settings))
         settings.steps, settings.guard, settings.lead_in = _STEPS[method], int(guard), lead_in
-        settings.damping, settings.forces, settings.motions = damping, nodes, nodes
+        # Forces on nodes, and those of a traction.
+        settings.damping, settings.forces, settings.motions = damping, 2 * nodes, nodes
+        settings.fallback, settings.cells = int(fallback), cells or (0, 0, 0)
+        self._threads = _threads(threads)
         for name, value in (("seconds", step), ("tolerance", tolerance)):
             if value is not None:
                 if not (np.isfinite(value) and value > 0.0):
@@ -143,6 +181,7 @@ class Simulation:
         library.checked(lib.supple_sim_describe(self._sim, objects))
         self._raw_scene, self._state, self._loads, self._network = objects.scene, objects.state, objects.loads, objects.learned
         self._contact: Contact | None = None
+        self._forces = self._tractions = np.zeros(0, _FORCE)
         self._lock = threading.RLock()
         self._vectors = self._view_of_displacements()
         self.gravity = gravity
@@ -168,8 +207,35 @@ class Simulation:
         numbers = library.node_numbers(nodes, len(self.scene.mesh.points), "forces")
         rows = np.zeros(len(numbers), _FORCE)
         rows["node"], rows["newton"], rows["ramp"] = numbers, library.vectors(newton, "newton", len(numbers)), ramp
-        error = library.new_error()
+        self._set_forces(rows, self._tractions)
+
+    @_one_at_a_time
+    def set_tractions(self, triangles: ArrayLike, pascal: ArrayLike, ramp: float = 0.0) -> None:
+        """Replaces all tractions: on these triangles of the boundary, (k, 3) node numbers as of `Mesh.boundary`, a force per area at rest
+        (Pa, one vector), which rises evenly over `ramp` s. Its direction stays while the body moves."""
+        corners, points = np.asarray(triangles), self.scene.mesh.points
+        if corners.size and (corners.ndim != 2 or corners.shape[1] != 3):
+            raise InputError(f"triangles: their shape is {corners.shape}, it must be (k, 3)")
+        numbers = library.node_numbers(corners.ravel(), len(points), "triangles")
+        if np.shape(pascal) != (3,):
+            raise InputError(f"pascal: {pascal!r}, it must be three numbers, Pa")
+        found, error = np.zeros(len(numbers), _FORCE), library.new_error()
+        status = lib.supple_traction(
+            library.pointer("float", points), len(points), library.pointer("uint32_t", numbers), len(numbers) // 3,
+            library.pointer("float", library.vectors([pascal], "pascal")), ramp, library.pointer("supple_force", found), len(found), error,
+        )  # fmt: skip
+        library.checked(status, error, "tractions")
+        # One for each node.
+        nodes, place = np.unique(found["node"], return_inverse=True)
+        rows, newton = np.zeros(len(nodes), _FORCE), np.zeros((len(nodes), 3))
+        np.add.at(newton, place, found["newton"])
+        rows["node"], rows["newton"], rows["ramp"] = nodes, newton, ramp
+        self._set_forces(self._forces, rows)
+
+    def _set_forces(self, forces: NDArray[np.void], tractions: NDArray[np.void]) -> None:
+        error, rows = library.new_error(), np.concatenate([forces, tractions])
         library.checked(lib.supple_set_forces(self._loads, library.pointer("supple_force", rows), len(rows), error), error, "forces")
+        self._forces, self._tractions = forces, tractions
 
     @_one_at_a_time
     def set_motions(self, nodes: ArrayLike, metre: ArrayLike, axes: str = "xyz", ramp: float = 0.0) -> None:
@@ -185,14 +251,16 @@ class Simulation:
     # Instruments.
 
     @_one_at_a_time
-    def set_instruments(self, instruments: list[Instrument], *, triangles: bool = False, grips: int = 0) -> None:
-        """Replaces all instruments, at most eight, which stand still where they are. `triangles` of the surface are needed by those that are
-        thinner than its edges are long; `grips` is how many nodes they can hold at once."""
-        contact = self._contact
-        if contact is None or triangles or grips:
-            contact = Contact(self.scene.mesh, self._raw_scene, triangles, grips)
+    def set_instruments(self, instruments: list[Instrument], *, triangles: bool | None = None, grips: int = 0) -> None:
+        """Replaces all instruments, at most eight, which stand still where they are. Unless you say it with `triangles`, they touch the
+        triangles of the surface, and not only its nodes, where one of them is thinner than edges are long; `grips` is how many nodes they
+        can hold at once."""
+        contact, points, boundary, rows = self._contact, self.scene.mesh.points, self.scene._boundary, Rows(instruments)
+        needed = need_triangles(rows, points, boundary) if triangles is None else triangles
+        if contact is None or grips or needed != contact.triangles:
+            contact = Contact(points, boundary, self._raw_scene, needed, grips or (contact.grips if contact else 0))
         # Refused ones leave the loads with the instruments that they have.
-        contact.put(instruments)
+        contact.put(rows)
         library.checked(lib.supple_set_contact(self._loads, contact.raw if instruments else ffi.NULL))
         self._contact = contact
 
@@ -218,6 +286,21 @@ class Simulation:
     def let_go(self, instrument: int) -> None:
         library.checked(lib.supple_let_go(self._touching(instrument).raw, instrument), what=f"instrument {instrument}")
 
+    @_one_at_a_time
+    def contact_points(self) -> NDArray[np.void]:
+        """Where instruments push in the latest step, 64 points at most, with the fields position (m), normal (outward of the instrument, zero
+        where it holds the node), force (on the tissue, N), depth (m), node and instrument."""
+        return np.zeros(0, POINT) if self._contact is None else self._contact.points()
+
+    # Supports.
+
+    @_one_at_a_time
+    def reaction(self, nodes: ArrayLike) -> Reaction:
+        """What tells the force by which some of the fixed or moved nodes act on the tissue. It takes as long as some hundred steps."""
+        numbers = library.node_numbers(nodes, len(self.scene.mesh.points), "reaction")
+        damping = self._settings.damping if self.network is None else self.network["damping"]
+        return Reaction(self, numbers, damping)
+
     def _touching(self, instrument: int) -> Contact:
         if self._contact is None:
             raise InputError("there are no instruments: set_instruments comes first")
@@ -235,7 +318,9 @@ class Simulation:
         said = []
         for remark in found[0 : min(count[0], room)]:
             figures = [f"{value:.4g}" for value in (remark.value, remark.limit) if value != 0.0]
-            said.append(f"{str(ffi.string(lib.supple_remark_text(remark.kind)), 'ascii')} ({' against '.join(figures) or 'no figure'})")
+            place = f"{_PLACES[remark.kind]} {remark.index}: " if remark.kind in _PLACES else ""
+            words = str(ffi.string(lib.supple_remark_text(remark.kind)), "ascii")
+            said.append(f"{place}{words} ({' against '.join(figures) or 'no figure'})")
         if not len(self.scene._supports):
             said.append("no node is fixed or moved: the body is free")
         return said
@@ -253,6 +338,22 @@ class Simulation:
 
     @property
     @_one_at_a_time
+    def network(self) -> dict[str, Any] | None:
+        """What the network of learned steps was trained for: seconds (of a step), damping (1/s), law, constants (Pa), density (kg/m^3),
+        element, exact_seconds (of the steps it learned from), multiply_adds (of a node's prediction); and fell_back, how often exact steps have
+        taken the place of its own. Of other steps None."""
+        if self._network == ffi.NULL:
+            return None
+        facts = ffi.new("supple_learned_facts *")
+        library.checked(lib.supple_learned_describe(self._network, facts), what="network")
+        law, names = next((name, names) for name, (number, names) in LAWS.items() if number == facts.law)
+        told = {name: getattr(facts, name) for name in ("seconds", "damping", "exact_seconds", "multiply_adds", "fell_back")}
+        element = next(name for name, number in ELEMENTS.items() if number == facts.element)
+        constants = dict(zip(names, facts.tissue.constants))
+        return {**told, "law": law, "constants": constants, "density": facts.tissue.density, "element": element}
+
+    @property
+    @_one_at_a_time
     def critical_step(self) -> float:
         """The longest exact step (s) at the present displacements: a bound, safe."""
         seconds = ffi.new("float *")
@@ -267,7 +368,7 @@ class Simulation:
             raise InputError(f"advance by {seconds} s: it must be a positive number")
         self._warn_once()
         report = ffi.new("supple_sim_report *")
-        status = lib.supple_sim_advance(self._sim, seconds, ffi.NULL, report)
+        status = lib.supple_sim_advance(self._sim, seconds, self._threads, report)
         call, estimate = report.call, report.estimate
         library.checked(status, call.error, f"at {call.time:.6g} s")
         return Report(
@@ -281,6 +382,18 @@ class Simulation:
             float(call.kinetic),
             float(estimate.mean) if estimate.known else None,
             float(estimate.allowed) if estimate.known else None,
+            float(estimate.largest) if estimate.known else None,
+            int(estimate.node) if estimate.known else None,
+            float(report.shortest),
+            float(report.longest),
+            float(call.available),
+            float(call.saturation),
+            float(call.energy_excess),
+            int(call.held_back),
+            float(call.lattice_share),
+            float(call.added_mass),
+            float(call.clipped),
+            float(call.outside),
         )
 
     @_one_at_a_time
@@ -357,6 +470,13 @@ class Simulation:
         library.checked(lib.supple_state_reset(self._state))
         self._prepare_again()
 
+    @_one_at_a_time
+    def stop(self) -> None:
+        """Stops all motion: nodes and time stay, velocities are zero, and the energy balance begins anew. To go on after `Diverged` for too
+        much energy, without a saved state."""
+        library.checked(lib.supple_state_stop(self._raw_scene, self._state))
+        self._prepare_again()
+
     def _prepare_again(self) -> None:
         """From the state as it is. Exact steps look at it by themselves."""
         if self.method != "exact":
@@ -366,6 +486,17 @@ class Simulation:
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the moved mesh with its displacements, in any format of meshio (.vtu, ...)."""
         self.scene.mesh.write(path, self._vectors)
+
+
+def _threads(count: int) -> Any:
+    """Threads of the kernel's own; the calling one alone is NULL."""
+    if int(count) != count or not 1 <= count <= lib.SUPPLE_MOST_PARTS:
+        raise InputError(f"threads {count}: there are 1 to {lib.SUPPLE_MOST_PARTS}")
+    if count == 1:
+        return ffi.NULL
+    threads = ffi.new("supple_threads *")
+    library.checked(lib.supple_own_threads(int(count), threads), what="threads")
+    return threads
 
 
 def _weights(path: str | os.PathLike[str]) -> library.Memory:
