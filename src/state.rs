@@ -5,6 +5,7 @@
 //! The increment `u_n - u_(n-1)` is kept instead of `u_(n-1)`: in float32 the rounding of
 //! `2 u_n - u_(n-1)` acts as a false spring to the ground (13.8 % after 20,000 steps of the paper's bar).
 
+use core::num::NonZeroU64;
 use core::ops::Deref;
 
 use crate::contact::{ContactPoint, Touch};
@@ -26,7 +27,14 @@ pub struct Progress {
     pub(crate) dt: f32,
     /// At the start of the latest step.
     pub(crate) extremes: Extremes<f32>,
+    /// Steps keep it, and copies have it; a state that was restored, reset or put has none.
+    pub(crate) seen: Option<Mark>,
 }
+
+/// Left by the guard that follows a state ([`crate::guard`]) at the moment at which it has seen it last: a state with
+/// this mark has come from there.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(crate) struct Mark(NonZeroU64);
 
 /// Tells a state from others that have taken as many steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,19 +44,40 @@ pub(crate) struct Moment {
     kinetic: f64,
 }
 
+impl Moment {
+    /// The same in one number.
+    const fn mark(&self) -> Mark {
+        // The finaliser of SplitMix64 (Steele, Lea, Flood 2014) after each.
+        const fn mixed(hash: u64) -> u64 {
+            let hash = (hash ^ (hash >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let hash = (hash ^ (hash >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            hash ^ (hash >> 31)
+        }
+        let hash = mixed(mixed(mixed(self.steps.wrapping_add(1)) ^ self.time.to_bits()) ^ self.kinetic.to_bits());
+        Mark(NonZeroU64::MIN.saturating_add(hash))
+    }
+}
+
 impl Progress {
+    /// A guard sees the state as it is now.
+    pub(crate) const fn mark(&mut self) -> Mark {
+        let mark = self.moment().mark();
+        self.seen = Some(mark);
+        mark
+    }
+
     pub(crate) const fn moment(&self) -> Moment {
         Moment { steps: self.steps, time: self.time, kinetic: self.energy_balance.kinetic }
     }
 
     /// At rest, at time zero.
     pub const START: Self =
-        Self { time: 0.0, steps: 0, energy_balance: EnergyBalance::NEW, dt: 0.0, extremes: Extremes::REST };
+        Self { time: 0.0, steps: 0, energy_balance: EnergyBalance::NEW, dt: 0.0, extremes: Extremes::REST, seen: None };
 
     /// A simulation that goes on from here; its displacements and increments are the caller's to restore.
     #[must_use]
     pub const fn resumed(time: f64, steps: u64, last_step: f32, energy_balance: EnergyBalance) -> Self {
-        Self { time, steps, energy_balance, dt: last_step, extremes: Extremes::REST }
+        Self { time, steps, energy_balance, dt: last_step, extremes: Extremes::REST, seen: None }
     }
 
     /// Length of the step that the last increment spans, s; zero before the first step.
@@ -208,7 +237,7 @@ impl<'a> StateView<'a> {
         for (node, (displacement, increment)) in vectors.enumerate() {
             [displacement.0, increment.0] = at(node).map(|[x, y, z]| [x, y, z, 0.0]);
         }
-        (self.progress.time, self.progress.dt) = (time, seconds);
+        (self.progress.time, self.progress.dt, self.progress.seen) = (time, seconds, None);
     }
 
     /// Back to rest at time zero.

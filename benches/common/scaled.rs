@@ -51,7 +51,7 @@ pub(crate) fn guarded<'a>(
     let mut run = move || {
         let status = large.step(scene.view(), loads, state.view());
         moved(match &mut guard {
-            Some(guard) => guard.follow(status, scene.view(), loads, &state.view()),
+            Some(guard) => guard.follow(status, scene.view(), loads, state.view()),
             None => status,
         });
     };

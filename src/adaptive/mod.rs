@@ -299,7 +299,7 @@ impl AdaptiveView<'_, '_> {
             watch.begin_anew();
         }
         let mut worst = Status::Ok;
-        let enter = |status: Status, loads: &Loads<'_>, state: &StateView<'_>| {
+        let enter = |status: Status, loads: &Loads<'_>, state: StateView<'_>| {
             if !status.is_taken() {
                 return;
             }
@@ -371,7 +371,7 @@ impl AdaptiveView<'_, '_> {
             }
             let before = self.watch.comparisons();
             let guard = GuardView { second: self.second, watch: self.watch, storage: second };
-            let _ = guard.follow(Status::Ok, scene, &loads, &state, threads);
+            let _ = guard.follow(Status::Ok, scene, &loads, state.reborrow(), threads);
             let estimate = self.watch.estimate().map_or([0.0; 2], |estimate| [estimate.mean, estimate.largest]);
             let control = &mut self.chooser.control;
             if !status.is_taken() {

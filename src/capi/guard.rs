@@ -170,7 +170,8 @@ fn allowed(tolerance: f32) -> Answer<Allowed> {
 
 /// To be called after each call that moves the state, with the same loads, at the latest after `every` steps of the
 /// configuration. Now and then it moves the second run and compares. SUPPLE_INEXACT if the estimate exceeds what is
-/// allowed. A state that was reset or restored begins a new second run.
+/// allowed. A state that has not come by steps from where this guard has seen it last (reset, restored, stopped, another
+/// copy) begins a new second run from where it is. So a state has one supple_guard at a time.
 ///
 /// @param loads as of the steps; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.
@@ -193,9 +194,9 @@ pub unsafe extern "C" fn supple_guard_follow(
         let mut view = opened(guard)?;
         let threads = HostThreads::of(threads)?;
         let written = place_if_wanted(estimate)?;
-        let state = loads.attached(opened_of(&open, state)?);
+        let mut state = loads.attached(opened_of(&open, state)?);
         let loads = loads.of_next_step(&state, 1);
-        let status = view.reborrow().follow(Status::Ok, open.view(), &loads, &state, &threads);
+        let status = view.reborrow().follow(Status::Ok, open.view(), &loads, state.reborrow(), &threads);
         if let Some(place) = written {
             place.write(estimated(view.watch.estimate()));
         }

@@ -27,13 +27,15 @@ pub(super) fn compare(nodes: usize, first: &[NodeVector], second: &[NodeVector])
     }
     // Squares overflow long before distances.
     let far = scaled(FAR, nodes, first, second);
-    let [mean, largest, motion] = [far.mean, far.largest, far.motion].map(|length| finite(length / FAR));
+    let [mean, largest] = [far.mean, far.largest].map(|length| finite(length / FAR));
+    // Without a number nothing has moved: what is allowed is a share of the motion.
+    let motion = finite((far.motion / FAR).max(0.0));
     Comparison { mean, largest, motion, ..far }
 }
 
-/// The same, or the largest number instead of infinity.
+/// The same, or the largest number instead of infinity or of what is no number, which are no reason to be content.
 pub(super) const fn finite(value: f32) -> f32 {
-    if value == f32::INFINITY { f32::MAX } else { value }
+    if value.is_nan() || value == f32::INFINITY { f32::MAX } else { value }
 }
 
 /// Compares displacements times `scale`.

@@ -86,7 +86,7 @@ impl Envelope {
 
     /// The state is another one.
     pub(super) fn forget(&mut self) {
-        *self = Self { motion: 0.0, held: None, comparisons: 0, growth: [0.0; 2], waited: 0.0, ..*self };
+        *self = Self { motion: 0.0, held: None, comparisons: 0, distance: 0.0, growth: [0.0; 2], waited: 0.0, ..*self };
     }
 
     /// Enters a comparison, so many seconds after the one before.
@@ -94,13 +94,12 @@ impl Envelope {
         let kept = libm::exp2f(-seconds / HALF_LIFE);
         let before = self.held.unwrap_or_default();
         self.motion = self.motion.max(found.motion);
-        // A distance that is no number stays one: it is no reason to be content.
-        let at_least = |value: f32, least: f32| if value <= least { least } else { value };
         let least = if self.is_new() { found.motion } else { 0.0 };
         self.comparisons = self.comparisons.saturating_add(1);
-        self.distance = found.mean;
-        let mean = at_least(at_least(found.mean, kept * before.mean), least);
-        let largest = at_least(at_least(found.largest, kept * before.largest), mean);
+        let [mean, largest] = [found.mean, found.largest].map(finite);
+        self.distance = mean;
+        let mean = mean.max(kept * before.mean).max(least);
+        let largest = largest.max(kept * before.largest).max(mean);
         let growth = |now: f32, before: f32| finite(((now - before) / seconds).max(0.0));
         self.growth = [growth(mean, before.mean), growth(largest, before.largest)];
         self.waited = 0.0;
@@ -127,7 +126,7 @@ impl Envelope {
 
     /// So many seconds have gone since the latest comparison.
     pub(super) const fn wait(&mut self, seconds: f32) {
-        self.waited = seconds;
+        self.waited = seconds.max(0.0);
     }
 
     /// Nothing could be compared: the error may be as large as the motion, and is more than is allowed.
@@ -194,6 +193,24 @@ mod tests {
         }
         envelope.add(&distance(0.001), 10.0 * HALF_LIFE);
         assert_eq!(envelope.estimate().unwrap().mean, ESTIMATE * 0.001);
+    }
+
+    #[test]
+    fn an_estimate_is_a_number_that_is_not_negative() {
+        let distances = [0.0, 1e-3, f32::MIN_POSITIVE, f32::MAX, f32::INFINITY, f32::NAN];
+        for (first, second) in distances.into_iter().flat_map(|first| distances.map(|second| (first, second))) {
+            for (seconds, waited) in [(0.0, -1.0), (1e-30, 0.0), (1e-3, 1e-3), (1e30, 1e30)] {
+                for mut envelope in [later(), Envelope::new(&[[0.0; 3], [0.1; 3]])] {
+                    envelope.add(&distance(first), seconds);
+                    envelope.add(&distance(second), seconds);
+                    envelope.wait(waited);
+                    let Estimate { mean, largest, allowed, .. } = envelope.estimate().unwrap();
+                    let all = [mean, largest, allowed];
+                    assert!(all.iter().all(|value| value.is_finite() && *value >= 0.0), "{first} {second}: {all:?}");
+                    assert!(largest >= mean);
+                }
+            }
+        }
     }
 
     #[test]

@@ -14,6 +14,10 @@
 //! after two steps more, after three more, and so on up to what the caller says ([`EVERY`]). A guard costs a multilevel
 //! step in each comparison, and memory for a second state and the second run's inertia ([`vectors_for`]). A scene
 //! without a guard pays nothing, and knows nothing of its error.
+//!
+//! A guard leaves a mark in the state at each call. Steps keep it, and a copy has it, so that a state with the mark has
+//! come from where the guard has seen it last, in whatever steps; any other begins a new second run. So a state has one
+//! guard at a time.
 
 mod compare;
 mod estimate;
@@ -28,7 +32,7 @@ use crate::loads::Loads;
 use crate::material::{Element, Material};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::state::{Progress, StateView};
+use crate::state::{Mark, Progress, StateView};
 use crate::step::{CallingThread, Status, Step, Threads};
 use compare::compare;
 use estimate::Envelope;
@@ -86,8 +90,8 @@ pub(crate) struct Watch {
     longest: f32,
     /// Time to the next comparison, s.
     interval: f32,
-    /// Steps of the first run after the latest step that the guard has seen.
-    steps: u64,
+    /// What the guard has left in the state that it has seen last.
+    seen: Option<Mark>,
     envelope: Envelope,
 }
 
@@ -158,20 +162,19 @@ impl Watch {
                 Err(error) => return Err(error),
             }
         };
-        let steps = state.steps();
+        let seen = Some(state.progress.mark());
         let envelope = Envelope::new(points);
-        Ok((second, Self { progress, nodes, longest: longest.seconds(), interval: 0.0, steps, envelope }))
+        Ok((second, Self { progress, nodes, longest: longest.seconds(), interval: 0.0, seen, envelope }))
     }
 
-    /// Compares at the next call, though no step has been taken.
+    /// Compares at the next call, though no step has been taken since the last.
     pub(crate) const fn compare_next(&mut self) {
         self.interval = 0.0;
-        self.steps = self.steps.saturating_sub(1);
     }
 
     /// The second run starts from the state at the next call.
     pub(crate) const fn begin_anew(&mut self) {
-        self.steps = u64::MAX;
+        self.seen = None;
     }
 
     /// The first run takes exact steps: it has no error in its first steps from rest.
@@ -242,11 +245,11 @@ impl GuardView<'_> {
         taken: Status,
         scene: SceneView<'_, M>,
         loads: &Loads<'_>,
-        state: &StateView<'_>,
+        state: StateView<'_>,
         threads: &impl Threads,
     ) -> Status {
         let Self { second: large, watch, storage } = self;
-        let Watch { progress, nodes, longest, interval, steps, envelope } = watch;
+        let Watch { progress, nodes, longest, interval, seen, envelope } = watch;
         let nodes = *nodes;
         if !taken.is_taken() {
             return taken;
@@ -259,14 +262,16 @@ impl GuardView<'_> {
             return mismatch;
         }
         let gone = state.time() - second.time();
-        let follows = *steps < state.steps() && gone <= MOST_BEHIND * f64::from(*longest);
-        *steps = state.steps();
+        let comes_from_last = seen.is_some() && *seen == state.progress.seen;
+        *seen = Some(state.progress.mark());
+        // Not with a time that is no number either.
+        let follows = comes_from_last && gone <= MOST_BEHIND * f64::from(*longest);
         if !follows {
-            // The state was restored or reset, or has gone on without the guard.
+            // The state was restored, reset or put, or has gone on for long without the guard.
             envelope.forget();
             // Right after a start errors are least certain.
             *interval = if envelope.is_new() { 0.0 } else { *longest };
-            start_from(state, &mut second);
+            start_from(&state, &mut second);
             return taken;
         }
         if gone <= 0.0 || gone < (1.0 - ROUNDING) * f64::from(*interval) {
@@ -276,7 +281,7 @@ impl GuardView<'_> {
         // At the start a load may begin within a step, of which the first run's first step knows nothing.
         let parts = if envelope.is_new() || gone > (1.0 + ROUNDING) * f64::from(*longest) { 2 } else { 1 };
         // The instruments are the first run's: the second one has their forces.
-        let loads = &loads.with_pushes_of(state);
+        let loads = &loads.with_pushes_of(&state);
         let (gone, seconds) = (gone as f32, f32::min(gone as f32 / parts as f32, *longest));
         let mut followed = large.set_seconds(seconds).is_ok();
         for _ in 0..parts {
@@ -295,7 +300,7 @@ impl GuardView<'_> {
         } else {
             // The second run cannot follow: nothing is known but that the body has moved.
             envelope.lose(gone);
-            start_from(state, &mut second);
+            start_from(&state, &mut second);
             *interval = state.last_step();
         }
         envelope.judge(taken)
@@ -365,14 +370,15 @@ impl<S: AsMut<[NodeVector]>> Guard<S> {
 
     /// To be called after each step of the first run, or after each few, with what it answered, the loads that it had
     /// and the state that it left. Every so often it moves the second run and compares. Gives that status, or
-    /// [`Status::Inexact`] in place of [`Status::Ok`] if the estimate exceeds what is allowed. A state that has been
-    /// restored or reset, or has gone on for longer than a step of the second run, begins a new second run.
+    /// [`Status::Inexact`] in place of [`Status::Ok`] if the estimate exceeds what is allowed. A state that has not come
+    /// by steps from where the guard has seen it last (restored, reset, put, stopped, another copy), or has gone on for
+    /// longer than a step of the second run, begins a new second run, from where it is now.
     pub fn follow<M: ElementMaterial>(
         &mut self,
         taken: Status,
         scene: SceneView<'_, M>,
         loads: &Loads<'_>,
-        state: &StateView<'_>,
+        state: StateView<'_>,
     ) -> Status {
         self.view().follow(taken, scene, loads, state, &CallingThread)
     }

@@ -169,7 +169,7 @@ fn run_to_end(
             let (mut status, clipped) = prepared.advance(seconds, scene.view(), &loads, &mut state)?;
             // The library's loop would not let it doubt the exact steps of a lead-in.
             if let Some(guard) = &mut guard {
-                status = guard.follow(status, scene.view(), &loads, &state.view());
+                status = guard.follow(status, scene.view(), &loads, state.view());
                 estimate = guard.estimate().map(|estimate| [estimate.mean, estimate.largest]);
             }
             if let Some(clipped) = clipped {

@@ -172,8 +172,8 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
                 while until - state.time() > ROUNDING * span {
                     watch(Event::Tries(state.time()));
                     let (left, mut worst, mut taken) = (until - state.time(), Status::Ok, 0);
-                    let enter = |status: Status, _: &Loads<'_>, state: &StateView<'_>| {
-                        watch(Event::Step(StepKind::Exact, status, state));
+                    let enter = |status: Status, _: &Loads<'_>, state: StateView<'_>| {
+                        watch(Event::Step(StepKind::Exact, status, &state));
                         worst = worst.worse(status);
                         taken += 1;
                     };
@@ -242,7 +242,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
             self.report.long += 1;
             self.report.enter_length(seconds);
             if let Some(guard) = &mut guard {
-                let status = guard.reborrow().follow(Status::Ok, scene, &loads, state, self.threads);
+                let status = guard.reborrow().follow(Status::Ok, scene, &loads, state.reborrow(), self.threads);
                 self.report.estimate = guard.watch.estimate();
                 (self.watch)(Event::Judged(status, self.report.estimate, state));
                 self.report.enter(status);
@@ -336,7 +336,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
             if let Some(guard) = &mut guard {
                 // Moved supports are where they have come to.
                 let loads = self.loads.of_step(state, seconds, u32::MAX);
-                let status = guard.reborrow().follow(Status::Ok, scene, &loads, state, self.threads);
+                let status = guard.reborrow().follow(Status::Ok, scene, &loads, state.reborrow(), self.threads);
                 self.report.estimate = guard.watch.estimate();
                 // Exact steps that lead have no error.
                 let status = if is_leading { Status::Ok } else { status };

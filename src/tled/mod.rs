@@ -167,7 +167,7 @@ pub fn stop(scene: &impl AsScene, state: &mut impl AsState) -> bool {
     let (scene, mut state) = (scene.as_scene(), state.as_state());
     let Some(strain) = strain_energy_of(scene, state.reborrow()) else { return false };
     state.increment.fill(NodeVector::ZERO);
-    state.progress.dt = 0.0;
+    (state.progress.dt, state.progress.seen) = (0.0, None);
     let start = strain + scene.rounding_energy();
     state.progress.energy_balance = EnergyBalance { start, peak: start, ..EnergyBalance::NEW };
     true

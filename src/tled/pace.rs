@@ -137,7 +137,7 @@ impl Pace {
         mut state: StateView<'_>,
         kept: &mut [NodeVector],
         threads: &impl Threads,
-        mut enter: impl FnMut(Status, &Loads<'_>, &StateView<'_>),
+        mut enter: impl FnMut(Status, &Loads<'_>, StateView<'_>),
     ) -> Approach {
         let (whole, seconds) = self.steps_to(state.time() + left, left);
         let Ok(step) = Step::unchecked(seconds, damping) else {
@@ -158,7 +158,7 @@ impl Pace {
         while taken < count {
             let of_step = loads.of_step(&state, seconds, whole.saturating_sub(taken));
             let status = step_in_parts(scene, &of_step, state.reborrow(), &step, threads);
-            enter(status, &of_step, &state);
+            enter(status, &of_step, state.reborrow());
             if !status.is_taken() {
                 refused = Some(status);
                 break;

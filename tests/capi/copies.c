@@ -160,6 +160,39 @@ static void large_copied(uint32_t method, const char *name) {
            name, needed, (double)report.added_mass, 1e3 * (double)estimate.mean, supple_status_text(told), for_guard);
 }
 
+/* Back to a copy, or to what was saved, and on in steps that are shorter than those that the guard has seen. */
+static void guard_restored(void) {
+    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), SUPPLE_MULTILEVEL, 2e-3f, 20.0f, {0, 0, 0}, NULL, 0};
+    const supple_guard_config guarded = {SUPPLE_CONFIG(supple_guard_config), config.seconds, config.damping, 5, 0.0f};
+    for (int copied = 0; copied < 2; copied++) {
+        supple_state *state = fresh();
+        supple_large *large;
+        supple_guard *guard;
+        supple_estimate estimate;
+        move_end(scene, loads, 0.01f, -0.005f, 0.01f);
+        CHECK(supple_large_init(large_memory, ROOM, scene, state, points[0], &config, &large, NULL) == SUPPLE_OK);
+        CHECK(supple_guard_init(guard_memory, ROOM, scene, state, points[0], &guarded, &guard, NULL) == SUPPLE_OK);
+        unsigned char *copy = state_memory + SUPPLE_STATE_SIZE(NODES, ELEMENT);
+        memcpy(copy, state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
+        CHECK(supple_save(state, saved, sizeof saved) == SUPPLE_OK);
+        for (int frame = 0; frame < 3; frame++) {
+            CHECK(supple_large_step(scene, loads, state, large, 1, NULL, NULL) >= 0);
+            CHECK(supple_guard_follow(scene, loads, state, guard, NULL, &estimate) >= 0 && estimate.known == 1);
+        }
+        if (copied) {
+            memcpy(state_memory, copy, SUPPLE_STATE_SIZE(NODES, ELEMENT));
+        } else {
+            CHECK(supple_restore(state, saved, sizeof saved) == SUPPLE_OK);
+        }
+        for (int frame = 0; frame < 20; frame++) {
+            CHECK(supple_step(scene, loads, state, 6, NULL, NULL) >= 0);
+            CHECK(supple_guard_follow(scene, loads, state, guard, NULL, &estimate) >= 0);
+            CHECK(estimate.known == (frame > 0) && (!estimate.known || estimate.mean >= 0.0f));
+        }
+    }
+    printf("copies: a guard begins anew after a copy and a restore, whatever steps follow\n");
+}
+
 /* Without a file damped steps give the bits of those with the file of the library's own damper. */
 static void damper_built_in(void) {
     size_t bytes;
@@ -189,6 +222,7 @@ int main(void) {
     large_copied(SUPPLE_MASS_SCALED, "mass-scaled");
     large_copied(SUPPLE_MULTILEVEL, "multilevel");
     large_copied(SUPPLE_DAMPED, "damped");
+    guard_restored();
     damper_built_in();
     return 0;
 }

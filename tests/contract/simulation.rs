@@ -123,7 +123,7 @@ fn long_steps_and_their_guard_are_those_of_the_layers_below() {
         let mut worst = Status::Ok;
         for _ in 0..4 {
             let status = large.step(view, &loads, parts.state.view());
-            worst = worst.worse(guard.follow(status, view, &loads, &parts.state.view()));
+            worst = worst.worse(guard.follow(status, view, &loads, parts.state.view()));
         }
         assert_eq!((report.status, report.long, report.estimate), (worst, 4, guard.estimate()));
     }

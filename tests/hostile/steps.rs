@@ -109,7 +109,7 @@ fn sequence<M: ElementMaterial>(dice: &mut Dice, body: &Body, material: M, kind:
         for _ in 0..1 + dice.below(8) {
             let status = pair.take(&loads);
             refused |= !status.is_taken();
-            let judged = guard.follow(status, scene.view(), &loads, &pair.seen.state.view());
+            let judged = guard.follow(status, scene.view(), &loads, pair.seen.state.view());
             assert_eq!(judged.is_taken(), status.is_taken());
             if let Some(estimate) = guard.estimate() {
                 assert!(estimate.mean.is_finite() && estimate.allowed.is_finite(), "{judged:?}, {estimate:?}");

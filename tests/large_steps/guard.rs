@@ -60,7 +60,7 @@ fn judged(gravity: [f32; 3], forces: &[NodalForce], multiple: u32, lattice: bool
         for _ in 0..INTERVAL / multiple {
             let status = large.step(scene.view(), &loads, state.view());
             assert!(status.is_taken(), "{status:?}");
-            last = guard.follow(status, scene.view(), &loads, &state.view());
+            last = guard.follow(status, scene.view(), &loads, state.view());
         }
         let estimate = guard.estimate().unwrap();
         assert!(estimate.largest >= estimate.mean && (estimate.node as usize) < body.points.len());
@@ -120,7 +120,7 @@ fn a_body_at_rest_has_no_error() {
         assert_eq!(guard.estimate(), None);
         for _ in 0..50 {
             let status = large.step(scene.view(), &Loads::NONE, state.view());
-            assert_eq!(guard.follow(status, scene.view(), &Loads::NONE, &state.view()), Status::Ok);
+            assert_eq!(guard.follow(status, scene.view(), &Loads::NONE, state.view()), Status::Ok);
             let estimate = guard.estimate().unwrap();
             assert_eq!([estimate.mean, estimate.largest], [0.0; 2]);
         }
@@ -137,7 +137,7 @@ fn a_tolerance_in_metres_takes_the_place_of_the_share() {
     let mut inexact = 0;
     for _ in 0..50 {
         let status = large.step(scene.view(), &loads, state.view());
-        if let Status::Inexact { error, allowed } = guard.follow(status, scene.view(), &loads, &state.view()) {
+        if let Status::Inexact { error, allowed } = guard.follow(status, scene.view(), &loads, state.view()) {
             assert!(error > allowed && allowed == 1e-7);
             inexact += 1;
         }
@@ -156,7 +156,7 @@ fn a_state_that_was_reset_begins_a_new_second_run() {
         let mut estimates = vec![];
         for step in 0..40 {
             let status = large.step(scene.view(), &loads, state.view());
-            let _ = guard.follow(status, scene.view(), &loads, &state.view());
+            let _ = guard.follow(status, scene.view(), &loads, state.view());
             // After a reset the guard has not seen the start.
             if step > 0 {
                 estimates.push(guard.estimate().map(|estimate| estimate.mean));
@@ -224,7 +224,7 @@ fn a_guard_stays_in_step_over_a_long_session() {
     let mut known = 0;
     for step in 0..30_000 {
         let status = large.step(scene.view(), &loads, state.view());
-        let _ = guard.follow(status, scene.view(), &loads, &state.view());
+        let _ = guard.follow(status, scene.view(), &loads, state.view());
         known += usize::from(guard.estimate().is_some());
         assert_eq!(known, step + 1, "the second run was begun anew at {} s", state.time());
     }

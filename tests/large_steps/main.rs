@@ -15,6 +15,7 @@ mod guard;
 mod pulled;
 mod reaction;
 mod refused;
+mod restored;
 mod switching;
 mod turning;
 mod wild;

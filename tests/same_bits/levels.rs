@@ -47,7 +47,7 @@ fn run(material: &VecMaterial, level: Level, method: Option<Method<'_>>) -> Bits
         let mut guard = Guard::prepare_in_vec(scene.view(), &points, state.view(), step, EVERY).unwrap();
         for _ in 0..400 / EMULATED {
             let status = large.step(scene.view(), &loads, state.view());
-            let status = guard.follow(status, scene.view(), &loads, &state.view());
+            let status = guard.follow(status, scene.view(), &loads, state.view());
             // Where a step is refused is among what has to be the same.
             if let Status::Diverged(divergence) = status {
                 println!("after {} steps: {divergence}", state.steps());
