@@ -18,8 +18,8 @@ const LEAST: f32 = 0.001;
 /// Part of that where the estimate exceeds the motion of the run: both runs may hold a body still that moves.
 const LEAST_OF_STILL: f32 = 0.1;
 
-/// In the first steps from rest no two runs differ much. So at the first comparisons, one a step, the error may be as
-/// large as the motion.
+/// In the first steps from rest no two runs differ much. So after the first comparisons, one a step, the error may be as
+/// large as the motion, until the next.
 const FIRST_COMPARISONS: u32 = 3;
 
 /// The error that a run may have before its steps are called inexact.
@@ -54,6 +54,8 @@ pub(super) struct Envelope {
     least: f32,
     /// Largest mean motion so far, m.
     motion: f32,
+    /// The error may be at least this, m: the motion at the first comparisons, nothing after them.
+    floor: f32,
     /// None before the first comparison.
     held: Option<Comparison>,
     comparisons: u32,
@@ -75,6 +77,7 @@ impl Envelope {
             allowed: Allowed::default(),
             least,
             motion: 0.0,
+            floor: 0.0,
             held: None,
             comparisons: 0,
             first: FIRST_COMPARISONS,
@@ -86,7 +89,16 @@ impl Envelope {
 
     /// The state is another one.
     pub(super) fn forget(&mut self) {
-        *self = Self { motion: 0.0, held: None, comparisons: 0, distance: 0.0, growth: [0.0; 2], waited: 0.0, ..*self };
+        *self = Self {
+            motion: 0.0,
+            floor: 0.0,
+            held: None,
+            comparisons: 0,
+            distance: 0.0,
+            growth: [0.0; 2],
+            waited: 0.0,
+            ..*self
+        };
     }
 
     /// Enters a comparison, so many seconds after the one before.
@@ -94,11 +106,11 @@ impl Envelope {
         let kept = libm::exp2f(-seconds / HALF_LIFE);
         let before = self.held.unwrap_or_default();
         self.motion = self.motion.max(found.motion);
-        let least = if self.is_new() { found.motion } else { 0.0 };
+        self.floor = if self.is_new() { found.motion } else { 0.0 };
         self.comparisons = self.comparisons.saturating_add(1);
         let [mean, largest] = [found.mean, found.largest].map(finite);
         self.distance = mean;
-        let mean = mean.max(kept * before.mean).max(least);
+        let mean = mean.max(kept * before.mean);
         let largest = largest.max(kept * before.largest).max(mean);
         let growth = |now: f32, before: f32| finite(((now - before) / seconds).max(0.0));
         self.growth = [growth(mean, before.mean), growth(largest, before.largest)];
@@ -139,7 +151,7 @@ impl Envelope {
     pub(super) fn estimate(&self) -> Option<Estimate> {
         let Comparison { mean, largest, node, .. } = self.held?;
         let [mean, largest] = [(mean, self.growth[0]), (largest, self.growth[1])]
-            .map(|(held, growth)| finite(ESTIMATE * (held + growth * self.waited)));
+            .map(|(held, growth)| finite(ESTIMATE * (held + growth * self.waited).max(self.floor)));
         Some(Estimate { mean, largest, node, allowed: self.allowed(mean) })
     }
 
@@ -189,9 +201,13 @@ mod tests {
         assert_eq!(envelope.estimate(), None);
         for _ in 0..FIRST_COMPARISONS {
             envelope.add(&distance(0.001), 1e-3);
-            assert!(envelope.estimate().unwrap().mean > ESTIMATE * 0.049);
+            envelope.wait(5e-4);
+            let Estimate { mean, largest, .. } = envelope.estimate().unwrap();
+            assert_eq!([mean, largest], [ESTIMATE * 0.05; 2]);
         }
-        envelope.add(&distance(0.001), 10.0 * HALF_LIFE);
+        // It is not held, and does not count as growth.
+        envelope.add(&distance(0.001), 1e-3);
+        envelope.wait(1e-3);
         assert_eq!(envelope.estimate().unwrap().mean, ESTIMATE * 0.001);
     }
 
