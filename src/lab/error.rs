@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use supple::contact::ContactError;
 use supple::inertia::{DamperError, InertiaError};
 use supple::io::ReadError;
 use supple::learned::LearnedError;
@@ -29,6 +30,8 @@ pub enum LabError {
     Build(BuildError),
     /// The loads of a scene do not fit it.
     Load(LoadError),
+    /// Its instrument does not.
+    Contact(ContactError),
     /// A step was refused.
     Step(StepError),
     /// An inertia could not be prepared.
@@ -107,6 +110,7 @@ impl fmt::Display for LabError {
             Self::Mesh(error) => error.fmt(f),
             Self::Build(error) => error.fmt(f),
             Self::Load(error) => error.fmt(f),
+            Self::Contact(error) => error.fmt(f),
             Self::Step(error) => error.fmt(f),
             Self::Inertia(error) => error.fmt(f),
             Self::Diverged { scene, divergence } => write!(f, "the truth of {scene} {divergence}"),
@@ -148,4 +152,4 @@ macro_rules! from {
     };
 }
 
-from!(ReadError => Mesh, BuildError => Build, LoadError => Load, StepError => Step, InertiaError => Inertia, WeightError => Weights, LearnedError => LearnedStep, DamperError => Damper, std::io::Error => Write);
+from!(ReadError => Mesh, BuildError => Build, LoadError => Load, ContactError => Contact, StepError => Step, InertiaError => Inertia, WeightError => Weights, LearnedError => LearnedStep, DamperError => Damper, std::io::Error => Write);

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`scenes`] | bodies, supports and loads as data; [`moving`] those that fall, turn and swing |
 //! | [`course`] | how loads vary over time |
+//! | [`touched`] | the surface of a body where an instrument touches it |
 //! | [`timing`] | how time is counted in a scene |
 //! | [`truth`] | the exact motion of a scene, kept on disk |
 //! | [`method`] | what is compared: one match arm each |
@@ -45,6 +46,7 @@ pub mod table;
 mod threads;
 pub mod timing;
 pub mod tolerance;
+pub mod touched;
 #[cfg(feature = "train")]
 pub mod training;
 pub mod truth;

@@ -232,6 +232,21 @@ impl Method {
         }
     }
 
+    /// Whether it moves a body that an instrument touches: others refuse.
+    #[must_use]
+    pub const fn meets_instruments(self) -> bool {
+        use Method as M;
+        matches!(
+            self,
+            M::Tled
+                | M::TledLargeStep
+                | M::Multilevel
+                | M::Damped
+                | M::DampedWith(_)
+                | M::Switching(Large::Multilevel | Large::Damped)
+        )
+    }
+
     /// Time at the start that exact steps take, s.
     #[must_use]
     pub const fn lead_in(self) -> f64 {

@@ -49,8 +49,46 @@ pub struct Frame {
     pub max: f64,
     /// Estimates of the mean error and of the largest, mm.
     pub estimate: Option<[f64; 2]>,
-    /// Whether all steps since the snapshot before were [`Status::Ok`].
-    pub ok: bool,
+    /// The worst status of the steps since the snapshot before.
+    pub said: Said,
+}
+
+/// What the status of a step says to a host, from good to bad.
+#[derive(Clone, Copy, Debug, Eq, Ord, PartialEq, PartialOrd)]
+pub enum Said {
+    /// [`Status::Ok`].
+    Ok,
+    /// Something in the step itself is not as it should be: [`Status::Limited`] in most cases.
+    Limited,
+    /// [`Status::Inexact`], the guard's word.
+    Inexact,
+}
+
+impl Said {
+    /// Of a step that was taken.
+    const fn of(status: Status) -> Self {
+        match status {
+            Status::Ok => Self::Ok,
+            Status::Inexact { .. } => Self::Inexact,
+            _ => Self::Limited,
+        }
+    }
+
+    /// Whether nothing was to be said.
+    #[must_use]
+    pub const fn is_ok(self) -> bool {
+        matches!(self, Self::Ok)
+    }
+
+    /// For tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Limited => "limited",
+            Self::Inexact => "inexact",
+        }
+    }
 }
 
 /// How a run ended.
@@ -158,7 +196,7 @@ fn run_to_end(
     let (mut clips, mut predictions) = (0.0, 0_u32);
     let mut loads = spec.loads(&scene)?;
     for snapshot in 0..spec.intervals {
-        let mut ok = true;
+        let mut said = Said::Ok;
         let parts = method.parts(snapshot);
         let (seconds, part) = (dt / parts as f32, 1.0 / f64::from(parts));
         // A lead-in is not timed.
@@ -184,7 +222,7 @@ fn run_to_end(
                 Status::Mismatch { nodes, room } => return Err(LabError::Mismatch { nodes, room }),
                 _ => limited += part,
             }
-            ok &= status == Status::Ok;
+            said = said.max(Said::of(status));
             taken += if timed { part } else { 0.0 };
         }
         if timed {
@@ -192,7 +230,7 @@ fn run_to_end(
         }
         errors.add_snapshot(truth, state.displacements())?;
         let estimate = estimate.map(|metres| metres.map(|metre| 1e3 * f64::from(metre)));
-        frames.push(Frame { mean: errors.mean(), max: errors.max, estimate, ok });
+        frames.push(Frame { mean: errors.mean(), max: errors.max, estimate, said });
         shape.clear();
         shape.extend(state.displacements().iter().map(|vector| vector.to_array()));
     }

@@ -5,6 +5,7 @@
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
+use supple::contact::Instrument;
 use supple::io::{TetMesh, parse_msh};
 use supple::loads::{Motion, NodalForce};
 use supple::material::{AnyLaw, Element, Exponential, NeoHookean, Tissue, VecMaterial};
@@ -16,6 +17,7 @@ use supple::tled;
 
 use super::course::{Course, CurrentLoads};
 use super::timing::Timing;
+use super::touched::TouchedSurface;
 use super::{LabError, moving};
 
 /// The names of all scenes of the tables, in their order. One more, `bent`, is for training.
@@ -99,8 +101,10 @@ pub struct SceneSpec {
     pub forces: Vec<NodalForce>,
     /// Prescribed motions.
     pub motions: Vec<Motion>,
-    /// How forces and motions vary over time.
+    /// How forces, motions and gravity vary over time.
     pub course: Course,
+    /// An instrument that touches the body.
+    pub instrument: Option<Instrument<'static>>,
     /// A second tissue of some elements, of the same kind of law.
     pub second: Option<SecondTissue>,
     /// How time is counted.
@@ -174,10 +178,23 @@ impl SceneSpec {
         CurrentLoads::new(self, scene)
     }
 
+    /// The surface that the instrument touches, if there is one.
+    pub(super) fn touched(&self) -> Result<Option<TouchedSurface>, LabError> {
+        let instruments = self.instrument.as_slice();
+        if instruments.is_empty() {
+            return Ok(None);
+        }
+        let mesh = Mesh::new(&self.points, &self.tets, Winding::Checked).map_err(BuildError::Mesh)?;
+        TouchedSurface::new(&mesh, instruments).map(Some)
+    }
+
     /// The state at the start, for steps of `dt` (s).
     pub fn state(&self, scene: &impl AsScene, dt: f32) -> Result<VecState, LabError> {
         let count = self.points.len();
         let mut state = VecState::at_rest(count);
+        if let Some(touched) = self.touched()? {
+            state = touched.met_by(state)?;
+        }
         if self.start != RigidVelocity::default() {
             let [linear, angular] = [self.start.linear, self.start.angular].map(Vec3::from);
             let centre = self.points.iter().copied().map(Vec3::from).sum::<Vec3>() / count as f32;
@@ -245,6 +262,7 @@ pub(super) fn bar(name: &'static str, forces: Vec<NodalForce>) -> SceneSpec {
         forces,
         motions: Vec::new(),
         course: Course::Steady,
+        instrument: None,
         second: None,
         timing: Timing::PAPER,
         intervals: INTERVALS,
@@ -270,7 +288,7 @@ fn pull(newton: f32, ramp: f32) -> Vec<NodalForce> {
     corners().map(|(node, _)| NodalForce { node, newton: [0.0, 0.0, newton], ramp }).to_vec()
 }
 
-const CYLINDER: &[u8] = include_bytes!("../../meshes/cylinder.msh");
+pub(super) const CYLINDER: &[u8] = include_bytes!("../../meshes/cylinder.msh");
 pub(super) const LOBE: &[u8] = include_bytes!("../../meshes/lobe.msh");
 /// The held end of a mesh, as a share of its length: more than a layer of elements.
 pub(super) const HELD: f32 = 0.12;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use supple_lab::hard::verdict::{Judged, Verdict};
-use supple_lab::hard::{Plan, cases, evaluate, random};
+use supple_lab::hard::verdict::{Judged, Kind, Verdict};
+use supple_lab::hard::{Plan, cases, evaluate, ordinary, random, report};
 use supple_lab::method::{Large, Method};
 
 #[test]
@@ -28,6 +28,59 @@ fn a_number_gives_one_scene_and_scenes_can_be_built() {
 }
 
 #[test]
+fn ordinary_scenes_are_held_by_a_face_and_one_of_each_kind_follows_the_other() {
+    let mut kinds = vec![];
+    for number in 0..6 {
+        let spec = ordinary::scene(number, 0).unwrap();
+        assert_eq!(spec, ordinary::scene(number, 0).unwrap());
+        kinds.push(spec.name.split('-').next().unwrap());
+        let (nodes, held) = (spec.points.len(), spec.supports.len());
+        assert!(held > 10 && held < nodes / 3 && (2_000..9_000).contains(&spec.tets.len()), "{}", spec.name);
+        let loads = [spec.gravity != [0.0; 3], !spec.forces.is_empty(), !spec.motions.is_empty()];
+        assert!(loads.contains(&true) || spec.instrument.is_some(), "{}", spec.name);
+        assert!((0.7..1.6).contains(&spec.duration()), "{}", spec.name);
+    }
+    assert_eq!(kinds, ["hang", "push", "pull", "breathe", "table", "instrument"]);
+}
+
+/// Two of them; `supple-lab hard` judges all.
+#[test]
+fn damped_steps_are_right_in_ordinary_scenes_and_seldom_doubted() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = Plan { cases: vec![], random: 0, ordinary: 2, methods: vec![Method::Damped], every: 3 };
+    let judged = evaluate(&plan, folder.path(), |_| ()).unwrap();
+    print!("{}", report::text(&judged));
+    assert_eq!(judged.len(), 4);
+    for run in &judged {
+        let doubted = run.doubted();
+        assert_eq!(
+            (run.kind, run.verdict(), doubted.limited),
+            (Kind::Ordinary, Verdict::Right, 0),
+            "{}",
+            run.row.scene
+        );
+        // A millimetre is above what is never wrong: a frozen body would not be right.
+        assert!(run.motion() > 1.0 && run.worst().unwrap().mean < 0.2 * run.motion(), "{}", run.motion());
+        assert!(doubted.good > 5 && 2 * doubted.inexact < doubted.good, "{doubted:?}");
+    }
+    let table = std::fs::read_to_string(folder.path().join("hard.csv")).unwrap();
+    assert_eq!(table.matches(",ordinary,damped,").count(), 4);
+}
+
+/// A step that knows of no instrument is left out where one presses.
+#[cfg(feature = "slow-tests")]
+#[test]
+fn an_instrument_presses_in_damped_steps_and_mass_scaled_ones_are_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let methods = vec![Method::MassScaled, Method::Damped];
+    let judged = evaluate(&Plan { cases: vec![], random: 0, ordinary: 6, methods, every: 3 }, folder.path(), |_| ());
+    let judged = judged.unwrap();
+    let of: Vec<&Judged> = judged.iter().filter(|run| run.row.scene == "instrument-00").collect();
+    assert_eq!(of.iter().map(|run| run.row.method).collect::<Vec<_>>(), [Method::Damped; 2]);
+    assert!(of.iter().all(|run| run.motion() > 0.3 && run.verdict() == Verdict::Right));
+}
+
+#[test]
 fn a_mesh_of_the_users_is_scaled_and_pulled_by_a_tenth_of_its_weight() {
     let lobe = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../meshes/lobe.msh"));
     let pull = |scale| {
@@ -45,7 +98,7 @@ fn a_mesh_of_the_users_is_scaled_and_pulled_by_a_tenth_of_its_weight() {
 fn long_cases_are_judged_only_if_they_are_named() {
     let names = |named: &[&str], mesh| {
         let named: Vec<String> = named.iter().map(ToString::to_string).collect();
-        let plan = Plan::new(&named, mesh, &[], 0, 3).unwrap();
+        let plan = Plan::new(&named, mesh, &[], [0, 0], 3).unwrap();
         plan.cases.iter().map(|case| case.name).collect::<Vec<_>>()
     };
     let lobe = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../meshes/lobe.msh"));
@@ -60,7 +113,13 @@ fn long_cases_are_judged_only_if_they_are_named() {
 fn exact_steps_beyond_the_critical_one_tell_and_switching_steps_follow() {
     let folder = tempfile::tempdir().unwrap();
     let methods = [Method::TledLargeStep, Method::Damped, Method::Switching(Large::Damped)];
-    let plan = Plan { cases: vec![cases::named("coarse").unwrap()], random: 0, methods: methods.to_vec(), every: 3 };
+    let plan = Plan {
+        cases: vec![cases::named("coarse").unwrap()],
+        random: 0,
+        ordinary: 0,
+        methods: methods.to_vec(),
+        every: 3,
+    };
     let judged = evaluate(&plan, folder.path(), |_| ()).unwrap();
     let of = |method| judged.iter().filter(move |run: &&Judged| run.row.method == method).collect::<Vec<_>>();
 

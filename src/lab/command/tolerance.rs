@@ -34,7 +34,7 @@ pub(crate) fn judge(Asked { out, scenes, methods, tolerances, random }: &Asked) 
         return Err(Problem(format!("--tolerance {wrong}: it must be a positive number of mm")));
     }
     let methods = if methods.is_empty() { &[Method::Damped.name().to_owned()] } else { &**methods };
-    let plan = Plan::new(scenes, None, methods, *random, supple::guard::EVERY).map_err(Problem::of)?;
+    let plan = Plan::new(scenes, None, methods, [*random, 0], supple::guard::EVERY).map_err(Problem::of)?;
     let rows = evaluate(&plan, tolerances, out, |words| message!("{words}")).map_err(Problem::of)?;
     print(text(&rows));
     output!("\nresults  {}", out.join("tolerance.csv").display());

@@ -1,16 +1,19 @@
 //! Hard cases: is a run ever wrong without a word? Scenes made to break a step, and random ones, at 10 to 100 times the
 //! critical step, and by exact steps at the critical one and beyond. A snapshot is wrong if the mean error of the nodes
 //! exceeds a millimetre and a fifth of the motion so far; it is silently wrong if every step since the snapshot before
-//! was [`supple::step::Status::Ok`].
+//! was [`supple::step::Status::Ok`]. And the reverse: how often are ordinary scenes, at 10 and 20 times the critical
+//! step, doubted without reason?
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`cases`] | scenes that are made to break a step |
 //! | [`random`] | random bodies, materials, supports and loads |
+//! | [`ordinary`] | what hosts do most of the time |
 //! | [`verdict`] | what was wrong, what was told, and how far off the estimates are |
 //! | [`report`] | tables for people and programs |
 
 pub mod cases;
+pub mod ordinary;
 pub mod random;
 pub mod report;
 pub mod verdict;
@@ -28,10 +31,13 @@ use super::timing::Timing;
 use super::truth::{self, Truth};
 use super::{DT, LabError};
 
-use verdict::Judged;
+use verdict::{Judged, Kind};
 
 /// Steps over the critical step of a body at rest.
 pub const TIMES_CRITICAL: [u32; 4] = [10, 20, 50, 100];
+
+/// The same in ordinary scenes.
+const TIMES_CRITICAL_ORDINARY: [u32; 2] = [10, 20];
 
 /// The same of exact steps, which have no guard in `supple simulate` either.
 const TIMES_CRITICAL_EXACT: [f64; 3] = [0.9, 1.0, 1.2];
@@ -46,6 +52,8 @@ pub struct Plan {
     pub cases: Vec<SceneSpec>,
     /// The number of random scenes.
     pub random: u32,
+    /// The number of ordinary scenes.
+    pub ordinary: u32,
     /// Methods.
     pub methods: Vec<Method>,
     /// Steps of a run in one of its guard's second run, except for learned steps.
@@ -54,13 +62,13 @@ pub struct Plan {
 
 impl Plan {
     /// A plan from names of cases and methods, and a mesh of the user's with its factor to metres; so many random
-    /// scenes, and guards with `every`. All cases but [`cases::LONG`] if there are neither names nor a mesh, and all
+    /// and ordinary scenes, and guards with `every`. All cases but [`cases::LONG`] if there are neither names nor a mesh, and all
     /// methods if there are none.
     pub fn new(
         cases: &[String],
         mesh: Option<(&Path, f64)>,
         methods: &[String],
-        random: u32,
+        [random, ordinary]: [u32; 2],
         every: u32,
     ) -> Result<Self, LabError> {
         let methods = match methods {
@@ -88,22 +96,31 @@ impl Plan {
         if let Some((path, scale)) = mesh {
             cases.push(cases::of_mesh(path, scale)?);
         }
-        Ok(Self { cases, random, methods, every })
+        Ok(Self { cases, random, ordinary, methods, every })
     }
 
     /// How many scenes there are.
     pub(super) const fn scenes(&self) -> usize {
-        self.cases.len() + self.random as usize
+        self.cases.len() + self.random as usize + self.ordinary as usize
     }
 
-    /// A scene by its number, with its truth, which is kept in `out/truth`. None for a random scene that cannot be
+    fn kind(&self, index: usize) -> Kind {
+        if index < self.cases.len() + self.random as usize { Kind::Hard } else { Kind::Ordinary }
+    }
+
+    /// A scene by its number, with its truth, which is kept in `out/truth`. None for a drawn scene that cannot be
     /// found.
     pub(super) fn scene(&self, index: usize, out: &Path) -> Result<Option<(SceneSpec, Truth)>, LabError> {
         let truths = out.join("truth");
         super::create_folder(&truths)?;
         match self.cases.get(index) {
             Some(case) => with_truth(case.clone(), &truths).map(Some),
-            None => random_scene((index - self.cases.len()) as u32, &truths),
+            None => match (index - self.cases.len()) as u32 {
+                number if number < self.random => {
+                    drawn(|attempt| random::scene(number, attempt), f64::INFINITY, &truths)
+                }
+                number => drawn(|attempt| ordinary::scene(number - self.random, attempt), ordinary::FARTHEST, &truths),
+            },
         }
     }
 }
@@ -134,7 +151,7 @@ pub fn evaluate(plan: &Plan, out: &Path, say: impl Fn(&str) + Sync) -> Result<Ve
     let judge = |index: usize| {
         let Some((spec, truth)) = plan.scene(index, out)? else { return Ok(Vec::new()) };
         say(&format!("{}: moves by {:.1} mm", spec.name, 1e3 * truth.most()));
-        runs(&spec, &truth, plan, &say)
+        runs(&spec, &truth, plan, plan.kind(index), &say)
     };
     let judged = in_parallel(plan.scenes(), judge, |_, _| ())?.concat();
     report::write(&judged, out)?;
@@ -151,12 +168,16 @@ fn with_truth(mut spec: SceneSpec, folder: &Path) -> Result<(SceneSpec, Truth), 
     }
 }
 
-/// The first attempt whose truth moves by more than a millimetre and neither diverges nor leaves the range of its law.
-/// None if ten do.
-fn random_scene(number: u32, folder: &Path) -> Result<Option<(SceneSpec, Truth)>, LabError> {
+/// The first attempt whose truth moves by more than a millimetre and no farther than `farthest` (m), and neither diverges
+/// nor leaves the range of its law. None if ten do.
+fn drawn(
+    draw: impl Fn(u32) -> Result<SceneSpec, LabError>,
+    farthest: f64,
+    folder: &Path,
+) -> Result<Option<(SceneSpec, Truth)>, LabError> {
     for attempt in 0..10 {
-        match with_truth(random::scene(number, attempt)?, folder) {
-            Ok((spec, truth)) if truth.limited_steps == 0 && truth.most() > 1e-3 => {
+        match with_truth(draw(attempt)?, folder) {
+            Ok((spec, truth)) if truth.limited_steps == 0 && truth.most() > 1e-3 && truth.most() <= farthest => {
                 return Ok(Some((spec, truth)));
             }
             Ok(_) | Err(LabError::Diverged { .. } | LabError::NoCriticalStep { .. }) => {}
@@ -167,10 +188,17 @@ fn random_scene(number: u32, folder: &Path) -> Result<Option<(SceneSpec, Truth)>
 }
 
 /// All methods over a scene, judged.
-fn runs(spec: &SceneSpec, truth: &Truth, plan: &Plan, say: &impl Fn(&str)) -> Result<Vec<Judged>, LabError> {
+fn runs(
+    spec: &SceneSpec,
+    truth: &Truth,
+    plan: &Plan,
+    kind: Kind,
+    say: &impl Fn(&str),
+) -> Result<Vec<Judged>, LabError> {
     let mut judged = Vec::new();
-    for &method in &plan.methods {
-        for (timing, multiple) in steps(spec, truth, method) {
+    let methods = plan.methods.iter().filter(|method| spec.instrument.is_none() || method.meets_instruments());
+    for &method in methods {
+        for (timing, multiple) in steps(spec, truth, method, kind) {
             let spec = SceneSpec { timing, ..spec.clone() };
             let every = match method {
                 Method::Tled | Method::TledLargeStep => None,
@@ -185,15 +213,16 @@ fn runs(spec: &SceneSpec, truth: &Truth, plan: &Plan, say: &impl Fn(&str)) -> Re
                 }
                 row => row?,
             };
-            judged.push(Judged::new(row, truth, spec.timing.interval_seconds()));
+            judged.push(Judged::new(kind, row, truth, spec.timing.interval_seconds()));
         }
     }
     Ok(judged)
 }
 
 /// The steps of a method on a scene: multiples of how its time is counted, with the same snapshots.
-fn steps(spec: &SceneSpec, truth: &Truth, method: Method) -> Vec<(Timing, u32)> {
+fn steps(spec: &SceneSpec, truth: &Truth, method: Method, kind: Kind) -> Vec<(Timing, u32)> {
     let timing = spec.timing;
+    let times: &[u32] = if kind == Kind::Ordinary { &TIMES_CRITICAL_ORDINARY } else { &TIMES_CRITICAL };
     match method {
         Method::Learned(_) => networks::multiples()
             .filter(|_| spec.damping == TRAINED_DAMPING)
@@ -205,7 +234,10 @@ fn steps(spec: &SceneSpec, truth: &Truth, method: Method) -> Vec<(Timing, u32)> 
         Method::TledLargeStep => {
             TIMES_CRITICAL_EXACT.map(|times| (cut(&timing, times * truth.limit_at_rest), 1)).to_vec()
         }
-        _ => TIMES_CRITICAL.map(|times| (timing, multiple_near(&timing, truth.limit_at_rest as f32, times))).to_vec(),
+        _ => {
+            let multiple = |&times: &u32| (timing, multiple_near(&timing, truth.limit_at_rest as f32, times));
+            times.iter().map(multiple).collect()
+        }
     }
 }
 

@@ -16,20 +16,20 @@ use super::timing_of;
 
 impl Random {
     /// From `low` to `high`.
-    fn between(&mut self, low: f32, high: f32) -> f32 {
+    pub(super) fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * ((self.next_u64() >> 40) as f32 / (1_u32 << 24) as f32)
     }
 
     /// The same with a uniform logarithm.
-    fn scale(&mut self, low: f32, high: f32) -> f32 {
+    pub(super) fn scale(&mut self, low: f32, high: f32) -> f32 {
         self.between(low.ln(), high.ln()).exp()
     }
 
-    fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
+    pub(super) fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[(self.next_u64() % choices.len() as u64) as usize]
     }
 
-    fn chance(&mut self, share: f32) -> bool {
+    pub(super) fn chance(&mut self, share: f32) -> bool {
         self.between(0.0, 1.0) < share
     }
 

@@ -89,7 +89,8 @@ fn over_time(judged: &[Judged]) -> Section {
         let error = frames.iter().map(|frame| frame.mean).collect();
         let (at, estimate): (Vec<_>, Vec<_>) =
             times.iter().zip(frames).filter_map(|(time, frame)| Some((*time, frame.estimate?[0]))).unzip();
-        let told = times.iter().zip(frames).filter(|(_, frame)| !frame.ok).map(|(time, frame)| (*time, frame.mean));
+        let told =
+            times.iter().zip(frames).filter(|(_, frame)| !frame.said.is_ok()).map(|(time, frame)| (*time, frame.mean));
         let (told_at, told): (Vec<_>, Vec<_>) = told.unzip();
         let curves = vec![
             Curve::new("true mean error", reached, error).coloured(COLOURS[1]),
