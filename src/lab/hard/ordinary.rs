@@ -73,7 +73,7 @@ pub fn scene(number: u32, attempt: u32) -> Result<SceneSpec, LabError> {
     Ok(spec)
 }
 
-/// Blocks of 2,900 to 6,700 tetrahedra and irregular meshes of 2,400 to 8,200, with edges of 5 to 10 mm.
+/// Bars of 2,900 to 6,700 tetrahedra and irregular meshes of 2,400 to 8,200, with edges of 5 to 10 mm.
 fn mesh(number: u32, random: &mut Random) -> Result<SceneSpec, LabError> {
     let file = match (number / KINDS.len() as u32 + number) % 6 {
         0 => Some(CYLINDER),
@@ -125,10 +125,10 @@ fn hold(spec: &mut SceneSpec, shear: f32, random: &mut Random) -> Body {
     let mut across = Vec3::ZERO;
     [across[(axis + 1) % 3], across[(axis + 2) % 3]] = [angle.cos(), angle.sin()];
     let middle = 0.5 * (low + high);
-    let beside = |point: Vec3| (point - middle).reject_from_normalized(outward).length();
+    let off_axis = |point: Vec3| (point - middle).reject_from_normalized(outward).length();
     // Among the nodes near the middle the one farthest from the held face: the other side need not be flat.
     let near = 0.2 * extent.min_element();
-    let far = points().filter(|point| beside(*point) < near).max_by(|a, b| share(*a).total_cmp(&share(*b)));
+    let far = points().filter(|point| off_axis(*point) < near).max_by(|a, b| share(*a).total_cmp(&share(*b)));
     let far = far.unwrap_or(middle);
     spec.supports =
         nodes_where(spec, |point| share(Vec3::from(point)) < FACE).into_iter().map(Support::fixed).collect();
