@@ -169,7 +169,7 @@ static void guard_restored(void) {
         supple_large *large;
         supple_guard *guard;
         supple_estimate estimate;
-        move_end(scene, loads, 0.01f, -0.005f, 0.01f);
+        move_end(scene, loads, 3e-4f, -1e-4f, 3e-4f);
         CHECK(supple_large_init(large_memory, ROOM, scene, state, points[0], &config, &large, NULL) == SUPPLE_OK);
         CHECK(supple_guard_init(guard_memory, ROOM, scene, state, points[0], &guarded, &guard, NULL) == SUPPLE_OK);
         unsigned char *copy = state_memory + SUPPLE_STATE_SIZE(NODES, ELEMENT);
