@@ -48,9 +48,9 @@
     (4 * (size_t)(elements) + 2 * SUPPLE_PATCHES_(nodes, elements, tissues) + 15) / 16 + (((size_t)(nodes) + 1) / 2 + 39) / 40 + \
     (2 * (size_t)(elements) + 39) / 40 + (SUPPLE_PATCHES_(nodes, elements, tissues) + 39) / 40))
 #define SUPPLE_STATE_SIZE(nodes, element) \
-    (SUPPLE_STATE_FRONT + ((element) == SUPPLE_LINEAR ? 3 : 4) * SUPPLE_ARRAY_(nodes, 16))
+    (SUPPLE_STATE_FRONT + ((element) == SUPPLE_LINEAR ? 4 : 5) * SUPPLE_ARRAY_(nodes, 16))
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
-#define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 80 : 48))
+#define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 96 : 48))
 #define SUPPLE_LARGE_SIZE(nodes, elements, method, x, y, z) (SUPPLE_LARGE_FRONT + ((method) == SUPPLE_MASS_SCALED              \
     ? SUPPLE_ARRAY_(nodes, 80) : SUPPLE_LATTICE_(nodes, elements, (method) == SUPPLE_DAMPED, x, y, z)))
 #define SUPPLE_ARRAY_(count, bytes) (((size_t)(count) * (bytes) + SUPPLE_ALIGN - 1) / SUPPLE_ALIGN * SUPPLE_ALIGN)

@@ -1,5 +1,5 @@
-//! What moves: the displacement of each node (m), its last increment (m), and the total force (N) that the latest step
-//! saw. A [`StateView`] borrows it, and every step works on one; [`VecState`] owns it on a host with a heap (feature
+//! What moves: the displacement of each node (m) and what rounding has left out of it ([`crate::step`]), its last
+//! increment (m), and the total force (N) that the latest step saw. A [`StateView`] borrows it, and every step works on one; [`VecState`] owns it on a host with a heap (feature
 //! `std`), [`FixedState`] without.
 //!
 //! The increment `u_n - u_(n-1)` is kept instead of `u_(n-1)`: in float32 the rounding of
@@ -11,10 +11,14 @@ use core::ops::Deref;
 use crate::contact::{ContactPoint, Touch};
 #[cfg(any(feature = "std", test))]
 use crate::contact::{MOST_INSTRUMENTS, Surface, vectors_to_push};
+use crate::copy::copy;
 use crate::element::Extremes;
 use crate::energy_balance::EnergyBalance;
 use crate::material::Element;
 pub use crate::simd::NodeVector;
+
+/// Vectors of a node that a step moves: displacement, remainder, increment.
+pub(crate) const MOVED_VECTORS: usize = 3;
 
 /// How far a simulation has come, apart from its vectors.
 #[derive(Clone, Copy, Debug)]
@@ -123,6 +127,8 @@ impl Progress {
 #[derive(Debug)]
 pub struct StateView<'a> {
     pub(crate) displacement: &'a mut [NodeVector],
+    /// What rounding has left out of the displacements, m.
+    pub(crate) remainder: &'a mut [NodeVector],
     pub(crate) increment: &'a mut [NodeVector],
     pub(crate) force: &'a mut [NodeVector],
     /// Of scenes with nodal pressure or strain ([`crate::element`]), empty for others.
@@ -145,17 +151,20 @@ impl Deref for StateView<'_> {
 }
 
 impl<'a> StateView<'a> {
-    /// A state over the given vectors as they are: zeros mean at rest. `volume` is as long as the others for scenes
+    /// A state over the given vectors as they are: zeros mean at rest. Displacements and remainders add up to where the
+    /// nodes are: what rounding leaves out of a displacement in a step is added in the next one. `volume` is as long as the others for scenes
     /// with [`NodalPressure`](crate::material::NodalPressure) or [`NodalStrain`](crate::material::NodalStrain), and may
     /// be empty for linear tetrahedra.
     pub const fn new(
         displacement: &'a mut [NodeVector],
+        remainder: &'a mut [NodeVector],
         increment: &'a mut [NodeVector],
         force: &'a mut [NodeVector],
         volume: &'a mut [NodeVector],
         progress: &'a mut Progress,
     ) -> Self {
-        Self { displacement, increment, force, volume, progress, touches: &mut [], points: &mut [], pushes: &mut [] }
+        let (touches, points, pushes): (&mut [_], &mut [_], &mut [_]) = (&mut [], &mut [], &mut []);
+        Self { displacement, remainder, increment, force, volume, progress, touches, points, pushes }
     }
 
     /// The same state, whose steps write to `touches` what each instrument feels ([`crate::contact`]) in the latest
@@ -184,6 +193,7 @@ impl<'a> StateView<'a> {
     pub const fn reborrow(&mut self) -> StateView<'_> {
         StateView {
             displacement: self.displacement,
+            remainder: self.remainder,
             increment: self.increment,
             force: self.force,
             volume: self.volume,
@@ -209,7 +219,8 @@ impl<'a> StateView<'a> {
     /// How many nodes the vectors hold.
     #[must_use]
     pub fn capacity(&self) -> usize {
-        self.displacement.len().min(self.increment.len()).min(self.force.len())
+        let Self { displacement, remainder, increment, force, .. } = self;
+        displacement.len().min(remainder.len()).min(increment.len()).min(force.len())
     }
 
     /// How many nodes of a scene of these elements the vectors hold.
@@ -237,12 +248,31 @@ impl<'a> StateView<'a> {
         for (node, (displacement, increment)) in vectors.enumerate() {
             [displacement.0, increment.0] = at(node).map(|[x, y, z]| [x, y, z, 0.0]);
         }
+        self.remainder.fill(NodeVector::ZERO);
         (self.progress.time, self.progress.dt, self.progress.seen) = (time, seconds, None);
+    }
+
+    /// Copies the vectors that a step moves to [`MOVED_VECTORS`] for each node.
+    pub(crate) fn save(&self, into: &mut [NodeVector]) {
+        let room = (into.len() / MOVED_VECTORS).max(1);
+        for (saved, vectors) in into.chunks_exact_mut(room).zip([&*self.displacement, self.remainder, self.increment]) {
+            copy(saved, vectors);
+        }
+    }
+
+    /// Copies them back.
+    pub(crate) fn restore(&mut self, from: &[NodeVector]) {
+        let Self { displacement, remainder, increment, .. } = self;
+        let room = (from.len() / MOVED_VECTORS).max(1);
+        for (vectors, saved) in [displacement, remainder, increment].into_iter().zip(from.chunks_exact(room)) {
+            copy(vectors, saved);
+        }
     }
 
     /// Back to rest at time zero.
     pub fn reset(&mut self) {
-        for vectors in [&mut *self.displacement, &mut *self.increment, &mut *self.force] {
+        let Self { displacement, remainder, increment, force, .. } = self;
+        for vectors in [displacement, remainder, increment, force] {
             vectors.fill(NodeVector::ZERO);
         }
         *self.progress = Progress::START;
@@ -263,10 +293,10 @@ impl AsState for StateView<'_> {
 
 /// Memory for the vectors of a state.
 pub trait StateVectors {
-    /// Displacements, increments, forces; volumes of the nodes, or nothing.
-    fn vectors(&self) -> [&[NodeVector]; 4];
+    /// Displacements, their remainders, increments, forces; volumes of the nodes, or nothing.
+    fn vectors(&self) -> [&[NodeVector]; 5];
     /// The same, to be changed, and what is kept for instruments, if anything.
-    fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 4], InstrumentMemory<'_>);
+    fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 5], InstrumentMemory<'_>);
 }
 
 /// What a state keeps for instruments ([`StateView::pushing`], [`StateView::feeling`]).
@@ -296,9 +326,10 @@ impl<S> Deref for State<S> {
 impl<S: StateVectors> State<S> {
     /// The state.
     pub fn view(&mut self) -> StateView<'_> {
-        let ([displacement, increment, force, volume], InstrumentMemory { pushes, touches }) =
+        let ([displacement, remainder, increment, force, volume], InstrumentMemory { pushes, touches }) =
             self.vectors.vectors_mut();
-        StateView::new(displacement, increment, force, volume, &mut self.progress).pushing(pushes).feeling(touches)
+        let state = StateView::new(displacement, remainder, increment, force, volume, &mut self.progress);
+        state.pushing(pushes).feeling(touches)
     }
 
     /// Displacement of each node, m.
@@ -312,13 +343,13 @@ impl<S: StateVectors> State<S> {
     /// was refused these are the forces of that step, and after [`crate::tled::critical_step`] zero.
     #[must_use]
     pub fn forces(&self) -> &[NodeVector] {
-        self.vectors.vectors()[2]
+        self.vectors.vectors()[3]
     }
 
     /// Velocity of a node over the latest step, m/s; zero for a node that does not exist.
     #[must_use]
     pub fn velocity(&self, node: usize) -> [f32; 3] {
-        let increment = self.vectors.vectors()[1].get(node).copied().unwrap_or_default();
+        let increment = self.vectors.vectors()[2].get(node).copied().unwrap_or_default();
         let dt = self.progress.dt;
         if dt > 0.0 { increment.to_array().map(|component| component / dt) } else { [0.0; 3] }
     }
@@ -326,8 +357,8 @@ impl<S: StateVectors> State<S> {
     /// How many nodes there is room for.
     #[must_use]
     pub fn capacity(&self) -> usize {
-        let [displacement, increment, force, _] = self.vectors.vectors();
-        displacement.len().min(increment.len()).min(force.len())
+        let [displacement, remainder, increment, force, _] = self.vectors.vectors();
+        displacement.len().min(remainder.len()).min(increment.len()).min(force.len())
     }
 
     /// Back to rest at time zero.
@@ -345,19 +376,19 @@ impl<S: StateVectors> AsState for State<S> {
 /// Vectors of `N` nodes, volumes of `P`.
 #[derive(Clone, Debug)]
 pub struct FixedVectors<const N: usize, const P: usize> {
-    vectors: [[NodeVector; N]; 3],
+    vectors: [[NodeVector; N]; 4],
     volumes: [NodeVector; P],
 }
 
 impl<const N: usize, const P: usize> StateVectors for FixedVectors<N, P> {
-    fn vectors(&self) -> [&[NodeVector]; 4] {
-        let [displacement, increment, force] = &self.vectors;
-        [displacement, increment, force, &self.volumes]
+    fn vectors(&self) -> [&[NodeVector]; 5] {
+        let [displacement, remainder, increment, force] = &self.vectors;
+        [displacement, remainder, increment, force, &self.volumes]
     }
 
-    fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 4], InstrumentMemory<'_>) {
-        let [displacement, increment, force] = &mut self.vectors;
-        ([displacement, increment, force, &mut self.volumes], InstrumentMemory::default())
+    fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 5], InstrumentMemory<'_>) {
+        let [displacement, remainder, increment, force] = &mut self.vectors;
+        ([displacement, remainder, increment, force, &mut self.volumes], InstrumentMemory::default())
     }
 }
 
@@ -370,7 +401,7 @@ impl<const N: usize, const P: usize> FixedState<N, P> {
     /// At rest.
     #[must_use]
     pub const fn new() -> Self {
-        let (vectors, volumes) = ([[NodeVector::ZERO; N]; 3], [NodeVector::ZERO; P]);
+        let (vectors, volumes) = ([[NodeVector::ZERO; N]; 4], [NodeVector::ZERO; P]);
         Self { vectors: FixedVectors { vectors, volumes }, progress: Progress::START }
     }
 }
@@ -385,18 +416,18 @@ impl<const N: usize, const P: usize> Default for FixedState<N, P> {
 #[cfg(any(feature = "std", test))]
 #[derive(Clone, Debug)]
 pub struct VecVectors {
-    vectors: [std::vec::Vec<NodeVector>; 4],
+    vectors: [std::vec::Vec<NodeVector>; 5],
     pushes: std::vec::Vec<NodeVector>,
     touches: std::vec::Vec<Touch>,
 }
 
 #[cfg(any(feature = "std", test))]
 impl StateVectors for VecVectors {
-    fn vectors(&self) -> [&[NodeVector]; 4] {
+    fn vectors(&self) -> [&[NodeVector]; 5] {
         self.vectors.each_ref().map(std::vec::Vec::as_slice)
     }
 
-    fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 4], InstrumentMemory<'_>) {
+    fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 5], InstrumentMemory<'_>) {
         let Self { vectors, pushes, touches } = self;
         (vectors.each_mut().map(std::vec::Vec::as_mut_slice), InstrumentMemory { pushes, touches })
     }
@@ -412,7 +443,8 @@ impl VecState {
     #[must_use]
     pub fn at_rest(nodes: usize) -> Self {
         let zero = || std::vec![NodeVector::ZERO; nodes];
-        let (vectors, pushes, touches) = ([zero(), zero(), zero(), zero()], std::vec![], std::vec![]);
+        let vectors = [zero(), zero(), zero(), zero(), zero()];
+        let (pushes, touches) = (std::vec![], std::vec![]);
         Self { vectors: VecVectors { vectors, pushes, touches }, progress: Progress::START }
     }
 

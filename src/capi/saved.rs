@@ -6,7 +6,7 @@ use core::{ptr, slice};
 use bytemuck::{Pod, Zeroable, bytes_of, must_cast_slice};
 
 use crate::copy::copy;
-use crate::state::{NodeVector, Progress};
+use crate::state::{MOVED_VECTORS, NodeVector, Progress};
 use crate::step::{EnergyBalance, EnergyCycle, Step};
 
 use super::memory::{self, array, place_for};
@@ -16,9 +16,9 @@ use super::vectors::overlap;
 use supple_status::*;
 
 const MAGIC: [u8; 8] = *b"SUPPLE-M";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
-/// Before displacements and increments, four floats each.
+/// Before displacements, their remainders and increments, four floats each.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Front {
@@ -45,7 +45,10 @@ const FRONT: usize = size_of::<Front>();
 /// Bytes that a saved state of so many nodes has.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_saved_size(nodes: u32) -> usize {
-    (nodes as usize).checked_mul(2 * size_of::<NodeVector>()).and_then(|bytes| bytes.checked_add(FRONT)).unwrap_or(0)
+    (nodes as usize)
+        .checked_mul(MOVED_VECTORS * size_of::<NodeVector>())
+        .and_then(|bytes| bytes.checked_add(FRONT))
+        .unwrap_or(0)
 }
 
 /// Saves a state with its step to `to`, at any address.
@@ -82,10 +85,10 @@ pub unsafe extern "C" fn supple_save(state: *const supple_state, to: *mut c_void
             energy_cycle: [cycle.next.into(), cycle.strain, cycle.kinetic, cycle.work],
         };
         let to = slice::from_raw_parts_mut(to, needed);
-        let [displacements, increments, _] = vectors(state)?;
+        let [displacements, remainders, increments, _] = vectors(state)?;
         let (first, rest) = to.split_at_mut_checked(FRONT).ok_or(short(bytes, needed))?;
         let places = rest.chunks_exact_mut(size_of_val(displacements).max(1));
-        for (place, vectors) in places.zip([displacements, increments]) {
+        for (place, vectors) in places.zip([displacements, remainders, increments]) {
             copy(place, must_cast_slice(vectors));
         }
         front.checksum = checksum(&front, rest);
@@ -138,9 +141,9 @@ pub unsafe extern "C" fn supple_restore(state: *mut supple_state, from: *const c
             }
             vectors
         };
-        let (displacements, increments) = rest.split_at_checked(rest.len() / 2).unwrap_or_default();
-        vectors(displacements);
-        vectors(increments);
+        for saved in rest.chunks_exact((rest.len() / MOVED_VECTORS).max(1)) {
+            vectors(saved);
+        }
         vectors(&[]).fill(NodeVector::ZERO);
         Ok(SUPPLE_OK)
     };

@@ -65,6 +65,7 @@ fn layout(nodes: u32, element: Element) -> Layout {
         .and::<NodeVector>(nodes)
         .and::<NodeVector>(nodes)
         .and::<NodeVector>(nodes)
+        .and::<NodeVector>(nodes)
         .and::<NodeVector>(volumes)
 }
 
@@ -225,10 +226,10 @@ impl supple_state {
 /// The arrays are those of a state of so many nodes, and nobody else uses them.
 unsafe fn view<'a>(mut arrays: Arrays, nodes: u32, element: Element, progress: &'a mut Progress) -> StateView<'a> {
     // SAFETY: the caller's promise. Any bits are vectors.
-    let [displacements, increments, forces] = [(); 3].map(|()| unsafe { arrays.change(nodes as usize) });
+    let [displacements, remainders, increments, forces] = [(); 4].map(|()| unsafe { arrays.change(nodes as usize) });
     // SAFETY: as above.
     let volumes = unsafe { arrays.change(volumes(nodes, element)) };
-    StateView::new(displacements, increments, forces, volumes, progress)
+    StateView::new(displacements, remainders, increments, forces, volumes, progress)
 }
 
 /// The state in an object, whose other fields may be used meanwhile.
@@ -261,15 +262,15 @@ pub(super) unsafe fn opened_of<'a>(open: &OpenScene<'_>, object: *mut supple_sta
     }
 }
 
-/// Displacements, increments and forces of a state.
+/// Displacements, their remainders, increments and forces of a state.
 ///
 /// # Safety
 /// As at [`memory::read`].
-pub(super) unsafe fn vectors<'a>(object: *const supple_state) -> Answer<[&'a [NodeVector]; 3]> {
+pub(super) unsafe fn vectors<'a>(object: *const supple_state) -> Answer<[&'a [NodeVector]; 4]> {
     // SAFETY: the caller's promise.
     unsafe {
         let nodes = memory::read(object)?.nodes as usize;
         let mut arrays = Arrays::behind(object);
-        Ok([(); 3].map(|()| arrays.read(nodes)))
+        Ok([(); 4].map(|()| arrays.read(nodes)))
     }
 }

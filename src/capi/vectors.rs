@@ -92,7 +92,7 @@ pub unsafe extern "C" fn supple_copy_velocities(
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let copy = || unsafe {
-        let [_, increments, _] = vectors(state)?;
+        let [_, _, increments, _] = vectors(state)?;
         let seconds = (*state).progress.last_step();
         copy(state, increments, out, floats, |_, increment| {
             if seconds > 0.0 { increment.map(|component| component / seconds) } else { [0.0; 3] }
@@ -112,7 +112,7 @@ pub unsafe extern "C" fn supple_copy_velocities(
 pub unsafe extern "C" fn supple_copy_forces(state: *const supple_state, out: *mut f32, floats: usize) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let copy = || unsafe {
-        let [_, _, forces] = vectors(state)?;
+        let [.., forces] = vectors(state)?;
         copy(state, forces, out, floats, |_, force| force)
     };
     status_of(copy())

@@ -71,7 +71,7 @@ pub fn vectors_at_most(element: Element, nodes: usize, elements: usize) -> usize
 
 /// Displacements, increments and forces; volumes for elements that have them.
 const fn vectors_of_state(element: Element, nodes: usize) -> usize {
-    if matches!(element, Element::Linear) { 3 * nodes } else { 4 * nodes }
+    if matches!(element, Element::Linear) { 4 * nodes } else { 5 * nodes }
 }
 
 /// A guard without its storage; it may be moved in memory.
@@ -315,16 +315,18 @@ fn split<'a>(
     progress: &'a mut Progress,
 ) -> Option<(StateView<'a>, &'a mut [NodeVector])> {
     let (displacement, rest) = storage.split_at_mut_checked(nodes)?;
+    let (remainder, rest) = rest.split_at_mut_checked(nodes)?;
     let (increment, rest) = rest.split_at_mut_checked(nodes)?;
     let (force, rest) = rest.split_at_mut_checked(nodes)?;
-    let volumes = vectors_of_state(element, nodes) - 3 * nodes;
+    let volumes = vectors_of_state(element, nodes) - 4 * nodes;
     let (volume, rest) = rest.split_at_mut_checked(volumes)?;
-    Some((StateView::new(displacement, increment, force, volume, progress), rest))
+    Some((StateView::new(displacement, remainder, increment, force, volume, progress), rest))
 }
 
 /// Makes the second run start from the state of the first.
 fn start_from(state: &StateView<'_>, second: &mut StateView<'_>) {
     copy(second.displacement, state.displacement);
+    copy(second.remainder, state.remainder);
     copy(second.increment, state.increment);
     *second.progress = *state.progress;
 }

@@ -17,7 +17,7 @@ use super::report::HeldBack;
 use super::{LARGEST_MOVE, LEAST_SHARE, NODE_GROWTH, RECOVERY};
 use crate::padding;
 use crate::simd::{Contiguous, Kernel, NodeVector, Real, Rows, TILE, dispatch};
-use crate::step::{Sums, Totals};
+use crate::step::{Moving, Sums, Totals, moved};
 
 /// For each frame the rotation from the frame of the bounds to the world, as padded rows; the identity for frames that
 /// are not used.
@@ -367,19 +367,17 @@ impl MotionPass<'_> {
 }
 
 /// Moves some consecutive nodes by their next increments.
-pub(super) fn apply_increments(
-    first: usize,
-    places: &[LatticeNode],
-    next: &[NodeVector],
-    displacement: &mut [NodeVector],
-    increment: &mut [NodeVector],
-) {
+pub(super) fn apply_increments(first: usize, places: &[LatticeNode], next: &[NodeVector], moving: Moving<'_>) {
+    let Moving { displacement, remainder, increment } = moving;
     // The fourth component is no increment.
     let axes = Vec4::new(1.0, 1.0, 1.0, 0.0).cmpgt(Vec4::ZERO);
-    for (node, (displacement, increment)) in (first..).zip(displacement.iter_mut().zip(increment)) {
+    for (node, ((displacement, remainder), increment)) in
+        (first..).zip(displacement.iter_mut().zip(remainder).zip(increment))
+    {
         let next = next.get(rank_of(places, node)).copied().unwrap_or_default();
         let next = Vec4::select(axes, Vec4::from(next.0), Vec4::ZERO);
-        displacement.0 = (Vec4::from(displacement.0) + next).to_array();
+        let sum = moved(displacement.0.into(), remainder.0.into(), next);
+        [displacement.0, remainder.0] = sum.map(|sum| sum.to_array());
         increment.0 = next.to_array();
     }
 }

@@ -18,7 +18,7 @@ use super::restriction_pass::{RestrictionExtremes, RestrictionPass};
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
 use crate::simd::NodeVector;
 use crate::step::threads::take;
-use crate::step::{Threads, Totals, move_in_parts};
+use crate::step::{Moving, Threads, Totals, move_in_parts};
 
 /// The parts of a step: partitions of the nodes, and who computes them.
 pub(super) struct NodeParts<'a, T> {
@@ -195,15 +195,9 @@ impl<T: Threads> NodeParts<'_, T> {
     }
 
     /// Moves the nodes by their next increments.
-    pub(super) fn apply_increments(
-        &self,
-        places: &[LatticeNode],
-        next: &[NodeVector],
-        displacement: &mut [NodeVector],
-        increment: &mut [NodeVector],
-    ) {
-        move_in_parts(self.partitions, displacement, increment, self.threads, |nodes, displacement, increment| {
-            apply_increments(nodes.start, places, next, displacement, increment);
+    pub(super) fn apply_increments(&self, places: &[LatticeNode], next: &[NodeVector], moving: Moving<'_>) {
+        move_in_parts(self.partitions, moving, self.threads, |nodes, moving| {
+            apply_increments(nodes.start, places, next, moving);
         });
     }
 

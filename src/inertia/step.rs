@@ -9,7 +9,9 @@ use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::StateView;
-use crate::step::{CallingThread, Computed, Forcing, Status, Step, StepMethod, Threads, Totals, Trial, nodal_volumes};
+use crate::step::{
+    CallingThread, Computed, Forcing, Moving, Status, Step, StepMethod, Threads, Totals, Trial, nodal_volumes,
+};
 
 use super::cells::{prolong, restrict};
 use super::coarse_motion::{CoarseMotion, CoarseSpace, MotionResult, removed_share};
@@ -155,9 +157,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     fn advance(&mut self, trial: &mut Trial<'_, M>) {
         let model = &mut *self.model;
         model.rough = self.rough;
-        let Trial { scene, displacement, increment, .. } = trial;
+        let Trial { scene, displacement, remainder, increment, .. } = trial;
+        let moving = Moving { displacement, remainder, increment };
         let Storage { tables, places, .. } = &self.storage;
-        node_parts(scene, self.threads).apply_increments(places, tables.next_increment, displacement, increment);
+        node_parts(scene, self.threads).apply_increments(places, tables.next_increment, moving);
     }
 
     #[inline(never)]

@@ -10,7 +10,7 @@ use super::{LearnedReport, Vertex};
 use crate::element::{ElementMaterial, NoVisitor, NodeInertia};
 use crate::mlp::Network;
 use crate::simd::NodeVector;
-use crate::step::{Computed, Forcing, Step, StepMethod, Threads, Totals, Trial, move_in_parts};
+use crate::step::{Computed, Forcing, Moving, Step, StepMethod, Threads, Totals, Trial, move_in_parts, moved};
 
 /// A learned step that is being computed.
 pub(super) struct Learned<'a, 'w, T> {
@@ -42,13 +42,16 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
     }
 
     fn advance(&mut self, trial: &mut Trial<'_, M>) {
-        let Trial { scene, displacement, increment, .. } = trial;
+        let Trial { scene, displacement, remainder, increment, .. } = trial;
+        let moving = Moving { displacement, remainder, increment };
         let (partitions, vertices) = (scene.elements().partitions, &*self.vertices);
-        move_in_parts(partitions, displacement, increment, self.threads, |nodes, displacement, increment| {
+        move_in_parts(partitions, moving, self.threads, |nodes, Moving { displacement, remainder, increment }| {
             let vertices = vertices.get(nodes).unwrap_or_default();
-            for ((displacement, increment), vertex) in displacement.iter_mut().zip(increment).zip(vertices) {
+            let vectors = displacement.iter_mut().zip(remainder).zip(increment);
+            for (((displacement, remainder), increment), vertex) in vectors.zip(vertices) {
                 *increment = vertex.next;
-                displacement.0 = (Vec4::from(displacement.0) + Vec4::from(vertex.next.0)).to_array();
+                let sum = moved(displacement.0.into(), remainder.0.into(), Vec4::from(vertex.next.0));
+                [displacement.0, remainder.0] = sum.map(|sum| sum.to_array());
             }
         });
     }

@@ -31,13 +31,12 @@ use core::fmt;
 use bytemuck::{Pod, Zeroable, must_cast_slice_mut};
 use glam::Vec4;
 
-use crate::copy::copy;
 use crate::element::ElementMaterial;
 use crate::loads::Loads;
 use crate::mlp::Network;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::state::{AsState, Moment, Progress, StateView};
+use crate::state::{AsState, MOVED_VECTORS, Moment, Progress, StateView};
 use crate::step::{CallingThread, Status, Step, Threads, Trial};
 use crate::tled;
 use frame::Frame;
@@ -73,7 +72,7 @@ const VERTEX_VECTORS: usize = size_of::<Vertex>() / size_of::<NodeVector>();
 /// Vectors of storage that learned steps of so many nodes need, with fallback or without.
 #[must_use]
 pub const fn vectors_for(nodes: usize, fallback: bool) -> usize {
-    (VERTEX_VECTORS + if fallback { 2 } else { 0 }).saturating_mul(nodes)
+    (VERTEX_VECTORS + if fallback { MOVED_VECTORS } else { 0 }).saturating_mul(nodes)
 }
 
 /// Why a network cannot move a scene.
@@ -436,8 +435,9 @@ impl<'w> LearnedView<'_, 'w> {
             return status;
         }
         let after = state.as_state();
-        for (vertex, displacement) in vertices.iter_mut().zip(&*after.displacement) {
-            let increment = Vec4::from(displacement.0) - Vec4::from(vertex.next.0);
+        let moved = after.displacement.iter().zip(&*after.remainder);
+        for (vertex, (displacement, remainder)) in vertices.iter_mut().zip(moved) {
+            let increment = (Vec4::from(displacement.0) - Vec4::from(vertex.next.0)) + Vec4::from(remainder.0);
             vertex.next = NodeVector(increment.to_array());
             vertex.frame.follow(vertex.next.to_array());
         }
@@ -481,7 +481,7 @@ impl<'w> LearnedView<'_, 'w> {
             return Ok(Err(Undone));
         }
         let nodes = scene.node_count();
-        let per_node = if self.model.undoes { VERTEX_VECTORS + 2 } else { VERTEX_VECTORS };
+        let per_node = if self.model.undoes { VERTEX_VECTORS + MOVED_VECTORS } else { VERTEX_VECTORS };
         let room = self.storage.len() / per_node;
         if let Err(refused) = Trial::check(scene, loads, state, room) {
             return Ok(Ok(refused));
@@ -489,7 +489,7 @@ impl<'w> LearnedView<'_, 'w> {
         let before = *state.progress;
         let (_, saved) = self.storage.split_at_mut(self.storage.len().min(VERTEX_VECTORS * nodes));
         if self.model.undoes {
-            save(state, saved);
+            state.save(saved);
         }
         self.take_over(state)?;
         let Self { model, storage } = self;
@@ -507,7 +507,7 @@ impl<'w> LearnedView<'_, 'w> {
         if model.undoes && status.is_unexplained() {
             model.turns.undo(before.time, status);
             *state.progress = before;
-            restore(state, saved);
+            state.restore(saved);
             if state.dt != exact {
                 state.respan(exact);
             }
@@ -557,17 +557,4 @@ fn exact_steps(count: u32, mut step: impl FnMut(u32) -> Status) -> Status {
         }
     }
     worst
-}
-
-/// Copies what a learned step changes.
-fn save(state: &StateView<'_>, saved: &mut [NodeVector]) {
-    let (displacement, increment) = saved.split_at_mut(saved.len() / 2);
-    copy(displacement, state.displacement);
-    copy(increment, state.increment);
-}
-
-fn restore(state: &mut StateView<'_>, saved: &[NodeVector]) {
-    let (displacement, increment) = saved.split_at(saved.len() / 2);
-    copy(state.displacement, displacement);
-    copy(state.increment, increment);
 }

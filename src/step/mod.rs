@@ -4,6 +4,7 @@
 //! what a method keeps of it: the next step is the same, to the bit, as if there had been none.
 
 mod cause;
+mod compensated;
 mod contact;
 mod energy_sums;
 mod length;
@@ -15,10 +16,11 @@ mod triangles;
 pub(crate) use crate::element::Extremes;
 pub use crate::energy_balance::{EnergyBalance, EnergyCycle};
 pub use cause::Cause;
+pub(crate) use compensated::moved;
 pub(crate) use energy_sums::{Sums, Totals};
 pub use length::{CriticalStep, Step, StepError};
 pub(crate) use length::{equal_steps, is_damping};
-pub(crate) use parts::{Forcing, internal_forces, move_in_parts, nodal_volumes};
+pub(crate) use parts::{Forcing, Moving, internal_forces, move_in_parts, nodal_volumes};
 pub use status::{Divergence, Status};
 #[cfg(feature = "parallel")]
 pub use threads::Rayon;
@@ -38,6 +40,8 @@ pub(crate) struct Trial<'a, M> {
     pub(crate) loads: &'a Loads<'a>,
     /// One vector for each node of the scene.
     pub(crate) displacement: &'a mut [NodeVector],
+    /// What rounding has left out of the displacements ([`moved`]).
+    pub(crate) remainder: &'a mut [NodeVector],
     pub(crate) increment: &'a mut [NodeVector],
     pub(crate) force: &'a mut [NodeVector],
     /// Rows of [`crate::element::NodalVolumes`] for materials with nodal pressure; with nodal strain only
@@ -117,11 +121,12 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     ) -> Result<Self, Status> {
         Self::check(scene, loads, &state, room)?;
         let nodes = scene.node_count();
-        let StateView { displacement, increment, force, volume, progress, touches, points, pushes } = state;
+        let StateView { displacement, remainder, increment, force, volume, progress, touches, points, pushes } = state;
         Ok(Self {
             scene,
             loads,
             displacement: displacement.get_mut(..nodes).unwrap_or_default(),
+            remainder: remainder.get_mut(..nodes).unwrap_or_default(),
             increment: increment.get_mut(..nodes).unwrap_or_default(),
             force: force.get_mut(..nodes).unwrap_or_default(),
             volume: volume.get_mut(..nodes).unwrap_or_default(),
@@ -228,11 +233,12 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
 
     /// Puts the nodes of motions where they belong by now.
     fn follow_motions(&mut self) {
-        let Self { loads, displacement, increment, progress, .. } = self;
+        let Self { loads, displacement, remainder, increment, progress, .. } = self;
         loads.each_prescribed(progress.time, increment, |node, axis, position, increment| {
-            if let Some(NodeVector(displacement)) = displacement.get_mut(node) {
+            let (displacement, remainder) = (displacement.get_mut(node), remainder.get_mut(node));
+            if let (Some(NodeVector(displacement)), Some(NodeVector(remainder))) = (displacement, remainder) {
                 increment[axis % 4] = position - displacement[axis % 4];
-                displacement[axis % 4] = position;
+                (displacement[axis % 4], remainder[axis % 4]) = (position, 0.0);
             }
         });
     }

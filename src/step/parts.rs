@@ -173,22 +173,30 @@ pub(crate) fn external_forces(
     }
 }
 
-/// Calls `advance` with the node range, displacements and increments of each part.
+/// The vectors of nodes that a step moves.
+pub(crate) struct Moving<'a> {
+    pub(crate) displacement: &'a mut [NodeVector],
+    /// See [`super::moved`].
+    pub(crate) remainder: &'a mut [NodeVector],
+    pub(crate) increment: &'a mut [NodeVector],
+}
+
+/// Calls `advance` with the node range and the vectors of each part.
 pub(crate) fn move_in_parts(
     partitions: &Partitions,
-    mut displacement: &mut [NodeVector],
-    mut increment: &mut [NodeVector],
+    moving: Moving<'_>,
     threads: &impl Threads,
-    advance: impl Fn(Range<usize>, &mut [NodeVector], &mut [NodeVector]) + Sync,
+    advance: impl Fn(Range<usize>, Moving<'_>) + Sync,
 ) {
+    let Moving { mut displacement, mut remainder, mut increment } = moving;
     let count = partitions.parts(threads.parts());
     let mut parts: [_; MOST_PARTS] = from_fn(|part| {
         let nodes = partitions.nodes(&partitions.part(part, count));
         let count = nodes.len();
-        (nodes, take(&mut displacement, count), take(&mut increment, count))
+        (nodes, [&mut displacement, &mut remainder, &mut increment].map(|vectors| take(vectors, count)))
     });
-    threads.each(parts.get_mut(..count).unwrap_or_default(), |(nodes, displacement, increment)| {
-        advance(nodes.clone(), displacement, increment);
+    threads.each(parts.get_mut(..count).unwrap_or_default(), |(nodes, [displacement, remainder, increment])| {
+        advance(nodes.clone(), Moving { displacement, remainder, increment });
     });
 }
 

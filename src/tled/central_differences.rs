@@ -5,7 +5,7 @@ use bytemuck::{Pod, must_cast_slice, must_cast_slice_mut};
 
 use crate::element::NodeInertia;
 use crate::simd::{Kernel, NodeVector, Real, axes, dispatch};
-use crate::step::{Step, Sums, Totals};
+use crate::step::{Moving, Step, Sums, Totals, moved};
 
 /// The next increment of a node; held axes stand still.
 #[inline(always)]
@@ -139,8 +139,7 @@ impl<const INSTRUMENTS: bool> Kernel for TotalsKernel<'_, INSTRUMENTS> {
 pub(super) struct Advance<'a> {
     pub(super) step: &'a Step,
     pub(super) inertia: &'a [NodeInertia],
-    pub(super) displacement: &'a mut [NodeVector],
-    pub(super) increment: &'a mut [NodeVector],
+    pub(super) moving: Moving<'a>,
     pub(super) force: &'a [NodeVector],
 }
 
@@ -157,23 +156,25 @@ impl Kernel for Advance<'_> {
 
     #[inline(always)]
     fn run<R: Real>(self) {
-        let Self { step, inertia, displacement, increment, force } = self;
+        let Self { step, inertia, moving: Moving { displacement, remainder, increment }, force } = self;
         let coefficients = Coefficients::<R>::new(step);
-        let moving = displacement.chunks_mut(4).zip(increment.chunks_mut(4));
-        for ((displacement, increment), first) in moving.zip((0..inertia.len()).step_by(4)) {
+        let moving = displacement.chunks_mut(4).zip(remainder.chunks_mut(4)).zip(increment.chunks_mut(4));
+        for (((displacement, remainder), increment), first) in moving.zip((0..inertia.len()).step_by(4)) {
             let (inertia, force) = (four(inertia, first), four(force, first));
-            let (mut at, mut moved) = (four(displacement, 0), four(increment, 0));
+            let (mut at, mut left, mut last) = (four(displacement, 0), four(remainder, 0), four(increment, 0));
             for from in (0..FOUR).step_by(R::COUNT) {
                 let inverse = axes::<R>() * vector_of::<R>(&inertia, from);
-                let next = coefficients.next(inverse, vector_of(&moved, from), vector_of(&force, from));
-                let here = vector_of::<R>(&at, from) + next;
+                let next = coefficients.next(inverse, vector_of(&last, from), vector_of(&force, from));
+                let [here, rest] = moved(vector_of::<R>(&at, from), vector_of(&left, from), next);
                 for lane in 0..R::COUNT {
-                    moved[(from + lane) % FOUR] = next.lane(lane);
+                    last[(from + lane) % FOUR] = next.lane(lane);
                     at[(from + lane) % FOUR] = here.lane(lane);
+                    left[(from + lane) % FOUR] = rest.lane(lane);
                 }
             }
             put(at, displacement);
-            put(moved, increment);
+            put(left, remainder);
+            put(last, increment);
         }
     }
 }

@@ -35,8 +35,8 @@ use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::{
-    self, CallingThread, Cause, Computed, EnergyBalance, Forcing, Status, Step, StepMethod, Threads, Totals, Trial,
-    move_in_parts, nodal_volumes,
+    self, CallingThread, Cause, Computed, EnergyBalance, Forcing, Moving, Status, Step, StepMethod, Threads, Totals,
+    Trial, move_in_parts, nodal_volumes,
 };
 use central_differences::{Advance, EnergyInput, next_increment};
 
@@ -96,13 +96,14 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
     }
 
     fn advance(&mut self, trial: &mut Trial<'_, M>) {
-        let Trial { scene, displacement, increment, force, .. } = trial;
+        let Trial { scene, displacement, remainder, increment, force, .. } = trial;
+        let moving = Moving { displacement, remainder, increment };
         let (inertia, force, step) = (scene.inertia, &**force, self.step);
         let partitions = scene.elements().partitions;
-        move_in_parts(partitions, displacement, increment, self.threads, |nodes, displacement, increment| {
+        move_in_parts(partitions, moving, self.threads, |nodes, moving| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let force = force.get(nodes).unwrap_or_default();
-            Advance { step, inertia, displacement, increment, force }.advance();
+            Advance { step, inertia, moving, force }.advance();
         });
     }
 }

@@ -9,7 +9,7 @@ use crate::element::{ElementMaterial, Extremes};
 use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::state::{Moment, StateView};
+use crate::state::{MOVED_VECTORS, Moment, StateView};
 use crate::step::{CriticalStep, Status, Step, StepError, Threads, equal_steps};
 
 use super::critical::{Weights, critical};
@@ -76,7 +76,7 @@ pub enum Approach {
 /// latest step meanwhile.
 #[must_use]
 pub const fn vectors_for_pace(nodes: usize) -> usize {
-    3 * nodes + nodes.div_ceil(4)
+    (MOVED_VECTORS + 1) * nodes + nodes.div_ceil(4)
 }
 
 impl Pace {
@@ -147,11 +147,9 @@ impl Pace {
             self.look_soon();
         }
         let nodes = scene.node_count();
-        let (displacement, kept) = kept.split_at_mut(nodes.min(kept.len()));
-        let (increment, kept) = kept.split_at_mut(nodes.min(kept.len()));
+        let (before, kept) = kept.split_at_mut((MOVED_VECTORS * nodes).min(kept.len()));
         let (force, weights) = kept.split_at_mut(nodes.min(kept.len()));
-        copy(displacement, state.displacement);
-        copy(increment, state.increment);
+        state.save(before);
         let progress = *state.progress;
         let count = whole.min(self.steps.saturating_sub(self.taken));
         let (mut refused, mut taken, mut extremes) = (None, 0, Extremes::none());
@@ -181,8 +179,7 @@ impl Pace {
         copy(state.force, force);
         let outrun = refused.is_some() || seconds > now;
         if outrun && seconds > self.shortest {
-            copy(state.displacement, displacement);
-            copy(state.increment, increment);
+            state.restore(before);
             *state.progress = progress;
             self.longest = 0.5 * seconds;
             self.look_soon();

@@ -12,7 +12,7 @@ SUPPLE_MEMORY(state_memory, 2 * SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(learned_memory, 2 * SUPPLE_LEARNED_SIZE(NODES, 1));
 SUPPLE_MEMORY(large_memory, 2 * ROOM);
 SUPPLE_MEMORY(guard_memory, 2 * ROOM);
-static unsigned char saved[1 + 32 * NODES + 256];
+static unsigned char saved[1 + 48 * NODES + 256];
 
 static supple_scene *scene;
 static supple_loads *loads;

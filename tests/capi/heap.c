@@ -10,7 +10,7 @@ SUPPLE_MEMORY(large_memory, 4 << 20);
 SUPPLE_MEMORY(guard_memory, 4 << 20);
 SUPPLE_MEMORY(adaptive_memory, 8 << 20);
 SUPPLE_MEMORY(weights, 40000);
-static unsigned char saved[32 * NODES + 256];
+static unsigned char saved[48 * NODES + 256];
 
 static unsigned long asked;
 void *__real_malloc(size_t bytes);

@@ -15,7 +15,7 @@ SUPPLE_MEMORY(small_loads_memory, SUPPLE_LOADS_SIZE(1, 1));
 SUPPLE_MEMORY(spare, 4 << 20);
 SUPPLE_MEMORY(weights, 40000);
 SUPPLE_MEMORY(damper, 4000);
-static unsigned char saved[32 * NODES + 256];
+static unsigned char saved[48 * NODES + 256];
 static float out[3 * NODES];
 
 static supple_scene *scene, *small_scene;
@@ -280,7 +280,7 @@ static void bytes_of_states(void) {
     REFUSED(SUPPLE_E_NOT_SAVED, supple_restore(state, points, sizeof points));
     saved[8] = 9;
     REFUSED(SUPPLE_E_SAVED_VERSION, supple_restore(state, saved, bytes));
-    saved[8] = 2, saved[bytes - 1] ^= 1;
+    saved[8] = 3, saved[bytes - 1] ^= 1;
     REFUSED(SUPPLE_E_SAVED_CHECKSUM, supple_restore(state, saved, bytes));
 }
 

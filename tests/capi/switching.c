@@ -9,7 +9,7 @@ SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(exact_memory, SUPPLE_STATE_SIZE(NODES, ELEMENT));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
 SUPPLE_MEMORY(large_memory, ROOM);
-static unsigned char saved[32 * NODES + 256];
+static unsigned char saved[48 * NODES + 256];
 static float before[NODES][3], truth[NODES][3], moved[NODES][3];
 
 /* A frame of 10 ms in steps of both kinds. */

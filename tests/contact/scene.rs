@@ -26,7 +26,7 @@ pub(crate) struct Body {
     pub(crate) step: Step,
     /// What the state keeps for instruments, if anything.
     pub(crate) pushes: Vec<NodeVector>,
-    vectors: [Vec<NodeVector>; 4],
+    vectors: [Vec<NodeVector>; 5],
     progress: Progress,
 }
 
@@ -41,11 +41,11 @@ impl Body {
         let surface = boundary(&mesh);
         let every_triangle = boundary_triangles(&mesh, &surface);
         let zeros = || vec![NodeVector::ZERO; points.len()];
-        let mut vectors = [zeros(), zeros(), zeros(), zeros()];
+        let mut vectors = [zeros(), zeros(), zeros(), zeros(), zeros()];
         let mut progress = Progress::START;
         let critical = {
-            let [displacement, increment, force, volume] = &mut vectors;
-            let mut state = StateView::new(displacement, increment, force, volume, &mut progress);
+            let [displacement, remainder, increment, force, volume] = &mut vectors;
+            let mut state = StateView::new(displacement, remainder, increment, force, volume, &mut progress);
             tled::critical_step(&scene, &mut state).unwrap()
         };
         let step = Step::new(0.9 * critical.seconds, damping, critical).unwrap();
@@ -70,8 +70,8 @@ impl Body {
     }
 
     pub(crate) fn state<'a>(&'a mut self, touches: &'a mut [Touch]) -> StateView<'a> {
-        let [displacement, increment, force, volume] = &mut self.vectors;
-        StateView::new(displacement, increment, force, volume, &mut self.progress).feeling(touches)
+        let [displacement, remainder, increment, force, volume] = &mut self.vectors;
+        StateView::new(displacement, remainder, increment, force, volume, &mut self.progress).feeling(touches)
     }
 
     pub(crate) fn time(&self) -> f64 {
@@ -96,8 +96,8 @@ impl Body {
         let (surface, triangles) = (self.surface.clone(), self.triangles.clone());
         let surface = Surface::new(&surface, self.points.len()).unwrap().with_triangles(&triangles).unwrap();
         let contact = Contact::new(surface, instruments).unwrap();
-        let [displacement, increment, force, volume] = &mut self.vectors;
-        let state = StateView::new(displacement, increment, force, volume, &mut self.progress);
+        let [displacement, remainder, increment, force, volume] = &mut self.vectors;
+        let state = StateView::new(displacement, remainder, increment, force, volume, &mut self.progress);
         let mut state = state.feeling(touches).pushing(&mut self.pushes);
         let loads = Loads::new(&self.scene, gravity, &[], &[]).unwrap().touched_by(contact);
         tled::step(&self.scene, &loads, &mut state.as_state(), &self.step)
@@ -106,7 +106,7 @@ impl Body {
     /// Momentum of all nodes, kg m/s, and the mass, kg.
     pub(crate) fn momentum(&self) -> ([f64; 3], f64) {
         let (mut sum, mut all) = ([0.0; 3], 0.0);
-        for (node, increment) in self.vectors[1].iter().enumerate() {
+        for (node, increment) in self.vectors[2].iter().enumerate() {
             let mass = f64::from(self.scene.view().node_mass(node));
             all += mass;
             for (sum, component) in sum.iter_mut().zip(increment.to_array()) {

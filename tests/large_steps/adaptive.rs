@@ -208,10 +208,11 @@ fn a_state_without_a_critical_step_is_refused() {
     let mut adaptive = adaptive(&body, &scene, &mut state, 1e-4, DAMPING);
     let mut loads = Loads::new(&scene, [1.0, 0.0, 0.0], &[], &[]).unwrap();
     let nodes = scene.view().node_count();
-    let [mut displacement, mut increment, mut force] =
-        [f32::NAN, 0.0, 0.0].map(|component| vec![bytemuck::cast::<[f32; 4], NodeVector>([component; 4]); nodes]);
+    let [mut displacement, mut remainder, mut increment, mut force] =
+        [f32::NAN, 0.0, 0.0, 0.0].map(|component| vec![bytemuck::cast::<[f32; 4], NodeVector>([component; 4]); nodes]);
     let mut progress = Progress::START;
-    let mut lost = StateView::new(&mut displacement, &mut increment, &mut force, &mut [], &mut progress);
+    let mut lost =
+        StateView::new(&mut displacement, &mut remainder, &mut increment, &mut force, &mut [], &mut progress);
     for _ in 0..3 {
         let (status, taken) = adaptive.advance(FRAME, scene.view(), &mut loads, lost.reborrow());
         assert!(matches!(status, Status::Diverged(_)) && taken == Taken::default(), "{status:?} {taken:?}");
