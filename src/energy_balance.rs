@@ -41,6 +41,9 @@ pub struct EnergyBalance {
     pub uncertainty: f64,
     /// The largest balance so far, or since a measurement that found much less.
     pub peak: f64,
+    /// What rounding of the displacements can give to vibrations in the long run, J, more rather than less. Where that
+    /// is no longer little, forces are computed from what it has left out as well.
+    pub heat: f64,
     /// The measurement under way.
     pub cycle: EnergyCycle,
 }
@@ -82,6 +85,7 @@ impl EnergyBalance {
         kinetic: 0.0,
         uncertainty: 0.0,
         peak: 0.0,
+        heat: 0.0,
         cycle: EnergyCycle::NEW,
     };
 
@@ -107,6 +111,11 @@ impl EnergyBalance {
     /// What the kinetic energy may be before a step is inexact, J.
     fn allowed(&self) -> f64 {
         self.balance() + self.uncertainty + SLACK * self.peak
+    }
+
+    /// Whether rounding gives to vibrations more than goes unnoticed.
+    pub(crate) fn is_heated(&self) -> bool {
+        self.heat > SLACK * self.peak
     }
 
     /// The share of the kinetic energy that the balance allows, at most one.

@@ -13,6 +13,7 @@
 //! | inverse mass and mass, while a scene is built | marks of held axes; the two lowest tissues of the node | [`crate::element`] | the same, which writes masses over them | 5, while it is built |
 //! | fourth component of a sum of bounds `xy, yz, zx` | share of its inverse inertia that a node could use before the step | [`crate::inertia`], while a step is computed | the same, if the step is refused | 4 of 104 |
 //! | last eight bits of a height | number of the frame that a node turns with | [`crate::inertia`], when it is prepared | its passes | 1 of 104 |
+//! | fourth components of a vertex's tangent, normal and increment | what rounding had left out of its displacement when an interval of exact steps began | [`crate::learned`], in a lead-in | the same, when the interval ends | 12 of 48 |
 //! | fourth component of a lattice position | number of the node | the same | the same | 4 of 104 |
 
 use crate::simd::NodeVector;

@@ -78,7 +78,7 @@ impl Progress {
     pub const START: Self =
         Self { time: 0.0, steps: 0, energy_balance: EnergyBalance::NEW, dt: 0.0, extremes: Extremes::REST, seen: None };
 
-    /// A simulation that goes on from here; its displacements and increments are the caller's to restore.
+    /// A simulation that goes on from here; its displacements, remainders and increments are the caller's to restore.
     #[must_use]
     pub const fn resumed(time: f64, steps: u64, last_step: f32, energy_balance: EnergyBalance) -> Self {
         Self { time, steps, energy_balance, dt: last_step, extremes: Extremes::REST, seen: None }

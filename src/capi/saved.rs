@@ -34,7 +34,7 @@ struct Front {
     step_damping: f32,
     time: f64,
     steps: u64,
-    energy_balance: [f64; 7],
+    energy_balance: [f64; 8],
     energy_cycle: [f64; 4],
 }
 
@@ -68,7 +68,7 @@ pub unsafe extern "C" fn supple_save(state: *const supple_state, to: *mut c_void
             return Err(supple_error::from(SUPPLE_E_OVERLAP));
         }
         let progress = &object.progress;
-        let EnergyBalance { start, work, dissipated, corrected, kinetic, uncertainty, peak, cycle } =
+        let EnergyBalance { start, work, dissipated, corrected, kinetic, uncertainty, peak, heat, cycle } =
             *progress.energy_balance();
         let step = object.step().ok();
         let mut front = Front {
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn supple_save(state: *const supple_state, to: *mut c_void
             step_damping: step.map_or(0.0, |step| step.damping()),
             time: progress.time(),
             steps: progress.steps(),
-            energy_balance: [start, work, dissipated, corrected, kinetic, uncertainty, peak],
+            energy_balance: [start, work, dissipated, corrected, kinetic, uncertainty, peak, heat],
             energy_cycle: [cycle.next.into(), cycle.strain, cycle.kinetic, cycle.work],
         };
         let to = slice::from_raw_parts_mut(to, needed);
@@ -128,10 +128,11 @@ pub unsafe extern "C" fn supple_restore(state: *mut supple_state, from: *const c
         check_finite(&front, rest)?;
         let (object, mut arrays) = memory::open(state)?;
         let Front { time, steps, last_step, step_seconds, step_damping, .. } = front;
-        let [start, work, dissipated, corrected, kinetic, uncertainty, peak] = front.energy_balance;
+        let [start, work, dissipated, corrected, kinetic, uncertainty, peak, heat] = front.energy_balance;
         let [next, strain, largest, of_cycle] = front.energy_cycle;
         let cycle = EnergyCycle { next: next as u32, strain, kinetic: largest, work: of_cycle };
-        let energy_balance = EnergyBalance { start, work, dissipated, corrected, kinetic, uncertainty, peak, cycle };
+        let energy_balance =
+            EnergyBalance { start, work, dissipated, corrected, kinetic, uncertainty, peak, heat, cycle };
         object.progress = Progress::resumed(time, steps, last_step, energy_balance);
         object.set_step(Step::unchecked(step_seconds, step_damping).ok());
         let mut vectors = |bytes: &[u8]| {

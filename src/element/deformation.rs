@@ -12,6 +12,30 @@ use super::symmetric::Symmetric;
 pub(crate) type Vector<R> = [R; 3];
 pub(crate) type Matrix<R> = [[R; 3]; 3];
 
+/// Vectors of three corners less that of the first one.
+#[inline(always)]
+pub(super) fn edges<R: Real>([origin, a, b, c]: [Vector<R>; 4]) -> [Vector<R>; 3] {
+    let mut edges = [a, b, c];
+    for edge in &mut edges {
+        for (component, origin) in edge.iter_mut().zip(origin) {
+            *component = *component - origin;
+        }
+    }
+    edges
+}
+
+/// The same of displacements and of what rounding has left out of them. Where that is nothing the bits are those without.
+#[inline(always)]
+pub(super) fn exact_edges<R: Real>(displacements: [Vector<R>; 4], remainders: [Vector<R>; 4]) -> [Vector<R>; 3] {
+    let mut sums = edges(displacements);
+    for (sum, remainder) in sums.iter_mut().zip(edges(remainders)) {
+        for (component, remainder) in sum.iter_mut().zip(remainder) {
+            *component = *component + remainder;
+        }
+    }
+    sums
+}
+
 /// Deformation of a vector of elements.
 #[derive(Clone, Copy)]
 pub(crate) struct Deformation<R> {
@@ -57,19 +81,19 @@ impl<R: Real> Deformation<R> {
     pub(crate) fn of_tile(tile: &ElementTile, first: usize, displacement: Gather<'_>) -> Self {
         let nodes = tile.nodes_below::<R>(displacement.count()).unwrap_or(TileNodes::ALL_ZERO);
         let at = |corner: usize| displacement.read_nodes::<R, 4>(&nodes, corner, first);
-        Self::of_displacements(tile, first, [at(0), at(1), at(2), at(3)])
+        Self::of_edges(tile, first, edges([at(0), at(1), at(2), at(3)]))
     }
 
-    /// From the displacements of the corners.
+    /// From the displacements of three corners relative to the first one.
     #[inline(always)]
-    pub(super) fn of_displacements(tile: &ElementTile, first: usize, [origin, a, b, c]: [Vector<R>; 4]) -> Self {
+    pub(super) fn of_edges(tile: &ElementTile, first: usize, edges: [Vector<R>; 3]) -> Self {
         let mut h = [[R::splat(0.0); 3]; 3];
-        for (corner, displacement) in [a, b, c].into_iter().enumerate() {
+        for (corner, along) in edges.into_iter().enumerate() {
             for j in 0..3 {
                 let gradient = tile.gradient::<R>(corner, j, first);
                 for i in 0..3 {
                     // Not fused: in ill-conditioned states this lowers the error of the forces by a fifth.
-                    h[i][j] = h[i][j] + (displacement[i] - origin[i]) * gradient;
+                    h[i][j] = h[i][j] + along[i] * gradient;
                 }
             }
         }

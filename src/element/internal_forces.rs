@@ -13,7 +13,7 @@ use crate::simd::{
 };
 
 use super::ElementTile;
-use super::deformation::{Deformation, Matrix};
+use super::deformation::{Deformation, Matrix, edges, exact_edges};
 use super::pressure::{OwnPressure, Pressure};
 
 /// The elements of a scene with their laws.
@@ -103,22 +103,26 @@ pub struct InternalForces<'a, L, V, P = OwnPressure> {
     /// Forces of the nodes in these partitions are computed.
     partitions: Range<usize>,
     displacement: Gather<'a>,
+    /// What rounding has left out of the displacements, or nothing.
+    remainder: Gather<'a>,
     force: Scatter<'a>,
     visitor: V,
 }
 
 impl<'a, L: Law, V, P> InternalForces<'a, L, V, P> {
-    /// Forces of the nodes in `partitions`; `force` has one vector for each of these.
+    /// Forces of the nodes in `partitions`; `force` has one vector for each of these. `moved` are displacements and
+    /// what rounding has left out of them, or nothing.
     pub(crate) fn of_partitions(
         elements: Elements<'a, L>,
         pressure: P,
         partitions: Range<usize>,
-        displacement: &'a [NodeVector],
+        moved: [&'a [NodeVector]; 2],
         force: &'a mut [NodeVector],
         visitor: V,
     ) -> Self {
         let force = Scatter::from(elements.partitions.nodes(&partitions).start, force);
-        Self { elements, pressure, partitions, displacement: Gather::new(displacement), force, visitor }
+        let [displacement, remainder] = moved.map(Gather::new);
+        Self { elements, pressure, partitions, displacement, remainder, force, visitor }
     }
 }
 
@@ -142,13 +146,13 @@ impl<L: Law, V: ElementVisitor, P: Pressure> Kernel for InternalForces<'_, L, V,
 fn in_batches<R: Real, L: Law, P: Pressure, const SIZE: usize>(
     kernel: InternalForces<'_, L, impl ElementVisitor, P>,
 ) -> Extremes<f32> {
-    let InternalForces { elements, pressure, partitions, displacement, mut force, mut visitor } = kernel;
+    let InternalForces { elements, pressure, partitions, displacement, remainder, mut force, mut visitor } = kernel;
     let Elements { laws, tiles, partitions: all } = elements;
     let displacement = pressure.displacement().unwrap_or(displacement);
     let mut extremes = Extremes::<Pair<R>>::none();
     for (touching, length) in all.touching(partitions) {
         let tiles = (tiles.get(touching).unwrap_or_default(), length);
-        let input = (displacement, pressure);
+        let input = (displacement, remainder, pressure);
         add_forces::<R, L, P, SIZE>(&laws, tiles, input, &mut force, &mut visitor, &mut extremes);
     }
     Extremes::none().merged_with(&extremes)
@@ -199,20 +203,20 @@ const SCALAR_BATCH: usize = SCATTER_WIDTH * LONGEST;
 pub(crate) fn add_forces<R: Real, L: Law, P: Pressure, const SIZE: usize>(
     laws: &Laws<'_, L>,
     (tiles, length): (&[ElementTile], usize),
-    input: (Gather<'_>, P),
+    input: (Gather<'_>, Gather<'_>, P),
     force: &mut Scatter<'_>,
     visitor: &mut impl ElementVisitor,
     extremes: &mut Extremes<Pair<R>>,
 ) {
     let Some(first) = tiles.first() else { return };
-    let (displacement, pressure) = input;
+    let (displacement, remainder, pressure) = input;
     let mut batch = [ElementVector::<R>::zero(first); SIZE];
     let strip_count = tiles.len().checked_div(length).unwrap_or(0) * (TILE / R::COUNT);
     let most = if R::COUNT == 1 { SCATTER_WIDTH } else { SIZE.checked_div(length).unwrap_or(SIZE).max(1) };
     for start in (0..strip_count).step_by(most) {
         let strips = start..strip_count.min(start + most);
         let count = length * strips.len();
-        R::run_piece(Deform { tiles, length, strips, displacement, pressure, batch: &mut batch });
+        R::run_piece(Deform { tiles, length, strips, displacement, remainder, pressure, batch: &mut batch });
         // If the count is odd, the second vector of the last pair is an old one; its result is not used.
         for (index, pair) in batch.as_chunks_mut::<2>().0.iter_mut().enumerate().take(count.div_ceil(2)) {
             let locals = respond::<R, L>(laws, pair, extremes);
@@ -242,6 +246,7 @@ struct Deform<'a, 'b, R: Real, P: Pressure> {
     length: usize,
     strips: Range<usize>,
     displacement: Gather<'b>,
+    remainder: Gather<'b>,
     pressure: P,
     batch: &'b mut [ElementVector<'a, R>],
 }
@@ -251,18 +256,21 @@ impl<R: Real, P: Pressure> Piece for Deform<'_, '_, R, P> {
 
     #[inline(always)]
     fn run(self) {
-        match self.length {
-            3 => deform::<R, P, 3, 6>(self),
-            2 => deform::<R, P, 2, 5>(self),
-            _ => deform::<R, P, 1, 4>(self),
+        match (self.length, self.remainder.count()) {
+            (3, 0) => deform::<R, P, 3, 6, false>(self),
+            (2, 0) => deform::<R, P, 2, 5, false>(self),
+            (_, 0) => deform::<R, P, 1, 4, false>(self),
+            (3, _) => deform::<R, P, 3, 6, true>(self),
+            (2, _) => deform::<R, P, 2, 5, true>(self),
+            _ => deform::<R, P, 1, 4, true>(self),
         }
     }
 }
 
 /// The same for strips of `K` elements with `N` nodes. Elements of tiles with nodes out of range do not deform.
 #[inline(always)]
-fn deform<R: Real, P: Pressure, const K: usize, const N: usize>(pass: Deform<'_, '_, R, P>) {
-    let Deform { tiles, strips, displacement, pressure, batch, .. } = pass;
+fn deform<R: Real, P: Pressure, const K: usize, const N: usize, const REMAINDERS: bool>(pass: Deform<'_, '_, R, P>) {
+    let Deform { tiles, strips, displacement, remainder, pressure, batch, .. } = pass;
     let (tiles, vectors) = (tiles.as_chunks::<K>().0, TILE / R::COUNT);
     for (strip, elements) in strips.zip(batch.as_chunks_mut::<K>().0) {
         let Some(tiles) = tiles.get(strip / vectors) else { return };
@@ -276,11 +284,17 @@ fn deform<R: Real, P: Pressure, const K: usize, const N: usize>(pass: Deform<'_,
             displacements[node] = [x, y, z];
             volumes[node] = pressure.read_with::<R, N>(fourth, &nodes, node, first);
         });
+        let mut remainders = [[R::splat(0.0); 3]; N];
+        if REMAINDERS {
+            unrolled!(node < N => { remainders[node] = remainder.read_nodes::<R, N>(&nodes, node, first); });
+        }
         unrolled!(element < K => {
             let [a, b, c, d] = CORNERS[element % LONGEST];
             let corners =
                 [displacements[a % N], displacements[b % N], displacements[c % N], displacements[d % N]];
-            let deformation = Deformation::of_displacements(&tiles[element], first, corners);
+            let of_corners = [remainders[a % N], remainders[b % N], remainders[c % N], remainders[d % N]];
+            let edges = if REMAINDERS { exact_edges(corners, of_corners) } else { edges(corners) };
+            let deformation = Deformation::of_edges(&tiles[element], first, edges);
             let vector = &mut elements[element];
             (vector.tile, vector.first) = (&tiles[element], first);
             (vector.h, vector.invariants) = (deformation.h, deformation.invariants);

@@ -13,7 +13,7 @@ use crate::simd::{
     unrolled,
 };
 
-use super::deformation::{Deformation, Matrix, Vector};
+use super::deformation::{Deformation, Matrix, Vector, edges, exact_edges};
 use super::internal_forces::nodes_of;
 use super::{ElementTile, NodeInertia};
 
@@ -52,6 +52,8 @@ pub(crate) struct NodalVolumes<'a> {
     pub(crate) density: Option<f32>,
     pub(crate) inertia: &'a [NodeInertia],
     pub(crate) displacement: &'a [NodeVector],
+    /// What rounding has left out of the displacements, or nothing.
+    pub(crate) remainder: &'a [NodeVector],
     /// Of the nodes in these partitions.
     pub(crate) rows: &'a mut [NodeVector],
 }
@@ -81,7 +83,7 @@ impl Kernel for NodalVolumes<'_> {
 /// The rows from sums of changes alone: the volume of a node follows from its mass.
 #[inline(always)]
 fn from_changes<R: Real>(kernel: NodalVolumes<'_>, density: f32) {
-    let NodalVolumes { tiles, all, partitions, inertia, displacement, rows, .. } = kernel;
+    let NodalVolumes { tiles, all, partitions, inertia, displacement, remainder, rows, .. } = kernel;
     let nodes = all.nodes(&partitions);
     let inertia = inertia.get(nodes.clone()).unwrap_or_default();
     let moved = displacement.get(nodes.clone()).unwrap_or_default();
@@ -90,7 +92,8 @@ fn from_changes<R: Real>(kernel: NodalVolumes<'_>, density: f32) {
     // The sums are in the first quarter of the rows, so that they stay in the cache.
     let sums = components.get_mut(..count).unwrap_or_default();
     sums.fill(0.0);
-    add_partitions::<R, _>((tiles, all, partitions), displacement, Changes(ScatterNumbers::from(nodes.start, sums)));
+    let vectors = [displacement, remainder];
+    add_partitions::<R, _>((tiles, all, partitions), vectors, Changes(ScatterNumbers::from(nodes.start, sums)));
     // The last rows first: each is written over sums of later nodes.
     for first in (0..count).step_by(TILE).rev() {
         let (mut changes, mut masses) = ([0.0; TILE], [1.0; TILE]);
@@ -122,10 +125,11 @@ fn from_changes<R: Real>(kernel: NodalVolumes<'_>, density: f32) {
 /// The rows from sums of changes and of volumes for each tissue.
 #[inline(always)]
 fn from_changes_and_volumes<R: Real>(kernel: NodalVolumes<'_>) {
-    let NodalVolumes { tiles, all, partitions, several_tissues, displacement, rows, .. } = kernel;
+    let NodalVolumes { tiles, all, partitions, several_tissues, displacement, remainder, rows, .. } = kernel;
     let nodes = all.nodes(&partitions);
     rows.fill(NodeVector::ZERO);
-    add_partitions::<R, _>((tiles, all, partitions), displacement, ChangesAndVolumes(Scatter::from(nodes.start, rows)));
+    let moved = [displacement, remainder];
+    add_partitions::<R, _>((tiles, all, partitions), moved, ChangesAndVolumes(Scatter::from(nodes.start, rows)));
     for (row, moved) in rows.iter_mut().zip(displacement.get(nodes).unwrap_or_default()) {
         let [change, volume, other_change, other_volume] = row.0;
         let ratio = |change: f32, volume: f32| if volume > 0.0 { change / volume } else { 0.0 };
@@ -142,25 +146,28 @@ fn from_changes_and_volumes<R: Real>(kernel: NodalVolumes<'_>) {
 #[inline(always)]
 fn add_partitions<R: Real, S: Sums>(
     (tiles, all, partitions): (&[ElementTile], &Partitions, Range<usize>),
-    displacement: &[NodeVector],
+    moved: [&[NodeVector]; 2],
     mut sums: S,
 ) {
-    let displacement = Gather::new(displacement);
+    let moved = moved.map(Gather::new);
     for (touching, length) in all.touching(partitions) {
         let tiles = tiles.get(touching).unwrap_or_default();
-        match length {
-            3 => add_strips::<R, S, 3, 6>(tiles, displacement, &mut sums),
-            2 => add_strips::<R, S, 2, 5>(tiles, displacement, &mut sums),
-            _ => add_strips::<R, S, 1, 4>(tiles, displacement, &mut sums),
+        match (length, moved[1].count()) {
+            (3, 0) => add_strips::<R, S, 3, 6, false>(tiles, moved, &mut sums),
+            (2, 0) => add_strips::<R, S, 2, 5, false>(tiles, moved, &mut sums),
+            (_, 0) => add_strips::<R, S, 1, 4, false>(tiles, moved, &mut sums),
+            (3, _) => add_strips::<R, S, 3, 6, true>(tiles, moved, &mut sums),
+            (2, _) => add_strips::<R, S, 2, 5, true>(tiles, moved, &mut sums),
+            _ => add_strips::<R, S, 1, 4, true>(tiles, moved, &mut sums),
         }
     }
 }
 
 /// Adds the volumes of strips of `K` elements with `N` nodes.
 #[inline(always)]
-fn add_strips<R: Real, S: Sums, const K: usize, const N: usize>(
+fn add_strips<R: Real, S: Sums, const K: usize, const N: usize, const REMAINDERS: bool>(
     tiles: &[ElementTile],
-    displacement: Gather<'_>,
+    [displacement, remainder]: [Gather<'_>; 2],
     sums: &mut S,
 ) {
     for tiles in tiles.as_chunks::<K>().0 {
@@ -174,12 +181,18 @@ fn add_strips<R: Real, S: Sums, const K: usize, const N: usize>(
             unrolled!(node < N => {
                 at[node] = displacement.read_nodes::<R, N>(&nodes, node, first);
             });
+            let mut left = [[R::splat(0.0); 3]; N];
+            if REMAINDERS {
+                unrolled!(node < N => { left[node] = remainder.read_nodes::<R, N>(&nodes, node, first); });
+            }
             // All gradients before all volumes: their operations do not wait for each other.
             let mut gradients = [[[R::splat(0.0); 3]; 3]; K];
             unrolled!(element < K => {
                 let [a, b, c, d] = CORNERS[element % LONGEST];
                 let corners = [at[a % N], at[b % N], at[c % N], at[d % N]];
-                gradients[element] = fused_gradient(&tiles[element], first, corners);
+                let of_corners = [left[a % N], left[b % N], left[c % N], left[d % N]];
+                let edges = if REMAINDERS { exact_edges(corners, of_corners) } else { edges(corners) };
+                gradients[element] = fused_gradient(&tiles[element], first, edges);
             });
             let mut shares = [S::none::<R>(); N];
             unrolled!(element < K => {
@@ -202,16 +215,16 @@ fn add_strips<R: Real, S: Sums, const K: usize, const N: usize>(
     }
 }
 
-/// The displacement gradients of elements from the displacements of their corners, with as few operations as possible.
+/// The displacement gradients of elements from the displacements of three corners relative to the first one, with as few
+/// operations as possible.
 #[inline(always)]
-fn fused_gradient<R: Real>(tile: &ElementTile, first: usize, [origin, a, b, c]: [Vector<R>; 4]) -> Matrix<R> {
+fn fused_gradient<R: Real>(tile: &ElementTile, first: usize, edges: [Vector<R>; 3]) -> Matrix<R> {
     let mut h = [[R::splat(0.0); 3]; 3];
-    for (corner, displacement) in [a, b, c].into_iter().enumerate() {
+    for (corner, along) in edges.into_iter().enumerate() {
         for j in 0..3 {
             let gradient = tile.gradient::<R>(corner, j, first);
             for i in 0..3 {
-                let along = displacement[i] - origin[i];
-                h[i][j] = if corner == 0 { along * gradient } else { along.fused(gradient, h[i][j]) };
+                h[i][j] = if corner == 0 { along[i] * gradient } else { along[i].fused(gradient, h[i][j]) };
             }
         }
     }

@@ -6,22 +6,31 @@ use super::deformation::{Deformation, Matrix, Vector};
 use super::patch::{Neighbours, PatchTile};
 use super::tile::vector_at;
 
-/// The displacement gradient of the patches from place `first` of a tile on, and `sum_b k_ab (u_b - u_a)`.
+/// The displacement gradient of the patches from place `first` of a tile on, and `sum_b k_ab (u_b - u_a)`, from
+/// displacements and what rounding has left out of them, or nothing.
 #[inline(always)]
 pub(super) fn gradient<R: Real>(
     tile: &PatchTile,
     neighbours: &[Neighbours],
     first: usize,
-    displacement: Gather<'_>,
+    [displacement, remainder]: [Gather<'_>; 2],
 ) -> (Matrix<R>, Vector<R>) {
     let zero = R::splat(0.0);
     let (mut h, mut pull) = ([[zero; 3]; 3], [zero; 3]);
     let Some(nodes) = tile.nodes_below::<R>(displacement.count()) else { return (h, pull) };
     let own = displacement.read_nodes::<R, 1>(&nodes, 0, first);
+    let has_remainders = remainder.count() > 0;
+    let own_remainder = if has_remainders { remainder.read_nodes::<R, 1>(&nodes, 0, first) } else { pull };
     for neighbour in neighbours {
         let nodes = neighbour.nodes_below::<R>(displacement.count()).unwrap_or(TileNodes::ALL_ZERO);
         let at = displacement.read_nodes::<R, 1>(&nodes, 0, first);
-        let along = [at[0] - own[0], at[1] - own[1], at[2] - own[2]];
+        let mut along = [at[0] - own[0], at[1] - own[1], at[2] - own[2]];
+        if has_remainders {
+            let at = remainder.read_nodes::<R, 1>(&nodes, 0, first);
+            for axis in 0..3 {
+                along[axis] = along[axis] + (at[axis] - own_remainder[axis]);
+            }
+        }
         let coupling = vector_at::<R>(&neighbour.couplings, first);
         for i in 0..3 {
             pull[i] = along[i].fused(coupling, pull[i]);
@@ -52,7 +61,7 @@ impl<R: Real, const PARTS: usize> Piece for PatchDeformations<'_, R, PARTS> {
     fn run(self) {
         let Self { tile, neighbours, displacement, deformations } = self;
         for (part, deformation) in deformations.iter_mut().enumerate() {
-            let (h, _) = gradient::<R>(tile, neighbours, part * R::COUNT, displacement);
+            let (h, _) = gradient::<R>(tile, neighbours, part * R::COUNT, [displacement, Gather::new(&[])]);
             *deformation = Deformation::new(h);
         }
     }

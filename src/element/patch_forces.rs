@@ -32,6 +32,8 @@ pub struct PatchForces<'a, L, V> {
     pub(crate) patches: Patches<'a>,
     pub(crate) partitions: Range<usize>,
     pub(crate) displacement: &'a [NodeVector],
+    /// What rounding has left out of the displacements, or nothing.
+    pub(crate) remainder: &'a [NodeVector],
     pub(crate) force: Scatter<'a>,
     pub(crate) visitor: PhantomData<V>,
 }
@@ -55,14 +57,14 @@ impl<L: Law, V: ElementVisitor> Kernel for PatchForces<'_, L, V> {
 
 #[inline(always)]
 fn add_all<R: Real, L: Law, V: ElementVisitor, const PARTS: usize>(kernel: PatchForces<'_, L, V>) -> Extremes<f32> {
-    let PatchForces { laws, patches, partitions, displacement, mut force, .. } = kernel;
-    let displacement = Gather::new(displacement);
+    let PatchForces { laws, patches, partitions, displacement, remainder, mut force, .. } = kernel;
+    let moved = [displacement, remainder].map(Gather::new);
     let mut extremes = Extremes::<R>::none();
     for tile in patches.touching(partitions) {
         let neighbours = patches.neighbours_of(tile);
         let mut stresses = [Stress::<R>::zero(); PARTS];
         for (part, stress) in stresses.iter_mut().enumerate() {
-            *stress = stress_of::<R, L, V>(&laws, tile, neighbours, part * R::COUNT, displacement, &mut extremes);
+            *stress = stress_of::<R, L, V>(&laws, tile, neighbours, part * R::COUNT, moved, &mut extremes);
         }
         scatter::<R, V, PARTS>(tile, neighbours, stresses, &mut force);
     }
@@ -102,10 +104,10 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor>(
     tile: &PatchTile,
     neighbours: &[Neighbours],
     first: usize,
-    displacement: Gather<'_>,
+    moved: [Gather<'_>; 2],
     extremes: &mut Extremes<R>,
 ) -> Stress<R> {
-    let (h, pull) = gradient::<R>(tile, neighbours, first, displacement);
+    let (h, pull) = gradient::<R>(tile, neighbours, first, moved);
     let deformation = Deformation::new(h);
     let law = laws.widen(|lane| tile.element(first + lane));
     let local = LawState::new::<L>(&law, deformation.invariants);

@@ -400,3 +400,31 @@ impl Guard<std::vec::Vec<NodeVector>> {
         Self::prepare(scene, points, state, step, every, std::vec![NodeVector::ZERO; vectors])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::NeoHookean;
+    use crate::mesh::Bar;
+    use crate::scene::test_scene::scene_of;
+    use crate::state::VecState;
+    use crate::tled;
+
+    /// A body that drifts far away, so slowly that rounding would stop it: the second run arrives where the first does.
+    #[test]
+    fn the_second_run_does_not_lose_slow_motion() {
+        let bar = Bar { size: [0.004; 3], cells: [1, 1, 1] };
+        let (points, scene) = scene_of(NeoHookean { c: 2e6, d: 2e8 }, bar);
+        let step = Step::unchecked(1e-6, 0.0).unwrap();
+        let mut state = VecState::at_rest(scene.node_count());
+        assert!(tled::start(&scene, &mut state, &step, |_| ([0.25, 0.0, 0.0], [0.004, 0.0, 0.0])));
+        let mut guard = Guard::prepare_in_vec(scene.view(), &points, state.view(), step, EVERY).unwrap();
+        for _ in 0..3_000 {
+            let status = tled::step(&scene, &Loads::NONE, &mut state, &step);
+            assert!(guard.follow(status, scene.view(), &Loads::NONE, &state.view()).is_taken());
+        }
+        let (watch, gone) = (&guard.model.watch, state.displacements()[0].to_array()[0] - 0.25);
+        std::println!("{} comparisons, {gone:e} m, {:e} m apart", watch.comparisons(), watch.distance());
+        assert!(watch.comparisons() > 500 && gone > 1.1e-5 && watch.distance() < 1e-7);
+    }
+}

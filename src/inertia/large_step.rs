@@ -211,7 +211,7 @@ impl<'w> LargeModel<'w> {
         self.moment = progress.moment();
         let nodes = self.nodes;
         let displacement = displacement.get(..nodes).unwrap_or_default();
-        nodal_volumes(scene, displacement, volume, &CallingThread);
+        nodal_volumes(scene, displacement, &[], volume, &CallingThread);
         let input = RefreshInput {
             scene,
             displacement,

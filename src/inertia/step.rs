@@ -117,8 +117,9 @@ impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
 impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         self.renew_if_stale(trial);
-        let Trial { scene, loads, displacement, force, volume, progress, .. } = &mut *trial;
-        let forcing = Forcing { scene: *scene, visitor: ScalarBound, displacement, loads, progress };
+        let Trial { scene, loads, displacement, remainder, is_heated, force, volume, progress, .. } = &mut *trial;
+        let remainder = if *is_heated { &**remainder } else { &[] };
+        let forcing = Forcing { scene: *scene, visitor: ScalarBound, displacement, remainder, loads, progress };
         let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
         self.model.refresh.update_frames(displacement, progress.steps);
         trial.add_pushes_before(self.step);
@@ -206,7 +207,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             return;
         }
         *is_for_other_step = false;
-        nodal_volumes(*scene, displacement, volume, &CallingThread);
+        nodal_volumes(*scene, displacement, &[], volume, &CallingThread);
         let input = RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
         if follows {
             refresh.restart(input, tables, matrices);

@@ -127,6 +127,18 @@ impl Frame {
     /// The world's axes: tangent x, normal y, binormal z.
     pub const WORLD: Self = Self { tangent: [1.0, 0.0, 0.0, 0.0], normal: [0.0, 1.0, 0.0, 0.0] };
 
+    /// Keeps two numbers in the padding ([`crate::padding`]).
+    pub(super) const fn keep(&mut self, [one, other]: [f32; 2]) {
+        (self.tangent[3], self.normal[3]) = (one, other);
+    }
+
+    /// These numbers, which it then no longer keeps.
+    pub(super) const fn take_kept(&mut self) -> [f32; 2] {
+        let kept = [self.tangent[3], self.normal[3]];
+        self.keep([0.0; 2]);
+        kept
+    }
+
     pub(crate) fn axes(self) -> Axes<f32> {
         Axes::of(|_| self)
     }

@@ -54,6 +54,22 @@ pub(crate) struct Vertex {
 impl Vertex {
     /// In the world's axes.
     const NEW: Self = Self { frame: Frame::WORLD, next: NodeVector::ZERO };
+
+    /// Notes where the vertex is: displacement and what rounding has left out of it, m.
+    fn begin_interval(&mut self, NodeVector([x, y, z, _]): NodeVector, remainder: NodeVector) {
+        let [of_x, of_y, of_z] = remainder.to_array();
+        self.next = NodeVector([x, y, z, of_x]);
+        self.frame.keep([of_y, of_z]);
+    }
+
+    /// The increment from there, m; the frame follows it.
+    fn end_interval(&mut self, displacement: NodeVector, remainder: NodeVector) {
+        let ([x, y, z, of_x], [of_y, of_z]) = (self.next.0, self.frame.take_kept());
+        let [before, left_before] = [Vec4::new(x, y, z, 0.0), Vec4::new(of_x, of_y, of_z, 0.0)];
+        let [after, left] = [displacement, remainder].map(|vector| Vec4::from(vector.0));
+        self.next = NodeVector(((after - before) + (left - left_before)).to_array());
+        self.frame.follow(self.next.to_array());
+    }
 }
 
 /// Most exact steps in one of the network's: with more a call would not end in any time that matters.
@@ -427,19 +443,18 @@ impl<'w> LearnedView<'_, 'w> {
         self.model.led = None;
         let before = state.as_state();
         let vertices = vertices(self.storage, before.displacement.len());
-        for (vertex, &displacement) in vertices.iter_mut().zip(&*before.displacement) {
-            vertex.next = displacement;
+        let at = before.displacement.iter().zip(&*before.remainder);
+        for (vertex, (displacement, remainder)) in vertices.iter_mut().zip(at) {
+            vertex.begin_interval(*displacement, *remainder);
         }
         let status = exact(state);
         if !status.is_taken() {
             return status;
         }
         let after = state.as_state();
-        let moved = after.displacement.iter().zip(&*after.remainder);
-        for (vertex, (displacement, remainder)) in vertices.iter_mut().zip(moved) {
-            let increment = (Vec4::from(displacement.0) - Vec4::from(vertex.next.0)) + Vec4::from(remainder.0);
-            vertex.next = NodeVector(increment.to_array());
-            vertex.frame.follow(vertex.next.to_array());
+        let at = after.displacement.iter().zip(&*after.remainder);
+        for (vertex, (displacement, remainder)) in vertices.iter_mut().zip(at) {
+            vertex.end_interval(*displacement, *remainder);
         }
         self.model.led = Some(after.moment());
         self.model.turns.exact = self.model.turns.exact.saturating_sub(1);

@@ -7,6 +7,7 @@ mod cause;
 mod compensated;
 mod contact;
 mod energy_sums;
+mod heat;
 mod length;
 mod parts;
 mod status;
@@ -48,6 +49,8 @@ pub(crate) struct Trial<'a, M> {
     /// [`crate::tled::critical_step`] uses them, with linear tetrahedra nothing does.
     pub(crate) volume: &'a mut [NodeVector],
     pub(crate) progress: &'a mut Progress,
+    /// Whether forces need the remainders ([`heat`]).
+    pub(crate) is_heated: bool,
     /// What the instruments feel, as far as the host wants to know.
     pub(crate) touches: &'a mut [Touch],
     /// Where they push, and how many of these are written.
@@ -130,6 +133,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             increment: increment.get_mut(..nodes).unwrap_or_default(),
             force: force.get_mut(..nodes).unwrap_or_default(),
             volume: volume.get_mut(..nodes).unwrap_or_default(),
+            is_heated: progress.energy_balance.is_heated(),
             progress,
             touches,
             points,
@@ -162,6 +166,12 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             let time = self.progress.time;
             return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoContact });
         }
+        let before = self.progress.energy_balance;
+        let heat = match self.progress.steps % heat::EVERY {
+            0 => heat::of_rounding(step, self.scene.inertia, self.displacement),
+            _ => before.heat,
+        };
+        self.is_heated = EnergyBalance { heat, ..before }.is_heated();
         let Computed { totals, extremes } = method.compute(&mut self);
         let balance = match self.refused {
             Some(refused) => Err(refused),
@@ -176,7 +186,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
                 return Status::Diverged(Divergence { time: self.progress.time, node, cause });
             }
         };
-        self.progress.energy_balance = self.measured(balance, method);
+        self.progress.energy_balance = EnergyBalance { heat, ..self.measured(balance, method) };
         self.progress.extremes = extremes;
         method.advance(&mut self);
         self.progress.dt = step.seconds();

@@ -23,6 +23,8 @@ pub(crate) struct Forcing<'a, M, V> {
     /// What is computed with the forces of each element.
     pub(crate) visitor: V,
     pub(crate) displacement: &'a [NodeVector],
+    /// See [`super::heat`]; empty if they are not needed.
+    pub(crate) remainder: &'a [NodeVector],
     pub(crate) loads: &'a Loads<'a>,
     /// Of the state, for the time of the loads.
     pub(crate) progress: &'a Progress,
@@ -41,6 +43,7 @@ struct Part<'a, T, F> {
 pub(crate) fn nodal_volumes<M: ElementMaterial>(
     scene: SceneView<'_, M>,
     displacement: &[NodeVector],
+    remainder: &[NodeVector],
     mut volumes: &mut [NodeVector],
     threads: &impl Threads,
 ) {
@@ -60,7 +63,8 @@ pub(crate) fn nodal_volumes<M: ElementMaterial>(
     });
     threads.each(parts.get_mut(..count).unwrap_or_default(), |(mine, rows)| {
         let partitions = mine.clone();
-        NodalVolumes { tiles, all, partitions, several_tissues, density, inertia, displacement, rows }.compute();
+        NodalVolumes { tiles, all, partitions, several_tissues, density, inertia, displacement, remainder, rows }
+            .compute();
     });
 }
 
@@ -75,7 +79,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         threads: &impl Threads,
         then: impl Fn(Range<usize>, &[NodeVector], &mut [T]) -> F + Sync,
     ) -> ([F; MAX_PARTITIONS], Extremes<f32>) {
-        nodal_volumes(self.scene, self.displacement, volumes, threads);
+        nodal_volumes(self.scene, self.displacement, self.remainder, volumes, threads);
         let volumes = &*volumes;
         let partitions = self.scene.elements().partitions;
         let count = partitions.parts(threads.parts());
@@ -111,7 +115,8 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         let nodes = all.nodes(partitions);
         let inertia = self.scene.inertia.get(nodes.clone()).unwrap_or_default();
         external_forces(force, nodes.start, inertia, self.loads, self.progress.time);
-        *extremes = internal_forces(self.scene, partitions.clone(), self.displacement, volumes, force, self.visitor);
+        let moved = [self.displacement, self.remainder];
+        *extremes = internal_forces(self.scene, partitions.clone(), moved, volumes, force, self.visitor);
         let (mut force, mut extra) = (&mut **force, &mut **extra);
         for (partition, result) in partitions.clone().zip(&mut **results) {
             let nodes = all.nodes(&(partition..partition + 1));
@@ -121,12 +126,12 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
     }
 }
 
-/// Adds internal forces to those of the nodes in `partitions`, from the [`nodal_volumes`] where the material needs
+/// Adds internal forces to those of the nodes in `partitions`, from displacements and their remainders, and from the [`nodal_volumes`] where the material needs
 /// them.
 pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     scene: SceneView<'_, M>,
     partitions: Range<usize>,
-    displacement: &[NodeVector],
+    moved: [&[NodeVector]; 2],
     volumes: &[NodeVector],
     force: &mut [NodeVector],
     visitor: V,
@@ -135,14 +140,14 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     if scene.element().is_nodal_strain() {
         let force = Scatter::from(elements.partitions.nodes(&partitions).start, force);
         let (laws, patches) = (elements.laws, scene.patches);
-        let visitor = PhantomData;
-        V::patch_forces(PatchForces { laws, patches, partitions, displacement, force, visitor })
+        let (visitor, [displacement, remainder]) = (PhantomData, moved);
+        V::patch_forces(PatchForces { laws, patches, partitions, displacement, remainder, force, visitor })
     } else if scene.element().is_nodal_pressure() {
         let pressure = MeanPressure::new(scene.volume_rows(volumes));
-        let kernel = InternalForces::of_partitions(elements, pressure, partitions, displacement, force, visitor);
+        let kernel = InternalForces::of_partitions(elements, pressure, partitions, moved, force, visitor);
         V::nodal_pressure_forces(kernel)
     } else {
-        let kernel = InternalForces::of_partitions(elements, OwnPressure, partitions, displacement, force, visitor);
+        let kernel = InternalForces::of_partitions(elements, OwnPressure, partitions, moved, force, visitor);
         V::forces(kernel)
     }
 }
@@ -234,8 +239,9 @@ mod tests {
                 let mine = elements.partitions.part(part, elements.partitions.parts(parts));
                 let count = elements.partitions.nodes(&mine).len();
                 let (mut one, mut eight) = (vec![NodeVector::ZERO; count], vec![NodeVector::ZERO; count]);
-                let of =
-                    |force| InternalForces::of_partitions(elements, OwnPressure, mine.clone(), &bent, force, NoVisitor);
+                let of = |force| {
+                    InternalForces::of_partitions(elements, OwnPressure, mine.clone(), [&bent, &[]], force, NoVisitor)
+                };
                 let (by_one, by_eight) = (of(&mut one).run_scalar(), of(&mut eight).run::<Baseline>());
                 assert!(eight.iter().any(|force| force.0[2] != 0.0));
                 assert_eq!(bits(&one), bits(&eight), "part {part} of {parts}");

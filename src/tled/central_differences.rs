@@ -3,6 +3,7 @@
 
 use bytemuck::{Pod, must_cast_slice, must_cast_slice_mut};
 
+use crate::copy::copy;
 use crate::element::NodeInertia;
 use crate::simd::{Kernel, NodeVector, Real, axes, dispatch};
 use crate::step::{Moving, Step, Sums, Totals, moved};
@@ -25,33 +26,24 @@ pub(crate) fn next_increment(
 
 /// Components of four nodes.
 const FOUR: usize = 16;
+type Four = [f32; FOUR];
 
-/// The components of four nodes, zeros beyond the last node.
+/// The components of the nodes, four nodes at a time, and those of the rest with zeros.
 #[inline(always)]
-fn four<T: Pod>(of: &[T], first: usize) -> [f32; FOUR] {
-    let components: &[f32] = must_cast_slice(of);
-    let components = components.get(4 * first..).unwrap_or_default();
-    if let Some(four) = components.first_chunk() {
-        return *four;
-    }
-    let mut four = [0.0; FOUR];
-    for (to, from) in four.iter_mut().zip(components) {
-        *to = *from;
-    }
-    four
+fn fours<T: Pod>(of: &[T]) -> (&[Four], Four) {
+    let (whole, rest) = must_cast_slice::<T, f32>(of).as_chunks();
+    let mut last = [0.0; FOUR];
+    copy(&mut last, rest);
+    (whole, last)
 }
 
-/// Writes the components of four nodes, or of as many as there are.
+/// The same, and the rest to write to.
 #[inline(always)]
-fn put(four: [f32; FOUR], into: &mut [NodeVector]) {
-    let components: &mut [f32] = must_cast_slice_mut(into);
-    if let Some(all) = components.first_chunk_mut() {
-        *all = four;
-        return;
-    }
-    for (to, from) in components.iter_mut().zip(four) {
-        *to = from;
-    }
+fn fours_mut(of: &mut [NodeVector]) -> (&mut [Four], Four, &mut [f32]) {
+    let (whole, rest) = must_cast_slice_mut::<NodeVector, f32>(of).as_chunks_mut();
+    let mut last = [0.0; FOUR];
+    copy(&mut last, rest);
+    (whole, last, rest)
 }
 
 /// One vector of the components of four nodes.
@@ -105,25 +97,15 @@ impl<const INSTRUMENTS: bool> Kernel for TotalsKernel<'_, INSTRUMENTS> {
     #[inline(always)]
     fn run<R: Real>(self) -> Totals {
         let EnergyInput { step, inertia, increment, force } = self.0;
-        let coefficients = Coefficients::<R>::new(step);
-        // Sixteen sums whatever the width, so that their bits are the same.
-        let mut sums = [Sums::<R>::new(step, R::splat); 4];
-        let mut farthest = [R::splat(0.0); 2];
-        for first in (0..inertia.len()).step_by(4) {
-            let (inertia, increment, force) = (four(inertia, first), four(increment, first), four(force, first));
-            for (sums, from) in sums.iter_mut().zip((0..FOUR).step_by(R::COUNT)) {
-                let inverse = axes::<R>() * vector_of::<R>(&inertia, from);
-                let mass = R::from_fn(|lane| inertia[((from + lane) | 3) % FOUR]);
-                let (increment, force) = (vector_of::<R>(&increment, from), vector_of::<R>(&force, from));
-                let next = coefficients.next(inverse, increment, force);
-                sums.add(mass, inverse.positive(), increment, force, next);
-                if INSTRUMENTS {
-                    for (most, moved) in farthest.iter_mut().zip([increment, next]) {
-                        *most = (axes::<R>() * moved).abs().max(*most);
-                    }
-                }
-            }
+        let mut sums = NodeSums::<R, INSTRUMENTS>::new(step);
+        let (whole_inertia, inertia) = fours(inertia);
+        let (whole_increment, increment) = fours(increment);
+        let (whole_force, force) = fours(force);
+        for ((inertia, increment), force) in whole_inertia.iter().zip(whole_increment).zip(whole_force) {
+            sums.add(inertia, increment, force);
         }
+        sums.add(&inertia, &increment, &force);
+        let NodeSums { sums, farthest, .. } = sums;
         let mut totals = Totals::default();
         for (sums, from) in sums.iter().zip((0..FOUR).step_by(R::COUNT)) {
             totals.add_interleaved(sums, from);
@@ -132,6 +114,39 @@ impl<const INSTRUMENTS: bool> Kernel for TotalsKernel<'_, INSTRUMENTS> {
             totals.farthest = farthest.map(|most| (0..R::COUNT).fold(0.0, |all, lane| most.lane(lane).max(all)));
         }
         totals
+    }
+}
+
+/// The sums over the nodes, vectorised.
+struct NodeSums<R, const INSTRUMENTS: bool> {
+    coefficients: Coefficients<R>,
+    /// Sixteen sums whatever the width, so that their bits are the same.
+    sums: [Sums<R>; 4],
+    farthest: [R; 2],
+}
+
+impl<R: Real, const INSTRUMENTS: bool> NodeSums<R, INSTRUMENTS> {
+    #[inline(always)]
+    fn new(step: &Step) -> Self {
+        let (sums, farthest) = ([Sums::new(step, R::splat); 4], [R::splat(0.0); 2]);
+        Self { coefficients: Coefficients::new(step), sums, farthest }
+    }
+
+    /// Adds four nodes.
+    #[inline(always)]
+    fn add(&mut self, inertia: &Four, increment: &Four, force: &Four) {
+        for (sums, from) in self.sums.iter_mut().zip((0..FOUR).step_by(R::COUNT)) {
+            let inverse = axes::<R>() * vector_of::<R>(inertia, from);
+            let mass = R::from_fn(|lane| inertia[((from + lane) | 3) % FOUR]);
+            let (increment, force) = (vector_of::<R>(increment, from), vector_of::<R>(force, from));
+            let next = self.coefficients.next(inverse, increment, force);
+            sums.add(mass, inverse.positive(), increment, force, next);
+            if INSTRUMENTS {
+                for (most, moved) in self.farthest.iter_mut().zip([increment, next]) {
+                    *most = (axes::<R>() * moved).abs().max(*most);
+                }
+            }
+        }
     }
 }
 
@@ -158,23 +173,37 @@ impl Kernel for Advance<'_> {
     fn run<R: Real>(self) {
         let Self { step, inertia, moving: Moving { displacement, remainder, increment }, force } = self;
         let coefficients = Coefficients::<R>::new(step);
-        let moving = displacement.chunks_mut(4).zip(remainder.chunks_mut(4)).zip(increment.chunks_mut(4));
-        for (((displacement, remainder), increment), first) in moving.zip((0..inertia.len()).step_by(4)) {
-            let (inertia, force) = (four(inertia, first), four(force, first));
-            let (mut at, mut left, mut last) = (four(displacement, 0), four(remainder, 0), four(increment, 0));
-            for from in (0..FOUR).step_by(R::COUNT) {
-                let inverse = axes::<R>() * vector_of::<R>(&inertia, from);
-                let next = coefficients.next(inverse, vector_of(&last, from), vector_of(&force, from));
-                let [here, rest] = moved(vector_of::<R>(&at, from), vector_of(&left, from), next);
-                for lane in 0..R::COUNT {
-                    last[(from + lane) % FOUR] = next.lane(lane);
-                    at[(from + lane) % FOUR] = here.lane(lane);
-                    left[(from + lane) % FOUR] = rest.lane(lane);
-                }
-            }
-            put(at, displacement);
-            put(left, remainder);
-            put(last, increment);
+        let (whole_inertia, inertia) = fours(inertia);
+        let (whole_force, force) = fours(force);
+        let (whole_at, mut at, at_rest) = fours_mut(displacement);
+        let (whole_left, mut left, left_rest) = fours_mut(remainder);
+        let (whole_last, mut last, last_rest) = fours_mut(increment);
+        let moving = whole_at.iter_mut().zip(whole_left).zip(whole_last);
+        for (((at, left), last), (inertia, force)) in moving.zip(whole_inertia.iter().zip(whole_force)) {
+            advance_four(&coefficients, (inertia, force), [at, left, last]);
+        }
+        advance_four(&coefficients, (&inertia, &force), [&mut at, &mut left, &mut last]);
+        copy(at_rest, &at);
+        copy(left_rest, &left);
+        copy(last_rest, &last);
+    }
+}
+
+/// Moves four nodes: their displacements, the remainders of these, and their increments.
+#[inline(always)]
+fn advance_four<R: Real>(
+    coefficients: &Coefficients<R>,
+    (inertia, force): (&Four, &Four),
+    [at, left, last]: [&mut Four; 3],
+) {
+    for from in (0..FOUR).step_by(R::COUNT) {
+        let inverse = axes::<R>() * vector_of::<R>(inertia, from);
+        let next = coefficients.next(inverse, vector_of(last, from), vector_of(force, from));
+        let [here, rest] = moved(vector_of::<R>(at, from), vector_of(left, from), next);
+        for lane in 0..R::COUNT {
+            last[(from + lane) % FOUR] = next.lane(lane);
+            at[(from + lane) % FOUR] = here.lane(lane);
+            left[(from + lane) % FOUR] = rest.lane(lane);
         }
     }
 }

@@ -81,7 +81,7 @@ pub(super) fn critical<M: ElementMaterial>(
         return None;
     }
     let StateView { displacement, increment, force, volume, .. } = state;
-    nodal_volumes(scene, displacement, volume, &CallingThread);
+    nodal_volumes(scene, displacement, &[], volume, &CallingThread);
     let mut sums = NodeMatrices {
         xx_yy_zz_xy: force.get_mut(..count)?,
         yz_in_padding: increment.get_mut(..count)?,

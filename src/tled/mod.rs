@@ -69,9 +69,11 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
     const ENERGY_CYCLE: usize = 2048;
 
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
-        let Trial { scene, loads, displacement, increment, force, volume, progress, .. } = &mut *trial;
+        let Trial { scene, loads, displacement, remainder, is_heated, increment, force, volume, progress, .. } =
+            &mut *trial;
         let (inertia, step) = (scene.inertia, self.step);
-        let forcing = Forcing { scene: *scene, visitor: NoVisitor, displacement, loads, progress };
+        let remainder = if *is_heated { &**remainder } else { &[] };
+        let forcing = Forcing { scene: *scene, visitor: NoVisitor, displacement, remainder, loads, progress };
         let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let increment = increment.get(nodes).unwrap_or_default();
@@ -185,7 +187,7 @@ fn strain_energy_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateVie
     if state.capacity_for(scene.element()) < nodes {
         return None;
     }
-    nodal_volumes(scene, state.displacement, state.volume, &CallingThread);
+    nodal_volumes(scene, state.displacement, &[], state.volume, &CallingThread);
     Some(scene.strain_energy(state.displacement, state.volume))
 }
 
@@ -203,8 +205,8 @@ fn internal_forces_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateV
     }
     let StateView { displacement, force, volume, .. } = state;
     let force = force.get_mut(..nodes).unwrap_or_default();
-    nodal_volumes(scene, displacement, volume, &CallingThread);
+    nodal_volumes(scene, displacement, &[], volume, &CallingThread);
     force.fill(NodeVector::ZERO);
-    step::internal_forces(scene, scene.elements().partitions.all(), displacement, volume, force, NoVisitor);
+    step::internal_forces(scene, scene.elements().partitions.all(), [displacement, &[]], volume, force, NoVisitor);
     true
 }

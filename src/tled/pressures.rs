@@ -26,7 +26,7 @@ fn nodal_pressures_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateV
     if state.capacity_for(scene.element()) < nodes {
         return None;
     }
-    nodal_volumes(scene, state.displacement, state.volume, &CallingThread);
+    nodal_volumes(scene, state.displacement, &[], state.volume, &CallingThread);
     let volumes = scene.element().is_nodal_pressure().then(|| scene.volume_rows(state.volume));
     let mut sums = vec![(0.0, 0.0); nodes];
     if scene.element().is_nodal_strain() {
