@@ -16,6 +16,7 @@ mod pulled;
 mod reaction;
 mod refused;
 mod restored;
+mod rounding;
 mod switching;
 mod turning;
 mod wild;
