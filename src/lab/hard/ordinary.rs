@@ -55,8 +55,8 @@ struct Body {
     shear: f32,
 }
 
-/// The scene with this number; one whose exact motion leaves the range of its law or goes beyond [`FARTHEST`] is drawn
-/// anew with the next `attempt`.
+/// The scene with this number; one whose exact motion leaves the range of its law or goes beyond 30 mm is drawn anew
+/// with the next `attempt`.
 pub fn scene(number: u32, attempt: u32) -> Result<SceneSpec, LabError> {
     const SEED: u64 = 0x6f72_6469;
     let mut random = Random(SEED ^ (u64::from(number) << 32 | u64::from(attempt)));
