@@ -421,7 +421,7 @@ mod tests {
         let mut guard = Guard::prepare_in_vec(scene.view(), &points, state.view(), step, EVERY).unwrap();
         for _ in 0..3_000 {
             let status = tled::step(&scene, &Loads::NONE, &mut state, &step);
-            assert!(guard.follow(status, scene.view(), &Loads::NONE, &state.view()).is_taken());
+            assert!(guard.follow(status, scene.view(), &Loads::NONE, state.view()).is_taken());
         }
         let (watch, gone) = (&guard.model.watch, state.displacements()[0].to_array()[0] - 0.25);
         std::println!("{} comparisons, {gone:e} m, {:e} m apart", watch.comparisons(), watch.distance());

@@ -25,25 +25,25 @@ const GRAVITY: [f32; 3] = [3.0, 0.0, 0.0];
 /// A state in memory of the host's: a clone is a copy by memcpy.
 #[derive(Clone)]
 struct Memory {
-    vectors: [Vec<NodeVector>; 3],
+    vectors: [Vec<NodeVector>; 4],
     progress: Progress,
 }
 
 impl Memory {
     fn at_rest(nodes: usize) -> Self {
-        Self { vectors: [(); 3].map(|()| vec![NodeVector::ZERO; nodes]), progress: Progress::START }
+        Self { vectors: [(); 4].map(|()| vec![NodeVector::ZERO; nodes]), progress: Progress::START }
     }
 
     fn view(&mut self) -> StateView<'_> {
-        let [displacement, increment, force] = &mut self.vectors;
-        StateView::new(displacement, increment, force, &mut [], &mut self.progress)
+        let [displacement, remainder, increment, force] = &mut self.vectors;
+        StateView::new(displacement, remainder, increment, force, &mut [], &mut self.progress)
     }
 
     /// The same for the same state, to the bit.
     fn hash(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
-        let [displacement, increment, _] = &self.vectors;
-        for vector in displacement.iter().chain(increment) {
+        let [moved @ .., _] = &self.vectors;
+        for vector in moved.iter().flatten() {
             vector.to_array().map(f32::to_bits).hash(&mut hasher);
         }
         self.progress.time().to_bits().hash(&mut hasher);
