@@ -401,6 +401,11 @@ impl<'a, M> SceneView<'a, M> {
 }
 
 impl<'a, M: Material> SceneView<'a, M> {
+    /// Volume of a node's own tissue, m^3.
+    pub(crate) fn node_volume(&self, node: usize) -> f32 {
+        self.node_mass(node) / self.material.tissue(0).map_or(f32::INFINITY, |tissue| tissue.density)
+    }
+
     /// The tetrahedra that it is made of.
     #[must_use]
     #[inline(always)]

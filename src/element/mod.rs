@@ -53,7 +53,7 @@ pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};
 pub(crate) use stiffness_bound::{MatrixSums, ScalarBound};
 pub(crate) use tile_bounds::{TileBounds, TileTangents};
-pub(crate) use volume_check::VolumeCheck;
+pub(crate) use volume_check::{CHECK_CYCLE, VolumeCheck};
 
 use crate::material::Material;
 

@@ -12,7 +12,8 @@
 //!
 //! The network knows nothing of energy. What it does is entered in the same energy balance as every other step
 //! ([`crate::step::EnergyBalance`]): with several times more kinetic energy than loads and supports have ever given the
-//! step is refused. With fallback a step that has more kinetic energy than the balance explains at all is undone, and
+//! step is refused. With fallback a step is undone that has more kinetic energy than the balance explains at all, moves a
+//! node by more than half the size of its tissue, or leaves an element inside out, and
 //! exact steps take its place for some intervals, while the frames follow as in the lead-in. Then the network is tried
 //! again. Each fallback lasts twice as long as the last one, up to [`LONGEST_WAIT`] intervals, until there have been
 //! many more learned steps than that without one. An attempt that is undone after exact steps leaves their motion as it
@@ -31,7 +32,7 @@ use core::fmt;
 use bytemuck::{Pod, Zeroable, must_cast_slice_mut};
 use glam::Vec4;
 
-use crate::element::ElementMaterial;
+use crate::element::{CHECK_CYCLE, ElementMaterial, VolumeCheck};
 use crate::loads::Loads;
 use crate::mlp::Network;
 use crate::scene::SceneView;
@@ -71,6 +72,9 @@ impl Vertex {
         self.frame.follow(self.next.to_array());
     }
 }
+
+/// Sixth power of the share of a node's size that a learned step may move it by.
+const MOST_OF_SIZE: f32 = 1.0 / 64.0;
 
 /// Most exact steps in one of the network's: with more a call would not end in any time that matters.
 const MOST_EXACT_STEPS: u32 = 65_536;
@@ -519,8 +523,9 @@ impl<'w> LearnedView<'_, 'w> {
                 trial.take(step, &mut Learned { network, step, report, vertices, threads })
             }
         };
-        if model.undoes && status.is_unexplained() {
-            model.turns.undo(before.time, status);
+        let wild = if model.undoes && status.is_taken() { is_wild(scene, state) } else { None };
+        if model.undoes && (status.is_unexplained() || wild.is_some()) {
+            model.turns.undo(before.time, wild.unwrap_or(status));
             *state.progress = before;
             state.restore(saved);
             if state.dt != exact {
@@ -552,6 +557,23 @@ impl<'w> LearnedView<'_, 'w> {
         }
         Err(LearnedError::NotLed { steps: state.steps })
     }
+}
+
+/// Whether a step has moved a node by more than half the size of its own tissue, or left an element inside out: no
+/// motion of tissue does that in a step, and energies of single elements do not show in that of the body. The status
+/// that says so.
+fn is_wild<M: ElementMaterial>(scene: SceneView<'_, M>, state: &StateView<'_>) -> Option<Status> {
+    let leaps = state.increment.iter().take(scene.node_count()).enumerate().any(|(node, increment)| {
+        let [x, y, z] = increment.to_array();
+        let (square, volume) = (x * x + y * y + z * z, scene.node_volume(node));
+        // Without a root, as this is for every node in every step.
+        square * square * square > MOST_OF_SIZE * volume * volume
+    });
+    let tiles = scene.tiles;
+    let looks = (0..CHECK_CYCLE as u64).map(|steps| VolumeCheck { tiles, displacement: state.displacement, steps });
+    let least = 1.0 + looks.map(VolumeCheck::least_change).fold(f32::INFINITY, f32::min);
+    let limited = Status::Limited { least_volume_ratio: least, saturation: 0.0, energy_excess: 0.0 };
+    (leaps || least <= 0.0).then_some(limited)
 }
 
 /// The vertices of so many nodes, or as many as there is storage for.

@@ -323,10 +323,19 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
             if exact_next {
                 self.report.fell_back |= !is_leading;
                 let rest = f64::from(count - done - 1) * f64::from(seconds);
-                let mut taken = true;
+                let (mut taken, before, recovers) = (true, self.report, learned.model().undoes() && !is_leading);
+                let until = state.time() + f64::from(seconds);
                 // A step that was refused is in the report.
                 let _ = learned.lead_interval(state, |state| {
                     taken = self.exact_steps(&mut exact, seconds.into(), rest, scene, state);
+                    if let Some(told) = energy_excess(self.report.status).filter(|_| recovers && !taken)
+                        && tled::stop_in(scene, state.reborrow())
+                    {
+                        self.report = Report { exact: self.report.exact, undone: self.report.undone, ..before };
+                        self.report.enter(told);
+                        (self.watch)(Event::TakenBack);
+                        taken = self.exact_steps(&mut exact, until - state.time(), rest, scene, state);
+                    }
                     if taken { Status::Ok } else { self.report.status }
                 });
                 if !taken {
@@ -342,7 +351,8 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
                 let status = if is_leading { Status::Ok } else { status };
                 (self.watch)(Event::Judged(status, self.report.estimate, state));
                 self.report.enter(status);
-                if let Status::Inexact { .. } = status {
+                let lost = if is_leading { None } else { lost_node(scene, self.report.estimate) };
+                if let Some(status) = matches!(status, Status::Inexact { .. }).then_some(status).or(lost) {
                     learned.fall_back(state.time(), status);
                 }
             }
@@ -359,6 +369,22 @@ impl ExactSteps<'_> {
             Self::Paced { pace, .. } => pace.seconds(),
         }
     }
+}
+
+/// Whether the estimated error of a node is more than half the size of its tissue: the mean may hide one that runs away.
+/// The status that says so.
+fn lost_node<M: ElementMaterial>(scene: SceneView<'_, M>, estimate: Option<Estimate>) -> Option<Status> {
+    let Estimate { largest, node, .. } = estimate?;
+    let allowed = 0.5 * libm::cbrtf(scene.node_volume(node as usize));
+    (largest > allowed).then_some(Status::Inexact { error: largest, allowed })
+}
+
+/// What to tell in place of a step that was refused because of energy that nothing gave: a network has left it, bit by
+/// bit, and exact steps go on from the same place at rest.
+fn energy_excess(status: Status) -> Option<Status> {
+    let Status::Diverged(Divergence { cause: Cause::Energy { kinetic, available }, .. }) = status else { return None };
+    let energy_excess = ((kinetic / available.max(f64::MIN_POSITIVE)) as f32).min(f32::MAX);
+    Some(Status::Limited { least_volume_ratio: 1.0, saturation: 0.0, energy_excess })
 }
 
 /// Whether a step was refused because tissue and an instrument come too near in it: in a shorter one they may not.

@@ -117,7 +117,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             let next = method.next_increment(node, inertia, increment, self.force.get(node)?);
             let change = [0, 1, 2].map(|axis| next[axis] - increment.0[axis]);
             let square: f32 = change.into_iter().map(|change| change * change).sum();
-            let volume = inertia.mass / self.density();
+            let volume = self.scene.node_volume(node);
             // Without a root, as this is for every force in every step.
             Some(square * square * square > volume * volume)
         };
@@ -125,13 +125,9 @@ impl<M: ElementMaterial> Trial<'_, M> {
         if torn { self.excessive_force(step, method.added_inertia()) } else { None }
     }
 
-    fn density(&self) -> f32 {
-        self.scene.material.tissue(0).map_or(f32::INFINITY, |tissue| tissue.density)
-    }
-
     /// Edge of a cube of the node's own tissue, m.
     pub(super) fn size_at(&self, node: usize) -> f32 {
-        libm::cbrtf(self.scene.node_mass(node) / self.density())
+        libm::cbrtf(self.scene.node_volume(node))
     }
 
     /// The node that supports moved farthest in the step before, if that is a cause.

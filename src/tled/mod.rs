@@ -167,7 +167,11 @@ pub fn start(
 /// gave. Returns whether the state has room for the scene.
 #[must_use = "a state without room for the scene goes on moving"]
 pub fn stop(scene: &impl AsScene, state: &mut impl AsState) -> bool {
-    let (scene, mut state) = (scene.as_scene(), state.as_state());
+    stop_in(scene.as_scene(), state.as_state())
+}
+
+/// See [`stop`].
+pub(crate) fn stop_in<M: ElementMaterial>(scene: SceneView<'_, M>, mut state: StateView<'_>) -> bool {
     let Some(strain) = strain_energy_of(scene, state.reborrow()) else { return false };
     state.increment.fill(NodeVector::ZERO);
     (state.progress.dt, state.progress.seen) = (0.0, None);

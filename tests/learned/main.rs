@@ -11,6 +11,7 @@ mod support;
 mod exchange;
 mod int8;
 mod learned_step;
+mod organs;
 mod weights;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
