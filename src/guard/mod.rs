@@ -328,7 +328,14 @@ fn start_from(state: &StateView<'_>, second: &mut StateView<'_>) {
     copy(second.displacement, state.displacement);
     copy(second.remainder, state.remainder);
     copy(second.increment, state.increment);
-    *second.progress = *state.progress;
+    set(second.progress, state.progress);
+}
+
+/// Not inlined: of what two structures borrow the compiler forgets that it does not overlap, and asks the host for
+/// `memmove`.
+#[inline(never)]
+fn set(to: &mut Progress, from: &Progress) {
+    *to = *from;
 }
 
 /// A guard with storage `S` of the caller.
