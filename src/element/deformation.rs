@@ -3,7 +3,7 @@
 //! nodes 1, 2, 3; that of node 0 is minus their sum, so that a translation gives exactly zero.
 
 use crate::material::Invariants;
-use crate::simd::{Gather, Real, TileNodes, dot};
+use crate::simd::{Gather, Piece, Real, TileNodes, dot};
 
 use super::ElementTile;
 use super::symmetric::Symmetric;
@@ -24,16 +24,30 @@ pub(super) fn edges<R: Real>([origin, a, b, c]: [Vector<R>; 4]) -> [Vector<R>; 3
     edges
 }
 
-/// The same of displacements and of what rounding has left out of them. Where that is nothing the bits are those without.
-#[inline(always)]
-pub(super) fn exact_edges<R: Real>(displacements: [Vector<R>; 4], remainders: [Vector<R>; 4]) -> [Vector<R>; 3] {
-    let mut sums = edges(displacements);
-    for (sum, remainder) in sums.iter_mut().zip(edges(remainders)) {
-        for (component, remainder) in sum.iter_mut().zip(remainder) {
-            *component = *component + remainder;
+/// Adds to the displacements of three corners relative to the first one what rounding has left out of them. A function
+/// of its own, as few steps need it.
+pub(super) struct LeftOut<'a, R> {
+    pub(super) tile: &'a ElementTile,
+    pub(super) first: usize,
+    pub(super) remainder: Gather<'a>,
+    pub(super) edges: [Vector<R>; 3],
+}
+
+impl<R: Real> Piece for LeftOut<'_, R> {
+    type Output = [Vector<R>; 3];
+
+    #[inline(always)]
+    fn run(self) -> [Vector<R>; 3] {
+        let Self { tile, first, remainder, edges: mut sums } = self;
+        let nodes = tile.nodes_below::<R>(remainder.count()).unwrap_or(TileNodes::ALL_ZERO);
+        let at = |corner: usize| remainder.read_nodes::<R, 4>(&nodes, corner, first);
+        for (sum, left) in sums.iter_mut().zip(edges([at(0), at(1), at(2), at(3)])) {
+            for (component, left) in sum.iter_mut().zip(left) {
+                *component = *component + left;
+            }
         }
+        sums
     }
-    sums
 }
 
 /// Deformation of a vector of elements.

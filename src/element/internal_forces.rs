@@ -13,7 +13,7 @@ use crate::simd::{
 };
 
 use super::ElementTile;
-use super::deformation::{Deformation, Matrix, edges, exact_edges};
+use super::deformation::{Deformation, LeftOut, Matrix, edges};
 use super::pressure::{OwnPressure, Pressure};
 
 /// The elements of a scene with their laws.
@@ -256,20 +256,17 @@ impl<R: Real, P: Pressure> Piece for Deform<'_, '_, R, P> {
 
     #[inline(always)]
     fn run(self) {
-        match (self.length, self.remainder.count()) {
-            (3, 0) => deform::<R, P, 3, 6, false>(self),
-            (2, 0) => deform::<R, P, 2, 5, false>(self),
-            (_, 0) => deform::<R, P, 1, 4, false>(self),
-            (3, _) => deform::<R, P, 3, 6, true>(self),
-            (2, _) => deform::<R, P, 2, 5, true>(self),
-            _ => deform::<R, P, 1, 4, true>(self),
+        match self.length {
+            3 => deform::<R, P, 3, 6>(self),
+            2 => deform::<R, P, 2, 5>(self),
+            _ => deform::<R, P, 1, 4>(self),
         }
     }
 }
 
 /// The same for strips of `K` elements with `N` nodes. Elements of tiles with nodes out of range do not deform.
 #[inline(always)]
-fn deform<R: Real, P: Pressure, const K: usize, const N: usize, const REMAINDERS: bool>(pass: Deform<'_, '_, R, P>) {
+fn deform<R: Real, P: Pressure, const K: usize, const N: usize>(pass: Deform<'_, '_, R, P>) {
     let Deform { tiles, strips, displacement, remainder, pressure, batch, .. } = pass;
     let (tiles, vectors) = (tiles.as_chunks::<K>().0, TILE / R::COUNT);
     for (strip, elements) in strips.zip(batch.as_chunks_mut::<K>().0) {
@@ -284,16 +281,14 @@ fn deform<R: Real, P: Pressure, const K: usize, const N: usize, const REMAINDERS
             displacements[node] = [x, y, z];
             volumes[node] = pressure.read_with::<R, N>(fourth, &nodes, node, first);
         });
-        let mut remainders = [[R::splat(0.0); 3]; N];
-        if REMAINDERS {
-            unrolled!(node < N => { remainders[node] = remainder.read_nodes::<R, N>(&nodes, node, first); });
-        }
         unrolled!(element < K => {
             let [a, b, c, d] = CORNERS[element % LONGEST];
             let corners =
                 [displacements[a % N], displacements[b % N], displacements[c % N], displacements[d % N]];
-            let of_corners = [remainders[a % N], remainders[b % N], remainders[c % N], remainders[d % N]];
-            let edges = if REMAINDERS { exact_edges(corners, of_corners) } else { edges(corners) };
+            let mut edges = edges(corners);
+            if remainder.count() > 0 {
+                edges = R::run_piece(LeftOut { tile: &tiles[element], first, remainder, edges });
+            }
             let deformation = Deformation::of_edges(&tiles[element], first, edges);
             let vector = &mut elements[element];
             (vector.tile, vector.first) = (&tiles[element], first);

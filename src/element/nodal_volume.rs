@@ -13,7 +13,7 @@ use crate::simd::{
     unrolled,
 };
 
-use super::deformation::{Deformation, Matrix, Vector, edges, exact_edges};
+use super::deformation::{Deformation, LeftOut, Matrix, Vector, edges};
 use super::internal_forces::nodes_of;
 use super::{ElementTile, NodeInertia};
 
@@ -152,20 +152,17 @@ fn add_partitions<R: Real, S: Sums>(
     let moved = moved.map(Gather::new);
     for (touching, length) in all.touching(partitions) {
         let tiles = tiles.get(touching).unwrap_or_default();
-        match (length, moved[1].count()) {
-            (3, 0) => add_strips::<R, S, 3, 6, false>(tiles, moved, &mut sums),
-            (2, 0) => add_strips::<R, S, 2, 5, false>(tiles, moved, &mut sums),
-            (_, 0) => add_strips::<R, S, 1, 4, false>(tiles, moved, &mut sums),
-            (3, _) => add_strips::<R, S, 3, 6, true>(tiles, moved, &mut sums),
-            (2, _) => add_strips::<R, S, 2, 5, true>(tiles, moved, &mut sums),
-            _ => add_strips::<R, S, 1, 4, true>(tiles, moved, &mut sums),
+        match length {
+            3 => add_strips::<R, S, 3, 6>(tiles, moved, &mut sums),
+            2 => add_strips::<R, S, 2, 5>(tiles, moved, &mut sums),
+            _ => add_strips::<R, S, 1, 4>(tiles, moved, &mut sums),
         }
     }
 }
 
 /// Adds the volumes of strips of `K` elements with `N` nodes.
 #[inline(always)]
-fn add_strips<R: Real, S: Sums, const K: usize, const N: usize, const REMAINDERS: bool>(
+fn add_strips<R: Real, S: Sums, const K: usize, const N: usize>(
     tiles: &[ElementTile],
     [displacement, remainder]: [Gather<'_>; 2],
     sums: &mut S,
@@ -181,17 +178,15 @@ fn add_strips<R: Real, S: Sums, const K: usize, const N: usize, const REMAINDERS
             unrolled!(node < N => {
                 at[node] = displacement.read_nodes::<R, N>(&nodes, node, first);
             });
-            let mut left = [[R::splat(0.0); 3]; N];
-            if REMAINDERS {
-                unrolled!(node < N => { left[node] = remainder.read_nodes::<R, N>(&nodes, node, first); });
-            }
             // All gradients before all volumes: their operations do not wait for each other.
             let mut gradients = [[[R::splat(0.0); 3]; 3]; K];
             unrolled!(element < K => {
                 let [a, b, c, d] = CORNERS[element % LONGEST];
                 let corners = [at[a % N], at[b % N], at[c % N], at[d % N]];
-                let of_corners = [left[a % N], left[b % N], left[c % N], left[d % N]];
-                let edges = if REMAINDERS { exact_edges(corners, of_corners) } else { edges(corners) };
+                let mut edges = edges(corners);
+                if remainder.count() > 0 {
+                    edges = R::run_piece(LeftOut { tile: &tiles[element], first, remainder, edges });
+                }
                 gradients[element] = fused_gradient(&tiles[element], first, edges);
             });
             let mut shares = [S::none::<R>(); N];
