@@ -463,7 +463,7 @@ static void divergence(void) {
     DONE(supple_learned_describe(learned, &facts));
     const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 3.0f, facts.damping};
     DONE(supple_set_step(scene, state, &step, NULL));
-    move_end(scene, loads, 0.03f, 0.0f, 0.03f);
+    move_end(scene, loads, 0.02f, 0.0f, 0.02f);
     DONE(supple_learned_lead(scene, loads, state, learned, 100 * (double)facts.seconds, NULL, &report));
     const supple_status outside = supple_learned_step(scene, loads, state, learned, 20, NULL, &report);
     note(outside);
