@@ -223,7 +223,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
             }
             let loads = self.loads.of_step(state, seconds, left);
             let status = model.with_storage(storage).step_in_parts(scene, &loads, state.reborrow(), self.threads);
-            if is_too_far(status) && longest > shortest {
+            if status.is_too_far() && longest > shortest {
                 self.report.undone += 1;
                 longest *= 0.5;
                 (left, seconds) = equal_steps(until - state.time(), longest);
@@ -385,11 +385,6 @@ fn energy_excess(status: Status) -> Option<Status> {
     let Status::Diverged(Divergence { cause: Cause::Energy { kinetic, available }, .. }) = status else { return None };
     let energy_excess = ((kinetic / available.max(f64::MIN_POSITIVE)) as f32).min(f32::MAX);
     Some(Status::Limited { least_volume_ratio: 1.0, saturation: 0.0, energy_excess })
-}
-
-/// Whether a step was refused because tissue and an instrument come too near in it: in a shorter one they may not.
-fn is_too_far(status: Status) -> bool {
-    matches!(status, Status::Diverged(Divergence { cause: Cause::Instrument { .. }, .. }))
 }
 
 /// The loads of a call that goes on for `rest` seconds after the span of these steps.

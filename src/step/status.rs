@@ -80,6 +80,11 @@ impl Status {
         matches!(self, Self::Ok | Self::Limited { .. } | Self::Inexact { .. })
     }
 
+    /// Whether a step was refused because tissue and an instrument come too near in it.
+    pub(crate) const fn is_too_far(self) -> bool {
+        matches!(self, Self::Diverged(Divergence { cause: Cause::Instrument { .. }, .. }))
+    }
+
     /// Whether the energy balance does not explain the step, taken or not.
     #[must_use]
     pub const fn is_unexplained(&self) -> bool {

@@ -177,7 +177,9 @@ impl Pace {
         let now = self.look(scene, state.reborrow(), must_cast_slice_mut(weights));
         // The look has used them as scratch.
         copy(state.force, force);
-        let outrun = refused.is_some() || seconds > now;
+        // An instrument that is too fast for an exact step is too fast for any: a jump.
+        let jumps = refused.is_some_and(Status::is_too_far);
+        let outrun = (refused.is_some() && !jumps) || seconds > now;
         if outrun && seconds > self.shortest {
             state.restore(before);
             *state.progress = progress;
