@@ -147,6 +147,7 @@ pub mod mlp;
 mod padding;
 pub mod plausibility;
 pub mod reaction;
+mod scattered;
 pub mod scene;
 pub mod simd;
 pub mod simulation;

@@ -1,5 +1,6 @@
 //! What moves: the displacement of each node (m) and what rounding has left out of it ([`crate::step`]), its last
-//! increment (m), and the total force (N) that the latest step saw. A [`StateView`] borrows it, and every step works on one; [`VecState`] owns it on a host with a heap (feature
+//! increment (m), and the total force (N) that the latest step saw. A [`StateView`] borrows it, and every step works on
+//! one; [`VecState`] owns it on a host with a heap (feature
 //! `std`), [`FixedState`] without.
 //!
 //! The increment `u_n - u_(n-1)` is kept instead of `u_(n-1)`: in float32 the rounding of
@@ -15,6 +16,7 @@ use crate::copy::copy;
 use crate::element::Extremes;
 use crate::energy_balance::EnergyBalance;
 use crate::material::Element;
+use crate::scattered::scattered;
 pub use crate::simd::NodeVector;
 
 /// Vectors of a node that a step moves: displacement, remainder, increment.
@@ -51,13 +53,8 @@ pub(crate) struct Moment {
 impl Moment {
     /// The same in one number.
     const fn mark(&self) -> Mark {
-        // The finaliser of SplitMix64 (Steele, Lea, Flood 2014) after each.
-        const fn mixed(hash: u64) -> u64 {
-            let hash = (hash ^ (hash >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            let hash = (hash ^ (hash >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            hash ^ (hash >> 31)
-        }
-        let hash = mixed(mixed(mixed(self.steps.wrapping_add(1)) ^ self.time.to_bits()) ^ self.kinetic.to_bits());
+        let hash = scattered(scattered(self.steps.wrapping_add(1)) ^ self.time.to_bits());
+        let hash = scattered(hash ^ self.kinetic.to_bits());
         Mark(NonZeroU64::MIN.saturating_add(hash))
     }
 }
@@ -152,9 +149,9 @@ impl Deref for StateView<'_> {
 
 impl<'a> StateView<'a> {
     /// A state over the given vectors as they are: zeros mean at rest. Displacements and remainders add up to where the
-    /// nodes are: what rounding leaves out of a displacement in a step is added in the next one. `volume` is as long as the others for scenes
-    /// with [`NodalPressure`](crate::material::NodalPressure) or [`NodalStrain`](crate::material::NodalStrain), and may
-    /// be empty for linear tetrahedra.
+    /// nodes are: what rounding leaves out of a displacement in a step is added in the next one. `volume` is as long as
+    /// the others for scenes with [`NodalPressure`](crate::material::NodalPressure) or
+    /// [`NodalStrain`](crate::material::NodalStrain), and may be empty for linear tetrahedra.
     pub const fn new(
         displacement: &'a mut [NodeVector],
         remainder: &'a mut [NodeVector],

@@ -5,6 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::ContactError;
+use crate::scattered::scattered;
 
 /// A node that instruments can touch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -93,8 +94,8 @@ impl<'a> Surface<'a> {
 }
 
 /// Whether an instrument of this [thickness](super::Shape::thickness), m, passes between the nodes of a surface, whose
-/// triangles it then needs: whether one of its edges is longer. `faces` are these triangles, or all faces of all elements of
-/// the body, of which those inside come twice and cancel each other.
+/// triangles it then needs: whether one of its edges is longer. `faces` are these triangles, or all faces of all
+/// elements of the body, of which those inside come twice and cancel each other.
 pub fn passes_between(points: &[[f32; 3]], faces: impl IntoIterator<Item = [u32; 3]>, thickness: f32) -> bool {
     let point = |node: u32| points.get(node as usize).map(|&point| Vec3::from_array(point));
     // Of the faces with a longer edge, combined so that the same nodes in any order cancel.
@@ -102,19 +103,11 @@ pub fn passes_between(points: &[[f32; 3]], faces: impl IntoIterator<Item = [u32;
     for face in faces {
         let [Some(a), Some(b), Some(c)] = face.map(point) else { continue };
         if (b - a).length().max((c - b).length()).max((a - c).length()) > thickness {
-            let [a, b, c] = face.map(|node| scattered(node.into()));
+            let [a, b, c] = face.map(|node| scattered(u64::from(node) + 1));
             left ^= scattered(a.wrapping_add(b).wrapping_add(c));
         }
     }
     left != 0
-}
-
-/// Bits that tell numbers apart (SplitMix64).
-const fn scattered(number: u64) -> u64 {
-    let mut bits = number.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    bits ^ (bits >> 31)
 }
 
 /// The nodes of the boundary of a mesh ([`crate::mesh::boundary`]), in increasing order.
@@ -142,7 +135,8 @@ mod tests {
     use super::*;
     use crate::mesh::{Bar, faces};
 
-    /// Cells of 10 mm: edges of the surface are at most their diagonal long, 14.1 mm, but there are edges of 17.3 mm inside.
+    /// Cells of 10 mm: edges of the surface are at most their diagonal long, 14.1 mm, but there are edges of 17.3 mm
+    /// inside.
     #[test]
     fn edges_inside_the_body_do_not_count() {
         let bar = Bar { size: [0.03; 3], cells: [3; 3] };
