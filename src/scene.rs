@@ -401,6 +401,11 @@ impl<'a, M> SceneView<'a, M> {
 }
 
 impl<'a, M: Material> SceneView<'a, M> {
+    /// Size of a node's own tissue: the edge of a cube of its volume, m.
+    pub(crate) fn node_size(&self, node: usize) -> f32 {
+        libm::cbrtf(self.node_volume(node))
+    }
+
     /// Volume of a node's own tissue, m^3.
     pub(crate) fn node_volume(&self, node: usize) -> f32 {
         self.node_mass(node) / self.material.tissue(0).map_or(f32::INFINITY, |tissue| tissue.density)

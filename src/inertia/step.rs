@@ -118,8 +118,15 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         self.renew_if_stale(trial);
         let Trial { scene, loads, displacement, remainder, is_heated, force, volume, progress, .. } = &mut *trial;
-        let remainder = if *is_heated { &**remainder } else { &[] };
-        let forcing = Forcing { scene: *scene, visitor: ScalarBound, displacement, remainder, loads, progress };
+        let forcing = Forcing {
+            scene: *scene,
+            visitor: ScalarBound,
+            displacement,
+            remainder,
+            is_heated: *is_heated,
+            loads,
+            progress,
+        };
         let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
         self.model.refresh.update_frames(displacement, progress.steps);
         trial.add_pushes_before(self.step);

@@ -25,8 +25,15 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
     fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
         let Trial { scene, loads, displacement, remainder, is_heated, increment, force, volume, progress, .. } = trial;
         let (network, step, inertia) = (self.network, self.step, scene.inertia);
-        let remainder = if *is_heated { &**remainder } else { &[] };
-        let forcing = Forcing { scene: *scene, visitor: NoVisitor, displacement, remainder, loads, progress };
+        let forcing = Forcing {
+            scene: *scene,
+            visitor: NoVisitor,
+            displacement,
+            remainder,
+            is_heated: *is_heated,
+            loads,
+            progress,
+        };
         let predict = |nodes: Range<usize>, force: &[NodeVector], vertices: &mut [Vertex]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let displacement = displacement.get(nodes.clone()).unwrap_or_default();

@@ -12,12 +12,11 @@
 //!
 //! The network knows nothing of energy. What it does is entered in the same energy balance as every other step
 //! ([`crate::step::EnergyBalance`]): with several times more kinetic energy than loads and supports have ever given the
-//! step is refused. With fallback a step is undone that has more kinetic energy than the balance explains at all, moves a
-//! node by more than half the size of its tissue, or leaves an element inside out, and
-//! exact steps take its place for some intervals, while the frames follow as in the lead-in. Then the network is tried
-//! again. Each fallback lasts twice as long as the last one, up to [`LONGEST_WAIT`] intervals, until there have been
-//! many more learned steps than that without one. An attempt that is undone after exact steps leaves their motion as it
-//! was, to the bit.
+//! step is refused. With fallback a step is undone that has more kinetic energy than the balance explains at all,
+//! moves a node by more than half the size of its tissue, or leaves an element inside out, and exact steps take its
+//! place for some intervals, while the frames follow as in the lead-in. Then the network is tried again. Each fallback
+//! lasts twice as long as the last one, up to [`LONGEST_WAIT`] intervals, until there have been many more learned steps
+//! than that without one. An attempt that is undone after exact steps leaves their motion as it was, to the bit.
 
 pub mod frame;
 mod method;
@@ -38,7 +37,7 @@ use crate::mlp::Network;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::{AsState, MOVED_VECTORS, Moment, Progress, StateView};
-use crate::step::{CallingThread, Status, Step, Threads, Trial};
+use crate::step::{CallingThread, MOST_OF_SIZE, Status, Step, Threads, Trial};
 use crate::tled;
 use frame::Frame;
 use method::Learned;
@@ -72,9 +71,6 @@ impl Vertex {
         self.frame.follow(self.next.to_array());
     }
 }
-
-/// Sixth power of the share of a node's size that a learned step may move it by.
-const MOST_OF_SIZE: f32 = 1.0 / 64.0;
 
 /// Most exact steps in one of the network's: with more a call would not end in any time that matters.
 const MOST_EXACT_STEPS: u32 = 65_536;
@@ -566,8 +562,9 @@ fn is_wild<M: ElementMaterial>(scene: SceneView<'_, M>, state: &StateView<'_>) -
     let leaps = state.increment.iter().take(scene.node_count()).enumerate().any(|(node, increment)| {
         let [x, y, z] = increment.to_array();
         let (square, volume) = (x * x + y * y + z * z, scene.node_volume(node));
-        // Without a root, as this is for every node in every step.
-        square * square * square > MOST_OF_SIZE * volume * volume
+        // Sixth powers, without a root, as this is for every node in every step.
+        let most = MOST_OF_SIZE * MOST_OF_SIZE * MOST_OF_SIZE * volume;
+        square * square * square > most * most
     });
     let tiles = scene.tiles;
     let looks = (0..CHECK_CYCLE as u64).map(|steps| VolumeCheck { tiles, displacement: state.displacement, steps });

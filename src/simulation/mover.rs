@@ -10,11 +10,9 @@ use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::StateView;
-use crate::step::{Cause, Divergence, Status, Step, Threads, equal_steps};
+use crate::step::{Cause, Divergence, MOST_OF_SIZE, ROUNDING, Status, Step, Threads, equal_steps};
 use crate::tled::{self, Approach, Pace};
 
-/// Share of a span that is no step but a rounding of single precision.
-const ROUNDING: f64 = 1e-6;
 /// How often a long step is halved that tissue or an instrument is too fast for.
 const MOST_HALVINGS: u32 = 3;
 
@@ -203,6 +201,30 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         }
     }
 
+    /// The same after a network's steps. Where one is refused because of energy that these have left, the body is
+    /// stopped where it is, which the status tells, and steps go on.
+    fn exact_steps_after_network<M: ElementMaterial>(
+        &mut self,
+        exact: &mut ExactSteps<'_>,
+        span: f64,
+        rest: f64,
+        scene: SceneView<'_, M>,
+        state: &mut StateView<'_>,
+    ) -> bool {
+        let (before, until) = (self.report, state.time() + span);
+        if self.exact_steps(exact, span, rest, scene, state) {
+            return true;
+        }
+        let Some(told) = energy_excess(self.report.status) else { return false };
+        if !tled::stop_in(scene, state.reborrow()) {
+            return false;
+        }
+        self.report = Report { exact: self.report.exact, undone: self.report.undone, ..before };
+        self.report.enter(told);
+        (self.watch)(Event::TakenBack);
+        self.exact_steps(exact, until - state.time(), rest, scene, state)
+    }
+
     fn long_steps<M: ElementMaterial>(
         &mut self,
         model: &mut LargeModel<'_>,
@@ -323,19 +345,14 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
             if exact_next {
                 self.report.fell_back |= !is_leading;
                 let rest = f64::from(count - done - 1) * f64::from(seconds);
-                let (mut taken, before, recovers) = (true, self.report, learned.model().undoes() && !is_leading);
-                let until = state.time() + f64::from(seconds);
+                let (mut taken, recovers) = (true, learned.model().undoes() && !is_leading);
                 // A step that was refused is in the report.
                 let _ = learned.lead_interval(state, |state| {
-                    taken = self.exact_steps(&mut exact, seconds.into(), rest, scene, state);
-                    if let Some(told) = energy_excess(self.report.status).filter(|_| recovers && !taken)
-                        && tled::stop_in(scene, state.reborrow())
-                    {
-                        self.report = Report { exact: self.report.exact, undone: self.report.undone, ..before };
-                        self.report.enter(told);
-                        (self.watch)(Event::TakenBack);
-                        taken = self.exact_steps(&mut exact, until - state.time(), rest, scene, state);
-                    }
+                    let span = f64::from(seconds);
+                    taken = match recovers {
+                        true => self.exact_steps_after_network(&mut exact, span, rest, scene, state),
+                        false => self.exact_steps(&mut exact, span, rest, scene, state),
+                    };
                     if taken { Status::Ok } else { self.report.status }
                 });
                 if !taken {
@@ -371,16 +388,15 @@ impl ExactSteps<'_> {
     }
 }
 
-/// Whether the estimated error of a node is more than half the size of its tissue: the mean may hide one that runs away.
-/// The status that says so.
+/// Whether the estimated error of a node is more than half the size of its tissue: the mean may hide one that runs
+/// away. The status that says so.
 fn lost_node<M: ElementMaterial>(scene: SceneView<'_, M>, estimate: Option<Estimate>) -> Option<Status> {
     let Estimate { largest, node, .. } = estimate?;
-    let allowed = 0.5 * libm::cbrtf(scene.node_volume(node as usize));
+    let allowed = MOST_OF_SIZE * scene.node_size(node as usize);
     (largest > allowed).then_some(Status::Inexact { error: largest, allowed })
 }
 
-/// What to tell in place of a step that was refused because of energy that nothing gave: a network has left it, bit by
-/// bit, and exact steps go on from the same place at rest.
+/// What to tell in place of a step that was refused because of energy that nothing gave.
 fn energy_excess(status: Status) -> Option<Status> {
     let Status::Diverged(Divergence { cause: Cause::Energy { kinetic, available }, .. }) = status else { return None };
     let energy_excess = ((kinetic / available.max(f64::MIN_POSITIVE)) as f32).min(f32::MAX);

@@ -52,8 +52,9 @@ pub enum Cause {
     },
 }
 
-/// Share of a node's own tissue by which a support or an instrument may move it in a step before that is a cause.
-pub(super) const MOST_OF_SIZE: f32 = 0.5;
+/// Share of the size of a node's own tissue by which a support or an instrument may move it in a step before that is a
+/// cause, and a network at all.
+pub(crate) const MOST_OF_SIZE: f32 = 0.5;
 
 impl fmt::Display for Divergence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -125,11 +126,6 @@ impl<M: ElementMaterial> Trial<'_, M> {
         if torn { self.excessive_force(step, method.added_inertia()) } else { None }
     }
 
-    /// Edge of a cube of the node's own tissue, m.
-    pub(super) fn size_at(&self, node: usize) -> f32 {
-        libm::cbrtf(self.scene.node_volume(node))
-    }
-
     /// The node that supports moved farthest in the step before, if that is a cause.
     fn jumping_support(&self) -> Option<(u32, Cause)> {
         let mut most = (MOST_OF_SIZE, None);
@@ -139,7 +135,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             let held = |inverse: f32, way: f32| if inverse > 0.0 { 0.0 } else { way };
             let metre = length([held(x, dx), held(y, dy), held(z, dz)]) as f32;
             if metre > 0.0 {
-                let size = self.size_at(node);
+                let size = self.scene.node_size(node);
                 if metre / size > most.0 {
                     most = (metre / size, Some((node as u32, Cause::Motion { metre, size })));
                 }
@@ -157,7 +153,7 @@ impl<M: ElementMaterial> Trial<'_, M> {
             let node = load.node as usize;
             let mass = f64::from((1.0 + added) * self.scene.node_mass(node));
             let newton = f64::from(ramp_factor(self.progress.time, load.ramp)) * length(load.newton);
-            let size = self.size_at(node);
+            let size = self.scene.node_size(node);
             let share = newton * seconds * seconds / (mass * f64::from(size));
             if share > most.0 {
                 most = (share, Some((load.node, Cause::Force { index, newton: newton as f32, size })));

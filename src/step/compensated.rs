@@ -1,6 +1,6 @@
 //! The sum `u += du` of a step with what rounding leaves out of it (Kahan 1965), m. Without that the slower part of a
-//! motion is lost: at a displacement of 0.25 m float32 has no increments below 1.5e-8 m, and in steps of 1.4e-6 s nothing
-//! below 10 mm/s moves on.
+//! motion is lost: at a displacement of 0.25 m float32 has no increments below 1.5e-8 m, and in steps of 1.4e-6 s
+//! nothing below 10 mm/s moves on.
 
 use core::ops::{Add, Sub};
 

@@ -424,10 +424,8 @@ impl<M: ElementMaterial> Trial<'_, M> {
     /// Refuses the step if an instrument moves too far in it.
     fn refuses_speed(&mut self, contact: &Contact<'_>, placed: &[Placed<'_>]) -> bool {
         for (index, placed) in placed.iter().enumerate() {
-            let [metre, most] = [placed.way(), placed.thickness()];
-            if metre > most {
-                let node = contact.surface().nodes().first().map_or(0, |entry| entry.node);
-                self.refused.get_or_insert((node, Cause::Instrument { index, metre, most }));
+            let node = contact.surface().nodes().first().map_or(0, |entry| entry.node);
+            if self.refuses(index, node, [placed.way(), placed.thickness()]) {
                 return true;
             }
         }
@@ -444,27 +442,21 @@ impl<M: ElementMaterial> Trial<'_, M> {
         meeting: &Meeting,
         way: Vec3,
     ) -> bool {
-        let approach = meeting.approach(way);
-        let most = placed.thickness().min(self.size_at(node as usize));
-        if approach > most {
-            self.refused.get_or_insert((node, Cause::Instrument { index, metre: approach, most }));
-        }
-        approach > most || self.refuses_distance(index, node, -meeting.gap - approach)
+        let (size, approach) = (self.scene.node_size(node as usize), meeting.approach(way));
+        self.refuses(index, node, [approach, placed.thickness().min(size)])
+            || self.refuses(index, node, [-meeting.gap - approach, MOST_OF_SIZE * size])
     }
 
     /// Refuses the step if a node was so far from where an instrument held it that it would be thrown, or is carried
     /// through the tissue around it, m.
     fn refuses_grip(&mut self, index: usize, node: u32, [before, carried]: [Vec3; 2]) -> bool {
-        let (metre, most) = (carried.length(), self.size_at(node as usize));
-        if metre > most {
-            self.refused.get_or_insert((node, Cause::Instrument { index, metre, most }));
-        }
-        metre > most || self.refuses_distance(index, node, before.length())
+        let size = self.scene.node_size(node as usize);
+        self.refuses(index, node, [carried.length(), size])
+            || self.refuses(index, node, [before.length(), MOST_OF_SIZE * size])
     }
 
-    /// Refuses the step if a node is so far (m) from where an instrument has it that it would be thrown.
-    fn refuses_distance(&mut self, index: usize, node: u32, metre: f32) -> bool {
-        let most = MOST_OF_SIZE * self.size_at(node as usize);
+    /// Refuses the step if a length (m) to an instrument is more than the most that is possible.
+    fn refuses(&mut self, index: usize, node: u32, [metre, most]: [f32; 2]) -> bool {
         if metre > most {
             self.refused.get_or_insert((node, Cause::Instrument { index, metre, most }));
         }

@@ -7,8 +7,8 @@
 //! ```
 //! collects in `n` steps, as many as damping lets act together. It is little in soft tissue, but a free and undamped
 //! fragment of cartilage that a small force moves by 4 mm in two million steps has several times the energy of its
-//! drift. Forces at displacements with their remainders ([`super::moved`]) leave nothing of it. They take longer, so that
-//! they are computed only where the noise could be told from an inexact step.
+//! drift. Forces at displacements with their remainders ([`super::moved`]) leave nothing of it. They take longer, so
+//! that they are computed only where the noise could be told from an inexact step.
 
 use glam::Vec4;
 

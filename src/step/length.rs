@@ -71,7 +71,7 @@ impl fmt::Display for StepError {
 impl core::error::Error for StepError {}
 
 /// Share of a span that is no step but a rounding of single precision.
-const ROUNDING: f64 = 1e-6;
+pub(crate) const ROUNDING: f64 = 1e-6;
 
 /// How many steps of at most `longest` (s) make up a span (s), and their length: `longest` itself if it differs by a
 /// rounding only.

@@ -17,10 +17,11 @@ mod triangles;
 pub(crate) use crate::element::Extremes;
 pub use crate::energy_balance::{EnergyBalance, EnergyCycle};
 pub use cause::Cause;
+pub(crate) use cause::MOST_OF_SIZE;
 pub(crate) use compensated::moved;
 pub(crate) use energy_sums::{Sums, Totals};
 pub use length::{CriticalStep, Step, StepError};
-pub(crate) use length::{equal_steps, is_damping};
+pub(crate) use length::{ROUNDING, equal_steps, is_damping};
 pub(crate) use parts::{Forcing, Moving, internal_forces, move_in_parts, nodal_volumes};
 pub use status::{Divergence, Status};
 #[cfg(feature = "parallel")]
@@ -49,7 +50,7 @@ pub(crate) struct Trial<'a, M> {
     /// [`crate::tled::critical_step`] uses them, with linear tetrahedra nothing does.
     pub(crate) volume: &'a mut [NodeVector],
     pub(crate) progress: &'a mut Progress,
-    /// Whether forces need the remainders ([`heat`]).
+    /// Whether forces need the remainders ([`heat`]): known once a step is to be computed.
     pub(crate) is_heated: bool,
     /// What the instruments feel, as far as the host wants to know.
     pub(crate) touches: &'a mut [Touch],
@@ -133,7 +134,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             increment: increment.get_mut(..nodes).unwrap_or_default(),
             force: force.get_mut(..nodes).unwrap_or_default(),
             volume: volume.get_mut(..nodes).unwrap_or_default(),
-            is_heated: progress.energy_balance.is_heated(),
+            is_heated: false,
             progress,
             touches,
             points,

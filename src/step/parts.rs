@@ -23,8 +23,9 @@ pub(crate) struct Forcing<'a, M, V> {
     /// What is computed with the forces of each element.
     pub(crate) visitor: V,
     pub(crate) displacement: &'a [NodeVector],
-    /// See [`super::heat`]; empty if they are not needed.
     pub(crate) remainder: &'a [NodeVector],
+    /// Whether forces need the remainders ([`super::heat`]).
+    pub(crate) is_heated: bool,
     pub(crate) loads: &'a Loads<'a>,
     /// Of the state, for the time of the loads.
     pub(crate) progress: &'a Progress,
@@ -69,6 +70,11 @@ pub(crate) fn nodal_volumes<M: ElementMaterial>(
 }
 
 impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
+    /// Displacements and their remainders; none of these if they are not needed.
+    fn moved(&self) -> [&[NodeVector]; 2] {
+        [self.displacement, if self.is_heated { self.remainder } else { &[] }]
+    }
+
     /// Total forces, with the nodes' [`nodal_volumes`] where the material needs them, and for each partition the result
     /// of `then` from its nodes, their forces and their entries of `extra`, an array that the step keeps for the nodes.
     pub(crate) fn in_parts<T: Send, F: Copy + Default + Send>(
@@ -79,7 +85,8 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         threads: &impl Threads,
         then: impl Fn(Range<usize>, &[NodeVector], &mut [T]) -> F + Sync,
     ) -> ([F; MAX_PARTITIONS], Extremes<f32>) {
-        nodal_volumes(self.scene, self.displacement, self.remainder, volumes, threads);
+        let [displacement, remainder] = self.moved();
+        nodal_volumes(self.scene, displacement, remainder, volumes, threads);
         let volumes = &*volumes;
         let partitions = self.scene.elements().partitions;
         let count = partitions.parts(threads.parts());
@@ -115,8 +122,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         let nodes = all.nodes(partitions);
         let inertia = self.scene.inertia.get(nodes.clone()).unwrap_or_default();
         external_forces(force, nodes.start, inertia, self.loads, self.progress.time);
-        let moved = [self.displacement, self.remainder];
-        *extremes = internal_forces(self.scene, partitions.clone(), moved, volumes, force, self.visitor);
+        *extremes = internal_forces(self.scene, partitions.clone(), self.moved(), volumes, force, self.visitor);
         let (mut force, mut extra) = (&mut **force, &mut **extra);
         for (partition, result) in partitions.clone().zip(&mut **results) {
             let nodes = all.nodes(&(partition..partition + 1));
@@ -126,8 +132,8 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
     }
 }
 
-/// Adds internal forces to those of the nodes in `partitions`, from displacements and their remainders, and from the [`nodal_volumes`] where the material needs
-/// them.
+/// Adds internal forces to those of the nodes in `partitions`, from displacements and their remainders, and from the
+/// [`nodal_volumes`] where the material needs them.
 pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     scene: SceneView<'_, M>,
     partitions: Range<usize>,

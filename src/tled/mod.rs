@@ -72,8 +72,15 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
         let Trial { scene, loads, displacement, remainder, is_heated, increment, force, volume, progress, .. } =
             &mut *trial;
         let (inertia, step) = (scene.inertia, self.step);
-        let remainder = if *is_heated { &**remainder } else { &[] };
-        let forcing = Forcing { scene: *scene, visitor: NoVisitor, displacement, remainder, loads, progress };
+        let forcing = Forcing {
+            scene: *scene,
+            visitor: NoVisitor,
+            displacement,
+            remainder,
+            is_heated: *is_heated,
+            loads,
+            progress,
+        };
         let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let increment = increment.get(nodes).unwrap_or_default();

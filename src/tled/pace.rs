@@ -10,7 +10,7 @@ use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::{MOVED_VECTORS, Moment, StateView};
-use crate::step::{CriticalStep, Status, Step, StepError, Threads, equal_steps};
+use crate::step::{CriticalStep, ROUNDING, Status, Step, StepError, Threads, equal_steps};
 
 use super::critical::{Weights, critical};
 use super::step_in_parts;
@@ -22,8 +22,6 @@ const STALE: f32 = 0.05;
 /// Relative fall of the least volume ratio, or rise of the saturation, after which the critical step is looked at at
 /// once.
 const SQUEEZE: f32 = 0.1;
-/// Relative difference of lengths that is none.
-const ROUNDING: f32 = 1e-6;
 /// By which share per step a step grows after it had to shrink. Slowly: steps that change in time with the motion feed
 /// energy into it (Skeel 1993, "Variable step size destabilizes the Stoermer/leapfrog/Verlet method").
 const GROWTH: f32 = 0.002;
@@ -72,8 +70,8 @@ pub enum Approach {
     Refused(Status),
 }
 
-/// Vectors of storage for a state of so many nodes, to undo steps, to look at the critical step, and to keep the forces of the
-/// latest step meanwhile.
+/// Vectors of storage for a state of so many nodes, to undo steps, to look at the critical step, and to keep the forces
+/// of the latest step meanwhile.
 #[must_use]
 pub const fn vectors_for_pace(nodes: usize) -> usize {
     (MOVED_VECTORS + 1) * nodes + nodes.div_ceil(4)
@@ -152,8 +150,8 @@ impl Pace {
         state.save(before);
         let progress = *state.progress;
         let count = whole.min(self.steps.saturating_sub(self.taken));
-        let (mut refused, mut taken, mut extremes) = (None, 0, Extremes::none());
-        while taken < count {
+        let (mut refused, mut taken, mut extremes, mut squeezed) = (None, 0, Extremes::none(), false);
+        while taken < count && !squeezed {
             let of_step = loads.of_step(&state, seconds, whole.saturating_sub(taken));
             let status = step_in_parts(scene, &of_step, state.reborrow(), &step, threads);
             enter(status, &of_step, state.reborrow());
@@ -163,12 +161,10 @@ impl Pace {
             }
             taken += 1;
             extremes = extremes.merged_with(&state.extremes);
-            if is_squeezed(&extremes, &self.extremes) {
-                break;
-            }
+            squeezed = is_squeezed(&extremes, &self.extremes);
         }
         self.taken += taken;
-        if refused.is_none() && self.taken < self.steps && !is_squeezed(&extremes, &self.extremes) {
+        if refused.is_none() && self.taken < self.steps && !squeezed {
             // The call ends, and steps go on in the next.
             self.moment = Some(state.moment());
             return Approach::Taken { seconds };
@@ -200,11 +196,11 @@ impl Pace {
         refused.map_or(Approach::Taken { seconds }, Approach::Refused)
     }
 
-    /// How many steps make up `left` seconds until `end` (s), and their length: that of the steps before if these were to
-    /// end there too, without a new rounding.
+    /// How many steps make up `left` seconds until `end` (s), and their length: that of the steps before if these were
+    /// to end there too, without a new rounding.
     fn steps_to(&mut self, end: f64, left: f64) -> (u32, f32) {
         let (whole, seconds) = equal_steps(left, self.longest);
-        let goes_on = (end - self.end).abs() < 0.5 * left && (seconds / self.length - 1.0).abs() < ROUNDING;
+        let goes_on = (end - self.end).abs() < 0.5 * left && (seconds / self.length - 1.0).abs() < ROUNDING as f32;
         (self.end, self.length) = (end, if goes_on { self.length } else { seconds });
         (whole, self.length)
     }

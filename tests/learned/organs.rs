@@ -11,6 +11,7 @@ use supple::state::NodeVector;
 use supple::step::Status;
 
 use crate::reference::Random;
+use crate::support::{mean_distance, to_f64};
 
 const FRAME: f64 = 1.0 / 60.0;
 const FRAMES: u32 = 24;
@@ -87,12 +88,8 @@ fn onto_ball([x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 /// Mean distance of the nodes, mm.
-fn distance(a: &[NodeVector], b: &[NodeVector]) -> f32 {
-    let lengths = a.iter().zip(b).map(|(a, b)| {
-        let [a, b] = [a, b].map(|vector| vector.to_array());
-        (0..3).map(|axis| (a[axis] - b[axis]).powi(2)).sum::<f32>().sqrt()
-    });
-    1e3 * lengths.sum::<f32>() / a.len() as f32
+fn distance(a: &[NodeVector], b: &[NodeVector]) -> f64 {
+    1e3 * mean_distance(&to_f64(a), &to_f64(b))
 }
 
 #[test]
