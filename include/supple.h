@@ -290,8 +290,8 @@
 #define SUPPLE_REMARK_OTHER_TISSUE 11
 
 /**
- * Instrument `index` is `value` m thick, and edges of the surface are longer: it passes between the nodes, or feels too
- * little. Give supple_surface its triangles.
+ * Instrument `index` is `value` m thick, and edges of the surface are longer: it passes between the nodes, or feels
+ * too little. Give supple_surface its triangles.
  */
 #define SUPPLE_REMARK_THIN 12
 
@@ -1347,8 +1347,8 @@ typedef struct {
     uint32_t steps;
     /**
      * Length of the steps, s; 0: chosen. Of damped steps at most so much, 20 critical steps unless given; of exact
-     * ones, a network's included, at most so much, nine tenths of the critical step unless given, and shorter where the
-     * critical step falls; of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
+     * ones, a network's included, at most so much, nine tenths of the critical step unless given, and shorter where
+     * the critical step falls; of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
      */
     float seconds;
     /**
@@ -1486,8 +1486,8 @@ typedef struct {
 
 #if defined(SUPPLE_IO)
 /**
- * How large the mesh of a file is. A host defines SUPPLE_IO, and has a library with the feature io, to use this and the
- * two functions that take it.
+ * How large the mesh of a file is. A host defines SUPPLE_IO, and has a library with the feature io, to use this and
+ * the two functions that take it.
  */
 typedef struct {
     /**
@@ -1721,10 +1721,10 @@ supple_status supple_step(const supple_scene *scene,
 
 #if defined(SUPPLE_PARALLEL)
 /**
- * Writes threads for all functions that take them: those of a pool, one for each processor and SUPPLE_MOST_PARTS at most,
- * which the library starts at the first step that needs them, and which stay as long as the process does. A process that
- * is forked has none of them: fork before. A host defines SUPPLE_PARALLEL, and has a library with the feature
- * parallel, to use it.
+ * Writes threads for all functions that take them: those of a pool, one for each processor and SUPPLE_MOST_PARTS at
+ * most, which the library starts at the first step that needs them, and which stay as long as the process does. A
+ * process that is forked has none of them: fork before. A host defines SUPPLE_PARALLEL, and has a library with the
+ * feature parallel, to use it.
  *
  * @param parts that a step shall be cut into, 1 to SUPPLE_MOST_PARTS.
  */
@@ -1778,7 +1778,8 @@ supple_status supple_copy_forces(const supple_state *state,
                                  size_t floats);
 
 /**
- * Writes the triangles of the boundary of a mesh, which belong to one element only, seen from outside: three nodes each.
+ * Writes the triangles of the boundary of a mesh, which belong to one element only, seen from outside: three nodes
+ * each.
  *
  * @param tetrahedra four nodes of each element, from zero.
  * @param triangles room for `room` of them; four for each element are needed while they are found.
@@ -1791,9 +1792,9 @@ supple_status supple_boundary(const uint32_t *tetrahedra,
                               uint32_t *count);
 
 /**
- * Writes whether one of these instruments passes between the nodes of a surface, since it is not as thick as the longest
- * edge of its triangles is long: `*needed` is 1 if supple_surface has to have these triangles, else 0. A sphere and a
- * capsule are as thick as their radius, a field as its deepest point is deep.
+ * Writes whether one of these instruments passes between the nodes of a surface, since it is not as thick as the
+ * longest edge of its triangles is long: `*needed` is 1 if supple_surface has to have these triangles, else 0. A
+ * sphere and a capsule are as thick as their radius, a field as its deepest point is deep.
  *
  * @param points of all `nodes` of the scene at rest, m, three coordinates each.
  * @param triangles `count` triangles of the boundary, as of supple_boundary.
@@ -2079,8 +2080,8 @@ supple_status supple_guard_init(void *memory,
 /**
  * To be called after each call that moves the state, with the same loads, at the latest after `every` steps of the
  * configuration. Now and then it moves the second run and compares. SUPPLE_INEXACT if the estimate exceeds what is
- * allowed. A state that has not come by steps from where this guard has seen it last (reset, restored, stopped, another
- * copy) begins a new second run from where it is. So a state has one supple_guard at a time.
+ * allowed. A state that has not come by steps from where this guard has seen it last (reset, restored, stopped,
+ * another copy) begins a new second run from where it is. So a state has one supple_guard at a time.
  *
  * @param loads as of the steps; NULL: nothing, supports stand still.
  * @param threads NULL: the calling thread alone.
@@ -2264,9 +2265,9 @@ const char *supple_remark_text(uint32_t kind);
 
 #if defined(SUPPLE_IO)
 /**
- * Writes how large the mesh of a file is. The extension tells the format: .vtk, .vtu, .msh (Gmsh 1, 2.x and 4.1), .node
- * or .ele (TetGen). It reads the whole file, on the heap, and releases what it took. What is wrong with the file,
- * SUPPLE_E_FILE, stands in `words`: a sentence with the file, the place in it and the value.
+ * Writes how large the mesh of a file is. The extension tells the format: .vtk, .vtu, .msh (Gmsh 1, 2.x and 4.1),
+ * .node or .ele (TetGen). It reads the whole file, on the heap, and releases what it took. What is wrong with the
+ * file, SUPPLE_E_FILE, stands in `words`: a sentence with the file, the place in it and the value.
  *
  * @param path in UTF-8.
  * @param words receives the sentence, cut to `room` bytes, or nothing; NULL if `room` is 0.

@@ -277,8 +277,8 @@ pub fn of_network<M: ElementMaterial>(scene: SceneView<'_, M>, recipe: &Recipe<'
     (!(is_same_law && tissues_of(scene.material).all(is_same))).then_some(Remark::OtherTissue)
 }
 
-/// Calls `say` with a remark and the number of each instrument that passes between the nodes that it can touch, of a scene
-/// that was built from these points, m.
+/// Calls `say` with a remark and the number of each instrument that passes between the nodes that it can touch, of a
+/// scene that was built from these points, m.
 pub fn of_contact<M: ElementMaterial>(
     scene: SceneView<'_, M>,
     points: &[[f32; 3]],

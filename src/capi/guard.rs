@@ -170,8 +170,8 @@ fn allowed(tolerance: f32) -> Answer<Allowed> {
 
 /// To be called after each call that moves the state, with the same loads, at the latest after `every` steps of the
 /// configuration. Now and then it moves the second run and compares. SUPPLE_INEXACT if the estimate exceeds what is
-/// allowed. A state that has not come by steps from where this guard has seen it last (reset, restored, stopped, another
-/// copy) begins a new second run from where it is. So a state has one supple_guard at a time.
+/// allowed. A state that has not come by steps from where this guard has seen it last (reset, restored, stopped,
+/// another copy) begins a new second run from where it is. So a state has one supple_guard at a time.
 ///
 /// @param loads as of the steps; NULL: nothing, supports stand still.
 /// @param threads NULL: the calling thread alone.

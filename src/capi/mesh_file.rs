@@ -1,5 +1,5 @@
-//! Meshes out of files, for C ([`crate::io`]): only in a library with the feature `io`, which needs the system's C library
-//! and its heap. What is read is handed over in memory of the host's, and nothing of the library's stays.
+//! Meshes out of files, for C ([`crate::io`]): only in a library with the feature `io`, which needs the system's C
+//! library and its heap. What is read is handed over in memory of the host's, and nothing of the library's stays.
 #![cfg(feature = "io")]
 
 use core::ffi::{CStr, c_char};
@@ -12,8 +12,8 @@ use super::memory::{one, place_for};
 use super::status::supple_status;
 use supple_status::*;
 
-/// How large the mesh of a file is. A host defines SUPPLE_IO, and has a library with the feature io, to use this and the
-/// two functions that take it.
+/// How large the mesh of a file is. A host defines SUPPLE_IO, and has a library with the feature io, to use this and
+/// the two functions that take it.
 #[cfg(feature = "io")]
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
@@ -26,9 +26,9 @@ pub struct supple_mesh_size {
     pub has_regions: u32,
 }
 
-/// Writes how large the mesh of a file is. The extension tells the format: .vtk, .vtu, .msh (Gmsh 1, 2.x and 4.1), .node
-/// or .ele (TetGen). It reads the whole file, on the heap, and releases what it took. What is wrong with the file,
-/// SUPPLE_E_FILE, stands in `words`: a sentence with the file, the place in it and the value.
+/// Writes how large the mesh of a file is. The extension tells the format: .vtk, .vtu, .msh (Gmsh 1, 2.x and 4.1),
+/// .node or .ele (TetGen). It reads the whole file, on the heap, and releases what it took. What is wrong with the
+/// file, SUPPLE_E_FILE, stands in `words`: a sentence with the file, the place in it and the value.
 ///
 /// @param path in UTF-8.
 /// @param words receives the sentence, cut to `room` bytes, or nothing; NULL if `room` is 0.

@@ -1,5 +1,5 @@
-//! Threads of the library's own, for C hosts that have none: only in a library with the feature `parallel`, which needs the
-//! system's C library and its heap.
+//! Threads of the library's own, for C hosts that have none: only in a library with the feature `parallel`, which needs
+//! the system's C library and its heap.
 #![cfg(feature = "parallel")]
 
 use core::ffi::c_void;
@@ -15,10 +15,10 @@ use super::status::{status_of, supple_status};
 use super::step::{SUPPLE_MOST_PARTS, supple_part, supple_threads};
 use supple_status::*;
 
-/// Writes threads for all functions that take them: those of a pool, one for each processor and SUPPLE_MOST_PARTS at most,
-/// which the library starts at the first step that needs them, and which stay as long as the process does. A process that
-/// is forked has none of them: fork before. A host defines SUPPLE_PARALLEL, and has a library with the feature
-/// parallel, to use it.
+/// Writes threads for all functions that take them: those of a pool, one for each processor and SUPPLE_MOST_PARTS at
+/// most, which the library starts at the first step that needs them, and which stay as long as the process does. A
+/// process that is forked has none of them: fork before. A host defines SUPPLE_PARALLEL, and has a library with the
+/// feature parallel, to use it.
 ///
 /// @param parts that a step shall be cut into, 1 to SUPPLE_MOST_PARTS.
 #[cfg(feature = "parallel")]

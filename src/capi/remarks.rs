@@ -35,8 +35,8 @@ pub const SUPPLE_REMARK_SPEED: u32 = 9;
 pub const SUPPLE_REMARK_COUNTED_FROM_ONE: u32 = 10;
 /// The network learned from another law, other constants or density, or other elements: its error here is not known.
 pub const SUPPLE_REMARK_OTHER_TISSUE: u32 = 11;
-/// Instrument `index` is `value` m thick, and edges of the surface are longer: it passes between the nodes, or feels too
-/// little. Give supple_surface its triangles.
+/// Instrument `index` is `value` m thick, and edges of the surface are longer: it passes between the nodes, or feels
+/// too little. Give supple_surface its triangles.
 pub const SUPPLE_REMARK_THIN: u32 = 12;
 
 /// What does not look right. Numbers that have no meaning are 0, an index SUPPLE_NONE.

@@ -56,8 +56,8 @@ pub struct supple_settings {
     /// SUPPLE_STEPS_EXACT and so on.
     pub steps: u32,
     /// Length of the steps, s; 0: chosen. Of damped steps at most so much, 20 critical steps unless given; of exact
-    /// ones, a network's included, at most so much, nine tenths of the critical step unless given, and shorter where the
-    /// critical step falls; of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
+    /// ones, a network's included, at most so much, nine tenths of the critical step unless given, and shorter where
+    /// the critical step falls; of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
     pub seconds: f32,
     /// Damping proportional to mass, 1/s, zero or more. A network has that of its training.
     pub damping: f32,

@@ -90,7 +90,8 @@ impl<'a> Given<'a> {
     }
 }
 
-/// Writes the triangles of the boundary of a mesh, which belong to one element only, seen from outside: three nodes each.
+/// Writes the triangles of the boundary of a mesh, which belong to one element only, seen from outside: three nodes
+/// each.
 ///
 /// @param tetrahedra four nodes of each element, from zero.
 /// @param triangles room for `room` of them; four for each element are needed while they are found.
@@ -126,9 +127,9 @@ pub unsafe extern "C" fn supple_boundary(
     status_of(find())
 }
 
-/// Writes whether one of these instruments passes between the nodes of a surface, since it is not as thick as the longest
-/// edge of its triangles is long: `*needed` is 1 if supple_surface has to have these triangles, else 0. A sphere and a
-/// capsule are as thick as their radius, a field as its deepest point is deep.
+/// Writes whether one of these instruments passes between the nodes of a surface, since it is not as thick as the
+/// longest edge of its triangles is long: `*needed` is 1 if supple_surface has to have these triangles, else 0. A
+/// sphere and a capsule are as thick as their radius, a field as its deepest point is deep.
 ///
 /// @param points of all `nodes` of the scene at rest, m, three coordinates each.
 /// @param triangles `count` triangles of the boundary, as of supple_boundary.

@@ -210,8 +210,8 @@ fn add_strips<R: Real, S: Sums, const K: usize, const N: usize>(
     }
 }
 
-/// The displacement gradients of elements from the displacements of three corners relative to the first one, with as few
-/// operations as possible.
+/// The displacement gradients of elements from the displacements of three corners relative to the first one, with as
+/// few operations as possible.
 #[inline(always)]
 fn fused_gradient<R: Real>(tile: &ElementTile, first: usize, edges: [Vector<R>; 3]) -> Matrix<R> {
     let mut h = [[R::splat(0.0); 3]; 3];

@@ -18,8 +18,8 @@ const LEAST: f32 = 0.001;
 /// Part of that where the estimate exceeds the motion of the run: both runs may hold a body still that moves.
 const LEAST_OF_STILL: f32 = 0.1;
 
-/// In the first steps from rest no two runs differ much. So after the first comparisons, one a step, the error may be as
-/// large as the motion, until the next.
+/// In the first steps from rest no two runs differ much. So after the first comparisons, one a step, the error may be
+/// as large as the motion, until the next.
 const FIRST_COMPARISONS: u32 = 3;
 
 /// The error that a run may have before its steps are called inexact.

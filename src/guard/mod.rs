@@ -379,9 +379,9 @@ impl<S: AsMut<[NodeVector]>> Guard<S> {
 
     /// To be called after each step of the first run, or after each few, with what it answered, the loads that it had
     /// and the state that it left. Every so often it moves the second run and compares. Gives that status, or
-    /// [`Status::Inexact`] in place of [`Status::Ok`] if the estimate exceeds what is allowed. A state that has not come
-    /// by steps from where the guard has seen it last (restored, reset, put, stopped, another copy), or has gone on for
-    /// longer than a step of the second run, begins a new second run, from where it is now.
+    /// [`Status::Inexact`] in place of [`Status::Ok`] if the estimate exceeds what is allowed. A state that has not
+    /// come by steps from where the guard has seen it last (restored, reset, put, stopped, another copy), or has gone
+    /// on for longer than a step of the second run, begins a new second run, from where it is now.
     pub fn follow<M: ElementMaterial>(
         &mut self,
         taken: Status,

@@ -17,14 +17,15 @@ pub fn boundary(tets: impl IntoIterator<Item = [u32; 4]>) -> std::vec::Vec<[u32;
     found
 }
 
-/// The same in memory of the caller, who has the faces of all elements there. Gives how many at its beginning are of the
-/// boundary.
+/// The same in memory of the caller, who has the faces of all elements there. Gives how many at its beginning are of
+/// the boundary.
 pub(crate) fn boundary_in(found: &mut [[u32; 3]]) -> usize {
     heap_sort::sort(found, in_order);
     keep_single(found)
 }
 
-/// Puts the faces that come once, of faces with equal nodes side by side, to the beginning, and gives how many they are.
+/// Puts the faces that come once, of faces with equal nodes side by side, to the beginning, and gives how many they
+/// are.
 fn keep_single(found: &mut [[u32; 3]]) -> usize {
     let (mut at, mut kept) = (0, 0);
     while let Some(&face) = found.get(at) {

@@ -1,5 +1,6 @@
-//! What rounding leaves out of displacements is not lost, whatever takes the steps: a free body that drifts so slowly that
-//! its displacement has no smaller change in float32 arrives where it must. And what is wrong by rounding does not heat.
+//! What rounding leaves out of displacements is not lost, whatever takes the steps: a free body that drifts so slowly
+//! that its displacement has no smaller change in float32 arrives where it must. And what is wrong by rounding does not
+//! heat.
 
 use supple::adaptive::{Adaptive, Request};
 use supple::element::ElementMaterial;

@@ -62,8 +62,8 @@ pub struct Plan {
 
 impl Plan {
     /// A plan from names of cases and methods, and a mesh of the user's with its factor to metres; so many random
-    /// and ordinary scenes, and guards with `every`. All cases but [`cases::LONG`] if there are neither names nor a mesh, and all
-    /// methods if there are none.
+    /// and ordinary scenes, and guards with `every`. All cases but [`cases::LONG`] if there are neither names nor a
+    /// mesh, and all methods if there are none.
     pub fn new(
         cases: &[String],
         mesh: Option<(&Path, f64)>,
@@ -168,8 +168,8 @@ fn with_truth(mut spec: SceneSpec, folder: &Path) -> Result<(SceneSpec, Truth), 
     }
 }
 
-/// The first attempt whose truth moves by more than a millimetre and no farther than `farthest` (m), and neither diverges
-/// nor leaves the range of its law. None if ten do.
+/// The first attempt whose truth moves by more than a millimetre and no farther than `farthest` (m), and neither
+/// diverges nor leaves the range of its law. None if ten do.
 fn drawn(
     draw: impl Fn(u32) -> Result<SceneSpec, LabError>,
     farthest: f64,

@@ -1,6 +1,6 @@
 //! Ordinary scenes: an organ under gravity, a slow push, a pull, breathing, a tilted table, an instrument that presses.
-//! Soft tissue, moderate speeds, held faces. Nothing here is made to break a step, so that whoever doubts doubts without
-//! reason. The same number gives the same scene.
+//! Soft tissue, moderate speeds, held faces. Nothing here is made to break a step, so that whoever doubts doubts
+//! without reason. The same number gives the same scene.
 
 use glam::Vec3;
 use supple::contact::{Instrument, Pose, Shape};
