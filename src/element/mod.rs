@@ -19,26 +19,26 @@ mod patch_bounds;
 mod patch_builder;
 mod patch_deformation;
 mod patch_forces;
-mod patch_tile_bounds;
+mod patch_tangents;
 mod pressure;
 mod stiffness_bound;
 #[cfg(test)]
 mod stiffness_bound_tests;
 pub(crate) mod symmetric;
 mod tile;
-mod tile_bounds;
+mod tile_tangents;
 mod volume_check;
 
 pub use fields::ElementFields;
 pub use kernels::ElementLaw;
-pub(crate) use kernels::{ForcesVisitor, tile_bounds};
+pub(crate) use kernels::{ForcesVisitor, tangents};
 pub use node::{Axes, NodeInertia};
 pub use patch::{Neighbours, PatchLayout, PatchRow, PatchTile, Patches};
 pub(crate) use patch_bounds::PatchBounds;
 pub(crate) use patch_builder::PatchBuilder;
 pub use patch_builder::patch_rows_for;
 pub(crate) use patch_forces::PatchForces;
-pub(crate) use patch_tile_bounds::PatchTileBounds;
+pub(crate) use patch_tangents::PatchTangents;
 pub use tile::ElementTile;
 pub(crate) use tile::MOST_ELEMENTS;
 
@@ -51,8 +51,8 @@ pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, 
 pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes, VolumeRows};
 pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};
-pub(crate) use stiffness_bound::{MatrixSums, ScalarBound};
-pub(crate) use tile_bounds::{TileBounds, TileTangents};
+pub(crate) use stiffness_bound::ScalarBound;
+pub(crate) use tile_tangents::{ElementTangents, Tangent, TileTangents};
 pub(crate) use volume_check::{CHECK_CYCLE, VolumeCheck};
 
 use crate::material::Material;

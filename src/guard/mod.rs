@@ -51,7 +51,7 @@ const MOST_BEHIND: f64 = 2.0;
 /// Relative error of times that are sums of steps.
 const ROUNDING: f64 = 1e-4;
 
-pub(crate) const SECOND_RUN: Method<'static> = Method::Multilevel(Cells::Suggested);
+pub(crate) const SECOND_RUN: Method<'static> = Method::undamped(Cells::Suggested);
 
 /// Vectors of storage that a guard needs on a scene with these `points` (m).
 pub fn vectors_for<M: Material>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<usize, InertiaError> {

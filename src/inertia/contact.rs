@@ -1,8 +1,8 @@
-//! Instruments in mass-scaled, multilevel and damped steps. A push on a node moves it by its own inertia, and all nodes
-//! by the lattice's: `B = D^2 (M^-1 + W (S^-1 - G^-1) W^T)` with the inertia and the shares of this step (`super`). The
-//! pushes of the step before act as forces from the start, so a push that stays the same moves the lattice as any other
-//! force does; what remains to be found is their change ([`crate::contact::solve`]). The pushes are forces on the
-//! tissue and contain no inertia that the step adds.
+//! Instruments in long steps. A push on a node moves it by its own inertia, and all nodes by the lattice's:
+//! `B = D^2 (N^-1 + W S^-1 W^T)` with the inertia of this step (`super`). The pushes of the step before act as forces
+//! from the start, so a push that stays the same moves the lattice as any other force does; what remains to be found is
+//! their change ([`crate::contact::solve`]). The pushes are forces on the tissue and contain no inertia that the step
+//! adds.
 
 use glam::Vec3;
 
@@ -12,15 +12,13 @@ use super::large_step::Storage;
 use super::lattice::LatticeNode;
 use super::lattice::{CoarseVectors, MAX_FUNCTIONS, node_place, rank_of};
 use super::local_response::{ListedFunctions, LocalResponse, MOST_LISTED};
-use super::matrices::Matrices;
-use super::motion_pass::{RotationTable, rotation_table};
+use super::node::Scaling;
 use super::node_tables::NodeTables;
 use super::parts::NodeParts;
 use super::pass_input::{PassInput, ResidualFactors};
 use super::step::InertiaStep;
 use crate::contact::{Compliance, SolverRoom, Surface, TouchedPoint, directions, solve};
 use crate::element::{ElementMaterial, NodeInertia};
-use crate::padding;
 use crate::simd::NodeVector;
 use crate::step::{Threads, Totals, Trial};
 
@@ -29,11 +27,13 @@ struct StepCompliance<'a, 'm> {
     tables: &'a mut NodeTables<'m>,
     places: &'a [LatticeNode],
     inertia: &'a [NodeInertia],
-    rotations: &'a RotationTable,
+    /// With the scalar bounds of the nodes.
+    force: &'a [NodeVector],
+    scaling: &'a Scaling,
     /// `D^2` for forces, s^2.
     square: f32,
-    /// The lattice, its matrices and the shares of `S^-1` and `G^-1`, if it is in use.
-    lattice: Option<(CoarseSpace<'a>, &'a Matrices<'m>, [f32; 2])>,
+    /// The lattice and the share of `S^-1`, if it is in use.
+    lattice: Option<(CoarseSpace<'a, 'm>, f32)>,
     /// The functions that move the nodes, and the answer of the lattice between them, if they are few.
     listed: ListedFunctions,
     local: Option<LocalResponse<'a>>,
@@ -50,26 +50,15 @@ impl StepCompliance<'_, '_> {
 
     /// The motion of a node by its own inertia, m.
     fn own(&self, node: usize, force: Vec3) -> Vec3 {
-        let (rank, free) = (rank_of(self.places, node), self.free(node));
-        let row = |table: &[NodeVector]| row(table, rank);
-        let frame = padding::frame_of(row(self.tables.next_increment)[3]);
-        let rotation = self.rotations[frame.min(MAX_FUNCTIONS)].map(|[x, y, z, _]| Vec3::new(x, y, z));
-        let [x, y, z] = rotation;
-        let residual = free * force * self.square;
-        let turned = x * residual.x + y * residual.y + z * residual.z;
-        let [xx, yy, zz, _] = row(self.tables.inverse_diagonal);
-        let [xy, yz, zx, share] = row(self.tables.inverse_off_diagonal);
-        let moved = Vec3::new(
-            turned.dot(Vec3::new(xx, xy, zx)),
-            turned.dot(Vec3::new(xy, yy, yz)),
-            turned.dot(Vec3::new(zx, yz, zz)),
-        );
-        free * share * Vec3::new(x.dot(moved), y.dot(moved), z.dot(moved))
+        let closeness = row(self.tables.next_increment, rank_of(self.places, node))[3];
+        let mass = self.inertia.get(node).map_or(0.0, |inertia| inertia.mass);
+        let inertia = self.scaling.inertia(mass, closeness * row(self.force, node)[3]);
+        self.free(node) * force * (self.square / inertia)
     }
 
     /// Sums over the nodes of their vectors (N), for each function: kg m.
     fn add_sums(&self, points: &[TouchedPoint], mut sum: impl FnMut(usize, Vec3)) {
-        let Some((space, ..)) = &self.lattice else { return };
+        let Some((space, _)) = &self.lattice else { return };
         for touched in points {
             for (node, share) in touched.corners() {
                 let residual = self.free(node) * Vec3::from_array(touched.vector) * (share * self.square);
@@ -83,19 +72,19 @@ impl StepCompliance<'_, '_> {
 
     /// The motion of the lattice by the vectors of the nodes. None without one.
     fn coarse(&self, points: &[TouchedPoint]) -> Option<CoarseVectors> {
-        let (space, matrices, shares) = self.lattice.as_ref()?;
+        let (space, share) = self.lattice.as_ref()?;
         let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
         self.add_sums(points, |function, residual| {
             if let Some(NodeVector([x, y, z, _])) = sums.get_mut(function) {
                 (*x, *y, *z) = (*x + residual.x, *y + residual.y, *z + residual.z);
             }
         });
-        Some(space.response(matrices, &sums, self.listed.functions(), *shares))
+        Some(scaled(space.solved(&sums), *share))
     }
 
     /// The lattice's motion at a node, m, from that of its functions.
     fn at(&self, node: usize, moved: impl Fn(usize) -> Vec3) -> Vec3 {
-        let (Some((space, ..)), Some(place)) = (&self.lattice, node_place(self.places, node)) else {
+        let (Some((space, _)), Some(place)) = (&self.lattice, node_place(self.places, node)) else {
             return Vec3::ZERO;
         };
         let weights = space.lattice.weights(place).into_iter().filter(|each| each.0 < MAX_FUNCTIONS);
@@ -144,7 +133,7 @@ impl StepCompliance<'_, '_> {
 impl Compliance for StepCompliance<'_, '_> {
     fn apply(&mut self, nodes: &mut [TouchedPoint]) {
         self.sum_at_nodes(nodes);
-        let Some((space, ..)) = &self.lattice else { return self.replace(nodes, |_| Vec3::ZERO) };
+        let Some((_, share)) = self.lattice else { return self.replace(nodes, |_| Vec3::ZERO) };
         let Some(local) = &self.local else {
             let moved = self.coarse(nodes).unwrap_or([NodeVector::ZERO; _]);
             return self.replace(nodes, |function| moved.get(function).copied().unwrap_or_default().to_array().into());
@@ -155,9 +144,9 @@ impl Compliance for StepCompliance<'_, '_> {
                 *sum += residual;
             }
         });
-        local.answer(&mut sums, &self.listed, space);
+        local.answer(&mut sums);
         self.replace(nodes, |function| {
-            self.listed.place(function).and_then(|place| sums.get(place)).copied().unwrap_or_default()
+            share * self.listed.place(function).and_then(|place| sums.get(place)).copied().unwrap_or_default()
         });
     }
 }
@@ -174,18 +163,15 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             return;
         }
         let inertia = trial.scene.inertia;
-        let rotations = &rotation_table(&model.refresh.frames.of_bounds, model.refresh.frames.functions());
         let square = ResidualFactors::new(step, &model.scaling, trial.progress.steps == 0).square();
-        let space = CoarseSpace { lattice: &model.lattice, refresh: &model.refresh };
-        let lattice = response.map(|shares| (space, &*matrices, shares));
-        let SolverRoom { touched, local: room, sums } = trial.solver_room();
+        let space = CoarseSpace { lattice: &model.lattice, renewal: &model.renewal, matrices: &*matrices };
+        let lattice = response.map(|share| (space, share));
+        let (SolverRoom { touched, local: room, sums }, force) = trial.solver_room_and_forces();
         let listed = ListedFunctions::of(touched, places, &model.lattice);
-        let local = lattice
-            .as_ref()
-            .and_then(|(space, matrices, shares)| LocalResponse::gathered(room, &listed, space, matrices, *shares));
-        let surface = contact.surface();
+        let local = lattice.as_ref().and_then(|(space, _)| LocalResponse::gathered(room, &listed, space));
+        let (surface, scaling) = (contact.surface(), &model.scaling);
         let mut compliance =
-            StepCompliance { tables, places, inertia, rotations, square, lattice, listed, local, surface, sums };
+            StepCompliance { tables, places, inertia, force, scaling, square, lattice, listed, local, surface, sums };
         // What the lattice adds is nearly the same at all points of an instrument, and the scale only makes light and
         // heavy ones alike.
         let (mut instrument, mut coarse) = (u32::MAX, 0.0);
@@ -225,4 +211,10 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
 
 fn row(table: &[NodeVector], rank: usize) -> [f32; 4] {
     table.get(rank).copied().unwrap_or_default().0
+}
+
+/// Vectors times a factor.
+fn scaled(mut vectors: CoarseVectors, factor: f32) -> CoarseVectors {
+    vectors.iter_mut().flat_map(|vector| &mut vector.0).for_each(|value| *value *= factor);
+    vectors
 }

@@ -68,7 +68,7 @@ impl core::error::Error for DamperError {}
 /// A network that decides how much of the rough motion a step removes.
 #[derive(Clone, Debug)]
 pub struct Damper<'w> {
-    /// None would damp nothing, and never is: a test reads the built-in one.
+    /// None damps nothing.
     network: Option<Network<'w>>,
 }
 
@@ -80,6 +80,9 @@ struct Aligned<B: ?Sized>(B);
 static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!("../../weights/damper.weights"));
 
 impl Damper<'static> {
+    /// Damps nothing.
+    pub(super) const NONE: Self = Self { network: None };
+
     /// The library's own network, `weights/damper.weights`. It checks 1.2 kB at each call.
     #[must_use]
     pub fn built_in() -> Self {

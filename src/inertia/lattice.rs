@@ -7,9 +7,11 @@ use core::{array, fmt};
 
 use bytemuck::{Pod, Zeroable};
 
-use glam::{Mat3, Vec4};
+use glam::Vec4;
+
 
 use super::InertiaError;
+use super::frames::Matrix;
 use crate::element::NodeInertia;
 use crate::padding;
 use crate::simd::NodeVector;
@@ -32,6 +34,13 @@ pub struct Grid {
     pub cells: [u32; 3],
     /// Functions of the lattice, without those that supports or the body's shape leave almost no mass.
     pub functions: usize,
+}
+
+impl Grid {
+    /// Number of cells.
+    pub(super) fn cell_count(&self) -> usize {
+        self.cells.iter().fold(1, |product, &count| product.saturating_mul(count as usize))
+    }
 }
 
 impl fmt::Display for Grid {
@@ -82,11 +91,16 @@ impl LatticeNode {
     /// Weights of the functions at the eight corners of its cell.
     #[inline(always)]
     pub(super) fn eight_weights(&self) -> [f32; 8] {
-        let [x, y, z] = self.within;
-        let (nx, ny, nz) = (1.0 - x, 1.0 - y, 1.0 - z);
-        let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
-        [a * nz, b * nz, c * nz, d * nz, a * z, b * z, c * z, d * z]
+        eight_weights(self.within)
     }
+}
+
+/// Weights of the functions at the eight corners of a cell, at a position in it or beyond it.
+#[inline(always)]
+pub(super) fn eight_weights([x, y, z]: [f32; 3]) -> [f32; 8] {
+    let (nx, ny, nz) = (1.0 - x, 1.0 - y, 1.0 - z);
+    let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
+    [a * nz, b * nz, c * nz, d * nz, a * z, b * z, c * z, d * z]
 }
 
 /// The place of a node.
@@ -316,13 +330,29 @@ impl Lattice {
     /// up to one wherever no support holds them, and reproduce linear fields.
     pub(super) fn place(&self, point: [f32; 3]) -> LatticeNode {
         let mut position = [0.0; 3];
-        let mut indices = [0; 3];
         for axis in 0..3 {
             let (count, size) = (self.cells[axis] as f32, self.size[axis]);
             if size > 0.0 {
                 // Rounding may put the last node slightly outside the box.
                 position[axis] = ((point[axis] - self.low[axis]) / size * count).clamp(0.0, count);
             }
+        }
+        let cell = self.whole_cell(position);
+        let corner = self.cell_indices(cell).map(f32::from);
+        let within = [0, 1, 2].map(|axis| position[axis] - corner[axis]);
+        LatticeNode { within, cell: cell as u32, ..LatticeNode::default() }
+    }
+
+    /// The position of a place, in cells along each axis.
+    pub(super) fn position(&self, place: &LatticeNode) -> [f32; 3] {
+        let corner = self.cell_indices(place.cell()).map(f32::from);
+        [0, 1, 2].map(|axis| corner[axis] + place.within[axis])
+    }
+
+    /// The cell of a position (in cells along each axis), or the nearest one without empty corners.
+    pub(super) fn whole_cell(&self, position: [f32; 3]) -> usize {
+        let mut indices = [0; 3];
+        for axis in 0..3 {
             indices[axis] = (position[axis] as u32).min(self.cells[axis].saturating_sub(1)) as u8;
         }
         let mut cell = self.cell_index(indices);
@@ -340,22 +370,7 @@ impl Lattice {
                 }
             }
         }
-        let corner = self.cell_indices(cell).map(f32::from);
-        let within = [0, 1, 2].map(|axis| position[axis] - corner[axis]);
-        LatticeNode { within, cell: cell as u32, ..LatticeNode::default() }
-    }
-
-    /// The function whose frame a node uses: the one with the largest weight. [`MAX_FUNCTIONS`], a frame that does not
-    /// rotate, if some of the node's axes are held, because these do not rotate.
-    pub(super) fn frame(&self, place: &LatticeNode, inertia: &NodeInertia) -> usize {
-        let held = inertia.inverse.iter().filter(|&&inverse| inverse <= 0.0).count();
-        let (mut frame, mut most) = (MAX_FUNCTIONS, 0.0);
-        for (function, weight) in self.weights(place) {
-            if function < MAX_FUNCTIONS && weight > most && (held == 0 || held == 3) {
-                (frame, most) = (function, weight);
-            }
-        }
-        frame
+        cell
     }
 
     /// Lattice points at the corners of a cell.
@@ -373,24 +388,26 @@ impl Lattice {
 
     /// Indices of a cell along the axes.
     #[inline(always)]
-    pub(super) fn cell_indices(&self, cell: usize) -> [u8; 3] {
+    fn cell_indices(&self, cell: usize) -> [u8; 3] {
         self.indices_of_cell.get(cell).copied().unwrap_or_default()
     }
 
     /// Index of the cell with these indices along the axes.
     #[inline(always)]
-    pub(super) fn cell_index(&self, indices: [u8; 3]) -> usize {
+    fn cell_index(&self, indices: [u8; 3]) -> usize {
         let [i, j, k] = indices.map(usize::from);
         i + self.cells[0] as usize * (j + self.cells[1] as usize * k)
     }
 
-    /// The function of the point that is this far from the lowest corner of a cell; [`MAX_FUNCTIONS`] or more if there
-    /// is none.
+    /// The position of a place, with respect to some cell.
     #[inline(always)]
-    pub(super) fn function_at(&self, cell: [u8; 3], offset: [u8; 3]) -> usize {
-        let [x, y, _] = self.cells.map(|count| count as usize + 1);
-        let [i, j, k] = [0, 1, 2].map(|axis| usize::from(cell[axis]) + usize::from(offset[axis]));
-        self.function_of_point.get(i + x * (j + y * k)).copied().map_or(MAX_FUNCTIONS, usize::from)
+    pub(super) fn within(&self, cell: usize, place: &LatticeNode) -> [f32; 3] {
+        let (here, there) = (self.cell_indices(cell), self.cell_indices(place.cell()));
+        let mut within = place.within;
+        for axis in 0..3 {
+            within[axis] += f32::from(there[axis]) - f32::from(here[axis]);
+        }
+        within
     }
 
     /// Number of cells.
@@ -398,10 +415,10 @@ impl Lattice {
         self.cells.iter().map(|&count| count as usize).product()
     }
 
-    /// Largest strain of a cell for vectors of the functions (m), with the rotation of each function since rest. A
-    /// translation or a rotation is none.
-    pub(super) fn largest_strain(&self, vectors: &CoarseVectors, rotations: &[[[f32; 3]; 3]]) -> f32 {
-        let mut largest = 0.0;
+    /// The largest gradient of a cell for vectors of the functions (m), rotation included, and the largest strain, with
+    /// the rotation of each function since rest.
+    pub(super) fn largest_gradients(&self, vectors: &CoarseVectors, rotations: &[Matrix]) -> [f32; 2] {
+        let mut largest = [0.0; 2];
         let mut per_metre = [0.0; 3];
         for axis in 0..3 {
             if self.size[axis] > 0.0 {
@@ -433,29 +450,17 @@ impl Lattice {
                 let [x, y, z, _] = (per_metre[axis] * along[axis]).to_array();
                 gradient[axis] = (rows[0] * x + rows[1] * y + rows[2] * z).to_array();
             }
-            let mut square = 0.0;
+            let (mut whole, mut square) = (0.0, 0.0);
             for i in 0..3 {
                 for j in 0..3 {
                     let strain = 0.5 * (gradient[i][j] + gradient[j][i]);
                     square += strain * strain;
+                    whole += gradient[i][j] * gradient[i][j];
                 }
             }
-            largest = f32::max(largest, square);
+            largest = [f32::max(largest[0], whole), f32::max(largest[1], square)];
         }
-        libm::sqrtf(largest)
-    }
-
-    /// Largest rotation of neighbouring functions relative to each other, rad, with that of each function.
-    pub(super) fn largest_bending(&self, rotation: impl Fn(usize) -> Mat3) -> f32 {
-        let mut largest = 0.0;
-        self.for_each_edge(|a, b, _| {
-            if a < MAX_FUNCTIONS && b < MAX_FUNCTIONS {
-                let difference = rotation(a) - rotation(b);
-                let square = difference.to_cols_array().iter().map(|entry| entry * entry).sum::<f32>();
-                largest = f32::max(largest, 0.5 * square);
-            }
-        });
-        libm::sqrtf(largest)
+        largest.map(libm::sqrtf)
     }
 
     /// Calls `visit` with the functions at the ends of each edge, [`MAX_FUNCTIONS`] at a held end, and the edge's

@@ -1,4 +1,4 @@
-//! Which of the three methods a step beyond the critical one uses, the lattice it needs, and the storage for both.
+//! The lattice and the damper of a long step, and the storage that it needs.
 
 use crate::material::{Element, Material};
 use crate::scene::SceneView;
@@ -8,19 +8,12 @@ use super::damper::Damper;
 use super::lattice::{self, Grid, Lattice, LatticeNode};
 use super::{InertiaError, matrices, node_tables};
 
-/// A way to step beyond the critical step.
+/// How to step beyond the critical step: smooth motion keeps its true inertia through a coarse lattice, and a small
+/// network damps rough motion, which the lattice cannot represent.
 #[derive(Clone, Debug)]
-// A network's tables stand where the method stands: there is no heap to put them on.
-#[allow(clippy::large_enum_variant)]
-pub enum Method<'w> {
-    /// Mass scaling, for comparisons: inertia is raised where the step would be unstable.
-    MassScaled,
-    /// Multilevel inertia, for comparisons: the same, and smooth motion keeps its true inertia through a coarse
-    /// lattice.
-    Multilevel(Cells),
-    /// The damped step: the same, and a small network damps rough motion, which the lattice cannot represent. Mostly
-    /// [`Method::damped`]; with a [`Damper`] of a network of your own.
-    Damped(Damper<'w>, Cells),
+pub struct Method<'w> {
+    pub(super) damper: Damper<'w>,
+    pub(super) cells: Cells,
 }
 
 /// Cells of a lattice.
@@ -37,34 +30,30 @@ pub enum Cells {
 }
 
 impl Method<'static> {
-    /// The damped step with the library's own damper.
+    /// With the library's own damper.
     #[must_use]
     pub fn damped(cells: Cells) -> Self {
-        Self::Damped(Damper::built_in(), cells)
+        Self::with(Damper::built_in(), cells)
+    }
+}
+
+impl Method<'static> {
+    /// Without a damper.
+    pub(crate) const fn undamped(cells: Cells) -> Self {
+        Self { damper: Damper::NONE, cells }
     }
 }
 
 impl<'w> Method<'w> {
-    pub(super) const fn damper(&self) -> Option<&Damper<'w>> {
-        match self {
-            Self::Damped(damper, _) => Some(damper),
-            _ => None,
-        }
+    /// With a damper of a network of your own.
+    #[must_use]
+    pub const fn with(damper: Damper<'w>, cells: Cells) -> Self {
+        Self { damper, cells }
     }
 
-    pub(super) const fn cells(&self) -> Option<Cells> {
-        match self {
-            Self::MassScaled => None,
-            Self::Multilevel(cells) | Self::Damped(_, cells) => Some(*cells),
-        }
-    }
-
-    /// The lattice of the method on a scene with these `points` (m).
+    /// The lattice on a scene with these `points` (m).
     pub fn grid<M: Material>(&self, scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<Grid, InertiaError> {
-        match self {
-            Self::MassScaled => Ok(Grid::default()),
-            Self::Multilevel(cells) | Self::Damped(_, cells) => cells.grid(scene, points),
-        }
+        self.cells.grid(scene, points)
     }
 }
 
@@ -88,24 +77,23 @@ pub fn vectors_for<M: Material>(
     points: &[[f32; 3]],
 ) -> Result<usize, InertiaError> {
     let (nodes, elements, grid) = (scene.node_count(), scene.element_count(), method.grid(scene, points)?);
-    Ok(vectors_for_lattice(scene.element(), nodes, elements, grid, method.damper().is_some()))
+    Ok(vectors_for_lattice(scene.element(), nodes, elements, grid))
 }
 
 /// The same for this many nodes and elements and a known lattice.
 #[must_use]
-pub const fn vectors_for_lattice(element: Element, nodes: usize, elements: usize, grid: Grid, damped: bool) -> usize {
-    let tables = node_tables::vectors_for(nodes, damped);
-    if grid.functions == 0 {
-        return tables;
-    }
-    let [x, y, z] = grid.cells;
-    let cells = (x as usize).saturating_mul(y as usize).saturating_mul(z as usize);
-    let floats = matrices::floats_for(cells, grid.functions, element.is_nodal_strain());
-    let lists = vectors_of_places(nodes).saturating_add(vectors_of_order(element, elements));
-    tables.saturating_add(lists).saturating_add(floats.div_ceil(FLOATS))
+pub fn vectors_for_lattice(element: Element, nodes: usize, elements: usize, grid: Grid) -> usize {
+    let lists = node_tables::vectors_for(nodes).saturating_add(vectors_of_places(nodes));
+    lists.saturating_add(matrices::vectors_for(grid, pieces(element, nodes, elements)))
 }
 
-/// No fewer than the damped step needs with these cells on any scene of so many nodes and elements.
+/// Elements, and patches with nodal strain, of a scene, or more than that.
+pub(super) const fn pieces(element: Element, nodes: usize, elements: usize) -> [usize; 2] {
+    // Where tissues meet, a node has a patch of each; a tile of patches that there is no room for is not sampled.
+    [elements, if element.is_nodal_strain() { nodes.saturating_mul(2) } else { 0 }]
+}
+
+/// No fewer than are needed with these cells on any scene of so many nodes and elements.
 #[must_use]
 pub fn vectors_at_most(element: Element, nodes: usize, elements: usize, cells: Cells) -> usize {
     let grid = match cells {
@@ -121,7 +109,7 @@ pub fn vectors_at_most(element: Element, nodes: usize, elements: usize, cells: C
             Grid { cells: [lattice::MAX_POINTS as u32, 1, 1], functions }
         }
     };
-    vectors_for_lattice(element, nodes, elements, grid, true)
+    vectors_for_lattice(element, nodes, elements, grid)
 }
 
 /// Limit of the third power of the number of unknowns of a suggested lattice.
@@ -129,20 +117,12 @@ fn most_multiply_adds(elements: usize) -> u64 {
     (MULTIPLY_ADDS * elements as u64).max(FEW_MULTIPLY_ADDS)
 }
 
-/// Floats of a vector.
-const FLOATS: usize = size_of::<NodeVector>() / size_of::<f32>();
-
 /// Two places take the memory of three vectors.
 const _: () = assert!(3 * size_of::<NodeVector>() == 2 * size_of::<LatticeNode>());
 
 /// Vectors of storage for the places of this many nodes.
 pub(super) const fn vectors_of_places(nodes: usize) -> usize {
     3 * nodes.div_ceil(2)
-}
-
-/// Vectors of storage for the order of this many elements; patches with nodal strain have none.
-pub(super) const fn vectors_of_order(element: Element, elements: usize) -> usize {
-    if element.is_nodal_strain() { 0 } else { elements.div_ceil(FLOATS) }
 }
 
 /// Least spacing of the points of a suggested lattice, as a multiple of the nodes'.

@@ -80,33 +80,25 @@
 //! much inertia was added, and where; a [`crate::guard`] estimates the error. Memory: see [`vectors_for`].
 
 mod added_motion;
-mod assembly;
-#[cfg(test)]
-mod assembly_tests;
-mod cell_boxes;
+mod band;
 mod cells;
+mod clusters;
 mod coarse_motion;
+mod coarse_stiffness;
 mod contact;
 mod damper;
-mod dense;
-mod direct_assembly;
 mod frames;
-mod inversion;
 mod large_step;
 mod lattice;
 mod local_response;
 mod matrices;
 mod method;
 mod motion_pass;
-mod nodal_strain;
-mod nodal_sums;
 mod node;
-mod node_refresh;
 mod node_tables;
 mod parts;
 mod pass_input;
-mod projected_inertia;
-mod refresh;
+mod renewal;
 mod report;
 mod restriction_pass;
 mod shorten;
@@ -124,15 +116,11 @@ pub use report::Report;
 
 use core::fmt;
 
-/// `s` without a lattice: `NODE_GROWTH`, and as much again for changes of a bound's directions within a cycle.
-const FINE_WITHOUT_LATTICE: f32 = 1.1;
-/// `s` and `s_c` with a lattice.
+/// `s` and `s_c`.
 const FINE: f32 = 1.8;
 const COARSE: f32 = 2.8;
-/// Growth of the stiffness of a node above which the node is held back.
-const NODE_GROWTH: f32 = 1.05;
-/// The same for the lattice's motion: `NODE_GROWTH / FINE + COARSE_GROWTH / COARSE = 1`.
-const COARSE_GROWTH: f32 = COARSE * (1.0 - NODE_GROWTH / FINE);
+/// Growth of the stiffness of a cell's nodes since `S` was computed, at which it is computed anew.
+const COARSE_GROWTH: f32 = 1.1;
 /// Largest distance by which a node's force may move it in one step from rest, as a part of the least height of its
 /// elements.
 const LARGEST_MOVE: f32 = 0.02;
@@ -140,23 +128,12 @@ const LARGEST_MOVE: f32 = 0.02;
 const LARGEST_STRAIN: f32 = 0.1;
 /// The same with nodal strain, whose critical step is half as long again: strains of a step grow with its square.
 const LARGEST_STRAIN_OF_PATCHES: f32 = 0.2;
-/// Share of the last increment's unresolved deformation of the lattice that a step removes where a step renews all
-/// bounds, and the largest share.
-const DRAG_AT_WHOLE_CYCLES: f32 = 0.02;
+/// Share of the last increment's unresolved deformation of the lattice that a step removes where the stiffness changes
+/// as much as it may in one step, and the largest share.
+const DRAG_AT_LARGEST_CHANGE: f32 = 0.02;
 const LARGEST_DRAG: f32 = 0.27;
 /// The same for each multiple of the mass that is added, which grows with the square of the step.
 const DRAG_OF_ADDED: f32 = 4e-5;
-/// Largest growth, from step to step, of the share of its motion that a held-back node may use.
-const RECOVERY: f32 = 1.05;
-/// Least share, so that it can grow again.
-const LEAST_SHARE: f32 = 1e-6;
-/// Largest time of a refresh cycle without a lattice, s: short compared with the motions of hands and breathing, which
-/// stiffen and rotate tissue.
-const CYCLE: f32 = 0.04;
-/// Limits of the largest number of steps of a cycle.
-const CYCLE_STEPS: (u32, u32) = (4, 64);
-/// The same with a lattice, which shows how fast the tissue deforms.
-const LATTICE_CYCLE_STEPS: u32 = 256;
 
 /// Why a step beyond the critical one could not be prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -185,6 +162,11 @@ pub enum InertiaError {
     Singular {
         /// Cells along x, y, z.
         cells: [u32; 3],
+    },
+    /// A mesh is too small for a lattice of one cell.
+    TooSmall {
+        /// Its nodes.
+        nodes: usize,
     },
     /// Not as many points as the scene has nodes.
     Points {
@@ -229,6 +211,9 @@ impl fmt::Display for InertiaError {
                 f,
                 "a lattice of {x} x {y} x {z} cells is too fine for this mesh and step: its inertia cannot be inverted"
             ),
+            Self::TooSmall { nodes } => {
+                write!(f, "a mesh of {nodes} nodes is too small for long steps: take exact ones")
+            }
             Self::Points { points, nodes } => {
                 write!(f, "{points} points for a scene of {nodes} nodes")
             }

@@ -1,5 +1,5 @@
-//! What the passes over the nodes of a step read: values of a vector of nodes, their residual and momentum. With a
-//! lattice the nodes are taken in the order of its cells, else in that of the scene.
+//! What the passes over the nodes of a step read: values of a vector of nodes, their residual and momentum. The nodes are
+//! taken in the order of the lattice's cells.
 
 use bytemuck::must_cast_slice;
 
@@ -49,7 +49,6 @@ pub(super) struct PassInput<'a> {
     pub(super) residual: ResidualFactors,
     pub(super) inertia: &'a [NodeInertia],
     pub(super) increment: &'a [NodeVector],
-    /// Empty without a lattice.
     pub(super) places: &'a [LatticeNode],
 }
 
@@ -96,13 +95,6 @@ impl PassInput<'_> {
         let ResidualFactors { square, loss } = self.residual;
         let (square, loss) = (R::splat(square), R::splat(loss) * mass);
         [free[0] * (square * fx - loss * vx), free[1] * (square * fy - loss * vy), free[2] * (square * fz - loss * vz)]
-    }
-
-    /// The inverse of the growth of the bound, with the mass added to both, because growth below the mass is harmless.
-    #[inline(always)]
-    pub(super) fn inverse_growth<R: Real>(&self, nodes: &NodeValues<R>, bound_before: R) -> R {
-        let weight = R::splat(self.scaling.weight);
-        (nodes.mass + weight * bound_before).divide(nodes.mass + weight * nodes.bound)
     }
 }
 

@@ -12,7 +12,7 @@
 
 use glam::{Mat3, Vec3, Vec4};
 
-use super::dense::{apply_to_axes, from_components, invert, row_length, to_components};
+use super::band::{Band, Row, factorise, solve};
 use super::frames::Frames;
 use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
 use crate::simd::NodeVector;
@@ -21,14 +21,12 @@ use crate::simd::NodeVector;
 /// consequence.
 const ANCHOR: f32 = 1e-3;
 
-/// Computes the inverse of the matrix of the least squares, with one unknown a function. Gives whether it could be
-/// inverted.
-pub(super) fn invert_edges(matrix: &mut [f32], lattice: &Lattice) -> bool {
-    let functions = lattice.functions();
-    let length = row_length(functions);
-    matrix.fill(0.0);
+/// Computes the factor of the matrix of the least squares, with one unknown a function. Gives whether it could be
+/// factorised.
+pub(super) fn factorise_edges(band: &Band, matrix: &mut [f32], scratch: &mut [f32], lattice: &Lattice) -> bool {
+    band.clear(matrix);
     let mut add = |row: usize, column: usize, value: f32| {
-        if let Some(entry) = matrix.get_mut(row * length + column).filter(|_| row < MAX_FUNCTIONS) {
+        if let Some(entry) = matrix.get_mut(band.at(row, column)).filter(|_| row < MAX_FUNCTIONS) {
             *entry += value;
         }
     };
@@ -39,11 +37,17 @@ pub(super) fn invert_edges(matrix: &mut [f32], lattice: &Lattice) -> bool {
             add(a.max(b), a.min(b), -weight);
         }
     });
-    invert(matrix, functions, length)
+    factorise(band, matrix, scratch)
 }
 
 /// `w` from the lattice's part `c` of the last increment, m.
-pub(super) fn turned_part(c: &CoarseVectors, lattice: &Lattice, frames: &Frames, inverse: &[f32]) -> CoarseVectors {
+pub(super) fn turned_part(
+    c: &CoarseVectors,
+    lattice: &Lattice,
+    frames: &Frames,
+    band: &Band,
+    factor: &[f32],
+) -> CoarseVectors {
     let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
     let at = |function: usize| c.get(function).map_or(Vec3::ZERO, |c| Vec4::from(c.0).truncate());
     lattice.for_each_edge(|a, b, weight| {
@@ -57,8 +61,15 @@ pub(super) fn turned_part(c: &CoarseVectors, lattice: &Lattice, frames: &Frames,
             }
         }
     });
-    let mut components = to_components(&sums);
-    apply_to_axes(inverse, lattice.functions(), &mut components);
-    from_components(&components, &mut sums);
+    let mut rows: [Row; 3] = [[0.0; _]; 3];
+    for (axis, row) in rows.iter_mut().enumerate() {
+        row.iter_mut().zip(&sums).take(lattice.functions()).for_each(|(value, sum)| *value = sum.0[axis]);
+    }
+    let [x, y, z] = &mut rows;
+    solve(band, factor, [x, y, z]);
+    for (function, sum) in sums.iter_mut().enumerate().take(lattice.functions()) {
+        let at = |row: &Row| row.get(function).copied().unwrap_or_default();
+        sum.0 = [at(&rows[0]), at(&rows[1]), at(&rows[2]), 0.0];
+    }
     sums
 }

@@ -1,0 +1,195 @@
+//! The coarse stiffness (kg, with the factor `s_c D^2 / 4`) from the tangents of a body and the moments of its clusters
+//! (`clusters.rs`): with the images `f = F^-T` of material gradients, and the factors `alpha`, `beta`, `gamma` of a
+//! tangent ([`crate::element::Tangent`], `src/element/stiffness_bound.rs`),
+//!
+//! ```text
+//! T[iI,jJ]   = V_cl / V_sampled sum_sampled (alpha (f^T f)_IJ d_ij + beta f_iI f_jJ + gamma f_jI f_iJ)
+//! Kc[ci,dj]  = sum_clusters sum_IJ T[iI,jJ] Q[c,d,I,J]
+//! ```
+//! That is `W^T K W` for the bounds of the tangents where they are the same in a whole cluster, and zero for rotations
+//! of tissue without tension. Crushed pieces have `d_IJ` in place of `f^T f`, and `C` in place of `F^-T`.
+
+use glam::Vec4;
+
+use super::clusters::{Cluster, Clusters, PAIRS, PairMatrices, clusters_of, for_each_pair};
+use crate::element::Tangent;
+use crate::simd::{Kernel, Real, dispatch};
+
+/// Entries of a lower triangle of nine rows, in whole vectors of four: `Vec4` number [`FIRST`]`[row] + column / 4`.
+const QUARTERS: usize = 18;
+/// The first vector of each row.
+const FIRST: [usize; 9] = [0, 1, 2, 3, 4, 6, 8, 10, 12];
+
+/// `T` of a cluster, entry `9 (3 i + I) + 3 j + J`.
+pub(super) type ClusterTangent = [f32; 81];
+
+/// Sums over the pieces of a cluster.
+#[derive(Clone, Copy)]
+struct Sums {
+    /// `beta f f^T` and `gamma f f^T`, with `f` as a vector of nine, entry `3 I + i`.
+    outer: [Vec4; QUARTERS],
+    exchanged: [Vec4; QUARTERS],
+    /// `alpha f^T f`.
+    inner: [f32; 6],
+}
+
+impl Sums {
+    const NONE: Self = Self { outer: [Vec4::ZERO; QUARTERS], exchanged: [Vec4::ZERO; QUARTERS], inner: [0.0; 6] };
+
+    #[inline(always)]
+    fn add(&mut self, tangent: &Tangent) {
+        let [x, y, z] = tangent.columns.map(|[x, y, z, _]| [x, y, z]);
+        let f = [x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]];
+        let vectors = [
+            Vec4::new(x[0], x[1], x[2], y[0]),
+            Vec4::new(y[1], y[2], z[0], z[1]),
+            Vec4::new(z[2], 0.0, 0.0, 0.0),
+        ];
+        let [inner, outer, exchanged, is_spatial] = tangent.factors;
+        for row in 0..9 {
+            let (a, b) = (outer * f[row], exchanged * f[row]);
+            for vector in 0..=row / 4 {
+                self.outer[FIRST[row] + vector] += a * vectors[vector];
+                self.exchanged[FIRST[row] + vector] += b * vectors[vector];
+            }
+        }
+        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let products = if is_spatial > 0.0 {
+            [dot(x, x), dot(y, x), dot(y, y), dot(z, x), dot(z, y), dot(z, z)]
+        } else {
+            [1.0, 0.0, 1.0, 0.0, 0.0, 1.0]
+        };
+        for (sum, product) in self.inner.iter_mut().zip(products) {
+            *sum += inner * product;
+        }
+    }
+
+    /// `T`, with a factor.
+    fn tangent(&self, factor: f32) -> ClusterTangent {
+        let of = |sums: &[Vec4; QUARTERS], a: usize, b: usize| {
+            let (row, column) = (a.max(b), a.min(b));
+            sums[FIRST[row] + column / 4].to_array()[column % 4]
+        };
+        let mut tangent = [0.0; 81];
+        for (large_i, large_j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            let (row, column) = (large_i.max(large_j), large_i.min(large_j));
+            let inner = self.inner[row * (row + 1) / 2 + column];
+            for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+                let outer = of(&self.outer, 3 * large_i + i, 3 * large_j + j);
+                let exchanged = of(&self.exchanged, 3 * large_i + j, 3 * large_j + i);
+                let whole = outer + exchanged + if i == j { inner } else { 0.0 };
+                tangent[9 * (3 * i + large_i) + 3 * j + large_j] = factor * whole;
+            }
+        }
+        tangent
+    }
+}
+
+/// `T` of a cluster, from the tangents of the sampled pieces.
+pub(super) fn tangent_of(cluster: &Cluster, members: &[u32], tangents: &[Tangent]) -> ClusterTangent {
+    let mut sums = Sums::NONE;
+    for &member in members.get(cluster.members()).unwrap_or_default() {
+        if let Some(tangent) = tangents.get(member as usize) {
+            sums.add(tangent);
+        }
+    }
+    sums.tangent(cluster.factor())
+}
+
+/// Writes the matrices of a cell, from the tangents and moments of the clusters.
+pub(super) fn write_cell(clusters: &Clusters<'_>, tangents: &[ClusterTangent], cell: usize, matrices: &mut PairMatrices) {
+    *matrices = PairMatrices::ZERO;
+    let head = clusters.heads.get(cell).copied().unwrap_or_default();
+    for (index, cluster) in clusters_of(clusters.all, head) {
+        let moments = clusters.moments.get(cluster.sets()).unwrap_or_default();
+        if let Some(tangent) = tangents.get(index) {
+            dispatch(Contract { tangent, moments, matrices });
+        }
+    }
+}
+
+/// Adds `sum_IJ T[iI,jJ] Q[c,d,I,J]` for all pairs.
+struct Contract<'a> {
+    tangent: &'a ClusterTangent,
+    /// One set, or one for each pair of axes.
+    moments: &'a [PairMatrices],
+    matrices: &'a mut PairMatrices,
+}
+
+impl Kernel for Contract<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<R: Real>(self) {
+        let Self { tangent, moments, matrices } = self;
+        match moments {
+            [] => {}
+            [one] => contract::<R::Width8>(tangent, one, matrices, 0..9),
+            each => {
+                for (entry, moments) in each.iter().enumerate() {
+                    contract::<R::Width8>(tangent, moments, matrices, entry..entry + 1);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn contract<R: Real>(
+    tangent: &ClusterTangent,
+    PairMatrices(moments): &PairMatrices,
+    PairMatrices(matrices): &mut PairMatrices,
+    entries: core::ops::Range<usize>,
+) {
+    for (moments, matrices) in moments.iter().zip(matrices) {
+        let mut of = [R::splat(0.0); 9];
+        for (of, moments) in of.iter_mut().zip(moments) {
+            *of = R::from_fn(|lane| moments[lane % 8]);
+        }
+        for entry in entries.clone() {
+            let (i, j) = (entry / 3, entry % 3);
+            let Some(sums) = matrices.get_mut(entry) else { return };
+            let mut sum = R::from_fn(|lane| sums[lane % 8]);
+            for (large, of) in of.iter().enumerate() {
+                let factor = tangent[(9 * (3 * i + large / 3) + 3 * j + large % 3) % 81];
+                sum = R::splat(factor).fused(*of, sum);
+            }
+            for (lane, value) in sums.iter_mut().enumerate() {
+                *value = sum.lane(lane);
+            }
+        }
+    }
+}
+
+/// A symmetric matrix of the eight functions of a cell for each axis, the fourth component unused.
+pub(super) type AxisMatrices = [[f32; 4]; PAIRS];
+
+/// Calls `add` with row, column and value of the entries of a cell's matrices on and below the diagonal of the matrix of
+/// all unknowns, three for each function. `more` are matrices for each axis.
+#[inline(always)]
+pub(super) fn for_each_entry(
+    matrices: &PairMatrices,
+    more: &AxisMatrices,
+    functions: [usize; 8],
+    count: usize,
+    mut add: impl FnMut(usize, usize, f32),
+) {
+    for_each_pair(|pair, c, d| {
+        let (first, second) = (functions[c], functions[d]);
+        if first >= count || second >= count {
+            return;
+        }
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            let more = if i == j { more[pair % PAIRS][i] } else { 0.0 };
+            let value = matrices.entry(pair, 3 * i + j) + more;
+            let (row, column) = (3 * first + i, 3 * second + j);
+            if first == second {
+                if j <= i {
+                    add(row, column, value);
+                }
+            } else {
+                add(row.max(column), row.min(column), value);
+            }
+        }
+    });
+}
