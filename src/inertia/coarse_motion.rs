@@ -9,6 +9,7 @@ use super::matrices::{Matrices, from_components, to_components};
 use super::renewal::Renewal;
 use super::supports::Pull;
 use super::transport::turned_part;
+use super::LEAST_DRAG;
 use crate::simd::NodeVector;
 
 /// Share of the strain rates that a step removes where only this share of the kinetic energy can have come from the
@@ -88,32 +89,27 @@ impl CoarseMotion<'_, '_> {
     /// The lattice's motion from the residual `g = W^T r`:
     ///
     /// ```text
-    /// share Z (g - M w) + p + w - (removed T + drag T^2) c        M = (1 + k) Mc + E,  T = S^-1 A = 1 - S^-1 M
+    /// share S^-1 (g - M w) + p + w - (removed T + drag T^2) c        M = (1 + k) Mc + E,  T = S^-1 A = 1 - S^-1 M
     /// ```
-    /// with `Z` of second order (`damper.rs`), the rotation `w` of the velocities (`transport.rs`), and `p = -S^-1 A_s d`
-    /// from the supports. Reduces the share if the forces of one step would strain a cell by more than
-    /// `largest_strain`.
+    /// with the rotation `w` of the velocities (`transport.rs`), and `p = -S^-1 A_s d` from the supports. Reduces the
+    /// share if the forces of one step would strain a cell by more than `largest_strain`.
     pub(super) fn compute(&self, forces: &CoarseVectors) -> MotionResult {
         let CoarseSpace { lattice, renewal, .. } = self.space;
         let mut given = self.turned();
         let forces = minus(forces, &self.space.times_inertia(&given));
         let pulled = self.supports.map(|pull| self.add_pulled(pull, &mut given));
         let last = self.smooth.copied().unwrap_or([NodeVector::ZERO; _]);
-        let [answer, kept] = self.space.both_solved([&forces, &self.space.times_inertia(&last)]);
-        let strained = minus(&last, &kept);
-        // `A S^-1 g` as `g - M S^-1 g`: where elements are crushed `A` is so large that products with it overflow.
-        let passed = minus(&forces, &self.space.times_inertia(&answer));
-        let [passed, kept] = self.space.both_solved([&passed, &self.space.times_inertia(&strained)]);
-        let twice = minus(&strained, &kept);
-        let more = self.space.solved(&self.space.times_inertia(&passed));
-        let mut solution = answer;
-        for (solution, more) in solution.iter_mut().zip(&more) {
-            solution.0 = (Vec4::from(solution.0) + Vec4::from(more.0)).to_array();
-        }
+        let [mut solution, kept] = self.space.both_solved([&forces, &self.space.times_inertia(&last)]);
+        let (strained, drag) = (minus(&last, &kept), renewal.drag());
+        let twice = if drag > LEAST_DRAG {
+            minus(&strained, &self.space.solved(&self.space.times_inertia(&strained)))
+        } else {
+            [NodeVector::ZERO; _]
+        };
         let rotations = renewal.frames.since_rest();
         let [_, strain] = lattice.largest_gradients(&solution, rotations);
         let share = if strain > self.largest_strain { self.largest_strain / strain } else { 1.0 };
-        let (removed, drag) = (removed_share(share.min(self.allowed)), renewal.drag());
+        let removed = removed_share(share.min(self.allowed));
         for ((solution, given), (strained, twice)) in solution.iter_mut().zip(&given).zip(strained.iter().zip(&twice)) {
             let [answer, given, strained, twice] =
                 [*solution, *given, *strained, *twice].map(|vector| Vec4::from(vector.0));

@@ -1,6 +1,7 @@
 //! The matrices of a lattice (kg, factors of them) and the sums of its cells, in the caller's storage.
 
 use bytemuck::{AnyBitPattern, NoUninit, cast_slice_mut};
+use glam::Vec4;
 
 use super::band::{Band, Row, factorise, solve};
 use super::cells::CellPolynomial;
@@ -93,7 +94,8 @@ pub(super) fn vectors_for(grid: Grid, pieces: [usize; 2]) -> usize {
 /// Takes `count` values.
 fn take<'a, T: AnyBitPattern + NoUninit>(from: &mut &'a mut [NodeVector], count: usize) -> Option<&'a mut [T]> {
     let vectors = from.split_off_mut(..vectors_of::<T>(count))?;
-    cast_slice_mut::<f32, T>(cast_slice_mut(vectors)).get_mut(..count)
+    let floats: &mut [f32] = cast_slice_mut(vectors);
+    Some(cast_slice_mut(floats.get_mut(..count * (size_of::<T>() / size_of::<f32>()))?))
 }
 
 impl<'a> Matrices<'a> {
@@ -181,20 +183,17 @@ impl<'a> Matrices<'a> {
         let mut out = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
         for (cell, matrices) in self.inertia.iter().enumerate() {
             let functions = lattice.functions_of(cell);
-            let at = functions.map(|function| x.get(function).copied().unwrap_or_default().0);
-            let mut sums = [[0.0f32; 4]; 8];
-            for_each_pair(|pair, c, d| {
-                let matrix = &matrices[pair % matrices.len()];
-                for axis in 0..4 {
-                    sums[c][axis] += matrix[axis] * at[d][axis];
-                    if c != d {
-                        sums[d][axis] += matrix[axis] * at[c][axis];
-                    }
+            let mut at = [Vec4::ZERO; 8];
+            for (at, &function) in at.iter_mut().zip(&functions) {
+                *at = x.get(function).map_or(Vec4::ZERO, |x| Vec4::from(x.0));
+            }
+            for (&function, pairs) in functions.iter().zip(&PAIR_OF) {
+                let mut sum = Vec4::ZERO;
+                for (&at, &pair) in at.iter().zip(pairs) {
+                    sum += Vec4::from(matrices[pair]) * at;
                 }
-            });
-            for (function, sum) in functions.into_iter().zip(sums) {
                 if let Some(NodeVector(out)) = out.get_mut(function).filter(|_| function < lattice.functions()) {
-                    out.iter_mut().zip(sum).for_each(|(out, sum)| *out += sum);
+                    *out = (Vec4::from(*out) + sum).to_array();
                 }
             }
         }
@@ -217,6 +216,21 @@ impl<'a> Matrices<'a> {
         }
     }
 }
+
+/// The pair of two of the eight functions of a cell.
+const PAIR_OF: [[usize; 8]; 8] = {
+    let mut pairs = [[0; 8]; 8];
+    let mut c = 0;
+    while c < 8 {
+        let mut d = 0;
+        while d < 8 {
+            pairs[c][d] = if c >= d { c * (c + 1) / 2 + d } else { d * (d + 1) / 2 + c };
+            d += 1;
+        }
+        c += 1;
+    }
+    pairs
+};
 
 /// Adds a node's value (kg) for each axis times the products of its weights.
 #[inline(always)]

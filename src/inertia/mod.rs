@@ -132,6 +132,8 @@ const LARGEST_STRAIN_OF_PATCHES: f32 = 0.2;
 /// as much as it may in one step, and the largest share.
 const DRAG_AT_LARGEST_CHANGE: f32 = 0.02;
 const LARGEST_DRAG: f32 = 0.27;
+/// Less drag is left out.
+const LEAST_DRAG: f32 = 0.01;
 /// The same for each multiple of the mass that is added, which grows with the square of the step.
 const DRAG_OF_ADDED: f32 = 4e-5;
 

@@ -21,7 +21,7 @@ use crate::step::threads::take;
 use crate::step::{Threads, internal_forces};
 
 /// Change of the lattice's gradient within which `S` is used.
-const LARGEST_CHANGE: f32 = 0.05;
+const LARGEST_CHANGE: f32 = 0.08;
 
 /// Change of the lattice's shape in one step at which drag is full, for tissue that is as stiff in volume as in shear.
 const LARGEST_CHANGE_OF_STEP: f32 = 0.8;
