@@ -24,12 +24,10 @@ use super::lattice::{Lattice, LatticeNode, eight_weights, node_place};
 
 /// Pairs of the eight functions of a cell, the first not before the second.
 pub(super) const PAIRS: usize = 36;
-/// Entries of the 3 x 3 matrices of all pairs: entry `9 pair + 3 i + j` in vectors of eight pairs.
-pub(super) const PAIR_FLOATS: usize = 9 * 8 * PAIRS.div_ceil(8);
 /// Sets of moments of a cluster with nodes that are held along some axes only: one for each pair of axes.
 const SETS_OF_AXES: usize = 9;
 
-/// The entries of all pairs.
+/// The entries `3 i + j` of the 3 x 3 matrices of all pairs, in vectors of eight pairs.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(transparent)]
 pub(super) struct PairMatrices(pub(super) [[[f32; 8]; 9]; PAIRS.div_ceil(8)]);
@@ -37,10 +35,10 @@ pub(super) struct PairMatrices(pub(super) [[[f32; 8]; 9]; PAIRS.div_ceil(8)]);
 impl PairMatrices {
     pub(super) const ZERO: Self = Self([[[0.0; 8]; 9]; PAIRS.div_ceil(8)]);
 
-    /// Entry `3 i + j` of a pair.
+    /// The entries of a pair.
     #[inline(always)]
-    pub(super) fn entry(&self, pair: usize, entry: usize) -> f32 {
-        self.0[pair / 8 % PAIRS.div_ceil(8)][entry % 9][pair % 8]
+    pub(super) fn of_pair(&self, pair: usize) -> [f32; 9] {
+        self.0[pair / 8 % PAIRS.div_ceil(8)].map(|entries| entries[pair % 8])
     }
 
     fn add(&mut self, pair: usize, entry: usize, value: f32) {
@@ -132,7 +130,7 @@ const CLUSTERS: [usize; 2] = [3, 16];
 /// Room for moments.
 const SETS: [usize; 2] = [5, 48];
 /// Room for sampled tiles.
-const TILES: [usize; 2] = [4, 96];
+const TILES: [usize; 2] = [2, 32];
 
 /// How much of each there can be.
 #[derive(Clone, Copy, Debug)]

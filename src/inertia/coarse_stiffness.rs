@@ -11,6 +11,7 @@
 
 use glam::Vec4;
 
+use super::band::Band;
 use super::clusters::{Cluster, Clusters, PAIRS, PairMatrices, clusters_of, for_each_pair};
 use crate::element::Tangent;
 use crate::simd::{Kernel, Real, dispatch};
@@ -134,6 +135,9 @@ impl Kernel for Contract<'_> {
     }
 }
 
+/// Vectors of eight pairs.
+const VECTORS: usize = PAIRS.div_ceil(8);
+
 #[inline(always)]
 fn contract<R: Real>(
     tangent: &ClusterTangent,
@@ -141,20 +145,20 @@ fn contract<R: Real>(
     PairMatrices(matrices): &mut PairMatrices,
     entries: core::ops::Range<usize>,
 ) {
-    for (moments, matrices) in moments.iter().zip(matrices) {
-        let mut of = [R::splat(0.0); 9];
-        for (of, moments) in of.iter_mut().zip(moments) {
-            *of = R::from_fn(|lane| moments[lane % 8]);
+    for entry in entries {
+        let (i, j) = (entry / 3 % 3, entry % 3);
+        let mut sums = [R::splat(0.0); VECTORS];
+        for (sum, matrices) in sums.iter_mut().zip(&*matrices) {
+            *sum = R::from_fn(|lane| matrices[entry % 9][lane % 8]);
         }
-        for entry in entries.clone() {
-            let (i, j) = (entry / 3, entry % 3);
-            let Some(sums) = matrices.get_mut(entry) else { return };
-            let mut sum = R::from_fn(|lane| sums[lane % 8]);
-            for (large, of) in of.iter().enumerate() {
-                let factor = tangent[(9 * (3 * i + large / 3) + 3 * j + large % 3) % 81];
-                sum = R::splat(factor).fused(*of, sum);
+        for large in 0..9 {
+            let factor = R::splat(tangent[9 * (3 * i + large / 3) + 3 * j + large % 3]);
+            for (sum, moments) in sums.iter_mut().zip(moments) {
+                *sum = factor.fused(R::from_fn(|lane| moments[large][lane % 8]), *sum);
             }
-            for (lane, value) in sums.iter_mut().enumerate() {
+        }
+        for (sum, matrices) in sums.iter().zip(&mut *matrices) {
+            for (lane, value) in matrices[entry % 9].iter_mut().enumerate() {
                 *value = sum.lane(lane);
             }
         }
@@ -164,32 +168,31 @@ fn contract<R: Real>(
 /// A symmetric matrix of the eight functions of a cell for each axis, the fourth component unused.
 pub(super) type AxisMatrices = [[f32; 4]; PAIRS];
 
-/// Calls `add` with row, column and value of the entries of a cell's matrices on and below the diagonal of the matrix of
-/// all unknowns, three for each function. `more` are matrices for each axis.
-#[inline(always)]
-pub(super) fn for_each_entry(
+/// Adds a cell's matrices to the lower triangle of the matrix of all unknowns, three for each function. `more` are
+/// matrices for each axis.
+pub(super) fn add_cell(
+    band: &Band,
+    sum: &mut [f32],
     matrices: &PairMatrices,
     more: &AxisMatrices,
     functions: [usize; 8],
     count: usize,
-    mut add: impl FnMut(usize, usize, f32),
 ) {
     for_each_pair(|pair, c, d| {
         let (first, second) = (functions[c], functions[d]);
         if first >= count || second >= count {
             return;
         }
-        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
-            let more = if i == j { more[pair % PAIRS][i] } else { 0.0 };
-            let value = matrices.entry(pair, 3 * i + j) + more;
-            let (row, column) = (3 * first + i, 3 * second + j);
-            if first == second {
-                if j <= i {
-                    add(row, column, value);
-                }
-            } else {
-                add(row.max(column), row.min(column), value);
-            }
+        let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = matrices.of_pair(pair);
+        let [x, y, z, _] = more[pair % PAIRS];
+        let rows = [[xx + x, xy, xz], [yx, yy + y, yz], [zx, zy, zz + z]];
+        let columns = [[xx + x, yx, zx], [xy, yy + y, zy], [xz, yz, zz + z]];
+        let (high, low, rows) = if first >= second { (first, second, rows) } else { (second, first, columns) };
+        for (axis, row) in rows.into_iter().enumerate() {
+            let at = band.at(3 * high + axis, 3 * low);
+            let entries = if high == low { axis + 1 } else { 3 };
+            let places = sum.get_mut(at..at + entries).unwrap_or_default();
+            places.iter_mut().zip(row).for_each(|(place, value)| *place += value);
         }
     });
 }

@@ -5,7 +5,7 @@
 
 use super::band::factorise;
 use super::cells::CellPolynomial;
-use super::coarse_stiffness::{for_each_entry, tangent_of, write_cell};
+use super::coarse_stiffness::{add_cell, tangent_of, write_cell};
 use super::frames::Frames;
 use super::lattice::{Lattice, LatticeNode, node_at};
 use super::matrices::{Bands, Matrices, add_node, fill_held_axes};
@@ -149,11 +149,7 @@ impl Renewal {
             for (sums, stiffness) in constant.iter_mut().zip(stabilising.get(cell).into_iter().flatten()) {
                 sums.iter_mut().zip(stiffness).for_each(|(sum, each)| *sum += input.scaling.coarse_weight * each);
             }
-            for_each_entry(stiffness, &constant, lattice.functions_of(cell), lattice.functions(), |row, column, value| {
-                if let Some(entry) = factor.get_mut(band.at(row, column)) {
-                    *entry += value;
-                }
-            });
+            add_cell(band, factor, stiffness, &constant, lattice.functions_of(cell), lattice.functions());
         }
         self.lattice_in_use = factorise(band, factor, scratch);
         self.changed = 0.0;
