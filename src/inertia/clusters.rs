@@ -125,11 +125,11 @@ pub(super) struct Clusters<'a> {
     pub(super) members: &'a mut [u32],
 }
 
-/// Room for clusters, for each cell and further ones.
-const CLUSTERS: [usize; 2] = [3, 16];
-/// Room for moments.
-const SETS: [usize; 2] = [5, 48];
-/// Room for sampled tiles.
+/// Room for clusters of each cell, without several tissues one for each [`Hold`].
+const CLUSTERS: usize = 3;
+/// Room for their moments.
+const SETS: usize = 2 + SETS_OF_AXES;
+/// Room for sampled tiles, for each cell and further ones.
 const TILES: [usize; 2] = [2, 32];
 
 /// How much of each there can be.
@@ -145,17 +145,14 @@ pub(super) struct ClusterRoom {
 impl ClusterRoom {
     /// For this many cells, elements and patches with nodal strain, or fewer.
     pub(super) const fn new(cells: usize, [elements, patches]: [usize; 2]) -> Self {
-        const fn room([each, more]: [usize; 2], cells: usize) -> usize {
-            if cells == 0 { 0 } else { cells.saturating_mul(each).saturating_add(more) }
-        }
         // Of each group of a partition the last tile may be partly empty.
         const fn tiles_of(pieces: usize) -> usize {
             pieces.div_ceil(TILE).saturating_add(2 * MAX_PARTITIONS)
         }
-        let (all, tiles) = (tiles_of(if patches > 0 { patches } else { elements }), room(TILES, cells));
+        let (all, tiles) = (tiles_of(if patches > 0 { patches } else { elements }), cells.saturating_mul(TILES[0]).saturating_add(TILES[1]));
         Self {
-            clusters: room(CLUSTERS, cells),
-            sets: room(SETS, cells),
+            clusters: cells.saturating_mul(CLUSTERS),
+            sets: cells.saturating_mul(SETS),
             tiles: if all < tiles { all } else { tiles },
             moved: [all, if patches > 0 { tiles_of(elements) } else { 0 }],
         }
@@ -272,7 +269,7 @@ pub(super) struct ClusterInput<'a, M> {
     pub(super) scene: SceneView<'a, M>,
     pub(super) lattice: &'a Lattice,
     pub(super) places: &'a [LatticeNode],
-    /// Tissues, and supports that hold some axes, are not told apart: for scenes with too many of them.
+    /// Tissues are not told apart: for scenes with too many of them.
     pub(super) is_merged: bool,
 }
 
@@ -299,7 +296,6 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
             let held = self.scene.inertia.get(node).map_or(0, |inertia| inertia.held_count());
             match held {
                 0 => {}
-                _ if self.is_merged => hold = Hold::Fully,
                 3 if hold == Hold::Partly => {}
                 3 => hold = Hold::Fully,
                 _ => hold = Hold::Partly,

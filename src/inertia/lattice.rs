@@ -19,7 +19,7 @@ use crate::simd::NodeVector;
 /// Largest number of lattice points.
 pub const MAX_POINTS: usize = 1024;
 /// Largest number of functions, without the dropped ones.
-pub const MAX_FUNCTIONS: usize = 128;
+pub const MAX_FUNCTIONS: usize = 240;
 /// Stands for a point that supports hold: its function is zero.
 const HELD: u8 = MAX_FUNCTIONS as u8;
 /// Stands for a point without a function, because too little of the body is near it.
