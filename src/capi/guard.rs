@@ -31,7 +31,7 @@ pub struct supple_guard_config {
     pub seconds: f32,
     pub damping: f32,
     /// How many times as long the second run's steps are, at least 1 and at least the number of steps between two calls
-    /// of supple_guard_follow. More costs less time, about a multilevel step in so many, and calls more right steps
+    /// of supple_guard_follow. More costs less time, about a long step in so many, and calls more right steps
     /// inexact. 3 is a good choice, the steps of a frame another; 1 for learned steps.
     pub every: u32,
     /// Mean error of the nodes that is allowed, m; 0: a fifth of the mean motion so far, where that is more than a

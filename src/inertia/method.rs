@@ -32,12 +32,10 @@ pub enum Cells {
 impl Method<'static> {
     /// With the library's own damper.
     #[must_use]
-    pub fn damped(cells: Cells) -> Self {
-        Self::with(Damper::built_in(), cells)
+    pub fn new(cells: Cells) -> Self {
+        Self::with_damper(Damper::built_in(), cells)
     }
-}
 
-impl Method<'static> {
     /// Without a damper.
     pub(crate) const fn undamped(cells: Cells) -> Self {
         Self { damper: Damper::NONE, cells }
@@ -47,7 +45,7 @@ impl Method<'static> {
 impl<'w> Method<'w> {
     /// With a damper of a network of your own.
     #[must_use]
-    pub const fn with(damper: Damper<'w>, cells: Cells) -> Self {
+    pub const fn with_damper(damper: Damper<'w>, cells: Cells) -> Self {
         Self { damper, cells }
     }
 

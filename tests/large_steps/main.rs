@@ -1,6 +1,6 @@
 //! Steps beyond the critical one (`supple::inertia`): below it they are the exact step, beyond it the
 //! operator that they apply is symmetric, positive and bounded, and no mesh, support, load or damping makes them
-//! diverge. Mass-scaled, multilevel and damped steps alike.
+//! diverge.
 
 #[path = "../support/networks.rs"]
 mod networks;
@@ -39,39 +39,23 @@ use support::{Body, EXP, NEO, bound, displaced, largest, largest_distance, mean_
 
 type VecLargeStep = LargeStep<'static, Vec<NodeVector>>;
 
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-enum Kind {
-    MassScaled,
-    Multilevel,
-    Damped,
-}
-
-const KINDS: [Kind; 3] = [Kind::MassScaled, Kind::Multilevel, Kind::Damped];
-
 /// Ten times the gain of the shipped damper.
 const GAIN: f32 = 20.0;
 
-impl Kind {
-    /// Prepared for this step from the state as it is; rough motion is damped with this gain.
-    fn prepared<M: ElementMaterial>(
-        self,
-        body: &Body,
-        scene: &VecScene<M>,
-        state: &mut VecState,
-        step: Step,
-        gain: f32,
-    ) -> VecLargeStep {
-        let method = match self {
-            Self::MassScaled => Method::MassScaled,
-            Self::Multilevel => Method::Multilevel(Cells::Suggested),
-            Self::Damped => Method::Damped(networks::damper(gain), Cells::Suggested),
-        };
-        let grid = method.grid(scene.view(), &body.points).unwrap();
-        assert!(grid.functions > 0 || self == Self::MassScaled, "no lattice for this scene");
-        let large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
-        assert_eq!(large.model().grid(), grid);
-        large
-    }
+/// Prepared for this step from the state as it is; rough motion is damped with this gain.
+fn prepared<M: ElementMaterial>(
+    body: &Body,
+    scene: &VecScene<M>,
+    state: &mut VecState,
+    step: Step,
+    gain: f32,
+) -> VecLargeStep {
+    let method = Method::with_damper(networks::damper(gain), Cells::Suggested);
+    let grid = method.grid(scene.view(), &body.points).unwrap();
+    assert!(grid.functions > 0, "no lattice for this scene");
+    let large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
+    assert_eq!(large.model().grid(), grid);
+    large
 }
 
 /// The bound on the stable step of the scene at rest, s.
@@ -82,14 +66,14 @@ fn limit<M: ElementMaterial>(scene: &VecScene<M>) -> f32 {
 // Below the critical step.
 
 /// Both steps over `time` seconds under torsion: largest distance of a node's path, and the largest displacement.
-fn apart(kind: Kind, damping: f32, share: f32, time: f32) -> (f64, f64) {
+fn apart(damping: f32, share: f32, time: f32) -> (f64, f64) {
     let body = small_bar();
     let scene = body.scene(tissue(EXP), &held(&body));
     let forces = torsion(&body, 5e-4, 0.05);
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
     let step = Step::unchecked(share * limit(&scene), damping).unwrap();
     let (mut exact, mut scaled) = (rest_of(&scene), rest_of(&scene));
-    let mut large = kind.prepared(&body, &scene, &mut scaled, step, 0.0);
+    let mut large = prepared(&body, &scene, &mut scaled, step, 0.0);
     let (mut most, mut moved) = (0.0_f64, 0.0_f64);
     while exact.time() < f64::from(time) {
         assert_eq!(tled::step(&scene, &loads, &mut exact, &step), Status::Ok);
@@ -102,22 +86,11 @@ fn apart(kind: Kind, damping: f32, share: f32, time: f32) -> (f64, f64) {
     (most, moved)
 }
 
-/// Where no node needs inertia mass scaling is the exact step. A third of the critical step: the bound that inertia is
-/// made from is coarser than that on the critical step, and the bar stiffens.
-#[test]
-fn mass_scaling_below_the_limit_is_the_exact_step() {
-    for damping in [0.0, 20.0] {
-        let (most, moved) = apart(Kind::MassScaled, damping, 0.3, 0.1);
-        println!("damping {damping}: {:.1e} of {:.2} mm apart from the exact step", most / moved, 1e3 * moved);
-        assert!(moved > 1e-3 && most < 1e-4 * moved);
-    }
-}
-
 /// The lattice's inertia holds a share of its stiffness, `D^2`: it is the exact step to second order.
 #[test]
-fn multilevel_inertia_below_the_limit_is_the_exact_step_to_second_order() {
+fn below_the_limit_it_is_the_exact_step_to_second_order() {
     for damping in [0.0, 20.0] {
-        let [coarse, fine] = [0.3, 0.15].map(|share| apart(Kind::Multilevel, damping, share, 0.1));
+        let [coarse, fine] = [0.3, 0.15].map(|share| apart(damping, share, 0.1));
         let [a, b] = [coarse, fine].map(|(most, moved)| most / moved);
         println!(
             "damping {damping}: {a:.1e} of the largest displacement at 0.3 of the limit, {b:.1e} at 0.15, ratio {:.2}",
@@ -139,9 +112,9 @@ fn free_axes<M: ElementMaterial>(scene: &VecScene<M>) -> Vec<(usize, usize)> {
 }
 
 /// `B` in `du = B D^2 f` (1/kg), column by column from rest.
-fn operator<M: ElementMaterial>(body: &Body, scene: &VecScene<M>, kind: Kind, step: Step) -> Matrix {
+fn operator<M: ElementMaterial>(body: &Body, scene: &VecScene<M>, step: Step) -> Matrix {
     let mut rest = rest_of(scene);
-    let large = kind.prepared(body, scene, &mut rest, step, 0.0);
+    let large = prepared(body, scene, &mut rest, step, 0.0);
     let free = free_axes(scene);
     let mut b = zeros(free.len());
     let square = f64::from(step.seconds()).powi(2);
@@ -214,30 +187,28 @@ fn the_operator_is_symmetric_positive_and_bounded() {
     let material = regions(laws[0], &values, &of_element);
     let scene = body.scene(material, &mixed_supports(&body));
     let k = stiffness(&body, &laws, &of_element, &free_axes(&scene));
-    for kind in KINDS {
-        for (multiple, damping) in [(5.0, 0.0), (20.0, 0.0), (80.0, 0.0), (20.0, 20.0)] {
-            let step = Step::unchecked(multiple * limit(&scene), damping).unwrap();
-            let b = operator(&body, &scene, kind, step);
-            let mut asymmetry = 0.0_f64;
-            for i in 0..b.len() {
-                for j in 0..i {
-                    asymmetry = asymmetry.max((b[i][j] - b[j][i]).abs() / (b[i][i] * b[j][j]).sqrt());
-                }
+    for (multiple, damping) in [(5.0, 0.0), (20.0, 0.0), (80.0, 0.0), (20.0, 20.0)] {
+        let step = Step::unchecked(multiple * limit(&scene), damping).unwrap();
+        let b = operator(&body, &scene, step);
+        let mut asymmetry = 0.0_f64;
+        for i in 0..b.len() {
+            for j in 0..i {
+                asymmetry = asymmetry.max((b[i][j] - b[j][i]).abs() / (b[i][i] * b[j][j]).sqrt());
             }
-            let b = symmetric_part(&b);
-            let of_b = eigenvalues(&b);
-            let root = cholesky(&b);
-            let most = root.as_ref().map(|root| *eigenvalues(&congruent(root, &k)).last().unwrap());
-            let share = most.map(|most| most * f64::from(step.seconds()).powi(2) / 4.0);
-            println!(
-                "{kind:?} at {multiple} times the limit, damping {damping}: asymmetry {asymmetry:.1e}, eigenvalues {:.2e} to {:.2e} /kg, lambda_max(B K) D^2 / 4 = {share:?}",
-                of_b[0],
-                of_b[of_b.len() - 1],
-            );
-            assert!(asymmetry < 1e-4);
-            assert!(of_b[0] > 0.0, "not positive: {:e}", of_b[0]);
-            assert!(share.is_some_and(|share| share > 0.01 && share <= 1.0));
         }
+        let b = symmetric_part(&b);
+        let of_b = eigenvalues(&b);
+        let root = cholesky(&b);
+        let most = root.as_ref().map(|root| *eigenvalues(&congruent(root, &k)).last().unwrap());
+        let share = most.map(|most| most * f64::from(step.seconds()).powi(2) / 4.0);
+        println!(
+            "{multiple} times the limit, damping {damping}: asymmetry {asymmetry:.1e}, eigenvalues {:.2e} to {:.2e} /kg, lambda_max(B K) D^2 / 4 = {share:?}",
+            of_b[0],
+            of_b[of_b.len() - 1],
+        );
+        assert!(asymmetry < 1e-4);
+        assert!(of_b[0] > 0.0, "not positive: {:e}", of_b[0]);
+        assert!(share.is_some_and(|share| share > 0.01 && share <= 1.0));
     }
 }
 
@@ -263,9 +234,9 @@ fn the_operator_stays_bounded_while_the_body_turns() {
     let step = Step::unchecked(20.0 * limit(&scene), 0.0).unwrap();
     let square = f64::from(step.seconds()).powi(2);
     let mut wrong = Vec::new();
-    for (kind, degrees) in KINDS.into_iter().flat_map(|kind| [0.0, 2.0, 5.0, 10.0, 20.0, 45.0].map(|d| (kind, d))) {
+    for degrees in [0.0, 2.0, 5.0, 10.0, 20.0, 45.0] {
         let r = reference::tensor::rotation([1.0, 2.0, 3.0], f64::to_radians(degrees));
-        let large = kind.prepared(&body, &scene, &mut rest_of(&scene), step, 0.0);
+        let large = prepared(&body, &scene, &mut rest_of(&scene), step, 0.0);
         let state = displaced(&scene, &body.affine(&r, [0.0; 3]));
         let (mut held_back, mut share) = (0, 1.0_f32);
         let mut first_step = |forces: &[NodalForce]| -> Vec<f64> {
@@ -290,10 +261,10 @@ fn the_operator_stays_bounded_while_the_body_turns() {
         let root = cholesky(&symmetric_part(&b)).expect("a positive operator");
         let most = *eigenvalues(&congruent(&root, &turned(&k, &r))).last().unwrap() * square / 4.0;
         println!(
-            "{kind:?}, turned by {degrees} degrees: lambda_max(B K) D^2 / 4 = {most:.3}, held back {held_back}, coarse share {share:.2}"
+            "turned by {degrees} degrees: lambda_max(B K) D^2 / 4 = {most:.3}, held back {held_back}, coarse share {share:.2}"
         );
         if most > 1.0 {
-            wrong.push((kind, degrees, most));
+            wrong.push((degrees, most));
         }
     }
     assert!(wrong.is_empty(), "unstable: {wrong:?}");
@@ -352,32 +323,30 @@ fn the_operator_is_positive_and_bounded_with_nodal_strain() {
         let balance: Vec<_> = balance.collect();
         let step = Step::unchecked(20.0 * limit(&scene), 0.0).unwrap();
         let square = f64::from(step.seconds()).powi(2);
-        for kind in KINDS {
-            let mut start = state.clone();
-            let large = kind.prepared(&body, &scene, &mut start, step, 0.0);
-            let first_step = |node: usize, axis: usize, newton: f32| -> Vec<f64> {
-                let mut forces = balance.clone();
-                forces[node].newton[axis] += newton;
-                let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
-                let (mut state, mut large) = (start.clone(), large.clone());
-                assert!(large.step(scene.view(), &loads, state.view()).is_taken());
-                let moved = |&(node, axis): &(usize, usize)| f64::from(state.velocity(node)[axis] * step.seconds());
-                free.iter().map(moved).collect()
-            };
-            let still = first_step(0, 0, 0.0);
-            let mut b = zeros(free.len());
-            for (column, &(node, axis)) in free.iter().enumerate() {
-                let newton = (1e-4 * f64::from(scene.view().node_mass(node)) / square) as f32;
-                for (row, (moved, still)) in first_step(node, axis, newton).iter().zip(&still).enumerate() {
-                    b[row][column] = (moved - still) / (square * f64::from(newton));
-                }
+        let mut start = state.clone();
+        let large = prepared(&body, &scene, &mut start, step, 0.0);
+        let first_step = |node: usize, axis: usize, newton: f32| -> Vec<f64> {
+            let mut forces = balance.clone();
+            forces[node].newton[axis] += newton;
+            let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
+            let (mut state, mut large) = (start.clone(), large.clone());
+            assert!(large.step(scene.view(), &loads, state.view()).is_taken());
+            let moved = |&(node, axis): &(usize, usize)| f64::from(state.velocity(node)[axis] * step.seconds());
+            free.iter().map(moved).collect()
+        };
+        let still = first_step(0, 0, 0.0);
+        let mut b = zeros(free.len());
+        for (column, &(node, axis)) in free.iter().enumerate() {
+            let newton = (1e-4 * f64::from(scene.view().node_mass(node)) / square) as f32;
+            for (row, (moved, still)) in first_step(node, axis, newton).iter().zip(&still).enumerate() {
+                b[row][column] = (moved - still) / (square * f64::from(newton));
             }
-            let root = cholesky(&symmetric_part(&b)).expect("a positive operator");
-            let most = *eigenvalues(&congruent(&root, &k)).last().unwrap() * square / 4.0;
-            println!("{name}, bulk over shear {ratio}, {kind:?}: lambda_max(B K) D^2 / 4 = {most:.3}");
-            if !(0.2..=1.0).contains(&most) {
-                wrong.push((name, ratio, kind, most));
-            }
+        }
+        let root = cholesky(&symmetric_part(&b)).expect("a positive operator");
+        let most = *eigenvalues(&congruent(&root, &k)).last().unwrap() * square / 4.0;
+        println!("{name}, bulk over shear {ratio}: lambda_max(B K) D^2 / 4 = {most:.3}");
+        if !(0.2..=1.0).contains(&most) {
+            wrong.push((name, ratio, most));
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
@@ -386,7 +355,7 @@ fn the_operator_is_positive_and_bounded_with_nodal_strain() {
 // Energy.
 
 /// A bar let go from a slight bend: kinetic and strain energy over those at the start, at every step.
-fn vibration<M: ElementMaterial>(material: impl Fn(Tissue<AnyLaw>) -> M, kind: Kind, damping: f32) -> Vec<f64> {
+fn vibration<M: ElementMaterial>(material: impl Fn(Tissue<AnyLaw>) -> M, damping: f32) -> Vec<f64> {
     let body = small_bar();
     let scene = body.scene(material(tissue(NEO)), &held(&body));
     let step = Step::unchecked(20.0 * limit(&scene), damping).unwrap();
@@ -397,7 +366,7 @@ fn vibration<M: ElementMaterial>(material: impl Fn(Tissue<AnyLaw>) -> M, kind: K
     };
     assert!(tled::start(&scene, &mut state, &step, bent));
     let start = tled::strain_energy(&scene, &mut state).expect("room");
-    let mut large = kind.prepared(&body, &scene, &mut state, step, GAIN);
+    let mut large = prepared(&body, &scene, &mut state, step, GAIN);
     (0..2_000)
         .map(|_| {
             let status = large.step(scene.view(), &Loads::NONE, state.view());
@@ -414,24 +383,22 @@ fn free_vibration_keeps_its_energy_bounded_and_damping_takes_it() {
 }
 
 fn vibrates<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>) -> M) {
-    for kind in KINDS {
-        let free = vibration(&material, kind, 0.0);
-        let most = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
-        let (first, last) = (most(&free[..200]), most(&free[1_800..]));
-        println!(
-            "{element}, {kind:?}: energy at most {:.3} of the start's, {first:.3} in the first 200 steps, {last:.3} in the last",
-            most(&free)
-        );
-        assert!(most(&free) < 1.1, "energy grows");
-        assert!(last < 1.1 * first);
-        let damped = vibration(&material, kind, 5.0);
-        let parts: Vec<f64> = damped.chunks(400).map(most).collect();
-        println!("{element}, {kind:?}: damped, in parts of 400 steps at most {parts:.3?}");
-        // Below that the bar is at rest but for rounding.
-        const REST: f64 = 1e-12;
-        assert!(parts.windows(2).all(|pair| pair[1] <= pair[0].max(REST)), "damped energy grows");
-        assert!(parts[4] < 0.5 * parts[0]);
-    }
+    let free = vibration(&material, 0.0);
+    let most = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
+    let (first, last) = (most(&free[..200]), most(&free[1_800..]));
+    println!(
+        "{element}: energy at most {:.3} of the start's, {first:.3} in the first 200 steps, {last:.3} in the last",
+        most(&free)
+    );
+    assert!(most(&free) < 1.1, "energy grows");
+    assert!(last < 1.1 * first);
+    let damped = vibration(&material, 5.0);
+    let parts: Vec<f64> = damped.chunks(400).map(most).collect();
+    println!("{element}: damped, in parts of 400 steps at most {parts:.3?}");
+    // Below that the bar is at rest but for rounding.
+    const REST: f64 = 1e-12;
+    assert!(parts.windows(2).all(|pair| pair[1] <= pair[0].max(REST)), "damped energy grows");
+    assert!(parts[4] < 0.5 * parts[0]);
 }
 
 // Accuracy.
@@ -468,10 +435,10 @@ fn is_followed<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLa
         1e3 * truth.iter().map(|u| largest(u)).fold(0.0, f64::max)
     );
     let mut wrong = Vec::new();
-    for (kind, multiple) in KINDS.into_iter().flat_map(|kind| [10, 20, 50, 100].map(|m| (kind, m))) {
+    for multiple in [10, 20, 50, 100] {
         let step = Step::unchecked(dt * multiple as f32, 5.0).unwrap();
         let mut state = rest_of(&scene);
-        let mut large = kind.prepared(&body, &scene, &mut state, step, GAIN);
+        let mut large = prepared(&body, &scene, &mut state, step, GAIN);
         let mut error = 0.0;
         let diverged = truth.iter().find_map(|truth| {
             for _ in 0..FINEST / multiple {
@@ -484,11 +451,11 @@ fn is_followed<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLa
         });
         let skill = 1.0 - error / hold;
         match diverged {
-            Some(divergence) => println!("{element}, {kind:?} at {multiple}: {divergence}"),
-            None => println!("{element}, {kind:?} at {multiple}: skill {skill:.3}, {:?}", large.report()),
+            Some(divergence) => println!("{element} at {multiple}: {divergence}"),
+            None => println!("{element} at {multiple}: skill {skill:.3}, {:?}", large.report()),
         }
         if diverged.is_some() || multiple <= 20 && skill <= 0.0 {
-            wrong.push((kind, multiple, skill));
+            wrong.push((multiple, skill));
         }
     }
     assert!(wrong.is_empty(), "diverged, or no better than nothing: {wrong:?}");
