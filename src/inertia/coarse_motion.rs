@@ -70,8 +70,8 @@ pub(super) struct MotionResult {
     pub(super) motion: CoarseVectors,
     /// Share of the motion that is used.
     pub(super) share: f32,
-    /// By how much the step changes the lattice's gradient and its strain.
-    pub(super) changes: [f32; 2],
+    /// Its part of the next increments.
+    pub(super) next: CoarseVectors,
     /// Work of the supports on the lattice, times `D^2`: kg m^2.
     pub(super) work: f32,
 }
@@ -119,12 +119,11 @@ impl CoarseMotion<'_, '_> {
         for (next, last) in next.iter_mut().zip(&last) {
             next.0 = (Vec4::from(next.0) + Vec4::from(last.0)).to_array();
         }
-        let changes = lattice.largest_gradients(&next, rotations);
         let work = match (self.supports, pulled) {
             (Some(pull), Some(share)) => self.work(pull, share, &next),
             _ => 0.0,
         };
-        MotionResult { motion: solution, share, changes, work }
+        MotionResult { motion: solution, share, next, work }
     }
 
     /// `w`; zero without `c`.

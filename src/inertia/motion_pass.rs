@@ -61,6 +61,8 @@ impl<R: Real> HeldSums<R> {
 pub(super) struct LatticeMotion<'a> {
     /// Added to the increments of the nodes.
     pub(super) cells: &'a [CellPolynomial],
+    /// What the forces of the step do to the body as a whole, m.
+    pub(super) mean: [f32; 3],
     /// The smooth part of the last increment, if rough motion can be told from it.
     pub(super) smooth: Option<&'a [CellPolynomial]>,
     /// The share of the rest, the rough part, that is removed.
@@ -195,11 +197,12 @@ impl MotionPass<'_> {
         let inertia = scaling.inertia(mass, closeness * bound);
         let (inverse, own_share) = (R::splat(1.0).divide(inertia), scaling.own_share(mass, inertia));
         let mut own = self.input.residual(&nodes);
-        // What the node would do relative to the lattice.
+        // What the node would do relative to the body, as far as not by its true inertia.
         let mut square = R::splat(0.0);
         for axis in 0..3 {
             own[axis] = inverse * own[axis];
-            let relative = own[axis] - free[axis] * own_share * coarse[axis];
+            let with_body = free[axis] * own_share * R::splat(self.lattice.mean[axis]);
+            let relative = (R::splat(1.0) - own_share) * (own[axis] - with_body);
             square = relative.fused(relative, square);
         }
         let share = before[3].divide(square.root()).min(R::splat(1.0));

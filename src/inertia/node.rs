@@ -32,8 +32,8 @@ pub(super) fn half_damping(step: &Step) -> f32 {
     0.5 * step.damping() * step.seconds()
 }
 
-/// Least difference between a node's inertia and that of its own motion, as a multiple of the mass.
-const LEAST_DIFFERENCE: f32 = 0.01;
+/// Least `1 - t`: a node that takes its true inertia leaves nothing to the lattice.
+const LEAST_REST: f32 = 1e-4;
 
 impl Scaling {
     /// `N + k (1 + k) m` of nodes with these masses (kg) and closer bounds `rho b`, N/m.
@@ -42,10 +42,15 @@ impl Scaling {
         (R::splat(self.weight) * bound).max(mass) + R::splat(self.reserve) * mass
     }
 
-    /// `t / (1 - t)` with `t = (1 + k) m / N`: what a node does of a motion by itself, over what the lattice has to do.
+    /// What a node does of a motion by itself, `t = (1 + k) m / N`.
     #[inline(always)]
     pub(super) fn own_share<R: Real>(&self, mass: R, inertia: R) -> R {
-        let moved = R::splat(1.0 + self.k) * mass;
-        moved.divide((inertia - moved).max(R::splat(LEAST_DIFFERENCE) * mass))
+        (R::splat(1.0 + self.k) * mass).divide(inertia)
+    }
+
+    /// What that leaves to the lattice, as inertia: `(1 + k) m / (1 - t)`, kg.
+    pub(super) fn coarse_inertia(&self, mass: f32, inertia: f32) -> f32 {
+        let moved = (1.0 + self.k) * mass;
+        moved / (1.0 - self.own_share(mass, inertia)).max(LEAST_REST)
     }
 }

@@ -3,11 +3,13 @@
 //! lattice's motion has changed its gradient by [`LARGEST_CHANGE`] since, rotation included, or where tissue has
 //! stiffened. All else is constant, and computed anew for a state that does not follow from the last one.
 
+use glam::Vec4;
+
 use super::band::factorise;
 use super::cells::CellPolynomial;
 use super::coarse_stiffness::{add_cell, tangent_of, write_cell};
 use super::frames::Frames;
-use super::lattice::{Lattice, LatticeNode, node_at};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, node_at};
 use super::matrices::{Bands, Matrices, add_node, fill_held_axes};
 use super::node::Scaling;
 use super::node_tables::NodeTables;
@@ -40,7 +42,8 @@ pub(super) struct Renewal {
     pub(super) frames: Frames,
     /// Step count of the state for which the frames were computed.
     frames_at: Option<u64>,
-    /// How far the lattice's gradient has changed since `S` was computed.
+    /// The lattice's motion since `S` was computed (m), and the largest gradient of a cell.
+    moved: CoarseVectors,
     changed: f32,
     /// Drag of the last step's change of shape.
     pace: f32,
@@ -50,6 +53,8 @@ pub(super) struct Renewal {
     /// Whether `S` could be factorised: if not, the lattice is not used.
     pub(super) lattice_in_use: bool,
     pub(super) added: AddedInertia,
+    /// Mass that can move along each axis, kg.
+    pub(super) mass: [f32; 3],
 }
 
 /// What `S` is computed from.
@@ -79,11 +84,13 @@ impl Renewal {
         is_merged: false,
         frames: Frames::NONE,
         frames_at: None,
+        moved: [NodeVector::ZERO; _],
         changed: 0.0,
         pace: 0.0,
         sensitivity: LEAST_SENSITIVITY,
         lattice_in_use: false,
         added: AddedInertia::NONE,
+        mass: [0.0; 3],
     };
 
     /// The share of the last increment's unresolved deformation of the lattice that a step removes. Deformation is fed
@@ -100,10 +107,15 @@ impl Renewal {
         }
     }
 
-    /// Enters a step that changed the lattice's gradient by `gradient`, and its strain by `strain`.
-    pub(super) fn enter(&mut self, [gradient, strain]: [f32; 2]) {
-        self.changed += gradient;
+    /// Enters the lattice's part of a step's increments, m.
+    pub(super) fn enter(&mut self, increments: &CoarseVectors, lattice: &Lattice) {
+        for (sum, increment) in self.moved.iter_mut().zip(increments) {
+            sum.0 = (Vec4::from(sum.0) + Vec4::from(increment.0)).to_array();
+        }
+        let rotations = self.frames.since_rest();
+        let [_, strain] = lattice.largest_gradients(increments, rotations);
         self.pace = strain * self.sensitivity / LARGEST_CHANGE_OF_STEP;
+        [self.changed, _] = lattice.largest_gradients(&self.moved, rotations);
     }
 
     /// Computes `S` anew if that is due, when the cells have the sums of the nodes' scalar bounds.
@@ -152,7 +164,7 @@ impl Renewal {
             add_cell(band, factor, stiffness, &constant, lattice.functions_of(cell), lattice.functions());
         }
         self.lattice_in_use = factorise(band, factor, scratch);
-        self.changed = 0.0;
+        (self.moved, self.changed) = ([NodeVector::ZERO; _], 0.0);
     }
 
     /// Computes everything anew for a state that does not follow from the last one, or for another length of steps.
@@ -176,6 +188,7 @@ impl Renewal {
         let Matrices { inertia: of_cells, bounds, .. } = matrices;
         of_cells.fill([[0.0; 4]; _]);
         bounds.fill(0.0);
+        self.mass = [0.0; 3];
         self.added = AddedInertia::NONE;
         for (rank, next) in next_increment.iter().enumerate() {
             let node = node_at(places, rank);
@@ -185,8 +198,10 @@ impl Renewal {
                 *sum += bound;
             }
             let own = scaling.inertia(inertia.mass, bound * next.0[3]);
-            let moved = (1.0 + scaling.k) * inertia.mass;
-            add_node(of_cells, place, inertia, moved + moved * scaling.own_share(inertia.mass, own));
+            add_node(of_cells, place, inertia, scaling.coarse_inertia(inertia.mass, own));
+            for (sum, free) in self.mass.iter_mut().zip(inertia.free().to_array()) {
+                *sum += inertia.mass * free;
+            }
             if inertia.held_count() < 3 {
                 self.added.add(node, (own - scaling.reserve * inertia.mass) / inertia.mass - 1.0);
             }

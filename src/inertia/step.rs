@@ -13,7 +13,7 @@ use crate::step::{
     CallingThread, Computed, Forcing, Moving, Status, Step, StepMethod, Threads, Totals, Trial, nodal_volumes,
 };
 
-use super::cells::{prolong, restrict};
+use super::cells::{mean_of, prolong, restrict};
 use super::clusters::ClusterInput;
 use super::coarse_motion::{CoarseMotion, CoarseSpace, MotionResult, removed_share};
 use super::damper::RoughMotion;
@@ -89,8 +89,8 @@ pub(super) struct InertiaStep<'a, 'w, T> {
     rough_written: bool,
     coarse_share: f32,
     damping: f32,
-    /// Changes of the lattice's gradient and strain by the next increment.
-    changes: [f32; 2],
+    /// The lattice's part of the next increments.
+    smooth: CoarseVectors,
     /// The share of `S^-1` in this step, if the lattice is in use.
     pub(super) response: Option<f32>,
 }
@@ -107,7 +107,7 @@ impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
             rough_written: false,
             coarse_share: 1.0,
             damping: 0.0,
-            changes: [0.0; 2],
+            smooth: [NodeVector::ZERO; _],
             response: None,
         }
     }
@@ -172,9 +172,9 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     #[inline(never)]
     fn finish(&mut self, trial: &mut Trial<'_, M>) -> bool {
         let Self { model, held_back, coarse_share, .. } = self;
-        let LargeModel { renewal, report, nodes, moment, .. } = &mut **model;
+        let LargeModel { lattice, renewal, report, nodes, moment, .. } = &mut **model;
         *moment = trial.progress.moment();
-        renewal.enter(self.changes);
+        renewal.enter(&self.smooth, lattice);
         *report = renewal.added.report(held_back.nodes, *coarse_share, self.damping);
         held_back.unused > LARGEST_UNUSED * *nodes as f32 || *coarse_share < LEAST_COARSE_SHARE
     }
@@ -192,6 +192,8 @@ struct MovedLattice {
     removed: f32,
     /// Work of the supports on the lattice, J.
     work: f32,
+    /// What the forces do to the body as a whole, m.
+    mean: [f32; 3],
 }
 
 // Not inlined, like `finish`: the stack of one is free in the others.
@@ -229,13 +231,14 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
         let largest = node_parts(&scene, *threads).restrict(input, force, cells, momentum);
+        let mean = mean_of(matrices.cells, renewal.mass.map(|mass| (1.0 + scaling.k) * mass));
         let forces = restrict(matrices.cells, lattice);
         let stiffness = RenewalInput { scene, displacement, volume, lattice, places, scaling };
         renewal.renew_if_due(stiffness, matrices, *threads);
         if !renewal.lattice_in_use {
             prolong(&[NodeVector::ZERO; _], lattice, matrices.cells);
-            (self.coarse_share, self.changes) = (0.0, [0.0; 2]);
-            return MovedLattice { has_smooth: false, removed: 0.0, work: 0.0 };
+            self.coarse_share = 0.0;
+            return MovedLattice { has_smooth: false, removed: 0.0, work: 0.0, mean };
         }
         let is_merged = renewal.is_merged;
         let supports = MovingSupports {
@@ -254,15 +257,16 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             allowed: progress.energy_balance.allowed_share(),
             largest_strain: if scene.element().is_nodal_strain() { LARGEST_STRAIN_OF_PATCHES } else { LARGEST_STRAIN },
         };
-        let MotionResult { motion: moved, share, changes, work } = motion.compute(&forces);
+        let MotionResult { motion: moved, share, next, work } = motion.compute(&forces);
         let removed = removed_share(share.min(motion.allowed));
         prolong(&moved, lattice, matrices.cells);
         self.damping = step.carry() * method.damper.share(rough, half_damping(step));
-        (self.changes, self.coarse_share, self.response) = (changes, share, Some(share));
+        (self.smooth, self.coarse_share, self.response) = (next, share, Some(share));
         MovedLattice {
             has_smooth: smooth.is_some(),
             removed: self.damping.max(removed),
             work: work / (step.seconds() * step.seconds()),
+            mean,
         }
     }
 
@@ -275,7 +279,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let residual = ResidualFactors::new(step, scaling, progress.steps == 0);
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let smooth = moved.has_smooth.then_some(&*matrices.smooth_cells);
-        let lattice = LatticeMotion { cells: matrices.cells, smooth, removed: moved.removed };
+        let lattice = LatticeMotion { cells: matrices.cells, smooth, removed: moved.removed, mean: moved.mean };
         self.rough_written = moved.has_smooth;
         let mut totals;
         PassTotals { totals, rough: self.rough, held_back: self.held_back } =
