@@ -1,6 +1,5 @@
 //! What a coarse stiffness needs to know of the tangents of a tile of patches with nodal strain, as
-//! [`super::tile_tangents`] has it of elements. The stabilising energy is not in it, as its stiffness does not change
-//! with the state; both together do not feel rotations.
+//! [`super::tile_tangents`] has it of elements: without the stabilising energy, and without what that takes off the law.
 
 use crate::material::{Law, LawState, Laws};
 use crate::simd::{Gather, Kernel, Real, TILE};
@@ -8,7 +7,6 @@ use crate::simd::{Gather, Kernel, Real, TILE};
 use super::deformation::Deformation;
 use super::patch::{Neighbours, PatchTile};
 use super::patch_deformation::PatchDeformations;
-use super::patch_forces::modulus_of;
 use super::stiffness_bound::Coefficients;
 use super::tile::vector_at;
 use super::tile_tangents::{Tangent, TileTangents, WriteTangents};
@@ -48,10 +46,9 @@ fn all<R: Real, L: Law, const PARTS: usize>(kernel: PatchTangents<'_, L>) -> Til
         let first = part * R::COUNT;
         let law = laws.widen(|lane| tile.element(first + lane));
         let local = LawState::new::<L>(&law, deformation.invariants);
-        let modulus = modulus_of::<R, L>(&law);
-        let coefficients = &Coefficients::new::<L>(&law, &local).less(modulus);
+        let coefficients = &Coefficients::new::<L>(&law, &local);
         let weight = vector_at::<R>(&tile.volumes, first) * R::splat(weight);
-        R::run_piece(WriteTangents { weight, deformation, coefficients, modulus: Some(modulus), tangents });
+        R::run_piece(WriteTangents { weight, deformation, coefficients, tangents });
     }
     tangents
 }

@@ -202,14 +202,11 @@ pub(super) fn scalar_bound_of_patches<R: Real>(
     scale * volume.fused(cofactor, iso.max(R::splat(0.0)))
 }
 
-/// The bound that rotations do not feel; only for elements that are not crushed. With `modulus`, that of the
-/// stabilising energy of patches (Pa), which `coefficients` are without, `stress` may be negative, as far as that energy
-/// resists rotations itself: in the principal axes it has `modulus (b_i + b_j) w^2`.
+/// The bound that rotations do not feel; only for elements that are not crushed.
 #[inline(always)]
 pub(super) fn spatial_bound<R: Real>(
     coefficients: &Coefficients<R>,
     deformation: &Deformation<R>,
-    modulus: Option<R>,
 ) -> SpatialBound<R> {
     let (zero, one) = (R::splat(0.0), R::splat(1.0));
     let &Coefficients { p1, p_j, cc, ce, ee, .. } = coefficients;
@@ -224,14 +221,7 @@ pub(super) fn spatial_bound<R: Real>(
         + R::splat(2.0)
             * (difference.xy * difference.xy + difference.yz * difference.yz + difference.zx * difference.zx);
     let mixed = ce.abs() * square.root() * volume_ratio;
-    let least = match modulus {
-        Some(modulus) => {
-            let trace = b.trace();
-            -(modulus * (trace - b.scaled_plus(-one, trace).largest_eigenvalue()).max(zero))
-        }
-        None => zero,
-    };
-    let stress = tension.max(least);
+    let stress = tension.max(zero);
     let shear = ((tension - stress) - (pressure + pressure)).max(zero);
     SpatialBound {
         shear: shear + ee * square + R::splat(1.0 / SPATIAL_SPLIT) * mixed,

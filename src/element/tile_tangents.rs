@@ -63,7 +63,7 @@ impl<L: Law, P: Pressure> Kernel for ElementTangents<'_, L, P> {
             let coefficients = &Coefficients::new::<L>(&law, &local);
             let weight = tile.volume::<R>(first) * R::splat(weight);
             let tangents = tangents.get_mut(first..first + R::COUNT).unwrap_or_default();
-            R::run_piece(WriteTangents { weight, deformation, coefficients, modulus: None, tangents });
+            R::run_piece(WriteTangents { weight, deformation, coefficients, tangents });
         }
         tangents
     }
@@ -75,8 +75,6 @@ pub(super) struct WriteTangents<'a, R> {
     pub(super) weight: R,
     pub(super) deformation: &'a Deformation<R>,
     pub(super) coefficients: &'a Coefficients<R>,
-    /// See [`spatial_bound`].
-    pub(super) modulus: Option<R>,
     pub(super) tangents: &'a mut [Tangent],
 }
 
@@ -85,11 +83,11 @@ impl<R: Real> Piece for WriteTangents<'_, R> {
 
     #[inline(always)]
     fn run(self) {
-        let Self { weight, deformation, coefficients, modulus, tangents } = self;
+        let Self { weight, deformation, coefficients, tangents } = self;
         let (zero, one) = (R::splat(0.0), R::splat(1.0));
         let volume_ratio = one + deformation.invariants.j;
         let sound = volume_ratio - R::splat(LEAST_VOLUME);
-        let spatial = spatial_bound(coefficients, deformation, modulus);
+        let spatial = spatial_bound(coefficients, deformation);
         let (iso, volume) = coefficients.bound(deformation);
         let half = R::splat(0.5) * spatial.shear;
         let factors = [

@@ -1,25 +1,27 @@
-//! Clusters of the pieces of a body, its elements or with nodal strain its patches: those of a cell of the lattice, of
-//! one tissue, that touch held nodes or do not. Within a cluster the tangents are taken to be the same, so the coarse
-//! stiffness needs only their sum and the second moments of the gradients of the lattice's functions at rest,
+//! Clusters of the elements of a body: those of a cell of the lattice, of one tissue, that touch held nodes or do not.
+//! Within a cluster the tangents are taken to be the same, so the coarse stiffness needs only their sum and the second
+//! moments of the gradients of the lattice's functions at rest,
 //!
 //! ```text
 //! Q[c,d,I,J] = 1 / V sum_e V_e G_ec,I G_ed,J,   G_ec = sum_a w_c(a) g_a
 //! ```
-//! over the free nodes `a` of the pieces, with the eight functions of the cluster's own cell, continued beyond it: so
+//! over the free nodes `a` of the elements, with the eight functions of the cluster's own cell, continued beyond it: so
 //! linear motion stays linear, and only functions of one cell are coupled. Where nodes are held along some axes only, a
 //! function has a gradient for each axis, and there are moments for each pair of axes.
 //!
-//! The tangents are those of the pieces of some tiles, always the same ones: all on small meshes.
+//! With nodal strain the energy is that of patches, which have the mean gradients of their elements, and a stabilising
+//! energy for what the mean does not see. By convexity it is at most that of the elements with the patches' tangents.
+//!
+//! The tangents are those of the elements or patches of some tiles, always the same ones: all on small meshes.
 
 use core::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
-use crate::element::{Axes, ElementMaterial, ElementTile, PatchTile, stabilising_modulus};
+use crate::element::{Axes, ElementMaterial, ElementTile, NodeInertia};
 use crate::mesh::partition::MAX_PARTITIONS;
 use crate::scene::SceneView;
 use crate::simd::TILE;
 
-use super::coarse_stiffness::AxisMatrices;
 use super::lattice::{Lattice, LatticeNode, eight_weights, node_place};
 
 /// Pairs of the eight functions of a cell, the first not before the second.
@@ -117,10 +119,8 @@ pub(super) struct Clusters<'a> {
     pub(super) heads: &'a mut [u32],
     /// The sampled tiles.
     pub(super) tiles: &'a mut [u32],
-    /// The tiles of pieces that touch a node that motions may move, and of elements; as many as there are, then
-    /// [`NO_TILE`].
+    /// The tiles of elements that touch a node that motions may move, as many as there are, then [`NO_TILE`].
     pub(super) moved: &'a mut [u32],
-    pub(super) moved_elements: &'a mut [u32],
     /// The sampled pieces, cluster by cluster: number of the tile among the sampled ones times [`TILE`] plus place.
     pub(super) members: &'a mut [u32],
 }
@@ -138,8 +138,8 @@ pub(super) struct ClusterRoom {
     pub(super) clusters: usize,
     pub(super) sets: usize,
     pub(super) tiles: usize,
-    /// Tiles of pieces, and of elements.
-    pub(super) moved: [usize; 2],
+    /// Tiles of elements.
+    pub(super) moved: usize,
 }
 
 impl ClusterRoom {
@@ -154,7 +154,7 @@ impl ClusterRoom {
             clusters: cells.saturating_mul(CLUSTERS),
             sets: cells.saturating_mul(SETS),
             tiles: if all < tiles { all } else { tiles },
-            moved: [all, if patches > 0 { tiles_of(elements) } else { 0 }],
+            moved: tiles_of(elements),
         }
     }
 }
@@ -168,95 +168,53 @@ pub(super) struct ClusterCounts {
     pub(super) is_merged: bool,
 }
 
-/// A piece: an element or a patch.
+/// An element, as its place in the scene's tables.
 #[derive(Clone, Copy)]
-pub(super) enum Piece<'a, M> {
-    Element(&'a ElementTile, usize),
-    Patch(SceneView<'a, M>, &'a PatchTile, usize),
+pub(super) struct Piece<'a> {
+    tile: &'a ElementTile,
+    lane: usize,
 }
 
-impl<'a, M: ElementMaterial> Piece<'a, M> {
-    /// The pieces of tile `tile` of a scene.
-    pub(super) fn of_tile(scene: SceneView<'a, M>, tile: usize) -> impl Iterator<Item = (usize, Self)> {
-        let elements = if scene.element().is_nodal_strain() { usize::MAX } else { tile };
-        let patches = Self::patches(scene, if elements == tile { usize::MAX } else { tile });
-        Self::elements(scene, elements).chain(patches)
-    }
-
+impl<'a> Piece<'a> {
     /// The elements of a tile.
-    pub(super) fn elements(scene: SceneView<'a, M>, tile: usize) -> impl Iterator<Item = (usize, Self)> {
-        let tile = scene.tiles.get(tile);
-        (0..TILE).filter_map(move |lane| {
-            Some((lane, Self::Element(tile.filter(|tile| tile.volume::<f32>(lane) > 0.0)?, lane)))
-        })
+    pub(super) fn of_tile(tile: &'a ElementTile) -> impl Iterator<Item = Self> {
+        (0..TILE).map(move |lane| Self { tile, lane }).filter(|piece| piece.volume() > 0.0)
     }
 
-    fn patches(scene: SceneView<'a, M>, tile: usize) -> impl Iterator<Item = (usize, Self)> {
-        let tile = scene.patches.tiles().get(tile);
-        (0..TILE).filter_map(move |lane| {
-            Some((lane, Self::Patch(scene, tile.filter(|tile| tile.volume(lane) > 0.0)?, lane)))
-        })
-    }
-
-    /// How many tiles of pieces a scene has.
-    pub(super) fn tiles(scene: SceneView<'a, M>) -> usize {
-        if scene.element().is_nodal_strain() { scene.patches.tiles().len() } else { scene.tiles.len() }
-    }
-
-    /// An element of the mesh in it.
     fn element(&self) -> usize {
-        match self {
-            Self::Element(tile, lane) => tile.element(*lane),
-            Self::Patch(_, tile, lane) => tile.element(*lane),
-        }
+        self.tile.element(self.lane)
     }
 
     /// m^3.
     pub(super) fn volume(&self) -> f32 {
-        match self {
-            Self::Element(tile, lane) => tile.volume(*lane),
-            Self::Patch(_, tile, lane) => tile.volume(*lane) as f32,
-        }
+        self.tile.volume(self.lane)
     }
 
-    /// Modulus of the stabilising energy of an element with nodal strain, Pa.
-    pub(super) fn stabilising_modulus(&self, scene: SceneView<'a, M>) -> f32 {
-        stabilising_modulus(&scene.material.laws().of(self.element())) as f32
+    /// Its nodes.
+    pub(super) fn nodes(&self) -> [usize; 4] {
+        [0, 1, 2, 3].map(|corner| self.tile.node(corner, self.lane))
     }
 
-    /// Calls `visit` with its nodes and the gradients of their functions, 1/m.
-    pub(super) fn each_node(&self, mut visit: impl FnMut(usize, [f32; 3])) {
-        match self {
-            Self::Element(tile, lane) => {
-                let mut own = [0.0; 3];
-                for corner in 0..3 {
-                    let gradient = [0, 1, 2].map(|axis| tile.gradient_of(corner, axis, *lane));
-                    own.iter_mut().zip(gradient).for_each(|(own, along)| *own -= along);
-                    visit(tile.node(corner + 1, *lane), gradient);
-                }
-                visit(tile.node(0, *lane), own);
-            }
-            Self::Patch(scene, tile, lane) => {
-                for (node, gradient, _) in tile.gradients(scene.patches.neighbours_of(tile), *lane) {
-                    visit(node, gradient);
-                }
+    /// The gradients of their functions, 1/m.
+    pub(super) fn gradients(&self) -> [[f32; 3]; 4] {
+        let mut gradients = [[0.0; 3]; 4];
+        for corner in 0..3 {
+            for axis in 0..3 {
+                gradients[corner + 1][axis] = self.tile.gradient_of(corner, axis, self.lane);
+                gradients[0][axis] -= gradients[corner + 1][axis];
             }
         }
+        gradients
     }
 
-    /// The cell of its centre: that of the element, or the patch's own node.
+    /// The cell of its centre.
     pub(super) fn cell(&self, lattice: &Lattice, places: &[LatticeNode]) -> usize {
-        let place = |node: usize| node_place(places, node).copied().unwrap_or_default();
-        match self {
-            Self::Element(tile, lane) => {
-                let mut position = [0.0; 3];
-                for at in (0..4).map(|corner| lattice.position(&place(tile.node(corner, *lane)))) {
-                    position.iter_mut().zip(at).for_each(|(sum, at)| *sum += 0.25 * at);
-                }
-                lattice.whole_cell(position)
-            }
-            Self::Patch(_, tile, lane) => place(tile.node(*lane)).cell(),
+        let mut position = [0.0; 3];
+        for node in self.nodes() {
+            let place = node_place(places, node).copied().unwrap_or_default();
+            position.iter_mut().zip(lattice.position(&place)).for_each(|(sum, at)| *sum += 0.25 * at);
         }
+        lattice.whole_cell(position)
     }
 }
 
@@ -274,10 +232,10 @@ pub(super) struct ClusterInput<'a, M> {
 }
 
 impl<M: ElementMaterial> ClusterInput<'_, M> {
-    /// `G_ec` of a piece, for the functions of a cell.
-    pub(super) fn gradients(&self, piece: &Piece<'_, M>, cell: usize) -> FunctionGradients {
+    /// `G_ec` of an element, for the functions of a cell.
+    pub(super) fn gradients(&self, piece: &Piece<'_>, cell: usize) -> FunctionGradients {
         let mut gradients = [[[0.0; 3]; 8]; 3];
-        piece.each_node(|node, gradient| {
+        for (node, gradient) in piece.nodes().into_iter().zip(piece.gradients()) {
             let place = node_place(self.places, node).copied().unwrap_or_default();
             let weights = eight_weights(self.lattice.within(cell, &place));
             let free = self.scene.inertia.get(node).map_or([0.0; 3], |inertia| inertia.free().truncate().to_array());
@@ -286,45 +244,43 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
                     sum.iter_mut().zip(gradient).for_each(|(sum, along)| *sum += free * weight * along);
                 }
             }
-        });
+        }
         gradients
     }
 
-    fn hold(&self, piece: &Piece<'_, M>) -> Hold {
+    fn hold(&self, nodes: &[usize]) -> Hold {
         let mut hold = Hold::Nowhere;
-        piece.each_node(|node, _| {
-            let held = self.scene.inertia.get(node).map_or(0, |inertia| inertia.held_count());
-            match held {
+        for &node in nodes {
+            match self.scene.inertia.get(node).map_or(0, NodeInertia::held_count) {
                 0 => {}
                 3 if hold == Hold::Partly => {}
                 3 => hold = Hold::Fully,
                 _ => hold = Hold::Partly,
             }
-        });
+        }
         hold
     }
 
-    fn tissue(&self, piece: &Piece<'_, M>) -> u16 {
-        if self.is_merged { 0 } else { self.scene.material.laws().tissue(piece.element()) }
+    fn tissue(&self, element: usize) -> u16 {
+        if self.is_merged { 0 } else { self.scene.material.laws().tissue(element) }
     }
 
     /// Makes the clusters. `None` if there is no room.
     pub(super) fn write(&self, clusters: &mut Clusters<'_>) -> Option<ClusterCounts> {
         clusters.heads.fill(0);
         let (mut count, mut sets) = (0, 0);
-        let tiles = Piece::tiles(self.scene);
-        for (_, piece) in (0..tiles).flat_map(|tile| Piece::of_tile(self.scene, tile)) {
-            let cell = self.cell(&piece);
+        for piece in self.scene.tiles.iter().flat_map(Piece::of_tile) {
+            let cell = piece.cell(self.lattice, self.places);
             let index = match self.find(&piece, cell, clusters.all, clusters.heads) {
                 Some(index) => index,
                 None => {
-                    let (tissue, hold) = (self.tissue(&piece), self.hold(&piece));
+                    let (tissue, hold) = (self.tissue(piece.element()), self.hold(&piece.nodes()) as u16);
                     let head = clusters.heads.get_mut(cell)?;
                     let place = clusters.all.get_mut(count)?;
-                    let (cell, first_set) = (cell as u32, sets as u32);
-                    *place = Cluster { cell, tissue, hold: hold as u16, first_set, next: *head, ..Cluster::default() };
-                    sets += if hold == Hold::Partly { SETS_OF_AXES } else { 1 };
-                    clusters.moments.get_mut(first_set as usize..sets)?.fill(PairMatrices::ZERO);
+                    let (cell, first_set, next) = (cell as u32, sets as u32, *head);
+                    *place = Cluster { cell, tissue, hold, first_set, next, ..Cluster::default() };
+                    clusters.moments.get_mut(place.sets())?.fill(PairMatrices::ZERO);
+                    sets += place.sets().len();
                     count += 1;
                     *head = count as u32;
                     count - 1
@@ -334,13 +290,8 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
             let volume = piece.volume();
             cluster.volume += volume;
             let gradients = self.gradients(&piece, cell);
-            let first = cluster.first_set as usize;
-            if cluster.is_by_axis() {
-                for (set, (i, j)) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).enumerate() {
-                    add_moments(clusters.moments.get_mut(first + set)?, volume, [&gradients[i], &gradients[j]]);
-                }
-            } else {
-                add_moments(clusters.moments.get_mut(first)?, volume, [&gradients[0]; 2]);
+            for (set, moments) in clusters.moments.get_mut(cluster.sets())?.iter_mut().enumerate() {
+                add_moments(moments, volume, [&gradients[set / 3 % 3], &gradients[set % 3]]);
             }
         }
         for cluster in clusters.all.get(..count).unwrap_or_default() {
@@ -349,31 +300,25 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
             }
         }
         self.list_moved(clusters);
-        let sampled = self.sample(clusters, count)?;
-        Some(ClusterCounts { clusters: count, tiles: sampled, is_merged: self.is_merged })
+        let tiles = self.sample(clusters, count)?;
+        Some(ClusterCounts { clusters: count, tiles, is_merged: self.is_merged })
     }
 
     /// Lists the tiles at supports that motions may move.
     fn list_moved(&self, clusters: &mut Clusters<'_>) {
-        let moves = |piece: &Piece<'_, M>| {
-            let mut moves = false;
-            piece.each_node(|node, _| moves |= self.scene.movable(node) != Axes::NONE);
-            moves
-        };
-        let of_pieces = (0..Piece::tiles(self.scene))
-            .filter(|tile| Piece::of_tile(self.scene, *tile).any(|(_, piece)| moves(&piece)));
-        let of_elements = (0..self.scene.tiles.len())
-            .filter(|tile| Piece::elements(self.scene, *tile).any(|(_, piece)| moves(&piece)));
+        let moves = |node: usize| self.scene.movable(node) != Axes::NONE;
+        let tiles = self.scene.tiles.iter().enumerate();
+        let moved = tiles.filter(|(_, tile)| Piece::of_tile(tile).any(|piece| piece.nodes().into_iter().any(moves)));
         clusters.moved.fill(NO_TILE);
-        clusters.moved_elements.fill(NO_TILE);
-        clusters.moved.iter_mut().zip(of_pieces).for_each(|(place, tile)| *place = tile as u32);
-        clusters.moved_elements.iter_mut().zip(of_elements).for_each(|(place, tile)| *place = tile as u32);
+        clusters.moved.iter_mut().zip(moved).for_each(|(place, (tile, _))| *place = tile as u32);
     }
 
-    /// Chooses the tiles: every one, or one of some; and further ones for clusters that have none.
+    /// Chooses the tiles: every one, or one of some; and further ones for clusters that have few. Lists the sampled
+    /// pieces of each cluster.
     fn sample(&self, clusters: &mut Clusters<'_>, count: usize) -> Option<usize> {
         let Clusters { all, heads, tiles, members, .. } = clusters;
-        let (most, of_scene) = (tiles.len(), Piece::tiles(self.scene));
+        let all = all.get_mut(..count)?;
+        let (most, of_scene) = (tiles.len(), self.tiles_with_tangents());
         // A part of the room is for clusters that a regular sample misses.
         let spacing = if of_scene <= most { 1 } else { of_scene.div_ceil(most - most / 4) };
         let mut chosen = 0;
@@ -383,9 +328,9 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
             self.enter(tile, all, heads);
         }
         for tile in (0..of_scene).filter(|tile| tile % spacing != 0) {
-            let misses = Piece::of_tile(self.scene, tile).any(|(_, piece)| {
-                let index = self.find(&piece, self.cell(&piece), all, heads);
-                index.and_then(|index| all.get(index)).is_some_and(|cluster| cluster.count < LEAST_SAMPLED)
+            let misses = (0..TILE).any(|lane| {
+                let index = self.cluster_of_tangent(tile, lane, all, heads);
+                index.and_then(|(index, _)| all.get(index)).is_some_and(|cluster| cluster.count < LEAST_SAMPLED)
             });
             if misses && chosen < most {
                 *tiles.get_mut(chosen)? = tile as u32;
@@ -394,49 +339,75 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
             }
         }
         let mut first = 0;
-        for cluster in all.iter_mut().take(count) {
+        for cluster in all.iter_mut() {
             cluster.first = first;
             first += cluster.count;
             cluster.count = 0;
         }
         for (place, &tile) in tiles.iter().take(chosen).enumerate() {
-            for (lane, piece) in Piece::of_tile(self.scene, tile as usize) {
-                let cluster = all.get_mut(self.find(&piece, self.cell(&piece), all, heads)?)?;
+            for lane in 0..TILE {
+                let Some((index, _)) = self.cluster_of_tangent(tile as usize, lane, all, heads) else { continue };
+                let cluster = all.get_mut(index)?;
                 *members.get_mut((cluster.first + cluster.count) as usize)? = (place * TILE + lane) as u32;
                 cluster.count += 1;
             }
+        }
+        // What has no sampled piece of its own takes those of another cluster, of its cell and tissue if there is one.
+        for index in 0..count {
+            let own = *all.get(index)?;
+            if own.count > 0 {
+                continue;
+            }
+            let like = |other: &Cluster| (other.cell != own.cell, other.tissue != own.tissue);
+            let others = all.iter().filter(|other| other.count > 0);
+            let donor = *others.min_by_key(|other| like(other))?;
+            let cluster = all.get_mut(index)?;
+            (cluster.first, cluster.count, cluster.sampled) = (donor.first, donor.count, donor.sampled);
         }
         Some(chosen)
     }
 
     /// Counts the pieces of a tile as sampled.
     fn enter(&self, tile: usize, all: &mut [Cluster], heads: &[u32]) {
-        for (_, piece) in Piece::of_tile(self.scene, tile) {
-            let index = self.find(&piece, self.cell(&piece), all, heads);
-            if let Some(cluster) = index.and_then(|index| all.get_mut(index)) {
+        for lane in 0..TILE {
+            if let Some((index, volume)) = self.cluster_of_tangent(tile, lane, all, heads)
+                && let Some(cluster) = all.get_mut(index)
+            {
                 cluster.count += 1;
-                cluster.sampled += piece.volume();
+                cluster.sampled += volume;
             }
         }
     }
 
-    fn cell(&self, piece: &Piece<'_, M>) -> usize {
-        piece.cell(self.lattice, self.places)
+    /// How many tiles of tangents a scene has.
+    fn tiles_with_tangents(&self) -> usize {
+        let Self { scene, .. } = self;
+        if scene.element().is_nodal_strain() { scene.patches.tiles().len() } else { scene.tiles.len() }
     }
 
-    /// The cluster of a piece in a cell.
-    pub(super) fn find(&self, piece: &Piece<'_, M>, cell: usize, all: &[Cluster], heads: &[u32]) -> Option<usize> {
-        let (tissue, hold) = (self.tissue(piece), self.hold(piece) as u16);
-        let mut next = heads.get(cell).copied()?;
-        // Each has another number than the others, so this ends.
-        while let Some(index) = (next as usize).checked_sub(1) {
-            let cluster = all.get(index)?;
-            if cluster.tissue == tissue && cluster.hold == hold {
-                return Some(index);
-            }
-            next = cluster.next;
+    /// The cluster and the volume (m^3) of the tangent of a place of a tile: of an element, or of a patch.
+    fn cluster_of_tangent(&self, tile: usize, lane: usize, all: &[Cluster], heads: &[u32]) -> Option<(usize, f32)> {
+        let Self { scene, lattice, places, .. } = *self;
+        if !scene.element().is_nodal_strain() {
+            let piece = Piece { tile: scene.tiles.get(tile)?, lane };
+            let cell = piece.cell(lattice, places);
+            let index = (piece.volume() > 0.0).then(|| self.find(&piece, cell, all, heads))??;
+            return Some((index, piece.volume()));
         }
-        None
+        let tile = scene.patches.tiles().get(tile).filter(|tile| tile.volume(lane) > 0.0)?;
+        let (node, tissue) = (tile.node(lane), self.tissue(tile.element(lane)));
+        let (cell, hold) = (node_place(places, node)?.cell(), self.hold(&[node]));
+        let unlike = |cluster: &Cluster| (cluster.tissue != tissue, cluster.hold != hold as u16);
+        let of_cell = clusters_of(all, heads.get(cell).copied()?);
+        let (index, _) = of_cell.min_by_key(|(_, cluster)| unlike(cluster))?;
+        Some((index, tile.volume(lane) as f32))
+    }
+
+    /// The cluster of an element in a cell.
+    pub(super) fn find(&self, piece: &Piece<'_>, cell: usize, all: &[Cluster], heads: &[u32]) -> Option<usize> {
+        let (tissue, hold) = (self.tissue(piece.element()), self.hold(&piece.nodes()) as u16);
+        let mut of_cell = clusters_of(all, heads.get(cell).copied()?);
+        of_cell.find(|(_, cluster)| cluster.tissue == tissue && cluster.hold == hold).map(|(index, _)| index)
     }
 }
 
@@ -466,24 +437,4 @@ fn add_moments(moments: &mut PairMatrices, volume: f32, [first, second]: [&[[f32
             }
         }
     });
-}
-
-impl<M: ElementMaterial> ClusterInput<'_, M> {
-    /// The stiffness of the stabilising energy of nodal strain in each cell, N/m:
-    /// `s mu sum_e V_e G_ec . G_ed I` over the elements.
-    pub(super) fn write_stabilising(&self, cells: &mut [AxisMatrices]) {
-        cells.fill([[0.0; 4]; _]);
-        for (_, piece) in (0..self.scene.tiles.len()).flat_map(|tile| Piece::elements(self.scene, tile)) {
-            let cell = piece.cell(self.lattice, self.places);
-            let Some(matrices) = cells.get_mut(cell) else { continue };
-            let gradients = self.gradients(&piece, cell);
-            let weight = piece.volume() * piece.stabilising_modulus(self.scene);
-            for_each_pair(|pair, c, d| {
-                for (axis, gradients) in gradients.iter().enumerate() {
-                    let product: f32 = gradients[c].iter().zip(gradients[d]).map(|(a, b)| a * b).sum();
-                    matrices[pair % PAIRS][axis] += weight * product;
-                }
-            });
-        }
-    }
 }

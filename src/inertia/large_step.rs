@@ -2,7 +2,7 @@
 
 use core::mem::MaybeUninit;
 
-use bytemuck::must_cast_slice_mut;
+use bytemuck::{must_cast_slice, must_cast_slice_mut};
 use glam::{DMat3, DVec3};
 
 use crate::element::{ElementMaterial, ElementTile, ScalarBound};
@@ -434,13 +434,18 @@ fn write_closeness<M: ElementMaterial>(
     volume: &mut [NodeVector],
     tables: &mut NodeTables<'_>,
 ) {
-    let NodeTables { next_increment, rough, rough_before, scratch } = tables;
+    let NodeTables { next_increment, rough, rough_before, scratch, more_scratch: units } = tables;
     for table in [&mut **next_increment, rough_before, scratch] {
         table.fill(NodeVector::ZERO);
     }
-    let rates = each_rate(scene, [scratch, next_increment, rough_before], volume, |node, rate| {
+    // With unit masses a light node has no smaller share of its elements' stiffness than a heavy one.
+    for (NodeVector(unit), inertia) in units.iter_mut().zip(scene.inertia) {
+        let [x, y, z] = inertia.inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 });
+        *unit = [x, y, z, 1.0];
+    }
+    let rates = each_rate(scene, must_cast_slice(units), [scratch, next_increment, rough_before], volume, |node, rate| {
         if let Some(rough) = rough.get_mut(node) {
-            rough.0[0] = rate * scene.node_mass(node);
+            rough.0[0] = rate;
         }
     });
     let all = scene.elements().partitions.all();

@@ -25,7 +25,7 @@ const HELD: u8 = MAX_FUNCTIONS as u8;
 /// Stands for a point without a function, because too little of the body is near it.
 const EMPTY: u8 = HELD + 1;
 /// Points with less than this share of the largest free mass of a point have no function.
-const LEAST_MASS: f32 = 0.02;
+const LEAST_MASS: f32 = 1e-4;
 
 /// A lattice around a body.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]

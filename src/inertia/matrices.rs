@@ -40,8 +40,6 @@ pub(super) struct Matrices<'a> {
     pub(super) edge_factor: &'a mut [f32],
     /// `(1 + k) Mc + E` of each cell.
     pub(super) inertia: &'a mut [AxisMatrices],
-    /// The stiffness of the stabilising energy of nodal strain, N/m; else empty.
-    pub(super) stabilising: &'a mut [AxisMatrices],
     /// The stiffness of each cell.
     pub(super) stiffness: &'a mut [PairMatrices],
     /// Sums of the nodes' scalar bounds in each cell when that was computed, N/m.
@@ -73,15 +71,13 @@ pub(super) fn vectors_for(grid: Grid, pieces: [usize; 2]) -> usize {
         vectors_of::<f32>(scalar_band.saturating_mul(3)),
         vectors_of::<f32>(scalar_band),
         vectors_of::<AxisMatrices>(cells),
-        if pieces[1] > 0 { vectors_of::<AxisMatrices>(cells) } else { 0 },
         vectors_of::<PairMatrices>(cells),
         vectors_of::<f32>(cells),
         vectors_of::<Cluster>(room.clusters),
         vectors_of::<PairMatrices>(room.sets),
         vectors_of::<u32>(cells),
         vectors_of::<u32>(room.tiles),
-        vectors_of::<u32>(room.moved[0]),
-        vectors_of::<u32>(room.moved[1]),
+        vectors_of::<u32>(room.moved),
         vectors_of::<u32>(room.tiles.saturating_mul(TILE)),
         vectors_of::<Tangent>(room.tiles.saturating_mul(TILE)),
         vectors_of::<ClusterTangent>(room.clusters),
@@ -113,7 +109,6 @@ impl<'a> Matrices<'a> {
             mass_factors: take(rest, 3 * bands.scalars.floats())?,
             edge_factor: take(rest, bands.scalars.floats())?,
             inertia: take(rest, cells)?,
-            stabilising: take(rest, if pieces[1] > 0 { cells } else { 0 })?,
             stiffness: take(rest, cells)?,
             bounds: take(rest, cells)?,
             clusters: Clusters {
@@ -121,8 +116,7 @@ impl<'a> Matrices<'a> {
                 moments: take(rest, room.sets)?,
                 heads: take(rest, cells)?,
                 tiles: take(rest, room.tiles)?,
-                moved: take(rest, room.moved[0])?,
-                moved_elements: take(rest, room.moved[1])?,
+                moved: take(rest, room.moved)?,
                 members: take(rest, TILE * room.tiles)?,
             },
             tangents: take(rest, TILE * room.tiles)?,
@@ -146,9 +140,6 @@ impl<'a> Matrices<'a> {
         let counts = input.write(&mut self.clusters).or_else(|| merged.write(&mut self.clusters));
         let Some(counts) = counts else { return false };
         (renewal.clusters, renewal.tiles, renewal.is_merged) = (counts.clusters, counts.tiles, counts.is_merged);
-        if !self.stabilising.is_empty() {
-            input.write_stabilising(self.stabilising);
-        }
         self.inertia.fill([[0.0; 4]; _]);
         for place in places {
             if let Some(inertia) = scene.inertia.get(place.node()) {

@@ -124,7 +124,7 @@ pub(super) const fn vectors_of_places(nodes: usize) -> usize {
 }
 
 /// Least spacing of the points of a suggested lattice, as a multiple of the nodes'.
-const LEAST_SPACING: f32 = 1.5;
+const LEAST_SPACING: f32 = 2.0;
 
 /// Least number of nodes for each function of a suggested lattice, and on meshes that are too small for that.
 const NODES_PER_FUNCTION: [usize; 2] = [4, 2];

@@ -61,7 +61,7 @@ impl<R: Real> HeldSums<R> {
 pub(super) struct LatticeMotion<'a> {
     /// Added to the increments of the nodes.
     pub(super) cells: &'a [CellPolynomial],
-    /// What the forces of the step do to the body as a whole, m.
+    /// What the forces of the step do to the body as a whole by the nodes' own inertia, m.
     pub(super) mean: [f32; 3],
     /// The smooth part of the last increment, if rough motion can be told from it.
     pub(super) smooth: Option<&'a [CellPolynomial]>,
@@ -201,7 +201,7 @@ impl MotionPass<'_> {
         let mut square = R::splat(0.0);
         for axis in 0..3 {
             own[axis] = inverse * own[axis];
-            let with_body = free[axis] * own_share * R::splat(self.lattice.mean[axis]);
+            let with_body = free[axis] * R::splat(self.lattice.mean[axis]);
             let relative = (R::splat(1.0) - own_share) * (own[axis] - with_body);
             square = relative.fused(relative, square);
         }

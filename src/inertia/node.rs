@@ -32,9 +32,6 @@ pub(super) fn half_damping(step: &Step) -> f32 {
     0.5 * step.damping() * step.seconds()
 }
 
-/// Least `1 - t`: a node that takes its true inertia leaves nothing to the lattice.
-const LEAST_REST: f32 = 1e-4;
-
 impl Scaling {
     /// `N + k (1 + k) m` of nodes with these masses (kg) and closer bounds `rho b`, N/m.
     #[inline(always)]
@@ -46,11 +43,5 @@ impl Scaling {
     #[inline(always)]
     pub(super) fn own_share<R: Real>(&self, mass: R, inertia: R) -> R {
         (R::splat(1.0 + self.k) * mass).divide(inertia)
-    }
-
-    /// What that leaves to the lattice, as inertia: `(1 + k) m / (1 - t)`, kg.
-    pub(super) fn coarse_inertia(&self, mass: f32, inertia: f32) -> f32 {
-        let moved = (1.0 + self.k) * mass;
-        moved / (1.0 - self.own_share(mass, inertia)).max(LEAST_REST)
     }
 }

@@ -1,4 +1,4 @@
-//! Tables over the nodes in the caller's storage: three vectors of four floats for each node, one without a damper. They
+//! Tables over the nodes in the caller's storage: five vectors of four floats for each node. They
 //! are in the order of the cells, in which a step takes the nodes ([`super::lattice::rank_of`]).
 //!
 //! A step changes the rough motion before it is known whether it will be taken, and keeps what it was for the case that
@@ -9,7 +9,7 @@ use crate::simd::NodeVector;
 
 /// Vectors of the tables of `nodes` nodes.
 pub(super) const fn vectors_for(nodes: usize) -> usize {
-    nodes.saturating_mul(4)
+    nodes.saturating_mul(5)
 }
 
 pub(super) struct NodeTables<'a> {
@@ -21,8 +21,9 @@ pub(super) struct NodeTables<'a> {
     pub(super) rough: &'a mut [NodeVector],
     /// The same before the step.
     pub(super) rough_before: &'a mut [NodeVector],
-    /// For use while inertia is computed anew.
+    /// For use while inertia is computed anew, and at the preparation.
     pub(super) scratch: &'a mut [NodeVector],
+    pub(super) more_scratch: &'a mut [NodeVector],
 }
 
 impl<'a> NodeTables<'a> {
@@ -30,7 +31,8 @@ impl<'a> NodeTables<'a> {
         let (next_increment, rest) = vectors.split_at_mut_checked(nodes)?;
         let (rough, rest) = rest.split_at_mut_checked(nodes)?;
         let (rough_before, rest) = rest.split_at_mut_checked(nodes)?;
-        Some(Self { next_increment, rough, rough_before, scratch: rest.get_mut(..nodes)? })
+        let (scratch, rest) = rest.split_at_mut_checked(nodes)?;
+        Some(Self { next_increment, rough, rough_before, scratch, more_scratch: rest.get_mut(..nodes)? })
     }
 
     /// Forgets the rough motion.

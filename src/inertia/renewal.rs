@@ -9,7 +9,7 @@ use super::band::factorise;
 use super::cells::CellPolynomial;
 use super::coarse_stiffness::{add_cell, tangent_of, write_cell};
 use super::frames::Frames;
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, node_at};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_POINTS, node_at};
 use super::matrices::{Bands, Matrices, add_node, fill_held_axes};
 use super::node::Scaling;
 use super::node_tables::NodeTables;
@@ -27,6 +27,8 @@ const LARGEST_CHANGE: f32 = 0.08;
 
 /// Change of the lattice's shape in one step at which drag is full, for tissue that is as stiff in volume as in shear.
 const LARGEST_CHANGE_OF_STEP: f32 = 0.8;
+/// Least part of a cell's motion that is left to the lattice: where nodes take their true inertia, there is none.
+const LEAST_REST: f32 = 1e-5;
 /// Least sensitivity to a change of shape: the stiffness changes with the shape for any tissue.
 const LEAST_SENSITIVITY: f32 = 8.0;
 
@@ -55,6 +57,8 @@ pub(super) struct Renewal {
     pub(super) added: AddedInertia,
     /// Mass that can move along each axis, kg.
     pub(super) mass: [f32; 3],
+    /// What nodes do of a motion of the body by themselves.
+    pub(super) own_share: f32,
 }
 
 /// What `S` is computed from.
@@ -91,6 +95,7 @@ impl Renewal {
         lattice_in_use: false,
         added: AddedInertia::NONE,
         mass: [0.0; 3],
+        own_share: 0.0,
     };
 
     /// The share of the last increment's unresolved deformation of the lattice that a step removes. Deformation is fed
@@ -144,7 +149,7 @@ impl Renewal {
         matrices: &mut Matrices<'_>,
         threads: &impl Threads,
     ) {
-        let Matrices { factor, scratch, inertia, stabilising, stiffness, clusters, tangents, of_clusters, .. } = matrices;
+        let Matrices { factor, scratch, inertia, stiffness, clusters, tangents, of_clusters, .. } = matrices;
         let tiles = clusters.tiles.get(..self.tiles).unwrap_or_default();
         write_tangents(input, tiles, tangents, threads);
         let clusters = &*clusters;
@@ -157,11 +162,7 @@ impl Renewal {
         let (lattice, band) = (input.lattice, &self.bands.vectors);
         band.clear(factor);
         for (cell, (stiffness, inertia)) in stiffness.iter().zip(&**inertia).enumerate() {
-            let mut constant = *inertia;
-            for (sums, stiffness) in constant.iter_mut().zip(stabilising.get(cell).into_iter().flatten()) {
-                sums.iter_mut().zip(stiffness).for_each(|(sum, each)| *sum += input.scaling.coarse_weight * each);
-            }
-            add_cell(band, factor, stiffness, &constant, lattice.functions_of(cell), lattice.functions());
+            add_cell(band, factor, stiffness, inertia, lattice.functions_of(cell), lattice.functions());
         }
         self.lattice_in_use = factorise(band, factor, scratch);
         (self.moved, self.changed) = ([NodeVector::ZERO; _], 0.0);
@@ -187,6 +188,7 @@ impl Renewal {
         internal_forces(scene, all, [displacement, &[]], volume, scratch, ScalarBound);
         let Matrices { inertia: of_cells, bounds, .. } = matrices;
         of_cells.fill([[0.0; 4]; _]);
+        let (mut sums, factor) = ([[0.0f32; 2]; MAX_POINTS], 1.0 + scaling.k);
         bounds.fill(0.0);
         self.mass = [0.0; 3];
         self.added = AddedInertia::NONE;
@@ -194,11 +196,10 @@ impl Renewal {
             let node = node_at(places, rank);
             let (Some(place), Some(inertia)) = (places.get(rank), scene.inertia.get(node)) else { continue };
             let bound = scratch.get(node).map_or(0.0, |force| force.0[3]);
-            if let Some(sum) = bounds.get_mut(place.cell()) {
-                *sum += bound;
-            }
             let own = scaling.inertia(inertia.mass, bound * next.0[3]);
-            add_node(of_cells, place, inertia, scaling.coarse_inertia(inertia.mass, own));
+            if let (Some(sum), Some([mass, inertia_sum])) = (bounds.get_mut(place.cell()), sums.get_mut(place.cell())) {
+                (*sum, *mass, *inertia_sum) = (*sum + bound, *mass + factor * inertia.mass, *inertia_sum + own);
+            }
             for (sum, free) in self.mass.iter_mut().zip(inertia.free().to_array()) {
                 *sum += inertia.mass * free;
             }
@@ -206,6 +207,14 @@ impl Renewal {
                 self.added.add(node, (own - scaling.reserve * inertia.mass) / inertia.mass - 1.0);
             }
         }
+        for place in places {
+            let [mass, own] = sums.get(place.cell()).copied().unwrap_or_default();
+            if let Some(inertia) = scene.inertia.get(place.node()) {
+                add_node(of_cells, place, inertia, factor * inertia.mass / (1.0 - mass / own).max(LEAST_REST));
+            }
+        }
+        let [mass, own] = sums.iter().fold([0.0; 2], |[a, b], [mass, own]| [a + mass, b + own]);
+        self.own_share = mass / own;
         self.added.end();
         fill_held_axes(of_cells, lattice);
         self.renew(input, matrices, threads);

@@ -192,7 +192,7 @@ struct MovedLattice {
     removed: f32,
     /// Work of the supports on the lattice, J.
     work: f32,
-    /// What the forces do to the body as a whole, m.
+    /// What the forces do to the body as a whole by the nodes' own inertia, m.
     mean: [f32; 3],
 }
 
@@ -231,7 +231,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
         let largest = node_parts(&scene, *threads).restrict(input, force, cells, momentum);
-        let mean = mean_of(matrices.cells, renewal.mass.map(|mass| (1.0 + scaling.k) * mass));
+        let mean = mean_of(matrices.cells, renewal.mass.map(|mass| (1.0 + scaling.k) * mass / renewal.own_share));
         let forces = restrict(matrices.cells, lattice);
         let stiffness = RenewalInput { scene, displacement, volume, lattice, places, scaling };
         renewal.renew_if_due(stiffness, matrices, *threads);
@@ -245,7 +245,6 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             input: ClusterInput { scene, lattice, places, is_merged },
             clusters: &matrices.clusters,
             tangents: matrices.of_clusters,
-            weight: scaling.coarse_weight,
             displacement,
         };
         let supports = supports.pull(loads, progress.time, step, increment, tables.scratch);

@@ -31,8 +31,6 @@ pub(super) struct MovingSupports<'a, 'm, M> {
     pub(super) clusters: &'a Clusters<'m>,
     /// Of the clusters.
     pub(super) tangents: &'a [ClusterTangent],
-    /// `s_c D^2 / 4`, s^2.
-    pub(super) weight: f32,
     pub(super) displacement: &'a [NodeVector],
 }
 
@@ -67,7 +65,7 @@ impl<M: ElementMaterial> MovingSupports<'_, '_, M> {
         }
         let mut pull = Pull { residual: [NodeVector::ZERO; MAX_FUNCTIONS + 1], energy: 0.0 };
         let (scene, clusters) = (self.input.scene, self.clusters);
-        for (_, piece) in tiles(clusters.moved).flat_map(|tile| Piece::of_tile(scene, tile)) {
+        for piece in tiles(clusters.moved).filter_map(|tile| scene.tiles.get(tile)).flat_map(Piece::of_tile) {
             let Some(motion) = motion_of(&piece, changes) else { continue };
             let cell = piece.cell(self.input.lattice, self.input.places);
             let index = self.input.find(&piece, cell, clusters.all, clusters.heads);
@@ -80,19 +78,13 @@ impl<M: ElementMaterial> MovingSupports<'_, '_, M> {
             };
             self.add(&piece, cell, &motion, stress, &mut pull);
         }
-        for (_, piece) in tiles(clusters.moved_elements).flat_map(|tile| Piece::elements(scene, tile)) {
-            let Some(motion) = motion_of(&piece, changes) else { continue };
-            let modulus = self.weight * piece.volume() * piece.stabilising_modulus(scene);
-            let cell = piece.cell(self.input.lattice, self.input.places);
-            self.add(&piece, cell, &motion, |i, large| modulus * motion[i][large], &mut pull);
-        }
         Some(pull)
     }
 
     /// Adds a piece with the gradient of its supports' motion; `stress(i, I)` is its tangent times that, kg m.
     fn add(
         &self,
-        piece: &Piece<'_, M>,
+        piece: &Piece<'_>,
         cell: usize,
         motion: &[[f32; 3]; 3],
         stress: impl Fn(usize, usize) -> f32,
@@ -119,13 +111,13 @@ fn tiles(list: &[u32]) -> impl Iterator<Item = usize> {
 }
 
 /// `sum_a d_a g_a^T` over the nodes of a piece (1), if it is not zero.
-fn motion_of<M: ElementMaterial>(piece: &Piece<'_, M>, changes: &[NodeVector]) -> Option<[[f32; 3]; 3]> {
+fn motion_of(piece: &Piece<'_>, changes: &[NodeVector]) -> Option<[[f32; 3]; 3]> {
     let mut motion = [[0.0; 3]; 3];
-    piece.each_node(|node, gradient| {
+    for (node, gradient) in piece.nodes().into_iter().zip(piece.gradients()) {
         let change = changes.get(node).copied().unwrap_or_default().to_array();
         for (row, change) in motion.iter_mut().zip(change) {
             row.iter_mut().zip(gradient).for_each(|(sum, along)| *sum += change * along);
         }
-    });
+    }
     (motion != [[0.0; 3]; 3]).then_some(motion)
 }

@@ -81,22 +81,24 @@ pub(super) fn critical<M: ElementMaterial>(
     }
     let StateView { displacement, increment, force, volume, .. } = state;
     let with = |sums: &NodeMatrices<'_>| Largest::of(sums, scene.inertia);
-    let largest = with_bounds(scene, [displacement, increment, force], volume, weights, with)?;
+    let largest = with_bounds(scene, scene.inertia, [displacement, increment, force], volume, weights, with)?;
     let seconds = 2.0 / libm::sqrtf(largest.rate) * (1.0 - ROUNDING);
     largest.finite.then_some(CriticalStep { seconds, node: largest.node })
 }
 
-/// Calls `with` with each node and the largest eigenvalue of its matrix (1/s^2): `K <= sum_a m_a lambda_a` for the
-/// stiffness at the displacements, the first of some vectors of the nodes; the others and `volume` are scratch.
+/// Calls `with` with each node and the largest eigenvalue of its matrix with other masses `x` than its own, 1/s^2:
+/// `K <= sum_a x_a lambda_a` for the stiffness at the displacements, the first of some vectors of the nodes; the others
+/// and `volume` are scratch.
 pub(crate) fn each_rate<M: ElementMaterial>(
     scene: SceneView<'_, M>,
+    inertia: &[NodeInertia],
     vectors: [&mut [NodeVector]; 3],
     volume: &mut [NodeVector],
     mut with: impl FnMut(usize, f32),
 ) -> Option<()> {
     let weights = &mut Weights { of_nodes: &mut [], chosen: true };
-    with_bounds(scene, vectors, volume, weights, |sums| {
-        for (node, inertia) in scene.inertia.iter().enumerate() {
+    with_bounds(scene, inertia, vectors, volume, weights, |sums| {
+        for (node, inertia) in inertia.iter().enumerate() {
             with(node, sums.largest_eigenvalue(node, inertia.inverse));
         }
     })
@@ -105,6 +107,7 @@ pub(crate) fn each_rate<M: ElementMaterial>(
 /// Calls `with` with the nodes' matrices.
 fn with_bounds<M: ElementMaterial, T>(
     scene: SceneView<'_, M>,
+    inertia: &[NodeInertia],
     [displacement, increment, force]: [&mut [NodeVector]; 3],
     volume: &mut [NodeVector],
     weights: &mut Weights<'_>,
@@ -118,7 +121,7 @@ fn with_bounds<M: ElementMaterial, T>(
         zx_in_padding: displacement.get_mut(..count)?,
     };
     sums.clear();
-    let (laws, tiles, inertia) = (scene.material.laws(), scene.tiles, scene.inertia);
+    let (laws, tiles) = (scene.material.laws(), scene.tiles);
     if scene.element().is_nodal_strain() {
         let rows = volume.get_mut(..count)?;
         rows.fill(NodeVector([1.0, 0.0, 0.0, 0.0]));
