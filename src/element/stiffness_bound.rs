@@ -102,13 +102,6 @@ impl<R: Real> Coefficients<R> {
         Self { p1, p_j, cc, ce, ee, floor: R::splat(FLOOR) * (bulk + p1 + ce.abs()) }
     }
 
-    /// Of a law without stress or stiffness.
-    #[inline(always)]
-    pub(super) fn zero() -> Self {
-        let zero = R::splat(0.0);
-        Self { p1: zero, p_j: zero, cc: zero, ce: zero, ee: zero, floor: zero }
-    }
-
     /// With `modulus |dF|^2` taken off.
     #[inline(always)]
     pub(super) fn less(self, modulus: R) -> Self {
@@ -214,6 +207,7 @@ pub(super) fn spatial_bound<R: Real>(
     let b = deformation.left_cauchy_green();
     let pressure = p_j * volume_ratio;
     let tension = p1.fused(b.largest_eigenvalue(), pressure);
+    let stress = tension.max(zero);
     let difference = b.scaled_plus(one, -volume_ratio);
     let square = difference.xx * difference.xx
         + difference.yy * difference.yy
@@ -221,7 +215,6 @@ pub(super) fn spatial_bound<R: Real>(
         + R::splat(2.0)
             * (difference.xy * difference.xy + difference.yz * difference.yz + difference.zx * difference.zx);
     let mixed = ce.abs() * square.root() * volume_ratio;
-    let stress = tension.max(zero);
     let shear = ((tension - stress) - (pressure + pressure)).max(zero);
     SpatialBound {
         shear: shear + ee * square + R::splat(1.0 / SPATIAL_SPLIT) * mixed,

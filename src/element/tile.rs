@@ -113,33 +113,6 @@ impl ElementTile {
         vector_at(&self.volumes, first)
     }
 
-    /// The elements of at most [`TILE`] places, each `TILE` times the index of a tile plus that in the tile.
-    #[inline(always)]
-    pub(crate) fn gather(tiles: &[Self], places: &[u32]) -> Self {
-        let mut gathered = Self::EMPTY;
-        for lane in 0..TILE {
-            let Some(&place) = places.get(lane).or_else(|| places.first()) else {
-                return gathered;
-            };
-            let (Some(tile), from) = (tiles.get(place as usize / TILE), place as usize % TILE) else {
-                continue;
-            };
-            for corner in 0..4 {
-                gathered.nodes[corner][lane] = tile.nodes[corner][from];
-            }
-            for corner in 0..3 {
-                for axis in 0..3 {
-                    gathered.gradients[corner][axis][lane] = tile.gradients[corner][axis][from];
-                }
-            }
-            gathered.elements[lane] = tile.elements[from];
-            gathered.gradient_eigenvalues[lane] = tile.gradient_eigenvalues[from];
-            // Places without an element have volume zero.
-            gathered.volumes[lane] = if lane < places.len() { tile.volumes[from] } else { 0.0 };
-        }
-        gathered
-    }
-
     /// Writes an element with these `corners` (m) to place `lane`.
     pub(crate) fn write(&mut self, lane: usize, element: Numbered, corners: [DVec3; 4]) {
         fn set<T>(values: &mut [T; TILE], lane: usize, value: T) {

@@ -420,7 +420,7 @@ mod tests {
     /// A body that drifts far away, so slowly that rounding would stop it: the second run arrives where the first does.
     #[test]
     fn the_second_run_does_not_lose_slow_motion() {
-        let bar = Bar { size: [0.004; 3], cells: [1, 1, 1] };
+        let bar = Bar { size: [0.008, 0.008, 0.016], cells: [2, 2, 4] };
         let (points, scene) = scene_of(NeoHookean { c: 2e6, d: 2e8 }, bar);
         let step = Step::unchecked(1e-6, 0.0).unwrap();
         let mut state = VecState::at_rest(scene.node_count());
