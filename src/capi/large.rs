@@ -19,7 +19,7 @@ use supple_status::*;
 /// Points that a lattice may have.
 pub const SUPPLE_LATTICE_POINTS: u32 = 1024;
 /// Functions that a lattice may have.
-pub const SUPPLE_LATTICE_FUNCTIONS: u32 = 128;
+pub const SUPPLE_LATTICE_FUNCTIONS: u32 = 240;
 const _: () = assert!(SUPPLE_LATTICE_POINTS as usize == crate::inertia::MAX_POINTS);
 const _: () = assert!(SUPPLE_LATTICE_FUNCTIONS as usize == crate::inertia::MAX_FUNCTIONS);
 

@@ -160,7 +160,7 @@ fn inverse_of_factor(mut square: [Part; PANEL]) -> Option<[Part; PANEL]> {
     for k in 0..PANEL {
         let (line, inverse_line) = (square[k], inverse[k]);
         let reciprocal = 1.0 / line[k];
-        if !(line[k] > 0.0 && reciprocal.is_finite()) {
+        if !(reciprocal > 0.0 && reciprocal.is_finite()) {
             return None;
         }
         for m in k + 1..PANEL {

@@ -16,11 +16,11 @@
 
 use core::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
 use crate::element::{Axes, ElementMaterial, ElementTile, NodeInertia};
 use crate::mesh::partition::MAX_PARTITIONS;
 use crate::scene::SceneView;
 use crate::simd::TILE;
+use bytemuck::{Pod, Zeroable};
 
 use super::lattice::{Lattice, LatticeNode, eight_weights, node_place};
 
@@ -149,7 +149,10 @@ impl ClusterRoom {
         const fn tiles_of(pieces: usize) -> usize {
             pieces.div_ceil(TILE).saturating_add(2 * MAX_PARTITIONS)
         }
-        let (all, tiles) = (tiles_of(if patches > 0 { patches } else { elements }), cells.saturating_mul(TILES[0]).saturating_add(TILES[1]));
+        let (all, tiles) = (
+            tiles_of(if patches > 0 { patches } else { elements }),
+            cells.saturating_mul(TILES[0]).saturating_add(TILES[1]),
+        );
         Self {
             clusters: cells.saturating_mul(CLUSTERS),
             sets: cells.saturating_mul(SETS),

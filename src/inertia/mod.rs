@@ -81,10 +81,14 @@
 
 mod added_motion;
 mod band;
+#[cfg(test)]
+mod band_tests;
 mod cells;
 mod clusters;
 mod coarse_motion;
 mod coarse_stiffness;
+#[cfg(test)]
+mod coarse_stiffness_tests;
 mod contact;
 mod damper;
 mod frames;

@@ -1,6 +1,6 @@
 //! What cannot be prepared or stepped is said, and nothing moves.
 
-use supple::inertia::{Cells, InertiaError, LargeModel, LargeStep, Method, vectors_for};
+use supple::inertia::{Cells, InertiaError, LargeModel, LargeStep, MAX_FUNCTIONS, Method, vectors_for};
 use supple::loads::{Loads, NodalForce};
 use supple::material::{Tissue, VecMaterial};
 use supple::scene::{Support, VecScene};
@@ -65,7 +65,7 @@ fn what_cannot_be_prepared_is_said_and_no_step_is_taken() {
         said(error, &format!("a lattice of {x} x {y} x {z} cells: each must be at least 1, with at most 1024 points"));
     }
     let error = refused(given([9, 9, 9]), 100_000, nothing);
-    said(error, "a lattice of 9 x 9 x 9 cells has more than 128 functions");
+    said(error, &format!("a lattice of 9 x 9 x 9 cells has more than {MAX_FUNCTIONS} functions"));
     let error = refused(given([1, 1, 2]), 100_000, |_, points, _| {
         points.pop();
     });
