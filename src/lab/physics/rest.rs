@@ -56,7 +56,7 @@ impl Setup<'_> {
             if calm >= 3 && (kinetic.is_nan() || kinetic <= STILL) {
                 return Ok(Cost { simulated: state.time() - from, computing });
             }
-            // The critical step changes with the shape; damped steps follow it by themselves.
+            // The critical step changes with the shape; long steps follow it by themselves.
             if self.steps.kind == Kind::Exact {
                 advance = self.advance(state, damping)?;
             }
