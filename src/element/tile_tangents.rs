@@ -41,7 +41,7 @@ pub struct Tangent {
 }
 
 /// Those of a tile.
-pub type TileTangents = [Tangent; TILE];
+pub(crate) type TileTangents = [Tangent; TILE];
 
 /// Least volume ratio of an element that is not crushed.
 const LEAST_VOLUME: f32 = 0.2;

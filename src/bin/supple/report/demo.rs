@@ -159,7 +159,7 @@ fn notes(case: &Compared) -> Vec<String> {
 
 /// What the words mean, for who has not read a page.
 const TERMS: [&str; 2] = [
-    "Exact steps (TLED) stay below the critical step. Damped ones are ten times as long as it: inertia is added where a step would be unstable, and given back to \
+    "Exact steps (TLED) stay below the critical step. Long ones are ten times as long as it: inertia is added where a step would be unstable, and given back to \
              smooth motion. The learned step is a network that predicts accelerations over 1.5 ms, seven times the critical step; it follows a lead-in of 0.3 s of exact ones, comes \
              with the crate, and learned from a twisted bar, not from this lobe.",
     "Errors are distances to the exact steps, mean over nodes and time; next to them stands the error of a lobe that never moves. The guard is a second run, which \
