@@ -88,7 +88,7 @@ pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, unchecked: bool) 
     };
     let step = step.map_err(|error| {
         let advice = if is_exact {
-            "; shorten it, write step = \"auto\", unchecked with --unchecked, or go beyond with method = \"multilevel\""
+            "; shorten it, write step = \"auto\", unchecked with --unchecked, or go beyond with method = \"long\""
         } else {
             ""
         };
