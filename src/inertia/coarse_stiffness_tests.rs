@@ -11,7 +11,7 @@ use reference::dense::{Matrix, zeros};
 use reference::tensor::{Mat3, Mat9, cross, from_fn, product, rotation};
 
 use super::band::{Row, solve};
-use super::clusters::{ClusterInput, Piece};
+use super::clusters::ClusterInput;
 use super::lattice::{Grid, Lattice, LatticeNode, sort_by_cell};
 use super::matrices::{Bands, Matrices, to_components, vectors_for};
 use super::node::Scaling;
@@ -130,38 +130,6 @@ impl<M: ElementMaterial> Prepared<'_, '_, M> {
         with_cell.collect()
     }
 
-    /// Quarters of the elements with the cells of their corners.
-    fn quarters(&self) -> Vec<Reference> {
-        let quarters = self.elements().into_iter().flat_map(|(volume, _, nodes)| {
-            let cells: Vec<_> = nodes.iter().map(|(node, _)| self.cell(*node)).collect();
-            cells.into_iter().map(move |cell| (0.25 * volume, cell, nodes.clone()))
-        });
-        quarters.collect()
-    }
-
-    fn cell(&self, node: usize) -> [usize; 3] {
-        let position = self.position(node);
-        [0, 1, 2].map(|axis| (position[axis] as usize).min(CELLS[axis] as usize - 1))
-    }
-
-    /// Means over the elements of each node.
-    fn patches(&self) -> Vec<Reference> {
-        let elements = self.elements();
-        let of_node = |node: usize| {
-            let own = elements.iter().filter(|(_, _, nodes)| nodes.iter().any(|(of, _)| *of == node));
-            let (mut volume, mut sums) = (0.0, vec![[0.0; 3]; self.points.len()]);
-            for (whole, _, nodes) in own {
-                volume += 0.25 * whole;
-                for (of, gradient) in nodes {
-                    (0..3).for_each(|axis| sums[*of][axis] += 0.25 * whole * gradient[axis]);
-                }
-            }
-            let nodes = sums.into_iter().enumerate().filter(|(_, sum)| *sum != [0.0; 3]);
-            (volume, self.cell(node), nodes.map(|(node, sum)| (node, sum.map(|sum| sum / volume))).collect())
-        };
-        (0..self.points.len()).map(of_node).collect()
-    }
-
     /// Adds `V G_c^T A G_d` of pieces, with the functions of their own cells.
     fn add(&self, pieces: &[Reference], a: &Mat9, sum: &mut Matrix) {
         let functions = self.lattice.functions();
@@ -206,16 +174,14 @@ impl<M: ElementMaterial> Prepared<'_, '_, M> {
         let (mut sum, functions) = (zeros(self.unknowns()), self.lattice.functions());
         for (cell, matrices) in self.matrices.stiffness.iter().enumerate() {
             let of_cell = self.lattice.functions_of(cell);
-            let stabilising = self.matrices.stabilising.get(cell);
             super::clusters::for_each_pair(|pair, c, d| {
                 if of_cell[c] >= functions || of_cell[d] >= functions {
                     return;
                 }
                 let entries = matrices.of_pair(pair);
                 for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
-                    let own = if i == j { stabilising.map_or(0.0, |own| WEIGHT * own[pair][i]) } else { 0.0 };
                     let (row, column) = (3 * of_cell[c] + i, 3 * of_cell[d] + j);
-                    let value = f64::from(entries[3 * i + j] + own);
+                    let value = f64::from(entries[3 * i + j]);
                     sum[row][column] += value;
                     if c != d {
                         sum[column][row] += value;
@@ -271,22 +237,9 @@ fn law_at_rest() -> Mat9 {
     law.tangent(&from_fn(|i, j| if i == j { 1.0 } else { 0.0 }))
 }
 
-fn unit() -> Mat9 {
-    core::array::from_fn(|row| core::array::from_fn(|column| if row == column { 1.0 } else { 0.0 }))
-}
-
-/// The modulus of the stabilising energy, Pa: 0.4 shear moduli.
-const MODULUS: f64 = 0.4 * 2.0 * LAW.c as f64;
-
 fn is_the_sum<M: ElementMaterial>(name: &str, prepared: &Prepared<'_, '_, M>) {
-    let (mut sum, of_rest) = (zeros(prepared.unknowns()), law_at_rest());
-    if prepared.scene.element().is_nodal_strain() {
-        let less = core::array::from_fn(|i| core::array::from_fn(|j| of_rest[i][j] - MODULUS * unit()[i][j]));
-        prepared.add(&prepared.patches(), &less, &mut sum);
-        prepared.add(&prepared.quarters(), &unit().map(|row| row.map(|x| MODULUS * x)), &mut sum);
-    } else {
-        prepared.add(&prepared.elements(), &of_rest, &mut sum);
-    }
+    let mut sum = zeros(prepared.unknowns());
+    prepared.add(&prepared.elements(), &law_at_rest(), &mut sum);
     let apart = worst(&prepared.of_cells(), &sum);
     println!(
         "{name}: {} functions, {} clusters: {apart:.1e} apart",
@@ -340,11 +293,19 @@ fn the_coarse_stiffness_under_even_strain_is_the_sum_over_elements_and_patches()
     fn of<M: ElementMaterial>(name: &str, prepared: &Prepared<'_, '_, M>) {
         let Prepared { scene, matrices, .. } = *prepared;
         // Of each piece: the columns are f, the factors alpha, beta, gamma.
-        let tangents = Piece::of_tile(scene, matrices.clusters.tiles[0] as usize).map(|(lane, piece)| -> Mat9 {
+        let tile = matrices.clusters.tiles[0] as usize;
+        let volume = |lane: usize| {
+            if scene.element().is_nodal_strain() {
+                scene.patches.tiles()[tile].volume(lane) as f32
+            } else {
+                scene.tiles[tile].volume(lane)
+            }
+        };
+        let tangents = (0..crate::simd::TILE).filter(|&lane| volume(lane) > 0.0).map(|lane| -> Mat9 {
             let tangent = &matrices.tangents[lane];
             let f = |i: usize, large: usize| f64::from(tangent.columns[large][i]);
             let [inner, outer, exchanged, is_spatial] =
-                tangent.factors.map(|factor| f64::from(factor) / f64::from(WEIGHT * piece.volume()));
+                tangent.factors.map(|factor| f64::from(factor) / f64::from(WEIGHT * volume(lane)));
             assert!(is_spatial > 0.0);
             core::array::from_fn(|row| {
                 core::array::from_fn(|column| {
@@ -359,12 +320,7 @@ fn the_coarse_stiffness_under_even_strain_is_the_sum_over_elements_and_patches()
         let dense = |a: &Mat9| a.iter().map(|row| row.to_vec()).collect::<Matrix>();
         assert!(tangents.iter().all(|each| worst(&dense(each), &dense(&tangents[0])) < 1e-4));
         let mut sum = zeros(prepared.unknowns());
-        if scene.element().is_nodal_strain() {
-            prepared.add(&prepared.patches(), &tangents[0], &mut sum);
-            prepared.add(&prepared.quarters(), &unit().map(|row| row.map(|x| MODULUS * x)), &mut sum);
-        } else {
-            prepared.add(&prepared.elements(), &tangents[0], &mut sum);
-        }
+        prepared.add(&prepared.elements(), &tangents[0], &mut sum);
         let apart = worst(&prepared.of_cells(), &sum);
         println!("{name}: {apart:.1e} apart");
         assert!(apart < 1e-4);
@@ -423,7 +379,6 @@ fn a_translation_of_body_and_supports_together_meets_no_resistance() {
             input: ClusterInput { scene, lattice, places, is_merged: renewal.is_merged },
             clusters: &matrices.clusters,
             tangents: matrices.of_clusters,
-            weight: WEIGHT,
             displacement,
         };
         let step = Step::unchecked(1e-3, 0.0).unwrap();

@@ -11,7 +11,7 @@
 
 use super::clusters::{ClusterInput, Clusters, NO_TILE, Piece};
 use super::coarse_stiffness::ClusterTangent;
-use super::lattice::{CoarseVectors, LatticeNode, MAX_FUNCTIONS, node_place};
+use super::lattice::{CoarseVectors, MAX_FUNCTIONS};
 use crate::element::ElementMaterial;
 use crate::loads::Loads;
 use crate::simd::NodeVector;
