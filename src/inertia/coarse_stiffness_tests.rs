@@ -389,11 +389,7 @@ fn a_translation_of_body_and_supports_together_meets_no_resistance() {
         let resistance = times(&prepared.of_cells(), &all);
         let fixed: Vec<usize> = supports.iter().filter(|support| !support.moves).map(|s| s.node as usize).collect();
         let mut near = vec![false; lattice.functions()];
-        let mut pieces = prepared.elements();
-        if scene.element().is_nodal_strain() {
-            pieces.extend(prepared.patches().into_iter().chain(prepared.quarters()));
-        }
-        for (_, [i, j, k], nodes) in pieces {
+        for (_, [i, j, k], nodes) in prepared.elements() {
             let touches = nodes.iter().any(|(node, _)| fixed.contains(node));
             let cell = i + CELLS[0] as usize * (j + CELLS[1] as usize * k);
             for function in lattice.functions_of(cell).into_iter().filter(|_| touches) {
