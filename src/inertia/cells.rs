@@ -229,18 +229,6 @@ pub(super) fn motion_at<R: Real>(cells: &[CellPolynomial], nodes: &NodesInCells<
     moved
 }
 
-/// The sum of the nodes' vectors over some mass along each axis (kg), from the sums of the cells.
-pub(super) fn mean_of(cells: &[CellPolynomial], mass: [f32; 3]) -> [f32; 3] {
-    let mut sum = [0.0; 3];
-    for cell in cells {
-        sum.iter_mut().zip(cell.0[0]).for_each(|(sum, of_cell)| *sum += of_cell);
-    }
-    for (sum, mass) in sum.iter_mut().zip(mass) {
-        *sum = if mass > 0.0 { *sum / mass } else { 0.0 };
-    }
-    sum
-}
-
 /// `W^T v` for each function, from the sums of the cells.
 pub(super) fn restrict(cells: &[CellPolynomial], lattice: &Lattice) -> CoarseVectors {
     let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];

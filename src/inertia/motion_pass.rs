@@ -61,8 +61,8 @@ impl<R: Real> HeldSums<R> {
 pub(super) struct LatticeMotion<'a> {
     /// Added to the increments of the nodes.
     pub(super) cells: &'a [CellPolynomial],
-    /// What the forces of the step do to the body as a whole by the nodes' own inertia, m.
-    pub(super) mean: [f32; 3],
+    /// What nodes do of a motion of the body by themselves.
+    pub(super) own_share: f32,
     /// The smooth part of the last increment, if rough motion can be told from it.
     pub(super) smooth: Option<&'a [CellPolynomial]>,
     /// The share of the rest, the rough part, that is removed.
@@ -197,12 +197,21 @@ impl MotionPass<'_> {
         let inertia = scaling.inertia(mass, closeness * bound);
         let (inverse, own_share) = (R::splat(1.0).divide(inertia), scaling.own_share(mass, inertia));
         let mut own = self.input.residual(&nodes);
-        // What the node would do relative to the body, as far as not by its true inertia.
-        let mut square = R::splat(0.0);
+        // What the node would do relative to its surroundings, as far as not by its true inertia: of their motion it does
+        // its own share where forces are new, and theirs where tissue has yielded to the difference.
+        let (mut along, mut square) = (R::splat(0.0), R::splat(f32::MIN_POSITIVE));
         for axis in 0..3 {
             own[axis] = inverse * own[axis];
-            let with_body = free[axis] * R::splat(self.lattice.mean[axis]);
-            let relative = (R::splat(1.0) - own_share) * (own[axis] - with_body);
+            along = along + own[axis] * coarse[axis];
+            square = square + coarse[axis] * coarse[axis];
+        }
+        let theirs = R::splat(self.lattice.own_share);
+        let ratio = |share: R| share.divide((R::splat(1.0) - theirs).max(R::splat(f32::MIN_POSITIVE)));
+        let [one, other] = [ratio(own_share), ratio(theirs)];
+        let with_them = along.divide(square).max(one.min(other)).min(one.max(other));
+        let mut square = R::splat(0.0);
+        for axis in 0..3 {
+            let relative = (R::splat(1.0) - own_share) * (own[axis] - free[axis] * with_them * coarse[axis]);
             square = relative.fused(relative, square);
         }
         let share = before[3].divide(square.root()).min(R::splat(1.0));

@@ -55,8 +55,6 @@ pub(super) struct Renewal {
     /// Whether `S` could be factorised: if not, the lattice is not used.
     pub(super) lattice_in_use: bool,
     pub(super) added: AddedInertia,
-    /// Mass that can move along each axis, kg.
-    pub(super) mass: [f32; 3],
     /// What nodes do of a motion of the body by themselves.
     pub(super) own_share: f32,
 }
@@ -94,7 +92,6 @@ impl Renewal {
         sensitivity: LEAST_SENSITIVITY,
         lattice_in_use: false,
         added: AddedInertia::NONE,
-        mass: [0.0; 3],
         own_share: 0.0,
     };
 
@@ -190,7 +187,6 @@ impl Renewal {
         of_cells.fill([[0.0; 4]; _]);
         let (mut sums, factor) = ([[0.0f32; 2]; MAX_POINTS], 1.0 + scaling.k);
         bounds.fill(0.0);
-        self.mass = [0.0; 3];
         self.added = AddedInertia::NONE;
         for (rank, next) in next_increment.iter().enumerate() {
             let node = node_at(places, rank);
@@ -199,9 +195,6 @@ impl Renewal {
             let own = scaling.inertia(inertia.mass, bound * next.0[3]);
             if let (Some(sum), Some([mass, inertia_sum])) = (bounds.get_mut(place.cell()), sums.get_mut(place.cell())) {
                 (*sum, *mass, *inertia_sum) = (*sum + bound, *mass + factor * inertia.mass, *inertia_sum + own);
-            }
-            for (sum, free) in self.mass.iter_mut().zip(inertia.free().to_array()) {
-                *sum += inertia.mass * free;
             }
             if inertia.held_count() < 3 {
                 self.added.add(node, (own - scaling.reserve * inertia.mass) / inertia.mass - 1.0);

@@ -13,7 +13,7 @@ use crate::step::{
     CallingThread, Computed, Forcing, Moving, Status, Step, StepMethod, Threads, Totals, Trial, nodal_volumes,
 };
 
-use super::cells::{mean_of, prolong, restrict};
+use super::cells::{prolong, restrict};
 use super::clusters::ClusterInput;
 use super::coarse_motion::{CoarseMotion, CoarseSpace, MotionResult, removed_share};
 use super::damper::RoughMotion;
@@ -192,8 +192,6 @@ struct MovedLattice {
     removed: f32,
     /// Work of the supports on the lattice, J.
     work: f32,
-    /// What the forces do to the body as a whole by the nodes' own inertia, m.
-    mean: [f32; 3],
 }
 
 // Not inlined, like `finish`: the stack of one is free in the others.
@@ -231,14 +229,13 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
         let largest = node_parts(&scene, *threads).restrict(input, force, cells, momentum);
-        let mean = mean_of(matrices.cells, renewal.mass.map(|mass| (1.0 + scaling.k) * mass / renewal.own_share));
         let forces = restrict(matrices.cells, lattice);
         let stiffness = RenewalInput { scene, displacement, volume, lattice, places, scaling };
         renewal.renew_if_due(stiffness, matrices, *threads);
         if !renewal.lattice_in_use {
             prolong(&[NodeVector::ZERO; _], lattice, matrices.cells);
             self.coarse_share = 0.0;
-            return MovedLattice { has_smooth: false, removed: 0.0, work: 0.0, mean };
+            return MovedLattice { has_smooth: false, removed: 0.0, work: 0.0 };
         }
         let is_merged = renewal.is_merged;
         let supports = MovingSupports {
@@ -265,7 +262,6 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             has_smooth: smooth.is_some(),
             removed: self.damping.max(removed),
             work: work / (step.seconds() * step.seconds()),
-            mean,
         }
     }
 
@@ -278,7 +274,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let residual = ResidualFactors::new(step, scaling, progress.steps == 0);
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let smooth = moved.has_smooth.then_some(&*matrices.smooth_cells);
-        let lattice = LatticeMotion { cells: matrices.cells, smooth, removed: moved.removed, mean: moved.mean };
+        let lattice = LatticeMotion { cells: matrices.cells, smooth, removed: moved.removed, own_share: model.renewal.own_share };
         self.rough_written = moved.has_smooth;
         let mut totals;
         PassTotals { totals, rough: self.rough, held_back: self.held_back } =
