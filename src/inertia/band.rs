@@ -43,12 +43,16 @@ impl Band {
     pub(super) fn new(lattice: &Lattice, unknowns: usize) -> Self {
         let mut lowest = [MAX_FUNCTIONS; MAX_FUNCTIONS];
         for cell in 0..lattice.cell_count() {
-            let functions = lattice.functions_of(cell);
-            let least = functions.into_iter().fold(MAX_FUNCTIONS, usize::min);
-            for function in functions {
-                if let Some(lowest) = lowest.get_mut(function) {
-                    *lowest = least.min(*lowest);
-                }
+            let (numbers, mut least) = (lattice.functions_of(cell), MAX_FUNCTIONS);
+            for number in numbers {
+                lattice.each_function(number, |function, _| least = function.min(least));
+            }
+            for number in numbers {
+                lattice.each_function(number, |function, _| {
+                    if let Some(lowest) = lowest.get_mut(function) {
+                        *lowest = least.min(*lowest);
+                    }
+                });
             }
         }
         let size = unknowns * lattice.functions();
@@ -68,10 +72,10 @@ impl Band {
     /// Floats of such a matrix for a lattice of these cells with this many functions, or more than that.
     pub(super) fn most_floats(cells: [u32; 3], functions: usize, unknowns: usize) -> usize {
         let [a, b, c] = cells.map(|count| (count as usize).saturating_add(1));
-        // Two layers across the longest axis, and whole panels at both ends.
-        let layer = (a * b).min(b.saturating_mul(c)).min(a.saturating_mul(c));
+        // Four layers across the longest axis, where light points lie between, and whole panels at both ends.
+        let layer = a.saturating_mul(b).min(b.saturating_mul(c)).min(a.saturating_mul(c));
         let size = whole(unknowns.saturating_mul(functions));
-        size.saturating_mul(size.min(whole(unknowns.saturating_mul(2 * layer)) + PANEL))
+        size.saturating_mul(size.min(whole(unknowns.saturating_mul(layer.saturating_mul(4))) + PANEL))
     }
 
     /// Floats that [`factorise`] needs for so many functions with three unknowns, or more than that.

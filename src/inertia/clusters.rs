@@ -217,7 +217,7 @@ impl<'a> Piece<'a> {
             let place = node_place(places, node).copied().unwrap_or_default();
             position.iter_mut().zip(lattice.position(&place)).for_each(|(sum, at)| *sum += 0.25 * at);
         }
-        lattice.whole_cell(position)
+        lattice.cell_at(position)
     }
 }
 

@@ -34,16 +34,16 @@ pub(super) struct CoarseSpace<'a, 'm> {
 impl CoarseSpace<'_, '_> {
     /// `S^-1 g`.
     pub(super) fn solved(&self, forces: &CoarseVectors) -> CoarseVectors {
-        let mut row = to_components(forces);
+        let mut row = to_components(forces, self.lattice);
         solve(&self.renewal.bands.vectors, self.matrices.factor, [&mut row]);
-        from_components(&row, self.lattice.functions())
+        from_components(&row, self.lattice)
     }
 
     /// The same for two.
     fn both_solved(&self, forces: [&CoarseVectors; 2]) -> [CoarseVectors; 2] {
-        let [mut a, mut b]: [Row; 2] = forces.map(to_components);
+        let [mut a, mut b]: [Row; 2] = forces.map(|forces| to_components(forces, self.lattice));
         solve(&self.renewal.bands.vectors, self.matrices.factor, [&mut a, &mut b]);
-        [a, b].map(|row| from_components(&row, self.lattice.functions()))
+        [a, b].map(|row| from_components(&row, self.lattice))
     }
 
     /// `((1 + k) Mc + E) x`.

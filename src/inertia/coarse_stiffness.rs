@@ -13,6 +13,7 @@ use glam::Vec4;
 
 use super::band::Band;
 use super::clusters::{Cluster, Clusters, PAIRS, PairMatrices, clusters_of, for_each_pair};
+use super::lattice::Lattice;
 use crate::element::Tangent;
 use crate::simd::{Kernel, Real, dispatch};
 
@@ -175,24 +176,47 @@ pub(super) fn add_cell(
     sum: &mut [f32],
     matrices: &PairMatrices,
     more: &AxisMatrices,
-    functions: [usize; 8],
-    count: usize,
+    lattice: &Lattice,
+    cell: usize,
 ) {
+    let numbers = lattice.functions_of(cell);
     for_each_pair(|pair, c, d| {
-        let (first, second) = (functions[c], functions[d]);
-        if first >= count || second >= count {
+        let (first, second) = (numbers[c], numbers[d]);
+        if !lattice.moves(first) || !lattice.moves(second) {
             return;
         }
         let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = matrices.of_pair(pair);
         let [x, y, z, _] = more[pair % PAIRS];
         let rows = [[xx + x, xy, xz], [yx, yy + y, yz], [zx, zy, zz + z]];
-        let columns = [[xx + x, yx, zx], [xy, yy + y, zy], [xz, yz, zz + z]];
-        let (high, low, rows) = if first >= second { (first, second, rows) } else { (second, first, columns) };
-        for (axis, row) in rows.into_iter().enumerate() {
-            let at = band.at(3 * high + axis, 3 * low);
-            let entries = if high == low { axis + 1 } else { 3 };
-            let places = sum.get_mut(at..at + entries).unwrap_or_default();
-            places.iter_mut().zip(row).for_each(|(place, value)| *place += value);
+        if lattice.is_light(first) || lattice.is_light(second) {
+            lattice.each_function(first, |a, weight| {
+                lattice.each_function(second, |b, other| {
+                    if c == d && b > a {
+                        return;
+                    }
+                    add_pair(band, sum, [a, b], rows.map(|row| row.map(|value| weight * other * value)));
+                    // What the two in turn add, which is the transpose, where both meet on the diagonal.
+                    if a == b && c != d {
+                        let columns = [0, 1, 2].map(|i| [0, 1, 2].map(|j| weight * other * rows[j][i]));
+                        add_pair(band, sum, [a, b], columns);
+                    }
+                });
+            });
+        } else {
+            add_pair(band, sum, [first, second], rows);
         }
     });
+}
+
+/// Adds the matrix of two functions, or its transpose below the diagonal.
+#[inline(always)]
+fn add_pair(band: &Band, sum: &mut [f32], [first, second]: [usize; 2], rows: [[f32; 3]; 3]) {
+    let (high, low) = (first.max(second), first.min(second));
+    for axis in 0..3 {
+        let row = if first >= second { rows[axis] } else { [rows[0][axis], rows[1][axis], rows[2][axis]] };
+        let at = band.at(3 * high + axis, 3 * low);
+        let entries = if high == low { axis + 1 } else { 3 };
+        let places = sum.get_mut(at..at + entries).unwrap_or_default();
+        places.iter_mut().zip(row).for_each(|(place, value)| *place += value);
+    }
 }

@@ -1,7 +1,6 @@
 //! A coarse lattice around the body: trilinear functions `W` on the nodes, one for each lattice point. Motion that they
-//! can represent is smooth motion. A function is zero at held axes. A function is dropped if supports or the surface of
-//! the body leave it almost no mass ([`LEAST_MASS`]): its inertia would be small compared with its stiffness, and the
-//! coarse system ill-conditioned.
+//! can represent is smooth motion. A function is zero at held axes. A point with too little of the body near it has no
+//! function of its own ([`LightPoint`]), as its inertia would be small compared with its stiffness.
 
 use core::{array, fmt};
 
@@ -22,10 +21,12 @@ pub const MAX_POINTS: usize = 1024;
 pub const MAX_FUNCTIONS: usize = 240;
 /// Stands for a point that supports hold: its function is zero.
 const HELD: u8 = MAX_FUNCTIONS as u8;
-/// Stands for a point without a function, because too little of the body is near it.
+/// Stands for a point without nodes near it.
 const EMPTY: u8 = HELD + 1;
-/// Points with less than this share of the largest free mass of a point have no function.
-const LEAST_MASS: f32 = 1e-4;
+/// Stands for a light point before it has a number.
+const LIGHT: u8 = HELD + 2;
+/// Points with less than this share of the largest free mass of a point have no function of their own.
+const LEAST_MASS: f32 = 0.02;
 
 /// A lattice around a body.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
@@ -169,6 +170,19 @@ struct PointMass {
     held: f32,
 }
 
+/// A point with too little of the body near it for a function of its own ([`LEAST_MASS`]): it moves as the nearest cell
+/// without such points would take it along, so that linear motion stays linear and all motion continuous (Höllig, Reif &
+/// Wipper 2001, "Weighted extended B-spline approximation").
+#[derive(Clone, Copy, Debug)]
+struct LightPoint {
+    cell: u16,
+    /// From the lowest corner of that cell, in cells.
+    offset: [i8; 3],
+}
+
+/// Most light points.
+const MAX_LIGHT: usize = 64;
+
 /// A lattice on the box around a body.
 #[derive(Clone, Debug)]
 pub(super) struct Lattice {
@@ -178,8 +192,11 @@ pub(super) struct Lattice {
     low: [f32; 3],
     size: [f32; 3],
     functions: usize,
-    /// Function of each lattice point, or [`HELD`] or [`EMPTY`].
+    /// Function of each lattice point; or from [`Lattice::functions`] on the number of a light point, or [`HELD`] or
+    /// [`EMPTY`].
     function_of_point: [u8; MAX_POINTS],
+    light: [LightPoint; MAX_LIGHT],
+    light_points: usize,
     /// Indices of each cell along the axes, at most 255.
     indices_of_cell: [[u8; 3]; MAX_POINTS],
 }
@@ -191,6 +208,8 @@ impl Lattice {
         size: [0.0; 3],
         functions: 0,
         function_of_point: [HELD; MAX_POINTS],
+        light: [LightPoint { cell: 0, offset: [0; 3] }; MAX_LIGHT],
+        light_points: 0,
         indices_of_cell: [[0; 3]; MAX_POINTS],
     };
 
@@ -240,23 +259,130 @@ impl Lattice {
         }
         let mut masses = [PointMass::default(); MAX_POINTS];
         self.add_masses(points, inertia, &mut masses);
-        if self.mark_empty_points(&masses) {
-            masses.fill(PointMass::default());
-            self.add_masses(points, inertia, &mut masses);
-        }
         let largest = masses.iter().fold(0.0, |most, mass| f32::max(most, mass.free));
         let mut full = false;
-        self.for_each_point(|lattice, point| {
-            let (Some(function), Some(mass)) = (lattice.function_of_point.get_mut(point), masses.get(point)) else {
-                return;
+        // First those that are light, without numbers.
+        for (function, mass) in self.function_of_point.iter_mut().zip(&masses) {
+            let (is_light, is_held) = (mass.free <= LEAST_MASS * largest, mass.held > mass.free);
+            *function = match mass.free > 0.0 {
+                true if !is_light => 0,
+                true if !is_held => LIGHT,
+                _ if mass.held > 0.0 => HELD,
+                _ => EMPTY,
             };
-            if *function != EMPTY && mass.free > 0.0 && (mass.free > LEAST_MASS * largest || mass.held <= mass.free) {
+        }
+        let before = self.function_of_point;
+        self.for_each_point(|lattice, point| {
+            let nearest = if before.get(point) == Some(&LIGHT) { lattice.nearest_whole(point, &before) } else { None };
+            let Some(function) = lattice.function_of_point.get_mut(point) else { return };
+            if nearest.is_none() && (*function == 0 || *function == LIGHT) {
                 full |= lattice.functions == MAX_FUNCTIONS;
                 *function = lattice.functions.min(MAX_FUNCTIONS - 1) as u8;
                 lattice.functions += 1;
             }
         });
+        self.for_each_point(|lattice, point| {
+            let Some(nearest) = lattice.nearest_whole(point, &before).filter(|_| before.get(point) == Some(&LIGHT))
+            else {
+                return;
+            };
+            let number = lattice.functions + lattice.light_points;
+            full |= number >= MAX_FUNCTIONS || lattice.light_points >= MAX_LIGHT;
+            if let (Some(place), Some(function)) =
+                (lattice.light.get_mut(lattice.light_points), lattice.function_of_point.get_mut(point))
+            {
+                *place = nearest;
+                *function = number.min(MAX_FUNCTIONS - 1) as u8;
+                lattice.light_points += 1;
+            }
+        });
         if full { Err(InertiaError::Functions { cells }) } else { Ok(()) }
+    }
+
+    /// The nearest cell without light points to a point, at most one cell away, with functions before they have numbers.
+    fn nearest_whole(&self, point: usize, functions: &[u8; MAX_POINTS]) -> Option<LightPoint> {
+        let counts = self.cells.map(|count| count as usize);
+        let [x, y] = [counts[0] + 1, counts[1] + 1];
+        let at = [point % x, point / x % y, point / x / y];
+        let mut best: Option<(u32, LightPoint)> = None;
+        for (k, j) in (0..4).flat_map(|k| (0..4).map(move |j| (k, j))) {
+            for i in 0..4 {
+                // From two cells before the point on.
+                let indices = [(at[0] + i).checked_sub(2), (at[1] + j).checked_sub(2), (at[2] + k).checked_sub(2)];
+                let [Some(a), Some(b), Some(c)] = indices else { continue };
+                if a >= counts[0] || b >= counts[1] || c >= counts[2] {
+                    continue;
+                }
+                let cell = a + counts[0] * (b + counts[1] * c);
+                let of = |point: usize| functions.get(point).copied().unwrap_or(EMPTY);
+                let corners = self.corner_points(cell).map(of);
+                if corners.iter().any(|&of| of == LIGHT || of == EMPTY) || corners.iter().all(|&of| of == HELD) {
+                    continue;
+                }
+                let offset = [at[0] as i8 - a as i8, at[1] as i8 - b as i8, at[2] as i8 - c as i8];
+                let beyond = offset.map(|offset| u32::from(offset < 0 || offset > 1));
+                let distance = beyond[0] + beyond[1] + beyond[2];
+                if best.is_none_or(|(least, _)| distance < least) {
+                    best = Some((distance, LightPoint { cell: cell as u16, offset }));
+                }
+            }
+        }
+        best.map(|(_, light)| light)
+    }
+
+    /// Calls `visit` with the functions that a number of a point of a cell stands for, and their weights: itself, or those
+    /// that take a light point along.
+    #[inline(always)]
+    pub(super) fn each_function(&self, number: usize, mut visit: impl FnMut(usize, f32)) {
+        match number.checked_sub(self.functions) {
+            None => visit(number, 1.0),
+            Some(light) => {
+                let Some(light) = self.light.get(..self.light_points).and_then(|all| all.get(light)) else { return };
+                let weights = eight_weights(light.offset.map(f32::from));
+                for (function, weight) in self.functions_of(light.cell.into()).into_iter().zip(weights) {
+                    if function < self.functions {
+                        visit(function, weight);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether a number stands for a function or a light point.
+    #[inline(always)]
+    pub(super) const fn moves(&self, number: usize) -> bool {
+        number < self.functions + self.light_points
+    }
+
+    /// Whether a number stands for a light point.
+    #[inline(always)]
+    pub(super) const fn is_light(&self, number: usize) -> bool {
+        number >= self.functions && self.moves(number)
+    }
+
+    /// Adds the sums of light points to those of the functions that take them along.
+    pub(super) fn fold(&self, sums: &mut CoarseVectors) {
+        for light in self.functions..self.functions + self.light_points {
+            let sum = sums.get_mut(light).map(core::mem::take).unwrap_or_default();
+            self.each_function(light, |function, weight| {
+                if let Some(NodeVector(to)) = sums.get_mut(function) {
+                    *to = (Vec4::from(*to) + weight * Vec4::from(sum.0)).to_array();
+                }
+            });
+        }
+    }
+
+    /// Sets the vectors of light points from those of the functions.
+    pub(super) fn expand(&self, vectors: &mut CoarseVectors) {
+        for light in self.functions..self.functions + self.light_points {
+            let mut sum = Vec4::ZERO;
+            self.each_function(light, |function, weight| {
+                sum += weight * vectors.get(function).map_or(Vec4::ZERO, |vector| Vec4::from(vector.0));
+            });
+            if let Some(vector) = vectors.get_mut(light) {
+                vector.0 = sum.to_array();
+            }
+        }
     }
 
     /// The axes from that with the fewest cells to that with the most: the order of the functions.
@@ -300,34 +426,7 @@ impl Lattice {
         }
     }
 
-    /// Marks the points with too little mass that supports do not hold. Gives whether there were any. None is marked
-    /// if no cell would be left.
-    fn mark_empty_points(&mut self, masses: &[PointMass]) -> bool {
-        let before = self.function_of_point;
-        let largest = masses.iter().fold(0.0, |most, mass| f32::max(most, mass.free));
-        let mut any = false;
-        for (function, mass) in self.function_of_point.iter_mut().zip(masses) {
-            let light = mass.free <= LEAST_MASS * largest && mass.held <= mass.free;
-            if light && mass.free > 0.0 {
-                *function = EMPTY;
-                any = true;
-            }
-        }
-        if (0..self.cell_count()).any(|cell| self.is_whole(cell)) {
-            return any;
-        }
-        self.function_of_point = before;
-        false
-    }
-
-    /// Whether no corner of a cell is empty.
-    fn is_whole(&self, cell: usize) -> bool {
-        let of = |point: usize| self.function_of_point.get(point).copied().unwrap_or(EMPTY);
-        self.corner_points(cell).into_iter().all(|point| of(point) != EMPTY)
-    }
-
-    /// The place of a point (m): in its cell, or outside the nearest cell without empty corners. So the functions add
-    /// up to one wherever no support holds them, and reproduce linear fields.
+    /// The place of a point, m.
     pub(super) fn place(&self, point: [f32; 3]) -> LatticeNode {
         let mut position = [0.0; 3];
         for axis in 0..3 {
@@ -337,7 +436,7 @@ impl Lattice {
                 position[axis] = ((point[axis] - self.low[axis]) / size * count).clamp(0.0, count);
             }
         }
-        let cell = self.whole_cell(position);
+        let cell = self.cell_at(position);
         let corner = self.cell_indices(cell).map(f32::from);
         let within = [0, 1, 2].map(|axis| position[axis] - corner[axis]);
         LatticeNode { within, cell: cell as u32, ..LatticeNode::default() }
@@ -349,28 +448,13 @@ impl Lattice {
         [0, 1, 2].map(|axis| corner[axis] + place.within[axis])
     }
 
-    /// The cell of a position (in cells along each axis), or the nearest one without empty corners.
-    pub(super) fn whole_cell(&self, position: [f32; 3]) -> usize {
+    /// The cell of a position, in cells along each axis.
+    pub(super) fn cell_at(&self, position: [f32; 3]) -> usize {
         let mut indices = [0; 3];
         for axis in 0..3 {
             indices[axis] = (position[axis] as u32).min(self.cells[axis].saturating_sub(1)) as u8;
         }
-        let mut cell = self.cell_index(indices);
-        if !self.is_whole(cell) {
-            let mut least = f32::INFINITY;
-            for other in (0..self.cell_count()).filter(|&other| self.is_whole(other)) {
-                let corner = self.cell_indices(other).map(f32::from);
-                let mut square = 0.0;
-                for axis in 0..3 {
-                    let beyond = (corner[axis] - position[axis]).max(position[axis] - corner[axis] - 1.0);
-                    square += beyond.max(0.0) * beyond.max(0.0);
-                }
-                if square < least {
-                    (least, cell) = (square, other);
-                }
-            }
-        }
-        cell
+        self.cell_index(indices)
     }
 
     /// Lattice points at the corners of a cell.
@@ -473,7 +557,10 @@ impl Lattice {
             let per_metre = if self.size[axis] > 0.0 { self.cells[axis] as f32 / self.size[axis] } else { 0.0 };
             weights[axis] = per_metre * per_metre;
         }
-        let of = |point: usize| self.function_of_point.get(point).copied().unwrap_or(EMPTY);
+        let of = |point: usize| match self.function_of_point.get(point).copied().unwrap_or(EMPTY) {
+            light if self.is_light(light.into()) => EMPTY,
+            other => other,
+        };
         let mut point = 0;
         for (k, j) in (0..nz).flat_map(|k| (0..ny).map(move |j| (k, j))) {
             for i in 0..nx {

@@ -31,7 +31,10 @@ impl ListedFunctions {
         for (node, _) in points.iter().flat_map(TouchedPoint::corners) {
             let Some(place) = node_place(places, node) else { continue };
             for function in lattice.functions_of(place.cell()) {
-                if function < MAX_FUNCTIONS && listed.place(function).is_none() {
+                // Light points are none of the functions: the answer is that of the whole lattice.
+                if lattice.is_light(function) {
+                    listed.count = MAX_FUNCTIONS;
+                } else if function < MAX_FUNCTIONS && listed.place(function).is_none() {
                     listed.places[function] = listed.count as u8;
                     if let Some(entry) = listed.list.get_mut(listed.count) {
                         *entry = function as u8;

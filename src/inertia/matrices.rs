@@ -155,12 +155,12 @@ impl<'a> Matrices<'a> {
             for (cell, matrices) in inertia.iter().enumerate() {
                 let functions = lattice.functions_of(cell);
                 for_each_pair(|pair, c, d| {
-                    let (row, column) = (functions[c].max(functions[d]), functions[c].min(functions[d]));
-                    if row < lattice.functions()
-                        && let Some(entry) = factor.get_mut(band.at(row, column))
-                    {
-                        *entry += matrices[pair % matrices.len()][axis % 4];
-                    }
+                    let value = matrices[pair % matrices.len()][axis % 4];
+                    for_each_product(lattice, functions[c], functions[d], |row, column, weight| {
+                        if let Some(entry) = factor.get_mut(band.at(row, column)) {
+                            *entry += weight * value;
+                        }
+                    });
                 });
             }
             is_sound &= factorise(band, factor, scratch);
@@ -183,7 +183,7 @@ impl<'a> Matrices<'a> {
                 for (&at, &pair) in at.iter().zip(pairs) {
                     sum += Vec4::from(matrices[pair]) * at;
                 }
-                if let Some(NodeVector(out)) = out.get_mut(function).filter(|_| function < lattice.functions()) {
+                if let Some(NodeVector(out)) = out.get_mut(function).filter(|_| lattice.moves(function)) {
                     *out = (Vec4::from(*out) + sum).to_array();
                 }
             }
@@ -193,7 +193,9 @@ impl<'a> Matrices<'a> {
 
     /// Replaces vectors of the functions by `Mc^-1` times them.
     #[inline(never)]
-    pub(super) fn divide_by_mass(&self, band: &Band, vectors: &mut CoarseVectors, functions: usize) {
+    pub(super) fn divide_by_mass(&self, band: &Band, vectors: &mut CoarseVectors, lattice: &Lattice) {
+        lattice.fold(vectors);
+        let functions = lattice.functions();
         let mut factors = self.mass_factors.chunks_exact(band.floats().max(1));
         let mut row: Row = [0.0; _];
         for axis in 0..3 {
@@ -205,6 +207,7 @@ impl<'a> Matrices<'a> {
                 vector.0[axis] = *value;
             }
         }
+        lattice.expand(vectors);
     }
 }
 
@@ -246,7 +249,7 @@ pub(super) fn fill_held_axes(matrices: &mut [AxisMatrices], lattice: &Lattice) {
     let mut most = 0.0f32;
     for (cell, matrices) in matrices.iter().enumerate() {
         for (function, at) in lattice.functions_of(cell).into_iter().zip(FIRST_OF_DIAGONAL) {
-            if let Some(sums) = sums.get_mut(function) {
+            if let Some(sums) = sums.get_mut(function).filter(|_| function < lattice.functions()) {
                 sums.iter_mut().zip(matrices[at % matrices.len()]).for_each(|(sum, each)| *sum += each);
                 most = sums.iter().copied().fold(most, f32::max);
             }
@@ -254,7 +257,7 @@ pub(super) fn fill_held_axes(matrices: &mut [AxisMatrices], lattice: &Lattice) {
     }
     for (cell, matrices) in matrices.iter_mut().enumerate() {
         for (function, at) in lattice.functions_of(cell).into_iter().zip(FIRST_OF_DIAGONAL) {
-            let Some(sums) = sums.get_mut(function) else { continue };
+            let Some(sums) = sums.get_mut(function).filter(|_| function < lattice.functions()) else { continue };
             for (axis, sum) in sums.iter_mut().enumerate().take(3).filter(|(_, sum)| **sum <= 0.0) {
                 matrices[at % matrices.len()][axis] = most;
                 *sum = most;
@@ -263,20 +266,43 @@ pub(super) fn fill_held_axes(matrices: &mut [AxisMatrices], lattice: &Lattice) {
     }
 }
 
+/// Calls `add` with row, column and weight of what a value of two numbers of a cell, the second not after the first,
+/// adds to the lower triangle of a symmetric matrix of the functions.
+#[inline(always)]
+pub(super) fn for_each_product(lattice: &Lattice, first: usize, second: usize, mut add: impl FnMut(usize, usize, f32)) {
+    if !lattice.moves(first) || !lattice.moves(second) {
+        return;
+    }
+    if !lattice.is_light(first) && !lattice.is_light(second) {
+        return add(first.max(second), first.min(second), 1.0);
+    }
+    lattice.each_function(first, |a, weight| {
+        lattice.each_function(second, |b, other| {
+            // Of two different numbers, the products with the two in turn meet on the diagonal.
+            let twice = if a == b && first != second { 2.0 } else { 1.0 };
+            if first != second || b <= a {
+                add(a.max(b), a.min(b), twice * weight * other);
+            }
+        });
+    });
+}
+
 /// The components of vectors, three for each function.
-pub(super) fn to_components(vectors: &CoarseVectors) -> Row {
-    let mut components: Row = [0.0; _];
-    for (three, vector) in components.as_chunks_mut::<3>().0.iter_mut().zip(vectors).take(MAX_FUNCTIONS) {
+pub(super) fn to_components(vectors: &CoarseVectors, lattice: &Lattice) -> Row {
+    let (mut vectors, mut components): (_, Row) = (*vectors, [0.0; _]);
+    lattice.fold(&mut vectors);
+    for (three, vector) in components.as_chunks_mut::<3>().0.iter_mut().zip(&vectors).take(lattice.functions()) {
         *three = vector.to_array();
     }
     components
 }
 
-/// Sets the vectors of some functions from their components.
-pub(super) fn from_components(components: &Row, functions: usize) -> CoarseVectors {
+/// The vectors of the functions from their components, and those of light points.
+pub(super) fn from_components(components: &Row, lattice: &Lattice) -> CoarseVectors {
     let mut vectors = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    for (&[x, y, z], vector) in components.as_chunks::<3>().0.iter().zip(&mut vectors).take(functions) {
+    for (&[x, y, z], vector) in components.as_chunks::<3>().0.iter().zip(&mut vectors).take(lattice.functions()) {
         vector.0 = [x, y, z, 0.0];
     }
+    lattice.expand(&mut vectors);
     vectors
 }

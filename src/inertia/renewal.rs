@@ -159,7 +159,7 @@ impl Renewal {
         let (lattice, band) = (input.lattice, &self.bands.vectors);
         band.clear(factor);
         for (cell, (stiffness, inertia)) in stiffness.iter().zip(&**inertia).enumerate() {
-            add_cell(band, factor, stiffness, inertia, lattice.functions_of(cell), lattice.functions());
+            add_cell(band, factor, stiffness, inertia, lattice, cell);
         }
         self.lattice_in_use = factorise(band, factor, scratch);
         (self.moved, self.changed) = ([NodeVector::ZERO; _], 0.0);

@@ -298,7 +298,7 @@ fn smooth_motion(
     largest: f32,
 ) -> Option<CoarseVectors> {
     let mut motion = restrict(matrices.smooth_cells, lattice);
-    matrices.divide_by_mass(&bands.scalars, &mut motion, lattice.functions());
+    matrices.divide_by_mass(&bands.scalars, &mut motion, lattice);
     let limit = Vec4::splat(LARGEST_SMOOTH * largest);
     if !motion.iter().all(|vector| Vec4::from(vector.0).abs().cmple(limit).all()) {
         return None;
