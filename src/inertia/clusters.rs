@@ -43,6 +43,25 @@ impl PairMatrices {
         self.0[pair / 8 % PAIRS.div_ceil(8)].map(|entries| entries[pair % 8])
     }
 
+    /// Makes the sum over all functions zero, which it is but for rounding where none is held: a translation shall meet
+    /// no resistance even where that of volume is a hundred thousand times the inertia.
+    fn balance(&mut self) {
+        let mut sums = [[0.0f32; 9]; 8];
+        for_each_pair(|pair, c, d| {
+            for (entry, value) in self.of_pair(pair).into_iter().enumerate() {
+                sums[c][entry] += value;
+                if c != d {
+                    sums[d][3 * (entry % 3) + entry / 3] += value;
+                }
+            }
+        });
+        for_each_pair(|pair, c, d| {
+            for entry in (0..9).filter(|_| c == d) {
+                self.add(pair, entry, -0.5 * (sums[c][entry] + sums[c][3 * (entry % 3) + entry / 3]));
+            }
+        });
+    }
+
     fn add(&mut self, pair: usize, entry: usize, value: f32) {
         self.0[pair / 8 % PAIRS.div_ceil(8)][entry % 9][pair % 8] += value;
     }
@@ -298,7 +317,11 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
             }
         }
         for cluster in clusters.all.get(..count).unwrap_or_default() {
+            let is_free = cluster.hold == Hold::Nowhere as u16;
             for moments in clusters.moments.get_mut(cluster.sets()).unwrap_or_default() {
+                if is_free {
+                    moments.balance();
+                }
                 moments.0.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|value| *value /= cluster.volume);
             }
         }

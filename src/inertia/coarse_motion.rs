@@ -96,6 +96,9 @@ impl CoarseMotion<'_, '_> {
     pub(super) fn compute(&self, forces: &CoarseVectors) -> MotionResult {
         let CoarseSpace { lattice, renewal, .. } = self.space;
         let mut given = self.turned();
+        if let Some(inertia) = renewal.free_inertia {
+            self.add_translation(forces, inertia, &mut given);
+        }
         let forces = minus(forces, &self.space.times_inertia(&given));
         let pulled = self.supports.map(|pull| self.add_pulled(pull, &mut given));
         let last = self.smooth.copied().unwrap_or([NodeVector::ZERO; _]);
@@ -124,6 +127,17 @@ impl CoarseMotion<'_, '_> {
             _ => 0.0,
         };
         MotionResult { motion: solution, share, next, work }
+    }
+
+    /// Adds the translation of a free body: rounding in `S` is of no consequence for it.
+    fn add_translation(&self, forces: &CoarseVectors, inertia: f32, motion: &mut CoarseVectors) {
+        let CoarseSpace { lattice, .. } = self.space;
+        let moving = forces.iter().enumerate().filter(|(number, _)| lattice.moves(*number));
+        let sum: Vec4 = moving.map(|(_, force)| Vec4::from(force.0)).sum();
+        for (_, vector) in motion.iter_mut().enumerate().filter(|(number, _)| lattice.moves(*number)) {
+            let [x, y, z, _] = (Vec4::from(vector.0) + sum / inertia).to_array();
+            vector.0 = [x, y, z, 0.0];
+        }
     }
 
     /// `w`; zero without `c`.

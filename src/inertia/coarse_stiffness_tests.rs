@@ -396,7 +396,7 @@ fn a_translation_of_body_and_supports_together_meets_no_resistance() {
                 near.get_mut(function).into_iter().for_each(|near| *near = true);
             }
         }
-        let pulled = to_components(&pull.residual);
+        let pulled = to_components(&pull.residual, lattice);
         let (mut worst, mut largest, mut at_fixed) = (0.0_f64, 0.0_f64, 0.0_f64);
         for (at, (&pulled, &resistance)) in pulled.iter().zip(&resistance).enumerate() {
             let apart = (f64::from(pulled) - resistance).abs();

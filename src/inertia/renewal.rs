@@ -57,6 +57,8 @@ pub(super) struct Renewal {
     pub(super) added: AddedInertia,
     /// What nodes do of a motion of the body by themselves.
     pub(super) own_share: f32,
+    /// Sum of the inertia of the lattice's motion, if no support holds the body, kg.
+    pub(super) free_inertia: Option<f32>,
 }
 
 /// What `S` is computed from.
@@ -93,6 +95,7 @@ impl Renewal {
         lattice_in_use: false,
         added: AddedInertia::NONE,
         own_share: 0.0,
+        free_inertia: None,
     };
 
     /// The share of the last increment's unresolved deformation of the lattice that a step removes. Deformation is fed
@@ -200,14 +203,17 @@ impl Renewal {
                 self.added.add(node, (own - scaling.reserve * inertia.mass) / inertia.mass - 1.0);
             }
         }
+        let mut free_inertia = Some(0.0);
         for place in places {
             let [mass, own] = sums.get(place.cell()).copied().unwrap_or_default();
             if let Some(inertia) = scene.inertia.get(place.node()) {
-                add_node(of_cells, place, inertia, factor * inertia.mass / (1.0 - mass / own).max(LEAST_REST));
+                let coarse = factor * inertia.mass / (1.0 - mass / own).max(LEAST_REST);
+                add_node(of_cells, place, inertia, coarse);
+                free_inertia = free_inertia.filter(|_| inertia.held_count() == 0).map(|sum| sum + coarse);
             }
         }
         let [mass, own] = sums.iter().fold([0.0; 2], |[a, b], [mass, own]| [a + mass, b + own]);
-        self.own_share = mass / own;
+        (self.own_share, self.free_inertia) = (mass / own, free_inertia);
         self.added.end();
         fill_held_axes(of_cells, lattice);
         self.renew(input, matrices, threads);
