@@ -1,11 +1,11 @@
 //! The motion of the lattice in a step, from the cells' sums of the residual (kg m) and the matrices in use
 //! ([`super`]); and its answer to further forces, as those of instruments (`contact.rs`).
 
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 
 use super::band::{Row, solve};
 use super::lattice::{CoarseVectors, Lattice};
-use super::matrices::{Matrices, from_components, to_components};
+use super::matrices::Matrices;
 use super::renewal::Renewal;
 use super::supports::Pull;
 use super::transport::turned_part;
@@ -34,16 +34,42 @@ pub(super) struct CoarseSpace<'a, 'm> {
 impl CoarseSpace<'_, '_> {
     /// `S^-1 g`.
     pub(super) fn solved(&self, forces: &CoarseVectors) -> CoarseVectors {
-        let mut row = to_components(forces, self.lattice);
+        let mut row = self.in_frames(forces);
         solve(&self.renewal.bands.vectors, self.matrices.factor, [&mut row]);
-        from_components(&row, self.lattice)
+        self.in_world(&row)
     }
 
     /// The same for two.
     fn both_solved(&self, forces: [&CoarseVectors; 2]) -> [CoarseVectors; 2] {
-        let [mut a, mut b]: [Row; 2] = forces.map(|forces| to_components(forces, self.lattice));
+        let [mut a, mut b]: [Row; 2] = forces.map(|forces| self.in_frames(forces));
         solve(&self.renewal.bands.vectors, self.matrices.factor, [&mut a, &mut b]);
-        [a, b].map(|row| from_components(&row, self.lattice))
+        [a, b].map(|row| self.in_world(&row))
+    }
+
+    /// Components in the frames in which `S` was computed, three for each function.
+    fn in_frames(&self, vectors: &CoarseVectors) -> Row {
+        let (mut vectors, mut components): (_, Row) = (*vectors, [0.0; _]);
+        self.lattice.fold(&mut vectors);
+        let functions = self.lattice.functions();
+        let rows = components.as_chunks_mut::<3>().0.iter_mut().zip(&vectors);
+        for (function, (three, vector)) in rows.enumerate().take(functions) {
+            let turned = self.renewal.frames.since_stiffness(function).transpose() * Vec3::from(vector.to_array());
+            *three = turned.to_array();
+        }
+        components
+    }
+
+    /// Vectors in the world from such components, and those of light points.
+    fn in_world(&self, components: &Row) -> CoarseVectors {
+        let mut vectors = [NodeVector::ZERO; _];
+        let functions = self.lattice.functions();
+        for (function, (vector, three)) in vectors.iter_mut().zip(components.as_chunks::<3>().0).enumerate().take(functions)
+        {
+            let turned = self.renewal.frames.since_stiffness(function) * Vec3::from(*three);
+            *vector = NodeVector(turned.extend(0.0).to_array());
+        }
+        self.lattice.expand(&mut vectors);
+        vectors
     }
 
     /// `((1 + k) Mc + E) x`.
@@ -110,7 +136,7 @@ impl CoarseMotion<'_, '_> {
             [NodeVector::ZERO; _]
         };
         let rotations = renewal.frames.since_rest();
-        let [_, strain] = lattice.largest_gradients(&solution, rotations);
+        let strain = lattice.largest_strain(&solution, rotations);
         let share = if strain > self.largest_strain { self.largest_strain / strain } else { 1.0 };
         let removed = removed_share(share.min(self.allowed));
         for ((solution, given), (strained, twice)) in solution.iter_mut().zip(&given).zip(strained.iter().zip(&twice)) {

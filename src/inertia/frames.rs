@@ -1,5 +1,6 @@
 //! Rotation of the tissue: each lattice function has a frame, the columns, made orthonormal (Gram-Schmidt), of the
-//! deformation gradient of a tetrahedron of four of its nodes.
+//! deformation gradient of a tetrahedron of four of its nodes. `S` is used in the frames in which it was computed: its
+//! added inertia is ten thousand times the mass, and resists a rotation if it is behind it by a few degrees.
 
 use glam::Mat3;
 
@@ -26,6 +27,9 @@ pub(super) struct Frames {
     latest: [Matrix; MAX_FUNCTIONS],
     /// Rotations in the latest step.
     in_latest_step: [Matrix; MAX_FUNCTIONS],
+    /// Frames when `S` was computed, and rotations since.
+    of_stiffness: [Matrix; MAX_FUNCTIONS],
+    since_stiffness: [Matrix; MAX_FUNCTIONS],
 }
 
 impl Frames {
@@ -34,6 +38,8 @@ impl Frames {
         nodes: [FrameNodes { nodes: [0; 4], inverse: [[0.0; 3]; 3] }; MAX_FUNCTIONS],
         latest: [IDENTITY; MAX_FUNCTIONS],
         in_latest_step: [IDENTITY; MAX_FUNCTIONS],
+        of_stiffness: [IDENTITY; MAX_FUNCTIONS],
+        since_stiffness: [IDENTITY; MAX_FUNCTIONS],
     };
 
     /// Chooses four nodes for each function, far apart from each other.
@@ -47,14 +53,29 @@ impl Frames {
     /// Computes the present frames and rotations.
     pub(super) fn update(&mut self, displacement: &[NodeVector]) {
         let turns = self.latest.iter_mut().zip(&mut self.in_latest_step);
-        for (nodes, (latest, turn)) in self.nodes.iter().zip(turns).take(self.functions) {
+        let since = self.of_stiffness.iter().zip(&mut self.since_stiffness);
+        for ((nodes, (latest, turn)), (start, since)) in self.nodes.iter().zip(turns).zip(since).take(self.functions) {
             // A collapsed tetrahedron has no frame: the last one is kept.
             let previous = *latest;
             if let Some(basis) = nodes.basis(displacement) {
                 *latest = basis;
             }
             *turn = times_transposed(latest, &previous);
+            *since = times_transposed(latest, start);
         }
+    }
+
+    /// `S` is computed in the present frames.
+    pub(super) fn start_stiffness(&mut self) {
+        self.of_stiffness = self.latest;
+        self.since_stiffness = [IDENTITY; MAX_FUNCTIONS];
+    }
+
+    /// Rotation of a function since `S` was computed.
+    #[inline(always)]
+    pub(super) fn since_stiffness(&self, function: usize) -> Mat3 {
+        let turn = self.since_stiffness.get(function).unwrap_or(&IDENTITY);
+        Mat3::from_cols_array_2d(turn).transpose()
     }
 
     /// Rotation in the latest step.

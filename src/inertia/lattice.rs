@@ -6,7 +6,7 @@ use core::{array, fmt};
 
 use bytemuck::{Pod, Zeroable};
 
-use glam::Vec4;
+use glam::{Mat3, Vec4};
 
 
 use super::InertiaError;
@@ -499,10 +499,10 @@ impl Lattice {
         self.cells.iter().map(|&count| count as usize).product()
     }
 
-    /// The largest gradient of a cell for vectors of the functions (m), rotation included, and the largest strain, with
-    /// the rotation of each function since rest.
-    pub(super) fn largest_gradients(&self, vectors: &CoarseVectors, rotations: &[Matrix]) -> [f32; 2] {
-        let mut largest = [0.0; 2];
+    /// The largest strain of a cell for vectors of the functions (m), with the rotation of each function since rest. A
+    /// translation or a rotation is none.
+    pub(super) fn largest_strain(&self, vectors: &CoarseVectors, rotations: &[Matrix]) -> f32 {
+        let mut largest = 0.0;
         let mut per_metre = [0.0; 3];
         for axis in 0..3 {
             if self.size[axis] > 0.0 {
@@ -534,17 +534,29 @@ impl Lattice {
                 let [x, y, z, _] = (per_metre[axis] * along[axis]).to_array();
                 gradient[axis] = (rows[0] * x + rows[1] * y + rows[2] * z).to_array();
             }
-            let (mut whole, mut square) = (0.0, 0.0);
+            let mut square = 0.0;
             for i in 0..3 {
                 for j in 0..3 {
                     let strain = 0.5 * (gradient[i][j] + gradient[j][i]);
                     square += strain * strain;
-                    whole += gradient[i][j] * gradient[i][j];
                 }
             }
-            largest = [f32::max(largest[0], whole), f32::max(largest[1], square)];
+            largest = f32::max(largest, square);
         }
-        largest.map(libm::sqrtf)
+        libm::sqrtf(largest)
+    }
+
+    /// Largest rotation of neighbouring functions relative to each other, rad, with that of each function.
+    pub(super) fn largest_bending(&self, rotation: impl Fn(usize) -> Mat3) -> f32 {
+        let mut largest = 0.0;
+        self.for_each_edge(|a, b, _| {
+            if a < MAX_FUNCTIONS && b < MAX_FUNCTIONS {
+                let difference = rotation(a) - rotation(b);
+                let square = difference.to_cols_array().iter().map(|entry| entry * entry).sum::<f32>();
+                largest = f32::max(largest, 0.5 * square);
+            }
+        });
+        libm::sqrtf(largest)
     }
 
     /// Calls `visit` with the functions at the ends of each edge, [`MAX_FUNCTIONS`] at a held end, and the edge's

@@ -286,23 +286,3 @@ pub(super) fn for_each_product(lattice: &Lattice, first: usize, second: usize, m
         });
     });
 }
-
-/// The components of vectors, three for each function.
-pub(super) fn to_components(vectors: &CoarseVectors, lattice: &Lattice) -> Row {
-    let (mut vectors, mut components): (_, Row) = (*vectors, [0.0; _]);
-    lattice.fold(&mut vectors);
-    for (three, vector) in components.as_chunks_mut::<3>().0.iter_mut().zip(&vectors).take(lattice.functions()) {
-        *three = vector.to_array();
-    }
-    components
-}
-
-/// The vectors of the functions from their components, and those of light points.
-pub(super) fn from_components(components: &Row, lattice: &Lattice) -> CoarseVectors {
-    let mut vectors = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-    for (&[x, y, z], vector) in components.as_chunks::<3>().0.iter().zip(&mut vectors).take(lattice.functions()) {
-        vector.0 = [x, y, z, 0.0];
-    }
-    lattice.expand(&mut vectors);
-    vectors
-}

@@ -1,7 +1,6 @@
 //! When the inertia of the lattice's motion, `S`, is computed anew, and how: from the tangents of the sampled pieces
 //! (`clusters.rs`, `coarse_stiffness.rs`) at the start of the step that needs it, all at once. That is due where the
-//! lattice's motion has changed its gradient by [`LARGEST_CHANGE`] since, rotation included, or where tissue has
-//! stiffened. All else is constant, and computed anew for a state that does not follow from the last one.
+//! lattice has been strained and bent by [`LARGEST_CHANGE`] since, or where tissue has stiffened. All else is constant, and computed anew for a state that does not follow from the last one.
 
 use glam::Vec4;
 
@@ -22,7 +21,7 @@ use crate::simd::{Gather, NodeVector, TILE};
 use crate::step::threads::take;
 use crate::step::{Threads, internal_forces};
 
-/// Change of the lattice's gradient within which `S` is used.
+/// Change of the lattice's shape within which `S` is used.
 const LARGEST_CHANGE: f32 = 0.08;
 
 /// Change of the lattice's shape in one step at which drag is full, for tissue that is as stiff in volume as in shear.
@@ -44,7 +43,7 @@ pub(super) struct Renewal {
     pub(super) frames: Frames,
     /// Step count of the state for which the frames were computed.
     frames_at: Option<u64>,
-    /// The lattice's motion since `S` was computed (m), and the largest gradient of a cell.
+    /// The lattice's motion since `S` was computed (m), and how far its shape has changed.
     moved: CoarseVectors,
     changed: f32,
     /// Drag of the last step's change of shape.
@@ -118,9 +117,10 @@ impl Renewal {
             sum.0 = (Vec4::from(sum.0) + Vec4::from(increment.0)).to_array();
         }
         let rotations = self.frames.since_rest();
-        let [_, strain] = lattice.largest_gradients(increments, rotations);
+        let strain = lattice.largest_strain(increments, rotations);
         self.pace = strain * self.sensitivity / LARGEST_CHANGE_OF_STEP;
-        [self.changed, _] = lattice.largest_gradients(&self.moved, rotations);
+        let bending = lattice.largest_bending(|function| self.frames.since_stiffness(function));
+        self.changed = lattice.largest_strain(&self.moved, rotations) + bending;
     }
 
     /// Computes `S` anew if that is due, when the cells have the sums of the nodes' scalar bounds.
@@ -166,6 +166,7 @@ impl Renewal {
         }
         self.lattice_in_use = factorise(band, factor, scratch);
         (self.moved, self.changed) = ([NodeVector::ZERO; _], 0.0);
+        self.frames.start_stiffness();
     }
 
     /// Computes everything anew for a state that does not follow from the last one, or for another length of steps.
