@@ -13,7 +13,7 @@ use reference::tensor::{Mat3, Mat9, cross, from_fn, product, rotation};
 use super::band::{Row, solve};
 use super::clusters::ClusterInput;
 use super::lattice::{Grid, Lattice, LatticeNode, sort_by_cell};
-use super::matrices::{Bands, Matrices, to_components, vectors_for};
+use super::matrices::{Bands, Matrices, vectors_for};
 use super::node::Scaling;
 use super::node_tables::{self, NodeTables};
 use super::renewal::{Renewal, RenewalInput};
@@ -396,7 +396,8 @@ fn a_translation_of_body_and_supports_together_meets_no_resistance() {
                 near.get_mut(function).into_iter().for_each(|near| *near = true);
             }
         }
-        let pulled = to_components(&pull.residual, lattice);
+        let mut pulled: Row = [0.0; _];
+        pulled.as_chunks_mut::<3>().0.iter_mut().zip(&pull.residual).for_each(|(to, sum)| *to = sum.to_array());
         let (mut worst, mut largest, mut at_fixed) = (0.0_f64, 0.0_f64, 0.0_f64);
         for (at, (&pulled, &resistance)) in pulled.iter().zip(&resistance).enumerate() {
             let apart = (f64::from(pulled) - resistance).abs();
