@@ -67,9 +67,11 @@ pub(super) fn turned_part(
     }
     let [x, y, z] = &mut rows;
     solve(band, factor, [x, y, z]);
-    for (function, sum) in sums.iter_mut().enumerate().take(lattice.functions()) {
+    let mut turned = [NodeVector::ZERO; _];
+    for (function, turned) in turned.iter_mut().enumerate().take(lattice.functions()) {
         let at = |row: &Row| row.get(function).copied().unwrap_or_default();
-        sum.0 = [at(&rows[0]), at(&rows[1]), at(&rows[2]), 0.0];
+        *turned = NodeVector([at(&rows[0]), at(&rows[1]), at(&rows[2]), 0.0]);
     }
-    sums
+    lattice.expand(&mut turned);
+    turned
 }
