@@ -235,7 +235,7 @@ fn of_several_motions_of_an_axis_the_last_one_alone_counts() {
         assert!(by_single.0 == by_several.0 && by_single.1 == by_several.1);
         let (one, several) = (by_single.2, by_several.2);
         println!(
-            "mass-scaled {is_scaled}: uncertainty {:.2e} and {:.2e} J of {:.2e} J",
+            "long {is_long}: uncertainty {:.2e} and {:.2e} J of {:.2e} J",
             one.uncertainty, several.uncertainty, one.peak
         );
         assert!((one.uncertainty - several.uncertainty).abs() <= 1e-9 * one.uncertainty);
