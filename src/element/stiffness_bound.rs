@@ -197,10 +197,7 @@ pub(super) fn scalar_bound_of_patches<R: Real>(
 
 /// The bound that rotations do not feel; only for elements that are not crushed.
 #[inline(always)]
-pub(super) fn spatial_bound<R: Real>(
-    coefficients: &Coefficients<R>,
-    deformation: &Deformation<R>,
-) -> SpatialBound<R> {
+pub(super) fn spatial_bound<R: Real>(coefficients: &Coefficients<R>, deformation: &Deformation<R>) -> SpatialBound<R> {
     let (zero, one) = (R::splat(0.0), R::splat(1.0));
     let &Coefficients { p1, p_j, cc, ce, ee, .. } = coefficients;
     let volume_ratio = one + deformation.invariants.j;

@@ -443,11 +443,12 @@ fn write_closeness<M: ElementMaterial>(
         let [x, y, z] = inertia.inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 });
         *unit = [x, y, z, 1.0];
     }
-    let rates = each_rate(scene, must_cast_slice(units), [scratch, next_increment, rough_before], volume, |node, rate| {
-        if let Some(rough) = rough.get_mut(node) {
-            rough.0[0] = rate;
-        }
-    });
+    let rates =
+        each_rate(scene, must_cast_slice(units), [scratch, next_increment, rough_before], volume, |node, rate| {
+            if let Some(rough) = rough.get_mut(node) {
+                rough.0[0] = rate;
+            }
+        });
     let all = scene.elements().partitions.all();
     for table in [&mut **rough_before, scratch] {
         table.fill(NodeVector::ZERO);
