@@ -1,8 +1,8 @@
-//! May a step be believed? A *second run* moves the same body by multilevel steps that are several times as long as
+//! May a step be believed? A *second run* moves the same body by long steps without a damper, several times as long as
 //! those of the first run, under the same loads. The distance between the two runs estimates the error of the first:
 //! the second is the less accurate one, so the distance is mostly an error of its own. That holds on bodies, materials
 //! and loads that nobody has tuned anything on, and for every method: exact steps above their critical one,
-//! mass-scaled, multilevel, damped and learned ones. A frozen body shows, because the second run's lattice has the true
+//! long and learned ones. A frozen body shows, because the second run's lattice has the true
 //! inertia of smooth motion.
 //!
 //! Step doubling (Hairer, Norsett & Wanner 1993, II.4) takes the difference as the leading term of an error of known
@@ -11,7 +11,7 @@
 //! larger: `docs/accuracy.md`.
 //!
 //! Comparisons take place at each of the first three steps, where the second run takes two steps in one of the first,
-//! after two steps more, after three more, and so on up to what the caller says ([`EVERY`]). A guard costs a multilevel
+//! after two steps more, after three more, and so on up to what the caller says ([`EVERY`]). A guard costs such a
 //! step in each comparison, and memory for a second state and the second run's inertia ([`vectors_for`]). A scene
 //! without a guard pays nothing, and knows nothing of its error.
 //!
@@ -41,7 +41,7 @@ use estimate::Envelope;
 /// and calls more right steps inexact.
 pub const EVERY: u32 = 3;
 /// The same for learned steps: their error does not grow with their length, and they take far more time than a
-/// multilevel step.
+/// long step.
 pub const EVERY_LEARNED: u32 = 1;
 /// The estimate over the distance of the two runs.
 pub const ESTIMATE: f32 = 2.0;

@@ -28,7 +28,7 @@ fn fragment() -> Body {
 }
 
 /// Large enough for a lattice.
-fn block() -> Body {
+fn slab() -> Body {
     Body::bar([0.008, 0.008, 0.016], [2, 2, 4])
 }
 
@@ -68,7 +68,7 @@ fn slow_exact_steps_arrive() {
 
 #[test]
 fn slow_long_steps_arrive() {
-    let body = block();
+    let body = slab();
     let scene = body.scene(tissue(STIFF), &[]);
     let (step, speed) = (Step::unchecked(1e-5, 0.0).unwrap(), 0.001);
     let mut state = drifting(&scene, &step, speed);
@@ -81,7 +81,7 @@ fn slow_long_steps_arrive() {
 
 #[test]
 fn slow_adaptive_steps_arrive() {
-    let body = block();
+    let body = slab();
     let scene = body.scene(tissue(STIFF), &[]);
     let (longest, speed) = (Step::unchecked(1e-5, 0.0).unwrap(), 0.001);
     let mut state = drifting(&scene, &longest, speed);
