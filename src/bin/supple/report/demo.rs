@@ -223,9 +223,9 @@ fn over_time(case: &Compared, exact: &[Shape]) -> Figure {
         let Some(outcome) = run.outcome() else { continue };
         let colour = COLOURS[index % COLOURS.len()];
         let times: Vec<f64> = outcome.frames.iter().map(|frame| frame.time).collect();
-        let errors = errors(exact, run.shapes());
-        curves
-            .push(Curve::new(format!("{}: error", run.name), times[..errors.len()].to_vec(), errors).coloured(colour));
+        // A run that ends early has one shape more, that of its end.
+        let (times, errors): (Vec<_>, Vec<_>) = times.into_iter().zip(errors(exact, run.shapes())).unzip();
+        curves.push(Curve::new(format!("{}: error", run.name), times, errors).coloured(colour));
         let estimated = outcome.frames.iter().filter_map(|frame| Some((frame.time, frame.estimate?)));
         let (at, estimates) = estimated.map(|(time, estimate)| (time, 1e3 * f64::from(estimate.mean))).unzip();
         curves
