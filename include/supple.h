@@ -51,11 +51,11 @@
     (SUPPLE_STATE_FRONT + ((element) == SUPPLE_LINEAR ? 4 : 5) * SUPPLE_ARRAY_(nodes, 16))
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 96 : 48))
-#define SUPPLE_LARGE_SIZE(nodes, elements, x, y, z) (SUPPLE_LARGE_FRONT + SUPPLE_ARRAY_(1, 89 * (size_t)(nodes) +              \
-    (size_t)(elements) / 2 + 1000 + 19764 * SUPPLE_CELLS_(x, y, z) + 1092 * SUPPLE_LEAST_(2 * SUPPLE_CELLS_(x, y, z) + 32,     \
+#define SUPPLE_LARGE_SIZE(nodes, elements, x, y, z) (SUPPLE_LARGE_FRONT + SUPPLE_ARRAY_(1, 104 * (size_t)(nodes) +             \
+    (size_t)(elements) / 4 + 1000 + 19188 * SUPPLE_CELLS_(x, y, z) + 1092 * SUPPLE_LEAST_(2 * SUPPLE_CELLS_(x, y, z) + 32,     \
     (size_t)(elements) / 16 + (size_t)(nodes) / 8 + 50) + 64 * SUPPLE_WHOLE_(3 * SUPPLE_FUNCTIONS_(x, y, z)) +                 \
-    4 * SUPPLE_BAND_(3 * SUPPLE_FUNCTIONS_(x, y, z), 6 * SUPPLE_LAYER_(x, y, z)) +                                             \
-    16 * SUPPLE_BAND_(SUPPLE_FUNCTIONS_(x, y, z), 2 * SUPPLE_LAYER_(x, y, z))))
+    4 * SUPPLE_BAND_(3 * SUPPLE_FUNCTIONS_(x, y, z), 12 * SUPPLE_LAYER_(x, y, z)) +                                            \
+    16 * SUPPLE_BAND_(SUPPLE_FUNCTIONS_(x, y, z), 4 * SUPPLE_LAYER_(x, y, z))))
 #define SUPPLE_ARRAY_(count, bytes) (((size_t)(count) * (bytes) + SUPPLE_ALIGN - 1) / SUPPLE_ALIGN * SUPPLE_ALIGN)
 #define SUPPLE_LEAST_(a, b) ((a) < (b) ? (a) : (b))
 #define SUPPLE_GROUPS_(elements) (2 * SUPPLE_LEAST_((size_t)(elements) / 1536 - ((elements) > 1535), 23) + 1)
@@ -199,7 +199,7 @@
 /**
  * Bytes before the arrays of a supple_large.
  */
-#define SUPPLE_LARGE_FRONT 43008
+#define SUPPLE_LARGE_FRONT 61440
 
 /**
  * Exact steps of nine tenths of the critical step, which is looked at again while tissue stiffens.

@@ -52,7 +52,7 @@ pub struct supple_adaptive {
 // SAFETY: `repr(C)`, begins with a head.
 unsafe impl Object for supple_adaptive {
     const MAGIC: [u8; 8] = magic(b'A');
-    const FRONT: usize = 86016;
+    const FRONT: usize = 122880;
 }
 
 pub(super) fn layout(vectors: usize) -> Layout {
@@ -123,7 +123,7 @@ pub unsafe extern "C" fn supple_adaptive_init(
         let nodes = open.node_count() as u32;
         let storage = storage(place.arrays::<supple_adaptive>(), vectors);
         let object = place.object::<supple_adaptive>();
-        // Of 38 kB each: they are made where they stay, not on the stack.
+        // Of 57 kB each: they are made where they stay, not on the stack.
         let [first, second] = [&raw mut (*object).first, &raw mut (*object).second]
             .map(|model| &mut *model.cast::<MaybeUninit<LargeModel<'static>>>());
         let points = request.points;
