@@ -8,7 +8,7 @@ SUPPLE_MEMORY(copy_memory, BYTES);
 SUPPLE_MEMORY(other_memory, BYTES);
 SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, SUPPLE_NODAL_STRAIN));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
-SUPPLE_MEMORY(large_memory, 1 << 20);
+SUPPLE_MEMORY(large_memory, 8 << 20);
 
 static supple_loads *loads;
 static supple_error error;
