@@ -147,6 +147,10 @@ pub mod mlp;
 mod padding;
 pub mod plausibility;
 pub mod reaction;
+/// Of the tests, in float64.
+#[cfg(test)]
+#[path = "../tests/reference/mod.rs"]
+mod reference;
 mod scattered;
 pub mod scene;
 pub mod simd;

@@ -43,6 +43,7 @@ pub use tile::ElementTile;
 pub(crate) use tile::MOST_ELEMENTS;
 
 pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
+#[cfg(feature = "std")]
 pub(crate) use fields::stabilising_modulus;
 pub(crate) use fields::{element_energy, element_fields, patch_energy, stabilising_energy};
 #[cfg(feature = "std")]

@@ -2,12 +2,10 @@
 //! slivers included, from small strain to inverted. The tangent `dP/dF` (Pa) in float64 is that of the tests' reference,
 //! which shares no code with the crate, and a central difference of its stress.
 
-#[path = "../../tests/reference/mod.rs"]
-mod reference;
-
-use reference::dense::{self, Matrix, eigenvalues};
-use reference::tensor::{apply, contraction, determinant, from_fn, inverse, product, rotation};
-use reference::{EXPONENT_CAP, J_MIN, Mat3, Random, Vec3};
+use crate::reference;
+use crate::reference::dense::{self, Matrix, eigenvalues};
+use crate::reference::tensor::{apply, contraction, determinant, from_fn, inverse, product, rotation};
+use crate::reference::{EXPONENT_CAP, J_MIN, Mat3, Random, Vec3};
 
 use super::deformation::Deformation;
 use super::internal_forces::ElementVisitor;

@@ -1,13 +1,10 @@
 //! Factors and solutions of matrices of lattices, against dense ones in float64.
 
-#[path = "../../tests/reference/mod.rs"]
-mod reference;
-
 use std::vec::Vec;
 use std::{println, vec};
 
-use reference::Random;
-use reference::dense::{Matrix, cholesky, zeros};
+use crate::reference::Random;
+use crate::reference::dense::{Matrix, cholesky, zeros};
 
 use super::band::{Band, Row, factorise, solve};
 use super::lattice::Lattice;

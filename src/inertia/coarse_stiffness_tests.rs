@@ -1,14 +1,12 @@
 //! The coarse stiffness and its factor against sums in float64 over single elements and patches, made from the mesh
 //! alone, with the tangents of the tests' reference; and what they must be zero for.
 
-#[path = "../../tests/reference/mod.rs"]
-mod reference;
-
 use std::vec::Vec;
 use std::{println, vec};
 
-use reference::dense::{Matrix, zeros};
-use reference::tensor::{Mat3, Mat9, cross, from_fn, product, rotation};
+use crate::reference;
+use crate::reference::dense::{Matrix, zeros};
+use crate::reference::tensor::{Mat3, Mat9, cross, from_fn, product, rotation};
 
 use super::band::{Row, solve};
 use super::clusters::ClusterInput;

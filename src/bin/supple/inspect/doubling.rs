@@ -117,11 +117,11 @@ pub(crate) fn predict_errors(
         let error = short.error / (order.exp2() - 1.0);
         let words =
             PREDICTED.map(|multiple| format!("{:.3} mm at {multiple}x", error * (multiple / shortest).powf(order)));
-        row("expected error", format!("{}", words.join(", ")));
+        row("expected error", words.join(", "));
         row("", format!("from pilots at {longest} to {shortest}x that moved {:.3} mm; order {order:.1}", short.moved));
         return Ok(());
     }
-    row("expected error", format!("not foretold: pilots diverge or are longer than the scene"));
+    row("expected error", "not foretold: pilots diverge or are longer than the scene");
     Ok(())
 }
 
