@@ -6,7 +6,7 @@ use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
 use supple::inertia::{Cells, LargeStep, Method, vectors_for};
 use supple::learned::{self, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{Element, Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue, TissueValues};
+use supple::material::{Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue, TissueValues};
 use supple::mesh::{self, Bar, Mesh, Winding};
 use supple::mlp::Network;
 use supple::scene::{AsScene, FixedScene, SceneFacts, SceneView, Support};
