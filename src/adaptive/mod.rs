@@ -96,7 +96,7 @@ impl<'w> AdaptiveModel<'w> {
         let step = chooser.shortest()?;
         let of_first = LargeModel::prepare(method, scene, points, state.reborrow(), step, first)?;
         let (of_second, watch) = Watch::prepare(scene, points, state, step, 1, second, |state, step, storage| {
-            LargeModel::prepare(guard::SECOND_RUN, scene, points, state, step, storage)
+            LargeModel::prepare(guard::second_run(), scene, points, state, step, storage)
         })?;
         Ok(Self { first: of_first, second: of_second, watch: chooser.allowing(watch), chooser })
     }

@@ -5,7 +5,7 @@ use core::ffi::c_void;
 use core::mem::MaybeUninit;
 
 use crate::adaptive::{AdaptiveView, Chooser, Request, StorageParts, Taken, vectors_with};
-use crate::guard::{SECOND_RUN, Watch};
+use crate::guard::{Watch, second_run};
 use crate::inertia::LargeModel;
 use crate::state::{NodeVector, StateView};
 use crate::step::Step;
@@ -133,7 +133,7 @@ pub unsafe extern "C" fn supple_adaptive_init(
         let step = chooser.shortest()?;
         LargeModel::prepare_in(first, method, scene, points, state.reborrow(), step, of_first)?;
         let prepare = |state: StateView<'_>, step, storage: &mut [NodeVector]| {
-            LargeModel::prepare_in(second, SECOND_RUN, scene, points, state, step, storage).map(|_| ())
+            LargeModel::prepare_in(second, second_run(), scene, points, state, step, storage).map(|_| ())
         };
         let ((), watch) = Watch::prepare(scene, points, state, step, 1, of_second, prepare)?;
         (&raw mut (*object).chooser).write(chooser);

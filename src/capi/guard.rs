@@ -4,7 +4,7 @@
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
 
-use crate::guard::{Allowed, Estimate, GuardView, SECOND_RUN, Watch, vectors_for};
+use crate::guard::{Allowed, Estimate, GuardView, Watch, second_run, vectors_for};
 use crate::inertia::LargeModel;
 use crate::state::NodeVector;
 use crate::step::{Status, Step};
@@ -133,7 +133,7 @@ pub unsafe extern "C" fn supple_guard_init(
         // Of 57 kB: it is made where it stays, not on the stack.
         let second = &mut *(&raw mut (*object).second).cast::<MaybeUninit<_>>();
         let prepare = |state: crate::state::StateView<'_>, step, storage: &mut [NodeVector]| {
-            LargeModel::prepare_in(second, SECOND_RUN, open.view(), points, state, step, storage).map(|_| ())
+            LargeModel::prepare_in(second, second_run(), open.view(), points, state, step, storage).map(|_| ())
         };
         let ((), mut watch) = Watch::prepare(open.view(), points, state, step, config.every, storage, prepare)?;
         watch.allow(allowed);

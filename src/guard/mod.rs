@@ -51,11 +51,14 @@ const MOST_BEHIND: f64 = 2.0;
 /// Relative error of times that are sums of steps.
 const ROUNDING: f64 = 1e-4;
 
-pub(crate) const SECOND_RUN: Method<'static> = Method::undamped(Cells::Suggested);
+/// How the second run steps.
+pub(crate) fn second_run() -> Method<'static> {
+    Method::new(Cells::Suggested)
+}
 
 /// Vectors of storage that a guard needs on a scene with these `points` (m).
 pub fn vectors_for<M: Material>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<usize, InertiaError> {
-    Ok(vectors_of_state(scene.element(), scene.node_count()) + vectors_for_method(&SECOND_RUN, scene, points)?)
+    Ok(vectors_of_state(scene.element(), scene.node_count()) + vectors_for_method(&second_run(), scene, points)?)
 }
 
 /// No fewer than a guard needs on any scene of so many nodes and elements.
@@ -108,7 +111,7 @@ impl GuardModel {
         storage: &mut [NodeVector],
     ) -> Result<Self, InertiaError> {
         let (second, watch) = Watch::prepare(scene, points, state, step, every, storage, |state, step, storage| {
-            LargeModel::prepare(SECOND_RUN, scene, points, state, step, storage)
+            LargeModel::prepare(second_run(), scene, points, state, step, storage)
         })?;
         Ok(Self { second, watch })
     }

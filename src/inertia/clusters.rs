@@ -7,7 +7,7 @@
 //! ```
 //! over the free nodes `a` of the elements, with the eight functions of the cluster's own cell, continued beyond it: so
 //! linear motion stays linear, and only functions of one cell are coupled. Where nodes are held along some axes only, a
-//! function has a gradient for each axis, and there are moments for each pair of axes.
+//! function has several gradients, and there are moments for each pair of them.
 //!
 //! With nodal strain the energy is that of patches, which have the mean gradients of their elements, and a stabilising
 //! energy for what the mean does not see. By convexity it is at most that of the elements with the patches' tangents.
@@ -26,8 +26,6 @@ use super::lattice::{Lattice, LatticeNode, eight_weights, node_place};
 
 /// Pairs of the eight functions of a cell, the first not before the second.
 pub(super) const PAIRS: usize = 36;
-/// Sets of moments of a cluster with nodes that are held along some axes only: one for each pair of axes.
-const SETS_OF_AXES: usize = 9;
 
 /// The entries `3 i + j` of the 3 x 3 matrices of all pairs, in vectors of eight pairs.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -74,7 +72,9 @@ pub(super) struct Cluster {
     pub(super) cell: u32,
     tissue: u16,
     /// How its nodes are held: see [`Hold`].
-    hold: u16,
+    hold: u8,
+    /// Bits of the axes x and y, y and z, z and x, if some node is held along one of the two.
+    differs: u8,
     /// Its moments, among all.
     first_set: u32,
     /// Its sampled pieces: those of [`Clusters::members`] from this one on, and how many.
@@ -88,15 +88,23 @@ pub(super) struct Cluster {
 }
 
 impl Cluster {
-    /// Whether it has moments for each pair of axes.
-    pub(super) const fn is_by_axis(&self) -> bool {
-        self.hold == Hold::Partly as u16
+    /// For each axis the number of its gradients: axes along which the same nodes are held have the same.
+    pub(super) const fn gradients(&self) -> [usize; 3] {
+        let [xy, yz, zx] = [self.differs & 1 != 0, self.differs & 2 != 0, self.differs & 4 != 0];
+        let y = if xy { 1 } else { 0 };
+        [0, y, if !zx { 0 } else if !yz { y } else { y + 1 }]
+    }
+
+    /// How many gradients it has, with moments for each pair.
+    pub(super) const fn gradient_count(&self) -> usize {
+        let [_, y, z] = self.gradients();
+        1 + if y > z { y } else { z }
     }
 
     /// Its sets of moments.
     pub(super) const fn sets(&self) -> Range<usize> {
-        let count = if self.is_by_axis() { SETS_OF_AXES } else { 1 };
-        self.first_set as usize..self.first_set as usize + count
+        let count = self.gradient_count();
+        self.first_set as usize..self.first_set as usize + count * count
     }
 
     /// Where its sampled pieces are listed.
@@ -147,7 +155,7 @@ pub(super) struct Clusters<'a> {
 /// Room for clusters of each cell, without several tissues one for each [`Hold`].
 const CLUSTERS: usize = 3;
 /// Room for their moments.
-const SETS: usize = 2 + SETS_OF_AXES;
+const SETS: usize = 6;
 /// Room for sampled tiles, for each cell and further ones.
 const TILES: [usize; 2] = [2, 32];
 
@@ -290,34 +298,46 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
     /// Makes the clusters. `None` if there is no room.
     pub(super) fn write(&self, clusters: &mut Clusters<'_>) -> Option<ClusterCounts> {
         clusters.heads.fill(0);
-        let (mut count, mut sets) = (0, 0);
+        let mut count = 0;
         for piece in self.scene.tiles.iter().flat_map(Piece::of_tile) {
             let cell = piece.cell(self.lattice, self.places);
             let index = match self.find(&piece, cell, clusters.all, clusters.heads) {
                 Some(index) => index,
                 None => {
-                    let (tissue, hold) = (self.tissue(piece.element()), self.hold(&piece.nodes()) as u16);
+                    let (tissue, hold) = (self.tissue(piece.element()), self.hold(&piece.nodes()) as u8);
                     let head = clusters.heads.get_mut(cell)?;
-                    let place = clusters.all.get_mut(count)?;
-                    let (cell, first_set, next) = (cell as u32, sets as u32, *head);
-                    *place = Cluster { cell, tissue, hold, first_set, next, ..Cluster::default() };
-                    clusters.moments.get_mut(place.sets())?.fill(PairMatrices::ZERO);
-                    sets += place.sets().len();
+                    let cell = cell as u32;
+                    *clusters.all.get_mut(count)? = Cluster { cell, tissue, hold, next: *head, ..Cluster::default() };
                     count += 1;
                     *head = count as u32;
                     count - 1
                 }
             };
             let cluster = clusters.all.get_mut(index)?;
-            let volume = piece.volume();
-            cluster.volume += volume;
-            let gradients = self.gradients(&piece, cell);
+            cluster.volume += piece.volume();
+            for node in piece.nodes() {
+                let [x, y, z] = [0, 1, 2].map(|axis| self.scene.held(node).has(axis));
+                cluster.differs |= u8::from(x != y) | u8::from(y != z) << 1 | u8::from(z != x) << 2;
+            }
+        }
+        let mut sets = 0;
+        for cluster in clusters.all.iter_mut().take(count) {
+            cluster.first_set = sets as u32;
+            sets = cluster.sets().end;
+        }
+        clusters.moments.get_mut(..sets)?.fill(PairMatrices::ZERO);
+        for piece in self.scene.tiles.iter().flat_map(Piece::of_tile) {
+            let cell = piece.cell(self.lattice, self.places);
+            let cluster = clusters.all.get(self.find(&piece, cell, clusters.all, clusters.heads)?)?;
+            let (of_axes, numbers, each) = (self.gradients(&piece, cell), cluster.gradients(), cluster.gradient_count());
+            let axis_of = |number: usize| numbers.iter().position(|&other| other == number).unwrap_or(0);
             for (set, moments) in clusters.moments.get_mut(cluster.sets())?.iter_mut().enumerate() {
-                add_moments(moments, volume, [&gradients[set / 3 % 3], &gradients[set % 3]]);
+                let [first, second] = [set / each, set % each].map(|number| &of_axes[axis_of(number) % 3]);
+                add_moments(moments, piece.volume(), [first, second]);
             }
         }
         for cluster in clusters.all.get(..count).unwrap_or_default() {
-            let is_free = cluster.hold == Hold::Nowhere as u16;
+            let is_free = cluster.hold == Hold::Nowhere as u8;
             for moments in clusters.moments.get_mut(cluster.sets()).unwrap_or_default() {
                 if is_free {
                     moments.balance();
@@ -423,7 +443,7 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
         let tile = scene.patches.tiles().get(tile).filter(|tile| tile.volume(lane) > 0.0)?;
         let (node, tissue) = (tile.node(lane), self.tissue(tile.element(lane)));
         let (cell, hold) = (node_place(places, node)?.cell(), self.hold(&[node]));
-        let unlike = |cluster: &Cluster| (cluster.tissue != tissue, cluster.hold != hold as u16);
+        let unlike = |cluster: &Cluster| (cluster.tissue != tissue, cluster.hold != hold as u8);
         let of_cell = clusters_of(all, heads.get(cell).copied()?);
         let (index, _) = of_cell.min_by_key(|(_, cluster)| unlike(cluster))?;
         Some((index, tile.volume(lane) as f32))
@@ -431,7 +451,7 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
 
     /// The cluster of an element in a cell.
     pub(super) fn find(&self, piece: &Piece<'_>, cell: usize, all: &[Cluster], heads: &[u32]) -> Option<usize> {
-        let (tissue, hold) = (self.tissue(piece.element()), self.hold(&piece.nodes()) as u16);
+        let (tissue, hold) = (self.tissue(piece.element()), self.hold(&piece.nodes()) as u8);
         let mut of_cell = clusters_of(all, heads.get(cell).copied()?);
         of_cell.find(|(_, cluster)| cluster.tissue == tissue && cluster.hold == hold).map(|(index, _)| index)
     }

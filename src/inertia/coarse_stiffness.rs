@@ -105,7 +105,7 @@ pub(super) fn write_cell(clusters: &Clusters<'_>, tangents: &[ClusterTangent], c
     for (index, cluster) in clusters_of(clusters.all, head) {
         let moments = clusters.moments.get(cluster.sets()).unwrap_or_default();
         if let Some(tangent) = tangents.get(index) {
-            dispatch(Contract { tangent, moments, matrices });
+            dispatch(Contract { tangent, cluster, moments, matrices });
         }
     }
 }
@@ -113,7 +113,8 @@ pub(super) fn write_cell(clusters: &Clusters<'_>, tangents: &[ClusterTangent], c
 /// Adds `sum_IJ T[iI,jJ] Q[c,d,I,J]` for all pairs.
 struct Contract<'a> {
     tangent: &'a ClusterTangent,
-    /// One set, or one for each pair of axes.
+    cluster: &'a Cluster,
+    /// One set, or one for each pair of gradients.
     moments: &'a [PairMatrices],
     matrices: &'a mut PairMatrices,
 }
@@ -123,13 +124,16 @@ impl Kernel for Contract<'_> {
 
     #[inline(always)]
     fn run<R: Real>(self) {
-        let Self { tangent, moments, matrices } = self;
+        let Self { tangent, cluster, moments, matrices } = self;
         match moments {
             [] => {}
             [one] => contract::<R::Width8>(tangent, one, matrices, 0..9),
             each => {
-                for (entry, moments) in each.iter().enumerate() {
-                    contract::<R::Width8>(tangent, moments, matrices, entry..entry + 1);
+                let (numbers, count) = (cluster.gradients(), cluster.gradient_count());
+                for entry in 0..9 {
+                    if let Some(moments) = each.get(numbers[entry / 3] * count + numbers[entry % 3]) {
+                        contract::<R::Width8>(tangent, moments, matrices, entry..entry + 1);
+                    }
                 }
             }
         }

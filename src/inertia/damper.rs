@@ -70,9 +70,6 @@ struct Aligned<B: ?Sized>(B);
 static BUILT_IN: &Aligned<[u8]> = &Aligned(*include_bytes!("../../weights/damper.weights"));
 
 impl Damper<'static> {
-    /// Damps nothing.
-    pub(super) const NONE: Self = Self { network: None };
-
     /// The library's own network, `weights/damper.weights`. It checks 1.2 kB at each call.
     #[must_use]
     pub fn built_in() -> Self {

@@ -35,11 +35,6 @@ impl Method<'static> {
     pub fn new(cells: Cells) -> Self {
         Self::with_damper(Damper::built_in(), cells)
     }
-
-    /// Without a damper.
-    pub(crate) const fn undamped(cells: Cells) -> Self {
-        Self { damper: Damper::NONE, cells }
-    }
 }
 
 impl<'w> Method<'w> {
@@ -104,10 +99,17 @@ pub fn vectors_at_most(element: Element, nodes: usize, elements: usize, cells: C
             let [_, few] = NODES_PER_FUNCTION;
             let unknowns = libm::cbrt(most_multiply_adds(elements) as f64) as usize + 1;
             let functions = lattice::MAX_FUNCTIONS.min(nodes / few + 1).min(unknowns / 3);
-            Grid { cells: [lattice::MAX_POINTS as u32, 1, 1], functions }
+            // As many cells as there may be, and layers as large.
+            let across = libm::cbrt(most_cells(functions) as f64) as u32 + 1;
+            Grid { cells: [across; 3], functions }
         }
     };
     vectors_for_lattice(element, nodes, elements, grid)
+}
+
+/// Most cells of a suggested lattice: a body that fills less of its box has a coarser one.
+const fn most_cells(functions: usize) -> usize {
+    3 * functions + 8
 }
 
 /// Limit of the third power of the number of unknowns of a suggested lattice.
@@ -157,6 +159,7 @@ fn grid_below<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], below: usize) -> 
         let unknowns = 3 * functions as u64;
         if functions > best.functions
             && functions < below
+            && cells.iter().map(|&count| count as usize).product::<usize>() <= most_cells(functions)
             && unknowns * unknowns * unknowns <= most_multiply_adds(scene.element_count())
         {
             best = Grid { cells, functions };
