@@ -175,7 +175,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         }
         let inertia = trial.scene.inertia;
         let rotations = &rotation_table(&model.refresh.frames.of_bounds, model.refresh.frames.functions());
-        let square = ResidualFactors::new(step, &model.scaling, trial.progress.steps == 0).square();
+        let square = ResidualFactors::new(step, model, trial.progress).square();
         let space = CoarseSpace { lattice: &model.lattice, refresh: &model.refresh };
         let lattice = response.map(|shares| (space, &*matrices, shares));
         let SolverRoom { touched, local: room, sums } = trial.solver_room();
@@ -214,7 +214,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         }
         prolong(&moved.unwrap_or([NodeVector::ZERO; _]), &model.lattice, matrices.cells);
         trial.add_changes_of_pushes();
-        let residual = ResidualFactors::new(step, &model.scaling, trial.progress.steps == 0);
+        let residual = ResidualFactors::new(step, model, trial.progress);
         let Trial { scene, increment, force, .. } = trial;
         let input = PassInput { step, scaling: &model.scaling, residual, inertia, increment, places };
         let parts = NodeParts { partitions: scene.elements().partitions, threads: *threads };

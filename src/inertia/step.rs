@@ -230,10 +230,11 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
     #[inline(never)]
     fn move_lattice<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) -> Option<MovedLattice> {
         let Self { step, model, storage: Storage { tables, places, order, matrices }, .. } = self;
-        let LargeModel { lattice, refresh, scaling, rough, method, moved_elements, least_share, .. } = &mut **model;
-        if lattice.functions() == 0 {
+        if model.lattice.functions() == 0 {
             return None;
         }
+        let residual = ResidualFactors::new(step, model, trial.progress);
+        let LargeModel { lattice, refresh, scaling, rough, method, moved_elements, least_share, .. } = &mut **model;
         let Trial { scene, loads, displacement, increment, force, volume, progress, .. } = trial;
         let supports = MovingSupports {
             scene: *scene,
@@ -245,7 +246,6 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             volume,
         };
         let supports = supports.pull(loads, progress.time, step, increment, tables.next_increment);
-        let residual = ResidualFactors::new(step, scaling, progress.steps == 0);
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
         let extremes = node_parts(scene, self.threads).restrict(input, force, tables.inverse_diagonal, cells, momentum);
@@ -282,8 +282,8 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
     fn move_nodes<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>, moved: Option<MovedLattice>) -> Totals {
         let Self { step, model, storage: Storage { tables, places, matrices, .. }, .. } = self;
         let LargeModel { refresh, scaling, method, .. } = &**model;
-        let Trial { scene, increment, force, progress, .. } = trial;
-        let residual = ResidualFactors::new(step, scaling, progress.steps == 0);
+        let residual = ResidualFactors::new(step, model, trial.progress);
+        let Trial { scene, increment, force, .. } = trial;
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let lattice = moved.as_ref().map(|moved| LatticeMotion {
             cells: matrices.cells,
