@@ -9,6 +9,7 @@ use reference::dense::{self, Matrix, cholesky, eigenvalues, symmetric_part, tran
 use reference::tensor::{apply, contraction, determinant, from_fn, product, rotation};
 use reference::{EXPONENT_CAP, J_MIN, Mat3, Random, Vec3};
 
+use super::barrier::{Barrier, ONSET};
 use super::deformation::Deformation;
 use super::stiffness_bound::{Bound, Coefficients, MatrixSums};
 use crate::material::{Exponential, Law, LawState, NeoHookean, Tissue};
@@ -34,16 +35,19 @@ struct Sample {
     scalar: f64,
 }
 
-fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
+/// `coefficients` are those of a law, or of a crushed element.
+fn sample(
+    coefficients: impl Fn(&Deformation<f32>) -> Coefficients<f32>,
+    points: &[[f32; 3]],
+    h: [[f32; 3]; 3],
+) -> Sample {
     let tets = [[0, 1, 2, 3]];
-    let tissue = Tissue { law, density: 1000.0 };
+    let tissue = Tissue { law: NeoHookean { c: 500.0, d: 5_000.0 }, density: 1000.0 };
     let scene = VecScene::build(tissue, &Mesh::new(points, &tets, Winding::Normalised).unwrap(), &[]).unwrap();
     let scene = scene.view();
     let tile = &scene.tiles[0];
     let deformation = Deformation::<f32>::new(h);
-    let wide = law.splat::<f32>();
-    let local = LawState::new::<L>(&wide, deformation.invariants);
-    let bound = Bound::of(Coefficients::new::<L>(&wide, &local), tile, 0, &deformation);
+    let bound = Bound::of(coefficients(&deformation), tile, 0, &deformation);
     let (mut diagonal, mut off_diagonal) = ([NodeVector::ZERO; 4], [NodeVector::ZERO; 4]);
     let mut sums = MatrixSums { diagonal: Scatter::new(&mut diagonal), off_diagonal: Scatter::new(&mut off_diagonal) };
     let rows = [0, 1, 2].map(|i| [0, 1, 2].map(|j| deformation.cofactor(i, j)));
@@ -83,20 +87,20 @@ fn sample<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Sample {
 }
 
 /// Forces on the four nodes, N.
-fn forces(law: &reference::Law, sample: &Sample, f: &Mat3) -> Vec<f64> {
-    let p = law.first_piola(f);
+fn forces(stress: &impl Fn(&Mat3) -> Mat3, sample: &Sample, f: &Mat3) -> Vec<f64> {
+    let p = stress(f);
     sample.gradients.iter().flat_map(|g| apply(&p, *g).map(|x| sample.volume * x)).collect()
 }
 
 /// The 12 x 12 tangent (N/m) by central differences of fourth order, with steps that change `F` by `size`.
-fn tangent(law: &reference::Law, sample: &Sample, f: &Mat3, size: f64) -> Matrix {
+fn tangent(stress: &impl Fn(&Mat3) -> Mat3, sample: &Sample, f: &Mat3, size: f64) -> Matrix {
     let mut k = dense::zeros(12);
     for (node, gradient) in sample.gradients.iter().enumerate() {
         let length = gradient.iter().map(|x| x * x).sum::<f64>().sqrt();
         for axis in 0..3 {
             let at = |times: f64| {
                 let moved = from_fn(|i, j| f[i][j] + if i == axis { times * size * gradient[j] / length } else { 0.0 });
-                forces(law, sample, &moved)
+                forces(stress, sample, &moved)
             };
             let (far_back, back, on, far_on) = (at(-2.0), at(-1.0), at(1.0), at(2.0));
             for row in 0..12 {
@@ -125,6 +129,16 @@ fn direct_sum(matrices: &[Matrix; 4]) -> Matrix {
     whole
 }
 
+fn largest(matrix: &Matrix) -> f64 {
+    *eigenvalues(matrix).last().unwrap()
+}
+
+/// Largest `lambda` of `K x = lambda D x` with the matrices `D_a` of the nodes.
+fn generalised(k: &Matrix, matrices: &[Matrix; 4]) -> f64 {
+    let root = cholesky(&direct_sum(matrices)).expect("the bound is positive");
+    largest(&transformed(&root, &symmetric_part(k)))
+}
+
 /// Comparison of the bounds with the tangent `K` in one state.
 struct Comparison {
     /// Largest `lambda` of `K x = lambda D x`, with the matrices in float64 and with those of the crate.
@@ -140,11 +154,15 @@ struct Comparison {
 }
 
 fn compare<L: Law>(law: L, reference_law: &reference::Law, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Comparison {
-    let sample = sample(law, points, h);
+    let wide = law.splat::<f32>();
+    let of_law = |deformation: &Deformation<f32>| {
+        Coefficients::new::<L>(&wide, &LawState::new::<L>(&wide, deformation.invariants))
+    };
+    let (sample, stress) = (sample(of_law, points, h), |f: &Mat3| reference_law.first_piola(f));
     let f = from_fn(|i, j| f64::from(h[i][j]) + if i == j { 1.0 } else { 0.0 });
     let size = step_size(reference_law, &f);
-    let k = tangent(reference_law, &sample, &f, size);
-    let coarser = tangent(reference_law, &sample, &f, 2.0 * size);
+    let k = tangent(&stress, &sample, &f, size);
+    let coarser = tangent(&stress, &sample, &f, 2.0 * size);
     let a = reference_law.tangent(&f);
     let mut by_formula = dense::zeros(12);
     for (row, column) in (0..12).flat_map(|row| (0..12).map(move |column| (row, column))) {
@@ -158,11 +176,7 @@ fn compare<L: Law>(law: L, reference_law: &reference::Law, points: &[[f32; 3]], 
         let square: f64 = k.iter().flatten().zip(other.iter().flatten()).map(|(x, y)| (x - y).powi(2)).sum();
         square.sqrt() / norm(&k)
     };
-    let largest = |matrix: &Matrix| *eigenvalues(matrix).last().unwrap();
-    let against = |matrices: &[Matrix; 4]| {
-        let root = cholesky(&direct_sum(matrices)).expect("the bound is positive");
-        largest(&transformed(&root, &symmetric_part(&k)))
-    };
+    let against = |matrices: &[Matrix; 4]| generalised(&k, matrices);
     let of_bound = sample.exact.iter().map(largest).fold(0.0, f64::max);
     let summed = sample.matrices.iter().map(largest).fold(0.0, f64::max);
     Comparison {
@@ -352,4 +366,61 @@ fn the_bound_of_an_element_is_an_upper_bound_and_close() {
     assert!(median <= CLOSE);
     // Most states of tissue belong to the first class; added inertia is small where the bound is close.
     assert!(medians[0] <= 2.0);
+}
+
+/// Crushed elements with nodal strain: between the onset of their own energy and its continuation along the tangent,
+/// and beyond that.
+#[test]
+fn the_bound_of_a_crushed_element_is_an_upper_bound() {
+    /// Shear modulus, Pa.
+    const SHEAR: f32 = 900.0;
+    let mut random = Random(7);
+    let (mut most, mut over_scalar, mut ratios, mut inverted) = (0.0_f64, 0.0_f64, Vec::new(), 0);
+    while ratios.len() < 4_000 {
+        let class = 2 + ratios.len() % 4;
+        let (points, f) = (tetrahedron(&mut random), deformation(&mut random, class));
+        let size = 3e-4 * contraction(&f, &f).sqrt();
+        let near = 4.0 * size * (1.0 + contraction(&f, &f));
+        let j = determinant(&f);
+        if j > f64::from(ONSET) - near || (j - 0.15).abs() < near {
+            continue;
+        }
+        let h = [0, 1, 2].map(|i| [0, 1, 2].map(|j| (f[i][j] - if i == j { 1.0 } else { 0.0 }) as f32));
+        let of_barrier = |deformation: &Deformation<f32>| {
+            let at = deformation.invariants;
+            Coefficients::of_barrier(&Barrier::new(SHEAR / 6.0, at), at)
+        };
+        let sample = sample(of_barrier, &points, h);
+        let f = from_fn(|i, j| f64::from(h[i][j]) + if i == j { 1.0 } else { 0.0 });
+        let stress = |f: &Mat3| reference::nodal_strain::barrier_stress(SHEAR.into(), f);
+        let k = tangent(&stress, &sample, &f, size);
+        most = most.max(generalised(&k, &sample.exact)).max(generalised(&k, &sample.matrices) - 9e-3);
+        let of_bound = sample.exact.iter().map(largest).fold(0.0, f64::max);
+        over_scalar = over_scalar.max(of_bound / sample.scalar);
+        ratios.push(of_bound / largest(&symmetric_part(&k)));
+        inverted += usize::from(j < 0.0);
+    }
+    // At rest, in front of the onset, and in a place without an element.
+    for (side, modulus) in [(1.0, SHEAR), (0.82, SHEAR), (0.7, 0.0)] {
+        let h = [0, 1, 2].map(|i| [0, 1, 2].map(|j| if i == j { side - 1.0 } else { 0.0 }));
+        let ahead = |deformation: &Deformation<f32>| {
+            let at = deformation.invariants;
+            Coefficients::of_barrier(&Barrier::ahead(modulus / 6.0, at), at)
+        };
+        let sample = sample(ahead, &tetrahedron(&mut random), h);
+        let of_bound = sample.matrices.iter().map(largest).fold(0.0, f64::max);
+        println!("side {side}, modulus {modulus}: {of_bound:.2e} N/m");
+        assert!(sample.matrices.iter().flatten().flatten().all(|entry| entry.is_finite()) && sample.scalar.is_finite());
+        // No more than what keeps a divisor from zero.
+        assert_eq!(of_bound > 1e-30, side == 0.82);
+    }
+    ratios.sort_by(f64::total_cmp);
+    let median = quantile(&ratios, 0.5);
+    println!(
+        "largest eigenvalue of the tangent against the bound {most:.5}, of the bound over that of the tangent {median:.2} \
+         (median), {:.1} (95 %), over the scalar bound {over_scalar:.5}; {inverted} inverted",
+        quantile(&ratios, 0.95)
+    );
+    assert!(most <= 1.0 + 1e-3 && over_scalar <= 1.0 + 1e-5 && inverted > 500);
+    assert!((1.0 - 1e-3..4.0).contains(&median) && ratios[0] >= 1.0 - 1e-3);
 }

@@ -121,23 +121,37 @@ impl ElementTile {
             let Some(&place) = places.get(lane).or_else(|| places.first()) else {
                 return gathered;
             };
-            let (Some(tile), from) = (tiles.get(place as usize / TILE), place as usize % TILE) else {
-                continue;
-            };
-            for corner in 0..4 {
-                gathered.nodes[corner][lane] = tile.nodes[corner][from];
-            }
-            for corner in 0..3 {
-                for axis in 0..3 {
-                    gathered.gradients[corner][axis][lane] = tile.gradients[corner][axis][from];
-                }
-            }
-            gathered.elements[lane] = tile.elements[from];
-            gathered.gradient_eigenvalues[lane] = tile.gradient_eigenvalues[from];
+            gathered.copy_element(lane, tiles, place);
             // Places without an element have volume zero.
-            gathered.volumes[lane] = if lane < places.len() { tile.volumes[from] } else { 0.0 };
+            if lane >= places.len() {
+                gathered.volumes[lane] = 0.0;
+            }
         }
         gathered
+    }
+
+    /// Copies the element at a place of some tiles to place `lane`.
+    #[inline(always)]
+    pub(crate) fn copy_element(&mut self, lane: usize, tiles: &[Self], place: u32) {
+        let (Some(tile), from, lane) = (tiles.get(place as usize / TILE), place as usize % TILE, lane % TILE) else {
+            return;
+        };
+        for corner in 0..4 {
+            self.nodes[corner][lane] = tile.nodes[corner][from];
+        }
+        for corner in 0..3 {
+            for axis in 0..3 {
+                self.gradients[corner][axis][lane] = tile.gradients[corner][axis][from];
+            }
+        }
+        self.elements[lane] = tile.elements[from];
+        self.gradient_eigenvalues[lane] = tile.gradient_eigenvalues[from];
+        self.volumes[lane] = tile.volumes[from];
+    }
+
+    /// Makes the places from `lane` on ones without an element.
+    pub(crate) fn empty_from(&mut self, lane: usize) {
+        self.volumes.iter_mut().skip(lane).for_each(|volume| *volume = 0.0);
     }
 
     /// Writes an element with these `corners` (m) to place `lane`.

@@ -81,16 +81,16 @@ impl<L: Law, P: Pressure> Kernel for TileBounds<'_, L, P> {
 }
 
 /// The bounds of the elements from place `first` on.
-struct AddBounds<'a, 'b, R> {
-    tile: &'a ElementTile,
-    first: usize,
-    deformation: &'a Deformation<R>,
-    coefficients: &'a Coefficients<R>,
-    rotations: &'a [Rotation; TILE],
-    weight: f32,
-    sums: &'a mut MatrixSums<'b>,
-    buffer: &'a mut [ScatterBuffer<4>; 2],
-    tangents: &'a mut TileTangents,
+pub(super) struct AddBounds<'a, 'b, R> {
+    pub(super) tile: &'a ElementTile,
+    pub(super) first: usize,
+    pub(super) deformation: &'a Deformation<R>,
+    pub(super) coefficients: &'a Coefficients<R>,
+    pub(super) rotations: &'a [Rotation; TILE],
+    pub(super) weight: f32,
+    pub(super) sums: &'a mut MatrixSums<'b>,
+    pub(super) buffer: &'a mut [ScatterBuffer<4>; 2],
+    pub(super) tangents: &'a mut TileTangents,
 }
 
 impl<R: Real> Piece for AddBounds<'_, '_, R> {

@@ -17,7 +17,8 @@ use super::lattice::rank_of;
 use super::node_tables::NodeTables;
 use super::refresh::RefreshInput;
 use crate::element::{
-    ElementLaw, ElementMaterial, MatrixSums, PatchTile, PatchTileBounds, TileTangents, stabilising_modulus,
+    CrushedBounds, ElementLaw, ElementMaterial, MatrixSums, PatchTile, PatchTileBounds, TileTangents, each_bounded,
+    stabilising_modulus,
 };
 use crate::scene::SceneView;
 use crate::simd::{Gather, NodeVector, Scatter, TILE};
@@ -78,6 +79,40 @@ pub(super) fn add_tile<M: ElementMaterial>(
     tangents
 }
 
+/// Adds the bounds of crushed elements to the sums of the nodes, and their tangents to the coarse stiffness: of the
+/// elements in the tables' tile `at` of `count` equal shares of them.
+pub(super) fn add_crushed<M: ElementMaterial>(
+    input: &RefreshInput<'_, M>,
+    frames: &Frames,
+    tables: &mut NodeTables<'_>,
+    (at, count): (usize, usize),
+    mut assembly: Option<&mut Assembly<'_>>,
+) {
+    let (tiles, displacement, mut slots) = (input.scene.tiles, input.displacement, NO_SLOTS);
+    let share = |at: usize| (at * tiles.len()).checked_div(count).unwrap_or(0);
+    let tiles = tiles.get(share(at)..share(at + 1)).unwrap_or_default();
+    each_bounded(&input.scene.material.laws(), tiles, displacement, |crushed| {
+        let mut rotations = [Rotation::NONE.0; TILE];
+        for (lane, rotation) in rotations.iter_mut().enumerate() {
+            *rotation = frames.since_start(tables.frame(rank_of(input.places, crushed.tile.node(0, lane)))).0;
+        }
+        let diagonal = Scatter::new(tables.sum_diagonal);
+        let tangents = CrushedBounds {
+            crushed,
+            displacement: Gather::new(displacement),
+            sums: MatrixSums { diagonal, off_diagonal: Scatter::new(tables.sum_off_diagonal) },
+            rotations: &rotations,
+            weight: if assembly.is_some() { input.scaling.coarse_weight } else { 0.0 },
+        };
+        let tangents = tangents.tangents();
+        if let Some(assembly) = &mut assembly {
+            for lane in (0..TILE).filter(|&lane| crushed.moduli[lane] > 0.0) {
+                assembly.add_element(&ElementTangent::of(&crushed.tile, &tangents, lane), &mut slots);
+            }
+        }
+    });
+}
+
 /// Calls `add` with the nodes of patches with a changed node and the forces by which these patches resist a change of
 /// the displacements (m), with the factor `weight` (s^2). `changed` gives the change of a node.
 pub(super) fn resist<M: ElementMaterial>(
@@ -113,4 +148,17 @@ pub(super) fn resist<M: ElementMaterial>(
             add(tile.node(lane), weight * modulus * pull);
         }
     }
+    each_bounded(&laws, scene.tiles, displacement, |crushed| {
+        let is_changed = |lane: usize| (0..4).any(|corner| changed(crushed.tile.node(corner, lane)) != Vec4::ZERO);
+        if !(0..TILE).any(is_changed) {
+            return;
+        }
+        let sums = MatrixSums { diagonal: Scatter::new(&mut []), off_diagonal: Scatter::new(&mut []) };
+        let (displacement, rotations) = (Gather::new(displacement), &[Rotation::NONE.0; TILE]);
+        let tangents = CrushedBounds { crushed, displacement, sums, rotations, weight }.tangents();
+        for lane in (0..TILE).filter(|&lane| crushed.moduli[lane] > 0.0 && is_changed(lane)) {
+            let element = ElementTangent::of(&crushed.tile, &tangents, lane);
+            forces(&element.tangent, element.corners(), &changed, &mut add);
+        }
+    });
 }

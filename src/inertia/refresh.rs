@@ -349,7 +349,8 @@ impl Refresh {
         BATCH_TILES as i64 * tile_cost(functions)
     }
 
-    /// The bounds of tile `at` of the patches of nodal strain. Not inlined, as above.
+    /// The bounds of tile `at` of the patches of nodal strain, and of as large a share of the elements, those that are
+    /// crushed. Not inlined, as above.
     #[inline(never)]
     fn add_patches<M: ElementMaterial>(
         &mut self,
@@ -363,6 +364,7 @@ impl Refresh {
         if let Some(tile) = tiles.get(at) {
             let mut assembly = (functions > 0).then(|| input.assembly(matrices.next_coarse, stride));
             let tangents = nodal_strain::add_tile(input, &self.frames, tables, tile, assembly.as_mut());
+            nodal_strain::add_crushed(input, &self.frames, tables, (at, tiles.len()), assembly.as_mut());
             if functions > 0 {
                 self.next_stiffness.add(&tangents);
             }

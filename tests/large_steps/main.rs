@@ -326,8 +326,8 @@ fn tangent_with_nodal_strain(
     (k, nodal_strain::forces(&tissues, u))
 }
 
-/// With nodal strain, in equilibrium at rest and strained by a third, with shaken nodes. The operator is what a force
-/// changes in the first step.
+/// With nodal strain, in equilibrium at rest, strained by a third and crushed, with shaken nodes. The operator is what
+/// a force changes in the first step.
 #[test]
 fn the_operator_is_positive_and_bounded_with_nodal_strain() {
     let body = Body::irregular([0.02, 0.02, 0.04], [2, 2, 4]);
@@ -338,6 +338,7 @@ fn the_operator_is_positive_and_bounded_with_nodal_strain() {
         ("at rest", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 1000.0),
         ("stretched", [[0.86, 0.0, 0.0], [0.0, 0.86, 0.0], [0.0, 0.0, 1.35]], 10.0),
         ("compressed", [[1.2, 0.0, 0.0], [0.0, 1.2, 0.0], [0.0, 0.0, 0.7]], 50.0),
+        ("crushed", [[1.2, 0.0, 0.0], [0.0, 1.1, 0.0], [0.0, 0.0, 0.3]], 50.0),
         ("sheared", [[1.0, 0.0, 0.5], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 1000.0),
     ] {
         let law = NeoHookean { c: 100.0, d: 100.0 * ratio };
@@ -375,7 +376,9 @@ fn the_operator_is_positive_and_bounded_with_nodal_strain() {
             let root = cholesky(&symmetric_part(&b)).expect("a positive operator");
             let most = *eigenvalues(&congruent(&root, &k)).last().unwrap() * square / 4.0;
             println!("{name}, bulk over shear {ratio}, {kind:?}: lambda_max(B K) D^2 / 4 = {most:.3}");
-            if !(0.2..=1.0).contains(&most) {
+            // The bounds of crushed elements are less close.
+            let least = if name == "crushed" { 0.05 } else { 0.2 };
+            if !(least..=1.0).contains(&most) {
                 wrong.push((name, ratio, kind, most));
             }
         }
