@@ -134,8 +134,8 @@
 
 /**
  * Tetrahedra with stabilised nodal strain, which bend well on coarse meshes and take less time than linear ones, but
- * more memory: supple_patches_size. Under strains above a half elements at sharp edges may turn inside out, which the
- * status tells within 16 steps. Only in a library with all laws.
+ * more memory: supple_patches_size. Elements that are crushed to less than half of their volume resist. Under strains
+ * above a half laws that stiffen much are too soft. Only in a library with all laws.
  */
 #define SUPPLE_NODAL_STRAIN 2
 
@@ -1907,10 +1907,11 @@ supple_status supple_save(const supple_state *state, void *to, size_t bytes);
 
 /**
  * Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the
- * saved one would have, to the bit. Forces are zero until the next step. A saved state with a time, a displacement or
- * an increment that is not finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE. The first
- * step of a supple_large computes its inertia anew, and a supple_learned needs a new lead-in; for the same bits with
- * these, copy their objects with memcpy as well.
+ * saved one would have, to the bit; with nodal strain unless an element was crushed within the last 16 steps, which
+ * the restored state may see some steps sooner. Forces are zero until the next step. A saved state with a time, a
+ * displacement or an increment that is not finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE.
+ * The first step of a supple_large computes its inertia anew, and a supple_learned needs a new lead-in; for the same
+ * bits with these, copy their objects with memcpy as well.
  */
 supple_status supple_restore(supple_state *state,
                              const void *from,

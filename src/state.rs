@@ -13,7 +13,7 @@ use crate::contact::{ContactPoint, Touch};
 #[cfg(any(feature = "std", test))]
 use crate::contact::{MOST_INSTRUMENTS, Surface, vectors_to_push};
 use crate::copy::copy;
-use crate::element::Extremes;
+use crate::element::{Extremes, forget_crushed};
 use crate::energy_balance::EnergyBalance;
 use crate::material::Element;
 use crate::scattered::scattered;
@@ -42,6 +42,12 @@ pub struct Progress {
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(crate) struct Mark(NonZeroU64);
 
+impl Mark {
+    pub(crate) const fn number(self) -> u64 {
+        self.0.get()
+    }
+}
+
 /// Tells a state from others that have taken as many steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Moment {
@@ -52,7 +58,7 @@ pub(crate) struct Moment {
 
 impl Moment {
     /// The same in one number.
-    const fn mark(&self) -> Mark {
+    pub(crate) const fn mark(&self) -> Mark {
         let hash = scattered(scattered(self.steps.wrapping_add(1)) ^ self.time.to_bits());
         let hash = scattered(hash ^ self.kinetic.to_bits());
         Mark(NonZeroU64::MIN.saturating_add(hash))
@@ -128,7 +134,8 @@ pub struct StateView<'a> {
     pub(crate) remainder: &'a mut [NodeVector],
     pub(crate) increment: &'a mut [NodeVector],
     pub(crate) force: &'a mut [NodeVector],
-    /// Of scenes with nodal pressure or strain ([`crate::element`]), empty for others.
+    /// Of scenes with nodal pressure; with nodal strain the marks of crushed elements ([`crate::element`]); empty for
+    /// others.
     pub(crate) volume: &'a mut [NodeVector],
     pub(crate) progress: &'a mut Progress,
     /// What the instruments feel in the latest step.
@@ -247,6 +254,7 @@ impl<'a> StateView<'a> {
         }
         self.remainder.fill(NodeVector::ZERO);
         (self.progress.time, self.progress.dt, self.progress.seen) = (time, seconds, None);
+        forget_crushed(self.volume);
     }
 
     /// Copies the vectors that a step moves to [`MOVED_VECTORS`] for each node.

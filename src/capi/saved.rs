@@ -99,10 +99,11 @@ pub unsafe extern "C" fn supple_save(state: *const supple_state, to: *mut c_void
 }
 
 /// Restores a saved state, from any address, into one prepared for the same scene: with exact steps it goes on as the
-/// saved one would have, to the bit. Forces are zero until the next step. A saved state with a time, a displacement or
-/// an increment that is not finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE. The first
-/// step of a supple_large computes its inertia anew, and a supple_learned needs a new lead-in; for the same bits with
-/// these, copy their objects with memcpy as well.
+/// saved one would have, to the bit; with nodal strain unless an element was crushed within the last 16 steps, which
+/// the restored state may see some steps sooner. Forces are zero until the next step. A saved state with a time, a
+/// displacement or an increment that is not finite, or with a time before the start, is refused: SUPPLE_E_NOT_FINITE.
+/// The first step of a supple_large computes its inertia anew, and a supple_learned needs a new lead-in; for the same
+/// bits with these, copy their objects with memcpy as well.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_restore(state: *mut supple_state, from: *const c_void, bytes: usize) -> supple_status {
     // SAFETY: what the header asks of the caller.

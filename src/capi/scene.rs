@@ -24,8 +24,8 @@ pub const SUPPLE_LINEAR: u32 = 0;
 /// Tetrahedra with average nodal pressure, which do not lock. Take these unless you compare with others' linear ones.
 pub const SUPPLE_NODAL_PRESSURE: u32 = 1;
 /// Tetrahedra with stabilised nodal strain, which bend well on coarse meshes and take less time than linear ones, but
-/// more memory: supple_patches_size. Under strains above a half elements at sharp edges may turn inside out, which the
-/// status tells within 16 steps. Only in a library with all laws.
+/// more memory: supple_patches_size. Elements that are crushed to less than half of their volume resist. Under strains
+/// above a half laws that stiffen much are too soft. Only in a library with all laws.
 pub const SUPPLE_NODAL_STRAIN: u32 = 2;
 const _: () = assert!(SUPPLE_LINEAR == Element::Linear.code());
 const _: () = assert!(SUPPLE_NODAL_PRESSURE == Element::NodalPressure.code());

@@ -27,6 +27,7 @@
 use crate::material::{Law, LawState, Laws};
 use crate::simd::{Gather, Kernel, NodeVector, Piece, Real, Scatter, ScatterBuffer, TILE, TileNodes, dot};
 
+use super::barrier::Barrier;
 use super::deformation::{Deformation, Vector};
 use super::pressure::{OwnPressure, Pressure, ReadTile};
 use super::symmetric::Symmetric;
@@ -167,14 +168,14 @@ pub(super) fn mass_weighted_gradients<R: Real>(
 }
 
 /// Adds the matrices of a vector of elements to the sums ([`mass_weighted_gradients`]).
-struct AddBounds<'a, 'b, R> {
-    tile: &'a ElementTile,
-    first: usize,
-    deformation: &'a Deformation<R>,
-    terms: &'a Terms<R>,
-    inertia: Gather<'a>,
-    sums: &'a mut NodeMatrices<'b>,
-    buffers: &'a mut [ScatterBuffer<4>; 3],
+pub(super) struct AddBounds<'a, 'b, R> {
+    pub(super) tile: &'a ElementTile,
+    pub(super) first: usize,
+    pub(super) deformation: &'a Deformation<R>,
+    pub(super) terms: &'a Terms<R>,
+    pub(super) inertia: Gather<'a>,
+    pub(super) sums: &'a mut NodeMatrices<'b>,
+    pub(super) buffers: &'a mut [ScatterBuffer<4>; 3],
 }
 
 impl<R: Real> Piece for AddBounds<'_, '_, R> {
@@ -313,11 +314,26 @@ impl<R: Real> Images<R> {
 impl<R: Real> Terms<R> {
     #[inline(always)]
     pub(super) fn new<L: Law>(law: &L::Wide<R>, local: &LawState<R>, deformation: &Deformation<R>) -> Self {
-        let at = deformation.invariants;
+        let stiffening = local.stiffening::<L>(law);
+        Self::of((local.slope, local.volume_factor()), [local.bulk, local.pressure, stiffening], deformation)
+    }
+
+    /// Of crushed elements.
+    #[inline(always)]
+    pub(super) fn of_barrier(barrier: &Barrier<R>, deformation: &Deformation<R>) -> Self {
+        Self::of((barrier.slope, barrier.factor), [R::splat(0.0); 3], deformation)
+    }
+
+    /// From `W'`, from `g` with its derivatives, and from `U''`, `U'` and `W''`.
+    #[inline(always)]
+    fn of(
+        (slope, [g, dg, ddg]): (R, [R; 3]),
+        [bulk, pressure, stiffening]: [R; 3],
+        deformation: &Deformation<R>,
+    ) -> Self {
         let (zero, two) = (R::splat(0.0), R::splat(2.0));
-        let (slope, [g, dg, ddg]) = (local.slope, local.volume_factor());
-        let i1 = at.i + R::splat(3.0);
-        let volume = local.bulk + slope * (R::splat(4.0) * dg + ddg * i1);
+        let i1 = deformation.invariants.i + R::splat(3.0);
+        let volume = bulk + slope * (R::splat(4.0) * dg + ddg * i1);
         // 4 W' g' (C:dF)(E:dF), split with r = |E| / |C|.
         let coupling = (two * slope * dg).abs();
         let (mut c, mut e) = (zero, zero);
@@ -331,8 +347,8 @@ impl<R: Real> Terms<R> {
         let ratio = (e + tiny).divide(c + tiny).sqrt();
         Self {
             p1: two * slope * g,
-            p_j: local.pressure + slope * dg * i1,
-            stiffening: local.stiffening::<L>(law),
+            p_j: pressure + slope * dg * i1,
+            stiffening,
             volume: (volume + coupling * ratio).max(zero),
             coupling: coupling.divide(ratio),
             x_f: two * g,

@@ -3,6 +3,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::barrier;
 use super::patch_forces::STABILISATION;
 use super::{ElementTile, PatchTile, Patches, VolumeRows};
 use crate::material::{Invariants, Law, Potential, energy_density, response};
@@ -135,8 +136,8 @@ pub(crate) fn patch_energy<L: Law>(
     tile.volume(lane) * (energy_density(law, i, j) - 0.5 * stabilising_modulus(law) * square)
 }
 
-/// What an element adds to it, J.
+/// What an element adds to it, J: where it is crushed also the energy of [`super::barrier`].
 pub(crate) fn stabilising_energy<L: Law>(law: &L, tile: &ElementTile, lane: usize, displacement: &[NodeVector]) -> f64 {
-    let (_, _, square) = invariants(gradient_of(tile, lane, displacements(displacement)));
-    f64::from(tile.volume::<f32>(lane)) * 0.5 * stabilising_modulus(law) * square
+    let (i, j, square) = invariants(gradient_of(tile, lane, displacements(displacement)));
+    f64::from(tile.volume::<f32>(lane)) * (0.5 * stabilising_modulus(law) * square + barrier::energy_density(law, i, j))
 }

@@ -5,6 +5,7 @@
 use crate::material::{AnyLaw, Element, Law, for_each_law};
 use crate::simd::{NodeVector, dispatch};
 
+use super::internal_forces::ElementVisitor;
 use super::{
     CriticalBounds, ElementTangents, Extremes, InternalForces, MeanPressure, NoVisitor, PatchBounds, PatchForces,
     PatchTangents, ScalarBound, TileTangents,
@@ -90,7 +91,7 @@ pub(crate) fn tangents<L: ElementLaw>(
 }
 
 /// A visitor with which the internal forces of every law are compiled.
-pub(crate) trait ForcesVisitor<L: ElementLaw>: Copy + Sync {
+pub(crate) trait ForcesVisitor<L: ElementLaw>: ElementVisitor + Copy + Sync {
     fn forces(kernel: InternalForces<'_, L, Self>) -> Extremes<f32>;
     fn nodal_pressure_forces(kernel: InternalForces<'_, L, Self, MeanPressure<'_>>) -> Extremes<f32>;
     fn patch_forces(kernel: PatchForces<'_, L, Self>) -> Extremes<f32>;

@@ -1,12 +1,16 @@
 //! Tetrahedra with linear displacements (T4): stress and pressure from each element's own deformation, with the
 //! pressure of the volumes around its nodes ([`crate::material::NodalPressure`]), or all from the mean strain around
-//! nodes ([`crate::material::NodalStrain`]). Their tables, deformation, internal forces, bounds of their tangent
-//! stiffness, and what they tell about themselves. Loops over elements are written once, for any law and any
-//! instruction-set level ([`crate::simd`]); they are compiled for each law of the list (`kernels.rs`), and linked only
-//! where a scene uses that law. What in them does not depend on the law is compiled once for each level
-//! ([`crate::simd::Piece`]).
+//! nodes ([`crate::material::NodalStrain`], with an energy of their own for crushed elements, `barrier.rs`). Their
+//! tables, deformation, internal forces, bounds of their tangent stiffness, and what they tell about themselves. Loops
+//! over elements are written once, for any law and any instruction-set level ([`crate::simd`]); they are compiled for
+//! each law of the list (`kernels.rs`), and linked only where a scene uses that law. What in them does not depend on
+//! the law is compiled once for each level ([`crate::simd::Piece`]).
 
+mod barrier;
+mod barrier_bounds;
+mod barrier_forces;
 mod critical_bounds;
+mod crushed;
 mod deformation;
 mod fields;
 mod internal_forces;
@@ -27,7 +31,6 @@ mod stiffness_bound_tests;
 pub(crate) mod symmetric;
 mod tile;
 mod tile_tangents;
-mod volume_check;
 
 pub use fields::ElementFields;
 pub use kernels::ElementLaw;
@@ -42,8 +45,15 @@ pub(crate) use patch_tangents::PatchTangents;
 pub use tile::ElementTile;
 pub(crate) use tile::MOST_ELEMENTS;
 
-pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
 #[cfg(feature = "std")]
+pub(crate) use barrier::{factor as barrier_factor, modulus as barrier_modulus};
+pub(crate) use barrier_bounds::{CrushedTangents, add_crushed_bounds, each_bounded};
+pub(crate) use barrier_forces::{AddCrushed, Forces as CrushedForces};
+pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
+pub(crate) use crushed::{
+    CrushedElements, LOOK_CYCLE, Look, MARKED, each_marked, forget_crushed, is_marked_at, mark_moment, mask_of, masks,
+    masks_mut,
+};
 pub(crate) use fields::stabilising_modulus;
 pub(crate) use fields::{element_energy, element_fields, patch_energy, stabilising_energy};
 #[cfg(feature = "std")]
@@ -54,7 +64,6 @@ pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};
 pub(crate) use stiffness_bound::ScalarBound;
 pub(crate) use tile_tangents::{ElementTangents, Tangent, TileTangents};
-pub(crate) use volume_check::{CHECK_CYCLE, VolumeCheck};
 
 use crate::material::Material;
 

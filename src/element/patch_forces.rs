@@ -7,7 +7,8 @@
 //! ```
 //! whose bracket is the sum over the patches of the variance of `H_e` (Puso & Solberg 2006 stabilise in the same way,
 //! with another energy). With `P_a = dPsi/dF(F_a) - s mu H_a` a patch gives its neighbour `b` the force `-P_a c_ab`,
-//! and its own node the opposite and `s mu sum_b k_ab (u_b - u_a)`, `k_ab = -sum_e V_e g_a . g_b`.
+//! and its own node the opposite and `s mu sum_b k_ab (u_b - u_a)`, `k_ab = -sum_e V_e g_a . g_b`. Crushed elements add
+//! an energy of their own ([`super::barrier`]).
 
 use core::marker::PhantomData;
 use core::ops::Range;

@@ -47,6 +47,7 @@ use crate::material::{Invariants, Law, LawState};
 use crate::simd::Real;
 
 use super::ElementTile;
+use super::barrier::Barrier;
 use super::deformation::Deformation;
 use super::internal_forces::ElementVisitor;
 
@@ -102,6 +103,18 @@ impl<R: Real> Coefficients<R> {
         Self { p1, p_j, cc, ce, ee, floor: R::splat(FLOOR) * (bulk + p1 + ce.abs()) }
     }
 
+    /// Of crushed elements with nodal strain.
+    #[inline(always)]
+    pub(super) fn of_barrier(barrier: &Barrier<R>, at: Invariants<R>) -> Self {
+        let (slope, [h, dh, ddh]) = (barrier.slope, barrier.factor);
+        let i1 = at.i + R::splat(3.0);
+        let (p1, ce) = (slope * (h + h), slope * (dh + dh));
+        let cc = slope * ddh.fused(i1, R::splat(4.0) * dh);
+        // Not zero where nothing is crushed yet, as it is a divisor.
+        let floor = (R::splat(FLOOR) * (p1 + ce.abs())).max(R::splat(f32::MIN_POSITIVE));
+        Self { p1, p_j: slope * dh * i1, cc, ce, ee: R::splat(0.0), floor }
+    }
+
     /// With `modulus |dF|^2` taken off.
     #[inline(always)]
     pub(super) fn less(self, modulus: R) -> Self {
@@ -140,7 +153,7 @@ impl<R: Real> Coefficients<R> {
 /// An upper bound (N/m) of the eigenvalues of an element's four matrices, from the invariants `i = I1 - 3` and
 /// `j = J - 1` alone: `|C|^2 <= I1^2 / 3`, and with it `|E|^2 = I1 + |C|^2 - 6 J`. `scale` (m) is `V lambda_G`.
 #[inline(always)]
-fn scalar_bound<R: Real>(coefficients: &Coefficients<R>, at: Invariants<R>, scale: R) -> R {
+pub(super) fn scalar_bound<R: Real>(coefficients: &Coefficients<R>, at: Invariants<R>, scale: R) -> R {
     let (zero, third) = (R::splat(0.0), R::splat(1.0 / 3.0));
     let i1 = at.i + R::splat(3.0);
     let cofactor = i1 * i1 * third;
@@ -154,7 +167,7 @@ fn scalar_bound<R: Real>(coefficients: &Coefficients<R>, at: Invariants<R>, scal
 
 /// `V lambda_G` of the elements from place `first` of a tile on, m.
 #[inline(always)]
-fn scale_of<R: Real>(tile: &ElementTile, first: usize) -> R {
+pub(super) fn scale_of<R: Real>(tile: &ElementTile, first: usize) -> R {
     tile.volume::<R>(first) * tile.gradient_eigenvalue::<R>(first)
 }
 

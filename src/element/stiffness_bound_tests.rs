@@ -7,10 +7,11 @@ use crate::reference::dense::{self, Matrix, eigenvalues};
 use crate::reference::tensor::{apply, contraction, determinant, from_fn, inverse, product, rotation};
 use crate::reference::{EXPONENT_CAP, J_MIN, Mat3, Random, Vec3};
 
+use super::barrier::{Barrier, ONSET};
 use super::deformation::Deformation;
 use super::internal_forces::ElementVisitor;
 use super::patch_forces::modulus_of;
-use super::stiffness_bound::{Coefficients, ScalarBound, scalar_bound_of_patches, spatial_bound};
+use super::stiffness_bound::{Coefficients, ScalarBound, scalar_bound, scalar_bound_of_patches, spatial_bound};
 use crate::material::{Exponential, Law, LawState, NeoHookean, Tissue};
 use crate::mesh::{Mesh, Winding};
 use crate::scene::VecScene;
@@ -64,6 +65,13 @@ struct Bounds {
     volume: f64,
 }
 
+/// The bound of `dF:A:dF` (Pa) that holds in any state.
+fn bound_of_any_state(coefficients: &Coefficients<f32>, deformation: &Deformation<f32>) -> Matrix {
+    let (iso, volume) = coefficients.bound(deformation);
+    let cofactor = from_fn(|i, j| f64::from(deformation.cofactor(i, j)));
+    quadratic(|change| f64::from(iso) * square(change) + f64::from(volume) * contraction(&cofactor, change).powi(2))
+}
+
 fn bounds<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Bounds {
     let tissue = Tissue { law, density: 1000.0 };
     let scene =
@@ -85,11 +93,7 @@ fn bounds<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Bounds {
             shear * square(&d) + volume * trace * trace + stress * square(&l)
         })
     };
-    let (iso, volume) = coefficients.bound(deformation);
-    let cofactor = from_fn(|i, j| f64::from(deformation.cofactor(i, j)));
-    let any = quadratic(|change| {
-        f64::from(iso) * square(change) + f64::from(volume) * contraction(&cofactor, change).powi(2)
-    });
+    let any = bound_of_any_state(coefficients, deformation);
     let modulus = modulus_of::<f32, L>(&wide);
     let less = &Coefficients::new::<L>(&wide, &local).less(modulus);
     let is_sound = determinant(&f) > CRUSHED;
@@ -106,24 +110,29 @@ fn bounds<L: Law>(law: L, points: &[[f32; 3]], h: [[f32; 3]; 3]) -> Bounds {
     }
 }
 
-/// The tangent, Pa, and how far it is from a central difference of fourth order.
-fn tangent(law: &reference::Law, f: &Mat3) -> (Matrix, f64) {
-    let a: Matrix = law.tangent(f).iter().map(|row| row.to_vec()).collect();
-    let size = step_size(law, f);
-    let mut by_differences = dense::zeros(9);
+/// `dP/dF` (Pa) by central differences of fourth order, with steps of `size`.
+fn by_differences(stress: impl Fn(&Mat3) -> Mat3, f: &Mat3, size: f64) -> Matrix {
+    let mut a = dense::zeros(9);
     for column in 0..9 {
         let at = |times: f64| {
             let unit = |i, j| if 3 * i + j == column { times * size } else { 0.0 };
-            law.first_piola(&from_fn(|i, j| f[i][j] + unit(i, j)))
+            stress(&from_fn(|i, j| f[i][j] + unit(i, j)))
         };
         let (far_back, back, on, far_on) = (at(-2.0), at(-1.0), at(1.0), at(2.0));
         for row in 0..9 {
             let (i, j) = (row / 3, row % 3);
             let difference = 8.0 * (on[i][j] - back[i][j]) - (far_on[i][j] - far_back[i][j]);
-            by_differences[row][column] = difference / (12.0 * size);
+            a[row][column] = difference / (12.0 * size);
         }
     }
-    let distance = norm(&plus(&by_differences, -1.0, &a)) / norm(&a);
+    a
+}
+
+/// The tangent, Pa, and how far it is from differences.
+fn tangent(law: &reference::Law, f: &Mat3) -> (Matrix, f64) {
+    let a: Matrix = law.tangent(f).iter().map(|row| row.to_vec()).collect();
+    let other = by_differences(|f| law.first_piola(f), f, step_size(law, f));
+    let distance = norm(&plus(&other, -1.0, &a)) / norm(&a);
     (a, distance)
 }
 
@@ -317,4 +326,58 @@ fn the_bounds_of_a_tangent_are_upper_bounds_and_close() {
         let [any, spatial, scalar, scalar_of_patch] = *medians;
         assert!([any, spatial, scalar_of_patch].iter().all(|median| *median < 1.5) && scalar < 5.0);
     }
+}
+
+/// Crushed elements with nodal strain: between the onset of their own energy and its continuation along the tangent,
+/// and beyond that.
+#[test]
+fn the_bounds_of_a_crushed_element_are_upper_bounds() {
+    /// Shear modulus, Pa.
+    const SHEAR: f32 = 900.0;
+    let mut random = Random(7);
+    let (mut margin, mut scalar, mut ratios, mut inverted) = (f64::INFINITY, f64::INFINITY, Vec::new(), 0);
+    while ratios.len() < 4_000 {
+        let class = 2 + ratios.len() % 4;
+        let f = deformation(&mut random, class);
+        let size = 3e-4 * square(&f).sqrt();
+        let near = 4.0 * size * (1.0 + square(&f));
+        let j = determinant(&f);
+        if j > f64::from(ONSET) - near || (j - 0.15).abs() < near {
+            continue;
+        }
+        let h = [0, 1, 2].map(|i| [0, 1, 2].map(|j| (f[i][j] - if i == j { 1.0 } else { 0.0 }) as f32));
+        let f = from_fn(|i, j| f64::from(h[i][j]) + if i == j { 1.0 } else { 0.0 });
+        let deformation = &Deformation::<f32>::new(h);
+        let at = deformation.invariants;
+        let coefficients = &Coefficients::of_barrier(&Barrier::new(SHEAR / 6.0, at), at);
+        let a = by_differences(|f| reference::nodal_strain::barrier_stress(SHEAR.into(), f), &f, size);
+        let (bound, most) = (bound_of_any_state(coefficients, deformation), largest(&a));
+        margin = margin.min(eigenvalues(&plus(&bound, -1.0, &a))[0] / norm(&bound));
+        scalar = scalar.min(f64::from(scalar_bound(coefficients, at, 1.0_f32)) / most);
+        ratios.push(largest(&bound) / most);
+        inverted += usize::from(j < 0.0);
+    }
+    // At rest, in front of the onset, and in a place without an element.
+    for (side, modulus) in [(1.0, SHEAR), (0.82, SHEAR), (0.7, 0.0)] {
+        let h = [0, 1, 2].map(|i| [0, 1, 2].map(|j| if i == j { side - 1.0 } else { 0.0 }));
+        let deformation = &Deformation::<f32>::new(h);
+        let at = deformation.invariants;
+        let coefficients = &Coefficients::of_barrier(&Barrier::ahead(modulus / 6.0, at), at);
+        let (bound, scalar) = (bound_of_any_state(coefficients, deformation), scalar_bound(coefficients, at, 1.0_f32));
+        println!("side {side}, modulus {modulus}: {:.2e} Pa", largest(&bound));
+        assert!(bound.iter().flatten().all(|entry| entry.is_finite()) && scalar.is_finite());
+        // No more than what keeps a divisor from zero.
+        assert_eq!(largest(&bound) > 1e-30, side == 0.82);
+    }
+    ratios.sort_by(f64::total_cmp);
+    let at = |share: f64| ratios[((ratios.len() - 1) as f64 * share) as usize];
+    println!(
+        "least eigenvalue of the bound less the tangent, over the bound: {margin:.1e}; largest of bound / largest of \
+         tangent: least {:.5}, median {:.2}, 95 % {:.1}; of the scalar bound: least {scalar:.5}; {inverted} inverted",
+        at(0.0),
+        at(0.5),
+        at(0.95)
+    );
+    assert!(margin > -1e-3 && scalar > 1.0 - 1e-3 && inverted > 500);
+    assert!((1.0 - 1e-3..4.0).contains(&at(0.5)));
 }

@@ -113,6 +113,30 @@ impl ElementTile {
         vector_at(&self.volumes, first)
     }
 
+    /// Copies the element at a place of some tiles to place `lane`.
+    #[inline(always)]
+    pub(crate) fn copy_element(&mut self, lane: usize, tiles: &[Self], place: u32) {
+        let (Some(tile), from, lane) = (tiles.get(place as usize / TILE), place as usize % TILE, lane % TILE) else {
+            return;
+        };
+        for corner in 0..4 {
+            self.nodes[corner][lane] = tile.nodes[corner][from];
+        }
+        for corner in 0..3 {
+            for axis in 0..3 {
+                self.gradients[corner][axis][lane] = tile.gradients[corner][axis][from];
+            }
+        }
+        self.elements[lane] = tile.elements[from];
+        self.gradient_eigenvalues[lane] = tile.gradient_eigenvalues[from];
+        self.volumes[lane] = tile.volumes[from];
+    }
+
+    /// Makes the places from `lane` on ones without an element.
+    pub(crate) fn empty_from(&mut self, lane: usize) {
+        self.volumes.iter_mut().skip(lane).for_each(|volume| *volume = 0.0);
+    }
+
     /// Writes an element with these `corners` (m) to place `lane`.
     pub(crate) fn write(&mut self, lane: usize, element: Numbered, corners: [DVec3; 4]) {
         fn set<T>(values: &mut [T; TILE], lane: usize, value: T) {

@@ -92,7 +92,17 @@ impl Cluster {
     pub(super) const fn gradients(&self) -> [usize; 3] {
         let [xy, yz, zx] = [self.differs & 1 != 0, self.differs & 2 != 0, self.differs & 4 != 0];
         let y = if xy { 1 } else { 0 };
-        [0, y, if !zx { 0 } else if !yz { y } else { y + 1 }]
+        [
+            0,
+            y,
+            if !zx {
+                0
+            } else if !yz {
+                y
+            } else {
+                y + 1
+            },
+        ]
     }
 
     /// How many gradients it has, with moments for each pair.
@@ -209,6 +219,11 @@ impl<'a> Piece<'a> {
     /// The elements of a tile.
     pub(super) fn of_tile(tile: &'a ElementTile) -> impl Iterator<Item = Self> {
         (0..TILE).map(move |lane| Self { tile, lane }).filter(|piece| piece.volume() > 0.0)
+    }
+
+    /// Its place in its tile.
+    pub(super) const fn lane(&self) -> usize {
+        self.lane
     }
 
     fn element(&self) -> usize {
@@ -329,7 +344,8 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
         for piece in self.scene.tiles.iter().flat_map(Piece::of_tile) {
             let cell = piece.cell(self.lattice, self.places);
             let cluster = clusters.all.get(self.find(&piece, cell, clusters.all, clusters.heads)?)?;
-            let (of_axes, numbers, each) = (self.gradients(&piece, cell), cluster.gradients(), cluster.gradient_count());
+            let (of_axes, numbers, each) =
+                (self.gradients(&piece, cell), cluster.gradients(), cluster.gradient_count());
             let axis_of = |number: usize| numbers.iter().position(|&other| other == number).unwrap_or(0);
             for (set, moments) in clusters.moments.get_mut(cluster.sets())?.iter_mut().enumerate() {
                 let [first, second] = [set / each, set % each].map(|number| &of_axes[axis_of(number) % 3]);

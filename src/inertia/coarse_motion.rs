@@ -3,13 +3,13 @@
 
 use glam::{Vec3, Vec4};
 
+use super::LEAST_DRAG;
 use super::band::{Row, solve};
 use super::lattice::{CoarseVectors, Lattice};
 use super::matrices::Matrices;
 use super::renewal::Renewal;
 use super::supports::Pull;
 use super::transport::turned_part;
-use super::LEAST_DRAG;
 use crate::simd::NodeVector;
 
 /// Share of the strain rates that a step removes where only this share of the kinetic energy can have come from the
@@ -63,7 +63,8 @@ impl CoarseSpace<'_, '_> {
     fn in_world(&self, components: &Row) -> CoarseVectors {
         let mut vectors = [NodeVector::ZERO; _];
         let functions = self.lattice.functions();
-        for (function, (vector, three)) in vectors.iter_mut().zip(components.as_chunks::<3>().0).enumerate().take(functions)
+        for (function, (vector, three)) in
+            vectors.iter_mut().zip(components.as_chunks::<3>().0).enumerate().take(functions)
         {
             let turned = self.renewal.frames.since_stiffness(function) * Vec3::from(*three);
             *vector = NodeVector(turned.extend(0.0).to_array());
@@ -171,9 +172,7 @@ impl CoarseMotion<'_, '_> {
     fn turned(&self) -> CoarseVectors {
         let CoarseSpace { lattice, renewal, matrices } = self.space;
         match self.smooth {
-            Some(smooth) => {
-                turned_part(smooth, lattice, &renewal.frames, &renewal.bands.scalars, matrices.edge_factor)
-            }
+            Some(smooth) => turned_part(smooth, lattice, &renewal.frames, &renewal.bands.scalars, matrices.edge_factor),
             None => [NodeVector::ZERO; _],
         }
     }

@@ -42,11 +42,8 @@ impl Sums {
     fn add(&mut self, tangent: &Tangent) {
         let [x, y, z] = tangent.columns.map(|[x, y, z, _]| [x, y, z]);
         let f = [x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]];
-        let vectors = [
-            Vec4::new(x[0], x[1], x[2], y[0]),
-            Vec4::new(y[1], y[2], z[0], z[1]),
-            Vec4::new(z[2], 0.0, 0.0, 0.0),
-        ];
+        let vectors =
+            [Vec4::new(x[0], x[1], x[2], y[0]), Vec4::new(y[1], y[2], z[0], z[1]), Vec4::new(z[2], 0.0, 0.0, 0.0)];
         let [inner, outer, exchanged, is_spatial] = tangent.factors;
         for row in 0..9 {
             let (a, b) = (outer * f[row], exchanged * f[row]);
@@ -98,8 +95,20 @@ pub(super) fn tangent_of(cluster: &Cluster, members: &[u32], tangents: &[Tangent
     sums.tangent(cluster.factor())
 }
 
+/// Adds the tangent of one more piece of a cluster.
+pub(super) fn add_tangent(sum: &mut ClusterTangent, tangent: &Tangent) {
+    let mut sums = Sums::NONE;
+    sums.add(tangent);
+    sum.iter_mut().zip(sums.tangent(1.0)).for_each(|(sum, value)| *sum += value);
+}
+
 /// Writes the matrices of a cell, from the tangents and moments of the clusters.
-pub(super) fn write_cell(clusters: &Clusters<'_>, tangents: &[ClusterTangent], cell: usize, matrices: &mut PairMatrices) {
+pub(super) fn write_cell(
+    clusters: &Clusters<'_>,
+    tangents: &[ClusterTangent],
+    cell: usize,
+    matrices: &mut PairMatrices,
+) {
     *matrices = PairMatrices::ZERO;
     let head = clusters.heads.get(cell).copied().unwrap_or_default();
     for (index, cluster) in clusters_of(clusters.all, head) {

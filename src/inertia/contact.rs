@@ -163,7 +163,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             return;
         }
         let inertia = trial.scene.inertia;
-        let square = ResidualFactors::new(step, &model.scaling, trial.progress.steps == 0).square();
+        let square = ResidualFactors::new(step, model, trial.progress).square();
         let space = CoarseSpace { lattice: &model.lattice, renewal: &model.renewal, matrices: &*matrices };
         let lattice = response.map(|share| (space, share));
         let (SolverRoom { touched, local: room, sums }, force) = trial.solver_room_and_forces();
@@ -200,7 +200,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         }
         prolong(&moved.unwrap_or([NodeVector::ZERO; _]), &model.lattice, matrices.cells);
         trial.add_changes_of_pushes();
-        let residual = ResidualFactors::new(step, &model.scaling, trial.progress.steps == 0);
+        let residual = ResidualFactors::new(step, model, trial.progress);
         let Trial { scene, increment, force, .. } = trial;
         let input = PassInput { step, scaling: &model.scaling, residual, inertia, increment, places };
         let parts = NodeParts { partitions: scene.elements().partitions, threads: *threads };

@@ -26,7 +26,7 @@ use crate::mlp::Network;
 /// Inputs of the network.
 const FEATURES: usize = 4;
 /// Largest share of the rough motion that one step removes.
-const MOST: f32 = 0.1;
+pub(super) const MOST: f32 = 0.1;
 /// Logarithms are clamped to this magnitude; larger ratios need not be told apart.
 const LARGEST_LOGARITHM: f32 = 25.0;
 

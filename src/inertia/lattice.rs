@@ -8,7 +8,6 @@ use bytemuck::{Pod, Zeroable};
 
 use glam::{Mat3, Vec4};
 
-
 use super::InertiaError;
 use super::frames::Matrix;
 use crate::element::NodeInertia;

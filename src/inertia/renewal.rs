@@ -6,7 +6,8 @@ use glam::Vec4;
 
 use super::band::factorise;
 use super::cells::CellPolynomial;
-use super::coarse_stiffness::{add_cell, tangent_of, write_cell};
+use super::clusters::{ClusterInput, Clusters, Piece};
+use super::coarse_stiffness::{ClusterTangent, add_cell, add_tangent, tangent_of, write_cell};
 use super::frames::Frames;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_POINTS, node_at};
 use super::matrices::{Bands, Matrices, add_node, fill_held_axes};
@@ -14,7 +15,10 @@ use super::node::Scaling;
 use super::node_tables::NodeTables;
 use super::report::AddedInertia;
 use super::{COARSE_GROWTH, DRAG_AT_LARGEST_CHANGE, DRAG_OF_ADDED, LARGEST_DRAG};
-use crate::element::{ElementLaw, ElementMaterial, ElementTangents, OwnPressure, PatchTangents, ScalarBound, Tangent, tangents};
+use crate::element::{
+    CrushedTangents, ElementLaw, ElementMaterial, ElementTangents, OwnPressure, PatchTangents, ScalarBound, Tangent,
+    each_bounded, tangents,
+};
 use crate::mesh::partition::MOST_PARTS;
 use crate::scene::SceneView;
 use crate::simd::{Gather, NodeVector, TILE};
@@ -158,6 +162,9 @@ impl Renewal {
                 *tangent = tangent_of(cluster, clusters.members, tangents);
             }
         });
+        if input.scene.element().is_nodal_strain() {
+            add_crushed(input, clusters, self.is_merged, of_clusters);
+        }
         each_in_parts(stiffness, threads, |cell, matrices| write_cell(clusters, of_clusters, cell, matrices));
         let (lattice, band) = (input.lattice, &self.bands.vectors);
         band.clear(factor);
@@ -228,6 +235,28 @@ fn each_in_parts<T: Send>(items: &mut [T], threads: &impl Threads, write: impl F
     let mut all: [_; MOST_PARTS] = core::array::from_fn(|part| (part * each, take(&mut rest, each)));
     threads.each(all.get_mut(..parts).unwrap_or_default(), |(first, items)| {
         (*first..).zip(&mut **items).for_each(|(index, item)| write(index, item));
+    });
+}
+
+/// Adds the tangents of crushed elements with nodal strain to those of their clusters.
+fn add_crushed<M: ElementMaterial>(
+    input: RenewalInput<'_, M>,
+    clusters: &Clusters<'_>,
+    is_merged: bool,
+    of_clusters: &mut [ClusterTangent],
+) {
+    let RenewalInput { scene, displacement, lattice, places, scaling, .. } = input;
+    let (of_element, weight) = (ClusterInput { scene, lattice, places, is_merged }, scaling.coarse_weight);
+    each_bounded(&scene.material.laws(), scene.tiles, displacement, |crushed| {
+        let tangents = CrushedTangents { crushed, displacement: Gather::new(displacement), weight }.tangents();
+        for piece in Piece::of_tile(&crushed.tile) {
+            let cell = piece.cell(lattice, places);
+            if let Some(index) = of_element.find(&piece, cell, clusters.all, clusters.heads)
+                && let Some(sum) = of_clusters.get_mut(index)
+            {
+                add_tangent(sum, &tangents[piece.lane() % TILE]);
+            }
+        }
     });
 }
 

@@ -71,8 +71,9 @@ impl<'a, 'w> LargeView<'a, 'w> {
         let Self { model, storage } = self;
         let nodes = model.nodes;
         let mismatch = |room| Status::Mismatch { nodes: scene.node_count(), room };
-        let storage = Storage::split(storage, model.element, [nodes, model.elements], &model.lattice, &model.renewal.bands)
-            .ok_or_else(|| mismatch(nodes.min(state.capacity())))?;
+        let storage =
+            Storage::split(storage, model.element, [nodes, model.elements], &model.lattice, &model.renewal.bands)
+                .ok_or_else(|| mismatch(nodes.min(state.capacity())))?;
         if model.is_for(scene) { Ok((model, storage)) } else { Err(mismatch(0)) }
     }
 }
@@ -125,6 +126,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
             is_heated: *is_heated,
             loads,
             progress,
+            look_cycle: 1,
         };
         let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
         self.model.renewal.update_frames(displacement, progress.steps);
@@ -222,10 +224,10 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
     #[inline(never)]
     fn move_lattice<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) -> MovedLattice {
         let Self { step, model, threads, storage: Storage { tables, places, matrices }, .. } = self;
+        let residual = ResidualFactors::new(step, model, trial.progress);
         let LargeModel { lattice, renewal, scaling, rough, method, .. } = &mut **model;
         let Trial { scene, loads, displacement, increment, force, volume, progress, .. } = trial;
         let (scene, places) = (*scene, &**places);
-        let residual = ResidualFactors::new(step, scaling, progress.steps == 0);
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
         let largest = node_parts(&scene, *threads).restrict(input, force, cells, momentum);
@@ -269,12 +271,13 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
     #[inline(never)]
     fn move_nodes<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>, moved: &MovedLattice) -> Totals {
         let Self { step, model, storage: Storage { tables, places, matrices, .. }, .. } = self;
-        let Trial { scene, increment, force, progress, .. } = trial;
+        let residual = ResidualFactors::new(step, model, trial.progress);
+        let Trial { scene, increment, force, .. } = trial;
         let scaling = &model.scaling;
-        let residual = ResidualFactors::new(step, scaling, progress.steps == 0);
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let smooth = moved.has_smooth.then_some(&*matrices.smooth_cells);
-        let lattice = LatticeMotion { cells: matrices.cells, smooth, removed: moved.removed, own_share: model.renewal.own_share };
+        let lattice =
+            LatticeMotion { cells: matrices.cells, smooth, removed: moved.removed, own_share: model.renewal.own_share };
         self.rough_written = moved.has_smooth;
         let mut totals;
         PassTotals { totals, rough: self.rough, held_back: self.held_back } =
@@ -291,12 +294,7 @@ const LARGEST_SMOOTH: f32 = 10.0;
 /// The lattice's part `c = Mc^-1 W^T m du` of the increments. Turns the cells' sums of momentum into the smooth part of
 /// the increments, of which `largest` is the largest component, `W` times that. To remove a share of the rest changes
 /// no momentum of the lattice, so neither that of the body. None if the result is not plausible.
-fn smooth_motion(
-    matrices: &mut Matrices<'_>,
-    lattice: &Lattice,
-    bands: &Bands,
-    largest: f32,
-) -> Option<CoarseVectors> {
+fn smooth_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, bands: &Bands, largest: f32) -> Option<CoarseVectors> {
     let mut motion = restrict(matrices.smooth_cells, lattice);
     matrices.divide_by_mass(&bands.scalars, &mut motion, lattice);
     let limit = Vec4::splat(LARGEST_SMOOTH * largest);

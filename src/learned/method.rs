@@ -33,6 +33,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
             is_heated: *is_heated,
             loads,
             progress,
+            look_cycle: 1,
         };
         let predict = |nodes: Range<usize>, force: &[NodeVector], vertices: &mut [Vertex]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();

@@ -31,7 +31,7 @@ use core::fmt;
 use bytemuck::{Pod, Zeroable, must_cast_slice_mut};
 use glam::Vec4;
 
-use crate::element::{CHECK_CYCLE, ElementMaterial, VolumeCheck};
+use crate::element::{ElementMaterial, Look};
 use crate::loads::Loads;
 use crate::mlp::Network;
 use crate::scene::SceneView;
@@ -566,9 +566,9 @@ fn is_wild<M: ElementMaterial>(scene: SceneView<'_, M>, state: &StateView<'_>) -
         let most = MOST_OF_SIZE * MOST_OF_SIZE * MOST_OF_SIZE * volume;
         square * square * square > most * most
     });
-    let tiles = scene.tiles;
-    let looks = (0..CHECK_CYCLE as u64).map(|steps| VolumeCheck { tiles, displacement: state.displacement, steps });
-    let least = 1.0 + looks.map(VolumeCheck::least_change).fold(f32::INFINITY, f32::min);
+    let (tiles, displacement) = (scene.tiles, &*state.displacement);
+    let look = Look { tiles, displacement, below: 0.0, first: 0, cycle: 1, masks: &mut [] };
+    let least = 1.0 + look.least_change();
     let limited = Status::Limited { least_volume_ratio: least, saturation: 0.0, energy_excess: 0.0 };
     (leaps || least <= 0.0).then_some(limited)
 }

@@ -128,8 +128,15 @@ impl<M: Material> Material for NodalPressure<M> {
 
 /// The same material in tetrahedra with stabilised nodal strain, which bend as they should on coarse meshes: all energy
 /// is taken at the nodes, from the mean displacement gradient of the elements of one tissue around them, and a
-/// quadratic energy holds what the mean does not see (Dohrmann et al. 2000; Puso & Solberg 2006). Under strains above a
-/// half elements at sharp edges may turn inside out, and laws that stiffen much are too soft there.
+/// quadratic energy holds what the mean does not see (Dohrmann et al. 2000; Puso & Solberg 2006). Elements that are
+/// crushed to less than half of their volume, as at clamped edges, resist by an energy of their own:
+///
+/// ```text
+/// E = sum_a V_a Psi(F_a) + s mu / 2 (sum_e V_e |H_e|^2 - sum_a V_a |H_a|^2) + sum_e V_e mu / 6 I1_e h(J_e)
+/// F_a = I + H_a,   H_a = (1 / V_a) sum_{e with a} V_e / 4 H_e,   s = 0.4,   mu = 2 W'(0)
+/// h(J) = 1.5 (0.5 - J)^2 / (0.5 J) for J < 0.5, along its tangent below 0.15; else 0
+/// ```
+/// Laws that stiffen much are too soft under strains above a half, as neither energy of elements stiffens.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodalStrain<M>(pub M);
 

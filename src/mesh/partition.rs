@@ -111,12 +111,32 @@ impl Partitions {
     /// Ranges of tiles, in their order, that hold all elements with a node in the given partitions (and some others),
     /// with the length of their strips.
     pub(crate) fn touching(&self, partitions: Range<usize>) -> impl Iterator<Item = (Range<usize>, usize)> {
-        let earlier = (0..partitions.start).filter(move |&partition| {
-            self.reach.get(partition).is_some_and(|&reach| usize::from(reach) >= partitions.start)
-        });
-        let reaching = earlier.flat_map(|partition| KINDS * partition + LONGEST..KINDS * (partition + 1));
         let own = KINDS * partitions.start..KINDS * partitions.end;
-        reaching.chain(own).map(|kind| (self.start(kind)..self.start(kind + 1), LONGEST - kind % LONGEST))
+        self.reaching(partitions.start)
+            .flatten()
+            .chain(own)
+            .map(|kind| (self.start(kind)..self.start(kind + 1), LONGEST - kind % LONGEST))
+    }
+
+    /// The same tiles in as few ranges as hold no others.
+    pub(crate) fn tiles_touching(&self, partitions: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+        let own = self.tiles_of(&partitions);
+        let reaching = self.reaching(partitions.start);
+        let ranges = reaching.map(|kinds| self.start(kinds.start)..self.start(kinds.end));
+        ranges.chain([own])
+    }
+
+    /// For each earlier partition with elements that have nodes in partition `first` or later ones, the kinds of its
+    /// elements with nodes in other partitions.
+    fn reaching(&self, first: usize) -> impl Iterator<Item = Range<usize>> {
+        let earlier = (0..first)
+            .filter(move |&partition| self.reach.get(partition).is_some_and(|&reach| usize::from(reach) >= first));
+        earlier.map(|partition| KINDS * partition + LONGEST..KINDS * (partition + 1))
+    }
+
+    /// Tiles of the elements whose first partition is one of these.
+    pub(crate) fn tiles_of(&self, partitions: &Range<usize>) -> Range<usize> {
+        self.start(KINDS * partitions.start)..self.start(KINDS * partitions.end)
     }
 
     /// Number of tiles of all elements.

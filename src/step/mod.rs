@@ -22,14 +22,14 @@ pub(crate) use compensated::moved;
 pub(crate) use energy_sums::{Sums, Totals};
 pub use length::{CriticalStep, Step, StepError};
 pub(crate) use length::{ROUNDING, equal_steps, is_damping};
-pub(crate) use parts::{Forcing, Moving, internal_forces, move_in_parts, nodal_volumes};
+pub(crate) use parts::{Forcing, Moving, internal_forces, look_at_all, move_in_parts, nodal_volumes};
 pub use status::{Divergence, Status};
 #[cfg(feature = "parallel")]
 pub use threads::Rayon;
 pub use threads::{CallingThread, MOST_PARTS, Threads};
 
 use crate::contact::{ContactPoint, Touch};
-use crate::element::{ElementMaterial, NodeInertia};
+use crate::element::{ElementMaterial, NodeInertia, mark_moment};
 use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
@@ -46,8 +46,8 @@ pub(crate) struct Trial<'a, M> {
     pub(crate) remainder: &'a mut [NodeVector],
     pub(crate) increment: &'a mut [NodeVector],
     pub(crate) force: &'a mut [NodeVector],
-    /// Rows of [`crate::element::NodalVolumes`] for materials with nodal pressure; with nodal strain only
-    /// [`crate::tled::critical_step`] uses them, with linear tetrahedra nothing does.
+    /// Rows of [`crate::element::NodalVolumes`] for materials with nodal pressure; with nodal strain marks of crushed
+    /// elements, with linear tetrahedra nothing.
     pub(crate) volume: &'a mut [NodeVector],
     pub(crate) progress: &'a mut Progress,
     /// Whether forces need the remainders ([`heat`]): known once a step is to be computed.
@@ -193,6 +193,9 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         self.progress.dt = step.seconds();
         self.progress.time += f64::from(step.seconds());
         self.progress.steps += 1;
+        if self.scene.element().is_nodal_strain() {
+            mark_moment(self.volume, &self.progress.moment());
+        }
         self.accept_pushes();
         self.follow_motions();
         let limited = method.finish(&mut self);

@@ -6,8 +6,9 @@ use core::marker::PhantomData;
 use core::ops::Range;
 
 use crate::element::{
-    ElementMaterial, Extremes, ForcesVisitor, InternalForces, MeanPressure, NodalVolumes, NodeInertia, OwnPressure,
-    PatchForces, VolumeCheck,
+    AddCrushed, CrushedElements, CrushedForces, ElementMaterial, Elements, Extremes, ForcesVisitor, InternalForces,
+    Look, MARKED, MeanPressure, NodalVolumes, NodeInertia, OwnPressure, PatchForces, each_marked, is_marked_at,
+    mask_of, masks, masks_mut,
 };
 use crate::loads::{Loads, ramp_factor};
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
@@ -29,6 +30,8 @@ pub(crate) struct Forcing<'a, M, V> {
     pub(crate) loads: &'a Loads<'a>,
     /// Of the state, for the time of the loads.
     pub(crate) progress: &'a Progress,
+    /// Steps of this kind in which every element is looked at where some may be crushed ([`crate::element`]).
+    pub(crate) look_cycle: usize,
 }
 
 /// The partitions of one thread, with their share of the arrays.
@@ -87,6 +90,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
     ) -> ([F; MAX_PARTITIONS], Extremes<f32>) {
         let [displacement, remainder] = self.moved();
         nodal_volumes(self.scene, displacement, remainder, volumes, threads);
+        let looked = self.look(volumes, threads);
         let volumes = &*volumes;
         let partitions = self.scene.elements().partitions;
         let count = partitions.parts(threads.parts());
@@ -101,13 +105,25 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         });
         let parts = parts.get_mut(..count).unwrap_or_default();
         threads.each(parts, |part| self.compute(part, volumes, &then));
-        let mut extremes = parts.iter().fold(Extremes::none(), |sum, part| sum.merged_with(&part.extremes));
-        if self.scene.element().is_nodal_strain() {
-            let (tiles, displacement) = (self.scene.tiles, self.displacement);
-            let check = VolumeCheck { tiles, displacement, steps: self.progress.steps };
-            extremes.least_change = check.least_change().min(extremes.least_change);
-        }
+        let mut extremes: Extremes<f32> =
+            parts.iter().fold(Extremes::none(), |sum, part| sum.merged_with(&part.extremes));
+        extremes.least_change = extremes.least_change.min(looked);
         (results, extremes)
+    }
+
+    /// Looks which elements with nodal strain are crushed: at those whose turn it is, or at all if the marks of the
+    /// state are not of this moment. Gives the least `J - 1` of those that were looked at.
+    fn look(&self, marks: &mut [NodeVector], threads: &impl Threads) -> f32 {
+        if !self.scene.element().is_nodal_strain() {
+            return f32::INFINITY;
+        }
+        if self.look_cycle <= 1 || !is_marked_at(marks, &self.progress.moment()) {
+            return look_at_all(self.scene, self.displacement, marks, threads);
+        }
+        let (tiles, cycle) = (self.scene.tiles, self.look_cycle);
+        let first = (self.progress.steps % cycle as u64) as usize;
+        let masks = masks_mut(marks, tiles.len());
+        Look { tiles, displacement: self.displacement, below: MARKED, first, cycle, masks }.least_change()
     }
 
     fn compute<T, F>(
@@ -132,8 +148,60 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
     }
 }
 
+/// Looks which elements are crushed, all of them. Gives the least `J - 1`.
+pub(crate) fn look_at_all<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    displacement: &[NodeVector],
+    marks: &mut [NodeVector],
+    threads: &impl Threads,
+) -> f32 {
+    let partitions = scene.elements().partitions;
+    let count = partitions.parts(threads.parts());
+    let (mut tiles, mut masks) = (scene.tiles, masks_mut(marks, scene.tiles.len()));
+    let mut parts: [_; MOST_PARTS] = from_fn(|part| {
+        let own = partitions.tiles_of(&partitions.part(part, count)).len();
+        let tiles = tiles.split_off(..own.min(tiles.len())).unwrap_or_default();
+        (tiles, take(&mut masks, own), f32::INFINITY)
+    });
+    let parts = parts.get_mut(..count).unwrap_or_default();
+    threads.each(parts, |(tiles, masks, least)| {
+        *least = Look { tiles, displacement, below: MARKED, first: 0, cycle: 1, masks }.least_change();
+    });
+    parts.iter().fold(f32::INFINITY, |least, (.., of_part)| least.min(*of_part))
+}
+
+/// Adds the forces of crushed elements to the nodes in `partitions`, from the marks of the state. Gives their least
+/// `J - 1`.
+fn crushed_forces<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    partitions: Range<usize>,
+    displacement: &[NodeVector],
+    marks: &[NodeVector],
+    force: &mut [NodeVector],
+    bounds: bool,
+) -> f32 {
+    let Elements { laws, tiles, partitions: all } = scene.elements();
+    let (masks, first) = (masks(marks, tiles.len()), all.nodes(&partitions).start);
+    let mut elements = CrushedElements::of(laws, tiles);
+    let mut sum = AddCrushed { displacement, bounds, first, force, least_change: f32::INFINITY };
+    let mut forces = CrushedForces::NONE;
+    let mut add = |crushed: &_| sum.add(crushed, &mut forces);
+    for touching in all.tiles_touching(partitions) {
+        if let Some(masks) = masks.get(touching.clone()) {
+            each_marked(masks, touching.start, |place| elements.enter(place, &mut add));
+            continue;
+        }
+        for index in touching {
+            let mask = tiles.get(index).map_or(0, |tile| mask_of(tile, displacement, MARKED));
+            each_marked(&[mask], index, |place| elements.enter(place, &mut add));
+        }
+    }
+    elements.end(add);
+    sum.least_change
+}
+
 /// Adds internal forces to those of the nodes in `partitions`, from displacements and their remainders, and from the
-/// [`nodal_volumes`] where the material needs them.
+/// [`nodal_volumes`] where the material needs them, or the marks of crushed elements.
 pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
     scene: SceneView<'_, M>,
     partitions: Range<usize>,
@@ -144,10 +212,21 @@ pub(crate) fn internal_forces<M: ElementMaterial, V: ForcesVisitor<M::Law>>(
 ) -> Extremes<f32> {
     let elements = scene.elements();
     if scene.element().is_nodal_strain() {
-        let force = Scatter::from(elements.partitions.nodes(&partitions).start, force);
-        let (laws, patches) = (elements.laws, scene.patches);
-        let (visitor, [displacement, remainder]) = (PhantomData, moved);
-        V::patch_forces(PatchForces { laws, patches, partitions, displacement, remainder, force, visitor })
+        let (laws, patches, visitor) = (elements.laws, scene.patches, PhantomData);
+        let ([displacement, remainder], of) = (moved, partitions.clone());
+        let scatter = Scatter::from(elements.partitions.nodes(&of).start, &mut *force);
+        let mut extremes = V::patch_forces(PatchForces {
+            laws,
+            patches,
+            partitions: of,
+            displacement,
+            remainder,
+            force: scatter,
+            visitor,
+        });
+        let least = crushed_forces(scene, partitions, displacement, volumes, force, V::BOUNDS_PATCHES);
+        extremes.least_change = extremes.least_change.min(least);
+        extremes
     } else if scene.element().is_nodal_pressure() {
         let pressure = MeanPressure::new(scene.volume_rows(volumes));
         let kernel = InternalForces::of_partitions(elements, pressure, partitions, moved, force, visitor);

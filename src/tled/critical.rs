@@ -5,7 +5,7 @@
 
 use crate::element::{
     CriticalBounds, ElementLaw, ElementMaterial, MeanPressure, NodalVolumeBounds, NodeInertia, NodeMatrices,
-    OwnPressure, PatchBounds, VolumeRows, balance, weigh,
+    OwnPressure, PatchBounds, VolumeRows, add_crushed_bounds, balance, weigh,
 };
 use crate::material::{Law, Laws, Potential};
 use crate::scene::{AsScene, SceneView};
@@ -125,11 +125,12 @@ fn with_bounds<M: ElementMaterial, T>(
     if scene.element().is_nodal_strain() {
         let rows = volume.get_mut(..count)?;
         rows.fill(NodeVector([1.0, 0.0, 0.0, 0.0]));
-        let patches = scene.patches;
-        let add = |weights: &mut [NodeVector], sums: &mut NodeMatrices<'_>| {
+        let (patches, mut crushed) = (scene.patches, true);
+        let mut add = |weights: &mut [NodeVector], sums: &mut NodeMatrices<'_>| {
             M::Law::patch_bounds(PatchBounds { laws, patches, inertia, weights, sums });
+            crushed = crushed && add_crushed_bounds(scene.elements(), inertia, sums);
         };
-        weights.choose(rows, &mut sums, inertia, add);
+        weights.choose(rows, &mut sums, inertia, &mut add);
         add(rows, &mut sums);
     } else if !scene.element().is_nodal_pressure() {
         let pressure = OwnPressure;

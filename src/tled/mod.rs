@@ -29,7 +29,7 @@ pub use tangent::{ElementTangent, element_tangents};
 
 use core::ops::Range;
 
-use crate::element::{self, ElementMaterial, NoVisitor, NodeInertia};
+use crate::element::{self, ElementMaterial, LOOK_CYCLE, NoVisitor, NodeInertia};
 use crate::loads::Loads;
 use crate::material::Material;
 use crate::scene::{AsScene, SceneView};
@@ -37,7 +37,7 @@ use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::{
     self, CallingThread, Cause, Computed, EnergyBalance, Forcing, Moving, Status, Step, StepMethod, Threads, Totals,
-    Trial, move_in_parts, nodal_volumes,
+    Trial, look_at_all, move_in_parts, nodal_volumes,
 };
 use central_differences::{Advance, EnergyInput, next_increment};
 
@@ -81,6 +81,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
             is_heated: *is_heated,
             loads,
             progress,
+            look_cycle: LOOK_CYCLE,
         };
         let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
@@ -218,6 +219,9 @@ fn internal_forces_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateV
     let StateView { displacement, force, volume, .. } = state;
     let force = force.get_mut(..nodes).unwrap_or_default();
     nodal_volumes(scene, displacement, &[], volume, &CallingThread);
+    if scene.element().is_nodal_strain() {
+        look_at_all(scene, displacement, volume, &CallingThread);
+    }
     force.fill(NodeVector::ZERO);
     step::internal_forces(scene, scene.elements().partitions.all(), [displacement, &[]], volume, force, NoVisitor);
     true

@@ -30,7 +30,7 @@ pub fn exact_critical_step<M: Material>(scene: SceneView<'_, M>, displacement: &
         Some(nodal) => nodal.with_pressures(tangents),
         None => tangents,
     };
-    let strain = if scene.element().is_nodal_strain() { Some(PatchTangents::new(scene, displacement)) } else { None };
+    let strain = scene.element().is_nodal_strain().then(|| PatchTangents::new(scene, &tangents, displacement));
     let roots: Vec<DVec3> = scene
         .inertia
         .iter()
@@ -132,10 +132,12 @@ struct PatchTangents {
     patches: Vec<LawTangent>,
     /// `s mu`, Pa, of each element.
     moduli: Vec<f64>,
+    /// Of crushed elements their own energy, with the index of the element.
+    crushed: Vec<(usize, LawTangent)>,
 }
 
 impl PatchTangents {
-    fn new<M: Material>(scene: SceneView<'_, M>, displacement: &[NodeVector]) -> Self {
+    fn new<M: Material>(scene: SceneView<'_, M>, tangents: &[ElementTangent], displacement: &[NodeVector]) -> Self {
         let laws = scene.material.laws();
         let at = |node: usize| DVec3::from_array(displacement[node].to_array().map(f64::from));
         let patches = scene.patches.places().map(|(tile, lane)| {
@@ -143,7 +145,11 @@ impl PatchTangents {
             LawTangent::new(&laws.of(tile.element(lane)), h)
         });
         let moduli = scene.places().map(|(tile, lane)| stabilising_modulus(&laws.of(tile.element(lane))));
-        Self { patches: patches.collect(), moduli: moduli.collect() }
+        let crushed =
+            tangents.iter().zip(scene.places()).enumerate().filter_map(|(element, (tangent, (tile, lane)))| {
+                Some((element, tangent.at.of_barrier(&laws.of(tile.element(lane)))?))
+            });
+        Self { patches: patches.collect(), moduli: moduli.collect(), crushed: crushed.collect() }
     }
 
     /// Adds the products with displacements (m) of the nodes, N.
@@ -164,6 +170,11 @@ impl PatchTangents {
         }
         for (tangent, modulus) in tangents.iter().zip(&self.moduli) {
             let stress = tangent.gradient_by(tangent.nodes.map(at)) * *modulus;
+            add_to_nodes(tangent, tangent.forces_of_stress(stress), out);
+        }
+        for (element, barrier) in &self.crushed {
+            let tangent = &tangents[*element];
+            let stress = barrier.stress_by(tangent.gradient_by(tangent.nodes.map(at)));
             add_to_nodes(tangent, tangent.forces_of_stress(stress), out);
         }
     }

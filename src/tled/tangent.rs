@@ -5,7 +5,7 @@ use core::array::from_fn;
 
 use glam::{DMat3, DVec3};
 
-use crate::element::ElementTile;
+use crate::element::{ElementTile, barrier_factor, barrier_modulus};
 use crate::material::{Invariants, Law, Material, Potential, VolumeFactor};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
@@ -174,6 +174,26 @@ impl LawTangent {
             x_f: 2.0 * g,
             x_c: slope_g * square,
         }
+    }
+
+    /// Of the energy that an element with nodal strain has of its own where it is crushed, at the same deformation.
+    pub(super) fn of_barrier<L: Law>(&self, law: &L) -> Option<Self> {
+        let [h, slope, curvature] = barrier_factor(1.0 + self.change);
+        if slope == 0.0 {
+            return None;
+        }
+        let (modulus, square) = (f64::from(barrier_modulus(law)), inner3(self.f, self.f));
+        Some(Self {
+            p1: 2.0 * modulus * h,
+            p_j: modulus * slope * square,
+            stiffening: 0.0,
+            coupling: 2.0 * modulus * slope,
+            bulk: modulus * curvature * square,
+            bulk_modulus: 0.0,
+            x_f: 0.0,
+            x_c: 0.0,
+            ..*self
+        })
     }
 
     /// The first Piola-Kirchhoff stress, Pa.

@@ -32,8 +32,8 @@ use supple::inertia::{Cells, LargeStep, Method};
 use supple::loads::{Loads, NodalForce};
 use supple::material::{AnyLaw, NeoHookean, NodalStrain, Tissue};
 use supple::scene::{Axes, Support, VecScene};
-use supple::state::{NodeVector, VecState};
-use supple::step::{Status, Step};
+use supple::state::{NodeVector, Progress, StateView, VecState};
+use supple::step::{EnergyBalance, Status, Step};
 use supple::tled;
 use support::bodies::{corner_torsion, held, small_bar, torsion};
 use support::{Body, EXP, NEO, bound, displaced, largest, largest_distance, mean_distance, rest_of, tissue, to_f64};
@@ -341,6 +341,7 @@ fn the_operator_is_positive_and_bounded_with_nodal_strain() {
         ("at rest", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 1000.0),
         ("stretched", [[0.86, 0.0, 0.0], [0.0, 0.86, 0.0], [0.0, 0.0, 1.35]], 10.0),
         ("compressed", [[1.2, 0.0, 0.0], [0.0, 1.2, 0.0], [0.0, 0.0, 0.7]], 50.0),
+        ("crushed", [[1.2, 0.0, 0.0], [0.0, 1.1, 0.0], [0.0, 0.0, 0.3]], 50.0),
         ("sheared", [[1.0, 0.0, 0.5], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], 1000.0),
     ] {
         let law = NeoHookean { c: 100.0, d: 100.0 * ratio };
@@ -377,7 +378,9 @@ fn the_operator_is_positive_and_bounded_with_nodal_strain() {
         let root = cholesky(&symmetric_part(&b)).expect("a positive operator");
         let most = *eigenvalues(&congruent(&root, &k)).last().unwrap() * square / 4.0;
         println!("{name}, bulk over shear {ratio}: lambda_max(B K) D^2 / 4 = {most:.3}");
-        if !(0.2..=1.0).contains(&most) {
+        // The bounds of crushed elements are less close.
+        let least = if name == "crushed" { 0.05 } else { 0.2 };
+        if !(least..=1.0).contains(&most) {
             wrong.push((name, ratio, most));
         }
     }
@@ -438,6 +441,35 @@ fn vibrates<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>)
 /// Intervals of the truth, and exact steps in each.
 const INTERVALS: usize = 10;
 const FINEST: u32 = 400;
+
+/// A slightly bent bar comes to rest although its balance says that there is no energy left, so that each step removes
+/// all strain rates: forces move it so much less that it stays stable. In the regular bar the operator is nearest to
+/// its limit.
+#[test]
+fn a_body_whose_balance_is_overdrawn_comes_to_rest() {
+    let body = Body::bar([0.05, 0.05, 0.1], [4, 4, 8]);
+    let scene = body.scene(NodalStrain(tissue(EXP)), &held(&body));
+    let step = Step::unchecked(8.0 * limit(&scene), 5.0).unwrap();
+    let mut bent = rest_of(&scene);
+    assert!(tled::start(&scene, &mut bent, &step, |node| ([0.01 * body.points[node][2].powi(2), 0.0, 0.0], [0.0; 3])));
+    let mut large = prepared(&body, &scene, &mut rest_of(&scene), step, GAIN);
+    let [mut displacement, mut remainder, mut increment, mut force, mut marks] =
+        [(); 5].map(|()| vec![NodeVector::ZERO; scene.node_count()]);
+    displacement.copy_from_slice(bent.displacements());
+    let balance = EnergyBalance { dissipated: 1.0, peak: 1.0, ..EnergyBalance::NEW };
+    let mut progress = Progress::resumed(1.0, 1_000, step.seconds(), balance);
+    let mut energies = vec![];
+    for _ in 0..600 {
+        let mut state =
+            StateView::new(&mut displacement, &mut remainder, &mut increment, &mut force, &mut marks, &mut progress);
+        let status = large.step(scene.view(), &Loads::NONE, state.reborrow());
+        assert!(status.is_taken(), "{status:?}");
+        energies.push(state.energy_balance().kinetic);
+    }
+    let parts: Vec<_> = energies.chunks(100).map(|part| part.iter().copied().fold(0.0, f64::max)).collect();
+    println!("kinetic energy in parts of 100 steps at most {parts:?} J");
+    assert!(parts[0] > 1e-9 && parts[5] < 0.5 * parts[0]);
+}
 
 #[test]
 fn sudden_torsion_does_not_diverge_and_is_followed() {

@@ -9,6 +9,7 @@ mod support;
 #[cfg(feature = "slow-tests")]
 mod against_reference;
 mod alarms;
+mod crushed;
 mod divergence;
 mod elements;
 mod loads;

@@ -12,7 +12,7 @@ const DEFINITION: Definition = Definition { energy: |body, u| body.energy(u), fo
 
 #[test]
 fn the_force_of_the_definition_is_minus_the_gradient_of_its_energy() {
-    DEFINITION.check_gradient();
+    DEFINITION.check_gradient(1e-3);
 }
 
 #[test]

@@ -16,7 +16,9 @@ const DEFINITION: Definition = Definition { energy, forces };
 
 #[test]
 fn the_force_of_the_definition_is_minus_the_gradient_of_its_energy() {
-    DEFINITION.check_gradient();
+    DEFINITION.check_gradient(1e-3);
+    // With crushed and inverted elements.
+    DEFINITION.check_gradient(6e-3);
 }
 
 #[test]
@@ -68,7 +70,9 @@ fn the_bound_of_the_critical_step_is_below_the_exact_one() {
     for (name, body) in &nodal_elements::of_bounds() {
         for law in nodal_elements::of_critical_steps() {
             let scene = body.scene(NodalStrain(tissue(law)), &[]);
-            nodal_elements::check_bounds((&format!("{name}, d {}", law.d), body), &scene, |_| 0.45);
+            // The noise turns slivers inside out, as with nodal pressure.
+            let least = |noise: f64| if *name == "slivers" && noise > 0.0 { 0.05 } else { 0.45 };
+            nodal_elements::check_bounds((&format!("{name}, d {}", law.d), body), &scene, least);
             let linear = body.scene(tissue(law), &[]);
             let ratio =
                 support::bound(&scene, &rest_of(&scene)).seconds / support::bound(&linear, &rest_of(&linear)).seconds;

@@ -1,9 +1,10 @@
 //! Tetrahedra with stabilised nodal strain in float64, from their definition: energy `sum_a V_a W(F_a) + s mu / 2 sum_a
 //! sum_{e with a} (V_e / 4) |F_e - F_a|^2` with `F_a = sum_e (V_e / 4) F_e / V_a`, the sums for each tissue by itself,
-//! `s` 0.4 and `mu` the shear modulus at rest (Dohrmann et al. 2000; Puso & Solberg 2006).
+//! `s` 0.4 and `mu` the shear modulus at rest (Dohrmann et al. 2000; Puso & Solberg 2006). Each element that is crushed
+//! below `J0 = 0.5` adds `V_e mu / 6 (F:F) h(J)`, `h = 1.5 (J0 - J)^2 / (J0 J)`, along its tangent below `J = 0.15`.
 
 use super::nodal_pressure::Tissues;
-use super::tensor::{IDENTITY, Mat3, Vec3, apply, determinant, from_fn};
+use super::tensor::{IDENTITY, Mat3, Vec3, apply, cross, determinant, from_fn};
 
 const SHARE: f64 = 0.4;
 
@@ -28,6 +29,31 @@ fn modulus(body: &Tissues<'_>, tissue: usize) -> f64 {
     SHARE * 2.0 * slope
 }
 
+/// `h(J)` and `h'(J)` of crushed elements.
+fn barrier(j: f64) -> (f64, f64) {
+    let (onset, floor) = (0.5, 0.15);
+    let h = |j: f64| 1.5 * (onset - j).powi(2) / (onset * j);
+    let slope = |j: f64| 1.5 * (1.0 / onset - onset / (j * j));
+    if j >= onset {
+        (0.0, 0.0)
+    } else if j > floor {
+        (h(j), slope(j))
+    } else {
+        (h(floor) + slope(floor) * (j - floor), slope(floor))
+    }
+}
+
+/// The stress by which a crushed element resists, Pa, from the shear modulus at rest, Pa.
+pub fn barrier_stress(shear: f64, f: &Mat3) -> Mat3 {
+    let (h, slope) = barrier(determinant(f));
+    let cofactor = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
+    from_fn(|i, j| shear / 6.0 * (2.0 * h * f[i][j] + slope * square(f) * cofactor[i][j]))
+}
+
+fn square(f: &Mat3) -> f64 {
+    f.iter().flatten().map(|x| x * x).sum()
+}
+
 /// Strain energy, J.
 pub fn energy(body: &Tissues<'_>, u: &[Vec3]) -> f64 {
     let gradients = body.mesh.deformation_gradients(u);
@@ -42,9 +68,11 @@ pub fn energy(body: &Tissues<'_>, u: &[Vec3]) -> f64 {
         let tissue = body.of_element[e];
         for &node in tet {
             let (mean, _) = means[node][tissue];
-            let square: f64 = (0..9).map(|k| (gradients[e][k / 3][k % 3] - mean[k / 3][k % 3]).powi(2)).sum();
+            let square = square(&from_fn(|i, j| gradients[e][i][j] - mean[i][j]));
             energy += 0.5 * modulus(body, tissue) * 0.25 * volume * square;
         }
+        let (h, _) = barrier(determinant(&gradients[e]));
+        energy += volume * modulus(body, tissue) / SHARE / 6.0 * square(&gradients[e]) * h;
     }
     energy
 }
@@ -70,7 +98,8 @@ pub fn forces(body: &Tissues<'_>, u: &[Vec3]) -> Vec<Vec3> {
             let p = body.laws[tissue].first_piola(&mean);
             from_fn(|i, j| p[i][j] + stabilising * (gradients[e][i][j] - mean[i][j]))
         });
-        let stress: Mat3 = from_fn(|i, j| 0.25 * stresses.iter().map(|p| p[i][j]).sum::<f64>());
+        let own = barrier_stress(stabilising / SHARE, &gradients[e]);
+        let stress: Mat3 = from_fn(|i, j| 0.25 * stresses.iter().map(|p| p[i][j]).sum::<f64>() + own[i][j]);
         for (node, gradient) in tet.iter().zip(element.gradients) {
             let force = apply(&stress, gradient);
             for (sum, force) in forces[*node].iter_mut().zip(force) {
