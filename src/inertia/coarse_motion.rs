@@ -19,7 +19,7 @@ pub(super) fn removed_share(share: f32) -> f32 {
 }
 
 /// Scalar product of two motions of the lattice.
-fn inner(a: &CoarseVectors, b: &CoarseVectors) -> f32 {
+pub(super) fn inner(a: &CoarseVectors, b: &CoarseVectors) -> f32 {
     a.iter().zip(b).map(|(a, b)| Vec4::from(a.0).dot(Vec4::from(b.0))).sum()
 }
 
@@ -112,6 +112,13 @@ fn minus(a: &CoarseVectors, b: &CoarseVectors) -> CoarseVectors {
     difference
 }
 
+/// Adds a multiple of other vectors.
+fn add(vectors: &mut CoarseVectors, factor: f32, others: &CoarseVectors) {
+    for (vector, other) in vectors.iter_mut().zip(others) {
+        vector.0 = (Vec4::from(vector.0) + factor * Vec4::from(other.0)).to_array();
+    }
+}
+
 impl CoarseMotion<'_, '_> {
     /// The lattice's motion from the residual `g = W^T r`:
     ///
@@ -127,9 +134,13 @@ impl CoarseMotion<'_, '_> {
             self.add_translation(forces, inertia, &mut given);
         }
         let forces = minus(forces, &self.space.times_inertia(&given));
-        let pulled = self.supports.map(|pull| self.add_pulled(pull, &mut given));
         let last = self.smooth.copied().unwrap_or([NodeVector::ZERO; _]);
-        let [mut solution, kept] = self.space.both_solved([&forces, &self.space.times_inertia(&last)]);
+        let mut momentum = self.space.times_inertia(&last);
+        if let Some(pull) = self.supports {
+            self.add_pulled(pull, &mut given);
+            add(&mut momentum, 1.0, &pull.of_last);
+        }
+        let [mut solution, kept] = self.space.both_solved([&forces, &momentum]);
         let (strained, drag) = (minus(&last, &kept), renewal.drag());
         let twice = if drag > LEAST_DRAG {
             minus(&strained, &self.space.solved(&self.space.times_inertia(&strained)))
@@ -146,13 +157,8 @@ impl CoarseMotion<'_, '_> {
             solution.0 = (share * answer + given - removed * strained - drag * twice).to_array();
         }
         let mut next = solution;
-        for (next, last) in next.iter_mut().zip(&last) {
-            next.0 = (Vec4::from(next.0) + Vec4::from(last.0)).to_array();
-        }
-        let work = match (self.supports, pulled) {
-            (Some(pull), Some(share)) => self.work(pull, share, &next),
-            _ => 0.0,
-        };
+        add(&mut next, 1.0, &last);
+        let work = self.supports.map_or(0.0, |pull| pull.work(&solution));
         MotionResult { motion: solution, share, next, work }
     }
 
@@ -177,22 +183,12 @@ impl CoarseMotion<'_, '_> {
         }
     }
 
-    /// Adds `p`, as far as its energy allows. Gives its share of `-S^-1 A_s d`.
+    /// Adds `p`, as far as its energy allows.
     #[inline(never)]
-    fn add_pulled(&self, pull: &Pull, motion: &mut CoarseVectors) -> f32 {
+    fn add_pulled(&self, pull: &Pull, motion: &mut CoarseVectors) {
         let answer = self.space.solved(&pull.residual);
         let energy = inner(&pull.residual, &answer);
         let share = if energy > pull.energy { pull.energy / energy } else { 1.0 };
-        for (vector, answer) in motion.iter_mut().zip(&answer) {
-            vector.0 = (Vec4::from(vector.0) + share * Vec4::from(answer.0)).to_array();
-        }
-        share
-    }
-
-    /// Work of this share of the supports' residual on the lattice, times `D^2`, from the lattice's part of the next
-    /// increments.
-    fn work(&self, pull: &Pull, share: f32, next: &CoarseVectors) -> f32 {
-        let last = self.smooth.map_or(0.0, |smooth| inner(&pull.residual, smooth));
-        0.5 * share * (inner(&pull.residual, next) + last)
+        add(motion, share, &answer);
     }
 }

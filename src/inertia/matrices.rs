@@ -165,7 +165,7 @@ impl<'a> Matrices<'a> {
             }
             is_sound &= factorise(band, factor, scratch);
         }
-        is_sound && factorise_edges(band, edge_factor, scratch, lattice)
+        is_sound && factorise_edges(band, edge_factor, scratch, lattice, &held_shares(scene, lattice, places))
     }
 
     /// `((1 + k) Mc + E) x` for vectors of the functions.
@@ -209,6 +209,28 @@ impl<'a> Matrices<'a> {
         }
         lattice.expand(vectors);
     }
+}
+
+/// For each function the share of its nodes that some support holds.
+#[inline(never)]
+fn held_shares<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    lattice: &Lattice,
+    places: &[LatticeNode],
+) -> [f32; MAX_FUNCTIONS] {
+    let mut sums = [[0.0f32; 2]; MAX_FUNCTIONS];
+    for place in places {
+        let is_held = scene.inertia.get(place.node()).is_some_and(|inertia| inertia.held_count() > 0);
+        for (number, weight) in lattice.weights(place) {
+            lattice.each_function(number, |function, share| {
+                if let Some([held, all]) = sums.get_mut(function) {
+                    *all += share * weight;
+                    *held += if is_held { share * weight } else { 0.0 };
+                }
+            });
+        }
+    }
+    sums.map(|[held, all]| if all > 0.0 { held / all } else { 0.0 })
 }
 
 /// The pair of two of the eight functions of a cell.

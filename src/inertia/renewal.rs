@@ -25,7 +25,7 @@ use crate::simd::{Gather, NodeVector, TILE};
 use crate::step::threads::take;
 use crate::step::{Threads, internal_forces};
 
-/// Change of the lattice's shape within which `S` is used.
+/// Change of the lattice's shape within which `S` is used, at the least sensitivity.
 const LARGEST_CHANGE: f32 = 0.08;
 
 /// Change of the lattice's shape in one step at which drag is full, for tissue that is as stiff in volume as in shear.
@@ -104,7 +104,10 @@ impl Renewal {
     /// The share of the last increment's unresolved deformation of the lattice that a step removes. Deformation is fed
     /// by `S` changing while velocities are kept, so the share follows the rate of that change.
     pub(super) fn drag(&self) -> f32 {
-        (DRAG_OF_ADDED * self.added.mean).max(DRAG_AT_LARGEST_CHANGE * self.pace).min(LARGEST_DRAG)
+        let of_shear = LEAST_SENSITIVITY / self.sensitivity;
+        (of_shear * of_shear * DRAG_OF_ADDED * self.added.mean)
+            .max(DRAG_AT_LARGEST_CHANGE * self.pace)
+            .min(LARGEST_DRAG)
     }
 
     /// Computes the frames, unless that was done for this state, which has taken `steps` steps.
@@ -138,7 +141,8 @@ impl Renewal {
         let mut now = bounds.iter_mut().zip(cells.iter().map(CellPolynomial::values));
         let stiffened = now.any(|(before, now)| now > COARSE_GROWTH * *before);
         // Not for a motion that is no number.
-        if self.lattice_in_use && !(self.changed > LARGEST_CHANGE) && !stiffened {
+        if self.lattice_in_use && !(self.changed * self.sensitivity > LARGEST_CHANGE * LEAST_SENSITIVITY) && !stiffened
+        {
             return;
         }
         bounds.iter_mut().zip(cells.iter()).for_each(|(before, cell)| *before = cell.values());
@@ -156,6 +160,7 @@ impl Renewal {
         let Matrices { factor, scratch, inertia, stiffness, clusters, tangents, of_clusters, .. } = matrices;
         let tiles = clusters.tiles.get(..self.tiles).unwrap_or_default();
         write_tangents(input, tiles, tangents, threads);
+        self.sensitivity = sensitivity(tangents.get(..TILE * tiles.len()).unwrap_or_default()).max(LEAST_SENSITIVITY);
         let clusters = &*clusters;
         each_in_parts(of_clusters.get_mut(..self.clusters).unwrap_or_default(), threads, |index, tangent| {
             if let Some(cluster) = clusters.all.get(index) {
@@ -226,6 +231,16 @@ impl Renewal {
         fill_held_axes(of_cells, lattice);
         self.renew(input, matrices, threads);
     }
+}
+
+/// How much sooner `S` is out of date than with equal stiffness of volume and shear.
+fn sensitivity(tangents: &[Tangent]) -> f32 {
+    let (mut volume, mut shear) = (0.0, f32::MIN_POSITIVE);
+    for Tangent { factors: [_, outer, exchanged, _], .. } in tangents {
+        volume += outer;
+        shear += 2.0 * exchanged;
+    }
+    libm::sqrtf(1.0 + volume / shear)
 }
 
 /// Calls `write` with each item and its number.

@@ -1,15 +1,21 @@
-//! Supports whose speed changes, coupled to the motion of the lattice. A step solves `S c + A_s d = g` for the lattice,
-//! where `d` (m) is the change of the supports' increments and `A_s = s_c D^2 / 4 W^T K_s` (kg) the stiffness between
-//! the lattice's functions and the supports. It has the tangents and the gradients of `coarse_stiffness.rs`, with the
+//! Supports that move, coupled to the motion of the lattice. A step solves `S c + A_s d = g` for the lattice, where `d`
+//! (m) is the change of the supports' increments and `A_s = s_c D^2 / 4 W^T K_s` (kg) the stiffness between the
+//! lattice's functions and the supports. It has the tangents and the gradients of `coarse_stiffness.rs`, with the
 //! supports' motion in place of that of further functions: so a motion of body and supports together meets no
 //! resistance. Without it a support that starts leaves the body behind until its elements are stretched by a whole
-//! step's motion; with it the lattice follows as far as `A` resists the strain. Supports that stand still or keep their
-//! speed add nothing.
+//! step's motion; with it the lattice follows as far as `A` resists the strain.
 //!
 //! The stiffness of elements and supports together is positive, so `S^-1 A_s d` gets at most the energy `d K_ss d` of
 //! supports that move alone. Where rounding gives it more, the motion is scaled down.
+//!
+//! **Work.** The added inertia exerts `A_sf dc + A_ss d` on the supports, where `dc` is the change of the lattice's part
+//! of the increments, so supports that move by `e` do the work `e (A_sf dc + A_ss d) / D^2` besides that against the
+//! stress. A body that starts with its supports has its kinetic energy from it.
+
+use glam::Vec4;
 
 use super::clusters::{ClusterInput, Clusters, NO_TILE, Piece};
+use super::coarse_motion::inner;
 use super::coarse_stiffness::ClusterTangent;
 use super::lattice::{CoarseVectors, MAX_FUNCTIONS};
 use crate::element::ElementMaterial;
@@ -17,12 +23,23 @@ use crate::loads::Loads;
 use crate::simd::NodeVector;
 use crate::step::Step;
 
-/// What supports whose speed changes do to the lattice.
+/// What moving supports do to the lattice, with the change `d` of their increments and their last increments `e`.
 pub(super) struct Pull {
-    /// `-A_s d` for each function, kg m.
+    /// `-A_s d` and `-A_s e` for each function, kg m.
     pub(super) residual: CoarseVectors,
-    /// `s_c D^2 / 4 d K_ss d`, kg m^2.
+    pub(super) of_last: CoarseVectors,
+    /// `d A_ss d` and `e A_ss d`, kg m^2.
     pub(super) energy: f32,
+    cross: f32,
+}
+
+impl Pull {
+    /// Work of the supports on added inertia, times `D^2`, where the lattice's part of the increments changes by `dc`:
+    /// kg m^2.
+    pub(super) fn work(&self, change: &CoarseVectors) -> f32 {
+        let along = |residual: &CoarseVectors| inner(residual, change);
+        self.cross + 0.5 * self.energy - along(&self.of_last) - 0.5 * along(&self.residual)
+    }
 }
 
 /// The supports of a scene that motions may move, in a state.
@@ -35,7 +52,7 @@ pub(super) struct MovingSupports<'a, 'm, M> {
 }
 
 impl<M: ElementMaterial> MovingSupports<'_, '_, M> {
-    /// None if no support changes its speed. `time` (s) is that of the state, `changes` are
+    /// None if no support moves. `time` (s) is that of the state, `changes` are
     /// vectors of the nodes whose first three components are free.
     #[inline(never)]
     pub(super) fn pull(
@@ -56,49 +73,69 @@ impl<M: ElementMaterial> MovingSupports<'_, '_, M> {
         loads.each_prescribed(time + f64::from(step.seconds()), increment, |node, axis, position, increment| {
             if let (Some(change), Some(displacement)) = (changes.get_mut(node), self.displacement.get(node)) {
                 let next = position - displacement.0[axis % 4];
-                change.0[axis % 3] = next - step.carry() * increment[axis % 4];
-                moves |= change.0[axis % 3] != 0.0;
+                let last = step.carry() * increment[axis % 4];
+                change.0[axis % 3] = next - last;
+                moves |= next != 0.0 || last != 0.0;
             }
         });
         if !moves {
             return None;
         }
-        let mut pull = Pull { residual: [NodeVector::ZERO; MAX_FUNCTIONS + 1], energy: 0.0 };
+        let none = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+        let mut pull = Pull { residual: none, of_last: none, energy: 0.0, cross: 0.0 };
         let (scene, clusters) = (self.input.scene, self.clusters);
+        let last = |node: usize| {
+            let held =
+                scene.inertia.get(node).map_or([0.0; 3], |inertia| (Vec4::ONE - inertia.free()).truncate().to_array());
+            let last = increment.get(node).copied().unwrap_or_default().to_array();
+            [0, 1, 2].map(|axis| step.carry() * held[axis] * last[axis])
+        };
+        let change = |node: usize| changes.get(node).copied().unwrap_or_default().to_array();
         for piece in tiles(clusters.moved).filter_map(|tile| scene.tiles.get(tile)).flat_map(Piece::of_tile) {
-            let Some(motion) = motion_of(&piece, changes) else { continue };
+            let motions = [motion_of(&piece, change), motion_of(&piece, last)];
+            if motions == [[[0.0; 3]; 3]; 2] {
+                continue;
+            }
             let cell = piece.cell(self.input.lattice, self.input.places);
             let index = self.input.find(&piece, cell, clusters.all, clusters.heads);
             let of_cluster = index.and_then(|index| Some((self.tangents.get(index)?, clusters.all.get(index)?)));
             let Some((tangent, cluster)) = of_cluster else { continue };
             let share = piece.volume() / cluster.volume;
-            let stress = |i: usize, large: usize| {
-                let row: &[f32; 9] = tangent.as_chunks().0.get(3 * i + large).unwrap_or(&[0.0; 9]);
-                share * row.iter().zip(motion.as_flattened()).map(|(factor, along)| factor * along).sum::<f32>()
-            };
-            self.add(&piece, cell, &motion, stress, &mut pull);
+            let stresses = motions.map(|motion| {
+                let of_row = |row: &[f32; 9]| {
+                    share * row.iter().zip(motion.as_flattened()).map(|(factor, along)| factor * along).sum::<f32>()
+                };
+                let rows: &[[f32; 9]] = tangent.as_chunks().0;
+                core::array::from_fn(|entry| rows.get(entry).map_or(0.0, of_row))
+            });
+            self.add(&piece, cell, motions, stresses, &mut pull);
         }
         Some(pull)
     }
 
-    /// Adds a piece with the gradient of its supports' motion; `stress(i, I)` is its tangent times that, kg m.
+    /// Adds a piece with the gradients of `d` and `e`, and its tangent times these, entry `3 i + I`, kg m.
     fn add(
         &self,
         piece: &Piece<'_>,
         cell: usize,
-        motion: &[[f32; 3]; 3],
-        stress: impl Fn(usize, usize) -> f32,
+        [change, last]: [[[f32; 3]; 3]; 2],
+        [of_change, of_last]: [[f32; 9]; 2],
         pull: &mut Pull,
     ) {
         let gradients = self.input.gradients(piece, cell);
         let functions = self.input.lattice.functions_of(cell);
         for i in 0..3 {
-            let row = [0, 1, 2].map(|large| stress(i, large));
-            let along = |gradient: [f32; 3]| row.iter().zip(gradient).map(|(row, along)| row * along).sum::<f32>();
-            pull.energy += along(motion[i]);
+            let along = |stress: &[f32; 9], gradient: [f32; 3]| {
+                stress[3 * i..3 * i + 3].iter().zip(gradient).map(|(row, along)| row * along).sum::<f32>()
+            };
+            pull.energy += along(&of_change, change[i]);
+            pull.cross += along(&of_change, last[i]);
             for (function, gradient) in functions.into_iter().zip(gradients[i]) {
-                if let Some(sum) = pull.residual.get_mut(function) {
-                    sum.0[i] -= along(gradient);
+                if let (Some(sum), Some(sum_of_last)) =
+                    (pull.residual.get_mut(function), pull.of_last.get_mut(function))
+                {
+                    sum.0[i] -= along(&of_change, gradient);
+                    sum_of_last.0[i] -= along(&of_last, gradient);
                 }
             }
         }
@@ -110,14 +147,13 @@ fn tiles(list: &[u32]) -> impl Iterator<Item = usize> {
     list.iter().take_while(|tile| **tile != NO_TILE).map(|tile| *tile as usize)
 }
 
-/// `sum_a d_a g_a^T` over the nodes of a piece (1), if it is not zero.
-fn motion_of(piece: &Piece<'_>, changes: &[NodeVector]) -> Option<[[f32; 3]; 3]> {
-    let mut motion = [[0.0; 3]; 3];
-    for (node, gradient) in piece.nodes().into_iter().zip(piece.gradients()) {
-        let change = changes.get(node).copied().unwrap_or_default().to_array();
-        for (row, change) in motion.iter_mut().zip(change) {
-            row.iter_mut().zip(gradient).for_each(|(sum, along)| *sum += change * along);
+/// `sum_a d_a g_a^T` over the nodes of a piece (1).
+fn motion_of(piece: &Piece<'_>, motion: impl Fn(usize) -> [f32; 3]) -> [[f32; 3]; 3] {
+    let mut gradient = [[0.0; 3]; 3];
+    for (node, of_node) in piece.nodes().into_iter().zip(piece.gradients()) {
+        for (row, motion) in gradient.iter_mut().zip(motion(node)) {
+            row.iter_mut().zip(of_node).for_each(|(sum, along)| *sum += motion * along);
         }
     }
-    (motion != [[0.0; 3]; 3]).then_some(motion)
+    gradient
 }

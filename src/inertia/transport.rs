@@ -8,7 +8,9 @@
 //! ```
 //! with the lattice's part `c` of the last increment (m) and the rotation `R` of the tissue in that step. For a rigid
 //! rotation `c + w` is the exact next increment. `A` is zero for translations and rotations, so `w` changes no
-//! momentum. Every edge counts with the square of its inverse length; the least squares are a constant matrix.
+//! momentum. Every edge counts with the square of its inverse length; the least squares are a constant matrix. Where
+//! nodes are held `A` resists translations too, so there `w` is kept at zero: a body that swings about a hinge turns
+//! about it, not about its centre.
 
 use glam::{Mat3, Vec3, Vec4};
 
@@ -21,9 +23,18 @@ use crate::simd::NodeVector;
 /// consequence.
 const ANCHOR: f32 = 1e-3;
 
+/// The same for each held node of a function, as a share of all.
+const HOLD: f32 = 10.0;
+
 /// Computes the factor of the matrix of the least squares, with one unknown a function. Gives whether it could be
-/// factorised.
-pub(super) fn factorise_edges(band: &Band, matrix: &mut [f32], scratch: &mut [f32], lattice: &Lattice) -> bool {
+/// factorised. `held` are the shares of the functions' nodes that are held.
+pub(super) fn factorise_edges(
+    band: &Band,
+    matrix: &mut [f32],
+    scratch: &mut [f32],
+    lattice: &Lattice,
+    held: &[f32; MAX_FUNCTIONS],
+) -> bool {
     band.clear(matrix);
     let mut add = |row: usize, column: usize, value: f32| {
         if let Some(entry) = matrix.get_mut(band.at(row, column)).filter(|_| row < MAX_FUNCTIONS) {
@@ -31,8 +42,9 @@ pub(super) fn factorise_edges(band: &Band, matrix: &mut [f32], scratch: &mut [f3
         }
     };
     lattice.for_each_edge(|a, b, weight| {
-        add(a, a, weight * (1.0 + ANCHOR));
-        add(b, b, weight * (1.0 + ANCHOR));
+        let anchor = |function: usize| ANCHOR + HOLD * held.get(function).copied().unwrap_or(0.0);
+        add(a, a, weight * (1.0 + anchor(a)));
+        add(b, b, weight * (1.0 + anchor(b)));
         if a < MAX_FUNCTIONS && b < MAX_FUNCTIONS {
             add(a.max(b), a.min(b), -weight);
         }
