@@ -4,7 +4,7 @@
 use bytemuck::{Pod, Zeroable, must_cast, must_cast_ref};
 use glam::Vec4;
 
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode};
 use crate::simd::{NodeVector, Real, TILE};
 
 /// Most vectors that [`TILE`] nodes fill. There are separate sums for each of the [`TILE`] places, so the bits do not
@@ -229,9 +229,9 @@ pub(super) fn motion_at<R: Real>(cells: &[CellPolynomial], nodes: &NodesInCells<
     moved
 }
 
-/// `W^T v` for each function, from the sums of the cells.
-pub(super) fn restrict(cells: &[CellPolynomial], lattice: &Lattice) -> CoarseVectors {
-    let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+/// Writes `W^T v` for each function, from the sums of the cells.
+pub(super) fn restrict(cells: &[CellPolynomial], lattice: &Lattice, sums: &mut CoarseVectors) {
+    sums.fill(NodeVector::ZERO);
     for (index, cell) in cells.iter().enumerate() {
         let [a, b, c, d, e, f, g, h] = cell.vectors();
         let (a, c, e, g) = (a - b, c - d, e - f, g - h);
@@ -243,7 +243,6 @@ pub(super) fn restrict(cells: &[CellPolynomial], lattice: &Lattice) -> CoarseVec
             }
         }
     }
-    sums
 }
 
 /// Sets the coefficients of each cell from vectors of the functions.

@@ -32,60 +32,63 @@ pub(super) struct CoarseSpace<'a, 'm> {
 }
 
 impl CoarseSpace<'_, '_> {
-    /// `S^-1 g`.
-    pub(super) fn solved(&self, forces: &CoarseVectors) -> CoarseVectors {
-        let mut row = self.in_frames(forces);
+    /// Replaces `g` by `S^-1 g`.
+    #[inline(never)]
+    pub(super) fn solve(&self, forces: &mut CoarseVectors) {
+        let mut row: Row = [0.0; _];
+        self.write_components(forces, &mut row);
         solve(&self.renewal.bands.vectors, self.matrices.factor, [&mut row]);
-        self.in_world(&row)
+        self.write_vectors(&row, forces);
     }
 
     /// The same for two.
-    fn both_solved(&self, forces: [&CoarseVectors; 2]) -> [CoarseVectors; 2] {
-        let [mut a, mut b]: [Row; 2] = forces.map(|forces| self.in_frames(forces));
+    #[inline(never)]
+    fn solve_both(&self, [first, second]: [&mut CoarseVectors; 2]) {
+        let (mut a, mut b): (Row, Row) = ([0.0; _], [0.0; _]);
+        self.write_components(first, &mut a);
+        self.write_components(second, &mut b);
         solve(&self.renewal.bands.vectors, self.matrices.factor, [&mut a, &mut b]);
-        [a, b].map(|row| self.in_world(&row))
+        self.write_vectors(&a, first);
+        self.write_vectors(&b, second);
     }
 
-    /// Components in the frames in which `S` was computed, three for each function.
-    fn in_frames(&self, vectors: &CoarseVectors) -> Row {
-        let (mut vectors, mut components): (_, Row) = (*vectors, [0.0; _]);
-        self.lattice.fold(&mut vectors);
+    /// Components in the frames in which `S` was computed, three for each function. Folds the vectors.
+    fn write_components(&self, vectors: &mut CoarseVectors, components: &mut Row) {
+        self.lattice.fold(vectors);
         let functions = self.lattice.functions();
-        let rows = components.as_chunks_mut::<3>().0.iter_mut().zip(&vectors);
+        let rows = components.as_chunks_mut::<3>().0.iter_mut().zip(&*vectors);
         for (function, (three, vector)) in rows.enumerate().take(functions) {
-            let turned = self.renewal.frames.since_stiffness(function).transpose() * Vec3::from(vector.to_array());
+            let turned = self.matrices.frames.since_stiffness(function).transpose() * Vec3::from(vector.to_array());
             *three = turned.to_array();
         }
-        components
     }
 
     /// Vectors in the world from such components, and those of light points.
-    fn in_world(&self, components: &Row) -> CoarseVectors {
-        let mut vectors = [NodeVector::ZERO; _];
+    fn write_vectors(&self, components: &Row, vectors: &mut CoarseVectors) {
+        vectors.fill(NodeVector::ZERO);
         let functions = self.lattice.functions();
         for (function, (vector, three)) in
             vectors.iter_mut().zip(components.as_chunks::<3>().0).enumerate().take(functions)
         {
-            let turned = self.renewal.frames.since_stiffness(function) * Vec3::from(*three);
+            let turned = self.matrices.frames.since_stiffness(function) * Vec3::from(*three);
             *vector = NodeVector(turned.extend(0.0).to_array());
         }
-        self.lattice.expand(&mut vectors);
-        vectors
+        self.lattice.expand(vectors);
     }
 
-    /// `((1 + k) Mc + E) x`.
-    fn times_inertia(&self, x: &CoarseVectors) -> CoarseVectors {
-        self.matrices.times_inertia(self.lattice, x)
+    /// Writes `((1 + k) Mc + E) x`.
+    fn multiply_by_inertia(&self, x: &CoarseVectors, out: &mut CoarseVectors) {
+        self.matrices.times_inertia(self.lattice, x, out);
     }
 }
 
 /// The motion of the lattice in a step.
 pub(super) struct CoarseMotion<'a, 'm> {
     pub(super) space: CoarseSpace<'a, 'm>,
-    /// The lattice's part of the last increment.
-    pub(super) smooth: Option<&'a CoarseVectors>,
+    /// Whether its part of the last increments is known.
+    pub(super) has_part: bool,
     /// Supports whose speed changes (`supports.rs`).
-    pub(super) supports: Option<&'a Pull>,
+    pub(super) supports: Option<&'a Pull<'a>>,
     /// The share of the kinetic energy that can have come from the loads.
     pub(super) allowed: f32,
     /// Largest strain of a cell by which the forces of the step may move it from rest.
@@ -94,22 +97,17 @@ pub(super) struct CoarseMotion<'a, 'm> {
 
 /// How the lattice moves.
 pub(super) struct MotionResult {
-    pub(super) motion: CoarseVectors,
     /// Share of the motion that is used.
     pub(super) share: f32,
-    /// Its part of the next increments.
-    pub(super) next: CoarseVectors,
     /// Work of the supports on the lattice, times `D^2`: kg m^2.
     pub(super) work: f32,
 }
 
-/// `a - b`.
-fn minus(a: &CoarseVectors, b: &CoarseVectors) -> CoarseVectors {
-    let mut difference = *a;
-    for (a, b) in difference.iter_mut().zip(b) {
-        a.0 = (Vec4::from(a.0) - Vec4::from(b.0)).to_array();
+/// Replaces `b` by `a - b`.
+fn subtract_from(a: &CoarseVectors, b: &mut CoarseVectors) {
+    for (b, a) in b.iter_mut().zip(a) {
+        b.0 = (Vec4::from(a.0) - Vec4::from(b.0)).to_array();
     }
-    difference
 }
 
 /// Adds a multiple of other vectors.
@@ -120,46 +118,58 @@ fn add(vectors: &mut CoarseVectors, factor: f32, others: &CoarseVectors) {
 }
 
 impl CoarseMotion<'_, '_> {
-    /// The lattice's motion from the residual `g = W^T r`:
+    /// Replaces the residual `g = W^T r` by the lattice's motion, and the lattice's part of the last increments by that of
+    /// the next ones:
     ///
     /// ```text
     /// share S^-1 (g - M w) + p + w - (removed T + drag T^2) c        M = (1 + k) Mc + E,  T = S^-1 A = 1 - S^-1 M
     /// ```
     /// with the rotation `w` of the velocities (`transport.rs`), and `p = -S^-1 A_s d` from the supports. Reduces the
     /// share if the forces of one step would strain a cell by more than `largest_strain`.
-    pub(super) fn compute(&self, forces: &CoarseVectors) -> MotionResult {
+    pub(super) fn compute(
+        &self,
+        motion: &mut CoarseVectors,
+        part: &mut CoarseVectors,
+        [given, strained, other]: [&mut CoarseVectors; 3],
+    ) -> MotionResult {
         let CoarseSpace { lattice, renewal, .. } = self.space;
-        let mut given = self.turned();
+        self.write_turned(part, given);
         if let Some(inertia) = renewal.free_inertia {
-            self.add_translation(forces, inertia, &mut given);
+            self.add_translation(motion, inertia, given);
         }
-        let forces = minus(forces, &self.space.times_inertia(&given));
-        let last = self.smooth.copied().unwrap_or([NodeVector::ZERO; _]);
-        let mut momentum = self.space.times_inertia(&last);
+        self.space.multiply_by_inertia(given, other);
+        add(motion, -1.0, other);
+        if !self.has_part {
+            part.fill(NodeVector::ZERO);
+        }
+        // The momentum, then what of the last motion is kept.
+        self.space.multiply_by_inertia(part, strained);
         if let Some(pull) = self.supports {
-            self.add_pulled(pull, &mut given);
-            add(&mut momentum, 1.0, &pull.of_last);
+            self.add_pulled(pull, given, other);
+            add(strained, 1.0, pull.of_last);
         }
-        let [mut solution, kept] = self.space.both_solved([&forces, &momentum]);
-        let (strained, drag) = (minus(&last, &kept), renewal.drag());
-        let twice = if drag > LEAST_DRAG {
-            minus(&strained, &self.space.solved(&self.space.times_inertia(&strained)))
+        self.space.solve_both([motion, strained]);
+        subtract_from(part, strained);
+        let drag = renewal.drag();
+        if drag > LEAST_DRAG {
+            self.space.multiply_by_inertia(strained, other);
+            self.space.solve(other);
+            subtract_from(strained, other);
         } else {
-            [NodeVector::ZERO; _]
-        };
-        let rotations = renewal.frames.since_rest();
-        let strain = lattice.largest_strain(&solution, rotations);
+            other.fill(NodeVector::ZERO);
+        }
+        let rotations = self.space.matrices.frames.since_rest();
+        let strain = lattice.largest_strain(motion, rotations);
         let share = if strain > self.largest_strain { self.largest_strain / strain } else { 1.0 };
         let removed = removed_share(share.min(self.allowed));
-        for ((solution, given), (strained, twice)) in solution.iter_mut().zip(&given).zip(strained.iter().zip(&twice)) {
+        for ((motion, given), (strained, twice)) in motion.iter_mut().zip(given).zip(strained.iter().zip(&*other)) {
             let [answer, given, strained, twice] =
-                [*solution, *given, *strained, *twice].map(|vector| Vec4::from(vector.0));
-            solution.0 = (share * answer + given - removed * strained - drag * twice).to_array();
+                [*motion, *given, *strained, *twice].map(|vector| Vec4::from(vector.0));
+            motion.0 = (share * answer + given - removed * strained - drag * twice).to_array();
         }
-        let mut next = solution;
-        add(&mut next, 1.0, &last);
-        let work = self.supports.map_or(0.0, |pull| pull.work(&solution));
-        MotionResult { motion: solution, share, next, work }
+        add(part, 1.0, motion);
+        let work = self.supports.map_or(0.0, |pull| pull.work(motion));
+        MotionResult { share, work }
     }
 
     /// Adds the translation of a free body: rounding in `S` is of no consequence for it.
@@ -173,22 +183,24 @@ impl CoarseMotion<'_, '_> {
         }
     }
 
-    /// `w`; zero without `c`.
+    /// Writes `w`; zero without `c`.
     #[inline(never)]
-    fn turned(&self) -> CoarseVectors {
+    fn write_turned(&self, part: &CoarseVectors, turned: &mut CoarseVectors) {
         let CoarseSpace { lattice, renewal, matrices } = self.space;
-        match self.smooth {
-            Some(smooth) => turned_part(smooth, lattice, &renewal.frames, &renewal.bands.scalars, matrices.edge_factor),
-            None => [NodeVector::ZERO; _],
-        }
+        *turned = if self.has_part {
+            turned_part(part, lattice, &matrices.frames, &renewal.bands.scalars, matrices.edge_factor)
+        } else {
+            [NodeVector::ZERO; _]
+        };
     }
 
     /// Adds `p`, as far as its energy allows.
     #[inline(never)]
-    fn add_pulled(&self, pull: &Pull, motion: &mut CoarseVectors) {
-        let answer = self.space.solved(&pull.residual);
-        let energy = inner(&pull.residual, &answer);
+    fn add_pulled(&self, pull: &Pull<'_>, motion: &mut CoarseVectors, answer: &mut CoarseVectors) {
+        *answer = *pull.residual;
+        self.space.solve(answer);
+        let energy = inner(pull.residual, answer);
         let share = if energy > pull.energy { pull.energy / energy } else { 1.0 };
-        add(motion, share, &answer);
+        add(motion, share, answer);
     }
 }

@@ -10,7 +10,7 @@ use crate::reference::tensor::{Mat3, Mat9, cross, from_fn, product, rotation};
 
 use super::band::{Row, solve};
 use super::clusters::ClusterInput;
-use super::lattice::{Grid, Lattice, LatticeNode, sort_by_cell};
+use super::lattice::{Grid, Lattice, LatticeNode, MAX_FUNCTIONS, sort_by_cell};
 use super::matrices::{Bands, Matrices, vectors_for};
 use super::node::Scaling;
 use super::node_tables::{self, NodeTables};
@@ -80,7 +80,7 @@ fn prepare<M: ElementMaterial>(material: M, supports: &[Support], h: &Mat3, judg
     let mut storage = vec![NodeVector::ZERO; vectors_for(grid, pieces)];
     let mut matrices = Matrices::split(&mut storage, lattice, &renewal.bands, pieces).unwrap();
     assert!(matrices.write_constants(scene, lattice, places, &mut renewal));
-    renewal.frames.choose(lattice, &points);
+    matrices.frames.choose(lattice, &points);
     let mut storage = vec![NodeVector([0.0, 0.0, 0.0, 1.0]); node_tables::vectors_for(points.len())];
     let mut tables = NodeTables::split(&mut storage, points.len()).unwrap();
     let moved = points.iter().map(|&x| {
@@ -382,7 +382,8 @@ fn a_translation_of_body_and_supports_together_meets_no_resistance() {
         let step = Step::unchecked(1e-3, 0.0).unwrap();
         let (mut increment, mut changes) =
             (vec![NodeVector::ZERO; places.len()], vec![NodeVector([7.0; 4]); places.len()]);
-        let pull = moving.pull(&loads, 0.0, &step, &mut increment, &mut changes).unwrap();
+        let mut room = [[NodeVector::ZERO; MAX_FUNCTIONS + 1]; 2];
+        let pull = moving.pull(&loads, 0.0, &step, &mut increment, &mut changes, room.each_mut()).unwrap();
         let all = prepared.motion(|_| shift.map(f64::from));
         let resistance = times(&prepared.of_cells(), &all);
         let fixed: Vec<usize> = supports.iter().filter(|support| !support.moves).map(|s| s.node as usize).collect();
@@ -395,7 +396,7 @@ fn a_translation_of_body_and_supports_together_meets_no_resistance() {
             }
         }
         let mut pulled: Row = [0.0; _];
-        pulled.as_chunks_mut::<3>().0.iter_mut().zip(&pull.residual).for_each(|(to, sum)| *to = sum.to_array());
+        pulled.as_chunks_mut::<3>().0.iter_mut().zip(&*pull.residual).for_each(|(to, sum)| *to = sum.to_array());
         let (mut worst, mut largest, mut at_fixed) = (0.0_f64, 0.0_f64, 0.0_f64);
         for (at, (&pulled, &resistance)) in pulled.iter().zip(&resistance).enumerate() {
             let apart = (f64::from(pulled) - resistance).abs();
@@ -413,7 +414,7 @@ fn a_translation_of_body_and_supports_together_meets_no_resistance() {
         if displacement.iter().all(|moved| moved.to_array() == [0.0; 3]) {
             // The supports now keep their speed.
             increment.fill(NodeVector([shift[0], shift[1], shift[2], 0.0]));
-            assert!(moving.pull(&loads, 0.0, &step, &mut increment, &mut changes).is_none());
+            assert!(moving.pull(&loads, 0.0, &step, &mut increment, &mut changes, room.each_mut()).is_none());
         }
     }
     let [_, foot, some] = supports();

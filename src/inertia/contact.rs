@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use super::cells::prolong;
 use super::coarse_motion::CoarseSpace;
+use super::coarse_room::CoarseRoom;
 use super::large_step::Storage;
 use super::lattice::LatticeNode;
 use super::lattice::{CoarseVectors, MAX_FUNCTIONS, node_place, rank_of};
@@ -22,38 +23,21 @@ use crate::element::{ElementMaterial, NodeInertia};
 use crate::simd::NodeVector;
 use crate::step::{Threads, Totals, Trial};
 
-/// `B` of a step.
-struct StepCompliance<'a, 'm> {
-    tables: &'a mut NodeTables<'m>,
+/// Nodes and what moves them in a step.
+#[derive(Clone, Copy)]
+struct MovedNodes<'a, 'm> {
     places: &'a [LatticeNode],
     inertia: &'a [NodeInertia],
-    /// With the scalar bounds of the nodes.
-    force: &'a [NodeVector],
-    scaling: &'a Scaling,
     /// `D^2` for forces, s^2.
     square: f32,
     /// The lattice and the share of `S^-1`, if it is in use.
     lattice: Option<(CoarseSpace<'a, 'm>, f32)>,
-    /// The functions that move the nodes, and the answer of the lattice between them, if they are few.
-    listed: ListedFunctions,
-    local: Option<LocalResponse<'a>>,
-    surface: Surface<'a>,
-    /// Sums of the vectors for each node of the surface, where triangles share nodes; else empty.
-    sums: &'a mut [NodeVector],
 }
 
-impl StepCompliance<'_, '_> {
+impl MovedNodes<'_, '_> {
     /// Ones along the free axes of a node.
     fn free(&self, node: usize) -> Vec3 {
         self.inertia.get(node).map_or(Vec3::ZERO, |inertia| inertia.free().truncate())
-    }
-
-    /// The motion of a node by its own inertia, m.
-    fn own(&self, node: usize, force: Vec3) -> Vec3 {
-        let closeness = row(self.tables.next_increment, rank_of(self.places, node))[3];
-        let mass = self.inertia.get(node).map_or(0.0, |inertia| inertia.mass);
-        let inertia = self.scaling.inertia(mass, closeness * row(self.force, node)[3]);
-        self.free(node) * force * (self.square / inertia)
     }
 
     /// Sums over the nodes of their vectors (N), for each function: kg m.
@@ -70,18 +54,6 @@ impl StepCompliance<'_, '_> {
         }
     }
 
-    /// The motion of the lattice by the vectors of the nodes. None without one.
-    fn coarse(&self, points: &[TouchedPoint]) -> Option<CoarseVectors> {
-        let (space, share) = self.lattice.as_ref()?;
-        let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-        self.add_sums(points, |function, residual| {
-            if let Some(NodeVector([x, y, z, _])) = sums.get_mut(function) {
-                (*x, *y, *z) = (*x + residual.x, *y + residual.y, *z + residual.z);
-            }
-        });
-        Some(scaled(space.solved(&sums), *share))
-    }
-
     /// The lattice's motion at a node, m, from that of its functions.
     fn at(&self, node: usize, moved: impl Fn(usize) -> Vec3) -> Vec3 {
         let (Some((space, _)), Some(place)) = (&self.lattice, node_place(self.places, node)) else {
@@ -89,6 +61,48 @@ impl StepCompliance<'_, '_> {
         };
         let weights = space.lattice.weights(place).into_iter().filter(|each| each.0 < MAX_FUNCTIONS);
         self.free(node) * weights.map(|(function, weight)| weight * moved(function)).sum::<Vec3>()
+    }
+}
+
+/// `B` of a step.
+struct StepCompliance<'a, 'm> {
+    nodes: MovedNodes<'a, 'm>,
+    tables: &'a mut NodeTables<'m>,
+    /// With the scalar bounds of the nodes.
+    force: &'a [NodeVector],
+    scaling: &'a Scaling,
+    /// The motion of the lattice's functions.
+    moved: &'a mut CoarseVectors,
+    /// The functions that move the nodes, and the answer of the lattice between them, if they are few.
+    listed: ListedFunctions,
+    local: Option<LocalResponse<'a>>,
+    surface: Surface<'a>,
+    /// Sums of the vectors for each node of the surface, where triangles share nodes; else empty.
+    sums: &'a mut [NodeVector],
+}
+
+impl StepCompliance<'_, '_> {
+    /// The motion of a node by its own inertia, m.
+    fn own(&self, node: usize, force: Vec3) -> Vec3 {
+        let closeness = row(self.tables.next_increment, rank_of(self.nodes.places, node))[3];
+        let mass = self.nodes.inertia.get(node).map_or(0.0, |inertia| inertia.mass);
+        let inertia = self.scaling.inertia(mass, closeness * row(self.force, node)[3]);
+        self.nodes.free(node) * force * (self.nodes.square / inertia)
+    }
+
+    /// Moves the lattice by the vectors of the nodes.
+    fn move_lattice(&mut self, points: &[TouchedPoint]) {
+        let Self { nodes, moved, .. } = self;
+        moved.fill(NodeVector::ZERO);
+        nodes.add_sums(points, |function, residual| {
+            if let Some(NodeVector([x, y, z, _])) = moved.get_mut(function) {
+                (*x, *y, *z) = (*x + residual.x, *y + residual.y, *z + residual.z);
+            }
+        });
+        if let Some((space, share)) = nodes.lattice {
+            space.solve(moved);
+            moved.iter_mut().flat_map(|vector| &mut vector.0).for_each(|value| *value *= share);
+        }
     }
 
     /// Replaces the vectors of the points (N) by their motions by the inertia of their nodes and that of the lattice.
@@ -98,7 +112,7 @@ impl StepCompliance<'_, '_> {
             let places = self.surface.corner_places(touched.place as usize);
             let motions = touched.corners().zip(places).map(|((node, share), place)| {
                 let force = self.sums.get(place).map_or(vector, |sum| sum.to_array().into());
-                share * (self.own(node, force) + self.at(node, &moved))
+                share * (self.own(node, force) + self.nodes.at(node, &moved))
             });
             touched.vector = motions.sum::<Vec3>().to_array();
         }
@@ -133,13 +147,14 @@ impl StepCompliance<'_, '_> {
 impl Compliance for StepCompliance<'_, '_> {
     fn apply(&mut self, nodes: &mut [TouchedPoint]) {
         self.sum_at_nodes(nodes);
-        let Some((_, share)) = self.lattice else { return self.replace(nodes, |_| Vec3::ZERO) };
+        let Some((_, share)) = self.nodes.lattice else { return self.replace(nodes, |_| Vec3::ZERO) };
         let Some(local) = &self.local else {
-            let moved = self.coarse(nodes).unwrap_or([NodeVector::ZERO; _]);
-            return self.replace(nodes, |function| moved.get(function).copied().unwrap_or_default().to_array().into());
+            self.move_lattice(nodes);
+            return self
+                .replace(nodes, |function| self.moved.get(function).copied().unwrap_or_default().to_array().into());
         };
         let mut sums = [Vec3::ZERO; MOST_LISTED];
-        self.add_sums(nodes, |function, residual| {
+        self.nodes.add_sums(nodes, |function, residual| {
             if let Some(sum) = self.listed.place(function).and_then(|place| sums.get_mut(place)) {
                 *sum += residual;
             }
@@ -156,7 +171,8 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
     #[inline(never)]
     pub(super) fn meet_instruments<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>, totals: &mut Totals) {
         let Some(contact) = trial.loads.contact() else { return };
-        let Self { threads, step, model, storage: Storage { tables, places, matrices, .. }, response, .. } = self;
+        let Self { threads, step, model, storage, response, .. } = self;
+        let Storage { tables, places, matrices, room: CoarseRoom { motion: moved, .. } } = storage;
         trial.find_touched(contact, step, tables.next_increment, |node| rank_of(places, node));
         if trial.touched == 0 {
             trial.report_touches(contact, step, totals, |_| [0.0; 4]);
@@ -168,10 +184,10 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let lattice = response.map(|share| (space, share));
         let (SolverRoom { touched, local: room, sums }, force) = trial.solver_room_and_forces();
         let listed = ListedFunctions::of(touched, places, &model.lattice);
-        let local = lattice.as_ref().and_then(|(space, _)| LocalResponse::gathered(room, &listed, space));
+        let local = lattice.as_ref().and_then(|(space, _)| LocalResponse::gathered(room, &listed, space, moved));
         let (surface, scaling) = (contact.surface(), &model.scaling);
-        let mut compliance =
-            StepCompliance { tables, places, inertia, force, scaling, square, lattice, listed, local, surface, sums };
+        let nodes = MovedNodes { places, inertia, square, lattice };
+        let mut compliance = StepCompliance { nodes, tables, force, scaling, moved, listed, local, surface, sums };
         // What the lattice adds is nearly the same at all points of an instrument, and the scale only makes light and
         // heavy ones alike.
         let (mut instrument, mut coarse) = (u32::MAX, 0.0);
@@ -191,14 +207,14 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         for each in &mut *touched {
             each.vector = (Vec3::from_array(each.push) - Vec3::from_array(each.before)).to_array();
         }
-        let moved = compliance.coarse(touched);
+        compliance.move_lattice(touched);
         for (each, (node, share)) in touched.iter().flat_map(|each| each.corners().map(move |at| (each, at))) {
             let change = compliance.own(node, share * Vec3::from_array(each.vector));
             if let Some(next) = compliance.tables.next_increment.get_mut(rank_of(places, node)) {
                 next.0.iter_mut().zip(change.to_array()).for_each(|(next, moved)| *next += moved);
             }
         }
-        prolong(&moved.unwrap_or([NodeVector::ZERO; _]), &model.lattice, matrices.cells);
+        prolong(moved, &model.lattice, matrices.cells);
         trial.add_changes_of_pushes();
         let residual = ResidualFactors::new(step, model, trial.progress);
         let Trial { scene, increment, force, .. } = trial;
@@ -211,10 +227,4 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
 
 fn row(table: &[NodeVector], rank: usize) -> [f32; 4] {
     table.get(rank).copied().unwrap_or_default().0
-}
-
-/// Vectors times a factor.
-fn scaled(mut vectors: CoarseVectors, factor: f32) -> CoarseVectors {
-    vectors.iter_mut().flat_map(|vector| &mut vector.0).for_each(|value| *value *= factor);
-    vectors
 }

@@ -2,9 +2,11 @@
 //! deformation gradient of a tetrahedron of four of its nodes. `S` is used in the frames in which it was computed: its
 //! added inertia is ten thousand times the mass, and resists a rotation if it is behind it by a few degrees.
 
+use bytemuck::{Pod, Zeroable};
 use glam::Mat3;
 
-use super::lattice::{Lattice, MAX_FUNCTIONS};
+use super::lattice::Lattice;
+use crate::copy::copy;
 use crate::simd::NodeVector;
 
 /// A 3 x 3 matrix by rows.
@@ -13,48 +15,38 @@ pub(super) type Matrix = [[f32; 3]; 3];
 const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// Four nodes that define a frame, and the inverse of the matrix of their edges at rest, 1/m.
-#[derive(Clone, Copy, Debug)]
-struct FrameNodes {
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct FrameNodes {
     nodes: [u32; 4],
     inverse: Matrix,
 }
 
-/// The frames of the functions.
-#[derive(Clone, Debug)]
-pub(super) struct Frames {
-    functions: usize,
-    nodes: [FrameNodes; MAX_FUNCTIONS],
-    latest: [Matrix; MAX_FUNCTIONS],
+/// The frames of the functions, in the caller's storage.
+pub(super) struct Frames<'a> {
+    pub(super) nodes: &'a mut [FrameNodes],
+    pub(super) latest: &'a mut [Matrix],
     /// Rotations in the latest step.
-    in_latest_step: [Matrix; MAX_FUNCTIONS],
+    pub(super) in_latest_step: &'a mut [Matrix],
     /// Frames when `S` was computed, and rotations since.
-    of_stiffness: [Matrix; MAX_FUNCTIONS],
-    since_stiffness: [Matrix; MAX_FUNCTIONS],
+    pub(super) of_stiffness: &'a mut [Matrix],
+    pub(super) since_stiffness: &'a mut [Matrix],
 }
 
-impl Frames {
-    pub(super) const NONE: Self = Self {
-        functions: 0,
-        nodes: [FrameNodes { nodes: [0; 4], inverse: [[0.0; 3]; 3] }; MAX_FUNCTIONS],
-        latest: [IDENTITY; MAX_FUNCTIONS],
-        in_latest_step: [IDENTITY; MAX_FUNCTIONS],
-        of_stiffness: [IDENTITY; MAX_FUNCTIONS],
-        since_stiffness: [IDENTITY; MAX_FUNCTIONS],
-    };
-
+impl Frames<'_> {
     /// Chooses four nodes for each function, far apart from each other.
     pub(super) fn choose(&mut self, lattice: &Lattice, points: &[[f32; 3]]) {
-        self.functions = lattice.functions();
-        for (function, nodes) in self.nodes.iter_mut().enumerate().take(self.functions) {
+        for (function, nodes) in self.nodes.iter_mut().enumerate() {
             *nodes = choose(function, lattice, points);
         }
+        self.latest.fill(IDENTITY);
     }
 
     /// Computes the present frames and rotations.
     pub(super) fn update(&mut self, displacement: &[NodeVector]) {
-        let turns = self.latest.iter_mut().zip(&mut self.in_latest_step);
-        let since = self.of_stiffness.iter().zip(&mut self.since_stiffness);
-        for ((nodes, (latest, turn)), (start, since)) in self.nodes.iter().zip(turns).zip(since).take(self.functions) {
+        let turns = self.latest.iter_mut().zip(&mut *self.in_latest_step);
+        let since = self.of_stiffness.iter().zip(&mut *self.since_stiffness);
+        for ((nodes, (latest, turn)), (start, since)) in self.nodes.iter().zip(turns).zip(since) {
             // A collapsed tetrahedron has no frame: the last one is kept.
             let previous = *latest;
             if let Some(basis) = nodes.basis(displacement) {
@@ -67,8 +59,8 @@ impl Frames {
 
     /// `S` is computed in the present frames.
     pub(super) fn start_stiffness(&mut self) {
-        self.of_stiffness = self.latest;
-        self.since_stiffness = [IDENTITY; MAX_FUNCTIONS];
+        copy(self.of_stiffness, self.latest);
+        self.since_stiffness.fill(IDENTITY);
     }
 
     /// Rotation of a function since `S` was computed.
@@ -87,7 +79,7 @@ impl Frames {
 
     /// Rotation of each function since rest.
     pub(super) fn since_rest(&self) -> &[Matrix] {
-        self.latest.get(..self.functions).unwrap_or_default()
+        self.latest
     }
 }
 

@@ -14,6 +14,7 @@ use crate::state::{Moment, Progress, StateView};
 use crate::step::{CallingThread, Status, Step, Threads, internal_forces, nodal_volumes};
 use crate::tled::each_rate;
 
+use super::coarse_room::CoarseRoom;
 use super::damper::RoughMotion;
 use super::lattice::{Grid, Lattice, LatticeNode, node_at, sort_by_cell};
 use super::matrices::{Bands, Matrices};
@@ -52,6 +53,7 @@ pub(super) struct Storage<'a> {
     pub(super) tables: NodeTables<'a>,
     pub(super) places: &'a mut [LatticeNode],
     pub(super) matrices: Matrices<'a>,
+    pub(super) room: CoarseRoom<'a>,
 }
 
 impl<'a> Storage<'a> {
@@ -63,13 +65,14 @@ impl<'a> Storage<'a> {
         lattice: &Lattice,
         bands: &Bands,
     ) -> Option<Self> {
-        let (tables, rest) = storage.split_at_mut_checked(node_tables::vectors_for(nodes))?;
+        let (room, rest) = CoarseRoom::split(storage)?;
+        let (tables, rest) = rest.split_at_mut_checked(node_tables::vectors_for(nodes))?;
         let tables = NodeTables::split(tables, nodes)?;
         let (places, rest) = rest.split_at_mut_checked(vectors_of_places(nodes))?;
         let places: &mut [[LatticeNode; 2]] = must_cast_slice_mut(places.as_chunks_mut::<3>().0);
         let places = places.as_flattened_mut().get_mut(..nodes)?;
         let matrices = Matrices::split(rest, lattice, bands, pieces(element, nodes, elements))?;
-        Some(Self { tables, places, matrices })
+        Some(Self { tables, places, matrices, room })
     }
 }
 
@@ -91,7 +94,7 @@ impl<'w> LargeModel<'w> {
         Ok(model)
     }
 
-    /// The same where the model shall stay, for hosts with little stack: a model has 38 kB.
+    /// The same where the model shall stay, for hosts with little stack: a model has 10 kB.
     pub fn prepare_in<'m, M: ElementMaterial>(
         place: &'m mut MaybeUninit<Self>,
         method: Method<'w>,
@@ -102,7 +105,7 @@ impl<'w> LargeModel<'w> {
         storage: &mut [NodeVector],
     ) -> Result<&'m mut Self, InertiaError> {
         let grid = checked_grid(&method, scene, points)?;
-        let model = place.write(Self::new(method, scene, step));
+        let model = Self::new_in(place, method, scene, step);
         model.first_cycles(grid, scene, points, state, storage)?;
         Ok(model)
     }
@@ -127,12 +130,20 @@ impl<'w> LargeModel<'w> {
                 return answer;
             }
             grid = coarser;
-            (self.lattice, self.renewal) = (Lattice::NONE, Renewal::NEW);
         }
     }
 
-    /// A model without its lattice. Always inlined: it is made where it stays.
-    #[inline(always)]
+    /// A model without its lattice. Not inlined: the stack on which it may be made first is free again afterwards.
+    #[inline(never)]
+    fn new_in<'m, M: ElementMaterial>(
+        place: &'m mut MaybeUninit<Self>,
+        method: Method<'w>,
+        scene: SceneView<'_, M>,
+        step: Step,
+    ) -> &'m mut Self {
+        place.write(Self::new(method, scene, step))
+    }
+
     fn new<M: ElementMaterial>(method: Method<'w>, scene: SceneView<'_, M>, step: Step) -> Self {
         Self {
             nodes: scene.node_count(),
@@ -172,7 +183,7 @@ impl<'w> LargeModel<'w> {
         check("nodes in the state", nodes, state.capacity_for(scene.element()))?;
         storage.fill(NodeVector::ZERO);
         let (lattice, sizes) = (&self.lattice, [nodes, self.elements]);
-        let Some(Storage { mut tables, places, mut matrices }) =
+        let Some(Storage { mut tables, places, mut matrices, .. }) =
             Storage::split(storage, scene.element(), sizes, lattice, &self.renewal.bands)
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
@@ -188,7 +199,7 @@ impl<'w> LargeModel<'w> {
         if !matrices.write_constants(scene, lattice, places, &mut self.renewal) {
             return singular;
         }
-        self.renewal.frames.choose(lattice, points);
+        matrices.frames.choose(lattice, points);
         self.moment = progress.moment();
         let displacement = displacement.get(..nodes).unwrap_or_default();
         nodal_volumes(scene, displacement, &[], volume, &CallingThread);

@@ -237,7 +237,7 @@ impl Lattice {
         Ok(Self::new(cells, points, inertia)?.functions)
     }
 
-    /// Makes [`Self::NONE`] such a lattice.
+    /// Makes this such a lattice.
     #[inline(never)]
     pub(super) fn set(
         &mut self,
@@ -250,7 +250,7 @@ impl Lattice {
         if !fits {
             return Err(InertiaError::Cells { cells });
         }
-        self.cells = cells;
+        (self.cells, self.functions, self.light_points) = (cells, 0, 0);
         (self.low, self.size) = bounding_box(points);
         let [along, across, _] = cells.map(|count| (count as usize).max(1));
         for (cell, indices) in self.indices_of_cell.iter_mut().enumerate() {

@@ -7,6 +7,7 @@ use super::band::{Band, Row, factorise, solve};
 use super::cells::CellPolynomial;
 use super::clusters::{Cluster, ClusterInput, ClusterRoom, Clusters, PairMatrices, for_each_pair};
 use super::coarse_stiffness::{AxisMatrices, ClusterTangent};
+use super::frames::{FrameNodes, Frames, Matrix};
 use super::lattice::{CoarseVectors, Grid, Lattice, LatticeNode, MAX_FUNCTIONS};
 use super::renewal::Renewal;
 use super::transport::factorise_edges;
@@ -38,6 +39,7 @@ pub(super) struct Matrices<'a> {
     pub(super) mass_factors: &'a mut [f32],
     /// See [`super::transport`].
     pub(super) edge_factor: &'a mut [f32],
+    pub(super) frames: Frames<'a>,
     /// `(1 + k) Mc + E` of each cell.
     pub(super) inertia: &'a mut [AxisMatrices],
     /// The stiffness of each cell.
@@ -70,6 +72,8 @@ pub(super) fn vectors_for(grid: Grid, pieces: [usize; 2]) -> usize {
         vectors_of::<f32>(Band::most_scratch_floats(grid.functions)),
         vectors_of::<f32>(scalar_band.saturating_mul(3)),
         vectors_of::<f32>(scalar_band),
+        vectors_of::<FrameNodes>(grid.functions),
+        4 * vectors_of::<Matrix>(grid.functions),
         vectors_of::<AxisMatrices>(cells),
         vectors_of::<PairMatrices>(cells),
         vectors_of::<f32>(cells),
@@ -101,13 +105,20 @@ impl<'a> Matrices<'a> {
         bands: &Bands,
         pieces: [usize; 2],
     ) -> Option<Self> {
-        let (rest, cells) = (&mut rest, lattice.cell_count());
+        let (rest, cells, functions) = (&mut rest, lattice.cell_count(), lattice.functions());
         let room = ClusterRoom::new(cells, pieces);
         Some(Self {
             factor: take(rest, bands.vectors.floats())?,
             scratch: take(rest, bands.vectors.scratch_floats())?,
             mass_factors: take(rest, 3 * bands.scalars.floats())?,
             edge_factor: take(rest, bands.scalars.floats())?,
+            frames: Frames {
+                nodes: take(rest, functions)?,
+                latest: take(rest, functions)?,
+                in_latest_step: take(rest, functions)?,
+                of_stiffness: take(rest, functions)?,
+                since_stiffness: take(rest, functions)?,
+            },
             inertia: take(rest, cells)?,
             stiffness: take(rest, cells)?,
             bounds: take(rest, cells)?,
@@ -168,10 +179,10 @@ impl<'a> Matrices<'a> {
         is_sound && factorise_edges(band, edge_factor, scratch, lattice, &held_shares(scene, lattice, places))
     }
 
-    /// `((1 + k) Mc + E) x` for vectors of the functions.
+    /// Writes `((1 + k) Mc + E) x` for vectors of the functions.
     #[inline(never)]
-    pub(super) fn times_inertia(&self, lattice: &Lattice, x: &CoarseVectors) -> CoarseVectors {
-        let mut out = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+    pub(super) fn times_inertia(&self, lattice: &Lattice, x: &CoarseVectors, out: &mut CoarseVectors) {
+        out.fill(NodeVector::ZERO);
         for (cell, matrices) in self.inertia.iter().enumerate() {
             let functions = lattice.functions_of(cell);
             let mut at = [Vec4::ZERO; 8];
@@ -188,7 +199,6 @@ impl<'a> Matrices<'a> {
                 }
             }
         }
-        out
     }
 
     /// Replaces vectors of the functions by `Mc^-1` times them.

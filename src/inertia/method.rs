@@ -6,7 +6,7 @@ use crate::simd::NodeVector;
 
 use super::damper::Damper;
 use super::lattice::{self, Grid, Lattice, LatticeNode};
-use super::{InertiaError, matrices, node_tables};
+use super::{InertiaError, coarse_room, matrices, node_tables};
 
 /// How to step beyond the critical step: smooth motion keeps its true inertia through a coarse lattice, and a small
 /// network damps rough motion, which the lattice cannot represent.
@@ -77,7 +77,9 @@ pub fn vectors_for<M: Material>(
 #[must_use]
 pub fn vectors_for_lattice(element: Element, nodes: usize, elements: usize, grid: Grid) -> usize {
     let lists = node_tables::vectors_for(nodes).saturating_add(vectors_of_places(nodes));
-    lists.saturating_add(matrices::vectors_for(grid, pieces(element, nodes, elements)))
+    coarse_room::VECTORS
+        .saturating_add(lists)
+        .saturating_add(matrices::vectors_for(grid, pieces(element, nodes, elements)))
 }
 
 /// Elements, and patches with nodal strain, of a scene, or more than that.

@@ -88,6 +88,7 @@ mod band_tests;
 mod cells;
 mod clusters;
 mod coarse_motion;
+mod coarse_room;
 mod coarse_stiffness;
 #[cfg(test)]
 mod coarse_stiffness_tests;

@@ -44,7 +44,6 @@ pub(super) struct Renewal {
     pub(super) tiles: usize,
     /// See [`super::clusters::ClusterInput::is_merged`].
     pub(super) is_merged: bool,
-    pub(super) frames: Frames,
     /// Step count of the state for which the frames were computed.
     frames_at: Option<u64>,
     /// The lattice's motion since `S` was computed (m), and how far its shape has changed.
@@ -89,7 +88,6 @@ impl Renewal {
         clusters: 0,
         tiles: 0,
         is_merged: false,
-        frames: Frames::NONE,
         frames_at: None,
         moved: [NodeVector::ZERO; _],
         changed: 0.0,
@@ -111,22 +109,22 @@ impl Renewal {
     }
 
     /// Computes the frames, unless that was done for this state, which has taken `steps` steps.
-    pub(super) fn update_frames(&mut self, displacement: &[NodeVector], steps: u64) {
+    pub(super) fn update_frames(&mut self, frames: &mut Frames<'_>, displacement: &[NodeVector], steps: u64) {
         if self.frames_at != Some(steps) {
-            self.frames.update(displacement);
+            frames.update(displacement);
             self.frames_at = Some(steps);
         }
     }
 
     /// Enters the lattice's part of a step's increments, m.
-    pub(super) fn enter(&mut self, increments: &CoarseVectors, lattice: &Lattice) {
+    pub(super) fn enter(&mut self, increments: &CoarseVectors, lattice: &Lattice, frames: &Frames<'_>) {
         for (sum, increment) in self.moved.iter_mut().zip(increments) {
             sum.0 = (Vec4::from(sum.0) + Vec4::from(increment.0)).to_array();
         }
-        let rotations = self.frames.since_rest();
+        let rotations = frames.since_rest();
         let strain = lattice.largest_strain(increments, rotations);
         self.pace = strain * self.sensitivity / LARGEST_CHANGE_OF_STEP;
-        let bending = lattice.largest_bending(|function| self.frames.since_stiffness(function));
+        let bending = lattice.largest_bending(|function| frames.since_stiffness(function));
         self.changed = lattice.largest_strain(&self.moved, rotations) + bending;
     }
 
@@ -157,7 +155,7 @@ impl Renewal {
         matrices: &mut Matrices<'_>,
         threads: &impl Threads,
     ) {
-        let Matrices { factor, scratch, inertia, stiffness, clusters, tangents, of_clusters, .. } = matrices;
+        let Matrices { factor, scratch, frames, inertia, stiffness, clusters, tangents, of_clusters, .. } = matrices;
         let tiles = clusters.tiles.get(..self.tiles).unwrap_or_default();
         write_tangents(input, tiles, tangents, threads);
         self.sensitivity = sensitivity(tangents.get(..TILE * tiles.len()).unwrap_or_default()).max(LEAST_SENSITIVITY);
@@ -178,7 +176,7 @@ impl Renewal {
         }
         self.lattice_in_use = factorise(band, factor, scratch);
         (self.moved, self.changed) = ([NodeVector::ZERO; _], 0.0);
-        self.frames.start_stiffness();
+        frames.start_stiffness();
     }
 
     /// Computes everything anew for a state that does not follow from the last one, or for another length of steps.
@@ -192,8 +190,8 @@ impl Renewal {
     ) {
         let RenewalInput { scene, displacement, volume, lattice, places, scaling } = input;
         // Twice: no rotation in the latest step.
-        self.frames.update(displacement);
-        self.frames.update(displacement);
+        matrices.frames.update(displacement);
+        matrices.frames.update(displacement);
         (self.frames_at, self.pace) = (None, 0.0);
         let NodeTables { next_increment, scratch, .. } = tables;
         scratch.fill(NodeVector::ZERO);

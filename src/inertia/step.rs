@@ -16,6 +16,7 @@ use crate::step::{
 use super::cells::{prolong, restrict};
 use super::clusters::ClusterInput;
 use super::coarse_motion::{CoarseMotion, CoarseSpace, MotionResult, removed_share};
+use super::coarse_room::CoarseRoom;
 use super::damper::RoughMotion;
 use super::large_step::{LargeModel, LargeView, Storage};
 use super::lattice::{CoarseVectors, Lattice, rank_of};
@@ -90,8 +91,6 @@ pub(super) struct InertiaStep<'a, 'w, T> {
     rough_written: bool,
     coarse_share: f32,
     damping: f32,
-    /// The lattice's part of the next increments.
-    smooth: CoarseVectors,
     /// The share of `S^-1` in this step, if the lattice is in use.
     pub(super) response: Option<f32>,
 }
@@ -108,7 +107,6 @@ impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
             rough_written: false,
             coarse_share: 1.0,
             damping: 0.0,
-            smooth: [NodeVector::ZERO; _],
             response: None,
         }
     }
@@ -129,7 +127,8 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
             look_cycle: 1,
         };
         let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
-        self.model.renewal.update_frames(displacement, progress.steps);
+        let frames = &mut self.storage.matrices.frames;
+        self.model.renewal.update_frames(frames, displacement, progress.steps);
         trial.add_pushes_before(self.step);
         let moved = self.move_lattice(trial);
         let mut totals = self.move_nodes(trial, &moved);
@@ -173,10 +172,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
 
     #[inline(never)]
     fn finish(&mut self, trial: &mut Trial<'_, M>) -> bool {
-        let Self { model, held_back, coarse_share, .. } = self;
+        let Self { model, storage, held_back, coarse_share, .. } = self;
         let LargeModel { lattice, renewal, report, nodes, moment, .. } = &mut **model;
         *moment = trial.progress.moment();
-        renewal.enter(&self.smooth, lattice);
+        renewal.enter(storage.room.part, lattice, &storage.matrices.frames);
         *report = renewal.added.report(held_back.nodes, *coarse_share, self.damping);
         held_back.unused > LARGEST_UNUSED * *nodes as f32 || *coarse_share < LEAST_COARSE_SHARE
     }
@@ -202,7 +201,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
     /// steps was changed.
     #[inline(never)]
     fn renew_if_stale<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) {
-        let Self { model, threads, storage: Storage { tables, places, matrices }, .. } = self;
+        let Self { model, threads, storage: Storage { tables, places, matrices, .. }, .. } = self;
         let LargeModel { lattice, renewal, scaling, rough, moment, is_for_other_step, .. } = &mut **model;
         let Trial { scene, displacement, volume, progress, .. } = trial;
         let follows = *moment == progress.moment();
@@ -223,7 +222,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
     /// Computes the motion of the lattice.
     #[inline(never)]
     fn move_lattice<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) -> MovedLattice {
-        let Self { step, model, threads, storage: Storage { tables, places, matrices }, .. } = self;
+        let Self { step, model, threads, storage: Storage { tables, places, matrices, room }, .. } = self;
         let residual = ResidualFactors::new(step, model, trial.progress);
         let LargeModel { lattice, renewal, scaling, rough, method, .. } = &mut **model;
         let Trial { scene, loads, displacement, increment, force, volume, progress, .. } = trial;
@@ -231,11 +230,14 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
         let largest = node_parts(&scene, *threads).restrict(input, force, cells, momentum);
-        let forces = restrict(matrices.cells, lattice);
+        let CoarseRoom { motion, part, pull, scratch } = room;
+        restrict(matrices.cells, lattice, motion);
         let stiffness = RenewalInput { scene, displacement, volume, lattice, places, scaling };
         renewal.renew_if_due(stiffness, matrices, *threads);
         if !renewal.lattice_in_use {
-            prolong(&[NodeVector::ZERO; _], lattice, matrices.cells);
+            motion.fill(NodeVector::ZERO);
+            part.fill(NodeVector::ZERO);
+            prolong(motion, lattice, matrices.cells);
             self.coarse_share = 0.0;
             return MovedLattice { has_smooth: false, removed: 0.0, work: 0.0 };
         }
@@ -246,22 +248,24 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             tangents: matrices.of_clusters,
             displacement,
         };
-        let supports = supports.pull(loads, progress.time, step, increment, tables.scratch);
-        let smooth = smooth_motion(matrices, lattice, &renewal.bands, largest);
-        let motion = CoarseMotion {
+        let pull = pull.each_mut().map(|vectors| &mut **vectors);
+        let supports = supports.pull(loads, progress.time, step, increment, tables.scratch, pull);
+        let has_part = write_part(matrices, lattice, &renewal.bands, largest, part);
+        let coarse = CoarseMotion {
             space: CoarseSpace { lattice, renewal, matrices },
-            smooth: smooth.as_ref(),
+            has_part,
             supports: supports.as_ref(),
             allowed: progress.energy_balance.allowed_share(),
             largest_strain: if scene.element().is_nodal_strain() { LARGEST_STRAIN_OF_PATCHES } else { LARGEST_STRAIN },
         };
-        let MotionResult { motion: moved, share, next, work } = motion.compute(&forces);
-        let removed = removed_share(share.min(motion.allowed));
-        prolong(&moved, lattice, matrices.cells);
+        let MotionResult { share, work } =
+            coarse.compute(motion, part, scratch.each_mut().map(|vectors| &mut **vectors));
+        let removed = removed_share(share.min(coarse.allowed));
+        prolong(motion, lattice, matrices.cells);
         self.damping = step.carry() * method.damper.share(rough, half_damping(step));
-        (self.smooth, self.coarse_share, self.response) = (next, share, Some(share));
+        (self.coarse_share, self.response) = (share, Some(share));
         MovedLattice {
-            has_smooth: smooth.is_some(),
+            has_smooth: has_part,
             removed: self.damping.max(removed),
             work: work / (step.seconds() * step.seconds()),
         }
@@ -291,16 +295,22 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
 /// may lie outside the body.
 const LARGEST_SMOOTH: f32 = 10.0;
 
-/// The lattice's part `c = Mc^-1 W^T m du` of the increments. Turns the cells' sums of momentum into the smooth part of
-/// the increments, of which `largest` is the largest component, `W` times that. To remove a share of the rest changes
-/// no momentum of the lattice, so neither that of the body. None if the result is not plausible.
-fn smooth_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, bands: &Bands, largest: f32) -> Option<CoarseVectors> {
-    let mut motion = restrict(matrices.smooth_cells, lattice);
-    matrices.divide_by_mass(&bands.scalars, &mut motion, lattice);
+/// Writes the lattice's part `c = Mc^-1 W^T m du` of the increments. Turns the cells' sums of momentum into the smooth
+/// part of the increments, of which `largest` is the largest component, `W` times that. To remove a share of the rest
+/// changes no momentum of the lattice, so neither that of the body. Gives whether the result is plausible.
+fn write_part(
+    matrices: &mut Matrices<'_>,
+    lattice: &Lattice,
+    bands: &Bands,
+    largest: f32,
+    part: &mut CoarseVectors,
+) -> bool {
+    restrict(matrices.smooth_cells, lattice, part);
+    matrices.divide_by_mass(&bands.scalars, part, lattice);
     let limit = Vec4::splat(LARGEST_SMOOTH * largest);
-    if !motion.iter().all(|vector| Vec4::from(vector.0).abs().cmple(limit).all()) {
-        return None;
+    if !part.iter().all(|vector| Vec4::from(vector.0).abs().cmple(limit).all()) {
+        return false;
     }
-    prolong(&motion, lattice, matrices.smooth_cells);
-    Some(motion)
+    prolong(part, lattice, matrices.smooth_cells);
+    true
 }

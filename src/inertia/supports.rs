@@ -17,28 +17,28 @@ use glam::Vec4;
 use super::clusters::{ClusterInput, Clusters, NO_TILE, Piece};
 use super::coarse_motion::inner;
 use super::coarse_stiffness::ClusterTangent;
-use super::lattice::{CoarseVectors, MAX_FUNCTIONS};
+use super::lattice::CoarseVectors;
 use crate::element::ElementMaterial;
 use crate::loads::Loads;
 use crate::simd::NodeVector;
 use crate::step::Step;
 
 /// What moving supports do to the lattice, with the change `d` of their increments and their last increments `e`.
-pub(super) struct Pull {
+pub(super) struct Pull<'a> {
     /// `-A_s d` and `-A_s e` for each function, kg m.
-    pub(super) residual: CoarseVectors,
-    pub(super) of_last: CoarseVectors,
+    pub(super) residual: &'a mut CoarseVectors,
+    pub(super) of_last: &'a mut CoarseVectors,
     /// `d A_ss d` and `e A_ss d`, kg m^2.
     pub(super) energy: f32,
     cross: f32,
 }
 
-impl Pull {
+impl Pull<'_> {
     /// Work of the supports on added inertia, times `D^2`, where the lattice's part of the increments changes by `dc`:
     /// kg m^2.
     pub(super) fn work(&self, change: &CoarseVectors) -> f32 {
         let along = |residual: &CoarseVectors| inner(residual, change);
-        self.cross + 0.5 * self.energy - along(&self.of_last) - 0.5 * along(&self.residual)
+        self.cross + 0.5 * self.energy - along(self.of_last) - 0.5 * along(self.residual)
     }
 }
 
@@ -55,14 +55,15 @@ impl<M: ElementMaterial> MovingSupports<'_, '_, M> {
     /// None if no support moves. `time` (s) is that of the state, `changes` are
     /// vectors of the nodes whose first three components are free.
     #[inline(never)]
-    pub(super) fn pull(
+    pub(super) fn pull<'r>(
         &self,
         loads: &Loads<'_>,
         time: f64,
         step: &Step,
         increment: &mut [NodeVector],
         changes: &mut [NodeVector],
-    ) -> Option<Pull> {
+        [residual, of_last]: [&'r mut CoarseVectors; 2],
+    ) -> Option<Pull<'r>> {
         if loads.motions().is_empty() {
             return None;
         }
@@ -81,8 +82,9 @@ impl<M: ElementMaterial> MovingSupports<'_, '_, M> {
         if !moves {
             return None;
         }
-        let none = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
-        let mut pull = Pull { residual: none, of_last: none, energy: 0.0, cross: 0.0 };
+        residual.fill(NodeVector::ZERO);
+        of_last.fill(NodeVector::ZERO);
+        let mut pull = Pull { residual, of_last, energy: 0.0, cross: 0.0 };
         let (scene, clusters) = (self.input.scene, self.clusters);
         let last = |node: usize| {
             let held =
@@ -120,7 +122,7 @@ impl<M: ElementMaterial> MovingSupports<'_, '_, M> {
         cell: usize,
         [change, last]: [[[f32; 3]; 3]; 2],
         [of_change, of_last]: [[f32; 9]; 2],
-        pull: &mut Pull,
+        pull: &mut Pull<'_>,
     ) {
         let gradients = self.input.gradients(piece, cell);
         let functions = self.input.lattice.functions_of(cell);

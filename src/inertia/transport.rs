@@ -56,7 +56,7 @@ pub(super) fn factorise_edges(
 pub(super) fn turned_part(
     c: &CoarseVectors,
     lattice: &Lattice,
-    frames: &Frames,
+    frames: &Frames<'_>,
     band: &Band,
     factor: &[f32],
 ) -> CoarseVectors {
