@@ -231,13 +231,12 @@ fn held_shares<M: ElementMaterial>(
     let mut sums = [[0.0f32; 2]; MAX_FUNCTIONS];
     for place in places {
         let is_held = scene.inertia.get(place.node()).is_some_and(|inertia| inertia.held_count() > 0);
-        for (number, weight) in lattice.weights(place) {
-            lattice.each_function(number, |function, share| {
-                if let Some([held, all]) = sums.get_mut(function) {
-                    *all += share * weight;
-                    *held += if is_held { share * weight } else { 0.0 };
-                }
-            });
+        for (function, weight) in lattice.weights(place) {
+            // Not those of light points, whose parts in a function may be negative.
+            if let Some([held, all]) = sums.get_mut(function).filter(|_| !lattice.is_light(function)) {
+                *all += weight;
+                *held += if is_held { weight } else { 0.0 };
+            }
         }
     }
     sums.map(|[held, all]| if all > 0.0 { held / all } else { 0.0 })

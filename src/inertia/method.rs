@@ -127,8 +127,10 @@ pub(super) const fn vectors_of_places(nodes: usize) -> usize {
     3 * nodes.div_ceil(2)
 }
 
-/// Least spacing of the points of a suggested lattice, as a multiple of the nodes'.
+/// Least spacing of the points of a suggested lattice, as a multiple of the edge of a cube of six elements: the coarse
+/// stiffness counts an element in one cell, and is too small for functions of which it is a large part.
 const LEAST_SPACING: f32 = 2.0;
+const ELEMENTS_OF_CUBE: f32 = 6.0;
 
 /// Least number of nodes for each function of a suggested lattice, and on meshes that are too small for that.
 const NODES_PER_FUNCTION: [usize; 2] = [4, 2];
@@ -148,8 +150,8 @@ pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], belo
 /// The largest suitable lattice with fewer than `below` functions.
 fn grid_below<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], below: usize) -> Grid {
     let volume: f32 = scene.places().map(|(tile, lane)| tile.volume::<f32>(lane)).sum();
-    let spacing = libm::cbrtf(volume / points.len().max(1) as f32);
-    let least = lattice::size_of(points).map(|size| LEAST_SPACING * spacing / size);
+    let edge = libm::cbrtf(ELEMENTS_OF_CUBE * volume / scene.element_count().max(1) as f32);
+    let least = lattice::size_of(points).map(|size| LEAST_SPACING * edge / size);
     let mut best = Grid::default();
     for cells in (1..64).flat_map(|parts| lattice::near_cubic(points, parts)) {
         if cells.iter().zip(least).any(|(&cells, least)| cells > 1 && cells as f32 * least > 1.0) {
