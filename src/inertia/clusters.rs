@@ -261,29 +261,7 @@ impl<'a> Piece<'a> {
         }
         lattice.cell_at(position)
     }
-
-    /// The cells that it counts in, and its share of each: that of its nodes that lie in the cell, where those on the
-    /// surface of the cell of its centre are in that.
-    pub(super) fn shares(
-        &self,
-        lattice: &Lattice,
-        places: &[LatticeNode],
-    ) -> impl Iterator<Item = (usize, f32)> + use<> {
-        let centre = self.cell(lattice, places);
-        let cells = self.nodes().map(|node| {
-            let place = node_place(places, node).copied().unwrap_or_default();
-            let is_inside = |at: f32| (-ON_SURFACE..=1.0 + ON_SURFACE).contains(&at);
-            if lattice.within(centre, &place).into_iter().all(is_inside) { centre } else { place.cell() }
-        });
-        (0..4).filter(move |&at| !cells[..at].contains(&cells[at])).map(move |at| {
-            let count = cells.iter().filter(|&&cell| cell == cells[at]).count();
-            (cells[at], 0.25 * count as f32)
-        })
-    }
 }
-
-/// How far outside a cell, in its length, a node still lies on its surface.
-const ON_SURFACE: f32 = 1e-3;
 
 /// The gradients of a cell's eight functions in a piece, 1/m, for motion along each axis.
 pub(super) type FunctionGradients = [[[f32; 3]; 8]; 3];
@@ -332,17 +310,12 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
         if self.is_merged { 0 } else { self.scene.material.laws().tissue(element) }
     }
 
-    /// All elements with the cells that they count in, and their shares of these.
-    fn shares(&self) -> impl Iterator<Item = (Piece<'_>, (usize, f32))> {
-        let pieces = self.scene.tiles.iter().flat_map(Piece::of_tile);
-        pieces.flat_map(|piece| piece.shares(self.lattice, self.places).map(move |share| (piece, share)))
-    }
-
     /// Makes the clusters. `None` if there is no room.
     pub(super) fn write(&self, clusters: &mut Clusters<'_>) -> Option<ClusterCounts> {
         clusters.heads.fill(0);
         let mut count = 0;
-        for (piece, (cell, share)) in self.shares() {
+        for piece in self.scene.tiles.iter().flat_map(Piece::of_tile) {
+            let cell = piece.cell(self.lattice, self.places);
             let index = match self.find(&piece, cell, clusters.all, clusters.heads) {
                 Some(index) => index,
                 None => {
@@ -356,7 +329,7 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
                 }
             };
             let cluster = clusters.all.get_mut(index)?;
-            cluster.volume += share * piece.volume();
+            cluster.volume += piece.volume();
             for node in piece.nodes() {
                 let [x, y, z] = [0, 1, 2].map(|axis| self.scene.held(node).has(axis));
                 cluster.differs |= u8::from(x != y) | u8::from(y != z) << 1 | u8::from(z != x) << 2;
@@ -368,14 +341,15 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
             sets = cluster.sets().end;
         }
         clusters.moments.get_mut(..sets)?.fill(PairMatrices::ZERO);
-        for (piece, (cell, share)) in self.shares() {
+        for piece in self.scene.tiles.iter().flat_map(Piece::of_tile) {
+            let cell = piece.cell(self.lattice, self.places);
             let cluster = clusters.all.get(self.find(&piece, cell, clusters.all, clusters.heads)?)?;
             let (of_axes, numbers, each) =
                 (self.gradients(&piece, cell), cluster.gradients(), cluster.gradient_count());
             let axis_of = |number: usize| numbers.iter().position(|&other| other == number).unwrap_or(0);
             for (set, moments) in clusters.moments.get_mut(cluster.sets())?.iter_mut().enumerate() {
                 let [first, second] = [set / each, set % each].map(|number| &of_axes[axis_of(number) % 3]);
-                add_moments(moments, share * piece.volume(), [first, second]);
+                add_moments(moments, piece.volume(), [first, second]);
             }
         }
         for cluster in clusters.all.get(..count).unwrap_or_default() {

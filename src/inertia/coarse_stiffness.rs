@@ -95,11 +95,11 @@ pub(super) fn tangent_of(cluster: &Cluster, members: &[u32], tangents: &[Tangent
     sums.tangent(cluster.factor())
 }
 
-/// Adds a share of the tangent of one more piece of a cluster.
-pub(super) fn add_tangent(sum: &mut ClusterTangent, tangent: &Tangent, share: f32) {
+/// Adds the tangent of one more piece of a cluster.
+pub(super) fn add_tangent(sum: &mut ClusterTangent, tangent: &Tangent) {
     let mut sums = Sums::NONE;
     sums.add(tangent);
-    sum.iter_mut().zip(sums.tangent(share)).for_each(|(sum, value)| *sum += value);
+    sum.iter_mut().zip(sums.tangent(1.0)).for_each(|(sum, value)| *sum += value);
 }
 
 /// Writes the matrices of a cell, from the tangents and moments of the clusters.

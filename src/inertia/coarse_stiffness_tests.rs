@@ -123,24 +123,9 @@ impl<M: ElementMaterial> Prepared<'_, '_, M> {
         let with_cell = elements.into_iter().map(|element| {
             let centre = [0, 1, 2].map(|axis| element.nodes.iter().map(|&node| self.position(node)[axis]).sum::<f64>());
             let cell = [0, 1, 2].map(|axis| ((0.25 * centre[axis]) as usize).min(CELLS[axis] as usize - 1));
-            // Each node takes a quarter to its cell, to that of the centre if it touches it.
-            let cells: Vec<[usize; 3]> = element
-                .nodes
-                .iter()
-                .map(|&node| {
-                    let at = self.position(node);
-                    let touches =
-                        |axis: usize| (cell[axis] as f64 - at[axis]).max(at[axis] - cell[axis] as f64 - 1.0) < 1e-3;
-                    if (0..3).all(touches) {
-                        return cell;
-                    }
-                    [0, 1, 2].map(|axis| (at[axis] as usize).min(CELLS[axis] as usize - 1))
-                })
-                .collect();
-            let nodes: Vec<_> = element.nodes.into_iter().zip(element.gradients).collect();
-            cells.into_iter().map(move |cell| (0.25 * element.volume, cell, nodes.clone())).collect::<Vec<_>>()
+            (element.volume, cell, element.nodes.into_iter().zip(element.gradients).collect())
         });
-        with_cell.flatten().collect()
+        with_cell.collect()
     }
 
     /// Adds `V G_c^T A G_d` of pieces, with the functions of their own cells.

@@ -263,12 +263,11 @@ fn add_crushed<M: ElementMaterial>(
     each_bounded(&scene.material.laws(), scene.tiles, displacement, |crushed| {
         let tangents = CrushedTangents { crushed, displacement: Gather::new(displacement), weight }.tangents();
         for piece in Piece::of_tile(&crushed.tile) {
-            for (cell, share) in piece.shares(lattice, places) {
-                if let Some(index) = of_element.find(&piece, cell, clusters.all, clusters.heads)
-                    && let Some(sum) = of_clusters.get_mut(index)
-                {
-                    add_tangent(sum, &tangents[piece.lane() % TILE], share);
-                }
+            let cell = piece.cell(lattice, places);
+            if let Some(index) = of_element.find(&piece, cell, clusters.all, clusters.heads)
+                && let Some(sum) = of_clusters.get_mut(index)
+            {
+                add_tangent(sum, &tangents[piece.lane() % TILE]);
             }
         }
     });

@@ -98,20 +98,19 @@ impl<M: ElementMaterial> MovingSupports<'_, '_, M> {
             if motions == [[[0.0; 3]; 3]; 2] {
                 continue;
             }
-            for (cell, of_piece) in piece.shares(self.input.lattice, self.input.places) {
-                let index = self.input.find(&piece, cell, clusters.all, clusters.heads);
-                let of_cluster = index.and_then(|index| Some((self.tangents.get(index)?, clusters.all.get(index)?)));
-                let Some((tangent, cluster)) = of_cluster else { continue };
-                let share = of_piece * piece.volume() / cluster.volume;
-                let stresses = motions.map(|motion| {
-                    let of_row = |row: &[f32; 9]| {
-                        share * row.iter().zip(motion.as_flattened()).map(|(factor, along)| factor * along).sum::<f32>()
-                    };
-                    let rows: &[[f32; 9]] = tangent.as_chunks().0;
-                    core::array::from_fn(|entry| rows.get(entry).map_or(0.0, of_row))
-                });
-                self.add(&piece, cell, motions, stresses, &mut pull);
-            }
+            let cell = piece.cell(self.input.lattice, self.input.places);
+            let index = self.input.find(&piece, cell, clusters.all, clusters.heads);
+            let of_cluster = index.and_then(|index| Some((self.tangents.get(index)?, clusters.all.get(index)?)));
+            let Some((tangent, cluster)) = of_cluster else { continue };
+            let share = piece.volume() / cluster.volume;
+            let stresses = motions.map(|motion| {
+                let of_row = |row: &[f32; 9]| {
+                    share * row.iter().zip(motion.as_flattened()).map(|(factor, along)| factor * along).sum::<f32>()
+                };
+                let rows: &[[f32; 9]] = tangent.as_chunks().0;
+                core::array::from_fn(|entry| rows.get(entry).map_or(0.0, of_row))
+            });
+            self.add(&piece, cell, motions, stresses, &mut pull);
         }
         Some(pull)
     }
