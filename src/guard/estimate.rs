@@ -152,7 +152,8 @@ impl Envelope {
         let Comparison { mean, largest, node, .. } = self.held?;
         let [mean, largest] = [(mean, self.growth[0]), (largest, self.growth[1])]
             .map(|(held, growth)| finite(ESTIMATE * (held + growth * self.waited).max(self.floor)));
-        Some(Estimate { mean, largest, node, allowed: self.allowed(mean) })
+        let apart = ESTIMATE * self.held.map_or(0.0, |held| held.mean);
+        Some(Estimate { mean, largest, node, allowed: self.allowed(apart) })
     }
 
     /// What is allowed where this mean error is estimated, m.

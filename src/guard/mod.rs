@@ -44,7 +44,7 @@ pub const EVERY: u32 = 3;
 /// long step.
 pub const EVERY_LEARNED: u32 = 1;
 /// The estimate over the distance of the two runs.
-pub const ESTIMATE: f32 = 2.0;
+pub const ESTIMATE: f32 = 1.5;
 
 /// Lengths of its steps by which the second run may be behind the first.
 const MOST_BEHIND: f64 = 2.0;

@@ -164,8 +164,8 @@ pub(super) struct Clusters<'a> {
 
 /// Room for clusters of each cell, without several tissues one for each [`Hold`].
 const CLUSTERS: usize = 3;
-/// Room for their moments.
-const SETS: usize = 6;
+/// Room for their moments, for each cell and further ones: of a body with few cells nearly all may be needed.
+const SETS: [usize; 2] = [6, 6];
 /// Room for sampled tiles, for each cell and further ones.
 const TILES: [usize; 2] = [2, 32];
 
@@ -192,7 +192,7 @@ impl ClusterRoom {
         );
         Self {
             clusters: cells.saturating_mul(CLUSTERS),
-            sets: cells.saturating_mul(SETS),
+            sets: cells.saturating_mul(SETS[0]).saturating_add(SETS[1]),
             tiles: if all < tiles { all } else { tiles },
             moved: tiles_of(elements),
         }
@@ -272,7 +272,7 @@ pub(super) struct ClusterInput<'a, M> {
     pub(super) scene: SceneView<'a, M>,
     pub(super) lattice: &'a Lattice,
     pub(super) places: &'a [LatticeNode],
-    /// Tissues are not told apart: for scenes with too many of them.
+    /// Tissues and how nodes are held are not told apart: for scenes with too many of them.
     pub(super) is_merged: bool,
 }
 
@@ -294,6 +294,9 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
     }
 
     fn hold(&self, nodes: &[usize]) -> Hold {
+        if self.is_merged {
+            return Hold::Partly;
+        }
         let mut hold = Hold::Nowhere;
         for &node in nodes {
             match self.scene.inertia.get(node).map_or(0, NodeInertia::held_count) {

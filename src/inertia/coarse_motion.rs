@@ -3,13 +3,13 @@
 
 use glam::{Vec3, Vec4};
 
-use super::LEAST_DRAG;
 use super::band::{Row, solve};
 use super::lattice::{CoarseVectors, Lattice};
 use super::matrices::Matrices;
 use super::renewal::Renewal;
 use super::supports::Pull;
 use super::transport::turned_part;
+use super::{LARGEST_KEPT, LEAST_DRAG};
 use crate::simd::NodeVector;
 
 /// Share of the strain rates that a step removes where only this share of the kinetic energy can have come from the
@@ -125,7 +125,8 @@ impl CoarseMotion<'_, '_> {
     /// share S^-1 (g - M w) + p + w - (removed T + drag T^2) c        M = (1 + k) Mc + E,  T = S^-1 A = 1 - S^-1 M
     /// ```
     /// with the rotation `w` of the velocities (`transport.rs`), and `p = -S^-1 A_s d` from the supports. Reduces the
-    /// share if the forces of one step would strain a cell by more than `largest_strain`.
+    /// share if the forces of one step would strain a cell by more than `largest_strain`, or the last increments strain it
+    /// by more than [`LARGEST_KEPT`].
     pub(super) fn compute(
         &self,
         motion: &mut CoarseVectors,
@@ -148,6 +149,7 @@ impl CoarseMotion<'_, '_> {
             self.add_pulled(pull, given, other);
             add(strained, 1.0, pull.of_last);
         }
+        let kept = lattice.largest_strain(part, self.space.matrices.frames.since_rest());
         self.space.solve_both([motion, strained]);
         subtract_from(part, strained);
         let drag = renewal.drag();
@@ -161,6 +163,7 @@ impl CoarseMotion<'_, '_> {
         let rotations = self.space.matrices.frames.since_rest();
         let strain = lattice.largest_strain(motion, rotations);
         let share = if strain > self.largest_strain { self.largest_strain / strain } else { 1.0 };
+        let share = if kept > LARGEST_KEPT { share.min(LARGEST_KEPT / kept) } else { share };
         let removed = removed_share(share.min(self.allowed));
         for ((motion, given), (strained, twice)) in motion.iter_mut().zip(given).zip(strained.iter().zip(&*other)) {
             let [answer, given, strained, twice] =

@@ -14,6 +14,7 @@ use crate::state::{Moment, Progress, StateView};
 use crate::step::{CallingThread, Status, Step, Threads, internal_forces, nodal_volumes};
 use crate::tled::each_rate;
 
+use super::coarse_motion::CoarseSpace;
 use super::coarse_room::CoarseRoom;
 use super::damper::RoughMotion;
 use super::lattice::{Grid, Lattice, LatticeNode, node_at, sort_by_cell};
@@ -22,6 +23,8 @@ use super::method::{Cells, Method, largest_grid, pieces, vectors_for_lattice, ve
 use super::node::{Scaling, half_damping};
 use super::node_tables::NodeTables;
 use super::renewal::{Renewal, RenewalInput};
+use super::rest_check::{RestCheck, stiffening};
+
 use super::{COARSE, FINE, InertiaError, LARGEST_MOVE, Report, node_tables};
 
 /// A prepared step without its storage; it may be moved in memory.
@@ -40,6 +43,8 @@ pub struct LargeModel<'w> {
     /// The next step, at most as long as the one that it was prepared for.
     pub(super) step: Step,
     prepared: Step,
+    /// See [`super::rest_check`].
+    stiffening: f32,
     /// Inertia in use is that of another length of step.
     pub(super) is_for_other_step: bool,
     pub(super) lattice: Lattice,
@@ -156,7 +161,8 @@ impl<'w> LargeModel<'w> {
             step,
             prepared: step,
             is_for_other_step: false,
-            scaling: scaling(step),
+            scaling: scaling(step, 1.0),
+            stiffening: 1.0,
             renewal: Renewal::NEW,
             lattice: Lattice::NONE,
             report: Report::NONE,
@@ -183,7 +189,7 @@ impl<'w> LargeModel<'w> {
         check("nodes in the state", nodes, state.capacity_for(scene.element()))?;
         storage.fill(NodeVector::ZERO);
         let (lattice, sizes) = (&self.lattice, [nodes, self.elements]);
-        let Some(Storage { mut tables, places, mut matrices, .. }) =
+        let Some(Storage { mut tables, places, mut matrices, room }) =
             Storage::split(storage, scene.element(), sizes, lattice, &self.renewal.bands)
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
@@ -200,6 +206,20 @@ impl<'w> LargeModel<'w> {
             return singular;
         }
         matrices.frames.choose(lattice, points);
+        let rest = core::mem::take(&mut tables.more_scratch);
+        rest.fill(NodeVector::ZERO);
+        let input = RenewalInput { scene, displacement: rest, volume, lattice, places, scaling: &self.scaling };
+        self.renewal.renew_all(input, &mut tables, &mut matrices, &CallingThread);
+        if self.renewal.lattice_in_use {
+            let space = CoarseSpace { lattice, renewal: &self.renewal, matrices: &matrices };
+            let (force, weight) = (&mut *tables.scratch, self.scaling.coarse_weight);
+            let mut check = RestCheck { scene, places, space, displacement: rest, force, volume, weight };
+            let ratio = check.largest_ratio([room.motion, room.part]);
+            self.stiffening = stiffening(ratio);
+            self.scaling = scaling(self.step, self.stiffening);
+        }
+        rest.fill(NodeVector::ZERO);
+        tables.more_scratch = rest;
         self.moment = progress.moment();
         let displacement = displacement.get(..nodes).unwrap_or_default();
         nodal_volumes(scene, displacement, &[], volume, &CallingThread);
@@ -251,7 +271,7 @@ impl<'w> LargeModel<'w> {
     /// not used, with a [`Report::coarse_share`] of zero, and [`Status::Limited`].
     pub fn change_step(&mut self, step: Step) {
         (self.step, self.prepared) = (step, step);
-        self.scaling = scaling(step);
+        self.scaling = scaling(step, self.stiffening);
         self.is_for_other_step = true;
     }
 
@@ -272,9 +292,14 @@ impl<'w> LargeModel<'w> {
     }
 }
 
-fn scaling(step: Step) -> Scaling {
+fn scaling(step: Step, stiffening: f32) -> Scaling {
     let (dt, k) = (step.seconds(), half_damping(&step));
-    Scaling { weight: 0.25 * FINE * dt * dt, k, reserve: k * (1.0 + k), coarse_weight: 0.25 * COARSE * dt * dt }
+    Scaling {
+        weight: 0.25 * FINE * dt * dt,
+        k,
+        reserve: k * (1.0 + k),
+        coarse_weight: 0.25 * COARSE * stiffening * dt * dt,
+    }
 }
 
 /// A prepared step with borrowed storage.

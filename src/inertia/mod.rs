@@ -107,6 +107,7 @@ mod parts;
 mod pass_input;
 mod renewal;
 mod report;
+mod rest_check;
 mod restriction_pass;
 mod shorten;
 mod step;
@@ -135,6 +136,8 @@ const LARGEST_MOVE: f32 = 0.02;
 const LARGEST_STRAIN: f32 = 0.1;
 /// The same with nodal strain, whose critical step is half as long again: strains of a step grow with its square.
 const LARGEST_STRAIN_OF_PATCHES: f32 = 0.2;
+/// Largest strain of a cell in one step that the velocities may go on with.
+const LARGEST_KEPT: f32 = 0.2;
 /// Share of the last increment's unresolved deformation of the lattice that a step removes where the stiffness changes
 /// as much as it may in one step, and the largest share.
 const DRAG_AT_LARGEST_CHANGE: f32 = 0.02;

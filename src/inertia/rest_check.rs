@@ -1,0 +1,99 @@
+//! `S` has the stiffness of clusters in place of that of elements: in cells that few elements fill, or in which they do
+//! not end, it may be too soft, and steps would not be stable. So the preparation compares both at rest.
+
+use glam::{Vec3, Vec4};
+
+use super::coarse_motion::{CoarseSpace, inner};
+use super::lattice::{CoarseVectors, LatticeNode, rank_of};
+use crate::element::{ElementMaterial, ScalarBound};
+use crate::scene::SceneView;
+use crate::simd::NodeVector;
+use crate::step::{CallingThread, internal_forces, nodal_volumes};
+
+/// Cycles of the iteration.
+const CYCLES: u32 = 12;
+
+/// What the proof leaves room for (`super`): `1/s + ratio/s_c` is at most one up to 1.24.
+const LARGEST_RATIO: f32 = 1.1;
+
+/// Largest strain of a cell: forces are linear in it, and larger than their rounding.
+const STRAIN: f32 = 1e-3;
+
+/// By how much the stiffness in `S` has to be larger, with this ratio.
+pub(super) fn stiffening(ratio: f32) -> f32 {
+    // Of a lattice without stiffness there is none.
+    if ratio > LARGEST_RATIO && ratio.is_finite() { ratio / LARGEST_RATIO } else { 1.0 }
+}
+
+/// The lattice and the memory to compare in.
+pub(super) struct RestCheck<'a, 'm, M> {
+    pub(super) scene: SceneView<'a, M>,
+    pub(super) places: &'a [LatticeNode],
+    pub(super) space: CoarseSpace<'a, 'm>,
+    /// Vectors of the nodes.
+    pub(super) displacement: &'a mut [NodeVector],
+    pub(super) force: &'a mut [NodeVector],
+    pub(super) volume: &'a mut [NodeVector],
+    /// `s_c D^2 / 4`, s^2.
+    pub(super) weight: f32,
+}
+
+impl<M: ElementMaterial> RestCheck<'_, '_, M> {
+    /// The largest eigenvalue of `S^-1 s_c D^2/4 W^T K W` with the stiffness `K` of the elements, by power iteration.
+    /// That of clusters alone has none above one.
+    #[inline(never)]
+    pub(super) fn largest_ratio(&mut self, [motion, forces]: [&mut CoarseVectors; 2]) -> f32 {
+        // Some motion that is not smooth.
+        let mut random = 1_u32;
+        for value in motion.iter_mut().flat_map(|vector| &mut vector.0[..3]) {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            *value = (random >> 8) as f32 / (1 << 24) as f32 - 0.5;
+        }
+        self.space.solve(motion);
+        let mut ratio = 0.0;
+        for _ in 0..CYCLES {
+            self.write_forces(motion, forces);
+            let energy = inner(motion, forces);
+            motion.copy_from_slice(forces);
+            self.space.solve(motion);
+            ratio = inner(motion, forces) / energy;
+        }
+        ratio
+    }
+
+    /// `s_c D^2/4 W^T K W x`.
+    fn write_forces(&mut self, motion: &CoarseVectors, forces: &mut CoarseVectors) {
+        let Self { scene, places, ref space, weight, .. } = *self;
+        let strain = space.lattice.largest_strain(motion, space.matrices.frames.since_rest());
+        let scale = STRAIN / strain.max(f32::MIN_POSITIVE);
+        for (node, displacement) in self.displacement.iter_mut().enumerate() {
+            *displacement = NodeVector::ZERO;
+            if let (Some(place), Some(inertia)) = (places.get(rank_of(places, node)), scene.inertia.get(node)) {
+                let moved = space.lattice.weights(place).into_iter().map(|(function, weight)| {
+                    weight * motion.get(function).map_or(Vec4::ZERO, |vector| Vec4::from(vector.0))
+                });
+                let moved = scale * moved.sum::<Vec4>() * inertia.free();
+                *displacement = NodeVector(moved.truncate().extend(0.0).to_array());
+            }
+        }
+        nodal_volumes(scene, self.displacement, &[], self.volume, &CallingThread);
+        self.force.fill(NodeVector::ZERO);
+        let all = scene.elements().partitions.all();
+        internal_forces(scene, all, [self.displacement, &[]], self.volume, self.force, ScalarBound);
+        forces.fill(NodeVector::ZERO);
+        for (node, force) in self.force.iter().enumerate() {
+            if let (Some(place), Some(inertia)) = (places.get(rank_of(places, node)), scene.inertia.get(node)) {
+                let force = -weight / scale * Vec3::from_slice(&force.0) * inertia.free().truncate();
+                for (function, weight) in space.lattice.weights(place) {
+                    if let Some(sum) = forces.get_mut(function) {
+                        sum.0 = (Vec4::from(sum.0) + weight * force.extend(0.0)).to_array();
+                    }
+                }
+            }
+        }
+        // What stands for the dropped functions.
+        forces.iter_mut().enumerate().filter(|(number, _)| !space.lattice.moves(*number)).for_each(|(_, sum)| {
+            *sum = NodeVector::ZERO;
+        });
+    }
+}
