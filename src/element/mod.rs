@@ -54,10 +54,9 @@ pub(crate) use crushed::{
     CrushedElements, LOOK_CYCLE, Look, MARKED, each_marked, forget_crushed, is_marked_at, mark_moment, mask_of, masks,
     masks_mut,
 };
-pub(crate) use fields::stabilising_modulus;
 pub(crate) use fields::{element_energy, element_fields, patch_energy, stabilising_energy};
 #[cfg(feature = "std")]
-pub(crate) use fields::{invariants, pressure_at};
+pub(crate) use fields::{invariants, pressure_at, stabilising_modulus};
 pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};
 pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes, VolumeRows};
 pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};

@@ -77,7 +77,7 @@ impl CoarseSpace<'_, '_> {
     }
 
     /// Writes `((1 + k) Mc + E) x`.
-    fn multiply_by_inertia(&self, x: &CoarseVectors, out: &mut CoarseVectors) {
+    pub(super) fn multiply_by_inertia(&self, x: &CoarseVectors, out: &mut CoarseVectors) {
         self.matrices.times_inertia(self.lattice, x, out);
     }
 }

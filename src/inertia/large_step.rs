@@ -23,7 +23,7 @@ use super::method::{Cells, Method, largest_grid, pieces, vectors_for_lattice, ve
 use super::node::{Scaling, half_damping};
 use super::node_tables::NodeTables;
 use super::renewal::{Renewal, RenewalInput};
-use super::rest_check::{RestCheck, stiffening};
+use super::rest_check::{FEWEST, MOST_RATIO, RestCheck, longer_step, stiffening};
 
 use super::{COARSE, FINE, InertiaError, LARGEST_MOVE, Report, node_tables};
 
@@ -43,8 +43,10 @@ pub struct LargeModel<'w> {
     /// The next step, at most as long as the one that it was prepared for.
     pub(super) step: Step,
     prepared: Step,
-    /// See [`super::rest_check`].
-    stiffening: f32,
+    /// What the stiffness in `S` is multiplied by, in steps up to the first one (s) and in longer ones
+    /// ([`super::rest_check`]).
+    stiffening: [f32; 2],
+    first: f32,
     /// Inertia in use is that of another length of step.
     pub(super) is_for_other_step: bool,
     pub(super) lattice: Lattice,
@@ -161,8 +163,9 @@ impl<'w> LargeModel<'w> {
             step,
             prepared: step,
             is_for_other_step: false,
-            scaling: scaling(step, 1.0),
-            stiffening: 1.0,
+            scaling: scaling_of(step, 1.0),
+            stiffening: [1.0; 2],
+            first: step.seconds(),
             renewal: Renewal::NEW,
             lattice: Lattice::NONE,
             report: Report::NONE,
@@ -189,7 +192,7 @@ impl<'w> LargeModel<'w> {
         check("nodes in the state", nodes, state.capacity_for(scene.element()))?;
         storage.fill(NodeVector::ZERO);
         let (lattice, sizes) = (&self.lattice, [nodes, self.elements]);
-        let Some(Storage { mut tables, places, mut matrices, room }) =
+        let Some(Storage { mut tables, places, mut matrices, mut room }) =
             Storage::split(storage, scene.element(), sizes, lattice, &self.renewal.bands)
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
@@ -206,20 +209,31 @@ impl<'w> LargeModel<'w> {
             return singular;
         }
         matrices.frames.choose(lattice, points);
-        let rest = core::mem::take(&mut tables.more_scratch);
-        rest.fill(NodeVector::ZERO);
-        let input = RenewalInput { scene, displacement: rest, volume, lattice, places, scaling: &self.scaling };
-        self.renewal.renew_all(input, &mut tables, &mut matrices, &CallingThread);
-        if self.renewal.lattice_in_use {
+        let (mut scaling, mut longer) = (self.scaling, None);
+        for (index, most) in MOST_RATIO.into_iter().enumerate() {
+            if let Some(step) = longer {
+                scaling = scaling_of(step, 1.0);
+            }
+            let rest = core::mem::take(&mut tables.more_scratch);
+            rest.fill(NodeVector::ZERO);
+            let input = RenewalInput { scene, displacement: rest, volume, lattice, places, scaling: &scaling };
+            self.renewal.renew_all(input, &mut tables, &mut matrices, &CallingThread);
             let space = CoarseSpace { lattice, renewal: &self.renewal, matrices: &matrices };
-            let (force, weight) = (&mut *tables.scratch, self.scaling.coarse_weight);
+            let (force, weight) = (&mut *tables.scratch, scaling.coarse_weight);
             let mut check = RestCheck { scene, places, space, displacement: rest, force, volume, weight };
-            let ratio = check.largest_ratio([room.motion, room.part]);
-            self.stiffening = stiffening(ratio);
-            self.scaling = scaling(self.step, self.stiffening);
+            let ratio = if self.renewal.lattice_in_use { check.largest_ratio(&mut room) } else { 1.0 };
+            rest.fill(NodeVector::ZERO);
+            tables.more_scratch = rest;
+            if ratio > most && self.method.cells == Cells::Suggested && grid.functions > FEWEST {
+                return singular;
+            }
+            self.stiffening.iter_mut().skip(index).for_each(|each| *each = each.max(stiffening(ratio)));
+            longer = longer_step(self.step, self.renewal.added.mean);
+            if longer.is_none() {
+                break;
+            }
         }
-        rest.fill(NodeVector::ZERO);
-        tables.more_scratch = rest;
+        self.scaling = scaling_of(self.step, self.stiffening[0]);
         self.moment = progress.moment();
         let displacement = displacement.get(..nodes).unwrap_or_default();
         nodal_volumes(scene, displacement, &[], volume, &CallingThread);
@@ -271,7 +285,8 @@ impl<'w> LargeModel<'w> {
     /// not used, with a [`Report::coarse_share`] of zero, and [`Status::Limited`].
     pub fn change_step(&mut self, step: Step) {
         (self.step, self.prepared) = (step, step);
-        self.scaling = scaling(step, self.stiffening);
+        let [first, longer] = self.stiffening;
+        self.scaling = scaling_of(step, if step.seconds() > self.first { longer } else { first });
         self.is_for_other_step = true;
     }
 
@@ -292,7 +307,7 @@ impl<'w> LargeModel<'w> {
     }
 }
 
-fn scaling(step: Step, stiffening: f32) -> Scaling {
+fn scaling_of(step: Step, stiffening: f32) -> Scaling {
     let (dt, k) = (step.seconds(), half_damping(&step));
     Scaling {
         weight: 0.25 * FINE * dt * dt,

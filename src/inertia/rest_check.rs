@@ -1,14 +1,17 @@
 //! `S` has the stiffness of clusters in place of that of elements: in cells that few elements fill, or in which they do
-//! not end, it may be too soft, and steps would not be stable. So the preparation compares both at rest.
+//! not end, it may be too soft, and steps would not be stable. So the preparation compares both at rest. How much too
+//! soft depends on the step: in short ones the stiffest motions count, in long ones also those that strain little but
+//! the elements' volumes. So they are compared for the step, and for one so long that a longer one changes nothing.
 
 use glam::{Vec3, Vec4};
 
 use super::coarse_motion::{CoarseSpace, inner};
+use super::coarse_room::CoarseRoom;
 use super::lattice::{CoarseVectors, LatticeNode, rank_of};
 use crate::element::{ElementMaterial, ScalarBound};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
-use crate::step::{CallingThread, internal_forces, nodal_volumes};
+use crate::step::{CallingThread, Step, internal_forces, nodal_volumes};
 
 /// Cycles of the iteration.
 const CYCLES: u32 = 12;
@@ -18,6 +21,22 @@ const LARGEST_RATIO: f32 = 1.1;
 
 /// Largest strain of a cell: forces are linear in it, and larger than their rounding.
 const STRAIN: f32 = 1e-3;
+
+/// Largest ratios of a suggested lattice, for its step and for a longer one: a coarser one has smaller ratios, and adds
+/// less inertia.
+pub(super) const MOST_RATIO: [f32; 2] = [3.0, 10.0];
+
+/// Functions of the smallest lattice.
+pub(super) const FEWEST: usize = 8;
+
+/// What a step adds to the mass (as a multiple, mean over the nodes) that is long enough.
+const ADDED: f32 = 2500.0;
+
+/// The longer step to compare with as well, of one that adds so much.
+pub(super) fn longer_step(step: Step, added: f32) -> Option<Step> {
+    let seconds = step.seconds() * libm::sqrtf(ADDED / added.max(f32::MIN_POSITIVE));
+    if added < ADDED { Step::unchecked(seconds, step.damping()).ok() } else { None }
+}
 
 /// By how much the stiffness in `S` has to be larger, with this ratio.
 pub(super) fn stiffening(ratio: f32) -> f32 {
@@ -39,24 +58,27 @@ pub(super) struct RestCheck<'a, 'm, M> {
 }
 
 impl<M: ElementMaterial> RestCheck<'_, '_, M> {
-    /// The largest eigenvalue of `S^-1 s_c D^2/4 W^T K W` with the stiffness `K` of the elements, by power iteration.
-    /// That of clusters alone has none above one.
+    /// The largest ratio of the energies of a motion with the stiffness of the elements and with that in `S`, for the
+    /// motions of a power iteration with `S^-1 W^T K W`: in the end the stiffest ones.
     #[inline(never)]
-    pub(super) fn largest_ratio(&mut self, [motion, forces]: [&mut CoarseVectors; 2]) -> f32 {
+    pub(super) fn largest_ratio(&mut self, room: &mut CoarseRoom<'_>) -> f32 {
+        let CoarseRoom { motion, part: forces, scratch: [other, ..], .. } = room;
         // Some motion that is not smooth.
         let mut random = 1_u32;
-        for value in motion.iter_mut().flat_map(|vector| &mut vector.0[..3]) {
+        for value in forces.iter_mut().flat_map(|vector| &mut vector.0[..3]) {
             random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             *value = (random >> 8) as f32 / (1 << 24) as f32 - 0.5;
         }
-        self.space.solve(motion);
-        let mut ratio = 0.0;
-        for _ in 0..CYCLES {
-            self.write_forces(motion, forces);
-            let energy = inner(motion, forces);
-            motion.copy_from_slice(forces);
+        let mut ratio = 0.0_f32;
+        for cycle in 0..CYCLES {
+            motion.copy_from_slice(&**forces);
             self.space.solve(motion);
-            ratio = inner(motion, forces) / energy;
+            self.space.multiply_by_inertia(motion, other);
+            let energy = inner(motion, forces) - inner(motion, other);
+            self.write_forces(motion, forces);
+            if cycle >= CYCLES / 2 {
+                ratio = ratio.max(inner(motion, forces) / energy);
+            }
         }
         ratio
     }
