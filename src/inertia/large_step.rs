@@ -227,7 +227,10 @@ impl<'w> LargeModel<'w> {
             if ratio > most && self.method.cells == Cells::Suggested && grid.functions > FEWEST {
                 return singular;
             }
-            self.stiffening.iter_mut().skip(index).for_each(|each| *each = each.max(stiffening(ratio)));
+            self.stiffening
+                .iter_mut()
+                .skip(index)
+                .for_each(|each| *each = each.max(stiffening(ratio, self.renewal.sensitivity)));
             longer = longer_step(self.step, self.renewal.added.mean);
             if longer.is_none() {
                 break;

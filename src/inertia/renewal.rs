@@ -53,7 +53,7 @@ pub(super) struct Renewal {
     pace: f32,
     /// How much sooner the stiffness of shear changes than with equal stiffness of volume and shear. A change `e` of
     /// shape gives motion without change of volume a share `e^2` of the stiffness of volume.
-    sensitivity: f32,
+    pub(super) sensitivity: f32,
     /// Whether `S` could be factorised: if not, the lattice is not used.
     pub(super) lattice_in_use: bool,
     pub(super) added: AddedInertia,
