@@ -131,9 +131,19 @@ pub unsafe extern "C" fn supple_adaptive_init(
         let chooser = Chooser::new(&method, scene, points, state.reborrow(), asked)?;
         let StorageParts { first: of_first, second: of_second, .. } = chooser.checked(storage, scene, points)?;
         let step = chooser.shortest()?;
-        LargeModel::prepare_in(first, method, scene, points, state.reborrow(), step, of_first)?;
-        let prepare = |state: StateView<'_>, step, storage: &mut [NodeVector]| {
-            LargeModel::prepare_in(second, second_run(), scene, points, state, step, storage).map(|_| ())
+        chooser.with_longest(|longest| {
+            let method = method.clone();
+            let model = LargeModel::prepare_in(first, method, scene, points, state.reborrow(), longest, of_first)?;
+            model.change_step(step);
+            Ok(())
+        })?;
+        let prepare = |mut state: StateView<'_>, step, storage: &mut [NodeVector]| {
+            chooser.with_longest(|longest| {
+                let model =
+                    LargeModel::prepare_in(second, second_run(), scene, points, state.reborrow(), longest, storage)?;
+                model.change_step(step);
+                Ok(())
+            })
         };
         let ((), watch) = Watch::prepare(scene, points, state, step, 1, of_second, prepare)?;
         (&raw mut (*object).chooser).write(chooser);

@@ -210,7 +210,7 @@ impl<'w> LargeModel<'w> {
         }
         matrices.frames.choose(lattice, points);
         let (mut scaling, mut longer) = (self.scaling, None);
-        for (index, most) in MOST_RATIO.into_iter().enumerate() {
+        for index in 0..self.stiffening.len() {
             if let Some(step) = longer {
                 scaling = scaling_of(step, 1.0);
             }
@@ -224,7 +224,7 @@ impl<'w> LargeModel<'w> {
             let ratio = if self.renewal.lattice_in_use { check.largest_ratio(&mut room) } else { 1.0 };
             rest.fill(NodeVector::ZERO);
             tables.more_scratch = rest;
-            if ratio > most && self.method.cells == Cells::Suggested && grid.functions > FEWEST {
+            if index == 0 && ratio > MOST_RATIO && self.method.cells == Cells::Suggested && grid.functions > FEWEST {
                 return singular;
             }
             self.stiffening

@@ -22,9 +22,9 @@ const LARGEST_RATIO: f32 = 1.1;
 /// Largest strain of a cell: forces are linear in it, and larger than their rounding.
 const STRAIN: f32 = 1e-3;
 
-/// Largest ratios of a suggested lattice, for its step and for a longer one: a coarser one has smaller ratios, and adds
-/// less inertia.
-pub(super) const MOST_RATIO: [f32; 2] = [3.0, 10.0];
+/// Largest ratio of a suggested lattice for the step that is prepared: a coarser one has smaller ratios, and adds less
+/// inertia.
+pub(super) const MOST_RATIO: f32 = 3.0;
 
 /// Functions of the smallest lattice.
 pub(super) const FEWEST: usize = 8;
