@@ -72,7 +72,6 @@ impl PatchTile {
     }
 
     /// Calls `with` with the patch's own node and its neighbours and their `c_ab`, m^2.
-    #[cfg(feature = "std")]
     pub(crate) fn each_gradient(&self, neighbours: &[Neighbours], lane: usize, mut with: impl FnMut(usize, DVec3)) {
         let mut own = DVec3::ZERO;
         for neighbour in neighbours {

@@ -16,7 +16,7 @@
 
 use core::ops::Range;
 
-use crate::element::{Axes, ElementMaterial, ElementTile, NodeInertia};
+use crate::element::{Axes, ElementMaterial, ElementTile, NodeInertia, PatchTile};
 use crate::mesh::partition::MAX_PARTITIONS;
 use crate::scene::SceneView;
 use crate::simd::TILE;
@@ -65,6 +65,9 @@ impl PairMatrices {
     }
 }
 
+/// Bit of clusters with a node that motions may move.
+const MOVES: u8 = 8;
+
 /// One cluster.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -73,7 +76,7 @@ pub(super) struct Cluster {
     tissue: u16,
     /// How its nodes are held: see [`Hold`].
     hold: u8,
-    /// Bits of the axes x and y, y and z, z and x, if some node is held along one of the two.
+    /// Bits of the axes x and y, y and z, z and x, if some node is held along one of the two, and [`MOVES`].
     differs: u8,
     /// Its moments, among all.
     first_set: u32,
@@ -88,6 +91,10 @@ pub(super) struct Cluster {
 }
 
 impl Cluster {
+    fn is_held_still(&self) -> bool {
+        self.hold != Hold::Nowhere as u8 && self.differs & MOVES == 0
+    }
+
     /// For each axis the number of its gradients: axes along which the same nodes are held have the same.
     pub(super) const fn gradients(&self) -> [usize; 3] {
         let [xy, yz, zx] = [self.differs & 1 != 0, self.differs & 2 != 0, self.differs & 4 != 0];
@@ -309,6 +316,62 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
         hold
     }
 
+    fn hold_of_patch(&self, tile: &PatchTile, lane: usize) -> Hold {
+        let mut hold = if self.is_merged { Hold::Partly } else { Hold::Nowhere };
+        tile.each_gradient(self.scene.patches.neighbours_of(tile), lane, |node, _| match (self.hold(&[node]), hold) {
+            (Hold::Nowhere, _) | (Hold::Fully, Hold::Partly) => {}
+            (other, _) => hold = other,
+        });
+        hold
+    }
+
+    /// `G` of a patch.
+    fn patch_gradients(&self, tile: &PatchTile, lane: usize, cell: usize) -> FunctionGradients {
+        let mut gradients = [[[0.0; 3]; 8]; 3];
+        let inverse = 1.0 / tile.volume(lane);
+        tile.each_gradient(self.scene.patches.neighbours_of(tile), lane, |node, gradient| {
+            let gradient = (inverse * gradient).as_vec3().to_array();
+            let place = node_place(self.places, node).copied().unwrap_or_default();
+            let weights = eight_weights(self.lattice.within(cell, &place));
+            let free = self.scene.inertia.get(node).map_or([0.0; 3], |inertia| inertia.free().truncate().to_array());
+            for (gradients, free) in gradients.iter_mut().zip(free) {
+                for (sum, weight) in gradients.iter_mut().zip(weights) {
+                    sum.iter_mut().zip(gradient).for_each(|(sum, along)| *sum += free * weight * along);
+                }
+            }
+        });
+        gradients
+    }
+
+    /// Calls with each patch at supports that stand still, its cluster and its volume.
+    fn each_held_patch(
+        &self,
+        heads: &[u32],
+        all: &mut [Cluster],
+        mut with: impl FnMut(&mut Cluster, &PatchTile, usize, f32),
+    ) {
+        for (index, tile) in self.scene.patches.tiles().iter().enumerate() {
+            for lane in 0..TILE {
+                let cluster = self.cluster_of_tangent(index, lane, all, heads);
+                if let Some((cluster, volume)) = cluster
+                    && let Some(cluster) = all.get_mut(cluster).filter(|cluster| cluster.is_held_still())
+                {
+                    with(cluster, tile, lane, volume);
+                }
+            }
+        }
+    }
+
+    /// Adds the moments of patches at supports that stand still, and writes their volumes in place of the sampled ones:
+    /// the mean of a patch is softer than its elements where some of their nodes are held.
+    fn add_patches(&self, heads: &[u32], all: &mut [Cluster], moments: &mut [PairMatrices]) {
+        self.each_held_patch(heads, all, |cluster, tile, lane, volume| {
+            cluster.sampled += volume;
+            let of_axes = self.patch_gradients(tile, lane, cluster.cell as usize);
+            add_to_sets(cluster, moments, &of_axes, volume);
+        });
+    }
+
     fn tissue(&self, element: usize) -> u16 {
         if self.is_merged { 0 } else { self.scene.material.laws().tissue(element) }
     }
@@ -335,7 +398,8 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
             cluster.volume += piece.volume();
             for node in piece.nodes() {
                 let [x, y, z] = [0, 1, 2].map(|axis| self.scene.held(node).has(axis));
-                cluster.differs |= u8::from(x != y) | u8::from(y != z) << 1 | u8::from(z != x) << 2;
+                let moves = if self.scene.movable(node) == Axes::NONE { 0 } else { MOVES };
+                cluster.differs |= u8::from(x != y) | u8::from(y != z) << 1 | u8::from(z != x) << 2 | moves;
             }
         }
         let mut sets = 0;
@@ -344,16 +408,20 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
             sets = cluster.sets().end;
         }
         clusters.moments.get_mut(..sets)?.fill(PairMatrices::ZERO);
+        let all = clusters.all.get_mut(..count)?;
+        if self.scene.element().is_nodal_strain() {
+            self.add_patches(clusters.heads, all, clusters.moments);
+        }
         for piece in self.scene.tiles.iter().flat_map(Piece::of_tile) {
             let cell = piece.cell(self.lattice, self.places);
             let cluster = clusters.all.get(self.find(&piece, cell, clusters.all, clusters.heads)?)?;
-            let (of_axes, numbers, each) =
-                (self.gradients(&piece, cell), cluster.gradients(), cluster.gradient_count());
-            let axis_of = |number: usize| numbers.iter().position(|&other| other == number).unwrap_or(0);
-            for (set, moments) in clusters.moments.get_mut(cluster.sets())?.iter_mut().enumerate() {
-                let [first, second] = [set / each, set % each].map(|number| &of_axes[axis_of(number) % 3]);
-                add_moments(moments, piece.volume(), [first, second]);
+            if cluster.sampled > 0.0 {
+                continue;
             }
+            add_to_sets(cluster, clusters.moments, &self.gradients(&piece, cell), piece.volume());
+        }
+        for cluster in clusters.all.iter_mut().take(count).filter(|cluster| cluster.sampled > 0.0) {
+            (cluster.volume, cluster.sampled) = (cluster.sampled, 0.0);
         }
         for cluster in clusters.all.get(..count).unwrap_or_default() {
             let is_free = cluster.hold == Hold::Nowhere as u8;
@@ -461,7 +529,7 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
         }
         let tile = scene.patches.tiles().get(tile).filter(|tile| tile.volume(lane) > 0.0)?;
         let (node, tissue) = (tile.node(lane), self.tissue(tile.element(lane)));
-        let (cell, hold) = (node_place(places, node)?.cell(), self.hold(&[node]));
+        let (cell, hold) = (node_place(places, node)?.cell(), self.hold_of_patch(tile, lane));
         let unlike = |cluster: &Cluster| (cluster.tissue != tissue, cluster.hold != hold as u8);
         let of_cell = clusters_of(all, heads.get(cell).copied()?);
         let (index, _) = of_cell.min_by_key(|(_, cluster)| unlike(cluster))?;
@@ -491,6 +559,15 @@ pub(super) fn for_each_pair(mut visit: impl FnMut(usize, usize, usize)) {
             visit(pair, c, d);
             pair += 1;
         }
+    }
+}
+
+fn add_to_sets(cluster: &Cluster, moments: &mut [PairMatrices], of_axes: &FunctionGradients, volume: f32) {
+    let (numbers, each) = (cluster.gradients(), cluster.gradient_count());
+    let axis_of = |number: usize| numbers.iter().position(|&other| other == number).unwrap_or(0);
+    for (set, moments) in moments.get_mut(cluster.sets()).unwrap_or_default().iter_mut().enumerate() {
+        let [first, second] = [set / each, set % each].map(|number| &of_axes[axis_of(number) % 3]);
+        add_moments(moments, volume, [first, second]);
     }
 }
 

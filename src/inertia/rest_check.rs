@@ -16,9 +16,6 @@ use crate::step::{CallingThread, Step, internal_forces, nodal_volumes};
 /// Cycles of the iteration.
 const CYCLES: u32 = 12;
 
-/// What the proof leaves room for (`super`): `1/s + ratio/s_c` is at most one up to 1.24.
-const LARGEST_RATIO: f32 = 1.1;
-
 /// Largest strain of a cell: forces are linear in it, and larger than their rounding.
 const STRAIN: f32 = 1e-3;
 
@@ -49,7 +46,7 @@ pub(super) fn stiffening(ratio: f32, sensitivity: f32) -> f32 {
     let of_volume = (sensitivity / SENSITIVITY).min(1.0);
     let bent = 1.0 + OF_BENDING * of_volume * of_volume;
     // Of a lattice without stiffness there is none.
-    if ratio.is_finite() { bent.max(ratio / LARGEST_RATIO) } else { bent }
+    if ratio.is_finite() { bent.max(ratio) } else { bent }
 }
 
 /// The lattice and the memory to compare in.

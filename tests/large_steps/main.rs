@@ -88,17 +88,13 @@ fn apart(damping: f32, share: f32, time: f32) -> (f64, f64) {
     (most, moved)
 }
 
-/// The lattice's inertia holds a share of its stiffness, `D^2`: it is the exact step to second order.
+/// No inertia is added: the lattice does not move what its nodes do by themselves.
 #[test]
-fn below_the_limit_it_is_the_exact_step_to_second_order() {
-    for damping in [0.0, 20.0] {
-        let [coarse, fine] = [0.3, 0.15].map(|share| apart(damping, share, 0.1));
-        let [a, b] = [coarse, fine].map(|(most, moved)| most / moved);
-        println!(
-            "damping {damping}: {a:.1e} of the largest displacement at 0.3 of the limit, {b:.1e} at 0.15, ratio {:.2}",
-            a / b
-        );
-        assert!(a < 0.02 && a / b > 3.0);
+fn below_the_limit_it_is_the_exact_step() {
+    for (damping, share) in [(0.0, 0.3), (0.0, 0.6), (20.0, 0.3), (20.0, 0.6)] {
+        let (most, moved) = apart(damping, share, 0.1);
+        println!("damping {damping}: {:.1e} of the largest displacement at {share} of the limit", most / moved);
+        assert!(moved > 1e-4 && most < 1e-3 * moved);
     }
 }
 
