@@ -257,12 +257,16 @@ const PAIR_OF: [[usize; 8]; 8] = {
     pairs
 };
 
+/// What a held axis counts, as a share: where only few nodes of a cell are free, no motion of the lattice is without
+/// inertia.
+const HELD: f32 = 1e-4;
+
 /// Adds a node's value (kg) for each axis times the products of its weights.
 #[inline(always)]
 pub(super) fn add_node(matrices: &mut [AxisMatrices], place: &LatticeNode, inertia: &NodeInertia, value: f32) {
     let Some(matrices) = matrices.get_mut(place.cell()) else { return };
     let weights = place.eight_weights();
-    let free = (value * inertia.free()).to_array();
+    let free = (value * inertia.free().max(Vec4::splat(HELD))).to_array();
     for_each_pair(|pair, c, d| {
         let product = weights[c] * weights[d];
         let at = pair % matrices.len();

@@ -55,7 +55,7 @@ int main(void) {
     CHECK(supple_state_init(state_memory, sizeof state_memory, scene, &state) == SUPPLE_OK);
     CHECK(supple_loads_init(loads_memory, sizeof loads_memory, scene, FORCES, MOTIONS, &loads) == SUPPLE_OK);
     CHECK(supple_set_gravity(loads, gravity) == SUPPLE_OK && supple_set_forces(loads, &force, 1, NULL) == SUPPLE_OK);
-    move_end(scene, loads, 0.005f, 0.0f, 0.005f);
+    move_end(scene, loads, 0.001f, 0.0f, 0.001f);
     CHECK(supple_learned_init(learned_memory, sizeof learned_memory, scene, &network, &learned, NULL) == SUPPLE_OK);
     CHECK(supple_learned_describe(learned, &facts) == SUPPLE_OK);
     const supple_step_config step = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 3.0f, facts.damping};

@@ -126,9 +126,9 @@ int main(void) {
         {"scene_init", init_scene, 16}, {"state_init", init_state, 2},     {"loads_init", init_loads, 2},
         {"set_step", set_step, 20},     {"step", exact, 22},               {"learned_init", init_learned, 12},
         {"learned_step", learn, 140},   {"large_init", init_large, 36},    {"large_step", step_large, 40},
-        {"guard_init", init_guard, 36},    {"guard_follow", follow, 40},
-        {"adaptive_init", init_adaptive, 36}, {"adaptive_advance", advance, 42},
-        {"sim_setup", sim_setup, 38}, {"sim_advance", sim_advance, 42},
+        {"guard_init", init_guard, 38},    {"guard_follow", follow, 40},
+        {"adaptive_init", init_adaptive, 42}, {"adaptive_advance", advance, 42},
+        {"sim_setup", sim_setup, 44}, {"sim_advance", sim_advance, 42},
     };
     const size_t count = sizeof calls / sizeof *calls;
     const uint32_t levels[2] = {supple_level(), SUPPLE_LEVEL_PORTABLE};

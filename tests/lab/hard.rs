@@ -60,7 +60,7 @@ fn long_steps_are_right_in_ordinary_scenes_and_seldom_doubted() {
             run.row.scene
         );
         // A millimetre is above what is never wrong: a frozen body would not be right.
-        assert!(run.motion() > 1.0 && run.worst().unwrap().mean < 0.2 * run.motion(), "{}", run.motion());
+        assert!(run.motion() > 1.0 && run.worst().unwrap().mean < 0.3 * run.motion(), "{}", run.motion());
         assert!(doubted.good > 5 && 2 * doubted.inexact < doubted.good, "{doubted:?}");
     }
     let table = std::fs::read_to_string(folder.path().join("hard.csv")).unwrap();
@@ -132,5 +132,5 @@ fn exact_steps_beyond_the_critical_one_tell_and_switching_steps_follow() {
     let error = |method| of(method)[0].worst().unwrap().mean;
     let [fixed, switching] = [Method::Long, Method::Switching].map(error);
     let motion = of(Method::Long)[0].motion();
-    assert!(switching != fixed && switching < 0.1 * motion, "{switching}, {fixed} of {motion} mm");
+    assert!(switching != fixed && switching < 0.15 * motion, "{switching}, {fixed} of {motion} mm");
 }

@@ -50,7 +50,7 @@ fn torsion_converges_with_every_element_and_either_step() {
     for element in Element::ALL {
         let [exact, long] = ["exact", "long 20x"].map(|method| error(&rows, ("grid", element, method), "torque"));
         println!("{}: torque {exact:+.2} %, with long steps {long:+.2} %", element.name());
-        assert!(exact > 0.0 && exact < 12.0 && (long - exact).abs() < 0.5);
+        assert!(exact > 0.0 && exact < 12.0 && (long - exact).abs() < 0.7);
     }
 }
 
