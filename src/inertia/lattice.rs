@@ -319,7 +319,7 @@ impl Lattice {
                     continue;
                 }
                 let offset = [at[0] as i8 - a as i8, at[1] as i8 - b as i8, at[2] as i8 - c as i8];
-                let beyond = offset.map(|offset| u32::from(offset < 0 || offset > 1));
+                let beyond = offset.map(|offset| u32::from(!(0..=1).contains(&offset)));
                 let distance = beyond[0] + beyond[1] + beyond[2];
                 if best.is_none_or(|(least, _)| distance < least) {
                     best = Some((distance, LightPoint { cell: cell as u16, offset }));

@@ -19,10 +19,11 @@ pub struct Method<'w> {
 /// Cells of a lattice.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub enum Cells {
-    /// The largest near-cubic lattice whose points are at least 1.5 times as far apart as the nodes, and whose matrices
-    /// cost little to renew: with `n` unknowns, three for each function, `n^3` is at most 4000 times the number of
-    /// elements. At least four nodes for each function, two where no lattice has four. A step takes a coarser one where
-    /// single precision cannot invert the matrices of this one. No lattice if the mesh is too small for one cell.
+    /// The largest near-cubic lattice whose cells are at least twice as wide as a cube of six elements of mean volume, and
+    /// whose matrices cost little to renew: with `n` unknowns, three for each function, `n^3` is at most 4000 times the
+    /// number of elements. At least four nodes for each function, two where no lattice has four. A step takes a coarser
+    /// one where single precision cannot invert the matrices of this one, or where its stiffness differs much from that
+    /// of the elements. No lattice if the mesh is too small for one cell.
     #[default]
     Suggested,
     /// This many along x, y, z, at least one each.

@@ -1,6 +1,7 @@
 //! When the inertia of the lattice's motion, `S`, is computed anew, and how: from the tangents of the sampled pieces
 //! (`clusters.rs`, `coarse_stiffness.rs`) at the start of the step that needs it, all at once. That is due where the
-//! lattice has been strained and bent by [`LARGEST_CHANGE`] since, or where tissue has stiffened. All else is constant, and computed anew for a state that does not follow from the last one.
+//! lattice has been strained and bent by [`LARGEST_CHANGE`] since, or where tissue has stiffened. All else is constant, and
+//! computed anew for a state that does not follow from the last one.
 
 use glam::Vec4;
 
@@ -138,9 +139,9 @@ impl Renewal {
         let Matrices { bounds, cells, .. } = matrices;
         let mut now = bounds.iter_mut().zip(cells.iter().map(CellPolynomial::values));
         let stiffened = now.any(|(before, now)| now > COARSE_GROWTH * *before);
-        // Not for a motion that is no number.
-        if self.lattice_in_use && !(self.changed * self.sensitivity > LARGEST_CHANGE * LEAST_SENSITIVITY) && !stiffened
-        {
+        // Not by a motion that is no number.
+        let has_changed = self.changed * self.sensitivity > LARGEST_CHANGE * LEAST_SENSITIVITY;
+        if self.lattice_in_use && !has_changed && !stiffened {
             return;
         }
         bounds.iter_mut().zip(cells.iter()).for_each(|(before, cell)| *before = cell.values());
