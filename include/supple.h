@@ -52,9 +52,9 @@
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 96 : 48))
 #define SUPPLE_LARGE_SIZE(nodes, elements, x, y, z) (SUPPLE_LARGE_FRONT + SUPPLE_ARRAY_(1, 104 * (size_t)(nodes) +             \
-    (size_t)(elements) / 4 + 36700 + 19188 * SUPPLE_CELLS_(x, y, z) + 1092 * SUPPLE_LEAST_(2 * SUPPLE_CELLS_(x, y, z) + 32,     \
+    (size_t)(elements) / 4 + 36700 + 19188 * SUPPLE_CELLS_(x, y, z) + 1092 * SUPPLE_LEAST_(2 * SUPPLE_CELLS_(x, y, z) + 32,    \
     (size_t)(elements) / 16 + (size_t)(nodes) / 8 + 50) + 64 * SUPPLE_WHOLE_(3 * SUPPLE_FUNCTIONS_(x, y, z)) +                 \
-    4 * SUPPLE_BAND_(3 * SUPPLE_FUNCTIONS_(x, y, z), 12 * SUPPLE_LAYER_(x, y, z)) +                                            \
+    196 * SUPPLE_FUNCTIONS_(x, y, z) + 4 * SUPPLE_BAND_(3 * SUPPLE_FUNCTIONS_(x, y, z), 12 * SUPPLE_LAYER_(x, y, z)) +         \
     16 * SUPPLE_BAND_(SUPPLE_FUNCTIONS_(x, y, z), 4 * SUPPLE_LAYER_(x, y, z))))
 #define SUPPLE_ARRAY_(count, bytes) (((size_t)(count) * (bytes) + SUPPLE_ALIGN - 1) / SUPPLE_ALIGN * SUPPLE_ALIGN)
 #define SUPPLE_LEAST_(a, b) ((a) < (b) ? (a) : (b))

@@ -453,7 +453,7 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
         let all = all.get_mut(..count)?;
         let (most, of_scene) = (tiles.len(), self.tiles_with_tangents());
         // A part of the room is for clusters that a regular sample misses.
-        let spacing = if of_scene <= most { 1 } else { of_scene.div_ceil(most - most / 4) };
+        let spacing = if of_scene <= most { 1 } else { of_scene.div_ceil((most - most / 4).max(1)).max(1) };
         let mut chosen = 0;
         for tile in (0..of_scene).step_by(spacing) {
             *tiles.get_mut(chosen)? = tile as u32;

@@ -67,7 +67,8 @@ impl Sums {
     fn tangent(&self, factor: f32) -> ClusterTangent {
         let of = |sums: &[Vec4; QUARTERS], a: usize, b: usize| {
             let (row, column) = (a.max(b), a.min(b));
-            sums[FIRST[row] + column / 4].to_array()[column % 4]
+            let first = FIRST.get(row).copied().unwrap_or_default();
+            sums.get(first + column / 4).map_or(0.0, |vector| vector.to_array()[column % 4])
         };
         let mut tangent = [0.0; 81];
         for (large_i, large_j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {

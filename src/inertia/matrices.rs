@@ -294,7 +294,9 @@ pub(super) fn fill_held_axes(matrices: &mut [AxisMatrices], lattice: &Lattice) {
         for (function, at) in lattice.functions_of(cell).into_iter().zip(FIRST_OF_DIAGONAL) {
             let Some(sums) = sums.get_mut(function).filter(|_| function < lattice.functions()) else { continue };
             for (axis, sum) in sums.iter_mut().enumerate().take(3).filter(|(_, sum)| **sum <= 0.0) {
-                matrices[at % matrices.len()][axis] = most;
+                if let Some(entry) = matrices[at % matrices.len()].get_mut(axis) {
+                    *entry = most;
+                }
                 *sum = most;
             }
         }

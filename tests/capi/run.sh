@@ -130,7 +130,7 @@ memory() {
     for test in misuse copies simulation heap strain threads; do
         options=(-pthread)
         [ $test != heap ] || options=("$wrapped")
-        gcc -std=c11 "${warnings[@]}" "${options[@]}" -DSMALL tests/capi/$test.c "$static" -o "$folder/$test-small"
+        gcc -std=c11 "${warnings[@]}" "${options[@]}" -DSMALL -DUNDER_VALGRIND tests/capi/$test.c "$static" -o "$folder/$test-small"
     done
     for test in misuse copies simulation heap strain; do
         valgrind --quiet --error-exitcode=9 --leak-check=full "$folder/$test-small" under-valgrind >"$folder/said"
