@@ -45,11 +45,13 @@ impl Sums {
         let vectors =
             [Vec4::new(x[0], x[1], x[2], y[0]), Vec4::new(y[1], y[2], z[0], z[1]), Vec4::new(z[2], 0.0, 0.0, 0.0)];
         let [inner, outer, exchanged, is_spatial] = tangent.factors;
-        for row in 0..9 {
-            let (a, b) = (outer * f[row], exchanged * f[row]);
-            for vector in 0..=row / 4 {
-                self.outer[FIRST[row] + vector] += a * vectors[vector];
-                self.exchanged[FIRST[row] + vector] += b * vectors[vector];
+        for (row, (first, value)) in FIRST.into_iter().zip(f).enumerate() {
+            let (a, b) = (outer * value, exchanged * value);
+            let outer = self.outer.get_mut(first..).unwrap_or_default();
+            let exchanged = self.exchanged.get_mut(first..).unwrap_or_default();
+            for ((outer, exchanged), vector) in outer.iter_mut().zip(exchanged).zip(vectors).take(row / 4 + 1) {
+                *outer += a * vector;
+                *exchanged += b * vector;
             }
         }
         let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -73,12 +75,14 @@ impl Sums {
         let mut tangent = [0.0; 81];
         for (large_i, large_j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
             let (row, column) = (large_i.max(large_j), large_i.min(large_j));
-            let inner = self.inner[row * (row + 1) / 2 + column];
+            let inner = self.inner.get(row * (row + 1) / 2 + column).copied().unwrap_or_default();
             for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
                 let outer = of(&self.outer, 3 * large_i + i, 3 * large_j + j);
                 let exchanged = of(&self.exchanged, 3 * large_i + j, 3 * large_j + i);
                 let whole = outer + exchanged + if i == j { inner } else { 0.0 };
-                tangent[9 * (3 * i + large_i) + 3 * j + large_j] = factor * whole;
+                if let Some(entry) = tangent.get_mut(9 * (3 * i + large_i) + 3 * j + large_j) {
+                    *entry = factor * whole;
+                }
             }
         }
         tangent

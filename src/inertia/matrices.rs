@@ -1,6 +1,6 @@
 //! The matrices of a lattice (kg, factors of them) and the sums of its cells, in the caller's storage.
 
-use bytemuck::{AnyBitPattern, NoUninit, cast_slice_mut};
+use bytemuck::{AnyBitPattern, NoUninit, try_cast_slice_mut};
 use glam::Vec4;
 
 use super::band::{Band, Row, factorise, solve};
@@ -94,8 +94,8 @@ pub(super) fn vectors_for(grid: Grid, pieces: [usize; 2]) -> usize {
 /// Takes `count` values.
 fn take<'a, T: AnyBitPattern + NoUninit>(from: &mut &'a mut [NodeVector], count: usize) -> Option<&'a mut [T]> {
     let vectors = from.split_off_mut(..vectors_of::<T>(count))?;
-    let floats: &mut [f32] = cast_slice_mut(vectors);
-    Some(cast_slice_mut(floats.get_mut(..count * (size_of::<T>() / size_of::<f32>()))?))
+    let floats: &mut [f32] = try_cast_slice_mut(vectors).ok()?;
+    try_cast_slice_mut(floats.get_mut(..count * (size_of::<T>() / size_of::<f32>()))?).ok()
 }
 
 impl<'a> Matrices<'a> {
