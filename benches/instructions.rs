@@ -4,7 +4,7 @@
 
 mod common {
     pub(crate) mod bar;
-    pub(crate) mod scaled;
+    pub(crate) mod long;
     pub(crate) mod vertices;
 }
 
@@ -12,10 +12,9 @@ use std::hint::black_box;
 use std::process::ExitCode;
 
 use common::bar::{self, DAMPING, DT, EXPONENTIAL, moved};
-use common::scaled::{damped, multilevel, scaled};
+use common::long::long;
 use common::vertices::{ROWS, vertices};
 use supple::element::ElementMaterial;
-use supple::inertia::Method;
 use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::Loads;
 use supple::material::{NeoHookean, NodalPressure, NodalStrain};
@@ -39,11 +38,11 @@ fn exact<M: ElementMaterial>(scene: &VecScene<M>, times: u32) {
     (0..=times).for_each(|_| moved(tled::step(scene, &loads, &mut state, &step)));
 }
 
-/// 64 steps each time: a whole refresh cycle without a lattice, with one a quarter at least.
-fn large(method: Method<'static>, times: u32) {
+/// 64 steps each time, with renewals of the lattice's inertia among them.
+fn large(times: u32) {
     let (points, forces, scene) = (bar::points(), bar::forces(), bar::scene(EXPONENTIAL));
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).expect("nodes of the bar");
-    let mut run = scaled(&scene, &loads, &points, 20.0, method);
+    let mut run = long(&scene, &loads, &points, 20.0);
     (0..64 * times).for_each(|_| run());
 }
 
@@ -71,7 +70,7 @@ fn learned(times: u32) {
 }
 
 fn main() -> ExitCode {
-    let lattice = std::env::args().any(|argument| ["multilevel", "damped"].contains(&argument.as_str()));
+    let lattice = std::env::args().any(|argument| argument == "long");
     // Every processor that is worth guarding has AVX2. Steps with a lattice are counted in portable code: their scalar
     // remainders hold VMOVQ between registers, which valgrind 3.19 (Debian 12) does not know.
     if !Level::force(if lattice { Level::Portable } else { Level::Avx2 }) {
@@ -80,9 +79,7 @@ fn main() -> ExitCode {
     }
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [name, times] = arguments.as_slice() else {
-        println!(
-            "exponential neo-hookean nodal-pressure nodal-strain mass-scaled multilevel damped compact int8 learned"
-        );
+        println!("exponential neo-hookean nodal-pressure nodal-strain long compact int8 learned");
         return ExitCode::SUCCESS;
     };
     let Ok(times) = times.parse() else {
@@ -94,9 +91,7 @@ fn main() -> ExitCode {
         "neo-hookean" => exact(&bar::scene(NeoHookean { c: 500.0, d: 15_000.0 }), times),
         "nodal-pressure" => exact(&bar::scene_with(NodalPressure(bar::tissue(EXPONENTIAL))), times),
         "nodal-strain" => exact(&bar::scene_with(NodalStrain(bar::tissue(EXPONENTIAL))), times),
-        "mass-scaled" => large(Method::MassScaled, times),
-        "multilevel" => large(multilevel(), times),
-        "damped" => large(damped(), times),
+        "long" => large(times),
         "compact" => forward(COMPACT, times),
         "int8" => forward(INT8, times),
         "learned" => learned(times),

@@ -1,19 +1,18 @@
-//! Time of mass-scaled, multilevel and damped steps on the paper's bar, compared with the exact one.
+//! Time of long steps on the paper's bar, compared with the exact one.
 //!
 //! `cargo bench --bench large_step` prints criterion's figures, then ratios from interleaved pairs of runs (the
-//! machine's speed drifts; the ratio does not) and what the steps of a refresh cycle cost against their mean.
+//! machine's speed drifts; the ratio does not) and how much the dearest steps take over the mean.
 
 mod common {
     pub(crate) mod bar;
+    pub(crate) mod long;
     pub(crate) mod pairs;
-    pub(crate) mod scaled;
 }
 
 use common::bar::{self, DAMPING, DT, moved};
+use common::long::{RUN, guarded, long};
 use common::pairs::{median, seconds};
-use common::scaled::{CYCLE, damped, guarded, multilevel, scaled};
 use criterion::{BenchmarkId, Criterion, Throughput};
-use supple::inertia::Method;
 use supple::loads::Loads;
 use supple::state::VecState;
 use supple::step::Step;
@@ -26,17 +25,12 @@ const MULTIPLE: f32 = 20.0;
 const LONGEST: f32 = 100.0;
 const PAIRS: usize = 41;
 
-/// Median time of each step of a cycle over their mean, from the current step of the cycle on.
-fn phases(run: &mut impl FnMut()) -> Vec<f64> {
-    let mut times = vec![Vec::new(); CYCLE as usize];
-    for _ in 0..PAIRS {
-        for times in &mut times {
-            times.push(seconds(&mut *run));
-        }
-    }
-    let times: Vec<f64> = times.into_iter().map(median).collect();
+/// The time that one step in a hundred exceeds, and the most, over the mean.
+fn dearest(run: &mut impl FnMut()) -> [f64; 2] {
+    let mut times: Vec<f64> = (0..16 * RUN).map(|_| seconds(&mut *run)).collect();
+    times.sort_by(f64::total_cmp);
     let mean = times.iter().sum::<f64>() / times.len() as f64;
-    times.iter().map(|time| time / mean).collect()
+    [times[times.len() * 99 / 100], times[times.len() - 1]].map(|time| time / mean)
 }
 
 fn main() {
@@ -50,53 +44,35 @@ fn main() {
     let small = Step::new(DT, DAMPING, critical).expect("dt is below the critical step");
     let mut exact = || moved(tled::step(&scene, &loads, &mut exact_state, &small));
     (0..8_000).for_each(|_| exact());
-    let mut longest = scaled(&scene, &loads, &points, LONGEST, multilevel());
-    let mut longest_damped = scaled(&scene, &loads, &points, LONGEST, damped());
-    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, Method::MassScaled);
-    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, multilevel());
-    let mut with_guards = EVERY.map(|every| guarded(&scene, &loads, &points, MULTIPLE, damped(), Some(every)));
-    let mut damped = scaled(&scene, &loads, &points, MULTIPLE, damped());
+    let mut longest = long(&scene, &loads, &points, LONGEST);
+    let mut with_guards = EVERY.map(|every| guarded(&scene, &loads, &points, MULTIPLE, Some(every)));
+    let mut long = long(&scene, &loads, &points, MULTIPLE);
 
     let mut group = criterion.benchmark_group("beyond the critical step");
     group.throughput(Throughput::Elements(scene.element_count() as u64));
     group.bench_function(BenchmarkId::from_parameter("exact"), |b| b.iter(&mut exact));
-    group.bench_function(BenchmarkId::from_parameter("mass-scaled"), |b| b.iter(&mut mass_scaled));
-    group.bench_function(BenchmarkId::from_parameter("multilevel"), |b| b.iter(&mut multilevel));
-    group.bench_function(BenchmarkId::from_parameter("damped"), |b| b.iter(&mut damped));
+    group.bench_function(BenchmarkId::from_parameter("long"), |b| b.iter(&mut long));
     group.finish();
 
-    let mut times = Vec::new();
-    let mut ratios = [const { Vec::new() }; 5];
+    let (mut times, mut ratios) = (Vec::new(), [const { Vec::new() }; 2]);
     let mut guards = [const { Vec::new() }; EVERY.len()];
     for _ in 0..PAIRS {
-        let one = seconds(|| (0..CYCLE).for_each(|_| exact())) / f64::from(CYCLE);
-        let others = [
-            seconds(|| (0..CYCLE).for_each(|_| mass_scaled())) / f64::from(CYCLE),
-            seconds(|| (0..CYCLE).for_each(|_| multilevel())) / f64::from(CYCLE),
-            seconds(|| (0..CYCLE).for_each(|_| longest())) / f64::from(CYCLE),
-            seconds(|| (0..CYCLE).for_each(|_| damped())) / f64::from(CYCLE),
-            seconds(|| (0..CYCLE).for_each(|_| longest_damped())) / f64::from(CYCLE),
-        ];
+        let one = seconds(|| (0..RUN).for_each(|_| exact()));
+        let others = [seconds(|| (0..RUN).for_each(|_| long())), seconds(|| (0..RUN).for_each(|_| longest()))];
         for (guards, guarded) in guards.iter_mut().zip(&mut with_guards) {
-            guards.push(seconds(|| (0..CYCLE).for_each(|_| guarded())) / f64::from(CYCLE) / others[3]);
+            guards.push(seconds(|| (0..RUN).for_each(|_| guarded())) / others[0]);
         }
-        times.push(one);
-        for (ratios, other) in ratios.iter_mut().zip(others) {
-            ratios.push(other / one);
-        }
+        times.push(one / f64::from(RUN));
+        ratios.iter_mut().zip(others).for_each(|(ratios, other)| ratios.push(other / one));
     }
-    let [mass_scaled_ratio, multilevel_ratio, longest_ratio, damped_ratio, longest_damped_ratio] = ratios.map(median);
-    let [most, most_damped] =
-        [phases(&mut multilevel), phases(&mut damped)].map(|phases| phases.into_iter().fold(0.0, f64::max));
+    let ([ratio, longest], [late, most]) = (ratios.map(median), dearest(&mut long));
     println!(
-        "exact {:.0} us a step; at {MULTIPLE} times its length mass-scaled {mass_scaled_ratio:.2} times that, multilevel \
-         {multilevel_ratio:.2} times; the dearest step of a cycle {most:.2} times their mean; at {LONGEST} times its \
-         length multilevel {longest_ratio:.2} times. Damped: {damped_ratio:.2} times, the \
-         dearest step {most_damped:.2} times, at {LONGEST} times its length {longest_damped_ratio:.2} times",
+        "exact {:.0} us a step; long ones at {MULTIPLE} times its length {ratio:.2} times that, one in a hundred {late:.2} \
+         and the dearest {most:.2} times their mean; at {LONGEST} times its length {longest:.2} times",
         median(times) * 1e6,
     );
     println!(
-        "damped steps with a guard whose second run takes one step in {EVERY:?}: {:.2?} times those without",
+        "with a guard whose second run takes one step in {EVERY:?}: {:.2?} times those without",
         guards.map(median)
     );
     criterion.final_summary();

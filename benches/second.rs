@@ -6,14 +6,14 @@
 
 mod common {
     pub(crate) mod bar;
+    #[allow(dead_code)] // This bench has no guard.
+    pub(crate) mod long;
     pub(crate) mod pairs;
-    pub(crate) mod scaled;
 }
 
 use common::bar::{self, DAMPING, DT};
+use common::long::long as long_steps;
 use common::pairs::{median, seconds};
-use common::scaled::{damped, multilevel, scaled};
-use supple::inertia::Method;
 use supple::learned::{LearnedStep, vectors_for};
 use supple::loads::Loads;
 use supple::mlp::{Network, WeightBytes};
@@ -61,13 +61,9 @@ fn main() {
             }
         }
     };
-    let mut mass_scaled = scaled(&scene, &loads, &points, MULTIPLE, Method::MassScaled);
-    let mut multilevel = scaled(&scene, &loads, &points, MULTIPLE, multilevel());
-    let mut damped = scaled(&scene, &loads, &points, MULTIPLE, damped());
-    let mut others: [(&str, Second<'_>); 7] = [
-        ("mass-scaled", Box::new(|| (0..long).for_each(|_| mass_scaled()))),
-        ("multilevel", Box::new(|| (0..long).for_each(|_| multilevel()))),
-        ("damped", Box::new(|| (0..long).for_each(|_| damped()))),
+    let mut long_step = long_steps(&scene, &loads, &points, MULTIPLE);
+    let mut others: [(&str, Second<'_>); 5] = [
+        ("long", Box::new(|| (0..long).for_each(|_| long_step()))),
         ("compact network", Box::new(learned(compact))),
         ("compact network, int8", Box::new(learned(compact_int8))),
         ("paper's network", Box::new(learned(paper))),

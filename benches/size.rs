@@ -1,5 +1,5 @@
 //! Time of an exact step from 6.5 thousand tetrahedra to a million, on one thread and on two, and with nodes in order,
-//! shuffled, and renumbered ([`supple::mesh::renumber`]); and of a multilevel step on one thread and on two.
+//! shuffled, and renumbered ([`supple::mesh::renumber`]); and of a long step on one thread and on two.
 //!
 //! `cargo bench --bench size --features parallel` prints medians, and the least time in brackets, of runs in turn. It
 //! has no criterion group: a body of that size takes seconds to prepare.
@@ -24,8 +24,8 @@ use supple::tled;
 const SIZES: [[u32; 3]; 5] = [[8, 8, 17], [16, 16, 32], [20, 20, 42], [32, 32, 64], [44, 44, 88]];
 const ROUNDS: usize = 21;
 const MULTIPLE: f32 = 20.0;
-const MULTILEVEL_SIZE: [u32; 3] = [20, 20, 42];
-const MULTILEVEL_STEPS: usize = 50;
+const LONG_SIZE: [u32; 3] = [20, 20, 42];
+const LONG_STEPS: usize = 50;
 
 /// A bar with its nodes and elements in some order.
 struct Body {
@@ -97,15 +97,15 @@ fn both(times: &[f64], unit: f64) -> String {
     format!("{:.1} ({:.1})", median(times.to_vec()) * unit, least * unit)
 }
 
-/// Times of a multilevel step at [`MULTIPLE`] times the critical step, on one thread and on two, compared with an exact
+/// Times of a long step at [`MULTIPLE`] times the critical step, on one thread and on two, compared with an exact
 /// one.
-fn multilevel(pool: &rayon::ThreadPool) {
-    let Body { points, tets } = Body::in_order(MULTILEVEL_SIZE);
+fn long(pool: &rayon::ThreadPool) {
+    let Body { points, tets } = Body::in_order(LONG_SIZE);
     let Bent { scene, mut state, step } = Bent::new(bar::EXPONENTIAL, &points, &tets);
     let scene = scene.view();
     let mut exact_state = state.clone();
     let length = Step::unchecked(MULTIPLE * step.seconds(), step.damping()).expect("a length");
-    let method = Method::Multilevel(Cells::Suggested);
+    let method = Method::new(Cells::Suggested);
     let mut large = LargeStep::prepare_in_vec(method, scene, &points, state.view(), length).expect("a bar");
     let loads = Loads::NONE;
     let (mut times, mut ratios) = ([const { Vec::new() }; 2], [const { Vec::new() }; 3]);
@@ -115,7 +115,7 @@ fn multilevel(pool: &rayon::ThreadPool) {
                 let mut step = || {
                     bar::moved(large.step_in_parts(scene, &loads, state.view(), &Rayon { parts }));
                 };
-                seconds(|| (0..MULTILEVEL_STEPS).for_each(|_| step())) / MULTILEVEL_STEPS as f64
+                seconds(|| (0..LONG_STEPS).for_each(|_| step())) / LONG_STEPS as f64
             };
             let [one, two] = [of(1), of(2)];
             let mut of = |parts| {
@@ -123,7 +123,7 @@ fn multilevel(pool: &rayon::ThreadPool) {
                     let view = exact_state.view();
                     bar::moved(tled::step_in_parts(scene, &loads, view, &step, &Rayon { parts }));
                 };
-                seconds(|| (0..MULTILEVEL_STEPS).for_each(|_| exact())) / MULTILEVEL_STEPS as f64
+                seconds(|| (0..LONG_STEPS).for_each(|_| exact())) / LONG_STEPS as f64
             };
             let [plain, plain_two] = [of(1), of(2)];
             times.iter_mut().zip([one, two]).for_each(|(times, time)| times.push(time));
@@ -134,7 +134,7 @@ fn multilevel(pool: &rayon::ThreadPool) {
     let [one, two] = times.map(|times| both(&times, 1e6));
     let [ratio, exact, cost] = ratios.map(median);
     println!(
-        "{} tetrahedra, multilevel at {MULTIPLE} times the critical step: {one} us on one thread, {cost:.2} times an exact \
+        "{} tetrahedra, long steps at {MULTIPLE} times the critical step: {one} us on one thread, {cost:.2} times an exact \
          step; {two} us on two threads, {ratio:.2} times faster (an exact step {exact:.2} times)",
         tets.len()
     );
@@ -163,5 +163,5 @@ fn main() {
         let [in_order, shuffled, renumbered, two] = times.map(|times| both(&times, unit));
         println!("{} | {in_order} | {shuffled} | {renumbered} | {two} | {:.2}", body.tets.len(), median(ratios));
     }
-    multilevel(&pool);
+    long(&pool);
 }

@@ -1,9 +1,9 @@
 // A host in C++ that shows tissue 60 times a second: a liver lobe hangs from its back; a sphere comes from above, presses
 // its dome, slides 4 mm sideways with friction and leaves, over and over. Each frame moves on by 1/60 s; the host reads the
-// status, with what a guard says of damped steps, and the force on the sphere. All memory is there before the first frame.
+// status, with what a guard says of long steps, and the force on the sphere. All memory is there before the first frame.
 //
 //     c++ -std=c++17 -O2 -Iinclude examples/instrument.cpp -lsupple -o instrument
-//     ./instrument [--mesh FILE] [--method exact|damped] [--frames N] [--out DIR] [--realtime] [--jitter N]
+//     ./instrument [--mesh FILE] [--method exact|long] [--frames N] [--out DIR] [--realtime] [--jitter N]
 //
 // Run from the repository it finds meshes/lobe.msh itself. --out leaves frames for ParaView, ten a second. --realtime
 // waits for the clock between frames. --jitter N then times N single steps, and after each a fixed piece of work of the
@@ -40,10 +40,10 @@ constexpr float RADIUS = 0.010f, FRICTION = 0.3f; // of the sphere, m
 constexpr float ABOVE = 0.004f, DEPTH = 0.018f;   // how far above the dome it begins, and how far down it goes, m: the lobe sags by 10 mm
 constexpr unsigned LARGE_STEPS = 4;               // a frame: each some 20 critical steps
 constexpr int FRAMES_A_PICTURE = 6;
-const std::map<std::string, supple::steps> STEPS = {{"exact", supple::steps::exact}, {"damped", supple::steps::damped}};
+const std::map<std::string, supple::steps> STEPS = {{"exact", supple::steps::exact}, {"long", supple::steps::long_steps}};
 
 struct options {
-    std::string mesh = "meshes/lobe.msh", method = "damped", out;
+    std::string mesh = "meshes/lobe.msh", method = "long", out;
     long frames = 240, jitter = 0;
     bool realtime = false;
 };
@@ -74,7 +74,7 @@ options read_options(int count, char **words) {
         else throw std::runtime_error(word + ": no such option");
     }
     if (STEPS.count(chosen.method) == 0)
-        throw std::runtime_error("--method " + chosen.method + ": not exact or damped");
+        throw std::runtime_error("--method " + chosen.method + ": not exact or long");
     return chosen;
 }
 
@@ -124,7 +124,7 @@ struct host {
 
         const std::vector<std::uint32_t> surface = gmsh::nodes_of(gmsh::boundary(mesh.tetrahedra));
         settings.touchable(nodes, {surface});
-        if (chosen.method == "damped") settings.seconds = FRAME / LARGE_STEPS;
+        if (chosen.method == "long") settings.seconds = FRAME / LARGE_STEPS;
         supple::body body;
         body.law = supple::law::exponential, body.points = mesh.points, body.tetrahedra = mesh.tetrahedra;
         body.supports = supports, body.tissues = {&LIVER, 1};

@@ -51,24 +51,30 @@
     (SUPPLE_STATE_FRONT + ((element) == SUPPLE_LINEAR ? 4 : 5) * SUPPLE_ARRAY_(nodes, 16))
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 96 : 48))
-#define SUPPLE_LARGE_SIZE(nodes, elements, method, x, y, z) (SUPPLE_LARGE_FRONT + ((method) == SUPPLE_MASS_SCALED              \
-    ? SUPPLE_ARRAY_(nodes, 80) : SUPPLE_LATTICE_(nodes, elements, (method) == SUPPLE_DAMPED, x, y, z)))
+#define SUPPLE_LARGE_SIZE(nodes, elements, x, y, z) (SUPPLE_LARGE_FRONT + SUPPLE_ARRAY_(1, 104 * (size_t)(nodes) +             \
+    (size_t)(elements) / 4 + 36700 + 19188 * SUPPLE_CELLS_(x, y, z) + 1092 * SUPPLE_LEAST_(2 * SUPPLE_CELLS_(x, y, z) + 32,    \
+    (size_t)(elements) / 16 + (size_t)(nodes) / 8 + 50) + 64 * SUPPLE_WHOLE_(3 * SUPPLE_FUNCTIONS_(x, y, z)) +                 \
+    196 * SUPPLE_FUNCTIONS_(x, y, z) + 4 * SUPPLE_BAND_(3 * SUPPLE_FUNCTIONS_(x, y, z), 12 * SUPPLE_LAYER_(x, y, z)) +         \
+    16 * SUPPLE_BAND_(SUPPLE_FUNCTIONS_(x, y, z), 4 * SUPPLE_LAYER_(x, y, z))))
 #define SUPPLE_ARRAY_(count, bytes) (((size_t)(count) * (bytes) + SUPPLE_ALIGN - 1) / SUPPLE_ALIGN * SUPPLE_ALIGN)
 #define SUPPLE_LEAST_(a, b) ((a) < (b) ? (a) : (b))
 #define SUPPLE_GROUPS_(elements) (2 * SUPPLE_LEAST_((size_t)(elements) / 1536 - ((elements) > 1535), 23) + 1)
 #define SUPPLE_TILES_(elements) (((size_t)(elements) + 15) / 16 + SUPPLE_GROUPS_(elements) - 1)
 #define SUPPLE_PATCHES_(nodes, elements, tissues) SUPPLE_LEAST_((size_t)(nodes) * (tissues), 4 * (size_t)(elements))
 #define SUPPLE_FUNCTIONS_(x, y, z) SUPPLE_LEAST_(((size_t)(x) + 1) * ((y) + 1) * ((z) + 1), SUPPLE_LATTICE_FUNCTIONS)
-#define SUPPLE_LATTICE_(nodes, elements, damped, x, y, z) SUPPLE_ARRAY_(1, ((damped) ? 136 : 104) * (size_t)(nodes) +           \
-    4 * (size_t)(elements) + 212 + 1152 * ((size_t)(x) * (y) * (z)) + 184 * SUPPLE_FUNCTIONS_(x, y, z) *                       \
-    (SUPPLE_FUNCTIONS_(x, y, z) + 8))
+#define SUPPLE_CELLS_(x, y, z) ((size_t)(x) * (y) * (z))
+#define SUPPLE_LAYER_(x, y, z) SUPPLE_LEAST_(((size_t)(x) + 1) * ((y) + 1),                                                    \
+    SUPPLE_LEAST_(((size_t)(y) + 1) * ((z) + 1), ((size_t)(x) + 1) * ((z) + 1)))
+#define SUPPLE_WHOLE_(count) (((count) + 15) / 16 * 16)
+#define SUPPLE_BAND_(unknowns, width) (SUPPLE_WHOLE_(unknowns) *                                                               \
+    SUPPLE_LEAST_(SUPPLE_WHOLE_(unknowns), SUPPLE_WHOLE_(width) + 16))
 
 
 /**
  * Version of the interface: of structures, of functions' arguments, of what statuses mean. Put it into
  * the field `abi` of every configuration; a library of another version refuses it.
  */
-#define SUPPLE_ABI 4
+#define SUPPLE_ABI 5
 
 /**
  * No node, element or axis.
@@ -181,24 +187,6 @@
 #define SUPPLE_LEARNED_FRONT 2048
 
 /**
- * For comparisons with a common method: inertia is raised where the step would be unstable, which slows all motion
- * down.
- */
-#define SUPPLE_MASS_SCALED 0
-
-/**
- * For comparisons: the lattice alone, without the damper. Rough motion, once excited, oscillates for long.
- */
-#define SUPPLE_MULTILEVEL 1
-
-/**
- * What steps beyond the critical one should be: inertia is raised where the step would be unstable, smooth motion
- * keeps its true inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not
- * carry.
- */
-#define SUPPLE_DAMPED 2
-
-/**
  * Points that a lattice may have.
  */
 #define SUPPLE_LATTICE_POINTS 1024
@@ -206,12 +194,12 @@
 /**
  * Functions that a lattice may have.
  */
-#define SUPPLE_LATTICE_FUNCTIONS 128
+#define SUPPLE_LATTICE_FUNCTIONS 240
 
 /**
  * Bytes before the arrays of a supple_large.
  */
-#define SUPPLE_LARGE_FRONT 43008
+#define SUPPLE_LARGE_FRONT 61440
 
 /**
  * Exact steps of nine tenths of the critical step, which is looked at again while tissue stiffens.
@@ -219,12 +207,12 @@
 #define SUPPLE_STEPS_EXACT 0
 
 /**
- * Equal damped steps beyond the critical one, and a guard that estimates their error.
+ * Equal steps beyond the critical one, and a guard that estimates their error.
  */
-#define SUPPLE_STEPS_DAMPED 1
+#define SUPPLE_STEPS_LONG 1
 
 /**
- * Exact and damped steps whose length keeps the error below a tolerance.
+ * Exact and long steps whose length keeps the error below a tolerance.
  */
 #define SUPPLE_STEPS_AUTO 2
 
@@ -503,7 +491,7 @@ enum supple_status
     SUPPLE_E_DAMPING = -52,
     /**
      * A lattice of impossible cells: each count at least 1, SUPPLE_LATTICE_POINTS points and SUPPLE_LATTICE_FUNCTIONS
-     * functions at most.
+     * functions at most. Or a mesh that is too small for a lattice of one cell: take exact steps.
      */
     SUPPLE_E_LATTICE = -60,
     /**
@@ -551,7 +539,7 @@ enum supple_status
      */
     SUPPLE_E_DIVERGED_INSTRUMENT = -94,
     /**
-     * The step was not taken: mass-scaled and learned steps cannot meet instruments.
+     * The step was not taken: learned steps cannot meet instruments.
      */
     SUPPLE_E_NO_CONTACT = -95,
 };
@@ -580,7 +568,7 @@ typedef struct supple_contact supple_contact;
 typedef struct supple_guard supple_guard;
 
 /**
- * Inertia for steps of one length, computed anew a little in each step. One thread at a time. It may be copied with
+ * Inertia for steps of one length, whose stiff part is computed anew where tissue deforms. One thread at a time. It may be copied with
  * memcpy together with its state.
  */
 typedef struct supple_large supple_large;
@@ -913,15 +901,15 @@ typedef struct {
      */
     float outside;
     /**
-     * Steps of a supple_large: mean over the nodes of the inertia added, in masses of the node.
+     * Long steps: mean over the nodes of the inertia added, in masses of the node.
      */
     float added_mass;
     /**
-     * Steps of a supple_large: most nodes that were held back in a step.
+     * Long steps: most nodes that were held back in a step.
      */
     uint32_t held_back;
     /**
-     * Multilevel and damped steps: the least share of the lattice's motion that was used in a step; below 0.5 it is
+     * Long steps: the least share of the lattice's motion that was used in a step; below 0.5 it is
      * remarked upon.
      */
     float lattice_share;
@@ -1187,7 +1175,8 @@ typedef struct {
 } supple_learned_facts;
 
 /**
- * What steps beyond the critical one need.
+ * What steps beyond the critical one need. Inertia is raised where they would be unstable, smooth motion keeps its true
+ * inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not carry.
  */
 typedef struct {
     /**
@@ -1199,10 +1188,6 @@ typedef struct {
      */
     uint32_t abi;
     /**
-     * SUPPLE_DAMPED; SUPPLE_MASS_SCALED and SUPPLE_MULTILEVEL are for comparisons.
-     */
-    uint32_t method;
-    /**
      * Length of a step, s.
      */
     float seconds;
@@ -1212,12 +1197,12 @@ typedef struct {
      */
     float damping;
     /**
-     * Cells of the lattice along x, y, z; zeros: chosen for the scene. Not used by SUPPLE_MASS_SCALED.
+     * Cells of the lattice along x, y, z; zeros: chosen for the scene.
      */
     uint32_t cells[3];
     /**
-     * NULL: the damper that is part of the library. Otherwise, for SUPPLE_DAMPED, the weight file of another one, at a
-     * multiple of 4 bytes. It is used where it is and must stay.
+     * NULL: the damper that is part of the library. Otherwise the weight file of another one, at a multiple of 4 bytes.
+     * It is used where it is and must stay.
      */
     const void *weights;
     /**
@@ -1245,7 +1230,7 @@ typedef struct {
     float damping;
     /**
      * How many times as long the second run's steps are, at least 1 and at least the number of steps between two calls
-     * of supple_guard_follow. More costs less time, about a multilevel step in so many, and calls more right steps
+     * of supple_guard_follow. More costs less time, about a long step in so many, and calls more right steps
      * inexact. 3 is a good choice, the steps of a frame another; 1 for learned steps.
      */
     uint32_t every;
@@ -1346,7 +1331,7 @@ typedef struct {
      */
     uint32_t steps;
     /**
-     * Length of the steps, s; 0: chosen. Of damped steps at most so much, 20 critical steps unless given; of exact
+     * Length of the steps, s; 0: chosen. Of long steps at most so much, 20 critical steps unless given; of exact
      * ones, a network's included, at most so much, nine tenths of the critical step unless given, and shorter where
      * the critical step falls; of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
      */
@@ -1361,7 +1346,7 @@ typedef struct {
      */
     float tolerance;
     /**
-     * 1: a guard estimates the error of damped and of learned steps. 0: nothing does.
+     * 1: a guard estimates the error of long and of learned steps. 0: nothing does.
      */
     uint32_t guard;
     /**
@@ -1373,7 +1358,7 @@ typedef struct {
      */
     double lead_in;
     /**
-     * Cells of the lattice of damped steps along x, y, z; zeros: chosen for the scene.
+     * Cells of the lattice of long steps along x, y, z; zeros: chosen for the scene.
      */
     uint32_t cells[3];
     /**
@@ -1446,9 +1431,9 @@ typedef struct {
      */
     uint32_t exact;
     /**
-     * Damped ones.
+     * Steps beyond the critical one.
      */
-    uint32_t damped;
+    uint32_t long_steps;
     /**
      * Those of a network.
      */
@@ -1618,7 +1603,7 @@ supple_status supple_set_motions(supple_loads *loads,
 
 /**
  * Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned
- * and mass-scaled steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
+ * steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
  */
 supple_status supple_set_contact(supple_loads *loads,
                                  supple_contact *contact);
@@ -2036,11 +2021,11 @@ supple_status supple_large_init(void *memory,
                                 supple_error *error);
 
 /**
- * Takes `count` steps of the prepared method and length. Stops at the first that is not to be believed: that one is
+ * Takes `count` steps of the prepared length. Stops at the first that is not to be believed: that one is
  * not taken, the state is as before it, and the status tells. They need no supple_set_step.
  *
  * @param loads what acts; NULL: nothing, supports stand still.
- * @param threads NULL: the calling thread alone. What a cycle assembles and inverts runs on that one in any case.
+ * @param threads NULL: the calling thread alone. The lattice's factorisation runs on that one in any case.
  * @param report may be NULL; is written whatever the status.
  */
 supple_status supple_large_step(const supple_scene *scene,

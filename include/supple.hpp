@@ -142,13 +142,6 @@ enum class element : std::uint32_t {
 // checked: elements must have positive volumes. normalised: they are turned where needed.
 enum class winding : std::uint32_t { checked = SUPPLE_WINDING_CHECKED, normalised = SUPPLE_WINDING_NORMALISED };
 
-// How steps beyond the critical one are kept stable.
-enum class method : std::uint32_t {
-    mass_scaled = SUPPLE_MASS_SCALED,
-    multilevel = SUPPLE_MULTILEVEL,
-    damped = SUPPLE_DAMPED
-};
-
 // Instructions that steps use.
 enum class level : std::uint32_t {
     portable = SUPPLE_LEVEL_PORTABLE,
@@ -684,7 +677,6 @@ private:
 
 // What steps beyond the critical one need.
 struct large_steps {
-    supple::method method = method::damped;  // the others are for comparisons
     float seconds = 0.0f;                    // length of a step, s
     float damping = 0.0f;                    // proportional to mass, 1/s
     std::array<std::uint32_t, 3> cells = {}; // of the lattice along x, y, z; zeros: chosen for the scene
@@ -695,7 +687,6 @@ namespace detail {
 
 inline supple_large_config config_of(const large_steps &steps) noexcept {
     auto made = config<supple_large_config>();
-    made.method = static_cast<std::uint32_t>(steps.method);
     made.seconds = steps.seconds;
     made.damping = steps.damping;
     for (std::size_t axis = 0; axis < 3; axis++) made.cells[axis] = steps.cells[axis];
@@ -1025,11 +1016,11 @@ private:
     supple_reaction *raw_ = nullptr;
 };
 
-// What moves a simulation. exact: steps below the critical one. damped: steps beyond it, and a guard. automatic: exact and damped ones
+// What moves a simulation. exact: steps below the critical one. long_steps: steps beyond it, and a guard. automatic: exact and long ones
 // as long as a tolerance allows. learned: a network's.
 enum class steps : std::uint32_t {
     exact = SUPPLE_STEPS_EXACT,
-    damped = SUPPLE_STEPS_DAMPED,
+    long_steps = SUPPLE_STEPS_LONG,
     automatic = SUPPLE_STEPS_AUTO,
     learned = SUPPLE_STEPS_LEARNED
 };

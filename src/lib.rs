@@ -33,7 +33,7 @@
 //! use supple::inertia::{self, Cells};
 //! use supple::simulation::{Method, Settings};
 //!
-//! let method = Method::Long(inertia::Method::damped(Cells::Given([1, 1, 4])));
+//! let method = Method::Long(inertia::Method::new(Cells::Given([1, 1, 4])));
 //! let mut bent = at_rest.with(Settings { method, damping: 20.0, ..Settings::default() });
 //! let report = bent.advance(0.2)?;
 //! if let Some(estimate) = report.estimate {
@@ -97,7 +97,7 @@
 //! | [`step`] | the protocol of every step: begin, compute, energy balance, accept or refuse; threads |
 //! | [`tled`] | the exact step and the critical step |
 //! | [`reaction`] | the force by which supports act on the tissue, also in long steps |
-//! | [`inertia`] | steps beyond the critical one: mass-scaled, multilevel, damped |
+//! | [`inertia`] | long steps, beyond the critical one |
 //! | [`guard`] | may a step be believed: a second run that estimates its error |
 //! | [`adaptive`] | steps that choose their length so that their error stays below a tolerance |
 //! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
@@ -147,6 +147,10 @@ pub mod mlp;
 mod padding;
 pub mod plausibility;
 pub mod reaction;
+/// Of the tests, in float64.
+#[cfg(test)]
+#[path = "../tests/reference/mod.rs"]
+mod reference;
 mod scattered;
 pub mod scene;
 pub mod simd;

@@ -11,10 +11,10 @@
 //! | fourth component of a volume row, in a body of one tissue | `J - 1` of the node, next to its displacement, also between steps | [`crate::element`], in each step with nodal pressure | the element loops | 4, and a second read of each node |
 //! | upper eight bits of an element's index | which of the tissues of each corner's node it is of, two bits each | [`crate::scene`], when it is built | [`crate::element`] | 1 of 64 an element |
 //! | inverse mass and mass, while a scene is built | marks of held axes; the two lowest tissues of the node | [`crate::element`] | the same, which writes masses over them | 5, while it is built |
-//! | fourth component of a sum of bounds `xy, yz, zx` | share of its inverse inertia that a node could use before the step | [`crate::inertia`], while a step is computed | the same, if the step is refused | 4 of 104 |
-//! | last eight bits of a height | number of the frame that a node turns with | [`crate::inertia`], when it is prepared | its passes | 1 of 104 |
+//! | fourth component of the next increment | what the scalar bound of the node has to be multiplied by | [`crate::inertia`], when it is prepared | its passes | 4 of 88 |
+//! | fourth component of a rough increment | how far its force may move the node in a step, m | the same | the same | 4 of 88 |
 //! | fourth components of a vertex's tangent, normal and increment | what rounding had left out of its displacement when an interval of exact steps began | [`crate::learned`], in a lead-in | the same, when the interval ends | 12 of 48 |
-//! | fourth component of a lattice position | number of the node | the same | the same | 4 of 104 |
+//! | fourth component of a lattice position | number of the node | [`crate::inertia`], when it is prepared | its passes | 4 of 88 |
 
 use crate::simd::NodeVector;
 
@@ -36,20 +36,6 @@ pub(crate) fn mark_axis(vector: &mut [f32; 4], axis: usize) -> bool {
 /// Removes the marks of all axes.
 pub(crate) fn clear_marks(NodeVector(vector): &mut NodeVector) {
     vector[3] = 0.0;
-}
-
-/// The bits of a height that tell the frame: it then has 16 binary digits left, and only tells how far is far.
-const FRAME: u32 = 0xFF;
-
-/// A height (m) with the number of a frame below 256.
-pub(crate) fn with_frame(height: f32, frame: usize) -> f32 {
-    f32::from_bits(height.to_bits() & !FRAME | frame as u32 & FRAME)
-}
-
-/// The number of the frame in a height.
-#[inline(always)]
-pub(crate) fn frame_of(height: f32) -> usize {
-    (height.to_bits() & FRAME) as usize
 }
 
 /// A node's number as a float with the same bits.

@@ -430,6 +430,7 @@ impl<'a, M: Material> SceneView<'a, M> {
     }
 
     /// Every element, as its place in the tables with its law.
+    #[cfg(feature = "std")]
     pub(crate) fn laws_at_places(self) -> impl Iterator<Item = (&'a ElementTile, usize, M::Law)> {
         let laws = self.material.laws();
         self.places().map(move |(tile, lane)| (tile, lane, laws.of(tile.element(lane))))

@@ -186,7 +186,7 @@ impl<'a> StateView<'a> {
     }
 
     /// The same state with [`crate::contact::vectors_to_push`] vectors that belong to it, for what instruments do:
-    /// multilevel and damped steps need them, exact ones for triangles, and are faster with them. Zeros: nothing
+    /// long steps need them, exact ones for triangles, and are faster with them. Zeros: nothing
     /// touches yet.
     #[must_use]
     pub fn pushing(self, pushes: &'a mut [NodeVector]) -> Self {

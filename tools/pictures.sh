@@ -15,6 +15,6 @@ out=out/pictures
 mkdir -p "$out" docs/pictures
 target/release/supple demo --out "$out/demo"
 scenes=(reversed stretch compression compression-neo-hookean cylinder lobe)
-methods=(tled hold tled-large-step mass-scaled multilevel damped compact-f32 paper-f32)
+methods=(tled hold tled-large-step long compact-f32 paper-f32)
 target/release/supple-lab methods "${scenes[@]/#/--scene=}" "${methods[@]/#/--method=}" --out "$out/lab" >"$out/lab.txt"
 node tools/pictures.mjs "$out" docs/pictures

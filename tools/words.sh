@@ -32,7 +32,7 @@ word 'one[ _]by[ _]one' 'scalar'
 word 'brake[ds]?|braking' 'velocity scale'
 word 'ledgers?' 'energy balance'
 word 'insists?' 'unchecked'
-word 'large steps?' 'mass-scaled, multilevel and damped steps' '^docs/GLOSSARY.md:[0-9]+:\*\*Long step'
+word 'large steps?' 'long steps' '^docs/GLOSSARY.md:[0-9]+:\*\*Long step'
 # Its former name in scene files is still read.
 word 'surrogates?' 'learned step' '^src/bin/supple/.*alias = "surrogate"|^tests/command/'
 # As above.

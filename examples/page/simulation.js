@@ -4,14 +4,14 @@
 import { Tool } from "./tool.js";
 
 export const FRAME = 1 / 60; // s
-export const METHODS = ["exact", "damped", "auto"];
+export const METHODS = ["exact", "long", "auto"];
 export const TOLERANCE = { least: 0.05e-3, most: 5e-3, usual: 0.5e-3 }; // m, mean error of the nodes
 
 // Neo-Hookean and liver-like: half the shear modulus and half the bulk modulus (Pa); kg/m^3. It does not stiffen when it is pulled.
 const TISSUE = { constants: [750, 40000, 0, 0], density: 1060 };
 const DAMPING = 20; // 1/s, proportional to mass
 const BACK = 0.03; // nodes behind y = 30 mm hang on the diaphragm
-const LONG = 4; // damped steps a frame
+const LONG = 4; // long steps a frame
 const MARGIN = 0.7; // exact steps, in critical steps at rest: deformed tissue is stiffer
 
 export class Simulation {
@@ -34,7 +34,7 @@ export class Simulation {
         this.exact = Math.ceil(FRAME / (MARGIN * library.floats(this.places.made, 1)[0])); // steps a frame
         this.tool = new Tool(this, surface);
         this.halted = null;
-        this.setMethod("damped", TOLERANCE.usual);
+        this.setMethod("long", TOLERANCE.usual);
     }
 
     #build(mesh) {
@@ -68,14 +68,14 @@ export class Simulation {
 
     #settings(method, tolerance) {
         const { library, surface } = this;
-        const { SUPPLE_STEPS_EXACT, SUPPLE_STEPS_DAMPED, SUPPLE_STEPS_AUTO } = library.header.constants;
-        const steps = { exact: SUPPLE_STEPS_EXACT, damped: SUPPLE_STEPS_DAMPED, auto: SUPPLE_STEPS_AUTO }[method];
+        const { SUPPLE_STEPS_EXACT, SUPPLE_STEPS_LONG, SUPPLE_STEPS_AUTO } = library.header.constants;
+        const steps = { exact: SUPPLE_STEPS_EXACT, long: SUPPLE_STEPS_LONG, auto: SUPPLE_STEPS_AUTO }[method];
         const seconds = method === "exact" ? (this.exact ? FRAME / this.exact : 0) : FRAME / LONG;
         return library.write(this.places.settings, "supple_settings", {
             steps, seconds, damping: DAMPING, tolerance, guard: 1, surface, grips: surface.node_count });
     }
 
-    /** From now on these steps. `tolerance` (m) is that of automatic steps, and what the guard of damped ones allows. */
+    /** From now on these steps. `tolerance` (m) is that of automatic steps, and what the guard of long ones allows. */
     setMethod(method, tolerance) {
         if (!METHODS.includes(method)) throw new Error(`no method ${method}`);
         this.method = method;

@@ -93,10 +93,16 @@ impl<'w> AdaptiveModel<'w> {
     ) -> Result<Self, InertiaError> {
         let chooser = Chooser::new(&method, scene, points, state.reborrow(), request)?;
         let StorageParts { first, second, .. } = chooser.checked(storage, scene, points)?;
+        let mut of_first = chooser
+            .with_longest(|step| LargeModel::prepare(method.clone(), scene, points, state.reborrow(), step, first))?;
         let step = chooser.shortest()?;
-        let of_first = LargeModel::prepare(method, scene, points, state.reborrow(), step, first)?;
-        let (of_second, watch) = Watch::prepare(scene, points, state, step, 1, second, |state, step, storage| {
-            LargeModel::prepare(guard::SECOND_RUN, scene, points, state, step, storage)
+        of_first.change_step(step);
+        let (of_second, watch) = Watch::prepare(scene, points, state, step, 1, second, |mut state, step, storage| {
+            let mut model = chooser.with_longest(|step| {
+                LargeModel::prepare(guard::second_run(), scene, points, state.reborrow(), step, storage)
+            })?;
+            model.change_step(step);
+            Ok(model)
         })?;
         Ok(Self { first: of_first, second: of_second, watch: chooser.allowing(watch), chooser })
     }
@@ -172,6 +178,21 @@ impl Chooser {
     /// The shortest step beyond the critical one.
     pub(crate) fn shortest(&self) -> Result<Step, InertiaError> {
         self.step_of(self.control.lengths().saturating_sub(1))
+    }
+
+    /// Prepares inertia with the longest step that single precision allows: a lattice that is stable in it is stable in
+    /// shorter ones.
+    pub(crate) fn with_longest<T>(
+        &self,
+        mut prepare: impl FnMut(Step) -> Result<T, InertiaError>,
+    ) -> Result<T, InertiaError> {
+        let mut halvings = 0;
+        loop {
+            match prepare(self.step_of(halvings)?) {
+                Err(InertiaError::Singular { .. }) if halvings + 1 < self.control.lengths() => halvings += 1,
+                answer => return answer,
+            }
+        }
     }
 
     /// Judges by the tolerance.

@@ -5,7 +5,7 @@ use core::ffi::c_void;
 use core::mem::MaybeUninit;
 
 use crate::adaptive::{AdaptiveView, Chooser, Request, StorageParts, Taken, vectors_with};
-use crate::guard::{SECOND_RUN, Watch};
+use crate::guard::{Watch, second_run};
 use crate::inertia::LargeModel;
 use crate::state::{NodeVector, StateView};
 use crate::step::Step;
@@ -52,7 +52,7 @@ pub struct supple_adaptive {
 // SAFETY: `repr(C)`, begins with a head.
 unsafe impl Object for supple_adaptive {
     const MAGIC: [u8; 8] = magic(b'A');
-    const FRONT: usize = 86016;
+    const FRONT: usize = 122880;
 }
 
 pub(super) fn layout(vectors: usize) -> Layout {
@@ -123,7 +123,7 @@ pub unsafe extern "C" fn supple_adaptive_init(
         let nodes = open.node_count() as u32;
         let storage = storage(place.arrays::<supple_adaptive>(), vectors);
         let object = place.object::<supple_adaptive>();
-        // Of 38 kB each: they are made where they stay, not on the stack.
+        // Of 57 kB each: they are made where they stay, not on the stack.
         let [first, second] = [&raw mut (*object).first, &raw mut (*object).second]
             .map(|model| &mut *model.cast::<MaybeUninit<LargeModel<'static>>>());
         let points = request.points;
@@ -131,9 +131,19 @@ pub unsafe extern "C" fn supple_adaptive_init(
         let chooser = Chooser::new(&method, scene, points, state.reborrow(), asked)?;
         let StorageParts { first: of_first, second: of_second, .. } = chooser.checked(storage, scene, points)?;
         let step = chooser.shortest()?;
-        LargeModel::prepare_in(first, method, scene, points, state.reborrow(), step, of_first)?;
-        let prepare = |state: StateView<'_>, step, storage: &mut [NodeVector]| {
-            LargeModel::prepare_in(second, SECOND_RUN, scene, points, state, step, storage).map(|_| ())
+        chooser.with_longest(|longest| {
+            let method = method.clone();
+            let model = LargeModel::prepare_in(first, method, scene, points, state.reborrow(), longest, of_first)?;
+            model.change_step(step);
+            Ok(())
+        })?;
+        let prepare = |mut state: StateView<'_>, step, storage: &mut [NodeVector]| {
+            chooser.with_longest(|longest| {
+                let model =
+                    LargeModel::prepare_in(second, second_run(), scene, points, state.reborrow(), longest, storage)?;
+                model.change_step(step);
+                Ok(())
+            })
         };
         let ((), watch) = Watch::prepare(scene, points, state, step, 1, of_second, prepare)?;
         (&raw mut (*object).chooser).write(chooser);

@@ -4,7 +4,7 @@
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
 
-use crate::guard::{Allowed, Estimate, GuardView, SECOND_RUN, Watch, vectors_for};
+use crate::guard::{Allowed, Estimate, GuardView, Watch, second_run, vectors_for};
 use crate::inertia::LargeModel;
 use crate::state::NodeVector;
 use crate::step::{Status, Step};
@@ -31,7 +31,7 @@ pub struct supple_guard_config {
     pub seconds: f32,
     pub damping: f32,
     /// How many times as long the second run's steps are, at least 1 and at least the number of steps between two calls
-    /// of supple_guard_follow. More costs less time, about a multilevel step in so many, and calls more right steps
+    /// of supple_guard_follow. More costs less time, about a long step in so many, and calls more right steps
     /// inexact. 3 is a good choice, the steps of a frame another; 1 for learned steps.
     pub every: u32,
     /// Mean error of the nodes that is allowed, m; 0: a fifth of the mean motion so far, where that is more than a
@@ -70,7 +70,7 @@ pub struct supple_guard {
 // SAFETY: `repr(C)`, begins with a head.
 unsafe impl Object for supple_guard {
     const MAGIC: [u8; 8] = magic(b'G');
-    const FRONT: usize = 43008;
+    const FRONT: usize = 61440;
 }
 
 pub(super) fn layout(vectors: usize) -> Layout {
@@ -130,10 +130,10 @@ pub unsafe extern "C" fn supple_guard_init(
         let nodes = open.node_count() as u32;
         let storage = storage(place.arrays::<supple_guard>(), vectors);
         let object = place.object::<supple_guard>();
-        // Of 38 kB: it is made where it stays, not on the stack.
+        // Of 57 kB: it is made where it stays, not on the stack.
         let second = &mut *(&raw mut (*object).second).cast::<MaybeUninit<_>>();
         let prepare = |state: crate::state::StateView<'_>, step, storage: &mut [NodeVector]| {
-            LargeModel::prepare_in(second, SECOND_RUN, open.view(), points, state, step, storage).map(|_| ())
+            LargeModel::prepare_in(second, second_run(), open.view(), points, state, step, storage).map(|_| ())
         };
         let ((), mut watch) = Watch::prepare(open.view(), points, state, step, config.every, storage, prepare)?;
         watch.allow(allowed);

@@ -1,40 +1,30 @@
-//! Steps beyond the critical one for C: damped, and for comparisons mass-scaled and multilevel.
+//! Steps beyond the critical one for C.
 
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
 
-use crate::inertia::{Cells, Damper, Grid, LargeModel, Method, vectors_for_lattice};
+use crate::inertia::{Cells, Damper, LargeModel, Method, vectors_for_lattice};
 use crate::mlp::Network;
 use crate::state::NodeVector;
 use crate::step::Step;
 
-use super::SUPPLE_NONE;
 use super::loads::{CallLoads, supple_loads};
 use super::memory::{self, Arrays, Head, Layout, Object, Place, array, lasting_bytes, magic, one, place_for, same_abi};
-use super::scene::{OpenScene, check_choice, supple_scene};
+use super::scene::{OpenScene, supple_scene};
 use super::state::{opened_of, supple_state};
 use super::status::{Answer, supple_error, supple_status};
 use super::step::{HostThreads, answer, reported, supple_report, supple_threads, take_steps};
 use supple_status::*;
 
-/// For comparisons with a common method: inertia is raised where the step would be unstable, which slows all motion
-/// down.
-pub const SUPPLE_MASS_SCALED: u32 = 0;
-/// For comparisons: the lattice alone, without the damper. Rough motion, once excited, oscillates for long.
-pub const SUPPLE_MULTILEVEL: u32 = 1;
-/// What steps beyond the critical one should be: inertia is raised where the step would be unstable, smooth motion
-/// keeps its true inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not
-/// carry.
-pub const SUPPLE_DAMPED: u32 = 2;
-
 /// Points that a lattice may have.
 pub const SUPPLE_LATTICE_POINTS: u32 = 1024;
 /// Functions that a lattice may have.
-pub const SUPPLE_LATTICE_FUNCTIONS: u32 = 128;
+pub const SUPPLE_LATTICE_FUNCTIONS: u32 = 240;
 const _: () = assert!(SUPPLE_LATTICE_POINTS as usize == crate::inertia::MAX_POINTS);
 const _: () = assert!(SUPPLE_LATTICE_FUNCTIONS as usize == crate::inertia::MAX_FUNCTIONS);
 
-/// What steps beyond the critical one need.
+/// What steps beyond the critical one need. Inertia is raised where they would be unstable, smooth motion keeps its true
+/// inertia through a coarse lattice, and a small network, the damper, damps what the lattice does not carry.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct supple_large_config {
@@ -42,23 +32,21 @@ pub struct supple_large_config {
     pub struct_size: u32,
     /// SUPPLE_ABI.
     pub abi: u32,
-    /// SUPPLE_DAMPED; SUPPLE_MASS_SCALED and SUPPLE_MULTILEVEL are for comparisons.
-    pub method: u32,
     /// Length of a step, s.
     pub seconds: f32,
     /// Damping proportional to mass, 1/s, zero or more. That of supple_step_config is not used here: give the same
     /// value twice if both kinds of steps move a state.
     pub damping: f32,
-    /// Cells of the lattice along x, y, z; zeros: chosen for the scene. Not used by SUPPLE_MASS_SCALED.
+    /// Cells of the lattice along x, y, z; zeros: chosen for the scene.
     pub cells: [u32; 3],
-    /// NULL: the damper that is part of the library. Otherwise, for SUPPLE_DAMPED, the weight file of another one, at a
-    /// multiple of 4 bytes. It is used where it is and must stay.
+    /// NULL: the damper that is part of the library. Otherwise the weight file of another one, at a multiple of 4 bytes.
+    /// It is used where it is and must stay.
     pub weights: *const c_void,
     /// Its bytes; 0 with NULL.
     pub weights_bytes: usize,
 }
 
-/// Inertia for steps of one length, computed anew a little in each step. One thread at a time. It may be copied with
+/// Inertia for steps of one length, whose stiff part is computed anew where tissue deforms. One thread at a time. It may be copied with
 /// memcpy together with its state.
 #[repr(C, align(64))]
 pub struct supple_large {
@@ -72,11 +60,11 @@ pub struct supple_large {
 // SAFETY: `repr(C)`, begins with a head.
 unsafe impl Object for supple_large {
     const MAGIC: [u8; 8] = magic(b'I');
-    const FRONT: usize = 43008;
+    const FRONT: usize = 61440;
 }
 
 /// Bytes before the arrays of a supple_large.
-pub const SUPPLE_LARGE_FRONT: usize = 43008;
+pub const SUPPLE_LARGE_FRONT: usize = 61440;
 const _: () = assert!(SUPPLE_LARGE_FRONT == <supple_large as Object>::FRONT);
 
 /// A configuration, checked against a scene with these points.
@@ -100,22 +88,12 @@ impl<'a> LargeRequest<'a> {
         let (config, points) = unsafe {
             let config = one(config)?;
             same_abi::<supple_large_config>(config.struct_size, config.abi)?;
-            check_choice(SUPPLE_NONE as usize, config.method, SUPPLE_DAMPED)?;
             (config, array(points.cast::<[f32; 3]>(), open.node_count())?)
         };
         let cells = if config.cells == [0; 3] { Cells::Suggested } else { Cells::Given(config.cells) };
-        let damped = config.method == SUPPLE_DAMPED;
-        let grid = match config.method {
-            SUPPLE_MASS_SCALED => Grid::default(),
-            _ => cells.grid(open.view(), points)?,
-        };
-        let vectors = vectors_for_lattice(
-            open.view().element(),
-            open.view().node_count(),
-            open.view().element_count(),
-            grid,
-            damped,
-        );
+        let scene = open.view();
+        let grid = cells.grid(scene, points)?;
+        let vectors = vectors_for_lattice(scene.element(), scene.node_count(), scene.element_count(), grid);
         Ok(Self { config, points, cells, vectors })
     }
 
@@ -126,16 +104,12 @@ impl<'a> LargeRequest<'a> {
     #[inline(never)]
     pub(super) unsafe fn method(&self) -> Answer<Method<'static>> {
         let Self { config, cells, .. } = *self;
-        Ok(match config.method {
-            SUPPLE_MASS_SCALED => Method::MassScaled,
-            SUPPLE_MULTILEVEL => Method::Multilevel(cells),
-            _ if config.weights.is_null() && config.weights_bytes == 0 => Method::damped(cells),
-            _ => {
-                // SAFETY: the caller's promise.
-                let weights = unsafe { lasting_bytes(config.weights, config.weights_bytes)? };
-                Method::Damped(Damper::new(Network::parse(weights)?)?, cells)
-            }
-        })
+        if config.weights.is_null() && config.weights_bytes == 0 {
+            return Ok(Method::new(cells));
+        }
+        // SAFETY: the caller's promise.
+        let weights = unsafe { lasting_bytes(config.weights, config.weights_bytes)? };
+        Ok(Method::with_damper(Damper::new(Network::parse(weights)?)?, cells))
     }
 }
 
@@ -194,7 +168,7 @@ pub unsafe extern "C" fn supple_large_init(
         let nodes = open.node_count() as u32;
         let storage = storage(place.arrays::<supple_large>(), vectors);
         let object = place.object::<supple_large>();
-        // Of 38 kB: it is made where it stays, not on the stack.
+        // Of 57 kB: it is made where it stays, not on the stack.
         let model = &mut *(&raw mut (*object).model).cast::<MaybeUninit<_>>();
         LargeModel::prepare_in(model, method, open.view(), points, state, step, storage)?;
         (&raw mut (*object).nodes).write(nodes);
@@ -228,11 +202,11 @@ pub(super) unsafe fn storage<'a>(mut arrays: Arrays, vectors: usize) -> &'a mut 
     unsafe { arrays.change(vectors) }
 }
 
-/// Takes `count` steps of the prepared method and length. Stops at the first that is not to be believed: that one is
+/// Takes `count` steps of the prepared length. Stops at the first that is not to be believed: that one is
 /// not taken, the state is as before it, and the status tells. They need no supple_set_step.
 ///
 /// @param loads what acts; NULL: nothing, supports stand still.
-/// @param threads NULL: the calling thread alone. What a cycle assembles and inverts runs on that one in any case.
+/// @param threads NULL: the calling thread alone. The lattice's factorisation runs on that one in any case.
 /// @param report may be NULL; is written whatever the status.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_large_step(

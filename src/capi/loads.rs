@@ -212,7 +212,7 @@ pub unsafe extern "C" fn supple_set_motions(
 }
 
 /// Lets the instruments of a contact touch what these loads act on, as long as both are there; NULL: none do. Learned
-/// and mass-scaled steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
+/// steps refuse loads with instruments, and a library without the feature `contact` refuses them here.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn supple_set_contact(loads: *mut supple_loads, contact: *mut supple_contact) -> supple_status {
     // SAFETY: what the header asks of the caller.

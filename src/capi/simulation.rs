@@ -20,7 +20,7 @@ use super::SUPPLE_NONE;
 use super::adaptive::{self, supple_adaptive, supple_adaptive_init};
 use super::contact::{CallContact, Felt, supple_contact, supple_contact_init, supple_contact_size};
 use super::guard::{self, supple_estimate, supple_guard, supple_guard_config, supple_guard_init};
-use super::large::{self, LargeRequest, SUPPLE_DAMPED, supple_large, supple_large_config, supple_large_init};
+use super::large::{self, LargeRequest, supple_large, supple_large_config, supple_large_init};
 use super::learned::{
     self, MUCH_OUTSIDE, supple_learned, supple_learned_config, supple_learned_init, supple_learned_size,
 };
@@ -38,9 +38,9 @@ use supple_status::*;
 
 /// Exact steps of nine tenths of the critical step, which is looked at again while tissue stiffens.
 pub const SUPPLE_STEPS_EXACT: u32 = 0;
-/// Equal damped steps beyond the critical one, and a guard that estimates their error.
-pub const SUPPLE_STEPS_DAMPED: u32 = 1;
-/// Exact and damped steps whose length keeps the error below a tolerance.
+/// Equal steps beyond the critical one, and a guard that estimates their error.
+pub const SUPPLE_STEPS_LONG: u32 = 1;
+/// Exact and long steps whose length keeps the error below a tolerance.
 pub const SUPPLE_STEPS_AUTO: u32 = 2;
 /// A lead-in of exact steps, then those of a network, with exact ones wherever energy or the guard does not believe it.
 pub const SUPPLE_STEPS_LEARNED: u32 = 3;
@@ -55,7 +55,7 @@ pub struct supple_settings {
     pub abi: u32,
     /// SUPPLE_STEPS_EXACT and so on.
     pub steps: u32,
-    /// Length of the steps, s; 0: chosen. Of damped steps at most so much, 20 critical steps unless given; of exact
+    /// Length of the steps, s; 0: chosen. Of long steps at most so much, 20 critical steps unless given; of exact
     /// ones, a network's included, at most so much, nine tenths of the critical step unless given, and shorter where
     /// the critical step falls; of SUPPLE_STEPS_AUTO the longest, 100 critical steps unless given.
     pub seconds: f32,
@@ -64,13 +64,13 @@ pub struct supple_settings {
     /// Mean error of the nodes that you accept, m; 0: chosen. What SUPPLE_STEPS_AUTO keeps, half a millimetre or less in
     /// bodies below 10 cm unless given, and what a guard calls inexact, a fifth of the motion unless given.
     pub tolerance: f32,
-    /// 1: a guard estimates the error of damped and of learned steps. 0: nothing does.
+    /// 1: a guard estimates the error of long and of learned steps. 0: nothing does.
     pub guard: u32,
     /// 1: exact steps take the place of learned ones that are not to be believed. 0: the call stops there.
     pub fallback: u32,
     /// Seconds of exact steps before a network takes over.
     pub lead_in: f64,
-    /// Cells of the lattice of damped steps along x, y, z; zeros: chosen for the scene.
+    /// Cells of the lattice of long steps along x, y, z; zeros: chosen for the scene.
     pub cells: [u32; 3],
     /// Most forces on nodes that the loads will have.
     pub forces: u32,
@@ -120,7 +120,7 @@ enum Prepared {
     /// They were refused.
     None,
     Exact(Exact),
-    Damped {
+    Long {
         steps: usize,
         guard: usize,
     },
@@ -167,8 +167,8 @@ pub struct supple_sim_report {
     pub call: supple_report,
     /// Exact steps taken.
     pub exact: u32,
-    /// Damped ones.
-    pub damped: u32,
+    /// Steps beyond the critical one.
+    pub long_steps: u32,
     /// Those of a network.
     pub learned: u32,
     /// Steps that were computed and not taken, or taken back.
@@ -184,7 +184,7 @@ impl Reported for supple_sim_report {
     const NOTHING: Self = Self {
         call: supple_report::NOTHING,
         exact: 0,
-        damped: 0,
+        long_steps: 0,
         learned: 0,
         undone: 0,
         shortest: 0.0,
@@ -348,7 +348,7 @@ pub unsafe extern "C" fn supple_sim_advance(
         report.call.close(&state);
         let taken = taken?;
         report.call.steps = taken.steps();
-        (report.exact, report.damped, report.learned) = (taken.exact, taken.long, taken.learned);
+        (report.exact, report.long_steps, report.learned) = (taken.exact, taken.long, taken.learned);
         report.undone = taken.undone;
         [report.shortest, report.longest] = taken.seconds;
         report.estimate = guard::estimated(taken.estimate);
@@ -384,15 +384,14 @@ impl supple_settings {
     }
 
     fn is_guarded(&self) -> bool {
-        self.guard == 1 && matches!(self.steps, SUPPLE_STEPS_DAMPED | SUPPLE_STEPS_LEARNED)
+        self.guard == 1 && matches!(self.steps, SUPPLE_STEPS_LONG | SUPPLE_STEPS_LEARNED)
     }
 
-    /// Of damped steps whose longest has so many seconds.
+    /// Of long steps whose longest has so many seconds.
     fn large(&self, seconds: f32) -> supple_large_config {
         supple_large_config {
             struct_size: size_of::<supple_large_config>() as u32,
             abi: self.abi,
-            method: SUPPLE_DAMPED,
             seconds,
             damping: self.damping,
             cells: self.cells,
@@ -441,7 +440,7 @@ fn size_of_all(body: &supple_scene_config, settings: &supple_settings) -> usize 
     let arrays = |count| Layout::of::<supple_sim>().and::<NodeVector>(count).bytes();
     let steps = match settings.steps {
         SUPPLE_STEPS_EXACT => arrays(of_pace),
-        SUPPLE_STEPS_DAMPED => large::layout(of_method).bytes(),
+        SUPPLE_STEPS_LONG => large::layout(of_method).bytes(),
         SUPPLE_STEPS_AUTO => adaptive::layout(of_pace.saturating_add(of_method).saturating_add(of_guard)).bytes(),
         _ => supple_learned_size(nodes, settings.fallback).saturating_add(arrays(of_pace)),
     };
@@ -625,7 +624,7 @@ unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -> Answer<()
     }
 }
 
-/// The length of damped steps, s.
+/// The length of long steps, s.
 fn seconds_of(settings: &supple_settings, critical: CriticalStep) -> f32 {
     let multiple = if settings.steps == SUPPLE_STEPS_AUTO { LONGEST_STEPS } else { LONG_STEPS };
     settings.given_seconds().unwrap_or(multiple * critical.seconds)
@@ -645,7 +644,7 @@ unsafe fn needed(
     // SAFETY: the caller's promise.
     unsafe {
         let large = settings.large(seconds_of(settings, critical));
-        let damped = || {
+        let long = || {
             let request = LargeRequest::of(open, points.as_ptr().cast(), &raw const large)?;
             if !settings.weights.is_null() {
                 request.method()?;
@@ -656,8 +655,8 @@ unsafe fn needed(
         let exact = |damping| Pace::of(settings.given_seconds(), damping, critical).map(|_| pace);
         let steps = match settings.steps {
             SUPPLE_STEPS_EXACT => exact(settings.damping)?,
-            SUPPLE_STEPS_DAMPED => large::layout(damped()?.vectors).bytes(),
-            SUPPLE_STEPS_AUTO => adaptive::layout(adaptive::vectors_of(open, &damped()?)?).bytes(),
+            SUPPLE_STEPS_LONG => large::layout(long()?.vectors).bytes(),
+            SUPPLE_STEPS_AUTO => adaptive::layout(adaptive::vectors_of(open, &long()?)?).bytes(),
             _ => {
                 let network = Network::parse(lasting_bytes(settings.weights, settings.weights_bytes)?)?;
                 supple_learned_size(nodes as u32, settings.fallback) + exact(network.recipe().damping)?
@@ -703,7 +702,7 @@ unsafe fn made(
         };
         Ok(match settings.steps {
             SUPPLE_STEPS_EXACT => Prepared::Exact(exact(room, settings.damping)?),
-            SUPPLE_STEPS_DAMPED => Prepared::Damped {
+            SUPPLE_STEPS_LONG => Prepared::Long {
                 steps: room.take::<supple_large>(|memory, bytes, made, error| {
                     supple_large_init(memory, bytes, scene, state, first, &raw const large, made, error)
                 })?,
@@ -750,7 +749,7 @@ impl Prepared {
             Ok(match self {
                 Self::None => return Err(SUPPLE_E_NO_STEP.into()),
                 Self::Exact(steps) => Mover::Exact(exact(steps)),
-                Self::Damped { steps, guard } => {
+                Self::Long { steps, guard } => {
                     let (model, storage) = large::opened(at(*steps).cast())?;
                     Mover::Long(model, storage, guarded(*guard)?)
                 }

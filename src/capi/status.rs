@@ -130,7 +130,7 @@ pub enum supple_status {
     SUPPLE_E_DAMPING = -52,
 
     /// A lattice of impossible cells: each count at least 1, SUPPLE_LATTICE_POINTS points and SUPPLE_LATTICE_FUNCTIONS
-    /// functions at most.
+    /// functions at most. Or a mesh that is too small for a lattice of one cell: take exact steps.
     SUPPLE_E_LATTICE = -60,
     /// The state is not finite, or so stiff at `node` that no step can be bounded.
     SUPPLE_E_TOO_STIFF = -61,
@@ -159,7 +159,7 @@ pub enum supple_status {
     /// The step was not taken: instrument `index` would move farther in it, or is farther inside the body at a node,
     /// (value, m) than it may (limit): start outside, move slower.
     SUPPLE_E_DIVERGED_INSTRUMENT = -94,
-    /// The step was not taken: mass-scaled and learned steps cannot meet instruments.
+    /// The step was not taken: learned steps cannot meet instruments.
     SUPPLE_E_NO_CONTACT = -95,
 }
 
@@ -363,9 +363,10 @@ impl From<InertiaError> for supple_error {
         let is = Self::from;
         match error {
             InertiaError::Capacity { needed, capacity, .. } => short(capacity, needed),
-            InertiaError::Cells { .. } | InertiaError::Functions { .. } | InertiaError::Singular { .. } => {
-                is(SUPPLE_E_LATTICE)
-            }
+            InertiaError::Cells { .. }
+            | InertiaError::Functions { .. }
+            | InertiaError::Singular { .. }
+            | InertiaError::TooSmall { .. } => is(SUPPLE_E_LATTICE),
             InertiaError::Points { points, nodes } => mismatch(points, nodes),
             InertiaError::OtherPoints { element } => Self::from(SUPPLE_E_POINTS).at(element),
             InertiaError::Step { seconds, most } => is(SUPPLE_E_STEP).value(seconds.into(), most.into()),
@@ -431,7 +432,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -50 => c"the learned step needs a lead-in up to this moment",
         -51 => c"the network's step is no whole number of the exact one, or of too many",
         -52 => c"the damping is not that of the training",
-        -60 => c"a lattice that cannot be",
+        -60 => c"a lattice that cannot be, or a mesh too small for one",
         -61 => c"too stiff, or not finite",
         -70 => c"not a saved state",
         -71 => c"a saved state of another version",

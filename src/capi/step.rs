@@ -67,11 +67,11 @@ pub struct supple_report {
     pub clipped: f32,
     /// Learned steps: the largest share with an input outside what training has seen.
     pub outside: f32,
-    /// Steps of a supple_large: mean over the nodes of the inertia added, in masses of the node.
+    /// Long steps: mean over the nodes of the inertia added, in masses of the node.
     pub added_mass: f32,
-    /// Steps of a supple_large: most nodes that were held back in a step.
+    /// Long steps: most nodes that were held back in a step.
     pub held_back: u32,
-    /// Multilevel and damped steps: the least share of the lattice's motion that was used in a step; below 0.5 it is
+    /// Long steps: the least share of the lattice's motion that was used in a step; below 0.5 it is
     /// remarked upon.
     pub lattice_share: f32,
     /// What stopped the call, with place and value; status SUPPLE_OK if nothing did.

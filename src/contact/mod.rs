@@ -45,8 +45,8 @@
 //! A body of any form is a [`Field`] of signed distances. Nodes that an instrument grasps ([`Contact::gripping`]) move with it, whatever
 //! force that takes. [`LocalForce`] is the force between two frames, for a haptic loop.
 //!
-//! Multilevel and damped steps solve for the pushes on all nodes together, as these move each other (`pushes.rs`), from those
-//! of the step before. Mass-scaled and learned steps refuse instruments: what they push would be inertia that is not there.
+//! Long steps solve for the pushes on all nodes together, as these move each other (`pushes.rs`), from those
+//! of the step before. Learned steps refuse instruments: what they push would be inertia that is not there.
 //!
 //! An instrument that is thinner than edges are long meets triangles too ([`Surface::with_triangles`]): the push acts on the point of a
 //! triangle that is deepest inside, shared among its corners by the point's weights (`triangle.rs`, `src/step/triangles.rs`).

@@ -1,14 +1,14 @@
 //! Bounds of the tangent of crushed elements with nodal strain ([`super::barrier`]), as those of a law: for the
-//! critical step ([`super::critical_bounds`]), and for steps beyond it ([`super::tile_bounds`]).
+//! critical step ([`super::critical_bounds`]), and for steps beyond it ([`super::tile_tangents`]).
 
 use super::NodeInertia;
 use super::barrier::{BOUNDED, Barrier};
 use super::critical_bounds::{AddBounds, NodeMatrices, Terms};
 use super::crushed::{CrushedElements, CrushedTile, each_marked, mask_of};
 use super::deformation::Deformation;
-use super::stiffness_bound::{Coefficients, MatrixSums};
+use super::stiffness_bound::Coefficients;
 use super::tile::vector_at;
-use super::tile_bounds::{self, Rotation, TileTangents};
+use super::tile_tangents::{Tangent, TileTangents, WriteTangents};
 use super::{ElementTile, Elements};
 use crate::material::{Law, Laws};
 use crate::simd::{Gather, Kernel, NodeVector, Real, ScatterBuffer, TILE, dispatch};
@@ -78,16 +78,15 @@ impl Kernel for CriticalBounds<'_, '_> {
     }
 }
 
-/// The bounds of crushed elements for steps beyond the critical one, see [`tile_bounds::TileBounds`].
-pub(crate) struct CrushedBounds<'a> {
+/// The tangents of crushed elements for the motion of a lattice, see [`super::tile_tangents`].
+pub(crate) struct CrushedTangents<'a> {
     pub(crate) crushed: &'a CrushedTile,
     pub(crate) displacement: Gather<'a>,
-    pub(crate) sums: MatrixSums<'a>,
-    pub(crate) rotations: &'a [Rotation; TILE],
+    /// Factor of the tangents, s^2.
     pub(crate) weight: f32,
 }
 
-impl CrushedBounds<'_> {
+impl CrushedTangents<'_> {
     /// Compiled with this crate, as it is not generic.
     #[inline(never)]
     pub(crate) fn tangents(self) -> TileTangents {
@@ -95,30 +94,22 @@ impl CrushedBounds<'_> {
     }
 }
 
-impl Kernel for CrushedBounds<'_> {
+impl Kernel for CrushedTangents<'_> {
     type Output = TileTangents;
 
     const SCALAR: bool = true;
 
     #[inline(always)]
     fn run<R: Real>(self) -> TileTangents {
-        let Self { crushed: CrushedTile { tile, moduli }, displacement, mut sums, rotations, weight } = self;
-        let mut tangents = TileTangents::NONE;
-        let mut buffer = [ScatterBuffer::NONE; 2];
+        let Self { crushed: CrushedTile { tile, moduli }, displacement, weight } = self;
+        let mut tangents = [Tangent::default(); TILE];
         for first in (0..TILE).step_by(R::COUNT) {
             let deformation = &Deformation::<R>::of_tile(tile, first, displacement);
             let barrier = Barrier::ahead(vector_at::<R>(moduli, first), deformation.invariants);
-            R::run_piece(tile_bounds::AddBounds {
-                tile,
-                first,
-                deformation,
-                coefficients: &Coefficients::of_barrier(&barrier, deformation.invariants),
-                rotations,
-                weight,
-                sums: &mut sums,
-                buffer: &mut buffer,
-                tangents: &mut tangents,
-            });
+            let coefficients = &Coefficients::of_barrier(&barrier, deformation.invariants);
+            let weight = tile.volume::<R>(first) * R::splat(weight);
+            let tangents = tangents.get_mut(first..first + R::COUNT).unwrap_or_default();
+            R::run_piece(WriteTangents { weight, deformation, coefficients, tangents });
         }
         tangents
     }

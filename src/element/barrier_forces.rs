@@ -7,7 +7,7 @@ use super::crushed::CrushedTile;
 use super::deformation::Deformation;
 use super::stiffness_bound::{Coefficients, scalar_bound, scale_of};
 use super::tile::vector_at;
-use crate::simd::{Gather, Kernel, NodeVector, Real, TILE, dispatch, dot, write_rows};
+use crate::simd::{Gather, Kernel, NodeVector, Real, TILE, dispatch, dot};
 
 /// Adds the forces of crushed elements to nodes.
 pub(crate) struct AddCrushed<'a> {
@@ -99,7 +99,7 @@ impl Kernel for CrushedForces<'_> {
                 corners[0][axis] = -(corners[1][axis] + corners[2][axis] + corners[3][axis]);
             }
             for (rows, values) in forces.corners.iter_mut().zip(corners) {
-                write_rows(rows, first, values);
+                R::to_rows(values, |lane, row| rows[(first + lane) % TILE] = row);
             }
         }
         let mut least_of_all = 0.0;

@@ -7,8 +7,8 @@ use crate::simd::{NodeVector, dispatch};
 
 use super::internal_forces::ElementVisitor;
 use super::{
-    CriticalBounds, Extremes, InternalForces, MeanPressure, NoVisitor, PatchBounds, PatchForces, PatchTileBounds,
-    ScalarBound, TileBounds, TileTangents,
+    CriticalBounds, ElementTangents, Extremes, InternalForces, MeanPressure, NoVisitor, PatchBounds, PatchForces,
+    PatchTangents, ScalarBound, TileTangents,
 };
 
 /// The list of loops: `for_each_kernel!(each first..)` calls `each!` with `first..` and then with their names,
@@ -35,12 +35,12 @@ macro_rules! for_each_kernel {
             critical_bounds(CriticalBounds<'_, '_, Self>) -> ();
             /// The same with nodal pressure.
             nodal_pressure_critical_bounds(CriticalBounds<'_, '_, Self, MeanPressure<'_>>) -> ();
-            /// Stiffness bounds of one tile.
-            tile_bounds(TileBounds<'_, Self>) -> TileTangents;
+            /// Tangents of one tile.
+            tangents(ElementTangents<'_, Self>) -> TileTangents;
             /// The same with nodal pressure.
-            nodal_pressure_tile_bounds(TileBounds<'_, Self, MeanPressure<'_>>) -> TileTangents;
-            /// Stiffness bounds of one tile of patches.
-            patch_tile_bounds(PatchTileBounds<'_, Self>) -> TileTangents;
+            nodal_pressure_tangents(ElementTangents<'_, Self, MeanPressure<'_>>) -> TileTangents;
+            /// Tangents of one tile of patches.
+            patch_tangents(PatchTangents<'_, Self>) -> TileTangents;
         }
     };
 }
@@ -77,16 +77,16 @@ macro_rules! implement {
 for_each_law!(implement);
 for_each_kernel! { implement [AnyLaw, #[inline(never)]] }
 
-/// [`ElementLaw::tile_bounds`] for elements, from the volumes of the nodes where these need them.
-pub(crate) fn tile_bounds<L: ElementLaw>(
+/// [`ElementLaw::tangents`] for elements, from the volumes of the nodes where these need them.
+pub(crate) fn tangents<L: ElementLaw>(
     element: Element,
-    kernel: TileBounds<'_, L>,
+    kernel: ElementTangents<'_, L>,
     rows: &[NodeVector],
 ) -> TileTangents {
     if element.is_nodal_pressure() {
-        L::nodal_pressure_tile_bounds(kernel.with_nodal_volumes(rows))
+        L::nodal_pressure_tangents(kernel.with_nodal_volumes(rows))
     } else {
-        L::tile_bounds(kernel)
+        L::tangents(kernel)
     }
 }
 

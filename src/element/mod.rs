@@ -23,47 +23,46 @@ mod patch_bounds;
 mod patch_builder;
 mod patch_deformation;
 mod patch_forces;
-mod patch_tile_bounds;
+mod patch_tangents;
 mod pressure;
 mod stiffness_bound;
 #[cfg(test)]
 mod stiffness_bound_tests;
 pub(crate) mod symmetric;
 mod tile;
-mod tile_bounds;
+mod tile_tangents;
 
 pub use fields::ElementFields;
 pub use kernels::ElementLaw;
-pub(crate) use kernels::{ForcesVisitor, tile_bounds};
+pub(crate) use kernels::{ForcesVisitor, tangents};
 pub use node::{Axes, NodeInertia};
 pub use patch::{Neighbours, PatchLayout, PatchRow, PatchTile, Patches};
 pub(crate) use patch_bounds::PatchBounds;
 pub(crate) use patch_builder::PatchBuilder;
 pub use patch_builder::patch_rows_for;
 pub(crate) use patch_forces::PatchForces;
-pub(crate) use patch_tile_bounds::PatchTileBounds;
+pub(crate) use patch_tangents::PatchTangents;
 pub use tile::ElementTile;
 pub(crate) use tile::MOST_ELEMENTS;
 
 #[cfg(feature = "std")]
 pub(crate) use barrier::{factor as barrier_factor, modulus as barrier_modulus};
-pub(crate) use barrier_bounds::{CrushedBounds, add_crushed_bounds, each_bounded};
+pub(crate) use barrier_bounds::{CrushedTangents, add_crushed_bounds, each_bounded};
 pub(crate) use barrier_forces::{AddCrushed, Forces as CrushedForces};
 pub(crate) use critical_bounds::{CriticalBounds, NodeMatrices};
 pub(crate) use crushed::{
     CrushedElements, LOOK_CYCLE, Look, MARKED, each_marked, forget_crushed, is_marked_at, mark_moment, mask_of, masks,
     masks_mut,
 };
-pub(crate) use fields::stabilising_modulus;
 pub(crate) use fields::{element_energy, element_fields, patch_energy, stabilising_energy};
 #[cfg(feature = "std")]
-pub(crate) use fields::{invariants, pressure_at};
+pub(crate) use fields::{invariants, pressure_at, stabilising_modulus};
 pub(crate) use internal_forces::{Elements, Extremes, InternalForces, NoVisitor, operations};
 pub(crate) use nodal_volume::{NODAL_PRESSURE_OPERATIONS, NodalVolumes, VolumeRows};
 pub(crate) use nodal_volume_bounds::{NodalVolumeBounds, balance, weigh};
 pub(crate) use pressure::{MeanPressure, OwnPressure};
-pub(crate) use stiffness_bound::{MatrixSums, ScalarBound};
-pub(crate) use tile_bounds::{TileBounds, TileTangents};
+pub(crate) use stiffness_bound::ScalarBound;
+pub(crate) use tile_tangents::{ElementTangents, Tangent, TileTangents};
 
 use crate::material::Material;
 

@@ -63,6 +63,11 @@ impl NodeInertia {
         Vec4::select(Vec4::new(x, y, z, 0.0).cmpgt(Vec4::ZERO), Vec4::ONE, Vec4::ZERO)
     }
 
+    /// How many axes are held.
+    pub(crate) fn held_count(&self) -> usize {
+        self.inverse.iter().filter(|&&inverse| inverse <= 0.0).count()
+    }
+
     /// Held axes.
     pub(crate) fn held(&self) -> Axes {
         self.axes_where(|inverse| inverse == 0.0)

@@ -71,30 +71,7 @@ impl PatchTile {
         sum * f64::from(self.inverse_volumes[lane % TILE])
     }
 
-    /// The nodes of the patch at place `lane` with `c_ab / V_a` (1/m), its own node last, and then with their `k_ab`
-    /// (m), zero for it.
-    pub(crate) fn gradients<'a>(
-        &'a self,
-        neighbours: &'a [Neighbours],
-        lane: usize,
-    ) -> impl Iterator<Item = (usize, [f32; 3], f32)> + Clone + 'a {
-        let inverse = self.inverse_volumes[lane % TILE];
-        let mut own = [0.0; 3];
-        let of_neighbours = neighbours.iter().map(Some).chain([None]);
-        of_neighbours.map(move |neighbour| match neighbour {
-            Some(neighbour) => {
-                let gradient = neighbour.gradients.map(|row| row[lane % TILE] * inverse);
-                for (own, along) in own.iter_mut().zip(gradient) {
-                    *own -= along;
-                }
-                (neighbour.nodes[lane % TILE] as usize, gradient, neighbour.couplings[lane % TILE])
-            }
-            None => (self.nodes[lane % TILE] as usize, own, 0.0),
-        })
-    }
-
     /// Calls `with` with the patch's own node and its neighbours and their `c_ab`, m^2.
-    #[cfg(feature = "std")]
     pub(crate) fn each_gradient(&self, neighbours: &[Neighbours], lane: usize, mut with: impl FnMut(usize, DVec3)) {
         let mut own = DVec3::ZERO;
         for neighbour in neighbours {

@@ -20,7 +20,7 @@ use super::deformation::{Deformation, Matrix, Vector};
 use super::internal_forces::{ElementVisitor, Extremes};
 use super::patch::{Neighbours, PatchTile, Patches};
 use super::patch_deformation::{GradientLengths, gradient};
-use super::stiffness_bound::{Bound, Coefficients};
+use super::stiffness_bound::{Coefficients, scalar_bound_of_patches};
 use super::tile::vector_at;
 
 /// Share of the shear modulus at rest in the stabilising energy. Less follows bending on coarse meshes more closely and
@@ -129,8 +129,8 @@ fn stress_of<R: Real, L: Law, V: ElementVisitor>(
     }
     let lengths = GradientLengths::<R>::of(neighbours, first);
     let scale = lengths.sum * vector_at::<R>(&tile.inverse_volumes, first);
-    let coefficients = Coefficients::new::<L>(&law, &local);
-    let scalar = Bound::of_patches(coefficients, &deformation, modulus, scale).scalar;
+    let coefficients = Coefficients::new::<L>(&law, &local).less(modulus);
+    let scalar = scalar_bound_of_patches(&coefficients, &deformation, scale);
     Stress { scalar, own_scalar: scalar.fused(lengths.own, modulus * lengths.couplings), ..stress }
 }
 

@@ -32,13 +32,6 @@
 //! above. At rest this is exactly linear elasticity. In a crushed element `F^-1` is too large: there the first bound is
 //! used.
 //!
-//! **Matrices of the nodes.** With `dF = sum_a v_a (x) ga` and `c = sum_a (C ga).va`, and by Cauchy-Schwarz with the
-//! weights `|C ga|`, the element's tangent is bounded by a matrix that couples no two nodes. It has one 3 x 3 submatrix
-//! (N/m) a node:
-//!
-//! ```text
-//! D_a = V (iso lambda_G I + volume (sum_b |C gb|) (C ga)(C ga)^T / |C ga|),   lambda_G = lambda_max(sum_a ga ga^T)
-//! ```
 //! **Scalar bound.** Between refreshes a step only needs to know how far stiffness has grown. It uses a value (N/m)
 //! that no eigenvalue of the four matrices exceeds, and that takes neither roots nor divisions:
 //!
@@ -51,7 +44,7 @@
 //! at most `(5/4 + 3/2 4/5) |q_ce| |E| |C| + 3/2 floor |C|^2`. `|C|^2` and `|E|^2` are bounded by the invariants.
 
 use crate::material::{Invariants, Law, LawState};
-use crate::simd::{Real, Scatter, ScatterBuffer};
+use crate::simd::Real;
 
 use super::ElementTile;
 use super::barrier::Barrier;
@@ -122,16 +115,9 @@ impl<R: Real> Coefficients<R> {
         Self { p1, p_j: slope * dh * i1, cc, ce, ee: R::splat(0.0), floor }
     }
 
-    /// Of a law without stress or stiffness.
-    #[inline(always)]
-    pub(super) fn zero() -> Self {
-        let zero = R::splat(0.0);
-        Self { p1: zero, p_j: zero, cc: zero, ce: zero, ee: zero, floor: zero }
-    }
-
     /// With `modulus |dF|^2` taken off.
     #[inline(always)]
-    fn less(self, modulus: R) -> Self {
+    pub(super) fn less(self, modulus: R) -> Self {
         Self { p1: self.p1 - modulus, ..self }
     }
 
@@ -146,7 +132,14 @@ impl<R: Real> Coefficients<R> {
         self.p1 + sphere.min(inverted)
     }
 
-    /// `iso` and `volume`, Pa, from `distortion` `|E|^2` and `cofactor` `|C|^2`.
+    /// `iso` and `volume`, Pa.
+    #[inline(always)]
+    pub(super) fn bound(&self, deformation: &Deformation<R>) -> (R, R) {
+        let [distortion, cofactor] = squares(deformation);
+        self.split(deformation.invariants, distortion, cofactor)
+    }
+
+    /// The same from `distortion` `|E|^2` and `cofactor` `|C|^2`.
     #[inline(always)]
     fn split(&self, at: Invariants<R>, distortion: R, cofactor: R) -> (R, R) {
         let ratio = distortion.divide(cofactor.max(R::splat(LEAST))).root();
@@ -178,16 +171,6 @@ pub(super) fn scale_of<R: Real>(tile: &ElementTile, first: usize) -> R {
     tile.volume::<R>(first) * tile.gradient_eigenvalue::<R>(first)
 }
 
-/// `iso` and `volume` of a vector of elements, Pa.
-#[derive(Clone, Copy)]
-pub(super) struct Bound<R> {
-    pub(super) iso: R,
-    pub(super) volume: R,
-    /// Upper bound of the eigenvalues of the nodes' matrices, N/m; of patches per length of `c_ab`, N/m^3.
-    pub(super) scalar: R,
-    coefficients: Coefficients<R>,
-}
-
 /// `|E|^2` and `|C|^2`.
 #[inline(always)]
 fn squares<R: Real>(deformation: &Deformation<R>) -> [R; 2] {
@@ -211,68 +194,42 @@ pub(super) struct SpatialBound<R> {
     pub(super) stress: R,
 }
 
-impl<R: Real> Bound<R> {
-    #[inline(always)]
-    pub(super) fn of(
-        coefficients: Coefficients<R>,
-        tile: &ElementTile,
-        first: usize,
-        deformation: &Deformation<R>,
-    ) -> Self {
-        let at = deformation.invariants;
-        let [distortion, cofactor] = squares(deformation);
-        let (iso, volume) = coefficients.split(at, distortion, cofactor);
-        Self { iso, volume, scalar: scalar_bound(&coefficients, at, scale_of(tile, first)), coefficients }
-    }
+/// The scalar bound of patches with nodal strain, N/m^3 for each length of `c_ab`: as there are fewer of them than
+/// elements, a close one, `scale (iso + volume |C|^2)`, with `scale` in m. `coefficients` are without the stabilising
+/// energy.
+#[inline(always)]
+pub(super) fn scalar_bound_of_patches<R: Real>(
+    coefficients: &Coefficients<R>,
+    deformation: &Deformation<R>,
+    scale: R,
+) -> R {
+    let [distortion, cofactor] = squares(deformation);
+    let (iso, volume) = coefficients.split(deformation.invariants, distortion, cofactor);
+    scale * volume.fused(cofactor, iso.max(R::splat(0.0)))
+}
 
-    /// Of patches with nodal strain, whose stabilising energy has this `modulus` (Pa). As there are fewer of them than
-    /// elements, the scalar bound is a close one: `scale (iso + volume |C|^2)`, with `scale` in m.
-    #[inline(always)]
-    pub(super) fn of_patches(
-        coefficients: Coefficients<R>,
-        deformation: &Deformation<R>,
-        modulus: R,
-        scale: R,
-    ) -> Self {
-        let coefficients = coefficients.less(modulus);
-        let [distortion, cofactor] = squares(deformation);
-        let (iso, volume) = coefficients.split(deformation.invariants, distortion, cofactor);
-        let iso = iso.max(R::splat(0.0));
-        Self { iso, volume, scalar: scale * volume.fused(cofactor, iso), coefficients }
-    }
-
-    /// The bound that rotations do not feel; only for elements that are not crushed. With `modulus`, that of the
-    /// stabilising energy of patches (Pa), `stress` may be negative, as far as that energy resists rotations itself: in
-    /// the principal axes it has `modulus (b_i + b_j) w^2`.
-    #[inline(always)]
-    pub(super) fn spatial(&self, deformation: &Deformation<R>, modulus: Option<R>) -> SpatialBound<R> {
-        let (zero, one) = (R::splat(0.0), R::splat(1.0));
-        let Coefficients { p1, p_j, cc, ce, ee, .. } = self.coefficients;
-        let volume_ratio = one + deformation.invariants.j;
-        let b = deformation.left_cauchy_green();
-        let pressure = p_j * volume_ratio;
-        let tension = p1.fused(b.largest_eigenvalue(), pressure);
-        let difference = b.scaled_plus(one, -volume_ratio);
-        let square = difference.xx * difference.xx
-            + difference.yy * difference.yy
-            + difference.zz * difference.zz
-            + R::splat(2.0)
-                * (difference.xy * difference.xy + difference.yz * difference.yz + difference.zx * difference.zx);
-        let mixed = ce.abs() * square.root() * volume_ratio;
-        let least = match modulus {
-            Some(modulus) => {
-                let trace = b.trace();
-                -(modulus * (trace - b.scaled_plus(-one, trace).largest_eigenvalue()).max(zero))
-            }
-            None => zero,
-        };
-        let stress = tension.max(least);
-        let shear = ((tension - stress) - (pressure + pressure)).max(zero);
-        SpatialBound {
-            shear: shear + ee * square + R::splat(1.0 / SPATIAL_SPLIT) * mixed,
-            volume: (pressure + cc * volume_ratio * volume_ratio + R::splat(SPATIAL_SPLIT) * mixed).max(zero),
-            stress,
-        }
+/// The bound that rotations do not feel; only for elements that are not crushed.
+#[inline(always)]
+pub(super) fn spatial_bound<R: Real>(coefficients: &Coefficients<R>, deformation: &Deformation<R>) -> SpatialBound<R> {
+    let (zero, one) = (R::splat(0.0), R::splat(1.0));
+    let &Coefficients { p1, p_j, cc, ce, ee, .. } = coefficients;
+    let volume_ratio = one + deformation.invariants.j;
+    let b = deformation.left_cauchy_green();
+    let pressure = p_j * volume_ratio;
+    let tension = p1.fused(b.largest_eigenvalue(), pressure);
+    let stress = tension.max(zero);
+    let difference = b.scaled_plus(one, -volume_ratio);
+    let square = difference.xx * difference.xx
+        + difference.yy * difference.yy
+        + difference.zz * difference.zz
+        + R::splat(2.0)
+            * (difference.xy * difference.xy + difference.yz * difference.yz + difference.zx * difference.zx);
+    let mixed = ce.abs() * square.root() * volume_ratio;
+    let shear = ((tension - stress) - (pressure + pressure)).max(zero);
+    SpatialBound {
+        shear: shear + ee * square + R::splat(1.0 / SPATIAL_SPLIT) * mixed,
+        volume: (pressure + cc * volume_ratio * volume_ratio + R::splat(SPATIAL_SPLIT) * mixed).max(zero),
+        stress,
     }
 }
 
@@ -293,58 +250,5 @@ impl ElementVisitor for ScalarBound {
         local: &LawState<R>,
     ) -> R {
         scalar_bound(&Coefficients::<R>::new::<L>(law, local), local.at, scale_of(tile, first))
-    }
-}
-
-/// Sums over the elements, for each node: the matrices `D_a` as `xx, yy, zz` and `xy, yz, zx`. The fourth component of
-/// the first vector is the sum of [`scalar_bound`].
-pub(crate) struct MatrixSums<'a> {
-    pub(crate) diagonal: Scatter<'a>,
-    pub(crate) off_diagonal: Scatter<'a>,
-}
-
-impl MatrixSums<'_> {
-    /// Adds the matrices of the elements from place `first` of a tile on. They are in the frame of the rows of
-    /// `cofactor`.
-    #[inline(always)]
-    pub(super) fn add<R: Real>(
-        &mut self,
-        bound: &Bound<R>,
-        tile: &ElementTile,
-        first: usize,
-        cofactor: &[[R; 3]; 3],
-        [diagonal_buffer, off_diagonal_buffer]: &mut [ScatterBuffer<4>; 2],
-    ) {
-        let volume = tile.volume::<R>(first);
-        let isotropic = volume * bound.iso * tile.gradient_eigenvalue::<R>(first);
-        let mut images = [[R::splat(0.0); 3]; 4];
-        for corner in 0..3 {
-            let gradient = tile.gradients::<R>(corner, first);
-            for i in 0..3 {
-                let c = &cofactor[i];
-                images[corner + 1][i] = c[0] * gradient[0] + c[1] * gradient[1] + c[2] * gradient[2];
-                images[0][i] = images[0][i] - images[corner + 1][i];
-            }
-        }
-        // A loop, because the compiler does not unroll `map` over four vectors.
-        let mut lengths = [R::splat(0.0); 4];
-        for (length, [x, y, z]) in lengths.iter_mut().zip(images) {
-            *length = (x * x + y * y + z * z).root();
-        }
-        let Some(nodes) = self.diagonal.checked::<R, 4>(tile.nodes()) else {
-            return;
-        };
-        let weight = volume * bound.volume * (lengths[0] + lengths[1] + lengths[2] + lengths[3]);
-        let mut diagonal = [[R::splat(0.0); 4]; 4];
-        let mut off_diagonal = [[R::splat(0.0); 4]; 4];
-        for (corner, ([x, y, z], length)) in images.into_iter().zip(lengths).enumerate() {
-            // Avoids 0 / 0; a length below this limit contributes nothing.
-            let weight = weight.divide(length.max(R::splat(1e-12)));
-            let (wx, wy, wz) = (weight * x, weight * y, weight * z);
-            diagonal[corner] = [isotropic + wx * x, isotropic + wy * y, isotropic + wz * z, bound.scalar];
-            off_diagonal[corner] = [wx * y, wy * z, wz * x, R::splat(0.0)];
-        }
-        self.diagonal.add_corners(&nodes, first, diagonal, diagonal_buffer);
-        self.off_diagonal.add_corners(&nodes, first, off_diagonal, off_diagonal_buffer);
     }
 }

@@ -113,23 +113,6 @@ impl ElementTile {
         vector_at(&self.volumes, first)
     }
 
-    /// The elements of at most [`TILE`] places, each `TILE` times the index of a tile plus that in the tile.
-    #[inline(always)]
-    pub(crate) fn gather(tiles: &[Self], places: &[u32]) -> Self {
-        let mut gathered = Self::EMPTY;
-        for lane in 0..TILE {
-            let Some(&place) = places.get(lane).or_else(|| places.first()) else {
-                return gathered;
-            };
-            gathered.copy_element(lane, tiles, place);
-            // Places without an element have volume zero.
-            if lane >= places.len() {
-                gathered.volumes[lane] = 0.0;
-            }
-        }
-        gathered
-    }
-
     /// Copies the element at a place of some tiles to place `lane`.
     #[inline(always)]
     pub(crate) fn copy_element(&mut self, lane: usize, tiles: &[Self], place: u32) {

@@ -1,8 +1,8 @@
-//! May a step be believed? A *second run* moves the same body by multilevel steps that are several times as long as
+//! May a step be believed? A *second run* moves the same body by long steps without a damper, several times as long as
 //! those of the first run, under the same loads. The distance between the two runs estimates the error of the first:
 //! the second is the less accurate one, so the distance is mostly an error of its own. That holds on bodies, materials
 //! and loads that nobody has tuned anything on, and for every method: exact steps above their critical one,
-//! mass-scaled, multilevel, damped and learned ones. A frozen body shows, because the second run's lattice has the true
+//! long and learned ones. A frozen body shows, because the second run's lattice has the true
 //! inertia of smooth motion.
 //!
 //! Step doubling (Hairer, Norsett & Wanner 1993, II.4) takes the difference as the leading term of an error of known
@@ -11,7 +11,7 @@
 //! larger: `docs/accuracy.md`.
 //!
 //! Comparisons take place at each of the first three steps, where the second run takes two steps in one of the first,
-//! after two steps more, after three more, and so on up to what the caller says ([`EVERY`]). A guard costs a multilevel
+//! after two steps more, after three more, and so on up to what the caller says ([`EVERY`]). A guard costs such a
 //! step in each comparison, and memory for a second state and the second run's inertia ([`vectors_for`]). A scene
 //! without a guard pays nothing, and knows nothing of its error.
 //!
@@ -41,21 +41,26 @@ use estimate::Envelope;
 /// and calls more right steps inexact.
 pub const EVERY: u32 = 3;
 /// The same for learned steps: their error does not grow with their length, and they take far more time than a
-/// multilevel step.
+/// long step.
 pub const EVERY_LEARNED: u32 = 1;
 /// The estimate over the distance of the two runs.
 pub const ESTIMATE: f32 = 2.0;
+/// The same where the second run's steps are at least [`EVERY`] times as long: its own error is larger.
+pub const ESTIMATE_OF_LONG: f32 = 1.5;
 
 /// Lengths of its steps by which the second run may be behind the first.
 const MOST_BEHIND: f64 = 2.0;
 /// Relative error of times that are sums of steps.
 const ROUNDING: f64 = 1e-4;
 
-pub(crate) const SECOND_RUN: Method<'static> = Method::Multilevel(Cells::Suggested);
+/// How the second run steps.
+pub(crate) fn second_run() -> Method<'static> {
+    Method::new(Cells::Suggested)
+}
 
 /// Vectors of storage that a guard needs on a scene with these `points` (m).
 pub fn vectors_for<M: Material>(scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<usize, InertiaError> {
-    Ok(vectors_of_state(scene.element(), scene.node_count()) + vectors_for_method(&SECOND_RUN, scene, points)?)
+    Ok(vectors_of_state(scene.element(), scene.node_count()) + vectors_for_method(&second_run(), scene, points)?)
 }
 
 /// No fewer than a guard needs on any scene of so many nodes and elements.
@@ -108,7 +113,7 @@ impl GuardModel {
         storage: &mut [NodeVector],
     ) -> Result<Self, InertiaError> {
         let (second, watch) = Watch::prepare(scene, points, state, step, every, storage, |state, step, storage| {
-            LargeModel::prepare(SECOND_RUN, scene, points, state, step, storage)
+            LargeModel::prepare(second_run(), scene, points, state, step, storage)
         })?;
         Ok(Self { second, watch })
     }
@@ -163,7 +168,8 @@ impl Watch {
             }
         };
         let seen = Some(state.progress.mark());
-        let envelope = Envelope::new(points);
+        let factor = if every < EVERY { ESTIMATE } else { ESTIMATE_OF_LONG };
+        let envelope = Envelope::new(points, factor);
         Ok((second, Self { progress, nodes, longest: longest.seconds(), interval: 0.0, seen, envelope }))
     }
 
@@ -420,7 +426,7 @@ mod tests {
     /// A body that drifts far away, so slowly that rounding would stop it: the second run arrives where the first does.
     #[test]
     fn the_second_run_does_not_lose_slow_motion() {
-        let bar = Bar { size: [0.004; 3], cells: [1, 1, 1] };
+        let bar = Bar { size: [0.008, 0.008, 0.016], cells: [2, 2, 4] };
         let (points, scene) = scene_of(NeoHookean { c: 2e6, d: 2e8 }, bar);
         let step = Step::unchecked(1e-6, 0.0).unwrap();
         let mut state = VecState::at_rest(scene.node_count());

@@ -4,7 +4,7 @@
 use bytemuck::{Pod, Zeroable, must_cast, must_cast_ref};
 use glam::Vec4;
 
-use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS};
+use super::lattice::{CoarseVectors, Lattice, LatticeNode};
 use crate::simd::{NodeVector, Real, TILE};
 
 /// Most vectors that [`TILE`] nodes fill. There are separate sums for each of the [`TILE`] places, so the bits do not
@@ -77,9 +77,15 @@ impl CellPolynomial {
         }
     }
 
-    /// Adds `W^T v` of a node.
+    /// The sum of further values of the nodes.
+    pub(super) const fn values(&self) -> f32 {
+        self.0[0][3]
+    }
+
+    /// Adds `W^T v` of a node, and a further value.
     #[inline(always)]
-    pub(super) fn add(&mut self, place: &LatticeNode, v: [f32; 3]) {
+    pub(super) fn add(&mut self, place: &LatticeNode, v: [f32; 3], value: f32) {
+        self.0[0][3] += value;
         let [x, y, z] = place.within();
         let products = monomials([x, y, z]);
         for (sums, of) in self.0.as_flattened_mut().chunks_exact_mut(4).zip(products) {
@@ -122,29 +128,38 @@ fn monomials<R: Real>([x, y, z]: [R; 3]) -> [R; 8] {
 pub(super) struct CellAccumulator<R> {
     cell: usize,
     sums: [[[R; 3]; 8]; VECTORS_PER_TILE],
+    values: [R; VECTORS_PER_TILE],
 }
 
 impl<R: Real> CellAccumulator<R> {
     #[inline(always)]
     /// `cell` is that of the first node.
     pub(super) fn new(cell: usize) -> Self {
-        Self { cell, sums: [[[R::splat(0.0); 3]; 8]; VECTORS_PER_TILE] }
+        let zero = R::splat(0.0);
+        Self { cell, sums: [[[zero; 3]; 8]; VECTORS_PER_TILE], values: [zero; VECTORS_PER_TILE] }
     }
 
-    /// Adds `W^T v` of a vector of nodes, the one with index `vector` in its tile.
+    /// Adds `W^T v` of a vector of nodes, the one with index `vector` in its tile, and further values of them.
     #[inline(always)]
-    pub(super) fn add(&mut self, cells: &mut CellSlots<'_>, nodes: &NodesInCells<'_, R>, vector: usize, v: [R; 3]) {
+    pub(super) fn add(
+        &mut self,
+        cells: &mut CellSlots<'_>,
+        nodes: &NodesInCells<'_, R>,
+        vector: usize,
+        v: [R; 3],
+        value: R,
+    ) {
         let of = monomials(nodes.position);
         let [mut cell, last] = nodes.ends;
         if cell == last {
             self.enter(cells, cell);
-            self.add_products(vector, &of, v);
+            self.add_products(vector, &of, v, value);
             return;
         }
         loop {
             self.enter(cells, cell);
             let mask = nodes.mask(cell);
-            self.add_products(vector, &of, [mask * v[0], mask * v[1], mask * v[2]]);
+            self.add_products(vector, &of, [mask * v[0], mask * v[1], mask * v[2]], mask * value);
             if cell >= last {
                 return;
             }
@@ -153,7 +168,9 @@ impl<R: Real> CellAccumulator<R> {
     }
 
     #[inline(always)]
-    fn add_products(&mut self, vector: usize, of: &[R; 8], v: [R; 3]) {
+    fn add_products(&mut self, vector: usize, of: &[R; 8], v: [R; 3], value: R) {
+        let sum = &mut self.values[vector % VECTORS_PER_TILE];
+        *sum = *sum + value;
         for (sums, of) in self.sums[vector % VECTORS_PER_TILE].iter_mut().zip(of) {
             for (sum, v) in sums.iter_mut().zip(v) {
                 *sum = of.fused(v, *sum);
@@ -178,11 +195,12 @@ impl<R: Real> CellAccumulator<R> {
         };
         for monomial in 0..8 {
             let mut sum = Vec4::ZERO;
-            for sums in self.sums.iter().take(TILE / R::COUNT) {
+            for (sums, &values) in self.sums.iter().zip(&self.values).take(TILE / R::COUNT) {
                 let [x, y, z] = sums[monomial];
+                let value = if monomial == 0 { values } else { R::splat(0.0) };
                 let mut rows = [[0.0; 4]; TILE];
                 let here = rows.get_mut(..R::COUNT).unwrap_or_default();
-                R::to_consecutive_rows([x, y, z, R::splat(0.0)], here);
+                R::to_consecutive_rows([x, y, z, value], here);
                 for row in rows.into_iter().take(R::COUNT) {
                     sum += Vec4::from(row);
                 }
@@ -191,7 +209,7 @@ impl<R: Real> CellAccumulator<R> {
                 *place = (Vec4::from(*place) + sum).to_array();
             }
         }
-        self.sums = [[[R::splat(0.0); 3]; 8]; VECTORS_PER_TILE];
+        *self = Self::new(self.cell);
     }
 }
 
@@ -211,9 +229,9 @@ pub(super) fn motion_at<R: Real>(cells: &[CellPolynomial], nodes: &NodesInCells<
     moved
 }
 
-/// `W^T v` for each function, from the sums of the cells.
-pub(super) fn restrict(cells: &[CellPolynomial], lattice: &Lattice) -> CoarseVectors {
-    let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
+/// Writes `W^T v` for each function, from the sums of the cells.
+pub(super) fn restrict(cells: &[CellPolynomial], lattice: &Lattice, sums: &mut CoarseVectors) {
+    sums.fill(NodeVector::ZERO);
     for (index, cell) in cells.iter().enumerate() {
         let [a, b, c, d, e, f, g, h] = cell.vectors();
         let (a, c, e, g) = (a - b, c - d, e - f, g - h);
@@ -225,7 +243,6 @@ pub(super) fn restrict(cells: &[CellPolynomial], lattice: &Lattice) -> CoarseVec
             }
         }
     }
-    sums
 }
 
 /// Sets the coefficients of each cell from vectors of the functions.

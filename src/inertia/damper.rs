@@ -18,16 +18,6 @@
 //! from the body. The energy of the step, `c^T S c + y^T M y` with `y` orthogonal to the lattice in `M`, need not fall
 //! where the added inertia differs much between nodes. So [`MOST`] is small: with 0.2 and a gain of 20 some meshes
 //! whose elements differ in volume by a factor of a thousand diverged. With `d = 0` this is the stable step.
-//!
-//! **Second order.** Without rough motion the remaining error comes from the inertia added to the lattice. With
-//! `S = M + A` and `T = S^-1 A` the true inverse is `M^-1 = (1 + T + T^2 + ...) S^-1`; a damped step uses
-//!
-//! ```text
-//! Z = S^-1 + S^-1 M S^-1 A S^-1 = (1 + T - T^2) S^-1
-//! ```
-//! instead of `S^-1`. For an eigenvalue `t` of `T`, from 0 to 1, `Z M` is `1 - 2 t^2 + t^3` instead of `1 - t`. `Z A`,
-//! which must be at most one for stability, is `t + t^2 - t^3 <= 1`, so no margin is used up. The series up to `T`
-//! would need twice the margin.
 
 use core::fmt;
 
@@ -68,7 +58,7 @@ impl core::error::Error for DamperError {}
 /// A network that decides how much of the rough motion a step removes.
 #[derive(Clone, Debug)]
 pub struct Damper<'w> {
-    /// None would damp nothing, and never is: a test reads the built-in one.
+    /// None damps nothing.
     network: Option<Network<'w>>,
 }
 

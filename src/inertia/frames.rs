@@ -1,13 +1,12 @@
-//! Rotation of the tissue since its bounds were computed. Bounds have directions (volume is stiff along `C ga`), so
-//! between two refreshes they must rotate with the tissue: without that a step of twenty times the critical one is
-//! unstable once the body has rotated by 15 degrees. Each lattice function has a frame: the columns, made orthonormal
-//! (Gram-Schmidt), of the deformation gradient of a tetrahedron of four of its nodes. Its rotation is that from the
-//! frame at the start of the cycle to the present one. Bounds are summed, inverted and applied in the frames at the
-//! start of their cycle.
+//! Rotation of the tissue: each lattice function has a frame, the columns, made orthonormal (Gram-Schmidt), of the
+//! deformation gradient of a tetrahedron of four of its nodes. `S` is used in the frames in which it was computed: its
+//! added inertia is ten thousand times the mass, and resists a rotation if it is behind it by a few degrees.
 
+use bytemuck::{Pod, Zeroable};
 use glam::Mat3;
 
-use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
+use super::lattice::Lattice;
+use crate::copy::copy;
 use crate::simd::NodeVector;
 
 /// A 3 x 3 matrix by rows.
@@ -15,104 +14,60 @@ pub(super) type Matrix = [[f32; 3]; 3];
 
 const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// A rotation from the frame at the start of a cycle to the present one.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Rotation(pub(super) Matrix);
-
-impl Rotation {
-    pub(super) const NONE: Self = Self(IDENTITY);
-
-    /// From the frame to the world.
-    #[inline(always)]
-    pub(super) fn in_world(&self, v: [f32; 3]) -> [f32; 3] {
-        self.0.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
-    }
-
-    /// From the world to the frame.
-    #[inline(always)]
-    pub(super) fn in_frame(&self, v: [f32; 3]) -> [f32; 3] {
-        let [x, y, z] = self.0;
-        let along = |x: f32, y: f32, z: f32| x * v[0] + y * v[1] + z * v[2];
-        [along(x[0], y[0], z[0]), along(x[1], y[1], z[1]), along(x[2], y[2], z[2])]
-    }
-}
-
 /// Four nodes that define a frame, and the inverse of the matrix of their edges at rest, 1/m.
-#[derive(Clone, Copy, Debug)]
-struct FrameNodes {
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct FrameNodes {
     nodes: [u32; 4],
     inverse: Matrix,
 }
 
-/// The frames of the functions, and a last one that never rotates, for nodes without a function.
-#[derive(Clone, Debug)]
-pub(super) struct Frames {
-    functions: usize,
-    nodes: [FrameNodes; MAX_FUNCTIONS],
-    /// Frames at the start of the cycle whose bounds are in use, at the start of the present cycle, and now.
-    in_use: [Matrix; MAX_FUNCTIONS],
-    under_way: [Matrix; MAX_FUNCTIONS],
-    latest: [Matrix; MAX_FUNCTIONS],
+/// The frames of the functions, in the caller's storage.
+pub(super) struct Frames<'a> {
+    pub(super) nodes: &'a mut [FrameNodes],
+    pub(super) latest: &'a mut [Matrix],
     /// Rotations in the latest step.
-    in_latest_step: [Matrix; MAX_FUNCTIONS],
-    /// Rotations from the first two of these to the last.
-    pub(super) of_bounds: [Rotation; MAX_FUNCTIONS + 1],
-    pub(super) of_cycle: [Rotation; MAX_FUNCTIONS + 1],
+    pub(super) in_latest_step: &'a mut [Matrix],
+    /// Frames when `S` was computed, and rotations since.
+    pub(super) of_stiffness: &'a mut [Matrix],
+    pub(super) since_stiffness: &'a mut [Matrix],
 }
 
-impl Frames {
-    pub(super) const NONE: Self = Self {
-        functions: 0,
-        nodes: [FrameNodes { nodes: [0; 4], inverse: [[0.0; 3]; 3] }; MAX_FUNCTIONS],
-        in_use: [IDENTITY; MAX_FUNCTIONS],
-        under_way: [IDENTITY; MAX_FUNCTIONS],
-        latest: [IDENTITY; MAX_FUNCTIONS],
-        in_latest_step: [IDENTITY; MAX_FUNCTIONS],
-        of_bounds: [Rotation::NONE; MAX_FUNCTIONS + 1],
-        of_cycle: [Rotation::NONE; MAX_FUNCTIONS + 1],
-    };
-
+impl Frames<'_> {
     /// Chooses four nodes for each function, far apart from each other.
     pub(super) fn choose(&mut self, lattice: &Lattice, points: &[[f32; 3]]) {
-        self.functions = lattice.functions();
-        for (function, nodes) in self.nodes.iter_mut().enumerate().take(self.functions) {
+        for (function, nodes) in self.nodes.iter_mut().enumerate() {
             *nodes = choose(function, lattice, points);
         }
-    }
-
-    pub(super) const fn functions(&self) -> usize {
-        self.functions
+        self.latest.fill(IDENTITY);
     }
 
     /// Computes the present frames and rotations.
     pub(super) fn update(&mut self, displacement: &[NodeVector]) {
-        let turns = self.latest.iter_mut().zip(&mut self.in_latest_step);
-        let frames = self.nodes.iter().zip(turns).take(self.functions);
-        let starts = self.in_use.iter().zip(&self.under_way);
-        let rotations = self.of_bounds.iter_mut().zip(&mut self.of_cycle);
-        for (((nodes, (latest, turn)), (in_use, under_way)), (of_bounds, of_cycle)) in frames.zip(starts).zip(rotations)
-        {
+        let turns = self.latest.iter_mut().zip(&mut *self.in_latest_step);
+        let since = self.of_stiffness.iter().zip(&mut *self.since_stiffness);
+        for ((nodes, (latest, turn)), (start, since)) in self.nodes.iter().zip(turns).zip(since) {
             // A collapsed tetrahedron has no frame: the last one is kept.
             let previous = *latest;
             if let Some(basis) = nodes.basis(displacement) {
                 *latest = basis;
             }
             *turn = times_transposed(latest, &previous);
-            *of_bounds = Rotation(times_transposed(latest, in_use));
-            *of_cycle = Rotation(times_transposed(latest, under_way));
+            *since = times_transposed(latest, start);
         }
     }
 
-    /// Starts a cycle: its bounds are computed in the present frames.
-    pub(super) fn start_cycle(&mut self) {
-        self.under_way = self.latest;
-        self.of_cycle = [Rotation::NONE; MAX_FUNCTIONS + 1];
+    /// `S` is computed in the present frames.
+    pub(super) fn start_stiffness(&mut self) {
+        copy(self.of_stiffness, self.latest);
+        self.since_stiffness.fill(IDENTITY);
     }
 
-    /// Ends a cycle: its bounds are in use from now on.
-    pub(super) fn end_cycle(&mut self) {
-        self.in_use = self.under_way;
-        self.of_bounds = self.of_cycle;
+    /// Rotation of a function since `S` was computed.
+    #[inline(always)]
+    pub(super) fn since_stiffness(&self, function: usize) -> Mat3 {
+        let turn = self.since_stiffness.get(function).unwrap_or(&IDENTITY);
+        Mat3::from_cols_array_2d(turn).transpose()
     }
 
     /// Rotation in the latest step.
@@ -124,36 +79,7 @@ impl Frames {
 
     /// Rotation of each function since rest.
     pub(super) fn since_rest(&self) -> &[Matrix] {
-        self.latest.get(..self.functions).unwrap_or_default()
-    }
-
-    /// Rotation of each function since its bounds were computed that are in use.
-    pub(super) fn of_functions(&self) -> &[Rotation] {
-        self.of_bounds.get(..self.functions).unwrap_or_default()
-    }
-
-    /// Rotation of a frame since its bounds were computed that are in use.
-    #[inline(always)]
-    pub(super) fn since_bounds(&self, frame: usize) -> Rotation {
-        self.of_bounds.get(frame).copied().unwrap_or(Rotation::NONE)
-    }
-
-    /// Rotation of a frame since the start of the present cycle.
-    #[inline(always)]
-    pub(super) fn since_start(&self, frame: usize) -> Rotation {
-        self.of_cycle.get(frame).copied().unwrap_or(Rotation::NONE)
-    }
-}
-
-/// Rotates the vector of each function, from its frame or into it.
-pub(super) fn rotate(
-    vectors: &mut CoarseVectors,
-    rotations: &[Rotation],
-    by: impl Fn(&Rotation, [f32; 3]) -> [f32; 3],
-) {
-    for (vector, rotation) in vectors.iter_mut().zip(rotations) {
-        let [x, y, z] = by(rotation, vector.to_array());
-        vector.0 = [x, y, z, 0.0];
+        self.latest
     }
 }
 

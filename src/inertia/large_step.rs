@@ -1,30 +1,31 @@
-//! A mass-scaled, multilevel or damped step as one object: a method, prepared for a scene and a step length, in the
-//! caller's storage.
+//! A long step as one object: a method, prepared for a scene and a step length, in the caller's storage.
 
 use core::mem::MaybeUninit;
 
-use bytemuck::must_cast_slice_mut;
+use bytemuck::{must_cast_slice, must_cast_slice_mut};
 use glam::{DMat3, DVec3};
 
-use crate::element::{ElementMaterial, ElementTile};
+use crate::element::{ElementMaterial, ElementTile, ScalarBound};
 use crate::loads::Loads;
 use crate::material::Element;
 use crate::scene::SceneView;
-use crate::simd::{Contiguous, NodeVector};
+use crate::simd::NodeVector;
 use crate::state::{Moment, Progress, StateView};
-use crate::step::{CallingThread, Status, Step, Threads, nodal_volumes};
+use crate::step::{CallingThread, Status, Step, Threads, internal_forces, nodal_volumes};
+use crate::tled::each_rate;
 
-use super::cell_boxes::sort_by_box;
+use super::coarse_motion::CoarseSpace;
+use super::coarse_room::CoarseRoom;
 use super::damper::RoughMotion;
-use super::lattice::{Grid, Lattice, LatticeNode, node_at, rank_of, sort_by_cell};
-use super::matrices::Matrices;
-use super::method::{Cells, Method, largest_grid, vectors_for_lattice, vectors_of_order, vectors_of_places};
+use super::lattice::{Grid, Lattice, LatticeNode, node_at, sort_by_cell};
+use super::matrices::{Bands, Matrices};
+use super::method::{Cells, Method, largest_grid, pieces, vectors_for_lattice, vectors_of_places};
 use super::node::{Scaling, half_damping};
-use super::node_tables::{NodeTables, read_matrices};
-use super::refresh::{Refresh, RefreshInput};
-use super::{
-    COARSE, CYCLE, CYCLE_STEPS, FINE, FINE_WITHOUT_LATTICE, InertiaError, LATTICE_CYCLE_STEPS, Report, node_tables,
-};
+use super::node_tables::NodeTables;
+use super::renewal::{Renewal, RenewalInput};
+use super::rest_check::{FEWEST, MOST_RATIO, RestCheck, longer_step, stiffening};
+
+use super::{COARSE, FINE, InertiaError, LARGEST_MOVE, Report, node_tables};
 
 /// A prepared step without its storage; it may be moved in memory.
 #[derive(Clone, Debug)]
@@ -32,8 +33,6 @@ pub struct LargeModel<'w> {
     pub(super) nodes: usize,
     pub(super) elements: usize,
     pub(super) element: Element,
-    /// Elements that touch a node that motions may move: the first ones in the order.
-    pub(super) moved_elements: usize,
     /// Checksum of the scene.
     scene: u32,
     /// The state after the latest step, or at the preparation: inertia belongs to it.
@@ -44,13 +43,15 @@ pub struct LargeModel<'w> {
     /// The next step, at most as long as the one that it was prepared for.
     pub(super) step: Step,
     prepared: Step,
+    /// What the stiffness in `S` is multiplied by, in steps up to the first one (s) and in longer ones
+    /// ([`super::rest_check`]).
+    stiffening: [f32; 2],
+    first: f32,
     /// Inertia in use is that of another length of step.
     pub(super) is_for_other_step: bool,
     pub(super) lattice: Lattice,
-    pub(super) refresh: Refresh,
+    pub(super) renewal: Renewal,
     pub(super) scaling: Scaling,
-    /// The least share of its inverse inertia that a node used in the latest step.
-    pub(super) least_share: f32,
     pub(super) report: Report,
 }
 
@@ -58,40 +59,33 @@ pub struct LargeModel<'w> {
 pub(super) struct Storage<'a> {
     pub(super) tables: NodeTables<'a>,
     pub(super) places: &'a mut [LatticeNode],
-    /// The elements in the order of their boxes of cells (`assembly.rs`); empty without a lattice, and with nodal
-    /// strain.
-    pub(super) order: &'a mut [u32],
     pub(super) matrices: Matrices<'a>,
+    pub(super) room: CoarseRoom<'a>,
 }
 
 impl<'a> Storage<'a> {
-    /// None if `storage` is shorter than [`vectors_for_lattice`].
+    /// None if `storage` is shorter than [`super::vectors_for_lattice`].
     pub(super) fn split(
         storage: &'a mut [NodeVector],
         element: Element,
         [nodes, elements]: [usize; 2],
         lattice: &Lattice,
-        damped: bool,
+        bands: &Bands,
     ) -> Option<Self> {
-        let (tables, rest) = storage.split_at_mut_checked(node_tables::vectors_for(nodes, damped))?;
+        let (room, rest) = CoarseRoom::split(storage)?;
+        let (tables, rest) = rest.split_at_mut_checked(node_tables::vectors_for(nodes))?;
         let tables = NodeTables::split(tables, nodes)?;
-        let has_lattice = lattice.functions() > 0;
-        let places = if has_lattice { vectors_of_places(nodes) } else { 0 };
-        let (places, rest) = rest.split_at_mut_checked(places)?;
+        let (places, rest) = rest.split_at_mut_checked(vectors_of_places(nodes))?;
         let places: &mut [[LatticeNode; 2]] = must_cast_slice_mut(places.as_chunks_mut::<3>().0);
-        let places = places.as_flattened_mut().get_mut(..if has_lattice { nodes } else { 0 })?;
-        let order = if has_lattice { vectors_of_order(element, elements) } else { 0 };
-        let (order, rest) = rest.split_at_mut_checked(order)?;
-        let order: &mut [u32] = must_cast_slice_mut(order);
-        let order = order.get_mut(..elements.min(order.len()))?;
-        let matrices = Matrices::split(must_cast_slice_mut(rest), lattice, element.is_nodal_strain())?;
-        Some(Self { tables, places, order, matrices })
+        let places = places.as_flattened_mut().get_mut(..nodes)?;
+        let matrices = Matrices::split(rest, lattice, bands, pieces(element, nodes, elements))?;
+        Some(Self { tables, places, matrices, room })
     }
 }
 
 impl<'w> LargeModel<'w> {
     /// Computes the inertia for `step` from the present state, for a scene with these `points` (m) at rest. It takes as
-    /// long as a few steps, with a lattice as long as a cycle of steps. `storage` of [`super::vectors_for`] vectors is
+    /// long as some ten steps. `storage` of [`super::vectors_for`] vectors is
     /// overwritten.
     pub fn prepare<M: ElementMaterial>(
         method: Method<'w>,
@@ -102,12 +96,12 @@ impl<'w> LargeModel<'w> {
         storage: &mut [NodeVector],
     ) -> Result<Self, InertiaError> {
         let grid = checked_grid(&method, scene, points)?;
-        let mut model = Self::new(method, scene, step, grid);
+        let mut model = Self::new(method, scene, step);
         model.first_cycles(grid, scene, points, state, storage)?;
         Ok(model)
     }
 
-    /// The same where the model shall stay, for hosts with little stack: a model has 38 kB.
+    /// The same where the model shall stay, for hosts with little stack: a model has 10 kB.
     pub fn prepare_in<'m, M: ElementMaterial>(
         place: &'m mut MaybeUninit<Self>,
         method: Method<'w>,
@@ -118,12 +112,12 @@ impl<'w> LargeModel<'w> {
         storage: &mut [NodeVector],
     ) -> Result<&'m mut Self, InertiaError> {
         let grid = checked_grid(&method, scene, points)?;
-        let model = place.write(Self::new(method, scene, step, grid));
+        let model = Self::new_in(place, method, scene, step);
         model.first_cycles(grid, scene, points, state, storage)?;
         Ok(model)
     }
 
-    /// The first cycle, with coarser lattices as long as single precision cannot invert the matrices of a suggested
+    /// Computes all inertia, with coarser lattices as long as single precision cannot invert the matrices of a suggested
     /// one.
     fn first_cycles<M: ElementMaterial>(
         &mut self,
@@ -135,7 +129,7 @@ impl<'w> LargeModel<'w> {
     ) -> Result<(), InertiaError> {
         loop {
             let answer = self.first_cycle(grid, scene, points, state.reborrow(), storage);
-            if !matches!(answer, Err(InertiaError::Singular { .. })) || self.method.cells() != Some(Cells::Suggested) {
+            if !matches!(answer, Err(InertiaError::Singular { .. })) || self.method.cells != Cells::Suggested {
                 return answer;
             }
             let coarser = largest_grid(scene, points, grid.functions);
@@ -143,25 +137,25 @@ impl<'w> LargeModel<'w> {
                 return answer;
             }
             grid = coarser;
-            self.lattice = Lattice::NONE;
-            self.refresh = Self::refresh_of(scene, self.step, grid);
         }
     }
 
-    fn refresh_of<M: ElementMaterial>(scene: SceneView<'_, M>, step: Step, grid: Grid) -> Refresh {
-        let cells = grid.cells.iter().map(|&count| count as usize).product();
-        Refresh::new(cycle(step, grid.functions > 0), scene, grid.functions, cells)
+    /// A model without its lattice. Not inlined: the stack on which it may be made first is free again afterwards.
+    #[inline(never)]
+    fn new_in<'m, M: ElementMaterial>(
+        place: &'m mut MaybeUninit<Self>,
+        method: Method<'w>,
+        scene: SceneView<'_, M>,
+        step: Step,
+    ) -> &'m mut Self {
+        place.write(Self::new(method, scene, step))
     }
 
-    /// A model without its lattice. Always inlined: it is made where it stays.
-    #[inline(always)]
-    fn new<M: ElementMaterial>(method: Method<'w>, scene: SceneView<'_, M>, step: Step, grid: Grid) -> Self {
-        let (nodes, has_lattice) = (scene.node_count(), grid.functions > 0);
+    fn new<M: ElementMaterial>(method: Method<'w>, scene: SceneView<'_, M>, step: Step) -> Self {
         Self {
-            nodes,
+            nodes: scene.node_count(),
             elements: scene.element_count(),
             element: scene.element(),
-            moved_elements: 0,
             scene: scene.checksum(),
             moment: Progress::START.moment(),
             method,
@@ -169,15 +163,16 @@ impl<'w> LargeModel<'w> {
             step,
             prepared: step,
             is_for_other_step: false,
-            scaling: scaling(step, has_lattice),
-            refresh: Self::refresh_of(scene, step, grid),
+            scaling: scaling_of(step, 1.0),
+            stiffening: [1.0; 2],
+            first: step.seconds(),
+            renewal: Renewal::NEW,
             lattice: Lattice::NONE,
-            least_share: 1.0,
             report: Report::NONE,
         }
     }
 
-    /// Makes the lattice, chooses the frames, and computes all bounds and inertia.
+    /// Makes the lattice and the clusters, and computes all inertia.
     fn first_cycle<M: ElementMaterial>(
         &mut self,
         grid: Grid,
@@ -186,95 +181,74 @@ impl<'w> LargeModel<'w> {
         state: StateView<'_>,
         storage: &mut [NodeVector],
     ) -> Result<(), InertiaError> {
-        if grid.cells != [0; 3] {
-            self.lattice.set(grid.cells, points, scene.inertia)?;
-        }
+        self.lattice.set(grid.cells, points, scene.inertia)?;
+        self.renewal.bands = Bands::new(&self.lattice);
         let check = |kind, needed, capacity| {
             if capacity < needed { Err(InertiaError::Capacity { kind, needed, capacity }) } else { Ok(()) }
         };
-        let (damped, capacity) = (self.method.damper().is_some(), storage.len());
-        let needed = vectors_for_lattice(scene.element(), self.nodes, self.elements, grid, damped);
+        let (capacity, nodes) = (storage.len(), self.nodes);
+        let needed = vectors_for_lattice(scene.element(), nodes, self.elements, grid);
         check("vectors", needed, capacity)?;
-        check("nodes in the state", self.nodes, state.capacity_for(scene.element()))?;
+        check("nodes in the state", nodes, state.capacity_for(scene.element()))?;
         storage.fill(NodeVector::ZERO);
-        let Some(Storage { mut tables, places, order, mut matrices }) =
-            Storage::split(storage, scene.element(), [self.nodes, self.elements], &self.lattice, damped)
+        let (lattice, sizes) = (&self.lattice, [nodes, self.elements]);
+        let Some(Storage { mut tables, places, mut matrices, mut room }) =
+            Storage::split(storage, scene.element(), sizes, lattice, &self.renewal.bands)
         else {
             return Err(InertiaError::Capacity { kind: "vectors", needed, capacity });
         };
-        write_heights(scene, &mut tables);
-        self.choose_frames(scene, points, &mut tables, places)?;
-        if !scene.element().is_nodal_strain() {
-            self.moved_elements = sort_by_box(order, scene, &self.lattice, places);
-        }
-        let StateView { displacement, increment, volume, progress, .. } = state;
-        self.moment = progress.moment();
-        let nodes = self.nodes;
-        let displacement = displacement.get(..nodes).unwrap_or_default();
-        nodal_volumes(scene, displacement, &[], volume, &CallingThread);
-        let input = RefreshInput {
-            scene,
-            displacement,
-            volume,
-            increment: increment.get_mut(..nodes).unwrap_or_default(),
-            lattice: &self.lattice,
-            places,
-            order,
-            scaling: &self.scaling,
-        };
-        self.refresh.whole_cycle(input, &mut tables, &mut matrices);
-        self.report = self.refresh.added.report(0, 1.0);
-        let unbounded = (0..nodes).find(|&node| {
-            let at = Contiguous(rank_of(places, node));
-            let (inverse, [scalar, _]) = read_matrices::<f32>(at, tables.inverse_diagonal, tables.inverse_off_diagonal);
-            !(inverse.trace().is_finite() && scalar.is_finite())
-        });
-        match unbounded {
-            Some(node) => Err(InertiaError::NotFinite { node: node as u32 }),
-            None if self.lattice.functions() > 0 && !self.refresh.lattice_in_use => {
-                Err(InertiaError::Singular { cells: self.lattice.cells() })
-            }
-            None => Ok(()),
-        }
-    }
-
-    /// Chooses the frames and those of the nodes, and writes the places of the nodes, sorted by cell, if there is a
-    /// lattice. Not inlined: the first cycle does without its stack.
-    #[inline(never)]
-    fn choose_frames<M>(
-        &mut self,
-        scene: SceneView<'_, M>,
-        points: &[[f32; 3]],
-        tables: &mut NodeTables<'_>,
-        places: &mut [LatticeNode],
-    ) -> Result<(), InertiaError> {
-        let mut of_frames = Lattice::NONE;
-        let lattice = if self.lattice.functions() > 0 {
-            &self.lattice
-        } else {
-            // Mass scaling has a lattice only to define frames.
-            let Grid { cells, functions } = largest_grid(scene, points, usize::MAX);
-            let cells = if functions > 0 { cells } else { [1; 3] };
-            of_frames.set(cells, points, scene.inertia)?;
-            &of_frames
-        };
-        self.refresh.frames.choose(lattice, points);
-        // The frame of a node goes with its height until its rank is known.
-        for (node, (&point, inertia)) in points.iter().zip(scene.inertia).enumerate() {
-            let place = lattice.place(point);
-            if let Some(sums) = tables.sum_diagonal.get_mut(node) {
-                sums.0[1] = lattice.frame(&place, inertia) as f32;
-            }
-            if let Some(to) = places.get_mut(node) {
-                *to = place;
-            }
+        for (place, &point) in places.iter_mut().zip(points) {
+            *place = lattice.place(point);
         }
         sort_by_cell(places);
-        for rank in 0..scene.node_count() {
-            let [height, frame, ..] = tables.sum_diagonal.get(node_at(places, rank)).copied().unwrap_or_default().0;
-            tables.set_node(rank, height, frame as usize);
+        write_limits(scene, places, &mut tables);
+        let StateView { displacement, volume, progress, .. } = state;
+        write_closeness(scene, places, volume, &mut tables);
+        let singular = Err(InertiaError::Singular { cells: lattice.cells() });
+        if !matrices.write_constants(scene, lattice, places, &mut self.renewal) {
+            return singular;
         }
-        Ok(())
+        matrices.frames.choose(lattice, points);
+        let (mut scaling, mut longer) = (self.scaling, None);
+        for index in 0..self.stiffening.len() {
+            if let Some(step) = longer {
+                scaling = scaling_of(step, 1.0);
+            }
+            let rest = core::mem::take(&mut tables.more_scratch);
+            rest.fill(NodeVector::ZERO);
+            let input = RenewalInput { scene, displacement: rest, volume, lattice, places, scaling: &scaling };
+            self.renewal.renew_all(input, &mut tables, &mut matrices, &CallingThread);
+            let space = CoarseSpace { lattice, renewal: &self.renewal, matrices: &matrices };
+            let (force, weight) = (&mut *tables.scratch, scaling.coarse_weight);
+            let mut check = RestCheck { scene, places, space, displacement: rest, force, volume, weight };
+            let ratio = if self.renewal.lattice_in_use { check.largest_ratio(&mut room) } else { 1.0 };
+            rest.fill(NodeVector::ZERO);
+            tables.more_scratch = rest;
+            if index == 0 && ratio > MOST_RATIO && self.method.cells == Cells::Suggested && grid.functions > FEWEST {
+                return singular;
+            }
+            self.stiffening
+                .iter_mut()
+                .skip(index)
+                .for_each(|each| *each = each.max(stiffening(ratio, self.renewal.sensitivity)));
+            longer = longer_step(self.step, self.renewal.added.mean);
+            if longer.is_none() {
+                break;
+            }
+        }
+        self.scaling = scaling_of(self.step, self.stiffening[0]);
+        self.moment = progress.moment();
+        let displacement = displacement.get(..nodes).unwrap_or_default();
+        nodal_volumes(scene, displacement, &[], volume, &CallingThread);
+        let input = RenewalInput { scene, displacement, volume, lattice, places, scaling: &self.scaling };
+        self.renewal.renew_all(input, &mut tables, &mut matrices, &CallingThread);
+        self.report = self.renewal.added.report(0, 1.0, 0.0);
+        let is_bounded = |node: &usize| tables.scratch.get(*node).is_some_and(|force| force.0[3].is_finite());
+        match (0..nodes).find(|node| !is_bounded(node)) {
+            Some(node) => Err(InertiaError::NotFinite { node: node as u32 }),
+            None if !self.renewal.lattice_in_use => singular,
+            None => Ok(()),
+        }
     }
 
     /// Whether it was prepared for this scene.
@@ -310,13 +284,12 @@ impl<'w> LargeModel<'w> {
     }
 
     /// Goes over to steps of another length, longer or shorter. The next step computes all inertia anew, which takes as
-    /// long as a cycle of steps. With steps so long that single precision cannot invert the lattice's matrices the
-    /// steps are those of mass scaling, with a [`Report::coarse_share`] of zero, and [`Status::Limited`].
+    /// long as two steps. With steps so long that single precision cannot invert the lattice's matrices the lattice is
+    /// not used, with a [`Report::coarse_share`] of zero, and [`Status::Limited`].
     pub fn change_step(&mut self, step: Step) {
-        let has_lattice = self.lattice.functions() > 0;
         (self.step, self.prepared) = (step, step);
-        self.scaling = scaling(step, has_lattice);
-        self.refresh.set_steps(cycle(step, has_lattice));
+        let [first, longer] = self.stiffening;
+        self.scaling = scaling_of(step, if step.seconds() > self.first { longer } else { first });
         self.is_for_other_step = true;
     }
 
@@ -331,35 +304,19 @@ impl<'w> LargeModel<'w> {
         Grid { cells: self.lattice.cells(), functions: self.lattice.functions() }
     }
 
-    /// Largest number of steps of a cycle, in which all bounds and inertia are renewed: 256 with a lattice, and sooner
-    /// while the tissue deforms fast; without one those of 0.04 s, but at least 4 and at most 64.
-    #[must_use]
-    pub const fn cycle(&self) -> u32 {
-        self.refresh.steps()
-    }
-
     /// The model with the storage in which it was prepared.
     pub const fn with_storage<'a>(&'a mut self, storage: &'a mut [NodeVector]) -> LargeView<'a, 'w> {
         LargeView { model: self, storage }
     }
 }
 
-/// Largest number of steps of a cycle. Without a lattice nothing measures how fast the tissue deforms.
-fn cycle(step: Step, has_lattice: bool) -> u32 {
-    let (least, most) = CYCLE_STEPS;
-    if has_lattice { LATTICE_CYCLE_STEPS } else { ((CYCLE / step.seconds()) as u32).clamp(least, most) }
-}
-
-fn scaling(step: Step, has_lattice: bool) -> Scaling {
-    let (dt, damping) = (step.seconds(), step.damping());
-    let k = half_damping(&step);
-    let fine = if has_lattice { FINE } else { FINE_WITHOUT_LATTICE };
+fn scaling_of(step: Step, stiffening: f32) -> Scaling {
+    let (dt, k) = (step.seconds(), half_damping(&step));
     Scaling {
-        weight: 0.25 * fine * dt * dt,
+        weight: 0.25 * FINE * dt * dt,
         k,
-        reserve: if has_lattice { k * (1.0 + k) } else { k },
-        loss: 2.0 * damping * dt * cycle(step, has_lattice) as f32,
-        coarse_weight: 0.25 * COARSE * dt * dt,
+        reserve: k * (1.0 + k),
+        coarse_weight: 0.25 * COARSE * stiffening * dt * dt,
     }
 }
 
@@ -427,11 +384,10 @@ impl<'w, S: AsMut<[NodeVector]>> LargeStep<'w, S> {
         self.model.with_storage(self.storage.as_mut()).shorten(seconds, scene, loads, state, &CallingThread)
     }
 
-    /// Takes one step of the length for which it was prepared, or that was set since ([`LargeModel::set_seconds`]).
-    /// Every call does the same work: one force evaluation and that of the lattice; more while the tissue deforms fast,
-    /// and for the elements at supports that change their speed, at most a whole cycle. In a state that another step
-    /// has moved, that was reset or restored, the first step computes all inertia anew. `Mismatch` with room for no
-    /// node if it was prepared for another scene.
+    /// Takes one step of the length for which it was prepared, or that was set since ([`LargeModel::set_seconds`]):
+    /// one force evaluation and the work of the lattice, whose stiffness is computed anew where the tissue deforms fast.
+    /// In a state that another step has moved, that was reset or restored, the first step computes all inertia anew.
+    /// `Mismatch` with room for no node if it was prepared for another scene.
     pub fn step<M: ElementMaterial>(
         &mut self,
         scene: SceneView<'_, M>,
@@ -482,7 +438,8 @@ fn checked_grid<M: ElementMaterial>(
     if let Some((tile, lane)) = other {
         return Err(InertiaError::OtherPoints { element: tile.element(lane) });
     }
-    method.grid(scene, points)
+    let grid = method.grid(scene, points)?;
+    if grid.functions > 0 { Ok(grid) } else { Err(InertiaError::TooSmall { nodes }) }
 }
 
 /// Whether an element has the edges between these points (m): `sum_a (x_a - x_0) ga^T` is one.
@@ -502,22 +459,62 @@ fn has_edges_of(tile: &ElementTile, lane: usize, points: &[[f32; 3]]) -> bool {
     sum.abs_diff_eq(DMat3::ZERO, MOST)
 }
 
-/// Writes the least height `1 / |ga|` (m) among the elements of each node to the node's first sum.
-fn write_heights<M>(scene: SceneView<'_, M>, tables: &mut NodeTables<'_>) {
-    // First the largest |ga|^2, then the height.
-    let heights = &mut *tables.sum_diagonal;
-    heights.fill(NodeVector::ZERO);
+/// Writes how far the force of each node may move it in one step from rest, from the least height `1 / |ga|` of its
+/// elements.
+fn write_limits<M>(scene: SceneView<'_, M>, places: &[LatticeNode], tables: &mut NodeTables<'_>) {
+    // First the largest |ga|^2.
+    let squares = &mut *tables.scratch;
+    squares.fill(NodeVector::ZERO);
     for (tile, lane) in scene.places() {
         let slopes = [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| tile.gradient_of(corner, axis, lane)));
         let origin = [0, 1, 2].map(|axis| slopes[0][axis] + slopes[1][axis] + slopes[2][axis]);
         for (corner, [x, y, z]) in [origin, slopes[0], slopes[1], slopes[2]].into_iter().enumerate() {
-            if let Some(node) = heights.get_mut(tile.node(corner, lane)) {
+            if let Some(node) = squares.get_mut(tile.node(corner, lane)) {
                 let square = x * x + y * y + z * z;
                 node.0[0] = if square > node.0[0] { square } else { node.0[0] };
             }
         }
     }
-    for node in heights.iter_mut() {
-        node.0[0] = if node.0[0] > 0.0 { 1.0 / libm::sqrtf(node.0[0]) } else { f32::MAX };
+    for (rank, rough) in tables.rough.iter_mut().enumerate() {
+        let square = squares.get(node_at(places, rank)).map_or(0.0, |square| square.0[0]);
+        rough.0[3] = if square > 0.0 { LARGEST_MOVE / libm::sqrtf(square) } else { f32::MAX };
     }
+}
+
+/// Writes `rho` of each node ([`super::node`]), from bounds at rest. `volume` is overwritten.
+fn write_closeness<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    places: &[LatticeNode],
+    volume: &mut [NodeVector],
+    tables: &mut NodeTables<'_>,
+) {
+    let NodeTables { next_increment, rough, rough_before, scratch, more_scratch: units } = tables;
+    for table in [&mut **next_increment, rough_before, scratch] {
+        table.fill(NodeVector::ZERO);
+    }
+    // With unit masses a light node has no smaller share of its elements' stiffness than a heavy one.
+    for (NodeVector(unit), inertia) in units.iter_mut().zip(scene.inertia) {
+        let [x, y, z] = inertia.inverse.map(|inverse| if inverse > 0.0 { 1.0 } else { 0.0 });
+        *unit = [x, y, z, 1.0];
+    }
+    let rates =
+        each_rate(scene, must_cast_slice(units), [scratch, next_increment, rough_before], volume, |node, rate| {
+            if let Some(rough) = rough.get_mut(node) {
+                rough.0[0] = rate;
+            }
+        });
+    let all = scene.elements().partitions.all();
+    for table in [&mut **rough_before, scratch] {
+        table.fill(NodeVector::ZERO);
+    }
+    nodal_volumes(scene, scratch, &[], volume, &CallingThread);
+    internal_forces(scene, all, [scratch, &[]], volume, rough_before, ScalarBound);
+    for (rank, next) in next_increment.iter_mut().enumerate() {
+        let node = node_at(places, rank);
+        let bound = rough_before.get(node).map_or(0.0, |force| force.0[3]);
+        let close = rough.get(node).map_or(0.0, |rough| rough.0[0]);
+        let is_close = rates.is_some() && bound > 0.0 && close < bound;
+        *next = NodeVector([0.0, 0.0, 0.0, if is_close { close / bound } else { 1.0 }]);
+    }
+    rough.iter_mut().for_each(|rough| rough.0[0] = 0.0);
 }

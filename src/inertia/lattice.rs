@@ -1,7 +1,6 @@
 //! A coarse lattice around the body: trilinear functions `W` on the nodes, one for each lattice point. Motion that they
-//! can represent is smooth motion. A function is zero at held axes. A function is dropped if supports or the surface of
-//! the body leave it almost no mass ([`LEAST_MASS`]): its inertia would be small compared with its stiffness, and the
-//! coarse system ill-conditioned.
+//! can represent is smooth motion. A function is zero at held axes. A point with too little of the body near it has no
+//! function of its own ([`LightPoint`]), as its inertia would be small compared with its stiffness.
 
 use core::{array, fmt};
 
@@ -10,6 +9,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Vec4};
 
 use super::InertiaError;
+use super::frames::Matrix;
 use crate::element::NodeInertia;
 use crate::padding;
 use crate::simd::NodeVector;
@@ -17,12 +17,14 @@ use crate::simd::NodeVector;
 /// Largest number of lattice points.
 pub const MAX_POINTS: usize = 1024;
 /// Largest number of functions, without the dropped ones.
-pub const MAX_FUNCTIONS: usize = 128;
+pub const MAX_FUNCTIONS: usize = 240;
 /// Stands for a point that supports hold: its function is zero.
 const HELD: u8 = MAX_FUNCTIONS as u8;
-/// Stands for a point without a function, because too little of the body is near it.
+/// Stands for a point without nodes near it.
 const EMPTY: u8 = HELD + 1;
-/// Points with less than this share of the largest free mass of a point have no function.
+/// Stands for a light point before it has a number.
+const LIGHT: u8 = HELD + 2;
+/// Points with less than this share of the largest free mass of a point have no function of their own.
 const LEAST_MASS: f32 = 0.02;
 
 /// A lattice around a body.
@@ -32,6 +34,13 @@ pub struct Grid {
     pub cells: [u32; 3],
     /// Functions of the lattice, without those that supports or the body's shape leave almost no mass.
     pub functions: usize,
+}
+
+impl Grid {
+    /// Number of cells.
+    pub(super) fn cell_count(&self) -> usize {
+        self.cells.iter().fold(1, |product, &count| product.saturating_mul(count as usize))
+    }
 }
 
 impl fmt::Display for Grid {
@@ -82,11 +91,16 @@ impl LatticeNode {
     /// Weights of the functions at the eight corners of its cell.
     #[inline(always)]
     pub(super) fn eight_weights(&self) -> [f32; 8] {
-        let [x, y, z] = self.within;
-        let (nx, ny, nz) = (1.0 - x, 1.0 - y, 1.0 - z);
-        let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
-        [a * nz, b * nz, c * nz, d * nz, a * z, b * z, c * z, d * z]
+        eight_weights(self.within)
     }
+}
+
+/// Weights of the functions at the eight corners of a cell, at a position in it or beyond it.
+#[inline(always)]
+pub(super) fn eight_weights([x, y, z]: [f32; 3]) -> [f32; 8] {
+    let (nx, ny, nz) = (1.0 - x, 1.0 - y, 1.0 - z);
+    let (a, b, c, d) = (nx * ny, x * ny, nx * y, x * y);
+    [a * nz, b * nz, c * nz, d * nz, a * z, b * z, c * z, d * z]
 }
 
 /// The place of a node.
@@ -155,6 +169,19 @@ struct PointMass {
     held: f32,
 }
 
+/// A point with too little of the body near it for a function of its own ([`LEAST_MASS`]): it moves as the nearest cell
+/// without such points would take it along, so that linear motion stays linear and all motion continuous (Höllig, Reif &
+/// Wipper 2001, "Weighted extended B-spline approximation").
+#[derive(Clone, Copy, Debug)]
+struct LightPoint {
+    cell: u16,
+    /// From the lowest corner of that cell, in cells.
+    offset: [i8; 3],
+}
+
+/// Most light points.
+const MAX_LIGHT: usize = 64;
+
 /// A lattice on the box around a body.
 #[derive(Clone, Debug)]
 pub(super) struct Lattice {
@@ -164,8 +191,11 @@ pub(super) struct Lattice {
     low: [f32; 3],
     size: [f32; 3],
     functions: usize,
-    /// Function of each lattice point, or [`HELD`] or [`EMPTY`].
+    /// Function of each lattice point; or from [`Lattice::functions`] on the number of a light point, or [`HELD`] or
+    /// [`EMPTY`].
     function_of_point: [u8; MAX_POINTS],
+    light: [LightPoint; MAX_LIGHT],
+    light_points: usize,
     /// Indices of each cell along the axes, at most 255.
     indices_of_cell: [[u8; 3]; MAX_POINTS],
 }
@@ -177,6 +207,8 @@ impl Lattice {
         size: [0.0; 3],
         functions: 0,
         function_of_point: [HELD; MAX_POINTS],
+        light: [LightPoint { cell: 0, offset: [0; 3] }; MAX_LIGHT],
+        light_points: 0,
         indices_of_cell: [[0; 3]; MAX_POINTS],
     };
 
@@ -205,7 +237,7 @@ impl Lattice {
         Ok(Self::new(cells, points, inertia)?.functions)
     }
 
-    /// Makes [`Self::NONE`] such a lattice.
+    /// Makes this such a lattice.
     #[inline(never)]
     pub(super) fn set(
         &mut self,
@@ -218,7 +250,7 @@ impl Lattice {
         if !fits {
             return Err(InertiaError::Cells { cells });
         }
-        self.cells = cells;
+        (self.cells, self.functions, self.light_points) = (cells, 0, 0);
         (self.low, self.size) = bounding_box(points);
         let [along, across, _] = cells.map(|count| (count as usize).max(1));
         for (cell, indices) in self.indices_of_cell.iter_mut().enumerate() {
@@ -226,23 +258,130 @@ impl Lattice {
         }
         let mut masses = [PointMass::default(); MAX_POINTS];
         self.add_masses(points, inertia, &mut masses);
-        if self.mark_empty_points(&masses) {
-            masses.fill(PointMass::default());
-            self.add_masses(points, inertia, &mut masses);
-        }
         let largest = masses.iter().fold(0.0, |most, mass| f32::max(most, mass.free));
         let mut full = false;
-        self.for_each_point(|lattice, point| {
-            let (Some(function), Some(mass)) = (lattice.function_of_point.get_mut(point), masses.get(point)) else {
-                return;
+        // First those that are light, without numbers.
+        for (function, mass) in self.function_of_point.iter_mut().zip(&masses) {
+            let (is_light, is_held) = (mass.free <= LEAST_MASS * largest, mass.held > mass.free);
+            *function = match mass.free > 0.0 {
+                true if !is_light => 0,
+                true if !is_held => LIGHT,
+                _ if mass.held > 0.0 => HELD,
+                _ => EMPTY,
             };
-            if *function != EMPTY && mass.free > 0.0 && (mass.free > LEAST_MASS * largest || mass.held <= mass.free) {
+        }
+        let before = self.function_of_point;
+        self.for_each_point(|lattice, point| {
+            let nearest = if before.get(point) == Some(&LIGHT) { lattice.nearest_whole(point, &before) } else { None };
+            let Some(function) = lattice.function_of_point.get_mut(point) else { return };
+            if nearest.is_none() && (*function == 0 || *function == LIGHT) {
                 full |= lattice.functions == MAX_FUNCTIONS;
                 *function = lattice.functions.min(MAX_FUNCTIONS - 1) as u8;
                 lattice.functions += 1;
             }
         });
+        self.for_each_point(|lattice, point| {
+            let Some(nearest) = lattice.nearest_whole(point, &before).filter(|_| before.get(point) == Some(&LIGHT))
+            else {
+                return;
+            };
+            let number = lattice.functions + lattice.light_points;
+            full |= number >= MAX_FUNCTIONS || lattice.light_points >= MAX_LIGHT;
+            if let (Some(place), Some(function)) =
+                (lattice.light.get_mut(lattice.light_points), lattice.function_of_point.get_mut(point))
+            {
+                *place = nearest;
+                *function = number.min(MAX_FUNCTIONS - 1) as u8;
+                lattice.light_points += 1;
+            }
+        });
         if full { Err(InertiaError::Functions { cells }) } else { Ok(()) }
+    }
+
+    /// The nearest cell without light points to a point, at most one cell away, with functions before they have numbers.
+    fn nearest_whole(&self, point: usize, functions: &[u8; MAX_POINTS]) -> Option<LightPoint> {
+        let counts = self.cells.map(|count| count as usize);
+        let [x, y] = [counts[0] + 1, counts[1] + 1];
+        let at = [point % x, point / x % y, point / x / y];
+        let mut best: Option<(u32, LightPoint)> = None;
+        for (k, j) in (0..4).flat_map(|k| (0..4).map(move |j| (k, j))) {
+            for i in 0..4 {
+                // From two cells before the point on.
+                let indices = [(at[0] + i).checked_sub(2), (at[1] + j).checked_sub(2), (at[2] + k).checked_sub(2)];
+                let [Some(a), Some(b), Some(c)] = indices else { continue };
+                if a >= counts[0] || b >= counts[1] || c >= counts[2] {
+                    continue;
+                }
+                let cell = a + counts[0] * (b + counts[1] * c);
+                let of = |point: usize| functions.get(point).copied().unwrap_or(EMPTY);
+                let corners = self.corner_points(cell).map(of);
+                if corners.iter().any(|&of| of == LIGHT || of == EMPTY) || corners.iter().all(|&of| of == HELD) {
+                    continue;
+                }
+                let offset = [at[0] as i8 - a as i8, at[1] as i8 - b as i8, at[2] as i8 - c as i8];
+                let beyond = offset.map(|offset| u32::from(!(0..=1).contains(&offset)));
+                let distance = beyond[0] + beyond[1] + beyond[2];
+                if best.is_none_or(|(least, _)| distance < least) {
+                    best = Some((distance, LightPoint { cell: cell as u16, offset }));
+                }
+            }
+        }
+        best.map(|(_, light)| light)
+    }
+
+    /// Calls `visit` with the functions that a number of a point of a cell stands for, and their weights: itself, or those
+    /// that take a light point along.
+    #[inline(always)]
+    pub(super) fn each_function(&self, number: usize, mut visit: impl FnMut(usize, f32)) {
+        match number.checked_sub(self.functions) {
+            None => visit(number, 1.0),
+            Some(light) => {
+                let Some(light) = self.light.get(..self.light_points).and_then(|all| all.get(light)) else { return };
+                let weights = eight_weights(light.offset.map(f32::from));
+                for (function, weight) in self.functions_of(light.cell.into()).into_iter().zip(weights) {
+                    if function < self.functions {
+                        visit(function, weight);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether a number stands for a function or a light point.
+    #[inline(always)]
+    pub(super) const fn moves(&self, number: usize) -> bool {
+        number < self.functions + self.light_points
+    }
+
+    /// Whether a number stands for a light point.
+    #[inline(always)]
+    pub(super) const fn is_light(&self, number: usize) -> bool {
+        number >= self.functions && self.moves(number)
+    }
+
+    /// Adds the sums of light points to those of the functions that take them along.
+    pub(super) fn fold(&self, sums: &mut CoarseVectors) {
+        for light in self.functions..self.functions + self.light_points {
+            let sum = sums.get_mut(light).map(core::mem::take).unwrap_or_default();
+            self.each_function(light, |function, weight| {
+                if let Some(NodeVector(to)) = sums.get_mut(function) {
+                    *to = (Vec4::from(*to) + weight * Vec4::from(sum.0)).to_array();
+                }
+            });
+        }
+    }
+
+    /// Sets the vectors of light points from those of the functions.
+    pub(super) fn expand(&self, vectors: &mut CoarseVectors) {
+        for light in self.functions..self.functions + self.light_points {
+            let mut sum = Vec4::ZERO;
+            self.each_function(light, |function, weight| {
+                sum += weight * vectors.get(function).map_or(Vec4::ZERO, |vector| Vec4::from(vector.0));
+            });
+            if let Some(vector) = vectors.get_mut(light) {
+                vector.0 = sum.to_array();
+            }
+        }
     }
 
     /// The axes from that with the fewest cells to that with the most: the order of the functions.
@@ -286,76 +425,35 @@ impl Lattice {
         }
     }
 
-    /// Marks the points with too little mass that supports do not hold. Gives whether there were any. None is marked
-    /// if no cell would be left.
-    fn mark_empty_points(&mut self, masses: &[PointMass]) -> bool {
-        let before = self.function_of_point;
-        let largest = masses.iter().fold(0.0, |most, mass| f32::max(most, mass.free));
-        let mut any = false;
-        for (function, mass) in self.function_of_point.iter_mut().zip(masses) {
-            let light = mass.free <= LEAST_MASS * largest && mass.held <= mass.free;
-            if light && mass.free > 0.0 {
-                *function = EMPTY;
-                any = true;
-            }
-        }
-        if (0..self.cell_count()).any(|cell| self.is_whole(cell)) {
-            return any;
-        }
-        self.function_of_point = before;
-        false
-    }
-
-    /// Whether no corner of a cell is empty.
-    fn is_whole(&self, cell: usize) -> bool {
-        let of = |point: usize| self.function_of_point.get(point).copied().unwrap_or(EMPTY);
-        self.corner_points(cell).into_iter().all(|point| of(point) != EMPTY)
-    }
-
-    /// The place of a point (m): in its cell, or outside the nearest cell without empty corners. So the functions add
-    /// up to one wherever no support holds them, and reproduce linear fields.
+    /// The place of a point, m.
     pub(super) fn place(&self, point: [f32; 3]) -> LatticeNode {
         let mut position = [0.0; 3];
-        let mut indices = [0; 3];
         for axis in 0..3 {
             let (count, size) = (self.cells[axis] as f32, self.size[axis]);
             if size > 0.0 {
                 // Rounding may put the last node slightly outside the box.
                 position[axis] = ((point[axis] - self.low[axis]) / size * count).clamp(0.0, count);
             }
-            indices[axis] = (position[axis] as u32).min(self.cells[axis].saturating_sub(1)) as u8;
         }
-        let mut cell = self.cell_index(indices);
-        if !self.is_whole(cell) {
-            let mut least = f32::INFINITY;
-            for other in (0..self.cell_count()).filter(|&other| self.is_whole(other)) {
-                let corner = self.cell_indices(other).map(f32::from);
-                let mut square = 0.0;
-                for axis in 0..3 {
-                    let beyond = (corner[axis] - position[axis]).max(position[axis] - corner[axis] - 1.0);
-                    square += beyond.max(0.0) * beyond.max(0.0);
-                }
-                if square < least {
-                    (least, cell) = (square, other);
-                }
-            }
-        }
+        let cell = self.cell_at(position);
         let corner = self.cell_indices(cell).map(f32::from);
         let within = [0, 1, 2].map(|axis| position[axis] - corner[axis]);
         LatticeNode { within, cell: cell as u32, ..LatticeNode::default() }
     }
 
-    /// The function whose frame a node uses: the one with the largest weight. [`MAX_FUNCTIONS`], a frame that does not
-    /// rotate, if some of the node's axes are held, because these do not rotate.
-    pub(super) fn frame(&self, place: &LatticeNode, inertia: &NodeInertia) -> usize {
-        let held = inertia.inverse.iter().filter(|&&inverse| inverse <= 0.0).count();
-        let (mut frame, mut most) = (MAX_FUNCTIONS, 0.0);
-        for (function, weight) in self.weights(place) {
-            if function < MAX_FUNCTIONS && weight > most && (held == 0 || held == 3) {
-                (frame, most) = (function, weight);
-            }
+    /// The position of a place, in cells along each axis.
+    pub(super) fn position(&self, place: &LatticeNode) -> [f32; 3] {
+        let corner = self.cell_indices(place.cell()).map(f32::from);
+        [0, 1, 2].map(|axis| corner[axis] + place.within[axis])
+    }
+
+    /// The cell of a position, in cells along each axis.
+    pub(super) fn cell_at(&self, position: [f32; 3]) -> usize {
+        let mut indices = [0; 3];
+        for axis in 0..3 {
+            indices[axis] = (position[axis] as u32).min(self.cells[axis].saturating_sub(1)) as u8;
         }
-        frame
+        self.cell_index(indices)
     }
 
     /// Lattice points at the corners of a cell.
@@ -373,24 +471,26 @@ impl Lattice {
 
     /// Indices of a cell along the axes.
     #[inline(always)]
-    pub(super) fn cell_indices(&self, cell: usize) -> [u8; 3] {
+    fn cell_indices(&self, cell: usize) -> [u8; 3] {
         self.indices_of_cell.get(cell).copied().unwrap_or_default()
     }
 
     /// Index of the cell with these indices along the axes.
     #[inline(always)]
-    pub(super) fn cell_index(&self, indices: [u8; 3]) -> usize {
+    fn cell_index(&self, indices: [u8; 3]) -> usize {
         let [i, j, k] = indices.map(usize::from);
         i + self.cells[0] as usize * (j + self.cells[1] as usize * k)
     }
 
-    /// The function of the point that is this far from the lowest corner of a cell; [`MAX_FUNCTIONS`] or more if there
-    /// is none.
+    /// The position of a place, with respect to some cell.
     #[inline(always)]
-    pub(super) fn function_at(&self, cell: [u8; 3], offset: [u8; 3]) -> usize {
-        let [x, y, _] = self.cells.map(|count| count as usize + 1);
-        let [i, j, k] = [0, 1, 2].map(|axis| usize::from(cell[axis]) + usize::from(offset[axis]));
-        self.function_of_point.get(i + x * (j + y * k)).copied().map_or(MAX_FUNCTIONS, usize::from)
+    pub(super) fn within(&self, cell: usize, place: &LatticeNode) -> [f32; 3] {
+        let (here, there) = (self.cell_indices(cell), self.cell_indices(place.cell()));
+        let mut within = place.within;
+        for axis in 0..3 {
+            within[axis] += f32::from(there[axis]) - f32::from(here[axis]);
+        }
+        within
     }
 
     /// Number of cells.
@@ -398,9 +498,9 @@ impl Lattice {
         self.cells.iter().map(|&count| count as usize).product()
     }
 
-    /// Largest strain of a cell for vectors of the functions (m), with the rotation of each function since rest. A
+    /// The largest strain of a cell for vectors of the functions (m), with the rotation of each function since rest. A
     /// translation or a rotation is none.
-    pub(super) fn largest_strain(&self, vectors: &CoarseVectors, rotations: &[[[f32; 3]; 3]]) -> f32 {
+    pub(super) fn largest_strain(&self, vectors: &CoarseVectors, rotations: &[Matrix]) -> f32 {
         let mut largest = 0.0;
         let mut per_metre = [0.0; 3];
         for axis in 0..3 {
@@ -468,7 +568,10 @@ impl Lattice {
             let per_metre = if self.size[axis] > 0.0 { self.cells[axis] as f32 / self.size[axis] } else { 0.0 };
             weights[axis] = per_metre * per_metre;
         }
-        let of = |point: usize| self.function_of_point.get(point).copied().unwrap_or(EMPTY);
+        let of = |point: usize| match self.function_of_point.get(point).copied().unwrap_or(EMPTY) {
+            light if self.is_light(light.into()) => EMPTY,
+            other => other,
+        };
         let mut point = 0;
         for (k, j) in (0..nz).flat_map(|k| (0..ny).map(move |j| (k, j))) {
             for i in 0..nx {

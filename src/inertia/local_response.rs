@@ -1,22 +1,20 @@
-//! How the lattice answers forces on few nodes, as those that an instrument touches: `share S^-1 - least G^-1`
-//! ([`super`]) between the few functions that move these nodes, gathered once a step, so that the many products of
-//! [`crate::contact::solve`] do not run over the whole lattice. In the frames of the bounds; 1/kg.
+//! How the lattice answers forces on few nodes, as those that an instrument touches: `S^-1` ([`super`]) between the few
+//! functions that move these nodes, computed once a step, so that the many products of [`crate::contact::solve`] do not
+//! run over the whole lattice. 1/kg.
 
 use glam::Vec3;
 
 use super::coarse_motion::CoarseSpace;
-use super::dense::{Row, apply, stride};
-use super::lattice::{Lattice, LatticeNode, MAX_FUNCTIONS, node_place};
-use super::matrices::Matrices;
-use super::nodal_sums;
+use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_FUNCTIONS, node_place};
 use crate::contact::TouchedPoint;
+use crate::simd::NodeVector;
 
 /// Functions of a box of four cells.
 pub(super) const MOST_LISTED: usize = 18;
-const STRIDE: usize = stride(MOST_LISTED);
+const STRIDE: usize = 3 * MOST_LISTED;
 
 /// Floats of the matrix.
-pub(crate) const LOCAL_FLOATS: usize = 3 * MOST_LISTED * STRIDE;
+pub(crate) const LOCAL_FLOATS: usize = STRIDE * STRIDE;
 
 /// The functions that move some nodes, and the place of each in the list.
 pub(super) struct ListedFunctions {
@@ -33,7 +31,10 @@ impl ListedFunctions {
         for (node, _) in points.iter().flat_map(TouchedPoint::corners) {
             let Some(place) = node_place(places, node) else { continue };
             for function in lattice.functions_of(place.cell()) {
-                if function < MAX_FUNCTIONS && listed.place(function).is_none() {
+                // Light points are none of the functions: the answer is that of the whole lattice.
+                if lattice.is_light(function) {
+                    listed.count = MAX_FUNCTIONS;
+                } else if function < MAX_FUNCTIONS && listed.place(function).is_none() {
                     listed.places[function] = listed.count as u8;
                     if let Some(entry) = listed.list.get_mut(listed.count) {
                         *entry = function as u8;
@@ -45,7 +46,7 @@ impl ListedFunctions {
         listed
     }
 
-    pub(super) fn functions(&self) -> &[u8] {
+    fn functions(&self) -> &[u8] {
         self.list.get(..self.count).unwrap_or_default()
     }
 
@@ -60,61 +61,39 @@ pub(super) struct LocalResponse<'a> {
 }
 
 impl<'a> LocalResponse<'a> {
-    /// Gathers the matrix in `room`. None if there are more functions than it is for.
+    /// Computes the matrix in `room`, with vectors to compute with. None if there are more functions than it is for.
     pub(super) fn gathered(
         room: &'a mut [f32],
         listed: &ListedFunctions,
-        space: &CoarseSpace<'_>,
-        matrices: &Matrices<'_>,
-        [share, least]: [f32; 2],
+        space: &CoarseSpace<'_, '_>,
+        vectors: &mut CoarseVectors,
     ) -> Option<Self> {
         let functions = listed.functions();
-        let stride = stride(space.lattice.functions());
         let room = room.get_mut(..3 * functions.len() * STRIDE).filter(|_| functions.len() <= MOST_LISTED)?;
-        room.fill(0.0);
-        let fine = if space.refresh.fine_in_use { Some(&*matrices.fine_inverse) } else { None };
-        for (three, &row) in room.chunks_exact_mut(3 * STRIDE).zip(functions) {
-            let row = usize::from(row);
-            for (to, axis) in three.chunks_exact_mut(STRIDE).zip(0..3) {
-                let from = (3 * row + axis) * stride;
-                let coarse = matrices.coarse_inverse.get(from..from + stride).unwrap_or_default();
-                let fine = fine.and_then(|fine| fine.get(from..from + stride)).unwrap_or_default();
+        for (rows, &row) in room.chunks_exact_mut(3 * STRIDE).zip(functions) {
+            for (axis, to) in rows.chunks_exact_mut(STRIDE).enumerate() {
+                vectors.fill(NodeVector::ZERO);
+                if let Some(NodeVector(vector)) = vectors.get_mut(usize::from(row)) {
+                    vector[axis % 3] = 1.0;
+                }
+                space.solve(vectors);
+                to.fill(0.0);
                 for (to, &column) in to.as_chunks_mut::<3>().0.iter_mut().zip(functions) {
-                    let column = usize::from(column);
-                    let three = |row: &[f32]| {
-                        row.get(3 * column..).and_then(<[f32]>::first_chunk::<3>).copied().unwrap_or_default()
-                    };
-                    let (coarse, fine) = (three(coarse), three(fine));
-                    for ((to, coarse), fine) in to.iter_mut().zip(coarse).zip(fine) {
-                        *to = share * coarse - least * fine;
-                    }
-                    // In fast motion the bound of `G`, which is one matrix for each function.
-                    if row == column
-                        && !space.refresh.fine_in_use
-                        && let Some(bound) = matrices.bound_inverse.get(row)
-                    {
-                        let unit = [0, 1, 2].map(|other| if other == axis { 1.0 } else { 0.0 });
-                        for (to, bound) in to.iter_mut().zip(nodal_sums::times(bound, unit)) {
-                            *to -= least * bound;
-                        }
-                    }
+                    *to = vectors.get(usize::from(column)).copied().unwrap_or_default().to_array();
                 }
             }
         }
         Some(Self { matrix: room })
     }
 
-    /// Replaces the sums of the listed functions (kg m) by their motions (m), both in the world.
-    pub(super) fn answer(&self, sums: &mut [Vec3; MOST_LISTED], listed: &ListedFunctions, space: &CoarseSpace<'_>) {
-        let rotations = space.refresh.frames.of_functions();
-        let rotation = |function: &u8| rotations.get(usize::from(*function));
-        let (mut x, mut out): ([f32; 3 * MOST_LISTED], Row) = ([0.0; _], [0.0; _]);
-        for ((x, sum), function) in x.as_chunks_mut::<3>().0.iter_mut().zip(&*sums).zip(listed.functions()) {
-            *x = rotation(function).map_or([0.0; 3], |rotation| rotation.in_frame(sum.to_array()));
+    /// Replaces the sums of the listed functions (kg m) by their motions, m.
+    pub(super) fn answer(&self, sums: &mut [Vec3; MOST_LISTED]) {
+        let mut out = [0.0; STRIDE];
+        for (row, factor) in self.matrix.chunks_exact(STRIDE).zip(sums.iter().flat_map(|sum| sum.to_array())) {
+            out.iter_mut().zip(row).for_each(|(out, entry)| *out += factor * entry);
         }
-        apply(self.matrix, STRIDE, &x, &mut out);
-        for ((sum, out), function) in sums.iter_mut().zip(out.as_chunks::<3>().0).zip(listed.functions()) {
-            *sum = rotation(function).map_or(Vec3::ZERO, |rotation| rotation.in_world(*out).into());
+        for (sum, &out) in sums.iter_mut().zip(out.as_chunks::<3>().0) {
+            *sum = out.into();
         }
     }
 }

@@ -1,124 +1,325 @@
-//! The matrices of a lattice (kg, inverses 1/kg) and the sums of its cells, in the caller's storage. `S` is the inertia
-//! of the lattice's motion, with the inertia that the step adds; `G` is the nodes' inertia projected to the
-//! lattice. [`super::refresh`] computes their inverses in cycles.
+//! The matrices of a lattice (kg, factors of them) and the sums of its cells, in the caller's storage.
 
-use bytemuck::must_cast_slice_mut;
+use bytemuck::{AnyBitPattern, NoUninit, try_cast_slice_mut};
+use glam::Vec4;
 
+use super::band::{Band, Row, factorise, solve};
 use super::cells::CellPolynomial;
-use super::dense::{invert, row_length, stride};
-use super::lattice::Lattice;
-use super::nodal_sums::FunctionInertia;
-use super::projected_inertia::CellSums;
-use crate::copy::copy;
+use super::clusters::{Cluster, ClusterInput, ClusterRoom, Clusters, PairMatrices, for_each_pair};
+use super::coarse_stiffness::{AxisMatrices, ClusterTangent};
+use super::frames::{FrameNodes, Frames, Matrix};
+use super::lattice::{CoarseVectors, Grid, Lattice, LatticeNode, MAX_FUNCTIONS};
+use super::renewal::Renewal;
+use super::transport::factorise_edges;
+use crate::element::{ElementMaterial, NodeInertia, Tangent};
+use crate::scene::SceneView;
+use crate::simd::{NodeVector, TILE};
 
-/// The matrices of a lattice, and the sums of its cells.
-pub(super) struct Matrices<'a> {
-    /// `S^-1` in use, and the next `S`, then its inverse.
-    pub(super) coarse_inverse: &'a mut [f32],
-    pub(super) next_coarse: &'a mut [f32],
-    /// `G^-1` in use, if any, and the next `G`, then its inverse.
-    pub(super) fine_inverse: &'a mut [f32],
-    pub(super) next_fine: &'a mut [f32],
-    /// The inverse of the bound of `G` in use, and the next bound, for each function.
-    pub(super) bound_inverse: &'a mut [FunctionInertia],
-    pub(super) next_bound: &'a mut [FunctionInertia],
-    /// `Mc` and its inverse, one after the other for each axis, with one unknown a function. They are constant, as is
-    /// the following.
-    pub(super) mass: &'a mut [f32],
-    pub(super) mass_inverse: &'a mut [f32],
-    /// The stiffness of the stabilising energy of nodal strain, with the factor `s_c D^2 / 4`; laid out as `Mc`, empty
-    /// for others.
-    pub(super) stabilising: &'a mut [f32],
-    /// See [`super::transport`].
-    pub(super) edge_inverse: &'a mut [f32],
-    /// Used by the passes over the nodes: sums of the residual, later the lattice's motion; the motion that the nodes'
-    /// own inertia gives to the lattice; sums of the momentum, later the smooth part of the increments.
-    pub(super) cells: &'a mut [CellPolynomial],
-    pub(super) fine_cells: &'a mut [CellPolynomial],
-    pub(super) smooth_cells: &'a mut [CellPolynomial],
-    /// Used by the assembly of `G`.
-    pub(super) sums: &'a mut [CellSums],
+/// The extents of the matrices of a lattice: three unknowns for each function, and one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bands {
+    pub(super) vectors: Band,
+    pub(super) scalars: Band,
 }
 
-/// Floats of a [`CellPolynomial`], of [`CellSums`] and of a [`FunctionInertia`].
-const POLYNOMIAL_FLOATS: usize = size_of::<CellPolynomial>() / size_of::<f32>();
-const SUM_FLOATS: usize = size_of::<CellSums>() / size_of::<f32>();
-const INERTIA_FLOATS: usize = size_of::<FunctionInertia>() / size_of::<f32>();
+impl Bands {
+    pub(super) const NONE: Self = Self { vectors: Band::NONE, scalars: Band::NONE };
 
-/// Floats of a matrix with three unknowns a function, and of one with one.
-const fn matrix_floats(functions: usize) -> [usize; 2] {
-    [3 * functions * stride(functions), functions * row_length(functions)]
-}
-
-/// Floats of storage for a lattice with this many cells and functions, on a scene with nodal strain or without.
-pub(super) const fn floats_for(cells: usize, functions: usize, nodal_strain: bool) -> usize {
-    let [matrix, scalar_matrix] = matrix_floats(functions);
-    let scalar_matrices = if nodal_strain { 10 } else { 7 };
-    let sums = (3 * POLYNOMIAL_FLOATS + SUM_FLOATS).saturating_mul(cells_with_sums(cells, functions));
-    sums.saturating_add(4 * matrix + scalar_matrices * scalar_matrix + 2 * INERTIA_FLOATS * functions)
-}
-
-/// Number of cells with sums: none if there are no functions.
-const fn cells_with_sums(cells: usize, functions: usize) -> usize {
-    if functions > 0 { cells } else { 0 }
-}
-
-impl<'a> Matrices<'a> {
-    pub(super) fn split(dense: &'a mut [f32], lattice: &Lattice, nodal_strain: bool) -> Option<Self> {
-        let [matrix, scalar_matrix] = matrix_floats(lattice.functions());
-        let count = cells_with_sums(lattice.cell_count(), lattice.functions());
-        let (coarse_inverse, rest) = dense.split_at_mut_checked(matrix)?;
-        let (next_coarse, rest) = rest.split_at_mut_checked(matrix)?;
-        let (fine_inverse, rest) = rest.split_at_mut_checked(matrix)?;
-        let (next_fine, rest) = rest.split_at_mut_checked(matrix)?;
-        let (mass, rest) = rest.split_at_mut_checked(3 * scalar_matrix)?;
-        let (mass_inverse, rest) = rest.split_at_mut_checked(3 * scalar_matrix)?;
-        let stabilising = if nodal_strain { 3 * scalar_matrix } else { 0 };
-        let (stabilising, rest) = rest.split_at_mut_checked(stabilising)?;
-        let (edge_inverse, rest) = rest.split_at_mut_checked(scalar_matrix)?;
-        let (cells, rest) = split_polynomials(rest, count)?;
-        let (fine_cells, rest) = split_polynomials(rest, count)?;
-        let (smooth_cells, rest) = split_polynomials(rest, count)?;
-        let (sums, rest) = rest.split_at_mut_checked(SUM_FLOATS * count)?;
-        let sums = must_cast_slice_mut(sums.as_chunks_mut::<SUM_FLOATS>().0);
-        let inertia = rest.get_mut(..2 * INERTIA_FLOATS * lattice.functions())?;
-        let inertia: &mut [FunctionInertia] = must_cast_slice_mut(inertia.as_chunks_mut::<INERTIA_FLOATS>().0);
-        let (bound_inverse, next_bound) = inertia.split_at_mut_checked(lattice.functions())?;
-        Some(Self {
-            coarse_inverse,
-            fine_inverse,
-            next_coarse,
-            next_fine,
-            mass,
-            mass_inverse,
-            stabilising,
-            edge_inverse,
-            cells,
-            fine_cells,
-            smooth_cells,
-            bound_inverse,
-            next_bound,
-            sums,
-        })
+    pub(super) fn new(lattice: &Lattice) -> Self {
+        Self { vectors: Band::new(lattice, 3), scalars: Band::new(lattice, 1) }
     }
 }
 
-fn split_polynomials(floats: &mut [f32], count: usize) -> Option<(&mut [CellPolynomial], &mut [f32])> {
-    let (polynomials, rest) = floats.split_at_mut_checked(POLYNOMIAL_FLOATS * count)?;
-    Some((must_cast_slice_mut(polynomials.as_chunks_mut::<POLYNOMIAL_FLOATS>().0), rest))
+/// The matrices, the sums of the cells and the clusters.
+pub(super) struct Matrices<'a> {
+    /// The factor of `S`; room for its computation.
+    pub(super) factor: &'a mut [f32],
+    pub(super) scratch: &'a mut [f32],
+    /// The factors of `Mc`, one after the other for each axis. Constant, as is the following.
+    pub(super) mass_factors: &'a mut [f32],
+    /// See [`super::transport`].
+    pub(super) edge_factor: &'a mut [f32],
+    pub(super) frames: Frames<'a>,
+    /// `(1 + k) Mc + E` of each cell.
+    pub(super) inertia: &'a mut [AxisMatrices],
+    /// The stiffness of each cell.
+    pub(super) stiffness: &'a mut [PairMatrices],
+    /// Sums of the nodes' scalar bounds in each cell when that was computed, N/m.
+    pub(super) bounds: &'a mut [f32],
+    pub(super) clusters: Clusters<'a>,
+    /// Of the sampled tiles, and of the clusters.
+    pub(super) tangents: &'a mut [Tangent],
+    pub(super) of_clusters: &'a mut [ClusterTangent],
+    /// Used by the passes over the nodes: sums of the residual, later the lattice's motion; sums of the momentum, later
+    /// the smooth part of the increments.
+    pub(super) cells: &'a mut [CellPolynomial],
+    pub(super) smooth_cells: &'a mut [CellPolynomial],
 }
 
-/// The matrix of each axis.
-pub(super) fn of_axes(matrices: &[f32]) -> [&[f32]; 3] {
-    let size = matrices.len() / 3;
-    let mut parts = matrices.chunks_exact(size.max(1));
-    [(); 3].map(|()| parts.next().unwrap_or_default())
+/// Vectors of `count` values of a type.
+const fn vectors_of<T>(count: usize) -> usize {
+    count.saturating_mul(size_of::<T>()).div_ceil(size_of::<NodeVector>())
 }
 
-/// Computes the inverses of such matrices from their lower triangles. Gives whether they could be inverted.
-pub(super) fn invert_axes(inverses: &mut [f32], matrices: &[f32], functions: usize) -> bool {
-    copy(inverses, matrices);
-    let size = inverses.len() / 3;
-    let mut parts = inverses.chunks_exact_mut(size.max(1));
-    parts.by_ref().fold(true, |sound, matrix| sound & invert(matrix, functions, row_length(functions)))
+/// Vectors of storage for a lattice on a scene of this many elements, and patches with nodal strain, or fewer.
+pub(super) fn vectors_for(grid: Grid, pieces: [usize; 2]) -> usize {
+    let cells = grid.cell_count();
+    let room = ClusterRoom::new(cells, pieces);
+    let band = Band::most_floats(grid.cells, grid.functions, 3);
+    let scalar_band = Band::most_floats(grid.cells, grid.functions, 1);
+    [
+        vectors_of::<f32>(band),
+        vectors_of::<f32>(Band::most_scratch_floats(grid.functions)),
+        vectors_of::<f32>(scalar_band.saturating_mul(3)),
+        vectors_of::<f32>(scalar_band),
+        vectors_of::<FrameNodes>(grid.functions),
+        4 * vectors_of::<Matrix>(grid.functions),
+        vectors_of::<AxisMatrices>(cells),
+        vectors_of::<PairMatrices>(cells),
+        vectors_of::<f32>(cells),
+        vectors_of::<Cluster>(room.clusters),
+        vectors_of::<PairMatrices>(room.sets),
+        vectors_of::<u32>(cells),
+        vectors_of::<u32>(room.tiles),
+        vectors_of::<u32>(room.moved),
+        vectors_of::<u32>(room.tiles.saturating_mul(TILE)),
+        vectors_of::<Tangent>(room.tiles.saturating_mul(TILE)),
+        vectors_of::<ClusterTangent>(room.clusters),
+        2 * vectors_of::<CellPolynomial>(cells),
+    ]
+    .into_iter()
+    .fold(0, usize::saturating_add)
+}
+
+/// Takes `count` values.
+fn take<'a, T: AnyBitPattern + NoUninit>(from: &mut &'a mut [NodeVector], count: usize) -> Option<&'a mut [T]> {
+    let vectors = from.split_off_mut(..vectors_of::<T>(count))?;
+    let floats: &mut [f32] = try_cast_slice_mut(vectors).ok()?;
+    try_cast_slice_mut(floats.get_mut(..count * (size_of::<T>() / size_of::<f32>()))?).ok()
+}
+
+impl<'a> Matrices<'a> {
+    pub(super) fn split(
+        mut rest: &'a mut [NodeVector],
+        lattice: &Lattice,
+        bands: &Bands,
+        pieces: [usize; 2],
+    ) -> Option<Self> {
+        let (rest, cells, functions) = (&mut rest, lattice.cell_count(), lattice.functions());
+        let room = ClusterRoom::new(cells, pieces);
+        Some(Self {
+            factor: take(rest, bands.vectors.floats())?,
+            scratch: take(rest, bands.vectors.scratch_floats())?,
+            mass_factors: take(rest, 3 * bands.scalars.floats())?,
+            edge_factor: take(rest, bands.scalars.floats())?,
+            frames: Frames {
+                nodes: take(rest, functions)?,
+                latest: take(rest, functions)?,
+                in_latest_step: take(rest, functions)?,
+                of_stiffness: take(rest, functions)?,
+                since_stiffness: take(rest, functions)?,
+            },
+            inertia: take(rest, cells)?,
+            stiffness: take(rest, cells)?,
+            bounds: take(rest, cells)?,
+            clusters: Clusters {
+                all: take(rest, room.clusters)?,
+                moments: take(rest, room.sets)?,
+                heads: take(rest, cells)?,
+                tiles: take(rest, room.tiles)?,
+                moved: take(rest, room.moved)?,
+                members: take(rest, TILE * room.tiles)?,
+            },
+            tangents: take(rest, TILE * room.tiles)?,
+            of_clusters: take(rest, room.clusters)?,
+            cells: take(rest, cells)?,
+            smooth_cells: take(rest, cells)?,
+        })
+    }
+
+    /// Writes what does not change with the state, for a scene whose nodes have these places: clusters, and the factors of
+    /// `Mc` and of the edges. Gives whether these could be factorised.
+    pub(super) fn write_constants<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        lattice: &Lattice,
+        places: &[LatticeNode],
+        renewal: &mut Renewal,
+    ) -> bool {
+        let input = ClusterInput { scene, lattice, places, is_merged: false };
+        let merged = ClusterInput { is_merged: true, ..input };
+        let counts = input.write(&mut self.clusters).or_else(|| merged.write(&mut self.clusters));
+        let Some(counts) = counts else { return false };
+        (renewal.clusters, renewal.tiles, renewal.is_merged) = (counts.clusters, counts.tiles, counts.is_merged);
+        self.inertia.fill([[0.0; 4]; _]);
+        for place in places {
+            if let Some(inertia) = scene.inertia.get(place.node()) {
+                add_node(self.inertia, place, inertia, inertia.mass);
+            }
+        }
+        fill_held_axes(self.inertia, lattice);
+        let Self { scratch, mass_factors, edge_factor, inertia, .. } = self;
+        let band = &renewal.bands.scalars;
+        let mut is_sound = true;
+        for (axis, factor) in mass_factors.chunks_exact_mut(band.floats().max(1)).enumerate() {
+            band.clear(factor);
+            for (cell, matrices) in inertia.iter().enumerate() {
+                let functions = lattice.functions_of(cell);
+                for_each_pair(|pair, c, d| {
+                    let value = matrices[pair % matrices.len()][axis % 4];
+                    for_each_product(lattice, functions[c], functions[d], |row, column, weight| {
+                        if let Some(entry) = factor.get_mut(band.at(row, column)) {
+                            *entry += weight * value;
+                        }
+                    });
+                });
+            }
+            is_sound &= factorise(band, factor, scratch);
+        }
+        is_sound && factorise_edges(band, edge_factor, scratch, lattice, &held_shares(scene, lattice, places))
+    }
+
+    /// Writes `((1 + k) Mc + E) x` for vectors of the functions.
+    #[inline(never)]
+    pub(super) fn times_inertia(&self, lattice: &Lattice, x: &CoarseVectors, out: &mut CoarseVectors) {
+        out.fill(NodeVector::ZERO);
+        for (cell, matrices) in self.inertia.iter().enumerate() {
+            let functions = lattice.functions_of(cell);
+            let mut at = [Vec4::ZERO; 8];
+            for (at, &function) in at.iter_mut().zip(&functions) {
+                *at = x.get(function).map_or(Vec4::ZERO, |x| Vec4::from(x.0));
+            }
+            for (&function, pairs) in functions.iter().zip(&PAIR_OF) {
+                let mut sum = Vec4::ZERO;
+                for (&at, &pair) in at.iter().zip(pairs) {
+                    sum += Vec4::from(matrices[pair]) * at;
+                }
+                if let Some(NodeVector(out)) = out.get_mut(function).filter(|_| lattice.moves(function)) {
+                    *out = (Vec4::from(*out) + sum).to_array();
+                }
+            }
+        }
+    }
+
+    /// Replaces vectors of the functions by `Mc^-1` times them.
+    #[inline(never)]
+    pub(super) fn divide_by_mass(&self, band: &Band, vectors: &mut CoarseVectors, lattice: &Lattice) {
+        lattice.fold(vectors);
+        let functions = lattice.functions();
+        let mut factors = self.mass_factors.chunks_exact(band.floats().max(1));
+        let mut row: Row = [0.0; _];
+        for axis in 0..3 {
+            for (value, vector) in row.iter_mut().zip(&*vectors).take(functions) {
+                *value = vector.0[axis];
+            }
+            solve(band, factors.next().unwrap_or_default(), [&mut row]);
+            for (value, vector) in row.iter().zip(&mut *vectors).take(functions) {
+                vector.0[axis] = *value;
+            }
+        }
+        lattice.expand(vectors);
+    }
+}
+
+/// For each function the share of its nodes that some support holds.
+#[inline(never)]
+fn held_shares<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    lattice: &Lattice,
+    places: &[LatticeNode],
+) -> [f32; MAX_FUNCTIONS] {
+    let mut sums = [[0.0f32; 2]; MAX_FUNCTIONS];
+    for place in places {
+        let is_held = scene.inertia.get(place.node()).is_some_and(|inertia| inertia.held_count() > 0);
+        for (function, weight) in lattice.weights(place) {
+            // Not those of light points, whose parts in a function may be negative.
+            if let Some([held, all]) = sums.get_mut(function).filter(|_| !lattice.is_light(function)) {
+                *all += weight;
+                *held += if is_held { weight } else { 0.0 };
+            }
+        }
+    }
+    sums.map(|[held, all]| if all > 0.0 { held / all } else { 0.0 })
+}
+
+/// The pair of two of the eight functions of a cell.
+const PAIR_OF: [[usize; 8]; 8] = {
+    let mut pairs = [[0; 8]; 8];
+    let mut c = 0;
+    while c < 8 {
+        let mut d = 0;
+        while d < 8 {
+            pairs[c][d] = if c >= d { c * (c + 1) / 2 + d } else { d * (d + 1) / 2 + c };
+            d += 1;
+        }
+        c += 1;
+    }
+    pairs
+};
+
+/// What a held axis counts, as a share: where only few nodes of a cell are free, no motion of the lattice is without
+/// inertia.
+const HELD: f32 = 1e-4;
+
+/// Adds a node's value (kg) for each axis times the products of its weights.
+#[inline(always)]
+pub(super) fn add_node(matrices: &mut [AxisMatrices], place: &LatticeNode, inertia: &NodeInertia, value: f32) {
+    let Some(matrices) = matrices.get_mut(place.cell()) else { return };
+    let weights = place.eight_weights();
+    let free = (value * inertia.free().max(Vec4::splat(HELD))).to_array();
+    for_each_pair(|pair, c, d| {
+        let product = weights[c] * weights[d];
+        let at = pair % matrices.len();
+        for axis in 0..4 {
+            matrices[at][axis] += product * free[axis];
+        }
+    });
+}
+
+/// Gives functions whose nodes are all held along an axis an inertia there: no force acts on it, so its size is of no
+/// consequence.
+pub(super) fn fill_held_axes(matrices: &mut [AxisMatrices], lattice: &Lattice) {
+    const FIRST_OF_DIAGONAL: [usize; 8] = [0, 2, 5, 9, 14, 20, 27, 35];
+    let mut sums = [[0.0f32; 4]; MAX_FUNCTIONS];
+    let mut most = 0.0f32;
+    for (cell, matrices) in matrices.iter().enumerate() {
+        for (function, at) in lattice.functions_of(cell).into_iter().zip(FIRST_OF_DIAGONAL) {
+            if let Some(sums) = sums.get_mut(function).filter(|_| function < lattice.functions()) {
+                sums.iter_mut().zip(matrices[at % matrices.len()]).for_each(|(sum, each)| *sum += each);
+                most = sums.iter().copied().fold(most, f32::max);
+            }
+        }
+    }
+    for (cell, matrices) in matrices.iter_mut().enumerate() {
+        for (function, at) in lattice.functions_of(cell).into_iter().zip(FIRST_OF_DIAGONAL) {
+            let Some(sums) = sums.get_mut(function).filter(|_| function < lattice.functions()) else { continue };
+            for (axis, sum) in sums.iter_mut().enumerate().take(3).filter(|(_, sum)| **sum <= 0.0) {
+                if let Some(entry) = matrices[at % matrices.len()].get_mut(axis) {
+                    *entry = most;
+                }
+                *sum = most;
+            }
+        }
+    }
+}
+
+/// Calls `add` with row, column and weight of what a value of two numbers of a cell, the second not after the first,
+/// adds to the lower triangle of a symmetric matrix of the functions.
+#[inline(always)]
+pub(super) fn for_each_product(lattice: &Lattice, first: usize, second: usize, mut add: impl FnMut(usize, usize, f32)) {
+    if !lattice.moves(first) || !lattice.moves(second) {
+        return;
+    }
+    if !lattice.is_light(first) && !lattice.is_light(second) {
+        return add(first.max(second), first.min(second), 1.0);
+    }
+    lattice.each_function(first, |a, weight| {
+        lattice.each_function(second, |b, other| {
+            // Of two different numbers, the products with the two in turn meet on the diagonal.
+            let twice = if a == b && first != second { 2.0 } else { 1.0 };
+            if first != second || b <= a {
+                add(a.max(b), a.min(b), twice * weight * other);
+            }
+        });
+    });
 }

@@ -1,4 +1,4 @@
-//! Which of the three methods a step beyond the critical one uses, the lattice it needs, and the storage for both.
+//! The lattice and the damper of a long step, and the storage that it needs.
 
 use crate::material::{Element, Material};
 use crate::scene::SceneView;
@@ -6,30 +6,24 @@ use crate::simd::NodeVector;
 
 use super::damper::Damper;
 use super::lattice::{self, Grid, Lattice, LatticeNode};
-use super::{InertiaError, matrices, node_tables};
+use super::{InertiaError, coarse_room, matrices, node_tables};
 
-/// A way to step beyond the critical step.
+/// How to step beyond the critical step: smooth motion keeps its true inertia through a coarse lattice, and a small
+/// network damps rough motion, which the lattice cannot represent.
 #[derive(Clone, Debug)]
-// A network's tables stand where the method stands: there is no heap to put them on.
-#[allow(clippy::large_enum_variant)]
-pub enum Method<'w> {
-    /// Mass scaling, for comparisons: inertia is raised where the step would be unstable.
-    MassScaled,
-    /// Multilevel inertia, for comparisons: the same, and smooth motion keeps its true inertia through a coarse
-    /// lattice.
-    Multilevel(Cells),
-    /// The damped step: the same, and a small network damps rough motion, which the lattice cannot represent. Mostly
-    /// [`Method::damped`]; with a [`Damper`] of a network of your own.
-    Damped(Damper<'w>, Cells),
+pub struct Method<'w> {
+    pub(super) damper: Damper<'w>,
+    pub(super) cells: Cells,
 }
 
 /// Cells of a lattice.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub enum Cells {
-    /// The largest near-cubic lattice whose points are at least 1.5 times as far apart as the nodes, and whose matrices
-    /// cost little to renew: with `n` unknowns, three for each function, `n^3` is at most 4000 times the number of
-    /// elements. At least four nodes for each function, two where no lattice has four. A step takes a coarser one where
-    /// single precision cannot invert the matrices of this one. No lattice if the mesh is too small for one cell.
+    /// The largest near-cubic lattice whose cells are at least twice as wide as a cube of six elements of mean volume, and
+    /// whose matrices cost little to renew: with `n` unknowns, three for each function, `n^3` is at most 4000 times the
+    /// number of elements. At least four nodes for each function, two where no lattice has four. A step takes a coarser
+    /// one where single precision cannot invert the matrices of this one, or where its stiffness differs much from that
+    /// of the elements. No lattice if the mesh is too small for one cell.
     #[default]
     Suggested,
     /// This many along x, y, z, at least one each.
@@ -37,34 +31,23 @@ pub enum Cells {
 }
 
 impl Method<'static> {
-    /// The damped step with the library's own damper.
+    /// With the library's own damper.
     #[must_use]
-    pub fn damped(cells: Cells) -> Self {
-        Self::Damped(Damper::built_in(), cells)
+    pub fn new(cells: Cells) -> Self {
+        Self::with_damper(Damper::built_in(), cells)
     }
 }
 
 impl<'w> Method<'w> {
-    pub(super) const fn damper(&self) -> Option<&Damper<'w>> {
-        match self {
-            Self::Damped(damper, _) => Some(damper),
-            _ => None,
-        }
+    /// With a damper of a network of your own.
+    #[must_use]
+    pub const fn with_damper(damper: Damper<'w>, cells: Cells) -> Self {
+        Self { damper, cells }
     }
 
-    pub(super) const fn cells(&self) -> Option<Cells> {
-        match self {
-            Self::MassScaled => None,
-            Self::Multilevel(cells) | Self::Damped(_, cells) => Some(*cells),
-        }
-    }
-
-    /// The lattice of the method on a scene with these `points` (m).
+    /// The lattice on a scene with these `points` (m).
     pub fn grid<M: Material>(&self, scene: SceneView<'_, M>, points: &[[f32; 3]]) -> Result<Grid, InertiaError> {
-        match self {
-            Self::MassScaled => Ok(Grid::default()),
-            Self::Multilevel(cells) | Self::Damped(_, cells) => cells.grid(scene, points),
-        }
+        self.cells.grid(scene, points)
     }
 }
 
@@ -88,24 +71,25 @@ pub fn vectors_for<M: Material>(
     points: &[[f32; 3]],
 ) -> Result<usize, InertiaError> {
     let (nodes, elements, grid) = (scene.node_count(), scene.element_count(), method.grid(scene, points)?);
-    Ok(vectors_for_lattice(scene.element(), nodes, elements, grid, method.damper().is_some()))
+    Ok(vectors_for_lattice(scene.element(), nodes, elements, grid))
 }
 
 /// The same for this many nodes and elements and a known lattice.
 #[must_use]
-pub const fn vectors_for_lattice(element: Element, nodes: usize, elements: usize, grid: Grid, damped: bool) -> usize {
-    let tables = node_tables::vectors_for(nodes, damped);
-    if grid.functions == 0 {
-        return tables;
-    }
-    let [x, y, z] = grid.cells;
-    let cells = (x as usize).saturating_mul(y as usize).saturating_mul(z as usize);
-    let floats = matrices::floats_for(cells, grid.functions, element.is_nodal_strain());
-    let lists = vectors_of_places(nodes).saturating_add(vectors_of_order(element, elements));
-    tables.saturating_add(lists).saturating_add(floats.div_ceil(FLOATS))
+pub fn vectors_for_lattice(element: Element, nodes: usize, elements: usize, grid: Grid) -> usize {
+    let lists = node_tables::vectors_for(nodes).saturating_add(vectors_of_places(nodes));
+    coarse_room::VECTORS
+        .saturating_add(lists)
+        .saturating_add(matrices::vectors_for(grid, pieces(element, nodes, elements)))
 }
 
-/// No fewer than the damped step needs with these cells on any scene of so many nodes and elements.
+/// Elements, and patches with nodal strain, of a scene, or more than that.
+pub(super) const fn pieces(element: Element, nodes: usize, elements: usize) -> [usize; 2] {
+    // Where tissues meet, a node has a patch of each; a tile of patches that there is no room for is not sampled.
+    [elements, if element.is_nodal_strain() { nodes.saturating_mul(2) } else { 0 }]
+}
+
+/// No fewer than are needed with these cells on any scene of so many nodes and elements.
 #[must_use]
 pub fn vectors_at_most(element: Element, nodes: usize, elements: usize, cells: Cells) -> usize {
     let grid = match cells {
@@ -118,19 +102,23 @@ pub fn vectors_at_most(element: Element, nodes: usize, elements: usize, cells: C
             let [_, few] = NODES_PER_FUNCTION;
             let unknowns = libm::cbrt(most_multiply_adds(elements) as f64) as usize + 1;
             let functions = lattice::MAX_FUNCTIONS.min(nodes / few + 1).min(unknowns / 3);
-            Grid { cells: [lattice::MAX_POINTS as u32, 1, 1], functions }
+            // As many cells as there may be, and layers as large.
+            let across = libm::cbrt(most_cells(functions) as f64) as u32 + 1;
+            Grid { cells: [across; 3], functions }
         }
     };
-    vectors_for_lattice(element, nodes, elements, grid, true)
+    vectors_for_lattice(element, nodes, elements, grid)
+}
+
+/// Most cells of a suggested lattice: a body that fills less of its box has a coarser one.
+const fn most_cells(functions: usize) -> usize {
+    3 * functions + 8
 }
 
 /// Limit of the third power of the number of unknowns of a suggested lattice.
 fn most_multiply_adds(elements: usize) -> u64 {
     (MULTIPLY_ADDS * elements as u64).max(FEW_MULTIPLY_ADDS)
 }
-
-/// Floats of a vector.
-const FLOATS: usize = size_of::<NodeVector>() / size_of::<f32>();
 
 /// Two places take the memory of three vectors.
 const _: () = assert!(3 * size_of::<NodeVector>() == 2 * size_of::<LatticeNode>());
@@ -140,13 +128,10 @@ pub(super) const fn vectors_of_places(nodes: usize) -> usize {
     3 * nodes.div_ceil(2)
 }
 
-/// Vectors of storage for the order of this many elements; patches with nodal strain have none.
-pub(super) const fn vectors_of_order(element: Element, elements: usize) -> usize {
-    if element.is_nodal_strain() { 0 } else { elements.div_ceil(FLOATS) }
-}
-
-/// Least spacing of the points of a suggested lattice, as a multiple of the nodes'.
-const LEAST_SPACING: f32 = 1.5;
+/// Least spacing of the points of a suggested lattice, as a multiple of the edge of a cube of six elements: the coarse
+/// stiffness counts an element in one cell, and is too small for functions of which it is a large part.
+const LEAST_SPACING: f32 = 2.0;
+const ELEMENTS_OF_CUBE: f32 = 6.0;
 
 /// Least number of nodes for each function of a suggested lattice, and on meshes that are too small for that.
 const NODES_PER_FUNCTION: [usize; 2] = [4, 2];
@@ -166,8 +151,8 @@ pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], belo
 /// The largest suitable lattice with fewer than `below` functions.
 fn grid_below<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], below: usize) -> Grid {
     let volume: f32 = scene.places().map(|(tile, lane)| tile.volume::<f32>(lane)).sum();
-    let spacing = libm::cbrtf(volume / points.len().max(1) as f32);
-    let least = lattice::size_of(points).map(|size| LEAST_SPACING * spacing / size);
+    let edge = libm::cbrtf(ELEMENTS_OF_CUBE * volume / scene.element_count().max(1) as f32);
+    let least = lattice::size_of(points).map(|size| LEAST_SPACING * edge / size);
     let mut best = Grid::default();
     for cells in (1..64).flat_map(|parts| lattice::near_cubic(points, parts)) {
         if cells.iter().zip(least).any(|(&cells, least)| cells > 1 && cells as f32 * least > 1.0) {
@@ -179,6 +164,7 @@ fn grid_below<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], below: usize) -> 
         let unknowns = 3 * functions as u64;
         if functions > best.functions
             && functions < below
+            && cells.iter().map(|&count| count as usize).product::<usize>() <= most_cells(functions)
             && unknowns * unknowns * unknowns <= most_multiply_adds(scene.element_count())
         {
             best = Grid { cells, functions };

@@ -1,80 +1,65 @@
-//! Steps beyond the critical one: mass-scaled, multilevel and damped steps. Inertia is raised where a step `D` (s)
-//! would be unstable, and smooth motion gets its true inertia back through a coarse lattice. A step takes one force
-//! evaluation, like the exact step.
-//!
-//! Three methods share the code ([`Method`]): *mass scaling* (no lattice), *multilevel inertia* (with a lattice), and
-//! the *damped* step, which is multilevel inertia with a small network that damps rough motion. Bounds and coarse
-//! inertia are renewed in cycles, sooner where tissue deforms fast (`refresh.rs`). Precedents: selective mass scaling
-//! (Olovsson et al. 2005), reciprocal mass matrices (Tkachuk & Bischoff 2015).
+//! Steps beyond the critical one. Inertia is raised where a step `D` (s) would be unstable, smooth motion gets its true
+//! inertia back through a coarse lattice, and a small network damps rough motion. A step takes one force evaluation,
+//! like the exact step. Precedents: selective mass scaling (Olovsson et al. 2005), reciprocal mass matrices (Tkachuk &
+//! Bischoff 2015).
 //!
 //! # The step
 //!
 //! ```text
-//! r   = D^2 f - 2 k m du,  g = W^T r                              k = mu D / 2
-//! du+ = du + M^-1 r + W (S^-1 (g + A w - A_s d) - G^-1 g - drag T^2 c)     M = N + reserve m     (node.rs)
-//! S   = (1 + k) Mc + A,  A = s_c D^2 / 4 Kc,  T = S^-1 A,  G >= W^T M W              (assembly.rs, nodal_sums.rs)
+//! r   = D^2 f - 2 k m du,  g = W^T r                                         k = mu D / 2
+//! du+ = du + N^-1 r + W (S^-1 (g - M w) + w + p - (removed T + drag T^2) c)  N (node.rs)
+//! S   = M + A,  M = (1 + k) Mc + E,  A = s_c D^2 / 4 Kc,  T = S^-1 A          (renewal.rs, coarse_stiffness.rs)
 //! ```
-//! `N >= s D^2 / 4 sum_e D_a`, with the bounds `D_a` of the elements' stiffness, and `Kc` from a bound that rotations
-//! do not feel (`src/element/stiffness_bound.rs`). `G^-1 g` removes what the nodes' own inertia gives to the lattice's
-//! motion, which has its inertia in `S`. The operator is symmetric, and positive because `W G^-1 W^T <= M^-1`. In slow
-//! motion `G = W^T M W`. In fast motion a bound of it with one 3 x 3 matrix for each function is cheaper to renew, and
-//! leaves a share of about mass over inertia. The functions `W` reproduce linear fields wherever no support holds them,
-//! so translations and rotations of the shape at rest are the lattice's alone, and as `A` is zero for them their
-//! momentum is conserved. `w` is the change of velocity that rotation alone brings (`transport.rs`). `A_s d` couples
-//! supports whose increments change by `d` (`supports.rs`). In the first step `D^2` is halved: a force that acts from
-//! the start on has acted for half a step. `c` is the lattice's part of `du`. `T` is zero for rigid motion and small
-//! for motion that the step resolves, so the drag takes neither momentum nor slow motion. It is there because `S`
-//! changes with the state while velocities are kept, which would feed deformation that the step cannot resolve; so it
-//! follows the rate at which the shape changes, up to 0.27.
+//! `N >= s D^2 / 4 rho b` has the scalar bound `b` of a node's stiffness that each force pass computes, times its ratio
+//! at rest to a closer bound. `Kc` stands for `W^T K W`: tangents of sampled elements, averaged over the clusters of a
+//! cell (held nodes, tissue), times the second moments of the cluster (`clusters.rs`). `E` is what the lattice's inertia
+//! has to be larger by because nodes also move by themselves: with `t = (1 + k) m / N` of a cell, `(1 + k) m / (1 - t)`
+//! in place of `(1 + k) m`. The functions `W` reproduce linear fields wherever no support holds them, so translations
+//! and rotations of the shape at rest are the lattice's alone, and as `A` is zero for them their momentum is conserved.
+//! `w` is the change of velocity that rotation alone brings (`transport.rs`), `p` what supports do whose speed changes
+//! (`supports.rs`), `c` the lattice's part of `du`. In the first step `D^2` is halved: a force that acts from the start
+//! on has acted for half a step. `T` is zero for rigid motion and small for motion that the step resolves, so drag takes
+//! neither momentum nor slow motion. It is there because `S` changes with the state while velocities are kept, which
+//! would feed deformation that the step cannot resolve; so it follows the rate at which the shape changes, up to 0.27.
 //!
-//! # Why it is stable
+//! `S` is computed anew where the lattice has been strained and bent by more than a limit since, the less the stiffer
+//! the tissue is in volume, or where the bounds of a cell's nodes have grown by a tenth; in the step that needs it, from
+//! the state at its start. Between, it is used in frames that rotate with the tissue (`frames.rs`).
 //!
-//! Central differences with the operator `B` are stable while `lambda_max(B K) < 4 / D^2`. As `G` is positive,
-//! `B <= M^-1 + W S^-1 W^T`, and `lambda_max((A + B) K) <= lambda_max(A K) + lambda_max(B K)` for symmetric positive
-//! matrices:
+//! # What is proved
+//!
+//! Central differences with the operator `B = N^-1 + W S^-1 W^T` are stable while `lambda_max(B K) < 4 / D^2`, and for
+//! symmetric positive matrices `lambda_max((X + Y) K) <= lambda_max(X K) + lambda_max(Y K)`:
 //!
 //! ```text
-//! lambda_max(B K) <= lambda_max(M^-1 K) + lambda_max(S^-1 W^T K W) <= 4 / D^2 (1 / s + 1 / s_c)
+//! lambda_max(B K) <= lambda_max(N^-1 K) + lambda_max(S^-1 W^T K W) <= 4 / D^2 (1 / s + q / s_c)
 //! ```
-//! The first term because `K <= sum_e D_a <= 4 / (s D^2) N`, the second because `W^T K W <= Kc`. Both come from bounds
-//! of each element's tangent, for any mesh, support, material and state. With `s` = 1.8 and `s_c` = 2.8 the bracket is
-//! 0.913. This margin allows the stiffness of a node to grow by 5 % and that of the lattice's motion by 17 % during a
-//! cycle. Drag on the last increment lowers the limit: with a share `d` of rough motion and `drag` of the lattice's, `K
-//! <= 4 / D^2 B^-1` becomes `K <= (4 B^-1 - 2 C) / D^2`, and with `2 a b <= e a^2 + b^2 / e` for the two parts of a
-//! motion it holds if `(1 + e) / s_c <= 1 - drag / 2` and `(1 + 1 / e) / s <= 1 - d / 2`. With `drag` at most 0.27 that
-//! allows `d` = 0.107; the damper removes at most 0.1. Both at once leave no margin for growth during a cycle. But a
-//! step has much drag where it renews all bounds, or where inertia is a thousand times the mass.
+//! with the largest ratio `q` of `W^T K W` to `Kc`. With `s` = 1.8 and `s_c` = 2.8 the bracket is 0.913 for `q` = 1. Drag
+//! on the last increment lowers the limit: with a share `d` of rough motion and `drag` of the lattice's, `K <= 4 / D^2
+//! B^-1` becomes `K <= (4 B^-1 - 2 C) / D^2`, and with `2 a b <= e a^2 + b^2 / e` for the two parts of a motion it holds
+//! if `(1 + e) / s_c <= 1 - drag / 2` and `(1 + 1 / e) / s <= 1 - d / 2`. With `drag` at most 0.27 that allows `d` =
+//! 0.107; the damper removes at most 0.1. Where more is removed than a damper does, the step moves less by its forces,
+//! `(1 - d / 2) / 0.95`.
 //!
-//! Between refreshes the bounds are out of date. Four measures compensate for that:
-//! - Bounds have directions, and tissue rotates. So bounds are kept in frames that rotate with the tissue
-//!   (`frames.rs`). Without them a free body that has rotated by 15 degrees is unstable at 20 times its critical step.
-//!   Mass scaling has a lattice for these frames only.
-//! - Motion without change of volume becomes stiff where the shape has changed by `e` since, with a share `e^2` of the
-//!   stiffness of volume. So a cycle takes the shorter, the faster the lattice changes its shape and the stiffer the
-//!   tissue is in volume, down to one step (`refresh.rs`).
-//! - Where tissue stiffens more than the margin allows, the step is held back, and a cycle is completed at once. Each
-//!   step computes a scalar bound of every element in the same pass as the forces. Where the sum at a node has grown
-//!   beyond its margin, the inverse inertia of the node is divided by the growth, and the lattice's part is multiplied
-//!   by `share = 1.17 / growth`.
+//! # What is measured or a safeguard
+//!
+//! - `N` is a bound at rest; `rho` is kept where the shape changes.
+//! - `q` is one where elements end at cells and are alike in a cluster. Elsewhere it is larger, up to ten and more where
+//!   few elements fill a cell and volume is stiff. The preparation measures it at rest by power iteration and multiplies
+//!   `Kc` by it (`rest_check.rs`), and by up to 1.35 more where tissue is stiff in volume, for what bending changes.
+//! - Where tissue stiffens within a step, `S` is too soft for that step. A linear bound does not cover a step that is
+//!   large compared with the range of the law. So the forces of one step may move a node, relative to the lattice, by at
+//!   most a fiftieth of the least height of its elements ([`Report::held_back`]), and strain a cell of the lattice by at
+//!   most a tenth, a fifth with nodal strain; where velocities strain it by more than a fifth in a step they are damped
+//!   ([`Report::coarse_share`]). With a law that becomes a hundred times as stiff in a step, a few runs in a hundred on
+//!   wild meshes are refused all the same (`tests/large_steps/wild.rs`).
 //! - Where inertia grows while velocities are kept, `1/2 v^T S v` grows as well. So where only a share of the lattice's
 //!   part is used, `1 - sqrt(share)` of `T c` and of the rough motion is removed. The same is done with kinetic energy
-//!   that cannot have come from the loads, which the energy balance shows. Neither takes momentum. With a share
-//!   `d` removed a step is stable for `lambda_max(B K) < 4 / D^2 (1 - d / 2)`. So where the balance asks for more than
-//!   a damper removes, the step moves less by its forces, `(1 - d / 2) / 0.95`.
-//!
-//! Where nodes use only a share of their inverse inertia, `G^-1` is multiplied by the least share, which keeps the
-//! operator positive. Between refreshes this is a safeguard and no proof: a change of a bound's directions other than
-//! the rotation of its frame is covered by the margin only. Without a lattice the nodes have the whole bracket: with
-//! `s` = 1.1 it is 0.91, and 0.955 where the stiffness of a node has grown by 5 %. A cycle takes at most 256 steps,
-//! without a lattice at most 64 and 0.04 s, short compared with the motions of hands and breathing.
-//!
-//! A linear bound does not cover a step that is large compared with the range of the law. So the forces of one step may
-//! move a node, relative to the lattice, by at most a fiftieth of the least height of its elements
-//! ([`Report::held_back`]), and strain a cell of the lattice by at most a tenth ([`Report::coarse_share`]). And float32
-//! cannot invert matrices that are too ill-conditioned. At the start that is an error ([`InertiaError::Singular`]).
-//! Later, where elements are crushed, an inverse that does not take the image of a known vector back to it is not used:
-//! the step is one of mass scaling until the next cycle, with a [`Report::coarse_share`] of zero. If a step goes wrong
-//! all the same, the energy balance detects it, and the step is refused.
+//!   that cannot have come from the loads, which the energy balance shows. Neither takes momentum.
+//! - Float32 cannot invert matrices that are too ill-conditioned. At the start that is an error
+//!   ([`InertiaError::Singular`]), or a coarser lattice where that is free. Later the lattice is not used until `S` is
+//!   computed again, with a [`Report::coarse_share`] of zero. If a step goes wrong all the same, the energy balance
+//!   detects it, and the step is refused.
 //!
 //! # What it costs
 //!
@@ -82,34 +67,32 @@
 //! much inertia was added, and where; a [`crate::guard`] estimates the error. Memory: see [`vectors_for`].
 
 mod added_motion;
-mod assembly;
+mod band;
 #[cfg(test)]
-mod assembly_tests;
-mod cell_boxes;
+mod band_tests;
 mod cells;
+mod clusters;
 mod coarse_motion;
+mod coarse_room;
+mod coarse_stiffness;
+#[cfg(test)]
+mod coarse_stiffness_tests;
 mod contact;
 mod damper;
-mod dense;
-mod direct_assembly;
 mod frames;
-mod inversion;
 mod large_step;
 mod lattice;
 mod local_response;
 mod matrices;
 mod method;
 mod motion_pass;
-mod nodal_strain;
-mod nodal_sums;
 mod node;
-mod node_refresh;
 mod node_tables;
 mod parts;
 mod pass_input;
-mod projected_inertia;
-mod refresh;
+mod renewal;
 mod report;
+mod rest_check;
 mod restriction_pass;
 mod shorten;
 mod step;
@@ -126,15 +109,11 @@ pub use report::Report;
 
 use core::fmt;
 
-/// `s` without a lattice: `NODE_GROWTH`, and as much again for changes of a bound's directions within a cycle.
-const FINE_WITHOUT_LATTICE: f32 = 1.1;
-/// `s` and `s_c` with a lattice.
+/// `s` and `s_c`.
 const FINE: f32 = 1.8;
 const COARSE: f32 = 2.8;
-/// Growth of the stiffness of a node above which the node is held back.
-const NODE_GROWTH: f32 = 1.05;
-/// The same for the lattice's motion: `NODE_GROWTH / FINE + COARSE_GROWTH / COARSE = 1`.
-const COARSE_GROWTH: f32 = COARSE * (1.0 - NODE_GROWTH / FINE);
+/// Growth of the stiffness of a cell's nodes since `S` was computed, at which it is computed anew.
+const COARSE_GROWTH: f32 = 1.1;
 /// Largest distance by which a node's force may move it in one step from rest, as a part of the least height of its
 /// elements.
 const LARGEST_MOVE: f32 = 0.02;
@@ -142,23 +121,16 @@ const LARGEST_MOVE: f32 = 0.02;
 const LARGEST_STRAIN: f32 = 0.1;
 /// The same with nodal strain, whose critical step is half as long again: strains of a step grow with its square.
 const LARGEST_STRAIN_OF_PATCHES: f32 = 0.2;
-/// Share of the last increment's unresolved deformation of the lattice that a step removes where a step renews all
-/// bounds, and the largest share.
-const DRAG_AT_WHOLE_CYCLES: f32 = 0.02;
+/// Largest strain of a cell in one step that the velocities may go on with.
+const LARGEST_KEPT: f32 = 0.2;
+/// Share of the last increment's unresolved deformation of the lattice that a step removes where the stiffness changes
+/// as much as it may in one step, and the largest share.
+const DRAG_AT_LARGEST_CHANGE: f32 = 0.02;
 const LARGEST_DRAG: f32 = 0.27;
+/// Less drag is left out.
+const LEAST_DRAG: f32 = 0.01;
 /// The same for each multiple of the mass that is added, which grows with the square of the step.
 const DRAG_OF_ADDED: f32 = 4e-5;
-/// Largest growth, from step to step, of the share of its motion that a held-back node may use.
-const RECOVERY: f32 = 1.05;
-/// Least share, so that it can grow again.
-const LEAST_SHARE: f32 = 1e-6;
-/// Largest time of a refresh cycle without a lattice, s: short compared with the motions of hands and breathing, which
-/// stiffen and rotate tissue.
-const CYCLE: f32 = 0.04;
-/// Limits of the largest number of steps of a cycle.
-const CYCLE_STEPS: (u32, u32) = (4, 64);
-/// The same with a lattice, which shows how fast the tissue deforms.
-const LATTICE_CYCLE_STEPS: u32 = 256;
 
 /// Why a step beyond the critical one could not be prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -187,6 +159,11 @@ pub enum InertiaError {
     Singular {
         /// Cells along x, y, z.
         cells: [u32; 3],
+    },
+    /// A mesh is too small for a lattice of one cell.
+    TooSmall {
+        /// Its nodes.
+        nodes: usize,
     },
     /// Not as many points as the scene has nodes.
     Points {
@@ -231,6 +208,9 @@ impl fmt::Display for InertiaError {
                 f,
                 "a lattice of {x} x {y} x {z} cells is too fine for this mesh and step: its inertia cannot be inverted"
             ),
+            Self::TooSmall { nodes } => {
+                write!(f, "a mesh of {nodes} nodes is too small for long steps: take exact ones")
+            }
             Self::Points { points, nodes } => {
                 write!(f, "{points} points for a scene of {nodes} nodes")
             }

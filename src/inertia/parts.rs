@@ -10,11 +10,11 @@ use super::added_motion::AddedMotion;
 use super::cells::{CellPolynomial, CellSlots};
 use super::damper::RoughMotion;
 use super::lattice::LatticeNode;
-use super::motion_pass::{LatticeMotion, MotionPass, MotionTables, PassTotals, RotationTable, apply_increments};
+use super::motion_pass::{LatticeMotion, MotionPass, MotionTables, PassTotals, apply_increments};
 use super::node_tables::NodeTables;
 use super::pass_input::PassInput;
 use super::report::HeldBack;
-use super::restriction_pass::{RestrictionExtremes, RestrictionPass};
+use super::restriction_pass::RestrictionPass;
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};
 use crate::simd::NodeVector;
 use crate::step::threads::take;
@@ -30,12 +30,12 @@ pub(super) struct NodeParts<'a, T> {
 #[derive(Clone, Copy)]
 struct Restricted {
     heads: [CellPolynomial; 2],
-    extremes: RestrictionExtremes<f32>,
+    largest: f32,
 }
 
 impl Restricted {
     fn none() -> Self {
-        Self { heads: [CellPolynomial::ZERO; 2], extremes: RestrictionExtremes::none() }
+        Self { heads: [CellPolynomial::ZERO; 2], largest: 0.0 }
     }
 }
 
@@ -50,8 +50,6 @@ struct RestrictionPart<'a> {
 
 struct MotionPart<'a> {
     partitions: Range<usize>,
-    inverse_off_diagonal: &'a mut [NodeVector],
-    sum_off_diagonal: &'a mut [NodeVector],
     next_increment: &'a mut [NodeVector],
     rough: &'a mut [NodeVector],
     rough_before: &'a mut [NodeVector],
@@ -59,16 +57,16 @@ struct MotionPart<'a> {
 }
 
 impl<T: Threads> NodeParts<'_, T> {
-    /// Writes the cells' sums of residual and momentum. Not inlined: the lattice's motion does without its stack.
+    /// Writes the cells' sums of residual, with those of the scalar bounds, and momentum. Gives the largest component of an
+    /// increment, m. Not inlined: the lattice's motion does without its stack.
     #[inline(never)]
     pub(super) fn restrict(
         &self,
         input: PassInput<'_>,
         force: &[NodeVector],
-        inverse_diagonal: &[NodeVector],
         residual: &mut [CellPolynomial],
         momentum: &mut [CellPolynomial],
-    ) -> RestrictionExtremes<f32> {
+    ) -> f32 {
         residual.fill(CellPolynomial::ZERO);
         momentum.fill(CellPolynomial::ZERO);
         let mut results = [Restricted::none(); MAX_PARTITIONS];
@@ -94,11 +92,10 @@ impl<T: Threads> NodeParts<'_, T> {
                 let [residual, momentum] = &mut result.heads;
                 let residual = CellSlots { first, head: residual, from, rest: &mut *part.residual };
                 let momentum = CellSlots { first, head: momentum, from, rest: &mut *part.momentum };
-                result.extremes =
-                    RestrictionPass { input, ranks, force, inverse_diagonal, residual, momentum }.dispatched();
+                result.largest = RestrictionPass { input, ranks, force, residual, momentum }.dispatched();
             }
         });
-        let mut extremes = RestrictionExtremes::none();
+        let mut largest = 0.0;
         for (partition, result) in all.all().zip(&results) {
             let first = cells_of(&all.nodes(&(partition..partition + 1)), input.places).start;
             for (cells, head) in [&mut *residual, &mut *momentum].into_iter().zip(&result.heads) {
@@ -106,31 +103,21 @@ impl<T: Threads> NodeParts<'_, T> {
                     cell.add_sums(head);
                 }
             }
-            extremes = extremes.merged_with(result.extremes);
+            largest = f32::max(result.largest, largest);
         }
-        extremes
+        largest
     }
 
     /// Writes the next increments.
     pub(super) fn move_nodes(
         &self,
         input: PassInput<'_>,
-        rotations: &RotationTable,
-        lattice: Option<&LatticeMotion<'_>>,
+        lattice: &LatticeMotion<'_>,
         force: &[NodeVector],
         tables: &mut NodeTables<'_>,
     ) -> PassTotals {
         let mut results = [PassTotals::NONE; MAX_PARTITIONS];
-        let NodeTables {
-            inverse_diagonal,
-            inverse_off_diagonal,
-            sum_off_diagonal,
-            next_increment,
-            rough,
-            rough_before,
-            ..
-        } = tables;
-        let (mut off_diagonal, mut sums) = (&mut **inverse_off_diagonal, &mut **sum_off_diagonal);
+        let NodeTables { next_increment, rough, rough_before, .. } = tables;
         let (mut next, mut rest) = (&mut **next_increment, &mut results[..]);
         let (mut rough, mut before) = (&mut **rough, &mut **rough_before);
         let (all, count) = (self.partitions, self.count());
@@ -138,8 +125,6 @@ impl<T: Threads> NodeParts<'_, T> {
             let partitions = all.part(part, count);
             let nodes = all.nodes(&partitions).len();
             MotionPart {
-                inverse_off_diagonal: take(&mut off_diagonal, nodes),
-                sum_off_diagonal: take(&mut sums, nodes),
                 next_increment: take(&mut next, nodes),
                 rough: take(&mut rough, nodes),
                 rough_before: take(&mut before, nodes),
@@ -148,21 +133,17 @@ impl<T: Threads> NodeParts<'_, T> {
             }
         });
         self.threads.each(parts.get_mut(..count).unwrap_or_default(), |part| {
-            let (mut off_diagonal, mut next) = (&mut *part.inverse_off_diagonal, &mut *part.next_increment);
-            let mut sums = &mut *part.sum_off_diagonal;
+            let mut next = &mut *part.next_increment;
             let (mut rough, mut before) = (&mut *part.rough, &mut *part.rough_before);
             for (partition, result) in part.partitions.clone().zip(&mut *part.results) {
                 let ranks = all.nodes(&(partition..partition + 1));
                 let nodes = ranks.len();
                 let tables = MotionTables {
-                    inverse_diagonal: inverse_diagonal.get(ranks.clone()).unwrap_or_default(),
-                    inverse_off_diagonal: take(&mut off_diagonal, nodes),
-                    sum_off_diagonal: take(&mut sums, nodes),
                     next_increment: take(&mut next, nodes),
                     rough: take(&mut rough, nodes),
                     rough_before: take(&mut before, nodes),
                 };
-                *result = MotionPass { input, rotations, lattice, ranks, force, tables }.dispatched();
+                *result = MotionPass { input, lattice, ranks, force, tables }.dispatched();
             }
         });
         PassTotals::of_all(results.get(all.all()).unwrap_or_default())

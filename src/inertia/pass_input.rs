@@ -1,5 +1,5 @@
-//! What the passes over the nodes of a step read: values of a vector of nodes, their residual and momentum. With a
-//! lattice the nodes are taken in the order of its cells, else in that of the scene.
+//! What the passes over the nodes of a step read: values of a vector of nodes, their residual and momentum. The nodes are
+//! taken in the order of the lattice's cells.
 
 use bytemuck::must_cast_slice;
 
@@ -39,11 +39,9 @@ impl ResidualFactors {
     /// explain the motion it is smaller ([`super`]).
     pub(super) fn new(step: &Step, model: &LargeModel<'_>, progress: &Progress) -> Self {
         let k = half_damping(step);
-        let mut ratio = (1.0 + model.scaling.k) / (1.0 + k);
-        if model.lattice.functions() > 0 {
-            let removed = removed_share(progress.energy_balance.allowed_share());
-            ratio *= (2.0 - removed.max(damper::MOST)) / (2.0 - damper::MOST);
-        }
+        let removed = removed_share(progress.energy_balance.allowed_share());
+        let stable = (2.0 - removed.max(damper::MOST)) / (2.0 - damper::MOST);
+        let ratio = stable * (1.0 + model.scaling.k) / (1.0 + k);
         let span = if progress.steps == 0 { 0.5 } else { (0.5 * (1.0 + 1.0 / step.carry())).min(LONGEST_SPAN) };
         let square = step.seconds() * step.seconds() * span;
         Self { square: ratio * square, loss: ratio * 2.0 * k * step.carry() }
@@ -58,7 +56,6 @@ pub(super) struct PassInput<'a> {
     pub(super) residual: ResidualFactors,
     pub(super) inertia: &'a [NodeInertia],
     pub(super) increment: &'a [NodeVector],
-    /// Empty without a lattice.
     pub(super) places: &'a [LatticeNode],
 }
 
@@ -105,13 +102,6 @@ impl PassInput<'_> {
         let ResidualFactors { square, loss } = self.residual;
         let (square, loss) = (R::splat(square), R::splat(loss) * mass);
         [free[0] * (square * fx - loss * vx), free[1] * (square * fy - loss * vy), free[2] * (square * fz - loss * vz)]
-    }
-
-    /// The inverse of the growth of the bound, with the mass added to both, because growth below the mass is harmless.
-    #[inline(always)]
-    pub(super) fn inverse_growth<R: Real>(&self, nodes: &NodeValues<R>, bound_before: R) -> R {
-        let weight = R::splat(self.scaling.weight);
-        (nodes.mass + weight * bound_before).divide(nodes.mass + weight * nodes.bound)
     }
 }
 

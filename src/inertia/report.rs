@@ -4,16 +4,17 @@
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
-    /// Added inertia as a multiple of the node's mass, mean over the nodes.
+    /// Added inertia as a multiple of the node's mass, mean over the nodes, when all inertia was last computed.
     pub added_mean: f32,
     /// The largest added inertia of a node, as a multiple of its mass.
     pub added_largest: f32,
     /// The node with the largest added inertia.
     pub added_node: u32,
-    /// Number of nodes that the latest step held back, because their stiffness has grown since their inertia was
-    /// computed, or because their force would have moved them by more than a small part of an element.
+    /// Number of nodes that the latest step held back, because their force would have moved them by more than a small
+    /// part of an element.
     pub held_back: u32,
-    /// Share of the lattice's motion that was used: below one if the body has stiffened since the last refresh.
+    /// Share of the lattice's motion that was used: below one if the forces of the step would have strained a cell too
+    /// much.
     pub coarse_share: f32,
     /// Share of the rough motion that the latest damped step removed.
     pub damping: f32,
@@ -30,64 +31,53 @@ pub(super) struct HeldBack {
     pub(super) nodes: u32,
     /// Sum of the unused shares of their inverse inertia.
     pub(super) unused: f32,
-    /// The least share.
-    pub(super) least: f32,
 }
 
 impl HeldBack {
-    pub(super) const NONE: Self = Self { nodes: 0, unused: 0.0, least: 1.0 };
+    pub(super) const NONE: Self = Self { nodes: 0, unused: 0.0 };
 
-    /// Adds a number of nodes, the sum of their unused shares and the least share.
+    /// Adds a number of nodes and the sum of their unused shares.
     #[inline(always)]
-    pub(super) fn add(&mut self, nodes: f32, unused: f32, least: f32) {
+    pub(super) fn add(&mut self, nodes: f32, unused: f32) {
         self.nodes += nodes as u32;
         self.unused += unused;
-        self.least = self.least.min(least);
     }
 
     /// Adds those of other nodes.
     pub(super) fn merge(&mut self, other: &Self) {
         self.nodes += other.nodes;
         self.unused += other.unused;
-        self.least = self.least.min(other.least);
     }
 }
 
-/// Sums of added inertia over the nodes of a cycle.
+/// Added inertia as a multiple of the node's mass.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct AddedInertiaSums {
-    sum: f32,
+pub(super) struct AddedInertia {
+    pub(super) mean: f32,
     nodes: u32,
     largest: f32,
     node: u32,
 }
 
-impl AddedInertiaSums {
-    pub(super) const NEW: Self = Self { sum: 0.0, nodes: 0, largest: 0.0, node: 0 };
+impl AddedInertia {
+    pub(super) const NONE: Self = Self { mean: 0.0, nodes: 0, largest: 0.0, node: 0 };
 
-    #[inline(always)]
+    /// Adds a node to the sum.
     pub(super) fn add(&mut self, node: usize, added: f32) {
-        self.sum += added;
+        self.mean += added;
         self.nodes += 1;
         if added > self.largest {
-            self.largest = added;
-            self.node = node as u32;
+            (self.largest, self.node) = (added, node as u32);
         }
     }
 
-    /// As a multiple of the mass.
-    pub(super) fn mean(&self) -> f32 {
-        self.sum / self.nodes.max(1) as f32
+    /// Makes the sum a mean.
+    pub(super) fn end(&mut self) {
+        self.mean /= self.nodes.max(1) as f32;
     }
 
-    pub(super) fn report(&self, held_back: u32, coarse_share: f32) -> Report {
-        Report {
-            added_mean: self.mean(),
-            added_largest: self.largest,
-            added_node: self.node,
-            held_back,
-            coarse_share,
-            damping: 0.0,
-        }
+    pub(super) const fn report(&self, held_back: u32, coarse_share: f32, damping: f32) -> Report {
+        let Self { mean: added_mean, largest: added_largest, node: added_node, .. } = *self;
+        Report { added_mean, added_largest, added_node, held_back, coarse_share, damping }
     }
 }

@@ -14,20 +14,21 @@ use crate::step::{
 };
 
 use super::cells::{prolong, restrict};
+use super::clusters::ClusterInput;
 use super::coarse_motion::{CoarseMotion, CoarseSpace, MotionResult, removed_share};
+use super::coarse_room::CoarseRoom;
 use super::damper::RoughMotion;
-use super::dense::{apply_by_axis, from_components, to_components};
 use super::large_step::{LargeModel, LargeView, Storage};
 use super::lattice::{CoarseVectors, Lattice, rank_of};
-use super::matrices::{Matrices, of_axes};
-use super::motion_pass::{LatticeMotion, PassTotals, RoughDamping, rotation_table};
+use super::matrices::{Bands, Matrices};
+use super::motion_pass::{LatticeMotion, PassTotals};
 use super::node::half_damping;
 use super::parts::NodeParts;
 use super::pass_input::{PassInput, ResidualFactors};
-use super::refresh::RefreshInput;
+use super::renewal::RenewalInput;
 use super::report::HeldBack;
 use super::supports::MovingSupports;
-use super::{COARSE_GROWTH, LARGEST_STRAIN, LARGEST_STRAIN_OF_PATCHES, NODE_GROWTH};
+use super::{LARGEST_STRAIN, LARGEST_STRAIN_OF_PATCHES};
 
 /// A step is [`Status::Limited`] if more than this share of the inverse inertia of all nodes is not used, or less than
 /// this share of the lattice's motion is used.
@@ -71,9 +72,9 @@ impl<'a, 'w> LargeView<'a, 'w> {
         let Self { model, storage } = self;
         let nodes = model.nodes;
         let mismatch = |room| Status::Mismatch { nodes: scene.node_count(), room };
-        let damped = model.method.damper().is_some();
-        let storage = Storage::split(storage, model.element, [nodes, model.elements], &model.lattice, damped)
-            .ok_or_else(|| mismatch(nodes.min(state.capacity())))?;
+        let storage =
+            Storage::split(storage, model.element, [nodes, model.elements], &model.lattice, &model.renewal.bands)
+                .ok_or_else(|| mismatch(nodes.min(state.capacity())))?;
         if model.is_for(scene) { Ok((model, storage)) } else { Err(mismatch(0)) }
     }
 }
@@ -90,10 +91,8 @@ pub(super) struct InertiaStep<'a, 'w, T> {
     rough_written: bool,
     coarse_share: f32,
     damping: f32,
-    /// Change of the lattice's shape by the last increment.
-    change: f32,
-    /// The shares of `S^-1` and `G^-1` in this step, if the lattice is in use.
-    pub(super) response: Option<[f32; 2]>,
+    /// The share of `S^-1` in this step, if the lattice is in use.
+    pub(super) response: Option<f32>,
 }
 
 impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
@@ -108,7 +107,6 @@ impl<'a, 'w, T> InertiaStep<'a, 'w, T> {
             rough_written: false,
             coarse_share: 1.0,
             damping: 0.0,
-            change: 0.0,
             response: None,
         }
     }
@@ -129,10 +127,11 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
             look_cycle: 1,
         };
         let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
-        self.model.refresh.update_frames(displacement, progress.steps);
+        let frames = &mut self.storage.matrices.frames;
+        self.model.renewal.update_frames(frames, displacement, progress.steps);
         trial.add_pushes_before(self.step);
         let moved = self.move_lattice(trial);
-        let mut totals = self.move_nodes(trial, moved);
+        let mut totals = self.move_nodes(trial, &moved);
         // Without instruments not even its stack is used.
         if trial.loads.contact().is_some() {
             self.meet_instruments(trial, &mut totals);
@@ -151,12 +150,11 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
     }
 
     fn added_inertia(&self) -> f32 {
-        self.model.refresh.added.mean()
+        self.model.renewal.added.mean
     }
 
     fn meets_instruments(&self, trial: &Trial<'_, M>) -> bool {
-        // In mass-scaled steps an instrument would push inertia that is not there.
-        self.model.lattice.functions() > 0 && trial.has_room_for_pushes()
+        trial.has_room_for_pushes()
     }
 
     fn refuse(&mut self) {
@@ -174,15 +172,11 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
 
     #[inline(never)]
     fn finish(&mut self, trial: &mut Trial<'_, M>) -> bool {
-        let Self { model, storage: Storage { tables, places, order, matrices }, held_back, coarse_share, .. } = self;
-        let LargeModel { lattice, refresh, scaling, report, nodes, least_share, moment, .. } = &mut **model;
-        *least_share = held_back.least;
-        let Trial { scene, displacement, increment, volume, progress, .. } = trial;
-        *moment = progress.moment();
-        let input = RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
-        refresh.advance(progress.steps, self.change, input, tables, matrices);
-        *report = refresh.added.report(held_back.nodes, *coarse_share);
-        report.damping = self.damping;
+        let Self { model, storage, held_back, coarse_share, .. } = self;
+        let LargeModel { lattice, renewal, report, nodes, moment, .. } = &mut **model;
+        *moment = trial.progress.moment();
+        renewal.enter(storage.room.part, lattice, &storage.matrices.frames);
+        *report = renewal.added.report(held_back.nodes, *coarse_share, self.damping);
         held_back.unused > LARGEST_UNUSED * *nodes as f32 || *coarse_share < LEAST_COARSE_SHARE
     }
 }
@@ -207,99 +201,92 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
     /// steps was changed.
     #[inline(never)]
     fn renew_if_stale<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) {
-        let Self { model, storage: Storage { tables, places, order, matrices }, .. } = self;
-        let LargeModel { lattice, refresh, scaling, rough, least_share, moment, is_for_other_step, .. } = &mut **model;
-        let Trial { scene, displacement, increment, volume, progress, .. } = trial;
+        let Self { model, threads, storage: Storage { tables, places, matrices, .. }, .. } = self;
+        let LargeModel { lattice, renewal, scaling, rough, moment, is_for_other_step, .. } = &mut **model;
+        let Trial { scene, displacement, volume, progress, .. } = trial;
         let follows = *moment == progress.moment();
         if follows && !*is_for_other_step {
             return;
         }
         *is_for_other_step = false;
-        nodal_volumes(*scene, displacement, &[], volume, &CallingThread);
-        let input = RefreshInput { scene: *scene, displacement, volume, increment, lattice, places, order, scaling };
-        if follows {
-            refresh.restart(input, tables, matrices);
-            return;
+        nodal_volumes(*scene, displacement, &[], volume, *threads);
+        let input = RenewalInput { scene: *scene, displacement, volume, lattice, places, scaling };
+        renewal.renew_all(input, tables, matrices, *threads);
+        if !follows {
+            *rough = RoughMotion::NONE;
+            tables.clear_rough();
+            *moment = progress.moment();
         }
-        refresh.renew(input, tables, matrices);
-        (*rough, *least_share) = (RoughMotion::NONE, 1.0);
-        tables.rough.fill(NodeVector::ZERO);
-        *moment = progress.moment();
     }
 
-    /// Computes the motion of the lattice. None without one.
+    /// Computes the motion of the lattice.
     #[inline(never)]
-    fn move_lattice<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) -> Option<MovedLattice> {
-        let Self { step, model, storage: Storage { tables, places, order, matrices }, .. } = self;
-        if model.lattice.functions() == 0 {
-            return None;
-        }
+    fn move_lattice<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>) -> MovedLattice {
+        let Self { step, model, threads, storage: Storage { tables, places, matrices, room }, .. } = self;
         let residual = ResidualFactors::new(step, model, trial.progress);
-        let LargeModel { lattice, refresh, scaling, rough, method, moved_elements, least_share, .. } = &mut **model;
+        let LargeModel { lattice, renewal, scaling, rough, method, .. } = &mut **model;
         let Trial { scene, loads, displacement, increment, force, volume, progress, .. } = trial;
-        let supports = MovingSupports {
-            scene: *scene,
-            lattice,
-            places,
-            elements: order.get(..*moved_elements).unwrap_or_default(),
-            weight: scaling.coarse_weight,
-            displacement,
-            volume,
-        };
-        let supports = supports.pull(loads, progress.time, step, increment, tables.next_increment);
+        let (scene, places) = (*scene, &**places);
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
         let (cells, momentum) = (&mut *matrices.cells, &mut *matrices.smooth_cells);
-        let extremes = node_parts(scene, self.threads).restrict(input, force, tables.inverse_diagonal, cells, momentum);
-        let growth = 1.0 / extremes.inverse_growth;
-        let share = if growth > COARSE_GROWTH { COARSE_GROWTH / growth } else { 1.0 };
-        let smooth = smooth_motion(matrices, lattice, extremes.increment).filter(|_| refresh.lattice_in_use);
-        let motion = CoarseMotion {
-            space: CoarseSpace { lattice, refresh },
-            second_order: method.damper().is_some(),
-            k: scaling.k,
-            least_share: least_share.min(NODE_GROWTH / growth),
-            smooth: smooth.as_ref(),
+        let largest = node_parts(&scene, *threads).restrict(input, force, cells, momentum);
+        let CoarseRoom { motion, part, pull, scratch } = room;
+        restrict(matrices.cells, lattice, motion);
+        let stiffness = RenewalInput { scene, displacement, volume, lattice, places, scaling };
+        renewal.renew_if_due(stiffness, matrices, *threads);
+        if !renewal.lattice_in_use {
+            motion.fill(NodeVector::ZERO);
+            part.fill(NodeVector::ZERO);
+            prolong(motion, lattice, matrices.cells);
+            self.coarse_share = 0.0;
+            return MovedLattice { has_smooth: false, removed: 0.0, work: 0.0 };
+        }
+        let is_merged = renewal.is_merged;
+        let supports = MovingSupports {
+            input: ClusterInput { scene, lattice, places, is_merged },
+            clusters: &matrices.clusters,
+            tangents: matrices.of_clusters,
+            displacement,
+        };
+        let pull = pull.each_mut().map(|vectors| &mut **vectors);
+        let supports = supports.pull(loads, progress.time, step, increment, tables.scratch, pull);
+        let has_part = write_part(matrices, lattice, &renewal.bands, largest, part);
+        let coarse = CoarseMotion {
+            space: CoarseSpace { lattice, renewal, matrices },
+            has_part,
             supports: supports.as_ref(),
             allowed: progress.energy_balance.allowed_share(),
             largest_strain: if scene.element().is_nodal_strain() { LARGEST_STRAIN_OF_PATCHES } else { LARGEST_STRAIN },
         };
-        let MotionResult { share, change, work } = motion.compute(matrices, share);
-        // Without a lattice in use there is no distinction of smooth and rough motion.
-        let damper = method.damper().filter(|_| refresh.lattice_in_use);
-        self.damping = damper.map_or(0.0, |damper| step.carry() * damper.share(rough, half_damping(step)));
-        // Where bounds have grown beyond their margin they are out of date whatever the lattice does.
-        self.change = if growth <= COARSE_GROWTH { change } else { f32::INFINITY };
-        self.response = refresh.lattice_in_use.then_some([share, motion.least_share]);
-        self.coarse_share = if refresh.lattice_in_use { share } else { 0.0 };
-        Some(MovedLattice {
-            has_smooth: smooth.is_some(),
-            removed: self.damping.max(removed_share(share.min(motion.allowed))),
+        let MotionResult { share, work } =
+            coarse.compute(motion, part, scratch.each_mut().map(|vectors| &mut **vectors));
+        let removed = removed_share(share.min(coarse.allowed));
+        prolong(motion, lattice, matrices.cells);
+        self.damping = step.carry() * method.damper.share(rough, half_damping(step));
+        (self.coarse_share, self.response) = (share, Some(share));
+        MovedLattice {
+            has_smooth: has_part,
+            removed: self.damping.max(removed),
             work: work / (step.seconds() * step.seconds()),
-        })
+        }
     }
 
     /// Computes the next increments of the nodes.
     #[inline(never)]
-    fn move_nodes<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>, moved: Option<MovedLattice>) -> Totals {
+    fn move_nodes<M: ElementMaterial>(&mut self, trial: &mut Trial<'_, M>, moved: &MovedLattice) -> Totals {
         let Self { step, model, storage: Storage { tables, places, matrices, .. }, .. } = self;
-        let LargeModel { refresh, scaling, method, .. } = &**model;
         let residual = ResidualFactors::new(step, model, trial.progress);
         let Trial { scene, increment, force, .. } = trial;
+        let scaling = &model.scaling;
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
-        let lattice = moved.as_ref().map(|moved| LatticeMotion {
-            cells: matrices.cells,
-            fine: matrices.fine_cells,
-            damped: (moved.has_smooth && (method.damper().is_some() || moved.removed > 0.0))
-                .then_some(RoughDamping { smooth: matrices.smooth_cells, share: moved.removed }),
-            in_use: moved.has_smooth,
-        });
-        self.rough_written = lattice.as_ref().is_some_and(|lattice| lattice.damped.is_some());
-        let rotations = &rotation_table(&refresh.frames.of_bounds, refresh.frames.functions());
-        let parts = node_parts(scene, self.threads);
-        let passed = parts.move_nodes(input, rotations, lattice.as_ref(), force, tables);
+        let smooth = moved.has_smooth.then_some(&*matrices.smooth_cells);
+        let lattice =
+            LatticeMotion { cells: matrices.cells, smooth, removed: moved.removed, own_share: model.renewal.own_share };
+        self.rough_written = moved.has_smooth;
         let mut totals;
-        PassTotals { totals, rough: self.rough, held_back: self.held_back } = passed;
-        totals.add_work(moved.map_or(0.0, |moved| moved.work));
+        PassTotals { totals, rough: self.rough, held_back: self.held_back } =
+            node_parts(scene, self.threads).move_nodes(input, &lattice, force, tables);
+        totals.add_work(moved.work);
         totals
     }
 }
@@ -308,18 +295,22 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
 /// may lie outside the body.
 const LARGEST_SMOOTH: f32 = 10.0;
 
-/// The lattice's part `c = Mc^-1 W^T m du` of the increments. Turns the cells' sums of momentum into the smooth part of
-/// the increments, of which `largest` is the largest component, `W` times that. To remove a share of the rest changes
-/// no momentum of the lattice, so neither that of the body. None if the result is not plausible.
-fn smooth_motion(matrices: &mut Matrices<'_>, lattice: &Lattice, largest: f32) -> Option<CoarseVectors> {
-    let mut motion = restrict(matrices.smooth_cells, lattice);
-    let mut components = to_components(&motion);
-    apply_by_axis(of_axes(matrices.mass_inverse), lattice.functions(), &mut components);
-    from_components(&components, &mut motion);
+/// Writes the lattice's part `c = Mc^-1 W^T m du` of the increments. Turns the cells' sums of momentum into the smooth
+/// part of the increments, of which `largest` is the largest component, `W` times that. To remove a share of the rest
+/// changes no momentum of the lattice, so neither that of the body. Gives whether the result is plausible.
+fn write_part(
+    matrices: &mut Matrices<'_>,
+    lattice: &Lattice,
+    bands: &Bands,
+    largest: f32,
+    part: &mut CoarseVectors,
+) -> bool {
+    restrict(matrices.smooth_cells, lattice, part);
+    matrices.divide_by_mass(&bands.scalars, part, lattice);
     let limit = Vec4::splat(LARGEST_SMOOTH * largest);
-    if !motion.iter().all(|vector| Vec4::from(vector.0).abs().cmple(limit).all()) {
-        return None;
+    if !part.iter().all(|vector| Vec4::from(vector.0).abs().cmple(limit).all()) {
+        return false;
     }
-    prolong(&motion, lattice, matrices.smooth_cells);
-    Some(motion)
+    prolong(part, lattice, matrices.smooth_cells);
+    true
 }

@@ -8,11 +8,13 @@
 //! ```
 //! with the lattice's part `c` of the last increment (m) and the rotation `R` of the tissue in that step. For a rigid
 //! rotation `c + w` is the exact next increment. `A` is zero for translations and rotations, so `w` changes no
-//! momentum. Every edge counts with the square of its inverse length; the least squares are a constant matrix.
+//! momentum. Every edge counts with the square of its inverse length; the least squares are a constant matrix. Where
+//! nodes are held `A` resists translations too, so there `w` is kept at zero: a body that swings about a hinge turns
+//! about it, not about its centre.
 
 use glam::{Mat3, Vec3, Vec4};
 
-use super::dense::{apply_to_axes, from_components, invert, row_length, to_components};
+use super::band::{Band, Row, factorise, solve};
 use super::frames::Frames;
 use super::lattice::{CoarseVectors, Lattice, MAX_FUNCTIONS};
 use crate::simd::NodeVector;
@@ -21,29 +23,43 @@ use crate::simd::NodeVector;
 /// consequence.
 const ANCHOR: f32 = 1e-3;
 
-/// Computes the inverse of the matrix of the least squares, with one unknown a function. Gives whether it could be
-/// inverted.
-pub(super) fn invert_edges(matrix: &mut [f32], lattice: &Lattice) -> bool {
-    let functions = lattice.functions();
-    let length = row_length(functions);
-    matrix.fill(0.0);
+/// The same for each held node of a function, as a share of all.
+const HOLD: f32 = 10.0;
+
+/// Computes the factor of the matrix of the least squares, with one unknown a function. Gives whether it could be
+/// factorised. `held` are the shares of the functions' nodes that are held.
+pub(super) fn factorise_edges(
+    band: &Band,
+    matrix: &mut [f32],
+    scratch: &mut [f32],
+    lattice: &Lattice,
+    held: &[f32; MAX_FUNCTIONS],
+) -> bool {
+    band.clear(matrix);
     let mut add = |row: usize, column: usize, value: f32| {
-        if let Some(entry) = matrix.get_mut(row * length + column).filter(|_| row < MAX_FUNCTIONS) {
+        if let Some(entry) = matrix.get_mut(band.at(row, column)).filter(|_| row < MAX_FUNCTIONS) {
             *entry += value;
         }
     };
     lattice.for_each_edge(|a, b, weight| {
-        add(a, a, weight * (1.0 + ANCHOR));
-        add(b, b, weight * (1.0 + ANCHOR));
+        let anchor = |function: usize| ANCHOR + HOLD * held.get(function).copied().unwrap_or(0.0);
+        add(a, a, weight * (1.0 + anchor(a)));
+        add(b, b, weight * (1.0 + anchor(b)));
         if a < MAX_FUNCTIONS && b < MAX_FUNCTIONS {
             add(a.max(b), a.min(b), -weight);
         }
     });
-    invert(matrix, functions, length)
+    factorise(band, matrix, scratch)
 }
 
 /// `w` from the lattice's part `c` of the last increment, m.
-pub(super) fn turned_part(c: &CoarseVectors, lattice: &Lattice, frames: &Frames, inverse: &[f32]) -> CoarseVectors {
+pub(super) fn turned_part(
+    c: &CoarseVectors,
+    lattice: &Lattice,
+    frames: &Frames<'_>,
+    band: &Band,
+    factor: &[f32],
+) -> CoarseVectors {
     let mut sums = [NodeVector::ZERO; MAX_FUNCTIONS + 1];
     let at = |function: usize| c.get(function).map_or(Vec3::ZERO, |c| Vec4::from(c.0).truncate());
     lattice.for_each_edge(|a, b, weight| {
@@ -57,8 +73,17 @@ pub(super) fn turned_part(c: &CoarseVectors, lattice: &Lattice, frames: &Frames,
             }
         }
     });
-    let mut components = to_components(&sums);
-    apply_to_axes(inverse, lattice.functions(), &mut components);
-    from_components(&components, &mut sums);
-    sums
+    let mut rows: [Row; 3] = [[0.0; _]; 3];
+    for (axis, row) in rows.iter_mut().enumerate() {
+        row.iter_mut().zip(&sums).take(lattice.functions()).for_each(|(value, sum)| *value = sum.0[axis]);
+    }
+    let [x, y, z] = &mut rows;
+    solve(band, factor, [x, y, z]);
+    let mut turned = [NodeVector::ZERO; _];
+    for (function, turned) in turned.iter_mut().enumerate().take(lattice.functions()) {
+        let at = |row: &Row| row.get(function).copied().unwrap_or_default();
+        *turned = NodeVector([at(&rows[0]), at(&rows[1]), at(&rows[2]), 0.0]);
+    }
+    lattice.expand(&mut turned);
+    turned
 }

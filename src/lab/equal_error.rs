@@ -92,7 +92,7 @@ pub fn text(rows: &[Row]) -> String {
     let multiples = multiples(rows);
     let mut text = String::new();
     for implicit in [Method::BackwardEuler, Method::ImplicitMidpoint] {
-        for method in [Method::Tled, Method::MassScaled, Method::Multilevel, Method::Damped] {
+        for method in [Method::Tled, Method::Long] {
             for &multiple in &multiples {
                 let ratios = ratios(rows, method, multiple, implicit);
                 let (Some([median, least, most]), scenes) = (ratios.spread(), ratios.count()) else {

@@ -84,7 +84,7 @@ pub enum LabError {
     File(String),
     /// A network does not fit the learned step.
     LearnedStep(LearnedError),
-    /// A network does not fit the damped step.
+    /// A network does not fit long steps.
     Damper(DamperError),
     /// A file could not be written; the text names it.
     Write(std::io::Error),

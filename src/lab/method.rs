@@ -27,36 +27,20 @@ pub enum Method {
     Hold,
     /// The exact step's formula at longer steps, stable or not.
     TledLargeStep,
-    /// Inertia raised where a step would be unstable.
-    MassScaled,
-    /// The same, with a coarse lattice that gives smooth motion its true inertia back.
-    Multilevel,
-    /// Multilevel inertia with rough motion damped as the crate's own network says.
-    Damped,
+    /// Steps beyond the critical one, with the crate's own damper.
+    Long,
     /// The same with a network of the user's.
-    DampedWith(NetworkFile),
+    LongWith(NetworkFile),
     /// Backward Euler, to compare with.
     BackwardEuler,
     /// The implicit midpoint rule, to compare with.
     ImplicitMidpoint,
-    /// Mass-scaled, multilevel or damped steps that the host makes half as long and as long again, in turn at every
-    /// snapshot.
-    Switching(Large),
+    /// Long steps that the host makes half as long and as long again, in turn at every snapshot.
+    Switching,
     /// The learned step with a network of the crate, after a lead-in of [`LEAD_IN`].
     Learned(Family),
     /// The same with a network of the user's.
     LearnedWith(NetworkFile),
-}
-
-/// Methods whose step may change while they run.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub enum Large {
-    /// See [`Method::MassScaled`].
-    MassScaled,
-    /// See [`Method::Multilevel`].
-    Multilevel,
-    /// See [`Method::Damped`].
-    Damped,
 }
 
 /// A network of the user's at its own step.
@@ -135,35 +119,25 @@ impl Prepared<'_> {
 
 impl Method {
     /// All methods that need no file of the user's, in the order of the tables.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 11] = [
         Self::Tled,
         Self::Hold,
         Self::TledLargeStep,
-        Self::MassScaled,
-        Self::Multilevel,
-        Self::Damped,
+        Self::Long,
         Self::BackwardEuler,
         Self::ImplicitMidpoint,
         Self::Learned(Family::Compact),
         Self::Learned(Family::Paper),
         Self::Learned(Family::CompactInt8),
         Self::Learned(Family::OtherStep),
-        Self::Switching(Large::MassScaled),
-        Self::Switching(Large::Multilevel),
-        Self::Switching(Large::Damped),
+        Self::Switching,
     ];
 
     /// Those that take more than ten minutes over all scenes.
     pub const SLOW: [Self; 3] = [Self::BackwardEuler, Self::ImplicitMidpoint, Self::Learned(Family::Paper)];
 
     /// Those that are for hard cases.
-    pub const HARD: [Self; 5] = [
-        Self::Learned(Family::CompactInt8),
-        Self::Learned(Family::OtherStep),
-        Self::Switching(Large::MassScaled),
-        Self::Switching(Large::Multilevel),
-        Self::Switching(Large::Damped),
-    ];
+    pub const HARD: [Self; 3] = [Self::Learned(Family::CompactInt8), Self::Learned(Family::OtherStep), Self::Switching];
 
     /// Its name in tables.
     #[must_use]
@@ -172,19 +146,15 @@ impl Method {
             Self::Tled => "tled",
             Self::Hold => "hold",
             Self::TledLargeStep => "tled-large-step",
-            Self::MassScaled => "mass-scaled",
-            Self::Multilevel => "multilevel",
-            Self::Damped => "damped",
+            Self::Long => "long",
             Self::BackwardEuler => "backward-euler",
             Self::ImplicitMidpoint => "implicit-midpoint",
             Self::Learned(Family::Compact) => "compact-f32",
             Self::Learned(Family::Paper) => "paper-f32",
             Self::Learned(Family::CompactInt8) => "compact-int8",
             Self::Learned(Family::OtherStep) => "compact-other-step",
-            Self::Switching(Large::MassScaled) => "mass-scaled-switching",
-            Self::Switching(Large::Multilevel) => "multilevel-switching",
-            Self::Switching(Large::Damped) => "damped-switching",
-            Self::DampedWith(file) | Self::LearnedWith(file) => file.name,
+            Self::Switching => "long-switching",
+            Self::LongWith(file) | Self::LearnedWith(file) => file.name,
         }
     }
 
@@ -197,14 +167,14 @@ impl Method {
         })
     }
 
-    /// With the network of a weight file: a damped step, or the learned step.
+    /// With the network of a weight file: long steps, or the learned step.
     pub fn with(path: &Path) -> Result<Self, LabError> {
         let problem = |error: &dyn core::fmt::Display| LabError::File(format!("{}: {error}", path.display()));
         let bytes = supple::io::read_file(path).map_err(|error| problem(&error))?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let file = NetworkFile::leaked(String::leak(name), &bytes).map_err(|error| problem(&error))?;
         let damps = Damper::new(Network::parse(file.bytes)?).is_ok();
-        Ok(if damps { Self::DampedWith(file) } else { Self::LearnedWith(file) })
+        Ok(if damps { Self::LongWith(file) } else { Self::LearnedWith(file) })
     }
 
     /// At which multiples of a scene's step it is run if asked for `multiples`. At 1 the long step is the exact one,
@@ -227,7 +197,7 @@ impl Method {
     #[must_use]
     pub const fn parts(self, snapshot: usize) -> u32 {
         match self {
-            Self::Switching(_) => 1 + (snapshot % 2) as u32,
+            Self::Switching => 1 + (snapshot % 2) as u32,
             _ => 1,
         }
     }
@@ -236,15 +206,7 @@ impl Method {
     #[must_use]
     pub const fn meets_instruments(self) -> bool {
         use Method as M;
-        matches!(
-            self,
-            M::Tled
-                | M::TledLargeStep
-                | M::Multilevel
-                | M::Damped
-                | M::DampedWith(_)
-                | M::Switching(Large::Multilevel | Large::Damped)
-        )
+        matches!(self, M::Tled | M::TledLargeStep | M::Long | M::LongWith(_) | M::Switching)
     }
 
     /// Time at the start that exact steps take, s.
@@ -287,14 +249,10 @@ impl Method {
             Self::Hold => Ok(Prepared::Own(Box::new(|_, _| Status::Ok))),
             Self::Tled => exact(spec.timing.refinement),
             Self::TledLargeStep => exact(1),
-            Self::MassScaled | Self::Switching(Large::MassScaled) => long(inertia::Method::MassScaled, state),
-            Self::Multilevel | Self::Switching(Large::Multilevel) => {
-                long(inertia::Method::Multilevel(Cells::Suggested), state)
-            }
-            Self::Damped | Self::Switching(Large::Damped) => long(inertia::Method::damped(Cells::Suggested), state),
-            Self::DampedWith(file) => {
+            Self::Long | Self::Switching => long(inertia::Method::new(Cells::Suggested), state),
+            Self::LongWith(file) => {
                 let damper = Damper::new(Network::parse(file.bytes)?)?;
-                long(inertia::Method::Damped(damper, Cells::Suggested), state)
+                long(inertia::Method::with_damper(damper, Cells::Suggested), state)
             }
             Self::BackwardEuler => Ok(implicit::prepare(implicit::Rule::BackwardEuler, scene, state, dt, damping)),
             Self::ImplicitMidpoint => Ok(implicit::prepare(implicit::Rule::Midpoint, scene, state, dt, damping)),
@@ -319,9 +277,8 @@ mod tests {
         let said = Method::named("euler").unwrap_err().to_string();
         assert_eq!(
             said,
-            "method \"euler\" is not known; there are tled, hold, tled-large-step, mass-scaled, multilevel, damped, \
-             backward-euler, implicit-midpoint, compact-f32, paper-f32, compact-int8, compact-other-step, \
-             mass-scaled-switching, multilevel-switching, damped-switching"
+            "method \"euler\" is not known; there are tled, hold, tled-large-step, long, backward-euler, \
+             implicit-midpoint, compact-f32, paper-f32, compact-int8, compact-other-step, long-switching"
         );
     }
 }

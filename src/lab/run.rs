@@ -250,7 +250,7 @@ impl Row {
     pub(super) const fn example(end: End) -> Self {
         Self {
             scene: "lobe",
-            method: Method::Multilevel,
+            method: Method::Long,
             multiple: 10,
             step: 3e-4,
             hold: 3.0,

@@ -135,7 +135,7 @@ fn run_adaptive(spec: &SceneSpec, truth: &Truth, tolerance: f64) -> Result<Toler
     let parts = (interval / (f64::from(LONGEST) * truth.limit_at_rest)).ceil().max(1.0);
     let longest = Step::unchecked((interval / parts) as f32, spec.damping)?;
     let request = Request { tolerance: (1e-3 * tolerance) as f32, longest };
-    let method = inertia::Method::damped(Cells::Suggested);
+    let method = inertia::Method::new(Cells::Suggested);
     let mut adaptive = Adaptive::prepare_in_vec(method, scene.view(), &spec.points, state.view(), request)?;
     let mut loads = spec.loads(&scene)?;
     let mut errors = Errors::default();

@@ -197,6 +197,14 @@ impl<'a, L: Law> Laws<'a, L> {
         matches!(self, Self::Regions { .. })
     }
 
+    /// The tissue of mesh element `element`.
+    pub(crate) fn tissue(&self, element: usize) -> u16 {
+        match *self {
+            Self::One(_) => 0,
+            Self::Regions { of_element, .. } => of_element.get(element).copied().unwrap_or_default(),
+        }
+    }
+
     /// The constants of mesh element `element`.
     #[must_use]
     #[inline(always)]

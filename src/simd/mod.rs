@@ -45,7 +45,7 @@ pub(crate) use pair::Pair;
 pub use vectors::NodeVector;
 use vectors::transpose;
 pub(crate) use vectors::{
-    Contiguous, Gather, Indexed, Rows, SCATTER_WIDTH, Scatter, ScatterBuffer, TileNodes, axes, dot, write_rows,
+    Contiguous, Gather, Indexed, Rows, SCATTER_WIDTH, Scatter, ScatterBuffer, TileNodes, axes, dot,
 };
 
 use core::ops::{Add, Mul, Neg, Sub};

@@ -57,17 +57,6 @@ pub(super) fn transpose(rows: [[f32; 4]; 4]) -> [[f32; 4]; 4] {
     }
 }
 
-/// Writes one row for each lane, from row `first` on; nothing if there are fewer rows.
-#[inline(always)]
-pub(crate) fn write_rows<R: Real>(rows: &mut [[f32; 4]], first: usize, values: [R; 4]) {
-    let rows = rows.get_mut(first..first + R::COUNT).unwrap_or_default();
-    R::to_rows(values, |lane, value| {
-        if let Some(row) = rows.get_mut(lane) {
-            *row = value;
-        }
-    });
-}
-
 /// Places of the rows of a vector of nodes in a table with one row a node.
 pub(crate) trait Rows: Copy {
     /// Index of the row that belongs to a lane.

@@ -40,8 +40,8 @@ pub enum Cause {
         /// The most that it may, m.
         most: f32,
     },
-    /// The loads have instruments, which mass-scaled and learned steps cannot meet, multilevel and damped ones only
-    /// with room for pushes ([`StateView::pushing`](crate::state::StateView::pushing)).
+    /// The loads have instruments, which learned steps cannot meet, long ones only with room for pushes
+    /// ([`StateView::pushing`](crate::state::StateView::pushing)).
     NoContact,
     /// Supports moved the node through most of the tissue around it in a step.
     Motion {

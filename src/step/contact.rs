@@ -193,9 +193,15 @@ impl<M: ElementMaterial> Trial<'_, M> {
 
     /// The points that may touch in this step, and room to solve for their pushes.
     pub(crate) fn solver_room(&mut self) -> SolverRoom<'_> {
-        let count = self.touched;
-        let room = self.memory().map(|memory| memory.room).unwrap_or_default();
-        SolverRoom { touched: room.touched.get_mut(..count).unwrap_or_default(), ..room }
+        self.solver_room_and_forces().0
+    }
+
+    /// The same, with the forces on the nodes.
+    pub(crate) fn solver_room_and_forces(&mut self) -> (SolverRoom<'_>, &[NodeVector]) {
+        let Self { loads, pushes, force, touched: count, .. } = self;
+        let memory = loads.contact().and_then(|contact| ContactMemory::split(pushes, &contact.surface()));
+        let room = memory.map(|memory| memory.room).unwrap_or_default();
+        (SolverRoom { touched: room.touched.get_mut(..*count).unwrap_or_default(), ..room }, force)
     }
 
     /// Adds the pushes of the step before to the forces, or those of another run.

@@ -222,17 +222,17 @@ impl Entry {
         mut self,
         loads: &Loads<'_>,
         displacement: &[NodeVector],
-        increment: &[NodeVector],
-        force: &mut [NodeVector],
+        increment: &mut [NodeVector],
+        force: &[NodeVector],
         time: f64,
         step: &Step,
     ) -> Self {
-        loads.each_prescribed(time + f64::from(step.seconds()), force, |node, axis, position, force| {
-            let (Some(displacement), Some(increment)) = (displacement.get(node), increment.get(node)) else {
+        loads.each_prescribed(time + f64::from(step.seconds()), increment, |node, axis, position, increment| {
+            let (Some(displacement), Some(force)) = (displacement.get(node), force.get(node)) else {
                 return;
             };
             let next = position - displacement.0[axis % 4];
-            let (force, last) = (f64::from(0.5 * force[axis % 4]), increment.0[axis % 4]);
+            let (force, last) = (f64::from(0.5 * force.0[axis % 4]), increment[axis % 4]);
             self.work -= force * f64::from(next);
             self.jump += force.abs() * f64::from((next - last).abs());
         });

@@ -76,11 +76,44 @@ pub(super) fn critical<M: ElementMaterial>(
     state: StateView<'_>,
     weights: &mut Weights<'_>,
 ) -> Option<CriticalStep> {
-    let count = scene.node_count();
-    if state.capacity_for(scene.element()) < count {
+    if state.capacity_for(scene.element()) < scene.node_count() {
         return None;
     }
     let StateView { displacement, increment, force, volume, .. } = state;
+    let with = |sums: &NodeMatrices<'_>| Largest::of(sums, scene.inertia);
+    let largest = with_bounds(scene, scene.inertia, [displacement, increment, force], volume, weights, with)?;
+    let seconds = 2.0 / libm::sqrtf(largest.rate) * (1.0 - ROUNDING);
+    largest.finite.then_some(CriticalStep { seconds, node: largest.node })
+}
+
+/// Calls `with` with each node and the largest eigenvalue of its matrix with other masses `x` than its own, 1/s^2:
+/// `K <= sum_a x_a lambda_a` for the stiffness at the displacements, the first of some vectors of the nodes; the others
+/// and `volume` are scratch.
+pub(crate) fn each_rate<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    inertia: &[NodeInertia],
+    vectors: [&mut [NodeVector]; 3],
+    volume: &mut [NodeVector],
+    mut with: impl FnMut(usize, f32),
+) -> Option<()> {
+    let weights = &mut Weights { of_nodes: &mut [], chosen: true };
+    with_bounds(scene, inertia, vectors, volume, weights, |sums| {
+        for (node, inertia) in inertia.iter().enumerate() {
+            with(node, sums.largest_eigenvalue(node, inertia.inverse));
+        }
+    })
+}
+
+/// Calls `with` with the nodes' matrices.
+fn with_bounds<M: ElementMaterial, T>(
+    scene: SceneView<'_, M>,
+    inertia: &[NodeInertia],
+    [displacement, increment, force]: [&mut [NodeVector]; 3],
+    volume: &mut [NodeVector],
+    weights: &mut Weights<'_>,
+    with: impl FnOnce(&NodeMatrices<'_>) -> T,
+) -> Option<T> {
+    let count = scene.node_count();
     nodal_volumes(scene, displacement, &[], volume, &CallingThread);
     let mut sums = NodeMatrices {
         xx_yy_zz_xy: force.get_mut(..count)?,
@@ -88,7 +121,7 @@ pub(super) fn critical<M: ElementMaterial>(
         zx_in_padding: displacement.get_mut(..count)?,
     };
     sums.clear();
-    let (laws, tiles, inertia) = (scene.material.laws(), scene.tiles, scene.inertia);
+    let (laws, tiles) = (scene.material.laws(), scene.tiles);
     if scene.element().is_nodal_strain() {
         let rows = volume.get_mut(..count)?;
         rows.fill(NodeVector([1.0, 0.0, 0.0, 0.0]));
@@ -119,12 +152,11 @@ pub(super) fn critical<M: ElementMaterial>(
         let kernel = CriticalBounds { laws, pressure, tiles, inertia, with_volume: true, sums: &mut sums };
         M::Law::nodal_pressure_critical_bounds(kernel);
     }
-    let rate = Largest::of(&sums, inertia);
+    let answer = with(&sums);
     sums.clear();
     // A fresh state stays as it is.
     volume.fill(NodeVector::ZERO);
-    let seconds = 2.0 / libm::sqrtf(rate.rate) * (1.0 - ROUNDING);
-    rate.finite.then_some(CriticalStep { seconds, node: rate.node })
+    Some(answer)
 }
 
 /// The largest eigenvalue of the nodes' matrices, 1/s^2.

@@ -18,6 +18,7 @@ mod spectrum;
 mod tangent;
 
 pub use critical::critical_step;
+pub(crate) use critical::each_rate;
 pub use pace::{Approach, Pace, vectors_for_pace};
 #[cfg(feature = "std")]
 pub use pressures::nodal_pressures;

@@ -65,6 +65,11 @@ static inline supple_scene_config bar_config(void) {
                                  2 * LAYER, 1, points[0], tets[0], supports, &tissue, NULL, ELEMENT, 0};
 }
 
+#ifdef UNDER_VALGRIND
+/* valgrind 3.19 does not know an encoding of vmovq that kernels for AVX2 have. */
+__attribute__((constructor)) static void use_portable_kernels(void) { supple_set_level(SUPPLE_LEVEL_PORTABLE); }
+#endif
+
 /* All motions of the moved end, to the same displacement, m. */
 static inline void move_end(supple_scene *scene, supple_loads *loads, float x, float y, float z) {
     supple_motion motions[MOTIONS];

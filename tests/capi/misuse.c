@@ -346,7 +346,7 @@ static void networks(void) {
     DONE(supple_step(scene, loads, state, 1, NULL, NULL));
     REFUSED(SUPPLE_E_NOT_LED, supple_learned_step(scene, loads, state, learned, 1, NULL, NULL));
 
-    const supple_large_config calm = {SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {1, 1, 3}, NULL, 0};
+    const supple_large_config calm = {SUPPLE_CONFIG(supple_large_config), 1e-3f, 20.0f, {1, 1, 3}, NULL, 0};
     supple_large_config wrong = calm;
     supple_large *no_large = NULL;
     const supple_threads threads = {NULL, 2, NULL};
@@ -355,7 +355,6 @@ static void networks(void) {
     wrong = calm, (change);                                                                                            \
     REFUSED(expected, supple_large_init(spare, sizeof spare, scene, state, points[0], &wrong, &no_large, &error))
     LARGE(SUPPLE_E_ABI, wrong.struct_size++);
-    LARGE(SUPPLE_E_CHOICE, wrong.method = 3);
     LARGE(SUPPLE_E_STEP, wrong.seconds = -1.0f);
     LARGE(SUPPLE_E_LATTICE, wrong.cells[0] = 5000);
     LARGE(SUPPLE_E_LATTICE, wrong.cells[0] = 0);
@@ -548,7 +547,7 @@ static void guards(void) {
 }
 
 static void adaptive_steps(void) {
-    static const supple_large_config good = {SUPPLE_CONFIG(supple_large_config), SUPPLE_MULTILEVEL, 1.0f / 60.0f, 20.0f, {0, 0, 0}, NULL, 0};
+    static const supple_large_config good = {SUPPLE_CONFIG(supple_large_config), 1.0f / 60.0f, 20.0f, {0, 0, 0}, NULL, 0};
     supple_adaptive *none = NULL, *adaptive = NULL;
     size_t bytes = 0;
     supple_large_config bad = good;
@@ -844,18 +843,13 @@ static void contacts(void) {
     DONE(supple_read_touch(contact, 0, &touch));
     CHECK(touch.contacts == 0 && touch.force[0] == 0.0f);
 
-    /* It is thrown into the bar; and other steps cannot meet it. */
+    /* It is thrown into the bar. */
     supple_pose inside = start;
     inside.position[0] = 0.005f * X;
     DONE(supple_move_instrument(contact, 0, &inside, report.time, report.time + 1e-4, &error));
     CHECK(supple_step(scene, acts, state, 1, NULL, &report) == SUPPLE_E_DIVERGED_INSTRUMENT);
     note(SUPPLE_E_DIVERGED_INSTRUMENT);
     CHECK(report.error.index == 0 && report.error.value > report.error.limit && report.steps == 0);
-    supple_large *scaled;
-    const supple_large_config config = {SUPPLE_CONFIG(supple_large_config), SUPPLE_MASS_SCALED, 1e-3f, 20.0f, {0, 0, 0}, NULL, 0};
-    DONE(supple_large_init(large_memory, sizeof large_memory, scene, state, points[0], &config, &scaled, &error));
-    CHECK(supple_large_step(scene, acts, state, scaled, 1, NULL, &report) == SUPPLE_E_NO_CONTACT);
-    note(SUPPLE_E_NO_CONTACT);
 
     /* It holds what is near, and lets go. */
     uint32_t held;
@@ -892,6 +886,17 @@ static void contacts(void) {
     DONE(supple_local_force_at(&model, further, between));
     CHECK(fabsf(between[0] + 0.25f) < 1e-5f);
     REFUSED(SUPPLE_E_NULL, supple_local_force_at(&model, none, NULL));
+
+    /* Learned steps cannot meet an instrument. */
+    supple_learned_facts facts;
+    DONE(supple_state_reset(state));
+    DONE(supple_learned_reset(learned));
+    DONE(supple_learned_describe(learned, &facts));
+    const supple_step_config exact = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 3.0f, facts.damping};
+    DONE(supple_set_step(scene, state, &exact, NULL));
+    DONE(supple_learned_lead(scene, NULL, state, learned, 5 * (double)facts.seconds, NULL, NULL));
+    CHECK(supple_learned_step(scene, acts, state, learned, 1, NULL, &report) == SUPPLE_E_NO_CONTACT);
+    note(SUPPLE_E_NO_CONTACT);
     DONE(supple_set_contact(acts, NULL));
     DONE(supple_state_reset(state));
 }

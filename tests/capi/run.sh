@@ -111,7 +111,7 @@ SCENE
     gcc -std=c11 "${warnings[@]}" -I"$folder" "$wrapped" examples/lobe.c tests/capi/no_heap.c "$static" -lm -o "$folder/lobe"
     "$folder/lobe"
     g++ -std=c++17 "${warnings[@]}" examples/instrument.cpp "$shared" -Wl,-rpath,"$prefix/lib" -o "$folder/instrument"
-    for method in exact damped; do
+    for method in exact long; do
         "$folder/instrument" --method $method --frames 60 --out "$folder/$method"
     done
     "$folder/instrument" --jitter 10000 --frames 1
@@ -130,7 +130,7 @@ memory() {
     for test in misuse copies simulation heap strain threads; do
         options=(-pthread)
         [ $test != heap ] || options=("$wrapped")
-        gcc -std=c11 "${warnings[@]}" "${options[@]}" -DSMALL tests/capi/$test.c "$static" -o "$folder/$test-small"
+        gcc -std=c11 "${warnings[@]}" "${options[@]}" -DSMALL -DUNDER_VALGRIND tests/capi/$test.c "$static" -o "$folder/$test-small"
     done
     for test in misuse copies simulation heap strain; do
         valgrind --quiet --error-exitcode=9 --leak-check=full "$folder/$test-small" under-valgrind >"$folder/said"

@@ -66,11 +66,11 @@ static supple_status frame_by_hand(uint32_t steps, supple_scene *scene, supple_l
         return worst;
     }
     /* The end goes on evenly over the frame: step by step, as guard and network are asked after each. */
-    const int count = steps == SUPPLE_STEPS_DAMPED ? 12 : 40;
+    const int count = steps == SUPPLE_STEPS_LONG ? 12 : 40;
     for (int done = 0; done < count; done++) {
         const float along = 4e-4f * ((float)frame + (float)(done + 1) / (float)count);
         move_end(scene, loads, along, 0.0f, -along);
-        supple_status status = steps == SUPPLE_STEPS_DAMPED ? supple_large_step(scene, loads, state, stepper, 1, NULL, NULL)
+        supple_status status = steps == SUPPLE_STEPS_LONG ? supple_large_step(scene, loads, state, stepper, 1, NULL, NULL)
                                : frame * count + done < 100     ? supple_learned_lead(scene, loads, state, stepper, 3e-4, NULL, NULL)
                                                             : supple_learned_step(scene, loads, state, stepper, 1, NULL, NULL);
         CHECK(status >= 0);
@@ -99,9 +99,9 @@ static void is_what_a_host_would_do(uint32_t steps, const char *name) {
     CHECK(supple_state_init(state_memory, sizeof state_memory, scene, &state) == SUPPLE_OK);
     CHECK(supple_loads_init(loads_memory, sizeof loads_memory, scene, FORCES, MOTIONS, &loads) == SUPPLE_OK);
     supple_step_config exact = {SUPPLE_CONFIG(supple_step_config), EXACT, DAMPING};
-    const supple_large_config large = {SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, longest, DAMPING, {0, 0, 0}, NULL, 0};
+    const supple_large_config large = {SUPPLE_CONFIG(supple_large_config), longest, DAMPING, {0, 0, 0}, NULL, 0};
     supple_guard_config guarded = {SUPPLE_CONFIG(supple_guard_config), LONG, DAMPING, 3, 0.0f};
-    if (steps == SUPPLE_STEPS_DAMPED)
+    if (steps == SUPPLE_STEPS_LONG)
         CHECK(supple_large_init(steps_memory, ROOM, scene, state, points[0], &large, (supple_large **)&stepper, NULL) == SUPPLE_OK);
     if (steps == SUPPLE_STEPS_AUTO)
         CHECK(supple_adaptive_init(steps_memory, ROOM, scene, state, points[0], &large, TOLERANCE, (supple_adaptive **)&stepper, NULL) ==
@@ -113,12 +113,12 @@ static void is_what_a_host_would_do(uint32_t steps, const char *name) {
         CHECK(supple_learned_describe(stepper, &facts) == SUPPLE_OK);
         exact.damping = guarded.damping = facts.damping, guarded.seconds = facts.seconds, guarded.every = 1;
     }
-    if (steps == SUPPLE_STEPS_DAMPED || learned)
+    if (steps == SUPPLE_STEPS_LONG || learned)
         CHECK(supple_guard_init(guard_memory, ROOM, scene, state, points[0], &guarded, &guard, NULL) == SUPPLE_OK);
     CHECK(supple_set_step(scene, state, &exact, NULL) == SUPPLE_OK);
 
     /* Motions are rounded where the host sets them step by step. */
-    const int by_step = learned || steps == SUPPLE_STEPS_DAMPED;
+    const int by_step = learned || steps == SUPPLE_STEPS_LONG;
     supple_sim_report report;
     uint32_t taken = 0, all_kinds = 0;
     for (int frame = 0; frame < FRAMES; frame++) {
@@ -131,9 +131,9 @@ static void is_what_a_host_would_do(uint32_t steps, const char *name) {
         CHECK(fabs(report.call.time - FRAME * (frame + 1)) < 1e-6 * FRAME * (frame + 1));
         CHECK(report.estimate.known == estimate.known);
         CHECK(fabsf(report.estimate.mean - estimate.mean) <= (by_step ? 5e-3f * estimate.mean + 5e-8f : 0.0f));
-        CHECK(report.call.steps == report.exact + report.damped + report.learned);
+        CHECK(report.call.steps == report.exact + report.long_steps + report.learned);
         taken += report.call.steps;
-        all_kinds |= (report.exact > 0) | (report.damped > 0) << 1 | (report.learned > 0) << 2;
+        all_kinds |= (report.exact > 0) | (report.long_steps > 0) << 1 | (report.learned > 0) << 2;
         CHECK(supple_copy_displacements(objects.state, from_sim[0], 3 * NODES) == SUPPLE_OK);
         CHECK(supple_copy_displacements(state, by_hand[0], 3 * NODES) == SUPPLE_OK);
         for (int n = 0; n < NODES; n++) {
@@ -241,8 +241,8 @@ static void refusals_change_nothing(void) {
     CHECK(supple_sim_set(sim, &wrong, NULL) == SUPPLE_E_NULL);
     wrong = settings_of(SUPPLE_STEPS_AUTO, 0.0f), wrong.tolerance = -1.0f;
     CHECK(supple_sim_set(sim, &wrong, &error) == SUPPLE_E_NEGATIVE && error.value == -1.0);
-    /* Damped steps need more memory than exact ones. */
-    wrong = settings_of(SUPPLE_STEPS_DAMPED, 0.0f);
+    /* Long steps need more memory than exact ones. */
+    wrong = settings_of(SUPPLE_STEPS_LONG, 0.0f);
     CHECK(supple_sim_set(sim, &wrong, &error) == SUPPLE_E_SHORT && error.limit > (double)bytes);
     CHECK(motion_of(objects.state) == moved);
     CHECK(supple_sim_advance(sim, FRAME, NULL, NULL) == SUPPLE_OK);
@@ -273,7 +273,7 @@ int main(void) {
     body = bar_config();
     file("weights/compact-10.weights", weights_memory, sizeof weights_memory, &weights_bytes);
     is_what_a_host_would_do(SUPPLE_STEPS_EXACT, "exact");
-    is_what_a_host_would_do(SUPPLE_STEPS_DAMPED, "damped");
+    is_what_a_host_would_do(SUPPLE_STEPS_LONG, "long");
     is_what_a_host_would_do(SUPPLE_STEPS_AUTO, "auto");
     is_what_a_host_would_do(SUPPLE_STEPS_LEARNED, "learned");
     copies_go_on(SUPPLE_STEPS_EXACT);

@@ -81,7 +81,7 @@ static void advance(void) {
 static void sim_setup(void) {
     supple_settings settings;
     CHECK(supple_default_settings(&settings) == SUPPLE_OK);
-    settings.steps = SUPPLE_STEPS_DAMPED, settings.damping = 20.0f, settings.seconds = 1e-3f;
+    settings.steps = SUPPLE_STEPS_LONG, settings.damping = 20.0f, settings.seconds = 1e-3f;
     CHECK(supple_sim_setup(sim_memory, sizeof sim_memory, &scene_config, &settings, &sim, NULL) == SUPPLE_OK);
 }
 static void sim_advance(void) {
@@ -114,7 +114,7 @@ int main(void) {
     file("weights/compact-10.weights", weights, sizeof weights, &of_weights);
     scene_config = bar_config();
     network = (supple_learned_config){SUPPLE_CONFIG(supple_learned_config), 0, 0, weights, of_weights};
-    beyond = (supple_large_config){SUPPLE_CONFIG(supple_large_config), SUPPLE_DAMPED, 1e-3f, 20.0f, {0, 0, 0}, NULL, 0};
+    beyond = (supple_large_config){SUPPLE_CONFIG(supple_large_config), 1e-3f, 20.0f, {0, 0, 0}, NULL, 0};
     guarded = (supple_guard_config){SUPPLE_CONFIG(supple_guard_config), 1e-3f, 20.0f, 4, 0.0f};
     step = (supple_step_config){SUPPLE_CONFIG(supple_step_config), 3e-5f, 20.0f};
     static const struct {
@@ -126,9 +126,9 @@ int main(void) {
         {"scene_init", init_scene, 16}, {"state_init", init_state, 2},     {"loads_init", init_loads, 2},
         {"set_step", set_step, 20},     {"step", exact, 22},               {"learned_init", init_learned, 12},
         {"learned_step", learn, 140},   {"large_init", init_large, 36},    {"large_step", step_large, 40},
-        {"guard_init", init_guard, 36},    {"guard_follow", follow, 40},
-        {"adaptive_init", init_adaptive, 36}, {"adaptive_advance", advance, 42},
-        {"sim_setup", sim_setup, 38}, {"sim_advance", sim_advance, 42},
+        {"guard_init", init_guard, 38},    {"guard_follow", follow, 40},
+        {"adaptive_init", init_adaptive, 42}, {"adaptive_advance", advance, 42},
+        {"sim_setup", sim_setup, 44}, {"sim_advance", sim_advance, 42},
     };
     const size_t count = sizeof calls / sizeof *calls;
     const uint32_t levels[2] = {supple_level(), SUPPLE_LEVEL_PORTABLE};

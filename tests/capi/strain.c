@@ -8,7 +8,7 @@ SUPPLE_MEMORY(copy_memory, BYTES);
 SUPPLE_MEMORY(other_memory, BYTES);
 SUPPLE_MEMORY(state_memory, SUPPLE_STATE_SIZE(NODES, SUPPLE_NODAL_STRAIN));
 SUPPLE_MEMORY(loads_memory, SUPPLE_LOADS_SIZE(FORCES, MOTIONS));
-SUPPLE_MEMORY(large_memory, 1 << 20);
+SUPPLE_MEMORY(large_memory, 8 << 20);
 
 static supple_loads *loads;
 static supple_error error;
@@ -79,7 +79,7 @@ int main(void) {
     CHECK(supple_scene_init(other_memory, sizeof other_memory, &config, &other, &error) == SUPPLE_OK);
     CHECK(moved(other) != end);
 
-    const supple_large_config large_config = {SUPPLE_CONFIG(supple_large_config), SUPPLE_MASS_SCALED, 1e-3f, 10.0f, {0, 0, 0}, NULL, 0};
+    const supple_large_config large_config = {SUPPLE_CONFIG(supple_large_config), 1e-3f, 10.0f, {0, 0, 0}, NULL, 0};
     supple_large *large = NULL;
     supple_state *state = fresh(other);
     CHECK(supple_large_init(large_memory, sizeof large_memory, other, state, points[0], &large_config, &large, &error) == SUPPLE_OK);

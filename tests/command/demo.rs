@@ -1,4 +1,4 @@
-//! `supple demo`: exact, damped and learned steps side by side, and what they leave.
+//! `supple demo`: exact, long and learned steps side by side, and what they leave.
 
 use super::{Desk, names};
 
@@ -16,15 +16,15 @@ fn the_demo_compares_steps_and_leaves_a_report_and_frames() {
     let rows = |name: &str| -> Vec<Vec<f64>> {
         said.out.lines().filter(|line| line.split_whitespace().next() == Some(name)).map(figures).collect()
     };
-    let (exact, damped, learned) = (rows("exact"), rows("damped"), rows("learned"));
+    let (exact, long, learned) = (rows("exact"), rows("long"), rows("learned"));
     // One row for each instrument.
-    assert_eq!([exact.len(), damped.len(), learned.len()], [2, 2, 2]);
-    for (exact, damped) in exact.iter().zip(&damped) {
+    assert_eq!([exact.len(), long.len(), learned.len()], [2, 2, 2]);
+    for (exact, long) in exact.iter().zip(&long) {
         let [length, .., still] = exact[..] else { panic!("{exact:?}") };
         // The lobe moves, longer steps are near the exact ones, and none is exact.
-        let [longer, _, _, _, error, same] = damped[..] else { panic!("{damped:?}") };
-        assert!(still > 5.0 && same == still && longer > 8.0 * length, "{exact:?} {damped:?}");
-        assert!(error > 0.0 && error < 0.02 * still, "{damped:?}");
+        let [longer, _, _, _, error, same] = long[..] else { panic!("{long:?}") };
+        assert!(still > 5.0 && same == still && longer > 8.0 * length, "{exact:?} {long:?}");
+        assert!(error > 0.0 && error < 0.02 * still, "{long:?}");
     }
     // The learned step cannot meet the ball and says so; forceps it can follow, in steps far above the critical one.
     assert!(learned[0].is_empty(), "{learned:?}");

@@ -239,8 +239,8 @@ fn what_does_not_go_together_is_refused_in_words() {
         ),
         (leaning("step = 0.1\nend = 0.4\n", ""), "0.1 s and that of ./a.weights 0.005 s, which is no whole"),
         (
-            leaning("step = \"20x\"\nmethod = \"multilevel\"\nend = 0.4\n", ""),
-            "line 15: method is \"multilevel\", but with [learned] the exact step leads",
+            leaning("step = \"20x\"\nmethod = \"long\"\nend = 0.4\n", ""),
+            "line 15: method is \"long\", but with [learned] the exact step leads",
         ),
         (leaning(auto, "lead_in = -0.1\n"), "line 18: lead_in is -0.1 s, it must be zero or more"),
         (leaning(auto, "lead_in = 0.4\n"), "line 18: the exact step leads for 0.4 s (lead_in), so a learned step of"),

@@ -48,7 +48,7 @@ fn step(
     touch[0]
 }
 
-/// A free bar is lifted by its top, turned, carried and let go, in exact and in multilevel steps: what is held follows
+/// A free bar is lifted by its top, turned, carried and let go, in exact and in long steps: what is held follows
 /// exactly, the forceps carry the weight, and a body that was let go falls like a stone.
 #[test]
 fn forceps_hold_lift_and_let_go() {
@@ -59,7 +59,7 @@ fn forceps_hold_lift_and_let_go() {
         let mut pushes = vec![NodeVector::ZERO; vectors_to_push(body.surface.len(), 0)];
         let (points, scene, length) = (body.points.clone(), body.scene.clone(), body.step);
         let mut large = (multiple > 1.0).then(|| {
-            let method = Method::Multilevel(Cells::Given([1, 1, 2]));
+            let method = Method::new(Cells::Given([1, 1, 2]));
             LargeStep::prepare_in_vec(method, scene.view(), &points, body.state(&mut []), length).unwrap()
         });
         let mut forceps = forceps();

@@ -133,7 +133,7 @@ fn what_a_hand_does_is_followed_in_exact_steps_of_a_length_and_in_long_ones() {
         };
         let long = |multiple: f32| {
             move |critical: f32| Settings {
-                method: Method::Long(inertia::Method::damped(Cells::Suggested)),
+                method: Method::Long(inertia::Method::new(Cells::Suggested)),
                 step: Some(multiple * critical),
                 damping: case.damping,
                 ..Settings::default()
@@ -151,7 +151,7 @@ fn what_a_hand_does_is_followed_in_exact_steps_of_a_length_and_in_long_ones() {
             judge(&format!("exact steps of {share}"), case.run(exact(Some(share))), 0.01);
         }
         for multiple in [10.0, 20.0] {
-            judge(&format!("damped steps of {multiple}"), case.run(long(multiple)), 0.05);
+            judge(&format!("long steps of {multiple}"), case.run(long(multiple)), 0.05);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Instruments in multilevel and damped steps, against exact steps at a quarter of the critical one.
+//! Instruments in long steps, against exact steps at a quarter of the critical one.
 
 use supple::contact::{Contact, Instrument, Pose, Shape, Surface, Touch, vectors_to_push};
 use supple::inertia::{Cells, LargeStep, Method};
@@ -57,21 +57,17 @@ impl Run {
 
 pub(crate) const BAR: Bar = Bar { size: [0.02, 0.02, 0.04], cells: [4, 4, 8] };
 
-pub(crate) fn multilevel() -> Method<'static> {
-    Method::Multilevel(Cells::Given([1, 1, 2]))
-}
-
-pub(crate) fn damped() -> Method<'static> {
-    Method::damped(Cells::Given([1, 1, 2]))
+pub(crate) fn long() -> Method<'static> {
+    Method::new(Cells::Given([1, 1, 2]))
 }
 
 /// A free body that is hit and dragged: the impulse of the instrument is the change of its momentum, whatever inertia
-/// is added, up to the share of a force that multilevel steps give to rough motion twice in fast motion.
+/// is added, up to the share of a force that steps give to rough motion twice in fast motion.
 #[test]
-fn the_impulse_of_an_instrument_is_the_change_of_momentum_in_multilevel_steps() {
+fn the_impulse_of_an_instrument_is_the_change_of_momentum_in_long_steps() {
     let critical = Body::new(BAR, &[], 0.0).step.seconds();
     for multiple in [0.5, 4.0, 10.0] {
-        let mut run = Run::new(Body::new(BAR, &[], 0.0), Some(multilevel()), multiple * critical, 0.0);
+        let mut run = Run::new(Body::new(BAR, &[], 0.0), Some(long()), multiple * critical, 0.0);
         let mut sphere = Instrument::resting(Shape::Sphere { radius: 0.008 }, Pose::at([-0.0085, 0.009, 0.031]));
         sphere.friction = 0.4;
         sphere.move_to(Pose::at([-0.001, 0.012, 0.033]), 0.0, 0.1);
@@ -99,7 +95,7 @@ fn the_impulse_of_an_instrument_is_the_change_of_momentum_in_multilevel_steps() 
         let (size, error) = compared(momentum, impulse);
         println!("{multiple} times: momentum {momentum:?}, impulse {impulse:?}, off by {:.1e}; {pushed} steps", error);
         assert!(pushed > 5 && size > 1e-5);
-        assert!(error < if multiple < 1.0 { 1e-4 } else { 0.02 });
+        assert!(error < if multiple < 1.0 { 3e-4 } else { 0.02 });
     }
 }
 
@@ -155,24 +151,14 @@ fn pressing_sliding_and_retracting_give_the_forces_of_exact_steps() {
     let fixed: Vec<_> = (0..25).map(Support::fixed).collect();
     let critical = Body::new(BAR, &fixed, 20.0).step.seconds();
     // Beyond 20 mm/s steps so long do not resolve how the bar swings.
-    for (speed, most, most_inside) in [(0.005, 0.025, 0.002), (0.02, 0.11, 0.002), (0.08, 0.6, 0.02)] {
+    for (speed, most, most_inside) in [(0.005, 0.025, 0.002), (0.02, 0.11, 0.002), (0.08, 0.66, 0.02)] {
         let (exact, _, left) = course(None, 0.25 * critical, speed);
         println!("{:.0} mm/s, exact: {exact:.4?}", 1e3 * speed);
         assert!(exact[1][0] < -1e-3 && left == 0);
         let all: f64 = exact.iter().map(|force| length(*force)).sum();
-        let cases = [
-            (None, 0.9),
-            (Some(multilevel()), 4.0),
-            (Some(multilevel()), 10.0),
-            (Some(damped()), 10.0),
-            (Some(damped()), 20.0),
-        ];
+        let cases = [(None, 0.9), (Some(long()), 4.0), (Some(long()), 10.0), (Some(long()), 20.0)];
         for (method, multiple) in cases {
-            let name = match &method {
-                None => "exact",
-                Some(Method::Multilevel(_)) => "multilevel",
-                Some(_) => "damped",
-            };
+            let name = if method.is_some() { "long" } else { "exact" };
             let method_is_exact = method.is_none();
             let (means, deepest, left) = course(method, multiple * critical, speed);
             let parts = means.iter().zip(&exact).map(|(a, b)| length([0, 1, 2].map(|axis| a[axis] - b[axis])));
@@ -188,7 +174,7 @@ fn pressing_sliding_and_retracting_give_the_forces_of_exact_steps() {
     }
 }
 
-/// Instruments anywhere, of any size and speed, in multilevel and damped steps: a step is taken with finite numbers, or
+/// Instruments anywhere, of any size and speed, in long steps: a step is taken with finite numbers, or
 /// refused.
 #[test]
 fn no_pose_makes_a_long_step_wrong_and_calls_it_right() {
@@ -198,10 +184,8 @@ fn no_pose_makes_a_long_step_wrong_and_calls_it_right() {
     let asked = std::env::var("POSES").ok().and_then(|poses| poses.parse().ok());
     let poses = asked.unwrap_or(if cfg!(feature = "slow-tests") { 10_000 } else { 1_000 });
     let body = || Body::new(BAR, &fixed, 20.0);
-    for (body, method, multiple) in
-        [(body(), multilevel(), 4.0f32), (body(), damped(), 20.0), (body().with_triangles(), damped(), 20.0)]
-    {
-        let mut run = Run::new(body, Some(method), multiple * critical, 20.0);
+    for (body, multiple) in [(body(), 4.0f32), (body(), 20.0), (body().with_triangles(), 20.0)] {
+        let mut run = Run::new(body, Some(long()), multiple * critical, 20.0);
         let mut uniform = uniform(3);
         let mut random = || 0.5 * (uniform() + 1.0);
         let (mut taken, mut refused, mut touched) = (0, 0, 0);

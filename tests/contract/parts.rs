@@ -138,11 +138,8 @@ fn learned(body: &Body, threads: &impl Threads) -> Vec<u64> {
     all
 }
 
-/// The mass-scaled, multilevel and damped step.
-const METHODS: [&str; 3] = ["mass-scaled", "multilevel", "damped"];
-
-/// The same after 30 steps of a method of `supple::inertia`, with their report.
-fn large(method: &str, body: &Body, threads: &impl Threads) -> Vec<u64> {
+/// The same after 30 long steps, with their report.
+fn large(body: &Body, threads: &impl Threads) -> Vec<u64> {
     let far = body.farthest(2);
     let mut supports = held(body);
     supports.push(Support::moved(far));
@@ -150,11 +147,7 @@ fn large(method: &str, body: &Body, threads: &impl Threads) -> Vec<u64> {
     let forces = corner_torsion(body, 0.2, 0.0);
     let motions = [Motion { node: far, axes: Axes::XYZ, metre: [1e-3, 0.0, 2e-3], ramp: 1e-2 }];
     let loads = Loads::new(&scene, [0.0, -9.81, 0.0], &forces, &motions).unwrap();
-    let method = match method {
-        "mass-scaled" => Method::MassScaled,
-        "multilevel" => Method::Multilevel(Cells::Suggested),
-        _ => Method::damped(Cells::Suggested),
-    };
+    let method = Method::new(Cells::Suggested);
     let mut state = rest_of(&scene);
     let step = Step::unchecked(20.0 * DT, 20.0).unwrap();
     let mut large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
@@ -173,12 +166,10 @@ fn large(method: &str, body: &Body, threads: &impl Threads) -> Vec<u64> {
 #[test]
 fn any_number_of_parts_gives_the_same_bits_of_large_steps() {
     for (name, body) in [("in order", body()), ("shuffled", shuffled())] {
-        for method in METHODS {
-            let of = |parts| large(method, &body, &Backwards { parts, most: AtomicUsize::new(0) });
-            let one = of(1);
-            for parts in [2, 3, 5, 8] {
-                assert!(of(parts) == one, "{name}: {parts} parts of a {method} step");
-            }
+        let of = |parts| large(&body, &Backwards { parts, most: AtomicUsize::new(0) });
+        let one = of(1);
+        for parts in [2, 3, 5, 8] {
+            assert!(of(parts) == one, "{name}: {parts} parts of a long step");
         }
     }
 }

@@ -20,7 +20,9 @@ use crate::support::{Body, EXP, bits};
 
 const DAMPING: f32 = 20.0;
 const FRAME: f64 = 1.0 / 60.0;
-const LONG: inertia::Method<'static> = inertia::Method::Multilevel(Cells::Suggested);
+fn long() -> inertia::Method<'static> {
+    inertia::Method::new(Cells::Suggested)
+}
 
 fn material(element: Element) -> VecMaterial {
     VecMaterial::one(element, EXP, 1000.0)
@@ -112,11 +114,11 @@ fn long_steps_and_their_guard_are_those_of_the_layers_below() {
     let mut parts = Parts::of(&body);
     let seconds = FRAME as f32 / 4.0;
     let settings =
-        Settings { method: Method::Long(LONG), step: Some(seconds), damping: DAMPING, ..Settings::default() };
+        Settings { method: Method::Long(long()), step: Some(seconds), damping: DAMPING, ..Settings::default() };
     let mut simulation = twisted(&body, settings);
     let step = Step::unchecked(seconds, DAMPING).unwrap();
     let view = parts.scene.view();
-    let mut large = LargeStep::prepare_in_vec(LONG, view, &body.points, parts.state.view(), step).unwrap();
+    let mut large = LargeStep::prepare_in_vec(long(), view, &body.points, parts.state.view(), step).unwrap();
     let mut guard = Guard::prepare_in_vec(view, &body.points, parts.state.view(), step, guard::EVERY).unwrap();
     let loads = Loads::new(&parts.scene, [0.0; 3], &parts.forces, &[]).unwrap();
     for report in frames(&mut simulation, 12) {
@@ -138,7 +140,7 @@ fn steps_that_choose_their_length_are_those_of_the_layer_below() {
     let mut parts = Parts::of(&body);
     let longest = FRAME as f32;
     let settings = Settings {
-        method: Method::Auto(LONG),
+        method: Method::Auto(long()),
         step: Some(longest),
         damping: DAMPING,
         tolerance: Some(1e-3),
@@ -149,7 +151,7 @@ fn steps_that_choose_their_length_are_those_of_the_layer_below() {
     parts.forces.clone_from(&simulation.forces);
     let request = Request { tolerance: 1e-3, longest: Step::unchecked(longest, DAMPING).unwrap() };
     let (scene, state) = (&parts.scene, &mut parts.state);
-    let mut adaptive = Adaptive::prepare_in_vec(LONG, scene.view(), &body.points, state.view(), request).unwrap();
+    let mut adaptive = Adaptive::prepare_in_vec(long(), scene.view(), &body.points, state.view(), request).unwrap();
     let mut loads = Loads::new(scene, [0.0; 3], &parts.forces, &[]).unwrap();
     let mut long = 0;
     for (frame, report) in (1..).zip(frames(&mut simulation, 60)) {

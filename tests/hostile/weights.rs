@@ -100,7 +100,7 @@ fn weight_files() {
             Network::parse(memory.bytes()).map_err(drop).and_then(|n| Damper::new(n).map_err(drop))
         {
             let step = Step::unchecked(20.0 * critical.seconds, 20.0).unwrap();
-            let method = Method::Damped(damper, Cells::Given([1, 1, 2]));
+            let method = Method::with_damper(damper, Cells::Given([1, 1, 2]));
             let mut large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
             for _ in 0..5 {
                 let status = large.step(scene.view(), &loads, state.view());

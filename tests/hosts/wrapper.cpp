@@ -47,9 +47,10 @@ alignas(supple::align) unsigned char loads_memory[supple::loads::size(2, 1)];
 alignas(supple::align) unsigned char state_memory[supple::state::size(4)];
 alignas(supple::align) unsigned char other_memory[supple::state::size(4)];
 alignas(supple::align) unsigned char learned_memory[supple::learned::size(4, true)];
-alignas(supple::align) unsigned char large_memory[SUPPLE_LARGE_SIZE(4, 1, SUPPLE_MASS_SCALED, 0, 0, 0)];
-
-alignas(supple::align) unsigned char guard_memory[1 << 17], adaptive_memory[1 << 18], reaction_memory[1 << 14];
+// Long steps, and what compares with them, need a mesh that is large enough for a lattice.
+alignas(supple::align) unsigned char cube_memory[supple::scene::size(64, 162)], cube_state_memory[supple::state::size(64)];
+alignas(supple::align) unsigned char cube_loads_memory[supple::loads::size(2, 1)];
+alignas(supple::align) unsigned char large_memory[1 << 20], guard_memory[1 << 20], adaptive_memory[1 << 21], reaction_memory[1 << 14];
 
 const float points[] = {0, 0, 0, 0.01f, 0, 0, 0, 0.01f, 0, 0, 0, 0.01f};
 const std::uint32_t tetrahedra[] = {0, 1, 2, 3}, turned[] = {0, 2, 1, 3}, outside[] = {0, 1, 2, 9};
@@ -65,6 +66,37 @@ supple::body tetrahedron() {
     body.tissues = {&tissue, 1};
     return body;
 }
+
+// A cube of n cells of 10 mm along each axis, held at its foot.
+struct grid {
+    std::uint32_t n;
+    std::vector<float> at;
+    std::vector<std::uint32_t> tets;
+    std::vector<supple::support> held;
+
+    explicit grid(std::uint32_t cells) : n(cells) {
+        const std::uint32_t side = n + 1;
+        for (std::uint32_t node = 0; node < side * side * side; node++) {
+            for (const std::uint32_t cell : {node % side, node / side % side, node / side / side}) at.push_back(0.01f * float(cell));
+            if (node < side * side) held.push_back({node, 7, 0});
+        }
+        const std::uint32_t step[] = {1, side, side * side};
+        for (std::uint32_t cell = 0; cell < n * n * n; cell++) {
+            const std::uint32_t a = cell % n + side * (cell / n % n) + side * side * (cell / n / n);
+            for (const auto &[first, second] : {std::pair{0, 1}, {1, 2}, {2, 0}, {1, 0}, {2, 1}, {0, 2}}) {
+                const bool even = (first + 1) % 3 == second;
+                const std::uint32_t b = a + step[first], c = b + step[second];
+                tets.insert(tets.end(), {a, even ? b : c, even ? c : b, a + 1 + side + side * side});
+            }
+        }
+    }
+
+    supple::body body() const {
+        supple::body body = tetrahedron();
+        body.points = at, body.tetrahedra = tets, body.supports = held;
+        return body;
+    }
+};
 
 void scenes() {
     supple::body body = tetrahedron();
@@ -133,15 +165,14 @@ void moving(supple::scene scene, supple::loads loads, supple::state state) {
     EXPECT(is_done(state.reset()) && state.now().value.steps == 0);
 }
 
-void large(supple::scene scene, supple::loads loads, supple::state state) {
+void large(const std::vector<float> &at, supple::scene scene, supple::loads loads, supple::state state) {
     supple::large_steps steps;
-    steps.method = supple::method::mass_scaled;
     steps.seconds = 0.01f;
     supple::report report;
-    const auto bytes = supple::large::size(scene, points, steps);
+    const auto bytes = supple::large::size(scene, at, steps);
     EXPECT(bytes && bytes.value <= sizeof large_memory);
-    EXPECT_SENTENCE(supple::large::size(scene, {points, 9}, steps).error, "fewer bytes or floats than needed: 9, against 12");
-    const auto made = supple::large::make(large_memory, scene, state, points, steps);
+    EXPECT_SENTENCE(supple::large::size(scene, {at.data(), 9}, steps).error, "fewer bytes or floats than needed: 9, against 192");
+    const auto made = supple::large::make(large_memory, scene, state, at, steps);
     EXPECT(made && is_done(made.value.step(scene, loads, state, 3, &report)) && report.added_mass > 0.0f);
     EXPECT(is_done(state.reset()));
 }
@@ -165,18 +196,18 @@ void learned(supple::scene scene, supple::loads loads, supple::state state, cons
     EXPECT(is_done(state.reset()));
 }
 
-void judged(supple::scene scene, supple::loads loads, supple::state state) {
+void judged(const std::vector<float> &at, supple::scene scene, supple::loads loads, supple::state state) {
     const auto exact = 0.5f * state.critical_step(scene).value.seconds;
     EXPECT(is_done(state.set_step(scene, exact, 20)));
     supple::guarded_steps guarded;
     guarded.seconds = exact;
     guarded.damping = 20;
-    const auto bytes = supple::guard::size(scene, points);
+    const auto bytes = supple::guard::size(scene, at);
     EXPECT(bytes && bytes.value <= sizeof guard_memory);
-    EXPECT_SENTENCE(supple::guard::size(scene, {points, 9}).error, "fewer bytes or floats than needed: 9, against 12");
-    const auto guard = supple::guard::make(guard_memory, scene, state, points, guarded);
+    EXPECT_SENTENCE(supple::guard::size(scene, {at.data(), 9}).error, "fewer bytes or floats than needed: 9, against 192");
+    const auto guard = supple::guard::make(guard_memory, scene, state, at, guarded);
     const auto reaction = supple::reaction::make(reaction_memory, scene, {supports_followed, 2}, 20);
-    EXPECT(guard && reaction && supple::reaction::size(4) <= sizeof reaction_memory);
+    EXPECT(guard && reaction && supple::reaction::size(64) <= sizeof reaction_memory);
     supple::estimate estimate{};
     supple::reaction_force force{};
     EXPECT(is_done(reaction.value.follow(scene, state, force)) && force.known == 0);
@@ -189,19 +220,18 @@ void judged(supple::scene scene, supple::loads loads, supple::state state) {
     EXPECT(is_done(state.reset()));
 }
 
-void adaptive(supple::scene scene, supple::loads loads, supple::state state) {
+void adaptive(const std::vector<float> &at, supple::scene scene, supple::loads loads, supple::state state) {
     supple::large_steps longest;
-    longest.method = supple::method::mass_scaled;
     longest.seconds = 0.01f;
-    const auto bytes = supple::adaptive::size(scene, points, longest);
+    const auto bytes = supple::adaptive::size(scene, at, longest);
     EXPECT(bytes && bytes.value <= sizeof adaptive_memory);
-    const auto made = supple::adaptive::make(adaptive_memory, scene, state, points, longest, 1e-4f);
+    const auto made = supple::adaptive::make(adaptive_memory, scene, state, at, longest, 1e-4f);
     EXPECT(made);
     supple::report report;
     supple::adaptive_report taken{};
     EXPECT(is_done(made.value.advance(scene, loads, state, 0.01f, &report, &taken)));
     EXPECT(taken.exact > 0 && report.time > 0.0099 && report.time < 0.0101);
-    EXPECT(!supple::adaptive::make(adaptive_memory, scene, state, points, longest, -1.0f));
+    EXPECT(!supple::adaptive::make(adaptive_memory, scene, state, at, longest, -1.0f));
     EXPECT(is_done(state.reset()));
 }
 
@@ -240,15 +270,16 @@ void refused(supple::scene scene, supple::loads loads, supple::state state) {
 
 // All of it in one memory: what is refused, a ball that presses, a copy that goes on, and other steps.
 void simulated(const char *path) {
+    const grid mesh(3);
     const auto build = [](const supple::settings &how, supple::memory place) {
         return supple::simulation::make(place, tetrahedron(), how);
     };
     const auto exact = supple::settings(supple::steps::exact, 20).touchable(4, {}, 2);
     EXPECT(exact.damping == 20 && exact.grips == 2 && supple::settings().guard == 1 && supple::settings().surface.node_count == 0);
-    auto damped = supple::settings(supple::steps::damped, 20).touchable(4, {{&tetrahedra[1], 3}});
-    damped.seconds = 0.01f;
-    EXPECT(damped.surface.nodes == &tetrahedra[1] && damped.surface.node_count == 3 && damped.surface.triangle_count == 0);
-    const auto few = supple::simulation::size(tetrahedron(), exact), bytes = supple::simulation::size(tetrahedron(), damped);
+    auto beyond = supple::settings(supple::steps::long_steps, 20).touchable(4, {{&tetrahedra[1], 3}});
+    beyond.seconds = 0.01f;
+    EXPECT(beyond.surface.nodes == &tetrahedra[1] && beyond.surface.node_count == 3 && beyond.surface.triangle_count == 0);
+    const auto few = supple::simulation::size(tetrahedron(), exact), bytes = supple::simulation::size(tetrahedron(), beyond);
     EXPECT(few && bytes && bytes.value > few.value);
     supple::body body = tetrahedron();
     body.points = {points, 11};
@@ -289,20 +320,23 @@ void simulated(const char *path) {
     EXPECT(sim.advance(-1, &report) == status::e_negative);
     EXPECT_SENTENCE(report.call.error, "a number is negative or not finite: -1");
     supple::error error;
-    EXPECT(sim.set(damped, &error) == status::e_short && error.value == double(few.value) && error.limit > error.value);
+    EXPECT(sim.set(beyond, &error) == status::e_short && error.value == double(few.value) && error.limit > error.value);
     EXPECT(press(sim, 0.0125f) > 0);
 
-    const auto longer = build(damped, memory);
+    auto steps = supple::settings(supple::steps::long_steps, 20);
+    steps.seconds = 0.01f;
+    std::vector<supple::line> cube(supple::lines(supple::simulation::size(mesh.body(), steps).value));
+    const auto longer = supple::simulation::make(cube, mesh.body(), steps);
     EXPECT(longer && is_done(longer.value.loads().set_gravity({0, 0, -9.81f})));
-    for (int frame = 0; frame < 30; frame++) EXPECT(is_done(longer.value.advance(0.02, &report)) && report.damped == 2);
+    for (int frame = 0; frame < 30; frame++) EXPECT(is_done(longer.value.advance(0.02, &report)) && report.long_steps == 2);
     EXPECT(report.estimate.known == 1 && report.longest == 0.01f && is_done(longer.value.set(exact)));
 
     std::ifstream file(path, std::ios::binary);
     const std::vector<char> weights(std::istreambuf_iterator<char>(file), {});
     auto network = supple::settings(supple::steps::learned).use_weights(weights);
     network.lead_in = 0.05;
-    std::vector<supple::line> room(supple::lines(supple::simulation::size(tetrahedron(), network).value));
-    const auto led = build(network, room);
+    std::vector<supple::line> room(supple::lines(supple::simulation::size(mesh.body(), network).value));
+    const auto led = supple::simulation::make(room, mesh.body(), network);
     EXPECT(led && led.value.learned().describe().value.seconds > 0 && longer.value.learned().raw() == nullptr);
     EXPECT(led.value.contact().raw() == nullptr && is_done(led.value.loads().set_gravity({0, 0, -1})));
     EXPECT(is_done(led.value.advance(0.1, &report)) && report.exact > 0 && report.learned > 0);
@@ -312,25 +346,9 @@ void simulated(const char *path) {
 // A ball as large as an edge is long presses the top of a cube of cells of 10 mm, between its nodes: the mean upward force of the last
 // frame, with what the helper lets it touch, with nodes alone, and with triangles.
 void thin() {
-    constexpr std::uint32_t n = 4, side = n + 1;
-    std::vector<float> at;
-    std::vector<std::uint32_t> tets;
-    std::vector<supple::support> held;
-    for (std::uint32_t node = 0; node < side * side * side; node++) {
-        for (const std::uint32_t cell : {node % side, node / side % side, node / side / side}) at.push_back(0.01f * float(cell));
-        if (node < side * side) held.push_back({node, 7, 0});
-    }
-    const std::uint32_t step[] = {1, side, side * side};
-    for (std::uint32_t cell = 0; cell < n * n * n; cell++) {
-        const std::uint32_t a = cell % n + side * (cell / n % n) + side * side * (cell / n / n);
-        for (const auto &[first, second] : {std::pair{0, 1}, {1, 2}, {2, 0}, {1, 0}, {2, 1}, {0, 2}}) {
-            const bool even = (first + 1) % 3 == second;
-            const std::uint32_t b = a + step[first], c = b + step[second];
-            tets.insert(tets.end(), {a, even ? b : c, even ? c : b, a + 1 + side + side * side});
-        }
-    }
-    supple::body cube = tetrahedron();
-    cube.points = at, cube.tetrahedra = tets, cube.supports = held;
+    const grid mesh(4);
+    const auto &[n, at, tets, held] = mesh;
+    const supple::body cube = mesh.body();
     std::vector<std::uint32_t> faces(3 * tets.size());
     const auto found = supple::boundary(tets, faces);
     EXPECT(found && found.value == 6 * 2 * n * n);
@@ -403,10 +421,15 @@ int main(int count, char **words) {
     EXPECT(scene.value.describe().value.bytes == sizeof scene_memory);
     acting(scene.value, loads.value);
     moving(scene.value, loads.value, state.value);
-    large(scene.value, loads.value, state.value);
     learned(scene.value, loads.value, state.value, words[1]);
-    judged(scene.value, loads.value, state.value);
-    adaptive(scene.value, loads.value, state.value);
+    const grid cube(3);
+    const auto body = supple::scene::make(cube_memory, cube.body());
+    const auto moved = supple::state::make(cube_state_memory, body.value);
+    const auto pulled = supple::loads::make(cube_loads_memory, body.value, 2, 1);
+    EXPECT(body && moved && pulled && is_done(pulled.value.set_gravity({3, 0, 0})));
+    large(cube.at, body.value, pulled.value, moved.value);
+    judged(cube.at, body.value, pulled.value, moved.value);
+    adaptive(cube.at, body.value, pulled.value, moved.value);
     remarked(scene.value, loads.value, state.value);
     refused(scene.value, loads.value, state.value);
     simulated(words[1]);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use supple_lab::hard::verdict::{Judged, Kind, Verdict};
 use supple_lab::hard::{Plan, cases, evaluate, ordinary, random, report};
-use supple_lab::method::{Large, Method};
+use supple_lab::method::Method;
 
 #[test]
 fn every_case_has_its_name_and_can_be_built() {
@@ -45,9 +45,9 @@ fn ordinary_scenes_are_held_by_a_face_and_one_of_each_kind_follows_the_other() {
 
 /// Two of them; `supple-lab hard` judges all.
 #[test]
-fn damped_steps_are_right_in_ordinary_scenes_and_seldom_doubted() {
+fn long_steps_are_right_in_ordinary_scenes_and_seldom_doubted() {
     let folder = tempfile::tempdir().unwrap();
-    let plan = Plan { cases: vec![], random: 0, ordinary: 2, methods: vec![Method::Damped], every: 3 };
+    let plan = Plan { cases: vec![], random: 0, ordinary: 2, methods: vec![Method::Long], every: 3 };
     let judged = evaluate(&plan, folder.path(), |_| ()).unwrap();
     print!("{}", report::text(&judged));
     assert_eq!(judged.len(), 4);
@@ -60,23 +60,23 @@ fn damped_steps_are_right_in_ordinary_scenes_and_seldom_doubted() {
             run.row.scene
         );
         // A millimetre is above what is never wrong: a frozen body would not be right.
-        assert!(run.motion() > 1.0 && run.worst().unwrap().mean < 0.2 * run.motion(), "{}", run.motion());
+        assert!(run.motion() > 1.0 && run.worst().unwrap().mean < 0.3 * run.motion(), "{}", run.motion());
         assert!(doubted.good > 5 && 2 * doubted.inexact < doubted.good, "{doubted:?}");
     }
     let table = std::fs::read_to_string(folder.path().join("hard.csv")).unwrap();
-    assert_eq!(table.matches(",ordinary,damped,").count(), 4);
+    assert_eq!(table.matches(",ordinary,long,").count(), 4);
 }
 
 /// A step that knows of no instrument is left out where one presses.
 #[cfg(feature = "slow-tests")]
 #[test]
-fn an_instrument_presses_in_damped_steps_and_mass_scaled_ones_are_left_out() {
+fn an_instrument_presses_in_long_steps_and_others_are_left_out() {
     let folder = tempfile::tempdir().unwrap();
-    let methods = vec![Method::MassScaled, Method::Damped];
+    let methods = vec![Method::BackwardEuler, Method::Long];
     let judged = evaluate(&Plan { cases: vec![], random: 0, ordinary: 6, methods, every: 3 }, folder.path(), |_| ());
     let judged = judged.unwrap();
     let of: Vec<&Judged> = judged.iter().filter(|run| run.row.scene == "instrument-00").collect();
-    assert_eq!(of.iter().map(|run| run.row.method).collect::<Vec<_>>(), [Method::Damped; 2]);
+    assert_eq!(of.iter().map(|run| run.row.method).collect::<Vec<_>>(), [Method::Long; 2]);
     assert!(of.iter().all(|run| run.motion() > 0.3 && run.verdict() == Verdict::Right));
 }
 
@@ -112,7 +112,7 @@ fn long_cases_are_judged_only_if_they_are_named() {
 #[test]
 fn exact_steps_beyond_the_critical_one_tell_and_switching_steps_follow() {
     let folder = tempfile::tempdir().unwrap();
-    let methods = [Method::TledLargeStep, Method::Damped, Method::Switching(Large::Damped)];
+    let methods = [Method::TledLargeStep, Method::Long, Method::Switching];
     let plan = Plan {
         cases: vec![cases::named("coarse").unwrap()],
         random: 0,
@@ -130,7 +130,7 @@ fn exact_steps_beyond_the_critical_one_tell_and_switching_steps_follow() {
 
     // At the shortest of the steps.
     let error = |method| of(method)[0].worst().unwrap().mean;
-    let [fixed, switching] = [Method::Damped, Method::Switching(Large::Damped)].map(error);
-    let motion = of(Method::Damped)[0].motion();
-    assert!(switching != fixed && switching < 0.1 * motion, "{switching}, {fixed} of {motion} mm");
+    let [fixed, switching] = [Method::Long, Method::Switching].map(error);
+    let motion = of(Method::Long)[0].motion();
+    assert!(switching != fixed && switching < 0.15 * motion, "{switching}, {fixed} of {motion} mm");
 }

@@ -1,4 +1,4 @@
-//! Damped steps: what a network may take away, and what it may not.
+//! The damper: what a network may take away, and what it may not.
 
 use supple::inertia::{Cells, Damper, DamperError, LargeStep, Method};
 use supple::loads::Loads;
@@ -9,7 +9,7 @@ use supple::tled;
 
 use crate::support::bodies::{corner_torsion, held, small_bar};
 use crate::support::{Body, EXP, NEO, bits, bound, mean_distance, rest_of, tissue, to_f64};
-use crate::{GAIN, Kind, networks};
+use crate::{GAIN, networks, prepared};
 
 #[test]
 fn networks_of_another_shape_are_refused() {
@@ -29,7 +29,7 @@ fn without_output_it_is_the_undamped_step() {
     let step = Step::unchecked(20.0 * bound(&scene, &rest_of(&scene)).seconds, 5.0).unwrap();
     let moved = |gain: f32| {
         let mut state = rest_of(&scene);
-        let mut damped = Kind::Damped.prepared(&body, &scene, &mut state, step, gain);
+        let mut damped = prepared(&body, &scene, &mut state, step, gain);
         let mut most = 0.0_f32;
         for _ in 0..100 {
             let status = damped.step(scene.view(), &loads, state.view());
@@ -45,7 +45,7 @@ fn without_output_it_is_the_undamped_step() {
     assert!(undamped != damped && most > 0.0);
 }
 
-/// Without a file the bits are those of a damped step with `weights/damper.weights`.
+/// Without a file the bits are those of a step with `weights/damper.weights`.
 #[test]
 fn the_built_in_damper_is_that_of_its_file() {
     let body = small_bar();
@@ -55,7 +55,7 @@ fn the_built_in_damper_is_that_of_its_file() {
     let step = Step::unchecked(20.0 * bound(&scene, &rest_of(&scene)).seconds, 5.0).unwrap();
     let file = networks::Memory::of(include_bytes!("../../weights/damper.weights"));
     let read = Damper::new(Network::parse(file.bytes()).unwrap()).unwrap();
-    let methods = [Method::damped(Cells::Suggested), Method::Damped(read, Cells::Suggested)];
+    let methods = [Method::new(Cells::Suggested), Method::with_damper(read, Cells::Suggested)];
     let [built_in, of_file] = methods.map(|method| {
         let mut state = rest_of(&scene);
         let mut damped = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
@@ -77,7 +77,7 @@ fn smooth_motion_is_left_alone() {
     let step = Step::unchecked(20.0 * bound(&scene, &rest_of(&scene)).seconds, 0.0).unwrap();
     let mut state = rest_of(&scene);
     assert!(tled::start(&scene, &mut state, &step, |_| ([0.0; 3], [0.3, -0.2, 0.1])));
-    let mut large = Kind::Damped.prepared(&body, &scene, &mut state, step, GAIN);
+    let mut large = prepared(&body, &scene, &mut state, step, GAIN);
     for _ in 0..200 {
         let status = large.step(scene.view(), &Loads::NONE, state.view());
         assert!(!matches!(status, Status::Diverged(_)), "{status:?}");
@@ -105,19 +105,16 @@ fn on_another_mesh_the_shipped_damper_does_no_harm() {
     let exact = Step::unchecked(limit, 20.0).unwrap();
     let long = Step::unchecked(10.0 * limit, 20.0).unwrap();
     let (mut truth, mut undamped, mut damped) = (rest_of(&scene), rest_of(&scene), rest_of(&scene));
-    let method = Method::damped(Cells::Suggested);
-    let cells = Cells::Given(method.grid(scene.view(), &body.points).unwrap().cells);
-    let [mut multilevel, mut with_damper] =
-        [(Method::Multilevel(cells), &mut undamped), (method, &mut damped)].map(|(method, state)| {
-            LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), long).unwrap()
-        });
+    let method = Method::new(Cells::Suggested);
+    let mut with_damper = LargeStep::prepare_in_vec(method, scene.view(), &body.points, damped.view(), long).unwrap();
+    let mut without = prepared(&body, &scene, &mut undamped, long, 0.0);
     let mean = |a: &VecState, b: &VecState| 1e3 * mean_distance(&to_f64(a.displacements()), &to_f64(b.displacements()));
     let (mut errors, mut hold, mut count) = ([0.0; 2], 0.0, 0.0);
     while truth.time() < 0.6 {
         for _ in 0..10 {
             assert_eq!(tled::step(&scene, &loads, &mut truth, &exact), Status::Ok);
         }
-        let _ = multilevel.step(scene.view(), &loads, undamped.view());
+        let _ = without.step(scene.view(), &loads, undamped.view());
         let _ = with_damper.step(scene.view(), &loads, damped.view());
         errors[0] += mean(&truth, &undamped);
         errors[1] += mean(&truth, &damped);
@@ -125,9 +122,6 @@ fn on_another_mesh_the_shipped_damper_does_no_harm() {
         count += 1.0;
     }
     let [undamped, damped] = errors.map(|error| error / count);
-    println!(
-        "mean over nodes and time: multilevel {undamped:.4} mm, damped {damped:.4} mm, hold {:.2} mm",
-        hold / count
-    );
+    println!("mean over nodes and time: without {undamped:.4} mm, with {damped:.4} mm, hold {:.2} mm", hold / count);
     assert!(hold / count > 3.0 && damped < undamped);
 }

@@ -8,7 +8,7 @@ use supple::step::Step;
 
 use crate::support::bodies::Body;
 use crate::support::{mean_distance, rest_of, run, tissue, to_f64};
-use crate::{Kind, limit};
+use crate::{limit, prepared};
 
 /// A bar with one end that moves.
 struct Pulled {
@@ -36,7 +36,7 @@ impl Pulled {
     fn compare<M: ElementMaterial>(
         &self,
         material: impl Fn(Tissue<AnyLaw>) -> M,
-        (kind, multiple): (Kind, f32),
+        multiple: f32,
         damping: f32,
         after: &[u32],
     ) -> Vec<[f64; 2]> {
@@ -48,10 +48,10 @@ impl Pulled {
         let parts = FINER * multiple as u32;
         let fine = Step::unchecked(step.seconds() / parts as f32, damping).unwrap();
         let [mut state, mut exact] = [rest_of(&scene), rest_of(&scene)];
-        let mut large = kind.prepared(&self.body, &scene, &mut state, step, 0.0);
+        let mut large = prepared(&self.body, &scene, &mut state, step, 0.0);
         let mut compared = Vec::new();
         for taken in 1..=after.iter().copied().max().unwrap() {
-            assert!(large.step(scene.view(), &loads, state.view()).is_taken(), "{kind:?}: step {taken}");
+            assert!(large.step(scene.view(), &loads, state.view()).is_taken(), "step {taken}");
             run(&scene, &loads, &mut exact, &fine, u64::from(parts));
             if after.contains(&taken) {
                 let [moved, truth] = [&state, &exact].map(|state| to_f64(state.displacements()));
@@ -77,13 +77,10 @@ fn is_taken_along<M: ElementMaterial>(
 ) {
     // Stiff enough for a wave to run through the bar in a step of 100 times the limit: it moves nearly as one.
     let pulled = Pulled::new(NeoHookean { c: 40_000.0, d: 400_000.0 }, [0.1, 0.0, 0.3], 0.3, false);
-    for kind in [Kind::Multilevel, Kind::Damped] {
-        for (multiple, steps, most) in [(eight, 8, 0.1), (one, 1, 0.1)] {
-            let [error, motion] =
-                pulled.compare(material, (kind, multiple), 20.0, &[steps])[0].map(|metre| 1e3 * metre);
-            println!("{element}, {kind:?} at {multiple}, {steps} steps: off by {error:.2} of {motion:.1} mm");
-            assert!(error < most * motion);
-        }
+    for (multiple, steps, most) in [(eight, 8, 0.1), (one, 1, 0.1)] {
+        let [error, motion] = pulled.compare(material, multiple, 20.0, &[steps])[0].map(|metre| 1e3 * metre);
+        println!("{element} at {multiple}, {steps} steps: off by {error:.2} of {motion:.1} mm");
+        assert!(error < most * motion);
     }
 }
 
@@ -100,13 +97,12 @@ fn follows<M: ElementMaterial>(element: &str, material: impl Fn(Tissue<AnyLaw>) 
         let law = NeoHookean { c: 20_000.0, d: 20_000.0 * ratio };
         let pulled = Pulled::new(law, [0.0, 0.0, 0.05], RAMP, true);
         let limit = limit(&pulled.body.scene(material(tissue(law)), &pulled.supports));
-        for (kind, multiple) in [Kind::Multilevel, Kind::Damped].into_iter().flat_map(|k| [10.0, 20.0].map(|m| (k, m)))
-        {
+        for multiple in [10.0, 20.0] {
             let ramp = (RAMP / (multiple * limit)) as u32;
-            let figures = pulled.compare(material, (kind, multiple), 20.0, &[ramp / 2, ramp, 2 * ramp]);
+            let figures = pulled.compare(material, multiple, 20.0, &[ramp / 2, ramp, 2 * ramp]);
             let shares: Vec<_> = figures.iter().map(|[error, motion]| error / motion).collect();
             println!(
-                "{element}, bulk over shear {ratio}, {kind:?} at {multiple}: error over motion while the support \
+                "{element}, bulk over shear {ratio}, at {multiple}: error over motion while the support \
                 moves, when it stops, and later {shares:.3?}"
             );
             assert!(shares.iter().all(|share| *share < 0.1), "{figures:?}");

@@ -1,18 +1,18 @@
 //! What cannot be prepared or stepped is said, and nothing moves.
 
-use supple::inertia::{Cells, Grid, InertiaError, LargeModel, LargeStep, Method, vectors_for, vectors_for_lattice};
-use supple::loads::{Loads, Motion, NodalForce};
-use supple::material::{Element, Tissue, VecMaterial};
-use supple::scene::{Axes, Support, VecScene};
+use supple::inertia::{Cells, InertiaError, LargeModel, LargeStep, MAX_FUNCTIONS, Method, vectors_for};
+use supple::loads::{Loads, NodalForce};
+use supple::material::{Tissue, VecMaterial};
+use supple::scene::{Support, VecScene};
 use supple::state::{NodeVector, VecState};
 use supple::step::{Status, Step};
 
 use crate::support::bodies::{held, small_bar};
 use crate::support::{Body, NEO, bits, displaced, rest_of, tissue};
-use crate::{Kind, limit, networks};
+use crate::{limit, prepared};
 
 fn given(cells: [u32; 3]) -> Method<'static> {
-    Method::Multilevel(Cells::Given(cells))
+    Method::new(Cells::Given(cells))
 }
 
 /// What [`LargeStep::prepare`] says of a small bar and storage of so many vectors. It gives no step then.
@@ -40,25 +40,22 @@ fn what_cannot_be_prepared_is_said_and_no_step_is_taken() {
     let body = small_bar();
     assert_eq!(body.points.len(), 96);
     let scene = body.scene(tissue(NEO), &held(&body));
-    let damped = Method::Damped(networks::damper(1.0), Cells::Given([1, 1, 2]));
     let nothing = |_: &VecScene<_>, _: &mut Vec<_>, _: &mut VecState| {};
     let said = |error: InertiaError, text: &str| assert_eq!(error.to_string(), text);
 
-    for method in [Method::MassScaled, given([1, 1, 2]), damped] {
-        let needed = vectors_for(&method, scene.view(), &body.points).unwrap();
-        for capacity in [0, needed - 1] {
-            let error = refused(method.clone(), capacity, nothing);
-            assert_eq!(error, InertiaError::Capacity { kind: "vectors", needed, capacity });
-            said(error, &format!("the inertia needs {needed} vectors, there is room for {capacity}"));
-        }
-        let step = Step::unchecked(10.0 * limit(&scene), 0.0).unwrap();
-        let (mut state, storage) = (rest_of(&scene), vec![NodeVector::ZERO; needed]);
-        let points = &body.points;
-        let enough = LargeStep::prepare(method, scene.view(), points, state.view(), step, storage);
-        assert_eq!(enough.unwrap().step(scene.view(), &Loads::NONE, state.view()), Status::Ok);
+    let method = given([1, 1, 2]);
+    let needed = vectors_for(&method, scene.view(), &body.points).unwrap();
+    for capacity in [0, needed - 1] {
+        let error = refused(method.clone(), capacity, nothing);
+        assert_eq!(error, InertiaError::Capacity { kind: "vectors", needed, capacity });
+        said(error, &format!("the inertia needs {needed} vectors, there is room for {capacity}"));
     }
-    assert_eq!(vectors_for(&Method::MassScaled, scene.view(), &body.points), Ok(480));
-    let error = refused(Method::MassScaled, 480, |_, _, state| *state = VecState::at_rest(95));
+    let step = Step::unchecked(10.0 * limit(&scene), 0.0).unwrap();
+    let (mut state, storage) = (rest_of(&scene), vec![NodeVector::ZERO; needed]);
+    let points = &body.points;
+    let enough = LargeStep::prepare(method, scene.view(), points, state.view(), step, storage);
+    assert_eq!(enough.unwrap().step(scene.view(), &Loads::NONE, state.view()), Status::Ok);
+    let error = refused(given([1, 1, 2]), needed, |_, _, state| *state = VecState::at_rest(95));
     said(error, "the inertia needs 96 nodes in the state, there is room for 95");
 
     for cells in [[0; 3], [1, 0, 1], [2_000, 1, 1], [10, 10, 10], [u32::MAX; 3]] {
@@ -68,20 +65,18 @@ fn what_cannot_be_prepared_is_said_and_no_step_is_taken() {
         said(error, &format!("a lattice of {x} x {y} x {z} cells: each must be at least 1, with at most 1024 points"));
     }
     let error = refused(given([9, 9, 9]), 100_000, nothing);
-    said(error, "a lattice of 9 x 9 x 9 cells has more than 128 functions");
+    said(error, &format!("a lattice of 9 x 9 x 9 cells has more than {MAX_FUNCTIONS} functions"));
     let error = refused(given([1, 1, 2]), 100_000, |_, points, _| {
         points.pop();
     });
     said(error, "95 points for a scene of 96 nodes");
-    for method in [Method::MassScaled, given([1, 1, 2])] {
-        let error = refused(method, 100_000, |scene, _, state| {
-            let mut u = vec![[0.0; 3]; 96];
-            u[50][0] = f32::NAN;
-            *state = displaced(scene, &u);
-        });
-        assert!(matches!(error, InertiaError::NotFinite { .. }));
-        assert!(error.to_string().ends_with(": its stiffness is not a finite number"), "{error}");
-    }
+    let error = refused(given([1, 1, 2]), 100_000, |scene, _, state| {
+        let mut u = vec![[0.0; 3]; 96];
+        u[50][0] = f32::NAN;
+        *state = displaced(scene, &u);
+    });
+    assert!(matches!(error, InertiaError::NotFinite { .. }));
+    assert!(error.to_string().ends_with(": its stiffness is not a finite number"), "{error}");
 }
 
 #[test]
@@ -90,14 +85,15 @@ fn an_inertia_serves_only_what_it_was_prepared_for() {
     let scene = body.scene(tissue(NEO), &held(&body));
     let step = Step::unchecked(10.0 * limit(&scene), 0.0).unwrap();
     let mut state = rest_of(&scene);
-    let mut storage = [NodeVector::ZERO; 480];
-    let (method, points) = (Method::MassScaled, &body.points);
+    let (method, points) = (given([1, 1, 2]), &body.points);
+    let mut storage = vec![NodeVector::ZERO; vectors_for(&method, scene.view(), points).unwrap()];
     let mut model = LargeModel::prepare(method, scene.view(), points, state.view(), step, &mut storage).unwrap();
-    let other_storage = model.with_storage(&mut storage[..479]);
+    storage.pop();
+    let other_storage = model.with_storage(&mut storage);
     let status = other_storage.step(scene.view(), &Loads::NONE, state.view());
     assert!(matches!(status, Status::Mismatch { nodes: 96, .. }), "{status:?}");
 
-    let mut large = Kind::MassScaled.prepared(&body, &scene, &mut state, step, 0.0);
+    let mut large = prepared(&body, &scene, &mut state, step, 0.0);
     let other = Body::irregular([0.02, 0.02, 0.04], [2, 2, 4]);
     let other_scene = other.scene(Tissue { law: NEO, density: 1000.0 }, &held(&other));
     let status = large.step(other_scene.view(), &Loads::NONE, state.view());
@@ -122,7 +118,7 @@ fn a_node_that_a_wild_force_held_back_is_let_go() {
     let node = 94;
     let moved = |wild: &[f32]| {
         let mut state = rest_of(&scene);
-        let mut large = Kind::MassScaled.prepared(&body, &scene, &mut state, step, 0.0);
+        let mut large = prepared(&body, &scene, &mut state, step, 0.0);
         let mut push = |newton: f32, copies: usize, steps: usize| {
             let force = NodalForce { node, newton: [newton, 0.0, 0.0], ramp: 0.0 };
             let forces = vec![force; copies];
@@ -149,27 +145,22 @@ fn a_node_that_a_wild_force_held_back_is_let_go() {
     assert!((wild / undisturbed - 1.0).abs() < 0.05);
 }
 
-/// Where every node is held no function of a lattice is left, and no memory is needed for one.
+/// No lattice has one function, or every node is held.
 #[test]
-fn a_lattice_that_has_nothing_to_move_needs_no_room_and_steps() {
+fn a_mesh_that_is_too_small_for_a_lattice_is_referred_to_exact_steps() {
+    let tiny = Body::bar([0.004; 3], [1, 1, 1]);
     let body = small_bar();
-    let nodes = body.points.len();
-    let moved: Vec<_> = (0..nodes as u32).map(Support::moved).collect();
-    let scene = body.scene(tissue(NEO), &moved);
-    let cells = [1, 1, 2];
-    let grid = given(cells).grid(scene.view(), &body.points).unwrap();
-    assert_eq!(grid, Grid { cells, functions: 0 });
-    let elements = scene.element_count();
-    let vectors = |grid| vectors_for_lattice(Element::Linear, nodes, elements, grid, false);
-    assert_eq!(vectors(grid), vectors(Grid::default()));
-    let mut state = rest_of(&scene);
-    let step = Step::unchecked(1e-3, 0.0).unwrap();
-    let (method, points) = (given(cells), &body.points);
-    let mut large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step).unwrap();
-    let motions = [Motion { node: 95, axes: Axes::Z, metre: [0.0, 0.0, 1e-3], ramp: 0.01 }];
-    let loads = Loads::new(&scene, [0.0; 3], &[], &motions).unwrap();
-    for _ in 0..10 {
-        assert_eq!(large.step(scene.view(), &loads, state.view()), Status::Ok);
+    let moved: Vec<_> = (0..body.points.len() as u32).map(Support::moved).collect();
+    for (body, supports, cells) in [(tiny, vec![], Cells::Suggested), (body, moved, Cells::Given([1, 1, 2]))] {
+        let scene = body.scene(tissue(NEO), &supports);
+        let mut state = rest_of(&scene);
+        let step = Step::unchecked(1e-3, 0.0).unwrap();
+        let method = Method::new(cells);
+        assert_eq!(method.grid(scene.view(), &body.points).unwrap().functions, 0);
+        let made = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step);
+        let (error, nodes) = (made.unwrap_err(), body.points.len());
+        assert_eq!(error, InertiaError::TooSmall { nodes });
+        let said = format!("a mesh of {nodes} nodes is too small for long steps: take exact ones");
+        assert_eq!(error.to_string(), said);
     }
-    assert!((state.displacements()[95].to_array()[2] - 1e-3).abs() < 1e-9);
 }

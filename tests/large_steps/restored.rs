@@ -76,7 +76,7 @@ impl Guarded {
         let critical = limit(&scene);
         let mut state = Memory::at_rest(scene.node_count());
         let step = Step::unchecked(20.0 * critical, DAMPING).unwrap();
-        let method = Method::Multilevel(Cells::Suggested);
+        let method = Method::new(Cells::Suggested);
         let large = LargeStep::prepare_in_vec(method, scene.view(), &body.points, state.view(), step).unwrap();
         let guard = Guard::prepare_in_vec(scene.view(), &body.points, state.view(), step, EVERY).unwrap();
         Self { scene, points: body.points, critical, state, large, guard }

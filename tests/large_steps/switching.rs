@@ -1,7 +1,6 @@
 //! Steps of one method after steps of another, and states that were reset or replaced: nothing is refused, and inertia
 //! of another state is not used.
 
-use supple::inertia::{LargeStep, Method};
 use supple::loads::Loads;
 use supple::state::VecState;
 use supple::step::{Status, Step};
@@ -9,10 +8,9 @@ use supple::tled;
 
 use crate::support::bodies::{held, small_bar, torsion};
 use crate::support::{Body, NEO, largest_distance, mean_distance, rest_of, tissue, to_f64};
-use crate::{KINDS, Kind, limit};
+use crate::{limit, prepared};
 
-/// 40 long steps, 200 exact ones, 40 long ones: the exact motion is followed as well as by long steps alone. Mass
-/// scaling, which lags behind, swings back in the exact steps; there only nothing is refused.
+/// 40 long steps, 200 exact ones, 40 long ones: the exact motion is followed as well as by long steps alone.
 #[test]
 fn long_and_exact_steps_may_follow_each_other() {
     let body = small_bar();
@@ -21,30 +19,28 @@ fn long_and_exact_steps_may_follow_each_other() {
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
     let short = Step::unchecked(0.4 * limit(&scene), 100.0).unwrap();
     let long = Step::unchecked(10.0 * limit(&scene), 100.0).unwrap();
-    for kind in KINDS {
-        let (mut exact, mut mixed, mut alone) = (rest_of(&scene), rest_of(&scene), rest_of(&scene));
-        let mut large = kind.prepared(&body, &scene, &mut mixed, long, 2.0);
-        let mut same = kind.prepared(&body, &scene, &mut alone, long, 2.0);
-        let mut run_long = |state: &mut VecState| {
-            (0..40).for_each(|_| assert!(large.step(scene.view(), &loads, state.view()).is_taken()));
-        };
-        run_long(&mut mixed);
-        for _ in 0..200 {
-            assert_eq!(tled::step(&scene, &loads, &mut mixed, &short), Status::Ok);
-        }
-        run_long(&mut mixed);
-        while exact.time() < mixed.time() {
-            assert_eq!(tled::step(&scene, &loads, &mut exact, &short), Status::Ok);
-        }
-        while alone.time() < mixed.time() {
-            assert!(same.step(scene.view(), &loads, alone.view()).is_taken());
-        }
-        let [truth, mixed, alone] = [&exact, &mixed, &alone].map(|state| to_f64(state.displacements()));
-        let way = mean_distance(&truth, &vec![[0.0; 3]; truth.len()]);
-        let [mixed, alone] = [mixed, alone].map(|moved| mean_distance(&truth, &moved) / way);
-        println!("{kind:?}: {:.1} mm, off by {mixed:.3} of that, long steps alone by {alone:.3}", 1e3 * way);
-        assert!(way > 1e-3 && (kind == Kind::MassScaled || mixed < 1.1 * alone.max(0.01)));
+    let (mut exact, mut mixed, mut alone) = (rest_of(&scene), rest_of(&scene), rest_of(&scene));
+    let mut large = prepared(&body, &scene, &mut mixed, long, 2.0);
+    let mut same = prepared(&body, &scene, &mut alone, long, 2.0);
+    let mut run_long = |state: &mut VecState| {
+        (0..40).for_each(|_| assert!(large.step(scene.view(), &loads, state.view()).is_taken()));
+    };
+    run_long(&mut mixed);
+    for _ in 0..200 {
+        assert_eq!(tled::step(&scene, &loads, &mut mixed, &short), Status::Ok);
     }
+    run_long(&mut mixed);
+    while exact.time() < mixed.time() {
+        assert_eq!(tled::step(&scene, &loads, &mut exact, &short), Status::Ok);
+    }
+    while alone.time() < mixed.time() {
+        assert!(same.step(scene.view(), &loads, alone.view()).is_taken());
+    }
+    let [truth, mixed, alone] = [&exact, &mixed, &alone].map(|state| to_f64(state.displacements()));
+    let way = mean_distance(&truth, &vec![[0.0; 3]; truth.len()]);
+    let [mixed, alone] = [mixed, alone].map(|moved| mean_distance(&truth, &moved) / way);
+    println!("{:.1} mm, off by {mixed:.3} of that, long steps alone by {alone:.3}", 1e3 * way);
+    assert!(way > 1e-3 && mixed < 1.1 * alone.max(0.01));
 }
 
 /// After a reset, and in a state of another run, a step is that of an inertia prepared for that state.
@@ -55,32 +51,30 @@ fn inertia_of_another_state_is_computed_anew() {
     let forces = torsion(&body, 5e-3, 0.05);
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
     let step = Step::unchecked(10.0 * limit(&scene), 5.0).unwrap();
-    for kind in KINDS {
-        let mut bent = rest_of(&scene);
-        let mut large = kind.prepared(&body, &scene, &mut bent, step, 2.0);
-        for _ in 0..60 {
-            assert!(large.step(scene.view(), &loads, bent.view()).is_taken());
+    let mut bent = rest_of(&scene);
+    let mut large = prepared(&body, &scene, &mut bent, step, 2.0);
+    for _ in 0..60 {
+        assert!(large.step(scene.view(), &loads, bent.view()).is_taken());
+    }
+    let stale = large.report().added_mean;
+    for start in [rest_of(&scene), bent.clone()] {
+        let mut first = start.clone();
+        let mut fresh = prepared(&body, &scene, &mut first, step, 2.0);
+        let mut reset = rest_of(&scene);
+        assert!(large.step(scene.view(), &loads, reset.view()).is_taken());
+        let mut second = start.clone();
+        let mut first = start;
+        for _ in 0..5 {
+            assert!(fresh.step(scene.view(), &loads, first.view()).is_taken());
+            assert!(large.step(scene.view(), &loads, second.view()).is_taken());
         }
-        let stale = large.report().added_mean;
-        for start in [rest_of(&scene), bent.clone()] {
-            let mut first = start.clone();
-            let mut fresh = kind.prepared(&body, &scene, &mut first, step, 2.0);
-            let mut reset = rest_of(&scene);
-            assert!(large.step(scene.view(), &loads, reset.view()).is_taken());
-            let mut second = start.clone();
-            let mut first = start;
-            for _ in 0..5 {
-                assert!(fresh.step(scene.view(), &loads, first.view()).is_taken());
-                assert!(large.step(scene.view(), &loads, second.view()).is_taken());
-            }
-            let apart = largest_distance(&to_f64(first.displacements()), &to_f64(second.displacements()));
-            println!(
-                "{kind:?}: added inertia {stale:.0}, {:.0} in a state of its own, {:.0} renewed, {apart:.1e} m apart",
-                fresh.report().added_mean,
-                large.report().added_mean
-            );
-            assert!(apart < 1e-8);
-        }
+        let apart = largest_distance(&to_f64(first.displacements()), &to_f64(second.displacements()));
+        println!(
+            "added inertia {stale:.0}, {:.0} in a state of its own, {:.0} renewed, {apart:.1e} m apart",
+            fresh.report().added_mean,
+            large.report().added_mean
+        );
+        assert!(apart < 1e-8);
     }
 }
 
@@ -93,26 +87,24 @@ fn inertia_of_another_state_with_as_many_steps_is_computed_anew() {
     let loads = Loads::new(&scene, [0.0; 3], &forces, &[]).unwrap();
     let step = Step::unchecked(10.0 * limit(&scene), 5.0).unwrap();
     let short = Step::unchecked(0.4 * limit(&scene), 5.0).unwrap();
-    for kind in KINDS {
-        let (mut bent, mut other) = (rest_of(&scene), rest_of(&scene));
-        let mut large = kind.prepared(&body, &scene, &mut bent, step, 2.0);
-        for _ in 0..60 {
-            assert!(large.step(scene.view(), &loads, bent.view()).is_taken());
-            assert_eq!(tled::step(&scene, &Loads::NONE, &mut other, &short), Status::Ok);
-        }
-        assert_eq!(bent.steps(), other.steps());
-        let stale = large.report().added_mean;
-        let mut first = other.clone();
-        let mut fresh = kind.prepared(&body, &scene, &mut first, step, 2.0);
-        for _ in 0..5 {
-            assert!(fresh.step(scene.view(), &loads, first.view()).is_taken());
-            assert!(large.step(scene.view(), &loads, other.view()).is_taken());
-        }
-        let apart = largest_distance(&to_f64(first.displacements()), &to_f64(other.displacements()));
-        let added = [stale, fresh.report().added_mean, large.report().added_mean];
-        println!("{kind:?}: added inertia {added:.0?} of the bent, the own and the renewed state, {apart:.1e} m apart");
-        assert!(apart < 1e-8 && (added[2] / added[1] - 1.0).abs() < 1e-3, "{added:?}");
+    let (mut bent, mut other) = (rest_of(&scene), rest_of(&scene));
+    let mut large = prepared(&body, &scene, &mut bent, step, 2.0);
+    for _ in 0..60 {
+        assert!(large.step(scene.view(), &loads, bent.view()).is_taken());
+        assert_eq!(tled::step(&scene, &Loads::NONE, &mut other, &short), Status::Ok);
     }
+    assert_eq!(bent.steps(), other.steps());
+    let stale = large.report().added_mean;
+    let mut first = other.clone();
+    let mut fresh = prepared(&body, &scene, &mut first, step, 2.0);
+    for _ in 0..5 {
+        assert!(fresh.step(scene.view(), &loads, first.view()).is_taken());
+        assert!(large.step(scene.view(), &loads, other.view()).is_taken());
+    }
+    let apart = largest_distance(&to_f64(first.displacements()), &to_f64(other.displacements()));
+    let added = [stale, fresh.report().added_mean, large.report().added_mean];
+    println!("added inertia {added:.0?} of the bent, the own and the renewed state, {apart:.1e} m apart");
+    assert!(apart < 1e-8 && (added[2] / added[1] - 1.0).abs() < 1e-3, "{added:?}");
 }
 
 /// Two scenes with the same number of nodes and elements.
@@ -122,8 +114,7 @@ fn inertia_of_another_scene_of_the_same_size_is_refused() {
     let [scene, other] = [&body, &other].map(|body| body.scene(tissue(NEO), &held(body)));
     let mut state = rest_of(&scene);
     let step = Step::unchecked(10.0 * limit(&scene), 0.0).unwrap();
-    let (method, points) = (Method::MassScaled, &body.points);
-    let mut large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step).unwrap();
+    let mut large = prepared(&body, &scene, &mut state, step, 0.0);
     let nodes = scene.node_count();
     assert_eq!(nodes, other.node_count());
     let status = large.step(other.view(), &Loads::NONE, state.view());

@@ -106,6 +106,6 @@ fn with_fallback_no_network_runs_away_on_an_organ_that_it_has_not_seen() {
         let (end, status) = organ.run(Settings { method, ..Settings::default() });
         let off = distance(&end, &exact);
         println!("{name}: {off:.2} mm off, exact steps moved by {motion:.2} mm, {status:?}");
-        assert!(off < 0.2 * motion && status != Status::Ok);
+        assert!(off < 0.25 * motion && status != Status::Ok);
     }
 }

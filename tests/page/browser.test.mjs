@@ -15,7 +15,7 @@ const puppeteer = createRequire(new URL("../../examples/page/package.json", impo
 const file = process.env.SUPPLE_PAGE;
 const nextToPage = (name) => join(dirname(file), name);
 const DOME = [-0.01, 0.004, 0.0605]; // a point of the tissue that the camera sees, m
-const METHODS = ["exact", "damped", "auto"];
+const METHODS = ["exact", "long", "auto"];
 const WIDE = { width: 1280, height: 900 };
 const NARROW = { width: 400, height: 860, hasTouch: true, isMobile: true };
 let browser;

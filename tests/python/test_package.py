@@ -121,7 +121,7 @@ def test_steps_are_refused_in_words(soft):
         supple.Simulation(scene, step=0.1).advance(0.1)
     assert caught.value.limit is not None and 1e-5 < caught.value.limit < 1e-2 and caught.value.node is not None
     with pytest.raises(supple.InputError, match="step -0.001: it must be a positive number"):
-        supple.Simulation(scene, "damped", step=-0.001)
+        supple.Simulation(scene, "long", step=-0.001)
     with pytest.raises(supple.InputError, match="tolerance nan: it must be a positive number"):
         supple.Simulation(scene, "auto", tolerance=np.nan)
     with pytest.raises(supple.InputError, match="method 'fast'"):

@@ -9,7 +9,7 @@ if (!has_simd128()) {
 }
 console.error("wasm32: Simd128");
 const names = [
-    "exact", "damped", "network", "learned", "int8", "exact-208", "learned-int8-208", "critical-208", "nodal-pressure", "nodal-strain",
+    "exact", "long", "network", "learned", "int8", "exact-208", "learned-int8-208", "critical-208", "nodal-pressure", "nodal-strain",
 ];
 for (const [what, name] of names.entries()) {
     for (const level of [0, 1]) {

@@ -1,5 +1,5 @@
 //! `supple demo`: a liver lobe that hangs from its back sags under its own weight, and an instrument moves it, by
-//! exact, damped and learned steps side by side. A ball presses its dome and slides along it, which the learned step
+//! exact, long and learned steps side by side. A ball presses its dome and slides along it, which the learned step
 //! refuses; forceps grip its front edge and lift it: their nodes are moved supports. The mesh is in the program, so the
 //! command needs no files.
 
@@ -43,7 +43,7 @@ const WAY: [(f64, [f64; 3]); 3] = [(0.0, [0.0; 3]), (0.6, [0.0, 0.0, -0.016]), (
 const GRIP: f64 = 0.010;
 const LIFT: [f32; 3] = [0.0, -0.006, 0.020];
 const LIFTED_IN: f32 = 0.6;
-/// The damped step, over the critical one.
+/// The long step, over the critical one.
 const TIMES_CRITICAL: f32 = 10.0;
 
 /// The instruments, by what they do.
@@ -54,7 +54,7 @@ const FORCEPS: &str = "forceps grip the front edge and lift it";
 #[derive(Clone, Copy)]
 enum Steps {
     Exact,
-    Damped,
+    Long,
     Learned,
 }
 
@@ -64,7 +64,7 @@ pub(crate) fn demo(out: &Path) -> Result<End, Problem> {
     let mut cases = vec![];
     for instrument in [BALL, FORCEPS] {
         let mut runs = vec![];
-        for steps in [Steps::Exact, Steps::Damped, Steps::Learned] {
+        for steps in [Steps::Exact, Steps::Long, Steps::Learned] {
             // Frames for ParaView of the first run.
             let out = folder.is_none().then_some(Out { path: out, force: true });
             let (run, made) = run(lobe(instrument, steps)?, steps.name(), out)?;
@@ -88,7 +88,7 @@ impl Steps {
     const fn name(self) -> &'static str {
         match self {
             Self::Exact => "exact",
-            Self::Damped => "damped",
+            Self::Long => "long",
             Self::Learned => "learned",
         }
     }
@@ -130,8 +130,8 @@ fn lobe(instrument: &str, steps: Steps) -> Result<Setup, Problem> {
     }
     match steps {
         Steps::Exact => {}
-        Steps::Damped => {
-            setup.time.method = Some(Method::damped(Cells::Suggested));
+        Steps::Long => {
+            setup.time.method = Some(Method::new(Cells::Suggested));
             setup.time.step = StepChoice::Multiple(TIMES_CRITICAL);
         }
         Steps::Learned => {

@@ -52,7 +52,7 @@ impl FileScene {
         let refused = |what: &str| {
             Err(Problem(format!("{what}: a network learns from exact steps of one tissue without instruments")))
         };
-        if setup.method_name() != "tled" {
+        if setup.method_name() != "exact" {
             return refused(&format!("the method is {:?}", setup.method_name()));
         }
         if !setup.instruments.is_empty() {

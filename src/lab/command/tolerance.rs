@@ -18,7 +18,7 @@ pub(crate) struct Asked {
     /// minutes; may be repeated
     #[arg(long = "scene", value_name = "NAME")]
     scenes: Vec<String>,
-    /// Method of the fixed steps, damped ones unless given; may be repeated
+    /// Method of the fixed steps, long ones unless given; may be repeated
     #[arg(long = "method", value_name = "NAME")]
     methods: Vec<String>,
     /// Tolerance of the adaptive steps, mm; may be repeated
@@ -33,7 +33,7 @@ pub(crate) fn judge(Asked { out, scenes, methods, tolerances, random }: &Asked) 
     if let Some(wrong) = tolerances.iter().find(|tolerance| !(tolerance.is_finite() && **tolerance > 0.0)) {
         return Err(Problem(format!("--tolerance {wrong}: it must be a positive number of mm")));
     }
-    let methods = if methods.is_empty() { &[Method::Damped.name().to_owned()] } else { &**methods };
+    let methods = if methods.is_empty() { &[Method::Long.name().to_owned()] } else { &**methods };
     let plan = Plan::new(scenes, None, methods, [*random, 0], supple::guard::EVERY).map_err(Problem::of)?;
     let rows = evaluate(&plan, tolerances, out, |words| message!("{words}")).map_err(Problem::of)?;
     print(text(&rows));

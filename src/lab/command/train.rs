@@ -95,9 +95,9 @@ fn train_damper(text: &str, recipe: &Path, out: &Path) -> Result<End, Problem> {
     let trained = trained.map_err(|error| Problem::in_file(recipe, error))?;
     weight_file::write(out, &trained.bytes)?;
     output!("mean error over nodes and time, mm");
-    output!("scene            load  step  multilevel  undamped      rule   network");
-    for damper::Judged { scene, load, multiple, errors: [multilevel, undamped, rule, network] } in &trained.judged {
-        output!("{scene:14} {load:6} {multiple:4}x {multilevel:11.4} {undamped:9.4} {rule:9.4} {network:9.4}");
+    output!("scene            load  step  undamped      rule   network");
+    for damper::Judged { scene, load, multiple, errors: [undamped, rule, network] } in &trained.judged {
+        output!("{scene:14} {load:6} {multiple:4}x {undamped:9.4} {rule:9.4} {network:9.4}");
     }
     output!("weights     {} ({} bytes)", out.display(), trained.bytes.len());
     Ok(End::Reached)

@@ -22,7 +22,7 @@ use std::path::Path;
 
 use supple::guard::EVERY_LEARNED;
 
-use super::method::{Large, Method};
+use super::method::Method;
 use super::networks::{self, Family};
 use super::run;
 use super::scenes::SceneSpec;
@@ -73,16 +73,12 @@ impl Plan {
     ) -> Result<Self, LabError> {
         let methods = match methods {
             [] => Vec::from([
-                Method::MassScaled,
-                Method::Multilevel,
-                Method::Damped,
+                Method::Long,
                 Method::Learned(Family::Compact),
                 Method::Learned(Family::CompactInt8),
                 Method::Learned(Family::OtherStep),
                 Method::TledLargeStep,
-                Method::Switching(Large::MassScaled),
-                Method::Switching(Large::Multilevel),
-                Method::Switching(Large::Damped),
+                Method::Switching,
             ]),
             names => names.iter().map(|name| Method::named(name)).collect::<Result<_, _>>()?,
         };

@@ -7,7 +7,7 @@ use supple::material::Element;
 use super::PhysicsRow;
 use super::mesh::GRID;
 use super::silicone::DISTANCE;
-use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
+use super::steps::{BACKWARD_EULER, EXACT, LONG_20, LONG_100};
 use super::svg::{COLOURS, line, put};
 
 const WIDTH: f64 = 860.0;
@@ -39,7 +39,7 @@ impl Curve {
     }
 
     fn dash(&self) -> &'static str {
-        let explicit = [EXACT, DAMPED_20, DAMPED_100];
+        let explicit = [EXACT, LONG_20, LONG_100];
         let place = [explicit, BACKWARD_EULER]
             .into_iter()
             .find_map(|methods| methods.into_iter().position(|steps| steps.name == self.method));

@@ -11,7 +11,7 @@
 //! | `torsion` | a square bar, against Saint-Venant's torsion constant |
 //! | `punch` | a flat circular punch on a half-space, against the closed form |
 //! | `body`, `mesh` | a body with its element; mapped grids and irregular meshes of tetrahedra |
-//! | `steps`, `rest` | exact steps, damped ones and backward Euler; the shape at rest |
+//! | `steps`, `rest` | exact steps, long ones and backward Euler; the shape at rest |
 //! | `pressure` | how much pressure oscillates from node to node |
 //! | [`report`], [`tables`] | rows as a file, and as the tables of the documentation |
 //! | `figure`, `locking`, `svg` | pictures of error over computing time, and of the beam at rest |
@@ -51,7 +51,7 @@ pub struct PhysicsRow {
     pub mesh: &'static str,
     /// The element.
     pub element: Element,
-    /// The steps: exact ones, damped ones and how far above the critical step, or backward Euler.
+    /// The steps: exact ones, long ones and how far above the critical step, or backward Euler.
     pub method: &'static str,
     /// Nodes of the mesh.
     pub nodes: usize,

@@ -15,6 +15,8 @@ use crate::LabError;
 /// Rounding of float32 in a sum of forces is half of it.
 const TOLERANCE: f64 = 2e-4;
 const MOST_WINDOWS: u32 = 120;
+/// The same for long steps, whose added inertia lets rough motion rest later.
+const MOST_WINDOWS_OF_LONG: u32 = 1200;
 /// Kinetic energy over the work of the loads, at most: rounding of displacements leaves 1e-5 where steps are short.
 const STILL: f64 = 3e-5;
 
@@ -42,8 +44,9 @@ impl Setup<'_> {
         let (from, mut computing) = (state.time(), Duration::ZERO);
         let (mut calm, mut latest, mut change, mut kinetic) = (0, f64::NAN, f64::NAN, f64::NAN);
         let damping = 2.0 * omega as f32;
+        let most = if matches!(self.steps.kind, Kind::Long(_)) { MOST_WINDOWS_OF_LONG } else { MOST_WINDOWS };
         let mut advance = self.advance(state, damping)?;
-        for window in 1..=MOST_WINDOWS {
+        for window in 1..=most {
             let start = Instant::now();
             advance(state, loads, from + f64::from(window) / omega)?;
             computing += start.elapsed();
@@ -56,7 +59,7 @@ impl Setup<'_> {
             if calm >= 3 && (kinetic.is_nan() || kinetic <= STILL) {
                 return Ok(Cost { simulated: state.time() - from, computing });
             }
-            // The critical step changes with the shape; damped steps follow it by themselves.
+            // The critical step changes with the shape; long steps follow it by themselves.
             if self.steps.kind == Kind::Exact {
                 advance = self.advance(state, damping)?;
             }

@@ -12,7 +12,7 @@ use supple::state::VecState;
 use super::mesh::{BodyMesh, GRID, same};
 use super::recordings::{DAMPING, GRAVITY, LEFT, LOAD, MARKERS, Measured, Recording};
 use super::specimen::{Cost, Elastic, Setup, Specimen, fixed};
-use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT};
+use super::steps::{BACKWARD_EULER, EXACT, LONG_20, LONG_100};
 use super::swing::{Markers, Swing};
 use super::{LabError, PhysicsRow};
 
@@ -60,7 +60,7 @@ pub(super) fn rows(meshes: usize) -> Result<Vec<PhysicsRow>, LabError> {
             for element in Element::ALL {
                 let implicit = load.kilogram == 0.0 && element == Element::Linear && body.mesh.family == GRID;
                 let implicit = BACKWARD_EULER.into_iter().filter(|_| implicit);
-                let explicit = [EXACT, DAMPED_20, DAMPED_100].into_iter();
+                let explicit = [EXACT, LONG_20, LONG_100].into_iter();
                 for steps in explicit.chain(implicit) {
                     let (found, row) = body.measure(NAME, element, steps, |setup| swing_and_rest(setup, &body, load));
                     compared(load, found, &PhysicsRow { unit: "mm", source: SOURCE, ..row }, &mut rows);

@@ -1,4 +1,4 @@
-//! The ways to take steps that are compared: exact ones at nine tenths of the critical step, damped ones far above it,
+//! The ways to take steps that are compared: exact ones at nine tenths of the critical step, long ones far above it,
 //! and backward Euler at steps of milliseconds as most packages have it ([`implicit`]), which is of linear tetrahedra
 //! only.
 
@@ -25,14 +25,14 @@ pub(super) struct Steps {
 pub(super) enum Kind {
     Exact,
     /// Steps over the critical one.
-    Damped(f32),
+    Long(f32),
     /// Steps in s.
     BackwardEuler(f32),
 }
 
 pub(super) const EXACT: Steps = Steps { name: "exact", kind: Kind::Exact };
-pub(super) const DAMPED_20: Steps = Steps { name: "damped 20x", kind: Kind::Damped(20.0) };
-pub(super) const DAMPED_100: Steps = Steps { name: "damped 100x", kind: Kind::Damped(100.0) };
+pub(super) const LONG_20: Steps = Steps { name: "long 20x", kind: Kind::Long(20.0) };
+pub(super) const LONG_100: Steps = Steps { name: "long 100x", kind: Kind::Long(100.0) };
 /// A frame of 60 a second, and parts of it.
 pub(super) const BACKWARD_EULER: [Steps; 3] = [
     Steps { name: "backward Euler 1 ms", kind: Kind::BackwardEuler(1e-3) },
@@ -40,7 +40,7 @@ pub(super) const BACKWARD_EULER: [Steps; 3] = [
     Steps { name: "backward Euler 16.7 ms", kind: Kind::BackwardEuler(1.0 / 60.0) },
 ];
 /// How shapes at rest are reached.
-pub(super) const TO_REST: [Steps; 2] = [EXACT, DAMPED_20];
+pub(super) const TO_REST: [Steps; 2] = [EXACT, LONG_20];
 
 /// Share of the critical step that exact steps take: tissue stiffens on the way.
 const SAFETY: f32 = 0.9;
@@ -55,14 +55,14 @@ impl Setup<'_> {
         let critical = tled::critical_step(scene, state).ok_or(LabError::NoCriticalStep { scene: case })?;
         let seconds = match steps.kind {
             Kind::Exact => SAFETY * critical.seconds,
-            Kind::Damped(multiple) => multiple * critical.seconds,
+            Kind::Long(multiple) => multiple * critical.seconds,
             Kind::BackwardEuler(seconds) => seconds,
         };
         let step = Step::unchecked(seconds, damping)?;
         let mut prepared = match steps.kind {
             Kind::Exact => Prepared::Exact(step),
-            Kind::Damped(_) => {
-                let method = inertia::Method::damped(Cells::Suggested);
+            Kind::Long(_) => {
+                let method = inertia::Method::new(Cells::Suggested);
                 let large = LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step)?;
                 Prepared::Long(Box::new(large), damping)
             }

@@ -6,7 +6,7 @@ use supple::material::Element;
 use super::mesh::GRID;
 use super::recordings::Recording;
 use super::report::ORDER;
-use super::steps::{BACKWARD_EULER, DAMPED_20, DAMPED_100, EXACT, Steps, TO_REST};
+use super::steps::{BACKWARD_EULER, EXACT, LONG_20, LONG_100, Steps, TO_REST};
 use super::{PhysicsRow, cook, pressure, silicone};
 use crate::literal::PAPER;
 
@@ -115,7 +115,7 @@ impl Rows<'_> {
             let exact = |row: &&PhysicsRow| row.method == EXACT.name && row.quantity == rest;
             let line = |row: &PhysicsRow| {
                 let (mesh, element, _, count) = key(row);
-                let seconds = [EXACT, DAMPED_20, DAMPED_100]
+                let seconds = [EXACT, LONG_20, LONG_100]
                     .map(|steps| self.seconds((mesh, element, steps.name, count), load.recordings));
                 let figures = self.marker(key(row), load.recordings);
                 let (name, seconds) = (element.name(), join(seconds.into_iter()));
@@ -126,17 +126,17 @@ impl Rows<'_> {
             lines.extend(runs);
         }
         let heads = "| load | mesh | element | tetrahedra | at rest, mm | error, % | lowest point, mm | error, % | \
-                     from a tenth to there, s | error, % | period error, % | curve, mm | s/s exact, damped 20x, 100x |";
+                     from a tenth to there, s | error, % | period error, % | curve, mm | s/s exact, long 20x, 100x |";
         table("The beam's left marker, exact steps", heads, lines)
     }
 
-    /// Under gravity on grids: damped steps where the element does not lock, backward Euler where it is.
+    /// Under gravity on grids: long steps where the element does not lock, backward Euler where it is.
     fn other_steps(&self) -> Option<String> {
         let [gravity, _] = silicone::LOADS;
         let rest = format!("{} left: drop at rest", gravity.recordings[0].name);
         let wanted = |row: &&PhysicsRow| {
-            let damped = row.method == DAMPED_20.name || row.method == DAMPED_100.name;
-            let shown = row.method != EXACT.name && damped == (row.element != Element::Linear);
+            let long = row.method == LONG_20.name || row.method == LONG_100.name;
+            let shown = row.method != EXACT.name && long == (row.element != Element::Linear);
             row.mesh == GRID && row.quantity == rest && shown
         };
         let line = |row: &PhysicsRow| {
@@ -146,7 +146,7 @@ impl Rows<'_> {
             format!("| {} | {} | {} | {figures} | {seconds} |", row.element.name(), row.method, row.tetrahedra)
         };
         let mut shown: Vec<&PhysicsRow> = self.of_case(silicone::NAME).filter(wanted).collect();
-        let kinds = [DAMPED_20, DAMPED_100].into_iter().chain(BACKWARD_EULER);
+        let kinds = [LONG_20, LONG_100].into_iter().chain(BACKWARD_EULER);
         let place = |row: &PhysicsRow| kinds.clone().position(|steps| steps.name == row.method);
         shown.sort_by_key(|row| (row.element.code(), place(row)));
         let heads = "| element | steps | tetrahedra | at rest, mm | error, % | lowest point, mm | error, % | \
@@ -212,8 +212,8 @@ impl Rows<'_> {
                 join(TO_REST.map(seconds).into_iter())
             )
         };
-        let heads = "| case | mesh | element | error from coarse to fine, %, exact steps | damped 20x | order | \
-                     s to rest on the finest mesh, exact, damped |";
+        let heads = "| case | mesh | element | error from coarse to fine, %, exact steps | long 20x | order | \
+                     s to rest on the finest mesh, exact, long |";
         let lines = self.groups(wanted).into_iter().map(line).collect();
         table("Shapes at rest against closed forms and a benchmark", heads, lines)
     }

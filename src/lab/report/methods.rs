@@ -291,8 +291,8 @@ const BAR_MULTIPLES: [u32; 2] = [10, 20];
 /// Of its figure of other bodies.
 const BODIES: [&str; 2] = ["cylinder", "lobe"];
 const BODY_MULTIPLES: [u32; 4] = [10, 20, 50, 100];
-/// Whose shapes are shown: the paper's network, the compact one, and the damped step.
-const SHOWN: [Method; 3] = [Method::Learned(Family::Paper), Method::Learned(Family::Compact), Method::Damped];
+/// Whose shapes are shown: the paper's network, the compact one, and the long step.
+const SHOWN: [Method; 3] = [Method::Learned(Family::Paper), Method::Learned(Family::Compact), Method::Long];
 
 fn find<'a>(
     evaluation: &'a Evaluation,
@@ -392,7 +392,7 @@ mod tests {
     const fn row(end: End) -> Row {
         Row {
             scene: "lobe",
-            method: Method::Damped,
+            method: Method::Long,
             multiple: 10,
             step: 3e-4,
             hold: 3.0,

@@ -1,4 +1,4 @@
-//! The network of the damped step ([`supple::inertia::Damper`]), trained by random search (CMA-ES): weights are drawn
+//! The network of long steps ([`supple::inertia::Damper`]), trained by random search (CMA-ES): weights are drawn
 //! around the best so far, each draw moves the recipe's scenes from rest to the end, and is judged by the exact motion.
 //! No gradient passes through the motion, and the whole roll-out is judged, not one step of it.
 //!
@@ -147,8 +147,8 @@ pub struct Judged {
     pub load: f32,
     /// Step over [`DT`].
     pub multiple: u32,
-    /// Mean error over nodes and time, mm: multilevel inertia, a damper that does nothing, the rule, the network.
-    pub errors: [f64; 4],
+    /// Mean error over nodes and time, mm: a damper that does nothing, the rule, the network.
+    pub errors: [f64; 3],
 }
 
 /// What a search came to.
@@ -209,10 +209,10 @@ pub fn train(text: &str, mut progress: impl FnMut(&Progress) -> ControlFlow<()>)
     let best = search(&recipe, &start, judge, &mut progress)?;
 
     let bytes = image(&best)?;
-    let methods = [Method::Multilevel, nothing, damped(image(&start)?)?, damped(bytes.clone())?];
+    let methods = [nothing, damped(image(&start)?)?, damped(bytes.clone())?];
     let mut judged = Vec::new();
     for trial in &trials {
-        let mut errors = [0.0; 4];
+        let mut errors = [0.0; 3];
         for (error, method) in errors.iter_mut().zip(methods) {
             *error = trial.error(method)?;
         }
@@ -259,7 +259,7 @@ fn search(
 
 fn damped(bytes: Vec<u8>) -> Result<Method, TrainError> {
     // A few hundred bytes for each draw, for as long as the program runs.
-    Ok(Method::DampedWith(NetworkFile::leaked("damper", &bytes)?))
+    Ok(Method::LongWith(NetworkFile::leaked("damper", &bytes)?))
 }
 
 /// A gain of [`GAIN`] whatever the inputs: rows of the hidden layer, its biases, the output's weights, its bias. Each

@@ -24,7 +24,7 @@ from .scene import ELEMENTS, Scene, axes_of
 
 _STEPS = {
     "exact": lib.SUPPLE_STEPS_EXACT,
-    "damped": lib.SUPPLE_STEPS_DAMPED,
+    "long": lib.SUPPLE_STEPS_LONG,
     "auto": lib.SUPPLE_STEPS_AUTO,
     "learned": lib.SUPPLE_STEPS_LEARNED,
 }
@@ -75,17 +75,17 @@ class Report:
     "fell back" (exact steps took the place of learned ones), "inexact" (the estimate of the error exceeds what is allowed).
     It is the worst of all steps of the call. `estimate`: mean error of the nodes (m) after the last of them, by the guard or the
     automatic steps, None where there is none (yet); `largest_estimate`: that of the worst node, `worst_node`; `allowed`: what the guard
-    accepts for the mean, a fifth of the motion so far or the tolerance. `exact`, `damped`, `learned` count the steps taken, `undone` those
+    accepts for the mean, a fifth of the motion so far or the tolerance. `exact`, `long`, `learned` count the steps taken, `undone` those
     computed and not taken, or taken back; `shortest` and `longest` are their lengths (s). What "limited" is about:
     `least_volume_ratio` below 0.1, `saturation` of the exponential law above 1, `energy_excess` above 0 (kinetic energy beyond the balance,
     a share), `held_back` nodes, `lattice_share` below 0.5. `available_energy`: the most that loads and supports ever gave (J).
-    `added_mass`: of damped steps, mean inertia added, in masses of the node. `clipped`, `outside`: of learned steps, shares of the vertices.
+    `added_mass`: of long steps, mean inertia added, in masses of the node. `clipped`, `outside`: of learned steps, shares of the vertices.
     """
 
     status: str
     time: float
     exact: int
-    damped: int
+    long: int
     learned: int
     undone: int
     least_volume_ratio: float
@@ -107,7 +107,7 @@ class Report:
 
     @property
     def steps(self) -> int:
-        return self.exact + self.damped + self.learned
+        return self.exact + self.long + self.learned
 
     @property
     def ok(self) -> bool:
@@ -120,17 +120,17 @@ class Simulation:
     Parameters
     ----------
     scene
-    method : "exact"; "damped" beyond the critical step; "auto", exact and damped steps whose length keeps a tolerance; "learned"
+    method : "exact"; "long" beyond the critical step; "auto", exact and long steps whose length keeps a tolerance; "learned"
     step : s; of exact steps, those around a network's included, 0.9 of the critical one unless given, and shorter where that falls; of
-        damped ones 20 times the critical one; of automatic ones the longest
+        long ones 20 times the critical one; of automatic ones the longest
     damping : 1/s; learned steps take that of their training
     tolerance : mean error (m) that automatic steps keep, half a millimetre or less in bodies below 10 cm unless given, and that the
         guard allows, a fifth of the motion unless given
-    weights : file of the network, for learned steps; of another damper than the library's own, for damped and automatic ones
+    weights : file of the network, for learned steps; of another damper than the library's own, for long and automatic ones
     lead_in : seconds of exact steps before a network takes over
-    guard : whether a second run estimates the error of damped and learned steps
+    guard : whether a second run estimates the error of long and learned steps
     fallback : whether exact steps take the place of learned ones that are not to be believed; else `advance` raises there
-    cells : of the lattice of damped steps along x, y, z; chosen for the scene unless given
+    cells : of the lattice of long steps along x, y, z; chosen for the scene unless given
     threads : 1 to 8 that compute a step, with the same bits. They are the kernel's own, one set for all
         simulations: a process that forks does so before
     """
@@ -375,7 +375,7 @@ class Simulation:
             _WORDS.get(status, str(status)),
             float(call.time),
             int(report.exact),
-            int(report.damped),
+            int(report.long_steps),
             int(report.learned),
             int(report.undone),
             float(call.least_volume_ratio),
@@ -398,8 +398,8 @@ class Simulation:
 
     @_one_at_a_time
     def take(self, count: int) -> Report:
-        """Takes so many exact or damped steps of the length that was given."""
-        if self._step is None or self.method not in ("exact", "damped"):
+        """Takes so many exact or long steps of the length that was given."""
+        if self._step is None or self.method not in ("exact", "long"):
             raise InputError(f"take: {self.method} steps without a length that is given; call advance")
         if int(count) != count or count < 1:
             raise InputError(f"take {count} steps: it must be a whole number, at least 1")

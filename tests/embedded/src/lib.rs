@@ -3,10 +3,10 @@
 #![no_std]
 
 use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
-use supple::inertia::{Cells, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
+use supple::inertia::{Cells, LargeStep, Method, vectors_for};
 use supple::learned::{self, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
-use supple::material::{Element, Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue, TissueValues};
+use supple::material::{Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue, TissueValues};
 use supple::mesh::{self, Bar, Mesh, Winding};
 use supple::mlp::Network;
 use supple::scene::{AsScene, FixedScene, SceneFacts, SceneView, Support};
@@ -168,9 +168,8 @@ pub extern "C" fn bar(bar: &Bar) -> f32 {
     bar.points().map(|[x, _, _]| x).sum::<f32>() + bar.tets().map(|[a, ..]| a as f32).sum::<f32>()
 }
 
-/// The largest lattice here.
-const GRID: Grid = Grid { cells: [2, 2, 2], functions: 27 };
-type Storage = [NodeVector; vectors_for_lattice(Element::Linear, 100, 400, GRID, true)];
+/// Enough for the lattices here.
+type Storage = [NodeVector; 16_000];
 
 /// Prepares a method and takes a step of it: error, inertia added and damping.
 fn large(
@@ -197,22 +196,9 @@ fn large(
     report.added_mean + report.damping + large.model().grid().functions as f32
 }
 
-/// A mass-scaled step.
+/// Long steps: with the lattice that suits, and with another.
 #[unsafe(no_mangle)]
-pub extern "C" fn scaled(
-    scene: &Scene<Exponential>,
-    state: &mut State,
-    storage: &mut Storage,
-    points: &[[f32; 3]; 100],
-    loads: &Loads<'_>,
-    seconds: f32,
-) -> f32 {
-    large(Method::MassScaled, scene, state, storage, points, loads, seconds)
-}
-
-/// Multilevel steps: with the lattice that suits, and with another.
-#[unsafe(no_mangle)]
-pub extern "C" fn multilevel(
+pub extern "C" fn long(
     scene: &Scene<Exponential>,
     state: &mut State,
     storage: &mut Storage,
@@ -221,22 +207,9 @@ pub extern "C" fn multilevel(
     cells: &[u32; 3],
     seconds: f32,
 ) -> f32 {
-    let [suggested, given] = [Cells::Suggested, Cells::Given(*cells)].map(Method::Multilevel);
+    let [suggested, given] = [Cells::Suggested, Cells::Given(*cells)].map(Method::new);
     large(suggested, scene, state, storage, points, loads, seconds)
         + large(given, scene, state, storage, points, loads, seconds)
-}
-
-/// A damped step.
-#[unsafe(no_mangle)]
-pub extern "C" fn damped(
-    scene: &Scene<Exponential>,
-    state: &mut State,
-    storage: &mut Storage,
-    points: &[[f32; 3]; 100],
-    loads: &Loads<'_>,
-    seconds: f32,
-) -> f32 {
-    large(Method::damped(Cells::Suggested), scene, state, storage, points, loads, seconds)
 }
 
 /// A weight file, a prediction, a lead-in and a learned step with fallback.

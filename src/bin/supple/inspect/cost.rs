@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use supple::element::{ElementTile, NodeInertia, PatchRow};
-use supple::inertia::{Cells, Grid, Method, vectors_for_lattice};
+use supple::inertia::{Cells, Method, vectors_for_lattice};
 use supple::loads::Loads;
 use supple::material::{Element, Moduli, VecMaterial};
 use supple::scene::{SceneView, tiles_for};
@@ -17,7 +17,6 @@ use crate::added_mass::describe_added;
 use crate::problem::Problem;
 use crate::run::start::{first_step, grid};
 use crate::scene::setup::Setup;
-use crate::scene::timing::method_name;
 use crate::screen::{output, row};
 
 /// Exact steps that are timed.
@@ -49,18 +48,30 @@ pub(crate) fn describe(setup: &Setup, accuracy: Option<f64>) -> Result<(), Probl
         let wanted = step.as_ref().map_or(bound.seconds, |step| step.seconds());
         row("real-time factor", real_time(wanted, seconds));
     }
-    let times = describe_beyond(setup, scene, &loads, bound)?;
-    doubling::predict_errors(setup, scene, &loads, bound)?;
+    let long = long_method(setup, scene)?;
+    let times = match &long {
+        Some(method) => {
+            let times = describe_beyond(method, setup, scene, &loads, bound)?;
+            doubling::predict_errors(method, setup, scene, &loads, bound)?;
+            Some(times)
+        }
+        None => {
+            row("long steps", "none: the mesh is too small for a lattice");
+            None
+        }
+    };
     if let Some(learned) = &setup.learned {
         learned_cost::describe(learned, setup, scene, &loads)?;
     }
     let step = step?;
-    if let Some(method) = &setup.time.method {
-        row("real-time factor", real_time(step.seconds(), times.of(method)));
+    if let (Some(times), true) = (&times, setup.time.method.is_some()) {
+        row("real-time factor", real_time(step.seconds(), times.long));
     }
-    match accuracy {
-        Some(accuracy) => doubling::recommend(setup, scene, &loads, bound, accuracy, &times),
-        None => Ok(()),
+    match (accuracy, &long, &times) {
+        (Some(accuracy), Some(method), Some(times)) => {
+            doubling::recommend(method, setup, scene, &loads, bound, accuracy, times)
+        }
+        _ => Ok(()),
     }
 }
 
@@ -122,68 +133,29 @@ fn describe_exact(
     Ok(seconds)
 }
 
+/// The method that long steps of the scene have, or would have. None if the mesh is too small for them.
+fn long_method(setup: &Setup, scene: SceneView<'_, VecMaterial>) -> Result<Option<Method<'static>>, Problem> {
+    if let Some(method) = &setup.time.method {
+        grid(setup, scene, method)?;
+        return Ok(Some(method.clone()));
+    }
+    let method = Method::new(Cells::Suggested);
+    let grid = method.grid(scene, &setup.body.local).map_err(Problem::of)?;
+    Ok((grid.functions > 0).then_some(method))
+}
+
 /// Prints what steps beyond the critical one need and do at rest.
 fn describe_beyond(
+    method: &Method<'static>,
     setup: &Setup,
     scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,
     bound: CriticalStep,
 ) -> Result<Times, Problem> {
-    output!("\nsteps beyond the limit");
-    let lattice = lattice(setup, scene)?;
-    let cells = match &setup.time.method {
-        Some(Method::Multilevel(cells) | Method::Damped(_, cells)) => *cells,
-        _ => Cells::Suggested,
-    };
-    let methods = [Method::MassScaled, Method::Multilevel(cells), Method::damped(cells)];
-    let kilobytes = |grid: Grid, damped: bool| {
-        1e-3 * (vectors_for_lattice(scene.element(), scene.node_count(), scene.element_count(), grid, damped)
-            * size_of::<NodeVector>()) as f64
-    };
-    row(
-        "memory of inertia",
-        format!(
-            "{:.1} kB damped, {:.1} kB multilevel, {:.1} kB mass-scaled, besides the above",
-            kilobytes(lattice, true),
-            kilobytes(lattice, false),
-            kilobytes(Grid::default(), false)
-        ),
-    );
-    let times = Times::measured(&methods, setup, scene, loads, bound)?;
-    for method in &methods {
-        let (seconds, exact) = (times.of(method), times.exact);
-        row(
-            &format!("{} step", method_name(Some(method))),
-            format!("{:.1} us, {:.2} times an exact one's {:.1} us", 1e6 * seconds, seconds / exact, 1e6 * exact),
-        );
-    }
-    let [mass_scaled, multilevel, damped] = &methods;
-    let method = match &setup.time.method {
-        Some(Method::MassScaled) => mass_scaled,
-        Some(Method::Damped(..)) => damped,
-        _ => multilevel,
-    };
-    for multiple in [10.0, 20.0, 50.0] {
-        let walker = Walker::new(method, setup, scene, multiple * bound.seconds)?;
-        row(
-            &format!("added mass at {multiple}x"),
-            format!("{}, {}", describe_added(walker.step.report()), method_name(Some(method))),
-        );
-    }
-    Ok(times)
-}
-
-/// Prints the lattice that suits the scene, and the one that its file gives. Gives the one that it has.
-fn lattice(setup: &Setup, scene: SceneView<'_, VecMaterial>) -> Result<Grid, Problem> {
-    let suggestion = match &setup.time.method {
-        Some(Method::Damped(damper, _)) => Method::Damped(damper.clone(), Cells::Suggested),
-        _ => Method::Multilevel(Cells::Suggested),
-    };
-    let suggested = suggestion.grid(scene, &setup.body.local).map_err(Problem::of)?;
-    let own = match &setup.time.method {
-        Some(method @ (Method::Multilevel(_) | Method::Damped(..))) => grid(setup, scene, method)?,
-        _ => suggested,
-    };
+    output!("\nlong steps");
+    let points = &setup.body.local;
+    let suggested = Method::new(Cells::Suggested).grid(scene, points).map_err(Problem::of)?;
+    let own = method.grid(scene, points).map_err(Problem::of)?;
     match suggested.functions {
         0 => row("lattice suggested", "none, too few elements"),
         _ => row("lattice suggested", suggested),
@@ -191,5 +163,15 @@ fn lattice(setup: &Setup, scene: SceneView<'_, VecMaterial>) -> Result<Grid, Pro
     if own != suggested {
         row("lattice of the scene", own);
     }
-    Ok(own)
+    let vectors = vectors_for_lattice(scene.element(), scene.node_count(), scene.element_count(), own);
+    let kilobytes = 1e-3 * (vectors * size_of::<NodeVector>()) as f64;
+    row("memory of inertia", format!("{kilobytes:.1} kB, besides the above"));
+    let times = Times::measured(method, setup, scene, loads, bound)?;
+    let Times { exact, long } = times;
+    row("long step", format!("{:.1} us, {:.2} times an exact one's {:.1} us", 1e6 * long, long / exact, 1e6 * exact));
+    for multiple in [10.0, 20.0, 50.0] {
+        let walker = Walker::new(method, setup, scene, multiple * bound.seconds)?;
+        row(&format!("added mass at {multiple}x"), describe_added(walker.step.report()));
+    }
+    Ok(times)
 }

@@ -5,7 +5,7 @@
 //! A body that hardly moves at any of the lengths passes as well, so the distance moved is printed too, and
 //! of a length that passes all shorter ones must pass as well.
 
-use supple::inertia::{Cells, Method};
+use supple::inertia::Method;
 use supple::loads::Loads;
 use supple::material::VecMaterial;
 use supple::scene::SceneView;
@@ -13,9 +13,7 @@ use supple::step::{CriticalStep, Divergence, Status};
 
 use super::times::{Times, Walker};
 use crate::problem::Problem;
-use crate::run::start::grid;
 use crate::scene::setup::Setup;
-use crate::scene::timing::method_name;
 use crate::screen::{output, row};
 
 /// Lengths that are tried, times the critical step.
@@ -50,6 +48,7 @@ enum Comparison {
 
 /// Prints the table of errors, and the longest step that keeps `accuracy` (mm).
 pub(crate) fn recommend(
+    method: &Method<'static>,
     setup: &Setup,
     scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,
@@ -57,21 +56,19 @@ pub(crate) fn recommend(
     accuracy: f64,
     times: &Times,
 ) -> Result<(), Problem> {
-    let method = judged(setup, scene)?;
-    let name = method_name(Some(&method));
     let span = (SHARE * setup.time.end).max(LEAST).min(setup.time.end);
-    output!("\n{name} steps, their error estimated by two of half their length, over the first {span:.3} s");
+    output!("\nlong steps, their error estimated by two of half their length, over the first {span:.3} s");
     output!("{:<21} {:>12} {:>14} {:>14} {:>17}", "step", "seconds", "estimate, mm", "moved, mm", "real-time factor");
     let mut longest = None;
     let mut unbroken = true;
     let mut rows = vec![];
     for multiple in MULTIPLES.into_iter().rev() {
         let seconds = multiple * bound.seconds;
-        let comparison = compare(setup, scene, loads, seconds, span, &method)?;
+        let comparison = compare(setup, scene, loads, seconds, span, method)?;
         let words = match &comparison {
             Comparison::Distance(Distance { error, moved }) => {
                 unbroken &= *error < accuracy;
-                let factor = f64::from(seconds) / times.of(&method);
+                let factor = f64::from(seconds) / times.long;
                 format!("{error:>14.4} {moved:>14.3} {factor:>17.3}")
             }
             Comparison::Diverged(divergence) => {
@@ -92,37 +89,25 @@ pub(crate) fn recommend(
     match longest {
         Some((multiple, error)) => row(
             "recommended",
-            format!("method = \"{name}\", step = \"{multiple}x\" (about {error:.3} mm off, {accuracy} mm allowed)"),
+            format!("method = \"long\", step = \"{multiple}x\" (about {error:.3} mm off, {accuracy} mm allowed)"),
         ),
-        None => row("recommended", format!("method = \"tled\": none of these {name} steps stays below {accuracy} mm")),
+        None => row("recommended", format!("method = \"exact\": none of these long steps stays below {accuracy} mm")),
     }
     Ok(())
-}
-
-/// The method that long steps of the scene would have, on its lattice.
-fn judged(setup: &Setup, scene: SceneView<'_, VecMaterial>) -> Result<Method<'static>, Problem> {
-    if let Some(method) = &setup.time.method {
-        grid(setup, scene, method)?;
-        return Ok(method.clone());
-    }
-    let multilevel = Method::Multilevel(Cells::Suggested);
-    let suggested = multilevel.grid(scene, &setup.body.local).map_err(Problem::of)?;
-    Ok(if suggested.functions == 0 { Method::MassScaled } else { multilevel })
 }
 
 /// Prints the errors that long steps will have at the worst moment of the whole scene. Step doubling at two lengths
 /// gives the order of convergence `p`: `|u_2D - u_D| = (2^p - 1) E(D)`, and `E` goes with `D^p`.
 pub(crate) fn predict_errors(
+    method: &Method<'static>,
     setup: &Setup,
     scene: SceneView<'_, VecMaterial>,
     loads: &Loads<'_>,
     bound: CriticalStep,
 ) -> Result<(), Problem> {
-    let method = judged(setup, scene)?;
-    let name = method_name(Some(&method));
     for longest in PILOTS {
         let pilot =
-            |multiple: f64| compare(setup, scene, loads, multiple as f32 * bound.seconds, setup.time.end, &method);
+            |multiple: f64| compare(setup, scene, loads, multiple as f32 * bound.seconds, setup.time.end, method);
         let Comparison::Distance(long) = pilot(longest)? else { continue };
         let Comparison::Distance(short) = pilot(0.5 * longest)? else { continue };
         let order = (long.error / short.error).log2();
@@ -132,11 +117,11 @@ pub(crate) fn predict_errors(
         let error = short.error / (order.exp2() - 1.0);
         let words =
             PREDICTED.map(|multiple| format!("{:.3} mm at {multiple}x", error * (multiple / shortest).powf(order)));
-        row("expected error", format!("{}, {name}", words.join(", ")));
+        row("expected error", words.join(", "));
         row("", format!("from pilots at {longest} to {shortest}x that moved {:.3} mm; order {order:.1}", short.moved));
         return Ok(());
     }
-    row("expected error", format!("not foretold: {name} pilots diverge or are longer than the scene"));
+    row("expected error", "not foretold: pilots diverge or are longer than the scene");
     Ok(())
 }
 

@@ -1,4 +1,4 @@
-//! Steps of one method and length from rest, and how long a step of each method takes.
+//! Long steps of one length from rest, and how long they and exact ones take.
 
 use std::time::Instant;
 
@@ -13,55 +13,38 @@ use supple::tled;
 use crate::problem::Problem;
 use crate::scene::setup::Setup;
 
-/// Steps of each method that are timed, and the length of those beyond the critical step in multiples of it.
+/// Steps of each kind that are timed, and the length of those beyond the critical step in multiples of it.
 const TIMED: usize = 50;
 const TIMED_MULTIPLE: f32 = 20.0;
 
 /// Median time of a step, s.
 pub(crate) struct Times {
     pub(crate) exact: f64,
-    mass_scaled: f64,
-    multilevel: f64,
-    damped: f64,
+    pub(crate) long: f64,
 }
 
 impl Times {
-    pub(crate) const fn of(&self, method: &Method<'_>) -> f64 {
-        match method {
-            Method::MassScaled => self.mass_scaled,
-            Method::Multilevel(_) => self.multilevel,
-            Method::Damped(..) => self.damped,
-        }
-    }
-
-    /// Times exact, mass-scaled, multilevel and damped steps from rest, in turn, so that what else the machine does
-    /// meets all of them.
+    /// Times exact and long steps from rest, in turn, so that what else the machine does meets both.
     pub(crate) fn measured(
-        methods: &[Method<'static>; 3],
+        method: &Method<'static>,
         setup: &Setup,
         scene: SceneView<'_, VecMaterial>,
         loads: &Loads<'_>,
         bound: CriticalStep,
     ) -> Result<Self, Problem> {
-        let seconds = TIMED_MULTIPLE * bound.seconds;
-        let mut walkers = vec![];
-        for method in methods {
-            walkers.push(Walker::new(method, setup, scene, seconds)?);
-        }
-        let exact = Step::unchecked(0.5 * bound.seconds, setup.damping).map_err(Problem::of)?;
+        let mut walker = Walker::new(method, setup, scene, TIMED_MULTIPLE * bound.seconds)?;
+        let step = Step::unchecked(0.5 * bound.seconds, setup.damping).map_err(Problem::of)?;
         let mut state = setup.state();
-        let mut spent = [(); 4].map(|()| vec![]);
+        let (mut exact, mut long) = (vec![], vec![]);
         for _ in 0..TIMED {
-            spent[0].push(timed(|| tled::step(&scene, loads, &mut state, &exact)));
-            for (walker, spent) in walkers.iter_mut().zip(&mut spent[1..]) {
-                spent.push(timed(|| walker.step(scene, loads)));
-            }
+            exact.push(timed(|| tled::step(&scene, loads, &mut state, &step)));
+            long.push(timed(|| walker.step(scene, loads)));
         }
-        let [exact, mass_scaled, multilevel, damped] = spent.map(|mut seconds| {
+        let [exact, long] = [exact, long].map(|mut seconds| {
             seconds.sort_by(f64::total_cmp);
             seconds[TIMED / 2]
         });
-        Ok(Self { exact, mass_scaled, multilevel, damped })
+        Ok(Self { exact, long })
     }
 }
 

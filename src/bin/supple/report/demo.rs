@@ -159,7 +159,7 @@ fn notes(case: &Compared) -> Vec<String> {
 
 /// What the words mean, for who has not read a page.
 const TERMS: [&str; 2] = [
-    "Exact steps (TLED) stay below the critical step. Damped ones are ten times as long as it: inertia is added where a step would be unstable, and given back to \
+    "Exact steps (TLED) stay below the critical step. Long ones are ten times as long as it: inertia is added where a step would be unstable, and given back to \
              smooth motion. The learned step is a network that predicts accelerations over 1.5 ms, seven times the critical step; it follows a lead-in of 0.3 s of exact ones, comes \
              with the crate, and learned from a twisted bar, not from this lobe.",
     "Errors are distances to the exact steps, mean over nodes and time; next to them stands the error of a lobe that never moves. The guard is a second run, which \
@@ -223,9 +223,9 @@ fn over_time(case: &Compared, exact: &[Shape]) -> Figure {
         let Some(outcome) = run.outcome() else { continue };
         let colour = COLOURS[index % COLOURS.len()];
         let times: Vec<f64> = outcome.frames.iter().map(|frame| frame.time).collect();
-        let errors = errors(exact, run.shapes());
-        curves
-            .push(Curve::new(format!("{}: error", run.name), times[..errors.len()].to_vec(), errors).coloured(colour));
+        // A run that ends early has one shape more, that of its end.
+        let (times, errors): (Vec<_>, Vec<_>) = times.into_iter().zip(errors(exact, run.shapes())).unzip();
+        curves.push(Curve::new(format!("{}: error", run.name), times, errors).coloured(colour));
         let estimated = outcome.frames.iter().filter_map(|frame| Some((frame.time, frame.estimate?)));
         let (at, estimates) = estimated.map(|(time, estimate)| (time, 1e3 * f64::from(estimate.mean))).unzip();
         curves

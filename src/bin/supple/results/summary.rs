@@ -207,7 +207,7 @@ fn add_reactions(summary: &mut Summary, reactions: &Reactions) {
     );
 }
 
-/// Mass-scaled, multilevel or damped steps.
+/// Steps beyond the critical one.
 fn large_section(method: &str, trace: &LargeTrace, outcome: &Outcome) -> Summary {
     let mut section = Summary::default();
     let multiple = outcome.steps.1 / outcome.at_rest.seconds;
@@ -216,15 +216,8 @@ fn large_section(method: &str, trace: &LargeTrace, outcome: &Outcome) -> Summary
         format!("{method}, steps of {multiple:.1} times the critical step at rest"),
         json!({ "step_s": decimal(outcome.steps.1), "step_over_critical_at_rest": decimal(multiple) }),
     );
-    let lattice = (trace.grid != Grid::default()).then_some(trace.grid);
-    section.add(
-        "lattice",
-        lattice.map(|grid| grid.to_string()),
-        json!({
-            "lattice_cells": lattice.map(|grid| grid.cells),
-            "lattice_functions": lattice.map(|grid| grid.functions),
-        }),
-    );
+    let Grid { cells, functions } = trace.grid;
+    section.add("lattice", trace.grid.to_string(), json!({ "lattice_cells": cells, "lattice_functions": functions }));
     section.add(
         "added mass",
         describe_added(&trace.report),
@@ -244,17 +237,15 @@ fn large_section(method: &str, trace: &LargeTrace, outcome: &Outcome) -> Summary
         words,
         json!({ "steps_held_back_share": share, "most_nodes_held_back": trace.most_held_back }),
     );
-    let coarse = lattice.map(|_| trace.least_coarse_share);
     section.add(
         "coarse motion",
-        coarse.map(|share| format!("used to {:.1} % or more", 100.0 * share)),
-        json!({ "coarse_share_least": coarse.map(decimal) }),
+        format!("used to {:.1} % or more", 100.0 * trace.least_coarse_share),
+        json!({ "coarse_share_least": decimal(trace.least_coarse_share) }),
     );
-    let damping = trace.is_damped.then_some(trace.most_damping);
     section.add(
         "rough motion",
-        damping.map(|share| format!("at most {:.1} % taken away in a step", 100.0 * share)),
-        json!({ "rough_motion_damped_largest": damping.map(decimal) }),
+        format!("at most {:.1} % taken away in a step", 100.0 * trace.most_damping),
+        json!({ "rough_motion_damped_largest": decimal(trace.most_damping) }),
     );
     section
 }

@@ -32,9 +32,7 @@ pub(crate) fn run<'a>(
     let time = &setup.time;
     let mut outcome = Outcome::new(at_rest, step.seconds());
     outcome.reactions = Reactions::new(setup.instruments.all.len(), time);
-    if let (Some(large), Some(method)) = (simulation.long_step(), &time.method) {
-        outcome.large = Some(LargeTrace::new(method, large.model()));
-    }
+    outcome.large = simulation.long_step().map(|large| LargeTrace::new(large.model()));
     outcome.learned = simulation.learned_step().map(LearnedTrace::new);
     if simulation.auto_step().is_some() {
         // They begin as exact ones.

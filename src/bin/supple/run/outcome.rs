@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use supple::adaptive::Taken;
 use supple::guard::Estimate;
-use supple::inertia::{self, Grid, LargeModel, Method};
+use supple::inertia::{self, Grid, LargeModel};
 use supple::learned::{Fallback, LearnedModel, LearnedReport};
 use supple::material::J_FLOOR;
 use supple::simulation::Report;
@@ -62,7 +62,7 @@ pub(crate) struct Outcome {
     pub(crate) divergence: Option<Divergence>,
     /// The first frame at which a fixed step was above the bound, s.
     pub(crate) above_from: Option<f64>,
-    /// With a mass-scaled, multilevel or damped step.
+    /// With steps beyond the critical one.
     pub(crate) large: Option<LargeTrace>,
     /// With a network.
     pub(crate) learned: Option<LearnedTrace>,
@@ -148,11 +148,10 @@ impl Outcome {
     }
 }
 
-/// What mass-scaled, multilevel or damped steps did.
+/// What steps beyond the critical one did.
 #[derive(Clone, Copy)]
 pub(crate) struct LargeTrace {
     pub(crate) grid: Grid,
-    pub(crate) is_damped: bool,
     /// After the latest step.
     pub(crate) report: inertia::Report,
     /// Steps in which nodes were held back, and the most nodes at once.
@@ -164,10 +163,9 @@ pub(crate) struct LargeTrace {
 }
 
 impl LargeTrace {
-    pub(crate) const fn new(method: &Method<'_>, model: &LargeModel<'_>) -> Self {
+    pub(crate) const fn new(model: &LargeModel<'_>) -> Self {
         Self {
             grid: model.grid(),
-            is_damped: matches!(method, Method::Damped(..)),
             report: *model.report(),
             steps_held_back: 0,
             most_held_back: 0,

@@ -1,6 +1,6 @@
 //! A simulation at rest: what moves the scene, and the length of its steps. All that can be refused is refused here.
 
-use supple::inertia::{Cells, Grid, Method};
+use supple::inertia::{Grid, Method};
 use supple::material::VecMaterial;
 use supple::scene::SceneView;
 use supple::simulation::{self, LONGEST_STEPS, Settings, Simulation};
@@ -54,11 +54,9 @@ pub(crate) fn grid(setup: &Setup, scene: SceneView<'_, VecMaterial>, method: &Me
         let place = setup.time.lattice_at.as_ref().unwrap_or(&setup.body.name);
         Problem(format!("{place}: {error}"))
     })?;
-    let suggested = matches!(method, Method::Multilevel(Cells::Suggested) | Method::Damped(_, Cells::Suggested));
-    if suggested && grid.functions == 0 {
+    if grid.functions == 0 {
         return Err(Problem(format!(
-            "{}: with {} elements the mesh is too small for a lattice to pay; give lattice = [1, 1, 1] under \
-             [time], or method = \"mass-scaled\"",
+            "{}: with {} elements the mesh is too small for long steps; write method = \"exact\" under [time]",
             setup.body.name,
             scene.element_count()
         )));
@@ -90,7 +88,7 @@ pub(crate) fn first_step(setup: &Setup, at_rest: CriticalStep, unchecked: bool) 
     };
     let step = step.map_err(|error| {
         let advice = if is_exact {
-            "; shorten it, write step = \"auto\", unchecked with --unchecked, or go beyond with method = \"multilevel\""
+            "; shorten it, write step = \"auto\", unchecked with --unchecked, or go beyond with method = \"long\""
         } else {
             ""
         };

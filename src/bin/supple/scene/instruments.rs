@@ -94,11 +94,8 @@ impl SceneInstruments {
         if let Some(at) = tables.get(MOST_INSTRUMENTS) {
             return Err(file.problem(at, format!("at most {MOST_INSTRUMENTS} instruments can touch a body")));
         }
-        let method = file.scene.time.get_ref().method.as_ref();
-        if method.is_some_and(|method| method.get_ref() == "mass-scaled") || file.scene.learned.is_some() {
-            return Err(
-                file.problem(first, "mass-scaled and learned steps cannot meet instruments; method = \"damped\" can")
-            );
+        if file.scene.learned.is_some() {
+            return Err(file.problem(first, "learned steps cannot meet instruments; method = \"long\" can"));
         }
         let all = tables.iter().map(|at| MovedInstrument::read(file, at, body)).collect::<Result<_, _>>()?;
         Ok(Self::new(all, body))

@@ -62,6 +62,7 @@ impl Setup {
         let element = read_element(file, learned.as_ref())?;
         let of_the_network = learned.as_ref().filter(|_| scene.mesh.get_ref().element.is_none());
         warnings.extend(locking(&file.place(&scene.mesh), of_the_network, element, &tissues));
+        warnings.extend(time.old_name.clone());
         if let Some(learned) = &learned {
             warnings.extend(learned.warning(&tissues, element)?);
         }

@@ -21,8 +21,10 @@ const MOST_FRAMES: u32 = 1_000_000;
 
 /// What `[time]` asks for.
 pub struct Timing {
-    /// None is the exact step.
+    /// Of steps beyond the critical one; none is the exact step.
     pub(crate) method: Option<Method<'static>>,
+    /// A method by a name that it had once, and what to write.
+    pub(crate) old_name: Option<String>,
     pub step: StepChoice,
     /// Whether steps choose their length, up to `step`.
     pub(crate) is_adaptive: bool,
@@ -40,31 +42,27 @@ pub struct Timing {
 impl Timing {
     pub(crate) fn read(file: &SceneFile) -> Result<Self, Problem> {
         let time = file.scene.time.get_ref();
-        let (method, names_auto) = read_method(file, time)?;
+        let ReadMethod { method, is_auto: names_auto, old_name } = read_method(file, time)?;
         let tolerance = read_tolerance(file, time, method.as_ref())?;
         let is_auto = match &time.step {
             Some(at) => matches!(at.get_ref(), StepLength::Named(name) if name == "auto"),
             None => true,
         };
-        let has_lattice = matches!(method, Some(Method::Multilevel(_) | Method::Damped(..)));
-        let is_adaptive = names_auto || (has_lattice && tolerance.is_some() && is_auto);
+        let is_adaptive = names_auto || (method.is_some() && tolerance.is_some() && is_auto);
         let step = match &time.step {
             Some(at) => read_step(file, at, method.as_ref().filter(|_| !is_adaptive))?,
             None if is_adaptive || method.is_none() => StepChoice::Auto,
             None => {
-                let name = method_name(method.as_ref());
                 return Err(file.problem(
                     &file.scene.time,
-                    format!(
-                        "step is missing: method \"{name}\" needs seconds, or a multiple of the critical step, as in \"20x\"; \
-                         method = \"auto\" chooses its own"
-                    ),
+                    "step is missing: method \"long\" needs seconds, or a multiple of the critical step, as in \"20x\"; \
+                     method = \"auto\" chooses its own",
                 ));
             }
         };
-        let method = match (method, &time.lattice) {
-            (method, Some(at)) => Some(with_lattice(file, at, method)?),
-            (method, None) => method,
+        let method = match &time.lattice {
+            Some(at) => Some(with_lattice(file, at, method.as_ref())?),
+            None => method,
         };
         let end = *time.end.get_ref();
         if !(end.is_finite() && end > 0.0) {
@@ -79,7 +77,7 @@ impl Timing {
         }
         let lattice_at = time.lattice.as_ref().map(|at| file.place(at));
         let step_at = time.step.as_ref().map_or_else(|| file.place(&file.scene.time), |at| file.place(at));
-        let timing = Self { method, step, is_adaptive, tolerance, step_at, lattice_at, end, frames };
+        let timing = Self { method, old_name, step, is_adaptive, tolerance, step_at, lattice_at, end, frames };
         if let StepChoice::Seconds(seconds) = step {
             timing.check_length(seconds)?;
         }
@@ -90,6 +88,7 @@ impl Timing {
     pub(crate) fn of_demo() -> Self {
         Self {
             method: None,
+            old_name: None,
             step: StepChoice::Auto,
             is_adaptive: false,
             tolerance: None,
@@ -117,34 +116,34 @@ impl Timing {
 /// The name of a method in scene files; none is the exact step.
 pub(crate) const fn method_name(method: Option<&Method<'_>>) -> &'static str {
     match method {
-        None => "tled",
-        Some(Method::MassScaled) => "mass-scaled",
-        Some(Method::Multilevel(_)) => "multilevel",
-        Some(Method::Damped(..)) => "damped",
+        None => "exact",
+        Some(_) => "long",
     }
 }
 
-/// The method, and whether it is "auto".
-fn read_method(file: &SceneFile, time: &TimeTable) -> Result<(Option<Method<'static>>, bool), Problem> {
-    let Some(at) = &time.method else {
-        return Ok((None, false));
-    };
-    let fixed = match at.get_ref().as_str() {
-        "auto" => return Ok((Some(Method::damped(Cells::Suggested)), true)),
-        "tled" | "exact" => None,
-        "mass-scaled" => Some(Method::MassScaled),
-        "multilevel" => Some(Method::Multilevel(Cells::Suggested)),
-        "damped" => Some(Method::damped(Cells::Suggested)),
-        name => {
-            return Err(file.problem(
-                at,
-                format!(
-                    "method \"{name}\" is not known; \"tled\", \"mass-scaled\", \"multilevel\", \"damped\" and \"auto\" are"
-                ),
-            ));
+#[derive(Default)]
+struct ReadMethod {
+    method: Option<Method<'static>>,
+    is_auto: bool,
+    old_name: Option<String>,
+}
+
+fn read_method(file: &SceneFile, time: &TimeTable) -> Result<ReadMethod, Problem> {
+    let Some(at) = &time.method else { return Ok(ReadMethod::default()) };
+    let name = at.get_ref().as_str();
+    let (method, now) = match name {
+        "exact" | "tled" => (None, "exact"),
+        "auto" => (Some(Method::new(Cells::Suggested)), "auto"),
+        "long" | "damped" | "multilevel" | "mass-scaled" => (Some(Method::new(Cells::Suggested)), "long"),
+        _ => {
+            let text = format!(
+                "method \"{name}\" is not known; \"exact\", \"long\" and \"auto\" are, and [learned] for a network"
+            );
+            return Err(file.problem(at, text));
         }
     };
-    Ok((fixed, false))
+    let remark = || file.problem(at, format!("method \"{name}\" is now \"{now}\": write method = \"{now}\"")).0;
+    Ok(ReadMethod { method, is_auto: now == "auto", old_name: (name != now).then(remark) })
 }
 
 fn read_tolerance(file: &SceneFile, time: &TimeTable, method: Option<&Method<'_>>) -> Result<Option<f32>, Problem> {
@@ -196,24 +195,15 @@ fn read_step(file: &SceneFile, at: &Spanned<StepLength>, method: Option<&Method<
 fn with_lattice(
     file: &SceneFile,
     at: &Spanned<[u32; 3]>,
-    method: Option<Method<'static>>,
+    method: Option<&Method<'static>>,
 ) -> Result<Method<'static>, Problem> {
     let cells = *at.get_ref();
-    let given = match method {
-        Some(Method::Multilevel(_)) => Method::Multilevel(Cells::Given(cells)),
-        Some(Method::Damped(damper, _)) => Method::Damped(damper, Cells::Given(cells)),
-        without => {
-            return Err(file.problem(
-                at,
-                format!(
-                    "lattice is {cells:?}, but method \"{}\" has none; \"multilevel\" and \"damped\" have",
-                    method_name(without.as_ref())
-                ),
-            ));
-        }
-    };
+    if method.is_none() {
+        let text = format!("lattice is {cells:?}, but method \"exact\" has none; \"long\" and \"auto\" have");
+        return Err(file.problem(at, text));
+    }
     if cells.contains(&0) {
         return Err(file.problem(at, format!("lattice is {cells:?}; give at least 1 cell along each axis")));
     }
-    Ok(given)
+    Ok(Method::new(Cells::Given(cells)))
 }

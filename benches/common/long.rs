@@ -1,4 +1,4 @@
-//! Mass-scaled, multilevel and damped steps on the paper's bar.
+//! Long steps on the paper's bar.
 
 use supple::guard::Guard;
 use supple::inertia::{Cells, LargeStep, Method};
@@ -9,26 +9,17 @@ use supple::step::Step;
 
 use super::bar::{BarScene, DAMPING, DT, moved};
 
-pub(crate) fn multilevel() -> Method<'static> {
-    Method::Multilevel(Cells::Given([2, 2, 4]))
-}
+/// Steps that are timed together: many enough for several renewals of the lattice's inertia.
+pub(crate) const RUN: u32 = 256;
 
-pub(crate) fn damped() -> Method<'static> {
-    Method::damped(Cells::Given([2, 2, 5]))
-}
-
-/// Steps of a refresh cycle with a lattice, a multiple of those without one.
-pub(crate) const CYCLE: u32 = 256;
-
-/// A step of this method, from a state that it has deformed for two refresh cycles, eight without a lattice.
-pub(crate) fn scaled<'a>(
+/// A step of so many times the exact one, from a state that it has deformed for some time.
+pub(crate) fn long<'a>(
     scene: &'a BarScene<Exponential>,
     loads: &'a Loads<'a>,
     points: &[[f32; 3]],
     multiple: f32,
-    method: Method<'static>,
 ) -> impl FnMut() + use<'a> {
-    guarded(scene, loads, points, multiple, method, None)
+    guarded(scene, loads, points, multiple, None)
 }
 
 /// The same with a guard whose second run takes one step in `every`, if any.
@@ -37,14 +28,13 @@ pub(crate) fn guarded<'a>(
     loads: &'a Loads<'a>,
     points: &[[f32; 3]],
     multiple: f32,
-    method: Method<'static>,
     every: Option<u32>,
 ) -> impl FnMut() + use<'a> {
     let mut state = VecState::at_rest(points.len());
     let step = Step::unchecked(multiple * DT, DAMPING).expect("a positive step");
+    let method = Method::new(Cells::Given([2, 2, 5]));
     let mut large =
         LargeStep::prepare_in_vec(method, scene.view(), points, state.view(), step).expect("the bar can be prepared");
-    assert!(CYCLE.is_multiple_of(large.model().cycle()), "the steps below are no whole cycles");
     let mut guard = every.map(|every| {
         Guard::prepare_in_vec(scene.view(), points, state.view(), step, every).expect("a guard of the bar")
     });
@@ -55,6 +45,6 @@ pub(crate) fn guarded<'a>(
             None => status,
         });
     };
-    (0..2 * CYCLE).for_each(|_| run());
+    (0..2 * RUN).for_each(|_| run());
     run
 }
