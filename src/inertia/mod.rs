@@ -50,7 +50,7 @@
 //! - Where tissue stiffens within a step, `S` is too soft for that step. A linear bound does not cover a step that is
 //!   large compared with the range of the law. So the forces of one step may move a node, relative to the lattice, by at
 //!   most a fiftieth of the least height of its elements ([`Report::held_back`]), and strain a cell of the lattice by at
-//!   most a tenth, a fifth with nodal strain; where velocities strain it by more than a fifth in a step they are damped
+//!   most a tenth, a fifth with nodal strain, less in short steps; where velocities strain it by more than a fifth in a step they are damped
 //!   ([`Report::coarse_share`]). With a law that becomes a hundred times as stiff in a step, a few runs in a hundred on
 //!   wild meshes are refused all the same (`tests/large_steps/wild.rs`).
 //! - Where inertia grows while velocities are kept, `1/2 v^T S v` grows as well. So where only a share of the lattice's
@@ -119,6 +119,10 @@ const COARSE_GROWTH: f32 = 1.1;
 const LARGEST_MOVE: f32 = 0.02;
 /// Largest strain of a cell of the lattice by which the forces of one step may move it from rest.
 const LARGEST_STRAIN: f32 = 0.1;
+/// Of steps that add less than so many masses it is less, as their length is: in a short step only a body that goes wrong
+/// is strained as much. Not below this share.
+const ADDED_AT_LARGEST_STRAIN: f32 = 2500.0;
+const LEAST_STRAIN_SHARE: f32 = 0.1;
 /// The same with nodal strain, whose critical step is half as long again: strains of a step grow with its square.
 const LARGEST_STRAIN_OF_PATCHES: f32 = 0.2;
 /// Largest strain of a cell in one step that the velocities may go on with.

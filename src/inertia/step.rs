@@ -28,7 +28,7 @@ use super::pass_input::{PassInput, ResidualFactors};
 use super::renewal::RenewalInput;
 use super::report::HeldBack;
 use super::supports::MovingSupports;
-use super::{LARGEST_STRAIN, LARGEST_STRAIN_OF_PATCHES};
+use super::{ADDED_AT_LARGEST_STRAIN, LARGEST_STRAIN, LARGEST_STRAIN_OF_PATCHES, LEAST_STRAIN_SHARE};
 
 /// A step is [`Status::Limited`] if more than this share of the inverse inertia of all nodes is not used, or less than
 /// this share of the lattice's motion is used.
@@ -256,7 +256,8 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             has_part,
             supports: supports.as_ref(),
             allowed: progress.energy_balance.allowed_share(),
-            largest_strain: if scene.element().is_nodal_strain() { LARGEST_STRAIN_OF_PATCHES } else { LARGEST_STRAIN },
+            largest_strain: strain_share(renewal.added.mean)
+                * if scene.element().is_nodal_strain() { LARGEST_STRAIN_OF_PATCHES } else { LARGEST_STRAIN },
         };
         let MotionResult { share, work } =
             coarse.compute(motion, part, scratch.each_mut().map(|vectors| &mut **vectors));
@@ -294,6 +295,11 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
 /// Largest ratio of a vector of the smooth motion to the largest increment. It may exceed one, because lattice points
 /// may lie outside the body.
 const LARGEST_SMOOTH: f32 = 10.0;
+
+/// Share of the largest strain of a step that adds so many masses, which grow with the square of its length.
+fn strain_share(added: f32) -> f32 {
+    libm::sqrtf(added / ADDED_AT_LARGEST_STRAIN).clamp(LEAST_STRAIN_SHARE, 1.0)
+}
 
 /// Writes the lattice's part `c = Mc^-1 W^T m du` of the increments. Turns the cells' sums of momentum into the smooth
 /// part of the increments, of which `largest` is the largest component, `W` times that. To remove a share of the rest
