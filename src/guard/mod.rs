@@ -45,8 +45,6 @@ pub const EVERY: u32 = 3;
 pub const EVERY_LEARNED: u32 = 1;
 /// The estimate over the distance of the two runs.
 pub const ESTIMATE: f32 = 2.0;
-/// The same where the second run's steps are at least [`EVERY`] times as long: its own error is larger.
-pub const ESTIMATE_OF_LONG: f32 = 1.5;
 
 /// Lengths of its steps by which the second run may be behind the first.
 const MOST_BEHIND: f64 = 2.0;
@@ -168,8 +166,7 @@ impl Watch {
             }
         };
         let seen = Some(state.progress.mark());
-        let factor = if every < EVERY { ESTIMATE } else { ESTIMATE_OF_LONG };
-        let envelope = Envelope::new(points, factor);
+        let envelope = Envelope::new(points, ESTIMATE);
         Ok((second, Self { progress, nodes, longest: longest.seconds(), interval: 0.0, seen, envelope }))
     }
 
