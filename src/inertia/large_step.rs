@@ -85,7 +85,7 @@ impl<'a> Storage<'a> {
 
 impl<'w> LargeModel<'w> {
     /// Computes the inertia for `step` from the present state, for a scene with these `points` (m) at rest. It takes as
-    /// long as some ten steps. `storage` of [`super::vectors_for`] vectors is
+    /// long as some hundreds of exact steps. `storage` of [`super::vectors_for`] vectors is
     /// overwritten.
     pub fn prepare<M: ElementMaterial>(
         method: Method<'w>,
