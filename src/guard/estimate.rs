@@ -2,6 +2,7 @@
 //! other, an error does not; so the estimate follows a larger distance at once, and forgets it by half in a fifth of a
 //! second. Between two comparisons it goes on growing as it grew between the two before.
 
+use super::ESTIMATE;
 use super::compare::{Comparison, finite};
 use crate::inertia::size_of;
 use crate::step::Status;
@@ -49,8 +50,6 @@ pub struct Estimate {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Envelope {
     pub(super) allowed: Allowed,
-    /// The estimate over the distance of the runs.
-    factor: f32,
     /// Errors below do not count, m.
     least: f32,
     /// Largest mean motion so far, m.
@@ -70,13 +69,12 @@ pub(super) struct Envelope {
 }
 
 impl Envelope {
-    /// For a body with these points at rest (m), where the estimate is this multiple of the distance.
-    pub(super) fn new(points: &[[f32; 3]], factor: f32) -> Self {
+    /// For a body with these points at rest, m.
+    pub(super) fn new(points: &[[f32; 3]]) -> Self {
         let square: f32 = size_of(points).iter().map(|side| side * side).sum();
         let least = LEAST.min(SHARE_OF_SIZE * libm::sqrtf(square));
         Self {
             allowed: Allowed::default(),
-            factor,
             least,
             motion: 0.0,
             floor: 0.0,
@@ -152,9 +150,9 @@ impl Envelope {
 
     pub(super) fn estimate(&self) -> Option<Estimate> {
         let Comparison { mean, largest, node, .. } = self.held?;
-        let apart = self.factor * mean;
+        let apart = ESTIMATE * mean;
         let [mean, largest] = [(mean, self.growth[0]), (largest, self.growth[1])]
-            .map(|(held, growth)| finite(self.factor * (held + growth * self.waited).max(self.floor)));
+            .map(|(held, growth)| finite(ESTIMATE * (held + growth * self.waited).max(self.floor)));
         Some(Estimate { mean, largest, node, allowed: self.allowed(apart) })
     }
 
@@ -189,31 +187,29 @@ pub(crate) fn judged(taken: Status, error: f32, allowed: f32) -> Status {
 mod tests {
     use super::*;
 
-    const FACTOR: f32 = 2.0;
-
     fn distance(mean: f32) -> Comparison {
         Comparison { mean, largest: 2.0 * mean, node: 3, motion: 0.05 }
     }
 
     /// Of a body of 5 cm, after the first comparisons.
     fn later() -> Envelope {
-        Envelope { comparisons: FIRST_COMPARISONS, ..Envelope::new(&[[0.0; 3], [0.03, 0.04, 0.0]], FACTOR) }
+        Envelope { comparisons: FIRST_COMPARISONS, ..Envelope::new(&[[0.0; 3], [0.03, 0.04, 0.0]]) }
     }
 
     #[test]
     fn at_first_the_error_may_be_the_whole_motion() {
-        let mut envelope = Envelope::new(&[[0.0; 3], [0.03, 0.04, 0.0]], FACTOR);
+        let mut envelope = Envelope::new(&[[0.0; 3], [0.03, 0.04, 0.0]]);
         assert_eq!(envelope.estimate(), None);
         for _ in 0..FIRST_COMPARISONS {
             envelope.add(&distance(0.001), 1e-3);
             envelope.wait(5e-4);
             let Estimate { mean, largest, .. } = envelope.estimate().unwrap();
-            assert_eq!([mean, largest], [FACTOR * 0.05; 2]);
+            assert_eq!([mean, largest], [ESTIMATE * 0.05; 2]);
         }
         // It is not held, and does not count as growth.
         envelope.add(&distance(0.001), 1e-3);
         envelope.wait(1e-3);
-        assert_eq!(envelope.estimate().unwrap().mean, FACTOR * 0.001);
+        assert_eq!(envelope.estimate().unwrap().mean, ESTIMATE * 0.001);
     }
 
     #[test]
@@ -221,7 +217,7 @@ mod tests {
         let distances = [0.0, 1e-3, f32::MIN_POSITIVE, f32::MAX, f32::INFINITY, f32::NAN];
         for (first, second) in distances.into_iter().flat_map(|first| distances.map(|second| (first, second))) {
             for (seconds, waited) in [(0.0, -1.0), (1e-30, 0.0), (1e-3, 1e-3), (1e30, 1e30)] {
-                for mut envelope in [later(), Envelope::new(&[[0.0; 3], [0.1; 3]], FACTOR)] {
+                for mut envelope in [later(), Envelope::new(&[[0.0; 3], [0.1; 3]])] {
                     envelope.add(&distance(first), seconds);
                     envelope.add(&distance(second), seconds);
                     envelope.wait(waited);
@@ -240,16 +236,16 @@ mod tests {
         envelope.add(&distance(0.004), 0.01);
         envelope.add(&distance(0.0), HALF_LIFE);
         let Estimate { mean, largest, .. } = envelope.estimate().unwrap();
-        assert!((mean - FACTOR * 0.002).abs() < 1e-8 && (largest - FACTOR * 0.004).abs() < 1e-8);
+        assert!((mean - ESTIMATE * 0.002).abs() < 1e-8 && (largest - ESTIMATE * 0.004).abs() < 1e-8);
         envelope.add(&distance(0.006), HALF_LIFE);
-        assert_eq!(envelope.estimate().unwrap().mean, FACTOR * 0.006);
+        assert_eq!(envelope.estimate().unwrap().mean, ESTIMATE * 0.006);
     }
 
     #[test]
     fn a_step_is_inexact_above_a_share_of_the_motion_or_above_the_tolerance() {
         let mut envelope = later();
         assert_eq!(envelope.judge(Status::Ok), Status::Ok);
-        envelope.add(&distance(0.2 * 0.05 / FACTOR * 0.99), 0.01);
+        envelope.add(&distance(0.2 * 0.05 / ESTIMATE * 0.99), 0.01);
         assert_eq!(envelope.judge(Status::Ok), Status::Ok);
         envelope.allowed = Allowed::Metres(0.001);
         let Status::Inexact { error, allowed } = envelope.judge(Status::Ok) else { panic!() };
@@ -298,6 +294,6 @@ mod tests {
         let mut envelope = later();
         envelope.add(&distance(0.001), 0.01);
         envelope.lose(0.01);
-        assert_eq!(envelope.estimate().unwrap().mean, FACTOR * 0.05);
+        assert_eq!(envelope.estimate().unwrap().mean, ESTIMATE * 0.05);
     }
 }

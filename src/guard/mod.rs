@@ -166,7 +166,7 @@ impl Watch {
             }
         };
         let seen = Some(state.progress.mark());
-        let envelope = Envelope::new(points, ESTIMATE);
+        let envelope = Envelope::new(points);
         Ok((second, Self { progress, nodes, longest: longest.seconds(), interval: 0.0, seen, envelope }))
     }
 
