@@ -145,7 +145,7 @@ pub(super) fn clusters_of(all: &[Cluster], head: u32) -> impl Iterator<Item = (u
 }
 
 /// How the nodes of a piece are held.
-#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+#[derive(Clone, Copy, Debug, Eq, Ord, PartialEq, PartialOrd)]
 enum Hold {
     Nowhere,
     /// Some are held along all axes.
@@ -288,41 +288,42 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
     pub(super) fn gradients(&self, piece: &Piece<'_>, cell: usize) -> FunctionGradients {
         let mut gradients = [[[0.0; 3]; 8]; 3];
         for (node, gradient) in piece.nodes().into_iter().zip(piece.gradients()) {
-            let place = node_place(self.places, node).copied().unwrap_or_default();
-            let weights = eight_weights(self.lattice.within(cell, &place));
-            let free = self.scene.inertia.get(node).map_or([0.0; 3], |inertia| inertia.free().truncate().to_array());
-            for (gradients, free) in gradients.iter_mut().zip(free) {
-                for (sum, weight) in gradients.iter_mut().zip(weights) {
-                    sum.iter_mut().zip(gradient).for_each(|(sum, along)| *sum += free * weight * along);
-                }
-            }
+            self.add_gradient(&mut gradients, cell, node, gradient);
         }
         gradients
     }
 
-    fn hold(&self, nodes: &[usize]) -> Hold {
-        if self.is_merged {
-            return Hold::Partly;
-        }
-        let mut hold = Hold::Nowhere;
-        for &node in nodes {
-            match self.scene.inertia.get(node).map_or(0, NodeInertia::held_count) {
-                0 => {}
-                3 if hold == Hold::Partly => {}
-                3 => hold = Hold::Fully,
-                _ => hold = Hold::Partly,
+    /// Adds what a node with this gradient in a piece, 1/m, brings to the gradients of a cell's functions.
+    fn add_gradient(&self, gradients: &mut FunctionGradients, cell: usize, node: usize, gradient: [f32; 3]) {
+        let place = node_place(self.places, node).copied().unwrap_or_default();
+        let weights = eight_weights(self.lattice.within(cell, &place));
+        let free = self.scene.inertia.get(node).map_or([0.0; 3], |inertia| inertia.free().truncate().to_array());
+        for (gradients, free) in gradients.iter_mut().zip(free) {
+            for (sum, weight) in gradients.iter_mut().zip(weights) {
+                sum.iter_mut().zip(gradient).for_each(|(sum, along)| *sum += free * weight * along);
             }
         }
+    }
+
+    /// How the nodes of an element, or those that a patch calls with, are held.
+    fn hold(&self, each_node: impl FnOnce(&mut dyn FnMut(usize))) -> Hold {
+        let mut hold = if self.is_merged { Hold::Partly } else { Hold::Nowhere };
+        each_node(&mut |node| {
+            hold = hold.max(match self.scene.inertia.get(node).map_or(0, NodeInertia::held_count) {
+                0 => Hold::Nowhere,
+                3 => Hold::Fully,
+                _ => Hold::Partly,
+            });
+        });
         hold
     }
 
+    fn hold_of(&self, piece: &Piece<'_>) -> Hold {
+        self.hold(|with| piece.nodes().into_iter().for_each(with))
+    }
+
     fn hold_of_patch(&self, tile: &PatchTile, lane: usize) -> Hold {
-        let mut hold = if self.is_merged { Hold::Partly } else { Hold::Nowhere };
-        tile.each_gradient(self.scene.patches.neighbours_of(tile), lane, |node, _| match (self.hold(&[node]), hold) {
-            (Hold::Nowhere, _) | (Hold::Fully, Hold::Partly) => {}
-            (other, _) => hold = other,
-        });
-        hold
+        self.hold(|with| tile.each_gradient(self.scene.patches.neighbours_of(tile), lane, |node, _| with(node)))
     }
 
     /// `G` of a patch.
@@ -331,14 +332,7 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
         let inverse = 1.0 / tile.volume(lane);
         tile.each_gradient(self.scene.patches.neighbours_of(tile), lane, |node, gradient| {
             let gradient = (inverse * gradient).as_vec3().to_array();
-            let place = node_place(self.places, node).copied().unwrap_or_default();
-            let weights = eight_weights(self.lattice.within(cell, &place));
-            let free = self.scene.inertia.get(node).map_or([0.0; 3], |inertia| inertia.free().truncate().to_array());
-            for (gradients, free) in gradients.iter_mut().zip(free) {
-                for (sum, weight) in gradients.iter_mut().zip(weights) {
-                    sum.iter_mut().zip(gradient).for_each(|(sum, along)| *sum += free * weight * along);
-                }
-            }
+            self.add_gradient(&mut gradients, cell, node, gradient);
         });
         gradients
     }
@@ -385,7 +379,7 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
             let index = match self.find(&piece, cell, clusters.all, clusters.heads) {
                 Some(index) => index,
                 None => {
-                    let (tissue, hold) = (self.tissue(piece.element()), self.hold(&piece.nodes()) as u8);
+                    let (tissue, hold) = (self.tissue(piece.element()), self.hold_of(&piece) as u8);
                     let head = clusters.heads.get_mut(cell)?;
                     let cell = cell as u32;
                     *clusters.all.get_mut(count)? = Cluster { cell, tissue, hold, next: *head, ..Cluster::default() };
@@ -538,7 +532,7 @@ impl<M: ElementMaterial> ClusterInput<'_, M> {
 
     /// The cluster of an element in a cell.
     pub(super) fn find(&self, piece: &Piece<'_>, cell: usize, all: &[Cluster], heads: &[u32]) -> Option<usize> {
-        let (tissue, hold) = (self.tissue(piece.element()), self.hold(&piece.nodes()) as u8);
+        let (tissue, hold) = (self.tissue(piece.element()), self.hold_of(piece) as u8);
         let mut of_cell = clusters_of(all, heads.get(cell).copied()?);
         of_cell.find(|(_, cluster)| cluster.tissue == tissue && cluster.hold == hold).map(|(index, _)| index)
     }

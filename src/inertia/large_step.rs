@@ -24,7 +24,6 @@ use super::node::{Scaling, half_damping};
 use super::node_tables::NodeTables;
 use super::renewal::{Renewal, RenewalInput};
 use super::rest_check::{FEWEST, MOST_RATIO, RestCheck, longer_step, stiffening};
-
 use super::{COARSE, FINE, InertiaError, LARGEST_MOVE, Report, node_tables};
 
 /// A prepared step without its storage; it may be moved in memory.
@@ -85,8 +84,7 @@ impl<'a> Storage<'a> {
 
 impl<'w> LargeModel<'w> {
     /// Computes the inertia for `step` from the present state, for a scene with these `points` (m) at rest. It takes as
-    /// long as some hundreds of exact steps. `storage` of [`super::vectors_for`] vectors is
-    /// overwritten.
+    /// long as some hundreds of exact steps. `storage` of [`super::vectors_for`] vectors is overwritten.
     pub fn prepare<M: ElementMaterial>(
         method: Method<'w>,
         scene: SceneView<'_, M>,
@@ -209,11 +207,10 @@ impl<'w> LargeModel<'w> {
             return singular;
         }
         matrices.frames.choose(lattice, points);
-        let (mut scaling, mut longer) = (self.scaling, None);
+        self.stiffening = [1.0; 2];
+        let mut compared = self.step;
         for index in 0..self.stiffening.len() {
-            if let Some(step) = longer {
-                scaling = scaling_of(step, 1.0);
-            }
+            let scaling = scaling_of(compared, 1.0);
             let rest = core::mem::take(&mut tables.more_scratch);
             rest.fill(NodeVector::ZERO);
             let input = RenewalInput { scene, displacement: rest, volume, lattice, places, scaling: &scaling };
@@ -231,10 +228,8 @@ impl<'w> LargeModel<'w> {
                 .iter_mut()
                 .skip(index)
                 .for_each(|each| *each = each.max(stiffening(ratio, self.renewal.sensitivity)));
-            longer = longer_step(self.step, self.renewal.added.mean);
-            if longer.is_none() {
-                break;
-            }
+            let Some(longer) = longer_step(self.step, self.renewal.added.mean) else { break };
+            compared = longer;
         }
         self.scaling = scaling_of(self.step, self.stiffening[0]);
         self.moment = progress.moment();

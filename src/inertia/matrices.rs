@@ -157,7 +157,6 @@ impl<'a> Matrices<'a> {
                 add_node(self.inertia, place, inertia, inertia.mass);
             }
         }
-        fill_held_axes(self.inertia, lattice);
         let Self { scratch, mass_factors, edge_factor, inertia, .. } = self;
         let band = &renewal.bands.scalars;
         let mut is_sound = true;
@@ -257,8 +256,8 @@ const PAIR_OF: [[usize; 8]; 8] = {
     pairs
 };
 
-/// What a held axis counts, as a share: where only few nodes of a cell are free, no motion of the lattice is without
-/// inertia.
+/// What a held axis counts, as a share: where few or none of a function's nodes are free, no motion of the lattice is
+/// without inertia.
 const HELD: f32 = 1e-4;
 
 /// Adds a node's value (kg) for each axis times the products of its weights.
@@ -274,33 +273,6 @@ pub(super) fn add_node(matrices: &mut [AxisMatrices], place: &LatticeNode, inert
             matrices[at][axis] += product * free[axis];
         }
     });
-}
-
-/// Gives functions whose nodes are all held along an axis an inertia there: no force acts on it, so its size is of no
-/// consequence.
-pub(super) fn fill_held_axes(matrices: &mut [AxisMatrices], lattice: &Lattice) {
-    const FIRST_OF_DIAGONAL: [usize; 8] = [0, 2, 5, 9, 14, 20, 27, 35];
-    let mut sums = [[0.0f32; 4]; MAX_FUNCTIONS];
-    let mut most = 0.0f32;
-    for (cell, matrices) in matrices.iter().enumerate() {
-        for (function, at) in lattice.functions_of(cell).into_iter().zip(FIRST_OF_DIAGONAL) {
-            if let Some(sums) = sums.get_mut(function).filter(|_| function < lattice.functions()) {
-                sums.iter_mut().zip(matrices[at % matrices.len()]).for_each(|(sum, each)| *sum += each);
-                most = sums.iter().copied().fold(most, f32::max);
-            }
-        }
-    }
-    for (cell, matrices) in matrices.iter_mut().enumerate() {
-        for (function, at) in lattice.functions_of(cell).into_iter().zip(FIRST_OF_DIAGONAL) {
-            let Some(sums) = sums.get_mut(function).filter(|_| function < lattice.functions()) else { continue };
-            for (axis, sum) in sums.iter_mut().enumerate().take(3).filter(|(_, sum)| **sum <= 0.0) {
-                if let Some(entry) = matrices[at % matrices.len()].get_mut(axis) {
-                    *entry = most;
-                }
-                *sum = most;
-            }
-        }
-    }
 }
 
 /// Calls `add` with row, column and weight of what a value of two numbers of a cell, the second not after the first,

@@ -11,7 +11,7 @@ use super::clusters::{ClusterInput, Clusters, Piece};
 use super::coarse_stiffness::{ClusterTangent, add_cell, add_tangent, tangent_of, write_cell};
 use super::frames::Frames;
 use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_POINTS, node_at};
-use super::matrices::{Bands, Matrices, add_node, fill_held_axes};
+use super::matrices::{Bands, Matrices, add_node};
 use super::node::Scaling;
 use super::node_tables::NodeTables;
 use super::report::AddedInertia;
@@ -189,7 +189,7 @@ impl Renewal {
         matrices: &mut Matrices<'_>,
         threads: &impl Threads,
     ) {
-        let RenewalInput { scene, displacement, volume, lattice, places, scaling } = input;
+        let RenewalInput { scene, displacement, volume, places, scaling, .. } = input;
         // Twice: no rotation in the latest step.
         matrices.frames.update(displacement);
         matrices.frames.update(displacement);
@@ -227,7 +227,6 @@ impl Renewal {
         let [mass, own] = sums.iter().fold([0.0; 2], |[a, b], [mass, own]| [a + mass, b + own]);
         (self.own_share, self.free_inertia) = (mass / own, free_inertia);
         self.added.end();
-        fill_held_axes(of_cells, lattice);
         self.renew(input, matrices, threads);
     }
 }
