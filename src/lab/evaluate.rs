@@ -85,9 +85,9 @@ pub struct Evaluation {
 pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Evaluation, LabError> {
     super::create_folder(out)?;
     let (specs, multiples): (Vec<_>, Vec<_>) = plan.scenes.iter().cloned().unzip();
-    let truths = truth::obtain(&specs, &out.join("truth"), |spec, truth| say(&about(spec, truth)))?;
+    let scenes = truth::obtain(&specs, &out.join("truth"), |spec, truth| say(&about(spec, truth)))?;
     let mut rows = Vec::new();
-    for ((spec, truth), multiples) in specs.iter().zip(&truths).zip(multiples) {
+    for ((spec, truth), multiples) in scenes.iter().zip(multiples) {
         for method in &plan.methods {
             say(&format!("{}: {}", spec.name, method.name()));
             for multiple in method.multiples(&spec.timing, &multiples) {
@@ -96,7 +96,7 @@ pub fn evaluate(plan: &Plan, out: &Path, mut say: impl FnMut(&str)) -> Result<Ev
         }
     }
     table::write_csv(&out.join("results.csv"), &rows)?;
-    Ok(Evaluation { scenes: specs.into_iter().zip(truths).collect(), rows })
+    Ok(Evaluation { scenes, rows })
 }
 
 fn about(spec: &SceneSpec, truth: &Truth) -> String {

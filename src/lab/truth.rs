@@ -53,18 +53,27 @@ impl Truth {
     }
 }
 
-/// The truths of `scenes`, in their order, from files in `folder` or computed on two threads and put there.
-/// `tick` is called with each that is ready.
+/// The truths of `scenes`, in their order, from files in `folder` or computed on two threads and put there, and the
+/// scenes, in parts of a step where their critical step falls along the motion. `tick` is called with each that is ready.
 pub fn obtain(
     scenes: &[SceneSpec],
     folder: &Path,
     mut tick: impl FnMut(&SceneSpec, &Truth),
-) -> Result<Vec<Truth>, LabError> {
+) -> Result<Vec<(SceneSpec, Truth)>, LabError> {
     super::create_folder(folder)?;
-    in_parallel(scenes.len(), |index| obtain_one(&scenes[index], folder), |index, truth| tick(&scenes[index], truth))
+    in_parallel(scenes.len(), |index| obtain_one(scenes[index].clone(), folder), |_, (spec, truth)| tick(spec, truth))
 }
 
-pub(super) fn obtain_one(scene: &SceneSpec, folder: &Path) -> Result<Truth, LabError> {
+pub(super) fn obtain_one(mut scene: SceneSpec, folder: &Path) -> Result<(SceneSpec, Truth), LabError> {
+    loop {
+        match of_file_or_computed(&scene, folder) {
+            Err(LabError::Diverged { .. }) if scene.timing.refinement < 20 => scene.timing.refinement *= 3,
+            other => return other.map(|truth| (scene, truth)),
+        }
+    }
+}
+
+fn of_file_or_computed(scene: &SceneSpec, folder: &Path) -> Result<Truth, LabError> {
     let key = key(scene)?;
     let path = folder.join(format!("{}.bin", scene.name));
     let shape = (scene.points.len(), scene.intervals);

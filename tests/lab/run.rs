@@ -60,7 +60,7 @@ fn a_damaged_file_on_disk_is_computed_again() {
     let folder = tempfile::tempdir().unwrap();
     let mut scene = scenes::named("cylinder").unwrap();
     scene.intervals = 1;
-    let obtain = || truth::obtain(&[scene.clone()], folder.path(), |_, _| ()).unwrap().remove(0);
+    let obtain = || truth::obtain(&[scene.clone()], folder.path(), |_, _| ()).unwrap().remove(0).1;
     let truth = obtain();
     let path = fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
     let sound = fs::read(&path).unwrap();

@@ -110,7 +110,7 @@ impl Plan {
         let truths = out.join("truth");
         super::create_folder(&truths)?;
         match self.cases.get(index) {
-            Some(case) => with_truth(case.clone(), &truths).map(Some),
+            Some(case) => truth::obtain_one(case.clone(), &truths).map(Some),
             None => match (index - self.cases.len()) as u32 {
                 number if number < self.random => {
                     drawn(|attempt| random::scene(number, attempt), f64::INFINITY, &truths)
@@ -154,16 +154,6 @@ pub fn evaluate(plan: &Plan, out: &Path, say: impl Fn(&str) + Sync) -> Result<Ve
     Ok(judged)
 }
 
-/// The truth in shorter steps, if the critical one falls along the motion.
-fn with_truth(mut spec: SceneSpec, folder: &Path) -> Result<(SceneSpec, Truth), LabError> {
-    loop {
-        match truth::obtain_one(&spec, folder) {
-            Err(LabError::Diverged { .. }) if spec.timing.refinement < 20 => spec.timing.refinement *= 3,
-            other => return other.map(|truth| (spec, truth)),
-        }
-    }
-}
-
 /// The first attempt whose truth moves by more than a millimetre and no farther than `farthest` (m), and neither
 /// diverges nor leaves the range of its law. None if ten do.
 fn drawn(
@@ -172,7 +162,7 @@ fn drawn(
     folder: &Path,
 ) -> Result<Option<(SceneSpec, Truth)>, LabError> {
     for attempt in 0..10 {
-        match with_truth(draw(attempt)?, folder) {
+        match truth::obtain_one(draw(attempt)?, folder) {
             Ok((spec, truth)) if truth.limited_steps == 0 && truth.most() > 1e-3 && truth.most() <= farthest => {
                 return Ok(Some((spec, truth)));
             }
