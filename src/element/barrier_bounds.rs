@@ -4,7 +4,7 @@
 use super::NodeInertia;
 use super::barrier::{BOUNDED, Barrier};
 use super::critical_bounds::{AddBounds, NodeMatrices, Terms};
-use super::crushed::{CrushedElements, CrushedTile, each_marked, mask_of};
+use super::crushed::{CrushedElements, CrushedTile, MARKED, each_marked, mask_of, masks};
 use super::deformation::Deformation;
 use super::stiffness_bound::Coefficients;
 use super::tile::vector_at;
@@ -13,15 +13,18 @@ use super::{ElementTile, Elements};
 use crate::material::{Law, Laws};
 use crate::simd::{Gather, Kernel, NodeVector, Real, ScatterBuffer, TILE, dispatch};
 
-/// Calls `with` with those of some tiles' elements that count in bounds.
+/// Calls `with` with the elements that count in bounds, from the marks of this moment if there is room for marks.
 pub(crate) fn each_bounded<L: Law>(
     laws: &Laws<'_, L>,
     tiles: &[ElementTile],
+    marks: &[NodeVector],
     displacement: &[NodeVector],
     mut with: impl FnMut(&CrushedTile),
 ) {
-    let mut elements = CrushedElements::of(*laws, tiles);
-    for (index, tile) in tiles.iter().enumerate() {
+    const { assert!(MARKED >= BOUNDED) };
+    let (mut elements, masks) = (CrushedElements::of(*laws, tiles), masks(marks, tiles.len()));
+    each_marked(masks, 0, |place| elements.enter(place, &mut with));
+    for (index, tile) in tiles.iter().enumerate().skip(masks.len()) {
         each_marked(&[mask_of(tile, displacement, BOUNDED)], index, |place| elements.enter(place, &mut with));
     }
     elements.end(with);

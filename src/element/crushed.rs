@@ -1,8 +1,9 @@
 //! Which elements with nodal strain are crushed, so that they have an energy of their own ([`super::barrier`]). To look
 //! at every element in every step would cost a sixth of an exact step. So a state keeps marks: for each tile of
 //! elements a mask of those below the volume ratio [`MARKED`] when last looked at, in the vectors that nodal pressure
-//! has for volumes. An exact step looks at one tile in [`LOOK_CYCLE`], and a longer step at all; forces are those of
-//! the marked elements, whose volume ratio is computed in every step.
+//! has for volumes. An exact step looks at one tile in [`LOOK_CYCLE`], a longer one at one in [`LOOK_CYCLE_OF_LONG`] and
+//! at those with marks, a learned one at all; forces are those of the marked elements, whose volume ratio is computed in
+//! every step.
 //!
 //! Marks follow from the displacements when the tile was looked at and from nothing else, so a step that is refused
 //! leaves none behind that the next one would not set. They are told apart from those of another moment by the number
@@ -22,6 +23,9 @@ use crate::state::Moment;
 
 /// Exact steps in which every element is looked at.
 pub(crate) const LOOK_CYCLE: usize = 16;
+
+/// Steps beyond the critical one in which it is.
+pub(crate) const LOOK_CYCLE_OF_LONG: usize = 4;
 
 /// Volume ratio below which an element is marked.
 pub(crate) const MARKED: f32 = 0.6;
@@ -78,14 +82,15 @@ pub(crate) fn each_marked(masks: &[u16], first: usize, mut with: impl FnMut(u32)
     }
 }
 
-/// The kernel that writes the masks of the elements below a volume ratio, of one tile in `cycle` from tile `first` on.
-/// Gives the least `J - 1` of these tiles.
+/// The kernel that writes the masks of the elements below a volume ratio, of one tile in `cycle` from tile `first` on,
+/// and `with_marked` of all that have marks. Gives the least `J - 1` of these tiles.
 pub(crate) struct Look<'a> {
     pub(crate) tiles: &'a [ElementTile],
     pub(crate) displacement: &'a [NodeVector],
     pub(crate) below: f32,
     pub(crate) first: usize,
     pub(crate) cycle: usize,
+    pub(crate) with_marked: bool,
     pub(crate) masks: &'a mut [u16],
 }
 
@@ -101,7 +106,7 @@ impl Look<'_> {
 pub(crate) fn mask_of(tile: &ElementTile, displacement: &[NodeVector], below: f32) -> u16 {
     let mut mask = [0];
     let tiles = core::slice::from_ref(tile);
-    Look { tiles, displacement, below, first: 0, cycle: 1, masks: &mut mask }.least_change();
+    Look { tiles, displacement, below, first: 0, cycle: 1, with_marked: false, masks: &mut mask }.least_change();
     mask[0]
 }
 
@@ -112,27 +117,22 @@ impl Kernel for Look<'_> {
 
     #[inline(always)]
     fn run<R: Real>(self) -> f32 {
-        let Self { tiles, displacement, below, first, cycle, masks } = self;
+        let Self { tiles, displacement, below, first, cycle, with_marked, masks } = self;
         let displacement = Gather::new(displacement);
         let mut least = R::splat(f32::INFINITY);
-        for index in (first..tiles.len()).step_by(cycle.max(1)) {
-            let Some(tile) = tiles.get(index) else { break };
-            let mut mask = 0;
-            for first in (0..TILE).step_by(R::COUNT) {
-                let change = Deformation::<R>::of_tile(tile, first, displacement).invariants.j;
-                least = change.min(least);
-                for lane in 0..R::COUNT {
-                    mask |= u16::from(change.lane(lane) < below - 1.0) << ((first + lane) % TILE);
+        let mut due = first;
+        if with_marked {
+            for (index, tile) in tiles.iter().enumerate() {
+                let is_due = index == due;
+                due += if is_due { cycle } else { 0 };
+                if is_due || masks.get(index).is_some_and(|&mask| mask != 0) {
+                    look_at::<R>(tile, displacement, below, masks.get_mut(index), &mut least);
                 }
             }
-            if mask != 0 {
-                // Places without an element have the nodes of another.
-                for lane in 0..TILE {
-                    mask &= !(u16::from(tile.volume::<f32>(lane) <= 0.0) << lane);
-                }
-            }
-            if let Some(place) = masks.get_mut(index) {
-                *place = mask;
+        } else {
+            for index in (first..tiles.len()).step_by(cycle.max(1)) {
+                let Some(tile) = tiles.get(index) else { break };
+                look_at::<R>(tile, displacement, below, masks.get_mut(index), &mut least);
             }
         }
         // A loop, because the compiler may leave closures over vectors as function calls.
@@ -141,6 +141,33 @@ impl Kernel for Look<'_> {
             least_of_all = least.lane(lane).min(least_of_all);
         }
         least_of_all
+    }
+}
+
+#[inline(always)]
+fn look_at<R: Real>(
+    tile: &ElementTile,
+    displacement: Gather<'_>,
+    below: f32,
+    place: Option<&mut u16>,
+    least: &mut R,
+) {
+    let mut mask = 0;
+    for first in (0..TILE).step_by(R::COUNT) {
+        let change = Deformation::<R>::of_tile(tile, first, displacement).invariants.j;
+        *least = change.min(*least);
+        for lane in 0..R::COUNT {
+            mask |= u16::from(change.lane(lane) < below - 1.0) << ((first + lane) % TILE);
+        }
+    }
+    if mask != 0 {
+        // Places without an element have the nodes of another.
+        for lane in 0..TILE {
+            mask &= !(u16::from(tile.volume::<f32>(lane) <= 0.0) << lane);
+        }
+    }
+    if let Some(place) = place {
+        *place = mask;
     }
 }
 

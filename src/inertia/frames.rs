@@ -5,7 +5,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Mat3;
 
-use super::lattice::Lattice;
+use super::lattice::{Lattice, LatticeNode, nodes_of_cell};
 use crate::copy::copy;
 use crate::simd::NodeVector;
 
@@ -35,9 +35,9 @@ pub(super) struct Frames<'a> {
 
 impl Frames<'_> {
     /// Chooses four nodes for each function, far apart from each other.
-    pub(super) fn choose(&mut self, lattice: &Lattice, points: &[[f32; 3]]) {
+    pub(super) fn choose(&mut self, lattice: &Lattice, places: &[LatticeNode], points: &[[f32; 3]]) {
         for (function, nodes) in self.nodes.iter_mut().enumerate() {
-            *nodes = choose(function, lattice, points);
+            *nodes = choose(function, lattice, places, points);
         }
         self.latest.fill(IDENTITY);
     }
@@ -145,12 +145,12 @@ impl FrameNodes {
 
 /// Chooses among the nodes of a function: the node nearest to their centre, the one farthest from that, the one with
 /// the largest triangle, and the one with the largest tetrahedron.
-fn choose(function: usize, lattice: &Lattice, points: &[[f32; 3]]) -> FrameNodes {
+fn choose(function: usize, lattice: &Lattice, places: &[LatticeNode], points: &[[f32; 3]]) -> FrameNodes {
     let nodes_of_function = || {
-        points.iter().enumerate().filter_map(|(node, &point)| {
-            let place = lattice.place(point);
-            let (_, weight) = lattice.weights(&place).into_iter().find(|&(f, weight)| f == function && weight > 0.0)?;
-            Some((node as u32, point, weight))
+        let places = lattice.cells_of(function).into_iter().flatten().flat_map(|cell| nodes_of_cell(places, cell));
+        places.filter_map(|place| {
+            let (_, weight) = lattice.weights(place).into_iter().find(|&(f, weight)| f == function && weight > 0.0)?;
+            Some((place.node() as u32, *points.get(place.node())?, weight))
         })
     };
     let (mut sum, mut total) = ([0.0f32; 3], 0.0);

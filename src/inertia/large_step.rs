@@ -11,7 +11,7 @@ use crate::material::Element;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::{Moment, Progress, StateView};
-use crate::step::{CallingThread, Status, Step, Threads, internal_forces, nodal_volumes};
+use crate::step::{CallingThread, Status, Step, Threads, internal_forces, nodal_volumes, write_volumes};
 use crate::tled::each_rate;
 
 use super::coarse_motion::CoarseSpace;
@@ -206,7 +206,7 @@ impl<'w> LargeModel<'w> {
         if !matrices.write_constants(scene, lattice, places, &mut self.renewal) {
             return singular;
         }
-        matrices.frames.choose(lattice, points);
+        matrices.frames.choose(lattice, places, points);
         self.stiffening = [1.0; 2];
         let mut compared = self.step;
         for index in 0..self.stiffening.len() {
@@ -234,7 +234,7 @@ impl<'w> LargeModel<'w> {
         self.scaling = scaling_of(self.step, self.stiffening[0]);
         self.moment = progress.moment();
         let displacement = displacement.get(..nodes).unwrap_or_default();
-        nodal_volumes(scene, displacement, &[], volume, &CallingThread);
+        write_volumes(scene, displacement, volume, &CallingThread);
         let input = RenewalInput { scene, displacement, volume, lattice, places, scaling: &self.scaling };
         self.renewal.renew_all(input, &mut tables, &mut matrices, &CallingThread);
         self.report = self.renewal.added.report(0, 1.0, 0.0);

@@ -121,6 +121,12 @@ pub(super) fn node_at(places: &[LatticeNode], rank: usize) -> usize {
     places.get(rank).map_or(rank, LatticeNode::node)
 }
 
+/// The places of the nodes of a cell.
+pub(super) fn nodes_of_cell(places: &[LatticeNode], cell: usize) -> &[LatticeNode] {
+    let [first, end] = [cell, cell + 1].map(|cell| places.partition_point(|place| place.cell() < cell));
+    places.get(first..end).unwrap_or_default()
+}
+
 /// Sorts the places of the nodes by their cells.
 pub(super) fn sort_by_cell(places: &mut [LatticeNode]) {
     // Counting sort. `ends` are first counts, then the place of the next node of each cell.
@@ -595,6 +601,23 @@ impl Lattice {
             *function = usize::from(self.function_of_point.get(point).copied().unwrap_or(HELD));
         }
         functions
+    }
+
+    /// The cells around the point of a function.
+    pub(super) fn cells_of(&self, function: usize) -> [Option<usize>; 8] {
+        let counts = self.cells.map(|count| count as usize);
+        let [x, y] = [counts[0] + 1, counts[1] + 1];
+        let Some(point) = self.function_of_point.iter().position(|&of| usize::from(of) == function) else {
+            return [None; 8];
+        };
+        let at = [point % x, point / x % y, point / x / y];
+        array::from_fn(|corner| {
+            let mut cell = [0; 3];
+            for axis in 0..3 {
+                cell[axis] = at[axis].checked_sub(corner >> axis & 1).filter(|&at| at < counts[axis])?;
+            }
+            Some(cell[0] + counts[0] * (cell[1] + counts[1] * cell[2]))
+        })
     }
 
     /// Functions and weights of a node; [`MAX_FUNCTIONS`] for dropped functions.

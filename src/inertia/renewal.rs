@@ -68,7 +68,7 @@ pub(super) struct Renewal {
 pub(super) struct RenewalInput<'a, M> {
     pub(super) scene: SceneView<'a, M>,
     pub(super) displacement: &'a [NodeVector],
-    /// Of the nodes, for materials with nodal pressure.
+    /// See [`write_volumes`](crate::step::write_volumes).
     pub(super) volume: &'a [NodeVector],
     pub(super) lattice: &'a Lattice,
     pub(super) places: &'a [LatticeNode],
@@ -258,9 +258,9 @@ fn add_crushed<M: ElementMaterial>(
     is_merged: bool,
     of_clusters: &mut [ClusterTangent],
 ) {
-    let RenewalInput { scene, displacement, lattice, places, scaling, .. } = input;
+    let RenewalInput { scene, displacement, volume, lattice, places, scaling } = input;
     let (of_element, weight) = (ClusterInput { scene, lattice, places, is_merged }, scaling.coarse_weight);
-    each_bounded(&scene.material.laws(), scene.tiles, displacement, |crushed| {
+    each_bounded(&scene.material.laws(), scene.tiles, volume, displacement, |crushed| {
         let tangents = CrushedTangents { crushed, displacement: Gather::new(displacement), weight }.tangents();
         for piece in Piece::of_tile(&crushed.tile) {
             let cell = piece.cell(lattice, places);

@@ -4,13 +4,13 @@
 
 use glam::Vec4;
 
-use crate::element::{ElementMaterial, NodeInertia, ScalarBound};
+use crate::element::{ElementMaterial, LOOK_CYCLE_OF_LONG, NodeInertia, ScalarBound};
 use crate::loads::Loads;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::StateView;
 use crate::step::{
-    CallingThread, Computed, Forcing, Moving, Status, Step, StepMethod, Threads, Totals, Trial, nodal_volumes,
+    CallingThread, Computed, Forcing, Moving, Status, Step, StepMethod, Threads, Totals, Trial, write_volumes,
 };
 
 use super::cells::{prolong, restrict};
@@ -124,7 +124,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
             is_heated: *is_heated,
             loads,
             progress,
-            look_cycle: 1,
+            look_cycle: LOOK_CYCLE_OF_LONG,
         };
         let (_, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, |_, _, _: &mut [()]| ());
         let frames = &mut self.storage.matrices.frames;
@@ -209,7 +209,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
             return;
         }
         *is_for_other_step = false;
-        nodal_volumes(*scene, displacement, &[], volume, *threads);
+        write_volumes(*scene, displacement, volume, *threads);
         let input = RenewalInput { scene: *scene, displacement, volume, lattice, places, scaling };
         renewal.renew_all(input, tables, matrices, *threads);
         if !follows {

@@ -7,7 +7,7 @@ use core::ops::Range;
 
 use crate::element::{
     AddCrushed, CrushedElements, CrushedForces, ElementMaterial, Elements, Extremes, ForcesVisitor, InternalForces,
-    Look, MARKED, MeanPressure, NodalVolumes, NodeInertia, OwnPressure, PatchForces, each_marked, is_marked_at,
+    LOOK_CYCLE, Look, MARKED, MeanPressure, NodalVolumes, NodeInertia, OwnPressure, PatchForces, each_marked, is_marked_at,
     mask_of, masks, masks_mut,
 };
 use crate::loads::{Loads, ramp_factor};
@@ -117,13 +117,15 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         if !self.scene.element().is_nodal_strain() {
             return f32::INFINITY;
         }
-        if self.look_cycle <= 1 || !is_marked_at(marks, &self.progress.moment()) {
-            return look_at_all(self.scene, self.displacement, marks, threads);
-        }
-        let (tiles, cycle) = (self.scene.tiles, self.look_cycle);
+        let cycle = if is_marked_at(marks, &self.progress.moment()) { self.look_cycle } else { 1 };
         let first = (self.progress.steps % cycle as u64) as usize;
-        let masks = masks_mut(marks, tiles.len());
-        Look { tiles, displacement: self.displacement, below: MARKED, first, cycle, masks }.least_change()
+        if cycle < LOOK_CYCLE {
+            return look_in_turn(self.scene, self.displacement, marks, [first, cycle], threads);
+        }
+        // Too little for threads.
+        let (tiles, masks) = (self.scene.tiles, masks_mut(marks, self.scene.tiles.len()));
+        let displacement = self.displacement;
+        Look { tiles, displacement, below: MARKED, first, cycle, with_marked: false, masks }.least_change()
     }
 
     fn compute<T, F>(
@@ -148,24 +150,42 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
     }
 }
 
-/// Looks which elements are crushed, all of them. Gives the least `J - 1`.
-pub(crate) fn look_at_all<M: ElementMaterial>(
+/// The [`nodal_volumes`], and where the material needs them the marks of all crushed elements.
+pub(crate) fn write_volumes<M: ElementMaterial>(
+    scene: SceneView<'_, M>,
+    displacement: &[NodeVector],
+    volumes: &mut [NodeVector],
+    threads: &impl Threads,
+) {
+    nodal_volumes(scene, displacement, &[], volumes, threads);
+    if scene.element().is_nodal_strain() {
+        look_in_turn(scene, displacement, volumes, [0, 1], threads);
+    }
+}
+
+/// Looks which elements are crushed, at one tile in so many, from a first one on, and at those that have marks. Gives the
+/// least `J - 1`.
+fn look_in_turn<M: ElementMaterial>(
     scene: SceneView<'_, M>,
     displacement: &[NodeVector],
     marks: &mut [NodeVector],
+    [first, cycle]: [usize; 2],
     threads: &impl Threads,
 ) -> f32 {
     let partitions = scene.elements().partitions;
     let count = partitions.parts(threads.parts());
     let (mut tiles, mut masks) = (scene.tiles, masks_mut(marks, scene.tiles.len()));
     let mut parts: [_; MOST_PARTS] = from_fn(|part| {
-        let own = partitions.tiles_of(&partitions.part(part, count)).len();
-        let tiles = tiles.split_off(..own.min(tiles.len())).unwrap_or_default();
-        (tiles, take(&mut masks, own), f32::INFINITY)
+        let own = partitions.tiles_of(&partitions.part(part, count));
+        // The first tile of the part whose turn it is.
+        let first = (first + cycle - own.start % cycle) % cycle;
+        let part = tiles.split_off(..own.len().min(tiles.len())).unwrap_or_default();
+        (part, take(&mut masks, own.len()), first, f32::INFINITY)
     });
     let parts = parts.get_mut(..count).unwrap_or_default();
-    threads.each(parts, |(tiles, masks, least)| {
-        *least = Look { tiles, displacement, below: MARKED, first: 0, cycle: 1, masks }.least_change();
+    threads.each(parts, |(tiles, masks, first, least)| {
+        let (first, with_marked) = (*first, cycle > 1);
+        *least = Look { tiles, displacement, below: MARKED, first, cycle, with_marked, masks }.least_change();
     });
     parts.iter().fold(f32::INFINITY, |least, (.., of_part)| least.min(*of_part))
 }

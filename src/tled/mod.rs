@@ -37,7 +37,7 @@ use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
 use crate::step::{
     self, CallingThread, Cause, Computed, EnergyBalance, Forcing, Moving, Status, Step, StepMethod, Threads, Totals,
-    Trial, look_at_all, move_in_parts, nodal_volumes,
+    Trial, move_in_parts, nodal_volumes, write_volumes,
 };
 use central_differences::{Advance, EnergyInput, next_increment};
 
@@ -218,10 +218,7 @@ fn internal_forces_of<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateV
     }
     let StateView { displacement, force, volume, .. } = state;
     let force = force.get_mut(..nodes).unwrap_or_default();
-    nodal_volumes(scene, displacement, &[], volume, &CallingThread);
-    if scene.element().is_nodal_strain() {
-        look_at_all(scene, displacement, volume, &CallingThread);
-    }
+    write_volumes(scene, displacement, volume, &CallingThread);
     force.fill(NodeVector::ZERO);
     step::internal_forces(scene, scene.elements().partitions.all(), [displacement, &[]], volume, force, NoVisitor);
     true
