@@ -130,11 +130,17 @@ impl<'w> LargeModel<'w> {
             if !matches!(answer, Err(InertiaError::Singular { .. })) || self.method.cells != Cells::Suggested {
                 return answer;
             }
-            let coarser = largest_grid(scene, points, grid.functions);
-            if coarser.functions == 0 {
-                return answer;
+            // A coarser one may have wider layers, and need more than there is room for.
+            let needed = |grid| vectors_for_lattice(scene.element(), self.nodes, self.elements, grid);
+            loop {
+                grid = largest_grid(scene, points, grid.functions);
+                if grid.functions == 0 {
+                    return answer;
+                }
+                if needed(grid) <= storage.len() {
+                    break;
+                }
             }
-            grid = coarser;
         }
     }
 

@@ -647,11 +647,11 @@ pub(crate) fn size_of(points: &[[f32; 3]]) -> [f32; 3] {
     bounding_box(points).1
 }
 
-/// Two grids of near-cubic cells, with `parts` cells along the longest side of the box around the points. Along the
-/// other sides the number of cells is rounded down in the first grid, and to the nearest integer in the second.
-pub(super) fn near_cubic(points: &[[f32; 3]], parts: u32) -> [[u32; 3]; 2] {
+/// Three grids of near-cubic cells, with `parts` cells along the longest side of the box around the points. Along the
+/// other sides the number of cells is rounded down, to the nearest integer and up.
+pub(super) fn near_cubic(points: &[[f32; 3]], parts: u32) -> [[u32; 3]; 3] {
     let size = size_of(points);
     let longest = size.iter().copied().fold(0.0, f32::max);
-    // 0.01, because rounding may make an integer slightly smaller.
-    [0.01, 0.5].map(|up| size.map(|size| (libm::floorf(size / longest * parts as f32 + up) as u32).max(1)))
+    // 0.01, because rounding may make an integer slightly smaller or larger.
+    [0.01, 0.5, 0.99].map(|up| size.map(|size| (libm::floorf(size / longest * parts as f32 + up) as u32).max(1)))
 }
