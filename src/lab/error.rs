@@ -9,6 +9,7 @@ use supple::learned::LearnedError;
 use supple::loads::LoadError;
 use supple::mlp::WeightError;
 use supple::scene::BuildError;
+use supple::simulation::SimulationError;
 use supple::step::{Divergence, Status, StepError};
 
 /// Why the laboratory could not do what it was asked.
@@ -36,6 +37,8 @@ pub enum LabError {
     Step(StepError),
     /// An inertia could not be prepared.
     Inertia(InertiaError),
+    /// A simulation was refused.
+    Simulation(SimulationError),
     /// The exact motion diverged, so there is no truth.
     Diverged {
         /// The scene.
@@ -113,6 +116,7 @@ impl fmt::Display for LabError {
             Self::Contact(error) => error.fmt(f),
             Self::Step(error) => error.fmt(f),
             Self::Inertia(error) => error.fmt(f),
+            Self::Simulation(error) => error.fmt(f),
             Self::Diverged { scene, divergence } => write!(f, "the truth of {scene} {divergence}"),
             Self::NoCriticalStep { scene } => write!(f, "{scene}: the exact critical step was not found"),
             Self::NotAtRest { case, change, kinetic } => write!(
@@ -152,4 +156,4 @@ macro_rules! from {
     };
 }
 
-from!(ReadError => Mesh, BuildError => Build, LoadError => Load, ContactError => Contact, StepError => Step, InertiaError => Inertia, WeightError => Weights, LearnedError => LearnedStep, DamperError => Damper, std::io::Error => Write);
+from!(ReadError => Mesh, BuildError => Build, LoadError => Load, ContactError => Contact, StepError => Step, InertiaError => Inertia, WeightError => Weights, SimulationError => Simulation, LearnedError => LearnedStep, DamperError => Damper, std::io::Error => Write);

@@ -20,11 +20,13 @@
 //! | [`equal_error`] | how much longer implicit steps take for the same error |
 //! | [`hard`] | is a run ever wrong without a word? |
 //! | [`tolerance`] | does an adaptive step keep its tolerance, and what does it cost? |
+//! | [`cost`] | what a simulated second takes, by size of mesh |
 //! | [`physics`] | cases with a truth that is not ours: nature, closed forms, published values |
 //! | [`table`] | rows as CSV and as aligned text |
 //! | `training` (feature `train`) | scenes to learn from; the search for a damper |
 //! | [`sweep`] | error over step on one scene, with fitted slopes |
 
+pub mod cost;
 pub mod course;
 pub mod equal_error;
 mod error;

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use supple_cli::screen;
 
-use command::{hard, methods, physics, tolerance};
+use command::{cost, hard, methods, physics, tolerance};
 #[cfg(feature = "train")]
 use command::{quantise, train};
 
@@ -35,6 +35,8 @@ enum Command {
     Hard(hard::Asked),
     /// Adaptive steps over the hard cases, against fixed steps: tolerance.csv
     Tolerance(tolerance::Asked),
+    /// What a simulated second takes, by size of mesh and method: cost.csv
+    Cost(cost::Asked),
     /// Train a network for the learned step; a training that was stopped goes on where it was
     #[cfg(feature = "train")]
     Train(train::Asked),
@@ -56,6 +58,7 @@ fn main() -> ExitCode {
         Command::Physics(asked) => physics::judge(&asked),
         Command::Hard(asked) => hard::judge(&asked),
         Command::Tolerance(asked) => tolerance::judge(&asked),
+        Command::Cost(asked) => cost::judge(&asked),
         #[cfg(feature = "train")]
         Command::Train(asked) => train::train(&asked),
         #[cfg(feature = "train")]

@@ -44,12 +44,17 @@ impl Errors {
 
     /// Compares displacements (m) with the next snapshot of the truth.
     pub fn add_snapshot(&mut self, truth: &Truth, displacements: &[NodeVector]) -> Result<(), LabError> {
+        let moved: Vec<_> = displacements.iter().map(|vector| vector.to_array()).collect();
+        self.add_shape(truth, &moved)
+    }
+
+    /// The same with displacements as the truth has them.
+    pub(super) fn add_shape(&mut self, truth: &Truth, moved: &[[f32; 3]]) -> Result<(), LabError> {
         let shape = truth.snapshots.get(self.means.len()).map_or(&[][..], Vec::as_slice);
-        if shape.is_empty() || shape.len() != displacements.len() {
-            return Err(LabError::Mismatch { nodes: shape.len(), room: displacements.len() });
+        if shape.is_empty() || shape.len() != moved.len() {
+            return Err(LabError::Mismatch { nodes: shape.len(), room: moved.len() });
         }
-        let pairs = shape.iter().zip(displacements);
-        let distances: Vec<f64> = pairs.map(|(a, b)| 1e3 * distance(*a, b.to_array())).collect();
+        let distances: Vec<f64> = shape.iter().zip(moved).map(|(a, b)| 1e3 * distance(*a, *b)).collect();
         let count = distances.len() as f64;
         let mean = distances.iter().sum::<f64>() / count;
         let variance = distances.iter().map(|distance| (distance - mean).powi(2)).sum::<f64>() / count;

@@ -29,7 +29,7 @@ const LOOK_STEPS: u32 = 10;
 const FALL: f32 = 0.02;
 
 /// The exact motion of a scene.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Truth {
     /// Displacement of each node (m) after each interval.
     pub snapshots: Vec<Vec<[f32; 3]>>,

@@ -1,5 +1,6 @@
 //! The commands of `supple-lab`, one a file.
 
+pub(crate) mod cost;
 #[cfg(feature = "train")]
 mod exemplar;
 pub(crate) mod hard;
