@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use supple_lab::hard::verdict::{Judged, Kind, Verdict};
-use supple_lab::hard::{Plan, cases, evaluate, ordinary, random, report};
+use supple_lab::hard::{Counts, Plan, cases, evaluate, ordinary, press, random, report};
 use supple_lab::method::Method;
 
 #[test]
@@ -25,6 +25,14 @@ fn a_number_gives_one_scene_and_scenes_can_be_built() {
         assert!(spec.points.len() > 20 && spec.timing.interval >= 100, "{number}");
     }
     assert_ne!(random::scene(0, 0).unwrap().points, random::scene(0, 1).unwrap().points);
+    let mut free = 0;
+    for number in 0..20 {
+        let spec = press::scene(number, 0).unwrap();
+        assert_eq!(spec, press::scene(number, 0).unwrap());
+        assert!(spec.instrument.is_some(), "{number}");
+        free += u32::from(spec.supports.is_empty());
+    }
+    assert!((5..=15).contains(&free), "{free} of 20 bodies are free");
 }
 
 #[test]
@@ -47,7 +55,7 @@ fn ordinary_scenes_are_held_by_a_face_and_one_of_each_kind_follows_the_other() {
 #[test]
 fn long_steps_are_right_in_ordinary_scenes_and_seldom_doubted() {
     let folder = tempfile::tempdir().unwrap();
-    let plan = Plan { cases: vec![], random: 0, ordinary: 2, methods: vec![Method::Long], every: 3 };
+    let plan = Plan { cases: vec![], counts: Counts { ordinary: 2, ..Counts::default() }, methods: vec![Method::Long], every: 3 };
     let judged = evaluate(&plan, folder.path(), |_| ()).unwrap();
     print!("{}", report::text(&judged));
     assert_eq!(judged.len(), 4);
@@ -73,7 +81,7 @@ fn long_steps_are_right_in_ordinary_scenes_and_seldom_doubted() {
 fn an_instrument_presses_in_long_steps_and_others_are_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let methods = vec![Method::BackwardEuler, Method::Long];
-    let judged = evaluate(&Plan { cases: vec![], random: 0, ordinary: 6, methods, every: 3 }, folder.path(), |_| ());
+    let judged = evaluate(&Plan { cases: vec![], counts: Counts { ordinary: 6, ..Counts::default() }, methods, every: 3 }, folder.path(), |_| ());
     let judged = judged.unwrap();
     let of: Vec<&Judged> = judged.iter().filter(|run| run.row.scene == "instrument-00").collect();
     assert_eq!(of.iter().map(|run| run.row.method).collect::<Vec<_>>(), [Method::Long; 2]);
@@ -98,7 +106,7 @@ fn a_mesh_of_the_users_is_scaled_and_pulled_by_a_tenth_of_its_weight() {
 fn long_cases_are_judged_only_if_they_are_named() {
     let names = |named: &[&str], mesh| {
         let named: Vec<String> = named.iter().map(ToString::to_string).collect();
-        let plan = Plan::new(&named, mesh, &[], [0, 0], 3).unwrap();
+        let plan = Plan::new(&named, mesh, &[], Counts::default(), 3).unwrap();
         plan.cases.iter().map(|case| case.name).collect::<Vec<_>>()
     };
     let lobe = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../meshes/lobe.msh"));
@@ -115,8 +123,7 @@ fn exact_steps_beyond_the_critical_one_tell_and_switching_steps_follow() {
     let methods = [Method::TledLargeStep, Method::Long, Method::Switching];
     let plan = Plan {
         cases: vec![cases::named("coarse").unwrap()],
-        random: 0,
-        ordinary: 0,
+        counts: Counts::default(),
         methods: methods.to_vec(),
         every: 3,
     };

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use supple_cli::problem::{End, Problem};
 use supple_cli::screen::{message, print};
-use supple_lab::hard::{Plan, evaluate, ordinary, report};
+use supple_lab::hard::{Counts, Plan, evaluate, ordinary, press, report};
 
 use super::finish;
 use crate::report::hard;
@@ -32,6 +32,9 @@ pub(crate) struct Asked {
     /// Random scenes among the hard cases
     #[arg(long, value_name = "N", default_value_t = 200)]
     random: u32,
+    /// Scenes in which a ball pushes a body that may give way
+    #[arg(long, value_name = "N", default_value_t = press::SCENES)]
+    presses: u32,
     /// Ordinary scenes, which show how often right steps are doubted
     #[arg(long, value_name = "N", default_value_t = ordinary::SCENES)]
     ordinary: u32,
@@ -41,12 +44,13 @@ pub(crate) struct Asked {
 }
 
 pub(crate) fn judge(asked: &Asked) -> Result<End, Problem> {
-    let Asked { out, scenes, methods, mesh, scale, random, ordinary, every } = asked;
+    let Asked { out, scenes, methods, mesh, scale, random, presses, ordinary, every } = asked;
     if !(scale.is_finite() && *scale > 0.0) {
         return Err(Problem(format!("--scale {scale}: it must be a positive number")));
     }
     let mesh = mesh.as_deref().map(|path| (path, *scale));
-    let plan = Plan::new(scenes, mesh, methods, [*random, *ordinary], *every).map_err(Problem::of)?;
+    let counts = Counts { random: *random, presses: *presses, ordinary: *ordinary };
+    let plan = Plan::new(scenes, mesh, methods, counts, *every).map_err(Problem::of)?;
     let judged = evaluate(&plan, out, |words| message!("{words}")).map_err(Problem::of)?;
     print(report::text(&judged));
     finish(out, "hard.csv", hard::NAME, &hard::part(&judged))

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use supple_cli::problem::{End, Problem};
 use supple_cli::screen::{message, output, print};
-use supple_lab::hard::Plan;
+use supple_lab::hard::{Counts, Plan};
 use supple_lab::method::Method;
 use supple_lab::tolerance::{evaluate, text};
 
@@ -34,7 +34,8 @@ pub(crate) fn judge(Asked { out, scenes, methods, tolerances, random }: &Asked) 
         return Err(Problem(format!("--tolerance {wrong}: it must be a positive number of mm")));
     }
     let methods = if methods.is_empty() { &[Method::Long.name().to_owned()] } else { &**methods };
-    let plan = Plan::new(scenes, None, methods, [*random, 0], supple::guard::EVERY).map_err(Problem::of)?;
+    let counts = Counts { random: *random, ..Counts::default() };
+    let plan = Plan::new(scenes, None, methods, counts, supple::guard::EVERY).map_err(Problem::of)?;
     let rows = evaluate(&plan, tolerances, out, |words| message!("{words}")).map_err(Problem::of)?;
     print(text(&rows));
     output!("\nresults  {}", out.join("tolerance.csv").display());

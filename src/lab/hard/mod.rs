@@ -8,12 +8,14 @@
 //! |---|---|
 //! | [`cases`] | scenes that are made to break a step |
 //! | [`random`] | random bodies, materials, supports and loads |
+//! | [`press`] | balls that push bodies which may give way |
 //! | [`ordinary`] | what hosts do most of the time |
 //! | [`verdict`] | what was wrong, what was told, and how far off the estimates are |
 //! | [`report`] | tables for people and programs |
 
 pub mod cases;
 pub mod ordinary;
+pub mod press;
 pub mod random;
 pub mod report;
 pub mod verdict;
@@ -45,15 +47,24 @@ const TIMES_CRITICAL_EXACT: [f64; 3] = [0.9, 1.0, 1.2];
 /// Damping of the motions that the networks of the crate learned, 1/s.
 const TRAINED_DAMPING: f32 = 20.0;
 
+/// How many scenes of each kind are drawn.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Counts {
+    /// See [`random`].
+    pub random: u32,
+    /// See [`press`].
+    pub presses: u32,
+    /// See [`ordinary`].
+    pub ordinary: u32,
+}
+
 /// What to judge.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Hand-made cases.
     pub cases: Vec<SceneSpec>,
-    /// The number of random scenes.
-    pub random: u32,
-    /// The number of ordinary scenes.
-    pub ordinary: u32,
+    /// How many scenes are drawn.
+    pub counts: Counts,
     /// Methods.
     pub methods: Vec<Method>,
     /// Steps of a run in one of its guard's second run, except for learned steps.
@@ -61,14 +72,14 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan from names of cases and methods, and a mesh of the user's with its factor to metres; so many random
-    /// and ordinary scenes, and guards with `every`. All cases but [`cases::LONG`] if there are neither names nor a
+    /// A plan from names of cases and methods, and a mesh of the user's with its factor to metres; drawn scenes, and
+    /// guards with `every`. All cases but [`cases::LONG`] if there are neither names nor a
     /// mesh, and all methods if there are none.
     pub fn new(
         cases: &[String],
         mesh: Option<(&Path, f64)>,
         methods: &[String],
-        [random, ordinary]: [u32; 2],
+        counts: Counts,
         every: u32,
     ) -> Result<Self, LabError> {
         let methods = match methods {
@@ -92,16 +103,24 @@ impl Plan {
         if let Some((path, scale)) = mesh {
             cases.push(cases::of_mesh(path, scale)?);
         }
-        Ok(Self { cases, random, ordinary, methods, every })
+        Ok(Self { cases, counts, methods, every })
     }
 
     /// How many scenes there are.
     pub(super) const fn scenes(&self) -> usize {
-        self.cases.len() + self.random as usize + self.ordinary as usize
+        let Counts { random, presses, ordinary } = self.counts;
+        self.cases.len() + random as usize + presses as usize + ordinary as usize
     }
 
-    fn kind(&self, index: usize) -> Kind {
-        if index < self.cases.len() + self.random as usize { Kind::Hard } else { Kind::Ordinary }
+    /// The kind of a scene by its number, and its number among those that are drawn.
+    fn kind(&self, index: usize) -> (Kind, Option<u32>) {
+        let Counts { random, presses, .. } = self.counts;
+        match index.checked_sub(self.cases.len()).map(|number| number as u32) {
+            None => (Kind::Hard, None),
+            Some(number) if number < random => (Kind::Hard, Some(number)),
+            Some(number) if number - random < presses => (Kind::Press, Some(number - random)),
+            Some(number) => (Kind::Ordinary, Some(number - random - presses)),
+        }
     }
 
     /// A scene by its number, with its truth, which is kept in `out/truth`. None for a drawn scene that cannot be
@@ -109,14 +128,13 @@ impl Plan {
     pub(super) fn scene(&self, index: usize, out: &Path) -> Result<Option<(SceneSpec, Truth)>, LabError> {
         let truths = out.join("truth");
         super::create_folder(&truths)?;
-        match self.cases.get(index) {
-            Some(case) => truth::obtain_one(case.clone(), &truths).map(Some),
-            None => match (index - self.cases.len()) as u32 {
-                number if number < self.random => {
-                    drawn(|attempt| random::scene(number, attempt), f64::INFINITY, &truths)
-                }
-                number => drawn(|attempt| ordinary::scene(number - self.random, attempt), ordinary::FARTHEST, &truths),
-            },
+        match (self.kind(index), self.cases.get(index)) {
+            (_, Some(case)) => truth::obtain_one(case.clone(), &truths).map(Some),
+            ((Kind::Hard, Some(number)), _) => drawn(|attempt| random::scene(number, attempt), f64::INFINITY, &truths),
+            ((Kind::Press, Some(number)), _) => drawn(|attempt| press::scene(number, attempt), press::FARTHEST, &truths),
+            ((_, number), _) => {
+                drawn(|attempt| ordinary::scene(number.unwrap_or(0), attempt), ordinary::FARTHEST, &truths)
+            }
         }
     }
 }
@@ -147,7 +165,7 @@ pub fn evaluate(plan: &Plan, out: &Path, say: impl Fn(&str) + Sync) -> Result<Ve
     let judge = |index: usize| {
         let Some((spec, truth)) = plan.scene(index, out)? else { return Ok(Vec::new()) };
         say(&format!("{}: moves by {:.1} mm", spec.name, 1e3 * truth.most()));
-        runs(&spec, &truth, plan, plan.kind(index), &say)
+        runs(&spec, &truth, plan, plan.kind(index).0, &say)
     };
     let judged = in_parallel(plan.scenes(), judge, |_, _| ())?.concat();
     report::write(&judged, out)?;

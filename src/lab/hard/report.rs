@@ -91,7 +91,7 @@ pub fn text(judged: &[Judged]) -> String {
          scenes   method                x critical   runs  right   told  silent  inexact limited   above 1  above 2  median\n",
     );
     let bands = [(0.0, 14.0), (14.0, 32.0), (32.0, 71.0), (71.0, f64::INFINITY)];
-    for kind in [Kind::Hard, Kind::Ordinary] {
+    for kind in [Kind::Hard, Kind::Press, Kind::Ordinary] {
         for method in unique(judged.iter().map(|run| run.row.method)) {
             for (low, high) in bands {
                 let of = |run: &&Judged| {

@@ -28,6 +28,8 @@ pub struct Judged {
 pub enum Kind {
     /// A case made to break a step, or a random scene.
     Hard,
+    /// See [`super::press`].
+    Press,
     /// See [`super::ordinary`].
     Ordinary,
 }
@@ -38,6 +40,7 @@ impl Kind {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Hard => "hard",
+            Self::Press => "press",
             Self::Ordinary => "ordinary",
         }
     }
