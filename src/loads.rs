@@ -5,7 +5,7 @@
 
 use core::fmt;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use crate::contact::{Contact, Surface, kept_pushes};
 use crate::element::Axes;
@@ -129,8 +129,8 @@ pub struct Loads<'a> {
     forces: &'a [NodalForce],
     motions: &'a [Motion],
     contact: Option<Contact<'a>>,
-    /// Pushes of instruments that another run has found, N.
-    given: Option<(Surface<'a>, &'a [NodeVector])>,
+    /// Pushes of instruments that another run has found, N, and a factor.
+    given: Option<(Surface<'a>, &'a [NodeVector], f32)>,
     /// Nodes of the scene they were checked against.
     nodes: Option<usize>,
 }
@@ -230,22 +230,28 @@ impl<'a> Loads<'a> {
         Self { contact: Some(contact), ..self }
     }
 
-    /// Loads with the pushes that the instruments exert in the latest step of a state in place of the instruments, if
-    /// it keeps them.
-    pub(crate) fn with_pushes_of<'b>(&self, state: &'b StateView<'_>) -> Loads<'b>
+    /// Loads with so many times the pushes that the instruments exert in the latest step of a state in place of the
+    /// instruments, if it keeps them.
+    pub(crate) fn with_pushes_of<'b>(&self, state: &'b StateView<'_>, times: f32) -> Loads<'b>
     where
         'a: 'b,
     {
         let given = self.contact().and_then(|contact| {
             let surface = contact.surface();
-            Some((surface, kept_pushes(state.pushes, &surface)?))
+            Some((surface, kept_pushes(state.pushes, &surface)?, times))
         });
         if given.is_none() { *self } else { Loads { contact: None, given, ..*self } }
     }
 
+    /// The sum of the lengths of these pushes, N.
+    pub(crate) fn sum_of_given(&self) -> f32 {
+        let length = |push: &NodeVector| Vec4::from(push.0).truncate().length();
+        self.given_pushes().map_or(0.0, |(_, pushes, _)| pushes.iter().map(length).sum())
+    }
+
     // Without the feature all that these lead to is left out of the program.
 
-    pub(crate) const fn given_pushes(&self) -> Option<(Surface<'a>, &'a [NodeVector])> {
+    pub(crate) const fn given_pushes(&self) -> Option<(Surface<'a>, &'a [NodeVector], f32)> {
         if cfg!(feature = "contact") { self.given } else { None }
     }
 

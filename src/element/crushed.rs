@@ -145,13 +145,7 @@ impl Kernel for Look<'_> {
 }
 
 #[inline(always)]
-fn look_at<R: Real>(
-    tile: &ElementTile,
-    displacement: Gather<'_>,
-    below: f32,
-    place: Option<&mut u16>,
-    least: &mut R,
-) {
+fn look_at<R: Real>(tile: &ElementTile, displacement: Gather<'_>, below: f32, place: Option<&mut u16>, least: &mut R) {
     let mut mask = 0;
     for first in (0..TILE).step_by(R::COUNT) {
         let change = Deformation::<R>::of_tile(tile, first, displacement).invariants.j;

@@ -266,14 +266,12 @@ fn run(
         error = [errors.mean_over_time(), errors.largest_mean()];
         motion = Errors::of_hold(truth)?.largest_mean();
     }
-    let second =
-        Second { tetrahedra: spec.tets.len(), way, prepare, frames, steps, error, motion, estimate, doubted };
+    let second = Second { tetrahedra: spec.tets.len(), way, prepare, frames, steps, error, motion, estimate, doubted };
     Ok((second, moved))
 }
 
 /// The table's head.
-pub const HEAD: &str =
-    "tetrahedra method             s/s  x exact  prepare s  frame ms median, 95 %, worst  steps exact, long  error mm mean, largest       %  estimate mm  not ok";
+pub const HEAD: &str = "tetrahedra method             s/s  x exact  prepare s  frame ms median, 95 %, worst  steps exact, long  error mm mean, largest       %  estimate mm  not ok";
 
 /// A line of it; `exact` is what exact steps took for the same, s, if that is known.
 #[must_use]

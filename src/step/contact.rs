@@ -208,31 +208,32 @@ impl<M: ElementMaterial> Trial<'_, M> {
     pub(crate) fn add_pushes_before(&mut self, step: &Step) {
         self.follow_triangles(step);
         let Self { pushes, force, loads, progress, .. } = self;
-        let mut add = |surface: &Surface<'_>, place: usize, push: &NodeVector| {
+        let mut add = |surface: &Surface<'_>, place: usize, push: &NodeVector, times: f32| {
             for (node, share) in corners_of(surface, place, push) {
+                let share = times * share;
                 if let Some(NodeVector([x, y, z, _])) = force.get_mut(node) {
                     let [a, b, c, _] = push.0;
                     (*x, *y, *z) = (*x + share * a, *y + share * b, *z + share * c);
                 }
             }
         };
-        if let Some((surface, pushes)) = loads.given_pushes() {
-            pushes.iter().enumerate().for_each(|(place, push)| add(&surface, place, push));
+        if let Some((surface, pushes, times)) = loads.given_pushes() {
+            pushes.iter().enumerate().for_each(|(place, push)| add(&surface, place, push, times));
         }
         let Some(surface) = loads.contact().map(Contact::surface) else { return };
         let Some(mut memory) = ContactMemory::split(pushes, &surface) else { return };
         memory.forget_if_other(progress);
-        memory.pushed().for_each(|(place, push)| add(&surface, place, push));
+        memory.pushed().for_each(|(place, push)| add(&surface, place, push, 1.0));
     }
 
     /// Enters the work of the pushes of another run.
     pub(crate) fn add_work_of_given(&self, totals: &mut Totals, next: impl Fn(usize) -> [f32; 4]) {
-        let Some((surface, pushes)) = self.loads.given_pushes() else { return };
+        let Some((surface, pushes, times)) = self.loads.given_pushes() else { return };
         for (place, push) in pushes.iter().enumerate() {
             if axes(push.0) != Vec3::ZERO {
                 for (node, share) in corners_of(&surface, place, push) {
                     let last = self.increment.get(node).copied().unwrap_or_default().0;
-                    totals.add_work(share * axes(push.0).dot(mean(next(node), last)));
+                    totals.add_work(times * share * axes(push.0).dot(mean(next(node), last)));
                 }
             }
         }

@@ -7,8 +7,8 @@ use core::ops::Range;
 
 use crate::element::{
     AddCrushed, CrushedElements, CrushedForces, ElementMaterial, Elements, Extremes, ForcesVisitor, InternalForces,
-    LOOK_CYCLE, Look, MARKED, MeanPressure, NodalVolumes, NodeInertia, OwnPressure, PatchForces, each_marked, is_marked_at,
-    mask_of, masks, masks_mut,
+    LOOK_CYCLE, Look, MARKED, MeanPressure, NodalVolumes, NodeInertia, OwnPressure, PatchForces, each_marked,
+    is_marked_at, mask_of, masks, masks_mut,
 };
 use crate::loads::{Loads, ramp_factor};
 use crate::mesh::partition::{MAX_PARTITIONS, MOST_PARTS, Partitions};

@@ -55,7 +55,12 @@ fn ordinary_scenes_are_held_by_a_face_and_one_of_each_kind_follows_the_other() {
 #[test]
 fn long_steps_are_right_in_ordinary_scenes_and_seldom_doubted() {
     let folder = tempfile::tempdir().unwrap();
-    let plan = Plan { cases: vec![], counts: Counts { ordinary: 2, ..Counts::default() }, methods: vec![Method::Long], every: 3 };
+    let plan = Plan {
+        cases: vec![],
+        counts: Counts { ordinary: 2, ..Counts::default() },
+        methods: vec![Method::Long],
+        every: 3,
+    };
     let judged = evaluate(&plan, folder.path(), |_| ()).unwrap();
     print!("{}", report::text(&judged));
     assert_eq!(judged.len(), 4);
@@ -81,7 +86,11 @@ fn long_steps_are_right_in_ordinary_scenes_and_seldom_doubted() {
 fn an_instrument_presses_in_long_steps_and_others_are_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let methods = vec![Method::BackwardEuler, Method::Long];
-    let judged = evaluate(&Plan { cases: vec![], counts: Counts { ordinary: 6, ..Counts::default() }, methods, every: 3 }, folder.path(), |_| ());
+    let judged = evaluate(
+        &Plan { cases: vec![], counts: Counts { ordinary: 6, ..Counts::default() }, methods, every: 3 },
+        folder.path(),
+        |_| (),
+    );
     let judged = judged.unwrap();
     let of: Vec<&Judged> = judged.iter().filter(|run| run.row.scene == "instrument-00").collect();
     assert_eq!(of.iter().map(|run| run.row.method).collect::<Vec<_>>(), [Method::Long; 2]);

@@ -131,7 +131,9 @@ impl Plan {
         match (self.kind(index), self.cases.get(index)) {
             (_, Some(case)) => truth::obtain_one(case.clone(), &truths).map(Some),
             ((Kind::Hard, Some(number)), _) => drawn(|attempt| random::scene(number, attempt), f64::INFINITY, &truths),
-            ((Kind::Press, Some(number)), _) => drawn(|attempt| press::scene(number, attempt), press::FARTHEST, &truths),
+            ((Kind::Press, Some(number)), _) => {
+                drawn(|attempt| press::scene(number, attempt), press::FARTHEST, &truths)
+            }
             ((_, number), _) => {
                 drawn(|attempt| ordinary::scene(number.unwrap_or(0), attempt), ordinary::FARTHEST, &truths)
             }
