@@ -20,8 +20,8 @@ pub struct Method<'w> {
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 pub enum Cells {
     /// The largest near-cubic lattice whose cells are at least twice as wide as a cube of six elements of mean volume, and
-    /// whose matrices cost little to renew: at most 0.7 times the root of the number of elements functions, or 75 if that
-    /// is more. At least five nodes for each function, two where no lattice has five. A step takes a coarser one where
+    /// whose matrices cost little to renew: at most 0.7 times the root of the number of elements functions, or 68 if that
+    /// is more. At least four nodes for each function, two where no lattice has four. A step takes a coarser one where
     /// single precision cannot invert the matrices of this one, or where its stiffness differs much from that of the
     /// elements. No lattice if the mesh is too small for one cell.
     #[default]
@@ -133,7 +133,7 @@ const LEAST_SPACING: f32 = 2.0;
 const ELEMENTS_OF_CUBE: f32 = 6.0;
 
 /// Least number of nodes for each function of a suggested lattice, and on meshes that are too small for that.
-const NODES_PER_FUNCTION: [usize; 2] = [5, 2];
+const NODES_PER_FUNCTION: [usize; 2] = [4, 2];
 
 /// Most functions of a suggested lattice, over the root of the number of elements, so that a step which renews the
 /// matrices costs at most five exact ones. Measured, a cuboid of 10,800 elements with nodal strain that swings: 60
@@ -141,7 +141,7 @@ const NODES_PER_FUNCTION: [usize; 2] = [5, 2];
 /// .76 / 1.8 % and 3.2 to 4.3.
 const FUNCTIONS_OF_ROOT: f64 = 0.7;
 /// The same for bodies with few elements.
-const FEW_FUNCTIONS: usize = 75;
+const FEW_FUNCTIONS: usize = 68;
 
 /// See [`Cells::Suggested`]; of the lattices with fewer than `below` functions.
 pub(super) fn largest_grid<M>(scene: SceneView<'_, M>, points: &[[f32; 3]], below: usize) -> Grid {
