@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-ABI, ALIGN, EXPONENTIAL, CHECKED = 5, 64, 1, 0  # SUPPLE_... in include/supple.h
+ABI, ALIGN, EXPONENTIAL, CHECKED = 6, 64, 1, 0  # SUPPLE_... in include/supple.h
 ELEMENTS = {"linear": 0, "nodal-pressure": 1, "nodal-strain": 2}
 SIZE, CELLS = np.array([0.05, 0.05, 0.1]), (8, 8, 17)  # m
 LAW, DENSITY, DAMPING = (59.0, 8.023, 60000.0), 1000.0, 20.0  # a Pa, b, d Pa; kg/m^3; 1/s

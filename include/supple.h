@@ -74,7 +74,7 @@
  * Version of the interface: of structures, of functions' arguments, of what statuses mean. Put it into
  * the field `abi` of every configuration; a library of another version refuses it.
  */
-#define SUPPLE_ABI 5
+#define SUPPLE_ABI 6
 
 /**
  * No node, element or axis.
@@ -317,6 +317,11 @@ enum supple_status
      * A guard, automatic steps or supple_sim_advance estimate that the error is more than is allowed.
      */
     SUPPLE_INEXACT = 4,
+    /**
+     * The work that supple_sim_advance may take (`most_steps`) is spent before the end of the call; the report tells
+     * how much time is missing, and its estimate whether the steps were exact enough.
+     */
+    SUPPLE_BEHIND = 5,
     /**
      * A pointer that must not be NULL is.
      */
@@ -1362,6 +1367,11 @@ typedef struct {
      */
     uint32_t cells[3];
     /**
+     * The most work that a call of supple_sim_advance takes, in exact steps; a long or a learned one counts four. 0: as
+     * much as it takes. When it is spent the call ends with SUPPLE_BEHIND, and the next goes on from there.
+     */
+    uint32_t most_steps;
+    /**
      * Most forces on nodes that the loads will have.
      */
     uint32_t forces;
@@ -1442,6 +1452,10 @@ typedef struct {
      * Steps that were computed and not taken, or taken back.
      */
     uint32_t undone;
+    /**
+     * What is missing to the end of the call where the work was spent before it, s; else 0.
+     */
+    double missing;
     /**
      * The shortest and the longest step taken, s.
      */

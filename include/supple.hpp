@@ -57,6 +57,7 @@ enum class [[nodiscard]] status : std::int32_t {
     outside = SUPPLE_OUTSIDE,
     fell_back = SUPPLE_FELL_BACK,
     inexact = SUPPLE_INEXACT,
+    behind = SUPPLE_BEHIND,
 
     e_null = SUPPLE_E_NULL,
     e_misaligned = SUPPLE_E_MISALIGNED,
@@ -227,7 +228,7 @@ template <class Config> constexpr Config config() noexcept {
 constexpr bool every(supple_status code) noexcept {
     using s = status;
     switch (code) {
-    case of(s::ok): case of(s::limited): case of(s::outside): case of(s::fell_back): case of(s::inexact):
+    case of(s::ok): case of(s::limited): case of(s::outside): case of(s::fell_back): case of(s::inexact): case of(s::behind):
     case of(s::e_null): case of(s::e_misaligned): case of(s::e_short): case of(s::e_abi): case of(s::e_not_initialised):
     case of(s::e_kind): case of(s::e_choice): case of(s::e_mismatch): case of(s::e_capacity):
     case of(s::e_index): case of(s::e_not_finite): case of(s::e_negative): case of(s::e_overlap):

@@ -18,9 +18,13 @@ use crate::energy_balance::EnergyBalance;
 use crate::material::Element;
 use crate::scattered::scattered;
 pub use crate::simd::NodeVector;
+use crate::step::CriticalStep;
 
 /// Vectors of a node that a step moves: displacement, remainder, increment.
 pub(crate) const MOVED_VECTORS: usize = 3;
+
+/// A step over the critical one that is not an exact one.
+const MUCH_LONGER: f32 = 2.0;
 
 /// How far a simulation has come, apart from its vectors.
 #[derive(Clone, Copy, Debug)]
@@ -243,6 +247,14 @@ impl<'a> StateView<'a> {
             }
         }
         self.progress.dt = seconds;
+    }
+
+    /// Exact steps follow: after steps beyond the critical one they would count half the acceleration of the last of these
+    /// into their own, of nodes whose forces only added inertia bears.
+    pub(crate) fn end_long_steps(&mut self, critical: CriticalStep) {
+        if self.dt > MUCH_LONGER * critical.seconds {
+            self.respan(critical.seconds);
+        }
     }
 
     /// Puts the state where a method of the host's own has brought it at a time (s): `at` gives displacement and

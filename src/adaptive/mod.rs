@@ -23,7 +23,7 @@ use crate::material::Material;
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::StateView;
-use crate::step::{CallingThread, Status, Step, Threads};
+use crate::step::{CallingThread, Status, Step, Threads, Work};
 use crate::tled::{self, Approach, Pace, vectors_for_pace};
 use control::Control;
 
@@ -274,6 +274,7 @@ impl AdaptiveView<'_, '_> {
     pub fn advance<M: ElementMaterial>(
         mut self,
         seconds: f32,
+        work: &mut Work,
         scene: SceneView<'_, M>,
         loads: &mut impl LoadsOverTime,
         mut state: StateView<'_>,
@@ -284,14 +285,14 @@ impl AdaptiveView<'_, '_> {
         loop {
             let left = end - state.time();
             // A remainder of rounding is no step, and a span that is no number none either.
-            if left.is_nan() || left <= ROUNDING * f64::from(seconds) {
+            if left.is_nan() || left <= ROUNDING * f64::from(seconds) || work.is_spent() {
                 return (worst, taken);
             }
             let state = state.reborrow();
             let status = if self.chooser.control.halvings().is_none() {
-                self.exact_steps(left, scene, loads, state, threads, &mut taken)
+                self.exact_steps(left, work, scene, loads, state, threads, &mut taken)
             } else {
-                self.large_steps(left, scene, loads, state, threads, &mut taken)
+                self.large_steps(left, work, scene, loads, state, threads, &mut taken)
             };
             match status {
                 Ok(status) => worst = worst.worse(status),
@@ -302,9 +303,11 @@ impl AdaptiveView<'_, '_> {
 
     /// Takes exact steps until the next look at the critical step. The worst status, or that with which the span ends
     /// early.
+    #[allow(clippy::too_many_arguments)]
     fn exact_steps<M: ElementMaterial>(
         &mut self,
         left: f64,
+        work: &mut Work,
         scene: SceneView<'_, M>,
         loads: &mut impl LoadsOverTime,
         mut state: StateView<'_>,
@@ -319,8 +322,9 @@ impl AdaptiveView<'_, '_> {
         if control.begins_probe() {
             watch.begin_anew();
         }
-        let mut worst = Status::Ok;
+        let (mut worst, most) = (Status::Ok, *work);
         let enter = |status: Status, loads: &Loads<'_>, state: StateView<'_>| {
+            work.exact_step();
             if !status.is_taken() {
                 return;
             }
@@ -337,7 +341,7 @@ impl AdaptiveView<'_, '_> {
                 }
             }
         };
-        let answer = pace.approach(left, longest.damping(), scene, loads, state.reborrow(), kept, threads, enter);
+        let answer = pace.approach(left, longest.damping(), most, scene, loads, state.reborrow(), kept, threads, enter);
         match answer {
             // The rest of the span is no step.
             Approach::TooShort => Err(worst),
@@ -358,9 +362,11 @@ impl AdaptiveView<'_, '_> {
 
     /// Takes steps of one length beyond the critical step to the end of the span, or until another length is better.
     /// The worst status, or that with which the span ends early.
+    #[allow(clippy::too_many_arguments)]
     fn large_steps<M: ElementMaterial>(
         &mut self,
         left: f64,
+        work: &mut Work,
         scene: SceneView<'_, M>,
         loads: &mut impl LoadsOverTime,
         mut state: StateView<'_>,
@@ -378,6 +384,10 @@ impl AdaptiveView<'_, '_> {
         }
         let (count, mut worst) = (count as u32, Status::Ok);
         for done in 0..count {
+            if work.is_spent() {
+                return Ok(worst);
+            }
+            work.long_step();
             let loads = loads.of_step(&state, seconds, count - done);
             let Some(StorageParts { first, second, .. }) = self.chooser.parts(self.storage) else {
                 return Err(mismatch);
@@ -492,7 +502,8 @@ impl<'w, S: AsMut<[NodeVector]>> Adaptive<'w, S> {
         loads: &mut impl LoadsOverTime,
         state: StateView<'_>,
     ) -> (Status, Taken) {
-        self.view().advance(seconds, scene, loads, state, &CallingThread)
+        let mut work = Work::UNBOUNDED;
+        self.view().advance(seconds, &mut work, scene, loads, state, &CallingThread)
     }
 }
 

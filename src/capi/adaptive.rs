@@ -8,7 +8,7 @@ use crate::adaptive::{AdaptiveView, Chooser, Request, StorageParts, Taken, vecto
 use crate::guard::{Watch, second_run};
 use crate::inertia::LargeModel;
 use crate::state::{NodeVector, StateView};
-use crate::step::Step;
+use crate::step::{Step, Work};
 
 use super::guard::{estimated, supple_estimate};
 use super::large::{LargeRequest, storage, supple_large_config};
@@ -203,8 +203,9 @@ pub unsafe extern "C" fn supple_adaptive_advance(
         let written = place_if_wanted(taken)?;
         let mut state = loads.attached(opened_of(&open, state)?);
         let view = AdaptiveView { chooser: &mut *chooser, first, second, watch: &mut *watch, storage };
+        let mut work = Work::UNBOUNDED;
         let (status, Taken { exact, large, changes }) =
-            view.advance(span.seconds(), open.view(), &mut loads.of_call, state.reborrow(), &threads);
+            view.advance(span.seconds(), &mut work, open.view(), &mut loads.of_call, state.reborrow(), &threads);
         loads.enter(state.touches());
         report.enter(&status, &state);
         report.steps = exact + large;

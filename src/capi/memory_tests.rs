@@ -131,7 +131,7 @@ fn host(element: u32, network: &[u8]) {
         assert_eq!(supple_set_gravity(loads, [0.0, 0.0, -9.81].as_ptr()), SUPPLE_OK);
         let force = supple_force { node: NODES - 2, newton: [1e-3; 3], ramp: 0.0 };
         assert_eq!(supple_set_forces(loads, [force, force].as_ptr(), 2, null_mut()), SUPPLE_OK);
-        let motion = supple_motion { node: NODES - 1, axes: 7, metre: [1e-5; 3], ramp: 0.0 };
+        let motion = supple_motion { node: NODES - 1, axes: 7, metre: [1e-7; 3], ramp: 0.0 };
         assert_eq!(supple_set_motions(loads, scene, &motion, 1, null_mut()), SUPPLE_OK);
         let step = supple_step_config {
             struct_size: size::<supple_step_config>(),

@@ -13,7 +13,7 @@ use crate::material::Element;
 use crate::mlp::Network;
 use crate::simulation::{Clock, Event, ExactSteps, LONG_STEPS, LONGEST_STEPS, Lead, Mover, usual_tolerance};
 use crate::state::NodeVector;
-use crate::step::{CriticalStep, Step};
+use crate::step::{CriticalStep, Status, Step, Work};
 use crate::tled::{Pace, vectors_for_pace};
 
 use super::SUPPLE_NONE;
@@ -72,6 +72,9 @@ pub struct supple_settings {
     pub lead_in: f64,
     /// Cells of the lattice of long steps along x, y, z; zeros: chosen for the scene.
     pub cells: [u32; 3],
+    /// The most work that a call of supple_sim_advance takes, in exact steps; a long or a learned one counts four. 0: as
+    /// much as it takes. When it is spent the call ends with SUPPLE_BEHIND, and the next goes on from there.
+    pub most_steps: u32,
     /// Most forces on nodes that the loads will have.
     pub forces: u32,
     /// Most motions.
@@ -105,6 +108,8 @@ pub struct supple_sim {
     /// The address that the contact of the loads was set at.
     address: usize,
     clock: Clock,
+    /// Of a call.
+    work: Work,
     prepared: Prepared,
 }
 
@@ -173,6 +178,8 @@ pub struct supple_sim_report {
     pub learned: u32,
     /// Steps that were computed and not taken, or taken back.
     pub undone: u32,
+    /// What is missing to the end of the call where the work was spent before it, s; else 0.
+    pub missing: f64,
     /// The shortest and the longest step taken, s.
     pub shortest: f32,
     pub longest: f32,
@@ -187,6 +194,7 @@ impl Reported for supple_sim_report {
         long_steps: 0,
         learned: 0,
         undone: 0,
+        missing: 0.0,
         shortest: 0.0,
         longest: 0.0,
         estimate: guard::estimated(None),
@@ -214,6 +222,7 @@ pub unsafe extern "C" fn supple_default_settings(settings: *mut supple_settings)
             fallback: 1,
             lead_in: 0.3,
             cells: [0; 3],
+            most_steps: 0,
             forces: 0,
             motions: 0,
             grips: 0,
@@ -335,14 +344,17 @@ pub unsafe extern "C" fn supple_sim_advance(
         let threads = HostThreads::of(threads)?;
         let mut state = loads.attached(opened_of(&open, objects.state)?);
         let CallLoads { of_call, contact } = &mut loads;
-        let supple_sim { clock, prepared, .. } = &mut *sim;
+        let supple_sim { clock, prepared, work, .. } = &mut *sim;
         let until = clock.end_of_call(state.time(), seconds);
         let mut watched = Watched { call: supple_report::NOTHING, contact, mark: None };
         let mover = prepared.mover(sim)?;
-        let taken = mover.advance(until, open.view(), of_call, state.reborrow(), &threads, &mut |event| {
+        let taken = mover.advance(until, open.view(), of_call, state.reborrow(), *work, &threads, &mut |event| {
             watched.enter(&event);
         });
-        clock.ended(state.time());
+        match &taken {
+            Ok(report) if matches!(report.status, Status::Behind { .. }) => clock.ended_early(state.time()),
+            _ => clock.ended(state.time()),
+        }
         let call = watched.call;
         *report = supple_sim_report { call, ..supple_sim_report::NOTHING };
         report.call.close(&state);
@@ -352,6 +364,9 @@ pub unsafe extern "C" fn supple_sim_advance(
         report.undone = taken.undone;
         [report.shortest, report.longest] = taken.seconds;
         report.estimate = guard::estimated(taken.estimate);
+        if let Status::Behind { seconds } = taken.status {
+            report.missing = seconds;
+        }
         let remark = answer(&taken.status)?;
         let outside = if call.outside > MUCH_OUTSIDE { SUPPLE_OUTSIDE } else { SUPPLE_OK };
         let fell_back = if taken.fell_back { SUPPLE_FELL_BACK } else { SUPPLE_OK };
@@ -543,7 +558,7 @@ unsafe fn build(
             }
         }
         let (place_of_steps, end, address) = (room.used, room.used, start.addr());
-        let (clock, prepared) = (Clock::default(), Prepared::None);
+        let (clock, work, prepared) = (Clock::default(), Work::UNBOUNDED, Prepared::None);
         let sim = place.put(|head| supple_sim {
             head: head.of_bytes(bytes),
             nodes,
@@ -555,6 +570,7 @@ unsafe fn build(
             end,
             address,
             clock,
+            work,
             prepared,
         });
         if let Err(error) = prepare(sim, settings) {
@@ -616,10 +632,14 @@ unsafe fn prepare(sim: *mut supple_sim, settings: &supple_settings) -> Answer<()
         if bytes.saturating_sub(steps) < needed {
             return Err(short(bytes, steps + needed));
         }
+        if settings.steps != SUPPLE_STEPS_LONG {
+            opened_of(&open, state)?.end_long_steps(critical);
+        }
         let mut room = Room { start: sim.cast(), used: steps, bytes };
         (*sim).prepared = Prepared::None;
         let made = made(settings, critical, &mut room, (scene, state), points)?;
         ((*sim).prepared, (*sim).end) = (made, room.used);
+        (*sim).work = if settings.most_steps == 0 { Work::UNBOUNDED } else { Work::of(settings.most_steps) };
         Ok(())
     }
 }

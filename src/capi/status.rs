@@ -36,6 +36,9 @@ pub enum supple_status {
     SUPPLE_FELL_BACK = 3,
     /// A guard, automatic steps or supple_sim_advance estimate that the error is more than is allowed.
     SUPPLE_INEXACT = 4,
+    /// The work that supple_sim_advance may take (`most_steps`) is spent before the end of the call; the report tells
+    /// how much time is missing, and its estimate whether the steps were exact enough.
+    SUPPLE_BEHIND = 5,
 
     /// A pointer that must not be NULL is.
     SUPPLE_E_NULL = -1,
@@ -389,6 +392,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         2 => c"learned steps were taken, with inputs outside what training has seen",
         3 => c"exact steps have taken the place of learned ones that were not to be believed",
         4 => c"the error is estimated to be more than is allowed",
+        5 => c"the work that a call may take is spent before its end",
         -1 => c"a pointer is NULL",
         -2 => c"a pointer is not aligned",
         -3 => c"fewer bytes or floats than needed",

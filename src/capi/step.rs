@@ -125,6 +125,7 @@ pub(super) fn answer(status: &Status) -> Answer<supple_status> {
         Status::Ok => Ok(SUPPLE_OK),
         Status::Limited { .. } => Ok(SUPPLE_LIMITED),
         Status::Inexact { .. } => Ok(SUPPLE_INEXACT),
+        Status::Behind { .. } => Ok(SUPPLE_BEHIND),
         Status::Diverged(Divergence { node, cause, .. }) => Err(match cause {
             Cause::NotFinite => supple_error::from(SUPPLE_E_DIVERGED).node(node),
             Cause::Instrument { index, metre, most } => {
@@ -201,7 +202,7 @@ pub(super) fn take_steps(
         report.enter(&status, state);
         match status {
             Status::Ok => {}
-            Status::Limited { .. } | Status::Inexact { .. } => worst = status,
+            taken if taken.is_taken() => worst = taken,
             refused => return refused,
         }
     }

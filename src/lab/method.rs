@@ -10,7 +10,7 @@ use supple::mlp::{Network, WeightBytes};
 use supple::scene::SceneView;
 use supple::simulation::{ExactSteps, Lead, Mover};
 use supple::state::{NodeVector, VecState};
-use supple::step::{CallingThread, Status, Step};
+use supple::step::{CallingThread, Status, Step, Work};
 
 use super::networks::{self, Family};
 use super::scenes::SceneSpec;
@@ -108,7 +108,8 @@ impl Prepared<'_> {
             Self::Own(step) => return Ok((step(state, loads), None)),
         };
         let until = state.time() + f64::from(seconds);
-        let report = mover.advance(until, scene, &mut { *loads }, state.view(), &CallingThread, &mut |_| {})?;
+        let report =
+            mover.advance(until, scene, &mut { *loads }, state.view(), Work::UNBOUNDED, &CallingThread, &mut |_| {})?;
         let clipped = match self {
             Self::Learned(learned, ..) if report.learned > 0 => Some(learned.model().report().clipped),
             _ => None,

@@ -18,6 +18,11 @@ impl Clock {
         if libm::fabs(due - now) <= 1e-6 * seconds { now + seconds } else { self.until }
     }
 
+    /// The call has ended at this time (s), and what is missing is not made up for.
+    pub const fn ended_early(&mut self, time: f64) {
+        (self.until, self.ended) = (time, time);
+    }
+
     /// The call has ended at this time, s.
     pub const fn ended(&mut self, time: f64) {
         self.ended = time;

@@ -10,7 +10,7 @@ use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::StateView;
-use crate::step::{Cause, Divergence, MOST_OF_SIZE, ROUNDING, Status, Step, Threads, equal_steps};
+use crate::step::{Cause, Divergence, MOST_OF_SIZE, ROUNDING, Status, Step, Threads, Work, equal_steps};
 use crate::tled::{self, Approach, Pace};
 
 /// How often a long step is halved that tissue or an instrument is too fast for.
@@ -101,22 +101,24 @@ struct Call<'c, L, T, W> {
     threads: &'c T,
     watch: &'c mut W,
     report: Report,
+    work: Work,
 }
 
 impl Mover<'_, '_> {
     /// Moves on until the time `until` (s), or to a step that is refused: the state is then that before it, and the
-    /// report has the status. `watch` is shown each step.
+    /// report has the status; or until the work is spent, which the status says. `watch` is shown each step.
     pub fn advance<M: ElementMaterial>(
         self,
         until: f64,
         scene: SceneView<'_, M>,
         loads: &mut impl LoadsOverTime,
         mut state: StateView<'_>,
+        work: Work,
         threads: &impl Threads,
         watch: &mut impl FnMut(Event<'_>),
     ) -> Result<Report, LearnedError> {
         let report = Report::new(state.time());
-        let mut call = Call { loads, threads, watch, report };
+        let mut call = Call { loads, threads, watch, report, work };
         let span = until - state.time();
         match self {
             // The last call may have ended here or beyond; a span that is no number is none either.
@@ -129,6 +131,10 @@ impl Mover<'_, '_> {
             Self::Learned(learned, exact, lead, guard) => {
                 call.learned_steps(learned, exact, lead, guard, span, scene, &mut state)?;
             }
+        }
+        let missing = until - state.time();
+        if call.work.is_spent() && call.report.status.is_taken() && missing > ROUNDING * span {
+            call.report.enter(Status::Behind { seconds: missing });
         }
         Ok(Report { time: state.time(), ..call.report })
     }
@@ -144,7 +150,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         scene: SceneView<'_, M>,
         state: &mut StateView<'_>,
     ) -> bool {
-        let Self { loads, threads, watch, report } = self;
+        let Self { loads, threads, watch, report, work } = self;
         let loads = &mut Longer { loads: &mut **loads, rest };
         match exact {
             ExactSteps::Fixed(step) => {
@@ -152,6 +158,10 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
                 // Only a span of 1e-18 s or less: that is no step.
                 let Ok(step) = Step::unchecked(seconds, step.damping()) else { return true };
                 for done in 0..count {
+                    if work.is_spent() {
+                        return false;
+                    }
+                    work.exact_step();
                     let loads = loads.of_step(state, seconds, count - done);
                     let status = tled::step_in_parts(scene, &loads, state.reborrow(), &step, *threads);
                     watch(Event::Step(StepKind::Exact, status, state));
@@ -168,6 +178,9 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
             ExactSteps::Paced { pace, kept, damping } => {
                 let until = state.time() + span;
                 while until - state.time() > ROUNDING * span {
+                    if work.is_spent() {
+                        return false;
+                    }
                     watch(Event::Tries(state.time()));
                     let (left, mut worst, mut taken) = (until - state.time(), Status::Ok, 0);
                     let enter = |status: Status, _: &Loads<'_>, state: StateView<'_>| {
@@ -175,8 +188,10 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
                         worst = worst.worse(status);
                         taken += 1;
                     };
-                    let state = state.reborrow();
-                    match pace.approach(left, *damping, scene, loads, state, kept, *threads, enter) {
+                    let (state, most) = (state.reborrow(), *work);
+                    let answer = pace.approach(left, *damping, most, scene, loads, state, kept, *threads, enter);
+                    (0..taken).for_each(|_| work.exact_step());
+                    match answer {
                         Approach::Undone => {
                             report.undone += taken;
                             watch(Event::TakenBack);
@@ -238,7 +253,8 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         let mut longest = model.longest();
         let shortest = longest / (1 << MOST_HALVINGS) as f32;
         let (mut left, mut seconds) = equal_steps(span, longest);
-        while left > 0 {
+        while left > 0 && !self.work.is_spent() {
+            self.work.long_step();
             // Only a span of 1e-18 s or less: that is no step.
             if model.set_seconds(seconds).is_err() {
                 return;
@@ -281,7 +297,8 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
     ) {
         let AdaptiveView { chooser, first, second, watch, storage } = adaptive;
         let view = AdaptiveView { chooser: &mut *chooser, first, second, watch: &mut *watch, storage };
-        let (status, taken) = view.advance(span as f32, scene, self.loads, state.reborrow(), self.threads);
+        let work = &mut self.work;
+        let (status, taken) = view.advance(span as f32, work, scene, self.loads, state.reborrow(), self.threads);
         let own = if matches!(status, Status::Inexact { .. }) { Status::Ok } else { status };
         (self.watch)(Event::Step(StepKind::Auto, own, state));
         let report = &mut self.report;
@@ -307,6 +324,9 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
         let seconds = learned.model().seconds();
         let count = libm::round(span / f64::from(seconds)).clamp(0.0, f64::from(u32::MAX)) as u32;
         for done in 0..count {
+            if self.work.is_spent() {
+                return Ok(());
+            }
             if !learned.model().is_led(state) {
                 if state.last_step() == 0.0 {
                     // From rest, also after a reset: the frames have followed nothing yet.
@@ -321,6 +341,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
             lead.left = lead.left.saturating_sub(1);
             let mut exact_next = is_leading || learned.model().is_exact_next();
             if !exact_next {
+                self.work.long_step();
                 let loads = self.loads.of_step(state, seconds, count - done);
                 (self.watch)(Event::Predicts(state.time()));
                 let tried = learned.try_step(scene, &loads, state, exact.seconds(), self.threads)?;

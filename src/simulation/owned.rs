@@ -19,7 +19,7 @@ use crate::mesh::{Mesh, MeshError, Winding};
 use crate::scene::{BuildError, Support, VecScene};
 use crate::simd::NodeVector;
 use crate::state::VecState;
-use crate::step::{CallingThread, CriticalStep, Divergence, Status, Step, StepError, Threads};
+use crate::step::{CallingThread, CriticalStep, Divergence, Status, Step, StepError, Threads, Work};
 use crate::tled::{self, Pace, vectors_for_pace};
 
 /// A scene in motion. Loads and instruments are set between two calls of [`Simulation::advance`] as the host likes.
@@ -147,7 +147,8 @@ impl<'w> Simulation<'w> {
             return Err(SimulationError::Seconds(seconds));
         }
         self.prepare_once()?;
-        let Self { gravity, forces, motions, instruments, scene, state, touchable, in_step, clock, .. } = self;
+        let Self { gravity, forces, motions, instruments, scene, state, settings, touchable, in_step, clock, .. } =
+            self;
         let mut loads = Loads::new(&*scene, *gravity, forces, motions)?;
         if !instruments.is_empty() {
             loads = loads.touched_by(Contact::new(surface(touchable, scene.node_count())?, instruments)?);
@@ -158,8 +159,12 @@ impl<'w> Simulation<'w> {
         // Not reached: prepared above; there is no panic in its place.
         let Some(prepared) = &mut self.prepared else { return Err(SimulationError::NotFinite) };
         let mover = prepared.mover();
-        let report = mover.advance(end, scene.view(), &mut loads, state.view(), threads, &mut |_| {})?;
-        clock.ended(state.time());
+        let work = settings.most_steps.map_or(Work::UNBOUNDED, Work::of);
+        let report = mover.advance(end, scene.view(), &mut loads, state.view(), work, threads, &mut |_| {})?;
+        match report.status {
+            Status::Behind { .. } => clock.ended_early(state.time()),
+            _ => clock.ended(state.time()),
+        }
         match report.status {
             Status::Diverged(divergence) => Err(SimulationError::Refused(divergence)),
             _ => Ok(report),
@@ -176,11 +181,13 @@ impl<'w> Simulation<'w> {
         watch: &mut dyn FnMut(Event<'_>),
     ) -> Result<Report, SimulationError> {
         self.prepare_once()?;
-        let Self { scene, state, prepared, .. } = self;
+        let Self { scene, state, prepared, settings, .. } = self;
+        let work = settings.most_steps.map_or(Work::UNBOUNDED, Work::of);
         // Not reached: prepared above; there is no panic in its place.
         let Some(prepared) = prepared else { return Err(SimulationError::NotFinite) };
         let mover = prepared.mover();
-        Ok(mover.advance(until, scene.view(), &mut loads, state.view(), &CallingThread, &mut |event| watch(event))?)
+        let watch = &mut |event: Event<'_>| watch(event);
+        Ok(mover.advance(until, scene.view(), &mut loads, state.view(), work, &CallingThread, watch)?)
     }
 
     fn prepare_once(&mut self) -> Result<(), SimulationError> {
@@ -194,6 +201,9 @@ impl<'w> Simulation<'w> {
         let Self { scene, state, points, settings, .. } = self;
         let Settings { step, damping, tolerance, unchecked, .. } = *settings;
         let nodes = scene.node_count();
+        if !matches!(settings.method, Method::Long(_)) {
+            state.view().end_long_steps(critical);
+        }
         let exact = |damping: f32| match step {
             Some(seconds) if unchecked => Ok(Exact::Fixed(Step::unchecked(seconds, damping)?)),
             _ => {

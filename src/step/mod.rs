@@ -13,6 +13,7 @@ mod parts;
 mod status;
 pub(crate) mod threads;
 mod triangles;
+mod work;
 
 pub(crate) use crate::element::Extremes;
 pub use crate::energy_balance::{EnergyBalance, EnergyCycle};
@@ -27,6 +28,7 @@ pub use status::{Divergence, Status};
 #[cfg(feature = "parallel")]
 pub use threads::Rayon;
 pub use threads::{CallingThread, MOST_PARTS, Threads};
+pub use work::Work;
 
 use crate::contact::{ContactPoint, Touch};
 use crate::element::{ElementMaterial, NodeInertia, mark_moment};

@@ -30,6 +30,11 @@ pub enum Status {
         /// What is allowed, m.
         allowed: f32,
     },
+    /// Steps were taken, but the work that a call may take ([`super::Work`]) is spent before its end.
+    Behind {
+        /// What is missing to the end of the call, s.
+        seconds: f64,
+    },
     /// The step was not taken and the state is as before.
     Diverged(Divergence),
     /// The step was not taken: the state has room for fewer nodes than the scene, or the loads were
@@ -65,7 +70,7 @@ impl Status {
     }
 
     /// The status of two steps, this one and a `later`: the later, unless that is `Ok`, or `Inexact` after `Limited`. A
-    /// refusal ends a call, so that it is the last there.
+    /// refusal or what is missing ends a call, so that it is the last there.
     pub fn worse(self, later: Self) -> Self {
         match (self, later) {
             (_, Self::Ok) => self,
@@ -77,7 +82,7 @@ impl Status {
     /// Whether the step was taken.
     #[must_use]
     pub const fn is_taken(&self) -> bool {
-        matches!(self, Self::Ok | Self::Limited { .. } | Self::Inexact { .. })
+        matches!(self, Self::Ok | Self::Limited { .. } | Self::Inexact { .. } | Self::Behind { .. })
     }
 
     /// Whether a step was refused because tissue and an instrument come too near in it.

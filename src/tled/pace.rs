@@ -10,7 +10,7 @@ use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::SceneView;
 use crate::simd::NodeVector;
 use crate::state::{MOVED_VECTORS, Moment, StateView};
-use crate::step::{CriticalStep, ROUNDING, Status, Step, StepError, Threads, equal_steps};
+use crate::step::{CriticalStep, ROUNDING, Status, Step, StepError, Threads, Work, equal_steps};
 
 use super::critical::{Weights, critical};
 use super::step_in_parts;
@@ -124,12 +124,13 @@ impl Pace {
     }
 
     /// Takes steps until the next look at the critical step, of a length of which whole numbers make up `left` seconds,
-    /// and no more of them than that. `enter` is called after each step. `kept` are [`vectors_for_pace`] vectors.
+    /// and no more of them than that or than there is work for. `enter` is called after each step. `kept` are [`vectors_for_pace`] vectors.
     #[allow(clippy::too_many_arguments)]
     pub fn approach<M: ElementMaterial>(
         &mut self,
         left: f64,
         damping: f32,
+        work: Work,
         scene: SceneView<'_, M>,
         loads: &mut impl LoadsOverTime,
         mut state: StateView<'_>,
@@ -149,7 +150,7 @@ impl Pace {
         let (force, weights) = kept.split_at_mut(nodes.min(kept.len()));
         state.save(before);
         let progress = *state.progress;
-        let count = whole.min(self.steps.saturating_sub(self.taken));
+        let count = whole.min(self.steps.saturating_sub(self.taken)).min(work.exact_steps().max(1));
         let (mut refused, mut taken, mut extremes, mut squeezed) = (None, 0, Extremes::none(), false);
         while taken < count && !squeezed {
             let of_step = loads.of_step(&state, seconds, whole.saturating_sub(taken));

@@ -647,6 +647,7 @@ static supple_settings some_settings(void) {
     made.struct_size = number(made.struct_size), made.abi = number(made.abi), made.steps = number(below(4));
     made.seconds = one_in(2) ? 0.0f : one_in(5) ? wild(1e-3f) : 1e-4f, made.damping = one_in(5) ? wild(20.0f) : 20.0f;
     made.tolerance = one_in(2) ? 0.0f : one_in(5) ? wild(1e-3f) : 1e-3f;
+    made.most_steps = one_in(2) ? 0 : number(1 + below(30));
     made.guard = number(below(2)), made.fallback = number(below(2)), made.lead_in = (double)(one_in(20) ? wild(0.01f) : 0.0f);
     for (int axis = 0; axis < 3; axis++) made.cells[axis] = number(1 + below(2));
     if (made.cells[0] * made.cells[1] * made.cells[2] > 8) made.cells[below(3)] = 0;

@@ -546,6 +546,21 @@ static void guards(void) {
     CHECK(told == SUPPLE_INEXACT && estimate.known == 1 && estimate.mean > estimate.allowed && estimate.allowed == 1e-9f);
 }
 
+/* A call of one step for a second. */
+static void little_work(const supple_scene_config *config) {
+    supple_settings settings;
+    DONE(supple_default_settings(&settings));
+    settings.most_steps = 1;
+    size_t bytes = 0;
+    DONE(supple_sim_size(config, &settings, &bytes, &error));
+    CHECK(bytes <= sizeof spare);
+    supple_sim *sim = NULL;
+    DONE(supple_sim_setup(spare, sizeof spare, config, &settings, &sim, &error));
+    const supple_status told = supple_sim_advance(sim, 1.0, NULL, NULL);
+    note(told);
+    CHECK(told == SUPPLE_BEHIND);
+}
+
 static void adaptive_steps(void) {
     static const supple_large_config good = {SUPPLE_CONFIG(supple_large_config), 1.0f / 60.0f, 20.0f, {0, 0, 0}, NULL, 0};
     supple_adaptive *none = NULL, *adaptive = NULL;
@@ -934,6 +949,7 @@ int main(int argc, char **argv) {
     surfaces();
     contacts();
     remarks(config);
+    little_work(&config);
     DONE(supple_state_reset(state));
     REFUSED(SUPPLE_E_ELEMENT, supple_step(other_element(config), NULL, state, 1, NULL, NULL));
 

@@ -269,6 +269,31 @@ static void refusals_change_nothing(void) {
     printf("simulation: three kinds of steps in turn, %.2f mm on average\n", 1e3 * mean_motion(from_sim));
 }
 
+/* With little work a call ends early and says so; the next one goes on from there. */
+static void a_call_ends_when_its_work_is_spent(uint32_t steps) {
+    supple_settings settings = settings_of(steps, 0.0f);
+    settings.most_steps = 20;
+    supple_sim_objects objects;
+    supple_sim *sim = set_up(&settings, &objects);
+    pull(objects.scene, objects.loads, 1);
+    double time = 0.0;
+    for (int call = 0; call < 5; call++) {
+        supple_sim_report report;
+        CHECK(supple_sim_advance(sim, 0.5, NULL, &report) == SUPPLE_BEHIND);
+        CHECK(report.missing > 0.1 && fabs(report.call.time + report.missing - time - 0.5) < 1e-6 && report.call.time > time);
+        const uint32_t work = report.exact + report.undone + 4 * report.long_steps;
+        CHECK(work >= 20 && work < 24);
+        time = report.call.time;
+    }
+    settings.most_steps = 0;
+    CHECK(supple_sim_set(sim, &settings, NULL) == SUPPLE_OK);
+    supple_sim_report report;
+    const supple_status told = supple_sim_advance(sim, 0.1, NULL, &report);
+    printf("simulation: work of 20 steps a call, then %s, missing %g s\n", supple_status_text(told), report.missing);
+    CHECK(told >= SUPPLE_OK);
+    CHECK(report.missing == 0.0 && fabs(report.call.time - time - 0.1) < 1e-6);
+}
+
 int main(void) {
     body = bar_config();
     file("weights/compact-10.weights", weights_memory, sizeof weights_memory, &weights_bytes);
@@ -279,5 +304,8 @@ int main(void) {
     copies_go_on(SUPPLE_STEPS_EXACT);
     copies_go_on(SUPPLE_STEPS_AUTO);
     refusals_change_nothing();
+    a_call_ends_when_its_work_is_spent(SUPPLE_STEPS_EXACT);
+    a_call_ends_when_its_work_is_spent(SUPPLE_STEPS_LONG);
+    a_call_ends_when_its_work_is_spent(SUPPLE_STEPS_AUTO);
     return 0;
 }

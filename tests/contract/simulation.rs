@@ -323,3 +323,62 @@ fn what_is_refused_is_told_and_leaves_the_motion_as_it_was() {
     assert_eq!(bits(simulation.state()), before);
     assert!(simulation.advance(FRAME).unwrap().is_ok());
 }
+
+/// Whatever moves it: no call takes more work than it may, each says what is missing, and nothing is made up for.
+#[test]
+fn a_call_ends_when_its_work_is_spent() {
+    const MOST: u32 = 24;
+    let body = small_bar();
+    let critical = Parts::of(&body).critical.seconds;
+    for (name, method, step) in [
+        ("exact, paced", Method::Exact, None),
+        ("exact, of one length", Method::Exact, Some(0.5 * critical)),
+        ("long", Method::Long(long()), Some(6.0 * critical)),
+        ("auto", Method::Auto(long()), None),
+    ] {
+        let settings = Settings { method, step, damping: DAMPING, most_steps: Some(MOST), ..Settings::default() };
+        let mut simulation = twisted(&body, settings);
+        let mut time = 0.0;
+        for _ in 0..20 {
+            // More than there is work for.
+            let report = simulation.advance(0.1).unwrap();
+            let Status::Behind { seconds } = report.status else { panic!("{:?}", report.status) };
+            let work = report.exact + report.undone + 4 * report.long;
+            assert!((MOST..MOST + 4).contains(&work), "{name}: {report:?}");
+            assert!(report.time > time && (report.time + seconds - time - 0.1).abs() < 1e-6, "{report:?}");
+            time = report.time;
+        }
+        println!("{name}: {:.1} mm after {time:.3} s", 1e3 * moved(simulation.state()));
+        assert!(moved(simulation.state()) > 1e-3);
+        // With enough of it the same steps, and no word.
+        let frame = 0.25 * f64::from(critical) * f64::from(MOST);
+        let report = simulation.advance(0.25 * frame).unwrap();
+        assert!(!matches!(report.status, Status::Behind { .. }) && (report.time - time - 0.25 * frame).abs() < 1e-9);
+    }
+}
+
+/// Nodes whose forces only added inertia bears must not be thrown by the first exact step.
+#[test]
+fn settings_may_change_from_long_to_exact_steps() {
+    let body = small_bar();
+    let critical = Parts::of(&body).critical.seconds;
+    let exact = Settings { damping: DAMPING, ..Settings::default() };
+    let long = Settings { method: Method::Long(long()), step: Some(20.0 * critical), ..exact.clone() };
+    for element in [Element::Linear, Element::NodalPressure, Element::NodalStrain] {
+        let begun = |settings: &Settings<'static>| {
+            let made = Simulation::new(body.points.clone(), body.tets.clone(), material(element), &held(&body));
+            let mut simulation = made.unwrap().with(settings.clone());
+            simulation.forces = torsion(&body, 2e-3, 0.02);
+            frames(&mut simulation, 6);
+            simulation
+        };
+        let [mut changed, mut expected] = [&long, &exact].map(begun);
+        changed.set(exact.clone());
+        let reports = [&mut changed, &mut expected].map(|each| each.advance(20.0 * f64::from(critical)).unwrap());
+        let [kinetic, of_exact] = [&changed, &expected].map(|each| each.state().energy_balance().kinetic);
+        println!("{element:?}: kinetic energy {kinetic:.2e} J, of exact steps alone {of_exact:.2e} J");
+        assert!(reports.iter().all(|report| report.undone == 0 && report.is_ok()), "{reports:?}");
+        // What long steps leave strained is set free, and no more: without care it is three times as much.
+        assert!(kinetic < 15.0 * of_exact && of_exact > 1e-6);
+    }
+}

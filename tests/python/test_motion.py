@@ -220,3 +220,16 @@ def test_a_network_moves_the_bar_of_its_training():
     error = np.linalg.norm(learned - exact, axis=1).mean()
     print(f"learned: {1e3 * error:.3f} of {1e3 * still:.3f} mm")
     assert still > 0.001 and error < 0.5 * still
+
+
+@pytest.mark.parametrize("method", ["exact", "long", "auto"])
+def test_a_call_ends_when_its_work_is_spent(lobe, liver, method):
+    simulation = supple.Simulation(supple.Scene(lobe, liver, fixed=lobe.points[:, 0] < 0.01), method, damping=20.0, most_steps=40)
+    simulation.gravity = (0.0, 0.0, -9.81)
+    for call in range(3):
+        before, report = simulation.time, simulation.advance(1.0)
+        assert report.status == "behind" and report.missing == pytest.approx(before + 1.0 - report.time)
+        assert 40 <= report.exact + report.undone + 4 * report.long < 44
+    assert np.abs(simulation.displacements).max() > 1e-6
+    with pytest.raises(supple.InputError, match="most_steps 0: it must be a whole number, at least 1"):
+        supple.Simulation(simulation.scene, most_steps=0)

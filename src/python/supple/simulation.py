@@ -35,6 +35,7 @@ _WORDS = {
     lib.SUPPLE_OUTSIDE: "outside",
     lib.SUPPLE_FELL_BACK: "fell back",
     lib.SUPPLE_INEXACT: "inexact",
+    lib.SUPPLE_BEHIND: "behind",
 }
 # What the index of a remark stands for.
 _PLACES = {
@@ -72,7 +73,8 @@ class Report:
     """What a call of `advance` came to.
 
     `status` is "ok"; "limited" (steps were taken, but are not exact), "outside" (the network saw what its training had not),
-    "fell back" (exact steps took the place of learned ones), "inexact" (the estimate of the error exceeds what is allowed).
+    "fell back" (exact steps took the place of learned ones), "inexact" (the estimate of the error exceeds what is allowed),
+    "behind" (the work that a call may take is spent, and `missing` seconds of it are).
     It is the worst of all steps of the call. `estimate`: mean error of the nodes (m) after the last of them, by the guard or the
     automatic steps, None where there is none (yet); `largest_estimate`: that of the worst node, `worst_node`; `allowed`: what the guard
     accepts for the mean, a fifth of the motion so far or the tolerance. `exact`, `long`, `learned` count the steps taken, `undone` those
@@ -88,6 +90,7 @@ class Report:
     long: int
     learned: int
     undone: int
+    missing: float
     least_volume_ratio: float
     kinetic_energy: float
     estimate: float | None
@@ -131,6 +134,8 @@ class Simulation:
     guard : whether a second run estimates the error of long and learned steps
     fallback : whether exact steps take the place of learned ones that are not to be believed; else `advance` raises there
     cells : of the lattice of long steps along x, y, z; chosen for the scene unless given
+    most_steps : the most work that a call of `advance` takes, in exact steps; a long or a learned one counts four. When it is spent the
+        call ends, its status is "behind", and the next goes on from there
     threads : 1 to 8 that compute a step, with the same bits. They are the kernel's own, one set for all
         simulations: a process that forks does so before
     """
@@ -148,6 +153,7 @@ class Simulation:
         guard: bool = True,
         fallback: bool = True,
         cells: tuple[int, int, int] | None = None,
+        most_steps: int | None = None,
         threads: int = 1,
         gravity: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
@@ -163,6 +169,10 @@ class Simulation:
         # Forces on nodes, and those of a traction.
         settings.damping, settings.forces, settings.motions = damping, 2 * nodes, nodes
         settings.fallback, settings.cells = int(fallback), cells or (0, 0, 0)
+        if most_steps is not None:
+            if int(most_steps) != most_steps or not 1 <= most_steps < 1 << 32:
+                raise InputError(f"most_steps {most_steps}: it must be a whole number, at least 1")
+            settings.most_steps = int(most_steps)
         self._threads = _threads(threads)
         for name, value in (("seconds", step), ("tolerance", tolerance)):
             if value is not None:
@@ -378,6 +388,7 @@ class Simulation:
             int(report.long_steps),
             int(report.learned),
             int(report.undone),
+            float(report.missing),
             float(call.least_volume_ratio),
             float(call.kinetic),
             float(estimate.mean) if estimate.known else None,

@@ -39,6 +39,7 @@ impl<'a> Start<'a> {
             damping: setup.damping,
             tolerance: setup.time.tolerance,
             guard: true,
+            most_steps: None,
             // The step has been checked.
             unchecked: true,
         });
