@@ -44,7 +44,7 @@ pub enum Way {
     Long(u32),
     /// Steps that choose their length for an error of half a millimetre.
     Auto,
-    /// Backward Euler, for comparison, without a guard.
+    /// Backward Euler, for comparison, without a guard; of linear tetrahedra.
     BackwardEuler(u32),
 }
 
@@ -149,6 +149,9 @@ pub fn evaluate(
     out: &Path,
     mut tick: impl FnMut(&Second) + Send,
 ) -> Result<Vec<Second>, LabError> {
+    if element != Element::Linear && ways.iter().any(|way| matches!(way, Way::BackwardEuler(_))) {
+        return Err(LabError::File("backward Euler moves linear tetrahedra only: ask for --element linear".into()));
+    }
     super::create_folder(out)?;
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| LabError::File(format!("{threads} threads: {error}")))?;

@@ -107,6 +107,7 @@ struct Call<'c, L, T, W> {
 impl Mover<'_, '_> {
     /// Moves on until the time `until` (s), or to a step that is refused: the state is then that before it, and the
     /// report has the status; or until the work is spent, which the status says. `watch` is shown each step.
+    #[allow(clippy::too_many_arguments)]
     pub fn advance<M: ElementMaterial>(
         self,
         until: f64,

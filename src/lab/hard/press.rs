@@ -53,7 +53,7 @@ pub fn scene(number: u32, attempt: u32) -> Result<SceneSpec, LabError> {
     let depth = random.between(0.003, 0.012);
     let speed = random.scale(0.008, 0.06);
     let start = line + (first + GAP) * out;
-    let way = (random.between(0.0, 0.3) * Vec3::from(out.any_orthonormal_vector()) - out).normalize();
+    let way = (random.between(0.0, 0.3) * out.any_orthonormal_vector() - out).normalize();
     let mut ball = Instrument::resting(Shape::Sphere { radius }, Pose::at(start.to_array()));
     ball.friction = random.one_of(&[0.0, 0.3, 0.8]);
     ball.move_to(Pose::at((start + (depth + GAP) * way).to_array()), 0.0, f64::from((depth + GAP) / speed));
