@@ -117,7 +117,7 @@ impl<M: ElementMaterial, V: ForcesVisitor<M::Law>> Forcing<'_, M, V> {
         if !self.scene.element().is_nodal_strain() {
             return f32::INFINITY;
         }
-        let cycle = if is_marked_at(marks, &self.progress.moment()) { self.look_cycle } else { 1 };
+        let cycle = if is_marked_at(marks, &self.progress.moment()) { self.look_cycle.max(1) } else { 1 };
         let first = (self.progress.steps % cycle as u64) as usize;
         if cycle < LOOK_CYCLE {
             return look_in_turn(self.scene, self.displacement, marks, [first, cycle], threads);
@@ -172,7 +172,8 @@ fn look_in_turn<M: ElementMaterial>(
     [first, cycle]: [usize; 2],
     threads: &impl Threads,
 ) -> f32 {
-    let partitions = scene.elements().partitions;
+    // Seen not to be zero.
+    let (partitions, cycle) = (scene.elements().partitions, cycle.max(1));
     let count = partitions.parts(threads.parts());
     let (mut tiles, mut masks) = (scene.tiles, masks_mut(marks, scene.tiles.len()));
     let mut parts: [_; MOST_PARTS] = from_fn(|part| {
