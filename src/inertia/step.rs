@@ -1,6 +1,5 @@
-//! One mass-scaled, multilevel or damped step: forces with scalar bounds; the motion of every node by its own inertia,
-//! and its contribution to the lattice; the lattice's motion; its addition to the nodes. After an accepted step, one
-//! part of the refresh.
+//! One long step: forces with scalar bounds; the motion of every node by its own inertia, and its contribution to the
+//! lattice; the lattice's stiffness anew if that is due; its motion, and its addition to the nodes.
 
 use glam::Vec4;
 
