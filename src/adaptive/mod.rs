@@ -319,12 +319,13 @@ impl AdaptiveView<'_, '_> {
         let Some(StorageParts { kept, second, .. }) = chooser.parts(storage) else { return Err(mismatch) };
         let Request { tolerance, longest } = chooser.request;
         let Chooser { control, pace, .. } = &mut **chooser;
+        watch.follow_exact_steps(true);
         if control.begins_probe() {
             watch.begin_anew();
         }
         let (mut worst, most) = (Status::Ok, *work);
         let enter = |status: Status, loads: &Loads<'_>, state: StateView<'_>| {
-            work.exact_step();
+            work.exact_steps(1);
             if !status.is_taken() {
                 return;
             }
@@ -382,6 +383,7 @@ impl AdaptiveView<'_, '_> {
             // The rest of the span is no step.
             return Err(Status::Ok);
         }
+        self.watch.follow_exact_steps(false);
         let (count, mut worst) = (count as u32, Status::Ok);
         for done in 0..count {
             if work.is_spent() {

@@ -54,8 +54,6 @@ const ROUNDING: f64 = 1e-4;
 /// How many times the impulse by which pushes grow in a step is uncertain. Measured, 100 presses of bodies that may give
 /// way: 2 leaves 7 of 396 runs silently wrong, 2.5 leaves 1, 3 leaves 3 and doubts more.
 const UNCERTAIN: f32 = 2.5;
-/// Steps of the first run are exact ones if those of the second are more than so many times as long.
-const EXACT: f32 = 5.0;
 /// Most times that the second run has pushes which fall.
 const MOST_TIMES: f32 = 4.0;
 
@@ -105,6 +103,8 @@ pub(crate) struct Watch {
     seen: Option<Mark>,
     envelope: Envelope,
     pushes: Pushes,
+    /// Whether the first run takes exact steps at present.
+    is_exact: bool,
 }
 
 impl GuardModel {
@@ -186,6 +186,7 @@ impl Watch {
                 seen,
                 envelope,
                 pushes: Pushes::default(),
+                is_exact: false,
             },
         ))
     }
@@ -193,6 +194,11 @@ impl Watch {
     /// Compares at the next call, though no step has been taken since the last.
     pub(crate) const fn compare_next(&mut self) {
         self.interval = 0.0;
+    }
+
+    /// Whether the first run takes exact steps from now on.
+    pub(crate) const fn follow_exact_steps(&mut self, is_exact: bool) {
+        self.is_exact = is_exact;
     }
 
     /// The second run starts from the state at the next call.
@@ -272,7 +278,7 @@ impl GuardView<'_> {
         threads: &impl Threads,
     ) -> Status {
         let Self { second: large, watch, storage } = self;
-        let Watch { progress, nodes, longest, interval, seen, envelope, pushes } = watch;
+        let Watch { progress, nodes, longest, interval, seen, envelope, pushes, is_exact } = watch;
         let nodes = *nodes;
         if !taken.is_taken() {
             return taken;
@@ -296,12 +302,10 @@ impl GuardView<'_> {
             *interval = if envelope.is_new() { 0.0 } else { *longest };
             start_from(&state, &mut second);
             let newton = loads.with_pushes_of(&state, 1.0).sum_of_given();
-            *pushes = Pushes { newton, before: newton, ..Pushes::default() };
+            *pushes = Pushes { newton, compared: newton, ..Pushes::default() };
             return taken;
         }
-        // Steps far shorter than those of the second run are exact ones, which have no such error.
-        let long = if EXACT * state.last_step() < *longest { *longest } else { state.last_step() };
-        pushes.enter(loads.with_pushes_of(&state, 1.0).sum_of_given(), state.last_step(), long);
+        pushes.enter(loads.with_pushes_of(&state, 1.0).sum_of_given(), gone as f32);
         if gone <= 0.0 || gone < (1.0 - ROUNDING) * f64::from(*interval) {
             envelope.wait(gone as f32);
             return envelope.judge(taken);
@@ -309,7 +313,7 @@ impl GuardView<'_> {
         // At the start a load may begin within a step, of which the first run's first step knows nothing.
         let parts = if envelope.is_new() || gone > (1.0 + ROUNDING) * f64::from(*longest) { 2 } else { 1 };
         // The instruments are the first run's: the second one has their impulse.
-        let times = pushes.take(gone as f32);
+        let times = pushes.take(if *is_exact { *longest } else { state.last_step() }, *is_exact);
         let loads = &loads.with_pushes_of(&state, times);
         let (gone, seconds) = (gone as f32, f32::min(gone as f32 / parts as f32, *longest));
         let mut followed = large.set_seconds(seconds).is_ok();
@@ -344,27 +348,28 @@ impl GuardView<'_> {
 struct Pushes {
     newton: f32,
     impulse: f32,
-    uncertain: f32,
-    /// The sum some time ago, and how long ago that is, s.
-    before: f32,
-    gone: f32,
+    /// By how much the sum grew, not counting where it fell, N.
+    growth: f32,
+    /// The sum at the latest comparison, N.
+    compared: f32,
+    /// How long the impulse has been counted, s.
+    entered: f32,
 }
 
 impl Pushes {
-    /// After a step of so many seconds, where long steps have `long` seconds.
-    fn enter(&mut self, newton: f32, seconds: f32, long: f32) {
-        (self.newton, self.gone) = (newton, self.gone + seconds);
-        self.impulse += seconds * newton;
-        if self.gone >= (1.0 - ROUNDING as f32) * long {
-            self.uncertain += self.gone * (newton - self.before).max(0.0);
-            (self.before, self.gone) = (newton, 0.0);
-        }
+    /// After one step or a few, so many seconds after the latest comparison.
+    fn enter(&mut self, newton: f32, gone: f32) {
+        self.impulse += (gone - self.entered) * newton;
+        self.growth += (newton - self.newton).max(0.0);
+        (self.newton, self.entered) = (newton, gone);
     }
 
-    /// How many times the present pushes the second run has, for so many seconds.
-    fn take(&mut self, seconds: f32) -> f32 {
-        let times = (self.impulse + UNCERTAIN * self.uncertain) / (self.newton * seconds);
-        (self.impulse, self.uncertain) = (0.0, 0.0);
+    /// How many times the present pushes the second run has, where the first run has long steps of so many seconds; where
+    /// it has exact ones, whose pushes go up and down, long steps of so many seconds would have seen the whole change.
+    fn take(&mut self, seconds: f32, is_exact: bool) -> f32 {
+        let growth = if is_exact { (self.newton - self.compared).max(0.0) } else { self.growth };
+        let times = (self.impulse + UNCERTAIN * seconds * growth) / (self.newton * self.entered);
+        *self = Self { newton: self.newton, compared: self.newton, ..Self::default() };
         if times.is_finite() { times.min(MOST_TIMES) } else { 1.0 }
     }
 }
@@ -478,6 +483,31 @@ mod tests {
     use crate::scene::test_scene::scene_of;
     use crate::state::VecState;
     use crate::tled;
+
+    /// A guard may be called after each step or after a few, and a steady push is what it is.
+    #[test]
+    fn the_second_run_has_the_impulse_of_the_pushes() {
+        let (newton, step) = (2.0, 0.01);
+        for at_once in [1, 3, 6] {
+            let mut pushes = Pushes { newton, compared: newton, ..Pushes::default() };
+            for count in (at_once..=6).step_by(at_once) {
+                pushes.enter(newton, count as f32 * step);
+            }
+            let times = pushes.take(step, false);
+            assert!((times - 1.0).abs() < 1e-6, "{at_once} steps a call: {times}");
+            // It doubles: that by which it grew counts besides, for a step.
+            pushes.enter(2.0 * newton, step);
+            pushes.enter(2.0 * newton, 2.0 * step);
+            let times = pushes.take(step, false);
+            assert!((times - (1.0 + 0.25 * UNCERTAIN)).abs() < 1e-6, "{times}");
+            // Pushes of exact steps go up and down.
+            for (count, newton) in [(1, 2.0), (2, 6.0), (3, 2.0), (4, 4.0)] {
+                pushes.enter(newton, count as f32 * step);
+            }
+            let times = pushes.take(4.0 * step, true);
+            assert!((times - 0.875).abs() < 1e-6, "{times}");
+        }
+    }
 
     /// A body that drifts far away, so slowly that rounding would stop it: the second run arrives where the first does.
     #[test]

@@ -162,7 +162,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
                     if work.is_spent() {
                         return false;
                     }
-                    work.exact_step();
+                    work.exact_steps(1);
                     let loads = loads.of_step(state, seconds, count - done);
                     let status = tled::step_in_parts(scene, &loads, state.reborrow(), &step, *threads);
                     watch(Event::Step(StepKind::Exact, status, state));
@@ -191,7 +191,7 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
                     };
                     let (state, most) = (state.reborrow(), *work);
                     let answer = pace.approach(left, *damping, most, scene, loads, state, kept, *threads, enter);
-                    (0..taken).for_each(|_| work.exact_step());
+                    work.exact_steps(taken);
                     match answer {
                         Approach::Undone => {
                             report.undone += taken;
@@ -368,6 +368,9 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
                 self.report.fell_back |= !is_leading;
                 let rest = f64::from(count - done - 1) * f64::from(seconds);
                 let (mut taken, recovers) = (true, learned.model().undoes() && !is_leading);
+                // The interval is not cut: the frames of the network follow all of it.
+                let mut work = core::mem::replace(&mut self.work, Work::UNBOUNDED);
+                let computed = self.report.exact + self.report.undone;
                 // A step that was refused is in the report.
                 let _ = learned.lead_interval(state, |state| {
                     let span = f64::from(seconds);
@@ -377,6 +380,8 @@ impl<L: LoadsOverTime, T: Threads, W: FnMut(Event<'_>)> Call<'_, L, T, W> {
                     };
                     if taken { Status::Ok } else { self.report.status }
                 });
+                work.exact_steps((self.report.exact + self.report.undone).saturating_sub(computed));
+                self.work = work;
                 if !taken {
                     return Ok(());
                 }

@@ -27,21 +27,19 @@ impl Work {
         self.left == 0
     }
 
-    /// Exact steps that are left.
-    pub(crate) const fn exact_steps(&self) -> u32 {
+    /// How many exact steps are left.
+    pub(crate) const fn left(&self) -> u32 {
         self.left
     }
 
-    pub(crate) const fn exact_step(&mut self) {
+    pub(crate) const fn exact_steps(&mut self, count: u32) {
         if self.left != u32::MAX {
-            self.left = self.left.saturating_sub(1);
+            self.left = self.left.saturating_sub(count);
         }
     }
 
     /// A long or a learned one.
     pub(crate) const fn long_step(&mut self) {
-        if self.left != u32::MAX {
-            self.left = self.left.saturating_sub(OF_LONG);
-        }
+        self.exact_steps(OF_LONG);
     }
 }

@@ -124,7 +124,8 @@ impl Pace {
     }
 
     /// Takes steps until the next look at the critical step, of a length of which whole numbers make up `left` seconds,
-    /// and no more of them than that or than there is work for. `enter` is called after each step. `kept` are [`vectors_for_pace`] vectors.
+    /// and no more of them than that or than there is work for. `enter` is called after each step. `kept` are
+    /// [`vectors_for_pace`] vectors.
     #[allow(clippy::too_many_arguments)]
     pub fn approach<M: ElementMaterial>(
         &mut self,
@@ -150,7 +151,7 @@ impl Pace {
         let (force, weights) = kept.split_at_mut(nodes.min(kept.len()));
         state.save(before);
         let progress = *state.progress;
-        let count = whole.min(self.steps.saturating_sub(self.taken)).min(work.exact_steps().max(1));
+        let count = whole.min(self.steps.saturating_sub(self.taken)).min(work.left().max(1));
         let (mut refused, mut taken, mut extremes, mut squeezed) = (None, 0, Extremes::none(), false);
         while taken < count && !squeezed {
             let of_step = loads.of_step(&state, seconds, whole.saturating_sub(taken));

@@ -205,6 +205,20 @@ fn a_network_is_led_and_led_again_after_a_restore_or_a_reset() {
     same.advance(15.0 * f64::from(interval)).unwrap();
     assert_eq!(bits(same.state()), bits(&state));
 
+    // Work that is spent within an interval of the lead-in cuts none: the network's frames follow all of it.
+    let little = Settings { most_steps: Some(7), step: Some(interval / 10.0), ..settings(10.0 * f64::from(interval)) };
+    let mut in_parts = at_rest().with(little);
+    in_parts.forces.clone_from(&forces);
+    let mut calls = 0;
+    while in_parts.state().time() < (15.0 - 0.5) * f64::from(interval) {
+        let left = 15.0 * f64::from(interval) - in_parts.state().time();
+        assert!(in_parts.advance(left).unwrap().steps() <= 12);
+        calls += 1;
+    }
+    println!("the same in {calls} calls of little work");
+    assert!(calls >= 12);
+    assert_eq!(bits(in_parts.state()), bits(&state));
+
     // A state from elsewhere is not led.
     let mut pushed = at_rest();
     pushed.forces.clone_from(&forces);
