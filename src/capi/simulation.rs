@@ -351,10 +351,7 @@ pub unsafe extern "C" fn supple_sim_advance(
         let taken = mover.advance(until, open.view(), of_call, state.reborrow(), *work, &threads, &mut |event| {
             watched.enter(&event);
         });
-        match &taken {
-            Ok(report) if matches!(report.status, Status::Behind { .. }) => clock.ended_early(state.time()),
-            _ => clock.ended(state.time()),
-        }
+        clock.ended(state.time(), taken.as_ref().map_or(Status::Ok, |report| report.status));
         let call = watched.call;
         *report = supple_sim_report { call, ..supple_sim_report::NOTHING };
         report.call.close(&state);

@@ -306,9 +306,7 @@ impl Lattice {
 
     /// The nearest cell without light points to a point, at most one cell away, with functions before they have numbers.
     fn nearest_whole(&self, point: usize, functions: &[u8; MAX_POINTS]) -> Option<LightPoint> {
-        let counts = self.cells.map(|count| count as usize);
-        let [x, y] = [counts[0] + 1, counts[1] + 1];
-        let at = [point % x, point / x % y, point / x / y];
+        let (counts, at) = (self.cells.map(|count| count as usize), self.point_indices(point));
         let mut best: Option<(u32, LightPoint)> = None;
         for (k, j) in (0..4).flat_map(|k| (0..4).map(move |j| (k, j))) {
             for i in 0..4 {
@@ -462,6 +460,12 @@ impl Lattice {
         self.cell_index(indices)
     }
 
+    /// Indices of a point along the axes.
+    const fn point_indices(&self, point: usize) -> [usize; 3] {
+        let [x, y] = [self.cells[0] as usize + 1, self.cells[1] as usize + 1];
+        [point % x, point / x % y, point / x / y]
+    }
+
     /// Lattice points at the corners of a cell.
     #[inline(always)]
     fn corner_points(&self, cell: usize) -> [usize; 8] {
@@ -606,11 +610,10 @@ impl Lattice {
     /// The cells around the point of a function.
     pub(super) fn cells_of(&self, function: usize) -> [Option<usize>; 8] {
         let counts = self.cells.map(|count| count as usize);
-        let [x, y] = [counts[0] + 1, counts[1] + 1];
         let Some(point) = self.function_of_point.iter().position(|&of| usize::from(of) == function) else {
             return [None; 8];
         };
-        let at = [point % x, point / x % y, point / x / y];
+        let at = self.point_indices(point);
         array::from_fn(|corner| {
             let mut cell = [0; 3];
             for axis in 0..3 {

@@ -13,6 +13,7 @@ use supple::material::{AnyLaw, Element, NeoHookean};
 use supple::mesh::Bar;
 use supple::scene::Support;
 use supple::simulation::{self, Settings, Simulation};
+use supple::state::NodeVector;
 use supple::step::{Rayon, Status};
 
 use super::LabError;
@@ -203,8 +204,14 @@ fn run(
     threads: usize,
     truth: Option<&Truth>,
 ) -> Result<(Second, Truth), LabError> {
-    let (mut frames, mut steps, mut estimate, mut doubted) = (Vec::new(), [0; 2], None, 0);
-    let mut snapshots = Vec::new();
+    let (mut frames, mut snapshots) = (Vec::new(), Vec::new());
+    let mut ended = |frame: usize, begin: Instant, displacements: &[NodeVector]| {
+        frames.push(begin.elapsed().as_secs_f64());
+        if frame.is_multiple_of(SNAPSHOT) {
+            snapshots.push(displacements.iter().map(|vector| vector.to_array()).collect());
+        }
+    };
+    let (mut steps, mut estimate, mut doubted) = ([0; 2], None, 0);
     let scene = spec.build()?;
     let mut body = Simulation::of_scene(scene, spec.points.clone(), spec.tets.clone());
     let critical = body.critical_step()?.seconds;
@@ -232,10 +239,7 @@ fn run(
                     LabError::if_refused(spec.name, status)?;
                     steps[1] += 1;
                 }
-                frames.push(begin.elapsed().as_secs_f64());
-                if frame % SNAPSHOT == 0 {
-                    snapshots.push(state.displacements().iter().map(|vector| vector.to_array()).collect());
-                }
+                ended(frame, begin, state.displacements());
             }
             prepare
         }
@@ -245,15 +249,12 @@ fn run(
             for frame in 1..=FRAMES {
                 let begin = Instant::now();
                 let report = body.advance_in_parts(1.0 / FRAMES as f64, &Rayon { parts: threads })?;
-                frames.push(begin.elapsed().as_secs_f64());
+                ended(frame, begin, body.displacements());
                 steps[0] += report.exact;
                 steps[1] += report.long;
                 doubted += usize::from(report.status != Status::Ok);
                 if let Some(mean) = report.estimate.map(|estimate| 1e3 * f64::from(estimate.mean)) {
                     estimate = Some(estimate.map_or(mean, |most: f64| most.max(mean)));
-                }
-                if frame % SNAPSHOT == 0 {
-                    snapshots.push(body.displacements().iter().map(|vector| vector.to_array()).collect());
                 }
             }
             prepare

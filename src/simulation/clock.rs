@@ -1,5 +1,7 @@
 //! When calls of `advance` should end.
 
+use crate::step::Status;
+
 /// Calls follow each other without a drift, unless the state was restored in between; and equal calls take equal steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Clock {
@@ -18,13 +20,11 @@ impl Clock {
         if libm::fabs(due - now) <= 1e-6 * seconds { now + seconds } else { self.until }
     }
 
-    /// The call has ended at this time (s), and what is missing is not made up for.
-    pub const fn ended_early(&mut self, time: f64) {
-        (self.until, self.ended) = (time, time);
-    }
-
-    /// The call has ended at this time, s.
-    pub const fn ended(&mut self, time: f64) {
+    /// The call has ended at this time (s) with this status. What its work did not suffice for is not made up for.
+    pub const fn ended(&mut self, time: f64, status: Status) {
+        if matches!(status, Status::Behind { .. }) {
+            self.until = time;
+        }
         self.ended = time;
     }
 }

@@ -29,6 +29,8 @@ pub use report::Report;
 
 use crate::inertia;
 use crate::mlp::Network;
+#[cfg(feature = "std")]
+use crate::step::Work;
 
 /// How a scene is moved.
 #[derive(Clone, Debug, Default)]
@@ -89,6 +91,14 @@ impl Default for Settings<'_> {
             most_steps: None,
             unchecked: false,
         }
+    }
+}
+
+impl Settings<'_> {
+    /// Of a call.
+    #[cfg(feature = "std")]
+    fn work(&self) -> Work {
+        self.most_steps.map_or(Work::UNBOUNDED, Work::of)
     }
 }
 

@@ -19,7 +19,7 @@ use crate::mesh::{Mesh, MeshError, Winding};
 use crate::scene::{BuildError, Support, VecScene};
 use crate::simd::NodeVector;
 use crate::state::VecState;
-use crate::step::{CallingThread, CriticalStep, Divergence, Status, Step, StepError, Threads, Work};
+use crate::step::{CallingThread, CriticalStep, Divergence, Status, Step, StepError, Threads};
 use crate::tled::{self, Pace, vectors_for_pace};
 
 /// A scene in motion. Loads and instruments are set between two calls of [`Simulation::advance`] as the host likes.
@@ -159,12 +159,9 @@ impl<'w> Simulation<'w> {
         // Not reached: prepared above; there is no panic in its place.
         let Some(prepared) = &mut self.prepared else { return Err(SimulationError::NotFinite) };
         let mover = prepared.mover();
-        let work = settings.most_steps.map_or(Work::UNBOUNDED, Work::of);
+        let work = settings.work();
         let report = mover.advance(end, scene.view(), &mut loads, state.view(), work, threads, &mut |_| {})?;
-        match report.status {
-            Status::Behind { .. } => clock.ended_early(state.time()),
-            _ => clock.ended(state.time()),
-        }
+        clock.ended(state.time(), report.status);
         match report.status {
             Status::Diverged(divergence) => Err(SimulationError::Refused(divergence)),
             _ => Ok(report),
@@ -182,7 +179,7 @@ impl<'w> Simulation<'w> {
     ) -> Result<Report, SimulationError> {
         self.prepare_once()?;
         let Self { scene, state, prepared, settings, .. } = self;
-        let work = settings.most_steps.map_or(Work::UNBOUNDED, Work::of);
+        let work = settings.work();
         // Not reached: prepared above; there is no panic in its place.
         let Some(prepared) = prepared else { return Err(SimulationError::NotFinite) };
         let mover = prepared.mover();

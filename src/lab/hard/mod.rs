@@ -112,14 +112,14 @@ impl Plan {
         self.cases.len() + random as usize + presses as usize + ordinary as usize
     }
 
-    /// The kind of a scene by its number, and its number among those that are drawn.
-    fn kind(&self, index: usize) -> (Kind, Option<u32>) {
+    /// The kind of a scene by its number, and its number among those of the kind.
+    fn kind(&self, index: usize) -> (Kind, u32) {
         let Counts { random, presses, .. } = self.counts;
         match index.checked_sub(self.cases.len()).map(|number| number as u32) {
-            None => (Kind::Hard, None),
-            Some(number) if number < random => (Kind::Hard, Some(number)),
-            Some(number) if number - random < presses => (Kind::Press, Some(number - random)),
-            Some(number) => (Kind::Ordinary, Some(number - random - presses)),
+            None => (Kind::Hard, index as u32),
+            Some(number) if number < random => (Kind::Hard, number),
+            Some(number) if number - random < presses => (Kind::Press, number - random),
+            Some(number) => (Kind::Ordinary, number - random - presses),
         }
     }
 
@@ -128,15 +128,14 @@ impl Plan {
     pub(super) fn scene(&self, index: usize, out: &Path) -> Result<Option<(SceneSpec, Truth)>, LabError> {
         let truths = out.join("truth");
         super::create_folder(&truths)?;
-        match (self.kind(index), self.cases.get(index)) {
-            (_, Some(case)) => truth::obtain_one(case.clone(), &truths).map(Some),
-            ((Kind::Hard, Some(number)), _) => drawn(|attempt| random::scene(number, attempt), f64::INFINITY, &truths),
-            ((Kind::Press, Some(number)), _) => {
-                drawn(|attempt| press::scene(number, attempt), press::FARTHEST, &truths)
-            }
-            ((_, number), _) => {
-                drawn(|attempt| ordinary::scene(number.unwrap_or(0), attempt), ordinary::FARTHEST, &truths)
-            }
+        if let Some(case) = self.cases.get(index) {
+            return truth::obtain_one(case.clone(), &truths).map(Some);
+        }
+        let (kind, number) = self.kind(index);
+        match kind {
+            Kind::Hard => drawn(|attempt| random::scene(number, attempt), f64::INFINITY, &truths),
+            Kind::Press => drawn(|attempt| press::scene(number, attempt), press::FARTHEST, &truths),
+            Kind::Ordinary => drawn(|attempt| ordinary::scene(number, attempt), ordinary::FARTHEST, &truths),
         }
     }
 }

@@ -66,7 +66,7 @@ pub fn scene(number: u32, attempt: u32) -> Result<SceneSpec, LabError> {
     spec.element =
         random.one_of(&[Element::Linear, Element::NodalPressure, Element::NodalPressure, Element::NodalStrain]);
     spec.damping = random.one_of(&[5.0, 10.0, 20.0]);
-    let shear = tissue(&mut spec, &mut random);
+    let shear = tissue(&mut spec, 0.3, &mut random);
     let body = hold(&mut spec, shear, &mut random);
     happens(&mut spec, &body, &mut random);
     (spec.timing, spec.intervals) = timing_of(critical_step(&spec)?, random.between(0.8, 1.2));
@@ -94,11 +94,11 @@ fn mesh(number: u32, random: &mut Random) -> Result<SceneSpec, LabError> {
     Ok(spec)
 }
 
-/// Young's modulus 2 to 20 kPa, Poisson's ratio 0.45 to 0.49. Gives the shear modulus, Pa.
-fn tissue(spec: &mut SceneSpec, random: &mut Random) -> f32 {
+/// Young's modulus 2 to 20 kPa, Poisson's ratio 0.45 to 0.49; a share of the bodies stiffens. Gives the shear modulus, Pa.
+pub(super) fn tissue(spec: &mut SceneSpec, stiffening: f32, random: &mut Random) -> f32 {
     let (young, ratio) = (random.scale(2e3, 2e4), random.one_of(&[10.0, 20.0, 50.0]));
     let shear = young * (3.0 * ratio + 1.0) / (9.0 * ratio);
-    spec.law = if random.chance(0.3) {
+    spec.law = if random.chance(stiffening) {
         AnyLaw::Exponential(Exponential { a: shear, b: random.between(1.0, 4.0), d: 0.5 * ratio * shear })
     } else {
         AnyLaw::NeoHookean(NeoHookean { c: 0.5 * shear, d: 0.5 * ratio * shear })

@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 use supple::contact::{Instrument, Pose, Shape};
-use supple::material::{AnyLaw, Element, Exponential, NeoHookean};
+use supple::material::Element;
 use supple::mesh::Bar;
 use supple::scene::Support;
 
@@ -12,6 +12,8 @@ use super::super::LabError;
 use super::super::moving::critical_step;
 use super::super::random_numbers::Random;
 use super::super::scenes::{CYLINDER, LOBE, SceneSpec, bar, held_at_its_end};
+use super::ordinary::tissue;
+use super::random::lowest;
 use super::timing_of;
 
 /// How many there are unless another number is asked for.
@@ -32,7 +34,7 @@ pub fn scene(number: u32, attempt: u32) -> Result<SceneSpec, LabError> {
     spec.element =
         random.one_of(&[Element::Linear, Element::NodalPressure, Element::NodalPressure, Element::NodalStrain]);
     spec.damping = random.one_of(&[0.5, 1.0, 2.0, 5.0, 10.0, 20.0]);
-    tissue(&mut spec, &mut random);
+    tissue(&mut spec, 0.2, &mut random);
     let points: Vec<Vec3> = spec.points.iter().map(|point| Vec3::from(*point)).collect();
     let centre = points.iter().copied().sum::<Vec3>() / points.len() as f32;
     // Out of the body, where the ball is.
@@ -77,17 +79,6 @@ fn body(random: &mut Random) -> Result<SceneSpec, LabError> {
     Ok(spec)
 }
 
-/// Young's modulus 2 to 20 kPa, Poisson's ratio 0.45 to 0.49.
-fn tissue(spec: &mut SceneSpec, random: &mut Random) {
-    let (young, ratio) = (random.scale(2e3, 2e4), random.one_of(&[10.0, 20.0, 50.0]));
-    let shear = young * (3.0 * ratio + 1.0) / (9.0 * ratio);
-    spec.law = if random.chance(0.2) {
-        AnyLaw::Exponential(Exponential { a: shear, b: random.between(1.0, 4.0), d: 0.5 * ratio * shear })
-    } else {
-        AnyLaw::NeoHookean(NeoHookean { c: 0.5 * shear, d: 0.5 * ratio * shear })
-    };
-}
-
 /// Not at all, at the nodes nearest to a corner, or at the side across from `across`.
 fn hold(spec: &mut SceneSpec, points: &[Vec3], across: Vec3, random: &mut Random) {
     let share = match random.next_u64() % 10 {
@@ -96,8 +87,6 @@ fn hold(spec: &mut SceneSpec, points: &[Vec3], across: Vec3, random: &mut Random
         _ => random.between(0.06, 0.15),
     };
     let at = if share < 0.05 { random.one_of(points) } else { across };
-    let mut nodes: Vec<(f32, u32)> = (0..).zip(points).map(|(node, point)| (point.distance(at), node)).collect();
-    nodes.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let count = ((share * nodes.len() as f32) as usize).max(3);
-    spec.supports = nodes.into_iter().take(count).map(|(_, node)| Support::fixed(node)).collect();
+    let nodes = lowest(points.iter().map(|point| point.distance(at)), share);
+    spec.supports = nodes.into_iter().map(Support::fixed).collect();
 }

@@ -142,13 +142,16 @@ fn patch(spec: &SceneSpec, random: &mut Random, share: f32) -> Vec<u32> {
     let point = Vec3::from(random.one_of(&spec.points));
     let normal = random.direction();
     let by_plane = random.chance(0.5);
-    let mut nodes: Vec<(f32, u32)> = (0..)
-        .zip(&spec.points)
-        .map(|(node, at)| {
-            let at = Vec3::from(*at);
-            (if by_plane { at.dot(normal) } else { at.distance(point) }, node)
-        })
-        .collect();
+    let value = |at: &[f32; 3]| {
+        let at = Vec3::from(*at);
+        if by_plane { at.dot(normal) } else { at.distance(point) }
+    };
+    lowest(spec.points.iter().map(value), share)
+}
+
+/// The nodes with the lowest values, at least three; `values` are those of all.
+pub(super) fn lowest(values: impl Iterator<Item = f32>, share: f32) -> Vec<u32> {
+    let mut nodes: Vec<(f32, u32)> = values.zip(0..).collect();
     nodes.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let count = ((share * nodes.len() as f32) as usize).max(3);
     nodes.into_iter().take(count).map(|(_, node)| node).collect()
