@@ -18,13 +18,9 @@ use crate::energy_balance::EnergyBalance;
 use crate::material::Element;
 use crate::scattered::scattered;
 pub use crate::simd::NodeVector;
-use crate::step::CriticalStep;
 
 /// Vectors of a node that a step moves: displacement, remainder, increment.
 pub(crate) const MOVED_VECTORS: usize = 3;
-
-/// A step over the critical one that is not an exact one.
-const MUCH_LONGER: f32 = 2.0;
 
 /// How far a simulation has come, apart from its vectors.
 #[derive(Clone, Copy, Debug)]
@@ -251,7 +247,10 @@ impl<'a> StateView<'a> {
 
     /// Exact steps follow: after steps beyond the critical one they would count half the acceleration of the last of these
     /// into their own, of nodes whose forces only added inertia bears.
-    pub(crate) fn end_long_steps(&mut self, critical: CriticalStep) {
+    #[cfg(any(feature = "std", feature = "capi-neo-hookean"))]
+    pub(crate) fn end_long_steps(&mut self, critical: crate::step::CriticalStep) {
+        /// A step over the critical one that is not an exact one.
+        const MUCH_LONGER: f32 = 2.0;
         if self.dt > MUCH_LONGER * critical.seconds {
             self.respan(critical.seconds);
         }
