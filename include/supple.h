@@ -455,6 +455,14 @@ enum supple_status
      */
     SUPPLE_E_FIELD = -35,
     /**
+     * Pull `index` has a point, radius, direction, target, stiffness or most force (value) that cannot be, or no nodes.
+     */
+    SUPPLE_E_PULL = -36,
+    /**
+     * No node is nearer to the point of pull `index` than its radius (value, m); the nearest is at the limit (m).
+     */
+    SUPPLE_E_NO_NODES = -37,
+    /**
      * Weights do not begin at a multiple of four bytes.
      */
     SUPPLE_E_WEIGHTS_MISALIGNED = -40,
@@ -547,6 +555,10 @@ enum supple_status
      * The step was not taken: learned steps cannot meet instruments.
      */
     SUPPLE_E_NO_CONTACT = -95,
+    /**
+     * The step was not taken: learned steps do not know pulls.
+     */
+    SUPPLE_E_NO_PULLS = -96,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -588,6 +600,12 @@ typedef struct supple_learned supple_learned;
  * What acts on a scene. One thread at a time; a call that takes steps changes it as well.
  */
 typedef struct supple_loads supple_loads;
+
+/**
+ * Pulls of a scene, with their targets. They belong to one state. One thread at a time; a call that takes steps changes
+ * them.
+ */
+typedef struct supple_pulls supple_pulls;
 
 /**
  * The reaction of some supports. It may be copied with memcpy together with its state.
@@ -923,6 +941,51 @@ typedef struct {
      */
     supple_error error;
 } supple_report;
+
+/**
+ * How a point is pulled.
+ */
+typedef struct {
+    /**
+     * The point at rest, m.
+     */
+    float at[3];
+    /**
+     * Nodes no farther than that are pulled, m; not used by supple_add_pull_of_nodes.
+     */
+    float radius;
+    /**
+     * N/m, from 0, absent, to 1e6.
+     */
+    float stiffness;
+    /**
+     * The most force, N, infinite for no limit; zero: half the shear modulus of the tissue on the cross-sections of the nodes' own
+     * tissue. More tears the tissue.
+     */
+    float most;
+    /**
+     * The direction along which it pulls, of any length, as the normal of a surface on which the point slides; zeros: along all.
+     */
+    float along[3];
+} supple_pull;
+
+/**
+ * Where a pulled point is.
+ */
+typedef struct {
+    /**
+     * m.
+     */
+    float point[3];
+    /**
+     * From the point to the target, m; along the direction of a pull that has one; zero for one without a target.
+     */
+    float gap[3];
+    /**
+     * On the tissue in the latest step, N.
+     */
+    float force[3];
+} supple_pulled;
 
 /**
  * Vectors where they are, without a copy: three floats each, `stride` bytes apart.
@@ -1730,6 +1793,86 @@ supple_status supple_step(const supple_scene *scene,
 supple_status supple_own_threads(uint32_t parts,
                                  supple_threads *threads);
 #endif
+
+/**
+ * Bytes of memory that so many pulls need, of so many nodes in sum.
+ */
+size_t supple_pulls_size(uint32_t pulls, uint32_t nodes);
+
+/**
+ * Prepares room for pulls in `memory` of at least supple_pulls_size bytes, aligned to SUPPLE_ALIGN: none yet.
+ */
+supple_status supple_pulls_init(void *memory,
+                                size_t bytes,
+                                const supple_scene *scene,
+                                uint32_t pulls,
+                                uint32_t nodes,
+                                supple_pulls **made);
+
+/**
+ * Adds a pull on the nodes that are no farther from its point than its radius at rest: their mean displacement moves it. A patch of
+ * some 24 nodes is a good one. It has no target yet: it is absent until supple_set_targets.
+ *
+ * @param points of all nodes of the scene at rest, m, three coordinates each.
+ * @param error may be NULL.
+ */
+supple_status supple_add_pull(supple_pulls *pulls,
+                              const supple_scene *scene,
+                              const float *points,
+                              const supple_pull *pull,
+                              supple_error *error);
+
+/**
+ * Adds a pull on `count` nodes with weights, which sum up to one, as supple_locate gives them for a point in an element.
+ *
+ * @param error may be NULL; node is one that does not exist.
+ */
+supple_status supple_add_pull_of_nodes(supple_pulls *pulls,
+                                       const supple_scene *scene,
+                                       const uint32_t *nodes,
+                                       const float *weights,
+                                       uint32_t count,
+                                       const supple_pull *pull,
+                                       supple_error *error);
+
+/**
+ * Replaces stiffness, most force (zero: as it is) and direction of a pull; its point and nodes stay.
+ *
+ * @param error may be NULL.
+ */
+supple_status supple_set_pull(supple_pulls *pulls,
+                              uint32_t index,
+                              const supple_pull *pull,
+                              supple_error *error);
+
+/**
+ * Sets the targets of all pulls, m, three coordinates each; of a pull whose first coordinate is NaN there is none: it is absent
+ * until it has one again. A target moves evenly from where it is at the time `from` (s) to there at the time `to`, usually
+ * the times of the state now and at the end of the frame; one that was absent is there at once.
+ *
+ * @param error may be NULL; index is that of a pull.
+ */
+supple_status supple_set_targets(supple_pulls *pulls,
+                                 const float *targets,
+                                 uint32_t count,
+                                 double from,
+                                 double to,
+                                 supple_error *error);
+
+/**
+ * Writes where the points of all pulls are in a state, how far from their targets, and the forces of the latest step.
+ */
+supple_status supple_read_pulls(supple_pulls *pulls,
+                                supple_state *state,
+                                supple_pulled *pulled,
+                                uint32_t count);
+
+/**
+ * Lets pulls act together with these loads, as long as both are there; NULL: none. Learned steps refuse loads with pulls,
+ * and a library without the feature `contact` refuses them here.
+ */
+supple_status supple_set_pulls(supple_loads *loads,
+                               supple_pulls *pulls);
 
 /**
  * Tells where the displacements of a state are, m. They stay there for as long as the state does; read them between

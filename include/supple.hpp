@@ -95,6 +95,8 @@ enum class [[nodiscard]] status : std::int32_t {
     e_unstable = SUPPLE_E_UNSTABLE,
     e_instrument = SUPPLE_E_INSTRUMENT,
     e_field = SUPPLE_E_FIELD,
+    e_pull = SUPPLE_E_PULL,
+    e_no_nodes = SUPPLE_E_NO_NODES,
 
     e_weights_misaligned = SUPPLE_E_WEIGHTS_MISALIGNED,
     e_weights_short = SUPPLE_E_WEIGHTS_SHORT,
@@ -123,6 +125,7 @@ enum class [[nodiscard]] status : std::int32_t {
     e_diverged_motion = SUPPLE_E_DIVERGED_MOTION,
     e_diverged_instrument = SUPPLE_E_DIVERGED_INSTRUMENT,
     e_no_contact = SUPPLE_E_NO_CONTACT,
+    e_no_pulls = SUPPLE_E_NO_PULLS,
 };
 
 // For all elements of a scene; each with its constants in the order of tissue::constants. tools/header.sh writes this list.
@@ -246,7 +249,8 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_lattice): case of(s::e_too_stiff): case of(s::e_not_saved): case of(s::e_saved_version):
     case of(s::e_saved_checksum): case of(s::e_level): case of(s::e_diverged):
     case of(s::e_diverged_energy): case of(s::e_diverged_force): case of(s::e_diverged_motion):
-    case of(s::e_instrument): case of(s::e_field): case of(s::e_diverged_instrument): case of(s::e_no_contact): return true;
+    case of(s::e_instrument): case of(s::e_field): case of(s::e_diverged_instrument): case of(s::e_no_contact):
+    case of(s::e_pull): case of(s::e_no_nodes): case of(s::e_no_pulls): return true;
     }
     return false;
 }
@@ -294,6 +298,8 @@ constexpr meaning meaning_of(status code) noexcept {
     case status::e_diverged_instrument: return {"instrument", " m", true, true};
     case status::e_instrument: return {"instrument", "", true, false};
     case status::e_field: return {"instrument", "", false, false};
+    case status::e_pull: return {"pull", "", true, false};
+    case status::e_no_nodes: return {"pull", " m", true, true};
     default: return {"entry", "", false, false};
     }
 }

@@ -90,6 +90,7 @@
 //! | [`element`] | tetrahedra (linear, nodal pressure, nodal strain): deformation, internal forces, stiffness bounds |
 //! | [`scene`] | what is simulated, computed once: element tables, masses, supports |
 //! | [`contact`] | rigid instruments that touch the tissue, and what they feel |
+//! | [`pulls`] | forces that draw points of the tissue to targets; supports that give way |
 //! | [`state`] | what moves: displacements and their last increment |
 //! | [`loads`] | what acts on it, set when the host likes: forces, traction, gravity, prescribed motion, instruments |
 //! | [`mlp`] | dense layers: the forward pass, the weight file |
@@ -146,6 +147,7 @@ pub mod mesh;
 pub mod mlp;
 mod padding;
 pub mod plausibility;
+pub mod pulls;
 pub mod reaction;
 /// Of the tests, in float64.
 #[cfg(test)]

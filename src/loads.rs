@@ -10,6 +10,7 @@ use glam::{Vec3, Vec4};
 use crate::contact::{Contact, Surface, kept_pushes};
 use crate::element::Axes;
 use crate::padding;
+use crate::pulls::Pulls;
 use crate::scene::AsScene;
 use crate::simd::NodeVector;
 use crate::state::StateView;
@@ -131,6 +132,7 @@ pub struct Loads<'a> {
     contact: Option<Contact<'a>>,
     /// Pushes of instruments that another run has found, N, and a factor.
     given: Option<(Surface<'a>, &'a [NodeVector], f32)>,
+    pulls: Option<Pulls<'a>>,
     /// Nodes of the scene they were checked against.
     nodes: Option<usize>,
 }
@@ -195,7 +197,7 @@ impl LoadsOverTime for LoadsOfCall<'_> {
 impl<'a> Loads<'a> {
     /// No load; supports stand still.
     pub const NONE: Self =
-        Self { gravity: [0.0; 3], forces: &[], motions: &[], contact: None, given: None, nodes: None };
+        Self { gravity: [0.0; 3], forces: &[], motions: &[], contact: None, given: None, pulls: None, nodes: None };
 
     /// Checks loads against the scene they will act on. Nodes may be listed more than once: forces add
     /// up, of several motions of an axis the last one holds.
@@ -214,13 +216,13 @@ impl<'a> Loads<'a> {
         for (index, motion) in motions.iter().enumerate() {
             motion.check(index, nodes, scene.movable(motion.node as usize))?;
         }
-        Ok(Self { gravity, forces, motions, contact: None, given: None, nodes: Some(nodes) })
+        Ok(Self::unchecked(gravity, forces, motions, nodes))
     }
 
     /// Loads that the caller has checked against a scene of so many nodes. Of those that have not been, nodes that do
     /// not exist and axes that are not held are ignored, and values that are not finite make a step diverge.
     pub const fn unchecked(gravity: [f32; 3], forces: &'a [NodalForce], motions: &'a [Motion], nodes: usize) -> Self {
-        Self { gravity, forces, motions, contact: None, given: None, nodes: Some(nodes) }
+        Self { gravity, forces, motions, nodes: Some(nodes), ..Self::NONE }
     }
 
     /// The same loads and instruments that touch the tissue.
@@ -228,6 +230,13 @@ impl<'a> Loads<'a> {
     #[must_use]
     pub const fn touched_by(self, contact: Contact<'a>) -> Self {
         Self { contact: Some(contact), ..self }
+    }
+
+    /// The same loads and pulls.
+    #[cfg(feature = "contact")]
+    #[must_use]
+    pub const fn pulled_by(self, pulls: Pulls<'a>) -> Self {
+        Self { pulls: Some(pulls), ..self }
     }
 
     /// Loads with so many times the pushes that the instruments exert in the latest step of a state in place of the
@@ -257,6 +266,10 @@ impl<'a> Loads<'a> {
 
     pub(crate) const fn contact(&self) -> Option<&Contact<'a>> {
         if cfg!(feature = "contact") { self.contact.as_ref() } else { None }
+    }
+
+    pub(crate) const fn pulls(&self) -> Option<&Pulls<'a>> {
+        if cfg!(feature = "contact") { self.pulls.as_ref() } else { None }
     }
 
     pub(crate) const fn nodes(&self) -> Option<usize> {

@@ -144,6 +144,8 @@ pub struct StateView<'a> {
     pub(crate) points: &'a mut [ContactPoint],
     /// Pushes of the instruments on the nodes of the surface, and room for the next.
     pub(crate) pushes: &'a mut [NodeVector],
+    /// Forces of the pulls in the latest step, N.
+    pub(crate) pulls: &'a mut [NodeVector],
 }
 
 impl Deref for StateView<'_> {
@@ -168,7 +170,7 @@ impl<'a> StateView<'a> {
         progress: &'a mut Progress,
     ) -> Self {
         let (touches, points, pushes): (&mut [_], &mut [_], &mut [_]) = (&mut [], &mut [], &mut []);
-        Self { displacement, remainder, increment, force, volume, progress, touches, points, pushes }
+        Self { displacement, remainder, increment, force, volume, progress, touches, points, pushes, pulls: &mut [] }
     }
 
     /// The same state, whose steps write to `touches` what each instrument feels ([`crate::contact`]) in the latest
@@ -193,6 +195,13 @@ impl<'a> StateView<'a> {
         Self { pushes, ..self }
     }
 
+    /// The same state, whose steps write to `forces` with which force (N) each pull acts on the tissue ([`crate::pulls`]) in the
+    /// latest step. Exact steps need one vector for each pull.
+    #[must_use]
+    pub fn pulling(self, forces: &'a mut [NodeVector]) -> Self {
+        Self { pulls: forces, ..self }
+    }
+
     /// The same state for a shorter time.
     pub const fn reborrow(&mut self) -> StateView<'_> {
         StateView {
@@ -205,6 +214,7 @@ impl<'a> StateView<'a> {
             touches: self.touches,
             points: self.points,
             pushes: self.pushes,
+            pulls: self.pulls,
         }
     }
 
@@ -315,13 +325,15 @@ pub trait StateVectors {
     fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 5], InstrumentMemory<'_>);
 }
 
-/// What a state keeps for instruments ([`StateView::pushing`], [`StateView::feeling`]).
+/// What a state keeps for instruments and pulls.
 #[derive(Debug, Default)]
 pub struct InstrumentMemory<'a> {
     /// See [`StateView::pushing`].
     pub pushes: &'a mut [NodeVector],
     /// See [`StateView::feeling`].
     pub touches: &'a mut [Touch],
+    /// See [`StateView::pulling`].
+    pub pulls: &'a mut [NodeVector],
 }
 
 /// A state that owns its vectors.
@@ -342,10 +354,10 @@ impl<S> Deref for State<S> {
 impl<S: StateVectors> State<S> {
     /// The state.
     pub fn view(&mut self) -> StateView<'_> {
-        let ([displacement, remainder, increment, force, volume], InstrumentMemory { pushes, touches }) =
+        let ([displacement, remainder, increment, force, volume], InstrumentMemory { pushes, touches, pulls }) =
             self.vectors.vectors_mut();
         let state = StateView::new(displacement, remainder, increment, force, volume, &mut self.progress);
-        state.pushing(pushes).feeling(touches)
+        state.pushing(pushes).feeling(touches).pulling(pulls)
     }
 
     /// Displacement of each node, m.
@@ -435,6 +447,7 @@ pub struct VecVectors {
     vectors: [std::vec::Vec<NodeVector>; 5],
     pushes: std::vec::Vec<NodeVector>,
     touches: std::vec::Vec<Touch>,
+    pulls: std::vec::Vec<NodeVector>,
 }
 
 #[cfg(any(feature = "std", test))]
@@ -444,8 +457,8 @@ impl StateVectors for VecVectors {
     }
 
     fn vectors_mut(&mut self) -> ([&mut [NodeVector]; 5], InstrumentMemory<'_>) {
-        let Self { vectors, pushes, touches } = self;
-        (vectors.each_mut().map(std::vec::Vec::as_mut_slice), InstrumentMemory { pushes, touches })
+        let Self { vectors, pushes, touches, pulls } = self;
+        (vectors.each_mut().map(std::vec::Vec::as_mut_slice), InstrumentMemory { pushes, touches, pulls })
     }
 }
 
@@ -460,8 +473,8 @@ impl VecState {
     pub fn at_rest(nodes: usize) -> Self {
         let zero = || std::vec![NodeVector::ZERO; nodes];
         let vectors = [zero(), zero(), zero(), zero(), zero()];
-        let (pushes, touches) = (std::vec![], std::vec![]);
-        Self { vectors: VecVectors { vectors, pushes, touches }, progress: Progress::START }
+        let (pushes, touches, pulls) = (std::vec![], std::vec![], std::vec![]);
+        Self { vectors: VecVectors { vectors, pushes, touches, pulls }, progress: Progress::START }
     }
 
     /// The same with room for what instruments do on a surface.
@@ -476,6 +489,17 @@ impl VecState {
         let vectors = vectors_to_push(surface.nodes().len(), surface.triangles().len());
         self.vectors.pushes = std::vec![NodeVector::ZERO; vectors];
         self.vectors.touches = std::vec![Touch::default(); MOST_INSTRUMENTS];
+    }
+
+    /// Makes room for the forces of so many pulls ([`StateView::pulling`]).
+    pub fn make_room_for_pulls(&mut self, pulls: usize) {
+        self.vectors.pulls.resize(pulls, NodeVector::ZERO);
+    }
+
+    /// The force of each pull in the latest step, N; nothing without room for it.
+    #[must_use]
+    pub fn pull_forces(&self) -> &[NodeVector] {
+        &self.vectors.pulls
     }
 
     /// What each instrument felt in the latest step ([`StateView::feeling`]); nothing without room for it.

@@ -9,6 +9,7 @@ use crate::state::StateView;
 
 use super::contact::{CallContact, supple_contact};
 use super::memory::{self, Head, Layout, Object, Place, array, magic, place_for};
+use super::pulls::{CallPulls, supple_pulls};
 use super::scene::{OpenScene, axes_of, check_choice, supple_scene};
 use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
 use supple_status::*;
@@ -53,6 +54,7 @@ pub struct supple_loads {
     motions: u32,
     gravity: [f32; 3],
     contact: *mut supple_contact,
+    pulls: *mut supple_pulls,
 }
 
 // SAFETY: `repr(C)`, begins with a head.
@@ -72,6 +74,10 @@ impl supple_loads {
 
     pub(super) const fn set_contact(&mut self, contact: *mut supple_contact) {
         self.contact = contact;
+    }
+
+    pub(super) const fn set_pulls(&mut self, pulls: *mut supple_pulls) {
+        self.pulls = pulls;
     }
 }
 
@@ -119,6 +125,7 @@ pub unsafe extern "C" fn supple_loads_init(
             motions: 0,
             gravity: [0.0; 3],
             contact: ptr::null_mut(),
+            pulls: ptr::null_mut(),
         }));
         Ok(SUPPLE_OK)
     };
@@ -244,6 +251,7 @@ fn room_for(count: u32, room: u32) -> Answer<()> {
 pub(super) struct CallLoads<'a> {
     pub(super) of_call: LoadsOfCall<'a>,
     pub(super) contact: Option<CallContact<'a>>,
+    pulls: Option<CallPulls<'a>>,
 }
 
 impl<'a> CallLoads<'a> {
@@ -255,7 +263,7 @@ impl<'a> CallLoads<'a> {
         let nodes = scene.node_count();
         if loads.is_null() {
             let none = Loads::unchecked([0.0; 3], &[], &[], nodes);
-            return Ok(Self { of_call: LoadsOfCall::new(none, &mut []), contact: None });
+            return Ok(Self { of_call: LoadsOfCall::new(none, &mut []), contact: None, pulls: None });
         }
         // SAFETY: the caller's promise; entries up to the counts were written.
         unsafe {
@@ -266,20 +274,27 @@ impl<'a> CallLoads<'a> {
             let asked = arrays.change_first::<Motion>(object.motions as usize, motion_room);
             let now = arrays.change_first::<Motion>(object.motions as usize, motion_room);
             let contact = CallContact::of(object.contact, nodes)?;
+            let pulls = CallPulls::of(object.pulls)?;
             let loads = Loads::unchecked(object.gravity, forces, asked, nodes);
             #[cfg(feature = "contact")]
             let loads = match &contact {
                 Some(contact) if contact.has_instruments() => loads.touched_by(contact.contact),
                 _ => loads,
             };
-            Ok(Self { of_call: LoadsOfCall::new(loads, now), contact })
+            #[cfg(feature = "contact")]
+            let loads = pulls.as_ref().map_or(loads, |pulls| loads.pulled_by(pulls.pulls));
+            Ok(Self { of_call: LoadsOfCall::new(loads, now), contact, pulls })
         }
     }
 
-    /// The state with what it keeps for instruments.
+    /// The state with what it keeps for instruments and pulls.
     pub(super) fn attached(&mut self, state: StateView<'a>) -> StateView<'a> {
-        match &mut self.contact {
+        let state = match &mut self.contact {
             Some(contact) => contact.attached(state),
+            None => state,
+        };
+        match &mut self.pulls {
+            Some(pulls) => pulls.attached(state),
             None => state,
         }
     }

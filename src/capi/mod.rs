@@ -31,6 +31,7 @@ mod state;
 mod step;
 
 mod pool;
+mod pulls;
 
 mod vectors;
 

@@ -343,7 +343,7 @@ pub unsafe extern "C" fn supple_sim_advance(
         let mut loads = CallLoads::of(objects.loads, &open)?;
         let threads = HostThreads::of(threads)?;
         let mut state = loads.attached(opened_of(&open, objects.state)?);
-        let CallLoads { of_call, contact } = &mut loads;
+        let CallLoads { of_call, contact, .. } = &mut loads;
         let supple_sim { clock, prepared, work, .. } = &mut *sim;
         let until = clock.end_of_call(state.time(), seconds);
         let mut watched = Watched { call: supple_report::NOTHING, contact, mark: None };

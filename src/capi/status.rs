@@ -109,6 +109,10 @@ pub enum supple_status {
     SUPPLE_E_INSTRUMENT = -34,
     /// The field of instrument `index` is none, damaged, or reaches the rim of its grid.
     SUPPLE_E_FIELD = -35,
+    /// Pull `index` has a point, radius, direction, target, stiffness or most force (value) that cannot be, or no nodes.
+    SUPPLE_E_PULL = -36,
+    /// No node is nearer to the point of pull `index` than its radius (value, m); the nearest is at the limit (m).
+    SUPPLE_E_NO_NODES = -37,
 
     /// Weights do not begin at a multiple of four bytes.
     SUPPLE_E_WEIGHTS_MISALIGNED = -40,
@@ -164,6 +168,8 @@ pub enum supple_status {
     SUPPLE_E_DIVERGED_INSTRUMENT = -94,
     /// The step was not taken: learned steps cannot meet instruments.
     SUPPLE_E_NO_CONTACT = -95,
+    /// The step was not taken: learned steps do not know pulls.
+    SUPPLE_E_NO_PULLS = -96,
 }
 
 use supple_status::*;
@@ -426,6 +432,8 @@ fn text(status: i32) -> Option<&'static CStr> {
         -33 => c"the step is above the critical step",
         -34 => c"an instrument with a size, friction, time or pose that cannot be",
         -35 => c"the bytes of an instrument's field are none, or damaged",
+        -36 => c"a pull with a point, radius, direction, target, stiffness or most force that cannot be, or without nodes",
+        -37 => c"no node is nearer to the point of a pull than its radius",
         -40 => c"the weights are not at a multiple of four bytes",
         -41 => c"the weights are shorter than their file says",
         -42 => c"not a weight file",
@@ -448,6 +456,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -93 => c"the step was not taken: supports moved a node too far in one step",
         -94 => c"the step was not taken: an instrument moves too far in one step, or is too far inside the body: slower, shorter steps, or start outside",
         -95 => c"the step was not taken: this kind of step cannot meet instruments",
+        -96 => c"the step was not taken: this kind of step does not know pulls",
         _ => return None,
     })
 }

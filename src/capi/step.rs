@@ -132,6 +132,7 @@ pub(super) fn answer(status: &Status) -> Answer<supple_status> {
                 supple_error::from(SUPPLE_E_DIVERGED_INSTRUMENT).at(index).node(node).value(metre.into(), most.into())
             }
             Cause::NoContact => SUPPLE_E_NO_CONTACT.into(),
+            Cause::NoPulls => SUPPLE_E_NO_PULLS.into(),
             Cause::Energy { kinetic, available } => {
                 supple_error::from(SUPPLE_E_DIVERGED_ENERGY).node(node).value(kinetic, available)
             }

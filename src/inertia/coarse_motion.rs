@@ -135,7 +135,7 @@ impl CoarseMotion<'_, '_> {
     ) -> MotionResult {
         let CoarseSpace { lattice, renewal, .. } = self.space;
         self.write_turned(part, given);
-        if let Some(inertia) = renewal.free_inertia {
+        if let Some(inertia) = renewal.free_inertia.filter(|_| !renewal.pulls.any) {
             self.add_translation(motion, inertia, given);
         }
         self.space.multiply_by_inertia(given, other);

@@ -90,6 +90,7 @@ mod node;
 mod node_tables;
 mod parts;
 mod pass_input;
+mod pulls;
 mod renewal;
 mod report;
 mod rest_check;

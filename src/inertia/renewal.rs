@@ -14,6 +14,7 @@ use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_POINTS, node_at};
 use super::matrices::{Bands, Matrices, add_node};
 use super::node::Scaling;
 use super::node_tables::NodeTables;
+use super::pulls::{PullsInUse, stiffness_of};
 use super::report::AddedInertia;
 use super::{COARSE_GROWTH, DRAG_AT_LARGEST_CHANGE, DRAG_OF_ADDED, LARGEST_DRAG};
 use crate::element::{
@@ -21,6 +22,7 @@ use crate::element::{
     each_bounded, tangents,
 };
 use crate::mesh::partition::MOST_PARTS;
+use crate::pulls::Pulls;
 use crate::scene::SceneView;
 use crate::simd::{Gather, NodeVector, TILE};
 use crate::step::threads::take;
@@ -62,6 +64,7 @@ pub(super) struct Renewal {
     pub(super) own_share: f32,
     /// Sum of the inertia of the lattice's motion, if no support holds the body, kg.
     pub(super) free_inertia: Option<f32>,
+    pub(super) pulls: PullsInUse,
 }
 
 /// What `S` is computed from.
@@ -98,6 +101,7 @@ impl Renewal {
         added: AddedInertia::NONE,
         own_share: 0.0,
         free_inertia: None,
+        pulls: PullsInUse::NONE,
     };
 
     /// The share of the last increment's unresolved deformation of the lattice that a step removes. Deformation is fed
@@ -133,19 +137,34 @@ impl Renewal {
     pub(super) fn renew_if_due<M: ElementMaterial>(
         &mut self,
         input: RenewalInput<'_, M>,
+        pulls: Option<&Pulls<'_>>,
         matrices: &mut Matrices<'_>,
         threads: &impl Threads,
     ) {
+        let others_pull = self.note_pulls(pulls, &input);
         let Matrices { bounds, cells, .. } = matrices;
         let mut now = bounds.iter_mut().zip(cells.iter().map(CellPolynomial::values));
         let stiffened = now.any(|(before, now)| now > COARSE_GROWTH * *before);
         // Not by a motion that is no number.
         let has_changed = self.changed * self.sensitivity > LARGEST_CHANGE * LEAST_SENSITIVITY;
-        if self.lattice_in_use && !has_changed && !stiffened {
+        if self.lattice_in_use && !has_changed && !stiffened && !others_pull {
             return;
         }
         bounds.iter_mut().zip(cells.iter()).for_each(|(before, cell)| *before = cell.values());
         self.renew(input, matrices, threads);
+    }
+
+    /// Notes the pulls that act now for the next time that `S` is computed. Gives whether that is due for them.
+    #[inline(never)]
+    fn note_pulls<M>(&mut self, pulls: Option<&Pulls<'_>>, input: &RenewalInput<'_, M>) -> bool {
+        if pulls.is_none() && !self.pulls.any {
+            return false;
+        }
+        let mut now = [0.0; _];
+        if let Some(pulls) = pulls {
+            stiffness_of(pulls, input.lattice, input.places, &mut now);
+        }
+        self.pulls.note(&now)
     }
 
     /// Computes `S`.
@@ -175,6 +194,7 @@ impl Renewal {
         for (cell, (stiffness, inertia)) in stiffness.iter().zip(&**inertia).enumerate() {
             add_cell(band, factor, stiffness, inertia, lattice, cell);
         }
+        self.pulls.add_to(band, factor, input.scaling.coarse_weight);
         self.lattice_in_use = factorise(band, factor, scratch);
         (self.moved, self.changed) = ([NodeVector::ZERO; _], 0.0);
         frames.start_stiffness();

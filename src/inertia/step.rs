@@ -24,6 +24,7 @@ use super::motion_pass::{LatticeMotion, PassTotals};
 use super::node::half_damping;
 use super::parts::NodeParts;
 use super::pass_input::{PassInput, ResidualFactors};
+use super::pulls;
 use super::renewal::RenewalInput;
 use super::report::HeldBack;
 use super::supports::MovingSupports;
@@ -129,6 +130,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
         let frames = &mut self.storage.matrices.frames;
         self.model.renewal.update_frames(frames, displacement, progress.steps);
         trial.add_pushes_before(self.step);
+        pulls::add_pulls(trial, self.step, &self.storage.tables, self.storage.places);
         let moved = self.move_lattice(trial);
         let mut totals = self.move_nodes(trial, &moved);
         // Without instruments not even its stack is used.
@@ -136,9 +138,9 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for InertiaStep<'_, '_, T> {
             self.meet_instruments(trial, &mut totals);
         }
         let Storage { tables, places, .. } = &self.storage;
-        trial.add_work_of_given(&mut totals, |node| {
-            tables.next_increment.get(rank_of(places, node)).copied().unwrap_or_default().0
-        });
+        let next = |node| tables.next_increment.get(rank_of(places, node)).copied().unwrap_or_default().0;
+        trial.add_work_of_given(&mut totals, next);
+        pulls::add_work(trial, self.step, &mut totals, next);
         Computed { totals, extremes }
     }
 
@@ -232,7 +234,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let CoarseRoom { motion, part, pull, scratch } = room;
         restrict(matrices.cells, lattice, motion);
         let stiffness = RenewalInput { scene, displacement, volume, lattice, places, scaling };
-        renewal.renew_if_due(stiffness, matrices, *threads);
+        renewal.renew_if_due(stiffness, loads.pulls(), matrices, *threads);
         if !renewal.lattice_in_use {
             motion.fill(NodeVector::ZERO);
             part.fill(NodeVector::ZERO);

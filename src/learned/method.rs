@@ -50,6 +50,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Learned<'_, '_, T> {
         self.vertices.get(node).map_or([0.0; 4], |vertex| vertex.next.0)
     }
 
+    fn follows_pulls(&self, _: &Trial<'_, M>) -> bool {
+        false
+    }
+
     fn advance(&mut self, trial: &mut Trial<'_, M>) {
         let Trial { scene, displacement, remainder, increment, .. } = trial;
         let moving = Moving { displacement, remainder, increment };

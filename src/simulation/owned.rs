@@ -16,6 +16,7 @@ use crate::learned::{self, LearnedError, LearnedModel, LearnedStep};
 use crate::loads::{LoadError, Loads, LoadsOfCall, LoadsOverTime, Motion, NodalForce};
 use crate::material::VecMaterial;
 use crate::mesh::{Mesh, MeshError, Winding};
+use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, in_tetrahedron, patch, usual_most};
 use crate::scene::{BuildError, Support, VecScene};
 use crate::simd::NodeVector;
 use crate::state::VecState;
@@ -33,6 +34,9 @@ pub struct Simulation<'w> {
     pub motions: Vec<Motion>,
     /// Rigid bodies that touch the tissue, after [`Simulation::meeting`].
     pub instruments: Vec<Instrument<'w>>,
+    /// What draws points of the tissue to targets ([`Simulation::pull`]).
+    pub pulls: Vec<Pull>,
+    pulled: Vec<PulledNode>,
     points: Vec<[f32; 3]>,
     tets: Vec<[u32; 4]>,
     scene: VecScene<VecMaterial>,
@@ -93,6 +97,8 @@ impl<'w> Simulation<'w> {
             forces: vec![],
             motions: vec![],
             instruments: vec![],
+            pulls: vec![],
+            pulled: vec![],
             points,
             tets,
             state: VecState::at_rest(scene.node_count()),
@@ -135,6 +141,45 @@ impl<'w> Simulation<'w> {
         Ok(())
     }
 
+    /// Adds a pull of so many N/m, with the usual limit ([`usual_most`]), at a point (m, at rest), and gives its place in [`Simulation::pulls`], where its target
+    /// and limits are set. It acts on the nodes within `radius` (m), or with a radius of zero on those of the element
+    /// around the point, or else nearest to it.
+    pub fn pull(&mut self, point: [f32; 3], radius: f32, stiffness: f32) -> Result<usize, SimulationError> {
+        let first = self.pulled.len();
+        if radius == 0.0 {
+            self.pulled.extend(self.nodes_around(point)?);
+        } else {
+            let nodes = self.points.len();
+            self.pulled.resize(first + nodes, PulledNode::default());
+            let count = patch(&self.points, point, radius, &mut self.pulled[first..]);
+            self.pulled.truncate(first + *count.as_ref().unwrap_or(&0));
+            count?;
+        }
+        let count = self.pulled.len() - first;
+        let most = usual_most(self.scene.view(), self.pulled.get(first..).unwrap_or_default());
+        self.pulls.push(Pull { most, ..Pull::new([first as u32, count as u32], point, stiffness) });
+        Ok(self.pulls.len() - 1)
+    }
+
+    /// The corners of the element around a point, or nearest to it.
+    fn nodes_around(&self, point: [f32; 3]) -> Result<[PulledNode; 4], SimulationError> {
+        // How far a weight is below zero: at most zero inside.
+        let outside = |nodes: &[PulledNode; 4]| nodes.iter().map(|pulled| -pulled.weight).fold(0.0, f32::max);
+        let elements = self.tets.iter().filter_map(|&corners| {
+            let points = corners.map(|node| self.points[node as usize]);
+            in_tetrahedron(corners, points, point)
+        });
+        let nearest = elements.min_by(|a, b| outside(a).total_cmp(&outside(b)));
+        nearest.ok_or(SimulationError::Pull(PullError::Nothing { radius: 0.0, nearest: f32::INFINITY }))
+    }
+
+    /// Where the point of a pull is and how it is pulled. None if there is no such pull.
+    #[must_use]
+    pub fn pulled(&self, pull: usize) -> Option<Pulled> {
+        let pulls = Pulls::new(self.scene.node_count(), &self.pulled, &self.pulls).ok()?;
+        pulls.read(pull, self.state.displacements(), self.state.pull_forces(), self.state.time())
+    }
+
     /// Moves on by so many seconds, usually a frame, under its loads and instruments. Where a step is refused the error
     /// says why, and the state is that before it.
     pub fn advance(&mut self, seconds: f64) -> Result<Report, SimulationError> {
@@ -147,11 +192,15 @@ impl<'w> Simulation<'w> {
             return Err(SimulationError::Seconds(seconds));
         }
         self.prepare_once()?;
-        let Self { gravity, forces, motions, instruments, scene, state, settings, touchable, in_step, clock, .. } =
-            self;
+        let Self { gravity, forces, motions, instruments, pulls, pulled, scene, state, touchable, in_step, .. } = self;
+        let Self { settings, clock, .. } = self;
         let mut loads = Loads::new(&*scene, *gravity, forces, motions)?;
         if !instruments.is_empty() {
             loads = loads.touched_by(Contact::new(surface(touchable, scene.node_count())?, instruments)?);
+        }
+        if !pulls.is_empty() {
+            state.make_room_for_pulls(pulls.len());
+            loads = loads.pulled_by(Pulls::new(scene.node_count(), pulled, pulls)?);
         }
         in_step.resize(motions.len(), Motion::default());
         let mut loads = LoadsOfCall::new(loads, in_step);
@@ -363,6 +412,8 @@ pub enum SimulationError {
     Load(LoadError),
     /// An instrument or a surface cannot be.
     Contact(ContactError),
+    /// A pull cannot be.
+    Pull(PullError),
     /// A length of step or a damping cannot be.
     Step(StepError),
     /// Steps beyond the critical one cannot be prepared.
@@ -384,6 +435,7 @@ impl fmt::Display for SimulationError {
             Self::Build(error) => error.fmt(f),
             Self::Load(error) => error.fmt(f),
             Self::Contact(error) => error.fmt(f),
+            Self::Pull(error) => error.fmt(f),
             Self::Step(error) => error.fmt(f),
             Self::Inertia(error) => error.fmt(f),
             Self::Learned(error) => error.fmt(f),
@@ -412,6 +464,7 @@ from! {
     Build: BuildError,
     Load: LoadError,
     Contact: ContactError,
+    Pull: PullError,
     Step: StepError,
     Inertia: InertiaError,
     Learned: LearnedError,

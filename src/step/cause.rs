@@ -43,6 +43,9 @@ pub enum Cause {
     /// The loads have instruments, which learned steps cannot meet, long ones only with room for pushes
     /// ([`StateView::pushing`](crate::state::StateView::pushing)).
     NoContact,
+    /// The loads have pulls, which learned steps do not know, exact ones only with room for their forces
+    /// ([`StateView::pulling`](crate::state::StateView::pulling)).
+    NoPulls,
     /// Supports moved the node through most of the tissue around it in a step.
     Motion {
         /// How far, m.
@@ -87,6 +90,12 @@ impl fmt::Display for Divergence {
                 f,
                 "stopped at {time:.6} s: the loads have instruments, which this step cannot meet, or has no room for their pushes"
             ),
+            Cause::NoPulls => {
+                write!(
+                    f,
+                    "stopped at {time:.6} s: the loads have pulls, which this step does not know, or has no room for their forces"
+                )
+            }
             Cause::Motion { metre, size } => write!(
                 f,
                 "diverged at {time:.6} s at node {node}: supports moved it by {:.3} mm in one step, its tissue is {:.3} mm across; \

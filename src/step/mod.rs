@@ -10,6 +10,7 @@ mod energy_sums;
 mod heat;
 mod length;
 mod parts;
+mod pulls;
 mod status;
 pub(crate) mod threads;
 mod triangles;
@@ -62,6 +63,8 @@ pub(crate) struct Trial<'a, M> {
     /// Pushes of the instruments, see [`StateView`], and how many nodes touch one in this step.
     pub(crate) pushes: &'a mut [NodeVector],
     pub(crate) touched: usize,
+    /// Forces of the pulls, N.
+    pub(crate) pulls: &'a mut [NodeVector],
     /// The node and the instrument that the step must not be taken with.
     pub(crate) refused: Option<(u32, Cause)>,
 }
@@ -105,6 +108,11 @@ pub(crate) trait StepMethod<M> {
         false
     }
 
+    /// Whether pulls act in this step.
+    fn follows_pulls(&self, _trial: &Trial<'_, M>) -> bool {
+        true
+    }
+
     /// Takes back what the method has noted for itself: the step is refused.
     fn refuse(&mut self) {}
 
@@ -127,7 +135,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
     ) -> Result<Self, Status> {
         Self::check(scene, loads, &state, room)?;
         let nodes = scene.node_count();
-        let StateView { displacement, remainder, increment, force, volume, progress, touches, points, pushes } = state;
+        let StateView { displacement, remainder, increment, force, volume, progress, touches, points, pushes, pulls } =
+            state;
         Ok(Self {
             scene,
             loads,
@@ -143,6 +152,7 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             listed: 0,
             pushes,
             touched: 0,
+            pulls,
             refused: None,
         })
     }
@@ -157,7 +167,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         let (nodes, room) = (scene.node_count(), room.min(state.capacity_for(scene.element())));
         let is_other = |checked| checked != nodes;
         let surface = loads.contact().map(|contact| contact.surface().scene_nodes());
-        if nodes == 0 || room < nodes || loads.nodes().is_some_and(is_other) || surface.is_some_and(is_other) {
+        let pulls = loads.pulls().map(|pulls| pulls.scene_nodes());
+        if nodes == 0 || room < nodes || [loads.nodes(), surface, pulls].into_iter().flatten().any(is_other) {
             return Err(Status::Mismatch { nodes, room });
         }
         Ok(())
@@ -168,6 +179,10 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
         if self.loads.contact().is_some() && !method.meets_instruments(&self) {
             let time = self.progress.time;
             return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoContact });
+        }
+        if self.loads.pulls().is_some() && !method.follows_pulls(&self) {
+            let time = self.progress.time;
+            return Status::Diverged(Divergence { time, node: 0, cause: Cause::NoPulls });
         }
         let before = self.progress.energy_balance;
         let heat = match self.progress.steps % heat::EVERY {

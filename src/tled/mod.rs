@@ -90,6 +90,7 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
         };
         let (totals, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, totals_of);
         let mut totals = Totals::of_all(&totals);
+        trial.pull((step, step.push()), self, &mut totals);
         trial.meet_instruments(step, self, &mut totals);
         Computed { totals, extremes }
     }
@@ -100,6 +101,10 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
 
     fn meets_instruments(&self, trial: &Trial<'_, M>) -> bool {
         trial.surface().triangles().is_empty() || trial.has_room_for_pushes()
+    }
+
+    fn follows_pulls(&self, trial: &Trial<'_, M>) -> bool {
+        trial.loads.pulls().is_none_or(|pulls| pulls.pulls().len() <= trial.pulls.len())
     }
 
     fn refused_load(&self, trial: &Trial<'_, M>) -> Option<(u32, Cause)> {

@@ -17,12 +17,13 @@ from ._library import lib as _lib
 from .errors import Diverged, Error, InputError, UnstableStep
 from .instruments import Instrument, LocalForce, Touch
 from .mesh import Mesh
+from .pulls import Pulls
 from .reactions import Reaction, ReactionForce
 from .scene import Material, Scene
 from .simulation import METHODS, Report, Simulation
 
 __all__ = [
-    "METHODS", "Diverged", "Error", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Reaction", "ReactionForce", "Report",
+    "METHODS", "Diverged", "Error", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Pulls", "Reaction", "ReactionForce", "Report",
     "Scene", "Simulation", "Touch", "UnstableStep", "level", "version",
 ]
 

@@ -126,6 +126,13 @@ class Scene:
     def _boundary(self) -> NDArray[np.uint32]:
         return self.mesh.boundary()
 
+    @functools.cached_property
+    def _edge(self) -> float:
+        """Mean length of the elements' edges, m."""
+        corners = self.mesh.points[self.mesh.tets].astype(np.float64)
+        pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
+        return float(np.mean([np.linalg.norm(corners[:, a] - corners[:, b], axis=1) for a, b in pairs]))
+
     def _supports_of(self, fixed: ArrayLike, moved: ArrayLike, axes: str) -> NDArray[np.uint32]:
         nodes = len(self.mesh.points)
         held = np.unique(library.node_numbers(fixed, nodes, "fixed"))

@@ -19,6 +19,7 @@ from ._laws import LAWS
 from ._library import ffi, lib
 from .errors import InputError
 from .instruments import POINT, Contact, Instrument, Rows, Touch, need_triangles
+from .pulls import PullMemory, Pulls, Wanted, wanted_of
 from .reactions import Reaction
 from .scene import ELEMENTS, Scene, axes_of
 
@@ -50,6 +51,9 @@ _PLACES = {
 _FORCE = np.dtype([("node", np.uint32), ("newton", np.float32, 3), ("ramp", np.float32)])
 _MOTION = np.dtype([("node", np.uint32), ("axes", np.uint32), ("metre", np.float32, 3), ("ramp", np.float32)])
 
+
+# Radius of a patch of some 24 nodes, in mean edges.
+_PATCH = 2.2
 
 _Given = ParamSpec("_Given")
 _Result = TypeVar("_Result")
@@ -191,6 +195,8 @@ class Simulation:
         library.checked(lib.supple_sim_describe(self._sim, objects))
         self._raw_scene, self._state, self._loads, self._network = objects.scene, objects.state, objects.loads, objects.learned
         self._contact: Contact | None = None
+        self._pull_memory: PullMemory | None = None
+        self._pull_groups = list[Wanted]()
         self._forces = self._tractions = np.zeros(0, _FORCE)
         self._lock = threading.RLock()
         self._vectors = self._view_of_displacements()
@@ -301,6 +307,71 @@ class Simulation:
         """Where instruments push in the latest step, 64 points at most, with the fields position (m), normal (outward of the instrument, zero
         where it holds the node), force (on the tissue, N), depth (m), node and instrument."""
         return np.zeros(0, POINT) if self._contact is None else self._contact.points()
+
+    # Pulls.
+
+    @_one_at_a_time
+    def pull(
+        self,
+        points: ArrayLike,
+        targets: ArrayLike | None = None,
+        *,
+        radius: float | None = None,
+        stiffness: ArrayLike = 300.0,
+        most: float | None = None,
+        along: ArrayLike | None = None,
+    ) -> Pulls:
+        """Draws points of the tissue (m, at rest) to targets (m) from now on, each by the nodes within `radius` (m; 2.2 mean edges unless
+        given, some 24 nodes), with `stiffness` (N/m, one
+        for all or one for each, up to 1e6; no stiffness makes a step unstable) and at most `most` N
+        (half the shear modulus on the cross-sections of the nodes' own tissue unless given; more tears the tissue). With `along`, a direction for all or for
+        each, such as the normal of a surface, only along it: the point slides free across. Without targets they are absent."""
+        radius = _PATCH * self.scene._edge if radius is None else radius
+        wanted = wanted_of(points, radius, stiffness, most, along)
+        made = Pulls(self, wanted)
+        groups = [*self._pull_groups, wanted]
+        if targets is not None:
+            array = np.array(targets, np.float32)
+            if array.shape != wanted.points.shape:
+                raise InputError(f"targets: their shape is {array.shape}, it must be {wanted.points.shape}")
+            wanted.targets = array
+        self._set_pulls(groups)
+        return made
+
+    def _set_pulls(self, groups: list[Wanted]) -> None:
+        memory = PullMemory(self, groups) if groups else None
+        library.checked(lib.supple_set_pulls(self._loads, memory.raw if memory else ffi.NULL), what="pulls")
+        self._pull_memory, self._pull_groups = memory, groups
+
+    @_one_at_a_time
+    def _release(self, pulls: Pulls) -> None:
+        self._place_of(pulls._wanted)
+        self._set_pulls([group for group in self._pull_groups if group is not pulls._wanted])
+
+    @_one_at_a_time
+    def _aim(self, wanted: Wanted, targets: NDArray[np.float32], within: float) -> None:
+        self._place_of(wanted)
+        if not (np.isfinite(within) and within >= 0.0):
+            raise InputError(f"within {within} s: it must be zero or more")
+        assert self._pull_memory is not None
+        # A later move of one group goes on from where the targets of the others are.
+        all_targets = [targets if group is wanted else group.targets for group in self._pull_groups]
+        self._pull_memory.aim(np.concatenate(all_targets), (self.time, self.time + within))
+        wanted.targets = targets
+
+    @_one_at_a_time
+    def _pulled(self, wanted: Wanted) -> NDArray[np.void]:
+        place = self._place_of(wanted)
+        assert self._pull_memory is not None
+        return self._pull_memory.read(self._state)[place]
+
+    def _place_of(self, wanted: Wanted) -> slice:
+        first = 0
+        for group in self._pull_groups:
+            if group is wanted:
+                return slice(first, first + len(group.points))
+            first += len(group.points)
+        raise InputError("these pulls were released")
 
     # Supports.
 

@@ -1,0 +1,329 @@
+//! Pulls: forces that draw points of the tissue to targets, as tracked points of a guidance system do, or supports that
+//! give way. A pull acts on a patch of nodes with weights `w` ([`patch`]); its point is at `x = x0 + sum w u`, and with
+//! the target `y`, the stiffness `k` (N/m) and at most `f` (N) it pulls with
+//!
+//! ```text
+//! p = k (y - x),  |p| <= f        along a direction n only: p = k n n . (y - x)
+//! ```
+//! shared among the nodes by their weights. The host sets targets, stiffnesses (0: absent) and limits whenever it likes.
+//!
+//! No stiffness makes a step unstable, and none lowers the critical step. Exact steps take the force at the end of the
+//! step, one pull after the other, from where the point would be without it, `z`:
+//!
+//! ```text
+//! p = k (y - z) / (1 + k c),   c = s sum w^2 / m,   s the step's factor of force over mass     (backward Euler)
+//! ```
+//! and again, at most three times, where pulls share nodes. //! Long steps take it half a step ahead of their start, at the velocity of the point, and raise inertia by twice the
+//! stiffness of the pulls, as they do by that of the tissue ([`crate::inertia`]). Both are the exact pull where nothing
+//! moves. In an exact step no pull moves its point by more than a fiftieth of the size of the tissue at its nodes, so that tissue is not torn
+//! before it can answer. Learned steps refuse pulls.
+//!
+//! Steps keep nothing of pulls but their forces, for the host to read ([`Pulls::read`]).
+
+mod patch;
+
+pub use patch::{in_tetrahedron, patch};
+
+use core::fmt;
+
+use glam::Vec3;
+
+use crate::material::{Material, Moduli};
+use crate::scene::SceneView;
+use crate::simd::NodeVector;
+
+/// A node that a pull moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct PulledNode {
+    /// The node.
+    pub node: u32,
+    /// Its share of the force. The weights of a pull sum up to one.
+    pub weight: f32,
+}
+
+/// A pull.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Pull {
+    /// Its first node in the list of nodes of all pulls, and how many it has.
+    pub nodes: [u32; 2],
+    /// Where its point is at rest, m.
+    pub at: [f32; 3],
+    /// N/m; 0: absent.
+    pub stiffness: f32,
+    /// The most force, N; infinite: no limit.
+    pub most: f32,
+    /// The direction along which it pulls, of any length, as the normal of a surface on which the point slides; zeros:
+    /// along all.
+    pub along: [f32; 3],
+    /// The target at the first of the times, m.
+    pub from: [f32; 3],
+    /// At the second.
+    pub to: [f32; 3],
+    /// s. Between these times the target moves evenly, before and after it stands still.
+    pub times: [f64; 2],
+}
+
+/// Where a pulled point is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct Pulled {
+    /// m.
+    pub point: [f32; 3],
+    /// From the point to the target, m; along the direction of a pull that has one.
+    pub gap: [f32; 3],
+    /// On the tissue, N.
+    pub force: [f32; 3],
+}
+
+impl Pull {
+    /// A pull at a point (m, at rest), of so many N/m without a limit ([`usual_most`] is one), whose target is there.
+    #[must_use]
+    pub const fn new(nodes: [u32; 2], at: [f32; 3], stiffness: f32) -> Self {
+        Self { nodes, at, stiffness, most: f32::INFINITY, along: [0.0; 3], from: at, to: at, times: [0.0; 2] }
+    }
+
+    /// The target moves, from where it is at the time `from` (s), to `target` (m) at the time `to`.
+    pub fn move_to(&mut self, target: [f32; 3], from: f64, to: f64) {
+        self.from = self.target(from).to_array();
+        (self.to, self.times) = (target, [from, to]);
+    }
+
+    /// The target is there at once, m.
+    pub const fn put(&mut self, target: [f32; 3]) {
+        (self.from, self.to, self.times) = (target, target, [0.0; 2]);
+    }
+
+    /// The target at a time (s), m.
+    #[must_use]
+    pub(crate) fn target(&self, time: f64) -> Vec3 {
+        let [start, end] = self.times;
+        let share = if time >= end { 1.0 } else { ((time - start) / (end - start)).max(0.0) };
+        let [from, to] = [self.from, self.to].map(Vec3::from_array);
+        if share >= 1.0 { to } else { from + share as f32 * (to - from) }
+    }
+
+    /// The gap, or its part along the direction of the pull, m.
+    fn gap(&self, gap: Vec3) -> Vec3 {
+        match Vec3::from_array(self.along).try_normalize() {
+            Some(along) => along.dot(gap) * along,
+            None => gap,
+        }
+    }
+
+    /// The force (N) that leaves the rest of a gap (m) which it alone makes, with what it is now, where the point moves by
+    /// `compliance` under a force in the step, m/N for each axis; zero: it does not move.
+    pub(crate) fn force(&self, gap: Vec3, now: Vec3, compliance: Vec3) -> Vec3 {
+        let force = match Vec3::from_array(self.along).try_normalize() {
+            Some(along) => {
+                let (compliance, now) = (along.dot(compliance * along), along.dot(now));
+                along * (self.stiffness * (along.dot(gap) + compliance * now) / (1.0 + self.stiffness * compliance))
+            }
+            None => self.stiffness * (gap + compliance * now) / (1.0 + self.stiffness * compliance),
+        };
+        force.clamp_length_max(self.most)
+    }
+
+    pub(crate) fn check(&self, index: usize, nodes: usize) -> Result<(), PullError> {
+        let [first, count] = self.nodes.map(|number| number as usize);
+        if count == 0 || first.checked_add(count).is_none_or(|end| end > nodes) {
+            return Err(PullError::Range { pull: index, first, count, nodes });
+        }
+        let vectors = [("point", self.at), ("direction", self.along), ("target", self.from), ("target", self.to)];
+        for (what, vector) in vectors {
+            if let Some(&value) = vector.iter().find(|component| !component.is_finite()) {
+                return Err(PullError::Value { pull: index, what, value });
+            }
+        }
+        if let Some(&time) = self.times.iter().find(|time| !time.is_finite()) {
+            return Err(PullError::Value { pull: index, what: "time", value: time as f32 });
+        }
+        if !(self.stiffness >= 0.0 && self.stiffness <= MOST_STIFFNESS) {
+            return Err(PullError::Value { pull: index, what: "stiffness", value: self.stiffness });
+        }
+        if self.most.is_nan() || self.most < 0.0 {
+            return Err(PullError::Value { pull: index, what: "most force", value: self.most });
+        }
+        Ok(())
+    }
+}
+
+/// The most force (N) of a pull on these nodes unless the host says otherwise: half the shear modulus of the tissue on the
+/// cross-sections of the nodes' own tissue. More tears the tissue before it holds it where the pull asks for. Infinite for tissue without a modulus.
+#[must_use]
+pub fn usual_most<M: Material>(scene: SceneView<'_, M>, nodes: &[PulledNode]) -> f32 {
+    let Some(tissue) = scene.material.tissue(0) else { return f32::INFINITY };
+    let area = |pulled: &PulledNode| {
+        let size = scene.node_size(pulled.node as usize);
+        size * size
+    };
+    0.5 * Moduli::of(&tissue.law).shear as f32 * nodes.iter().map(area).sum::<f32>()
+}
+
+/// The stiffest pull, N/m.
+pub const MOST_STIFFNESS: f32 = 1e6;
+
+/// Pulls of a scene, checked.
+#[derive(Clone, Copy, Debug)]
+pub struct Pulls<'a> {
+    nodes: &'a [PulledNode],
+    pulls: &'a [Pull],
+    scene_nodes: usize,
+}
+
+impl<'a> Pulls<'a> {
+    /// Checks pulls and their nodes for a scene of so many nodes.
+    pub fn new(scene_nodes: usize, nodes: &'a [PulledNode], pulls: &'a [Pull]) -> Result<Self, PullError> {
+        for (index, pulled) in nodes.iter().enumerate() {
+            if pulled.node as usize >= scene_nodes {
+                return Err(PullError::Node { index, node: pulled.node, nodes: scene_nodes });
+            }
+            if !pulled.weight.is_finite() {
+                return Err(PullError::Weight { index, value: pulled.weight });
+            }
+        }
+        for (index, pull) in pulls.iter().enumerate() {
+            pull.check(index, nodes.len())?;
+        }
+        Ok(Self { nodes, pulls, scene_nodes })
+    }
+
+    /// Pulls that the caller has checked against a scene of so many nodes. Of those that have not been, nodes that do not
+    /// exist are ignored, and values that are not finite make a step diverge.
+    #[cfg(feature = "capi-neo-hookean")]
+    pub(crate) const fn unchecked(scene_nodes: usize, nodes: &'a [PulledNode], pulls: &'a [Pull]) -> Self {
+        Self { nodes, pulls, scene_nodes }
+    }
+
+    pub(crate) const fn scene_nodes(&self) -> usize {
+        self.scene_nodes
+    }
+
+    /// The pulls.
+    #[must_use]
+    pub const fn pulls(&self) -> &'a [Pull] {
+        self.pulls
+    }
+
+    /// Those that act now, and their places.
+    pub(crate) fn acting(&self) -> impl Iterator<Item = (usize, &'a Pull)> + use<'a> {
+        self.pulls.iter().enumerate().filter(|(_, pull)| pull.stiffness > 0.0)
+    }
+
+    /// The nodes of a pull.
+    pub(crate) fn nodes_of(&self, pull: &Pull) -> &'a [PulledNode] {
+        let [first, count] = pull.nodes.map(|number| number as usize);
+        self.nodes.get(first..first.saturating_add(count)).unwrap_or_default()
+    }
+
+    /// Where the point of a pull is at a time (s) with these displacements of the nodes (m), and how it was pulled in the
+    /// latest step, from the forces that the state keeps (N). None if there is no such pull.
+    #[must_use]
+    pub fn read(&self, index: usize, displacements: &[NodeVector], forces: &[NodeVector], time: f64) -> Option<Pulled> {
+        let pull = self.pulls.get(index)?;
+        let moved = self.mean(pull, |node| displacements.get(node).copied().unwrap_or_default().to_array().into());
+        let at = Vec3::from_array(pull.at);
+        let gap = pull.gap((pull.target(time) - at) - moved);
+        let force = forces.get(index).copied().unwrap_or_default().to_array();
+        Some(Pulled { point: (at + moved).to_array(), gap: gap.to_array(), force })
+    }
+
+    /// The mean of a vector over the nodes of a pull, by their weights.
+    pub(crate) fn mean(&self, pull: &Pull, of_node: impl Fn(usize) -> Vec3) -> Vec3 {
+        self.nodes_of(pull).iter().map(|pulled| pulled.weight * of_node(pulled.node as usize)).sum()
+    }
+}
+
+/// Why a pull was refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PullError {
+    /// It names a node that is not there.
+    Node {
+        /// Place in the list of nodes.
+        index: usize,
+        /// The node.
+        node: u32,
+        /// Nodes of the scene.
+        nodes: usize,
+    },
+    /// A weight is not a finite number.
+    Weight {
+        /// Place in the list of nodes.
+        index: usize,
+        /// The weight.
+        value: f32,
+    },
+    /// It has no nodes, or others than there are.
+    Range {
+        /// Its place in the list of pulls.
+        pull: usize,
+        /// Its first node in the list of nodes.
+        first: usize,
+        /// How many.
+        count: usize,
+        /// How many the list has.
+        nodes: usize,
+    },
+    /// A value that cannot be.
+    Value {
+        /// Its place in the list of pulls.
+        pull: usize,
+        /// "point", "direction", "target", "time", "stiffness" or "most force".
+        what: &'static str,
+        /// The value.
+        value: f32,
+    },
+    /// No node is near enough to the point.
+    Nothing {
+        /// The radius that was asked for, m.
+        radius: f32,
+        /// Distance of the nearest node, m.
+        nearest: f32,
+    },
+    /// More nodes are near than there is room for.
+    Capacity {
+        /// How many.
+        needed: usize,
+        /// How many fit.
+        capacity: usize,
+    },
+}
+
+impl fmt::Display for PullError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Node { index, node, nodes } => {
+                write!(f, "entry {index} of the pulled nodes: node {node} does not exist, the scene has {nodes} nodes")
+            }
+            Self::Weight { index, value } => {
+                write!(f, "entry {index} of the pulled nodes: a weight of {value}, it must be a finite number")
+            }
+            Self::Range { pull, first, count, nodes } => write!(
+                f,
+                "pull {pull}: {count} nodes from entry {first} on, of a list of {nodes}: it needs at least one, and all must be there"
+            ),
+            Self::Value { pull, what: "stiffness", value } => {
+                write!(f, "pull {pull}: a stiffness of {value} N/m, it must be from 0 (absent) to {MOST_STIFFNESS:e}")
+            }
+            Self::Value { pull, what: "most force", value } => {
+                write!(f, "pull {pull}: a most force of {value} N, it must be zero or more, infinite for no limit")
+            }
+            Self::Value { pull, what, value } => {
+                write!(f, "pull {pull}: a component of its {what} is {value}, it must be a finite number")
+            }
+            Self::Nothing { radius, nearest } => write!(
+                f,
+                "a pull of radius {:.3} mm: the nearest node is {:.3} mm away, a larger radius reaches it",
+                1e3 * radius,
+                1e3 * nearest
+            ),
+            Self::Capacity { needed, capacity } => {
+                write!(f, "the pulls need room for {needed} nodes, there is room for {capacity}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for PullError {}
