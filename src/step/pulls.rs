@@ -1,72 +1,69 @@
-//! Pulls in a step ([`crate::pulls`]).
+//! Pulls in an exact step ([`crate::pulls`]).
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
-use super::{Step, StepMethod, Totals, Trial};
+use super::{Step, Trial};
 use crate::element::ElementMaterial;
 use crate::pulls::{Pull, Pulls};
 use crate::simd::NodeVector;
 
 /// The most that a pull moves its point in an exact step, as a share of the size of a node's tissue.
 const MOST_WAY: f32 = 0.02;
-/// Times that the pulls are solved for one after the other, and the change, as a share of the largest force squared, below which
-/// they are not again.
+/// Times that the pulls are solved for one after the other, and the change, as a share of the largest force squared, below
+/// which they are not again.
 const SWEEPS: usize = 3;
-const SETTLED: f32 = 1e-6;
+const SETTLED: f32 = 1e-4;
 
 /// A pulled point in a step.
 struct Point {
+    /// Its displacement, m.
+    here: Vec3,
     /// How it moves in the step, and in that before, m.
     next: Vec3,
     last: Vec3,
-    /// The largest component of the motion of a node, m.
-    farthest: f32,
     /// How far it moves under a force, m/N for each axis.
     compliance: Vec3,
 }
 
 impl<M: ElementMaterial> Trial<'_, M> {
-    /// Adds the forces of pulls at the end of the step, for methods whose next increment of a node follows from its force
-    /// and its mass alone, with the factor `s` of the force over the mass (s^2).
+    /// Adds the forces of pulls at the end of an exact step to the total forces. Gives their work, J.
     #[inline(never)]
-    pub(crate) fn pull(&mut self, (step, factor): (&Step, f32), method: &impl StepMethod<M>, totals: &mut Totals) {
-        let Some(pulls) = self.loads.pulls() else { return };
+    pub(crate) fn pull(&mut self, step: &Step) -> f32 {
+        let Some(pulls) = self.loads.pulls() else { return 0.0 };
+        let end = self.progress.time + f64::from(step.seconds());
         self.pulls.fill(NodeVector::ZERO);
-        for _ in 0..SWEEPS {
-            let (mut changed, mut all) = (0.0f32, 0.0f32);
+        let mut sweep = 0;
+        loop {
+            let (mut changed, mut all, mut work) = (0.0f32, 0.0f32, 0.0);
             for (index, pull) in pulls.acting() {
                 let now = at(self.pulls, index);
-                let point = self.pulled_point(pulls, pull, factor, method);
-                let force =
-                    self.without_tearing(pulls, pull, &point, self.force_at_end(step, pulls, pull, &point, now), now);
-                let change = force - now;
-                (changed, all) = (changed.max(change.length_squared()), all.max(force.length_squared()));
-                if change == Vec3::ZERO {
-                    continue;
-                }
-                if let Some(place) = self.pulls.get_mut(index) {
-                    place.0 = force.extend(0.0).to_array();
-                }
-                for pulled in pulls.nodes_of(pull) {
-                    self.add_force(pulled.node as usize, pulled.weight * change, (step, method), totals);
+                let point = self.pulled_point(pulls, pull, step);
+                let gap = (pull.target(end) - Vec3::from_array(pull.at)) - (point.here + point.next);
+                let change = self.without_tearing(pulls, pull, &point, pull.force(gap, now, point.compliance) - now);
+                (changed, all) = (changed.max(change.length_squared()), all.max(now.length_squared()));
+                work += 0.5 * now.dot(point.next + point.last);
+                if sweep < SWEEPS && change != Vec3::ZERO {
+                    self.add_pull(pulls, pull, (index, now + change), change);
                 }
             }
-            if changed <= SETTLED * all {
-                break;
+            // The last sweep only sums up what the pulls do.
+            if sweep == SWEEPS || (sweep > 0 && changed <= SETTLED * all) {
+                return work;
             }
-        }
-        for (index, pull) in pulls.acting() {
-            let (force, point) = (at(self.pulls, index), self.pulled_point(pulls, pull, factor, method));
-            totals.add_work(0.5 * force.dot(point.next + point.last));
-            totals.farthest[1] = totals.farthest[1].max(point.farthest);
+            sweep += 1;
         }
     }
 
-    /// The force of a pull at the end of a step, N.
-    fn force_at_end(&self, step: &Step, pulls: &Pulls<'_>, pull: &Pull, point: &Point, now: Vec3) -> Vec3 {
-        let end = self.progress.time + f64::from(step.seconds());
-        let moved = self.moved_mean(pulls, pull) + point.next;
-        pull.force((pull.target(end) - Vec3::from_array(pull.at)) - moved, now, point.compliance)
+    fn add_pull(&mut self, pulls: &Pulls<'_>, pull: &Pull, (index, force): (usize, Vec3), change: Vec3) {
+        if let Some(place) = self.pulls.get_mut(index) {
+            place.0 = force.extend(0.0).to_array();
+        }
+        let change = change.extend(0.0);
+        for pulled in pulls.nodes_of(pull) {
+            if let Some(force) = self.force.get_mut(pulled.node as usize) {
+                force.0 = (Vec4::from(force.0) + pulled.weight * change).to_array();
+            }
+        }
     }
 
     /// The mean displacement of the nodes of a pull, m.
@@ -74,49 +71,44 @@ impl<M: ElementMaterial> Trial<'_, M> {
         pulls.mean(pull, |node| at(self.displacement, node) + at(self.remainder, node))
     }
 
-    fn pulled_point(&self, pulls: &Pulls<'_>, pull: &Pull, factor: f32, method: &impl StepMethod<M>) -> Point {
-        let mut point = Point { next: Vec3::ZERO, last: Vec3::ZERO, farthest: 0.0, compliance: Vec3::ZERO };
+    fn pulled_point(&self, pulls: &Pulls<'_>, pull: &Pull, step: &Step) -> Point {
+        let [mut here, mut next, mut last, mut compliance] = [Vec4::ZERO; 4];
+        let (keep, push) = (step.keep() * step.carry(), step.push());
         for pulled in pulls.nodes_of(pull) {
             let (node, weight) = (pulled.node as usize, pulled.weight);
-            let (Some(inertia), Some(increment), Some(force)) =
-                (self.scene.inertia.get(node), self.increment.get(node), self.force.get(node))
-            else {
-                continue;
-            };
-            let [x, y, z, _] = method.next_increment(node, inertia, increment, force);
-            let (next, inverse) = (Vec3::new(x, y, z), Vec3::from_array(inertia.inverse));
-            let last = Vec3::from_array(increment.to_array());
+            let vectors = (self.displacement.get(node), self.remainder.get(node), self.increment.get(node));
+            let (Some(displacement), Some(remainder), Some(increment)) = vectors else { continue };
+            let (Some(inertia), Some(force)) = (self.scene.inertia.get(node), self.force.get(node)) else { continue };
+            let [x, y, z] = inertia.inverse;
+            let (inverse, increment) = (Vec4::new(x, y, z, 0.0), Vec4::from(increment.0));
+            let moved = keep * increment + push * (inverse * Vec4::from(force.0));
+            here += weight * (Vec4::from(displacement.0) + Vec4::from(remainder.0));
             // A held axis moves as in the step before.
-            point.next += weight * Vec3::select(inverse.cmpgt(Vec3::ZERO), next, last);
-            point.last += weight * last;
-            point.farthest = point.farthest.max(next.abs().max_element());
-            point.compliance += weight * weight * factor * inverse;
+            next += weight * Vec4::select(inverse.cmpgt(Vec4::ZERO), moved, increment);
+            last += weight * increment;
+            compliance += (weight * weight) * inverse;
         }
-        point
+        let [here, next, last, compliance] = [here, next, last, push * compliance].map(Vec4::truncate);
+        Point { here, next, last, compliance }
     }
 
-    /// The force, or as much of its change from what it is now as moves the point no farther than tissue can follow in a step, or no farther than it
-    /// moves by itself.
-    fn without_tearing(&self, pulls: &Pulls<'_>, pull: &Pull, point: &Point, force: Vec3, now: Vec3) -> Vec3 {
-        let change = force - now;
+    /// The change of a force, or as much of it as moves the point no farther than tissue can follow in a step, or no farther
+    /// than it moves by itself.
+    fn without_tearing(&self, pulls: &Pulls<'_>, pull: &Pull, point: &Point, change: Vec3) -> Vec3 {
         let (free, way) = (point.next, point.compliance * change);
         let square = (free + way).length_squared();
-        let nodes = pulls.nodes_of(pull).iter();
-        let heaviest = nodes.fold((0, 0.0), |(node, most), pulled| {
-            if pulled.weight > most { (pulled.node as usize, pulled.weight) } else { (node, most) }
-        });
-        let volume = self.scene.node_volume(heaviest.0);
+        let volume = pulls.nodes_of(pull).first().map_or(0.0, |pulled| self.scene.node_volume(pulled.node as usize));
         // Without a root where there is nothing to be done, as this is for every pull in every step.
         const CUBE: f32 = MOST_WAY * MOST_WAY * MOST_WAY;
         if square * square * square <= CUBE * CUBE * volume * volume || square <= free.length_squared() {
-            return force;
+            return change;
         }
-        let most = (MOST_WAY * self.scene.node_size(heaviest.0)).max(free.length());
+        let most = (MOST_WAY * libm::cbrtf(volume)).max(free.length());
         // |free + share way| = most
         let (product, length) = (free.dot(way), way.length_squared());
         let rest = product * product + length * (most * most - free.length_squared()).max(0.0);
         let share = (libm::sqrtf(rest) - product) / length;
-        now + share.clamp(0.0, 1.0) * change
+        share.clamp(0.0, 1.0) * change
     }
 }
 

@@ -83,14 +83,24 @@ impl<M: ElementMaterial, T: Threads> StepMethod<M> for Exact<'_, T> {
             progress,
             look_cycle: LOOK_CYCLE,
         };
-        let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
+        let (instruments, is_pulled) = (loads.contact().is_some(), loads.pulls().is_some());
+        let total = |nodes: Range<usize>, increment: &[NodeVector], force: &[NodeVector]| {
             let inertia = inertia.get(nodes.clone()).unwrap_or_default();
             let increment = increment.get(nodes).unwrap_or_default();
-            EnergyInput { step, inertia, increment, force }.total(loads.contact().is_some())
+            EnergyInput { step, inertia, increment, force }.total(instruments)
+        };
+        let totals_of = |nodes: Range<usize>, force: &[NodeVector], _: &mut [()]| {
+            // The forces of pulls are not among these yet.
+            if is_pulled { Totals::NONE } else { total(nodes, increment, force) }
         };
         let (totals, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, totals_of);
         let mut totals = Totals::of_all(&totals);
-        trial.pull((step, step.push()), self, &mut totals);
+        if is_pulled {
+            let work = trial.pull(step);
+            let all = 0..trial.scene.node_count();
+            totals = total(all, trial.increment, trial.force);
+            totals.add_work(work);
+        }
         trial.meet_instruments(step, self, &mut totals);
         Computed { totals, extremes }
     }
