@@ -408,7 +408,12 @@ impl<'a, M: Material> SceneView<'a, M> {
 
     /// Volume of a node's own tissue, m^3.
     pub(crate) fn node_volume(&self, node: usize) -> f32 {
-        self.node_mass(node) / self.material.tissue(0).map_or(f32::INFINITY, |tissue| tissue.density)
+        self.node_mass(node) / self.density()
+    }
+
+    /// Of the first tissue, kg/m^3.
+    pub(crate) fn density(&self) -> f32 {
+        self.material.tissue(0).map_or(f32::INFINITY, |tissue| tissue.density)
     }
 
     /// The tetrahedra that it is made of.

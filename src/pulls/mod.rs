@@ -22,7 +22,7 @@
 
 mod patch;
 
-pub use patch::{in_tetrahedron, patch};
+pub use patch::{around, in_tetrahedron, patch};
 
 use core::fmt;
 
@@ -99,23 +99,28 @@ impl Pull {
     #[must_use]
     pub(crate) fn target(&self, time: f64) -> Vec3 {
         let [start, end] = self.times;
-        let share = if time >= end { 1.0 } else { ((time - start) / (end - start)).max(0.0) };
+        if time >= end {
+            return self.to.into();
+        }
+        let share = ((time - start) / (end - start)).max(0.0) as f32;
         let [from, to] = [self.from, self.to].map(Vec3::from_array);
-        if share >= 1.0 { to } else { from + share as f32 * (to - from) }
+        from + share * (to - from)
+    }
+
+    /// The direction along which it pulls, of length one, if there is one.
+    fn direction(&self) -> Option<Vec3> {
+        if self.along == [0.0; 3] { None } else { Vec3::from_array(self.along).try_normalize() }
     }
 
     /// The gap, or its part along the direction of the pull, m.
     fn gap(&self, gap: Vec3) -> Vec3 {
-        match Vec3::from_array(self.along).try_normalize() {
-            Some(along) => along.dot(gap) * along,
-            None => gap,
-        }
+        self.direction().map_or(gap, |along| along.dot(gap) * along)
     }
 
     /// The force (N) that leaves the rest of a gap (m) which it alone makes, with what it is now, where the point moves by
     /// `compliance` under a force in the step, m/N for each axis; zero: it does not move.
     pub(crate) fn force(&self, gap: Vec3, now: Vec3, compliance: Vec3) -> Vec3 {
-        let force = match Vec3::from_array(self.along).try_normalize() {
+        let force = match self.direction() {
             Some(along) => {
                 let (compliance, now) = (along.dot(compliance * along), along.dot(now));
                 along * (self.stiffness * (along.dot(gap) + compliance * now) / (1.0 + self.stiffness * compliance))

@@ -39,6 +39,21 @@ pub fn patch(points: &[[f32; 3]], point: [f32; 3], radius: f32, nodes: &mut [Pul
     Ok(count)
 }
 
+/// The corners of the tetrahedron around a point (m, at rest), or of the one nearest to it in barycentric coordinates. Looks at all.
+#[must_use]
+pub fn around(points: &[[f32; 3]], tets: &[[u32; 4]], point: [f32; 3]) -> Option<[PulledNode; 4]> {
+    // How far a weight is below zero: at most zero inside.
+    let outside = |nodes: &[PulledNode; 4]| nodes.iter().map(|pulled| -pulled.weight).fold(0.0, f32::max);
+    let of_element = |&corners: &[u32; 4]| {
+        let mut at = [[0.0; 3]; 4];
+        for (place, node) in at.iter_mut().zip(corners) {
+            *place = *points.get(node as usize)?;
+        }
+        in_tetrahedron(corners, at, point)
+    };
+    tets.iter().filter_map(of_element).min_by(|a, b| outside(a).total_cmp(&outside(b)))
+}
+
 /// The corners of a tetrahedron with the barycentric coordinates of a point, its points at rest in m. None if it has no
 /// volume.
 #[must_use]

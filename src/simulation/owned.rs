@@ -16,7 +16,7 @@ use crate::learned::{self, LearnedError, LearnedModel, LearnedStep};
 use crate::loads::{LoadError, Loads, LoadsOfCall, LoadsOverTime, Motion, NodalForce};
 use crate::material::VecMaterial;
 use crate::mesh::{Mesh, MeshError, Winding};
-use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, in_tetrahedron, patch, usual_most};
+use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, around, patch, usual_most};
 use crate::scene::{BuildError, Support, VecScene};
 use crate::simd::NodeVector;
 use crate::state::VecState;
@@ -147,7 +147,8 @@ impl<'w> Simulation<'w> {
     pub fn pull(&mut self, point: [f32; 3], radius: f32, stiffness: f32) -> Result<usize, SimulationError> {
         let first = self.pulled.len();
         if radius == 0.0 {
-            self.pulled.extend(self.nodes_around(point)?);
+            let nodes = around(&self.points, &self.tets, point);
+            self.pulled.extend(nodes.ok_or(PullError::Nothing { radius, nearest: f32::INFINITY })?);
         } else {
             let nodes = self.points.len();
             self.pulled.resize(first + nodes, PulledNode::default());
@@ -159,18 +160,6 @@ impl<'w> Simulation<'w> {
         let most = usual_most(self.scene.view(), self.pulled.get(first..).unwrap_or_default());
         self.pulls.push(Pull { most, ..Pull::new([first as u32, count as u32], point, stiffness) });
         Ok(self.pulls.len() - 1)
-    }
-
-    /// The corners of the element around a point, or nearest to it.
-    fn nodes_around(&self, point: [f32; 3]) -> Result<[PulledNode; 4], SimulationError> {
-        // How far a weight is below zero: at most zero inside.
-        let outside = |nodes: &[PulledNode; 4]| nodes.iter().map(|pulled| -pulled.weight).fold(0.0, f32::max);
-        let elements = self.tets.iter().filter_map(|&corners| {
-            let points = corners.map(|node| self.points[node as usize]);
-            in_tetrahedron(corners, points, point)
-        });
-        let nearest = elements.min_by(|a, b| outside(a).total_cmp(&outside(b)));
-        nearest.ok_or(SimulationError::Pull(PullError::Nothing { radius: 0.0, nearest: f32::INFINITY }))
     }
 
     /// Where the point of a pull is and how it is pulled. None if there is no such pull.

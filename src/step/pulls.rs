@@ -32,14 +32,19 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let Some(pulls) = self.loads.pulls() else { return 0.0 };
         let end = self.progress.time + f64::from(step.seconds());
         self.pulls.fill(NodeVector::ZERO);
-        let mut sweep = 0;
+        let (mut sweep, density) = (0, self.scene.density());
         loop {
             let (mut changed, mut all, mut work) = (0.0f32, 0.0f32, 0.0);
             for (index, pull) in pulls.acting() {
                 let now = at(self.pulls, index);
                 let point = self.pulled_point(pulls, pull, step);
                 let gap = (pull.target(end) - Vec3::from_array(pull.at)) - (point.here + point.next);
-                let change = self.without_tearing(pulls, pull, &point, pull.force(gap, now, point.compliance) - now);
+                let change = pull.force(gap, now, point.compliance) - now;
+                let volume = pulls
+                    .nodes_of(pull)
+                    .first()
+                    .map_or(0.0, |pulled| self.scene.node_mass(pulled.node as usize) / density);
+                let change = point.without_tearing(change, volume);
                 (changed, all) = (changed.max(change.length_squared()), all.max(now.length_squared()));
                 work += 0.5 * now.dot(point.next + point.last);
                 if sweep < SWEEPS && change != Vec3::ZERO {
@@ -91,13 +96,14 @@ impl<M: ElementMaterial> Trial<'_, M> {
         let [here, next, last, compliance] = [here, next, last, push * compliance].map(Vec4::truncate);
         Point { here, next, last, compliance }
     }
+}
 
-    /// The change of a force, or as much of it as moves the point no farther than tissue can follow in a step, or no farther
-    /// than it moves by itself.
-    fn without_tearing(&self, pulls: &Pulls<'_>, pull: &Pull, point: &Point, change: Vec3) -> Vec3 {
-        let (free, way) = (point.next, point.compliance * change);
+impl Point {
+    /// The change of a force, or as much of it as moves the point no farther than tissue can follow in a step, a share of the
+    /// size of a node's volume (m^3), or no farther than it moves by itself.
+    fn without_tearing(&self, change: Vec3, volume: f32) -> Vec3 {
+        let (free, way) = (self.next, self.compliance * change);
         let square = (free + way).length_squared();
-        let volume = pulls.nodes_of(pull).first().map_or(0.0, |pulled| self.scene.node_volume(pulled.node as usize));
         // Without a root where there is nothing to be done, as this is for every pull in every step.
         const CUBE: f32 = MOST_WAY * MOST_WAY * MOST_WAY;
         if square * square * square <= CUBE * CUBE * volume * volume || square <= free.length_squared() {

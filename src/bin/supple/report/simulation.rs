@@ -14,6 +14,7 @@ use crate::scene::setup::Setup;
 pub(crate) fn part(setup: &Setup, state: &VecState, outcome: &Outcome, conclusion: &Conclusion) -> ReportPart {
     let mut sections = vec![result(setup, outcome, conclusion), shapes(setup, state), motion(outcome)];
     sections.extend(forces(outcome));
+    sections.extend(gaps(outcome));
     ReportPart { made: Made::by_this_command("none"), sections }
 }
 
@@ -99,6 +100,26 @@ fn motion(Outcome { frames, .. }: &Outcome) -> Section {
         figures: vec![Figure::choice(caption, vec![Panel::new("motion", plot)])],
         ..Section::default()
     }
+}
+
+fn gaps(outcome: &Outcome) -> Option<Section> {
+    let gaps = outcome.pulls.gaps();
+    if gaps.is_empty() {
+        return None;
+    }
+    let curves = gaps.into_iter().enumerate().map(|(index, rows)| {
+        let (times, metres): (_, Vec<_>) = rows.into_iter().unzip();
+        let millimetres = metres.into_iter().map(|metre| 1e3 * metre).collect();
+        Curve::new(format!("pull {index}"), times, millimetres).coloured(COLOURS[index % COLOURS.len()])
+    });
+    let plot = plots::linear("time, s", "gap, mm", curves.collect());
+    let caption =
+        "Distance of each pulled point from its target at the frames; points, gaps and forces are in pulls.csv.";
+    Some(Section {
+        title: "Gaps of pulls".into(),
+        figures: vec![Figure::choice(caption, vec![Panel::new("gaps", plot)])],
+        ..Section::default()
+    })
 }
 
 fn forces(outcome: &Outcome) -> Option<Section> {

@@ -18,7 +18,7 @@ use crate::scene::body::Body;
 use crate::scene::setup::Setup;
 
 /// Results but frames, by the names of their files.
-const TABLES: [&str; 5] = ["frames.pvd", "final.csv", "reactions.csv", "summary.json", report::FILE];
+const TABLES: [&str; 6] = ["frames.pvd", "final.csv", "pulls.csv", "reactions.csv", "summary.json", report::FILE];
 
 /// The folder of a simulation's results.
 pub(crate) struct Folder {

@@ -42,6 +42,9 @@ pub(crate) fn conclude(
         if !outcome.reactions.is_empty() {
             folder.write_text("reactions.csv", &outcome.reactions.table())?;
         }
+        if !outcome.pulls.is_empty() {
+            folder.write_text("pulls.csv", &outcome.pulls.table(setup.body.centre))?;
+        }
         folder.write_text("summary.json", &summary.json())?;
     }
     Ok(Conclusion { summary, warnings })

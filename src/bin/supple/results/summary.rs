@@ -8,6 +8,7 @@ use supple::inertia::Grid;
 use super::figures::Figures;
 use crate::added_mass::describe_added;
 use crate::run::outcome::{AdaptiveTrace, GuardTrace, LargeTrace, LearnedTrace, Outcome};
+use crate::run::pulled::{PulledPoints, length};
 use crate::run::reactions::Reactions;
 use crate::scene::learned::LearnedChoice;
 use crate::scene::setup::Setup;
@@ -71,6 +72,7 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome, figures: &Figures, warnings: 
     add_estimate(&mut summary, outcome.guard.as_ref());
     add_motion(&mut summary, outcome, figures);
     add_reactions(&mut summary, &outcome.reactions);
+    add_pulls(&mut summary, &outcome.pulls);
     summary
 }
 
@@ -204,6 +206,28 @@ fn add_reactions(summary: &mut Summary, reactions: &Reactions) {
         "instruments",
         words.collect::<Vec<_>>().join(", "),
         json!({ "instruments": figures.collect::<Vec<_>>() }),
+    );
+}
+
+/// How far pulled points are from their targets.
+fn add_pulls(summary: &mut Summary, pulls: &PulledPoints) {
+    let gaps = pulls.at_end().iter().map(|pulled| length(pulled.gap));
+    let Some((farthest, gap)) = gaps.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
+    let mean = pulls.at_end().iter().map(|pulled| length(pulled.gap)).sum::<f64>() / pulls.at_end().len() as f64;
+    let figures = pulls
+        .at_end()
+        .iter()
+        .map(|pulled| json!({ "gap_mm": 1e3 * length(pulled.gap), "force_n": length(pulled.force) }));
+    summary.add(
+        "pulls",
+        format!(
+            "{} points are {:.3} mm from their targets on average at the end, number {farthest} {:.3} mm, with {:.3e} N",
+            pulls.at_end().len(),
+            1e3 * mean,
+            1e3 * gap,
+            length(pulls.at_end()[farthest].force)
+        ),
+        json!({ "pulls": figures.collect::<Vec<_>>() }),
     );
 }
 

@@ -1,6 +1,7 @@
 //! A simulation from rest to its end: steps, frames at even intervals, what became of it.
 
 pub(crate) mod outcome;
+pub(crate) mod pulled;
 pub(crate) mod reactions;
 pub(crate) mod start;
 
@@ -46,8 +47,10 @@ pub(crate) fn run<'a>(
     // No two frames of one state.
     let frames = if is_even { total.min(time.frames.into()) } else { time.frames.into() };
     let loads = setup.loads(simulation.scene())?;
-    let mut running = Running { setup, simulation, loads, outcome, tick, taken: 0 };
+    let limits = setup.pulls.limit(simulation.scene().view());
+    let mut running = Running { setup, simulation, loads, limits, outcome, tick, taken: 0 };
     running.outcome.enter_frame(running.simulation.state());
+    running.read_pulls()?;
     frame(&mut running.simulation)?;
     for index in 1..=frames {
         let share = index as f64 / frames as f64;
@@ -71,8 +74,10 @@ pub(crate) fn run<'a>(
 struct Running<'a> {
     setup: &'a Setup,
     simulation: Simulation<'a>,
-    /// Without instruments.
+    /// Without instruments and pulls.
     loads: Loads<'a>,
+    /// The most force of each pull, N.
+    limits: Vec<f32>,
     outcome: Outcome,
     /// Is told the time now and then, s.
     tick: &'a dyn Fn(f64),
@@ -94,14 +99,25 @@ impl Running<'_> {
         Ok(())
     }
 
-    /// Exact steps of their own pace to a time (s), along the parts of the instruments' paths.
+    /// Exact steps of their own pace to a time (s), along the parts of the paths of instruments and targets.
     fn reach(&mut self, target: f64) -> Result<(), Problem> {
         let mut from = self.simulation.state().time();
         while from < target && self.outcome.divergence.is_none() {
-            let until = target.min(self.setup.instruments.next_turn(from + self.rounding()));
+            let now = from + self.rounding();
+            let until = target.min(self.setup.instruments.next_turn(now)).min(self.setup.pulls.next_turn(now));
             self.advance_from(from, until)?;
             from = until;
         }
+        Ok(())
+    }
+
+    /// Takes down where pulled points are.
+    fn read_pulls(&mut self) -> Result<(), Problem> {
+        let Self { setup, simulation, limits, outcome, .. } = self;
+        let state = simulation.state();
+        let pulls = setup.pulls.at(state.time(), limits);
+        let pulling = setup.pulls.pulling(&pulls, simulation.scene().node_count())?;
+        outcome.pulls.enter(&pulling, setup.pulls.pulls, state);
         Ok(())
     }
 
@@ -113,15 +129,18 @@ impl Running<'_> {
         self.advance_from(self.simulation.state().time(), until)
     }
 
-    /// Moves on to a time (s) with the instruments on the parts of their paths that begin at `from` or before, s.
+    /// Moves on to a time (s) with instruments and targets on the parts of their paths that begin at `from` or before, s.
     fn advance_from(&mut self, from: f64, until: f64) -> Result<(), Problem> {
         let rounding = self.rounding();
-        let Self { setup, simulation, loads, outcome, tick, .. } = self;
-        let mut loads = *loads;
+        let Self { setup, simulation, loads, limits, outcome, tick, .. } = self;
+        let (mut loads, nodes) = (*loads, simulation.scene().node_count());
         let instruments = setup.instruments.at(from + rounding);
         if !instruments.is_empty() {
-            let nodes = simulation.scene().node_count();
             loads = loads.touched_by(setup.instruments.contact(&instruments, nodes)?);
+        }
+        let pulls = setup.pulls.at(from + rounding, limits);
+        if !pulls.is_empty() {
+            loads = loads.pulled_by(setup.pulls.pulling(&pulls, nodes)?);
         }
         let mut watched = Watched { mark: (outcome.limits, outcome.reactions.mark()), outcome, began: Instant::now() };
         let mut watch = |event: Event<'_>| {
@@ -174,7 +193,7 @@ impl Running<'_> {
             outcome.above_from.get_or_insert(time);
         }
         outcome.enter_frame(simulation.state());
-        Ok(())
+        self.read_pulls()
     }
 }
 

@@ -11,6 +11,7 @@ use supple::simulation::Report;
 use supple::state::{StateView, VecState};
 use supple::step::{CriticalStep, Divergence, Status};
 
+use super::pulled::PulledPoints;
 use super::reactions::Reactions;
 use crate::weight_file::describe_step;
 
@@ -72,12 +73,14 @@ pub(crate) struct Outcome {
     pub(crate) guard: Option<GuardTrace>,
     /// With instruments.
     pub(crate) reactions: Reactions,
+    /// With pulls.
+    pub(crate) pulls: PulledPoints,
     pub(crate) frames: Vec<FrameTrace>,
 }
 
 impl Outcome {
     /// Before the first step, which is `seconds` long.
-    pub(crate) const fn new(at_rest: CriticalStep, seconds: f32) -> Self {
+    pub(crate) fn new(at_rest: CriticalStep, seconds: f32) -> Self {
         Self {
             at_rest,
             least: (at_rest, 0.0),
@@ -93,6 +96,7 @@ impl Outcome {
             adaptive: None,
             guard: None,
             reactions: Reactions::NONE,
+            pulls: PulledPoints::default(),
             frames: vec![],
         }
     }

@@ -76,6 +76,20 @@ impl Body {
         self.mesh.tets.iter().map(|tet| volume(tet.map(|node| self.mesh.points[node as usize])).abs())
     }
 
+    /// Area of the boundary at each node (m^2): a third of those triangles whose nodes are all chosen.
+    pub(crate) fn areas(&self, chosen: impl Fn(u32) -> bool) -> Vec<f64> {
+        let mut areas = vec![0.0; self.local.len()];
+        for triangle in self.boundary().into_iter().filter(|triangle| triangle.iter().all(|&node| chosen(node))) {
+            let [a, b, c] = triangle.map(|node| self.mesh.points[node as usize]);
+            let edge = |p: [f64; 3]| [p[0] - a[0], p[1] - a[1], p[2] - a[2]];
+            let (u, v) = (edge(b), edge(c));
+            let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            let area = 0.5 * normal.iter().map(|component| component * component).sum::<f64>().sqrt();
+            triangle.iter().for_each(|&node| areas[node as usize] += area / 3.0);
+        }
+        areas
+    }
+
     /// Triangles that belong to one element only.
     pub(crate) fn boundary(&self) -> Vec<[u32; 3]> {
         boundary(self.mesh.tets.iter().copied())

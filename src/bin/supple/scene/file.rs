@@ -9,6 +9,7 @@ use serde::Deserialize;
 use toml::{Spanned, Value};
 
 use super::instruments::InstrumentTable;
+use super::pulls::PullTable;
 use crate::problem::Problem;
 
 /// A scene file with its text, for line numbers.
@@ -36,6 +37,10 @@ pub(crate) struct SceneTable {
     pub(crate) traction: Vec<Spanned<TractionTable>>,
     #[serde(default)]
     pub(crate) instrument: Vec<Spanned<InstrumentTable>>,
+    #[serde(default)]
+    pub(crate) pull: Vec<Spanned<PullTable>>,
+    #[serde(default)]
+    pub(crate) spring: Vec<Spanned<SpringTable>>,
     gravity: Option<Spanned<[f32; 3]>>,
     pub(crate) time: Spanned<TimeTable>,
     // The former name stays readable.
@@ -114,6 +119,7 @@ entry!(FixTable { axes: Option<Spanned<String>> });
 entry!(ForceTable { newton: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>> });
 entry!(MoveTable { metre: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>>, axes: Option<Spanned<String>> });
 entry!(TractionTable { pascal: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>> });
+entry!(SpringTable { stiffness: Option<Spanned<f32>>, per_area: Option<Spanned<f32>> });
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -184,7 +190,9 @@ impl SceneFile {
         let traction = scene.traction.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let instrument = scene.instrument.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let given = scene.gravity.iter().chain(fix).chain(force).chain(motion).chain(traction);
-        let mut given = given.chain(instrument);
+        let pull = scene.pull.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
+        let spring = scene.spring.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
+        let mut given = given.chain(instrument).chain(pull).chain(spring);
         let first = given.next();
         if let Some(second) = given.next() {
             return Err(self.problem(second, "gravity is given twice"));

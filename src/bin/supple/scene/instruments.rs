@@ -268,18 +268,24 @@ impl OwnedField {
 
 fn read_path(file: &SceneFile, at: &Spanned<InstrumentTable>, body: &Body) -> Result<Vec<(f64, [f32; 3])>, Problem> {
     let table = at.get_ref();
-    let local = |[x, y, z]: [f64; 3]| {
-        let [a, b, c] = body.centre;
-        [(x - a) as f32, (y - b) as f32, (z - c) as f32]
-    };
     let Some(path) = &table.path else {
         return if table.shape.get_ref() == "field" {
             // Where its file has it.
-            Ok(vec![(0.0, local([0.0; 3]))])
+            Ok(vec![(0.0, body.centre.map(|component| -component as f32))])
         } else {
             Err(file.problem(at, "an instrument needs a path = [[t, x, y, z], ...], s and m"))
         };
     };
+    checked_path(file, path, body)
+}
+
+/// Times (s) that increase, and points (m from the centre of the body).
+pub(super) fn checked_path(
+    file: &SceneFile,
+    path: &Spanned<Vec<[f64; 4]>>,
+    body: &Body,
+) -> Result<Vec<(f64, [f32; 3])>, Problem> {
+    let local = |point: [f64; 3]| [0, 1, 2].map(|axis| (point[axis] - body.centre[axis]) as f32);
     let points = path.get_ref();
     if points.is_empty() {
         return Err(file.problem(path, "the path has no point"));
@@ -294,7 +300,12 @@ fn read_path(file: &SceneFile, at: &Spanned<InstrumentTable>, body: &Body) -> Re
 }
 
 /// A number that is finite and not below `least`.
-fn positive(file: &SceneFile, what: &str, value: Option<&Spanned<f32>>, least: f32) -> Result<Option<f32>, Problem> {
+pub(super) fn positive(
+    file: &SceneFile,
+    what: &str,
+    value: Option<&Spanned<f32>>,
+    least: f32,
+) -> Result<Option<f32>, Problem> {
     let Some(at) = value else { return Ok(None) };
     let value = *at.get_ref();
     if value.is_finite() && value >= least {

@@ -12,6 +12,7 @@ use super::instruments::SceneInstruments;
 use super::learned::LearnedChoice;
 use super::loads::read_loads;
 use super::plausible;
+use super::pulls::ScenePulls;
 use super::timing::{Timing, method_name};
 use super::tissues::Tissues;
 use crate::element_name::element_named;
@@ -26,6 +27,7 @@ pub struct Setup {
     pub forces: Vec<NodalForce>,
     pub(crate) motions: Vec<Motion>,
     pub instruments: SceneInstruments,
+    pub pulls: ScenePulls,
     pub(crate) gravity: [f32; 3],
     /// 1/s.
     pub damping: f32,
@@ -57,6 +59,7 @@ impl Setup {
         };
         let (supports, forces, motions) = read_loads(file, &body)?;
         let instruments = SceneInstruments::read(file, &body)?;
+        let pulls = ScenePulls::read(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
         let mut warnings = plausible::warnings(file, &body, &tissues, gravity, &supports, &forces);
         let element = read_element(file, learned.as_ref())?;
@@ -74,6 +77,7 @@ impl Setup {
             forces,
             motions,
             instruments,
+            pulls,
             gravity,
             damping,
             time,
@@ -92,6 +96,7 @@ impl Setup {
             forces: vec![],
             motions: vec![],
             instruments: SceneInstruments::default(),
+            pulls: ScenePulls::default(),
             gravity: [0.0; 3],
             damping: 0.0,
             time: Timing::of_demo(),
@@ -137,8 +142,9 @@ impl Setup {
         state
     }
 
-    /// For what the instruments do, if there are any.
+    /// For what instruments and pulls do, if there are any.
     fn make_room(&self, state: &mut VecState) {
+        state.make_room_for_pulls(self.pulls.len());
         match self.instruments.surface(self.body.local.len()) {
             Ok(surface) if !self.instruments.is_empty() => state.make_room(&surface),
             _ => {}
