@@ -5,7 +5,9 @@
 //! ```text
 //! K + K_p <= 4 / D^2 B^-1 - K_p        must hold, the tissue's bound with K + 2 K_p
 //! ```
-//! A node's part in `K_p` is bounded by `k |w| sum |w|`, a function's by the same of its weights.
+//! A node's part in `K_p` is bounded by `k |w| sum |w|`, a function's by the same of its weights. Inertia that grew with the force
+//! of a pull at its limit, as the gap closes, would feed motion. So no pull is stiffer in long steps than its most force over
+//! [`LEAST_GAP`].
 
 use glam::Vec3;
 
@@ -19,6 +21,8 @@ use crate::step::{Step, Totals, Trial};
 
 /// Stiffness with which pulls are counted, over their own.
 const COUNTED: f32 = 2.0;
+/// At the most force of a pull, m.
+const LEAST_GAP: f32 = 5e-4;
 /// Growth at which `S` is computed anew, and for how many steps one that is this much too large is used.
 const GROWTH: f32 = 1.05;
 const MOST_STEPS: u32 = 12;
@@ -36,6 +40,7 @@ pub(super) fn add_pulls<M: ElementMaterial>(
     let Some(pulls) = trial.loads.pulls() else { return };
     trial.pulls.fill(NodeVector::ZERO);
     for (index, pull) in pulls.acting() {
+        let pull = &softened(pull);
         let force = force_of(trial, step, pulls, pull);
         if let Some(place) = trial.pulls.get_mut(index) {
             place.0 = force.extend(0.0).to_array();
@@ -52,6 +57,11 @@ pub(super) fn add_pulls<M: ElementMaterial>(
             }
         }
     }
+}
+
+/// As stiff as long steps have it.
+fn softened(pull: &Pull) -> Pull {
+    Pull { stiffness: pull.stiffness.min(pull.most / LEAST_GAP), ..*pull }
 }
 
 /// The force of a pull in the step, N.
@@ -78,20 +88,20 @@ pub(super) fn add_work<M: ElementMaterial>(
             let [x, y, z, _] = next(node);
             0.5 * (Vec3::new(x, y, z) + Vec3::from(last))
         });
-        totals.add_work(force_of(trial, step, pulls, pull).dot(way));
+        totals.add_work(force_of(trial, step, pulls, &softened(pull)).dot(way));
     }
 }
 
 /// What the pulls that act now add to the functions.
-pub(super) fn stiffness_of(pulls: &Pulls<'_>, lattice: &Lattice, places: &[LatticeNode], sums: &mut FunctionStiffness) {
-    sums.fill(0.0);
+fn stiffness_of(pulls: &Pulls<'_>, lattice: &Lattice, places: &[LatticeNode], sums: &mut FunctionStiffness) {
     for (_, pull) in pulls.acting() {
         // Twice: the sum of all weights, then each one times it.
         let mut all = 0.0;
         each_weight(pulls, pull, lattice, places, |_, weight| all += weight);
+        let counted = COUNTED * softened(pull).stiffness * all;
         each_weight(pulls, pull, lattice, places, |function, weight| {
             if let Some(sum) = sums.get_mut(function) {
-                *sum += COUNTED * pull.stiffness * weight * all;
+                *sum += counted * weight;
             }
         });
     }
@@ -129,9 +139,22 @@ pub(super) struct PullsInUse {
 impl PullsInUse {
     pub(super) const NONE: Self = Self { of_functions: [0.0; _], any: false, steps: 0 };
 
+    /// Whether `S` has to be computed anew for the pulls that act now. In the function's own stack, which is free elsewhere.
+    #[inline(never)]
+    pub(super) fn follow(&mut self, pulls: Option<&Pulls<'_>>, lattice: &Lattice, places: &[LatticeNode]) -> bool {
+        if pulls.is_none() && !self.any {
+            return false;
+        }
+        let mut now = [0.0; _];
+        if let Some(pulls) = pulls {
+            stiffness_of(pulls, lattice, places, &mut now);
+        }
+        self.note(&now)
+    }
+
     /// Takes the stiffness of the pulls that act now, if `S` has to be computed anew for them: there is more than it
     /// contains, or for long much less. A pull that is absent for a few frames changes nothing.
-    pub(super) fn note(&mut self, now: &FunctionStiffness) -> bool {
+    fn note(&mut self, now: &FunctionStiffness) -> bool {
         let mut pairs = self.of_functions.iter().zip(now);
         let is_small = pairs.clone().any(|(used, now)| *now > GROWTH * used);
         let is_large = !is_small && pairs.any(|(used, now)| *used > GROWTH * now);

@@ -14,7 +14,7 @@ use super::lattice::{CoarseVectors, Lattice, LatticeNode, MAX_POINTS, node_at};
 use super::matrices::{Bands, Matrices, add_node};
 use super::node::Scaling;
 use super::node_tables::NodeTables;
-use super::pulls::{PullsInUse, stiffness_of};
+use super::pulls::PullsInUse;
 use super::report::AddedInertia;
 use super::{COARSE_GROWTH, DRAG_AT_LARGEST_CHANGE, DRAG_OF_ADDED, LARGEST_DRAG};
 use crate::element::{
@@ -22,7 +22,6 @@ use crate::element::{
     each_bounded, tangents,
 };
 use crate::mesh::partition::MOST_PARTS;
-use crate::pulls::Pulls;
 use crate::scene::SceneView;
 use crate::simd::{Gather, NodeVector, TILE};
 use crate::step::threads::take;
@@ -133,15 +132,14 @@ impl Renewal {
         self.changed = lattice.largest_strain(&self.moved, rotations) + bending;
     }
 
-    /// Computes `S` anew if that is due, when the cells have the sums of the nodes' scalar bounds.
+    /// Computes `S` anew if that is due, when the cells have the sums of the nodes' scalar bounds, or as pulls ask for it.
     pub(super) fn renew_if_due<M: ElementMaterial>(
         &mut self,
         input: RenewalInput<'_, M>,
-        pulls: Option<&Pulls<'_>>,
+        others_pull: bool,
         matrices: &mut Matrices<'_>,
         threads: &impl Threads,
     ) {
-        let others_pull = self.note_pulls(pulls, &input);
         let Matrices { bounds, cells, .. } = matrices;
         let mut now = bounds.iter_mut().zip(cells.iter().map(CellPolynomial::values));
         let stiffened = now.any(|(before, now)| now > COARSE_GROWTH * *before);
@@ -152,19 +150,6 @@ impl Renewal {
         }
         bounds.iter_mut().zip(cells.iter()).for_each(|(before, cell)| *before = cell.values());
         self.renew(input, matrices, threads);
-    }
-
-    /// Notes the pulls that act now for the next time that `S` is computed. Gives whether that is due for them.
-    #[inline(never)]
-    fn note_pulls<M>(&mut self, pulls: Option<&Pulls<'_>>, input: &RenewalInput<'_, M>) -> bool {
-        if pulls.is_none() && !self.pulls.any {
-            return false;
-        }
-        let mut now = [0.0; _];
-        if let Some(pulls) = pulls {
-            stiffness_of(pulls, input.lattice, input.places, &mut now);
-        }
-        self.pulls.note(&now)
     }
 
     /// Computes `S`.

@@ -226,6 +226,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let Self { step, model, threads, storage: Storage { tables, places, matrices, room }, .. } = self;
         let residual = ResidualFactors::new(step, model, trial.progress);
         let LargeModel { lattice, renewal, scaling, rough, method, .. } = &mut **model;
+        let others_pull = renewal.pulls.follow(trial.loads.pulls(), lattice, places);
         let Trial { scene, loads, displacement, increment, force, volume, progress, .. } = trial;
         let (scene, places) = (*scene, &**places);
         let input = PassInput { step, scaling, residual, inertia: scene.inertia, increment, places };
@@ -234,7 +235,7 @@ impl<T: Threads> InertiaStep<'_, '_, T> {
         let CoarseRoom { motion, part, pull, scratch } = room;
         restrict(matrices.cells, lattice, motion);
         let stiffness = RenewalInput { scene, displacement, volume, lattice, places, scaling };
-        renewal.renew_if_due(stiffness, loads.pulls(), matrices, *threads);
+        renewal.renew_if_due(stiffness, others_pull, matrices, *threads);
         if !renewal.lattice_in_use {
             motion.fill(NodeVector::ZERO);
             part.fill(NodeVector::ZERO);

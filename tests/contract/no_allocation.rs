@@ -13,6 +13,7 @@ use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{AnyLaw, Element, Exponential, NeoHookean, NodalStrain, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::mlp::Network;
+use supple::pulls::{Pull, PulledNode, Pulls, patch};
 use supple::scene::{Axes, BuildError, FixedScene, Support, patch_rows_for, tiles_for};
 use supple::state::{FixedState, NodeVector};
 use supple::step::{Status, Step};
@@ -136,6 +137,21 @@ fn building_and_stepping_in_statics_allocates_nothing() {
     }
     state.reset();
 
+    // A pull draws its middle aside.
+    let mut nodes = [PulledNode::default(); NODES];
+    let count = patch(&points, [0.01, 0.01, 0.02], 0.011, &mut nodes).unwrap() as u32;
+    let mut pulls = [Pull::new([0, count], [0.01, 0.01, 0.02], 100.0)];
+    pulls[0].put([0.015, 0.01, 0.02]);
+    let mut pull_forces = [NodeVector::ZERO];
+    let mut pulled = 0;
+    for _ in 0..100 {
+        let mut state = state.view().pulling(&mut pull_forces);
+        let loads = Loads::NONE.pulled_by(Pulls::new(NODES, &nodes, &pulls).unwrap());
+        let taken = tled::step(scene, &loads, &mut state, &step).is_taken();
+        pulled += u32::from(taken && pull_forces[0] != NodeVector::ZERO);
+    }
+    state.reset();
+
     // Refusals as well.
     assert!(Step::new(1.0, 0.0, critical).is_err());
     let huge = [NodalForce { newton: [f32::MAX; 3], ..forces[0] }];
@@ -144,7 +160,7 @@ fn building_and_stepping_in_statics_allocates_nothing() {
     assert!(scene.build(&mesh, &[Support::fixed(10_000)]).is_err());
 
     assert_eq!(allocations(), before);
-    assert!(pressed > 50, "{pressed}");
+    assert!(pressed > 50 && pulled == 100, "{pressed}, {pulled}");
     println!("200 steps, strain energy {energy:.3e} J, no allocation");
     assert!(taken == 200 && energy > 0.0 && diverged && (volume / TETS as f64 - 1.0).abs() < 0.1);
 }

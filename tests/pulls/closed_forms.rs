@@ -1,0 +1,121 @@
+use super::*;
+
+/// Long steps, too, carry a weight without an error: only their inertia is another one.
+#[test]
+fn a_free_body_hangs_on_a_pull_that_carries_its_weight() {
+    for (name, method, step) in [("exact", Method::Exact, None), ("long", long(), Some(0.004))] {
+        let mut body = bar(Element::NodalStrain, false).with(settings(method, 10.0, step));
+        body.gravity = [0.0, 0.0, -9.81];
+        let pull = body.pull([0.015, 0.015, 0.12], 0.02, 300.0).unwrap();
+        body.pulls[pull].most = f32::INFINITY;
+        for _ in 0..300 {
+            body.advance(0.01).unwrap();
+        }
+        let pulled = body.pulled(pull).unwrap();
+        let weight = 9.81 * MASS;
+        println!("{name}: {:.5} N of {weight:.5} N at a gap of {:.4} mm", pulled.force[2], 1e3 * pulled.gap[2]);
+        assert!((pulled.force[2] / weight - 1.0).abs() < 1e-3);
+        assert!((pulled.gap[2] / (weight / 300.0) - 1.0).abs() < 1e-3);
+    }
+}
+
+/// `m x'' = -k x`: a stiff light bar on a soft spring in its middle.
+#[test]
+fn a_free_body_swings_about_its_target_with_the_period_of_a_spring() {
+    let stiffness = 10.0;
+    let mut body = bar(Element::Linear, false);
+    let at = [0.015, 0.015, 0.06];
+    let pull = body.pull(at, 0.07, stiffness).unwrap();
+    body.pulls[pull].put([at[0], at[1] + 0.002, at[2]]);
+    let (mut last, mut crossings) = (0.0, vec![]);
+    while crossings.len() < 3 && body.state().time() < 5.0 {
+        body.advance(0.001).unwrap();
+        let gap = body.pulled(pull).unwrap().gap[1];
+        if last * gap < 0.0 {
+            // Where the line through both is zero.
+            crossings.push(body.state().time() - 0.001 * f64::from(gap / (gap - last)));
+        }
+        last = gap;
+    }
+    let period = crossings[2] - crossings[0];
+    let expected = std::f64::consts::TAU * f64::from(MASS / stiffness).sqrt();
+    println!("period {:.3} ms, closed form {:.3} ms", 1e3 * period, 1e3 * expected);
+    assert!((period / expected - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn a_pull_along_one_direction_leaves_the_others_free() {
+    let mut body = bar(Element::NodalPressure, false).with(settings(Method::Exact, 5.0, None));
+    body.gravity = [2.0, 0.0, -9.81];
+    let at = [0.015, 0.015, 0.12];
+    let pull = body.pull(at, 0.02, 1000.0).unwrap();
+    body.pulls[pull].along = [0.0, 0.0, 3.0];
+    body.pulls[pull].most = f32::INFINITY;
+    for _ in 0..100 {
+        body.advance(0.01).unwrap();
+    }
+    let pulled = body.pulled(pull).unwrap();
+    println!("force {:?} N, point {:?} m", pulled.force, pulled.point);
+    assert!(pulled.force[0] == 0.0 && (pulled.force[2] / (9.81 * MASS) - 1.0).abs() < 0.05);
+    // Half of 2 m/s^2, less what damping takes of it: v = g / mu (1 - exp(-mu t)).
+    let way = 2.0 / 5.0 * (1.0 - (1.0 - (-5.0f32).exp()) / 5.0);
+    assert!((pulled.point[0] - at[0] - way).abs() < 0.02 * way, "{way}");
+}
+
+#[test]
+fn a_pull_exerts_no_more_than_its_most_force() {
+    for (name, method, step) in [("exact", Method::Exact, None), ("long", long(), Some(0.004))] {
+        let mut body = bar(Element::NodalPressure, true).with(settings(method, 20.0, step));
+        let pull = body.pull([0.015, 0.015, 0.12], 0.02, 1000.0).unwrap();
+        body.pulls[pull].most = 0.02;
+        body.pulls[pull].put([0.115, 0.015, 0.12]);
+        body.advance(2.0).unwrap();
+        let pulled = body.pulled(pull).unwrap();
+        println!("{name}: {:.5} N at a gap of {:.1} mm", length(pulled.force), 1e3 * length(pulled.gap));
+        assert!((length(pulled.force) / 0.02 - 1.0).abs() < 1e-3 && length(pulled.gap) > 0.02);
+    }
+}
+
+/// Pulls at the corners of the elements themselves, as springs of supports are, hold them as supports do.
+#[test]
+fn stiff_springs_hold_a_body_as_supports_do() {
+    let hung = |is_fixed: bool, stiffness: f32| {
+        let mut body = bar(Element::NodalStrain, is_fixed).with(settings(Method::Exact, 20.0, None));
+        body.gravity = [0.0, -0.2, 0.0];
+        if !is_fixed {
+            for node in 0..25 {
+                let at = body.points()[node];
+                let pull = body.pull(at, 1e-4, stiffness).unwrap();
+                body.pulls[pull].most = f32::INFINITY;
+            }
+        }
+        body.advance(2.0).unwrap();
+        body.displacements()[BAR.node(2, 2, 16) as usize].to_array()[1]
+    };
+    let fixed = hung(true, 0.0);
+    let [stiff, soft] = [1e6, 1.0].map(|stiffness| hung(false, stiffness));
+    println!(
+        "tip: {:.4} mm fixed, {:.4} mm on springs of 1e6 N/m, {:.4} mm on 1 N/m",
+        1e3 * fixed,
+        1e3 * stiff,
+        1e3 * soft
+    );
+    assert!((stiff / fixed - 1.0).abs() < 2e-3);
+    assert!(soft < 1.2 * fixed);
+}
+
+#[test]
+fn absent_pulls_change_no_bit() {
+    let moved = |pulls: usize| {
+        let mut body = bar(Element::NodalStrain, true).with(settings(Method::Exact, 5.0, None));
+        body.gravity = [0.0, -9.81, 0.0];
+        for _ in 0..pulls {
+            body.pull([0.015, 0.015, 0.1], 0.02, 0.0).unwrap();
+        }
+        body.advance(0.05).unwrap();
+        body.displacements().to_vec()
+    };
+    let alone = moved(0);
+    assert!(alone.iter().any(|vector| vector.to_array()[1] < -1e-3));
+    assert_eq!(alone, moved(2));
+}
