@@ -444,6 +444,7 @@ private:
 };
 
 class contact;
+class pulls;
 
 // What acts on a scene. One thread at a time.
 class loads {
@@ -488,6 +489,8 @@ public:
 
     // Lets the instruments of a contact touch what these loads act on; a contact() ends that.
     status set_contact(const contact &with) const noexcept;
+    // Lets pulls act as well; pulls() ends that.
+    status set_pulls(const pulls &with) const noexcept;
 
 private:
     static status too_many(std::size_t count, error *why) noexcept {
@@ -979,6 +982,63 @@ private:
 
 inline status loads::set_contact(const contact &with) const noexcept {
     return detail::of(supple_set_contact(raw_, with.raw()));
+}
+
+using pull = supple_pull;
+using pulled = supple_pulled;
+
+// Points of the tissue that are drawn to targets. They belong to one state. One thread at a time.
+class pulls {
+public:
+    constexpr pulls() noexcept = default;
+    constexpr explicit pulls(supple_pulls *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_pulls *raw() const noexcept { return raw_; }
+
+    // Bytes of memory for so many pulls, of so many nodes in sum; some 24 each is a good number.
+    [[nodiscard]] static std::size_t size(std::uint32_t count, std::uint32_t nodes) noexcept { return supple_pulls_size(count, nodes); }
+
+    // Prepares room, without pulls yet.
+    static result<pulls> make(memory place, scene of, std::uint32_t count, std::uint32_t nodes) noexcept {
+        result<pulls> made{status::ok, detail::nothing(status::ok), {}};
+        made.status = detail::of(supple_pulls_init(place.data(), place.size(), of.raw(), count, nodes, &made.value.raw_));
+        made.error = detail::nothing(made.status);
+        return made;
+    }
+
+    // Adds one on the nodes within its radius, or on nodes with weights; it is absent until it has a target. `points` are those of the
+    // scene at rest, m.
+    status add(scene of, span<const float> points, const pull &wanted, error *why = nullptr) const noexcept {
+        return detail::of(supple_add_pull(raw_, of.raw(), points.data(), &wanted, why));
+    }
+    status add(scene of, span<const std::uint32_t> nodes, span<const float> weights, const pull &wanted,
+               error *why = nullptr) const noexcept {
+        const std::size_t count = nodes.size() < weights.size() ? nodes.size() : weights.size();
+        return detail::of(supple_add_pull_of_nodes(raw_, of.raw(), nodes.data(), weights.data(),
+                                                   static_cast<std::uint32_t>(count < none ? count : none), &wanted, why));
+    }
+
+    // Another stiffness, most force or direction of one.
+    status change(std::uint32_t which, const pull &wanted, error *why = nullptr) const noexcept {
+        return detail::of(supple_set_pull(raw_, which, &wanted, why));
+    }
+
+    // Targets of all, m, which they reach evenly from one time to another, s; usually those of a frame. NaN: absent.
+    status aim(span<const float> targets, double from, double to, error *why = nullptr) const noexcept {
+        const std::size_t count = targets.size() / 3;
+        return detail::of(supple_set_targets(raw_, targets.data(), static_cast<std::uint32_t>(count < none ? count : none), from, to, why));
+    }
+
+    // Where all are, how far from their targets, and the forces on the tissue.
+    status read(state moved, span<pulled> out) const noexcept {
+        return detail::of(supple_read_pulls(raw_, moved.raw(), out.data(), static_cast<std::uint32_t>(out.size() < none ? out.size() : none)));
+    }
+
+private:
+    supple_pulls *raw_ = nullptr;
+};
+
+inline status loads::set_pulls(const pulls &with) const noexcept {
+    return detail::of(supple_set_pulls(raw_, with.raw()));
 }
 
 // The force on an instrument between two frames, for a haptic loop.

@@ -916,6 +916,83 @@ static void contacts(void) {
     DONE(supple_state_reset(state));
 }
 
+static void pulls(void) {
+    static _Alignas(64) unsigned char memory[32768], acting[4096];
+    enum { MOST = 2, ROOM = 40 };
+    const size_t bytes = supple_pulls_size(MOST, ROOM);
+    supple_pulls *made;
+    supple_loads *acts;
+    CHECK(bytes > 0 && bytes <= sizeof memory);
+    DONE(supple_loads_init(acting, sizeof acting, scene, 1, 1, &acts));
+    REFUSED(SUPPLE_E_NULL, supple_pulls_init(NULL, bytes, scene, MOST, ROOM, &made));
+    REFUSED(SUPPLE_E_SHORT, supple_pulls_init(memory, bytes - 1, scene, MOST, ROOM, &made));
+    DONE(supple_pulls_init(memory, bytes, scene, MOST, ROOM, &made));
+
+    /* The middle of the far end, from an element's own corners or from a patch. */
+    supple_pull pull = {{0.005f * X, 0.005f * Y, 0.01f * Z}, 0.012f, 200.0f, INFINITY, {0, 0, 0}};
+    supple_pull wrong = pull;
+    wrong.radius = 1e-6f, wrong.at[2] += 0.5f;
+    REFUSED(SUPPLE_E_NO_NODES, supple_add_pull(made, scene, points[0], &wrong, &error));
+    CHECK(error.index == 0 && error.limit > 0.4);
+    wrong = pull, wrong.radius = -1.0f;
+    REFUSED(SUPPLE_E_PULL, supple_add_pull(made, scene, points[0], &wrong, &error));
+    wrong = pull, wrong.stiffness = 2e6f;
+    REFUSED(SUPPLE_E_PULL, supple_add_pull(made, scene, points[0], &wrong, &error));
+    CHECK(error.value == 2e6);
+    wrong = pull, wrong.at[0] = NAN;
+    REFUSED(SUPPLE_E_PULL, supple_add_pull(made, scene, points[0], &wrong, &error));
+    wrong = pull, wrong.radius = 10.0f;
+    REFUSED(SUPPLE_E_CAPACITY, supple_add_pull(made, scene, points[0], &wrong, &error));
+    CHECK(error.value == NODES && error.limit == ROOM);
+    REFUSED(SUPPLE_E_MISMATCH, supple_add_pull(made, small_scene, points[0], &pull, &error));
+    REFUSED(SUPPLE_E_NULL, supple_add_pull(made, scene, NULL, &pull, &error));
+    const uint32_t corners[2] = {NODES - 1, NODES};
+    const float halves[2] = {0.5f, 0.5f};
+    REFUSED(SUPPLE_E_INDEX, supple_add_pull_of_nodes(made, scene, corners, halves, 2, &pull, &error));
+    CHECK(error.node == NODES);
+    DONE(supple_add_pull(made, scene, points[0], &pull, &error));
+    DONE(supple_add_pull_of_nodes(made, scene, corners, halves, 1, &pull, &error));
+    REFUSED(SUPPLE_E_CAPACITY, supple_add_pull_of_nodes(made, scene, corners, halves, 1, &pull, &error));
+    wrong = pull, wrong.most = -1.0f;
+    REFUSED(SUPPLE_E_PULL, supple_set_pull(made, 1, &wrong, &error));
+    REFUSED(SUPPLE_E_CAPACITY, supple_set_pull(made, 2, &pull, &error));
+    DONE(supple_set_pull(made, 1, &pull, &error));
+
+    /* One target, 2 mm aside; the other pull is absent. */
+    float targets[2][3] = {{pull.at[0] + 0.002f, pull.at[1], pull.at[2]}, {NAN, 0, 0}};
+    REFUSED(SUPPLE_E_MISMATCH, supple_set_targets(made, targets[0], 1, 0.0, 0.01, &error));
+    REFUSED(SUPPLE_E_PULL, supple_set_targets(made, (const float[6]){0, INFINITY, 0, NAN, 0, 0}, 2, 0.0, 0.01, &error));
+    CHECK(error.index == 0);
+    DONE(supple_set_targets(made, targets[0], 2, 0.0, 0.01, &error));
+    REFUSED(SUPPLE_E_MISMATCH, supple_set_pulls(small_loads, made));
+    REFUSED(SUPPLE_E_KIND, supple_set_pulls(acts, (supple_pulls *)(void *)state));
+    DONE(supple_set_pulls(acts, made));
+    supple_report report;
+    supple_pulled read[2];
+    DONE(supple_state_reset(state));
+    DONE(supple_step(scene, acts, state, 2000, NULL, &report));
+    REFUSED(SUPPLE_E_MISMATCH, supple_read_pulls(made, state, read, 1));
+    REFUSED(SUPPLE_E_NULL, supple_read_pulls(made, state, NULL, 2));
+    REFUSED(SUPPLE_E_MISMATCH, supple_read_pulls(made, small_state, read, 2));
+    DONE(supple_read_pulls(made, state, read, 2));
+    CHECK(read[0].gap[0] < 0.002f && read[0].point[0] > pull.at[0] && read[0].force[0] > 0.0f);
+    CHECK(fabsf(read[0].force[0] - pull.stiffness * read[0].gap[0]) < 1e-3f * read[0].force[0]);
+    CHECK(read[1].force[0] == 0.0f && read[1].gap[0] == 0.0f);
+
+    /* Learned steps do not know pulls. */
+    supple_learned_facts facts;
+    DONE(supple_state_reset(state));
+    DONE(supple_learned_reset(learned));
+    DONE(supple_learned_describe(learned, &facts));
+    const supple_step_config exact = {SUPPLE_CONFIG(supple_step_config), facts.seconds / 3.0f, facts.damping};
+    DONE(supple_set_step(scene, state, &exact, NULL));
+    DONE(supple_learned_lead(scene, NULL, state, learned, 5 * (double)facts.seconds, NULL, NULL));
+    CHECK(supple_learned_step(scene, acts, state, learned, 1, NULL, &report) == SUPPLE_E_NO_PULLS);
+    note(SUPPLE_E_NO_PULLS);
+    DONE(supple_set_pulls(acts, NULL));
+    DONE(supple_state_reset(state));
+}
+
 int main(int argc, char **argv) {
     (void)argv;
     watched = argc == 1;
@@ -948,6 +1025,7 @@ int main(int argc, char **argv) {
     reactions();
     surfaces();
     contacts();
+    pulls();
     remarks(config);
     little_work(&config);
     DONE(supple_state_reset(state));

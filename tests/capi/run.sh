@@ -117,6 +117,8 @@ SCENE
     "$folder/instrument" --jitter 10000 --frames 1
     g++ -std=c++17 "${warnings[@]}" examples/press.cpp "$static" -o "$folder/press"
     "$folder/press"
+    g++ -std=c++17 "${warnings[@]}" examples/pull.cpp "$static" -o "$folder/pull"
+    "$folder/pull"
 
     # From Python.
     find_python

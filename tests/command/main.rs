@@ -6,6 +6,7 @@ mod inspect;
 mod instruments;
 mod interrupted;
 mod learned;
+mod pulls;
 mod screen;
 mod simulate;
 mod weights;

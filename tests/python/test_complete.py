@@ -17,6 +17,8 @@ ADVANCED = {
     "supple_set_level": "for comparisons of instruction sets; the best is chosen by itself",
     "supple_copy_displacements": "Simulation.displacements is a view; numpy copies it",
     "supple_copy_positions": "numpy adds points and displacements",
+    "supple_set_pull": "Pulls.release ends pulls, Simulation.pull makes others",
+    "supple_add_pull_of_nodes": "for springs and points of hosts with weights of their own; Simulation.pull takes patches",
     **dict.fromkeys(["supple_loads_size", "supple_loads_init", "supple_state_size", "supple_state_init"], BY_THE_SIMULATION),
     **dict.fromkeys(["supple_guard_size", "supple_guard_init", "supple_guard_follow", "supple_learned_fall_back"], BY_THE_SIMULATION),
     **dict.fromkeys(["supple_learned_size", "supple_learned_init", "supple_learned_reset", "supple_learned_lead"], BY_THE_SIMULATION),

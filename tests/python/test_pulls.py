@@ -1,0 +1,96 @@
+"""Pulls: a weight on a spring, registration from points with errors, lost and wrong points, and what is refused."""
+
+import numpy as np
+import pytest
+import supple
+from conftest import bar
+
+
+def test_a_pull_carries_the_weight(soft):
+    mesh = bar(cells=(3, 3, 8))
+    simulation = supple.Simulation(supple.Scene(mesh, soft, element="nodal-strain"), damping=20.0, gravity=(0.0, 0.0, -9.81))
+    pulls = simulation.pull([[0.01, 0.01, 0.06]], [[0.01, 0.01, 0.06]], radius=0.012, stiffness=100.0, most=np.inf)
+    simulation.advance(2.0)
+    weight = 1000.0 * 0.02 * 0.02 * 0.06 * 9.81
+    assert pulls.forces[0] == pytest.approx([0.0, 0.0, weight], abs=0.01 * weight)
+    assert pulls.gaps[0] == pytest.approx([0.0, 0.0, weight / 100.0], abs=0.01 * weight / 100.0)
+    assert pulls.points[0, 2] == pytest.approx(0.06 - weight / 100.0, abs=1e-5)
+
+
+def bent(points):
+    """A smooth deformation, up to 10 mm."""
+    x, y, z = points.T
+    return np.column_stack([x + 3.0 * z * z, y - 0.1 * z, z])
+
+
+def error_of(simulation, mesh):
+    return np.linalg.norm(simulation.positions - bent(mesh.points), axis=1).mean()
+
+
+@pytest.mark.parametrize("method", ["exact", "long", "auto"])
+def test_points_with_errors_register_a_body(soft, method):
+    mesh, random = bar(cells=(4, 4, 12)), np.random.default_rng(4)
+    step = {"long": 4e-3, "exact": None, "auto": None}[method]
+    simulation = supple.Simulation(supple.Scene(mesh, soft, element="nodal-strain"), method, step=step, damping=20.0)
+    chosen = random.choice(len(mesh.points), 24, replace=False)
+    targets = bent(mesh.points[chosen]) + random.normal(0.0, 0.0003, (24, 3))
+    targets[3] += [0.0, 0.015, 0.0]  # one is wrong
+    targets[7] = np.nan  # one is not seen
+    pulls = simulation.pull(mesh.points[chosen], targets)
+    before = error_of(simulation, mesh)
+    for _ in range(20):
+        report = simulation.advance(0.1)
+    gaps = np.linalg.norm(pulls.gaps, axis=1)
+    print(f"{method}: {1e3 * error_of(simulation, mesh):.2f} mm of {1e3 * before:.2f} mm, gaps {np.round(1e3 * gaps, 1)} mm")
+    assert report.ok and error_of(simulation, mesh) < 0.2 * before
+    assert gaps.argmax() == 3 and gaps[3] > 3.0 * np.delete(gaps, 3).max()
+    assert not pulls.forces[7].any() and np.isnan(pulls.targets[7]).all()
+
+
+def test_targets_move_and_pulls_end(soft):
+    mesh = bar()
+    simulation = supple.Simulation(supple.Scene(mesh, soft), damping=20.0)
+    first = simulation.pull([[0.01, 0.01, 0.0], [0.01, 0.01, 0.06]], [[0.01, 0.01, 0.0], [0.01, 0.01, 0.06]])
+    side = simulation.pull([[0.01, 0.0, 0.03]], [[0.015, 0.003, 0.03]], along=[0.0, 1.0, 0.0])
+    for frame in range(30):
+        first.move([[0.01, 0.01 + 1e-4 * frame, 0.0], [0.01, 0.01 + 1e-4 * frame, 0.06]], within=1 / 60)
+        simulation.advance(1 / 60)
+    assert first.points[:, 1] == pytest.approx([0.0129] * 2, abs=5e-4)
+    # Only along its direction.
+    assert side.gaps[0, 0] == 0.0 and side.points[0, 0] == pytest.approx(0.01, abs=5e-4)
+    side.release()
+    with pytest.raises(supple.InputError, match="were released"):
+        side.points
+    assert first.points[:, 1] == pytest.approx([0.0129] * 2, abs=5e-4)
+
+
+def test_what_cannot_be_is_refused(soft):
+    simulation = supple.Simulation(supple.Scene(bar(), soft))
+    at = [[0.01, 0.01, 0.03]]
+    for arguments, words in [
+        ({"radius": -1.0}, "radius -1.0"),
+        ({"stiffness": 2e6}, "stiffness"),
+        ({"most": np.nan}, "most nan"),
+        ({"along": [[0.0, np.nan, 0.0]]}, "along"),
+        ({"targets": [[0.0, 0.0]]}, r"their shape is \(1, 2\)"),
+    ]:
+        with pytest.raises(supple.InputError, match=words):
+            simulation.pull(at, **arguments)
+    with pytest.raises(supple.InputError, match="no node is nearer"):
+        simulation.pull([[1.0, 0.0, 0.0]], radius=0.001)
+    pulls = simulation.pull(at)
+    with pytest.raises(supple.InputError, match="targets"):
+        pulls.move([[np.inf, 0.0, 0.0]])
+    assert simulation.advance(0.01).ok
+
+
+def test_learned_steps_do_not_know_pulls():
+    from test_motion import ROOT
+
+    mesh = bar()
+    material = supple.Material("exponential", a=59.0, b=8.023, d=60000.0, density=1000.0)
+    scene = supple.Scene(mesh, material, fixed=mesh.points[:, 2] < 1e-6, element="linear")
+    simulation = supple.Simulation(scene, "learned", weights=ROOT / "weights" / "compact-10.weights", lead_in=0.0, fallback=False)
+    simulation.pull([[0.01, 0.01, 0.06]], [[0.011, 0.01, 0.06]])
+    with pytest.raises(supple.Diverged, match="does not know pulls"):
+        simulation.advance(0.5)
