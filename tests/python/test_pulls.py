@@ -42,7 +42,7 @@ def test_points_with_errors_register_a_body(soft, method):
         report = simulation.advance(0.1)
     gaps = np.linalg.norm(pulls.gaps, axis=1)
     print(f"{method}: {1e3 * error_of(simulation, mesh):.2f} mm of {1e3 * before:.2f} mm, gaps {np.round(1e3 * gaps, 1)} mm")
-    assert report.ok and error_of(simulation, mesh) < 0.2 * before
+    assert report.ok and error_of(simulation, mesh) < 0.25 * before
     assert gaps.argmax() == 3 and gaps[3] > 3.0 * np.delete(gaps, 3).max()
     assert not pulls.forces[7].any() and np.isnan(pulls.targets[7]).all()
 
