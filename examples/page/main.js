@@ -38,7 +38,7 @@ const answers = {
         ask();
     },
     frame({ frame }) {
-        const largest = view.show(frame.positions, frame.tool);
+        const largest = view.show(frame.positions, frame.tool, frame.pins);
         supple.latest = { ...frame, largest, number: (supple.latest?.number ?? 0) + 1 };
         panel.show(frame, largest);
         counts.simulated += frame.seconds ?? 0;

@@ -52,8 +52,9 @@ export class Panel {
     /** @param frame of the kernel, @param {number} largest displacement, m */
     show(frame, largest) {
         const set = (id, text) => { element(id).textContent = text; };
-        set("force", frame.tool ? `${frame.tool.force.toFixed(2)} N` : "0.00 N");
-        set("contacts", contacts(frame.tool));
+        const most = Math.max(0, frame.tool?.force ?? 0, ...frame.pins.map(({ force }) => force));
+        set("force", `${most.toFixed(2)} N`);
+        set("contacts", contacts(frame));
         set("largest", millimetres(largest, 1));
         if (frame.steps > 0) {
             set("step", `${this.#mean("step", frame.milliseconds / frame.steps).toFixed(2)} ms`);
@@ -68,7 +69,7 @@ export class Panel {
             element("status").title = frame.text;
         }
         if (frame.halted) this.say(`The kernel: ${frame.refusal.text}. The simulation stands still: reset it to go on.`, true);
-        else if (frame.refusal) this.say(`The kernel: ${frame.refusal.text}. The instrument was taken away.`);
+        else if (frame.refusal) this.say(frame.refusal.name ? `The kernel: ${frame.refusal.text}. The instrument was taken away.` : frame.refusal.text);
     }
 
     /** Pictures a second, and seconds simulated in a second. */
@@ -78,8 +79,9 @@ export class Panel {
     }
 }
 
-function contacts(tool) {
-    if (!tool) return "none";
+function contacts({ tool, pins }) {
+    const pinned = pins.length === 1 ? "1 pin" : `${pins.length} pins`;
+    if (!tool) return pins.length > 0 ? pinned : "none";
     if (tool.held > 0) return `holds ${tool.held} nodes`;
     return tool.contacts > 0 ? `touches ${tool.contacts} nodes` : "touches nothing";
 }

@@ -1,6 +1,7 @@
-// A liver lobe and one instrument, as a host of supple's C API: the scene, the methods, a frame. No page and no clock of its own:
+// A liver lobe an instrument and pins, as a host of supple's C API: the scene, the methods, a frame. No page and no clock of its own:
 // worker.js runs it in the page, the tests run it in node. SI units; a frame has a sixtieth of a second.
 
+import { Pins } from "./pins.js";
 import { Tool } from "./tool.js";
 
 export const FRAME = 1 / 60; // s
@@ -33,6 +34,8 @@ export class Simulation {
         library.call("supple_critical_step", this.scene, this.state, this.places.made, 0);
         this.exact = Math.ceil(FRAME / (MARGIN * library.floats(this.places.made, 1)[0])); // steps a frame
         this.tool = new Tool(this, surface);
+        this.pins = new Pins(this, surface);
+        this.leading = this.tool;
         this.halted = null;
         this.setMethod("long", TOLERANCE.usual);
     }
@@ -89,7 +92,14 @@ export class Simulation {
     reset() {
         this.library.call("supple_state_reset", this.state);
         this.tool.remove();
+        this.pins.remove();
         this.setMethod(this.method, this.tolerance);
+    }
+
+    /** An instrument or a pin where the pointer touches the tissue. Gives what the library refused, or null. */
+    begin(kind, hit, direction) {
+        this.leading = kind === "pin" ? this.pins : this.tool;
+        return this.leading.begin(...(kind === "pin" ? [hit] : [kind, hit, direction]));
     }
 
     /** Simulated time, s. */
@@ -112,6 +122,7 @@ export class Simulation {
         const { library, places } = this;
         const before = this.time();
         const unplaced = this.tool.move(before);
+        this.pins.move(before);
         const begin = performance.now();
         const status = library.functions.supple_sim_advance(this.sim, FRAME, 0, places.report);
         const milliseconds = performance.now() - begin;
@@ -133,7 +144,7 @@ export class Simulation {
     }
 
     #standing() {
-        return { method: this.method, time: this.time(), tool: this.tool.describe(), positions: this.positions().slice() };
+        return { method: this.method, time: this.time(), tool: this.tool.describe(), pins: this.pins.describe(), positions: this.positions().slice() };
     }
 
     /** In the library's own words, with its numbers. */

@@ -8,6 +8,9 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 const SCALE = 0.03;
 /** From tissue that stands still to the end of the scale, sRGB, ever lighter. The style sheet has the same for the legend. */
 const COLOURS = ["#8a3f45", "#c9603f", "#f0a63c", "#fbe58a"].map((hex) => new THREE.Color(hex));
+/** Of a pin; m. */
+const PIN = "#3f8fd0";
+const PIN_RADIUS = 0.003;
 const MIDDLE = new THREE.Vector3(0.01, -0.005, 0.03);
 const CAMERA = new THREE.Vector3(0.03, -0.24, 0.17);
 
@@ -28,10 +31,11 @@ export class View {
         this.controls.addEventListener("change", () => { this.stale = true; });
         this.controls.update();
         this.#fill(lobe);
+        this.pins = [];
         this.raycaster = new THREE.Raycaster();
         new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);
         this.#resize();
-        this.show(lobe.points, null);
+        this.show(lobe.points, null, []);
     }
 
     #fill({ triangles, groups }) {
@@ -75,7 +79,7 @@ export class View {
     }
 
     /** Takes the nodes and the instrument of a frame. Gives the largest displacement of the surface, m. */
-    show(positions, tool) {
+    show(positions, tool, pins) {
         const { rest, vertices } = this;
         const colour = new THREE.Color();
         let largest = 0;
@@ -96,8 +100,22 @@ export class View {
             this.ball.position.fromArray(tool.position);
             this.ball.scale.setScalar(tool.radius);
         }
+        this.#showPins(pins);
         this.stale = true;
         return largest;
+    }
+
+    #showPins(pins) {
+        while (this.pins.length < pins.length) {
+            const pin = new THREE.Mesh(this.ball.geometry, new THREE.MeshStandardMaterial({ color: PIN, roughness: 0.4 }));
+            pin.scale.setScalar(PIN_RADIUS);
+            this.scene.add(pin);
+            this.pins.push(pin);
+        }
+        this.pins.forEach((pin, index) => {
+            pin.visible = index < pins.length;
+            if (pin.visible) pin.position.fromArray(pins[index].position);
+        });
     }
 
     /** Draws if anything has changed since the last time. */
@@ -118,10 +136,10 @@ export class View {
         return performance.now() - begin;
     }
 
-    /** Where a pointer meets the tissue, and along which direction the camera sees it; null if it does not. */
+    /** Where a pointer meets the tissue or a pin, and along which direction the camera sees it; null if it does not. */
     pick(event) {
         this.#aim(event);
-        const [first] = this.raycaster.intersectObject(this.body);
+        const [first] = this.raycaster.intersectObjects([this.body, ...this.pins.filter((pin) => pin.visible)]);
         return first ? { hit: first.point, direction: this.raycaster.ray.direction.clone() } : null;
     }
 

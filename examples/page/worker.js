@@ -23,9 +23,9 @@ async function start() {
 }
 
 const answers = {
-    begin: ({ kind, hit, direction }) => { refused = simulation.tool.begin(kind, hit, direction); },
-    lead: ({ way }) => simulation.tool.lead(way),
-    release: () => simulation.tool.release(),
+    begin: ({ kind, hit, direction }) => { refused = simulation.begin(kind, hit, direction); },
+    lead: ({ way }) => simulation.leading.lead(way),
+    release: () => simulation.leading.release(),
     method: ({ method, tolerance }) => simulation.setMethod(method, tolerance),
     reset: () => simulation.reset(),
     frame: () => {

@@ -136,6 +136,23 @@ for (const method of METHODS) {
     });
 }
 
+test("a pin stays where it was dragged, and goes when it is touched again", async (context) => {
+    const page = await open(context);
+    await page.click("label:has(input[value=pin])");
+    const { held, free } = await drag(page, "mouse", [0, -60]);
+    assert.equal(free.pins.length, 1);
+    assert.ok(held.moved > 0.002 && free.moved > 0.002, `${held.moved} m and ${free.moved} m`);
+    assert.ok(free.pins[0].force > 0.01 && free.pins[0].force < 5, `a force of ${free.pins[0].force} N`);
+    assert.equal(await text(page, "contacts"), "1 pin");
+    await page.screenshot({ path: nextToPage("pin.png") });
+    const at = await page.evaluate(() => window.supple.pixel(window.supple.latest.pins[0].position));
+    await page.mouse.click(at.x, at.y);
+    await simulate(page, 2);
+    const { pins } = await look(page);
+    assert.ok(pins.length === 0 && await movedAt(page, DOME) < 0.0005);
+    context.diagnostic(`pin: ${(1e3 * free.moved).toFixed(1)} mm, ${free.pins[0].force.toFixed(2)} N`);
+});
+
 /** Tissue held and moved about for some seconds: times of the frames, ms, sorted, and frames in a second. */
 async function shake(page, method) {
     await page.select("#method", method);

@@ -206,9 +206,9 @@ test("no input stops the module: 600 random messages", () => {
     const counts = { refused: 0, halted: 0, frames: 0 };
     for (let message = 0; message < 600; message++) {
         const which = random();
-        if (which < 0.1) simulation.tool.begin(one(["press", "pull"]), vector(0.08), vector(1));
-        else if (which < 0.2) simulation.tool.lead(vector(one([0.03, 1, 1e4])));
-        else if (which < 0.23) simulation.tool.release();
+        if (which < 0.1) simulation.begin(one(["press", "pull", "pin"]), vector(0.08), vector(1));
+        else if (which < 0.2) simulation.leading.lead(vector(one([0.03, 1, 1e4])));
+        else if (which < 0.23) simulation.leading.release();
         else if (which < 0.26) simulation.setMethod(one(METHODS), random() < 0.3 ? one(odd) : 0.001);
         else if (which < 0.28) simulation.reset();
         else {
