@@ -101,6 +101,7 @@
 //! | [`guard`] | may a step be believed: a second run that estimates its error |
 //! | [`adaptive`] | steps that choose their length so that their error stays below a tolerance |
 //! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
+//! | [`points`] | points that follow the tissue: tumours, vessels, finer surfaces, targets |
 //! | [`simulation`] | one owner of all that: scene, state, loads, method, guard, fallback, pace |
 //!
 //! With the feature `io` meshes are read and fields written (`io`), with `train` networks are trained (`train`), with
@@ -146,6 +147,7 @@ pub mod mesh;
 pub mod mlp;
 mod padding;
 pub mod plausibility;
+pub mod points;
 pub mod reaction;
 /// Of the tests, in float64.
 #[cfg(test)]
