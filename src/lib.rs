@@ -102,6 +102,7 @@
 //! | [`adaptive`] | steps that choose their length so that their error stays below a tolerance |
 //! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
 //! | [`points`] | points that follow the tissue: tumours, vessels, finer surfaces, targets |
+//! | [`image`] | displacement fields on the grid of an image, forward and inverse |
 //! | [`simulation`] | one owner of all that: scene, state, loads, method, guard, fallback, pace |
 //!
 //! With the feature `io` meshes are read and fields written (`io`), with `train` networks are trained (`train`), with
@@ -139,6 +140,7 @@ pub mod element;
 mod energy_balance;
 pub mod guard;
 mod heap_sort;
+pub mod image;
 pub mod inertia;
 pub mod learned;
 pub mod loads;
