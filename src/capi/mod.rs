@@ -36,6 +36,10 @@ mod vectors;
 
 mod surface;
 
+mod points;
+
+mod image;
+
 mod contact;
 
 mod local_force;

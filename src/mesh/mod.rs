@@ -208,6 +208,12 @@ impl<'a> Mesh<'a> {
         self.tets.get(element as usize).copied().unwrap_or_default()
     }
 
+    /// The nodes of all elements in the order in which they were given.
+    #[cfg(feature = "capi-neo-hookean")]
+    pub(crate) fn all_given(&self) -> &'a [[u32; 4]] {
+        self.tets
+    }
+
     /// Corners of an element, m, in float64.
     pub(crate) fn corners(&self, tet: [u32; 4]) -> [DVec3; 4] {
         tet.map(|node| corner(self.points, node))
