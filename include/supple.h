@@ -160,6 +160,16 @@
 #define SUPPLE_MOST_PARTS 8
 
 /**
+ * At a place of the shape at rest: where its material is now, less where it was.
+ */
+#define SUPPLE_FORWARD_FIELD 0
+
+/**
+ * At a place now: where its material was at rest, less where it is.
+ */
+#define SUPPLE_INVERSE_FIELD 1
+
+/**
  * Shapes of an instrument: all below the plane z = 0 of its axes; a ball around its centre; a cylinder along z with
  * round ends; the signed distances in a field's file, which `supple field` makes of a mesh.
  */
@@ -527,6 +537,11 @@ enum supple_status
      * This processor does not have these instructions.
      */
     SUPPLE_E_LEVEL = -80,
+    /**
+     * The grid of an image that cannot be: along `axis` an origin or a spacing (value, m); without an axis directions that
+     * are not orthonormal (value: by how much), or no points or too many (value).
+     */
+    SUPPLE_E_GRID = -85,
     /**
      * The step was not taken: a displacement, first of `node`, would not be a finite number.
      */
@@ -1053,6 +1068,56 @@ typedef struct {
      */
     size_t field_bytes;
 } supple_instrument;
+
+/**
+ * A point that follows the tissue. It may be copied and kept as bytes; it belongs to the mesh that it was located in.
+ */
+typedef struct {
+    /**
+     * Where it is at rest, m.
+     */
+    float rest[3];
+    /**
+     * The tetrahedron that holds it, or the nearest one.
+     */
+    uint32_t element;
+    /**
+     * The nodes of the element.
+     */
+    uint32_t nodes[4];
+    /**
+     * How much of each node's displacement is the point's: from 0 to 1, 1 in sum. Of a point outside those of the
+     * nearest point of the element.
+     */
+    float weights[4];
+    /**
+     * From the element at rest, m; 0 inside.
+     */
+    float distance;
+} supple_followed_point;
+
+/**
+ * The grid of an image, as ITK has it but in metres and in the axes of the mesh: place = origin + direction * (spacing *
+ * index).
+ */
+typedef struct {
+    /**
+     * Of the first point, m.
+     */
+    double origin[3];
+    /**
+     * Between points along each axis of the grid, m.
+     */
+    double spacing[3];
+    /**
+     * Direction cosines, row by row: column `a` is the direction of axis `a` of the grid. Orthonormal to a thousandth.
+     */
+    double direction[3][3];
+    /**
+     * Points along each axis of the grid, at most 2^31 together.
+     */
+    uint32_t size[3];
+} supple_image_grid;
 
 /**
  * What instruments can touch.
@@ -1950,6 +2015,99 @@ supple_status supple_needs_triangles(const float *points,
                                      uint32_t instrument_count,
                                      uint32_t *needed,
                                      supple_error *error);
+
+/**
+ * Bytes of memory that supple_locate needs for a mesh of so many elements: some 20 to 32 for each; 0 if there is no such
+ * size.
+ */
+size_t supple_locate_size(uint32_t elements);
+
+/**
+ * Locates places in the mesh at rest, for supple_follow: the element that holds each, or the nearest one with the
+ * distance, which tells you whether you meant that place. 100,000 elements and thousands of places take some tens of
+ * milliseconds, those inside less.
+ *
+ * @param points of all `nodes` of the scene at rest, m, three coordinates each.
+ * @param tetrahedra four nodes of each of `elements`, of either winding.
+ * @param places three coordinates of each of `count` places, m.
+ * @param memory of `bytes`, supple_locate_size at least, aligned to 4; free again afterwards.
+ * @param located receives `count` points.
+ * @param error may be NULL; of SUPPLE_E_NOT_FINITE index is that of a place, or with node that of a point of the mesh.
+ */
+supple_status supple_locate(const float *points,
+                            uint32_t nodes,
+                            const uint32_t *tetrahedra,
+                            uint32_t elements,
+                            const float *places,
+                            uint32_t count,
+                            void *memory,
+                            size_t bytes,
+                            supple_followed_point *located,
+                            supple_error *error);
+
+/**
+ * Writes where points are (m), and how fast over the latest step (m/s), in a state of the mesh that they were located
+ * in: some nanoseconds for each.
+ *
+ * @param located `count` points, as of supple_locate.
+ * @param positions room for three floats of each.
+ * @param velocities the same; NULL if they are not wanted.
+ * @param error may be NULL; index is that of a point: it follows a node that the state does not have (SUPPLE_E_INDEX), or
+ * is no number.
+ */
+supple_status supple_follow(const supple_state *state,
+                            const supple_followed_point *located,
+                            uint32_t count,
+                            float *positions,
+                            float *velocities,
+                            supple_error *error);
+
+/**
+ * Writes how many bytes of scratch supple_displacement_field needs: 2 for each point of the grid where spacings are alike,
+ * some 12 at most, and 8 more for each where the reach is below eight spacings.
+ *
+ * @param reach as there, m.
+ * @param error may be NULL; SUPPLE_E_GRID: axis and value tell what is wrong with it.
+ */
+supple_status supple_displacement_field_size(const supple_image_grid *grid,
+                                             float reach,
+                                             size_t *bytes,
+                                             supple_error *error);
+
+/**
+ * Writes the displacement field of a body at the points of a grid: three floats for each, m, in the axes of the mesh, x
+ * fastest. Within the tissue it is that of the linear elements, to rounding. Elsewhere it goes on smoothly, near the
+ * surface as there, far away as the mean of the body, never beyond what is within; with a reach it falls off to zero. An
+ * element that is turned inside out is left out, and where several overlap the last one counts.
+ *
+ * An image is warped with the inverse field: the new image at a point has what the old one has at the point plus the
+ * field. Points and surfaces are moved with the forward field.
+ *
+ * @param points of all `nodes` of the scene at rest, m, three coordinates each.
+ * @param tetrahedra four nodes of each of `elements`, of either winding.
+ * @param displacements of all nodes, m, as supple_displacements tells where those of a state are; or your own.
+ * @param kind SUPPLE_FORWARD_FIELD or SUPPLE_INVERSE_FIELD.
+ * @param reach how far from the tissue the field ends, m; 0: it goes on.
+ * @param scratch of `bytes`, supple_displacement_field_size at least, aligned to 4; free again afterwards.
+ * @param field room for `floats`, three for each point of the grid at least.
+ * @param covered may be NULL; receives how many points are within the tissue. With none the field is zero: the grid is
+ * elsewhere (in mm? in other axes?) or coarser than the body.
+ * @param error may be NULL.
+ */
+supple_status supple_displacement_field(const float *points,
+                                        uint32_t nodes,
+                                        const uint32_t *tetrahedra,
+                                        uint32_t elements,
+                                        const supple_vectors *displacements,
+                                        uint32_t kind,
+                                        const supple_image_grid *grid,
+                                        float reach,
+                                        void *scratch,
+                                        size_t bytes,
+                                        float *field,
+                                        size_t floats,
+                                        size_t *covered,
+                                        supple_error *error);
 
 /**
  * Bytes of memory that a supple_contact needs for a surface of so many nodes and triangles, of which so many nodes can

@@ -35,6 +35,9 @@ using estimate = supple_estimate;
 using adaptive_report = supple_adaptive_report;
 using sim_report = supple_sim_report;
 using reaction_force = supple_reaction_force;
+// A point that follows the tissue, and the grid of an image.
+using followed_point = supple_followed_point;
+using image_grid = supple_image_grid;
 // Where an instrument is, what it feels, and where it pushes.
 using pose = supple_pose;
 using touch = supple_touch;
@@ -118,6 +121,8 @@ enum class [[nodiscard]] status : std::int32_t {
     e_saved_checksum = SUPPLE_E_SAVED_CHECKSUM,
 
     e_level = SUPPLE_E_LEVEL,
+
+    e_grid = SUPPLE_E_GRID,
 
     e_diverged = SUPPLE_E_DIVERGED,
     e_diverged_energy = SUPPLE_E_DIVERGED_ENERGY,
@@ -247,7 +252,7 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_weights_version): case of(s::e_weights_checksum): case of(s::e_weights_content):
     case of(s::e_weights_shape): case of(s::e_not_led): case of(s::e_step_ratio): case of(s::e_damping):
     case of(s::e_lattice): case of(s::e_too_stiff): case of(s::e_not_saved): case of(s::e_saved_version):
-    case of(s::e_saved_checksum): case of(s::e_level): case of(s::e_diverged):
+    case of(s::e_saved_checksum): case of(s::e_level): case of(s::e_grid): case of(s::e_diverged):
     case of(s::e_diverged_energy): case of(s::e_diverged_force): case of(s::e_diverged_motion):
     case of(s::e_instrument): case of(s::e_field): case of(s::e_diverged_instrument): case of(s::e_no_contact):
     case of(s::e_pull): case of(s::e_no_nodes): case of(s::e_no_pulls): return true;
@@ -300,6 +305,7 @@ constexpr meaning meaning_of(status code) noexcept {
     case status::e_field: return {"instrument", "", false, false};
     case status::e_pull: return {"pull", "", true, false};
     case status::e_no_nodes: return {"pull", " m", true, true};
+    case status::e_grid: return {"entry", "", true, false};
     default: return {"entry", "", false, false};
     }
 }
@@ -898,6 +904,54 @@ inline result<std::size_t> traction(span<const float> points, span<const std::ui
     count.status = detail::of(supple_traction(points.data(), number(points.size()), triangles.data(), number(triangles.size()),
                                               pascal.data(), ramp, out.data(), out.size(), &count.error));
     return count;
+}
+
+// Where places (three coordinates each, m) are in a body at rest, for `follow`: at the beginning of `out`, the element that holds each or
+// the nearest one. `work` is memory of supple_locate_size bytes, free again afterwards. Gives how many there are.
+inline result<std::size_t> locate(span<const float> points, span<const std::uint32_t> tetrahedra, span<const float> places,
+                                  memory work, span<followed_point> out) noexcept {
+    result<std::size_t> count{status::ok, detail::nothing(status::ok), places.size() / 3};
+    const auto number = [](std::size_t of) { return static_cast<std::uint32_t>(of < none ? of : none); };
+    if (out.size() < count.value) {
+        count.status = status::e_short;
+        count.error = detail::nothing(count.status);
+        count.error.value = static_cast<double>(out.size()), count.error.limit = static_cast<double>(count.value);
+        return count;
+    }
+    count.status = detail::of(supple_locate(points.data(), number(points.size() / 3), tetrahedra.data(), number(tetrahedra.size() / 4),
+                                            places.data(), number(count.value), work.data(), work.size(), out.data(), &count.error));
+    return count;
+}
+
+// Where points are now, m, and how fast, m/s: three floats each; `velocities` may be empty.
+inline status follow(const state &now, span<const followed_point> points, span<float> positions, span<float> velocities,
+                     error *why = nullptr) noexcept {
+    const std::size_t needed = 3 * points.size();
+    if (positions.size() < needed || (velocities.size() != 0 && velocities.size() < needed)) return status::e_short;
+    return detail::of(supple_follow(now.raw(), points.data(), static_cast<std::uint32_t>(points.size()), positions.data(),
+                                    velocities.size() != 0 ? velocities.data() : nullptr, why));
+}
+
+enum class field_kind : std::uint32_t { forward = SUPPLE_FORWARD_FIELD, inverse = SUPPLE_INVERSE_FIELD };
+
+// Bytes of scratch of a displacement field.
+inline result<std::size_t> displacement_field_size(const image_grid &grid, float reach) noexcept {
+    result<std::size_t> bytes{};
+    bytes.status = detail::of(supple_displacement_field_size(&grid, reach, &bytes.value, &bytes.error));
+    return bytes;
+}
+
+// The displacement field of a body of these points at the points of a grid, three floats each. Gives how many of these are within it.
+inline result<std::size_t> displacement_field(span<const float> points, span<const std::uint32_t> tetrahedra,
+                                              const supple_vectors &displacements, field_kind kind, const image_grid &grid, float reach,
+                                              memory scratch, span<float> field) noexcept {
+    result<std::size_t> covered{};
+    const auto number = [](std::size_t of) { return static_cast<std::uint32_t>(of < none ? of : none); };
+    covered.status = detail::of(supple_displacement_field(
+        points.data(), number(points.size() / 3), tetrahedra.data(), number(tetrahedra.size() / 4), &displacements,
+        static_cast<std::uint32_t>(kind), &grid, reach, scratch.data(), scratch.size(), field.data(), field.size(), &covered.value,
+        &covered.error));
+    return covered;
 }
 
 // What instruments can touch. Without `nodes` all of the scene's; `triangles`, the numbers of their three nodes each, where an

@@ -102,6 +102,8 @@
 //! | [`guard`] | may a step be believed: a second run that estimates its error |
 //! | [`adaptive`] | steps that choose their length so that their error stays below a tolerance |
 //! | [`learned`] | the learned step with lead-in and fallback; the local frame of a vertex |
+//! | [`points`] | points that follow the tissue: tumours, vessels, finer surfaces, targets |
+//! | [`image`] | displacement fields on the grid of an image, forward and inverse |
 //! | [`simulation`] | one owner of all that: scene, state, loads, method, guard, fallback, pace |
 //!
 //! With the feature `io` meshes are read and fields written (`io`), with `train` networks are trained (`train`), with
@@ -139,6 +141,7 @@ pub mod element;
 mod energy_balance;
 pub mod guard;
 mod heap_sort;
+pub mod image;
 pub mod inertia;
 pub mod learned;
 pub mod loads;
@@ -147,6 +150,7 @@ pub mod mesh;
 pub mod mlp;
 mod padding;
 pub mod plausibility;
+pub mod points;
 pub mod pulls;
 pub mod reaction;
 /// Of the tests, in float64.

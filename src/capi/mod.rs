@@ -37,6 +37,10 @@ mod vectors;
 
 mod surface;
 
+mod points;
+
+mod image;
+
 mod contact;
 
 mod local_force;

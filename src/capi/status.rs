@@ -152,6 +152,10 @@ pub enum supple_status {
     /// This processor does not have these instructions.
     SUPPLE_E_LEVEL = -80,
 
+    /// The grid of an image that cannot be: along `axis` an origin or a spacing (value, m); without an axis directions that
+    /// are not orthonormal (value: by how much), or no points or too many (value).
+    SUPPLE_E_GRID = -85,
+
     /// The step was not taken: a displacement, first of `node`, would not be a finite number.
     SUPPLE_E_DIVERGED = -90,
     /// The step was not taken: the kinetic energy (value, J), most of it at `node`, is several times what loads and
@@ -450,6 +454,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -71 => c"a saved state of another version",
         -72 => c"the saved state is damaged",
         -80 => c"this processor does not have these instructions",
+        -85 => c"the grid of an image that cannot be: its origin, spacing, directions or number of points",
         -90 => c"diverged: a displacement would not be a finite number",
         -91 => c"diverged: more kinetic energy than loads and supports can have given",
         -92 => c"the step was not taken: a force would move its node through the tissue around it",

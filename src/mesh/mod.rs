@@ -13,6 +13,7 @@ pub use boundary::boundary;
 pub(crate) use boundary::boundary_in;
 pub(crate) use boundary::faces;
 pub use renumbering::renumber;
+pub(crate) use renumbering::{BITS as CURVE_BITS, every_third_bit};
 
 use core::fmt;
 
@@ -200,6 +201,17 @@ impl<'a> Mesh<'a> {
             let tet = [a, b, c, d];
             if volume(tet.map(|node| corner(points, node))) < 0.0 { [a, c, b, d] } else { tet }
         })
+    }
+
+    /// The nodes of an element in the order in which they were given; zeros for one that does not exist.
+    pub(crate) fn given(&self, element: u32) -> [u32; 4] {
+        self.tets.get(element as usize).copied().unwrap_or_default()
+    }
+
+    /// The nodes of all elements in the order in which they were given.
+    #[cfg(feature = "capi-neo-hookean")]
+    pub(crate) fn all_given(&self) -> &'a [[u32; 4]] {
+        self.tets
     }
 
     /// Corners of an element, m, in float64.

@@ -5,7 +5,7 @@
 use super::{MeshError, in_range};
 
 /// Bits of each coordinate in the place on the curve.
-const BITS: u32 = 10;
+pub(crate) const BITS: u32 = 10;
 
 /// Renumbers the nodes of a mesh (`points` in m, `tets` of node indices) along a Morton curve, in place. Elements keep
 /// their order. Afterwards `old[n]` is the former index of node `n`, and `new[n]` the index that the former node `n`
@@ -93,7 +93,7 @@ fn sort_by_key<K: Ord>(heap: &mut [u32], key: impl Fn(u32) -> K) {
 }
 
 /// Moves each of ten bits to every third place, with zeros between them.
-const fn every_third_bit(bits: u32) -> u32 {
+pub(crate) const fn every_third_bit(bits: u32) -> u32 {
     let bits = (bits | bits << 16) & 0x0300_00ff;
     let bits = (bits | bits << 8) & 0x0300_f00f;
     let bits = (bits | bits << 4) & 0x030c_30c3;

@@ -991,6 +991,77 @@ static void pulls(void) {
     note(SUPPLE_E_NO_PULLS);
     DONE(supple_set_pulls(acts, NULL));
     DONE(supple_state_reset(state));
+static void images(void) {
+    static supple_followed_point located[2];
+    static float places[2][3] = {{0.01f, 0.01f, 0.01f}, {0.01f, 0.01f, -0.01f}}, moved[2][3], field[3 * 27];
+    const size_t room = supple_locate_size(TETS);
+    size_t bytes = 0, covered = 0;
+#define LOCATE(count, memory, bytes, to)                                                                               \
+    supple_locate(points[0], NODES, tets[0], TETS, places[0], count, memory, bytes, to, &error)
+    REFUSED(SUPPLE_E_NULL, LOCATE(2, NULL, room, located));
+    REFUSED(SUPPLE_E_NULL, LOCATE(2, spare, room, NULL));
+    REFUSED(SUPPLE_E_MISALIGNED, LOCATE(2, spare + 1, room, located));
+    REFUSED(SUPPLE_E_SHORT, LOCATE(2, spare, room - 1, located));
+    CHECK(error.value == (double)(room - 1) && error.limit == (double)room);
+    REFUSED(SUPPLE_E_OVERLAP, LOCATE(2, spare, room, (supple_followed_point *)(void *)spare));
+    REFUSED(SUPPLE_E_MESH_EMPTY, supple_locate(points[0], NODES, tets[0], 0, places[0], 2, spare, room, located, &error));
+    places[1][2] = NAN;
+    REFUSED(SUPPLE_E_NOT_FINITE, LOCATE(2, spare, room, located));
+    CHECK(error.index == 1 && error.axis == 2 && located[0].weights[0] == 0.0f);
+    places[1][2] = -0.01f;
+    DONE(LOCATE(2, spare, room, located));
+    DONE(LOCATE(0, spare, room, NULL));
+#define FOLLOW(to, velocities) supple_follow(state, located, 2, to, velocities, &error)
+    REFUSED(SUPPLE_E_NULL, FOLLOW(NULL, moved[0]));
+    REFUSED(SUPPLE_E_OVERLAP, FOLLOW(moved[0], moved[0]));
+    REFUSED(SUPPLE_E_OVERLAP, FOLLOW((float *)(void *)located, NULL));
+    REFUSED(SUPPLE_E_NOT_INITIALISED, supple_follow((supple_state *)(void *)spare, located, 2, moved[0], NULL, &error));
+    located[1].nodes[3] = NODES;
+    REFUSED(SUPPLE_E_INDEX, FOLLOW(moved[0], NULL));
+    CHECK(error.index == 1 && error.node == NODES && error.limit == NODES);
+    located[1].nodes[3] = 0, located[1].weights[0] = INFINITY;
+    REFUSED(SUPPLE_E_NOT_FINITE, FOLLOW(moved[0], NULL));
+
+    const supple_image_grid good = {{0, 0, 0}, {0.01, 0.01, 0.01}, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {3, 3, 3}};
+    supple_image_grid bad = good;
+    supple_vectors from;
+    DONE(supple_displacements(state, &from));
+    supple_vectors wrong = from;
+    DONE(supple_displacement_field_size(&good, 0.0f, &bytes, &error));
+#define FIELD(grid, vectors, kind, bytes, floats)                                                                      \
+    supple_displacement_field(points[0], NODES, tets[0], TETS, vectors, kind, grid, 0.0f, spare, bytes, field, floats, \
+                              &covered, &error)
+#define GRID(change)                                                                                                   \
+    bad = good, (change);                                                                                              \
+    REFUSED(SUPPLE_E_GRID, supple_displacement_field_size(&bad, 0.0f, &bytes, &error));                                \
+    REFUSED(SUPPLE_E_GRID, FIELD(&bad, &from, SUPPLE_INVERSE_FIELD, sizeof spare, 81))
+    GRID(bad.origin[1] = INFINITY);
+    CHECK(error.axis == 1);
+    GRID(bad.spacing[2] = 0.0);
+    CHECK(error.axis == 2);
+    GRID(bad.size[0] = 0);
+    GRID(bad.size[0] = bad.size[1] = UINT32_MAX);
+    GRID(bad.direction[0][1] = 0.5);
+    REFUSED(SUPPLE_E_NEGATIVE, supple_displacement_field_size(&good, -1.0f, &bytes, &error));
+    REFUSED(SUPPLE_E_NULL, supple_displacement_field_size(NULL, 0.0f, &bytes, &error));
+    REFUSED(SUPPLE_E_CHOICE, FIELD(&good, &from, 2, sizeof spare, 81));
+    REFUSED(SUPPLE_E_SHORT, FIELD(&good, &from, SUPPLE_FORWARD_FIELD, bytes - 1, 81));
+    REFUSED(SUPPLE_E_SHORT, FIELD(&good, &from, SUPPLE_FORWARD_FIELD, bytes, 80));
+    wrong = from, wrong.count--;
+    REFUSED(SUPPLE_E_MISMATCH, FIELD(&good, &wrong, SUPPLE_FORWARD_FIELD, bytes, 81));
+    wrong = from, wrong.first = NULL;
+    REFUSED(SUPPLE_E_NULL, FIELD(&good, &wrong, SUPPLE_FORWARD_FIELD, bytes, 81));
+    wrong = from, wrong.stride = 8;
+    REFUSED(SUPPLE_E_SHORT, FIELD(&good, &wrong, SUPPLE_FORWARD_FIELD, bytes, 81));
+    wrong = from, wrong.stride = 13;
+    REFUSED(SUPPLE_E_MISALIGNED, FIELD(&good, &wrong, SUPPLE_FORWARD_FIELD, bytes, 81));
+    static float nan[NODES][3];
+    nan[5][1] = NAN;
+    wrong = (supple_vectors){nan[0], sizeof *nan, NODES};
+    REFUSED(SUPPLE_E_NOT_FINITE, FIELD(&good, &wrong, SUPPLE_INVERSE_FIELD, bytes, 81));
+    CHECK(error.node == 5 && error.axis == 1 && field[0] == 0.0f);
+    DONE(FIELD(&good, &from, SUPPLE_INVERSE_FIELD, bytes, 81));
+    CHECK(covered > 0);
 }
 
 int main(int argc, char **argv) {
@@ -1024,6 +1095,7 @@ int main(int argc, char **argv) {
     adaptive_steps();
     reactions();
     surfaces();
+    images();
     contacts();
     pulls();
     remarks(config);

@@ -90,6 +90,22 @@ static void sim_advance(void) {
     }
 }
 
+static void locate_and_follow(void) {
+    static unsigned char memory[64 * TETS];
+    static float places[2][3] = {{0.01f, 0.02f, 0.01f}, {1.0f, 1.0f, 1.0f}}, now[2][3];
+    static supple_followed_point located[2];
+    CHECK(supple_locate(points[0], NODES, tets[0], TETS, places[0], 2, memory, sizeof memory, located, NULL) == SUPPLE_OK);
+    CHECK(supple_follow(state, located, 2, now[0], NULL, NULL) == SUPPLE_OK);
+}
+static void field(void) {
+    static float scratch[200000], out[3 * 40 * 40 * 40];
+    const supple_image_grid grid = {{-0.02, -0.02, -0.02}, {0.004, 0.004, 0.01}, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {40, 40, 40}};
+    supple_vectors from;
+    CHECK(supple_displacements(state, &from) == SUPPLE_OK);
+    CHECK(supple_displacement_field(points[0], NODES, tets[0], TETS, &from, SUPPLE_INVERSE_FIELD, &grid, 0.03f, scratch, sizeof scratch,
+                                    out, sizeof out / sizeof *out, NULL, NULL) == SUPPLE_OK);
+}
+
 static void *run(void *call) {
     (*(void (**)(void))call)();
     return NULL;
@@ -129,6 +145,7 @@ int main(void) {
         {"guard_init", init_guard, 38},    {"guard_follow", follow, 40},
         {"adaptive_init", init_adaptive, 42}, {"adaptive_advance", advance, 42},
         {"sim_setup", sim_setup, 44}, {"sim_advance", sim_advance, 42},
+        {"locate", locate_and_follow, 3}, {"displacement_field", field, 10},
     };
     const size_t count = sizeof calls / sizeof *calls;
     const uint32_t levels[2] = {supple_level(), SUPPLE_LEVEL_PORTABLE};

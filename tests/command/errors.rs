@@ -204,6 +204,13 @@ fn wrong_usage_has_code_2() {
 }
 
 #[test]
+fn warping_says_that_it_is_pythons() {
+    let said = Desk::new().supple(&["warp", "out/run", "--image", "CT.nii.gz", "--out", "warped.nii.gz"]);
+    let rest = "pip install SimpleITK; python -m supple warp out/run --image CT.nii.gz --out warped.nii.gz\n";
+    assert!(said.code == 2 && said.err.ends_with(rest), "{}", said.err);
+}
+
+#[test]
 fn a_command_that_is_the_laboratorys_now_says_what_to_type() {
     let desk = Desk::new();
     let package = "of the laboratory: cargo run --release -p supple-lab";

@@ -7,12 +7,14 @@ use std::cell::Cell;
 use std::sync::Mutex;
 
 use supple::contact::{Contact, Instrument, Pose, Shape, Surface, SurfaceNode, Touch};
+use supple::image::{FieldKind, ImageGrid, displacement_field, scratch_for};
 use supple::inertia::{Cells, Grid, LargeStep, Method, vectors_for, vectors_for_lattice};
 use supple::learned::{self, LearnedError, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{AnyLaw, Element, Exponential, NeoHookean, NodalStrain, Tissue};
 use supple::mesh::{Bar, Mesh, Winding};
 use supple::mlp::Network;
+use supple::points::{FollowedPoint, follow, locate, words_for};
 use supple::pulls::{Pull, PulledNode, Pulls, patch};
 use supple::scene::{Axes, BuildError, FixedScene, Support, patch_rows_for, tiles_for};
 use supple::state::{FixedState, NodeVector};
@@ -371,4 +373,34 @@ fn too_few_nodes_or_tiles_is_an_error_and_leaves_the_scene_empty() {
     assert_eq!(tled::exact_critical_step(scene.view(), state.displacements()), None);
     assert!(!tled::start(&scene, &mut state, &step, |_| ([0.0; 3], [0.0; 3])));
     assert_eq!(state.steps(), 0);
+}
+
+#[test]
+fn points_and_fields_in_arrays_allocate_nothing() {
+    let (points, tets) = mesh();
+    let mesh = Mesh::new(&points, &tets, Winding::Checked).unwrap();
+    let mut state = FixedState::<NODES>::new();
+    state.view().put(0.0, 1e-3, |node| [[1e-3, 0.0, points[node][2] / 10.0], [1e-6, 0.0, 0.0]]);
+    let (mut memory, mut scratch) = ([0; words_for(TETS)], vec![0.0; 40_000]);
+    let mut out = vec![[0.0; 3]; 20 * 20 * 30];
+    let before = allocations();
+
+    let places = [[0.01, 0.012, 0.013], [0.01, 0.01, 0.05], [0.0, 0.0, 0.0]];
+    let (mut located, mut now, mut fast) = ([FollowedPoint::default(); 3], [[0.0; 3]; 3], [[0.0; 3]; 3]);
+    locate(&mesh, &places, &mut memory, &mut located).unwrap();
+    follow(&located, &mut state, &mut now, &mut fast).unwrap();
+    let grid = ImageGrid::aligned([-0.01; 3], [0.002; 3], [20, 20, 30]);
+    let mut covered = 0;
+    for (kind, reach) in [(FieldKind::Forward, 0.0), (FieldKind::Inverse, 0.015), (FieldKind::Inverse, 0.004)] {
+        assert!(scratch_for(&grid, reach).unwrap() <= scratch.len());
+        let moved = |node: usize| state.displacements()[node].to_array();
+        covered = displacement_field(&mesh, moved, (kind, &grid, reach), &mut scratch, &mut out).unwrap();
+    }
+    // Refusals as well.
+    assert!(locate(&mesh, &[[f32::NAN; 3]], &mut memory, &mut located).is_err());
+    assert!(scratch_for(&ImageGrid { size: [0; 3], ..grid }, 0.0).is_err());
+
+    assert_eq!(allocations(), before);
+    assert!((now[0][0] - 0.011).abs() < 1e-8 && (fast[0][0] - 1e-3).abs() < 1e-8, "{now:?} {fast:?}");
+    assert!((located[1].distance - 0.01).abs() < 1e-7 && covered > 1000, "{located:?} {covered}");
 }

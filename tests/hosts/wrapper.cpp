@@ -2,6 +2,7 @@
 //
 //     c++ -std=c++17 -Wall -Wextra -Werror -pedantic -Iinclude tests/hosts/wrapper.cpp -lsupple -o wrapper
 //     ./wrapper weights/compact-10.weights
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -403,6 +404,39 @@ void thin() {
     EXPECT_SENTENCE(supple::traction(at, top, {0, 0, -100}, 0, forces).error, "a node that does not exist: entry 1, node 999, against 125");
 }
 
+// Points that follow a state, and its displacement field.
+void followed(const grid &cube, supple::scene scene, supple::loads loads, supple::state moved) {
+    EXPECT(is_done(moved.set_step(scene, 0.5f * moved.critical_step(scene).value.seconds, 0)) && is_done(moved.step(scene, loads, 20)));
+    std::vector<supple::line> work(supple::lines(supple_locate_size(std::uint32_t(cube.tets.size() / 4))));
+    const float places[] = {0.005f, 0.006f, 0.007f, 0.005f, 0.006f, -0.01f};
+    supple::followed_point located[2];
+    const auto found = supple::locate(cube.at, cube.tets, {places, 6}, work, {located, 2});
+    EXPECT(found && found.value == 2 && located[0].distance == 0 && std::fabs(located[1].distance - 0.01f) < 1e-7f);
+    EXPECT(supple::locate(cube.at, cube.tets, {places, 6}, work, {located, 1}).status == status::e_short);
+    float now[6], fast[6];
+    EXPECT(is_done(supple::follow(moved, {located, 2}, {now, 6}, {fast, 6})) && now[0] != places[0] && fast[0] != 0);
+    EXPECT(is_done(supple::follow(moved, {located, 2}, {now, 6}, {})));
+    EXPECT(supple::follow(moved, {located, 2}, {now, 5}, {}) == status::e_short);
+    supple::error why{};
+    located[1].nodes[2] = 999;
+    EXPECT(supple::follow(moved, {located, 2}, {now, 6}, {}, &why) == status::e_index && why.index == 1 && why.node == 999);
+
+    supple::image_grid around{{-0.01, -0.01, -0.01}, {0.005, 0.005, 0.005}, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {8, 8, 8}};
+    const auto bytes = supple::displacement_field_size(around, 0);
+    std::vector<supple::line> scratch(supple::lines(bytes.value));
+    std::vector<float> field(3 * 512);
+    supple_vectors from{};
+    EXPECT(bytes && supple_displacements(moved.raw(), &from) == SUPPLE_OK);
+    using kind = supple::field_kind;
+    const auto covered = supple::displacement_field(cube.at, cube.tets, from, kind::inverse, around, 0, scratch, field);
+    EXPECT(covered && covered.value > 8 && covered.value < 512 && field[3 * (7 * 64 + 3 * 8 + 3)] < 0);
+    EXPECT(supple::displacement_field(cube.at, cube.tets, from, kind::forward, around, 0, scratch, {field.data(), 9}).status == status::e_short);
+    around.spacing[1] = -1;
+    EXPECT_SENTENCE(supple::displacement_field_size(around, 0).error,
+                    "the grid of an image that cannot be: its origin, spacing, directions or number of points: axis y, -1");
+    EXPECT(is_done(moved.reset()));
+}
+
 } // namespace
 
 int main(int count, char **words) {
@@ -428,6 +462,7 @@ int main(int count, char **words) {
     const auto pulled = supple::loads::make(cube_loads_memory, body.value, 2, 1);
     EXPECT(body && moved && pulled && is_done(pulled.value.set_gravity({3, 0, 0})));
     large(cube.at, body.value, pulled.value, moved.value);
+    followed(cube, body.value, pulled.value, moved.value);
     judged(cube.at, body.value, pulled.value, moved.value);
     adaptive(cube.at, body.value, pulled.value, moved.value);
     remarked(scene.value, loads.value, state.value);

@@ -78,6 +78,9 @@ enum Command {
     /// Convert weight files to and from safetensors
     #[command(subcommand)]
     Weights(convert::Conversion),
+    /// Warp an image with a run: `python -m supple warp`, as image formats are those of SimpleITK
+    #[command(disable_help_flag = true)]
+    Warp(moved::Arguments),
     /// Moved to the laboratory
     #[command(hide = true, disable_help_flag = true)]
     Evaluate(moved::Arguments),
@@ -95,6 +98,7 @@ pub fn main() -> ExitCode {
         Command::Demo { out } => demo::demo(&out),
         Command::Field(asked) => field::make(&asked),
         Command::Weights(conversion) => convert::convert(&conversion),
+        Command::Warp(given) => moved::say_python(&given),
         Command::Evaluate(_) => moved::refuse("evaluate", "methods|physics|hard|tolerance --out DIR"),
         Command::Train(_) => moved::refuse("train", "train RECIPE --out FILE"),
     })

@@ -15,16 +15,19 @@ From a mesh to a deformed one, in ten lines:
 
 from ._library import lib as _lib
 from .errors import Diverged, Error, InputError, UnstableStep
+from .images import Field, Grid, displacement_field, read_image, write_image
 from .instruments import Instrument, LocalForce, Touch
 from .mesh import Mesh
+from .points import FollowedPoints
 from .pulls import Pulls
 from .reactions import Reaction, ReactionForce
 from .scene import Material, Scene
 from .simulation import METHODS, Report, Simulation
 
 __all__ = [
-    "METHODS", "Diverged", "Error", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Pulls", "Reaction", "ReactionForce", "Report",
-    "Scene", "Simulation", "Touch", "UnstableStep", "level", "version",
+    "METHODS", "Diverged", "Error", "Field", "FollowedPoints", "Grid", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Pulls",
+    "Reaction", "ReactionForce", "Report", "Scene", "Simulation", "Touch", "UnstableStep", "displacement_field", "level", "read_image",
+    "version", "write_image",
 ]
 
 

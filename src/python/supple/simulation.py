@@ -18,7 +18,9 @@ from . import _library as library
 from ._laws import LAWS
 from ._library import ffi, lib
 from .errors import InputError
+from .images import Field, field_of
 from .instruments import POINT, Contact, Instrument, Rows, Touch, need_triangles
+from .points import FollowedPoints
 from .pulls import PullMemory, Pulls, Wanted, wanted_of
 from .reactions import Reaction
 from .scene import ELEMENTS, Scene, axes_of
@@ -530,6 +532,22 @@ class Simulation:
         out = np.empty((len(self.scene.mesh.points), 3), np.float32)
         library.checked(copy(self._state, library.pointer("float", out), out.size))
         return out
+
+    @_one_at_a_time
+    def locate(self, points: ArrayLike) -> FollowedPoints:
+        """Points (m, (n, 3), of the shape at rest) that follow the tissue: a tumour, vessels, a finer surface, targets. Located once; where they
+        are is asked for after each frame. Those outside follow the nearest point of the tissue, `distances` tells how far that is."""
+        return FollowedPoints(self, points)
+
+    @_one_at_a_time
+    def field(self, image: Any, kind: str = "inverse", *, reach: float = 0.0, axes: str = "LPS") -> Field:
+        """The displacement field on the grid of an image (of SimpleITK, or a `Grid`): "inverse" warps that image as the tissue has moved, "forward"
+        moves points. In mm and LPS, as ITK has it. Within the tissue it is that of the elements; elsewhere it goes on smoothly, within the
+        bounds of what is within, or falls off to zero at a `reach` (mm). `axes` are those of the mesh, "LPS" or "RAS"; its unit is m."""
+        vectors = ffi.new("supple_vectors *")
+        library.checked(lib.supple_displacements(self._state, vectors))
+        largest = float(np.linalg.norm(self._vectors, axis=1).max())
+        return field_of(self.scene.mesh, vectors, largest, (image, kind, reach, axes))
 
     @_one_at_a_time
     def save(self) -> bytes:

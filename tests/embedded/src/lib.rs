@@ -3,12 +3,14 @@
 #![no_std]
 
 use supple::element::{ElementMaterial, ElementTile, NodeInertia, PatchRow};
+use supple::image::{FieldKind, ImageGrid, displacement_field};
 use supple::inertia::{Cells, LargeStep, Method, vectors_for};
 use supple::learned::{self, LearnedStep};
 use supple::loads::{Loads, Motion, NodalForce, traction};
 use supple::material::{Exponential, NeoHookean, NodalPressure, NodalStrain, Regions, Tissue, TissueValues};
 use supple::mesh::{self, Bar, Mesh, Winding};
 use supple::mlp::Network;
+use supple::points::{FollowedPoint, follow, locate, words_for};
 use supple::scene::{AsScene, FixedScene, SceneFacts, SceneView, Support};
 use supple::state::{FixedState, NodeVector};
 use supple::step::{Status, Step};
@@ -241,4 +243,44 @@ pub extern "C" fn learned(
         Ok(Status::Ok) => (100.0 * learned.model().report().outside) as i32,
         _ => learned.model().fell_back().is_some().into(),
     }
+}
+
+/// Points that follow.
+#[unsafe(no_mangle)]
+pub extern "C" fn points(
+    points: &[[f32; 3]; 100],
+    tets: &[[u32; 4]; 300],
+    places: &[[f32; 3]; 10],
+    state: &mut State,
+    memory: &mut [u32; words_for(300)],
+    velocities: &mut [[f32; 3]; 10],
+) -> i32 {
+    let mut located = [FollowedPoint::default(); 10];
+    let Ok(mesh) = Mesh::new(points, tets, Winding::Normalised) else {
+        return -1;
+    };
+    if locate(&mesh, places, memory, &mut located).is_err() {
+        return -2;
+    }
+    follow(&located, state, &mut [[0.0; 3]; 10], velocities).map_or(-3, |()| 0)
+}
+
+/// A displacement field.
+#[unsafe(no_mangle)]
+pub extern "C" fn field(
+    points: &[[f32; 3]; 100],
+    tets: &[[u32; 4]; 300],
+    state: &mut State,
+    grid: &ImageGrid,
+    reach: f32,
+    scratch: &mut [f32; 10_000],
+    out: &mut [[f32; 3]; 1000],
+) -> i32 {
+    let Ok(mesh) = Mesh::new(points, tets, Winding::Normalised) else {
+        return -1;
+    };
+    let moved = |node: usize| state.displacements().get(node).copied().unwrap_or_default().to_array();
+    let fields = [FieldKind::Forward, FieldKind::Inverse];
+    let covered = fields.map(|kind| displacement_field(&mesh, moved, (kind, grid, reach), scratch, out).unwrap_or(0));
+    covered.iter().sum::<usize>() as i32
 }

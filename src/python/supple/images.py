@@ -1,0 +1,207 @@
+"""Displacement fields on the grid of an image, and images that follow the tissue, in the conventions of ITK: millimetres, LPS axes (x to the
+patient's left, y to the back, z to the head), direction cosines. Meshes stay in metres; their axes are LPS unless you say "RAS".
+
+Files and resampling are SimpleITK's (`pip install SimpleITK`, or the extra `image`); fields need numpy alone.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _library as library
+from ._library import ffi, lib
+from .errors import InputError
+from .mesh import Mesh
+
+_KINDS = {"forward": lib.SUPPLE_FORWARD_FIELD, "inverse": lib.SUPPLE_INVERSE_FIELD}
+# From the axes of the mesh to LPS, and back.
+_SIGNS = {"LPS": np.array([1.0, 1.0, 1.0]), "RAS": np.array([-1.0, -1.0, 1.0])}
+_TRANSFORMS = (".h5", ".hdf5", ".tfm", ".txt")
+_IMAGES = (".nrrd", ".mha", ".nii.gz", ".nii", ".mhd", ".nhdr")
+# A field of more points is made on a coarser grid: 24 bytes each while an image is warped.
+_MOST_POINTS = 1 << 24
+# The slope of a field that falls off is at most 1.54 times the displacement over the reach; from 1 on it folds.
+_STEEPEST = 1.54
+
+
+@dataclasses.dataclass(frozen=True)
+class Grid:
+    """Where the points of an image are, as ITK has it: origin and spacing (mm, LPS), points along x, y, z, and direction cosines, of which
+    column `a` is the direction of axis `a`."""
+
+    origin: tuple[float, ...]
+    spacing: tuple[float, ...]
+    size: tuple[int, ...]
+    direction: tuple[tuple[float, ...], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+    @classmethod
+    def of(cls, image: Any) -> Grid:
+        """Of a SimpleITK image, or of a grid."""
+        if isinstance(image, Grid):
+            return image
+        try:
+            origin, spacing, size, direction = (
+                np.asarray(getattr(image, f"Get{name}")(), np.float64) for name in ("Origin", "Spacing", "Size", "Direction")
+            )
+        except (AttributeError, TypeError, ValueError):
+            raise InputError(f"an image of SimpleITK or a supple.Grid is needed, not {type(image).__name__}") from None
+        if len(size) != 3:
+            raise InputError(f"the image has {len(size)} dimensions, 3 are needed")
+        rows = direction.reshape(3, 3).tolist()
+        return cls(tuple(origin), tuple(spacing), tuple(int(count) for count in size), tuple(tuple(row) for row in rows))
+
+    def coarser(self, factor: int) -> Grid:
+        """The same box, with every `factor`-th point, and one more where these do not reach its end."""
+        size = tuple(-(-(count - 1) // factor) + 1 for count in self.size)
+        return dataclasses.replace(self, spacing=tuple(factor * each for each in self.spacing), size=size)
+
+    def points(self) -> NDArray[np.float64]:
+        """Where they are, mm, LPS, of shape (nz, ny, nx, 3)."""
+        index = np.stack(np.meshgrid(*(np.arange(count) for count in reversed(self.size)), indexing="ij")[::-1], axis=-1)
+        places: NDArray[np.float64] = (index * self.spacing) @ np.asarray(self.direction, np.float64).T + self.origin
+        return places
+
+    def _raw(self, signs: NDArray[np.float64]) -> Any:
+        """As the kernel has it: metres, in the axes of the mesh."""
+        made = ffi.new("supple_image_grid *")
+        origin, spacing, size, direction = (np.asarray(getattr(self, field.name)) for field in dataclasses.fields(self))
+        if origin.shape != (3,) or spacing.shape != (3,) or size.shape != (3,) or direction.shape != (3, 3):
+            raise InputError(f"{self}: three numbers each are needed, and three rows of three directions")
+        if not np.issubdtype(size.dtype, np.integer) or size.min() < 0 or size.max() >= 1 << 32:
+            raise InputError(f"size {self.size}: whole numbers of points are needed")
+        made.origin, made.spacing = (1e-3 * signs * origin).tolist(), (1e-3 * spacing).tolist()
+        made.size, made.direction = size.tolist(), (signs[:, None] * direction).tolist()
+        return made
+
+
+@dataclasses.dataclass(frozen=True)
+class Field:
+    """Displacements at the points of a grid: `values` (mm, LPS) of shape (nz, ny, nx, 3), float32; `inside`: how many points are within the
+    tissue. Of kind "inverse" they tell where in the image at rest the material comes from that is at a point now: what ITK and 3D Slicer
+    warp an image with. Of kind "forward", where the material that was at a point has gone."""
+
+    kind: str
+    grid: Grid
+    values: NDArray[np.float32]
+    inside: int
+
+    def image(self) -> Any:
+        """As a SimpleITK image of three float64 a point."""
+        sitk = _simple_itk()
+        made = sitk.GetImageFromArray(self.values.astype(np.float64), isVector=True)
+        made.SetOrigin([float(each) for each in self.grid.origin])
+        made.SetSpacing([float(each) for each in self.grid.spacing])
+        made.SetDirection(np.ravel(self.grid.direction).astype(float).tolist())
+        return made
+
+    def transform(self) -> Any:
+        """As a SimpleITK transform, which is the identity outside the grid."""
+        return _simple_itk().DisplacementFieldTransform(self.image())
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes it for SimpleITK and 3D Slicer: as a transform (.h5, .tfm, .txt), or as an image of vectors (.nrrd, .mha, .nii.gz)."""
+        sitk, name = _simple_itk(), str(path)
+        if name.lower().endswith(_TRANSFORMS):
+            _by_simple_itk(path, "write", lambda: sitk.WriteTransform(self.transform(), name))
+        elif name.lower().endswith(_IMAGES):
+            _by_simple_itk(path, "write", lambda: sitk.WriteImage(sitk.Cast(self.image(), sitk.sitkVectorFloat32), name, True))
+        else:
+            raise InputError(f"{path}: a transform ends in {', '.join(_TRANSFORMS)}, an image in {', '.join(_IMAGES)}")
+
+    def warp(self, image: Any, *, labels: bool = False) -> Any:
+        """The image at rest as it looks now, on its own grid, from an inverse field: interpolated linearly, of a map of labels by the nearest
+        voxel. What comes from outside the image has its least value, of labels 0."""
+        if self.kind != "inverse":
+            raise InputError("an image is warped with an inverse field, this is a forward one")
+        sitk = _simple_itk()
+        outside = 0.0 if labels else float(sitk.GetArrayViewFromImage(image).min())
+        return sitk.Resample(image, image, self.transform(), sitk.sitkNearestNeighbor if labels else sitk.sitkLinear, outside)
+
+
+def displacement_field(
+    mesh: Mesh, displacements: ArrayLike, image: Any, kind: str = "inverse", *, reach: float = 0.0, axes: str = "LPS"
+) -> Field:
+    """The field of these displacements of the nodes (m, (n, 3)) at the points of an image: see `Simulation.field`."""
+    moved = library.vectors(displacements, "displacements", len(mesh.points))
+    vectors = ffi.new("supple_vectors *", {"first": library.pointer("float", moved), "stride": 12, "count": len(moved)})
+    return field_of(mesh, vectors, float(np.linalg.norm(moved, axis=1).max()), (image, kind, reach, axes))
+
+
+def field_of(mesh: Mesh, vectors: Any, largest: float, asked: tuple[Any, str, float, str]) -> Field:
+    """The same of vectors as the kernel has them, of which the largest is so long (m)."""
+    image, kind, reach, axes = asked
+    for value, known, what in ((kind, _KINDS, "kind"), (axes, _SIGNS, "axes")):
+        if value not in known:
+            raise InputError(f"{what} {value!r}: there are {', '.join(known)}")
+    if not (np.isfinite(reach) and reach >= 0.0):
+        raise InputError(f"reach {reach}: a number from 0 (none) on is needed, mm")
+    if 0.0 < reach < _STEEPEST * 1e3 * largest:
+        warnings.warn(
+            f"reach {reach:g} mm: the field may fold where it falls off, since nodes move by up to {1e3 * largest:.3g} mm; "
+            f"from {_STEEPEST * 1e3 * largest:.3g} mm on it does not",
+            RuntimeWarning, stacklevel=3,
+        )  # fmt: skip
+    grid, signs = Grid.of(image), _SIGNS[axes]
+    raw, error, bytes_needed = grid._raw(signs), library.new_error(), ffi.new("size_t *")
+    library.checked(lib.supple_displacement_field_size(raw, 1e-3 * reach, bytes_needed, error), error, "the grid")
+    scratch, covered = library.Memory(bytes_needed[0]), ffi.new("size_t *")
+    values = np.empty((*reversed(grid.size), 3), np.float32)
+    status = lib.supple_displacement_field(
+        library.pointer("float", mesh.points), len(mesh.points), library.pointer("uint32_t", mesh.tets), len(mesh.tets),
+        vectors, _KINDS[kind], raw, 1e-3 * reach, scratch.pointer, scratch.size,
+        library.pointer("float", values), values.size, covered, error,
+    )  # fmt: skip
+    library.checked(status, error, "the field")
+    if covered[0] == 0:
+        low, high = 1e3 * signs * mesh.points.min(axis=0), 1e3 * signs * mesh.points.max(axis=0)
+        raise InputError(
+            f"no point of the grid is within the tissue, which lies from {np.minimum(low, high).round(1).tolist()} to "
+            f"{np.maximum(low, high).round(1).tolist()} mm (LPS): is the mesh in metres, and in {axes} axes? Or the grid too coarse?"
+        )
+    values *= (1e3 * signs).astype(np.float32)
+    return Field(kind, grid, values, int(covered[0]))
+
+
+def grid_for_warping(image: Any) -> Grid:
+    """The grid of an image, or one with every second, third, ... point where it has more than 2^24."""
+    grid, factor = Grid.of(image), 1
+    while np.prod([float(count) for count in grid.coarser(factor).size]) > _MOST_POINTS:
+        factor += 1
+    return grid.coarser(factor)
+
+
+def read_image(path: str | os.PathLike[str]) -> Any:
+    """An image from a file, by SimpleITK: .nrrd, .mha, .nii.gz and others."""
+    sitk = _simple_itk()
+    if not pathlib.Path(path).is_file():
+        raise InputError(f"{path}: there is no such file")
+    return _by_simple_itk(path, "read", lambda: sitk.ReadImage(str(path)))
+
+
+def write_image(image: Any, path: str | os.PathLike[str]) -> None:
+    """Writes an image to a file, compressed, by SimpleITK."""
+    sitk = _simple_itk()
+    _by_simple_itk(path, "write", lambda: sitk.WriteImage(image, str(path), True))
+
+
+def _by_simple_itk(path: str | os.PathLike[str], what: str, do: Any) -> Any:
+    try:
+        return do()
+    except RuntimeError as problem:
+        said = str(problem).strip().splitlines()
+        raise InputError(f"{path}: SimpleITK cannot {what} it: {said[-1] if said else 'it does not say why'}") from None
+
+
+def _simple_itk() -> Any:
+    try:
+        import SimpleITK
+    except ModuleNotFoundError:
+        raise ImportError("for images SimpleITK is needed: pip install SimpleITK") from None
+    return SimpleITK
