@@ -23,7 +23,7 @@
 
 mod patch;
 
-pub use patch::{around, in_tetrahedron, patch};
+pub use patch::{corners, patch};
 
 use core::fmt;
 

@@ -1,13 +1,14 @@
 //! The nodes of a pull: those within a radius of its point at rest, which move it by their mean, or the corners of the
-//! tetrahedron around it.
+//! element that it follows.
 //!
 //! A force on few nodes tears a mesh, and light ones most, so all nodes of a patch have the same share. Of patches of 12 to 48
 //! nodes those of 24 registered the lobe best (20 points: 1.1 mm; 8 mm and weights that fall to the rim, 10 nodes: 1.5 mm), weights
 //! in proportion to the nodes' masses, or with the point as their mean position, worse.
 
-use glam::{Mat3, Vec3};
+use glam::Vec3;
 
 use super::{PullError, PulledNode};
+use crate::points::FollowedPoint;
 
 /// Writes the nodes within `radius` (m) of a point (m) to `nodes`, with equal weights. `points` are those of all nodes at
 /// rest, m. Gives how many.
@@ -39,35 +40,12 @@ pub fn patch(points: &[[f32; 3]], point: [f32; 3], radius: f32, nodes: &mut [Pul
     Ok(count)
 }
 
-/// The corners of the tetrahedron around a point (m, at rest), or of the one nearest to it in barycentric coordinates. Looks at all.
+/// The corners of the element that a point follows ([`crate::points`]), with its weights.
 #[must_use]
-pub fn around(points: &[[f32; 3]], tets: &[[u32; 4]], point: [f32; 3]) -> Option<[PulledNode; 4]> {
-    // How far a weight is below zero: at most zero inside.
-    let outside = |nodes: &[PulledNode; 4]| nodes.iter().map(|pulled| -pulled.weight).fold(0.0, f32::max);
-    let of_element = |&corners: &[u32; 4]| {
-        let mut at = [[0.0; 3]; 4];
-        for (place, node) in at.iter_mut().zip(corners) {
-            *place = *points.get(node as usize)?;
-        }
-        in_tetrahedron(corners, at, point)
-    };
-    tets.iter().filter_map(of_element).min_by(|a, b| outside(a).total_cmp(&outside(b)))
-}
-
-/// The corners of a tetrahedron with the barycentric coordinates of a point, its points at rest in m. None if it has no
-/// volume.
-#[must_use]
-pub fn in_tetrahedron(corners: [u32; 4], points: [[f32; 3]; 4], point: [f32; 3]) -> Option<[PulledNode; 4]> {
-    let [origin, a, b, c] = points.map(Vec3::from_array);
-    let edges = Mat3::from_cols(a - origin, b - origin, c - origin);
-    let weights = edges.inverse() * (Vec3::from_array(point) - origin);
-    if !weights.is_finite() {
-        return None;
-    }
-    let all = [1.0 - weights.x - weights.y - weights.z, weights.x, weights.y, weights.z];
+pub fn corners(point: &FollowedPoint) -> [PulledNode; 4] {
     let mut nodes = [PulledNode::default(); 4];
-    for (place, (node, weight)) in nodes.iter_mut().zip(corners.into_iter().zip(all)) {
+    for (place, (node, weight)) in nodes.iter_mut().zip(point.nodes.into_iter().zip(point.weights)) {
         *place = PulledNode { node, weight };
     }
-    Some(nodes)
+    nodes
 }

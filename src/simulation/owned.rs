@@ -16,7 +16,8 @@ use crate::learned::{self, LearnedError, LearnedModel, LearnedStep};
 use crate::loads::{LoadError, Loads, LoadsOfCall, LoadsOverTime, Motion, NodalForce};
 use crate::material::VecMaterial;
 use crate::mesh::{Mesh, MeshError, Winding};
-use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, around, patch, usual_most};
+use crate::points::{PointError, VecPoints};
+use crate::pulls::{Pull, PullError, Pulled, PulledNode, Pulls, corners, patch, usual_most};
 use crate::scene::{BuildError, Support, VecScene};
 use crate::simd::NodeVector;
 use crate::state::VecState;
@@ -147,8 +148,8 @@ impl<'w> Simulation<'w> {
     pub fn pull(&mut self, point: [f32; 3], radius: f32, stiffness: f32) -> Result<usize, SimulationError> {
         let first = self.pulled.len();
         if radius == 0.0 {
-            let nodes = around(&self.points, &self.tets, point);
-            self.pulled.extend(nodes.ok_or(PullError::Nothing { radius, nearest: f32::INFINITY })?);
+            let mesh = Mesh::new(&self.points, &self.tets, Winding::Normalised)?;
+            self.pulled.extend(VecPoints::locate(&mesh, &[point])?.points().iter().flat_map(corners));
         } else {
             let nodes = self.points.len();
             self.pulled.resize(first + nodes, PulledNode::default());
@@ -403,6 +404,8 @@ pub enum SimulationError {
     Contact(ContactError),
     /// A pull cannot be.
     Pull(PullError),
+    /// A point cannot be located.
+    Point(PointError),
     /// A length of step or a damping cannot be.
     Step(StepError),
     /// Steps beyond the critical one cannot be prepared.
@@ -425,6 +428,7 @@ impl fmt::Display for SimulationError {
             Self::Load(error) => error.fmt(f),
             Self::Contact(error) => error.fmt(f),
             Self::Pull(error) => error.fmt(f),
+            Self::Point(error) => error.fmt(f),
             Self::Step(error) => error.fmt(f),
             Self::Inertia(error) => error.fmt(f),
             Self::Learned(error) => error.fmt(f),
@@ -454,6 +458,7 @@ from! {
     Load: LoadError,
     Contact: ContactError,
     Pull: PullError,
+    Point: PointError,
     Step: StepError,
     Inertia: InertiaError,
     Learned: LearnedError,

@@ -37,6 +37,26 @@ fn a_bar_on_springs_is_drawn_to_a_target() {
 }
 
 #[test]
+fn points_follow_the_tissue() {
+    let desk = Desk::new();
+    let loads = "[[move]]\nplane = { axis = \"z\", at = 0.05 }\nmetre = [0.0, 0.0, 0.005]\nramp = 0.2\n\
+        [[fix]]\nplane = { axis = \"z\", at = 0.0 }\n\
+        [[point]]\nname = \"middle\"\nat = [0.01, 0.01, 0.025]\n\
+        [[point]]\nname = \"above\"\nat = [0.01, 0.01, 0.052]\n";
+    let said = desk.simulate(&bar(&format!("{loads}[time]\nend = 1.0\nframes = 2\n")), &[]);
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert!(said.err.contains("point \"above\" is 2.00 mm outside the mesh"), "{}", said.err);
+    let text = std::fs::read_to_string(desk.path("out/points.csv")).unwrap();
+    println!("{text}");
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows[0].join(","), "time_s,name,x_m,y_m,z_m");
+    assert!(rows.len() == 7 && rows[5][1] == "middle" && rows[6][1] == "above");
+    let height = |row: usize| rows[row][4].parse::<f64>().unwrap();
+    // The middle goes half the way, the end all of it.
+    assert!((height(5) - 0.0275).abs() < 2e-4 && (height(6) - 0.057).abs() < 1e-6);
+}
+
+#[test]
 fn pulls_that_cannot_be_are_refused_with_their_line() {
     let pull = "[[pull]]\npoint = [0.01, 0.01, 0.05]\nstiffness = 100.0\n";
     let spring = "[[spring]]\nplane = { axis = \"z\", at = 0.0 }\nstiffness = 20.0\n";
@@ -60,7 +80,13 @@ fn pulls_that_cannot_be_are_refused_with_their_line() {
             "no boundary triangle",
         ),
     ];
-    for (loads, words) in cases {
+    let point = "[[point]]\nname = \"a\"\nat = [0.01, 0.01, 0.02]\n";
+    let points = [
+        (format!("{point}{point}"), "two points are named"),
+        (point.replace("0.02]", "nan]"), "at holds NaN"),
+        (point.replace("\"a\"", "\"a,b\""), "must not be empty, nor hold a comma"),
+    ];
+    for (loads, words) in cases.into_iter().chain(points) {
         let desk = Desk::new();
         let said = desk.simulate(&bar(&format!("{loads}[time]\nend = 0.1\n")), &[]);
         println!("{}", said.err);

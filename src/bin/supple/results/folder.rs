@@ -18,7 +18,8 @@ use crate::scene::body::Body;
 use crate::scene::setup::Setup;
 
 /// Results but frames, by the names of their files.
-const TABLES: [&str; 6] = ["frames.pvd", "final.csv", "pulls.csv", "reactions.csv", "summary.json", report::FILE];
+const TABLES: [&str; 7] =
+    ["frames.pvd", "final.csv", "points.csv", "pulls.csv", "reactions.csv", "summary.json", report::FILE];
 
 /// The folder of a simulation's results.
 pub(crate) struct Folder {

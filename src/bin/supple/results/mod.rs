@@ -45,6 +45,9 @@ pub(crate) fn conclude(
         if !outcome.pulls.is_empty() {
             folder.write_text("pulls.csv", &outcome.pulls.table(setup.body.centre))?;
         }
+        if !outcome.points.moved().is_empty() {
+            folder.write_text("points.csv", &outcome.points.table(setup.body.centre))?;
+        }
         folder.write_text("summary.json", &summary.json())?;
     }
     Ok(Conclusion { summary, warnings })

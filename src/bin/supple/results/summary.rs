@@ -7,6 +7,7 @@ use supple::inertia::Grid;
 
 use super::figures::Figures;
 use crate::added_mass::describe_added;
+use crate::run::followed::FollowedPoints;
 use crate::run::outcome::{AdaptiveTrace, GuardTrace, LargeTrace, LearnedTrace, Outcome};
 use crate::run::pulled::{PulledPoints, length};
 use crate::run::reactions::Reactions;
@@ -73,6 +74,7 @@ pub(crate) fn of(setup: &Setup, outcome: &Outcome, figures: &Figures, warnings: 
     add_motion(&mut summary, outcome, figures);
     add_reactions(&mut summary, &outcome.reactions);
     add_pulls(&mut summary, &outcome.pulls);
+    add_points(&mut summary, &outcome.points);
     summary
 }
 
@@ -228,6 +230,19 @@ fn add_pulls(summary: &mut Summary, pulls: &PulledPoints) {
             length(pulls.at_end()[farthest].force)
         ),
         json!({ "pulls": figures.collect::<Vec<_>>() }),
+    );
+}
+
+/// How far followed points have moved.
+fn add_points(summary: &mut Summary, points: &FollowedPoints) {
+    let moved = points.moved();
+    let Some((name, most)) = moved.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { return };
+    let mean = moved.iter().map(|(_, way)| way).sum::<f64>() / moved.len() as f64;
+    let figures: Map<_, _> = moved.iter().map(|(name, way)| ((*name).to_owned(), json!(1e3 * way))).collect();
+    summary.add(
+        "followed points",
+        format!("{} moved by {:.3} mm on average, {name} by {:.3} mm", moved.len(), 1e3 * mean, 1e3 * most),
+        json!({ "points_moved_mm": figures }),
     );
 }
 

@@ -1,5 +1,6 @@
 //! A simulation from rest to its end: steps, frames at even intervals, what became of it.
 
+pub(crate) mod followed;
 pub(crate) mod outcome;
 pub(crate) mod pulled;
 pub(crate) mod reactions;
@@ -14,6 +15,7 @@ use supple::tled::Pace;
 
 use crate::problem::Problem;
 use crate::scene::setup::Setup;
+use followed::FollowedPoints;
 use outcome::{AdaptiveTrace, LargeTrace, LearnedTrace, Outcome};
 use reactions::{Mark, Reactions};
 use start::Start;
@@ -32,6 +34,7 @@ pub(crate) fn run<'a>(
     let Start { at_rest, step, simulation } = start;
     let time = &setup.time;
     let mut outcome = Outcome::new(at_rest, step.seconds());
+    outcome.points = FollowedPoints::new(&setup.points);
     outcome.reactions = Reactions::new(setup.instruments.all.len(), time);
     outcome.large = simulation.long_step().map(|large| LargeTrace::new(large.model()));
     outcome.learned = simulation.learned_step().map(LearnedTrace::new);
@@ -50,7 +53,7 @@ pub(crate) fn run<'a>(
     let limits = setup.pulls.limit(simulation.scene().view());
     let mut running = Running { setup, simulation, loads, limits, outcome, tick, taken: 0 };
     running.outcome.enter_frame(running.simulation.state());
-    running.read_pulls()?;
+    running.read_points()?;
     frame(&mut running.simulation)?;
     for index in 1..=frames {
         let share = index as f64 / frames as f64;
@@ -111,14 +114,14 @@ impl Running<'_> {
         Ok(())
     }
 
-    /// Takes down where pulled points are.
-    fn read_pulls(&mut self) -> Result<(), Problem> {
+    /// Takes down where pulled and followed points are.
+    fn read_points(&mut self) -> Result<(), Problem> {
         let Self { setup, simulation, limits, outcome, .. } = self;
         let state = simulation.state();
         let pulls = setup.pulls.at(state.time(), limits);
         let pulling = setup.pulls.pulling(&pulls, simulation.scene().node_count())?;
         outcome.pulls.enter(&pulling, setup.pulls.pulls, state);
-        Ok(())
+        outcome.points.enter(state)
     }
 
     fn rounding(&self) -> f64 {
@@ -193,7 +196,7 @@ impl Running<'_> {
             outcome.above_from.get_or_insert(time);
         }
         outcome.enter_frame(simulation.state());
-        self.read_pulls()
+        self.read_points()
     }
 }
 

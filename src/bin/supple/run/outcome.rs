@@ -11,6 +11,7 @@ use supple::simulation::Report;
 use supple::state::{StateView, VecState};
 use supple::step::{CriticalStep, Divergence, Status};
 
+use super::followed::FollowedPoints;
 use super::pulled::PulledPoints;
 use super::reactions::Reactions;
 use crate::weight_file::describe_step;
@@ -75,6 +76,8 @@ pub(crate) struct Outcome {
     pub(crate) reactions: Reactions,
     /// With pulls.
     pub(crate) pulls: PulledPoints,
+    /// With points.
+    pub(crate) points: FollowedPoints,
     pub(crate) frames: Vec<FrameTrace>,
 }
 
@@ -97,6 +100,7 @@ impl Outcome {
             guard: None,
             reactions: Reactions::NONE,
             pulls: PulledPoints::default(),
+            points: FollowedPoints::default(),
             frames: vec![],
         }
     }

@@ -9,6 +9,7 @@ use serde::Deserialize;
 use toml::{Spanned, Value};
 
 use super::instruments::InstrumentTable;
+use super::points::PointTable;
 use super::pulls::PullTable;
 use crate::problem::Problem;
 
@@ -39,6 +40,8 @@ pub(crate) struct SceneTable {
     pub(crate) instrument: Vec<Spanned<InstrumentTable>>,
     #[serde(default)]
     pub(crate) pull: Vec<Spanned<PullTable>>,
+    #[serde(default)]
+    pub(crate) point: Vec<Spanned<PointTable>>,
     #[serde(default)]
     pub(crate) spring: Vec<Spanned<SpringTable>>,
     gravity: Option<Spanned<[f32; 3]>>,
@@ -191,8 +194,9 @@ impl SceneFile {
         let instrument = scene.instrument.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let given = scene.gravity.iter().chain(fix).chain(force).chain(motion).chain(traction);
         let pull = scene.pull.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
+        let point = scene.point.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let spring = scene.spring.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
-        let mut given = given.chain(instrument).chain(pull).chain(spring);
+        let mut given = given.chain(instrument).chain(pull).chain(spring).chain(point);
         let first = given.next();
         if let Some(second) = given.next() {
             return Err(self.problem(second, "gravity is given twice"));

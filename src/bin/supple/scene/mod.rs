@@ -9,6 +9,7 @@ pub mod instruments;
 pub(crate) mod learned;
 pub(crate) mod loads;
 mod plausible;
+pub mod points;
 pub mod pulls;
 pub(crate) mod select;
 pub mod setup;

@@ -2,7 +2,8 @@
 
 use serde::Deserialize;
 use supple::material::VecMaterial;
-use supple::pulls::{MOST_STIFFNESS, Pull, PulledNode, Pulls, around, patch, usual_most};
+use supple::points::VecPoints;
+use supple::pulls::{MOST_STIFFNESS, Pull, PulledNode, Pulls, corners, patch, usual_most};
 use supple::scene::SceneView;
 use toml::Spanned;
 
@@ -80,8 +81,9 @@ impl ScenePulls {
                 count.map_err(|error| file.problem(&table.point, error))?;
             }
             None => {
-                let nodes = around(&body.local, &body.mesh.tets, point);
-                self.nodes.extend(nodes.ok_or_else(|| file.problem(&table.point, "no element is near this point"))?);
+                let located = VecPoints::locate(&body.checked()?, &[point]);
+                let located = located.map_err(|error| file.problem(&table.point, error))?;
+                self.nodes.extend(located.points().iter().flat_map(corners));
             }
         }
         let path = match &table.path {

@@ -12,6 +12,7 @@ use super::instruments::SceneInstruments;
 use super::learned::LearnedChoice;
 use super::loads::read_loads;
 use super::plausible;
+use super::points::ScenePoints;
 use super::pulls::ScenePulls;
 use super::timing::{Timing, method_name};
 use super::tissues::Tissues;
@@ -28,6 +29,7 @@ pub struct Setup {
     pub(crate) motions: Vec<Motion>,
     pub instruments: SceneInstruments,
     pub pulls: ScenePulls,
+    pub points: ScenePoints,
     pub(crate) gravity: [f32; 3],
     /// 1/s.
     pub damping: f32,
@@ -60,12 +62,14 @@ impl Setup {
         let (supports, forces, motions) = read_loads(file, &body)?;
         let instruments = SceneInstruments::read(file, &body)?;
         let pulls = ScenePulls::read(file, &body)?;
+        let points = ScenePoints::read(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
         let mut warnings = plausible::warnings(file, &body, &tissues, gravity, &supports, &forces);
         let element = read_element(file, learned.as_ref())?;
         let of_the_network = learned.as_ref().filter(|_| scene.mesh.get_ref().element.is_none());
         warnings.extend(locking(&file.place(&scene.mesh), of_the_network, element, &tissues));
         warnings.extend(time.old_name.clone());
+        warnings.extend(points.warnings(file));
         if let Some(learned) = &learned {
             warnings.extend(learned.warning(&tissues, element)?);
         }
@@ -78,6 +82,7 @@ impl Setup {
             motions,
             instruments,
             pulls,
+            points,
             gravity,
             damping,
             time,
@@ -97,6 +102,7 @@ impl Setup {
             motions: vec![],
             instruments: SceneInstruments::default(),
             pulls: ScenePulls::default(),
+            points: ScenePoints::default(),
             gravity: [0.0; 3],
             damping: 0.0,
             time: Timing::of_demo(),
