@@ -20,7 +20,7 @@ use crate::scene::{BuildError, Support, VecScene};
 use crate::simd::NodeVector;
 use crate::state::VecState;
 use crate::step::{CallingThread, CriticalStep, Divergence, Status, Step, StepError, Threads};
-use crate::tled::{self, Pace, vectors_for_pace};
+use crate::tled::{self, DisplacementError, Pace, SettleError, vectors_for_pace};
 
 /// A scene in motion. Loads and instruments are set between two calls of [`Simulation::advance`] as the host likes.
 #[derive(Debug)]
@@ -149,10 +149,7 @@ impl<'w> Simulation<'w> {
         self.prepare_once()?;
         let Self { gravity, forces, motions, instruments, scene, state, settings, touchable, in_step, clock, .. } =
             self;
-        let mut loads = Loads::new(&*scene, *gravity, forces, motions)?;
-        if !instruments.is_empty() {
-            loads = loads.touched_by(Contact::new(surface(touchable, scene.node_count())?, instruments)?);
-        }
+        let loads = checked_loads(scene, *gravity, (forces, motions), instruments, touchable)?;
         in_step.resize(motions.len(), Motion::default());
         let mut loads = LoadsOfCall::new(loads, in_step);
         let end = clock.end_of_call(state.time(), seconds);
@@ -185,6 +182,21 @@ impl<'w> Simulation<'w> {
         let mover = prepared.mover();
         let watch = &mut |event: Event<'_>| watch(event);
         Ok(mover.advance(until, scene.view(), &mut loads, state.view(), work, &CallingThread, watch)?)
+    }
+
+    /// The loads of a call, and what they act on.
+    pub(super) fn acting(
+        &mut self,
+    ) -> Result<(LoadsOfCall<'_>, &VecScene<VecMaterial>, &mut VecState), SimulationError> {
+        let Self { gravity, forces, motions, instruments, scene, state, touchable, in_step, .. } = self;
+        let loads = checked_loads(scene, *gravity, (forces, motions), instruments, touchable)?;
+        in_step.resize(motions.len(), Motion::default());
+        Ok((LoadsOfCall::new(loads, in_step), scene, state))
+    }
+
+    /// The next call prepares the steps anew, from the state as it is.
+    pub(super) fn forget_steps(&mut self) {
+        self.prepared = None;
     }
 
     fn prepare_once(&mut self) -> Result<(), SimulationError> {
@@ -344,6 +356,20 @@ impl<'w> Prepared<'w> {
     }
 }
 
+fn checked_loads<'a>(
+    scene: &VecScene<VecMaterial>,
+    gravity: [f32; 3],
+    (forces, motions): (&'a [NodalForce], &'a [Motion]),
+    instruments: &'a [Instrument<'a>],
+    touchable: &'a (Vec<SurfaceNode>, Vec<[u32; 3]>),
+) -> Result<Loads<'a>, SimulationError> {
+    let loads = Loads::new(scene, gravity, forces, motions)?;
+    if instruments.is_empty() {
+        return Ok(loads);
+    }
+    Ok(loads.touched_by(Contact::new(surface(touchable, scene.node_count())?, instruments)?))
+}
+
 fn surface<'a>(
     (nodes, triangles): &'a (Vec<SurfaceNode>, Vec<[u32; 3]>),
     scene_nodes: usize,
@@ -369,6 +395,10 @@ pub enum SimulationError {
     Inertia(InertiaError),
     /// A network cannot move the scene.
     Learned(LearnedError),
+    /// The body cannot be brought to rest as asked for.
+    Settle(SettleError),
+    /// Displacements cannot be.
+    Displacement(DisplacementError),
     /// The stiffness of some element is not a finite number.
     NotFinite,
     /// A span (s) that cannot be.
@@ -387,6 +417,8 @@ impl fmt::Display for SimulationError {
             Self::Step(error) => error.fmt(f),
             Self::Inertia(error) => error.fmt(f),
             Self::Learned(error) => error.fmt(f),
+            Self::Settle(error) => error.fmt(f),
+            Self::Displacement(error) => error.fmt(f),
             Self::NotFinite => f.write_str("the stiffness of some element is not a finite number"),
             Self::Seconds(seconds) => write!(f, "advance by {seconds} s: it must be a positive number"),
             Self::Refused(divergence) => divergence.fmt(f),
@@ -415,5 +447,7 @@ from! {
     Step: StepError,
     Inertia: InertiaError,
     Learned: LearnedError,
+    Settle: SettleError,
+    Displacement: DisplacementError,
     Refused: Divergence,
 }

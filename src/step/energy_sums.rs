@@ -139,6 +139,34 @@ impl Totals {
         }
     }
 
+    /// Adds a node whose inertia in the step, over its square, is `stiffness` (N/m), not that of its mass, which gravity
+    /// acts on.
+    pub(crate) fn add_node(
+        &mut self,
+        step: &Step,
+        inertia: &NodeInertia,
+        stiffness: f32,
+        increment: &NodeVector,
+        force: &NodeVector,
+        next: &[f32; 4],
+    ) {
+        let mut square = 0.0;
+        for (axis, inverse) in inertia.inverse.into_iter().enumerate() {
+            let mut sums = Sums::new(step, |value| value);
+            let free = if inverse > 0.0 { 1.0 } else { 0.0 };
+            sums.add(inertia.mass, free, increment.0[axis], force.0[axis], next[axis]);
+            let mean = 0.5 * free * (next[axis] + step.carry() * increment.0[axis]);
+            square += mean * mean;
+            self.momentum[axis] += f64::from(sums.momentum);
+            self.prescribed += f64::from(sums.prescribed);
+            for (most, moved) in self.farthest.iter_mut().zip([increment.0[axis], next[axis]]) {
+                *most = moved.abs().max(*most);
+            }
+        }
+        let seconds = f64::from(step.seconds());
+        self.kinetic += seconds * seconds * f64::from(stiffness) * f64::from(square);
+    }
+
     /// Adds vectorised sums of nodes, one for each axis.
     pub(crate) fn add_vectors<R: Real>(&mut self, sums: &[Sums<R>; 3]) {
         for (sums, momentum) in sums.iter().zip(&mut self.momentum) {

@@ -9,9 +9,11 @@
 
 mod central_differences;
 mod critical;
+mod displace;
 mod pace;
 #[cfg(feature = "std")]
 mod pressures;
+mod settle;
 #[cfg(feature = "std")]
 mod spectrum;
 #[cfg(feature = "std")]
@@ -19,9 +21,11 @@ mod tangent;
 
 pub use critical::critical_step;
 pub(crate) use critical::each_rate;
+pub use displace::{DisplacementError, displace};
 pub use pace::{Approach, Pace, vectors_for_pace};
 #[cfg(feature = "std")]
 pub use pressures::nodal_pressures;
+pub use settle::{SettleError, Settled, settle, settle_in_parts, vectors_to_settle};
 #[cfg(feature = "std")]
 pub use spectrum::exact_critical_step;
 #[cfg(feature = "std")]
