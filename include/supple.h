@@ -319,7 +319,8 @@ enum supple_status
     SUPPLE_INEXACT = 4,
     /**
      * The work that supple_sim_advance may take (`most_steps`) is spent before the end of the call; the report tells
-     * how much time is missing, and its estimate whether the steps were exact enough.
+     * how much time is missing, and its estimate whether the steps were exact enough. Of supple_settle: the body is not
+     * at rest yet, and the report tells how far it is from it.
      */
     SUPPLE_BEHIND = 5,
     /**
@@ -1468,6 +1469,24 @@ typedef struct {
 } supple_sim_report;
 
 /**
+ * What supple_settle came to.
+ */
+typedef struct {
+    /**
+     * The estimate of the largest distance of a node from where it rests, m; infinite before the body has swung once.
+     */
+    float remaining;
+    /**
+     * Steps that were computed.
+     */
+    uint32_t steps;
+    /**
+     * What stopped the call; status SUPPLE_OK if nothing did.
+     */
+    supple_error error;
+} supple_settled;
+
+/**
  * What does not look right. Numbers that have no meaning are 0, an index SUPPLE_NONE.
  */
 typedef struct {
@@ -2238,6 +2257,69 @@ supple_status supple_sim_advance(supple_sim *sim,
                                  double seconds,
                                  const supple_threads *threads,
                                  supple_sim_report *report);
+
+/**
+ * Bytes of memory that supple_settle needs for a scene of so many nodes.
+ */
+size_t supple_settle_size(uint32_t nodes);
+
+/**
+ * Brings a body to rest: every node to within about `metre` of where it rests under these loads, by kinetic damping.
+ * Loads and instruments act as at the time of the state, which stands still: ramps do not go on, motions without a ramp
+ * go to where they are asked for. Velocities are zero afterwards, and the energy balance begins with the strain energy.
+ * Steps of every kind go on from there; a guard begins anew.
+ *
+ * SUPPLE_BEHIND: the body is not at rest after `most_steps`, or never can be, because no support holds it. The report
+ * tells how much is missing, and another call goes on from there. Where a step is refused the status says why, and the
+ * state is that before it.
+ *
+ * @param metre m, above zero.
+ * @param most_steps at least one is taken; each takes about as long as an exact one.
+ * @param threads NULL: the calling thread alone.
+ * @param memory at least supple_settle_size bytes, aligned to SUPPLE_ALIGN, for the call alone.
+ * @param settled may be NULL; is written whatever the status.
+ */
+supple_status supple_settle(const supple_scene *scene,
+                            supple_loads *loads,
+                            supple_state *state,
+                            float metre,
+                            uint32_t most_steps,
+                            const supple_threads *threads,
+                            void *memory,
+                            size_t bytes,
+                            supple_settled *settled);
+
+/**
+ * The same of a simulation, under its loads and instruments: see supple_settle.
+ *
+ * @param metre m, above zero.
+ * @param most_steps at least one is taken; each takes about as long as an exact one.
+ * @param threads NULL: the calling thread alone.
+ * @param memory at least supple_settle_size bytes, aligned to SUPPLE_ALIGN, for the call alone.
+ * @param settled may be NULL; is written whatever the status.
+ */
+supple_status supple_sim_settle(supple_sim *sim,
+                                float metre,
+                                uint32_t most_steps,
+                                const supple_threads *threads,
+                                void *memory,
+                                size_t bytes,
+                                supple_settled *settled);
+
+/**
+ * Puts the nodes at displacements of yours, at a stop: velocities are zero, time stays, and the energy balance begins
+ * with the strain energy. It counts as a step. Fixed nodes keep what is given, moved ones until a motion moves them. Of
+ * a simulation call supple_sim_set afterwards, so that the lengths of steps fit.
+ *
+ * @param displacements three components of each of `nodes` nodes, m, from rest.
+ * @param nodes must be that of the scene.
+ * @param error may be NULL; index and node are those of a displacement that is not finite. Nothing has changed then.
+ */
+supple_status supple_set_displacements(const supple_scene *scene,
+                                       supple_state *state,
+                                       const float *displacements,
+                                       uint32_t nodes,
+                                       supple_error *error);
 
 /**
  * Writes what in a scene looks as if a unit or a number was mistaken; it can be simulated all the same. To be called

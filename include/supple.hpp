@@ -29,6 +29,7 @@ using force = supple_force;
 using motion = supple_motion;
 using threads = supple_threads;
 using report = supple_report;
+using settled = supple_settled;
 using scene_facts = supple_scene_facts;
 using learned_facts = supple_learned_facts;
 using estimate = supple_estimate;
@@ -545,6 +546,20 @@ public:
 
     // Stops all motion: to go on from a state with more energy than loads and supports gave.
     status stop(const scene &of) const noexcept { return detail::of(supple_state_stop(of.raw(), raw_)); }
+
+    // Puts the nodes at these displacements, m, three components each, at a stop.
+    status set_displacements(scene of, span<const float> displacements, error *why = nullptr) const noexcept {
+        const std::size_t nodes = displacements.size() / 3;
+        return detail::of(supple_set_displacements(of.raw(), raw_, displacements.data(),
+                                                   static_cast<std::uint32_t>(nodes < none ? nodes : none), why));
+    }
+
+    // Brings the body to rest to within so many metres, in at most so many steps; `room` of supple_settle_size bytes.
+    status settle(scene of, loads acting, float metre, std::uint32_t most_steps, memory room, settled *out = nullptr,
+                  const threads *on = nullptr) const noexcept {
+        return detail::of(
+            supple_settle(of.raw(), acting.raw(), raw_, metre, most_steps, on, room.data(), room.size(), out));
+    }
 
     // Bound on the stable step at these displacements, s; takes as long as some steps.
     [[nodiscard]] result<supple::critical_step> critical_step(scene of) const noexcept {
@@ -1101,6 +1116,13 @@ public:
     // Moves on by so many seconds, usually a frame.
     status advance(double seconds, sim_report *out = nullptr, const threads *on = nullptr) const noexcept {
         return detail::of(supple_sim_advance(raw_, seconds, on, out));
+    }
+
+    // Brings the body to rest to within so many metres, in at most so many steps, under its loads and instruments; `room` of
+    // supple_settle_size bytes.
+    status settle(float metre, std::uint32_t most_steps, memory room, settled *out = nullptr,
+                  const threads *on = nullptr) const noexcept {
+        return detail::of(supple_sim_settle(raw_, metre, most_steps, on, room.data(), room.size(), out));
     }
 
     // Its objects; of none if it is no simulation.

@@ -54,6 +54,8 @@ mod reaction;
 
 mod simulation;
 
+mod settle;
+
 mod remarks;
 
 mod mesh_file;

@@ -37,7 +37,8 @@ pub enum supple_status {
     /// A guard, automatic steps or supple_sim_advance estimate that the error is more than is allowed.
     SUPPLE_INEXACT = 4,
     /// The work that supple_sim_advance may take (`most_steps`) is spent before the end of the call; the report tells
-    /// how much time is missing, and its estimate whether the steps were exact enough.
+    /// how much time is missing, and its estimate whether the steps were exact enough. Of supple_settle: the body is not
+    /// at rest yet, and the report tells how far it is from it.
     SUPPLE_BEHIND = 5,
 
     /// A pointer that must not be NULL is.

@@ -3,6 +3,7 @@
 use std::vec;
 
 use super::{Simulation, SimulationError};
+use crate::loads::LoadsOverTime;
 use crate::simd::NodeVector;
 use crate::step::{CallingThread, Status, Threads};
 use crate::tled::{self, Settled, settle_in_parts, vectors_to_settle};
@@ -30,6 +31,19 @@ impl Simulation<'_> {
             Status::Diverged(divergence) => Err(SimulationError::Refused(divergence)),
             _ => Ok(settled),
         }
+    }
+
+    /// The same under loads of the caller's in place of its own. A step that is refused is in the result, not an error.
+    pub fn settle_under(
+        &mut self,
+        metre: f32,
+        most_steps: u32,
+        mut loads: &mut dyn LoadsOverTime,
+    ) -> Result<Settled, SimulationError> {
+        let (scene, state) = self.parts_mut();
+        let mut room = vec![NodeVector::ZERO; vectors_to_settle(scene.node_count())];
+        let (view, state) = (scene.view(), state.view());
+        Ok(settle_in_parts(view, &mut loads, state, metre, most_steps, &mut room, &CallingThread)?)
     }
 
     /// Puts the nodes at these displacements (m, from rest), one for each, at a stop: velocities are zero and time stays

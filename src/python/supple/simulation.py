@@ -117,6 +117,21 @@ class Report:
         return self.status == "ok"
 
 
+@dataclasses.dataclass(frozen=True)
+class Settled:
+    """What a call of `settle` came to.
+
+    `at_rest`: whether every node is within the tolerance of where it rests; `remaining`: the estimate of the largest distance from there (m),
+    infinite before the body has swung once; `steps` that were computed; `status`: "ok", "limited" as of `advance`, or "behind" where the body
+    is not at rest after the steps, or never can be.
+    """
+
+    at_rest: bool
+    remaining: float
+    steps: int
+    status: str
+
+
 class Simulation:
     """A scene that starts at rest.
 
@@ -415,6 +430,35 @@ class Simulation:
         if int(count) != count or count < 1:
             raise InputError(f"take {count} steps: it must be a whole number, at least 1")
         return self.advance(count * float(self._step))
+
+    @_one_at_a_time
+    def settle(self, metre: float, *, most_steps: int = 10_000) -> Settled:
+        """Brings the body to rest under its loads and instruments, as they act at the present time, which stands still: every node to within
+        about `metre` of where it rests. Velocities are zero afterwards. Each of the steps takes about as long as an exact one. Raises
+        `Diverged` where a step is refused."""
+        if int(most_steps) != most_steps or not 1 <= most_steps < 1 << 32:
+            raise InputError(f"most_steps {most_steps}: it must be a whole number, at least 1")
+        if not (np.isfinite(metre) and metre > 0.0):
+            raise InputError(f"settle to within {metre} m: it must be a positive number")
+        self._warn_once()
+        room = library.Memory(lib.supple_settle_size(len(self.scene.mesh.points)))
+        told = ffi.new("supple_settled *")
+        status = lib.supple_sim_settle(self._sim, metre, int(most_steps), self._threads, room.pointer, room.size, told)
+        library.checked(status, told.error, "settle")
+        word = _WORDS.get(status, str(status))
+        return Settled(word != "behind", float(told.remaining), int(told.steps), word)
+
+    @_one_at_a_time
+    def set_displacements(self, metre: ArrayLike) -> None:
+        """Puts the nodes at these displacements, shape (n, 3), m from rest, at a stop: velocities are zero, time stays, and the energy balance
+        begins anew. Fixed nodes keep what is given."""
+        rows = library.vectors(metre, "displacements")
+        if len(rows) != len(self.scene.mesh.points):
+            raise InputError(f"displacements: {len(rows)} rows, there are {len(self.scene.mesh.points)} nodes")
+        error = library.new_error()
+        given = library.pointer("float", rows)
+        library.checked(lib.supple_set_displacements(self._raw_scene, self._state, given, len(rows), error), error, "displacements")
+        self._prepare_again()
 
     # What it comes to.
 

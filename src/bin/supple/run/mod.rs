@@ -20,6 +20,9 @@ use start::Start;
 /// Steps are single precision: their sum may miss a time by this share of the whole.
 const ROUNDING: f64 = 1e-7;
 
+/// Steps after which a body is left where it is on its way to rest.
+const MOST_STEPS_TO_SETTLE: u32 = 50_000;
+
 /// Runs to the end or to divergence. `frame` is called at rest and after each interval between frames, `tick` with the
 /// time (s) now and then.
 pub(crate) fn run<'a>(
@@ -47,8 +50,12 @@ pub(crate) fn run<'a>(
     let frames = if is_even { total.min(time.frames.into()) } else { time.frames.into() };
     let loads = setup.loads(simulation.scene())?;
     let mut running = Running { setup, simulation, loads, outcome, tick, taken: 0 };
+    if let Some(metre) = time.settle {
+        running.settle(metre)?;
+    }
     running.outcome.enter_frame(running.simulation.state());
     frame(&mut running.simulation)?;
+    let frames = if running.outcome.divergence.is_some() { 0 } else { frames };
     for index in 1..=frames {
         let share = index as f64 / frames as f64;
         let clock = Instant::now();
@@ -81,6 +88,27 @@ struct Running<'a> {
 }
 
 impl Running<'_> {
+    /// To rest to within so many metres, under the loads of the start.
+    fn settle(&mut self, metre: f32) -> Result<(), Problem> {
+        let rounding = self.rounding();
+        let Self { setup, simulation, loads, outcome, .. } = self;
+        let mut loads = *loads;
+        let instruments = setup.instruments.at(rounding);
+        if !instruments.is_empty() {
+            let nodes = simulation.scene().node_count();
+            loads = loads.touched_by(setup.instruments.contact(&instruments, nodes)?);
+        }
+        let clock = Instant::now();
+        let settled = simulation.settle_under(metre, MOST_STEPS_TO_SETTLE, &mut loads).map_err(Problem::of)?;
+        outcome.spent += clock.elapsed();
+        outcome.computed += u64::from(settled.steps);
+        outcome.settled = Some(settled);
+        if let Status::Diverged(divergence) = settled.status {
+            outcome.divergence = Some(divergence);
+        }
+        Ok(())
+    }
+
     /// Intervals of so many seconds, until there have been as many.
     fn take_until(&mut self, target: u64, seconds: f32) -> Result<(), Problem> {
         while self.taken < target && self.outcome.divergence.is_none() {

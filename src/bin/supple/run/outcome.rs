@@ -10,6 +10,7 @@ use supple::material::J_FLOOR;
 use supple::simulation::Report;
 use supple::state::{StateView, VecState};
 use supple::step::{CriticalStep, Divergence, Status};
+use supple::tled::Settled;
 
 use super::reactions::Reactions;
 use crate::weight_file::describe_step;
@@ -73,6 +74,8 @@ pub(crate) struct Outcome {
     /// With instruments.
     pub(crate) reactions: Reactions,
     pub(crate) frames: Vec<FrameTrace>,
+    /// Where the body was brought to rest before it moved.
+    pub(crate) settled: Option<Settled>,
 }
 
 impl Outcome {
@@ -94,6 +97,7 @@ impl Outcome {
             guard: None,
             reactions: Reactions::NONE,
             frames: vec![],
+            settled: None,
         }
     }
 

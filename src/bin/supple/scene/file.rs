@@ -124,6 +124,7 @@ pub(crate) struct TimeTable {
     pub(crate) frames: Option<Spanned<u32>>,
     pub(crate) method: Option<Spanned<String>>,
     pub(crate) lattice: Option<Spanned<[u32; 3]>>,
+    pub(crate) settle: Option<Spanned<f32>>,
 }
 
 /// A network that takes over from the exact step.
