@@ -50,6 +50,9 @@
 #define SUPPLE_STATE_SIZE(nodes, element) \
     (SUPPLE_STATE_FRONT + ((element) == SUPPLE_LINEAR ? 4 : 5) * SUPPLE_ARRAY_(nodes, 16))
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
+#define SUPPLE_PRESSURE_SIZE(triangles, surfaces) \
+    (SUPPLE_PRESSURE_FRONT + SUPPLE_ARRAY_(triangles, 52) + SUPPLE_ARRAY_(surfaces, 8))
+#define SUPPLE_SETTLE_SIZE(nodes) ((size_t)16 * (2 * (size_t)(nodes) + ((size_t)(nodes) + 3) / 4))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 96 : 48))
 #define SUPPLE_LARGE_SIZE(nodes, elements, x, y, z) (SUPPLE_LARGE_FRONT + SUPPLE_ARRAY_(1, 104 * (size_t)(nodes) +             \
     (size_t)(elements) / 4 + 36700 + 19188 * SUPPLE_CELLS_(x, y, z) + 1092 * SUPPLE_LEAST_(2 * SUPPLE_CELLS_(x, y, z) + 32,    \
@@ -153,6 +156,11 @@
  * Bytes before the arrays of a state.
  */
 #define SUPPLE_STATE_FRONT 192
+
+/**
+ * Bytes before the arrays of pressures.
+ */
+#define SUPPLE_PRESSURE_FRONT 64
 
 /**
  * Most parts of a step.
@@ -548,6 +556,11 @@ enum supple_status
      * The step was not taken: learned steps cannot meet instruments.
      */
     SUPPLE_E_NO_CONTACT = -95,
+    /**
+     * The step was not taken: the pressure on surface `index` (value, Pa) would move `node` in it through the tissue
+     * around it (limit: its size, m).
+     */
+    SUPPLE_E_DIVERGED_PRESSURE = -98,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -589,6 +602,11 @@ typedef struct supple_learned supple_learned;
  * What acts on a scene. One thread at a time; a call that takes steps changes it as well.
  */
 typedef struct supple_loads supple_loads;
+
+/**
+ * Pressures on surfaces of a body, which follow them as they move. One thread at a time. It may be copied with memcpy.
+ */
+typedef struct supple_pressure supple_pressure;
 
 /**
  * The reaction of some supports. It may be copied with memcpy together with its state.
@@ -1723,6 +1741,63 @@ supple_status supple_set_step(const supple_scene *scene,
 supple_status supple_state_time(const supple_state *state, double *seconds, uint64_t *steps);
 
 /**
+ * Bytes of memory that pressures on so many triangles and surfaces need. SUPPLE_PRESSURE_SIZE is the same as a
+ * constant.
+ */
+size_t supple_pressure_size(uint32_t triangles,
+                            uint32_t surfaces);
+
+/**
+ * Prepares pressures, zero yet, in `memory` of at least supple_pressure_size bytes, aligned to SUPPLE_ALIGN.
+ *
+ * @param points of all nodes of the scene at rest, m, three coordinates each.
+ * @param triangles three nodes of each of `count` triangles, as of supple_boundary: seen from outside of the tissue
+ * counter-clockwise.
+ * @param surface_of the surface of each triangle, from zero; NULL: all are of surface 0.
+ * @param surfaces how many there are, each with a pressure of its own.
+ * @param error may be NULL; index is that of a triangle.
+ */
+supple_status supple_pressure_init(void *memory,
+                                   size_t bytes,
+                                   const supple_scene *scene,
+                                   const float *points,
+                                   const uint32_t *triangles,
+                                   const uint32_t *surface_of,
+                                   uint32_t count,
+                                   uint32_t surfaces,
+                                   supple_pressure **pressure,
+                                   supple_error *error);
+
+/**
+ * Sets the pressure on a surface, between two calls as you like.
+ *
+ * @param pascal Pa: positive where it presses the tissue, from outside or from within a cavity.
+ * @param ramp seconds from the start of the simulation over which it grows to that, zero or more.
+ */
+supple_status supple_pressure_set(supple_pressure *pressure,
+                                  uint32_t surface,
+                                  float pascal,
+                                  float ramp);
+
+/**
+ * Lets pressures act where these loads do, as long as both are there; NULL: none do. A copy of the loads has the same
+ * pressures.
+ */
+supple_status supple_set_pressure(supple_loads *loads,
+                                  const supple_pressure *pressure);
+
+/**
+ * Writes the volume within a closed surface at the displacements of a state: positive around a body, negative around a
+ * cavity, whose triangles face inward.
+ *
+ * @param cubic_metres receives it, m^3.
+ */
+supple_status supple_pressure_volume(const supple_pressure *pressure,
+                                     const supple_state *state,
+                                     uint32_t surface,
+                                     double *cubic_metres);
+
+/**
  * Takes `count` exact steps. Stops at the first that is not to be believed: that one is not taken, the state is as
  * before it, and the status tells.
  *
@@ -2259,7 +2334,7 @@ supple_status supple_sim_advance(supple_sim *sim,
                                  supple_sim_report *report);
 
 /**
- * Bytes of memory that supple_settle needs for a scene of so many nodes.
+ * Bytes of memory that supple_settle needs for a scene of so many nodes. SUPPLE_SETTLE_SIZE is the same as a constant.
  */
 size_t supple_settle_size(uint32_t nodes);
 

@@ -124,6 +124,7 @@ enum class [[nodiscard]] status : std::int32_t {
     e_diverged_motion = SUPPLE_E_DIVERGED_MOTION,
     e_diverged_instrument = SUPPLE_E_DIVERGED_INSTRUMENT,
     e_no_contact = SUPPLE_E_NO_CONTACT,
+    e_diverged_pressure = SUPPLE_E_DIVERGED_PRESSURE,
 };
 
 // For all elements of a scene; each with its constants in the order of tissue::constants. tools/header.sh writes this list.
@@ -247,7 +248,8 @@ constexpr bool every(supple_status code) noexcept {
     case of(s::e_lattice): case of(s::e_too_stiff): case of(s::e_not_saved): case of(s::e_saved_version):
     case of(s::e_saved_checksum): case of(s::e_level): case of(s::e_diverged):
     case of(s::e_diverged_energy): case of(s::e_diverged_force): case of(s::e_diverged_motion):
-    case of(s::e_instrument): case of(s::e_field): case of(s::e_diverged_instrument): case of(s::e_no_contact): return true;
+    case of(s::e_instrument): case of(s::e_field): case of(s::e_diverged_instrument): case of(s::e_no_contact):
+    case of(s::e_diverged_pressure): return true;
     }
     return false;
 }
@@ -291,6 +293,7 @@ constexpr meaning meaning_of(status code) noexcept {
     case status::e_damping: return {"entry", " 1/s", true, true};
     case status::e_diverged_energy: return {"entry", " J", true, true};
     case status::e_diverged_force: return {"force", "", true, true};
+    case status::e_diverged_pressure: return {"surface", "", true, true};
     case status::e_diverged_motion: return {"entry", " m", true, true};
     case status::e_diverged_instrument: return {"instrument", " m", true, true};
     case status::e_instrument: return {"instrument", "", true, false};
@@ -440,6 +443,8 @@ private:
 
 class contact;
 
+class pressure;
+
 // What acts on a scene. One thread at a time.
 class loads {
 public:
@@ -480,6 +485,9 @@ public:
         const auto count = static_cast<std::uint32_t>(all.size());
         return detail::of(supple_set_motions(raw_, of.raw(), all.data(), count, why));
     }
+
+    // Lets pressures act where these loads do; a pressure() ends that.
+    status set_pressure(const pressure &with) const noexcept;
 
     // Lets the instruments of a contact touch what these loads act on; a contact() ends that.
     status set_contact(const contact &with) const noexcept;
@@ -894,6 +902,58 @@ inline result<std::size_t> boundary(span<const std::uint32_t> tetrahedra, span<s
     count.error = detail::nothing(count.status);
     count.value = found;
     return count;
+}
+
+// Pressures that follow the surface of a body. One thread at a time.
+class pressure {
+public:
+    // None.
+    constexpr pressure() noexcept = default;
+    constexpr explicit pressure(supple_pressure *raw) noexcept : raw_(raw) {}
+    [[nodiscard]] constexpr supple_pressure *raw() const noexcept { return raw_; }
+
+    // Bytes of memory that some on so many triangles and surfaces need.
+    [[nodiscard]] static constexpr std::size_t size(std::uint32_t triangles, std::uint32_t surfaces = 1) noexcept {
+        return SUPPLE_PRESSURE_SIZE(triangles, surfaces);
+    }
+
+    // Prepares them, zero yet, on triangles as of boundary(), all of one surface or each of its own in `surface_of`.
+    static result<pressure> make(memory place, scene of, span<const float> points, span<const std::uint32_t> triangles,
+                                 span<const std::uint32_t> surface_of = {}, std::uint32_t surfaces = 1) noexcept {
+        result<pressure> made{};
+        const std::size_t count = triangles.size() / 3;
+        const bool fits = points.size() / 3 >= of.describe().value.nodes && count < none &&
+                          (surface_of.size() == 0 || surface_of.size() >= count);
+        if (!fits) {
+            made.status = status::e_short;
+            made.error = detail::nothing(made.status);
+            return made;
+        }
+        made.status = detail::of(supple_pressure_init(place.data(), place.size(), of.raw(), points.data(), triangles.data(),
+                                                      surface_of.data(), static_cast<std::uint32_t>(count), surfaces,
+                                                      &made.value.raw_, &made.error));
+        return made;
+    }
+
+    // Sets the pressure on a surface, Pa: positive where it presses the tissue.
+    status set(float pascal, float ramp = 0.0f, std::uint32_t surface = 0) const noexcept {
+        return detail::of(supple_pressure_set(raw_, surface, pascal, ramp));
+    }
+
+    // Volume within a closed surface, m^3; negative around a cavity.
+    [[nodiscard]] result<double> volume(state at, std::uint32_t surface = 0) const noexcept {
+        result<double> found{};
+        found.status = detail::of(supple_pressure_volume(raw_, at.raw(), surface, &found.value));
+        found.error = detail::nothing(found.status);
+        return found;
+    }
+
+private:
+    supple_pressure *raw_ = nullptr;
+};
+
+inline status loads::set_pressure(const pressure &with) const noexcept {
+    return detail::of(supple_set_pressure(raw_, with.raw()));
 }
 
 // The forces of a uniform traction, Pa, on triangles of the boundary of a body of these points, for loads::set_forces: three for each.

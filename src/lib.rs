@@ -92,6 +92,7 @@
 //! | [`contact`] | rigid instruments that touch the tissue, and what they feel |
 //! | [`state`] | what moves: displacements and their last increment |
 //! | [`loads`] | what acts on it, set when the host likes: forces, traction, gravity, prescribed motion, instruments |
+//! | [`pressure`] | pressure that follows the surface |
 //! | [`mlp`] | dense layers: the forward pass, the weight file |
 //! | [`plausibility`] | does a scene look as if a unit was mistaken |
 //! | [`step`] | the protocol of every step: begin, compute, energy balance, accept or refuse; threads |
@@ -146,6 +147,7 @@ pub mod mesh;
 pub mod mlp;
 mod padding;
 pub mod plausibility;
+pub mod pressure;
 pub mod reaction;
 /// Of the tests, in float64.
 #[cfg(test)]

@@ -9,6 +9,7 @@ use crate::state::StateView;
 
 use super::contact::{CallContact, supple_contact};
 use super::memory::{self, Head, Layout, Object, Place, array, magic, place_for};
+use super::pressure::{self, supple_pressure};
 use super::scene::{OpenScene, axes_of, check_choice, supple_scene};
 use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
 use supple_status::*;
@@ -53,6 +54,7 @@ pub struct supple_loads {
     motions: u32,
     gravity: [f32; 3],
     contact: *mut supple_contact,
+    pressure: *const supple_pressure,
 }
 
 // SAFETY: `repr(C)`, begins with a head.
@@ -68,6 +70,10 @@ impl supple_loads {
 
     pub(super) const fn contact(&self) -> *mut supple_contact {
         self.contact
+    }
+
+    pub(super) const fn set_pressure(&mut self, pressure: *const supple_pressure) {
+        self.pressure = pressure;
     }
 
     pub(super) const fn set_contact(&mut self, contact: *mut supple_contact) {
@@ -119,6 +125,7 @@ pub unsafe extern "C" fn supple_loads_init(
             motions: 0,
             gravity: [0.0; 3],
             contact: ptr::null_mut(),
+            pressure: ptr::null(),
         }));
         Ok(SUPPLE_OK)
     };
@@ -266,7 +273,11 @@ impl<'a> CallLoads<'a> {
             let asked = arrays.change_first::<Motion>(object.motions as usize, motion_room);
             let now = arrays.change_first::<Motion>(object.motions as usize, motion_room);
             let contact = CallContact::of(object.contact, nodes)?;
-            let loads = Loads::unchecked(object.gravity, forces, asked, nodes);
+            let mut loads = Loads::unchecked(object.gravity, forces, asked, nodes);
+            if !object.pressure.is_null() {
+                scene.fits(memory::read(object.pressure)?.nodes())?;
+                loads = loads.pressed_by(pressure::opened(object.pressure)?);
+            }
             #[cfg(feature = "contact")]
             let loads = match &contact {
                 Some(contact) if contact.has_instruments() => loads.touched_by(contact.contact),

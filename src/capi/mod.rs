@@ -28,6 +28,8 @@ mod traction;
 
 mod state;
 
+mod pressure;
+
 mod step;
 
 mod pool;

@@ -58,7 +58,7 @@ impl From<DisplacementError> for supple_error {
     }
 }
 
-/// Bytes of memory that supple_settle needs for a scene of so many nodes.
+/// Bytes of memory that supple_settle needs for a scene of so many nodes. SUPPLE_SETTLE_SIZE is the same as a constant.
 #[unsafe(no_mangle)]
 pub extern "C" fn supple_settle_size(nodes: u32) -> usize {
     vectors_to_settle(nodes as usize).saturating_mul(size_of::<NodeVector>())

@@ -165,6 +165,9 @@ pub enum supple_status {
     SUPPLE_E_DIVERGED_INSTRUMENT = -94,
     /// The step was not taken: learned steps cannot meet instruments.
     SUPPLE_E_NO_CONTACT = -95,
+    /// The step was not taken: the pressure on surface `index` (value, Pa) would move `node` in it through the tissue
+    /// around it (limit: its size, m).
+    SUPPLE_E_DIVERGED_PRESSURE = -98,
 }
 
 use supple_status::*;
@@ -287,6 +290,9 @@ impl From<LoadError> for supple_error {
             }
             LoadError::NotFinite { index, value, .. } => is(SUPPLE_E_NOT_FINITE).at(index).value(value.into(), 0.0),
             LoadError::Ramp { index, value, .. } => is(SUPPLE_E_NEGATIVE).at(index).value(value.into(), 0.0),
+            LoadError::Surface { index, surface, surfaces } => {
+                is(SUPPLE_E_CAPACITY).at(index).value(surface.into(), surfaces as f64)
+            }
             LoadError::NotHeld { index, node, axis } => is(SUPPLE_E_NOT_HELD).at(index).node(node).axis(axis),
         }
     }
@@ -448,6 +454,7 @@ fn text(status: i32) -> Option<&'static CStr> {
         -92 => c"the step was not taken: a force would move its node through the tissue around it",
         -93 => c"the step was not taken: supports moved a node too far in one step",
         -94 => c"the step was not taken: an instrument moves too far in one step, or is too far inside the body: slower, shorter steps, or start outside",
+        -98 => c"the step was not taken: a pressure would move a node through its tissue",
         -95 => c"the step was not taken: this kind of step cannot meet instruments",
         _ => return None,
     })

@@ -50,7 +50,7 @@ impl LargeView<'_, '_> {
             method.storage.tables.next_increment.get(rank).copied().unwrap_or_default().0
         };
         let all_finite = (0..nodes).all(|node| next(node).iter().take(3).all(|value| value.is_finite()));
-        let Trial { scene, loads, increment, force, progress, .. } = trial;
+        let Trial { scene, loads, displacement, increment, force, progress, .. } = trial;
         let (mut work, gravity) = (0.0, loads.gravity());
         let shortened = |last: f32, next: f32, free: bool| {
             let gain = if all_finite && free { 0.5 * (next - last) } else { 0.0 };
@@ -67,6 +67,26 @@ impl LargeView<'_, '_> {
                 let way = 0.5 * (last[axis] - shortened(last[axis], next[axis], true));
                 work += f64::from(factor * load.newton[axis] * way);
             }
+        }
+        if let Some(pressure) = loads.pressure() {
+            pressure.each(
+                progress.time,
+                displacement,
+                |_| true,
+                |nodes, newton, _| {
+                    for node in nodes.map(|node| node as usize) {
+                        let (Some(NodeVector(last)), Some(inertia)) = (increment.get(node), scene.inertia.get(node))
+                        else {
+                            continue;
+                        };
+                        let next = next(node);
+                        for axis in (0..3).filter(|&axis| inertia.inverse[axis] > 0.0) {
+                            let way = 0.5 * (last[axis] - shortened(last[axis], next[axis], true));
+                            work += f64::from(newton[axis] * way);
+                        }
+                    }
+                },
+            );
         }
         let nodes = increment.iter_mut().zip(scene.inertia).zip(&*force);
         for (node, ((NodeVector(last), inertia), force)) in nodes.enumerate() {

@@ -16,6 +16,7 @@ use crate::learned::{self, LearnedError, LearnedModel, LearnedStep};
 use crate::loads::{LoadError, Loads, LoadsOfCall, LoadsOverTime, Motion, NodalForce};
 use crate::material::VecMaterial;
 use crate::mesh::{Mesh, MeshError, Winding};
+use crate::pressure::VecPressure;
 use crate::scene::{BuildError, Support, VecScene};
 use crate::simd::NodeVector;
 use crate::state::VecState;
@@ -31,6 +32,8 @@ pub struct Simulation<'w> {
     pub forces: Vec<NodalForce>,
     /// Where moved supports go, m.
     pub motions: Vec<Motion>,
+    /// Pressures that follow the surface, Pa.
+    pub pressures: VecPressure,
     /// Rigid bodies that touch the tissue, after [`Simulation::meeting`].
     pub instruments: Vec<Instrument<'w>>,
     points: Vec<[f32; 3]>,
@@ -92,6 +95,7 @@ impl<'w> Simulation<'w> {
             gravity: [0.0; 3],
             forces: vec![],
             motions: vec![],
+            pressures: VecPressure::default(),
             instruments: vec![],
             points,
             tets,
@@ -147,9 +151,9 @@ impl<'w> Simulation<'w> {
             return Err(SimulationError::Seconds(seconds));
         }
         self.prepare_once()?;
-        let Self { gravity, forces, motions, instruments, scene, state, settings, touchable, in_step, clock, .. } =
-            self;
-        let loads = checked_loads(scene, *gravity, (forces, motions), instruments, touchable)?;
+        let Self { gravity, forces, motions, pressures, instruments, scene, state, settings, .. } = self;
+        let (touchable, in_step, clock) = (&self.touchable, &mut self.in_step, &mut self.clock);
+        let loads = checked_loads(scene, *gravity, (forces, motions), pressures, (instruments, touchable))?;
         in_step.resize(motions.len(), Motion::default());
         let mut loads = LoadsOfCall::new(loads, in_step);
         let end = clock.end_of_call(state.time(), seconds);
@@ -188,8 +192,8 @@ impl<'w> Simulation<'w> {
     pub(super) fn acting(
         &mut self,
     ) -> Result<(LoadsOfCall<'_>, &VecScene<VecMaterial>, &mut VecState), SimulationError> {
-        let Self { gravity, forces, motions, instruments, scene, state, touchable, in_step, .. } = self;
-        let loads = checked_loads(scene, *gravity, (forces, motions), instruments, touchable)?;
+        let Self { gravity, forces, motions, pressures, instruments, scene, state, touchable, in_step, .. } = self;
+        let loads = checked_loads(scene, *gravity, (forces, motions), pressures, (instruments, touchable))?;
         in_step.resize(motions.len(), Motion::default());
         Ok((LoadsOfCall::new(loads, in_step), scene, state))
     }
@@ -360,10 +364,10 @@ fn checked_loads<'a>(
     scene: &VecScene<VecMaterial>,
     gravity: [f32; 3],
     (forces, motions): (&'a [NodalForce], &'a [Motion]),
-    instruments: &'a [Instrument<'a>],
-    touchable: &'a (Vec<SurfaceNode>, Vec<[u32; 3]>),
+    pressures: &'a VecPressure,
+    (instruments, touchable): (&'a [Instrument<'a>], &'a (Vec<SurfaceNode>, Vec<[u32; 3]>)),
 ) -> Result<Loads<'a>, SimulationError> {
-    let loads = Loads::new(scene, gravity, forces, motions)?;
+    let loads = pressures.on(scene, Loads::new(scene, gravity, forces, motions)?)?;
     if instruments.is_empty() {
         return Ok(loads);
     }

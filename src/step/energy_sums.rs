@@ -113,6 +113,11 @@ impl Totals {
         self.work += f64::from(joule);
     }
 
+    /// Adds work of loads, J.
+    pub(crate) fn add_work_of_loads(&mut self, joule: f64) {
+        self.work += joule;
+    }
+
     /// Replaces the sums over the nodes; the work stays.
     pub(crate) fn replace_sums(&mut self, sums: &Self) {
         *self = Self { work: self.work, ..*sums };

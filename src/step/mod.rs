@@ -10,6 +10,7 @@ mod energy_sums;
 mod heat;
 mod length;
 mod parts;
+mod pressure;
 mod status;
 pub(crate) mod threads;
 mod triangles;
@@ -186,7 +187,8 @@ impl<'a, M: ElementMaterial> Trial<'a, M> {
             _ => before.heat,
         };
         self.is_heated = method.needs_remainders().unwrap_or_else(|| EnergyBalance { heat, ..before }.is_heated());
-        let Computed { totals, extremes } = method.compute(&mut self);
+        let Computed { mut totals, extremes } = method.compute(&mut self);
+        self.enter_pressure(step, method, &mut totals);
         let balance = match self.refused {
             Some(refused) => Err(refused),
             None => self.balance(step, method, &totals).map_err(|cause| self.blamed(step, method, cause)),

@@ -332,10 +332,8 @@ impl Run<'_> {
 
     /// After a step that was refused: from a stop, with half the step. Whether that may help.
     fn retry<M: ElementMaterial>(&mut self, scene: SceneView<'_, M>, mut state: StateView<'_>, status: Status) -> bool {
-        let too_long = matches!(
-            status,
-            Status::Diverged(Divergence { cause: Cause::NotFinite | Cause::Energy { .. } | Cause::Force { .. }, .. })
-        );
+        let too_long =
+            matches!(status, Status::Diverged(Divergence { cause: Cause::NotFinite | Cause::Energy { .. }, .. }));
         self.halvings += 1;
         if !too_long || self.halvings > MOST_HALVINGS || !stop_in(scene, state.reborrow()) {
             return false;

@@ -6,6 +6,8 @@ use supple::contact::{Instrument, Pose, Shape};
 use supple::inertia::{self, Cells};
 use supple::loads::{Motion, NodalForce};
 use supple::material::{Element, VecMaterial};
+use supple::mesh::boundary;
+use supple::pressure::SurfacePressure;
 use supple::scene::{Axes, Support};
 use supple::simulation::{Method, Settings, Simulation, SimulationError};
 use supple::state::NodeVector;
@@ -215,8 +217,12 @@ fn threads_change_no_bit() {
             let material = VecMaterial::one(element, NEO, 1000.0);
             let mut simulation = Simulation::new(body.points.clone(), body.tets.clone(), material, &fixed).unwrap();
             simulation.gravity = GRAVITY;
+            let surface = boundary(body.tets.iter().copied());
+            let pressure = SurfacePressure { pascal: 200.0, ramp: 0.0 };
+            simulation.pressures.press(&body.points, &surface, pressure).unwrap();
             let threads = Backwards { parts, most: AtomicUsize::new(0) };
             let settled = simulation.settle_in_parts(TOLERANCE, 60, &threads).unwrap();
+            simulation.advance_in_parts(0.01, &threads).unwrap();
             (bits(simulation.state()), settled.steps, settled.remaining.to_bits(), threads.most.into_inner())
         };
         let (one, several) = (settle(1), settle(MOST_PARTS));

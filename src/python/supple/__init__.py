@@ -19,11 +19,11 @@ from .instruments import Instrument, LocalForce, Touch
 from .mesh import Mesh
 from .reactions import Reaction, ReactionForce
 from .scene import Material, Scene
-from .simulation import METHODS, Report, Settled, Simulation
+from .simulation import METHODS, Pressure, Report, Settled, Simulation
 
 __all__ = [
-    "METHODS", "Diverged", "Error", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Reaction", "ReactionForce", "Report",
-    "Scene", "Settled", "Simulation", "Touch", "UnstableStep", "level", "version",
+    "METHODS", "Diverged", "Error", "InputError", "Instrument", "LocalForce", "Material", "Mesh", "Pressure", "Reaction", "ReactionForce",
+    "Report", "Scene", "Settled", "Simulation", "Touch", "UnstableStep", "level", "version",
 ]
 
 

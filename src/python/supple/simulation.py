@@ -207,6 +207,7 @@ class Simulation:
         self._raw_scene, self._state, self._loads, self._network = objects.scene, objects.state, objects.loads, objects.learned
         self._contact: Contact | None = None
         self._forces = self._tractions = np.zeros(0, _FORCE)
+        self._pressures: list[Pressure] = []
         self._lock = threading.RLock()
         self._vectors = self._view_of_displacements()
         self.gravity = gravity
@@ -261,6 +262,38 @@ class Simulation:
         error, rows = library.new_error(), np.concatenate([forces, tractions])
         library.checked(lib.supple_set_forces(self._loads, library.pointer("supple_force", rows), len(rows), error), error, "forces")
         self._forces, self._tractions = forces, tractions
+
+    @_one_at_a_time
+    def add_pressure(self, triangles: ArrayLike, pascal: float, ramp: float = 0.0) -> Pressure:
+        """Adds a pressure that follows a part of the surface as it moves: triangles of the boundary, (k, 3) node numbers as of
+        `Mesh.boundary`. `pascal` is positive where it presses the tissue, from outside or from within a cavity, and rises evenly over
+        `ramp` s. It is changed through what this gives."""
+        corners, points = np.asarray(triangles), self.scene.mesh.points
+        if corners.ndim != 2 or corners.shape[1] != 3 or not len(corners):
+            raise InputError(f"triangles: their shape is {corners.shape}, it must be (k, 3)")
+        numbers = library.node_numbers(corners.ravel(), len(points), "triangles")
+        made = [*self._pressures, Pressure(self, len(self._pressures), numbers)]
+        rows = np.concatenate([one._numbers for one in made])
+        surface_of = np.concatenate([np.full(len(one._numbers) // 3, one._surface, np.uint32) for one in made])
+        memory = library.Memory(lib.supple_pressure_size(len(surface_of), len(made)))
+        error, raw = library.new_error(), ffi.new("supple_pressure **")
+        status = lib.supple_pressure_init(
+            memory.pointer, memory.size, self._raw_scene, library.pointer("float", points), library.pointer("uint32_t", rows),
+            library.pointer("uint32_t", surface_of), len(surface_of), len(made), raw, error,
+        )  # fmt: skip
+        library.checked(status, error, "pressure")
+        for one, (value, time) in zip(made, [*((one._pascal, one._ramp) for one in self._pressures), (pascal, ramp)]):
+            library.checked(lib.supple_pressure_set(raw[0], one._surface, value, time), what="pressure")
+        made[-1]._pascal, made[-1]._ramp = pascal, ramp
+        library.checked(lib.supple_set_pressure(self._loads, raw[0]))
+        self._pressures, self._pressure_memory, self._pressure = made, memory, raw[0]
+        return made[-1]
+
+    @_one_at_a_time
+    def clear_pressures(self) -> None:
+        """Takes all pressures away."""
+        library.checked(lib.supple_set_pressure(self._loads, ffi.NULL))
+        self._pressures = []
 
     @_one_at_a_time
     def set_motions(self, nodes: ArrayLike, metre: ArrayLike, axes: str = "xyz", ramp: float = 0.0) -> None:
@@ -541,6 +574,44 @@ class Simulation:
     def write(self, path: str | os.PathLike[str]) -> None:
         """Writes the moved mesh with its displacements, in any format of meshio (.vtu, ...)."""
         self.scene.mesh.write(path, self._vectors)
+
+
+class Pressure:
+    """A pressure on a part of the surface, of `Simulation.add_pressure`."""
+
+    def __init__(self, simulation: Simulation, surface: int, numbers: NDArray[np.uint32]) -> None:
+        self._simulation, self._surface, self._numbers = simulation, surface, numbers
+        self._pascal = self._ramp = 0.0
+
+    @property
+    def pascal(self) -> float:
+        """Pa, in full."""
+        return self._pascal
+
+    @pascal.setter
+    def pascal(self, value: float) -> None:
+        self.set(value)
+
+    def set(self, pascal: float, ramp: float = 0.0) -> None:
+        """Sets it, Pa; it rises evenly over `ramp` s from the start of the simulation."""
+        with self._simulation._lock:
+            self._check()
+            status = lib.supple_pressure_set(self._simulation._pressure, self._surface, pascal, ramp)
+            library.checked(status, what=f"pressure {pascal} Pa, ramp {ramp} s")
+            self._pascal, self._ramp = pascal, ramp
+
+    @property
+    def volume(self) -> float:
+        """Within the surface, if it is closed, m^3: positive around a body, negative around a cavity."""
+        with self._simulation._lock:
+            self._check()
+            found = ffi.new("double *")
+            library.checked(lib.supple_pressure_volume(self._simulation._pressure, self._simulation._state, self._surface, found))
+            return float(found[0])
+
+    def _check(self) -> None:
+        if self not in self._simulation._pressures:
+            raise InputError("this pressure is no more: clear_pressures has taken it away")
 
 
 def _threads(count: int) -> Any:

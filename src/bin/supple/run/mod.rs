@@ -98,10 +98,7 @@ impl Running<'_> {
             let nodes = simulation.scene().node_count();
             loads = loads.touched_by(setup.instruments.contact(&instruments, nodes)?);
         }
-        let clock = Instant::now();
         let settled = simulation.settle_under(metre, MOST_STEPS_TO_SETTLE, &mut loads).map_err(Problem::of)?;
-        outcome.spent += clock.elapsed();
-        outcome.computed += u64::from(settled.steps);
         outcome.settled = Some(settled);
         if let Status::Diverged(divergence) = settled.status {
             outcome.divergence = Some(divergence);

@@ -35,6 +35,8 @@ pub(crate) struct SceneTable {
     #[serde(default)]
     pub(crate) traction: Vec<Spanned<TractionTable>>,
     #[serde(default)]
+    pub(crate) pressure: Vec<Spanned<PressureTable>>,
+    #[serde(default)]
     pub(crate) instrument: Vec<Spanned<InstrumentTable>>,
     gravity: Option<Spanned<[f32; 3]>>,
     pub(crate) time: Spanned<TimeTable>,
@@ -114,6 +116,7 @@ entry!(FixTable { axes: Option<Spanned<String>> });
 entry!(ForceTable { newton: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>> });
 entry!(MoveTable { metre: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>>, axes: Option<Spanned<String>> });
 entry!(TractionTable { pascal: Spanned<[f32; 3]>, ramp: Option<Spanned<f32>> });
+entry!(PressureTable { pascal: Spanned<f32>, ramp: Option<Spanned<f32>> });
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -183,9 +186,10 @@ impl SceneFile {
         let force = scene.force.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let motion = scene.motion.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let traction = scene.traction.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
+        let pressure = scene.pressure.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let instrument = scene.instrument.iter().filter_map(|entry| entry.get_ref().gravity.as_ref());
         let given = scene.gravity.iter().chain(fix).chain(force).chain(motion).chain(traction);
-        let mut given = given.chain(instrument);
+        let mut given = given.chain(pressure).chain(instrument);
         let first = given.next();
         if let Some(second) = given.next() {
             return Err(self.problem(second, "gravity is given twice"));

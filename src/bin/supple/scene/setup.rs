@@ -2,6 +2,7 @@
 
 use supple::loads::{Loads, Motion, NodalForce};
 use supple::material::{AnyLaw, Element, Tissue, VecMaterial};
+use supple::pressure::VecPressure;
 use supple::scene::{AsScene, BuildError, Support, VecScene};
 use supple::simulation::Simulation;
 use supple::state::VecState;
@@ -25,6 +26,7 @@ pub struct Setup {
     pub supports: Vec<Support>,
     pub forces: Vec<NodalForce>,
     pub(crate) motions: Vec<Motion>,
+    pub(crate) pressures: VecPressure,
     pub instruments: SceneInstruments,
     pub(crate) gravity: [f32; 3],
     /// 1/s.
@@ -55,7 +57,7 @@ impl Setup {
             Some(learned) => learned.damping(file, scene.damping.as_ref())?,
             None => scene.damping.as_ref().map_or(0.0, |damping| *damping.get_ref()),
         };
-        let (supports, forces, motions) = read_loads(file, &body)?;
+        let (supports, forces, motions, pressures) = read_loads(file, &body)?;
         let instruments = SceneInstruments::read(file, &body)?;
         let tissues = Tissues::read(file, &body)?;
         let mut warnings = plausible::warnings(file, &body, &tissues, gravity, &supports, &forces);
@@ -73,6 +75,7 @@ impl Setup {
             supports,
             forces,
             motions,
+            pressures,
             instruments,
             gravity,
             damping,
@@ -91,6 +94,7 @@ impl Setup {
             supports: vec![],
             forces: vec![],
             motions: vec![],
+            pressures: VecPressure::default(),
             instruments: SceneInstruments::default(),
             gravity: [0.0; 3],
             damping: 0.0,
@@ -147,7 +151,8 @@ impl Setup {
 
     /// What acts on the scene.
     pub fn loads(&self, scene: &impl AsScene) -> Result<Loads<'_>, Problem> {
-        Loads::new(scene, self.gravity, &self.forces, &self.motions).map_err(Problem::of)
+        let loads = Loads::new(scene, self.gravity, &self.forces, &self.motions).map_err(Problem::of)?;
+        self.pressures.on(scene, loads).map_err(Problem::of)
     }
 }
 
