@@ -41,13 +41,16 @@ pub struct Simulation<'w> {
     scene: VecScene<VecMaterial>,
     state: VecState,
     settings: Settings<'w>,
-    touchable: (Vec<SurfaceNode>, Vec<[u32; 3]>),
+    touchable: Touchable,
     /// Room for where motions are in the next step.
     in_step: Vec<Motion>,
     /// None until the first call.
     prepared: Option<Prepared<'w>>,
     clock: Clock,
 }
+
+/// Nodes and triangles that instruments can touch.
+type Touchable = (Vec<SurfaceNode>, Vec<[u32; 3]>);
 
 /// Steps of a method with their storage.
 #[derive(Debug)]
@@ -365,7 +368,7 @@ fn checked_loads<'a>(
     gravity: [f32; 3],
     (forces, motions): (&'a [NodalForce], &'a [Motion]),
     pressures: &'a VecPressure,
-    (instruments, touchable): (&'a [Instrument<'a>], &'a (Vec<SurfaceNode>, Vec<[u32; 3]>)),
+    (instruments, touchable): (&'a [Instrument<'a>], &'a Touchable),
 ) -> Result<Loads<'a>, SimulationError> {
     let loads = pressures.on(scene, Loads::new(scene, gravity, forces, motions)?)?;
     if instruments.is_empty() {
@@ -374,10 +377,7 @@ fn checked_loads<'a>(
     Ok(loads.touched_by(Contact::new(surface(touchable, scene.node_count())?, instruments)?))
 }
 
-fn surface<'a>(
-    (nodes, triangles): &'a (Vec<SurfaceNode>, Vec<[u32; 3]>),
-    scene_nodes: usize,
-) -> Result<Surface<'a>, ContactError> {
+fn surface<'a>((nodes, triangles): &'a Touchable, scene_nodes: usize) -> Result<Surface<'a>, ContactError> {
     Surface::new(nodes, scene_nodes)?.with_triangles(triangles)
 }
 
@@ -400,7 +400,7 @@ pub enum SimulationError {
     /// A network cannot move the scene.
     Learned(LearnedError),
     /// The body cannot be brought to rest as asked for.
-    Settle(SettleError),
+    Settling(SettleError),
     /// Displacements cannot be.
     Displacement(DisplacementError),
     /// The stiffness of some element is not a finite number.
@@ -421,7 +421,7 @@ impl fmt::Display for SimulationError {
             Self::Step(error) => error.fmt(f),
             Self::Inertia(error) => error.fmt(f),
             Self::Learned(error) => error.fmt(f),
-            Self::Settle(error) => error.fmt(f),
+            Self::Settling(error) => error.fmt(f),
             Self::Displacement(error) => error.fmt(f),
             Self::NotFinite => f.write_str("the stiffness of some element is not a finite number"),
             Self::Seconds(seconds) => write!(f, "advance by {seconds} s: it must be a positive number"),
@@ -451,7 +451,7 @@ from! {
     Step: StepError,
     Inertia: InertiaError,
     Learned: LearnedError,
-    Settle: SettleError,
+    Settling: SettleError,
     Displacement: DisplacementError,
     Refused: Divergence,
 }

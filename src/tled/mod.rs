@@ -13,6 +13,7 @@ mod displace;
 mod pace;
 #[cfg(feature = "std")]
 mod pressures;
+mod relaxation;
 mod settle;
 #[cfg(feature = "std")]
 mod spectrum;

@@ -21,23 +21,19 @@
 //! or less: what is left of a mode after a whole swing is less than what it went. The body is at rest when two swings
 //! in a row say so.
 
-use core::ops::Range;
-
 use bytemuck::{must_cast_slice, must_cast_slice_mut};
 use glam::Vec4;
 
 use crate::copy::copy;
-use crate::element::{ElementMaterial, Extremes, LOOK_CYCLE, NoVisitor, NodeInertia};
+use crate::element::{ElementMaterial, Extremes};
 use crate::loads::LoadsOverTime;
 use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
-use crate::step::{
-    CallingThread, Cause, Computed, Divergence, Forcing, Moving, Status, Step, StepMethod, Threads, Totals, Trial,
-    move_in_parts, moved,
-};
+use crate::step::{CallingThread, Cause, Divergence, Status, Step, Threads, Trial};
 
 use super::critical::each_rate;
+use super::relaxation::{NodeMotion, Relaxation, go_back};
 use super::stop_in;
 
 /// Share of the largest stable stiffness that is taken.
@@ -323,8 +319,9 @@ impl Run<'_> {
             copy(begin, state.displacement);
             *is_fine = settled.remaining < FINE * farthest(&[], state.displacement);
         }
+        let time = state.progress.time;
         if bounds.is_due(&extremes) && !bounds.look(scene, state) {
-            settled.status = Status::Diverged(Divergence { time: 0.0, node: 0, cause: Cause::NotFinite });
+            settled.status = Status::Diverged(Divergence { time, node: 0, cause: Cause::NotFinite });
             return false;
         }
         true
@@ -347,21 +344,6 @@ impl Run<'_> {
     }
 }
 
-/// Puts the nodes where the kinetic energy was largest, half a step before the last but one, at a stop.
-fn go_back<M: ElementMaterial>(scene: SceneView<'_, M>, state: StateView<'_>, node: NodeMotion, rates: &[f32]) {
-    let StateView { displacement, remainder, increment, force, progress, .. } = state;
-    let vectors = displacement.iter_mut().zip(remainder).zip(increment).zip(&*force);
-    for (((((at, left), last), force), inertia), rate) in vectors.zip(scene.inertia).zip(rates) {
-        for axis in 0..3 {
-            let before = last.0[axis] - node.push * force.0[axis] / rate;
-            let back = if inertia.inverse[axis] > 0.0 { last.0[axis] + 0.5 * before } else { 0.0 };
-            [at.0[axis], left.0[axis]] = moved(at.0[axis], left.0[axis], -back);
-            last.0[axis] = 0.0;
-        }
-    }
-    progress.dt = 0.0;
-}
-
 /// The largest distance of a node between two states, of which the first one may be that at rest, m.
 fn farthest(before: &[NodeVector], now: &[NodeVector]) -> f32 {
     let square = |(before, now): (&NodeVector, &NodeVector)| {
@@ -370,137 +352,4 @@ fn farthest(before: &[NodeVector], now: &[NodeVector]) -> f32 {
     };
     let before = before.iter().chain(core::iter::repeat(&NodeVector::ZERO));
     libm::sqrtf(before.zip(now).map(square).fold(0.0, f32::max))
-}
-
-/// How a force moves a node.
-#[derive(Clone, Copy)]
-struct NodeMotion {
-    /// `b_a / s_a`.
-    push: f32,
-}
-
-impl NodeMotion {
-    #[inline(always)]
-    fn next(self, inertia: &NodeInertia, rate: f32, increment: &NodeVector, force: &NodeVector) -> [f32; 4] {
-        let (mut next, share) = ([0.0; 4], self.push / rate);
-        for (axis, inverse) in inertia.inverse.into_iter().enumerate() {
-            let moved = increment.0[axis] + share * force.0[axis];
-            next[axis] = if inverse > 0.0 { moved } else { 0.0 };
-        }
-        next
-    }
-}
-
-/// One step.
-struct Relaxation<'a, T> {
-    step: &'a Step,
-    node: NodeMotion,
-    rates: &'a [f32],
-    threads: &'a T,
-    /// Whether motions are so small that rounding of the displacements matters.
-    is_fine: bool,
-}
-
-impl<T> Relaxation<'_, T> {
-    /// The inertia of a node in this step, kg.
-    fn inertia(&self, inertia: &NodeInertia, rate: f32) -> NodeInertia {
-        NodeInertia { mass: rate / self.node.push * self.step.push(), ..*inertia }
-    }
-
-    /// The sums of these nodes.
-    fn sums(
-        &self,
-        nodes: Range<usize>,
-        inertia: &[NodeInertia],
-        increment: &[NodeVector],
-        force: &[NodeVector],
-    ) -> Totals {
-        let mut totals = Totals::default();
-        let of_nodes = [increment.get(nodes.clone()).unwrap_or_default(), force];
-        let (inertia, rates) =
-            (inertia.get(nodes.clone()).unwrap_or_default(), self.rates.get(nodes).unwrap_or_default());
-        for (((inertia, rate), increment), force) in inertia.iter().zip(rates).zip(of_nodes[0]).zip(of_nodes[1]) {
-            let next = self.node.next(inertia, *rate, increment, force);
-            totals.add_node(self.step, inertia, rate / self.node.push, increment, force, &next);
-        }
-        totals
-    }
-}
-
-impl<M: ElementMaterial, T: Threads> StepMethod<M> for Relaxation<'_, T> {
-    const ENERGY_CYCLE: usize = 2048;
-
-    fn compute(&mut self, trial: &mut Trial<'_, M>) -> Computed {
-        let Trial { scene, loads, displacement, remainder, is_heated, increment, force, volume, progress, .. } =
-            &mut *trial;
-        let (inertia, scene) = (scene.inertia, *scene);
-        let forcing = Forcing {
-            scene,
-            visitor: NoVisitor,
-            displacement,
-            remainder,
-            is_heated: *is_heated,
-            loads,
-            progress,
-            look_cycle: LOOK_CYCLE,
-        };
-        let own = Relaxation { step: self.step, node: self.node, rates: self.rates, threads: &(), is_fine: false };
-        let sums_of = |nodes, force: &[NodeVector], _: &mut [()]| own.sums(nodes, inertia, increment, force);
-        let (sums, extremes) = forcing.in_parts(volume, force, &mut [], self.threads, sums_of);
-        let mut totals = Totals::of_all(&sums);
-        if trial.loads.contact().is_some() {
-            trial.meet_instruments(self.step, self, &mut totals);
-            let Trial { increment, force, .. } = &*trial;
-            // Pushes have changed them, and their masses are not those that gravity acts on.
-            totals.replace_sums(&own.sums(0..inertia.len(), inertia, increment, force));
-        }
-        Computed { totals, extremes }
-    }
-
-    fn next_increment(
-        &self,
-        node: usize,
-        inertia: &NodeInertia,
-        increment: &NodeVector,
-        force: &NodeVector,
-    ) -> [f32; 4] {
-        self.rates.get(node).map_or([0.0; 4], |rate| self.node.next(inertia, *rate, increment, force))
-    }
-
-    fn needs_remainders(&self) -> Option<bool> {
-        Some(self.is_fine)
-    }
-
-    fn inertia_of(&self, node: usize, inertia: &NodeInertia) -> NodeInertia {
-        self.rates.get(node).map_or(*inertia, |rate| self.inertia(inertia, *rate))
-    }
-
-    fn meets_instruments(&self, trial: &Trial<'_, M>) -> bool {
-        trial.surface().triangles().is_empty() || trial.has_room_for_pushes()
-    }
-
-    fn refused_load(&self, trial: &Trial<'_, M>) -> Option<(u32, Cause)> {
-        trial.tearing_force(self.step, self)
-    }
-
-    fn advance(&mut self, trial: &mut Trial<'_, M>) {
-        let Trial { scene, displacement, remainder, increment, force, .. } = trial;
-        let moving = Moving { displacement, remainder, increment };
-        let (inertia, force, rates, node) = (scene.inertia, &**force, self.rates, self.node);
-        move_in_parts(scene.elements().partitions, moving, self.threads, |nodes, moving| {
-            let (inertia, force) = (inertia.get(nodes.clone()), force.get(nodes.clone()));
-            let Moving { displacement, remainder, increment } = moving;
-            let rows = displacement.iter_mut().zip(remainder).zip(increment);
-            let of_nodes = inertia.unwrap_or_default().iter().zip(force.unwrap_or_default());
-            for ((((at, left), last), (inertia, force)), rate) in
-                rows.zip(of_nodes).zip(rates.get(nodes).unwrap_or_default())
-            {
-                let next = node.next(inertia, *rate, last, force);
-                for axis in 0..3 {
-                    [at.0[axis], left.0[axis]] = moved(at.0[axis], left.0[axis], next[axis]);
-                    last.0[axis] = next[axis];
-                }
-            }
-        });
-    }
 }
