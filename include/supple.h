@@ -51,7 +51,7 @@
     (SUPPLE_STATE_FRONT + ((element) == SUPPLE_LINEAR ? 4 : 5) * SUPPLE_ARRAY_(nodes, 16))
 #define SUPPLE_LOADS_SIZE(forces, motions) (SUPPLE_LOADS_FRONT + SUPPLE_ARRAY_(forces, 20) + 2 * SUPPLE_ARRAY_(motions, 24))
 #define SUPPLE_PRESSURE_SIZE(triangles, surfaces) \
-    (SUPPLE_PRESSURE_FRONT + SUPPLE_ARRAY_(triangles, 52) + SUPPLE_ARRAY_(surfaces, 8))
+    (SUPPLE_PRESSURE_FRONT + SUPPLE_ARRAY_(triangles, 52) + SUPPLE_ARRAY_(surfaces, 16))
 #define SUPPLE_SETTLE_SIZE(nodes) ((size_t)16 * (2 * (size_t)(nodes) + ((size_t)(nodes) + 3) / 4))
 #define SUPPLE_LEARNED_SIZE(nodes, fallback) (SUPPLE_LEARNED_FRONT + SUPPLE_ARRAY_(nodes, (fallback) ? 96 : 48))
 #define SUPPLE_LARGE_SIZE(nodes, elements, x, y, z) (SUPPLE_LARGE_FRONT + SUPPLE_ARRAY_(1, 104 * (size_t)(nodes) +             \
@@ -1780,6 +1780,19 @@ supple_status supple_pressure_set(supple_pressure *pressure,
                                   float ramp);
 
 /**
+ * Asks for the volume within a closed surface, of a body or of a cavity: in addition to its pressure there is one from
+ * within, `bulk` times the share of the volume that is missing. At rest the volume is short of that by the pressure that
+ * the tissue needs over `bulk`. A bulk of up to five times Young's modulus is within the margin of exact steps.
+ *
+ * @param cubic_metres m^3, above zero.
+ * @param bulk Pa; 0: the volume is not asked for.
+ */
+supple_status supple_pressure_fill(supple_pressure *pressure,
+                                   uint32_t surface,
+                                   float cubic_metres,
+                                   float bulk);
+
+/**
  * Lets pressures act where these loads do, as long as both are there; NULL: none do. A copy of the loads has the same
  * pressures.
  */
@@ -1787,15 +1800,17 @@ supple_status supple_set_pressure(supple_loads *loads,
                                   const supple_pressure *pressure);
 
 /**
- * Writes the volume within a closed surface at the displacements of a state: positive around a body, negative around a
- * cavity, whose triangles face inward.
+ * Writes the volume within a closed surface at the displacements of a state, of a body or of a cavity, and the pressure
+ * on it at its time, with what fills it.
  *
- * @param cubic_metres receives it, m^3.
+ * @param cubic_metres may be NULL; receives the volume, m^3.
+ * @param pascal may be NULL; receives the pressure, Pa, positive where it presses the tissue.
  */
-supple_status supple_pressure_volume(const supple_pressure *pressure,
-                                     const supple_state *state,
-                                     uint32_t surface,
-                                     double *cubic_metres);
+supple_status supple_pressure_now(const supple_pressure *pressure,
+                                  const supple_state *state,
+                                  uint32_t surface,
+                                  double *cubic_metres,
+                                  float *pascal);
 
 /**
  * Takes `count` exact steps. Stops at the first that is not to be believed: that one is not taken, the state is as

@@ -940,10 +940,23 @@ public:
         return detail::of(supple_pressure_set(raw_, surface, pascal, ramp));
     }
 
-    // Volume within a closed surface, m^3; negative around a cavity.
+    // Asks for the volume within a closed surface, m^3, with a stiffness, Pa; of zero: no more.
+    status fill(float cubic_metres, float bulk, std::uint32_t surface = 0) const noexcept {
+        return detail::of(supple_pressure_fill(raw_, surface, cubic_metres, bulk));
+    }
+
+    // Volume within a closed surface, m^3.
     [[nodiscard]] result<double> volume(state at, std::uint32_t surface = 0) const noexcept {
         result<double> found{};
-        found.status = detail::of(supple_pressure_volume(raw_, at.raw(), surface, &found.value));
+        found.status = detail::of(supple_pressure_now(raw_, at.raw(), surface, &found.value, nullptr));
+        found.error = detail::nothing(found.status);
+        return found;
+    }
+
+    // The pressure on a surface with what fills it, Pa.
+    [[nodiscard]] result<float> now(state at, std::uint32_t surface = 0) const noexcept {
+        result<float> found{};
+        found.status = detail::of(supple_pressure_now(raw_, at.raw(), surface, nullptr, &found.value));
         found.error = detail::nothing(found.status);
         return found;
     }

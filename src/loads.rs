@@ -91,6 +91,15 @@ pub enum LoadError {
         /// The ramp, s.
         value: f32,
     },
+    /// A volume that is to be filled cannot be.
+    Filling {
+        /// Position in the list of surfaces.
+        index: usize,
+        /// The volume, m^3, which must be above zero.
+        volume: f32,
+        /// The stiffness, Pa, which must be zero or more.
+        bulk: f32,
+    },
     /// A triangle is of a surface that has no pressure.
     Surface {
         /// Position in the list of triangles.
@@ -123,6 +132,10 @@ impl fmt::Display for LoadError {
             Self::Ramp { kind, index, value } => {
                 write!(f, "{kind} {index}: the ramp is {value} s, it must be zero or more")
             }
+            Self::Filling { index, volume, bulk } => write!(
+                f,
+                "pressure {index}: filling to {volume} m^3 with {bulk} Pa; the volume must be positive, the stiffness zero or more"
+            ),
             Self::Surface { index, surface, surfaces } => {
                 write!(f, "pressure triangle {index}: surface {surface} does not exist, there are {surfaces}")
             }

@@ -8,6 +8,17 @@
 //! or from within a cavity. The forces on a closed surface have no sum and no moment. They are taken at the start of a
 //! step, as all forces are, and their work `f . b` enters the energy balance ([`crate::step::EnergyBalance`]).
 //!
+//! **Organs that fill.** With a volume `V*` (m^3) that a closed surface shall have, and a stiffness `B` (Pa), the pressure
+//! within, which acts in addition, is `B (V* - V) / V*`. At rest the volume is short of `V*` by the pressure that the
+//! tissue needs over `B`. It is taken at the start of a step as well, so that `B` is bounded by the step `h`, with the
+//! area `g` of each node (m^2, a vector) and its mass `m`:
+//!
+//! ```text
+//! B sum |g|^2 / m < V* (2 / h)^2 / 5
+//! ```
+//! of which exact steps have the margin: five times Young's modulus of the wall is within it for a shell as thick as its
+//! cavity. With too much the motion grows until the energy balance refuses a step.
+//!
 //! The stiffness of a pressure that follows is about `p` times a length, that of tissue `E` times it, and the bound of
 //! [`crate::tled::critical_step`] knows nothing of it: pressures up to a tenth of Young's modulus are within the margin
 //! that exact steps have. A pressure that moves a node by more than the size of its tissue in one step is refused.
@@ -40,6 +51,10 @@ pub struct SurfacePressure {
     pub pascal: f32,
     /// Ramp, s ([`crate::loads::ramp_factor`]).
     pub ramp: f32,
+    /// Volume that a closed surface shall have, m^3, whichever side the tissue is on.
+    pub volume: f32,
+    /// With which stiffness, Pa; zero: the volume is not asked for.
+    pub bulk: f32,
 }
 
 impl PressedTriangle {
@@ -80,11 +95,26 @@ impl PressedTriangle {
 }
 
 impl SurfacePressure {
+    /// A pressure (Pa) with a ramp (s).
+    #[must_use]
+    pub const fn new(pascal: f32, ramp: f32) -> Self {
+        Self { pascal, ramp, volume: 0.0, bulk: 0.0 }
+    }
+
+    /// What fills a closed surface to a volume (m^3) with a stiffness (Pa) over a ramp (s).
+    #[must_use]
+    pub const fn filling(volume: f32, bulk: f32, ramp: f32) -> Self {
+        Self { pascal: 0.0, ramp, volume, bulk }
+    }
+
     /// Checks entry `index` of a list.
     pub fn check(&self, index: usize) -> Result<(), LoadError> {
-        let Self { pascal, ramp } = *self;
-        if !pascal.is_finite() {
-            return Err(LoadError::NotFinite { kind: "pressure", index, value: pascal });
+        let Self { pascal, ramp, volume, bulk } = *self;
+        if let Some(value) = [pascal, volume, bulk].into_iter().find(|value| !value.is_finite()) {
+            return Err(LoadError::NotFinite { kind: "pressure", index, value });
+        }
+        if bulk < 0.0 || (bulk > 0.0 && volume <= 0.0) {
+            return Err(LoadError::Filling { index, volume, bulk });
         }
         if !(ramp.is_finite() && ramp >= 0.0) {
             return Err(LoadError::Ramp { kind: "pressure", index, value: ramp });
@@ -130,10 +160,14 @@ impl<'a> Pressure<'a> {
         Self { triangles, surfaces }
     }
 
-    /// The volume (m^3) within a closed surface at these displacements (m): positive if its triangles face outward, as
-    /// those around a body do; those around a cavity face inward.
+    /// The volume (m^3) within a closed surface at these displacements (m), of a body or of a cavity.
     #[must_use]
     pub fn volume(&self, surface: usize, displacement: &[NodeVector]) -> f64 {
+        libm::fabs(self.signed_volume(surface, displacement))
+    }
+
+    /// The same: negative for a cavity, whose triangles face inward.
+    fn signed_volume(&self, surface: usize, displacement: &[NodeVector]) -> f64 {
         let own = self.triangles.iter().filter(|triangle| triangle.surface as usize == surface);
         // From a point near all of them, so that nothing cancels.
         let origin = own.clone().next().map_or(Vec3::ZERO, |triangle| triangle.placed(displacement)[0]);
@@ -142,6 +176,20 @@ impl<'a> Pressure<'a> {
             f64::from((a - origin).dot(to_b.cross(to_c))) / 6.0
         })
         .sum()
+    }
+
+    /// The pressure on a surface at `time` (s) and these displacements (m), Pa: with what it takes to fill it.
+    #[must_use]
+    pub fn pascal(&self, surface: usize, time: f64, displacement: &[NodeVector]) -> f32 {
+        let Some(&SurfacePressure { pascal, ramp, volume, bulk }) = self.surfaces.get(surface) else { return 0.0 };
+        let mut all = pascal;
+        if bulk > 0.0 {
+            let (now, wanted) = (self.signed_volume(surface, displacement), f64::from(volume));
+            let filling = bulk * ((wanted - libm::fabs(now)) / wanted) as f32;
+            // From within: against the tissue around a cavity, outward on a body.
+            all += if now < 0.0 { filling } else { -filling };
+        }
+        ramp_factor(time, ramp) * all
     }
 
     /// Calls `with` with the nodes of each triangle, the force on each of them at `time` (s), N, and its surface.
@@ -156,12 +204,39 @@ impl<'a> Pressure<'a> {
         let (mut of, mut sixth) = (u32::MAX, 0.0);
         for triangle in self.triangles {
             if triangle.surface != of {
-                let pressure = self.surfaces.get(triangle.surface as usize).copied().unwrap_or_default();
-                (of, sixth) = (triangle.surface, -ramp_factor(time, pressure.ramp) * pressure.pascal / 6.0);
+                of = triangle.surface;
+                sixth = -self.pascal(of as usize, time, displacement) / 6.0;
             }
             if is_wanted(&triangle.nodes) {
                 let [_, to_b, to_c] = triangle.placed(displacement);
                 with(triangle.nodes, sixth * to_b.cross(to_c), of as usize);
+            }
+        }
+    }
+
+    /// Adds bounds of their stiffness at these displacements to those of the nodes, N/m: of the turning and growing of
+    /// triangles with the longest edge `l` a third of `p l` at each corner, and of filling `B g g^T / V*`, with the sum
+    /// of all areas for one of the two.
+    pub(crate) fn add_stiffness(&self, time: f64, displacement: &[NodeVector], rates: &mut [f32]) {
+        let areas = |triangle: &PressedTriangle| {
+            let [_, to_b, to_c] = triangle.placed(displacement);
+            (0.5 * to_b.cross(to_c).length(), to_b.length().max(to_c.length()).max(to_b.distance(to_c)))
+        };
+        let (mut of, mut pascal, mut filling) = (u32::MAX, 0.0, 0.0);
+        for triangle in self.triangles {
+            if triangle.surface != of {
+                of = triangle.surface;
+                let SurfacePressure { volume, bulk, .. } = self.surfaces.get(of as usize).copied().unwrap_or_default();
+                pascal = self.pascal(of as usize, time, displacement).abs();
+                let own = self.triangles.iter().filter(|triangle| triangle.surface == of);
+                let all: f32 = if bulk > 0.0 { own.map(|triangle| areas(triangle).0).sum() } else { 0.0 };
+                filling = if bulk > 0.0 { bulk * all / volume } else { 0.0 };
+            }
+            let (area, longest) = areas(triangle);
+            for node in triangle.nodes {
+                if let Some(rate) = rates.get_mut(node as usize) {
+                    *rate += (pascal * longest + filling * area) / 3.0;
+                }
             }
         }
     }
@@ -178,11 +253,6 @@ impl<'a> Pressure<'a> {
                 }
             }
         });
-    }
-
-    /// The pressure on a surface at `time`, s.
-    pub(crate) fn pascal(&self, surface: usize, time: f64) -> f32 {
-        self.surfaces.get(surface).map_or(0.0, |pressure| ramp_factor(time, pressure.ramp) * pressure.pascal)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::loads::LoadError;
 use crate::pressure::{PressedTriangle, Pressure, SurfacePressure};
 
 use super::loads::supple_loads;
-use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, place_for};
+use super::memory::{self, Arrays, Head, Layout, Object, Place, array, magic, place_for, place_if_wanted};
 use super::scene::{OpenScene, supple_scene};
 use super::state::{supple_state, vectors};
 use super::status::{Answer, mismatch, status_of, supple_error, supple_status};
@@ -108,15 +108,46 @@ pub unsafe extern "C" fn supple_pressure_set(
     ramp: f32,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
+    unsafe { change(pressure, surface, |old| SurfacePressure { pascal, ramp, ..old }) }
+}
+
+/// Asks for the volume within a closed surface, of a body or of a cavity: in addition to its pressure there is one from
+/// within, `bulk` times the share of the volume that is missing. At rest the volume is short of that by the pressure that
+/// the tissue needs over `bulk`. A bulk of up to five times Young's modulus is within the margin of exact steps.
+///
+/// @param cubic_metres m^3, above zero.
+/// @param bulk Pa; 0: the volume is not asked for.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn supple_pressure_fill(
+    pressure: *mut supple_pressure,
+    surface: u32,
+    cubic_metres: f32,
+    bulk: f32,
+) -> supple_status {
+    // SAFETY: what the header asks of the caller.
+    unsafe { change(pressure, surface, |old| SurfacePressure { volume: cubic_metres, bulk, ..old }) }
+}
+
+/// Changes the pressure of a surface.
+///
+/// # Safety
+/// As at [`memory::change`].
+unsafe fn change(
+    pressure: *mut supple_pressure,
+    surface: u32,
+    to: impl FnOnce(SurfacePressure) -> SurfacePressure,
+) -> supple_status {
+    // SAFETY: the caller's promise; entries were written when it was prepared.
     let set = || unsafe {
         let (object, mut arrays) = memory::open(pressure)?;
-        let asked = SurfacePressure { pascal, ramp };
-        asked.check(surface as usize)?;
+        let count = object.surfaces.into();
         arrays.change::<PressedTriangle>(object.triangles as usize);
         let surfaces = arrays.change::<SurfacePressure>(object.surfaces as usize);
-        let count = object.surfaces.into();
         let place = surfaces.get_mut(surface as usize);
-        *place.ok_or(supple_error::from(SUPPLE_E_CAPACITY).value(surface.into(), count))? = asked;
+        let place = place.ok_or(supple_error::from(SUPPLE_E_CAPACITY).value(surface.into(), count))?;
+        let asked = to(*place);
+        asked.check(surface as usize)?;
+        *place = asked;
         Ok(SUPPLE_OK)
     };
     status_of(set())
@@ -144,26 +175,34 @@ pub unsafe extern "C" fn supple_set_pressure(
     status_of(set())
 }
 
-/// Writes the volume within a closed surface at the displacements of a state: positive around a body, negative around a
-/// cavity, whose triangles face inward.
+/// Writes the volume within a closed surface at the displacements of a state, of a body or of a cavity, and the pressure
+/// on it at its time, with what fills it.
 ///
-/// @param cubic_metres receives it, m^3.
+/// @param cubic_metres may be NULL; receives the volume, m^3.
+/// @param pascal may be NULL; receives the pressure, Pa, positive where it presses the tissue.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn supple_pressure_volume(
+pub unsafe extern "C" fn supple_pressure_now(
     pressure: *const supple_pressure,
     state: *const supple_state,
     surface: u32,
     cubic_metres: *mut f64,
+    pascal: *mut f32,
 ) -> supple_status {
     // SAFETY: what the header asks of the caller.
     let tell = || unsafe {
-        let to = place_for(cubic_metres)?;
-        let ([displacement, ..], nodes) = (vectors(state)?, memory::read(state)?.nodes);
-        let there = memory::read(pressure)?.nodes;
-        if nodes != there {
-            return Err(mismatch(nodes as usize, there as usize));
+        let (volume, now) = (place_if_wanted(cubic_metres)?, place_if_wanted(pascal)?);
+        let ([displacement, ..], state) = (vectors(state)?, memory::read(state)?);
+        let (there, surface) = (memory::read(pressure)?.nodes, surface as usize);
+        if state.nodes != there {
+            return Err(mismatch(state.nodes as usize, there as usize));
         }
-        to.write(opened(pressure)?.volume(surface as usize, displacement));
+        let pressure = opened(pressure)?;
+        if let Some(volume) = volume {
+            volume.write(pressure.volume(surface, displacement));
+        }
+        if let Some(now) = now {
+            now.write(pressure.pascal(surface, state.progress.time(), displacement));
+        }
         Ok(SUPPLE_OK)
     };
     status_of(tell())

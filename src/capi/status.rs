@@ -290,6 +290,9 @@ impl From<LoadError> for supple_error {
             }
             LoadError::NotFinite { index, value, .. } => is(SUPPLE_E_NOT_FINITE).at(index).value(value.into(), 0.0),
             LoadError::Ramp { index, value, .. } => is(SUPPLE_E_NEGATIVE).at(index).value(value.into(), 0.0),
+            LoadError::Filling { index, volume, bulk } => {
+                is(SUPPLE_E_NEGATIVE).at(index).value(if bulk < 0.0 { bulk } else { volume }.into(), 0.0)
+            }
             LoadError::Surface { index, surface, surfaces } => {
                 is(SUPPLE_E_CAPACITY).at(index).value(surface.into(), surfaces as f64)
             }

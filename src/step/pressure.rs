@@ -52,10 +52,9 @@ impl<M: ElementMaterial> Trial<'_, M> {
         // Only if it does so by itself: something else may have thrown the node.
         let mut newton = Vec3::ZERO;
         pressure.each(time, displacement, |nodes| nodes.contains(&node), |_, of_triangle, _| newton += of_triangle);
-        let size = scene.node_size(node as usize);
+        let (size, pascal) = (scene.node_size(node as usize), pressure.pascal(surface, time, displacement));
         let way = self.way_of(step, method, node as usize, newton.length().into());
         if way > f64::from(size) {
-            let pascal = pressure.pascal(surface, time);
             self.refused.get_or_insert((node, Cause::Pressure { surface, pascal, size }));
         }
     }

@@ -26,7 +26,7 @@ use glam::Vec4;
 
 use crate::copy::copy;
 use crate::element::{ElementMaterial, Extremes};
-use crate::loads::LoadsOverTime;
+use crate::loads::{Loads, LoadsOverTime};
 use crate::scene::{AsScene, SceneView};
 use crate::simd::NodeVector;
 use crate::state::{AsState, StateView};
@@ -160,7 +160,11 @@ pub fn settle_in_parts<M: ElementMaterial>(
     }
     let rates = must_cast_slice_mut(rates).get_mut(..nodes).unwrap_or_default();
     let mut bounds = Bounds { units, rates, share: SHARE, left: 0, between: 1, extremes: Extremes::REST };
-    if !stop_in(scene, state.reborrow()) || !bounds.look(scene, state.reborrow()) {
+    let is_finite = stop_in(scene, state.reborrow()) && {
+        let first = loads.of_step(&state, SECONDS, STEPS_OF_SUPPORTS);
+        bounds.look(scene, &first, state.reborrow())
+    };
+    if !is_finite {
         return Err(SettleError::NotFinite);
     }
     let time = state.progress.time;
@@ -206,19 +210,22 @@ struct Bounds<'a> {
 
 impl Bounds<'_> {
     /// Computes them for the state. Whether they are numbers.
-    fn look<M: ElementMaterial>(&mut self, scene: SceneView<'_, M>, state: StateView<'_>) -> bool {
-        let StateView { displacement, increment, force, volume, .. } = state;
+    fn look<M: ElementMaterial>(&mut self, scene: SceneView<'_, M>, loads: &Loads<'_>, state: StateView<'_>) -> bool {
+        let StateView { displacement, increment, force, volume, progress, .. } = state;
         let (rates, mut finite) = (&mut *self.rates, true);
-        let vectors = [displacement, increment, force];
+        let vectors = [&mut *displacement, increment, force];
         let found = each_rate(scene, must_cast_slice(self.units), vectors, volume, |node, rate| {
             finite &= rate.is_finite();
             if let Some(to) = rates.get_mut(node) {
                 *to = rate.max(f32::MIN_POSITIVE);
             }
         });
+        if let Some(pressure) = loads.pressure() {
+            pressure.add_stiffness(progress.time, displacement, rates);
+        }
         self.left = self.between;
         self.between = (2 * self.between).min(STEPS_BETWEEN_LOOKS);
-        self.extremes = state.progress.extremes;
+        self.extremes = progress.extremes;
         found.is_some() && finite
     }
 
@@ -294,7 +301,7 @@ impl Run<'_> {
     fn take<M: ElementMaterial>(
         &mut self,
         scene: SceneView<'_, M>,
-        loads: &crate::loads::Loads<'_>,
+        loads: &Loads<'_>,
         mut state: StateView<'_>,
         threads: &impl Threads,
     ) -> bool {
@@ -309,7 +316,7 @@ impl Run<'_> {
         settled.steps += 1;
         settled.status = status;
         if !status.is_taken() {
-            return self.retry(scene, state, status);
+            return self.retry(scene, loads, state, status);
         }
         let (kinetic, extremes) = (state.energy_balance.kinetic, state.progress.extremes);
         if swing.enter(kinetic) {
@@ -320,7 +327,7 @@ impl Run<'_> {
             *is_fine = settled.remaining < FINE * farthest(&[], state.displacement);
         }
         let time = state.progress.time;
-        if bounds.is_due(&extremes) && !bounds.look(scene, state) {
+        if bounds.is_due(&extremes) && !bounds.look(scene, loads, state) {
             settled.status = Status::Diverged(Divergence { time, node: 0, cause: Cause::NotFinite });
             return false;
         }
@@ -328,7 +335,13 @@ impl Run<'_> {
     }
 
     /// After a step that was refused: from a stop, with half the step. Whether that may help.
-    fn retry<M: ElementMaterial>(&mut self, scene: SceneView<'_, M>, mut state: StateView<'_>, status: Status) -> bool {
+    fn retry<M: ElementMaterial>(
+        &mut self,
+        scene: SceneView<'_, M>,
+        loads: &Loads<'_>,
+        mut state: StateView<'_>,
+        status: Status,
+    ) -> bool {
         let too_long =
             matches!(status, Status::Diverged(Divergence { cause: Cause::NotFinite | Cause::Energy { .. }, .. }));
         self.halvings += 1;
@@ -340,7 +353,7 @@ impl Run<'_> {
         self.bounds.between = 1;
         (self.swing.steps, self.swing.kinetic) = (0, 0.0);
         copy(self.begin, state.displacement);
-        self.bounds.look(scene, state)
+        self.bounds.look(scene, loads, state)
     }
 }
 

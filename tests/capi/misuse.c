@@ -783,16 +783,19 @@ static void pressures_and_rest(void) {
     REFUSED(SUPPLE_E_CAPACITY, supple_pressure_set(pressure, 2, 1.0f, 0.0f));
     REFUSED(SUPPLE_E_KIND, supple_set_pressure(loads, (supple_pressure *)(void *)state));
     REFUSED(SUPPLE_E_MISMATCH, supple_set_pressure(small_loads, pressure));
-    REFUSED(SUPPLE_E_NULL, supple_pressure_volume(pressure, state, 0, NULL));
-    REFUSED(SUPPLE_E_MISMATCH, supple_pressure_volume(pressure, small_state, 0, &volume));
+    REFUSED(SUPPLE_E_NEGATIVE, supple_pressure_fill(pressure, 0, 0.0f, 1.0f));
+    REFUSED(SUPPLE_E_NEGATIVE, supple_pressure_fill(pressure, 0, 1e-3f, -1.0f));
+    REFUSED(SUPPLE_E_NOT_FINITE, supple_pressure_fill(pressure, 0, NAN, 1.0f));
+    REFUSED(SUPPLE_E_CAPACITY, supple_pressure_fill(pressure, 2, 1e-3f, 1.0f));
+    REFUSED(SUPPLE_E_MISMATCH, supple_pressure_now(pressure, small_state, 0, &volume, NULL));
 
     DONE(supple_set_motions(loads, scene, NULL, 0, NULL));
     DONE(supple_set_forces(loads, NULL, 0, NULL));
     DONE(supple_set_gravity(loads, (const float[3]){0.0f, 0.0f, 0.0f}));
     DONE(supple_state_reset(state));
-    DONE(supple_pressure_volume(pressure, state, 0, &before));
+    DONE(supple_pressure_now(pressure, state, 0, &before, NULL));
     CHECK(fabs(before / (1e-6 * X * Y * Z) - 1.0) < 1e-4);
-    DONE(supple_pressure_volume(pressure, state, 1, &volume));
+    DONE(supple_pressure_now(pressure, state, 1, &volume, NULL));
     CHECK(volume == 0.0);
     DONE(supple_set_pressure(loads, pressure));
     DONE(supple_pressure_set(pressure, 0, 2000.0f, 0.0f));
@@ -809,10 +812,21 @@ static void pressures_and_rest(void) {
     CHECK(supple_settle(scene, loads, state, 1e-5f, 3, NULL, room, enough, &settled) == SUPPLE_BEHIND && settled.steps == 3);
     DONE(supple_settle(scene, loads, state, 1e-5f, 5000, NULL, room, enough, &settled));
     CHECK(settled.remaining < 1e-5f && settled.error.status == SUPPLE_OK);
-    DONE(supple_pressure_volume(pressure, state, 0, &volume));
+    float now = 0.0f;
+    DONE(supple_pressure_now(pressure, state, 0, &volume, &now));
+    CHECK(now == 2000.0f);
     /* Held at both ends: less than a free body, whose bulk modulus is 120 kPa. */
     CHECK(volume < before * (1.0 - 0.004) && volume > before * (1.0 - 0.02));
     printf("pressure: %.2f %% of the volume in %u steps\n", 100.0 * volume / before, (unsigned)settled.steps);
+
+    /* Back to the volume that it had, by a pressure from within that is not much less than the one from outside. */
+    DONE(supple_pressure_fill(pressure, 0, (float)before, 200000.0f));
+    DONE(supple_settle(scene, loads, state, 1e-5f, 5000, NULL, room, enough, &settled));
+    double filled = 0.0;
+    DONE(supple_pressure_now(pressure, state, 0, &filled, &now));
+    CHECK(filled > volume && filled < before && now < 1000.0f && now > 0.0f);
+    CHECK(fabs(2000.0 - 200000.0 * (1.0 - filled / before) - (double)now) < 1.0);
+    DONE(supple_pressure_fill(pressure, 0, 0.0f, 0.0f));
 
     DONE(supple_copy_displacements(state, moved[0], 3 * NODES));
     moved[NODES / 2][1] = INFINITY;

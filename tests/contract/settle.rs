@@ -218,7 +218,7 @@ fn threads_change_no_bit() {
             let mut simulation = Simulation::new(body.points.clone(), body.tets.clone(), material, &fixed).unwrap();
             simulation.gravity = GRAVITY;
             let surface = boundary(body.tets.iter().copied());
-            let pressure = SurfacePressure { pascal: 200.0, ramp: 0.0 };
+            let pressure = SurfacePressure::new(200.0, 0.0);
             simulation.pressures.press(&body.points, &surface, pressure).unwrap();
             let threads = Backwards { parts, most: AtomicUsize::new(0) };
             let settled = simulation.settle_in_parts(TOLERANCE, 60, &threads).unwrap();

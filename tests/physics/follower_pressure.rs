@@ -28,7 +28,7 @@ fn cube(element: Element, pascal: f32, ramp: f32) -> Simulation<'static> {
     let body = Body::irregular([0.03, 0.03, 0.03], [4, 4, 4]);
     let mut simulation = simulation(&body, element, SOFT, &[]);
     let triangles = boundary(body.tets.iter().copied());
-    simulation.pressures.press(&body.points, &triangles, SurfacePressure { pascal, ramp }).unwrap();
+    simulation.pressures.press(&body.points, &triangles, SurfacePressure::new(pascal, ramp)).unwrap();
     simulation
 }
 
@@ -120,7 +120,7 @@ fn a_pressure_turns_with_the_body() {
         .collect();
     for element in ELEMENTS {
         let mut simulation = simulation(&body, element, SOFT, &[]);
-        simulation.pressures.press(&body.points, &end, SurfacePressure { pascal: 100.0, ramp: 0.0 }).unwrap();
+        simulation.pressures.press(&body.points, &end, SurfacePressure::new(100.0, 0.0)).unwrap();
         // About y by a quarter turn: the end looks along x.
         let turned: Vec<_> = body.points.iter().map(|&[x, y, z]| [z - x, y - y, -x - z]).collect();
         simulation.set_displacements(&turned).unwrap();
@@ -211,7 +211,7 @@ fn a_thick_spherical_shell_grows_as_lame_says() {
     for element in ELEMENTS {
         let law = NeoHookean { c: (shear / 2.0) as f32, d: (bulk / 2.0) as f32 };
         let mut simulation = simulation(&body, element, law, &supports);
-        let pressure = SurfacePressure { pascal: pascal as f32, ramp: 0.0 };
+        let pressure = SurfacePressure::new(pascal as f32, 0.0);
         simulation.pressures.press(&body.points, &cavity, pressure).unwrap();
         let settled = simulation.settle(1e-7, 5000).unwrap();
         assert!(settled.at_rest, "{settled:?}");
@@ -229,6 +229,76 @@ fn a_thick_spherical_shell_grows_as_lame_says() {
             assert!(error.abs() < most);
         }
     }
+}
+
+/// A whole shell of eight such parts.
+fn sphere(inner: f64, outer: f64, cells: usize, layers: usize) -> Body {
+    let (part, _) = shell(inner, outer, cells, layers);
+    let mut numbers = BTreeMap::new();
+    let (mut points, mut tets) = (Vec::new(), Vec::new());
+    for mirrored in 0..8 {
+        let mut node = |old: u32| {
+            let point = part.points[old as usize];
+            let point = [0, 1, 2].map(|axis| if mirrored >> axis & 1 == 1 { -point[axis] } else { point[axis] });
+            let key = point.map(|axis| (axis * 1e8).round() as i64);
+            *numbers.entry(key).or_insert_with(|| {
+                points.push(point);
+                points.len() as u32 - 1
+            })
+        };
+        tets.extend(part.tets.iter().map(|tet| tet.map(&mut node)));
+    }
+    let mut body = Body { points, tets };
+    body.tets = body.mesh().tets().collect();
+    body
+}
+
+/// The pressure that Lame's solution takes for the volume that it leads to, and the volume itself.
+#[test]
+fn a_cavity_fills_to_its_volume() {
+    let (inner, outer) = (0.02_f64, 0.04_f64);
+    let body = sphere(inner, outer, 3, 4);
+    let (shear, bulk) = (4_000.0, 8_000.0);
+    let poisson = Moduli { shear, bulk }.poisson_ratio();
+    let young = 2.0 * shear * (1.0 + poisson);
+    // Displacement of the inner surface for each pascal.
+    let cubes = inner.powi(3) / (outer.powi(3) - inner.powi(3));
+    let per_pascal =
+        cubes / young * ((1.0 - 2.0 * poisson) * inner + (1.0 + poisson) * outer.powi(3) / (2.0 * inner * inner));
+    let radius = |node: u32| length(body.points[node as usize].map(f64::from));
+    let cavity: Vec<_> = boundary(body.tets.iter().copied())
+        .into_iter()
+        .filter(|triangle| triangle.iter().all(|&node| radius(node) < inner + 1e-6))
+        .collect();
+    for element in ELEMENTS {
+        let law = NeoHookean { c: (shear / 2.0) as f32, d: (bulk / 2.0) as f32 };
+        let mut simulation = simulation(&body, element, law, &[]);
+        simulation.pressures.press(&body.points, &cavity, SurfacePressure::new(0.0, 0.0)).unwrap();
+        let before = simulation.pressures.volume(0, simulation.displacements());
+        let wanted = 1.01 * before;
+        let stiffness = 5.0 * young;
+        simulation.pressures.surfaces[0] = SurfacePressure::filling(wanted as f32, stiffness as f32, 0.0);
+        let settled = simulation.settle(1e-7, 10_000).unwrap();
+        assert!(settled.at_rest, "{settled:?}");
+        let after = simulation.pressures.volume(0, simulation.displacements());
+        let pascal = stiffness * (1.0 - after / wanted);
+        let area = 3.0 * before / inner;
+        let lame = stiffness * (wanted - before) / (wanted + stiffness * area * per_pascal);
+        println!("{element:?}: volume {:.5} of 1.01, {pascal:.2} Pa, Lame {lame:.2} Pa", after / before);
+        assert!((pascal / lame - 1.0).abs() < 0.1 && after > 1.007 * before && after < wanted);
+        // It stays there in exact steps.
+        simulation.set(Settings { damping: 5.0, ..Settings::default() });
+        for _ in 0..20 {
+            assert!(simulation.advance(0.02).unwrap().is_ok());
+        }
+        let later = simulation.pressures.volume(0, simulation.displacements());
+        assert!((later / after - 1.0).abs() < 1e-3, "{later} {after}");
+    }
+    let bad = SurfacePressure::filling(-1.0, 10.0, 0.0).check(3).unwrap_err().to_string();
+    assert_eq!(
+        bad,
+        "pressure 3: filling to -1 m^3 with 10 Pa; the volume must be positive, the stiffness zero or more"
+    );
 }
 
 /// `W = -p (V - V0)` for a pressure that does not change, whatever the motion.
@@ -273,7 +343,7 @@ fn steps_of_every_kind_come_to_the_same_rest() {
                 damping: 20.0,
                 ..Settings::default()
             });
-            simulation.pressures.press(&body.points, &side, SurfacePressure { pascal: 60.0, ramp: 0.2 }).unwrap();
+            simulation.pressures.press(&body.points, &side, SurfacePressure::new(60.0, 0.2)).unwrap();
             simulation
         };
         let cells = || inertia::Method::new(Cells::Given([1, 1, 2]));
@@ -308,7 +378,7 @@ fn hostile_pressures_are_refused_in_words() {
     let body = Body::bar([0.02, 0.02, 0.04], [2, 2, 4]);
     let mut simulation = simulation(&body, Element::Linear, SOFT, &[]);
     let press = |simulation: &mut Simulation<'_>, triangles: &[[u32; 3]], pascal, ramp| {
-        simulation.pressures.press(&body.points, triangles, SurfacePressure { pascal, ramp })
+        simulation.pressures.press(&body.points, triangles, SurfacePressure::new(pascal, ramp))
     };
     let words = |result: Result<usize, supple::loads::LoadError>| result.unwrap_err().to_string();
     let triangles = boundary(body.tets.iter().copied());
@@ -332,7 +402,7 @@ fn hostile_pressures_are_refused_in_words() {
     assert_eq!(error.to_string(), "pressure triangle 0: surface 0 does not exist, there are 0");
     let before = simulation.state().displacements().to_vec();
     for pascal in [1e13, -1e13, 1e30, f32::MAX] {
-        simulation.pressures.surfaces = vec![SurfacePressure { pascal, ramp: 0.0 }];
+        simulation.pressures.surfaces = vec![SurfacePressure::new(pascal, 0.0)];
         let error = simulation.advance(0.01).unwrap_err();
         println!("{error}");
         assert!(matches!(
@@ -341,6 +411,7 @@ fn hostile_pressures_are_refused_in_words() {
         ));
         assert!(simulation.state().displacements() == before);
         assert!(simulation.settle(1e-5, 100).is_err());
+        simulation.state_mut().reset();
     }
     // Where tissue gives way a pressure blows it up: never in silence.
     let mut blown = cube(Element::NodalPressure, -20_000.0, 0.0);

@@ -81,8 +81,19 @@ def test_a_free_body_shrinks_under_a_pressure_by_its_bulk_modulus():
     found = 1.0 - pressure.volume / volume
     print(f"{found:.6f} of {25.0 / bulk:.6f}")
     assert abs(found / (25.0 / bulk) - 1.0) < 0.01
+    pressure.fill(0.99 * volume, 10 * bulk)
     pressure.pascal = 0.0
     assert pressure.pascal == 0.0
+    assert simulation.settle(1e-7).at_rest
+    missing = 1.0 - pressure.volume / (0.99 * volume)
+    print(f"filled to {pressure.volume / volume:.5f}, {pressure.now:.2f} Pa")
+    # The tissue pushes back with its own bulk modulus.
+    assert abs(pressure.now / (0.01 * bulk * 10 / 11) - 1.0) < 0.02
+    assert abs(-10 * bulk * missing / pressure.now - 1.0) < 1e-3
+    for wrong in ((0.0, 1.0), (1e-5, -1.0), (np.nan, 1.0)):
+        with pytest.raises(supple.InputError, match="fill"):
+            pressure.fill(*wrong)
+    pressure.fill(0.0, 0.0)
     simulation.settle(1e-7)
     assert abs(pressure.volume / volume - 1.0) < 1e-5
 

@@ -284,6 +284,7 @@ class Simulation:
         library.checked(status, error, "pressure")
         for one, (value, time) in zip(made, [*((one._pascal, one._ramp) for one in self._pressures), (pascal, ramp)]):
             library.checked(lib.supple_pressure_set(raw[0], one._surface, value, time), what="pressure")
+            library.checked(lib.supple_pressure_fill(raw[0], one._surface, *one._filling), what="pressure")
         made[-1]._pascal, made[-1]._ramp = pascal, ramp
         library.checked(lib.supple_set_pressure(self._loads, raw[0]))
         self._pressures, self._pressure_memory, self._pressure = made, memory, raw[0]
@@ -582,6 +583,7 @@ class Pressure:
     def __init__(self, simulation: Simulation, surface: int, numbers: NDArray[np.uint32]) -> None:
         self._simulation, self._surface, self._numbers = simulation, surface, numbers
         self._pascal = self._ramp = 0.0
+        self._filling = (0.0, 0.0)
 
     @property
     def pascal(self) -> float:
@@ -600,14 +602,32 @@ class Pressure:
             library.checked(status, what=f"pressure {pascal} Pa, ramp {ramp} s")
             self._pascal, self._ramp = pascal, ramp
 
-    @property
-    def volume(self) -> float:
-        """Within the surface, if it is closed, m^3: positive around a body, negative around a cavity."""
+    def fill(self, volume: float, bulk: float) -> None:
+        """Asks for the volume (m^3) within the surface, which is closed, of a body or of a cavity: in addition to `pascal` there is a pressure from
+        within, `bulk` (Pa) times the share of the volume that is missing. With a bulk of 0 the volume is not asked for."""
         with self._simulation._lock:
             self._check()
-            found = ffi.new("double *")
-            library.checked(lib.supple_pressure_volume(self._simulation._pressure, self._simulation._state, self._surface, found))
-            return float(found[0])
+            status = lib.supple_pressure_fill(self._simulation._pressure, self._surface, volume, bulk)
+            library.checked(status, what=f"fill to {volume} m^3 with {bulk} Pa")
+            self._filling = (volume, bulk)
+
+    @property
+    def volume(self) -> float:
+        """Within the surface, if it is closed, m^3."""
+        return self._now()[0]
+
+    @property
+    def now(self) -> float:
+        """The pressure at present, with what fills the surface, Pa."""
+        return self._now()[1]
+
+    def _now(self) -> tuple[float, float]:
+        with self._simulation._lock:
+            self._check()
+            volume, pascal = ffi.new("double *"), ffi.new("float *")
+            state = self._simulation._state
+            library.checked(lib.supple_pressure_now(self._simulation._pressure, state, self._surface, volume, pascal))
+            return float(volume[0]), float(pascal[0])
 
     def _check(self) -> None:
         if self not in self._simulation._pressures:

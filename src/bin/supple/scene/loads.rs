@@ -55,7 +55,7 @@ pub(crate) fn read_loads(file: &SceneFile, body: &Body) -> Result<Lists, Problem
         }
         let ramp = read_ramp(file, at.get_ref().ramp.as_ref())?;
         let triangles = select_triangles(file, at, "pressure", &at.get_ref().selection(), (body, &boundary))?;
-        let pressure = SurfacePressure { pascal, ramp };
+        let pressure = SurfacePressure::new(pascal, ramp);
         pressures.press(&body.local, &triangles, pressure).map_err(|error| file.problem(at, error))?;
     }
     Ok((supports, forces, motions, pressures))
